@@ -1,0 +1,11 @@
+# Warnings, floating-point rules and sanitizers of every target of this project.
+function(ist_compile_options target)
+  target_compile_options(${target} PRIVATE
+    -Wall -Wextra -Wconversion -Werror
+    # The same bytes on any machine (DESIGN 3.3): nothing is fused or re-associated.
+    -ffp-contract=off)
+  if(IST_SANITIZE)
+    target_compile_options(${target} PRIVATE -fsanitize=${IST_SANITIZE} -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC -fsanitize=${IST_SANITIZE})
+  endif()
+endfunction()

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <ist/mesh.h>
+#include <ist/packing.h>
+#include <ist/tree_view.h>
+
+namespace ist {
+
+/// The bytes of an asset in memory that owns them, aligned to 64 bytes.
+class Asset {
+ public:
+  /// Copies the bytes. Throws Error, naming `name`, unless TreeView::from_bytes accepts them.
+  Asset(std::span<const std::byte> bytes, const std::string& name);
+
+  /// Reads a file written by save(). Throws Error (file, what is wrong, way out).
+  static Asset load(const std::filesystem::path& path);
+
+  /// Writes to a temporary file beside `path` and renames it: the old file or the whole new one
+  /// is there at every moment. Throws Error.
+  void save(const std::filesystem::path& path) const;
+
+  std::span<const std::byte> bytes() const noexcept { return {data_.get(), size_}; }
+  const TreeView& view() const noexcept { return view_; }
+
+ private:
+  struct AlignedDelete {
+    void operator()(std::byte* p) const noexcept;
+  };
+  std::unique_ptr<std::byte[], AlignedDelete> data_;
+  std::size_t size_ = 0;
+  TreeView view_;
+};
+
+/// Packs, calibrates and clusters a closed mesh (DESIGN 1). Same mesh, settings and seed give the
+/// same bytes on any machine and for any number of threads. Cancelling during packing keeps what is
+/// packed; later it throws Error. Throws Error if not one sphere fits.
+Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
+           const ProgressCallback& progress = {});
+
+/// One proven property of an asset.
+struct Invariant {
+  std::string name;  ///< "sphere inside solid", …
+  double worst =
+      0;  ///< largest violation measure, unit as in `meaning`; ≤ 0 is sound unless stated
+  std::string meaning;      ///< what `worst` measures, with its unit
+  std::size_t where = 0;    ///< index of the sphere or node that is worst
+  std::size_t checked = 0;  ///< how many spheres, pairs or nodes were looked at
+  std::size_t violations = 0;
+};
+
+/// Proves every invariant of an asset again, in double, from its bytes and the mesh alone: it
+/// shares no code with packing but the mesh. Throws Error if the asset is of another mesh.
+std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigned threads = 0);
+
+}  // namespace ist

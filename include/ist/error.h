@@ -1,0 +1,15 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace ist {
+
+/// The one exception of the offline stages (import … bake). Its message names the file, the place
+/// and the way out. Queries never throw; they answer with a QueryStatus.
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace ist

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <ist/progress.h>
+#include <ist/solid.h>
+
+namespace ist {
+
+/// How the space is searched for the next spheres (DESIGN 4.1).
+enum class GridMode : std::uint32_t { banded = 0 };
+
+/// What a packing may cost and how far it goes. The first limit met stops it.
+struct PackingSettings {
+  std::size_t max_spheres =
+      10'000;                    ///< count, exactly met unless another limit is first; 0 = no limit
+  double target_coverage = 1.0;  ///< [0, 1] of the solid's volume
+  double min_radius = 0.0;       ///< [u] smaller spheres are not inserted
+  double time_limit = 0.0;  ///< [s] wall clock, 0 = none; the only setting that costs repeatability
+  /// Greedy slack: every sphere is at least (1 − epsilon) times the largest that would fit when its
+  /// round began. 0 = automatic: the library's schedule, fastest at equal coverage.
+  double epsilon = 0.0;
+  GridMode grid = GridMode::banded;
+  std::uint64_t seed = 0;  ///< tie-breaks only; any value packs equally well
+  unsigned threads = 0;    ///< 0 = all cores; never changes the result
+};
+
+/// A sphere in the unit frame of its solid (half-extent of the solid in (½, 1]).
+struct Sphere {
+  float x = 0, y = 0, z = 0;  ///< centre, unit frame
+  float r = 0;                ///< radius, unit frame, rounded down
+};
+
+enum class StopReason : std::uint32_t {
+  sphere_count,
+  coverage,
+  min_radius,
+  time_limit,
+  cancelled,
+  exhausted,  ///< nothing above float resolution fits any more
+};
+
+/// Certified, non-overlapping spheres inside a solid, in insertion order: every prefix is a valid
+/// packing, and under the greedy order a good one of its size.
+struct SpherePacking {
+  UnitFrame frame;
+  std::vector<Sphere> spheres;
+  StopReason stop = StopReason::sphere_count;
+  double coverage = 0;           ///< [0, 1] of the solid's volume
+  double kept_ratio_worst = 1;   ///< min over spheres of radius / largest live bound at insertion
+  double kept_ratio_median = 1;  ///< median of the same
+  bool below_float_noise =
+      false;  ///< radii fell under 1e-4 of the half-extent: certified, not greedy
+  std::size_t rounds = 0;
+};
+
+/// Packs a solid (DESIGN 4.2). Same solid and settings give the same spheres, bit for bit, for any
+/// number of threads (a time limit or cancel excepted). Throws Error on settings out of range.
+SpherePacking pack(const Solid& solid, const PackingSettings& settings = {},
+                   const ProgressCallback& progress = {});
+
+}  // namespace ist

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace ist {
+
+/// Where a long offline stage stands.
+struct Progress {
+  const char* stage = "";   ///< "pack", "calibrate", "cover", "tree"
+  std::size_t spheres = 0;  ///< count so far
+  double coverage = 0;      ///< [0, 1] of the solid's volume covered by inner spheres
+  double radius = 0;        ///< [u] of the spheres being inserted now
+  double fraction = 0;      ///< [0, 1] of this stage's work, an estimate
+  double elapsed = 0;       ///< [s] since the stage began
+};
+
+/// Called from the thread that started the stage, a few times a second at most.
+/// Return false to cancel: packing ends with what is packed so far, which is valid.
+using ProgressCallback = std::function<bool(const Progress&)>;
+
+}  // namespace ist

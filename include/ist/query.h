@@ -1,0 +1,108 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include <ist/pose.h>
+#include <ist/tree_view.h>
+
+namespace ist {
+
+enum class QueryStatus : std::uint32_t {
+  ok = 0,
+  budget_exhausted =
+      1,             ///< a limit of QuerySettings or the workspace's capacity stopped the descent
+  invalid_pose = 2,  ///< NaN, Inf, a quaternion off unit length by > 1e-3, or a scale ≤ 0; all zero
+};
+
+/// Which spheres stand for the solid.
+enum class Measure : std::uint32_t {
+  matched = 0,  ///< effective spheres whose volumes sum to the solid's: the accurate one
+  inner = 1,    ///< inner spheres: a certified lower bound of the true volume
+};
+
+/// Limits on one query. Zero means no limit; with none set the answer is the finished sum.
+struct QuerySettings {
+  Measure measure = Measure::matched;
+  std::uint32_t max_visits = 0;  ///< count of node pairs looked at
+  double deadline_us = 0;        ///< [µs] wall clock from the call; read rarely
+  double relative_error = 0;     ///< stop once (volume_max − volume_min) ≤ this · volume_max
+  double min_radius = 0;         ///< [u] nodes smaller than this are not opened
+};
+
+/// A tree at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
+struct PlacedTree {
+  TreeView tree;
+  Pose pose;
+  double scale = 1;  ///< > 0, about the object's own origin, before the pose
+};
+
+/// Overlap of two placed solids. Gradients are taken with respect to a motion of B, A held still.
+struct Penetration {
+  double volume = 0;  ///< [u³] in the chosen measure
+  double volume_min =
+      0;  ///< [u³] lower bound on that sum, rounding included; not on the true overlap
+  double volume_max = 0;                               ///< [u³] upper bound on that sum, likewise
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the overlap, world; zero if none
+  /// [u²] dV/d(translation of B), world. A k·V penalty pushes B by −k times this, A by the
+  /// opposite.
+  Eigen::Vector3d translation_gradient = Eigen::Vector3d::Zero();
+  /// [u³/rad] dV/d(rotation vector of B about B's origin), world.
+  Eigen::Vector3d rotation_gradient = Eigen::Vector3d::Zero();
+  QueryStatus status = QueryStatus::ok;
+  std::uint32_t node_visits = 0;   ///< node pairs looked at
+  std::uint32_t sphere_pairs = 0;  ///< lenses summed
+};
+
+/// Gap of two placed solids; all zero once inner spheres overlap.
+struct Separation {
+  double distance = 0;      ///< [u] between the inner spheres
+  double distance_min = 0;  ///< [u] the true distance of the solids is at least this, certified
+  double distance_max = 0;  ///< [u] and at most this, certified
+  Eigen::Vector3d point_a = Eigen::Vector3d::Zero();  ///< [u] on A's inner spheres, world
+  Eigen::Vector3d point_b = Eigen::Vector3d::Zero();  ///< [u] on B's inner spheres, world
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();   ///< unit, from A to B, world
+  QueryStatus status = QueryStatus::ok;
+  std::uint32_t node_visits = 0;   ///< node pairs looked at
+  std::uint32_t sphere_pairs = 0;  ///< sphere pairs measured
+};
+
+/// Scratch memory of a query: make one a thread, once. It never changes an answer; a query that
+/// needs more than its capacity stops with budget_exhausted.
+class Workspace {
+ public:
+  /// `capacity`: node pairs that may wait at once; the default serves two trees of 64,000 spheres
+  /// at any pose. Throws std::bad_alloc.
+  explicit Workspace(std::size_t capacity = 1u << 20);
+  ~Workspace();
+  Workspace(Workspace&&) noexcept;
+  Workspace& operator=(Workspace&&) noexcept;
+
+  struct Impl;
+  Impl& impl() noexcept { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Volume, wrench and centroid of the overlap (DESIGN 7). No allocation, lock or exception. Trees
+/// may be shared by threads; the workspace may not.
+Penetration penetration(const PlacedTree& a, const PlacedTree& b, const QuerySettings& settings,
+                        Workspace& workspace) noexcept;
+
+/// Distance with a certified interval and witness points.
+Separation separation(const PlacedTree& a, const PlacedTree& b, const QuerySettings& settings,
+                      Workspace& workspace) noexcept;
+
+struct PenetrationAndSeparation {
+  Penetration penetration;
+  Separation separation;
+};
+
+/// Both in one call: the unified query of the Inner Sphere Trees papers.
+PenetrationAndSeparation query(const PlacedTree& a, const PlacedTree& b,
+                               const QuerySettings& settings, Workspace& workspace) noexcept;
+
+}  // namespace ist

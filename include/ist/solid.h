@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <ist/mesh.h>
+
+namespace ist {
+
+/// Places a solid in the unit cube by a shift and a power of two, so that nothing downstream
+/// depends on the mesh's unit or offset: x_unit = (x − centre) · 2^−exponent (DESIGN 3.1).
+struct UnitFrame {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< [u]
+  int exponent = 0;                                  ///< half-extent in (½, 1] after scaling
+
+  double scale() const;  ///< [u] length of one unit-frame unit, 2^exponent
+  Eigen::Vector3d to_unit(const Eigen::Vector3d& x) const { return (x - centre) / scale(); }
+  Eigen::Vector3d from_unit(const Eigen::Vector3d& x) const { return x * scale() + centre; }
+};
+
+/// The frame whose cube of half-extent in (½, 1] holds the box. Throws Error for an empty,
+/// infinite or zero-size box.
+UnitFrame unit_frame(const Eigen::AlignedBox3d& bounds);
+
+/// Anything that can be packed: a set of points with a signed distance. Implementations are
+/// immutable; every function may be called from many threads at once.
+class Solid {
+ public:
+  virtual ~Solid() = default;
+
+  /// [u] distance to the surface, positive inside, negative outside; 1-Lipschitz. It may
+  /// underestimate the true distance (as CSG by min and max does), never overestimate it.
+  virtual double signed_distance(const Eigen::Vector3d& x) const = 0;
+
+  virtual Eigen::AlignedBox3d bounds() const = 0;    ///< [u] holds the whole solid
+  virtual double volume() const = 0;                 ///< [u³]
+  virtual double volume_error() const { return 0; }  ///< [u³] bound on the error of volume()
+};
+
+/// The solid of a closed mesh: where its winding number is ≥ 1 (DESIGN 3.6). Copies the mesh.
+std::unique_ptr<Solid> make_solid(const ClosedMesh& mesh);
+
+/// Analytic solids. Radii and half-extents [u] must be finite and > 0, else Error.
+std::unique_ptr<Solid> make_ball(const Eigen::Vector3d& centre, double radius);
+std::unique_ptr<Solid> make_box(const Eigen::Vector3d& centre, const Eigen::Vector3d& half_extent);
+/// Torus about the z axis: `major` from the centre to the tube's centre line, `minor` the tube's.
+std::unique_ptr<Solid> make_torus(const Eigen::Vector3d& centre, double major, double minor);
+
+/// Boolean combinations by min and max of signed distances. Their volume is integrated, with the
+/// error that volume_error() states.
+std::unique_ptr<Solid> make_union(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b);
+std::unique_ptr<Solid> make_intersection(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b);
+std::unique_ptr<Solid> make_difference(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b);
+
+}  // namespace ist

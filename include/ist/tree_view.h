@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace ist {
+
+struct AssetHeader;  // the layout: ist/query/asset_layout.h
+
+/// Why bytes were not accepted as an asset.
+enum class AssetStatus : std::uint32_t {
+  ok = 0,
+  too_short,       ///< fewer bytes than the header says
+  misaligned,      ///< the span must start on a 64-byte boundary
+  not_an_asset,    ///< wrong magic
+  other_version,   ///< written by another 0.x format: bake again
+  corrupt_hash,    ///< content differs from its XXH3
+  corrupt_layout,  ///< an offset, count or field out of range
+};
+
+/// One English sentence for a status; never null.
+const char* describe(AssetStatus status) noexcept;
+
+/// A checked, read-only view of an asset's bytes: file, mapped memory or buffer. A value of one
+/// pointer; the bytes must outlive it. Copy freely, share between threads.
+class TreeView {
+ public:
+  TreeView() = default;
+
+  /// Checks everything before use (hash, offsets, counts, finiteness) without allocating. On any
+  /// status but ok, `out` is left empty.
+  static AssetStatus from_bytes(std::span<const std::byte> bytes, TreeView& out) noexcept;
+
+  bool empty() const noexcept { return header_ == nullptr; }
+  std::size_t sphere_count() const noexcept;
+  double volume() const noexcept;  ///< [u³] of the solid
+
+  /// The checked bytes behind the view.
+  const AssetHeader& header() const noexcept { return *header_; }
+
+ private:
+  const AssetHeader* header_ = nullptr;
+};
+
+}  // namespace ist

@@ -1,0 +1,125 @@
+#pragma once
+
+// The .ist asset: one little-endian, offset-only, 64-byte-aligned block. The file, the mapped
+// memory and the device buffer are the same bytes. Offsets count bytes from the start of the file
+// and are multiples of 64; 0 means the array is absent. Unused bytes are zero.
+//
+//   AssetHeader                       512 B
+//   inner spheres                     Sphere4[n]   centre and radius, insertion (greedy) order
+//   cover radii                       float[n]     the solid lies in ∪ B(inner centre, cover)
+//   effective spheres                 Sphere4[n]   centre and radius of the matched set, same order
+//   inner tree                        see TreeHeader
+//   matched tree                      see TreeHeader
+//
+// A tree is implicit and kWidth wide. Level 0 holds the spheres, sixteen to a block; lane l of
+// block b at level k + 1 is a ball around block 16 b + l of level k. The last level is one block.
+// Every level but the last block of each is full.
+
+#include <cstddef>
+#include <cstdint>
+
+namespace ist {
+
+inline constexpr std::uint32_t kFormatMajor = 0;
+inline constexpr std::uint32_t kFormatMinor = 1;
+inline constexpr char kAssetMagic[8] = {'I', 'S', 'T', 'R', 'E', 'E', '\r', '\n'};
+inline constexpr std::size_t kAssetAlignment = 64;
+inline constexpr std::uint32_t kWidth = 16;     ///< balls in a block
+inline constexpr std::uint32_t kMaxLevels = 7;  ///< 16^7 spheres
+/// Radius of an unused lane: no distance makes it overlap anything.
+inline constexpr float kEmptyRadius = -1e30f;
+
+struct Sphere4 {
+  float x = 0, y = 0, z = 0, r = 0;  ///< unit frame
+};
+static_assert(sizeof(Sphere4) == 16);
+
+/// Sixteen balls, structure of arrays. Centres are relative to the block's Origin, so that a small
+/// block keeps all digits of its floats (DESIGN 3.4).
+struct alignas(64) BallBlock {
+  float x[kWidth], y[kWidth], z[kWidth];  ///< unit frame, relative to the block's origin
+  float r[kWidth];  ///< radius; rounded up above level 0; kEmptyRadius if unused
+};
+static_assert(sizeof(BallBlock) == 256);
+
+struct Origin {
+  double x = 0, y = 0, z = 0;  ///< unit frame
+};
+static_assert(sizeof(Origin) == 24);
+
+/// What a node knows of the spheres below it; one per BallBlock of level ≥ 1.
+struct alignas(64) NodeBlock {
+  float volume[kWidth];   ///< Σ of the tree's sphere volumes, unit frame, rounded up; 0 if unused
+  float cover[kWidth];    ///< radius about the ball's centre that holds every cover ball below
+  float overlap[kWidth];  ///< κ: no point lies in more than this many of the tree's spheres below
+};
+static_assert(sizeof(NodeBlock) == 192);
+
+struct LevelHeader {
+  std::uint64_t blocks = 0;   ///< offset of BallBlock[count]
+  std::uint64_t origins = 0;  ///< offset of Origin[count]
+  std::uint64_t nodes = 0;    ///< offset of NodeBlock[count]; 0 at level 0
+  std::uint32_t count = 0;    ///< blocks at this level
+  std::uint32_t reserved = 0;
+};
+static_assert(sizeof(LevelHeader) == 32);
+
+/// One set of spheres as a tree. `volume_sum` is exact to double rounding: the finished sum's cap.
+struct TreeHeader {
+  std::uint64_t sphere_index =
+      0;  ///< offset of uint32[16 · level[0].count]: insertion index of a lane
+  std::uint64_t sphere_cover =
+      0;  ///< offset of float[16 · level[0].count]: cover radii; 0 in the matched tree
+  std::uint32_t sphere_count = 0;
+  std::uint32_t level_count = 0;  ///< ≥ 1
+  double root[4] = {};            ///< bounding ball of all spheres: centre, radius; unit frame
+  double root_cover = 0;          ///< radius about the root centre that holds every cover ball
+  double volume_sum = 0;          ///< Σ of sphere volumes, unit frame
+  float overlap = 1;              ///< κ of the whole tree
+  std::uint32_t reserved = 0;
+  LevelHeader level[kMaxLevels];
+};
+
+struct AssetHeader {
+  char magic[8];
+  std::uint32_t format_major = kFormatMajor;
+  std::uint32_t format_minor = kFormatMinor;
+  std::uint64_t file_bytes = 0;
+  std::uint64_t content_hash = 0;  ///< XXH3-64 of all bytes of the file with this field zero
+  std::uint64_t mesh_hash = 0;     ///< XXH3-64 of the solid's welded, oriented mesh
+  std::uint64_t sphere_count = 0;
+
+  // Frame: x_mesh = x_unit · 2^exponent + centre.
+  double centre[3] = {};  ///< [u]
+  std::int32_t exponent = 0;
+  std::uint32_t flags = 0;  ///< kFlag…
+  double volume = 0;        ///< unit frame, of the solid
+  double volume_error = 0;  ///< unit frame, bound on the error of `volume`
+  double coverage = 0;      ///< [0, 1] by inner spheres
+  double protrusion = 0;    ///< unit frame: no effective sphere sticks further out of the solid
+
+  // What was asked for, so that a cache can tell whether to bake again.
+  std::uint64_t asked_spheres = 0;
+  double asked_coverage = 0;
+  double asked_min_radius = 0;  ///< [u]
+  double asked_epsilon = 0;
+  std::uint64_t asked_seed = 0;
+  std::uint32_t asked_grid = 0;
+  std::uint32_t stop_reason = 0;
+
+  std::uint64_t inner_spheres = 0;      ///< offset of Sphere4[sphere_count]
+  std::uint64_t cover_radii = 0;        ///< offset of float[sphere_count]
+  std::uint64_t effective_spheres = 0;  ///< offset of Sphere4[sphere_count]
+  TreeHeader inner_tree;
+  TreeHeader matched_tree;
+};
+
+inline constexpr std::uint32_t kFlagRepaired = 1u << 0;    ///< the mesh was open and repaired
+inline constexpr std::uint32_t kFlagBelowNoise = 1u << 1;  ///< greedy order ends under float noise
+
+template <class T>
+const T* at(const AssetHeader& header, std::uint64_t offset) noexcept {
+  return reinterpret_cast<const T*>(reinterpret_cast<const std::byte*>(&header) + offset);
+}
+
+}  // namespace ist

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <ist/solid.h>
+
+#include "mesh/mesh_view.h"
+
+namespace ist {
+
+/// Closest point of a triangle mesh.
+struct ClosestPoint {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< unit frame
+  double distance = 0;                              ///< unit frame, ≥ 0
+  std::uint32_t triangle = 0;                       ///< smallest index among equals
+};
+
+/// Where a line parallel to x pierces the surface.
+struct Crossing {
+  double x = 0;  ///< unit frame
+  int sign = 0;  ///< +1: the winding number rises by one towards +x; −1: falls
+};
+
+/// The solid of a closed mesh. All internals live in the unit frame, in double; view() adds float
+/// copies for packing. Immutable; every function may be called from many threads at once.
+class MeshSolid final : public Solid {
+ public:
+  explicit MeshSolid(const ClosedMesh& mesh);
+  ~MeshSolid() override;
+
+  double signed_distance(const Eigen::Vector3d& x) const override;
+  Eigen::AlignedBox3d bounds() const override;
+  double volume() const override;
+  double volume_error() const override;
+
+  const UnitFrame& frame() const;
+  double unit_volume() const;        ///< unit frame³
+  double unit_volume_error() const;  ///< unit frame³
+  std::uint64_t hash() const;        ///< XXH3-64 of vertices and triangles
+  const MeshView& view() const;      ///< plain arrays for host and device code
+
+  /// Exact to double rounding, over every triangle (inner walls included).
+  ClosestPoint closest_point(const Eigen::Vector3d& unit) const;
+  /// Same, but gives up early: returns distance ≥ limit as soon as nothing is closer than `limit`.
+  ClosestPoint closest_point(const Eigen::Vector3d& unit, double limit) const;
+
+  /// Winding number of a point off the surface (any integer; ≥ 1 is inside). Robust: edges and
+  /// vertices on the test ray are counted consistently.
+  int winding_number(const Eigen::Vector3d& unit) const;
+  bool inside(const Eigen::Vector3d& unit) const { return winding_number(unit) >= 1; }
+
+  /// All crossings of the line {(x, y, z) : x ∈ ℝ}, sorted by x (equal x: +1 first). The signs sum
+  /// to zero for every line. Appends nothing; replaces the content of `out`.
+  void line_crossings(double y, double z, std::vector<Crossing>& out) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ist
