@@ -1,0 +1,110 @@
+#pragma once
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+
+namespace ist::benchmark {
+
+/// What a benchmark program measured: rows of named tables, targets met or missed, remarks, and
+/// where it ran. Written as JSON to the path given by --out; without it, printed. tables.py makes
+/// results/README's tables and plots of these files.
+class Report {
+ public:
+  using Json = nlohmann::ordered_json;
+
+  /// Arguments: [--out FILE] [--quick]. Ends the program with code 2 on any other.
+  Report(const std::string& name, int argc, char** argv) {
+    for (int i = 1; i < argc; ++i) {
+      const std::string argument = argv[i];
+      if (argument == "--quick") {
+        quick_ = true;
+      } else if (argument == "--out" && i + 1 < argc) {
+        out_ = argv[++i];
+      } else {
+        std::cerr << "usage: " << name << " [--out FILE] [--quick]\n";
+        std::exit(2);
+      }
+    }
+    json_["benchmark"] = name;
+    json_["commit"] = first_line("git -C '" IST_SOURCE_DIR "' describe --always --dirty");
+    json_["date"] = first_line("date -u +%F");
+    json_["cpu"] = first_line("sed -n 's/^model name.*: //p' /proc/cpuinfo");
+    json_["cores"] = std::thread::hardware_concurrency();
+    json_["compiler"] = compiler();
+    json_["quick"] = quick_;
+    json_["tables"] = Json::object();
+    json_["targets"] = Json::array();
+    json_["remarks"] = Json::array();
+  }
+
+  bool quick() const { return quick_; }
+
+  /// Appends a row, {"column": value, …}, to the table of that title; shows it as it comes.
+  void row(const std::string& table, const Json& values) {
+    json_["tables"][table].push_back(values);
+    std::cerr << table << ": " << values.dump() << "\n";
+  }
+
+  /// A figure that has to reach a limit: value ≥ limit, or value ≤ limit if `at_most`.
+  void target(const std::string& what, double value, double limit, bool at_most = false) {
+    const bool met = at_most ? value <= limit : value >= limit;
+    const Json entry = {{"what", what},
+                        {"value", value},
+                        {"limit", (at_most ? "≤ " : "≥ ") + Json(limit).dump()},
+                        {"met", met}};
+    json_["targets"].push_back(entry);
+    std::cerr << entry.dump() << "\n";
+  }
+
+  /// One sentence that a reader of the figures must know.
+  void remark(const std::string& sentence) { json_["remarks"].push_back(sentence); }
+
+  /// Writes the report; the value is main's exit code. A missed target is reported, not an error:
+  /// figures differ between machines.
+  int write() const {
+    if (out_.empty()) {
+      std::cout << json_.dump(1) << "\n";
+      return 0;
+    }
+    std::ofstream file(out_);
+    file << json_.dump(1) << "\n";
+    file.close();
+    if (!file) {
+      std::cerr << "cannot write " << out_ << "\n";
+      return 1;
+    }
+    return 0;
+  }
+
+ private:
+  static std::string compiler() {
+#ifdef __clang__
+    return "clang " __clang_version__;
+#else
+    return "g++ " __VERSION__;
+#endif
+  }
+
+  static std::string first_line(const std::string& command) {
+    std::string line;
+    if (std::FILE* const pipe = popen((command + " 2>/dev/null").c_str(), "r")) {
+      for (int c = std::fgetc(pipe); c != EOF && c != '\n'; c = std::fgetc(pipe)) {
+        line.push_back(static_cast<char>(c));
+      }
+      pclose(pipe);
+    }
+    return line.empty() ? "unknown" : line;
+  }
+
+  Json json_;
+  std::filesystem::path out_;
+  bool quick_ = false;
+};
+
+}  // namespace ist::benchmark

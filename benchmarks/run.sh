@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Builds every benchmark, runs them one after another and writes benchmarks/results: a JSON file
+# each, tables.md and the plots. Nothing else should run meanwhile.
+# usage: benchmarks/run.sh [--quick] [--build DIR] [--results DIR] [NAME…]
+set -eu
+root=$(cd "$(dirname "$0")/.." && pwd)
+build=$root/build-bench
+results=$root/benchmarks/results
+quick=()
+names=()
+while [ $# -gt 0 ]; do
+  case $1 in
+    --quick) quick=(--quick) ;;
+    --build) build=$2; shift ;;
+    --results) results=$2; shift ;;
+    -*) sed -n '4s/^# //p' "$0" >&2; exit 2 ;;
+    *) names+=("$1") ;;
+  esac
+  shift
+done
+
+cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DIST_BUILD_BENCHMARKS=ON
+cmake --build "$build" --target benchmarks
+mkdir -p "$results"
+if [ ${#names[@]} -eq 0 ]; then
+  for program in "$build"/bin/benchmarks/*; do names+=("$(basename "$program")"); done
+fi
+for name in "${names[@]}"; do
+  echo "== $name"
+  "$build/bin/benchmarks/$name" --out "$results/$name.json" "${quick[@]}"
+done
+python3 "$root/benchmarks/tables.py" "$results"

@@ -1,0 +1,52 @@
+#!/usr/bin/env python3
+"""Makes tables.md and the plots of a folder of benchmark reports (JSON, see report.h)."""
+import json
+import pathlib
+import sys
+
+import plots
+
+
+def cell(value):
+    if isinstance(value, bool):
+        return "yes" if value else "**no**"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value)
+
+
+def markdown_table(rows):
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    for row in rows:
+        lines.append("| " + " | ".join(cell(row.get(c, "–")) for c in columns) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def section(report):
+    quick = ", quick run" if report["quick"] else ""
+    parts = [f"## {report['benchmark']}\n",
+             f"Commit {report['commit']}, {report['date']}{quick}; {report['cpu']}, "
+             f"{report['cores']} cores, {report['compiler']}.\n"]
+    parts += [f"- {remark}" for remark in report["remarks"]]
+    for title, rows in report["tables"].items():
+        parts.append(f"\n### {title}\n\n{markdown_table(rows)}")
+    if report["targets"]:
+        parts.append(f"\n### Targets\n\n{markdown_table(report['targets'])}")
+    return "\n".join(parts)
+
+
+def main(folder):
+    reports = [json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))]
+    text = "# Benchmark results\n\nMade by `benchmarks/run.sh`; do not edit.\n\n"
+    (folder / "tables.md").write_text(text + "\n".join(section(r) for r in reports))
+    for report in reports:
+        plot = getattr(plots, report["benchmark"], None)
+        if plot:
+            plot(report, folder / f"{report['benchmark']}.png")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit("usage: tables.py FOLDER")
+    main(pathlib.Path(sys.argv[1]))

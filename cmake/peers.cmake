@@ -1,0 +1,28 @@
+# Libraries that ist is measured and checked against: FCL and Bullet's double-precision build
+# (tests/oracle, benchmarks). Each is optional; a missing one is named when CMake runs.
+#   ist_peer_fcl, ist_peer_bullet: interface targets, there only when the library was found.
+include_guard(GLOBAL)
+
+find_package(fcl QUIET)
+if(fcl_FOUND)
+  add_library(ist_peer_fcl INTERFACE)
+  target_include_directories(ist_peer_fcl SYSTEM INTERFACE ${FCL_INCLUDE_DIRS})
+  target_link_libraries(ist_peer_fcl INTERFACE fcl ccd Eigen3::Eigen)
+else()
+  message(STATUS "FCL not found (libfcl-dev): no comparison with it")
+endif()
+
+# Debian installs both precisions side by side: the headers follow BT_USE_DOUBLE_PRECISION, the
+# libraries carry the suffix -float64. Linking the plain ones compiles and then reads garbage.
+find_path(IST_BULLET_INCLUDE_DIR btBulletCollisionCommon.h PATH_SUFFIXES bullet)
+find_library(IST_BULLET_COLLISION BulletCollision-float64)
+find_library(IST_BULLET_MATH LinearMath-float64)
+mark_as_advanced(IST_BULLET_INCLUDE_DIR IST_BULLET_COLLISION IST_BULLET_MATH)
+if(IST_BULLET_INCLUDE_DIR AND IST_BULLET_COLLISION AND IST_BULLET_MATH)
+  add_library(ist_peer_bullet INTERFACE)
+  target_include_directories(ist_peer_bullet SYSTEM INTERFACE ${IST_BULLET_INCLUDE_DIR})
+  target_compile_definitions(ist_peer_bullet INTERFACE BT_USE_DOUBLE_PRECISION)
+  target_link_libraries(ist_peer_bullet INTERFACE ${IST_BULLET_COLLISION} ${IST_BULLET_MATH})
+else()
+  message(STATUS "Bullet in double precision not found (libbullet-dev): no comparison with it")
+endif()
