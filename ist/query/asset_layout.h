@@ -4,16 +4,28 @@
 // memory and the device buffer are the same bytes. Offsets count bytes from the start of the file
 // and are multiples of 64; 0 means the array is absent. Unused bytes are zero.
 //
-//   AssetHeader                       512 B
+//   AssetHeader                       832 B
 //   inner spheres                     Sphere4[n]   centre and radius, insertion (greedy) order
 //   cover radii                       float[n]     the solid lies in ∪ B(inner centre, cover)
 //   effective spheres                 Sphere4[n]   centre and radius of the matched set, same order
-//   inner tree                        see TreeHeader
-//   matched tree                      see TreeHeader
+//   inner tree                        as below
+//   matched tree                      as below, without sphere covers
+//
+// A tree, with m(k) = ⌈n / 16^(k+1)⌉ blocks at level k, up to the first level of one block:
+//
+//   sphere index                      uint32[16 m(0)]   insertion index of a lane; 0 if unused
+//   sphere covers                     float[16 m(0)]    cover radius of a lane (inner tree only)
+//   level 0                           BallBlock[m(0)], Origin[m(0)]
+//   level k ≥ 1                       BallBlock[m(k)], Origin[m(k)], NodeBlock[m(k)]
 //
 // A tree is implicit and kWidth wide. Level 0 holds the spheres, sixteen to a block; lane l of
-// block b at level k + 1 is a ball around block 16 b + l of level k. The last level is one block.
-// Every level but the last block of each is full.
+// block b at level k + 1 is a ball around the spheres below block 16 b + l of level k. Every block
+// but the last of each level is full. Sections follow each other in this order without a gap but
+// the padding to 64 bytes, so that n alone gives every offset (place_sections).
+//
+// Centres of spheres and balls are floats of the unit frame. A block's origin is chosen so that the
+// difference of every centre in it and the origin is a float too: origin + offset is the centre
+// exactly, and the leaf spheres are the spheres of the table bit for bit.
 
 #include <cstddef>
 #include <cstdint>
@@ -26,8 +38,12 @@ inline constexpr char kAssetMagic[8] = {'I', 'S', 'T', 'R', 'E', 'E', '\r', '\n'
 inline constexpr std::size_t kAssetAlignment = 64;
 inline constexpr std::uint32_t kWidth = 16;     ///< balls in a block
 inline constexpr std::uint32_t kMaxLevels = 7;  ///< 16^7 spheres
-/// Radius of an unused lane: no distance makes it overlap anything.
+/// Radius and cover radius of an unused lane: no distance makes it overlap anything.
 inline constexpr float kEmptyRadius = -1e30f;
+/// No coordinate, offset or radius of a checked asset is larger than this, unit frame.
+inline constexpr double kMaxExtent = 16;
+/// Volumes [u³] stay finite: |exponent of the frame| is at most this.
+inline constexpr std::int32_t kMaxExponent = 300;
 
 struct Sphere4 {
   float x = 0, y = 0, z = 0, r = 0;  ///< unit frame
@@ -49,9 +65,12 @@ static_assert(sizeof(Origin) == 24);
 
 /// What a node knows of the spheres below it; one per BallBlock of level ≥ 1.
 struct alignas(64) NodeBlock {
-  float volume[kWidth];   ///< Σ of the tree's sphere volumes, unit frame, rounded up; 0 if unused
-  float cover[kWidth];    ///< radius about the ball's centre that holds every cover ball below
-  float overlap[kWidth];  ///< κ: no point lies in more than this many of the tree's spheres below
+  float volume[kWidth];  ///< Σ of the tree's sphere volumes, unit frame, rounded up; 0 if unused
+  /// Inner tree: radius about the ball's centre that holds every cover ball below; kEmptyRadius if
+  /// unused. Matched tree: 0.
+  float cover[kWidth];
+  /// κ: no point lies inside more than this many of the tree's spheres below; 0 if unused.
+  float overlap[kWidth];
 };
 static_assert(sizeof(NodeBlock) == 192);
 
@@ -64,7 +83,7 @@ struct LevelHeader {
 };
 static_assert(sizeof(LevelHeader) == 32);
 
-/// One set of spheres as a tree. `volume_sum` is exact to double rounding: the finished sum's cap.
+/// One set of spheres as a tree.
 struct TreeHeader {
   std::uint64_t sphere_index =
       0;  ///< offset of uint32[16 · level[0].count]: insertion index of a lane
@@ -73,15 +92,16 @@ struct TreeHeader {
   std::uint32_t sphere_count = 0;
   std::uint32_t level_count = 0;  ///< ≥ 1
   double root[4] = {};            ///< bounding ball of all spheres: centre, radius; unit frame
-  double root_cover = 0;          ///< radius about the root centre that holds every cover ball
-  double volume_sum = 0;          ///< Σ of sphere volumes, unit frame
+  double root_cover = 0;          ///< as NodeBlock::cover, about the root's centre
+  double volume_sum = 0;          ///< Σ of sphere volumes in insertion order, unit frame
   float overlap = 1;              ///< κ of the whole tree
   std::uint32_t reserved = 0;
   LevelHeader level[kMaxLevels];
 };
+static_assert(sizeof(TreeHeader) == 304);
 
-struct AssetHeader {
-  char magic[8];
+struct alignas(64) AssetHeader {
+  char magic[8] = {};
   std::uint32_t format_major = kFormatMajor;
   std::uint32_t format_minor = kFormatMinor;
   std::uint64_t file_bytes = 0;
@@ -112,10 +132,59 @@ struct AssetHeader {
   std::uint64_t effective_spheres = 0;  ///< offset of Sphere4[sphere_count]
   TreeHeader inner_tree;
   TreeHeader matched_tree;
+
+  double kept_ratio_worst = 0;   ///< SpherePacking's: inserted radius over the largest live bound
+  double kept_ratio_median = 0;  ///< likewise
+  std::uint64_t reserved[3] = {};
 };
+static_assert(sizeof(AssetHeader) == 832);
 
 inline constexpr std::uint32_t kFlagRepaired = 1u << 0;    ///< the mesh was open and repaired
 inline constexpr std::uint32_t kFlagBelowNoise = 1u << 1;  ///< greedy order ends under float noise
+
+namespace detail {
+
+/// Takes the next section of `count` values and returns its offset.
+template <class T>
+constexpr std::uint64_t take(std::uint64_t& end, std::uint64_t count) noexcept {
+  const std::uint64_t offset = end;
+  end += (count * sizeof(T) + kAssetAlignment - 1) / kAssetAlignment * kAssetAlignment;
+  return offset;
+}
+
+constexpr void place_tree(TreeHeader& tree, bool with_covers, std::uint64_t& end) noexcept {
+  std::uint32_t count = (tree.sphere_count + kWidth - 1) / kWidth;
+  tree.sphere_index = take<std::uint32_t>(end, std::uint64_t{kWidth} * count);
+  tree.sphere_cover = with_covers ? take<float>(end, std::uint64_t{kWidth} * count) : 0;
+  tree.level_count = 0;
+  for (;; count = (count + kWidth - 1) / kWidth) {
+    LevelHeader& level = tree.level[tree.level_count];
+    level.count = count;
+    level.blocks = take<BallBlock>(end, count);
+    level.origins = take<Origin>(end, count);
+    level.nodes = tree.level_count > 0 ? take<NodeBlock>(end, count) : 0;
+    ++tree.level_count;
+    if (count == 1) return;
+  }
+}
+
+}  // namespace detail
+
+/// Most spheres an asset holds: kMaxLevels levels.
+inline constexpr std::uint64_t kMaxSpheres = std::uint64_t{1} << (4 * kMaxLevels);
+
+/// Sets every offset, count and the file size from `sphere_count` in [1, kMaxSpheres].
+constexpr void place_sections(AssetHeader& header) noexcept {
+  const std::uint64_t n = header.sphere_count;
+  std::uint64_t end = sizeof(AssetHeader);
+  header.inner_spheres = detail::take<Sphere4>(end, n);
+  header.cover_radii = detail::take<float>(end, n);
+  header.effective_spheres = detail::take<Sphere4>(end, n);
+  header.inner_tree.sphere_count = header.matched_tree.sphere_count = static_cast<std::uint32_t>(n);
+  detail::place_tree(header.inner_tree, true, end);
+  detail::place_tree(header.matched_tree, false, end);
+  header.file_bytes = end;
+}
 
 template <class T>
 const T* at(const AssetHeader& header, std::uint64_t offset) noexcept {

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "asset/asset_writer.h"
+
+namespace ist {
+
+/// Clusters spheres into an implicit 16-wide tree (asset_layout.h, DESIGN 6). `covers` are the
+/// cover radii of disjoint inner spheres; it is empty for effective spheres, which may overlap, and
+/// κ is bounded for them. Every ball of the tree holds the spheres below it for certain: radii are
+/// rounded up. Same input, same tree, for any number of threads. The set must not be empty.
+TreeArrays build_tree(std::span<const Sphere4> spheres, std::span<const float> covers);
+
+/// The tree whose leaves are the spheres in a given order: lane i holds spheres[order[i]].
+TreeArrays tree_from_order(std::span<const Sphere4> spheres, std::span<const float> covers,
+                           std::vector<std::uint32_t> order);
+
+}  // namespace ist

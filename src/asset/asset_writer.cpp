@@ -1,0 +1,75 @@
+#include "asset/asset_writer.h"
+
+#include <ist/error.h>
+#include <cstring>
+
+#include "query/content_hash.h"
+
+namespace ist {
+namespace {
+
+/// Copies arrays to their offsets in a zeroed block.
+class SectionWriter {
+ public:
+  explicit SectionWriter(std::vector<std::byte>& bytes) : bytes_(bytes) {}
+
+  template <class T>
+  void write(std::uint64_t offset, const std::vector<T>& values, std::uint64_t count) {
+    if (values.size() != count) throw Error("asset: an array's length differs from its count");
+    if (count > 0) std::memcpy(bytes_.data() + offset, values.data(), count * sizeof(T));
+  }
+
+  void write(const TreeHeader& header, const TreeArrays& tree) {
+    const std::uint64_t lanes = std::uint64_t{kWidth} * header.level[0].count;
+    write(header.sphere_index, tree.sphere_index, lanes);
+    write(header.sphere_cover, tree.sphere_cover, header.sphere_cover != 0 ? lanes : 0);
+    if (tree.levels.size() != header.level_count) throw Error("asset: wrong number of levels");
+    for (std::size_t k = 0; k < tree.levels.size(); ++k) {
+      const LevelHeader& level = header.level[k];
+      write(level.blocks, tree.levels[k].blocks, level.count);
+      write(level.origins, tree.levels[k].origins, level.count);
+      write(level.nodes, tree.levels[k].nodes, k > 0 ? level.count : 0);
+    }
+  }
+
+ private:
+  std::vector<std::byte>& bytes_;
+};
+
+void fill_scalars(TreeHeader& header, const TreeArrays& tree) {
+  std::memcpy(header.root, tree.root, sizeof(header.root));
+  header.root_cover = tree.root_cover;
+  header.volume_sum = tree.volume_sum;
+  header.overlap = tree.overlap;
+}
+
+}  // namespace
+
+std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
+  AssetHeader header = arrays.header;
+  header.sphere_count = arrays.inner_spheres.size();
+  if (header.sphere_count < 1 || header.sphere_count > kMaxSpheres)
+    throw Error("asset: it must hold at least one sphere and at most 16^7");
+  std::memcpy(header.magic, kAssetMagic, sizeof(kAssetMagic));
+  place_sections(header);
+  fill_scalars(header.inner_tree, arrays.inner_tree);
+  fill_scalars(header.matched_tree, arrays.matched_tree);
+
+  std::vector<std::byte> bytes(header.file_bytes, std::byte{0});
+  std::memcpy(bytes.data(), &header, sizeof(header));
+  SectionWriter writer(bytes);
+  writer.write(header.inner_spheres, arrays.inner_spheres, header.sphere_count);
+  writer.write(header.cover_radii, arrays.cover_radii, header.sphere_count);
+  writer.write(header.effective_spheres, arrays.effective_spheres, header.sphere_count);
+  writer.write(header.inner_tree, arrays.inner_tree);
+  writer.write(header.matched_tree, arrays.matched_tree);
+  seal(bytes);
+  return bytes;
+}
+
+void seal(std::vector<std::byte>& bytes) {
+  const std::uint64_t hash = content_hash(bytes);
+  std::memcpy(bytes.data() + offsetof(AssetHeader, content_hash), &hash, sizeof(hash));
+}
+
+}  // namespace ist

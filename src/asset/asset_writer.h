@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "query/asset_layout.h"
+
+namespace ist {
+
+/// One level of a tree as it will lie in the file.
+struct TreeLevelArrays {
+  std::vector<BallBlock> blocks;
+  std::vector<Origin> origins;
+  std::vector<NodeBlock> nodes;  ///< empty at level 0
+};
+
+/// One tree as it will lie in the file (asset_layout.h draws it).
+struct TreeArrays {
+  std::vector<std::uint32_t> sphere_index;  ///< [16 · blocks of level 0]
+  std::vector<float> sphere_cover;          ///< the same length; empty in the matched tree
+  std::vector<TreeLevelArrays> levels;
+  double root[4] = {};    ///< centre, radius; unit frame
+  double root_cover = 0;  ///< unit frame
+  double volume_sum = 0;  ///< unit frame
+  float overlap = 1;      ///< κ
+};
+
+/// What an asset is made of.
+struct AssetArrays {
+  AssetHeader header;  ///< scalar fields; offsets, counts, magic and hash are filled in by writing
+  std::vector<Sphere4> inner_spheres;
+  std::vector<float> cover_radii;          ///< the same length
+  std::vector<Sphere4> effective_spheres;  ///< the same length
+  TreeArrays inner_tree;
+  TreeArrays matched_tree;
+};
+
+/// The bytes of the asset. Throws Error unless the arrays' lengths fit each other.
+std::vector<std::byte> asset_bytes(const AssetArrays& arrays);
+
+/// Sets the content hash of bytes that hold at least a header.
+void seal(std::vector<std::byte>& bytes);
+
+}  // namespace ist

@@ -1,0 +1,96 @@
+#include "build/tree_builder.h"
+
+#include <gtest/gtest.h>
+#include <cmath>
+#include <random>
+#include <set>
+
+#include "build/bounding_ball.h"
+
+namespace ist {
+namespace {
+
+std::vector<Sphere4> random_spheres(std::size_t n, unsigned seed) {
+  std::mt19937 bits(seed);
+  const auto unit = [&] { return static_cast<double>(bits()) / 4294967296.0; };
+  std::vector<Sphere4> spheres(n);
+  for (Sphere4& s : spheres) {
+    const auto coordinate = [&] { return static_cast<float>(2 * unit() - 1); };
+    s = {coordinate(), coordinate(), coordinate(), 0};
+    s.r = static_cast<float>(0.1 / (1 + 99 * unit()));
+  }
+  return spheres;
+}
+
+class TreeOfCount : public ::testing::TestWithParam<std::size_t> {};
+
+// Every node's ball holds every sphere and cover ball below it, in double, for any count.
+TEST_P(TreeOfCount, BallsHoldWhatIsBelow) {
+  const std::size_t n = GetParam();
+  const auto spheres = random_spheres(n, static_cast<unsigned>(n));
+  std::vector<float> covers(n);
+  for (std::size_t i = 0; i < n; ++i) covers[i] = spheres[i].r * 1.5f;
+  const TreeArrays tree = build_tree(spheres, covers);
+
+  std::set<std::uint32_t> seen;
+  for (std::size_t i = 0; i < n; ++i) {
+    const BallBlock& block = tree.levels[0].blocks[i / kWidth];
+    const Origin& origin = tree.levels[0].origins[i / kWidth];
+    const Sphere4& s = spheres[tree.sphere_index[i]];
+    EXPECT_TRUE(seen.insert(tree.sphere_index[i]).second);
+    EXPECT_EQ(origin.x + block.x[i % kWidth], s.x);
+    EXPECT_EQ(origin.y + block.y[i % kWidth], s.y);
+    EXPECT_EQ(origin.z + block.z[i % kWidth], s.z);
+    EXPECT_EQ(block.r[i % kWidth], s.r);
+    EXPECT_EQ(tree.sphere_cover[i], covers[tree.sphere_index[i]]);
+  }
+  std::size_t span = kWidth;
+  for (std::size_t k = 1; k < tree.levels.size(); ++k, span *= kWidth) {
+    const TreeLevelArrays& level = tree.levels[k];
+    for (std::size_t i = 0; i < tree.levels[k - 1].blocks.size(); ++i) {
+      const BallBlock& block = level.blocks[i / kWidth];
+      const Origin& origin = level.origins[i / kWidth];
+      const std::size_t l = i % kWidth;
+      double volume = 0;
+      for (std::size_t j = i * span; j < std::min(n, (i + 1) * span); ++j) {
+        const Sphere4& s = spheres[tree.sphere_index[j]];
+        const double d = reach(origin.x + block.x[l], origin.y + block.y[l], origin.z + block.z[l],
+                               {s.x, s.y, s.z, 0});
+        EXPECT_LE(d + s.r, block.r[l]);
+        EXPECT_LE(d + tree.sphere_cover[j], level.nodes[i / kWidth].cover[l]);
+        volume += 4 * M_PI / 3 * s.r * s.r * s.r;
+      }
+      EXPECT_LE(volume, level.nodes[i / kWidth].volume[l]);
+      EXPECT_GE(volume * (1 + 1e-6), level.nodes[i / kWidth].volume[l]);
+    }
+  }
+  EXPECT_EQ(tree.levels.back().blocks.size(), 1u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Counts, TreeOfCount,
+                         ::testing::Values(1, 2, 15, 16, 17, 31, 32, 33, 255, 256, 257, 300, 4095,
+                                           4096, 4097, 5000));
+
+// The ball is as small as a fine search for a better centre can make it.
+TEST(BoundingBall, IsSmallest) {
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    const auto spheres = random_spheres(2 + seed % 40, seed);
+    std::vector<Ball> balls;
+    for (const Sphere4& s : spheres) balls.push_back({s.x, s.y, s.z, s.r});
+    const Ball ball = bounding_ball(balls);
+    const auto radius_about = [&](double x, double y, double z) {
+      double r = 0;
+      for (const Ball& b : balls) r = std::max(r, reach(x, y, z, b));
+      return r;
+    };
+    EXPECT_LE(radius_about(ball.x, ball.y, ball.z), ball.r * (1 + 1e-9));
+    for (int axis = 0; axis < 3; ++axis)  // the radius is convex in the centre
+      for (const double step : {-1e-5, 1e-5})
+        EXPECT_GE(radius_about(ball.x + (axis == 0) * step, ball.y + (axis == 1) * step,
+                               ball.z + (axis == 2) * step),
+                  ball.r * (1 - 1e-9));
+  }
+}
+
+}  // namespace
+}  // namespace ist
