@@ -1,14 +1,11 @@
-#include <fcntl.h>
 #include <ist/bake.h>
 #include <ist/error.h>
-#include <unistd.h>
-#include <atomic>
 #include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <new>
 #include <system_error>
 
+#include "asset/atomic_file.h"
 #include "query/asset_layout.h"
 
 namespace ist {
@@ -17,53 +14,6 @@ namespace {
 constexpr std::align_val_t kAlignment{kAssetAlignment};
 
 std::string reason(int error) { return std::generic_category().message(error); }
-
-/// A file that vanishes unless it is renamed to its final name.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const std::filesystem::path& target) : target_(target) {
-    static std::atomic<unsigned> counter = 0;  // two threads may save to one target
-    do {
-      name_ = target.string() + "." + std::to_string(getpid()) + "." + std::to_string(counter++);
-      descriptor_ = open(name_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    } while (descriptor_ < 0 && errno == EEXIST);
-    if (descriptor_ < 0) fail("cannot create a file in this folder");
-  }
-  ~TemporaryFile() {
-    if (descriptor_ >= 0) close(descriptor_);
-    if (!renamed_) unlink(name_.c_str());
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-
-  void write(std::span<const std::byte> bytes) {
-    while (!bytes.empty()) {
-      const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) fail("cannot write");
-      bytes = bytes.subspan(static_cast<std::size_t>(written));
-    }
-  }
-
-  void rename_to_target() {
-    if (fsync(descriptor_) != 0) fail("cannot write to disk");
-    const int closed = close(descriptor_);
-    descriptor_ = -1;
-    if (closed != 0) fail("cannot write to disk");
-    if (std::rename(name_.c_str(), target_.c_str()) != 0) fail("cannot replace the file");
-    renamed_ = true;
-  }
-
- private:
-  [[noreturn]] void fail(const char* what) {
-    throw Error(target_.string() + ": " + what + ": " + reason(errno));
-  }
-
-  std::filesystem::path target_;
-  std::string name_;
-  int descriptor_ = -1;
-  bool renamed_ = false;
-};
 
 }  // namespace
 
@@ -91,10 +41,6 @@ Asset Asset::load(const std::filesystem::path& path) {
   return Asset(bytes, path.string());
 }
 
-void Asset::save(const std::filesystem::path& path) const {
-  TemporaryFile file(path);
-  file.write(bytes());
-  file.rename_to_target();
-}
+void Asset::save(const std::filesystem::path& path) const { write_atomically(path, bytes()); }
 
 }  // namespace ist

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+// The subcommands of `ist`. Each function adds one, with its options; the callback that it leaves
+// behind does the work when the command line names it. A callback throws ist::Error for what goes
+// wrong (exit 1) and ExitCode to end with another code.
+
+namespace ist::app {
+
+inline constexpr int kExitError = 1;
+inline constexpr int kExitUsage = 2;
+inline constexpr int kExitViolation = 3;
+inline constexpr int kExitInterrupted = 130;
+
+struct ExitCode {
+  int value;
+};
+
+void add_sample(CLI::App& app);
+
+}  // namespace ist::app

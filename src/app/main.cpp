@@ -1,0 +1,31 @@
+#include <fmt/format.h>
+
+#include <exception>
+
+#include <ist/error.h>
+
+#include "app/commands.h"
+
+int main(int argc, char** argv) {
+  using namespace ist::app;
+  CLI::App app(
+      "Sphere packings, inner sphere trees and the volume by which two solids overlap.\n"
+      "Lengths are [u], the mesh's own unit.",
+      "ist");
+  app.set_version_flag("--version", "ist " IST_VERSION);
+  app.require_subcommand(1);
+  app.footer(
+      "Exit codes: 0 done, 1 error, 2 wrong usage, 3 check found a violation, 130 interrupted.");
+  add_sample(app);
+  try {
+    app.parse(argc, argv);
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kExitUsage;
+  } catch (const ExitCode& code) {
+    return code.value;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "ist: {}\n", error.what());
+    return kExitError;
+  }
+}

@@ -1,0 +1,39 @@
+#include "mesh/samples/samples.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "app/commands.h"
+#include "app/write_mesh.h"
+
+namespace ist::app {
+namespace {
+
+struct SampleOptions {
+  std::string name;
+  std::filesystem::path output;
+};
+
+std::string list_of_samples() {
+  std::string list = "NAME is one of\n";
+  for (const Sample& sample : samples())
+    list += fmt::format("  {:<14} {}\n", sample.name, sample.description);
+  return list + "\nExample: ist sample bolt -o bolt.obj";
+}
+
+}  // namespace
+
+void add_sample(CLI::App& app) {
+  const auto options = std::make_shared<SampleOptions>();
+  CLI::App* const command = app.add_subcommand("sample", "Write a closed mesh made on the spot");
+  command->add_option("NAME", options->name, "Which one, see below")->required();
+  command->add_option("-o,--output", options->output, "MESH to write: .obj, .ply, .off or .stl")
+      ->required();
+  command->footer(list_of_samples());
+  command->callback([options] { write_mesh(make_sample(options->name), options->output); });
+}
+
+}  // namespace ist::app
