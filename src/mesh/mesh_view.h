@@ -4,6 +4,28 @@
 
 namespace ist {
 
+constexpr int kBvhWidth = 4;                      ///< children of a node, triangles of a block
+constexpr std::uint32_t kBvhLeaf = 0x80000000u;   ///< flag of a child that is a triangle block
+constexpr std::uint32_t kBvhEmpty = 0xFFFFFFFFu;  ///< child that is not there
+constexpr std::uint32_t kNoTriangle = 0xFFFFFFFFu;
+
+/// Four child boxes of a bounding volume hierarchy. The boxes hold the exact and the float
+/// vertices (rounded outward); an absent child has an empty, infinitely far box.
+struct alignas(64) BvhNode {
+  float lower[3][kBvhWidth];
+  float upper[3][kBvhWidth];
+  std::uint32_t child[kBvhWidth];  ///< node index, kBvhLeaf | block index, or kBvhEmpty
+};
+
+/// Up to four triangles as TriangleFrame<float>s side by side, frames made in double from the
+/// exact vertices and rounded once. Absent ones lie at 1e18 and carry kNoTriangle.
+struct alignas(64) TriangleBlock {
+  float origin[3][kBvhWidth];
+  float u[3][kBvhWidth], v[3][kBvhWidth], n[3][kBvhWidth];
+  float length[kBvhWidth], apex[kBvhWidth], height[kBvhWidth];
+  std::uint32_t triangle[kBvhWidth];
+};
+
 /// Plain arrays of a mesh in its unit frame, for host and device code alike. Owned by MeshSolid.
 struct MeshView {
   const float* vertices = nullptr;           ///< float[3 · vertex_count], unit frame, rounded
@@ -13,6 +35,10 @@ struct MeshView {
   std::uint32_t triangle_count = 0;
   /// No float vertex is further than this from its exact position, unit frame.
   float vertex_error = 0;
+
+  const BvhNode* nodes = nullptr;
+  const TriangleBlock* blocks = nullptr;
+  std::uint32_t root = kBvhEmpty;  ///< coded like BvhNode::child
 };
 
 }  // namespace ist

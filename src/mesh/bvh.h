@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mesh/mesh_view.h"
+
+namespace ist {
+
+/// A bounding volume hierarchy over all triangles of a mesh. Built by binned surface area
+/// heuristic, the same for any number of threads. No query's answer depends on its shape.
+struct Bvh {
+  std::vector<BvhNode> nodes;
+  std::vector<TriangleBlock> blocks;
+  std::uint32_t root = kBvhEmpty;
+};
+
+/// Builds over `triangles` (three indices each) of exact unit-frame vertices (three doubles each).
+Bvh build_bvh(const std::vector<double>& vertices, const std::vector<std::uint32_t>& triangles);
+
+}  // namespace ist

@@ -1,0 +1,151 @@
+#include "mesh/mesh_solid.h"
+
+#include <ist/error.h>
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mesh/bvh.h"
+#include "mesh/exact_closest_point.h"
+#include "mesh/mesh_volume.h"
+#include "mesh/winding.h"
+
+namespace ist {
+
+struct MeshSolid::Impl {
+  UnitFrame frame;
+  Eigen::AlignedBox3d bounds;
+  std::vector<double> vertices;  // unit frame
+  std::vector<float> vertices_float;
+  std::vector<std::uint32_t> triangles;
+  Bvh bvh;
+  MeshView view;
+  MeshVolume volume;
+  std::uint64_t hash = 0;
+};
+
+namespace {
+
+/// Hash over the frame, the counts, the vertices and the triangles.
+std::uint64_t hash_mesh(const UnitFrame& frame, const std::vector<double>& vertices,
+                        const std::vector<std::uint32_t>& triangles) {
+  struct Head {
+    double centre[3];
+    std::int64_t exponent;
+    std::uint64_t vertices, triangles;
+  };
+  const Head head = {{frame.centre.x(), frame.centre.y(), frame.centre.z()},
+                     frame.exponent,
+                     vertices.size(),
+                     triangles.size()};
+  XXH3_state_t* state = XXH3_createState();
+  XXH3_64bits_reset(state);
+  XXH3_64bits_update(state, &head, sizeof head);
+  XXH3_64bits_update(state, vertices.data(), vertices.size() * sizeof(double));
+  XXH3_64bits_update(state, triangles.data(), triangles.size() * sizeof(std::uint32_t));
+  const std::uint64_t hash = XXH3_64bits_digest(state);
+  XXH3_freeState(state);
+  return hash;
+}
+
+}  // namespace
+
+MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>()) {
+  const TriangleMesh& mesh = closed.mesh;
+  if (mesh.triangles.empty()) throw Error(closed.name + ": no triangles: there is no solid");
+  if (mesh.triangles.size() >= kBvhLeaf / 2)
+    throw Error(closed.name + ": more than 2^30 triangles: simplify the mesh");
+  // Only what a triangle refers to counts; strays may lie anywhere, even at NaN.
+  constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> place(mesh.vertices.size(), kUnused);
+  for (const auto& triangle : mesh.triangles) {
+    for (const std::uint32_t v : triangle) {
+      if (v >= mesh.vertices.size())
+        throw Error(closed.name + ": a triangle refers to a vertex that is not there");
+      place[v] = 0;
+      impl_->bounds.extend(mesh.vertices[v]);
+    }
+  }
+  impl_->frame = unit_frame(impl_->bounds);
+  std::uint32_t count = 0;
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (place[v] == kUnused) continue;
+    place[v] = count++;
+    const Eigen::Vector3d x = impl_->frame.to_unit(mesh.vertices[v]);
+    for (int k = 0; k < 3; ++k) {
+      const auto rounded = static_cast<float>(x[k]);
+      impl_->vertices.push_back(x[k]);
+      impl_->vertices_float.push_back(rounded);
+      const auto error = static_cast<float>(std::abs(static_cast<double>(rounded) - x[k]));
+      // Largest error of a coordinate times √3, generously rounded.
+      impl_->view.vertex_error = std::max(impl_->view.vertex_error, 1.8f * error);
+    }
+  }
+  impl_->triangles.reserve(3 * mesh.triangles.size());
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t v : triangle) impl_->triangles.push_back(place[v]);
+
+  impl_->hash = hash_mesh(impl_->frame, impl_->vertices, impl_->triangles);
+  impl_->bvh = build_bvh(impl_->vertices, impl_->triangles);
+  MeshView& view = impl_->view;
+  view.vertices = impl_->vertices_float.data();
+  view.vertices_exact = impl_->vertices.data();
+  view.triangles = impl_->triangles.data();
+  view.vertex_count = count;
+  view.triangle_count = static_cast<std::uint32_t>(mesh.triangles.size());
+  view.nodes = impl_->bvh.nodes.data();
+  view.blocks = impl_->bvh.blocks.data();
+  view.root = impl_->bvh.root;
+  impl_->volume = mesh_volume(view);
+}
+
+MeshSolid::~MeshSolid() = default;
+
+double MeshSolid::signed_distance(const Eigen::Vector3d& x) const {
+  const Eigen::Vector3d unit = impl_->frame.to_unit(x);
+  const double distance = closest_point(unit).distance * impl_->frame.scale();
+  return inside(unit) ? distance : -distance;
+}
+
+Eigen::AlignedBox3d MeshSolid::bounds() const { return impl_->bounds; }
+
+double MeshSolid::volume() const {
+  const double scale = impl_->frame.scale();
+  return impl_->volume.value * scale * scale * scale;
+}
+
+double MeshSolid::volume_error() const {
+  const double scale = impl_->frame.scale();
+  return impl_->volume.error * scale * scale * scale;
+}
+
+const UnitFrame& MeshSolid::frame() const { return impl_->frame; }
+double MeshSolid::unit_volume() const { return impl_->volume.value; }
+double MeshSolid::unit_volume_error() const { return impl_->volume.error; }
+std::uint64_t MeshSolid::hash() const { return impl_->hash; }
+const MeshView& MeshSolid::view() const { return impl_->view; }
+
+ClosestPoint MeshSolid::closest_point(const Eigen::Vector3d& unit) const {
+  return closest_point(unit, std::numeric_limits<double>::infinity());
+}
+
+ClosestPoint MeshSolid::closest_point(const Eigen::Vector3d& unit, double limit) const {
+  return exact_closest_point(impl_->view, unit, limit);
+}
+
+int MeshSolid::winding_number(const Eigen::Vector3d& unit) const {
+  return ist::winding_number(impl_->view, unit.data());
+}
+
+void MeshSolid::line_crossings(double y, double z, std::vector<Crossing>& out) const {
+  ist::line_crossings(impl_->view, y, z, out);
+}
+
+std::unique_ptr<Solid> make_solid(const ClosedMesh& mesh) {
+  return std::make_unique<MeshSolid>(mesh);
+}
+
+}  // namespace ist

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <vector>
+
+#include "mesh/mesh_solid.h"
+#include "mesh/mesh_view.h"
+
+// Winding numbers by rays parallel to x. A ray is thought to be moved by an infinitesimal amount in
+// z and a larger infinitesimal in y, so that it meets no edge and no vertex; every predicate is
+// exact. A closed mesh's crossings then sum to zero on every line, and the winding number of a
+// point off the surface is right however close it is.
+
+namespace ist {
+
+/// Winding number of p (unit frame) about a closed mesh.
+int winding_number(const MeshView& mesh, const double p[3]);
+
+/// All crossings of the line (·, y, z), sorted by x, +1 first among equals.
+void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossing>& out);
+
+}  // namespace ist
