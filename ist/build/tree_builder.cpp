@@ -1,12 +1,14 @@
 #include "build/tree_builder.h"
 
+#include <tbb/parallel_for.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
 #include "build/bounding_ball.h"
-#include "build/two_means.h"
+#include "build/overlap_bound.h"
+#include "build/tree_order.h"
 
 namespace ist {
 namespace {
@@ -81,12 +83,39 @@ double volume_of(std::span<const Ball> spheres) {
   return sum;
 }
 
+/// Balls around each 16^(k+1) consecutive spheres, for every level up to one of a single block.
+std::vector<std::vector<Sphere4>> level_balls(std::span<const Ball> sorted) {
+  std::vector<std::vector<Sphere4>> levels;
+  for (std::size_t span = kWidth; span < sorted.size(); span *= kWidth) {
+    std::vector<Sphere4>& balls = levels.emplace_back((sorted.size() + span - 1) / span);
+    tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t i) {
+      balls[i] = ball_around(sorted.subspan(i * span, std::min(span, sorted.size() - i * span)));
+    });
+  }
+  return levels;
+}
+
+/// κ of every level's nodes and, last, of the whole tree; 1 for disjoint spheres.
+std::vector<std::vector<float>> overlaps(std::span<const Ball> sorted,
+                                         const std::vector<std::vector<Sphere4>>& levels,
+                                         bool disjoint) {
+  std::vector<std::vector<Ball>> balls;
+  for (const auto& level : levels) {
+    balls.emplace_back();
+    for (const Sphere4& ball : level) balls.back().push_back(to_ball(ball));
+  }
+  if (!disjoint) return overlap_bounds(sorted, balls);
+  std::vector<std::vector<float>> kappa;
+  for (const auto& level : levels) kappa.emplace_back(level.size(), 1.0f);
+  kappa.push_back({1.0f});
+  return kappa;
+}
+
 }  // namespace
 
 TreeArrays tree_from_order(std::span<const Sphere4> spheres, std::span<const float> covers,
                            std::vector<std::uint32_t> order) {
   const std::size_t n = spheres.size();
-  TreeArrays tree;
   std::vector<Sphere4> lanes(n);
   std::vector<Ball> sorted(n);
   std::vector<float> sorted_covers(covers.size());
@@ -95,9 +124,9 @@ TreeArrays tree_from_order(std::span<const Sphere4> spheres, std::span<const flo
     sorted[i] = to_ball(lanes[i]);
     if (!covers.empty()) sorted_covers[i] = covers[order[i]];
   }
-  tree.levels.emplace_back();
-  fill_blocks(lanes, tree.levels.back());
 
+  TreeArrays tree;
+  fill_blocks(lanes, tree.levels.emplace_back());
   const std::size_t padded = tree.levels.back().blocks.size() * kWidth;
   order.resize(padded, 0);
   tree.sphere_index = std::move(order);
@@ -106,29 +135,28 @@ TreeArrays tree_from_order(std::span<const Sphere4> spheres, std::span<const flo
     tree.sphere_cover.resize(padded, kEmptyRadius);
   }
 
-  for (std::size_t span = kWidth; tree.levels.back().blocks.size() > 1; span *= kWidth) {
-    const std::size_t count = tree.levels.back().blocks.size();
-    TreeLevelArrays level;
-    level.nodes.resize((count + kWidth - 1) / kWidth);
-    for (NodeBlock& nodes : level.nodes) {
-      nodes = {};
-      if (!covers.empty()) std::fill(std::begin(nodes.cover), std::end(nodes.cover), kEmptyRadius);
-    }
-    std::vector<Sphere4> balls(count);
-    for (std::size_t i = 0; i < count; ++i) {
+  const auto levels = level_balls(sorted);
+  const auto kappa = overlaps(sorted, levels, !covers.empty());
+  std::size_t span = kWidth;
+  for (std::size_t k = 0; k < levels.size(); ++k, span *= kWidth) {
+    TreeLevelArrays& level = tree.levels.emplace_back();
+    fill_blocks(levels[k], level);
+    level.nodes.resize(level.blocks.size());
+    if (!covers.empty())
+      for (NodeBlock& nodes : level.nodes)
+        std::fill(std::begin(nodes.cover), std::end(nodes.cover), kEmptyRadius);
+    for (std::size_t i = 0; i < levels[k].size(); ++i) {
       const std::size_t begin = i * span;
       const std::size_t size = std::min(span, n - begin);
       const auto below = std::span<const Ball>(sorted).subspan(begin, size);
-      balls[i] = ball_around(below);
       NodeBlock& nodes = level.nodes[i / kWidth];
-      nodes.volume[i % kWidth] = round_up(volume_of(below));
+      const std::size_t lane = i % kWidth;
+      nodes.volume[lane] = round_up(volume_of(below));
+      nodes.overlap[lane] = kappa[k][i];
       if (!covers.empty())
-        nodes.cover[i % kWidth] = cover_about(
-            balls[i], below, std::span<const float>(sorted_covers).subspan(begin, size));
-      nodes.overlap[i % kWidth] = covers.empty() ? static_cast<float>(size) : 1;
+        nodes.cover[lane] = cover_about(levels[k][i], below,
+                                        std::span<const float>(sorted_covers).subspan(begin, size));
     }
-    fill_blocks(balls, level);
-    tree.levels.push_back(std::move(level));
   }
 
   const Sphere4 root = ball_around(sorted);
@@ -138,15 +166,16 @@ TreeArrays tree_from_order(std::span<const Sphere4> spheres, std::span<const flo
   tree.root[3] = root.r;
   if (!covers.empty()) tree.root_cover = cover_about(root, sorted, sorted_covers);
   for (const Sphere4& s : spheres) tree.volume_sum += volume_of(std::array{to_ball(s)});
-  tree.overlap = covers.empty() ? static_cast<float>(n) : 1;
+  tree.overlap = kappa.back().front();
   return tree;
 }
 
-TreeArrays build_tree(std::span<const Sphere4> spheres, std::span<const float> covers) {
+TreeArrays build_tree(std::span<const Sphere4> spheres, std::span<const float> covers,
+                      Clustering clustering) {
   std::vector<Ball> balls;
   balls.reserve(spheres.size());
   for (const Sphere4& s : spheres) balls.push_back(to_ball(s));
-  return tree_from_order(spheres, covers, two_means_order(balls, false));
+  return tree_from_order(spheres, covers, tree_order(balls, clustering));
 }
 
 }  // namespace ist

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "asset/asset_writer.h"
+#include "build/tree_order.h"
 
 namespace ist {
 
@@ -12,7 +13,8 @@ namespace ist {
 /// cover radii of disjoint inner spheres; it is empty for effective spheres, which may overlap, and
 /// κ is bounded for them. Every ball of the tree holds the spheres below it for certain: radii are
 /// rounded up. Same input, same tree, for any number of threads. The set must not be empty.
-TreeArrays build_tree(std::span<const Sphere4> spheres, std::span<const float> covers);
+TreeArrays build_tree(std::span<const Sphere4> spheres, std::span<const float> covers,
+                      Clustering clustering = Clustering::two_means);
 
 /// The tree whose leaves are the spheres in a given order: lane i holds spheres[order[i]].
 TreeArrays tree_from_order(std::span<const Sphere4> spheres, std::span<const float> covers,

@@ -22,15 +22,15 @@ std::vector<Sphere4> random_spheres(std::size_t n, unsigned seed) {
   return spheres;
 }
 
-class TreeOfCount : public ::testing::TestWithParam<std::size_t> {};
+class TreeOfCount : public ::testing::TestWithParam<std::tuple<std::size_t, Clustering>> {};
 
 // Every node's ball holds every sphere and cover ball below it, in double, for any count.
 TEST_P(TreeOfCount, BallsHoldWhatIsBelow) {
-  const std::size_t n = GetParam();
+  const auto [n, clustering] = GetParam();
   const auto spheres = random_spheres(n, static_cast<unsigned>(n));
   std::vector<float> covers(n);
   for (std::size_t i = 0; i < n; ++i) covers[i] = spheres[i].r * 1.5f;
-  const TreeArrays tree = build_tree(spheres, covers);
+  const TreeArrays tree = build_tree(spheres, covers, clustering);
 
   std::set<std::uint32_t> seen;
   for (std::size_t i = 0; i < n; ++i) {
@@ -67,9 +67,46 @@ TEST_P(TreeOfCount, BallsHoldWhatIsBelow) {
   EXPECT_EQ(tree.levels.back().blocks.size(), 1u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Counts, TreeOfCount,
-                         ::testing::Values(1, 2, 15, 16, 17, 31, 32, 33, 255, 256, 257, 300, 4095,
-                                           4096, 4097, 5000));
+INSTANTIATE_TEST_SUITE_P(
+    Counts, TreeOfCount,
+    ::testing::Combine(::testing::Values(1, 2, 15, 16, 17, 31, 32, 33, 255, 256, 257, 300, 4095,
+                                         4096, 4097, 5000),
+                       ::testing::Values(Clustering::two_means, Clustering::neural_gas)));
+
+// No random point lies in more spheres of a node than its κ, and κ is not idle.
+TEST(OverlapBound, HoldsAtRandomPoints) {
+  const auto spheres = random_spheres(1500, 7);
+  std::vector<Ball> sorted;
+  const TreeArrays tree = build_tree(spheres, {});
+  for (std::size_t i = 0; i < spheres.size(); ++i) {
+    const Sphere4& s = spheres[tree.sphere_index[i]];
+    sorted.push_back({s.x, s.y, s.z, s.r});
+  }
+  std::mt19937 bits(3);
+  const auto unit = [&] { return static_cast<double>(bits()) / 2147483648.0 - 1; };
+  float most = 0;
+  for (int trial = 0; trial < 300'000; ++trial) {
+    const Ball& home = sorted[bits() % sorted.size()];
+    const double x = home.x + home.r * unit();
+    const double y = home.y + home.r * unit();
+    const double z = home.z + home.r * unit();
+    std::vector<std::size_t> inside;
+    for (std::size_t i = 0; i < sorted.size(); ++i)
+      if (reach(x, y, z, {sorted[i].x, sorted[i].y, sorted[i].z, 0}) < sorted[i].r)
+        inside.push_back(i);
+    most = std::max(most, static_cast<float>(inside.size()));
+    for (std::size_t k = 0; k + 1 < tree.levels.size(); ++k)
+      for (const std::size_t i : inside) {
+        const std::size_t node = i >> (4 * (k + 1));
+        const auto count = std::count_if(inside.begin(), inside.end(),
+                                         [&](std::size_t j) { return j >> (4 * (k + 1)) == node; });
+        EXPECT_LE(static_cast<float>(count),
+                  tree.levels[k + 1].nodes[node / kWidth].overlap[node % kWidth]);
+      }
+  }
+  EXPECT_LE(most, tree.overlap);
+  EXPECT_LE(tree.overlap, most + 1);
+}
 
 // The ball is as small as a fine search for a better centre can make it.
 TEST(BoundingBall, IsSmallest) {

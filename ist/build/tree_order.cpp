@@ -1,0 +1,55 @@
+#include "build/tree_order.h"
+
+#include <algorithm>
+
+#include "build/neural_gas.h"
+#include "build/tree_swaps.h"
+#include "build/two_means.h"
+#include "query/asset_layout.h"
+
+namespace ist {
+namespace {
+
+std::vector<std::uint32_t> group_order(std::span<const Ball> balls, bool last_stays,
+                                       Clustering clustering) {
+  if (clustering == Clustering::neural_gas) return neural_gas_order(balls, last_stays);
+  std::vector<std::uint32_t> order = two_means_order(balls, last_stays);
+  improve_groups(balls, last_stays, order);
+  return order;
+}
+
+/// Balls around each 16 consecutive entries of `order`.
+std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::uint32_t> order) {
+  std::vector<Ball> groups;
+  for (std::size_t begin = 0; begin < order.size(); begin += kWidth) {
+    std::vector<Ball> members;
+    for (std::size_t i = begin; i < std::min(begin + kWidth, order.size()); ++i)
+      members.push_back(balls[order[i]]);
+    groups.push_back(bounding_ball(members));
+  }
+  return groups;
+}
+
+std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays,
+                                    Clustering clustering) {
+  const std::vector<std::uint32_t> order = group_order(balls, last_stays, clustering);
+  if (order.size() <= std::size_t{kWidth} * kWidth) return order;
+  // A group that is not full comes last, and so does any that holds one that is not.
+  const std::vector<std::uint32_t> groups =
+      order_of(group_balls(balls, order), last_stays || order.size() % kWidth != 0, clustering);
+  std::vector<std::uint32_t> sorted;
+  sorted.reserve(order.size());
+  for (const std::uint32_t g : groups)
+    for (std::size_t i = std::size_t{g} * kWidth;
+         i < std::min<std::size_t>((std::size_t{g} + 1) * kWidth, order.size()); ++i)
+      sorted.push_back(order[i]);
+  return sorted;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, Clustering clustering) {
+  return order_of(spheres, false, clustering);
+}
+
+}  // namespace ist

@@ -1,0 +1,188 @@
+#include "build/tree_swaps.h"
+
+#include <tbb/parallel_for.h>
+#include <algorithm>
+#include <cmath>
+
+#include "query/asset_layout.h"
+
+namespace ist {
+namespace {
+
+constexpr std::size_t kNeighbours = 12;  ///< groups that a group may trade with
+constexpr int kMaxRounds = 40;
+/// s, relative to the mean radius of the groups' balls before any swap.
+constexpr double kReach = 0.5;
+constexpr double kLeastGain = 1e-4;  ///< relative to the two groups' cost; smaller ones are noise
+
+struct Swap {
+  double gain = 0;
+  std::uint32_t a = 0, b = 0;  ///< groups
+  std::uint32_t s = 0, t = 0;  ///< entries of a and of b
+};
+
+struct Group {
+  std::vector<Ball> members;
+  Ball ball;
+  std::vector<Ball> without;  ///< bounding ball without each member
+};
+
+class GroupSwaps {
+ public:
+  GroupSwaps(std::span<const Ball> balls, bool last_stays, std::vector<std::uint32_t>& order)
+      : balls_(balls),
+        last_stays_(last_stays),
+        order_(order),
+        groups_((order.size() + kWidth - 1) / kWidth) {
+    tbb::parallel_for(std::size_t{0}, groups_.size(), [&](std::size_t g) { refresh(g); });
+    double sum = 0;
+    for (const Group& group : groups_) sum += group.ball.r;
+    reach_ = kReach * sum / static_cast<double>(groups_.size());
+  }
+
+  void run() {
+    find_pairs();
+    std::vector<char> changed(groups_.size(), 1);
+    for (int round = 0; round < kMaxRounds; ++round) {
+      std::vector<Swap> swaps(pairs_.size());
+      tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t p) {
+        const auto [a, b] = pairs_[p];
+        if (changed[a] != 0 || changed[b] != 0) swaps[p] = best_swap(a, b);
+      });
+      std::erase_if(swaps, [](const Swap& swap) { return swap.gain <= 0; });
+      if (swaps.empty()) return;
+      std::sort(swaps.begin(), swaps.end(), [](const Swap& x, const Swap& y) {
+        if (x.gain != y.gain) return x.gain > y.gain;
+        return x.a != y.a ? x.a < y.a : x.b < y.b;
+      });
+      // The best swap of each group; what it blocks is found again in the next round.
+      std::vector<char> touched(groups_.size(), 0);
+      std::vector<char> retry(groups_.size(), 0);
+      for (const Swap& swap : swaps) {
+        if (touched[swap.a] != 0 || touched[swap.b] != 0) {
+          retry[swap.a] = retry[swap.b] = 1;
+          continue;
+        }
+        touched[swap.a] = touched[swap.b] = 1;
+        std::swap(order_[swap.a * kWidth + swap.s], order_[swap.b * kWidth + swap.t]);
+      }
+      tbb::parallel_for(std::size_t{0}, groups_.size(), [&](std::size_t g) {
+        if (touched[g] != 0) refresh(g);
+      });
+      for (std::size_t g = 0; g < groups_.size(); ++g)
+        changed[g] = touched[g] != 0 || retry[g] != 0;
+    }
+  }
+
+ private:
+  double cost(double radius) const {
+    const double r = radius + reach_;
+    return r * r * r;
+  }
+
+  void refresh(std::size_t g) {
+    Group& group = groups_[g];
+    group.members.clear();
+    const std::size_t end = std::min(order_.size(), (g + 1) * kWidth);
+    for (std::size_t i = g * kWidth; i < end; ++i) group.members.push_back(balls_[order_[i]]);
+    group.ball = bounding_ball(group.members);
+    group.without.assign(group.members.size(), group.ball);
+    if (group.members.size() == 1) group.without[0].r = 0;
+    if (group.members.size() < 2) return;
+    for (std::size_t i = 0; i < group.members.size(); ++i) {
+      // Only a ball that touches the bounding ball from inside holds it at its size.
+      if (reach(group.ball.x, group.ball.y, group.ball.z, group.members[i]) <
+          group.ball.r * (1 - 1e-9))
+        continue;
+      std::vector<Ball> rest = group.members;
+      rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(i));
+      group.without[i] = bounding_ball(rest);
+    }
+  }
+
+  bool pinned(std::uint32_t g, std::size_t member) const {
+    return last_stays_ && g * kWidth + member + 1 == order_.size();
+  }
+
+  void find_pairs() {
+    const std::size_t count = std::min(kNeighbours, groups_.size() - 1);
+    std::vector<std::vector<std::pair<std::uint32_t, std::uint32_t>>> found(groups_.size());
+    tbb::parallel_for(std::size_t{0}, groups_.size(), [&](std::size_t g) {
+      std::vector<std::pair<double, std::uint32_t>> near;
+      const Ball& ball = groups_[g].ball;
+      for (std::uint32_t h = 0; h < groups_.size(); ++h)
+        if (h != g)
+          near.emplace_back(reach(ball.x, ball.y, ball.z, groups_[h].ball) - 2 * groups_[h].ball.r,
+                            h);
+      std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count),
+                        near.end());
+      for (std::size_t k = 0; k < count; ++k)
+        found[g].emplace_back(std::min(static_cast<std::uint32_t>(g), near[k].second),
+                              std::max(static_cast<std::uint32_t>(g), near[k].second));
+    });
+    for (const auto& pairs : found) pairs_.insert(pairs_.end(), pairs.begin(), pairs.end());
+    std::sort(pairs_.begin(), pairs_.end());
+    pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
+  }
+
+  /// Lower bound of the radius once `added` joins `group` in place of member `left_out`.
+  static double least_radius(const Group& group, std::size_t left_out, const Ball& added) {
+    double radius = group.without[left_out].r;
+    for (std::size_t i = 0; i < group.members.size(); ++i)
+      if (i != left_out)
+        radius =
+            std::fmax(radius, (reach(added.x, added.y, added.z, group.members[i]) + added.r) / 2);
+    return radius;
+  }
+
+  static double radius_with(const Group& group, std::size_t left_out, const Ball& added) {
+    const Ball& rest = group.without[left_out];
+    if (reach(rest.x, rest.y, rest.z, added) <= rest.r) return rest.r;
+    std::vector<Ball> members = group.members;
+    members[left_out] = added;
+    return bounding_ball(members).r;
+  }
+
+  Swap best_swap(std::uint32_t a, std::uint32_t b) const {
+    const Group& ga = groups_[a];
+    const Group& gb = groups_[b];
+    const double now = cost(ga.ball.r) + cost(gb.ball.r);
+    Swap best;
+    best.gain = kLeastGain * now;
+    bool found = false;
+    for (std::uint32_t s = 0; s < ga.members.size(); ++s) {
+      if (pinned(a, s)) continue;
+      for (std::uint32_t t = 0; t < gb.members.size(); ++t) {
+        if (pinned(b, t)) continue;
+        if (now - cost(ga.without[s].r) - cost(gb.without[t].r) <= best.gain) continue;
+        const double least_a = cost(least_radius(ga, s, gb.members[t]));
+        if (now - least_a - cost(gb.without[t].r) <= best.gain) continue;
+        const double least_b = cost(least_radius(gb, t, ga.members[s]));
+        if (now - least_a - least_b <= best.gain) continue;
+        const double cost_a = cost(radius_with(ga, s, gb.members[t]));
+        if (now - cost_a - least_b <= best.gain) continue;
+        const double gain = now - cost_a - cost(radius_with(gb, t, ga.members[s]));
+        if (gain <= best.gain) continue;
+        best = {gain, a, b, s, t};
+        found = true;
+      }
+    }
+    return found ? best : Swap{};
+  }
+
+  std::span<const Ball> balls_;
+  bool last_stays_;
+  std::vector<std::uint32_t>& order_;
+  std::vector<Group> groups_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;
+  double reach_ = 0;
+};
+
+}  // namespace
+
+void improve_groups(std::span<const Ball> balls, bool last_stays,
+                    std::vector<std::uint32_t>& order) {
+  if (order.size() > kWidth) GroupSwaps(balls, last_stays, order).run();
+}
+
+}  // namespace ist
