@@ -29,4 +29,5 @@ for name in "${names[@]}"; do
   echo "== $name"
   "$build/bin/benchmarks/$name" --out "$results/$name.json" "${quick[@]}"
 done
-python3 "$root/benchmarks/tables.py" "$results"
+# apt installs matplotlib for the system's own interpreter
+/usr/bin/python3 "$root/benchmarks/tables.py" "$results"

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+
+namespace ist::testing {
+
+/// What a mesh library says about two surfaces: contact where triangles cross, no inside. Summed
+/// over all contacts it reports.
+struct MeshContacts {
+  std::size_t count = 0;
+  double depth_sum = 0;  ///< [u] Σ depth, ≥ 0
+  /// [u] Σ depth · unit normal, the way B is pushed, world.
+  Eigen::Vector3d push_b = Eigen::Vector3d::Zero();
+
+  bool any() const { return count > 0; }
+};
+
+}  // namespace ist::testing
