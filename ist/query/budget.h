@@ -1,0 +1,42 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+
+#include <ist/query.h>
+
+namespace ist {
+
+/// Counts visits and watches the clock. Reads it once a grant, and only if there is a deadline.
+class Budget {
+ public:
+  explicit Budget(const QuerySettings& settings) noexcept
+      : max_visits_(settings.max_visits != 0 ? settings.max_visits : ~0u),
+        timed_(settings.deadline_us > 0) {
+    if (timed_)
+      deadline_ = Clock::now() + std::chrono::nanoseconds(static_cast<std::int64_t>(
+                                     std::min(settings.deadline_us, 1e12) * 1e3));
+  }
+
+  /// How many of the next `wanted` visits may be made; they count as made.
+  std::size_t grant(std::size_t wanted) noexcept {
+    const std::size_t granted = std::min<std::size_t>(wanted, left());
+    if (granted == 0 || (timed_ && Clock::now() >= deadline_)) return 0;
+    visits_ += static_cast<std::uint32_t>(granted);
+    return granted;
+  }
+
+  std::uint32_t left() const noexcept { return max_visits_ - visits_; }
+  std::uint32_t visits() const noexcept { return visits_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::uint32_t max_visits_;
+  std::uint32_t visits_ = 0;
+  bool timed_;
+  Clock::time_point deadline_;
+};
+
+}  // namespace ist

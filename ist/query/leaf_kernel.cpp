@@ -1,0 +1,270 @@
+#include "query/leaf_kernel.h"
+
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/leaf_kernel.cpp"
+#include <hwy/foreach_target.h>
+
+#include "query/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
+
+/// Sixteen spheres in the frame of A's block.
+template <class T>
+struct alignas(64) Spheres {
+  T x[kWidth], y[kWidth], z[kWidth], r[kWidth];
+};
+
+/// Sums of one pair of blocks, a lane a sphere of the side that lies in lanes.
+template <class T>
+struct alignas(64) PairSums {
+  T caps[kWidth];
+  T force[3][kWidth], torque[3][kWidth], moment[3][kWidth];
+  T error[kWidth];
+};
+
+/// Which spheres of a block the other block's ball leaves in play.
+struct Reach {
+  std::uint32_t touching = 0;  ///< spheres that come within reach of the ball
+  std::uint32_t holding = 0;   ///< of these, spheres that hold the whole ball
+};
+
+template <class T>
+HWY_INLINE Reach reach_of(const Spheres<T>& s, const double (&q)[3], double radius, double error) {
+  const LaneTag<T> d;
+  const auto qx = hn::Set(d, static_cast<T>(q[0]));
+  const auto qy = hn::Set(d, static_cast<T>(q[1]));
+  const auto qz = hn::Set(d, static_cast<T>(q[2]));
+  const auto reach = hn::Set(d, static_cast<T>(radius + error));
+  Reach result;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const auto dx = hn::Load(d, s.x + lane) - qx;
+    const auto dy = hn::Load(d, s.y + lane) - qy;
+    const auto dz = hn::Load(d, s.z + lane) - qz;
+    const auto d2 = (dx * dx + dy * dy) + dz * dz;
+    const auto r = hn::Load(d, s.r + lane);
+    const auto sum = hn::Max(r + reach, hn::Zero(d));
+    const auto difference = hn::Max(r - reach, hn::Zero(d));
+    result.touching |= mask_bits(d, d2 < sum * sum) << lane;
+    result.holding |= mask_bits(d, d2 < difference * difference) << lane;
+  }
+  return result;
+}
+
+/// Lenses of the spheres `tasks` of `one` with all of `many`; a sphere of `one` counted by
+/// `holding` swallows all of `many`. This is lens() of lens.h, sixteen at a time and without
+/// branches.
+template <class T>
+HWY_INLINE std::uint32_t sum_lenses(const Spheres<T>& one, std::uint32_t tasks,
+                                    std::uint32_t holding, const Spheres<T>& many,
+                                    std::uint32_t lanes_in_play, const double (&lever)[3],
+                                    double sign, double error, PairSums<T>& out) {
+  const LaneTag<T> d;
+  const std::size_t width = hn::Lanes(d);
+  using V = hn::Vec<decltype(d)>;
+  const V zero = hn::Zero(d);
+  const V two = hn::Set(d, T(2));
+  const V three = hn::Set(d, T(3));
+  const V half = hn::Set(d, T(0.5));
+  const V tiny = hn::Set(d, std::numeric_limits<T>::min());
+  const V delta = hn::Set(d, static_cast<T>(error));
+  const V held = hn::Set(d, static_cast<T>(4 * hwy::PopCount(holding)));
+  const V flip = hn::Set(d, static_cast<T>(sign));
+  const std::uint32_t width_mask = (1u << width) - 1;
+  std::uint32_t lenses = 0;
+  for (std::size_t lane = 0; lane < kWidth; lane += width) {
+    V caps = zero, fx = zero, fy = zero, fz = zero, mx = zero, my = zero, mz = zero, err = zero;
+    V lx = zero, ly = zero, lz = zero;
+    if (((lanes_in_play >> lane) & width_mask) != 0) {
+      const V xj = hn::Load(d, many.x + lane);
+      const V yj = hn::Load(d, many.y + lane);
+      const V zj = hn::Load(d, many.z + lane);
+      const V rj = hn::Max(hn::Load(d, many.r + lane), zero);
+      caps = held * (rj * (rj * rj));
+      lenses += static_cast<std::uint32_t>(hwy::PopCount(holding) * hn::CountTrue(d, rj > zero));
+      for (std::uint32_t left = tasks; left != 0; left &= left - 1) {
+        const std::size_t i = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
+        const V ri = hn::Set(d, one.r[i]);
+        const V dx = xj - hn::Set(d, one.x[i]);
+        const V dy = yj - hn::Set(d, one.y[i]);
+        const V dz = zj - hn::Set(d, one.z[i]);
+        const V distance = hn::Sqrt((dx * dx + dy * dy) + dz * dz);
+        const V a = hn::Max(ri, rj);
+        const V b = hn::Min(ri, rj);
+        const V g = (a - distance) + b;
+        const V f = (distance - a) + b;
+        const V e = (a - b) + distance;
+        const V g0 = hn::Max(g, zero);
+        const auto holds = hn::Or(f <= zero, distance < tiny);
+        const V inverse = half / hn::Max(distance, tiny);
+        const V ha = hn::IfThenZeroElse(holds, (f * g0) * inverse);
+        const V diameter = two * b;
+        const V hb = hn::IfThenElse(holds, diameter, hn::Min((e * g0) * inverse, diameter));
+        const V large = (ha * ha) * (three * a - ha);
+        const V small = (hb * hb) * (three * b - hb);
+        const V circle = ha * (two * a - ha);
+        const V volume = large + small;
+        const V cap_i = hn::IfThenElse(ri > rj, large, small);
+        const V pull = circle * inverse;
+        caps = caps + volume;
+        fx = fx + pull * dx;
+        fy = fy + pull * dy;
+        fz = fz + pull * dz;
+        mx = mx + cap_i * dx;
+        my = my + cap_i * dy;
+        mz = mz + cap_i * dz;
+        // Within rounding of tangency the circle says nothing; b² holds it at any distance. Else it
+        // is concave between the tangencies, so within ± delta it is at most doubled.
+        const V near = hn::Abs(hn::Min(g, f));
+        err = err + hn::IfThenElse(near < delta, b * b, circle);
+        lenses += static_cast<std::uint32_t>(hn::CountTrue(d, volume > zero));
+      }
+      lx = xj + hn::Set(d, static_cast<T>(lever[0]));
+      ly = yj + hn::Set(d, static_cast<T>(lever[1]));
+      lz = zj + hn::Set(d, static_cast<T>(lever[2]));
+      fx = fx * flip;
+      fy = fy * flip;
+      fz = fz * flip;
+    }
+    hn::Store(caps, d, out.caps + lane);
+    hn::Store(err, d, out.error + lane);
+    hn::Store(fx, d, out.force[0] + lane);
+    hn::Store(fy, d, out.force[1] + lane);
+    hn::Store(fz, d, out.force[2] + lane);
+    hn::Store(ly * fz - lz * fy, d, out.torque[0] + lane);
+    hn::Store(lz * fx - lx * fz, d, out.torque[1] + lane);
+    hn::Store(lx * fy - ly * fx, d, out.torque[2] + lane);
+    hn::Store(caps * lx - mx, d, out.moment[0] + lane);
+    hn::Store(caps * ly - my, d, out.moment[1] + lane);
+    hn::Store(caps * lz - mz, d, out.moment[2] + lane);
+  }
+  return lenses;
+}
+
+/// total[l] += from[l] + from[l + 8], the last additions in double.
+template <class T>
+HWY_INLINE void fold(const T* from, double* total, double factor) {
+  const hn::CappedTag<double, kSumLanes> d;
+  const auto scale = hn::Set(d, factor);
+  for (std::size_t lane = 0; lane < kSumLanes; lane += hn::Lanes(d)) {
+    hn::Vec<decltype(d)> sum;
+    if constexpr (sizeof(T) == sizeof(float)) {
+      const hn::Rebind<float, decltype(d)> df;
+      sum = hn::PromoteTo(d, hn::Load(df, from + lane) + hn::Load(df, from + lane + kSumLanes));
+    } else {
+      sum = hn::Load(d, from + lane) + hn::Load(d, from + lane + kSumLanes);
+    }
+    hn::Store(hn::Load(d, total + lane) + sum * scale, d, total + lane);
+  }
+}
+
+template <class T>
+void add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b, std::size_t n,
+            LeafSums& sums) {
+  const LaneTag<T> d;
+  const std::size_t width = hn::Lanes(d);
+  const Similarity& map = *stage.a_from_b;
+  hn::Vec<decltype(d)> m[9];
+  for (int i = 0; i < 9; ++i) m[i] = hn::Set(d, static_cast<T>(map.m[i]));
+  const auto scale = hn::Set(d, static_cast<T>(map.scale));
+
+  Spheres<T> sa, sb;
+  PairSums<T> pair;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Origin& origin_a = stage.a->level[0].origins[a[i]];
+    const Origin& origin_b = stage.b->level[0].origins[b[i]];
+    const BallBlock& block_a = stage.a->level[0].blocks[a[i]];
+    const BallBlock& block_b = stage.b->level[0].blocks[b[i]];
+    const NodeBall ball_a = stage.a->ball(0, a[i]);
+    const NodeBall ball_b = stage.b->ball(0, b[i]);
+
+    // All that follows is relative to the origin of A's block: differences taken in double.
+    double offset[3], q[3];
+    map.apply({origin_b.x, origin_b.y, origin_b.z}, offset);
+    map.apply(ball_b.centre, q);
+    const double origin[3] = {origin_a.x, origin_a.y, origin_a.z};
+    double p[3], lever[3];
+    double magnitude = 0;
+    for (int k = 0; k < 3; ++k) {
+      offset[k] -= origin[k];
+      q[k] -= origin[k];
+      p[k] = ball_a.centre[k] - origin[k];
+      lever[k] = origin[k] - map.t[k];
+      magnitude += std::abs(offset[k]) + std::abs(q[k] - offset[k]) + std::abs(p[k]);
+    }
+    const double radius_b = ball_b.r * map.scale;
+    magnitude += ball_a.r + radius_b;
+    const double error = distance_error<T>(magnitude);
+
+    const auto ox = hn::Set(d, static_cast<T>(offset[0]));
+    const auto oy = hn::Set(d, static_cast<T>(offset[1]));
+    const auto oz = hn::Set(d, static_cast<T>(offset[2]));
+    for (std::size_t lane = 0; lane < kWidth; lane += width) {
+      hn::Store(load_as<T>(d, block_a.x + lane), d, sa.x + lane);
+      hn::Store(load_as<T>(d, block_a.y + lane), d, sa.y + lane);
+      hn::Store(load_as<T>(d, block_a.z + lane), d, sa.z + lane);
+      hn::Store(load_as<T>(d, block_a.r + lane), d, sa.r + lane);
+      const auto x = load_as<T>(d, block_b.x + lane);
+      const auto y = load_as<T>(d, block_b.y + lane);
+      const auto z = load_as<T>(d, block_b.z + lane);
+      hn::Store(((m[0] * x + m[1] * y) + m[2] * z) + ox, d, sb.x + lane);
+      hn::Store(((m[3] * x + m[4] * y) + m[5] * z) + oy, d, sb.y + lane);
+      hn::Store(((m[6] * x + m[7] * y) + m[8] * z) + oz, d, sb.z + lane);
+      hn::Store(load_as<T>(d, block_b.r + lane) * scale, d, sb.r + lane);
+    }
+
+    const Reach ra = reach_of<T>(sa, q, radius_b, error);
+    if (ra.touching == 0) continue;
+    const Reach rb = reach_of<T>(sb, p, ball_a.r, error);
+    if (rb.touching == 0) continue;
+    const std::uint32_t tasks_a = ra.touching & ~ra.holding;
+    const std::uint32_t tasks_b = rb.touching & ~rb.holding;
+    // The side with fewer spheres in play goes one by one; the other lies in lanes.
+    if (hwy::PopCount(tasks_a) <= hwy::PopCount(tasks_b)) {
+      sums.lenses += sum_lenses<T>(sa, tasks_a, ra.holding, sb, rb.touching, lever, 1, error, pair);
+    } else {
+      sums.lenses +=
+          sum_lenses<T>(sb, tasks_b, rb.holding, sa, ra.touching, lever, -1, error, pair);
+    }
+    fold(pair.caps, sums.caps, 1);
+    fold(pair.error, sums.error, error);
+    for (int k = 0; k < 3; ++k) {
+      fold(pair.force[k], sums.force[k], 1);
+      fold(pair.torque[k], sums.torque[k], 1);
+      fold(pair.moment[k], sums.moment[k], 1);
+    }
+  }
+}
+
+void add_single(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
+                std::size_t n, LeafSums& sums) {
+  add_as<float>(stage, a, b, n, sums);
+}
+
+void add_twice(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
+               std::size_t n, LeafSums& sums) {
+  add_as<double>(stage, a, b, n, sums);
+}
+
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ist {
+
+HWY_EXPORT(add_single);
+HWY_EXPORT(add_twice);
+
+void add_leaf_pairs(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
+                    std::size_t n, LeafSums& sums) noexcept {
+  if (stage.precision == Precision::single) {
+    HWY_DYNAMIC_DISPATCH(add_single)(stage, a, b, n, sums);
+  } else {
+    HWY_DYNAMIC_DISPATCH(add_twice)(stage, a, b, n, sums);
+  }
+}
+
+}  // namespace ist
+#endif

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "query/node_kernel.h"
+
+namespace ist {
+
+/// Half of the virtual lanes: what a block pair's sums are folded to before they are added up.
+inline constexpr std::size_t kSumLanes = 8;
+
+/// Running sums over leaf pairs, in A's unit frame, positions relative to B's unit-frame origin.
+/// Factors of π are left to the end. Lanes keep the order of additions the same for every vector
+/// width, and thus the bits.
+struct alignas(64) LeafSums {
+  double caps[kSumLanes] = {};       ///< 3/π · volume
+  double force[3][kSumLanes] = {};   ///< −1/2π · dV/d(translation of B)
+  double torque[3][kSumLanes] = {};  ///< likewise about B's unit-frame origin
+  double moment[3][kSumLanes] = {};  ///< 3/π · ∫ x dV
+  double error[kSumLanes] = {};      ///< 1/2π · bound on what rounded distances change in V
+  std::uint32_t lenses = 0;          ///< that are not empty
+};
+
+struct LeafStage {
+  const SphereTree* a;
+  const SphereTree* b;
+  const Similarity* a_from_b;
+  Precision precision;
+};
+
+/// Adds the lenses of every sphere of block a[i] with every sphere of block b[i].
+void add_leaf_pairs(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
+                    std::size_t n, LeafSums& sums) noexcept;
+
+}  // namespace ist

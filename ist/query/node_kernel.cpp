@@ -1,0 +1,97 @@
+#include "query/node_kernel.h"
+
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/node_kernel.cpp"
+#include <hwy/foreach_target.h>
+
+#include "query/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
+
+template <class T>
+std::size_t open_as(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                    std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
+  const LaneTag<T> d;
+  const std::size_t lanes = hn::Lanes(d);
+  const SphereTree::Level& opened = stage.x->level[stage.level_x];
+  const Similarity& x_from_y = *stage.x_from_y;
+  const auto grow = hn::Set(d, static_cast<T>(1 + distance_error<T>(1)));
+
+  std::uint32_t last_y = ~0u;
+  double centre[3] = {};
+  double radius = 0;
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (y[i] != last_y) {
+      last_y = y[i];
+      const NodeBall ball = stage.y->ball(stage.level_y, last_y);
+      x_from_y.apply(ball.centre, centre);
+      radius = ball.r * x_from_y.scale;
+    }
+    const BallBlock& block = opened.blocks[x[i]];
+    const Origin& origin = opened.origins[x[i]];
+    const double q[3] = {centre[0] - origin.x, centre[1] - origin.y, centre[2] - origin.z};
+    const double magnitude = std::abs(q[0]) + std::abs(q[1]) + std::abs(q[2]) + radius;
+    const auto qx = hn::Set(d, static_cast<T>(q[0]));
+    const auto qy = hn::Set(d, static_cast<T>(q[1]));
+    const auto qz = hn::Set(d, static_cast<T>(q[2]));
+    const auto reach = hn::Set(d, static_cast<T>(radius + distance_error<T>(2 * magnitude)));
+    const std::uint32_t first_child = kWidth * x[i];
+    for (std::size_t lane = 0; lane < kWidth; lane += lanes) {
+      const auto dx = load_as<T>(d, block.x + lane) - qx;
+      const auto dy = load_as<T>(d, block.y + lane) - qy;
+      const auto dz = load_as<T>(d, block.z + lane) - qz;
+      const auto d2 = (dx * dx + dy * dy) + dz * dz;
+      // Negative for an unused lane, whose square must not count.
+      const auto sum = hn::Max(load_as<T>(d, block.r + lane) * grow + reach, hn::Zero(d));
+      const auto near = d2 < sum * sum;
+      const std::uint32_t child = first_child + static_cast<std::uint32_t>(lane);
+      if constexpr (sizeof(T) == sizeof(float)) {
+        const hn::RebindToUnsigned<decltype(d)> du;
+        hn::StoreU(hn::Set(du, last_y), du, out_y + found);
+        // Compressing in registers: the store form is microcode on some processors.
+        hn::StoreU(hn::Compress(hn::Iota(du, child), hn::RebindMask(du, near)), du, out_x + found);
+        found += hn::CountTrue(d, near);
+      } else {
+        for (std::uint32_t bits = mask_bits(d, near); bits != 0; bits &= bits - 1) {
+          out_x[found] =
+              child + static_cast<std::uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
+          out_y[found++] = last_y;
+        }
+      }
+    }
+  }
+  return found;
+}
+
+std::size_t open_single(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
+  return open_as<float>(stage, x, y, n, out_x, out_y);
+}
+
+std::size_t open_twice(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
+  return open_as<double>(stage, x, y, n, out_x, out_y);
+}
+
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ist {
+
+HWY_EXPORT(open_single);
+HWY_EXPORT(open_twice);
+
+std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept {
+  return stage.precision == Precision::single
+             ? HWY_DYNAMIC_DISPATCH(open_single)(stage, x, y, n, out_x, out_y)
+             : HWY_DYNAMIC_DISPATCH(open_twice)(stage, x, y, n, out_x, out_y);
+}
+
+}  // namespace ist
+#endif

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "query/relative_pose.h"
+#include "query/sphere_tree.h"
+
+namespace ist {
+
+/// Digits of the arithmetic inside a block. Float serves unless one object is far smaller than the
+/// other.
+enum class Precision { single, twice };
+
+/// How far rounding may move a distance that is computed from coordinates of this magnitude: each
+/// coordinate comes out of a three-term product, a sum and a difference, then a norm.
+constexpr double distance_error(Precision precision, double magnitude) {
+  return 12 * (precision == Precision::single ? 0x1p-24 : 0x1p-53) * magnitude;
+}
+template <class T>
+constexpr double distance_error(double magnitude) {
+  return distance_error(sizeof(T) == sizeof(float) ? Precision::single : Precision::twice,
+                        magnitude);
+}
+
+/// One stage of the descent: nodes of tree x are opened, those of y stand still.
+struct NodeStage {
+  const SphereTree* x;
+  const SphereTree* y;
+  int level_x;  ///< of the blocks that are opened, ≥ 1
+  int level_y;
+  const Similarity* x_from_y;
+  Precision precision;
+};
+
+/// Opens node x[i] of each pair and keeps its children that come within reach of node y[i], never
+/// losing one to rounding. Writes at most 16 n pairs and up to 16 entries of scratch beyond them;
+/// returns how many pairs. Same output on every instruction set.
+std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept;
+
+}  // namespace ist

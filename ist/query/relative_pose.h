@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include <ist/query.h>
+
+namespace ist {
+
+/// x ↦ scale · R x + t with the matrix stored scaled: plain numbers, because SIMD code reads them.
+struct Similarity {
+  double m[9] = {};  ///< scale · R, row by row
+  double t[3] = {};
+  double scale = 1;
+
+  void apply(const double (&x)[3], double (&y)[3]) const {
+    for (int i = 0; i < 3; ++i)
+      y[i] = (m[3 * i] * x[0] + m[3 * i + 1] * x[1]) + m[3 * i + 2] * x[2] + t[i];
+  }
+};
+
+/// Two placed trees, seen from A's unit frame (DESIGN 3.4): poses, scales and both unit frames are
+/// folded into one map, in double.
+struct RelativePose {
+  Similarity a_from_b;  ///< unit frame of B → unit frame of A
+  Similarity b_from_a;
+  Eigen::Matrix3d rotation_a;     ///< world from A
+  Eigen::Vector3d unit_origin_a;  ///< [u] world position of A's unit-frame origin
+  Eigen::Vector3d unit_offset_b;  ///< [u] from B's origin to its unit-frame origin, world
+  double unit_a = 1;              ///< [u] length of one unit of A's unit frame
+
+  Eigen::Vector3d to_world(const Eigen::Vector3d& x_unit_a) const {
+    return rotation_a * (x_unit_a * unit_a) + unit_origin_a;
+  }
+};
+
+/// Empty if a pose or scale is not usable (QueryStatus::invalid_pose) or a tree is empty.
+std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree& b) noexcept;
+
+}  // namespace ist

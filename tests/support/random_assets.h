@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <ist/bake.h>
+
+#include "asset/asset_writer.h"
+#include "build/tree_builder.h"
+
+namespace ist::testing {
+
+/// What a made-up asset is like.
+struct RandomAsset {
+  std::size_t spheres = 500;
+  double smallest = 0.2;  ///< smallest radius over largest
+  double centre[3] = {};  ///< [u] of the mesh frame
+  int exponent = 0;
+};
+
+/// An asset of random spheres in the unit ball: inner ones with covers, and effective ones that
+/// overlap each other a little, as calibrated ones do. No solid stands behind it.
+inline Asset make_random_asset(const RandomAsset& like, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const double n = static_cast<double>(like.spheres);
+  const double largest = 0.8 * std::cbrt(1 / n);
+  AssetArrays arrays;
+  while (arrays.inner_spheres.size() < like.spheres) {
+    const Eigen::Vector3d x(uniform(random), uniform(random), uniform(random));
+    if (x.norm() > 1) continue;
+    const double r = largest * std::pow(like.smallest, std::abs(uniform(random)));
+    const Eigen::Vector3d e =
+        x + 0.3 * r * Eigen::Vector3d(uniform(random), uniform(random), uniform(random));
+    arrays.inner_spheres.push_back({static_cast<float>(x.x()), static_cast<float>(x.y()),
+                                    static_cast<float>(x.z()), static_cast<float>(0.8 * r)});
+    arrays.effective_spheres.push_back({static_cast<float>(e.x()), static_cast<float>(e.y()),
+                                        static_cast<float>(e.z()), static_cast<float>(r)});
+    arrays.cover_radii.push_back(static_cast<float>(2 * r));
+  }
+  arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
+  arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  for (int k = 0; k < 3; ++k) arrays.header.centre[k] = like.centre[k];
+  arrays.header.exponent = like.exponent;
+  arrays.header.volume = arrays.matched_tree.volume_sum;
+  return Asset(asset_bytes(arrays), "random asset");
+}
+
+/// A pose with a random rotation and a shift of length `distance` in a random direction.
+inline Pose random_pose(std::mt19937_64& random, double distance) {
+  std::normal_distribution<double> normal;
+  Pose pose;
+  double norm = 0;
+  for (double& q : pose.q) {
+    q = normal(random);
+    norm += q * q;
+  }
+  for (double& q : pose.q) q /= std::sqrt(norm);
+  const Eigen::Vector3d direction =
+      Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
+  for (int k = 0; k < 3; ++k) pose.t[k] = distance * direction[k];
+  return pose;
+}
+
+}  // namespace ist::testing
