@@ -37,7 +37,7 @@ class Solid {
 
   virtual Eigen::AlignedBox3d bounds() const = 0;    ///< [u] holds the whole solid
   virtual double volume() const = 0;                 ///< [u³]
-  virtual double volume_error() const { return 0; }  ///< [u³] bound on the error of volume()
+  virtual double volume_error() const { return 0; }  ///< [u³] on volume(), see the maker
 };
 
 /// The solid of a closed mesh: where its winding number is ≥ 1 (DESIGN 3.6). Copies the mesh.
@@ -46,11 +46,13 @@ std::unique_ptr<Solid> make_solid(const ClosedMesh& mesh);
 /// Analytic solids. Radii and half-extents [u] must be finite and > 0, else Error.
 std::unique_ptr<Solid> make_ball(const Eigen::Vector3d& centre, double radius);
 std::unique_ptr<Solid> make_box(const Eigen::Vector3d& centre, const Eigen::Vector3d& half_extent);
-/// Torus about the z axis: `major` from the centre to the tube's centre line, `minor` the tube's.
+/// Torus about the z axis: `major` is the radius of the tube's centre line, `minor` ≤ `major` that of
+/// the tube.
 std::unique_ptr<Solid> make_torus(const Eigen::Vector3d& centre, double major, double minor);
 
-/// Boolean combinations by min and max of signed distances. Their volume is integrated, with the
-/// error that volume_error() states.
+/// Boolean combinations by min and max of signed distances. Their volume is integrated on first
+/// use (some 0.1 s); volume_error() is then an estimate with room (six times the error or more on
+/// smooth solids), not a proof. Error for an intersection of solids whose bounds do not meet.
 std::unique_ptr<Solid> make_union(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b);
 std::unique_ptr<Solid> make_intersection(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b);
 std::unique_ptr<Solid> make_difference(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b);

@@ -17,6 +17,11 @@ struct ExitCode {
   int value;
 };
 
+void add_bake(CLI::App& app);
+void add_query(CLI::App& app);
+void add_info(CLI::App& app);
+void add_check(CLI::App& app);
+void add_export(CLI::App& app);
 void add_sample(CLI::App& app);
 
 }  // namespace ist::app

@@ -1,13 +1,18 @@
-#include <fmt/format.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
 
 #include <exception>
 
 #include <ist/error.h>
 
 #include "app/commands.h"
+#include "app/interrupt.h"
 
 int main(int argc, char** argv) {
   using namespace ist::app;
+  install_interrupt_handler();
+  spdlog::set_default_logger(spdlog::stderr_color_mt("ist"));
+  spdlog::set_pattern("ist: %^%l%$: %v");
   CLI::App app(
       "Sphere packings, inner sphere trees and the volume by which two solids overlap.\n"
       "Lengths are [u], the mesh's own unit.",
@@ -16,6 +21,8 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Exit codes: 0 done, 1 error, 2 wrong usage, 3 check found a violation, 130 interrupted.");
+  add_info(app);
+  add_export(app);
   add_sample(app);
   try {
     app.parse(argc, argv);
@@ -25,7 +32,7 @@ int main(int argc, char** argv) {
   } catch (const ExitCode& code) {
     return code.value;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "ist: {}\n", error.what());
+    spdlog::error("{}", error.what());
     return kExitError;
   }
 }

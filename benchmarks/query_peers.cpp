@@ -1,0 +1,266 @@
+// Queries beside the peers on the oracle's rows: who answers what, how exactly, in what time.
+// One thread; thread CPU time of each call; every pose fresh: a round goes over all rows of a pair
+// key in turn, a row's time is its least of all rounds. Repeating one pose would train the branch
+// predictor and flatter everybody.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <optional>
+
+#include <ist/bake.h>
+#include <ist/query.h>
+
+#include "report.h"
+#include "sdf_voxel_sum.h"
+#include "support/bullet_mesh.h"
+#include "support/fcl_mesh.h"
+#include "support/oracle_rows.h"
+#include "timing.h"
+
+namespace {
+
+using Eigen::Vector3d;
+using ist::benchmark::quantile;
+using ist::benchmark::Report;
+using ist::benchmark::thread_seconds;
+using ist::testing::OracleRow;
+
+constexpr std::size_t kSpheres = 4000;
+constexpr double kVoxel = 0.01;  ///< of the diameter, which is 1
+
+/// What a library says of one row; empty where it does not answer that question.
+struct Answer {
+  bool touching = false;
+  std::optional<double> volume = {};
+  Vector3d push_b = Vector3d::Zero();  ///< any length; zero if none
+  std::optional<std::array<double, 2>> interval = {};
+};
+
+struct Query {
+  std::string name;
+  std::function<Answer(const OracleRow&)> ask;
+  std::vector<Answer> answers = {};  ///< a row each
+  std::vector<double> seconds = {};  ///< a row each, least of all rounds
+};
+
+/// The two meshes of a pair key as everybody sees them.
+struct PairOfBodies {
+  struct Body {
+    explicit Body(const std::string& mesh_name, double small_scale)
+        : closed(ist::close_mesh(ist::load_mesh(ist::testing::oracle_mesh_path(mesh_name)),
+                                 mesh_name)),
+          asset(ist::bake(closed, {.max_spheres = kSpheres})),
+          fcl(closed.mesh),
+          fcl_small(closed.mesh, small_scale),
+          bullet(closed.mesh),
+          bullet_small(closed.mesh, small_scale),
+          voxels(*ist::make_solid(closed), kVoxel) {}
+    ist::ClosedMesh closed;
+    ist::Asset asset;
+    ist::testing::FclMesh fcl, fcl_small;
+    ist::testing::BulletMesh bullet, bullet_small;
+    ist::benchmark::SdfVoxels voxels;
+  };
+
+  explicit PairOfBodies(const std::vector<OracleRow>& rows)
+      : a(rows.front().mesh_a, rows.back().scale_b), b(rows.front().mesh_b, rows.back().scale_b) {}
+
+  Body a, b;
+  ist::Workspace workspace;
+  ist::testing::BulletNarrowPhase bullet;
+};
+
+std::vector<Query> all_queries(PairOfBodies& pair) {
+  const auto placed_b = [&pair](const OracleRow& row) {
+    return ist::PlacedTree{pair.b.asset.view(), row.pose, row.scale_b};
+  };
+  const auto fcl_b = [&pair](const OracleRow& row) -> const ist::testing::FclMesh& {
+    return row.scale_b == 1 ? pair.b.fcl : pair.b.fcl_small;
+  };
+  const auto from_contacts = [](const ist::testing::MeshContacts& contacts) {
+    return Answer{.touching = contacts.any(), .push_b = contacts.push_b};
+  };
+  return {
+      {"ist penetration",
+       [&pair, placed_b](const OracleRow& row) {
+         const auto p =
+             ist::penetration({pair.a.asset.view(), {}}, placed_b(row), {}, pair.workspace);
+         return Answer{p.volume > 0, p.volume, -p.translation_gradient, {}};
+       }},
+      {"ist separation",
+       [&pair, placed_b](const OracleRow& row) {
+         const auto s =
+             ist::separation({pair.a.asset.view(), {}}, placed_b(row), {}, pair.workspace);
+         return Answer{.touching = s.distance == 0,
+                       .interval = std::array{s.distance_min, s.distance_max}};
+       }},
+      {"FCL collide, all contacts",
+       [&pair, fcl_b, from_contacts](const OracleRow& row) {
+         return from_contacts(ist::testing::fcl_contacts(pair.a.fcl, {}, fcl_b(row), row.pose));
+       }},
+      {"FCL distance",
+       [&pair, fcl_b](const OracleRow& row) {
+         const double d = ist::testing::fcl_distance(pair.a.fcl, {}, fcl_b(row), row.pose);
+         return Answer{.touching = d == 0, .interval = std::array{d, d}};
+       }},
+      {"Bullet GImpact, all contacts",
+       [&pair, from_contacts](const OracleRow& row) {
+         auto& b = row.scale_b == 1 ? pair.b.bullet : pair.b.bullet_small;
+         return from_contacts(pair.bullet.contacts(pair.a.bullet, {}, b, row.pose));
+       }},
+      {"SDF voxel sum, h = 0.01 D",
+       [&pair](const OracleRow& row) {
+         const double volume =
+             pair.a.voxels.overlap(pair.b.voxels, ist::to_isometry(row.pose), row.scale_b);
+         return Answer{.touching = volume > 0, .volume = volume};
+       }},
+  };
+}
+
+/// [s] what reading the clock twice costs by itself; taken off every measurement.
+double clock_cost() {
+  std::vector<double> costs;
+  for (int i = 0; i < 1001; ++i) {
+    const double start = thread_seconds();
+    costs.push_back(thread_seconds() - start);
+  }
+  return quantile(costs, 0.5);
+}
+
+void measure(std::vector<Query>& queries, const std::vector<OracleRow>& rows, int rounds) {
+  const double clock = clock_cost();
+  for (Query& query : queries) {
+    query.answers.resize(rows.size());
+    query.seconds.assign(rows.size(), std::numeric_limits<double>::infinity());
+    for (int round = 0; round < rounds; ++round) {
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        const double start = thread_seconds();
+        query.answers[i] = query.ask(rows[i]);
+        const double seconds = std::max(0.0, thread_seconds() - start - clock);
+        query.seconds[i] = std::min(query.seconds[i], seconds);
+      }
+    }
+  }
+}
+
+void report_times(Report& report, const std::string& key, const std::vector<Query>& queries,
+                  const std::vector<OracleRow>& rows) {
+  for (const std::string pose_class : {"sep", "pen", "deep", "contain"}) {
+    std::map<std::string, std::array<double, 2>> us;
+    for (const Query& query : queries) {
+      std::vector<double> times;
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (rows[i].pose_class == pose_class) times.push_back(1e6 * query.seconds[i]);
+      }
+      us[query.name] = {quantile(times, 0.5), quantile(times, 0.99)};
+    }
+    for (const Query& query : queries) {
+      const bool distance = query.name == "FCL distance" || query.name == "ist separation";
+      const auto& ours = us[distance ? "ist separation" : "ist penetration"];
+      const auto& its = us[query.name];
+      report.row("Time a query", {{"pair", key},
+                                  {"class", pose_class},
+                                  {"query", query.name},
+                                  {"median us", its[0]},
+                                  {"p99 us", its[1]},
+                                  {"median, times ist", its[0] / ours[0]},
+                                  {"p99, times ist", its[1] / ours[1]}});
+    }
+  }
+}
+
+double degrees(const Vector3d& u, const Vector3d& v) {
+  return std::acos(std::clamp(u.normalized().dot(v.normalized()), -1.0, 1.0)) * 180 /
+         std::numbers::pi;
+}
+
+void report_answers(Report& report, const std::string& key, const std::vector<Query>& queries,
+                    const std::vector<OracleRow>& rows) {
+  for (const Query& query : queries) {
+    std::size_t missed_contained = 0, contained = 0, missed_crossing = 0, false_touch = 0;
+    std::size_t wrong_interval = 0;
+    std::vector<double> error, angle, width;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const OracleRow& row = rows[i];
+      const Answer& answer = query.answers[i];
+      const bool held = row.volume > 0 && row.surface_distance > 0;
+      contained += held;
+      missed_contained += held && !answer.touching;
+      missed_crossing += row.surface_distance == 0 && !answer.touching;
+      false_touch += row.volume == 0 && answer.touching;
+      if (answer.volume && row.pose_class == "pen") {
+        error.push_back(100 * std::abs(*answer.volume / row.volume - 1));
+      }
+      if (answer.push_b.norm() > 0 && row.pose_class == "pen") {
+        angle.push_back(degrees(answer.push_b, -row.translation_gradient));
+      }
+      if (answer.interval) {
+        const auto [low, high] = *answer.interval;
+        const double slack = 1e-9;  // the oracle's distances are rounded so
+        wrong_interval += row.solid_distance() < low - slack || row.solid_distance() > high + slack;
+        if (row.pose_class == "sep") width.push_back(high - low);
+      }
+    }
+    Report::Json line = {
+        {"pair", key},
+        {"query", query.name},
+        {"contained missed", std::to_string(missed_contained) + " of " + std::to_string(contained)},
+        {"crossing missed", missed_crossing},
+        {"contact at a gap", false_touch}};
+    if (!error.empty()) {
+      line["pen: volume error %, median"] = quantile(error, 0.5);
+      line["p95"] = quantile(error, 0.95);
+    }
+    if (!angle.empty()) {
+      line["pen: force angle, median"] = quantile(angle, 0.5);
+      line["angle p95"] = quantile(angle, 0.95);
+    }
+    if (!width.empty()) {
+      line["distance outside its interval"] = wrong_interval;
+      line["sep: interval width / D, median"] = quantile(width, 0.5);
+    }
+    report.row("Right and wrong answers", line);
+
+    if (query.name == "ist penetration") {
+      report.target(key + ": contained rows missed", double(missed_contained), 0, true);
+    }
+    if (query.name == "ist separation") {
+      report.target(key + ": distances outside the interval", double(wrong_interval), 0, true);
+      if (key == "eledino") {
+        report.target("eledino sep: median interval width / D", quantile(width, 0.5), 0.02, true);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Report report("query_peers", argc, argv);
+  report.remark(
+      "One thread, 4,000 spheres an object, thread CPU time less the cost of the clock; "
+      "every pose fresh (rounds over all 200 rows in turn, least of the rounds a row).");
+  report.remark(
+      "FCL 0.7 (OBBRSS) and Bullet 3.24 (double precision, GImpact, margin 0) know "
+      "surfaces only: they answer 'no contact' for an object held by another. 'Contact "
+      "at a gap' of ist penetration is the soft skin of the matched measure; of Bullet, "
+      "triangle pairs that cross each other's planes without touching.");
+  report.remark(
+      "Times 'times ist' compare distances with ist separation, the rest with ist "
+      "penetration.");
+  std::vector<std::string> keys = ist::testing::kPairKeys;
+  if (report.quick()) keys = {"eledino", "ico1k"};
+  for (const std::string& key : keys) {
+    const auto rows = ist::testing::read_oracle_rows(key);
+    PairOfBodies pair(rows);
+    std::vector<Query> queries = all_queries(pair);
+    measure(queries, rows, report.quick() ? 2 : 5);
+    report_times(report, key, queries, rows);
+    report_answers(report, key, queries, rows);
+  }
+  return report.write();
+}

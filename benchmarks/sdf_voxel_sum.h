@@ -1,0 +1,69 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include <ist/solid.h>
+
+namespace ist::benchmark {
+
+/// The plain way to an overlap volume: a grid of A's signed distance, and the voxels inside B. The
+/// volume is that of B's voxels whose centre is inside A by trilinear interpolation. Both grids
+/// have the same spacing.
+class SdfVoxels {
+ public:
+  /// `spacing` [u]. Samples the solid at every grid node, and lists the voxels inside it.
+  SdfVoxels(const Solid& solid, double spacing) : spacing_(spacing) {
+    const Eigen::AlignedBox3d box = solid.bounds();
+    origin_ = box.min() - Eigen::Vector3d::Constant(1.5 * spacing);
+    for (int k = 0; k < 3; ++k) {
+      nodes_[k] = static_cast<int>(std::ceil(box.sizes()[k] / spacing)) + 4;
+    }
+    for (int z = 0; z < nodes_[2]; ++z) {
+      for (int y = 0; y < nodes_[1]; ++y) {
+        for (int x = 0; x < nodes_[0]; ++x) {
+          const Eigen::Vector3d at = origin_ + spacing * Eigen::Vector3d(x, y, z);
+          distance_.push_back(static_cast<float>(solid.signed_distance(at)));
+          if (distance_.back() > 0) inside_.push_back(at);
+        }
+      }
+    }
+  }
+
+  /// [u³] overlap with B, whose frame `b_to_a` takes into this frame after a uniform scale.
+  double overlap(const SdfVoxels& b, const Eigen::Isometry3d& b_to_a, double scale_b) const {
+    const Eigen::Matrix3d to_grid = b_to_a.linear() * (scale_b / spacing_);
+    const Eigen::Vector3d shift = (b_to_a.translation() - origin_) / spacing_;
+    std::size_t count = 0;
+    for (const Eigen::Vector3d& voxel : b.inside_) count += is_inside(to_grid * voxel + shift);
+    return static_cast<double>(count) * std::pow(scale_b * b.spacing_, 3);
+  }
+
+ private:
+  bool is_inside(const Eigen::Vector3d& grid) const {
+    for (int k = 0; k < 3; ++k) {
+      if (!(grid[k] >= 0 && grid[k] < nodes_[k] - 1)) return false;
+    }
+    const int x = static_cast<int>(grid.x()), y = static_cast<int>(grid.y()),
+              z = static_cast<int>(grid.z());
+    const double u = grid.x() - x, v = grid.y() - y, w = grid.z() - z;
+    const auto row = [&](int j, int k) {
+      const std::size_t i =
+          static_cast<std::size_t>(((z + k) * nodes_[1] + (y + j)) * nodes_[0] + x);
+      return (1 - u) * distance_[i] + u * distance_[i + 1];
+    };
+    return (1 - w) * ((1 - v) * row(0, 0) + v * row(1, 0)) +
+               w * ((1 - v) * row(0, 1) + v * row(1, 1)) >
+           0;
+  }
+
+  double spacing_;
+  Eigen::Vector3d origin_;
+  int nodes_[3] = {};
+  std::vector<float> distance_;          ///< [u] at the nodes, x fastest
+  std::vector<Eigen::Vector3d> inside_;  ///< [u] centres of the voxels inside
+};
+
+}  // namespace ist::benchmark

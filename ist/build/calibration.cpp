@@ -1,0 +1,111 @@
+#include "build/calibration.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include <ist/error.h>
+
+#include "build/column_lattice.h"
+#include "build/cube_root.h"
+#include "build/power_cells.h"
+
+namespace ist {
+namespace {
+
+constexpr int kRelaxations = 8;
+constexpr double kStep = 0.15;  // distance of columns over the mean leaf radius
+// Enough columns to measure the solid where spheres are few, and a bound where it is thin.
+constexpr double kMinColumns = 1u << 14;
+constexpr double kColumnsPerSphere = 64;
+// Columns that see less or more of the volume than this are too few: a sliver at a slant.
+constexpr double kLargestMiss = 0.1;
+// Radius of a sphere whose cell is empty, over the mean leaf radius: legal, and counts for nothing.
+constexpr double kEmptyCellRadius = 1e-4;
+
+double radius_of(double volume) { return cube_root(3 * volume / (4 * std::numbers::pi)); }
+
+/// Shares by the inner spheres' own volumes, for a solid that columns cannot measure.
+std::vector<PowerCell> inflated_spheres(std::span<const Sphere> inner) {
+  std::vector<PowerCell> cells;
+  double sum = 0;
+  for (const Sphere& s : inner) {
+    cells.push_back({double{s.r} * s.r * s.r, s.x, s.y, s.z});
+    sum += cells.back().share;
+  }
+  for (PowerCell& cell : cells) cell.share /= sum;
+  return cells;
+}
+
+/// Distance by which a ball sticks out of the solid at most; negative if it lies inside.
+double protrusion(const MeshSolid& solid, const Sphere4& ball) {
+  const Eigen::Vector3d centre(ball.x, ball.y, ball.z);
+  const double distance = solid.closest_point(centre).distance;
+  return ball.r + (solid.inside(centre) ? -distance : distance);
+}
+
+}  // namespace
+
+Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, unsigned threads,
+                      const ProgressCallback& progress) {
+  if (inner.empty()) throw Error("calibration: no inner spheres");
+  const auto start = std::chrono::steady_clock::now();
+  const auto report = [&](double fraction) {
+    if (!progress) return;
+    Progress now;
+    now.stage = "calibrate";
+    now.spheres = inner.size();
+    now.fraction = fraction;
+    now.elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (!progress(now)) throw Error("calibration: cancelled");
+  };
+  tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : static_cast<int>(threads));
+
+  const double volume = solid.unit_volume();
+  const double mean_radius = radius_of(volume / static_cast<double>(inner.size()));
+  std::vector<PowerSite> sites;
+  sites.reserve(inner.size());
+  for (const Sphere& s : inner) sites.push_back({s.x, s.y, s.z, double{s.r} * s.r});
+
+  report(0);
+  ColumnLattice lattice;
+  arena.execute([&] {
+    lattice = cut_columns(solid, kStep * mean_radius, kMinColumns,
+                          kMinColumns + kColumnsPerSphere * static_cast<double>(inner.size()));
+  });
+  if (std::abs(lattice.volume() - volume) > kLargestMiss * volume) lattice = {};
+
+  std::vector<PowerCell> cells = inflated_spheres(inner);
+  for (int round = 0; round < kRelaxations && lattice.length > 0; ++round) {
+    report(0.2 + 0.8 * round / kRelaxations);
+    arena.execute([&] { cells = power_cells(lattice, sites); });
+    for (std::size_t k = 0; k < sites.size(); ++k) {
+      if (cells[k].share <= 0) continue;  // keeps its place, and may win some back
+      const double radius = radius_of(cells[k].share * volume);
+      sites[k] = {cells[k].x, cells[k].y, cells[k].z, radius * radius};
+    }
+  }
+
+  Calibration result;
+  result.effective.resize(inner.size());
+  for (std::size_t k = 0; k < sites.size(); ++k) {
+    const double radius =
+        cells[k].share > 0 ? radius_of(cells[k].share * volume) : kEmptyCellRadius * mean_radius;
+    result.effective[k] = {static_cast<float>(sites[k].x), static_cast<float>(sites[k].y),
+                           static_cast<float>(sites[k].z), static_cast<float>(radius)};
+  }
+  std::vector<double> out(inner.size());
+  arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, out.size(),
+                      [&](std::size_t k) { out[k] = protrusion(solid, result.effective[k]); });
+  });
+  result.protrusion = std::max(0.0, *std::max_element(out.begin(), out.end()));
+  report(1);
+  return result;
+}
+
+}  // namespace ist

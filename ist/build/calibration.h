@@ -1,0 +1,30 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <ist/packing.h>
+#include <ist/progress.h>
+
+#include "mesh/mesh_solid.h"
+#include "query/asset_layout.h"
+
+namespace ist {
+
+/// The effective spheres of a solid: one ball for each cell of a partition of the solid, with the
+/// cell's volume and centre of mass (DESIGN 5).
+struct Calibration {
+  /// Unit frame, one for each inner sphere and in their order. Σ 4/3 π r³ is the solid's volume
+  /// within 1e-6; every radius is > 0.
+  std::vector<Sphere4> effective;
+  /// Unit frame, proven: no effective sphere sticks further out of the solid than this.
+  double protrusion = 0;
+};
+
+/// Calibrates a packing: relaxed power cells seeded by the inner spheres, integrated over columns
+/// of the solid. Same bytes for any number of threads (0 = all cores). Throws Error if there are no
+/// spheres or progress cancels.
+Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, unsigned threads,
+                      const ProgressCallback& progress);
+
+}  // namespace ist

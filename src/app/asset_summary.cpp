@@ -1,0 +1,84 @@
+#include "app/asset_summary.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "app/text.h"
+#include "query/asset_layout.h"
+
+namespace ist::app {
+namespace {
+
+std::string hex(std::uint64_t hash) { return fmt::format("{:016x}", hash); }
+
+nlohmann::ordered_json tree_json(const TreeHeader& tree, double scale) {
+  return {{"spheres", tree.sphere_count},
+          {"levels", tree.level_count},
+          {"volume_sum", tree.volume_sum * scale * scale * scale},
+          {"root_radius", tree.root[3] * scale},
+          {"overlap", tree.overlap}};
+}
+
+}  // namespace
+
+std::string describe_asset(const TreeView& tree) {
+  const AssetHeader& h = tree.header();
+  const double scale = std::ldexp(1.0, h.exponent);
+  const double cube = scale * scale * scale;
+  std::string text;
+  const auto line = [&](const char* name, const std::string& value) {
+    text += fmt::format("  {:<12} {}\n", name, value);
+  };
+  line("spheres",
+       fmt::format("{}, {:.3f} % of the volume (stopped by: {})", grouped(h.sphere_count),
+                   100 * h.coverage, name_of(static_cast<StopReason>(h.stop_reason))));
+  line("volume", fmt::format("{:.9g} ± {:.1g} u³", h.volume * cube, h.volume_error * cube));
+  line("frame", fmt::format("centre ({:.9g}, {:.9g}, {:.9g}) u, scale 2^{}", h.centre[0],
+                            h.centre[1], h.centre[2], h.exponent));
+  line("soft skin", fmt::format("{:.4g} u: no effective sphere sticks further out of the solid",
+                                h.protrusion * scale));
+  line("asked", fmt::format("{} spheres, coverage {:g}, min radius {:g} u, epsilon {:g}, grid {}, "
+                            "seed {}",
+                            h.asked_spheres == 0 ? "unlimited" : grouped(h.asked_spheres),
+                            h.asked_coverage, h.asked_min_radius, h.asked_epsilon,
+                            name_of(static_cast<GridMode>(h.asked_grid)), h.asked_seed));
+  if ((h.flags & kFlagRepaired) != 0) line("note", "the mesh was open and was repaired");
+  if ((h.flags & kFlagBelowNoise) != 0)
+    line("note", "the smallest spheres lie under float noise: certified, not in greedy order");
+  line("file", fmt::format("{} bytes, format {}.{}, content {}, mesh {}", grouped(h.file_bytes),
+                           h.format_major, h.format_minor, hex(h.content_hash), hex(h.mesh_hash)));
+  return text;
+}
+
+nlohmann::ordered_json asset_json(const TreeView& tree) {
+  const AssetHeader& h = tree.header();
+  const double scale = std::ldexp(1.0, h.exponent);
+  const double cube = scale * scale * scale;
+  return {
+      {"format", fmt::format("{}.{}", h.format_major, h.format_minor)},
+      {"bytes", h.file_bytes},
+      {"content_hash", hex(h.content_hash)},
+      {"mesh_hash", hex(h.mesh_hash)},
+      {"spheres", h.sphere_count},
+      {"coverage", h.coverage},
+      {"stop", name_of(static_cast<StopReason>(h.stop_reason))},
+      {"volume", h.volume * cube},
+      {"volume_error", h.volume_error * cube},
+      {"protrusion", h.protrusion * scale},
+      {"frame", {{"centre", h.centre}, {"exponent", h.exponent}}},
+      {"repaired", (h.flags & kFlagRepaired) != 0},
+      {"below_float_noise", (h.flags & kFlagBelowNoise) != 0},
+      {"asked",
+       {{"spheres", h.asked_spheres},
+        {"coverage", h.asked_coverage},
+        {"min_radius", h.asked_min_radius},
+        {"epsilon", h.asked_epsilon},
+        {"grid", name_of(static_cast<GridMode>(h.asked_grid))},
+        {"seed", h.asked_seed}}},
+      {"inner_tree", tree_json(h.inner_tree, scale)},
+      {"matched_tree", tree_json(h.matched_tree, scale)},
+  };
+}
+
+}  // namespace ist::app

@@ -1,0 +1,131 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <map>
+#include <memory>
+
+#include <ist/bake.h>
+#include <ist/error.h>
+
+#include "app/asset_summary.h"
+#include "app/commands.h"
+#include "app/interrupt.h"
+#include "app/progress_line.h"
+
+namespace ist::app {
+namespace {
+
+struct BakeOptions {
+  std::string mesh, output;
+  PackingSettings packing;
+  std::string grid = "banded", device = "auto";
+  bool repair = false, json = false, quiet = false;
+};
+
+void require_cpu(const BakeOptions& options) {
+  if (options.device == "cuda")
+    throw Error("--device cuda: this build has no GPU backend; use --device cpu or auto");
+  if (options.device == "auto") spdlog::info("baking on the CPU: this build has no GPU backend");
+}
+
+GridMode grid_mode(const std::string& name) {
+  if (name != "banded")
+    throw Error("--grid " + name + ": not available in this version; use --grid banded");
+  return GridMode::banded;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+Asset bake_interruptibly(const ClosedMesh& mesh, const PackingSettings& settings, bool quiet) {
+  const InterruptGuard guard;
+  ProgressLine line(quiet);
+  try {
+    Asset asset = bake(mesh, settings, [&](const Progress& progress) {
+      line.show(progress);
+      return !interrupted();
+    });
+    exit_if_interrupted();
+    return asset;
+  } catch (const Error&) {
+    exit_if_interrupted();
+    throw;
+  }
+}
+
+void run_bake(const BakeOptions& options) {
+  if (options.quiet) spdlog::set_level(spdlog::level::err);
+  PackingSettings settings = options.packing;
+  settings.grid = grid_mode(options.grid);
+  require_cpu(options);
+
+  const auto start = std::chrono::steady_clock::now();
+  const ClosedMesh mesh =
+      close_mesh(load_mesh(options.mesh), options.mesh,
+                 options.repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+  for (const std::string& note : mesh.report.notes) spdlog::warn("{}: {}", options.mesh, note);
+  const double import_seconds = seconds_since(start);
+  const Asset asset = bake_interruptibly(mesh, settings, options.quiet);
+  const double bake_seconds = seconds_since(start) - import_seconds;
+  asset.save(options.output);
+
+  if (options.json) {
+    nlohmann::ordered_json result = {{"asset", options.output}, {"mesh", options.mesh}};
+    result.update(asset_json(asset.view()));
+    result["notes"] = mesh.report.notes;
+    result["seconds"] = {{"import", import_seconds}, {"bake", bake_seconds}};
+    fmt::print("{}\n", result.dump(2));
+  } else if (!options.quiet) {
+    fmt::print("{}\n{}  {:<12} import {:.2f} s, bake {:.2f} s\n", options.output,
+               describe_asset(asset.view()), "time", import_seconds, bake_seconds);
+  }
+}
+
+}  // namespace
+
+void add_bake(CLI::App& app) {
+  const auto options = std::make_shared<BakeOptions>();
+  PackingSettings& packing = options->packing;
+  CLI::App* const command =
+      app.add_subcommand("bake", "Pack a closed mesh with spheres and write an .ist asset");
+  command->add_option("MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, …")->required();
+  command->add_option("-o,--output", options->output, "The .ist file to write")->required();
+  command->add_option("--spheres", packing.max_spheres, "Stop at this count, 0 = no limit")
+      ->capture_default_str();
+  command->add_option("--coverage", packing.target_coverage, "Stop at this share of the volume")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command->add_option("--min-radius", packing.min_radius, "[u] Insert nothing smaller")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--time", packing.time_limit, "[s] Stop packing after this, 0 = no limit")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--epsilon", packing.epsilon,
+                   "Every sphere is at least 1 − E times the largest that would fit; 0 = the "
+                   "library's own schedule")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command->add_option("--grid", options->grid, "How space is searched")
+      ->check(CLI::IsMember({"banded", "uniform", "explicit", "implicit", "hybrid"}))
+      ->capture_default_str();
+  command->add_option("--device", options->device, "Where packing runs")
+      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
+      ->capture_default_str();
+  command->add_option("--threads", packing.threads, "0 = all cores; never changes the result")
+      ->capture_default_str();
+  command->add_option("--seed", packing.seed, "Breaks ties; any value packs equally well")
+      ->capture_default_str();
+  command->add_flag("--repair", options->repair, "Close an open mesh, and say what was done");
+  command->add_flag("--json", options->json, "The result as JSON on stdout");
+  command->add_flag("--quiet", options->quiet, "Only errors");
+  command->footer(
+      "The first limit met stops the packing. Ctrl-C ends the bake without writing a file.\n"
+      "Example: ist bake bolt.obj -o bolt.ist --spheres 4000");
+  command->callback([options] { run_bake(*options); });
+}
+
+}  // namespace ist::app

@@ -1,0 +1,78 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include <ist/bake.h>
+
+#include "app/commands.h"
+#include "app/text.h"
+#include "query/asset_layout.h"
+
+namespace ist::app {
+namespace {
+
+struct CheckOptions {
+  std::string asset, mesh;
+  unsigned threads = 0;
+  bool json = false;
+};
+
+void print_json(const CheckOptions& options, const std::vector<Invariant>& invariants, bool sound) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const Invariant& i : invariants)
+    list.push_back({{"name", i.name},
+                    {"worst", i.worst},
+                    {"meaning", i.meaning},
+                    {"where", i.where},
+                    {"checked", i.checked},
+                    {"violations", i.violations}});
+  const nlohmann::ordered_json result = {
+      {"asset", options.asset}, {"mesh", options.mesh}, {"sound", sound}, {"invariants", list}};
+  fmt::print("{}\n", result.dump(2));
+}
+
+void print_table(const CheckOptions& options, const std::vector<Invariant>& invariants,
+                 bool sound) {
+  std::size_t width = 0;
+  for (const Invariant& i : invariants) width = std::max(width, i.name.size());
+  fmt::print("{} against {}\n", options.asset, options.mesh);
+  for (const Invariant& i : invariants) {
+    fmt::print("  {:<4} {:<{}}  worst {:>10.3g}  {} checked  ({})\n",
+               i.violations == 0 ? "ok" : "FAIL", i.name, width, i.worst, grouped(i.checked),
+               i.meaning);
+    if (i.violations != 0)
+      fmt::print("       {} violations, the worst at index {}\n", grouped(i.violations), i.where);
+  }
+  fmt::print("{}\n", sound ? "sound: no violations" : "NOT SOUND");
+}
+
+void run_check(const CheckOptions& options) {
+  const Asset asset = Asset::load(options.asset);
+  const bool repaired = (asset.view().header().flags & kFlagRepaired) != 0;
+  const ClosedMesh mesh = close_mesh(load_mesh(options.mesh), options.mesh,
+                                     repaired ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+  const std::vector<Invariant> invariants = check(asset, mesh, options.threads);
+  const bool sound = std::all_of(invariants.begin(), invariants.end(),
+                                 [](const Invariant& i) { return i.violations == 0; });
+  options.json ? print_json(options, invariants, sound) : print_table(options, invariants, sound);
+  if (!sound) throw ExitCode{kExitViolation};
+}
+
+}  // namespace
+
+void add_check(CLI::App& app) {
+  const auto options = std::make_shared<CheckOptions>();
+  CLI::App* const command =
+      app.add_subcommand("check", "Prove every invariant again, from asset and mesh alone");
+  command->add_option("ASSET", options->asset, "An .ist file")->required();
+  command->add_option("--mesh", options->mesh, "The MESH it was baked from")->required();
+  command->add_option("--threads", options->threads, "0 = all cores")->capture_default_str();
+  command->add_flag("--json", options->json, "The invariants as JSON");
+  command->footer(
+      "Exits 3 if an invariant is violated.\nExample: ist check bolt.ist --mesh bolt.obj");
+  command->callback([options] { run_check(*options); });
+}
+
+}  // namespace ist::app

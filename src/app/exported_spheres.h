@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <ist/tree_view.h>
+
+namespace ist::app {
+
+/// A sphere of an asset in the mesh's own unit and frame.
+struct ExportedSphere {
+  Eigen::Vector3d centre;            ///< [u] of the inner sphere
+  double radius = 0;                 ///< [u] rounded down: certified around the rounded centre
+  Eigen::Vector3d effective_centre;  ///< [u]
+  double effective_radius = 0;       ///< [u]
+  double cover_radius = 0;           ///< [u] about `centre`, rounded up
+};
+
+std::vector<ExportedSphere> exported_spheres(const TreeView& tree);
+
+// Text of a whole file: columns x,y,z,r,ex,ey,ez,er,c, 17 digits.
+std::string spheres_csv(std::span<const ExportedSphere> spheres);
+std::string spheres_ply(std::span<const ExportedSphere> spheres);
+std::string spheres_json(std::span<const ExportedSphere> spheres);
+
+}  // namespace ist::app

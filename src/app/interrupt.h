@@ -1,0 +1,23 @@
+#pragma once
+
+namespace ist::app {
+
+/// Ctrl-C ends the program with exit code 130 at once, unless an InterruptGuard is alive.
+void install_interrupt_handler();
+
+/// While one is alive, the first Ctrl-C only sets interrupted(), so that a long stage can end
+/// cleanly and no temporary file stays behind; the second ends the program.
+class InterruptGuard {
+ public:
+  InterruptGuard();
+  ~InterruptGuard();
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+};
+
+bool interrupted();
+
+/// Throws ExitCode 130 if Ctrl-C was pressed.
+void exit_if_interrupted();
+
+}  // namespace ist::app

@@ -1,0 +1,27 @@
+#include "app/progress_line.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+namespace ist::app {
+namespace {
+constexpr const char* kWipe = "\r\033[K";
+}
+
+ProgressLine::ProgressLine(bool quiet) : active_(!quiet && isatty(STDERR_FILENO) == 1) {}
+
+ProgressLine::~ProgressLine() {
+  if (active_) fmt::print(stderr, "{}", kWipe);
+}
+
+void ProgressLine::show(const Progress& progress) {
+  if (!active_) return;
+  fmt::print(stderr, "{}{:<9} {:3.0f} %  {} spheres  coverage {:.2f} %  radius {:.3g}  {:.1f} s",
+             kWipe, progress.stage, 100 * progress.fraction, progress.spheres,
+             100 * progress.coverage, progress.radius, progress.elapsed);
+  std::fflush(stderr);
+}
+
+}  // namespace ist::app

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <span>
+#include <string>
+
+#include <ist/query.h>
+
+#include "app/pose_rows.h"
+
+namespace ist::app {
+
+struct Answer {
+  PoseRow row;
+  PenetrationAndSeparation result;
+  double time_us = 0;  ///< [µs] wall time of this one query
+
+  /// Of both halves the one that says most.
+  QueryStatus status() const {
+    return std::max(result.penetration.status, result.separation.status);
+  }
+  std::uint64_t node_visits() const;
+  std::uint64_t sphere_pairs() const;
+};
+
+// The columns of DESIGN 9, 17 digits; other tools read them: new ones only at the end.
+std::string answers_csv(std::span<const Answer> answers);
+std::string answers_json(std::span<const Answer> answers);
+
+/// One answer for a person.
+std::string answer_text(const Answer& answer, Measure measure);
+
+}  // namespace ist::app

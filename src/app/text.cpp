@@ -1,0 +1,65 @@
+#include "app/text.h"
+
+#include <fmt/format.h>
+
+namespace ist::app {
+
+std::string grouped(std::uint64_t count) {
+  std::string digits = std::to_string(count);
+  for (std::size_t i = digits.size(); i > 3; i -= 3) digits.insert(i - 3, 1, ',');
+  return digits;
+}
+
+std::string short_vector(const Eigen::Vector3d& v) {
+  return fmt::format("({:.5g}, {:.5g}, {:.5g})", v.x(), v.y(), v.z());
+}
+
+const char* name_of(StopReason reason) noexcept {
+  switch (reason) {
+    case StopReason::sphere_count:
+      return "sphere_count";
+    case StopReason::coverage:
+      return "coverage";
+    case StopReason::min_radius:
+      return "min_radius";
+    case StopReason::time_limit:
+      return "time_limit";
+    case StopReason::cancelled:
+      return "cancelled";
+    case StopReason::exhausted:
+      return "exhausted";
+  }
+  return "unknown";
+}
+
+const char* name_of(GridMode mode) noexcept {
+  switch (mode) {
+    case GridMode::banded:
+      return "banded";
+  }
+  return "unknown";
+}
+
+const char* name_of(QueryStatus status) noexcept {
+  switch (status) {
+    case QueryStatus::ok:
+      return "ok";
+    case QueryStatus::budget_exhausted:
+      return "budget_exhausted";
+    case QueryStatus::invalid_pose:
+      return "invalid_pose";
+  }
+  return "unknown";
+}
+
+const char* name_of(Measure measure) noexcept {
+  switch (measure) {
+    case Measure::matched:
+      return "matched";
+    case Measure::inner:
+      return "inner";
+  }
+  return "unknown";
+}
+
+}  // namespace ist::app

@@ -1,0 +1,164 @@
+#include <ist/error.h>
+#include <ist/solid.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "mesh/solid_volume.h"
+
+namespace ist {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+void require_length(double value, const char* what) {
+  if (!(value > 0) || !std::isfinite(value))
+    throw Error(std::string(what) + " must be finite and > 0");
+}
+
+void require_point(const Eigen::Vector3d& p) {
+  if (!p.allFinite()) throw Error("the centre of a solid must be finite");
+}
+
+class Ball final : public Solid {
+ public:
+  Ball(const Eigen::Vector3d& centre, double radius) : centre_(centre), radius_(radius) {
+    require_point(centre);
+    require_length(radius, "the radius of a ball");
+  }
+  double signed_distance(const Eigen::Vector3d& x) const override {
+    return radius_ - (x - centre_).norm();
+  }
+  Eigen::AlignedBox3d bounds() const override {
+    const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius_);
+    return {centre_ - reach, centre_ + reach};
+  }
+  double volume() const override { return 4 * kPi / 3 * radius_ * radius_ * radius_; }
+
+ private:
+  Eigen::Vector3d centre_;
+  double radius_;
+};
+
+class Box final : public Solid {
+ public:
+  Box(const Eigen::Vector3d& centre, const Eigen::Vector3d& half_extent)
+      : centre_(centre), half_extent_(half_extent) {
+    require_point(centre);
+    for (int k = 0; k < 3; ++k) require_length(half_extent[k], "the half-extents of a box");
+  }
+  double signed_distance(const Eigen::Vector3d& x) const override {
+    const Eigen::Vector3d beyond = (x - centre_).cwiseAbs() - half_extent_;
+    const double deepest = beyond.maxCoeff();
+    return deepest <= 0 ? -deepest : -beyond.cwiseMax(0.0).norm();
+  }
+  Eigen::AlignedBox3d bounds() const override {
+    return {centre_ - half_extent_, centre_ + half_extent_};
+  }
+  double volume() const override { return 8 * half_extent_.prod(); }
+
+ private:
+  Eigen::Vector3d centre_, half_extent_;
+};
+
+class Torus final : public Solid {
+ public:
+  Torus(const Eigen::Vector3d& centre, double major, double minor)
+      : centre_(centre), major_(major), minor_(minor) {
+    require_point(centre);
+    require_length(major, "the major radius of a torus");
+    require_length(minor, "the minor radius of a torus");
+    if (minor > major) throw Error("the minor radius of a torus must not exceed the major one");
+  }
+  double signed_distance(const Eigen::Vector3d& x) const override {
+    const Eigen::Vector3d p = x - centre_;
+    return minor_ - Eigen::Vector2d(p.head<2>().norm() - major_, p.z()).norm();
+  }
+  Eigen::AlignedBox3d bounds() const override {
+    const Eigen::Vector3d reach(major_ + minor_, major_ + minor_, minor_);
+    return {centre_ - reach, centre_ + reach};
+  }
+  double volume() const override { return 2 * kPi * kPi * major_ * minor_ * minor_; }
+
+ private:
+  Eigen::Vector3d centre_;
+  double major_, minor_;
+};
+
+enum class Combination { join, meet, subtract };
+
+class Combined final : public Solid {
+ public:
+  Combined(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b, Combination combination)
+      : a_(std::move(a)), b_(std::move(b)), combination_(combination) {
+    if (a_ == nullptr || b_ == nullptr) throw Error("a combination of solids needs two of them");
+    if (bounds().isEmpty()) throw Error("the two solids do not meet: their intersection is empty");
+  }
+  double signed_distance(const Eigen::Vector3d& x) const override {
+    const double a = a_->signed_distance(x), b = b_->signed_distance(x);
+    switch (combination_) {
+      case Combination::join:
+        return std::max(a, b);
+      case Combination::meet:
+        return std::min(a, b);
+      case Combination::subtract:
+        break;
+    }
+    return std::min(a, -b);
+  }
+  Eigen::AlignedBox3d bounds() const override {
+    switch (combination_) {
+      case Combination::join:
+        return a_->bounds().merged(b_->bounds());
+      case Combination::meet:
+        return a_->bounds().intersection(b_->bounds());
+      case Combination::subtract:
+        break;
+    }
+    return a_->bounds();
+  }
+  double volume() const override { return integrated().value; }
+  double volume_error() const override { return integrated().error; }
+
+ private:
+  const IntegratedVolume& integrated() const {
+    std::call_once(integrate_once_, [this] { volume_ = integrate_volume(*this); });
+    return volume_;
+  }
+
+  std::unique_ptr<Solid> a_, b_;
+  Combination combination_;
+  mutable std::once_flag integrate_once_;  // only the outermost of nested solids is ever asked
+  mutable IntegratedVolume volume_;
+};
+
+}  // namespace
+
+std::unique_ptr<Solid> make_ball(const Eigen::Vector3d& centre, double radius) {
+  return std::make_unique<Ball>(centre, radius);
+}
+
+std::unique_ptr<Solid> make_box(const Eigen::Vector3d& centre, const Eigen::Vector3d& half_extent) {
+  return std::make_unique<Box>(centre, half_extent);
+}
+
+std::unique_ptr<Solid> make_torus(const Eigen::Vector3d& centre, double major, double minor) {
+  return std::make_unique<Torus>(centre, major, minor);
+}
+
+std::unique_ptr<Solid> make_union(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b) {
+  return std::make_unique<Combined>(std::move(a), std::move(b), Combination::join);
+}
+
+std::unique_ptr<Solid> make_intersection(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b) {
+  return std::make_unique<Combined>(std::move(a), std::move(b), Combination::meet);
+}
+
+std::unique_ptr<Solid> make_difference(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b) {
+  return std::make_unique<Combined>(std::move(a), std::move(b), Combination::subtract);
+}
+
+}  // namespace ist

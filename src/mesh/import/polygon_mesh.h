@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include <ist/mesh.h>
+
+#include "mesh/import/source_file.h"
+
+namespace ist {
+
+/// What a mesh file says: polygons over vertices. Corner indices are within the vertices; the
+/// coordinates may still be infinite or not a number.
+struct PolygonMesh {
+  std::vector<Eigen::Vector3d> vertices;  ///< [u]
+  std::vector<std::uint32_t> corners;     ///< of all polygons, one after the other
+  std::vector<std::size_t> ends;          ///< polygon i ends before corners[ends[i]]
+  /// Text files only: the line of each vertex that is not finite.
+  std::map<std::uint32_t, std::size_t> line_of_nonfinite;
+
+  void add_triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    corners.insert(corners.end(), {a, b, c});
+    ends.push_back(corners.size());
+  }
+};
+
+/// Readers of this library. Coordinates in double, every index and count checked. Each throws Error
+/// that names the file and the line, byte or element.
+PolygonMesh read_obj(const SourceFile& file);
+PolygonMesh read_stl(const SourceFile& file);
+PolygonMesh read_ply(const SourceFile& file);
+PolygonMesh read_off(const SourceFile& file);
+
+/// glTF 2.0: the default scene with its node transforms, skins in their bind pose.
+PolygonMesh read_gltf(const SourceFile& file);
+
+/// Any other format that assimp reads, the transforms of root and nodes applied. Coordinates pass
+/// through float.
+PolygonMesh read_with_assimp(const SourceFile& file);
+
+/// Polygons into triangles: a fan where it is valid, else ears cut off in the polygon's own plane
+/// (Newell normal), so that concave polygons come out right.
+std::vector<std::array<std::uint32_t, 3>> triangulate(const PolygonMesh& mesh);
+
+/// Appends the triangles of one polygon of three or more corners.
+void triangulate_polygon(const std::vector<Eigen::Vector3d>& vertices, const std::uint32_t* corners,
+                         std::size_t count, std::vector<std::array<std::uint32_t, 3>>& out);
+
+}  // namespace ist

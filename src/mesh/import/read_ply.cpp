@@ -1,0 +1,305 @@
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "mesh/import/polygon_mesh.h"
+#include "mesh/import/text_scanner.h"
+
+namespace ist {
+namespace {
+
+enum class Scalar { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
+enum class Encoding { ascii, little_endian, big_endian };
+
+struct Property {
+  std::string name;
+  Scalar type{};
+  bool is_list = false;
+  Scalar count_type{};  ///< of a list
+};
+
+struct Element {
+  std::string name;
+  std::uint64_t count = 0;
+  std::vector<Property> properties;
+};
+
+struct Header {
+  Encoding encoding{};
+  std::vector<Element> elements;
+  std::size_t body = 0;  ///< first byte after it
+  std::size_t lines = 0;
+};
+
+std::size_t size_of(const Scalar type) {
+  constexpr std::array<std::size_t, 8> kSizes{1, 1, 2, 2, 4, 4, 4, 8};
+  return kSizes[static_cast<std::size_t>(type)];
+}
+
+Scalar parse_type(const TextScanner& scanner, const std::string_view word) {
+  constexpr std::array<std::pair<std::string_view, Scalar>, 16> kNames{{
+      {"char", Scalar::int8},
+      {"int8", Scalar::int8},
+      {"uchar", Scalar::uint8},
+      {"uint8", Scalar::uint8},
+      {"short", Scalar::int16},
+      {"int16", Scalar::int16},
+      {"ushort", Scalar::uint16},
+      {"uint16", Scalar::uint16},
+      {"int", Scalar::int32},
+      {"int32", Scalar::int32},
+      {"uint", Scalar::uint32},
+      {"uint32", Scalar::uint32},
+      {"float", Scalar::float32},
+      {"float32", Scalar::float32},
+      {"double", Scalar::float64},
+      {"float64", Scalar::float64},
+  }};
+  for (const auto& [name, type] : kNames)
+    if (name == word) return type;
+  scanner.fail("unknown property type " + quoted(word));
+}
+
+Encoding parse_encoding(const TextScanner& scanner, const std::string_view word) {
+  if (word == "ascii") return Encoding::ascii;
+  if (word == "binary_little_endian") return Encoding::little_endian;
+  if (word == "binary_big_endian") return Encoding::big_endian;
+  scanner.fail("unknown PLY format " + quoted(word));
+}
+
+Header parse_header(const SourceFile& file) {
+  TextScanner scanner(file, 0);
+  scanner.next_line();
+  if (scanner.word() != "ply") fail(file, "does not begin with \"ply\", so it is not a PLY file");
+  Header header;
+  bool has_format = false;
+  while (scanner.next_line()) {
+    const std::string_view keyword = scanner.word();
+    if (keyword == "end_header") {
+      if (!has_format) scanner.fail("the header names no format");
+      header.body = scanner.next_line_start();
+      header.lines = scanner.line();
+      return header;
+    }
+    if (keyword == "format") {
+      header.encoding = parse_encoding(scanner, scanner.word());
+      has_format = true;
+    } else if (keyword == "element") {
+      Element element;
+      element.name = scanner.word();
+      const std::int64_t count = scanner.integer(scanner.word());
+      if (count < 0) scanner.fail("a negative number of elements " + quoted(element.name));
+      element.count = static_cast<std::uint64_t>(count);
+      header.elements.push_back(std::move(element));
+    } else if (keyword == "property") {
+      if (header.elements.empty()) scanner.fail("a property before any element");
+      Property property;
+      std::string_view type = scanner.word();
+      if (type == "list") {
+        property.is_list = true;
+        property.count_type = parse_type(scanner, scanner.word());
+        type = scanner.word();
+      }
+      property.type = parse_type(scanner, type);
+      property.name = scanner.word();
+      header.elements.back().properties.push_back(std::move(property));
+    } else if (keyword != "comment" && keyword != "obj_info" && !keyword.empty()) {
+      scanner.fail("unknown header line " + quoted(keyword));
+    }
+  }
+  fail(file, "the file ends early: the header has no end_header");
+}
+
+/// The values after the header, one after the other, whatever their encoding.
+class Body {
+ public:
+  Body(const SourceFile& file, const Header& header)
+      : file_(file),
+        encoding_(header.encoding),
+        position_(header.body),
+        text_(file, 0, header.body, header.lines + 1) {}
+
+  double read(const Scalar type) {
+    if (encoding_ == Encoding::ascii) {
+      const std::string_view word = text_.word_anywhere();
+      if (word.empty()) fail_early();
+      return text_.real(word);
+    }
+    switch (type) {
+      case Scalar::int8:
+        return binary<std::int8_t>();
+      case Scalar::uint8:
+        return binary<std::uint8_t>();
+      case Scalar::int16:
+        return binary<std::int16_t>();
+      case Scalar::uint16:
+        return binary<std::uint16_t>();
+      case Scalar::int32:
+        return binary<std::int32_t>();
+      case Scalar::uint32:
+        return binary<std::uint32_t>();
+      case Scalar::float32:
+        return binary<float>();
+      case Scalar::float64:
+        return binary<double>();
+    }
+    return 0;
+  }
+
+  std::uint64_t read_list_count(const Property& list) {
+    const double count = read(list.count_type);
+    if (!(count >= 0) || count != std::floor(count)) fail_here("a list of impossible length");
+    require(static_cast<std::uint64_t>(std::min(count, 1e18)), least_bytes(list.type), "list");
+    return static_cast<std::uint64_t>(count);
+  }
+
+  /// Throws unless the file is long enough for `count` records of `bytes` each.
+  void require(const std::uint64_t count, const std::size_t bytes, const std::string& what) const {
+    const std::size_t left =
+        encoding_ == Encoding::ascii ? text_.bytes_left() : file_.bytes.size() - position_;
+    if (bytes > 0 && count > left / bytes)
+      fail_here("the file ends early: it is too short for " + std::to_string(count) + " × " + what);
+  }
+
+  /// A value takes at least this much of the file. (Text: a digit and a space, the last one aside.)
+  std::size_t least_bytes(const Scalar type) const {
+    return encoding_ == Encoding::ascii ? 1 : size_of(type);
+  }
+  std::size_t least_bytes(const Element& element) const {
+    std::size_t sum = 0;
+    for (const Property& property : element.properties)
+      sum += least_bytes(property.is_list ? property.count_type : property.type);
+    return sum;
+  }
+
+  bool is_text() const { return encoding_ == Encoding::ascii; }
+  std::size_t line() const { return text_.line(); }
+  [[noreturn]] void fail_here(const std::string& what) const {
+    if (is_text()) text_.fail(what);
+    fail(file_, "byte " + std::to_string(position_) + ": " + what);
+  }
+
+ private:
+  [[noreturn]] void fail_early() const { fail_here("the file ends early"); }
+
+  template <class T>
+  double binary() {
+    if (file_.bytes.size() - position_ < sizeof(T)) fail_early();
+    std::array<char, sizeof(T)> raw;
+    std::memcpy(raw.data(), file_.bytes.data() + position_, sizeof(T));
+    static_assert(std::endian::native == std::endian::little);
+    if (encoding_ == Encoding::big_endian) std::reverse(raw.begin(), raw.end());
+    position_ += sizeof(T);
+    return static_cast<double>(std::bit_cast<T>(raw));
+  }
+
+  const SourceFile& file_;
+  Encoding encoding_;
+  std::size_t position_;
+  TextScanner text_;
+};
+
+void read_vertices(Body& body, const Element& element, PolygonMesh& mesh) {
+  // Where x, y and z stand among the properties.
+  std::vector<int> axis_of(element.properties.size(), -1);
+  std::array<bool, 3> found{};
+  for (std::size_t p = 0; p < element.properties.size(); ++p) {
+    const Property& property = element.properties[p];
+    for (int axis = 0; axis < 3; ++axis) {
+      if (property.is_list || property.name != std::string_view("xyz").substr(std::size_t(axis), 1))
+        continue;
+      axis_of[p] = axis;
+      found[static_cast<std::size_t>(axis)] = true;
+    }
+  }
+  if (!found[0] || !found[1] || !found[2]) body.fail_here("vertices without x, y and z");
+  if (element.count > UINT32_MAX) body.fail_here("more than 2^32 vertices");
+  mesh.vertices.reserve(element.count);
+  for (std::uint64_t i = 0; i < element.count; ++i) {
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();
+    for (std::size_t p = 0; p < element.properties.size(); ++p) {
+      const Property& property = element.properties[p];
+      const std::uint64_t values = property.is_list ? body.read_list_count(property) : 1;
+      for (std::uint64_t k = 0; k < values; ++k) {
+        const double value = body.read(property.type);
+        if (axis_of[p] >= 0) position[axis_of[p]] = value;
+      }
+    }
+    if (body.is_text() && !position.allFinite())
+      mesh.line_of_nonfinite[static_cast<std::uint32_t>(i)] = body.line();
+    mesh.vertices.push_back(position);
+  }
+}
+
+void read_faces(Body& body, const Element& element, const std::uint64_t vertex_count,
+                PolygonMesh& mesh) {
+  mesh.ends.reserve(element.count);
+  mesh.corners.reserve(3 * element.count);
+  for (std::uint64_t i = 0; i < element.count; ++i) {
+    for (const Property& property : element.properties) {
+      const std::uint64_t values = property.is_list ? body.read_list_count(property) : 1;
+      const bool corners = property.is_list &&
+                           (property.name == "vertex_indices" || property.name == "vertex_index");
+      for (std::uint64_t k = 0; k < values; ++k) {
+        const double value = body.read(property.type);
+        if (!corners) continue;
+        if (!(value >= 0) || value >= static_cast<double>(vertex_count) ||
+            value != std::floor(value))
+          body.fail_here("face " + std::to_string(i) + ": corner " + std::to_string(k) +
+                         " is no vertex: the file has " + std::to_string(vertex_count) +
+                         ", counted from 0");
+        mesh.corners.push_back(static_cast<std::uint32_t>(value));
+      }
+      if (!corners) continue;
+      if (values >= 3)
+        mesh.ends.push_back(mesh.corners.size());
+      else
+        mesh.corners.resize(mesh.corners.size() - values);
+    }
+  }
+}
+
+void skip(Body& body, const Element& element) {
+  if (element.properties.empty()) return;
+  for (std::uint64_t i = 0; i < element.count; ++i) {
+    for (const Property& property : element.properties) {
+      const std::uint64_t values = property.is_list ? body.read_list_count(property) : 1;
+      for (std::uint64_t k = 0; k < values; ++k) body.read(property.type);
+    }
+  }
+}
+
+}  // namespace
+
+/// Polygon file format, text or binary of either byte order; elements other than vertices and faces
+/// and properties other than position and corners are passed over.
+PolygonMesh read_ply(const SourceFile& file) {
+  const Header header = parse_header(file);
+  std::uint64_t vertex_count = 0;
+  for (const Element& element : header.elements)
+    if (element.name == "vertex") vertex_count += element.count;
+  Body body(file, header);
+  PolygonMesh mesh;
+  bool has_vertices = false, has_faces = false;
+  for (const Element& element : header.elements) {
+    body.require(element.count, body.least_bytes(element), element.name);
+    if (element.name == "vertex") {
+      if (std::exchange(has_vertices, true)) fail(file, "the header lists vertices twice");
+      read_vertices(body, element, mesh);
+    } else if (element.name == "face") {
+      if (std::exchange(has_faces, true)) fail(file, "the header lists faces twice");
+      read_faces(body, element, vertex_count, mesh);
+    } else {
+      skip(body, element);
+    }
+  }
+  return mesh;
+}
+
+}  // namespace ist

@@ -1,0 +1,116 @@
+#include <bit>
+#include <cctype>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include "mesh/import/polygon_mesh.h"
+#include "mesh/import/text_scanner.h"
+
+namespace ist {
+namespace {
+
+constexpr std::size_t kHeaderBytes = 84;  // 80 of free text, then the count
+constexpr std::size_t kFacetBytes = 50;   // normal, three corners, 2 bytes of attributes
+
+std::uint64_t triangles_announced(const SourceFile& file) {
+  std::uint32_t count = 0;
+  std::memcpy(&count, file.bytes.data() + kHeaderBytes - 4, sizeof count);
+  return count;
+}
+
+PolygonMesh read_binary(const SourceFile& file) {
+  if (file.bytes.size() < kHeaderBytes)
+    fail(file, "the file ends early: binary STL begins with " + std::to_string(kHeaderBytes) +
+                   " bytes, here are " + std::to_string(file.bytes.size()));
+  const std::uint64_t count = triangles_announced(file);
+  const std::uint64_t needed = kHeaderBytes + kFacetBytes * count;
+  if (needed > file.bytes.size())
+    fail(file, "the file ends early: " + std::to_string(count) + " triangles need " +
+                   std::to_string(needed) + " bytes, here are " +
+                   std::to_string(file.bytes.size()));
+  PolygonMesh mesh;
+  mesh.vertices.reserve(3 * count);
+  mesh.corners.reserve(3 * count);
+  mesh.ends.reserve(count);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    float corners[9];
+    std::memcpy(corners, file.bytes.data() + kHeaderBytes + kFacetBytes * i + 12, sizeof corners);
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (int k = 0; k < 3; ++k)
+      mesh.vertices.emplace_back(corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]);
+    mesh.add_triangle(first, first + 1, first + 2);
+  }
+  return mesh;
+}
+
+bool same_letters(const std::string_view word, const std::string_view lower) {
+  if (word.size() != lower.size()) return false;
+  for (std::size_t i = 0; i < word.size(); ++i)
+    if (std::tolower(static_cast<unsigned char>(word[i])) != lower[i]) return false;
+  return true;
+}
+
+PolygonMesh read_text(const SourceFile& file) {
+  TextScanner scanner(file, 0);
+  const auto next = [&] {
+    const std::string_view word = scanner.word_anywhere();
+    if (word.empty()) scanner.fail("the file ends early: a solid is not closed by endsolid");
+    return word;
+  };
+  const auto expect = [&](const std::string_view word, const char* keyword) {
+    if (!same_letters(word, keyword))
+      scanner.fail("expected " + quoted(keyword) + ", found " + quoted(word));
+  };
+  PolygonMesh mesh;
+  for (std::string_view word = scanner.word_anywhere(); !word.empty();
+       word = scanner.word_anywhere()) {
+    expect(word, "solid");
+    while (!scanner.word().empty()) {
+    }  // its name
+    for (word = next(); !same_letters(word, "endsolid"); word = next()) {
+      expect(word, "facet");
+      expect(next(), "normal");
+      for (int k = 0; k < 3; ++k) next();  // implied by the corners, and often wrong
+      expect(next(), "outer");
+      expect(next(), "loop");
+      const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+      for (int corner = 0; corner < 3; ++corner) {
+        expect(next(), "vertex");
+        Eigen::Vector3d position;
+        for (int k = 0; k < 3; ++k) position[k] = scanner.real(next());
+        if (!position.allFinite())
+          mesh.line_of_nonfinite[static_cast<std::uint32_t>(mesh.vertices.size())] = scanner.line();
+        mesh.vertices.push_back(position);
+      }
+      expect(next(), "endloop");
+      expect(next(), "endfacet");
+      mesh.add_triangle(first, first + 1, first + 2);
+    }
+    while (!scanner.word().empty()) {
+    }
+  }
+  return mesh;
+}
+
+bool is_text(const SourceFile& file) {
+  const std::string_view bytes = file.bytes;
+  if (bytes.size() >= kHeaderBytes &&
+      kHeaderBytes + kFacetBytes * triangles_announced(file) == bytes.size())
+    return false;  // many binary files begin with "solid" too
+  const std::size_t first = bytes.find_first_not_of(" \t\r\n");
+  return first != std::string_view::npos && same_letters(bytes.substr(first, 5), "solid") &&
+         bytes.find('\0') == std::string_view::npos;
+}
+
+}  // namespace
+
+PolygonMesh read_stl(const SourceFile& file) {
+  static_assert(std::endian::native == std::endian::little);
+  // 3 corners a triangle must stay countable in 32 bits.
+  if (file.bytes.size() / kFacetBytes > UINT32_MAX / 3)
+    fail(file, "more than 2^32 corners. Split the mesh");
+  return is_text(file) ? read_text(file) : read_binary(file);
+}
+
+}  // namespace ist

@@ -1,0 +1,67 @@
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <assimp/Importer.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mesh/import/polygon_mesh.h"
+
+namespace ist {
+namespace {
+
+using Transform = Eigen::Matrix4d;
+
+Transform to_double(const aiMatrix4x4& m) {
+  Transform result;
+  result << double(m.a1), double(m.a2), double(m.a3), double(m.a4),  //
+      double(m.b1), double(m.b2), double(m.b3), double(m.b4),        //
+      double(m.c1), double(m.c2), double(m.c3), double(m.c4),        //
+      double(m.d1), double(m.d2), double(m.d3), double(m.d4);
+  return result;
+}
+
+void append(const aiMesh& mesh, const Transform& world, PolygonMesh& out) {
+  const auto first = out.vertices.size();
+  if (first + mesh.mNumVertices > UINT32_MAX) return;
+  for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
+    const aiVector3D& v = mesh.mVertices[i];
+    out.vertices.push_back((world * Eigen::Vector4d(v.x, v.y, v.z, 1)).head<3>());
+  }
+  // A mirror turns every face inside out; turn it back.
+  const bool mirrored = world.topLeftCorner<3, 3>().determinant() < 0;
+  for (unsigned i = 0; i < mesh.mNumFaces; ++i) {
+    const aiFace& face = mesh.mFaces[i];
+    if (face.mNumIndices < 3) continue;  // points and lines
+    for (unsigned k = 0; k < face.mNumIndices; ++k) {
+      const unsigned corner = face.mIndices[mirrored ? face.mNumIndices - 1 - k : k];
+      out.corners.push_back(static_cast<std::uint32_t>(first + corner));
+    }
+    out.ends.push_back(out.corners.size());
+  }
+}
+
+}  // namespace
+
+PolygonMesh read_with_assimp(const SourceFile& file) {
+  Assimp::Importer importer;
+  // ValidateDataStructure: indices within range, whatever the file said.
+  const aiScene* const scene = importer.ReadFile(file.path, aiProcess_ValidateDataStructure);
+  if (scene == nullptr || scene->mRootNode == nullptr)
+    fail(file, "cannot be read as a mesh: " + std::string(importer.GetErrorString()));
+  PolygonMesh mesh;
+  std::vector<std::pair<const aiNode*, Transform>> open{
+      {scene->mRootNode, to_double(scene->mRootNode->mTransformation)}};
+  while (!open.empty()) {
+    const auto [node, world] = open.back();
+    open.pop_back();
+    for (unsigned i = 0; i < node->mNumMeshes; ++i)
+      append(*scene->mMeshes[node->mMeshes[i]], world, mesh);
+    for (unsigned i = node->mNumChildren; i-- > 0;)
+      open.emplace_back(node->mChildren[i], world * to_double(node->mChildren[i]->mTransformation));
+  }
+  return mesh;
+}
+
+}  // namespace ist

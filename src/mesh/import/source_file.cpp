@@ -1,0 +1,84 @@
+#include "mesh/import/source_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+#include <system_error>
+#include <utility>
+
+#include <ist/error.h>
+
+namespace ist {
+namespace {
+
+struct Signature {
+  std::string_view start;
+  std::string_view meaning;
+};
+
+using namespace std::string_view_literals;
+constexpr std::array kForeign{
+    Signature{"\x89PNG"sv, "a PNG image"},
+    Signature{"\xff\xd8\xff"sv, "a JPEG image"},
+    Signature{"GIF8"sv, "a GIF image"},
+    Signature{"%PDF"sv, "a PDF document"},
+    Signature{"\x1f\x8b"sv, "a gzip archive: unpack it first"},
+    Signature{"version https://git-lfs"sv,
+              "a Git LFS pointer, not the mesh itself: fetch it with `git lfs pull`"},
+};
+
+bool looks_like_web_page(std::string_view bytes) {
+  std::string start;
+  for (const char c : bytes.substr(0, 512))
+    start += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const auto first = start.find_first_not_of(" \t\r\n\xef\xbb\xbf");
+  if (first == std::string::npos || start[first] != '<') return false;
+  return start.find("<html") != std::string::npos || start.find("<!doctype html") == first;
+}
+
+}  // namespace
+
+SourceFile read_source_file(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) throw Error(path + ": no such file. Check the path");
+  if (std::filesystem::is_directory(path, error))
+    throw Error(path + ": is a folder. Name a mesh file in it");
+  std::ifstream stream(path, std::ios::binary | std::ios::ate);
+  if (!stream) throw Error(path + ": cannot be opened. Check its permissions");
+  const std::streamoff size = stream.tellg();
+  if (size == 0) throw Error(path + ": empty file");
+  SourceFile file{path, {}};
+  if (size > 0) {
+    file.bytes.resize(static_cast<std::size_t>(size));
+    stream.seekg(0);
+    stream.read(file.bytes.data(), size);
+  }
+  if (size < 0 || !stream) throw Error(path + ": cannot be read");
+  return file;
+}
+
+void refuse_other_content(const SourceFile& file) {
+  const std::string_view bytes = file.bytes;
+  for (const Signature& foreign : kForeign)
+    if (bytes.substr(0, foreign.start.size()) == foreign.start)
+      fail(file, "is " + std::string(foreign.meaning));
+  if (looks_like_web_page(bytes))
+    fail(file, "is a web page, perhaps an error message saved in its place: download it again");
+}
+
+void fail(const SourceFile& file, const std::string& what) { throw Error(file.path + ": " + what); }
+
+void fail_at_line(const SourceFile& file, const std::size_t line, const std::string& what) {
+  fail(file, "line " + std::to_string(line) + ": " + what);
+}
+
+std::string quoted(const std::string_view word) {
+  constexpr std::size_t kLongest = 40;
+  std::string text = "\"";
+  for (const char c : word.substr(0, kLongest)) text += (c >= ' ' && c <= '~') ? c : '?';
+  return text + (word.size() > kLongest ? "…\"" : "\"");
+}
+
+}  // namespace ist

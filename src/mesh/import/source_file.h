@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace ist {
+
+/// A whole file in memory, and its name for messages.
+struct SourceFile {
+  std::string path;
+  std::string bytes;
+};
+
+/// Throws Error if the file is missing, a folder, unreadable or empty.
+SourceFile read_source_file(const std::string& path);
+
+/// Throws Error if the bytes are plainly something else than a mesh: an image, an archive, a web
+/// page, a Git LFS pointer. Says which, and what to do.
+void refuse_other_content(const SourceFile& file);
+
+/// Throws Error "path: what".
+[[noreturn]] void fail(const SourceFile& file, const std::string& what);
+[[noreturn]] void fail_at_line(const SourceFile& file, std::size_t line, const std::string& what);
+
+/// Words of a file as they may appear in a message: printable, short, in quotes.
+std::string quoted(std::string_view word);
+
+}  // namespace ist

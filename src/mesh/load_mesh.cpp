@@ -1,0 +1,69 @@
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <utility>
+
+#include <ist/error.h>
+#include <ist/mesh.h>
+
+#include "mesh/import/polygon_mesh.h"
+#include "mesh/weld.h"
+
+namespace ist {
+namespace {
+
+using Reader = PolygonMesh (*)(const SourceFile&);
+
+constexpr std::array<std::pair<std::string_view, Reader>, 6> kReaders{{
+    {".obj", read_obj},
+    {".stl", read_stl},
+    {".ply", read_ply},
+    {".off", read_off},
+    {".glb", read_with_assimp},
+    {".gltf", read_with_assimp},
+}};
+
+Reader reader_of(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  for (const auto& [known, reader] : kReaders)
+    if (ending == known) return reader;
+  return read_with_assimp;
+}
+
+/// Bounds of the referenced vertices. Throws if one of them is infinite or not a number.
+Eigen::AlignedBox3d finite_bounds(const SourceFile& file, const PolygonMesh& mesh) {
+  Eigen::AlignedBox3d bounds;
+  for (const std::uint32_t v : mesh.corners) {
+    if (mesh.vertices[v].allFinite()) {
+      bounds.extend(mesh.vertices[v]);
+      continue;
+    }
+    const auto found = mesh.line_of_nonfinite.find(v);
+    const std::string line =
+        found == mesh.line_of_nonfinite.end() ? "" : "line " + std::to_string(found->second) + ": ";
+    fail(file, line + "vertex " + std::to_string(v) +
+                   " (counted from 0) has a coordinate that is infinite or not a number. "
+                   "Correct it, or remove the faces that use it");
+  }
+  return bounds;
+}
+
+}  // namespace
+
+TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings) {
+  if (!(settings.weld_tolerance >= 0) || settings.weld_tolerance > 0.1)
+    throw Error(path + ": the weld tolerance must lie in 0 … 0.1 of the diagonal");
+  const SourceFile file = read_source_file(path);
+  refuse_other_content(file);
+  const PolygonMesh polygons = reader_of(path)(file);
+  if (polygons.ends.empty()) fail(file, "no faces. There is nothing to bound a solid");
+  const Eigen::AlignedBox3d bounds = finite_bounds(file, polygons);
+  TriangleMesh mesh{polygons.vertices, triangulate(polygons)};
+  return weld(mesh, settings.weld_tolerance * bounds.diagonal().norm());
+}
+
+}  // namespace ist

@@ -1,0 +1,112 @@
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "mesh/line_winding.h"
+#include "mesh/shells.h"
+
+namespace ist {
+namespace {
+
+struct Shell {
+  SignedVolume volume;
+  Eigen::AlignedBox3d box;
+  std::vector<std::uint32_t> probes;                           ///< some of its vertices
+  std::vector<std::pair<std::uint32_t, int>> containers = {};  ///< shell, its winding number here
+};
+
+std::vector<Shell> measure(const std::vector<Eigen::Vector3d>& vertices,
+                           const std::vector<Triangle>& triangles, const Shells& shells) {
+  constexpr std::size_t kProbes = 9;
+  std::vector<Shell> result(shells.count);
+  std::vector<std::size_t> sizes(shells.count, 0), seen(shells.count, 0);
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    ++sizes[shells.of_triangle[t]];
+    for (const std::uint32_t v : triangles[t])
+      result[shells.of_triangle[t]].box.extend(vertices[v]);
+  }
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const std::uint32_t s = shells.of_triangle[t];
+    Shell& shell = result[s];
+    const Eigen::Vector3d origin = shell.box.center();
+    const auto corner = [&](const std::size_t k) { return vertices[triangles[t][k]] - origin; };
+    const double term = corner(0).dot(corner(1).cross(corner(2))) / 6;
+    shell.volume.volume += term;
+    shell.volume.magnitude += std::abs(term);
+    const std::size_t step = (sizes[s] + kProbes - 1) / kProbes;
+    if (seen[s]++ % step == 0) shell.probes.push_back(triangles[t][0]);
+  }
+  return result;
+}
+
+/// Fills in which shells hold which: all probes of the inner one lie inside.
+void find_containers(const std::vector<Eigen::Vector3d>& vertices,
+                     const std::vector<Triangle>& triangles, const Shells& shells,
+                     std::vector<Shell>& measured) {
+  const LineWinding winding(vertices, triangles, shells);
+  std::vector<int> numbers(shells.count, 0);
+  std::vector<std::uint32_t> met;
+  for (std::uint32_t s = 0; s < shells.count; ++s) {
+    auto& containers = measured[s].containers;
+    for (std::size_t i = 0; i < measured[s].probes.size(); ++i) {
+      winding.around(vertices[measured[s].probes[i]], numbers, met);
+      if (i == 0) {
+        std::sort(met.begin(), met.end());
+        for (const std::uint32_t other : met)
+          if (other != s && measured[other].box.contains(measured[s].box))
+            containers.emplace_back(other, numbers[other]);
+      }
+      std::erase_if(containers,
+                    [&](const auto& c) { return numbers[c.first] != c.second || c.second == 0; });
+      for (const std::uint32_t other : met) numbers[other] = 0;
+    }
+  }
+}
+
+}  // namespace
+
+Nesting orient_shells(const std::vector<Eigen::Vector3d>& vertices,
+                      std::vector<Triangle>& triangles, const Shells& shells) {
+  std::vector<Shell> measured = measure(vertices, triangles, shells);
+  if (shells.count > 1) find_containers(vertices, triangles, shells, measured);
+
+  // From the outside in: what holds a shell has fewer holders than it.
+  std::vector<std::uint32_t> order(shells.count);
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(), [&](const std::uint32_t a, const std::uint32_t b) {
+    return measured[a].containers.size() < measured[b].containers.size();
+  });
+  Nesting nesting;
+  std::vector<bool> turned(shells.count, false);
+  for (const std::uint32_t s : order) {
+    const Shell& shell = measured[s];
+    if (shell.volume.is_flat()) {
+      ++nesting.flat;
+      continue;
+    }
+    std::uint32_t outermost = s;
+    int around = 0;  // winding number of the shells that hold this one, as they are turned now
+    for (const auto& [holder, number] : shell.containers) {
+      around += turned[holder] ? -number : number;
+      if (measured[holder].containers.size() < measured[outermost].containers.size())
+        outermost = holder;
+    }
+    const bool follows = outermost != s && turned[outermost];
+    const bool outward = (shell.volume.volume > 0) != follows;
+    if (outward || around >= 1) {
+      turned[s] = follows;
+      if (outward && around >= 1) ++nesting.nested_solids;
+      if (!outward) ++nesting.cavities;
+    } else {
+      turned[s] = !follows;
+    }
+    nesting.flipped += turned[s] ? 1 : 0;
+    nesting.volume.volume += turned[s] ? -shell.volume.volume : shell.volume.volume;
+    nesting.volume.magnitude += shell.volume.magnitude;
+  }
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    if (turned[shells.of_triangle[t]]) std::swap(triangles[t][1], triangles[t][2]);
+  return nesting;
+}
+
+}  // namespace ist

@@ -1,0 +1,167 @@
+#include "mesh/surface_reduction.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdlib>
+#include <numeric>
+
+#include "mesh/disjoint_sets.h"
+
+namespace ist {
+
+bool is_degenerate(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
+  if (has_repeated_corner(t)) return true;
+  constexpr double kRounding = 8 * 2.220446049250313e-16;
+  const Eigen::Vector3d u = vertices[t[1]] - vertices[t[0]], v = vertices[t[2]] - vertices[t[0]];
+  return u.cross(v).norm() <= kRounding * u.norm() * v.norm();
+}
+
+std::size_t count_odd_edges(const EdgeTable& edges) {
+  std::size_t odd = 0;
+  for (std::size_t e = 0; e < edges.size(); ++e) odd += edges.sides(e).size() % 2;
+  return odd;
+}
+
+namespace {
+
+void keep_only(std::vector<Triangle>& triangles, const std::vector<bool>& keep) {
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    if (keep[t]) triangles[kept++] = triangles[t];
+  triangles.resize(kept);
+}
+
+}  // namespace
+
+std::size_t drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
+                            std::vector<Triangle>& triangles) {
+  const std::size_t before = triangles.size();
+  std::erase_if(triangles, has_repeated_corner);
+  std::vector<std::uint32_t> open;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t)
+    if (is_degenerate(vertices, triangles[t])) open.push_back(t);
+  if (open.empty()) return before - triangles.size();
+
+  const EdgeTable edges(triangles);
+  std::vector<std::size_t> sides(edges.size());
+  for (std::size_t e = 0; e < edges.size(); ++e) sides[e] = edges.sides(e).size();
+  std::vector<bool> keep(triangles.size(), true);
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (const std::uint32_t t : open) {
+      if (!keep[t]) continue;
+      std::size_t odd = 0;
+      for (std::size_t k = 0; k < 3; ++k) odd += sides[edges.edge_of(3 * t + k)] % 2;
+      if (odd < 2) continue;
+      for (std::size_t k = 0; k < 3; ++k) --sides[edges.edge_of(3 * t + k)];
+      keep[t] = false;
+      changed = true;
+    }
+  }
+  keep_only(triangles, keep);
+  return before - triangles.size();
+}
+
+namespace {
+
+/// Triangles with the same corners.
+struct Stack {
+  std::vector<std::uint32_t> members;
+  int sum = 0;  ///< of the members' directions, relative to the first
+};
+
+Triangle sorted(Triangle t) {
+  std::sort(t.begin(), t.end());
+  return t;
+}
+
+/// Same cyclic order of the same corners.
+bool same_direction(const Triangle& a, const Triangle& b) {
+  for (std::size_t k = 0; k < 3; ++k)
+    if (a[0] == b[k]) return a[1] == b[(k + 1) % 3];
+  return false;
+}
+
+std::vector<Stack> find_stacks(const std::vector<Triangle>& triangles) {
+  std::vector<std::pair<Triangle, std::uint32_t>> order(triangles.size());
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) order[t] = {sorted(triangles[t]), t};
+  std::sort(order.begin(), order.end());
+  std::vector<Stack> stacks;
+  for (std::size_t begin = 0, end; begin < order.size(); begin = end) {
+    end = begin + 1;
+    while (end < order.size() && order[end].first == order[begin].first) ++end;
+    if (end == begin + 1) continue;
+    Stack stack;
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t t = order[i].second;
+      stack.members.push_back(t);
+      stack.sum += same_direction(triangles[stack.members[0]], triangles[t]) ? 1 : -1;
+    }
+    stacks.push_back(std::move(stack));
+  }
+  return stacks;
+}
+
+}  // namespace
+
+std::size_t reduce_coincident(std::vector<Triangle>& triangles) {
+  const std::vector<Stack> stacks = find_stacks(triangles);
+  if (stacks.empty()) return 0;
+  const EdgeTable edges(triangles);
+
+  // Stacks that share an edge decide together.
+  DisjointSets groups(stacks.size());
+  std::vector<std::uint32_t> stack_at(edges.size(), kNoIndex);
+  const auto edge_of = [&](const Stack& stack, const std::size_t k) {
+    return edges.edge_of(3 * std::size_t{stack.members[0]} + k);
+  };
+  for (std::uint32_t s = 0; s < stacks.size(); ++s)
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::uint32_t& other = stack_at[edge_of(stacks[s], k)];
+      if (other == kNoIndex) other = s;
+      groups.unite(other, s);
+    }
+
+  // Two ways to reduce a group: how many copies of a stack are left, and how many odd edges.
+  const auto copies_left = [&](const Stack& stack, const bool one_copy) {
+    return one_copy ? 1u : static_cast<std::uint32_t>(std::abs(stack.sum));
+  };
+  std::vector<std::array<std::size_t, 2>> odd(stacks.size(), {0, 0});
+  std::vector<bool> cancels(stacks.size(), false);
+  std::vector<std::array<std::size_t, 2>> sides(edges.size());
+  for (std::size_t e = 0; e < edges.size(); ++e) sides[e].fill(edges.sides(e).size());
+  for (const Stack& stack : stacks)
+    for (std::size_t k = 0; k < 3; ++k)
+      for (const bool one_copy : {false, true})
+        sides[edge_of(stack, k)][one_copy] -= stack.members.size() - copies_left(stack, one_copy);
+  for (std::uint32_t s = 0; s < stacks.size(); ++s) {
+    const std::uint32_t group = groups.find(s);
+    for (std::size_t k = 0; k < 3; ++k)
+      for (const bool one_copy : {false, true})
+        odd[group][one_copy] += sides[edge_of(stacks[s], k)][one_copy] % 2;
+    if (stacks[s].sum == 0) cancels[group] = true;
+  }
+
+  std::vector<bool> keep(triangles.size(), true);
+  for (std::uint32_t s = 0; s < stacks.size(); ++s) {
+    const Stack& stack = stacks[s];
+    const std::uint32_t group = groups.find(s);
+    // Copies of the same direction are needless even where they cancel nothing.
+    const bool one_copy =
+        odd[group][1] < odd[group][0] || (odd[group][1] == odd[group][0] && !cancels[group]);
+    const std::uint32_t copies = copies_left(stack, one_copy);
+    // Those kept point the way that the sum does.
+    std::uint32_t kept = 0;
+    for (const std::uint32_t t : stack.members) {
+      const bool direction = same_direction(triangles[stack.members[0]], triangles[t]);
+      const bool wanted = stack.sum == 0 || direction == (stack.sum > 0);
+      keep[t] = wanted && kept < copies;
+      kept += keep[t] ? 1 : 0;
+    }
+  }
+  const std::size_t before = triangles.size();
+  keep_only(triangles, keep);
+  return before - triangles.size();
+}
+
+}  // namespace ist

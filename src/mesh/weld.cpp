@@ -1,0 +1,97 @@
+#include "mesh/weld.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace ist {
+namespace {
+
+constexpr std::uint32_t kNone = UINT32_MAX;
+
+std::uint64_t mix(std::uint64_t h, const std::uint64_t value) {
+  h = (h ^ value) * 0x9e3779b97f4a7c15u;
+  return h ^ (h >> 32);
+}
+
+/// Kept vertices by hash of their cell: chains in one array, newest first.
+class CellTable {
+ public:
+  explicit CellTable(const std::size_t vertices)
+      : mask_(std::bit_ceil(std::max<std::size_t>(vertices, 16)) - 1), heads_(mask_ + 1, kNone) {}
+
+  void add(const std::uint64_t hash, const std::uint32_t vertex) {
+    if (vertex >= next_.size()) next_.resize(vertex + 1, kNone);
+    next_[vertex] = heads_[hash & mask_];
+    heads_[hash & mask_] = vertex;
+  }
+
+  template <class Visit>
+  void visit(const std::uint64_t hash, const Visit& visit) const {
+    for (std::uint32_t v = heads_[hash & mask_]; v != kNone; v = next_[v]) visit(v);
+  }
+
+ private:
+  std::size_t mask_;
+  std::vector<std::uint32_t> heads_, next_;
+};
+
+using Cell = std::array<double, 3>;
+
+std::uint64_t hash_of(const Cell& cell) {
+  std::uint64_t h = 0;
+  for (const double c : cell) h = mix(h, std::bit_cast<std::uint64_t>(c + 0.0));  // −0 + 0 = 0
+  return h;
+}
+
+std::vector<bool> referenced(const TriangleMesh& mesh) {
+  std::vector<bool> used(mesh.vertices.size(), false);
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t v : triangle) used[v] = true;
+  return used;
+}
+
+}  // namespace
+
+TriangleMesh weld(const TriangleMesh& mesh, const double tolerance) {
+  const std::vector<bool> used = referenced(mesh);
+  TriangleMesh result;
+  std::vector<std::uint32_t> kept_as(mesh.vertices.size(), kNone);
+  CellTable table(mesh.vertices.size());
+  // Cells as wide as the tolerance: what is near enough lies in one of 27.
+  const auto cell_of = [&](const Eigen::Vector3d& p) {
+    if (tolerance == 0) return Cell{p[0], p[1], p[2]};
+    return Cell{std::floor(p[0] / tolerance), std::floor(p[1] / tolerance),
+                std::floor(p[2] / tolerance)};
+  };
+  const int reach = tolerance > 0 ? 1 : 0;
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    if (!used[i]) continue;
+    const Eigen::Vector3d& p = mesh.vertices[i];
+    const Cell cell = cell_of(p);
+    std::uint32_t first = kNone;
+    for (int dx = -reach; dx <= reach; ++dx)
+      for (int dy = -reach; dy <= reach; ++dy)
+        for (int dz = -reach; dz <= reach; ++dz)
+          table.visit(hash_of({cell[0] + dx, cell[1] + dy, cell[2] + dz}),
+                      [&](const std::uint32_t v) {
+                        const Eigen::Vector3d& q = result.vertices[v];
+                        const bool near = tolerance > 0 ? (q - p).norm() <= tolerance : q == p;
+                        if (near && v < first) first = v;
+                      });
+    if (first == kNone) {
+      first = static_cast<std::uint32_t>(result.vertices.size());
+      result.vertices.emplace_back(p + Eigen::Vector3d::Zero());
+      table.add(hash_of(cell), first);
+    }
+    kept_as[i] = first;
+  }
+  result.triangles.reserve(mesh.triangles.size());
+  for (const auto& t : mesh.triangles)
+    result.triangles.push_back({kept_as[t[0]], kept_as[t[1]], kept_as[t[2]]});
+  return result;
+}
+
+}  // namespace ist

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <ist/mesh.h>
+
+namespace ist {
+
+/// One vertex for all that lie within `tolerance` [u] of the first of them in file order (0: equal
+/// coordinates, −0 = 0); triangles follow. Unreferenced vertices are dropped, the rest keep their
+/// order. Every referenced coordinate must be finite.
+TriangleMesh weld(const TriangleMesh& mesh, double tolerance);
+
+}  // namespace ist

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+
+#include "packing/float3.h"
+#include "packing/ring.h"
+
+namespace ist::packing {
+
+/// A cube of the octree over the unit frame, and what is known about it. Its prototype is the
+/// point that the ascent reached from it, which may lie outside the cube.
+template <class Feature>
+struct Cell {
+  Float3 centre;
+  float half = 1;              ///< half-edge
+  float bound = 2;             ///< no sphere centred in the cube can have a larger radius
+  float surface_at_least = 0;  ///< lower bound of the centre's distance to the surface
+  bool inside = false;         ///< the centre lies in the solid
+  bool side_known = true;      ///< inside is the centre's own, not yet its parent's
+  std::uint32_t seen = 0;      ///< count of spheres when bound and prototype were last worked out
+  Float3 prototype;
+  float radius = 0;  ///< clearance of the prototype; 0: none
+  Ring<Feature> ring;
+};
+
+}  // namespace ist::packing

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <ist/solid.h>
+#include "packing/constraint.h"
+#include "packing/ring.h"
+
+namespace ist::packing {
+
+/// The surface of any Solid, known by its signed distance alone. Features are balls: a value s at q
+/// bounds the field by |x − q| + s everywhere (it is 1-Lipschitz), which is the ball {q, −s}; taken
+/// where the gradient leads to the surface, it is a surface point.
+class FieldSurface {
+ public:
+  struct Feature {
+    Float3 centre;
+    float radius = 0;
+  };
+
+  FieldSurface(const Solid& solid, const UnitFrame& frame)
+      : solid_(solid), frame_(frame), scale_(frame.scale()) {}
+
+  /// Unsigned distance to the surface, and the feature there, if it is less than `limit`.
+  bool nearest(Float3 x, float limit, Feature& feature, float& distance) const {
+    const double s = value(x);
+    if (!(std::fabs(s) < limit)) return false;
+    distance = static_cast<float>(std::fabs(s));
+    // Central differences over a step that float coordinates resolve.
+    const double step = 0x1p-20;
+    const Eigen::Vector3d at(x.x, x.y, x.z);
+    Eigen::Vector3d g;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d e = step * Eigen::Vector3d::Unit(k);
+      g[k] = value(at + e) - value(at - e);
+    }
+    const double length = std::sqrt(g.dot(g));
+    const Eigen::Vector3d q = length > 0 ? Eigen::Vector3d(at - s / length * g) : at;
+    feature.centre = {static_cast<float>(q.x()), static_cast<float>(q.y()),
+                      static_cast<float>(q.z())};
+    feature.radius = static_cast<float>(-value(feature.centre));
+    return true;
+  }
+
+  /// A remembered feature seen from x.
+  Constraint at(const Feature& feature, Float3 x) const {
+    return ball_constraint(feature.centre, feature.radius, x);
+  }
+
+  bool inside(Float3 x) const { return value(x) > 0; }
+  double clearance(Float3 x) const { return value(x); }
+
+ private:
+  double value(Float3 x) const { return value(Eigen::Vector3d(x.x, x.y, x.z)); }
+  double value(const Eigen::Vector3d& x) const {
+    return solid_.signed_distance(frame_.from_unit(x)) / scale_;
+  }
+
+  const Solid& solid_;
+  UnitFrame frame_;
+  double scale_;
+};
+
+}  // namespace ist::packing

@@ -1,0 +1,48 @@
+#include <ist/error.h>
+#include <ist/packing.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+
+#include "packing/banded_packer.h"
+#include "packing/field_surface.h"
+#include "packing/mesh_surface.h"
+#include "packing/packing_settings.h"
+
+namespace ist {
+
+SpherePacking pack(const Solid& solid, const PackingSettings& settings,
+                   const ProgressCallback& progress) {
+  packing::check_settings(settings);
+  const auto* mesh = dynamic_cast<const MeshSolid*>(&solid);
+  const UnitFrame frame = mesh != nullptr ? mesh->frame() : unit_frame(solid.bounds());
+  const double scale = frame.scale();
+  packing::BandedLimits limits;
+  limits.volume = solid.volume() / scale / scale / scale;
+  limits.target_coverage = settings.target_coverage;
+  limits.min_radius = settings.min_radius / scale;
+  limits.length_unit = scale;
+  if (!(limits.volume > 0)) throw Error("packing: the solid's volume is not positive");
+
+  SpherePacking result;
+  // More threads than TBB may run would only draw its warning.
+  const std::size_t allowed = oneapi::tbb::global_control::active_value(
+      oneapi::tbb::global_control::max_allowed_parallelism);
+  const std::size_t threads =
+      settings.threads == 0 ? allowed : std::min<std::size_t>(settings.threads, allowed);
+  oneapi::tbb::task_arena arena(static_cast<int>(threads));
+  arena.execute([&] {
+    if (mesh != nullptr) {
+      const packing::MeshSurface surface(*mesh);
+      result = packing::BandedPacker(surface, limits, settings, progress).run();
+    } else {
+      const packing::FieldSurface surface(solid, frame);
+      result = packing::BandedPacker(surface, limits, settings, progress).run();
+    }
+  });
+  result.frame = frame;
+  return result;
+}
+
+}  // namespace ist

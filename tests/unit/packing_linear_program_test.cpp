@@ -1,0 +1,89 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "packing/linear_program.h"
+
+namespace ist::packing {
+namespace {
+
+struct Ball {
+  Float3 centre;
+  float radius;
+};
+
+float clearance(const std::vector<Ball>& balls, Float3 x) {
+  float least = 1e30f;
+  for (const Ball& b : balls) least = std::min(least, norm(x - b.centre) - b.radius);
+  return least;
+}
+
+/// Balls about the origin, some of which may hold it.
+std::vector<Ball> random_balls(std::mt19937& random, int count, float scale) {
+  std::uniform_real_distribution<float> unit(-1, 1);
+  std::vector<Ball> balls;
+  for (int i = 0; i < count; ++i) {
+    const Float3 direction{unit(random), unit(random), unit(random)};
+    const float distance = scale * (0.2f + std::fabs(unit(random)));
+    const float radius = std::max(0.0f, 2 * scale * unit(random));
+    balls.push_back({((distance + radius) / norm(direction)) * direction, radius});
+  }
+  return balls;
+}
+
+TEST(LinearProgram, BoundIsNeverBelowASampledClearance) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  for (int round = 0; round < 2000; ++round) {
+    const float scale = round % 3 == 0 ? 1.0f : (round % 3 == 1 ? 1e-2f : 1e-4f);
+    const auto balls = random_balls(random, 1 + round % 40, scale);
+    const float a = scale * 0.5f * (1.1f + unit(random));
+    std::vector<Constraint> constraints;
+    for (const Ball& b : balls) constraints.push_back(ball_constraint(b.centre, b.radius, {}));
+    const ClearanceOptimum best =
+        maximise_clearance(constraints.data(), static_cast<int>(constraints.size()), a, 3 * a * a);
+    for (int i = 0; i < 300; ++i) {
+      const Float3 y = a * Float3{unit(random), unit(random), unit(random)};
+      ASSERT_LE(clearance(balls, y), best.value + 4e-6f * scale) << "round " << round;
+    }
+  }
+}
+
+TEST(LinearProgram, LinearModelIsSolvedToOptimality) {
+  // Against the best of many random points and of the reported point itself.
+  std::mt19937 random(2);
+  std::uniform_real_distribution<float> unit(-1, 1);
+  for (int round = 0; round < 2000; ++round) {
+    const auto balls = random_balls(random, 1 + round % 30, 1);
+    const float a = 0.3f;
+    std::vector<Constraint> constraints;
+    for (const Ball& b : balls) constraints.push_back(ball_constraint(b.centre, b.radius, {}));
+    const auto model = [&](Float3 y) {
+      float least = 1e30f;
+      for (const Constraint& c : constraints)
+        least = std::min(least, c.distance + dot(c.gradient, y));
+      return least;
+    };
+    const ClearanceOptimum best =
+        maximise_clearance(constraints.data(), static_cast<int>(constraints.size()), a, 0);
+    EXPECT_LE(norm1(best.y), 3 * a);
+    EXPECT_NEAR(model(best.y), best.value, 2e-5f) << "round " << round;
+    for (int i = 0; i < 100; ++i)
+      ASSERT_LE(model(a * Float3{unit(random), unit(random), unit(random)}), best.value + 1e-5f);
+  }
+}
+
+TEST(LinearProgram, FourFacesOfATetrahedronMeetAtItsIncentre) {
+  std::vector<Constraint> faces;
+  const float s = 1 / std::sqrt(3.0f);
+  for (const Float3 n : {Float3{s, s, s}, Float3{s, -s, -s}, Float3{-s, s, -s}, Float3{-s, -s, s}})
+    faces.push_back({n, 0.5f + dot(n, Float3{0.1f, 0.2f, -0.1f}), 0});
+  const ClearanceOptimum best = maximise_clearance(faces.data(), 4, 1, 0);
+  EXPECT_NEAR(best.value, 0.5f, 1e-6f);
+  EXPECT_NEAR(norm(best.y - Float3{-0.1f, -0.2f, 0.1f}), 0, 1e-6f);
+}
+
+}  // namespace
+}  // namespace ist::packing
