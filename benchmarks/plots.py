@@ -1,5 +1,54 @@
-"""One plot a benchmark: a function of the program's name draws its report into a PNG file."""
+"""One plot a benchmark: the function named for the program draws its report into a PNG file."""
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+
+
+def save(figure, path):
+    figure.tight_layout()
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def packing_openvdb(report, path):
+    rows = report["tables"]["Against OpenVDB fillWithSpheres"]
+    meshes = list(dict.fromkeys(row["mesh"] for row in rows))
+    figure, axes = plt.subplots(1, len(meshes), figsize=(5 * len(meshes), 4), squeeze=False)
+    for axis, mesh in zip(axes[0], meshes):
+        mine = [row for row in rows if row["mesh"] == mesh]
+        for name, seconds, coverage, style in (
+                ("ist", "ist s", "ist coverage %", "o-"),
+                ("OpenVDB", "OpenVDB s", "OpenVDB claimed %", "s--")):
+            axis.semilogx([row[seconds] for row in mine], [row[coverage] for row in mine], style,
+                          label=name)
+            for row in mine:
+                axis.annotate(f" {row['spheres']:,}", (row[seconds], row[coverage]), fontsize=8,
+                              va="top")
+        axis.set(title=mesh, xlabel="seconds, 2 threads", ylabel="coverage, %")
+        axis.grid(True, which="both", alpha=0.3)
+        axis.legend(loc="lower right")
+    save(figure, path)
+
+
+def query_peers(report, path):
+    rows = report["tables"]["Time a query"]
+    pairs = list(dict.fromkeys(row["pair"] for row in rows))
+    classes = list(dict.fromkeys(row["class"] for row in rows))
+    queries = list(dict.fromkeys(row["query"] for row in rows))
+    figure, axes = plt.subplots(len(pairs), 1, figsize=(9, 3 * len(pairs)), squeeze=False)
+    width = 0.8 / len(queries)
+    for axis, pair in zip(axes[:, 0], pairs):
+        for i, query in enumerate(queries):
+            at = [c + (i - len(queries) / 2 + 0.5) * width for c in range(len(classes))]
+            by_class = [next(row for row in rows if (row["pair"], row["class"], row["query"]) ==
+                             (pair, c, query)) for c in classes]
+            median = [row["median us"] for row in by_class]
+            tail = [row["p99 us"] - row["median us"] for row in by_class]
+            axis.bar(at, median, width, label=query,
+                     yerr=[[0] * len(tail), tail], error_kw={"elinewidth": 0.8, "capsize": 2})
+        axis.set(yscale="log", title=pair, ylabel="µs: median, whisker p99",
+                 xticks=range(len(classes)), xticklabels=classes)
+        axis.grid(True, axis="y", alpha=0.3)
+    axes[0, 0].legend(fontsize=7, ncol=3, loc="upper center", bbox_to_anchor=(0.5, 1.45))
+    save(figure, path)
