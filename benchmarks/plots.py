@@ -27,7 +27,8 @@ def packing_openvdb(report, path):
                               va="top")
         axis.set(title=mesh, xlabel="seconds, 2 threads", ylabel="coverage, %")
         axis.grid(True, which="both", alpha=0.3)
-        axis.legend(loc="lower right")
+        axis.margins(x=0.2)
+        axis.legend(loc="upper left")
     save(figure, path)
 
 
