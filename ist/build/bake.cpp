@@ -1,0 +1,77 @@
+#include <ist/bake.h>
+#include <ist/error.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+#include "asset/asset_writer.h"
+#include "build/calibration.h"
+#include "build/cover.h"
+#include "build/tree_builder.h"
+#include "mesh/mesh_solid.h"
+
+namespace ist {
+namespace {
+
+AssetHeader describe_bake(const ClosedMesh& mesh, const MeshSolid& solid,
+                          const PackingSettings& settings, const SpherePacking& packing) {
+  AssetHeader header;
+  header.mesh_hash = solid.hash();
+  for (int k = 0; k < 3; ++k) header.centre[k] = packing.frame.centre[k];
+  header.exponent = packing.frame.exponent;
+  header.flags = (mesh.report.repaired ? kFlagRepaired : 0) |
+                 (packing.below_float_noise ? kFlagBelowNoise : 0);
+  header.volume = solid.unit_volume();
+  header.volume_error = solid.unit_volume_error();
+  header.coverage = std::min(packing.coverage, 1.0);
+  header.asked_spheres = settings.max_spheres;
+  header.asked_coverage = settings.target_coverage;
+  header.asked_min_radius = settings.min_radius;
+  header.asked_epsilon = settings.epsilon;
+  header.asked_seed = settings.seed;
+  header.asked_grid = static_cast<std::uint32_t>(settings.grid);
+  header.stop_reason = static_cast<std::uint32_t>(packing.stop);
+  header.kept_ratio_worst = packing.kept_ratio_worst;
+  header.kept_ratio_median = packing.kept_ratio_median;
+  return header;
+}
+
+void report_tree(const ProgressCallback& progress, std::size_t spheres, double fraction) {
+  Progress now;
+  now.stage = "tree";
+  now.spheres = spheres;
+  now.fraction = fraction;
+  if (progress && !progress(now)) throw Error("tree: cancelled");
+}
+
+}  // namespace
+
+Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
+           const ProgressCallback& progress) {
+  const MeshSolid solid(mesh);
+  const SpherePacking packing = pack(solid, settings, progress);
+  if (packing.spheres.empty())
+    throw Error(mesh.name +
+                ": not one sphere fits within the limits; lower the smallest radius or the "
+                "coverage, or allow more time");
+  AssetArrays arrays;
+  arrays.header = describe_bake(mesh, solid, settings, packing);
+  for (const Sphere& s : packing.spheres) arrays.inner_spheres.push_back({s.x, s.y, s.z, s.r});
+
+  Calibration calibration = calibrate(solid, packing.spheres, settings.threads, progress);
+  arrays.effective_spheres = std::move(calibration.effective);
+  arrays.header.protrusion = calibration.protrusion;
+  arrays.cover_radii = cover_radii(solid, packing.spheres, settings.threads, progress);
+
+  report_tree(progress, packing.spheres.size(), 0);
+  tbb::task_arena arena(settings.threads == 0 ? tbb::task_arena::automatic
+                                              : static_cast<int>(settings.threads));
+  arena.execute([&] {
+    arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
+    arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  });
+  report_tree(progress, packing.spheres.size(), 1);
+  return Asset(asset_bytes(arrays), mesh.name);
+}
+
+}  // namespace ist

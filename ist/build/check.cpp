@@ -1,0 +1,40 @@
+#include <ist/bake.h>
+#include <ist/error.h>
+#include <tbb/task_arena.h>
+
+#include "build/check_spheres.h"
+#include "build/check_surface.h"
+#include "build/check_tree.h"
+#include "mesh/mesh_solid.h"
+#include "query/asset_layout.h"
+
+namespace ist {
+namespace {
+
+void append(std::vector<Invariant>& all, std::vector<Invariant> more) {
+  for (Invariant& one : more) all.push_back(std::move(one));
+}
+
+std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mesh) {
+  const MeshSolid solid(mesh);
+  if (solid.hash() != asset.mesh_hash)
+    throw Error(mesh.name + ": the asset was baked from another mesh; bake again");
+  const CheckSurface surface(mesh, solid.frame());
+  std::vector<Invariant> all = check_header(asset, surface, solid);
+  append(all, check_spheres(asset, surface));
+  all.push_back(check_cover(asset, surface));
+  append(all, check_tree(asset, asset.inner_tree, at<Sphere4>(asset, asset.inner_spheres),
+                         at<float>(asset, asset.cover_radii), "inner tree"));
+  append(all, check_tree(asset, asset.matched_tree, at<Sphere4>(asset, asset.effective_spheres),
+                         nullptr, "matched tree"));
+  return all;
+}
+
+}  // namespace
+
+std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigned threads) {
+  tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : static_cast<int>(threads));
+  return arena.execute([&] { return check_all(asset.view().header(), mesh); });
+}
+
+}  // namespace ist

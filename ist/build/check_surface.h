@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <ist/mesh.h>
+#include <ist/solid.h>
+
+namespace ist {
+
+/// A mesh's surface as `check` sees it: plain, in double, and of its own making, so that a mistake
+/// in the solid that packing asked is not repeated here. Immutable.
+class CheckSurface {
+ public:
+  CheckSurface(const ClosedMesh& mesh, const UnitFrame& frame);
+
+  /// Unit frame, to the nearest triangle; once nothing is nearer than `limit`, any value ≥ limit.
+  double distance(const Eigen::Vector3d& p, double limit) const;
+
+  /// Winding number of a point off the surface, by a ray in a direction that no mesh was modelled
+  /// along; where rounding leaves a sign open, by the sum of all solid angles.
+  int winding(const Eigen::Vector3d& p) const;
+
+  const Eigen::AlignedBox3d& bounds() const { return bounds_; }  ///< unit frame
+
+ private:
+  using Corners = std::array<Eigen::Vector3d, 3>;
+  struct Node {
+    Eigen::AlignedBox3d box;
+    std::uint32_t begin = 0, end = 0;  ///< triangles
+    std::uint32_t right = 0;           ///< second child; the first is the next node; 0 at a leaf
+  };
+
+  void build(std::uint32_t begin, std::uint32_t end);
+  int winding_by_solid_angle(const Eigen::Vector3d& p) const;
+
+  std::vector<Corners> triangles_;
+  std::vector<Node> nodes_;
+  Eigen::AlignedBox3d bounds_;
+};
+
+}  // namespace ist

@@ -1,0 +1,223 @@
+#include <gtest/gtest.h>
+#include <ist/bake.h>
+#include <ist/error.h>
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+
+#include "asset/asset_writer.h"
+#include "query/asset_layout.h"
+#include "query/content_hash.h"
+#include "support/test_meshes.h"
+
+namespace ist {
+namespace {
+
+ClosedMesh cube() { return testing::closed(testing::cube_mesh(), "cube"); }
+
+PackingSettings of_size(std::size_t spheres, unsigned threads = 0) {
+  PackingSettings settings;
+  settings.max_spheres = spheres;
+  settings.threads = threads;
+  return settings;
+}
+
+std::vector<std::byte> bytes_of(const Asset& asset) {
+  return {asset.bytes().begin(), asset.bytes().end()};
+}
+
+const Asset& cube_asset() {
+  static const Asset asset = bake(cube(), of_size(60));
+  return asset;
+}
+
+void expect_sound(const std::vector<Invariant>& invariants) {
+  EXPECT_GE(invariants.size(), 20u);
+  for (const Invariant& one : invariants) {
+    EXPECT_EQ(one.violations, 0u) << one.name << ": " << one.worst << " at " << one.where;
+    EXPECT_LE(one.worst, 0) << one.name;
+    if (one.name != "spheres disjoint") EXPECT_GT(one.checked, 0u) << one.name;
+  }
+}
+
+TEST(Check, FindsBakesSound) {
+  expect_sound(check(cube_asset(), cube()));
+  for (const std::size_t n : {1u, 16u, 17u, 400u}) {
+    const ClosedMesh torus = testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
+    expect_sound(check(bake(torus, of_size(n)), torus));
+  }
+}
+
+TEST(Check, RefusesAnotherMesh) {
+  const ClosedMesh other = testing::closed(testing::icosphere_mesh(1), "ball");
+  EXPECT_THROW(check(cube_asset(), other), Error);
+}
+
+/// A copy of the cube's asset with something changed and the hash made right again.
+Asset tampered(const std::function<void(AssetHeader&)>& change) {
+  std::vector<std::byte> bytes = bytes_of(cube_asset());
+  // The header and the arrays are changed in an aligned copy.
+  const std::unique_ptr<std::byte[], void (*)(std::byte*)> block(
+      static_cast<std::byte*>(::operator new[](bytes.size(), std::align_val_t{kAssetAlignment})),
+      [](std::byte* p) { ::operator delete[](p, std::align_val_t{kAssetAlignment}); });
+  std::memcpy(block.get(), bytes.data(), bytes.size());
+  change(*reinterpret_cast<AssetHeader*>(block.get()));
+  std::memcpy(bytes.data(), block.get(), bytes.size());
+  seal(bytes);
+  return Asset(bytes, "tampered");
+}
+
+template <class T>
+T* writable(AssetHeader& header, std::uint64_t offset) {
+  return const_cast<T*>(at<T>(header, offset));
+}
+
+Sphere4& inner(AssetHeader& h, std::size_t i) { return writable<Sphere4>(h, h.inner_spheres)[i]; }
+Sphere4& effective(AssetHeader& h, std::size_t i) {
+  return writable<Sphere4>(h, h.effective_spheres)[i];
+}
+BallBlock& block(AssetHeader& h, const TreeHeader& tree, std::size_t level) {
+  return *writable<BallBlock>(h, tree.level[level].blocks);
+}
+NodeBlock& nodes(AssetHeader& h, const TreeHeader& tree, std::size_t level) {
+  return *writable<NodeBlock>(h, tree.level[level].nodes);
+}
+
+struct Tampering {
+  const char* invariant;  ///< what must turn red
+  std::function<void(AssetHeader&)> change;
+};
+
+// Every invariant can fail, and the one that is hurt says so.
+TEST(Check, TurnsRedForEveryInvariant) {
+  const std::vector<Tampering> cases = {
+      {"frame", [](AssetHeader& h) { h.exponent += 1; }},
+      {"frame", [](AssetHeader& h) { h.centre[1] += 1e-9; }},
+      {"solid volume", [](AssetHeader& h) { h.volume *= 1 + 1e-9; }},
+      {"sampled volume", [](AssetHeader& h) { h.volume *= 0.9; }},
+      {"centre inside solid", [](AssetHeader& h) { inner(h, 7).x += 2; }},
+      {"sphere clear of surface", [](AssetHeader& h) { inner(h, 3).r *= 1.01f; }},
+      {"sphere clear of surface", [](AssetHeader& h) { inner(h, 0).x += 1e-6f; }},
+      {"spheres disjoint", [](AssetHeader& h) { inner(h, 0).r *= 1.0001f; }},
+      {"spheres disjoint", [](AssetHeader& h) { inner(h, 20) = inner(h, 21); }},
+      {"coverage", [](AssetHeader& h) { h.coverage += 1e-6; }},
+      {"effective volumes sum to the solid", [](AssetHeader& h) { effective(h, 0).r *= 1.001f; }},
+      {"effective protrusion", [](AssetHeader& h) { h.protrusion *= 0.999; }},
+      {"cover holds sphere",
+       [](AssetHeader& h) { writable<float>(h, h.cover_radii)[0] = 0.9f * inner(h, 0).r; }},
+      {"solid covered",
+       [](AssetHeader& h) {
+         for (std::size_t i = 0; i < h.sphere_count; ++i)
+           writable<float>(h, h.cover_radii)[i] *= 0.9f;
+       }},
+      {"solid covered", [](AssetHeader& h) { writable<float>(h, h.cover_radii)[1] = 0; }},
+      {"inner tree: each sphere once",
+       [](AssetHeader& h) {
+         auto* index = writable<std::uint32_t>(h, h.inner_tree.sphere_index);
+         index[5] = index[6];
+       }},
+      {"inner tree: leaves are the table",
+       [](AssetHeader& h) { block(h, h.inner_tree, 0).x[2] += 1e-6f; }},
+      {"inner tree: leaves are the table",
+       [](AssetHeader& h) { writable<float>(h, h.inner_tree.sphere_cover)[4] *= 1.000001f; }},
+      {"inner tree: balls hold spheres",
+       [](AssetHeader& h) { block(h, h.inner_tree, 1).r[1] *= 0.99999f; }},
+      {"inner tree: balls hold spheres", [](AssetHeader& h) { h.inner_tree.root[3] *= 0.99999; }},
+      {"inner tree: cover balls hold covers",
+       [](AssetHeader& h) { nodes(h, h.inner_tree, 1).cover[2] *= 0.99999f; }},
+      {"inner tree: cover balls hold covers",
+       [](AssetHeader& h) { h.inner_tree.root_cover *= 0.99999; }},
+      {"inner tree: volume sums",
+       [](AssetHeader& h) { nodes(h, h.inner_tree, 1).volume[0] *= 0.99999f; }},
+      {"matched tree: each sphere once",
+       [](AssetHeader& h) {
+         auto* index = writable<std::uint32_t>(h, h.matched_tree.sphere_index);
+         index[5] = index[6];
+       }},
+      {"matched tree: leaves are the table",
+       [](AssetHeader& h) { block(h, h.matched_tree, 0).r[2] *= 1.000001f; }},
+      {"matched tree: balls hold spheres",
+       [](AssetHeader& h) { block(h, h.matched_tree, 1).y[1] += 1e-5f; }},
+      {"matched tree: volume sums", [](AssetHeader& h) { h.matched_tree.volume_sum *= 1.0000001; }},
+      {"matched tree: overlap bounds", [](AssetHeader& h) { h.matched_tree.overlap = 1; }},
+      {"matched tree: overlap bounds",
+       [](AssetHeader& h) {
+         for (float& kappa : nodes(h, h.matched_tree, 1).overlap) kappa = std::min(kappa, 1.0f);
+       }},
+      {"inner tree: overlap bounds",
+       [](AssetHeader& h) {
+         const auto* index = at<std::uint32_t>(h, h.inner_tree.sphere_index);
+         inner(h, index[3]) = inner(h, index[2]);  // two in one place
+       }},
+  };
+  for (const Tampering& one : cases) {
+    bool red = false;
+    for (const Invariant& invariant : check(tampered(one.change), cube()))
+      if (invariant.name == one.invariant) red |= invariant.violations > 0;
+    EXPECT_TRUE(red) << one.invariant;
+  }
+}
+
+// The whole asset, for any number of threads and in a second run.
+TEST(Bake, SameBytesForAnyThreadCount) {
+  const ClosedMesh meshes[] = {cube(),
+                               testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus")};
+  for (const ClosedMesh& mesh : meshes) {
+    const auto one = bytes_of(bake(mesh, of_size(300, 1)));
+    for (const unsigned threads : {1u, 2u, 5u})
+      EXPECT_EQ(one, bytes_of(bake(mesh, of_size(300, threads)))) << mesh.name << threads;
+  }
+}
+
+/// The asset without what says where and how large the mesh is.
+std::vector<std::byte> frameless(const Asset& asset) {
+  std::vector<std::byte> bytes = bytes_of(asset);
+  AssetHeader header;
+  std::memcpy(&header, bytes.data(), sizeof(header));
+  header.content_hash = header.mesh_hash = 0;
+  for (double& c : header.centre) c = 0;
+  header.exponent = 0;
+  std::memcpy(bytes.data(), &header, sizeof(header));
+  return bytes;
+}
+
+// DESIGN 3.1: nothing depends on the mesh's unit, and a shift by whole units costs nothing where
+// doubles carry it.
+TEST(Bake, SameBytesAtAnyScaleAndOffset) {
+  const TriangleMesh torus = testing::torus_mesh(1.0, 0.375, 24, 12);
+  TriangleMesh snapped = torus;  // on a grid that the shifts below keep
+  for (auto& v : snapped.vertices) v = (v.array() * 1048576).round() / 1048576;
+  const auto bytes = frameless(bake(testing::closed(snapped, "torus"), of_size(200)));
+  for (const double scale : {std::ldexp(1.0, -30), 1.0, 4.0, std::ldexp(1.0, 30)})
+    for (const double shift : {0.0, 1e6}) {
+      TriangleMesh moved = snapped;
+      for (auto& v : moved.vertices) v = scale * (v + Eigen::Vector3d(shift, -shift, 2 * shift));
+      EXPECT_EQ(bytes, frameless(bake(testing::closed(moved, "torus"), of_size(200))))
+          << scale << " " << shift;
+    }
+}
+
+TEST(Bake, CancelKeepsWhatIsPacked) {
+  bool cancelled = false;
+  const Asset asset = bake(cube(), of_size(100'000), [&](const Progress& now) {
+    if (std::strcmp(now.stage, "pack") != 0 || now.spheres < 100) return true;
+    cancelled = true;
+    return false;
+  });
+  ASSERT_TRUE(cancelled);
+  EXPECT_LT(asset.view().sphere_count(), 100'000u);
+  EXPECT_EQ(asset.view().header().stop_reason, static_cast<std::uint32_t>(StopReason::cancelled));
+  EXPECT_THROW(bake(cube(), of_size(50),
+                    [](const Progress& now) { return std::strcmp(now.stage, "tree") != 0; }),
+               Error);
+}
+
+TEST(Bake, SaysSoIfNothingFits) {
+  PackingSettings settings;
+  settings.min_radius = 10;
+  EXPECT_THROW(bake(cube(), settings), Error);
+}
+
+}  // namespace
+}  // namespace ist
