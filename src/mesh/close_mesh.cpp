@@ -9,6 +9,7 @@
 
 #include "mesh/disjoint_sets.h"
 #include "mesh/edge_table.h"
+#include "mesh/self_intersections.h"
 #include "mesh/shells.h"
 #include "mesh/surface_reduction.h"
 #include "mesh/weld.h"
@@ -71,6 +72,9 @@ MeshReport survey(const TriangleMesh& mesh) {
     if (sides.size() == 2 && runs_up(mesh.triangles, sides[0]) == runs_up(mesh.triangles, sides[1]))
       ++report.inconsistent_edges;
   }
+  const auto self_intersections = count_self_intersections(mesh.vertices, mesh.triangles);
+  report.self_intersections = self_intersections.value_or(0);
+  report.self_intersections_counted = self_intersections.has_value();
   return report;
 }
 
@@ -101,6 +105,13 @@ ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMes
     throw Error(name + ": all " + counted(mesh.triangles.size(), "triangle") +
                 " collapse to points or lines: the coordinates have too few digits for this size " +
                 "and offset. Export nearer to the origin, or in a format with more digits");
+
+  if (report.self_intersections > 0)
+    notes.push_back(counted(report.self_intersections, "pair") +
+                    " of triangles intersect: inside is where the winding number is 1 or more");
+  if (!report.self_intersections_counted)
+    notes.push_back(
+        "self-intersections were not looked for: too many triangles too close together");
 
   const std::size_t dropped = drop_degenerate(mesh.vertices, mesh.triangles);
   if (dropped > 0) notes.push_back(counted(dropped, "degenerate triangle") + " dropped");

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "mesh/exact_sign.h"
+
 namespace ist {
 namespace {
 
@@ -12,7 +14,7 @@ namespace {
 /// bit for bit, whichever of its triangles asks. On the edge counts as left.
 bool left_of_upward_edge(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
                          const Eigen::Vector3d& p) {
-  return (upper[1] - lower[1]) * (p[2] - lower[2]) - (p[1] - lower[1]) * (upper[2] - lower[2]) >= 0;
+  return orient2d_sign(lower.data() + 1, upper.data() + 1, p.data() + 1) >= 0;
 }
 
 /// Turns of the triangle's outline around the point in the yz plane: −1, 0 or 1.
@@ -78,10 +80,9 @@ void LineWinding::around(const Eigen::Vector3d& p, std::vector<int>& numbers,
     const std::array<Eigen::Vector3d, 3> corners{vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]};
     const int turns = turns_around(corners, p);
     if (turns == 0) continue;
-    // Beyond p in the direction of +x? The plane through the corners, solved for x.
-    const Eigen::Vector3d normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-    const double ahead = normal.dot(corners[0] - p);
-    if (ahead == 0 || (ahead > 0) != (normal[0] > 0)) continue;
+    // Beyond p in the direction of +x? Then p lies behind a triangle that faces that way.
+    if (orient3d_sign(corners[0].data(), corners[1].data(), corners[2].data(), p.data()) != turns)
+      continue;
     const std::uint32_t shell = shells_.of_triangle[listed_[i]];
     if (std::find(shells_met.begin(), shells_met.end(), shell) == shells_met.end())
       shells_met.push_back(shell);

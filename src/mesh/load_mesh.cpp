@@ -22,8 +22,8 @@ constexpr std::array<std::pair<std::string_view, Reader>, 6> kReaders{{
     {".stl", read_stl},
     {".ply", read_ply},
     {".off", read_off},
-    {".glb", read_with_assimp},
-    {".gltf", read_with_assimp},
+    {".glb", read_gltf},
+    {".gltf", read_gltf},
 }};
 
 Reader reader_of(const std::string& path) {

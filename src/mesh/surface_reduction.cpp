@@ -3,17 +3,22 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdlib>
-#include <numeric>
+#include <utility>
 
 #include "mesh/disjoint_sets.h"
+#include "mesh/exact_sign.h"
 
 namespace ist {
 
 bool is_degenerate(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
   if (has_repeated_corner(t)) return true;
-  constexpr double kRounding = 8 * 2.220446049250313e-16;
-  const Eigen::Vector3d u = vertices[t[1]] - vertices[t[0]], v = vertices[t[2]] - vertices[t[0]];
-  return u.cross(v).norm() <= kRounding * u.norm() * v.norm();
+  for (const int skip : {0, 1, 2}) {  // seen along each axis
+    double corners[3][2];
+    for (std::size_t c = 0; c < 3; ++c)
+      for (int k = 0; k < 2; ++k) corners[c][k] = vertices[t[c]][(skip + 1 + k) % 3];
+    if (orient2d_sign(corners[0], corners[1], corners[2]) != 0) return false;
+  }
+  return true;
 }
 
 std::size_t count_odd_edges(const EdgeTable& edges) {
@@ -70,11 +75,6 @@ struct Stack {
   int sum = 0;  ///< of the members' directions, relative to the first
 };
 
-Triangle sorted(Triangle t) {
-  std::sort(t.begin(), t.end());
-  return t;
-}
-
 /// Same cyclic order of the same corners.
 bool same_direction(const Triangle& a, const Triangle& b) {
   for (std::size_t k = 0; k < 3; ++k)
@@ -82,22 +82,33 @@ bool same_direction(const Triangle& a, const Triangle& b) {
   return false;
 }
 
-std::vector<Stack> find_stacks(const std::vector<Triangle>& triangles) {
-  std::vector<std::pair<Triangle, std::uint32_t>> order(triangles.size());
-  for (std::uint32_t t = 0; t < triangles.size(); ++t) order[t] = {sorted(triangles[t]), t};
-  std::sort(order.begin(), order.end());
+std::uint32_t corner_opposite(const std::vector<Triangle>& triangles, const std::uint32_t side) {
+  return triangles[side / 3][(side + 2) % 3];
+}
+
+std::vector<Stack> find_stacks(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
   std::vector<Stack> stacks;
-  for (std::size_t begin = 0, end; begin < order.size(); begin = end) {
-    end = begin + 1;
-    while (end < order.size() && order[end].first == order[begin].first) ++end;
-    if (end == begin + 1) continue;
-    Stack stack;
-    for (std::size_t i = begin; i < end; ++i) {
-      const std::uint32_t t = order[i].second;
-      stack.members.push_back(t);
-      stack.sum += same_direction(triangles[stack.members[0]], triangles[t]) ? 1 : -1;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> at_edge;  // opposite corner, triangle
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    at_edge.clear();
+    for (const std::uint32_t side : edges.sides(e)) {
+      // Each stack is seen at its three edges; take it at that of its two smallest corners.
+      const std::uint32_t opposite = corner_opposite(triangles, side);
+      if (opposite > edges.high(e)) at_edge.emplace_back(opposite, side / 3);
     }
-    stacks.push_back(std::move(stack));
+    std::sort(at_edge.begin(), at_edge.end());
+    for (std::size_t begin = 0, end; begin < at_edge.size(); begin = end) {
+      end = begin + 1;
+      while (end < at_edge.size() && at_edge[end].first == at_edge[begin].first) ++end;
+      if (end == begin + 1) continue;
+      Stack stack;
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::uint32_t t = at_edge[i].second;
+        stack.members.push_back(t);
+        stack.sum += same_direction(triangles[stack.members[0]], triangles[t]) ? 1 : -1;
+      }
+      stacks.push_back(std::move(stack));
+    }
   }
   return stacks;
 }
@@ -105,9 +116,9 @@ std::vector<Stack> find_stacks(const std::vector<Triangle>& triangles) {
 }  // namespace
 
 std::size_t reduce_coincident(std::vector<Triangle>& triangles) {
-  const std::vector<Stack> stacks = find_stacks(triangles);
-  if (stacks.empty()) return 0;
   const EdgeTable edges(triangles);
+  const std::vector<Stack> stacks = find_stacks(triangles, edges);
+  if (stacks.empty()) return 0;
 
   // Stacks that share an edge decide together.
   DisjointSets groups(stacks.size());

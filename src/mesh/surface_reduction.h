@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// Corners on a line, to the rounding of double; repeated corners too.
+/// Corners exactly on a line; repeated corners too.
 bool is_degenerate(const std::vector<Eigen::Vector3d>& vertices, const Triangle& triangle);
 
 /// Edges with an odd number of sides: where the surface has a border, whatever its orientation.

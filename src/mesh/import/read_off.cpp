@@ -32,7 +32,7 @@ PolygonMesh read_off(const SourceFile& file) {
   if (keyword.size() < 3 || keyword.substr(keyword.size() - 3) != "OFF" ||
       keyword.find_first_not_of("STCNOF") != std::string_view::npos)
     fail(file, "does not begin with OFF (or COFF, NOFF, …, three-dimensional): it begins with " +
-                   quoted(keyword));
+                   in_quotes(keyword));
   TextScanner ahead = scanner;
   if (ahead.word() == "BINARY") scanner.fail("binary OFF is not supported. Save it as text");
 

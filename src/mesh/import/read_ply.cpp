@@ -63,14 +63,14 @@ Scalar parse_type(const TextScanner& scanner, const std::string_view word) {
   }};
   for (const auto& [name, type] : kNames)
     if (name == word) return type;
-  scanner.fail("unknown property type " + quoted(word));
+  scanner.fail("unknown property type " + in_quotes(word));
 }
 
 Encoding parse_encoding(const TextScanner& scanner, const std::string_view word) {
   if (word == "ascii") return Encoding::ascii;
   if (word == "binary_little_endian") return Encoding::little_endian;
   if (word == "binary_big_endian") return Encoding::big_endian;
-  scanner.fail("unknown PLY format " + quoted(word));
+  scanner.fail("unknown PLY format " + in_quotes(word));
 }
 
 Header parse_header(const SourceFile& file) {
@@ -94,7 +94,7 @@ Header parse_header(const SourceFile& file) {
       Element element;
       element.name = scanner.word();
       const std::int64_t count = scanner.integer(scanner.word());
-      if (count < 0) scanner.fail("a negative number of elements " + quoted(element.name));
+      if (count < 0) scanner.fail("a negative number of elements " + in_quotes(element.name));
       element.count = static_cast<std::uint64_t>(count);
       header.elements.push_back(std::move(element));
     } else if (keyword == "property") {
@@ -110,7 +110,7 @@ Header parse_header(const SourceFile& file) {
       property.name = scanner.word();
       header.elements.back().properties.push_back(std::move(property));
     } else if (keyword != "comment" && keyword != "obj_info" && !keyword.empty()) {
-      scanner.fail("unknown header line " + quoted(keyword));
+      scanner.fail("unknown header line " + in_quotes(keyword));
     }
   }
   fail(file, "the file ends early: the header has no end_header");

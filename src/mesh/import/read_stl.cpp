@@ -60,7 +60,7 @@ PolygonMesh read_text(const SourceFile& file) {
   };
   const auto expect = [&](const std::string_view word, const char* keyword) {
     if (!same_letters(word, keyword))
-      scanner.fail("expected " + quoted(keyword) + ", found " + quoted(word));
+      scanner.fail("expected " + in_quotes(keyword) + ", found " + in_quotes(word));
   };
   PolygonMesh mesh;
   for (std::string_view word = scanner.word_anywhere(); !word.empty();

@@ -74,7 +74,7 @@ void fail_at_line(const SourceFile& file, const std::size_t line, const std::str
   fail(file, "line " + std::to_string(line) + ": " + what);
 }
 
-std::string quoted(const std::string_view word) {
+std::string in_quotes(const std::string_view word) {
   constexpr std::size_t kLongest = 40;
   std::string text = "\"";
   for (const char c : word.substr(0, kLongest)) text += (c >= ' ' && c <= '~') ? c : '?';

@@ -24,6 +24,6 @@ void refuse_other_content(const SourceFile& file);
 [[noreturn]] void fail_at_line(const SourceFile& file, std::size_t line, const std::string& what);
 
 /// Words of a file as they may appear in a message: printable, short, in quotes.
-std::string quoted(std::string_view word);
+std::string in_quotes(std::string_view word);
 
 }  // namespace ist

@@ -60,7 +60,7 @@ void TextScanner::fail(const std::string& what) const { fail_at_line(file_, line
 double TextScanner::real(const std::string_view word) const {
   if (word.empty()) fail("a number is missing");
   const std::optional<double> value = parse_real(word);
-  if (!value) fail(quoted(word) + " is not a number");
+  if (!value) fail(in_quotes(word) + " is not a number");
   return *value;
 }
 
@@ -69,9 +69,9 @@ std::int64_t TextScanner::integer(const std::string_view word) const {
   const std::string_view digits = without_plus(word);
   std::int64_t value = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error == std::errc::result_out_of_range) fail(quoted(word) + " is out of range");
+  if (error == std::errc::result_out_of_range) fail(in_quotes(word) + " is out of range");
   if (error != std::errc() || end != digits.data() + digits.size())
-    fail(quoted(word) + " is not a whole number");
+    fail(in_quotes(word) + " is not a whole number");
   return value;
 }
 

@@ -1,0 +1,283 @@
+#include "mesh/import/gltf_document.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+
+namespace ist {
+namespace {
+
+std::uint32_t word_at(const std::string_view bytes, const std::size_t offset) {
+  std::uint32_t value = 0;
+  std::memcpy(&value, bytes.data() + offset, sizeof value);
+  return value;
+}
+
+/// Extensions that change how a surface looks, not where it is; and integer coordinates, which are
+/// read like any others.
+bool is_harmless(const std::string_view extension) {
+  constexpr std::array<std::string_view, 5> kHarmless{
+      "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"};
+  return std::any_of(kHarmless.begin(), kHarmless.end(), [&](const std::string_view start) {
+    return extension.substr(0, start.size()) == start;
+  });
+}
+
+std::optional<std::string> decode_base64(const std::string_view text) {
+  std::string bytes;
+  std::uint32_t bits = 0;
+  int held = 0;
+  for (const char c : text) {
+    if (c == '=') break;
+    std::uint32_t value = 0;
+    if (c >= 'A' && c <= 'Z')
+      value = static_cast<std::uint32_t>(c - 'A');
+    else if (c >= 'a' && c <= 'z')
+      value = static_cast<std::uint32_t>(c - 'a') + 26;
+    else if (c >= '0' && c <= '9')
+      value = static_cast<std::uint32_t>(c - '0') + 52;
+    else if (c == '+')
+      value = 62;
+    else if (c == '/')
+      value = 63;
+    else
+      return std::nullopt;
+    bits = bits << 6 | value;
+    held += 6;
+    if (held < 8) continue;
+    held -= 8;
+    bytes += static_cast<char>(bits >> held & 0xff);
+  }
+  return bytes;
+}
+
+/// "%20" and the like.
+std::string decode_percent(const std::string& uri) {
+  std::string text;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    const bool escaped = uri[i] == '%' && i + 2 < uri.size() &&
+                         std::isxdigit(static_cast<unsigned char>(uri[i + 1])) &&
+                         std::isxdigit(static_cast<unsigned char>(uri[i + 2]));
+    text += escaped ? static_cast<char>(std::stoi(uri.substr(i + 1, 2), nullptr, 16)) : uri[i];
+    if (escaped) i += 2;
+  }
+  return text;
+}
+
+struct ComponentType {
+  std::size_t bytes;
+  double largest;  ///< what 1.0 is stored as, if normalized
+  double (*read)(const char*);
+};
+
+template <class T>
+double read_as(const char* const bytes) {
+  T value;
+  std::memcpy(&value, bytes, sizeof value);
+  return static_cast<double>(value);
+}
+
+template <class T>
+constexpr ComponentType component() {
+  return {sizeof(T), static_cast<double>(std::numeric_limits<T>::max()), read_as<T>};
+}
+
+std::optional<ComponentType> component_type(const std::size_t code) {
+  switch (code) {
+    case 5120:
+      return component<std::int8_t>();
+    case 5121:
+      return component<std::uint8_t>();
+    case 5122:
+      return component<std::int16_t>();
+    case 5123:
+      return component<std::uint16_t>();
+    case 5125:
+      return component<std::uint32_t>();
+    case 5126:
+      return ComponentType{4, 1, read_as<float>};
+    default:
+      return std::nullopt;
+  }
+}
+
+}  // namespace
+
+GltfDocument::GltfDocument(const SourceFile& file) : file_(file) {
+  const std::string_view text = parse_container();
+  root_ = Json::parse(text.begin(), text.end());
+  if (!root_.is_object()) fail("its JSON is not an object");
+  const std::string version = root_.at("asset").at("version");
+  if (version.substr(0, 2) != "2.")
+    fail("glTF version " + in_quotes(version) + " is not supported. Export it as version 2.0");
+  check_extensions();
+  load_buffers();
+}
+
+void GltfDocument::fail(const std::string& what) const { ist::fail(file_, what); }
+
+std::string_view GltfDocument::parse_container() {
+  std::string_view bytes = file_.bytes;
+  if (bytes.substr(0, 4) != "glTF") return bytes;
+  constexpr std::size_t kHeader = 12, kChunkHeader = 8;
+  constexpr std::uint32_t kJson = 0x4e4f534a, kBinary = 0x004e4942;
+  if (bytes.size() < kHeader + kChunkHeader)
+    fail("the file ends early: " + std::to_string(bytes.size()) + " bytes hold no glTF");
+  if (word_at(bytes, 4) != 2)
+    fail("version " + std::to_string(word_at(bytes, 4)) +
+         " of the glTF container is not supported. Export it as version 2.0");
+  const std::size_t length = word_at(bytes, 8);
+  if (length > bytes.size())
+    fail("the file ends early: it announces " + std::to_string(length) + " bytes, here are " +
+         std::to_string(bytes.size()));
+  bytes = bytes.substr(0, length);
+  std::optional<std::string_view> json;
+  for (std::size_t at = kHeader; bytes.size() - at >= kChunkHeader;) {
+    const std::size_t size = word_at(bytes, at);
+    const std::uint32_t type = word_at(bytes, at + 4);
+    at += kChunkHeader;
+    if (size > bytes.size() - at)
+      fail("byte " + std::to_string(at - kChunkHeader) + ": a chunk of " + std::to_string(size) +
+           " bytes in a file that has " + std::to_string(bytes.size() - at) + " left");
+    if (!json && type != kJson) fail("its first chunk is not JSON");
+    if (!json)
+      json = bytes.substr(at, size);
+    else if (type == kBinary && !binary_chunk_)
+      binary_chunk_ = bytes.substr(at, size);
+    at += size;
+  }
+  if (!json) fail("holds no JSON chunk");
+  return *json;
+}
+
+void GltfDocument::check_extensions() const {
+  if (!root_.contains("extensionsRequired")) return;
+  for (const Json& entry : root_.at("extensionsRequired")) {
+    const std::string name = entry;
+    if (!is_harmless(name))
+      fail("requires the extension " + in_quotes(name) +
+           ", which is not supported. Export it without (no compression)");
+  }
+}
+
+void GltfDocument::load_buffers() {
+  if (!root_.contains("buffers")) return;
+  const std::size_t count = root_.at("buffers").size();
+  owned_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Json& buffer = at("buffers", i);
+    const std::string name = "buffer " + std::to_string(i);
+    std::string_view bytes;
+    if (buffer.contains("uri")) {
+      owned_[i] = external_buffer(buffer.at("uri"));
+      bytes = owned_[i];
+    } else {
+      if (i != 0 || !binary_chunk_) fail(name + " has no data: no uri, and no binary chunk");
+      bytes = *binary_chunk_;
+    }
+    const std::size_t length = whole(buffer, "byteLength");
+    if (length > bytes.size())
+      fail(name + " ends early: it announces " + std::to_string(length) + " bytes, there are " +
+           std::to_string(bytes.size()));
+    buffers_.push_back(bytes.substr(0, length));
+  }
+}
+
+std::string GltfDocument::external_buffer(const std::string& uri) const {
+  if (uri.substr(0, 5) == "data:") {
+    const std::size_t comma = uri.find(";base64,");
+    const auto bytes = comma == std::string::npos
+                           ? std::nullopt
+                           : decode_base64(std::string_view(uri).substr(comma + 8));
+    if (!bytes) fail("a data URI that is not base64");
+    return *bytes;
+  }
+  const std::filesystem::path relative = decode_percent(uri);
+  const bool leaves_folder =
+      relative.is_absolute() || uri.find(':') != std::string::npos ||
+      uri.find('\\') != std::string::npos || uri.find('\0') != std::string::npos ||
+      std::any_of(relative.begin(), relative.end(), [](const auto& part) { return part == ".."; });
+  if (leaves_folder)
+    fail("refers to " + in_quotes(uri) +
+         ", outside its own folder: refused. Put the data beside it");
+  return read_source_file((std::filesystem::path(file_.path).parent_path() / relative).string())
+      .bytes;
+}
+
+const GltfDocument::Json& GltfDocument::at(const std::string& name, const std::size_t index) const {
+  const bool exists = root_.contains(name) && root_.at(name).is_array();
+  const std::size_t count = exists ? root_.at(name).size() : 0;
+  if (index >= count)
+    fail("refers to entry " + std::to_string(index) + " of " + in_quotes(name) + ", which has " +
+         std::to_string(count));
+  return root_.at(name)[index];
+}
+
+std::size_t GltfDocument::whole(const Json& object, const std::string& key,
+                                const std::optional<std::size_t> fallback) const {
+  const auto found = object.find(key);
+  if (found == object.end() && fallback) return *fallback;
+  if (found == object.end() || !found->is_number_unsigned())
+    fail("expected a whole number ≥ 0 as " + in_quotes(key));
+  return *found;
+}
+
+double GltfDocument::real(const Json& value) const {
+  const double number = value.get<double>();
+  if (!(std::abs(number) <= static_cast<double>(std::numeric_limits<float>::max())))
+    fail("the number " + in_quotes(value.dump()) + " does not fit into float32");
+  return number;
+}
+
+std::vector<double> GltfDocument::accessor(const std::size_t index,
+                                           const std::string_view type) const {
+  const Json& accessor = at("accessors", index);
+  const std::string name = "accessor " + std::to_string(index);
+  const std::string stored_type = accessor.at("type");
+  if (stored_type != type)
+    fail(name + " is " + in_quotes(stored_type) + ", not " + in_quotes(type));
+  if (accessor.contains("sparse"))
+    fail(name + " is sparse, which is not supported. Export it without sparse accessors");
+  if (!accessor.contains("bufferView")) fail(name + " has no data");
+  const std::size_t code = whole(accessor, "componentType");
+  const auto component = component_type(code);
+  if (!component) fail(name + ": unknown componentType " + std::to_string(code));
+  const std::size_t width = type == "SCALAR" ? 1 : 3;
+  const std::size_t element = width * component->bytes;
+
+  const Json& view = at("bufferViews", whole(accessor, "bufferView"));
+  const std::size_t buffer = whole(view, "buffer");
+  at("buffers", buffer);
+  const std::size_t view_offset = whole(view, "byteOffset", 0);
+  const std::size_t view_length = whole(view, "byteLength");
+  const std::string_view bytes = buffers_[buffer];
+  if (view_offset > bytes.size() || view_length > bytes.size() - view_offset)
+    fail(name + ": its view lies outside of buffer " + std::to_string(buffer));
+  const std::size_t stride = whole(view, "byteStride", element);
+  if (stride < element || (view.contains("byteStride") && (stride % 4 != 0 || stride > 252)))
+    fail(name + ": a byteStride of " + std::to_string(stride) + " for elements of " +
+         std::to_string(element) + " bytes");
+  const std::size_t offset = whole(accessor, "byteOffset", 0);
+  const std::size_t count = whole(accessor, "count");
+  if (count == 0 || offset > view_length || element > view_length - offset ||
+      (view_length - offset - element) / stride < count - 1)
+    fail(name + ": " + std::to_string(count) + " elements do not fit into its view of " +
+         std::to_string(view_length) + " bytes");
+
+  const bool normalized = accessor.value("normalized", false);
+  std::vector<double> values(width * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const char* const start = bytes.data() + view_offset + offset + i * stride;
+    for (std::size_t k = 0; k < width; ++k) {
+      const double value = component->read(start + k * component->bytes);
+      values[width * i + k] = normalized ? std::max(value / component->largest, -1.0) : value;
+    }
+  }
+  return values;
+}
+
+}  // namespace ist
