@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 #include "mesh/host_device.h"
 #include "mesh/mesh_view.h"
@@ -33,53 +34,76 @@ IST_HD inline float prune_distance2(float distance2, float error) {
   return reach * reach * (1 + 0x1p-20f);
 }
 
-/// Squared distances from p to the four children of a node.
+#if defined(__GNUC__) && !defined(__CUDACC__)
+using FloatLanes [[gnu::vector_size(4 * kBvhWidth)]] = float;  ///< SSE2 or NEON, no dispatch
+#else
+using FloatLanes = float;
+#endif
+constexpr int kFloatLanes = sizeof(FloatLanes) / sizeof(float);
+
+IST_HD inline FloatLanes load_lanes(const float* from) {
+  FloatLanes lanes;
+  std::memcpy(&lanes, from, sizeof lanes);
+  return lanes;
+}
+
+IST_HD inline void store_lanes(FloatLanes lanes, float* to) {
+  std::memcpy(to, &lanes, sizeof lanes);
+}
+
+/// Squared distances from p to the children of a node.
 IST_HD inline void child_distances2(const BvhNode& node, const float p[3],
                                     float distance2[kBvhWidth]) {
-  for (int i = 0; i < kBvhWidth; ++i) distance2[i] = 0;
-  for (int k = 0; k < 3; ++k) {
-    for (int i = 0; i < kBvhWidth; ++i) {
-      const float below = node.lower[k][i] - p[k];
-      const float above = p[k] - node.upper[k][i];
-      float gap = below > above ? below : above;
-      gap = gap > 0 ? gap : 0;
-      distance2[i] += gap * gap;
+  for (int i = 0; i < kBvhWidth; i += kFloatLanes) {
+    const FloatLanes zero{};
+    FloatLanes sum = zero;
+    for (int k = 0; k < 3; ++k) {
+      const FloatLanes below = load_lanes(node.lower[k] + i) - p[k];
+      const FloatLanes above = p[k] - load_lanes(node.upper[k] + i);
+      const FloatLanes outside = below > above ? below : above;
+      const FloatLanes gap = outside > zero ? outside : zero;
+      sum += gap * gap;
     }
+    store_lanes(sum, distance2 + i);
   }
 }
 
-/// The closest points of a block's triangles, lane by lane.
-IST_HD inline void block_points(const TriangleBlock& block, const float p[3],
-                                FramePoint<float> points[kBvhWidth]) {
-  float px[kBvhWidth], py[kBvhWidth], d2[kBvhWidth];
-  for (int i = 0; i < kBvhWidth; ++i) {
-    const float dx = p[0] - block.origin[0][i];
-    const float dy = p[1] - block.origin[1][i];
-    const float dz = p[2] - block.origin[2][i];
-    const float x = dx * block.u[0][i] + dy * block.u[1][i] + dz * block.u[2][i];
-    const float y = dx * block.v[0][i] + dy * block.v[1][i] + dz * block.v[2][i];
-    const float z = dx * block.n[0][i] + dy * block.n[1][i] + dz * block.n[2][i];
-    const FramePoint<float> q =
-        closest_in_frame(x, y, z, block.length[i], block.apex[i], block.height[i]);
-    px[i] = q.x;
-    py[i] = q.y;
-    d2[i] = q.distance2;
+/// Closest points of a block's triangles, in their frames.
+struct BlockPoints {
+  float x[kBvhWidth];
+  float y[kBvhWidth];
+  float distance2[kBvhWidth];
+};
+
+IST_HD inline void block_points(const TriangleBlock& block, const float p[3], BlockPoints& points) {
+  for (int i = 0; i < kBvhWidth; i += kFloatLanes) {
+    const FloatLanes dx = p[0] - load_lanes(block.origin[0] + i);
+    const FloatLanes dy = p[1] - load_lanes(block.origin[1] + i);
+    const FloatLanes dz = p[2] - load_lanes(block.origin[2] + i);
+    const auto along = [&](const float axis[3][kBvhWidth]) {
+      return dx * load_lanes(axis[0] + i) + dy * load_lanes(axis[1] + i) +
+             dz * load_lanes(axis[2] + i);
+    };
+    const FramePoint<FloatLanes> q = closest_in_frame(
+        along(block.u), along(block.v), along(block.n), load_lanes(block.length + i),
+        load_lanes(block.apex + i), load_lanes(block.height + i));
+    store_lanes(q.x, points.x + i);
+    store_lanes(q.y, points.y + i);
+    store_lanes(q.distance2, points.distance2 + i);
   }
-  for (int i = 0; i < kBvhWidth; ++i) points[i] = {px[i], py[i], d2[i]};
 }
 
 /// A triangle within reach of a query, as the visitor of for_triangles_near gets it.
 struct NearTriangle {
+  FramePoint<float> closest;  ///< unit frame
   std::uint32_t triangle;
-  float distance2;  ///< unit frame, squared; by the float formula
-  FramePoint<float> in_frame;
   const TriangleBlock* block;
   int lane;
 
   IST_HD void point(float out[3]) const {
     for (int k = 0; k < 3; ++k)
-      out[k] = block->origin[k][lane] +
-               (in_frame.x * block->u[k][lane] + in_frame.y * block->v[k][lane]);
+      out[k] =
+          block->origin[k][lane] + (closest.x * block->u[k][lane] + closest.y * block->v[k][lane]);
   }
 };
 
@@ -105,12 +129,12 @@ IST_HD void for_triangles_near(const MeshView& mesh, const float p[3], float rad
   for (;;) {
     if ((at & kBvhLeaf) != 0) {
       const TriangleBlock& block = mesh.blocks[at & ~kBvhLeaf];
-      FramePoint<float> points[kBvhWidth];
+      BlockPoints points;
       block_points(block, p, points);
       for (int i = 0; i < kBvhWidth; ++i) {
-        if (points[i].distance2 <= radius2 && block.triangle[i] != kNoTriangle) {
-          radius2 =
-              visit(NearTriangle{block.triangle[i], points[i].distance2, points[i], &block, i});
+        if (points.distance2[i] <= radius2 && block.triangle[i] != kNoTriangle) {
+          radius2 = visit(NearTriangle{
+              {points.x[i], points.y[i], points.distance2[i]}, block.triangle[i], &block, i});
           bound = prune_distance2(radius2, error);
         }
       }
@@ -145,8 +169,8 @@ IST_HD inline NearestTriangle nearest_triangle(const MeshView& mesh, const float
   NearestTriangle best;
   best.distance2 = limit2;
   for_triangles_near(mesh, p, limit2, [&](const NearTriangle& near) {
-    if (near.distance2 < best.distance2 || near.triangle < best.triangle) {
-      best.distance2 = near.distance2;
+    if (near.closest.distance2 < best.distance2 || near.triangle < best.triangle) {
+      best.distance2 = near.closest.distance2;
       best.triangle = near.triangle;
       near.point(best.point);
     }

@@ -18,11 +18,11 @@ struct TriangleFrame {
   Real length, apex, height;
 };
 
-/// The closest point of a triangle in its frame.
-template <class Real>
+/// The closest point of a triangle in its frame; Lane is a number or a vector of numbers.
+template <class Lane>
 struct FramePoint {
-  Real x, y;       ///< of the closest point, along u and v
-  Real distance2;  ///< squared distance from the query
+  Lane x, y;       ///< of the closest point, along u and v
+  Lane distance2;  ///< squared distance from the query
 };
 
 template <class Real>
@@ -79,36 +79,36 @@ IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3],
 }
 
 /// Closest point of the triangle (0, 0), (length, 0), (apex, height) to (x, y), z off its plane.
-/// Free of branches, so that lanes of triangles run it side by side with the same bits.
-template <class Real>
-IST_HD inline FramePoint<Real> closest_in_frame(Real x, Real y, Real z, Real length, Real apex,
-                                                Real height) {
-  const Real smallest = Real(1e-37);  // only keeps 0 / 0 away: collapsed edges give t = 0
-  const Real left = apex - length;
-  const Real from_b = x - length;
-  // Below the longest edge, both angles at it being acute, the closest point is on that edge.
-  const Real x_ab = x < 0 ? Real(0) : (x > length ? length : x);
-  // The two other edges, from either end of the longest one to the apex.
-  const Real ac2 = apex * apex + height * height;
-  const Real bc2 = left * left + height * height;
-  const Real t_ac = (x * apex + y * height) / (ac2 > smallest ? ac2 : smallest);
-  const Real t_bc = (from_b * left + y * height) / (bc2 > smallest ? bc2 : smallest);
-  const Real s_ac = t_ac < 0 ? Real(0) : (t_ac > 1 ? Real(1) : t_ac);
-  const Real s_bc = t_bc < 0 ? Real(0) : (t_bc > 1 ? Real(1) : t_bc);
-  const Real x_ac = s_ac * apex, y_ac = s_ac * height;
-  const Real x_bc = length + s_bc * left, y_bc = s_bc * height;
-  const Real d_ac = (x - x_ac) * (x - x_ac) + (y - y_ac) * (y - y_ac);
-  const Real d_bc = (x - x_bc) * (x - x_bc) + (y - y_bc) * (y - y_bc);
-  const bool ac = d_ac <= d_bc;
-  const bool below = y <= 0;
-  const bool inside = (height > 0) & (y * apex <= x * height) & (from_b * height <= y * left);
-  Real px = ac ? x_ac : x_bc;
-  Real py = ac ? y_ac : y_bc;
+/// Free of branches: float, double and vectors of them run it alike, lane by lane the same bits.
+template <class Lane>
+IST_HD inline FramePoint<Lane> closest_in_frame(Lane x, Lane y, Lane z, Lane length, Lane apex,
+                                                Lane height) {
+  const Lane zero{}, one = zero + 1;
+  const Lane smallest = zero + 1e-37f;  // only keeps 0 / 0 away: collapsed edges give t = 0
+  const auto clamp = [](Lane value, Lane lower, Lane upper) {
+    const Lane raised = value > lower ? value : lower;
+    return raised < upper ? raised : upper;
+  };
+  // The edges from either end of the longest one to the apex.
+  const Lane left = apex - length, from_b = x - length;
+  const Lane height2 = height * height;
+  const Lane ac2 = apex * apex + height2, bc2 = left * left + height2;
+  const Lane rise = y * height;
+  const Lane t_ac = clamp((x * apex + rise) / (ac2 > smallest ? ac2 : smallest), zero, one);
+  const Lane t_bc = clamp((from_b * left + rise) / (bc2 > smallest ? bc2 : smallest), zero, one);
+  const Lane x_ac = t_ac * apex, y_ac = t_ac * height;
+  const Lane x_bc = length + t_bc * left, y_bc = t_bc * height;
+  const Lane d_ac = (x - x_ac) * (x - x_ac) + (y - y_ac) * (y - y_ac);
+  const Lane d_bc = (x - x_bc) * (x - x_bc) + (y - y_bc) * (y - y_bc);
+  Lane px = d_ac <= d_bc ? x_ac : x_bc;
+  Lane py = d_ac <= d_bc ? y_ac : y_bc;
+  const auto inside = (height > zero) & (y * apex <= x * height) & (from_b * height <= y * left);
   px = inside ? x : px;
   py = inside ? y : py;
-  px = below ? x_ab : px;
-  py = below ? Real(0) : py;
-  const Real dx = x - px, dy = y - py;
+  // Below the longest edge, both angles at it being acute, the closest point is on that edge.
+  px = y <= zero ? clamp(x, zero, length) : px;
+  py = y <= zero ? zero : py;
+  const Lane dx = x - px, dy = y - py;
   return {px, py, z * z + (dx * dx + dy * dy)};
 }
 
