@@ -1,6 +1,4 @@
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <string>
 #include <utility>
 
@@ -9,6 +7,8 @@
 
 #include "mesh/disjoint_sets.h"
 #include "mesh/edge_table.h"
+#include "mesh/message_text.h"
+#include "mesh/repair.h"
 #include "mesh/self_intersections.h"
 #include "mesh/shells.h"
 #include "mesh/surface_reduction.h"
@@ -16,21 +16,6 @@
 
 namespace ist {
 namespace {
-
-std::string shortest(const double value) {
-  char text[32];
-  const auto [end, error] = std::to_chars(text, text + sizeof text, value);
-  return {text, end};
-}
-
-std::string position(const Eigen::Vector3d& p) {
-  return std::string("(") + shortest(p[0]) + " " + shortest(p[1]) + " " + shortest(p[2]) + ")";
-}
-
-/// "1 boundary edge", "3 boundary edges".
-std::string counted(const std::size_t count, const std::string& noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
-}
 
 void check_indices_and_coordinates(const TriangleMesh& mesh, const std::string& name) {
   if (mesh.triangles.empty())
@@ -90,67 +75,92 @@ MeshReport survey(const TriangleMesh& mesh) {
   }
   const std::string kind = boundary == odd ? "boundary edge" : "boundary or odd edge";
   throw Error(name + ": " + counted(odd, kind) + ", first at vertex " +
-              std::to_string(edges.low(first)) + " " + position(mesh.vertices[edges.low(first)]) +
+              std::to_string(edges.low(first)) + " " +
+              position_text(mesh.vertices[edges.low(first)]) +
               ": not closed. Bake with --repair, or close it");
 }
 
-}  // namespace
-
-ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMeshPolicy) {
-  check_indices_and_coordinates(input, name);
-  TriangleMesh mesh = weld(input, 0);
-  MeshReport report = survey(mesh);
-  auto& notes = report.notes;
-  if (report.degenerate_triangles == mesh.triangles.size())
-    throw Error(name + ": all " + counted(mesh.triangles.size(), "triangle") +
-                " collapse to points or lines: the coordinates have too few digits for this size " +
-                "and offset. Export nearer to the origin, or in a format with more digits");
-
+void note_findings(MeshReport& report) {
   if (report.self_intersections > 0)
-    notes.push_back(counted(report.self_intersections, "pair") +
-                    " of triangles intersect: inside is where the winding number is 1 or more");
+    report.notes.push_back(counted(report.self_intersections, "pair") +
+                           " of triangles intersect: inside is where the winding number is 1 or "
+                           "more");
   if (!report.self_intersections_counted)
-    notes.push_back(
-        "self-intersections were not looked for: too many triangles too close together");
+    report.notes.push_back(
+        "self-intersections were not looked for: too many triangles, or too close together");
+  if (report.nonmanifold_edges > 0)
+    report.notes.push_back(counted(report.nonmanifold_edges, "edge") + " of three or more faces");
+}
 
+/// Degenerate and coincident triangles (DESIGN 3.6).
+void reduce(TriangleMesh& mesh, MeshReport& report) {
   const std::size_t dropped = drop_degenerate(mesh.vertices, mesh.triangles);
-  if (dropped > 0) notes.push_back(counted(dropped, "degenerate triangle") + " dropped");
+  if (dropped > 0) report.notes.push_back(counted(dropped, "degenerate triangle") + " dropped");
   report.coincident_triangles = reduce_coincident(mesh.triangles);
   if (report.coincident_triangles > 0)
-    notes.push_back(counted(report.coincident_triangles, "coincident triangle") +
-                    " removed as copies or cancelling pairs");
-  if (mesh.triangles.empty())
-    throw Error(name + ": every face is doubled back to back: flat, no volume to fill");
+    report.notes.push_back(counted(report.coincident_triangles, "coincident triangle") +
+                           " removed as copies or cancelling pairs");
+}
 
-  EdgeTable edges(mesh.triangles);
-  if (count_odd_edges(edges) > 0) refuse_open(mesh, edges, name);
-  if (const auto edge = make_consistent(mesh.triangles, edges))
-    throw Error(name + ": not orientable, no side of it is outside (seen at vertex " +
-                std::to_string(edges.low(*edge)) + " " + position(mesh.vertices[edges.low(*edge)]) +
-                "). Remodel it as a closed solid");
-  edges = EdgeTable(mesh.triangles);  // turned triangles have new sides
-  if (const auto edge = find_unbalanced_edge(mesh.triangles, edges))
-    throw Error(name + ": the faces at the edge from vertex " + std::to_string(edges.low(*edge)) +
-                " " + position(mesh.vertices[edges.low(*edge)]) +
-                " disagree about the outside. Orient them, or bake with --repair");
-  if (report.inconsistent_edges > 0)
-    notes.push_back(counted(report.inconsistent_edges, "edge") +
-                    " with faces of opposite orientation: faces turned to agree");
+/// Makes the faces at every edge agree about the outside.
+void orient_faces(TriangleMesh& mesh, const std::string& name, MeshReport& report) {
+  const auto corner = [&](const std::uint32_t side) {
+    const std::uint32_t v = mesh.triangles[side / 3][side % 3];
+    return "vertex " + std::to_string(v) + " " + position_text(mesh.vertices[v]);
+  };
+  const EdgeTable edges(mesh.triangles);
+  if (!find_unbalanced_edge(mesh.triangles, edges)) return;
+  report.notes.push_back("neighbouring faces disagreed about the outside: turned to agree");
+  auto conflict = make_consistent(mesh.triangles, manifold_partners(edges));
+  if (!conflict) {
+    const EdgeTable turned(mesh.triangles);
+    if (!find_unbalanced_edge(mesh.triangles, turned)) return;
+    conflict = make_consistent(mesh.triangles, all_partners(mesh.vertices, mesh.triangles, turned));
+    if (!conflict) return;
+  }
+  throw Error(name + ": not orientable, neither side of it is the outside (seen at " +
+              corner(*conflict) + "). Remodel it as a closed solid");
+}
 
+void orient_outward(TriangleMesh& mesh, const std::string& name, MeshReport& report) {
+  const EdgeTable edges(mesh.triangles);
   const Nesting nesting =
       orient_shells(mesh.vertices, mesh.triangles, find_shells(mesh.triangles, edges));
   if (nesting.volume.is_flat())
     throw Error(name + ": flat, it encloses no volume. Give it thickness");
+  report.volume = nesting.volume.volume;
   report.flipped_components = nesting.flipped;
   report.cavities = nesting.cavities;
   if (nesting.flipped > 0)
-    notes.push_back(counted(nesting.flipped, "shell") + " turned inside out to face outward");
-  if (nesting.cavities > 0) notes.push_back(counted(nesting.cavities, "cavity shell"));
+    report.notes.push_back(counted(nesting.flipped, "shell") + " turned to face outward");
+  if (nesting.cavities > 0) report.notes.push_back(counted(nesting.cavities, "cavity", "cavities"));
+  if (nesting.flat > 0) report.notes.push_back(counted(nesting.flat, "shell") + " without volume");
   if (nesting.nested_solids > 0)
-    notes.push_back(counted(nesting.nested_solids, "outward shell") +
-                    " within another one: inside is where the winding number is 1 or more, so "
-                    "they are solid, not cavities");
-  report.volume = nesting.volume.volume;
+    report.notes.push_back(counted(nesting.nested_solids, "outward shell") +
+                           " within another: solid, not a cavity, because inside is where the "
+                           "winding number is 1 or more");
+}
+
+}  // namespace
+
+ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMeshPolicy policy) {
+  check_indices_and_coordinates(input, name);
+  TriangleMesh mesh = weld(input, 0);
+  MeshReport report = survey(mesh);
+  if (report.degenerate_triangles == mesh.triangles.size())
+    throw Error(name + ": all " + counted(mesh.triangles.size(), "triangle") +
+                " collapse to points or lines: the coordinates have too few digits for this size "
+                "and offset. Export nearer to the origin, or in a format with more digits");
+  note_findings(report);
+  reduce(mesh, report);
+  if (mesh.triangles.empty())
+    throw Error(name + ": every face is doubled back to back: flat, it encloses no volume");
+  if (const EdgeTable edges(mesh.triangles); count_odd_edges(edges) > 0) {
+    if (policy == OpenMeshPolicy::refuse) refuse_open(mesh, edges, name);
+    mesh = repair(std::move(mesh), name, report);
+  }
+  orient_faces(mesh, name, report);
+  orient_outward(mesh, name, report);
   report.closed = true;
   return {weld(mesh, 0), std::move(report), name};
 }

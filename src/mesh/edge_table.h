@@ -18,6 +18,7 @@ class EdgeTable {
   explicit EdgeTable(const std::vector<Triangle>& triangles);
 
   std::size_t size() const { return edges_.size(); }
+  std::size_t side_count() const { return edge_of_side_.size(); }  ///< of all triangles
   /// Sides that lie on an edge, in ascending order.
   std::span<const std::uint32_t> sides(std::size_t edge) const;
   /// Its two vertices, the smaller index first. Edges are sorted by them.

@@ -1,20 +1,90 @@
 #include "mesh/shells.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "mesh/disjoint_sets.h"
 
 namespace ist {
 
+SidePartners manifold_partners(const EdgeTable& edges) {
+  SidePartners partners(edges.side_count(), kNoIndex);
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    const auto sides = edges.sides(e);
+    if (sides.size() != 2) continue;
+    partners[sides[0]] = sides[1];
+    partners[sides[1]] = sides[0];
+  }
+  return partners;
+}
+
+namespace {
+
+/// Angle of p about the axis through `origin`, from 0 at `zero`, as a monotone stand-in in [0, 4):
+/// the perimeter of a diamond instead of a circle.
+double diamond_angle(const Eigen::Vector3d& p, const Eigen::Vector3d& origin,
+                     const Eigen::Vector3d& axis, const Eigen::Vector3d& zero) {
+  const Eigen::Vector3d right = (zero - origin) - axis * (axis.dot(zero - origin));
+  const double x = right.dot(p - origin), y = axis.cross(right).dot(p - origin);
+  const double sum = std::abs(x) + std::abs(y);
+  if (sum == 0) return 0;
+  if (y >= 0) return x >= 0 ? y / sum : 1 - x / sum;
+  return x < 0 ? 2 - y / sum : 3 + x / sum;
+}
+
+/// Sides of an edge in the order of their angle about it.
+std::vector<std::pair<double, std::uint32_t>> around_edge(
+    const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
+    const EdgeTable& edges, const std::size_t edge) {
+  const auto sides = edges.sides(edge);
+  const Eigen::Vector3d& origin = vertices[edges.low(edge)];
+  const Eigen::Vector3d axis = (vertices[edges.high(edge)] - origin).normalized();
+  const auto opposite = [&](const std::uint32_t side) {
+    return vertices[triangles[side / 3][(side + 2) % 3]];
+  };
+  std::vector<std::pair<double, std::uint32_t>> order;
+  for (const std::uint32_t side : sides)
+    order.emplace_back(diamond_angle(opposite(side), origin, axis, opposite(sides[0])), side);
+  std::sort(order.begin(), order.end());
+  return order;
+}
+
+}  // namespace
+
+SidePartners all_partners(const std::vector<Eigen::Vector3d>& vertices,
+                          const std::vector<Triangle>& triangles, const EdgeTable& edges) {
+  SidePartners partners = manifold_partners(edges);
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    const std::size_t count = edges.sides(e).size();
+    if (count <= 2 || count % 2 != 0) continue;
+    const auto order = around_edge(vertices, triangles, edges, e);
+    // Pairing the first with the second …, or the second with the third …
+    std::array<int, 2> agreeing{0, 0};
+    std::array<double, 2> angle{0, 0};
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto& [from, side] = order[i];
+      const auto& [to, next] = order[(i + 1) % count];
+      agreeing[i % 2] += runs_up(triangles, side) != runs_up(triangles, next) ? 1 : 0;
+      angle[i % 2] += i + 1 < count ? to - from : to + 4 - from;
+    }
+    const bool shifted =
+        agreeing[0] != agreeing[1] ? agreeing[1] > agreeing[0] : angle[1] < angle[0];
+    for (std::size_t i = shifted ? 1 : 0; i < count; i += 2) {
+      const std::uint32_t a = order[i].second, b = order[(i + 1) % count].second;
+      partners[a] = b;
+      partners[b] = a;
+    }
+  }
+  return partners;
+}
+
 std::optional<std::uint32_t> make_consistent(std::vector<Triangle>& triangles,
-                                             const EdgeTable& edges) {
+                                             const SidePartners& partners) {
   const std::size_t n = triangles.size();
   std::vector<bool> seen(n, false), turned(n, false);
   std::vector<std::uint32_t> piece;
-  std::optional<std::uint32_t> conflict;
   for (std::uint32_t seed = 0; seed < n; ++seed) {
     if (seen[seed]) continue;
     seen[seed] = true;
@@ -23,28 +93,23 @@ std::optional<std::uint32_t> make_consistent(std::vector<Triangle>& triangles,
     for (std::size_t next = 0; next < piece.size(); ++next) {
       const std::uint32_t t = piece[next];
       for (std::uint32_t side = 3 * t; side < 3 * t + 3; ++side) {
-        const std::uint32_t edge = edges.edge_of(side);
-        if (edge == kNoIndex) continue;
-        const auto sides = edges.sides(edge);
-        if (sides.size() != 2) continue;
-        const std::uint32_t other_side = sides[0] == side ? sides[1] : sides[0];
-        const std::uint32_t other = other_side / 3;
-        const bool disagree = runs_up(triangles, side) == runs_up(triangles, other_side);
+        if (partners[side] == kNoIndex) continue;
+        const std::uint32_t other = partners[side] / 3;
+        const bool disagree = runs_up(triangles, side) == runs_up(triangles, partners[side]);
         const bool other_turned = turned[t] != disagree;
         if (!seen[other]) {
           seen[other] = true;
           turned[other] = other_turned;
           turns += other_turned ? 1 : 0;
           piece.push_back(other);
-        } else if (turned[other] != other_turned && !conflict) {
-          conflict = edge;
+        } else if (turned[other] != other_turned) {
+          return side;
         }
       }
     }
     if (2 * turns > piece.size())
       for (const std::uint32_t t : piece) turned[t] = !turned[t];
   }
-  if (conflict) return conflict;
   for (std::size_t t = 0; t < n; ++t)
     if (turned[t]) std::swap(triangles[t][1], triangles[t][2]);
   return std::nullopt;

@@ -18,10 +18,24 @@ struct Shells {
   std::uint32_t count = 0;
 };
 
-/// Turns triangles so that the two at each edge that has exactly two agree; the smaller part of
-/// each piece turns. Returns an edge that makes this impossible (a Möbius strip), if there is one.
+/// For every side of a triangle (EdgeTable) the side of the neighbour that continues the surface
+/// across the edge; kNoIndex where there is none.
+using SidePartners = std::vector<std::uint32_t>;
+
+/// Partners at edges of exactly two sides.
+SidePartners manifold_partners(const EdgeTable& edges);
+
+/// Partners at edges of four, six … sides too: neighbours in the angle about the edge, chosen of
+/// the two ways to pair them so that more pairs agree about the outside, then so that the pairs
+/// enclose the smaller angles.
+SidePartners all_partners(const std::vector<Eigen::Vector3d>& vertices,
+                          const std::vector<Triangle>& triangles, const EdgeTable& edges);
+
+/// Turns triangles so that partners agree about the outside; the smaller part of each connected
+/// piece turns. Returns a side at which that is impossible (a Möbius strip), if there is one, and
+/// then turns none.
 std::optional<std::uint32_t> make_consistent(std::vector<Triangle>& triangles,
-                                             const EdgeTable& edges);
+                                             const SidePartners& partners);
 
 /// An edge that is run unequally often in its two directions, if there is one. Without any, the
 /// surface is a closed 2-cycle and the winding number is defined.

@@ -11,6 +11,9 @@ using Point = Eigen::Vector3d;
 using Corners = std::array<Point, 3>;
 
 int side_of(const Corners& t, const Point& p) {
+  // The usual case in machine parts, decided without exact arithmetic.
+  for (int k = 0; k < 3; ++k)
+    if (t[0][k] == p[k] && t[1][k] == p[k] && t[2][k] == p[k]) return 0;
   return orient3d_sign(t[0].data(), t[1].data(), t[2].data(), p.data());
 }
 

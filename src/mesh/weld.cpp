@@ -56,6 +56,11 @@ std::vector<bool> referenced(const TriangleMesh& mesh) {
 }  // namespace
 
 TriangleMesh weld(const TriangleMesh& mesh, const double tolerance) {
+  return weld_among(mesh, tolerance, std::vector<bool>(mesh.vertices.size(), true));
+}
+
+TriangleMesh weld_among(const TriangleMesh& mesh, const double tolerance,
+                        const std::vector<bool>& among) {
   const std::vector<bool> used = referenced(mesh);
   TriangleMesh result;
   std::vector<std::uint32_t> kept_as(mesh.vertices.size(), kNone);
@@ -70,21 +75,23 @@ TriangleMesh weld(const TriangleMesh& mesh, const double tolerance) {
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     if (!used[i]) continue;
     const Eigen::Vector3d& p = mesh.vertices[i];
-    const Cell cell = cell_of(p);
     std::uint32_t first = kNone;
-    for (int dx = -reach; dx <= reach; ++dx)
-      for (int dy = -reach; dy <= reach; ++dy)
-        for (int dz = -reach; dz <= reach; ++dz)
-          table.visit(hash_of({cell[0] + dx, cell[1] + dy, cell[2] + dz}),
-                      [&](const std::uint32_t v) {
-                        const Eigen::Vector3d& q = result.vertices[v];
-                        const bool near = tolerance > 0 ? (q - p).norm() <= tolerance : q == p;
-                        if (near && v < first) first = v;
-                      });
+    if (among[i]) {
+      const Cell cell = cell_of(p);
+      for (int dx = -reach; dx <= reach; ++dx)
+        for (int dy = -reach; dy <= reach; ++dy)
+          for (int dz = -reach; dz <= reach; ++dz)
+            table.visit(hash_of({cell[0] + dx, cell[1] + dy, cell[2] + dz}),
+                        [&](const std::uint32_t v) {
+                          const Eigen::Vector3d& q = result.vertices[v];
+                          const bool near = tolerance > 0 ? (q - p).norm() <= tolerance : q == p;
+                          if (near && v < first) first = v;
+                        });
+    }
     if (first == kNone) {
       first = static_cast<std::uint32_t>(result.vertices.size());
       result.vertices.emplace_back(p + Eigen::Vector3d::Zero());
-      table.add(hash_of(cell), first);
+      if (among[i]) table.add(hash_of(cell_of(p)), first);
     }
     kept_as[i] = first;
   }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include <ist/mesh.h>
 
 namespace ist {
@@ -8,5 +10,8 @@ namespace ist {
 /// coordinates, −0 = 0); triangles follow. Unreferenced vertices are dropped, the rest keep their
 /// order. Every referenced coordinate must be finite.
 TriangleMesh weld(const TriangleMesh& mesh, double tolerance);
+
+/// The same, but vertices that are not in `among` (by index) stay apart.
+TriangleMesh weld_among(const TriangleMesh& mesh, double tolerance, const std::vector<bool>& among);
 
 }  // namespace ist

@@ -1,0 +1,185 @@
+#include "mesh/repair.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <ist/error.h>
+
+#include "mesh/disjoint_sets.h"
+#include "mesh/edge_table.h"
+#include "mesh/fill_holes.h"
+#include "mesh/message_text.h"
+#include "mesh/stitch.h"
+#include "mesh/surface_reduction.h"
+
+namespace ist {
+namespace {
+
+void tidy(TriangleMesh& mesh) {
+  drop_degenerate(mesh.vertices, mesh.triangles);
+  reduce_coincident(mesh.triangles);
+}
+
+std::size_t odd_edges(const TriangleMesh& mesh) {
+  return count_odd_edges(EdgeTable(mesh.triangles));
+}
+
+/// Of all tolerances up to 1e-5 of the diagonal, the smallest that leaves the fewest odd edges.
+void close_cracks(TriangleMesh& mesh, MeshReport& report) {
+  const std::size_t before = odd_edges(mesh);
+  std::size_t fewest = before;
+  double best_fraction = 0;
+  TriangleMesh best;
+  for (const double fraction : {1e-9, 1e-8, 1e-7, 1e-6, 1e-5}) {
+    if (fewest == 0) break;
+    TriangleMesh candidate = stitch(mesh, fraction * report.bounds.diagonal().norm());
+    tidy(candidate);
+    const std::size_t left = odd_edges(candidate);
+    if (left >= fewest) continue;
+    fewest = left;
+    best_fraction = fraction;
+    best = std::move(candidate);
+  }
+  if (best_fraction == 0) return;
+  mesh = std::move(best);
+  report.notes.push_back("repair: cracks up to " + shortest(best_fraction) +
+                         " of the diagonal closed: " + counted(before - fewest, "open edge") +
+                         " fewer");
+}
+
+/// Connected by edges of exactly two sides.
+DisjointSets patches_of(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
+  DisjointSets patches(triangles.size());
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    if (const auto sides = edges.sides(e); sides.size() == 2)
+      patches.unite(sides[0] / 3, sides[1] / 3);
+  return patches;
+}
+
+/// How often each patch lies on an edge: patch, sides.
+std::vector<std::pair<std::uint32_t, std::uint32_t>> patches_at(
+    DisjointSets& patches, const std::span<const std::uint32_t> sides) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> counts;
+  for (const std::uint32_t side : sides) counts.emplace_back(patches.find(side / 3), 1);
+  std::sort(counts.begin(), counts.end());
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    if (kept > 0 && counts[kept - 1].first == counts[i].first)
+      ++counts[kept - 1].second;
+    else
+      counts[kept++] = counts[i];
+  }
+  counts.resize(kept);
+  return counts;
+}
+
+/// Drops patches that hang on others and leave fewer odd edges when they go, best first. What is
+/// right for one changes what is right for its neighbours, so those wait. Returns how many went.
+std::size_t drop_fins_once(TriangleMesh& mesh) {
+  const EdgeTable edges(mesh.triangles);
+  DisjointSets patches = patches_of(mesh.triangles, edges);
+  std::vector<int> gain(mesh.triangles.size(), 0);  // odd edges fewer without this patch
+  std::vector<std::vector<std::uint32_t>> shared_edges(mesh.triangles.size());
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    const auto sides = edges.sides(e);
+    if (sides.size() == 2) continue;  // inside a patch
+    for (const auto& [patch, count] : patches_at(patches, sides)) {
+      if (count % 2 == 1) gain[patch] += sides.size() % 2 == 1 ? 1 : -1;
+      if (count < sides.size()) shared_edges[patch].push_back(e);
+    }
+  }
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t patch = 0; patch < gain.size(); ++patch)
+    if (gain[patch] > 0 && !shared_edges[patch].empty()) order.push_back(patch);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](const std::uint32_t a, const std::uint32_t b) { return gain[a] > gain[b]; });
+  std::vector<bool> changed(edges.size(), false), dropped(mesh.triangles.size(), false);
+  std::size_t count = 0;
+  for (const std::uint32_t patch : order) {
+    const auto& shared = shared_edges[patch];
+    if (std::any_of(shared.begin(), shared.end(), [&](std::uint32_t e) { return changed[e]; }))
+      continue;
+    for (const std::uint32_t e : shared) changed[e] = true;
+    dropped[patch] = true;
+    ++count;
+  }
+  std::vector<Triangle> kept;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+    if (!dropped[patches.find(t)]) kept.push_back(mesh.triangles[t]);
+  mesh.triangles = std::move(kept);
+  return count;
+}
+
+std::size_t drop_fins(TriangleMesh& mesh) {
+  std::size_t total = 0;
+  while (const std::size_t dropped = drop_fins_once(mesh)) total += dropped;
+  return total;
+}
+
+double area(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
+  return (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).norm() / 2;
+}
+
+/// Caps every loop of odd edges; but a piece that would be capped with nearly as much surface as it
+/// has is an open sheet, no solid with a hole, and is dropped.
+void cap_holes(TriangleMesh& mesh, MeshReport& report) {
+  constexpr double kSheet = 0.9;  // caps to own area
+  const EdgeTable edges(mesh.triangles);
+  DisjointSets pieces(mesh.triangles.size());
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    for (const std::uint32_t side : edges.sides(e)) pieces.unite(edges.sides(e)[0] / 3, side / 3);
+  const auto loops = border_loops(edges);
+  std::vector<std::vector<Triangle>> caps;
+  std::vector<double> own_area(mesh.triangles.size(), 0), cap_area(mesh.triangles.size(), 0);
+  std::vector<std::uint32_t> piece_of_loop;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+    own_area[pieces.find(t)] += area(mesh.vertices, mesh.triangles[t]);
+  for (const BorderLoop& loop : loops) {
+    const std::uint32_t piece = pieces.find(edges.sides(loop.edge)[0] / 3);
+    piece_of_loop.push_back(piece);
+    caps.push_back(cap(mesh.vertices, loop));
+    for (const Triangle& t : caps.back()) cap_area[piece] += area(mesh.vertices, t);
+  }
+  const auto is_sheet = [&](const std::uint32_t piece) {
+    return cap_area[piece] > kSheet * own_area[piece];
+  };
+  std::vector<Triangle> result;
+  std::size_t sheets = 0;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::uint32_t piece = pieces.find(t);
+    if (!is_sheet(piece)) result.push_back(mesh.triangles[t]);
+    sheets += is_sheet(piece) && piece == t ? 1 : 0;
+  }
+  for (std::size_t i = 0; i < caps.size(); ++i) {
+    if (is_sheet(piece_of_loop[i])) continue;
+    result.insert(result.end(), caps[i].begin(), caps[i].end());
+    ++report.filled_holes;
+  }
+  mesh.triangles = std::move(result);
+  if (sheets > 0)
+    report.notes.push_back("repair: " + counted(sheets, "open sheet") +
+                           " dropped: they enclose nothing");
+  if (report.filled_holes > 0)
+    report.notes.push_back("repair: " + counted(report.filled_holes, "hole") + " capped");
+}
+
+}  // namespace
+
+TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& report) {
+  report.repaired = true;
+  close_cracks(mesh, report);
+  if (const std::size_t fins = drop_fins(mesh); fins > 0)
+    report.notes.push_back("repair: " + counted(fins, "patch", "patches") +
+                           " dropped that hang on edges of three or more faces");
+  cap_holes(mesh, report);
+  tidy(mesh);
+  if (mesh.triangles.empty())
+    throw Error(name + ": cannot be repaired: nothing in it encloses a volume");
+  return mesh;
+}
+
+}  // namespace ist
