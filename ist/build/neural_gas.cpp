@@ -10,6 +10,7 @@ namespace ist {
 namespace {
 
 constexpr int kEpochs = 24;
+constexpr int kSweeps = 20;
 
 struct Point {
   double x = 0, y = 0, z = 0;
@@ -82,43 +83,71 @@ class NeuralGas {
     return at;
   }
 
-  /// Sorts `range` into groups of `unit`, the last of what remains. Balls choose in the order of
-  /// their distance to the prototypes. The last one stays last if `pinned`.
+  /// Sorts `range` into groups of `unit`, the last of what remains; the last ball stays last if
+  /// `pinned`. Starts in the order of the range; then two groups at a time share out their balls
+  /// anew, each to the prototype it prefers, until nothing moves: Σ distance² falls every time.
   void assign(std::span<std::uint32_t> range, std::vector<Point> at, std::size_t unit,
               bool pinned) const {
-    const std::uint32_t last = range.back();
-    std::size_t remainder = at.size() - 1;
-    for (std::size_t p = 0; pinned && p < at.size(); ++p)
-      if (squared_distance(balls_[last], at[p]) < squared_distance(balls_[last], at[remainder]))
-        remainder = p;
-    std::swap(at[remainder], at.back());
-    struct Choice {
-      double distance;
-      std::uint32_t ball;
-      std::uint32_t prototype;
-    };
-    std::vector<Choice> choices;
-    choices.reserve(range.size() * at.size());
-    for (std::uint32_t i = 0; i < range.size() - pinned; ++i)
-      for (std::uint32_t p = 0; p < at.size(); ++p)
-        choices.push_back({squared_distance(balls_[range[i]], at[p]), i, p});
-    std::sort(choices.begin(), choices.end(), [](const Choice& a, const Choice& b) {
-      if (a.distance != b.distance) return a.distance < b.distance;
-      return a.ball != b.ball ? a.ball < b.ball : a.prototype < b.prototype;
-    });
-    std::vector<std::vector<std::uint32_t>> groups(at.size());
-    std::vector<char> placed(range.size(), 0);
-    const std::size_t rest = range.size() - unit * (at.size() - 1) - pinned;
-    for (const Choice& choice : choices) {
-      auto& group = groups[choice.prototype];
-      const std::size_t room = choice.prototype + 1 < at.size() ? unit : rest;
-      if (placed[choice.ball] != 0 || group.size() >= room) continue;
-      placed[choice.ball] = 1;
-      group.push_back(range[choice.ball]);
+    const std::size_t groups = at.size();
+    if (pinned) {
+      const Ball& last = balls_[range.back()];
+      const auto nearest =
+          std::min_element(at.begin(), at.end(), [&](const Point& a, const Point& b) {
+            return squared_distance(last, a) < squared_distance(last, b);
+          });
+      std::iter_swap(nearest, at.end() - 1);
     }
-    if (pinned) groups.back().push_back(last);
-    auto out = range.begin();
-    for (const auto& group : groups) out = std::copy(group.begin(), group.end(), out);
+    // First shares along the prototypes' order, nearest first, as far as there is room.
+    fill_in_turn(range.first(range.size() - pinned), at, unit);
+    bool moved = true;
+    for (int sweep = 0; moved && sweep < kSweeps; ++sweep) {
+      moved = false;
+      for (std::size_t p = 0; p < groups; ++p)
+        for (std::size_t q = p + 1; q < groups; ++q)
+          moved |= share(range.first(range.size() - pinned), at, unit, p, q);
+    }
+  }
+
+  /// Group by group, the balls that are nearest to its prototype among those that are left.
+  void fill_in_turn(std::span<std::uint32_t> range, const std::vector<Point>& at,
+                    std::size_t unit) const {
+    for (std::size_t p = 0; p + 1 < at.size(); ++p) {
+      const auto rest = range.subspan(p * unit);
+      std::sort(rest.begin(), rest.end(), [&](std::uint32_t a, std::uint32_t b) {
+        const double da = squared_distance(balls_[a], at[p]);
+        const double db = squared_distance(balls_[b], at[p]);
+        return da != db ? da < db : a < b;
+      });
+    }
+  }
+
+  bool share(std::span<std::uint32_t> range, const std::vector<Point>& at, std::size_t unit,
+             std::size_t p, std::size_t q) const {
+    const auto group = [&](std::size_t g) {
+      return range.subspan(g * unit, std::min(unit, range.size() - g * unit));
+    };
+    const auto first = group(p);
+    const auto second = group(q);
+    std::vector<std::pair<double, std::uint32_t>> pool;
+    pool.reserve(first.size() + second.size());
+    for (const auto part : {first, second})
+      for (const std::uint32_t i : part)
+        pool.emplace_back(squared_distance(balls_[i], at[p]) - squared_distance(balls_[i], at[q]),
+                          i);
+    std::sort(pool.begin(), pool.end());
+    bool moved = false;
+    std::vector<std::uint32_t> before(first.begin(), first.end());
+    std::sort(before.begin(), before.end());
+    for (std::size_t k = 0; k < pool.size(); ++k) {
+      const std::uint32_t i = pool[k].second;
+      if (k < first.size()) {
+        first[k] = i;
+        moved |= !std::binary_search(before.begin(), before.end(), i);
+      } else {
+        second[k - first.size()] = i;
+      }
+    }
+    return moved;
   }
 
   std::span<const Ball> balls_;

@@ -171,11 +171,11 @@ TreeArrays tree_from_order(std::span<const Sphere4> spheres, std::span<const flo
 }
 
 TreeArrays build_tree(std::span<const Sphere4> spheres, std::span<const float> covers,
-                      Clustering clustering) {
+                      Clustering clustering, bool swaps) {
   std::vector<Ball> balls;
   balls.reserve(spheres.size());
   for (const Sphere4& s : spheres) balls.push_back(to_ball(s));
-  return tree_from_order(spheres, covers, tree_order(balls, clustering));
+  return tree_from_order(spheres, covers, tree_order(balls, clustering, swaps));
 }
 
 }  // namespace ist

@@ -11,10 +11,11 @@ namespace ist {
 namespace {
 
 std::vector<std::uint32_t> group_order(std::span<const Ball> balls, bool last_stays,
-                                       Clustering clustering) {
-  if (clustering == Clustering::neural_gas) return neural_gas_order(balls, last_stays);
-  std::vector<std::uint32_t> order = two_means_order(balls, last_stays);
-  improve_groups(balls, last_stays, order);
+                                       Clustering clustering, bool swaps) {
+  std::vector<std::uint32_t> order = clustering == Clustering::neural_gas
+                                         ? neural_gas_order(balls, last_stays)
+                                         : two_means_order(balls, last_stays);
+  if (swaps) improve_groups(balls, last_stays, order);
   return order;
 }
 
@@ -31,12 +32,12 @@ std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::
 }
 
 std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays,
-                                    Clustering clustering) {
-  const std::vector<std::uint32_t> order = group_order(balls, last_stays, clustering);
+                                    Clustering clustering, bool swaps) {
+  const std::vector<std::uint32_t> order = group_order(balls, last_stays, clustering, swaps);
   if (order.size() <= std::size_t{kWidth} * kWidth) return order;
   // A group that is not full comes last, and so does any that holds one that is not.
-  const std::vector<std::uint32_t> groups =
-      order_of(group_balls(balls, order), last_stays || order.size() % kWidth != 0, clustering);
+  const std::vector<std::uint32_t> groups = order_of(
+      group_balls(balls, order), last_stays || order.size() % kWidth != 0, clustering, swaps);
   std::vector<std::uint32_t> sorted;
   sorted.reserve(order.size());
   for (const std::uint32_t g : groups)
@@ -48,8 +49,9 @@ std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays
 
 }  // namespace
 
-std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, Clustering clustering) {
-  return order_of(spheres, false, clustering);
+std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, Clustering clustering,
+                                      bool swaps) {
+  return order_of(spheres, false, clustering, swaps);
 }
 
 }  // namespace ist

@@ -9,10 +9,10 @@
 namespace ist {
 namespace {
 
-constexpr std::size_t kNeighbours = 12;  ///< groups that a group may trade with
+constexpr std::size_t kNeighbours = 8;  ///< groups that a group may trade with
 constexpr int kMaxRounds = 40;
 /// s, relative to the mean radius of the groups' balls before any swap.
-constexpr double kReach = 0.5;
+constexpr double kReach = 0.25;
 constexpr double kLeastGain = 1e-4;  ///< relative to the two groups' cost; smaller ones are noise
 
 struct Swap {
