@@ -43,10 +43,9 @@ Asset rebuilt(const Asset& asset, const Builder& builder) {
   arrays.inner_spheres = copy(at<Sphere4>(header, header.inner_spheres));
   arrays.cover_radii = copy(at<float>(header, header.cover_radii));
   arrays.effective_spheres = copy(at<Sphere4>(header, header.effective_spheres));
-  arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii, builder.clustering,
-                                 builder.swaps);
-  arrays.matched_tree =
-      build_tree(arrays.effective_spheres, {}, builder.clustering, builder.swaps);
+  arrays.inner_tree =
+      build_tree(arrays.inner_spheres, arrays.cover_radii, builder.clustering, builder.swaps);
+  arrays.matched_tree = build_tree(arrays.effective_spheres, {}, builder.clustering, builder.swaps);
   return Asset(asset_bytes(arrays), builder.name);
 }
 

@@ -1,5 +1,6 @@
 #include <ist/bake.h>
 #include <ist/error.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -67,8 +68,9 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   tbb::task_arena arena(settings.threads == 0 ? tbb::task_arena::automatic
                                               : static_cast<int>(settings.threads));
   arena.execute([&] {
-    arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
-    arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+    tbb::parallel_invoke(
+        [&] { arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii); },
+        [&] { arrays.matched_tree = build_tree(arrays.effective_spheres, {}); });
   });
   report_tree(progress, packing.spheres.size(), 1);
   return Asset(asset_bytes(arrays), mesh.name);

@@ -14,7 +14,7 @@ namespace ist {
 /// κ is bounded for them. Every ball of the tree holds the spheres below it for certain: radii are
 /// rounded up. Same input, same tree, for any number of threads. The set must not be empty.
 TreeArrays build_tree(std::span<const Sphere4> spheres, std::span<const float> covers,
-                      Clustering clustering = Clustering::two_means, bool swaps = true);
+                      Clustering clustering = Clustering::neural_gas, bool swaps = true);
 
 /// The tree whose leaves are the spheres in a given order: lane i holds spheres[order[i]].
 TreeArrays tree_from_order(std::span<const Sphere4> spheres, std::span<const float> covers,

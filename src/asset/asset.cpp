@@ -30,6 +30,9 @@ Asset::Asset(std::span<const std::byte> bytes, const std::string& name)
 }
 
 Asset Asset::load(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored))
+    throw Error(path.string() + ": is a folder, no asset");
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) throw Error(path.string() + ": cannot open: " + reason(errno));
   const std::streamoff size = file.tellg();

@@ -122,7 +122,9 @@ TEST(Asset, SectionsAreAlignedAndInOrder) {
     EXPECT_EQ(offsets.front(), sizeof(AssetHeader));
     for (std::size_t i = 0; i < offsets.size(); ++i) {
       EXPECT_EQ(offsets[i] % kAssetAlignment, 0u);
-      if (i > 0) EXPECT_GT(offsets[i], offsets[i - 1]);
+      if (i > 0) {
+        EXPECT_GT(offsets[i], offsets[i - 1]);
+      }
     }
   }
 }
@@ -308,12 +310,12 @@ TEST(AssetBytes, ValuesOutOfRangeAreRefused) {
 TEST(AssetSave, KeepsTheOldFileIfTheDiskIsFull) {
   const TemporaryFolder folder;
   const Asset old_asset(small_asset(17), "old");
-  const Asset large(small_asset(3000), "new");
+  const Asset large(small_asset(900), "new");
   old_asset.save(folder / "a.ist");
   // The largest file that this process may write stands in for a full disk.
   rlimit before;
   getrlimit(RLIMIT_FSIZE, &before);
-  const rlimit small = {100'000, before.rlim_max};
+  const rlimit small = {50'000, before.rlim_max};
   const auto handler = std::signal(SIGXFSZ, SIG_IGN);
   setrlimit(RLIMIT_FSIZE, &small);
   EXPECT_THROW(large.save(folder / "a.ist"), Error);
