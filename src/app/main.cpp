@@ -21,7 +21,10 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Exit codes: 0 done, 1 error, 2 wrong usage, 3 check found a violation, 130 interrupted.");
+  add_bake(app);
+  add_query(app);
   add_info(app);
+  add_check(app);
   add_export(app);
   add_sample(app);
   try {
