@@ -6,8 +6,9 @@
 
 int main(int argc, char** argv) {
   if (argc != 3) return std::fprintf(stderr, "usage: bake_and_query MESH_A MESH_B\n"), 2;
-  const ist::Asset a = ist::bake(ist::close_mesh(ist::load_mesh(argv[1]), argv[1]));
-  const ist::Asset b = ist::bake(ist::close_mesh(ist::load_mesh(argv[2]), argv[2]));
+  const ist::PackingSettings settings{.max_spheres = 2'000};
+  const ist::Asset a = ist::bake(ist::close_mesh(ist::load_mesh(argv[1]), argv[1]), settings);
+  const ist::Asset b = ist::bake(ist::close_mesh(ist::load_mesh(argv[2]), argv[2]), settings);
   const ist::Pose pose_b{.t = {0.5, 0, 0}};  // x_world = R x + t; A stays at the origin
   ist::Workspace scratch;
   const ist::Penetration p = ist::penetration({a.view(), {}}, {b.view(), pose_b}, {}, scratch);
