@@ -13,6 +13,7 @@
 #include "build/column_lattice.h"
 #include "build/cube_root.h"
 #include "build/power_cells.h"
+#include "build/turned_solid.h"
 
 namespace ist {
 namespace {
@@ -26,6 +27,7 @@ constexpr double kColumnsPerSphere = 64;
 constexpr double kLargestMiss = 0.1;
 // Radius of a sphere whose cell is empty, over the mean leaf radius: legal, and counts for nothing.
 constexpr double kEmptyCellRadius = 1e-4;
+constexpr double kMargin = 1e-12;  // unit frame, above the rounding of any distance here
 
 double radius_of(double volume) { return cube_root(3 * volume / (4 * std::numbers::pi)); }
 
@@ -41,11 +43,12 @@ std::vector<PowerCell> inflated_spheres(std::span<const Sphere> inner) {
   return cells;
 }
 
-/// Distance by which a ball sticks out of the solid at most; negative if it lies inside.
+/// Distance by which a ball sticks out of the solid at most, rounding included; negative if it lies
+/// inside.
 double protrusion(const MeshSolid& solid, const Sphere4& ball) {
   const Eigen::Vector3d centre(ball.x, ball.y, ball.z);
   const double distance = solid.closest_point(centre).distance;
-  return ball.r + (solid.inside(centre) ? -distance : distance);
+  return ball.r + (solid.inside(centre) ? -distance : distance) + kMargin;
 }
 
 }  // namespace
@@ -69,12 +72,15 @@ Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, uns
   const double mean_radius = radius_of(volume / static_cast<double>(inner.size()));
   std::vector<PowerSite> sites;
   sites.reserve(inner.size());
-  for (const Sphere& s : inner) sites.push_back({s.x, s.y, s.z, double{s.r} * s.r});
-
   report(0);
+  const TurnedSolid turned(solid);
+  for (const Sphere& s : inner) {
+    const Eigen::Vector3d x = turned.turn({s.x, s.y, s.z});
+    sites.push_back({x.x(), x.y(), x.z(), double{s.r} * s.r});
+  }
   ColumnLattice lattice;
   arena.execute([&] {
-    lattice = cut_columns(solid, kStep * mean_radius, kMinColumns,
+    lattice = cut_columns(turned.solid(), kStep * mean_radius, kMinColumns,
                           kMinColumns + kColumnsPerSphere * static_cast<double>(inner.size()));
   });
   if (std::abs(lattice.volume() - volume) > kLargestMiss * volume) lattice = {};
@@ -95,8 +101,9 @@ Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, uns
   for (std::size_t k = 0; k < sites.size(); ++k) {
     const double radius =
         cells[k].share > 0 ? radius_of(cells[k].share * volume) : kEmptyCellRadius * mean_radius;
-    result.effective[k] = {static_cast<float>(sites[k].x), static_cast<float>(sites[k].y),
-                           static_cast<float>(sites[k].z), static_cast<float>(radius)};
+    const Eigen::Vector3d x = turned.turn_back({sites[k].x, sites[k].y, sites[k].z});
+    result.effective[k] = {static_cast<float>(x.x()), static_cast<float>(x.y()),
+                           static_cast<float>(x.z()), static_cast<float>(radius)};
   }
   std::vector<double> out(inner.size());
   arena.execute([&] {
