@@ -68,15 +68,16 @@ Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, uns
   };
   tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : static_cast<int>(threads));
 
-  const double volume = solid.unit_volume();
-  const double mean_radius = radius_of(volume / static_cast<double>(inner.size()));
-  std::vector<PowerSite> sites;
-  sites.reserve(inner.size());
+  // The cells are found in the frame of the turned solid.
   report(0);
   const TurnedSolid turned(solid);
+  const double volume = turned.solid().unit_volume();
+  const double mean_radius = radius_of(volume / static_cast<double>(inner.size()));
+  std::vector<PowerSite> sites;
   for (const Sphere& s : inner) {
     const Eigen::Vector3d x = turned.turn({s.x, s.y, s.z});
-    sites.push_back({x.x(), x.y(), x.z(), double{s.r} * s.r});
+    const double radius = s.r / turned.scale();
+    sites.push_back({x.x(), x.y(), x.z(), radius * radius});
   }
   ColumnLattice lattice;
   arena.execute([&] {
@@ -99,8 +100,8 @@ Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, uns
   Calibration result;
   result.effective.resize(inner.size());
   for (std::size_t k = 0; k < sites.size(); ++k) {
-    const double radius =
-        cells[k].share > 0 ? radius_of(cells[k].share * volume) : kEmptyCellRadius * mean_radius;
+    const double radius = cells[k].share > 0 ? radius_of(cells[k].share * solid.unit_volume())
+                                             : kEmptyCellRadius * mean_radius * turned.scale();
     const Eigen::Vector3d x = turned.turn_back({sites[k].x, sites[k].y, sites[k].z});
     result.effective[k] = {static_cast<float>(x.x()), static_cast<float>(x.y()),
                            static_cast<float>(x.z()), static_cast<float>(radius)};

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "build/turned_solid.h"
-
 namespace ist {
 namespace {
 
@@ -17,6 +15,19 @@ constexpr double kMaxBoxColumns = 1u << 22;
 Eigen::AlignedBox3d unit_box(const MeshSolid& solid) {
   const Eigen::AlignedBox3d box = solid.bounds();
   return {solid.frame().to_unit(box.min()), solid.frame().to_unit(box.max())};
+}
+
+/// Area of the solid's shadow along x, a point counted as often as a line enters the surface there.
+double shadow_area(const MeshView& mesh) {
+  double sum = 0;
+  for (std::size_t t = 0; t < mesh.triangle_count; ++t) {
+    const std::uint32_t* corner = mesh.triangles + 3 * t;
+    const double* a = mesh.vertices_exact + 3 * std::size_t{corner[0]};
+    const double* b = mesh.vertices_exact + 3 * std::size_t{corner[1]};
+    const double* c = mesh.vertices_exact + 3 * std::size_t{corner[2]};
+    sum += std::abs((b[1] - a[1]) * (c[2] - a[2]) - (c[1] - a[1]) * (b[2] - a[2]));
+  }
+  return sum / 4;  // half the parallelograms, and half of the crossings enter
 }
 
 /// The parts of a line where the winding number is ≥ 1.
@@ -43,7 +54,7 @@ ColumnLattice cut_columns(const MeshSolid& solid, double step, double min_column
   ColumnLattice lattice;
   lattice.box = unit_box(solid);
   const double width = lattice.box.sizes().y(), depth = lattice.box.sizes().z();
-  const double shadow = shadow_areas(solid.view()).x();
+  const double shadow = shadow_area(solid.view());
   for (double spacing = std::min(step, std::sqrt(shadow / min_columns));; spacing *= 1.05) {
     const double ny = std::max(kMinColumnsAcross, std::ceil(width / spacing));
     const double nz = std::max(kMinColumnsAcross, std::ceil(depth / spacing));

@@ -1,62 +1,103 @@
 #include "build/turned_solid.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace ist {
 namespace {
 
-// A turned copy of the mesh costs memory and time: only for a shadow smaller than this part of the
-// largest.
-constexpr double kSmallShadow = 0.25;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
 
-Eigen::Vector3d cycled(const Eigen::Vector3d& x, int axis) {
-  return {x[axis], x[(axis + 1) % 3], x[(axis + 2) % 3]};
+// A turned copy of the mesh costs memory and time: only for a shadow along x that is smaller than
+// this part of the largest, or than that part of the box.
+constexpr double kSmallShadow = 0.25;
+constexpr double kEmptyBox = 0.02;
+
+/// The surface's area seen along each axis, and its second moments.
+struct SurfaceMoments {
+  Vector3d shadow = Vector3d::Zero();  // a point counts as often as a line enters the surface there
+  Matrix3d covariance = Matrix3d::Zero();
+};
+
+SurfaceMoments surface_moments(const MeshView& mesh) {
+  SurfaceMoments moments;
+  double area_sum = 0;
+  Vector3d first = Vector3d::Zero();
+  Matrix3d second = Matrix3d::Zero();
+  for (std::size_t t = 0; t < mesh.triangle_count; ++t) {
+    Vector3d p[3];
+    for (std::size_t k = 0; k < 3; ++k)
+      p[k] = Vector3d(mesh.vertices_exact + 3 * std::size_t{mesh.triangles[3 * t + k]});
+    const Vector3d normal = (p[1] - p[0]).cross(p[2] - p[0]);
+    const double area = 0.5 * normal.norm();
+    const Vector3d sum = p[0] + p[1] + p[2];
+    moments.shadow += 0.25 * normal.cwiseAbs();  // half the parallelogram, half of it entered
+    area_sum += area;
+    first += area / 3 * sum;
+    second += area / 12 * (sum * sum.transpose());
+    for (const Vector3d& x : p) second += area / 12 * (x * x.transpose());
+  }
+  first /= area_sum;
+  moments.covariance = second / area_sum - first * first.transpose();
+  return moments;
+}
+
+/// Rows: the eigenvectors of a symmetric matrix by rising eigenvalue, right-handed. Jacobi's method
+/// by + − × ÷ sqrt: the same bits everywhere.
+Matrix3d principal_axes(Matrix3d m) {
+  Matrix3d axes = Matrix3d::Identity();
+  for (int sweep = 0; sweep < 12; ++sweep)
+    for (int k = 0; k < 3; ++k) {
+      const int p = k, q = (k + 1) % 3;
+      if (m(p, q) == 0) continue;
+      const double theta = (m(q, q) - m(p, p)) / (2 * m(p, q));
+      const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
+      const double c = 1 / std::sqrt(t * t + 1), s = t * c;
+      Matrix3d rotation = Matrix3d::Identity();
+      rotation(p, p) = rotation(q, q) = c;
+      rotation(p, q) = -s;
+      rotation(q, p) = s;
+      m = rotation * m * rotation.transpose();
+      axes = rotation * axes;
+    }
+  int order[3] = {0, 1, 2};
+  std::sort(order, order + 3, [&](int a, int b) { return m(a, a) < m(b, b); });
+  Matrix3d sorted;
+  sorted.row(0) = axes.row(order[0]);
+  sorted.row(1) = axes.row(order[1]);
+  sorted.row(2) = sorted.row(0).cross(sorted.row(1));
+  return sorted;
 }
 
 }  // namespace
 
-Eigen::Vector3d shadow_areas(const MeshView& mesh) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (std::uint32_t t = 0; t < mesh.triangle_count; ++t) {
-    const std::uint32_t* corner = mesh.triangles + 3 * std::size_t{t};
-    const double* a = mesh.vertices_exact + 3 * std::size_t{corner[0]};
-    const double* b = mesh.vertices_exact + 3 * std::size_t{corner[1]};
-    const double* c = mesh.vertices_exact + 3 * std::size_t{corner[2]};
-    for (int k = 0; k < 3; ++k) {
-      const int u = (k + 1) % 3, v = (k + 2) % 3;
-      sum[k] += std::abs((b[u] - a[u]) * (c[v] - a[v]) - (c[u] - a[u]) * (b[v] - a[v]));
-    }
-  }
-  return sum / 4;  // half the parallelograms, and half of the crossings enter
-}
-
 TurnedSolid::TurnedSolid(const MeshSolid& solid) : original_(solid) {
   const MeshView& view = solid.view();
-  const Eigen::Vector3d shadow = shadow_areas(view);
-  int largest = 0;
-  const double area = shadow.maxCoeff(&largest);
-  if (shadow.x() >= kSmallShadow * area) return;
-  axis_ = largest;
+  const SurfaceMoments moments = surface_moments(view);
+  const Vector3d size = solid.bounds().sizes() / solid.frame().scale();
+  if (moments.shadow.x() >= kSmallShadow * moments.shadow.maxCoeff() &&
+      moments.shadow.x() >= kEmptyBox * size.y() * size.z())
+    return;
+  axes_ = principal_axes(moments.covariance);
   ClosedMesh mesh;
   mesh.name = "turned mesh";
-  for (std::size_t v = 0; v < view.vertex_count; ++v) {
-    const double* x = view.vertices_exact + 3 * v;
-    mesh.mesh.vertices.push_back(cycled({x[0], x[1], x[2]}, axis_));
-  }
+  mesh.report.closed = true;
+  for (std::size_t v = 0; v < view.vertex_count; ++v)
+    mesh.mesh.vertices.push_back(axes_ * Vector3d(view.vertices_exact + 3 * v));
   for (std::size_t t = 0; t < view.triangle_count; ++t) {
     const std::uint32_t* corner = view.triangles + 3 * t;
     mesh.mesh.triangles.push_back({corner[0], corner[1], corner[2]});
   }
-  mesh.report.closed = true;
   turned_ = std::make_unique<MeshSolid>(mesh);
 }
 
-Eigen::Vector3d TurnedSolid::turn(const Eigen::Vector3d& x) const {
-  return turned_ ? turned_->frame().to_unit(cycled(x, axis_)) : x;
+Vector3d TurnedSolid::turn(const Vector3d& x) const {
+  return turned_ ? turned_->frame().to_unit(axes_ * x) : x;
 }
 
-Eigen::Vector3d TurnedSolid::turn_back(const Eigen::Vector3d& x) const {
-  return turned_ ? cycled(turned_->frame().from_unit(x), (3 - axis_) % 3) : x;
+Vector3d TurnedSolid::turn_back(const Vector3d& x) const {
+  return turned_ ? Vector3d(axes_.transpose() * turned_->frame().from_unit(x)) : x;
 }
 
 }  // namespace ist

