@@ -34,22 +34,34 @@ class BandedPacker {
 
   SpherePacking run() {
     start_ = last_report_ = Clock::now();
-    cells_.assign(1, Cell{});
-    cells_[0].inside = surface_.inside(cells_[0].centre);
+    begin_at_root();
     rebuild_grid(2.0f);
     float previous = 4;
     while (!stopped_) {
+      floor_ = radius_floor(previous);
       drop_dead_cells();
       float top = 0;
       for (const Cell& cell : cells_) top = std::max(top, cell.bound);
-      if (top < kSmallestRadius)
+      if (dropped_ >= kSmallestRadius && top < dropped_) {
+        // The forecast was too high, and what it dropped is needed: find it again.
+        forecast_ = false;
+        begin_at_root();
+        continue;
+      }
+      if (top < kSmallestRadius) {
         stop(StopReason::exhausted);
-      else if (top < limits_.min_radius)
+      } else if (top < limits_.min_radius) {
         stop(StopReason::min_radius);
-      else {
-        if (top < 0.7f * grid_.reach()) rebuild_grid(top * 1.001f);
+      } else {
+        if (top < 0.7f * grid_.reach() ||
+            result_.spheres.size() > 4 * std::max<std::size_t>(grid_.built_for(), 16))
+          rebuild_grid(std::min(top * 1.001f, grid_.reach()));
         const float slack = band_slack();
         if (!strict()) top = std::min(top, previous);
+        if ((1 - slack) * top < kSmallestRadius) {
+          stop(StopReason::exhausted);
+          break;
+        }
         previous = std::max((1 - slack) * top, static_cast<float>(limits_.min_radius));
         band(previous, slack);
       }
@@ -71,6 +83,9 @@ class BandedPacker {
   static constexpr float kSmallestRadius = 0x1p-21f;  ///< float coordinates resolve nothing below
   static constexpr float kSmallestHalfEdge = 0x1p-23f;
   static constexpr float kFloatNoise = 1e-4f;
+  static constexpr float kLargest = 1.5f;  ///< half-edge of a cell that is climbed from, in radii
+  static constexpr std::size_t kMostCells = std::size_t{1} << 22;  ///< some 400 MB
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
   bool strict() const { return settings_.epsilon > 0; }
 
@@ -82,9 +97,32 @@ class BandedPacker {
     if (settings_.max_spheres > 0 && !result_.spheres.empty()) {
       const auto n = static_cast<double>(result_.spheres.size());
       const double left = static_cast<double>(settings_.max_spheres) - n;
-      slack = std::min(slack, 1 - power_three_eighths(n / (n + 0.5 * left)));
+      slack = std::min(slack, 1 - power_three_eighths(n / (n + 1.5 * left)));
     }
     return static_cast<float>(std::max(slack, 0.02));
+  }
+
+  /// Radius below which nothing can matter: the forecast of the last sphere's, with a margin. Where
+  /// it turns out too high, the packing starts again at the root cell with the spheres it has.
+  float radius_floor(float radius) const {
+    const auto n = static_cast<double>(result_.spheres.size());
+    if (strict() || !forecast_ || settings_.max_spheres == 0 || n < 64) return kSmallestRadius;
+    const double left = n / static_cast<double>(settings_.max_spheres);
+    return std::max(kSmallestRadius,
+                    static_cast<float>(0.6 * double{radius} * power_three_eighths(left)));
+  }
+
+  /// Cells under work at once beyond which more of them cannot be needed.
+  std::size_t plateau() const {
+    const std::size_t left =
+        settings_.max_spheres > 0 ? settings_.max_spheres - result_.spheres.size() : 10000;
+    return 4096 + 16 * left;
+  }
+
+  void begin_at_root() {
+    dropped_ = 0;
+    cells_.assign(1, Cell{});
+    cells_[0].inside = surface_.inside(cells_[0].centre);
   }
 
   /// Inserts spheres of radius ≥ threshold until the band has given what it has.
@@ -108,58 +146,72 @@ class BandedPacker {
 
   /// Works on the cells until each has settled or holds a candidate; leaves the latter in `active`.
   void resolve(std::vector<std::uint32_t>& active, float threshold, float margin) {
-    std::vector<std::uint32_t> frontier = std::move(active), next;
+    const PrototypeField<Surface> field(surface_, result_.spheres, grid_);
+    std::vector<std::uint32_t> frontier = std::move(active), splitting;
     std::vector<CellState> state;
     active.clear();
     while (!frontier.empty()) {
-      state.assign(frontier.size(), CellState::settled);
-      const PrototypeField<Surface> field(surface_, result_.spheres, grid_);
+      // A plateau: so many places are equally good that any of them will do. Cells then are climbed
+      // from at any size, and split only where that fails.
+      const float largest = frontier.size() > plateau() ? 2 : kLargest * threshold;
+      state.resize(frontier.size());
+      splitting.clear();
       for (std::size_t from = 0; from < frontier.size(); from += kChunk) {
-        oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(
-                                      from, std::min(frontier.size(), from + kChunk), 16),
-                                  [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
-                                    for (std::size_t i = range.begin(); i != range.end(); ++i)
-                                      state[i] = field.work(cells_[frontier[i]], threshold, margin,
-                                                            threshold);
-                                  });
+        const std::size_t to = std::min(frontier.size(), from + kChunk);
+        for_each_index(from, to, [&](std::size_t i) {
+          state[i] = field.work(cells_[frontier[i]], threshold, margin, largest);
+        });
         if (out_of_time_or_cancelled(threshold)) return;
       }
-      next.clear();
       for (std::size_t i = 0; i < frontier.size(); ++i) {
         if (state[i] == CellState::candidate) active.push_back(frontier[i]);
-        if (state[i] == CellState::split) split(frontier[i], margin, next);
+        if (state[i] == CellState::split) splitting.push_back(frontier[i]);
       }
-      frontier.swap(next);
+      frontier.clear();
+      if (cells_.size() > kMostCells) {
+        // Bounds that do not separate: in the automatic schedule the next band asks for less.
+        if (strict()) stop(StopReason::exhausted);
+        break;
+      }
+      split(splitting, field, margin, frontier);
     }
     std::sort(active.begin(), active.end());
   }
 
-  /// Replaces a cell by its eight children; the first takes its place.
-  void split(std::uint32_t index, float margin, std::vector<std::uint32_t>& children) {
-    const Cell parent = cells_[index];
-    if (parent.half <= kSmallestHalfEdge) {
-      cells_[index].bound = 0.999f * margin;
-      return;
-    }
-    const float quarter = 0.5f * parent.half;
-    const float offset = quarter * 1.7320510f;
-    for (int k = 0; k < 8; ++k) {
-      Cell child;
-      child.centre = {parent.centre.x + ((k & 1) != 0 ? quarter : -quarter),
-                      parent.centre.y + ((k & 2) != 0 ? quarter : -quarter),
-                      parent.centre.z + ((k & 4) != 0 ? quarter : -quarter)};
-      child.half = quarter;
-      child.bound = parent.bound;
-      child.ring = parent.ring;
-      child.surface_at_least = parent.surface_at_least - offset;
-      child.inside = parent.inside;
-      child.side_known = child.surface_at_least > 0;
-      if (k == 0) {
-        cells_[index] = child;
-        children.push_back(index);
-      } else {
-        children.push_back(static_cast<std::uint32_t>(cells_.size()));
-        cells_.push_back(child);
+  /// Replaces each cell by those of its children that still count; appends the ones that reach the
+  /// margin to `unsettled`.
+  void split(const std::vector<std::uint32_t>& parents, const PrototypeField<Surface>& field,
+             float margin, std::vector<std::uint32_t>& unsettled) {
+    std::vector<Cell> children(8 * std::min(parents.size(), kChunk));
+    for (std::size_t from = 0; from < parents.size(); from += kChunk) {
+      const std::size_t to = std::min(parents.size(), from + kChunk);
+      for_each_index(from, to, [&](std::size_t i) {
+        for (int k = 0; k < 8; ++k) {
+          Cell& child = children[8 * (i - from) + static_cast<std::size_t>(k)];
+          child = octant(cells_[parents[i]], k);
+          Sample s;
+          Float3 y;
+          field.settles(child, margin, s, y);
+          if (child.half < kSmallestHalfEdge) child.bound = std::min(child.bound, 0.999f * margin);
+        }
+      });
+      for (std::size_t i = from; i < to; ++i) {
+        std::uint32_t place = parents[i];
+        cells_[place].bound = 0;
+        for (std::size_t k = 0; k < 8; ++k) {
+          const Cell& child = children[8 * (i - from) + k];
+          if (child.bound < floor_) {
+            dropped_ = std::max(dropped_, child.bound);
+            continue;
+          }
+          if (place == kNone) {
+            place = static_cast<std::uint32_t>(cells_.size());
+            cells_.emplace_back();
+          }
+          cells_[place] = child;
+          if (child.bound >= margin) unsettled.push_back(place);
+          place = kNone;
+        }
       }
     }
   }
@@ -177,12 +229,9 @@ class BandedPacker {
     }
     const std::vector<std::uint32_t> winners = select_independent(candidates);
     std::vector<double> surface_distance(winners.size());
-    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, winners.size(), 16),
-                              [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
-                                for (std::size_t i = range.begin(); i != range.end(); ++i)
-                                  surface_distance[i] =
-                                      surface_.clearance(candidates[winners[i]].centre);
-                              });
+    for_each_index(0, winners.size(), [&](std::size_t i) {
+      surface_distance[i] = surface_.clearance(candidates[winners[i]].centre);
+    });
     std::size_t inserted = 0;
     for (std::size_t i = 0; i < winners.size() && !stopped_; ++i) {
       const Candidate& c = candidates[winners[i]];
@@ -210,10 +259,18 @@ class BandedPacker {
   }
 
   void drop_dead_cells() {
-    const auto dead = [](const Cell& cell) { return cell.bound < kSmallestRadius; };
-    const auto count = std::count_if(cells_.begin(), cells_.end(), dead);
-    if (2 * static_cast<std::size_t>(count) > cells_.size())
-      cells_.erase(std::remove_if(cells_.begin(), cells_.end(), dead), cells_.end());
+    const auto dead = [this](const Cell& cell) { return cell.bound < floor_; };
+    for (const Cell& cell : cells_)
+      if (dead(cell)) dropped_ = std::max(dropped_, cell.bound);
+    cells_.erase(std::remove_if(cells_.begin(), cells_.end(), dead), cells_.end());
+  }
+
+  template <class Work>
+  static void for_each_index(std::size_t from, std::size_t to, const Work& work) {
+    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(from, to, 16),
+                              [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
+                                for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
+                              });
   }
 
   void rebuild_grid(float reach) { grid_ = SphereGrid(result_.spheres, reach); }
@@ -256,6 +313,9 @@ class BandedPacker {
   SpherePacking result_;
   std::vector<float> kept_;
   double covered_ = 0;
+  float floor_ = kSmallestRadius;
+  float dropped_ = 0;  ///< largest bound of the cells that the floor took
+  bool forecast_ = true;
   bool stopped_ = false;
   StopReason reason_ = StopReason::exhausted;
   Clock::time_point start_, last_report_;

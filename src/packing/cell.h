@@ -23,4 +23,21 @@ struct Cell {
   Ring<Feature> ring;
 };
 
+/// The k-th of the eight children of a cell. It knows what its parent's knowledge implies for it.
+template <class Feature>
+Cell<Feature> octant(const Cell<Feature>& parent, int k) {
+  const float quarter = 0.5f * parent.half;
+  Cell<Feature> child;
+  child.centre = {parent.centre.x + ((k & 1) != 0 ? quarter : -quarter),
+                  parent.centre.y + ((k & 2) != 0 ? quarter : -quarter),
+                  parent.centre.z + ((k & 4) != 0 ? quarter : -quarter)};
+  child.half = quarter;
+  child.bound = parent.bound;
+  child.surface_at_least = parent.surface_at_least - quarter * 1.7320510f;
+  child.inside = parent.inside;
+  child.side_known = child.surface_at_least > 0;
+  child.ring = parent.ring;
+  return child;
+}
+
 }  // namespace ist::packing

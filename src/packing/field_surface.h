@@ -40,10 +40,14 @@ class FieldSurface {
     return true;
   }
 
-  /// A remembered feature seen from x.
-  Constraint at(const Feature& feature, Float3 x) const {
-    return ball_constraint(feature.centre, feature.radius, x);
+  /// Constraints at x of remembered features.
+  void constraints(const Feature* features, int count, Float3 x, Constraint* out) const {
+    for (int i = 0; i < count; ++i)
+      out[i] = ball_constraint(features[i].centre, features[i].radius, x);
   }
+
+  /// Nothing is known of faces.
+  int convex_planes(Float3, float, bool, Constraint*, int) const { return 0; }
 
   bool inside(Float3 x) const { return value(x) > 0; }
   double clearance(Float3 x) const { return value(x); }

@@ -4,45 +4,24 @@
 
 #include "packing/cell.h"
 #include "packing/linear_program.h"
-#include "packing/sphere_grid.h"
+#include "packing/sample.h"
 
 namespace ist::packing {
 
-/// The field around a point: its clearance (distance to surface ∪ spheres; ≤ 0 inside a sphere)
-/// and the constraints of the features that can matter near it.
-struct Sample {
-  static constexpr int kCapacity = 64;
-  Constraint constraint[kCapacity];
-  int size = 0;
-  float clearance = 0;
-
-  IST_HD void add(const Constraint& c) {
-    if (c.distance < clearance) clearance = c.distance;
-    if (size < kCapacity) {
-      constraint[size++] = c;
-      return;
-    }
-    // Full: the farthest makes room. Any subset still gives a bound.
-    int farthest = 0;
-    for (int i = 1; i < kCapacity; ++i)
-      if (constraint[i].distance > constraint[farthest].distance) farthest = i;
-    if (c.distance < constraint[farthest].distance) constraint[farthest] = c;
-  }
-};
-
 /// Outcome of working on a cell.
 enum class CellState : std::uint8_t {
-  settled,    ///< bound below the threshold
+  settled,    ///< bound below the margin
   candidate,  ///< prototype's radius reaches the threshold
   split,      ///< neither: look closer
 };
 
-/// The part of the packing that works on one cell at a time: bound, ascent. Const, so any number
+/// The part of packing that works on one cell at a time: bounds and ascents. Const, so any number
 /// of threads may share it.
 template <class Surface>
 class PrototypeField {
  public:
-  using Cell = packing::Cell<typename Surface::Feature>;
+  using Feature = typename Surface::Feature;
+  using Cell = packing::Cell<Feature>;
 
   PrototypeField(const Surface& surface, const std::vector<Sphere>& spheres, const SphereGrid& grid)
       : surface_(surface), spheres_(spheres), grid_(grid) {}
@@ -51,76 +30,76 @@ class PrototypeField {
   /// `margin` ≥ threshold; cells with a half-edge above `largest` are only bounded.
   CellState work(Cell& cell, float threshold, float margin, float largest) const {
     const auto count = static_cast<std::uint32_t>(spheres_.size());
-    if (cell.radius > 0 && cell.seen < count) {
-      const float now = clearance_of_spheres(cell.prototype);
-      if (now < cell.radius) cell.radius = 0;
-    }
-    if (cell.radius >= threshold) {
-      cell.seen = count;
-      return CellState::candidate;
-    }
-    const float h = cell.half * kSqrt3;
+    if (cell.radius > 0 && cell.seen < count &&
+        sphere_clearance(cell.prototype, spheres_, grid_) < cell.radius)
+      cell.radius = 0;
+    cell.seen = count;
+    if (cell.radius >= threshold) return CellState::candidate;
+
+    Sample s;
+    Float3 y;
+    const float window = kWindow * cell.half;
+    if (settles(cell, margin, s, y)) return CellState::settled;
     if (!cell.side_known) {
       cell.inside = surface_.inside(cell.centre);
       cell.side_known = true;
     }
     if (!cell.inside) {
-      typename Surface::Feature feature;
-      float distance;
-      if (!surface_.nearest(cell.centre, h, feature, distance)) {
-        cell.bound = 0;
-        return CellState::settled;
-      }
-      cell.ring.push(feature);
+      const float h = cell.half * kSqrt3;
+      Feature feature;
+      float distance = h;
+      if (surface_.nearest(cell.centre, h, feature, distance)) cell.ring.push(feature);
       cell.surface_at_least = distance;
       lower(cell, h - distance);
+      if (cell.bound < margin || bounded_by_planes(cell, margin, s)) return CellState::settled;
+      return distance < h && climb_from_surface(cell, feature, distance, threshold, largest)
+                 ? CellState::candidate
+                 : CellState::split;
     }
-    Sample s;
-    sample(cell.centre, cell.inside ? cell.surface_at_least : 1e30f, 4 * cell.half, cell.ring, s,
-           cell.surface_at_least);
-    cell.seen = count;
-    if (cell.inside) lower(cell, s.clearance + h);
-    if (s.size == 0) return CellState::split;
-    if (cell.bound < margin) return CellState::settled;
-    const ClearanceOptimum best =
-        maximise_clearance(s.constraint, s.size, cell.half, 3 * cell.half * cell.half);
-    lower(cell, best.value);
-    if (cell.bound < margin) return CellState::settled;
-    if (cell.half > largest || !cell.inside) return CellState::split;
+    if (look_at_surface(cell.centre, cell.surface_at_least, cell.ring, s)) {
+      s.keep_near(window);
+      if (bounded(cell, margin, s, y)) return CellState::settled;
+    }
+    if (bounded_by_planes(cell, margin, s)) return CellState::settled;
+    if (cell.half > largest || s.size == 0) return CellState::split;
 
-    // Start where the linear model is greatest, if that is sure to be inside and better.
+    // Start where the cell's bound is attained, if that is sure to be inside and
+    // better.
     Float3 x = cell.centre;
     float surface_at_least = cell.surface_at_least;
-    if (norm(best.y) < 0.99f * surface_at_least) {
+    if (norm(y) < 0.99f * surface_at_least) {
       Sample there;
-      float at_least = surface_at_least - norm(best.y);
-      sample(x + best.y, at_least, 4 * cell.half, cell.ring, there, at_least);
+      float at_least = surface_at_least - norm(y);
+      sample(x + y, window, at_least, cell.ring, there);
       if (there.clearance > s.clearance) {
-        x = x + best.y;
-        s = there;
+        x = x + y;
+        copy(there, s);
         surface_at_least = at_least;
       }
     }
     if (!(s.clearance > 0)) return CellState::split;
-    ascend(x, surface_at_least, cell.half, cell.ring, s);
+    ascend(x, surface_at_least, cell.half, threshold, cell.ring, s);
     cell.prototype = x;
     cell.radius = s.clearance;
     return cell.radius >= threshold ? CellState::candidate : CellState::split;
   }
 
-  /// Clearance of a point to the spheres alone, no more than the grid's reach.
-  float clearance_of_spheres(Float3 x) const {
-    float clearance = grid_.reach();
-    grid_.for_near(x, [&](std::uint32_t i) {
-      const Sphere& s = spheres_[i];
-      const float g = norm(x - Float3{s.x, s.y, s.z}) - s.r;
-      if (g < clearance) clearance = g;
-    });
-    return clearance;
+  /// Lowers the bound by the spheres and remembered features alone; true if below the margin. `s`
+  /// is left with what was seen at the centre, y with where the bound is attained.
+  bool settles(Cell& cell, float margin, Sample& s, Float3& y) const {
+    const float window = kWindow * cell.half;
+    sample_spheres(cell.centre, spheres_, grid_, window, kSpare, s);
+    lower(cell, s.clearance + cell.half * kSqrt3);
+    if (cell.bound < margin) return true;
+    look_at_ring(cell.centre, window, cell.surface_at_least, cell.ring, s);
+    return bounded(cell, margin, s, y);
   }
 
  private:
   static constexpr float kSqrt3 = 1.7320510f;  // rounded up
+  static constexpr float kWindow = 4;          // × half-edge: 2√3 and some
+  static constexpr float kHope = 6;
+  static constexpr int kSpare = Ring<Feature>::kCapacity + 1;
 
   /// The bound only falls; float errors of the field are allowed for.
   static void lower(Cell& cell, float bound) {
@@ -128,41 +107,92 @@ class PrototypeField {
     if (bound < cell.bound) cell.bound = bound;
   }
 
-  /// The field at x. `surface_at_least` bounds the distance to the surface from below;
-  /// `improved` takes the better bound found. Features further than clearance + window are left
-  /// out.
-  void sample(Float3 x, float surface_at_least, float window, Ring<typename Surface::Feature>& ring,
-              Sample& out, float& improved) const {
-    out.size = 0;
-    out.clearance = grid_.reach();
-    grid_.for_near(x, [&](std::uint32_t i) {
-      const Sphere& s = spheres_[i];
-      const Constraint c = ball_constraint({s.x, s.y, s.z}, s.r, x);
-      if (c.distance < out.clearance + window) out.add(c);
-    });
-    for (int i = 0; i < ring.size; ++i) out.add(surface_.at(ring.feature[i], x));
-    if (surface_at_least < out.clearance) {
-      typename Surface::Feature feature;
-      float distance;
-      if (surface_.nearest(x, out.clearance, feature, distance)) {
-        ring.push(feature);
-        out.add(surface_.at(feature, x));
-        if (distance < out.clearance) out.clearance = distance;
-      }
-      if (out.clearance > surface_at_least) surface_at_least = out.clearance;
+  static bool bounded(Cell& cell, float margin, const Sample& s, Float3& y) {
+    lower(cell, s.clearance + cell.half * kSqrt3);
+    if (cell.bound < margin) return true;
+    if (s.size == 0) return false;
+    const ClearanceOptimum best =
+        maximise_clearance(s.constraint, s.size, cell.half, 3 * cell.half * cell.half);
+    lower(cell, best.value);
+    y = best.y;
+    return cell.bound < margin;
+  }
+
+  bool bounded_by_planes(Cell& cell, float margin, const Sample& s) const {
+    if (cell.surface_at_least > cell.half) return false;
+    Sample flat;
+    copy(s, flat);
+    const int room = Sample::kCapacity - flat.size;
+    const int planes = surface_.convex_planes(cell.centre, cell.half * kSqrt3, cell.inside,
+                                              flat.constraint + flat.size, room);
+    if (planes == 0) return false;
+    flat.size += planes;
+    lower(
+        cell,
+        maximise_clearance(flat.constraint, flat.size, cell.half, 3 * cell.half * cell.half).value);
+    return cell.bound < margin;
+  }
+
+  /// Climbs from just behind the surface point nearest to a centre that lies outside: the only way
+  /// into a wall much thinner than the cell. Only for cells that are to be climbed from whatever
+  /// their size.
+  bool climb_from_surface(Cell& cell, const Feature& feature, float distance, float threshold,
+                          float largest) const {
+    if (largest < 1) return false;
+    Constraint c;
+    surface_.constraints(&feature, 1, cell.centre, &c);
+    Float3 x = cell.centre - (distance + threshold) * c.gradient;
+    if (!surface_.inside(x)) return false;
+    Sample s;
+    float surface_at_least = 0;
+    sample(x, kWindow * threshold, surface_at_least, cell.ring, s);
+    if (!(s.clearance > 0)) return false;
+    ascend(x, surface_at_least, threshold, threshold, cell.ring, s);
+    cell.prototype = x;
+    cell.radius = s.clearance;
+    return cell.radius >= threshold;
+  }
+
+  void look_at_ring(Float3 x, float window, float surface_at_least, const Ring<Feature>& ring,
+                    Sample& s) const {
+    if (surface_at_least > s.clearance + window || ring.size == 0) return;
+    Constraint known[Ring<Feature>::kCapacity];
+    surface_.constraints(ring.feature, ring.size, x, known);
+    for (int i = 0; i < ring.size; ++i)
+      if (known[i].distance <= s.clearance + window) s.add(known[i]);
+  }
+
+  /// Searches the surface for what is closer than everything seen; true if there is something.
+  /// Improves `surface_at_least`, the lower bound of x's distance to the surface.
+  bool look_at_surface(Float3 x, float& surface_at_least, Ring<Feature>& ring, Sample& s) const {
+    if (surface_at_least >= s.clearance) return false;
+    Feature feature;
+    float distance = s.clearance;
+    // The search compares squares: a remembered feature may come back at the very same distance.
+    const bool found =
+        surface_.nearest(x, s.clearance, feature, distance) && distance < s.clearance;
+    if (found) {
+      ring.push(feature);
+      Constraint c;
+      surface_.constraints(&feature, 1, x, &c);
+      s.add(c);
     }
-    improved = surface_at_least < 1e29f ? surface_at_least : improved;
-    int kept = 0;
-    for (int i = 0; i < out.size; ++i)
-      if (out.constraint[i].distance < out.clearance + window)
-        out.constraint[kept++] = out.constraint[i];
-    out.size = kept;
+    if (s.clearance > surface_at_least) surface_at_least = s.clearance;
+    return found;
+  }
+
+  void sample(Float3 x, float window, float& surface_at_least, Ring<Feature>& ring,
+              Sample& s) const {
+    sample_spheres(x, spheres_, grid_, window, kSpare, s);
+    look_at_ring(x, window, surface_at_least, ring, s);
+    look_at_surface(x, surface_at_least, ring, s);
+    s.keep_near(window);
   }
 
   /// Climbs from x by sequential linear programs in a trust box that never reaches the surface.
   /// The linear model is a lower bound of the features it knows, so a step fails only over
   /// features it does not.
-  void ascend(Float3& x, float surface_at_least, float trust, Ring<typename Surface::Feature>& ring,
+  void ascend(Float3& x, float surface_at_least, float trust, float threshold, Ring<Feature>& ring,
               Sample& s) const {
     constexpr int kSteps = 8;
     Sample next;
@@ -172,19 +202,20 @@ class PrototypeField {
       const ClearanceOptimum best = maximise_clearance(s.constraint, s.size, box, 0);
       const float predicted = best.value - s.clearance;
       if (!(predicted > 1e-4f * s.clearance)) return;
+      if (s.clearance + kHope * predicted < threshold) return;
       const Float3 there = x + best.y;
       float at_least = surface_at_least - norm(best.y) * 1.00001f;
-      sample(there, at_least, 4 * box, ring, next, at_least);
+      sample(there, kWindow * box, at_least, ring, next);
       const float gain = next.clearance - s.clearance;
       if (gain > 0.05f * predicted) {
         x = there;
-        s = next;
+        copy(next, s);
         surface_at_least = at_least;
         trust = 2 * box;
       } else {
         trust = 0.25f * box;
         // The features found there warn the model here.
-        sample(x, surface_at_least, 4 * box, ring, s, surface_at_least);
+        sample(x, kWindow * box, surface_at_least, ring, s);
       }
     }
   }

@@ -18,10 +18,15 @@ Span span_of(float lo, float hi) {
 
 }  // namespace
 
-SphereGrid::SphereGrid(const std::vector<Sphere>& spheres, float reach) : reach_(reach) {
-  // Cells of about the reach; no more than 1024 a side, so that the table of blocks stays small.
+SphereGrid::SphereGrid(const std::vector<Sphere>& spheres, float reach)
+    : built_for_(spheres.size()), reach_(reach) {
+  // Cells of about the reach, so that lists are short; but no more than the spheres are worth (a
+  // single large one would be listed in millions).
   const float wanted = 2 * kHalfExtent / reach;
   blocks_per_side_ = std::clamp(static_cast<int>(wanted / 8) + 1, 1, 128);
+  const auto most = static_cast<std::int64_t>(27 * std::max<std::size_t>(spheres.size(), 1));
+  while (std::int64_t{blocks_per_side_} * blocks_per_side_ * blocks_per_side_ > most)
+    --blocks_per_side_;
   cells_per_side_ = 8 * blocks_per_side_;
   size_ = 2 * kHalfExtent / static_cast<float>(cells_per_side_);
   inverse_size_ = 1 / size_;

@@ -19,6 +19,7 @@ class SphereGrid {
   SphereGrid(const std::vector<Sphere>& spheres, float reach);
 
   float reach() const { return reach_; }
+  std::size_t built_for() const { return built_for_; }  ///< count of spheres it was laid out for
 
   /// Lists sphere `index` = {centre, r}.
   void insert(std::uint32_t index, const Sphere& sphere);
@@ -68,6 +69,7 @@ class SphereGrid {
   void append(Cell& cell, std::uint32_t index);
 
   static constexpr float kHalfExtent = 1.0f;
+  std::size_t built_for_;
   float reach_, size_, inverse_size_;
   int blocks_per_side_, cells_per_side_;
   std::vector<Block> blocks_;
