@@ -161,12 +161,14 @@ class BandedPacker {
         for_each_index(from, to, [&](std::size_t i) {
           state[i] = field.work(cells_[frontier[i]], threshold, margin, largest);
         });
+        for (std::size_t i = from; i < to; ++i) {
+          if (state[i] == CellState::candidate) active.push_back(frontier[i]);
+          if (state[i] == CellState::split) splitting.push_back(frontier[i]);
+        }
         if (out_of_time_or_cancelled(threshold)) return;
+        if (active.size() > plateau()) break;
       }
-      for (std::size_t i = 0; i < frontier.size(); ++i) {
-        if (state[i] == CellState::candidate) active.push_back(frontier[i]);
-        if (state[i] == CellState::split) splitting.push_back(frontier[i]);
-      }
+      if (active.size() > plateau()) break;
       frontier.clear();
       if (cells_.size() > kMostCells) {
         // Bounds that do not separate: in the automatic schedule the next band asks for less.

@@ -21,8 +21,9 @@ class MeshSurface {
     float best2 = limit * limit;
     std::uint32_t best = kNoTriangle;
     for_triangles_near(view_, p, best2, [&](const NearTriangle& near) {
-      if (near.distance2 < best2 || (near.distance2 == best2 && near.triangle < best)) {
-        best2 = near.distance2;
+      if (near.closest.distance2 < best2 ||
+          (near.closest.distance2 == best2 && near.triangle < best)) {
+        best2 = near.closest.distance2;
         best = near.triangle;
         feature = static_cast<std::uint32_t>(near.block - view_.blocks) * kBvhWidth +
                   static_cast<std::uint32_t>(near.lane);
@@ -81,7 +82,7 @@ class MeshSurface {
       const TriangleBlock& b = *near.block;
       const int lane = near.lane;
       if (count == kMost || !(b.height[lane] > 1e-6f * b.length[lane])) convex = false;
-      if (!convex) return -1.0f;
+      if (!convex) return 0.0f;
       const Float3 o{b.origin[0][lane], b.origin[1][lane], b.origin[2][lane]};
       const Float3 u{b.u[0][lane], b.u[1][lane], b.u[2][lane]};
       const Float3 v{b.v[0][lane], b.v[1][lane], b.v[2][lane]};
