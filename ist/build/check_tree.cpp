@@ -122,7 +122,7 @@ void TreeCheck::count_cover(const Eigen::Vector3d& p, std::span<const std::size_
       const std::size_t mine = node_of(lane, k);
       const auto together = std::count_if(
           holds.begin(), holds.end(), [&](std::size_t other) { return node_of(other, k) == mine; });
-      tally.add(static_cast<double>(together) - node(k, mine).overlap, lane);
+      tally.add(static_cast<double>(together) - node(k, mine).overlap, index(lane));
     }
 }
 

@@ -1,7 +1,10 @@
 #include "build/neural_gas.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <numeric>
 
 #include "query/asset_layout.h"
@@ -65,12 +68,14 @@ class NeuralGas {
       std::array<double, kWidth> total{};
       for (const std::uint32_t i : range) {
         const Ball& ball = balls_[i];
-        std::array<std::pair<double, std::size_t>, kWidth> rank;
-        for (std::size_t p = 0; p < count; ++p) rank[p] = {squared_distance(ball, at[p]), p};
-        std::sort(rank.begin(), rank.begin() + static_cast<std::ptrdiff_t>(count));
-        for (std::size_t k = 0; k < count && kernel[k] > 1e-6; ++k) {
-          const std::size_t p = rank[k].second;
-          const double w = kernel[k] * weight(ball);
+        std::array<double, kWidth> distance;
+        distance.fill(std::numeric_limits<double>::infinity());
+        for (std::size_t p = 0; p < count; ++p) distance[p] = squared_distance(ball, at[p]);
+        for (std::size_t p = 0; p < count; ++p) {
+          std::size_t rank = 0;  // counting beats sorting: no branch depends on the data
+          for (std::size_t q = 0; q < kWidth; ++q)
+            rank += (distance[q] < distance[p]) | ((distance[q] == distance[p]) & (q < p));
+          const double w = kernel[rank] * weight(ball);
           sum[p].x += w * ball.x;
           sum[p].y += w * ball.y;
           sum[p].z += w * ball.z;
@@ -106,6 +111,11 @@ class NeuralGas {
         for (std::size_t q = p + 1; q < groups; ++q)
           moved |= share(range.first(range.size() - pinned), at, unit, p, q);
     }
+    // Which balls are where is settled; their order within a group is not until now.
+    for (std::size_t begin = 0; begin < range.size(); begin += unit) {
+      const auto group = range.subspan(begin, std::min(unit, range.size() - begin));
+      std::sort(group.begin(), group.end() - (pinned && begin + unit >= range.size()));
+    }
   }
 
   /// Group by group, the balls that are nearest to its prototype among those that are left.
@@ -128,23 +138,29 @@ class NeuralGas {
     };
     const auto first = group(p);
     const auto second = group(q);
-    std::vector<std::pair<double, std::uint32_t>> pool;
+    struct Member {
+      double preference;  // negative: nearer to p's prototype
+      std::uint32_t ball;
+      bool was_first;
+    };
+    std::vector<Member> pool;
     pool.reserve(first.size() + second.size());
     for (const auto part : {first, second})
       for (const std::uint32_t i : part)
-        pool.emplace_back(squared_distance(balls_[i], at[p]) - squared_distance(balls_[i], at[q]),
-                          i);
-    std::sort(pool.begin(), pool.end());
+        pool.push_back({squared_distance(balls_[i], at[p]) - squared_distance(balls_[i], at[q]), i,
+                        part.data() == first.data()});
+    std::nth_element(pool.begin(), pool.begin() + static_cast<std::ptrdiff_t>(first.size()),
+                     pool.end(), [](const Member& a, const Member& b) {
+                       return a.preference != b.preference ? a.preference < b.preference
+                                                           : a.ball < b.ball;
+                     });
     bool moved = false;
-    std::vector<std::uint32_t> before(first.begin(), first.end());
-    std::sort(before.begin(), before.end());
     for (std::size_t k = 0; k < pool.size(); ++k) {
-      const std::uint32_t i = pool[k].second;
       if (k < first.size()) {
-        first[k] = i;
-        moved |= !std::binary_search(before.begin(), before.end(), i);
+        first[k] = pool[k].ball;
+        moved |= !pool[k].was_first;
       } else {
-        second[k - first.size()] = i;
+        second[k - first.size()] = pool[k].ball;
       }
     }
     return moved;
