@@ -73,6 +73,37 @@ INSTANTIATE_TEST_SUITE_P(
                                          4096, 4097, 5000),
                        ::testing::Values(Clustering::two_means, Clustering::neural_gas)));
 
+/// Σ r³ over the balls of one level.
+double cost(const TreeArrays& tree, std::size_t level) {
+  double sum = 0;
+  const std::size_t count = tree.levels[level - 1].blocks.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const double r = tree.levels[level].blocks[i / kWidth].r[i % kWidth];
+    sum += r * r * r;
+  }
+  return sum;
+}
+
+// A group that is not full, left in the middle, would shift every group behind it across two
+// clusters: still a sound tree, but a bad one.
+TEST(TreeOrder, OneSphereMoreCostsLittle) {
+  for (const Clustering clustering : {Clustering::two_means, Clustering::neural_gas}) {
+    const TreeArrays full = build_tree(random_spheres(4096, 1), {}, clustering);
+    for (const std::size_t n : {4097u, 4111u, 4113u}) {
+      const TreeArrays tree = build_tree(random_spheres(n, 1), {}, clustering);
+      for (const std::size_t level : {1u, 2u})
+        EXPECT_LT(cost(tree, level), 1.15 * cost(full, level)) << n << " level " << level;
+    }
+  }
+}
+
+TEST(TreeOrder, SwapsShrinkBalls) {
+  const auto spheres = random_spheres(3000, 2);
+  for (const Clustering clustering : {Clustering::two_means, Clustering::neural_gas})
+    EXPECT_LT(cost(build_tree(spheres, {}, clustering, true), 1),
+              0.95 * cost(build_tree(spheres, {}, clustering, false), 1));
+}
+
 // No random point lies in more spheres of a node than its κ, and κ is not idle.
 TEST(OverlapBound, HoldsAtRandomPoints) {
   const auto spheres = random_spheres(1500, 7);
