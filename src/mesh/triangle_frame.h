@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 
 #include "mesh/host_device.h"
 
@@ -60,9 +61,10 @@ IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3],
     along = dot3(w, f.u);
   }
   f.height = std::sqrt(dot3(w, w));
-  if (f.height > 0) {
+  if (f.height > 4 * std::numeric_limits<Real>::epsilon() * f.length) {
     for (int k = 0; k < 3; ++k) f.v[k] = w[k] / f.height;
-  } else {  // a segment: any direction across it will do
+  } else {  // a segment but for rounding: any direction across it will do
+    f.height = 0;
     const Real x = std::abs(f.u[0]), y = std::abs(f.u[1]), z = std::abs(f.u[2]);
     const int axis = x <= y && x <= z ? 0 : (y <= z ? 1 : 2);
     const int j = (axis + 1) % 3, k = (axis + 2) % 3;
