@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kIntervals = 200;  ///< along y and along z before any is halved
 constexpr int kMaxHalvings = 30;
-constexpr double kTolerance = 1e-8;  ///< of an interval, relative to the bounding box
+constexpr double kTolerance = 1e-7;  ///< of an interval, relative to the bounding box
 
 /// Adaptive integral of f over [a, b], whose values at both ends are known: halves where f is not
 /// linear, so that a step is found like a root.
