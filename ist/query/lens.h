@@ -18,24 +18,25 @@ struct Lens {
   T derivative() const { return -T(M_PI) * circle; }  ///< dV/d(centre distance)
 };
 
-/// Lens of balls of radii `ra`, `rb` ≥ 0 at centre distance `d` ≥ 0. The three sums g, f, e must
-/// never be re-associated: in this order each loses no digit at any ratio of radii or near tangency
-/// (DESIGN 3.5). The moment of a cap about its ball's centre is π/4 · circle² along the axis, the
-/// same for both caps and opposite, so the lens's centroid is
-/// (cap_a · centre_a + cap_b · centre_b) / (cap_a + cap_b).
+/// Lens of balls of radii `ra`, `rb` ≥ 0 at centre distance `d` ≥ 0. The sums g, f, e must never be
+/// re-associated: in this order each loses no digit at any ratio of radii, near tangency or near
+/// coincidence (DESIGN 3.5; f goes two ways, because d − a is exact only where d is of a's size,
+/// and a − b only where b is). The moment of a cap about its ball's centre is π/4 · circle² along
+/// the axis, the same for both caps and opposite, so the lens's centroid is (cap_a · centre_a +
+/// cap_b · centre_b) / (cap_a + cap_b).
 template <class T>
 Lens<T> lens(T ra, T rb, T d) {
   const T a = ra > rb ? ra : rb;
   const T b = ra > rb ? rb : ra;
   const T g = (a - d) + b;
-  const T f = (d - a) + b;
+  const T f = a - b <= b ? d - (a - b) : (d - a) + b;
   const T e = (a - b) + d;
   if (!(g > 0)) return {};
   // Below the smallest normal number 1/(2d) overflows, and equal balls coincide to rounding.
   const bool holds = f <= 0 || d < std::numeric_limits<T>::min();
   const T inverse = T(0.5) / (holds ? T(1) : d);
-  const T ha = holds ? T(0) : (f * g) * inverse;
-  const T hb = holds ? T(2) * b : std::min((e * g) * inverse, T(2) * b);
+  const T ha = holds ? T(0) : (f * inverse) * g;
+  const T hb = holds ? T(2) * b : std::min((e * inverse) * g, T(2) * b);
   const T cap_large = (ha * ha) * (T(3) * a - ha);
   const T cap_small = (hb * hb) * (T(3) * b - hb);
   const T circle = ha * (T(2) * a - ha);

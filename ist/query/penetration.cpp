@@ -20,6 +20,10 @@ namespace {
 // Pairs between two looks at the limits: a few microseconds.
 constexpr std::size_t kChunk = 64;
 
+// Sums whose rounding may exceed this share are taken again in double. The bound is some hundred
+// times what rounding does, so float keeps 1e-5.
+constexpr double kGrazing = 5e-4;
+
 /// The finished sums and what is known of pairs that were not opened, in A's unit frame; positions
 /// relative to B's unit-frame origin.
 struct Overlap {
@@ -138,7 +142,7 @@ class Descent {
     double waiting = 0;  // bound on the pairs still to come
     if (by_error || now.size > budget_.left()) waiting = rank();
 
-    const LeafStage stage{&a_, &b_, &map_, precision_};
+    LeafStage stage{&a_, &b_, &map_, precision_};
     std::size_t done = 0;
     while (done < now.size) {
       if (by_error && accurate(waiting)) break;
@@ -150,6 +154,14 @@ class Descent {
       done += n;
     }
     leave(now, done);
+
+    // A few grazing lenses are all rounding in float; they are as few as they are shallow.
+    const Overlap sum = finish(sums_, precision_);
+    if (precision_ == Precision::single && sum.error > kGrazing * sum.volume) {
+      stage.precision = precision_ = Precision::twice;
+      sums_ = LeafSums();
+      add_leaf_pairs(stage, now.a.get(), now.b.get(), done, sums_);
+    }
   }
 
   bool accurate(double waiting) const {
@@ -214,7 +226,7 @@ class Descent {
   const SphereTree& b_;
   const Similarity& map_;
   const Similarity& inverse_;
-  const Precision precision_;
+  Precision precision_;
   const QuerySettings& settings_;
   const double min_radius_;  ///< A's unit frame
   Workspace::Impl& scratch_;

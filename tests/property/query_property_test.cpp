@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 #include <ist/query.h>
 
+#include <limits>
+
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
 
@@ -73,6 +75,199 @@ TEST(Query, SeparationMatchesAllPairs) {
       }
     }
   }
+}
+
+TEST(Query, HoldsOverScalesAndSizeRatios) {
+  Workspace workspace;
+  std::mt19937_64 random(5);
+  const Asset a = make_random_asset({400, 0.2, {}, 0}, 30);
+  const Asset b = make_random_asset({300, 0.2, {0.5, -0.3, 0.1}, 3}, 31);
+  for (const double scale_a : {1.0, 1e-6, 1e6}) {
+    for (const double ratio : {1.0, 0.02, 1e-2, 1e-4, 1e-6, 1e2, 1e6}) {
+      // B touches A's surface region, small B near one of A's spheres.
+      PlacedTree pa{a.view(), random_pose(random, 0.4 * scale_a), scale_a};
+      PlacedTree pb{b.view(), random_pose(random, 1.0), scale_a * ratio / 8};
+      const auto spheres = testing::world_spheres(pa, Measure::matched);
+      const auto own = testing::world_spheres(pb, Measure::matched);
+      const testing::WorldSphere& near = spheres[17];
+      const Eigen::Vector3d direction =
+          Eigen::Vector3d(pb.pose.t[0], pb.pose.t[1], pb.pose.t[2]).normalized();
+      const Eigen::Vector3d to = near.centre + (near.r + 0.2 * own[3].r) * direction;
+      for (int k = 0; k < 3; ++k) pb.pose.t[k] += to[k] - own[3].centre[k];
+      SCOPED_TRACE(::testing::Message() << "scale " << scale_a << ", ratio " << ratio);
+      const ReferenceSum sum = reference_sum(pa, pb, Measure::matched);
+      ASSERT_GT(sum.volume, 0);
+      const Penetration answer = penetration(pa, pb, {}, workspace);
+      ASSERT_EQ(answer.status, QueryStatus::ok);
+      EXPECT_NEAR(answer.volume, sum.volume, 1e-5 * sum.volume);
+      EXPECT_LE(answer.volume_min, sum.volume);
+      EXPECT_GE(answer.volume_max, sum.volume);
+      EXPECT_LE((answer.translation_gradient - sum.translation_gradient).norm(),
+                1e-4 * sum.force_scale);
+      const Separation gap = separation(pa, pb, {}, workspace);
+      const testing::ReferenceGap want = testing::reference_gap(pa, pb);
+      EXPECT_LE(gap.distance_min, std::max(0.0, want.covered) + 1e-12 * scale_a);
+      EXPECT_GE(gap.distance_max, std::max(0.0, want.distance) - 1e-12 * scale_a);
+    }
+  }
+}
+
+TEST(Query, HoldsFarFromTheOrigin) {
+  Workspace workspace;
+  const Asset a = make_random_asset({300, 0.2, {1e7, -2e7, 3e7}, 0}, 40);
+  const Asset b = make_random_asset({300, 0.2, {-1e7, 0, 1e7}, 0}, 41);
+  const PlacedTree pa{a.view(), {}, 1.0};
+  const PlacedTree pb{b.view(), {{1, 0, 0, 0}, {2e7 + 0.9, -2e7, 2e7}}, 1.0};
+  const ReferenceSum sum = reference_sum(pa, pb, Measure::matched);
+  ASSERT_GT(sum.volume, 0);
+  const Penetration answer = penetration(pa, pb, {}, workspace);
+  EXPECT_NEAR(answer.volume, sum.volume, 1e-5 * sum.volume);
+  EXPECT_LE((answer.translation_gradient - sum.translation_gradient).norm(),
+            1e-4 * sum.force_scale);
+  EXPECT_LE((answer.centroid - sum.centroid()).norm(), 1e-6 * 1e7 * 1e-2);
+}
+
+TEST(Query, IsSymmetric) {
+  Workspace workspace;
+  std::mt19937_64 random(6);
+  const Asset a = make_random_asset({500, 0.2, {}, 0}, 50);
+  const Asset b = make_random_asset({200, 0.2, {}, 0}, 51);
+  for (int i = 0; i < 20; ++i) {
+    const PlacedTree pa{a.view(), random_pose(random, 0.5), 1.0};
+    const PlacedTree pb{b.view(), random_pose(random, 0.1 * i), i % 2 == 0 ? 1.0 : 0.3};
+    const Penetration ab = penetration(pa, pb, {}, workspace);
+    const Penetration ba = penetration(pb, pa, {}, workspace);
+    const double force = reference_sum(pa, pb, Measure::matched).force_scale;
+    EXPECT_NEAR(ab.volume, ba.volume, 1e-5 * ab.volume);
+    // Action = reaction: the same force turned round, and torques about one point that cancel.
+    EXPECT_LE((ab.translation_gradient + ba.translation_gradient).norm(), 1e-5 * force);
+    const Eigen::Vector3d to_a(pa.pose.t[0], pa.pose.t[1], pa.pose.t[2]);
+    const Eigen::Vector3d to_b(pb.pose.t[0], pb.pose.t[1], pb.pose.t[2]);
+    const Eigen::Vector3d torque_on_a = ba.rotation_gradient + to_a.cross(ba.translation_gradient);
+    const Eigen::Vector3d torque_on_b = ab.rotation_gradient + to_b.cross(ab.translation_gradient);
+    EXPECT_LE((torque_on_a + torque_on_b).norm(), 1e-4 * force);
+    const Separation sab = separation(pa, pb, {}, workspace);
+    const Separation sba = separation(pb, pa, {}, workspace);
+    EXPECT_NEAR(sab.distance, sba.distance, 3e-6);
+  }
+}
+
+TEST(Query, IsUnchangedByACommonMotion) {
+  Workspace workspace;
+  std::mt19937_64 random(7);
+  const Asset a = make_random_asset({500, 0.2, {}, 0}, 60);
+  const Asset b = make_random_asset({500, 0.2, {}, 0}, 61);
+  const auto moved = [](const Pose& motion, const Pose& pose) {
+    const Eigen::Quaterniond qm(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
+    const Eigen::Quaterniond q =
+        qm * Eigen::Quaterniond(pose.q[0], pose.q[1], pose.q[2], pose.q[3]);
+    const Eigen::Vector3d t = qm * Eigen::Vector3d(pose.t[0], pose.t[1], pose.t[2]) +
+                              Eigen::Vector3d(motion.t[0], motion.t[1], motion.t[2]);
+    return Pose{{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}};
+  };
+  for (int i = 0; i < 10; ++i) {
+    const PlacedTree pa{a.view(), random_pose(random, 0.2), 1.0};
+    const PlacedTree pb{b.view(), random_pose(random, 1.0), 1.0};
+    const Pose motion = random_pose(random, 5);
+    const Eigen::Quaterniond q(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
+    const Penetration here = penetration(pa, pb, {}, workspace);
+    const Penetration there = penetration({a.view(), moved(motion, pa.pose), 1.0},
+                                          {b.view(), moved(motion, pb.pose), 1.0}, {}, workspace);
+    EXPECT_NEAR(here.volume, there.volume, 1e-6 * here.volume);
+    EXPECT_LE((q * here.translation_gradient - there.translation_gradient).norm(),
+              1e-5 * here.translation_gradient.norm());
+    EXPECT_LE((q * here.rotation_gradient - there.rotation_gradient).norm(),
+              1e-4 * here.translation_gradient.norm());
+  }
+}
+
+TEST(Query, GradientsAreThoseOfTheSum) {
+  // The reference against its own finite differences, to 1e-6; the library against the reference.
+  std::mt19937_64 random(8);
+  const Asset a = make_random_asset({200, 0.3, {}, 0}, 70);
+  const Asset b = make_random_asset({200, 0.3, {0.2, 0.1, 0}, 0}, 71);
+  const PlacedTree pa{a.view(), random_pose(random, 0.1), 1.0};
+  const PlacedTree pb{b.view(), random_pose(random, 0.9), 0.7};
+  const ReferenceSum sum = reference_sum(pa, pb, Measure::matched);
+  ASSERT_GT(sum.volume, 0);
+  const double h = 1e-6;
+  for (int k = 0; k < 3; ++k) {
+    const auto volume_at = [&](double shift, double angle) {
+      PlacedTree moved = pb;
+      moved.pose.t[k] += shift;
+      const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle, Eigen::Vector3d::Unit(k)));
+      const Eigen::Quaterniond q =
+          turn * Eigen::Quaterniond(pb.pose.q[0], pb.pose.q[1], pb.pose.q[2], pb.pose.q[3]);
+      moved.pose.q[0] = q.w(), moved.pose.q[1] = q.x();
+      moved.pose.q[2] = q.y(), moved.pose.q[3] = q.z();
+      return reference_sum(pa, moved, Measure::matched).volume;
+    };
+    EXPECT_NEAR((volume_at(h, 0) - volume_at(-h, 0)) / (2 * h), sum.translation_gradient[k],
+                1e-6 * sum.force_scale);
+    EXPECT_NEAR((volume_at(0, h) - volume_at(0, -h)) / (2 * h), sum.rotation_gradient[k],
+                1e-6 * sum.force_scale);
+  }
+  Workspace workspace;
+  const Penetration answer = penetration(pa, pb, {}, workspace);
+  EXPECT_LE((answer.translation_gradient - sum.translation_gradient).norm(),
+            1e-5 * sum.force_scale);
+  EXPECT_LE((answer.rotation_gradient - sum.rotation_gradient).norm(), 1e-5 * sum.force_scale);
+}
+
+TEST(Query, HoldsAtSpecialPoses) {
+  Workspace workspace;
+  const Asset a = make_random_asset({400, 0.2, {}, 0}, 80);
+  const double s = std::sqrt(0.5);
+  const Pose poses[] = {
+      {},                                   // coincident with its copy
+      {{0, 1, 0, 0}, {0, 0, 0}},            // turned by π
+      {{0, s, s, 0}, {1e-7, 0, 0}},         // by π about another axis, hardly moved
+      {{1.0000009, 0, 0, 0}, {0.3, 0, 0}},  // off unit length within the tolerance
+      {{-1, 0, 0, 0}, {0.3, 0.1, 0}},
+  };
+  for (const Pose& pose : poses) {
+    for (const double scale : {1.0, 0.1}) {  // the smaller one lies inside
+      const PlacedTree pa{a.view(), {}, 1.0}, pb{a.view(), pose, scale};
+      const ReferenceSum sum = reference_sum(pa, pb, Measure::matched);
+      const Penetration answer = penetration(pa, pb, {}, workspace);
+      EXPECT_NEAR(answer.volume, sum.volume, 1e-5 * sum.volume);
+      EXPECT_LE((answer.translation_gradient - sum.translation_gradient).norm(),
+                1e-4 * sum.force_scale);
+      EXPECT_LE((answer.rotation_gradient - sum.rotation_gradient).norm(), 1e-4 * sum.force_scale);
+      EXPECT_EQ(separation(pa, pb, {}, workspace).distance_min, 0);
+    }
+  }
+}
+
+TEST(Query, RefusesPosesThatAreNone) {
+  Workspace workspace;
+  const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  const PlacedTree good{a.view(), {}, 1.0};
+  std::vector<PlacedTree> bad(8, good);
+  bad[0].pose.q[2] = nan;
+  bad[1].pose.t[0] = nan;
+  bad[2].pose.t[1] = inf;
+  bad[3].pose.q[0] = 1.002;
+  bad[4].scale = 0;
+  bad[5].scale = -1;
+  bad[6].scale = nan;
+  bad[7].tree = TreeView();
+  for (const PlacedTree& wrong : bad) {
+    for (const auto& answer :
+         {query(good, wrong, {}, workspace), query(wrong, good, {}, workspace)}) {
+      EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_pose);
+      EXPECT_EQ(answer.penetration.volume, 0);
+      EXPECT_EQ(answer.penetration.volume_max, 0);
+      EXPECT_EQ(answer.separation.status, QueryStatus::invalid_pose);
+      EXPECT_EQ(answer.separation.distance_max, 0);
+    }
+  }
+  PlacedTree far = good;
+  far.pose.t[0] = 1e200;
+  EXPECT_EQ(penetration(good, far, {}, workspace).volume, 0);
+  EXPECT_GT(separation(good, far, {}, workspace).distance_min, 0.9e200);
 }
 
 }  // namespace

@@ -1,0 +1,138 @@
+#include <gtest/gtest.h>
+#include <ist/query.h>
+
+#include "support/random_assets.h"
+#include "support/reference_sum.h"
+
+namespace ist {
+namespace {
+
+using testing::make_random_asset;
+using testing::random_pose;
+
+class QueryBudget : public ::testing::Test {
+ protected:
+  const Asset a_ = make_random_asset({1500, 0.1, {}, 0}, 1);
+  const Asset b_ = make_random_asset({700, 0.2, {}, 0}, 2);
+  Workspace workspace_;
+  std::mt19937_64 random_{9};
+
+  PlacedTree placed_a() { return {a_.view(), random_pose(random_, 0.2), 1.0}; }
+  PlacedTree placed_b(double distance) { return {b_.view(), random_pose(random_, distance), 0.8}; }
+};
+
+/// The stopped answer's bounds hold the finished one, and its volume lies between them.
+void expect_bounds(const Penetration& stopped, const Penetration& finished) {
+  EXPECT_LE(stopped.volume_min, finished.volume);
+  EXPECT_GE(stopped.volume_max, finished.volume);
+  EXPECT_LE(stopped.volume_min, stopped.volume);
+  EXPECT_GE(stopped.volume_max, stopped.volume);
+  EXPECT_TRUE(stopped.translation_gradient.allFinite());
+  EXPECT_TRUE(stopped.rotation_gradient.allFinite());
+  EXPECT_TRUE(stopped.centroid.allFinite());
+}
+
+TEST_F(QueryBudget, VisitsAreKeptAndBoundsHold) {
+  double last_width = 1e30, last_error = 1e30;
+  for (const std::uint32_t visits : {1u, 3u, 10u, 30u, 100u, 300u, 1000u, 100'000u}) {
+    double width = 0, error = 0;
+    random_.seed(9);
+    for (int i = 0; i < 40; ++i) {
+      const PlacedTree a = placed_a(), b = placed_b(0.05 * i);
+      const Penetration finished = penetration(a, b, {}, workspace_);
+      QuerySettings settings;
+      settings.max_visits = visits;
+      settings.measure = Measure::matched;
+      const Penetration stopped = penetration(a, b, settings, workspace_);
+      EXPECT_LE(stopped.node_visits, visits);
+      EXPECT_EQ(stopped.status,
+                finished.node_visits > visits ? QueryStatus::budget_exhausted : QueryStatus::ok);
+      expect_bounds(stopped, finished);
+      width += stopped.volume_max - stopped.volume_min;
+      error += std::abs(stopped.volume - finished.volume);
+    }
+    // Bounds of sixteen children need not add up to less than their parent's.
+    EXPECT_LE(width, 1.2 * last_width) << visits;
+    EXPECT_LE(error, 1.2 * last_error) << visits;
+    last_width = width;
+    last_error = error;
+  }
+}
+
+TEST_F(QueryBudget, RelativeErrorIsMet) {
+  for (const double accepted : {0.5, 0.1, 0.01}) {
+    for (int i = 0; i < 30; ++i) {
+      const PlacedTree a = placed_a(), b = placed_b(0.06 * i);
+      const Penetration finished = penetration(a, b, {}, workspace_);
+      QuerySettings settings;
+      settings.relative_error = accepted;
+      const Penetration answer = penetration(a, b, settings, workspace_);
+      expect_bounds(answer, finished);
+      EXPECT_LE(answer.volume_max - answer.volume_min, accepted * answer.volume_max * (1 + 1e-9));
+      EXPECT_LE(answer.node_visits, finished.node_visits);
+    }
+  }
+}
+
+TEST_F(QueryBudget, SmallNodesStayShut) {
+  for (const double radius : {0.4, 0.1, 0.02}) {
+    for (int i = 0; i < 20; ++i) {
+      const PlacedTree a = placed_a(), b = placed_b(0.09 * i);
+      QuerySettings settings;
+      settings.min_radius = radius;
+      const Penetration answer = penetration(a, b, settings, workspace_);
+      expect_bounds(answer, penetration(a, b, {}, workspace_));
+    }
+  }
+}
+
+TEST_F(QueryBudget, DeadlineStopsWithBounds) {
+  const PlacedTree a = placed_a(), b = placed_b(0.1);
+  const Penetration finished = penetration(a, b, {}, workspace_);
+  QuerySettings settings;
+  settings.deadline_us = 1e-3;  // over before the first look at the clock
+  const Penetration stopped = penetration(a, b, settings, workspace_);
+  EXPECT_EQ(stopped.status, QueryStatus::budget_exhausted);
+  expect_bounds(stopped, finished);
+  settings.deadline_us = 1e9;
+  const Penetration unhurried = penetration(a, b, settings, workspace_);
+  EXPECT_EQ(unhurried.status, QueryStatus::ok);
+  EXPECT_EQ(unhurried.volume, finished.volume);
+}
+
+TEST_F(QueryBudget, AWorkspaceChangesNothingButWhenFull) {
+  Workspace small(64), ample(1 << 16);
+  int full = 0;
+  for (int i = 0; i < 40; ++i) {
+    const PlacedTree a = placed_a(), b = placed_b(0.05 * i);
+    const Penetration finished = penetration(a, b, {}, workspace_);
+    const Penetration same = penetration(a, b, {}, ample);
+    EXPECT_EQ(same.volume, finished.volume);
+    EXPECT_EQ(same.translation_gradient, finished.translation_gradient);
+    const Penetration cramped = penetration(a, b, {}, small);
+    expect_bounds(cramped, finished);
+    if (cramped.status == QueryStatus::budget_exhausted) ++full;
+    if (cramped.status == QueryStatus::ok) {
+      EXPECT_EQ(cramped.volume, finished.volume);
+    }
+  }
+  EXPECT_GT(full, 0);
+}
+
+TEST_F(QueryBudget, AStoppedSeparationStillHoldsTheGap) {
+  for (const std::uint32_t visits : {1u, 5u, 20u, 80u}) {
+    for (int i = 0; i < 20; ++i) {
+      const PlacedTree a = placed_a(), b = placed_b(1.6 + 0.1 * i);
+      const testing::ReferenceGap gap = testing::reference_gap(a, b);
+      QuerySettings settings;
+      settings.max_visits = visits;
+      const Separation answer = separation(a, b, settings, workspace_);
+      EXPECT_LE(answer.node_visits, visits);
+      EXPECT_LE(answer.distance_min, std::max(0.0, gap.covered));
+      EXPECT_GE(answer.distance_max, std::max(0.0, gap.distance));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ist
