@@ -47,6 +47,8 @@ TEST(Check, FindsBakesSound) {
     const ClosedMesh torus = testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
     expect_sound(check(bake(torus, of_size(n)), torus));
   }
+  const ClosedMesh two = testing::closed(testing::overlapping_cubes_mesh(), "two cubes");
+  expect_sound(check(bake(two, of_size(300)), two));
 }
 
 TEST(Check, RefusesAnotherMesh) {
