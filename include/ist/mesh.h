@@ -30,6 +30,7 @@ struct MeshReport {
   std::size_t components = 0;            ///< edge-connected shells
   std::size_t boundary_edges = 0;        ///< edges with one triangle
   std::size_t nonmanifold_edges = 0;     ///< edges with three or more triangles
+  std::size_t nonmanifold_vertices = 0;  ///< where sheets touch in a point only (bow-ties)
   std::size_t inconsistent_edges = 0;    ///< edges whose two triangles disagree about the outside
   std::size_t flipped_components = 0;    ///< shells turned outward by validation
   std::size_t cavities = 0;              ///< inward shells that lie inside an outward one

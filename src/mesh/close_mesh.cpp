@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <ist/error.h>
 #include <ist/mesh.h>
@@ -41,6 +42,30 @@ std::size_t count_components(const TriangleMesh& mesh, const EdgeTable& edges) {
   return count;
 }
 
+/// Vertices whose triangles do not all hang together by the edges there.
+std::size_t count_nonmanifold_vertices(const TriangleMesh& mesh, const EdgeTable& edges) {
+  DisjointSets corners(3 * mesh.triangles.size());
+  const auto corner_at = [&](const std::uint32_t side, const std::uint32_t vertex) {
+    const std::uint32_t next = side - side % 3 + (side + 1) % 3;
+    return mesh.triangles[side / 3][side % 3] == vertex ? side : next;
+  };
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    const auto sides = edges.sides(e);
+    for (const std::uint32_t v : {edges.low(e), edges.high(e)})
+      for (const std::uint32_t side : sides)
+        corners.unite(corner_at(sides[0], v), corner_at(side, v));
+  }
+  std::vector<std::uint32_t> fan_of(mesh.vertices.size(), kNoIndex);
+  std::vector<bool> split(mesh.vertices.size(), false);
+  for (std::uint32_t c = 0; c < 3 * mesh.triangles.size(); ++c) {
+    if (has_repeated_corner(mesh.triangles[c / 3])) continue;
+    const std::uint32_t v = mesh.triangles[c / 3][c % 3];
+    if (fan_of[v] == kNoIndex) fan_of[v] = corners.find(c);
+    if (fan_of[v] != corners.find(c)) split[v] = true;
+  }
+  return static_cast<std::size_t>(std::count(split.begin(), split.end(), true));
+}
+
 MeshReport survey(const TriangleMesh& mesh) {
   MeshReport report;
   report.vertices = mesh.vertices.size();
@@ -50,6 +75,7 @@ MeshReport survey(const TriangleMesh& mesh) {
     report.degenerate_triangles += is_degenerate(mesh.vertices, t) ? 1 : 0;
   const EdgeTable edges(mesh.triangles);
   report.components = count_components(mesh, edges);
+  report.nonmanifold_vertices = count_nonmanifold_vertices(mesh, edges);
   for (std::size_t e = 0; e < edges.size(); ++e) {
     const auto sides = edges.sides(e);
     if (sides.size() == 1) ++report.boundary_edges;
@@ -80,6 +106,26 @@ MeshReport survey(const TriangleMesh& mesh) {
               ": not closed. Bake with --repair, or close it");
 }
 
+/// Coordinates that were rounded until the shape was lost, and sizes beyond what double can cube.
+void refuse_unusable_coordinates(const std::string& name, MeshReport& report) {
+  const double size = report.bounds.sizes().maxCoeff();
+  const double offset = std::max(report.bounds.min().cwiseAbs().maxCoeff(),
+                                 report.bounds.max().cwiseAbs().maxCoeff());
+  const bool far_off = offset > 1e3 * size;
+  if (report.degenerate_triangles == report.triangles ||
+      (far_off && report.degenerate_triangles > report.triangles / 10))
+    throw Error(name + ": " + std::to_string(report.degenerate_triangles) + " of " +
+                counted(report.triangles, "triangle") +
+                " collapse to points or lines: the coordinates have too few digits for a size of " +
+                shortest(size) + " at an offset of " + shortest(offset) +
+                ". Export it nearer to the origin, or in a format with more digits");
+  if (!(size > 1e-90 && size < 1e90))
+    throw Error(name + ": a size of " + shortest(size) + " cannot be computed with. Scale it");
+  if (size < 1e-9 || size > 1e10)
+    report.notes.push_back("a size of " + shortest(size) +
+                           " is unusual: is the unit right? (1e-9 to 1e9 is promised to work)");
+}
+
 void note_findings(MeshReport& report) {
   if (report.self_intersections > 0)
     report.notes.push_back(counted(report.self_intersections, "pair") +
@@ -90,6 +136,9 @@ void note_findings(MeshReport& report) {
         "self-intersections were not looked for: too many triangles, or too close together");
   if (report.nonmanifold_edges > 0)
     report.notes.push_back(counted(report.nonmanifold_edges, "edge") + " of three or more faces");
+  if (report.nonmanifold_vertices > 0)
+    report.notes.push_back(counted(report.nonmanifold_vertices, "vertex", "vertices") +
+                           " in which sheets only touch");
 }
 
 /// Degenerate and coincident triangles (DESIGN 3.6).
@@ -147,10 +196,7 @@ ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMes
   check_indices_and_coordinates(input, name);
   TriangleMesh mesh = weld(input, 0);
   MeshReport report = survey(mesh);
-  if (report.degenerate_triangles == mesh.triangles.size())
-    throw Error(name + ": all " + counted(mesh.triangles.size(), "triangle") +
-                " collapse to points or lines: the coordinates have too few digits for this size "
-                "and offset. Export nearer to the origin, or in a format with more digits");
+  refuse_unusable_coordinates(name, report);
   note_findings(report);
   reduce(mesh, report);
   if (mesh.triangles.empty())

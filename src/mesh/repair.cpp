@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <map>
 #include <span>
 #include <string>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "mesh/message_text.h"
 #include "mesh/stitch.h"
 #include "mesh/surface_reduction.h"
+#include "mesh/weld.h"
 
 namespace ist {
 namespace {
@@ -124,14 +126,42 @@ double area(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
   return (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).norm() / 2;
 }
 
+/// Edge-connected pieces; each triangle by the first of its piece.
+DisjointSets pieces_of(const std::vector<Triangle>& triangles) {
+  const EdgeTable edges(triangles);
+  DisjointSets pieces(triangles.size());
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    for (const std::uint32_t side : edges.sides(e)) pieces.unite(edges.sides(e)[0] / 3, side / 3);
+  return pieces;
+}
+
+/// Gives each piece vertices of its own, so that no walk along a border leaves its piece.
+void separate(TriangleMesh& mesh, DisjointSets& pieces) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> copies;  // vertex, piece
+  std::vector<std::uint32_t> owner(mesh.vertices.size(), kNoIndex);
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::uint32_t piece = pieces.find(t);
+    for (std::uint32_t& v : mesh.triangles[t]) {
+      if (owner[v] == kNoIndex) owner[v] = piece;
+      if (owner[v] == piece) continue;
+      const auto [copy, is_new] =
+          copies.try_emplace({v, piece}, static_cast<std::uint32_t>(mesh.vertices.size()));
+      if (is_new) {
+        const Eigen::Vector3d position = mesh.vertices[v];
+        mesh.vertices.push_back(position);
+      }
+      v = copy->second;
+    }
+  }
+}
+
 /// Caps every loop of odd edges; but a piece that would be capped with nearly as much surface as it
 /// has is an open sheet, no solid with a hole, and is dropped.
 void cap_holes(TriangleMesh& mesh, MeshReport& report) {
-  constexpr double kSheet = 0.9;  // caps to own area
+  constexpr double kSheet = 0.95;  // caps to own area
+  DisjointSets pieces = pieces_of(mesh.triangles);
+  separate(mesh, pieces);
   const EdgeTable edges(mesh.triangles);
-  DisjointSets pieces(mesh.triangles.size());
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    for (const std::uint32_t side : edges.sides(e)) pieces.unite(edges.sides(e)[0] / 3, side / 3);
   const auto loops = border_loops(edges);
   std::vector<std::vector<Triangle>> caps;
   std::vector<double> own_area(mesh.triangles.size(), 0), cap_area(mesh.triangles.size(), 0);
@@ -160,6 +190,7 @@ void cap_holes(TriangleMesh& mesh, MeshReport& report) {
     ++report.filled_holes;
   }
   mesh.triangles = std::move(result);
+  mesh = weld(mesh, 0);
   if (sheets > 0)
     report.notes.push_back("repair: " + counted(sheets, "open sheet") +
                            " dropped: they enclose nothing");
@@ -179,6 +210,8 @@ TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& repo
   tidy(mesh);
   if (mesh.triangles.empty())
     throw Error(name + ": cannot be repaired: nothing in it encloses a volume");
+  if (const std::size_t left = odd_edges(mesh); left > 0)
+    throw Error(name + ": cannot be repaired: " + counted(left, "edge") + " still open");
   return mesh;
 }
 

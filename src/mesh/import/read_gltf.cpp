@@ -118,7 +118,7 @@ std::vector<std::size_t> root_nodes(const GltfDocument& document) {
 PolygonMesh read_scene(const SourceFile& file) {
   const GltfDocument document(file);
   // A small file can ask for many copies of its meshes: more than this is no accident.
-  const std::size_t most_corners = 30'000'000 + file.bytes.size();
+  const std::size_t most_corners = 12'000'000 + file.bytes.size();
   PolygonMesh mesh;
   std::vector<bool> seen(document.root().value("nodes", Json::array()).size(), false);
   std::vector<std::pair<std::size_t, Transform>> open;

@@ -59,8 +59,9 @@ PolygonMesh read_text(const SourceFile& file) {
     return word;
   };
   const auto expect = [&](const std::string_view word, const char* keyword) {
-    if (!same_letters(word, keyword))
-      scanner.fail("expected " + in_quotes(keyword) + ", found " + in_quotes(word));
+    if (same_letters(word, keyword)) return;
+    if (scanner.bytes_left() == 0) scanner.fail("the file ends early, in " + in_quotes(word));
+    scanner.fail("expected " + in_quotes(keyword) + ", found " + in_quotes(word));
   };
   PolygonMesh mesh;
   for (std::string_view word = scanner.word_anywhere(); !word.empty();

@@ -2,6 +2,7 @@
 #include <assimp/scene.h>
 
 #include <assimp/Importer.hpp>
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -46,6 +47,10 @@ void append(const aiMesh& mesh, const Transform& world, PolygonMesh& out) {
 
 PolygonMesh read_with_assimp(const SourceFile& file) {
   Assimp::Importer importer;
+  const std::string ending = std::filesystem::path(file.path).extension().string();
+  if (ending.empty() || !importer.IsExtensionSupported(ending))
+    fail(file, "no mesh format ends in " + in_quotes(ending) +
+                   ". Known are obj, stl, ply, off, glb, gltf, dae and what assimp reads");
   // ValidateDataStructure: indices within range, whatever the file said.
   const aiScene* const scene = importer.ReadFile(file.path, aiProcess_ValidateDataStructure);
   if (scene == nullptr || scene->mRootNode == nullptr)

@@ -1,0 +1,116 @@
+#include <gtest/gtest.h>
+
+#include <random>
+#include <string>
+
+#include <ist/error.h>
+#include <ist/mesh.h>
+
+#include "support/temp_file.h"
+
+// Damaged files end in a mesh or in an Error, never in anything else. (Run under the sanitizers
+// this looks for reads out of bounds too.)
+
+namespace ist {
+namespace {
+
+using testing::TempFile;
+
+std::string damaged(std::string bytes, std::mt19937_64& random) {
+  const auto below = [&](std::size_t n) { return static_cast<std::size_t>(random() % n); };
+  static const std::string kOdd[] = {"-1",  "4294967296", "1e999", "nan", "\xff\xff\xff\xff",
+                                     "0 0", "\n",         "\0\0",  "{",   "9999999999999999999999"};
+  for (std::size_t edits = 1 + below(3); edits > 0 && !bytes.empty(); --edits) {
+    const std::size_t at = below(bytes.size());
+    switch (below(5)) {
+      case 0:
+        bytes[at] = static_cast<char>(random());
+        break;
+      case 1:
+        bytes.resize(at);
+        break;
+      case 2:
+        bytes.erase(at, 1 + below(8));
+        break;
+      case 3:
+        bytes.insert(at, bytes.substr(below(bytes.size()), below(40)));
+        break;
+      case 4:
+        bytes.replace(at, 1, kOdd[below(std::size(kOdd))]);
+        break;
+    }
+  }
+  return bytes;
+}
+
+void survive_damage(const std::string& name, const std::string& bytes) {
+  ASSERT_NO_THROW(load_mesh(TempFile(name, bytes).path()));
+  std::mt19937_64 random(1);
+  for (int i = 0; i < 300; ++i) {
+    const TempFile file(name, damaged(bytes, random));
+    try {
+      close_mesh(load_mesh(file.path()), name, OpenMeshPolicy::repair);
+    } catch (const Error&) {
+    }
+  }
+}
+
+const std::string kCorners = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
+const std::string kFaces = "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+
+TEST(DamagedFiles, Text) {
+  survive_damage("a.off", "OFF\n4 4 6\n" + kCorners + kFaces);
+  survive_damage("a.ply",
+                 "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+                 "property float z\nelement face 4\nproperty list uchar int vertex_indices\n"
+                 "end_header\n" +
+                     kCorners + kFaces);
+  survive_damage(
+      "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1/1 2/2 4/3\nf -3 -2 -1\nf 1 4 3\n");
+  survive_damage("a.stl",
+                 "solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+                 "vertex 0 1 0\nendloop\nendfacet\nendsolid a\n");
+}
+
+TEST(DamagedFiles, Binary) {
+  const auto raw = [](const auto value) {
+    return std::string(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  constexpr float kPoints[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  constexpr std::int32_t kCorner[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
+  std::string ply =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\n"
+      "property float y\nproperty float z\nelement face 4\n"
+      "property list uchar int vertex_indices\nend_header\n";
+  std::string stl(80, ' ');
+  stl += raw(std::uint32_t{4});
+  for (const auto& p : kPoints)
+    for (const float x : p) ply += raw(x);
+  for (const auto& f : kCorner) {
+    ply += '\3';
+    stl.append(12, '\0');
+    for (const std::int32_t v : f) {
+      ply += raw(v);
+      for (const float x : kPoints[v]) stl += raw(x);
+    }
+    stl.append(2, '\0');
+  }
+  survive_damage("a.ply", ply);
+  survive_damage("a.stl", stl);
+}
+
+TEST(DamagedFiles, Gltf) {
+  survive_damage(
+      "a.gltf",
+      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,
+      "scale":[1,2,1]}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+      "buffers":[{"byteLength":72,"uri":"data:application/octet-stream;base64,)"
+      "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/"
+      "AAACAAEAAAABAAMAAQACAAMAAAADAAIA"
+      R"("}],"bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":24}],
+      "accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},
+      {"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}]})");
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,193 @@
+#include <gtest/gtest.h>
+
+#include <clocale>
+#include <cstring>
+#include <string>
+
+#include <ist/error.h>
+#include <ist/mesh.h>
+
+#include "support/temp_file.h"
+
+namespace ist {
+namespace {
+
+using testing::TempFile;
+
+TriangleMesh load(const std::string& name, const std::string& bytes) {
+  return load_mesh(TempFile(name, bytes).path());
+}
+
+std::string error_of(const std::string& name, const std::string& bytes) {
+  try {
+    load(name, bytes);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+#define EXPECT_ERROR(name, bytes, words) \
+  EXPECT_NE(error_of(name, bytes).find(words), std::string::npos) << error_of(name, bytes)
+
+// A tetrahedron, in the corners that each format asks for.
+const std::string kObj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+const std::string kObjFaces = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+
+void expect_tetrahedron(const TriangleMesh& mesh) {
+  EXPECT_EQ(mesh.vertices.size(), 4u);
+  EXPECT_EQ(mesh.triangles.size(), 4u);
+  EXPECT_NEAR(close_mesh(mesh, "tetrahedron").report.volume, 1.0 / 6, 1e-15);
+}
+
+TEST(ReadObj, Grammar) {
+  expect_tetrahedron(load("a.obj", kObj + kObjFaces));
+  expect_tetrahedron(load("a.OBJ", kObjFaces + kObj));  // faces first
+  expect_tetrahedron(load("a.obj", "\xef\xbb\xbf# c\r\nmtllib x\r\n" + kObj +
+                                       "vn 0 0 1\nvt 0 0\no a\ng b\nusemtl m\ns off\n"
+                                       "f 1/1 3/1 2/1\nf 1//1 2//1 4//1\nf -3/1/1 -2/1/1 -1/1/1\n"
+                                       "f 1 4 \\\n 3"));
+  expect_tetrahedron(
+      load("a.obj", "v 0 0 0 1 0 0\nv +1 0 0\nv 0 1e0 0 # one\nv 0 0 .1e1\n" + kObjFaces));
+}
+
+TEST(ReadObj, KeepsAllDigitsOfADouble) {
+  const TriangleMesh mesh =
+      load("a.obj", "v 1000000.0000001234 0.1 1e-300\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_EQ(mesh.vertices[0], Eigen::Vector3d(1000000.0000001234, 0.1, 1e-300));
+}
+
+TEST(ReadObj, ReadsPointsWhateverTheLocale) {
+  const std::string before = std::setlocale(LC_ALL, nullptr);
+  for (const char* name : {"de_DE.UTF-8", "fr_FR.UTF-8"}) std::setlocale(LC_ALL, name);
+  EXPECT_EQ(load("a.obj", "v 1.5 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n").vertices[0][0], 1.5);
+  std::setlocale(LC_ALL, before.c_str());
+}
+
+TEST(ReadObj, ErrorsNameTheLine) {
+  EXPECT_ERROR("a.obj", kObj + "f 1 2 5\n", "line 5: vertex 5 does not exist");
+  EXPECT_ERROR("a.obj", kObj + "f 1 2 -5\n", "line 5: vertex -5 does not exist");
+  EXPECT_ERROR("a.obj", kObj + "f 0 1 2\n", "line 5: vertex 0 does not exist");
+  EXPECT_ERROR("a.obj", kObj + "f 1 2\n", "line 5: a face needs three");
+  EXPECT_ERROR("a.obj", "v 0 0\nf 1 1 1\n", "line 1: a number is missing");
+  EXPECT_ERROR("a.obj", "v 0 0 1,5\nf 1 1 1\n", "line 1: \"1,5\" is not a number");
+  EXPECT_ERROR("a.obj", "v 0 0 0\nv 0 nan 0\nv 1 0 0\nf 1 2 3\n", "line 2: vertex 1");
+  EXPECT_ERROR("a.obj", "v 0 0 0\nv 0 1e999 0\nv 1 0 0\nf 1 2 3\n", "line 2: vertex 1");
+  EXPECT_ERROR("a.obj", kObj, "no faces");
+  EXPECT_ERROR("a.obj", "", "empty file");
+}
+
+TEST(ReadObj, IgnoresWhatNoFaceUses) {
+  const TriangleMesh mesh = load("a.obj", kObj + "v nan 1e400 0\nv 1e20 0 0\n" + kObjFaces);
+  expect_tetrahedron(mesh);
+}
+
+TEST(ReadObj, ConcavePolygonKeepsItsShape) {
+  // An L, and an arrow head whose first corner sees not all of it.
+  const std::string l = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\n";
+  for (const std::string face : {"f 1 2 3 4 5 6\n", "f 3 4 5 6 1 2\n", "f 5 6 1 2 3 4\n"}) {
+    const TriangleMesh mesh = load("a.obj", l + face);
+    double area = 0;
+    for (const auto& t : mesh.triangles) {
+      const auto& v = mesh.vertices;
+      const double z = (v[t[1]] - v[t[0]]).cross(v[t[2]] - v[t[0]])[2] / 2;
+      EXPECT_GT(z, 0) << face;
+      area += z;
+    }
+    EXPECT_DOUBLE_EQ(area, 3) << face;
+    EXPECT_EQ(mesh.triangles.size(), 4u);
+  }
+}
+
+TEST(ReadOff, Grammar) {
+  const std::string body =
+      "4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+  expect_tetrahedron(load("a.off", "OFF\n" + body));
+  expect_tetrahedron(load("a.off", "# c\nOFF " + body));
+  expect_tetrahedron(
+      load("a.off", "OFF 4 4 6 0 0 0 1 0 0 0 1 0 0 0 1 3 0 2 1 3 0 1 3 3 1 2 3 3 0 3 2"));
+  expect_tetrahedron(load("a.off",
+                          "COFF\n4 4 6\n0 0 0 255 0 0 1\n1 0 0 9 9 9 1\n0 1 0 1 1 1 1\n"
+                          "0 0 1 1 1 1 1\n3 0 2 1 255 0 0\n3 0 1 3\n3 1 2 3 7\n3 0 3 2\n"));
+  expect_tetrahedron(load("a.off",
+                          "NOFF\n4 4 6\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n"
+                          "0 0 1 0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"));
+}
+
+TEST(ReadOff, Errors) {
+  EXPECT_ERROR("a.off", "4 4 6\n", "does not begin with OFF");
+  EXPECT_ERROR("a.off", "4OFF\n1 1 1\n", "does not begin with OFF");
+  EXPECT_ERROR("a.off", "OFF BINARY\n", "binary OFF");
+  EXPECT_ERROR("a.off", "OFF\n-1 1 0\n", "negative");
+  EXPECT_ERROR("a.off", "OFF\n3 4000000000 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "too short");
+  EXPECT_ERROR("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "line 6: face 0: vertex 3");
+  EXPECT_ERROR("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n9 0 1 2\n", "fewer than the 9 corners");
+  EXPECT_ERROR("a.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "ends early");
+}
+
+std::string stl_facet(const char* corners) {
+  std::string text = "facet normal 0 0 0\nouter loop\n";
+  const std::string list = corners;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    text += "vertex";
+    for (int k = 0; k < 3; ++k) text += list[i] == "xyz"[k] ? " 1" : " 0";
+    text += "\n";
+  }
+  return text + "endloop\nendfacet\n";
+}
+
+std::string stl_text() {
+  return "solid a name with facet in it\n" + stl_facet("oyx") + stl_facet("oxz") +
+         stl_facet("xyz") + stl_facet("ozy") + "endsolid a\n";
+}
+
+std::string stl_binary(const std::string& header = "") {
+  std::string bytes = header;
+  bytes.resize(80, ' ');
+  const std::uint32_t count = 4;
+  bytes.append(reinterpret_cast<const char*>(&count), 4);
+  for (const std::string facet : {"oyx", "oxz", "xyz", "ozy"}) {
+    bytes.append(12, '\0');
+    for (const char c : facet)
+      for (const char axis : {'x', 'y', 'z'}) {
+        const float value = c == axis ? 1.f : 0.f;
+        bytes.append(reinterpret_cast<const char*>(&value), 4);
+      }
+    bytes.append(2, '\0');
+  }
+  return bytes;
+}
+
+TEST(ReadStl, TextAndBinary) {
+  expect_tetrahedron(load("a.stl", stl_text()));
+  std::string upper = stl_text();
+  for (char& c : upper) c = static_cast<char>(std::toupper(c));
+  expect_tetrahedron(load("a.STL", upper));
+  expect_tetrahedron(load("a.stl", stl_binary()));
+  expect_tetrahedron(load("a.stl", stl_binary("solid exported by something")));
+  expect_tetrahedron(load("a.stl", stl_binary("solid") + "trailing"));
+}
+
+TEST(ReadStl, Errors) {
+  EXPECT_ERROR("a.stl", stl_text().substr(0, 200), "the file ends early");
+  EXPECT_ERROR("a.stl", stl_binary().substr(0, 200), "the file ends early");
+  EXPECT_ERROR("a.stl", stl_binary().substr(0, 83), "the file ends early");
+  EXPECT_ERROR("a.stl", "solid a\nfacet abnormal 0 0 0\n", "line 2: expected \"normal\"");
+  EXPECT_ERROR("a.stl", "solid a\nendsolid a\n", "no faces");
+  std::string lying = stl_binary();
+  std::memset(lying.data() + 80, 0xff, 4);
+  EXPECT_ERROR("a.stl", lying, "4294967295 triangles need 214748364834 bytes");
+}
+
+TEST(OtherContent, IsNamed) {
+  EXPECT_ERROR("a.stl", "\x89PNG\r\n\x1a\n", "PNG image");
+  EXPECT_ERROR("a.ply", "version https://git-lfs.github.com/spec/v1\n", "git lfs pull");
+  EXPECT_ERROR("a.obj", "\n<!DOCTYPE html><html>", "web page");
+  EXPECT_ERROR("a.obj", stl_binary(), "binary data");
+  EXPECT_ERROR("a.mesh7", "v 0 0 0", "no mesh format ends in");
+  EXPECT_THROW(load_mesh("/nonexistent/a.obj"), Error);
+  EXPECT_THROW(load_mesh(::testing::TempDir()), Error);
+}
+
+}  // namespace
+}  // namespace ist
