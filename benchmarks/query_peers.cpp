@@ -253,7 +253,7 @@ int main(int argc, char** argv) {
       "Times 'times ist' compare distances with ist separation, the rest with ist "
       "penetration.");
   std::vector<std::string> keys = ist::testing::kPairKeys;
-  if (report.quick()) keys = {"eledino", "ico1k"};
+  if (report.quick()) keys = {"eledino"};
   for (const std::string& key : keys) {
     const auto rows = ist::testing::read_oracle_rows(key);
     PairOfBodies pair(rows);
