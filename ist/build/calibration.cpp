@@ -18,7 +18,7 @@
 namespace ist {
 namespace {
 
-constexpr int kRelaxations = 8;
+constexpr int kRelaxations = 16;
 constexpr double kStep = 0.15;  // distance of columns over the mean leaf radius
 // Enough columns to measure the solid where spheres are few, and a bound where it is thin.
 constexpr double kMinColumns = 1u << 14;
