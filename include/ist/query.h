@@ -11,10 +11,11 @@
 namespace ist {
 
 enum class QueryStatus : std::uint32_t {
-  ok = 0,
-  budget_exhausted =
-      1,             ///< a limit of QuerySettings or the workspace's capacity stopped the descent
-  invalid_pose = 2,  ///< NaN, Inf, a quaternion off unit length by > 1e-3, or a scale ≤ 0; all zero
+  ok = 0,  ///< finished: the gradients are exactly those of the returned volume
+  /// A limit of QuerySettings or the workspace's capacity stopped the descent: bounds still hold.
+  budget_exhausted = 1,
+  /// NaN, Inf, a quaternion off unit length by > 1e-3, a scale ≤ 0, or an empty tree; all zero.
+  invalid_pose = 2,
 };
 
 /// Which spheres stand for the solid.
@@ -23,13 +24,14 @@ enum class Measure : std::uint32_t {
   inner = 1,    ///< inner spheres: a certified lower bound of the true volume
 };
 
-/// Limits on one query. Zero means no limit; with none set the answer is the finished sum.
+/// Limits on one query. Zero means no limit; with none set the answer is the finished sum. A
+/// stopped penetration guesses what is left from the densities of the nodes that were not opened.
 struct QuerySettings {
   Measure measure = Measure::matched;
-  std::uint32_t max_visits = 0;  ///< count of node pairs looked at
-  double deadline_us = 0;        ///< [µs] wall clock from the call; read rarely
-  double relative_error = 0;     ///< stop once (volume_max − volume_min) ≤ this · volume_max
-  double min_radius = 0;         ///< [u] nodes smaller than this are not opened
+  std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
+  double deadline_us = 0;     ///< [µs] wall clock from the call; read every 64 node pairs or less
+  double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
+  double min_radius = 0;      ///< [u] nodes smaller than this are not opened; penetration only
 };
 
 /// A tree at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
@@ -52,8 +54,8 @@ struct Penetration {
   /// [u³/rad] dV/d(rotation vector of B about B's origin), world.
   Eigen::Vector3d rotation_gradient = Eigen::Vector3d::Zero();
   QueryStatus status = QueryStatus::ok;
-  std::uint32_t node_visits = 0;   ///< node pairs looked at
-  std::uint32_t sphere_pairs = 0;  ///< lenses summed
+  std::uint32_t node_visits = 0;   ///< node pairs opened
+  std::uint32_t sphere_pairs = 0;  ///< lenses summed that are not empty
 };
 
 /// Gap of two placed solids; all zero once inner spheres overlap.
@@ -65,7 +67,7 @@ struct Separation {
   Eigen::Vector3d point_b = Eigen::Vector3d::Zero();  ///< [u] on B's inner spheres, world
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();   ///< unit, from A to B, world
   QueryStatus status = QueryStatus::ok;
-  std::uint32_t node_visits = 0;   ///< node pairs looked at
+  std::uint32_t node_visits = 0;   ///< node pairs opened
   std::uint32_t sphere_pairs = 0;  ///< sphere pairs measured
 };
 
@@ -92,7 +94,9 @@ class Workspace {
 Penetration penetration(const PlacedTree& a, const PlacedTree& b, const QuerySettings& settings,
                         Workspace& workspace) noexcept;
 
-/// Distance with a certified interval and witness points.
+/// Distance of the inner spheres, with a certified interval for the solids and witness points, to
+/// about 1e-6 of the objects' size. Of the settings, max_visits and deadline_us apply. Once one
+/// object's spheres overlap the other's all is zero. No allocation, lock or exception.
 Separation separation(const PlacedTree& a, const PlacedTree& b, const QuerySettings& settings,
                       Workspace& workspace) noexcept;
 
@@ -101,7 +105,7 @@ struct PenetrationAndSeparation {
   Separation separation;
 };
 
-/// Both in one call: the unified query of the Inner Sphere Trees papers.
+/// Both in one call: the unified query of the Inner Sphere Trees papers. Limits apply to each.
 PenetrationAndSeparation query(const PlacedTree& a, const PlacedTree& b,
                                const QuerySettings& settings, Workspace& workspace) noexcept;
 

@@ -9,7 +9,7 @@
 
 namespace ist {
 
-/// Counts visits and watches the clock. Reads it once a grant, and only if there is a deadline.
+/// Counts visits and watches the clock, if there is a deadline: at most once in 16 visits.
 class Budget {
  public:
   explicit Budget(const QuerySettings& settings) noexcept
@@ -23,7 +23,11 @@ class Budget {
   /// How many of the next `wanted` visits may be made; they count as made.
   std::size_t grant(std::size_t wanted) noexcept {
     const std::size_t granted = std::min<std::size_t>(wanted, left());
-    if (granted == 0 || (timed_ && Clock::now() >= deadline_)) return 0;
+    if (granted == 0) return 0;
+    if (timed_ && visits_ >= next_look_) {
+      if (Clock::now() >= deadline_) return 0;
+      next_look_ = visits_ + 16;
+    }
     visits_ += static_cast<std::uint32_t>(granted);
     return granted;
   }
@@ -35,6 +39,7 @@ class Budget {
   using Clock = std::chrono::steady_clock;
   std::uint32_t max_visits_;
   std::uint32_t visits_ = 0;
+  std::uint32_t next_look_ = 0;
   bool timed_;
   Clock::time_point deadline_;
 };
