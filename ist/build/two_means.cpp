@@ -58,14 +58,14 @@ class TwoMeans {
     std::size_t unit = kWidth;
     while (unit * kWidth < count) unit *= kWidth;
 
-    auto [left, right] = two_means(begin, end);
+    std::pair<Mean, Mean> means = two_means(begin, end);
     const auto range = std::span(order_).subspan(begin, count);
     const bool holds_pinned = std::find(range.begin(), range.end(), pinned_) != range.end();
     const auto side = [&](std::uint32_t i) {
-      return squared_distance(balls_[i], left) - squared_distance(balls_[i], right);
+      return squared_distance(balls_[i], means.first) - squared_distance(balls_[i], means.second);
     };
     // The group that is not full is the last one: what stays last decides which side that is.
-    if (holds_pinned && side(pinned_) < 0) std::swap(left, right);
+    if (holds_pinned && side(pinned_) < 0) std::swap(means.first, means.second);
     std::size_t natural = 0;
     for (const std::uint32_t i : range) {
       key_[i] = i == pinned_ ? std::numeric_limits<double>::infinity() : side(i);
