@@ -74,7 +74,7 @@ class NeuralGas {
         for (std::size_t p = 0; p < count; ++p) {
           std::size_t rank = 0;  // counting beats sorting: no branch depends on the data
           for (std::size_t q = 0; q < kWidth; ++q)
-            rank += (distance[q] < distance[p]) | ((distance[q] == distance[p]) & (q < p));
+            rank += q < p ? distance[q] <= distance[p] : distance[q] < distance[p];
           const double w = kernel[rank] * weight(ball);
           sum[p].x += w * ball.x;
           sum[p].y += w * ball.y;

@@ -24,6 +24,7 @@ std::size_t open_as(const NodeStage& stage, const std::uint32_t* x, const std::u
   double centre[3] = {};
   double radius = 0;
   std::size_t found = 0;
+  const std::uint32_t below = stage.x->level[stage.level_x - 1].count;
   for (std::size_t i = 0; i < n; ++i) {
     if (y[i] != last_y) {
       last_y = y[i];
@@ -63,6 +64,8 @@ std::size_t open_as(const NodeStage& stage, const std::uint32_t* x, const std::u
         }
       }
     }
+    // Unused lanes, which a large enough ball would reach all the same.
+    while (found > 0 && out_x[found - 1] >= below) --found;
   }
   return found;
 }

@@ -83,8 +83,11 @@ class GapDescent {
       child_gaps(b_side_, pair.level_b, pair.b, pair.level_a, pair.a, precision_, gaps);
       factor = scale_;
     }
+    const std::uint32_t below = open_a ? a_.level[pair.level_a - 1].count - kWidth * pair.a
+                                       : b_.level[pair.level_b - 1].count - kWidth * pair.b;
     const std::size_t first = size_;
-    for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
+    // Unused lanes are left out by number: among objects far enough apart no radius would do it.
+    for (std::uint32_t lane = 0; lane < std::min(kWidth, below); ++lane) {
       const double gap = factor * gaps.gap[lane];
       const double cover = factor * gaps.cover[lane];
       if (!wanted(gap, cover)) continue;

@@ -225,7 +225,7 @@ TEST(AssetBytes, HostileFieldsAreRefusedOrHarmless) {
       if (bits() % 3 == 0) value = bits();
       if (bits() % 4 == 0) {  // a neighbour of what is there
         std::memcpy(&value, &changed[at], width);
-        value += bits() % 2 == 0 ? 1 : -1;
+        value += bits() % 2 == 0 ? 1 : ~std::uint64_t{0};
       }
       std::memcpy(&changed[at], &value, width);
     }
