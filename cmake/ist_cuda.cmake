@@ -9,6 +9,9 @@ if(NOT IST_CUDA STREQUAL "OFF")
     set(CMAKE_CUDA_ARCHITECTURES 90)
     set(CMAKE_CUDA_RUNTIME_LIBRARY Static)
     enable_language(CUDA)
+    if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)  # CMake 3.25 does not know how nvcc calls C++20
+      set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
+    endif()
     set(IST_HAVE_CUDA TRUE)
   elseif(IST_CUDA STREQUAL "ON")
     message(FATAL_ERROR "IST_CUDA=ON, but there is no nvcc: install the CUDA Toolkit 13, put nvcc "
@@ -18,9 +21,8 @@ if(NOT IST_CUDA STREQUAL "OFF")
   endif()
 endif()
 
-# The same bytes as on the CPU: nothing is fused (DESIGN 3.3). CMake 3.25 does not know nvcc's name
-# for C++20, so it is given here.
+# The same bytes as on the CPU: nothing is fused (DESIGN 3.3).
 function(ist_cuda_options target)
   target_compile_options(${target} PRIVATE
-    $<$<COMPILE_LANGUAGE:CUDA>:-std=c++20 -fmad=false --Werror=all-warnings -Xcompiler=-Wall,-Wextra>)
+    $<$<COMPILE_LANGUAGE:CUDA>:-fmad=false --Werror=all-warnings -Xcompiler=-Wall,-Wextra>)
 endfunction()

@@ -33,6 +33,8 @@ std::string describe_asset(const TreeView& tree) {
   line("spheres",
        fmt::format("{}, {:.3f} % of the volume (stopped by: {})", grouped(h.sphere_count),
                    100 * h.coverage, name_of(static_cast<StopReason>(h.stop_reason))));
+  line("greedy", fmt::format("radius / largest that would fit: {:.3f} worst, {:.3f} median",
+                             h.kept_ratio_worst, h.kept_ratio_median));
   line("volume", fmt::format("{:.9g} ± {:.1g} u³", h.volume * cube, h.volume_error * cube));
   line("frame", fmt::format("centre ({:.9g}, {:.9g}, {:.9g}) u, scale 2^{}", h.centre[0],
                             h.centre[1], h.centre[2], h.exponent));
@@ -62,6 +64,8 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
       {"mesh_hash", hex(h.mesh_hash)},
       {"spheres", h.sphere_count},
       {"coverage", h.coverage},
+      {"kept_ratio_worst", h.kept_ratio_worst},
+      {"kept_ratio_median", h.kept_ratio_median},
       {"stop", name_of(static_cast<StopReason>(h.stop_reason))},
       {"volume", h.volume * cube},
       {"volume_error", h.volume_error * cube},

@@ -93,6 +93,7 @@ void add_bake(CLI::App& app) {
   command->add_option("MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, …")->required();
   command->add_option("-o,--output", options->output, "The .ist file to write")->required();
   command->add_option("--spheres", packing.max_spheres, "Stop at this count, 0 = no limit")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--coverage", packing.target_coverage, "Stop at this share of the volume")
       ->check(CLI::Range(0.0, 1.0))
@@ -116,8 +117,10 @@ void add_bake(CLI::App& app) {
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
       ->capture_default_str();
   command->add_option("--threads", packing.threads, "0 = all cores; never changes the result")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--seed", packing.seed, "Breaks ties; any value packs equally well")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_flag("--repair", options->repair, "Close an open mesh, and say what was done");
   command->add_flag("--json", options->json, "The result as JSON on stdout");

@@ -68,7 +68,9 @@ void add_check(CLI::App& app) {
       app.add_subcommand("check", "Prove every invariant again, from asset and mesh alone");
   command->add_option("ASSET", options->asset, "An .ist file")->required();
   command->add_option("--mesh", options->mesh, "The MESH it was baked from")->required();
-  command->add_option("--threads", options->threads, "0 = all cores")->capture_default_str();
+  command->add_option("--threads", options->threads, "0 = all cores")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   command->add_flag("--json", options->json, "The invariants as JSON");
   command->footer(
       "Exits 3 if an invariant is violated.\nExample: ist check bolt.ist --mesh bolt.obj");

@@ -18,7 +18,6 @@ int main(int argc, char** argv) {
       "Lengths are [u], the mesh's own unit.",
       "ist");
   app.set_version_flag("--version", "ist " IST_VERSION);
-  app.require_subcommand(1);
   app.footer(
       "Exit codes: 0 done, 1 error, 2 wrong usage, 3 check found a violation, 130 interrupted.");
   add_bake(app);
@@ -29,7 +28,8 @@ int main(int argc, char** argv) {
   add_sample(app);
   try {
     app.parse(argc, argv);
-    return 0;
+    if (!app.get_subcommands().empty()) return 0;
+    throw CLI::RequiredError("A subcommand");
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   } catch (const ExitCode& code) {

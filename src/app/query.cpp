@@ -26,6 +26,16 @@ struct QueryOptions {
   bool json = false, csv = false;
 };
 
+/// What CLI11 asks of a validator: "" or what is wrong.
+std::string is_pose(const std::string& text) {
+  try {
+    parse_pose(text);
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
 std::vector<PoseRow> asked_rows(const QueryOptions& options) {
   if (!options.pose.empty()) return {{"0", "", parse_pose(options.pose), options.scale_b}};
   std::vector<PoseRow> rows = read_pose_rows(options.poses, options.scale_b);
@@ -84,7 +94,8 @@ void add_query(CLI::App& app) {
   command->add_option("A", options->asset_a, "An .ist file")->required();
   command->add_option("B", options->asset_b, "An .ist file")->required();
   CLI::Option_group* const poses = command->add_option_group("Poses", "Where B stands");
-  poses->add_option("--pose", options->pose, "qw,qx,qy,qz,tx,ty,tz: x_A = R (scale · x_B) + t");
+  poses->add_option("--pose", options->pose, "qw,qx,qy,qz,tx,ty,tz: x_A = R (scale · x_B) + t")
+      ->check(is_pose);
   poses->add_option("--poses", options->poses, "CSV with those columns, and id, class, scale_b");
   poses->require_option(1);
   command->add_option("--scale-b", options->scale_b, "Uniform scale of B about its own origin")
@@ -100,6 +111,7 @@ void add_query(CLI::App& app) {
   command
       ->add_option("--max-visits", options->settings.max_visits,
                    "Stop a query after so many node pairs, 0 = no limit")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
       ->add_option("--deadline-us", options->settings.deadline_us,

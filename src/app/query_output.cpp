@@ -71,7 +71,7 @@ std::string answer_text(const Answer& answer, Measure measure) {
   const Separation& s = answer.result.separation;
   std::string text;
   const auto line = [&](const char* name, const std::string& value, const char* meaning) {
-    text += fmt::format("  {:<10} {:<34} {}\n", name, value, meaning);
+    text += fmt::format("  {:<10} {:<36} {}\n", name, value, meaning);
   };
   line("volume", fmt::format("{:.6g} u³", p.volume),
        measure == Measure::matched ? "of the overlap, by matched spheres"

@@ -11,7 +11,8 @@ std::string grouped(std::uint64_t count) {
 }
 
 std::string short_vector(const Eigen::Vector3d& v) {
-  return fmt::format("({:.5g}, {:.5g}, {:.5g})", v.x(), v.y(), v.z());
+  // + 0.0: no minus sign before a zero.
+  return fmt::format("({:.5g}, {:.5g}, {:.5g})", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);
 }
 
 const char* name_of(StopReason reason) noexcept {

@@ -1,0 +1,116 @@
+#include <nlohmann/json.hpp>
+
+#include "cli/program.h"
+
+namespace {
+
+using ist::testing::CommandLine;
+using ist::testing::Outcome;
+
+class BakeCommand : public CommandLine {
+ protected:
+  /// The bake fails with exit code 1, says `message`, and leaves nothing behind.
+  void expect_error(const std::vector<std::string>& arguments, const std::string& message) {
+    const Outcome outcome = ist(arguments);
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+    EXPECT_NE(outcome.err.find(message), std::string::npos) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_TRUE(new_files().empty()) << new_files().front();
+  }
+};
+
+TEST_F(BakeCommand, WritesAnAssetAndSaysWhatItHolds) {
+  const Outcome outcome = ist({"bake", "cube.obj", "-o", "new.ist", "--spheres", "50"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.out.find("50, "), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.err.find("CPU"), std::string::npos) << outcome.err;
+  EXPECT_EQ(new_files(), std::vector<std::string>{"new.ist"});
+}
+
+TEST_F(BakeCommand, QuietSaysNothing) {
+  const Outcome outcome = ist({"bake", "cube.obj", "-o", "new.ist", "--spheres", "5", "--quiet"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(outcome.err, "");
+}
+
+TEST_F(BakeCommand, JsonHoldsTheResult) {
+  const Outcome outcome = ist({"bake", "cube.obj", "-o", "new.ist", "--spheres", "5", "--json"});
+  const nlohmann::json json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json.at("spheres"), 5);
+  EXPECT_EQ(json.at("stop"), "sphere_count");
+  EXPECT_NEAR(json.at("volume"), 1, 1e-12);
+  EXPECT_GT(json.at("coverage"), 0.5);
+  EXPECT_GE(json.at("seconds").at("bake"), 0);
+}
+
+TEST_F(BakeCommand, EveryLimitStopsThePacking) {
+  const auto stop = [&](const std::vector<std::string>& limits) {
+    std::vector<std::string> arguments = {"bake", "cube.obj", "-o", "new.ist", "--json"};
+    arguments.insert(arguments.end(), limits.begin(), limits.end());
+    return nlohmann::json::parse(ist(arguments).out);
+  };
+  EXPECT_EQ(stop({"--spheres", "9"}).at("spheres"), 9);
+  const nlohmann::json coverage = stop({"--coverage", "0.6"});
+  EXPECT_EQ(coverage.at("stop"), "coverage");
+  EXPECT_GE(coverage.at("coverage"), 0.6);
+  EXPECT_EQ(stop({"--min-radius", "0.1"}).at("stop"), "min_radius");
+  EXPECT_EQ(stop({"--spheres", "0", "--time", "0.1"}).at("stop"), "time_limit");
+}
+
+TEST_F(BakeCommand, TheSameAssetForAnyNumberOfThreads) {
+  for (const std::string threads : {"1", "2", "5"})
+    ASSERT_EQ(ist({"bake", "capsule.obj", "-o", threads + ".ist", "--spheres", "100", "--threads",
+                   threads})
+                  .exit_code,
+              0);
+  EXPECT_EQ(read("1.ist"), read("capsule.ist"));
+  EXPECT_EQ(read("2.ist"), read("capsule.ist"));
+  EXPECT_EQ(read("5.ist"), read("capsule.ist"));
+}
+
+TEST_F(BakeCommand, AnOpenMeshIsRefusedUnlessRepaired) {
+  write(
+      "open.obj",
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+      "f 1 3 2\nf 1 4 3\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n");
+  const Outcome refused = ist({"bake", "open.obj", "-o", "new.ist"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find("open.obj"), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("--repair"), std::string::npos) << refused.err;
+  EXPECT_FALSE(exists("new.ist"));
+
+  const Outcome repaired =
+      ist({"bake", "open.obj", "-o", "new.ist", "--spheres", "20", "--repair", "--json"});
+  ASSERT_EQ(repaired.exit_code, 0) << repaired.err;
+  EXPECT_NE(repaired.err.find("warning"), std::string::npos) << repaired.err;
+  EXPECT_EQ(nlohmann::json::parse(repaired.out).at("repaired"), true);
+  EXPECT_EQ(ist({"check", "new.ist", "--mesh", "open.obj"}).exit_code, 0);
+}
+
+TEST_F(BakeCommand, ErrorsNameTheFileAndLeaveNothingBehind) {
+  expect_error({"bake", "none.obj", "-o", "new.ist"}, "none.obj");
+  expect_error({"bake", "cube.obj", "-o", "none/new.ist", "--spheres", "5"}, "none/new.ist");
+  expect_error({"bake", "cube.obj", "-o", "/dev/full", "--spheres", "5", "--quiet"}, "/dev/full");
+  expect_error({"bake", "cube.obj", "-o", "new.ist", "--grid", "hybrid"}, "--grid banded");
+  expect_error({"bake", "cube.obj", "-o", "new.ist", "--device", "cuda"}, "--device cpu");
+  expect_error({"bake", "cube.obj", "-o", "new.ist", "--epsilon", "nan"}, "epsilon");
+  expect_error({"bake", "cube.ist", "-o", "new.ist"}, "cube.ist");
+  expect_error({"bake", "cube.obj", "-o", "new.ist", "--min-radius", "5"}, "cube.obj");
+}
+
+TEST_F(BakeCommand, AFailedBakeKeepsTheOldFile) {
+  const std::string before = read("cube.ist");
+  EXPECT_EQ(ist({"bake", "none.obj", "-o", "cube.ist"}).exit_code, 1);
+  EXPECT_EQ(read("cube.ist"), before);
+}
+
+TEST_F(BakeCommand, CtrlCEndsWith130AndWritesNothing) {
+  const Outcome outcome = ist({"bake", "cube.obj", "-o", "new.ist", "--spheres", "10000000"},
+                              {.environment = {}, .interrupt_after = "CPU"});
+  EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_TRUE(new_files().empty()) << new_files().front();
+}
+
+}  // namespace

@@ -1,0 +1,198 @@
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "cli/program.h"
+
+namespace {
+
+using ist::testing::CommandLine;
+using ist::testing::lines_of;
+using ist::testing::numbers_of;
+using ist::testing::Outcome;
+
+constexpr const char* kHeader =
+    "id,volume,volume_min,volume_max,cx,cy,cz,dVdtx,dVdty,dVdtz,dVdrx,dVdry,dVdrz,distance,"
+    "distance_min,distance_max,status,node_visits,sphere_pairs,time_us";
+
+// Columns of kHeader.
+enum Column {
+  id,
+  volume,
+  volume_min,
+  volume_max,
+  cx,
+  dVdtx = 7,
+  distance = 13,
+  distance_min,
+  distance_max,
+  status,
+  node_visits,
+  sphere_pairs,
+  time_us
+};
+
+class QueryCommand : public CommandLine {
+ protected:
+  /// Data rows of a CSV answer; the header is checked.
+  std::vector<std::string> rows(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "query");
+    const Outcome outcome = ist(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    std::vector<std::string> lines = lines_of(outcome.out);
+    if (lines.empty() || lines.front() != kHeader) {
+      ADD_FAILURE() << outcome.out;
+      return {};
+    }
+    lines.erase(lines.begin());
+    return lines;
+  }
+  std::vector<double> row(const std::string& pose, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"cube.ist", "cube.ist", "--csv", "--pose", pose};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const std::vector<std::string> all = rows(arguments);
+    return all.size() == 1 ? numbers_of(all.front()) : std::vector<double>(20);
+  }
+  void expect_exit(int code, std::vector<std::string> arguments, const std::string& message) {
+    arguments.insert(arguments.begin(), "query");
+    const Outcome outcome = ist(arguments);
+    EXPECT_EQ(outcome.exit_code, code) << outcome.err;
+    EXPECT_NE(outcome.err.find(message), std::string::npos) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+  }
+};
+
+TEST_F(QueryCommand, HalfACubeOverlapsHalfACube) {
+  const std::vector<double> r = row("1,0,0,0,0.5,0,0");
+  EXPECT_NEAR(r[volume], 0.5, 0.05);  // 100 spheres
+  EXPECT_LE(r[volume_min], r[volume]);
+  EXPECT_GE(r[volume_max], r[volume]);
+  EXPECT_NEAR(r[cx], 0.25, 0.05);
+  EXPECT_LT(r[dVdtx], -0.5);  // pushing B further along +x lets go of volume
+  EXPECT_GT(r[sphere_pairs], 0);
+  EXPECT_GT(r[time_us], 0);
+}
+
+TEST_F(QueryCommand, APoseMayBeginWithAMinus) {
+  EXPECT_EQ(row("-1,0,0,0,0.5,0,0")[volume], row("1,0,0,0,0.5,0,0")[volume]);
+}
+
+TEST_F(QueryCommand, FarCubesHaveADistanceAndNoVolume) {
+  const std::vector<double> r = row("1,0,0,0,0,0,3");
+  EXPECT_EQ(r[volume], 0);
+  EXPECT_GE(r[distance], 2);
+  EXPECT_LE(r[distance_min], 2);
+  EXPECT_GE(r[distance_max], 2);
+}
+
+TEST_F(QueryCommand, ScaleOfBIsAboutItsOwnOrigin) {
+  // Half the size, at 2: from 1.75 to 2.25 along x; the gap to the unit cube is 1.25.
+  const std::vector<double> r = row("1,0,0,0,2,0,0", {"--scale-b", "0.5"});
+  EXPECT_LE(r[distance_min], 1.25);
+  EXPECT_GE(r[distance_max], 1.25);
+  EXPECT_LT(r[distance_max], 1.3);
+}
+
+TEST_F(QueryCommand, InnerMeasureIsALowerBound) {
+  const double inner = row("1,0,0,0,0.5,0,0", {"--measure", "inner"})[volume];
+  EXPECT_GT(inner, 0);
+  EXPECT_LT(inner, 0.5);
+}
+
+TEST_F(QueryCommand, AnswersARowForARow) {
+  write("poses.csv",
+        "id,class,meshA,meshB,qw,qx,qy,qz,tx,ty,tz,scale_b\n"
+        "first,pen,a,b,1,0,0,0,0.5,0,0,1\n"
+        "second,sep,a,b,1,0,0,0,3,0,0,1\n"
+        "third,pen,a,b,1,0,0,0,3,0,0,8\n"
+        "fourth,other,a,b,0,0,0,0,nan,0,0,1\n");
+  const std::vector<std::string> all =
+      rows({"cube.ist", "cube.ist", "--poses", "poses.csv", "--repeat", "3"});
+  ASSERT_EQ(all.size(), 4u);
+  EXPECT_EQ(all[0].substr(0, 6), "first,");
+  EXPECT_EQ(all[3].substr(0, 7), "fourth,");
+  EXPECT_GT(numbers_of(all[0])[volume], 0);
+  EXPECT_EQ(numbers_of(all[1])[volume], 0);
+  EXPECT_GT(numbers_of(all[2])[volume], 0) << "the row's own scale overrides";
+  EXPECT_NE(all[0].find(",ok,"), std::string::npos);
+  EXPECT_NE(all[3].find(",invalid_pose,"), std::string::npos);
+  // 17 digits bring every double back.
+  EXPECT_EQ(numbers_of(all[0])[volume], row("1,0,0,0,0.5,0,0")[volume]);
+
+  const auto of_class = [&](std::vector<std::string> classes) {
+    std::vector<std::string> arguments = {"cube.ist", "cube.ist", "--poses", "poses.csv"};
+    for (const std::string& name : classes) arguments.insert(arguments.end(), {"--class", name});
+    return rows(arguments).size();
+  };
+  EXPECT_EQ(of_class({"pen"}), 2u);
+  EXPECT_EQ(of_class({"pen", "sep"}), 3u);
+  EXPECT_EQ(of_class({"none"}), 0u);
+}
+
+TEST_F(QueryCommand, ABudgetIsNamedInTheStatus) {
+  const std::vector<std::string> all =
+      rows({"cube.ist", "cube.ist", "--csv", "--pose", "1,0,0,0,0.5,0,0", "--max-visits", "1"});
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_NE(all[0].find(",budget_exhausted,"), std::string::npos) << all[0];
+}
+
+TEST_F(QueryCommand, JsonHasTheColumnsOfTheCsv) {
+  const Outcome outcome =
+      ist({"query", "cube.ist", "cube.ist", "--pose", "1,0,0,0,0.5,0,0", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::ordered_json json = nlohmann::ordered_json::parse(outcome.out);
+  ASSERT_EQ(json.size(), 1u);
+  std::string keys;
+  for (const auto& [key, value] : json[0].items()) keys += (keys.empty() ? "" : ",") + key;
+  EXPECT_EQ(keys, kHeader);
+  EXPECT_EQ(json[0].at("volume").get<double>(), row("1,0,0,0,0.5,0,0")[volume]);
+}
+
+TEST_F(QueryCommand, OnePoseIsAnsweredForAPerson) {
+  const Outcome outcome = ist({"query", "cube.ist", "capsule.ist", "--pose", "1,0,0,0,0,0,0"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  for (const char* word : {"volume", "bounds", "force/k", "torque/k", "distance", "µs"})
+    EXPECT_NE(outcome.out.find(word), std::string::npos) << word;
+}
+
+TEST_F(QueryCommand, WrongInputIsNamed) {
+  expect_exit(1, {"none.ist", "cube.ist", "--pose", "1,0,0,0,0,0,0"}, "none.ist");
+  expect_exit(1, {"cube.obj", "cube.ist", "--pose", "1,0,0,0,0,0,0"}, "cube.obj");
+  expect_exit(1, {"cube.ist", "cube.ist", "--poses", "none.csv"}, "none.csv");
+  write("short.csv", "id,qw,qx,qy,qz,tx,ty\n");
+  expect_exit(1, {"cube.ist", "cube.ist", "--poses", "short.csv"}, "'tz'");
+  write("word.csv", "qw,qx,qy,qz,tx,ty,tz\n1,0,0,0,0,0,0\n1,0,0,0,zero,0,0\n");
+  expect_exit(1, {"cube.ist", "cube.ist", "--poses", "word.csv"}, "word.csv:3");
+  write("ragged.csv", "qw,qx,qy,qz,tx,ty,tz\n1,0,0,0,0,0\n");
+  expect_exit(1, {"cube.ist", "cube.ist", "--poses", "ragged.csv"}, "ragged.csv:2");
+
+  std::string bytes = read("cube.ist");
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
+  write("flipped.ist", bytes);
+  expect_exit(1, {"flipped.ist", "cube.ist", "--pose", "1,0,0,0,0,0,0"}, "flipped.ist");
+}
+
+TEST_F(QueryCommand, WrongUsageExitsWith2) {
+  expect_exit(2, {"cube.ist", "cube.ist"}, "pose");
+  expect_exit(2, {"cube.ist", "--pose", "1,0,0,0,0,0,0"}, "");
+  expect_exit(2, {"cube.ist", "cube.ist", "--pose", "1,0,0"}, "1,0,0");
+  expect_exit(2, {"cube.ist", "cube.ist", "--pose", "1,0,0,0,0,0,x"}, "seven numbers");
+  expect_exit(2, {"cube.ist", "cube.ist", "--pose", "1,0,0,0,0,0,0", "--scale-b", "0"}, "scale-b");
+  expect_exit(2, {"cube.ist", "cube.ist", "--pose", "1,0,0,0,0,0,0", "--measure", "x"}, "measure");
+  expect_exit(2, {"cube.ist", "cube.ist", "--pose", "1,0,0,0,0,0,0", "--csv", "--json"}, "json");
+}
+
+/// The program speaks the C locale whatever the user's is.
+TEST_F(QueryCommand, NumbersDoNotDependOnTheLocale) {
+  const std::string command =
+      "localedef -i de_DE -f UTF-8 " + (folder_ / "de_DE.UTF-8").string() + " >/dev/null 2>&1";
+  if (std::system(command.c_str()) != 0) GTEST_SKIP() << "no localedef or no German locale here";
+  const std::vector<std::string> arguments = {"query",  "cube.ist",        "cube.ist",  "--csv",
+                                              "--pose", "1,0,0,0,0.5,0,0", "--scale-b", "1.25"};
+  const Outcome german =
+      ist(arguments, {.environment = {"LOCPATH=" + folder_.string(), "LC_ALL=de_DE.UTF-8"},
+                      .interrupt_after = ""});
+  const auto upto_time = [](const std::string& out) { return out.substr(0, out.rfind(',')); };
+  EXPECT_EQ(upto_time(german.out), upto_time(ist(arguments).out));
+}
+
+}  // namespace
