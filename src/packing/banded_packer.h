@@ -170,8 +170,9 @@ class BandedPacker {
       }
       if (active.size() > plateau()) break;
       frontier.clear();
+      // Bounds that do not separate: in the automatic schedule the next band asks for less.
+      if (!strict() && splitting.size() > 2 * plateau()) break;
       if (cells_.size() > kMostCells) {
-        // Bounds that do not separate: in the automatic schedule the next band asks for less.
         if (strict()) stop(StopReason::exhausted);
         break;
       }

@@ -81,7 +81,7 @@ class MeshSurface {
     for_triangles_near(view_, p, radius2, [&](const NearTriangle& near) {
       const TriangleBlock& b = *near.block;
       const int lane = near.lane;
-      if (count == kMost || !(b.height[lane] > 1e-6f * b.length[lane])) convex = false;
+      if (count == kMost || !(b.height[lane] > 1e-9f * b.length[lane])) convex = false;
       if (!convex) return 0.0f;
       const Float3 o{b.origin[0][lane], b.origin[1][lane], b.origin[2][lane]};
       const Float3 u{b.u[0][lane], b.u[1][lane], b.u[2][lane]};
