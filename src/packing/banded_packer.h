@@ -50,20 +50,28 @@ class BandedPacker {
       }
       if (top < kSmallestRadius) {
         stop(StopReason::exhausted);
-      } else if (top < limits_.min_radius) {
+      } else if (top < limits_.min_radius * (1 + kLastSlack)) {
         stop(StopReason::min_radius);
       } else {
         if (top < 0.7f * grid_.reach() ||
             result_.spheres.size() > 4 * std::max<std::size_t>(grid_.built_for(), 16))
           rebuild_grid(std::min(top * 1.001f, grid_.reach()));
-        const float slack = band_slack();
+        float slack = band_slack();
         if (!strict()) top = std::min(top, previous);
         if ((1 - slack) * top < kSmallestRadius) {
           stop(StopReason::exhausted);
           break;
         }
-        previous = std::max((1 - slack) * top, static_cast<float>(limits_.min_radius));
+        previous = (1 - slack) * top;
+        if (previous <= limits_.min_radius) {
+          // The last bands are cut at the smallest radius and end a hair above it.
+          previous = smallest_wanted();
+          slack = kLastSlack;
+        }
+        const std::size_t before = result_.spheres.size();
         band(previous, slack);
+        const bool last = previous <= smallest_wanted();
+        if (last && !stopped_ && result_.spheres.size() == before) stop(StopReason::min_radius);
       }
     }
     result_.stop = reason_;
@@ -82,11 +90,14 @@ class BandedPacker {
   using Clock = std::chrono::steady_clock;
   static constexpr float kSmallestRadius = 0x1p-21f;  ///< float coordinates resolve nothing below
   static constexpr float kSmallestHalfEdge = 0x1p-23f;
+  static constexpr float kLastSlack = 0.01f;
   static constexpr float kFloatNoise = 1e-4f;
   static constexpr float kLargest = 1.5f;  ///< half-edge of a cell that is climbed from, in radii
   static constexpr std::size_t kMostCells = std::size_t{1} << 22;  ///< some 400 MB
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
+  /// The smallest radius that the user allows, rounded up.
+  float smallest_wanted() const { return -rounded_down(-limits_.min_radius); }
   bool strict() const { return settings_.epsilon > 0; }
 
   /// ε of the next band. Near the target count bands get thinner, so that the last spheres are the
@@ -140,7 +151,8 @@ class BandedPacker {
       const std::size_t inserted = insert_independent(active, threshold, margin);
       ++result_.rounds;
       if (first == 0) first = inserted;
-      if (!strict() && 10 * inserted <= 3 * first) break;
+      const bool last = threshold <= smallest_wanted();
+      if (last ? inserted == 0 : !strict() && 10 * inserted <= 3 * first) break;
     }
   }
 
@@ -240,7 +252,9 @@ class BandedPacker {
       const Candidate& c = candidates[winners[i]];
       const float r =
           certified_radius(c.centre, c.radius, surface_distance[i], result_.spheres, grid_);
-      if (r < threshold && !(r >= kSmallestRadius && r >= 0.99f * threshold && !strict())) {
+      const bool close = !strict() && r >= 0.99f * threshold && r >= kSmallestRadius / 2 &&
+                         double{r} >= limits_.min_radius;
+      if (r < threshold && !close) {
         // Float saw more room than there is.
         cells_[active[winners[i]]].bound = 0.999f * margin;
         cells_[active[winners[i]]].radius = 0;

@@ -174,7 +174,9 @@ TEST(Packing, CancelledPackingIsCertifiedAndAPrefix) {
     EXPECT_LE(p.fraction, 1.0 + 1e-9);
     return ++calls < 2;
   });
-  if (calls >= 2) EXPECT_EQ(cut.stop, StopReason::cancelled);
+  if (calls >= 2) {
+    EXPECT_EQ(cut.stop, StopReason::cancelled);
+  }
   ASSERT_LE(cut.spheres.size(), whole.spheres.size());
   EXPECT_EQ(
       std::memcmp(cut.spheres.data(), whole.spheres.data(), cut.spheres.size() * sizeof(Sphere)),
