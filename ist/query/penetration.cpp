@@ -22,7 +22,7 @@ constexpr std::size_t kChunk = 64;
 
 // Sums whose rounding may exceed this share are taken again in double. The bound is some hundred
 // times what rounding does, so float keeps 1e-5.
-constexpr double kGrazing = 5e-4;
+constexpr double kGrazing = 3e-4;
 
 /// The finished sums and what is known of pairs that were not opened, in A's unit frame; positions
 /// relative to B's unit-frame origin.

@@ -51,6 +51,25 @@ TEST(Query, MatchesTheSumOverAllPairs) {
   }
 }
 
+TEST(Query, NoGrazingPairIsLost) {
+  // A single sphere just touches each sphere of the other tree from outside: many lie on the rim of
+  // their node's ball.
+  Workspace workspace;
+  const Asset many = make_random_asset({300, 0.2, {}, 0}, 12);
+  const Asset one = make_random_asset({1, 0.2, {}, 0}, 13);
+  const PlacedTree pa{many.view(), {}, 1.0};
+  PlacedTree pb{one.view(), {}, 0.3};
+  const testing::WorldSphere own = testing::world_spheres(pb, Measure::matched)[0];
+  for (const testing::WorldSphere& sphere : testing::world_spheres(pa, Measure::matched)) {
+    const Eigen::Vector3d to =
+        sphere.centre + (sphere.r + (1 - 1e-3) * own.r) * sphere.centre.normalized() - own.centre;
+    for (int k = 0; k < 3; ++k) pb.pose.t[k] = to[k];
+    const double want = reference_sum(pa, pb, Measure::matched).volume;
+    EXPECT_NEAR(penetration(pa, pb, {}, workspace).volume, want, 1e-5 * want);
+    EXPECT_NEAR(penetration(pb, pa, {}, workspace).volume, want, 1e-5 * want);
+  }
+}
+
 TEST(Query, SeparationMatchesAllPairs) {
   Workspace workspace;
   std::mt19937_64 random(2);
