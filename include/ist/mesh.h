@@ -23,7 +23,8 @@ struct ImportSettings {
   double weld_tolerance = 0;
 };
 
-/// What import and validation found. Counts refer to the welded mesh.
+/// What import and validation found. Counts refer to the welded mesh as it came, unless they name
+/// the closed one.
 struct MeshReport {
   std::size_t vertices = 0;              ///< referenced vertices after welding
   std::size_t triangles = 0;             ///< as imported
@@ -39,9 +40,11 @@ struct MeshReport {
   std::size_t self_intersections =
       0;  ///< triangle pairs that meet elsewhere than in shared corners
   bool self_intersections_counted = false;  ///< false: too many triangles, not looked for
-  std::size_t filled_holes = 0;             ///< boundary loops closed by repair
-  bool closed = false;                      ///< bounds a solid
-  bool repaired = false;                    ///< repair changed the mesh
+  std::size_t shells = 0;    ///< of the closed mesh: pieces that are oriented one by one
+  bool meets_itself = true;  ///< the closed mesh: triangles of it intersect, or may (not counted)
+  std::size_t filled_holes = 0;    ///< boundary loops closed by repair
+  bool closed = false;             ///< bounds a solid
+  bool repaired = false;           ///< repair changed the mesh
   double volume = 0;               ///< [u³] divergence theorem; counts self-overlaps twice
   Eigen::AlignedBox3d bounds;      ///< [u] of the referenced vertices
   std::vector<std::string> notes;  ///< one sentence a finding, ready to print

@@ -172,9 +172,9 @@ void orient_faces(TriangleMesh& mesh, const std::string& name, MeshReport& repor
 }
 
 void orient_outward(TriangleMesh& mesh, const std::string& name, MeshReport& report) {
-  const EdgeTable edges(mesh.triangles);
-  const Nesting nesting =
-      orient_shells(mesh.vertices, mesh.triangles, find_shells(mesh.triangles, edges));
+  const Shells shells = find_shells(mesh.triangles, EdgeTable(mesh.triangles));
+  const Nesting nesting = orient_shells(mesh.vertices, mesh.triangles, shells);
+  report.shells = shells.count;
   if (nesting.volume.is_flat())
     throw Error(name + ": flat, it encloses no volume. Give it thickness");
   report.volume = nesting.volume.volume;
@@ -207,6 +207,10 @@ ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMes
   }
   orient_faces(mesh, name, report);
   orient_outward(mesh, name, report);
+  // Dropped degenerate triangles never counted; other changes may add or remove intersections.
+  report.meets_itself = !report.self_intersections_counted || report.self_intersections > 0;
+  if (report.repaired || report.coincident_triangles > 0)
+    report.meets_itself = count_self_intersections(mesh.vertices, mesh.triangles) != 0;
   report.closed = true;
   return {weld(mesh, 0), std::move(report), name};
 }

@@ -99,11 +99,11 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
   view.nodes = impl_->bvh.nodes.data();
   view.blocks = impl_->bvh.blocks.data();
   view.root = impl_->bvh.root;
-  const MeshReport& report = closed.report;
-  const bool meets_itself = !report.self_intersections_counted || report.self_intersections > 0;
+  const bool meets_itself = closed.report.meets_itself;
   // One shell that does not meet itself winds around no point twice.
-  impl_->volume = !meets_itself && report.components == 1 ? enclosed_volume(view)
-                                                          : winding_set_volume(view, meets_itself);
+  impl_->volume = !meets_itself && closed.report.shells == 1
+                      ? enclosed_volume(view)
+                      : winding_set_volume(view, meets_itself);
 }
 
 MeshSolid::~MeshSolid() = default;

@@ -144,6 +144,8 @@ TEST(CloseMesh, NestedSolidsAndOverlapsKeepTheirWindingNumber) {
   EXPECT_EQ(overlapping.report.flipped_components, 0u);
   EXPECT_GT(overlapping.report.self_intersections, 0u);
   EXPECT_TRUE(has_note(overlapping.report, "intersect"));
+  EXPECT_TRUE(overlapping.report.meets_itself);
+  EXPECT_EQ(overlapping.report.shells, 2u);
   // An inward shell that is only partly within another is no cavity.
   const TriangleMesh half_out =
       joined(cube_mesh(), inverted(box_mesh(kZero, Eigen::Vector3d::Constant(1.5))));
@@ -161,6 +163,9 @@ TEST(CloseMesh, CoincidentFacesAreTheirSignedSum) {
   const ClosedMesh joined_block = close_mesh(block, "block");
   EXPECT_EQ(joined_block.report.coincident_triangles, 4u);
   EXPECT_EQ(joined_block.mesh.triangles.size(), 20u);
+  EXPECT_GT(joined_block.report.self_intersections, 0u);  // the wall, as it came
+  EXPECT_FALSE(joined_block.report.meets_itself);
+  EXPECT_EQ(joined_block.report.shells, 1u);
   EXPECT_DOUBLE_EQ(joined_block.report.volume, 2);
   // A sum of zero (or two) that would open the mesh: one copy stays.
   for (const bool opposite : {false, true}) {

@@ -179,6 +179,17 @@ TEST(ReadStl, Errors) {
   EXPECT_ERROR("a.stl", lying, "4294967295 triangles need 214748364834 bytes");
 }
 
+TEST(LoadMesh, WeldsWithinTheStatedFractionOfTheDiagonal) {
+  const std::string cracked =
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1.00001 0 0\n"
+      "f 1 3 2\nf 1 5 4\nf 2 3 4\nf 1 4 3\n";
+  const TempFile file("a.obj", cracked);
+  EXPECT_EQ(load_mesh(file.path()).vertices.size(), 5u);
+  EXPECT_EQ(load_mesh(file.path(), {.weld_tolerance = 1e-6}).vertices.size(), 5u);
+  expect_tetrahedron(load_mesh(file.path(), {.weld_tolerance = 1e-4}));
+  EXPECT_THROW(load_mesh(file.path(), {.weld_tolerance = -1}), Error);
+}
+
 TEST(OtherContent, IsNamed) {
   EXPECT_ERROR("a.stl", "\x89PNG\r\n\x1a\n", "PNG image");
   EXPECT_ERROR("a.ply", "version https://git-lfs.github.com/spec/v1\n", "git lfs pull");

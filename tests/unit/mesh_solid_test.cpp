@@ -96,8 +96,8 @@ TEST(MeshSolid, OverlapOfRoundShells) {
 TEST(MeshSolid, OneSimpleShellNeedsNoIntegration) {
   ist::ClosedMesh torus = closed(torus_mesh(2, 0.5, 64, 32), "torus");
   const MeshSolid integrated(torus);
-  torus.report.self_intersections_counted = true;
-  torus.report.components = 1;
+  torus.report.meets_itself = false;
+  torus.report.shells = 1;
   const MeshSolid simple(torus);
   EXPECT_LT(simple.volume_error(), 1e-12 * simple.volume());
   EXPECT_NEAR(integrated.volume(), simple.volume(), 1e-12 * simple.volume());

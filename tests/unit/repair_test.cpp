@@ -94,6 +94,18 @@ TEST(Repair, FinsAndSheetsAreDropped) {
   EXPECT_EQ(closed.mesh.triangles, cube_mesh().triangles);
 }
 
+TEST(Repair, TellsWhetherTheClosedMeshMeetsItself) {
+  // A post stands in the open side of a box: only the cap meets it.
+  TriangleMesh box = box_mesh(Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(4));
+  std::erase_if(box.triangles, [](const auto& t) { return t[0] == 4; });  // z = 4
+  const ClosedMesh empty = repaired(box);
+  EXPECT_FALSE(empty.report.meets_itself);
+  const ClosedMesh post = repaired(joined(box, box_mesh({1, 1, 1}, {2, 2, 5})));
+  EXPECT_EQ(post.report.self_intersections, 0u);  // as it came
+  EXPECT_TRUE(post.report.meets_itself);
+  EXPECT_EQ(post.report.shells, 2u);
+}
+
 TEST(Repair, WhatEnclosesNothingFailsWithAReason) {
   TriangleMesh triangle;
   triangle.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
