@@ -46,8 +46,8 @@ std::unique_ptr<Solid> make_solid(const ClosedMesh& mesh);
 /// Analytic solids. Radii and half-extents [u] must be finite and > 0, else Error.
 std::unique_ptr<Solid> make_ball(const Eigen::Vector3d& centre, double radius);
 std::unique_ptr<Solid> make_box(const Eigen::Vector3d& centre, const Eigen::Vector3d& half_extent);
-/// Torus about the z axis: `major` is the radius of the tube's centre line, `minor` ≤ `major` that of
-/// the tube.
+/// Torus about the z axis: `major` is the radius of the tube's centre line, `minor` ≤ `major` that
+/// of the tube.
 std::unique_ptr<Solid> make_torus(const Eigen::Vector3d& centre, double major, double minor);
 
 /// Boolean combinations by min and max of signed distances. Their volume is integrated on first
