@@ -51,5 +51,5 @@ def query_peers(report, path):
         axis.set(yscale="log", title=pair, ylabel="µs: median, whisker p99",
                  xticks=range(len(classes)), xticklabels=classes)
         axis.grid(True, axis="y", alpha=0.3)
-    axes[0, 0].legend(fontsize=7, ncol=3, loc="upper center", bbox_to_anchor=(0.5, 1.45))
+    axes[0, 0].legend(fontsize=7, ncol=3, loc="lower center", bbox_to_anchor=(0.5, 1.12))
     save(figure, path)
