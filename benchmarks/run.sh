@@ -25,9 +25,11 @@ mkdir -p "$results"
 if [ ${#names[@]} -eq 0 ]; then
   for program in "$build"/bin/benchmarks/*; do names+=("$(basename "$program")"); done
 fi
+failed=()
 for name in "${names[@]}"; do
   echo "== $name"
-  "$build/bin/benchmarks/$name" --out "$results/$name.json" "${quick[@]}"
+  "$build/bin/benchmarks/$name" --out "$results/$name.json" "${quick[@]}" || failed+=("$name")
 done
 # apt installs matplotlib for the system's own interpreter
 /usr/bin/python3 "$root/benchmarks/tables.py" "$results"
+[ ${#failed[@]} -eq 0 ] || { echo "failed: ${failed[*]}" >&2; exit 1; }
