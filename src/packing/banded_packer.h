@@ -144,15 +144,13 @@ class BandedPacker {
     std::vector<std::uint32_t> active;
     for (std::size_t i = 0; i < cells_.size(); ++i)
       if (cells_[i].bound >= margin) active.push_back(static_cast<std::uint32_t>(i));
-    std::size_t first = 0;
     while (!active.empty() && !stopped_) {
       resolve(active, threshold, margin);
       if (stopped_) return;
       const std::size_t inserted = insert_independent(active, threshold, margin);
       ++result_.rounds;
-      if (first == 0) first = inserted;
-      const bool last = threshold <= smallest_wanted();
-      if (last ? inserted == 0 : !strict() && 10 * inserted <= 3 * first) break;
+      // Under an explicit ε what is left must be refuted, not only found to yield nothing now.
+      if (inserted == 0 && (!strict() || threshold <= smallest_wanted())) break;
     }
   }
 
