@@ -53,3 +53,30 @@ def query_peers(report, path):
         axis.grid(True, axis="y", alpha=0.3)
     axes[0, 0].legend(fontsize=7, ncol=3, loc="lower center", bbox_to_anchor=(0.5, 1.12))
     save(figure, path)
+
+
+def volume_error(report, path):
+    """Error of the volume by class of overlap: a panel a pair, a curve a sphere count."""
+    rows = report["tables"]["Volume and force against exact booleans"]
+    pairs = list(dict.fromkeys(row["pair"] for row in rows))
+    classes = list(dict.fromkeys(row["class"] for row in rows))
+    figure, axes = plt.subplots(1, len(pairs), figsize=(4 * len(pairs), 4), squeeze=False,
+                                sharey=True)
+    for axis, pair in zip(axes[0], pairs):
+        for spheres in sorted({row["spheres"] for row in rows if row["pair"] == pair}):
+            mine = [next(row for row in rows if (row["pair"], row["spheres"], row["class"]) ==
+                         (pair, spheres, c)) for c in classes]
+            line, = axis.semilogy(classes, [row["error median %"] for row in mine], "o-",
+                                  label=f"{spheres:,} spheres, median")
+            axis.semilogy(classes, [row["error p95 %"] for row in mine], ":",
+                          color=line.get_color(), label="p95")
+        inner = max(row["spheres"] for row in rows)
+        axis.semilogy(classes, [row["inner median %"] for row in rows
+                                if (row["pair"], row["spheres"]) == (pair, inner)], "k--",
+                      linewidth=0.8, label=f"inner spheres, {inner:,}")
+        axis.set(title=pair, xlabel="overlap, share of the smaller solid")
+        axis.tick_params(axis="x", rotation=30)
+        axis.grid(True, which="major", alpha=0.3)
+    axes[0, 0].set_ylabel("error of the volume, %")
+    axes[0, -1].legend(fontsize=7)
+    save(figure, path)
