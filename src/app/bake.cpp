@@ -2,7 +2,7 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <map>
+#include <filesystem>
 #include <memory>
 
 #include <ist/bake.h>
@@ -11,6 +11,7 @@
 #include "app/asset_summary.h"
 #include "app/commands.h"
 #include "app/interrupt.h"
+#include "app/number_checks.h"
 #include "app/progress_line.h"
 
 namespace ist::app {
@@ -33,6 +34,12 @@ GridMode grid_mode(const std::string& name) {
   if (name != "banded")
     throw Error("--grid " + name + ": not available in this version; use --grid banded");
   return GridMode::banded;
+}
+
+void require_another_file(const BakeOptions& options) {
+  std::error_code no_such_file;
+  if (std::filesystem::equivalent(options.mesh, options.output, no_such_file))
+    throw Error(options.output + ": this is the mesh itself; name another file for the asset");
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -59,6 +66,7 @@ void run_bake(const BakeOptions& options) {
   if (options.quiet) spdlog::set_level(spdlog::level::err);
   PackingSettings settings = options.packing;
   settings.grid = grid_mode(options.grid);
+  require_another_file(options);
   require_cpu(options);
 
   const auto start = std::chrono::steady_clock::now();
@@ -93,16 +101,16 @@ void add_bake(CLI::App& app) {
   command->add_option("MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, …")->required();
   command->add_option("-o,--output", options->output, "The .ist file to write")->required();
   command->add_option("--spheres", packing.max_spheres, "Stop at this count, 0 = no limit")
-      ->check(CLI::NonNegativeNumber)
+      ->check(is_count)
       ->capture_default_str();
   command->add_option("--coverage", packing.target_coverage, "Stop at this share of the volume")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command->add_option("--min-radius", packing.min_radius, "[u] Insert nothing smaller")
-      ->check(CLI::NonNegativeNumber)
+      ->check(is_not_negative)
       ->capture_default_str();
   command->add_option("--time", packing.time_limit, "[s] Stop packing after this, 0 = no limit")
-      ->check(CLI::NonNegativeNumber)
+      ->check(is_not_negative)
       ->capture_default_str();
   command
       ->add_option("--epsilon", packing.epsilon,
@@ -117,10 +125,10 @@ void add_bake(CLI::App& app) {
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
       ->capture_default_str();
   command->add_option("--threads", packing.threads, "0 = all cores; never changes the result")
-      ->check(CLI::NonNegativeNumber)
+      ->check(is_count)
       ->capture_default_str();
   command->add_option("--seed", packing.seed, "Breaks ties; any value packs equally well")
-      ->check(CLI::NonNegativeNumber)
+      ->check(is_count)
       ->capture_default_str();
   command->add_flag("--repair", options->repair, "Close an open mesh, and say what was done");
   command->add_flag("--json", options->json, "The result as JSON on stdout");

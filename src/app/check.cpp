@@ -7,6 +7,7 @@
 #include <ist/bake.h>
 
 #include "app/commands.h"
+#include "app/number_checks.h"
 #include "app/text.h"
 #include "query/asset_layout.h"
 
@@ -69,7 +70,7 @@ void add_check(CLI::App& app) {
   command->add_option("ASSET", options->asset, "An .ist file")->required();
   command->add_option("--mesh", options->mesh, "The MESH it was baked from")->required();
   command->add_option("--threads", options->threads, "0 = all cores")
-      ->check(CLI::NonNegativeNumber)
+      ->check(is_count)
       ->capture_default_str();
   command->add_flag("--json", options->json, "The invariants as JSON");
   command->footer(

@@ -1,7 +1,10 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <cerrno>
+#include <cstdio>
 #include <exception>
+#include <system_error>
 
 #include <ist/error.h>
 
@@ -28,8 +31,11 @@ int main(int argc, char** argv) {
   add_sample(app);
   try {
     app.parse(argc, argv);
-    if (!app.get_subcommands().empty()) return 0;
-    throw CLI::RequiredError("A subcommand");
+    if (app.get_subcommands().empty()) throw CLI::RequiredError("A subcommand");
+    // A full disk may show only here.
+    if (std::fflush(stdout) != 0)
+      throw ist::Error("standard output: cannot write: " + std::generic_category().message(errno));
+    return 0;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   } catch (const ExitCode& code) {

@@ -78,6 +78,7 @@ std::vector<PoseRow> read_pose_rows(const std::filesystem::path& path, double sc
     throw Error(path.string() + ": cannot open: " + std::generic_category().message(errno));
   std::string line;
   if (!std::getline(file, line)) throw Error(path.string() + ": cannot read a header row");
+  if (line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // the mark of UTF-8, as Excel writes
   Header header;
   for (const std::string_view name : split(line)) header.names.emplace_back(name);
   for (const char* name : Header::kPose)

@@ -1,17 +1,18 @@
 #include <ist/query.h>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
 #include <limits>
-#include <map>
 #include <memory>
 
 #include <ist/bake.h>
 #include <ist/error.h>
 
 #include "app/commands.h"
+#include "app/number_checks.h"
 #include "app/query_output.h"
 
 namespace ist::app {
@@ -39,11 +40,13 @@ std::string is_pose(const std::string& text) {
 std::vector<PoseRow> asked_rows(const QueryOptions& options) {
   if (!options.pose.empty()) return {{"0", "", parse_pose(options.pose), options.scale_b}};
   std::vector<PoseRow> rows = read_pose_rows(options.poses, options.scale_b);
+  const std::size_t all = rows.size();
   if (!options.classes.empty())
     std::erase_if(rows, [&](const PoseRow& row) {
       return std::find(options.classes.begin(), options.classes.end(), row.label) ==
              options.classes.end();
     });
+  if (rows.empty()) spdlog::warn("{}: none of its {} rows is asked for", options.poses, all);
   return rows;
 }
 
@@ -96,32 +99,39 @@ void add_query(CLI::App& app) {
   CLI::Option_group* const poses = command->add_option_group("Poses", "Where B stands");
   poses->add_option("--pose", options->pose, "qw,qx,qy,qz,tx,ty,tz: x_A = R (scale · x_B) + t")
       ->check(is_pose);
-  poses->add_option("--poses", options->poses, "CSV with those columns, and id, class, scale_b");
+  CLI::Option* const file = poses->add_option("--poses", options->poses,
+                                              "CSV with those columns, and id, class, scale_b");
   poses->require_option(1);
   command->add_option("--scale-b", options->scale_b, "Uniform scale of B about its own origin")
-      ->check(CLI::PositiveNumber)
+      ->check(is_positive)
       ->capture_default_str();
   command->add_option("--class", options->classes, "Only rows of this class; may be repeated")
       ->take_all()
-      ->allow_extra_args(false);
-  command->add_option("--measure", options->settings.measure, "Which spheres stand for the solid")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, Measure>{{"matched", Measure::matched}, {"inner", Measure::inner}}))
+      ->allow_extra_args(false)
+      ->needs(file);
+  command
+      ->add_option_function<std::string>(
+          "--measure",
+          [options](const std::string& name) {
+            options->settings.measure = name == "inner" ? Measure::inner : Measure::matched;
+          },
+          "Which spheres stand for the solid")
+      ->check(CLI::IsMember({"matched", "inner"}))
       ->default_str("matched");
   command
       ->add_option("--max-visits", options->settings.max_visits,
                    "Stop a query after so many node pairs, 0 = no limit")
-      ->check(CLI::NonNegativeNumber)
+      ->check(is_count)
       ->capture_default_str();
   command
       ->add_option("--deadline-us", options->settings.deadline_us,
                    "[µs] Stop a query after this, 0 = no limit")
-      ->check(CLI::NonNegativeNumber)
+      ->check(is_not_negative)
       ->capture_default_str();
   command
       ->add_option("--repeat", options->repeat,
                    "Rounds over all rows in turn; time_us is a row's least")
-      ->check(CLI::PositiveNumber)
+      ->check(is_positive)
       ->capture_default_str();
   CLI::Option* const json = command->add_flag("--json", options->json, "Answers as JSON");
   command->add_flag("--csv", options->csv, "Answers as CSV (the default with --poses)")

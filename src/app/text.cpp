@@ -53,14 +53,4 @@ const char* name_of(QueryStatus status) noexcept {
   return "unknown";
 }
 
-const char* name_of(Measure measure) noexcept {
-  switch (measure) {
-    case Measure::matched:
-      return "matched";
-    case Measure::inner:
-      return "inner";
-  }
-  return "unknown";
-}
-
 }  // namespace ist::app

@@ -17,6 +17,5 @@ std::string short_vector(const Eigen::Vector3d& v);
 const char* name_of(StopReason reason) noexcept;
 const char* name_of(GridMode mode) noexcept;
 const char* name_of(QueryStatus status) noexcept;
-const char* name_of(Measure measure) noexcept;
 
 }  // namespace ist::app

@@ -99,6 +99,12 @@ TEST_F(BakeCommand, ErrorsNameTheFileAndLeaveNothingBehind) {
   expect_error({"bake", "cube.obj", "-o", "new.ist", "--min-radius", "5"}, "cube.obj");
 }
 
+TEST_F(BakeCommand, TheMeshIsNeverOverwritten) {
+  const std::string before = read("cube.obj");
+  expect_error({"bake", "cube.obj", "-o", "./cube.obj", "--spheres", "5"}, "the mesh itself");
+  EXPECT_EQ(read("cube.obj"), before);
+}
+
 TEST_F(BakeCommand, AFailedBakeKeepsTheOldFile) {
   const std::string before = read("cube.ist");
   EXPECT_EQ(ist({"bake", "none.obj", "-o", "cube.ist"}).exit_code, 1);

@@ -179,6 +179,37 @@ TEST_F(QueryCommand, WrongUsageExitsWith2) {
   expect_exit(2, {"cube.ist", "cube.ist", "--pose", "1,0,0,0,0,0,0", "--scale-b", "0"}, "scale-b");
   expect_exit(2, {"cube.ist", "cube.ist", "--pose", "1,0,0,0,0,0,0", "--measure", "x"}, "measure");
   expect_exit(2, {"cube.ist", "cube.ist", "--pose", "1,0,0,0,0,0,0", "--csv", "--json"}, "json");
+  expect_exit(2, {"cube.ist", "cube.ist", "--pose", "1,0,0,0,0,0,0", "--class", "pen"}, "--poses");
+}
+
+TEST_F(QueryCommand, AnInvalidPoseIsNoZeroForAPerson) {
+  const Outcome outcome = ist({"query", "cube.ist", "cube.ist", "--pose", "2,0,0,0,0,0,0"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.out.find("invalid_pose"), std::string::npos) << outcome.out;
+  EXPECT_EQ(outcome.out.find("volume"), std::string::npos) << outcome.out;
+}
+
+TEST_F(QueryCommand, AByteOrderMarkAndCarriageReturnsAreNoPartOfACsv) {
+  write("poses.csv", "\xEF\xBB\xBFqw,qx,qy,qz,tx,ty,tz\r\n1,0,0,0,0.5,0,0\r\n");
+  const std::vector<std::string> all = rows({"cube.ist", "cube.ist", "--poses", "poses.csv"});
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_EQ(numbers_of(all[0])[volume], row("1,0,0,0,0.5,0,0")[volume]);
+}
+
+TEST_F(QueryCommand, AClassWithoutRowsIsSaid) {
+  write("poses.csv", "class,qw,qx,qy,qz,tx,ty,tz\npen,1,0,0,0,0.5,0,0\n");
+  const Outcome outcome =
+      ist({"query", "cube.ist", "cube.ist", "--poses", "poses.csv", "--class", "pne"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.err.find("none of its 1 rows"), std::string::npos) << outcome.err;
+}
+
+TEST_F(QueryCommand, AnswersThatCannotBeWrittenAreAnError) {
+  const std::string command = "cd " + folder_.string() +
+                              " && " IST_BINARY
+                              " query cube.ist cube.ist --pose 1,0,0,0,0,0,0 >/dev/full 2>err";
+  EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 1);
+  EXPECT_NE(read("err").find("standard output"), std::string::npos) << read("err");
 }
 
 /// The program speaks the C locale whatever the user's is.

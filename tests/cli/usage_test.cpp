@@ -35,10 +35,13 @@ TEST_F(Usage, WrongUsageExitsWith2AndSaysWhy) {
   expect_usage_error({"pack"}, "pack");
   expect_usage_error({"bake", "cube.obj"}, "output");
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--sphere", "5"}, "--sphere");
-  expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--spheres", "many"}, "spheres");
-  expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--spheres", "-5"}, "spheres");
+  expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--spheres", "many"},
+                     "--spheres: 'many' is not a whole number");
+  expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--spheres", "-5"},
+                     "--spheres: '-5' is not a whole number");
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--coverage", "1.5"}, "coverage");
-  expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--time", "-1"}, "time");
+  expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--time", "-1"},
+                     "--time: '-1' is not a finite number");
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--grid", "octree"}, "grid");
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--device", "tpu"}, "device");
   expect_usage_error({"sample", "cube"}, "output");
