@@ -19,7 +19,7 @@ struct TriangleMesh {
 /// How a file becomes a TriangleMesh.
 struct ImportSettings {
   /// Vertices closer than this fraction of the bounding-box diagonal are one vertex.
-  /// 0 welds equal coordinates only.
+  /// In [0, 0.1], else Error; 0 welds equal coordinates only.
   double weld_tolerance = 0;
 };
 

@@ -9,13 +9,14 @@ namespace ist {
 struct Progress {
   const char* stage = "";   ///< "pack", "calibrate", "cover", "tree"
   std::size_t spheres = 0;  ///< count so far
-  double coverage = 0;      ///< [0, 1] of the solid's volume covered by inner spheres
-  double radius = 0;        ///< [u] of the spheres being inserted now
+  double coverage = 0;      ///< [0, 1] of the solid's volume in inner spheres; "pack" only
+  double radius = 0;        ///< [u] of the spheres being inserted now; "pack" only
   double fraction = 0;      ///< [0, 1] of this stage's work, an estimate
   double elapsed = 0;       ///< [s] since the stage began
 };
 
-/// Called from the thread that started the stage, a few times a second at most.
+/// Called from the thread that started the stage: ten times a second at most while packing, after
+/// every step of the shorter stages.
 /// Return false to cancel: packing ends with what is packed so far, which is valid.
 using ProgressCallback = std::function<bool(const Progress&)>;
 
