@@ -14,7 +14,8 @@ enum class QueryStatus : std::uint32_t {
   ok = 0,  ///< finished: the gradients are exactly those of the returned volume
   /// A limit of QuerySettings or the workspace's capacity stopped the descent: bounds still hold.
   budget_exhausted = 1,
-  /// NaN, Inf, a quaternion off unit length by > 1e-3, a scale ≤ 0, or an empty tree; all zero.
+  /// NaN, Inf, a quaternion off unit length by > 1e-3, a scale ≤ 0, an empty tree, or sizes or
+  /// distances more than 1e60 : 1 apart; all zero.
   invalid_pose = 2,
 };
 
@@ -24,8 +25,9 @@ enum class Measure : std::uint32_t {
   inner = 1,    ///< inner spheres: a certified lower bound of the true volume
 };
 
-/// Limits on one query. Zero means no limit; with none set the answer is the finished sum. A
-/// stopped penetration guesses what is left from the densities of the nodes that were not opened.
+/// Limits on one query. Zero, a negative value or NaN means no limit; with none set the answer is
+/// the finished sum. A stopped penetration guesses what is left from the densities of the nodes
+/// that were not opened.
 struct QuerySettings {
   Measure measure = Measure::matched;
   std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
@@ -44,8 +46,8 @@ struct PlacedTree {
 /// Overlap of two placed solids. Gradients are taken with respect to a motion of B, A held still.
 struct Penetration {
   double volume = 0;  ///< [u³] in the chosen measure
-  double volume_min =
-      0;  ///< [u³] lower bound on that sum, rounding included; not on the true overlap
+  /// [u³] lower bound on that sum, rounding included; not on the true overlap
+  double volume_min = 0;
   double volume_max = 0;                               ///< [u³] upper bound on that sum, likewise
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the overlap, world; zero if none
   /// [u²] dV/d(translation of B), world. A k·V penalty pushes B by −k times this, A by the

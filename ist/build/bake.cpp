@@ -1,7 +1,6 @@
 #include <ist/bake.h>
 #include <ist/error.h>
 #include <tbb/parallel_invoke.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 
@@ -10,6 +9,7 @@
 #include "build/cover.h"
 #include "build/tree_builder.h"
 #include "mesh/mesh_solid.h"
+#include "packing/thread_arena.h"
 
 namespace ist {
 namespace {
@@ -65,8 +65,7 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   arrays.cover_radii = cover_radii(solid, packing.spheres, settings.threads, progress);
 
   report_tree(progress, packing.spheres.size(), 0);
-  tbb::task_arena arena(settings.threads == 0 ? tbb::task_arena::automatic
-                                              : static_cast<int>(settings.threads));
+  tbb::task_arena arena = thread_arena(settings.threads);
   arena.execute([&] {
     tbb::parallel_invoke(
         [&] { arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii); },

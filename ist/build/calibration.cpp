@@ -1,7 +1,6 @@
 #include "build/calibration.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <chrono>
@@ -14,6 +13,7 @@
 #include "build/cube_root.h"
 #include "build/power_cells.h"
 #include "build/turned_solid.h"
+#include "packing/thread_arena.h"
 
 namespace ist {
 namespace {
@@ -66,7 +66,7 @@ Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, uns
     now.elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!progress(now)) throw Error("calibration: cancelled");
   };
-  tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : static_cast<int>(threads));
+  tbb::task_arena arena = thread_arena(threads);
 
   // The cells are found in the frame of the turned solid.
   report(0);

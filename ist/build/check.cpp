@@ -1,11 +1,11 @@
 #include <ist/bake.h>
 #include <ist/error.h>
-#include <tbb/task_arena.h>
 
 #include "build/check_spheres.h"
 #include "build/check_surface.h"
 #include "build/check_tree.h"
 #include "mesh/mesh_solid.h"
+#include "packing/thread_arena.h"
 #include "query/asset_layout.h"
 
 namespace ist {
@@ -33,7 +33,7 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mes
 }  // namespace
 
 std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigned threads) {
-  tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : static_cast<int>(threads));
+  tbb::task_arena arena = thread_arena(threads);
   return arena.execute([&] { return check_all(asset.view().header(), mesh); });
 }
 

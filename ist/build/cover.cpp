@@ -2,7 +2,6 @@
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <chrono>
@@ -14,6 +13,7 @@
 #include <ist/error.h>
 
 #include "build/cube_root.h"
+#include "packing/thread_arena.h"
 
 namespace ist {
 namespace {
@@ -149,7 +149,7 @@ std::vector<float> cover_radii(const MeshSolid& solid, std::span<const Sphere> i
     now.elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!progress(now)) throw Error("cover radii: cancelled");
   };
-  tbb::task_arena arena(threads == 0 ? tbb::task_arena::automatic : static_cast<int>(threads));
+  tbb::task_arena arena = thread_arena(threads);
 
   const double mean_volume = solid.unit_volume() / static_cast<double>(inner.size());
   const double slack = kSlack * cube_root(3 * mean_volume / (4 * std::numbers::pi));

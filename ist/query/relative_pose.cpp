@@ -8,6 +8,9 @@
 namespace ist {
 namespace {
 
+// Beyond this many sizes of A nothing is told apart, and squares of squares stay finite below it.
+constexpr double kFarthest = 1e60;
+
 struct Frame {
   Eigen::Quaterniond rotation;
   Eigen::Vector3d translation;  ///< [u] of the object's origin
@@ -55,7 +58,8 @@ std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree&
   const Eigen::Vector3d between = fa->rotation.conjugate() * (fb->translation - fa->translation);
   const Eigen::Vector3d t = (between + (rotation * fb->offset - fa->offset)) / fa->unit;
   const double scale = fb->unit / fa->unit;
-  if (!t.allFinite() || !(scale > 0) || !std::isfinite(scale)) return std::nullopt;
+  if (!(t.norm() <= kFarthest) || !(scale <= kFarthest) || !(scale >= 1 / kFarthest))
+    return std::nullopt;
 
   RelativePose pose;
   pose.a_from_b = similarity(scale, rotation, t);

@@ -33,7 +33,7 @@ std::string describe_asset(const TreeView& tree) {
   line("spheres",
        fmt::format("{}, {:.3f} % of the volume (stopped by: {})", grouped(h.sphere_count),
                    100 * h.coverage, name_of(static_cast<StopReason>(h.stop_reason))));
-  line("greedy", fmt::format("radius / largest that would fit: {:.3f} worst, {:.3f} median",
+  line("greedy", fmt::format("radius at least {:.3f} of the largest that would fit, median {:.3f}",
                              h.kept_ratio_worst, h.kept_ratio_median));
   line("volume", fmt::format("{:.9g} ± {:.1g} u³", h.volume * cube, h.volume_error * cube));
   line("frame", fmt::format("centre ({:.9g}, {:.9g}, {:.9g}) u, scale 2^{}", h.centre[0],

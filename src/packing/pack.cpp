@@ -1,14 +1,11 @@
 #include <ist/error.h>
 #include <ist/packing.h>
-#include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/task_arena.h>
-
-#include <algorithm>
 
 #include "packing/banded_packer.h"
 #include "packing/field_surface.h"
 #include "packing/mesh_surface.h"
 #include "packing/packing_settings.h"
+#include "packing/thread_arena.h"
 
 namespace ist {
 
@@ -26,13 +23,7 @@ SpherePacking pack(const Solid& solid, const PackingSettings& settings,
   if (!(limits.volume > 0)) throw Error("packing: the solid's volume is not positive");
 
   SpherePacking result;
-  // More threads than TBB may run would only draw its warning.
-  const std::size_t allowed = oneapi::tbb::global_control::active_value(
-      oneapi::tbb::global_control::max_allowed_parallelism);
-  const std::size_t threads =
-      settings.threads == 0 ? allowed : std::min<std::size_t>(settings.threads, allowed);
-  oneapi::tbb::task_arena arena(static_cast<int>(threads));
-  arena.execute([&] {
+  thread_arena(settings.threads).execute([&] {
     if (mesh != nullptr) {
       const packing::MeshSurface surface(*mesh);
       result = packing::BandedPacker(surface, limits, settings, progress).run();

@@ -264,7 +264,7 @@ TEST(Query, RefusesPosesThatAreNone) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double inf = std::numeric_limits<double>::infinity();
   const PlacedTree good{a.view(), {}, 1.0};
-  std::vector<PlacedTree> bad(8, good);
+  std::vector<PlacedTree> bad(9, good);
   bad[0].pose.q[2] = nan;
   bad[1].pose.t[0] = nan;
   bad[2].pose.t[1] = inf;
@@ -273,6 +273,7 @@ TEST(Query, RefusesPosesThatAreNone) {
   bad[5].scale = -1;
   bad[6].scale = nan;
   bad[7].tree = TreeView();
+  bad[8].pose.t[2] = 1e200;
   for (const PlacedTree& wrong : bad) {
     for (const auto& answer :
          {query(good, wrong, {}, workspace), query(wrong, good, {}, workspace)}) {
@@ -284,9 +285,13 @@ TEST(Query, RefusesPosesThatAreNone) {
     }
   }
   PlacedTree far = good;
-  far.pose.t[0] = 1e200;
+  far.pose.t[0] = 1e50;
   EXPECT_EQ(penetration(good, far, {}, workspace).volume, 0);
-  EXPECT_GT(separation(good, far, {}, workspace).distance_min, 0.9e200);
+  const Separation gap = separation(good, far, {}, workspace);
+  EXPECT_GT(gap.distance_min, 0.999e50);
+  EXPECT_LE(gap.distance_min, 1e50);
+  EXPECT_GE(gap.distance_max, 1e50);
+  EXPECT_LT(gap.distance_max, 1.001e50);
 }
 
 }  // namespace
