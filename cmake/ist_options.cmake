@@ -5,7 +5,9 @@ function(ist_compile_options target)
     # The same bytes on any machine (DESIGN 3.3): nothing is fused or re-associated.
     -ffp-contract=off)
   if(IST_SANITIZE)
-    target_compile_options(${target} PRIVATE -fsanitize=${IST_SANITIZE} -fno-omit-frame-pointer)
+    # A finding ends the program, so that its test fails.
+    target_compile_options(${target} PRIVATE
+      -fsanitize=${IST_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${IST_SANITIZE})
   endif()
 endfunction()

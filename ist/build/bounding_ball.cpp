@@ -50,19 +50,19 @@ bool solve(double g[3][3], double a[3], double b[3], int n) {
 bool tangent_ball(const Support& support, Ball& out) {
   const Ball& first = support.balls[0];
   const int n = support.count - 1;
-  double p[3][3];
-  double g[3][3];
-  double a[3];
-  double b[3];
+  double p[3][3] = {};
+  double g[3][3] = {};
+  double a[3] = {};
+  double b[3] = {};
   for (int i = 0; i < n; ++i) {
-    const Ball& ball = support.balls[static_cast<std::size_t>(i + 1)];
+    const Ball& ball = support.balls[static_cast<std::size_t>(i) + 1];
     p[i][0] = ball.x - first.x;
     p[i][1] = ball.y - first.y;
     p[i][2] = ball.z - first.z;
   }
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) g[i][j] = p[i][0] * p[j][0] + p[i][1] * p[j][1] + p[i][2] * p[j][2];
-    const double r = support.balls[static_cast<std::size_t>(i + 1)].r;
+    const double r = support.balls[static_cast<std::size_t>(i) + 1].r;
     a[i] = (g[i][i] + (first.r - r) * (first.r + r)) / 2;
     b[i] = r - first.r;
   }

@@ -24,10 +24,10 @@ inline bool shared_required() {
 }  // namespace ist::testing
 
 /// Skips the test, visibly, where the shared file is missing; fails it under IST_REQUIRE_SHARED=1.
-#define IST_NEEDS_SHARED(relative)                                                        \
-  do {                                                                                    \
-    if (!std::filesystem::exists(ist::testing::shared_path(relative))) {                  \
-      if (ist::testing::shared_required()) FAIL() << "missing shared data: " << relative; \
-      GTEST_SKIP() << "no shared data (IST_SHARED): " << relative;                        \
-    }                                                                                     \
+#define IST_NEEDS_SHARED(relative)                                                          \
+  do {                                                                                      \
+    if (!std::filesystem::exists(ist::testing::shared_path(relative))) {                    \
+      if (ist::testing::shared_required()) FAIL() << "missing shared data: " << (relative); \
+      GTEST_SKIP() << "no shared data (IST_SHARED): " << (relative);                        \
+    }                                                                                       \
   } while (false)
