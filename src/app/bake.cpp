@@ -116,7 +116,7 @@ void add_bake(CLI::App& app) {
       ->add_option("--epsilon", packing.epsilon,
                    "Every sphere is at least 1 − E times the largest that would fit; 0 = the "
                    "library's own schedule")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(is_slack)
       ->capture_default_str();
   command->add_option("--grid", options->grid, "How space is searched")
       ->check(CLI::IsMember({"banded", "uniform", "explicit", "implicit", "hybrid"}))

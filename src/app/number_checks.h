@@ -29,6 +29,14 @@ inline std::string is_not_negative(const std::string& text) {
              : "'" + text + "' is not a finite number, 0 or more";
 }
 
+/// A number in [0, 1).
+inline std::string is_slack(const std::string& text) {
+  double value = 0;
+  return CLI::detail::lexical_cast(text, value) && value >= 0 && value < 1
+             ? ""
+             : "'" + text + "' is not a number from 0 to below 1";
+}
+
 /// A finite number > 0.
 inline std::string is_positive(const std::string& text) {
   double value = 0;

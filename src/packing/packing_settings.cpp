@@ -31,8 +31,8 @@ void check_settings(const PackingSettings& s) {
   require(s.grid == GridMode::banded, "grid", static_cast<double>(s.grid), "banded (0)");
   if (s.max_spheres == 0 && s.target_coverage >= 1 && s.min_radius <= 0 && s.time_limit <= 0)
     throw Error(
-        "packing: no limit is set; give max_spheres, target_coverage below 1, min_radius or "
-        "time_limit");
+        "packing: no limit is set; give a sphere count, a coverage below 1, a smallest radius or a "
+        "time");
 }
 
 }  // namespace ist::packing
