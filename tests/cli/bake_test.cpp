@@ -94,7 +94,6 @@ TEST_F(BakeCommand, ErrorsNameTheFileAndLeaveNothingBehind) {
   expect_error({"bake", "cube.obj", "-o", "/dev/full", "--spheres", "5", "--quiet"}, "/dev/full");
   expect_error({"bake", "cube.obj", "-o", "new.ist", "--grid", "hybrid"}, "--grid banded");
   expect_error({"bake", "cube.obj", "-o", "new.ist", "--device", "cuda"}, "--device cpu");
-  expect_error({"bake", "cube.obj", "-o", "new.ist", "--epsilon", "nan"}, "epsilon");
   expect_error({"bake", "cube.ist", "-o", "new.ist"}, "cube.ist");
   expect_error({"bake", "cube.obj", "-o", "new.ist", "--min-radius", "5"}, "cube.obj");
 }

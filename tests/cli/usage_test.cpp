@@ -39,8 +39,9 @@ TEST_F(Usage, WrongUsageExitsWith2AndSaysWhy) {
                      "--spheres: 'many' is not a whole number");
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--spheres", "-5"},
                      "--spheres: '-5' is not a whole number");
-  expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--epsilon", "1"},
-                     "--epsilon: '1' is not a number from 0 to below 1");
+  for (const std::string epsilon : {"1", "nan"})
+    expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--epsilon", epsilon},
+                       "--epsilon: '" + epsilon + "' is not a number from 0 to below 1");
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--coverage", "1.5"}, "coverage");
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--time", "-1"},
                      "--time: '-1' is not a finite number");
