@@ -12,6 +12,7 @@ if(NOT IST_CUDA STREQUAL "OFF")
     if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)  # CMake 3.25 does not know how nvcc calls C++20
       set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
     endif()
+    find_package(CUDAToolkit REQUIRED)
     set(IST_HAVE_CUDA TRUE)
   elseif(IST_CUDA STREQUAL "ON")
     message(FATAL_ERROR "IST_CUDA=ON, but there is no nvcc: install the CUDA Toolkit 13, put nvcc "
@@ -24,5 +25,7 @@ endif()
 # The same bytes as on the CPU: nothing is fused (DESIGN 3.3).
 function(ist_cuda_options target)
   target_compile_options(${target} PRIVATE
-    $<$<COMPILE_LANGUAGE:CUDA>:-fmad=false --Werror=all-warnings -Xcompiler=-Wall,-Wextra>)
+    $<$<COMPILE_LANGUAGE:CUDA>:-fmad=false --Werror=all-warnings
+      -Xcompiler=-Wall,-Wextra,-ffp-contract=off>
+    $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wconversion -Werror -ffp-contract=off>)
 endfunction()

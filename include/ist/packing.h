@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <ist/gpu.h>
 #include <ist/progress.h>
 #include <ist/solid.h>
 
@@ -11,6 +12,13 @@ namespace ist {
 
 /// How the space is searched for the next spheres (DESIGN 4.1).
 enum class GridMode : std::uint32_t { banded = 0 };
+
+/// Where packing and baking run. The result is the same, bit for bit.
+enum class Device : std::uint32_t {
+  automatic,  ///< the GPU if there is one, else the CPU
+  cpu,
+  cuda,  ///< an Error where gpu_available() is false
+};
 
 /// What a packing may cost and how far it goes. The first limit met stops it.
 struct PackingSettings {
@@ -23,8 +31,10 @@ struct PackingSettings {
   /// round began. 0 = automatic: the library's schedule, fastest at equal coverage.
   double epsilon = 0.0;
   GridMode grid = GridMode::banded;
-  std::uint64_t seed = 0;  ///< tie-breaks only; any value packs equally well
-  unsigned threads = 0;    ///< 0 = all cores; never changes the result
+  std::uint64_t seed = 0;             ///< tie-breaks only; any value packs equally well
+  unsigned threads = 0;               ///< 0 = all cores; never changes the result
+  Device device = Device::automatic;  ///< a Solid that is not a mesh is always packed on the CPU
+  GpuSettings gpu;                    ///< where `device` is a GPU
 };
 
 /// A sphere in the unit frame of its solid (half-extent of the solid in (½, 1]).

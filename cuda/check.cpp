@@ -1,0 +1,38 @@
+#include "check.h"
+
+#include <ist/error.h>
+
+#include <string>
+
+namespace ist::gpu {
+namespace {
+
+const char* way_out(cudaError_t status) {
+  switch (status) {
+    case cudaErrorMemoryAllocation:
+      return "free device memory, ask for fewer spheres, or bake with --device cpu";
+    case cudaErrorNoDevice:
+    case cudaErrorInvalidDevice:
+      return "there is no such GPU here: bake with --device cpu";
+    case cudaErrorInsufficientDriver:
+      return "the driver is older than CUDA 13: update it, or bake with --device cpu";
+    case cudaErrorNoKernelImageForDevice:
+    case cudaErrorUnsupportedPtxVersion:
+      return "this build has no code for this GPU: build with its CMAKE_CUDA_ARCHITECTURES, or "
+             "bake "
+             "with --device cpu";
+    default:
+      return "bake with --device cpu, and report this";
+  }
+}
+
+}  // namespace
+
+void check(cudaError_t status, const char* doing) {
+  if (status == cudaSuccess) return;
+  cudaGetLastError();  // an error that is not sticky must not be met again by the next call
+  throw Error(std::string("GPU: ") + doing + ": " + cudaGetErrorString(status) + " (" +
+              cudaGetErrorName(status) + "): " + way_out(status));
+}
+
+}  // namespace ist::gpu

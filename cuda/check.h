@@ -1,0 +1,13 @@
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+namespace ist::gpu {
+
+/// Throws Error unless `status` is success: what was being done, what CUDA says, and the way out.
+void check(cudaError_t status, const char* doing);
+
+/// Throws Error if the last kernel could not be launched.
+inline void check_launch(const char* kernel) { check(cudaGetLastError(), kernel); }
+
+}  // namespace ist::gpu

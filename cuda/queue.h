@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cuda_runtime_api.h>
+#include <ist/gpu.h>
+
+#include <cstddef>
+#include <memory>
+
+namespace ist::gpu {
+
+/// The stream that a bake's device work runs on, in order, and where its memory comes from. One a
+/// bake; not shared by threads. The device it was made for must be current (DeviceGuard) wherever
+/// it is used.
+class Queue {
+ public:
+  /// Throws Error if the device cannot be used.
+  explicit Queue(const GpuSettings& settings);
+  ~Queue();
+  Queue(const Queue&) = delete;
+  Queue& operator=(const Queue&) = delete;
+
+  cudaStream_t stream() const { return stream_; }
+  int multiprocessors() const { return multiprocessors_; }
+
+  /// Throws Error if there is no memory left. 0 bytes: nullptr.
+  void* allocate(std::size_t bytes);
+  void deallocate(void* memory, std::size_t bytes) noexcept;
+
+  std::size_t bytes_in_use() const { return in_use_; }
+  std::size_t peak_bytes() const { return peak_; }  ///< largest bytes_in_use() so far
+  void reset_peak() { peak_ = in_use_; }
+
+  /// Waits for all work of the stream; throws Error if any of it failed.
+  void wait();
+
+ private:
+  class DeviceGuard {  // makes the device current, and the previous one again at the end
+   public:
+    explicit DeviceGuard(int device);
+    ~DeviceGuard();
+
+   private:
+    int previous_ = 0;
+  };
+
+  DeviceGuard guard_;
+  std::unique_ptr<DeviceMemoryResource> own_memory_;
+  DeviceMemoryResource* memory_ = nullptr;
+  cudaStream_t stream_ = nullptr;
+  bool own_stream_ = false;
+  int multiprocessors_ = 0;
+  std::size_t in_use_ = 0, peak_ = 0;
+};
+
+}  // namespace ist::gpu

@@ -1,0 +1,52 @@
+#pragma once
+
+// Device code only.
+
+#include <cstdint>
+
+#include "mesh/team.h"
+
+namespace ist::gpu {
+
+/// The 32 threads of a warp (mesh/team.h). All of them must be converged at every call.
+struct WarpTeam {
+  static constexpr int kWidth = 32;
+  static constexpr unsigned kAll = 0xFFFFFFFFu;
+
+  __device__ int lane() const { return static_cast<int>(threadIdx.x & 31u); }
+  __device__ void sync() const { __syncwarp(); }
+
+  __device__ std::uint32_t min(std::uint32_t value) const { return __reduce_min_sync(kAll, value); }
+  __device__ std::uint32_t max(std::uint32_t value) const { return __reduce_max_sync(kAll, value); }
+  __device__ int min(int value) const { return __reduce_min_sync(kAll, value); }
+  __device__ int max(int value) const { return __reduce_max_sync(kAll, value); }
+  __device__ float min(float value) const { return from_ordered_bits(min(ordered_bits(value))); }
+  __device__ float max(float value) const { return from_ordered_bits(max(ordered_bits(value))); }
+  __device__ std::uint64_t min(std::uint64_t value) const {
+    // The high words first; the low words of those that hold the least.
+    const auto high = static_cast<std::uint32_t>(value >> 32);
+    const auto low = static_cast<std::uint32_t>(value);
+    const std::uint32_t least = min(high);
+    return std::uint64_t{least} << 32 | min(high == least ? low : 0xFFFFFFFFu);
+  }
+  __device__ std::uint64_t max(std::uint64_t value) const { return ~min(~value); }
+  __device__ double min(double value) const { return from_ordered_bits(min(ordered_bits(value))); }
+  __device__ double max(double value) const { return from_ordered_bits(max(ordered_bits(value))); }
+
+  __device__ int sum(int value) const { return __reduce_add_sync(kAll, value); }
+  __device__ bool any(bool flag) const { return __any_sync(kAll, flag) != 0; }
+  __device__ bool all(bool flag) const { return __all_sync(kAll, flag) != 0; }
+
+  __device__ int exclusive_count(bool flag, int& total) const {
+    const unsigned raised = __ballot_sync(kAll, flag);
+    total = __popc(raised);
+    return __popc(raised & ((1u << lane()) - 1u));
+  }
+
+  template <class T>
+  __device__ T broadcast(T value, int from) const {
+    return __shfl_sync(kAll, value, from);
+  }
+};
+
+}  // namespace ist::gpu
