@@ -12,7 +12,10 @@ const char* obstacle(int device) {
   int count = 0;
   const cudaError_t status = cudaGetDeviceCount(&count);
   cudaGetLastError();
-  if (status == cudaErrorInsufficientDriver) return "the GPU driver is older than CUDA 13";
+  int driver = 0;
+  if (status == cudaErrorInsufficientDriver && cudaDriverGetVersion(&driver) == cudaSuccess &&
+      driver != 0)
+    return "the GPU driver is older than CUDA 13";
   if (status != cudaSuccess || count == 0) return "there is no GPU here, or no driver for it";
   if (device < 0 || device >= count) return "there is no GPU of that index";
   cudaDeviceProp properties{};

@@ -24,10 +24,20 @@ struct BakeOptions {
   bool repair = false, json = false, quiet = false;
 };
 
-void require_cpu(const BakeOptions& options) {
-  if (options.device == "cuda")
-    throw Error("--device cuda: this build has no GPU backend; use --device cpu or auto");
-  if (options.device == "auto") spdlog::info("baking on the CPU: this build has no GPU backend");
+Device device_of(const std::string& name) {
+  if (name == "cpu") return Device::cpu;
+  return name == "cuda" ? Device::cuda : Device::automatic;
+}
+
+/// Says where the bake runs, if that was left open. Throws Error if it cannot run there.
+void announce_device(Device device) {
+  std::string why;
+  if (device == Device::cuda)
+    gpu_info();
+  else if (device == Device::automatic && gpu_available(0, &why))
+    spdlog::info("baking on the GPU: {}", gpu_info().name);
+  else if (device == Device::automatic)
+    spdlog::info("baking on the CPU: {}", why);
 }
 
 GridMode grid_mode(const std::string& name) {
@@ -67,7 +77,8 @@ void run_bake(const BakeOptions& options) {
   PackingSettings settings = options.packing;
   settings.grid = grid_mode(options.grid);
   require_another_file(options);
-  require_cpu(options);
+  settings.device = device_of(options.device);
+  announce_device(settings.device);
 
   const auto start = std::chrono::steady_clock::now();
   const ClosedMesh mesh =
@@ -121,7 +132,9 @@ void add_bake(CLI::App& app) {
   command->add_option("--grid", options->grid, "How space is searched")
       ->check(CLI::IsMember({"banded", "uniform", "explicit", "implicit", "hybrid"}))
       ->capture_default_str();
-  command->add_option("--device", options->device, "Where packing runs")
+  command
+      ->add_option("--device", options->device,
+                   "Where the bake runs; auto: on the GPU if there is one")
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
       ->capture_default_str();
   command->add_option("--threads", packing.threads, "0 = all cores; never changes the result")

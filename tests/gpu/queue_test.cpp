@@ -14,7 +14,7 @@ namespace {
 using gpu::DeviceArray;
 using gpu::Queue;
 
-class QueueTest : public test::GpuTest {};
+class QueueTest : public testing::GpuTest {};
 
 /// Gives out no more than so many bytes.
 class ScarceMemory final : public DeviceMemoryResource {

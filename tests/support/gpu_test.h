@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace ist::test {
+namespace ist::testing {
 
 /// A test that needs a GPU: skipped, with the reason, where there is none.
 class GpuTest : public ::testing::Test {
@@ -16,4 +16,4 @@ class GpuTest : public ::testing::Test {
   }
 };
 
-}  // namespace ist::test
+}  // namespace ist::testing
