@@ -1,5 +1,7 @@
 #pragma once
 
+#include <ist/gpu.h>
+
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -32,10 +34,15 @@ class Report {
       }
     }
     json_["benchmark"] = name;
-    json_["commit"] = first_line("git -C '" IST_SOURCE_DIR "' describe --always --dirty");
+    // A machine that has the programs but no repository is told the commit.
+    const char* const commit = std::getenv("IST_COMMIT");
+    json_["commit"] = commit != nullptr
+                          ? commit
+                          : first_line("git -C '" IST_SOURCE_DIR "' describe --always --dirty");
     json_["date"] = first_line("date -u +%F");
     json_["cpu"] = first_line("sed -n 's/^model name.*: //p' /proc/cpuinfo");
     json_["cores"] = std::thread::hardware_concurrency();
+    if (gpu_available()) json_["gpu"] = gpu_info().name;
     json_["compiler"] = compiler();
     json_["quick"] = quick_;
     json_["tables"] = Json::object();

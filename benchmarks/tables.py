@@ -27,7 +27,8 @@ def section(report):
     quick = ", quick run" if report["quick"] else ""
     parts = [f"## {report['benchmark']}\n",
              f"Commit {report['commit']}, {report['date']}{quick}; {report['cpu']}, "
-             f"{report['cores']} cores, {report['compiler']}.\n"]
+             f"{report['cores']} cores, {report['compiler']}"
+             f"{', ' + report['gpu'] if 'gpu' in report else ''}.\n"]
     parts += [f"- {remark}" for remark in report["remarks"]]
     for title, rows in report["tables"].items():
         parts.append(f"\n### {title}\n\n{markdown_table(rows)}")
