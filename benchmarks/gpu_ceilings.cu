@@ -168,11 +168,11 @@ class Ceilings {
     for (const std::size_t bytes :
          {std::size_t{16} << 10, std::size_t{8} << 20, std::size_t{1} << 30}) {
       const std::size_t count = bytes / sizeof(unsigned);
-      // A cycle of a stride that leaves every line for another one.
+      // One cycle through all of them in no order that a prefetcher sees: a full-period linear
+      // congruential generator modulo a power of two.
       std::vector<unsigned> next(count);
-      const std::size_t stride = count / 2 + 17 * 32 + 1;
       for (std::size_t i = 0; i < count; ++i)
-        next[i] = static_cast<unsigned>((i + (stride | 1)) % count);
+        next[i] = (static_cast<unsigned>(i) * 1664525u + 1013904223u) & unsigned(count - 1);
       unsigned* device = nullptr;
       check(cudaMalloc(&device, bytes), "allocating");
       check(cudaMemcpy(device, next.data(), bytes, cudaMemcpyHostToDevice), "copying");
