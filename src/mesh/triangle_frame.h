@@ -7,6 +7,10 @@
 
 namespace ist {
 
+/// Spacing of the numbers above 1. (Device code may not call numeric_limits' functions.)
+template <class Real>
+constexpr Real kSpacing = std::numeric_limits<Real>::epsilon();
+
 /// A triangle in its own orthonormal frame: origin at one end of its longest edge, u along that
 /// edge, v towards the third corner, n = u × v. In it the corners are (0, 0), (length, 0) and
 /// (apex, height), the angles at the first two are acute, and a distance to the triangle is a
@@ -33,22 +37,21 @@ IST_HD inline Real dot3(const Real a[3], const Real b[3]) {
 
 template <class Real>
 IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3], const Real c[3]) {
-  const Real* corner[3] = {a, b, c};
-  int longest = 0;
-  Real longest2 = -1;
-  for (int i = 0; i < 3; ++i) {
-    const Real* p = corner[i];
-    const Real* q = corner[(i + 1) % 3];
-    const Real e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-    const Real e2 = dot3(e, e);
-    if (e2 > longest2) {
-      longest2 = e2;
-      longest = i;
-    }
+  // Choices instead of indices: what is indexed at run time leaves a GPU's registers.
+  const auto edge2 = [](const Real from[3], const Real to[3]) {
+    const Real e[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
+    return dot3(e, e);
+  };
+  const Real ab2 = edge2(a, b), bc2 = edge2(b, c), ca2 = edge2(c, a);
+  const bool second = bc2 > ab2;
+  const bool third = ca2 > (second ? bc2 : ab2);
+  const Real longest2 = third ? ca2 : second ? bc2 : ab2;
+  Real p[3], q[3], r[3];
+  for (int k = 0; k < 3; ++k) {
+    p[k] = third ? c[k] : second ? b[k] : a[k];
+    q[k] = third ? a[k] : second ? c[k] : b[k];
+    r[k] = third ? b[k] : second ? a[k] : c[k];
   }
-  const Real* p = corner[longest];
-  const Real* q = corner[(longest + 1) % 3];
-  const Real* r = corner[(longest + 2) % 3];
   TriangleFrame<Real> f = {{p[0], p[1], p[2]}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0, 0, 0};
   f.length = std::sqrt(longest2);
   if (!(f.length > 0)) return f;  // a single point: any frame will do
@@ -61,17 +64,20 @@ IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3],
     along = dot3(w, f.u);
   }
   f.height = std::sqrt(dot3(w, w));
-  if (f.height > 4 * std::numeric_limits<Real>::epsilon() * f.length) {
+  if (f.height > 4 * kSpacing<Real> * f.length) {
     for (int k = 0; k < 3; ++k) f.v[k] = w[k] / f.height;
   } else {  // a segment but for rounding: any direction across it will do
     f.height = 0;
     const Real x = std::abs(f.u[0]), y = std::abs(f.u[1]), z = std::abs(f.u[2]);
     const int axis = x <= y && x <= z ? 0 : (y <= z ? 1 : 2);
-    const int j = (axis + 1) % 3, k = (axis + 2) % 3;
-    const Real across = std::sqrt(f.u[j] * f.u[j] + f.u[k] * f.u[k]);
-    f.v[axis] = 0;
-    f.v[j] = -f.u[k] / across;
-    f.v[k] = f.u[j] / across;
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, k = (i + 2) % 3;
+      if (i != axis) continue;
+      const Real across = std::sqrt(f.u[j] * f.u[j] + f.u[k] * f.u[k]);
+      f.v[i] = 0;
+      f.v[j] = -f.u[k] / across;
+      f.v[k] = f.u[j] / across;
+    }
   }
   for (int k = 0; k < 3; ++k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;

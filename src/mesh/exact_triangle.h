@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+
+#include "mesh/closest_point.h"
+#include "mesh/host_device.h"
+#include "mesh/triangle_frame.h"
+
+namespace ist {
+
+/// The exact corners of a triangle, unit frame.
+struct Corners {
+  const double* p[3];
+};
+
+/// Closest point of a triangle by the double formula; returns the squared distance.
+IST_HD inline double exact_closest_in(const Corners& corners, const double p[3], double point[3]) {
+  const TriangleFrame<double> frame = make_triangle_frame(corners.p[0], corners.p[1], corners.p[2]);
+  const FramePoint<double> q = closest_in_frame(frame, p);
+  for (int k = 0; k < 3; ++k) point[k] = frame.origin[k] + (q.x * frame.u[k] + q.y * frame.v[k]);
+  return q.distance2;
+}
+
+/// Rules triangles out by their float distances from a double point.
+struct ExactReach {
+  float p[3];   ///< the point, rounded
+  float error;  ///< of a float distance from it
+
+  IST_HD explicit ExactReach(const double exact[3]) {
+    float reach = 0;
+    for (int k = 0; k < 3; ++k) {
+      p[k] = static_cast<float>(exact[k]);
+      const auto a = static_cast<float>(exact[k] < 0 ? -exact[k] : exact[k]);
+      reach = a > reach ? a : reach;
+    }
+    error = float_distance_error(reach * (1 + 0x1p-20f));
+  }
+
+  /// A triangle may lie within `distance2` only if its float distance² is at most this.
+  IST_HD float reach2(double distance2) const {
+    // A float at or above distance2; large ones all count as infinitely far.
+    const float above =
+        distance2 < 1e30 ? static_cast<float>(distance2) * (1 + 0x1p-20f) + 1e-37f : 1e35f;
+    return prune_distance2(above, error);
+  }
+};
+
+}  // namespace ist

@@ -1,0 +1,254 @@
+#pragma once
+
+#include <cmath>
+#include <cstring>
+
+#include "mesh/closest_point.h"
+#include "mesh/exact_triangle.h"
+#include "mesh/wide_traversal.h"
+
+// Distance queries of a WideTree, by a team: one thread or a warp (mesh/team.h). The answers are
+// those of closest_point.h and exact_closest_point.h, bit for bit. All lanes ask the same and get
+// the same.
+
+namespace ist {
+
+/// Closest triangle by the float formula.
+struct WideNearest {
+  float distance2 = 0;                   ///< unit frame, squared
+  std::uint32_t triangle = kNoTriangle;  ///< index in the mesh, the smallest among equals
+  std::uint32_t slot = kNoSlot;          ///< where the tree keeps it
+};
+
+/// Closest triangle by the double formula.
+struct WideExact {
+  double distance = 0;                   ///< unit frame
+  std::uint32_t triangle = kNoTriangle;  ///< index in the mesh, the smallest among equals
+  std::uint32_t slot = kNoSlot;          ///< where the tree keeps it
+};
+
+IST_HD inline Corners corners_in(const WideTree& tree, const WideBlock& block, int lane) {
+  const auto at = [&](int i) { return tree.vertices + 3 * std::size_t{block.corner[i][lane]}; };
+  return {{at(0), at(1), at(2)}};
+}
+
+/// The exact corners of the triangle in a slot.
+IST_HD inline Corners corners_in(const WideTree& tree, std::uint32_t slot) {
+  return corners_in(tree, tree.blocks[slot / kWideWidth], static_cast<int>(slot % kWideWidth));
+}
+
+/// The part of a distance query that orders and prunes boxes.
+struct WideBall {
+  const float* p;
+  float error;
+  std::uint32_t last = 0;  ///< see traverse()
+
+  IST_HD WideBall(const float point[3], float rounding, float radius2) : p(point), error(rounding) {
+    shrink(radius2);
+  }
+
+  IST_HD void shrink(float radius2) {
+    constexpr std::uint32_t kInfiniteBits = 0x7F800000u;
+    const std::uint32_t bits = bits_of(prune_distance2(radius2, error));
+    last = bits < kInfiniteBits ? bits + 1 : kInfiniteBits;
+  }
+  IST_HD std::uint32_t limit() const { return last; }
+  IST_HD std::uint32_t key(const WideNode& node, int child) const {
+    float sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      const float below = node.lower[k][child] - p[k];
+      const float above = p[k] - node.upper[k][child];
+      const float outside = below > above ? below : above;
+      const float gap = outside > 0 ? outside : 0;
+      sum += gap * gap;
+    }
+    return bits_of(sum);
+  }
+
+  /// Of a number ≥ 0: they order as the numbers do.
+  IST_HD static std::uint32_t bits_of(float x) {
+    std::uint32_t bits;
+    std::memcpy(&bits, &x, sizeof bits);
+    return bits;
+  }
+};
+
+/// Error of float distances from p, see float_distance_error().
+IST_HD inline float distance_error_at(const float p[3]) {
+  float reach = 0;
+  for (int k = 0; k < 3; ++k) {
+    const float a = p[k] < 0 ? -p[k] : p[k];
+    reach = a > reach ? a : reach;
+  }
+  return float_distance_error(reach);
+}
+
+template <class Team>
+struct WideNearestQuery : WideBall {
+  const Team& team;
+  const WideTree& tree;
+  float radius2;
+  WideNearest best;  ///< of this lane
+
+  IST_HD WideNearestQuery(const Team& members, const WideTree& of, const float point[3],
+                          float rounding, float limit2)
+      : WideBall(point, rounding, limit2), team(members), tree(of), radius2(limit2) {
+    best.distance2 = limit2;
+  }
+
+  IST_HD void visit(std::uint32_t index) {
+    const WideBlock& block = tree.blocks[index];
+    for (int lane = team.lane(); lane < kWideWidth; lane += Team::kWidth) {
+      const std::uint32_t triangle = block.triangle[lane];
+      const float distance2 = closest_in_frame(frame_in(block, lane), p).distance2;
+      if (triangle != kNoTriangle &&
+          (distance2 < best.distance2 || (distance2 == best.distance2 && triangle < best.triangle)))
+        best = {distance2, triangle, index * kWideWidth + static_cast<std::uint32_t>(lane)};
+    }
+    const float least = team.min(best.distance2);
+    if (least < radius2) {
+      radius2 = least;
+      shrink(least);
+    }
+  }
+
+  IST_HD WideNearest result() const {
+    const float least = team.min(best.distance2);
+    const std::uint32_t triangle = team.min(best.distance2 == least ? best.triangle : kNoTriangle);
+    return {least, triangle, team.min(best.triangle == triangle ? best.slot : kNoSlot)};
+  }
+};
+
+/// The closest triangle of the mesh, as nearest_triangle(). `limit2`: squared distance beyond which
+/// nothing is of interest; where no triangle is that close, distance2 = limit2 and triangle =
+/// kNoTriangle.
+template <class Team>
+IST_HD WideNearest nearest(const Team& team, const WideTree& tree, const float p[3],
+                           float limit2 = 1e30f) {
+  WideNearestQuery<Team> query(team, tree, p, distance_error_at(p), limit2);
+  traverse(team, tree, query);
+  return query.result();
+}
+
+template <class Team>
+struct WideWithinQuery : WideBall {
+  const Team& team;
+  const WideTree& tree;
+  float radius2;
+  std::uint32_t* slots;
+  int capacity;
+  int count = 0;
+
+  IST_HD WideWithinQuery(const Team& members, const WideTree& of, const float point[3],
+                         float within2, std::uint32_t* out, int room)
+      : WideBall(point, distance_error_at(point), within2),
+        team(members),
+        tree(of),
+        radius2(within2),
+        slots(out),
+        capacity(room) {}
+
+  IST_HD void visit(std::uint32_t index) {
+    const WideBlock& block = tree.blocks[index];
+    for (int lane = team.lane(); lane < kWideWidth; lane += Team::kWidth) {
+      const float distance2 = closest_in_frame(frame_in(block, lane), p).distance2;
+      const bool near = block.triangle[lane] != kNoTriangle && distance2 <= radius2;
+      int found = 0;
+      const int place = count + team.exclusive_count(near, found);
+      if (near && place < capacity)
+        slots[place] = index * kWideWidth + static_cast<std::uint32_t>(lane);
+      count += found;
+    }
+    if (count > capacity) last = 0;
+  }
+};
+
+/// All triangles whose float distance² from p is at most radius2: writes their slots, in no
+/// particular order, and returns how many there are. More than `capacity`: too many, and what is
+/// written means nothing. Ends with a sync of the team.
+template <class Team>
+IST_HD int triangles_within(const Team& team, const WideTree& tree, const float p[3], float radius2,
+                            std::uint32_t* slots, int capacity) {
+  WideWithinQuery<Team> query(team, tree, p, radius2, slots, capacity);
+  traverse(team, tree, query);
+  team.sync();
+  return query.count;
+}
+
+template <class Team>
+struct WideExactQuery : WideBall {
+  const Team& team;
+  const WideTree& tree;
+  const double* exact;
+  const ExactReach& reach;
+  float radius2 = 0;
+  double best2;  ///< of this lane, like the two below
+  std::uint32_t triangle = kNoTriangle, slot = kNoSlot;
+
+  IST_HD WideExactQuery(const Team& members, const WideTree& of, const double point[3],
+                        const ExactReach& rounded, double limit2)
+      : WideBall(rounded.p, rounded.error, 0),
+        team(members),
+        tree(of),
+        exact(point),
+        reach(rounded),
+        best2(limit2) {
+    narrow(limit2);
+  }
+
+  IST_HD void narrow(double distance2) {
+    radius2 = reach.reach2(distance2);
+    shrink(radius2);
+  }
+
+  /// Takes a triangle's exact distance into account.
+  IST_HD void look_at(const WideBlock& block, std::uint32_t at) {
+    const int lane = static_cast<int>(at % kWideWidth);
+    double point[3];
+    const double distance2 = exact_closest_in(corners_in(tree, block, lane), exact, point);
+    const std::uint32_t candidate = block.triangle[lane];
+    if (distance2 < best2 ||
+        (distance2 == best2 && candidate < triangle && triangle != kNoTriangle)) {
+      best2 = distance2;
+      triangle = candidate;
+      slot = at;
+    }
+  }
+
+  IST_HD void visit(std::uint32_t index) {
+    const WideBlock& block = tree.blocks[index];
+    bool looked = false;
+    for (int lane = team.lane(); lane < kWideWidth; lane += Team::kWidth) {
+      if (block.triangle[lane] == kNoTriangle ||
+          !(closest_in_frame(frame_in(block, lane), p).distance2 <= radius2))
+        continue;
+      look_at(block, index * kWideWidth + static_cast<std::uint32_t>(lane));
+      looked = true;
+    }
+    if (team.any(looked)) narrow(team.min(best2));
+  }
+};
+
+/// Closest triangle by the double formula over every triangle, as exact_closest_point(): where
+/// nothing is closer than `limit`, distance = limit and triangle = kNoTriangle.
+template <class Team>
+IST_HD WideExact exact_nearest(const Team& team, const WideTree& tree, const double p[3],
+                               double limit) {
+  const ExactReach reach(p);
+  WideExactQuery<Team> query(team, tree, p, reach, limit * limit);
+  // The float answer first: then few triangles are left to look at in double.
+  const float rounded[3] = {reach.p[0], reach.p[1], reach.p[2]};
+  WideNearestQuery<Team> coarse(team, tree, rounded, reach.error, query.radius2);
+  traverse(team, tree, coarse);
+  const WideNearest first = coarse.result();
+  if (first.triangle == kNoTriangle) return {limit, kNoTriangle, kNoSlot};
+  query.look_at(tree.blocks[first.slot / kWideWidth], first.slot);
+  query.narrow(query.best2);
+  traverse(team, tree, query);
+  const double least = team.min(query.best2);
+  const std::uint32_t triangle = team.min(query.best2 == least ? query.triangle : kNoTriangle);
+  if (triangle == kNoTriangle) return {limit, kNoTriangle, kNoSlot};
+  return {std::sqrt(least), triangle, team.min(query.triangle == triangle ? query.slot : kNoSlot)};
+}
+
+}  // namespace ist
