@@ -1,0 +1,142 @@
+#include "device_mesh.h"
+
+#include <span>
+
+#include "mesh/wide_build.h"
+#include "radix_sort.h"
+#include "warp_team.h"
+
+namespace ist::gpu {
+namespace {
+
+constexpr unsigned kThreads = 128;
+constexpr unsigned kWarps = kThreads / 32;
+
+unsigned blocks_for(std::size_t items, unsigned each) {
+  return static_cast<unsigned>((items + each - 1) / each);
+}
+
+struct Placement {
+  double centre[3];
+  double scale;
+};
+
+/// UnitFrame::to_unit.
+__global__ void place_in_unit_frame(double* coordinates, std::size_t count, Placement placement) {
+  const std::size_t i = std::size_t{blockIdx.x} * kThreads + threadIdx.x;
+  if (i >= count) return;
+  const unsigned axis = static_cast<unsigned>(i % 3);
+  const double centre = axis == 0   ? placement.centre[0]
+                        : axis == 1 ? placement.centre[1]
+                                    : placement.centre[2];
+  coordinates[i] = (coordinates[i] - centre) / placement.scale;
+}
+
+__device__ Corners corners_of(const double* vertices, const std::uint32_t* t) {
+  return {{vertices + 3 * std::size_t{t[0]}, vertices + 3 * std::size_t{t[1]},
+           vertices + 3 * std::size_t{t[2]}}};
+}
+
+__global__ void place_on_curve(const double* vertices, const std::uint32_t* triangles,
+                               std::uint32_t count, std::uint64_t* keys, std::uint32_t* order) {
+  const std::uint32_t t = blockIdx.x * kThreads + threadIdx.x;
+  if (t >= count) return;
+  keys[t] = curve_place(corners_of(vertices, triangles + 3 * std::size_t{t}));
+  order[t] = t;
+}
+
+/// Writes what its lanes' boxes hold together as the box of a node's child; `place` counts nodes
+/// and blocks alike and is not the root's.
+__device__ void write_joint_box(WideBox box, WideNode* nodes, std::uint32_t place) {
+  const WarpTeam team;
+  for (int k = 0; k < 3; ++k) {
+    box.lower[k] = team.min(box.lower[k]);
+    box.upper[k] = team.max(box.upper[k]);
+  }
+  if (team.lane() != 0) return;
+  box.write_to(nodes[(place - 1) / kWideWidth], static_cast<int>((place - 1) % kWideWidth));
+}
+
+/// A warp a block of triangles; blocks that are not there leave empty boxes in the last node.
+__global__ void fill_blocks(const double* vertices, const std::uint32_t* triangles,
+                            const std::uint32_t* order, std::uint32_t count, WideBlock* blocks,
+                            std::uint32_t block_count, WideNode* nodes, std::uint32_t first_leaf) {
+  const std::uint32_t index = blockIdx.x * kWarps + threadIdx.x / 32;
+  const int lane = static_cast<int>(threadIdx.x % 32);
+  const std::uint32_t slot = index * kWideWidth + static_cast<std::uint32_t>(lane);
+  WideBox box;
+  if (index < block_count) {
+    std::uint32_t triangle = kNoTriangle, corner[3] = {};
+    if (slot < count) {
+      triangle = order[slot];
+      for (int k = 0; k < 3; ++k) corner[k] = triangles[3 * std::size_t{triangle} + std::size_t(k)];
+      box = box_of(corners_of(vertices, corner));
+    }
+    write_lane(blocks[index], lane, vertices, triangle, corner);
+  }
+  if (index < (block_count + kWideWidth - 1) / kWideWidth * kWideWidth)
+    write_joint_box(box, nodes, first_leaf + index);
+}
+
+/// Gives each of a level's nodes, counted from `first`, its box in the level above. A warp a node.
+__global__ void join_boxes(WideNode* nodes, std::uint32_t first, std::uint32_t node_count) {
+  const std::uint32_t index = blockIdx.x * kWarps + threadIdx.x / 32;
+  const int lane = static_cast<int>(threadIdx.x % 32);
+  if (index >= (node_count + kWideWidth - 1) / kWideWidth * kWideWidth) return;
+  WideBox box;
+  if (index < node_count) {
+    for (int k = 0; k < 3; ++k) {
+      box.lower[k] = nodes[first + index].lower[k][lane];
+      box.upper[k] = nodes[first + index].upper[k][lane];
+    }
+  }
+  write_joint_box(box, nodes, first + index);
+}
+
+}  // namespace
+
+DeviceMesh::DeviceMesh(Queue& queue, const HostMesh& mesh) {
+  const auto count = static_cast<std::uint32_t>(mesh.triangle_count);
+  const std::uint32_t block_count = (count + kWideWidth - 1) / kWideWidth;
+  const int depth = wide_depth(block_count);
+  tree_.first_leaf = first_wide_node(depth);
+  tree_.block_count = block_count;
+  tree_.triangle_count = count;
+  tree_.vertex_count = static_cast<std::uint32_t>(mesh.vertex_count);
+  const cudaStream_t stream = queue.stream();
+
+  DeviceArray<std::uint32_t> triangles(queue, 3 * mesh.triangle_count);
+  vertices_ = DeviceArray<double>(queue, 3 * mesh.vertex_count);
+  vertices_.upload(std::span(mesh.vertices, vertices_.size()));
+  triangles.upload(std::span(mesh.triangles, triangles.size()));
+  const Placement placement = {{mesh.centre[0], mesh.centre[1], mesh.centre[2]}, mesh.scale};
+  place_in_unit_frame<<<blocks_for(vertices_.size(), kThreads), kThreads, 0, stream>>>(
+      vertices_.data(), vertices_.size(), placement);
+
+  DeviceArray<std::uint64_t> keys(queue, count);
+  DeviceArray<std::uint32_t> order(queue, count);
+  place_on_curve<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(
+      vertices_.data(), triangles.data(), count, keys.data(), order.data());
+  check_launch("sorting the triangles");
+  sort_pairs(queue, keys, order, 3 * kCurveBits);
+  keys.release();
+
+  blocks_ = DeviceArray<WideBlock>(queue, block_count);
+  std::uint32_t node_count = blocks_for(block_count, kWideWidth);
+  nodes_ = DeviceArray<WideNode>(queue, first_wide_node(depth - 1) + node_count);
+  fill_blocks<<<blocks_for(std::size_t{node_count} * kWideWidth, kWarps), kThreads, 0, stream>>>(
+      vertices_.data(), triangles.data(), order.data(), count, blocks_.data(), block_count,
+      nodes_.data(), tree_.first_leaf);
+  for (int level = depth - 1; level > 0; --level) {
+    const std::uint32_t parents = blocks_for(node_count, kWideWidth);
+    join_boxes<<<blocks_for(std::size_t{parents} * kWideWidth, kWarps), kThreads, 0, stream>>>(
+        nodes_.data(), first_wide_node(level), node_count);
+    node_count = parents;
+  }
+  check_launch("building the mesh's hierarchy");
+  tree_.vertices = vertices_.data();
+  tree_.blocks = blocks_.data();
+  tree_.nodes = nodes_.data();
+}
+
+}  // namespace ist::gpu
