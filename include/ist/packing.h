@@ -7,6 +7,8 @@
 #include <ist/gpu.h>
 #include <ist/progress.h>
 #include <ist/solid.h>
+#include <ist/sphere.h>
+#include <ist/stop_reason.h>
 
 namespace ist {
 
@@ -35,21 +37,6 @@ struct PackingSettings {
   unsigned threads = 0;               ///< 0 = all cores; never changes the result
   Device device = Device::automatic;  ///< a Solid that is not a mesh is always packed on the CPU
   GpuSettings gpu;                    ///< where `device` is a GPU
-};
-
-/// A sphere in the unit frame of its solid (half-extent of the solid in (½, 1]).
-struct Sphere {
-  float x = 0, y = 0, z = 0;  ///< centre, unit frame
-  float r = 0;                ///< radius, unit frame, rounded down
-};
-
-enum class StopReason : std::uint32_t {
-  sphere_count,
-  coverage,
-  min_radius,
-  time_limit,
-  cancelled,
-  exhausted,  ///< nothing above float resolution fits any more
 };
 
 /// Certified, non-overlapping spheres inside a solid, in insertion order: every prefix is a valid

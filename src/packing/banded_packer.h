@@ -2,80 +2,55 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <vector>
 
 #include <ist/packing.h>
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
 
-#include "packing/certificate.h"
+#include "packing/band_schedule.h"
 #include "packing/prototype.h"
-#include "packing/roots.h"
 #include "packing/selection.h"
+#include "packing/sphere_grid.h"
 
 namespace ist::packing {
 
-/// What the band loop needs to know of a solid beside its surface, and where it stops; unit frame.
-struct BandedLimits {
-  double volume = 0;
-  double target_coverage = 1;
-  double min_radius = 0;
-  double length_unit = 1;  ///< [u] of one unit-frame unit, for progress reports
+/// Lists as they come. The result depends on no order; tests put another one in its place.
+struct AsFound {
+  using Spheres = GridSpheres;
+  static void arrange(std::vector<std::uint32_t>&) {}
 };
 
-/// The greedy packing with a guarantee of DESIGN 4.2 over one kind of surface.
-template <class Surface>
+/// The greedy packing with a guarantee of DESIGN 4.2 over one kind of surface, on the host.
+template <class Surface, class Order = AsFound>
 class BandedPacker {
  public:
-  BandedPacker(const Surface& surface, const BandedLimits& limits, const PackingSettings& settings,
-               const ProgressCallback& progress)
-      : surface_(surface), limits_(limits), settings_(settings), progress_(progress) {}
+  /// `length_unit`: [u] of one unit-frame unit, for progress reports.
+  BandedPacker(const Surface& surface, const BandLimits& limits, double time_limit,
+               double length_unit, const ProgressCallback& progress)
+      : surface_(surface),
+        time_limit_(time_limit),
+        length_unit_(length_unit),
+        progress_(progress),
+        schedule_(limits) {}
 
   SpherePacking run() {
     start_ = last_report_ = Clock::now();
     begin_at_root();
-    rebuild_grid(2.0f);
-    float previous = 4;
-    while (!stopped_) {
-      floor_ = radius_floor(previous);
-      drop_dead_cells();
-      float top = 0;
-      for (const Cell& cell : cells_) top = std::max(top, cell.bound);
-      if (dropped_ >= kSmallestRadius && top < dropped_) {
-        // The forecast was too high, and what it dropped is needed: find it again.
-        forecast_ = false;
-        begin_at_root();
-        continue;
-      }
-      if (top < kSmallestRadius) {
-        stop(StopReason::exhausted);
-      } else if (top < limits_.min_radius * (1 + kLastSlack)) {
-        stop(StopReason::min_radius);
-      } else {
-        if (top < 0.7f * grid_.reach() ||
-            result_.spheres.size() > 4 * std::max<std::size_t>(grid_.built_for(), 16))
-          rebuild_grid(std::min(top * 1.001f, grid_.reach()));
-        float slack = band_slack();
-        if (!strict()) top = std::min(top, previous);
-        if ((1 - slack) * top < kSmallestRadius) {
-          stop(StopReason::exhausted);
-          break;
-        }
-        previous = (1 - slack) * top;
-        if (previous <= limits_.min_radius) {
-          // The last bands are cut at the smallest radius and end a hair above it.
-          previous = smallest_wanted();
-          slack = kLastSlack;
-        }
-        const std::size_t before = result_.spheres.size();
-        band(previous, slack);
-        const bool last = previous <= smallest_wanted();
-        if (last && !stopped_ && result_.spheres.size() == before) stop(StopReason::min_radius);
-      }
+    while (!schedule_.stopped) {
+      schedule_.begin_cleaning();
+      const BandStep step = schedule_.begin_band(largest_live_bound());
+      if (step == BandStep::restart) begin_at_root();
+      if (step != BandStep::work) continue;
+      if (schedule_.rebuild_grid)
+        grid_ = SphereGrid(result_.spheres,
+                           sphere_grid_layout(schedule_.grid_spheres, schedule_.grid_reach));
+      band();
+      schedule_.end_band();
     }
-    result_.stop = reason_;
-    result_.coverage = std::min(1.0, covered_ / limits_.volume);
+    result_.stop = schedule_.reason;
+    result_.coverage = schedule_.coverage();
+    result_.rounds = schedule_.rounds;
     if (!kept_.empty()) {
       const auto middle = kept_.begin() + static_cast<std::ptrdiff_t>(kept_.size() / 2);
       std::nth_element(kept_.begin(), middle, kept_.end());
@@ -86,198 +61,169 @@ class BandedPacker {
   }
 
  private:
-  using Cell = packing::Cell<typename Surface::Feature>;
+  using Feature = typename Surface::Feature;
+  using Spheres = typename Order::Spheres;
+  using Field = PrototypeField<Surface, Spheres>;
   using Clock = std::chrono::steady_clock;
-  static constexpr float kSmallestRadius = 0x1p-21f;  ///< float coordinates resolve nothing below
-  static constexpr float kSmallestHalfEdge = 0x1p-23f;
-  static constexpr float kLastSlack = 0.01f;
+  using Indices = std::vector<std::uint32_t>;
   static constexpr float kFloatNoise = 1e-4f;
-  static constexpr float kLargest = 1.5f;  ///< half-edge of a cell that is climbed from, in radii
-  static constexpr std::size_t kMostCells = std::size_t{1} << 22;  ///< some 400 MB
-  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
-
-  /// The smallest radius that the user allows, rounded up.
-  float smallest_wanted() const { return -rounded_down(-limits_.min_radius); }
-  bool strict() const { return settings_.epsilon > 0; }
-
-  /// ε of the next band. Near the target count bands get thinner, so that the last spheres are the
-  /// largest ones: with radius ~ count^(−3/8), a band of ε adds n ((1−ε)^(−8/3) − 1) spheres.
-  float band_slack() const {
-    if (strict()) return static_cast<float>(settings_.epsilon);
-    double slack = 0.2;
-    if (settings_.max_spheres > 0 && !result_.spheres.empty()) {
-      const auto n = static_cast<double>(result_.spheres.size());
-      const double left = static_cast<double>(settings_.max_spheres) - n;
-      slack = std::min(slack, 1 - power_three_eighths(n / (n + 1.5 * left)));
-    }
-    return static_cast<float>(std::max(slack, 0.02));
-  }
-
-  /// Radius below which nothing can matter: the forecast of the last sphere's, with a margin. Where
-  /// it turns out too high, the packing starts again at the root cell with the spheres it has.
-  float radius_floor(float radius) const {
-    const auto n = static_cast<double>(result_.spheres.size());
-    if (strict() || !forecast_ || settings_.max_spheres == 0 || n < 64) return kSmallestRadius;
-    const double left = n / static_cast<double>(settings_.max_spheres);
-    return std::max(kSmallestRadius,
-                    static_cast<float>(0.6 * double{radius} * power_three_eighths(left)));
-  }
-
-  /// Cells under work at once beyond which more of them cannot be needed.
-  std::size_t plateau() const {
-    const std::size_t left =
-        settings_.max_spheres > 0 ? settings_.max_spheres - result_.spheres.size() : 10000;
-    return 4096 + 16 * left;
-  }
+  static constexpr std::size_t kChunk = 4096;  ///< cells between two looks at clock and progress
 
   void begin_at_root() {
-    dropped_ = 0;
-    cells_.assign(1, Cell{});
-    cells_[0].inside = surface_.inside(cells_[0].centre);
+    Cell root;
+    root.inside = surface_.inside(SerialTeam{}, root.centre);
+    cells_.assign(1, {root, {}});
+    spare_.clear();
+  }
+
+  /// Removes the cells that cannot matter.
+  float largest_live_bound() {
+    spare_.clear();
+    const auto dead = [this](const StoredCell<Feature>& c) {
+      return c.cell.bound < schedule_.floor;
+    };
+    for (const auto& c : cells_)
+      if (dead(c)) schedule_.drop(c.cell.bound);
+    cells_.erase(std::remove_if(cells_.begin(), cells_.end(), dead), cells_.end());
+    float top = 0;
+    for (const auto& c : cells_) top = std::max(top, c.cell.bound);
+    return top;
   }
 
   /// Inserts spheres of radius ≥ threshold until the band has given what it has.
-  void band(float threshold, float slack) {
-    // A cell with a half-diagonal below a quarter of the margin settles or holds a candidate, for
-    // its bound exceeds its prototype's radius by no more than the half-diagonal.
-    const float margin = threshold * (1 + 0.5f * slack);
-    std::vector<std::uint32_t> active;
+  void band() {
+    Indices active;
     for (std::size_t i = 0; i < cells_.size(); ++i)
-      if (cells_[i].bound >= margin) active.push_back(static_cast<std::uint32_t>(i));
-    while (!active.empty() && !stopped_) {
-      resolve(active, threshold, margin);
-      if (stopped_) return;
-      const std::size_t inserted = insert_independent(active, threshold, margin);
-      ++result_.rounds;
-      // Under an explicit ε what is left must be refuted, not only found to yield nothing now.
-      if (inserted == 0 && (!strict() || threshold <= smallest_wanted())) break;
+      if (cells_[i].cell.bound >= schedule_.margin) active.push_back(static_cast<std::uint32_t>(i));
+    while (!active.empty() && !schedule_.stopped) {
+      resolve(active);
+      if (schedule_.stopped) return;
+      if (!schedule_.end_round(insert_independent(active))) return;
     }
   }
 
   /// Works on the cells until each has settled or holds a candidate; leaves the latter in `active`.
-  void resolve(std::vector<std::uint32_t>& active, float threshold, float margin) {
-    const PrototypeField<Surface> field(surface_, result_.spheres, grid_);
-    std::vector<std::uint32_t> frontier = std::move(active), splitting;
+  void resolve(Indices& active) {
+    const Spheres spheres(result_.spheres, grid_);
+    const Field field(surface_, spheres);
+    Indices frontier = std::move(active), splitting;
     std::vector<CellState> state;
     active.clear();
     while (!frontier.empty()) {
-      // A plateau: so many places are equally good that any of them will do. Cells then are climbed
-      // from at any size, and split only where that fails.
-      const float largest = frontier.size() > plateau() ? 2 : kLargest * threshold;
-      state.resize(frontier.size());
+      Order::arrange(frontier);
+      const float largest = schedule_.largest_half(frontier.size());
+      const std::uint32_t classes = schedule_.classes(frontier.size());
       splitting.clear();
-      for (std::size_t from = 0; from < frontier.size(); from += kChunk) {
-        const std::size_t to = std::min(frontier.size(), from + kChunk);
-        for_each_index(from, to, [&](std::size_t i) {
-          state[i] = field.work(cells_[frontier[i]], threshold, margin, largest);
-        });
-        for (std::size_t i = from; i < to; ++i) {
-          if (state[i] == CellState::candidate) active.push_back(frontier[i]);
-          if (state[i] == CellState::split) splitting.push_back(frontier[i]);
+      for (std::uint32_t k = 0; k < classes; ++k) {
+        Indices part;
+        if (classes > 1)
+          for (const std::uint32_t i : frontier)
+            if (BandSchedule::class_of(cells_[i].cell.centre, classes) == k) part.push_back(i);
+        const Indices& now = classes > 1 ? part : frontier;
+        for (std::size_t from = 0; from < now.size(); from += kChunk) {
+          const std::size_t to = std::min(now.size(), from + kChunk);
+          state.resize(kChunk);
+          for_each_index(from, to, [&](std::size_t i) {
+            typename Field::Scratch scratch;
+            StoredCell<Feature>& stored = cells_[now[i]];
+            Cell cell = load_cell(SerialTeam{}, stored, scratch);
+            state[i - from] = field.work(SerialTeam{}, cell, scratch, schedule_.threshold,
+                                         schedule_.margin, largest);
+            store_cell(SerialTeam{}, cell, scratch, stored);
+          });
+          for (std::size_t i = from; i < to; ++i) {
+            if (state[i - from] == CellState::candidate) active.push_back(now[i]);
+            if (state[i - from] == CellState::split) splitting.push_back(now[i]);
+          }
+          if (out_of_time_or_cancelled()) return;
         }
-        if (out_of_time_or_cancelled(threshold)) return;
-        if (active.size() > plateau()) break;
+        if (schedule_.enough(active.size())) return;
       }
-      if (active.size() > plateau()) break;
       frontier.clear();
-      // Bounds that do not separate: in the automatic schedule the next band asks for less.
-      if (!strict() && splitting.size() > 2 * plateau()) break;
-      if (cells_.size() > kMostCells) {
-        if (strict()) stop(StopReason::exhausted);
-        break;
-      }
-      split(splitting, field, margin, frontier);
+      if (schedule_.gives_up(splitting.size(), cells_.size() - spare_.size())) return;
+      split(splitting, field, frontier);
     }
-    std::sort(active.begin(), active.end());
   }
 
   /// Replaces each cell by those of its children that still count; appends the ones that reach the
   /// margin to `unsettled`.
-  void split(const std::vector<std::uint32_t>& parents, const PrototypeField<Surface>& field,
-             float margin, std::vector<std::uint32_t>& unsettled) {
+  void split(const Indices& parents, const Field& field, Indices& unsettled) {
     std::vector<Cell> children(8 * std::min(parents.size(), kChunk));
     for (std::size_t from = 0; from < parents.size(); from += kChunk) {
       const std::size_t to = std::min(parents.size(), from + kChunk);
       for_each_index(from, to, [&](std::size_t i) {
-        for (int k = 0; k < 8; ++k) {
-          Cell& child = children[8 * (i - from) + static_cast<std::size_t>(k)];
-          child = octant(cells_[parents[i]], k);
-          Sample s;
-          Float3 y;
-          field.settles(child, margin, s, y);
-          if (child.half < kSmallestHalfEdge) child.bound = std::min(child.bound, 0.999f * margin);
-        }
+        typename Field::Scratch scratch;
+        const Cell parent = load_cell(SerialTeam{}, cells_[parents[i]], scratch);
+        for (int k = 0; k < 8; ++k)
+          children[8 * (i - from) + static_cast<std::size_t>(k)] =
+              field.child(SerialTeam{}, parent, k, scratch, schedule_.margin);
       });
       for (std::size_t i = from; i < to; ++i) {
-        std::uint32_t place = parents[i];
-        cells_[place].bound = 0;
+        StoredCell<Feature> kept = cells_[parents[i]];  // for its ring
+        cells_[parents[i]].cell.bound = 0;
+        spare_.push_back(parents[i]);
         for (std::size_t k = 0; k < 8; ++k) {
-          const Cell& child = children[8 * (i - from) + k];
-          if (child.bound < floor_) {
-            dropped_ = std::max(dropped_, child.bound);
+          kept.cell = children[8 * (i - from) + k];
+          if (kept.cell.bound < schedule_.floor) {
+            schedule_.drop(kept.cell.bound);
             continue;
           }
-          if (place == kNone) {
-            place = static_cast<std::uint32_t>(cells_.size());
-            cells_.emplace_back();
-          }
-          cells_[place] = child;
-          if (child.bound >= margin) unsettled.push_back(place);
-          place = kNone;
+          const std::uint32_t place = store(kept);
+          if (kept.cell.bound >= schedule_.margin) unsettled.push_back(place);
         }
       }
     }
   }
 
+  std::uint32_t store(const StoredCell<Feature>& cell) {
+    if (spare_.empty()) {
+      cells_.push_back(cell);
+      return static_cast<std::uint32_t>(cells_.size() - 1);
+    }
+    const std::uint32_t place = spare_.back();
+    spare_.pop_back();
+    cells_[place] = cell;
+    return place;
+  }
+
   /// Inserts what wins among the candidates of the active cells; returns how many were inserted.
-  std::size_t insert_independent(const std::vector<std::uint32_t>& active, float threshold,
-                                 float margin) {
+  std::size_t insert_independent(const Indices& active) {
     std::vector<Candidate> candidates(active.size());
-    float top = margin;
+    float top = schedule_.margin;
     for (std::size_t i = 0; i < active.size(); ++i) {
-      const Cell& cell = cells_[active[i]];
+      const Cell& cell = cells_[active[i]].cell;
       top = std::max(top, cell.bound);
       candidates[i] = {cell.prototype, cell.radius,
-                       candidate_key(cell.radius, cell.centre, settings_.seed)};
+                       candidate_key(cell.radius, cell.centre, schedule_.limits.seed), cell.centre};
     }
-    const std::vector<std::uint32_t> winners = select_independent(candidates);
-    std::vector<double> surface_distance(winners.size());
+    const std::vector<Winner> winners = select_independent(candidates);
+    const Spheres spheres(result_.spheres, grid_);
+    std::vector<float> radius(winners.size());
     for_each_index(0, winners.size(), [&](std::size_t i) {
-      surface_distance[i] = surface_.clearance(candidates[winners[i]].centre);
+      const Candidate& c = candidates[winners[i].index];
+      const double to_surface = gap_to_surface(surface_.clearance(SerialTeam{}, c.centre));
+      radius[i] = certified_radius(SerialTeam{}, c.centre, c.radius,
+                                   std::min(winners[i].gap, to_surface), spheres);
     });
     std::size_t inserted = 0;
-    for (std::size_t i = 0; i < winners.size() && !stopped_; ++i) {
-      const Candidate& c = candidates[winners[i]];
-      const float r =
-          certified_radius(c.centre, c.radius, surface_distance[i], result_.spheres, grid_);
-      const bool close = !strict() && r >= 0.99f * threshold && r >= kSmallestRadius / 2 &&
-                         double{r} >= limits_.min_radius;
-      if (r < threshold && !close) {
-        // Float saw more room than there is.
-        cells_[active[winners[i]]].bound = 0.999f * margin;
-        cells_[active[winners[i]]].radius = 0;
+    for (std::size_t i = 0; i < winners.size() && !schedule_.stopped; ++i) {
+      const float r = radius[i];
+      if (!schedule_.accepts(r)) {
+        Cell& cell = cells_[active[winners[i].index]].cell;
+        cell.bound = schedule_.refused_bound();
+        cell.radius = 0;
         continue;
       }
-      const Sphere sphere{c.centre.x, c.centre.y, c.centre.z, r};
+      const Float3 centre = candidates[winners[i].index].centre;
+      const Sphere sphere{centre.x, centre.y, centre.z, r};
       grid_.insert(static_cast<std::uint32_t>(result_.spheres.size()), sphere);
       result_.spheres.push_back(sphere);
       kept_.push_back(std::min(1.0f, r / top));
       if (r < kFloatNoise) result_.below_float_noise = true;
-      covered_ += kBallVolume * double{r} * double{r} * double{r};
+      schedule_.insert(r);
       ++inserted;
-      if (result_.spheres.size() == settings_.max_spheres)
-        stop(StopReason::sphere_count);
-      else if (covered_ >= limits_.target_coverage * limits_.volume)
-        stop(StopReason::coverage);
     }
     return inserted;
-  }
-
-  void drop_dead_cells() {
-    const auto dead = [this](const Cell& cell) { return cell.bound < floor_; };
-    for (const Cell& cell : cells_)
-      if (dead(cell)) dropped_ = std::max(dropped_, cell.bound);
-    cells_.erase(std::remove_if(cells_.begin(), cells_.end(), dead), cells_.end());
   }
 
   template <class Work>
@@ -288,51 +234,37 @@ class BandedPacker {
                               });
   }
 
-  void rebuild_grid(float reach) { grid_ = SphereGrid(result_.spheres, reach); }
-
-  void stop(StopReason reason) {
-    stopped_ = true;
-    reason_ = reason;
-  }
-
-  bool out_of_time_or_cancelled(float radius) {
+  bool out_of_time_or_cancelled() {
     const auto now = Clock::now();
     const double elapsed = std::chrono::duration<double>(now - start_).count();
-    if (settings_.time_limit > 0 && elapsed >= settings_.time_limit) stop(StopReason::time_limit);
+    if (time_limit_ > 0 && elapsed >= time_limit_) schedule_.stop(StopReason::time_limit);
     if (progress_ && now - last_report_ >= std::chrono::milliseconds(100)) {
       last_report_ = now;
       Progress p;
       p.stage = "pack";
       p.spheres = result_.spheres.size();
-      p.coverage = covered_ / limits_.volume;
-      p.radius = radius * limits_.length_unit;
-      p.fraction = p.coverage / limits_.target_coverage;
-      if (settings_.max_spheres > 0)
+      p.coverage = schedule_.coverage();
+      p.radius = schedule_.threshold * length_unit_;
+      p.fraction = p.coverage / schedule_.limits.target_coverage;
+      if (schedule_.limits.max_spheres > 0)
         p.fraction = std::max(p.fraction, static_cast<double>(p.spheres) /
-                                              static_cast<double>(settings_.max_spheres));
+                                              static_cast<double>(schedule_.limits.max_spheres));
       p.elapsed = elapsed;
-      if (!progress_(p)) stop(StopReason::cancelled);
+      if (!progress_(p)) schedule_.stop(StopReason::cancelled);
     }
-    return stopped_;
+    return schedule_.stopped;
   }
 
-  static constexpr std::size_t kChunk = 4096;  ///< cells between two looks at clock and progress
-  static constexpr double kBallVolume = 4.18879020478639098;
-
   const Surface& surface_;
-  const BandedLimits limits_;
-  const PackingSettings& settings_;
+  const double time_limit_;
+  const double length_unit_;
   const ProgressCallback& progress_;
-  std::vector<Cell> cells_;
-  SphereGrid grid_{{}, 2.0f};
+  BandSchedule schedule_;
+  std::vector<StoredCell<Feature>> cells_;
+  Indices spare_;  ///< places in cells_ of cells that were split
+  SphereGrid grid_{{}, sphere_grid_layout(0, 2.0f)};
   SpherePacking result_;
   std::vector<float> kept_;
-  double covered_ = 0;
-  float floor_ = kSmallestRadius;
-  float dropped_ = 0;  ///< largest bound of the cells that the floor took
-  bool forecast_ = true;
-  bool stopped_ = false;
-  StopReason reason_ = StopReason::exhausted;
   Clock::time_point start_, last_report_;
 };
 

@@ -1,21 +1,57 @@
 #pragma once
 
-#include <ist/packing.h>
+#include <ist/sphere.h>
 
-#include "packing/sphere_grid.h"
+#include "mesh/team.h"
+#include "packing/float3.h"
 
 namespace ist::packing {
 
 /// Gap that a certified sphere keeps to the surface and to other spheres, unit frame (DESIGN 3.2).
 constexpr double kClearance = 1e-12;
+/// The same with what the square root and the sum round by: some 2⁻⁵³ of their size (≤ 4).
+constexpr double kGap = kClearance + 1e-14;
 
 /// Largest float not above x.
-float rounded_down(double x);
+IST_HD inline float rounded_down(double x) {
+  const auto nearest = static_cast<float>(x);
+  if (!(double{nearest} > x)) return nearest;
+  return nearest == 0 ? -0x1p-149f : from_ordered_bits(ordered_bits(nearest) - 1u);
+}
 
-/// The largest radius that {centre, radius} may keep next to the spheres of the grid, in double,
-/// rounded down; ≤ 0 if none. `surface_distance`: exact, positive inside. The grid's reach must not
-/// be less than `radius`.
-float certified_radius(Float3 centre, float radius, double surface_distance,
-                       const std::vector<Sphere>& spheres, const SphereGrid& grid);
+/// The largest radius that a sphere about `centre` may have next to another one, before rounding.
+IST_HD inline double gap_to_sphere(Float3 centre, const Sphere& s) {
+  const double x = double{centre.x} - double{s.x};
+  const double y = double{centre.y} - double{s.y};
+  const double z = double{centre.z} - double{s.z};
+  return std::sqrt(x * x + y * y + z * z) - double{s.r} - kGap;
+}
+
+/// The same next to the surface at the exact distance `clearance`, positive inside.
+IST_HD inline double gap_to_surface(double clearance) { return clearance - kGap; }
+
+/// Certified radius of a candidate: no more than its own radius and all its gaps; ≤ 0 if there is
+/// no room. `gap`: least of those to the surface and to the winners of the same round that go
+/// before it, each taken with its candidate's radius. The grid's reach must not be less than
+/// `radius`.
+template <class Team, class Spheres>
+IST_HD float certified_radius(const Team& team, Float3 centre, float radius, double gap,
+                              const Spheres& spheres) {
+  double r = double{radius} < gap ? double{radius} : gap;
+  spheres.for_near(team, centre, [&](bool valid, std::uint32_t, const Sphere& s) {
+    const double room = gap_to_sphere(centre, s);
+    if (valid && room < r) r = room;
+  });
+  return rounded_down(team.min(r));
+}
+
+/// Volumes are summed as integers, in units of 2^-58 unit-frame³, so that no order changes a sum
+/// (the frame's cube has 2^61).
+constexpr double kVolumeUnit = 0x1p-58;
+
+IST_HD inline std::uint64_t fixed_ball_volume(float r) {
+  const double radius = r;
+  return static_cast<std::uint64_t>(4.18879020478639098 * radius * radius * radius / kVolumeUnit);
+}
 
 }  // namespace ist::packing

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <ist/solid.h>
-#include "packing/constraint.h"
-#include "packing/ring.h"
+
+#include "packing/sample.h"
 
 namespace ist::packing {
 
@@ -20,7 +20,8 @@ class FieldSurface {
       : solid_(solid), frame_(frame), scale_(frame.scale()) {}
 
   /// Unsigned distance to the surface, and the feature there, if it is less than `limit`.
-  bool nearest(Float3 x, float limit, Feature& feature, float& distance) const {
+  template <class Team>
+  bool nearest(const Team&, Float3 x, float limit, Feature& feature, float& distance) const {
     const double s = value(x);
     if (!(std::fabs(s) < limit)) return false;
     distance = static_cast<float>(std::fabs(s));
@@ -40,17 +41,25 @@ class FieldSurface {
     return true;
   }
 
-  /// Constraints at x of remembered features.
-  void constraints(const Feature* features, int count, Float3 x, Constraint* out) const {
-    for (int i = 0; i < count; ++i)
-      out[i] = ball_constraint(features[i].centre, features[i].radius, x);
+  /// Where x stands to a remembered feature.
+  FeatureOffset offset(const Feature& feature, Float3 x) const {
+    return ball_offset(feature.centre, feature.radius, kSurfaceTag, x);
   }
 
   /// Nothing is known of faces.
-  int convex_planes(Float3, float, bool, Constraint*, int) const { return 0; }
+  template <class Team>
+  int convex_planes(const Team&, Float3, float, bool, Feature*, int, SampleMemory&, int) const {
+    return 0;
+  }
 
-  bool inside(Float3 x) const { return value(x) > 0; }
-  double clearance(Float3 x) const { return value(x); }
+  template <class Team>
+  bool inside(const Team&, Float3 x) const {
+    return value(x) > 0;
+  }
+  template <class Team>
+  double clearance(const Team&, Float3 x) const {
+    return value(x);
+  }
 
  private:
   double value(Float3 x) const { return value(Eigen::Vector3d(x.x, x.y, x.z)); }

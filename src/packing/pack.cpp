@@ -15,21 +15,23 @@ SpherePacking pack(const Solid& solid, const PackingSettings& settings,
   const auto* mesh = dynamic_cast<const MeshSolid*>(&solid);
   const UnitFrame frame = mesh != nullptr ? mesh->frame() : unit_frame(solid.bounds());
   const double scale = frame.scale();
-  packing::BandedLimits limits;
+  packing::BandLimits limits;
   limits.volume = solid.volume() / scale / scale / scale;
   limits.target_coverage = settings.target_coverage;
   limits.min_radius = settings.min_radius / scale;
-  limits.length_unit = scale;
+  limits.epsilon = settings.epsilon;
+  limits.max_spheres = settings.max_spheres;
+  limits.seed = settings.seed;
   if (!(limits.volume > 0)) throw Error("packing: the solid's volume is not positive");
 
   SpherePacking result;
   thread_arena(settings.threads).execute([&] {
     if (mesh != nullptr) {
       const packing::MeshSurface surface(*mesh);
-      result = packing::BandedPacker(surface, limits, settings, progress).run();
+      result = packing::BandedPacker(surface, limits, settings.time_limit, scale, progress).run();
     } else {
       const packing::FieldSurface surface(solid, frame);
-      result = packing::BandedPacker(surface, limits, settings, progress).run();
+      result = packing::BandedPacker(surface, limits, settings.time_limit, scale, progress).run();
     }
   });
   result.frame = frame;

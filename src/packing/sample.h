@@ -1,98 +1,196 @@
 #pragma once
 
-#include <vector>
+#include <ist/sphere.h>
 
+#include "mesh/team.h"
 #include "packing/constraint.h"
-#include "packing/sphere_grid.h"
+
+// What is seen from a point. Written for a team (mesh/team.h) whose lanes share a SampleMemory;
+// everything here is a function of the *set* of features, in whatever order a team meets them.
 
 namespace ist::packing {
 
-/// The field around a point: its clearance (distance to what was looked at; ≤ 0 inside a sphere)
-/// and the constraints of the features that can matter near it. Any subset of constraints gives a
-/// bound, so one that does not fit may be left out.
-struct Sample {
-  static constexpr int kCapacity = 64;
-  Constraint constraint[kCapacity];
-  int size = 0;
-  float clearance = 0;
+constexpr int kSampleCapacity = 64;
 
-  void add(const Constraint& c) {
-    if (c.distance < clearance) clearance = c.distance;
-    if (size < kCapacity) constraint[size++] = c;
-  }
-
-  /// Forgets what is further than the nearest + window.
-  void keep_near(float window) {
-    int kept = 0;
-    for (int i = 0; i < size; ++i)
-      if (constraint[i].distance <= clearance + window) constraint[kept++] = constraint[i];
-    size = kept;
-  }
+/// Constraints side by side, so that lanes read neighbouring words.
+struct SampleMemory {
+  float x[kSampleCapacity], y[kSampleCapacity], z[kSampleCapacity];  ///< gradients
+  float distance[kSampleCapacity];
+  float curvature[kSampleCapacity];
+  std::uint32_t tag[kSampleCapacity];
 };
 
-inline void copy(const Sample& from, Sample& to) {
-  to.size = from.size;
-  to.clearance = from.clearance;
-  for (int i = 0; i < from.size; ++i) to.constraint[i] = from.constraint[i];
+IST_HD inline Constraint get(const SampleMemory& memory, int i) {
+  return {{memory.x[i], memory.y[i], memory.z[i]},
+          memory.distance[i],
+          memory.curvature[i],
+          memory.tag[i]};
 }
 
-/// Starts the sample at x with the spheres near it: those no further than the nearest + window.
-/// Leaves room for `spare` more constraints. Sees no further than the grid's reach.
-inline void sample_spheres(Float3 x, const std::vector<Sphere>& spheres, const SphereGrid& grid,
-                           float window, int spare, Sample& out) {
-  // In batches, so that distances are worked out side by side.
-  constexpr int kBatch = 64;
-  float dx[kBatch], dy[kBatch], dz[kBatch], radius[kBatch], range[kBatch], distance[kBatch];
-  const int room = Sample::kCapacity - spare;
+IST_HD inline void put(SampleMemory& memory, int i, const Constraint& c) {
+  memory.x[i] = c.gradient.x;
+  memory.y[i] = c.gradient.y;
+  memory.z[i] = c.gradient.z;
+  memory.distance[i] = c.distance;
+  memory.curvature[i] = c.curvature;
+  memory.tag[i] = c.tag;
+}
+
+/// The field around a point: its clearance (distance to what was looked at; ≤ 0 inside a sphere)
+/// and the constraints of the features that can matter near it. Any subset of constraints gives a
+/// bound, so one that does not fit may be left out. The same in all lanes but for the memory.
+struct Sample {
+  SampleMemory* at = nullptr;
+  int size = 0;
+  float clearance = 0;
+};
+
+constexpr float kFarAway = 3e38f;  ///< distance of what is not there
+
+/// Index of the item with the least (value, tag) of all lanes; equal items are interchangeable.
+/// Lanes without one give kFarAway. `value` becomes the least.
+template <class Team>
+IST_HD int index_of_least(const Team& team, float& value, std::uint32_t tag, int index) {
+  if constexpr (Team::kWidth == 1) return index;
+  const float least = team.min(value);
+  const std::uint32_t low = team.min(value == least ? tag : 0xFFFFFFFFu);
+  const std::uint32_t found =
+      team.min(value == least && tag == low ? static_cast<std::uint32_t>(index) : 0xFFFFFFFFu);
+  value = least;
+  return static_cast<int>(found);
+}
+
+/// Adds a constraint that all lanes know, if there is room.
+template <class Team>
+IST_HD void add(const Team& team, const Constraint& c, Sample& s) {
+  if (c.distance < s.clearance) s.clearance = c.distance;
+  if (s.size == kSampleCapacity) return;
+  if (team.lane() == 0) put(*s.at, s.size, c);
+  ++s.size;
+  team.sync();
+}
+
+/// Forgets what is further than the nearest + window.
+template <class Team>
+IST_HD void keep_near(const Team& team, float window, Sample& s) {
+  const float limit = s.clearance + window;
+  int kept = 0;
+  for (int base = 0; base < s.size; base += Team::kWidth) {
+    const int i = base + team.lane();
+    const bool keep = i < s.size && s.at->distance[i] <= limit;
+    int total = 0;
+    const int place = kept + team.exclusive_count(keep, total);
+    const int here = s.size - base < Team::kWidth ? s.size - base : Team::kWidth;
+    if (kept != base || total != here) {
+      Constraint c;
+      if (keep) c = get(*s.at, i);
+      team.sync();
+      if (keep) put(*s.at, place, c);
+    }
+    kept += total;
+  }
+  s.size = kept;
+  team.sync();
+}
+
+/// Adds one constraint to a sample that is full at `room`: the farthest, by (distance, tag), is
+/// left out. All lanes know `c`.
+template <class Team>
+IST_HD void add_nearer(const Team& team, const Constraint& c, int room, Sample& s) {
+  float least = kFarAway;  // of the negated distances
+  std::uint32_t tag = 0xFFFFFFFFu;
+  int index = 0;
+  for (int i = team.lane(); i < room; i += Team::kWidth) {
+    const float value = -s.at->distance[i];
+    const std::uint32_t reversed = ~s.at->tag[i];
+    if (value < least || (value == least && reversed < tag)) {
+      least = value;
+      tag = reversed;
+      index = i;
+    }
+  }
+  index = index_of_least(team, least, tag, index);
+  const bool nearer = c.distance < -least || (c.distance == -least && c.tag < s.at->tag[index]);
+  team.sync();
+  if (nearer && team.lane() == 0) put(*s.at, index, c);
+  team.sync();
+}
+
+/// Starts the sample at x with the spheres near it: those no further than the nearest + window, the
+/// nearest ones if they leave no room for `spare` more constraints. Sees no further than the grid's
+/// reach.
+template <class Team, class Spheres>
+IST_HD void sample_spheres(const Team& team, Float3 x, const Spheres& spheres, float window,
+                           int spare, Sample& out) {
+  // A thread alone works in batches, so that distances are worked out side by side.
+  constexpr int kBatch = Team::kWidth == 1 ? 64 : 1;
+  FeatureOffset offset[kBatch];
+  float range[kBatch], distance[kBatch];
+  const int room = kSampleCapacity - spare;
   int count = 0;
   out.size = 0;
-  out.clearance = grid.reach();
+  out.clearance = spheres.reach();
   const auto flush = [&] {
+    float nearest = kFarAway;
     for (int i = 0; i < count; ++i) {
-      range[i] = std::sqrt(dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i]);
-      distance[i] = range[i] - radius[i];
+      range[i] = sqrtf(offset[i].range2);
+      distance[i] = range[i] - offset[i].radius;
     }
-    for (int i = 0; i < count; ++i)
-      out.clearance = distance[i] < out.clearance ? distance[i] : out.clearance;
+    for (int i = 0; i < count; ++i) nearest = distance[i] < nearest ? distance[i] : nearest;
+    nearest = team.min(nearest);
+    out.clearance = nearest < out.clearance ? nearest : out.clearance;
     for (int i = 0; i < count; ++i) {
-      if (distance[i] > out.clearance + window) continue;
-      if (out.size == room) out.keep_near(window);
-      if (out.size == room) {
-        int farthest = 0;
-        for (int k = 1; k < room; ++k)
-          if (out.constraint[k].distance > out.constraint[farthest].distance) farthest = k;
-        if (distance[i] >= out.constraint[farthest].distance) continue;
-        out.constraint[farthest] = out.constraint[--out.size];
+      const bool near = distance[i] <= out.clearance + window;
+      int total = 0;
+      const int place = team.exclusive_count(near, total);
+      if (total == 0) continue;
+      if (out.size + total > room) {
+        team.sync();
+        keep_near(team, window, out);
       }
-      const float inverse = range[i] > 0 ? 1 / range[i] : 0;
-      out.constraint[out.size++] = {{inverse * dx[i], inverse * dy[i], inverse * dz[i]},
-                                    distance[i],
-                                    range[i] > 0 ? 0.5f * inverse : 1e30f};
+      if (out.size + total <= room) {
+        if (near) put(*out.at, out.size + place, constraint_of(offset[i], range[i]));
+        out.size += total;
+        continue;
+      }
+      for (int lane = 0; lane < Team::kWidth; ++lane) {
+        if (team.broadcast(near ? 1 : 0, lane) == 0) continue;
+        Constraint c = constraint_of(offset[i], range[i]);
+        c.gradient = {team.broadcast(c.gradient.x, lane), team.broadcast(c.gradient.y, lane),
+                      team.broadcast(c.gradient.z, lane)};
+        c.distance = team.broadcast(c.distance, lane);
+        c.curvature = team.broadcast(c.curvature, lane);
+        c.tag = team.broadcast(c.tag, lane);
+        if (out.size == room) {
+          add_nearer(team, c, room, out);
+        } else {
+          if (team.lane() == 0) put(*out.at, out.size, c);
+          ++out.size;
+          team.sync();
+        }
+      }
     }
     count = 0;
   };
-  grid.for_near(x, [&](std::uint32_t i) {
-    const Sphere& s = spheres[i];
-    dx[count] = x.x - s.x;
-    dy[count] = x.y - s.y;
-    dz[count] = x.z - s.z;
-    radius[count] = s.r;
+  spheres.for_near(team, x, [&](bool valid, std::uint32_t index, const Sphere& s) {
+    offset[count] = ball_offset({s.x, s.y, s.z}, s.r, index, x);
+    if (!valid) offset[count].range2 = kFarAway;
     if (++count == kBatch) flush();
   });
-  flush();
-  out.keep_near(window);
+  if (count > 0) flush();
+  team.sync();
+  keep_near(team, window, out);
 }
 
 /// Clearance of a point to the spheres alone, no more than the grid's reach.
-inline float sphere_clearance(Float3 x, const std::vector<Sphere>& spheres,
-                              const SphereGrid& grid) {
-  float clearance = grid.reach();
-  grid.for_near(x, [&](std::uint32_t i) {
-    const Sphere& s = spheres[i];
+template <class Team, class Spheres>
+IST_HD float sphere_clearance(const Team& team, Float3 x, const Spheres& spheres) {
+  float clearance = spheres.reach();
+  spheres.for_near(team, x, [&](bool valid, std::uint32_t, const Sphere& s) {
     const float distance = norm(x - Float3{s.x, s.y, s.z}) - s.r;
-    if (distance < clearance) clearance = distance;
+    if (valid && distance < clearance) clearance = distance;
   });
-  return clearance;
+  return team.min(clearance);
 }
 
 }  // namespace ist::packing

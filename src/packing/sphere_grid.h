@@ -3,31 +3,27 @@
 #include <cstdint>
 #include <vector>
 
-#include <ist/packing.h>
-
-#include "packing/float3.h"
+#include "packing/sphere_grid_layout.h"
 
 namespace ist::packing {
 
-/// Spheres by place. A sphere is listed in every grid cell within `reach` of its surface, so what
-/// is no further than `reach` from a point stands in the one cell that holds the point. Cells come
-/// in blocks of 8³ that exist where a sphere's reach touches them; blocks and cells wholly inside a
-/// sphere list that sphere alone. Reading is thread-safe between insertions.
+/// The lists of a SphereGridLayout on the host. Blocks exist where a sphere's reach touches them.
+/// Reading is thread-safe between insertions.
 class SphereGrid {
  public:
-  /// Lists `spheres` (in order). reach > 0, unit frame.
-  SphereGrid(const std::vector<Sphere>& spheres, float reach);
+  SphereGrid(const std::vector<Sphere>& spheres, const SphereGridLayout& layout);
 
-  float reach() const { return reach_; }
-  std::size_t built_for() const { return built_for_; }  ///< count of spheres it was laid out for
+  const SphereGridLayout& layout() const { return layout_; }
 
-  /// Lists sphere `index` = {centre, r}.
-  void insert(std::uint32_t index, const Sphere& sphere);
+  /// Lists sphere `index` = s.
+  void insert(std::uint32_t index, const Sphere& s);
 
-  /// Calls visit(index) for every sphere within reach of x, and perhaps others.
+  /// Calls visit(index) for the spheres that x's cell lists: all within reach of x, or the one that
+  /// covers the cell, and perhaps others.
   template <class Visit>
   void for_near(Float3 x, Visit&& visit) const {
-    const int i = cell_of(x.x), j = cell_of(x.y), k = cell_of(x.z);
+    const int i = grid_coordinate(layout_, x.x), j = grid_coordinate(layout_, x.y),
+              k = grid_coordinate(layout_, x.z);
     const Block& block = blocks_[block_index(i >> 3, j >> 3, k >> 3)];
     if (block.owner != kNone) return visit(block.owner);
     if (block.cells == kNone) return;
@@ -50,17 +46,12 @@ class SphereGrid {
   };
   struct Block {
     std::uint32_t cells = kNone;  ///< first of its 512 cells
-    std::uint32_t owner = kNone;  ///< a sphere that holds the whole block
+    std::uint32_t owner = kNone;  ///< a sphere that covers the whole block
   };
 
-  int cell_of(float x) const {
-    const int i = static_cast<int>((x + kHalfExtent) * inverse_size_);
-    return i < 0 ? 0 : (i >= cells_per_side_ ? cells_per_side_ - 1 : i);
-  }
   std::size_t block_index(int i, int j, int k) const {
-    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(blocks_per_side_) +
-            static_cast<std::size_t>(j)) *
-               static_cast<std::size_t>(blocks_per_side_) +
+    const auto side = static_cast<std::size_t>(layout_.blocks_per_side);
+    return (static_cast<std::size_t>(k) * side + static_cast<std::size_t>(j)) * side +
            static_cast<std::size_t>(i);
   }
   static std::uint32_t cell_index(int i, int j, int k) {
@@ -68,13 +59,45 @@ class SphereGrid {
   }
   void append(Cell& cell, std::uint32_t index);
 
-  static constexpr float kHalfExtent = 1.0f;
-  std::size_t built_for_;
-  float reach_, size_, inverse_size_;
-  int blocks_per_side_, cells_per_side_;
+  SphereGridLayout layout_;
   std::vector<Block> blocks_;
   std::vector<Cell> cells_;
   std::vector<Chunk> chunks_;
+};
+
+/// The spheres as a PrototypeField sees them, on the host.
+class GridSpheres {
+ public:
+  GridSpheres(const std::vector<Sphere>& spheres, const SphereGrid& grid)
+      : spheres_(spheres), grid_(grid) {}
+
+  std::uint32_t count() const { return static_cast<std::uint32_t>(spheres_.size()); }
+  float reach() const { return grid_.layout().reach; }
+
+  /// Calls visit(valid, index, sphere) for the spheres that x's cell lists, each on one lane; all
+  /// lanes make the same number of calls, those without a sphere with valid = false.
+  template <class Team, class Visit>
+  void for_near(const Team& team, Float3 x, Visit&& visit) const {
+    if constexpr (Team::kWidth == 1) {
+      grid_.for_near(x, [&](std::uint32_t i) { visit(true, i, spheres_[i]); });
+    } else {  // a team of the tests
+      std::uint32_t mine = 0;
+      int count = 0;
+      const auto hand_out = [&] {
+        if (count > 0) visit(team.lane() < count, mine, spheres_[mine]);
+        count = 0;
+      };
+      grid_.for_near(x, [&](std::uint32_t i) {
+        if (count++ == team.lane()) mine = i;
+        if (count == Team::kWidth) hand_out();
+      });
+      hand_out();
+    }
+  }
+
+ private:
+  const std::vector<Sphere>& spheres_;
+  const SphereGrid& grid_;
 };
 
 }  // namespace ist::packing

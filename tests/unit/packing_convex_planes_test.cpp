@@ -30,21 +30,24 @@ ClosedMesh l_shape() {
 TEST(ConvexPlanes, NoClearanceInTheCellExceedsThem) {
   const MeshSolid solid(l_shape());
   const MeshSurface surface(solid);
+  const SerialTeam team;
   std::mt19937 random(1);
   std::uniform_real_distribution<float> unit(-1, 1);
   int answered = 0, refused = 0;
   for (int round = 0; round < 3000; ++round) {
     const Float3 x{unit(random), unit(random), 0.1f * unit(random)};
     const float half = 0.002f + 0.1f * std::fabs(unit(random));
-    Constraint planes[64];
-    const int count = surface.convex_planes(x, half * 1.7320510f, surface.inside(x), planes, 64);
+    SampleMemory planes;
+    std::uint32_t triangles[32];
+    const int count = surface.convex_planes(team, x, half * 1.7320510f, surface.inside(team, x),
+                                            triangles, 32, planes, 0);
     (count > 0 ? answered : refused)++;
     for (int i = 0; i < 40 && count > 0; ++i) {
       const Float3 y = half * Float3{unit(random), unit(random), unit(random)};
-      const double clearance = surface.clearance(x + y);
+      const double clearance = surface.clearance(team, x + y);
       if (clearance < 0) continue;
       for (int k = 0; k < count; ++k)
-        ASSERT_LE(clearance, planes[k].distance + dot(planes[k].gradient, y) + 1e-6)
+        ASSERT_LE(clearance, planes.distance[k] + dot(get(planes, k).gradient, y) + 1e-6)
             << "round " << round;
     }
   }

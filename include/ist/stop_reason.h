@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstdint>
+
+namespace ist {
+
+/// What ended a packing.
+enum class StopReason : std::uint32_t {
+  sphere_count,
+  coverage,
+  min_radius,
+  time_limit,
+  cancelled,
+  exhausted,  ///< nothing above float resolution fits any more
+};
+
+}  // namespace ist
