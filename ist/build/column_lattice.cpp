@@ -54,7 +54,7 @@ ColumnLattice cut_columns(const MeshSolid& solid, double step, double min_column
   ColumnLattice lattice;
   lattice.box = unit_box(solid);
   const double width = lattice.box.sizes().y(), depth = lattice.box.sizes().z();
-  const double shadow = shadow_area(solid.view());
+  const double shadow = shadow_area(solid.arrays());
   for (double spacing = std::min(step, std::sqrt(shadow / min_columns));; spacing *= 1.05) {
     const double ny = std::max(kMinColumnsAcross, std::ceil(width / spacing));
     const double nz = std::max(kMinColumnsAcross, std::ceil(depth / spacing));

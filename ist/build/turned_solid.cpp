@@ -73,7 +73,7 @@ Matrix3d principal_axes(Matrix3d m) {
 }  // namespace
 
 TurnedSolid::TurnedSolid(const MeshSolid& solid) : original_(solid) {
-  const MeshView& view = solid.view();
+  const MeshView& view = solid.arrays();
   const SurfaceMoments moments = surface_moments(view);
   const Vector3d size = solid.bounds().sizes() / solid.frame().scale();
   if (moments.shadow.x() >= kSmallShadow * moments.shadow.maxCoeff() &&

@@ -1,6 +1,7 @@
 #include "mesh/mesh_solid.h"
 
 #include <ist/error.h>
+#include <oneapi/tbb/collaborative_call_once.h>
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
@@ -21,10 +22,34 @@ struct MeshSolid::Impl {
   std::vector<double> vertices;  // unit frame
   std::vector<float> vertices_float;
   std::vector<std::uint32_t> triangles;
-  Bvh bvh;
-  MeshView view;
-  MeshVolume volume;
+  MeshView arrays;
   std::uint64_t hash = 0;
+  bool meets_itself = false, may_overlap = false;
+
+  oneapi::tbb::collaborative_once_flag hierarchy_made, volume_made;
+  Bvh bvh;
+  MeshView view;  // arrays and bvh
+  MeshVolume volume;
+
+  const MeshView& with_hierarchy() {
+    oneapi::tbb::collaborative_call_once(hierarchy_made, [this] {
+      bvh = build_bvh(vertices, triangles);
+      view = arrays;
+      view.nodes = bvh.nodes.data();
+      view.blocks = bvh.blocks.data();
+      view.root = bvh.root;
+    });
+    return view;
+  }
+
+  const MeshVolume& with_volume() {
+    // One shell that does not meet itself winds around no point twice.
+    oneapi::tbb::collaborative_call_once(volume_made, [this] {
+      volume = may_overlap ? winding_set_volume(with_hierarchy(), meets_itself)
+                           : enclosed_volume(arrays);
+    });
+    return volume;
+  }
 };
 
 namespace {
@@ -81,7 +106,7 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
       impl_->vertices_float.push_back(rounded);
       const auto error = static_cast<float>(std::abs(static_cast<double>(rounded) - x[k]));
       // Largest error of a coordinate times √3, generously rounded.
-      impl_->view.vertex_error = std::max(impl_->view.vertex_error, 1.8f * error);
+      impl_->arrays.vertex_error = std::max(impl_->arrays.vertex_error, 1.8f * error);
     }
   }
   impl_->triangles.reserve(3 * mesh.triangles.size());
@@ -89,21 +114,14 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
     for (const std::uint32_t v : triangle) impl_->triangles.push_back(place[v]);
 
   impl_->hash = hash_mesh(impl_->frame, impl_->vertices, impl_->triangles);
-  impl_->bvh = build_bvh(impl_->vertices, impl_->triangles);
-  MeshView& view = impl_->view;
-  view.vertices = impl_->vertices_float.data();
-  view.vertices_exact = impl_->vertices.data();
-  view.triangles = impl_->triangles.data();
-  view.vertex_count = count;
-  view.triangle_count = static_cast<std::uint32_t>(mesh.triangles.size());
-  view.nodes = impl_->bvh.nodes.data();
-  view.blocks = impl_->bvh.blocks.data();
-  view.root = impl_->bvh.root;
-  const bool meets_itself = closed.report.meets_itself;
-  // One shell that does not meet itself winds around no point twice.
-  impl_->volume = !meets_itself && closed.report.shells == 1
-                      ? enclosed_volume(view)
-                      : winding_set_volume(view, meets_itself);
+  MeshView& arrays = impl_->arrays;
+  arrays.vertices = impl_->vertices_float.data();
+  arrays.vertices_exact = impl_->vertices.data();
+  arrays.triangles = impl_->triangles.data();
+  arrays.vertex_count = count;
+  arrays.triangle_count = static_cast<std::uint32_t>(mesh.triangles.size());
+  impl_->meets_itself = closed.report.meets_itself;
+  impl_->may_overlap = closed.report.meets_itself || closed.report.shells != 1;
 }
 
 MeshSolid::~MeshSolid() = default;
@@ -118,34 +136,35 @@ Eigen::AlignedBox3d MeshSolid::bounds() const { return impl_->bounds; }
 
 double MeshSolid::volume() const {
   const double scale = impl_->frame.scale();
-  return impl_->volume.value * scale * scale * scale;
+  return impl_->with_volume().value * scale * scale * scale;
 }
 
 double MeshSolid::volume_error() const {
   const double scale = impl_->frame.scale();
-  return impl_->volume.error * scale * scale * scale;
+  return impl_->with_volume().error * scale * scale * scale;
 }
 
 const UnitFrame& MeshSolid::frame() const { return impl_->frame; }
-double MeshSolid::unit_volume() const { return impl_->volume.value; }
-double MeshSolid::unit_volume_error() const { return impl_->volume.error; }
+double MeshSolid::unit_volume() const { return impl_->with_volume().value; }
+double MeshSolid::unit_volume_error() const { return impl_->with_volume().error; }
 std::uint64_t MeshSolid::hash() const { return impl_->hash; }
-const MeshView& MeshSolid::view() const { return impl_->view; }
+const MeshView& MeshSolid::view() const { return impl_->with_hierarchy(); }
+const MeshView& MeshSolid::arrays() const { return impl_->arrays; }
 
 ClosestPoint MeshSolid::closest_point(const Eigen::Vector3d& unit) const {
   return closest_point(unit, std::numeric_limits<double>::infinity());
 }
 
 ClosestPoint MeshSolid::closest_point(const Eigen::Vector3d& unit, double limit) const {
-  return exact_closest_point(impl_->view, unit, limit);
+  return exact_closest_point(view(), unit, limit);
 }
 
 int MeshSolid::winding_number(const Eigen::Vector3d& unit) const {
-  return ist::winding_number(impl_->view, unit.data());
+  return ist::winding_number(view(), unit.data());
 }
 
 void MeshSolid::line_crossings(double y, double z, std::vector<Crossing>& out) const {
-  ist::line_crossings(impl_->view, y, z, out);
+  ist::line_crossings(view(), y, z, out);
 }
 
 std::unique_ptr<Solid> make_solid(const ClosedMesh& mesh) {

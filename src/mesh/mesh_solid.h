@@ -25,7 +25,9 @@ struct Crossing {
 };
 
 /// The solid of a closed mesh. All internals live in the unit frame, in double; view() adds float
-/// copies for packing. Immutable; every function may be called from many threads at once.
+/// copies for packing. Immutable; every function may be called from many threads at once. The
+/// hierarchy and the volume are made when they are first asked for, on the caller's TBB threads: a
+/// bake on the GPU never asks for the hierarchy.
 class MeshSolid final : public Solid {
  public:
   explicit MeshSolid(const ClosedMesh& mesh);
@@ -40,7 +42,9 @@ class MeshSolid final : public Solid {
   double unit_volume() const;        ///< unit frame³
   double unit_volume_error() const;  ///< unit frame³
   std::uint64_t hash() const;        ///< XXH3-64 of vertices and triangles
-  const MeshView& view() const;      ///< plain arrays for host and device code
+  const MeshView& view() const;      ///< plain arrays for host code, the hierarchy included
+  /// The vertices and triangles of view() alone, without the hierarchy: nodes and blocks are null.
+  const MeshView& arrays() const;
 
   /// Exact to double rounding, over every triangle (inner walls included).
   ClosestPoint closest_point(const Eigen::Vector3d& unit) const;
