@@ -2,14 +2,16 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
@@ -18,6 +20,12 @@ extern char** environ;
 
 namespace ist::testing {
 namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 std::vector<char*> pointers(std::vector<std::string>& strings) {
   std::vector<char*> result;
@@ -43,28 +51,36 @@ Outcome run_ist(const std::filesystem::path& folder, const std::vector<std::stri
   argv_strings.insert(argv_strings.end(), arguments.begin(), arguments.end());
   std::vector<std::string> env_strings(options.environment);
   for (char** entry = environ; *entry != nullptr; ++entry) env_strings.emplace_back(*entry);
+  const std::vector<char*> argv = pointers(argv_strings), env = pointers(env_strings);
 
   int out_pipe[2], err_pipe[2];
   EXPECT_EQ(pipe2(out_pipe, O_CLOEXEC), 0);
   EXPECT_EQ(pipe2(err_pipe, O_CLOEXEC), 0);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
-  posix_spawn_file_actions_adddup2(&actions, out_pipe[1], STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, err_pipe[1], STDERR_FILENO);
-  pid_t child = -1;
-  const int spawned = posix_spawn(&child, IST_BINARY, &actions, nullptr,
-                                  pointers(argv_strings).data(), pointers(env_strings).data());
-  posix_spawn_file_actions_destroy(&actions);
+  const Clock::time_point start = Clock::now();
+  const pid_t child = fork();
+  if (child == 0) {
+    if (options.in_child) options.in_child();
+    if (dup2(out_pipe[1], STDOUT_FILENO) >= 0 && dup2(err_pipe[1], STDERR_FILENO) >= 0 &&
+        chdir(folder.c_str()) == 0)
+      execve(IST_BINARY, argv.data(), env.data());
+    _exit(127);
+  }
+  EXPECT_GT(child, 0);
   close(out_pipe[1]);
   close(err_pipe[1]);
-  EXPECT_EQ(spawned, 0) << IST_BINARY;
 
   Outcome outcome;
-  bool interrupted = options.interrupt_after.empty();
+  bool interrupted = options.interrupt_after.empty(), killed = options.kill_after <= 0;
   std::array<pollfd, 2> streams = {pollfd{out_pipe[0], POLLIN, 0}, pollfd{err_pipe[0], POLLIN, 0}};
-  while (spawned == 0 && (streams[0].fd >= 0 || streams[1].fd >= 0)) {
-    poll(streams.data(), streams.size(), -1);
+  while (child > 0 && (streams[0].fd >= 0 || streams[1].fd >= 0)) {
+    const double left = options.kill_after - seconds_since(start);
+    if (!killed && left <= 0) {
+      kill(child, SIGKILL);
+      killed = true;
+    }
+    const auto nanoseconds = static_cast<std::int64_t>(std::max(left, 0.0) * 1e9);
+    const timespec wait = {nanoseconds / 1'000'000'000, nanoseconds % 1'000'000'000};
+    ppoll(streams.data(), streams.size(), killed ? nullptr : &wait, nullptr);
     if (streams[0].revents != 0 && !drain(out_pipe[0], outcome.out)) streams[0].fd = -1;
     if (streams[1].revents != 0 && !drain(err_pipe[0], outcome.err)) streams[1].fd = -1;
     if (!interrupted && outcome.err.find(options.interrupt_after) != std::string::npos) {
@@ -75,8 +91,10 @@ Outcome run_ist(const std::filesystem::path& folder, const std::vector<std::stri
   close(out_pipe[0]);
   close(err_pipe[0]);
   int status = 0;
-  if (spawned == 0) waitpid(child, &status, 0);
+  rusage usage = {};
+  if (child > 0) wait4(child, &status, 0, &usage);
   outcome.exit_code = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+  outcome.peak_memory = static_cast<std::size_t>(usage.ru_maxrss) * 1024;
   return outcome;
 }
 

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -13,12 +15,16 @@ namespace ist::testing {
 struct Outcome {
   int exit_code = -1;  ///< 128 + signal if a signal ended it
   std::string out, err;
+  std::size_t peak_memory = 0;  ///< [bytes] resident
 };
 
 struct RunOptions {
-  std::vector<std::string> environment;  ///< NAME=value, added to this process's own
+  std::vector<std::string> environment = {};  ///< NAME=value, added to this process's own
   /// Send SIGINT once this text has appeared on stderr; "" = never.
-  std::string interrupt_after;
+  std::string interrupt_after = {};
+  double kill_after = 0;  ///< [s] SIGKILL if it still runs then; 0 = never
+  /// Called in the new process before `ist` starts in it.
+  std::function<void()> in_child = nullptr;
 };
 
 /// Runs `ist` with the arguments in the given folder and waits for its end.

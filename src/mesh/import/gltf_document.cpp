@@ -169,11 +169,11 @@ void GltfDocument::load_buffers() {
   const std::size_t count = root_.at("buffers").size();
   owned_.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const Json& buffer = at("buffers", i);
     const std::string name = "buffer " + std::to_string(i);
+    const Json& buffer = at("buffers", i, name);
     std::string_view bytes;
     if (buffer.contains("uri")) {
-      owned_[i] = external_buffer(buffer.at("uri"));
+      owned_[i] = external_buffer(buffer.at("uri"), name);
       bytes = owned_[i];
     } else {
       if (i != 0 || !binary_chunk_) fail(name + " has no data: no uri, and no binary chunk");
@@ -187,13 +187,13 @@ void GltfDocument::load_buffers() {
   }
 }
 
-std::string GltfDocument::external_buffer(const std::string& uri) const {
+std::string GltfDocument::external_buffer(const std::string& uri, const std::string& name) const {
   if (uri.substr(0, 5) == "data:") {
     const std::size_t comma = uri.find(";base64,");
     const auto bytes = comma == std::string::npos
                            ? std::nullopt
                            : decode_base64(std::string_view(uri).substr(comma + 8));
-    if (!bytes) fail("a data URI that is not base64");
+    if (!bytes) fail(name + " is a data URI that is not base64");
     return *bytes;
   }
   const std::filesystem::path relative = decode_percent(uri);
@@ -202,18 +202,19 @@ std::string GltfDocument::external_buffer(const std::string& uri) const {
       uri.find('\\') != std::string::npos || uri.find('\0') != std::string::npos ||
       std::any_of(relative.begin(), relative.end(), [](const auto& part) { return part == ".."; });
   if (leaves_folder)
-    fail("refers to " + in_quotes(uri) +
+    fail(name + " refers to " + in_quotes(uri) +
          ", outside its own folder: refused. Put the data beside it");
   return read_source_file((std::filesystem::path(file_.path).parent_path() / relative).string())
       .bytes;
 }
 
-const GltfDocument::Json& GltfDocument::at(const std::string& name, const std::size_t index) const {
+const GltfDocument::Json& GltfDocument::at(const std::string& name, const std::size_t index,
+                                           const std::string& from) const {
   const bool exists = root_.contains(name) && root_.at(name).is_array();
   const std::size_t count = exists ? root_.at(name).size() : 0;
   if (index >= count)
-    fail("refers to entry " + std::to_string(index) + " of " + in_quotes(name) + ", which has " +
-         std::to_string(count));
+    fail(from + " refers to entry " + std::to_string(index) + " of " + in_quotes(name) +
+         ", which has " + std::to_string(count));
   return root_.at(name)[index];
 }
 
@@ -226,16 +227,16 @@ std::size_t GltfDocument::whole(const Json& object, const std::string& key,
   return *found;
 }
 
-double GltfDocument::real(const Json& value) const {
+double GltfDocument::real(const Json& value, const std::string& where) const {
   const double number = value.get<double>();
   if (!(std::abs(number) <= static_cast<double>(std::numeric_limits<float>::max())))
-    fail("the number " + in_quotes(value.dump()) + " does not fit into float32");
+    fail(where + ": the number " + in_quotes(value.dump()) + " does not fit into float32");
   return number;
 }
 
-std::vector<double> GltfDocument::accessor(const std::size_t index,
-                                           const std::string_view type) const {
-  const Json& accessor = at("accessors", index);
+std::vector<double> GltfDocument::accessor(const std::size_t index, const std::string_view type,
+                                           const std::string& from) const {
+  const Json& accessor = at("accessors", index, from);
   const std::string name = "accessor " + std::to_string(index);
   const std::string stored_type = accessor.at("type");
   if (stored_type != type)
@@ -249,9 +250,9 @@ std::vector<double> GltfDocument::accessor(const std::size_t index,
   const std::size_t width = type == "SCALAR" ? 1 : 3;
   const std::size_t element = width * component->bytes;
 
-  const Json& view = at("bufferViews", whole(accessor, "bufferView"));
+  const Json& view = at("bufferViews", whole(accessor, "bufferView"), name);
   const std::size_t buffer = whole(view, "buffer");
-  at("buffers", buffer);
+  at("buffers", buffer, name);
   const std::size_t view_offset = whole(view, "byteOffset", 0);
   const std::size_t view_length = whole(view, "byteLength");
   const std::string_view bytes = buffers_[buffer];

@@ -23,17 +23,19 @@ class GltfDocument {
   explicit GltfDocument(const SourceFile& file);
 
   const Json& root() const { return root_; }
-  /// Member `index` of the array `name` at the top level.
-  const Json& at(const std::string& name, std::size_t index) const;
+  /// Member `index` of the array `name` at the top level; `from` is what refers to it, for
+  /// messages.
+  const Json& at(const std::string& name, std::size_t index, const std::string& from) const;
   /// A whole number ≥ 0 under `key`.
   std::size_t whole(const Json& object, const std::string& key,
                     std::optional<std::size_t> fallback = std::nullopt) const;
-  /// A number that float32 can hold, as all of glTF's are.
-  double real(const Json& value) const;
+  /// A number that float32 can hold, as all of glTF's are; `where` it stands, for messages.
+  double real(const Json& value, const std::string& where) const;
 
   /// All components of an accessor, one after the other. `type` is "SCALAR", "VEC3"; a number from
-  /// the binary data may be infinite or NaN.
-  std::vector<double> accessor(std::size_t index, std::string_view type) const;
+  /// the binary data may be infinite or NaN. `from` as in at().
+  std::vector<double> accessor(std::size_t index, std::string_view type,
+                               const std::string& from) const;
 
   [[noreturn]] void fail(const std::string& what) const;
 
@@ -41,7 +43,7 @@ class GltfDocument {
   std::string_view parse_container();
   void check_extensions() const;
   void load_buffers();
-  std::string external_buffer(const std::string& uri) const;
+  std::string external_buffer(const std::string& uri, const std::string& name) const;
 
   const SourceFile& file_;
   Json root_;

@@ -71,8 +71,9 @@ PolygonMesh read_off(const SourceFile& file) {
     for (std::int64_t k = 0; k < corners; ++k) {
       const std::string_view word = next_word();
       if (word.empty())
-        scanner.fail("face " + std::to_string(i) + " has fewer than the " +
-                     std::to_string(corners) + " corners it announces");
+        scanner.fail((scanner.bytes_left() == 0 ? "the file ends early: face " : "face ") +
+                     std::to_string(i) + " has fewer than the " + std::to_string(corners) +
+                     " corners it announces");
       const std::int64_t index = scanner.integer(word);
       if (index < 0 || static_cast<std::uint64_t>(index) >= vertex_count)
         scanner.fail("face " + std::to_string(i) + ": vertex " + std::to_string(index) +
