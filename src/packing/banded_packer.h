@@ -201,7 +201,8 @@ class BandedPacker {
     std::vector<float> radius(winners.size());
     for_each_index(0, winners.size(), [&](std::size_t i) {
       const Candidate& c = candidates[winners[i].index];
-      const double to_surface = gap_to_surface(surface_.clearance(SerialTeam{}, c.centre));
+      const double to_surface =
+          gap_to_surface(surface_.clearance(SerialTeam{}, c.centre, clearance_limit(c.radius)));
       radius[i] = certified_radius(SerialTeam{}, c.centre, c.radius,
                                    std::min(winners[i].gap, to_surface), spheres);
     });

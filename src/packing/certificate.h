@@ -27,8 +27,10 @@ IST_HD inline double gap_to_sphere(Float3 centre, const Sphere& s) {
   return std::sqrt(x * x + y * y + z * z) - double{s.r} - kGap;
 }
 
-/// The same next to the surface at the exact distance `clearance`, positive inside.
+/// The same next to the surface at the exact distance `clearance`, positive inside. To certify a
+/// candidate only distances below clearance_limit() of its radius matter.
 IST_HD inline double gap_to_surface(double clearance) { return clearance - kGap; }
+IST_HD inline double clearance_limit(float radius) { return 1.001 * double{radius}; }
 
 /// Certified radius of a candidate: no more than its own radius and all its gaps; ≤ 0 if there is
 /// no room. `gap`: least of those to the surface and to the winners of the same round that go

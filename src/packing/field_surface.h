@@ -57,7 +57,7 @@ class FieldSurface {
     return value(x) > 0;
   }
   template <class Team>
-  double clearance(const Team&, Float3 x) const {
+  double clearance(const Team&, Float3 x, double) const {
     return value(x);
   }
 

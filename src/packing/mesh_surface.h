@@ -86,10 +86,11 @@ class MeshSurface {
     return solid_.winding_number(exact(x)) == 1;
   }
 
-  /// Exact clearance of a point for certification: distance to the surface, negative outside.
+  /// Exact clearance of a point for certification: distance to the surface, `limit` if it is not
+  /// less, negative outside.
   template <class Team>
-  double clearance(const Team&, Float3 x) const {
-    return solid_.inside(exact(x)) ? solid_.closest_point(exact(x)).distance : -1.0;
+  double clearance(const Team&, Float3 x, double limit) const {
+    return solid_.inside(exact(x)) ? solid_.closest_point(exact(x), limit).distance : -1.0;
   }
 
  private:

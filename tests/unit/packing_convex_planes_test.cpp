@@ -44,7 +44,7 @@ TEST(ConvexPlanes, NoClearanceInTheCellExceedsThem) {
     (count > 0 ? answered : refused)++;
     for (int i = 0; i < 40 && count > 0; ++i) {
       const Float3 y = half * Float3{unit(random), unit(random), unit(random)};
-      const double clearance = surface.clearance(team, x + y);
+      const double clearance = surface.clearance(team, x + y, 10);
       if (clearance < 0) continue;
       for (int k = 0; k < count; ++k)
         ASSERT_LE(clearance, planes.distance[k] + dot(get(planes, k).gradient, y) + 1e-6)

@@ -1,0 +1,83 @@
+#pragma once
+
+#include "mesh/wide_nearest.h"
+#include "mesh/wide_rays.h"
+#include "packing/surface_triangle.h"
+
+namespace ist::packing {
+
+/// The surface of a mesh as the GPU asks it: MeshSurface over a WideTree, with the same answers bit
+/// for bit. Features are triangles, named by their slots.
+class WideMeshSurface {
+ public:
+  using Feature = std::uint32_t;
+
+  IST_HD explicit WideMeshSurface(const WideTree& tree) : tree_(tree) {}
+
+  template <class Team>
+  IST_HD bool nearest(const Team& team, Float3 x, float limit, Feature& feature,
+                      float& distance) const {
+    const float p[3] = {x.x, x.y, x.z};
+    const WideNearest found = ist::nearest(team, tree_, p, limit * limit);
+    feature = found.slot;
+    distance = sqrtf(found.distance2);
+    return found.triangle != kNoTriangle;
+  }
+
+  IST_HD SurfaceTriangle triangle(Feature feature) const {
+    const WideBlock& b = tree_.blocks[feature / kWideWidth];
+    const auto lane = static_cast<int>(feature % kWideWidth);
+    return {{b.origin[0][lane], b.origin[1][lane], b.origin[2][lane]},
+            {b.u[0][lane], b.u[1][lane], b.u[2][lane]},
+            {b.v[0][lane], b.v[1][lane], b.v[2][lane]},
+            {b.n[0][lane], b.n[1][lane], b.n[2][lane]},
+            b.length[lane],
+            b.apex[lane],
+            b.height[lane],
+            b.triangle[lane]};
+  }
+
+  IST_HD FeatureOffset offset(Feature feature, Float3 x) const {
+    return triangle_offset(triangle(feature), x);
+  }
+
+  template <class Team>
+  IST_HD int triangles_within(const Team& team, Float3 x, float radius2, Feature* out,
+                              int most) const {
+    const float p[3] = {x.x, x.y, x.z};
+    const int count = ist::triangles_within(team, tree_, p, radius2, out, most);
+    return count > most ? -1 : count;
+  }
+
+  template <class Team>
+  IST_HD int convex_planes(const Team& team, Float3 x, float h, bool x_inside, Feature* triangles,
+                           int most, SampleMemory& out, int from) const {
+    return packing::convex_planes(team, *this, x, h, x_inside, triangles, most, out, from);
+  }
+
+  template <class Team>
+  IST_HD int winding_number(const Team& team, Float3 x) const {
+    const double p[3] = {x.x, x.y, x.z};
+    return ist::winding_number(team, tree_, p);
+  }
+  template <class Team>
+  IST_HD bool inside(const Team& team, Float3 x) const {
+    return winding_number(team, x) >= 1;
+  }
+  template <class Team>
+  IST_HD bool inside_once(const Team& team, Float3 x) const {
+    return winding_number(team, x) == 1;
+  }
+
+  template <class Team>
+  IST_HD double clearance(const Team& team, Float3 x, double limit) const {
+    if (!inside(team, x)) return -1;
+    const double p[3] = {x.x, x.y, x.z};
+    return exact_nearest(team, tree_, p, limit).distance;
+  }
+
+ private:
+  WideTree tree_;
+};
+
+}  // namespace ist::packing

@@ -1,0 +1,157 @@
+#pragma once
+
+#include <ucontext.h>
+
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <random>
+#include <stdexcept>
+#include <vector>
+
+#include "mesh/team.h"
+
+namespace ist::testing {
+
+/// Runs the lanes of a team of the given width on one thread of the host, as a warp runs them on
+/// the GPU but in an order that changes from one common call to the next: what is right here needs
+/// no luck. Throws where lanes do not make the same calls.
+template <int Width>
+class Fibers {
+ public:
+  explicit Fibers(unsigned seed) : random_(seed) {}
+
+  /// body(lane) on every lane; returns when all have returned.
+  void run(const std::function<void(int)>& body) {
+    body_ = &body;
+    Fibers*& current = current_fibers();
+    current = this;
+    call_.assign(Width, 0);
+    done_.assign(Width, false);
+    round_ = 0;
+    for (int i = 0; i < Width; ++i) {
+      if (stack_[i] == nullptr) stack_[i] = std::make_unique<char[]>(kStackSize);
+      getcontext(&lane_[i]);
+      lane_[i].uc_stack.ss_sp = stack_[i].get();
+      lane_[i].uc_stack.ss_size = kStackSize;
+      lane_[i].uc_link = &main_;
+      makecontext(&lane_[i], reinterpret_cast<void (*)()>(&Fibers::enter), 1, i);
+    }
+    for (bool running = true; running; ++round_) {
+      int order[Width];
+      for (int i = 0; i < Width; ++i) order[i] = i;
+      for (int i = Width - 1; i > 0; --i)
+        std::swap(order[i], order[static_cast<int>(random_() % static_cast<unsigned>(i + 1))]);
+      for (const int i : order) swapcontext(&main_, &lane_[i]);
+      running = !done_[0];
+      for (int i = 1; i < Width; ++i)
+        if (done_[i] != done_[0] || (running && call_[i] != call_[0]))
+          throw std::logic_error("lanes of a team went different ways");
+    }
+  }
+
+  /// One lane's part of a call that all make: gives its value, gets everyone's.
+  const std::uint64_t* exchange(int lane, int call, std::uint64_t value) {
+    std::uint64_t* slots = slots_[round_ % 2];
+    slots[lane] = value;
+    call_[lane] = call;
+    swapcontext(&lane_[lane], &main_);
+    return slots;
+  }
+
+ private:
+  static constexpr std::size_t kStackSize = 256 * 1024;
+  static Fibers*& current_fibers() {
+    static thread_local Fibers* current = nullptr;
+    return current;
+  }
+  static void enter(int lane) {
+    Fibers& fibers = *current_fibers();
+    (*fibers.body_)(lane);
+    fibers.done_[lane] = true;
+  }
+
+  std::mt19937 random_;
+  const std::function<void(int)>* body_ = nullptr;
+  ucontext_t main_, lane_[Width];
+  std::unique_ptr<char[]> stack_[Width];
+  std::vector<int> call_;
+  std::vector<bool> done_;
+  std::uint64_t slots_[2][Width] = {};
+  unsigned round_ = 0;
+};
+
+/// A team (mesh/team.h) whose lanes are Fibers.
+template <int Width>
+class FiberTeam {
+ public:
+  static constexpr int kWidth = Width;
+
+  FiberTeam(Fibers<Width>& fibers, int lane) : fibers_(fibers), lane_(lane) {}
+
+  int lane() const { return lane_; }
+  void sync() const { fibers_.exchange(lane_, 1, 0); }
+
+  template <class T>
+  T min(T value) const {
+    const std::uint64_t* all = fibers_.exchange(lane_, 2, coded(value));
+    std::uint64_t least = all[0];
+    for (int i = 1; i < Width; ++i) least = all[i] < least ? all[i] : least;
+    return decoded<T>(least);
+  }
+  template <class T>
+  T max(T value) const {
+    const std::uint64_t* all = fibers_.exchange(lane_, 3, coded(value));
+    std::uint64_t most = all[0];
+    for (int i = 1; i < Width; ++i) most = all[i] > most ? all[i] : most;
+    return decoded<T>(most);
+  }
+  int sum(int value) const {
+    const std::uint64_t* all = fibers_.exchange(lane_, 4, coded(value));
+    int total = 0;
+    for (int i = 0; i < Width; ++i) total += decoded<int>(all[i]);
+    return total;
+  }
+  bool any(bool flag) const { return sum(flag ? 1 : 0) > 0; }
+  bool all(bool flag) const { return sum(flag ? 1 : 0) == Width; }
+  int exclusive_count(bool flag, int& total) const {
+    const std::uint64_t* all = fibers_.exchange(lane_, 5, flag ? 1 : 0);
+    int before = 0;
+    total = 0;
+    for (int i = 0; i < Width; ++i) {
+      before += i < lane_ ? static_cast<int>(all[i]) : 0;
+      total += static_cast<int>(all[i]);
+    }
+    return before;
+  }
+  template <class T>
+  T broadcast(T value, int from) const {
+    return decoded<T>(fibers_.exchange(lane_, 6, coded(value))[from]);
+  }
+
+ private:
+  static std::uint64_t coded(float x) { return ordered_bits(x); }
+  static std::uint64_t coded(double x) { return ordered_bits(x); }
+  static std::uint64_t coded(std::uint32_t x) { return x; }
+  static std::uint64_t coded(std::uint64_t x) { return x; }
+  static std::uint64_t coded(int x) {
+    return static_cast<std::uint64_t>(std::int64_t{x} + (1ll << 40));
+  }
+  template <class T>
+  static T decoded(std::uint64_t code) {
+    if constexpr (std::is_same_v<T, float>)
+      return from_ordered_bits(static_cast<std::uint32_t>(code));
+    else if constexpr (std::is_same_v<T, double>)
+      return from_ordered_bits(code);
+    else if constexpr (std::is_same_v<T, int>)
+      return static_cast<int>(static_cast<std::int64_t>(code) - (1ll << 40));
+    else
+      return static_cast<T>(code);
+  }
+
+  Fibers<Width>& fibers_;
+  int lane_;
+};
+
+}  // namespace ist::testing
