@@ -36,7 +36,7 @@ struct PackingSettings {
   std::uint64_t seed = 0;             ///< tie-breaks only; any value packs equally well
   unsigned threads = 0;               ///< 0 = all cores; never changes the result
   Device device = Device::automatic;  ///< a Solid that is not a mesh is always packed on the CPU
-  GpuSettings gpu;                    ///< where `device` is a GPU
+  GpuSettings gpu = {};               ///< where `device` is a GPU
 };
 
 /// Certified, non-overlapping spheres inside a solid, in insertion order: every prefix is a valid
