@@ -1,6 +1,7 @@
 #include <ist/error.h>
 #include <ist/packing.h>
 
+#include "packing/band_limits.h"
 #include "packing/banded_packer.h"
 #include "packing/field_surface.h"
 #include "packing/mesh_surface.h"
@@ -15,13 +16,7 @@ SpherePacking pack(const Solid& solid, const PackingSettings& settings,
   const auto* mesh = dynamic_cast<const MeshSolid*>(&solid);
   const UnitFrame frame = mesh != nullptr ? mesh->frame() : unit_frame(solid.bounds());
   const double scale = frame.scale();
-  packing::BandLimits limits;
-  limits.volume = solid.volume() / scale / scale / scale;
-  limits.target_coverage = settings.target_coverage;
-  limits.min_radius = settings.min_radius / scale;
-  limits.epsilon = settings.epsilon;
-  limits.max_spheres = settings.max_spheres;
-  limits.seed = settings.seed;
+  const packing::BandLimits limits = packing::band_limits(solid, scale, settings);
   if (!(limits.volume > 0)) throw Error("packing: the solid's volume is not positive");
 
   SpherePacking result;

@@ -1,0 +1,122 @@
+// How long the GPU takes from a mesh's triangles in pageable host memory to certified spheres in
+// host memory: upload and hierarchy every time, only context and memory pool kept.
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <ist/packing.h>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "banded_pack.h"
+#include "device_mesh.h"
+#include "mesh/mesh_solid.h"
+#include "report.h"
+#include "support/shared_data.h"
+#include "timing.h"
+
+namespace {
+
+using ist::benchmark::Report;
+
+std::string fingerprint(const ist::SpherePacking& packing) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx",
+                static_cast<unsigned long long>(XXH3_64bits(
+                    packing.spheres.data(), packing.spheres.size() * sizeof(ist::Sphere))));
+  return text;
+}
+
+struct Run {
+  double mesh = 0, all = 0;  ///< [s] until the mesh is on the device; until the spheres are here
+  double peak = 0;           ///< [MiB] of device memory
+  ist::gpu::BandedCost cost;
+  ist::SpherePacking packing;
+};
+
+/// `split`: waits for the mesh, to see how long it takes alone.
+Run run_once(const ist::MeshSolid& solid, std::size_t count, bool split) {
+  const ist::MeshView& view = solid.view();
+  const ist::gpu::HostMesh mesh{
+      view.vertices_exact, view.triangles, view.vertex_count, view.triangle_count, {}, 1};
+  ist::packing::BandLimits limits;
+  limits.volume = solid.unit_volume();
+  limits.max_spheres = count;
+  ist::gpu::Queue queue{ist::GpuSettings{}};
+  Run run;
+  const double start = ist::benchmark::wall_seconds();
+  {
+    const ist::gpu::DeviceMesh on_device(queue, mesh);
+    if (split) {
+      queue.wait();
+      run.mesh = ist::benchmark::wall_seconds() - start;
+    }
+    run.packing = pack_banded(queue, on_device.tree(), limits, 1, 0, {}, &run.cost);
+  }
+  run.all = ist::benchmark::wall_seconds() - start;
+  run.peak = static_cast<double>(queue.peak_bytes()) / (1 << 20);
+  return run;
+}
+
+void measure(const std::string& name, const ist::MeshSolid& solid,
+             const std::vector<std::size_t>& counts, int repeats, Report& report) {
+  for (const std::size_t count : counts) {
+    std::vector<double> ms, mesh_ms;
+    Run last;
+    run_once(solid, count, false);
+    for (int i = 0; i < repeats; ++i) {
+      last = run_once(solid, count, false);
+      ms.push_back(last.all * 1e3);
+    }
+    for (int i = 0; i < 3; ++i) mesh_ms.push_back(run_once(solid, count, true).mesh * 1e3);
+    report.row("Packing on the GPU", {{"mesh", name},
+                                      {"triangles", solid.view().triangle_count},
+                                      {"spheres", last.packing.spheres.size()},
+                                      {"coverage", last.packing.coverage},
+                                      {"ms, median", ist::benchmark::quantile(ms, 0.5)},
+                                      {"least", ist::benchmark::quantile(ms, 0)},
+                                      {"most", ist::benchmark::quantile(ms, 1)},
+                                      {"mesh alone, ms", ist::benchmark::quantile(mesh_ms, 0.5)},
+                                      {"work, ms", last.cost.work * 1e3},
+                {"split, ms", last.cost.split * 1e3},
+                {"select, ms", last.cost.select * 1e3},
+                {"grid, ms", last.cost.grid * 1e3},
+                {"rest, ms", last.cost.rest * 1e3},
+                {"rounds", last.packing.rounds},
+                                      {"levels", last.cost.levels},
+                                      {"steps", last.cost.steps},
+                                      {"cells worked on", last.cost.cells_worked},
+                                      {"launches", last.cost.launches},
+                                      {"peak MiB", last.peak},
+                                      {"hash", fingerprint(last.packing)}});
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Report report("gpu_packing", argc, argv);
+  const std::vector<std::size_t> counts =
+      report.quick() ? std::vector<std::size_t>{100, 1'000, 10'000}
+                     : std::vector<std::size_t>{100, 1'000, 10'000, 100'000};
+  try {
+    for (const char* file : {"oracle/meshes/dino.off", "meshes/dev/dragon_871k.ply",
+                             "oracle/meshes/elephant.off", "meshes/dev/unit_cube.stl"}) {
+      const std::filesystem::path path = ist::testing::shared_path(file);
+      if (!std::filesystem::exists(path)) {
+        report.remark("missing: " + std::string(file));
+        continue;
+      }
+      const std::string name = path.stem().string();
+      const ist::MeshSolid solid(ist::close_mesh(ist::load_mesh(path.string()), name));
+      measure(name, solid, counts, 10, report);
+    }
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+  return report.write();
+}

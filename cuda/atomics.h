@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+
+#include "mesh/host_device.h"
+
+// Relaxed atomics for host and device. Each returns the value before. What they build is a sum, a
+// maximum or a set, so that the order in which threads come to them does not show.
+
+namespace ist::gpu {
+
+IST_HD inline std::uint32_t atomic_add(std::uint32_t* at, std::uint32_t value) {
+#ifdef __CUDA_ARCH__
+  return atomicAdd(at, value);
+#else
+  return __atomic_fetch_add(at, value, __ATOMIC_RELAXED);
+#endif
+}
+
+IST_HD inline std::uint64_t atomic_add(std::uint64_t* at, std::uint64_t value) {
+#ifdef __CUDA_ARCH__
+  return atomicAdd(reinterpret_cast<unsigned long long*>(at), value);
+#else
+  return __atomic_fetch_add(at, value, __ATOMIC_RELAXED);
+#endif
+}
+
+IST_HD inline std::uint32_t atomic_or(std::uint32_t* at, std::uint32_t bits) {
+#ifdef __CUDA_ARCH__
+  return atomicOr(at, bits);
+#else
+  return __atomic_fetch_or(at, bits, __ATOMIC_RELAXED);
+#endif
+}
+
+IST_HD inline std::uint32_t atomic_and(std::uint32_t* at, std::uint32_t bits) {
+#ifdef __CUDA_ARCH__
+  return atomicAnd(at, bits);
+#else
+  return __atomic_fetch_and(at, bits, __ATOMIC_RELAXED);
+#endif
+}
+
+IST_HD inline std::uint32_t atomic_exchange(std::uint32_t* at, std::uint32_t value) {
+#ifdef __CUDA_ARCH__
+  return atomicExch(at, value);
+#else
+  return __atomic_exchange_n(at, value, __ATOMIC_RELAXED);
+#endif
+}
+
+/// Writes `value` if `expected` is there.
+IST_HD inline std::uint32_t atomic_replace(std::uint32_t* at, std::uint32_t expected,
+                                           std::uint32_t value) {
+#ifdef __CUDA_ARCH__
+  return atomicCAS(at, expected, value);
+#else
+  __atomic_compare_exchange_n(at, &expected, value, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED);
+  return expected;
+#endif
+}
+
+IST_HD inline std::uint32_t atomic_max(std::uint32_t* at, std::uint32_t value) {
+#ifdef __CUDA_ARCH__
+  return atomicMax(at, value);
+#else
+  std::uint32_t old = __atomic_load_n(at, __ATOMIC_RELAXED);
+  while (old < value &&
+         !__atomic_compare_exchange_n(at, &old, value, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
+  }
+  return old;
+#endif
+}
+
+/// A value that others may be changing.
+IST_HD inline std::uint32_t atomic_load(const std::uint32_t* at) {
+#ifdef __CUDA_ARCH__
+  return *static_cast<const volatile std::uint32_t*>(at);
+#else
+  return __atomic_load_n(at, __ATOMIC_RELAXED);
+#endif
+}
+
+}  // namespace ist::gpu

@@ -1,0 +1,184 @@
+#pragma once
+
+#include "banded_state.h"
+
+// What comes after each step: run by one thread at a meeting, while nobody works.
+
+namespace ist::gpu {
+
+IST_HD inline void to_sweep(BandedState& s) {
+  s.schedule.begin_cleaning();
+  s.free = s.free_taken = s.live = 0;
+  s.top = s.dropped = 0;
+  s.step = Step::sweep;
+}
+
+/// The next round of the band, or the next band.
+IST_HD inline void to_round(BandedState& s) {
+  if (s.frontier == 0 || s.schedule.stopped) {
+    s.schedule.end_band();
+    s.schedule.drop(float_of(s.dropped));
+    if (s.schedule.stopped)
+      s.step = Step::finished;
+    else
+      to_sweep(s);
+    return;
+  }
+  s.active = s.splitting = 0;
+  s.largest_radius = s.largest_bound = 0;
+  s.classes = s.schedule.classes(s.frontier);
+  s.cell_class = 0;
+  s.step = Step::work;
+}
+
+IST_HD inline void after_start(BandedState& s) {
+  s.slots = 1;
+  to_sweep(s);
+}
+
+IST_HD inline void after_sweep(BandedState& s) {
+  s.schedule.drop(float_of(s.dropped));
+  s.dropped = 0;
+  s.active = s.frontier = s.frontier_array = 0;
+  switch (s.schedule.begin_band(float_of(s.top))) {
+    case packing::BandStep::restart:
+      s.step = Step::start;
+      break;
+    case packing::BandStep::stop:
+      s.step = Step::finished;
+      break;
+    case packing::BandStep::work:
+      s.step = s.after_grid = Step::activate;
+      if (s.schedule.rebuild_grid) {
+        s.layout = packing::sphere_grid_layout(s.schedule.grid_spheres, s.schedule.grid_reach);
+        s.step = Step::clear_grid;
+      }
+      break;
+  }
+}
+
+IST_HD inline void after_clear_grid(BandedState& s) {
+  s.use = {SphereLists::kFirstWord, 0, 0};
+  s.step = Step::touch_all;
+}
+
+/// After a pass that may have found the pools of the sphere grid too small.
+IST_HD inline void after_grid_pass(const BandedArrays& a, Step next) {
+  BandedState& s = *a.state;
+  if (a.grid().overflown()) {
+    s.need = Need::grid;
+    s.step = Step::clear_grid;
+  } else {
+    s.step = s.use.pairs > 0 ? next : s.after_grid;
+  }
+}
+
+IST_HD inline void after_fill(BandedState& s) {
+  s.use.pairs = 0;
+  s.step = s.after_grid;
+}
+
+IST_HD inline void finish_round(BandedState& s, std::uint32_t inserted) {
+  const bool more = s.schedule.end_round(inserted);
+  s.frontier = more ? s.active : 0;
+  s.frontier_array = 1 - s.frontier_array;
+  to_round(s);
+}
+
+IST_HD inline void to_selection(const BandedArrays& a) {
+  BandedState& s = *a.state;
+  s.winners = s.accepted = 0;
+  s.volume = 0;
+  if (s.active == 0) {
+    finish_round(s, 0);
+    return;
+  }
+  s.buckets = packing::candidate_buckets(float_of(s.largest_radius), s.active);
+  s.step = Step::collect;
+  if (s.active > a.candidate_capacity) s.need = Need::candidates;
+}
+
+IST_HD inline void after_work(const BandedArrays& a) {
+  BandedState& s = *a.state;
+  if (s.cell_class == 0) {
+    ++s.levels;
+    s.worked += s.frontier;
+  }
+  if (s.stop_asked != 0) {
+    s.schedule.stop(static_cast<StopReason>(s.stop_asked - 1));
+    s.step = Step::finished;
+  } else if (s.schedule.enough(s.active)) {
+    to_selection(a);
+  } else if (++s.cell_class < s.classes) {
+    s.step = Step::work;
+  } else if (s.schedule.gives_up(s.splitting, s.live) || s.splitting == 0) {
+    if (s.schedule.stopped)
+      s.step = Step::finished;
+    else
+      to_selection(a);
+  } else {
+    s.live -= s.splitting;
+    s.frontier = 0;
+    s.step = Step::split;
+  }
+}
+
+IST_HD inline void after_split(const BandedArrays& a) {
+  BandedState& s = *a.state;
+  if (s.slots > a.cell_capacity) {
+    s.slots = a.cell_capacity;
+    s.free = s.free_taken = 0;
+    s.need = Need::cells;
+    return;
+  }
+  if (s.free_taken > s.free) s.free_taken = s.free;
+  s.free += s.splitting;
+  if (s.frontier == 0) {
+    to_selection(a);
+  } else {
+    s.splitting = 0;
+    s.classes = s.schedule.classes(s.frontier);
+    s.cell_class = 0;
+    s.step = Step::work;
+  }
+}
+
+IST_HD inline std::uint64_t spheres_left(const BandedState& s) {
+  const packing::BandSchedule& schedule = s.schedule;
+  return schedule.limits.max_spheres > 0 ? schedule.limits.max_spheres - schedule.spheres
+                                         : ~std::uint64_t{0};
+}
+
+IST_HD inline void after_find_winners(const BandedArrays& a) {
+  BandedState& s = *a.state;
+  const std::uint64_t left = spheres_left(s);
+  const std::uint64_t coming = s.winners < left ? s.winners : left;
+  if (s.schedule.spheres + coming > a.sphere_capacity) s.need = Need::spheres;
+  s.step = Step::certify;
+}
+
+IST_HD inline void after_insert(const BandedArrays& a) {
+  BandedState& s = *a.state;
+  packing::BandSchedule& schedule = s.schedule;
+  const std::uint64_t left = spheres_left(s);
+  const auto inserted = static_cast<std::uint32_t>(s.accepted < left ? s.accepted : left);
+  if (schedule.covered + s.volume < schedule.volume_wanted && inserted < left) {
+    schedule.spheres += inserted;
+    schedule.covered += s.volume;
+  } else {
+    // The packing stops among these: one by one, to find where.
+    for (std::uint64_t first = schedule.spheres, i = 0; i < inserted && !schedule.stopped; ++i)
+      schedule.insert(a.spheres[first + i].r);
+  }
+  if (a.mailbox != nullptr) {
+    a.mailbox->spheres = static_cast<std::uint32_t>(schedule.spheres);
+    a.mailbox->covered = schedule.covered;
+    a.mailbox->radius = schedule.threshold;
+  }
+  finish_round(s, inserted);
+  if (s.step == Step::finished) return;
+  s.after_grid = s.step;
+  after_grid_pass(a, Step::count);
+}
+
+}  // namespace ist::gpu

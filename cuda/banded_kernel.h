@@ -1,0 +1,20 @@
+#pragma once
+
+#include "banded_state.h"
+#include "mesh/wide_tree.h"
+#include "queue.h"
+
+namespace ist::gpu {
+
+/// Where the blocks of a cooperative kernel meet; zero before the first launch.
+struct MeetingPlace {
+  std::uint32_t here;
+  std::uint32_t generation;
+};
+
+/// Enqueues a crew that packs from the step that the state says until it is finished or needs
+/// something (banded_loop.h).
+void launch_banded(Queue& queue, const BandedArrays& arrays, const WideTree& mesh,
+                   MeetingPlace* place);
+
+}  // namespace ist::gpu

@@ -1,0 +1,154 @@
+#include "banded_pack.h"
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <thread>
+
+#include "banded_buffers.h"
+#include "banded_kernel.h"
+#include "device_array.h"
+
+namespace ist::gpu {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// The host's side of a packing that somebody looks on at: reports progress while the kernel runs,
+/// and tells it to stop.
+class Watch {
+ public:
+  Watch(const packing::BandLimits& limits, double length_unit, double time_limit,
+        const ProgressCallback& progress)
+      : limits_(limits), length_unit_(length_unit), time_limit_(time_limit), progress_(progress) {
+    if (time_limit <= 0 && !progress) return;
+    void* memory = nullptr;
+    check(cudaHostAlloc(&memory, sizeof(Mailbox), cudaHostAllocMapped | cudaHostAllocPortable),
+          "allocating pinned host memory");
+    mailbox_ = new (memory) Mailbox{};
+  }
+  ~Watch() {
+    if (mailbox_ != nullptr) cudaFreeHost(mailbox_);
+  }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+
+  Mailbox* mailbox() const { return mailbox_; }
+
+  /// Waits for the queue's work.
+  void wait(Queue& queue) {
+    if (mailbox_ == nullptr) return queue.wait();
+    for (;;) {
+      const cudaError_t status = cudaStreamQuery(queue.stream());
+      if (status != cudaErrorNotReady) {
+        check(status, "packing");
+        return;
+      }
+      look();
+      // A short packing is waited for at once, a long one does not need a core.
+      if (Clock::now() - start_ > std::chrono::milliseconds(50))
+        std::this_thread::sleep_for(std::chrono::microseconds(500));
+    }
+  }
+
+ private:
+  void look() {
+    const auto now = Clock::now();
+    const double elapsed = std::chrono::duration<double>(now - start_).count();
+    if (time_limit_ > 0 && elapsed >= time_limit_) stop(StopReason::time_limit);
+    if (!progress_ || now - last_report_ < std::chrono::milliseconds(100)) return;
+    last_report_ = now;
+    Progress p;
+    p.stage = "pack";
+    p.spheres = mailbox_->spheres;
+    p.coverage = static_cast<double>(mailbox_->covered) * packing::kVolumeUnit / limits_.volume;
+    p.radius = double{mailbox_->radius} * length_unit_;
+    p.fraction = p.coverage / limits_.target_coverage;
+    if (limits_.max_spheres > 0)
+      p.fraction = std::max(
+          p.fraction, static_cast<double>(p.spheres) / static_cast<double>(limits_.max_spheres));
+    p.elapsed = elapsed;
+    try {
+      if (!progress_(p)) stop(StopReason::cancelled);
+    } catch (...) {
+      stop(StopReason::cancelled);
+      throw;
+    }
+  }
+
+  void stop(StopReason why) {
+    if (mailbox_->stop == 0) mailbox_->stop = 1 + static_cast<std::uint32_t>(why);
+  }
+
+  const packing::BandLimits& limits_;
+  const double length_unit_, time_limit_;
+  const ProgressCallback& progress_;
+  const Clock::time_point start_ = Clock::now();
+  Clock::time_point last_report_ = start_;
+  Mailbox* mailbox_ = nullptr;
+};
+
+BandedCost cost_of(const BandedState& state, std::uint32_t launches) {
+  BandedCost cost{state.worked, state.levels, state.steps, launches};
+  for (int i = 0; i < static_cast<int>(Step::finished); ++i) {
+    const double seconds = static_cast<double>(state.time[i]) * 1e-9;
+    switch (static_cast<Step>(i)) {
+      case Step::work:
+        cost.work += seconds;
+        break;
+      case Step::split:
+        cost.split += seconds;
+        break;
+      case Step::collect:
+      case Step::dominate:
+      case Step::certify:
+      case Step::insert:
+        cost.select += seconds;
+        break;
+      case Step::clear_grid:
+      case Step::touch_all:
+      case Step::count:
+      case Step::make_room:
+      case Step::fill:
+        cost.grid += seconds;
+        break;
+      default:
+        cost.rest += seconds;
+        break;
+    }
+  }
+  return cost;
+}
+
+}  // namespace
+
+SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::BandLimits& limits,
+                          double length_unit, double time_limit, const ProgressCallback& progress,
+                          BandedCost* cost) {
+  BandedBuffers<DeviceArray, Queue> buffers(queue, packing::BandSchedule(limits),
+                                            banded_sizes(limits.max_spheres));
+  DeviceArray<MeetingPlace> place(queue, 1);
+  place.fill_bytes(0);
+  Watch watch(limits, length_unit, time_limit, progress);
+  BandedState state;
+  std::uint32_t launches = 0;
+  try {
+    for (;;) {
+      BandedArrays arrays = buffers.arrays();
+      arrays.mailbox = watch.mailbox();
+      launch_banded(queue, arrays, mesh, place.data());
+      ++launches;
+      watch.wait(queue);
+      state = buffers.state();
+      if (state.need == Need::nothing) break;
+      buffers.provide(state);
+    }
+  } catch (...) {
+    cudaStreamSynchronize(queue.stream());  // the kernel may still write to the mailbox
+    throw;
+  }
+  if (cost != nullptr) *cost = cost_of(state, launches);
+  return buffers.result(state);
+}
+
+}  // namespace ist::gpu

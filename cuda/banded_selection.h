@@ -1,0 +1,141 @@
+#pragma once
+
+#include "banded_control.h"
+#include "packing/certificate.h"
+
+// The steps of a round that choose among the candidates of the active cells, certify the winners
+// and insert them. A step's teams do not wait for each other: certification takes the other winners
+// at their candidates' radii, and a winner's place is the count of those that go before it.
+
+namespace ist::gpu {
+
+using packing::Candidate;
+
+/// Hangs the active cells' candidates into the chains of their buckets.
+template <class Crew>
+IST_HD void collect_candidates(Crew& crew, const BandedArrays& a) {
+  BandedState& s = *a.state;
+  const std::uint32_t* const active = a.lists[1 - s.frontier_array];
+  const std::uint64_t seed = s.schedule.limits.seed;
+  share_out_to_lanes(crew, s.active, [&](std::uint32_t i) {
+    if (i >= s.active) return;
+    const packing::Cell& cell = a.cells[active[i]].cell;
+    BucketNode node;
+    node.candidate = {cell.prototype, cell.radius,
+                      packing::candidate_key(cell.radius, cell.centre, seed), cell.centre};
+    node.cell = active[i];
+    const std::uint32_t bucket = s.buckets.bucket_of(node.candidate.centre, 0, 0, 0);
+    node.next = atomic_exchange(&a.heads[bucket], i + 1);
+    a.nodes[i] = node;
+    a.won[i] = 0;
+  });
+}
+
+/// Calls visit(place, candidate) for those in the buckets around a candidate, the lanes going
+/// through different buckets, until it returns false.
+template <class Team, class Visit>
+IST_HD void for_neighbours(const Team& team, const BandedArrays& a, Float3 centre,
+                           const Visit& visit) {
+  for (int n = team.lane(); n < 27; n += Team::kWidth) {
+    const std::uint32_t bucket =
+        a.state->buckets.bucket_of(centre, n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+    for (std::uint32_t at = a.heads[bucket]; at != 0; at = a.nodes[at - 1].next)
+      if (!visit(at - 1, a.nodes[at - 1].candidate)) return;
+  }
+}
+
+/// Finds the candidates that no overlapping one goes before.
+template <class Crew>
+IST_HD void find_winners(Crew& crew, const BandedArrays& a) {
+  BandedState& s = *a.state;
+  const auto& team = crew.team();
+  share_out(crew, s.active, [&](std::uint32_t i) {
+    const Candidate me = a.nodes[i].candidate;
+    bool lost = false;
+    for_neighbours(team, a, me.centre, [&](std::uint32_t place, const Candidate& other) {
+      lost = place != i && packing::goes_before(other, me) && packing::overlap(me, other);
+      return !lost;
+    });
+    if (!team.any(lost) && team.lane() == 0) {
+      a.won[i] = 1;
+      a.winners[atomic_add(&s.winners, 1)] = i;
+    }
+  });
+}
+
+/// Works out what radius the winners may keep. A cell whose winner is not accepted loses it.
+template <class Crew, class Surface>
+IST_HD void certify_winners(Crew& crew, const BandedArrays& a, const Surface& surface) {
+  BandedState& s = *a.state;
+  const auto& team = crew.team();
+  const ListedSpheres spheres{a.grid(), a.spheres, static_cast<std::uint32_t>(s.schedule.spheres)};
+  take_turns(crew, s.winners, &s.taken, [&](std::uint32_t w) {
+    const std::uint32_t i = a.winners[w];
+    const Candidate me = a.nodes[i].candidate;
+    double gap = packing::gap_to_surface(
+        surface.clearance(team, me.centre, packing::clearance_limit(me.radius)));
+    for_neighbours(team, a, me.centre, [&](std::uint32_t place, const Candidate& other) {
+      if (a.won[place] != 0 && place != i && packing::goes_before(other, me)) {
+        const double room = packing::gap_to_sphere(
+            me.centre, {other.centre.x, other.centre.y, other.centre.z, other.radius});
+        gap = room < gap ? room : gap;
+      }
+      return true;
+    });
+    const float radius = packing::certified_radius(team, me.centre, me.radius, gap, spheres);
+    if (team.lane() != 0) return;
+    const bool accepted = s.schedule.accepts(radius);
+    a.winner_radius[w] = radius;
+    a.winner_key[w] = accepted ? me.key : 0;
+    if (accepted) {
+      atomic_add(&s.accepted, 1);
+    } else {
+      packing::Cell& cell = a.cells[a.nodes[i].cell].cell;
+      cell.bound = a.bounds[a.nodes[i].cell] = s.schedule.refused_bound();
+      cell.radius = 0;
+    }
+  });
+}
+
+/// Inserts the accepted winners in their order, as many as may still come, and notes the blocks of
+/// the sphere grid that they touch.
+template <class Crew>
+IST_HD void insert_winners(Crew& crew, const BandedArrays& a) {
+  BandedState& s = *a.state;
+  const auto& team = crew.team();
+  const SphereLists grid = a.grid();
+  const std::uint64_t most = spheres_left(s);
+  const float top = packing::bits_of(s.schedule.margin) > s.largest_bound
+                        ? s.schedule.margin
+                        : float_of(s.largest_bound);
+  share_out(crew, s.winners, [&](std::uint32_t w) {
+    const std::uint64_t key = a.winner_key[w];
+    if (key == 0) return;
+    const Candidate me = a.nodes[a.winners[w]].candidate;
+    int before = 0;
+    for (std::uint32_t v = static_cast<std::uint32_t>(team.lane()); v < s.winners;
+         v += Crew::Team::kWidth) {
+      const std::uint64_t other = a.winner_key[v];
+      if (other > key ||
+          (other == key && v != w && packing::goes_before(a.nodes[a.winners[v]].candidate, me)))
+        ++before;
+    }
+    const auto rank = static_cast<std::uint32_t>(team.sum(before));
+    if (rank >= most) return;
+    const std::uint32_t index = static_cast<std::uint32_t>(s.schedule.spheres) + rank;
+    const float r = a.winner_radius[w];
+    if (team.lane() == 0) {
+      a.spheres[index] = {me.centre.x, me.centre.y, me.centre.z, r};
+      a.kept[index] = r < top ? r / top : 1.0f;
+      atomic_add(&s.volume, packing::fixed_ball_volume(r));
+    }
+    grid.touch_blocks(team, index, {me.centre.x, me.centre.y, me.centre.z, r});
+  });
+  share_out_to_lanes(crew, s.active, [&](std::uint32_t i) {
+    if (i >= s.active) return;
+    const std::uint32_t bucket = s.buckets.bucket_of(a.nodes[i].candidate.centre, 0, 0, 0);
+    a.heads[bucket] = 0;
+  });
+}
+
+}  // namespace ist::gpu

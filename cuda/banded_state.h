@@ -1,0 +1,158 @@
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#include "packing/band_schedule.h"
+#include "packing/candidate.h"
+#include "packing/cell.h"
+#include "sphere_lists.h"
+
+namespace ist::gpu {
+
+/// What the crew does next. Every step ends with a meeting.
+enum class Step : std::uint32_t {
+  start,       ///< the root cell's side
+  sweep,       ///< drop dead cells, find the largest bound; the schedule begins a band
+  clear_grid,  ///< lay the sphere grid out anew …
+  touch_all,   ///< … and list every sphere
+  count,       ///< the sphere grid's passes over the noted pairs
+  make_room,
+  fill,
+  activate,  ///< cells that reach the margin become the frontier
+  work,      ///< on the frontier's cells, one class of them at a time
+  split,     ///< the cells that have neither settled nor a candidate
+  collect,   ///< candidates into buckets
+  dominate,  ///< which of them no other one goes before
+  certify,
+  insert,  ///< winners in order, and the blocks of the grid that they touch
+  finished,
+};
+
+/// What is too small for the next step. The crew stops; the host makes it larger and starts the
+/// crew again where it stopped.
+enum class Need : std::uint32_t { nothing, cells, candidates, spheres, grid };
+
+/// A candidate in a chain of its bucket.
+struct alignas(16) BucketNode {
+  packing::Candidate candidate;
+  std::uint32_t cell;
+  std::uint32_t next;  ///< 1 + the next one's place, 0: the last
+};
+
+/// The float of these bits.
+IST_HD inline float float_of(std::uint32_t bits) {
+  float x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+/// A sphere in one load.
+struct alignas(16) StoredSphere {
+  float x, y, z, r;
+  IST_HD Sphere sphere() const { return {x, y, z, r}; }
+};
+
+/// Where a host that looks on is told how far the packing is, and says that it should stop.
+struct Mailbox {
+  volatile std::uint32_t spheres;
+  volatile float radius;
+  volatile std::uint64_t covered;
+  volatile std::uint32_t stop;  ///< set by the host
+};
+
+/// All that changes but for the large arrays. Read by all teams, written by the last one that comes
+/// to a meeting, or by atomics.
+struct BandedState {
+  packing::BandSchedule schedule;
+  Step step = Step::start;
+  Step after_grid = Step::activate;  ///< where the grid's passes lead to
+  Need need = Need::nothing;
+  std::uint32_t taken = 0;  ///< items of this step that teams took in turns
+  std::uint32_t pairs_from = 0;
+
+  // Cells. A slot whose bound is 0 is free, and found by the next sweep.
+  std::uint32_t slots = 1;             ///< in use or free
+  std::uint32_t free = 0;              ///< end of the queue in free_list, before the modulus
+  std::uint32_t free_taken = 0;        ///< its front
+  std::uint32_t live = 1;              ///< as the schedule counts them
+  std::uint32_t top = 0, dropped = 0;  ///< bits of bounds, positive floats
+
+  // Lists of cells. The frontier is in one of two arrays and the active ones go to the other.
+  std::uint32_t frontier = 0, active = 0, splitting = 0;
+  std::uint32_t frontier_array = 0;
+  std::uint32_t cell_class = 0, classes = 1;
+
+  // Selection.
+  std::uint32_t largest_radius = 0;  ///< bits
+  std::uint32_t largest_bound = 0;   ///< bits; of the candidates' cells
+  packing::CandidateBuckets buckets;
+  std::uint32_t winners = 0, accepted = 0;
+  std::uint64_t volume = 0;  ///< of the spheres inserted in this step
+  bool below_noise = false;
+
+  packing::SphereGridLayout layout;
+  SphereLists::Use use{SphereLists::kFirstWord, 0, 0};
+
+  std::uint32_t stop_asked = 0;
+  std::uint64_t worked = 0;  ///< cells, for notes
+  std::uint32_t levels = 0, steps = 0;
+  std::uint64_t since = 0;                              ///< [ns] when this step began
+  std::uint64_t time[static_cast<int>(Step::finished)]  ///< [ns] by step
+      = {};
+};
+
+/// The arrays, by value.
+struct BandedArrays {
+  using Cell = packing::StoredCell<std::uint32_t>;
+
+  BandedState* state;
+  Cell* cells;
+  float* bounds;             ///< the cells' bounds again; 0: free slot
+  std::uint32_t* free_list;  ///< slots
+  std::uint32_t* lists[2];   ///< frontier and active cells
+  std::uint32_t* splitting;  ///< cell | children that are still to make << kCellBits
+  std::uint32_t cell_capacity;
+
+  BucketNode* nodes;
+  std::uint32_t* heads;       ///< of the buckets; all 0 between rounds
+  std::uint32_t* winners;     ///< places in nodes
+  std::uint32_t* won;         ///< by node
+  std::uint64_t* winner_key;  ///< 0: not accepted
+  float* winner_radius;
+  std::uint32_t candidate_capacity;  ///< heads: twice as many and 64
+
+  StoredSphere* spheres;
+  float* kept;  ///< radius over the largest bound when it was inserted, by sphere
+  std::uint32_t sphere_capacity;
+
+  SphereLists lists_of_spheres;  ///< layout and use: see the state
+  Mailbox* mailbox;              ///< null if nobody looks on
+
+  static constexpr std::uint32_t kCellBits = 24;
+
+  IST_HD SphereLists grid() const {
+    SphereLists grid = lists_of_spheres;
+    grid.layout = state->layout;
+    return grid;
+  }
+};
+
+/// The packed spheres as the packing numerics ask for them.
+struct ListedSpheres {
+  SphereLists lists;
+  const StoredSphere* spheres;
+  std::uint32_t size;
+
+  IST_HD std::uint32_t count() const { return size; }
+  IST_HD float reach() const { return lists.layout.reach; }
+
+  template <class Team, class Visit>
+  IST_HD void for_near(const Team& team, packing::Float3 x, Visit&& visit) const {
+    lists.for_near(team, x, [&](bool valid, std::uint32_t index) {
+      visit(valid, index, spheres[index].sphere());
+    });
+  }
+};
+
+}  // namespace ist::gpu

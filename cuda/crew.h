@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+
+#include "atomics.h"
+
+// A crew is all the teams that do one packing together: the warps of a kernel, or a few threads of
+// the host (tests). Steps are templates over it. It has
+//
+//   using Team;             const Team& team() const;
+//   Scratch& scratch();     this team's own memory
+//   std::uint32_t index();  this team's number, below size()
+//   std::uint64_t now();    [ns] of a clock that all teams share
+//   void sync(last);        all teams meet; the last to come runs last(), then all go on and see
+//                           what any of them wrote before
+
+namespace ist::gpu {
+
+/// Calls work(i) for all i < count, a team an item, a fixed share each: for items of equal work.
+template <class Crew, class Work>
+IST_HD void share_out(Crew& crew, std::uint32_t count, const Work& work) {
+  for (std::uint32_t i = crew.index(); i < count; i += crew.size()) work(i);
+}
+
+/// The same, each team taking the next item when it is done with one. `taken` starts at 0.
+template <class Crew, class Work>
+IST_HD void take_turns(Crew& crew, std::uint32_t count, std::uint32_t* taken, const Work& work) {
+  std::uint32_t i = crew.index();
+  while (i < count) {
+    work(i);
+    if (count <= crew.size()) return;
+    std::uint32_t next = 0;
+    if (crew.team().lane() == 0) next = atomic_add(taken, 1);
+    i = crew.size() + crew.team().broadcast(next, 0);
+  }
+}
+
+/// Calls work(i) for all i < count, a lane an item. A team's lanes come together: where i ≥ count,
+/// `work` is called all the same and must only take part in what the team does together.
+template <class Crew, class Work>
+IST_HD void share_out_to_lanes(Crew& crew, std::uint32_t count, const Work& work) {
+  constexpr auto kWidth = static_cast<std::uint32_t>(Crew::Team::kWidth);
+  const std::uint32_t stride = crew.size() * kWidth;
+  for (std::uint32_t base = crew.index() * kWidth; base < count; base += stride)
+    work(base + static_cast<std::uint32_t>(crew.team().lane()));
+}
+
+/// Place of this lane's item in a list to which the lanes with `adds` append one each.
+template <class Team>
+IST_HD std::uint32_t append(const Team& team, bool adds, std::uint32_t* size) {
+  int total = 0;
+  const int before = team.exclusive_count(adds, total);
+  std::uint32_t base = 0;
+  if (team.lane() == 0 && total > 0) base = atomic_add(size, static_cast<std::uint32_t>(total));
+  return team.broadcast(base, 0) + static_cast<std::uint32_t>(before);
+}
+
+}  // namespace ist::gpu

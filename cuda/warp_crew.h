@@ -1,0 +1,66 @@
+#pragma once
+
+// Device code only.
+
+#include <cstdint>
+
+#include "banded_kernel.h"
+#include "crew.h"
+#include "warp_team.h"
+
+namespace ist::gpu {
+
+/// The crew of a cooperative kernel (crew.h): all its warps. Successive numbers stand in different
+/// blocks, so that little work spreads over many multiprocessors.
+template <class Scratch_>
+class WarpCrew {
+ public:
+  using Team = WarpTeam;
+  using Scratch = Scratch_;
+
+  /// `scratch`: shared memory, one a warp.
+  __device__ WarpCrew(MeetingPlace* place, Scratch* scratch)
+      : place_(place), scratch_(scratch + threadIdx.x / 32) {
+    generation_ = atomic_load(&place->generation);
+  }
+
+  __device__ const Team& team() const { return team_; }
+  __device__ Scratch& scratch() { return *scratch_; }
+  __device__ std::uint32_t index() const { return threadIdx.x / 32 * gridDim.x + blockIdx.x; }
+  __device__ std::uint32_t size() const { return blockDim.x / 32 * gridDim.x; }
+
+  __device__ std::uint64_t now() const {
+    std::uint64_t ns;
+    asm volatile("mov.u64 %0, %%globaltimer;" : "=l"(ns));
+    return ns;
+  }
+
+  template <class Last>
+  __device__ void sync(const Last& last) {
+    __syncthreads();
+    if (threadIdx.x == 0) {
+      __threadfence();
+      if (atomicAdd(&place_->here, 1u) == gridDim.x - 1) {
+        __threadfence();
+        place_->here = 0;
+        last();
+        __threadfence();
+        atomicExch(&place_->generation, generation_ + 1);
+      } else {
+        while (atomic_load(&place_->generation) == generation_) {
+        }
+        __threadfence();
+      }
+    }
+    ++generation_;
+    __syncthreads();
+  }
+
+ private:
+  MeetingPlace* place_;
+  Scratch* scratch_;
+  std::uint32_t generation_;
+  Team team_;
+};
+
+}  // namespace ist::gpu

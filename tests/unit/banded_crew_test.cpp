@@ -1,0 +1,137 @@
+#include "banded_loop.h"
+
+#include <gtest/gtest.h>
+#include <ist/packing.h>
+
+#include <memory>
+#include <vector>
+
+#include "banded_buffers.h"
+#include "mesh/samples/samples.h"
+#include "packing/band_limits.h"
+#include "packing/mesh_surface.h"
+#include "support/host_crew.h"
+#include "support/test_meshes.h"
+
+// The GPU's banded packing, run by a crew of host threads: the same spheres as the CPU's packer,
+// whatever the number of teams and however small its arrays are at first.
+
+namespace ist::testing {
+namespace {
+
+struct Host {};
+
+/// Stands in for a DeviceArray.
+template <class T>
+class HostArray {
+ public:
+  HostArray() = default;
+  HostArray(Host&, std::size_t size) : data_(new T[size]), size_(size) {
+    std::memset(static_cast<void*>(data_.get()), 0xA5, size * sizeof(T));
+  }
+  T* data() const { return data_.get(); }
+  std::size_t size() const { return size_; }
+  void fill_bytes(int value) {
+    std::memset(static_cast<void*>(data_.get()), value, size_ * sizeof(T));
+  }
+  void upload(std::span<const T> from) { std::copy(from.begin(), from.end(), data_.get()); }
+  std::vector<T> to_host(std::size_t count) const { return {data_.get(), data_.get() + count}; }
+  void grow(std::size_t size, std::size_t kept) {
+    Host host;
+    HostArray larger(host, size);
+    std::copy(data_.get(), data_.get() + kept, larger.data());
+    *this = std::move(larger);
+  }
+  void release() { *this = HostArray(); }
+
+ private:
+  std::unique_ptr<T[]> data_;
+  std::size_t size_ = 0;
+};
+
+struct CrewPacking {
+  SpherePacking packing;
+  gpu::BandedState state;
+  int launches = 0;
+};
+
+CrewPacking pack_by_crew(const MeshSolid& solid, const PackingSettings& settings,
+                         std::uint32_t teams, const gpu::BandedSizes& sizes) {
+  const packing::MeshSurface surface(solid);
+  Host host;
+  gpu::BandedBuffers<HostArray, Host> buffers(
+      host, packing::BandSchedule(packing::band_limits(solid, solid.frame().scale(), settings)),
+      sizes);
+  CrewPacking out;
+  for (;;) {
+    const gpu::BandedArrays arrays = buffers.arrays();
+    run_crew<packing::CellScratch<std::uint32_t>>(
+        teams, [&](auto& crew) { gpu::pack_banded(crew, arrays, surface); });
+    ++out.launches;
+    out.state = buffers.state();
+    if (out.state.need == gpu::Need::nothing) break;
+    buffers.provide(out.state);
+  }
+  out.packing = buffers.result(out.state);
+  return out;
+}
+
+void expect_same(const SpherePacking& a, const SpherePacking& b) {
+  ASSERT_EQ(a.spheres.size(), b.spheres.size());
+  for (std::size_t i = 0; i < a.spheres.size(); ++i)
+    ASSERT_EQ(std::memcmp(&a.spheres[i], &b.spheres[i], sizeof(Sphere)), 0) << "sphere " << i;
+  EXPECT_EQ(a.stop, b.stop);
+  EXPECT_EQ(a.rounds, b.rounds);
+  EXPECT_EQ(a.coverage, b.coverage);
+  EXPECT_EQ(a.kept_ratio_worst, b.kept_ratio_worst);
+  EXPECT_EQ(a.kept_ratio_median, b.kept_ratio_median);
+}
+
+TEST(BandedCrew, PacksLikeTheCpuWhateverItsSize) {
+  for (const char* name : {"bolt", "gear"}) {
+    const MeshSolid solid(close_mesh(make_sample(name), name));
+    for (const std::size_t count : {30, 300, 2000}) {
+      PackingSettings settings;
+      settings.max_spheres = count;
+      const SpherePacking expected = pack(solid, settings);
+      for (const std::uint32_t teams : {1u, 3u}) {
+        SCOPED_TRACE(std::string(name) + " " + std::to_string(count) + " by " +
+                     std::to_string(teams));
+        const CrewPacking got =
+            pack_by_crew(solid, settings, teams, gpu::banded_sizes(settings.max_spheres));
+        expect_same(got.packing, expected);
+      }
+    }
+  }
+}
+
+TEST(BandedCrew, ArraysThatAreTooSmallGrow) {
+  const MeshSolid solid(close_mesh(make_sample("bolt"), "bolt"));
+  PackingSettings settings;
+  settings.max_spheres = 500;
+  const SpherePacking expected = pack(solid, settings);
+  const CrewPacking got = pack_by_crew(solid, settings, 2, {64, 64, 10, 1, 16, 64});
+  EXPECT_GT(got.launches, 20);
+  expect_same(got.packing, expected);
+}
+
+TEST(BandedCrew, StopsLikeTheCpu) {
+  const MeshSolid solid(closed(icosphere_mesh(2), "icosphere"));
+  std::vector<PackingSettings> cases(4);
+  cases[0].max_spheres = 0;
+  cases[0].target_coverage = 0.8;
+  cases[1].max_spheres = 0;
+  cases[1].min_radius = 0.05;
+  cases[2].max_spheres = 200;
+  cases[2].epsilon = 0.1;
+  cases[3].max_spheres = 400;
+  cases[3].seed = 7;
+  for (const PackingSettings& settings : cases) {
+    SCOPED_TRACE(&settings - cases.data());
+    expect_same(pack_by_crew(solid, settings, 2, gpu::banded_sizes(1000)).packing,
+                pack(solid, settings));
+  }
+}
+
+}  // namespace
+}  // namespace ist::testing
