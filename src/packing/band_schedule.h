@@ -18,6 +18,10 @@ struct BandLimits {
   std::uint64_t seed = 0;
 };
 
+/// Radius under which float noise wins: spheres stay certified, the greedy promise ends
+/// (DESIGN 4.2).
+constexpr float kFloatNoise = 1e-4f;
+
 /// What comes next.
 enum class BandStep : std::uint32_t {
   work,     ///< a band: work on the cells whose bound reaches the margin
@@ -148,7 +152,8 @@ struct BandSchedule {
   IST_HD bool enough(std::uint64_t candidates) const { return candidates > plateau(); }
 
   /// After a level, before its cells are split: bounds do not separate, and the next band asks for
-  /// less; or there are too many cells.
+  /// less; or there are too many cells. `cells`: those that begin_band() left and all children
+  /// since then that reach the floor, whether split later or not.
   IST_HD bool gives_up(std::uint64_t splitting, std::uint64_t cells) {
     if (!strict() && splitting > 2 * plateau()) return true;
     if (cells <= kMostCells) return false;

@@ -66,7 +66,6 @@ class BandedPacker {
   using Field = PrototypeField<Surface, Spheres>;
   using Clock = std::chrono::steady_clock;
   using Indices = std::vector<std::uint32_t>;
-  static constexpr float kFloatNoise = 1e-4f;
   static constexpr std::size_t kChunk = 4096;  ///< cells between two looks at clock and progress
 
   void begin_at_root() {
@@ -74,6 +73,7 @@ class BandedPacker {
     root.inside = surface_.inside(SerialTeam{}, root.centre);
     cells_.assign(1, {root, {}});
     spare_.clear();
+    cell_count_ = 1;
   }
 
   /// Removes the cells that cannot matter.
@@ -85,6 +85,7 @@ class BandedPacker {
     for (const auto& c : cells_)
       if (dead(c)) schedule_.drop(c.cell.bound);
     cells_.erase(std::remove_if(cells_.begin(), cells_.end(), dead), cells_.end());
+    cell_count_ = cells_.size();
     float top = 0;
     for (const auto& c : cells_) top = std::max(top, c.cell.bound);
     return top;
@@ -140,7 +141,7 @@ class BandedPacker {
         if (schedule_.enough(active.size())) return;
       }
       frontier.clear();
-      if (schedule_.gives_up(splitting.size(), cells_.size() - spare_.size())) return;
+      if (schedule_.gives_up(splitting.size(), cell_count_)) return;
       split(splitting, field, frontier);
     }
   }
@@ -169,6 +170,7 @@ class BandedPacker {
             continue;
           }
           const std::uint32_t place = store(kept);
+          ++cell_count_;
           if (kept.cell.bound >= schedule_.margin) unsettled.push_back(place);
         }
       }
@@ -262,7 +264,8 @@ class BandedPacker {
   const ProgressCallback& progress_;
   BandSchedule schedule_;
   std::vector<StoredCell<Feature>> cells_;
-  Indices spare_;  ///< places in cells_ of cells that were split
+  Indices spare_;               ///< places in cells_ of cells that were split
+  std::size_t cell_count_ = 0;  ///< as BandSchedule::gives_up() wants it
   SphereGrid grid_{{}, sphere_grid_layout(0, 2.0f)};
   SpherePacking result_;
   std::vector<float> kept_;
