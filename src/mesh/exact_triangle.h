@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "mesh/closest_point.h"
@@ -12,6 +13,12 @@ namespace ist {
 struct Corners {
   const double* p[3];
 };
+
+IST_HD inline Corners corners_of(const MeshView& mesh, std::uint32_t triangle) {
+  const std::uint32_t* t = mesh.triangles + 3 * std::size_t{triangle};
+  const auto at = [&](int i) { return mesh.vertices_exact + 3 * std::size_t{t[i]}; };
+  return {{at(0), at(1), at(2)}};
+}
 
 /// Closest point of a triangle by the double formula; returns the squared distance.
 IST_HD inline double exact_closest_in(const Corners& corners, const double p[3], double point[3]) {

@@ -45,7 +45,8 @@ struct MeshSolid::Impl {
   const MeshVolume& with_volume() {
     // One shell that does not meet itself winds around no point twice.
     oneapi::tbb::collaborative_call_once(volume_made, [this] {
-      volume = may_overlap ? winding_set_volume(with_hierarchy(), meets_itself)
+      const HierarchyMaker hierarchy = [this]() -> const MeshView& { return with_hierarchy(); };
+      volume = may_overlap ? winding_set_volume(arrays, meets_itself, hierarchy)
                            : enclosed_volume(arrays);
     });
     return volume;

@@ -18,12 +18,6 @@ struct ClosestPoint {
   std::uint32_t triangle = 0;                       ///< smallest index among equals
 };
 
-/// Where a line parallel to x pierces the surface.
-struct Crossing {
-  double x = 0;  ///< unit frame
-  int sign = 0;  ///< +1: the winding number rises by one towards +x; −1: falls
-};
-
 /// The solid of a closed mesh. All internals live in the unit frame, in double; view() adds float
 /// copies for packing. Immutable; every function may be called from many threads at once. The
 /// hierarchy and the volume are made when they are first asked for, on the caller's TBB threads: a

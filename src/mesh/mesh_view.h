@@ -41,4 +41,10 @@ struct MeshView {
   std::uint32_t root = kBvhEmpty;  ///< coded like BvhNode::child
 };
 
+/// Where a line parallel to x pierces the surface.
+struct Crossing {
+  double x = 0;  ///< unit frame
+  int sign = 0;  ///< +1: the winding number rises by one towards +x; −1: falls
+};
+
 }  // namespace ist

@@ -8,12 +8,6 @@
 namespace ist {
 namespace {
 
-Corners corners(const MeshView& mesh, std::uint32_t triangle) {
-  const std::uint32_t* t = mesh.triangles + 3 * std::size_t{triangle};
-  const auto at = [&](int i) { return mesh.vertices_exact + 3 * std::size_t{t[i]}; };
-  return {{at(0), at(1), at(2)}};
-}
-
 /// Calls visit(triangle) for all triangles whose boxes meet the box.
 template <class Visit>
 void for_triangles_in(const MeshView& mesh, const RayBox& box, Visit&& visit) {
@@ -44,7 +38,7 @@ void for_triangles_in(const MeshView& mesh, const RayBox& box, Visit&& visit) {
 int winding_number(const MeshView& mesh, const double p[3]) {
   int winding = 0;
   for_triangles_in(mesh, RayBox::ray(p), [&](std::uint32_t triangle) {
-    winding += ray_winding(corners(mesh, triangle), p);
+    winding += ray_winding(corners_of(mesh, triangle), p);
   });
   return winding;
 }
@@ -53,7 +47,7 @@ void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossi
   out.clear();
   const double yz[2] = {y, z};
   for_triangles_in(mesh, RayBox::line(y, z), [&](std::uint32_t triangle) {
-    const Corners t = corners(mesh, triangle);
+    const Corners t = corners_of(mesh, triangle);
     const int facing = pierced(t, yz);
     if (facing != 0) out.push_back({crossing_x(t, yz), -facing});
   });

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "mesh/host_device.h"
+#include "mesh/mesh_view.h"
+#include "mesh/ray_crossing.h"
+
+namespace ist {
+
+constexpr double kGoldenRatio = 0.6180339887498949;  ///< the most irrational part of a step
+
+/// Lines along x, evenly spaced: line (i, j) at y(i, j), z(j). All of them together are cut with a
+/// mesh by drawing its triangles onto the lattice, which needs no hierarchy.
+struct LineLattice {
+  double y0 = 0, z0 = 0;          ///< lower corner of the lattice, unit frame
+  double step_y = 0, step_z = 0;  ///< unit frame, > 0
+  double offset = 0;              ///< of the first line from the lower corner, over the step
+  double shift = 0;               ///< of every row against the one before, over the step
+  std::uint32_t ny = 0, nz = 0;   ///< lines in a row, rows
+
+  IST_HD double y(std::uint32_t i, std::uint32_t j) const {
+    const double turned = offset + j * shift;
+    return y0 + (i + (shift == 0 ? turned : turned - std::floor(turned))) * step_y;
+  }
+  IST_HD double z(std::uint32_t j) const { return z0 + (j + offset) * step_z; }
+  IST_HD std::uint64_t lines() const { return std::uint64_t{ny} * nz; }
+};
+
+/// Steps [first, last) of a range of `count` places whose neighbourhood holds [low, high], both in
+/// steps.
+struct LatticeRange {
+  std::uint32_t first, last;
+
+  IST_HD LatticeRange(double low, double high, std::uint32_t count) {
+    const auto clamped = [count](double x) {
+      return static_cast<std::uint32_t>(x > 0 ? (x < count ? x : count) : 0);
+    };
+    first = clamped(std::floor(low) - 1);
+    last = clamped(std::floor(high) + 2);
+  }
+};
+
+/// Rows that may meet a triangle.
+IST_HD inline LatticeRange rows_of(const LineLattice& lattice, const Corners& t) {
+  double low = t.p[0][2], high = low;
+  for (int k = 1; k < 3; ++k) {
+    low = t.p[k][2] < low ? t.p[k][2] : low;
+    high = t.p[k][2] > high ? t.p[k][2] : high;
+  }
+  return {(low - lattice.z0) / lattice.step_z - lattice.offset,
+          (high - lattice.z0) / lattice.step_z - lattice.offset, lattice.nz};
+}
+
+/// Lines of row j that may pierce a triangle.
+IST_HD inline LatticeRange lines_of(const LineLattice& lattice, const Corners& t, std::uint32_t j) {
+  constexpr double kRoom = 1e-12;  // above the rounding of what follows
+  const double z = lattice.z(j);
+  double low = 1e300, high = -1e300;
+  for (int k = 0; k < 3; ++k) {
+    const double* p = t.p[k];
+    const double* q = t.p[(k + 1) % 3];
+    if ((p[2] > z) == (q[2] > z)) continue;
+    const double y = p[1] + (z - p[2]) / (q[2] - p[2]) * (q[1] - p[1]);
+    low = y - kRoom < low ? y - kRoom : low;
+    high = y + kRoom > high ? y + kRoom : high;
+  }
+  if (low > high) return {0, -3, lattice.ny};
+  const double first = lattice.y(0, j);
+  return {(low - first) / lattice.step_y, (high - first) / lattice.step_y, lattice.ny};
+}
+
+/// Order of crossings along a line: by x, equal x: +1 first.
+IST_HD inline bool comes_before(const Crossing& a, const Crossing& b) {
+  return a.x != b.x ? a.x < b.x : a.sign > b.sign;
+}
+
+/// Where a triangle crosses line (i, j), as line_crossings() has it; sign 0: nowhere.
+IST_HD inline Crossing crossing_of(const LineLattice& lattice, const Corners& t, std::uint32_t i,
+                                   std::uint32_t j) {
+  const double yz[2] = {lattice.y(i, j), lattice.z(j)};
+  const int facing = pierced(t, yz);
+  if (facing == 0) return {};
+  return {crossing_x(t, yz), -facing};
+}
+
+/// The crossings of every line: those of line (i, j) start at first[j ny + i], in order.
+struct LatticeCrossings {
+  std::vector<std::uint32_t> first;  ///< lines + 1
+  std::vector<Crossing> crossings;
+};
+
+/// All crossings of a mesh (its arrays suffice) with a lattice. Runs on the caller's TBB threads.
+LatticeCrossings cross_lattice(const MeshView& mesh, const LineLattice& lattice);
+
+}  // namespace ist
