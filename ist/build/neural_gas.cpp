@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kEpochs = 24;
 constexpr int kSweeps = 20;
+constexpr std::size_t kPart = 256;  // balls that one thread takes
 
 struct Point {
   double x = 0, y = 0, z = 0;
@@ -47,8 +48,39 @@ class NeuralGas {
     const auto range = std::span(order_).subspan(begin, count);
     assign(range, prototypes(range, (count + unit - 1) / unit), unit,
            last_stays_ && end == order_.size());
-    for (std::size_t part = begin; part < end; part += unit)
-      split(part, std::min(part + unit, end));
+    if (unit == kWidth) return;
+    tbb::parallel_for(std::size_t{0}, (count + unit - 1) / unit, [&](std::size_t p) {
+      split(begin + p * unit, std::min(begin + (p + 1) * unit, end));
+    });
+  }
+
+  /// What the balls of one part of a range say to the prototypes.
+  struct Pull {
+    std::array<Point, kWidth> sum{};
+    std::array<double, kWidth> total{};
+  };
+
+  Pull pull_of(std::span<const std::uint32_t> part, const std::vector<Point>& at,
+               const std::array<double, kWidth>& kernel) const {
+    Pull pull;
+    const std::size_t count = at.size();
+    for (const std::uint32_t i : part) {
+      const Ball& ball = balls_[i];
+      std::array<double, kWidth> distance;
+      distance.fill(std::numeric_limits<double>::infinity());
+      for (std::size_t p = 0; p < count; ++p) distance[p] = squared_distance(ball, at[p]);
+      for (std::size_t p = 0; p < count; ++p) {
+        std::size_t rank = 0;  // counting beats sorting: no branch depends on the data
+        for (std::size_t q = 0; q < kWidth; ++q)
+          rank += q < p ? distance[q] <= distance[p] : distance[q] < distance[p];
+        const double w = kernel[rank] * weight(ball);
+        pull.sum[p].x += w * ball.x;
+        pull.sum[p].y += w * ball.y;
+        pull.sum[p].z += w * ball.z;
+        pull.total[p] += w;
+      }
+    }
+    return pull;
   }
 
   std::vector<Point> prototypes(std::span<const std::uint32_t> range, std::size_t count) const {
@@ -64,26 +96,28 @@ class NeuralGas {
       std::array<double, kWidth> kernel{};
       kernel[0] = 1;
       for (std::size_t k = 1; k < count; ++k) kernel[k] = kernel[k - 1] * (lambda / (1 + lambda));
-      std::vector<Point> sum(count);
-      std::array<double, kWidth> total{};
-      for (const std::uint32_t i : range) {
-        const Ball& ball = balls_[i];
-        std::array<double, kWidth> distance;
-        distance.fill(std::numeric_limits<double>::infinity());
-        for (std::size_t p = 0; p < count; ++p) distance[p] = squared_distance(ball, at[p]);
-        for (std::size_t p = 0; p < count; ++p) {
-          std::size_t rank = 0;  // counting beats sorting: no branch depends on the data
-          for (std::size_t q = 0; q < kWidth; ++q)
-            rank += q < p ? distance[q] <= distance[p] : distance[q] < distance[p];
-          const double w = kernel[rank] * weight(ball);
-          sum[p].x += w * ball.x;
-          sum[p].y += w * ball.y;
-          sum[p].z += w * ball.z;
-          total[p] += w;
-        }
+      // In parts of fixed size, added in their order: the same bits for any number of threads.
+      std::vector<Pull> pulls((range.size() + kPart - 1) / kPart);
+      const auto pull = [&](std::size_t k) {
+        const std::size_t first = k * kPart;
+        pulls[k] = pull_of(range.subspan(first, std::min(kPart, range.size() - first)), at, kernel);
+      };
+      if (pulls.size() > 1) {
+        tbb::parallel_for(std::size_t{0}, pulls.size(), pull);
+      } else {
+        pull(0);
       }
-      for (std::size_t p = 0; p < count; ++p)
-        if (total[p] > 0) at[p] = {sum[p].x / total[p], sum[p].y / total[p], sum[p].z / total[p]};
+      for (std::size_t p = 0; p < count; ++p) {
+        Point sum;
+        double total = 0;
+        for (const Pull& part : pulls) {
+          sum.x += part.sum[p].x;
+          sum.y += part.sum[p].y;
+          sum.z += part.sum[p].z;
+          total += part.total[p];
+        }
+        if (total > 0) at[p] = {sum.x / total, sum.y / total, sum.z / total};
+      }
     }
     return at;
   }
@@ -104,12 +138,29 @@ class NeuralGas {
     }
     // First shares along the prototypes' order, nearest first, as far as there is room.
     fill_in_turn(range.first(range.size() - pinned), at, unit);
-    bool moved = true;
-    for (int sweep = 0; moved && sweep < kSweeps; ++sweep) {
-      moved = false;
-      for (std::size_t p = 0; p < groups; ++p)
-        for (std::size_t q = p + 1; q < groups; ++q)
-          moved |= share(range.first(range.size() - pinned), at, unit, p, q);
+    const auto all = range.first(range.size() - pinned);
+    std::vector<int> changed(groups, 0);  // the sweep that last moved a ball of the group
+    for (int sweep = 1; sweep <= kSweeps; ++sweep) {
+      // Every two groups meet once a sweep, in turns in which each group has one partner: one stays
+      // and the others go round.
+      const std::size_t seats = groups + groups % 2;
+      for (std::size_t turn = 0; turn + 1 < seats; ++turn) {
+        const auto meet = [&](std::size_t k) {
+          const std::size_t a = k == 0 ? seats - 1 : (turn + k) % (seats - 1);
+          const std::size_t b = (turn + seats - 1 - k) % (seats - 1);
+          const std::size_t p = std::min(a, b), q = std::max(a, b);
+          if (q >= groups) return;
+          // Two groups that are as they were when they last met have nothing to share.
+          if (changed[p] < sweep - 1 && changed[q] < sweep - 1) return;
+          if (share(all, at, unit, p, q)) changed[p] = changed[q] = sweep;
+        };
+        if (unit >= kPart) {
+          tbb::parallel_for(std::size_t{0}, seats / 2, meet);
+        } else {
+          for (std::size_t k = 0; k < seats / 2; ++k) meet(k);
+        }
+      }
+      if (*std::max_element(changed.begin(), changed.end()) < sweep) break;
     }
     // Which balls are where is settled; their order within a group is not until now.
     for (std::size_t begin = 0; begin < range.size(); begin += unit) {
@@ -121,13 +172,23 @@ class NeuralGas {
   /// Group by group, the balls that are nearest to its prototype among those that are left.
   void fill_in_turn(std::span<std::uint32_t> range, const std::vector<Point>& at,
                     std::size_t unit) const {
+    struct Near {
+      double distance2;
+      std::uint32_t ball;
+    };
+    std::vector<Near> rest(range.size());
     for (std::size_t p = 0; p + 1 < at.size(); ++p) {
-      const auto rest = range.subspan(p * unit);
-      std::sort(rest.begin(), rest.end(), [&](std::uint32_t a, std::uint32_t b) {
-        const double da = squared_distance(balls_[a], at[p]);
-        const double db = squared_distance(balls_[b], at[p]);
-        return da != db ? da < db : a < b;
-      });
+      const std::size_t taken = p * unit;
+      if (range.size() - taken <= unit) return;
+      rest.resize(range.size() - taken);
+      for (std::size_t i = 0; i < rest.size(); ++i)
+        rest[i] = {squared_distance(balls_[range[taken + i]], at[p]), range[taken + i]};
+      std::nth_element(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(unit), rest.end(),
+                       [](const Near& a, const Near& b) {
+                         return a.distance2 != b.distance2 ? a.distance2 < b.distance2
+                                                           : a.ball < b.ball;
+                       });
+      for (std::size_t i = 0; i < rest.size(); ++i) range[taken + i] = rest[i].ball;
     }
   }
 

@@ -1,5 +1,7 @@
 #include "build/tree_order.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 
 #include "build/neural_gas.h"
@@ -21,13 +23,13 @@ std::vector<std::uint32_t> group_order(std::span<const Ball> balls, bool last_st
 
 /// Balls around each 16 consecutive entries of `order`.
 std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::uint32_t> order) {
-  std::vector<Ball> groups;
-  for (std::size_t begin = 0; begin < order.size(); begin += kWidth) {
+  std::vector<Ball> groups((order.size() + kWidth - 1) / kWidth);
+  tbb::parallel_for(std::size_t{0}, groups.size(), [&](std::size_t g) {
     std::vector<Ball> members;
-    for (std::size_t i = begin; i < std::min(begin + kWidth, order.size()); ++i)
+    for (std::size_t i = g * kWidth; i < std::min((g + 1) * kWidth, order.size()); ++i)
       members.push_back(balls[order[i]]);
-    groups.push_back(bounding_ball(members));
-  }
+    groups[g] = bounding_ball(members);
+  });
   return groups;
 }
 
