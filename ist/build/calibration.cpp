@@ -5,50 +5,63 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numbers>
+#include <functional>
 
 #include <ist/error.h>
 
 #include "build/column_lattice.h"
-#include "build/cube_root.h"
 #include "build/power_cells.h"
+#include "build/protrusion.h"
 #include "build/turned_solid.h"
 #include "packing/thread_arena.h"
 
 namespace ist {
 namespace {
 
-constexpr int kRelaxations = 16;
 constexpr double kStep = 0.15;  // distance of columns over the mean leaf radius
 // Enough columns to measure the solid where spheres are few, and a bound where it is thin.
 constexpr double kMinColumns = 1u << 14;
 constexpr double kColumnsPerSphere = 64;
-// Columns that see less or more of the volume than this are too few: a sliver at a slant.
-constexpr double kLargestMiss = 0.1;
 // Radius of a sphere whose cell is empty, over the mean leaf radius: legal, and counts for nothing.
 constexpr double kEmptyCellRadius = 1e-4;
-constexpr double kMargin = 1e-12;  // unit frame, above the rounding of any distance here
-
-double radius_of(double volume) { return cube_root(3 * volume / (4 * std::numbers::pi)); }
 
 /// Shares by the inner spheres' own volumes, for a solid that columns cannot measure.
-std::vector<PowerCell> inflated_spheres(std::span<const Sphere> inner) {
-  std::vector<PowerCell> cells;
+std::vector<double> inflated_shares(std::span<const Sphere> inner) {
+  std::vector<double> shares;
   double sum = 0;
   for (const Sphere& s : inner) {
-    cells.push_back({double{s.r} * s.r * s.r, s.x, s.y, s.z});
-    sum += cells.back().share;
+    shares.push_back(double{s.r} * s.r * s.r);
+    sum += shares.back();
   }
-  for (PowerCell& cell : cells) cell.share /= sum;
-  return cells;
+  for (double& share : shares) share /= sum;
+  return shares;
 }
 
-/// Distance by which a ball sticks out of the solid at most, rounding included; negative if it lies
-/// inside.
+/// Relaxes the sites on the caller's threads.
+RelaxedSites relax_sites(const MeshSolid& solid, const ColumnPlan& plan,
+                         std::vector<PowerSite> sites, double volume,
+                         const std::function<void(double)>& report) {
+  const ColumnLattice lattice = cut_columns(solid, plan);
+  if (!columns_measure(lattice.volume(), volume)) return {};
+  const PowerOctree octree(lattice);
+  std::vector<double> shares(sites.size());
+  for (int round = 0; round < kRelaxations; ++round) {
+    report(static_cast<double>(round) / kRelaxations);
+    const std::vector<PowerSums> sums = octree.cell_sums(sites);
+    std::int64_t total = 0;
+    for (const PowerSums& sum : sums) total += sum.length;
+    for (std::size_t k = 0; k < sites.size(); ++k) {
+      shares[k] = share_of(sums[k], total);
+      relax(sites[k], sums[k], total, volume);
+    }
+  }
+  return {std::move(sites), std::move(shares)};
+}
+
+/// Distance by which a ball sticks out of the solid at most.
 double protrusion(const MeshSolid& solid, const Sphere4& ball) {
   const Eigen::Vector3d centre(ball.x, ball.y, ball.z);
-  const double distance = solid.closest_point(centre).distance;
-  return ball.r + (solid.inside(centre) ? -distance : distance) + kMargin;
+  return protrusion_of(ball.r, solid.closest_point(centre).distance, solid.inside(centre));
 }
 
 }  // namespace
@@ -79,29 +92,28 @@ Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, uns
     const double radius = s.r / turned.scale();
     sites.push_back({x.x(), x.y(), x.z(), radius * radius});
   }
-  ColumnLattice lattice;
+  ColumnPlan plan;
   arena.execute([&] {
-    lattice = cut_columns(turned.solid(), kStep * mean_radius, kMinColumns,
-                          kMinColumns + kColumnsPerSphere * static_cast<double>(inner.size()));
+    plan = plan_columns(turned.solid(), kStep * mean_radius, kMinColumns,
+                        kMinColumns + kColumnsPerSphere * static_cast<double>(inner.size()));
   });
-  if (std::abs(lattice.volume() - volume) > kLargestMiss * volume) lattice = {};
-
-  std::vector<PowerCell> cells = inflated_spheres(inner);
-  for (int round = 0; round < kRelaxations && lattice.length > 0; ++round) {
-    report(0.2 + 0.8 * round / kRelaxations);
-    arena.execute([&] { cells = power_cells(lattice, sites); });
-    for (std::size_t k = 0; k < sites.size(); ++k) {
-      if (cells[k].share <= 0) continue;  // keeps its place, and may win some back
-      const double radius = radius_of(cells[k].share * volume);
-      sites[k] = {cells[k].x, cells[k].y, cells[k].z, radius * radius};
-    }
+  RelaxedSites relaxed;
+  arena.execute([&] {
+    relaxed = relax_sites(turned.solid(), plan, sites, volume,
+                          [&](double part) { report(0.2 + 0.8 * part); });
+  });
+  std::vector<double> shares = std::move(relaxed.shares);
+  if (shares.empty()) {
+    shares = inflated_shares(inner);
+  } else {
+    sites = std::move(relaxed.sites);
   }
 
   Calibration result;
   result.effective.resize(inner.size());
   for (std::size_t k = 0; k < sites.size(); ++k) {
-    const double radius = cells[k].share > 0 ? radius_of(cells[k].share * solid.unit_volume())
-                                             : kEmptyCellRadius * mean_radius * turned.scale();
+    const double radius = shares[k] > 0 ? radius_of(shares[k] * solid.unit_volume())
+                                        : kEmptyCellRadius * mean_radius * turned.scale();
     const Eigen::Vector3d x = turned.turn_back({sites[k].x, sites[k].y, sites[k].z});
     result.effective[k] = {static_cast<float>(x.x()), static_cast<float>(x.y()),
                            static_cast<float>(x.z()), static_cast<float>(radius)};

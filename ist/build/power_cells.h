@@ -1,69 +1,26 @@
 #pragma once
 
-#include <cstdint>
 #include <span>
 #include <vector>
 
 #include "build/column_lattice.h"
-#include "mesh/host_device.h"
+#include "build/power_relaxation.h"
 
 namespace ist {
 
-/// A site of a power diagram: x belongs to the site of smallest |x − c|² − weight.
-struct PowerSite {
-  double x = 0, y = 0, z = 0;  ///< centre c, unit frame
-  double weight = 0;           ///< ρ², squared radius, unit frame²
+/// The octree over a solid's columns in host memory; refers to the lattice.
+class PowerOctree {
+ public:
+  explicit PowerOctree(const ColumnLattice& solid);
+  const PowerGrid& grid() const { return grid_; }
+
+  /// The sums of every site's power cell within the solid. Integers: the same bits for any number
+  /// of threads.
+  std::vector<PowerSums> cell_sums(std::span<const PowerSite> sites) const;
+
+ private:
+  PowerGrid grid_;
+  std::vector<std::vector<std::uint32_t>> flags_;
 };
-
-IST_HD inline double power(const PowerSite& site, double x, double y, double z) {
-  const double dx = x - site.x, dy = y - site.y, dz = z - site.z;
-  return dx * dx + dy * dy + dz * dz - site.weight;
-}
-
-/// Cuts the segment [x0, x1] of the line (·, y, z) at the power cells of the listed sites and calls
-/// add(site, from, to) for each piece, from left to right. Exact: along a line all powers share the
-/// term x², so their lower envelope is one of straight lines, and its sites follow each other by
-/// rising x. Among equals the first listed wins.
-template <class Add>
-IST_HD void cut_by_power_cells(const PowerSite* sites, const std::uint32_t* list, std::uint32_t n,
-                               double y, double z, double x0, double x1, Add&& add) {
-  std::uint32_t current = list[0];
-  double least = power(sites[current], x0, y, z);
-  for (std::uint32_t k = 1; k < n; ++k) {
-    const double p = power(sites[list[k]], x0, y, z);
-    if (p > least || (p == least && sites[list[k]].x <= sites[current].x)) continue;
-    least = p;
-    current = list[k];
-  }
-  for (double x = x0;;) {
-    const PowerSite& here = sites[current];
-    double end = x1;
-    std::uint32_t next = current;
-    for (std::uint32_t k = 0; k < n; ++k) {
-      const PowerSite& other = sites[list[k]];
-      const double ahead = other.x - here.x;
-      if (!(ahead > 0)) continue;
-      // Where the powers are equal; measured from x, so that digits are kept.
-      const double t = x + (power(other, x, y, z) - power(here, x, y, z)) / (2 * ahead);
-      if (t > end || (t == end && (next == current || other.x <= sites[next].x))) continue;
-      end = t;
-      next = list[k];
-    }
-    if (end > x) add(current, x, end);
-    if (next == current) return;
-    if (end > x) x = end;
-    current = next;
-  }
-}
-
-/// Volume and centre of mass of one power cell's part of the solid.
-struct PowerCell {
-  double share = 0;            ///< [0, 1] of the solid's volume
-  double x = 0, y = 0, z = 0;  ///< centre of mass, unit frame; of an empty cell zero
-};
-
-/// The power cells of the sites within the solid. Sums run in integers: the same bits for any
-/// number of threads.
-std::vector<PowerCell> power_cells(const ColumnLattice& solid, std::span<const PowerSite> sites);
 
 }  // namespace ist

@@ -29,17 +29,17 @@ struct LineLattice {
   IST_HD std::uint64_t lines() const { return std::uint64_t{ny} * nz; }
 };
 
-/// Steps [first, last) of a range of `count` places whose neighbourhood holds [low, high], both in
-/// steps.
+/// The places among 0 … count − 1 in [low, high], with room for rounding.
 struct LatticeRange {
-  std::uint32_t first, last;
+  std::uint32_t first, last;  ///< [first, last)
 
   IST_HD LatticeRange(double low, double high, std::uint32_t count) {
+    constexpr double kRoom = 1e-6;
     const auto clamped = [count](double x) {
       return static_cast<std::uint32_t>(x > 0 ? (x < count ? x : count) : 0);
     };
-    first = clamped(std::floor(low) - 1);
-    last = clamped(std::floor(high) + 2);
+    first = clamped(std::ceil(low - kRoom));
+    last = clamped(std::floor(high + kRoom) + 1);
   }
 };
 

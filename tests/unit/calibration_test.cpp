@@ -99,7 +99,7 @@ TEST(PowerCells, PiecesOfALineBelongToTheLeastPower) {
 /// The subdivision must give every column the pieces that all sites together would.
 TEST(PowerCells, SubdivisionLosesNoSite) {
   const MeshSolid solid(closed(testing::torus_mesh(1, 0.4, 48, 24), "torus"));
-  const ColumnLattice lattice = cut_columns(solid, 0.02, 1000, 1e6);
+  const ColumnLattice lattice = cut_columns(solid, plan_columns(solid, 0.02, 1000, 1e6));
   std::vector<PowerSite> sites;
   std::vector<std::uint32_t> all;
   for (const Sphere& s : packed(solid, 300)) {
@@ -107,26 +107,29 @@ TEST(PowerCells, SubdivisionLosesNoSite) {
     sites.push_back({s.x, s.y, s.z, double{s.r} * s.r});
   }
   std::vector<double> lengths(sites.size());
-  for (std::uint32_t j = 0; j < lattice.nz; ++j)
-    for (std::uint32_t i = 0; i < lattice.ny; ++i)
-      for (std::uint32_t s = lattice.first[j * lattice.ny + i];
-           s < lattice.first[j * lattice.ny + i + 1]; ++s)
+  for (std::uint32_t j = 0; j < lattice.lines.nz; ++j)
+    for (std::uint32_t i = 0; i < lattice.lines.ny; ++i)
+      for (std::uint32_t s = lattice.first[j * lattice.lines.ny + i];
+           s < lattice.first[j * lattice.lines.ny + i + 1]; ++s)
         cut_by_power_cells(
             sites.data(), all.data(), static_cast<std::uint32_t>(all.size()), lattice.y(i, j),
             lattice.z(j), lattice.spans[s].x0, lattice.spans[s].x1,
             [&](std::uint32_t site, double from, double to) { lengths[site] += to - from; });
-  const std::vector<PowerCell> cells = power_cells(lattice, sites);
+  const PowerOctree octree(lattice);
+  const std::vector<PowerSums> sums = octree.cell_sums(sites);
   for (std::size_t k = 0; k < sites.size(); ++k)
-    EXPECT_NEAR(cells[k].share * lattice.length, lengths[k], 1e-9 * lattice.length) << k;
+    EXPECT_NEAR(static_cast<double>(sums[k].length) / octree.grid().to_fixed, lengths[k],
+                1e-9 * lattice.length)
+        << k;
 }
 
 TEST(ColumnLattice, MeasuresVolumes) {
   const MeshSolid cubes(closed(testing::overlapping_cubes_mesh(), "cubes"));
-  const ColumnLattice lattice = cut_columns(cubes, 0.01, 1000, 1e6);
+  const ColumnLattice lattice = cut_columns(cubes, plan_columns(cubes, 0.01, 1000, 1e6));
   const double scale = cubes.frame().scale();
   EXPECT_NEAR(lattice.volume() * scale * scale * scale, 1.875, 2e-3);  // the overlap counts once
   const MeshSolid box(closed(testing::cube_mesh(), "cube"));
-  EXPECT_NEAR(cut_columns(box, 0.05, 1, 1e6).volume(), box.unit_volume(), 1e-12);
+  EXPECT_NEAR(cut_columns(box, plan_columns(box, 0.05, 1, 1e6)).volume(), box.unit_volume(), 1e-12);
 }
 
 TEST(Calibration, OneSphereStandsForABall) {
