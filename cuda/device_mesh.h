@@ -26,12 +26,15 @@ class DeviceMesh {
 
   /// The view for kernels; its pointers are to device memory.
   const WideTree& tree() const { return tree_; }
-  std::size_t bytes() const { return vertices_.bytes() + blocks_.bytes() + nodes_.bytes(); }
+  std::size_t bytes() const {
+    return vertices_.bytes() + blocks_.bytes() + nodes_.bytes() + oriented_.bytes();
+  }
 
  private:
   DeviceArray<double> vertices_;
   DeviceArray<WideBlock> blocks_;
   DeviceArray<WideNode> nodes_;
+  DeviceArray<WideOriented> oriented_;
   WideTree tree_;
 };
 

@@ -35,6 +35,15 @@ IST_HD inline Real dot3(const Real a[3], const Real b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+/// a × b.
+template <class Real>
+IST_HD inline void cross3(const Real a[3], const Real b[3], Real out[3]) {
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    out[k] = a[i] * b[j] - a[j] * b[i];
+  }
+}
+
 template <class Real>
 IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3], const Real c[3]) {
   // Choices instead of indices: what is indexed at run time leaves a GPU's registers.
@@ -70,19 +79,15 @@ IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3],
     f.height = 0;
     const Real x = std::abs(f.u[0]), y = std::abs(f.u[1]), z = std::abs(f.u[2]);
     const int axis = x <= y && x <= z ? 0 : (y <= z ? 1 : 2);
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3, k = (i + 2) % 3;
-      if (i != axis) continue;
-      const Real across = std::sqrt(f.u[j] * f.u[j] + f.u[k] * f.u[k]);
-      f.v[i] = 0;
-      f.v[j] = -f.u[k] / across;
-      f.v[k] = f.u[j] / across;
-    }
+    const Real uj = axis == 0 ? f.u[1] : axis == 1 ? f.u[2] : f.u[0];  // the axes after it
+    const Real uk = axis == 0 ? f.u[2] : axis == 1 ? f.u[0] : f.u[1];
+    const Real across = std::sqrt(uj * uj + uk * uk);
+    const Real vj = -uk / across, vk = uj / across;
+    f.v[0] = axis == 0 ? 0 : axis == 1 ? vk : vj;
+    f.v[1] = axis == 0 ? vj : axis == 1 ? 0 : vk;
+    f.v[2] = axis == 0 ? vk : axis == 1 ? vj : 0;
   }
-  for (int k = 0; k < 3; ++k) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
-    f.n[k] = f.u[i] * f.v[j] - f.u[j] * f.v[i];
-  }
+  cross3(f.u, f.v, f.n);
   return f;
 }
 

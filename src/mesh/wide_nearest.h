@@ -39,11 +39,13 @@ IST_HD inline Corners corners_in(const WideTree& tree, std::uint32_t slot) {
 
 /// The part of a distance query that orders and prunes boxes.
 struct WideBall {
+  const WideTree& tree;
   const float* p;
   float error;
   std::uint32_t last = 0;  ///< see traverse()
 
-  IST_HD WideBall(const float point[3], float rounding, float radius2) : p(point), error(rounding) {
+  IST_HD WideBall(const WideTree& of, const float point[3], float rounding, float radius2)
+      : tree(of), p(point), error(rounding) {
     shrink(radius2);
   }
 
@@ -53,7 +55,14 @@ struct WideBall {
     last = bits < kInfiniteBits ? bits + 1 : kInfiniteBits;
   }
   IST_HD std::uint32_t limit() const { return last; }
-  IST_HD std::uint32_t key(const WideNode& node, int child) const {
+  IST_HD std::uint32_t key(std::uint32_t node, int child) const {
+    const std::uint32_t oriented_from = tree.last_level();
+    return bits_of(node < oriented_from
+                       ? box_distance2(tree.nodes[node], child)
+                       : oriented_distance2(tree.oriented[node - oriented_from], child));
+  }
+
+  IST_HD float box_distance2(const WideNode& node, int child) const {
     float sum = 0;
     for (int k = 0; k < 3; ++k) {
       const float below = node.lower[k][child] - p[k];
@@ -62,7 +71,26 @@ struct WideBall {
       const float gap = outside > 0 ? outside : 0;
       sum += gap * gap;
     }
-    return bits_of(sum);
+    return sum;
+  }
+
+  /// Never above the exact distance: twice the error of a float distance is taken off for the
+  /// roundings here and for directions that are not quite orthogonal unit vectors.
+  IST_HD float oriented_distance2(const WideOriented& boxes, int child) const {
+    float axis[3][3];
+    for (int k = 0; k < 3; ++k) {
+      axis[0][k] = boxes.n[k][child];
+      axis[1][k] = boxes.u[k][child];
+    }
+    cross3(axis[0], axis[1], axis[2]);
+    float sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      const float off = dot3(axis[k], p) - boxes.middle[k][child];
+      const float outside = (off < 0 ? -off : off) - boxes.half[k][child] - 2 * error;
+      const float gap = outside > 0 ? outside : 0;
+      sum += gap * gap;
+    }
+    return sum;
   }
 
   /// Of a number ≥ 0: they order as the numbers do.
@@ -83,16 +111,18 @@ IST_HD inline float distance_error_at(const float p[3]) {
   return float_distance_error(reach);
 }
 
-template <class Team>
+/// `kLoosely`: also visits every triangle that is no further than the closest one plus two errors,
+/// and knows whether a lane met more than one of these.
+template <class Team, bool kLoosely = false>
 struct WideNearestQuery : WideBall {
   const Team& team;
-  const WideTree& tree;
   float radius2;
-  WideNearest best;  ///< of this lane
+  WideNearest best;         ///< of this lane
+  float runner_up = 1e30f;  ///< squared distance of the second of this lane, if any
 
   IST_HD WideNearestQuery(const Team& members, const WideTree& of, const float point[3],
                           float rounding, float limit2)
-      : WideBall(point, rounding, limit2), team(members), tree(of), radius2(limit2) {
+      : WideBall(of, point, rounding, limit2), team(members), radius2(limit2) {
     best.distance2 = limit2;
   }
 
@@ -101,15 +131,24 @@ struct WideNearestQuery : WideBall {
     for (int lane = team.lane(); lane < kWideWidth; lane += Team::kWidth) {
       const std::uint32_t triangle = block.triangle[lane];
       const float distance2 = closest_in_frame(frame_in(block, lane), p).distance2;
-      if (triangle != kNoTriangle &&
-          (distance2 < best.distance2 || (distance2 == best.distance2 && triangle < best.triangle)))
+      if (triangle == kNoTriangle) continue;
+      if (distance2 < best.distance2 || (distance2 == best.distance2 && triangle < best.triangle)) {
+        if (best.triangle != kNoTriangle) runner_up = best.distance2;
         best = {distance2, triangle, index * kWideWidth + static_cast<std::uint32_t>(lane)};
+      } else if (distance2 < runner_up) {
+        runner_up = distance2;
+      }
     }
     const float least = team.min(best.distance2);
     if (least < radius2) {
       radius2 = least;
-      shrink(least);
+      shrink(reach2());
     }
+  }
+
+  /// Squared float distance up to which every triangle is visited.
+  IST_HD float reach2() const {
+    return kLoosely ? prune_distance2(prune_distance2(radius2, error), error) : radius2;
   }
 
   IST_HD WideNearest result() const {
@@ -133,7 +172,6 @@ IST_HD WideNearest nearest(const Team& team, const WideTree& tree, const float p
 template <class Team>
 struct WideWithinQuery : WideBall {
   const Team& team;
-  const WideTree& tree;
   float radius2;
   std::uint32_t* slots;
   int capacity;
@@ -141,9 +179,8 @@ struct WideWithinQuery : WideBall {
 
   IST_HD WideWithinQuery(const Team& members, const WideTree& of, const float point[3],
                          float within2, std::uint32_t* out, int room)
-      : WideBall(point, distance_error_at(point), within2),
+      : WideBall(of, point, distance_error_at(point), within2),
         team(members),
-        tree(of),
         radius2(within2),
         slots(out),
         capacity(room) {}
@@ -178,7 +215,6 @@ IST_HD int triangles_within(const Team& team, const WideTree& tree, const float 
 template <class Team>
 struct WideExactQuery : WideBall {
   const Team& team;
-  const WideTree& tree;
   const double* exact;
   const ExactReach& reach;
   float radius2 = 0;
@@ -187,9 +223,8 @@ struct WideExactQuery : WideBall {
 
   IST_HD WideExactQuery(const Team& members, const WideTree& of, const double point[3],
                         const ExactReach& rounded, double limit2)
-      : WideBall(rounded.p, rounded.error, 0),
+      : WideBall(of, rounded.p, rounded.error, 0),
         team(members),
-        tree(of),
         exact(point),
         reach(rounded),
         best2(limit2) {
@@ -202,7 +237,8 @@ struct WideExactQuery : WideBall {
   }
 
   /// Takes a triangle's exact distance into account.
-  IST_HD void look_at(const WideBlock& block, std::uint32_t at) {
+  IST_HD void look_at(std::uint32_t at) {
+    const WideBlock& block = tree.blocks[at / kWideWidth];
     const int lane = static_cast<int>(at % kWideWidth);
     double point[3];
     const double distance2 = exact_closest_in(corners_in(tree, block, lane), exact, point);
@@ -222,10 +258,17 @@ struct WideExactQuery : WideBall {
       if (block.triangle[lane] == kNoTriangle ||
           !(closest_in_frame(frame_in(block, lane), p).distance2 <= radius2))
         continue;
-      look_at(block, index * kWideWidth + static_cast<std::uint32_t>(lane));
+      look_at(index * kWideWidth + static_cast<std::uint32_t>(lane));
       looked = true;
     }
     if (team.any(looked)) narrow(team.min(best2));
+  }
+
+  IST_HD WideExact result(double limit) const {
+    const double least = team.min(best2);
+    const std::uint32_t nearest = team.min(best2 == least ? triangle : kNoTriangle);
+    if (nearest == kNoTriangle) return {limit, kNoTriangle, kNoSlot};
+    return {std::sqrt(least), nearest, team.min(triangle == nearest ? slot : kNoSlot)};
   }
 };
 
@@ -236,19 +279,18 @@ IST_HD WideExact exact_nearest(const Team& team, const WideTree& tree, const dou
                                double limit) {
   const ExactReach reach(p);
   WideExactQuery<Team> query(team, tree, p, reach, limit * limit);
-  // The float answer first: then few triangles are left to look at in double.
-  const float rounded[3] = {reach.p[0], reach.p[1], reach.p[2]};
-  WideNearestQuery<Team> coarse(team, tree, rounded, reach.error, query.radius2);
+  // The float answer first. What may be closer in double has been met on the way to it, and is
+  // hardly ever more than one triangle a lane.
+  WideNearestQuery<Team, true> coarse(team, tree, reach.p, reach.error, query.radius2);
   traverse(team, tree, coarse);
-  const WideNearest first = coarse.result();
-  if (first.triangle == kNoTriangle) return {limit, kNoTriangle, kNoSlot};
-  query.look_at(tree.blocks[first.slot / kWideWidth], first.slot);
-  query.narrow(query.best2);
-  traverse(team, tree, query);
-  const double least = team.min(query.best2);
-  const std::uint32_t triangle = team.min(query.best2 == least ? query.triangle : kNoTriangle);
-  if (triangle == kNoTriangle) return {limit, kNoTriangle, kNoSlot};
-  return {std::sqrt(least), triangle, team.min(query.triangle == triangle ? query.slot : kNoSlot)};
+  const float candidate2 = coarse.reach2();
+  if (coarse.best.triangle != kNoTriangle && coarse.best.distance2 <= candidate2)
+    query.look_at(coarse.best.slot);
+  if (team.any(coarse.runner_up <= candidate2)) {
+    query.narrow(team.min(query.best2));
+    traverse(team, tree, query);
+  }
+  return query.result(limit);
 }
 
 }  // namespace ist

@@ -11,13 +11,15 @@ namespace ist {
 
 /// The part of a ray query that picks boxes, in no particular order.
 struct WideRay {
+  const WideTree& tree;
   RayBox box;
 
   IST_HD std::uint32_t limit() const { return 0xFFFFFFE0u; }
-  IST_HD std::uint32_t key(const WideNode& node, int child) const {
+  IST_HD std::uint32_t key(std::uint32_t node, int child) const {
+    const WideNode& boxes = tree.nodes[node];
     bool hit = true;
     for (int k = 0; k < 3; ++k)
-      hit = hit & (node.lower[k][child] <= box.upper[k]) & (node.upper[k][child] >= box.lower[k]);
+      hit = hit & (boxes.lower[k][child] <= box.upper[k]) & (boxes.upper[k][child] >= box.lower[k]);
     return hit ? 0 : limit();
   }
 };
@@ -25,12 +27,11 @@ struct WideRay {
 template <class Team>
 struct WideWindingQuery : WideRay {
   const Team& team;
-  const WideTree& tree;
   const double* p;
   int winding = 0;  ///< of this lane's triangles
 
   IST_HD WideWindingQuery(const Team& members, const WideTree& of, const double point[3])
-      : WideRay{RayBox::ray(point)}, team(members), tree(of), p(point) {}
+      : WideRay{of, RayBox::ray(point)}, team(members), p(point) {}
 
   IST_HD void visit(std::uint32_t index) {
     const WideBlock& block = tree.blocks[index];
@@ -56,7 +57,6 @@ IST_HD bool inside(const Team& team, const WideTree& tree, const double p[3]) {
 template <class Team>
 struct WideLineQuery : WideRay {
   const Team& team;
-  const WideTree& tree;
   double yz[2];
   double* x;
   int* sign;
@@ -65,9 +65,8 @@ struct WideLineQuery : WideRay {
 
   IST_HD WideLineQuery(const Team& members, const WideTree& of, double y, double z, double* out_x,
                        int* out_sign, int room)
-      : WideRay{RayBox::line(y, z)},
+      : WideRay{of, RayBox::line(y, z)},
         team(members),
-        tree(of),
         yz{y, z},
         x(out_x),
         sign(out_sign),

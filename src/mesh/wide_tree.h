@@ -24,6 +24,15 @@ struct alignas(128) WideNode {
   float upper[3][kWideWidth];
 };
 
+/// The same blocks' boxes in directions of their own, for the nodes of the last level: the points x
+/// with |a · x − middle[k]| ≤ half[k] for a = n, u, n × u. A patch of a curved surface is flat, but
+/// seldom flat along the axes. half = −∞ where there is no block.
+struct alignas(128) WideOriented {
+  float n[3][kWideWidth], u[3][kWideWidth];
+  float middle[3][kWideWidth];
+  float half[3][kWideWidth];
+};
+
 /// 32 triangles side by side, their frames made in double from the exact vertices and rounded once,
 /// as in TriangleBlock. Lanes beyond the last triangle lie at 1e18 and carry kNoTriangle.
 struct alignas(128) WideBlock {
@@ -37,12 +46,16 @@ struct alignas(128) WideBlock {
 /// Plain arrays, in the memory of whoever asks. A triangle's *slot* is 32 · block + lane.
 struct WideTree {
   const WideNode* nodes = nullptr;
+  const WideOriented* oriented = nullptr;  ///< one for each node from last_level() on
   const WideBlock* blocks = nullptr;
   const double* vertices = nullptr;  ///< double[3 · vertex_count], unit frame
   std::uint32_t first_leaf = 0;      ///< number of nodes, gaps included
   std::uint32_t block_count = 0;
   std::uint32_t triangle_count = 0;
   std::uint32_t vertex_count = 0;
+
+  /// The first of the nodes whose children are blocks.
+  IST_HD std::uint32_t last_level() const { return (first_leaf - 1) / kWideWidth; }
 };
 
 constexpr std::uint32_t kNoSlot = 0xFFFFFFFFu;

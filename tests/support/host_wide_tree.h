@@ -15,7 +15,7 @@ namespace ist::testing {
 class HostWideTree {
  public:
   explicit HostWideTree(const MeshView& mesh) {
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+    Order order;
     for (std::uint32_t t = 0; t < mesh.triangle_count; ++t)
       order.emplace_back(curve_place(corners(mesh, t)), t);
     std::sort(order.begin(), order.end());
@@ -30,6 +30,11 @@ class HostWideTree {
     nodes_.resize(tree_.first_leaf);
     for (WideNode& node : nodes_)
       for (int child = 0; child < kWideWidth; ++child) WideBox().write_to(node, child);
+
+    oriented_.resize((tree_.block_count + kWideWidth - 1) / kWideWidth);
+    for (std::uint32_t block = 0; block < oriented_.size() * kWideWidth; ++block)
+      oriented_box(mesh, order, block)
+          .write_to(oriented_[block / kWideWidth], static_cast<int>(block % kWideWidth));
 
     std::vector<WideBox> boxes(tree_.block_count);
     for (std::uint32_t slot = 0; slot < tree_.block_count * kWideWidth; ++slot) {
@@ -59,11 +64,28 @@ class HostWideTree {
     }
     tree_.blocks = blocks_.data();
     tree_.nodes = nodes_.data();
+    tree_.oriented = oriented_.data();
   }
 
   const WideTree& tree() const { return tree_; }
 
  private:
+  using Order = std::vector<std::pair<std::uint64_t, std::uint32_t>>;
+
+  static WideOrientedBox oriented_box(const MeshView& mesh, const Order& order,
+                                      std::uint32_t block) {
+    const std::size_t begin = std::size_t{block} * kWideWidth;
+    if (begin >= order.size()) return {};
+    const std::size_t end = std::min(begin + kWideWidth, order.size());
+    WideMoments moments;
+    for (std::size_t i = begin; i < end; ++i)
+      moments.add(corners(mesh, order[i].second), corners(mesh, order[begin].second).p[0]);
+    WideOrientedBox box(moments);
+    for (std::size_t i = begin; i < end; ++i)
+      for (const double* corner : corners(mesh, order[i].second).p) box.extend(corner);
+    return box;
+  }
+
   static Corners corners(const MeshView& mesh, std::uint32_t triangle) {
     const std::uint32_t* t = mesh.triangles + 3 * std::size_t{triangle};
     const auto at = [&](int i) { return mesh.vertices_exact + 3 * std::size_t{t[i]}; };
@@ -71,6 +93,7 @@ class HostWideTree {
   }
 
   std::vector<WideNode> nodes_;
+  std::vector<WideOriented> oriented_;
   std::vector<WideBlock> blocks_;
   WideTree tree_;
 };

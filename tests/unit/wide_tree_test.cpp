@@ -133,6 +133,29 @@ TEST_P(WideTree, HoldsEveryTriangleOnceInBoxesThatHoldIt) {
   EXPECT_EQ(seen.size(), mesh.triangle_count);
 }
 
+TEST_P(WideTree, OrientedBoxesHoldTheirTriangles) {
+  for (std::uint32_t slot = 0; slot < tree_.block_count * ist::kWideWidth; ++slot) {
+    const std::uint32_t block = slot / ist::kWideWidth, child = block % ist::kWideWidth;
+    if (triangle_in(tree_, slot) == kNoTriangle) continue;
+    const ist::WideOriented& boxes = tree_.oriented[block / ist::kWideWidth];
+    float axis[3][3];
+    for (int k = 0; k < 3; ++k) {
+      axis[0][k] = boxes.n[k][child];
+      axis[1][k] = boxes.u[k][child];
+    }
+    ist::cross3(axis[0], axis[1], axis[2]);
+    for (int i = 0; i < 3; ++i) {
+      const Vector3d a(axis[i][0], axis[i][1], axis[i][2]);
+      const Vector3d b(axis[(i + 1) % 3][0], axis[(i + 1) % 3][1], axis[(i + 1) % 3][2]);
+      ASSERT_NEAR(a.norm(), 1, 2e-7);
+      ASSERT_NEAR(a.dot(b), 0, 2e-7);
+      for (const double* corner : corners_in(tree_, slot).p)
+        ASSERT_LE(std::abs(a.dot(Vector3d(corner)) - boxes.middle[i][child]),
+                  double(boxes.half[i][child]));
+    }
+  }
+}
+
 TEST_P(WideTree, NearestIsTheCpusBitForBit) {
   for (const Vector3d& x : points_) {
     const float p[3] = {float(x.x()), float(x.y()), float(x.z())};
