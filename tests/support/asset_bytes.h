@@ -1,0 +1,67 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <new>
+#include <span>
+#include <vector>
+
+#include "asset/asset_writer.h"
+#include "build/tree_builder.h"
+#include "query/content_hash.h"
+
+// Small assets without a mesh, and bytes to damage.
+
+namespace ist::testing {
+
+/// Spheres on a grid: an asset without a mesh.
+inline std::vector<std::byte> small_asset(std::size_t n) {
+  AssetArrays arrays;
+  for (std::size_t i = 0; i < n; ++i) {
+    const float x = static_cast<float>(i % 4) / 4 - 0.5f;
+    const float y = static_cast<float>(i / 4 % 4) / 4 - 0.5f;
+    const float z = static_cast<float>(i / 16) / 4 - 0.5f;
+    arrays.inner_spheres.push_back({x, y, z, 0.1f});
+    arrays.effective_spheres.push_back({x, y, z, 0.12f});
+    arrays.cover_radii.push_back(0.3f);
+  }
+  arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
+  arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  arrays.header.volume = 1;
+  return asset_bytes(arrays);
+}
+
+/// Bytes on a 64-byte boundary, as a mapped file has them, that end where the span ends: reading
+/// further is seen by the address sanitizer.
+class AlignedBytes {
+ public:
+  explicit AlignedBytes(std::span<const std::byte> bytes)
+      : size_(bytes.size()),
+        data_(static_cast<std::byte*>(
+            ::operator new[](bytes.size(), std::align_val_t{kAssetAlignment}))) {
+    std::copy(bytes.begin(), bytes.end(), data_);
+  }
+  ~AlignedBytes() { ::operator delete[](data_, std::align_val_t{kAssetAlignment}); }
+  AlignedBytes(const AlignedBytes&) = delete;
+  AlignedBytes& operator=(const AlignedBytes&) = delete;
+
+  std::byte& operator[](std::size_t i) { return data_[i]; }
+  std::span<const std::byte> span() const { return {data_, size_}; }
+  AssetStatus status() const {
+    TreeView view;
+    const AssetStatus status = TreeView::from_bytes(span(), view);
+    EXPECT_EQ(view.empty(), status != AssetStatus::ok);
+    return status;
+  }
+  void seal() {
+    const std::uint64_t hash = content_hash(span());
+    std::memcpy(data_ + offsetof(AssetHeader, content_hash), &hash, sizeof(hash));
+  }
+
+ private:
+  std::size_t size_;
+  std::byte* data_;
+};
+
+}  // namespace ist::testing
