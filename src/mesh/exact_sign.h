@@ -92,18 +92,41 @@ struct Area {
   }
 };
 
+/// One of the six products of |x y z|.
+IST_HD inline ProductTerms determinant_product(const double* x, const double* y, const double* z,
+                                               double sign, int i) {
+  const int column = i / 2, j = (column + 1) % 3, k = (column + 2) % 3;
+  return i % 2 == 0 ? ProductTerms(sign * x[column], y[j], z[k])
+                    : ProductTerms(-sign * x[column], y[k], z[j]);
+}
+
 /// |a b c| − |a b q| + |a c q| − |b c q|.
 struct Volume {
   const double *a, *b, *c, *q;
 
   IST_HD ProductTerms product(int i) const {
-    const int minor = i / 6, column = i % 6 / 2;
-    const double* x = minor == 3 ? b : a;
-    const double* y = minor < 2 ? b : c;
-    const double* z = minor == 0 ? c : q;
-    const int j = (column + 1) % 3, k = (column + 2) % 3;
-    const double factor = minor % 2 == 0 ? x[column] : -x[column];
-    return i % 2 == 0 ? ProductTerms(factor, y[j], z[k]) : ProductTerms(-factor, y[k], z[j]);
+    const int minor = i / 6;
+    return determinant_product(minor == 3 ? b : a, minor < 2 ? b : c, minor == 0 ? c : q,
+                               minor % 2 == 0 ? 1 : -1, i % 6);
+  }
+};
+
+/// |a−q b−q c−q|, where these differences are exact: a quarter of the products.
+struct VolumeSeen {
+  double p[3][3];
+
+  IST_HD ProductTerms product(int i) const { return determinant_product(p[0], p[1], p[2], 1, i); }
+
+  /// p = from − q; false if it is rounded.
+  IST_HD bool set(int row, const double from[3], const double q[3]) {
+    bool exact = true;
+    for (int k = 0; k < 3; ++k) {
+      const double difference = from[k] - q[k];
+      const double q_part = difference - from[k];  // −q, as far as it got in (Knuth's two-sum)
+      exact = exact && from[k] == difference - q_part && q_part == -q[k];
+      p[row][k] = difference;
+    }
+    return exact;
   }
 };
 
@@ -113,6 +136,8 @@ IST_HD_COLD int orient2d_exact(const double a[2], const double b[2], const doubl
 
 IST_HD_COLD int orient3d_exact(const double a[3], const double b[3], const double c[3],
                                const double q[3]) {
+  VolumeSeen seen;
+  if (seen.set(0, a, q) && seen.set(1, b, q) && seen.set(2, c, q)) return sign_of_sum<6>(seen);
   return sign_of_sum<24>(Volume{a, b, c, q});
 }
 
