@@ -80,3 +80,28 @@ def volume_error(report, path):
     axes[0, 0].set_ylabel("error of the volume, %")
     axes[0, -1].legend(fontsize=7)
     save(figure, path)
+
+
+def grids(report, path):
+    """The paper's Figure 9: a column a mesh, a curve a grid; coverage above, spheres below."""
+    rows = report["tables"]["Rounds"]
+    meshes = list(dict.fromkeys(row["mesh"] for row in rows))
+    modes = list(dict.fromkeys(row["grid"] for row in rows))
+    figure, axes = plt.subplots(2, len(meshes), figsize=(4 * len(meshes), 7), squeeze=False,
+                                sharex="col")
+    for column, mesh in enumerate(meshes):
+        for mode in modes:
+            mine = [row for row in rows if (row["mesh"], row["grid"]) == (mesh, mode)]
+            style = "k.-" if mode == "banded" else ".-"
+            times = [row["ms"] for row in mine]
+            axes[0, column].semilogx(times, [100 * row["coverage"] for row in mine], style,
+                                     label=mode)
+            axes[1, column].loglog(times, [row["spheres"] for row in mine], style, label=mode)
+        axes[0, column].set(title=mesh)
+        axes[1, column].set(xlabel="ms")
+        for axis in axes[:, column]:
+            axis.grid(True, which="both", alpha=0.3)
+    axes[0, 0].set_ylabel("coverage, %")
+    axes[1, 0].set_ylabel("spheres")
+    axes[0, 0].legend(fontsize=8)
+    save(figure, path)

@@ -2,6 +2,8 @@
 #include <ist/error.h>
 #include <ist/gpu.h>
 
+#include "medial_on_gpu.h"
+
 namespace ist {
 
 bool gpu_available(int, std::string* why) {
@@ -10,5 +12,16 @@ bool gpu_available(int, std::string* why) {
 }
 
 GpuInfo gpu_info(int) { throw Error("GPU: this build has no GPU backend: bake with --device cpu"); }
+
+namespace gpu {
+
+std::vector<packing::GridCandidate> converged_on_gpu(const MeshView&, const packing::GridLayout&,
+                                                     const packing::AscentSettings&,
+                                                     const GpuSettings& gpu) {
+  gpu_info(gpu.device);
+  return {};
+}
+
+}  // namespace gpu
 
 }  // namespace ist

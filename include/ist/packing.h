@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <ist/gpu.h>
+#include <ist/grid_settings.h>
 #include <ist/progress.h>
 #include <ist/solid.h>
 #include <ist/sphere.h>
@@ -13,7 +14,13 @@
 namespace ist {
 
 /// How the space is searched for the next spheres (DESIGN 4.1).
-enum class GridMode : std::uint32_t { banded = 0 };
+enum class GridMode : std::uint32_t {
+  banded = 0,               ///< ours: a greedy packing with a guarantee
+  uniform = 1,              ///< original ProtoSphere: one fixed, fine grid
+  explicit_refinement = 2,  ///< one grid, coarse at first, split in 8 every few rounds
+  implicit_refinement = 3,  ///< prototypes on a grid that is refined, distances on a fixed fine one
+  hybrid = 4,               ///< both refined together
+};
 
 /// Where packing and baking run. The result is the same, bit for bit.
 enum class Device : std::uint32_t {
@@ -33,6 +40,7 @@ struct PackingSettings {
   /// round began. 0 = automatic: the library's schedule, fastest at equal coverage.
   double epsilon = 0.0;
   GridMode grid = GridMode::banded;
+  GridSettings grids;                 ///< of the other modes
   std::uint64_t seed = 0;             ///< tie-breaks only; any value packs equally well
   unsigned threads = 0;               ///< 0 = all cores; never changes the result
   Device device = Device::automatic;  ///< a Solid that is not a mesh is always packed on the CPU
@@ -46,7 +54,8 @@ struct SpherePacking {
   std::vector<Sphere> spheres;
   StopReason stop = StopReason::sphere_count;
   double coverage = 0;           ///< [0, 1] of the solid's volume
-  double kept_ratio_worst = 1;   ///< min over spheres of radius / largest live bound at insertion
+  /// Min over spheres of radius / largest live bound at insertion; 1 for modes that keep no bound.
+  double kept_ratio_worst = 1;
   double kept_ratio_median = 1;  ///< median of the same
   bool below_float_noise =
       false;  ///< radii fell under 1e-4 of the half-extent: certified, not greedy

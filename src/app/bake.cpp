@@ -41,8 +41,10 @@ void announce_device(Device device) {
 }
 
 GridMode grid_mode(const std::string& name) {
-  if (name != "banded")
-    throw Error("--grid " + name + ": not available in this version; use --grid banded");
+  if (name == "uniform") return GridMode::uniform;
+  if (name == "explicit") return GridMode::explicit_refinement;
+  if (name == "implicit") return GridMode::implicit_refinement;
+  if (name == "hybrid") return GridMode::hybrid;
   return GridMode::banded;
 }
 

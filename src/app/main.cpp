@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
   add_info(app);
   add_check(app);
   add_export(app);
+  add_medial(app);
   add_sample(app);
   try {
     app.parse(argc, argv);

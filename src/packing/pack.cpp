@@ -4,6 +4,7 @@
 #include "packing/band_limits.h"
 #include "packing/banded_packer.h"
 #include "packing/field_surface.h"
+#include "packing/grids/pack_grids.h"
 #include "packing/mesh_surface.h"
 #include "packing/packing_settings.h"
 #include "packing/thread_arena.h"
@@ -19,9 +20,14 @@ SpherePacking pack(const Solid& solid, const PackingSettings& settings,
   const packing::BandLimits limits = packing::band_limits(solid, scale, settings);
   if (!(limits.volume > 0)) throw Error("packing: the solid's volume is not positive");
 
+  if (settings.grid != GridMode::banded && mesh == nullptr)
+    throw Error("packing: the grid modes pack meshes; pack other solids with the banded mode");
+
   SpherePacking result;
   thread_arena(settings.threads).execute([&] {
-    if (mesh != nullptr) {
+    if (settings.grid != GridMode::banded) {
+      result = packing::pack_grids(*mesh, settings, progress);
+    } else if (mesh != nullptr) {
       const packing::MeshSurface surface(*mesh);
       result = packing::BandedPacker(surface, limits, settings.time_limit, scale, progress).run();
     } else {

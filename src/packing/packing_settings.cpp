@@ -28,7 +28,12 @@ void check_settings(const PackingSettings& s) {
   require(s.time_limit >= 0 && std::isfinite(s.time_limit), "time_limit", s.time_limit,
           "finite and not negative (0 = none)");
   require(s.epsilon >= 0 && s.epsilon < 1, "epsilon", s.epsilon, "in [0, 1) (0 = automatic)");
-  require(s.grid == GridMode::banded, "grid", static_cast<double>(s.grid), "banded (0)");
+  require(s.grid <= GridMode::hybrid, "grid", static_cast<double>(s.grid), "a GridMode (0 … 4)");
+  require(s.grids.start <= 1024, "grids.start", s.grids.start, "at most 1024 (0 = automatic)");
+  require(s.grids.resolution <= 1024, "grids.resolution", s.grids.resolution,
+          "at most 1024 (0 = automatic)");
+  require(s.grids.refinements <= 10, "grids.refinements", s.grids.refinements,
+          "at most 10 (negative = automatic)");
   if (s.max_spheres == 0 && s.target_coverage >= 1 && s.min_radius <= 0 && s.time_limit <= 0)
     throw Error(
         "packing: no limit is set; give a sphere count, a coverage below 1, a smallest radius or a "

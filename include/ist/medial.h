@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include <ist/gpu.h>
+#include <ist/packing.h>
+#include <ist/progress.h>
+#include <ist/solid.h>
+
+namespace ist {
+
+/// A point of a solid's medial axis, where a ball touches the surface from several sides.
+struct MedialNode {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< [u], the mesh's frame
+  double radius = 0;  ///< [u] its distance from the surface, within 4e-6 of the half-extent
+  int contacts =
+      0;  ///< directions to the surface over 45° apart that were seen there: 2, 3 or 4 (or more)
+};
+
+struct MedialSettings {
+  unsigned resolution = 0;  ///< cells on the solid's longest side, one node each at most; 1 … 1024
+                            ///< or 0 = automatic (32–72)
+  std::uint64_t seed = 0;  ///< another seed, other nodes of the same axis
+  unsigned threads = 0;    ///< 0 = all cores; never changes the result
+  Device device = Device::automatic;
+  GpuSettings gpu = {};  ///< where `device` is a GPU
+};
+
+/// The first round of the grid packing (DESIGN 4.1) as an approximation of the medial axis: one
+/// prototype a grid cell flees from the surface, confined to its cell. Those that come to rest
+/// between surface points over 45° apart are the nodes: Voronoi nodes where they meet four, else
+/// points of the axis' sheets and seams. Ordered by cell; the same for any device and number of
+/// threads. Throws Error on settings out of range, and for a Solid that is not a mesh.
+std::vector<MedialNode> medial_nodes(const Solid& solid, const MedialSettings& settings = {});
+
+}  // namespace ist

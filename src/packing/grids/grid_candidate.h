@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+
+#include "mesh/host_device.h"
+#include "packing/float3.h"
+#include "packing/grids/grid_random.h"
+
+namespace ist::packing {
+
+/// A converged prototype: the best point that it saw in its cell. radius ≤ 0: none.
+struct GridCandidate {
+  Float3 centre;
+  float radius = 0;
+  std::uint64_t key = 0;      ///< radius bits, then a hash of the cell
+  std::uint32_t cell = 0;     ///< of the prototype grid
+  std::int32_t contacts = 0;  ///< features that it came to lie between, as far as it could tell
+};
+
+IST_HD inline std::uint64_t grid_key(float radius, std::uint64_t seed, std::uint32_t round,
+                                     std::uint32_t cell) {
+  // Positive floats order like their bits.
+  return std::uint64_t{bits_of(radius)} << 32 | random_bits(seed, round, cell, 0xFFFFu) >> 32;
+}
+
+/// The order of candidates of one round: larger ones first. Total, for different cells.
+IST_HD inline bool goes_before(const GridCandidate& a, const GridCandidate& b) {
+  return a.key != b.key ? a.key > b.key : a.cell < b.cell;
+}
+
+/// Do they overlap, or come closer than certified spheres may (certificate.h)?
+IST_HD inline bool overlap(const GridCandidate& a, const GridCandidate& b) {
+  constexpr double kMoreThanGap = 4e-12;
+  const double x = double{a.centre.x} - double{b.centre.x};
+  const double y = double{a.centre.y} - double{b.centre.y};
+  const double z = double{a.centre.z} - double{b.centre.z};
+  const double r = double{a.radius} + double{b.radius} + kMoreThanGap;
+  return x * x + y * y + z * z < r * r;
+}
+
+}  // namespace ist::packing

@@ -1,0 +1,98 @@
+#include "packing/grids/grid_schedule.h"
+
+#include <ist/error.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace ist::packing {
+namespace {
+
+/// Of a grid's words and records while it is built, active cells being a third of all.
+constexpr double kBytesPerCell = 24;
+
+double cell_count(const GridLayout& g) { return double(g.n[0]) * double(g.n[1]) * double(g.n[2]); }
+
+/// Cells on the longest side such that a compact solid fills some kFirstPrototypes of them: the
+/// paper's 4–9, by how much of its box the solid fills.
+int automatic_start(const GridFigures& solid) {
+  constexpr double kFirstPrototypes = 64;
+  double longest = 0;
+  for (int k = 0; k < 3; ++k) longest = std::max(longest, solid.upper[k] - solid.lower[k]);
+  const double wanted = longest / std::cbrt(std::max(solid.volume, 1e-30) / kFirstPrototypes);
+  return static_cast<int>(std::clamp(std::ceil(wanted - 0.01), 4.0, 9.0));
+}
+
+/// The finest level ≤ `wanted` whose grid fits the memory.
+int affordable(const GridLayout& first, int wanted, std::size_t memory) {
+  const double most = static_cast<double>(memory) / kBytesPerCell;
+  while (wanted > 0 && cell_count(first) * std::pow(8.0, wanted) > most) --wanted;
+  return wanted;
+}
+
+double root_of(std::size_t count) { return std::sqrt(static_cast<double>(count)); }
+
+void require_size(int start, int levels) {
+  if ((std::int64_t{start} << levels) <= kMostCellsPerSide) return;
+  throw Error("packing: a grid of " + std::to_string(start) + " cells on the longest side, split " +
+              std::to_string(levels) + " times, has more than " +
+              std::to_string(kMostCellsPerSide) +
+              " on a side: set a smaller grid start, resolution or fewer refinements");
+}
+
+/// Refinements that bring `start` to at least `resolution`.
+int levels_to(int start, int resolution) {
+  int level = 0;
+  while ((std::int64_t{start} << level) < resolution) ++level;
+  return level;
+}
+
+}  // namespace
+
+GridSchedule grid_schedule(GridMode mode, const GridSettings& settings, const GridFigures& solid) {
+  constexpr int kRefinements = 5, kFinest = 5, kUniform = 4, kHybridRefinements = 4;
+  constexpr double kCellsPerRoot = 0.12;  // cells on the longest side per √triangles; measured
+  GridSchedule s;
+  const int start = settings.start > 0 ? static_cast<int>(settings.start) : automatic_start(solid);
+  const int resolution = static_cast<int>(settings.resolution);
+  s.rounds_per_level =
+      settings.rounds_per_level > 0 ? static_cast<int>(settings.rounds_per_level) : 2;
+  if (mode == GridMode::uniform) {
+    const int cells = resolution > 0 ? resolution : start << kUniform;
+    require_size(cells, 0);
+    s.first = make_grid_layout(solid.lower, solid.upper, cells, 0);
+    return s;
+  }
+  const int refinements = settings.refinements >= 0 ? settings.refinements : kRefinements;
+  const int asked = resolution > 0 ? levels_to(start, resolution) : -1;
+  require_size(start, std::max(refinements, asked));
+  int levels = 0;  // that there can be
+  while ((start << (levels + 1)) <= kMostCellsPerSide) ++levels;
+  s.first = make_grid_layout(solid.lower, solid.upper, start, levels);
+  s.finest_prototypes = refinements;
+  // A distance grid finer than the triangles costs more steps than it saves tests.
+  const int fine = levels_to(start, static_cast<int>(kCellsPerRoot * root_of(solid.triangles)));
+  switch (mode) {
+    case GridMode::explicit_refinement:
+      s.finest_distances = refinements;
+      break;
+    case GridMode::implicit_refinement:
+      s.distances = asked >= 0 ? asked
+                               : affordable(s.first, std::min({std::max(fine, 2), levels, kFinest}),
+                                            solid.memory);
+      s.finest_distances = s.distances;
+      break;
+    default:
+      s.distances = asked >= 0 ? asked
+                               : affordable(s.first, std::min({std::max(fine, 1), levels, kFinest}),
+                                            solid.memory);
+      s.finest_distances = std::max(
+          s.distances, affordable(s.first, std::min(refinements, s.distances + kHybridRefinements),
+                                  solid.memory));
+      break;
+  }
+  return s;
+}
+
+}  // namespace ist::packing

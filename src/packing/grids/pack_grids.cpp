@@ -1,0 +1,37 @@
+#include "packing/grids/pack_grids.h"
+
+#include "packing/grids/host_backend.h"
+
+namespace ist::packing {
+
+GridFigures grid_figures(const MeshSolid& solid, std::size_t memory) {
+  GridFigures figures;
+  const Eigen::AlignedBox3d bounds = solid.bounds();
+  const Eigen::Vector3d lower = solid.frame().to_unit(bounds.min());
+  const Eigen::Vector3d upper = solid.frame().to_unit(bounds.max());
+  for (int k = 0; k < 3; ++k) {
+    figures.lower[k] = lower[k];
+    figures.upper[k] = upper[k];
+  }
+  figures.volume = solid.unit_volume();
+  figures.triangles = solid.arrays().triangle_count;
+  figures.memory = memory;
+  return figures;
+}
+
+GridLimits grid_limits(const MeshSolid& solid, const PackingSettings& settings) {
+  const double scale = solid.frame().scale();
+  return {solid.unit_volume(), settings.target_coverage, settings.min_radius / scale, scale};
+}
+
+SpherePacking pack_grids(const MeshSolid& solid, const PackingSettings& settings,
+                         const ProgressCallback& progress, std::vector<GridRound>* history) {
+  constexpr std::size_t kHostMemory = std::size_t{512} << 20;
+  const GridSchedule schedule =
+      grid_schedule(settings.grid, settings.grids, grid_figures(solid, kHostMemory));
+  const auto backend = make_host_grid_backend(solid.arrays());
+  return pack_on_grids(*backend, schedule, grid_limits(solid, settings), settings, progress,
+                       history);
+}
+
+}  // namespace ist::packing
