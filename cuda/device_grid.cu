@@ -6,10 +6,10 @@
 #include <span>
 
 #include "grid_cells.h"
+#include "grid_triangles.h"
+#include "packing/grids/cell_listing.h"
 #include "packing/grids/discrete_distance.h"
-#include "packing/grids/local_winding.h"
 #include "prefix_sum.h"
-#include "warp_team.h"
 
 namespace ist::gpu {
 namespace {
@@ -19,130 +19,14 @@ using packing::CellRecord;
 using packing::DistanceGrid;
 using packing::GridLayout;
 using packing::GridScene;
-using packing::TriangleCells;
 
 constexpr unsigned kThreads = 128;
-constexpr unsigned kWarps = kThreads / 32;
-constexpr std::uint32_t kMostCellsOfAWarp = 4096;
 
 unsigned blocks_for(std::size_t items, unsigned each) {
   return static_cast<unsigned>(std::max<std::size_t>((items + each - 1) / each, 1));
 }
 
 __device__ unsigned global_thread() { return blockIdx.x * kThreads + threadIdx.x; }
-
-__global__ void make_triangles(const double* vertices, const std::uint32_t* corners,
-                               std::uint32_t count, packing::GridTriangle* triangles) {
-  const unsigned t = global_thread();
-  if (t >= count) return;
-  const std::uint32_t* c = corners + 3 * std::size_t{t};
-  triangles[t] = packing::make_grid_triangle(vertices + 3 * std::size_t{c[0]},
-                                             vertices + 3 * std::size_t{c[1]},
-                                             vertices + 3 * std::size_t{c[2]});
-}
-
-/// What a triangle does to a cell that it meets, and to a row whose centre line it pierces.
-struct CountTriangles {
-  std::uint32_t* counts;
-  std::int32_t* crossings;
-
-  __device__ void meet(std::uint32_t cell, std::uint32_t) const { atomicAdd(counts + cell, 1u); }
-  __device__ void row(const GridLayout& g, const Corners& corners, const TriangleCells& cells,
-                      int j, int k) const {
-    const int crossing = packing::row_crossing(g, corners, j, k);
-    if (crossing == 0) return;
-    const int i = packing::first_in_row(g, cells, j, k);
-    if (i != packing::kNoCell) atomicAdd(crossings + g.id(i, j, k), crossing);
-  }
-};
-
-struct ListTriangles {
-  const std::uint32_t* words;
-  const CellRecord* records;
-  std::uint32_t* filled;
-  std::uint32_t* lists;
-
-  __device__ void meet(std::uint32_t cell, std::uint32_t triangle) const {
-    const CellRecord& record = records[DistanceGrid::slot(words[cell])];
-    lists[record.triangles + atomicAdd(filled + cell, 1u)] = triangle;
-  }
-  __device__ void row(const GridLayout&, const Corners&, const TriangleCells&, int, int) const {}
-};
-
-template <class Act>
-__device__ void act_on(const GridScene& mesh, const GridLayout& g, std::uint32_t triangle,
-                       const TriangleCells& cells, std::uint32_t first, std::uint32_t step,
-                       const Act& act) {
-  const CellRange& range = cells.range();
-  const auto nx = static_cast<std::uint32_t>(range.hi[0] - range.lo[0] + 1);
-  const auto ny = static_cast<std::uint32_t>(range.hi[1] - range.lo[1] + 1);
-  for (std::uint32_t n = first; n < range.count(); n += step) {
-    const int i = range.lo[0] + static_cast<int>(n % nx);
-    const int j = range.lo[1] + static_cast<int>(n / nx % ny);
-    const int k = range.lo[2] + static_cast<int>(n / nx / ny);
-    if (cells.meets(g, i, j, k)) act.meet(g.id(i, j, k), triangle);
-  }
-  const Corners corners = packing::corners_of(mesh, triangle);
-  for (std::uint32_t n = first; n < range.count() / nx; n += step)
-    act.row(g, corners, cells, range.lo[1] + static_cast<int>(n % ny),
-            range.lo[2] + static_cast<int>(n / ny));
-}
-
-/// A warp a triangle. Those that may meet many cells are left to the whole grid of threads.
-template <class Act>
-__global__ void act_on_small_triangles(const GridScene mesh, const GridLayout g,
-                                       std::uint32_t count, Act act, std::uint32_t* large,
-                                       std::uint32_t* large_count) {
-  const std::uint32_t t = global_thread() / 32;
-  if (t >= count) return;
-  const TriangleCells cells = packing::cells_of(g, packing::corners_of(mesh, t));
-  if (cells.range().count() > kMostCellsOfAWarp) {
-    if (threadIdx.x % 32 == 0) large[atomicAdd(large_count, 1u)] = t;
-    return;
-  }
-  act_on(mesh, g, t, cells, threadIdx.x % 32, 32, act);
-}
-
-template <class Act>
-__global__ void act_on_large_triangles(const GridScene mesh, const GridLayout g, Act act,
-                                       const std::uint32_t* large,
-                                       const std::uint32_t* large_count) {
-  for (std::uint32_t n = 0; n < *large_count; ++n) {
-    const TriangleCells cells = packing::cells_of(g, packing::corners_of(mesh, large[n]));
-    act_on(mesh, g, large[n], cells, global_thread(), gridDim.x * kThreads, act);
-  }
-}
-
-/// A warp a row: HostGrid::classify().
-__global__ void classify_rows(const GridLayout g, const std::uint32_t* counts,
-                              std::int32_t* windings, std::uint32_t* words) {
-  const unsigned row = global_thread() / 32;
-  if (row >= static_cast<unsigned>(g.n[1] * g.n[2])) return;
-  const unsigned lane = threadIdx.x % 32;
-  const std::size_t first = std::size_t{row} * static_cast<unsigned>(g.n[0]);
-  int winding = 0, last = 0;  // before this piece of the row
-  for (unsigned base = 0; base < static_cast<unsigned>(g.n[0]); base += 32) {
-    const bool there = base + lane < static_cast<unsigned>(g.n[0]);
-    const std::size_t cell = first + base + lane;
-    int sum = there ? windings[cell] : 0;
-    const bool empty = there && counts[cell] == 0;
-    for (unsigned d = 1; d < 32; d *= 2) {
-      const int before = __shfl_up_sync(0xFFFFFFFFu, sum, d);
-      if (lane >= d) sum += before;
-    }
-    sum += winding;
-    const unsigned empties = __ballot_sync(0xFFFFFFFFu, empty);
-    const unsigned before = empties & ((1u << lane) - 1u);
-    const int previous = __shfl_sync(0xFFFFFFFFu, sum, before == 0 ? 0 : 31 - __clz(before));
-    if (there) {
-      windings[cell] = empty ? sum : (before == 0 ? last : previous);
-      words[cell] = empty && sum < 1 ? DistanceGrid::kInactive : 0;
-    }
-    const int final_empty = __shfl_sync(0xFFFFFFFFu, sum, empties == 0 ? 0 : 31 - __clz(empties));
-    if (empties != 0) last = final_empty;
-    winding = __shfl_sync(0xFFFFFFFFu, sum, 31);
-  }
-}
 
 /// A block a sphere: calls act(cell, covered) for what it meets or covers.
 template <class Act>
@@ -261,6 +145,12 @@ __global__ void take_field(const CellRecord* records, std::uint32_t count, GridW
     *word = DistanceGrid::slot(*word) | std::uint32_t{field[records[r].cell]} << 24;
 }
 
+GridWords words_of(const DeviceArray<std::uint32_t>& words,
+                   const DeviceArray<std::uint32_t>& keys) {
+  if (keys.size() == 0) return {words.data()};
+  return {words.data(), keys.data(), static_cast<std::uint32_t>(keys.size() - 1)};
+}
+
 }  // namespace
 
 DeviceGrid::DeviceGrid(Queue& queue, const MeshView& mesh)
@@ -269,12 +159,10 @@ DeviceGrid::DeviceGrid(Queue& queue, const MeshView& mesh)
       vertices_(queue, 3 * std::size_t{mesh.vertex_count}),
       corners_(queue, 3 * std::size_t{mesh.triangle_count}),
       triangles_(queue, mesh.triangle_count),
-      counter_(queue, 2) {
+      counter_(queue, 1) {
   vertices_.upload(std::span(mesh.vertices_exact, vertices_.size()));
   corners_.upload(std::span(mesh.triangles, corners_.size()));
-  make_triangles<<<blocks_for(triangle_count_, kThreads), kThreads, 0, queue.stream()>>>(
-      vertices_.data(), corners_.data(), triangle_count_, triangles_.data());
-  check_launch("preparing the triangles");
+  prepare_triangles(queue, vertices_, corners_, triangles_);
 }
 
 GridScene DeviceGrid::scene() const {
@@ -324,23 +212,10 @@ void DeviceGrid::build(const GridLayout& layout) {
   DeviceArray<std::uint32_t> counts(*queue_, std::size_t{cells} + 1);
   DeviceArray<std::int32_t> windings(*queue_, cells);
   DeviceArray<std::uint32_t> large(*queue_, triangle_count_);
-  counts.fill_bytes(0);
-  windings.fill_bytes(0);
   counter_.fill_bytes(0);
   const GridScene mesh = scene();
-  const auto for_triangles = [&](const auto& act) {
-    std::uint32_t* const large_count = counter_.data() + 1;
-    act_on_small_triangles<<<blocks_for(triangle_count_, kWarps), kThreads, 0, stream>>>(
-        mesh, layout_, triangle_count_, act, large.data(), large_count);
-    act_on_large_triangles<<<static_cast<unsigned>(4 * queue_->multiprocessors()), kThreads, 0,
-                             stream>>>(mesh, layout_, act, large.data(), large_count);
-    check_launch("listing triangles");
-  };
-  for_triangles(CountTriangles{counts.data(), windings.data()});
-  const auto rows = static_cast<std::size_t>(layout.n[1]) * static_cast<std::size_t>(layout.n[2]);
-  classify_rows<<<blocks_for(rows, kWarps), kThreads, 0, stream>>>(layout_, counts.data(),
-                                                                   windings.data(), words_.data());
-  check_launch("classifying cells");
+  count_triangles(*queue_, mesh, layout, triangle_count_, counts, windings, large);
+  classify_rows(*queue_, layout, counts, windings, words_);
   cover(0);
 
   DeviceArray<std::uint32_t> slots(*queue_, std::size_t{cells} + 1);
@@ -364,11 +239,8 @@ void DeviceGrid::build(const GridLayout& layout) {
   make_records<<<blocks_for(cells, kThreads), kThreads, 0, stream>>>(
       cells, slots.data(), counts.data(), windings.data(), words_.data(), records_.data());
   slots.release();
-  windings.fill_bytes(0);
-  counter_.fill_bytes(0);
-  for_triangles(ListTriangles{words_.data(), records_.data(),
-                              reinterpret_cast<std::uint32_t*>(windings.data()),
-                              triangle_lists_.data()});
+  fill_triangle_lists(*queue_, mesh, layout, triangle_count_, words_, records_, windings, large,
+                      triangle_lists_);
   counts.release();
   windings.release();
   large.release();
@@ -389,8 +261,7 @@ void DeviceGrid::update() {
 void DeviceGrid::cover(std::size_t first_new) {
   if (sphere_count_ > first_new) {
     const auto most = static_cast<std::size_t>(64 * queue_->multiprocessors());
-    const GridWords words{words_.data(), hashed() ? keys_.data() : nullptr,
-                          static_cast<std::uint32_t>(keys_.size() - 1)};
+    const GridWords words = words_of(words_, keys_);
     cover_cells<<<static_cast<unsigned>(std::min(most, sphere_count_ - first_new)), kThreads, 0,
                   queue_->stream()>>>(
         layout_, spheres_.data(), static_cast<std::uint32_t>(first_new),
@@ -405,8 +276,7 @@ void DeviceGrid::drop_inactive() {
   const std::size_t count = records_.size();
   if (8 * (count - active_) < count) return;
   const cudaStream_t stream = queue_->stream();
-  const GridWords words{words_.data(), hashed() ? keys_.data() : nullptr,
-                        static_cast<std::uint32_t>(keys_.size() - 1)};
+  const GridWords words = words_of(words_, keys_);
   DeviceArray<std::uint32_t> places(*queue_, count + 1);
   flag_active_records<<<blocks_for(count + 1, kThreads), kThreads, 0, stream>>>(
       records_.data(), static_cast<std::uint32_t>(count), words, places.data());
@@ -437,8 +307,7 @@ void DeviceGrid::list_spheres() {
   const auto spheres = static_cast<std::uint32_t>(sphere_count_);
   if (count == 0) return;
   const cudaStream_t stream = queue_->stream();
-  const GridWords words{words_.data(), hashed() ? keys_.data() : nullptr,
-                        static_cast<std::uint32_t>(keys_.size() - 1)};
+  const GridWords words = words_of(words_, keys_);
   const auto list = [&](std::uint32_t* lists) {
     if (spheres == 0) return;
     const auto most = static_cast<unsigned>(64 * queue_->multiprocessors());
@@ -468,8 +337,7 @@ void DeviceGrid::measure_distances() {
   const auto count = static_cast<std::uint32_t>(records_.size());
   if (count == 0) return;
   const cudaStream_t stream = queue_->stream();
-  const GridWords words{words_.data(), hashed() ? keys_.data() : nullptr,
-                        static_cast<std::uint32_t>(keys_.size() - 1)};
+  const GridWords words = words_of(words_, keys_);
   DeviceArray<std::uint8_t> field(*queue_, layout_.count());
   field.fill_bytes(packing::kInactiveCell);
   start_field<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(records_.data(), count, words,

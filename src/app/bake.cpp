@@ -135,6 +135,27 @@ void add_bake(CLI::App& app) {
       ->check(CLI::IsMember({"banded", "uniform", "explicit", "implicit", "hybrid"}))
       ->capture_default_str();
   command
+      ->add_option("--grid-resolution", packing.grids.resolution,
+                   "Cells on the longest side of the fixed grid, or of hybrid's first distance "
+                   "grid; 0 = automatic")
+      ->check(is_count)
+      ->capture_default_str();
+  command
+      ->add_option("--grid-start", packing.grids.start,
+                   "Cells on the longest side of the first grid of prototypes; 0 = automatic")
+      ->check(is_count)
+      ->capture_default_str();
+  command
+      ->add_option("--grid-refinements", packing.grids.refinements,
+                   "How often that grid is split in 8; -1 = automatic")
+      ->check(CLI::Range(-1, 10))
+      ->capture_default_str();
+  command
+      ->add_option("--grid-rounds", packing.grids.rounds_per_level,
+                   "Rounds before each split; 0 = automatic")
+      ->check(is_count)
+      ->capture_default_str();
+  command
       ->add_option("--device", options->device,
                    "Where the bake runs; auto: on the GPU if there is one")
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
