@@ -37,6 +37,14 @@ const char* name_of(GridMode mode) noexcept {
   switch (mode) {
     case GridMode::banded:
       return "banded";
+    case GridMode::uniform:
+      return "uniform";
+    case GridMode::explicit_refinement:
+      return "explicit";
+    case GridMode::implicit_refinement:
+      return "implicit";
+    case GridMode::hybrid:
+      return "hybrid";
   }
   return "unknown";
 }
