@@ -3,6 +3,7 @@
 #include <ist/gpu.h>
 
 #include "medial_on_gpu.h"
+#include "mesh_on_gpu.h"
 
 namespace ist {
 
@@ -21,6 +22,12 @@ std::vector<packing::GridCandidate> converged_on_gpu(const MeshView&, const pack
   gpu_info(gpu.device);
   return {};
 }
+struct MeshOnGpu::Impl {};
+
+MeshOnGpu::MeshOnGpu(const MeshSolid&, const GpuSettings&) { gpu_info(); }
+MeshOnGpu::~MeshOnGpu() = default;
+SpherePacking MeshOnGpu::pack(const PackingSettings&, const ProgressCallback&) { return {}; }
+std::size_t MeshOnGpu::peak_bytes() const { return 0; }
 
 }  // namespace gpu
 
