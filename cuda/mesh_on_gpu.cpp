@@ -3,10 +3,13 @@
 #include <ist/error.h>
 
 #include "banded_pack.h"
+#include "cover_on_gpu.h"
 #include "device_mesh.h"
 #include "pack_grids.h"
 #include "packing/band_limits.h"
+#include "protrusion_on_gpu.h"
 #include "queue.h"
+#include "relax_on_gpu.h"
 
 namespace ist::gpu {
 namespace {
@@ -30,10 +33,14 @@ HostMesh host_mesh(const MeshView& arrays) {
 }  // namespace
 
 struct MeshOnGpu::Impl {
-  Impl(const MeshSolid& mesh, const GpuSettings& settings)
-      : solid(mesh), queue(usable(settings)), device(queue, host_mesh(mesh.arrays())) {}
+  Impl(const MeshSolid& mesh, const GpuSettings& asked)
+      : solid(mesh),
+        settings(usable(asked)),
+        queue(settings),
+        device(queue, host_mesh(mesh.arrays())) {}
 
   const MeshSolid& solid;
+  GpuSettings settings;
   Queue queue;
   DeviceMesh device;
 };
@@ -54,6 +61,22 @@ SpherePacking MeshOnGpu::pack(const PackingSettings& settings, const ProgressCal
   result.frame = frame;
   return result;
 }
+
+RelaxedSites MeshOnGpu::relax_sites(const ColumnPlan& plan, std::span<const PowerSite> sites,
+                                    double volume, const std::function<void(double)>& report) {
+  return gpu::relax_sites(impl_->queue, impl_->device.tree(), plan, sites, volume, report);
+}
+
+double MeshOnGpu::largest_protrusion(std::span<const Sphere4> balls) {
+  return gpu::largest_protrusion(impl_->queue, impl_->device.tree(), balls);
+}
+
+std::vector<double> MeshOnGpu::cover_radii(const CoverTask& task,
+                                           const std::function<void(int)>& report) {
+  return gpu::cover_radii(impl_->queue, impl_->device.tree(), task, report);
+}
+
+const GpuSettings& MeshOnGpu::settings() const { return impl_->settings; }
 
 std::size_t MeshOnGpu::peak_bytes() const { return impl_->queue.peak_bytes(); }
 

@@ -27,6 +27,18 @@ struct MeshOnGpu::Impl {};
 MeshOnGpu::MeshOnGpu(const MeshSolid&, const GpuSettings&) { gpu_info(); }
 MeshOnGpu::~MeshOnGpu() = default;
 SpherePacking MeshOnGpu::pack(const PackingSettings&, const ProgressCallback&) { return {}; }
+RelaxedSites MeshOnGpu::relax_sites(const ColumnPlan&, std::span<const PowerSite>, double,
+                                    const std::function<void(double)>&) {
+  return {};
+}
+double MeshOnGpu::largest_protrusion(std::span<const Sphere4>) { return 0; }
+std::vector<double> MeshOnGpu::cover_radii(const CoverTask&, const std::function<void(int)>&) {
+  return {};
+}
+const GpuSettings& MeshOnGpu::settings() const {
+  static const GpuSettings none;
+  return none;
+}
 std::size_t MeshOnGpu::peak_bytes() const { return 0; }
 
 }  // namespace gpu

@@ -1,12 +1,13 @@
 #include <ist/bake.h>
 #include <ist/error.h>
-#include <tbb/parallel_invoke.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 
 #include "asset/asset_writer.h"
 #include "build/calibration.h"
 #include "build/cover.h"
+#include "build/pack.h"
 #include "build/tree_builder.h"
 #include "mesh/mesh_solid.h"
 #include "packing/thread_arena.h"
@@ -37,6 +38,24 @@ AssetHeader describe_bake(const ClosedMesh& mesh, const MeshSolid& solid,
   return header;
 }
 
+/// Waits for a group's tasks whichever way a scope is left. A group that is left alone would be
+/// cancelled, and with it, unseen, the loops inside its tasks.
+class WaitAtEnd {
+ public:
+  explicit WaitAtEnd(tbb::task_group& group) : group_(group) {}
+  ~WaitAtEnd() {
+    try {
+      group_.wait();
+    } catch (...) {  // the scope is left by an exception already
+    }
+  }
+  WaitAtEnd(const WaitAtEnd&) = delete;
+  WaitAtEnd& operator=(const WaitAtEnd&) = delete;
+
+ private:
+  tbb::task_group& group_;
+};
+
 void report_tree(const ProgressCallback& progress, std::size_t spheres, double fraction) {
   Progress now;
   now.stage = "tree";
@@ -50,7 +69,8 @@ void report_tree(const ProgressCallback& progress, std::size_t spheres, double f
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
            const ProgressCallback& progress) {
   const MeshSolid solid(mesh);
-  const SpherePacking packing = pack(solid, settings, progress);
+  const auto gpu = put_on_gpu(solid, settings);
+  const SpherePacking packing = pack(solid, gpu.get(), settings, progress);
   if (packing.spheres.empty())
     throw Error(mesh.name +
                 ": not one sphere fits within the limits; lower the smallest radius or the "
@@ -59,17 +79,30 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   arrays.header = describe_bake(mesh, solid, settings, packing);
   for (const Sphere& s : packing.spheres) arrays.inner_spheres.push_back({s.x, s.y, s.z, s.r});
 
-  Calibration calibration = calibrate(solid, packing.spheres, settings.threads, progress);
-  arrays.effective_spheres = std::move(calibration.effective);
-  arrays.header.protrusion = calibration.protrusion;
-  arrays.cover_radii = cover_radii(solid, packing.spheres, settings.threads, progress);
-
-  report_tree(progress, packing.spheres.size(), 0);
-  tbb::task_arena arena = thread_arena(settings.threads);
-  arena.execute([&] {
-    tbb::parallel_invoke(
-        [&] { arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii); },
-        [&] { arrays.matched_tree = build_tree(arrays.effective_spheres, {}); });
+  std::vector<std::uint32_t> inner_order;
+  const auto order_inner = [&] { inner_order = sphere_order(arrays.inner_spheres); };
+  const auto cluster_matched = [&] {
+    arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  };
+  thread_arena(settings.threads).execute([&] {
+    // While the GPU calibrates, the CPU clusters. A CPU alone has its threads full either way.
+    tbb::task_group trees;
+    const WaitAtEnd wait(trees);
+    if (gpu) trees.run(order_inner);
+    Calibration calibration =
+        calibrate(solid, packing.spheres, settings.threads, progress, gpu.get());
+    arrays.effective_spheres = std::move(calibration.effective);
+    arrays.header.protrusion = calibration.protrusion;
+    if (gpu) trees.run(cluster_matched);
+    arrays.cover_radii = cover_radii(solid, packing.spheres, settings.threads, progress, gpu.get());
+    report_tree(progress, packing.spheres.size(), 0);
+    if (!gpu) {
+      trees.run(order_inner);
+      trees.run(cluster_matched);
+    }
+    trees.wait();
+    arrays.inner_tree =
+        tree_from_order(arrays.inner_spheres, arrays.cover_radii, std::move(inner_order));
   });
   report_tree(progress, packing.spheres.size(), 1);
   return Asset(asset_bytes(arrays), mesh.name);

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <memory>
+#include <optional>
 
 #include <ist/error.h>
 
@@ -13,6 +15,7 @@
 #include "build/power_cells.h"
 #include "build/protrusion.h"
 #include "build/turned_solid.h"
+#include "mesh_on_gpu.h"
 #include "packing/thread_arena.h"
 
 namespace ist {
@@ -58,16 +61,20 @@ RelaxedSites relax_sites(const MeshSolid& solid, const ColumnPlan& plan,
   return {std::move(sites), std::move(shares)};
 }
 
-/// Distance by which a ball sticks out of the solid at most.
-double protrusion(const MeshSolid& solid, const Sphere4& ball) {
-  const Eigen::Vector3d centre(ball.x, ball.y, ball.z);
-  return protrusion_of(ball.r, solid.closest_point(centre).distance, solid.inside(centre));
+/// How far any of the balls sticks out of the solid at most, at least 0.
+double largest_protrusion(const MeshSolid& solid, std::span<const Sphere4> balls) {
+  std::vector<double> out(balls.size());
+  tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t k) {
+    const Eigen::Vector3d centre(balls[k].x, balls[k].y, balls[k].z);
+    out[k] = protrusion_of(balls[k].r, solid.closest_point(centre).distance, solid.inside(centre));
+  });
+  return std::max(0.0, *std::max_element(out.begin(), out.end()));
 }
 
 }  // namespace
 
 Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, unsigned threads,
-                      const ProgressCallback& progress) {
+                      const ProgressCallback& progress, gpu::MeshOnGpu* gpu) {
   if (inner.empty()) throw Error("calibration: no inner spheres");
   const auto start = std::chrono::steady_clock::now();
   const auto report = [&](double fraction) {
@@ -83,7 +90,9 @@ Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, uns
 
   // The cells are found in the frame of the turned solid.
   report(0);
-  const TurnedSolid turned(solid);
+  std::optional<TurnedSolid> turned_solid;
+  arena.execute([&] { turned_solid.emplace(solid); });
+  const TurnedSolid& turned = *turned_solid;
   const double volume = turned.solid().unit_volume();
   const double mean_radius = radius_of(volume / static_cast<double>(inner.size()));
   std::vector<PowerSite> sites;
@@ -98,10 +107,16 @@ Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, uns
                         kMinColumns + kColumnsPerSphere * static_cast<double>(inner.size()));
   });
   RelaxedSites relaxed;
-  arena.execute([&] {
-    relaxed = relax_sites(turned.solid(), plan, sites, volume,
-                          [&](double part) { report(0.2 + 0.8 * part); });
-  });
+  const auto report_round = [&](double part) { report(0.2 + 0.8 * part); };
+  if (gpu != nullptr) {
+    std::unique_ptr<gpu::MeshOnGpu> turned_gpu;
+    if (&turned.solid() != &solid)
+      turned_gpu = std::make_unique<gpu::MeshOnGpu>(turned.solid(), gpu->settings());
+    relaxed = (turned_gpu ? *turned_gpu : *gpu).relax_sites(plan, sites, volume, report_round);
+  } else {
+    arena.execute(
+        [&] { relaxed = relax_sites(turned.solid(), plan, sites, volume, report_round); });
+  }
   std::vector<double> shares = std::move(relaxed.shares);
   if (shares.empty()) {
     shares = inflated_shares(inner);
@@ -118,12 +133,11 @@ Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, uns
     result.effective[k] = {static_cast<float>(x.x()), static_cast<float>(x.y()),
                            static_cast<float>(x.z()), static_cast<float>(radius)};
   }
-  std::vector<double> out(inner.size());
-  arena.execute([&] {
-    tbb::parallel_for(std::size_t{0}, out.size(),
-                      [&](std::size_t k) { out[k] = protrusion(solid, result.effective[k]); });
-  });
-  result.protrusion = std::max(0.0, *std::max_element(out.begin(), out.end()));
+  if (gpu != nullptr) {
+    result.protrusion = gpu->largest_protrusion(result.effective);
+  } else {
+    arena.execute([&] { result.protrusion = largest_protrusion(solid, result.effective); });
+  }
   report(1);
   return result;
 }

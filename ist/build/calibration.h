@@ -9,6 +9,10 @@
 #include "mesh/mesh_solid.h"
 #include "query/asset_layout.h"
 
+namespace ist::gpu {
+class MeshOnGpu;
+}
+
 namespace ist {
 
 /// The effective spheres of a solid: one ball for each cell of a partition of the solid, with the
@@ -22,9 +26,10 @@ struct Calibration {
 };
 
 /// Calibrates a packing: relaxed power cells seeded by the inner spheres, integrated over columns
-/// of the solid. Same bytes for any number of threads (0 = all cores). Throws Error if there are no
-/// spheres or progress cancels.
+/// of the solid. Same bytes for any number of threads (0 = all cores) and on the GPU, which does it
+/// if `gpu`, where the solid lies, is not null. Throws Error if there are no spheres or progress
+/// cancels.
 Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, unsigned threads,
-                      const ProgressCallback& progress);
+                      const ProgressCallback& progress, gpu::MeshOnGpu* gpu = nullptr);
 
 }  // namespace ist

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -17,6 +18,7 @@
 #include "build/cube_root.h"
 #include "mesh/closest_point.h"
 #include "mesh/exact_triangle.h"
+#include "mesh_on_gpu.h"
 #include "packing/thread_arena.h"
 
 namespace ist {
@@ -89,6 +91,40 @@ Frontier divide(const Frontier& from, const CoverLevel& level, const CoverSurfac
   return all;
 }
 
+/// The cover radii on the caller's threads, before they are rounded. `report(depth)` is called
+/// before each level.
+std::vector<double> cover_on_cpu(const MeshSolid& solid, const CoverTask& task,
+                                 const std::function<void(int)>& report) {
+  std::vector<CoverBall> balls(task.balls.begin(), task.balls.end());
+  tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t k) {
+    CoverBall& ball = balls[k];
+    const Eigen::Vector3d centre(ball.x, ball.y, ball.z);
+    // A ball up to the surface is part of the solid: it costs the separation bound nothing.
+    const double clear = solid.inside(centre) ? solid.closest_point(centre).distance : 0;
+    ball.radius = std::max(ball.radius, clear) + task.slack;
+  });
+  const CoverSurface surface(solid);
+  const auto count = static_cast<std::uint32_t>(balls.size());
+  Frontier frontier;
+  frontier.cells.push_back({task.middle[0], task.middle[1], task.middle[2], 0, count, false});
+  frontier.lists.resize(count);
+  std::iota(frontier.lists.begin(), frontier.lists.end(), 0u);
+  std::vector<double> extensions(count, 0.0), raised = extensions;
+  CoverLevel level;
+  level.half = task.half;
+  level.smallest = task.slack;
+  level.balls = balls.data();
+  level.extension = extensions.data();
+  for (int depth = 1; !frontier.cells.empty(); ++depth) {
+    report(depth);
+    level.half *= 0.5;
+    frontier = divide(frontier, level, surface, raised);
+    extensions = raised;
+  }
+  for (std::size_t k = 0; k < count; ++k) extensions[k] = balls[k].radius + extensions[k];
+  return extensions;
+}
+
 float round_up(double x) {
   const float f = static_cast<float>(x);
   return double{f} < x ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
@@ -97,7 +133,8 @@ float round_up(double x) {
 }  // namespace
 
 std::vector<float> cover_radii(const MeshSolid& solid, std::span<const Sphere> inner,
-                               unsigned threads, const ProgressCallback& progress) {
+                               unsigned threads, const ProgressCallback& progress,
+                               gpu::MeshOnGpu* gpu) {
   if (inner.empty()) throw Error("cover radii: no inner spheres");
   const auto start = std::chrono::steady_clock::now();
   const auto report = [&](double fraction) {
@@ -109,46 +146,28 @@ std::vector<float> cover_radii(const MeshSolid& solid, std::span<const Sphere> i
     now.elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!progress(now)) throw Error("cover radii: cancelled");
   };
-  tbb::task_arena arena = thread_arena(threads);
-
-  const double mean_volume = solid.unit_volume() / static_cast<double>(inner.size());
-  const double slack = kCoverSlack * cube_root(3 * mean_volume / (4 * std::numbers::pi));
-  // A ball up to the surface is part of the solid: it costs the separation bound nothing.
-  std::vector<CoverBall> balls(inner.size());
   report(0);
-  arena.execute([&] {
-    tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t k) {
-      const Eigen::Vector3d centre(inner[k].x, inner[k].y, inner[k].z);
-      const double clear = solid.inside(centre) ? solid.closest_point(centre).distance : 0;
-      balls[k] = {centre.x(), centre.y(), centre.z(), std::max(double{inner[k].r}, clear) + slack};
-    });
-  });
 
-  const CoverSurface surface(solid);
+  std::vector<CoverBall> balls;
+  for (const Sphere& s : inner) balls.push_back({s.x, s.y, s.z, s.r});
   const Eigen::AlignedBox3d box(solid.frame().to_unit(solid.bounds().min()),
                                 solid.frame().to_unit(solid.bounds().max()));
   const Eigen::Vector3d middle = box.center();
-  Frontier frontier;
-  frontier.cells.push_back(
-      {middle.x(), middle.y(), middle.z(), 0, static_cast<std::uint32_t>(balls.size()), false});
-  frontier.lists.resize(balls.size());
-  std::iota(frontier.lists.begin(), frontier.lists.end(), 0u);
-  std::vector<double> extensions(balls.size(), 0.0), raised = extensions;
-  CoverLevel level;
-  level.half = 0.5 * box.sizes().maxCoeff() + 1e-9;  // the cube around the box, rounding included
-  level.smallest = slack;
-  level.balls = balls.data();
-  level.extension = extensions.data();
-  for (int depth = 1; !frontier.cells.empty(); ++depth) {
-    report(1 - 1.0 / depth);
-    level.half *= 0.5;
-    arena.execute([&] { frontier = divide(frontier, level, surface, raised); });
-    extensions = raised;
+  const double mean_volume = solid.unit_volume() / static_cast<double>(inner.size());
+  CoverTask task;
+  task.balls = balls;
+  task.slack = kCoverSlack * cube_root(3 * mean_volume / (4 * std::numbers::pi));
+  for (int k = 0; k < 3; ++k) task.middle[k] = middle[k];
+  task.half = 0.5 * box.sizes().maxCoeff() + 1e-9;  // the cube around the box, rounding included
+  const auto report_level = [&](int depth) { report(1 - 1.0 / depth); };
+  std::vector<double> exact;
+  if (gpu != nullptr) {
+    exact = gpu->cover_radii(task, report_level);
+  } else {
+    thread_arena(threads).execute([&] { exact = cover_on_cpu(solid, task, report_level); });
   }
-
   std::vector<float> radii(inner.size());
-  for (std::size_t k = 0; k < radii.size(); ++k)
-    radii[k] = round_up(balls[k].radius + extensions[k]);
+  for (std::size_t k = 0; k < radii.size(); ++k) radii[k] = round_up(exact[k]);
   report(1);
   return radii;
 }

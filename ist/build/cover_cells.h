@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <span>
 
 #include "mesh/host_device.h"
 #include "mesh/team.h"
@@ -23,6 +24,14 @@ constexpr double kCoverMargin = 1e-12;  ///< unit frame, above the rounding of a
 struct CoverBall {
   double x = 0, y = 0, z = 0;
   double radius = 0;  ///< unit frame, before extension
+};
+
+/// What is to be covered by which balls.
+struct CoverTask {
+  std::span<const CoverBall> balls;  ///< radius: of the sphere, before it is enlarged
+  double slack = 0;                  ///< by which every ball is enlarged, unit frame
+  double middle[3] = {};             ///< of the first cell, unit frame
+  double half = 0;                   ///< its half edge
 };
 
 /// A cube that is not yet proven covered, and the balls that may be nearest somewhere in it.

@@ -63,7 +63,7 @@ class NeuralGas {
   Pull pull_of(std::span<const std::uint32_t> part, const std::vector<Point>& at,
                const std::array<double, kWidth>& kernel) const {
     Pull pull;
-    const std::size_t count = at.size();
+    const std::size_t count = std::min<std::size_t>(at.size(), kWidth);
     for (const std::uint32_t i : part) {
       const Ball& ball = balls_[i];
       std::array<double, kWidth> distance;

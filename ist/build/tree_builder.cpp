@@ -170,12 +170,17 @@ TreeArrays tree_from_order(std::span<const Sphere4> spheres, std::span<const flo
   return tree;
 }
 
-TreeArrays build_tree(std::span<const Sphere4> spheres, std::span<const float> covers,
-                      Clustering clustering, bool swaps) {
+std::vector<std::uint32_t> sphere_order(std::span<const Sphere4> spheres, Clustering clustering,
+                                        bool swaps) {
   std::vector<Ball> balls;
   balls.reserve(spheres.size());
   for (const Sphere4& s : spheres) balls.push_back(to_ball(s));
-  return tree_from_order(spheres, covers, tree_order(balls, clustering, swaps));
+  return tree_order(balls, clustering, swaps);
+}
+
+TreeArrays build_tree(std::span<const Sphere4> spheres, std::span<const float> covers,
+                      Clustering clustering, bool swaps) {
+  return tree_from_order(spheres, covers, sphere_order(spheres, clustering, swaps));
 }
 
 }  // namespace ist

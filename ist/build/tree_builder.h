@@ -16,6 +16,11 @@ namespace ist {
 TreeArrays build_tree(std::span<const Sphere4> spheres, std::span<const float> covers,
                       Clustering clustering = Clustering::neural_gas, bool swaps = true);
 
+/// The order in which build_tree() puts the spheres.
+std::vector<std::uint32_t> sphere_order(std::span<const Sphere4> spheres,
+                                        Clustering clustering = Clustering::neural_gas,
+                                        bool swaps = true);
+
 /// The tree whose leaves are the spheres in a given order: lane i holds spheres[order[i]].
 TreeArrays tree_from_order(std::span<const Sphere4> spheres, std::span<const float> covers,
                            std::vector<std::uint32_t> order);

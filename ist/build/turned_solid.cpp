@@ -1,7 +1,12 @@
 #include "build/turned_solid.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
+#include <vector>
+
+#include "mesh/exact_triangle.h"
 
 namespace ist {
 namespace {
@@ -20,26 +25,50 @@ struct SurfaceMoments {
   Matrix3d covariance = Matrix3d::Zero();
 };
 
-SurfaceMoments surface_moments(const MeshView& mesh) {
-  SurfaceMoments moments;
-  double area_sum = 0;
-  Vector3d first = Vector3d::Zero();
+struct MomentSums {
+  Vector3d shadow = Vector3d::Zero(), first = Vector3d::Zero();
+  double area = 0;
   Matrix3d second = Matrix3d::Zero();
-  for (std::size_t t = 0; t < mesh.triangle_count; ++t) {
-    Vector3d p[3];
-    for (std::size_t k = 0; k < 3; ++k)
-      p[k] = Vector3d(mesh.vertices_exact + 3 * std::size_t{mesh.triangles[3 * t + k]});
+
+  void add(const MomentSums& other) {
+    shadow += other.shadow;
+    first += other.first;
+    area += other.area;
+    second += other.second;
+  }
+};
+
+MomentSums moments_of(const MeshView& mesh, std::uint32_t begin, std::uint32_t end) {
+  MomentSums sums;
+  for (std::uint32_t t = begin; t < end; ++t) {
+    const Corners corners = corners_of(mesh, t);
+    const Vector3d p[3] = {Vector3d(corners.p[0]), Vector3d(corners.p[1]), Vector3d(corners.p[2])};
     const Vector3d normal = (p[1] - p[0]).cross(p[2] - p[0]);
     const double area = 0.5 * normal.norm();
     const Vector3d sum = p[0] + p[1] + p[2];
-    moments.shadow += 0.25 * normal.cwiseAbs();  // half the parallelogram, half of it entered
-    area_sum += area;
-    first += area / 3 * sum;
-    second += area / 12 * (sum * sum.transpose());
-    for (const Vector3d& x : p) second += area / 12 * (x * x.transpose());
+    sums.shadow += 0.25 * normal.cwiseAbs();  // half the parallelogram, half of it entered
+    sums.area += area;
+    sums.first += area / 3 * sum;
+    sums.second += area / 12 * (sum * sum.transpose());
+    for (const Vector3d& x : p) sums.second += area / 12 * (x * x.transpose());
   }
-  first /= area_sum;
-  moments.covariance = second / area_sum - first * first.transpose();
+  return sums;
+}
+
+SurfaceMoments surface_moments(const MeshView& mesh) {
+  // In parts of fixed size, added in their order: the same bits for any number of threads.
+  constexpr std::uint32_t kPart = 1u << 13;
+  std::vector<MomentSums> parts((mesh.triangle_count + kPart - 1) / kPart);
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
+    const auto begin = static_cast<std::uint32_t>(p * kPart);
+    parts[p] = moments_of(mesh, begin, std::min(begin + kPart, mesh.triangle_count));
+  });
+  MomentSums sums;
+  for (const MomentSums& part : parts) sums.add(part);
+  sums.first /= sums.area;
+  SurfaceMoments moments;
+  moments.shadow = sums.shadow;
+  moments.covariance = sums.second / sums.area - sums.first * sums.first.transpose();
   return moments;
 }
 

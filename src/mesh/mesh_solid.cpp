@@ -3,9 +3,12 @@
 #include <ist/error.h>
 #include <oneapi/tbb/collaborative_call_once.h>
 #define XXH_INLINE_ALL
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 #include <xxhash.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -87,32 +90,46 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
   // Only what a triangle refers to counts; strays may lie anywhere, even at NaN.
   constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> place(mesh.vertices.size(), kUnused);
-  for (const auto& triangle : mesh.triangles) {
-    for (const std::uint32_t v : triangle) {
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
+    for (const std::uint32_t v : mesh.triangles[t]) {
       if (v >= mesh.vertices.size())
         throw Error(closed.name + ": a triangle refers to a vertex that is not there");
-      place[v] = 0;
-      impl_->bounds.extend(mesh.vertices[v]);
+      std::atomic_ref<std::uint32_t>(place[v]).store(0, std::memory_order_relaxed);
     }
-  }
-  impl_->frame = unit_frame(impl_->bounds);
+  });
   std::uint32_t count = 0;
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     if (place[v] == kUnused) continue;
     place[v] = count++;
-    const Eigen::Vector3d x = impl_->frame.to_unit(mesh.vertices[v]);
-    for (int k = 0; k < 3; ++k) {
-      const auto rounded = static_cast<float>(x[k]);
-      impl_->vertices.push_back(x[k]);
-      impl_->vertices_float.push_back(rounded);
-      const auto error = static_cast<float>(std::abs(static_cast<double>(rounded) - x[k]));
-      // Largest error of a coordinate times √3, generously rounded.
-      impl_->arrays.vertex_error = std::max(impl_->arrays.vertex_error, 1.8f * error);
-    }
+    impl_->bounds.extend(mesh.vertices[v]);
   }
-  impl_->triangles.reserve(3 * mesh.triangles.size());
-  for (const auto& triangle : mesh.triangles)
-    for (const std::uint32_t v : triangle) impl_->triangles.push_back(place[v]);
+  impl_->frame = unit_frame(impl_->bounds);
+  impl_->vertices.resize(3 * std::size_t{count});
+  impl_->vertices_float.resize(3 * std::size_t{count});
+  using Range = tbb::blocked_range<std::size_t>;
+  impl_->arrays.vertex_error = tbb::parallel_reduce(
+      Range(0, mesh.vertices.size()), 0.0f,
+      [&](const Range& range, float largest) {
+        for (std::size_t v = range.begin(); v != range.end(); ++v) {
+          if (place[v] == kUnused) continue;
+          const Eigen::Vector3d x = impl_->frame.to_unit(mesh.vertices[v]);
+          for (std::size_t k = 0; k < 3; ++k) {
+            const double exact = x[static_cast<int>(k)];
+            const auto rounded = static_cast<float>(exact);
+            impl_->vertices[3 * std::size_t{place[v]} + k] = exact;
+            impl_->vertices_float[3 * std::size_t{place[v]} + k] = rounded;
+            const auto error = static_cast<float>(std::abs(static_cast<double>(rounded) - exact));
+            // Largest error of a coordinate times √3, generously rounded.
+            largest = std::max(largest, 1.8f * error);
+          }
+        }
+        return largest;
+      },
+      [](float a, float b) { return std::max(a, b); });
+  impl_->triangles.resize(3 * mesh.triangles.size());
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
+    for (std::size_t k = 0; k < 3; ++k) impl_->triangles[3 * t + k] = place[mesh.triangles[t][k]];
+  });
 
   impl_->hash = hash_mesh(impl_->frame, impl_->vertices, impl_->triangles);
   MeshView& arrays = impl_->arrays;

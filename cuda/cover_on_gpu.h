@@ -1,0 +1,17 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "build/cover_cells.h"
+#include "mesh/wide_tree.h"
+#include "queue.h"
+
+namespace ist::gpu {
+
+/// The cover radii before rounding to float, bit for bit those of the host. `report(depth)` is
+/// called before each level.
+std::vector<double> cover_radii(Queue& queue, const WideTree& mesh, const CoverTask& task,
+                                const std::function<void(int)>& report);
+
+}  // namespace ist::gpu

@@ -1,0 +1,94 @@
+#include <ist/bake.h>
+#include <ist/error.h>
+
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "build/calibration.h"
+#include "build/cover.h"
+#include "mesh_on_gpu.h"
+#include "support/gpu_test.h"
+#include "support/shared_data.h"
+#include "support/test_meshes.h"
+
+// Calibration, cover radii and whole bakes on the card, against the CPU: the same bytes.
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+using testing::closed;
+
+class GpuBake : public testing::GpuTest {};
+
+std::vector<Sphere> packed_on_cpu(const MeshSolid& solid, std::size_t count) {
+  PackingSettings settings;
+  settings.max_spheres = count;
+  settings.device = Device::cpu;
+  return pack(solid, settings).spheres;
+}
+
+void expect_same(const ClosedMesh& mesh, std::size_t count) {
+  SCOPED_TRACE(mesh.name + ", " + std::to_string(count));
+  const MeshSolid solid(mesh);
+  const std::vector<Sphere> inner = packed_on_cpu(solid, count);
+  gpu::MeshOnGpu on_gpu(solid, {});
+  const Calibration host = calibrate(solid, inner, 0, {});
+  const Calibration card = calibrate(solid, inner, 0, {}, &on_gpu);
+  EXPECT_EQ(std::memcmp(host.effective.data(), card.effective.data(),
+                        host.effective.size() * sizeof(Sphere4)),
+            0);
+  EXPECT_EQ(host.protrusion, card.protrusion);
+  EXPECT_EQ(cover_radii(solid, inner, 0, {}), cover_radii(solid, inner, 0, {}, &on_gpu));
+}
+
+TEST_F(GpuBake, CalibrationAndCoverAreThoseOfTheCpu) {
+  const TriangleMesh plate = testing::box_mesh(Vector3d(0, 0, 0), Vector3d(1, 1, 1e-2));
+  for (const std::size_t count : {1, 40, 700}) {
+    expect_same(closed(testing::cube_mesh(), "cube"), count);
+    expect_same(closed(testing::torus_mesh(1, 0.3, 64, 32), "torus"), count);
+    expect_same(closed(testing::overlapping_cubes_mesh(), "overlapping cubes"), count);
+    expect_same(closed(plate, "plate"), count);
+  }
+}
+
+/// A plate across x is turned before it is cut into columns, a slanted needle too.
+TEST_F(GpuBake, TurnedSolidsAreThoseOfTheCpu) {
+  TriangleMesh needle = testing::box_mesh(Vector3d(-1, -5e-3, -5e-3), Vector3d(1, 5e-3, 5e-3));
+  for (Vector3d& v : needle.vertices) v = Vector3d(v.x() - v.y(), v.x() + v.y(), v.z() + v.x());
+  expect_same(closed(needle, "needle"), 30);
+  expect_same(closed(testing::box_mesh(Vector3d(0, 0, 0), Vector3d(1, 1e-2, 1)), "plate"), 30);
+}
+
+TEST_F(GpuBake, RealMeshesAreThoseOfTheCpu) {
+  IST_NEEDS_SHARED("oracle/meshes/dino.off");
+  for (const char* file : {"oracle/meshes/dino.off", "oracle/meshes/elephant.off"}) {
+    const std::string path = testing::shared_path(file).string();
+    expect_same(close_mesh(load_mesh(path), file), 3000);
+  }
+}
+
+TEST_F(GpuBake, AssetsAreThoseOfTheCpu) {
+  const ClosedMesh torus = closed(testing::torus_mesh(1, 0.3, 64, 32), "torus");
+  PackingSettings settings;
+  settings.max_spheres = 500;
+  settings.device = Device::cpu;
+  const Asset host = bake(torus, settings);
+  settings.device = Device::cuda;
+  const Asset card = bake(torus, settings);
+  ASSERT_EQ(host.bytes().size(), card.bytes().size());
+  EXPECT_EQ(std::memcmp(host.bytes().data(), card.bytes().data(), host.bytes().size()), 0);
+}
+
+TEST_F(GpuBake, CancellingEndsIt) {
+  const MeshSolid solid(closed(testing::cube_mesh(), "cube"));
+  gpu::MeshOnGpu on_gpu(solid, {});
+  const Sphere ball = {0, 0, 0, 0.5f};
+  const auto cancel = [](const Progress&) { return false; };
+  EXPECT_THROW(calibrate(solid, {&ball, 1}, 0, cancel, &on_gpu), Error);
+  EXPECT_THROW(cover_radii(solid, {&ball, 1}, 0, cancel, &on_gpu), Error);
+}
+
+}  // namespace
+}  // namespace ist
