@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mesh/mesh_solid.h"
+#include "mesh/samples/samples.h"
 #include "pack_grids.h"
 #include "queue.h"
 #include "report.h"
@@ -50,8 +51,8 @@ struct Curve {
 
 class MeshOnGrids {
  public:
-  MeshOnGrids(Report& report, const std::string& name, const std::string& path)
-      : report_(report), name_(name), solid_(ist::close_mesh(ist::load_mesh(path), name)) {
+  MeshOnGrids(Report& report, const std::string& name, const ist::ClosedMesh& mesh)
+      : report_(report), name_(name), solid_(mesh) {
     settings_.max_spheres = report.quick() ? 1'000 : 100'000;
     settings_.time_limit = 3;
     solid_.unit_volume();
@@ -195,19 +196,23 @@ int main(int argc, char** argv) {
     report.remark("nothing measured: " + why);
     return report.write();
   }
-  for (const char* file :
-       {"oracle/meshes/dino.off", "oracle/meshes/elephant.off", "meshes/dev/dragon_174k.ply",
-        "meshes/dev/dragon_871k.ply", "meshes/dev/mug.ply"}) {
+  const auto measure = [&](const std::string& name, const ist::ClosedMesh& closed) {
+    MeshOnGrids mesh(report, name, closed);
+    mesh.grids();
+    mesh.banded();
+    mesh.compare();
+    mesh.medial();
+  };
+  measure("bolt", ist::close_mesh(ist::make_sample("bolt"), "bolt"));
+  for (const char* file : {"oracle/meshes/dino.off", "oracle/meshes/elephant.off",
+                           "meshes/dev/dragon_174k.ply", "meshes/dev/dragon_871k.ply"}) {
     const std::filesystem::path path = ist::testing::shared_path(file);
     if (!std::filesystem::exists(path)) {
       report.remark("missing: " + std::string(file));
       continue;
     }
-    MeshOnGrids mesh(report, path.stem().string(), path.string());
-    mesh.grids();
-    mesh.banded();
-    mesh.compare();
-    mesh.medial();
+    const std::string name = path.stem().string();
+    measure(name, ist::close_mesh(ist::load_mesh(path.string()), name));
   }
   return report.write();
 }

@@ -5,6 +5,7 @@
 #include "packing/grids/discrete_distance.h"
 #include "packing/grids/grid_certificate.h"
 #include "packing/grids/prototype_cells.h"
+#include "search_crew.h"
 #include "warp_team.h"
 
 namespace ist::gpu {
@@ -81,6 +82,24 @@ __global__ void converge_prototypes(const __grid_constant__ GridScene scene,
   }
 }
 
+/// The same, a block a prototype.
+__global__ void converge_by_crews(const __grid_constant__ GridScene scene,
+                                  const __grid_constant__ packing::AscentSettings settings,
+                                  const std::uint32_t* cells, std::uint32_t end,
+                                  std::uint32_t* next, GridCandidate* candidates) {
+  __shared__ SearchCrew::Memory memory;
+  const SearchCrew crew(&memory);
+  for (;;) {
+    __syncthreads();
+    if (threadIdx.x == 0) memory.next = atomicAdd(next, 1u);
+    __syncthreads();
+    const std::uint32_t n = memory.next;
+    if (n >= end) return;
+    const GridCandidate c = packing::converged_prototype(crew, scene, settings, cells[n]);
+    if (threadIdx.x == 0) candidates[n] = c;
+  }
+}
+
 __global__ void fill_table(const std::uint32_t* cells, std::uint32_t count, std::uint32_t* keys,
                            std::uint32_t* values, std::uint32_t mask) {
   const unsigned n = global_thread();
@@ -131,6 +150,9 @@ __global__ void certify(const __grid_constant__ GridScene scene, const GridCandi
   const double room = packing::certified_room(team, scene, c);
   if (team.lane() == 0) certified[n] = {c, room};
 }
+
+/// Prototypes up to which a block works on each.
+constexpr std::size_t kMostCrews = 1024;
 
 enum Counter { kKept, kNext, kAhead, kWinners };
 
@@ -193,11 +215,16 @@ bool DevicePrototypes::converge(const GridScene& scene, const packing::AscentSet
     check(cudaMemcpyAsync(counters_.data() + kNext, &next, sizeof next, cudaMemcpyHostToDevice,
                           stream),
           "starting a round");
-    converge_prototypes<<<static_cast<unsigned>(
-                              std::min<std::size_t>(most, blocks_for(end - from, kWarps))),
-                          kThreads, 0, stream>>>(scene, settings, cells_.data(),
-                                                 static_cast<std::uint32_t>(end),
-                                                 counters_.data() + kNext, candidates_.data());
+    const auto last = static_cast<std::uint32_t>(end);
+    if (count_ <= kMostCrews) {
+      converge_by_crews<<<static_cast<unsigned>(std::min(most, count_)), SearchCrew::kThreads, 0,
+                          stream>>>(scene, settings, cells_.data(), last, counters_.data() + kNext,
+                                    candidates_.data());
+    } else {
+      const std::size_t blocks = std::min<std::size_t>(most, blocks_for(end - from, kWarps));
+      converge_prototypes<<<static_cast<unsigned>(blocks), kThreads, 0, stream>>>(
+          scene, settings, cells_.data(), last, counters_.data() + kNext, candidates_.data());
+    }
     check_launch("letting prototypes converge");
     if (count_ > kChunk) queue_->wait();
     if (!go_on()) return false;

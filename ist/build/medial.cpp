@@ -14,23 +14,36 @@ namespace {
 
 constexpr int kFewestContacts = 2;
 
-/// Automatic: the refinements of hybrid packing's first grid that take some milliseconds on a GPU.
-packing::GridLayout medial_layout(const MeshSolid& mesh, unsigned resolution) {
+/// The grids of prototypes and distances. Automatic: as fine as takes milliseconds on a GPU.
+struct MedialGrids {
+  packing::GridLayout prototypes, distances;
+};
+
+MedialGrids medial_grids(const MeshSolid& mesh, unsigned resolution) {
   constexpr int kRefinements = 3;
-  const packing::GridFigures figures = packing::grid_figures(mesh, 0);
+  constexpr std::size_t kMemory = std::size_t{512} << 20;
+  const packing::GridFigures figures = packing::grid_figures(mesh, kMemory);
   GridSettings grids;
-  grids.resolution = resolution;
-  if (resolution > 0) return packing::grid_schedule(GridMode::uniform, grids, figures).first;
-  return packing::grid_schedule(GridMode::explicit_refinement, grids, figures).level(kRefinements);
+  if (resolution > 0) {
+    grids.start = resolution;
+    grids.refinements = 0;
+    const int wanted = packing::distance_resolution(figures);
+    const int most = packing::kMostCellsPerSide / 2;
+    grids.resolution = std::max(resolution, static_cast<unsigned>(std::min(wanted, most)));
+  }
+  const packing::GridSchedule schedule =
+      packing::grid_schedule(GridMode::implicit_refinement, grids, figures);
+  return {schedule.level(resolution > 0 ? 0 : kRefinements), schedule.level(schedule.distances)};
 }
 
 std::vector<packing::GridCandidate> converged_on_host(const MeshSolid& solid,
+                                                      const packing::GridLayout& distances,
                                                       const packing::AscentSettings& ascent,
                                                       unsigned threads) {
   std::vector<packing::GridCandidate> converged;
   thread_arena(threads).execute([&] {
     const auto backend = packing::make_host_grid_backend(solid.arrays());
-    backend->build(ascent.layout);
+    backend->build(distances);
     backend->place_prototypes(ascent.layout);
     converged = backend->converged(ascent, [] { return true; });
   });
@@ -47,13 +60,14 @@ std::vector<MedialNode> medial_nodes(const Solid& solid, const MedialSettings& s
                 ", must be at most " + std::to_string(packing::kMostCellsPerSide) +
                 " (0 = automatic)");
   packing::AscentSettings ascent;
-  ascent.layout = medial_layout(*mesh, settings.resolution);
+  const MedialGrids grids = medial_grids(*mesh, settings.resolution);
+  ascent.layout = grids.prototypes;
   ascent.seed = settings.seed;
   const bool on_gpu = settings.device == Device::cuda ||
                       (settings.device == Device::automatic && gpu_available(settings.gpu.device));
   std::vector<packing::GridCandidate> converged =
-      on_gpu ? gpu::converged_on_gpu(mesh->arrays(), ascent.layout, ascent, settings.gpu)
-             : converged_on_host(*mesh, ascent, settings.threads);
+      on_gpu ? gpu::converged_on_gpu(mesh->arrays(), grids.distances, ascent, settings.gpu)
+             : converged_on_host(*mesh, grids.distances, ascent, settings.threads);
   std::erase_if(converged, [](const packing::GridCandidate& c) {
     return !(c.radius > 0) || c.contacts < kFewestContacts;
   });

@@ -34,6 +34,10 @@ struct GridSchedule {
   }
 };
 
+/// Cells on the longest side of a distance grid that suits the triangles: a finer one costs more
+/// steps than it saves tests.
+int distance_resolution(const GridFigures& solid);
+
 /// Throws Error if settings ask for more cells than there can be.
 GridSchedule grid_schedule(GridMode mode, const GridSettings& settings, const GridFigures& solid);
 

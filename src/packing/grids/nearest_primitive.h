@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "mesh/team.h"
 #include "packing/grids/cell_listing.h"
 
 // The closest point on surface ∪ spheres through the distance grid (paper §3): a cell's discrete
@@ -92,6 +93,19 @@ IST_HD void visit_lists(const Team& team, const DistanceGrid& grid, const CellRe
   }
 }
 
+/// A *crew* is several teams at work on one search, each in its part of the rows; all its teams
+/// make the same calls otherwise. It has part(), parts(), and what nearest_primitive() uses below.
+template <class Team>
+concept Crew = requires(const Team& team) {
+  team.parts();
+};
+
+template <class Team>
+IST_HD bool takes_part(const Team& team, int group) {
+  if constexpr (Crew<Team>) return group % team.parts() == team.part();
+  return true;
+}
+
 /// Visits the primitives of all cells that `bound` leaves within reach of p, in growing square
 /// rings of rows along x, a row a lane. `bound()` is the same in all lanes: the distance beyond
 /// which nothing counts. `visit(tag)` is called by single lanes; `settle()` by all, between visits.
@@ -103,10 +117,12 @@ IST_HD void for_primitives_near(const Team& team, const DistanceGrid& grid, Floa
   const std::uint32_t own = grid.word(ci, cj, ck);
   const int empty = own == DistanceGrid::kInactive ? 0 : DistanceGrid::distance(own);
   const int most = (g.n[1] > g.n[2] ? g.n[1] : g.n[2]);
+  int group = 0;
   for (int ring = 0; ring < most; ++ring) {
     if (static_cast<float>(ring - 1) * g.size - kSearchMargin > bound()) return;
     const int rows = ring == 0 ? 1 : 8 * ring;
     for (int first = 0; first < rows; first += Team::kWidth) {
+      if (!takes_part(team, group++)) continue;
       const int row = first + team.lane();
       int dj = 0, dk = 0;
       if (ring > 0) {
@@ -156,6 +172,7 @@ IST_HD NearestPrimitive nearest_primitive(const Team& team, const GridScene& sce
                                           std::uint32_t hint = kNoTag) {
   NearestPrimitive mine{hint == kNoTag ? 1e10f : distance_to(scene, hint, p), hint};
   float shared = mine.distance;
+  if constexpr (Crew<Team>) team.begin_search();
   for_primitives_near(
       team, scene.grid, p, [&] { return shared; },
       [&](std::uint32_t tag) {
@@ -163,9 +180,19 @@ IST_HD NearestPrimitive nearest_primitive(const Team& team, const GridScene& sce
         if (distance < mine.distance || (distance == mine.distance && tag < mine.tag))
           mine = {distance, tag};
       },
-      [&] { shared = team.min(mine.distance); });
+      [&] {
+        shared = team.min(mine.distance);
+        if constexpr (Crew<Team>) shared = team.least_so_far(shared);
+      });
   const float least = team.min(mine.distance);
-  return {least, team.min(mine.distance == least ? mine.tag : kNoTag)};
+  const std::uint32_t tag = team.min(mine.distance == least ? mine.tag : kNoTag);
+  if constexpr (Crew<Team>) {
+    const std::uint64_t found = team.end_search(std::uint64_t{ordered_bits(least)} << 32 | tag);
+    return {from_ordered_bits(static_cast<std::uint32_t>(found >> 32)),
+            static_cast<std::uint32_t>(found)};
+  } else {
+    return {least, tag};
+  }
 }
 
 }  // namespace ist::packing
