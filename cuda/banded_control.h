@@ -117,7 +117,6 @@ IST_HD inline void after_work(const BandedArrays& a) {
     else
       to_selection(a);
   } else {
-    s.live -= s.splitting;
     s.frontier = 0;
     s.step = Step::split;
   }
