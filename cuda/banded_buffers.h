@@ -22,8 +22,12 @@ struct BandedSizes {
 inline BandedSizes banded_sizes(std::uint64_t max_spheres) {
   const std::uint64_t n = max_spheres > 0 ? std::min<std::uint64_t>(max_spheres, 1u << 20) : 10000;
   const auto size = [](std::uint64_t x) { return static_cast<std::uint32_t>(x); };
-  return {size((1u << 16) + 8 * n), size((1u << 14) + 4 * n), size(n),
-          size((1u << 11) + n / 2), size((1u << 14) + 8 * n), (1u << 20) + 300 * n};
+  return {size(std::min<std::uint64_t>((1u << 16) + 48 * n, 9u << 19)),
+          size((1u << 15) + 8 * n),
+          size(n),
+          size((1u << 11) + n / 2),
+          size((1u << 14) + 8 * n),
+          (1u << 20) + 300 * n};
 }
 
 /// The arrays of one banded packing. Array<T> is a DeviceArray or, for tests, one of the host;
