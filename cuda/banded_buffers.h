@@ -129,7 +129,7 @@ class BandedBuffers {
     packing.spheres.reserve(count);
     for (const StoredSphere& s : stored) {
       packing.spheres.push_back(s.sphere());
-      if (s.r < 1e-4f) packing.below_float_noise = true;
+      if (s.r < packing::kFloatNoise) packing.below_float_noise = true;
     }
     packing.stop = state.schedule.reason;
     packing.coverage = state.schedule.coverage();

@@ -69,14 +69,25 @@ struct SphereLists {
     const int j = packing::grid_coordinate(layout, x.y);
     const int k = packing::grid_coordinate(layout, x.z);
     const std::uint32_t block = blocks[block_index(i >> 3, j >> 3, k >> 3)];
-    if (block == 0) return;
-    if ((block & kCoveredBlock) != 0) return visit(team.lane() == 0, block & ~kCoveredBlock);
-    const Cell cell = cells[std::size_t{block - 1} * kCellsPerBlock + cell_index(i, j, k)];
-    if ((cell.size & kCovered) != 0) return visit(team.lane() == 0, cell.where);
-    for (std::uint32_t base = 0; base < cell.size; base += Team::kWidth) {
+    std::uint32_t count = 0, only = 0;
+    const std::uint32_t* list = nullptr;
+    if ((block & kCoveredBlock) != 0) {
+      count = 1;
+      only = block & ~kCoveredBlock;
+    } else if (block != 0) {
+      const Cell cell = cells[std::size_t{block - 1} * kCellsPerBlock + cell_index(i, j, k)];
+      if ((cell.size & kCovered) != 0) {
+        count = 1;
+        only = cell.where;
+      } else {
+        count = cell.size;
+        list = words + cell.where + 1;
+      }
+    }
+    IST_ROLLED for (std::uint32_t base = 0; base < count; base += Team::kWidth) {
       const std::uint32_t n = base + static_cast<std::uint32_t>(team.lane());
-      const bool valid = n < cell.size;
-      visit(valid, valid ? words[std::size_t{cell.where} + 1 + n] : 0u);
+      const bool valid = n < count;
+      visit(valid, valid && list != nullptr ? list[n] : only);
     }
   }
 

@@ -26,8 +26,8 @@ IST_HD inline float pick(const float v[4], int k) {
 /// can only loosen it. Ties go to the smallest tag, so the result is a function of the set of
 /// constraints. Lanes share the search for the entering row; each does the pivot for itself.
 template <class Team>
-IST_HD ClearanceOptimum maximise_clearance(const Team& team, const SampleMemory& constraints,
-                                           int count, float a, float h2) {
+IST_HD_ONCE ClearanceOptimum maximise_clearance(const Team& team, const SampleMemory& constraints,
+                                                int count, float a, float h2) {
   constexpr int kMaxPivots = 24;
   const auto level = [&](int i) { return constraints.distance[i] + constraints.curvature[i] * h2; };
 
@@ -35,7 +35,7 @@ IST_HD ClearanceOptimum maximise_clearance(const Team& team, const SampleMemory&
   float first_value = kFarAway;
   {
     std::uint32_t tag = 0xFFFFFFFFu;
-    for (int i = team.lane(); i < count; i += Team::kWidth) {
+    IST_ROLLED for (int i = team.lane(); i < count; i += Team::kWidth) {
       const float value = level(i) + a * (fabsf(constraints.x[i]) + fabsf(constraints.y[i]) +
                                           fabsf(constraints.z[i]));
       if (value < first_value || (value == first_value && constraints.tag[i] < tag)) {
@@ -58,12 +58,12 @@ IST_HD ClearanceOptimum maximise_clearance(const Team& team, const SampleMemory&
       {1, sx * n.x, sy * n.y, sz * n.z}, {0, sx, 0, 0}, {0, 0, sy, 0}, {0, 0, 0, sz}};
 
   const float tolerance = 1e-5f * a;
-  for (int pivot = 0; pivot < kMaxPivots; ++pivot) {
+  IST_ROLLED for (int pivot = 0; pivot < kMaxPivots; ++pivot) {
     // Entering row: the most violated; the smallest tag among equals, constraints before sides.
     int entering = -7;
     float worst = tolerance;
     std::uint32_t tag = 0xFFFFFFFFu;
-    for (int i = team.lane(); i < count; i += Team::kWidth) {
+    IST_ROLLED for (int i = team.lane(); i < count; i += Team::kWidth) {
       const float violation = z[0] - constraints.x[i] * z[1] - constraints.y[i] * z[2] -
                               constraints.z[i] * z[3] - level(i);
       if (violation > worst || (violation == worst && constraints.tag[i] < tag)) {

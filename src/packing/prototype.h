@@ -168,8 +168,8 @@ class PrototypeField {
   /// Lowers the bound by the spheres and remembered features alone; true if below the margin. `s`
   /// is left with what was seen at the centre, y with where the bound is attained.
   template <class Team>
-  IST_HD bool settles(const Team& team, Cell& cell, const Scratch& scratch, float margin, Sample& s,
-                      Float3& y) const {
+  IST_HD_ONCE bool settles(const Team& team, Cell& cell, const Scratch& scratch, float margin,
+                           Sample& s, Float3& y) const {
     const float window = kWindow * cell.half;
     sample_spheres(team, cell.centre, spheres_, window, kSpare, s);
     lower(cell, s.clearance + cell.half * kSqrt3);
@@ -205,8 +205,8 @@ class PrototypeField {
   }
 
   template <class Team>
-  IST_HD void look_at_ring(const Team& team, Float3 x, float window, float surface_at_least,
-                           const Cell& cell, const Scratch& scratch, Sample& s) const {
+  IST_HD_ONCE void look_at_ring(const Team& team, Float3 x, float window, float surface_at_least,
+                                const Cell& cell, const Scratch& scratch, Sample& s) const {
     if (surface_at_least > s.clearance + window || cell.ring_size == 0) return;
     constexpr int kMost = (kRingCapacity + Team::kWidth - 1) / Team::kWidth;
     FeatureOffset offset[kMost];
@@ -257,8 +257,8 @@ class PrototypeField {
   }
 
   template <class Team>
-  IST_HD void sample(const Team& team, Float3 x, float window, float& surface_at_least, Cell& cell,
-                     Scratch& scratch, Sample& s) const {
+  IST_HD_ONCE void sample(const Team& team, Float3 x, float window, float& surface_at_least,
+                          Cell& cell, Scratch& scratch, Sample& s) const {
     sample_spheres(team, x, spheres_, window, kSpare, s);
     look_at_ring(team, x, window, surface_at_least, cell, scratch, s);
     look_at_surface(team, x, surface_at_least, cell, scratch, s);
@@ -272,7 +272,7 @@ class PrototypeField {
   IST_HD void ascend(const Team& team, Float3& x, float surface_at_least, float trust,
                      float threshold, Cell& cell, Scratch& scratch, Sample& s) const {
     constexpr int kSteps = 8;
-    for (int step = 0; step < kSteps && s.size > 0; ++step) {
+    IST_ROLLED for (int step = 0; step < kSteps && s.size > 0; ++step) {
       const float reach = 0.5f * s.clearance;
       const float box = trust < reach ? trust : reach;
       const ClearanceOptimum best = maximise_clearance(team, *s.at, s.size, box, 0);

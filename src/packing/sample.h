@@ -72,10 +72,10 @@ IST_HD void add(const Team& team, const Constraint& c, Sample& s) {
 
 /// Forgets what is further than the nearest + window.
 template <class Team>
-IST_HD void keep_near(const Team& team, float window, Sample& s) {
+IST_HD_ONCE void keep_near(const Team& team, float window, Sample& s) {
   const float limit = s.clearance + window;
   int kept = 0;
-  for (int base = 0; base < s.size; base += Team::kWidth) {
+  IST_ROLLED for (int base = 0; base < s.size; base += Team::kWidth) {
     const int i = base + team.lane();
     const bool keep = i < s.size && s.at->distance[i] <= limit;
     int total = 0;
@@ -96,11 +96,11 @@ IST_HD void keep_near(const Team& team, float window, Sample& s) {
 /// Adds one constraint to a sample that is full at `room`: the farthest, by (distance, tag), is
 /// left out. All lanes know `c`.
 template <class Team>
-IST_HD void add_nearer(const Team& team, const Constraint& c, int room, Sample& s) {
+IST_HD_COLD void add_nearer(const Team& team, const Constraint& c, int room, Sample& s) {
   float least = kFarAway;  // of the negated distances
   std::uint32_t tag = 0xFFFFFFFFu;
   int index = 0;
-  for (int i = team.lane(); i < room; i += Team::kWidth) {
+  IST_ROLLED for (int i = team.lane(); i < room; i += Team::kWidth) {
     const float value = -s.at->distance[i];
     const std::uint32_t reversed = ~s.at->tag[i];
     if (value < least || (value == least && reversed < tag)) {
@@ -120,8 +120,8 @@ IST_HD void add_nearer(const Team& team, const Constraint& c, int room, Sample& 
 /// nearest ones if they leave no room for `spare` more constraints. Sees no further than the grid's
 /// reach.
 template <class Team, class Spheres>
-IST_HD void sample_spheres(const Team& team, Float3 x, const Spheres& spheres, float window,
-                           int spare, Sample& out) {
+IST_HD_ONCE void sample_spheres(const Team& team, Float3 x, const Spheres& spheres, float window,
+                                int spare, Sample& out) {
   // A thread alone works in batches, so that distances are worked out side by side.
   constexpr int kBatch = Team::kWidth == 1 ? 64 : 1;
   FeatureOffset offset[kBatch];
@@ -153,7 +153,7 @@ IST_HD void sample_spheres(const Team& team, Float3 x, const Spheres& spheres, f
         out.size += total;
         continue;
       }
-      for (int lane = 0; lane < Team::kWidth; ++lane) {
+      IST_ROLLED for (int lane = 0; lane < Team::kWidth; ++lane) {
         if (team.broadcast(near ? 1 : 0, lane) == 0) continue;
         Constraint c = constraint_of(offset[i], range[i]);
         c.gradient = {team.broadcast(c.gradient.x, lane), team.broadcast(c.gradient.y, lane),
@@ -177,7 +177,8 @@ IST_HD void sample_spheres(const Team& team, Float3 x, const Spheres& spheres, f
     if (!valid) offset[count].range2 = kFarAway;
     if (++count == kBatch) flush();
   });
-  if (count > 0) flush();
+  if constexpr (kBatch > 1)
+    if (count > 0) flush();
   team.sync();
   keep_near(team, window, out);
 }

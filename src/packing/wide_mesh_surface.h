@@ -15,8 +15,8 @@ class WideMeshSurface {
   IST_HD explicit WideMeshSurface(const WideTree& tree) : tree_(tree) {}
 
   template <class Team>
-  IST_HD bool nearest(const Team& team, Float3 x, float limit, Feature& feature,
-                      float& distance) const {
+  IST_HD_ONCE bool nearest(const Team& team, Float3 x, float limit, Feature& feature,
+                           float& distance) const {
     const float p[3] = {x.x, x.y, x.z};
     const WideNearest found = ist::nearest(team, tree_, p, limit * limit);
     feature = found.slot;
@@ -50,13 +50,13 @@ class WideMeshSurface {
   }
 
   template <class Team>
-  IST_HD int convex_planes(const Team& team, Float3 x, float h, bool x_inside, Feature* triangles,
-                           int most, SampleMemory& out, int from) const {
+  IST_HD_ONCE int convex_planes(const Team& team, Float3 x, float h, bool x_inside,
+                                Feature* triangles, int most, SampleMemory& out, int from) const {
     return packing::convex_planes(team, *this, x, h, x_inside, triangles, most, out, from);
   }
 
   template <class Team>
-  IST_HD int winding_number(const Team& team, Float3 x) const {
+  IST_HD_ONCE int winding_number(const Team& team, Float3 x) const {
     const double p[3] = {x.x, x.y, x.z};
     return ist::winding_number(team, tree_, p);
   }
@@ -70,7 +70,7 @@ class WideMeshSurface {
   }
 
   template <class Team>
-  IST_HD double clearance(const Team& team, Float3 x, double limit) const {
+  IST_HD_ONCE double clearance(const Team& team, Float3 x, double limit) const {
     if (!inside(team, x)) return -1;
     const double p[3] = {x.x, x.y, x.z};
     return exact_nearest(team, tree_, p, limit).distance;
