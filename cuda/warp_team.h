@@ -43,6 +43,12 @@ struct WarpTeam {
     return __popc(raised & ((1u << lane()) - 1u));
   }
 
+  __device__ int first(bool flag, int& total) const {
+    const unsigned raised = __ballot_sync(kAll, flag);
+    total = __popc(raised);
+    return __ffs(static_cast<int>(raised)) - 1;
+  }
+
   template <class T>
   __device__ T broadcast(T value, int from) const {
     return __shfl_sync(kAll, value, from);

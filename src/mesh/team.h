@@ -70,7 +70,13 @@ struct SerialTeam {
     return 0;
   }
 
-  /// The value that lane `from` holds.
+  /// The lowest lane that raises the flag, −1 if none does; `total`: how many do.
+  IST_HD int first(bool flag, int& total) const {
+    total = flag ? 1 : 0;
+    return flag ? 0 : -1;
+  }
+
+  /// The value that lane `from` holds, which may be another for each lane.
   template <class T>
   IST_HD T broadcast(T value, int from) const {
     (void)from;

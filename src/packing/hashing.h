@@ -15,6 +15,12 @@ IST_HD inline std::uint32_t bits_of(float x) {
   return bits;
 }
 
+IST_HD inline float float_of(std::uint32_t bits) {
+  float x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
 IST_HD inline std::uint64_t mixed(std::uint64_t x) {  // the finaliser of SplitMix64
   x ^= x >> 30;
   x *= 0xBF58476D1CE4E5B9ull;

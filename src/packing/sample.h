@@ -4,6 +4,7 @@
 
 #include "mesh/team.h"
 #include "packing/constraint.h"
+#include "packing/hashing.h"
 
 // What is seen from a point. Written for a team (mesh/team.h) whose lanes share a SampleMemory;
 // everything here is a function of the *set* of features, in whatever order a team meets them.
@@ -14,23 +15,23 @@ constexpr int kSampleCapacity = 64;
 
 /// Constraints side by side, so that lanes read neighbouring words.
 struct SampleMemory {
-  float x[kSampleCapacity], y[kSampleCapacity], z[kSampleCapacity];  ///< gradients
+  float gradient[3][kSampleCapacity];
   float distance[kSampleCapacity];
   float curvature[kSampleCapacity];
   std::uint32_t tag[kSampleCapacity];
 };
 
 IST_HD inline Constraint get(const SampleMemory& memory, int i) {
-  return {{memory.x[i], memory.y[i], memory.z[i]},
+  return {{memory.gradient[0][i], memory.gradient[1][i], memory.gradient[2][i]},
           memory.distance[i],
           memory.curvature[i],
           memory.tag[i]};
 }
 
 IST_HD inline void put(SampleMemory& memory, int i, const Constraint& c) {
-  memory.x[i] = c.gradient.x;
-  memory.y[i] = c.gradient.y;
-  memory.z[i] = c.gradient.z;
+  memory.gradient[0][i] = c.gradient.x;
+  memory.gradient[1][i] = c.gradient.y;
+  memory.gradient[2][i] = c.gradient.z;
   memory.distance[i] = c.distance;
   memory.curvature[i] = c.curvature;
   memory.tag[i] = c.tag;
@@ -53,11 +54,15 @@ template <class Team>
 IST_HD int index_of_least(const Team& team, float& value, std::uint32_t tag, int index) {
   if constexpr (Team::kWidth == 1) return index;
   const float least = team.min(value);
-  const std::uint32_t low = team.min(value == least ? tag : 0xFFFFFFFFu);
-  const std::uint32_t found =
-      team.min(value == least && tag == low ? static_cast<std::uint32_t>(index) : 0xFFFFFFFFu);
+  const bool holds = value == least;
   value = least;
-  return static_cast<int>(found);
+  int holders = 0;
+  int lane = team.first(holds, holders);
+  if (holders > 1) {
+    const std::uint32_t low = team.min(holds ? tag : 0xFFFFFFFFu);
+    lane = team.first(holds && tag == low, holders);
+  }
+  return team.broadcast(index, lane);
 }
 
 /// Adds a constraint that all lanes know, if there is room.

@@ -125,6 +125,16 @@ class FiberTeam {
     }
     return before;
   }
+  int first(bool flag, int& total) const {
+    const std::uint64_t* all = fibers_.exchange(lane_, 7, flag ? 1 : 0);
+    int found = -1;
+    total = 0;
+    for (int i = Width - 1; i >= 0; --i) {
+      if (all[i] != 0) found = i;
+      total += static_cast<int>(all[i]);
+    }
+    return found;
+  }
   template <class T>
   T broadcast(T value, int from) const {
     return decoded<T>(fibers_.exchange(lane_, 6, coded(value))[from]);
