@@ -45,7 +45,7 @@ IST_HD inline std::uint32_t atomic_exchange(std::uint32_t* at, std::uint32_t val
 #ifdef __CUDA_ARCH__
   return atomicExch(at, value);
 #else
-  return __atomic_exchange_n(at, value, __ATOMIC_RELAXED);
+  return __atomic_exchange_n(at, value, __ATOMIC_RELEASE);
 #endif
 }
 
@@ -72,12 +72,42 @@ IST_HD inline std::uint32_t atomic_max(std::uint32_t* at, std::uint32_t value) {
 #endif
 }
 
+/// Makes what this thread's team wrote visible to who then reads what it stores atomically.
+IST_HD inline void publish() {
+#ifdef __CUDA_ARCH__
+  __threadfence();
+#else
+  __atomic_thread_fence(__ATOMIC_RELEASE);
+#endif
+}
+
+struct alignas(16) Words4 {
+  std::uint32_t word[4];
+};
+
+/// A load that does not look into the multiprocessor's own cache.
+IST_HD inline std::uint32_t load_fresh(const std::uint32_t* at) {
+#ifdef __CUDA_ARCH__
+  return __ldcg(at);
+#else
+  return *at;
+#endif
+}
+IST_HD inline Words4 load_fresh(const Words4* at) {
+#ifdef __CUDA_ARCH__
+  const uint4 words = __ldcg(reinterpret_cast<const uint4*>(at));
+  return {{words.x, words.y, words.z, words.w}};
+#else
+  return *at;
+#endif
+}
+
 /// A value that others may be changing.
 IST_HD inline std::uint32_t atomic_load(const std::uint32_t* at) {
 #ifdef __CUDA_ARCH__
   return *static_cast<const volatile std::uint32_t*>(at);
 #else
-  return __atomic_load_n(at, __ATOMIC_RELAXED);
+  return __atomic_load_n(at, __ATOMIC_ACQUIRE);
 #endif
 }
 

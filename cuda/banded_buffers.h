@@ -36,11 +36,15 @@ template <template <class> class Array, class Place>
 class BandedBuffers {
  public:
   BandedBuffers(Place& place, const packing::BandSchedule& schedule, const BandedSizes& sizes)
-      : place_(place), state_(place, 1), blocks_(place, SphereLists::kMostBlocks) {
+      : place_(place),
+        state_(place, 1),
+        queue_(place, kQueue),
+        blocks_(place, SphereLists::kMostBlocks) {
     BandedState state;
     state.schedule = schedule;
     state.layout = packing::sphere_grid_layout(schedule.grid_spheres, schedule.grid_reach);
     put_state(state);
+    queue_.fill_bytes(0xFF);
     blocks_.fill_bytes(0);
     enlarge_cells(sizes.cells, 0);
     enlarge_candidates(sizes.candidates);
@@ -58,6 +62,8 @@ class BandedBuffers {
     a.lists[1] = lists_[1].data();
     a.splitting = splitting_.data();
     a.cell_capacity = static_cast<std::uint32_t>(cells_.size());
+    a.queue = queue_.data();
+    a.queue_capacity = kQueue;
     a.nodes = nodes_.data();
     a.heads = heads_.data();
     a.winners = winners_.data();
@@ -201,8 +207,11 @@ class BandedBuffers {
     array = Array<T>(place_, size);
   }
 
+  static constexpr std::uint32_t kQueue = 1u << 18;
+
   Place& place_;
   Array<BandedState> state_;
+  Array<std::uint32_t> queue_;
   Array<BandedArrays::Cell> cells_;
   Array<float> bounds_, kept_, winner_radius_;
   Array<std::uint32_t> free_list_, lists_[2], splitting_, heads_, winners_, won_, words_, blocks_;

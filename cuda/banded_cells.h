@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstring>
+
 #include "banded_state.h"
 #include "packing/prototype.h"
 
@@ -78,7 +80,78 @@ IST_HD void activate_cells(Crew& crew, const BandedArrays& a) {
   });
 }
 
-/// Works on the frontier's cells of one class.
+/// Where a kept child goes.
+IST_HD inline std::uint32_t take_slot(const BandedArrays& a) {
+  BandedState& s = *a.state;
+  const std::uint32_t taken = atomic_add(&s.free_taken, 1);
+  return taken < s.free ? a.free_list[taken % a.cell_capacity] : atomic_add(&s.slots, 1);
+}
+
+/// A stored cell that another team may have written in this step: past the first-level cache. What
+/// orders the loads after the one of the cell's number is that they depend on it.
+template <class Team>
+IST_HD packing::Cell load_fresh_cell(const Team& team, const BandedArrays::Cell& from,
+                                     packing::CellScratch<std::uint32_t>& scratch) {
+  static_assert(sizeof(packing::Cell) % sizeof(Words4) == 0);
+  constexpr int kWords = sizeof(packing::Cell) / sizeof(Words4);
+  team.sync();
+  const auto* words = reinterpret_cast<const Words4*>(&from.cell);
+  Words4 copy[kWords];
+  for (int i = 0; i < kWords; ++i) copy[i] = load_fresh(words + i);
+  for (int i = team.lane(); i < packing::kRingCapacity; i += Team::kWidth)
+    scratch.ring[i] = load_fresh(&from.ring[i]);
+  packing::Cell cell;
+  std::memcpy(static_cast<void*>(&cell), copy, sizeof cell);
+  team.sync();
+  return cell;
+}
+
+/// A child in the queue of those that a step makes and works on beside its frontier.
+struct ChildCode {
+  std::uint32_t parent, depth, octant;
+
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+  IST_HD static ChildCode of(std::uint32_t code) { return {code >> 5, code >> 3 & 3, code & 7}; }
+  IST_HD std::uint32_t code() const { return parent << 5 | depth << 3 | octant; }
+};
+
+/// Queues a cell's children and frees its slot, for later steps. `pending` then counts them instead
+/// of the cell.
+template <class Team>
+IST_HD void queue_children(const Team& team, const BandedArrays& a, ChildCode first) {
+  BandedState& s = *a.state;
+  std::uint32_t place = 0;
+  if (team.lane() == 0) {
+    a.bounds[first.parent] = 0;
+    a.free_list[(s.free + atomic_add(&s.cascaded, 1)) % a.cell_capacity] = first.parent;
+    atomic_add(&s.pending, 7);
+    place = atomic_add(&s.queued, 8);
+  }
+  place = team.broadcast(place, 0);
+  team.sync();
+  publish();
+  for (int k = team.lane(); k < 8; k += Team::kWidth) {
+    first.octant = static_cast<std::uint32_t>(k);
+    atomic_exchange(&a.queue[place + first.octant], first.code());
+  }
+}
+
+/// Waits for the entry of the queue that is this team's; kNone if none will come.
+template <class Crew>
+IST_HD std::uint32_t wait_for_child(const Crew& crew, const BandedArrays& a, std::uint32_t place) {
+  std::uint32_t code = ChildCode::kNone;
+  if (crew.team().lane() == 0 && place < a.queue_capacity) {
+    while ((code = atomic_load(&a.queue[place])) == ChildCode::kNone &&
+           atomic_load(&a.state->pending) != 0)
+      crew.pause();
+    if (code != ChildCode::kNone) atomic_exchange(&a.queue[place], ChildCode::kNone);
+  }
+  return crew.team().broadcast(code, 0);
+}
+
+/// Works on the frontier's cells of one class. Where the schedule says that no rule can come between
+/// (state.depth), cells that are to be split are split in the same step, and so on for that many
+/// levels: a chain of splits then waits for itself alone.
 template <class Crew, class Surface>
 IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
@@ -86,28 +159,65 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
   const ListedSpheres spheres{a.grid(), a.spheres, static_cast<std::uint32_t>(s.schedule.spheres)};
   const packing::PrototypeField<Surface, ListedSpheres> field(surface, spheres);
   const float threshold = s.schedule.threshold, margin = s.schedule.margin;
-  const float largest = s.schedule.largest_half(s.frontier);
+  const float floor = s.schedule.floor, largest = s.schedule.largest_half(s.frontier);
+  const std::uint32_t frontier_size = s.frontier, deepest = s.depth;
   const std::uint32_t* const frontier = a.lists[s.frontier_array];
   std::uint32_t* const active = a.lists[1 - s.frontier_array];
   if (a.mailbox != nullptr && crew.index() + 1 == crew.size() && team.lane() == 0)
     s.stop_asked = a.mailbox->stop;
-  take_turns(crew, s.frontier, &s.taken, [&](std::uint32_t i) {
-    const std::uint32_t slot = frontier[i];
-    if (s.classes > 1 &&
-        packing::BandSchedule::class_of(a.cells[slot].cell.centre, s.classes) != s.cell_class)
-      return;
-    packing::Cell cell = packing::load_cell(team, a.cells[slot], crew.scratch());
-    const CellState outcome = field.work(team, cell, crew.scratch(), threshold, margin, largest);
-    put_cell(team, a, cell, crew.scratch(), slot);
-    if (team.lane() != 0) return;
-    if (outcome == CellState::candidate) {
-      active[atomic_add(&s.active, 1)] = slot;
-      atomic_max(&s.largest_radius, packing::bits_of(cell.radius));
-      atomic_max(&s.largest_bound, packing::bits_of(cell.bound));
-    } else if (outcome == CellState::split) {
-      a.splitting[atomic_add(&s.splitting, 1)] = slot | 0xFFu << BandedArrays::kCellBits;
+  for (std::uint32_t item = crew.index();;) {
+    std::uint32_t slot = 0, depth = 0;
+    packing::Cell cell;
+    bool works = true;
+    if (item < frontier_size) {
+      slot = frontier[item];
+      cell = packing::load_cell(team, a.cells[slot], crew.scratch());
+      works = s.classes == 1 ||
+              packing::BandSchedule::class_of(cell.centre, s.classes) == s.cell_class;
+    } else {
+      if (deepest == 0) return;
+      const std::uint32_t code = wait_for_child(crew, a, item - frontier_size);
+      if (code == ChildCode::kNone) return;
+      const ChildCode child = ChildCode::of(code);
+      const packing::Cell parent = load_fresh_cell(team, a.cells[child.parent], crew.scratch());
+      cell = field.child(team, parent, static_cast<int>(child.octant), crew.scratch(), margin);
+      depth = child.depth;
+      works = cell.bound >= margin;
+      if (team.lane() == 0) {
+        if (cell.bound < floor) {
+          atomic_max(&s.dropped, packing::bits_of(cell.bound > 0 ? cell.bound : 0.0f));
+        } else {
+          slot = take_slot(a);
+          atomic_add(&s.live, 1);
+        }
+      }
+      slot = team.broadcast(slot, 0);
+      if (cell.bound >= floor && !works) put_cell(team, a, cell, crew.scratch(), slot);
     }
-  });
+    bool queues = false;
+    if (works) {
+      const CellState outcome = field.work(team, cell, crew.scratch(), threshold, margin, largest);
+      put_cell(team, a, cell, crew.scratch(), slot);
+      queues = outcome == CellState::split && depth < deepest;
+      if (team.lane() == 0) {
+        if (outcome == CellState::candidate) {
+          active[atomic_add(&s.active, 1)] = slot;
+          atomic_max(&s.largest_radius, packing::bits_of(cell.radius));
+          atomic_max(&s.largest_bound, packing::bits_of(cell.bound));
+        } else if (outcome == CellState::split && !queues) {
+          a.splitting[atomic_add(&s.splitting, 1)] = slot | 0xFFu << BandedArrays::kCellBits;
+        }
+      }
+    }
+    if (queues) queue_children(team, a, {slot, depth + 1, 0});
+    std::uint32_t next = 0;
+    if (team.lane() == 0) {
+      if (!queues && deepest > 0) atomic_add(&s.pending, 0xFFFFFFFFu);
+      if (deepest > 0 || frontier_size > crew.size()) next = atomic_add(&s.taken, 1);
+    }
+    if (deepest == 0 && frontier_size <= crew.size()) return;
+    item = crew.size() + team.broadcast(next, 0);
+  }
 }
 
 /// Replaces cells by those of their children that still count. Slots come from the free list, a
@@ -138,8 +248,7 @@ IST_HD void split_cells(Crew& crew, const BandedArrays& a, const Surface& surfac
       if (child.bound < floor) {
         atomic_max(&s.dropped, packing::bits_of(child.bound > 0 ? child.bound : 0.0f));
       } else {
-        const std::uint32_t taken = atomic_add(&s.free_taken, 1);
-        slot = taken < s.free ? a.free_list[taken % a.cell_capacity] : atomic_add(&s.slots, 1);
+        slot = take_slot(a);
       }
     }
     if (child.bound >= floor) {

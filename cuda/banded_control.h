@@ -13,8 +13,36 @@ IST_HD inline void to_sweep(BandedState& s) {
   s.step = Step::sweep;
 }
 
+/// Work on the frontier. As many levels are done at once as surely meet none of the rules that the
+/// schedule has between levels, even if every cell is split.
+IST_HD inline void to_work(const BandedArrays& a) {
+  constexpr std::uint32_t kDeepest = 3;
+  BandedState& s = *a.state;
+  s.splitting = 0;
+  s.classes = s.schedule.classes(s.frontier);
+  s.cell_class = 0;
+  s.depth = 0;
+  const std::uint64_t plateau = s.schedule.plateau();
+  const std::uint64_t room = std::uint64_t{a.cell_capacity} - s.slots +
+                             (s.free > s.free_taken ? s.free - s.free_taken : 0);
+  std::uint64_t cells = s.frontier, level = s.frontier;
+  while (s.classes == 1 && s.depth < kDeepest) {
+    level *= 8;
+    cells += level;
+    const std::uint64_t children = cells - s.frontier;
+    if (s.active + cells > plateau || s.live + children > packing::BandSchedule::kMostCells ||
+        children > room || children > a.queue_capacity)
+      break;
+    ++s.depth;
+  }
+  s.queued = s.cascaded = 0;
+  s.pending = s.frontier;
+  s.step = Step::work;
+}
+
 /// The next round of the band, or the next band.
-IST_HD inline void to_round(BandedState& s) {
+IST_HD inline void to_round(const BandedArrays& a) {
+  BandedState& s = *a.state;
   if (s.frontier == 0 || s.schedule.stopped) {
     s.schedule.end_band();
     s.schedule.drop(float_of(s.dropped));
@@ -24,11 +52,9 @@ IST_HD inline void to_round(BandedState& s) {
       to_sweep(s);
     return;
   }
-  s.active = s.splitting = 0;
+  s.active = 0;
   s.largest_radius = s.largest_bound = 0;
-  s.classes = s.schedule.classes(s.frontier);
-  s.cell_class = 0;
-  s.step = Step::work;
+  to_work(a);
 }
 
 IST_HD inline void after_start(BandedState& s) {
@@ -79,11 +105,12 @@ IST_HD inline void after_fill(BandedState& s) {
   s.step = s.after_grid;
 }
 
-IST_HD inline void finish_round(BandedState& s, std::uint32_t inserted) {
+IST_HD inline void finish_round(const BandedArrays& a, std::uint32_t inserted) {
+  BandedState& s = *a.state;
   const bool more = s.schedule.end_round(inserted);
   s.frontier = more ? s.active : 0;
   s.frontier_array = 1 - s.frontier_array;
-  to_round(s);
+  to_round(a);
 }
 
 IST_HD inline void to_selection(const BandedArrays& a) {
@@ -92,7 +119,7 @@ IST_HD inline void to_selection(const BandedArrays& a) {
   s.volume = 0;
   if (s.active > s.most_active) s.most_active = s.active;
   if (s.active == 0) {
-    finish_round(s, 0);
+    finish_round(a, 0);
     return;
   }
   s.buckets = packing::candidate_buckets(float_of(s.largest_radius), s.active);
@@ -106,6 +133,9 @@ IST_HD inline void after_work(const BandedArrays& a) {
     ++s.levels;
     s.worked += s.frontier;
   }
+  if (s.free_taken > s.free) s.free_taken = s.free;
+  s.free += s.cascaded;
+  s.cascaded = 0;
   if (s.stop_asked != 0) {
     s.schedule.stop(static_cast<StopReason>(s.stop_asked - 1));
     s.step = Step::finished;
@@ -134,14 +164,10 @@ IST_HD inline void after_split(const BandedArrays& a) {
   }
   if (s.free_taken > s.free) s.free_taken = s.free;
   s.free += s.splitting;
-  if (s.frontier == 0) {
+  if (s.frontier == 0)
     to_selection(a);
-  } else {
-    s.splitting = 0;
-    s.classes = s.schedule.classes(s.frontier);
-    s.cell_class = 0;
-    s.step = Step::work;
-  }
+  else
+    to_work(a);
 }
 
 IST_HD inline std::uint64_t spheres_left(const BandedState& s) {
@@ -176,7 +202,7 @@ IST_HD inline void after_insert(const BandedArrays& a) {
     a.mailbox->covered = schedule.covered;
     a.mailbox->radius = schedule.threshold;
   }
-  finish_round(s, inserted);
+  finish_round(a, inserted);
   if (s.step == Step::finished) return;
   s.after_grid = s.step;
   after_grid_pass(a, Step::count);

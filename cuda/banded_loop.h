@@ -131,7 +131,7 @@ IST_HD void pack_banded(Crew& crew, const BandedArrays& a, const Surface& surfac
           after_fill(s);
           break;
         case Step::activate:
-          to_round(s);
+          to_round(a);
           break;
         case Step::work:
           after_work(a);

@@ -83,6 +83,12 @@ struct BandedState {
   std::uint32_t frontier_array = 0;
   std::uint32_t cell_class = 0, classes = 1;
 
+  // Levels that one step does: see work_on_cells().
+  std::uint32_t depth = 0;     ///< levels below the frontier's
+  std::uint32_t queued = 0;    ///< children put into the queue
+  std::uint32_t pending = 0;   ///< cells and children not yet done with
+  std::uint32_t cascaded = 0;  ///< cells that were split
+
   // Selection.
   std::uint32_t largest_radius = 0;  ///< bits
   std::uint32_t largest_bound = 0;   ///< bits; of the candidates' cells
@@ -114,6 +120,8 @@ struct BandedArrays {
   std::uint32_t* lists[2];   ///< frontier and active cells
   std::uint32_t* splitting;  ///< cell | children that are still to make << kCellBits
   std::uint32_t cell_capacity;
+  std::uint32_t* queue;  ///< children to make, ChildCode; all kNone between steps
+  std::uint32_t queue_capacity;
 
   BucketNode* nodes;
   std::uint32_t* heads;       ///< of the buckets; all 0 between rounds

@@ -29,6 +29,8 @@ class WarpCrew {
   __device__ std::uint32_t index() const { return threadIdx.x / 32 * gridDim.x + blockIdx.x; }
   __device__ std::uint32_t size() const { return blockDim.x / 32 * gridDim.x; }
 
+  __device__ void pause() const { __nanosleep(100); }
+
   __device__ std::uint64_t now() const {
     std::uint64_t ns;
     asm volatile("mov.u64 %0, %%globaltimer;" : "=l"(ns));

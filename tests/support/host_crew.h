@@ -32,6 +32,7 @@ class HostCrew {
   std::uint32_t index() const { return index_; }
   std::uint32_t size() const { return size_; }
 
+  void pause() const { std::this_thread::yield(); }
   std::uint64_t now() const { return 0; }
 
   template <class Last>
