@@ -8,10 +8,14 @@
 #define IST_HD __host__ __device__
 #define IST_HD_COLD __host__ __device__ __noinline__ inline
 #define IST_HD_ONCE __host__ __device__ __noinline__
-#define IST_ROLLED _Pragma("unroll 1")
 #else
 #define IST_HD
 #define IST_HD_COLD [[gnu::noinline]] inline
 #define IST_HD_ONCE
+#endif
+
+#ifdef __CUDA_ARCH__  // the host's half of a CUDA compilation does not know the pragma
+#define IST_ROLLED _Pragma("unroll 1")
+#else
 #define IST_ROLLED
 #endif
