@@ -61,6 +61,30 @@ Run run_once(const ist::MeshSolid& solid, std::size_t count, bool split) {
   return run;
 }
 
+/// What one H200 is to reach: milliseconds, coverage and device memory of the last row measured.
+void compare(const std::string& mesh, const Run& run, double ms, Report& report) {
+  struct Target {
+    const char* mesh;
+    std::size_t spheres;
+    double ms, coverage;
+  };
+  constexpr Target kTargets[] = {{"dino", 100, 4, 0},
+                                 {"dino", 10'000, 22, 0.854},
+                                 {"dino", 100'000, 110, 0.908},
+                                 {"dragon_871k", 100, 11, 0},
+                                 {"dragon_871k", 10'000, 35, 0.825},
+                                 {"dragon_871k", 100'000, 150, 0.89}};
+  const std::size_t spheres = run.packing.spheres.size();
+  for (const Target& target : kTargets) {
+    if (mesh != target.mesh || spheres != target.spheres) continue;
+    const std::string what = mesh + ", " + std::to_string(spheres) + " spheres: ";
+    report.target(what + "ms", ms, target.ms, true);
+    if (target.coverage > 0)
+      report.target(what + "coverage", run.packing.coverage, target.coverage);
+    if (target.coverage == 0.89) report.target(what + "peak MiB", run.peak, 1024, true);
+  }
+}
+
 void measure(const std::string& name, const ist::MeshSolid& solid,
              const std::vector<std::size_t>& counts, int repeats, Report& report) {
   for (const std::size_t count : counts) {
@@ -81,17 +105,18 @@ void measure(const std::string& name, const ist::MeshSolid& solid,
                                       {"most", ist::benchmark::quantile(ms, 1)},
                                       {"mesh alone, ms", ist::benchmark::quantile(mesh_ms, 0.5)},
                                       {"work, ms", last.cost.work * 1e3},
-                {"split, ms", last.cost.split * 1e3},
-                {"select, ms", last.cost.select * 1e3},
-                {"grid, ms", last.cost.grid * 1e3},
-                {"rest, ms", last.cost.rest * 1e3},
-                {"rounds", last.packing.rounds},
+                                      {"split, ms", last.cost.split * 1e3},
+                                      {"select, ms", last.cost.select * 1e3},
+                                      {"grid, ms", last.cost.grid * 1e3},
+                                      {"rest, ms", last.cost.rest * 1e3},
+                                      {"rounds", last.packing.rounds},
                                       {"levels", last.cost.levels},
                                       {"steps", last.cost.steps},
                                       {"cells worked on", last.cost.cells_worked},
                                       {"launches", last.cost.launches},
                                       {"peak MiB", last.peak},
                                       {"hash", fingerprint(last.packing)}});
+    compare(name, last, ist::benchmark::quantile(ms, 0.5), report);
   }
 }
 
