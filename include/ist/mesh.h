@@ -64,8 +64,8 @@ enum class OpenMeshPolicy {
   repair,  ///< weld cracks, fill holes, drop what cannot bound a solid; say so in the report
 };
 
-/// Reads a mesh file: OBJ, STL, PLY and OFF in double by readers of this library, GLB/glTF, DAE and
-/// the rest through assimp. The file's own node transforms are applied; units and axes are left as
+/// Reads a mesh file: OBJ, STL, PLY, OFF and GLB/glTF by readers of this library, DAE and the
+/// rest through assimp. The file's own node transforms are applied; units and axes are left as
 /// they are. Vertices are welded. Throws Error (file, place, way out). Thread-safe.
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings = {});
 

@@ -40,7 +40,7 @@ struct PackingSettings {
   /// round began. 0 = automatic: the library's schedule, fastest at equal coverage.
   double epsilon = 0.0;
   GridMode grid = GridMode::banded;
-  GridSettings grids;                 ///< of the other modes
+  GridSettings grids = {};            ///< of the other modes
   std::uint64_t seed = 0;             ///< tie-breaks only; any value packs equally well
   unsigned threads = 0;               ///< 0 = all cores; never changes the result
   Device device = Device::automatic;  ///< a Solid that is not a mesh is always packed on the CPU
