@@ -61,7 +61,8 @@ class Watch {
     Progress p;
     p.stage = "pack";
     p.spheres = mailbox_->spheres;
-    p.coverage = static_cast<double>(mailbox_->covered) * packing::kVolumeUnit / limits_.volume;
+    p.coverage = static_cast<double>(mailbox_->covered) * packing::volume_unit_of(limits_.volume) /
+                 limits_.volume;
     p.radius = double{mailbox_->radius} * length_unit_;
     p.fraction = p.coverage / limits_.target_coverage;
     if (limits_.max_spheres > 0)

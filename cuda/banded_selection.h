@@ -127,7 +127,7 @@ IST_HD void insert_winners(Crew& crew, const BandedArrays& a) {
     if (team.lane() == 0) {
       a.spheres[index] = {me.centre.x, me.centre.y, me.centre.z, r};
       a.kept[index] = r < top ? r / top : 1.0f;
-      atomic_add(&s.volume, packing::fixed_ball_volume(r));
+      atomic_add(&s.volume, packing::fixed_ball_volume(r, s.schedule.volume_unit));
     }
     grid.touch_blocks(team, index, {me.centre.x, me.centre.y, me.centre.z, r});
   });

@@ -16,6 +16,7 @@ using namespace packing;
 /// A few triangles, all of which every query looks at.
 struct ListedSurface {
   using Feature = std::uint32_t;
+  static constexpr int kAscentSteps = 5;
   const SurfaceTriangle* triangles;
   int count;
 

@@ -46,7 +46,8 @@ struct BandSchedule {
   static constexpr std::uint64_t kMostCells = std::uint64_t{1} << 22;  ///< 80 B each
 
   BandLimits limits;
-  std::uint64_t volume_wanted = 0;  ///< target, in kVolumeUnit
+  double volume_unit = 0x1p-58;     ///< [unit-frame³] of the integers that volumes are summed in
+  std::uint64_t volume_wanted = 0;  ///< target, in volume_unit
 
   float threshold = 4;            ///< radius that a candidate of this band reaches
   float margin = 0;               ///< bound below which a cell settles
@@ -58,7 +59,7 @@ struct BandSchedule {
   bool rebuild_grid = false;       ///< set by begin_band(): lay it out anew, for these
 
   std::uint64_t spheres = 0;
-  std::uint64_t covered = 0;  ///< in kVolumeUnit
+  std::uint64_t covered = 0;  ///< in volume_unit
   std::uint64_t spheres_before_band = 0;
   std::uint64_t rounds = 0;
   bool forecast = true;
@@ -66,14 +67,14 @@ struct BandSchedule {
   StopReason reason = StopReason::exhausted;
 
   BandSchedule() = default;
-  explicit BandSchedule(const BandLimits& of) : limits(of) {
-    const double wanted = of.target_coverage * of.volume / kVolumeUnit;
+  explicit BandSchedule(const BandLimits& of) : limits(of), volume_unit(volume_unit_of(of.volume)) {
+    const double wanted = of.target_coverage * of.volume / volume_unit;
     volume_wanted = wanted < 0x1p63 ? static_cast<std::uint64_t>(wanted) + 1 : ~std::uint64_t{0};
   }
 
   IST_HD bool strict() const { return limits.epsilon > 0; }
   IST_HD double coverage() const {
-    const double part = static_cast<double>(covered) * kVolumeUnit / limits.volume;
+    const double part = static_cast<double>(covered) * volume_unit / limits.volume;
     return part < 1 ? part : 1;
   }
 
@@ -173,7 +174,7 @@ struct BandSchedule {
   /// Counts an inserted sphere; stops the packing when it is the last that is wanted.
   IST_HD void insert(float r) {
     ++spheres;
-    covered += fixed_ball_volume(r);
+    covered += fixed_ball_volume(r, volume_unit);
     if (spheres == limits.max_spheres)
       stop(StopReason::sphere_count);
     else if (covered >= volume_wanted)

@@ -2,6 +2,8 @@
 
 #include <ist/sphere.h>
 
+#include <cmath>
+
 #include "mesh/team.h"
 #include "packing/float3.h"
 
@@ -47,13 +49,18 @@ IST_HD float certified_radius(const Team& team, Float3 centre, float radius, dou
   return rounded_down(team.min(r));
 }
 
-/// Volumes are summed as integers, in units of 2^-58 unit-frame³, so that no order changes a sum
-/// (the frame's cube has 2^61).
-constexpr double kVolumeUnit = 0x1p-58;
+/// Volumes are summed as integers, so that no order changes a sum. Their unit [unit-frame³] is a
+/// power of two that the solid's volume is 2^60 to 2^61 of: a needle's spheres count as well as
+/// a ball's.
+inline double volume_unit_of(double solid_volume) {
+  int exponent = 0;
+  std::frexp(solid_volume, &exponent);
+  return std::ldexp(1.0, exponent - 61);
+}
 
-IST_HD inline std::uint64_t fixed_ball_volume(float r) {
+IST_HD inline std::uint64_t fixed_ball_volume(float r, double volume_unit) {
   const double radius = r;
-  return static_cast<std::uint64_t>(4.18879020478639098 * radius * radius * radius / kVolumeUnit);
+  return static_cast<std::uint64_t>(4.18879020478639098 * radius * radius * radius / volume_unit);
 }
 
 }  // namespace ist::packing

@@ -11,6 +11,9 @@ namespace ist::packing {
 /// where the gradient leads to the surface, it is a surface point.
 class FieldSurface {
  public:
+  /// A search of a field finds one feature, so an ascent must take more steps to know them all.
+  static constexpr int kAscentSteps = 8;
+
   struct Feature {
     Float3 centre;
     float radius = 0;

@@ -12,6 +12,7 @@ namespace ist::packing {
 class MeshSurface {
  public:
   using Feature = std::uint32_t;
+  static constexpr int kAscentSteps = 5;  ///< more cover no more (docs/packing_notes.md)
 
   explicit MeshSurface(const MeshSolid& solid) : solid_(solid), view_(solid.view()) {}
 

@@ -271,7 +271,7 @@ class PrototypeField {
   template <class Team>
   IST_HD void ascend(const Team& team, Float3& x, float surface_at_least, float trust,
                      float threshold, Cell& cell, Scratch& scratch, Sample& s) const {
-    constexpr int kSteps = 5;
+    constexpr int kSteps = Surface::kAscentSteps;
     IST_ROLLED for (int step = 0; step < kSteps && s.size > 0; ++step) {
       const float reach = 0.5f * s.clearance;
       const float box = trust < reach ? trust : reach;

@@ -11,6 +11,7 @@ namespace ist::packing {
 class WideMeshSurface {
  public:
   using Feature = std::uint32_t;
+  static constexpr int kAscentSteps = 5;  ///< more cover no more (docs/packing_notes.md)
 
   IST_HD explicit WideMeshSurface(const WideTree& tree) : tree_(tree) {}
 

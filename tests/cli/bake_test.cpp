@@ -94,7 +94,6 @@ TEST_F(BakeCommand, ErrorsNameTheFileAndLeaveNothingBehind) {
   expect_error({"bake", "none.obj", "-o", "new.ist"}, "none.obj");
   expect_error({"bake", "cube.obj", "-o", "none/new.ist", "--spheres", "5"}, "none/new.ist");
   expect_error({"bake", "cube.obj", "-o", "/dev/full", "--spheres", "5", "--quiet"}, "/dev/full");
-  expect_error({"bake", "cube.obj", "-o", "new.ist", "--grid", "hybrid"}, "--grid banded");
   if (!ist::gpu_available())
     expect_error({"bake", "cube.obj", "-o", "new.ist", "--device", "cuda"}, "--device cpu");
   expect_error({"bake", "cube.ist", "-o", "new.ist"}, "cube.ist");

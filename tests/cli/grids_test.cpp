@@ -34,7 +34,8 @@ TEST_F(GridCommands, GridOptionsAreTakenAndChecked) {
 }
 
 TEST_F(GridCommands, MedialWritesPointsInsideTheMesh) {
-  const Outcome outcome = ist({"medial", "cube.obj", "-o", "nodes.csv", "--resolution", "12"});
+  ASSERT_EQ(ist({"sample", "gear", "-o", "gear.obj"}).exit_code, 0);
+  const Outcome outcome = ist({"medial", "gear.obj", "-o", "nodes.csv", "--resolution", "24"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   std::istringstream table(read("nodes.csv"));
   std::string line;
@@ -45,7 +46,7 @@ TEST_F(GridCommands, MedialWritesPointsInsideTheMesh) {
     double x = 0, y = 0, z = 0, r = 0;
     ASSERT_EQ(std::sscanf(line.c_str(), "%lf,%lf,%lf,%lf", &x, &y, &z, &r), 4) << line;
     EXPECT_GT(r, 0);
-    EXPECT_LE(r, 0.500001);  // the cube's edge is 1
+    EXPECT_LE(r, 5);  // the gear is 10 across
     ++rows;
   }
   EXPECT_GT(rows, 50u);

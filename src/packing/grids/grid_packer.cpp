@@ -73,7 +73,7 @@ class GridPacker {
       inserted.push_back({w.candidate.centre.x, w.candidate.centre.y, w.candidate.centre.z, r});
       radius_ = inserted.front().r;
       result_.spheres.push_back(inserted.back());
-      covered_ += fixed_ball_volume(r);
+      covered_ += fixed_ball_volume(r, volume_unit_);
       if (result_.spheres.size() == settings_.max_spheres)
         stop(StopReason::sphere_count);
       else if (coverage() >= limits_.target_coverage)
@@ -106,7 +106,7 @@ class GridPacker {
   }
 
   double coverage() const {
-    return std::min(1.0, static_cast<double>(covered_) * kVolumeUnit / limits_.volume);
+    return std::min(1.0, static_cast<double>(covered_) * volume_unit_ / limits_.volume);
   }
 
   double elapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
@@ -147,7 +147,8 @@ class GridPacker {
   GridLayout prototypes_;
   int distances_;
   SpherePacking result_;
-  std::uint64_t covered_ = 0;  ///< in kVolumeUnit
+  double volume_unit_ = volume_unit_of(limits_.volume);
+  std::uint64_t covered_ = 0;  ///< in volume_unit_
   float radius_ = 0;
   bool too_small_ = false;  ///< a smallest radius was asked for
   bool stopped_ = false;
