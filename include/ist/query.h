@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include <ist/pose.h>
 #include <ist/tree_view.h>
@@ -110,5 +111,39 @@ struct PenetrationAndSeparation {
 /// Both in one call: the unified query of the Inner Sphere Trees papers. Limits apply to each.
 PenetrationAndSeparation query(const PlacedTree& a, const PlacedTree& b,
                                const QuerySettings& settings, Workspace& workspace) noexcept;
+
+/// A part of a contact that a solver may take for one contact point: the lenses near one region of
+/// the smaller solid.
+struct ContactPatch {
+  /// Names the region: the same in every query of the same two trees in the same measure, so that a
+  /// solver finds what it kept of the patch. Other pairs of trees use the same names.
+  std::uint64_t id = 0;
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the patch's overlap, world
+  /// Unit, world: the direction in which the patch pushes B, from A to B; zero if the area is.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  double area = 0;    ///< [u²] |force|: what the contact surface measures, seen along the normal
+  double depth = 0;   ///< [u] volume/area, ≤ the smaller solid's bounding diameter; 0 if no area
+  double volume = 0;  ///< [u³] share of Penetration::volume
+  /// [u²] share of −translation_gradient: the push on B of a penalty of 1 · volume. A's is
+  /// opposite.
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  /// [u³/rad] share of −rotation_gradient, about B's origin: not the moment of `force` at
+  /// `centroid` alone, since a patch resists turning about its normal too.
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();
+};
+
+struct ContactPatches {
+  Penetration penetration;  ///< the whole, the bits that penetration() answers
+  std::size_t count = 0;    ///< patches written
+};
+
+/// The contact condensed into at most patches.size() patches; volumes, forces and torques sum to
+/// the whole's to about 1e-15. The contact is divided along the tree of the smaller solid (B's if
+/// equal or if A is too coarse), always at the same places; a budgeted query's guess of what it did
+/// not open is shared out too. Costs 1.3 (one patch) to 1.8 (32) times a penetration. No
+/// allocation, lock or exception.
+ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
+                               const QuerySettings& settings, Workspace& workspace,
+                               std::span<ContactPatch> patches) noexcept;
 
 }  // namespace ist

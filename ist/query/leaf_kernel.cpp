@@ -196,6 +196,17 @@ HWY_INLINE void fold(const T* from, double* total) {
   }
 }
 
+template <class T>
+HWY_INLINE void add_pair(const PairSums<T>& pair, LeafSums& sums) {
+  fold(pair.caps, sums.caps);
+  fold(pair.error, sums.error);
+  for (int k = 0; k < 3; ++k) {
+    fold(pair.force[k], sums.force[k]);
+    fold(pair.torque[k], sums.torque[k]);
+    fold(pair.moment[k], sums.moment[k]);
+  }
+}
+
 /// A leaf block of B turned and scaled into A's axes, not yet shifted: runs of pairs share it.
 template <class T>
 struct TurnedBlock {
@@ -303,13 +314,9 @@ void add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t*
     bool any = false;
     sums.lenses += sum_lenses<T>(lanes_b ? sa : sb, lanes_b ? sb : sa, what, lever, pair, any);
     if (!any) continue;
-    fold(pair.caps, sums.caps);
-    fold(pair.error, sums.error);
-    for (int k = 0; k < 3; ++k) {
-      fold(pair.force[k], sums.force[k]);
-      fold(pair.torque[k], sums.torque[k]);
-      fold(pair.moment[k], sums.moment[k]);
-    }
+    add_pair(pair, sums);
+    if (stage.bins.sums != nullptr)
+      add_pair(pair, stage.bins.sums[stage.bins.node[i] >> stage.bins.shift]);
   }
 }
 

@@ -22,11 +22,19 @@ struct alignas(64) LeafSums {
   std::uint32_t lenses = 0;          ///< that are not empty
 };
 
+/// Where the sums of single pairs go besides the whole's: pair i to sums[node[i] >> shift].
+struct LeafBinning {
+  LeafSums* sums = nullptr;
+  const std::uint32_t* node = nullptr;  ///< one a pair
+  int shift = 0;
+};
+
 struct LeafStage {
   const SphereTree* a;
   const SphereTree* b;
   const Similarity* a_from_b;
   Precision precision;
+  LeafBinning bins = {};
 };
 
 /// Adds the lenses of every sphere of block a[i] with every sphere of block b[i].

@@ -7,6 +7,7 @@
 #include <ist/query.h>
 
 #include "query/asset_layout.h"
+#include "query/contact_bins.h"
 
 namespace ist {
 
@@ -40,6 +41,7 @@ struct Workspace::Impl {
   PairList now, next;    ///< pairs of the current pair of levels; those of the next
   std::unique_ptr<RankedPair[]> ranked;
   std::unique_ptr<WaitingPair[]> waiting;  ///< [kWaiting] a stack
+  ContactBins contact;
 };
 
 }  // namespace ist

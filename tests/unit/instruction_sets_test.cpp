@@ -38,6 +38,13 @@ std::vector<unsigned char> answers(const Asset& a, const Asset& b) {
     for (const Eigen::Vector3d& v :
          {p.centroid, p.translation_gradient, p.rotation_gradient, s.point_a, s.point_b, s.normal})
       for (int k = 0; k < 3; ++k) keep(v[k]);
+    ContactPatch patches[6];
+    const std::size_t count = contact_patches(pa, pb, settings, workspace, patches).count;
+    for (const ContactPatch& patch : std::span(patches, count)) {
+      keep(patch.id), keep(patch.volume), keep(patch.area), keep(patch.depth);
+      for (const Eigen::Vector3d& v : {patch.centroid, patch.normal, patch.force, patch.torque})
+        for (int k = 0; k < 3; ++k) keep(v[k]);
+    }
   }
   return bytes;
 }

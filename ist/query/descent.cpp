@@ -1,0 +1,213 @@
+#include "query/descent.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "query/node_kernel.h"
+#include "query/precision.h"
+
+namespace ist {
+namespace {
+
+// Pairs between two looks at the limits: a few microseconds.
+constexpr std::size_t kChunk = 64;
+
+// Sums whose rounding may exceed this share are taken again in double. The bound is some hundred
+// times what rounding does, so float keeps 1e-5.
+constexpr double kGrazing = 3e-4;
+
+}  // namespace
+
+Descent::Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
+                 const QuerySettings& settings, Workspace::Impl& scratch, ContactBins* bins)
+    : a_(a),
+      b_(b),
+      pose_(pose),
+      map_(pose.a_from_b),
+      precision_(precision_for(a, b, pose)),
+      settings_(settings),
+      min_radius_(settings.min_radius / pose.unit_a),
+      scratch_(scratch),
+      bins_(bins),
+      budget_(settings) {}
+
+void Descent::run() noexcept {
+  level_a_ = a_.top;
+  level_b_ = b_.top;
+  scratch_.now.a[0] = scratch_.now.b[0] = 0;
+  scratch_.now.size = estimate(level_a_, 0, level_b_, 0).bound > 0 ? 1 : 0;
+  while (level_a_ > 0 || level_b_ > 0) {
+    if (!open_level()) return;
+  }
+  open_leaves();
+}
+
+Overlap Descent::overlap() const {
+  Overlap result = finish(sums_, precision_);
+  result.add(left_);
+  return result;
+}
+
+bool Descent::open_level() {
+  const double cube = map_.scale * map_.scale * map_.scale;
+  const bool open_a = level_b_ == 0 || (level_a_ > 0 && a_.typical_cube(level_a_) >=
+                                                            cube * b_.typical_cube(level_b_));
+  if (min_radius_ > 0) drop_small([&](double ra, double rb) { return open_a ? ra : rb; });
+  PairList& now = scratch_.now;
+  PairList& next = scratch_.next;
+  if (now.size > budget_.left()) rank();
+
+  const NodeStage stage =
+      open_a ? NodeStage{&a_, &b_, level_a_, level_b_, &map_, precision_}
+             : NodeStage{&b_, &a_, level_b_, level_a_, &pose_.b_from_a, precision_};
+  next.size = 0;
+  std::size_t done = 0;
+  while (done < now.size) {
+    const std::size_t room = (scratch_.capacity - next.size) / kWidth;
+    const std::size_t n = budget_.grant(std::min({kChunk, now.size - done, room}));
+    if (n == 0) break;
+    next.size += open_a ? open_nodes(stage, now.a.get() + done, now.b.get() + done, n,
+                                     next.a.get() + next.size, next.b.get() + next.size)
+                        : open_nodes(stage, now.b.get() + done, now.a.get() + done, n,
+                                     next.b.get() + next.size, next.a.get() + next.size);
+    done += n;
+  }
+  const bool finished = done == now.size;
+  if (!finished) leave(now, done);
+  --(open_a ? level_a_ : level_b_);
+  std::swap(now, next);
+  if (!finished) leave(now, 0);
+  return finished;
+}
+
+void Descent::open_leaves() {
+  if (min_radius_ > 0) drop_small([](double ra, double rb) { return std::max(ra, rb); });
+  PairList& now = scratch_.now;
+  const bool by_error = settings_.relative_error > 0;
+  double waiting = 0;  // bound on the pairs still to come
+  if (by_error || now.size > budget_.left()) waiting = rank();
+
+  std::size_t done = 0;
+  while (done < now.size) {
+    if (by_error && accurate(waiting)) break;
+    const std::size_t n = budget_.grant(std::min(kChunk, now.size - done));
+    if (n == 0) break;
+    add_leaves(done, n);
+    if (by_error)
+      for (std::size_t i = done; i < done + n; ++i) waiting -= scratch_.ranked[i].bound;
+    done += n;
+  }
+  leave(now, done);
+
+  // A few grazing lenses are all rounding in float; they are as few as they are shallow.
+  const Overlap sum = finish(sums_, precision_);
+  if (precision_ == Precision::single && sum.error > kGrazing * sum.volume) {
+    precision_ = Precision::twice;
+    sums_ = LeafSums();
+    if (bins_ != nullptr) bins_->forget_sums();
+    add_leaves(0, done);
+  }
+}
+
+void Descent::add_leaves(std::size_t from, std::size_t n) {
+  const std::uint32_t* const a = scratch_.now.a.get() + from;
+  const std::uint32_t* const b = scratch_.now.b.get() + from;
+  LeafStage stage{&a_, &b_, &map_, precision_};
+  if (bins_ != nullptr) stage.bins = bins_->touch(a, b, n);
+  add_leaf_pairs(stage, a, b, n, sums_);
+}
+
+bool Descent::accurate(double waiting) const {
+  const Overlap sure = finish(sums_, precision_);
+  const double spread = 2 * sure.error + waiting + left_bound_;
+  return spread <= settings_.relative_error * (sure.volume + sure.error + waiting + left_bound_);
+}
+
+double Descent::rank() {
+  PairList& now = scratch_.now;
+  RankedPair* ranked = scratch_.ranked.get();
+  for (std::size_t i = 0; i < now.size; ++i)
+    ranked[i] = {estimate(level_a_, now.a[i], level_b_, now.b[i]).bound, now.a[i], now.b[i]};
+  std::sort(ranked, ranked + now.size, [](const RankedPair& l, const RankedPair& r) {
+    if (l.bound != r.bound) return l.bound > r.bound;
+    return l.a != r.a ? l.a < r.a : l.b < r.b;
+  });
+  double sum = 0;
+  for (std::size_t i = 0; i < now.size; ++i) {
+    now.a[i] = ranked[i].a;
+    now.b[i] = ranked[i].b;
+    sum += ranked[i].bound;
+  }
+  return sum;
+}
+
+template <class Measured>
+void Descent::drop_small(Measured measured) {
+  PairList& now = scratch_.now;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < now.size; ++i) {
+    const double ra = a_.ball(level_a_, now.a[i]).r;
+    const double rb = b_.ball(level_b_, now.b[i]).r * map_.scale;
+    if (measured(ra, rb) < min_radius_) {
+      leave_pair(now.a[i], now.b[i]);
+    } else {
+      now.a[kept] = now.a[i];
+      now.b[kept++] = now.b[i];
+    }
+  }
+  now.size = kept;
+}
+
+void Descent::leave(const PairList& list, std::size_t from) {
+  for (std::size_t i = from; i < list.size; ++i) leave_pair(list.a[i], list.b[i]);
+}
+
+void Descent::leave_pair(std::uint32_t a, std::uint32_t b) {
+  const PairEstimate pair = estimate(level_a_, a, level_b_, b);
+  const Eigen::Vector3d lever = pair.centre - Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]);
+  stopped_ = true;
+  left_bound_ += pair.bound;
+  Overlap guess;
+  guess.volume = pair.volume;
+  guess.force = pair.force;
+  guess.torque = lever.cross(pair.force);
+  guess.moment = pair.volume * lever;
+  left_.add(guess);
+  if (bins_ != nullptr) bins_->add_guess(level_a_, a, level_b_, b, guess);
+}
+
+Penetration Descent::penetration() const noexcept {
+  Penetration result;
+  const Overlap overlap = this->overlap();
+
+  // No point is counted more often than κ A's κ B, nor beyond either tree's own volume.
+  const double scale = pose_.a_from_b.scale;
+  const double volume_a = a_.header->volume_sum;
+  const double volume_b = b_.header->volume_sum * (scale * scale * scale);
+  const double cap = (1 + 1e-9) * std::min(volume_a * static_cast<double>(b_.header->overlap),
+                                           volume_b * static_cast<double>(a_.header->overlap));
+  const double sure = overlap.volume - left_.volume;
+  const double lowest = std::max(0.0, sure - overlap.error);
+  const double highest = std::max(lowest, std::min(cap, sure + overlap.error + left_bound_));
+
+  const double unit = pose_.unit_a;
+  const double unit3 = unit * unit * unit;
+  result.volume = unit3 * std::clamp(overlap.volume, lowest, highest);
+  result.volume_min = unit3 * lowest;
+  result.volume_max = unit3 * highest;
+  result.node_visits = budget_.visits();
+  result.sphere_pairs = sums_.lenses;
+  if (stopped_) result.status = QueryStatus::budget_exhausted;
+  if (overlap.volume > 0) {
+    const Eigen::Vector3d origin_b(pose_.a_from_b.t[0], pose_.a_from_b.t[1], pose_.a_from_b.t[2]);
+    result.centroid = pose_.to_world(overlap.moment / overlap.volume + origin_b);
+  }
+  result.translation_gradient = unit * unit * (pose_.rotation_a * overlap.force);
+  result.rotation_gradient = unit3 * (pose_.rotation_a * overlap.torque) +
+                             pose_.unit_offset_b.cross(result.translation_gradient);
+  return result;
+}
+
+}  // namespace ist

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include <ist/query.h>
+
+#include "query/budget.h"
+#include "query/contact_bins.h"
+#include "query/leaf_kernel.h"
+#include "query/overlap.h"
+#include "query/relative_pose.h"
+#include "query/sphere_tree.h"
+#include "query/unresolved.h"
+#include "query/workspace.h"
+
+namespace ist {
+
+/// The staged descent of DESIGN 7: node pairs level by level, then pairs of leaf blocks.
+class Descent {
+ public:
+  /// All arguments must outlive the descent. With `bins`, what is summed is sorted into them too.
+  Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
+          const QuerySettings& settings, Workspace::Impl& scratch, ContactBins* bins = nullptr);
+
+  void run() noexcept;
+
+  /// The answer in world units, from what has been summed.
+  Penetration penetration() const noexcept;
+
+  Precision precision() const { return precision_; }
+
+ private:
+  PairEstimate estimate(int level_a, std::uint32_t a, int level_b, std::uint32_t b) const {
+    return estimate_pair(a_, level_a, a, b_, level_b, b, map_);
+  }
+
+  /// Best answer: what was summed and a guess of the rest.
+  Overlap overlap() const;
+
+  /// Opens one side of every pair of the current list. False if the budget stopped it.
+  bool open_level();
+
+  void open_leaves();
+
+  /// Sums pairs [from, from + n) of the current list.
+  void add_leaves(std::size_t from, std::size_t n);
+
+  bool accurate(double waiting) const;
+
+  /// Sorts the current list, largest bound first; returns the sum of the bounds.
+  double rank();
+
+  /// Leaves the pairs unopened of which `measured(radius_a, radius_b)` is under the limit.
+  template <class Measured>
+  void drop_small(Measured measured);
+
+  void leave(const PairList& list, std::size_t from);
+  void leave_pair(std::uint32_t a, std::uint32_t b);
+
+  const SphereTree& a_;
+  const SphereTree& b_;
+  const RelativePose& pose_;
+  const Similarity& map_;
+  Precision precision_;
+  const QuerySettings& settings_;
+  const double min_radius_;  ///< A's unit frame
+  Workspace::Impl& scratch_;
+  ContactBins* const bins_;
+  Budget budget_;
+  int level_a_ = 0, level_b_ = 0;  ///< of the current list
+  LeafSums sums_;
+  Overlap left_;           ///< guess of what was not opened
+  double left_bound_ = 0;  ///< what that can add at most
+  bool stopped_ = false;
+};
+
+}  // namespace ist

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "query/leaf_kernel.h"
+
+namespace ist {
+
+/// Overlap of two trees or of parts of them, in A's unit frame; positions relative to B's
+/// unit-frame origin.
+struct Overlap {
+  double volume = 0;
+  double error = 0;                                  ///< bound on the rounding of `volume`
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< d(volume)/d(translation of B)
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< likewise about B's unit-frame origin
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();  ///< ∫ x dV
+
+  /// All but `error`.
+  void add(const Overlap& other) noexcept {
+    volume += other.volume;
+    force += other.force;
+    torque += other.torque;
+    moment += other.moment;
+  }
+};
+
+/// Adds up the lanes and sets in the factors of π.
+Overlap finish(const LeafSums& sums, Precision precision) noexcept;
+
+}  // namespace ist

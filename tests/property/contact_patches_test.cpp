@@ -1,0 +1,222 @@
+#include <gtest/gtest.h>
+#include <ist/query.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "support/random_assets.h"
+#include "support/reference_sum.h"
+
+namespace ist {
+namespace {
+
+using testing::make_random_asset;
+using testing::random_pose;
+
+/// Every promise about the patches of one query.
+void expect_patches(const PlacedTree& a, const PlacedTree& b, const QuerySettings& settings,
+                    std::size_t most, Workspace& workspace) {
+  const Penetration whole = penetration(a, b, settings, workspace);
+  std::vector<ContactPatch> patches(most);
+  const ContactPatches found = contact_patches(a, b, settings, workspace, patches);
+  EXPECT_EQ(found.penetration.volume, whole.volume);
+  EXPECT_EQ(found.penetration.volume_max, whole.volume_max);
+  EXPECT_EQ(found.penetration.translation_gradient, whole.translation_gradient);
+  EXPECT_EQ(found.penetration.rotation_gradient, whole.rotation_gradient);
+  EXPECT_EQ(found.penetration.status, whole.status);
+  ASSERT_LE(found.count, most);
+  EXPECT_EQ(found.count > 0, most > 0 && whole.volume > 0);
+  if (found.count == 0) return;
+  patches.resize(found.count);
+
+  std::set<std::uint64_t> ids;
+  double volume = 0, force_scale = 0, torque_scale = 0;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  for (const ContactPatch& patch : patches) {
+    ids.insert(patch.id);
+    volume += patch.volume;
+    force += patch.force;
+    torque += patch.torque;
+    moment += patch.volume * (patch.centroid - whole.centroid);
+    force_scale += patch.force.norm();
+    torque_scale += patch.torque.norm();
+    EXPECT_GE(patch.volume, 0);
+    EXPECT_NEAR(patch.area, patch.force.norm(), 1e-15 * patch.area);
+    EXPECT_TRUE(patch.centroid.allFinite());
+    if (patch.area > 0) {
+      EXPECT_NEAR(patch.normal.norm(), 1, 1e-14);
+      EXPECT_GT(patch.normal.dot(patch.force), 0);
+      EXPECT_LE(patch.depth * patch.area, patch.volume * (1 + 1e-14));
+    } else {
+      EXPECT_EQ(patch.normal, Eigen::Vector3d::Zero());
+      EXPECT_EQ(patch.depth, 0);
+    }
+  }
+  EXPECT_EQ(ids.size(), patches.size()) << "ids of one query differ";
+  EXPECT_NEAR(volume, whole.volume, 1e-14 * whole.volume);
+  EXPECT_LE((force + whole.translation_gradient).norm(), 1e-14 * force_scale);
+  EXPECT_LE((torque + whole.rotation_gradient).norm(), 1e-14 * torque_scale);
+  if (whole.status == QueryStatus::ok) {
+    EXPECT_LE(moment.norm(), 1e-6 * whole.volume);
+  }
+}
+
+TEST(ContactPatchesTest, SumToTheWhole) {
+  Workspace workspace, small(64);
+  std::mt19937_64 random(1);
+  for (const std::size_t n : {1u, 16u, 40u, 900u}) {
+    const Asset a = make_random_asset({n, 0.1, {1, 2, 3}, 2}, 10);
+    const Asset b = make_random_asset({n / 2 + 1, 0.3, {}, 0}, 11);
+    for (int i = 0; i < 24; ++i) {
+      QuerySettings settings;
+      settings.measure = i % 2 == 0 ? Measure::matched : Measure::inner;
+      if (i % 4 == 1) settings.max_visits = 1 + 3 * static_cast<std::uint32_t>(i);
+      if (i % 8 == 2) settings.min_radius = 0.3;
+      if (i % 8 == 3) settings.relative_error = 0.2;
+      const PlacedTree pa{a.view(), random_pose(random, 0.1 * i), 1.0};
+      const PlacedTree pb{b.view(), random_pose(random, 0.2 * i), i % 3 == 0 ? 0.01 : 3.0};
+      for (const std::size_t most : {0u, 1u, 2u, 5u, 64u}) {
+        SCOPED_TRACE(::testing::Message() << n << " spheres, pose " << i << ", " << most);
+        expect_patches(pa, pb, settings, most, i % 5 == 4 ? small : workspace);
+        expect_patches(pb, pa, settings, most, i % 5 == 4 ? small : workspace);
+      }
+    }
+  }
+}
+
+TEST(ContactPatchesTest, SumOfGrazingSpheresIsTakenAgainInDouble) {
+  // One lens so thin that float is not enough: the patches have to be those of the second sum.
+  Workspace workspace;
+  const Asset one = make_random_asset({1, 1, {}, 0}, 13);
+  const PlacedTree pa{one.view(), {}, 1.0};
+  PlacedTree pb = pa;
+  const double r = testing::world_spheres(pa, Measure::matched)[0].r;
+  pb.pose.t[0] = 2 * r * (1 - 1e-6);
+  expect_patches(pa, pb, {}, 4, workspace);
+  const testing::ReferenceSum sum = testing::reference_sum(pa, pb, Measure::matched);
+  ContactPatch patch;
+  ASSERT_EQ(contact_patches(pa, pb, {}, workspace, {&patch, 1}).count, 1u);
+  EXPECT_NEAR(patch.volume, sum.volume, 1e-5 * sum.volume);
+  EXPECT_NEAR(patch.area, sum.translation_gradient.norm(), 1e-5 * patch.area);
+  // Two equal balls: V = A·δ/2 to first order, for overlap δ.
+  EXPECT_NEAR(patch.depth, 0.5 * 2e-6 * r, 1e-4 * 2e-6 * r);
+}
+
+/// An asset of these spheres, inner and effective.
+Asset make_asset(const std::vector<Sphere4>& spheres) {
+  AssetArrays arrays;
+  arrays.inner_spheres = arrays.effective_spheres = spheres;
+  for (const Sphere4& s : spheres) arrays.cover_radii.push_back(2 * s.r);
+  arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
+  arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  arrays.header.volume = arrays.matched_tree.volume_sum;
+  return Asset(asset_bytes(arrays), "made-up asset");
+}
+
+TEST(ContactPatchesTest, TellSeparateContactsApart) {
+  // Two clumps about x = ±2 are pressed outward by a ball between them: forces that cancel unless
+  // they are told apart.
+  std::vector<Sphere4> clumps;
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<float> uniform(-0.5f, 0.5f);
+  for (int i = 0; i < 400; ++i)
+    clumps.push_back(
+        {uniform(random) + (i < 208 ? 2 : -2), uniform(random), uniform(random), 0.1f});
+  const Asset bell = make_asset(clumps);
+  const Asset ball = make_asset({{0, 0, 0, 2}});
+  const PlacedTree pa{ball.view(), {}, 1.0}, pb{bell.view(), {}, 1.0};
+  Workspace workspace;
+  std::vector<ContactPatch> patches(2);
+  ASSERT_EQ(contact_patches(pa, pb, {}, workspace, patches).count, 2u);
+  EXPECT_LT(patches[0].centroid.x() * patches[1].centroid.x(), 0);
+  for (const ContactPatch& patch : patches) {
+    EXPECT_NEAR(std::abs(patch.centroid.x()), 1.75, 0.2);
+    EXPECT_GT(patch.normal.dot(patch.centroid.normalized()), 0.95);
+  }
+  ContactPatch one;
+  ASSERT_EQ(contact_patches(pa, pb, {}, workspace, {&one, 1}).count, 1u);
+  EXPECT_LT(one.area, 0.2 * patches[0].area);
+}
+
+TEST(ContactPatchesTest, AreEqualAndOppositeOnA) {
+  Workspace workspace;
+  std::mt19937_64 random(7);
+  const Asset a = make_random_asset({500, 0.2, {}, 0}, 50);
+  const Asset b = make_random_asset({200, 0.2, {}, 0}, 51);
+  std::vector<ContactPatch> ab(8), ba(8);
+  for (int i = 0; i < 20; ++i) {
+    const PlacedTree pa{a.view(), random_pose(random, 0.5), 1.0};
+    const PlacedTree pb{b.view(), random_pose(random, 0.1 * i), 0.3};
+    const std::size_t count = contact_patches(pa, pb, {}, workspace, ab).count;
+    ASSERT_EQ(contact_patches(pb, pa, {}, workspace, ba).count, count);
+    const double scale = testing::reference_sum(pa, pb, Measure::matched).force_scale;
+    for (std::size_t k = 0; k < count; ++k) {
+      EXPECT_EQ(ab[k].id, ba[k].id);
+      EXPECT_LE((ab[k].force + ba[k].force).norm(), 1e-5 * scale);
+      EXPECT_LE((ab[k].centroid - ba[k].centroid).norm(), 1e-3 * 0.3);
+    }
+  }
+}
+
+TEST(ContactPatchesTest, KeepTheirNamesUnderSmallMotions) {
+  Workspace workspace;
+  std::mt19937_64 random(8);
+  const Asset a = make_random_asset({700, 0.2, {}, 0}, 60);
+  const Asset b = make_random_asset({700, 0.2, {}, 0}, 61);
+  std::vector<ContactPatch> here(8), there(8);
+  int patches = 0, kept = 0;
+  for (int i = 0; i < 100; ++i) {
+    const PlacedTree pa{a.view(), random_pose(random, 0.2), 1.0};
+    PlacedTree pb{b.view(), random_pose(random, 0.018 * i), 0.7};
+    const std::size_t count = contact_patches(pa, pb, {}, workspace, here).count;
+    pb.pose.t[0] += 1e-5;
+    const std::size_t count_there = contact_patches(pa, pb, {}, workspace, there).count;
+    for (std::size_t k = 0; k < count; ++k, ++patches)
+      for (std::size_t l = 0; l < count_there; ++l)
+        if (here[k].id == there[l].id) {
+          ++kept;
+          EXPECT_LE((here[k].centroid - there[l].centroid).norm(), 1e-3);
+        }
+  }
+  EXPECT_GT(patches, 400);
+  EXPECT_GE(kept, 0.98 * patches);
+}
+
+TEST(ContactPatchesTest, LargeTreesAreBinnedByLargerNodes) {
+  Workspace workspace;
+  AssetArrays arrays;  // a lattice in its own order: clustering it would take a while
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t i = 0; i < 42 * 40 * 40; ++i) {
+    const auto at = [](std::uint32_t k) { return 0.04f * static_cast<float>(k) - 0.8f; };
+    arrays.inner_spheres.push_back({at(i / 1600), at(i / 40 % 40), at(i % 40), 0.019f});
+    arrays.cover_radii.push_back(0.04f);
+    order.push_back(i);
+  }
+  arrays.effective_spheres = arrays.inner_spheres;
+  arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, order);
+  arrays.matched_tree = tree_from_order(arrays.effective_spheres, {}, order);
+  arrays.header.volume = arrays.matched_tree.volume_sum;
+  const Asset a(asset_bytes(arrays), "lattice");
+  const Asset b = make_random_asset({100, 0.5, {}, 0}, 71);
+  const PlacedTree pa{a.view(), {}, 1.0}, pb{b.view(), {{1, 0, 0, 0}, {2, 0.1, 0}}, 1.5};
+  expect_patches(pa, pb, {}, 16, workspace);
+  QuerySettings stopped;
+  stopped.max_visits = 40;
+  expect_patches(pa, pb, stopped, 16, workspace);
+}
+
+TEST(ContactPatchesTest, RefusesWhatPenetrationRefuses) {
+  Workspace workspace;
+  const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
+  PlacedTree bad{a.view(), {}, 1.0};
+  bad.pose.t[1] = std::numeric_limits<double>::quiet_NaN();
+  ContactPatch patch;
+  const ContactPatches answer = contact_patches({a.view(), {}, 1}, bad, {}, workspace, {&patch, 1});
+  EXPECT_EQ(answer.count, 0u);
+  EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_pose);
+}
+
+}  // namespace
+}  // namespace ist
