@@ -146,4 +146,26 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
                                const QuerySettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept;
 
+/// Two placed solids of a batch.
+struct PlacedPair {
+  PlacedTree a, b;
+};
+
+/// How penetration_batch reaches the caller's threads: two pointers, nothing that allocates.
+struct ParallelFor {
+  /// Calls work(batch, i) once for each i in [0, workers), on any threads, at the same time or one
+  /// after another, and returns when all calls have. Null: the calling thread does it all.
+  void (*run)(void* pool, std::size_t workers, void (*work)(void* batch, std::size_t worker),
+              void* batch) = nullptr;
+  void* pool = nullptr;  ///< handed to `run`
+};
+
+/// answers[i] = penetration(pairs[i]), the same bits, for as many as there are answers. As many
+/// workers as workspaces; pairs are handed out by an atomic counter, so that a pool need not
+/// balance them. Without a workspace every answer is budget_exhausted with no upper bound. No
+/// allocation or lock but the pool's own; an exception of `run` ends the program.
+void penetration_batch(std::span<const PlacedPair> pairs, const QuerySettings& settings,
+                       std::span<Workspace> workspaces, std::span<Penetration> answers,
+                       const ParallelFor& parallel = {}) noexcept;
+
 }  // namespace ist
