@@ -1,0 +1,135 @@
+// Nothing inside a query may wait: every way to the heap, to a lock and to the system is trapped
+// while queries of all kinds run, and every trap is shown to spring.
+#include <gtest/gtest.h>
+#include <ist/query.h>
+
+#include <cstdio>
+
+#include "support/random_assets.h"
+#include "support/real_time_traps.h"
+
+namespace ist {
+namespace {
+
+using testing::Trapped;
+
+class RealTime : public ::testing::Test {
+ protected:
+  /// One query of each kind, at a pose that depends on `i`.
+  void ask(int i, const QuerySettings& settings) {
+    const PlacedTree a{a_.view(), poses_a_[i], 1.0};
+    const PlacedTree b{b_.view(), poses_b_[i], i % 3 == 0 ? 0.01 : 1.0};
+    volume_[i] = penetration(a, b, settings, workspaces_[0]).volume;
+    separation(a, b, settings, workspaces_[0]);
+    query(a, b, settings, workspaces_[0]);
+    contact_patches(a, b, settings, workspaces_[0], patches_);
+    const PlacedPair pairs[] = {{a, b}, {b, a}};
+    penetration_batch(pairs, settings, workspaces_, answers_);
+  }
+
+  static constexpr int kPoses = 40;
+  const Asset a_ = testing::make_random_asset({600, 0.2, {}, 0}, 1);
+  const Asset b_ = testing::make_random_asset({600, 0.2, {}, 0}, 2);
+  Workspace workspaces_[1];
+  ContactPatch patches_[8];
+  Penetration answers_[2];
+  double volume_[kPoses] = {};
+  Pose poses_a_[kPoses], poses_b_[kPoses];
+
+  RealTime() {
+    std::mt19937_64 random(4);
+    for (int i = 0; i < kPoses; ++i) {
+      poses_a_[i] = testing::random_pose(random, 0.0);
+      poses_b_[i] = testing::random_pose(random, 0.06 * i);
+    }
+  }
+};
+
+// The first one, so that a process's first query is among what it looks at.
+TEST_F(RealTime, QueriesMakeNoSystemCall) {
+  if (!testing::kTrapsWork) GTEST_SKIP() << "the sanitizer owns the traps";
+  const auto all = [&] {
+    for (int i = 0; i < kPoses; ++i) {
+      QuerySettings settings;  // no deadline: what reads the clock may enter the system
+      if (i % 3 == 1) settings.max_visits = 40;
+      if (i % 3 == 2) settings.relative_error = 0.1;
+      ask(i, settings);
+    }
+  };
+  const testing::SystemCall none = testing::first_system_call(all);
+  if (!none.watched) GTEST_SKIP() << "this system has no seccomp filters";
+  EXPECT_EQ(none.number, -1) << "system call " << none.number << " inside a query";
+
+  // The filter sees what a query might do by accident.
+  const auto sees = [](auto violation) { return testing::first_system_call(violation).number; };
+  EXPECT_NE(sees([] { std::this_thread::yield(); }), -1);
+  EXPECT_NE(sees([] { std::fputs("a query may not print\n", stderr); }), -1);
+  void* volatile kept = nullptr;
+  EXPECT_NE(sees([&] { kept = std::malloc(std::size_t{1} << 30); }), -1);
+}
+
+TEST_F(RealTime, QueriesTouchNeitherHeapNorLock) {
+  if (!testing::kTrapsWork) GTEST_SKIP() << "the sanitizer owns the traps";
+  for (int i = 0; i < kPoses; ++i) {
+    QuerySettings settings;
+    if (i % 4 == 1) settings.max_visits = 40;
+    if (i % 4 == 2) settings.relative_error = 0.1;
+    if (i % 4 == 3) settings.deadline_us = 5;
+    const Trapped trapped = testing::trapped_by([&] { ask(i, settings); });
+    EXPECT_EQ(trapped.heap, 0) << "pose " << i;
+    EXPECT_EQ(trapped.locks, 0) << "pose " << i;
+  }
+  int overlapping = 0;
+  for (const double volume : volume_) overlapping += volume > 0 ? 1 : 0;
+  EXPECT_GT(overlapping, kPoses / 2) << "the poses ask for no work";
+}
+
+TEST_F(RealTime, EveryTrapSprings) {
+  if (!testing::kTrapsWork) GTEST_SKIP() << "the sanitizer owns the traps";
+  void* volatile kept = nullptr;  // or the compiler leaves the pair out
+  const auto heap = [&](auto get) {
+    const Trapped trapped = testing::trapped_by([&] { kept = get(); });
+    std::free(kept);
+    return trapped.heap;
+  };
+  EXPECT_GT(heap([] { return std::malloc(8); }), 0);
+  EXPECT_GT(heap([] { return std::calloc(2, 8); }), 0);
+  EXPECT_GT(heap([] { return std::realloc(nullptr, 8); }), 0);
+  EXPECT_GT(heap([] { return std::aligned_alloc(64, 64); }), 0);
+  EXPECT_GT(heap([] {
+              void* p = nullptr;
+              return posix_memalign(&p, 64, 64) == 0 ? p : nullptr;
+            }),
+            0);
+  EXPECT_GT(heap([] { return ::operator new(8); }), 0);
+  EXPECT_GT(heap([] { return ::operator new(64, std::align_val_t(64)); }), 0);
+  kept = std::malloc(8);
+  EXPECT_GT(testing::trapped_by([&] { std::free(kept); }).heap, 0);
+
+  std::mutex mutex;
+  std::shared_mutex shared;
+  std::condition_variable condition;
+  std::once_flag once;
+  pthread_spinlock_t spin;
+  sem_t semaphore;
+  pthread_spin_init(&spin, 0);
+  sem_init(&semaphore, 0, 1);
+  const auto locks = [](auto use) { return testing::trapped_by(use).locks; };
+  EXPECT_GT(locks([&] { std::lock_guard lock(mutex); }), 0);
+  EXPECT_GT(locks([&] {
+              if (mutex.try_lock()) mutex.unlock();
+            }),
+            0);
+  EXPECT_GT(locks([&] { std::unique_lock lock(shared); }), 0);
+  EXPECT_GT(locks([&] { std::shared_lock lock(shared); }), 0);
+  EXPECT_GT(locks([&] { condition.notify_one(); }), 0);
+  EXPECT_GT(locks([&] { condition.notify_all(); }), 0);
+  EXPECT_GT(locks([&] { std::call_once(once, [] {}); }), 0);
+  EXPECT_GT(locks([&] { pthread_spin_lock(&spin), pthread_spin_unlock(&spin); }), 0);
+  EXPECT_GT(locks([&] { sem_wait(&semaphore), sem_post(&semaphore); }), 0);
+  EXPECT_GT(locks([&] { static const std::string text(std::to_string(spin)); }), 0)
+      << "the guard of a local static";
+}
+
+}  // namespace
+}  // namespace ist
