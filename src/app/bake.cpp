@@ -90,7 +90,11 @@ void run_bake(const BakeOptions& options) {
   const double import_seconds = seconds_since(start);
   const Asset asset = bake_interruptibly(mesh, settings, options.quiet);
   const double bake_seconds = seconds_since(start) - import_seconds;
-  asset.save(options.output);
+  {
+    const InterruptGuard guard;  // the file is written whole, or not at all
+    asset.save(options.output);
+  }
+  exit_if_interrupted();
 
   if (options.json) {
     nlohmann::ordered_json result = {{"asset", options.output}, {"mesh", options.mesh}};

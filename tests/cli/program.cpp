@@ -70,17 +70,17 @@ Outcome run_ist(const std::filesystem::path& folder, const std::vector<std::stri
   close(err_pipe[1]);
 
   Outcome outcome;
-  bool interrupted = options.interrupt_after.empty(), killed = options.kill_after <= 0;
+  bool interrupted = options.interrupt_after.empty(), stopped = options.stop_after <= 0;
   std::array<pollfd, 2> streams = {pollfd{out_pipe[0], POLLIN, 0}, pollfd{err_pipe[0], POLLIN, 0}};
   while (child > 0 && (streams[0].fd >= 0 || streams[1].fd >= 0)) {
-    const double left = options.kill_after - seconds_since(start);
-    if (!killed && left <= 0) {
-      kill(child, SIGKILL);
-      killed = true;
+    const double left = options.stop_after - seconds_since(start);
+    if (!stopped && left <= 0) {
+      kill(child, options.stop_signal);
+      stopped = true;
     }
     const auto nanoseconds = static_cast<std::int64_t>(std::max(left, 0.0) * 1e9);
     const timespec wait = {nanoseconds / 1'000'000'000, nanoseconds % 1'000'000'000};
-    ppoll(streams.data(), streams.size(), killed ? nullptr : &wait, nullptr);
+    ppoll(streams.data(), streams.size(), stopped ? nullptr : &wait, nullptr);
     if (streams[0].revents != 0 && !drain(out_pipe[0], outcome.out)) streams[0].fd = -1;
     if (streams[1].revents != 0 && !drain(err_pipe[0], outcome.err)) streams[1].fd = -1;
     if (!interrupted && outcome.err.find(options.interrupt_after) != std::string::npos) {

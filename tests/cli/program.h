@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <cstddef>
 #include <filesystem>
 #include <functional>
@@ -22,7 +23,8 @@ struct RunOptions {
   std::vector<std::string> environment = {};  ///< NAME=value, added to this process's own
   /// Send SIGINT once this text has appeared on stderr; "" = never.
   std::string interrupt_after = {};
-  double kill_after = 0;  ///< [s] SIGKILL if it still runs then; 0 = never
+  double stop_after = 0;      ///< [s] send stop_signal if it still runs then; 0 = never
+  int stop_signal = SIGKILL;  ///< which
   /// Called in the new process before `ist` starts in it.
   std::function<void()> in_child = nullptr;
 };

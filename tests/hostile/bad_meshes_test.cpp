@@ -73,7 +73,7 @@ class BadMesh : public ::testing::TestWithParam<std::string> {
   /// Bakes the mesh to out.ist.
   Outcome bake() const {
     RunOptions options;
-    options.kill_after = kMostSeconds;
+    options.stop_after = kMostSeconds;
     // A refused file is refused before any thread starts: nothing else needs address space.
     if (row_.at("expect") == "reject" && !kSanitized)
       options.in_child = [] {

@@ -99,6 +99,29 @@ TEST(AssetSave, KeepsTheOldFileIfTheDiskIsFull) {
   EXPECT_EQ(folder.files(), 1u);
 }
 
+// A program that was killed may leave a temporary file, and the next one may have its process id.
+TEST(AssetSave, PassesOverNamesThatAreTaken) {
+  const TemporaryFolder folder;
+  const Asset asset(small_asset(3), "a");
+  for (int i = 0; i < 50; ++i)
+    std::ofstream(folder / ("a.ist." + std::to_string(getpid()) + "." + std::to_string(i)).c_str());
+  asset.save(folder / "a.ist");
+  asset.save(folder / "a.ist");  // over a file, too
+  EXPECT_EQ(Asset::load(folder / "a.ist").view().sphere_count(), 3u);
+  EXPECT_EQ(folder.files(), 51u);
+}
+
+// Without a folder in its name the file goes to where the program runs.
+TEST(AssetSave, TakesABareName) {
+  const TemporaryFolder folder;
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder / "");
+  Asset(small_asset(3), "a").save("a.ist");
+  std::filesystem::current_path(before);
+  EXPECT_EQ(Asset::load(folder / "a.ist").view().sphere_count(), 3u);
+  EXPECT_EQ(folder.files(), 1u);
+}
+
 /// Nobody in particular while it lives: root may write anywhere.
 class WithoutPrivileges {
  public:
