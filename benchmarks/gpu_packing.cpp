@@ -1,8 +1,5 @@
 // How long the GPU takes from a mesh's triangles in pageable host memory to certified spheres in
 // host memory: upload and hierarchy every time, only context and memory pool kept.
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
 #include <ist/packing.h>
 #include <cstdio>
 #include <cstdlib>
@@ -13,6 +10,7 @@
 
 #include "banded_pack.h"
 #include "device_mesh.h"
+#include "fingerprint.h"
 #include "mesh/mesh_solid.h"
 #include "report.h"
 #include "support/shared_data.h"
@@ -20,15 +18,8 @@
 
 namespace {
 
+using ist::benchmark::fingerprint;
 using ist::benchmark::Report;
-
-std::string fingerprint(const ist::SpherePacking& packing) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx",
-                static_cast<unsigned long long>(XXH3_64bits(
-                    packing.spheres.data(), packing.spheres.size() * sizeof(ist::Sphere))));
-  return text;
-}
 
 struct Run {
   double mesh = 0, all = 0;  ///< [s] until the mesh is on the device; until the spheres are here

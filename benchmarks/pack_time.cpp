@@ -1,8 +1,5 @@
 // What packing alone costs and reaches on solids of every kind: organic, mechanical, with many
 // places that are equally good, and thinner than any cell.
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
 #include <ist/packing.h>
 #include <chrono>
 #include <cstdio>
@@ -10,22 +7,15 @@
 #include <string>
 #include <vector>
 
+#include "fingerprint.h"
 #include "mesh/samples/samples.h"
 #include "report.h"
 #include "support/shared_data.h"
 
 namespace {
 
+using ist::benchmark::fingerprint;
 using ist::benchmark::Report;
-
-/// The spheres' bits in one number: equal on every machine and for any number of threads.
-std::string fingerprint(const ist::SpherePacking& packing) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx",
-                static_cast<unsigned long long>(XXH3_64bits(
-                    packing.spheres.data(), packing.spheres.size() * sizeof(ist::Sphere))));
-  return text;
-}
 
 void measure(const std::string& name, const ist::ClosedMesh& mesh,
              const std::vector<std::size_t>& counts, Report& report) {

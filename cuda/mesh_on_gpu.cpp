@@ -78,6 +78,4 @@ std::vector<double> MeshOnGpu::cover_radii(const CoverTask& task,
 
 const GpuSettings& MeshOnGpu::settings() const { return impl_->settings; }
 
-std::size_t MeshOnGpu::peak_bytes() const { return impl_->queue.peak_bytes(); }
-
 }  // namespace ist::gpu

@@ -40,7 +40,6 @@ class MeshOnGpu {
   std::vector<double> cover_radii(const CoverTask& task, const std::function<void(int)>& report);
 
   const GpuSettings& settings() const;
-  std::size_t peak_bytes() const;  ///< most device memory that was in use at a time
 
  private:
   struct Impl;

@@ -39,7 +39,6 @@ const GpuSettings& MeshOnGpu::settings() const {
   static const GpuSettings none;
   return none;
 }
-std::size_t MeshOnGpu::peak_bytes() const { return 0; }
 
 }  // namespace gpu
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "build/pack.h"
 #include "medial_on_gpu.h"
 #include "mesh/mesh_solid.h"
 #include "packing/grids/host_backend.h"
@@ -63,11 +64,10 @@ std::vector<MedialNode> medial_nodes(const Solid& solid, const MedialSettings& s
   const MedialGrids grids = medial_grids(*mesh, settings.resolution);
   ascent.layout = grids.prototypes;
   ascent.seed = settings.seed;
-  const bool on_gpu = settings.device == Device::cuda ||
-                      (settings.device == Device::automatic && gpu_available(settings.gpu.device));
   std::vector<packing::GridCandidate> converged =
-      on_gpu ? gpu::converged_on_gpu(mesh->arrays(), grids.distances, ascent, settings.gpu)
-             : converged_on_host(*mesh, grids.distances, ascent, settings.threads);
+      wants_gpu(settings.device, settings.gpu)
+          ? gpu::converged_on_gpu(mesh->arrays(), grids.distances, ascent, settings.gpu)
+          : converged_on_host(*mesh, grids.distances, ascent, settings.threads);
   std::erase_if(converged, [](const packing::GridCandidate& c) {
     return !(c.radius > 0) || c.contacts < kFewestContacts;
   });

@@ -5,12 +5,14 @@
 
 namespace ist {
 
+bool wants_gpu(Device device, const GpuSettings& gpu) {
+  return device == Device::cuda || (device == Device::automatic && gpu_available(gpu.device));
+}
+
 std::unique_ptr<gpu::MeshOnGpu> put_on_gpu(const Solid& solid, const PackingSettings& settings) {
-  if (settings.device == Device::cpu) return nullptr;
   const auto* const mesh = dynamic_cast<const MeshSolid*>(&solid);
-  const bool wanted = settings.device == Device::cuda || gpu_available(settings.gpu.device);
-  return mesh != nullptr && wanted ? std::make_unique<gpu::MeshOnGpu>(*mesh, settings.gpu)
-                                   : nullptr;
+  if (mesh == nullptr || !wants_gpu(settings.device, settings.gpu)) return nullptr;
+  return std::make_unique<gpu::MeshOnGpu>(*mesh, settings.gpu);
 }
 
 SpherePacking pack(const Solid& solid, gpu::MeshOnGpu* gpu, const PackingSettings& settings,

@@ -8,6 +8,9 @@
 
 namespace ist {
 
+/// Whether a mesh is for the GPU: asked for by name, or left open where there is one.
+bool wants_gpu(Device device, const GpuSettings& gpu);
+
 /// The solid in the memory of the GPU that the settings ask for, or null where the CPU is to do it:
 /// by choice, because there is no GPU, or because the solid is no mesh. Throws Error where a GPU
 /// was asked for by name and cannot be used.

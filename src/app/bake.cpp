@@ -13,6 +13,7 @@
 #include "app/interrupt.h"
 #include "app/number_checks.h"
 #include "app/progress_line.h"
+#include "app/text.h"
 
 namespace ist::app {
 namespace {
@@ -24,11 +25,6 @@ struct BakeOptions {
   bool repair = false, json = false, quiet = false;
 };
 
-Device device_of(const std::string& name) {
-  if (name == "cpu") return Device::cpu;
-  return name == "cuda" ? Device::cuda : Device::automatic;
-}
-
 /// Says where the bake runs, if that was left open. Throws Error if it cannot run there.
 void announce_device(Device device) {
   std::string why;
@@ -38,14 +34,6 @@ void announce_device(Device device) {
     spdlog::info("baking on the GPU: {}", gpu_info().name);
   else if (device == Device::automatic)
     spdlog::info("baking on the CPU: {}", why);
-}
-
-GridMode grid_mode(const std::string& name) {
-  if (name == "uniform") return GridMode::uniform;
-  if (name == "explicit") return GridMode::explicit_refinement;
-  if (name == "implicit") return GridMode::implicit_refinement;
-  if (name == "hybrid") return GridMode::hybrid;
-  return GridMode::banded;
 }
 
 void require_another_file(const BakeOptions& options) {
@@ -77,9 +65,9 @@ Asset bake_interruptibly(const ClosedMesh& mesh, const PackingSettings& settings
 void run_bake(const BakeOptions& options) {
   if (options.quiet) spdlog::set_level(spdlog::level::err);
   PackingSettings settings = options.packing;
-  settings.grid = grid_mode(options.grid);
+  settings.grid = grid_named(options.grid);
   require_another_file(options);
-  settings.device = device_of(options.device);
+  settings.device = device_named(options.device);
   announce_device(settings.device);
 
   const auto start = std::chrono::steady_clock::now();

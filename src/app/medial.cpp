@@ -11,6 +11,7 @@
 
 #include "app/commands.h"
 #include "app/number_checks.h"
+#include "app/text.h"
 #include "asset/atomic_file.h"
 
 namespace ist::app {
@@ -36,9 +37,7 @@ void run_medial(const MedialOptions& options) {
   if (std::filesystem::equivalent(options.mesh, options.output, no_such_file))
     throw Error(options.output + ": this is the mesh itself; name another file for the nodes");
   MedialSettings settings = options.settings;
-  settings.device = options.device == "cpu"    ? Device::cpu
-                    : options.device == "cuda" ? Device::cuda
-                                               : Device::automatic;
+  settings.device = device_named(options.device);
   const ClosedMesh mesh =
       close_mesh(load_mesh(options.mesh), options.mesh,
                  options.repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);

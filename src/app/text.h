@@ -14,6 +14,10 @@ namespace ist::app {
 std::string grouped(std::uint64_t count);  ///< 10,000
 std::string short_vector(const Eigen::Vector3d& v);
 
+/// The one whose name it is; the command line has let no other through.
+Device device_named(const std::string& name) noexcept;
+GridMode grid_named(const std::string& name) noexcept;
+
 const char* name_of(StopReason reason) noexcept;
 const char* name_of(GridMode mode) noexcept;
 const char* name_of(QueryStatus status) noexcept;

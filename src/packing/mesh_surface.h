@@ -37,16 +37,7 @@ class MeshSurface {
   }
 
   SurfaceTriangle triangle(Feature feature) const {
-    const TriangleBlock& b = view_.blocks[feature / kBvhWidth];
-    const auto lane = static_cast<int>(feature % kBvhWidth);
-    return {{b.origin[0][lane], b.origin[1][lane], b.origin[2][lane]},
-            {b.u[0][lane], b.u[1][lane], b.u[2][lane]},
-            {b.v[0][lane], b.v[1][lane], b.v[2][lane]},
-            {b.n[0][lane], b.n[1][lane], b.n[2][lane]},
-            b.length[lane],
-            b.apex[lane],
-            b.height[lane],
-            b.triangle[lane]};
+    return triangle_of(view_.blocks[feature / kBvhWidth], feature % kBvhWidth);
   }
 
   /// Where x stands to a remembered feature; a lane's own.

@@ -13,6 +13,19 @@ struct SurfaceTriangle {
   std::uint32_t index = 0;  ///< in the mesh
 };
 
+/// The triangle in a lane of a hierarchy's block (TriangleBlock, WideBlock).
+template <class Block>
+IST_HD SurfaceTriangle triangle_of(const Block& b, std::uint32_t lane) {
+  return {{b.origin[0][lane], b.origin[1][lane], b.origin[2][lane]},
+          {b.u[0][lane], b.u[1][lane], b.u[2][lane]},
+          {b.v[0][lane], b.v[1][lane], b.v[2][lane]},
+          {b.n[0][lane], b.n[1][lane], b.n[2][lane]},
+          b.length[lane],
+          b.apex[lane],
+          b.height[lane],
+          b.triangle[lane]};
+}
+
 /// Where x stands to the triangle's closest point; range2 is what a search compares.
 IST_HD inline FeatureOffset triangle_offset(const SurfaceTriangle& t, Float3 x) {
   const Float3 d = x - t.origin;

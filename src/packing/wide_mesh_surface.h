@@ -26,16 +26,7 @@ class WideMeshSurface {
   }
 
   IST_HD SurfaceTriangle triangle(Feature feature) const {
-    const WideBlock& b = tree_.blocks[feature / kWideWidth];
-    const auto lane = static_cast<int>(feature % kWideWidth);
-    return {{b.origin[0][lane], b.origin[1][lane], b.origin[2][lane]},
-            {b.u[0][lane], b.u[1][lane], b.u[2][lane]},
-            {b.v[0][lane], b.v[1][lane], b.v[2][lane]},
-            {b.n[0][lane], b.n[1][lane], b.n[2][lane]},
-            b.length[lane],
-            b.apex[lane],
-            b.height[lane],
-            b.triangle[lane]};
+    return triangle_of(tree_.blocks[feature / kWideWidth], feature % kWideWidth);
   }
 
   IST_HD FeatureOffset offset(Feature feature, Float3 x) const {

@@ -13,6 +13,8 @@
 #include "mesh/samples/samples.h"
 #include "packing/band_limits.h"
 #include "support/gpu_test.h"
+#include "support/same_packing.h"
+#include "support/scarce_memory.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 
@@ -32,17 +34,6 @@ SpherePacking pack_on_gpu(const MeshSolid& solid, const PackingSettings& setting
   return gpu::pack_banded(queue, mesh.tree(),
                           packing::band_limits(solid, solid.frame().scale(), settings),
                           solid.frame().scale(), settings.time_limit, progress);
-}
-
-void expect_same(const SpherePacking& a, const SpherePacking& b) {
-  ASSERT_EQ(a.spheres.size(), b.spheres.size());
-  for (std::size_t i = 0; i < a.spheres.size(); ++i)
-    ASSERT_EQ(std::memcmp(&a.spheres[i], &b.spheres[i], sizeof(Sphere)), 0) << "sphere " << i;
-  EXPECT_EQ(a.stop, b.stop);
-  EXPECT_EQ(a.rounds, b.rounds);
-  EXPECT_EQ(a.coverage, b.coverage);
-  EXPECT_EQ(a.kept_ratio_worst, b.kept_ratio_worst);
-  EXPECT_EQ(a.kept_ratio_median, b.kept_ratio_median);
 }
 
 void compare(const ClosedMesh& mesh, const std::vector<PackingSettings>& cases) {
@@ -118,26 +109,6 @@ TEST_F(BandedGpuTest, TwoStreamsAtOnceGiveWhatOneGives) {
     expect_same(gear_beside, gear_alone);
   }
 }
-
-/// Gives out no more than so many bytes.
-class ScarceMemory final : public DeviceMemoryResource {
- public:
-  explicit ScarceMemory(std::size_t bytes) : left_(bytes) {}
-  void* allocate(std::size_t bytes, CUstream_st* stream) override {
-    void* memory = nullptr;
-    if (bytes > left_ || cudaMallocAsync(&memory, bytes, stream) != cudaSuccess) return nullptr;
-    left_ -= bytes;
-    return memory;
-  }
-  void deallocate(void* memory, std::size_t bytes, CUstream_st* stream) noexcept override {
-    cudaFreeAsync(memory, stream);
-    left_ += bytes;
-  }
-  std::size_t left() const { return left_; }
-
- private:
-  std::size_t left_;
-};
 
 TEST_F(BandedGpuTest, TooLittleMemoryIsAnErrorAtAnyPointAndLeaksNothing) {
   const MeshSolid solid(close_mesh(make_sample("bolt"), "bolt"));

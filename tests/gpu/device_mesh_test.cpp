@@ -17,6 +17,7 @@
 #include "mesh_queries.h"
 #include "support/gpu_test.h"
 #include "support/host_wide_tree.h"
+#include "support/scarce_memory.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 
@@ -257,20 +258,6 @@ TEST_F(DeviceMeshTest, Dragon) {
 }
 
 TEST_F(DeviceMeshTest, AnEndOfMemoryLeaksNothing) {
-  class Scarce final : public DeviceMemoryResource {
-   public:
-    void* allocate(std::size_t bytes, CUstream_st* stream) override {
-      void* memory = nullptr;
-      if (bytes > left || cudaMallocAsync(&memory, bytes, stream) != cudaSuccess) return nullptr;
-      left -= bytes;
-      return memory;
-    }
-    void deallocate(void* memory, std::size_t bytes, CUstream_st* stream) noexcept override {
-      cudaFreeAsync(memory, stream);
-      left += bytes;
-    }
-    std::size_t left = 0;
-  };
   const ist::TriangleMesh mesh = icosphere_mesh(4);
   gpu::HostMesh host;
   host.vertices = mesh.vertices.front().data();
@@ -279,8 +266,7 @@ TEST_F(DeviceMeshTest, AnEndOfMemoryLeaksNothing) {
   host.triangle_count = mesh.triangles.size();
   int failures = 0;
   for (std::size_t room = 0;; room += 50000) {
-    Scarce memory;
-    memory.left = room;
+    ScarceMemory memory(room);
     GpuSettings settings;
     settings.memory = &memory;
     Queue queue(settings);
@@ -292,7 +278,7 @@ TEST_F(DeviceMeshTest, AnEndOfMemoryLeaksNothing) {
       ++failures;
     }
     queue.wait();
-    EXPECT_EQ(memory.left, room);
+    EXPECT_EQ(memory.left(), room);
     if (built) break;
   }
   EXPECT_GT(failures, 3);

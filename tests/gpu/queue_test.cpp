@@ -7,35 +7,16 @@
 
 #include "device_array.h"
 #include "support/gpu_test.h"
+#include "support/scarce_memory.h"
 
 namespace ist {
 namespace {
 
 using gpu::DeviceArray;
 using gpu::Queue;
+using testing::ScarceMemory;
 
 class QueueTest : public testing::GpuTest {};
-
-/// Gives out no more than so many bytes.
-class ScarceMemory final : public DeviceMemoryResource {
- public:
-  explicit ScarceMemory(std::size_t bytes) : left_(bytes) {}
-  void* allocate(std::size_t bytes, CUstream_st* stream) override {
-    if (bytes > left_) return nullptr;
-    void* memory = nullptr;
-    if (cudaMallocAsync(&memory, bytes, stream) != cudaSuccess) return nullptr;
-    left_ -= bytes;
-    return memory;
-  }
-  void deallocate(void* memory, std::size_t bytes, CUstream_st* stream) noexcept override {
-    cudaFreeAsync(memory, stream);
-    left_ += bytes;
-  }
-  std::size_t left() const { return left_; }
-
- private:
-  std::size_t left_;
-};
 
 TEST_F(QueueTest, ArraysTravelThereAndBackAndGrow) {
   Queue queue{GpuSettings{}};

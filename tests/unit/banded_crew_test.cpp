@@ -11,6 +11,7 @@
 #include "packing/band_limits.h"
 #include "packing/mesh_surface.h"
 #include "support/host_crew.h"
+#include "support/same_packing.h"
 #include "support/test_meshes.h"
 
 // The GPU's banded packing, run by a crew of host threads: the same spheres as the CPU's packer,
@@ -74,17 +75,6 @@ CrewPacking pack_by_crew(const MeshSolid& solid, const PackingSettings& settings
   }
   out.packing = buffers.result(out.state);
   return out;
-}
-
-void expect_same(const SpherePacking& a, const SpherePacking& b) {
-  ASSERT_EQ(a.spheres.size(), b.spheres.size());
-  for (std::size_t i = 0; i < a.spheres.size(); ++i)
-    ASSERT_EQ(std::memcmp(&a.spheres[i], &b.spheres[i], sizeof(Sphere)), 0) << "sphere " << i;
-  EXPECT_EQ(a.stop, b.stop);
-  EXPECT_EQ(a.rounds, b.rounds);
-  EXPECT_EQ(a.coverage, b.coverage);
-  EXPECT_EQ(a.kept_ratio_worst, b.kept_ratio_worst);
-  EXPECT_EQ(a.kept_ratio_median, b.kept_ratio_median);
 }
 
 TEST(BandedCrew, PacksLikeTheCpuWhateverItsSize) {

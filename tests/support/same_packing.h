@@ -1,0 +1,22 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <ist/packing.h>
+
+#include <cstring>
+
+namespace ist::testing {
+
+/// Two packings are the same: the spheres bit for bit, and all that is said of them.
+inline void expect_same(const SpherePacking& a, const SpherePacking& b) {
+  ASSERT_EQ(a.spheres.size(), b.spheres.size());
+  for (std::size_t i = 0; i < a.spheres.size(); ++i)
+    ASSERT_EQ(std::memcmp(&a.spheres[i], &b.spheres[i], sizeof(Sphere)), 0) << "sphere " << i;
+  EXPECT_EQ(a.stop, b.stop);
+  EXPECT_EQ(a.rounds, b.rounds);
+  EXPECT_EQ(a.coverage, b.coverage);
+  EXPECT_EQ(a.kept_ratio_worst, b.kept_ratio_worst);
+  EXPECT_EQ(a.kept_ratio_median, b.kept_ratio_median);
+}
+
+}  // namespace ist::testing
