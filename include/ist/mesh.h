@@ -64,9 +64,9 @@ enum class OpenMeshPolicy {
   repair,  ///< weld cracks, fill holes, drop what cannot bound a solid; say so in the report
 };
 
-/// Reads a mesh file: OBJ, STL, PLY, OFF and GLB/glTF by readers of this library, DAE and the
-/// rest through assimp. The file's own node transforms are applied; units and axes are left as
-/// they are. Vertices are welded. Throws Error (file, place, way out). Thread-safe.
+/// Reads a mesh file: OBJ, STL, PLY, OFF, GLB/glTF and DAE by readers of this library, the rest
+/// through assimp. The file's own node transforms are applied; units and axes are left as they are
+/// (DAE: metres, y up). Vertices are welded. Throws Error (file, place, way out). Thread-safe.
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings = {});
 
 /// Validates and orients a mesh: reduces coincident faces to their signed sum, drops degenerate

@@ -10,6 +10,7 @@
 #include <ist/mesh.h>
 
 #include "mesh/import/polygon_mesh.h"
+#include "mesh/import/read_mesh.h"
 #include "mesh/weld.h"
 
 namespace ist {
@@ -17,13 +18,14 @@ namespace {
 
 using Reader = PolygonMesh (*)(const SourceFile&);
 
-constexpr std::array<std::pair<std::string_view, Reader>, 6> kReaders{{
+constexpr std::array<std::pair<std::string_view, Reader>, 7> kReaders{{
     {".obj", read_obj},
     {".stl", read_stl},
     {".ply", read_ply},
     {".off", read_off},
     {".glb", read_gltf},
     {".gltf", read_gltf},
+    {".dae", read_collada},
 }};
 
 Reader reader_of(const std::string& path) {
@@ -57,9 +59,12 @@ Eigen::AlignedBox3d finite_bounds(const SourceFile& file, const PolygonMesh& mes
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings) {
   if (!(settings.weld_tolerance >= 0) || settings.weld_tolerance > 0.1)
     throw Error(path + ": the weld tolerance must lie in 0 … 0.1 of the diagonal");
-  const SourceFile file = read_source_file(path);
+  return read_mesh(read_source_file(path), settings);
+}
+
+TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings) {
   refuse_other_content(file);
-  const PolygonMesh polygons = reader_of(path)(file);
+  const PolygonMesh polygons = reader_of(file.path)(file);
   if (polygons.ends.empty()) fail(file, "no faces. There is nothing to bound a solid");
   const Eigen::AlignedBox3d bounds = finite_bounds(file, polygons);
   TriangleMesh mesh{polygons.vertices, triangulate(polygons)};

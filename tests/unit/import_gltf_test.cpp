@@ -160,7 +160,8 @@ TEST(ReadGltf, EveryLieIsCaught) {
        [](json& d) {
          d["nodes"] = {{{"children", {1, 1}}}, {{"mesh", 0}}};
        }},
-      {"\"nodes\"", [](json& d) { d["nodes"][0]["children"] = {-1}; }},
+      {"\"children\"", [](json& d) { d["nodes"][0]["children"] = {-1}; }},
+      {"\"children\"", [](json& d) { d["nodes"][0]["children"] = {1e300}; }},
       {"\"meshes\"", [](json& d) { d["nodes"][0]["mesh"] = 1; }},
       {"whole number", [](json& d) { d["nodes"][0]["mesh"] = "0"; }},
       {"float32",

@@ -122,6 +122,22 @@ TEST(ReadPly, CountsAreCheckedBeforeMemoryIsTaken) {
             std::string::npos);
 }
 
+// Elements without properties take no bytes, so that no length of file contradicts their number.
+TEST(ReadPly, AnyNumberOfNothingIsNothing) {
+  const std::string start =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+      "z\n";
+  for (const std::string name : {"face", "other"}) try {
+      load_mesh(
+          TempFile("a.ply", start + "element " + name + " 9000000000000000000\nend_header\n0 0 0\n")
+              .path());
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("a.ply: no faces"), std::string::npos)
+          << error.what();
+    }
+}
+
 TEST(ReadPly, IndicesAreChecked) {
   for (const std::int32_t bad : {-1, 4, 2147483647}) {
     std::string bytes = binary<float, std::int32_t>(false, "float", "int");

@@ -21,6 +21,16 @@ bool has_node_transforms(const MeshRow& row) {
   return row.at("format") == "dae" || row.at("format") == "glb";
 }
 
+/// The table's tool read DAE through float, ours does not: its triangles that just touch are these
+/// only once they are rounded likewise.
+TriangleMesh load_as_the_table_did(const MeshRow& row, const std::string& path) {
+  TriangleMesh mesh = load_mesh(path);
+  if (row.at("format") == "dae")
+    for (Eigen::Vector3d& v : mesh.vertices)
+      for (double& x : v) x = static_cast<float>(x);
+  return mesh;
+}
+
 void expect_counts(const MeshRow& row, const MeshReport& report) {
   EXPECT_EQ(report.triangles, number(row, "triangles"));
   EXPECT_EQ(report.vertices, number(row, "vertices_welded"));
@@ -60,7 +70,8 @@ TEST(SharedMeshes, ReportMatchesTheTable) {
     if (row.at("format") == "urdf" || row.at("format") == "md") continue;
     SCOPED_TRACE(row.at("file"));
     const std::string path = shared_path("meshes/dev/" + row.at("file")).string();
-    const ClosedMesh mesh = close_mesh(load_mesh(path), path, OpenMeshPolicy::repair);
+    const ClosedMesh mesh =
+        close_mesh(load_as_the_table_did(row, path), path, OpenMeshPolicy::repair);
     expect_counts(row, mesh.report);
     expect_bounds(row, mesh.report);
     const bool watertight = row.at("watertight") == "yes";

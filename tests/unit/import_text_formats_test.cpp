@@ -2,7 +2,9 @@
 
 #include <clocale>
 #include <cstring>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include <ist/error.h>
 #include <ist/mesh.h>
@@ -97,6 +99,42 @@ TEST(ReadObj, ConcavePolygonKeepsItsShape) {
     EXPECT_DOUBLE_EQ(area, 3) << face;
     EXPECT_EQ(mesh.triangles.size(), 4u);
   }
+}
+
+// Teeth: every second corner is reflex. Cutting ears must not take the cube of their number.
+TEST(ReadObj, ManyLargeConcavePolygonsAreReadSoon) {
+  std::ostringstream text;
+  constexpr int kTeeth = 990, kCopies = 20;
+  for (int i = 0; i < kTeeth; ++i) text << "v " << i << " 1 0\nv " << i << ".5 0.1 0\n";
+  text << "v 990 -1 0\nv 0 -1 0\n";
+  for (int copy = 0; copy < kCopies; ++copy) {
+    text << 'f';
+    for (int i = 2 * kTeeth + 2; i > 0; --i) text << ' ' << i;
+    text << '\n';
+  }
+  const TriangleMesh mesh = load("a.obj", text.str());
+  ASSERT_EQ(mesh.triangles.size(), std::size_t{kCopies} * 2 * kTeeth);
+  double area = 0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const double signed_area =
+        (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).z() / 2;
+    EXPECT_GE(signed_area, 0);
+    area += signed_area / kCopies;
+  }
+  // The shoelace formula: teeth, then down to y = −1 and back.
+  double expected = 0;
+  std::vector<Eigen::Vector2d> corners;
+  for (int i = 0; i < kTeeth; ++i) {
+    corners.emplace_back(i, 1);
+    corners.emplace_back(i + 0.5, 0.1);
+  }
+  corners.emplace_back(990, -1);
+  corners.emplace_back(0, -1);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Eigen::Vector2d &p = corners[i], &q = corners[(i + 1) % corners.size()];
+    expected -= (p.x() * q.y() - p.y() * q.x()) / 2;
+  }
+  EXPECT_NEAR(area, expected, 1e-9 * expected);
 }
 
 TEST(ReadOff, Grammar) {

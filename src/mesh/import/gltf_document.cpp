@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <limits>
+#include <utility>
 
 namespace ist {
 namespace {
@@ -167,14 +168,12 @@ void GltfDocument::check_extensions() const {
 void GltfDocument::load_buffers() {
   if (!root_.contains("buffers")) return;
   const std::size_t count = root_.at("buffers").size();
-  owned_.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
     const std::string name = "buffer " + std::to_string(i);
     const Json& buffer = at("buffers", i, name);
     std::string_view bytes;
     if (buffer.contains("uri")) {
-      owned_[i] = external_buffer(buffer.at("uri"), name);
-      bytes = owned_[i];
+      bytes = external_buffer(buffer.at("uri"), name);
     } else {
       if (i != 0 || !binary_chunk_) fail(name + " has no data: no uri, and no binary chunk");
       bytes = *binary_chunk_;
@@ -187,14 +186,14 @@ void GltfDocument::load_buffers() {
   }
 }
 
-std::string GltfDocument::external_buffer(const std::string& uri, const std::string& name) const {
+std::string_view GltfDocument::external_buffer(const std::string& uri, const std::string& name) {
   if (uri.substr(0, 5) == "data:") {
     const std::size_t comma = uri.find(";base64,");
-    const auto bytes = comma == std::string::npos
-                           ? std::nullopt
-                           : decode_base64(std::string_view(uri).substr(comma + 8));
+    auto bytes = comma == std::string::npos
+                     ? std::nullopt
+                     : decode_base64(std::string_view(uri).substr(comma + 8));
     if (!bytes) fail(name + " is a data URI that is not base64");
-    return *bytes;
+    return decoded_.emplace_back(std::move(*bytes));
   }
   const std::filesystem::path relative = decode_percent(uri);
   const bool leaves_folder =
@@ -204,8 +203,11 @@ std::string GltfDocument::external_buffer(const std::string& uri, const std::str
   if (leaves_folder)
     fail(name + " refers to " + in_quotes(uri) +
          ", outside its own folder: refused. Put the data beside it");
-  return read_source_file((std::filesystem::path(file_.path).parent_path() / relative).string())
-      .bytes;
+  const std::string path =
+      (std::filesystem::path(file_.path).parent_path() / relative).lexically_normal().string();
+  const auto found = files_.find(path);
+  if (found != files_.end()) return found->second;
+  return files_.emplace(path, read_source_file(path).bytes).first->second;
 }
 
 const GltfDocument::Json& GltfDocument::at(const std::string& name, const std::size_t index,
@@ -225,6 +227,18 @@ std::size_t GltfDocument::whole(const Json& object, const std::string& key,
   if (found == object.end() || !found->is_number_unsigned())
     fail("expected a whole number ≥ 0 as " + in_quotes(key));
   return *found;
+}
+
+std::vector<std::size_t> GltfDocument::whole_list(const Json& object,
+                                                  const std::string& key) const {
+  std::vector<std::size_t> values;
+  const auto found = object.find(key);
+  if (found == object.end()) return values;
+  for (const Json& value : *found) {
+    if (!value.is_number_unsigned()) fail("expected whole numbers ≥ 0 in " + in_quotes(key));
+    values.push_back(value);
+  }
+  return values;
 }
 
 double GltfDocument::real(const Json& value, const std::string& where) const {

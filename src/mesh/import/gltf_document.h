@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -29,6 +31,8 @@ class GltfDocument {
   /// A whole number ≥ 0 under `key`.
   std::size_t whole(const Json& object, const std::string& key,
                     std::optional<std::size_t> fallback = std::nullopt) const;
+  /// Whole numbers ≥ 0 under `key`; none if it is missing.
+  std::vector<std::size_t> whole_list(const Json& object, const std::string& key) const;
   /// A number that float32 can hold, as all of glTF's are; `where` it stands, for messages.
   double real(const Json& value, const std::string& where) const;
 
@@ -43,12 +47,13 @@ class GltfDocument {
   std::string_view parse_container();
   void check_extensions() const;
   void load_buffers();
-  std::string external_buffer(const std::string& uri, const std::string& name) const;
+  std::string_view external_buffer(const std::string& uri, const std::string& name);
 
   const SourceFile& file_;
   Json root_;
   std::optional<std::string_view> binary_chunk_;
-  std::vector<std::string> owned_;  ///< buffers from outside the file, by buffer index
+  std::deque<std::string> decoded_;           ///< buffers in data URIs
+  std::map<std::string, std::string> files_;  ///< buffers beside the file, each read once, by path
   std::vector<std::string_view> buffers_;
 };
 

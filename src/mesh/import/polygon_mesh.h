@@ -37,6 +37,10 @@ PolygonMesh read_off(const SourceFile& file);
 /// glTF 2.0: the default scene with its node transforms, skins in their bind pose.
 PolygonMesh read_gltf(const SourceFile& file);
 
+/// COLLADA: the visual scene with its node transforms, in metres with y up; skins in their bind
+/// pose.
+PolygonMesh read_collada(const SourceFile& file);
+
 /// Any other format that assimp reads, the transforms of root and nodes applied. Coordinates pass
 /// through float.
 PolygonMesh read_with_assimp(const SourceFile& file);

@@ -102,14 +102,13 @@ std::vector<std::size_t> root_nodes(const GltfDocument& document) {
   const Json& root = document.root();
   if (root.contains("scenes")) {
     const Json& scene = document.at("scenes", document.whole(root, "scene", 0), "the file");
-    for (const Json& node : scene.value("nodes", Json::array())) roots.push_back(node);
-    return roots;
+    return document.whole_list(scene, "nodes");
   }
   // Without a scene: every node that is no child.
   const Json nodes = root.value("nodes", Json::array());
   std::vector<bool> is_child(nodes.size(), false);
   for (const Json& node : nodes)
-    for (const std::size_t child : node.value("children", std::vector<std::size_t>()))
+    for (const std::size_t child : document.whole_list(node, "children"))
       if (child < is_child.size()) is_child[child] = true;
   for (std::size_t i = 0; i < is_child.size(); ++i)
     if (!is_child[i]) roots.push_back(i);
@@ -149,7 +148,7 @@ PolygonMesh read_scene(const SourceFile& file) {
         append_primitive(document, primitive, placed, most_corners,
                          "mesh " + std::to_string(mesh_index), mesh);
     }
-    visit_later(node.value("children", std::vector<std::size_t>()), world, name);
+    visit_later(document.whole_list(node, "children"), world, name);
   }
   return mesh;
 }

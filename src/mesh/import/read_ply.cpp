@@ -239,6 +239,7 @@ void read_vertices(Body& body, const Element& element, PolygonMesh& mesh) {
 
 void read_faces(Body& body, const Element& element, const std::uint64_t vertex_count,
                 PolygonMesh& mesh) {
+  if (element.properties.empty()) return;  // any number of nothing
   mesh.ends.reserve(element.count);
   mesh.corners.reserve(3 * element.count);
   for (std::uint64_t i = 0; i < element.count; ++i) {
@@ -283,7 +284,8 @@ PolygonMesh read_ply(const SourceFile& file) {
   const Header header = parse_header(file);
   std::uint64_t vertex_count = 0;
   for (const Element& element : header.elements)
-    if (element.name == "vertex") vertex_count += element.count;
+    if (element.name == "vertex") vertex_count = element.count;
+  if (vertex_count > UINT32_MAX) fail(file, "more than 2^32 vertices");
   Body body(file, header);
   PolygonMesh mesh;
   bool has_vertices = false, has_faces = false;

@@ -30,11 +30,13 @@ double roundness(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen
   return sides > 0 ? turn(a, b, c, normal) / (sides * normal.norm()) : 0;
 }
 
+/// Takes the square of the number of corners, whatever the polygon.
 class EarClipper {
  public:
   EarClipper(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& normal)
-      : points_(points), normal_(normal), left_(points.size()) {
+      : points_(points), normal_(normal), left_(points.size()), corners_(points.size()) {
     for (std::size_t i = 0; i < left_.size(); ++i) left_[i] = i;
+    for (std::size_t i = 0; i < left_.size(); ++i) look_at(i);
   }
 
   /// Cuts the best ear until a triangle is left. Where the polygon crosses itself no proper ear may
@@ -43,42 +45,69 @@ class EarClipper {
   void clip(const Emit& emit) {
     while (left_.size() > 3) {
       std::size_t best = 0;
-      double best_quality = -2;
-      for (std::size_t i = 0; i < left_.size(); ++i) {
-        const auto [a, b, c] = corner(i);
-        double quality = roundness(points_[a], points_[b], points_[c], normal_);
-        if (quality > 0 && holds_another(a, b, c)) quality = -1 + quality;
-        if (quality > best_quality) {
-          best = i;
-          best_quality = quality;
-        }
-      }
-      const auto [a, b, c] = corner(best);
-      emit(a, b, c);
+      for (std::size_t i = 1; i < left_.size(); ++i)
+        if (quality(left_[i]) > quality(left_[best])) best = i;
+      const std::size_t cut = left_[best];
+      emit(corners_[cut].before, cut, corners_[cut].after);
       left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(best));
+      corners_[cut].is_cut = true;
+      const std::size_t n = left_.size();
+      look_at((best + n - 1) % n);
+      look_at(best % n);
+      for (const std::size_t k : left_)
+        if (corners_[k].blocked_by == cut) find_blocker(k);
     }
     emit(left_[0], left_[1], left_[2]);
   }
 
  private:
-  std::array<std::size_t, 3> corner(const std::size_t i) const {
-    const std::size_t n = left_.size();
-    return {left_[(i + n - 1) % n], left_[i], left_[(i + 1) % n]};
+  static constexpr std::size_t kNobody = SIZE_MAX;
+
+  struct Corner {
+    std::size_t before = 0, after = 0;  ///< its neighbours
+    double roundness = 0;               ///< of the ear between them
+    std::size_t blocked_by = kNobody;   ///< the first point that lies in the ear
+    bool is_cut = false;
+  };
+
+  double quality(const std::size_t k) const {
+    const Corner& corner = corners_[k];
+    return corner.blocked_by == kNobody ? corner.roundness : corner.roundness - 1;
   }
 
-  bool holds_another(const std::size_t a, const std::size_t b, const std::size_t c) const {
-    return std::any_of(left_.begin(), left_.end(), [&](const std::size_t k) {
-      const Eigen::Vector3d& p = points_[k];
-      if (p == points_[a] || p == points_[b] || p == points_[c]) return false;
-      return turn(points_[a], points_[b], p, normal_) >= 0 &&
-             turn(points_[b], points_[c], p, normal_) >= 0 &&
-             turn(points_[c], points_[a], p, normal_) >= 0;
-    });
+  /// The corner at place i has new neighbours.
+  void look_at(const std::size_t i) {
+    const std::size_t n = left_.size(), k = left_[i];
+    Corner& corner = corners_[k];
+    corner.before = left_[(i + n - 1) % n];
+    corner.after = left_[(i + 1) % n];
+    corner.roundness =
+        roundness(points_[corner.before], points_[k], points_[corner.after], normal_);
+    corner.blocked_by = kNobody;
+    if (corner.roundness > 0) find_blocker(k);
+  }
+
+  /// Points before the blocker that was cut do not lie in the ear, so it goes on from there.
+  void find_blocker(const std::size_t k) {
+    Corner& corner = corners_[k];
+    const Eigen::Vector3d &a = points_[corner.before], &b = points_[k], &c = points_[corner.after];
+    std::size_t i = corner.blocked_by == kNobody ? 0 : corner.blocked_by + 1;
+    corner.blocked_by = kNobody;
+    for (; i < points_.size(); ++i) {
+      const Eigen::Vector3d& p = points_[i];
+      if (corners_[i].is_cut || p == a || p == b || p == c) continue;
+      if (turn(a, b, p, normal_) >= 0 && turn(b, c, p, normal_) >= 0 &&
+          turn(c, a, p, normal_) >= 0) {
+        corner.blocked_by = i;
+        return;
+      }
+    }
   }
 
   const std::vector<Eigen::Vector3d>& points_;
   const Eigen::Vector3d normal_;
   std::vector<std::size_t> left_;
+  std::vector<Corner> corners_;  ///< by point
 };
 
 }  // namespace
@@ -98,7 +127,7 @@ void triangulate_polygon(const std::vector<Eigen::Vector3d>& vertices,
     fan_is_valid = turn(points[0], points[i], points[i + 1], normal) > 0;
   // Without a normal (a flat or unreadable polygon) one way is as good as another.
   const bool has_normal = normal.squaredNorm() > 0;
-  // Cutting ears takes the square to the cube of the number of corners: a huge polygon is fanned.
+  // Cutting ears takes the square of the number of corners: a huge polygon is fanned.
   constexpr std::size_t kMostCorners = 2000;
   if (fan_is_valid || !has_normal || count > kMostCorners) {
     for (std::size_t i = 1; i + 1 < count; ++i)

@@ -1,0 +1,85 @@
+#include "mesh/import/collada_document.h"
+
+#include <algorithm>
+#include <charconv>
+#include <string>
+
+#include "mesh/import/text_scanner.h"
+
+namespace ist {
+
+ColladaDocument::ColladaDocument(const SourceFile& file)
+    : xml_(file), most_(12'000'000 + file.bytes.size()) {
+  if (xml_[0].name != "COLLADA")
+    fail(file, "is not COLLADA: its root is " + in_quotes(xml_[0].name));
+  for (Index i = 0; i < xml_.size(); ++i)
+    if (const std::string_view id = xml_.attribute(i, "id"); !id.empty()) by_id_.emplace(id, i);
+}
+
+ColladaDocument::Index ColladaDocument::target(const Index element,
+                                               const std::string_view attribute,
+                                               const std::string_view name) const {
+  const std::string_view url = xml_.attribute(element, attribute);
+  if (url.empty() || url[0] != '#')
+    xml_.fail(element, "refers to " + in_quotes(url) + ", not to an element of this file");
+  const auto found = by_id_.find(url.substr(1));
+  if (found == by_id_.end() || xml_[found->second].name != name)
+    xml_.fail(element, "refers to " + in_quotes(url) + ", which is no " + std::string(name) +
+                           " of this file");
+  return found->second;
+}
+
+std::uint64_t ColladaDocument::whole(const Index element, const std::string_view attribute,
+                                     const std::optional<std::uint64_t> fallback) const {
+  const std::string_view text = xml_.attribute(element, attribute);
+  if (text.empty() && fallback) return *fallback;
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size())
+    xml_.fail(element, "its " + std::string(attribute) + " is no whole number: " + in_quotes(text));
+  return value;
+}
+
+/// The words of an element's text, one after the other.
+template <class Visit>
+void ColladaDocument::for_words(const Index element, const Visit& visit) const {
+  constexpr std::string_view kSpace = " \t\r\n";
+  const std::string_view text = xml_[element].text;
+  for (std::size_t at = text.find_first_not_of(kSpace); at != std::string_view::npos;) {
+    const std::size_t end = std::min(text.find_first_of(kSpace, at), text.size());
+    visit(text.substr(at, end - at));
+    at = text.find_first_not_of(kSpace, end);
+  }
+}
+
+std::vector<double> ColladaDocument::reals(const Index element) const {
+  std::vector<double> values;
+  for_words(element, [&](const std::string_view word) {
+    const std::optional<double> value = parse_real(word);
+    if (!value) xml_.fail(element, in_quotes(word) + " is not a number");
+    values.push_back(*value);
+  });
+  return values;
+}
+
+std::vector<double> ColladaDocument::reals(const Index element, const std::size_t count) const {
+  std::vector<double> values = reals(element);
+  if (values.size() != count)
+    xml_.fail(element, std::to_string(values.size()) + " numbers, where " + std::to_string(count) +
+                           " belong");
+  return values;
+}
+
+std::vector<std::uint64_t> ColladaDocument::wholes(const Index element) const {
+  std::vector<std::uint64_t> values;
+  for_words(element, [&](const std::string_view word) {
+    std::uint64_t value = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size())
+      xml_.fail(element, in_quotes(word) + " is not a whole number ≥ 0");
+    values.push_back(value);
+  });
+  return values;
+}
+
+}  // namespace ist

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "mesh/import/polygon_mesh.h"
+#include "mesh/import/xml_document.h"
+
+namespace ist {
+
+/// The elements of a COLLADA file, their references and their lists of numbers.
+class ColladaDocument {
+ public:
+  using Index = std::uint32_t;
+  static constexpr Index kNone = XmlDocument::kNone;
+
+  explicit ColladaDocument(const SourceFile& file);
+
+  const XmlDocument& xml() const { return xml_; }
+
+  /// The element of the given name that an attribute refers to.
+  Index target(Index element, std::string_view attribute, std::string_view name) const;
+
+  /// An attribute as a whole number ≥ 0.
+  std::uint64_t whole(Index element, std::string_view attribute,
+                      std::optional<std::uint64_t> fallback = std::nullopt) const;
+
+  /// The numbers of an element's text.
+  std::vector<double> reals(Index element) const;
+  std::vector<double> reals(Index element, std::size_t count) const;
+  std::vector<std::uint64_t> wholes(Index element) const;
+
+  /// What one file may come to, in corners or in numbers read: a small file can ask for many copies
+  /// of its meshes, and more than this is no accident.
+  std::size_t most() const { return most_; }
+
+ private:
+  template <class Visit>
+  void for_words(Index element, const Visit& visit) const;
+
+  const XmlDocument xml_;
+  const std::size_t most_;
+  std::unordered_map<std::string_view, Index> by_id_;
+};
+
+/// Reads the faces of <geometry> elements.
+class ColladaGeometries {
+ public:
+  explicit ColladaGeometries(const ColladaDocument& document) : document_(document) {}
+
+  /// In its own frame; read once, however often it is asked for.
+  const PolygonMesh& operator[](std::uint32_t geometry);
+
+ private:
+  const ColladaDocument& document_;
+  std::unordered_map<std::uint32_t, PolygonMesh> read_;
+  std::size_t numbers_read_ = 0;
+};
+
+}  // namespace ist

@@ -1,0 +1,219 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "mesh/import/collada_document.h"
+#include "mesh/import/text_scanner.h"
+
+namespace ist {
+namespace {
+
+using Transform = Eigen::Affine3d;
+using Index = ColladaDocument::Index;
+constexpr Index kNone = ColladaDocument::kNone;
+
+/// Sine and cosine of an angle in degrees from + − × ÷ alone, the same on every machine; exact at
+/// multiples of 90°.
+std::pair<double, double> sine_and_cosine(const double degrees) {
+  const double turned = std::fmod(degrees, 360.0);  // exact
+  const double quarter = std::round(turned / 90);
+  const double x = (turned - 90 * quarter) * (std::numbers::pi / 180);  // |x| ≤ π/4
+  double sine = 0, cosine = 0;
+  for (int k = 10; k >= 0; --k) {  // Horner of the Taylor series
+    sine = 1 - x * x / ((2 * k + 2) * (2 * k + 3)) * sine;
+    cosine = 1 - x * x / ((2 * k + 1) * (2 * k + 2)) * cosine;
+  }
+  sine *= x;
+  switch (static_cast<int>(quarter) & 3) {
+    case 0:
+      return {sine, cosine};
+    case 1:
+      return {cosine, -sine};
+    case 2:
+      return {-sine, -cosine};
+    default:
+      return {-cosine, sine};
+  }
+}
+
+class SceneReader {
+ public:
+  explicit SceneReader(const SourceFile& file)
+      : document_(file), xml_(document_.xml()), geometries_(document_) {}
+
+  PolygonMesh read() {
+    const Index scene = visual_scene();
+    open_nodes_below(scene, root_transform());
+    while (!open_.empty()) {
+      const auto [node, parent] = open_.back();
+      open_.pop_back();
+      const Transform world = parent * local_transform(node);
+      for (Index child = xml_[node].first_child; child != kNone; child = xml_[child].next_sibling) {
+        if (xml_[child].name == "instance_geometry")
+          append(document_.target(child, "url", "geometry"), world, child);
+        else if (xml_[child].name == "instance_controller")
+          append_controller(child, world);
+      }
+      open_nodes_below(node, world);
+    }
+    return std::move(out_);
+  }
+
+ private:
+  void open_nodes_below(const Index element, const Transform& parent) {
+    for (Index child = xml_[element].first_child; child != kNone;
+         child = xml_[child].next_sibling) {
+      if (++steps_ > kMostInstances + xml_.size())
+        xml_.fail(child,
+                  "too many nodes, counted as often as they are instanced. Does one hold "
+                  "itself?");
+      if (xml_[child].name == "node")
+        open_.emplace_back(child, parent);
+      else if (xml_[child].name == "instance_node")
+        open_.emplace_back(document_.target(child, "url", "node"), parent);
+    }
+  }
+
+  Index visual_scene() const {
+    const Index scene = xml_.child(0, "scene");
+    const Index instance = scene == kNone ? kNone : xml_.child(scene, "instance_visual_scene");
+    if (instance != kNone) return document_.target(instance, "url", "visual_scene");
+    const Index library = xml_.child(0, "library_visual_scenes");
+    const Index first = library == kNone ? kNone : xml_.child(library, "visual_scene");
+    if (first == kNone) xml_.fail(0, "holds no visual scene. Export it with one");
+    return first;
+  }
+
+  /// Metres, y up: what glTF has, too.
+  Transform root_transform() const {
+    Transform transform = Transform::Identity();
+    const Index asset = xml_.child(0, "asset");
+    if (asset == kNone) return transform;
+    const Index axis = xml_.child(asset, "up_axis"), unit = xml_.child(asset, "unit");
+    const std::string_view up = axis == kNone ? "Y_UP" : xml_[axis].text;
+    if (up.find("Z_UP") != std::string_view::npos)
+      transform.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+    else if (up.find("X_UP") != std::string_view::npos)
+      transform.linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+    const std::string_view meter = unit == kNone ? "" : xml_.attribute(unit, "meter");
+    if (meter.empty()) return transform;
+    const std::optional<double> scale = parse_real(meter);
+    if (!scale || !(*scale > 0)) xml_.fail(unit, in_quotes(meter) + " is no length in metres");
+    transform.linear() *= *scale;
+    return transform;
+  }
+
+  /// Of a node, read once however often it is visited.
+  const Transform& local_transform(const Index node) {
+    const auto [found, is_new] = transforms_.try_emplace(node, Transform::Identity());
+    if (!is_new) return found->second;
+    Transform& transform = found->second;
+    for (Index child = xml_[node].first_child; child != kNone; child = xml_[child].next_sibling) {
+      const std::string_view name = xml_[child].name;
+      if (name == "matrix") {
+        transform = transform * matrix(child);
+      } else if (name == "translate") {
+        transform.translate(Eigen::Vector3d(document_.reals(child, 3).data()));
+      } else if (name == "scale") {
+        transform.scale(Eigen::Vector3d(document_.reals(child, 3).data()));
+      } else if (name == "rotate") {
+        transform.rotate(rotation(child));
+      } else if (name == "skew" || name == "lookat") {
+        if (xml_.child(node, "camera") == kNone && xml_.child(node, "instance_camera") == kNone &&
+            xml_.child(node, "instance_light") == kNone)
+          xml_.fail(child, "is not supported. Export it with matrices");
+      }
+    }
+    return transform;
+  }
+
+  Transform matrix(const Index element) const {
+    const std::vector<double> m = document_.reals(element, 16);  // by rows
+    if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1)
+      xml_.fail(element, "a projection, not a transform");
+    Transform result;
+    result.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(m.data());
+    return result;
+  }
+
+  Eigen::Matrix3d rotation(const Index element) const {
+    const std::vector<double> r = document_.reals(element, 4);  // axis, degrees
+    const Eigen::Vector3d axis(r.data());
+    if (!(axis.norm() > 0) || !axis.allFinite() || !std::isfinite(r[3]))
+      xml_.fail(element, "no axis and angle to rotate by");
+    const auto [sine, cosine] = sine_and_cosine(r[3]);
+    const Eigen::Vector3d u = axis / axis.norm();
+    Eigen::Matrix3d cross;
+    cross << 0, -u[2], u[1], u[2], 0, -u[0], -u[1], u[0], 0;
+    return Eigen::Matrix3d::Identity() + sine * cross + (1 - cosine) * cross * cross;  // Rodrigues
+  }
+
+  /// A skinned mesh in its bind pose stands where its skin says, not its node.
+  void append_controller(const Index instance, const Transform& world) {
+    const Index controller = document_.target(instance, "url", "controller");
+    const auto [found, is_new] = controllers_.try_emplace(controller);
+    Controlled& controlled = found->second;
+    if (is_new) {
+      const Index skin = xml_.child(controller, "skin"), morph = xml_.child(controller, "morph");
+      if (skin == kNone && morph == kNone) xml_.fail(controller, "is neither skin nor morph");
+      controlled.geometry = document_.target(skin == kNone ? morph : skin, "source", "geometry");
+      if (skin != kNone) {
+        const Index bind = xml_.child(skin, "bind_shape_matrix");
+        controlled.pose =
+            bind == kNone ? root_transform() : Transform(root_transform() * matrix(bind));
+      }
+    }
+    append(controlled.geometry, controlled.pose.value_or(world), instance);
+  }
+
+  void append(const Index element, const Transform& world, const Index instance) {
+    const PolygonMesh& mesh = geometries_[element];
+    if (out_.corners.size() + mesh.corners.size() > document_.most() ||
+        out_.vertices.size() + mesh.vertices.size() >
+            std::min<std::size_t>(document_.most(), UINT32_MAX))
+      xml_.fail(instance, "the nodes repeat the meshes to more than " +
+                              std::to_string(document_.most()) +
+                              " corners. Flatten or split the scene");
+    const auto first = static_cast<Index>(out_.vertices.size());
+    for (const Eigen::Vector3d& v : mesh.vertices) out_.vertices.push_back(world * v);
+    // A mirror turns every face inside out; turn it back.
+    const bool mirrored = world.linear().determinant() < 0;
+    std::size_t begin = 0;
+    for (const std::size_t end : mesh.ends) {
+      for (std::size_t i = begin; i < end; ++i)
+        out_.corners.push_back(first + mesh.corners[mirrored ? end - 1 - (i - begin) : i]);
+      out_.ends.push_back(out_.corners.size());
+      begin = end;
+    }
+  }
+
+  /// A small file can ask for many copies of its nodes: more than this is no accident.
+  static constexpr std::size_t kMostInstances = 1'000'000;
+
+  struct Controlled {
+    Index geometry = kNone;
+    std::optional<Transform> pose;  ///< a skin's
+  };
+
+  const ColladaDocument document_;
+  const XmlDocument& xml_;
+  ColladaGeometries geometries_;
+  std::unordered_map<Index, Transform> transforms_;
+  std::unordered_map<Index, Controlled> controllers_;
+  std::vector<std::pair<Index, Transform>> open_;  ///< nodes to visit, with their parents' frames
+  std::size_t steps_ = 0;
+  PolygonMesh out_;
+};
+
+}  // namespace
+
+PolygonMesh read_collada(const SourceFile& file) { return SceneReader(file).read(); }
+
+}  // namespace ist
