@@ -130,7 +130,7 @@ __device__ void look_into(const Team& team, const PowerRound& round, const Power
     return;
   }
   const int octant = team.lane();
-  const PowerGridCell child = child_of(task.cell, octant & 7);
+  const PowerGridCell child = child_of(task.cell, static_cast<std::uint32_t>(octant) & 7);
   const bool needed = octant < 8 && !is_empty(grid, child);
   int total = 0;
   const auto place = static_cast<std::uint32_t>(team.exclusive_count(needed, total));

@@ -47,7 +47,7 @@ class CellIntegrator {
     if (kept <= kPowerLeafSites || cell.level == 0) {
       walk(cell, lists.data() + end, static_cast<std::uint32_t>(kept));
     } else if (kept >= kParallelSites) {
-      tbb::parallel_for(0, 8, [&](int octant) {
+      tbb::parallel_for(0u, 8u, [&](std::uint32_t octant) {
         const PowerGridCell child = child_of(cell, octant);
         if (is_empty(grid_, child)) return;
         std::vector<std::uint32_t> own(lists.begin() + static_cast<std::ptrdiff_t>(end),
@@ -55,7 +55,7 @@ class CellIntegrator {
         look_into(child, own, 0);
       });
     } else {
-      for (int octant = 0; octant < 8; ++octant) {
+      for (std::uint32_t octant = 0; octant < 8; ++octant) {
         const PowerGridCell child = child_of(cell, octant);
         if (!is_empty(grid_, child)) look_into(child, lists, end);
       }

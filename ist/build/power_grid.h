@@ -76,7 +76,7 @@ struct PowerGridCell {
   int level = 0;
 };
 
-IST_HD inline PowerGridCell child_of(const PowerGridCell& cell, int octant) {
+IST_HD inline PowerGridCell child_of(const PowerGridCell& cell, std::uint32_t octant) {
   return {2 * cell.s + (octant & 1), 2 * cell.i + ((octant >> 1) & 1), 2 * cell.j + (octant >> 2),
           cell.level - 1};
 }
@@ -150,7 +150,7 @@ IST_HD void for_cells_of_row(const PowerGrid& grid, int level, std::uint32_t j, 
 
 /// Whether any child of a cell of level > kFlagLevel is flagged.
 IST_HD inline bool any_child(const PowerGrid& grid, const PowerGridCell& cell) {
-  for (int octant = 0; octant < 8; ++octant)
+  for (std::uint32_t octant = 0; octant < 8; ++octant)
     if (!is_empty(grid, child_of(cell, octant))) return true;
   return false;
 }
