@@ -1,0 +1,92 @@
+#include <ist/query.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include "support/random_assets.h"
+
+// Any pose, scale and limits: the answer is not NaN, lies within its bounds, and is the same when
+// asked again.
+
+namespace {
+
+using namespace ist;
+
+/// Numbers from the input; zeros once it has ended.
+class Input {
+ public:
+  Input(const std::uint8_t* data, std::size_t size) : data_(data), left_(size) {}
+
+  template <class T>
+  T next() {
+    T value{};
+    const std::size_t n = std::min(left_, sizeof(T));
+    if (n > 0) std::memcpy(&value, data_, n);
+    data_ += n;
+    left_ -= n;
+    return value;
+  }
+
+ private:
+  const std::uint8_t* data_;
+  std::size_t left_;
+};
+
+Pose next_pose(Input& input) {
+  Pose pose;
+  // Bytes rarely make a unit quaternion: half of the poses are made from directions instead.
+  const bool any = input.next<std::uint8_t>() % 2 == 0;
+  double norm = 0;
+  for (double& q : pose.q) {
+    q = any ? input.next<double>() : input.next<std::int8_t>() / 127.0;
+    norm += q * q;
+  }
+  if (!any && norm > 0)
+    for (double& q : pose.q) q /= std::sqrt(norm);
+  for (double& t : pose.t) t = any ? input.next<double>() : input.next<std::int16_t>() / 16384.0;
+  return pose;
+}
+
+void require(bool holds) {
+  if (!holds) std::abort();
+}
+
+bool same_bits(const Penetration& a, const Penetration& b) {
+  return a.volume == b.volume && a.volume_min == b.volume_min && a.volume_max == b.volume_max &&
+         a.translation_gradient == b.translation_gradient &&
+         a.rotation_gradient == b.rotation_gradient && a.centroid == b.centroid &&
+         a.status == b.status && a.node_visits == b.node_visits;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const Asset a =
+      testing::make_random_asset({.spheres = 300, .smallest = 0.2, .centre = {}, .exponent = 0}, 1);
+  static const Asset b =
+      testing::make_random_asset({.spheres = 40, .smallest = 0.05, .centre = {}, .exponent = 0}, 2);
+  static Workspace large(1u << 16), small(64);
+  Input input(data, size);
+  const auto flags = input.next<std::uint8_t>();
+  QuerySettings settings;
+  settings.measure = (flags & 1) != 0 ? Measure::inner : Measure::matched;
+  if ((flags & 2) != 0) settings.max_visits = input.next<std::uint8_t>();
+  if ((flags & 4) != 0) settings.relative_error = input.next<double>();
+  if ((flags & 8) != 0) settings.min_radius = input.next<double>();
+  Workspace& workspace = (flags & 16) != 0 ? small : large;
+  PlacedTree placed_a{a.view(), next_pose(input), 1}, placed_b{b.view(), next_pose(input), 1};
+  if ((flags & 32) != 0) placed_b.scale = input.next<double>();
+  if ((flags & 64) != 0) placed_a.scale = input.next<float>();
+  if ((flags & 128) != 0) placed_b.tree = a.view();
+
+  const auto [penetration, separation] = query(placed_a, placed_b, settings, workspace);
+  require(penetration.volume >= 0);
+  require(penetration.volume_min <= penetration.volume);
+  require(penetration.volume <= penetration.volume_max);
+  require(!penetration.translation_gradient.hasNaN() && !penetration.rotation_gradient.hasNaN());
+  require(!penetration.centroid.hasNaN());
+  require(separation.distance_min >= 0 && separation.distance_min <= separation.distance_max);
+  require(same_bits(penetration, query(placed_a, placed_b, settings, workspace).penetration));
+  return 0;
+}
