@@ -37,10 +37,20 @@ def section(report):
     return "\n".join(parts)
 
 
+def write_page(report, docs):
+    name = report["benchmark"]
+    text = f"# {report['page']}\n\nMade by `benchmarks/run.sh {name}`; do not edit.\n\n"
+    (docs / f"{name}.md").write_text(text + section(report).partition("\n")[2])
+
+
 def main(folder):
     reports = [json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))]
     text = "# Benchmark results\n\nMade by `benchmarks/run.sh`; do not edit.\n\n"
-    (folder / "tables.md").write_text(text + "\n".join(section(r) for r in reports))
+    of_tables = [r for r in reports if "page" not in r]
+    (folder / "tables.md").write_text(text + "\n".join(section(r) for r in of_tables))
+    for report in reports:
+        if "page" in report:
+            write_page(report, folder.parents[1] / "docs")
     for report in reports:
         plot = getattr(plots, report["benchmark"], None)
         if plot:

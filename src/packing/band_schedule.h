@@ -40,7 +40,7 @@ enum class BandStep : std::uint32_t {
 ///     rounds: resolve active (plateau(), largest_half(), classes(), …), insert, end_round()
 ///     end_band()
 struct BandSchedule {
-  static constexpr float kSmallestRadius = 0x1p-21f;  ///< float coordinates resolve nothing below
+  static constexpr float kSmallestRadius = 0x1p-23f;  ///< float coordinates resolve nothing below
   static constexpr float kLastSlack = 0.01f;
   static constexpr float kLargest = 1.5f;  ///< half-edge of a cell that is climbed from, in radii
   static constexpr std::uint64_t kMostCells = std::uint64_t{1} << 22;  ///< 80 B each
