@@ -106,11 +106,26 @@ MeshReport survey(const TriangleMesh& mesh) {
               ": not closed. Bake with --repair, or close it");
 }
 
-/// Coordinates that were rounded until the shape was lost, and sizes beyond what double can cube.
+double largest_coordinate(const Eigen::AlignedBox3d& bounds) {
+  return std::max(bounds.min().cwiseAbs().maxCoeff(), bounds.max().cwiseAbs().maxCoeff());
+}
+
+/// What double cannot cube. Before anything is computed with it: exact signs of infinite products
+/// have no end. A mesh of one point has its own message.
+void refuse_unusable_size(const TriangleMesh& mesh, const std::string& name) {
+  constexpr double kSmallest = 1e-90, kLargest = 1e90, kFarthest = 1e100;
+  Eigen::AlignedBox3d bounds;
+  for (const Eigen::Vector3d& v : mesh.vertices) bounds.extend(v);
+  const double size = bounds.sizes().maxCoeff(), offset = largest_coordinate(bounds);
+  if (!(size == 0 || size > kSmallest) || !(size < kLargest && offset < kFarthest))
+    throw Error(name + ": a size of " + shortest(size) + " at an offset of " + shortest(offset) +
+                " cannot be computed with. Scale it");
+}
+
+/// Coordinates that were rounded until the shape was lost.
 void refuse_unusable_coordinates(const std::string& name, MeshReport& report) {
   const double size = report.bounds.sizes().maxCoeff();
-  const double offset = std::max(report.bounds.min().cwiseAbs().maxCoeff(),
-                                 report.bounds.max().cwiseAbs().maxCoeff());
+  const double offset = largest_coordinate(report.bounds);
   const bool far_off = offset > 1e3 * size;
   if (report.degenerate_triangles == report.triangles ||
       (far_off && report.degenerate_triangles > report.triangles / 10))
@@ -119,8 +134,6 @@ void refuse_unusable_coordinates(const std::string& name, MeshReport& report) {
                 " collapse to points or lines: the coordinates have too few digits for a size of " +
                 shortest(size) + " at an offset of " + shortest(offset) +
                 ". Export it nearer to the origin, or in a format with more digits");
-  if (!(size > 1e-90 && size < 1e90))
-    throw Error(name + ": a size of " + shortest(size) + " cannot be computed with. Scale it");
   if (size < 1e-9 || size > 1e10)
     report.notes.push_back("a size of " + shortest(size) +
                            " is unusual: is the unit right? (1e-9 to 1e9 is promised to work)");
@@ -195,6 +208,7 @@ void orient_outward(TriangleMesh& mesh, const std::string& name, MeshReport& rep
 ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMeshPolicy policy) {
   check_indices_and_coordinates(input, name);
   TriangleMesh mesh = weld(input, 0);
+  refuse_unusable_size(mesh, name);
   MeshReport report = survey(mesh);
   refuse_unusable_coordinates(name, report);
   note_findings(report);

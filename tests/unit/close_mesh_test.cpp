@@ -102,6 +102,19 @@ TEST(CloseMesh, FlatAndCollapsedAreRefused) {
   EXPECT_NE(error_of(coarse).find("too few digits"), std::string::npos);
 }
 
+// Products of such coordinates overflow, and signs of infinite sums would be looked for for ever.
+TEST(CloseMesh, WhatDoubleCannotCubeIsRefused) {
+  const TriangleMesh mesh = joined(cube_mesh(), box_mesh(Eigen::Vector3d(0.5, 0, 0), {1, 1, 1}));
+  EXPECT_EQ(error_of(mesh), "accepted");
+  for (const double scale : {1e124, 1e300, 1e-100, 1e-300})
+    EXPECT_NE(error_of(moved(mesh, scale, kZero)).find("cannot be computed with"),
+              std::string::npos)
+        << scale;
+  EXPECT_NE(
+      error_of(moved(mesh, 1e86, Eigen::Vector3d::Constant(1e101))).find("cannot be computed with"),
+      std::string::npos);
+}
+
 TEST(CloseMesh, ThinSolidsAreSolids) {
   for (const double thickness : {1e-3, 1e-6, 1e-9})
     EXPECT_NEAR(close_mesh(box_mesh(kZero, {1, 1, thickness}), "plate").report.volume, thickness,
