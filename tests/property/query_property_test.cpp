@@ -233,6 +233,44 @@ TEST(Query, GradientsAreThoseOfTheSum) {
   EXPECT_LE((answer.rotation_gradient - sum.rotation_gradient).norm(), 1e-5 * sum.force_scale);
 }
 
+// Work of the forces and torques along a closed path, by Simpson's rule: none; and over its first
+// quarter what the volume changed.
+TEST(Query, EnergyIsConservedOverClosedLoops) {
+  Workspace workspace;
+  const Asset a = make_random_asset({300, 0.2, {}, 0}, 75);
+  const Asset b = make_random_asset({200, 0.2, {0.1, 0, 0}, 0}, 76);
+  const PlacedTree pa{a.view(), {}, 1.0};
+  // B on a circle that leaves A and comes back, turning about an axis askew meanwhile.
+  const Eigen::Vector3d axis = Eigen::Vector3d(0.3, -0.5, 0.8).normalized();
+  const auto at = [&](double phase) {
+    const double turn = 2 * M_PI * phase;
+    const Eigen::Quaterniond q(Eigen::AngleAxisd(turn, axis));
+    return PlacedTree{b.view(),
+                      {{q.w(), q.x(), q.y(), q.z()},
+                       {0.2 + 1.2 * (1 - std::cos(turn)), 0.7 * std::sin(turn), 0.1}},
+                      0.8};
+  };
+  const auto power = [&](double phase) {  // dV / d(phase)
+    const double turn = 2 * M_PI * phase;
+    const Penetration here = penetration(pa, at(phase), {}, workspace);
+    const Eigen::Vector3d velocity(1.2 * std::sin(turn), 0.7 * std::cos(turn), 0);
+    return 2 * M_PI * (here.translation_gradient.dot(velocity) + here.rotation_gradient.dot(axis));
+  };
+  constexpr int kSteps = 16'000;  // lenses begin and end with a kink in the force's slope
+  double work = 0, first_quarter = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double from = double(i) / kSteps, to = double(i + 1) / kSteps;
+    work += (power(from) + 4 * power((from + to) / 2) + power(to)) / (6 * kSteps);
+    if (i + 1 == kSteps / 4) first_quarter = work;
+  }
+  const double start = penetration(pa, at(0), {}, workspace).volume;
+  const double quarter = penetration(pa, at(0.25), {}, workspace).volume;
+  ASSERT_GT(start, 0.01);
+  ASSERT_LT(quarter, 0.5 * start);
+  EXPECT_NEAR(first_quarter, quarter - start, 1e-5 * start);
+  EXPECT_NEAR(work, 0, 1e-5 * start);
+}
+
 TEST(Query, HoldsAtSpecialPoses) {
   Workspace workspace;
   const Asset a = make_random_asset({400, 0.2, {}, 0}, 80);
