@@ -1,0 +1,227 @@
+// Contact, distance and force beside FCL, Bullet and the exact answers: every row of the oracle,
+// and random poses over pairs of development meshes. What must hold stands in
+// support/contact_oracle.h.
+
+#include "support/contact_oracle.h"
+
+#include <cstdio>
+
+#include "report.h"
+#include "timing.h"
+
+namespace {
+
+using ist::benchmark::quantile;
+using ist::benchmark::Report;
+using ist::testing::ContactCase;
+using ist::testing::ContactVerdict;
+
+struct MeshPair {
+  const char *name, *a, *b;
+  double size_b;  ///< B's diagonal over A's
+};
+
+/// Meshes of one component that do not cross themselves.
+constexpr MeshPair kMeshPairs[] = {
+    {"spot, torus", "spot.obj", "torus.off", 1.2},
+    {"mug, spot", "mug.ply", "spot.obj", 0.3},
+    {"hole tray, peg", "hole_tray_round_16mm.obj", "peg_round_16mm.obj", 0.9},
+    {"bolt, nut", "bolt_gen.ply", "nut_gen.ply", 0.6},
+    {"cube, cube", "unit_cube.stl", "unit_cube.stl", 1},
+    {"Menger sponge, torus", "menger_sponge3.glb", "torus.off", 0.5},
+    {"tray, sword", "tray_perforated.stl", "sword.ply", 0.5},
+    {"ADIS16480, spot", "adis16480.stl", "spot.obj", 0.8},
+    {"bunny, spot", "bunny_60k.ply", "spot.obj", 0.7},
+};
+
+/// What is counted over the cases of one pair, and listed by row.
+class Findings {
+ public:
+  Findings(Report& report, std::string pair) : report_(report), pair_(std::move(pair)) {}
+
+  void add(const ContactCase& c, const ContactVerdict& verdict) {
+    ++cases_;
+    meet_ += c.meet();
+    wrong_ += verdict.wrong.size();
+    for (const std::string& wrong : verdict.wrong) list(c, verdict, "WRONG: " + wrong);
+    if (c.held) {
+      ++held_;
+      held_found_ += verdict.matched;
+      held_by_fcl_ += verdict.fcl;
+      held_by_bullet_ += verdict.bullet;
+      held_low_ = std::min(held_low_, verdict.held_share);
+      held_high_ = std::max(held_high_, verdict.held_share);
+    }
+    if (!c.meet())
+      widths_.push_back(verdict.interval_width / c.a->closed->report.bounds.diagonal().norm());
+    if (verdict.soft_skin) {
+      ++soft_skin_;
+      char reason[160];
+      std::snprintf(reason, sizeof reason,
+                    "soft skin: the gap, %.3g u, is below the protrusions' sum, %.3g u",
+                    c.surface_distance, c.a->protrusion + c.b->protrusion);
+      list(c, verdict, reason);
+    }
+    shallow_ += verdict.shallow;
+    if (c.cross() && !verdict.matched) {
+      ++unfound_;
+      list(c, verdict, "shallow band: moved out by cover radii and protrusions, nothing crosses");
+    }
+    if (verdict.bullet && !c.cross()) {
+      ++bullet_false_;
+      list(c, verdict, "Bullet passes triangles that cross each other's planes without touching");
+    }
+    if (!verdict.bullet && c.cross()) {
+      ++bullet_missed_;
+      list(c, verdict, "Bullet misses a contact that FCL and the exact distance show");
+    }
+    if (verdict.fcl != c.cross()) list(c, verdict, "FCL disagrees with the exact distance");
+  }
+
+  void write() const {
+    report_.row("Contact or none", {{"pair", pair_},
+                                    {"cases", cases_},
+                                    {"meet", meet_},
+                                    {"wrong answers of ist", wrong_},
+                                    {"gaps within the soft skin", soft_skin_},
+                                    {"crossings in the shallow band", shallow_},
+                                    {"of them read 0", unfound_},
+                                    {"Bullet: contact at a gap", bullet_false_},
+                                    {"Bullet: missed", bullet_missed_}});
+    if (held_ > 0)
+      report_.row("One solid holds the other", {{"pair", pair_},
+                                                {"cases", held_},
+                                                {"found by ist", held_found_},
+                                                {"by FCL", held_by_fcl_},
+                                                {"by Bullet", held_by_bullet_},
+                                                {"overlap / held volume, least", held_low_},
+                                                {"most", held_high_}});
+    if (!widths_.empty())
+      report_.row("Certified intervals of the distance",
+                  {{"pair", pair_},
+                   {"cases apart", widths_.size()},
+                   {"width median / A's diagonal", quantile(widths_, 0.5)},
+                   {"p95", quantile(widths_, 0.95)}});
+    report_.target("wrong answers, " + pair_, static_cast<double>(wrong_), 0, true);
+  }
+
+ private:
+  static const char* yes_no(bool value) { return value ? "yes" : "no"; }
+
+  void list(const ContactCase& c, const ContactVerdict& verdict, const std::string& reason) {
+    report_.row("Disagreements", {{"pair", pair_},
+                                  {"case", c.name},
+                                  {"exact", c.held      ? "held"
+                                            : c.cross() ? "cross"
+                                                        : "apart"},
+                                  {"ist", yes_no(verdict.matched)},
+                                  {"FCL", yes_no(verdict.fcl)},
+                                  {"Bullet", yes_no(verdict.bullet)},
+                                  {"reason", reason}});
+  }
+
+  Report& report_;
+  std::string pair_;
+  std::size_t cases_ = 0, meet_ = 0, wrong_ = 0, soft_skin_ = 0, shallow_ = 0, unfound_ = 0;
+  std::size_t bullet_false_ = 0, bullet_missed_ = 0;
+  std::size_t held_ = 0, held_found_ = 0, held_by_fcl_ = 0, held_by_bullet_ = 0;
+  double held_low_ = 1, held_high_ = 0;
+  std::vector<double> widths_;
+};
+
+/// Angles of the three libraries' pushes to a direction that is trusted more.
+class Angles {
+ public:
+  void add(const ist::testing::ForceAngles& angles) {
+    ist_.push_back(angles.ist);
+    fcl_.push_back(angles.fcl);
+    bullet_.push_back(angles.bullet);
+  }
+  void write(Report& report, const std::string& pair, const std::string& against) const {
+    if (ist_.empty()) return;
+    Report::Json row = {{"pair", pair}, {"rows", ist_.size()}, {"against", against}};
+    row["ist median °"] = quantile(ist_, 0.5);
+    row["ist p95 °"] = quantile(ist_, 0.95);
+    if (against == "exact gradient") {
+      row["FCL normals median °"] = quantile(fcl_, 0.5);
+      row["FCL normals p95 °"] = quantile(fcl_, 0.95);
+    }
+    row["Bullet normals median °"] = quantile(bullet_, 0.5);
+    row["Bullet normals p95 °"] = quantile(bullet_, 0.95);
+    report.row("Direction of the force", row);
+  }
+
+ private:
+  std::vector<double> ist_, fcl_, bullet_;
+};
+
+void ask_oracle_rows(Report& report, ist::testing::ContactJudge& judge, const std::string& key,
+                     std::size_t spheres) {
+  const auto rows = ist::testing::read_oracle_rows(key);
+  ist::testing::Model a(ist::testing::oracle_mesh_path(rows.front().mesh_a), spheres);
+  ist::testing::Model b(ist::testing::oracle_mesh_path(rows.front().mesh_b), spheres);
+  Findings findings(report, key);
+  Angles angles;
+  for (const ist::testing::OracleRow& row : rows) {
+    const ContactCase c = case_of(row, "", a, b);
+    findings.add(c, judge.judge(c));
+    if (row.pose_class == "pen" && row.fraction_of_smaller >= 1e-3) angles.add(judge.angles(c));
+  }
+  findings.write();
+  angles.write(report, key, "exact gradient");
+}
+
+void ask_random_poses(Report& report, ist::testing::ContactJudge& judge, const MeshPair& pair,
+                      std::size_t spheres, int poses) {
+  const auto path = [](const char* name) {
+    return ist::testing::shared_path(std::string("meshes/dev/") + name).string();
+  };
+  ist::testing::Model a(path(pair.a), spheres), b(path(pair.b), spheres);
+  ist::testing::RandomContacts contacts(a, b, pair.size_b, 5);
+  Findings findings(report, pair.name);
+  Angles angles;
+  for (int i = 0; i < poses; ++i) {
+    const ContactCase c = contacts.next();
+    const ContactVerdict verdict = judge.judge(c);
+    findings.add(c, verdict);
+    if (c.cross() && !verdict.shallow) angles.add(judge.angles(c));
+  }
+  findings.write();
+  angles.write(report, pair.name, "FCL's normals");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Report report("checked_against", argc, argv);
+  report.page("Checked against FCL, Bullet and exact answers");
+  const std::size_t spheres = report.quick() ? 1'000 : 4'000;
+  const int poses = report.quick() ? 30 : 200;
+  report.remark(
+      "Assets of " + std::to_string(spheres) +
+      " spheres. Pairs `eledino` … `ico20k`: all rows of the oracle, whose volumes, "
+      "distances and forces are exact. Other pairs: " +
+      std::to_string(poses) +
+      " random poses, a third with B at a tenth of its size; FCL's distance and a winding "
+      "number by solid angles decide what is true.");
+  report.remark(
+      "A wrong answer of ist: inner spheres overlap though the solids are apart; a true distance "
+      "outside the certified interval; a held solid not found; a matched overlap at a gap wider "
+      "than both largest protrusions; crossing surfaces that read 0 deeper than the shallow band. "
+      "The band: moving B out by both largest protrusions and both largest cover layers (cover "
+      "radius less radius) ends the contact.");
+  report.remark(
+      "Bullet is its double-precision build with margin 0. FCL and Bullet see surfaces: a solid "
+      "wholly inside another is no contact to them.");
+  report.remark(
+      "Direction of the force: angle between the push on B and the exact gradient; for random "
+      "poses, "
+      "whose exact gradient is not known, the depth-weighted mean of FCL's contact normals, which "
+      "is "
+      "itself off by what the first four rows show.");
+  ist::testing::ContactJudge judge;
+  for (const std::string& key : ist::testing::kPairKeys)
+    ask_oracle_rows(report, judge, key, spheres);
+  for (const MeshPair& pair : kMeshPairs) ask_random_poses(report, judge, pair, spheres, poses);
+  return report.write();
+}

@@ -1,0 +1,273 @@
+#pragma once
+
+// Contact or no contact, against FCL and Bullet on the same meshes and poses. A mesh library sees
+// surfaces; whether one solid holds the other comes from the oracle or from solid angles here.
+//
+// What must hold, without any band:
+//   inner overlap > 0      ⇒ the solids meet                       (inner spheres are inside)
+//   the solids meet        ⇒ distance_min = 0                      (cover balls hold the solids)
+//   they are d > 0 apart   ⇒ distance_min ≤ d ≤ distance_max
+//   one holds the other    ⇒ matched overlap > 0
+// and with a band that follows from the assets:
+//   matched overlap > 0    ⇒ the solids meet or d ≤ p_A + p_B      (p: largest protrusion)
+//   the solids meet deeper ⇒ matched overlap > 0                   (than the layer w below)
+// w = g_A + g_B + p_A + p_B, g the largest cover radius less its sphere's: no point of a solid is
+// further than g from its inner spheres. Deeper than w: moving B by w along the exact force (the
+// mean contact normal where that is unknown) leaves the surfaces crossing.
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <ist/bake.h>
+#include <ist/query.h>
+
+#include "query/asset_layout.h"
+#include "support/bullet_mesh.h"
+#include "support/fcl_mesh.h"
+#include "support/oracle_rows.h"
+
+namespace ist::testing {
+
+/// A mesh under one uniform scale, as each of the three libraries sees it.
+struct Body {
+  Body(std::shared_ptr<const ClosedMesh> closed_mesh, std::shared_ptr<const Asset> baked,
+       double uniform_scale)
+      : closed(std::move(closed_mesh)),
+        asset(std::move(baked)),
+        scale(uniform_scale),
+        fcl(closed->mesh, scale),
+        bullet(closed->mesh, scale) {
+    const AssetHeader& header = asset->view().header();
+    const auto* spheres = ist::at<Sphere4>(header, header.inner_spheres);
+    const auto* cover = ist::at<float>(header, header.cover_radii);
+    double missed = 0;
+    for (std::uint64_t i = 0; i < header.sphere_count; ++i)
+      missed = std::max(missed, double(cover[i]) - double(spheres[i].r));
+    missed_layer = scale * std::ldexp(missed, header.exponent);
+    protrusion = scale * std::ldexp(header.protrusion, header.exponent);
+  }
+
+  PlacedTree at(const Pose& pose) const { return {asset->view(), pose, scale}; }
+  double volume() const { return asset->view().volume() * std::pow(scale, 3); }
+
+  std::shared_ptr<const ClosedMesh> closed;
+  std::shared_ptr<const Asset> asset;
+  double scale;
+  FclMesh fcl;
+  BulletMesh bullet;
+  double missed_layer = 0;  ///< [u] g: the solid lies within this of the inner spheres
+  double protrusion = 0;    ///< [u] p: no effective sphere sticks out further
+};
+
+/// A mesh, baked once, at every scale it is asked for.
+class Model {
+ public:
+  Model(const std::string& path, std::size_t spheres)
+      : closed_(std::make_shared<const ClosedMesh>(
+            close_mesh(load_mesh(path), std::filesystem::path(path).filename().string()))),
+        asset_(std::make_shared<const Asset>(bake(*closed_, {.max_spheres = spheres}))) {}
+
+  Body& at(double scale) {
+    std::unique_ptr<Body>& body = bodies_[scale];
+    if (!body) body = std::make_unique<Body>(closed_, asset_, scale);
+    return *body;
+  }
+  const Eigen::AlignedBox3d& bounds() const { return closed_->report.bounds; }
+
+ private:
+  std::shared_ptr<const ClosedMesh> closed_;
+  std::shared_ptr<const Asset> asset_;
+  std::map<double, std::unique_ptr<Body>> bodies_;
+};
+
+/// Two placed solids and what is known of them. A rests at the identity.
+struct ContactCase {
+  std::string name;
+  Body* a = nullptr;
+  Body* b = nullptr;
+  Pose pose_b;
+  bool held = false;            ///< one solid holds the other: no surface crosses
+  double surface_distance = 0;  ///< [u]
+  /// Unit: the way B leaves A; zero where they do not cross. Exact for rows of the oracle, the mean
+  /// contact normal of FCL else.
+  Eigen::Vector3d exit = Eigen::Vector3d::Zero();
+
+  bool cross() const { return surface_distance == 0; }
+  bool meet() const { return cross() || held; }
+};
+
+/// What the three libraries said of a case.
+struct ContactVerdict {
+  std::vector<std::string> wrong;  ///< statements above that are false: none may be
+  bool matched = false;            ///< overlap > 0 in that measure
+  bool soft_skin = false;          ///< matched, though the solids are apart
+  bool shallow = false;            ///< crossing, within the band
+  bool fcl = false, bullet = false;
+  double interval_width = 0;  ///< [u] of the certified distances
+  double held_share = 0;      ///< of a held solid: matched overlap / its volume
+};
+
+inline double degrees_between(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
+  return std::atan2(u.cross(v).norm(), u.dot(v)) * 180 / std::numbers::pi;
+}
+
+/// Angles to the exit direction [degrees].
+struct ForceAngles {
+  double ist = 0, fcl = 0, bullet = 0;
+};
+
+/// Asks all three libraries.
+class ContactJudge {
+ public:
+  ContactVerdict judge(const ContactCase& c) {
+    const Body &a = *c.a, &b = *c.b;
+    const PlacedTree place_a = a.at({}), place_b = b.at(c.pose_b);
+    const Penetration inner =
+        penetration(place_a, place_b, {.measure = Measure::inner}, workspace_);
+    const Penetration matched = penetration(place_a, place_b, {}, workspace_);
+    const Separation gap = separation(place_a, place_b, {}, workspace_);
+    const double d = c.surface_distance;
+    ContactVerdict verdict;
+    const auto require = [&](bool holds, const std::string& otherwise) {
+      if (!holds) verdict.wrong.push_back(otherwise);
+    };
+    verdict.fcl = fcl_in_contact(a.fcl, {}, b.fcl, c.pose_b);
+    verdict.bullet = bullet_.contacts(c.a->bullet, {}, c.b->bullet, c.pose_b).any();
+    verdict.matched = matched.volume > 0;
+    verdict.interval_width = gap.distance_max - gap.distance_min;
+    if (!c.meet()) {
+      require(inner.volume == 0, "inner spheres overlap, the solids are apart");
+      require(gap.distance_min <= d, "the solids are closer than distance_min");
+      require(gap.distance_max >= d, "the solids are further apart than distance_max");
+      verdict.soft_skin = verdict.matched;
+      require(!verdict.matched || d <= a.protrusion + b.protrusion,
+              "matched overlap beyond both protrusions");
+      return verdict;
+    }
+    require(gap.distance_min == 0, "the solids meet, the interval says that they do not");
+    if (c.held) {
+      require(verdict.matched, "a held solid was missed");
+      verdict.held_share = matched.volume / std::min(a.volume(), b.volume());
+    } else {
+      verdict.shallow = shallow(c);
+      require(verdict.matched || verdict.shallow, "crossing deeper than the band was missed");
+    }
+    return verdict;
+  }
+
+  /// For crossing surfaces.
+  ForceAngles angles(const ContactCase& c) {
+    const Penetration found = penetration(c.a->at({}), c.b->at(c.pose_b), {}, workspace_);
+    return {
+        degrees_between(-found.translation_gradient, c.exit),
+        degrees_between(fcl_contacts(c.a->fcl, {}, c.b->fcl, c.pose_b).push_b, c.exit),
+        degrees_between(bullet_.contacts(c.a->bullet, {}, c.b->bullet, c.pose_b).push_b, c.exit)};
+  }
+
+ private:
+  /// Does moving B out by w end the contact?
+  static bool shallow(const ContactCase& c) {
+    const double w = c.a->missed_layer + c.b->missed_layer + c.a->protrusion + c.b->protrusion;
+    Pose out = c.pose_b;
+    for (int k = 0; k < 3; ++k) out.t[k] += w * c.exit[k];
+    return !fcl_in_contact(c.a->fcl, {}, c.b->fcl, out);
+  }
+
+  Workspace workspace_;
+  BulletNarrowPhase bullet_;
+};
+
+/// A row of the oracle, whose distances and forces are exact.
+inline ContactCase case_of(const OracleRow& row, const std::string& key, Model& a, Model& b) {
+  ContactCase c;
+  c.name = key + " row " + std::to_string(row.id) + " (" + row.pose_class + ")";
+  c.a = &a.at(1);
+  c.b = &b.at(row.scale_b);
+  c.pose_b = row.pose;
+  c.held = row.volume > 0 && row.surface_distance > 0;
+  c.surface_distance = row.surface_distance;
+  if (c.cross()) c.exit = -row.translation_gradient.normalized();
+  return c;
+}
+
+/// Winding number by solid angles over all triangles: slow, and independent of the library.
+inline double winding_number(const TriangleMesh& mesh, const Eigen::Vector3d& x) {
+  double sum = 0;
+  for (const auto& t : mesh.triangles) {
+    const Eigen::Vector3d a = mesh.vertices[t[0]] - x, b = mesh.vertices[t[1]] - x,
+                          c = mesh.vertices[t[2]] - x;
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    sum +=
+        std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return sum / (2 * std::numbers::pi);
+}
+
+/// For surfaces that do not cross and meshes of one component: does either solid hold the other?
+inline bool one_holds_the_other(const ContactCase& c) {
+  const Eigen::Isometry3d b_to_a = to_isometry(c.pose_b);
+  const Eigen::Vector3d of_b = b_to_a * (c.b->scale * c.b->closed->mesh.vertices.front());
+  const Eigen::Vector3d of_a =
+      b_to_a.inverse() * (c.a->scale * c.a->closed->mesh.vertices.front()) / c.b->scale;
+  return winding_number(c.a->closed->mesh, of_b / c.a->scale) > 0.5 ||
+         winding_number(c.b->closed->mesh, of_a) > 0.5;
+}
+
+/// Random places of B about A. A third of them has B small, perhaps held. For meshes of one
+/// component that do not cross themselves; FCL decides what is known of a case.
+class RandomContacts {
+ public:
+  /// `size_b`: B's diagonal over A's.
+  RandomContacts(Model& a, Model& b, double size_b, unsigned seed)
+      : a_(a),
+        b_(b),
+        scale_(size_b * a.bounds().diagonal().norm() / b.bounds().diagonal().norm()),
+        random_(seed) {}
+
+  ContactCase next() {
+    ContactCase c;
+    const bool is_small = count_ % 3 == 0;
+    c.name = "pose " + std::to_string(count_++);
+    c.a = &a_.at(1);
+    c.b = &b_.at(is_small ? 0.1 * scale_ : scale_);
+    const Eigen::AlignedBox3d &box_a = a_.bounds(), &box_b = b_.bounds();
+    const double w = around(), x = around(), y = around(), z = around();
+    const Eigen::Quaterniond q = Eigen::Quaterniond(w, x, y, z).normalized();
+    // B's box centre falls somewhere in A's box, grown by half of B's diagonal unless B is small.
+    const double grow = is_small ? 0 : 0.5 * scale_ * box_b.diagonal().norm();
+    const Eigen::Vector3d share(uniform(), uniform(), uniform());
+    const Eigen::Vector3d target =
+        box_a.min() - Eigen::Vector3d::Constant(grow) +
+        share.cwiseProduct(box_a.sizes() + Eigen::Vector3d::Constant(2 * grow));
+    const Eigen::Vector3d t = target - q * (c.b->scale * box_b.center());
+    c.pose_b = {{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}};
+    const MeshContacts contacts = fcl_contacts(c.a->fcl, {}, c.b->fcl, c.pose_b);
+    if (contacts.any()) {
+      c.exit = contacts.push_b.normalized();
+    } else {
+      c.surface_distance = fcl_distance(c.a->fcl, {}, c.b->fcl, c.pose_b);
+      c.held = one_holds_the_other(c);
+    }
+    return c;
+  }
+
+ private:
+  double uniform() { return double(random_() >> 11) * 0x1p-53; }
+  double around() { return 2 * uniform() - 1; }
+
+  Model &a_, &b_;
+  double scale_;
+  std::mt19937_64 random_;
+  int count_ = 0;
+};
+
+}  // namespace ist::testing
