@@ -32,10 +32,24 @@ AssetHeader describe_bake(const ClosedMesh& mesh, const MeshSolid& solid,
   header.asked_epsilon = settings.epsilon;
   header.asked_seed = settings.seed;
   header.asked_grid = static_cast<std::uint32_t>(settings.grid);
+  header.asked_grid_start = settings.grids.start;
+  header.asked_grid_resolution = settings.grids.resolution;
+  header.asked_grid_refinements = settings.grids.refinements;
+  header.asked_grid_rounds = settings.grids.rounds_per_level;
   header.stop_reason = static_cast<std::uint32_t>(packing.stop);
   header.kept_ratio_worst = packing.kept_ratio_worst;
   header.kept_ratio_median = packing.kept_ratio_median;
   return header;
+}
+
+/// Spheres of each level of detail, the finest first: a quarter of the one before, as long as
+/// there are enough to tell the solid's parts apart.
+std::vector<std::size_t> detail_counts(std::size_t spheres) {
+  constexpr std::size_t kFewest = 250;
+  std::vector<std::size_t> counts = {spheres};
+  for (std::uint32_t i = 1; i <= kMaxDetails && detail_spheres(spheres, i) >= kFewest; ++i)
+    counts.push_back(detail_spheres(spheres, i));
+  return counts;
 }
 
 /// Waits for a group's tasks whichever way a scope is left. A group that is left alone would be
@@ -84,21 +98,32 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   const auto cluster_matched = [&] {
     arrays.matched_tree = build_tree(arrays.effective_spheres, {});
   };
+  const auto cluster_details = [&] {
+    for (DetailArrays& detail : arrays.details)
+      detail.matched_tree = build_tree(detail.effective_spheres, {});
+  };
   thread_arena(settings.threads).execute([&] {
     // While the GPU calibrates, the CPU clusters. A CPU alone has its threads full either way.
     tbb::task_group trees;
     const WaitAtEnd wait(trees);
     if (gpu) trees.run(order_inner);
-    Calibration calibration =
-        calibrate(solid, packing.spheres, settings.threads, progress, gpu.get());
-    arrays.effective_spheres = std::move(calibration.effective);
-    arrays.header.protrusion = calibration.protrusion;
-    if (gpu) trees.run(cluster_matched);
+    std::vector<Calibration> details =
+        calibrate_prefixes(solid, packing.spheres, detail_counts(packing.spheres.size()),
+                           settings.threads, progress, gpu.get());
+    arrays.effective_spheres = std::move(details.front().effective);
+    arrays.header.protrusion = details.front().protrusion;
+    for (std::size_t i = 1; i < details.size(); ++i)
+      arrays.details.push_back({std::move(details[i].effective), details[i].protrusion, {}});
+    if (gpu) {
+      trees.run(cluster_matched);
+      trees.run(cluster_details);
+    }
     arrays.cover_radii = cover_radii(solid, packing.spheres, settings.threads, progress, gpu.get());
     report_tree(progress, packing.spheres.size(), 0);
     if (!gpu) {
       trees.run(order_inner);
       trees.run(cluster_matched);
+      trees.run(cluster_details);
     }
     trees.wait();
     arrays.inner_tree =

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <optional>
 
 #include <ist/error.h>
@@ -71,10 +72,79 @@ double largest_protrusion(const MeshSolid& solid, std::span<const Sphere4> balls
   return std::max(0.0, *std::max_element(out.begin(), out.end()));
 }
 
+/// Calibrates prefixes of a packing; holds what is made of the solid for all of them.
+class Calibrator {
+ public:
+  Calibrator(const MeshSolid& solid, unsigned threads, gpu::MeshOnGpu* gpu)
+      : solid_(solid), arena_(thread_arena(threads)), gpu_(gpu), turned_gpu_(gpu) {
+    // The cells are found in the frame of the turned solid.
+    arena_.execute([&] { turned_.emplace(solid); });
+    if (gpu == nullptr || &turned_->solid() == &solid) return;
+    own_gpu_ = std::make_unique<gpu::MeshOnGpu>(turned_->solid(), gpu->settings());
+    turned_gpu_ = own_gpu_.get();
+  }
+
+  Calibration run(std::span<const Sphere> inner, const std::function<void(double)>& report) {
+    const double volume = turned_->solid().unit_volume();
+    const double mean_radius = radius_of(volume / static_cast<double>(inner.size()));
+    std::vector<PowerSite> sites;
+    for (const Sphere& s : inner) {
+      const Eigen::Vector3d x = turned_->turn({s.x, s.y, s.z});
+      const double radius = s.r / turned_->scale();
+      sites.push_back({x.x(), x.y(), x.z(), radius * radius});
+    }
+    RelaxedSites relaxed = relax(sites, mean_radius, volume, report);
+    std::vector<double> shares = std::move(relaxed.shares);
+    if (shares.empty()) {
+      shares = inflated_shares(inner);
+    } else {
+      sites = std::move(relaxed.sites);
+    }
+
+    Calibration result;
+    result.effective.resize(inner.size());
+    for (std::size_t k = 0; k < sites.size(); ++k) {
+      const double radius = shares[k] > 0 ? radius_of(shares[k] * solid_.unit_volume())
+                                          : kEmptyCellRadius * mean_radius * turned_->scale();
+      const Eigen::Vector3d x = turned_->turn_back({sites[k].x, sites[k].y, sites[k].z});
+      result.effective[k] = {static_cast<float>(x.x()), static_cast<float>(x.y()),
+                             static_cast<float>(x.z()), static_cast<float>(radius)};
+    }
+    if (gpu_ != nullptr) {
+      result.protrusion = gpu_->largest_protrusion(result.effective);
+    } else {
+      arena_.execute([&] { result.protrusion = largest_protrusion(solid_, result.effective); });
+    }
+    return result;
+  }
+
+ private:
+  RelaxedSites relax(const std::vector<PowerSite>& sites, double mean_radius, double volume,
+                     const std::function<void(double)>& report) {
+    ColumnPlan plan;
+    arena_.execute([&] {
+      plan = plan_columns(turned_->solid(), kStep * mean_radius, kMinColumns,
+                          kMinColumns + kColumnsPerSphere * static_cast<double>(sites.size()));
+    });
+    if (gpu_ != nullptr) return turned_gpu_->relax_sites(plan, sites, volume, report);
+    RelaxedSites relaxed;
+    arena_.execute([&] { relaxed = relax_sites(turned_->solid(), plan, sites, volume, report); });
+    return relaxed;
+  }
+
+  const MeshSolid& solid_;
+  tbb::task_arena arena_;
+  gpu::MeshOnGpu* const gpu_;
+  std::optional<TurnedSolid> turned_;
+  std::unique_ptr<gpu::MeshOnGpu> own_gpu_;  ///< null where the solid is not turned
+  gpu::MeshOnGpu* turned_gpu_;
+};
+
 }  // namespace
 
-Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, unsigned threads,
-                      const ProgressCallback& progress, gpu::MeshOnGpu* gpu) {
+std::vector<Calibration> calibrate_prefixes(const MeshSolid& solid, std::span<const Sphere> inner,
+                                            std::span<const std::size_t> counts, unsigned threads,
+                                            const ProgressCallback& progress, gpu::MeshOnGpu* gpu) {
   if (inner.empty()) throw Error("calibration: no inner spheres");
   const auto start = std::chrono::steady_clock::now();
   const auto report = [&](double fraction) {
@@ -86,60 +156,26 @@ Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, uns
     now.elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!progress(now)) throw Error("calibration: cancelled");
   };
-  tbb::task_arena arena = thread_arena(threads);
-
-  // The cells are found in the frame of the turned solid.
   report(0);
-  std::optional<TurnedSolid> turned_solid;
-  arena.execute([&] { turned_solid.emplace(solid); });
-  const TurnedSolid& turned = *turned_solid;
-  const double volume = turned.solid().unit_volume();
-  const double mean_radius = radius_of(volume / static_cast<double>(inner.size()));
-  std::vector<PowerSite> sites;
-  for (const Sphere& s : inner) {
-    const Eigen::Vector3d x = turned.turn({s.x, s.y, s.z});
-    const double radius = s.r / turned.scale();
-    sites.push_back({x.x(), x.y(), x.z(), radius * radius});
-  }
-  ColumnPlan plan;
-  arena.execute([&] {
-    plan = plan_columns(turned.solid(), kStep * mean_radius, kMinColumns,
-                        kMinColumns + kColumnsPerSphere * static_cast<double>(inner.size()));
-  });
-  RelaxedSites relaxed;
-  const auto report_round = [&](double part) { report(0.2 + 0.8 * part); };
-  if (gpu != nullptr) {
-    std::unique_ptr<gpu::MeshOnGpu> turned_gpu;
-    if (&turned.solid() != &solid)
-      turned_gpu = std::make_unique<gpu::MeshOnGpu>(turned.solid(), gpu->settings());
-    relaxed = (turned_gpu ? *turned_gpu : *gpu).relax_sites(plan, sites, volume, report_round);
-  } else {
-    arena.execute(
-        [&] { relaxed = relax_sites(turned.solid(), plan, sites, volume, report_round); });
-  }
-  std::vector<double> shares = std::move(relaxed.shares);
-  if (shares.empty()) {
-    shares = inflated_shares(inner);
-  } else {
-    sites = std::move(relaxed.sites);
-  }
-
-  Calibration result;
-  result.effective.resize(inner.size());
-  for (std::size_t k = 0; k < sites.size(); ++k) {
-    const double radius = shares[k] > 0 ? radius_of(shares[k] * solid.unit_volume())
-                                        : kEmptyCellRadius * mean_radius * turned.scale();
-    const Eigen::Vector3d x = turned.turn_back({sites[k].x, sites[k].y, sites[k].z});
-    result.effective[k] = {static_cast<float>(x.x()), static_cast<float>(x.y()),
-                           static_cast<float>(x.z()), static_cast<float>(radius)};
-  }
-  if (gpu != nullptr) {
-    result.protrusion = gpu->largest_protrusion(result.effective);
-  } else {
-    arena.execute([&] { result.protrusion = largest_protrusion(solid, result.effective); });
+  Calibrator calibrator(solid, threads, gpu);
+  const double total =
+      static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0}));
+  double done = 0;
+  std::vector<Calibration> results;
+  for (const std::size_t count : counts) {
+    const double part = static_cast<double>(count) / total;
+    results.push_back(calibrator.run(
+        inner.first(count), [&](double of_part) { report(0.2 + 0.8 * (done + part * of_part)); }));
+    done += part;
   }
   report(1);
-  return result;
+  return results;
+}
+
+Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, unsigned threads,
+                      const ProgressCallback& progress, gpu::MeshOnGpu* gpu) {
+  const std::size_t all = inner.size();
+  return calibrate_prefixes(solid, inner, {&all, 1}, threads, progress, gpu).front();
 }
 
 }  // namespace ist

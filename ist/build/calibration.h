@@ -32,4 +32,11 @@ struct Calibration {
 Calibration calibrate(const MeshSolid& solid, std::span<const Sphere> inner, unsigned threads,
                       const ProgressCallback& progress, gpu::MeshOnGpu* gpu = nullptr);
 
+/// The same for several prefixes of the spheres, each of `counts` by itself: what is made of the
+/// solid is shared.
+std::vector<Calibration> calibrate_prefixes(const MeshSolid& solid, std::span<const Sphere> inner,
+                                            std::span<const std::size_t> counts, unsigned threads,
+                                            const ProgressCallback& progress,
+                                            gpu::MeshOnGpu* gpu = nullptr);
+
 }  // namespace ist

@@ -25,8 +25,12 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mes
   all.push_back(check_cover(asset, surface));
   append(all, check_tree(asset, asset.inner_tree, at<Sphere4>(asset, asset.inner_spheres),
                          at<float>(asset, asset.cover_radii), "inner tree"));
-  append(all, check_tree(asset, asset.matched_tree, at<Sphere4>(asset, asset.effective_spheres),
-                         nullptr, "matched tree"));
+  for (std::uint32_t i = 0; i <= asset.detail_count; ++i) {
+    const std::string name = i == 0 ? "" : "detail " + std::to_string(i) + ": ";
+    append(all, check_effective(asset, i, surface, name));
+    append(all, check_tree(asset, matched_tree(asset, i), effective_spheres(asset, i), nullptr,
+                           name + "matched tree"));
+  }
   return all;
 }
 

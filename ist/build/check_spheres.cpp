@@ -84,7 +84,6 @@ std::vector<std::vector<std::uint32_t>> overlapping_pairs(const Sphere4* spheres
 std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckSurface& surface) {
   const std::size_t n = asset.sphere_count;
   const Sphere4* inner = at<Sphere4>(asset, asset.inner_spheres);
-  const Sphere4* effective = at<Sphere4>(asset, asset.effective_spheres);
   const float* covers = at<float>(asset, asset.cover_radii);
   std::vector<Invariant> out;
 
@@ -109,24 +108,33 @@ std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckSurfac
   out.push_back(coverage.named("coverage",
                                "difference of Σ inner volumes / solid volume and the header, "
                                "above 1e-9"));
+  out.push_back(tally_all(n, [&](std::size_t i, Tally& tally) {
+                  tally.add(double{inner[i].r} - double{covers[i]}, i);
+                }).named("cover holds sphere", "radius − cover radius, unit frame"));
+  return out;
+}
+
+std::vector<Invariant> check_effective(const AssetHeader& asset, std::uint32_t detail,
+                                       const CheckSurface& surface, const std::string& name) {
+  const std::size_t n = matched_tree(asset, detail).sphere_count;
+  const Sphere4* const effective = effective_spheres(asset, detail);
+  const double protrusion =
+      detail == 0 ? asset.protrusion : at<DetailLevel>(asset, asset.details)[detail - 1].protrusion;
+  std::vector<Invariant> out;
   Tally sum;
   sum.add(std::fabs(volume_of(effective, n) / asset.volume - 1) - 1e-6, 0);
-  out.push_back(sum.named("effective volumes sum to the solid",
+  out.push_back(sum.named(name + "effective volumes sum to the solid",
                           "relative difference of Σ effective volumes and the solid, above 1e-6"));
-
   out.push_back(
       tally_all(n,
                 [&](std::size_t i, Tally& tally) {
                   const Eigen::Vector3d c = centre(effective[i]);
                   const double d = surface.distance(c, 100);
                   const double depth = surface.winding(c) >= 1 ? d : -d;
-                  tally.add(effective[i].r - depth - asset.protrusion - 1e-12, i);
+                  tally.add(effective[i].r - depth - protrusion - 1e-12, i);
                 })
-          .named("effective protrusion",
-                 "reach of an effective sphere out of the solid − the header's bound, unit frame"));
-  out.push_back(tally_all(n, [&](std::size_t i, Tally& tally) {
-                  tally.add(double{inner[i].r} - double{covers[i]}, i);
-                }).named("cover holds sphere", "radius − cover radius, unit frame"));
+          .named(name + "effective protrusion",
+                 "reach of an effective sphere out of the solid − the asset's bound, unit frame"));
   return out;
 }
 

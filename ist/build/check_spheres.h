@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -11,8 +12,12 @@
 
 namespace ist {
 
-/// Inner spheres lie in the solid and apart; effective spheres stand for it; covers hold spheres.
+/// Inner spheres lie in the solid and apart; covers hold spheres.
 std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckSurface& surface);
+
+/// The effective spheres of a detail (0: the finest) stand for the solid. Names start with `name`.
+std::vector<Invariant> check_effective(const AssetHeader& asset, std::uint32_t detail,
+                                       const CheckSurface& surface, const std::string& name);
 
 /// The header's frame and volumes are those of the mesh.
 std::vector<Invariant> check_header(const AssetHeader& asset, const CheckSurface& surface,

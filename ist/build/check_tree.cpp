@@ -231,6 +231,15 @@ std::vector<Invariant> check_tree(const AssetHeader& asset, const TreeHeader& tr
           .named(name + ": volume sums",
                  "relative difference of a node's volume and the sum below, above its rounding"));
 
+  Tally mean;
+  const double mean_volume = tree.volume_sum / static_cast<double>(n);
+  mean.add(
+      std::fabs(4 * std::numbers::pi / 3 * std::pow(tree.mean_radius, 3) / mean_volume - 1) - 1e-12,
+      0);
+  out.push_back(mean.named(name + ": mean radius",
+                           "relative difference of its ball and the mean sphere volume, above "
+                           "1e-12"));
+
   // Overlaps are found between lanes.
   std::vector<Sphere4> lanes(n);
   for (std::size_t lane = 0; lane < n; ++lane) lanes[lane] = check.sphere(lane);

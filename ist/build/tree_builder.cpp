@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "build/bounding_ball.h"
+#include "build/cube_root.h"
 #include "build/overlap_bound.h"
 #include "build/tree_order.h"
 
@@ -166,6 +167,7 @@ TreeArrays tree_from_order(std::span<const Sphere4> spheres, std::span<const flo
   tree.root[3] = root.r;
   if (!covers.empty()) tree.root_cover = cover_about(root, sorted, sorted_covers);
   for (const Sphere4& s : spheres) tree.volume_sum += volume_of(std::array{to_ball(s)});
+  tree.mean_radius = cube_root(tree.volume_sum / static_cast<double>(n) * 0.75 / std::numbers::pi);
   tree.overlap = kappa.back().front();
   return tree;
 }

@@ -4,12 +4,19 @@
 // memory and the device buffer are the same bytes. Offsets count bytes from the start of the file
 // and are multiples of 64; 0 means the array is absent. Unused bytes are zero.
 //
-//   AssetHeader                       832 B
+//   AssetHeader                       960 B
+//   details                           DetailLevel[d]
 //   inner spheres                     Sphere4[n]   centre and radius, insertion (greedy) order
 //   cover radii                       float[n]     the solid lies in ∪ B(inner centre, cover)
 //   effective spheres                 Sphere4[n]   centre and radius of the matched set, same order
 //   inner tree                        as below
 //   matched tree                      as below, without sphere covers
+//   for each detail i = 1 … d, of m = ⌊n / 4^i⌋ spheres
+//     effective spheres               Sphere4[m]   the matched set of the first m inner spheres
+//     matched tree                    as below, without sphere covers
+//
+// The matched set of all n inner spheres is detail 0 and stands in AssetHeader; the coarser ones
+// are what a query may answer from instead (detail_chain.h).
 //
 // A tree, with m(k) = ⌈n / 16^(k+1)⌉ blocks at level k, up to the first level of one block:
 //
@@ -21,7 +28,7 @@
 // A tree is implicit and kWidth wide. Level 0 holds the spheres, sixteen to a block; lane l of
 // block b at level k + 1 is a ball around the spheres below block 16 b + l of level k. Every block
 // but the last of each level is full. Sections follow each other in this order without a gap but
-// the padding to 64 bytes, so that n alone gives every offset (place_sections).
+// the padding to 64 bytes, so that n and d alone give every offset (place_sections).
 //
 // Centres of spheres and balls are floats of the unit frame. A block's origin is chosen so that the
 // difference of every centre in it and the origin is a float too: origin + offset is the centre
@@ -33,11 +40,15 @@
 namespace ist {
 
 inline constexpr std::uint32_t kFormatMajor = 0;
-inline constexpr std::uint32_t kFormatMinor = 1;
+inline constexpr std::uint32_t kFormatMinor = 2;
 inline constexpr char kAssetMagic[8] = {'I', 'S', 'T', 'R', 'E', 'E', '\r', '\n'};
 inline constexpr std::size_t kAssetAlignment = 64;
-inline constexpr std::uint32_t kWidth = 16;     ///< balls in a block
-inline constexpr std::uint32_t kMaxLevels = 7;  ///< 16^7 spheres
+inline constexpr std::uint32_t kWidth = 16;       ///< balls in a block
+inline constexpr std::uint32_t kMaxLevels = 7;    ///< 16^7 spheres
+inline constexpr std::uint32_t kMaxDetails = 10;  ///< coarser matched sets of an asset
+/// Classes of overlap by which errors are predicted, from the whole of the smaller solid down:
+/// contained, then parts of its volume down to 0.1, 0.01, 0.001 and 0.0001.
+inline constexpr std::uint32_t kOverlapClasses = 5;
 /// Radius and cover radius of an unused lane: no distance makes it overlap anything.
 inline constexpr float kEmptyRadius = -1e30f;
 /// No coordinate, offset or radius of a checked asset is larger than this, unit frame.
@@ -94,11 +105,20 @@ struct TreeHeader {
   double root[4] = {};            ///< bounding ball of all spheres: centre, radius; unit frame
   double root_cover = 0;          ///< as NodeBlock::cover, about the root's centre
   double volume_sum = 0;          ///< Σ of sphere volumes in insertion order, unit frame
+  double mean_radius = 0;         ///< of the ball of the mean sphere volume, unit frame
   float overlap = 1;              ///< κ of the whole tree
   std::uint32_t reserved = 0;
   LevelHeader level[kMaxLevels];
 };
-static_assert(sizeof(TreeHeader) == 304);
+static_assert(sizeof(TreeHeader) == 312);
+
+/// A matched set of fewer spheres: a prefix of the greedy order, calibrated by itself (DESIGN 5).
+struct DetailLevel {
+  std::uint64_t effective_spheres = 0;  ///< offset of Sphere4[matched_tree.sphere_count]
+  double protrusion = 0;                ///< as AssetHeader::protrusion
+  TreeHeader matched_tree;
+};
+static_assert(sizeof(DetailLevel) == 328);
 
 struct alignas(64) AssetHeader {
   char magic[8] = {};
@@ -125,19 +145,30 @@ struct alignas(64) AssetHeader {
   double asked_epsilon = 0;
   std::uint64_t asked_seed = 0;
   std::uint32_t asked_grid = 0;
+  std::uint32_t asked_grid_start = 0;  ///< GridSettings, as are the next three
+  std::uint32_t asked_grid_resolution = 0;
+  std::int32_t asked_grid_refinements = 0;
+  std::uint32_t asked_grid_rounds = 0;
   std::uint32_t stop_reason = 0;
 
   std::uint64_t inner_spheres = 0;      ///< offset of Sphere4[sphere_count]
   std::uint64_t cover_radii = 0;        ///< offset of float[sphere_count]
   std::uint64_t effective_spheres = 0;  ///< offset of Sphere4[sphere_count]
+  std::uint64_t details = 0;            ///< offset of DetailLevel[detail_count]
+  std::uint32_t detail_count = 0;       ///< coarser matched sets, ≤ kMaxDetails
+  std::uint32_t predicted_poses = 0;    ///< behind predicted_error; 0: no prediction
+  /// Median relative error of the volume in each class of overlap, of two copies of the solid.
+  double predicted_error[kOverlapClasses] = {};
+  double asked_error = 0;       ///< relative error asked for; 0: none
+  double asked_at_overlap = 0;  ///< part of the solid's volume where it was asked for
   TreeHeader inner_tree;
   TreeHeader matched_tree;
 
   double kept_ratio_worst = 0;   ///< SpherePacking's: inserted radius over the largest live bound
   double kept_ratio_median = 0;  ///< likewise
-  std::uint64_t reserved[3] = {};
+  std::uint64_t reserved[6] = {};
 };
-static_assert(sizeof(AssetHeader) == 832);
+static_assert(sizeof(AssetHeader) == 960);
 
 inline constexpr std::uint32_t kFlagRepaired = 1u << 0;    ///< the mesh was open and repaired
 inline constexpr std::uint32_t kFlagBelowNoise = 1u << 1;  ///< greedy order ends under float noise
@@ -173,22 +204,48 @@ constexpr void place_tree(TreeHeader& tree, bool with_covers, std::uint64_t& end
 /// Most spheres an asset holds: kMaxLevels levels.
 inline constexpr std::uint64_t kMaxSpheres = std::uint64_t{1} << (4 * kMaxLevels);
 
-/// Sets every offset, count and the file size from `sphere_count` in [1, kMaxSpheres].
-constexpr void place_sections(AssetHeader& header) noexcept {
+/// Spheres of detail i of an asset of n spheres.
+constexpr std::uint64_t detail_spheres(std::uint64_t n, std::uint32_t i) noexcept {
+  return n >> (2 * i);
+}
+
+/// Sets every offset, count and the file size from `sphere_count` in [1, kMaxSpheres] and
+/// `detail_count`, all of whose sets must have a sphere; `details` are those of the file.
+constexpr void place_sections(AssetHeader& header, DetailLevel* details) noexcept {
   const std::uint64_t n = header.sphere_count;
   std::uint64_t end = sizeof(AssetHeader);
+  header.details =
+      header.detail_count > 0 ? detail::take<DetailLevel>(end, header.detail_count) : 0;
   header.inner_spheres = detail::take<Sphere4>(end, n);
   header.cover_radii = detail::take<float>(end, n);
   header.effective_spheres = detail::take<Sphere4>(end, n);
   header.inner_tree.sphere_count = header.matched_tree.sphere_count = static_cast<std::uint32_t>(n);
   detail::place_tree(header.inner_tree, true, end);
   detail::place_tree(header.matched_tree, false, end);
+  for (std::uint32_t i = 0; i < header.detail_count; ++i) {
+    const std::uint64_t m = detail_spheres(n, i + 1);
+    details[i].effective_spheres = detail::take<Sphere4>(end, m);
+    details[i].matched_tree.sphere_count = static_cast<std::uint32_t>(m);
+    detail::place_tree(details[i].matched_tree, false, end);
+  }
   header.file_bytes = end;
 }
 
 template <class T>
 const T* at(const AssetHeader& header, std::uint64_t offset) noexcept {
   return reinterpret_cast<const T*>(reinterpret_cast<const std::byte*>(&header) + offset);
+}
+
+/// The matched tree of a detail in [0, detail_count], 0 the finest.
+inline const TreeHeader& matched_tree(const AssetHeader& asset, std::uint32_t detail) noexcept {
+  return detail == 0 ? asset.matched_tree
+                     : at<DetailLevel>(asset, asset.details)[detail - 1].matched_tree;
+}
+
+inline const Sphere4* effective_spheres(const AssetHeader& asset, std::uint32_t detail) noexcept {
+  return at<Sphere4>(
+      asset, detail == 0 ? asset.effective_spheres
+                         : at<DetailLevel>(asset, asset.details)[detail - 1].effective_spheres);
 }
 
 }  // namespace ist

@@ -1,6 +1,7 @@
 #include <ist/query.h>
 
 #include "query/descent.h"
+#include "query/detail_blend.h"
 
 namespace ist {
 
@@ -12,6 +13,8 @@ Penetration penetration(const PlacedTree& a, const PlacedTree& b, const QuerySet
     refused.status = QueryStatus::invalid_pose;
     return refused;
   }
+  if (settings.pair_budget > 0 && settings.measure == Measure::matched)
+    return blend_details(a, b, *pose, settings, workspace);
   const SphereTree tree_a = sphere_tree(a.tree, settings.measure);
   const SphereTree tree_b = sphere_tree(b.tree, settings.measure);
   Descent descent(tree_a, tree_b, *pose, settings, workspace.impl());

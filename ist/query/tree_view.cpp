@@ -43,10 +43,10 @@ bool sound_nodes(const NodeBlock& nodes, std::uint64_t used, bool covers) noexce
   return sound;
 }
 
-bool sound_spheres(const AssetHeader& header, std::uint64_t offset) noexcept {
+bool sound_spheres(const AssetHeader& header, std::uint64_t offset, std::uint64_t count) noexcept {
   const Sphere4* spheres = at<Sphere4>(header, offset);
   bool sound = true;
-  for (std::uint64_t i = 0; i < header.sphere_count; ++i)
+  for (std::uint64_t i = 0; i < count; ++i)
     sound &= is_offset(spheres[i].x) && is_offset(spheres[i].y) && is_offset(spheres[i].z) &&
              is_radius(spheres[i].r);
   return sound;
@@ -56,7 +56,8 @@ bool sound_tree(const AssetHeader& header, const TreeHeader& tree) noexcept {
   const bool covers = tree.sphere_cover != 0;
   bool sound = is_offset(tree.root[0]) && is_offset(tree.root[1]) && is_offset(tree.root[2]) &&
                is_radius(tree.root[3]) && is_radius(tree.root_cover) &&
-               is_finite_sum(tree.volume_sum) && in_range(tree.overlap, 1, kMaxSpheres);
+               is_finite_sum(tree.volume_sum) && is_radius(tree.mean_radius) &&
+               in_range(tree.overlap, 1, kMaxSpheres);
 
   const std::uint32_t* index = at<std::uint32_t>(header, tree.sphere_index);
   const std::uint64_t lanes = std::uint64_t{kWidth} * tree.level[0].count;
@@ -84,18 +85,29 @@ bool sound_tree(const AssetHeader& header, const TreeHeader& tree) noexcept {
   return sound;
 }
 
-/// Offsets and counts are a function of the sphere count: nothing else is accepted.
+/// Offsets and counts are a function of the counts of spheres and details: nothing else is
+/// accepted.
 bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
   if (header.sphere_count < 1 || header.sphere_count > kMaxSpheres) return false;
+  if (header.detail_count > kMaxDetails) return false;
+  if (detail_spheres(header.sphere_count, header.detail_count) < 1) return false;
   AssetHeader expected;
+  DetailLevel details[kMaxDetails];
   expected.sphere_count = header.sphere_count;
-  place_sections(expected);
+  expected.detail_count = header.detail_count;
+  place_sections(expected, details);
   const auto same_tree = [](const TreeHeader& a, const TreeHeader& b) {
     return a.sphere_index == b.sphere_index && a.sphere_cover == b.sphere_cover &&
            a.sphere_count == b.sphere_count && a.level_count == b.level_count &&
            std::memcmp(a.level, b.level, sizeof(a.level)) == 0;
   };
-  return expected.file_bytes == bytes && expected.inner_spheres == header.inner_spheres &&
+  if (expected.file_bytes != bytes || expected.details != header.details) return false;
+  const DetailLevel* const found = at<DetailLevel>(header, header.details);
+  for (std::uint32_t i = 0; i < header.detail_count; ++i)
+    if (details[i].effective_spheres != found[i].effective_spheres ||
+        !same_tree(details[i].matched_tree, found[i].matched_tree))
+      return false;
+  return expected.inner_spheres == header.inner_spheres &&
          expected.cover_radii == header.cover_radii &&
          expected.effective_spheres == header.effective_spheres &&
          same_tree(expected.inner_tree, header.inner_tree) &&
@@ -112,9 +124,18 @@ bool sound_values(const AssetHeader& header) noexcept {
   const float* covers = at<float>(header, header.cover_radii);
   for (std::uint64_t i = 0; i < header.sphere_count; ++i)
     if (!is_radius(covers[i])) return false;
-  return sound_spheres(header, header.inner_spheres) &&
-         sound_spheres(header, header.effective_spheres) && sound_tree(header, header.inner_tree) &&
-         sound_tree(header, header.matched_tree);
+  for (const double error : header.predicted_error)
+    if (!is_finite_sum(error)) return false;
+  const DetailLevel* const details = at<DetailLevel>(header, header.details);
+  for (std::uint32_t i = 0; i < header.detail_count; ++i) {
+    const TreeHeader& tree = details[i].matched_tree;
+    if (!is_radius(details[i].protrusion) || !sound_tree(header, tree) ||
+        !sound_spheres(header, details[i].effective_spheres, tree.sphere_count))
+      return false;
+  }
+  return sound_spheres(header, header.inner_spheres, header.sphere_count) &&
+         sound_spheres(header, header.effective_spheres, header.sphere_count) &&
+         sound_tree(header, header.inner_tree) && sound_tree(header, header.matched_tree);
 }
 
 }  // namespace

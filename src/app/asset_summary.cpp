@@ -17,7 +17,18 @@ nlohmann::ordered_json tree_json(const TreeHeader& tree, double scale) {
           {"levels", tree.level_count},
           {"volume_sum", tree.volume_sum * scale * scale * scale},
           {"root_radius", tree.root[3] * scale},
+          {"mean_radius", tree.mean_radius * scale},
           {"overlap", tree.overlap}};
+}
+
+nlohmann::ordered_json details_json(const AssetHeader& h, double scale) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (std::uint32_t i = 1; i <= h.detail_count; ++i) {
+    const DetailLevel& detail = at<DetailLevel>(h, h.details)[i - 1];
+    list.push_back({{"protrusion", detail.protrusion * scale},
+                    {"matched_tree", tree_json(detail.matched_tree, scale)}});
+  }
+  return list;
 }
 
 }  // namespace
@@ -40,6 +51,12 @@ std::string describe_asset(const TreeView& tree) {
                             h.centre[1], h.centre[2], h.exponent));
   line("soft skin", fmt::format("{:.4g} u: no effective sphere sticks further out of the solid",
                                 h.protrusion * scale));
+  for (std::uint32_t i = 1; i <= h.detail_count; ++i) {
+    const DetailLevel& detail = at<DetailLevel>(h, h.details)[i - 1];
+    line("detail",
+         fmt::format("{} spheres, soft skin {:.4g} u", grouped(detail.matched_tree.sphere_count),
+                     detail.protrusion * scale));
+  }
   line("asked", fmt::format("{} spheres, coverage {:g}, min radius {:g} u, epsilon {:g}, grid {}, "
                             "seed {}",
                             h.asked_spheres == 0 ? "unlimited" : grouped(h.asked_spheres),
@@ -79,9 +96,14 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
         {"min_radius", h.asked_min_radius},
         {"epsilon", h.asked_epsilon},
         {"grid", name_of(static_cast<GridMode>(h.asked_grid))},
+        {"grid_start", h.asked_grid_start},
+        {"grid_resolution", h.asked_grid_resolution},
+        {"grid_refinements", h.asked_grid_refinements},
+        {"grid_rounds", h.asked_grid_rounds},
         {"seed", h.asked_seed}}},
       {"inner_tree", tree_json(h.inner_tree, scale)},
       {"matched_tree", tree_json(h.matched_tree, scale)},
+      {"details", details_json(h, scale)},
   };
 }
 

@@ -9,7 +9,9 @@
 #include "app/commands.h"
 #include "app/exported_spheres.h"
 #include "app/interrupt.h"
+#include "app/number_checks.h"
 #include "asset/atomic_file.h"
+#include "query/asset_layout.h"
 
 namespace ist::app {
 namespace {
@@ -17,11 +19,16 @@ namespace {
 struct ExportOptions {
   std::string asset;
   std::filesystem::path output;
+  std::uint32_t detail = 0;
 };
 
 void run_export(const ExportOptions& options) {
   const Asset asset = Asset::load(options.asset);
-  const std::vector<ExportedSphere> spheres = exported_spheres(asset.view());
+  const std::uint32_t details = asset.view().header().detail_count;
+  if (options.detail > details)
+    throw Error(fmt::format("{}: it has {} coarser levels of detail, not {}", options.asset,
+                            details, options.detail));
+  const std::vector<ExportedSphere> spheres = exported_spheres(asset.view(), options.detail);
   const std::string extension = options.output.extension().string();
   const InterruptGuard guard;
   if (extension == ".csv") return write_atomically(options.output, spheres_csv(spheres));
@@ -40,6 +47,11 @@ void add_export(CLI::App& app) {
   command->add_option("ASSET", options->asset, "An .ist file")->required();
   command->add_option("-o,--output", options->output, "The .csv, .ply or .json file to write")
       ->required();
+  command
+      ->add_option("--detail", options->detail,
+                   "0: all spheres; i: the i-th coarser level of detail")
+      ->check(is_count)
+      ->capture_default_str();
   command->footer(
       "A row a sphere, in greedy order, in the mesh's own unit and frame: x,y,z,r the inner "
       "sphere\n"

@@ -61,13 +61,13 @@ std::string joined_columns(const char* before, const char* between, const char* 
 
 }  // namespace
 
-std::vector<ExportedSphere> exported_spheres(const TreeView& tree) {
+std::vector<ExportedSphere> exported_spheres(const TreeView& tree, std::uint32_t detail) {
   const AssetHeader& header = tree.header();
   const double scale = std::ldexp(1.0, header.exponent);
   const Sphere4* const inner = at<Sphere4>(header, header.inner_spheres);
-  const Sphere4* const effective = at<Sphere4>(header, header.effective_spheres);
+  const Sphere4* const effective = effective_spheres(header, detail);
   const float* const cover = at<float>(header, header.cover_radii);
-  std::vector<ExportedSphere> result(header.sphere_count);
+  std::vector<ExportedSphere> result(matched_tree(header, detail).sphere_count);
   for (std::size_t i = 0; i < result.size(); ++i) {
     const Moved moved = to_mesh_frame(inner[i], header.centre, scale);
     const double radius = inner[i].r * scale, cover_radius = cover[i] * scale;

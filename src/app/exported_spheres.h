@@ -18,7 +18,9 @@ struct ExportedSphere {
   double cover_radius = 0;           ///< [u] about `centre`, rounded up
 };
 
-std::vector<ExportedSphere> exported_spheres(const TreeView& tree);
+/// Those of a detail in [0, header().detail_count]: the first of the inner spheres, with the
+/// effective spheres that stand for them.
+std::vector<ExportedSphere> exported_spheres(const TreeView& tree, std::uint32_t detail);
 
 // Text of a whole file: columns x,y,z,r,ex,ey,ez,er,c, 17 digits.
 std::string spheres_csv(std::span<const ExportedSphere> spheres);

@@ -119,6 +119,12 @@ void add_query(CLI::App& app) {
       ->check(CLI::IsMember({"matched", "inner"}))
       ->default_str("matched");
   command
+      ->add_option("--pair-budget", options->settings.pair_budget,
+                   "Answer from the level of detail that needs about so many sphere pairs, "
+                   "0 = from the finest")
+      ->check(is_count)
+      ->capture_default_str();
+  command
       ->add_option("--max-visits", options->settings.max_visits,
                    "Stop a query after so many node pairs, 0 = no limit")
       ->check(is_count)

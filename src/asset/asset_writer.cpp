@@ -40,6 +40,7 @@ void fill_scalars(TreeHeader& header, const TreeArrays& tree) {
   std::memcpy(header.root, tree.root, sizeof(header.root));
   header.root_cover = tree.root_cover;
   header.volume_sum = tree.volume_sum;
+  header.mean_radius = tree.mean_radius;
   header.overlap = tree.overlap;
 }
 
@@ -50,10 +51,17 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
   header.sphere_count = arrays.inner_spheres.size();
   if (header.sphere_count < 1 || header.sphere_count > kMaxSpheres)
     throw Error("asset: it must hold at least one sphere and at most 16^7");
+  if (arrays.details.size() > kMaxDetails) throw Error("asset: too many levels of detail");
+  header.detail_count = static_cast<std::uint32_t>(arrays.details.size());
+  std::vector<DetailLevel> details(arrays.details.size());
   std::memcpy(header.magic, kAssetMagic, sizeof(kAssetMagic));
-  place_sections(header);
+  place_sections(header, details.data());
   fill_scalars(header.inner_tree, arrays.inner_tree);
   fill_scalars(header.matched_tree, arrays.matched_tree);
+  for (std::size_t i = 0; i < details.size(); ++i) {
+    details[i].protrusion = arrays.details[i].protrusion;
+    fill_scalars(details[i].matched_tree, arrays.details[i].matched_tree);
+  }
 
   std::vector<std::byte> bytes(header.file_bytes, std::byte{0});
   std::memcpy(bytes.data(), &header, sizeof(header));
@@ -63,6 +71,13 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
   writer.write(header.effective_spheres, arrays.effective_spheres, header.sphere_count);
   writer.write(header.inner_tree, arrays.inner_tree);
   writer.write(header.matched_tree, arrays.matched_tree);
+  writer.write(header.details, details, header.detail_count);
+  for (std::size_t i = 0; i < details.size(); ++i) {
+    const TreeHeader& tree = details[i].matched_tree;
+    writer.write(details[i].effective_spheres, arrays.details[i].effective_spheres,
+                 tree.sphere_count);
+    writer.write(tree, arrays.details[i].matched_tree);
+  }
   seal(bytes);
   return bytes;
 }

@@ -20,10 +20,18 @@ struct TreeArrays {
   std::vector<std::uint32_t> sphere_index;  ///< [16 · blocks of level 0]
   std::vector<float> sphere_cover;          ///< the same length; empty in the matched tree
   std::vector<TreeLevelArrays> levels;
-  double root[4] = {};    ///< centre, radius; unit frame
-  double root_cover = 0;  ///< unit frame
-  double volume_sum = 0;  ///< unit frame
-  float overlap = 1;      ///< κ
+  double root[4] = {};     ///< centre, radius; unit frame
+  double root_cover = 0;   ///< unit frame
+  double volume_sum = 0;   ///< unit frame
+  double mean_radius = 0;  ///< unit frame
+  float overlap = 1;       ///< κ
+};
+
+/// A coarser matched set.
+struct DetailArrays {
+  std::vector<Sphere4> effective_spheres;
+  double protrusion = 0;  ///< unit frame
+  TreeArrays matched_tree;
 };
 
 /// What an asset is made of.
@@ -34,6 +42,7 @@ struct AssetArrays {
   std::vector<Sphere4> effective_spheres;  ///< the same length
   TreeArrays inner_tree;
   TreeArrays matched_tree;
+  std::vector<DetailArrays> details;  ///< the i-th from 1 of ⌊n / 4^i⌋ spheres
 };
 
 /// The bytes of the asset. Throws Error unless the arrays' lengths fit each other.

@@ -209,7 +209,7 @@ TEST(AssetBytes, CheckEndsOnHostileAssets) {
 
 // Each field the query stands on is looked at by name too: chance may miss one.
 TEST(AssetBytes, EveryOffsetAndCountIsLookedAt) {
-  const auto bytes = small_asset(40);
+  const auto bytes = small_asset(40, 1);
   const auto tree_fields = [](std::size_t tree) {
     std::vector<std::size_t> fields = {
         tree + offsetof(TreeHeader, sphere_index), tree + offsetof(TreeHeader, sphere_cover),
@@ -229,6 +229,14 @@ TEST(AssetBytes, EveryOffsetAndCountIsLookedAt) {
   for (const std::size_t tree :
        {offsetof(AssetHeader, inner_tree), offsetof(AssetHeader, matched_tree)})
     for (const std::size_t field : tree_fields(tree)) fields.push_back(field);
+  fields.push_back(offsetof(AssetHeader, details));
+  fields.push_back(offsetof(AssetHeader, detail_count));
+  AssetHeader header;
+  std::memcpy(&header, bytes.data(), sizeof(header));
+  const std::size_t first_detail = header.details;
+  fields.push_back(first_detail + offsetof(DetailLevel, effective_spheres));
+  for (const std::size_t field : tree_fields(first_detail + offsetof(DetailLevel, matched_tree)))
+    fields.push_back(field);
   for (const std::size_t field : fields)
     for (const int change : {-64, -16, -1, 1, 16, 64}) {
       AlignedBytes changed(bytes);
@@ -273,6 +281,31 @@ TEST(AssetBytes, ValuesOutOfRangeAreRefused) {
     refused(tree.level[1].nodes + offsetof(NodeBlock, overlap), 0.5f);
   }
   refused(header.inner_tree.sphere_cover, -0.5f);
+}
+
+TEST(AssetBytes, DetailsAreLookedAt) {
+  const auto bytes = small_asset(200, 2);
+  const AlignedBytes sound(bytes);
+  ASSERT_EQ(sound.status(), AssetStatus::ok);
+  const auto& header = *reinterpret_cast<const AssetHeader*>(sound.span().data());
+  const auto refused = [&](std::uint64_t offset, auto value) {
+    AlignedBytes changed(bytes);
+    std::memcpy(&changed[offset], &value, sizeof(value));
+    changed.seal();
+    EXPECT_EQ(changed.status(), AssetStatus::corrupt_layout) << offset << " " << value;
+  };
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  refused(offsetof(AssetHeader, detail_count), kMaxDetails + 1);
+  refused(offsetof(AssetHeader, predicted_error), kNan);
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    const std::uint64_t detail = header.details + i * sizeof(DetailLevel);
+    refused(detail + offsetof(DetailLevel, protrusion), -1.0);
+    refused(detail + offsetof(DetailLevel, matched_tree) + offsetof(TreeHeader, mean_radius), kNan);
+    refused(at<DetailLevel>(header, header.details)[i].effective_spheres, kNan);
+    const TreeHeader& tree = matched_tree(header, i + 1);
+    refused(tree.sphere_index, tree.sphere_count);  // no such sphere
+    refused(tree.level[0].blocks + 12, 1e30f);
+  }
 }
 
 }  // namespace

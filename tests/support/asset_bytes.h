@@ -16,7 +16,7 @@
 namespace ist::testing {
 
 /// Spheres on a grid: an asset without a mesh.
-inline std::vector<std::byte> small_asset(std::size_t n) {
+inline std::vector<std::byte> small_asset(std::size_t n, std::uint32_t details = 0) {
   AssetArrays arrays;
   for (std::size_t i = 0; i < n; ++i) {
     const float x = static_cast<float>(i % 4) / 4 - 0.5f;
@@ -28,6 +28,13 @@ inline std::vector<std::byte> small_asset(std::size_t n) {
   }
   arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
   arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  for (std::uint32_t i = 1; i <= details; ++i) {
+    DetailArrays& detail = arrays.details.emplace_back();
+    const auto count = static_cast<std::ptrdiff_t>(detail_spheres(n, i));
+    detail.effective_spheres.assign(arrays.effective_spheres.begin(),
+                                    arrays.effective_spheres.begin() + count);
+    detail.matched_tree = build_tree(detail.effective_spheres, {});
+  }
   arrays.header.volume = 1;
   return asset_bytes(arrays);
 }

@@ -18,6 +18,7 @@ struct RandomAsset {
   double smallest = 0.2;  ///< smallest radius over largest
   double centre[3] = {};  ///< [u] of the mesh frame
   int exponent = 0;
+  std::uint32_t details = 0;  ///< coarser levels: the first spheres, each as large as four
 };
 
 /// An asset of random spheres in the unit ball: inner ones with covers, and effective ones that
@@ -42,6 +43,15 @@ inline Asset make_random_asset(const RandomAsset& like, unsigned seed) {
   }
   arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
   arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  for (std::uint32_t i = 1; i <= like.details; ++i) {
+    DetailArrays& detail = arrays.details.emplace_back();
+    const auto count = static_cast<std::ptrdiff_t>(detail_spheres(like.spheres, i));
+    detail.effective_spheres.assign(arrays.effective_spheres.begin(),
+                                    arrays.effective_spheres.begin() + count);
+    for (Sphere4& s : detail.effective_spheres)
+      s.r *= static_cast<float>(std::cbrt(std::pow(4, i)));
+    detail.matched_tree = build_tree(detail.effective_spheres, {});
+  }
   for (int k = 0; k < 3; ++k) arrays.header.centre[k] = like.centre[k];
   arrays.header.exponent = like.exponent;
   arrays.header.volume = arrays.matched_tree.volume_sum;

@@ -21,12 +21,15 @@ struct WorldSphere {
   double cover = 0;  ///< of an inner sphere
 };
 
-/// Every sphere of a placed tree, read from the asset's tables and not from its tree.
-inline std::vector<WorldSphere> world_spheres(const PlacedTree& placed, Measure measure) {
+/// Every sphere of a placed tree, read from the asset's tables and not from its tree; of the
+/// matched measure those of a level of detail.
+inline std::vector<WorldSphere> world_spheres(const PlacedTree& placed, Measure measure,
+                                              std::uint32_t detail = 0) {
   const AssetHeader& header = placed.tree.header();
   const bool inner = measure == Measure::inner;
   const Sphere4* spheres =
-      at<Sphere4>(header, inner ? header.inner_spheres : header.effective_spheres);
+      inner ? at<Sphere4>(header, header.inner_spheres) : effective_spheres(header, detail);
+  const std::uint64_t count = detail_spheres(header.sphere_count, inner ? 0 : detail);
   const float* covers = at<float>(header, header.cover_radii);
   const Eigen::Quaterniond q =
       Eigen::Quaterniond(placed.pose.q[0], placed.pose.q[1], placed.pose.q[2], placed.pose.q[3])
@@ -34,7 +37,7 @@ inline std::vector<WorldSphere> world_spheres(const PlacedTree& placed, Measure 
   const Eigen::Vector3d t(placed.pose.t[0], placed.pose.t[1], placed.pose.t[2]);
   const double unit = std::ldexp(1.0, header.exponent);
   std::vector<WorldSphere> out;
-  for (std::uint64_t i = 0; i < header.sphere_count; ++i) {
+  for (std::uint64_t i = 0; i < count; ++i) {
     const Sphere4& s = spheres[i];
     const Eigen::Vector3d mesh =
         unit * Eigen::Vector3d(s.x, s.y, s.z) +
@@ -57,9 +60,10 @@ struct ReferenceSum {
 };
 
 /// The sum that `penetration` answers, over all pairs in double: no tree, no frame but the world.
-inline ReferenceSum reference_sum(const PlacedTree& a, const PlacedTree& b, Measure measure) {
-  const auto spheres_a = world_spheres(a, measure);
-  const auto spheres_b = world_spheres(b, measure);
+inline ReferenceSum reference_sum(const PlacedTree& a, const PlacedTree& b, Measure measure,
+                                  std::uint32_t detail_a = 0, std::uint32_t detail_b = 0) {
+  const auto spheres_a = world_spheres(a, measure, detail_a);
+  const auto spheres_b = world_spheres(b, measure, detail_b);
   const Eigen::Vector3d origin(b.pose.t[0], b.pose.t[1], b.pose.t[2]);
   ReferenceSum sum;
   for (const WorldSphere& i : spheres_a) {

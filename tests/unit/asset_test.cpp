@@ -47,6 +47,12 @@ TEST(Asset, RoundTrip) {
     const Asset again = Asset::load(folder / "a.ist");
     EXPECT_TRUE(std::equal(bytes.begin(), bytes.end(), again.bytes().begin(), again.bytes().end()));
   }
+  for (const std::uint32_t details : {1u, 3u, 4u}) {
+    const Asset asset(small_asset(300, details), "memory");
+    EXPECT_EQ(asset.view().header().detail_count, details);
+  }
+  EXPECT_THROW(small_asset(300, kMaxDetails + 1), Error);  // and the last would be empty
+  EXPECT_THROW(Asset(small_asset(300, 5), "memory"), Error);
   EXPECT_EQ(folder.files(), 1u);
 }
 
@@ -54,11 +60,16 @@ TEST(Asset, SectionsAreAlignedAndInOrder) {
   for (const std::uint64_t n :
        {std::uint64_t{1}, std::uint64_t{17}, std::uint64_t{70'000}, kMaxSpheres}) {
     AssetHeader header;
+    DetailLevel details[kMaxDetails];
     header.sphere_count = n;
-    place_sections(header);
-    std::vector<std::uint64_t> offsets = {header.inner_spheres, header.cover_radii,
-                                          header.effective_spheres};
-    for (const TreeHeader* tree : {&header.inner_tree, &header.matched_tree}) {
+    while (header.detail_count < kMaxDetails && detail_spheres(n, header.detail_count + 1) > 0)
+      ++header.detail_count;
+    place_sections(header, details);
+    std::vector<std::uint64_t> offsets;
+    if (header.detail_count > 0) offsets.push_back(header.details);
+    offsets.insert(offsets.end(),
+                   {header.inner_spheres, header.cover_radii, header.effective_spheres});
+    const auto add_tree = [&](const TreeHeader* tree) {
       offsets.push_back(tree->sphere_index);
       if (tree->sphere_cover != 0) offsets.push_back(tree->sphere_cover);
       ASSERT_LE(tree->level_count, kMaxLevels);
@@ -68,6 +79,12 @@ TEST(Asset, SectionsAreAlignedAndInOrder) {
         offsets.push_back(tree->level[k].origins);
         if (k > 0) offsets.push_back(tree->level[k].nodes);
       }
+    };
+    add_tree(&header.inner_tree);
+    add_tree(&header.matched_tree);
+    for (std::uint32_t i = 0; i < header.detail_count; ++i) {
+      offsets.push_back(details[i].effective_spheres);
+      add_tree(&details[i].matched_tree);
     }
     offsets.push_back(header.file_bytes);
     EXPECT_EQ(offsets.front(), sizeof(AssetHeader));

@@ -44,7 +44,7 @@ void expect_sound(const std::vector<Invariant>& invariants) {
 
 TEST(Check, FindsBakesSound) {
   expect_sound(check(cube_asset(), cube()));
-  for (const std::size_t n : {1u, 16u, 17u, 400u}) {
+  for (const std::size_t n : {1u, 16u, 17u, 400u, 1000u}) {
     const ClosedMesh torus = testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
     expect_sound(check(bake(torus, of_size(n)), torus));
   }
@@ -57,9 +57,10 @@ TEST(Check, RefusesAnotherMesh) {
   EXPECT_THROW(check(cube_asset(), other), Error);
 }
 
-/// A copy of the cube's asset with something changed and the hash made right again.
-Asset tampered(const std::function<void(AssetHeader&)>& change) {
-  std::vector<std::byte> bytes = bytes_of(cube_asset());
+/// A copy of an asset with something changed and the hash made right again.
+Asset tampered(const std::function<void(AssetHeader&)>& change,
+               const Asset& original = cube_asset()) {
+  std::vector<std::byte> bytes = bytes_of(original);
   // The header and the arrays are changed in an aligned copy.
   const std::unique_ptr<std::byte[], void (*)(std::byte*)> block(
       static_cast<std::byte*>(::operator new[](bytes.size(), std::align_val_t{kAssetAlignment})),
@@ -162,14 +163,40 @@ TEST(Check, TurnsRedForEveryInvariant) {
   }
 }
 
+// A level of detail is checked like the finest.
+TEST(Check, TurnsRedForEveryInvariantOfADetail) {
+  const Asset asset = bake(cube(), of_size(1000));
+  ASSERT_EQ(asset.view().header().detail_count, 1u);
+  const auto detail = [](AssetHeader& h) -> DetailLevel& {
+    return *writable<DetailLevel>(h, h.details);
+  };
+  const std::vector<Tampering> cases = {
+      {"detail 1: effective volumes sum to the solid",
+       [&](AssetHeader& h) { writable<Sphere4>(h, detail(h).effective_spheres)->r *= 1.001f; }},
+      {"detail 1: effective protrusion", [&](AssetHeader& h) { detail(h).protrusion *= 0.999; }},
+      {"detail 1: matched tree: leaves are the table",
+       [&](AssetHeader& h) { block(h, detail(h).matched_tree, 0).r[2] *= 1.000001f; }},
+      {"detail 1: matched tree: mean radius",
+       [&](AssetHeader& h) { detail(h).matched_tree.mean_radius *= 1.000001; }},
+      {"detail 1: matched tree: overlap bounds",
+       [&](AssetHeader& h) { detail(h).matched_tree.overlap = 1; }},
+  };
+  for (const Tampering& one : cases) {
+    bool red = false;
+    for (const Invariant& invariant : check(tampered(one.change, asset), cube()))
+      if (invariant.name == one.invariant) red |= invariant.violations > 0;
+    EXPECT_TRUE(red) << one.invariant;
+  }
+}
+
 // The whole asset, for any number of threads and in a second run.
 TEST(Bake, SameBytesForAnyThreadCount) {
   const ClosedMesh meshes[] = {cube(),
                                testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus")};
   for (const ClosedMesh& mesh : meshes) {
-    const auto one = bytes_of(bake(mesh, of_size(300, 1)));
+    const auto one = bytes_of(bake(mesh, of_size(1000, 1)));
     for (const unsigned threads : {1u, 2u, 5u})
-      EXPECT_EQ(one, bytes_of(bake(mesh, of_size(300, threads)))) << mesh.name << threads;
+      EXPECT_EQ(one, bytes_of(bake(mesh, of_size(1000, threads)))) << mesh.name << threads;
   }
 }
 

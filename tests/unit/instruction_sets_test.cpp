@@ -26,6 +26,7 @@ std::vector<unsigned char> answers(const Asset& a, const Asset& b) {
     QuerySettings settings;
     settings.measure = i % 2 == 0 ? Measure::matched : Measure::inner;
     settings.max_visits = i % 5 == 4 ? 50 : 0;
+    settings.pair_budget = i % 7 >= 4 ? 300 : 0;
     const double scale = i % 3 == 0 ? 1 : i % 3 == 1 ? 0.3 : 0.001;
     const PlacedTree pa{a.view(), random_pose(random, 0.2), 1.0};
     const PlacedTree pb{b.view(), random_pose(random, 0.05 * i), scale};
@@ -50,8 +51,8 @@ std::vector<unsigned char> answers(const Asset& a, const Asset& b) {
 }
 
 TEST(InstructionSets, GiveTheSameBits) {
-  const Asset a = make_random_asset({900, 0.1, {}, 0}, 1);
-  const Asset b = make_random_asset({400, 0.3, {}, 0}, 2);
+  const Asset a = make_random_asset({900, 0.1, {}, 0, 2}, 1);
+  const Asset b = make_random_asset({400, 0.3, {}, 0, 1}, 2);
   const auto native = answers(a, b);
   EXPECT_EQ(answers(a, b), native) << "a repeated query";
   int levels = 0;

@@ -28,8 +28,8 @@ class RealTime : public ::testing::Test {
   }
 
   static constexpr int kPoses = 40;
-  const Asset a_ = testing::make_random_asset({600, 0.2, {}, 0}, 1);
-  const Asset b_ = testing::make_random_asset({600, 0.2, {}, 0}, 2);
+  const Asset a_ = testing::make_random_asset({600, 0.2, {}, 0, 2}, 1);
+  const Asset b_ = testing::make_random_asset({600, 0.2, {}, 0, 1}, 2);
   Workspace workspaces_[1];
   ContactPatch patches_[8];
   Penetration answers_[2];
@@ -53,6 +53,7 @@ TEST_F(RealTime, QueriesMakeNoSystemCall) {
       QuerySettings settings;  // no deadline: what reads the clock may enter the system
       if (i % 3 == 1) settings.max_visits = 40;
       if (i % 3 == 2) settings.relative_error = 0.1;
+      if (i % 2 == 1) settings.pair_budget = 200;
       ask(i, settings);
     }
   };
@@ -75,6 +76,7 @@ TEST_F(RealTime, QueriesTouchNeitherHeapNorLock) {
     if (i % 4 == 1) settings.max_visits = 40;
     if (i % 4 == 2) settings.relative_error = 0.1;
     if (i % 4 == 3) settings.deadline_us = 5;
+    if (i % 5 >= 3) settings.pair_budget = 200;
     const Trapped trapped = testing::trapped_by([&] { ask(i, settings); });
     EXPECT_EQ(trapped.heap, 0) << "pose " << i;
     EXPECT_EQ(trapped.locks, 0) << "pose " << i;

@@ -1,0 +1,111 @@
+#include "query/detail_blend.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "query/descent.h"
+#include "query/detail_chain.h"
+
+namespace ist {
+namespace {
+
+/// Asks pairs of levels one after another under the limits that they share.
+class DetailQueries {
+ public:
+  DetailQueries(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+                const QuerySettings& settings, Workspace& workspace) noexcept
+      : a_(a.tree.header()),
+        b_(b.tree.header()),
+        pose_(pose),
+        settings_(settings),
+        workspace_(workspace),
+        start_(settings.deadline_us > 0 ? Clock::now() : Clock::time_point()) {}
+
+  Penetration ask(const DetailPair& pair, double relative_error, double min_radius) noexcept {
+    QuerySettings limits = settings_;
+    limits.relative_error = relative_error;
+    limits.min_radius = min_radius;
+    if (settings_.deadline_us > 0) {
+      const std::chrono::duration<double, std::micro> gone = Clock::now() - start_;
+      limits.deadline_us = std::max(kNoTime, settings_.deadline_us - gone.count());
+    }
+    if (settings_.max_visits > 0) {
+      limits.max_visits = settings_.max_visits - visits_;
+      if (limits.max_visits == 0) limits.deadline_us = kNoTime;
+    }
+    const SphereTree tree_a(a_, matched_tree(a_, pair.a));
+    const SphereTree tree_b(b_, matched_tree(b_, pair.b));
+    Descent descent(tree_a, tree_b, pose_, limits, workspace_.impl());
+    descent.run();
+    const Penetration answer = descent.penetration();
+    visits_ += answer.node_visits;
+    pairs_ += answer.sphere_pairs;
+    return answer;
+  }
+
+  std::uint32_t visits() const noexcept { return visits_; }
+  std::uint32_t pairs() const noexcept { return pairs_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  // [µs] A deadline that is over before anything is opened: nothing but the roots is looked at.
+  static constexpr double kNoTime = 1e-6;
+
+  const AssetHeader& a_;
+  const AssetHeader& b_;
+  const RelativePose& pose_;
+  const QuerySettings& settings_;
+  Workspace& workspace_;
+  const Clock::time_point start_;
+  std::uint32_t visits_ = 0, pairs_ = 0;
+};
+
+}  // namespace
+
+Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+                          const QuerySettings& settings, Workspace& workspace) noexcept {
+  const DetailChain chain(a.tree.header(), b.tree.header(), pose.a_from_b.scale);
+  DetailQueries queries(a, b, pose, settings, workspace);
+  if (chain.size() == 1) return queries.ask(chain[0], settings.relative_error, settings.min_radius);
+
+  // Whatever else is asked, the gauge is the whole sum: only that is smooth.
+  const Penetration gauge = queries.ask(chain.coarsest(), 0, 0);
+  Penetration result;
+  if (gauge.status != QueryStatus::ok) {
+    // Stopped here, any level might have been meant.
+    result = gauge;
+    for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
+      const Penetration bounds = queries.ask(chain[i], 0, 0);
+      result.volume_min = std::min(result.volume_min, bounds.volume_min);
+      result.volume_max = std::max(result.volume_max, bounds.volume_max);
+    }
+  } else {
+    const double unit3 = pose.unit_a * pose.unit_a * pose.unit_a;
+    const DetailChain::Weights weights = chain.weights(gauge.volume / unit3, settings.pair_budget);
+    double slope = 0;                               // of the blend by the gauge
+    for (std::size_t i = chain.size(); i-- > 0;) {  // the coarse ones first: they are sure to end
+      const double weight = weights[i].weight;
+      if (weight == 0 && weights[i].slope == 0) continue;
+      const Penetration part =
+          i + 1 == chain.size()
+              ? gauge
+              : queries.ask(chain[i], settings.relative_error, settings.min_radius);
+      result.volume += weight * part.volume;
+      result.volume_min += weight * part.volume_min;
+      result.volume_max += weight * part.volume_max;
+      result.centroid += weight * part.volume * part.centroid;
+      result.translation_gradient += weight * part.translation_gradient;
+      result.rotation_gradient += weight * part.rotation_gradient;
+      result.status = std::max(result.status, part.status);
+      slope += weights[i].slope / unit3 * part.volume;
+    }
+    if (result.volume > 0) result.centroid /= result.volume;
+    result.translation_gradient += slope * gauge.translation_gradient;
+    result.rotation_gradient += slope * gauge.rotation_gradient;
+  }
+  result.node_visits = queries.visits();
+  result.sphere_pairs = queries.pairs();
+  return result;
+}
+
+}  // namespace ist

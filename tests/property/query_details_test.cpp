@@ -1,0 +1,246 @@
+#include <gtest/gtest.h>
+#include <ist/query.h>
+
+#include "query/detail_chain.h"
+#include "support/random_assets.h"
+#include "support/reference_sum.h"
+
+// Answers under a pair budget: levels of detail, blended.
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+using testing::make_random_asset;
+using testing::random_pose;
+using testing::reference_sum;
+using testing::ReferenceSum;
+
+/// A turn by a small rotation vector about the origin of the pose, and a shift.
+Pose moved(const Pose& pose, const Vector3d& shift, const Vector3d& turn) {
+  const Eigen::Quaterniond q(pose.q[0], pose.q[1], pose.q[2], pose.q[3]);
+  const double angle = turn.norm();
+  const Eigen::Quaterniond r(angle > 0 ? Eigen::AngleAxisd(angle, turn / angle)
+                                       : Eigen::AngleAxisd::Identity());
+  const Eigen::Quaterniond both = r * q;
+  Pose result = {{both.w(), both.x(), both.y(), both.z()}, {}};
+  for (int k = 0; k < 3; ++k) result.t[k] = pose.t[k] + shift[k];
+  return result;
+}
+
+class QueryDetails : public ::testing::Test {
+ protected:
+  const Asset a_ = make_random_asset({1600, 0.3, {0.1, 0, 0}, 1, 3}, 1);
+  const Asset b_ = make_random_asset({700, 0.3, {0, 0.2, 0}, 0, 2}, 2);
+  Workspace workspace_;
+  std::mt19937_64 random_{5};
+
+  PlacedTree placed_a() { return {a_.view(), random_pose(random_, 0.2), 1.0}; }
+  PlacedTree placed_b(double distance, double scale = 1.6) {
+    return {b_.view(), random_pose(random_, distance), scale};
+  }
+  Penetration ask(const PlacedTree& a, const PlacedTree& b, std::uint32_t budget) {
+    return penetration(a, b, {.pair_budget = budget}, workspace_);
+  }
+
+  static DetailChain chain_of(const PlacedTree& a, const PlacedTree& b) {
+    return {a.tree.header(), b.tree.header(),
+            std::ldexp(b.scale / a.scale, b.tree.header().exponent - a.tree.header().exponent)};
+  }
+  static double unit3(const PlacedTree& a) {
+    return std::pow(std::ldexp(a.scale, a.tree.header().exponent), 3);
+  }
+
+  /// The blended sum over all pairs of spheres in double.
+  static double reference(const PlacedTree& a, const PlacedTree& b, std::uint32_t budget) {
+    const DetailChain chain = chain_of(a, b);
+    const auto sum = [&](const DetailPair& pair) {
+      return reference_sum(a, b, Measure::matched, pair.a, pair.b).volume;
+    };
+    const auto weights = chain.weights(sum(chain.coarsest()) / unit3(a), budget);
+    double volume = 0;
+    for (std::size_t i = 0; i < chain.size(); ++i)
+      if (weights[i].weight > 0) volume += weights[i].weight * sum(chain[i]);
+    return volume;
+  }
+};
+
+TEST_F(QueryDetails, AnAmpleBudgetTakesTheFinestLevel) {
+  for (int i = 0; i < 30; ++i) {
+    const PlacedTree a = placed_a(), b = placed_b(0.12 * i);
+    const Penetration finest = ask(a, b, 0), ample = ask(a, b, 1u << 30);
+    EXPECT_EQ(ample.volume, finest.volume);
+    EXPECT_EQ(ample.translation_gradient, finest.translation_gradient);
+    EXPECT_EQ(ample.rotation_gradient, finest.rotation_gradient);
+    EXPECT_EQ(ample.volume_max, finest.volume_max);
+    EXPECT_LT((ample.centroid - finest.centroid).norm(), 1e-12);
+  }
+}
+
+TEST_F(QueryDetails, ATinyBudgetTakesTheCoarsestLevel) {
+  for (int i = 0; i < 20; ++i) {
+    const PlacedTree a = placed_a(), b = placed_b(0.05 * i);
+    const ReferenceSum coarsest = reference_sum(a, b, Measure::matched, 3, 2);
+    const Penetration answer = ask(a, b, 1);
+    EXPECT_NEAR(answer.volume, coarsest.volume, 1e-5 * coarsest.volume);
+    EXPECT_EQ(answer.sphere_pairs, coarsest.lenses);
+  }
+}
+
+TEST_F(QueryDetails, WeightsSumToOneAndFallWithTheGauge) {
+  const DetailChain chain = chain_of(placed_a(), placed_b(0));
+  EXPECT_EQ(chain[0].a, 0u);
+  EXPECT_EQ(chain[0].b, 0u);
+  EXPECT_EQ(chain.coarsest().a, 3u);
+  EXPECT_EQ(chain.coarsest().b, 2u);
+  EXPECT_EQ(chain.weights(0, 100)[0].weight, 1);
+  double before = 1;
+  for (double gauge = 1e-9; gauge < 10; gauge *= 1.01) {
+    const auto weights = chain.weights(gauge, 300);
+    const auto further = chain.weights(gauge * (1 + 1e-6), 300);
+    double sum = 0, slope = 0;
+    for (std::size_t i = 0; i < chain.size(); ++i) {
+      sum += weights[i].weight;
+      slope += weights[i].slope;
+      EXPECT_GE(weights[i].weight, 0);
+      const double difference = (further[i].weight - weights[i].weight) / (gauge * 1e-6);
+      EXPECT_NEAR(weights[i].slope * gauge, difference * gauge, 1e-4);
+    }
+    EXPECT_NEAR(sum, 1, 1e-12);
+    EXPECT_NEAR(slope * gauge, 0, 1e-9);
+    EXPECT_LE(weights[0].weight, before);
+    before = weights[0].weight;
+  }
+  EXPECT_EQ(before, 0);
+}
+
+/// From `least` on, the first budget under which two levels share an answer; 0 if there is none.
+std::uint32_t sharing_budget(const DetailChain& chain, double gauge, std::uint32_t least) {
+  for (std::uint32_t budget = least; budget < 10'000'000; budget += 1 + budget / 16)
+    for (const DetailWeight& w : chain.weights(gauge, budget))
+      if (w.weight > 0.2 && w.weight < 0.8) return budget;
+  return 0;
+}
+
+TEST_F(QueryDetails, AnswerTheBlendedSumAndItsGradient) {
+  const double h = 1e-5;
+  int blended = 0;
+  for (int i = 0; i < 24; ++i) {
+    const PlacedTree a = placed_a(), b = placed_b(0.13 * i);
+    const DetailChain chain = chain_of(a, b);
+    const double gauge =
+        reference_sum(a, b, Measure::matched, chain.coarsest().a, chain.coarsest().b).volume;
+    const std::uint32_t budget = sharing_budget(chain, gauge / unit3(a), 10u << (2 * (i % 6)));
+    if (budget == 0) continue;
+    ++blended;
+    const Penetration answer = ask(a, b, budget);
+    const double sum = reference(a, b, budget);
+    ASSERT_EQ(answer.status, QueryStatus::ok);
+    EXPECT_NEAR(answer.volume, sum, 1e-5 * sum);
+    EXPECT_LE(answer.volume_min, sum * (1 + 1e-12));
+    EXPECT_GE(answer.volume_max, sum * (1 - 1e-12));
+    Vector3d force, torque;
+    for (int k = 0; k < 3; ++k) {
+      const Vector3d step = h * Vector3d::Unit(k);
+      const auto at = [&](const Vector3d& shift, const Vector3d& turn) {
+        return reference(a, {b.tree, moved(b.pose, shift, turn), b.scale}, budget);
+      };
+      force[k] = (at(step, {0, 0, 0}) - at(-step, {0, 0, 0})) / (2 * h);
+      torque[k] = (at({0, 0, 0}, step) - at({0, 0, 0}, -step)) / (2 * h);
+    }
+    const double scale = reference_sum(a, b, Measure::matched).force_scale;
+    EXPECT_LE((answer.translation_gradient - force).norm(), 1e-4 * scale) << i;
+    EXPECT_LE((answer.rotation_gradient - torque).norm(), 1e-4 * 3 * scale) << i;
+  }
+  EXPECT_GE(blended, 12) << "the poses blend nothing";
+}
+
+// Half the step, half the largest change: a jump would not shrink.
+TEST_F(QueryDetails, NothingJumpsAlongAPath) {
+  const PlacedTree a{a_.view(), {}, 1.0};
+  PlacedTree b{b_.view(), random_pose(random_, 0), 1.6};
+  const Vector3d direction = Vector3d(1, 0.3, -0.2).normalized();
+  const auto largest_changes = [&](int steps, std::uint32_t budget) {
+    double volume = 0, force = 0, torque = 0;
+    Penetration before;
+    for (int i = 0; i <= steps; ++i) {
+      const double way = 0.8 + 3.0 * i / steps;
+      for (int k = 0; k < 3; ++k) b.pose.t[k] = way * direction[k];
+      const Penetration now = ask(a, b, budget);
+      if (i > 0) {
+        volume = std::max(volume, std::abs(now.volume - before.volume));
+        force = std::max(force, (now.translation_gradient - before.translation_gradient).norm());
+        torque = std::max(torque, (now.rotation_gradient - before.rotation_gradient).norm());
+      }
+      before = now;
+    }
+    return std::array{volume, force, torque};
+  };
+  for (const std::uint32_t budget : {100u, 400u, 2000u}) {
+    const auto coarse = largest_changes(1000, budget), fine = largest_changes(4000, budget);
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_LE(fine[k], 0.4 * coarse[k]) << budget << " " << k;
+  }
+}
+
+// What the coarsest level does not see is not lost.
+TEST(QueryDetailsAlone, WithoutAGaugeTheFinestAnswers) {
+  // The finest reaches out to x = 1, the coarser level stops far short of it.
+  AssetArrays arrays;
+  for (int i = 0; i < 8; ++i) {
+    const Sphere4 s = {static_cast<float>(i) / 4 - 0.9f, 0, 0, 0.15f};
+    arrays.inner_spheres.push_back(s);
+    arrays.effective_spheres.push_back(s);
+    arrays.cover_radii.push_back(0.3f);
+  }
+  arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
+  arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  arrays.details.resize(1);
+  arrays.details[0].effective_spheres = {{-0.5f, 0, 0, 0.3f}, {-0.4f, 0, 0, 0.3f}};
+  arrays.details[0].matched_tree = build_tree(arrays.details[0].effective_spheres, {});
+  arrays.header.volume = arrays.matched_tree.volume_sum;
+  const Asset asset(asset_bytes(arrays), "two levels");
+  Workspace workspace;
+  const PlacedTree a{asset.view(), {}, 1}, b{asset.view(), {{0, 0, 0, 1}, {1.9, 0, 0}}, 1};
+  const Penetration finest = penetration(a, b, {}, workspace);
+  ASSERT_GT(finest.volume, 0);
+  EXPECT_EQ(penetration(a, b, {.pair_budget = 1}, workspace).volume, finest.volume);
+}
+
+TEST_F(QueryDetails, TheOtherWayRoundIsTheSame) {
+  for (int i = 0; i < 20; ++i) {
+    const PlacedTree a = placed_a(), b = placed_b(0.15 * i, i % 2 == 0 ? 1.6 : 0.3);
+    const Penetration ab = ask(a, b, 500), ba = ask(b, a, 500);
+    EXPECT_NEAR(ab.volume, ba.volume, 1e-5 * ab.volume);
+    EXPECT_LE((ab.translation_gradient + ba.translation_gradient).norm(),
+              1e-3 * ab.translation_gradient.norm() + 1e-9);
+  }
+}
+
+TEST_F(QueryDetails, OtherLimitsHoldOnTop) {
+  int stopped = 0;
+  for (int i = 0; i < 600; ++i) {
+    const PlacedTree a = placed_a(), b = placed_b(0.05 * (i % 60));
+    QuerySettings settings;
+    settings.pair_budget = 3000;
+    const Penetration finished = penetration(a, b, settings, workspace_);
+    settings.max_visits = 1u << (i % 11);
+    if (i % 4 == 1) settings.relative_error = 0.2;
+    if (i % 4 == 2) settings.min_radius = 0.15;
+    if (i % 4 == 3) settings.deadline_us = 1e-3;
+    const Penetration answer = penetration(a, b, settings, workspace_);
+    EXPECT_LE(answer.node_visits, settings.max_visits);
+    EXPECT_LE(answer.volume_min, finished.volume);
+    EXPECT_GE(answer.volume_max, finished.volume);
+    EXPECT_LE(answer.volume_min, answer.volume);
+    EXPECT_GE(answer.volume_max, answer.volume);
+    EXPECT_TRUE(answer.translation_gradient.allFinite());
+    if (answer.status == QueryStatus::ok) {
+      EXPECT_EQ(answer.volume, finished.volume);
+    }
+    stopped += answer.status == QueryStatus::budget_exhausted ? 1 : 0;
+  }
+  EXPECT_GT(stopped, 200);
+}
+
+}  // namespace
+}  // namespace ist
