@@ -44,11 +44,12 @@ void ContactBins::mark(std::uint32_t bin) noexcept {
   new (&guesses_[bin]) Overlap();
 }
 
-LeafBinning ContactBins::touch(const std::uint32_t* a, const std::uint32_t* b,
-                               std::size_t n) noexcept {
-  const std::uint32_t* const blocks = of_b_ ? b : a;
-  for (std::size_t i = 0; i < n; ++i) mark(blocks[i] >> (4 * level_));
-  return {sums_.get(), blocks, 4 * level_};
+LeafBinning ContactBins::touch(int level_a, const std::uint32_t* a, int level_b,
+                               const std::uint32_t* b, std::size_t n) noexcept {
+  const std::uint32_t* const nodes = of_b_ ? b : a;
+  const int shift = 4 * (level_ - (of_b_ ? level_b : level_a));
+  for (std::size_t i = 0; i < n; ++i) mark(nodes[i] >> shift);
+  return {sums_.get(), nodes, shift};
 }
 
 void ContactBins::add_guess(int level_a, std::uint32_t a, int level_b, std::uint32_t b,

@@ -42,10 +42,11 @@ class ContactBins {
   /// level of no more than kBins.
   void start(const SphereTree& tree, bool of_b) noexcept;
 
-  /// Where the sums of these leaf pairs go.
-  LeafBinning touch(const std::uint32_t* a, const std::uint32_t* b, std::size_t n) noexcept;
+  /// Where the sums of these pairs of leaves or spheres go.
+  LeafBinning touch(int level_a, const std::uint32_t* a, int level_b, const std::uint32_t* b,
+                    std::size_t n) noexcept;
 
-  /// Keeps what a pair of nodes that is not opened may hold, in the first bin below it.
+  /// Keeps what a pair of nodes holds or may hold that is not opened, in the first bin below it.
   void add_guess(int level_a, std::uint32_t a, int level_b, std::uint32_t b,
                  const Overlap& guess) noexcept;
 

@@ -7,6 +7,7 @@
 
 #include "query/node_kernel.h"
 #include "query/precision.h"
+#include "query/subtree_kernel.h"
 
 namespace ist {
 namespace {
@@ -17,6 +18,9 @@ constexpr std::size_t kChunk = 64;
 // Sums whose rounding may exceed this share are taken again in double. The bound is some hundred
 // times what rounding does, so float keeps 1e-5.
 constexpr double kGrazing = 3e-4;
+
+// Σ r³ in double.
+constexpr double kHeldRounding = 1e-12;
 
 }  // namespace
 
@@ -45,15 +49,23 @@ void Descent::run() noexcept {
 }
 
 Overlap Descent::overlap() const {
-  Overlap result = finish(sums_, precision_);
+  Overlap result = sure();
   result.add(left_);
+  return result;
+}
+
+Overlap Descent::sure() const {
+  Overlap result = finish(sums_, precision_);
+  result.add(held_);
+  result.error += kHeldRounding * held_.volume;
   return result;
 }
 
 bool Descent::open_level() {
   const double cube = map_.scale * map_.scale * map_.scale;
-  const bool open_a = level_b_ == 0 || (level_a_ > 0 && a_.typical_cube(level_a_) >=
-                                                            cube * b_.typical_cube(level_b_));
+  const bool open_a =
+      level_b_ == kSphereLevel ||
+      (level_a_ != kSphereLevel && a_.typical_cube(level_a_) >= cube * b_.typical_cube(level_b_));
   if (min_radius_ > 0) drop_small([&](double ra, double rb) { return open_a ? ra : rb; });
   PairList& now = scratch_.now;
   PairList& next = scratch_.next;
@@ -68,10 +80,7 @@ bool Descent::open_level() {
     const std::size_t room = (scratch_.capacity - next.size) / kWidth;
     const std::size_t n = budget_.grant(std::min({kChunk, now.size - done, room}));
     if (n == 0) break;
-    next.size += open_a ? open_nodes(stage, now.a.get() + done, now.b.get() + done, n,
-                                     next.a.get() + next.size, next.b.get() + next.size)
-                        : open_nodes(stage, now.b.get() + done, now.a.get() + done, n,
-                                     next.b.get() + next.size, next.a.get() + next.size);
+    open_pairs(stage, open_a, done, n);
     done += n;
   }
   const bool finished = done == now.size;
@@ -80,6 +89,48 @@ bool Descent::open_level() {
   std::swap(now, next);
   if (!finished) leave(now, 0);
   return finished;
+}
+
+void Descent::open_pairs(const NodeStage& stage, bool open_a, std::size_t from, std::size_t n) {
+  const PairList& now = scratch_.now;
+  PairList& next = scratch_.next;
+  const std::uint32_t* const x = (open_a ? now.a : now.b).get() + from;
+  const std::uint32_t* const y = (open_a ? now.b : now.a).get() + from;
+  std::uint32_t* const out_x = (open_a ? next.a : next.b).get() + next.size;
+  std::uint32_t* const out_y = (open_a ? next.b : next.a).get() + next.size;
+  if (stage.level_y != kSphereLevel) {
+    next.size += open_nodes(stage, x, y, n, out_x, out_y);
+    return;
+  }
+  std::uint32_t held_x[kWidth * (kChunk + 1)], held_y[kWidth * (kChunk + 1)];
+  HeldNodes held{held_x, held_y};
+  next.size += open_under_spheres(stage, x, y, n, out_x, out_y, held);
+  hold(open_a, stage.level_x - 1, held);
+}
+
+void Descent::hold(bool of_a, int level, const HeldNodes& held) {
+  const SphereTree& tree = of_a ? a_ : b_;
+  const Eigen::Vector3d origin_b(map_.t[0], map_.t[1], map_.t[2]);
+  const double cube = map_.scale * map_.scale * map_.scale;
+  for (std::size_t i = 0; i < held.size; ++i) {
+    const SubtreeSums sums = subtree_sums(tree, level, held.x[i]);
+    const Eigen::Vector3d moment(sums.moment[0], sums.moment[1], sums.moment[2]);
+    Overlap whole;
+    if (of_a) {
+      whole.volume = sums.volume;
+      whole.moment = moment - sums.volume * origin_b;
+    } else {
+      whole.volume = cube * sums.volume;
+      for (int k = 0; k < 3; ++k)
+        whole.moment[k] =
+            cube * Eigen::Vector3d(map_.m[3 * k], map_.m[3 * k + 1], map_.m[3 * k + 2]).dot(moment);
+    }
+    held_.add(whole);
+    held_spheres_ += sums.spheres;
+    if (bins_ != nullptr)
+      bins_->add_guess(of_a ? level : kSphereLevel, of_a ? held.x[i] : held.y[i],
+                       of_a ? kSphereLevel : level, of_a ? held.y[i] : held.x[i], whole);
+  }
 }
 
 void Descent::open_leaves() {
@@ -102,7 +153,7 @@ void Descent::open_leaves() {
   leave(now, done);
 
   // A few grazing lenses are all rounding in float; they are as few as they are shallow.
-  const Overlap sum = finish(sums_, precision_);
+  const Overlap sum = sure();
   if (precision_ == Precision::single && sum.error > kGrazing * sum.volume) {
     precision_ = Precision::twice;
     sums_ = LeafSums();
@@ -114,15 +165,15 @@ void Descent::open_leaves() {
 void Descent::add_leaves(std::size_t from, std::size_t n) {
   const std::uint32_t* const a = scratch_.now.a.get() + from;
   const std::uint32_t* const b = scratch_.now.b.get() + from;
-  LeafStage stage{&a_, &b_, &map_, precision_};
-  if (bins_ != nullptr) stage.bins = bins_->touch(a, b, n);
+  LeafStage stage{&a_, &b_, level_a_, level_b_, &map_, precision_};
+  if (bins_ != nullptr) stage.bins = bins_->touch(level_a_, a, level_b_, b, n);
   add_leaf_pairs(stage, a, b, n, sums_);
 }
 
 bool Descent::accurate(double waiting) const {
-  const Overlap sure = finish(sums_, precision_);
-  const double spread = 2 * sure.error + waiting + left_bound_;
-  return spread <= settings_.relative_error * (sure.volume + sure.error + waiting + left_bound_);
+  const Overlap sum = sure();
+  const double spread = 2 * sum.error + waiting + left_bound_;
+  return spread <= settings_.relative_error * (sum.volume + sum.error + waiting + left_bound_);
 }
 
 double Descent::rank() {
@@ -198,7 +249,7 @@ Penetration Descent::penetration() const noexcept {
   result.volume_min = unit3 * lowest;
   result.volume_max = unit3 * highest;
   result.node_visits = budget_.visits();
-  result.sphere_pairs = sums_.lenses;
+  result.sphere_pairs = sums_.lenses + held_spheres_;
   if (stopped_) result.status = QueryStatus::budget_exhausted;
   if (overlap.volume > 0) {
     const Eigen::Vector3d origin_b(pose_.a_from_b.t[0], pose_.a_from_b.t[1], pose_.a_from_b.t[2]);

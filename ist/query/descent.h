@@ -38,8 +38,18 @@ class Descent {
   /// Best answer: what was summed and a guess of the rest.
   Overlap overlap() const;
 
+  /// What was summed, without guesses.
+  Overlap sure() const;
+
   /// Opens one side of every pair of the current list. False if the budget stopped it.
   bool open_level();
+
+  /// Opens pairs [from, from + n) of the current list into the next, where the standing side's
+  /// spheres hold whole nodes into `held_`.
+  void open_pairs(const NodeStage& stage, bool open_a, std::size_t from, std::size_t n);
+
+  /// Adds the spheres below nodes of A, or of B: each node lies in one sphere of the other side.
+  void hold(bool of_a, int level, const HeldNodes& held);
 
   void open_leaves();
 
@@ -70,6 +80,8 @@ class Descent {
   Budget budget_;
   int level_a_ = 0, level_b_ = 0;  ///< of the current list
   LeafSums sums_;
+  Overlap held_;  ///< nodes that lie in a sphere of the other tree
+  std::uint32_t held_spheres_ = 0;
   Overlap left_;           ///< guess of what was not opened
   double left_bound_ = 0;  ///< what that can add at most
   bool stopped_ = false;

@@ -10,6 +10,7 @@
 #include <hwy/highway.h>
 
 #include "query/asset_layout.h"
+#include "query/compress_table.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
@@ -39,6 +40,56 @@ HWY_INLINE std::uint32_t mask_bits(D d, hn::Mask<D> mask) {
       static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
   return bits & ((1u << hn::Lanes(d)) - 1);
 }
+
+/// Moves the lanes of a mask to the front of many vectors alike. Highway's Compress, of which GCC
+/// copies the table to the stack at every call, is used where it is one instruction.
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
+template <class D>
+class Compressor {
+ public:
+  HWY_INLINE Compressor(D d, hn::Mask<D> mask) : mask_(mask), count_(hn::CountTrue(d, mask)) {}
+
+  template <class V>
+  HWY_INLINE V operator()(V v) const {
+    return hn::Compress(v, hn::RebindMask(hn::DFromV<V>(), mask_));
+  }
+
+  HWY_INLINE std::size_t count() const { return count_; }
+
+ private:
+  hn::Mask<D> mask_;
+  std::size_t count_;
+};
+#else
+template <class D>
+class Compressor {
+ public:
+  HWY_INLINE Compressor(D d, hn::Mask<D> mask)
+      : from_(lanes_of(kSetBits[mask_bits(d, mask)].data())), count_(hn::CountTrue(d, mask)) {}
+
+  template <class V>
+  HWY_INLINE V operator()(V v) const {
+    return hn::TableLookupLanes(v, hn::IndicesFromVec(hn::DFromV<V>(), from_));
+  }
+
+  HWY_INLINE std::size_t count() const { return count_; }
+
+ private:
+  using DI = hn::RebindToUnsigned<D>;
+  static HWY_INLINE hn::Vec<DI> lanes_of(const std::uint8_t* numbers) {
+    const hn::Rebind<std::uint32_t, DI> d32;
+    const hn::Rebind<std::uint8_t, DI> d8;
+    const auto narrow = hn::PromoteTo(d32, hn::LoadU(d8, numbers));
+    if constexpr (sizeof(hn::TFromD<DI>) == sizeof(std::uint32_t)) {
+      return narrow;
+    } else {
+      return hn::PromoteTo(DI(), narrow);
+    }
+  }
+  hn::Vec<DI> from_;
+  std::size_t count_;
+};
+#endif
 
 }  // namespace ist::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

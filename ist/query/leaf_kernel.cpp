@@ -1,323 +1,311 @@
 #include "query/leaf_kernel.h"
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "query/leaf_kernel.cpp"
 #include <hwy/foreach_target.h>
 
 #include "query/lanes-inl.h"
+#include "query/lens_list-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Sixteen spheres in the frame of A's block.
+/// Pairs that go through the stages together: little enough to stay in the nearest cache.
+inline constexpr std::size_t kPairsAtOnce = 32;
+
+/// Sixteen spheres in A's axes, relative to an origin of their own.
 template <class T>
 struct alignas(64) Spheres {
   T x[kWidth], y[kWidth], z[kWidth], r[kWidth];
 };
 
-/// Sums of one pair of blocks, a lane a sphere of the side that lies in lanes.
+/// One side of a pair of leaf blocks, in A's unit frame. Four numbers, since vectors hold so many.
 template <class T>
-struct alignas(64) PairSums {
-  T caps[kWidth];
-  T force[3][kWidth], torque[3][kWidth], moment[3][kWidth];
-  T error[kWidth];
+struct alignas(32) Side {
+  double origin[4] = {};  ///< of the spheres' coordinates
+  double centre[4] = {};  ///< of the leaf ball
+  double radius = 0;      ///< of the leaf ball
+  double size = 0;        ///< bound on the way from the origin to the end of any sphere
+  const Spheres<T>* spheres = nullptr;
 };
 
-/// Which spheres of a block the other block's ball leaves in play.
-struct Reach {
-  std::uint32_t touching = 0;  ///< spheres that come within reach of the ball
-  std::uint32_t holding = 0;   ///< of these, spheres that hold the whole ball
+/// A block of A that was met before.
+template <class T>
+struct Cached {
+  std::uint32_t block = ~0u;
+  Side<T> side;
+};
+inline constexpr std::size_t kCached = 32;
+
+/// What the tasks of one pair of leaf blocks share.
+template <class T>
+struct alignas(32) PairOfBlocks {
+  T lever[4];              ///< from B's origin to that of `many`
+  const Spheres<T>* many;  ///< the side whose sixteen spheres lie in lanes
+  T error;                 ///< bound on the rounding of a distance; negative if the tasks are B's
+  std::uint32_t bin;
 };
 
+/// Single spheres, each to meet sixteen: centres relative to the sixteen's origin.
 template <class T>
-HWY_INLINE Reach reach_of(const Spheres<T>& s, const double (&q)[3], double radius, double error) {
-  const LaneTag<T> d;
-  const auto qx = hn::Set(d, static_cast<T>(q[0]));
-  const auto qy = hn::Set(d, static_cast<T>(q[1]));
-  const auto qz = hn::Set(d, static_cast<T>(q[2]));
-  const auto reach = hn::Set(d, static_cast<T>(radius + error));
-  Reach result;
-  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    const auto dx = hn::Load(d, s.x + lane) - qx;
-    const auto dy = hn::Load(d, s.y + lane) - qy;
-    const auto dz = hn::Load(d, s.z + lane) - qz;
-    const auto d2 = (dx * dx + dy * dy) + dz * dz;
-    const auto r = hn::Load(d, s.r + lane);
-    const auto sum = hn::Max(r + reach, hn::Zero(d));
-    const auto difference = hn::Max(r - reach, hn::Zero(d));
-    result.touching |= mask_bits(d, d2 < sum * sum) << lane;
-    result.holding |= mask_bits(d, d2 < difference * difference) << lane;
-  }
-  return result;
-}
-
-/// Spheres of `one`, of those in `tasks`, that come near any of the lanes: a cheap look that spares
-/// most tasks the roots and divisions.
-template <class T>
-HWY_INLINE std::uint32_t near_tasks(const Spheres<T>& one, std::uint32_t tasks,
-                                    const Spheres<T>& many, std::size_t lane, double error) {
-  const LaneTag<T> d;
-  const auto xj = hn::Load(d, many.x + lane);
-  const auto yj = hn::Load(d, many.y + lane);
-  const auto zj = hn::Load(d, many.z + lane);
-  const auto reach = hn::Load(d, many.r + lane) + hn::Set(d, static_cast<T>(2 * error));
-  std::uint32_t near = 0;
-  for (std::uint32_t left = tasks; left != 0; left &= left - 1) {
-    const std::size_t i = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
-    const auto dx = xj - hn::Set(d, one.x[i]);
-    const auto dy = yj - hn::Set(d, one.y[i]);
-    const auto dz = zj - hn::Set(d, one.z[i]);
-    const auto sum = hn::Max(reach + hn::Set(d, one.r[i]), hn::Zero(d));
-    const bool none = hn::AllFalse(d, ((dx * dx + dy * dy) + dz * dz) < sum * sum);
-    near |= static_cast<std::uint32_t>(!none) << i;
-  }
-  return near;
-}
-
-/// Which spheres meet which, and how: what sum_lenses is to add.
-struct LensTasks {
-  std::uint32_t tasks;    ///< spheres of `one` that go one by one
-  std::uint32_t holding;  ///< spheres of `one` that swallow all of `many`
-  std::uint32_t lanes;    ///< spheres of `many` in play
-  double sign;            ///< 1 if `many` are B's
-  double error;           ///< bound on the rounding of a distance
+struct alignas(64) Tasks {
+  static constexpr std::size_t kRoom = (kPairsAtOnce + 1) * kWidth;
+  T x[kRoom], y[kRoom], z[kRoom], r[kRoom];
+  std::uint32_t pair[kRoom];
+  std::size_t size = 0;
 };
 
-/// Lenses of spheres of `one` with all of `many`: lens() of lens.h, sixteen at a time and without
-/// branches. Returns how many are not empty. `any` is left false if `out` is all zero.
+inline constexpr double kSign[2] = {1, -1};
+
+/// The map from B's unit frame to A's in the forms the stages load: T row by row, and columns.
 template <class T>
-HWY_INLINE std::uint32_t sum_lenses(const Spheres<T>& one, const Spheres<T>& many,
-                                    const LensTasks& what, const double (&lever)[3],
-                                    PairSums<T>& out, bool& any) {
-  const LaneTag<T> d;
-  const std::size_t width = hn::Lanes(d);
-  using V = hn::Vec<decltype(d)>;
-  const V zero = hn::Zero(d);
-  const V two = hn::Set(d, T(2));
-  const V three = hn::Set(d, T(3));
-  const V half = hn::Set(d, T(0.5));
-  const V tiny = hn::Set(d, std::numeric_limits<T>::min());
-  const V delta = hn::Set(d, static_cast<T>(what.error));
-  const std::size_t holding = hwy::PopCount(what.holding);
-  const V held = hn::Set(d, static_cast<T>(4 * holding));
-  const V flip = hn::Set(d, static_cast<T>(what.sign));
-  const std::uint32_t width_mask = (1u << width) - 1;
-  std::uint32_t lenses = 0;
-  for (std::size_t lane = 0; lane < kWidth; lane += width) {
-    V caps = zero, fx = zero, fy = zero, fz = zero, mx = zero, my = zero, mz = zero, err = zero;
-    V lx = zero, ly = zero, lz = zero;
-    const std::uint32_t tasks = ((what.lanes >> lane) & width_mask) != 0
-                                    ? near_tasks<T>(one, what.tasks, many, lane, what.error)
-                                    : 0;
-    if (tasks != 0 || holding != 0) {
-      any = true;
-      const V xj = hn::Load(d, many.x + lane);
-      const V yj = hn::Load(d, many.y + lane);
-      const V zj = hn::Load(d, many.z + lane);
-      const V rj = hn::Max(hn::Load(d, many.r + lane), zero);
-      caps = held * (rj * (rj * rj));
-      lenses += static_cast<std::uint32_t>(holding * hn::CountTrue(d, rj > zero));
-      for (std::uint32_t left = tasks; left != 0; left &= left - 1) {
-        const std::size_t i = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
-        const V ri = hn::Set(d, one.r[i]);
-        const V dx = xj - hn::Set(d, one.x[i]);
-        const V dy = yj - hn::Set(d, one.y[i]);
-        const V dz = zj - hn::Set(d, one.z[i]);
-        const V distance = hn::Sqrt((dx * dx + dy * dy) + dz * dz);
-        const V a = hn::Max(ri, rj);
-        const V b = hn::Min(ri, rj);
-        const V g = (a - distance) + b;
-        const V step = a - b;
-        const V f = hn::IfThenElse(step <= b, distance - step, (distance - a) + b);
-        const V e = step + distance;
-        const V g0 = hn::Max(g, zero);
-        const auto holds = hn::Or(f <= zero, distance < tiny);
-        const V inverse = half / hn::Max(distance, tiny);
-        const V ha = hn::IfThenZeroElse(holds, (f * inverse) * g0);
-        const V diameter = two * b;
-        const V hb = hn::IfThenElse(holds, diameter, hn::Min((e * inverse) * g0, diameter));
-        const V large = (ha * ha) * (three * a - ha);
-        const V small = (hb * hb) * (three * b - hb);
-        const V circle = ha * (two * a - ha);
-        const V volume = large + small;
-        const V cap_i = hn::IfThenElse(ri > rj, large, small);
-        const V pull = circle * inverse;
-        caps = caps + volume;
-        fx = fx + pull * dx;
-        fy = fy + pull * dy;
-        fz = fz + pull * dz;
-        mx = mx + cap_i * dx;
-        my = my + cap_i * dy;
-        mz = mz + cap_i * dz;
-        // Within rounding of tangency the circle says nothing; b² holds it at any distance. Else it
-        // is concave between the tangencies, so within ± delta it is at most doubled.
-        const V near = hn::Abs(hn::Min(g, f));
-        err = err + hn::IfThenElse(near < delta, b * b, circle);
-        lenses += static_cast<std::uint32_t>(hn::CountTrue(d, volume > zero));
-      }
-      lx = xj + hn::Set(d, static_cast<T>(lever[0]));
-      ly = yj + hn::Set(d, static_cast<T>(lever[1]));
-      lz = zj + hn::Set(d, static_cast<T>(lever[2]));
-      fx = fx * flip;
-      fy = fy * flip;
-      fz = fz * flip;
+struct alignas(32) TurnedAxes {
+  explicit TurnedAxes(const Similarity& map) : scale(map.scale) {
+    for (int i = 0; i < 9; ++i) m[i] = static_cast<T>(map.m[i]);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) column[j][i] = map.m[3 * i + j];
+      column[3][i] = map.t[i];
     }
-    hn::Store(caps, d, out.caps + lane);
-    hn::Store(err * delta, d, out.error + lane);
-    hn::Store(fx, d, out.force[0] + lane);
-    hn::Store(fy, d, out.force[1] + lane);
-    hn::Store(fz, d, out.force[2] + lane);
-    hn::Store(ly * fz - lz * fy, d, out.torque[0] + lane);
-    hn::Store(lz * fx - lx * fz, d, out.torque[1] + lane);
-    hn::Store(lx * fy - ly * fx, d, out.torque[2] + lane);
-    hn::Store(caps * lx - mx, d, out.moment[0] + lane);
-    hn::Store(caps * ly - my, d, out.moment[1] + lane);
-    hn::Store(caps * lz - mz, d, out.moment[2] + lane);
   }
-  return lenses;
+  double column[4][4] = {};  ///< the last is the translation
+  double scale;
+  T m[9];
+};
+
+using FourDoubles = hn::CappedTag<double, 4>;
+
+/// Where a leaf block of A and its ball are.
+template <class T>
+HWY_INLINE void place(const SphereTree& tree, std::uint32_t block, Side<T>& side) {
+  const Origin& o = tree.level[0].origins[block];
+  const NodeBall ball = tree.ball(0, block);
+  const double origin[3] = {o.x, o.y, o.z};
+  side.size = side.radius = ball.r;
+  for (int k = 0; k < 3; ++k) {
+    side.origin[k] = origin[k];
+    side.centre[k] = ball.centre[k];
+    side.size += std::abs(ball.centre[k] - origin[k]);
+  }
 }
 
-/// total[l] += from[l] + from[l + 8], the last additions in double.
+/// Likewise of B.
 template <class T>
-HWY_INLINE void fold(const T* from, double* total) {
-  const hn::CappedTag<double, kSumLanes> d;
-  for (std::size_t lane = 0; lane < kSumLanes; lane += hn::Lanes(d)) {
-    hn::Vec<decltype(d)> sum;
+HWY_INLINE void place(const SphereTree& tree, std::uint32_t block, const TurnedAxes<T>& axes,
+                      Side<T>& side) {
+  const FourDoubles d;
+  const Origin& o = tree.level[0].origins[block];
+  const NodeBall ball = tree.ball(0, block);
+  alignas(32) double way[4];
+  side.radius = ball.r * axes.scale;
+  for (std::size_t k = 0; k < 4; k += hn::Lanes(d)) {
+    const auto x = hn::Load(d, axes.column[0] + k);
+    const auto y = hn::Load(d, axes.column[1] + k);
+    const auto z = hn::Load(d, axes.column[2] + k);
+    const auto t = hn::Load(d, axes.column[3] + k);
+    const auto origin = ((x * hn::Set(d, o.x) + y * hn::Set(d, o.y)) + z * hn::Set(d, o.z)) + t;
+    const auto centre = ((x * hn::Set(d, ball.centre[0]) + y * hn::Set(d, ball.centre[1])) +
+                         z * hn::Set(d, ball.centre[2])) +
+                        t;
+    hn::Store(origin, d, side.origin + k);
+    hn::Store(centre, d, side.centre + k);
+    hn::Store(hn::Abs(centre - origin), d, way + k);
+  }
+  side.size = side.radius + ((way[0] + way[1]) + way[2]);
+}
+
+/// Differences are taken in double (DESIGN 3.4).
+template <class T>
+HWY_INLINE void subtract(const double (&x)[4], const double (&y)[4], T (&difference)[4]) {
+  const hn::CappedTag<double, 4> d;
+  for (std::size_t k = 0; k < 4; k += hn::Lanes(d)) {
+    const auto exact = hn::Load(d, x + k) - hn::Load(d, y + k);
     if constexpr (sizeof(T) == sizeof(float)) {
       const hn::Rebind<float, decltype(d)> df;
-      sum = hn::PromoteTo(d, hn::Load(df, from + lane) + hn::Load(df, from + lane + kSumLanes));
+      hn::Store(hn::DemoteTo(df, exact), df, difference + k);
     } else {
-      sum = hn::Load(d, from + lane) + hn::Load(d, from + lane + kSumLanes);
+      hn::Store(exact, d, difference + k);
     }
-    hn::Store(hn::Load(d, total + lane) + sum, d, total + lane);
   }
 }
 
+/// A leaf block of A; floats lie in the asset as they are needed.
 template <class T>
-HWY_INLINE void add_pair(const PairSums<T>& pair, LeafSums& sums) {
-  fold(pair.caps, sums.caps);
-  fold(pair.error, sums.error);
-  for (int k = 0; k < 3; ++k) {
-    fold(pair.force[k], sums.force[k]);
-    fold(pair.torque[k], sums.torque[k]);
-    fold(pair.moment[k], sums.moment[k]);
+HWY_INLINE void take_block(const SphereTree& tree, std::uint32_t block, Spheres<T>& room,
+                           Side<T>& side) {
+  const BallBlock& balls = tree.level[0].blocks[block];
+  if constexpr (sizeof(T) == sizeof(float)) {
+    static_assert(sizeof(Spheres<float>) == sizeof(BallBlock));
+    side.spheres = reinterpret_cast<const Spheres<float>*>(&balls);
+  } else {
+    const LaneTag<T> d;
+    for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+      hn::Store(load_as<T>(d, balls.x + lane), d, room.x + lane);
+      hn::Store(load_as<T>(d, balls.y + lane), d, room.y + lane);
+      hn::Store(load_as<T>(d, balls.z + lane), d, room.z + lane);
+      hn::Store(load_as<T>(d, balls.r + lane), d, room.r + lane);
+    }
+    side.spheres = &room;
   }
+  place(tree, block, side);
 }
 
-/// A leaf block of B turned and scaled into A's axes, not yet shifted: runs of pairs share it.
+/// A leaf block of B, turned and scaled into A's axes.
 template <class T>
-struct TurnedBlock {
-  Spheres<T> spheres;
-  double origin[3] = {};  ///< A's unit frame
-  double centre[3] = {};  ///< of the leaf ball, A's unit frame
-  double radius = 0;
-  double own_size = 0;  ///< bound on |origin − any centre| of the block
-};
-
-template <class T>
-HWY_INLINE void turn_block(const SphereTree& tree, std::uint32_t block, const Similarity& map,
-                           TurnedBlock<T>& out) {
+HWY_INLINE void turn_block(const SphereTree& tree, std::uint32_t block, const TurnedAxes<T>& axes,
+                           Spheres<T>& room, Side<T>& side) {
   const LaneTag<T> d;
   hn::Vec<decltype(d)> m[9];
-  for (int i = 0; i < 9; ++i) m[i] = hn::Set(d, static_cast<T>(map.m[i]));
-  const auto scale = hn::Set(d, static_cast<T>(map.scale));
+  for (int i = 0; i < 9; ++i) m[i] = hn::Set(d, axes.m[i]);
+  const auto scale = hn::Set(d, static_cast<T>(axes.scale));
   const BallBlock& balls = tree.level[0].blocks[block];
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
     const auto x = load_as<T>(d, balls.x + lane);
     const auto y = load_as<T>(d, balls.y + lane);
     const auto z = load_as<T>(d, balls.z + lane);
-    hn::Store((m[0] * x + m[1] * y) + m[2] * z, d, out.spheres.x + lane);
-    hn::Store((m[3] * x + m[4] * y) + m[5] * z, d, out.spheres.y + lane);
-    hn::Store((m[6] * x + m[7] * y) + m[8] * z, d, out.spheres.z + lane);
-    hn::Store(load_as<T>(d, balls.r + lane) * scale, d, out.spheres.r + lane);
+    hn::Store((m[0] * x + m[1] * y) + m[2] * z, d, room.x + lane);
+    hn::Store((m[3] * x + m[4] * y) + m[5] * z, d, room.y + lane);
+    hn::Store((m[6] * x + m[7] * y) + m[8] * z, d, room.z + lane);
+    hn::Store(load_as<T>(d, balls.r + lane) * scale, d, room.r + lane);
   }
-  const Origin& origin = tree.level[0].origins[block];
-  const NodeBall ball = tree.ball(0, block);
-  map.apply({origin.x, origin.y, origin.z}, out.origin);
-  map.apply(ball.centre, out.centre);
-  out.radius = ball.r * map.scale;
-  out.own_size = out.radius;
-  for (int k = 0; k < 3; ++k) out.own_size += std::abs(out.centre[k] - out.origin[k]);
+  side.spheres = &room;
+  place(tree, block, axes, side);
 }
 
+/// Appends the spheres of `one` that come within reach of the ball of `many`, or only the sphere
+/// `single` if that is not negative.
 template <class T>
-HWY_INLINE void shift(const Spheres<T>& from, const double (&offset)[3], Spheres<T>& to) {
+HWY_INLINE void add_tasks(const Side<T>& one, const Side<T>& many, int single, double error,
+                          std::uint32_t pair, Tasks<T>& tasks) {
   const LaneTag<T> d;
-  const auto ox = hn::Set(d, static_cast<T>(offset[0]));
-  const auto oy = hn::Set(d, static_cast<T>(offset[1]));
-  const auto oz = hn::Set(d, static_cast<T>(offset[2]));
+  const hn::Repartition<std::uint32_t, hn::CappedTag<float, kWidth>> du;
+  alignas(32) T q[4], offset[4];
+  subtract(many.centre, one.origin, q);
+  subtract(one.origin, many.origin, offset);
+  const auto reach = hn::Set(d, static_cast<T>(many.radius + error));
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    hn::Store(hn::Load(d, from.x + lane) + ox, d, to.x + lane);
-    hn::Store(hn::Load(d, from.y + lane) + oy, d, to.y + lane);
-    hn::Store(hn::Load(d, from.z + lane) + oz, d, to.z + lane);
-    hn::Store(hn::Load(d, from.r + lane), d, to.r + lane);
+    const auto x = hn::Load(d, one.spheres->x + lane);
+    const auto y = hn::Load(d, one.spheres->y + lane);
+    const auto z = hn::Load(d, one.spheres->z + lane);
+    const auto r = hn::Load(d, one.spheres->r + lane);
+    const auto dx = x - hn::Set(d, q[0]);
+    const auto dy = y - hn::Set(d, q[1]);
+    const auto dz = z - hn::Set(d, q[2]);
+    // Negative for an unused lane, whose square must not count.
+    const auto sum = hn::Max(r + reach, hn::Zero(d));
+    auto near = ((dx * dx + dy * dy) + dz * dz) < sum * sum;
+    if (single >= 0)
+      near = hn::And(near, hn::Iota(d, static_cast<T>(lane)) == hn::Set(d, static_cast<T>(single)));
+    const Compressor compress(d, near);
+    const std::size_t at = tasks.size;
+    hn::StoreU(compress(x + hn::Set(d, offset[0])), d, tasks.x + at);
+    hn::StoreU(compress(y + hn::Set(d, offset[1])), d, tasks.y + at);
+    hn::StoreU(compress(z + hn::Set(d, offset[2])), d, tasks.z + at);
+    hn::StoreU(compress(r), d, tasks.r + at);
+    for (std::size_t i = 0; i < hn::Lanes(d); i += hn::Lanes(du))
+      hn::StoreU(hn::Set(du, pair), du, tasks.pair + at + i);
+    tasks.size += compress.count();
   }
 }
 
+/// Appends what task `k` meets, or all but meets: its rounding counts too.
 template <class T>
-HWY_INLINE void load_block(const BallBlock& block, Spheres<T>& to) {
+HWY_INLINE void add_lenses(const Tasks<T>& tasks, std::size_t k, const PairOfBlocks<T>& pair,
+                           bool binned, LensList<T>& list) {
   const LaneTag<T> d;
+  const auto xi = hn::Set(d, tasks.x[k]);
+  const auto yi = hn::Set(d, tasks.y[k]);
+  const auto zi = hn::Set(d, tasks.z[k]);
+  const auto ri = hn::Set(d, tasks.r[k]);
+  const auto lx = xi + hn::Set(d, pair.lever[0]);
+  const auto ly = yi + hn::Set(d, pair.lever[1]);
+  const auto lz = zi + hn::Set(d, pair.lever[2]);
+  const auto error = hn::Set(d, pair.error);
+  const auto reach = ri + (hn::Abs(error) + hn::Abs(error));
+  const std::size_t before = list.size;
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    hn::Store(load_as<T>(d, block.x + lane), d, to.x + lane);
-    hn::Store(load_as<T>(d, block.y + lane), d, to.y + lane);
-    hn::Store(load_as<T>(d, block.z + lane), d, to.z + lane);
-    hn::Store(load_as<T>(d, block.r + lane), d, to.r + lane);
+    const auto rj = hn::Load(d, pair.many->r + lane);
+    const auto dx = hn::Load(d, pair.many->x + lane) - xi;
+    const auto dy = hn::Load(d, pair.many->y + lane) - yi;
+    const auto dz = hn::Load(d, pair.many->z + lane) - zi;
+    const auto sum = hn::Max(rj + reach, hn::Zero(d));
+    const auto near = ((dx * dx + dy * dy) + dz * dz) < sum * sum;
+    const Compressor compress(d, near);
+    const std::size_t at = list.size;
+    hn::StoreU(compress(dx), d, list.dx + at);
+    hn::StoreU(compress(dy), d, list.dy + at);
+    hn::StoreU(compress(dz), d, list.dz + at);
+    hn::StoreU(compress(rj), d, list.rj + at);
+    hn::StoreU(ri, d, list.ri + at);
+    hn::StoreU(lx, d, list.lx + at);
+    hn::StoreU(ly, d, list.ly + at);
+    hn::StoreU(lz, d, list.lz + at);
+    hn::StoreU(error, d, list.error + at);
+    list.size += compress.count();
   }
+  if (binned) std::fill(list.bin + before, list.bin + list.size, pair.bin);
 }
 
 template <class T>
 void add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b, std::size_t n,
             LeafSums& sums) {
   const Similarity& map = *stage.a_from_b;
-  Spheres<T> sa, sb;
-  TurnedBlock<T> turned;
-  PairSums<T> pair;
-  std::uint32_t last_b = ~0u;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (b[i] != last_b) {
-      last_b = b[i];
-      turn_block<T>(*stage.b, last_b, map, turned);
+  LeafSums* const bins = stage.bins.sums;
+  const bool single_a = stage.level_a == kSphereLevel;
+  const bool single_b = stage.level_b == kSphereLevel;
+  const std::uint32_t either = !single_a && !single_b ? 1 : 0;
+  const std::uint32_t only_b = single_b ? 1 : 0;
+  alignas(32) const double origin_b[4] = {map.t[0], map.t[1], map.t[2], 0};
+  const TurnedAxes<T> axes(map);
+  Spheres<T> of_a[sizeof(T) == sizeof(float) ? 1 : kPairsAtOnce], of_b[kPairsAtOnce];
+  PairOfBlocks<T> pairs[kPairsAtOnce];
+  Cached<T> cache[kCached];
+  Tasks<T> tasks;
+  LensList<T> list;
+  for (std::size_t done = 0; done < n; done += kPairsAtOnce) {
+    const std::size_t now = std::min(kPairsAtOnce, n - done);
+    Side<T> side_b;
+    std::uint32_t last_b = ~0u;
+    tasks.size = 0;
+    for (std::size_t i = 0; i < now; ++i) {
+      const std::uint32_t block_a = single_a ? a[done + i] / kWidth : a[done + i];
+      const std::uint32_t block_b = single_b ? b[done + i] / kWidth : b[done + i];
+      // Neighbours in the list share the blocks below one node.
+      Cached<T>& cached = cache[block_a % kCached];
+      if (cached.block != block_a) {
+        cached.block = sizeof(T) == sizeof(float) ? block_a : ~0u;
+        take_block<T>(*stage.a, block_a, of_a[sizeof(T) == sizeof(float) ? 0 : i], cached.side);
+      }
+      const Side<T>* const sides[2] = {&cached.side, &side_b};
+      if (block_b != last_b) {
+        last_b = block_b;
+        turn_block<T>(*stage.b, block_b, axes, of_b[i], side_b);
+      }
+      // The side of the larger spread goes one by one: fewer of its spheres come near the other.
+      const std::uint32_t task_side =
+          (static_cast<std::uint32_t>(sides[0]->radius <= sides[1]->radius) & either) | only_b;
+      const Side<T>& one = *sides[task_side];
+      const Side<T>& many = *sides[1 - task_side];
+      // The two touch: their origins are no further apart than both sizes.
+      const double error = distance_error<T>(2.8 * (one.size + many.size));
+      PairOfBlocks<T>& pair = pairs[i];
+      pair.many = many.spheres;
+      subtract(many.origin, origin_b, pair.lever);
+      pair.error = static_cast<T>(error * kSign[task_side]);
+      pair.bin = bins != nullptr ? stage.bins.node[done + i] >> stage.bins.shift : 0;
+      const int single = single_a   ? static_cast<int>(a[done + i] % kWidth)
+                         : single_b ? static_cast<int>(b[done + i] % kWidth)
+                                    : -1;
+      add_tasks<T>(one, many, single, error, static_cast<std::uint32_t>(i), tasks);
     }
-    // All that follows is relative to the origin of A's block: differences taken in double.
-    const Origin& o = stage.a->level[0].origins[a[i]];
-    const NodeBall ball_a = stage.a->ball(0, a[i]);
-    const double origin[3] = {o.x, o.y, o.z};
-    double offset[3], p[3], q[3], lever[3];
-    double magnitude = ball_a.r + turned.own_size;
-    for (int k = 0; k < 3; ++k) {
-      offset[k] = turned.origin[k] - origin[k];
-      q[k] = turned.centre[k] - origin[k];
-      p[k] = ball_a.centre[k] - origin[k];
-      lever[k] = origin[k] - map.t[k];
-      magnitude += std::abs(offset[k]) + std::abs(p[k]);
+    for (std::size_t k = 0; k < tasks.size; ++k) {
+      add_lenses<T>(tasks, k, pairs[tasks.pair[k]], bins != nullptr, list);
+      if (list.size >= kFullList) sum_full_list(list, sums, bins);
     }
-    LensTasks what;
-    what.error = distance_error<T>(magnitude);
-    load_block<T>(stage.a->level[0].blocks[a[i]], sa);
-    const Reach ra = reach_of<T>(sa, q, turned.radius, what.error);
-    if (ra.touching == 0) continue;
-    shift<T>(turned.spheres, offset, sb);
-    const Reach rb = reach_of<T>(sb, p, ball_a.r, what.error);
-    if (rb.touching == 0) continue;
-
-    // The side with fewer spheres in play goes one by one; the other lies in lanes.
-    const std::uint32_t tasks_a = ra.touching & ~ra.holding;
-    const std::uint32_t tasks_b = rb.touching & ~rb.holding;
-    const bool lanes_b = hwy::PopCount(tasks_a) <= hwy::PopCount(tasks_b);
-    what.tasks = lanes_b ? tasks_a : tasks_b;
-    what.holding = lanes_b ? ra.holding : rb.holding;
-    what.lanes = lanes_b ? rb.touching : ra.touching;
-    what.sign = lanes_b ? 1 : -1;
-    bool any = false;
-    sums.lenses += sum_lenses<T>(lanes_b ? sa : sb, lanes_b ? sb : sa, what, lever, pair, any);
-    if (!any) continue;
-    add_pair(pair, sums);
-    if (stage.bins.sums != nullptr)
-      add_pair(pair, stage.bins.sums[stage.bins.node[i] >> stage.bins.shift]);
   }
+  sum_last_lenses(list, sums, bins);
 }
 
 void add_single(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,

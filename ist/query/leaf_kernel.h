@@ -7,7 +7,8 @@
 
 namespace ist {
 
-/// Half of the virtual lanes: what a block pair's sums are folded to before they are added up.
+/// Half of the virtual lanes: what the sums of a list of lenses are folded to before they are added
+/// up.
 inline constexpr std::size_t kSumLanes = 8;
 
 /// Running sums over leaf pairs, in A's unit frame, positions relative to B's unit-frame origin.
@@ -29,15 +30,19 @@ struct LeafBinning {
   int shift = 0;
 };
 
+/// One stage of leaf pairs: of each pair one side at least is a leaf block (level 0), the other one
+/// too or a single sphere (kSphereLevel).
 struct LeafStage {
   const SphereTree* a;
   const SphereTree* b;
+  int level_a;
+  int level_b;
   const Similarity* a_from_b;
   Precision precision;
   LeafBinning bins = {};
 };
 
-/// Adds the lenses of every sphere of block a[i] with every sphere of block b[i].
+/// Adds the lenses of every sphere of a[i] with every sphere of b[i].
 void add_leaf_pairs(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
                     std::size_t n, LeafSums& sums) noexcept;
 

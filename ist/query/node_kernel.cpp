@@ -11,9 +11,31 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-template <class T>
-std::size_t open_as(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                    std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
+/// Appends the pairs of the chosen lanes and y to two lists, whose room ends a vector later.
+template <class T, class M>
+HWY_INLINE std::size_t append(LaneTag<T> d, M chosen, std::uint32_t first, std::uint32_t y,
+                              std::uint32_t* out_x, std::uint32_t* out_y) {
+  if constexpr (sizeof(T) == sizeof(float)) {
+    const hn::RebindToUnsigned<decltype(d)> du;
+    const Compressor compress(d, chosen);
+    hn::StoreU(hn::Set(du, y), du, out_y);
+    hn::StoreU(compress(hn::Iota(du, first)), du, out_x);
+    return compress.count();
+  } else {
+    std::size_t count = 0;
+    for (std::uint32_t bits = mask_bits(d, chosen); bits != 0; bits &= bits - 1) {
+      out_x[count] = first + static_cast<std::uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
+      out_y[count++] = y;
+    }
+    return count;
+  }
+}
+
+/// With kHeld, children inside of y[i] go to `held`.
+template <class T, bool kHeld>
+HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
+                               const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
+                               std::uint32_t* out_y, HeldNodes* held) {
   const LaneTag<T> d;
   const std::size_t lanes = hn::Lanes(d);
   const SphereTree::Level& opened = stage.x->level[stage.level_x];
@@ -24,7 +46,7 @@ std::size_t open_as(const NodeStage& stage, const std::uint32_t* x, const std::u
   double centre[3] = {};
   double radius = 0;
   std::size_t found = 0;
-  const std::uint32_t below = stage.x->level[stage.level_x - 1].count;
+  const std::uint32_t below = stage.x->count(stage.level_x - 1);
   for (std::size_t i = 0; i < n; ++i) {
     if (y[i] != last_y) {
       last_y = y[i];
@@ -40,6 +62,8 @@ std::size_t open_as(const NodeStage& stage, const std::uint32_t* x, const std::u
     const auto qy = hn::Set(d, static_cast<T>(q[1]));
     const auto qz = hn::Set(d, static_cast<T>(q[2]));
     const auto reach = hn::Set(d, static_cast<T>(radius + distance_error<T>(2 * magnitude)));
+    [[maybe_unused]] const auto within =
+        hn::Set(d, static_cast<T>(radius - distance_error<T>(2 * magnitude)));
     const std::uint32_t first_child = kWidth * x[i];
     for (std::size_t lane = 0; lane < kWidth; lane += lanes) {
       const auto dx = load_as<T>(d, block.x + lane) - qx;
@@ -47,37 +71,46 @@ std::size_t open_as(const NodeStage& stage, const std::uint32_t* x, const std::u
       const auto dz = load_as<T>(d, block.z + lane) - qz;
       const auto d2 = (dx * dx + dy * dy) + dz * dz;
       // Negative for an unused lane, whose square must not count.
-      const auto sum = hn::Max(load_as<T>(d, block.r + lane) * grow + reach, hn::Zero(d));
-      const auto near = d2 < sum * sum;
+      const auto r = load_as<T>(d, block.r + lane);
+      const auto sum = hn::Max(r * grow + reach, hn::Zero(d));
+      auto near = d2 < sum * sum;
       const std::uint32_t child = first_child + static_cast<std::uint32_t>(lane);
-      if constexpr (sizeof(T) == sizeof(float)) {
-        const hn::RebindToUnsigned<decltype(d)> du;
-        hn::StoreU(hn::Set(du, last_y), du, out_y + found);
-        // Compressing in registers: the store form is microcode on some processors.
-        hn::StoreU(hn::Compress(hn::Iota(du, child), hn::RebindMask(du, near)), du, out_x + found);
-        found += hn::CountTrue(d, near);
-      } else {
-        for (std::uint32_t bits = mask_bits(d, near); bits != 0; bits &= bits - 1) {
-          out_x[found] =
-              child + static_cast<std::uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
-          out_y[found++] = last_y;
-        }
+      if constexpr (kHeld) {
+        const auto spare = hn::Max(within - r * grow, hn::Zero(d));
+        const auto inside = hn::And(near, d2 < spare * spare);
+        held->size +=
+            append<T>(d, inside, child, last_y, held->x + held->size, held->y + held->size);
+        near = hn::AndNot(inside, near);
       }
+      found += append<T>(d, near, child, last_y, out_x + found, out_y + found);
     }
     // Unused lanes, which a large enough ball would reach all the same.
     while (found > 0 && out_x[found - 1] >= below) --found;
+    if constexpr (kHeld)
+      while (held->size > 0 && held->x[held->size - 1] >= below) --held->size;
   }
   return found;
 }
 
 std::size_t open_single(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
                         std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
-  return open_as<float>(stage, x, y, n, out_x, out_y);
+  return open_as<float, false>(stage, x, y, n, out_x, out_y, nullptr);
 }
 
 std::size_t open_twice(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
-  return open_as<double>(stage, x, y, n, out_x, out_y);
+  return open_as<double, false>(stage, x, y, n, out_x, out_y, nullptr);
+}
+
+std::size_t hold_single(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y,
+                        HeldNodes& held) {
+  return open_as<float, true>(stage, x, y, n, out_x, out_y, &held);
+}
+
+std::size_t hold_twice(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y, HeldNodes& held) {
+  return open_as<double, true>(stage, x, y, n, out_x, out_y, &held);
 }
 
 }  // namespace ist::HWY_NAMESPACE
@@ -88,12 +121,22 @@ namespace ist {
 
 HWY_EXPORT(open_single);
 HWY_EXPORT(open_twice);
+HWY_EXPORT(hold_single);
+HWY_EXPORT(hold_twice);
 
 std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept {
   return stage.precision == Precision::single
              ? HWY_DYNAMIC_DISPATCH(open_single)(stage, x, y, n, out_x, out_y)
              : HWY_DYNAMIC_DISPATCH(open_twice)(stage, x, y, n, out_x, out_y);
+}
+
+std::size_t open_under_spheres(const NodeStage& stage, const std::uint32_t* x,
+                               const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
+                               std::uint32_t* out_y, HeldNodes& held) noexcept {
+  return stage.precision == Precision::single
+             ? HWY_DYNAMIC_DISPATCH(hold_single)(stage, x, y, n, out_x, out_y, held)
+             : HWY_DYNAMIC_DISPATCH(hold_twice)(stage, x, y, n, out_x, out_y, held);
 }
 
 }  // namespace ist

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include <ist/query.h>
@@ -7,6 +8,9 @@
 #include "query/asset_layout.h"
 
 namespace ist {
+
+/// The level under the leaves: a "node" is a single sphere, block · 16 + lane.
+inline constexpr int kSphereLevel = -1;
 
 struct NodeBall {
   double centre[3] = {};
@@ -61,6 +65,10 @@ struct SphereTree {
   }
 
   NodeSums sums(int at_level, std::uint32_t block) const noexcept {
+    if (at_level == kSphereLevel) {
+      const double r = ball(at_level, block).r;
+      return {4 * M_PI / 3 * (r * r * r), 1};
+    }
     if (at_level == top) return {header->volume_sum, static_cast<double>(header->overlap)};
     const NodeBlock& n = level[at_level + 1].nodes[block / kWidth];
     const std::uint32_t lane = block % kWidth;
@@ -76,7 +84,12 @@ struct SphereTree {
   /// Cube of the typical radius of a level's nodes, up to a factor that all trees share: blocks
   /// tile the root ball.
   double typical_cube(int at_level) const noexcept {
-    return header->root[3] * header->root[3] * header->root[3] / level[at_level].count;
+    return header->root[3] * header->root[3] * header->root[3] / count(at_level);
+  }
+
+  /// Nodes of a level.
+  std::uint32_t count(int at_level) const noexcept {
+    return at_level == kSphereLevel ? header->sphere_count : level[at_level].count;
   }
 
   const TreeHeader* header;
