@@ -196,6 +196,20 @@ TEST(ReadGltf, EveryLieIsCaught) {
   }
 }
 
+TEST(ReadGltf, AContainerOfAnyAnnouncedLengthIsReadOrRefused) {
+  const std::string whole = glb(tetrahedron());
+  for (std::uint32_t length = 0; length < whole.size() + 20; ++length) {
+    std::string bytes = whole;
+    std::memcpy(bytes.data() + 8, &length, sizeof(length));
+    try {
+      load_mesh(TempFile("a.glb", bytes).path());
+      EXPECT_EQ(length, whole.size());
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("a.glb: "), std::string::npos) << length;
+    }
+  }
+}
+
 TEST(ReadGltf, DeepAndWideScenesEnd) {
   json deep = tetrahedron();
   deep["nodes"] = json::array();

@@ -135,6 +135,8 @@ std::string_view GltfDocument::parse_container() {
   if (length > bytes.size())
     fail("the file ends early: it announces " + std::to_string(length) + " bytes, here are " +
          std::to_string(bytes.size()));
+  if (length < kHeader + kChunkHeader)
+    fail("its header announces " + std::to_string(length) + " bytes, which hold no glTF");
   bytes = bytes.substr(0, length);
   std::optional<std::string_view> json;
   for (std::size_t at = kHeader; bytes.size() - at >= kChunkHeader;) {
