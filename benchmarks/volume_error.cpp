@@ -50,7 +50,22 @@ struct ErrorsOfClass {
   std::size_t found = 0;
 };
 
-void ask_oracle_rows(Report& report, const std::string& key, std::size_t spheres) {
+/// Median errors of one class, from few spheres to many.
+using Medians = std::vector<std::pair<std::size_t, double>>;
+
+/// p of error ~ spheres^−p: the slope of the straight line that fits the logarithms best.
+double convergence_order(const Medians& medians) {
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
+  for (const auto& [spheres, error] : medians) {
+    const double u = std::log(static_cast<double>(spheres)), v = std::log(error);
+    n += 1, x += u, y += v, xx += u * u, xy += u * v;
+  }
+  return -(n * xy - x * y) / (n * xx - x * x);
+}
+
+/// Returns the median error of the volume by class.
+std::map<std::size_t, double> ask_oracle_rows(Report& report, const std::string& key,
+                                              std::size_t spheres) {
   const std::vector<OracleRow> rows = ist::testing::read_oracle_rows(key);
   std::map<std::string, ist::Asset> assets;
   const auto asset = [&](const std::string& mesh) -> const ist::Asset& {
@@ -89,7 +104,9 @@ void ask_oracle_rows(Report& report, const std::string& key, std::size_t spheres
 
   const std::string of = key + ", " + std::to_string(spheres) + " spheres";
   const std::array<double, 5> limits = volume_limits(spheres);
+  std::map<std::size_t, double> medians;
   for (const auto& [k, error] : errors) {
+    medians[k] = quantile(error.volume, 0.5);
     report.row("Volume and force against exact booleans",
                {{"pair", key},
                 {"spheres", spheres},
@@ -122,6 +139,7 @@ void ask_oracle_rows(Report& report, const std::string& key, std::size_t spheres
                 0, true);
   if (key == "eledino" && spheres == 4'000)
     report.target("interval width median / D, " + of, quantile(widths, 0.5), 0.02, true);
+  return medians;
 }
 
 /// Volumes [u³] of a solid's overlaps with its copies moved by `shifts` along x: columns along x,
@@ -199,12 +217,31 @@ int main(int argc, char** argv) {
   report.remark(
       "Aligned copies: sides and gaps along the sample's z axis, gaps as parts of the side; exact "
       "volumes by a million columns.");
+  report.remark(
+      "Convergence: the error falls as spheres^(−order), fitted over all counts. A ball (ico1k, "
+      "ico20k) is one sphere and begins at its floor.");
   const std::vector<std::size_t> counts =
-      report.quick() ? std::vector<std::size_t>{1'000} : std::vector<std::size_t>{4'000, 16'000};
+      report.quick() ? std::vector<std::size_t>{300, 1'000}
+                     : std::vector<std::size_t>{300, 1'000, 4'000, 16'000, 30'000};
+  std::map<std::pair<std::string, std::size_t>, Medians> medians;  // by pair and class
   for (const std::size_t spheres : counts) {
-    for (const std::string& key : ist::testing::kPairKeys) ask_oracle_rows(report, key, spheres);
+    for (const std::string& key : ist::testing::kPairKeys)
+      for (const auto& [k, median] : ask_oracle_rows(report, key, spheres))
+        medians[{key, k}].emplace_back(spheres, median);
     for (const std::string name : {"cube", "bolt", "gear"})
       ask_aligned_copies(report, name, spheres);
+  }
+  for (const auto& [of, errors] : medians) {
+    const double order = convergence_order(errors);
+    report.row(
+        "Convergence",
+        {{"pair", of.first},
+         {"class", kClasses[of.second]},
+         {"error median % at " + std::to_string(errors.front().first), 100 * errors.front().second},
+         {"at " + std::to_string(errors.back().first), 100 * errors.back().second},
+         {"order", order}});
+    if (of.first == "eledino" || of.first == "big200k")
+      report.target("order of convergence, " + kClasses[of.second] + ", " + of.first, order, 0.5);
   }
   return report.write();
 }
