@@ -37,7 +37,9 @@ constexpr MeshPair kMeshPairs[] = {
 /// What is counted over the cases of one pair, and listed by row.
 class Findings {
  public:
-  Findings(Report& report, std::string pair) : report_(report), pair_(std::move(pair)) {}
+  /// Disagreements are appended to a list: their table comes last.
+  Findings(Report& report, std::string pair, std::vector<Report::Json>& disagreements)
+      : report_(report), pair_(std::move(pair)), disagreements_(disagreements) {}
 
   void add(const ContactCase& c, const ContactVerdict& verdict) {
     ++cases_;
@@ -109,19 +111,20 @@ class Findings {
   static const char* yes_no(bool value) { return value ? "yes" : "no"; }
 
   void list(const ContactCase& c, const ContactVerdict& verdict, const std::string& reason) {
-    report_.row("Disagreements", {{"pair", pair_},
-                                  {"case", c.name},
-                                  {"exact", c.held      ? "held"
-                                            : c.cross() ? "cross"
-                                                        : "apart"},
-                                  {"ist", yes_no(verdict.matched)},
-                                  {"FCL", yes_no(verdict.fcl)},
-                                  {"Bullet", yes_no(verdict.bullet)},
-                                  {"reason", reason}});
+    disagreements_.push_back({{"pair", pair_},
+                              {"case", c.name},
+                              {"exact", c.held      ? "held"
+                                        : c.cross() ? "cross"
+                                                    : "apart"},
+                              {"ist", yes_no(verdict.matched)},
+                              {"FCL", yes_no(verdict.fcl)},
+                              {"Bullet", yes_no(verdict.bullet)},
+                              {"reason", reason}});
   }
 
   Report& report_;
   std::string pair_;
+  std::vector<Report::Json>& disagreements_;
   std::size_t cases_ = 0, meet_ = 0, wrong_ = 0, soft_skin_ = 0, shallow_ = 0, unfound_ = 0;
   std::size_t bullet_false_ = 0, bullet_missed_ = 0;
   std::size_t held_ = 0, held_found_ = 0, held_by_fcl_ = 0, held_by_bullet_ = 0;
@@ -159,14 +162,14 @@ class Angles {
 };
 
 void ask_oracle_rows(Report& report, ist::testing::ContactJudge& judge, const std::string& key,
-                     std::size_t spheres) {
+                     std::size_t spheres, std::vector<Report::Json>& disagreements) {
   const auto rows = ist::testing::read_oracle_rows(key);
   ist::testing::Model a(ist::testing::oracle_mesh_path(rows.front().mesh_a), spheres);
   ist::testing::Model b(ist::testing::oracle_mesh_path(rows.front().mesh_b), spheres);
-  Findings findings(report, key);
+  Findings findings(report, key, disagreements);
   Angles angles;
   for (const ist::testing::OracleRow& row : rows) {
-    const ContactCase c = case_of(row, "", a, b);
+    const ContactCase c = case_of(row, a, b);
     findings.add(c, judge.judge(c));
     if (row.pose_class != "pen" || row.fraction_of_smaller < 1e-3) continue;
     angles.add(judge.angles(c));
@@ -178,13 +181,13 @@ void ask_oracle_rows(Report& report, ist::testing::ContactJudge& judge, const st
 }
 
 void ask_random_poses(Report& report, ist::testing::ContactJudge& judge, const MeshPair& pair,
-                      std::size_t spheres, int poses) {
+                      std::size_t spheres, int poses, std::vector<Report::Json>& disagreements) {
   const auto path = [](const char* name) {
     return ist::testing::shared_path(std::string("meshes/dev/") + name).string();
   };
   ist::testing::Model a(path(pair.a), spheres), b(path(pair.b), spheres);
   ist::testing::RandomContacts contacts(a, b, pair.size_b, 5);
-  Findings findings(report, pair.name);
+  Findings findings(report, pair.name, disagreements);
   Angles angles;
   for (int i = 0; i < poses; ++i) {
     const ContactCase c = contacts.next();
@@ -226,8 +229,11 @@ int main(int argc, char** argv) {
       "integrated over B's surface inside A; how far this integral is from the oracle's gradients "
       "stands in the first four rows. Random crossings in the shallow band are left out.");
   ist::testing::ContactJudge judge;
+  std::vector<Report::Json> disagreements;
   for (const std::string& key : ist::testing::kPairKeys)
-    ask_oracle_rows(report, judge, key, spheres);
-  for (const MeshPair& pair : kMeshPairs) ask_random_poses(report, judge, pair, spheres, poses);
+    ask_oracle_rows(report, judge, key, spheres, disagreements);
+  for (const MeshPair& pair : kMeshPairs)
+    ask_random_poses(report, judge, pair, spheres, poses, disagreements);
+  for (const Report::Json& row : disagreements) report.row("Disagreements", row);
   return report.write();
 }

@@ -36,7 +36,7 @@ TEST_P(OracleRows, AgreeWithFclBulletAndExactDistances) {
   Tally tally;
   std::vector<double> ist, fcl, bullet;  // [degrees] to the exact force
   for (const OracleRow& row : rows) {
-    const ContactCase c = case_of(row, key, a, b);
+    const ContactCase c = case_of(row, a, b);
     SCOPED_TRACE(c.name);
     // FCL, the judge of the random poses below, must know the exact answers itself.
     EXPECT_NEAR(fcl_distance(c.a->fcl, {}, c.b->fcl, c.pose_b), c.surface_distance, 1e-6);

@@ -195,9 +195,9 @@ class ContactJudge {
 };
 
 /// A row of the oracle, whose distances and forces are exact.
-inline ContactCase case_of(const OracleRow& row, const std::string& key, Model& a, Model& b) {
+inline ContactCase case_of(const OracleRow& row, Model& a, Model& b) {
   ContactCase c;
-  c.name = key + " row " + std::to_string(row.id) + " (" + row.pose_class + ")";
+  c.name = "row " + std::to_string(row.id) + " (" + row.pose_class + ")";
   c.a = &a.at(1);
   c.b = &b.at(row.scale_b);
   c.pose_b = row.pose;
