@@ -19,6 +19,7 @@ constexpr std::uint32_t kTriesPerPose = 4;
 // Size of a contained B over A's, if it finds room; half of it if not, and so on.
 constexpr double kContainedSize = 0.15;
 constexpr std::uint32_t kContainedTries = 400;  // for each pose
+constexpr int kApproachSteps = 24;
 constexpr int kBisections = 40;
 
 /// Random numbers by + − × ÷ sqrt, so that poses are the same everywhere.
@@ -93,8 +94,18 @@ class Trials {
     const auto ask = [&](const Pose& pose) {
       return penetration({a_.tree, {}, 1}, {b_.tree, pose, 1}, {}, workspace_);
     };
-    double near = 0, far = ball_a_.radius + ball_b_.radius;
-    if (ask(at(near)).volume < fraction * smaller_) return false;
+    // From outside in, since solids may have holes in the middle.
+    const double start = ball_a_.radius + ball_b_.radius;
+    double near = start, far = start;
+    for (int i = kApproachSteps; i-- > 0 && near == start;) {
+      const double way = start * i / kApproachSteps;
+      if (ask(at(way)).volume >= fraction * smaller_) {
+        near = way;
+      } else {
+        far = way;
+      }
+    }
+    if (near == start) return false;
     for (int i = 0; i < kBisections; ++i) {
       const double middle = (near + far) / 2;
       (ask(at(middle)).volume < fraction * smaller_ ? far : near) = middle;
@@ -171,10 +182,14 @@ std::vector<TrialPose> trial_poses(const TrialBody& a, const TrialBody& b, std::
       continue;
     }
     for (std::uint32_t i = 0; i < kTriesPerPose * per_class && found < per_class; ++i) {
-      // From the class's floor up a decade, or to 0.5, evenly on the logarithm.
+      // From the class's floor up a decade, evenly on the logarithm; deep ones evenly up to 0.5.
       double fraction = kOverlapClassFloor[k];
-      for (double left = (k == 1 ? 0.7 : 1.0) * trials.random().uniform(); left > 0; left -= 0.01)
-        fraction *= 1.0232929922807541;  // 10^0.01
+      if (k == 1) {
+        fraction += 0.4 * trials.random().uniform();
+      } else {
+        constexpr double kStep = 1.0232929922807541;  // 10^0.01
+        for (double left = trials.random().uniform(); left > 0; left -= 0.01) fraction *= kStep;
+      }
       TrialPose pose;
       if (!trials.approach(fraction, pose)) continue;
       poses.push_back(pose);

@@ -36,10 +36,10 @@ struct TrialBody {
 };
 
 /// About `per_class` poses for each class of overlap: independent random rotations, directions of
-/// approach and overlaps, evenly spread over the logarithm; `contained` ones hold a smaller B
-/// whole. Volumes are integrated over the meshes to `relative_error`; a pose for which that cannot
-/// be done is left out. Same poses for the same seed, on any machine and for any number of threads.
-/// Runs on the caller's TBB threads.
+/// approach and overlaps, spread evenly over their logarithm (over 10–50 % over themselves);
+/// `contained` ones hold a smaller B whole. Volumes are integrated over the meshes to
+/// `relative_error`; a pose for which that cannot be done is left out. Same poses for the same
+/// seed, on any machine and for any number of threads. Runs on the caller's TBB threads.
 std::vector<TrialPose> trial_poses(const TrialBody& a, const TrialBody& b, std::uint32_t per_class,
                                    double relative_error, std::uint64_t seed);
 

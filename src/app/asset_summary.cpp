@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "app/text.h"
+#include "build/trial_poses.h"
 #include "query/asset_layout.h"
 
 namespace ist::app {
@@ -19,6 +20,16 @@ nlohmann::ordered_json tree_json(const TreeHeader& tree, double scale) {
           {"root_radius", tree.root[3] * scale},
           {"mean_radius", tree.mean_radius * scale},
           {"overlap", tree.overlap}};
+}
+
+/// Empty where nothing was predicted.
+nlohmann::ordered_json predicted_json(const AssetHeader& h) {
+  nlohmann::ordered_json result = nlohmann::ordered_json::object();
+  if (h.predicted_poses == 0) return result;
+  result["poses"] = h.predicted_poses;
+  for (std::uint32_t k = 0; k < kOverlapClasses; ++k)
+    result["error"][kOverlapClassNames[k]] = h.predicted_error[k];
+  return result;
 }
 
 nlohmann::ordered_json details_json(const AssetHeader& h, double scale) {
@@ -62,6 +73,15 @@ std::string describe_asset(const TreeView& tree) {
                             h.asked_spheres == 0 ? "unlimited" : grouped(h.asked_spheres),
                             h.asked_coverage, h.asked_min_radius, h.asked_epsilon,
                             name_of(static_cast<GridMode>(h.asked_grid)), h.asked_seed));
+  if (h.predicted_poses > 0) {
+    std::string errors;
+    for (std::uint32_t k = 0; k < kOverlapClasses; ++k)
+      errors += fmt::format("{}{}: {:.2g} %", k == 0 ? "" : ", ", kOverlapClassNames[k],
+                            100 * h.predicted_error[k]);
+    line("error",
+         fmt::format("median by overlap of two copies, {} poses: {}", h.predicted_poses, errors));
+    line("", fmt::format("asked: {:g} % at {:g} %", 100 * h.asked_error, 100 * h.asked_at_overlap));
+  }
   if ((h.flags & kFlagRepaired) != 0) line("note", "the mesh was open and was repaired");
   if ((h.flags & kFlagBelowNoise) != 0)
     line("note", "the smallest spheres lie under float noise: certified, not in greedy order");
@@ -100,7 +120,10 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
         {"grid_resolution", h.asked_grid_resolution},
         {"grid_refinements", h.asked_grid_refinements},
         {"grid_rounds", h.asked_grid_rounds},
-        {"seed", h.asked_seed}}},
+        {"seed", h.asked_seed},
+        {"error", h.asked_error},
+        {"at_overlap", h.asked_at_overlap}}},
+      {"predicted", predicted_json(h)},
       {"inner_tree", tree_json(h.inner_tree, scale)},
       {"matched_tree", tree_json(h.matched_tree, scale)},
       {"details", details_json(h, scale)},

@@ -22,6 +22,7 @@ struct BakeOptions {
   std::string mesh, output;
   PackingSettings packing;
   std::string grid = "banded", device = "auto";
+  ErrorTarget target = {0, ErrorTarget().at_overlap};  ///< error 0: none is asked for
   bool repair = false, json = false, quiet = false;
 };
 
@@ -46,14 +47,37 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-Asset bake_interruptibly(const ClosedMesh& mesh, const PackingSettings& settings, bool quiet) {
+/// A number, or a number and a percent sign.
+double parse_share(const std::string& text) {
+  const bool percent = !text.empty() && text.back() == '%';
+  double value = 0;
+  if (!CLI::detail::lexical_cast(percent ? text.substr(0, text.size() - 1) : text, value))
+    return -1;
+  return percent ? value / 100 : value;
+}
+
+/// What CLI11 asks of a validator: "" or what is wrong.
+template <class Accepts>
+CLI::Validator share(const char* range, Accepts accepts) {
+  return CLI::Validator(
+      [=](std::string& text) {
+        return accepts(parse_share(text)) ? std::string()
+                                          : "'" + text + "' is not a share " + range;
+      },
+      "SHARE");
+}
+
+Asset bake_interruptibly(const ClosedMesh& mesh, const ErrorTarget& target,
+                         const PackingSettings& settings, bool quiet) {
   const InterruptGuard guard;
   ProgressLine line(quiet);
   try {
-    Asset asset = bake(mesh, settings, [&](const Progress& progress) {
+    const auto show = [&](const Progress& progress) {
       line.show(progress);
       return !interrupted();
-    });
+    };
+    Asset asset = target.relative_error > 0 ? bake_to_error(mesh, target, settings, show)
+                                            : bake(mesh, settings, show);
     exit_if_interrupted();
     return asset;
   } catch (const Error&) {
@@ -76,7 +100,7 @@ void run_bake(const BakeOptions& options) {
                  options.repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
   for (const std::string& note : mesh.report.notes) spdlog::warn("{}: {}", options.mesh, note);
   const double import_seconds = seconds_since(start);
-  const Asset asset = bake_interruptibly(mesh, settings, options.quiet);
+  const Asset asset = bake_interruptibly(mesh, options.target, settings, options.quiet);
   const double bake_seconds = seconds_since(start) - import_seconds;
   {
     const InterruptGuard guard;  // the file is written whole, or not at all
@@ -108,6 +132,25 @@ void add_bake(CLI::App& app) {
   command->add_option("--spheres", packing.max_spheres, "Stop at this count, 0 = no limit")
       ->check(is_count)
       ->capture_default_str();
+  command
+      ->add_option_function<std::string>(
+          "--target-error",
+          [options, command](const std::string& text) {
+            options->target.relative_error = parse_share(text);
+            // Unless asked for, the default count is no limit here.
+            if (command->count("--spheres") == 0) options->packing.max_spheres = 0;
+          },
+          "As many spheres as this median error of the volume needs, e.g. 1%; --spheres is the "
+          "most")
+      ->check(share("above 0 and below 1", [](double x) { return x > 0 && x < 1; }));
+  command
+      ->add_option_function<std::string>(
+          "--at-overlap",
+          [options](const std::string& text) { options->target.at_overlap = parse_share(text); },
+          "Overlap, part of the volume, at which it is to hold")
+      ->check(share("from 0.01% to 50%", [](double x) { return x >= 1e-4 && x <= 0.5; }))
+      ->needs("--target-error")
+      ->default_str("0.1%");
   command->add_option("--coverage", packing.target_coverage, "Stop at this share of the volume")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();

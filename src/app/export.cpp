@@ -26,7 +26,7 @@ void run_export(const ExportOptions& options) {
   const Asset asset = Asset::load(options.asset);
   const std::uint32_t details = asset.view().header().detail_count;
   if (options.detail > details)
-    throw Error(fmt::format("{}: it has {} coarser levels of detail, not {}", options.asset,
+    throw Error(fmt::format("{}: it has {} coarser level(s) of detail, not {}", options.asset,
                             details, options.detail));
   const std::vector<ExportedSphere> spheres = exported_spheres(asset.view(), options.detail);
   const std::string extension = options.output.extension().string();

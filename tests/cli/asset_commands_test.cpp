@@ -38,6 +38,18 @@ TEST_F(AssetCommands, InfoShowsTheHeader) {
   expect_exit(1, {"info", "cube.obj"}, "not an .ist asset");
 }
 
+TEST_F(AssetCommands, LevelsOfDetailAreListedAndExported) {
+  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "fine.ist", "--spheres", "1000"}).exit_code, 0);
+  const nlohmann::json json = nlohmann::json::parse(ist({"info", "fine.ist", "--json"}).out);
+  ASSERT_EQ(json.at("details").size(), 1u);
+  EXPECT_EQ(json.at("details")[0].at("matched_tree").at("spheres"), 250);
+  ASSERT_EQ(ist({"export", "fine.ist", "-o", "d.csv", "--detail", "1"}).exit_code, 0);
+  EXPECT_EQ(lines_of(read("d.csv")).size(), 251u);
+  const Outcome none = ist({"export", "fine.ist", "-o", "e.csv", "--detail", "2"});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_NE(none.err.find("1 coarser level"), std::string::npos) << none.err;
+}
+
 TEST_F(AssetCommands, CheckPassesASoundAsset) {
   const Outcome text = ist({"check", "cube.ist", "--mesh", "cube.obj"});
   EXPECT_EQ(text.exit_code, 0) << text.out;

@@ -46,6 +46,22 @@ TEST_F(BakeCommand, JsonHoldsTheResult) {
   EXPECT_GE(json.at("seconds").at("bake"), 0);
 }
 
+TEST_F(BakeCommand, ATargetPicksTheSphereCount) {
+  const Outcome outcome = ist({"bake", "cube.obj", "-o", "new.ist", "--target-error", "20%",
+                               "--at-overlap", "1%", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const nlohmann::json json = nlohmann::json::parse(outcome.out);
+  EXPECT_LT(json.at("spheres"), 1000);
+  EXPECT_EQ(json.at("asked").at("error"), 0.2);
+  EXPECT_EQ(json.at("asked").at("at_overlap"), 0.01);
+  EXPECT_GE(json.at("predicted").at("poses"), 100);
+  EXPECT_LE(json.at("predicted").at("error").at("10–50 %"), 0.2);
+  EXPECT_NE(ist({"info", "new.ist"}).out.find("asked: 20 % at 1 %"), std::string::npos);
+  for (const char* bad : {"0", "100%", "1x", "-1%"})
+    EXPECT_EQ(ist({"bake", "cube.obj", "-o", "n.ist", "--target-error", bad}).exit_code, 2) << bad;
+  EXPECT_EQ(ist({"bake", "cube.obj", "-o", "n.ist", "--at-overlap", "1%"}).exit_code, 2);
+}
+
 TEST_F(BakeCommand, EveryLimitStopsThePacking) {
   const auto stop = [&](const std::vector<std::string>& limits) {
     std::vector<std::string> arguments = {"bake", "cube.obj", "-o", "new.ist", "--json"};

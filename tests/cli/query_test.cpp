@@ -135,6 +135,18 @@ TEST_F(QueryCommand, ABudgetIsNamedInTheStatus) {
   EXPECT_NE(all[0].find(",budget_exhausted,"), std::string::npos) << all[0];
 }
 
+TEST_F(QueryCommand, APairBudgetTakesACoarserLevel) {
+  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "fine.ist", "--spheres", "1000"}).exit_code, 0);
+  const auto row = [&](const char* budget) {
+    const auto all = rows(
+        {"fine.ist", "fine.ist", "--csv", "--pose", "1,0,0,0,0.4,0.1,0", "--pair-budget", budget});
+    return numbers_of(all.at(0));
+  };
+  const auto finest = row("0"), coarse = row("10");
+  EXPECT_NEAR(coarse[1], finest[1], 0.05 * finest[1]);
+  EXPECT_NE(coarse[1], finest[1]);
+}
+
 TEST_F(QueryCommand, JsonHasTheColumnsOfTheCsv) {
   const Outcome outcome =
       ist({"query", "cube.ist", "cube.ist", "--pose", "1,0,0,0,0.5,0,0", "--json"});
