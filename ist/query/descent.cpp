@@ -19,9 +19,6 @@ constexpr std::size_t kChunk = 64;
 // times what rounding does, so float keeps 1e-5.
 constexpr double kGrazing = 3e-4;
 
-// Σ r³ in double.
-constexpr double kHeldRounding = 1e-12;
-
 }  // namespace
 
 Descent::Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
@@ -57,7 +54,7 @@ Overlap Descent::overlap() const {
 Overlap Descent::sure() const {
   Overlap result = finish(sums_, precision_);
   result.add(held_);
-  result.error += kHeldRounding * held_.volume;
+  result.error += sum_rounding(precision_) * held_.volume;
   return result;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "query/descent.h"
 #include "query/detail_chain.h"
@@ -99,6 +100,10 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       result.status = std::max(result.status, part.status);
       slope += weights[i].slope / unit3 * part.volume;
     }
+    // The gauge is rounded too, and with it the weights.
+    const double doubt = std::abs(slope) * (gauge.volume_max - gauge.volume_min);
+    result.volume_min = std::max(0.0, result.volume_min - doubt);
+    result.volume_max += doubt;
     if (result.volume > 0) result.centroid /= result.volume;
     result.translation_gradient += slope * gauge.translation_gradient;
     result.rotation_gradient += slope * gauge.rotation_gradient;

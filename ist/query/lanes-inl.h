@@ -91,6 +91,23 @@ class Compressor {
 };
 #endif
 
+/// Writes first + lane for every lane that is chosen, and perhaps more behind; returns how many.
+template <class T, class M>
+HWY_INLINE std::size_t append_lanes(LaneTag<T> d, M chosen, std::uint32_t first,
+                                    std::uint32_t* out) {
+  if constexpr (sizeof(T) == sizeof(float)) {
+    const hn::RebindToUnsigned<decltype(d)> du;
+    const Compressor compress(d, chosen);
+    hn::StoreU(compress(hn::Set(du, first) + hn::Load(du, kLaneNumbers)), du, out);
+    return compress.count();
+  } else {
+    std::size_t count = 0;
+    for (std::uint32_t bits = mask_bits(d, chosen); bits != 0; bits &= bits - 1)
+      out[count++] = first + static_cast<std::uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
+    return count;
+  }
+}
+
 }  // namespace ist::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

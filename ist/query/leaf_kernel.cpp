@@ -25,20 +25,42 @@ struct alignas(64) Spheres {
 /// One side of a pair of leaf blocks, in A's unit frame. Four numbers, since vectors hold so many.
 template <class T>
 struct alignas(32) Side {
-  double origin[4] = {};  ///< of the spheres' coordinates
-  double centre[4] = {};  ///< of the leaf ball
-  double radius = 0;      ///< of the leaf ball
-  double size = 0;        ///< bound on the way from the origin to the end of any sphere
-  const Spheres<T>* spheres = nullptr;
+  double origin[4];  ///< of the spheres' coordinates
+  double centre[4];  ///< of the leaf ball
+  double radius;     ///< of the leaf ball
+  double size;       ///< bound on the way from the origin to the end of any sphere
+  const Spheres<T>* spheres;
 };
 
-/// A block of A that was met before.
+/// Blocks that were met lately: neighbours in a list of pairs share the blocks below one node.
 template <class T>
-struct Cached {
-  std::uint32_t block = ~0u;
-  Side<T> side;
+class BlockCache {
+ public:
+  struct Entry {
+    std::uint32_t block = ~0u;
+    std::uint32_t round = 0;  ///< that last used it
+    Side<T> side;
+    Spheres<T> room;
+  };
+
+  /// The entry of a block, which `fill` makes if it is not there; null if this round uses its place
+  /// for another one.
+  template <class Fill>
+  HWY_INLINE const Side<T>* find(std::uint32_t block, std::uint32_t round, Fill fill) {
+    Entry& entry = entries_[block % kEntries];
+    if (entry.block != block) {
+      if (entry.round == round) return nullptr;
+      entry.block = block;
+      fill(entry);
+    }
+    entry.round = round;
+    return &entry.side;
+  }
+
+ private:
+  static constexpr std::size_t kEntries = 32;
+  Entry entries_[kEntries];
 };
-inline constexpr std::size_t kCached = 32;
 
 /// What the tasks of one pair of leaf blocks share.
 template <class T>
@@ -259,30 +281,26 @@ void add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t*
   const std::uint32_t only_b = single_b ? 1 : 0;
   alignas(32) const double origin_b[4] = {map.t[0], map.t[1], map.t[2], 0};
   const TurnedAxes<T> axes(map);
-  Spheres<T> of_a[sizeof(T) == sizeof(float) ? 1 : kPairsAtOnce], of_b[kPairsAtOnce];
+  BlockCache<T> blocks_a, blocks_b;
   PairOfBlocks<T> pairs[kPairsAtOnce];
-  Cached<T> cache[kCached];
   Tasks<T> tasks;
   LensList<T> list;
-  for (std::size_t done = 0; done < n; done += kPairsAtOnce) {
-    const std::size_t now = std::min(kPairsAtOnce, n - done);
-    Side<T> side_b;
-    std::uint32_t last_b = ~0u;
+  std::uint32_t round = 0;
+  for (std::size_t done = 0; done < n;) {
+    const std::size_t most = std::min(kPairsAtOnce, n - done);
+    ++round;
     tasks.size = 0;
-    for (std::size_t i = 0; i < now; ++i) {
+    std::size_t i = 0;
+    for (; i < most; ++i) {
       const std::uint32_t block_a = single_a ? a[done + i] / kWidth : a[done + i];
       const std::uint32_t block_b = single_b ? b[done + i] / kWidth : b[done + i];
-      // Neighbours in the list share the blocks below one node.
-      Cached<T>& cached = cache[block_a % kCached];
-      if (cached.block != block_a) {
-        cached.block = sizeof(T) == sizeof(float) ? block_a : ~0u;
-        take_block<T>(*stage.a, block_a, of_a[sizeof(T) == sizeof(float) ? 0 : i], cached.side);
-      }
-      const Side<T>* const sides[2] = {&cached.side, &side_b};
-      if (block_b != last_b) {
-        last_b = block_b;
-        turn_block<T>(*stage.b, block_b, axes, of_b[i], side_b);
-      }
+      const Side<T>* const sides[2] = {
+          blocks_a.find(block_a, round,
+                        [&](auto& to) { take_block<T>(*stage.a, block_a, to.room, to.side); }),
+          blocks_b.find(block_b, round, [&](auto& to) {
+            turn_block<T>(*stage.b, block_b, axes, to.room, to.side);
+          })};
+      if (sides[0] == nullptr || sides[1] == nullptr) break;
       // The side of the larger spread goes one by one: fewer of its spheres come near the other.
       const std::uint32_t task_side =
           (static_cast<std::uint32_t>(sides[0]->radius <= sides[1]->radius) & either) | only_b;
@@ -300,6 +318,7 @@ void add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t*
                                     : -1;
       add_tasks<T>(one, many, single, error, static_cast<std::uint32_t>(i), tasks);
     }
+    done += i;
     for (std::size_t k = 0; k < tasks.size; ++k) {
       add_lenses<T>(tasks, k, pairs[tasks.pair[k]], bins != nullptr, list);
       if (list.size >= kFullList) sum_full_list(list, sums, bins);

@@ -15,20 +15,10 @@ namespace ist::HWY_NAMESPACE {
 template <class T, class M>
 HWY_INLINE std::size_t append(LaneTag<T> d, M chosen, std::uint32_t first, std::uint32_t y,
                               std::uint32_t* out_x, std::uint32_t* out_y) {
-  if constexpr (sizeof(T) == sizeof(float)) {
-    const hn::RebindToUnsigned<decltype(d)> du;
-    const Compressor compress(d, chosen);
-    hn::StoreU(hn::Set(du, y), du, out_y);
-    hn::StoreU(compress(hn::Iota(du, first)), du, out_x);
-    return compress.count();
-  } else {
-    std::size_t count = 0;
-    for (std::uint32_t bits = mask_bits(d, chosen); bits != 0; bits &= bits - 1) {
-      out_x[count] = first + static_cast<std::uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
-      out_y[count++] = y;
-    }
-    return count;
-  }
+  const hn::CappedTag<std::uint32_t, kWidth> du;
+  for (std::size_t i = 0; i < hn::Lanes(d); i += hn::Lanes(du))
+    hn::StoreU(hn::Set(du, y), du, out_y + i);
+  return append_lanes<T>(d, chosen, first, out_x);
 }
 
 /// With kHeld, children inside of y[i] go to `held`.

@@ -20,10 +20,7 @@ Eigen::Vector3d total(const double (&lanes)[3][kSumLanes]) {
 Overlap finish(const LeafSums& sums, Precision precision) noexcept {
   Overlap overlap;
   overlap.volume = M_PI / 3 * total(sums.caps);
-  // A lens is good to a few units in the last place, and at most 33 of them meet in one lane
-  // before the sum goes on in double.
-  const double relative = precision == Precision::single ? 4e-6 : 1e-14;
-  overlap.error = 2 * M_PI * total(sums.error) + relative * overlap.volume;
+  overlap.error = 2 * M_PI * total(sums.error) + sum_rounding(precision) * overlap.volume;
   overlap.force = -2 * M_PI * total(sums.force);
   overlap.torque = -2 * M_PI * total(sums.torque);
   overlap.moment = M_PI / 3 * total(sums.moment);

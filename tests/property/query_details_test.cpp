@@ -235,7 +235,8 @@ TEST_F(QueryDetails, OtherLimitsHoldOnTop) {
     EXPECT_GE(answer.volume_max, answer.volume);
     EXPECT_TRUE(answer.translation_gradient.allFinite());
     if (answer.status == QueryStatus::ok) {
-      EXPECT_EQ(answer.volume, finished.volume);
+      // An accepted error changes the order of the sum.
+      EXPECT_NEAR(answer.volume, finished.volume, 4e-6 * finished.volume);
     }
     stopped += answer.status == QueryStatus::budget_exhausted ? 1 : 0;
   }
