@@ -69,7 +69,8 @@ def volume_error(report, path):
             line, = axis.semilogy(classes, [row["error median %"] for row in mine], "o-",
                                   label=f"{spheres:,} spheres, median")
             axis.semilogy(classes, [row["error p95 %"] for row in mine], ":",
-                          color=line.get_color(), label="p95")
+                          color=line.get_color())
+        axis.plot([], [], "k:", label="p95")
         inner = max(row["spheres"] for row in rows)
         axis.semilogy(classes, [row["inner median %"] for row in rows
                                 if (row["pair"], row["spheres"]) == (pair, inner)], "k--",
@@ -78,7 +79,7 @@ def volume_error(report, path):
         axis.tick_params(axis="x", rotation=30)
         axis.grid(True, which="major", alpha=0.3)
     axes[0, 0].set_ylabel("error of the volume, %")
-    axes[0, -1].legend(fontsize=7)
+    axes[0, -1].legend(fontsize=7, loc="center left", bbox_to_anchor=(1, 0.5))
     save(figure, path)
 
 
