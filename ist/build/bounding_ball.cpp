@@ -132,13 +132,6 @@ bool grow(const Support& support, const Ball& added, Support& best_support, Ball
 
 }  // namespace
 
-double reach(double x, double y, double z, const Ball& ball) {
-  const double dx = ball.x - x;
-  const double dy = ball.y - y;
-  const double dz = ball.z - z;
-  return std::sqrt(dx * dx + dy * dy + dz * dz) + ball.r;
-}
-
 // The radius grows with every ball that joins the support, so the walk ends; the cap is for ties
 // within rounding only.
 Ball bounding_ball(std::span<const Ball> balls) {

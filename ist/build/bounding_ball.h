@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <span>
 
 namespace ist {
@@ -14,7 +15,12 @@ struct Ball {
 Ball bounding_ball(std::span<const Ball> balls);
 
 /// Smallest radius about (x, y, z) that holds the ball, before rounding.
-double reach(double x, double y, double z, const Ball& ball);
+inline double reach(double x, double y, double z, const Ball& ball) {
+  const double dx = ball.x - x;
+  const double dy = ball.y - y;
+  const double dz = ball.z - z;
+  return std::sqrt(dx * dx + dy * dy + dz * dz) + ball.r;
+}
 
 /// A float no smaller than `value` plus a relative margin of 1e-12, which covers the rounding of a
 /// radius computed in double. `value` ≥ 0.

@@ -3,6 +3,8 @@
 #include <tbb/parallel_for.h>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <optional>
 
 #include "query/asset_layout.h"
 
@@ -23,8 +25,41 @@ struct Swap {
 
 struct Group {
   std::vector<Ball> members;
+  double x[kWidth] = {}, y[kWidth] = {}, z[kWidth] = {}, r[kWidth] = {};  ///< of the members
   Ball ball;
   std::vector<Ball> without;  ///< bounding ball without each member
+  double least_radius = 0;    ///< of `without`
+};
+
+/// Lower bounds of a group's radius once a ball joins it in place of a member.
+struct Fit {
+  double farthest = 0;  ///< half of the way across the ball and the member it is farthest from
+  double next = 0;      ///< and the member after that
+  std::size_t member = 0;
+
+  Fit(const Group& group, const Ball& added) {
+    double radius[kWidth];
+    for (std::size_t i = 0; i < kWidth; ++i)
+      radius[i] =
+          (reach(added.x, added.y, added.z, {group.x[i], group.y[i], group.z[i], group.r[i]}) +
+           added.r) /
+          2;
+    for (std::size_t i = 0; i < group.members.size(); ++i) {
+      if (radius[i] > farthest) {
+        next = farthest;
+        farthest = radius[i];
+        member = i;
+      } else if (radius[i] > next) {
+        next = radius[i];
+      }
+    }
+  }
+
+  double least_radius(const Group& group, std::size_t left_out) const {
+    const double across = left_out == member ? next : farthest;
+    const double rest = group.without[left_out].r;
+    return across > rest ? across : rest;
+  }
 };
 
 class GroupSwaps {
@@ -82,9 +117,22 @@ class GroupSwaps {
 
   void refresh(std::size_t g) {
     Group& group = groups_[g];
+    fill(group, g);
+    group.least_radius = group.ball.r;
+    for (const Ball& ball : group.without)
+      group.least_radius = std::min(group.least_radius, ball.r);
+  }
+
+  void fill(Group& group, std::size_t g) const {
     group.members.clear();
     const std::size_t end = std::min(order_.size(), (g + 1) * kWidth);
-    for (std::size_t i = g * kWidth; i < end; ++i) group.members.push_back(balls_[order_[i]]);
+    for (std::size_t i = g * kWidth; i < end; ++i) {
+      const Ball& ball = balls_[order_[i]];
+      const std::size_t lane = group.members.size();
+      group.members.push_back(ball);
+      group.x[lane] = ball.x, group.y[lane] = ball.y, group.z[lane] = ball.z,
+      group.r[lane] = ball.r;
+    }
     group.ball = bounding_ball(group.members);
     group.without.assign(group.members.size(), group.ball);
     if (group.members.size() == 1) group.without[0].r = 0;
@@ -105,34 +153,42 @@ class GroupSwaps {
   }
 
   void find_pairs() {
-    const std::size_t count = std::min(kNeighbours, groups_.size() - 1);
-    std::vector<std::vector<std::pair<std::uint32_t, std::uint32_t>>> found(groups_.size());
-    tbb::parallel_for(std::size_t{0}, groups_.size(), [&](std::size_t g) {
-      std::vector<std::pair<double, std::uint32_t>> near;
-      const Ball& ball = groups_[g].ball;
-      for (std::uint32_t h = 0; h < groups_.size(); ++h)
-        if (h != g)
-          near.emplace_back(reach(ball.x, ball.y, ball.z, groups_[h].ball) - 2 * groups_[h].ball.r,
-                            h);
-      std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count),
-                        near.end());
-      for (std::size_t k = 0; k < count; ++k)
-        found[g].emplace_back(std::min(static_cast<std::uint32_t>(g), near[k].second),
-                              std::max(static_cast<std::uint32_t>(g), near[k].second));
+    // Along x: what is further away in x alone need not be looked at.
+    std::vector<std::uint32_t> along(groups_.size());
+    std::iota(along.begin(), along.end(), 0u);
+    const auto x = [&](std::size_t k) { return groups_[along[k]].ball.x; };
+    std::sort(along.begin(), along.end(), [&](std::uint32_t g, std::uint32_t h) {
+      const double xg = groups_[g].ball.x, xh = groups_[h].ball.x;
+      return xg != xh ? xg < xh : g < h;
     });
-    for (const auto& pairs : found) pairs_.insert(pairs_.end(), pairs.begin(), pairs.end());
+    double largest = 0;
+    for (const Group& group : groups_) largest = std::max(largest, group.ball.r);
+    const std::size_t count = std::min(kNeighbours, groups_.size() - 1);
+    using Near = std::pair<double, std::uint32_t>;
+    std::vector<std::vector<Near>> found(groups_.size());
+    tbb::parallel_for(std::size_t{0}, groups_.size(), [&](std::size_t k) {
+      std::vector<Near>& near = found[k];
+      const Ball& ball = groups_[along[k]].ball;
+      const auto look = [&](std::size_t at) {
+        const Ball& other = groups_[along[at]].ball;
+        const Near here = {reach(ball.x, ball.y, ball.z, other) - 2 * other.r, along[at]};
+        if (near.size() == count) {
+          if (!(here < near.back())) return;
+          near.pop_back();
+        }
+        near.insert(std::upper_bound(near.begin(), near.end(), here), here);
+      };
+      const auto beyond = [&](double away) {
+        return near.size() == count && away - largest > near.back().first + 1e-9;
+      };
+      for (std::size_t at = k; at-- > 0 && !beyond(x(k) - x(at));) look(at);
+      for (std::size_t at = k + 1; at < along.size() && !beyond(x(at) - x(k)); ++at) look(at);
+    });
+    for (std::size_t k = 0; k < found.size(); ++k)
+      for (const Near& near : found[k])
+        pairs_.emplace_back(std::min(along[k], near.second), std::max(along[k], near.second));
     std::sort(pairs_.begin(), pairs_.end());
     pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
-  }
-
-  /// Lower bound of the radius once `added` joins `group` in place of member `left_out`.
-  static double least_radius(const Group& group, std::size_t left_out, const Ball& added) {
-    double radius = group.without[left_out].r;
-    for (std::size_t i = 0; i < group.members.size(); ++i)
-      if (i != left_out)
-        radius =
-            std::fmax(radius, (reach(added.x, added.y, added.z, group.members[i]) + added.r) / 2);
-    return radius;
   }
 
   static double radius_with(const Group& group, std::size_t left_out, const Ball& added) {
@@ -149,15 +205,22 @@ class GroupSwaps {
     const double now = cost(ga.ball.r) + cost(gb.ball.r);
     Swap best;
     best.gain = kLeastGain * now;
+    const double least_cost_b = cost(gb.least_radius);
+    if (now - cost(ga.least_radius) - least_cost_b <= best.gain) return {};
     bool found = false;
+    double without_b[kWidth];
+    for (std::size_t t = 0; t < gb.members.size(); ++t) without_b[t] = cost(gb.without[t].r);
+    std::optional<Fit> into_a[kWidth];
     for (std::uint32_t s = 0; s < ga.members.size(); ++s) {
-      if (pinned(a, s)) continue;
+      const double without_a = cost(ga.without[s].r);
+      if (pinned(a, s) || now - without_a - least_cost_b <= best.gain) continue;
+      const Fit into_b(gb, ga.members[s]);
       for (std::uint32_t t = 0; t < gb.members.size(); ++t) {
-        if (pinned(b, t)) continue;
-        if (now - cost(ga.without[s].r) - cost(gb.without[t].r) <= best.gain) continue;
-        const double least_a = cost(least_radius(ga, s, gb.members[t]));
-        if (now - least_a - cost(gb.without[t].r) <= best.gain) continue;
-        const double least_b = cost(least_radius(gb, t, ga.members[s]));
+        if (pinned(b, t) || now - without_a - without_b[t] <= best.gain) continue;
+        const double least_b = cost(into_b.least_radius(gb, t));
+        if (now - without_a - least_b <= best.gain) continue;
+        if (!into_a[t]) into_a[t].emplace(ga, gb.members[t]);
+        const double least_a = cost(into_a[t]->least_radius(ga, s));
         if (now - least_a - least_b <= best.gain) continue;
         const double cost_a = cost(radius_with(ga, s, gb.members[t]));
         if (now - cost_a - least_b <= best.gain) continue;
