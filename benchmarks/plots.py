@@ -106,3 +106,49 @@ def grids(report, path):
     axes[1, 0].set_ylabel("spheres")
     axes[0, 0].legend(fontsize=8)
     save(figure, path)
+
+
+def trade(report, path):
+    """Error of the volume against time: a row a pair, a panel a class of overlap, a curve a way to
+    ask. Points on the front are ringed; libraries that answer no volume are vertical lines."""
+    rows = report["tables"]["Trade"]
+    pairs = list(dict.fromkeys(row["pair"] for row in rows))[:2]
+    classes = list(dict.fromkeys(row["class"] for row in rows))
+    curves = list(dict.fromkeys(row["curve"] for row in rows))
+    colours = plt.get_cmap("tab10").colors
+    figure, axes = plt.subplots(len(pairs), len(classes), squeeze=False,
+                                figsize=(4 * len(classes), 4.2 * len(pairs)))
+    for axis_row, pair in zip(axes, pairs):
+        for axis, c in zip(axis_row, classes):
+            for i, curve in enumerate(curves):
+                mine = [row for row in rows
+                        if (row["pair"], row["class"], row["curve"]) == (pair, c, curve)]
+                if not mine:
+                    continue
+                colour = colours[i % len(colours)]
+                if "error median %" not in mine[0]:
+                    axis.axvline(mine[0]["median us"], color=colour, linestyle=":", label=curve)
+                    continue
+                style = {"matched": "o-", "inner": "v--", "SDF voxel sum": "s-"}.get(curve, ".-")
+                # An error of 0 has no place on a logarithm.
+                points = [(row["median us"], max(row["error median %"], 1e-5)) for row in mine]
+                axis.loglog(*zip(*points), style, color=colour, label=curve, markersize=5)
+                if curve == "matched":
+                    for row, point in zip(mine, points):
+                        axis.annotate(f" {int(row['setting']):,}", point, fontsize=6)
+                front = [p for row, p in zip(mine, points) if row["on the front"]]
+                if front:
+                    axis.loglog(*zip(*front), "o", markersize=10, markerfacecolor="none",
+                                markeredgecolor="black", markeredgewidth=0.8)
+            axis.set(title=f"{pair}: {c}")
+            axis.grid(True, which="major", alpha=0.3)
+        axis_row[0].set_ylabel("error of the volume, median, %")
+    for axis in axes[-1]:
+        axis.set_xlabel("µs, median")
+    handles = {label: handle for axis in axes.flat
+               for handle, label in zip(*axis.get_legend_handles_labels())}
+    figure.legend(handles.values(), handles.keys(), ncol=4, fontsize=8, loc="upper center",
+                  bbox_to_anchor=(0.5, 0.0))
+    figure.tight_layout()
+    figure.savefig(path, dpi=100, bbox_inches="tight")
+    plt.close(figure)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds every benchmark, runs them one after another and writes benchmarks/results: a JSON file
-# each, tables.md and the plots. Nothing else should run meanwhile.
+# Builds every benchmark, or the NAMEs alone, runs them one after another and writes
+# benchmarks/results: a JSON file each, tables.md and the plots. Nothing else should run meanwhile.
 # usage: benchmarks/run.sh [--quick] [--build DIR] [--results DIR] [NAME…]
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -20,7 +20,11 @@ while [ $# -gt 0 ]; do
 done
 
 cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DIST_BUILD_BENCHMARKS=ON
-cmake --build "$build" --target benchmarks
+if [ ${#names[@]} -eq 0 ]; then
+  cmake --build "$build" --target benchmarks
+else
+  cmake --build "$build" --target "${names[@]}"
+fi
 mkdir -p "$results"
 if [ ${#names[@]} -eq 0 ]; then
   for program in "$build"/bin/benchmarks/*; do names+=("$(basename "$program")"); done
