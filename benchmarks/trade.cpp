@@ -137,7 +137,7 @@ void report_pair(Report& report, const PairOfBodies& pair, const std::vector<Met
   }
 }
 
-/// The issue's own line: `pen` rows under a pair budget.
+/// The oracle's `pen` rows together, and the slowest of all rows.
 void report_pen_rows(Report& report, const PairOfBodies& pair, const std::vector<Method>& methods,
                      const std::vector<Measured>& measured) {
   const auto median_of_pen = [&](const Measured& m) {
@@ -149,9 +149,14 @@ void report_pen_rows(Report& report, const PairOfBodies& pair, const std::vector
   double fcl = 0;
   for (std::size_t i = 0; i < methods.size(); ++i)
     if (methods[i].curve.starts_with("FCL")) fcl = median_of_pen(measured[i]);
+  constexpr double kQuick = 10;            // µs, median of all pen rows
+  double best = 100, shallow_of_best = 0;  // %, among the quick ones
   for (std::size_t i = 0; i < methods.size(); ++i) {
-    if (!methods[i].curve.starts_with("pair budget") && methods[i].curve != "matched") continue;
+    const bool budgeted = methods[i].curve.starts_with("pair budget");
+    if (!budgeted && methods[i].curve != "matched") continue;
     const double us = median_of_pen(measured[i]);
+    const double error = point_of(measured[i], pair.rows, 3).error;
+    const double shallow = point_of(measured[i], pair.rows, 4).error;
     report.row("All pen rows",
                {{"pair", pair.key},
                 {"curve", methods[i].curve},
@@ -159,9 +164,18 @@ void report_pen_rows(Report& report, const PairOfBodies& pair, const std::vector
                 {"median us", us},
                 {"FCL's median, times this", fcl / us},
                 {"1–10 %: error median %", point_of(measured[i], pair.rows, 2).error},
-                {"0.1–1 %", point_of(measured[i], pair.rows, 3).error},
-                {"0.01–0.1 %", point_of(measured[i], pair.rows, 4).error}});
+                {"0.1–1 %", error},
+                {"0.01–0.1 %", shallow},
+                {"slowest of all rows us",
+                 *std::max_element(measured[i].us.begin(), measured[i].us.end())}});
+    if (budgeted && us <= kQuick && error < best) {
+      best = error;
+      shallow_of_best = shallow;
+    }
   }
+  if (report.quick()) return;
+  report.target("pair budgets of ≤ 10 µs on pen rows: median error %, 0.1–1 %", best, 0.2, true);
+  report.target("the same one, 0.01–0.1 %", shallow_of_best, 2, true);
 }
 
 double degrees_between(const Vector3d& a, const Vector3d& b) {
@@ -282,7 +296,9 @@ int run_pair(Report& report, const PairOfBodies& pair, const Sweep& sweep) {
     report_pen_rows(report, pair, methods, measured);
     for (const Baked& assets : baked)
       if (std::count(sweep.with_budgets.begin(), sweep.with_budgets.end(), assets.spheres) > 0)
-        report_continuity(report, pair, assets, sweep.pair_budgets);
+        report_continuity(
+            report, pair, assets,
+            report.quick() ? sweep.pair_budgets : std::vector{300u, 500u, 1'000u, 30'000u});
   }
   return wrong_answers(pair, baked.back(), workspace);
 }
@@ -326,7 +342,7 @@ int main(int argc, char** argv) {
     wrong += run_pair(report, development_pair("bolt_gen.ply", "nut_gen.ply", 30), sweep);
     sweep.spheres = {100, 300, 1'000, 3'000, 10'000};
     sweep.with_budgets = {10'000};
-    wrong += run_pair(report, development_pair("spot.obj", "mug.ply", 30), sweep);
+    wrong += run_pair(report, development_pair("spot.obj", "bunny_60k.ply", 30), sweep);
     for (const char* key : {"big200k", "ico1k", "ico20k"})
       wrong += run_pair(report, oracle_pair(key), sweep);
   }

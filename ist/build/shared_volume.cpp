@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::uint32_t kFirstLines = 128;  // on a side of the lattice
-constexpr std::uint32_t kMostLines = 2048;
+constexpr std::uint32_t kMostLines = 1024;
 
 /// A mesh moved to where lines run along x.
 class MovedMesh {
