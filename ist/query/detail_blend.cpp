@@ -67,7 +67,15 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
                           const QuerySettings& settings, Workspace& workspace) noexcept {
   const DetailChain chain(a.tree.header(), b.tree.header(), pose.a_from_b.scale);
   DetailQueries queries(a, b, pose, settings, workspace);
-  if (chain.size() == 1) return queries.ask(chain[0], settings.relative_error, settings.min_radius);
+  // Nothing to choose, or nothing dear: no gauge can exceed either solid's sum, κ times over.
+  const TreeHeader& coarse_a = matched_tree(a.tree.header(), chain.coarsest().a);
+  const TreeHeader& coarse_b = matched_tree(b.tree.header(), chain.coarsest().b);
+  const double scale = pose.a_from_b.scale;
+  const double most =
+      std::min(coarse_a.volume_sum * double{coarse_b.overlap},
+               coarse_b.volume_sum * (scale * scale * scale) * double{coarse_a.overlap});
+  if (chain.size() == 1 || chain.weights(most, settings.pair_budget)[0].weight == 1)
+    return queries.ask(chain[0], settings.relative_error, settings.min_radius);
 
   // Whatever else is asked, the gauge is the whole sum: only that is smooth.
   const Penetration gauge = queries.ask(chain.coarsest(), 0, 0);
