@@ -46,6 +46,18 @@ HWY_INLINE void child_gaps_as(const GapSide& side, int level_x, std::uint32_t bl
   }
 }
 
+/// A bit a lane that comes under one of the limits.
+template <class T>
+HWY_INLINE std::uint32_t nearer(const Gaps<T>& gaps, T gap_limit, T cover_limit) {
+  const LaneTag<T> d;
+  std::uint32_t bits = 0;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d))
+    bits |= mask_bits(d, hn::Or(hn::Load(d, gaps.gap + lane) < hn::Set(d, gap_limit),
+                                hn::Load(d, gaps.cover + lane) < hn::Set(d, cover_limit)))
+            << lane;
+  return bits;
+}
+
 template <class T>
 HWY_INLINE LeafGap leaf_gap_as(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
                                double gap_limit, double cover_limit) {
@@ -54,14 +66,7 @@ HWY_INLINE LeafGap leaf_gap_as(const GapSide& side, std::uint32_t block_x, std::
   // Spheres of x that y's leaf ball leaves in play.
   Gaps<T> reach;
   child_gaps_as<T>(side, 0, block_x, 0, block_y, reach);
-  std::uint32_t tasks = 0;
-  const V limit = hn::Set(d, static_cast<T>(gap_limit));
-  const V limit_cover = hn::Set(d, static_cast<T>(cover_limit));
-  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    tasks |= mask_bits(d, hn::Or(hn::Load(d, reach.gap + lane) < limit,
-                                 hn::Load(d, reach.cover + lane) < limit_cover))
-             << lane;
-  }
+  const std::uint32_t tasks = nearer(reach, static_cast<T>(gap_limit), static_cast<T>(cover_limit));
   LeafGap result{static_cast<double>(hwy::HighestValue<T>()),
                  static_cast<double>(hwy::HighestValue<T>()), 0, 0};
   if (tasks == 0) return result;
@@ -80,7 +85,13 @@ HWY_INLINE LeafGap leaf_gap_as(const GapSide& side, std::uint32_t block_x, std::
   const V oz = hn::Set(d, static_cast<T>(offset[2] - origin_x.z));
   const V scale = hn::Set(d, static_cast<T>(map.scale));
   V m[9];
-  for (int i = 0; i < 9; ++i) m[i] = hn::Set(d, static_cast<T>(map.m[i]));
+  for (int i = 0; i < 9; ++i) {
+    if constexpr (sizeof(T) == sizeof(float)) {
+      m[i] = hn::Set(d, side.single[i]);
+    } else {
+      m[i] = hn::Set(d, map.m[i]);
+    }
+  }
 
   // A lane keeps its own least gap, so that ties fall alike for every vector width.
   alignas(64) T least[kWidth], least_cover[kWidth], task_of[kWidth];
@@ -120,24 +131,35 @@ HWY_INLINE LeafGap leaf_gap_as(const GapSide& side, std::uint32_t block_x, std::
   return result;
 }
 
+/// A limit that no rounding to T makes smaller, and that T holds.
+template <class T>
+T rounded_up(double limit) {
+  constexpr double kMost = sizeof(T) == sizeof(float) ? 1e38 : 1e300;
+  const double finite = std::clamp(limit, -kMost, kMost);
+  return static_cast<T>(finite + 1e-6 * std::abs(finite));
+}
+
 template <class T>
 HWY_INLINE void child_gaps_to(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-                              std::uint32_t block_y, ChildGaps& out) {
+                              std::uint32_t block_y, double gap_limit, double cover_limit,
+                              ChildGaps& out) {
   Gaps<T> gaps;
   child_gaps_as<T>(side, level_x, block_x, level_y, block_y, gaps);
-  for (std::size_t lane = 0; lane < kWidth; ++lane) {
+  out.near = nearer(gaps, rounded_up<T>(gap_limit), rounded_up<T>(cover_limit));
+  for (std::uint32_t left = out.near; left != 0; left &= left - 1) {
+    const std::size_t lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
     out.gap[lane] = static_cast<double>(gaps.gap[lane]);
     out.cover[lane] = static_cast<double>(gaps.cover[lane]);
   }
 }
 
 void child_single(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-                  std::uint32_t block_y, ChildGaps& out) {
-  child_gaps_to<float>(side, level_x, block_x, level_y, block_y, out);
+                  std::uint32_t block_y, double gap_limit, double cover_limit, ChildGaps& out) {
+  child_gaps_to<float>(side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
 }
 void child_twice(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-                 std::uint32_t block_y, ChildGaps& out) {
-  child_gaps_to<double>(side, level_x, block_x, level_y, block_y, out);
+                 std::uint32_t block_y, double gap_limit, double cover_limit, ChildGaps& out) {
+  child_gaps_to<double>(side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
 }
 LeafGap leaf_single(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
                     double gap_limit, double cover_limit) {
@@ -160,11 +182,14 @@ HWY_EXPORT(leaf_single);
 HWY_EXPORT(leaf_twice);
 
 void child_gaps(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-                std::uint32_t block_y, Precision precision, ChildGaps& out) noexcept {
+                std::uint32_t block_y, double gap_limit, double cover_limit, Precision precision,
+                ChildGaps& out) noexcept {
   if (precision == Precision::single) {
-    HWY_DYNAMIC_DISPATCH(child_single)(side, level_x, block_x, level_y, block_y, out);
+    HWY_DYNAMIC_DISPATCH(child_single)
+    (side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
   } else {
-    HWY_DYNAMIC_DISPATCH(child_twice)(side, level_x, block_x, level_y, block_y, out);
+    HWY_DYNAMIC_DISPATCH(child_twice)
+    (side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
   }
 }
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -22,8 +23,8 @@ class GapDescent {
              const QuerySettings& settings, Workspace::Impl& scratch)
       : a_(a),
         b_(b),
-        a_side_{&a, &b, &pose.a_from_b},
-        b_side_{&b, &a, &pose.b_from_a},
+        a_side_(a, b, pose.a_from_b),
+        b_side_(b, a, pose.b_from_a),
         scale_(pose.a_from_b.scale),
         precision_(precision_for_gap(a, b, pose)),
         stack_(scratch.waiting.get()),
@@ -75,19 +76,23 @@ class GapDescent {
     const bool open_a =
         pair.level_b == 0 || (pair.level_a > 0 && a_.ball(pair.level_a, pair.a).r >=
                                                       scale_ * b_.ball(pair.level_b, pair.b).r);
+    const double factor = open_a ? 1 : scale_;
+    const double cover_limit = cover_ > 0 ? cover_ : -std::numeric_limits<double>::infinity();
     ChildGaps gaps;
-    double factor = 1;
     if (open_a) {
-      child_gaps(a_side_, pair.level_a, pair.a, pair.level_b, pair.b, precision_, gaps);
+      child_gaps(a_side_, pair.level_a, pair.a, pair.level_b, pair.b, gap_, cover_limit, precision_,
+                 gaps);
     } else {
-      child_gaps(b_side_, pair.level_b, pair.b, pair.level_a, pair.a, precision_, gaps);
-      factor = scale_;
+      child_gaps(b_side_, pair.level_b, pair.b, pair.level_a, pair.a, gap_ / scale_,
+                 cover_limit / scale_, precision_, gaps);
     }
     const std::uint32_t below = open_a ? a_.level[pair.level_a - 1].count - kWidth * pair.a
                                        : b_.level[pair.level_b - 1].count - kWidth * pair.b;
     const std::size_t first = size_;
     // Unused lanes are left out by number: among objects far enough apart no radius would do it.
-    for (std::uint32_t lane = 0; lane < std::min(kWidth, below); ++lane) {
+    const std::uint32_t used = (1u << std::min(kWidth, below)) - 1;
+    for (std::uint32_t left = gaps.near & used; left != 0; left &= left - 1) {
+      const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
       const double gap = factor * gaps.gap[lane];
       const double cover = factor * gaps.cover[lane];
       if (!wanted(gap, cover)) continue;
