@@ -307,6 +307,7 @@ int run_pair(Report& report, const PairOfBodies& pair, const Sweep& sweep) {
 
 int main(int argc, char** argv) {
   Report report("trade", argc, argv);
+  report.page("What accuracy costs: every figure");
   report.remark(
       "Medians over the rows of a class; one thread, thread CPU time less the cost of the clock; "
       "every pose fresh. `setting`: spheres of each object, or the budget.");
