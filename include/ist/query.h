@@ -38,7 +38,7 @@ struct QuerySettings {
   /// two from what is expected. penetration() and penetration_batch() in the matched measure only.
   std::uint32_t pair_budget = 0;
   std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
-  double deadline_us = 0;     ///< [µs] wall clock from the call; read every 64 node pairs or less
+  double deadline_us = 0;     ///< [µs] wall clock from the call; read every 256 node pairs or less
   double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
   double min_radius = 0;      ///< [u] nodes smaller than this are not opened; penetration only
 };

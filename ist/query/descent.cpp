@@ -12,8 +12,10 @@
 namespace ist {
 namespace {
 
-// Pairs between two looks at the limits: a few microseconds.
+// Pairs between two looks at the limits: a few microseconds. Leaf pairs share lists and turned
+// blocks, which every call starts anew.
 constexpr std::size_t kChunk = 64;
+constexpr std::size_t kLeafChunk = 256;
 
 // Sums whose rounding may exceed this share are taken again in double. The bound is some hundred
 // times what rounding does, so float keeps 1e-5.
@@ -140,7 +142,7 @@ void Descent::open_leaves() {
   std::size_t done = 0;
   while (done < now.size) {
     if (by_error && accurate(waiting)) break;
-    const std::size_t n = budget_.grant(std::min(kChunk, now.size - done));
+    const std::size_t n = budget_.grant(std::min(kLeafChunk, now.size - done));
     if (n == 0) break;
     add_leaves(done, n);
     if (by_error)

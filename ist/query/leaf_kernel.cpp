@@ -14,7 +14,7 @@ HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 /// Pairs that go through the stages together: little enough to stay in the nearest cache.
-inline constexpr std::size_t kPairsAtOnce = 32;
+inline constexpr std::size_t kPairsAtOnce = 64;
 
 /// Sixteen spheres in A's axes, relative to an origin of their own.
 template <class T>
@@ -29,6 +29,7 @@ struct alignas(32) Side {
   double centre[4];  ///< of the leaf ball
   double radius;     ///< of the leaf ball
   double size;       ///< bound on the way from the origin to the end of any sphere
+  T lever[4];        ///< from B's origin to this one
   const Spheres<T>* spheres;
 };
 
@@ -65,9 +66,8 @@ class BlockCache {
 /// What the tasks of one pair of leaf blocks share.
 template <class T>
 struct alignas(32) PairOfBlocks {
-  T lever[4];              ///< from B's origin to that of `many`
-  const Spheres<T>* many;  ///< the side whose sixteen spheres lie in lanes
-  T error;                 ///< bound on the rounding of a distance; negative if the tasks are B's
+  const Side<T>* many;  ///< the side whose sixteen spheres lie in lanes
+  T error;              ///< bound on the rounding of a distance; negative if the tasks are B's
   std::uint32_t bin;
 };
 
@@ -241,17 +241,17 @@ HWY_INLINE void add_lenses(const Tasks<T>& tasks, std::size_t k, const PairOfBlo
   const auto yi = hn::Set(d, tasks.y[k]);
   const auto zi = hn::Set(d, tasks.z[k]);
   const auto ri = hn::Set(d, tasks.r[k]);
-  const auto lx = xi + hn::Set(d, pair.lever[0]);
-  const auto ly = yi + hn::Set(d, pair.lever[1]);
-  const auto lz = zi + hn::Set(d, pair.lever[2]);
+  const auto lx = xi + hn::Set(d, pair.many->lever[0]);
+  const auto ly = yi + hn::Set(d, pair.many->lever[1]);
+  const auto lz = zi + hn::Set(d, pair.many->lever[2]);
   const auto error = hn::Set(d, pair.error);
   const auto reach = ri + (hn::Abs(error) + hn::Abs(error));
   const std::size_t before = list.size;
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    const auto rj = hn::Load(d, pair.many->r + lane);
-    const auto dx = hn::Load(d, pair.many->x + lane) - xi;
-    const auto dy = hn::Load(d, pair.many->y + lane) - yi;
-    const auto dz = hn::Load(d, pair.many->z + lane) - zi;
+    const auto rj = hn::Load(d, pair.many->spheres->r + lane);
+    const auto dx = hn::Load(d, pair.many->spheres->x + lane) - xi;
+    const auto dy = hn::Load(d, pair.many->spheres->y + lane) - yi;
+    const auto dz = hn::Load(d, pair.many->spheres->z + lane) - zi;
     const auto sum = hn::Max(rj + reach, hn::Zero(d));
     const auto near = ((dx * dx + dy * dy) + dz * dz) < sum * sum;
     const Compressor compress(d, near);
@@ -296,9 +296,13 @@ void add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t*
       const std::uint32_t block_b = single_b ? b[done + i] / kWidth : b[done + i];
       const Side<T>* const sides[2] = {
           blocks_a.find(block_a, round,
-                        [&](auto& to) { take_block<T>(*stage.a, block_a, to.room, to.side); }),
+                        [&](auto& to) {
+                          take_block<T>(*stage.a, block_a, to.room, to.side);
+                          subtract(to.side.origin, origin_b, to.side.lever);
+                        }),
           blocks_b.find(block_b, round, [&](auto& to) {
             turn_block<T>(*stage.b, block_b, axes, to.room, to.side);
+            subtract(to.side.origin, origin_b, to.side.lever);
           })};
       if (sides[0] == nullptr || sides[1] == nullptr) break;
       // The side of the larger spread goes one by one: fewer of its spheres come near the other.
@@ -309,8 +313,7 @@ void add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t*
       // The two touch: their origins are no further apart than both sizes.
       const double error = distance_error<T>(2.8 * (one.size + many.size));
       PairOfBlocks<T>& pair = pairs[i];
-      pair.many = many.spheres;
-      subtract(many.origin, origin_b, pair.lever);
+      pair.many = &many;
       pair.error = static_cast<T>(error * kSign[task_side]);
       pair.bin = bins != nullptr ? stage.bins.node[done + i] >> stage.bins.shift : 0;
       const int single = single_a   ? static_cast<int>(a[done + i] % kWidth)
