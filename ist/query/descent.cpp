@@ -153,7 +153,7 @@ void Descent::open_leaves() {
 
   // A few grazing lenses are all rounding in float; they are as few as they are shallow.
   const Overlap sum = sure();
-  if (precision_ == Precision::single && sum.error > kGrazing * sum.volume) {
+  if (precision_ == Precision::single && !keep_rounding_ && sum.error > kGrazing * sum.volume) {
     precision_ = Precision::twice;
     sums_ = LeafSums();
     if (bins_ != nullptr) bins_->forget_sums();

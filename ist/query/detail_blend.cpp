@@ -22,7 +22,12 @@ class DetailQueries {
         workspace_(workspace),
         start_(settings.deadline_us > 0 ? Clock::now() : Clock::time_point()) {}
 
-  Penetration ask(const DetailPair& pair, double relative_error, double min_radius) noexcept {
+  /// The whole sum of a pair of levels, rounded as it may be: where lenses graze they are few, and
+  /// the finest level is taken anyway.
+  Penetration gauge(const DetailPair& pair) noexcept { return ask(pair, 0, 0, true); }
+
+  Penetration ask(const DetailPair& pair, double relative_error, double min_radius,
+                  bool keep_rounding = false) noexcept {
     QuerySettings limits = settings_;
     limits.relative_error = relative_error;
     limits.min_radius = min_radius;
@@ -37,6 +42,7 @@ class DetailQueries {
     const SphereTree tree_a(a_, matched_tree(a_, pair.a));
     const SphereTree tree_b(b_, matched_tree(b_, pair.b));
     Descent descent(tree_a, tree_b, pose_, limits, workspace_.impl());
+    if (keep_rounding) descent.keep_rounding();
     descent.run();
     const Penetration answer = descent.penetration();
     visits_ += answer.node_visits;
@@ -61,6 +67,9 @@ class DetailQueries {
   std::uint32_t visits_ = 0, pairs_ = 0;
 };
 
+// A gauge whose bounds are further apart than this part of it is too rough for an answer.
+constexpr double kRough = 5e-4;
+
 }  // namespace
 
 Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
@@ -78,7 +87,7 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
     return queries.ask(chain[0], settings.relative_error, settings.min_radius);
 
   // Whatever else is asked, the gauge is the whole sum: only that is smooth.
-  const Penetration gauge = queries.ask(chain.coarsest(), 0, 0);
+  const Penetration gauge = queries.gauge(chain.coarsest());
   Penetration result;
   if (gauge.status != QueryStatus::ok) {
     // Stopped here, any level might have been meant.
@@ -91,12 +100,13 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
   } else {
     const double unit3 = pose.unit_a * pose.unit_a * pose.unit_a;
     const DetailChain::Weights weights = chain.weights(gauge.volume / unit3, settings.pair_budget);
+    const bool rough = gauge.volume_max - gauge.volume_min > kRough * gauge.volume;
     double slope = 0;                               // of the blend by the gauge
     for (std::size_t i = chain.size(); i-- > 0;) {  // the coarse ones first: they are sure to end
       const double weight = weights[i].weight;
       if (weight == 0 && weights[i].slope == 0) continue;
       const Penetration part =
-          i + 1 == chain.size()
+          i + 1 == chain.size() && !rough
               ? gauge
               : queries.ask(chain[i], settings.relative_error, settings.min_radius);
       result.volume += weight * part.volume;
