@@ -22,7 +22,7 @@ struct BandedSizes {
 inline BandedSizes banded_sizes(std::uint64_t max_spheres) {
   const std::uint64_t n = max_spheres > 0 ? std::min<std::uint64_t>(max_spheres, 1u << 20) : 10000;
   const auto size = [](std::uint64_t x) { return static_cast<std::uint32_t>(x); };
-  return {size(std::min<std::uint64_t>((1u << 16) + 48 * n, 9u << 19)),
+  return {size(std::min<std::uint64_t>((1u << 16) + 64 * n, 9u << 19)),
           size((1u << 15) + 8 * n),
           size(n),
           size((1u << 11) + n / 2),
@@ -39,7 +39,8 @@ class BandedBuffers {
       : place_(place),
         state_(place, 1),
         queue_(place, kQueue),
-        blocks_(place, SphereLists::kMostBlocks) {
+        blocks_(place, SphereLists::kMostBlocks),
+        ranks_(place, 1) {
     BandedState state;
     state.schedule = schedule;
     state.layout = packing::sphere_grid_layout(schedule.grid_spheres, schedule.grid_reach);
@@ -60,16 +61,17 @@ class BandedBuffers {
     a.free_list = free_list_.data();
     a.lists[0] = lists_[0].data();
     a.lists[1] = lists_[1].data();
+    a.refreshed = refreshed_.data();
+    a.confined = confined_.data();
     a.splitting = splitting_.data();
     a.cell_capacity = static_cast<std::uint32_t>(cells_.size());
     a.queue = queue_.data();
     a.queue_capacity = kQueue;
     a.nodes = nodes_.data();
     a.heads = heads_.data();
-    a.winners = winners_.data();
     a.won = won_.data();
-    a.winner_key = winner_key_.data();
-    a.winner_radius = winner_radius_.data();
+    a.winners = winners_.data();
+    a.ranks = ranks_.data();
     a.candidate_capacity = static_cast<std::uint32_t>(nodes_.size());
     a.spheres = spheres_.data();
     a.kept = kept_.data();
@@ -161,6 +163,8 @@ class BandedBuffers {
     grow(free_list_, size, kept);
     grow(lists_[0], size, kept);
     grow(lists_[1], size, kept);
+    grow(refreshed_, size, kept);
+    grow(confined_, size, kept);
     grow(splitting_, size, kept);
   }
 
@@ -172,8 +176,6 @@ class BandedBuffers {
     heads_.fill_bytes(0);
     renew(winners_, size);
     renew(won_, size);
-    renew(winner_key_, size);
-    renew(winner_radius_, size);
   }
 
   void enlarge_spheres(std::size_t size, std::size_t kept) {
@@ -213,10 +215,12 @@ class BandedBuffers {
   Array<BandedState> state_;
   Array<std::uint32_t> queue_;
   Array<BandedArrays::Cell> cells_;
-  Array<float> bounds_, kept_, winner_radius_;
-  Array<std::uint32_t> free_list_, lists_[2], splitting_, heads_, winners_, won_, words_, blocks_;
+  Array<float> bounds_, kept_;
+  Array<std::uint32_t> free_list_, lists_[2], refreshed_, confined_, splitting_, heads_, won_,
+      words_, blocks_;
   Array<BucketNode> nodes_;
-  Array<std::uint64_t> winner_key_;
+  Array<Winner> winners_;
+  Array<RankBuckets> ranks_;
   Array<StoredSphere> spheres_;
   Array<SphereLists::Cell> grid_cells_;
   Array<SphereLists::Pair> pairs_;

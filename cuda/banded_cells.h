@@ -141,15 +141,102 @@ template <class Crew>
 IST_HD std::uint32_t wait_for_child(const Crew& crew, const BandedArrays& a, std::uint32_t place) {
   std::uint32_t code = ChildCode::kNone;
   if (crew.team().lane() == 0 && place < a.queue_capacity) {
-    while ((code = atomic_load(&a.queue[place])) == ChildCode::kNone &&
-           atomic_load(&a.state->pending) != 0)
+    // `pending` is one word for all teams: looked at seldom, not to hold up those that count in it.
+    constexpr std::uint32_t kSeldom = 8;
+    for (std::uint32_t looks = 1; (code = atomic_load(&a.queue[place])) == ChildCode::kNone;
+         ++looks) {
+      if (looks % kSeldom == 0 && atomic_load(&a.state->pending) == 0) break;
       crew.pause();
+    }
     if (code != ChildCode::kNone) atomic_exchange(&a.queue[place], ChildCode::kNone);
   }
   return crew.team().broadcast(code, 0);
 }
 
-/// Works on the frontier's cells of one class. Where the schedule says that no rule can come between
+/// Counts a candidate that a cell holds.
+IST_HD inline void note_candidate(BandedState& s, const packing::Cell& cell) {
+  atomic_max(&s.largest_radius, packing::bits_of(cell.radius));
+  atomic_max(&s.largest_bound, packing::bits_of(cell.bound));
+}
+
+/// The first part of the work on the frontier's cells of one class, a lane a cell: what the spheres
+/// and the remembered triangles tell has little to share among lanes. Where the bound is attained
+/// is kept in place of the prototype, which an open cell does not have.
+template <class Crew, class Surface>
+IST_HD void refresh_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
+  BandedState& s = *a.state;
+  const auto& team = crew.team();
+  const ListedSpheres spheres{a.grid(), a.spheres, static_cast<std::uint32_t>(s.schedule.spheres)};
+  const packing::PrototypeField<Surface, ListedSpheres> field(surface, spheres);
+  const float threshold = s.schedule.threshold, margin = s.schedule.margin;
+  const std::uint32_t* const frontier = a.lists[s.frontier_array];
+  std::uint32_t* const active = a.lists[1 - s.frontier_array];
+  std::uint32_t radius = 0, bound = 0;  // largest, bits
+  share_out_to_lanes(crew, s.frontier, [&](std::uint32_t i) {
+    const std::uint32_t slot = i < s.frontier ? frontier[i] : 0;
+    packing::Cell cell;
+    CellState state = CellState::settled;
+    const bool due = i < s.frontier &&
+                     (s.classes == 1 || packing::BandSchedule::class_of(a.cells[slot].cell.centre,
+                                                                        s.classes) == s.cell_class);
+    if (due) {
+      packing::SampleMemory memory;
+      typename packing::PrototypeField<Surface, ListedSpheres>::Bounded seen;
+      cell = a.cells[slot].cell;
+      state = field.refresh(typename Crew::Lane{}, cell, a.cells[slot].ring, &memory, threshold,
+                            margin, seen);
+      if (state == CellState::open) cell.prototype = seen.y;
+      a.cells[slot].cell = cell;
+      a.bounds[slot] = cell.bound;
+    }
+    team.sync();
+    const bool candidate = due && state == CellState::candidate;
+    if (candidate) {
+      radius = packing::bits_of(cell.radius) > radius ? packing::bits_of(cell.radius) : radius;
+      bound = packing::bits_of(cell.bound) > bound ? packing::bits_of(cell.bound) : bound;
+    }
+    const std::uint32_t place = append(team, candidate, &s.active);
+    if (candidate) active[place] = slot;
+    const bool open = due && state == CellState::open;
+    const std::uint32_t left = append(team, open, &s.refreshed);
+    if (open) a.refreshed[left] = slot;
+  });
+  radius = team.max(radius);
+  bound = team.max(bound);
+  if (team.lane() == 0 && radius > 0) {
+    atomic_max(&s.largest_radius, radius);
+    atomic_max(&s.largest_bound, bound);
+  }
+}
+
+/// Notes a cell that is to be split in the step that splits.
+IST_HD inline void note_splitting(const BandedArrays& a, std::uint32_t slot) {
+  a.splitting[atomic_add(&a.state->splitting, 1)] = slot | 0xFFu << BandedArrays::kCellBits;
+}
+
+/// The second part, of the cells that the first left open.
+template <class Crew, class Surface>
+IST_HD void confine_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
+  BandedState& s = *a.state;
+  const auto& team = crew.team();
+  const ListedSpheres spheres{a.grid(), a.spheres, static_cast<std::uint32_t>(s.schedule.spheres)};
+  const packing::PrototypeField<Surface, ListedSpheres> field(surface, spheres);
+  const float margin = s.schedule.margin, largest = s.schedule.largest_half(s.frontier);
+  take_turns(crew, s.refreshed, &s.taken, [&](std::uint32_t i) {
+    const std::uint32_t slot = a.refreshed[i];
+    packing::Cell cell = packing::load_cell(team, a.cells[slot], crew.scratch());
+    const CellState outcome = field.confine(
+        team, cell, crew.scratch(), field.look_again(team, cell, crew.scratch(), cell.prototype),
+        margin, largest);
+    put_cell(team, a, cell, crew.scratch(), slot);
+    if (team.lane() != 0) return;
+    if (outcome == CellState::open) a.confined[atomic_add(&s.confined, 1)] = slot;
+    if (outcome == CellState::split) note_splitting(a, slot);
+  });
+}
+
+/// Works on the frontier's cells of one class, or does the last part of the work on those that are
+/// still open. Where the schedule says that no rule can come between
 /// (state.depth), cells that are to be split are split in the same step, and so on for that many
 /// levels: a chain of splits then waits for itself alone.
 template <class Crew, class Surface>
@@ -160,8 +247,9 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
   const packing::PrototypeField<Surface, ListedSpheres> field(surface, spheres);
   const float threshold = s.schedule.threshold, margin = s.schedule.margin;
   const float floor = s.schedule.floor, largest = s.schedule.largest_half(s.frontier);
-  const std::uint32_t frontier_size = s.frontier, deepest = s.depth;
-  const std::uint32_t* const frontier = a.lists[s.frontier_array];
+  const bool in_parts = s.in_parts;
+  const std::uint32_t frontier_size = in_parts ? s.confined : s.frontier, deepest = s.depth;
+  const std::uint32_t* const frontier = in_parts ? a.confined : a.lists[s.frontier_array];
   std::uint32_t* const active = a.lists[1 - s.frontier_array];
   if (a.mailbox != nullptr && crew.index() + 1 == crew.size() && team.lane() == 0)
     s.stop_asked = a.mailbox->stop;
@@ -172,7 +260,7 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
     if (item < frontier_size) {
       slot = frontier[item];
       cell = packing::load_cell(team, a.cells[slot], crew.scratch());
-      works = s.classes == 1 ||
+      works = in_parts || s.classes == 1 ||
               packing::BandSchedule::class_of(cell.centre, s.classes) == s.cell_class;
     } else {
       if (deepest == 0) return;
@@ -180,7 +268,8 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
       if (code == ChildCode::kNone) return;
       const ChildCode child = ChildCode::of(code);
       const packing::Cell parent = load_fresh_cell(team, a.cells[child.parent], crew.scratch());
-      cell = field.child(team, parent, static_cast<int>(child.octant), crew.scratch(), margin);
+      cell = field.child(team, parent, static_cast<int>(child.octant), crew.scratch().ring,
+                         &crew.scratch().sample[0], margin);
       depth = child.depth;
       works = cell.bound >= margin;
       if (team.lane() == 0) {
@@ -196,16 +285,18 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
     }
     bool queues = false;
     if (works) {
-      const CellState outcome = field.work(team, cell, crew.scratch(), threshold, margin, largest);
+      const CellState outcome =
+          in_parts && item < frontier_size
+              ? field.climb(team, cell, crew.scratch(), threshold)
+              : field.work(team, cell, crew.scratch(), threshold, margin, largest);
       put_cell(team, a, cell, crew.scratch(), slot);
       queues = outcome == CellState::split && depth < deepest;
       if (team.lane() == 0) {
         if (outcome == CellState::candidate) {
           active[atomic_add(&s.active, 1)] = slot;
-          atomic_max(&s.largest_radius, packing::bits_of(cell.radius));
-          atomic_max(&s.largest_bound, packing::bits_of(cell.bound));
+          note_candidate(s, cell);
         } else if (outcome == CellState::split && !queues) {
-          a.splitting[atomic_add(&s.splitting, 1)] = slot | 0xFFu << BandedArrays::kCellBits;
+          note_splitting(a, slot);
         }
       }
     }
@@ -220,9 +311,20 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
   }
 }
 
-/// Replaces cells by those of their children that still count. Slots come from the free list, a
-/// queue; the parents' own go to its end, for later steps. A child for which there is no slot stays
-/// to be made, and the step is done again when there are more.
+/// Where the lanes' kept children go: take_slot() for those with `keeps`.
+template <class Team>
+IST_HD std::uint32_t take_slots(const Team& team, const BandedArrays& a, bool keeps) {
+  BandedState& s = *a.state;
+  const std::uint32_t taken = append(team, keeps, &s.free_taken);
+  const bool fresh = keeps && taken >= s.free;
+  const std::uint32_t beyond = append(team, fresh, &s.slots);
+  return fresh ? beyond : a.free_list[taken % a.cell_capacity];
+}
+
+/// Replaces cells by those of their children that still count, a lane a child: bounding one has
+/// little to share among lanes. Slots come from the free list, a queue; the parents' own go to its
+/// end, for later steps. A child for which there is no slot stays to be made, and the step is done
+/// again when there are more.
 template <class Crew, class Surface>
 IST_HD void split_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
@@ -231,37 +333,48 @@ IST_HD void split_cells(Crew& crew, const BandedArrays& a, const Surface& surfac
   const packing::PrototypeField<Surface, ListedSpheres> field(surface, spheres);
   const float margin = s.schedule.margin, floor = s.schedule.floor;
   std::uint32_t* const frontier = a.lists[s.frontier_array];
-  take_turns(crew, 8 * s.splitting, &s.taken, [&](std::uint32_t i) {
-    const std::uint32_t entry = atomic_load(&a.splitting[i / 8]);
+  float dropped = 0;
+  int live = 0;
+  share_out_to_lanes(crew, 8 * s.splitting, [&](std::uint32_t i) {
+    const bool valid = i < 8 * s.splitting;
+    const std::uint32_t entry = valid ? atomic_load(&a.splitting[i / 8]) : 0;
     const std::uint32_t parent_slot = entry & ((1u << BandedArrays::kCellBits) - 1);
-    if (i % 8 == 0 && team.lane() == 0) {
+    const std::uint32_t bit = 1u << (BandedArrays::kCellBits + i % 8);
+    const bool due = (entry & bit) != 0;
+    if (valid && i % 8 == 0) {
       a.bounds[parent_slot] = 0;
       a.free_list[(s.free + i / 8) % a.cell_capacity] = parent_slot;
     }
-    const std::uint32_t bit = 1u << (BandedArrays::kCellBits + i % 8);
-    if ((entry & bit) == 0) return;
-    const packing::Cell parent = packing::load_cell(team, a.cells[parent_slot], crew.scratch());
-    const packing::Cell child =
-        field.child(team, parent, static_cast<int>(i % 8), crew.scratch(), margin);
-    std::uint32_t slot = 0;
-    if (team.lane() == 0) {
-      if (child.bound < floor) {
-        atomic_max(&s.dropped, packing::bits_of(child.bound > 0 ? child.bound : 0.0f));
-      } else {
-        slot = take_slot(a);
-      }
+    BandedArrays::Cell child;
+    child.cell.bound = 0;
+    if (due) {
+      const BandedArrays::Cell& parent = a.cells[parent_slot];
+      packing::SampleMemory memory;
+      for (int k = 0; k < packing::kRingCapacity; ++k) child.ring[k] = parent.ring[k];
+      child.cell = field.child(typename Crew::Lane{}, parent.cell, static_cast<int>(i % 8),
+                               child.ring, &memory, margin);
+      if (child.cell.bound < floor && child.cell.bound > dropped) dropped = child.cell.bound;
     }
-    if (child.bound >= floor) {
-      slot = team.broadcast(slot, 0);
-      if (slot >= a.cell_capacity) return;
-      put_cell(team, a, child, crew.scratch(), slot);
-      if (team.lane() == 0) {
-        atomic_add(&s.live, 1);
-        if (child.bound >= margin) frontier[atomic_add(&s.frontier, 1)] = slot;
-      }
+    team.sync();
+    const bool keeps = due && child.cell.bound >= floor;
+    const std::uint32_t slot = take_slots(team, a, keeps);
+    const bool stored = keeps && slot < a.cell_capacity;
+    if (stored) {
+      a.cells[slot] = child;
+      a.bounds[slot] = child.cell.bound;
+      ++live;
     }
-    if (team.lane() == 0) atomic_and(&a.splitting[i / 8], ~bit);
+    const bool active = stored && child.cell.bound >= margin;
+    const std::uint32_t place = append(team, active, &s.frontier);
+    if (active) frontier[place] = slot;
+    if (due && (stored || !keeps)) atomic_and(&a.splitting[i / 8], ~bit);
   });
+  dropped = team.max(dropped);
+  live = team.sum(live);
+  if (team.lane() == 0) {
+    atomic_max(&s.dropped, packing::bits_of(dropped));
+    atomic_add(&s.live, static_cast<std::uint32_t>(live));
+  }
 }
 
 }  // namespace ist::gpu

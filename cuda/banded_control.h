@@ -13,6 +13,16 @@ IST_HD inline void to_sweep(BandedState& s) {
   s.step = Step::sweep;
 }
 
+/// Work on the frontier's cells of one class. Many cells are worked on in parts, each a step: the
+/// first by a lane a cell, and then all teams run the same little code. Few are done with in one
+/// step, whose end one has to wait for.
+IST_HD inline void to_class(const BandedArrays& a) {
+  BandedState& s = *a.state;
+  s.in_parts = s.frontier >= a.many;
+  s.refreshed = s.confined = 0;
+  s.step = s.in_parts ? Step::refresh : Step::work;
+}
+
 /// Work on the frontier. As many levels are done at once as surely meet none of the rules that the
 /// schedule has between levels, even if every cell is split.
 IST_HD inline void to_work(const BandedArrays& a) {
@@ -37,7 +47,7 @@ IST_HD inline void to_work(const BandedArrays& a) {
   }
   s.queued = s.cascaded = 0;
   s.pending = s.frontier;
-  s.step = Step::work;
+  to_class(a);
 }
 
 /// The next round of the band, or the next band.
@@ -142,7 +152,7 @@ IST_HD inline void after_work(const BandedArrays& a) {
   } else if (s.schedule.enough(s.active)) {
     to_selection(a);
   } else if (++s.cell_class < s.classes) {
-    s.step = Step::work;
+    to_class(a);
   } else if (s.schedule.gives_up(s.splitting, s.live) || s.splitting == 0) {
     if (s.schedule.stopped)
       s.step = Step::finished;

@@ -22,13 +22,16 @@ IST_HD void clear_grid(Crew& crew, const BandedArrays& a) {
   });
 }
 
-/// Calls pass(pair, sphere) for all pairs that were noted.
+/// Calls pass(pair, sphere, share) for all shares of all pairs that were noted. Few pairs are
+/// shared by teams that would have none: what a pass takes is the time of its longest chain of
+/// atomics.
 template <class Crew, class Pass>
 IST_HD void for_pairs(Crew& crew, const BandedArrays& a, const SphereLists& grid,
                       const Pass& pass) {
-  share_out(crew, grid.use->pairs, [&](std::uint32_t i) {
-    const SphereLists::Pair pair = grid.pairs[i];
-    pass(pair, a.spheres[pair.sphere].sphere());
+  const std::uint32_t shares = grid.use->pairs < crew.size() ? 8 : 1;
+  share_out(crew, shares * grid.use->pairs, [&](std::uint32_t i) {
+    const SphereLists::Pair pair = grid.pairs[i / shares];
+    pass(pair, a.spheres[pair.sphere].sphere(), SphereLists::Share{i % shares, shares});
   });
 }
 
@@ -59,27 +62,35 @@ IST_HD void pack_banded(Crew& crew, const BandedArrays& a, const Surface& surfac
       }
       case Step::count: {
         const SphereLists grid = a.grid();
-        for_pairs(crew, a, grid, [&](const SphereLists::Pair& pair, const Sphere& sphere) {
-          grid.count_in_cells(team, pair, sphere);
-        });
+        for_pairs(
+            crew, a, grid,
+            [&](const SphereLists::Pair& pair, const Sphere& sphere, SphereLists::Share share) {
+              grid.count_in_cells(team, pair, sphere, share);
+            });
         break;
       }
       case Step::make_room: {
         const SphereLists grid = a.grid();
-        for_pairs(crew, a, grid, [&](const SphereLists::Pair& pair, const Sphere& sphere) {
-          grid.make_room(team, pair, sphere);
-        });
+        for_pairs(crew, a, grid,
+                  [&](const SphereLists::Pair& pair, const Sphere& sphere,
+                      SphereLists::Share share) { grid.make_room(team, pair, sphere, share); });
         break;
       }
       case Step::fill: {
         const SphereLists grid = a.grid();
-        for_pairs(crew, a, grid, [&](const SphereLists::Pair& pair, const Sphere& sphere) {
-          grid.fill_cells(team, pair, sphere);
-        });
+        for_pairs(crew, a, grid,
+                  [&](const SphereLists::Pair& pair, const Sphere& sphere,
+                      SphereLists::Share share) { grid.fill_cells(team, pair, sphere, share); });
         break;
       }
       case Step::activate:
         activate_cells(crew, a);
+        break;
+      case Step::refresh:
+        refresh_cells(crew, a, surface);
+        break;
+      case Step::confine:
+        confine_cells(crew, a, surface);
         break;
       case Step::work:
         work_on_cells(crew, a, surface);
@@ -105,9 +116,11 @@ IST_HD void pack_banded(Crew& crew, const BandedArrays& a, const Surface& surfac
     crew.sync([&] {
       s.taken = 0;
       ++s.steps;
-      const std::uint64_t now = crew.now();
-      if (s.since != 0) s.time[static_cast<int>(step)] += now - s.since;
-      s.since = now;
+      if (a.timed) {
+        const std::uint64_t now = crew.now();
+        if (s.since != 0) s.time[static_cast<int>(step)] += now - s.since;
+        s.since = now;
+      }
       switch (step) {
         case Step::start:
           after_start(s);
@@ -132,6 +145,13 @@ IST_HD void pack_banded(Crew& crew, const BandedArrays& a, const Surface& surfac
           break;
         case Step::activate:
           to_round(a);
+          break;
+        case Step::refresh:
+          s.step = Step::confine;
+          break;
+        case Step::confine:
+          s.pending = s.confined;
+          s.step = Step::work;
           break;
         case Step::work:
           after_work(a);

@@ -99,6 +99,8 @@ BandedCost cost_of(const BandedState& state, std::uint32_t launches) {
   for (int i = 0; i < static_cast<int>(Step::finished); ++i) {
     const double seconds = static_cast<double>(state.time[i]) * 1e-9;
     switch (static_cast<Step>(i)) {
+      case Step::refresh:
+      case Step::confine:
       case Step::work:
         cost.work += seconds;
         break;
@@ -142,6 +144,7 @@ SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::Ban
     for (;;) {
       BandedArrays arrays = buffers.arrays();
       arrays.mailbox = watch.mailbox();
+      arrays.timed = cost != nullptr;
       launch_banded(queue, arrays, mesh, place.data());
       ++launches;
       watch.wait(queue);

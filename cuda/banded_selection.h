@@ -29,6 +29,9 @@ IST_HD void collect_candidates(Crew& crew, const BandedArrays& a) {
     a.nodes[i] = node;
     a.won[i] = 0;
   });
+  share_out_to_lanes(crew, RankBuckets::kCount, [&](std::uint32_t i) {
+    if (i < RankBuckets::kCount) a.ranks->size[i] = a.ranks->head[i] = 0;
+  });
 }
 
 /// Calls visit(place, candidate) for those in the buckets around a candidate, the lanes going
@@ -58,42 +61,69 @@ IST_HD void find_winners(Crew& crew, const BandedArrays& a) {
     });
     if (!team.any(lost) && team.lane() == 0) {
       a.won[i] = 1;
-      a.winners[atomic_add(&s.winners, 1)] = i;
+      a.winners[atomic_add(&s.winners, 1)] = {me.key, i, 0, 0, 0};
     }
   });
 }
 
-/// Works out what radius the winners may keep. A cell whose winner is not accepted loses it.
+/// The rank bucket of a candidate of this round; larger radii in higher ones.
+IST_HD inline std::uint32_t rank_bucket(const BandedState& s, float radius) {
+  const std::uint32_t least = packing::bits_of(s.schedule.threshold);
+  std::uint32_t shift = 0;
+  while ((s.largest_radius - least) >> shift >= RankBuckets::kCount) ++shift;
+  return (packing::bits_of(radius) - least) >> shift;
+}
+
+/// Takes in a winner of which all is known. A cell whose winner is not accepted loses it.
+IST_HD inline void judge_winner(const BandedArrays& a, std::uint32_t w) {
+  BandedState& s = *a.state;
+  Winner& winner = a.winners[w];
+  const bool inside = (atomic_load(&winner.checks) & Winner::kInside) != 0;
+  const float radius = float_of(load_fresh(&winner.radius));
+  if (inside && s.schedule.accepts(radius)) {
+    atomic_add(&s.accepted, 1);
+    const std::uint32_t bucket = rank_bucket(s, a.nodes[winner.node].candidate.radius);
+    atomic_add(&a.ranks->size[bucket], 1);
+    winner.next = atomic_exchange(&a.ranks->head[bucket], w + 1);
+  } else {
+    winner.key = 0;
+    const std::uint32_t slot = a.nodes[winner.node].cell;
+    packing::Cell& cell = a.cells[slot].cell;
+    cell.bound = a.bounds[slot] = s.schedule.refused_bound();
+    cell.radius = 0;
+  }
+}
+
+/// Works out what radius the winners may keep. Two teams a winner: one finds on which side of the
+/// surface it lies, the other how far it is from everything; who comes last judges.
 template <class Crew, class Surface>
 IST_HD void certify_winners(Crew& crew, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = crew.team();
   const ListedSpheres spheres{a.grid(), a.spheres, static_cast<std::uint32_t>(s.schedule.spheres)};
-  take_turns(crew, s.winners, &s.taken, [&](std::uint32_t w) {
-    const std::uint32_t i = a.winners[w];
+  take_turns(crew, 2 * s.winners, &s.taken, [&](std::uint32_t item) {
+    const std::uint32_t w = item / 2, i = a.winners[w].node;
     const Candidate me = a.nodes[i].candidate;
-    double gap = packing::gap_to_surface(
-        surface.clearance(team, me.centre, packing::clearance_limit(me.radius)));
-    for_neighbours(team, a, me.centre, [&](std::uint32_t place, const Candidate& other) {
-      if (a.won[place] != 0 && place != i && packing::goes_before(other, me)) {
-        const double room = packing::gap_to_sphere(
-            me.centre, {other.centre.x, other.centre.y, other.centre.z, other.radius});
-        gap = room < gap ? room : gap;
-      }
-      return true;
-    });
-    const float radius = packing::certified_radius(team, me.centre, me.radius, gap, spheres);
-    if (team.lane() != 0) return;
-    const bool accepted = s.schedule.accepts(radius);
-    a.winner_radius[w] = radius;
-    a.winner_key[w] = accepted ? me.key : 0;
-    if (accepted) {
-      atomic_add(&s.accepted, 1);
+    std::uint32_t found = Winner::kDistances;
+    if (item % 2 == 0) {
+      found = surface.inside(team, me.centre) ? Winner::kInside : Winner::kOutside;
     } else {
-      packing::Cell& cell = a.cells[a.nodes[i].cell].cell;
-      cell.bound = a.bounds[a.nodes[i].cell] = s.schedule.refused_bound();
-      cell.radius = 0;
+      double gap = packing::gap_to_surface(
+          surface.exact_distance(team, me.centre, packing::clearance_limit(me.radius)));
+      for_neighbours(team, a, me.centre, [&](std::uint32_t place, const Candidate& other) {
+        if (a.won[place] != 0 && place != i && packing::goes_before(other, me)) {
+          const double room = packing::gap_to_sphere(
+              me.centre, {other.centre.x, other.centre.y, other.centre.z, other.radius});
+          gap = room < gap ? room : gap;
+        }
+        return true;
+      });
+      const float radius = packing::certified_radius(team, me.centre, me.radius, gap, spheres);
+      if (team.lane() == 0) a.winners[w].radius = packing::bits_of(radius);
     }
+    if (team.lane() != 0) return;
+    publish();
+    if (atomic_or(&a.winners[w].checks, found) != 0) judge_winner(a, w);
   });
 }
 
@@ -109,21 +139,25 @@ IST_HD void insert_winners(Crew& crew, const BandedArrays& a) {
                         ? s.schedule.margin
                         : float_of(s.largest_bound);
   share_out(crew, s.winners, [&](std::uint32_t w) {
-    const std::uint64_t key = a.winner_key[w];
-    if (key == 0) return;
-    const Candidate me = a.nodes[a.winners[w]].candidate;
+    const Winner winner = a.winners[w];
+    if (winner.key == 0) return;
+    const Candidate me = a.nodes[winner.node].candidate;
+    const std::uint32_t bucket = rank_bucket(s, me.radius);
     int before = 0;
-    for (std::uint32_t v = static_cast<std::uint32_t>(team.lane()); v < s.winners;
-         v += Crew::Team::kWidth) {
-      const std::uint64_t other = a.winner_key[v];
-      if (other > key ||
-          (other == key && v != w && packing::goes_before(a.nodes[a.winners[v]].candidate, me)))
+    for (std::uint32_t b = bucket + 1 + static_cast<std::uint32_t>(team.lane());
+         b < RankBuckets::kCount; b += Crew::Team::kWidth)
+      before += static_cast<int>(a.ranks->size[b]);
+    before = team.sum(before);
+    for (std::uint32_t at = a.ranks->head[bucket]; at != 0; at = a.winners[at - 1].next) {
+      const Winner& other = a.winners[at - 1];
+      if (other.key > winner.key || (other.key == winner.key && at - 1 != w &&
+                                     packing::goes_before(a.nodes[other.node].candidate, me)))
         ++before;
     }
-    const auto rank = static_cast<std::uint32_t>(team.sum(before));
+    const auto rank = static_cast<std::uint32_t>(before);
     if (rank >= most) return;
     const std::uint32_t index = static_cast<std::uint32_t>(s.schedule.spheres) + rank;
-    const float r = a.winner_radius[w];
+    const float r = float_of(winner.radius);
     if (team.lane() == 0) {
       a.spheres[index] = {me.centre.x, me.centre.y, me.centre.z, r};
       a.kept[index] = r < top ? r / top : 1.0f;

@@ -20,7 +20,9 @@ enum class Step : std::uint32_t {
   make_room,
   fill,
   activate,  ///< cells that reach the margin become the frontier
-  work,      ///< on the frontier's cells, one class of them at a time
+  refresh,   ///< the frontier's cells of one class: many settle already, the rest are open
+  confine,   ///< the open cells: what the surface tells of them
+  work,      ///< on the frontier's cells, or those that are open still
   split,     ///< the cells that have neither settled nor a candidate
   collect,   ///< candidates into buckets
   dominate,  ///< which of them no other one goes before
@@ -38,6 +40,26 @@ struct alignas(16) BucketNode {
   packing::Candidate candidate;
   std::uint32_t cell;
   std::uint32_t next;  ///< 1 + the next one's place, 0: the last
+};
+
+/// A candidate that no other goes before, on its way to become a sphere.
+struct Winner {
+  std::uint64_t key;     ///< the candidate's; 0: not accepted
+  std::uint32_t node;    ///< place in nodes
+  std::uint32_t next;    ///< 1 + the next of its rank bucket, 0: the last
+  std::uint32_t checks;  ///< kDistances, kInside: what is known of it
+  std::uint32_t radius;  ///< bits of the certified one
+
+  static constexpr std::uint32_t kDistances = 1;
+  static constexpr std::uint32_t kOutside = 2;
+  static constexpr std::uint32_t kInside = 4;
+};
+
+/// Winners by radius, so that one finds its place among them without looking at them all.
+struct RankBuckets {
+  static constexpr std::uint32_t kCount = 1024;
+  std::uint32_t size[kCount];
+  std::uint32_t head[kCount];  ///< 1 + a winner, 0: none
 };
 
 /// The float of these bits.
@@ -82,6 +104,8 @@ struct BandedState {
   std::uint32_t frontier = 0, active = 0, splitting = 0;
   std::uint32_t frontier_array = 0;
   std::uint32_t cell_class = 0, classes = 1;
+  bool in_parts = false;                      ///< with steps `refresh` and `confine` before `work`
+  std::uint32_t refreshed = 0, confined = 0;  ///< cells that these left open
 
   // Levels that one step does: see work_on_cells().
   std::uint32_t depth = 0;     ///< levels below the frontier's
@@ -115,20 +139,20 @@ struct BandedArrays {
 
   BandedState* state;
   Cell* cells;
-  float* bounds;             ///< the cells' bounds again; 0: free slot
-  std::uint32_t* free_list;  ///< slots
-  std::uint32_t* lists[2];   ///< frontier and active cells
-  std::uint32_t* splitting;  ///< cell | children that are still to make << kCellBits
+  float* bounds;                        ///< the cells' bounds again; 0: free slot
+  std::uint32_t* free_list;             ///< slots
+  std::uint32_t* lists[2];              ///< frontier and active cells
+  std::uint32_t *refreshed, *confined;  ///< cells
+  std::uint32_t* splitting;             ///< cell | children that are still to make << kCellBits
   std::uint32_t cell_capacity;
   std::uint32_t* queue;  ///< children to make, ChildCode; all kNone between steps
   std::uint32_t queue_capacity;
 
   BucketNode* nodes;
-  std::uint32_t* heads;       ///< of the buckets; all 0 between rounds
-  std::uint32_t* winners;     ///< places in nodes
-  std::uint32_t* won;         ///< by node
-  std::uint64_t* winner_key;  ///< 0: not accepted
-  float* winner_radius;
+  std::uint32_t* heads;  ///< of the buckets; all 0 between rounds
+  std::uint32_t* won;    ///< by node
+  Winner* winners;
+  RankBuckets* ranks;
   std::uint32_t candidate_capacity;  ///< heads: twice as many and 64
 
   StoredSphere* spheres;
@@ -137,7 +161,11 @@ struct BandedArrays {
 
   SphereLists lists_of_spheres;  ///< layout and use: see the state
   Mailbox* mailbox;              ///< null if nobody looks on
+  bool timed;                    ///< steps are timed, which costs some 0.8 µs each
 
+  std::uint32_t many = kMany;  ///< cells from which on a level is worked on in parts
+
+  static constexpr std::uint32_t kMany = 8192;
   static constexpr std::uint32_t kCellBits = 24;
 
   IST_HD SphereLists grid() const {
@@ -159,7 +187,7 @@ struct ListedSpheres {
   template <class Team, class Visit>
   IST_HD void for_near(const Team& team, packing::Float3 x, Visit&& visit) const {
     lists.for_near(team, x, [&](bool valid, std::uint32_t index) {
-      visit(valid, index, spheres[index].sphere());
+      visit(valid, index, in_global_memory(spheres)[index].sphere());
     });
   }
 };

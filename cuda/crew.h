@@ -8,6 +8,7 @@
 // the host (tests). Steps are templates over it. It has
 //
 //   using Team;             const Team& team() const;
+//   using Lane;             a team of one of its lanes
 //   Scratch& scratch();     this team's own memory
 //   std::uint32_t index();  this team's number, below size()
 //   void pause();           waits a little for other teams

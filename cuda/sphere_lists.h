@@ -21,6 +21,10 @@ struct SphereLists {
   struct Pair {
     std::uint32_t sphere, block;
   };
+  /// One of `count` equal shares of the cells that a pair has in common.
+  struct Share {
+    std::uint32_t index, count;
+  };
   /// What is used of the pools; above their capacities where they were too small. Then the lists
   /// are unusable until they are filled anew.
   struct Use {
@@ -68,20 +72,21 @@ struct SphereLists {
     const int i = packing::grid_coordinate(layout, x.x);
     const int j = packing::grid_coordinate(layout, x.y);
     const int k = packing::grid_coordinate(layout, x.z);
-    const std::uint32_t block = blocks[block_index(i >> 3, j >> 3, k >> 3)];
+    const std::uint32_t block = in_global_memory(blocks)[block_index(i >> 3, j >> 3, k >> 3)];
     std::uint32_t count = 0, only = 0;
     const std::uint32_t* list = nullptr;
     if ((block & kCoveredBlock) != 0) {
       count = 1;
       only = block & ~kCoveredBlock;
     } else if (block != 0) {
-      const Cell cell = cells[std::size_t{block - 1} * kCellsPerBlock + cell_index(i, j, k)];
+      const Cell cell =
+          in_global_memory(cells)[std::size_t{block - 1} * kCellsPerBlock + cell_index(i, j, k)];
       if ((cell.size & kCovered) != 0) {
         count = 1;
         only = cell.where;
       } else {
         count = cell.size;
-        list = words + cell.where + 1;
+        list = in_global_memory(words) + cell.where + 1;
       }
     }
     IST_ROLLED for (std::uint32_t base = 0; base < count; base += Team::kWidth) {
@@ -128,8 +133,9 @@ struct SphereLists {
 
   /// Second pass, over a noted pair: how much longer lists become.
   template <class Team>
-  IST_HD void count_in_cells(const Team& team, const Pair& pair, const Sphere& s) const {
-    for_cells(team, pair, s, [&](Cell& cell, packing::GridRelation relation) {
+  IST_HD void count_in_cells(const Team& team, const Pair& pair, const Sphere& s,
+                             Share share) const {
+    for_cells(team, pair, s, share, [&](Cell& cell, packing::GridRelation relation) {
       if (relation == packing::GridRelation::covers) {
         atomic_exchange(&cell.where, pair.sphere);
         atomic_or(&cell.size, kCovered);
@@ -141,8 +147,8 @@ struct SphereLists {
 
   /// Third pass: the first pair that comes to a cell gives it a segment for the longer list.
   template <class Team>
-  IST_HD void make_room(const Team& team, const Pair& pair, const Sphere& s) const {
-    for_cells(team, pair, s, [&](Cell& cell, packing::GridRelation) {
+  IST_HD void make_room(const Team& team, const Pair& pair, const Sphere& s, Share share) const {
+    for_cells(team, pair, s, share, [&](Cell& cell, packing::GridRelation) {
       if ((cell.size & kCovered) != 0) return;
       const std::uint32_t old = atomic_or(&cell.where, kInMaking);
       if ((old & kInMaking) != 0) return;
@@ -159,8 +165,8 @@ struct SphereLists {
 
   /// Fourth pass: lists the sphere.
   template <class Team>
-  IST_HD void fill_cells(const Team& team, const Pair& pair, const Sphere& s) const {
-    for_cells(team, pair, s, [&](Cell& cell, packing::GridRelation) {
+  IST_HD void fill_cells(const Team& team, const Pair& pair, const Sphere& s, Share share) const {
+    for_cells(team, pair, s, share, [&](Cell& cell, packing::GridRelation) {
       if ((cell.size & kCovered) != 0) return;
       std::uint32_t* segment = words + (atomic_load(&cell.where) & ~kInMaking);
       const std::uint32_t place = atomic_add(segment, 1);
@@ -175,9 +181,9 @@ struct SphereLists {
   }
 
   /// Calls visit(cell, relation) for the cells of the pair's block that the sphere is not away
-  /// from, in the lanes' own order.
+  /// from, of this share, in the lanes' own order.
   template <class Team, class Visit>
-  IST_HD void for_cells(const Team& team, const Pair& pair, const Sphere& s,
+  IST_HD void for_cells(const Team& team, const Pair& pair, const Sphere& s, Share share,
                         const Visit& visit) const {
     const std::uint32_t block = blocks[pair.block];
     if ((block & kCoveredBlock) != 0) return;
@@ -193,7 +199,9 @@ struct SphereLists {
       const int hi = range.hi[axis] < first + 7 ? range.hi[axis] : first + 7;
       count[axis] = hi - lo[axis] + 1;
     }
-    for (int n = team.lane(); n < count[0] * count[1] * count[2]; n += Team::kWidth) {
+    const int stride = static_cast<int>(share.count) * Team::kWidth;
+    for (int n = static_cast<int>(share.index) * Team::kWidth + team.lane();
+         n < count[0] * count[1] * count[2]; n += stride) {
       const int i = lo[0] + n % count[0], j = lo[1] + n / count[0] % count[1],
                 k = lo[2] + n / count[0] / count[1];
       const packing::GridRelation relation = packing::cell_relation(layout, s, i, j, k);

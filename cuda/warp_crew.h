@@ -16,6 +16,7 @@ template <class Scratch_>
 class WarpCrew {
  public:
   using Team = WarpTeam;
+  using Lane = LaneTeam;
   using Scratch = Scratch_;
 
   /// `scratch`: shared memory, one a warp.

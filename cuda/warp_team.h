@@ -14,7 +14,16 @@ struct WarpTeam {
   static constexpr unsigned kAll = 0xFFFFFFFFu;
 
   __device__ int lane() const { return static_cast<int>(threadIdx.x & 31u); }
+  static constexpr int kBatch = 1;
+
   __device__ void sync() const { __syncwarp(); }
+
+  /// A team's memory is the block's.
+  template <class T>
+  __device__ T* memory(T* p) const {
+    __builtin_assume(__isShared(p));
+    return p;
+  }
 
   __device__ std::uint32_t min(std::uint32_t value) const { return __reduce_min_sync(kAll, value); }
   __device__ std::uint32_t max(std::uint32_t value) const { return __reduce_max_sync(kAll, value); }
@@ -53,6 +62,11 @@ struct WarpTeam {
   __device__ T broadcast(T value, int from) const {
     return __shfl_sync(kAll, value, from);
   }
+};
+
+/// A thread of the device alone.
+struct LaneTeam : SerialTeam {
+  static constexpr int kBatch = 8;
 };
 
 }  // namespace ist::gpu

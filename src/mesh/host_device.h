@@ -14,6 +14,20 @@
 #define IST_HD_ONCE
 #endif
 
+// The device's compiler sees which memory a pointer leads to only where the array itself is in
+// sight. This tells it, as a team's memory() does; loads then need no general addressing.
+namespace ist {
+
+template <class T>
+IST_HD inline T* in_global_memory(T* p) {
+#ifdef __CUDA_ARCH__
+  __builtin_assume(__isGlobal(p));
+#endif
+  return p;
+}
+
+}  // namespace ist
+
 #ifdef __CUDA_ARCH__  // the host's half of a CUDA compilation does not know the pragma
 #define IST_ROLLED _Pragma("unroll 1")
 #else

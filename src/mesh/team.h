@@ -52,6 +52,14 @@ struct SerialTeam {
   IST_HD int lane() const { return 0; }
   IST_HD void sync() const {}
 
+  static constexpr int kBatch = 64;  ///< items that are worth working out side by side
+
+  /// Of a pointer to what the team's lanes share: itself.
+  template <class T>
+  IST_HD T* memory(T* p) const {
+    return p;
+  }
+
   template <class T>
   IST_HD T min(T value) const {
     return value;

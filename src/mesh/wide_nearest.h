@@ -28,13 +28,13 @@ struct WideExact {
 };
 
 IST_HD inline Corners corners_in(const WideTree& tree, const WideBlock& block, int lane) {
-  const auto at = [&](int i) { return tree.vertices + 3 * std::size_t{block.corner[i][lane]}; };
+  const auto at = [&](int i) { return tree.vertex(block.corner[i][lane]); };
   return {{at(0), at(1), at(2)}};
 }
 
 /// The exact corners of the triangle in a slot.
 IST_HD inline Corners corners_in(const WideTree& tree, std::uint32_t slot) {
-  return corners_in(tree, tree.blocks[slot / kWideWidth], static_cast<int>(slot % kWideWidth));
+  return corners_in(tree, tree.block(slot / kWideWidth), static_cast<int>(slot % kWideWidth));
 }
 
 /// The part of a distance query that orders and prunes boxes.
@@ -57,9 +57,8 @@ struct WideBall {
   IST_HD std::uint32_t limit() const { return last; }
   IST_HD std::uint32_t key(std::uint32_t node, int child) const {
     const std::uint32_t oriented_from = tree.last_level();
-    return bits_of(node < oriented_from
-                       ? box_distance2(tree.nodes[node], child)
-                       : oriented_distance2(tree.oriented[node - oriented_from], child));
+    return bits_of(node < oriented_from ? box_distance2(tree.node(node), child)
+                                        : oriented_distance2(tree.oriented_node(node), child));
   }
 
   IST_HD float box_distance2(const WideNode& node, int child) const {
@@ -127,7 +126,7 @@ struct WideNearestQuery : WideBall {
   }
 
   IST_HD void visit(std::uint32_t index) {
-    const WideBlock& block = tree.blocks[index];
+    const WideBlock& block = tree.block(index);
     for (int lane = team.lane(); lane < kWideWidth; lane += Team::kWidth) {
       const std::uint32_t triangle = block.triangle[lane];
       const float distance2 = closest_in_frame(frame_in(block, lane), p).distance2;
@@ -186,7 +185,7 @@ struct WideWithinQuery : WideBall {
         capacity(room) {}
 
   IST_HD void visit(std::uint32_t index) {
-    const WideBlock& block = tree.blocks[index];
+    const WideBlock& block = tree.block(index);
     for (int lane = team.lane(); lane < kWideWidth; lane += Team::kWidth) {
       const float distance2 = closest_in_frame(frame_in(block, lane), p).distance2;
       const bool near = block.triangle[lane] != kNoTriangle && distance2 <= radius2;
@@ -238,7 +237,7 @@ struct WideExactQuery : WideBall {
 
   /// Takes a triangle's exact distance into account.
   IST_HD void look_at(std::uint32_t at) {
-    const WideBlock& block = tree.blocks[at / kWideWidth];
+    const WideBlock& block = tree.block(at / kWideWidth);
     const int lane = static_cast<int>(at % kWideWidth);
     double point[3];
     const double distance2 = exact_closest_in(corners_in(tree, block, lane), exact, point);
@@ -252,7 +251,7 @@ struct WideExactQuery : WideBall {
   }
 
   IST_HD void visit(std::uint32_t index) {
-    const WideBlock& block = tree.blocks[index];
+    const WideBlock& block = tree.block(index);
     bool looked = false;
     for (int lane = team.lane(); lane < kWideWidth; lane += Team::kWidth) {
       if (block.triangle[lane] == kNoTriangle ||

@@ -16,7 +16,7 @@ struct WideRay {
 
   IST_HD std::uint32_t limit() const { return 0xFFFFFFE0u; }
   IST_HD std::uint32_t key(std::uint32_t node, int child) const {
-    const WideNode& boxes = tree.nodes[node];
+    const WideNode& boxes = tree.node(node);
     bool hit = true;
     for (int k = 0; k < 3; ++k)
       hit = hit & (boxes.lower[k][child] <= box.upper[k]) & (boxes.upper[k][child] >= box.lower[k]);
@@ -34,7 +34,7 @@ struct WideWindingQuery : WideRay {
       : WideRay{of, RayBox::ray(point)}, team(members), p(point) {}
 
   IST_HD void visit(std::uint32_t index) {
-    const WideBlock& block = tree.blocks[index];
+    const WideBlock& block = tree.block(index);
     for (int lane = team.lane(); lane < kWideWidth; lane += Team::kWidth)
       if (block.triangle[lane] != kNoTriangle)
         winding += ray_winding(corners_in(tree, block, lane), p);
@@ -73,7 +73,7 @@ struct WideLineQuery : WideRay {
         capacity(room) {}
 
   IST_HD void visit(std::uint32_t index) {
-    const WideBlock& block = tree.blocks[index];
+    const WideBlock& block = tree.block(index);
     for (int lane = team.lane(); lane < kWideWidth; lane += Team::kWidth) {
       int facing = 0;
       if (block.triangle[lane] != kNoTriangle) facing = pierced(corners_in(tree, block, lane), yz);

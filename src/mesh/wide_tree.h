@@ -54,6 +54,15 @@ struct WideTree {
   std::uint32_t triangle_count = 0;
   std::uint32_t vertex_count = 0;
 
+  IST_HD const WideNode& node(std::uint32_t i) const { return in_global_memory(nodes)[i]; }
+  IST_HD const WideOriented& oriented_node(std::uint32_t i) const {
+    return in_global_memory(oriented)[i - last_level()];
+  }
+  IST_HD const WideBlock& block(std::uint32_t i) const { return in_global_memory(blocks)[i]; }
+  IST_HD const double* vertex(std::uint32_t i) const {
+    return in_global_memory(vertices) + 3 * std::size_t{i};
+  }
+
   /// The first of the nodes whose children are blocks.
   IST_HD std::uint32_t last_level() const { return (first_leaf - 1) / kWideWidth; }
 };
@@ -90,12 +99,12 @@ IST_HD inline TriangleFrame<float> frame_in(const WideBlock& block, int lane) {
 }
 
 IST_HD inline TriangleFrame<float> frame_in(const WideTree& tree, std::uint32_t slot) {
-  return frame_in(tree.blocks[slot / kWideWidth], static_cast<int>(slot % kWideWidth));
+  return frame_in(tree.block(slot / kWideWidth), static_cast<int>(slot % kWideWidth));
 }
 
 /// Index in the mesh of the triangle in a slot.
 IST_HD inline std::uint32_t triangle_in(const WideTree& tree, std::uint32_t slot) {
-  return tree.blocks[slot / kWideWidth].triangle[slot % kWideWidth];
+  return tree.block(slot / kWideWidth).triangle[slot % kWideWidth];
 }
 
 }  // namespace ist

@@ -156,8 +156,8 @@ class BandedPacker {
         typename Field::Scratch scratch;
         const Cell parent = load_cell(SerialTeam{}, cells_[parents[i]], scratch);
         for (int k = 0; k < 8; ++k)
-          children[8 * (i - from) + static_cast<std::size_t>(k)] =
-              field.child(SerialTeam{}, parent, k, scratch, schedule_.margin);
+          children[8 * (i - from) + static_cast<std::size_t>(k)] = field.child(
+              SerialTeam{}, parent, k, scratch.ring, &scratch.sample[0], schedule_.margin);
       });
       for (std::size_t i = from; i < to; ++i) {
         StoredCell<Feature> kept = cells_[parents[i]];  // for its ring

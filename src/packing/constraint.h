@@ -29,6 +29,14 @@ struct FeatureOffset {
   std::uint32_t tag = 0;
 };
 
+/// What a search of a surface finds within a limit.
+template <class Feature>
+struct NearestFeature {
+  Feature feature{};
+  float distance = 0;  ///< of the feature; the limit where there is none
+  bool found = false;
+};
+
 /// The ball {centre, radius} seen from x. A surface point is a ball of radius 0.
 IST_HD inline FeatureOffset ball_offset(Float3 centre, float radius, std::uint32_t tag, Float3 x) {
   const Float3 away = x - centre;

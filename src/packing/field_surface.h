@@ -24,10 +24,9 @@ class FieldSurface {
 
   /// Unsigned distance to the surface, and the feature there, if it is less than `limit`.
   template <class Team>
-  bool nearest(const Team&, Float3 x, float limit, Feature& feature, float& distance) const {
+  NearestFeature<Feature> nearest(const Team&, Float3 x, float limit) const {
     const double s = value(x);
-    if (!(std::fabs(s) < limit)) return false;
-    distance = static_cast<float>(std::fabs(s));
+    if (!(std::fabs(s) < limit)) return {{}, limit, false};
     // Central differences over a step that float coordinates resolve.
     const double step = 0x1p-20;
     const Eigen::Vector3d at(x.x, x.y, x.z);
@@ -38,10 +37,11 @@ class FieldSurface {
     }
     const double length = std::sqrt(g.dot(g));
     const Eigen::Vector3d q = length > 0 ? Eigen::Vector3d(at - s / length * g) : at;
+    Feature feature;
     feature.centre = {static_cast<float>(q.x()), static_cast<float>(q.y()),
                       static_cast<float>(q.z())};
     feature.radius = static_cast<float>(-value(feature.centre));
-    return true;
+    return {feature, static_cast<float>(std::fabs(s)), true};
   }
 
   /// Where x stands to a remembered feature.
@@ -51,7 +51,7 @@ class FieldSurface {
 
   /// Nothing is known of faces.
   template <class Team>
-  int convex_planes(const Team&, Float3, float, bool, Feature*, int, SampleMemory&, int) const {
+  int convex_planes(const Team&, Float3, float, bool, Feature*, int, SampleMemory*, int) const {
     return 0;
   }
 

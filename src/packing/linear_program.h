@@ -4,12 +4,6 @@
 
 namespace ist::packing {
 
-/// Result of maximise_clearance().
-struct ClearanceOptimum {
-  float value = 0;  ///< ≥ max over the box of min over the constraints, whatever the rounding
-  Float3 y;         ///< where the linear model is greatest, inside the box
-};
-
 /// Maximises min_i (distance_i + curvature_i·h2 + gradient_i·y) over the box |y_k| ≤ a. `count`
 /// ≥ 1. With h2 = 3a² the value bounds every clearance in the box (Constraint); with h2 = 0 it is
 /// the linear model that the ascent follows.
@@ -19,11 +13,12 @@ struct ClearanceOptimum {
 /// still gives a bound. The value is formed at the end from the multipliers by weak duality,
 /// Σλ_i b_i + a‖Σλ_i gradient_i‖₁ with Σλ_i = 1, which holds for any λ ≥ 0: rounding in the pivots
 /// can only loosen it. Ties go to the smallest tag, so the result is a function of the set of
-/// constraints. Lanes share the search for the entering row and the pivots.
+/// constraints. `sample`: its constraints.
 template <class Team>
-IST_HD_ONCE ClearanceOptimum maximise_clearance(const Team& team, const SampleMemory& constraints,
-                                                int count, float a, float h2) {
-  constexpr int kMaxPivots = 24;
+IST_HD ClearanceOptimum maximise_clearance(const Team& team, const SampleMemory* sample, int count,
+                                           float a, float h2) {
+  if constexpr (Team::kWidth >= 32) return maximise_by_lanes(team, sample, count, a, h2);
+  const SampleMemory& constraints = *sample;
   const auto level = [&](int i) { return constraints.distance[i] + constraints.curvature[i] * h2; };
   const auto& g = constraints.gradient;
 
@@ -31,7 +26,7 @@ IST_HD_ONCE ClearanceOptimum maximise_clearance(const Team& team, const SampleMe
   float first_value = kFarAway;
   {
     std::uint32_t tag = 0xFFFFFFFFu;
-    IST_ROLLED for (int i = team.lane(); i < count; i += Team::kWidth) {
+    for (int i = team.lane(); i < count; i += Team::kWidth) {
       const float value = level(i) + a * (fabsf(g[0][i]) + fabsf(g[1][i]) + fabsf(g[2][i]));
       if (value < first_value || (value == first_value && constraints.tag[i] < tag)) {
         first = i;
@@ -41,17 +36,17 @@ IST_HD_ONCE ClearanceOptimum maximise_clearance(const Team& team, const SampleMe
     }
     first = index_of_least(team, first_value, tag, first);
   }
-  SimplexBasis<Team> basis;
-  basis.begin(team, first, first_value, get(constraints, first).gradient, a);
+  SimplexBasis basis;
+  basis.begin(first, first_value, get(team, sample, first).gradient, a);
 
-  const float tolerance = 1e-5f * a;
-  IST_ROLLED for (int pivot = 0; pivot < kMaxPivots; ++pivot) {
+  const float tolerance = kTolerance * a;
+  for (int pivot = 0; pivot < kMostPivots; ++pivot) {
     // Entering row: the most violated; the smallest tag among equals, constraints before sides.
     const float* z = basis.z;
     int entering = 0;
     float least = -tolerance;  // of the negated violations
     std::uint32_t tag = 0xFFFFFFFFu;
-    IST_ROLLED for (int i = team.lane(); i < count; i += Team::kWidth) {
+    for (int i = team.lane(); i < count; i += Team::kWidth) {
       const float slack = level(i) + g[0][i] * z[1] + g[1][i] * z[2] + g[2][i] * z[3] - z[0];
       if (slack < least || (slack == least && constraints.tag[i] < tag)) {
         least = slack;
@@ -70,21 +65,12 @@ IST_HD_ONCE ClearanceOptimum maximise_clearance(const Team& team, const SampleMe
         violated = true;
       }
     }
-    if (!violated || !basis.exchange(team, constraints, entering, worst)) break;
+    if (!violated || !basis.exchange(constraints, entering, worst)) break;
   }
 
   float sums[5];  // of λ, λb, λ·gradient
-  basis.dual(team, constraints, level, sums);
-  ClearanceOptimum optimum;
-  optimum.value = first_value;
-  if (sums[0] > 0) {
-    const float value =
-        (sums[1] + a * (fabsf(sums[2]) + fabsf(sums[3]) + fabsf(sums[4]))) / sums[0];
-    if (value < first_value) optimum.value = value;
-  }
-  const auto clamp = [a](float y) { return y > a ? a : (y < -a ? -a : y); };
-  optimum.y = {clamp(basis.z[1]), clamp(basis.z[2]), clamp(basis.z[3])};
-  return optimum;
+  basis.dual(constraints, level, sums);
+  return optimum_of(first_value, sums, basis.z, a);
 }
 
 }  // namespace ist::packing

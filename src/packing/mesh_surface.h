@@ -19,10 +19,11 @@ class MeshSurface {
   /// Unsigned distance to the surface, and the feature there, if it is less than `limit` or just
   /// that. Among equals the triangle with the smallest index.
   template <class Team>
-  bool nearest(const Team&, Float3 x, float limit, Feature& feature, float& distance) const {
+  NearestFeature<Feature> nearest(const Team&, Float3 x, float limit) const {
     const float p[3] = {x.x, x.y, x.z};
     float best2 = limit * limit;
     std::uint32_t best = kNoTriangle;
+    Feature feature = 0;
     for_triangles_near(view_, p, best2, [&](const NearTriangle& near) {
       if (near.closest.distance2 < best2 ||
           (near.closest.distance2 == best2 && near.triangle < best)) {
@@ -32,8 +33,7 @@ class MeshSurface {
       }
       return best2;
     });
-    distance = std::sqrt(best2);
-    return best != kNoTriangle;
+    return {feature, std::sqrt(best2), best != kNoTriangle};
   }
 
   SurfaceTriangle triangle(Feature feature) const {
@@ -63,7 +63,7 @@ class MeshSurface {
 
   template <class Team>
   int convex_planes(const Team& team, Float3 x, float h, bool x_inside, Feature* triangles,
-                    int most, SampleMemory& out, int from) const {
+                    int most, SampleMemory* out, int from) const {
     return packing::convex_planes(team, *this, x, h, x_inside, triangles, most, out, from);
   }
 
@@ -81,8 +81,14 @@ class MeshSurface {
   /// Exact clearance of a point for certification: distance to the surface, `limit` if it is not
   /// less, negative outside.
   template <class Team>
-  double clearance(const Team&, Float3 x, double limit) const {
-    return solid_.inside(exact(x)) ? solid_.closest_point(exact(x), limit).distance : -1.0;
+  double clearance(const Team& team, Float3 x, double limit) const {
+    return inside(team, x) ? exact_distance(team, x, limit) : -1.0;
+  }
+
+  /// Exact unsigned distance, `limit` if it is not less.
+  template <class Team>
+  double exact_distance(const Team&, Float3 x, double limit) const {
+    return solid_.closest_point(exact(x), limit).distance;
   }
 
  private:

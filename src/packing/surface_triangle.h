@@ -47,7 +47,7 @@ IST_HD inline FeatureOffset triangle_offset(const SurfaceTriangle& t, Float3 x) 
 /// `surface`: triangles_within(), triangle(), inside_once(). `triangles`: room for `most` of them.
 template <class Team, class Surface>
 IST_HD int convex_planes(const Team& team, const Surface& surface, Float3 x, float h, bool x_inside,
-                         typename Surface::Feature* triangles, int most, SampleMemory& out,
+                         typename Surface::Feature* triangles, int most, SampleMemory* out,
                          int from) {
   constexpr float kTolerance = 4e-7f;  // rounding of the frames
   const int count = surface.triangles_within(team, x, 9 * h * h, triangles, most);
@@ -80,7 +80,7 @@ IST_HD int convex_planes(const Team& team, const Surface& surface, Float3 x, flo
     int total = 0;
     const int place = from + written + team.exclusive_count(near, total);
     if (from + written + total > kSampleCapacity) return 0;
-    if (near) put(out, place, c);
+    if (near) put(team, out, place, c);
     written += total;
   }
   team.sync();

@@ -87,6 +87,12 @@ template <int Width>
 class FiberTeam {
  public:
   static constexpr int kWidth = Width;
+  static constexpr int kBatch = 1;
+
+  template <class T>
+  T* memory(T* p) const {
+    return p;
+  }
 
   FiberTeam(Fibers<Width>& fibers, int lane) : fibers_(fibers), lane_(lane) {}
 

@@ -16,6 +16,7 @@ template <class Scratch_>
 class HostCrew {
  public:
   using Team = SerialTeam;
+  using Lane = SerialTeam;
   using Scratch = Scratch_;
 
   struct Meeting {

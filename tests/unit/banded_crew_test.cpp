@@ -57,7 +57,8 @@ struct CrewPacking {
 };
 
 CrewPacking pack_by_crew(const MeshSolid& solid, const PackingSettings& settings,
-                         std::uint32_t teams, const gpu::BandedSizes& sizes) {
+                         std::uint32_t teams, const gpu::BandedSizes& sizes,
+                         std::uint32_t many = gpu::BandedArrays::kMany) {
   const packing::MeshSurface surface(solid);
   Host host;
   gpu::BandedBuffers<HostArray, Host> buffers(
@@ -65,7 +66,8 @@ CrewPacking pack_by_crew(const MeshSolid& solid, const PackingSettings& settings
       sizes);
   CrewPacking out;
   for (;;) {
-    const gpu::BandedArrays arrays = buffers.arrays();
+    gpu::BandedArrays arrays = buffers.arrays();
+    arrays.many = many;
     run_crew<packing::CellScratch<std::uint32_t>>(
         teams, [&](auto& crew) { gpu::pack_banded(crew, arrays, surface); });
     ++out.launches;
@@ -91,6 +93,20 @@ TEST(BandedCrew, PacksLikeTheCpuWhateverItsSize) {
             pack_by_crew(solid, settings, teams, gpu::banded_sizes(settings.max_spheres));
         expect_same(got.packing, expected);
       }
+    }
+  }
+}
+
+TEST(BandedCrew, WorkInPartsIsTheSameWork) {
+  const MeshSolid solid(close_mesh(make_sample("bolt"), "bolt"));
+  for (const std::size_t count : {100, 1000}) {
+    PackingSettings settings;
+    settings.max_spheres = count;
+    const SpherePacking expected = pack(solid, settings);
+    for (const std::uint32_t many : {1u, 100u}) {
+      SCOPED_TRACE(std::to_string(count) + " in parts from " + std::to_string(many));
+      expect_same(pack_by_crew(solid, settings, 2, gpu::banded_sizes(count), many).packing,
+                  expected);
     }
   }
 }

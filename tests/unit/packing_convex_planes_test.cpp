@@ -40,14 +40,15 @@ TEST(ConvexPlanes, NoClearanceInTheCellExceedsThem) {
     SampleMemory planes;
     std::uint32_t triangles[32];
     const int count = surface.convex_planes(team, x, half * 1.7320510f, surface.inside(team, x),
-                                            triangles, 32, planes, 0);
+                                            triangles, 32, &planes, 0);
     (count > 0 ? answered : refused)++;
     for (int i = 0; i < 40 && count > 0; ++i) {
       const Float3 y = half * Float3{unit(random), unit(random), unit(random)};
       const double clearance = surface.clearance(team, x + y, 10);
       if (clearance < 0) continue;
       for (int k = 0; k < count; ++k)
-        ASSERT_LE(clearance, planes.distance[k] + dot(get(planes, k).gradient, y) + 1e-6)
+        ASSERT_LE(clearance,
+                  planes.distance[k] + dot(get(SerialTeam{}, &planes, k).gradient, y) + 1e-6)
             << "round " << round;
     }
   }

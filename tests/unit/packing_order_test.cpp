@@ -117,7 +117,7 @@ void expect_team_agrees(const char* name, int ways, unsigned seed) {
   const SerialTeam one;
   std::mt19937 random(seed);
   ist::testing::Fibers<Width> fibers(seed);
-  int states[3] = {};
+  int states[3] = {};  // of settled, candidate, split
   for (int way = 0; way < ways; ++way) {
     StoredCell<std::uint32_t> stored{};
     stored.cell.inside = surface.inside(one, stored.cell.centre);
@@ -133,7 +133,8 @@ void expect_team_agrees(const char* name, int ways, unsigned seed) {
         Cell cell = load_cell(one, stored, scratch);
         state = field.work(one, cell, scratch, threshold, margin, largest);
         store_cell(one, cell, scratch, stored);
-        store_cell(one, field.child(one, cell, k, scratch, margin), scratch, child);
+        store_cell(one, field.child(one, cell, k, scratch.ring, &scratch.sample[0], margin),
+                   scratch, child);
       }
       auto shared = std::make_unique<Scratch>();
       fibers.run([&](int lane) {
@@ -141,7 +142,7 @@ void expect_team_agrees(const char* name, int ways, unsigned seed) {
         Cell cell = load_cell(team, other, *shared);
         EXPECT_EQ(field.work(team, cell, *shared, threshold, margin, largest), state);
         store_cell(team, cell, *shared, other);
-        const Cell octant = field.child(team, cell, k, *shared, margin);
+        const Cell octant = field.child(team, cell, k, shared->ring, &shared->sample[0], margin);
         store_cell(team, octant, *shared, other_child);
       });
       ++states[static_cast<int>(state)];
@@ -183,7 +184,7 @@ TEST(PackingOrder, AFullSampleKeepsTheNearestOfAnyOrder) {
     for (std::uint32_t i = 0; i < spheres.size(); ++i)
       expected.emplace_back(norm(x - Float3{spheres[i].x, spheres[i].y, spheres[i].z}) - 0.001f, i);
     std::sort(expected.begin(), expected.end());
-    expected.resize(55);
+    expected.resize(kSampleCapacity - 9);
     const auto check = [&](const Sample& s) {
       std::vector<std::pair<float, std::uint32_t>> seen;
       for (int i = 0; i < s.size; ++i) seen.emplace_back(s.at->distance[i], s.at->tag[i]);
@@ -192,14 +193,12 @@ TEST(PackingOrder, AFullSampleKeepsTheNearestOfAnyOrder) {
       EXPECT_EQ(s.clearance, expected[0].first);
     };
     SampleMemory memory;
-    Sample s{&memory, 0, 0};
-    sample_spheres(SerialTeam{}, x, ShuffledSpheres(spheres, filled), 10, 9, s);
+    Sample s = sample_spheres(SerialTeam{}, x, ShuffledSpheres(spheres, filled), 10, 9, &memory);
     check(s);
     ist::testing::Fibers<32> fibers(static_cast<unsigned>(round));
     fibers.run([&](int lane) {
-      Sample mine{&memory, 0, 0};
-      sample_spheres(ist::testing::FiberTeam<32>(fibers, lane), x, GridSpheres(spheres, filled), 10,
-                     9, mine);
+      const Sample mine = sample_spheres(ist::testing::FiberTeam<32>(fibers, lane), x,
+                                         GridSpheres(spheres, filled), 10, 9, &memory);
       if (lane == 0) s = mine;
     });
     check(s);
