@@ -54,7 +54,7 @@ class MeshOnGrids {
   MeshOnGrids(Report& report, const std::string& name, const ist::ClosedMesh& mesh)
       : report_(report), name_(name), solid_(mesh) {
     settings_.max_spheres = report.quick() ? 1'000 : 100'000;
-    settings_.time_limit = 3;
+    settings_.time_limit = 2;
     solid_.unit_volume();
   }
 
@@ -64,7 +64,7 @@ class MeshOnGrids {
       // The run of median duration among some.
       std::vector<std::pair<double, History>> runs;
       std::size_t peak = 0;
-      for (int run = 0; run < (report_.quick() ? 2 : 6); ++run) {
+      for (int run = 0; run < (report_.quick() ? 2 : 4); ++run) {
         ist::gpu::Queue queue{ist::GpuSettings{}};
         History history;
         const double start = wall_seconds();
