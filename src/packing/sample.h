@@ -165,6 +165,7 @@ IST_HD_ONCE Sample sample_spheres(const Team& team, Float3 x, const Spheres& sph
   const int room = kSampleCapacity - spare;
   int count = 0, batches = 0;
   Sample out{at, 0, spheres.reach()};
+  team.sync();  // all lanes are done with what was here before
   const auto flush = [&] {
     float nearest = kFarAway;
     IST_ROLLED for (int i = 0; i < count; ++i) {
