@@ -112,19 +112,23 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       result.volume += weight * part.volume;
       result.volume_min += weight * part.volume_min;
       result.volume_max += weight * part.volume_max;
-      result.centroid += weight * part.volume * part.centroid;
+      if (result.volume > 0)
+        result.centroid +=
+            (weight * part.volume / result.volume) * (part.centroid - result.centroid);
       result.translation_gradient += weight * part.translation_gradient;
       result.rotation_gradient += weight * part.rotation_gradient;
       result.status = std::max(result.status, part.status);
-      slope += weights[i].slope / unit3 * part.volume;
+      // At extreme sizes nought times the volume need not be nought.
+      if (weights[i].slope != 0) slope += weights[i].slope / unit3 * part.volume;
     }
     // The gauge is rounded too, and with it the weights.
-    const double doubt = std::abs(slope) * (gauge.volume_max - gauge.volume_min);
-    result.volume_min = std::max(0.0, result.volume_min - doubt);
-    result.volume_max += doubt;
-    if (result.volume > 0) result.centroid /= result.volume;
-    result.translation_gradient += slope * gauge.translation_gradient;
-    result.rotation_gradient += slope * gauge.rotation_gradient;
+    if (slope != 0) {
+      const double doubt = std::abs(slope) * (gauge.volume_max - gauge.volume_min);
+      result.volume_min = std::max(0.0, result.volume_min - doubt);
+      result.volume_max += doubt;
+      result.translation_gradient += slope * gauge.translation_gradient;
+      result.rotation_gradient += slope * gauge.rotation_gradient;
+    }
   }
   result.node_visits = queries.visits();
   result.sphere_pairs = queries.pairs();

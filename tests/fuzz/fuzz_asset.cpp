@@ -32,6 +32,9 @@ std::vector<std::byte> sound_asset() {
   }
   arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
   arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  DetailArrays& detail = arrays.details.emplace_back();
+  detail.effective_spheres.assign(10, {0, 0, 0, 0.2f});
+  detail.matched_tree = build_tree(detail.effective_spheres, {});
   arrays.header.volume = 1;
   return asset_bytes(arrays);
 }
@@ -57,9 +60,11 @@ void use(const TreeView& view, const TreeView& sound) {
   static Workspace workspace(1u << 14);
   Pose pose;
   pose.t[0] = 0.2;
-  for (const Measure measure : {Measure::matched, Measure::inner}) {
+  for (const auto& [measure, pair_budget] :
+       {std::pair(Measure::matched, 0u), {Measure::matched, 20u}, {Measure::inner, 0u}}) {
     QuerySettings settings;
     settings.measure = measure;
+    settings.pair_budget = pair_budget;
     const auto [penetration, separation] =
         query({view, {}, 1}, {sound, pose, 1}, settings, workspace);
     if (!(penetration.volume >= 0) || !std::isfinite(penetration.volume_max)) std::abort();

@@ -62,10 +62,10 @@ bool same_bits(const Penetration& a, const Penetration& b) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const Asset a =
-      testing::make_random_asset({.spheres = 300, .smallest = 0.2, .centre = {}, .exponent = 0}, 1);
-  static const Asset b =
-      testing::make_random_asset({.spheres = 40, .smallest = 0.05, .centre = {}, .exponent = 0}, 2);
+  static const Asset a = testing::make_random_asset(
+      {.spheres = 300, .smallest = 0.2, .centre = {}, .exponent = 0, .details = 2}, 1);
+  static const Asset b = testing::make_random_asset(
+      {.spheres = 40, .smallest = 0.05, .centre = {}, .exponent = 0, .details = 1}, 2);
   static Workspace large(1u << 16), small(64);
   Input input(data, size);
   const auto flags = input.next<std::uint8_t>();
@@ -79,6 +79,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if ((flags & 32) != 0) placed_b.scale = input.next<double>();
   if ((flags & 64) != 0) placed_a.scale = input.next<float>();
   if ((flags & 128) != 0) placed_b.tree = a.view();
+  settings.pair_budget = input.next<std::uint16_t>();
 
   const auto [penetration, separation] = query(placed_a, placed_b, settings, workspace);
   require(penetration.volume >= 0);
