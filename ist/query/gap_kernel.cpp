@@ -12,6 +12,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
+/// Half of the lanes at most: every step of this descent waits for the one before, and roots of a
+/// longer vector come later.
+template <class T>
+using GapTag = hn::CappedTag<T, kWidth / 2>;
+
 template <class T>
 struct alignas(64) Gaps {
   T gap[kWidth];
@@ -21,7 +26,7 @@ struct alignas(64) Gaps {
 template <class T>
 HWY_INLINE void child_gaps_as(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
                               std::uint32_t block_y, Gaps<T>& out) {
-  const LaneTag<T> d;
+  const GapTag<T> d;
   const SphereTree::Level& level = side.x->level[level_x];
   const BallBlock& block = level.blocks[block_x];
   const Origin& origin = level.origins[block_x];
@@ -49,7 +54,7 @@ HWY_INLINE void child_gaps_as(const GapSide& side, int level_x, std::uint32_t bl
 /// A bit a lane that comes under one of the limits.
 template <class T>
 HWY_INLINE std::uint32_t nearer(const Gaps<T>& gaps, T gap_limit, T cover_limit) {
-  const LaneTag<T> d;
+  const GapTag<T> d;
   std::uint32_t bits = 0;
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d))
     bits |= mask_bits(d, hn::Or(hn::Load(d, gaps.gap + lane) < hn::Set(d, gap_limit),
@@ -61,7 +66,7 @@ HWY_INLINE std::uint32_t nearer(const Gaps<T>& gaps, T gap_limit, T cover_limit)
 template <class T>
 HWY_INLINE LeafGap leaf_gap_as(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
                                double gap_limit, double cover_limit) {
-  const LaneTag<T> d;
+  const GapTag<T> d;
   using V = hn::Vec<decltype(d)>;
   // Spheres of x that y's leaf ball leaves in play.
   Gaps<T> reach;
