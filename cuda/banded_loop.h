@@ -3,6 +3,7 @@
 #include "banded_cells.h"
 #include "banded_control.h"
 #include "banded_selection.h"
+#include "banded_split.h"
 
 namespace ist::gpu {
 
