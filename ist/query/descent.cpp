@@ -7,7 +7,6 @@
 
 #include "query/node_kernel.h"
 #include "query/precision.h"
-#include "query/subtree_kernel.h"
 
 namespace ist {
 namespace {
@@ -55,8 +54,10 @@ Overlap Descent::overlap() const {
 
 Overlap Descent::sure() const {
   Overlap result = finish(sums_, precision_);
-  result.add(held_);
-  result.error += sum_rounding(precision_) * held_.volume;
+  Overlap held = held_overlap(true, held_a_);
+  held.add(held_overlap(false, held_b_));
+  result.add(held);
+  result.error += sum_rounding(precision_) * held.volume;
   return result;
 }
 
@@ -109,27 +110,37 @@ void Descent::open_pairs(const NodeStage& stage, bool open_a, std::size_t from, 
 
 void Descent::hold(bool of_a, int level, const HeldNodes& held) {
   const SphereTree& tree = of_a ? a_ : b_;
-  const Eigen::Vector3d origin_b(map_.t[0], map_.t[1], map_.t[2]);
-  const double cube = map_.scale * map_.scale * map_.scale;
+  add_subtrees(tree, level, held.x, held.size, of_a ? held_a_ : held_b_);
+  if (bins_ == nullptr) return;
   for (std::size_t i = 0; i < held.size; ++i) {
-    const SubtreeSums sums = subtree_sums(tree, level, held.x[i]);
-    const Eigen::Vector3d moment(sums.moment[0], sums.moment[1], sums.moment[2]);
-    Overlap whole;
-    if (of_a) {
-      whole.volume = sums.volume;
-      whole.moment = moment - sums.volume * origin_b;
-    } else {
-      whole.volume = cube * sums.volume;
-      for (int k = 0; k < 3; ++k)
-        whole.moment[k] =
-            cube * Eigen::Vector3d(map_.m[3 * k], map_.m[3 * k + 1], map_.m[3 * k + 2]).dot(moment);
-    }
-    held_.add(whole);
-    held_spheres_ += sums.spheres;
-    if (bins_ != nullptr)
-      bins_->add_guess(of_a ? level : kSphereLevel, of_a ? held.x[i] : held.y[i],
-                       of_a ? kSphereLevel : level, of_a ? held.y[i] : held.x[i], whole);
+    SubtreeSums sums;
+    add_subtrees(tree, level, held.x + i, 1, sums);
+    bins_->add_guess(of_a ? level : kSphereLevel, of_a ? held.x[i] : held.y[i],
+                     of_a ? kSphereLevel : level, of_a ? held.y[i] : held.x[i],
+                     held_overlap(of_a, sums));
   }
+}
+
+Overlap Descent::held_overlap(bool of_a, const SubtreeSums& held) const {
+  Overlap overlap;
+  if (held.spheres == 0) return overlap;
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  for (std::size_t lane = 0; lane < kWidth; ++lane) {
+    overlap.volume += held.cubes[lane];
+    for (int k = 0; k < 3; ++k) moment[k] += held.moment[k][lane];
+  }
+  overlap.volume *= 4 * M_PI / 3;
+  moment *= 4 * M_PI / 3;
+  if (of_a) {
+    overlap.moment = moment - overlap.volume * Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]);
+  } else {
+    const double cube = map_.scale * map_.scale * map_.scale;
+    overlap.volume *= cube;
+    for (int k = 0; k < 3; ++k)
+      overlap.moment[k] = cube * ((map_.m[3 * k] * moment[0] + map_.m[3 * k + 1] * moment[1]) +
+                                  map_.m[3 * k + 2] * moment[2]);
+  }
+  return overlap;
 }
 
 void Descent::open_leaves() {
@@ -248,7 +259,7 @@ Penetration Descent::penetration() const noexcept {
   result.volume_min = unit3 * lowest;
   result.volume_max = unit3 * highest;
   result.node_visits = budget_.visits();
-  result.sphere_pairs = sums_.lenses + held_spheres_;
+  result.sphere_pairs = sums_.lenses + held_a_.spheres + held_b_.spheres;
   if (stopped_) result.status = QueryStatus::budget_exhausted;
   if (overlap.volume > 0) {
     const Eigen::Vector3d origin_b(pose_.a_from_b.t[0], pose_.a_from_b.t[1], pose_.a_from_b.t[2]);

@@ -11,6 +11,7 @@
 #include "query/overlap.h"
 #include "query/relative_pose.h"
 #include "query/sphere_tree.h"
+#include "query/subtree_kernel.h"
 #include "query/unresolved.h"
 #include "query/workspace.h"
 
@@ -47,12 +48,15 @@ class Descent {
   /// Opens one side of every pair of the current list. False if the budget stopped it.
   bool open_level();
 
-  /// Opens pairs [from, from + n) of the current list into the next, where the standing side's
-  /// spheres hold whole nodes into `held_`.
+  /// Opens pairs [from, from + n) of the current list into the next. Nodes that a sphere of the
+  /// standing side holds are added up instead.
   void open_pairs(const NodeStage& stage, bool open_a, std::size_t from, std::size_t n);
 
   /// Adds the spheres below nodes of A, or of B: each node lies in one sphere of the other side.
   void hold(bool of_a, int level, const HeldNodes& held);
+
+  /// What spheres of A, or of B, add that lie in one of the other side.
+  Overlap held_overlap(bool of_a, const SubtreeSums& held) const;
 
   void open_leaves();
 
@@ -83,10 +87,9 @@ class Descent {
   Budget budget_;
   int level_a_ = 0, level_b_ = 0;  ///< of the current list
   LeafSums sums_;
-  Overlap held_;  ///< nodes that lie in a sphere of the other tree
-  std::uint32_t held_spheres_ = 0;
-  Overlap left_;           ///< guess of what was not opened
-  double left_bound_ = 0;  ///< what that can add at most
+  SubtreeSums held_a_, held_b_;  ///< nodes that lie in a sphere of the other tree
+  Overlap left_;                 ///< guess of what was not opened
+  double left_bound_ = 0;        ///< what that can add at most
   bool stopped_ = false;
   bool keep_rounding_ = false;
 };

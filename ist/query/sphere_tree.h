@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -85,6 +86,17 @@ struct SphereTree {
   /// tile the root ball.
   double typical_cube(int at_level) const noexcept {
     return header->root[3] * header->root[3] * header->root[3] / count(at_level);
+  }
+
+  /// The leaf blocks [begin, end) below a node.
+  struct Leaves {
+    std::uint32_t begin, end;
+  };
+  Leaves leaves_below(int at_level, std::uint32_t block) const noexcept {
+    const std::uint64_t full = std::uint64_t{1} << (4 * at_level);
+    const std::uint64_t all = level[0].count;
+    return {static_cast<std::uint32_t>(std::min(all, full * block)),
+            static_cast<std::uint32_t>(std::min(all, full * (block + 1)))};
   }
 
   /// Nodes of a level.

@@ -1,19 +1,22 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "query/sphere_tree.h"
 
 namespace ist {
 
-/// All spheres below a node, in its tree's unit frame.
-struct SubtreeSums {
-  double volume = 0;
-  double moment[3] = {};  ///< Σ volume · centre
+/// Running sums over spheres, in their tree's unit frame, a lane a sphere of a block. Factors of π
+/// are left to the end.
+struct alignas(64) SubtreeSums {
+  double cubes[kWidth] = {};      ///< Σ r³
+  double moment[3][kWidth] = {};  ///< Σ r³ · centre
   std::uint32_t spheres = 0;
 };
 
-/// Adds up the spheres below a node, to rounding in double. Same bits on every instruction set.
-SubtreeSums subtree_sums(const SphereTree& tree, int level, std::uint32_t block) noexcept;
+/// Adds the spheres below n nodes of a level, in order. Same bits on every instruction set.
+void add_subtrees(const SphereTree& tree, int level, const std::uint32_t* nodes, std::size_t n,
+                  SubtreeSums& sums) noexcept;
 
 }  // namespace ist
