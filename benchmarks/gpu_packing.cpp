@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "banded_pack.h"
+#include "banded/banded_pack.h"
 #include "device_mesh.h"
 #include "fingerprint.h"
 #include "mesh/mesh_solid.h"

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "grids/pack_grids.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/samples/samples.h"
-#include "pack_grids.h"
 #include "queue.h"
 #include "report.h"
 #include "support/shared_data.h"

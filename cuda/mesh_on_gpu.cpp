@@ -2,14 +2,14 @@
 
 #include <ist/error.h>
 
-#include "banded_pack.h"
-#include "cover_on_gpu.h"
+#include "bake/cover_on_gpu.h"
+#include "bake/protrusion_on_gpu.h"
+#include "bake/relax_on_gpu.h"
+#include "banded/banded_pack.h"
 #include "device_mesh.h"
-#include "pack_grids.h"
+#include "grids/pack_grids.h"
 #include "packing/band_limits.h"
-#include "protrusion_on_gpu.h"
 #include "queue.h"
-#include "relax_on_gpu.h"
 
 namespace ist::gpu {
 namespace {

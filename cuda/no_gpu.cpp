@@ -2,7 +2,7 @@
 #include <ist/error.h>
 #include <ist/gpu.h>
 
-#include "medial_on_gpu.h"
+#include "grids/medial_on_gpu.h"
 #include "mesh_on_gpu.h"
 
 namespace ist {

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "build/pack.h"
-#include "medial_on_gpu.h"
+#include "grids/medial_on_gpu.h"
 #include "mesh/mesh_solid.h"
 #include "packing/grids/host_backend.h"
 #include "packing/grids/pack_grids.h"

@@ -1,4 +1,4 @@
-#include "banded_pack.h"
+#include "banded/banded_pack.h"
 
 #include <ist/error.h>
 #include <ist/packing.h>

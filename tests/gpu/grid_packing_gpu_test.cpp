@@ -2,9 +2,9 @@
 
 #include <thread>
 
+#include "grids/pack_grids.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/samples/samples.h"
-#include "pack_grids.h"
 #include "packing/thread_arena.h"
 #include "queue.h"
 #include "support/certified_packing.h"

@@ -6,12 +6,12 @@
 #include <thread>
 #include <vector>
 
-#include "crew.h"
+#include "banded/crew.h"
 #include "mesh/team.h"
 
 namespace ist::testing {
 
-/// A crew (cuda/crew.h) of host threads, each a team of one.
+/// A crew (cuda/banded/crew.h) of host threads, each a team of one.
 template <class Scratch_>
 class HostCrew {
  public:

@@ -1,4 +1,4 @@
-#include "banded_loop.h"
+#include "banded/banded_loop.h"
 
 #include <gtest/gtest.h>
 #include <ist/packing.h>
@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "banded_buffers.h"
+#include "banded/banded_buffers.h"
 #include "mesh/samples/samples.h"
 #include "packing/band_limits.h"
 #include "packing/mesh_surface.h"

@@ -1,4 +1,4 @@
-#include "cover_on_gpu.h"
+#include "bake/cover_on_gpu.h"
 
 #include "device_array.h"
 #include "mesh/wide_rays.h"

@@ -1,4 +1,4 @@
-#include "columns_on_gpu.h"
+#include "bake/columns_on_gpu.h"
 
 #include "build/power_relaxation.h"
 #include "mesh/wide_nearest.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "banded_state.h"
+#include "banded/banded_state.h"
 #include "mesh/wide_tree.h"
 #include "queue.h"
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "banded_control.h"
+#include "banded/banded_control.h"
 #include "packing/certificate.h"
 
 // The steps of a round that choose among the candidates of the active cells, certify the winners

@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <cstring>
 
+#include "banded/sphere_lists.h"
 #include "packing/band_schedule.h"
 #include "packing/candidate.h"
 #include "packing/cell.h"
-#include "sphere_lists.h"
 
 namespace ist::gpu {
 

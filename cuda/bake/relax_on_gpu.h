@@ -3,8 +3,8 @@
 #include <functional>
 #include <span>
 
+#include "bake/columns_on_gpu.h"
 #include "build/power_relaxation.h"
-#include "columns_on_gpu.h"
 
 namespace ist::gpu {
 

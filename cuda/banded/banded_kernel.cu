@@ -1,9 +1,9 @@
-#include "banded_kernel.h"
+#include "banded/banded_kernel.h"
 
-#include "banded_loop.h"
+#include "banded/banded_loop.h"
+#include "banded/warp_crew.h"
 #include "check.h"
 #include "packing/wide_mesh_surface.h"
-#include "warp_crew.h"
 
 namespace ist::gpu {
 namespace {

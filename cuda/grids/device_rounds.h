@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-#include "device_grid.h"
+#include "grids/device_grid.h"
 #include "packing/grids/grid_backend.h"
 
 namespace ist::gpu {

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "banded_state.h"
+#include "banded/banded_state.h"
 #include "packing/prototype.h"
 
 // The steps of a band that deal with cells (BandedPacker on the CPU). Every one is written for a

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "atomics.h"
-#include "crew.h"
+#include "banded/crew.h"
 #include "packing/sphere_grid_layout.h"
 
 namespace ist::gpu {

@@ -1,8 +1,8 @@
-#include "pack_grids.h"
+#include "grids/pack_grids.h"
 
 #include <algorithm>
 
-#include "device_rounds.h"
+#include "grids/device_rounds.h"
 
 namespace ist::gpu {
 namespace {

@@ -1,4 +1,4 @@
-#include "grid_triangles.h"
+#include "grids/grid_triangles.h"
 
 #include <algorithm>
 

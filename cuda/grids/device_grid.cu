@@ -1,12 +1,12 @@
-#include "device_grid.h"
+#include "grids/device_grid.h"
 
 #include <ist/error.h>
 
 #include <algorithm>
 #include <span>
 
-#include "grid_cells.h"
-#include "grid_triangles.h"
+#include "grids/grid_cells.h"
+#include "grids/grid_triangles.h"
 #include "packing/grids/cell_listing.h"
 #include "packing/grids/discrete_distance.h"
 #include "prefix_sum.h"

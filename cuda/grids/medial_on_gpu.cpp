@@ -1,8 +1,8 @@
-#include "medial_on_gpu.h"
+#include "grids/medial_on_gpu.h"
 
 #include <ist/error.h>
 
-#include "pack_grids.h"
+#include "grids/pack_grids.h"
 #include "queue.h"
 
 namespace ist::gpu {

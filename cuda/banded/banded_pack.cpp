@@ -1,12 +1,12 @@
-#include "banded_pack.h"
+#include "banded/banded_pack.h"
 
 #include <algorithm>
 #include <chrono>
 #include <memory>
 #include <thread>
 
-#include "banded_buffers.h"
-#include "banded_kernel.h"
+#include "banded/banded_buffers.h"
+#include "banded/banded_kernel.h"
 #include "device_array.h"
 
 namespace ist::gpu {

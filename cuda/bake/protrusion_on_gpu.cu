@@ -1,4 +1,4 @@
-#include "protrusion_on_gpu.h"
+#include "bake/protrusion_on_gpu.h"
 
 #include "build/protrusion.h"
 #include "device_array.h"

@@ -1,11 +1,11 @@
-#include "device_rounds.h"
+#include "grids/device_rounds.h"
 
 #include <algorithm>
 
+#include "grids/search_crew.h"
 #include "packing/grids/discrete_distance.h"
 #include "packing/grids/grid_certificate.h"
 #include "packing/grids/prototype_cells.h"
-#include "search_crew.h"
 #include "warp_team.h"
 
 namespace ist::gpu {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "banded_cells.h"
+#include "banded/banded_cells.h"
 
 // The step of a band that splits cells.
 

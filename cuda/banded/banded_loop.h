@@ -1,9 +1,9 @@
 #pragma once
 
-#include "banded_cells.h"
-#include "banded_control.h"
-#include "banded_selection.h"
-#include "banded_split.h"
+#include "banded/banded_cells.h"
+#include "banded/banded_control.h"
+#include "banded/banded_selection.h"
+#include "banded/banded_split.h"
 
 namespace ist::gpu {
 

@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include "banded_kernel.h"
-#include "crew.h"
+#include "banded/banded_kernel.h"
+#include "banded/crew.h"
 #include "warp_team.h"
 
 namespace ist::gpu {

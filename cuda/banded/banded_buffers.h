@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "banded_control.h"
+#include "banded/banded_control.h"
 
 namespace ist::gpu {
 

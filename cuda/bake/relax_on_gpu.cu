@@ -1,4 +1,4 @@
-#include "relax_on_gpu.h"
+#include "bake/relax_on_gpu.h"
 
 #include "block_team.h"
 #include "warp_team.h"
