@@ -207,7 +207,7 @@ void orient_outward(TriangleMesh& mesh, const std::string& name, MeshReport& rep
 
 ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMeshPolicy policy) {
   check_indices_and_coordinates(input, name);
-  TriangleMesh mesh = weld(input, 0);
+  TriangleMesh mesh = weld(std::exchange(input, {}), 0);
   refuse_unusable_size(mesh, name);
   MeshReport report = survey(mesh);
   refuse_unusable_coordinates(name, report);
