@@ -53,6 +53,8 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
     throw Error("asset: it must hold at least one sphere and at most 16^7");
   if (arrays.details.size() > kMaxDetails) throw Error("asset: too many levels of detail");
   header.detail_count = static_cast<std::uint32_t>(arrays.details.size());
+  if (detail_spheres(header.sphere_count, header.detail_count) < 1)
+    throw Error("asset: the last level of detail has no spheres");
   std::vector<DetailLevel> details(arrays.details.size());
   std::memcpy(header.magic, kAssetMagic, sizeof(kAssetMagic));
   place_sections(header, details.data());

@@ -137,7 +137,9 @@ TEST(LineCrossings, SumToZeroAndAgreeWithTheWindingNumber) {
     for (int i = 0; i < 300; ++i) {
       double y = coordinate(random), z = coordinate(random);
       if (i % 3 == 1) {  // straight through a corner
-        const double* corner = solid.view().vertices_exact + 3 * i;
+        const auto& view = solid.view();
+        const double* corner =
+            view.vertices_exact + 3 * (static_cast<std::size_t>(i) % view.vertex_count);
         y = corner[1];
         z = corner[2];
       }
