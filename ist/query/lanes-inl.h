@@ -41,27 +41,14 @@ HWY_INLINE std::uint32_t mask_bits(D d, hn::Mask<D> mask) {
   return bits & ((1u << hn::Lanes(d)) - 1);
 }
 
-/// Moves the lanes of a mask to the front of many vectors alike. Highway's Compress, of which GCC
-/// copies the table to the stack at every call, is used where it is one instruction.
-#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
+/// Whether Highway's Compress is one instruction. Where it is a table, GCC copies that to the stack
+/// at every call.
 template <class D>
-class Compressor {
- public:
-  HWY_INLINE Compressor(D d, hn::Mask<D> mask) : mask_(mask), count_(hn::CountTrue(d, mask)) {}
+inline constexpr bool kCompressInstruction = HWY_ARCH_X86&& HWY_TARGET <= HWY_AVX3 &&
+                                             sizeof(hn::TFromD<D>) == sizeof(float);
 
-  template <class V>
-  HWY_INLINE V operator()(V v) const {
-    return hn::Compress(v, hn::RebindMask(hn::DFromV<V>(), mask_));
-  }
-
-  HWY_INLINE std::size_t count() const { return count_; }
-
- private:
-  hn::Mask<D> mask_;
-  std::size_t count_;
-};
-#else
-template <class D>
+/// Moves the lanes of a mask to the front of many vectors alike.
+template <class D, bool = kCompressInstruction<D>>
 class Compressor {
  public:
   HWY_INLINE Compressor(D d, hn::Mask<D> mask)
@@ -89,7 +76,23 @@ class Compressor {
   hn::Vec<DI> from_;
   std::size_t count_;
 };
-#endif
+
+template <class D>
+class Compressor<D, true> {
+ public:
+  HWY_INLINE Compressor(D d, hn::Mask<D> mask) : mask_(mask), count_(hn::CountTrue(d, mask)) {}
+
+  template <class V>
+  HWY_INLINE V operator()(V v) const {
+    return hn::Compress(v, hn::RebindMask(hn::DFromV<V>(), mask_));
+  }
+
+  HWY_INLINE std::size_t count() const { return count_; }
+
+ private:
+  hn::Mask<D> mask_;
+  std::size_t count_;
+};
 
 /// Writes first + lane for every lane that is chosen, and perhaps more behind; returns how many.
 template <class T, class M>
