@@ -120,21 +120,11 @@ Asset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
     const bool cancelled = header.stop_reason == static_cast<std::uint32_t>(StopReason::cancelled);
     const std::size_t packed = header.sphere_count;
     const bool enough = error <= target.relative_error;
-    if (enough) {
-      does = count;
-      best = std::move(asset);
-    } else {
-      fails = count;
-      // Another limit than the count ended it, or there is no room for more: this is the best.
-      if (!best && (packed < count || count >= most)) {
-        best = std::move(asset);
-        break;
-      }
-    }
-    if (cancelled) {
-      if (!best) best = std::move(asset);
-      break;
-    }
+    (enough ? does : fails) = count;
+    // Another limit than the count ended it, or there is no room for more.
+    const bool last = cancelled || packed < count || count >= most;
+    if (enough || (does == 0 && last)) best = std::move(asset);
+    if (cancelled || (does == 0 && last)) break;
     const double ratio = static_cast<double>(does) / static_cast<double>(std::max(fails, kFewest));
     if (bakes >= kMostBakes && best) break;
     if (does > 0 && (ratio <= kCloseEnough || does <= kFewest)) break;

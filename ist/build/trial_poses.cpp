@@ -187,8 +187,10 @@ std::vector<TrialPose> trial_poses(const TrialBody& a, const TrialBody& b, std::
       if (k == 1) {
         fraction += 0.4 * trials.random().uniform();
       } else {
-        constexpr double kStep = 1.0232929922807541;  // 10^0.01
-        for (double left = trials.random().uniform(); left > 0; left -= 0.01) fraction *= kStep;
+        constexpr std::uint64_t kSteps = 100;         // of a decade
+        constexpr double kStep = 1.0232929922807541;  // 10^(1/100)
+        const std::uint64_t steps = trials.random().bits() % kSteps;
+        for (std::uint64_t step = 0; step < steps; ++step) fraction *= kStep;
       }
       TrialPose pose;
       if (!trials.approach(fraction, pose)) continue;

@@ -44,7 +44,7 @@ class DetailQueries {
     Descent descent(tree_a, tree_b, pose_, limits, workspace_.impl());
     if (keep_rounding) descent.keep_rounding();
     descent.run();
-    const Penetration answer = descent.penetration();
+    Penetration answer = descent.penetration();
     visits_ += answer.node_visits;
     pairs_ += answer.sphere_pairs;
     return answer;

@@ -45,12 +45,14 @@ TEST(TrialPoses, EveryClassHasItsPosesAndTheirTruth) {
     if (k > 1) {
       EXPECT_LT(pose.fraction, kOverlapClassFloor[k - 1]);
     }
-    // The spheres alone know the volume to some per cent.
+    // The spheres alone know the volume to some per cent, of shallow overlaps the order.
     const double matched =
         penetration({torus().asset.view(), {}, 1}, {cube().asset.view(), pose.b_in_a, pose.scale_b},
                     {}, workspace)
             .volume;
-    EXPECT_NEAR(matched, pose.volume, (k <= 1 ? 0.05 : k == 2 ? 0.3 : 1.0) * pose.volume) << k;
+    const double factor = k <= 1 ? 1.05 : k == 2 ? 1.3 : 4;
+    EXPECT_LE(matched, factor * pose.volume) << k;
+    EXPECT_GE(matched, pose.volume / factor) << k;
   }
   for (const int count : found) EXPECT_GE(count, 3);
 }
