@@ -1,8 +1,7 @@
 #include "device_mesh.h"
 
-#include <span>
-
 #include "mesh/wide_build.h"
+#include "pageable_upload.h"
 #include "radix_sort.h"
 #include "warp_team.h"
 
@@ -135,8 +134,11 @@ DeviceMesh::DeviceMesh(Queue& queue, const HostMesh& mesh) {
 
   DeviceArray<std::uint32_t> triangles(queue, 3 * mesh.triangle_count);
   vertices_ = DeviceArray<double>(queue, 3 * mesh.vertex_count);
-  vertices_.upload(std::span(mesh.vertices, vertices_.size()));
-  triangles.upload(std::span(mesh.triangles, triangles.size()));
+  {
+    PageableUpload upload(queue, vertices_.bytes() + triangles.bytes());
+    upload.copy(vertices_.data(), mesh.vertices, vertices_.bytes());
+    upload.copy(triangles.data(), mesh.triangles, triangles.bytes());
+  }
   const Placement placement = {{mesh.centre[0], mesh.centre[1], mesh.centre[2]}, mesh.scale};
   place_in_unit_frame<<<blocks_for(vertices_.size(), kThreads), kThreads, 0, stream>>>(
       vertices_.data(), vertices_.size(), placement);
