@@ -146,7 +146,7 @@ struct ContactPatches {
 /// The contact condensed into at most patches.size() patches; volumes, forces and torques sum to
 /// the whole's to about 1e-15. The contact is divided along the tree of the smaller solid (B's if
 /// equal or if A is too coarse), always at the same places; a budgeted query's guess of what it did
-/// not open is shared out too. Costs 1.7 (one patch) to 2.3 (32) times a penetration. No
+/// not open is shared out too. Costs 1.7 (one patch) to 2.4 (32) times a penetration. No
 /// allocation, lock or exception.
 ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
                                const QuerySettings& settings, Workspace& workspace,
