@@ -93,6 +93,13 @@ IST_HD inline std::uint32_t load_fresh(const std::uint32_t* at) {
   return *at;
 #endif
 }
+IST_HD inline float load_fresh(const float* at) {
+#ifdef __CUDA_ARCH__
+  return __ldcg(at);
+#else
+  return *at;
+#endif
+}
 IST_HD inline Words4 load_fresh(const Words4* at) {
 #ifdef __CUDA_ARCH__
   const uint4 words = __ldcg(reinterpret_cast<const uint4*>(at));

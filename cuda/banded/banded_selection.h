@@ -61,7 +61,7 @@ IST_HD void find_winners(Crew& crew, const BandedArrays& a) {
     });
     if (!team.any(lost) && team.lane() == 0) {
       a.won[i] = 1;
-      a.winners[atomic_add(&s.winners, 1)] = {me.key, i, 0, 0, 0};
+      a.winners[atomic_add(&s.winners, 1)] = {me.key, i, 0, 0, 0, 0};
     }
   });
 }
@@ -75,12 +75,12 @@ IST_HD inline std::uint32_t rank_bucket(const BandedState& s, float radius) {
 }
 
 /// Takes in a winner of which all is known. A cell whose winner is not accepted loses it.
-IST_HD inline void judge_winner(const BandedArrays& a, std::uint32_t w) {
+IST_HD inline void judge_winner(const BandedArrays& a, std::uint32_t w, bool inside) {
   BandedState& s = *a.state;
   Winner& winner = a.winners[w];
-  const bool inside = (atomic_load(&winner.checks) & Winner::kInside) != 0;
-  const float radius = float_of(load_fresh(&winner.radius));
-  if (inside && s.schedule.accepts(radius)) {
+  const float by_surface = load_fresh(&winner.by_surface);
+  const float by_spheres = load_fresh(&winner.by_spheres);
+  if (inside && s.schedule.accepts(by_surface < by_spheres ? by_surface : by_spheres)) {
     atomic_add(&s.accepted, 1);
     const std::uint32_t bucket = rank_bucket(s, a.nodes[winner.node].candidate.radius);
     atomic_add(&a.ranks->size[bucket], 1);
@@ -94,24 +94,28 @@ IST_HD inline void judge_winner(const BandedArrays& a, std::uint32_t w) {
   }
 }
 
-/// Works out what radius the winners may keep. Two teams a winner: one finds on which side of the
-/// surface it lies, the other how far it is from everything; who comes last judges.
+/// Works out what radius the winners may keep. Three teams a winner: one finds on which side of the
+/// surface it lies, one how far it is from it, one how far from spheres and other winners; who
+/// comes last judges.
 template <class Crew, class Surface>
 IST_HD void certify_winners(Crew& crew, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = crew.team();
   const ListedSpheres spheres{a.grid(), a.spheres, static_cast<std::uint32_t>(s.schedule.spheres)};
-  take_turns(crew, 2 * s.winners, &s.taken, [&](std::uint32_t item) {
-    const std::uint32_t w = item / 2, i = a.winners[w].node;
-    const Candidate me = a.nodes[i].candidate;
-    std::uint32_t found = Winner::kDistances;
-    if (item % 2 == 0) {
-      found = surface.inside(team, me.centre) ? Winner::kInside : Winner::kOutside;
-    } else {
-      double gap = packing::gap_to_surface(
+  take_turns(crew, 3 * s.winners, &s.taken, [&](std::uint32_t item) {
+    Winner& winner = a.winners[item / 3];
+    const Candidate me = a.nodes[winner.node].candidate;
+    std::uint32_t found = 0;
+    if (item % 3 == 0) {
+      const double gap = packing::gap_to_surface(
           surface.exact_distance(team, me.centre, packing::clearance_limit(me.radius)));
+      const double radius = me.radius;
+      if (team.lane() == 0) winner.by_surface = packing::rounded_down(gap < radius ? gap : radius);
+      found = Winner::kBySurface;
+    } else if (item % 3 == 1) {
+      double gap = me.radius;
       for_neighbours(team, a, me.centre, [&](std::uint32_t place, const Candidate& other) {
-        if (a.won[place] != 0 && place != i && packing::goes_before(other, me)) {
+        if (a.won[place] != 0 && place != winner.node && packing::goes_before(other, me)) {
           const double room = packing::gap_to_sphere(
               me.centre, {other.centre.x, other.centre.y, other.centre.z, other.radius});
           gap = room < gap ? room : gap;
@@ -119,11 +123,16 @@ IST_HD void certify_winners(Crew& crew, const BandedArrays& a, const Surface& su
         return true;
       });
       const float radius = packing::certified_radius(team, me.centre, me.radius, gap, spheres);
-      if (team.lane() == 0) a.winners[w].radius = packing::bits_of(radius);
+      if (team.lane() == 0) winner.by_spheres = radius;
+      found = Winner::kBySpheres;
+    } else {
+      found = surface.inside(team, me.centre) ? Winner::kInside : Winner::kOutside;
     }
     if (team.lane() != 0) return;
     publish();
-    if (atomic_or(&a.winners[w].checks, found) != 0) judge_winner(a, w);
+    const std::uint32_t before = atomic_or(&winner.checks, found);
+    if (Winner::all_known(before | found))
+      judge_winner(a, item / 3, ((before | found) & Winner::kInside) != 0);
   });
 }
 
@@ -157,7 +166,7 @@ IST_HD void insert_winners(Crew& crew, const BandedArrays& a) {
     const auto rank = static_cast<std::uint32_t>(before);
     if (rank >= most) return;
     const std::uint32_t index = static_cast<std::uint32_t>(s.schedule.spheres) + rank;
-    const float r = float_of(winner.radius);
+    const float r = winner.radius();
     if (team.lane() == 0) {
       a.spheres[index] = {me.centre.x, me.centre.y, me.centre.z, r};
       a.kept[index] = r < top ? r / top : 1.0f;

@@ -47,12 +47,20 @@ struct Winner {
   std::uint64_t key;     ///< the candidate's; 0: not accepted
   std::uint32_t node;    ///< place in nodes
   std::uint32_t next;    ///< 1 + the next of its rank bucket, 0: the last
-  std::uint32_t checks;  ///< kDistances, kInside: what is known of it
-  std::uint32_t radius;  ///< bits of the certified one
+  std::uint32_t checks;  ///< what is known of it, the flags below
+  float by_surface;      ///< radius certified against the surface
+  float by_spheres;      ///< … against spheres and other winners
 
-  static constexpr std::uint32_t kDistances = 1;
-  static constexpr std::uint32_t kOutside = 2;
+  static constexpr std::uint32_t kBySurface = 1;
+  static constexpr std::uint32_t kBySpheres = 2;
   static constexpr std::uint32_t kInside = 4;
+  static constexpr std::uint32_t kOutside = 8;
+
+  IST_HD static bool all_known(std::uint32_t checks) {
+    return (checks & kBySurface) != 0 && (checks & kBySpheres) != 0 &&
+           (checks & (kInside | kOutside)) != 0;
+  }
+  IST_HD float radius() const { return by_surface < by_spheres ? by_surface : by_spheres; }
 };
 
 /// Winners by radius, so that one finds its place among them without looking at them all.
