@@ -25,11 +25,11 @@ struct alignas(64) Spheres {
 /// One side of a pair of leaf blocks, in A's unit frame. Four numbers, since vectors hold so many.
 template <class T>
 struct alignas(32) Side {
-  double origin[4];  ///< of the spheres' coordinates
-  double centre[4];  ///< of the leaf ball
-  double radius;     ///< of the leaf ball
-  double size;       ///< bound on the way from the origin to the end of any sphere
-  T lever[4];        ///< from B's origin to this one
+  double origin[4];        ///< of the spheres' coordinates
+  double centre[4];        ///< of the leaf ball
+  double radius;           ///< of the leaf ball
+  double size;             ///< bound on the way from the origin to the end of any sphere
+  alignas(32) T lever[4];  ///< from B's origin to this one
   const Spheres<T>* spheres;
 };
 
