@@ -29,7 +29,7 @@ IST_HD inline std::uint32_t atomic_or(std::uint32_t* at, std::uint32_t bits) {
 #ifdef __CUDA_ARCH__
   return atomicOr(at, bits);
 #else
-  return __atomic_fetch_or(at, bits, __ATOMIC_RELAXED);
+  return __atomic_fetch_or(at, bits, __ATOMIC_ACQ_REL);
 #endif
 }
 
@@ -76,9 +76,7 @@ IST_HD inline std::uint32_t atomic_max(std::uint32_t* at, std::uint32_t value) {
 IST_HD inline void publish() {
 #ifdef __CUDA_ARCH__
   __threadfence();
-#else
-  __atomic_thread_fence(__ATOMIC_RELEASE);
-#endif
+#endif  // the host's atomic_exchange() and atomic_or() do it themselves
 }
 
 struct alignas(16) Words4 {

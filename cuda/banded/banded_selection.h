@@ -177,7 +177,7 @@ IST_HD void insert_winners(Crew& crew, const BandedArrays& a) {
   share_out_to_lanes(crew, s.active, [&](std::uint32_t i) {
     if (i >= s.active) return;
     const std::uint32_t bucket = s.buckets.bucket_of(a.nodes[i].candidate.centre, 0, 0, 0);
-    a.heads[bucket] = 0;
+    atomic_exchange(&a.heads[bucket], 0);  // that of several, maybe
   });
 }
 

@@ -13,6 +13,7 @@ IST_HD std::uint32_t take_slots(const Team& team, const BandedArrays& a, bool ke
   const std::uint32_t taken = append(team, keeps, &s.free_taken);
   const bool fresh = keeps && taken >= s.free;
   const std::uint32_t beyond = append(team, fresh, &s.slots);
+  if (!keeps) return 0;
   return fresh ? beyond : a.free_list[taken % a.cell_capacity];
 }
 

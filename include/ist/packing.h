@@ -53,7 +53,7 @@ struct SpherePacking {
   UnitFrame frame;
   std::vector<Sphere> spheres;
   StopReason stop = StopReason::sphere_count;
-  double coverage = 0;           ///< [0, 1] of the solid's volume
+  double coverage = 0;  ///< [0, 1] of the solid's volume
   /// Min over spheres of radius / largest live bound at insertion; 1 for modes that keep no bound.
   double kept_ratio_worst = 1;
   double kept_ratio_median = 1;  ///< median of the same

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <ucontext.h>
+#include <algorithm>
 
 #include <cstdint>
 #include <cstring>
@@ -8,7 +9,6 @@
 #include <memory>
 #include <random>
 #include <stdexcept>
-#include <vector>
 
 #include "mesh/team.h"
 
@@ -27,8 +27,8 @@ class Fibers {
     body_ = &body;
     Fibers*& current = current_fibers();
     current = this;
-    call_.assign(Width, 0);
-    done_.assign(Width, false);
+    std::fill_n(call_, Width, 0);
+    std::fill_n(done_, Width, false);
     round_ = 0;
     for (int i = 0; i < Width; ++i) {
       if (stack_[i] == nullptr) stack_[i] = std::make_unique<char[]>(kStackSize);
@@ -76,8 +76,8 @@ class Fibers {
   const std::function<void(int)>* body_ = nullptr;
   ucontext_t main_, lane_[Width];
   std::unique_ptr<char[]> stack_[Width];
-  std::vector<int> call_;
-  std::vector<bool> done_;
+  int call_[Width] = {};
+  bool done_[Width] = {};
   std::uint64_t slots_[2][Width] = {};
   unsigned round_ = 0;
 };

@@ -82,7 +82,7 @@ CrewPacking pack_by_crew(const MeshSolid& solid, const PackingSettings& settings
 TEST(BandedCrew, PacksLikeTheCpuWhateverItsSize) {
   for (const char* name : {"bolt", "gear"}) {
     const MeshSolid solid(close_mesh(make_sample(name), name));
-    for (const std::size_t count : {30, 300, 2000}) {
+    for (const unsigned count : {30u, 300u, 2000u}) {
       PackingSettings settings;
       settings.max_spheres = count;
       const SpherePacking expected = pack(solid, settings);
@@ -99,7 +99,7 @@ TEST(BandedCrew, PacksLikeTheCpuWhateverItsSize) {
 
 TEST(BandedCrew, WorkInPartsIsTheSameWork) {
   const MeshSolid solid(close_mesh(make_sample("bolt"), "bolt"));
-  for (const std::size_t count : {100, 1000}) {
+  for (const unsigned count : {100u, 1000u}) {
     PackingSettings settings;
     settings.max_spheres = count;
     const SpherePacking expected = pack(solid, settings);
