@@ -1,5 +1,6 @@
 #include "device_mesh.h"
 
+#include "launch.h"
 #include "mesh/wide_build.h"
 #include "pageable_upload.h"
 #include "radix_sort.h"
@@ -10,10 +11,6 @@ namespace {
 
 constexpr unsigned kThreads = 128;
 constexpr unsigned kWarps = kThreads / 32;
-
-unsigned blocks_for(std::size_t items, unsigned each) {
-  return static_cast<unsigned>((items + each - 1) / each);
-}
 
 struct Placement {
   double centre[3];

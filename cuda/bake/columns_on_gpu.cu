@@ -1,6 +1,7 @@
 #include "bake/columns_on_gpu.h"
 
 #include "build/power_relaxation.h"
+#include "launch.h"
 #include "mesh/wide_nearest.h"
 #include "prefix_sum.h"
 
@@ -10,10 +11,6 @@ namespace {
 constexpr unsigned kThreads = 128;
 /// A triangle over more lines than this is drawn by many threads.
 constexpr std::uint64_t kManyLines = 64;
-
-unsigned blocks_for(std::uint64_t items, unsigned each = kThreads) {
-  return static_cast<unsigned>((items + each - 1) / each);
-}
 
 /// Where crossings go: counted, or written to each line's place.
 struct CrossingSink {
@@ -176,8 +173,8 @@ void ColumnsOnGpu::cut(Queue& queue, const WideTree& mesh, const LineLattice& li
   const auto draw_all = [&](Crossing* crossings) {
     const CrossingSink sink = {counts.data(), first.data(), crossings};
     large_count.fill_bytes(0);
-    draw_triangles<<<blocks_for(slots), kThreads, 0, stream>>>(mesh, lines, sink, large.data(),
-                                                               large_count.data());
+    draw_triangles<<<blocks_for(slots, kThreads), kThreads, 0, stream>>>(
+        mesh, lines, sink, large.data(), large_count.data());
     draw_large<<<dim3(64, 16), kThreads, 0, stream>>>(mesh, lines, sink, large.data(),
                                                       large_count.data());
     check_launch("drawing the mesh onto columns");
@@ -198,10 +195,10 @@ void ColumnsOnGpu::cut(Queue& queue, const WideTree& mesh, const LineLattice& li
   first_ = DeviceArray<std::uint32_t>(queue, line_count + 1);
   first_.fill_bytes(0);
   spans_ = DeviceArray<ColumnSpan>(queue, crossing_count / 2 + 1);
-  count_spans<<<blocks_for(line_count), kThreads, 0, stream>>>(
+  count_spans<<<blocks_for(line_count, kThreads), kThreads, 0, stream>>>(
       crossings.data(), first.data(), line_count, first_.data(), length.data());
   exclusive_sum(queue, first_);
-  write_spans<<<blocks_for(line_count), kThreads, 0, stream>>>(
+  write_spans<<<blocks_for(line_count, kThreads), kThreads, 0, stream>>>(
       crossings.data(), first.data(), line_count, first_.data(), spans_.data());
   check_launch("cutting columns");
   length_ = static_cast<double>(length.to_host(1).front()) * kLengthUnit;
@@ -214,11 +211,11 @@ void ColumnsOnGpu::flag(Queue& queue) {
     flags_.back().fill_bytes(0);
     if (level == kFlagLevel) {
       const std::uint64_t line_count = grid_.columns.lines();
-      flag_spans<<<blocks_for(line_count), kThreads, 0, queue.stream()>>>(grid_, line_count,
-                                                                          flags_.back().data());
+      flag_spans<<<blocks_for(line_count, kThreads), kThreads, 0, queue.stream()>>>(
+          grid_, line_count, flags_.back().data());
     } else {
-      flag_level<<<blocks_for(cells), kThreads, 0, queue.stream()>>>(grid_, level,
-                                                                     flags_.back().data());
+      flag_level<<<blocks_for(cells, kThreads), kThreads, 0, queue.stream()>>>(
+          grid_, level, flags_.back().data());
     }
     grid_.flags[level] = flags_.back().data();
   }

@@ -153,10 +153,10 @@ IST_HD std::uint32_t wait_for_child(const Crew& crew, const BandedArrays& a, std
   return crew.team().broadcast(code, 0);
 }
 
-/// Counts a candidate that a cell holds.
-IST_HD inline void note_candidate(BandedState& s, const packing::Cell& cell) {
-  atomic_max(&s.largest_radius, packing::bits_of(cell.radius));
-  atomic_max(&s.largest_bound, packing::bits_of(cell.bound));
+/// Notes the largest radius and bound, in bits, of cells that hold candidates.
+IST_HD inline void note_candidates(BandedState& s, std::uint32_t radius, std::uint32_t bound) {
+  atomic_max(&s.largest_radius, radius);
+  atomic_max(&s.largest_bound, bound);
 }
 
 /// The first part of the work on the frontier's cells of one class, a lane a cell: what the spheres
@@ -166,8 +166,8 @@ template <class Crew, class Surface>
 IST_HD void refresh_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = crew.team();
-  const ListedSpheres spheres{a.grid(), a.spheres, static_cast<std::uint32_t>(s.schedule.spheres)};
-  const packing::PrototypeField<Surface, ListedSpheres> field(surface, spheres);
+  const ListedSpheres spheres = listed_spheres(a);
+  const packing::PrototypeField field(surface, spheres);
   const float threshold = s.schedule.threshold, margin = s.schedule.margin;
   const std::uint32_t* const frontier = a.lists[s.frontier_array];
   std::uint32_t* const active = a.lists[1 - s.frontier_array];
@@ -181,7 +181,7 @@ IST_HD void refresh_cells(Crew& crew, const BandedArrays& a, const Surface& surf
                                                                         s.classes) == s.cell_class);
     if (due) {
       packing::SampleMemory memory;
-      typename packing::PrototypeField<Surface, ListedSpheres>::Bounded seen;
+      typename decltype(field)::Bounded seen;
       cell = a.cells[slot].cell;
       state = field.refresh(typename Crew::Lane{}, cell, a.cells[slot].ring, &memory, threshold,
                             margin, seen);
@@ -203,10 +203,7 @@ IST_HD void refresh_cells(Crew& crew, const BandedArrays& a, const Surface& surf
   });
   radius = team.max(radius);
   bound = team.max(bound);
-  if (team.lane() == 0 && radius > 0) {
-    atomic_max(&s.largest_radius, radius);
-    atomic_max(&s.largest_bound, bound);
-  }
+  if (team.lane() == 0 && radius > 0) note_candidates(s, radius, bound);
 }
 
 /// Notes a cell that is to be split in the step that splits.
@@ -219,8 +216,8 @@ template <class Crew, class Surface>
 IST_HD void confine_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = crew.team();
-  const ListedSpheres spheres{a.grid(), a.spheres, static_cast<std::uint32_t>(s.schedule.spheres)};
-  const packing::PrototypeField<Surface, ListedSpheres> field(surface, spheres);
+  const ListedSpheres spheres = listed_spheres(a);
+  const packing::PrototypeField field(surface, spheres);
   const float margin = s.schedule.margin, largest = s.schedule.largest_half(s.frontier);
   take_turns(crew, s.refreshed, &s.taken, [&](std::uint32_t i) {
     const std::uint32_t slot = a.refreshed[i];
@@ -236,15 +233,15 @@ IST_HD void confine_cells(Crew& crew, const BandedArrays& a, const Surface& surf
 }
 
 /// Works on the frontier's cells of one class, or does the last part of the work on those that are
-/// still open. Where the schedule says that no rule can come between
-/// (state.depth), cells that are to be split are split in the same step, and so on for that many
-/// levels: a chain of splits then waits for itself alone.
+/// still open. Where the schedule says that no rule can come between (state.depth), cells that are
+/// to be split are split in the same step, and so on for that many levels: a chain of splits then
+/// waits for itself alone.
 template <class Crew, class Surface>
 IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = crew.team();
-  const ListedSpheres spheres{a.grid(), a.spheres, static_cast<std::uint32_t>(s.schedule.spheres)};
-  const packing::PrototypeField<Surface, ListedSpheres> field(surface, spheres);
+  const ListedSpheres spheres = listed_spheres(a);
+  const packing::PrototypeField field(surface, spheres);
   const float threshold = s.schedule.threshold, margin = s.schedule.margin;
   const float floor = s.schedule.floor, largest = s.schedule.largest_half(s.frontier);
   const bool in_parts = s.in_parts;
@@ -294,7 +291,7 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
       if (team.lane() == 0) {
         if (outcome == CellState::candidate) {
           active[atomic_add(&s.active, 1)] = slot;
-          note_candidate(s, cell);
+          note_candidates(s, packing::bits_of(cell.radius), packing::bits_of(cell.bound));
         } else if (outcome == CellState::split && !queues) {
           note_splitting(a, slot);
         }

@@ -101,7 +101,7 @@ template <class Crew, class Surface>
 IST_HD void certify_winners(Crew& crew, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = crew.team();
-  const ListedSpheres spheres{a.grid(), a.spheres, static_cast<std::uint32_t>(s.schedule.spheres)};
+  const ListedSpheres spheres = listed_spheres(a);
   take_turns(crew, 3 * s.winners, &s.taken, [&](std::uint32_t item) {
     Winner& winner = a.winners[item / 3];
     const Candidate me = a.nodes[winner.node].candidate;

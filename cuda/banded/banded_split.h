@@ -64,8 +64,8 @@ template <class Crew, class Surface>
 IST_HD void split_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = crew.team();
-  const ListedSpheres spheres{a.grid(), a.spheres, static_cast<std::uint32_t>(s.schedule.spheres)};
-  const packing::PrototypeField<Surface, ListedSpheres> field(surface, spheres);
+  const ListedSpheres spheres = listed_spheres(a);
+  const packing::PrototypeField field(surface, spheres);
   if (8 * s.splitting <= crew.size()) return split_few(crew, a, field);
   const float margin = s.schedule.margin, floor = s.schedule.floor;
   std::uint32_t* const frontier = a.lists[s.frontier_array];

@@ -99,7 +99,6 @@ struct BandedState {
   Step after_grid = Step::activate;  ///< where the grid's passes lead to
   Need need = Need::nothing;
   std::uint32_t taken = 0;  ///< items of this step that teams took in turns
-  std::uint32_t pairs_from = 0;
 
   // Cells. A slot whose bound is 0 is free, and found by the next sweep.
   std::uint32_t slots = 1;             ///< in use or free
@@ -127,7 +126,6 @@ struct BandedState {
   packing::CandidateBuckets buckets;
   std::uint32_t winners = 0, accepted = 0;
   std::uint64_t volume = 0;  ///< of the spheres inserted in this step
-  bool below_noise = false;
 
   packing::SphereGridLayout layout;
   SphereLists::Use use{SphereLists::kFirstWord, 0, 0};
@@ -199,5 +197,9 @@ struct ListedSpheres {
     });
   }
 };
+
+IST_HD inline ListedSpheres listed_spheres(const BandedArrays& a) {
+  return {a.grid(), a.spheres, static_cast<std::uint32_t>(a.state->schedule.spheres)};
+}
 
 }  // namespace ist::gpu

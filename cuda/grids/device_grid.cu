@@ -7,6 +7,7 @@
 
 #include "grids/grid_cells.h"
 #include "grids/grid_triangles.h"
+#include "launch.h"
 #include "packing/grids/cell_listing.h"
 #include "packing/grids/discrete_distance.h"
 #include "prefix_sum.h"
@@ -21,10 +22,6 @@ using packing::GridLayout;
 using packing::GridScene;
 
 constexpr unsigned kThreads = 128;
-
-unsigned blocks_for(std::size_t items, unsigned each) {
-  return static_cast<unsigned>(std::max<std::size_t>((items + each - 1) / each, 1));
-}
 
 __device__ unsigned global_thread() { return blockIdx.x * kThreads + threadIdx.x; }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "grids/search_crew.h"
+#include "launch.h"
 #include "packing/grids/discrete_distance.h"
 #include "packing/grids/grid_certificate.h"
 #include "packing/grids/prototype_cells.h"
@@ -19,10 +20,6 @@ using packing::GridWinner;
 
 constexpr unsigned kThreads = 128;
 constexpr unsigned kWarps = kThreads / 32;
-
-unsigned blocks_for(std::size_t items, unsigned each) {
-  return static_cast<unsigned>(std::max<std::size_t>((items + each - 1) / each, 1));
-}
 
 __device__ unsigned global_thread() { return blockIdx.x * kThreads + threadIdx.x; }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "launch.h"
 #include "packing/grids/local_winding.h"
 
 namespace ist::gpu {
@@ -17,10 +18,6 @@ using packing::TriangleCells;
 constexpr unsigned kThreads = 128;
 constexpr unsigned kWarps = kThreads / 32;
 constexpr std::uint32_t kMostCellsOfAWarp = 4096;
-
-unsigned blocks_for(std::size_t items, unsigned each) {
-  return static_cast<unsigned>(std::max<std::size_t>((items + each - 1) / each, 1));
-}
 
 __device__ unsigned global_thread() { return blockIdx.x * kThreads + threadIdx.x; }
 
