@@ -30,14 +30,7 @@ class Fibers {
     std::fill_n(call_, Width, 0);
     std::fill_n(done_, Width, false);
     round_ = 0;
-    for (int i = 0; i < Width; ++i) {
-      if (stack_[i] == nullptr) stack_[i] = std::make_unique<char[]>(kStackSize);
-      getcontext(&lane_[i]);
-      lane_[i].uc_stack.ss_sp = stack_[i].get();
-      lane_[i].uc_stack.ss_size = kStackSize;
-      lane_[i].uc_link = &main_;
-      makecontext(&lane_[i], reinterpret_cast<void (*)()>(&Fibers::enter), 1, i);
-    }
+    for (int i = 0; i < Width; ++i) prepare(i);
     for (bool running = true; running; ++round_) {
       int order[Width];
       for (int i = 0; i < Width; ++i) order[i] = i;
@@ -65,6 +58,15 @@ class Fibers {
   static Fibers*& current_fibers() {
     static thread_local Fibers* current = nullptr;
     return current;
+  }
+  /// Not inlined: getcontext may return twice, and a caller's variables would not survive that.
+  [[gnu::noinline]] void prepare(const int lane) {
+    if (stack_[lane] == nullptr) stack_[lane] = std::make_unique<char[]>(kStackSize);
+    getcontext(&lane_[lane]);
+    lane_[lane].uc_stack.ss_sp = stack_[lane].get();
+    lane_[lane].uc_stack.ss_size = kStackSize;
+    lane_[lane].uc_link = &main_;
+    makecontext(&lane_[lane], reinterpret_cast<void (*)()>(&Fibers::enter), 1, lane);
   }
   static void enter(int lane) {
     Fibers& fibers = *current_fibers();
