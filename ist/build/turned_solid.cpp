@@ -79,7 +79,8 @@ Matrix3d principal_axes(Matrix3d m) {
   for (int sweep = 0; sweep < 12; ++sweep)
     for (int k = 0; k < 3; ++k) {
       const int p = k, q = (k + 1) % 3;
-      if (m(p, q) == 0) continue;
+      // Turns nothing, and the square of theta may be no double.
+      if (std::abs(m(p, q)) <= 1e-150 * std::abs(m(q, q) - m(p, p))) continue;
       const double theta = (m(q, q) - m(p, p)) / (2 * m(p, q));
       const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
       const double c = 1 / std::sqrt(t * t + 1), s = t * c;

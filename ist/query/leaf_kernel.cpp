@@ -111,6 +111,7 @@ HWY_INLINE void place(const SphereTree& tree, std::uint32_t block, Side<T>& side
     side.centre[k] = ball.centre[k];
     side.size += std::abs(ball.centre[k] - origin[k]);
   }
+  side.origin[3] = side.centre[3] = 0;  // converted to float with the others
 }
 
 /// Likewise of B.

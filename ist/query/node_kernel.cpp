@@ -66,8 +66,9 @@ HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
       auto near = d2 < sum * sum;
       const std::uint32_t child = first_child + static_cast<std::uint32_t>(lane);
       if constexpr (kHeld) {
-        const auto spare = hn::Max(within - r * grow, hn::Zero(d));
-        const auto inside = hn::And(near, d2 < spare * spare);
+        // Zero but near: an unused lane's square is no float.
+        const auto spare = hn::IfThenElseZero(near, hn::Max(within - r * grow, hn::Zero(d)));
+        const auto inside = d2 < spare * spare;
         held->size +=
             append<T>(d, inside, child, last_y, held->x + held->size, held->y + held->size);
         near = hn::AndNot(inside, near);
