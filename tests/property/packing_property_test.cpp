@@ -12,6 +12,7 @@
 
 #include "mesh/mesh_solid.h"
 #include "mesh/samples/samples.h"
+#include "support/float_traps.h"
 #include "support/shared_data.h"
 
 namespace ist {
@@ -273,6 +274,7 @@ TEST(Packing, PlateausEnd) {
 }
 
 TEST(Packing, SettingsOutOfRangeAreRefused) {
+  const testing::NoFloatTraps with_nan;
   const auto solid = make_solid(box_mesh({0, 0, 0}, {1, 1, 1}));
   PackingSettings bad;
   bad.target_coverage = 1.5;

@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "support/float_traps.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
 
@@ -297,6 +298,7 @@ TEST(Query, HoldsAtSpecialPoses) {
 }
 
 TEST(Query, RefusesPosesThatAreNone) {
+  const testing::NoFloatTraps with_nan;
   Workspace workspace;
   const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
   const double nan = std::numeric_limits<double>::quiet_NaN();

@@ -8,6 +8,8 @@
 #include <ist/error.h>
 #include <ist/solid.h>
 
+#include "support/float_traps.h"
+
 namespace {
 
 using Eigen::Vector3d;
@@ -103,6 +105,7 @@ TEST(AnalyticSolid, IntegratedVolumesKeepTheirStatedError) {
 }
 
 TEST(AnalyticSolid, RefusesWhatIsNoSolid) {
+  const ist::testing::NoFloatTraps with_nan;
   const double nan = std::nan("");
   EXPECT_THROW(ist::make_ball({0, 0, 0}, 0), ist::Error);
   EXPECT_THROW(ist::make_ball({0, nan, 0}, 1), ist::Error);

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "query/lens.h"
+#include "support/float_traps.h"
 
 namespace ist {
 namespace {
@@ -138,6 +139,7 @@ TEST(Lens, IsContinuousWhereItsBranchesMeet) {
 }
 
 TEST(Lens, NeverNegativeOrNanAtTheEndsOfTheRange) {
+  const testing::NoFloatTraps cubes_overflow;
   const double values[] = {0, 5e-324, 1e-310, 2.3e-308, 1e-160, 1e-100, 1e-8, 1, 1e8, 1e100, 1e150};
   for (const double a : values) {
     for (const double b : values) {
