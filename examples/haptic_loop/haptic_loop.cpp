@@ -148,11 +148,12 @@ void burden(const std::atomic<bool>& stop) {
     }
 }
 
-double now_us() {
+double clock_us(clockid_t clock) {
   timespec t{};
-  clock_gettime(CLOCK_MONOTONIC, &t);
+  clock_gettime(clock, &t);
   return 1e6 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_nsec);
 }
+double now_us() { return clock_us(CLOCK_MONOTONIC); }
 
 void sleep_until(double us) {
   timespec t{};
@@ -161,6 +162,20 @@ void sleep_until(double us) {
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr) != 0) {
   }
 }
+
+/// Answers that came after the next tick was due, by what is to blame.
+struct Missed {
+  std::size_t query = 0;        ///< the query itself ran for longer than a period
+  std::size_t timer = 0;        ///< the loop was woken late; the query then took less than a period
+  std::size_t interrupted = 0;  ///< in time by its own work, but something else ran in its midst
+
+  std::size_t all() const { return query + timer + interrupted; }
+
+  /// `computed`: time this thread ran for the answer; `taken`: wall time from call to answer.
+  void count(double computed, double taken, double period) {
+    ++(computed > period ? query : taken > period ? interrupted : timer);
+  }
+};
 
 struct Quantiles {
   double p50, p99, p999, max;
@@ -185,9 +200,9 @@ int main(int argc, char** argv) {
   Hand hand(object.volume(), probe.volume() * std::pow(options.scale, 3));
   const double period = 1e6 / options.rate;  // [µs]
   const auto ticks = static_cast<std::size_t>(std::ceil(options.seconds * options.rate));
-  std::vector<double> compute, latency;
-  compute.reserve(ticks);
-  latency.reserve(ticks);
+  std::vector<double> overslept, computed, taken, late;  // [µs] one a tick
+  for (std::vector<double>* const times : {&overslept, &computed, &taken, &late})
+    times->reserve(ticks);
 
   std::atomic<bool> stop = false;
   std::vector<std::thread> burdens;
@@ -204,54 +219,68 @@ int main(int argc, char** argv) {
   for (int i = 0; i < 100; ++i)
     hand.move(query({object, {}}, {probe, hand.pose(), options.scale}, settings, scratch), 1e-3);
 
-  std::size_t missed = 0, skipped = 0, touching = 0, cut_short = 0;
+  Missed missed;
+  std::size_t skipped = 0, touching = 0, cut_short = 0;
   double due = now_us() + period;
   for (std::size_t i = 0; i < ticks; ++i) {
     sleep_until(due);
     const double woken = now_us();
+    const double ran = clock_us(CLOCK_THREAD_CPUTIME_ID);
     const ist::PenetrationAndSeparation contact =
         query({object, {}}, {probe, hand.pose(), options.scale}, settings, scratch);
+    computed.push_back(clock_us(CLOCK_THREAD_CPUTIME_ID) - ran);
     const double done = now_us();
-    compute.push_back(done - woken);
-    latency.push_back(done - due);
+    overslept.push_back(woken - due);
+    taken.push_back(done - woken);
+    late.push_back(done - due);
     if (contact.penetration.volume > 0) ++touching;
     if (contact.penetration.status != ist::QueryStatus::ok) ++cut_short;
     hand.move(contact, 1e-6 * period);  // a device would be sent stiffness · −translation_gradient
     due += period;
     if (done > due) {  // the next tick was due before this one was answered
-      ++missed;
-      const double late = std::floor((done - due) / period);
-      skipped += static_cast<std::size_t>(late);
-      due += late * period;
+      missed.count(computed.back(), taken.back(), period);
+      const double behind = std::floor((done - due) / period);
+      skipped += static_cast<std::size_t>(behind);
+      due += behind * period;
     }
   }
   stop = true;
   for (std::thread& thread : burdens) thread.join();
 
-  const Quantiles c = quantiles(compute), l = quantiles(latency);
+  const struct {
+    const char *name, *key, *text;
+    Quantiles us;
+  } rows[] = {
+      {"timer", "overslept_us", "from the tick to being woken", quantiles(overslept)},
+      {"query", "computed_us", "this thread's time for the answer", quantiles(computed)},
+      {"wall", "query_us", "from call to answer", quantiles(taken)},
+      {"late", "late_us", "from the tick to the answer", quantiles(late)},
+  };
   std::printf("%zu ticks at %g Hz, %zu in contact, %d load threads%s\n", ticks, options.rate,
               touching, options.load, fifo ? ", real-time priority" : "");
   std::printf("[us]      p50      p99    p99.9      max\n");
-  std::printf("query %7.1f  %7.1f  %7.1f  %7.1f   from call to answer\n", c.p50, c.p99, c.p999,
-              c.max);
-  std::printf("late  %7.1f  %7.1f  %7.1f  %7.1f   from the tick to the answer\n", l.p50, l.p99,
-              l.p999, l.max);
-  std::printf("missed deadlines: %zu, ticks skipped after them: %zu, answers cut short: %zu\n",
-              missed, skipped, cut_short);
+  for (const auto& row : rows)
+    std::printf("%-5s %7.1f  %7.1f  %7.1f  %7.1f   %s\n", row.name, row.us.p50, row.us.p99,
+                row.us.p999, row.us.max, row.text);
+  std::printf(
+      "missed deadlines: %zu, of them %zu by the query, %zu by an overslept timer, %zu "
+      "interrupted;\n"
+      "ticks skipped after them: %zu, answers cut short: %zu\n",
+      missed.all(), missed.query, missed.timer, missed.interrupted, skipped, cut_short);
   if (options.json == nullptr) return 0;
   std::FILE* const file = std::fopen(options.json, "w");
   if (file == nullptr) return std::fprintf(stderr, "%s: cannot write\n", options.json), 1;
   std::fprintf(file,
                "{\"ticks\": %zu, \"rate_hz\": %g, \"load_threads\": %d, \"fifo\": %s,\n"
                " \"object_spheres\": %zu, \"probe_spheres\": %zu, \"in_contact\": %zu,\n"
-               " \"missed\": %zu, \"skipped\": %zu, \"cut_short\": %zu,\n",
+               " \"missed\": %zu, \"missed_by_query\": %zu, \"missed_by_timer\": %zu,\n"
+               " \"interrupted\": %zu, \"skipped\": %zu, \"cut_short\": %zu",
                ticks, options.rate, options.load, fifo ? "true" : "false", object.sphere_count(),
-               probe.sphere_count(), touching, missed, skipped, cut_short);
-  const auto print = [&](const char* name, const Quantiles& q, const char* end) {
-    std::fprintf(file, " \"%s\": {\"p50\": %.3f, \"p99\": %.3f, \"p99.9\": %.3f, \"max\": %.3f}%s",
-                 name, q.p50, q.p99, q.p999, q.max, end);
-  };
-  print("query_us", c, ",\n");
-  print("late_us", l, "}\n");
+               probe.sphere_count(), touching, missed.all(), missed.query, missed.timer,
+               missed.interrupted, skipped, cut_short);
+  for (const auto& row : rows)
+    std::fprintf(file, ",\n \"%s\": {\"p50\": %.3f, \"p99\": %.3f, \"p99.9\": %.3f, \"max\": %.3f}",
+                 row.key, row.us.p50, row.us.p99, row.us.p999, row.us.max);
+  std::fprintf(file, "}\n");
   return std::fclose(file) == 0 ? 0 : 1;
 }
