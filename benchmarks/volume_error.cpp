@@ -1,5 +1,4 @@
-// How exact the answers are: bakes the oracle's meshes and asks all of its rows, then solids laid
-// against their own copies, where both sets of spheres repeat each other and the error is worst.
+// How exact the answers are: bakes the oracle's meshes and asks all of its rows.
 
 #include <algorithm>
 #include <array>
@@ -10,8 +9,6 @@
 #include <ist/bake.h>
 #include <ist/query.h>
 
-#include "mesh/mesh_solid.h"
-#include "mesh/samples/samples.h"
 #include "report.h"
 #include "support/oracle_rows.h"
 #include "timing.h"
@@ -142,69 +139,6 @@ std::map<std::size_t, double> ask_oracle_rows(Report& report, const std::string&
   return medians;
 }
 
-/// Volumes [u³] of a solid's overlaps with its copies moved by `shifts` along x: columns along x,
-/// exact in their direction, on a grid so dense that its own error is far below what is measured.
-std::vector<double> overlaps_with_moved_copies(const ist::MeshSolid& solid,
-                                               const std::vector<double>& shifts) {
-  constexpr int kColumns = 1'000;
-  const double scale = solid.frame().scale();
-  const Vector3d low = solid.frame().to_unit(solid.bounds().min());
-  const Vector3d size = solid.bounds().sizes() / scale;
-  const double area = size.y() * size.z() / (double{kColumns} * kColumns);
-  std::vector<double> volumes(shifts.size());
-  std::vector<ist::Crossing> crossings, both;
-  for (int j = 0; j < kColumns; ++j)
-    for (int i = 0; i < kColumns; ++i) {
-      const double y = low.y() + (i + 0.5) / kColumns * size.y();
-      const double z = low.z() + (j + 0.5) / kColumns * size.z();
-      solid.line_crossings(y, z, crossings);
-      for (std::size_t s = 0; s < shifts.size(); ++s) {
-        both = crossings;
-        for (const ist::Crossing& c : crossings) both.push_back({c.x + shifts[s] / scale, c.sign});
-        std::sort(both.begin(), both.end(), [](const auto& a, const auto& b) { return a.x < b.x; });
-        int winding = 0;  // 2: inside of both, as the samples overlap themselves nowhere
-        for (std::size_t k = 0; k + 1 < both.size(); ++k) {
-          winding += both[k].sign;
-          if (winding == 2)
-            volumes[s] += (both[k + 1].x - both[k].x) * area * scale * scale * scale;
-        }
-      }
-    }
-  return volumes;
-}
-
-/// A sample and its copy, with equal axes, side by side along the sample's z axis.
-void ask_aligned_copies(Report& report, const std::string& name, std::size_t spheres) {
-  ist::TriangleMesh mesh = ist::make_sample(name);
-  for (Vector3d& v : mesh.vertices) v = Vector3d(v.z(), v.x(), v.y());
-  const ist::ClosedMesh closed = ist::close_mesh(std::move(mesh), name);
-  const ist::MeshSolid solid(closed);
-  const ist::Asset asset = ist::bake(closed, {.max_spheres = spheres});
-  ist::Workspace workspace;
-  const double side = solid.bounds().sizes().x();
-  std::vector<std::string> placements = {"coincident", "half a side apart"};
-  std::vector<double> shifts = {0, 0.5 * side};
-  for (const double gap : {-0.03, -0.01, -0.003, 0.0, 0.003, 0.01}) {
-    char text[32];
-    std::snprintf(text, sizeof text, "face to face, gap %+.3f", gap);
-    placements.emplace_back(text);
-    shifts.push_back((1 + gap) * side);
-  }
-  const std::vector<double> exact = overlaps_with_moved_copies(solid, shifts);
-  for (std::size_t k = 0; k < shifts.size(); ++k) {
-    const ist::Pose pose = {{1, 0, 0, 0}, {shifts[k], 0, 0}};
-    const double volume =
-        ist::penetration({asset.view(), {}, 1}, {asset.view(), pose, 1}, {}, workspace).volume;
-    Report::Json row = {{"solid", name},
-                        {"spheres", spheres},
-                        {"placement", placements[k]},
-                        {"volume, % of the solid", 100 * volume / solid.volume()},
-                        {"exact %", 100 * exact[k] / solid.volume()}};
-    if (exact[k] > 1e-9 * solid.volume()) row["error %"] = 100 * (volume / exact[k] - 1);
-    report.row("Aligned copies", row);
-  }
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -214,9 +148,6 @@ int main(int argc, char** argv) {
       "angle: between the returned translation gradient and the exact one.");
   report.remark(
       "Classes by overlap over the smaller solid's volume. D is the diameter of the meshes.");
-  report.remark(
-      "Aligned copies: sides and gaps along the sample's z axis, gaps as parts of the side; exact "
-      "volumes by a million columns.");
   report.remark(
       "Convergence: the error falls as spheres^(−order), fitted over all counts. A ball (ico1k, "
       "ico20k) is one sphere and begins at its floor.");
@@ -228,8 +159,6 @@ int main(int argc, char** argv) {
     for (const std::string& key : ist::testing::kPairKeys)
       for (const auto& [k, median] : ask_oracle_rows(report, key, spheres))
         medians[{key, k}].emplace_back(spheres, median);
-    for (const std::string name : {"cube", "bolt", "gear"})
-      ask_aligned_copies(report, name, spheres);
   }
   for (const auto& [of, errors] : medians) {
     const double order = convergence_order(errors);

@@ -6,6 +6,7 @@
 
 #include "query/descent.h"
 #include "query/detail_chain.h"
+#include "query/twins.h"
 
 namespace ist {
 namespace {
@@ -20,14 +21,43 @@ class DetailQueries {
         pose_(pose),
         settings_(settings),
         workspace_(workspace),
+        twins_(are_twins(a_, b_)),
         start_(settings.deadline_us > 0 ? Clock::now() : Clock::time_point()) {}
 
   /// The whole sum of a pair of levels, rounded as it may be: where lenses graze they are few, and
   /// the finest level is taken anyway.
-  Penetration gauge(const DetailPair& pair) noexcept { return ask(pair, 0, 0, true); }
+  Penetration gauge(const DetailPair& pair) noexcept { return descend(pair, 0, 0, true); }
 
-  Penetration ask(const DetailPair& pair, double relative_error, double min_radius,
-                  bool keep_rounding = false) noexcept {
+  /// The sum of a pair of levels; of twins that all but coincide, that of unlike levels instead.
+  Penetration ask(const DetailPair& pair, double relative_error, double min_radius) noexcept {
+    const TwinWeight twins = twin_weight_of(pair);
+    if (twins.weight == 0) return descend(pair, relative_error, min_radius);
+    DetailPair unlike[2] = {pair, pair};
+    unlike[0].b = unlike[1].a = pair.a < a_.detail_count ? pair.a + 1 : pair.a - 1;
+    const Penetration other = mix(descend(unlike[0], relative_error, min_radius),
+                                  descend(unlike[1], relative_error, min_radius), 0.5);
+    if (twins.weight == 1) return other;
+    const Penetration alike = descend(pair, relative_error, min_radius);
+    Penetration mixed = mix(alike, other, twins.weight);
+    add_slope(twins, other.volume - alike.volume, pose_, mixed);
+    return mixed;
+  }
+
+  TwinWeight twin_weight_of(const DetailPair& pair) const noexcept {
+    return twins_ && pair.a == pair.b ? twin_weight(matched_tree(a_, pair.a), pose_.a_from_b)
+                                      : TwinWeight{};
+  }
+
+  std::uint32_t visits() const noexcept { return visits_; }
+  std::uint32_t pairs() const noexcept { return pairs_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  // [µs] A deadline that is over before anything is opened: nothing but the roots is looked at.
+  static constexpr double kNoTime = 1e-6;
+
+  Penetration descend(const DetailPair& pair, double relative_error, double min_radius,
+                      bool keep_rounding = false) noexcept {
     QuerySettings limits = settings_;
     limits.relative_error = relative_error;
     limits.min_radius = min_radius;
@@ -50,19 +80,12 @@ class DetailQueries {
     return answer;
   }
 
-  std::uint32_t visits() const noexcept { return visits_; }
-  std::uint32_t pairs() const noexcept { return pairs_; }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  // [µs] A deadline that is over before anything is opened: nothing but the roots is looked at.
-  static constexpr double kNoTime = 1e-6;
-
   const AssetHeader& a_;
   const AssetHeader& b_;
   const RelativePose& pose_;
   const QuerySettings& settings_;
   Workspace& workspace_;
+  const bool twins_;
   const Clock::time_point start_;
   std::uint32_t visits_ = 0, pairs_ = 0;
 };
@@ -74,8 +97,10 @@ constexpr double kRough = 5e-4;
 
 Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
                           const QuerySettings& settings, Workspace& workspace) noexcept {
-  const DetailChain chain(a.tree.header(), b.tree.header(), pose.a_from_b.scale);
   DetailQueries queries(a, b, pose, settings, workspace);
+  if (settings.pair_budget == 0)
+    return queries.ask(DetailPair(), settings.relative_error, settings.min_radius);
+  const DetailChain chain(a.tree.header(), b.tree.header(), pose.a_from_b.scale);
   // Nothing to choose, or nothing dear: no gauge can exceed either solid's sum, κ times over.
   const TreeHeader& coarse_a = matched_tree(a.tree.header(), chain.coarsest().a);
   const TreeHeader& coarse_b = matched_tree(b.tree.header(), chain.coarsest().b);
@@ -106,7 +131,7 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       const double weight = weights[i].weight;
       if (weight == 0 && weights[i].slope == 0) continue;
       const Penetration part =
-          i + 1 == chain.size() && !rough
+          i + 1 == chain.size() && !rough && queries.twin_weight_of(chain[i]).weight == 0
               ? gauge
               : queries.ask(chain[i], settings.relative_error, settings.min_radius);
       result.volume += weight * part.volume;

@@ -2,6 +2,7 @@
 
 #include "query/descent.h"
 #include "query/detail_blend.h"
+#include "query/twins.h"
 
 namespace ist {
 
@@ -13,7 +14,8 @@ Penetration penetration(const PlacedTree& a, const PlacedTree& b, const QuerySet
     refused.status = QueryStatus::invalid_pose;
     return refused;
   }
-  if (settings.pair_budget > 0 && settings.measure == Measure::matched)
+  if (settings.measure == Measure::matched &&
+      (settings.pair_budget > 0 || are_twins(a.tree.header(), b.tree.header())))
     return blend_details(a, b, *pose, settings, workspace);
   const SphereTree tree_a = sphere_tree(a.tree, settings.measure);
   const SphereTree tree_b = sphere_tree(b.tree, settings.measure);
