@@ -2,7 +2,9 @@
 #include <ist/bake.h>
 #include <ist/query.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "mesh/samples/samples.h"
 #include "query/twins.h"

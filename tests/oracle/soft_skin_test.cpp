@@ -1,0 +1,94 @@
+#include <gtest/gtest.h>
+#include <ist/bake.h>
+#include <ist/query.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "mesh/samples/samples.h"
+#include "support/oracle_assets.h"
+#include "support/shared_data.h"
+
+// Flat faces that meet, without the soft skin.
+
+namespace ist {
+namespace {
+
+class FlatFaces : public ::testing::Test {
+ protected:
+  static const Asset& cube() {
+    static const Asset asset =
+        bake(close_mesh(make_sample("cube"), "cube"), {.max_spheres = 2'000});
+    return asset;
+  }
+  const double side_ = std::cbrt(cube().view().volume());
+  const double radius_ = side_ * std::cbrt(3 / (4 * M_PI * 2'000));  ///< [u] of the mean sphere
+  Workspace workspace_;
+
+  struct Answers {
+    Penetration raw, sharp;
+  };
+  /// `gap` [u]; B is turned about the faces' normal and shifted along them.
+  Answers at(double gap, double turn = 0.3) {
+    const PlacedTree a{cube().view(), {}, 1};
+    const PlacedTree b{
+        cube().view(),
+        {{std::cos(turn), std::sin(turn), 0, 0}, {side_ + gap, 0.1 * side_, -0.05 * side_}},
+        1};
+    const Penetration raw = penetration(a, b, {}, workspace_);
+    return {raw, without_soft_skin(raw, a, b)};
+  }
+};
+
+TEST_F(FlatFaces, NothingIsReadAcrossAGap) {
+  const double face = at(-radius_).raw.volume / radius_;
+  for (const double turn : {0.0, 0.2, 0.5}) {
+    EXPECT_GT(at(0, turn).raw.volume, 0.05 * radius_ * face);
+    EXPECT_LT(at(0, turn).sharp.volume, 0.04 * radius_ * face);
+    for (double gap = 0.1; gap < 0.3; gap += 0.02)
+      EXPECT_LT(at(gap * radius_, turn).sharp.volume, 0.002 * radius_ * face) << gap;
+  }
+}
+
+TEST_F(FlatFaces, DeeperContactsAreLeftAlone) {
+  for (double depth = 0.4; depth < 10; depth *= 1.3) {
+    const Answers answers = at(-depth * radius_);
+    EXPECT_EQ(answers.sharp.volume, answers.raw.volume);
+    EXPECT_EQ(answers.sharp.translation_gradient, answers.raw.translation_gradient);
+  }
+}
+
+TEST_F(FlatFaces, VolumeAndForceGrowSmoothlyWithTheDepth) {
+  const int steps = 400;
+  double work = 0, largest_step = 0;
+  Penetration before = at(0.5 * radius_).sharp;
+  const double step = 0.9 * radius_ / steps;
+  for (int i = 1; i <= steps; ++i) {
+    const Penetration now = at(0.5 * radius_ - i * step).sharp;
+    // A single lens that grazes is round.
+    EXPECT_GE(now.volume, before.volume - 1e-5 * radius_ * side_ * side_);
+    EXPECT_LE(now.volume_min, now.volume);
+    EXPECT_GE(now.volume_max, now.volume);
+    work += step * -(now.translation_gradient.x() + before.translation_gradient.x()) / 2;
+    largest_step =
+        std::max(largest_step, (now.translation_gradient - before.translation_gradient).norm());
+    before = now;
+  }
+  EXPECT_NEAR(work, before.volume, 0.15 * before.volume);
+  // From none to all of the force in a fifth of a radius: 90 steps. A jump would be all of it.
+  EXPECT_LT(largest_step, 0.1 * before.translation_gradient.norm());
+}
+
+TEST(RoundContacts, KeepTheirVolume) {
+  IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
+  Workspace workspace;
+  for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
+    if (row.pose_class != "pen") continue;
+    const auto [a, b] = testing::placed(row, 2'000);
+    const Penetration raw = penetration(a, b, {}, workspace);
+    EXPECT_EQ(without_soft_skin(raw, a, b).volume, raw.volume) << row.id;
+  }
+}
+
+}  // namespace
+}  // namespace ist
