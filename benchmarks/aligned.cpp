@@ -120,7 +120,6 @@ void ask_copies(Report& report, const std::string& name, std::size_t spheres) {
                 {"exact, % of the solid", 100 * exact[k] / volume},
                 {"equal spheres: error %", error_alike},
                 {"answer: error %", error},
-                {"equal spheres: µs", microseconds(alike)},
                 {"answer: µs", microseconds(answer)}});
   }
   report.target("largest error over that of equal spheres, " + name + ", " +
