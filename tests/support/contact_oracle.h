@@ -60,6 +60,11 @@ struct Body {
 
   PlacedTree at(const Pose& pose) const { return {asset->view(), pose, scale}; }
   double volume() const { return asset->view().volume() * std::pow(scale, 3); }
+  /// [u] of a ball with the mean volume of the effective spheres
+  double leaf_radius() const {
+    const auto spheres = static_cast<double>(asset->view().sphere_count());
+    return std::cbrt(3 * volume() / (4 * std::numbers::pi * spheres));
+  }
   bool holds(const Eigen::Vector3d& x) const {
     return solid->inside(solid->frame().to_unit(x / scale));
   }
@@ -131,6 +136,7 @@ inline double degrees_between(const Eigen::Vector3d& u, const Eigen::Vector3d& v
 /// Angles to the exit direction [degrees].
 struct ForceAngles {
   double ist = 0, fcl = 0, bullet = 0;
+  Penetration found;  ///< by ist
 };
 
 /// Asks all three libraries.
@@ -178,7 +184,8 @@ class ContactJudge {
     return {
         degrees_between(-found.translation_gradient, c.exit),
         degrees_between(fcl_contacts(c.a->fcl, {}, c.b->fcl, c.pose_b).push_b, c.exit),
-        degrees_between(bullet_.contacts(c.a->bullet, {}, c.b->bullet, c.pose_b).push_b, c.exit)};
+        degrees_between(bullet_.contacts(c.a->bullet, {}, c.b->bullet, c.pose_b).push_b, c.exit),
+        found};
   }
 
  private:
