@@ -353,7 +353,9 @@ class PrototypeField {
   IST_HD void ascend(const Team& team, Float3& x, float trust, float threshold, Cell& cell,
                      Scratch& scratch, View& view) const {
     constexpr int kSteps = Surface::kAscentSteps;
-    IST_ROLLED for (int step = 0; step < kSteps && view.sample.size > 0; ++step) {
+    bool far = false;  // from the top: the last step gained much
+    IST_ROLLED for (int step = 0;
+                    (step < kSteps || (far && step < 2 * kSteps)) && view.sample.size > 0; ++step) {
       const Sample& s = view.sample;
       const float reach = 0.5f * s.clearance;
       const float box = trust < reach ? trust : reach;
@@ -364,7 +366,9 @@ class PrototypeField {
       const View next =
           look(team, x + best.y, kWindow * box, view.surface_at_least - norm(best.y) * 1.00001f,
                cell, scratch, other(scratch, s));
-      if (next.sample.clearance - s.clearance > 0.05f * predicted) {
+      const float gain = next.sample.clearance - s.clearance;
+      far = gain > 0.1f * s.clearance;
+      if (gain > 0.05f * predicted) {
         x = x + best.y;
         view = next;
         trust = 2 * box;
