@@ -3,7 +3,7 @@
 #include "launch.h"
 #include "mesh/wide_build.h"
 #include "pageable_upload.h"
-#include "radix_sort.h"
+#include "triangle_order.h"
 #include "warp_team.h"
 
 namespace ist::gpu {
@@ -31,14 +31,6 @@ __global__ void place_in_unit_frame(double* coordinates, std::size_t count, Plac
 __device__ Corners corners_of(const double* vertices, const std::uint32_t* t) {
   return {{vertices + 3 * std::size_t{t[0]}, vertices + 3 * std::size_t{t[1]},
            vertices + 3 * std::size_t{t[2]}}};
-}
-
-__global__ void place_on_curve(const double* vertices, const std::uint32_t* triangles,
-                               std::uint32_t count, std::uint64_t* keys, std::uint32_t* order) {
-  const std::uint32_t t = blockIdx.x * kThreads + threadIdx.x;
-  if (t >= count) return;
-  keys[t] = curve_place(corners_of(vertices, triangles + 3 * std::size_t{t}));
-  order[t] = t;
 }
 
 /// Writes what its lanes' boxes hold together as the box of a node's child; `place` counts nodes
@@ -140,13 +132,9 @@ DeviceMesh::DeviceMesh(Queue& queue, const HostMesh& mesh) {
   place_in_unit_frame<<<blocks_for(vertices_.size(), kThreads), kThreads, 0, stream>>>(
       vertices_.data(), vertices_.size(), placement);
 
-  DeviceArray<std::uint64_t> keys(queue, count);
-  DeviceArray<std::uint32_t> order(queue, count);
-  place_on_curve<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(
-      vertices_.data(), triangles.data(), count, keys.data(), order.data());
-  check_launch("sorting the triangles");
-  sort_pairs(queue, keys, order, 3 * kCurveBits);
-  keys.release();
+  check_launch("placing the mesh in the unit frame");
+  const DeviceArray<std::uint32_t> order =
+      order_triangles(queue, vertices_.data(), triangles.data(), count);
 
   blocks_ = DeviceArray<WideBlock>(queue, block_count);
   std::uint32_t node_count = blocks_for(block_count, kWideWidth);

@@ -6,12 +6,12 @@
 
 namespace ist::gpu {
 
-void sort_pairs(Queue& queue, DeviceArray<std::uint64_t>& keys, DeviceArray<std::uint32_t>& values,
+void sort_pairs(Queue& queue, DeviceArray<std::uint32_t>& keys, DeviceArray<std::uint32_t>& values,
                 int bits) {
   const auto count = static_cast<int>(keys.size());
-  DeviceArray<std::uint64_t> other_keys(queue, keys.size());
+  DeviceArray<std::uint32_t> other_keys(queue, keys.size());
   DeviceArray<std::uint32_t> other_values(queue, values.size());
-  cub::DoubleBuffer<std::uint64_t> key_buffers(keys.data(), other_keys.data());
+  cub::DoubleBuffer<std::uint32_t> key_buffers(keys.data(), other_keys.data());
   cub::DoubleBuffer<std::uint32_t> value_buffers(values.data(), other_values.data());
   std::size_t bytes = 0;
   check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, key_buffers, value_buffers, count, 0, bits,

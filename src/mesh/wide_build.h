@@ -152,49 +152,6 @@ struct WideOrientedBox {
   }
 };
 
-constexpr int kCurveBits = 16;  ///< of each coordinate
-
-/// Place of a point of the unit frame's cube along Hilbert's curve, 3 · kCurveBits bits. What is
-/// near on the curve is near in space, and no step of it is long, so blocks of successive triangles
-/// have small boxes. (J. Skilling, "Programming the Hilbert curve", 2004.)
-IST_HD inline std::uint64_t curve_place(const float point[3]) {
-  constexpr float kCells = 1 << kCurveBits;
-  std::uint32_t x[3];
-  for (int k = 0; k < 3; ++k) {
-    const float cell = (point[k] + 1) * (kCells / 2);
-    x[k] = static_cast<std::uint32_t>(cell > 0 ? (cell < kCells - 1 ? cell : kCells - 1) : 0);
-  }
-  for (std::uint32_t bit = 1u << (kCurveBits - 1); bit > 1; bit >>= 1) {
-    const std::uint32_t lower = bit - 1;
-    for (int k = 0; k < 3; ++k) {
-      if ((x[k] & bit) != 0) {
-        x[0] ^= lower;
-      } else {
-        const std::uint32_t swapped = (x[0] ^ x[k]) & lower;
-        x[0] ^= swapped;
-        x[k] ^= swapped;
-      }
-    }
-  }
-  x[1] ^= x[0];
-  x[2] ^= x[1];
-  std::uint32_t turned = 0;
-  for (std::uint32_t bit = 1u << (kCurveBits - 1); bit > 1; bit >>= 1)
-    if ((x[2] & bit) != 0) turned ^= bit - 1;
-  std::uint64_t place = 0;
-  for (int b = kCurveBits - 1; b >= 0; --b)
-    for (int k = 0; k < 3; ++k) place = place << 1 | ((x[k] ^ turned) >> b & 1u);
-  return place;
-}
-
-/// Place of a triangle along the curve: that of its box's centre.
-IST_HD inline std::uint64_t curve_place(const Corners& corners) {
-  const WideBox box = box_of(corners);
-  float centre[3];
-  for (int k = 0; k < 3; ++k) centre[k] = (box.lower[k] + box.upper[k]) / 2;
-  return curve_place(centre);
-}
-
 /// Writes a lane of a block; its corners are looked up in `vertices`. kNoTriangle: an empty lane.
 IST_HD inline void write_lane(WideBlock& block, int lane, const double* vertices,
                               std::uint32_t triangle, const std::uint32_t corner[3]) {

@@ -111,7 +111,18 @@ class DeviceMeshTest : public GpuTest {
     const Download copy(queue, tree);
     EXPECT_EQ(queue.bytes_in_use(), device.bytes());  // no scratch is left
 
-    const HostWideTree expected(view);
+    // In whatever order it took the triangles, but every one once, and in blocks as tight as by
+    // cutting one part after the other.
+    HostWideTree::Order order;
+    for (const WideBlock& block : copy.blocks)
+      for (const std::uint32_t triangle : block.triangle)
+        if (triangle != kNoTriangle) order.push_back(triangle);
+    HostWideTree::Order sorted = order;
+    std::sort(sorted.begin(), sorted.end());
+    ASSERT_EQ(sorted.size(), tree.triangle_count);
+    for (std::uint32_t t = 0; t < tree.triangle_count; ++t) ASSERT_EQ(sorted[t], t);
+    const HostWideTree expected(view, order);
+    EXPECT_LE(expected.area_of_boxes(), 1.15 * HostWideTree(view).area_of_boxes());
     ASSERT_EQ(tree.first_leaf, expected.tree().first_leaf);
     ASSERT_EQ(tree.block_count, expected.tree().block_count);
     for (std::uint32_t b = 0; b < tree.block_count; ++b) {

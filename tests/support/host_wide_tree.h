@@ -1,7 +1,11 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
 #include <cstdint>
+#include <numeric>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -14,12 +18,12 @@ namespace ist::testing {
 /// A WideTree in host memory, built one triangle after the other. Its vertices are the mesh view's.
 class HostWideTree {
  public:
-  explicit HostWideTree(const MeshView& mesh) {
-    Order order;
-    for (std::uint32_t t = 0; t < mesh.triangle_count; ++t)
-      order.emplace_back(curve_place(corners(mesh, t)), t);
-    std::sort(order.begin(), order.end());
+  using Order = std::vector<std::uint32_t>;
 
+  /// Over triangles in an order of its own: cut in halves across the longest side.
+  explicit HostWideTree(const MeshView& mesh) : HostWideTree(mesh, halved(mesh)) {}
+
+  HostWideTree(const MeshView& mesh, const Order& order) {
     tree_.triangle_count = mesh.triangle_count;
     tree_.vertex_count = mesh.vertex_count;
     tree_.vertices = mesh.vertices_exact;
@@ -44,7 +48,7 @@ class HostWideTree {
         write_lane(block, lane, nullptr, kNoTriangle, nullptr);
         continue;
       }
-      const std::uint32_t t = order[slot].second;
+      const std::uint32_t t = order[slot];
       write_lane(block, lane, mesh.vertices_exact, t, mesh.triangles + 3 * std::size_t{t});
       for (const double* corner : corners(mesh, t).p) boxes[slot / kWideWidth].extend(corner);
     }
@@ -69,8 +73,44 @@ class HostWideTree {
 
   const WideTree& tree() const { return tree_; }
 
+  /// Sum of the surfaces of the blocks' boxes, halved.
+  double area_of_boxes() const {
+    double sum = 0;
+    for (std::uint32_t b = 0; b < tree_.block_count; ++b) {
+      const WideNode& node = nodes_[(tree_.first_leaf + b - 1) / kWideWidth];
+      Eigen::Vector3d side;
+      for (int k = 0; k < 3; ++k)
+        side[k] = double(node.upper[k][b % kWideWidth]) - node.lower[k][b % kWideWidth];
+      sum += side[0] * side[1] + side[1] * side[2] + side[2] * side[0];
+    }
+    return sum;
+  }
+
  private:
-  using Order = std::vector<std::pair<std::uint64_t, std::uint32_t>>;
+  static Order halved(const MeshView& mesh) {
+    Order order(mesh.triangle_count);
+    std::iota(order.begin(), order.end(), 0u);
+    halve(mesh, order, std::bit_ceil(mesh.triangle_count));
+    return order;
+  }
+
+  /// Cuts the triangles across the longest side of the box of their first corners, and so on.
+  static void halve(const MeshView& mesh, std::span<std::uint32_t> order, std::size_t size) {
+    if (size <= kWideWidth || order.empty()) return;
+    Eigen::AlignedBox3d box;
+    const auto corner = [&](std::uint32_t t) {
+      return Eigen::Vector3d::Map(corners(mesh, t).p[0]);
+    };
+    for (const std::uint32_t t : order) box.extend(corner(t));
+    Eigen::Index axis = 0;
+    box.sizes().maxCoeff(&axis);
+    const std::size_t half = std::min(size / 2, order.size());
+    std::nth_element(
+        order.begin(), order.begin() + static_cast<std::ptrdiff_t>(half), order.end(),
+        [&](std::uint32_t a, std::uint32_t b) { return corner(a)[axis] < corner(b)[axis]; });
+    halve(mesh, order.first(half), size / 2);
+    halve(mesh, order.subspan(half), size / 2);
+  }
 
   static WideOrientedBox oriented_box(const MeshView& mesh, const Order& order,
                                       std::uint32_t block) {
@@ -79,10 +119,10 @@ class HostWideTree {
     const std::size_t end = std::min(begin + kWideWidth, order.size());
     WideMoments moments;
     for (std::size_t i = begin; i < end; ++i)
-      moments.add(corners(mesh, order[i].second), corners(mesh, order[begin].second).p[0]);
+      moments.add(corners(mesh, order[i]), corners(mesh, order[begin]).p[0]);
     WideOrientedBox box(moments);
     for (std::size_t i = begin; i < end; ++i)
-      for (const double* corner : corners(mesh, order[i].second).p) box.extend(corner);
+      for (const double* corner : corners(mesh, order[i]).p) box.extend(corner);
     return box;
   }
 
