@@ -61,13 +61,17 @@ TEST(Query, NoGrazingPairIsLost) {
   const PlacedTree pa{many.view(), {}, 1.0};
   PlacedTree pb{one.view(), {}, 0.3};
   const testing::WorldSphere own = testing::world_spheres(pb, Measure::matched)[0];
-  for (const testing::WorldSphere& sphere : testing::world_spheres(pa, Measure::matched)) {
-    const Eigen::Vector3d to =
-        sphere.centre + (sphere.r + (1 - 1e-3) * own.r) * sphere.centre.normalized() - own.centre;
-    for (int k = 0; k < 3; ++k) pb.pose.t[k] = to[k];
-    const double want = reference_sum(pa, pb, Measure::matched).volume;
-    EXPECT_NEAR(penetration(pa, pb, {}, workspace).volume, want, 1e-5 * want);
-    EXPECT_NEAR(penetration(pb, pa, {}, workspace).volume, want, 1e-5 * want);
+  for (const double depth :
+       {1e-3, 1e-2, 3e-2, 6e-2, 0.1, 0.2, 0.4}) {  // where float no longer serves
+    for (const testing::WorldSphere& sphere : testing::world_spheres(pa, Measure::matched)) {
+      const Eigen::Vector3d to = sphere.centre +
+                                 (sphere.r + (1 - depth) * own.r) * sphere.centre.normalized() -
+                                 own.centre;
+      for (int k = 0; k < 3; ++k) pb.pose.t[k] = to[k];
+      const double want = reference_sum(pa, pb, Measure::matched).volume;
+      EXPECT_NEAR(penetration(pa, pb, {}, workspace).volume, want, 1e-5 * want);
+      EXPECT_NEAR(penetration(pb, pa, {}, workspace).volume, want, 1e-5 * want);
+    }
   }
 }
 
