@@ -19,4 +19,11 @@ inline void expect_same(const SpherePacking& a, const SpherePacking& b) {
   EXPECT_EQ(a.kept_ratio_median, b.kept_ratio_median);
 }
 
+/// The spheres of a packing that was cut short are the first of the whole, bit for bit.
+inline void expect_prefix(const SpherePacking& cut, const SpherePacking& whole) {
+  ASSERT_LE(cut.spheres.size(), whole.spheres.size());
+  for (std::size_t i = 0; i < cut.spheres.size(); ++i)
+    ASSERT_EQ(std::memcmp(&cut.spheres[i], &whole.spheres[i], sizeof(Sphere)), 0) << "sphere " << i;
+}
+
 }  // namespace ist::testing
