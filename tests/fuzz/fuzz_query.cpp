@@ -52,6 +52,14 @@ void require(bool holds) {
   if (!holds) std::abort();
 }
 
+void look_at(const Penetration& answer) {
+  require(answer.volume >= 0);
+  require(answer.volume_min <= answer.volume);
+  require(answer.volume <= answer.volume_max);
+  require(!answer.translation_gradient.hasNaN() && !answer.rotation_gradient.hasNaN());
+  require(!answer.centroid.hasNaN());
+}
+
 bool same_bits(const Penetration& a, const Penetration& b) {
   return a.volume == b.volume && a.volume_min == b.volume_min && a.volume_max == b.volume_max &&
          a.translation_gradient == b.translation_gradient &&
@@ -82,11 +90,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   settings.pair_budget = input.next<std::uint16_t>();
 
   const auto [penetration, separation] = query(placed_a, placed_b, settings, workspace);
-  require(penetration.volume >= 0);
-  require(penetration.volume_min <= penetration.volume);
-  require(penetration.volume <= penetration.volume_max);
-  require(!penetration.translation_gradient.hasNaN() && !penetration.rotation_gradient.hasNaN());
-  require(!penetration.centroid.hasNaN());
+  look_at(penetration);
+  if (settings.measure == Measure::matched && settings.pair_budget == 0)
+    look_at(without_soft_skin(penetration, placed_a, placed_b));
   require(separation.distance_min >= 0 && separation.distance_min <= separation.distance_max);
   require(same_bits(penetration, query(placed_a, placed_b, settings, workspace).penetration));
   return 0;

@@ -153,7 +153,11 @@ class Chunk {
     const std::size_t which_a = random_() % assets_.size();
     const std::size_t which_b = random_() % assets_.size();
     const PlacedTree a = placed(assets_[which_a]);
-    const PlacedTree b = placed(assets_[which_b]);
+    PlacedTree b = placed(assets_[which_b]);
+    if (one_in(64)) {  // a copy, all but at the same place
+      b = a;
+      b.pose.t[random_() % 3] += std::pow(10, uniform(-9, 0));
+    }
     const QuerySettings settings = limits();
     Workspace& workspace = one_in(8) ? worker_.small : worker_.large;
     // A clock's answer is not repeated: of a deadline only what always holds is looked at.
@@ -185,6 +189,11 @@ class Chunk {
         const Penetration answer = penetration(a, b, settings, workspace);
         look_at(answer);
         if (repeatable) bits_.add(answer);
+        if (settings.measure == Measure::matched && settings.pair_budget == 0) {
+          const Penetration hard = without_soft_skin(answer, a, b);
+          look_at(hard);
+          if (repeatable) bits_.add(hard);
+        }
         // A level of detail is another sum: its bounds are on that one. Bounds on the inner measure
         // hold for spheres that do not overlap.
         const bool bounded = settings.pair_budget == 0 && (settings.measure == Measure::matched ||
