@@ -1,5 +1,6 @@
 #include "triangle_order.h"
 
+#include <algorithm>
 #include <bit>
 
 #include "launch.h"
@@ -18,7 +19,7 @@ namespace {
 constexpr unsigned kThreads = 1024;
 constexpr std::uint32_t kNodeTriangles = kWideWidth * kWideWidth;  ///< of a node of the last level
 static_assert(kThreads == kNodeTriangles);
-constexpr int kPlaceBits = 14;  ///< of a coordinate within a part
+constexpr int kPlaceBits = 14;  ///< of a coordinate within a part, at most
 constexpr std::uint32_t kAll = 0xFFFFFFFFu;
 
 /// Middles of the triangles' boxes, axis by axis.
@@ -98,13 +99,13 @@ __global__ void __launch_bounds__(kThreads)
 /// Keys that sort the triangles of every part along its longest side.
 __global__ void __launch_bounds__(kThreads)
     place_in_parts(const float* middles, const std::uint32_t* order, std::uint32_t count,
-                   std::uint32_t size, const Extent* extents, std::uint32_t* keys) {
+                   std::uint32_t size, const Extent* extents, int place_bits, std::uint32_t* keys) {
   const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
   if (i >= count) return;
   const Extent& extent = extents[i / size];
   const int axis = extent.longest();
-  keys[i] = i / size << kPlaceBits | extent.place(middles[std::size_t(axis) * count + order[i]],
-                                                  axis, (1u << kPlaceBits) - 1);
+  const float middle = middles[std::size_t(axis) * count + order[i]];
+  keys[i] = i / size << place_bits | extent.place(middle, axis, (1u << place_bits) - 1);
 }
 
 /// Sorts the keys of every `size` successive threads, a power of two: Batcher's bitonic network.
@@ -185,13 +186,15 @@ DeviceArray<std::uint32_t> order_triangles(Queue& queue, const double* vertices,
   const auto cut = [&](std::uint32_t whole, std::uint32_t size) {
     if (size >= count) return;
     const unsigned parts = blocks_for(count, whole);
+    const int part_bits = std::bit_width(parts - 1);
+    const int place_bits = std::min(kPlaceBits, 32 - part_bits);
     DeviceArray<Extent> extents(queue, parts);
     extents.fill_bytes(0xFF);
     find_extents<<<blocks, kThreads, 0, stream>>>(middles.data(), order.data(), count, whole,
                                                   extents.data());
     place_in_parts<<<blocks, kThreads, 0, stream>>>(middles.data(), order.data(), count, whole,
-                                                    extents.data(), keys.data());
-    sort_pairs(queue, keys, order, kPlaceBits + std::bit_width(parts - 1));
+                                                    extents.data(), place_bits, keys.data());
+    sort_pairs(queue, keys, order, part_bits + place_bits);
   };
   constexpr std::uint32_t kMost = 1u << 30;  // triangles
   for (std::uint32_t whole = kMost; whole > kNodeTriangles; whole /= kWideWidth) {
