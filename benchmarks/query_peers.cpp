@@ -31,6 +31,9 @@ using ist::testing::OracleRow;
 
 constexpr std::size_t kSpheres = 4000;
 constexpr double kVoxel = 0.01;  ///< of the diameter, which is 1
+constexpr std::uint32_t kPairBudget = 3'000;
+const std::string kPlain = "ist penetration";
+const std::string kBudgeted = "ist penetration, budget of 3,000 pairs";
 
 /// What a library says of one row; empty where it does not answer that question.
 struct Answer {
@@ -84,13 +87,16 @@ std::vector<Query> all_queries(PairOfBodies& pair) {
   const auto from_contacts = [](const ist::testing::MeshContacts& contacts) {
     return Answer{.touching = contacts.any(), .push_b = contacts.push_b};
   };
+  const auto penetration = [&pair, placed_b](std::uint32_t budget) {
+    return [&pair, placed_b, budget](const OracleRow& row) {
+      const auto p = ist::penetration({pair.a.asset.view(), {}}, placed_b(row),
+                                      {.pair_budget = budget}, pair.workspace);
+      return Answer{p.volume > 0, p.volume, -p.translation_gradient, {}};
+    };
+  };
   return {
-      {"ist penetration",
-       [&pair, placed_b](const OracleRow& row) {
-         const auto p =
-             ist::penetration({pair.a.asset.view(), {}}, placed_b(row), {}, pair.workspace);
-         return Answer{p.volume > 0, p.volume, -p.translation_gradient, {}};
-       }},
+      {kPlain, penetration(0)},
+      {kBudgeted, penetration(kPairBudget)},
       {"ist separation",
        [&pair, placed_b](const OracleRow& row) {
          const auto s =
@@ -147,10 +153,33 @@ void measure(std::vector<Query>& queries, const std::vector<OracleRow>& rows, in
   }
 }
 
+/// Median and p99 [µs] of a class by query.
+using Times = std::map<std::string, std::array<double, 2>>;
+
+/// What is asked of pair key `eledino`: how many times as long a peer takes.
+void aim(Report& report, const std::string& pose_class, const Times& us) {
+  struct Aim {
+    std::string pose_class, peer;
+    double median, p99;
+  };
+  const std::string fcl = "FCL collide, all contacts", bullet = "Bullet GImpact, all contacts";
+  for (const Aim& aim : std::initializer_list<Aim>{{"pen", fcl, 25, 100},
+                                                   {"deep", fcl, 50, 50},
+                                                   {"deep", bullet, 50, 50},
+                                                   {"contain", bullet, 15, 10}}) {
+    if (aim.pose_class != pose_class) continue;
+    for (const std::string& query : {kPlain, kBudgeted}) {
+      const std::string what = "eledino " + pose_class + ": " + aim.peer + " over " + query + ", ";
+      report.target(what + "median", us.at(aim.peer)[0] / us.at(query)[0], aim.median);
+      report.target(what + "p99", us.at(aim.peer)[1] / us.at(query)[1], aim.p99);
+    }
+  }
+}
+
 void report_times(Report& report, const std::string& key, const std::vector<Query>& queries,
                   const std::vector<OracleRow>& rows) {
   for (const std::string pose_class : {"sep", "pen", "deep", "contain"}) {
-    std::map<std::string, std::array<double, 2>> us;
+    Times us;
     for (const Query& query : queries) {
       std::vector<double> times;
       for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -160,7 +189,7 @@ void report_times(Report& report, const std::string& key, const std::vector<Quer
     }
     for (const Query& query : queries) {
       const bool distance = query.name == "FCL distance" || query.name == "ist separation";
-      const auto& ours = us[distance ? "ist separation" : "ist penetration"];
+      const auto& ours = us[distance ? "ist separation" : kPlain];
       const auto& its = us[query.name];
       report.row("Time a query", {{"pair", key},
                                   {"class", pose_class},
@@ -170,6 +199,7 @@ void report_times(Report& report, const std::string& key, const std::vector<Quer
                                   {"median, times ist", its[0] / ours[0]},
                                   {"p99, times ist", its[1] / ours[1]}});
     }
+    if (key == "eledino") aim(report, pose_class, us);
   }
 }
 
@@ -183,7 +213,7 @@ void report_answers(Report& report, const std::string& key, const std::vector<Qu
   for (const Query& query : queries) {
     std::size_t missed_contained = 0, contained = 0, missed_crossing = 0, false_touch = 0;
     std::size_t wrong_interval = 0;
-    std::vector<double> error, angle, width;
+    std::vector<double> error, deep_error, angle, width;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const OracleRow& row = rows[i];
       const Answer& answer = query.answers[i];
@@ -194,6 +224,9 @@ void report_answers(Report& report, const std::string& key, const std::vector<Qu
       false_touch += row.volume == 0 && answer.touching;
       if (answer.volume && row.pose_class == "pen") {
         error.push_back(100 * std::abs(*answer.volume / row.volume - 1));
+      }
+      if (answer.volume && row.pose_class == "deep") {
+        deep_error.push_back(100 * std::abs(*answer.volume / row.volume - 1));
       }
       if (answer.push_b.norm() > 0 && row.pose_class == "pen") {
         angle.push_back(degrees(answer.push_b, -row.translation_gradient));
@@ -214,6 +247,7 @@ void report_answers(Report& report, const std::string& key, const std::vector<Qu
     if (!error.empty()) {
       line["pen: volume error %, median"] = quantile(error, 0.5);
       line["p95"] = quantile(error, 0.95);
+      line["deep: volume error %, median"] = quantile(deep_error, 0.5);
     }
     if (!angle.empty()) {
       line["pen: force angle, median"] = quantile(angle, 0.5);
@@ -225,8 +259,12 @@ void report_answers(Report& report, const std::string& key, const std::vector<Qu
     }
     report.row("Right and wrong answers", line);
 
-    if (query.name == "ist penetration") {
-      report.target(key + ": contained rows missed", double(missed_contained), 0, true);
+    if (query.name == kPlain || query.name == kBudgeted) {
+      report.target(key + ": contained rows missed, " + query.name, double(missed_contained), 0,
+                    true);
+      if (key == "eledino")
+        report.target("eledino deep: median volume error %, " + query.name,
+                      quantile(deep_error, 0.5), 0.05, true);
     }
     if (query.name == "ist separation") {
       report.target(key + ": distances outside the interval", double(wrong_interval), 0, true);
