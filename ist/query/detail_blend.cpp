@@ -34,8 +34,8 @@ class DetailQueries {
     if (twins.weight == 0) return descend(pair, relative_error, min_radius);
     DetailPair unlike[2] = {pair, pair};
     unlike[0].b = unlike[1].a = pair.a < a_.detail_count ? pair.a + 1 : pair.a - 1;
-    const Penetration other = mix(descend(unlike[0], relative_error, min_radius),
-                                  descend(unlike[1], relative_error, min_radius), 0.5);
+    Penetration other = mix(descend(unlike[0], relative_error, min_radius),
+                            descend(unlike[1], relative_error, min_radius), 0.5);
     if (twins.weight == 1) return other;
     const Penetration alike = descend(pair, relative_error, min_radius);
     Penetration mixed = mix(alike, other, twins.weight);
