@@ -261,12 +261,14 @@ int main(int argc, char** argv) {
       "integrated over B's surface inside A; how far this integral is from the oracle's gradients "
       "stands in the first four rows. Random crossings in the shallow band are left out.");
   report.remark(
-      "Where ist is furthest off, the overlap is shallower than a leaf: depth is volume / |force|, "
-      "a "
-      "leaf's radius (3 V / 4 π N)^⅓ of the coarser solid. A handful of spheres then decides the "
-      "direction. It is that of the sum's own gradient (`property_query` compares it with finite "
-      "differences), so only more spheres turn it right: volume_error.json has the angles from 300 "
-      "to 30,000.");
+      "Forces furthest off: depth is volume / |force|, a leaf's radius (3 V / 4 π N)^⅓ of the "
+      "coarser "
+      "solid. Directions are off where the overlap is no deeper than a leaf, so that a handful of "
+      "spheres decides (the oracle's rows); where pushes from opposite sides all but cancel, and "
+      "depth comes out large; and where parts are as thin as a leaf (perforated tray, Menger "
+      "sponge). "
+      "The direction is that of the sum's own gradient (`property_query`): more spheres turn it "
+      "right, as volume_error shows from 300 to 30,000.");
   ist::testing::ContactJudge judge;
   Lists lists;
   for (const std::string& key : ist::testing::kPairKeys)
