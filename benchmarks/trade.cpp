@@ -1,8 +1,8 @@
 // What accuracy costs: error of the volume against time for sphere counts, budgets and measures,
 // the peers in the same run. One thread; thread CPU time of each call less the cost of the clock;
-// every pose fresh (rounds over all rows in turn, least of the rounds a row). Full runs keep their
-// assets in the folder IST_TRADE_ASSETS (default: ist_trade in the temporary folder), since most of
-// their time is baking.
+// every pose fresh (rounds over all rows in turn, least of the rounds a row). Most of the time is
+// baking: IST_TRADE_ASSETS names a folder that keeps the assets for further runs of the same
+// library.
 
 #include <algorithm>
 #include <array>

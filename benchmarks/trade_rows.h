@@ -43,13 +43,13 @@ struct PairOfBodies {
   std::vector<Row> rows;
 };
 
-/// The asset of that name in the folder of kept ones if it is of this mesh and `same(header)`, else
-/// baked and kept.
+/// Baked; or, where a folder of kept ones is named, the asset of that name in it if it is of this
+/// mesh and `same(header)`, else baked and kept. Which library baked it nobody can tell.
 template <class Same, class Bake>
 Asset kept_or_baked(const Body& body, const std::string& label, Same same, Bake bake) {
   const char* const asked = std::getenv("IST_TRADE_ASSETS");
-  const std::filesystem::path folder =
-      asked != nullptr ? asked : std::filesystem::temp_directory_path() / "ist_trade";
+  if (asked == nullptr) return bake();
+  const std::filesystem::path folder = asked;
   std::filesystem::create_directories(folder);
   const std::filesystem::path path = folder / (body.name + "_" + label + ".ist");
   try {
