@@ -107,6 +107,7 @@ std::vector<std::vector<float>> overlaps(std::span<const Ball> sorted,
   }
   if (!disjoint) return overlap_bounds(sorted, balls);
   std::vector<std::vector<float>> kappa;
+  kappa.reserve(levels.size() + 1);
   for (const auto& level : levels) kappa.emplace_back(level.size(), 1.0f);
   kappa.push_back({1.0f});
   return kappa;

@@ -35,7 +35,7 @@ std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::
 
 std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays,
                                     Clustering clustering, bool swaps) {
-  const std::vector<std::uint32_t> order = group_order(balls, last_stays, clustering, swaps);
+  std::vector<std::uint32_t> order = group_order(balls, last_stays, clustering, swaps);
   if (order.size() <= std::size_t{kWidth} * kWidth) return order;
   // A group that is not full comes last, and so does any that holds one that is not.
   const std::vector<std::uint32_t> groups = order_of(

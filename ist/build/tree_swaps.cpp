@@ -208,7 +208,7 @@ class GroupSwaps {
     const double least_cost_b = cost(gb.least_radius);
     if (now - cost(ga.least_radius) - least_cost_b <= best.gain) return {};
     bool found = false;
-    double without_b[kWidth];
+    double without_b[kWidth] = {};
     for (std::size_t t = 0; t < gb.members.size(); ++t) without_b[t] = cost(gb.without[t].r);
     std::optional<Fit> into_a[kWidth];
     for (std::uint32_t s = 0; s < ga.members.size(); ++s) {

@@ -45,6 +45,7 @@ class SortedVertices {
     }
     std::sort(found.begin(), found.end());
     std::vector<std::uint32_t> result;
+    result.reserve(found.size());
     for (const auto& [at, w] : found) result.push_back(w);
     return result;
   }

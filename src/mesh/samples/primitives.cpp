@@ -62,6 +62,7 @@ TriangleMesh revolve(const std::vector<std::pair<double, double>>& profile, doub
                      double top) {
   MeshBuilder builder;
   std::vector<Ring> rings;
+  rings.reserve(profile.size());
   for (const auto& [radius, z] : profile)
     rings.push_back(builder.ring(kSegments, z, [r = radius](std::size_t) { return r; }));
   for (std::size_t k = 0; k + 1 < rings.size(); ++k) builder.wall(rings[k], rings[k + 1]);
