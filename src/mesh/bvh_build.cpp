@@ -175,7 +175,10 @@ class Builder {
     return static_cast<std::uint32_t>(middle - begin);
   }
 
-  static float blocks_of(std::uint32_t n) { return float((n + kBvhWidth - 1) / kBvhWidth); }
+  static float blocks_of(std::uint32_t n) {
+    const std::uint32_t blocks = (n + kBvhWidth - 1) / kBvhWidth;
+    return float(blocks);
+  }
 
   /// Turns a binary subtree into wide nodes, opening the child of largest area while there is room.
   std::uint32_t gather(std::uint32_t at, Bvh& bvh) {
