@@ -27,9 +27,9 @@ template <class T>
 struct alignas(32) Side {
   double origin[4];        ///< of the spheres' coordinates
   double centre[4];        ///< of the leaf ball
+  alignas(32) T lever[4];  ///< from B's origin to this one
   double radius;           ///< of the leaf ball
   double size;             ///< bound on the way from the origin to the end of any sphere
-  alignas(32) T lever[4];  ///< from B's origin to this one
   const Spheres<T>* spheres;
 };
 
