@@ -128,6 +128,7 @@ std::vector<std::vector<float>> overlap_bounds(std::span<const Ball> spheres,
   tbb::parallel_for(std::size_t{0}, spheres.size(),
                     [&](std::size_t i) { around[i] = bounds.around(i); });
   std::vector<std::vector<float>> kappa;
+  kappa.reserve(balls.size() + 1);
   for (const auto& level : balls) kappa.emplace_back(level.size(), 1.0f);
   kappa.push_back({1.0f});
   for (std::size_t i = 0; i < spheres.size(); ++i)
