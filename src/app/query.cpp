@@ -56,6 +56,7 @@ std::vector<Answer> answer(const TreeView& a, const TreeView& b, const std::vect
                            const QueryOptions& options) {
   using Clock = std::chrono::steady_clock;
   std::vector<Answer> answers;
+  answers.reserve(rows.size());
   for (const PoseRow& row : rows)
     answers.push_back({row, {}, std::numeric_limits<double>::infinity()});
   Workspace workspace;
