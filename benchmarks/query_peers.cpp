@@ -31,9 +31,16 @@ using ist::testing::OracleRow;
 
 constexpr std::size_t kSpheres = 4000;
 constexpr double kVoxel = 0.01;  ///< of the diameter, which is 1
-constexpr std::uint32_t kPairBudget = 3'000;
+
+/// The ways to ask for a volume: in full, and under pair budgets for deep and for shallow contacts.
+struct Way {
+  std::string name;
+  std::uint32_t pair_budget;
+};
 const std::string kPlain = "ist penetration";
-const std::string kBudgeted = "ist penetration, budget of 3,000 pairs";
+const std::vector<Way> kWays = {{kPlain, 0},
+                                {kPlain + ", budget of 3,000 pairs", 3'000},
+                                {kPlain + ", budget of 600 pairs", 600}};
 
 /// What a library says of one row; empty where it does not answer that question.
 struct Answer {
@@ -94,9 +101,9 @@ std::vector<Query> all_queries(PairOfBodies& pair) {
       return Answer{p.volume > 0, p.volume, -p.translation_gradient, {}};
     };
   };
-  return {
-      {kPlain, penetration(0)},
-      {kBudgeted, penetration(kPairBudget)},
+  std::vector<Query> queries;
+  for (const Way& way : kWays) queries.push_back({way.name, penetration(way.pair_budget)});
+  const std::vector<Query> others = {
       {"ist separation",
        [&pair, placed_b](const OracleRow& row) {
          const auto s =
@@ -125,6 +132,8 @@ std::vector<Query> all_queries(PairOfBodies& pair) {
          return Answer{.touching = volume > 0, .volume = volume};
        }},
   };
+  queries.insert(queries.end(), others.begin(), others.end());
+  return queries;
 }
 
 /// [s] what reading the clock twice costs by itself; taken off every measurement.
@@ -156,22 +165,26 @@ void measure(std::vector<Query>& queries, const std::vector<OracleRow>& rows, in
 /// Median and p99 [µs] of a class by query.
 using Times = std::map<std::string, std::array<double, 2>>;
 
-/// What is asked of pair key `eledino`: how many times as long a peer takes.
-void aim(Report& report, const std::string& pose_class, const Times& us) {
+/// What is asked for: how many times as long a peer takes.
+void aim(Report& report, const std::string& key, const std::string& pose_class, const Times& us) {
   struct Aim {
-    std::string pose_class, peer;
-    double median, p99;
+    std::string key, pose_class, peer;
+    double median, p99;  ///< 0: nothing is asked
   };
   const std::string fcl = "FCL collide, all contacts", bullet = "Bullet GImpact, all contacts";
-  for (const Aim& aim : std::initializer_list<Aim>{{"pen", fcl, 25, 100},
-                                                   {"deep", fcl, 50, 50},
-                                                   {"deep", bullet, 50, 50},
-                                                   {"contain", bullet, 15, 10}}) {
-    if (aim.pose_class != pose_class) continue;
-    for (const std::string& query : {kPlain, kBudgeted}) {
-      const std::string what = "eledino " + pose_class + ": " + aim.peer + " over " + query + ", ";
-      report.target(what + "median", us.at(aim.peer)[0] / us.at(query)[0], aim.median);
-      report.target(what + "p99", us.at(aim.peer)[1] / us.at(query)[1], aim.p99);
+  for (const Aim& aim : std::initializer_list<Aim>{{"eledino", "pen", fcl, 25, 100},
+                                                   {"eledino", "deep", fcl, 50, 50},
+                                                   {"eledino", "deep", bullet, 50, 50},
+                                                   {"eledino", "contain", bullet, 15, 10},
+                                                   {"big200k", "pen", fcl, 0, 500}}) {
+    if (aim.key != key || aim.pose_class != pose_class) continue;
+    for (const Way& way : kWays) {
+      const std::string what =
+          key + " " + pose_class + ": " + aim.peer + " over " + way.name + ", ";
+      const auto& peers = us.at(aim.peer);
+      const auto& ours = us.at(way.name);
+      if (aim.median > 0) report.target(what + "median", peers[0] / ours[0], aim.median);
+      report.target(what + "p99", peers[1] / ours[1], aim.p99);
     }
   }
 }
@@ -199,9 +212,17 @@ void report_times(Report& report, const std::string& key, const std::vector<Quer
                                   {"median, times ist", its[0] / ours[0]},
                                   {"p99, times ist", its[1] / ours[1]}});
     }
-    if (key == "eledino") aim(report, pose_class, us);
+    aim(report, key, pose_class, us);
   }
 }
+
+/// Shares of the smaller solid that overlap, with the median error [%] that is asked for.
+struct OverlapClass {
+  std::string name;
+  double least, most, error;
+};
+const std::vector<OverlapClass> kClasses = {
+    {"1–10 %", 1e-2, 1e-1, 0.2}, {"0.1–1 %", 1e-3, 1e-2, 0.6}, {"0.01–0.1 %", 1e-4, 1e-3, 7}};
 
 double degrees(const Vector3d& u, const Vector3d& v) {
   return std::acos(std::clamp(u.normalized().dot(v.normalized()), -1.0, 1.0)) * 180 /
@@ -214,6 +235,7 @@ void report_answers(Report& report, const std::string& key, const std::vector<Qu
     std::size_t missed_contained = 0, contained = 0, missed_crossing = 0, false_touch = 0;
     std::size_t wrong_interval = 0;
     std::vector<double> error, deep_error, angle, width;
+    std::vector<std::vector<double>> class_error(kClasses.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const OracleRow& row = rows[i];
       const Answer& answer = query.answers[i];
@@ -224,6 +246,10 @@ void report_answers(Report& report, const std::string& key, const std::vector<Qu
       false_touch += row.volume == 0 && answer.touching;
       if (answer.volume && row.pose_class == "pen") {
         error.push_back(100 * std::abs(*answer.volume / row.volume - 1));
+        for (std::size_t c = 0; c < kClasses.size(); ++c)
+          if (row.fraction_of_smaller >= kClasses[c].least &&
+              row.fraction_of_smaller < kClasses[c].most)
+            class_error[c].push_back(error.back());
       }
       if (answer.volume && row.pose_class == "deep") {
         deep_error.push_back(100 * std::abs(*answer.volume / row.volume - 1));
@@ -247,6 +273,9 @@ void report_answers(Report& report, const std::string& key, const std::vector<Qu
     if (!error.empty()) {
       line["pen: volume error %, median"] = quantile(error, 0.5);
       line["p95"] = quantile(error, 0.95);
+      for (std::size_t c = 0; c < kClasses.size(); ++c)
+        if (!class_error[c].empty())
+          line["error %, median, " + kClasses[c].name] = quantile(class_error[c], 0.5);
       line["deep: volume error %, median"] = quantile(deep_error, 0.5);
     }
     if (!angle.empty()) {
@@ -259,12 +288,17 @@ void report_answers(Report& report, const std::string& key, const std::vector<Qu
     }
     report.row("Right and wrong answers", line);
 
-    if (query.name == kPlain || query.name == kBudgeted) {
+    if (query.name.starts_with(kPlain)) {
       report.target(key + ": contained rows missed, " + query.name, double(missed_contained), 0,
                     true);
-      if (key == "eledino")
+      if (key == "eledino") {
         report.target("eledino deep: median volume error %, " + query.name,
                       quantile(deep_error, 0.5), 0.05, true);
+        for (std::size_t c = 0; c < kClasses.size(); ++c)
+          report.target(
+              "eledino pen, " + kClasses[c].name + ": median volume error %, " + query.name,
+              quantile(class_error[c], 0.5), kClasses[c].error, true);
+      }
     }
     if (query.name == "ist separation") {
       report.target(key + ": distances outside the interval", double(wrong_interval), 0, true);
