@@ -33,9 +33,9 @@ struct QuerySettings {
   Measure measure = Measure::matched;
   /// Count of sphere pairs to spend, 0 = as many as it takes. Above 0 the answer comes from the
   /// finest level of detail that is expected to need no more, and is blended with the next coarser
-  /// one from half of that on: volume and force stay continuous, gradients are the blended sum's,
-  /// and shallow contacts keep all spheres. Aimed at, not kept: counts differ by up to a factor of
-  /// two from what is expected. penetration() and penetration_batch() in the matched measure only.
+  /// one from 0.7 of that on: volume and force stay continuous, gradients are the blended sum's,
+  /// and shallow contacts keep all spheres. Aimed at, not kept; never less than the coarsest level
+  /// takes. penetration() and penetration_batch() in the matched measure only.
   std::uint32_t pair_budget = 0;
   std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
   double deadline_us = 0;     ///< [µs] wall clock from the call; read every 256 node pairs or less
@@ -105,12 +105,12 @@ Penetration penetration(const PlacedTree& a, const PlacedTree& b, const QuerySet
                         Workspace& workspace) noexcept;
 
 /// `whole`, what penetration() answered for these two in the matched measure without a pair budget,
-/// freed of the soft skin where flat faces meet: no volume and no force across a gap, and less of
-/// both in the first fifth of a mean sphere radius of depth, where the spheres that stick out count
-/// too much. Told from volume and force alone: contacts that are round or deeper come back as they
-/// are, and a large ball that touches lightly may pass for flat. Both stay continuous in the pose;
-/// the force is the volume's gradient but for 15 %, so use it for contacts, not where energy must
-/// be kept. volume_min is lowered to hold the new volume. A few nanoseconds.
+/// freed of the soft skin where flat faces meet: nothing across a gap of a fifth of a mean sphere
+/// radius and more, less volume nearer and in the first fifth of depth, where the spheres that
+/// stick out count too much. Told from volume and force alone: round or deeper contacts come back
+/// as they are, and a large ball that touches lightly may pass for flat. Both stay continuous in
+/// the pose; the force is the volume's gradient but for 15 %, so use it for contacts, not where
+/// energy must be kept. volume_min is lowered to hold the new volume. A few nanoseconds.
 Penetration without_soft_skin(const Penetration& whole, const PlacedTree& a,
                               const PlacedTree& b) noexcept;
 

@@ -129,7 +129,9 @@ void add_bake(CLI::App& app) {
       app.add_subcommand("bake", "Pack a closed mesh with spheres and write an .ist asset");
   command->add_option("MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, …")->required();
   command->add_option("-o,--output", options->output, "The .ist file to write")->required();
-  command->add_option("--spheres", packing.max_spheres, "Stop at this count, 0 = no limit")
+  command
+      ->add_option("--spheres", packing.max_spheres,
+                   "Stop at this count, 0 = no limit (with --target-error: 200,000, as by default)")
       ->check(is_count)
       ->capture_default_str();
   command
@@ -140,8 +142,8 @@ void add_bake(CLI::App& app) {
             // Unless asked for, the default count is no limit here.
             if (command->count("--spheres") == 0) options->packing.max_spheres = 0;
           },
-          "As many spheres as this median error of the volume needs, e.g. 1%; --spheres is the "
-          "most")
+          "As many spheres as this median error of the volume needs, e.g. 1%; at most --spheres "
+          "where given, else 200,000")
       ->check(share("above 0 and below 1", [](double x) { return x > 0 && x < 1; }));
   command
       ->add_option_function<std::string>(

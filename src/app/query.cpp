@@ -122,17 +122,17 @@ void add_query(CLI::App& app) {
   command
       ->add_option("--pair-budget", options->settings.pair_budget,
                    "Answer from the level of detail that needs about so many sphere pairs, "
-                   "0 = from the finest")
+                   "0 = from the finest; matched measure only")
       ->check(is_count)
       ->capture_default_str();
   command
       ->add_option("--max-visits", options->settings.max_visits,
-                   "Stop a query after so many node pairs, 0 = no limit")
+                   "Stop penetration and separation after so many node pairs each, 0 = no limit")
       ->check(is_count)
       ->capture_default_str();
   command
       ->add_option("--deadline-us", options->settings.deadline_us,
-                   "[µs] Stop a query after this, 0 = no limit")
+                   "[µs] Stop penetration and separation after this each, 0 = no limit")
       ->check(is_not_negative)
       ->capture_default_str();
   command
