@@ -9,15 +9,18 @@
 
 namespace ist {
 
-/// Counts visits and watches the clock, if there is a deadline: at most once in 16 visits.
+/// Counts visits and watches the clock, if there is a deadline: at most once in 16 visits. Visits
+/// end at a part of the time, what is left being for a guess of what was not visited.
 class Budget {
  public:
   explicit Budget(const QuerySettings& settings) noexcept
       : max_visits_(settings.max_visits != 0 ? settings.max_visits : ~0u),
         timed_(settings.deadline_us > 0) {
-    if (timed_)
-      deadline_ = Clock::now() + std::chrono::nanoseconds(static_cast<std::int64_t>(
-                                     std::min(settings.deadline_us, 1e12) * 1e3));
+    if (timed_) {
+      start_ = Clock::now();
+      allowed_ = std::chrono::nanoseconds(
+          static_cast<std::int64_t>(std::min(settings.deadline_us, 1e12) * 1e3));
+    }
   }
 
   /// How many of the next `wanted` visits may be made; they count as made.
@@ -25,23 +28,38 @@ class Budget {
     const std::size_t granted = std::min<std::size_t>(wanted, left());
     if (granted == 0) return 0;
     if (timed_ && visits_ >= next_look_) {
-      if (Clock::now() >= deadline_) return 0;
+      if (visits_end()) return 0;
       next_look_ = visits_ + 16;
     }
     visits_ += static_cast<std::uint32_t>(granted);
     return granted;
   }
 
+  /// Whether visits are to end now.
+  bool visits_end() const noexcept { return spent(kForVisits); }
+
+  /// Whether such a part of the time is over; never without a deadline.
+  bool spent(double part) const noexcept {
+    return timed_ && Clock::now() - start_ >= allowed_ * part;
+  }
+
+  bool timed() const noexcept { return timed_; }
+
+  /// Takes back visits that were granted and not made.
+  void give_back(std::size_t visits) noexcept { visits_ -= static_cast<std::uint32_t>(visits); }
+
   std::uint32_t left() const noexcept { return max_visits_ - visits_; }
   std::uint32_t visits() const noexcept { return visits_; }
 
  private:
   using Clock = std::chrono::steady_clock;
+  static constexpr double kForVisits = 0.6;
   std::uint32_t max_visits_;
   std::uint32_t visits_ = 0;
   std::uint32_t next_look_ = 0;
   bool timed_;
-  Clock::time_point deadline_;
+  Clock::time_point start_;
+  std::chrono::nanoseconds allowed_{0};
 };
 
 }  // namespace ist

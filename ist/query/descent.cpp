@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "query/node_kernel.h"
@@ -15,6 +16,11 @@ namespace {
 // blocks, which every call starts anew.
 constexpr std::size_t kChunk = 64;
 constexpr std::size_t kLeafChunk = 256;
+
+// Shares of the time that a deadline gives: sums are taken again in double only before the one, and
+// no more guesses are made after the other.
+constexpr double kEarly = 0.3, kLate = 0.85;
+constexpr std::size_t kGuesses = 32;  ///< between two looks at the clock, evenly over what is left
 
 // Sums whose rounding may exceed this share are taken again in double. The bound is at least fifty
 // times what rounding does, so float keeps 1e-5 (property_query, NoGrazingPairIsLost).
@@ -153,9 +159,10 @@ void Descent::open_leaves() {
   std::size_t done = 0;
   while (done < now.size) {
     if (by_error && accurate(waiting)) break;
-    const std::size_t n = budget_.grant(std::min(kLeafChunk, now.size - done));
+    const std::size_t granted = budget_.grant(std::min(kLeafChunk, now.size - done));
+    const std::size_t n = add_leaves(done, granted, &budget_);
+    budget_.give_back(granted - n);
     if (n == 0) break;
-    add_leaves(done, n);
     if (by_error)
       for (std::size_t i = done; i < done + n; ++i) waiting -= scratch_.ranked[i].bound;
     done += n;
@@ -164,20 +171,22 @@ void Descent::open_leaves() {
 
   // A few grazing lenses are all rounding in float; they are as few as they are shallow.
   const Overlap sum = sure();
-  if (precision_ == Precision::single && !keep_rounding_ && sum.error > kGrazing * sum.volume) {
+  if (precision_ == Precision::single && !keep_rounding_ && sum.error > kGrazing * sum.volume &&
+      !budget_.spent(kEarly)) {
     precision_ = Precision::twice;
     sums_ = LeafSums();
     if (bins_ != nullptr) bins_->forget_sums();
-    add_leaves(0, done);
+    add_leaves(0, done, nullptr);
   }
 }
 
-void Descent::add_leaves(std::size_t from, std::size_t n) {
+std::size_t Descent::add_leaves(std::size_t from, std::size_t n, const Budget* budget) {
+  if (n == 0) return 0;
   const std::uint32_t* const a = scratch_.now.a.get() + from;
   const std::uint32_t* const b = scratch_.now.b.get() + from;
-  LeafStage stage{&a_, &b_, level_a_, level_b_, &map_, precision_};
+  LeafStage stage{&a_, &b_, level_a_, level_b_, &map_, precision_, budget};
   if (bins_ != nullptr) stage.bins = bins_->touch(level_a_, a, level_b_, b, n);
-  add_leaf_pairs(stage, a, b, n, sums_);
+  return add_leaf_pairs(stage, a, b, n, sums_);
 }
 
 bool Descent::accurate(double waiting) const {
@@ -212,7 +221,7 @@ void Descent::drop_small(Measured measured) {
     const double ra = a_.ball(level_a_, now.a[i]).r;
     const double rb = b_.ball(level_b_, now.b[i]).r * map_.scale;
     if (measured(ra, rb) < min_radius_) {
-      leave_pair(now.a[i], now.b[i]);
+      left_.add(leave_pair(now.a[i], now.b[i]));
     } else {
       now.a[kept] = now.a[i];
       now.b[kept++] = now.b[i];
@@ -222,10 +231,26 @@ void Descent::drop_small(Measured measured) {
 }
 
 void Descent::leave(const PairList& list, std::size_t from) {
-  for (std::size_t i = from; i < list.size; ++i) leave_pair(list.a[i], list.b[i]);
+  const std::size_t count = list.size - from;
+  // Bins must add up to the whole, so theirs are all guessed.
+  const std::size_t step =
+      budget_.timed() && bins_ == nullptr ? std::max<std::size_t>(1, count / kGuesses) : 1;
+  Overlap guesses;
+  std::size_t guessed = 0;
+  for (std::size_t first = 0; first < step; ++first) {
+    if (first > 0 && budget_.spent(kLate)) {
+      // The others are taken for as large as these on average; penetration() caps the bound.
+      guesses.scale(static_cast<double>(count) / static_cast<double>(guessed));
+      left_bound_ = std::numeric_limits<double>::infinity();
+      break;
+    }
+    for (std::size_t i = from + first; i < list.size; i += step, ++guessed)
+      guesses.add(leave_pair(list.a[i], list.b[i]));
+  }
+  left_.add(guesses);
 }
 
-void Descent::leave_pair(std::uint32_t a, std::uint32_t b) {
+Overlap Descent::leave_pair(std::uint32_t a, std::uint32_t b) {
   const PairEstimate pair = estimate(level_a_, a, level_b_, b);
   const Eigen::Vector3d lever = pair.centre - Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]);
   stopped_ = true;
@@ -235,8 +260,8 @@ void Descent::leave_pair(std::uint32_t a, std::uint32_t b) {
   guess.force = pair.force;
   guess.torque = lever.cross(pair.force);
   guess.moment = pair.volume * lever;
-  left_.add(guess);
   if (bins_ != nullptr) bins_->add_guess(level_a_, a, level_b_, b, guess);
+  return guess;
 }
 
 Penetration Descent::penetration() const noexcept {

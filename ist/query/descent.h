@@ -60,8 +60,8 @@ class Descent {
 
   void open_leaves();
 
-  /// Sums pairs [from, from + n) of the current list.
-  void add_leaves(std::size_t from, std::size_t n);
+  /// Sums pairs [from, from + n) of the current list, or as many as a budget has time for.
+  std::size_t add_leaves(std::size_t from, std::size_t n, const Budget* budget);
 
   bool accurate(double waiting) const;
 
@@ -72,8 +72,11 @@ class Descent {
   template <class Measured>
   void drop_small(Measured measured);
 
+  /// Guesses the pairs from `from` on; if the time is over, from an even choice of them.
   void leave(const PairList& list, std::size_t from);
-  void leave_pair(std::uint32_t a, std::uint32_t b);
+
+  /// Guesses one pair that stays unopened.
+  Overlap leave_pair(std::uint32_t a, std::uint32_t b);
 
   const SphereTree& a_;
   const SphereTree& b_;

@@ -272,8 +272,8 @@ HWY_INLINE void add_lenses(const Tasks<T>& tasks, std::size_t k, const PairOfBlo
 }
 
 template <class T>
-void add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b, std::size_t n,
-            LeafSums& sums) {
+std::size_t add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
+                   std::size_t n, LeafSums& sums) {
   const Similarity& map = *stage.a_from_b;
   LeafSums* const bins = stage.bins.sums;
   const bool single_a = stage.level_a == kSphereLevel;
@@ -287,7 +287,8 @@ void add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t*
   Tasks<T> tasks;
   LensList<T> list;
   std::uint32_t round = 0;
-  for (std::size_t done = 0; done < n;) {
+  std::size_t done = 0;
+  while (done < n && !(done > 0 && stage.budget != nullptr && stage.budget->visits_end())) {
     const std::size_t most = std::min(kPairsAtOnce, n - done);
     ++round;
     tasks.size = 0;
@@ -329,16 +330,17 @@ void add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t*
     }
   }
   sum_last_lenses(list, sums, bins);
+  return done;
 }
 
-void add_single(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
-                std::size_t n, LeafSums& sums) {
-  add_as<float>(stage, a, b, n, sums);
+std::size_t add_single(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
+                       std::size_t n, LeafSums& sums) {
+  return add_as<float>(stage, a, b, n, sums);
 }
 
-void add_twice(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
-               std::size_t n, LeafSums& sums) {
-  add_as<double>(stage, a, b, n, sums);
+std::size_t add_twice(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
+                      std::size_t n, LeafSums& sums) {
+  return add_as<double>(stage, a, b, n, sums);
 }
 
 }  // namespace ist::HWY_NAMESPACE
@@ -350,13 +352,12 @@ namespace ist {
 HWY_EXPORT(add_single);
 HWY_EXPORT(add_twice);
 
-void add_leaf_pairs(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
-                    std::size_t n, LeafSums& sums) noexcept {
+std::size_t add_leaf_pairs(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
+                           std::size_t n, LeafSums& sums) noexcept {
   if (stage.precision == Precision::single) {
-    HWY_DYNAMIC_DISPATCH(add_single)(stage, a, b, n, sums);
-  } else {
-    HWY_DYNAMIC_DISPATCH(add_twice)(stage, a, b, n, sums);
+    return HWY_DYNAMIC_DISPATCH(add_single)(stage, a, b, n, sums);
   }
+  return HWY_DYNAMIC_DISPATCH(add_twice)(stage, a, b, n, sums);
 }
 
 }  // namespace ist

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "query/budget.h"
 #include "query/node_kernel.h"
 
 namespace ist {
@@ -39,11 +40,13 @@ struct LeafStage {
   int level_b;
   const Similarity* a_from_b;
   Precision precision;
+  const Budget* budget = nullptr;  ///< whose deadline ends the stage, between batches
   LeafBinning bins = {};
 };
 
-/// Adds the lenses of every sphere of a[i] with every sphere of b[i].
-void add_leaf_pairs(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
-                    std::size_t n, LeafSums& sums) noexcept;
+/// Adds the lenses of every sphere of a[i] with every sphere of b[i]. Returns how many pairs it
+/// took: all n, or those that came before the deadline.
+std::size_t add_leaf_pairs(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
+                           std::size_t n, LeafSums& sums) noexcept;
 
 }  // namespace ist
