@@ -1,7 +1,8 @@
-# Warnings, floating-point rules and sanitizers of every target of this project.
+# Warnings, floating-point rules and sanitizers of every target of this project. A warning ends the
+# build, but not that of a project that this one is a part of.
 function(ist_compile_options target)
   target_compile_options(${target} PRIVATE
-    -Wall -Wextra -Wconversion -Werror
+    -Wall -Wextra -Wconversion $<$<BOOL:${PROJECT_IS_TOP_LEVEL}>:-Werror>
     # The same bytes on any machine (DESIGN 3.3): nothing is fused or re-associated.
     -ffp-contract=off)
   if(IST_SANITIZE)

@@ -2,7 +2,6 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <filesystem>
 #include <memory>
 
 #include <ist/bake.h>
@@ -12,6 +11,7 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/number_checks.h"
+#include "app/output_file.h"
 #include "app/progress_line.h"
 #include "app/text.h"
 
@@ -35,12 +35,6 @@ void announce_device(Device device) {
     spdlog::info("baking on the GPU: {}", gpu_info().name);
   else if (device == Device::automatic)
     spdlog::info("baking on the CPU: {}", why);
-}
-
-void require_another_file(const BakeOptions& options) {
-  std::error_code no_such_file;
-  if (std::filesystem::equivalent(options.mesh, options.output, no_such_file))
-    throw Error(options.output + ": this is the mesh itself; name another file for the asset");
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -90,7 +84,7 @@ void run_bake(const BakeOptions& options) {
   if (options.quiet) spdlog::set_level(spdlog::level::err);
   PackingSettings settings = options.packing;
   settings.grid = grid_named(options.grid);
-  require_another_file(options);
+  require_output(options.output, options.mesh, "the asset");
   settings.device = device_named(options.device);
   announce_device(settings.device);
 

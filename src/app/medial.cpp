@@ -4,13 +4,13 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <filesystem>
 #include <memory>
 
 #include <ist/error.h>
 
 #include "app/commands.h"
 #include "app/number_checks.h"
+#include "app/output_file.h"
 #include "app/text.h"
 #include "asset/atomic_file.h"
 
@@ -33,9 +33,7 @@ std::string table_of(const std::vector<MedialNode>& nodes) {
 
 void run_medial(const MedialOptions& options) {
   if (options.quiet) spdlog::set_level(spdlog::level::err);
-  std::error_code no_such_file;
-  if (std::filesystem::equivalent(options.mesh, options.output, no_such_file))
-    throw Error(options.output + ": this is the mesh itself; name another file for the nodes");
+  require_output(options.output, options.mesh, "the nodes");
   MedialSettings settings = options.settings;
   settings.device = device_named(options.device);
   const ClosedMesh mesh =

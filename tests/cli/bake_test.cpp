@@ -116,6 +116,13 @@ TEST_F(BakeCommand, ErrorsNameTheFileAndLeaveNothingBehind) {
   expect_error({"bake", "cube.obj", "-o", "new.ist", "--min-radius", "5"}, "cube.obj");
 }
 
+TEST_F(BakeCommand, AnOutputThatCannotBeMadeIsSaidBeforeTheWork) {
+  // Before even the mesh is looked for.
+  expect_error({"bake", "none.obj", "-o", "nowhere/new.ist"}, "there is no folder nowhere");
+  expect_error({"bake", "none.obj", "-o", "."}, "this is a folder");
+  expect_error({"medial", "none.obj", "-o", "nowhere/nodes.csv"}, "there is no folder nowhere");
+}
+
 TEST_F(BakeCommand, TheMeshIsNeverOverwritten) {
   const std::string before = read("cube.obj");
   expect_error({"bake", "cube.obj", "-o", "./cube.obj", "--spheres", "5"}, "the mesh itself");
