@@ -34,7 +34,9 @@ class TreeView {
 
   bool empty() const noexcept { return header_ == nullptr; }
   std::size_t sphere_count() const noexcept;
-  double volume() const noexcept;  ///< [u³] of the solid
+  double volume() const noexcept;     ///< [u³] of the solid
+  double coverage() const noexcept;   ///< [0, 1] share of it in inner spheres
+  double soft_skin() const noexcept;  ///< [u] no effective sphere sticks further out of the solid
 
   /// The checked bytes behind the view.
   const AssetHeader& header() const noexcept { return *header_; }

@@ -168,4 +168,10 @@ double TreeView::volume() const noexcept {
   return header_ == nullptr ? 0 : std::ldexp(header_->volume, 3 * header_->exponent);
 }
 
+double TreeView::coverage() const noexcept { return header_ == nullptr ? 0 : header_->coverage; }
+
+double TreeView::soft_skin() const noexcept {
+  return header_ == nullptr ? 0 : std::ldexp(header_->protrusion, header_->exponent);
+}
+
 }  // namespace ist

@@ -237,6 +237,20 @@ TEST(Bake, SameBytesAtAnyScaleAndOffset) {
     }
 }
 
+TEST(Bake, AViewSpeaksInTheMeshsUnit) {
+  TriangleMesh torus = testing::torus_mesh(1.0, 0.375, 24, 12);
+  const Asset small = bake(testing::closed(torus, "torus"), of_size(100));
+  for (auto& v : torus.vertices) v *= 8;
+  const Asset large = bake(testing::closed(torus, "torus"), of_size(100));
+  EXPECT_EQ(large.view().volume(), 512 * small.view().volume());
+  EXPECT_EQ(large.view().soft_skin(), 8 * small.view().soft_skin());
+  EXPECT_EQ(large.view().coverage(), small.view().coverage());
+  EXPECT_GT(small.view().coverage(), 0.5);
+  EXPECT_LT(small.view().coverage(), 1);
+  EXPECT_GT(small.view().soft_skin(), 0);
+  EXPECT_LT(small.view().soft_skin(), 0.375);  // the tube's radius
+}
+
 TEST(Bake, CancelKeepsWhatIsPacked) {
   bool cancelled = false;
   const Asset asset = bake(cube(), of_size(100'000), [&](const Progress& now) {
