@@ -6,11 +6,11 @@
 #include "mesh/mesh_view.h"
 #include "mesh/triangle_frame.h"
 
-// A mesh as the GPU asks it: a hierarchy without pointers, as wide as a warp, over triangles ordered
-// so that successive ones lie close together (cuda/triangle_order.h). Node 0 is the root and the
-// children of node i are the nodes 32 i + 1 … 32 i + 32; from `first_leaf` on the numbers mean
-// blocks of 32 triangles. No query's answer depends on the order of the triangles, so they are those
-// of the CPU's hierarchy, bit for bit.
+// A mesh as the GPU asks it: a hierarchy without pointers, as wide as a warp, over triangles
+// ordered so that successive ones lie close together (cuda/triangle_order.h). Node 0 is the root
+// and the children of node i are the nodes 32 i + 1 … 32 i + 32; from `first_leaf` on the numbers
+// mean blocks of 32 triangles. No query's answer depends on the order of the triangles, so they are
+// those of the CPU's hierarchy, bit for bit.
 
 namespace ist {
 
