@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "query/smooth_step.h"
+
 namespace ist {
 namespace {
 
@@ -67,7 +69,7 @@ DetailChain::Weights DetailChain::weights(double gauge, double budget) const noe
     const double expected = pair.density * (gauge + pair.skin * root);
     // (written so that a damaged asset's NaN takes the coarsest level)
     const double t = expected < budget ? std::min((1 - expected / budget) / (1 - kFading), 1.0) : 0;
-    DetailWeight part{t * t * (3 - 2 * t), 0};
+    DetailWeight part{smooth_step(t), 0};
     if (t > 0 && t < 1)
       part.slope =
           -6 * t * (1 - t) / ((1 - kFading) * budget) * pair.density * (1 + pair.skin / (2 * root));

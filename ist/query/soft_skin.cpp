@@ -4,6 +4,7 @@
 #include <ist/query.h>
 
 #include "query/asset_layout.h"
+#include "query/smooth_step.h"
 
 namespace ist {
 namespace {
@@ -19,11 +20,6 @@ constexpr double kStiffening = 0.42;
 // 5,000 on for faces, up to the last sphere that touches.
 constexpr double kRound = 1500;
 constexpr double kFlat = 4500;
-
-double smooth_step(double t) {
-  t = std::clamp(t, 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
 
 /// [u] Scale of the layer in which a solid's effective spheres stick out and leave room: their mean
 /// radius, but for balls and the like, whose few large spheres fit better than that.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "query/smooth_step.h"
+
 namespace ist {
 namespace {
 
@@ -32,7 +34,7 @@ TwinWeight twin_weight(const TreeHeader& tree, const Similarity& a_from_b) noexc
   if (!(square < (kApart * kApart) * (radius * radius))) return result;
   const double distance = std::sqrt(square);
   const double t = std::min((kApart - distance / radius) / (kApart - kAlone), 1.0);
-  result.weight = t * t * (3 - 2 * t);
+  result.weight = smooth_step(t);
   if (t == 1) return result;
   const double slope = -6 * t * (1 - t) / ((kApart - kAlone) * radius) / distance;
   result.by_translation = slope * way;
