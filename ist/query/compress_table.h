@@ -21,4 +21,9 @@ inline constexpr auto kSetBits = [] {
 alignas(64) inline constexpr std::uint32_t kLaneNumbers[16] = {0, 1, 2,  3,  4,  5,  6,  7,
                                                                8, 9, 10, 11, 12, 13, 14, 15};
 
+/// From entry 16 − n on: n zeros, then the lane numbers.
+alignas(64) inline constexpr std::uint32_t kLateLanes[32] = {0, 0, 0, 0, 0,  0,  0,  0,  0,  0, 0,
+                                                             0, 0, 0, 0, 0,  0,  1,  2,  3,  4, 5,
+                                                             6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+
 }  // namespace ist

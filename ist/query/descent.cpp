@@ -12,9 +12,7 @@
 namespace ist {
 namespace {
 
-// Pairs between two looks at the limits: a few microseconds. Leaf pairs share lists and turned
-// blocks, which every call starts anew.
-constexpr std::size_t kChunk = 64;
+// Leaf pairs between two looks at the error that is left, a few microseconds.
 constexpr std::size_t kLeafChunk = 256;
 
 // Shares of the time that a deadline gives: sums are taken again in double only before the one, and
@@ -84,7 +82,7 @@ bool Descent::open_level() {
   std::size_t done = 0;
   while (done < now.size) {
     const std::size_t room = (scratch_.capacity - next.size) / kWidth;
-    const std::size_t n = budget_.grant(std::min({kChunk, now.size - done, room}));
+    const std::size_t n = budget_.grant(std::min({kNodePairs, now.size - done, room}));
     if (n == 0) break;
     open_pairs(stage, open_a, done, n);
     done += n;
@@ -108,7 +106,7 @@ void Descent::open_pairs(const NodeStage& stage, bool open_a, std::size_t from, 
     next.size += open_nodes(stage, x, y, n, out_x, out_y);
     return;
   }
-  std::uint32_t held_x[kWidth * (kChunk + 1)], held_y[kWidth * (kChunk + 1)];
+  std::uint32_t held_x[kWidth * (kNodePairs + 1)], held_y[kWidth * (kNodePairs + 1)];
   HeldNodes held{held_x, held_y};
   next.size += open_under_spheres(stage, x, y, n, out_x, out_y, held);
   hold(open_a, stage.level_x - 1, held);
@@ -156,10 +154,12 @@ void Descent::open_leaves() {
   double waiting = 0;  // bound on the pairs still to come
   if (by_error || now.size > budget_.left()) waiting = rank();
 
+  if (now.size > 0) scratch_.leaves->forget();
   std::size_t done = 0;
   while (done < now.size) {
     if (by_error && accurate(waiting)) break;
-    const std::size_t granted = budget_.grant(std::min(kLeafChunk, now.size - done));
+    const std::size_t granted =
+        budget_.grant(by_error ? std::min(kLeafChunk, now.size - done) : now.size - done);
     const std::size_t n = add_leaves(done, granted, &budget_);
     budget_.give_back(granted - n);
     if (n == 0) break;
@@ -186,7 +186,7 @@ std::size_t Descent::add_leaves(std::size_t from, std::size_t n, const Budget* b
   const std::uint32_t* const b = scratch_.now.b.get() + from;
   LeafStage stage{&a_, &b_, level_a_, level_b_, &map_, precision_, budget};
   if (bins_ != nullptr) stage.bins = bins_->touch(level_a_, a, level_b_, b, n);
-  return add_leaf_pairs(stage, a, b, n, sums_);
+  return add_leaf_pairs(stage, *scratch_.leaves, a, b, n, sums_);
 }
 
 bool Descent::accurate(double waiting) const {

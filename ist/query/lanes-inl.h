@@ -9,6 +9,8 @@
 
 #include <hwy/highway.h>
 
+#include <cstring>
+
 #include "query/asset_layout.h"
 #include "query/compress_table.h"
 
@@ -34,11 +36,19 @@ HWY_INLINE hn::Vec<D> load_as(D d, const float* from) {
 /// One bit a lane.
 template <class D>
 HWY_INLINE std::uint32_t mask_bits(D d, hn::Mask<D> mask) {
-  alignas(8) std::uint8_t bytes[8] = {};
+  std::uint8_t bytes[8] = {};
   hn::StoreMaskBits(d, mask, bytes);
-  const std::uint32_t bits =
-      static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8;
-  return bits & ((1u << hn::Lanes(d)) - 1);
+  std::uint16_t bits;  // x86 and ARM are little-endian, as assets are
+  std::memcpy(&bits, bytes, sizeof(bits));
+  return hn::Lanes(d) < 16 ? bits & ((1u << hn::Lanes(d)) - 1) : bits;
+}
+
+/// The mask of the lowest bits, one a lane.
+template <class D>
+HWY_INLINE hn::Mask<D> mask_of_bits(D d, std::uint32_t bits) {
+  std::uint8_t bytes[8] = {};
+  std::memcpy(bytes, &bits, sizeof(bits));
+  return hn::LoadMaskBits(d, bytes);
 }
 
 /// Whether Highway's Compress is one instruction. Where it is a table, GCC copies that to the stack

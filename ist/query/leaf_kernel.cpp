@@ -1,331 +1,178 @@
 #include "query/leaf_kernel.h"
 
 #include <algorithm>
-#include <cmath>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "query/leaf_kernel.cpp"
 #include <hwy/foreach_target.h>
 
-#include "query/lanes-inl.h"
+#include "query/leaf_pairs-inl.h"
 #include "query/lens_list-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Pairs that go through the stages together: little enough to stay in the nearest cache.
-inline constexpr std::size_t kPairsAtOnce = 64;
-
-/// Sixteen spheres in A's axes, relative to an origin of their own.
+/// Appends the lenses of a task with the lanes it meets.
 template <class T>
-struct alignas(64) Spheres {
-  T x[kWidth], y[kWidth], z[kWidth], r[kWidth];
-};
-
-/// One side of a pair of leaf blocks, in A's unit frame. Four numbers, since vectors hold so many.
-template <class T>
-struct alignas(32) Side {
-  double origin[4];        ///< of the spheres' coordinates
-  double centre[4];        ///< of the leaf ball
-  alignas(32) T lever[4];  ///< from B's origin to this one
-  double radius;           ///< of the leaf ball
-  double size;             ///< bound on the way from the origin to the end of any sphere
-  const Spheres<T>* spheres;
-};
-
-/// Blocks that were met lately: neighbours in a list of pairs share the blocks below one node.
-template <class T>
-class BlockCache {
- public:
-  struct Entry {
-    std::uint32_t block = ~0u;
-    std::uint32_t round = 0;  ///< that last used it
-    Side<T> side;
-    Spheres<T> room;
-  };
-
-  /// The entry of a block, which `fill` makes if it is not there; null if this round uses its place
-  /// for another one.
-  template <class Fill>
-  HWY_INLINE const Side<T>* find(std::uint32_t block, std::uint32_t round, Fill fill) {
-    Entry& entry = entries_[block % kEntries];
-    if (entry.block != block) {
-      if (entry.round == round) return nullptr;
-      entry.block = block;
-      fill(entry);
-    }
-    entry.round = round;
-    return &entry.side;
-  }
-
- private:
-  static constexpr std::size_t kEntries = 32;
-  Entry entries_[kEntries];
-};
-
-/// What the tasks of one pair of leaf blocks share.
-template <class T>
-struct alignas(32) PairOfBlocks {
-  const Side<T>* many;  ///< the side whose sixteen spheres lie in lanes
-  T error;              ///< bound on the rounding of a distance; negative if the tasks are B's
-  std::uint32_t bin;
-};
-
-/// Single spheres, each to meet sixteen: centres relative to the sixteen's origin.
-template <class T>
-struct alignas(64) Tasks {
-  static constexpr std::size_t kRoom = (kPairsAtOnce + 1) * kWidth;
-  T x[kRoom], y[kRoom], z[kRoom], r[kRoom];
-  std::uint32_t pair[kRoom];
-  std::size_t size = 0;
-};
-
-inline constexpr double kSign[2] = {1, -1};
-
-/// The map from B's unit frame to A's in the forms the stages load: T row by row, and columns.
-template <class T>
-struct alignas(32) TurnedAxes {
-  explicit TurnedAxes(const Similarity& map) : scale(map.scale) {
-    for (int i = 0; i < 9; ++i) m[i] = static_cast<T>(map.m[i]);
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) column[j][i] = map.m[3 * i + j];
-      column[3][i] = map.t[i];
-    }
-  }
-  double column[4][4] = {};  ///< the last is the translation
-  double scale;
-  T m[9];
-};
-
-using FourDoubles = hn::CappedTag<double, 4>;
-
-/// Where a leaf block of A and its ball are.
-template <class T>
-HWY_INLINE void place(const SphereTree& tree, std::uint32_t block, Side<T>& side) {
-  const Origin& o = tree.level[0].origins[block];
-  const NodeBall ball = tree.ball(0, block);
-  const double origin[3] = {o.x, o.y, o.z};
-  side.size = side.radius = ball.r;
-  for (int k = 0; k < 3; ++k) {
-    side.origin[k] = origin[k];
-    side.centre[k] = ball.centre[k];
-    side.size += std::abs(ball.centre[k] - origin[k]);
-  }
-  side.origin[3] = side.centre[3] = 0;  // converted to float with the others
-}
-
-/// Likewise of B.
-template <class T>
-HWY_INLINE void place(const SphereTree& tree, std::uint32_t block, const TurnedAxes<T>& axes,
-                      Side<T>& side) {
-  const FourDoubles d;
-  const Origin& o = tree.level[0].origins[block];
-  const NodeBall ball = tree.ball(0, block);
-  alignas(32) double way[4];
-  side.radius = ball.r * axes.scale;
-  for (std::size_t k = 0; k < 4; k += hn::Lanes(d)) {
-    const auto x = hn::Load(d, axes.column[0] + k);
-    const auto y = hn::Load(d, axes.column[1] + k);
-    const auto z = hn::Load(d, axes.column[2] + k);
-    const auto t = hn::Load(d, axes.column[3] + k);
-    const auto origin = ((x * hn::Set(d, o.x) + y * hn::Set(d, o.y)) + z * hn::Set(d, o.z)) + t;
-    const auto centre = ((x * hn::Set(d, ball.centre[0]) + y * hn::Set(d, ball.centre[1])) +
-                         z * hn::Set(d, ball.centre[2])) +
-                        t;
-    hn::Store(origin, d, side.origin + k);
-    hn::Store(centre, d, side.centre + k);
-    hn::Store(hn::Abs(centre - origin), d, way + k);
-  }
-  side.size = side.radius + ((way[0] + way[1]) + way[2]);
-}
-
-/// Differences are taken in double (DESIGN 3.4).
-template <class T>
-HWY_INLINE void subtract(const double (&x)[4], const double (&y)[4], T (&difference)[4]) {
-  const hn::CappedTag<double, 4> d;
-  for (std::size_t k = 0; k < 4; k += hn::Lanes(d)) {
-    const auto exact = hn::Load(d, x + k) - hn::Load(d, y + k);
-    if constexpr (sizeof(T) == sizeof(float)) {
-      const hn::Rebind<float, decltype(d)> df;
-      hn::Store(hn::DemoteTo(df, exact), df, difference + k);
-    } else {
-      hn::Store(exact, d, difference + k);
-    }
-  }
-}
-
-/// A leaf block of A; floats lie in the asset as they are needed.
-template <class T>
-HWY_INLINE void take_block(const SphereTree& tree, std::uint32_t block, Spheres<T>& room,
-                           Side<T>& side) {
-  const BallBlock& balls = tree.level[0].blocks[block];
-  if constexpr (sizeof(T) == sizeof(float)) {
-    static_assert(sizeof(Spheres<float>) == sizeof(BallBlock));
-    side.spheres = reinterpret_cast<const Spheres<float>*>(&balls);
-  } else {
-    const LaneTag<T> d;
-    for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-      hn::Store(load_as<T>(d, balls.x + lane), d, room.x + lane);
-      hn::Store(load_as<T>(d, balls.y + lane), d, room.y + lane);
-      hn::Store(load_as<T>(d, balls.z + lane), d, room.z + lane);
-      hn::Store(load_as<T>(d, balls.r + lane), d, room.r + lane);
-    }
-    side.spheres = &room;
-  }
-  place(tree, block, side);
-}
-
-/// A leaf block of B, turned and scaled into A's axes.
-template <class T>
-HWY_INLINE void turn_block(const SphereTree& tree, std::uint32_t block, const TurnedAxes<T>& axes,
-                           Spheres<T>& room, Side<T>& side) {
+HWY_INLINE void add_lenses(const PairsOfBlocks<T>& pairs, std::uint32_t met, bool binned,
+                           LensList<T>& list) {
   const LaneTag<T> d;
-  hn::Vec<decltype(d)> m[9];
-  for (int i = 0; i < 9; ++i) m[i] = hn::Set(d, axes.m[i]);
-  const auto scale = hn::Set(d, static_cast<T>(axes.scale));
-  const BallBlock& balls = tree.level[0].blocks[block];
-  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    const auto x = load_as<T>(d, balls.x + lane);
-    const auto y = load_as<T>(d, balls.y + lane);
-    const auto z = load_as<T>(d, balls.z + lane);
-    hn::Store((m[0] * x + m[1] * y) + m[2] * z, d, room.x + lane);
-    hn::Store((m[3] * x + m[4] * y) + m[5] * z, d, room.y + lane);
-    hn::Store((m[6] * x + m[7] * y) + m[8] * z, d, room.z + lane);
-    hn::Store(load_as<T>(d, balls.r + lane) * scale, d, room.r + lane);
-  }
-  side.spheres = &room;
-  place(tree, block, axes, side);
-}
-
-/// Appends the spheres of `one` that come within reach of the ball of `many`, or only the sphere
-/// `single` if that is not negative.
-template <class T>
-HWY_INLINE void add_tasks(const Side<T>& one, const Side<T>& many, int single, double error,
-                          std::uint32_t pair, Tasks<T>& tasks) {
-  const LaneTag<T> d;
-  const hn::Repartition<std::uint32_t, hn::CappedTag<float, kWidth>> du;
-  alignas(32) T q[4], offset[4];
-  subtract(many.centre, one.origin, q);
-  subtract(one.origin, many.origin, offset);
-  const auto reach = hn::Set(d, static_cast<T>(many.radius + error));
-  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    const auto x = hn::Load(d, one.spheres->x + lane);
-    const auto y = hn::Load(d, one.spheres->y + lane);
-    const auto z = hn::Load(d, one.spheres->z + lane);
-    const auto r = hn::Load(d, one.spheres->r + lane);
-    const auto dx = x - hn::Set(d, q[0]);
-    const auto dy = y - hn::Set(d, q[1]);
-    const auto dz = z - hn::Set(d, q[2]);
-    // Negative for an unused lane, whose square must not count.
-    const auto sum = hn::Max(r + reach, hn::Zero(d));
-    auto near = ((dx * dx + dy * dy) + dz * dz) < sum * sum;
-    if (single >= 0)
-      near = hn::And(near, hn::Iota(d, static_cast<T>(lane)) == hn::Set(d, static_cast<T>(single)));
-    const Compressor compress(d, near);
-    const std::size_t at = tasks.size;
-    hn::StoreU(compress(x + hn::Set(d, offset[0])), d, tasks.x + at);
-    hn::StoreU(compress(y + hn::Set(d, offset[1])), d, tasks.y + at);
-    hn::StoreU(compress(z + hn::Set(d, offset[2])), d, tasks.z + at);
-    hn::StoreU(compress(r), d, tasks.r + at);
-    for (std::size_t i = 0; i < hn::Lanes(d); i += hn::Lanes(du))
-      hn::StoreU(hn::Set(du, pair), du, tasks.pair + at + i);
-    tasks.size += compress.count();
-  }
-}
-
-/// Appends what task `k` meets, or all but meets: its rounding counts too.
-template <class T>
-HWY_INLINE void add_lenses(const Tasks<T>& tasks, std::size_t k, const PairOfBlocks<T>& pair,
-                           bool binned, LensList<T>& list) {
-  const LaneTag<T> d;
-  const auto xi = hn::Set(d, tasks.x[k]);
-  const auto yi = hn::Set(d, tasks.y[k]);
-  const auto zi = hn::Set(d, tasks.z[k]);
-  const auto ri = hn::Set(d, tasks.r[k]);
-  const auto lx = xi + hn::Set(d, pair.many->lever[0]);
-  const auto ly = yi + hn::Set(d, pair.many->lever[1]);
-  const auto lz = zi + hn::Set(d, pair.many->lever[2]);
-  const auto error = hn::Set(d, pair.error);
-  const auto reach = ri + (hn::Abs(error) + hn::Abs(error));
+  const std::size_t at = met >> 16;
+  const std::size_t i = at / kWidth;
+  const Spheres<T>& spheres = *pairs.many[i];
+  const T* const lever = pairs.lever[i];
+  const auto xi = hn::Set(d, pairs.x[at]);
+  const auto yi = hn::Set(d, pairs.y[at]);
+  const auto zi = hn::Set(d, pairs.z[at]);
+  const auto ri = hn::Set(d, pairs.one[i]->r[at % kWidth]);
+  const auto lx = xi + hn::Set(d, lever[0]);
+  const auto ly = yi + hn::Set(d, lever[1]);
+  const auto lz = zi + hn::Set(d, lever[2]);
+  const auto error = hn::Set(d, pairs.error[i]);
   const std::size_t before = list.size;
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    const auto rj = hn::Load(d, pair.many->spheres->r + lane);
-    const auto dx = hn::Load(d, pair.many->spheres->x + lane) - xi;
-    const auto dy = hn::Load(d, pair.many->spheres->y + lane) - yi;
-    const auto dz = hn::Load(d, pair.many->spheres->z + lane) - zi;
-    const auto sum = hn::Max(rj + reach, hn::Zero(d));
-    const auto near = ((dx * dx + dy * dy) + dz * dz) < sum * sum;
-    const Compressor compress(d, near);
-    const std::size_t at = list.size;
-    hn::StoreU(compress(dx), d, list.dx + at);
-    hn::StoreU(compress(dy), d, list.dy + at);
-    hn::StoreU(compress(dz), d, list.dz + at);
-    hn::StoreU(compress(rj), d, list.rj + at);
-    hn::StoreU(ri, d, list.ri + at);
-    hn::StoreU(lx, d, list.lx + at);
-    hn::StoreU(ly, d, list.ly + at);
-    hn::StoreU(lz, d, list.lz + at);
-    hn::StoreU(error, d, list.error + at);
+    const Compressor compress(d, mask_of_bits(d, (met & 0xffff) >> lane));
+    const auto rj = hn::Load(d, spheres.r + lane);
+    const auto dx = hn::Load(d, spheres.x + lane) - xi;
+    const auto dy = hn::Load(d, spheres.y + lane) - yi;
+    const auto dz = hn::Load(d, spheres.z + lane) - zi;
+    const std::size_t end = list.size;
+    hn::StoreU(compress(dx), d, list.dx + end);
+    hn::StoreU(compress(dy), d, list.dy + end);
+    hn::StoreU(compress(dz), d, list.dz + end);
+    hn::StoreU(compress(rj), d, list.rj + end);
+    hn::StoreU(ri, d, list.ri + end);
+    hn::StoreU(lx, d, list.lx + end);
+    hn::StoreU(ly, d, list.ly + end);
+    hn::StoreU(lz, d, list.lz + end);
+    hn::StoreU(error, d, list.error + end);
     list.size += compress.count();
   }
-  if (binned) std::fill(list.bin + before, list.bin + list.size, pair.bin);
+  if (binned) std::fill(list.bin + before, list.bin + list.size, pairs.bin[i]);
 }
 
+/// Appends the lenses of two tasks, which together meet sixteen lanes at most, with half the
+/// stores: only for vectors of sixteen lanes.
 template <class T>
-std::size_t add_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
-                   std::size_t n, LeafSums& sums) {
-  const Similarity& map = *stage.a_from_b;
+HWY_INLINE void add_two(const PairsOfBlocks<T>& pairs, std::uint32_t met_1, std::uint32_t met_2,
+                        LensList<T>& list) {
+  const LaneTag<T> d;
+  static_assert(hn::MaxLanes(d) == kWidth);
+  const hn::RebindToUnsigned<decltype(d)> du;
+  using V = hn::Vec<decltype(d)>;
+  const std::size_t at_1 = met_1 >> 16, at_2 = met_2 >> 16;
+  const std::size_t i_1 = at_1 / kWidth, i_2 = at_2 / kWidth;
+  const auto lanes_1 = hn::RebindMask(du, mask_of_bits(d, met_1 & 0xffff));
+  const auto lanes_2 = hn::RebindMask(du, mask_of_bits(d, met_2 & 0xffff));
+  const std::size_t count_1 = hn::CountTrue(du, lanes_1);
+  const std::size_t count_2 = hn::CountTrue(du, lanes_2);
+  const auto later = mask_of_bits(d, 0xffffu << count_1 & 0xffffu);
+  const auto numbers = hn::Load(du, kLaneNumbers);
+  // The second task's lanes move up behind the first one's.
+  const auto moved = hn::IndicesFromVec(du, hn::LoadU(du, kLateLanes + kWidth - count_1));
+  const auto from = hn::IndicesFromVec(
+      d, hn::IfThenElse(hn::RebindMask(du, later),
+                        hn::TableLookupLanes(hn::Compress(numbers, lanes_2), moved),
+                        hn::Compress(numbers, lanes_1)));
+  const auto of_lanes = [&](const T* x_1, const T* x_2) -> V {
+    return hn::IfThenElse(later, hn::TableLookupLanes(hn::Load(d, x_2), from),
+                          hn::TableLookupLanes(hn::Load(d, x_1), from));
+  };
+  const auto of_tasks = [&](T x_1, T x_2) -> V {
+    return hn::IfThenElse(later, hn::Set(d, x_2), hn::Set(d, x_1));
+  };
+  const Spheres<T>& many_1 = *pairs.many[i_1];
+  const Spheres<T>& many_2 = *pairs.many[i_2];
+  const auto xi = of_tasks(pairs.x[at_1], pairs.x[at_2]);
+  const auto yi = of_tasks(pairs.y[at_1], pairs.y[at_2]);
+  const auto zi = of_tasks(pairs.z[at_1], pairs.z[at_2]);
+  const T* const lever_1 = pairs.lever[i_1];
+  const T* const lever_2 = pairs.lever[i_2];
+  const std::size_t end = list.size;
+  hn::StoreU(of_lanes(many_1.x, many_2.x) - xi, d, list.dx + end);
+  hn::StoreU(of_lanes(many_1.y, many_2.y) - yi, d, list.dy + end);
+  hn::StoreU(of_lanes(many_1.z, many_2.z) - zi, d, list.dz + end);
+  hn::StoreU(of_lanes(many_1.r, many_2.r), d, list.rj + end);
+  hn::StoreU(of_tasks(pairs.one[i_1]->r[at_1 % kWidth], pairs.one[i_2]->r[at_2 % kWidth]), d,
+             list.ri + end);
+  hn::StoreU(xi + of_tasks(lever_1[0], lever_2[0]), d, list.lx + end);
+  hn::StoreU(yi + of_tasks(lever_1[1], lever_2[1]), d, list.ly + end);
+  hn::StoreU(zi + of_tasks(lever_1[2], lever_2[2]), d, list.lz + end);
+  hn::StoreU(of_tasks(pairs.error[i_1], pairs.error[i_2]), d, list.error + end);
+  list.size = end + count_1 + count_2;
+}
+
+/// Tasks that meet too much for add_two: seldom, so kept out of the registers of the others.
+template <class T>
+HWY_NOINLINE void add_apart(const PairsOfBlocks<T>& pairs, std::uint32_t met_1, std::uint32_t met_2,
+                            bool binned, LensList<T>& list) {
+  add_lenses(pairs, met_1, binned, list);
+  add_lenses(pairs, met_2, binned, list);
+}
+
+/// Appends the lenses of two tasks: the same list whatever the vectors.
+template <class T>
+HWY_INLINE void add_both(const PairsOfBlocks<T>& pairs, std::uint32_t met_1, std::uint32_t met_2,
+                         bool binned, LensList<T>& list) {
+  if constexpr (kCompressInstruction<LaneTag<T>>) {
+    const std::size_t count_1 = hwy::PopCount(met_1 & 0xffff);
+    if (count_1 + hwy::PopCount(met_2 & 0xffff) > kWidth)
+      return add_apart(pairs, met_1, met_2, binned, list);
+    std::uint32_t* const bins = list.bin + list.size;
+    add_two(pairs, met_1, met_2, list);
+    if (!binned) return;
+    std::fill(bins, bins + count_1, pairs.bin[(met_1 >> 16) / kWidth]);
+    std::fill(bins + count_1, list.bin + list.size, pairs.bin[(met_2 >> 16) / kWidth]);
+  } else {
+    add_lenses(pairs, met_1, binned, list);
+    add_lenses(pairs, met_2, binned, list);
+  }
+}
+
+/// add_leaf_pairs in T, a few pairs through all stages at a time.
+template <class T>
+std::size_t add_as(const LeafStage& stage, PlacedBlocks<T>& blocks, const std::uint32_t* a,
+                   const std::uint32_t* b, std::size_t n, LeafSums& sums) {
+  const TurnedAxes<T> axes(*stage.a_from_b);
   LeafSums* const bins = stage.bins.sums;
   const bool single_a = stage.level_a == kSphereLevel;
   const bool single_b = stage.level_b == kSphereLevel;
-  const std::uint32_t either = !single_a && !single_b ? 1 : 0;
-  const std::uint32_t only_b = single_b ? 1 : 0;
-  alignas(32) const double origin_b[4] = {map.t[0], map.t[1], map.t[2], 0};
-  const TurnedAxes<T> axes(map);
-  BlockCache<T> blocks_a, blocks_b;
-  PairOfBlocks<T> pairs[kPairsAtOnce];
-  Tasks<T> tasks;
+  const Tasks tasks{!single_a && !single_b ? 1u : 0u, single_b ? 1u : 0u};
+  const int shift_a = single_a ? kWidthBits : 0;  // from spheres to blocks
+  const int shift_b = single_b ? kWidthBits : 0;
+  PairsOfBlocks<T> pairs;
   LensList<T> list;
-  std::uint32_t round = 0;
   std::size_t done = 0;
   while (done < n && !(done > 0 && stage.budget != nullptr && stage.budget->visits_end())) {
     const std::size_t most = std::min(kPairsAtOnce, n - done);
-    ++round;
-    tasks.size = 0;
-    std::size_t i = 0;
-    for (; i < most; ++i) {
-      const std::uint32_t block_a = single_a ? a[done + i] / kWidth : a[done + i];
-      const std::uint32_t block_b = single_b ? b[done + i] / kWidth : b[done + i];
-      const Side<T>* const sides[2] = {
-          blocks_a.find(block_a, round,
-                        [&](auto& to) {
-                          take_block<T>(*stage.a, block_a, to.room, to.side);
-                          subtract(to.side.origin, origin_b, to.side.lever);
-                        }),
-          blocks_b.find(block_b, round, [&](auto& to) {
-            turn_block<T>(*stage.b, block_b, axes, to.room, to.side);
-            subtract(to.side.origin, origin_b, to.side.lever);
-          })};
-      if (sides[0] == nullptr || sides[1] == nullptr) break;
-      // The side of the larger spread goes one by one: fewer of its spheres come near the other.
-      const std::uint32_t task_side =
-          (static_cast<std::uint32_t>(sides[0]->radius <= sides[1]->radius) & either) | only_b;
-      const Side<T>& one = *sides[task_side];
-      const Side<T>& many = *sides[1 - task_side];
-      // The two touch: their origins are no further apart than both sizes.
-      const double error = distance_error<T>(2.8 * (one.size + many.size));
-      PairOfBlocks<T>& pair = pairs[i];
-      pair.many = &many;
-      pair.error = static_cast<T>(error * kSign[task_side]);
-      pair.bin = bins != nullptr ? stage.bins.node[done + i] >> stage.bins.shift : 0;
+    std::size_t taken = 0;
+    for (; taken < most; ++taken) {
+      const std::uint32_t block_a = a[done + taken] >> shift_a;
+      const std::uint32_t block_b = b[done + taken] >> shift_b;
+      pairs.a[taken] = blocks.a.find(block_a, pairs.a, taken, [&](PlacedBlock<T>& placed) {
+        place_block(*stage.a, block_a, axes, placed);
+      });
+      pairs.b[taken] = blocks.b.find(block_b, pairs.b, taken, [&](PlacedBlock<T>& placed) {
+        turn_block(*stage.b, block_b, axes, placed);
+      });
+      if (pairs.a[taken] == nullptr || pairs.b[taken] == nullptr) break;
+    }
+    for (std::size_t i = 0; i < taken; ++i) describe_pair(tasks, i, pairs);
+    std::size_t listed = 0;
+    for (std::size_t i = 0; i < taken; ++i) {
       const int single = single_a   ? static_cast<int>(a[done + i] % kWidth)
                          : single_b ? static_cast<int>(b[done + i] % kWidth)
                                     : -1;
-      add_tasks<T>(one, many, single, error, static_cast<std::uint32_t>(i), tasks);
+      listed = list_tasks(pairs, i, single, listed);
     }
-    done += i;
-    for (std::size_t k = 0; k < tasks.size; ++k) {
-      add_lenses<T>(tasks, k, pairs[tasks.pair[k]], bins != nullptr, list);
+    if (bins != nullptr)
+      for (std::size_t i = 0; i < taken; ++i)
+        pairs.bin[i] = stage.bins.node[done + i] >> stage.bins.shift;
+    done += taken;
+    const std::size_t found = find_met(pairs, listed);
+    if (found % 2 != 0) pairs.met[found] = pairs.met[found - 1] & 0xffff0000;  // meets nothing
+    for (std::size_t k = 0; k < found; k += 2) {
+      add_both(pairs, pairs.met[k], pairs.met[k + 1], bins != nullptr, list);
       if (list.size >= kFullList) sum_full_list(list, sums, bins);
     }
   }
@@ -333,14 +180,14 @@ std::size_t add_as(const LeafStage& stage, const std::uint32_t* a, const std::ui
   return done;
 }
 
-std::size_t add_single(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
-                       std::size_t n, LeafSums& sums) {
-  return add_as<float>(stage, a, b, n, sums);
+std::size_t add_single(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+                       const std::uint32_t* b, std::size_t n, LeafSums& sums) {
+  return add_as<float>(stage, scratch.single, a, b, n, sums);
 }
 
-std::size_t add_twice(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
-                      std::size_t n, LeafSums& sums) {
-  return add_as<double>(stage, a, b, n, sums);
+std::size_t add_twice(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+                      const std::uint32_t* b, std::size_t n, LeafSums& sums) {
+  return add_as<double>(stage, scratch.twice, a, b, n, sums);
 }
 
 }  // namespace ist::HWY_NAMESPACE
@@ -352,12 +199,12 @@ namespace ist {
 HWY_EXPORT(add_single);
 HWY_EXPORT(add_twice);
 
-std::size_t add_leaf_pairs(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
-                           std::size_t n, LeafSums& sums) noexcept {
+std::size_t add_leaf_pairs(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+                           const std::uint32_t* b, std::size_t n, LeafSums& sums) noexcept {
   if (stage.precision == Precision::single) {
-    return HWY_DYNAMIC_DISPATCH(add_single)(stage, a, b, n, sums);
+    return HWY_DYNAMIC_DISPATCH(add_single)(stage, scratch, a, b, n, sums);
   }
-  return HWY_DYNAMIC_DISPATCH(add_twice)(stage, a, b, n, sums);
+  return HWY_DYNAMIC_DISPATCH(add_twice)(stage, scratch, a, b, n, sums);
 }
 
 }  // namespace ist

@@ -5,6 +5,7 @@
 
 #include "query/budget.h"
 #include "query/node_kernel.h"
+#include "query/placed_blocks.h"
 
 namespace ist {
 
@@ -45,8 +46,8 @@ struct LeafStage {
 };
 
 /// Adds the lenses of every sphere of a[i] with every sphere of b[i]. Returns how many pairs it
-/// took: all n, or those that came before the deadline.
-std::size_t add_leaf_pairs(const LeafStage& stage, const std::uint32_t* a, const std::uint32_t* b,
-                           std::size_t n, LeafSums& sums) noexcept;
+/// took: all n, or those that came before the deadline. The scratch keeps blocks from call to call.
+std::size_t add_leaf_pairs(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+                           const std::uint32_t* b, std::size_t n, LeafSums& sums) noexcept;
 
 }  // namespace ist

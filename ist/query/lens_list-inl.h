@@ -16,7 +16,7 @@ HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 /// Lenses are summed as soon as there are so many.
-inline constexpr std::size_t kFullList = 16 * kWidth;
+inline constexpr std::size_t kFullList = 8 * kWidth;
 inline constexpr std::size_t kListRoom = kFullList + 2 * kWidth;
 
 /// Pairs of spheres i, j that may meet, in A's axes. A store writes a whole vector and counts what

@@ -21,59 +21,101 @@ HWY_INLINE std::size_t append(LaneTag<T> d, M chosen, std::uint32_t first, std::
   return append_lanes<T>(d, chosen, first, out_x);
 }
 
+/// What stands still while nodes are opened: the ball of node y of each pair, from the origin of
+/// the block that is opened.
+template <class T>
+struct alignas(64) StandingBalls {
+  T x[kNodePairs], y[kNodePairs], z[kNodePairs];
+  T reach[kNodePairs];   ///< radius, more by what rounding may move a distance
+  T within[kNodePairs];  ///< less by it
+};
+
+/// Collects what the balls follow from, pair by pair, and computes them a vector at a time.
+template <class T>
+HWY_INLINE void stand(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                      std::size_t n, StandingBalls<T>& standing) {
+  const hn::CappedTag<double, 8> d;
+  const hn::Rebind<float, decltype(d)> df;
+  using V = hn::Vec<decltype(d)>;
+  alignas(64) double centre[3][kNodePairs];
+  alignas(64) double radius[kNodePairs];
+  alignas(64) double origin[3][kNodePairs];
+  const SphereTree::Level& opened = stage.x->level[stage.level_x];
+  for (std::size_t i = 0; i < n; ++i) {
+    const NodeBall ball = stage.y->ball(stage.level_y, y[i]);
+    const Origin& o = opened.origins[x[i]];
+    centre[0][i] = ball.centre[0], centre[1][i] = ball.centre[1], centre[2][i] = ball.centre[2];
+    radius[i] = ball.r;
+    origin[0][i] = o.x, origin[1][i] = o.y, origin[2][i] = o.z;
+  }
+  for (std::size_t i = n; i % hn::Lanes(d) != 0; ++i) {  // numbers, though nobody reads them
+    for (int k = 0; k < 3; ++k) centre[k][i] = origin[k][i] = 0;
+    radius[i] = 0;
+  }
+  const Similarity& map = *stage.x_from_y;
+  const V scale = hn::Set(d, map.scale);
+  for (std::size_t i = 0; i < n; i += hn::Lanes(d)) {
+    const V cx = hn::Load(d, centre[0] + i);
+    const V cy = hn::Load(d, centre[1] + i);
+    const V cz = hn::Load(d, centre[2] + i);
+    const V r = hn::Load(d, radius + i) * scale;
+    V q[3];
+    V magnitude = r;
+    for (int k = 0; k < 3; ++k) {
+      const V moved = ((hn::Set(d, map.m[3 * k]) * cx + hn::Set(d, map.m[3 * k + 1]) * cy) +
+                       hn::Set(d, map.m[3 * k + 2]) * cz) +
+                      hn::Set(d, map.t[k]);
+      q[k] = moved - hn::Load(d, origin[k] + i);
+      magnitude = magnitude + hn::Abs(q[k]);
+    }
+    const V error = magnitude * hn::Set(d, distance_error<T>(2));
+    const auto store = [&](V value, T* to) {
+      if constexpr (sizeof(T) == sizeof(float)) {
+        hn::Store(hn::DemoteTo(df, value), df, to + i);
+      } else {
+        hn::Store(value, d, to + i);
+      }
+    };
+    store(q[0], standing.x), store(q[1], standing.y), store(q[2], standing.z);
+    store(r + error, standing.reach);
+    store(r - error, standing.within);
+  }
+}
+
 /// With kHeld, children inside of y[i] go to `held`.
 template <class T, bool kHeld>
 HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
                                const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
                                std::uint32_t* out_y, HeldNodes* held) {
   const LaneTag<T> d;
-  const std::size_t lanes = hn::Lanes(d);
   const SphereTree::Level& opened = stage.x->level[stage.level_x];
-  const Similarity& x_from_y = *stage.x_from_y;
   const auto grow = hn::Set(d, static_cast<T>(1 + distance_error<T>(1)));
-
-  std::uint32_t last_y = ~0u;
-  double centre[3] = {};
-  double radius = 0;
+  StandingBalls<T> standing;
+  stand(stage, x, y, n, standing);
   std::size_t found = 0;
   const std::uint32_t below = stage.x->count(stage.level_x - 1);
   for (std::size_t i = 0; i < n; ++i) {
-    if (y[i] != last_y) {
-      last_y = y[i];
-      const NodeBall ball = stage.y->ball(stage.level_y, last_y);
-      x_from_y.apply(ball.centre, centre);
-      radius = ball.r * x_from_y.scale;
-    }
     const BallBlock& block = opened.blocks[x[i]];
-    const Origin& origin = opened.origins[x[i]];
-    const double q[3] = {centre[0] - origin.x, centre[1] - origin.y, centre[2] - origin.z};
-    const double magnitude = std::abs(q[0]) + std::abs(q[1]) + std::abs(q[2]) + radius;
-    const auto qx = hn::Set(d, static_cast<T>(q[0]));
-    const auto qy = hn::Set(d, static_cast<T>(q[1]));
-    const auto qz = hn::Set(d, static_cast<T>(q[2]));
-    const auto reach = hn::Set(d, static_cast<T>(radius + distance_error<T>(2 * magnitude)));
-    [[maybe_unused]] const auto within =
-        hn::Set(d, static_cast<T>(radius - distance_error<T>(2 * magnitude)));
     const std::uint32_t first_child = kWidth * x[i];
-    for (std::size_t lane = 0; lane < kWidth; lane += lanes) {
-      const auto dx = load_as<T>(d, block.x + lane) - qx;
-      const auto dy = load_as<T>(d, block.y + lane) - qy;
-      const auto dz = load_as<T>(d, block.z + lane) - qz;
+    for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+      const auto dx = load_as<T>(d, block.x + lane) - hn::Set(d, standing.x[i]);
+      const auto dy = load_as<T>(d, block.y + lane) - hn::Set(d, standing.y[i]);
+      const auto dz = load_as<T>(d, block.z + lane) - hn::Set(d, standing.z[i]);
       const auto d2 = (dx * dx + dy * dy) + dz * dz;
       // Negative for an unused lane, whose square must not count.
-      const auto r = load_as<T>(d, block.r + lane);
-      const auto sum = hn::Max(r * grow + reach, hn::Zero(d));
+      const auto r = load_as<T>(d, block.r + lane) * grow;
+      const auto sum = hn::Max(r + hn::Set(d, standing.reach[i]), hn::Zero(d));
       auto near = d2 < sum * sum;
       const std::uint32_t child = first_child + static_cast<std::uint32_t>(lane);
       if constexpr (kHeld) {
         // Zero but near: an unused lane's square is no float.
-        const auto spare = hn::IfThenElseZero(near, hn::Max(within - r * grow, hn::Zero(d)));
+        const auto spare =
+            hn::IfThenElseZero(near, hn::Max(hn::Set(d, standing.within[i]) - r, hn::Zero(d)));
         const auto inside = d2 < spare * spare;
-        held->size +=
-            append<T>(d, inside, child, last_y, held->x + held->size, held->y + held->size);
+        held->size += append<T>(d, inside, child, y[i], held->x + held->size, held->y + held->size);
         near = hn::AndNot(inside, near);
       }
-      found += append<T>(d, near, child, last_y, out_x + found, out_y + found);
+      found += append<T>(d, near, child, y[i], out_x + found, out_y + found);
     }
     // Unused lanes, which a large enough ball would reach all the same.
     while (found > 0 && out_x[found - 1] >= below) --found;

@@ -23,6 +23,9 @@ constexpr double distance_error(double magnitude) {
                         magnitude);
 }
 
+/// Pairs that are opened together.
+inline constexpr std::size_t kNodePairs = 64;
+
 /// One stage of the descent: nodes of tree x are opened, those of y stand still.
 struct NodeStage {
   const SphereTree* x;
@@ -33,9 +36,9 @@ struct NodeStage {
   Precision precision;
 };
 
-/// Opens node x[i] of each pair and keeps its children that come within reach of node y[i], never
-/// losing one to rounding. Writes at most 16 n pairs and up to 16 entries of scratch beyond them;
-/// returns how many pairs. Same output on every instruction set.
+/// Opens node x[i] of each of n ≤ kNodePairs pairs and keeps its children that come within reach of
+/// node y[i], never losing one to rounding. Writes at most 16 n pairs and up to 16 entries of
+/// scratch beyond them; returns how many pairs. Same output on every instruction set.
 std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept;
 

@@ -23,7 +23,8 @@ Workspace::Impl::Impl(std::size_t wanted)
       now(make_list(capacity)),
       next(make_list(capacity)),
       ranked(std::make_unique_for_overwrite<RankedPair[]>(capacity)),
-      waiting(std::make_unique_for_overwrite<WaitingPair[]>(kWaiting)) {}
+      waiting(std::make_unique_for_overwrite<WaitingPair[]>(kWaiting)),
+      leaves(std::make_unique_for_overwrite<LeafScratch>()) {}
 
 Workspace::Workspace(std::size_t capacity) : impl_(std::make_unique<Impl>(capacity)) {}
 Workspace::~Workspace() = default;

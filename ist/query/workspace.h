@@ -8,6 +8,7 @@
 
 #include "query/asset_layout.h"
 #include "query/contact_bins.h"
+#include "query/placed_blocks.h"
 
 namespace ist {
 
@@ -41,6 +42,7 @@ struct Workspace::Impl {
   PairList now, next;    ///< pairs of the current pair of levels; those of the next
   std::unique_ptr<RankedPair[]> ranked;
   std::unique_ptr<WaitingPair[]> waiting;  ///< [kWaiting] a stack
+  std::unique_ptr<LeafScratch> leaves;
   ContactBins contact;
 };
 
