@@ -140,6 +140,12 @@ std::size_t add_as(const LeafStage& stage, PlacedBlocks<T>& blocks, const std::u
   const Tasks tasks{!single_a && !single_b ? 1u : 0u, single_b ? 1u : 0u};
   const int shift_a = single_a ? kWidthBits : 0;  // from spheres to blocks
   const int shift_b = single_b ? kWidthBits : 0;
+  const auto place_a = [&](std::uint32_t block, PlacedBlock<T>& placed) {
+    place_block(*stage.a, block, axes, placed);
+  };
+  const auto turn_b = [&](std::uint32_t block, PlacedBlock<T>& placed) {
+    turn_block(*stage.b, block, axes, placed);
+  };
   PairsOfBlocks<T> pairs;
   LensList<T> list;
   std::size_t done = 0;
@@ -147,15 +153,10 @@ std::size_t add_as(const LeafStage& stage, PlacedBlocks<T>& blocks, const std::u
     const std::size_t most = std::min(kPairsAtOnce, n - done);
     std::size_t taken = 0;
     for (; taken < most; ++taken) {
-      const std::uint32_t block_a = a[done + taken] >> shift_a;
-      const std::uint32_t block_b = b[done + taken] >> shift_b;
-      pairs.a[taken] = blocks.a.find(block_a, pairs.a, taken, [&](PlacedBlock<T>& placed) {
-        place_block(*stage.a, block_a, axes, placed);
-      });
-      pairs.b[taken] = blocks.b.find(block_b, pairs.b, taken, [&](PlacedBlock<T>& placed) {
-        turn_block(*stage.b, block_b, axes, placed);
-      });
-      if (pairs.a[taken] == nullptr || pairs.b[taken] == nullptr) break;
+      const PlacedBlock<T>** const both = pairs.block[taken];
+      both[0] = blocks.a.find(a[done + taken] >> shift_a, pairs.block[0], 2 * taken, place_a);
+      both[1] = blocks.b.find(b[done + taken] >> shift_b, pairs.block[0], 2 * taken, turn_b);
+      if (both[0] == nullptr || both[1] == nullptr) break;
     }
     for (std::size_t i = 0; i < taken; ++i) describe_pair(tasks, i, pairs);
     std::size_t listed = 0;

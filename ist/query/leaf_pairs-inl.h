@@ -23,13 +23,12 @@ inline constexpr std::size_t kTaskRoom = kPairsAtOnce * kWidth;
 /// whose leaf ball fewer of them reach. Task 16 i + l is lane l of pair i.
 template <class T>
 struct alignas(64) PairsOfBlocks {
-  T x[kTaskRoom], y[kTaskRoom], z[kTaskRoom];  ///< from the other block's origin
-  T reach[kTaskRoom];                          ///< radius and rounding
-  const PlacedBlock<T>* a[kPairsAtOnce];
-  const PlacedBlock<T>* b[kPairsAtOnce];
-  const Spheres<T>* one[kPairsAtOnce];    ///< the tasks
-  const Spheres<T>* many[kPairsAtOnce];   ///< the others
-  const T* lever[kPairsAtOnce];           ///< of the others
+  T x[kTaskRoom], y[kTaskRoom], z[kTaskRoom];    ///< from the other block's origin
+  T reach[kTaskRoom];                            ///< radius and rounding
+  const PlacedBlock<T>* block[kPairsAtOnce][2];  ///< of A and of B
+  const Spheres<T>* one[kPairsAtOnce];           ///< the tasks
+  const Spheres<T>* many[kPairsAtOnce];          ///< the others
+  const T* lever[kPairsAtOnce];                  ///< of the others
   alignas(32) T ball[kPairsAtOnce][4];    ///< the centre of the other's leaf ball from one's origin
   alignas(32) T offset[kPairsAtOnce][4];  ///< one's origin from the other's
   T ball_reach[kPairsAtOnce];             ///< radius of that ball and rounding
@@ -50,7 +49,7 @@ inline constexpr T kSign[2] = {1, -1};
 /// Chooses whose spheres are tasks, and says where the two blocks are.
 template <class T>
 HWY_INLINE void describe_pair(Tasks tasks, std::size_t i, PairsOfBlocks<T>& pairs) {
-  const PlacedBlock<T>* const both[2] = {pairs.a[i], pairs.b[i]};
+  const PlacedBlock<T>* const* both = pairs.block[i];
   const std::size_t of_b =
       (static_cast<std::size_t>(both[0]->radius <= both[1]->radius) & tasks.of_larger) | tasks.of_b;
   const PlacedBlock<T>& one = *both[of_b];  // no branch: nobody could predict it

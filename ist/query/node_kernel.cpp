@@ -48,24 +48,21 @@ HWY_INLINE void stand(const NodeStage& stage, const std::uint32_t* x, const std:
     radius[i] = ball.r;
     origin[0][i] = o.x, origin[1][i] = o.y, origin[2][i] = o.z;
   }
-  for (std::size_t i = n; i % hn::Lanes(d) != 0; ++i) {  // numbers, though nobody reads them
-    for (int k = 0; k < 3; ++k) centre[k][i] = origin[k][i] = 0;
-    radius[i] = 0;
-  }
   const Similarity& map = *stage.x_from_y;
   const V scale = hn::Set(d, map.scale);
   for (std::size_t i = 0; i < n; i += hn::Lanes(d)) {
-    const V cx = hn::Load(d, centre[0] + i);
-    const V cy = hn::Load(d, centre[1] + i);
-    const V cz = hn::Load(d, centre[2] + i);
-    const V r = hn::Load(d, radius + i) * scale;
+    const auto pairs = hn::FirstN(d, n - i);  // beyond are no numbers
+    const V cx = hn::MaskedLoad(pairs, d, centre[0] + i);
+    const V cy = hn::MaskedLoad(pairs, d, centre[1] + i);
+    const V cz = hn::MaskedLoad(pairs, d, centre[2] + i);
+    const V r = hn::MaskedLoad(pairs, d, radius + i) * scale;
     V q[3];
     V magnitude = r;
     for (int k = 0; k < 3; ++k) {
       const V moved = ((hn::Set(d, map.m[3 * k]) * cx + hn::Set(d, map.m[3 * k + 1]) * cy) +
                        hn::Set(d, map.m[3 * k + 2]) * cz) +
                       hn::Set(d, map.t[k]);
-      q[k] = moved - hn::Load(d, origin[k] + i);
+      q[k] = moved - hn::MaskedLoad(pairs, d, origin[k] + i);
       magnitude = magnitude + hn::Abs(q[k]);
     }
     const V error = magnitude * hn::Set(d, distance_error<T>(2));

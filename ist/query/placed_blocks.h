@@ -33,18 +33,18 @@ class BlockCache {
  public:
   void forget() noexcept { std::fill_n(block_, kSlots, kNone); }
 
-  /// The block, which `place` makes if it is not there; null if its place is that of one of the
-  /// `held` blocks.
+  /// The block, which `place(block, placed)` makes if it is not there; null if its room is that of
+  /// one of the `held` blocks.
   template <class Place>
   const PlacedBlock<T>* find(std::uint32_t block, const PlacedBlock<T>* const* held,
-                             std::size_t count, Place place) {
+                             std::size_t count, const Place& place) {
     const std::uint32_t slot = block % kSlots;
     PlacedBlock<T>& placed = placed_[slot];
     if (block_[slot] != block) {
       if (block_[slot] != kNone && std::find(held, held + count, &placed) != held + count)
         return nullptr;
       block_[slot] = block;
-      place(placed);
+      place(block, placed);
     }
     return &placed;
   }

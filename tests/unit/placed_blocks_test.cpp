@@ -15,8 +15,8 @@ class Cache {
   const PlacedBlock<float>* find(std::uint32_t block,
                                  const PlacedBlock<float>* const* held = nullptr,
                                  std::size_t count = 0) {
-    return cache_->find(block, held, count, [&](PlacedBlock<float>& placed) {
-      placed.radius = static_cast<float>(block);
+    return cache_->find(block, held, count, [&](std::uint32_t number, PlacedBlock<float>& placed) {
+      placed.radius = static_cast<float>(number);
       ++placings;
     });
   }
@@ -65,7 +65,7 @@ TEST(PlacedBlocks, AreForgottenForAnotherPose) {
   int placings = 0;
   for (int pose = 0; pose < 3; ++pose) {
     cache->forget();
-    cache->find(3, nullptr, 0, [&](PlacedBlock<double>&) { ++placings; });
+    cache->find(3, nullptr, 0, [&](std::uint32_t, PlacedBlock<double>&) { ++placings; });
   }
   EXPECT_EQ(placings, 3);
 }
