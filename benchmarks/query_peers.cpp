@@ -384,7 +384,7 @@ int main(int argc, char** argv) {
     const auto rows = ist::testing::read_oracle_rows(key);
     PairOfBodies pair(rows);
     std::vector<Query> queries = all_queries(pair);
-    measure(queries, rows, report.quick() ? 2 : 5);
+    measure(queries, rows, report.quick() ? 2 : 9);
     report_times(report, key, queries, rows);
     report_answers(report, key, queries, rows);
     report_deadlines(report, key, pair, rows, report.quick() ? 3 : 20);
