@@ -154,7 +154,7 @@ void Descent::open_leaves() {
   double waiting = 0;  // bound on the pairs still to come
   if (by_error || now.size > budget_.left()) waiting = rank();
 
-  if (now.size > 0) scratch_.leaves->forget();
+  if (now.size > 0) scratch_.leaves->forget(precision_);
   std::size_t done = 0;
   while (done < now.size) {
     if (by_error && accurate(waiting)) break;
@@ -174,6 +174,7 @@ void Descent::open_leaves() {
   if (precision_ == Precision::single && !keep_rounding_ && sum.error > kGrazing * sum.volume &&
       !budget_.spent(kEarly)) {
     precision_ = Precision::twice;
+    scratch_.leaves->forget(precision_);
     sums_ = LeafSums();
     if (bins_ != nullptr) bins_->forget_sums();
     add_leaves(0, done, nullptr);

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "query/asset_layout.h"
+#include "query/node_kernel.h"
 
 namespace ist {
 
@@ -62,14 +63,17 @@ struct PlacedBlocks {
   BlockCache<T> a, b;
 };
 
-/// In either precision; forget() before the first use, and for other trees or another pose.
+/// In either precision; forget() that before its first use, and for other trees or another pose.
 struct LeafScratch {
   PlacedBlocks<float> single;
   PlacedBlocks<double> twice;
 
-  void forget() noexcept {
-    single.a.forget(), single.b.forget();
-    twice.a.forget(), twice.b.forget();
+  void forget(Precision precision) noexcept {
+    if (precision == Precision::single) {
+      single.a.forget(), single.b.forget();
+    } else {
+      twice.a.forget(), twice.b.forget();
+    }
   }
 };
 
