@@ -24,6 +24,12 @@ constexpr std::size_t kGuesses = 32;  ///< between two looks at the clock, evenl
 // times what rounding does, so float keeps 1e-5 (property_query, NoGrazingPairIsLost).
 constexpr double kGrazing = 5e-4;
 
+/// Larger bounds first; no two pairs are alike.
+bool before(const RankedPair& l, const RankedPair& r) {
+  if (l.bound != r.bound) return l.bound > r.bound;
+  return l.a != r.a ? l.a < r.a : l.b < r.b;
+}
+
 }  // namespace
 
 Descent::Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
@@ -73,8 +79,7 @@ bool Descent::open_level() {
   if (min_radius_ > 0) drop_small([&](double ra, double rb) { return open_a ? ra : rb; });
   PairList& now = scratch_.now;
   PairList& next = scratch_.next;
-  if (now.size > budget_.left()) rank();
-
+  choose();
   const NodeStage stage =
       open_a ? NodeStage{&a_, &b_, level_a_, level_b_, &map_, precision_}
              : NodeStage{&b_, &a_, level_b_, level_a_, &pose_.b_from_a, precision_};
@@ -152,8 +157,10 @@ void Descent::open_leaves() {
   PairList& now = scratch_.now;
   const bool by_error = settings_.relative_error > 0;
   double waiting = 0;  // bound on the pairs still to come
-  if (by_error || now.size > budget_.left()) waiting = rank();
-
+  if (by_error)
+    waiting = rank();
+  else
+    choose();
   if (now.size > 0) scratch_.leaves->forget(precision_);
   std::size_t done = 0;
   while (done < now.size) {
@@ -196,15 +203,15 @@ bool Descent::accurate(double waiting) const {
   return spread <= settings_.relative_error * (sum.volume + sum.error + waiting + left_bound_);
 }
 
+double Descent::bound(std::size_t i) const {
+  return bound_pair(a_, level_a_, scratch_.now.a[i], b_, level_b_, scratch_.now.b[i], map_);
+}
+
 double Descent::rank() {
   PairList& now = scratch_.now;
   RankedPair* ranked = scratch_.ranked.get();
-  for (std::size_t i = 0; i < now.size; ++i)
-    ranked[i] = {estimate(level_a_, now.a[i], level_b_, now.b[i]).bound, now.a[i], now.b[i]};
-  std::sort(ranked, ranked + now.size, [](const RankedPair& l, const RankedPair& r) {
-    if (l.bound != r.bound) return l.bound > r.bound;
-    return l.a != r.a ? l.a < r.a : l.b < r.b;
-  });
+  for (std::size_t i = 0; i < now.size; ++i) ranked[i] = {bound(i), now.a[i], now.b[i]};
+  std::sort(ranked, ranked + now.size, before);
   double sum = 0;
   for (std::size_t i = 0; i < now.size; ++i) {
     now.a[i] = ranked[i].a;
@@ -212,6 +219,30 @@ double Descent::rank() {
     sum += ranked[i].bound;
   }
   return sum;
+}
+
+void Descent::choose() {
+  const std::size_t left = budget_.left();
+  PairList& now = scratch_.now;
+  PairList& next = scratch_.next;
+  if (left == 0 || now.size <= left) return;
+  RankedPair* ranked = scratch_.ranked.get();
+  double* bounds = scratch_.bounds.get();
+  for (std::size_t i = 0; i < now.size; ++i) {
+    bounds[i] = bound(i);
+    ranked[i] = {bounds[i], now.a[i], now.b[i]};
+  }
+  RankedPair* const last = ranked + left - 1;
+  std::nth_element(ranked, last, ranked + now.size, before);
+  std::size_t chosen = 0, others = left;
+  for (std::size_t i = 0; i < now.size; ++i) {
+    const bool is_other = before(*last, {bounds[i], now.a[i], now.b[i]});
+    std::size_t& to = is_other ? others : chosen;
+    next.a[to] = now.a[i];
+    next.b[to++] = now.b[i];
+  }
+  next.size = now.size;
+  std::swap(now, next);
 }
 
 template <class Measured>

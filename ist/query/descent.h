@@ -68,6 +68,13 @@ class Descent {
   /// Sorts the current list, largest bound first; returns the sum of the bounds.
   double rank();
 
+  /// Puts the pairs of largest bound that visits are left for first in the current list, if there
+  /// are more. Otherwise they stay in order, as neighbours share nodes.
+  void choose();
+
+  /// What ranks the pairs of the current list, from the largest bound down.
+  double bound(std::size_t i) const;
+
   /// Leaves the pairs unopened of which `measured(radius_a, radius_b)` is under the limit.
   template <class Measured>
   void drop_small(Measured measured);

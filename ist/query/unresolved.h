@@ -15,6 +15,10 @@ struct PairEstimate {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of the guessed overlap
 };
 
+/// PairEstimate::bound alone.
+double bound_pair(const SphereTree& a, int level_a, std::uint32_t block_a, const SphereTree& b,
+                  int level_b, std::uint32_t block_b, const Similarity& a_from_b) noexcept;
+
 PairEstimate estimate_pair(const SphereTree& a, int level_a, std::uint32_t block_a,
                            const SphereTree& b, int level_b, std::uint32_t block_b,
                            const Similarity& a_from_b) noexcept;

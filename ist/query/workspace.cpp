@@ -23,6 +23,7 @@ Workspace::Impl::Impl(std::size_t wanted)
       now(make_list(capacity)),
       next(make_list(capacity)),
       ranked(std::make_unique_for_overwrite<RankedPair[]>(capacity)),
+      bounds(std::make_unique_for_overwrite<double[]>(capacity)),
       waiting(std::make_unique_for_overwrite<WaitingPair[]>(kWaiting)),
       leaves(std::make_unique_for_overwrite<LeafScratch>()) {}
 

@@ -41,6 +41,7 @@ struct Workspace::Impl {
   std::size_t capacity;  ///< pairs in each list
   PairList now, next;    ///< pairs of the current pair of levels; those of the next
   std::unique_ptr<RankedPair[]> ranked;
+  std::unique_ptr<double[]> bounds;        ///< of the pairs of `now`, while some are chosen
   std::unique_ptr<WaitingPair[]> waiting;  ///< [kWaiting] a stack
   std::unique_ptr<LeafScratch> leaves;
   ContactBins contact;
