@@ -33,6 +33,17 @@ HWY_INLINE hn::Vec<D> load_as(D d, const float* from) {
   }
 }
 
+/// Stores doubles as T.
+template <class T, class D>
+HWY_INLINE void store_as(hn::Vec<D> v, D d, T* to) {
+  if constexpr (sizeof(T) == sizeof(float)) {
+    const hn::Rebind<float, D> df;
+    hn::Store(hn::DemoteTo(df, v), df, to);
+  } else {
+    hn::Store(v, d, to);
+  }
+}
+
 /// One bit a lane.
 template <class D>
 HWY_INLINE std::uint32_t mask_bits(D d, hn::Mask<D> mask) {

@@ -33,7 +33,6 @@ struct alignas(64) PairsOfBlocks {
   alignas(32) T offset[kPairsAtOnce][4];  ///< one's origin from the other's
   T ball_reach[kPairsAtOnce];             ///< radius of that ball and rounding
   T error[kPairsAtOnce];  ///< bound on the rounding of a distance; negative if the tasks are B's
-  T slack[kPairsAtOnce];  ///< twice that, not negative
   std::uint32_t bin[kPairsAtOnce];
   std::uint32_t task[kTaskRoom + kWidth];  ///< that reach the other's leaf ball
   std::uint32_t met[kTaskRoom + 1];        ///< task << 16 | the lanes it meets
@@ -62,7 +61,6 @@ HWY_INLINE void describe_pair(Tasks tasks, std::size_t i, PairsOfBlocks<T>& pair
   const T error = one.error + many.error;
   pairs.ball_reach[i] = many.radius + error;
   pairs.error[i] = error * kSign<T>[of_b];
-  pairs.slack[i] = error + error;
 }
 
 /// Places the spheres of pair `i` and lists those that come within reach of the other's leaf ball,
@@ -73,7 +71,7 @@ HWY_INLINE std::size_t list_tasks(PairsOfBlocks<T>& pairs, std::size_t i, int si
   const LaneTag<T> d;
   const Spheres<T>& spheres = *pairs.one[i];
   const auto reach = hn::Set(d, pairs.ball_reach[i]);
-  const auto slack = hn::Set(d, pairs.slack[i]);
+  const auto error = hn::Abs(hn::Set(d, pairs.error[i]));
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
     const std::size_t at = kWidth * i + lane;
     const auto x = hn::Load(d, spheres.x + lane);
@@ -90,7 +88,7 @@ HWY_INLINE std::size_t list_tasks(PairsOfBlocks<T>& pairs, std::size_t i, int si
     hn::Store(x + hn::Set(d, pairs.offset[i][0]), d, pairs.x + at);
     hn::Store(y + hn::Set(d, pairs.offset[i][1]), d, pairs.y + at);
     hn::Store(z + hn::Set(d, pairs.offset[i][2]), d, pairs.z + at);
-    hn::Store(r + slack, d, pairs.reach + at);
+    hn::Store(r + (error + error), d, pairs.reach + at);
     listed += append_lanes<T>(d, near, static_cast<std::uint32_t>(at), pairs.task + listed);
   }
   return listed;

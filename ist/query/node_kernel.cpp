@@ -35,7 +35,6 @@ template <class T>
 HWY_INLINE void stand(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
                       std::size_t n, StandingBalls<T>& standing) {
   const hn::CappedTag<double, 8> d;
-  const hn::Rebind<float, decltype(d)> df;
   using V = hn::Vec<decltype(d)>;
   alignas(64) double centre[3][kNodePairs];
   alignas(64) double radius[kNodePairs];
@@ -66,16 +65,11 @@ HWY_INLINE void stand(const NodeStage& stage, const std::uint32_t* x, const std:
       magnitude = magnitude + hn::Abs(q[k]);
     }
     const V error = magnitude * hn::Set(d, distance_error<T>(2));
-    const auto store = [&](V value, T* to) {
-      if constexpr (sizeof(T) == sizeof(float)) {
-        hn::Store(hn::DemoteTo(df, value), df, to + i);
-      } else {
-        hn::Store(value, d, to + i);
-      }
-    };
-    store(q[0], standing.x), store(q[1], standing.y), store(q[2], standing.z);
-    store(r + error, standing.reach);
-    store(r - error, standing.within);
+    store_as(q[0], d, standing.x + i);
+    store_as(q[1], d, standing.y + i);
+    store_as(q[2], d, standing.z + i);
+    store_as(r + error, d, standing.reach + i);
+    store_as(r - error, d, standing.within + i);
   }
 }
 

@@ -10,7 +10,6 @@
 #include <cmath>
 
 #include "query/lanes-inl.h"
-#include "query/node_kernel.h"
 #include "query/placed_blocks.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -37,15 +36,8 @@ using FourDoubles = hn::CappedTag<double, 4>;
 template <class T>
 HWY_INLINE void subtract(const double (&x)[4], const double (&y)[4], T (&difference)[4]) {
   const FourDoubles d;
-  for (std::size_t k = 0; k < 4; k += hn::Lanes(d)) {
-    const auto exact = hn::Load(d, x + k) - hn::Load(d, y + k);
-    if constexpr (sizeof(T) == sizeof(float)) {
-      const hn::Rebind<float, decltype(d)> df;
-      hn::Store(hn::DemoteTo(df, exact), df, difference + k);
-    } else {
-      hn::Store(exact, d, difference + k);
-    }
-  }
+  for (std::size_t k = 0; k < 4; k += hn::Lanes(d))
+    store_as(hn::Load(d, x + k) - hn::Load(d, y + k), d, difference + k);
 }
 
 /// What follows from where a block and its leaf ball are; `size` bounds the way from the block's

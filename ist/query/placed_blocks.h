@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "query/asset_layout.h"
-#include "query/node_kernel.h"
+#include "query/precision.h"
 
 namespace ist {
 

@@ -3,9 +3,25 @@
 #include <algorithm>
 #include <cmath>
 
-#include "query/node_kernel.h"
+#include "query/relative_pose.h"
+#include "query/sphere_tree.h"
 
 namespace ist {
+
+/// Digits of the arithmetic inside a block. Float serves unless one object is far smaller than the
+/// other.
+enum class Precision { single, twice };
+
+/// How far rounding may move a distance that is computed from coordinates of this magnitude: each
+/// coordinate comes out of a three-term product, a sum and a difference, then a norm.
+constexpr double distance_error(Precision precision, double magnitude) {
+  return 12 * (precision == Precision::single ? 0x1p-24 : 0x1p-53) * magnitude;
+}
+template <class T>
+constexpr double distance_error(double magnitude) {
+  return distance_error(sizeof(T) == sizeof(float) ? Precision::single : Precision::twice,
+                        magnitude);
+}
 
 // Float keeps a sum of lenses to 1e-5 while both trees' spheres are of like size: what is rounded
 // are differences to the nearest block's origin, a few radii long.

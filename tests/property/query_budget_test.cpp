@@ -59,6 +59,29 @@ TEST_F(QueryBudget, VisitsAreKeptAndBoundsHold) {
   }
 }
 
+TEST_F(QueryBudget, TheSmallestPairsAreLeft) {
+  // The more are left, the larger they are on average: bounds widen faster than their number grows.
+  constexpr std::uint32_t kMany = 16;
+  double one = 0, many = 0;
+  int asked = 0;
+  for (int i = 0; i < 40; ++i) {
+    const PlacedTree a = placed_a(), b = placed_b(0.05 * i);
+    const Penetration finished = penetration(a, b, {}, workspace_);
+    if (finished.node_visits < 10 * kMany) continue;
+    const auto widened = [&](std::uint32_t left) {
+      const Penetration stopped =
+          penetration(a, b, {.max_visits = finished.node_visits - left}, workspace_);
+      return (stopped.volume_max - stopped.volume_min) -
+             (finished.volume_max - finished.volume_min);
+    };
+    one += widened(1);
+    many += widened(kMany);
+    ++asked;
+  }
+  ASSERT_GT(asked, 10);
+  EXPECT_GT(many, 2 * kMany * one);
+}
+
 TEST_F(QueryBudget, RelativeErrorIsMet) {
   for (const double accepted : {0.5, 0.1, 0.01}) {
     for (int i = 0; i < 30; ++i) {
