@@ -13,10 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "build/calibration.h"
-#include "build/cover.h"
-#include "build/pack.h"
-#include "build/tree_builder.h"
+#include "bake/calibrate/calibration.h"
+#include "bake/cluster/tree_builder.h"
+#include "bake/cover/cover.h"
 #include "report.h"
 #include "support/shared_data.h"
 
@@ -55,16 +54,15 @@ class Stages {
 void one_bake(const ClosedMesh& mesh, const PackingSettings& settings, Stages& stages) {
   const auto solid = stages.time("1 solid", [&] { return std::make_unique<MeshSolid>(mesh); });
   stages.time("2 volume", [&] { return solid->unit_volume(); });
-  const auto gpu = stages.time("3 to the GPU", [&] { return put_on_gpu(*solid, settings); });
-  const auto inner =
-      stages.time("4 pack", [&] { return pack(*solid, gpu.get(), settings, {}).spheres; });
-  const auto calibration = stages.time(
-      "5 calibrate", [&] { return calibrate(*solid, inner, settings.threads, {}, gpu.get()); });
-  const auto covers = stages.time(
-      "6 cover", [&] { return cover_radii(*solid, inner, settings.threads, {}, gpu.get()); });
-  std::vector<Sphere4> spheres;
-  for (const Sphere& s : inner) spheres.push_back({s.x, s.y, s.z, s.r});
-  stages.time("7 inner tree", [&] { return build_tree(spheres, covers); });
+  const auto backend = stages.time("3 backend", [&] {
+    return make_backend(*solid, {settings.device, settings.gpu});
+  });
+  const auto inner = stages.time("4 pack", [&] { return backend->pack(settings, {}).spheres; });
+  const auto calibration =
+      stages.time("5 calibrate", [&] { return calibrate(*solid, *backend, inner, {}); });
+  const auto covers =
+      stages.time("6 cover", [&] { return cover_radii(*solid, *backend, inner, {}); });
+  stages.time("7 inner tree", [&] { return build_tree(inner, covers); });
   stages.time("8 matched tree", [&] { return build_tree(calibration.effective, {}); });
 }
 

@@ -10,7 +10,7 @@
 #include <functional>
 #include <vector>
 
-#include "check.h"
+#include "cuda/check.h"
 #include "report.h"
 
 namespace {

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "device_mesh.h"
-#include "mesh_queries.h"
+#include "cuda/device_mesh.h"
+#include "cuda/mesh_queries.h"
 #include "report.h"
 #include "support/shared_data.h"
 #include "timing.h"

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "banded/banded_pack.h"
-#include "device_mesh.h"
+#include "cuda/banded/banded_pack.h"
+#include "cuda/device_mesh.h"
 #include "fingerprint.h"
 #include "mesh/mesh_solid.h"
 #include "report.h"
@@ -33,7 +33,7 @@ Run run_once(const ist::MeshSolid& solid, std::size_t count, bool split) {
   const ist::MeshView& view = solid.view();
   const ist::gpu::HostMesh mesh{
       view.vertices_exact, view.triangles, view.vertex_count, view.triangle_count, {}, 1};
-  ist::packing::BandLimits limits;
+  ist::packing::PackingLimits limits;
   limits.volume = solid.unit_volume();
   limits.max_spheres = count;
   ist::gpu::Queue queue{ist::GpuSettings{}};
@@ -45,8 +45,8 @@ Run run_once(const ist::MeshSolid& solid, std::size_t count, bool split) {
       queue.wait();
       run.mesh = ist::benchmark::wall_seconds() - start;
     }
-    run.packing =
-        pack_banded(queue, on_device.tree(), limits, 1, 0, {}, split ? &run.cost : nullptr);
+    ist::Stage stage("pack", {});
+    run.packing = pack_banded(queue, on_device.tree(), limits, stage, split ? &run.cost : nullptr);
   }
   run.all = ist::benchmark::wall_seconds() - start;
   run.peak = static_cast<double>(queue.peak_bytes()) / (1 << 20);

@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "grids/pack_grids.h"
+#include "cuda/grids/device_grid_rounds.h"
+#include "cuda/queue.h"
 #include "mesh/mesh_solid.h"
-#include "mesh/samples/samples.h"
-#include "queue.h"
 #include "report.h"
+#include "samples/samples.h"
 #include "support/shared_data.h"
 #include "timing.h"
 
@@ -70,7 +70,8 @@ class MeshOnGrids {
         ist::gpu::Queue queue{ist::GpuSettings{}};
         History history;
         const double start = wall_seconds();
-        ist::gpu::pack_grids(queue, solid_, settings_, {}, &history);
+        ist::Stage stage("pack", {});
+        ist::gpu::pack_grids(queue, solid_, settings_, stage, &history);
         if (run > 0) runs.emplace_back(wall_seconds() - start, std::move(history));
         peak = queue.peak_bytes();
       }

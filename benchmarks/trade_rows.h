@@ -13,7 +13,7 @@
 #include <ist/bake.h>
 #include <ist/error.h>
 
-#include "build/trial_poses.h"
+#include "bake/predict/trial_poses.h"
 #include "mesh/mesh_solid.h"
 #include "support/oracle_rows.h"
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include <ist/asset_layout.h>
 #include "asset/asset_writer.h"
-#include "build/tree_builder.h"
-#include "query/asset_layout.h"
+#include "bake/cluster/tree_builder.h"
 #include "report.h"
 #include "support/oracle_rows.h"
 #include "timing.h"
@@ -39,9 +39,9 @@ Asset rebuilt(const Asset& asset, const Builder& builder) {
   const auto copy = [&]<class T>(const T* from) { return std::vector<T>(from, from + n); };
   AssetArrays arrays;
   arrays.header = header;
-  arrays.inner_spheres = copy(at<Sphere4>(header, header.inner_spheres));
+  arrays.inner_spheres = copy(at<Sphere>(header, header.inner_spheres));
   arrays.cover_radii = copy(at<float>(header, header.cover_radii));
-  arrays.effective_spheres = copy(at<Sphere4>(header, header.effective_spheres));
+  arrays.effective_spheres = copy(at<Sphere>(header, header.effective_spheres));
   arrays.inner_tree =
       build_tree(arrays.inner_spheres, arrays.cover_radii, builder.clustering, builder.swaps);
   arrays.matched_tree = build_tree(arrays.effective_spheres, {}, builder.clustering, builder.swaps);

@@ -21,14 +21,3 @@ if(NOT IST_CUDA STREQUAL "OFF")
     message(NOTICE "ist: no nvcc found, building CPU only")
   endif()
 endif()
-
-# The same bytes as on the CPU: nothing is fused (DESIGN 3.3).
-function(ist_cuda_options target)
-  target_compile_options(${target} PRIVATE
-    $<$<COMPILE_LANGUAGE:CUDA>:-fmad=false -Xcompiler=-Wall,-Wextra,-ffp-contract=off>
-    $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wconversion -ffp-contract=off>)
-  if(PROJECT_IS_TOP_LEVEL)
-    target_compile_options(${target} PRIVATE
-      $<$<COMPILE_LANGUAGE:CUDA>:--Werror=all-warnings> $<$<COMPILE_LANGUAGE:CXX>:-Werror>)
-  endif()
-endfunction()

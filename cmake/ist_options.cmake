@@ -2,9 +2,13 @@
 # build, but not that of a project that this one is a part of.
 function(ist_compile_options target)
   target_compile_options(${target} PRIVATE
-    -Wall -Wextra -Wconversion $<$<BOOL:${PROJECT_IS_TOP_LEVEL}>:-Werror>
-    # The same bytes on any machine (DESIGN 3.3): nothing is fused or re-associated.
-    -ffp-contract=off)
+    # The same bytes on any machine (docs/design.md 3.3): nothing is fused or re-associated.
+    $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wconversion;-ffp-contract=off>
+    $<$<COMPILE_LANGUAGE:CUDA>:-fmad=false;-Xcompiler=-Wall,-Wextra,-ffp-contract=off>)
+  if(PROJECT_IS_TOP_LEVEL)
+    target_compile_options(${target} PRIVATE
+      $<$<COMPILE_LANGUAGE:CXX>:-Werror> $<$<COMPILE_LANGUAGE:CUDA>:--Werror=all-warnings>)
+  endif()
   if(IST_SANITIZE)
     # A finding ends the program, so that its test fails.
     target_compile_options(${target} PRIVATE

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "mesh/host_device.h"
+#include "numerics/host_device.h"
 
 // Relaxed atomics for host and device. Each returns the value before. What they build is a sum, a
 // maximum or a set, so that the order in which threads come to them does not show.

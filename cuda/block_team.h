@@ -2,7 +2,7 @@
 
 // Device code only.
 
-#include "warp_team.h"
+#include "cuda/warp_team.h"
 
 namespace ist::gpu {
 

@@ -1,4 +1,4 @@
-#include "check.h"
+#include "cuda/check.h"
 
 #include <ist/error.h>
 
@@ -10,19 +10,18 @@ namespace {
 const char* way_out(cudaError_t status) {
   switch (status) {
     case cudaErrorMemoryAllocation:
-      return "free device memory, ask for fewer spheres, or bake with --device cpu";
+      return "free device memory, ask for fewer spheres, or bake on the CPU";
     case cudaErrorNoDevice:
     case cudaErrorInvalidDevice:
-      return "there is no such GPU here: bake with --device cpu";
+      return "there is no such GPU here: bake on the CPU";
     case cudaErrorInsufficientDriver:
-      return "the driver is older than CUDA 13: update it, or bake with --device cpu";
+      return "the driver is older than CUDA 13: update it, or bake on the CPU";
     case cudaErrorNoKernelImageForDevice:
     case cudaErrorUnsupportedPtxVersion:
       return "this build has no code for this GPU: build with its CMAKE_CUDA_ARCHITECTURES, or "
-             "bake "
-             "with --device cpu";
+             "bake on the CPU";
     default:
-      return "bake with --device cpu, and report this";
+      return "bake on the CPU, and report this";
   }
 }
 

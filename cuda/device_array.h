@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "check.h"
-#include "queue.h"
+#include "cuda/check.h"
+#include "cuda/queue.h"
 
 namespace ist::gpu {
 

@@ -1,10 +1,10 @@
-#include "device_mesh.h"
+#include "cuda/device_mesh.h"
 
-#include "launch.h"
+#include "cuda/launch.h"
+#include "cuda/pageable_upload.h"
+#include "cuda/triangle_order.h"
+#include "cuda/warp_team.h"
 #include "mesh/wide_build.h"
-#include "pageable_upload.h"
-#include "triangle_order.h"
-#include "warp_team.h"
 
 namespace ist::gpu {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "device_array.h"
+#include "cuda/device_array.h"
 #include "mesh/wide_tree.h"
 
 namespace ist::gpu {

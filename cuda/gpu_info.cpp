@@ -2,7 +2,7 @@
 #include <ist/error.h>
 #include <ist/gpu.h>
 
-#include "check.h"
+#include "cuda/check.h"
 
 namespace ist {
 namespace {
@@ -37,7 +37,7 @@ bool gpu_available(int device, std::string* why) {
 
 GpuInfo gpu_info(int device) {
   std::string why;
-  if (!gpu_available(device, &why)) throw Error("GPU: " + why + ": bake with --device cpu");
+  if (!gpu_available(device, &why)) throw Error("GPU: " + why + ": bake on the CPU");
   cudaDeviceProp properties{};
   gpu::check(cudaGetDeviceProperties(&properties, device), "asking the GPU for its properties");
   int previous = 0;

@@ -1,9 +1,9 @@
-#include "mesh_queries.h"
+#include "cuda/mesh_queries.h"
 
 #include <algorithm>
 
+#include "cuda/warp_team.h"
 #include "mesh/wide_rays.h"
-#include "warp_team.h"
 
 namespace ist::gpu {
 namespace {

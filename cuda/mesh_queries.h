@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "device_array.h"
+#include "cuda/device_array.h"
 #include "mesh/wide_nearest.h"
 
 // Many questions to a mesh at once, a warp each. All arrays are in device memory; answers come in

@@ -1,4 +1,4 @@
-#include "pageable_upload.h"
+#include "cuda/pageable_upload.h"
 
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "check.h"
+#include "cuda/check.h"
 
 namespace ist::gpu {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "queue.h"
+#include "cuda/queue.h"
 
 namespace ist::gpu {
 

@@ -1,4 +1,4 @@
-#include "prefix_sum.h"
+#include "cuda/prefix_sum.h"
 
 #include <cub/device/device_scan.cuh>
 

@@ -1,4 +1,4 @@
-#include "queue.h"
+#include "cuda/queue.h"
 
 #include <ist/error.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 #include <string>
 
-#include "check.h"
+#include "cuda/check.h"
 
 namespace ist::gpu {
 namespace {
@@ -71,10 +71,10 @@ void* Queue::allocate(std::size_t bytes) {
   if (bytes == 0) return nullptr;
   void* memory = memory_->allocate(bytes, stream_);
   if (memory == nullptr)
-    throw Error("GPU: no device memory left for " + std::to_string(bytes) + " more bytes (" +
-                std::to_string(in_use_) +
-                " in use by this bake): free device memory, ask for fewer spheres, or bake with "
-                "--device cpu");
+    throw Error(
+        "GPU: no device memory left for " + std::to_string(bytes) + " more bytes (" +
+        std::to_string(in_use_) +
+        " in use by this bake): free device memory, ask for fewer spheres, or bake on the CPU");
   in_use_ += bytes;
   peak_ = std::max(peak_, in_use_);
   return memory;

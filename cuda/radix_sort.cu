@@ -1,4 +1,4 @@
-#include "radix_sort.h"
+#include "cuda/radix_sort.h"
 
 #include <cub/device/device_radix_sort.cuh>
 

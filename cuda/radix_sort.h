@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "device_array.h"
+#include "cuda/device_array.h"
 
 namespace ist::gpu {
 

@@ -1,12 +1,12 @@
-#include "triangle_order.h"
+#include "cuda/triangle_order.h"
 
 #include <algorithm>
 #include <bit>
 
-#include "launch.h"
+#include "cuda/launch.h"
+#include "cuda/radix_sort.h"
+#include "cuda/warp_team.h"
 #include "mesh/wide_build.h"
-#include "radix_sort.h"
-#include "warp_team.h"
 
 // Parts of a power of two of triangles begin at multiples of it, so that a place in the order tells
 // its part. The triangles of one last node are cut in halves in shared memory; larger parts, by

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "mesh/team.h"
+#include "numerics/team.h"
 
 namespace ist::gpu {
 

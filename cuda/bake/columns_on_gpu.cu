@@ -1,9 +1,9 @@
-#include "bake/columns_on_gpu.h"
+#include "cuda/bake/columns_on_gpu.h"
 
-#include "build/power_relaxation.h"
-#include "launch.h"
+#include "bake/calibrate/power_relaxation.h"
+#include "cuda/launch.h"
+#include "cuda/prefix_sum.h"
 #include "mesh/wide_nearest.h"
-#include "prefix_sum.h"
 
 namespace ist::gpu {
 namespace {

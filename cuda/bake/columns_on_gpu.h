@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "build/column_plan.h"
-#include "build/power_grid.h"
-#include "device_array.h"
+#include "backend/tasks.h"
+#include "bake/calibrate/power_grid.h"
+#include "cuda/device_array.h"
 #include "mesh/wide_tree.h"
 
 namespace ist::gpu {

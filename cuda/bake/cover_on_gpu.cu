@@ -1,8 +1,8 @@
-#include "bake/cover_on_gpu.h"
+#include "cuda/bake/cover_on_gpu.h"
 
-#include "device_array.h"
+#include "cuda/device_array.h"
+#include "cuda/warp_team.h"
 #include "mesh/wide_rays.h"
-#include "warp_team.h"
 
 namespace ist::gpu {
 namespace {

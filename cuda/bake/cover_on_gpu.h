@@ -3,9 +3,9 @@
 #include <functional>
 #include <vector>
 
-#include "build/cover_cells.h"
+#include "bake/cover/cover_cells.h"
+#include "cuda/queue.h"
 #include "mesh/wide_tree.h"
-#include "queue.h"
 
 namespace ist::gpu {
 

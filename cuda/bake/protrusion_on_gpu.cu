@@ -1,9 +1,9 @@
-#include "bake/protrusion_on_gpu.h"
+#include "cuda/bake/protrusion_on_gpu.h"
 
-#include "build/protrusion.h"
-#include "device_array.h"
+#include "bake/calibrate/protrusion.h"
+#include "cuda/device_array.h"
+#include "cuda/warp_team.h"
 #include "mesh/wide_rays.h"
-#include "warp_team.h"
 
 namespace ist::gpu {
 namespace {
@@ -14,7 +14,7 @@ constexpr double kAnywhere = 1e30;  // beyond any distance, unit frame
 
 /// A warp a ball.
 __global__ void __launch_bounds__(kThreads)
-    find_protrusion(WideTree tree, const Sphere4* balls, std::uint32_t count,
+    find_protrusion(WideTree tree, const Sphere* balls, std::uint32_t count,
                     unsigned long long* largest) {
   const std::uint32_t k = blockIdx.x * kWarps + threadIdx.x / 32;
   if (k >= count) return;
@@ -28,9 +28,9 @@ __global__ void __launch_bounds__(kThreads)
 
 }  // namespace
 
-double largest_protrusion(Queue& queue, const WideTree& mesh, std::span<const Sphere4> balls) {
+double largest_protrusion(Queue& queue, const WideTree& mesh, std::span<const Sphere> balls) {
   const auto count = static_cast<std::uint32_t>(balls.size());
-  DeviceArray<Sphere4> on_device(queue, count);
+  DeviceArray<Sphere> on_device(queue, count);
   on_device.upload(balls);
   DeviceArray<double> largest(queue, 1);
   largest.fill_bytes(0);

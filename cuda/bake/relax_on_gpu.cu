@@ -1,7 +1,7 @@
-#include "bake/relax_on_gpu.h"
+#include "cuda/bake/relax_on_gpu.h"
 
-#include "block_team.h"
-#include "warp_team.h"
+#include "cuda/block_team.h"
+#include "cuda/warp_team.h"
 
 namespace ist::gpu {
 namespace {
@@ -296,15 +296,14 @@ class Relaxation {
 
 }  // namespace
 
-RelaxedSites relax_sites(Queue& queue, const WideTree& mesh, const ColumnPlan& plan,
-                         std::span<const PowerSite> sites, double volume,
+RelaxedSites relax_sites(Queue& queue, const WideTree& mesh, const RelaxTask& task,
                          const std::function<void(double)>& report) {
-  const ColumnsOnGpu columns(queue, mesh, plan);
-  if (!columns_measure(columns.length() * plan.cross_section(), volume)) return {};
-  Relaxation relaxation(queue, columns.grid(), sites);
+  const ColumnsOnGpu columns(queue, mesh, task.columns);
+  if (!columns_measure(columns.length() * task.columns.cross_section(), task.volume)) return {};
+  Relaxation relaxation(queue, columns.grid(), task.sites);
   for (int round = 0; round < kRelaxations; ++round) {
     report(static_cast<double>(round) / kRelaxations);
-    relaxation.round(volume);
+    relaxation.round(task.volume);
   }
   return relaxation.result();
 }

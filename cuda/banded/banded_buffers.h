@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "banded/banded_control.h"
+#include "cuda/banded/banded_control.h"
 
 namespace ist::gpu {
 
@@ -187,7 +187,7 @@ class BandedBuffers {
     if (words > 0x7FFFFFFFu)
       throw Error(
           "packing: the sphere grid outgrows the GPU backend: ask for fewer spheres, or "
-          "bake with --device cpu");
+          "bake on the CPU");
     if (words > words_.size()) renew(words_, words);
     if (pairs > pairs_.size()) renew(pairs_, pairs);
     if (blocks * SphereLists::kCellsPerBlock > grid_cells_.size())

@@ -2,8 +2,8 @@
 
 #include <cstring>
 
-#include "banded/banded_state.h"
-#include "packing/prototype.h"
+#include "cuda/banded/banded_state.h"
+#include "packing/banded/prototype.h"
 
 // The steps of a band that deal with cells (BandedPacker on the CPU). Every one is written for a
 // crew; `a` are the arrays, `s` = *a.state. What depends on an order of threads is only where in an
@@ -61,8 +61,8 @@ IST_HD void sweep_cells(Crew& crew, const BandedArrays& a) {
   dropped = crew.team().max(dropped);
   live = crew.team().sum(live);
   if (crew.team().lane() == 0) {
-    atomic_max(&s.top, packing::bits_of(top));
-    atomic_max(&s.dropped, packing::bits_of(dropped));
+    atomic_max(&s.top, bits_of(top));
+    atomic_max(&s.dropped, bits_of(dropped));
     atomic_add(&s.live, static_cast<std::uint32_t>(live));
   }
 }
@@ -192,8 +192,8 @@ IST_HD void refresh_cells(Crew& crew, const BandedArrays& a, const Surface& surf
     team.sync();
     const bool candidate = due && state == CellState::candidate;
     if (candidate) {
-      radius = packing::bits_of(cell.radius) > radius ? packing::bits_of(cell.radius) : radius;
-      bound = packing::bits_of(cell.bound) > bound ? packing::bits_of(cell.bound) : bound;
+      radius = bits_of(cell.radius) > radius ? bits_of(cell.radius) : radius;
+      bound = bits_of(cell.bound) > bound ? bits_of(cell.bound) : bound;
     }
     const std::uint32_t place = append(team, candidate, &s.active);
     if (candidate) active[place] = slot;
@@ -271,7 +271,7 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
       works = cell.bound >= margin;
       if (team.lane() == 0) {
         if (cell.bound < floor) {
-          atomic_max(&s.dropped, packing::bits_of(cell.bound > 0 ? cell.bound : 0.0f));
+          atomic_max(&s.dropped, bits_of(cell.bound > 0 ? cell.bound : 0.0f));
         } else {
           slot = take_slot(a);
           atomic_add(&s.live, 1);
@@ -291,7 +291,7 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
       if (team.lane() == 0) {
         if (outcome == CellState::candidate) {
           active[atomic_add(&s.active, 1)] = slot;
-          note_candidates(s, packing::bits_of(cell.radius), packing::bits_of(cell.bound));
+          note_candidates(s, bits_of(cell.radius), bits_of(cell.bound));
         } else if (outcome == CellState::split && !queues) {
           note_splitting(a, slot);
         }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "banded/banded_state.h"
+#include "cuda/banded/banded_state.h"
 
 // What comes after each step: run by one thread at a meeting, while nobody works.
 

@@ -1,9 +1,9 @@
-#include "banded/banded_kernel.h"
+#include "cuda/banded/banded_kernel.h"
 
-#include "banded/banded_loop.h"
-#include "banded/warp_crew.h"
-#include "check.h"
-#include "packing/wide_mesh_surface.h"
+#include "cuda/banded/banded_loop.h"
+#include "cuda/banded/warp_crew.h"
+#include "cuda/check.h"
+#include "packing/banded/wide_mesh_surface.h"
 
 namespace ist::gpu {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "banded/banded_state.h"
+#include "cuda/banded/banded_state.h"
+#include "cuda/queue.h"
 #include "mesh/wide_tree.h"
-#include "queue.h"
 
 namespace ist::gpu {
 

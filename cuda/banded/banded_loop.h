@@ -1,9 +1,9 @@
 #pragma once
 
-#include "banded/banded_cells.h"
-#include "banded/banded_control.h"
-#include "banded/banded_selection.h"
-#include "banded/banded_split.h"
+#include "cuda/banded/banded_cells.h"
+#include "cuda/banded/banded_control.h"
+#include "cuda/banded/banded_selection.h"
+#include "cuda/banded/banded_split.h"
 
 namespace ist::gpu {
 

@@ -1,27 +1,23 @@
-#include "banded/banded_pack.h"
+#include "cuda/banded/banded_pack.h"
 
-#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <thread>
 
-#include "banded/banded_buffers.h"
-#include "banded/banded_kernel.h"
-#include "device_array.h"
+#include "cuda/banded/banded_buffers.h"
+#include "cuda/banded/banded_kernel.h"
+#include "cuda/device_array.h"
+#include "packing/packing_settings.h"
 
 namespace ist::gpu {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// The host's side of a packing that somebody looks on at: reports progress while the kernel runs,
 /// and tells it to stop.
 class Watch {
  public:
-  Watch(const packing::BandLimits& limits, double length_unit, double time_limit,
-        const ProgressCallback& progress)
-      : limits_(limits), length_unit_(length_unit), time_limit_(time_limit), progress_(progress) {
-    if (time_limit <= 0 && !progress) return;
+  Watch(const packing::PackingLimits& limits, Stage& stage) : limits_(limits), stage_(stage) {
+    if (!stage.watched()) return;
     void* memory = nullptr;
     check(cudaHostAlloc(&memory, sizeof(Mailbox), cudaHostAllocMapped | cudaHostAllocPortable),
           "allocating pinned host memory");
@@ -46,31 +42,19 @@ class Watch {
       }
       look();
       // A short packing is waited for at once, a long one does not need a core.
-      if (Clock::now() - start_ > std::chrono::milliseconds(50))
-        std::this_thread::sleep_for(std::chrono::microseconds(500));
+      if (stage_.elapsed() > 0.05) std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
   }
 
  private:
   void look() {
-    const auto now = Clock::now();
-    const double elapsed = std::chrono::duration<double>(now - start_).count();
-    if (time_limit_ > 0 && elapsed >= time_limit_) stop(StopReason::time_limit);
-    if (!progress_ || now - last_report_ < std::chrono::milliseconds(100)) return;
-    last_report_ = now;
-    Progress p;
-    p.stage = "pack";
-    p.spheres = mailbox_->spheres;
-    p.coverage = static_cast<double>(mailbox_->covered) * packing::volume_unit_of(limits_.volume) /
-                 limits_.volume;
-    p.radius = double{mailbox_->radius} * length_unit_;
-    p.fraction = p.coverage / limits_.target_coverage;
-    if (limits_.max_spheres > 0)
-      p.fraction = std::max(
-          p.fraction, static_cast<double>(p.spheres) / static_cast<double>(limits_.max_spheres));
-    p.elapsed = elapsed;
     try {
-      if (!progress_(p)) stop(StopReason::cancelled);
+      const auto why = stage_.stop([this](Progress& now) {
+        const double coverage = static_cast<double>(mailbox_->covered) *
+                                packing::volume_unit_of(limits_.volume) / limits_.volume;
+        packing::set_progress(now, limits_, mailbox_->spheres, coverage, double{mailbox_->radius});
+      });
+      if (why) stop(*why);
     } catch (...) {
       stop(StopReason::cancelled);
       throw;
@@ -81,11 +65,8 @@ class Watch {
     if (mailbox_->stop == 0) mailbox_->stop = 1 + static_cast<std::uint32_t>(why);
   }
 
-  const packing::BandLimits& limits_;
-  const double length_unit_, time_limit_;
-  const ProgressCallback& progress_;
-  const Clock::time_point start_ = Clock::now();
-  Clock::time_point last_report_ = start_;
+  const packing::PackingLimits& limits_;
+  Stage& stage_;
   Mailbox* mailbox_ = nullptr;
 };
 
@@ -130,14 +111,13 @@ BandedCost cost_of(const BandedState& state, std::uint32_t launches) {
 
 }  // namespace
 
-SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::BandLimits& limits,
-                          double length_unit, double time_limit, const ProgressCallback& progress,
-                          BandedCost* cost) {
+SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::PackingLimits& limits,
+                          Stage& stage, BandedCost* cost) {
   BandedBuffers<DeviceArray, Queue> buffers(queue, packing::BandSchedule(limits),
                                             banded_sizes(limits.max_spheres));
   DeviceArray<MeetingPlace> place(queue, 1);
   place.fill_bytes(0);
-  Watch watch(limits, length_unit, time_limit, progress);
+  Watch watch(limits, stage);
   BandedState state;
   std::uint32_t launches = 0;
   try {

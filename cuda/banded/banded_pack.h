@@ -2,9 +2,10 @@
 
 #include <ist/packing.h>
 
+#include "cuda/queue.h"
 #include "mesh/wide_tree.h"
-#include "packing/band_schedule.h"
-#include "queue.h"
+#include "packing/banded/band_schedule.h"
+#include "stage/stage.h"
 
 namespace ist::gpu {
 
@@ -22,11 +23,9 @@ struct BandedCost {
   double work = 0, split = 0, select = 0, grid = 0, rest = 0;
 };
 
-/// packing::BandedPacker on the GPU: the same spheres, bit for bit. `mesh` is in device memory;
-/// `length_unit`: [u] of one unit-frame unit, for progress reports. The result's frame is left to
-/// the caller.
-SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::BandLimits& limits,
-                          double length_unit, double time_limit, const ProgressCallback& progress,
-                          BandedCost* cost = nullptr);
+/// packing::BandedPacker on the GPU: the same spheres, bit for bit. `mesh` is in device memory. The
+/// result's frame is left to the caller.
+SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::PackingLimits& limits,
+                          Stage& stage, BandedCost* cost = nullptr);
 
 }  // namespace ist::gpu

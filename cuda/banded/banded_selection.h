@@ -1,7 +1,7 @@
 #pragma once
 
-#include "banded/banded_control.h"
-#include "packing/certificate.h"
+#include "cuda/banded/banded_control.h"
+#include "packing/spheres/certificate.h"
 
 // The steps of a round that choose among the candidates of the active cells, certify the winners
 // and insert them. A step's teams do not wait for each other: certification takes the other winners
@@ -68,10 +68,10 @@ IST_HD void find_winners(Crew& crew, const BandedArrays& a) {
 
 /// The rank bucket of a candidate of this round; larger radii in higher ones.
 IST_HD inline std::uint32_t rank_bucket(const BandedState& s, float radius) {
-  const std::uint32_t least = packing::bits_of(s.schedule.threshold);
+  const std::uint32_t least = bits_of(s.schedule.threshold);
   std::uint32_t shift = 0;
   while ((s.largest_radius - least) >> shift >= RankBuckets::kCount) ++shift;
-  return (packing::bits_of(radius) - least) >> shift;
+  return (bits_of(radius) - least) >> shift;
 }
 
 /// Takes in a winner of which all is known. A cell whose winner is not accepted loses it.
@@ -110,7 +110,7 @@ IST_HD void certify_winners(Crew& crew, const BandedArrays& a, const Surface& su
       const double gap = packing::gap_to_surface(
           surface.exact_distance(team, me.centre, packing::clearance_limit(me.radius)));
       const double radius = me.radius;
-      if (team.lane() == 0) winner.by_surface = packing::rounded_down(gap < radius ? gap : radius);
+      if (team.lane() == 0) winner.by_surface = rounded_down(gap < radius ? gap : radius);
       found = Winner::kBySurface;
     } else if (item % 3 == 1) {
       double gap = me.radius;
@@ -144,9 +144,8 @@ IST_HD void insert_winners(Crew& crew, const BandedArrays& a) {
   const auto& team = crew.team();
   const SphereLists grid = a.grid();
   const std::uint64_t most = spheres_left(s);
-  const float top = packing::bits_of(s.schedule.margin) > s.largest_bound
-                        ? s.schedule.margin
-                        : float_of(s.largest_bound);
+  const float top =
+      bits_of(s.schedule.margin) > s.largest_bound ? s.schedule.margin : float_of(s.largest_bound);
   share_out(crew, s.winners, [&](std::uint32_t w) {
     const Winner winner = a.winners[w];
     if (winner.key == 0) return;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "banded/banded_cells.h"
+#include "cuda/banded/banded_cells.h"
 
 // The step of a band that splits cells.
 
@@ -42,7 +42,7 @@ IST_HD void split_few(Crew& crew, const BandedArrays& a, const Field& field) {
     if (keeps)
       slot = take_slot(a);
     else if (child.bound > 0)
-      atomic_max(&s.dropped, packing::bits_of(child.bound));
+      atomic_max(&s.dropped, bits_of(child.bound));
   }
   slot = team.broadcast(slot, 0);
   const bool stored = keeps && slot < a.cell_capacity;
@@ -108,7 +108,7 @@ IST_HD void split_cells(Crew& crew, const BandedArrays& a, const Surface& surfac
   dropped = team.max(dropped);
   live = team.sum(live);
   if (team.lane() == 0) {
-    atomic_max(&s.dropped, packing::bits_of(dropped));
+    atomic_max(&s.dropped, bits_of(dropped));
     atomic_add(&s.live, static_cast<std::uint32_t>(live));
   }
 }

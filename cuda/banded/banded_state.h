@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <cstring>
 
-#include "banded/sphere_lists.h"
-#include "packing/band_schedule.h"
-#include "packing/candidate.h"
-#include "packing/cell.h"
+#include "cuda/banded/sphere_lists.h"
+#include "packing/banded/band_schedule.h"
+#include "packing/banded/candidate.h"
+#include "packing/banded/cell.h"
 
 namespace ist::gpu {
 
@@ -191,7 +191,7 @@ struct ListedSpheres {
   IST_HD float reach() const { return lists.layout.reach; }
 
   template <class Team, class Visit>
-  IST_HD void for_near(const Team& team, packing::Float3 x, Visit&& visit) const {
+  IST_HD void for_near(const Team& team, Float3 x, Visit&& visit) const {
     lists.for_near(team, x, [&](bool valid, std::uint32_t index) {
       visit(valid, index, in_global_memory(spheres)[index].sphere());
     });

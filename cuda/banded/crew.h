@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "atomics.h"
+#include "cuda/atomics.h"
 
 // A crew is all the teams that do one packing together: the warps of a kernel, or a few threads of
 // the host (tests). Steps are templates over it. It has

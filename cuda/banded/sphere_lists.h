@@ -1,18 +1,16 @@
 #pragma once
 
-#include "atomics.h"
-#include "banded/crew.h"
-#include "packing/sphere_grid_layout.h"
+#include "cuda/atomics.h"
+#include "cuda/banded/crew.h"
+#include "packing/spheres/sphere_grid_layout.h"
 
 namespace ist::gpu {
 
-using packing::Float3;
-
-/// The sphere grid in device memory: lists as sets (packing/sphere_grid_layout.h), filled by many
-/// teams at once. A table of blocks of 8³ cells; cells where a sphere comes near; a cell's list is
-/// a segment of one pool of words, its length first. Filling goes in passes with a meeting of all
-/// teams between them: touch_blocks of every sphere, then count_in_cells, make_room and fill_cells
-/// of every (sphere, block) pair that it noted.
+/// The sphere grid in device memory: lists as sets (packing/spheres/sphere_grid_layout.h), filled
+/// by many teams at once. A table of blocks of 8³ cells; cells where a sphere comes near; a cell's
+/// list is a segment of one pool of words, its length first. Filling goes in passes with a meeting
+/// of all teams between them: touch_blocks of every sphere, then count_in_cells, make_room and
+/// fill_cells of every (sphere, block) pair that it noted.
 struct SphereLists {
   struct Cell {
     std::uint32_t where;  ///< segment, 0: none; the coverer of a covered cell

@@ -4,9 +4,9 @@
 
 #include <cstdint>
 
-#include "banded/banded_kernel.h"
-#include "banded/crew.h"
-#include "warp_team.h"
+#include "cuda/banded/banded_kernel.h"
+#include "cuda/banded/crew.h"
+#include "cuda/warp_team.h"
 
 namespace ist::gpu {
 

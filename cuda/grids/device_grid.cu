@@ -1,16 +1,16 @@
-#include "grids/device_grid.h"
+#include "cuda/grids/device_grid.h"
 
 #include <ist/error.h>
 
 #include <algorithm>
 #include <span>
 
-#include "grids/grid_cells.h"
-#include "grids/grid_triangles.h"
-#include "launch.h"
+#include "cuda/grids/grid_cells.h"
+#include "cuda/grids/grid_triangles.h"
+#include "cuda/launch.h"
+#include "cuda/prefix_sum.h"
 #include "packing/grids/cell_listing.h"
 #include "packing/grids/discrete_distance.h"
-#include "prefix_sum.h"
 
 namespace ist::gpu {
 namespace {

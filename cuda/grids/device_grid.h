@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "device_array.h"
+#include "cuda/device_array.h"
 #include "mesh/mesh_view.h"
 #include "packing/grids/distance_grid.h"
 

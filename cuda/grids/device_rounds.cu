@@ -1,13 +1,13 @@
-#include "grids/device_rounds.h"
+#include "cuda/grids/device_rounds.h"
 
 #include <algorithm>
 
-#include "grids/search_crew.h"
-#include "launch.h"
+#include "cuda/grids/search_crew.h"
+#include "cuda/launch.h"
+#include "cuda/warp_team.h"
 #include "packing/grids/discrete_distance.h"
 #include "packing/grids/grid_certificate.h"
 #include "packing/grids/prototype_cells.h"
-#include "warp_team.h"
 
 namespace ist::gpu {
 namespace {

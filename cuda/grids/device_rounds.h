@@ -3,8 +3,8 @@
 #include <functional>
 #include <vector>
 
-#include "grids/device_grid.h"
-#include "packing/grids/grid_backend.h"
+#include "cuda/grids/device_grid.h"
+#include "packing/grids/grid_rounds.h"
 
 namespace ist::gpu {
 

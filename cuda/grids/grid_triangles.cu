@@ -1,8 +1,8 @@
-#include "grids/grid_triangles.h"
+#include "cuda/grids/grid_triangles.h"
 
 #include <algorithm>
 
-#include "launch.h"
+#include "cuda/launch.h"
 #include "packing/grids/local_winding.h"
 
 namespace ist::gpu {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "device_array.h"
+#include "cuda/device_array.h"
 #include "packing/grids/distance_grid.h"
 
 // Triangles and the distance grid's cells, in device memory: HostGrid's steps of the same names.

@@ -25,6 +25,8 @@ struct UnitFrame {
 /// infinite or zero-size box.
 UnitFrame unit_frame(const Eigen::AlignedBox3d& bounds);
 
+class MeshSolid;
+
 /// Anything that can be packed: a set of points with a signed distance. Implementations are
 /// immutable; every function may be called from many threads at once.
 class Solid {
@@ -38,6 +40,10 @@ class Solid {
   virtual Eigen::AlignedBox3d bounds() const = 0;    ///< [u] holds the whole solid
   virtual double volume() const = 0;                 ///< [u³]
   virtual double volume_error() const { return 0; }  ///< [u³] on volume(), see the maker
+
+  /// The mesh that bounds the solid, where one does (make_solid): it is then packed by its
+  /// triangles, on a GPU too. Null for every other solid.
+  virtual const MeshSolid* mesh() const noexcept { return nullptr; }
 };
 
 /// The solid of a closed mesh: where its winding number is ≥ 1 (DESIGN 3.6). Copies the mesh.

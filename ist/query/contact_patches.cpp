@@ -3,11 +3,11 @@
 
 #include <ist/query.h>
 
-#include "query/contact_bins.h"
-#include "query/contact_division.h"
-#include "query/descent.h"
-#include "query/sphere_tree.h"
-#include "query/workspace.h"
+#include "query/asset/sphere_tree.h"
+#include "query/contact/contact_bins.h"
+#include "query/contact/contact_division.h"
+#include "query/descent/descent.h"
+#include "query/descent/workspace.h"
 
 namespace ist {
 namespace {

@@ -1,8 +1,8 @@
 #include <ist/query.h>
 
-#include "query/descent.h"
-#include "query/detail_blend.h"
-#include "query/twins.h"
+#include "query/descent/descent.h"
+#include "query/detail/coincident.h"
+#include "query/detail/detail_blend.h"
 
 namespace ist {
 

@@ -5,12 +5,12 @@
 
 #include <ist/query.h>
 
-#include "query/budget.h"
-#include "query/gap_kernel.h"
-#include "query/precision.h"
-#include "query/relative_pose.h"
-#include "query/sphere_tree.h"
-#include "query/workspace.h"
+#include "query/asset/sphere_tree.h"
+#include "query/base/budget.h"
+#include "query/base/precision.h"
+#include "query/base/relative_pose.h"
+#include "query/descent/workspace.h"
+#include "query/kernel/gap_kernel.h"
 
 namespace ist {
 namespace {

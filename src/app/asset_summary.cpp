@@ -4,9 +4,9 @@
 
 #include <cmath>
 
+#include <ist/asset_layout.h>
 #include "app/text.h"
-#include "build/trial_poses.h"
-#include "query/asset_layout.h"
+#include "bake/predict/trial_poses.h"
 
 namespace ist::app {
 namespace {

@@ -6,10 +6,10 @@
 
 #include <ist/bake.h>
 
+#include <ist/asset_layout.h>
 #include "app/commands.h"
 #include "app/number_checks.h"
 #include "app/text.h"
-#include "query/asset_layout.h"
 
 namespace ist::app {
 namespace {

@@ -6,12 +6,12 @@
 #include <ist/bake.h>
 #include <ist/error.h>
 
+#include <ist/asset_layout.h>
 #include "app/commands.h"
 #include "app/exported_spheres.h"
 #include "app/interrupt.h"
 #include "app/number_checks.h"
 #include "asset/atomic_file.h"
-#include "query/asset_layout.h"
 
 namespace ist::app {
 namespace {

@@ -8,7 +8,7 @@
 #include <iterator>
 #include <limits>
 
-#include "query/asset_layout.h"
+#include <ist/asset_layout.h>
 
 namespace ist::app {
 namespace {
@@ -23,7 +23,7 @@ struct Moved {
 
 /// x · scale + origin. The product is exact (a power of two); what the sum rounds away is found by
 /// Knuth's two-sum, which is exact again.
-Moved to_mesh_frame(const Sphere4& s, const double origin[3], double scale) {
+Moved to_mesh_frame(const Sphere& s, const double origin[3], double scale) {
   const double unit[3] = {s.x, s.y, s.z};
   Moved moved{Eigen::Vector3d::Zero(), 0};
   for (int k = 0; k < 3; ++k) {
@@ -64,8 +64,8 @@ std::string joined_columns(const char* before, const char* between, const char* 
 std::vector<ExportedSphere> exported_spheres(const TreeView& tree, std::uint32_t detail) {
   const AssetHeader& header = tree.header();
   const double scale = std::ldexp(1.0, header.exponent);
-  const Sphere4* const inner = at<Sphere4>(header, header.inner_spheres);
-  const Sphere4* const effective = effective_spheres(header, detail);
+  const Sphere* const inner = at<Sphere>(header, header.inner_spheres);
+  const Sphere* const effective = effective_spheres(header, detail);
   const float* const cover = at<float>(header, header.cover_radii);
   std::vector<ExportedSphere> result(matched_tree(header, detail).sphere_count);
   for (std::size_t i = 0; i < result.size(); ++i) {

@@ -5,8 +5,8 @@
 #include <new>
 #include <system_error>
 
+#include <ist/asset_layout.h>
 #include "asset/atomic_file.h"
-#include "query/asset_layout.h"
 
 namespace ist {
 namespace {

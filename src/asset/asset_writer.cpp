@@ -3,7 +3,7 @@
 #include <ist/error.h>
 #include <cstring>
 
-#include "query/content_hash.h"
+#include "query/asset/content_hash.h"
 
 namespace ist {
 namespace {

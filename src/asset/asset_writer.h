@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "query/asset_layout.h"
+#include <ist/asset_layout.h>
 
 namespace ist {
 
@@ -29,7 +29,7 @@ struct TreeArrays {
 
 /// A coarser matched set.
 struct DetailArrays {
-  std::vector<Sphere4> effective_spheres;
+  std::vector<Sphere> effective_spheres;
   double protrusion = 0;  ///< unit frame
   TreeArrays matched_tree;
 };
@@ -37,9 +37,9 @@ struct DetailArrays {
 /// What an asset is made of.
 struct AssetArrays {
   AssetHeader header;  ///< scalar fields; offsets, counts, magic and hash are filled in by writing
-  std::vector<Sphere4> inner_spheres;
-  std::vector<float> cover_radii;          ///< the same length
-  std::vector<Sphere4> effective_spheres;  ///< the same length
+  std::vector<Sphere> inner_spheres;
+  std::vector<float> cover_radii;         ///< the same length
+  std::vector<Sphere> effective_spheres;  ///< the same length
   TreeArrays inner_tree;
   TreeArrays matched_tree;
   std::vector<DetailArrays> details;  ///< the i-th from 1 of ⌊n / 4^i⌋ spheres

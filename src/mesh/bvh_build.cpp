@@ -8,6 +8,7 @@
 
 #include "mesh/bvh.h"
 #include "mesh/triangle_frame.h"
+#include "numerics/rounding.h"
 
 namespace ist {
 namespace {
@@ -34,13 +35,6 @@ struct Box {
     return x < 0 ? 0 : x * y + y * z + z * x;
   }
 };
-
-float round_down(double value) {
-  const float f = static_cast<float>(value);
-  return static_cast<double>(f) > value ? std::nextafterf(f, -kInfinity) : f;
-}
-
-float round_up(double value) { return -round_down(-value); }
 
 /// A triangle on its way to a leaf.
 struct Reference {
@@ -89,8 +83,8 @@ class Builder {
     for (int i = 0; i < 3; ++i) {
       const double* p = corner(triangle, i);
       for (int k = 0; k < 3; ++k) {
-        box.lower[k] = std::min(box.lower[k], round_down(p[k]));
-        box.upper[k] = std::max(box.upper[k], round_up(p[k]));
+        box.lower[k] = std::min(box.lower[k], rounded_down(p[k]));
+        box.upper[k] = std::max(box.upper[k], rounded_up(p[k]));
       }
     }
     return box;

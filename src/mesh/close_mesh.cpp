@@ -102,8 +102,7 @@ MeshReport survey(const TriangleMesh& mesh) {
   const std::string kind = boundary == odd ? "boundary edge" : "boundary or odd edge";
   throw Error(name + ": " + counted(odd, kind) + ", first at vertex " +
               std::to_string(edges.low(first)) + " " +
-              position_text(mesh.vertices[edges.low(first)]) +
-              ": not closed. Bake with --repair, or close it");
+              position_text(mesh.vertices[edges.low(first)]) + ": not closed. Repair or close it");
 }
 
 double largest_coordinate(const Eigen::AlignedBox3d& bounds) {

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <cstring>
 
-#include "mesh/host_device.h"
 #include "mesh/mesh_view.h"
 #include "mesh/triangle_frame.h"
+#include "numerics/host_device.h"
 
 // Closest-point queries for host and device. The float answer is the minimum of one fixed formula
 // (closest_in_frame over the blocks' frames) over *all* triangles, the smaller index among equals:

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "mesh/host_device.h"
+#include "numerics/host_device.h"
 
 // Orientation predicates, for host and device. A bound on the rounding error decides nearly always
 // (J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric

@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "mesh/closest_point.h"
-#include "mesh/host_device.h"
 #include "mesh/triangle_frame.h"
+#include "numerics/host_device.h"
 
 namespace ist {
 

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "mesh/host_device.h"
 #include "mesh/mesh_view.h"
 #include "mesh/ray_crossing.h"
+#include "numerics/host_device.h"
 
 namespace ist {
 

@@ -31,6 +31,7 @@ class MeshSolid final : public Solid {
   Eigen::AlignedBox3d bounds() const override;
   double volume() const override;
   double volume_error() const override;
+  const MeshSolid* mesh() const noexcept override { return this; }
 
   const UnitFrame& frame() const;
   double unit_volume() const;        ///< unit frame³

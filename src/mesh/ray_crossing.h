@@ -4,7 +4,7 @@
 
 #include "mesh/exact_sign.h"
 #include "mesh/exact_triangle.h"
-#include "mesh/host_device.h"
+#include "numerics/rounding.h"
 
 // Crossings of single triangles with lines parallel to x, see winding.h.
 
@@ -82,11 +82,8 @@ IST_HD inline int ray_winding(const Corners& t, const double p[3]) {
 struct FloatInterval {
   float lower, upper;
 
-  IST_HD explicit FloatInterval(double value) {
-    const auto f = static_cast<float>(value);
-    lower = static_cast<double>(f) > value ? nextafterf(f, -HUGE_VALF) : f;
-    upper = static_cast<double>(f) < value ? nextafterf(f, HUGE_VALF) : f;
-  }
+  IST_HD explicit FloatInterval(double value)
+      : lower(rounded_down(value)), upper(rounded_up(value)) {}
 };
 
 /// A box that holds the ray from p, or a whole line; rounded outward.

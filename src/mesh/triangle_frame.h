@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "mesh/host_device.h"
+#include "numerics/host_device.h"
 
 namespace ist {
 

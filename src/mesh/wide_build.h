@@ -4,6 +4,7 @@
 
 #include "mesh/exact_triangle.h"
 #include "mesh/wide_tree.h"
+#include "numerics/rounding.h"
 
 // The steps of building a WideTree that concern one triangle, for host and device.
 
@@ -17,9 +18,7 @@ struct WideBox {
   /// Takes a point in; the box then holds its exact and its rounded coordinates.
   IST_HD void extend(const double point[3]) {
     for (int k = 0; k < 3; ++k) {
-      const auto f = static_cast<float>(point[k]);
-      const float below = static_cast<double>(f) > point[k] ? nextafterf(f, -HUGE_VALF) : f;
-      const float above = static_cast<double>(f) < point[k] ? nextafterf(f, HUGE_VALF) : f;
+      const float below = rounded_down(point[k]), above = rounded_up(point[k]);
       lower[k] = below < lower[k] ? below : lower[k];
       upper[k] = above > upper[k] ? above : upper[k];
     }

@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "mesh/host_device.h"
 #include "mesh/mesh_view.h"
 #include "mesh/triangle_frame.h"
+#include "numerics/host_device.h"
 
 // A mesh as the GPU asks it: a hierarchy without pointers, as wide as a warp, over triangles
 // ordered so that successive ones lie close together (cuda/triangle_order.h). Node 0 is the root

@@ -2,6 +2,7 @@
 
 #include <ist/error.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -38,6 +39,34 @@ void check_settings(const PackingSettings& s) {
     throw Error(
         "packing: no limit is set; give a sphere count, a coverage below 1, a smallest radius or a "
         "time");
+}
+
+PackingLimits packing_limits(const Solid& solid, double scale, const PackingSettings& settings) {
+  PackingLimits limits;
+  limits.volume = solid.volume() / scale / scale / scale;
+  if (!(limits.volume > 0)) throw Error("packing: the solid's volume is not positive");
+  limits.target_coverage = settings.target_coverage;
+  limits.min_radius = settings.min_radius / scale;
+  limits.epsilon = settings.epsilon;
+  limits.max_spheres = settings.max_spheres;
+  limits.seed = settings.seed;
+  limits.length_unit = scale;
+  return limits;
+}
+
+void set_progress(Progress& progress, const PackingLimits& limits, std::size_t spheres,
+                  double coverage, double radius) {
+  progress.spheres = spheres;
+  progress.coverage = coverage;
+  progress.radius = radius * limits.length_unit;
+  // The first sphere meets a target of 0.
+  double fraction = limits.target_coverage > 0
+                        ? coverage / limits.target_coverage
+                        : static_cast<double>(std::min<std::size_t>(spheres, 1));
+  if (limits.max_spheres > 0)
+    fraction =
+        std::max(fraction, static_cast<double>(spheres) / static_cast<double>(limits.max_spheres));
+  progress.fraction = std::min(1.0, fraction);
 }
 
 }  // namespace ist::packing

@@ -2,9 +2,20 @@
 
 #include <ist/packing.h>
 
+#include "packing/spheres/packing_limits.h"
+
 namespace ist::packing {
 
 /// Throws Error, naming the setting, its value and its range, unless every setting is in range.
 void check_settings(const PackingSettings& settings);
+
+/// What the settings mean in the unit frame of a solid; `scale`: [u] of one unit-frame unit. Throws
+/// Error if the solid has no volume.
+PackingLimits packing_limits(const Solid& solid, double scale, const PackingSettings& settings);
+
+/// Sets where a packing stands; `radius`: of the spheres being inserted, unit frame. The fraction
+/// is that of the limit that is nearest, of count and coverage.
+void set_progress(Progress& progress, const PackingLimits& limits, std::size_t spheres,
+                  double coverage, double radius);
 
 }  // namespace ist::packing

@@ -67,7 +67,7 @@ TEST_F(AssetCommands, CheckExitsWith3WhereASphereHasGrown) {
   std::memcpy(bytes.data(), file.data(), file.size());
   ist::AssetHeader header;
   std::memcpy(&header, bytes.data(), sizeof(header));
-  ist::Sphere4 sphere;
+  ist::Sphere sphere;
   std::memcpy(&sphere, bytes.data() + header.inner_spheres, sizeof(sphere));
   sphere.r *= 1.001f;
   std::memcpy(bytes.data() + header.inner_spheres, &sphere, sizeof(sphere));

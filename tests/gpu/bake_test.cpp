@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "build/calibration.h"
-#include "build/cover.h"
-#include "mesh_on_gpu.h"
+#include "bake/calibrate/calibration.h"
+#include "bake/cover/cover.h"
 #include "support/gpu_test.h"
+#include "support/on_host.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 
@@ -33,14 +33,14 @@ void expect_same(const ClosedMesh& mesh, std::size_t count) {
   SCOPED_TRACE(mesh.name + ", " + std::to_string(count));
   const MeshSolid solid(mesh);
   const std::vector<Sphere> inner = packed_on_cpu(solid, count);
-  gpu::MeshOnGpu on_gpu(solid, {});
-  const Calibration host = calibrate(solid, inner, 0, {});
-  const Calibration card = calibrate(solid, inner, 0, {}, &on_gpu);
+  const auto on_gpu = make_backend(solid, {Device::cuda, {}});
+  const Calibration host = testing::calibrate_on_host(solid, inner);
+  const Calibration card = calibrate(solid, *on_gpu, inner, {});
   EXPECT_EQ(std::memcmp(host.effective.data(), card.effective.data(),
-                        host.effective.size() * sizeof(Sphere4)),
+                        host.effective.size() * sizeof(Sphere)),
             0);
   EXPECT_EQ(host.protrusion, card.protrusion);
-  EXPECT_EQ(cover_radii(solid, inner, 0, {}), cover_radii(solid, inner, 0, {}, &on_gpu));
+  EXPECT_EQ(testing::cover_on_host(solid, inner), cover_radii(solid, *on_gpu, inner, {}));
 }
 
 TEST_F(GpuBake, CalibrationAndCoverAreThoseOfTheCpu) {
@@ -83,11 +83,11 @@ TEST_F(GpuBake, AssetsAreThoseOfTheCpu) {
 
 TEST_F(GpuBake, CancellingEndsIt) {
   const MeshSolid solid(closed(testing::cube_mesh(), "cube"));
-  gpu::MeshOnGpu on_gpu(solid, {});
+  const auto on_gpu = make_backend(solid, {Device::cuda, {}});
   const Sphere ball = {0, 0, 0, 0.5f};
   const auto cancel = [](const Progress&) { return false; };
-  EXPECT_THROW(calibrate(solid, {&ball, 1}, 0, cancel, &on_gpu), Error);
-  EXPECT_THROW(cover_radii(solid, {&ball, 1}, 0, cancel, &on_gpu), Error);
+  EXPECT_THROW(calibrate(solid, *on_gpu, {&ball, 1}, cancel), Error);
+  EXPECT_THROW(cover_radii(solid, *on_gpu, {&ball, 1}, cancel), Error);
 }
 
 }  // namespace

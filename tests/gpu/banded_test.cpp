@@ -1,4 +1,4 @@
-#include "banded/banded_pack.h"
+#include "cuda/banded/banded_pack.h"
 
 #include <ist/error.h>
 #include <ist/packing.h>
@@ -8,10 +8,10 @@
 #include <thread>
 #include <vector>
 
-#include "device_mesh.h"
+#include "cuda/device_mesh.h"
 #include "mesh/mesh_solid.h"
-#include "mesh/samples/samples.h"
-#include "packing/band_limits.h"
+#include "packing/packing_settings.h"
+#include "samples/samples.h"
 #include "support/gpu_test.h"
 #include "support/same_packing.h"
 #include "support/scarce_memory.h"
@@ -31,9 +31,9 @@ SpherePacking pack_on_gpu(const MeshSolid& solid, const PackingSettings& setting
   gpu::Queue queue(settings.gpu);
   const gpu::DeviceMesh mesh(
       queue, {view.vertices_exact, view.triangles, view.vertex_count, view.triangle_count, {}, 1});
+  Stage stage("pack", progress, settings.time_limit);
   return gpu::pack_banded(queue, mesh.tree(),
-                          packing::band_limits(solid, solid.frame().scale(), settings),
-                          solid.frame().scale(), settings.time_limit, progress);
+                          packing::packing_limits(solid, solid.frame().scale(), settings), stage);
 }
 
 void compare(const ClosedMesh& mesh, const std::vector<PackingSettings>& cases) {

@@ -2,11 +2,11 @@
 
 #include <thread>
 
-#include "grids/pack_grids.h"
+#include "cuda/grids/device_grid_rounds.h"
+#include "cuda/queue.h"
 #include "mesh/mesh_solid.h"
-#include "mesh/samples/samples.h"
-#include "packing/thread_arena.h"
-#include "queue.h"
+#include "samples/samples.h"
+#include "stage/thread_arena.h"
 #include "support/certified_packing.h"
 #include "support/gpu_test.h"
 #include "support/shared_data.h"
@@ -37,14 +37,14 @@ PackingSettings small(GridMode mode, std::size_t spheres) {
 }
 
 SpherePacking on_cpu(const MeshSolid& solid, const PackingSettings& settings) {
-  SpherePacking packing;
-  thread_arena(0).execute([&] { packing = packing::pack_grids(solid, settings, {}); });
-  return packing;
+  Stage stage("pack", {});
+  return thread_arena(0).execute([&] { return packing::pack_grids(solid, settings, stage); });
 }
 
 SpherePacking on_gpu(const MeshSolid& solid, const PackingSettings& settings) {
   gpu::Queue queue{GpuSettings{}};
-  SpherePacking packing = gpu::pack_grids(queue, solid, settings, {});
+  Stage stage("pack", {});
+  SpherePacking packing = gpu::pack_grids(queue, solid, settings, stage);
   EXPECT_EQ(queue.bytes_in_use(), 0u);
   return packing;
 }
@@ -104,7 +104,8 @@ TEST_F(GridPackingGpuTest, TheMemoryOfInactiveCellsIsGivenBack) {
   PackingSettings settings = small(GridMode::implicit_refinement, 300);
   settings.grids.resolution = 128;
   std::vector<packing::GridRound> history;
-  gpu::pack_grids(queue, solid, settings, {}, &history);
+  Stage stage("pack", {});
+  gpu::pack_grids(queue, solid, settings, stage, &history);
   ASSERT_GE(history.size(), 3u);
   EXPECT_LT(history.back().use.active_cells, history.front().use.active_cells / 3);
   EXPECT_LT(history.back().use.bytes, history.front().use.bytes / 2);

@@ -1,11 +1,11 @@
-#include "queue.h"
+#include "cuda/queue.h"
 
 #include <ist/error.h>
 
 #include <numeric>
 #include <vector>
 
-#include "device_array.h"
+#include "cuda/device_array.h"
 #include "support/gpu_test.h"
 #include "support/scarce_memory.h"
 

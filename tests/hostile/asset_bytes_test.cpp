@@ -9,7 +9,7 @@
 #include <random>
 #include <string>
 
-#include "mesh/samples/samples.h"
+#include "samples/samples.h"
 #include "support/asset_bytes.h"
 
 // Assets that were cut, damaged or made to harm.

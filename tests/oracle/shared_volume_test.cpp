@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "build/shared_volume.h"
+#include "bake/predict/shared_volume.h"
 #include "mesh/mesh_solid.h"
 #include "support/oracle_rows.h"
 #include "support/test_meshes.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mesh/samples/samples.h"
+#include "samples/samples.h"
 #include "support/oracle_assets.h"
 #include "support/shared_data.h"
 

@@ -105,10 +105,10 @@ TEST(ContactPatchesTest, SumOfGrazingSpheresIsTakenAgainInDouble) {
 }
 
 /// An asset of these spheres, inner and effective.
-Asset make_asset(const std::vector<Sphere4>& spheres) {
+Asset make_asset(const std::vector<Sphere>& spheres) {
   AssetArrays arrays;
   arrays.inner_spheres = arrays.effective_spheres = spheres;
-  for (const Sphere4& s : spheres) arrays.cover_radii.push_back(2 * s.r);
+  for (const Sphere& s : spheres) arrays.cover_radii.push_back(2 * s.r);
   arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
   arrays.matched_tree = build_tree(arrays.effective_spheres, {});
   arrays.header.volume = arrays.matched_tree.volume_sum;
@@ -118,7 +118,7 @@ Asset make_asset(const std::vector<Sphere4>& spheres) {
 TEST(ContactPatchesTest, TellSeparateContactsApart) {
   // Two clumps about x = ±2 are pressed outward by a ball between them: forces that cancel unless
   // they are told apart.
-  std::vector<Sphere4> clumps;
+  std::vector<Sphere> clumps;
   std::mt19937_64 random(5);
   std::uniform_real_distribution<float> uniform(-0.5f, 0.5f);
   for (int i = 0; i < 400; ++i)

@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "query/lens.h"
+#include "query/kernel/lens.h"
 
 // The overlap of two balls against 100 decimal digits, for exactly the given radii and distance:
 // random ones and such as are made to lose digits.

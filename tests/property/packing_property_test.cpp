@@ -11,7 +11,7 @@
 #include <random>
 
 #include "mesh/mesh_solid.h"
-#include "mesh/samples/samples.h"
+#include "samples/samples.h"
 #include "support/float_traps.h"
 #include "support/same_packing.h"
 #include "support/shared_data.h"

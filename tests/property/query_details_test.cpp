@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <ist/query.h>
 
-#include "query/detail_chain.h"
+#include "query/detail/detail_chain.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
 
@@ -187,7 +187,7 @@ TEST(QueryDetailsAlone, WithoutAGaugeTheFinestAnswers) {
   // The finest reaches out to x = 1, the coarser level stops far short of it.
   AssetArrays arrays;
   for (int i = 0; i < 8; ++i) {
-    const Sphere4 s = {static_cast<float>(i) / 4 - 0.9f, 0, 0, 0.15f};
+    const Sphere s = {static_cast<float>(i) / 4 - 0.9f, 0, 0, 0.15f};
     arrays.inner_spheres.push_back(s);
     arrays.effective_spheres.push_back(s);
     arrays.cover_radii.push_back(0.3f);

@@ -19,8 +19,8 @@
 #include <string>
 #include <vector>
 
-#include "mesh/samples/samples.h"
-#include "query/asset_layout.h"
+#include <ist/asset_layout.h>
+#include "samples/samples.h"
 #include "support/shared_data.h"
 
 namespace {
@@ -118,7 +118,7 @@ Hashes bake_and_hash(const Row& row, const ist::ClosedMesh& mesh, ist::Device de
   ist::AssetHeader header;
   std::memcpy(&header, asset.bytes().data(), sizeof header);
   const std::byte* const spheres = asset.bytes().data() + header.inner_spheres;
-  return {hex(XXH3_64bits(spheres, header.sphere_count * sizeof(ist::Sphere4))),
+  return {hex(XXH3_64bits(spheres, header.sphere_count * sizeof(ist::Sphere))),
           hex(header.content_hash)};
 }
 

@@ -22,8 +22,8 @@
 #include <thread>
 #include <vector>
 
-#include "mesh/samples/samples.h"
 #include "report.h"
+#include "samples/samples.h"
 #include "support/random_assets.h"
 
 namespace {

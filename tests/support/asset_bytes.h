@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "asset/asset_writer.h"
-#include "build/tree_builder.h"
-#include "query/content_hash.h"
+#include "bake/cluster/tree_builder.h"
+#include "query/asset/content_hash.h"
 
 // Small assets without a mesh, and bytes to damage.
 

@@ -30,8 +30,8 @@
 #include <ist/bake.h>
 #include <ist/query.h>
 
+#include <ist/asset_layout.h>
 #include "mesh/mesh_solid.h"
-#include "query/asset_layout.h"
 #include "support/bullet_mesh.h"
 #include "support/fcl_mesh.h"
 #include "support/oracle_rows.h"
@@ -49,7 +49,7 @@ struct Body {
         fcl(closed->mesh, scale),
         bullet(closed->mesh, scale) {
     const AssetHeader& header = asset->view().header();
-    const auto* spheres = ist::at<Sphere4>(header, header.inner_spheres);
+    const auto* spheres = ist::at<Sphere>(header, header.inner_spheres);
     const auto* cover = ist::at<float>(header, header.cover_radii);
     double missed = 0;
     for (std::uint64_t i = 0; i < header.sphere_count; ++i)

@@ -1,4 +1,4 @@
-#include "mesh/samples/samples.h"
+#include "samples/samples.h"
 #include "support/extreme_boxes.h"
 
 // Extremes of where solids are placed.

@@ -10,7 +10,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "mesh/team.h"
+#include "numerics/team.h"
 
 namespace ist::testing {
 

@@ -6,8 +6,8 @@
 #include <thread>
 #include <vector>
 
-#include "banded/crew.h"
-#include "mesh/team.h"
+#include "cuda/banded/crew.h"
+#include "numerics/team.h"
 
 namespace ist::testing {
 

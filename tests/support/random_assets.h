@@ -8,7 +8,7 @@
 #include <ist/bake.h>
 
 #include "asset/asset_writer.h"
-#include "build/tree_builder.h"
+#include "bake/cluster/tree_builder.h"
 
 namespace ist::testing {
 
@@ -48,8 +48,7 @@ inline Asset make_random_asset(const RandomAsset& like, unsigned seed) {
     const auto count = static_cast<std::ptrdiff_t>(detail_spheres(like.spheres, i));
     detail.effective_spheres.assign(arrays.effective_spheres.begin(),
                                     arrays.effective_spheres.begin() + count);
-    for (Sphere4& s : detail.effective_spheres)
-      s.r *= static_cast<float>(std::cbrt(std::pow(4, i)));
+    for (Sphere& s : detail.effective_spheres) s.r *= static_cast<float>(std::cbrt(std::pow(4, i)));
     detail.matched_tree = build_tree(detail.effective_spheres, {});
   }
   for (int k = 0; k < 3; ++k) arrays.header.centre[k] = like.centre[k];

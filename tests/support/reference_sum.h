@@ -9,8 +9,8 @@
 
 #include <ist/query.h>
 
-#include "query/asset_layout.h"
-#include "query/lens.h"
+#include <ist/asset_layout.h>
+#include "query/kernel/lens.h"
 
 namespace ist::testing {
 
@@ -27,8 +27,8 @@ inline std::vector<WorldSphere> world_spheres(const PlacedTree& placed, Measure 
                                               std::uint32_t detail = 0) {
   const AssetHeader& header = placed.tree.header();
   const bool inner = measure == Measure::inner;
-  const Sphere4* spheres =
-      inner ? at<Sphere4>(header, header.inner_spheres) : effective_spheres(header, detail);
+  const Sphere* spheres =
+      inner ? at<Sphere>(header, header.inner_spheres) : effective_spheres(header, detail);
   const std::uint64_t count = detail_spheres(header.sphere_count, inner ? 0 : detail);
   const float* covers = at<float>(header, header.cover_radii);
   const Eigen::Quaterniond q =
@@ -38,7 +38,7 @@ inline std::vector<WorldSphere> world_spheres(const PlacedTree& placed, Measure 
   const double unit = std::ldexp(1.0, header.exponent);
   std::vector<WorldSphere> out;
   for (std::uint64_t i = 0; i < count; ++i) {
-    const Sphere4& s = spheres[i];
+    const Sphere& s = spheres[i];
     const Eigen::Vector3d mesh =
         unit * Eigen::Vector3d(s.x, s.y, s.z) +
         Eigen::Vector3d(header.centre[0], header.centre[1], header.centre[2]);

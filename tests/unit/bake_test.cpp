@@ -6,9 +6,9 @@
 #include <cstring>
 #include <functional>
 
+#include <ist/asset_layout.h>
 #include "asset/asset_writer.h"
-#include "query/asset_layout.h"
-#include "query/content_hash.h"
+#include "query/asset/content_hash.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 
@@ -77,9 +77,9 @@ T* writable(AssetHeader& header, std::uint64_t offset) {
   return const_cast<T*>(at<T>(header, offset));
 }
 
-Sphere4& inner(AssetHeader& h, std::size_t i) { return writable<Sphere4>(h, h.inner_spheres)[i]; }
-Sphere4& effective(AssetHeader& h, std::size_t i) {
-  return writable<Sphere4>(h, h.effective_spheres)[i];
+Sphere& inner(AssetHeader& h, std::size_t i) { return writable<Sphere>(h, h.inner_spheres)[i]; }
+Sphere& effective(AssetHeader& h, std::size_t i) {
+  return writable<Sphere>(h, h.effective_spheres)[i];
 }
 BallBlock& block(AssetHeader& h, const TreeHeader& tree, std::size_t level) {
   return *writable<BallBlock>(h, tree.level[level].blocks);
@@ -172,7 +172,7 @@ TEST(Check, TurnsRedForEveryInvariantOfADetail) {
   };
   const std::vector<Tampering> cases = {
       {"detail 1: effective volumes sum to the solid",
-       [&](AssetHeader& h) { writable<Sphere4>(h, detail(h).effective_spheres)->r *= 1.001f; }},
+       [&](AssetHeader& h) { writable<Sphere>(h, detail(h).effective_spheres)->r *= 1.001f; }},
       {"detail 1: effective protrusion", [&](AssetHeader& h) { detail(h).protrusion *= 0.999; }},
       {"detail 1: matched tree: leaves are the table",
        [&](AssetHeader& h) { block(h, detail(h).matched_tree, 0).r[2] *= 1.000001f; }},

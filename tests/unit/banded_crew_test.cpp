@@ -1,4 +1,4 @@
-#include "banded/banded_loop.h"
+#include "cuda/banded/banded_loop.h"
 
 #include <gtest/gtest.h>
 #include <ist/packing.h>
@@ -6,10 +6,10 @@
 #include <memory>
 #include <vector>
 
-#include "banded/banded_buffers.h"
-#include "mesh/samples/samples.h"
-#include "packing/band_limits.h"
-#include "packing/mesh_surface.h"
+#include "cuda/banded/banded_buffers.h"
+#include "packing/banded/mesh_surface.h"
+#include "packing/packing_settings.h"
+#include "samples/samples.h"
 #include "support/host_crew.h"
 #include "support/same_packing.h"
 #include "support/test_meshes.h"
@@ -62,7 +62,7 @@ CrewPacking pack_by_crew(const MeshSolid& solid, const PackingSettings& settings
   const packing::MeshSurface surface(solid);
   Host host;
   gpu::BandedBuffers<HostArray, Host> buffers(
-      host, packing::BandSchedule(packing::band_limits(solid, solid.frame().scale(), settings)),
+      host, packing::BandSchedule(packing::packing_limits(solid, solid.frame().scale(), settings)),
       sizes);
   CrewPacking out;
   for (;;) {

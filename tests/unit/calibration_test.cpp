@@ -1,4 +1,4 @@
-#include "build/calibration.h"
+#include "bake/calibrate/calibration.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,9 @@
 #include <ist/error.h>
 #include <ist/packing.h>
 
-#include "build/cube_root.h"
-#include "build/power_cells.h"
+#include "bake/calibrate/power_cells.h"
+#include "numerics/roots.h"
+#include "support/on_host.h"
 #include "support/test_meshes.h"
 
 namespace ist {
@@ -20,21 +21,22 @@ namespace {
 
 using Eigen::Vector3d;
 using testing::box_mesh;
+using testing::calibrate_on_host;
 using testing::closed;
 
 double ball_volume(double r) { return 4 * std::numbers::pi / 3 * r * r * r; }
 
-Vector3d centre(const Sphere4& s) { return {s.x, s.y, s.z}; }
+Vector3d centre(const Sphere& s) { return {s.x, s.y, s.z}; }
 
 double volume_sum(const Calibration& calibration) {
   double sum = 0;
-  for (const Sphere4& s : calibration.effective) sum += ball_volume(s.r);
+  for (const Sphere& s : calibration.effective) sum += ball_volume(s.r);
   return sum;
 }
 
 Vector3d centre_of_mass(const Calibration& calibration) {
   Vector3d sum = Vector3d::Zero();
-  for (const Sphere4& s : calibration.effective) sum += ball_volume(s.r) * centre(s);
+  for (const Sphere& s : calibration.effective) sum += ball_volume(s.r) * centre(s);
   return sum / volume_sum(calibration);
 }
 
@@ -45,7 +47,7 @@ std::vector<Sphere> packed(const MeshSolid& solid, std::size_t count) {
 }
 
 Calibration calibrated(const MeshSolid& solid, std::size_t count) {
-  return calibrate(solid, packed(solid, count), 0, {});
+  return calibrate_on_host(solid, packed(solid, count));
 }
 
 TriangleMesh moved(TriangleMesh mesh, const Eigen::Affine3d& motion) {
@@ -135,7 +137,7 @@ TEST(ColumnLattice, MeasuresVolumes) {
 TEST(Calibration, OneSphereStandsForABall) {
   const MeshSolid solid(closed(testing::icosphere_mesh(4), "ball"));
   const Sphere off = {0.1f, -0.05f, 0.02f, 0.3f};  // wherever the inner sphere is
-  const Calibration result = calibrate(solid, {&off, 1}, 0, {});
+  const Calibration result = calibrate_on_host(solid, {&off, 1});
   ASSERT_EQ(result.effective.size(), 1u);
   EXPECT_NEAR(centre(result.effective[0]).norm(), 0, 2e-4);
   EXPECT_NEAR(ball_volume(result.effective[0].r) / solid.unit_volume(), 1, 1e-6);
@@ -149,7 +151,7 @@ TEST(Calibration, EightSpheresQuarterACube) {
   for (int k = 0; k < 8; ++k)
     inner.push_back({(k & 1) != 0 ? 0.25f : -0.25f, (k & 2) != 0 ? 0.25f : -0.25f,
                      (k & 4) != 0 ? 0.25f : -0.25f, 0.2f});
-  const Calibration result = calibrate(solid, inner, 0, {});
+  const Calibration result = calibrate_on_host(solid, inner);
   const double half = 0.5 / solid.frame().scale();
   for (int k = 0; k < 8; ++k) {
     EXPECT_NEAR(ball_volume(result.effective[k].r) / solid.unit_volume(), 0.125, 2e-3);
@@ -179,7 +181,7 @@ TEST(Calibration, KeepsVolumeAndCentreOfMass) {
     const double allowed = 1e-6 + solid.unit_volume_error() / solid.unit_volume();
     EXPECT_NEAR(volume_sum(result) / solid.unit_volume(), 1, allowed);
     EXPECT_LT((centre_of_mass(result) - solid.frame().to_unit(c.centre)).norm(), 1e-3);
-    for (const Sphere4& s : result.effective) EXPECT_GT(s.r, 0);
+    for (const Sphere& s : result.effective) EXPECT_GT(s.r, 0);
   }
 }
 
@@ -189,7 +191,7 @@ TEST(Calibration, ProtrusionHoldsOnTheSurfacesOfSpheres) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   double farthest = 0;
-  for (const Sphere4& s : result.effective)
+  for (const Sphere& s : result.effective)
     for (int k = 0; k < 100; ++k) {
       const Vector3d x =
           centre(s) +
@@ -203,11 +205,11 @@ TEST(Calibration, ProtrusionHoldsOnTheSurfacesOfSpheres) {
 TEST(Calibration, SameBytesForAnyThreadCount) {
   const MeshSolid solid(closed(testing::torus_mesh(1, 0.3, 64, 32), "torus"));
   const std::vector<Sphere> inner = packed(solid, 700);
-  const Calibration one = calibrate(solid, inner, 1, {});
+  const Calibration one = calibrate_on_host(solid, inner, 1);
   for (const unsigned threads : {2u, 3u, 8u}) {
-    const Calibration many = calibrate(solid, inner, threads, {});
+    const Calibration many = calibrate_on_host(solid, inner, threads);
     EXPECT_EQ(std::memcmp(one.effective.data(), many.effective.data(),
-                          one.effective.size() * sizeof(Sphere4)),
+                          one.effective.size() * sizeof(Sphere)),
               0);
     EXPECT_EQ(one.protrusion, many.protrusion);
   }
@@ -218,8 +220,8 @@ TEST(Calibration, ScaleByAPowerOfTwoChangesNothing) {
   const MeshSolid solid(closed(mesh, "torus"));
   const MeshSolid large(closed(moved(mesh, Eigen::Affine3d(Eigen::UniformScaling(0x1p30))), "big"));
   const std::vector<Sphere> inner = packed(solid, 100);
-  const Calibration a = calibrate(solid, inner, 0, {}), b = calibrate(large, inner, 0, {});
-  EXPECT_EQ(std::memcmp(a.effective.data(), b.effective.data(), 100 * sizeof(Sphere4)), 0);
+  const Calibration a = calibrate_on_host(solid, inner), b = calibrate_on_host(large, inner);
+  EXPECT_EQ(std::memcmp(a.effective.data(), b.effective.data(), 100 * sizeof(Sphere)), 0);
 }
 
 /// A plate of any thickness, turned any way, is shared out evenly among an even grid of spheres.
@@ -235,7 +237,7 @@ TEST(Calibration, MeasuresThinPlates) {
         inner.push_back({static_cast<float>(x.x()), static_cast<float>(x.y()),
                          static_cast<float>(x.z()), static_cast<float>(0.4 * thickness)});
       }
-      const Calibration result = calibrate(solid, inner, 0, {});
+      const Calibration result = calibrate_on_host(solid, inner);
       EXPECT_NEAR(volume_sum(result) / solid.unit_volume(), 1, 1e-6);
       for (std::size_t i = 0; i < inner.size(); ++i) {
         const Vector3d expected(inner[i].x, inner[i].y, inner[i].z);
@@ -257,7 +259,7 @@ TEST(Calibration, MeasuresNeedles) {
       inner.push_back({static_cast<float>(x.x()), static_cast<float>(x.y()),
                        static_cast<float>(x.z()), 0.4e-6f});
     }
-    const Calibration result = calibrate(solid, inner, 0, {});
+    const Calibration result = calibrate_on_host(solid, inner);
     EXPECT_NEAR(volume_sum(result) / solid.unit_volume(), 1, 1e-6);
     for (std::size_t i = 0; i < inner.size(); ++i) {
       EXPECT_NEAR(10 * ball_volume(result.effective[i].r) / solid.unit_volume(), 1, 0.05) << k;
@@ -272,7 +274,7 @@ TEST(Calibration, MeasuresNeedles) {
 TEST(Calibration, EmptyCellsAreLegal) {
   const MeshSolid solid(closed(testing::cube_mesh(), "cube"));
   const std::vector<Sphere> inner = {{0, 0, 0, 0.3f}, {0, 0, 0, 0.3f}, {0, 0, 0, 0.1f}};
-  const Calibration result = calibrate(solid, inner, 0, {});
+  const Calibration result = calibrate_on_host(solid, inner);
   EXPECT_NEAR(volume_sum(result) / solid.unit_volume(), 1, 1e-6);
   EXPECT_GT(result.effective[1].r, 0);
   EXPECT_GT(result.effective[2].r, 0);
@@ -281,8 +283,9 @@ TEST(Calibration, EmptyCellsAreLegal) {
 TEST(Calibration, CancelAndNoSpheresAreErrors) {
   const MeshSolid solid(closed(testing::cube_mesh(), "cube"));
   const Sphere ball = {0, 0, 0, 0.5f};
-  EXPECT_THROW(calibrate(solid, {&ball, 1}, 0, [](const Progress&) { return false; }), Error);
-  EXPECT_THROW(calibrate(solid, {}, 0, {}), Error);
+  EXPECT_THROW(calibrate_on_host(solid, {&ball, 1}, 0, [](const Progress&) { return false; }),
+               Error);
+  EXPECT_THROW(calibrate_on_host(solid, {}), Error);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "build/check_surface.h"
+#include "bake/check/check_surface.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "build/cover.h"
+#include "bake/cover/cover.h"
 
 #include <gtest/gtest.h>
 
@@ -10,6 +10,7 @@
 #include <ist/error.h>
 #include <ist/packing.h>
 
+#include "support/on_host.h"
 #include "support/test_meshes.h"
 
 namespace ist {
@@ -17,6 +18,7 @@ namespace {
 
 using Eigen::Vector3d;
 using testing::closed;
+using testing::cover_on_host;
 
 /// A packing; in a sliver, where packing has no end of equal places, equal spheres at random.
 std::vector<Sphere> packed(const MeshSolid& solid, std::size_t count) {
@@ -92,7 +94,7 @@ TEST(Cover, HoldsEveryPointOfTheSolid) {
     const MeshSolid solid(closed(c.mesh, c.name));
     for (const std::size_t count : {1, 30, 300}) {
       const std::vector<Sphere> inner = packed(solid, count);
-      const std::vector<float> covers = cover_radii(solid, inner, 0, {});
+      const std::vector<float> covers = cover_on_host(solid, inner);
       ASSERT_EQ(covers.size(), inner.size());
       for (std::size_t k = 0; k < inner.size(); ++k) EXPECT_GE(covers[k], inner[k].r);
       EXPECT_LE(worst_gap(solid, inner, covers), 0) << c.name << ", " << count << " spheres";
@@ -105,7 +107,7 @@ TEST(Cover, ShrunkRadiiLeaveGaps) {
   for (const Case& c : cases()) {
     const MeshSolid solid(closed(c.mesh, c.name));
     const std::vector<Sphere> inner = packed(solid, 30);
-    std::vector<float> covers = cover_radii(solid, inner, 0, {});
+    std::vector<float> covers = cover_on_host(solid, inner);
     for (float& r : covers) r *= 0.7f;
     EXPECT_GT(worst_gap(solid, inner, covers), 0) << c.name;
   }
@@ -116,7 +118,7 @@ TEST(Cover, IsTight) {
   double before = 1;
   for (const std::size_t count : {100, 1'000}) {
     const std::vector<Sphere> inner = packed(solid, count);
-    const std::vector<float> covers = cover_radii(solid, inner, 0, {});
+    const std::vector<float> covers = cover_on_host(solid, inner);
     double sum = 0;  // how far cover balls stick out of the solid
     for (std::size_t k = 0; k < inner.size(); ++k) {
       const Vector3d x(inner[k].x, inner[k].y, inner[k].z);
@@ -132,15 +134,15 @@ TEST(Cover, IsTight) {
 TEST(Cover, SameBytesForAnyThreadCount) {
   const MeshSolid solid(closed(testing::torus_mesh(1, 0.3, 64, 32), "torus"));
   const std::vector<Sphere> inner = packed(solid, 300);
-  const std::vector<float> one = cover_radii(solid, inner, 1, {});
-  for (const unsigned threads : {2u, 7u}) EXPECT_EQ(one, cover_radii(solid, inner, threads, {}));
+  const std::vector<float> one = cover_on_host(solid, inner, 1);
+  for (const unsigned threads : {2u, 7u}) EXPECT_EQ(one, cover_on_host(solid, inner, threads));
 }
 
 TEST(Cover, CancelAndNoSpheresAreErrors) {
   const MeshSolid solid(closed(testing::cube_mesh(), "cube"));
   const Sphere ball = {0, 0, 0, 0.5f};
-  EXPECT_THROW(cover_radii(solid, {&ball, 1}, 0, [](const Progress&) { return false; }), Error);
-  EXPECT_THROW(cover_radii(solid, {}, 0, {}), Error);
+  EXPECT_THROW(cover_on_host(solid, {&ball, 1}, 0, [](const Progress&) { return false; }), Error);
+  EXPECT_THROW(cover_on_host(solid, {}), Error);
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "query/lens.h"
+#include "query/kernel/lens.h"
 #include "support/float_traps.h"
 
 namespace ist {

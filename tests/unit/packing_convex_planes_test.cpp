@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "packing/mesh_surface.h"
+#include "packing/banded/mesh_surface.h"
 
 namespace ist::packing {
 namespace {

@@ -4,12 +4,12 @@
 #include <random>
 
 #include "mesh/mesh_solid.h"
-#include "mesh/samples/samples.h"
-#include "mesh/team.h"
+#include "numerics/team.h"
 #include "packing/grids/grid_schedule.h"
 #include "packing/grids/host_grid.h"
 #include "packing/grids/local_winding.h"
 #include "packing/grids/nearest_primitive.h"
+#include "samples/samples.h"
 #include "support/test_meshes.h"
 
 namespace ist::packing {

@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "packing/linear_program.h"
+#include "packing/banded/linear_program.h"
 #include "support/fiber_team.h"
 
 namespace ist::packing {

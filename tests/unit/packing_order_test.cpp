@@ -6,10 +6,10 @@
 #include <cstring>
 #include <random>
 
-#include "mesh/samples/samples.h"
-#include "packing/banded_packer.h"
-#include "packing/mesh_surface.h"
-#include "packing/wide_mesh_surface.h"
+#include "packing/banded/banded_packer.h"
+#include "packing/banded/mesh_surface.h"
+#include "packing/banded/wide_mesh_surface.h"
+#include "samples/samples.h"
 #include "support/fiber_team.h"
 #include "support/host_wide_tree.h"
 
@@ -49,8 +49,8 @@ struct Shuffled {
   }
 };
 
-BandLimits limits_of(const MeshSolid& solid, std::uint64_t spheres, double epsilon = 0) {
-  BandLimits limits;
+PackingLimits limits_of(const MeshSolid& solid, std::uint64_t spheres, double epsilon = 0) {
+  PackingLimits limits;
   limits.volume = solid.unit_volume();
   limits.max_spheres = spheres;
   limits.epsilon = epsilon;
@@ -58,9 +58,9 @@ BandLimits limits_of(const MeshSolid& solid, std::uint64_t spheres, double epsil
 }
 
 template <class Order, class Surface>
-std::vector<Sphere> packed(const Surface& surface, const BandLimits& limits) {
-  const ProgressCallback quiet;
-  return BandedPacker<Surface, Order>(surface, limits, 0, 1, quiet).run().spheres;
+std::vector<Sphere> packed(const Surface& surface, const PackingLimits& limits) {
+  Stage stage("pack", {});
+  return BandedPacker<Surface, Order>(surface, limits, stage).run().spheres;
 }
 
 void expect_same(const std::vector<Sphere>& a, const std::vector<Sphere>& b) {
@@ -86,7 +86,7 @@ TEST(PackingOrder, ShuffledCellsAndListsGiveTheSameSpheres) {
     const MeshSolid solid(mesh);
     const MeshSurface surface(solid);
     for (const double epsilon : {0.0, 0.3}) {
-      const BandLimits limits = limits_of(solid, 250, epsilon);
+      const PackingLimits limits = limits_of(solid, 250, epsilon);
       expect_same(packed<AsFound>(surface, limits), packed<Shuffled>(surface, limits));
     }
   }
@@ -96,7 +96,7 @@ TEST(PackingOrder, AnotherHierarchyGivesTheSameSpheres) {
   for (const ClosedMesh& mesh : {cube_mesh(), sample_mesh("gear")}) {
     const MeshSolid solid(mesh);
     const ist::testing::HostWideTree wide(solid.view());
-    const BandLimits limits = limits_of(solid, 300);
+    const PackingLimits limits = limits_of(solid, 300);
     expect_same(packed<AsFound>(MeshSurface(solid), limits),
                 packed<AsFound>(WideMeshSurface(wide.tree()), limits));
   }

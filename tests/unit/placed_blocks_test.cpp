@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "query/placed_blocks.h"
+#include "query/kernel/placed_blocks.h"
 
 namespace ist {
 namespace {

@@ -1,4 +1,4 @@
-#include "mesh/samples/samples.h"
+#include "samples/samples.h"
 
 #include <gtest/gtest.h>
 

@@ -1,20 +1,20 @@
-#include "build/tree_builder.h"
+#include "bake/cluster/tree_builder.h"
 
 #include <gtest/gtest.h>
 #include <cmath>
 #include <random>
 #include <set>
 
-#include "build/bounding_ball.h"
+#include "bake/cluster/bounding_ball.h"
 
 namespace ist {
 namespace {
 
-std::vector<Sphere4> random_spheres(std::size_t n, unsigned seed) {
+std::vector<Sphere> random_spheres(std::size_t n, unsigned seed) {
   std::mt19937 bits(seed);
   const auto unit = [&] { return static_cast<double>(bits()) / 4294967296.0; };
-  std::vector<Sphere4> spheres(n);
-  for (Sphere4& s : spheres) {
+  std::vector<Sphere> spheres(n);
+  for (Sphere& s : spheres) {
     const auto coordinate = [&] { return static_cast<float>(2 * unit() - 1); };
     s = {coordinate(), coordinate(), coordinate(), 0};
     s.r = static_cast<float>(0.1 / (1 + 99 * unit()));
@@ -36,7 +36,7 @@ TEST_P(TreeOfCount, BallsHoldWhatIsBelow) {
   for (std::size_t i = 0; i < n; ++i) {
     const BallBlock& block = tree.levels[0].blocks[i / kWidth];
     const Origin& origin = tree.levels[0].origins[i / kWidth];
-    const Sphere4& s = spheres[tree.sphere_index[i]];
+    const Sphere& s = spheres[tree.sphere_index[i]];
     EXPECT_TRUE(seen.insert(tree.sphere_index[i]).second);
     EXPECT_EQ(origin.x + block.x[i % kWidth], s.x);
     EXPECT_EQ(origin.y + block.y[i % kWidth], s.y);
@@ -53,7 +53,7 @@ TEST_P(TreeOfCount, BallsHoldWhatIsBelow) {
       const std::size_t l = i % kWidth;
       double volume = 0;
       for (std::size_t j = i * span; j < std::min(n, (i + 1) * span); ++j) {
-        const Sphere4& s = spheres[tree.sphere_index[j]];
+        const Sphere& s = spheres[tree.sphere_index[j]];
         const double d = reach(origin.x + block.x[l], origin.y + block.y[l], origin.z + block.z[l],
                                {s.x, s.y, s.z, 0});
         EXPECT_LE(d + s.r, block.r[l]);
@@ -110,7 +110,7 @@ TEST(OverlapBound, HoldsAtRandomPoints) {
   std::vector<Ball> sorted;
   const TreeArrays tree = build_tree(spheres, {});
   for (std::size_t i = 0; i < spheres.size(); ++i) {
-    const Sphere4& s = spheres[tree.sphere_index[i]];
+    const Sphere& s = spheres[tree.sphere_index[i]];
     sorted.push_back({s.x, s.y, s.z, s.r});
   }
   std::mt19937 bits(3);
@@ -144,7 +144,7 @@ TEST(BoundingBall, IsSmallest) {
   for (unsigned seed = 1; seed <= 200; ++seed) {
     const auto spheres = random_spheres(2 + seed % 40, seed);
     std::vector<Ball> balls;
-    for (const Sphere4& s : spheres) balls.push_back({s.x, s.y, s.z, s.r});
+    for (const Sphere& s : spheres) balls.push_back({s.x, s.y, s.z, s.r});
     const Ball ball = bounding_ball(balls);
     const auto radius_about = [&](double x, double y, double z) {
       double r = 0;

@@ -7,7 +7,7 @@
 #include <array>
 #include <cstring>
 
-#include "build/trial_poses.h"
+#include "bake/predict/trial_poses.h"
 #include "support/test_meshes.h"
 
 namespace ist {

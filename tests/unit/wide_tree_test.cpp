@@ -11,9 +11,9 @@
 
 #include "mesh/closest_point.h"
 #include "mesh/mesh_solid.h"
-#include "mesh/team.h"
 #include "mesh/wide_nearest.h"
 #include "mesh/wide_rays.h"
+#include "numerics/team.h"
 #include "support/host_wide_tree.h"
 #include "support/test_meshes.h"
 

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "packing/certificate.h"
 #include "packing/grids/grid_candidate.h"
 #include "packing/grids/local_winding.h"
 #include "packing/grids/nearest_primitive.h"
+#include "packing/spheres/certificate.h"
 
 namespace ist::packing {
 

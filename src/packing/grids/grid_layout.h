@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "mesh/host_device.h"
-#include "packing/float3.h"
+#include "numerics/float3.h"
+#include "numerics/host_device.h"
 
 namespace ist::packing {
 

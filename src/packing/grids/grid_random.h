@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "packing/hashing.h"
+#include "numerics/hashing.h"
 
 namespace ist::packing {
 

@@ -1,6 +1,6 @@
 #include "packing/grids/pack_grids.h"
 
-#include "packing/grids/host_backend.h"
+#include "packing/grids/host_rounds.h"
 
 namespace ist::packing {
 
@@ -19,19 +19,14 @@ GridFigures grid_figures(const MeshSolid& solid, std::size_t memory) {
   return figures;
 }
 
-GridLimits grid_limits(const MeshSolid& solid, const PackingSettings& settings) {
-  const double scale = solid.frame().scale();
-  return {solid.unit_volume(), settings.target_coverage, settings.min_radius / scale, scale};
-}
-
-SpherePacking pack_grids(const MeshSolid& solid, const PackingSettings& settings,
-                         const ProgressCallback& progress, std::vector<GridRound>* history) {
+SpherePacking pack_grids(const MeshSolid& solid, const PackingSettings& settings, Stage& stage,
+                         std::vector<GridRound>* history) {
   constexpr std::size_t kHostMemory = std::size_t{512} << 20;
   const GridSchedule schedule =
       grid_schedule(settings.grid, settings.grids, grid_figures(solid, kHostMemory));
-  const auto backend = make_host_grid_backend(solid.arrays());
-  return pack_on_grids(*backend, schedule, grid_limits(solid, settings), settings, progress,
-                       history);
+  const PackingLimits limits = packing_limits(solid, solid.frame().scale(), settings);
+  HostRounds rounds(solid.arrays());
+  return GridPacker(rounds, schedule, limits, stage, history).run();
 }
 
 }  // namespace ist::packing

@@ -1,0 +1,98 @@
+#include "cuda/cuda_backend.h"
+
+#include <optional>
+
+#include <ist/error.h>
+
+#include "cuda/bake/cover_on_gpu.h"
+#include "cuda/bake/protrusion_on_gpu.h"
+#include "cuda/bake/relax_on_gpu.h"
+#include "cuda/banded/banded_pack.h"
+#include "cuda/device_mesh.h"
+#include "cuda/grids/device_grid_rounds.h"
+#include "cuda/queue.h"
+#include "mesh/mesh_solid.h"
+#include "packing/grids/medial_grids.h"
+#include "packing/packing_settings.h"
+#include "stage/stage.h"
+
+namespace ist::gpu {
+namespace {
+
+const GpuSettings& usable(const GpuSettings& settings) {
+  std::string why;
+  if (!gpu_available(settings.device, &why)) throw Error("GPU: " + why + ": bake on the CPU");
+  return settings;
+}
+
+HostMesh host_mesh(const MeshView& arrays) {
+  HostMesh mesh;  // in the unit frame already
+  mesh.vertices = arrays.vertices_exact;
+  mesh.triangles = arrays.triangles;
+  mesh.vertex_count = arrays.vertex_count;
+  mesh.triangle_count = arrays.triangle_count;
+  return mesh;
+}
+
+class CudaBackend final : public SolidBackend {
+ public:
+  CudaBackend(const MeshSolid& solid, const GpuSettings& settings)
+      : solid_(solid), settings_(usable(settings)), queue_(settings_) {}
+
+  SpherePacking pack(const PackingSettings& settings, const ProgressCallback& progress) override {
+    const UnitFrame frame = solid_.frame();
+    Stage stage("pack", progress, settings.time_limit);
+    SpherePacking result =
+        settings.grid == GridMode::banded
+            ? pack_banded(queue_, tree(), packing::packing_limits(solid_, frame.scale(), settings),
+                          stage)
+            : pack_grids(queue_, solid_, settings, stage);
+    result.frame = frame;
+    return result;
+  }
+
+  std::vector<MedialNode> medial_nodes(const MedialSettings& settings) override {
+    return packing::medial_nodes_by(DeviceGridRounds(queue_, solid_.arrays()), solid_, settings);
+  }
+
+  RelaxedSites relax_sites(const RelaxTask& task,
+                           const std::function<void(double)>& report) override {
+    return gpu::relax_sites(queue_, tree(), task, report);
+  }
+
+  double largest_protrusion(std::span<const Sphere> balls) override {
+    return gpu::largest_protrusion(queue_, tree(), balls);
+  }
+
+  std::vector<double> cover_radii(const CoverTask& task,
+                                  const std::function<void(int)>& report) override {
+    return gpu::cover_radii(queue_, tree(), task, report);
+  }
+
+  std::unique_ptr<SolidBackend> with(const MeshSolid& other) const override {
+    return std::make_unique<CudaBackend>(other, settings_);
+  }
+
+  bool leaves_threads_idle() const override { return true; }
+
+ private:
+  /// The mesh's hierarchy, made when it is first needed: the grids have none.
+  const WideTree& tree() {
+    if (!mesh_) mesh_.emplace(queue_, host_mesh(solid_.arrays()));
+    return mesh_->tree();
+  }
+
+  const MeshSolid& solid_;
+  const GpuSettings settings_;
+  Queue queue_;
+  std::optional<DeviceMesh> mesh_;
+};
+
+}  // namespace
+
+std::unique_ptr<SolidBackend> make_cuda_backend(const MeshSolid& solid,
+                                                const GpuSettings& settings) {
+  return std::make_unique<CudaBackend>(solid, settings);
+}
+
+}  // namespace ist::gpu

@@ -1,0 +1,147 @@
+#include <ist/bake.h>
+
+#include <tbb/task_group.h>
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+#include <ist/error.h>
+
+#include "asset/asset_writer.h"
+#include "backend/solid_backend.h"
+#include "bake/calibrate/calibration.h"
+#include "bake/cluster/tree_builder.h"
+#include "bake/cover/cover.h"
+#include "mesh/mesh_solid.h"
+#include "packing/packing_settings.h"
+#include "stage/stage.h"
+#include "stage/thread_arena.h"
+
+namespace ist {
+namespace {
+
+AssetHeader describe_bake(const ClosedMesh& mesh, const MeshSolid& solid,
+                          const PackingSettings& settings, const SpherePacking& packing) {
+  AssetHeader header;
+  header.mesh_hash = solid.hash();
+  for (int k = 0; k < 3; ++k) header.centre[k] = packing.frame.centre[k];
+  header.exponent = packing.frame.exponent;
+  header.flags = (mesh.report.repaired ? kFlagRepaired : 0) |
+                 (packing.below_float_noise ? kFlagBelowNoise : 0);
+  header.volume = solid.unit_volume();
+  header.volume_error = solid.unit_volume_error();
+  header.coverage = std::min(packing.coverage, 1.0);
+  header.asked_spheres = settings.max_spheres;
+  header.asked_coverage = settings.target_coverage;
+  header.asked_min_radius = settings.min_radius;
+  header.asked_epsilon = settings.epsilon;
+  header.asked_seed = settings.seed;
+  header.asked_grid = static_cast<std::uint32_t>(settings.grid);
+  header.asked_grid_start = settings.grids.start;
+  header.asked_grid_resolution = settings.grids.resolution;
+  header.asked_grid_refinements = settings.grids.refinements;
+  header.asked_grid_rounds = settings.grids.rounds_per_level;
+  header.stop_reason = static_cast<std::uint32_t>(packing.stop);
+  header.kept_ratio_worst = packing.kept_ratio_worst;
+  header.kept_ratio_median = packing.kept_ratio_median;
+  return header;
+}
+
+/// Spheres of each level of detail, the finest first: a quarter of the one before, as long as
+/// there are enough to tell the solid's parts apart.
+std::vector<std::size_t> detail_counts(std::size_t spheres) {
+  constexpr std::size_t kFewest = 250;
+  std::vector<std::size_t> counts = {spheres};
+  for (std::uint32_t i = 1; i <= kMaxDetails && detail_spheres(spheres, i) >= kFewest; ++i)
+    counts.push_back(detail_spheres(spheres, i));
+  return counts;
+}
+
+/// Work on trees, done while a backend leaves the caller's threads idle, or when they are free.
+class TreeWork {
+ public:
+  explicit TreeWork(bool threads_are_idle) : at_once_(threads_are_idle) {}
+  /// Waits, whichever way the scope is left: a group that is left alone would be cancelled, and
+  /// with it, unseen, the loops inside its tasks.
+  ~TreeWork() {
+    try {
+      group_.wait();
+    } catch (...) {  // the scope is left by an exception already
+    }
+  }
+  TreeWork(const TreeWork&) = delete;
+  TreeWork& operator=(const TreeWork&) = delete;
+
+  void add(std::function<void()> work) {
+    if (at_once_)
+      group_.run(std::move(work));
+    else
+      waiting_.push_back(std::move(work));
+  }
+
+  void finish() {
+    for (std::function<void()>& work : waiting_) group_.run(std::move(work));
+    group_.wait();
+  }
+
+ private:
+  const bool at_once_;
+  std::vector<std::function<void()>> waiting_;
+  tbb::task_group group_;
+};
+
+/// Everything of the asset but its bytes, on the threads of the current arena.
+AssetArrays baked(const ClosedMesh& mesh, const PackingSettings& settings,
+                  const ProgressCallback& progress) {
+  const MeshSolid solid(mesh);
+  const auto backend = make_backend(solid, {settings.device, settings.gpu});
+  const SpherePacking packing = backend->pack(settings, progress);
+  const std::size_t count = packing.spheres.size();
+  if (count == 0)
+    throw Error(mesh.name +
+                ": not one sphere fits within the limits; lower the smallest radius or the "
+                "coverage, or allow more time");
+  AssetArrays arrays;
+  arrays.header = describe_bake(mesh, solid, settings, packing);
+  arrays.inner_spheres = packing.spheres;
+
+  std::vector<std::uint32_t> inner_order;
+  TreeWork trees(backend->leaves_threads_idle());
+  trees.add([&] { inner_order = sphere_order(arrays.inner_spheres); });
+
+  std::vector<Calibration> details =
+      calibrate_prefixes(solid, *backend, packing.spheres, detail_counts(count), progress);
+  arrays.effective_spheres = std::move(details.front().effective);
+  arrays.header.protrusion = details.front().protrusion;
+  for (std::size_t i = 1; i < details.size(); ++i)
+    arrays.details.push_back({std::move(details[i].effective), details[i].protrusion, {}});
+  trees.add([&] { arrays.matched_tree = build_tree(arrays.effective_spheres, {}); });
+  trees.add([&] {
+    for (DetailArrays& detail : arrays.details)
+      detail.matched_tree = build_tree(detail.effective_spheres, {});
+  });
+
+  arrays.cover_radii = cover_radii(solid, *backend, packing.spheres, progress);
+
+  Stage stage("tree", progress);
+  stage.step(count, 0);
+  trees.finish();
+  arrays.inner_tree =
+      tree_from_order(arrays.inner_spheres, arrays.cover_radii, std::move(inner_order));
+  stage.step(count, 1);
+  return arrays;
+}
+
+}  // namespace
+
+Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
+           const ProgressCallback& progress) {
+  packing::check_settings(settings);
+  return Asset(asset_bytes(thread_arena(settings.threads).execute([&] {
+                 return baked(mesh, settings, progress);
+               })),
+               mesh.name);
+}
+
+}  // namespace ist

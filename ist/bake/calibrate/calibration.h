@@ -1,0 +1,36 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <ist/progress.h>
+
+#include "backend/solid_backend.h"
+#include "mesh/mesh_solid.h"
+
+namespace ist {
+
+/// The effective spheres of a solid: one ball for each cell of a partition of the solid, with the
+/// cell's volume and centre of mass (docs/design.md 5).
+struct Calibration {
+  /// Unit frame, one for each inner sphere and in their order. Σ 4/3 π r³ is the solid's volume
+  /// within 1e-6; every radius is > 0.
+  std::vector<Sphere> effective;
+  /// Unit frame, proven: no effective sphere sticks further out of the solid than this.
+  double protrusion = 0;
+};
+
+/// Calibrates a packing: relaxed power cells seeded by the inner spheres, integrated over columns
+/// of the solid. `backend`: the solid's. Same bytes for any backend and number of threads, which
+/// are those of the current arena. Throws Error if there are no spheres or progress cancels.
+Calibration calibrate(const MeshSolid& solid, SolidBackend& backend, std::span<const Sphere> inner,
+                      const ProgressCallback& progress);
+
+/// The same for several prefixes of the spheres, each of `counts` by itself: what is made of the
+/// solid is shared.
+std::vector<Calibration> calibrate_prefixes(const MeshSolid& solid, SolidBackend& backend,
+                                            std::span<const Sphere> inner,
+                                            std::span<const std::size_t> counts,
+                                            const ProgressCallback& progress);
+
+}  // namespace ist

@@ -1,0 +1,161 @@
+#include "bake/check/check_spheres.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <random>
+
+#include "bake/check/check_tally.h"
+
+namespace ist {
+namespace {
+
+Eigen::Vector3d centre(const Sphere& s) { return {s.x, s.y, s.z}; }
+
+double volume_of(const Sphere* spheres, std::size_t count) {
+  double sum = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double r = spheres[i].r;
+    sum += r * r * r;
+  }
+  return 4 * std::numbers::pi / 3 * sum;
+}
+
+double distance(const Sphere& a, const Sphere& b) { return (centre(a) - centre(b)).norm(); }
+
+/// Calls visit(i, j) for every pair whose extents along x overlap, j after i in that order. All
+/// pairs are looked at; those that are not visited lie apart along x.
+template <class Visit>
+Tally sweep(const Sphere* spheres, std::size_t count, const Visit& visit) {
+  std::vector<std::uint32_t> order(count);
+  std::iota(order.begin(), order.end(), 0u);
+  const auto low = [&](std::uint32_t i) { return double{spheres[i].x} - double{spheres[i].r}; };
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return low(a) != low(b) ? low(a) < low(b) : a < b;
+  });
+  return tally_all(count, [&](std::size_t k, Tally& tally) {
+    const std::uint32_t i = order[k];
+    const double high = double{spheres[i].x} + double{spheres[i].r};
+    for (std::size_t m = k + 1; m < count && low(order[m]) <= high; ++m) visit(i, order[m], tally);
+  });
+}
+
+/// Share of fixed random points of the bounding box that are inside, against the header's volume:
+/// blind to small errors, but it sees the set itself, where the winding number is ≥ 1.
+Invariant sampled_volume(const AssetHeader& asset, const CheckSurface& surface) {
+  constexpr std::size_t kPoints = 50'000;
+  std::mt19937_64 bits(1);
+  std::vector<Eigen::Vector3d> points(kPoints);
+  const Eigen::Vector3d size = surface.bounds().sizes();
+  for (Eigen::Vector3d& p : points)
+    for (int k = 0; k < 3; ++k)
+      p[k] = surface.bounds().min()[k] + size[k] * (static_cast<double>(bits() >> 11) * 0x1p-53);
+  std::vector<char> inside(kPoints);
+  tbb::parallel_for(std::size_t{0}, kPoints,
+                    [&](std::size_t i) { inside[i] = surface.winding(points[i]) >= 1; });
+  const double share = static_cast<double>(std::count(inside.begin(), inside.end(), 1)) / kPoints;
+  const double expected = asset.volume / size.prod();
+  const double deviation = std::sqrt(expected * std::fabs(1 - expected) / kPoints);
+  Tally tally;
+  tally.add(std::fabs(share - expected) - 6 * deviation - 1.0 / kPoints, 0);
+  return tally.named("sampled volume",
+                     "difference of the share of points inside and the header's volume, above six "
+                     "standard deviations, of the bounding box");
+}
+
+}  // namespace
+
+std::vector<std::vector<std::uint32_t>> overlapping_pairs(const Sphere* spheres,
+                                                          std::size_t count) {
+  std::vector<std::vector<std::uint32_t>> found(count);
+  // Each call writes the list of its first sphere only.
+  sweep(spheres, count, [&](std::uint32_t i, std::uint32_t j, Tally&) {
+    const double sum = double{spheres[i].r} + double{spheres[j].r};
+    if (std::fabs(double{spheres[i].y} - double{spheres[j].y}) > sum) return;
+    if (distance(spheres[i], spheres[j]) < sum) found[i].push_back(j);
+  });
+  std::vector<std::vector<std::uint32_t>> both = found;
+  for (std::uint32_t i = 0; i < count; ++i)
+    for (const std::uint32_t j : found[i]) both[j].push_back(i);
+  return both;
+}
+
+std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckSurface& surface) {
+  const std::size_t n = asset.sphere_count;
+  const Sphere* inner = at<Sphere>(asset, asset.inner_spheres);
+  const float* covers = at<float>(asset, asset.cover_radii);
+  std::vector<Invariant> out;
+
+  out.push_back(tally_all(n, [&](std::size_t i, Tally& tally) {
+                  tally.add(1.0 - surface.winding(centre(inner[i])), i);
+                }).named("centre inside solid", "1 − winding number of an inner sphere's centre"));
+  out.push_back(tally_all(n,
+                          [&](std::size_t i, Tally& tally) {
+                            const double r = inner[i].r;
+                            tally.add(r - surface.distance(centre(inner[i]), 2 * r + 1e-3), i);
+                          })
+                    .named("sphere clear of surface",
+                           "radius − distance of the centre to the surface, unit frame"));
+  out.push_back(
+      sweep(inner, n, [&](std::uint32_t i, std::uint32_t j, Tally& tally) {
+        const double sum = double{inner[i].r} + double{inner[j].r};
+        tally.add(sum - distance(inner[i], inner[j]), std::max(i, j));
+      }).named("spheres disjoint", "sum of two radii − distance of their centres, unit frame"));
+
+  Tally coverage;
+  coverage.add(std::fabs(volume_of(inner, n) / asset.volume - asset.coverage) - 1e-9, 0);
+  out.push_back(coverage.named("coverage",
+                               "difference of Σ inner volumes / solid volume and the header, "
+                               "above 1e-9"));
+  out.push_back(tally_all(n, [&](std::size_t i, Tally& tally) {
+                  tally.add(double{inner[i].r} - double{covers[i]}, i);
+                }).named("cover holds sphere", "radius − cover radius, unit frame"));
+  return out;
+}
+
+std::vector<Invariant> check_effective(const AssetHeader& asset, std::uint32_t detail,
+                                       const CheckSurface& surface, const std::string& name) {
+  const std::size_t n = matched_tree(asset, detail).sphere_count;
+  const Sphere* const effective = effective_spheres(asset, detail);
+  const double protrusion =
+      detail == 0 ? asset.protrusion : at<DetailLevel>(asset, asset.details)[detail - 1].protrusion;
+  std::vector<Invariant> out;
+  Tally sum;
+  sum.add(std::fabs(volume_of(effective, n) / asset.volume - 1) - 1e-6, 0);
+  out.push_back(sum.named(name + "effective volumes sum to the solid",
+                          "relative difference of Σ effective volumes and the solid, above 1e-6"));
+  out.push_back(
+      tally_all(n,
+                [&](std::size_t i, Tally& tally) {
+                  const Eigen::Vector3d c = centre(effective[i]);
+                  const double d = surface.distance(c, 100);
+                  const double depth = surface.winding(c) >= 1 ? d : -d;
+                  tally.add(effective[i].r - depth - protrusion - 1e-12, i);
+                })
+          .named(name + "effective protrusion",
+                 "reach of an effective sphere out of the solid − the asset's bound, unit frame"));
+  return out;
+}
+
+std::vector<Invariant> check_header(const AssetHeader& asset, const CheckSurface& surface,
+                                    const MeshSolid& solid) {
+  std::vector<Invariant> out;
+  const UnitFrame& frame = solid.frame();
+  Tally same;
+  same.add(std::abs(asset.exponent - frame.exponent), 0);
+  for (int k = 0; k < 3; ++k) same.add(std::fabs(asset.centre[k] - frame.centre[k]), 0);
+  out.push_back(same.named("frame", "difference of the header's frame and the mesh's, [u]"));
+
+  Tally volume;
+  const double scale = solid.unit_volume();
+  volume.add(std::fabs(asset.volume - solid.unit_volume()) / scale - 1e-12, 0);
+  volume.add(std::fabs(asset.volume_error - solid.unit_volume_error()) / scale - 1e-12, 0);
+  out.push_back(volume.named("solid volume",
+                             "relative difference of the header's volume and the mesh's, above "
+                             "1e-12"));
+  out.push_back(sampled_volume(asset, surface));
+  return out;
+}
+
+}  // namespace ist

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <ist/bake.h>
+
+#include <ist/asset_layout.h>
+#include "bake/check/check_surface.h"
+#include "mesh/mesh_solid.h"
+
+namespace ist {
+
+/// Inner spheres lie in the solid and apart; covers hold spheres.
+std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckSurface& surface);
+
+/// The effective spheres of a detail (0: the finest) stand for the solid. Names start with `name`.
+std::vector<Invariant> check_effective(const AssetHeader& asset, std::uint32_t detail,
+                                       const CheckSurface& surface, const std::string& name);
+
+/// The header's frame and volumes are those of the mesh.
+std::vector<Invariant> check_header(const AssetHeader& asset, const CheckSurface& surface,
+                                    const MeshSolid& solid);
+
+/// Every point of the solid lies in some cover ball: proven by subdivision.
+Invariant check_cover(const AssetHeader& asset, const CheckSurface& surface);
+
+/// For every sphere, the others that it overlaps.
+std::vector<std::vector<std::uint32_t>> overlapping_pairs(const Sphere* spheres, std::size_t count);
+
+}  // namespace ist

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "asset/asset_writer.h"
+#include "bake/cluster/tree_order.h"
+
+namespace ist {
+
+/// Clusters spheres into an implicit 16-wide tree (asset_layout.h, DESIGN 6). `covers` are the
+/// cover radii of disjoint inner spheres; it is empty for effective spheres, which may overlap, and
+/// κ is bounded for them. Every ball of the tree holds the spheres below it for certain: radii are
+/// rounded up. Same input, same tree, for any number of threads. The set must not be empty.
+TreeArrays build_tree(std::span<const Sphere> spheres, std::span<const float> covers,
+                      Clustering clustering = Clustering::neural_gas, bool swaps = true);
+
+/// The order in which build_tree() puts the spheres.
+std::vector<std::uint32_t> sphere_order(std::span<const Sphere> spheres,
+                                        Clustering clustering = Clustering::neural_gas,
+                                        bool swaps = true);
+
+/// The tree whose leaves are the spheres in a given order: lane i holds spheres[order[i]].
+TreeArrays tree_from_order(std::span<const Sphere> spheres, std::span<const float> covers,
+                           std::vector<std::uint32_t> order);
+
+}  // namespace ist

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "bake/cluster/bounding_ball.h"
+
+namespace ist {
+
+/// How spheres are grouped (docs/tree_builders.md compares them).
+enum class Clustering {
+  two_means,   ///< recursive weighted 2-means
+  neural_gas,  ///< batch neural gas with magnification control, as in the Inner Sphere Trees papers
+};
+
+/// The order in which spheres lie in a tree: every 16^(k+1) consecutive ones from the start are a
+/// node of level k. Groups of 16 are formed first, then groups of their balls, and so on up.
+/// With `swaps`, near groups of a level then trade members (tree_swaps.h). Deterministic for any
+/// number of threads.
+std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, Clustering clustering,
+                                      bool swaps);
+
+}  // namespace ist

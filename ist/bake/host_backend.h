@@ -1,0 +1,12 @@
+#pragma once
+
+#include <memory>
+
+#include "backend/solid_backend.h"
+
+namespace ist {
+
+/// The seam's host implementation. What only meshes can be asked throws Error for other solids.
+std::unique_ptr<SolidBackend> make_host_backend(const Solid& solid);
+
+}  // namespace ist

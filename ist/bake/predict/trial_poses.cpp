@@ -1,0 +1,204 @@
+#include "bake/predict/trial_poses.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include <ist/query.h>
+
+#include "bake/predict/shared_volume.h"
+#include "numerics/hashing.h"
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+
+// Of a class's poses, as many are tried again where no place or no truth was found.
+constexpr std::uint32_t kTriesPerPose = 4;
+// Size of a contained B over A's, if it finds room; half of it if not, and so on.
+constexpr double kContainedSize = 0.15;
+constexpr std::uint32_t kContainedTries = 400;  // for each pose
+constexpr int kApproachSteps = 24;
+constexpr int kBisections = 40;
+
+/// Random numbers by + − × ÷ sqrt, so that poses are the same everywhere.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : state_(seed) {}
+
+  std::uint64_t bits() { return mixed(state_ += 0x9E3779B97F4A7C15ull); }
+  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }  ///< [0, 1)
+  double symmetric() { return 2 * uniform() - 1; }
+
+  Vector3d direction() {
+    for (;;) {
+      const Vector3d v(symmetric(), symmetric(), symmetric());
+      const double squared = v.squaredNorm();
+      if (squared <= 1 && squared > 1e-4) return v / std::sqrt(squared);
+    }
+  }
+
+  /// Evenly spread over all rotations: a point of the ball in four dimensions, brought to length 1.
+  Eigen::Quaterniond rotation() {
+    for (;;) {
+      const double q[4] = {symmetric(), symmetric(), symmetric(), symmetric()};
+      const double squared = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
+      if (squared > 1 || squared < 1e-4) continue;
+      const double norm = std::sqrt(squared);
+      return {q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm};
+    }
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+/// Ball around a solid's spheres in the mesh's frame.
+struct Ball {
+  Vector3d centre;
+  double radius;
+};
+
+Ball root_ball(const TreeView& tree) {
+  const AssetHeader& h = tree.header();
+  const double scale = std::ldexp(1.0, h.exponent);
+  const double* root = h.matched_tree.root;
+  return {
+      scale * Vector3d(root[0], root[1], root[2]) + Vector3d(h.centre[0], h.centre[1], h.centre[2]),
+      scale * root[3]};
+}
+
+Pose pose_of(const Eigen::Quaterniond& q, const Vector3d& t) {
+  return {{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}};
+}
+
+class Trials {
+ public:
+  Trials(const TrialBody& a, const TrialBody& b, double relative_error, std::uint64_t seed)
+      : a_(a),
+        b_(b),
+        ball_a_(root_ball(a.tree)),
+        ball_b_(root_ball(b.tree)),
+        smaller_(std::min(a.solid.volume(), b.solid.volume())),
+        relative_error_(relative_error),
+        random_(seed) {}
+
+  /// B approaches A along a random direction until it shares `fraction` of the smaller solid.
+  bool approach(double fraction, TrialPose& out) {
+    const Eigen::Quaterniond q = random_.rotation();
+    const Vector3d direction = random_.direction();
+    const auto at = [&](double way) {
+      return pose_of(q, ball_a_.centre + way * direction - q * ball_b_.centre);
+    };
+    const auto ask = [&](const Pose& pose) {
+      return penetration({a_.tree, {}, 1}, {b_.tree, pose, 1}, {}, workspace_);
+    };
+    // From outside in, since solids may have holes in the middle.
+    const double start = ball_a_.radius + ball_b_.radius;
+    double near = start, far = start;
+    for (int i = kApproachSteps; i-- > 0 && near == start;) {
+      const double way = start * i / kApproachSteps;
+      if (ask(at(way)).volume >= fraction * smaller_) {
+        near = way;
+      } else {
+        far = way;
+      }
+    }
+    if (near == start) return false;
+    for (int i = 0; i < kBisections; ++i) {
+      const double middle = (near + far) / 2;
+      (ask(at(middle)).volume < fraction * smaller_ ? far : near) = middle;
+    }
+    out.b_in_a = at(near);
+    const Vector3d push = ask(out.b_in_a).translation_gradient;
+    const Vector3d along = push.norm() > 0 ? push : direction;
+    const SharedVolume truth =
+        shared_volume(a_.solid, b_.solid, out.b_in_a, 1, along, relative_error_);
+    if (!(truth.volume > 0) || truth.error > relative_error_ * truth.volume) return false;
+    out.volume = truth.volume;
+    out.fraction = truth.volume / smaller_;
+    for (std::uint32_t k = 1; k < kOverlapClasses; ++k)
+      if (out.fraction >= kOverlapClassFloor[k]) {
+        out.overlap_class = k;
+        return out.fraction <= 0.5;
+      }
+    return false;
+  }
+
+  /// A small B somewhere inside A: the truth is its own volume.
+  bool contain(double size, TrialPose& out) {
+    out.scale_b = size * ball_a_.radius / ball_b_.radius;
+    const Eigen::AlignedBox3d box = a_.solid.bounds();
+    Vector3d place;
+    for (int k = 0; k < 3; ++k)
+      place[k] = box.min()[k] + random_.uniform() * (box.max()[k] - box.min()[k]);
+    const Eigen::Quaterniond q = random_.rotation();
+    if (a_.solid.signed_distance(place) <= 0) return false;
+    out.b_in_a = pose_of(q, place - q * (out.scale_b * ball_b_.centre));
+    const Eigen::Matrix3d rotation = q.toRotationMatrix();
+    const Vector3d shift(out.b_in_a.t[0], out.b_in_a.t[1], out.b_in_a.t[2]);
+    const MeshView& mesh = b_.solid.arrays();
+    for (std::size_t v = 0; v < mesh.vertex_count; ++v) {
+      const Vector3d x = b_.solid.frame().from_unit(Vector3d(mesh.vertices_exact + 3 * v));
+      if (a_.solid.signed_distance(rotation * (out.scale_b * x) + shift) <= 0) return false;
+    }
+    out.volume = out.scale_b * out.scale_b * out.scale_b * b_.solid.volume();
+    out.fraction = 1;
+    out.overlap_class = 0;
+    // Vertices inside are not all of it.
+    const SharedVolume shared =
+        shared_volume(a_.solid, b_.solid, out.b_in_a, out.scale_b, Vector3d::UnitX(), 1e-2);
+    return std::abs(shared.volume - out.volume) <= 3 * shared.error;
+  }
+
+  Random& random() { return random_; }
+
+ private:
+  const TrialBody& a_;
+  const TrialBody& b_;
+  const Ball ball_a_, ball_b_;
+  const double smaller_, relative_error_;
+  Random random_;
+  Workspace workspace_;
+};
+
+}  // namespace
+
+std::vector<TrialPose> trial_poses(const TrialBody& a, const TrialBody& b, std::uint32_t per_class,
+                                   double relative_error, std::uint64_t seed) {
+  Trials trials(a, b, relative_error, seed);
+  std::vector<TrialPose> poses;
+  for (std::uint32_t k = 0; k < kOverlapClasses; ++k) {
+    std::uint32_t found = 0;
+    if (k == 0) {
+      for (double size = kContainedSize; found == 0 && size > 0.01; size /= 2)
+        for (std::uint32_t i = 0; i < kContainedTries * per_class && found < per_class; ++i) {
+          TrialPose pose;
+          if (!trials.contain(size, pose)) continue;
+          poses.push_back(pose);
+          ++found;
+        }
+      continue;
+    }
+    for (std::uint32_t i = 0; i < kTriesPerPose * per_class && found < per_class; ++i) {
+      // From the class's floor up a decade, evenly on the logarithm; deep ones evenly up to 0.5.
+      double fraction = kOverlapClassFloor[k];
+      if (k == 1) {
+        fraction += 0.4 * trials.random().uniform();
+      } else {
+        constexpr std::uint64_t kSteps = 100;         // of a decade
+        constexpr double kStep = 1.0232929922807541;  // 10^(1/100)
+        const std::uint64_t steps = trials.random().bits() % kSteps;
+        for (std::uint64_t step = 0; step < steps; ++step) fraction *= kStep;
+      }
+      TrialPose pose;
+      if (!trials.approach(fraction, pose)) continue;
+      poses.push_back(pose);
+      ++found;
+    }
+  }
+  return poses;
+}
+
+}  // namespace ist

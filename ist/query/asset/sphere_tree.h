@@ -1,0 +1,118 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include <ist/query.h>
+
+#include <ist/asset_layout.h>
+
+namespace ist {
+
+/// The level under the leaves: a "node" is a single sphere, block · 16 + lane.
+inline constexpr int kSphereLevel = -1;
+
+struct NodeBall {
+  double centre[3] = {};
+  double r = 0;
+};
+
+/// What is known of all spheres below a block.
+struct NodeSums {
+  double volume = 0;   ///< Σ of sphere volumes, rounded up
+  double overlap = 1;  ///< κ: no point lies in more spheres than this
+};
+
+/// One tree of an asset with its offsets resolved. A *node* is named by a level and a block of it:
+/// the ball around the sixteen balls (or spheres, at level 0) of that block.
+struct SphereTree {
+  struct Level {
+    const BallBlock* blocks = nullptr;
+    const Origin* origins = nullptr;
+    const NodeBlock* nodes = nullptr;
+    std::uint32_t count = 0;
+  };
+
+  SphereTree(const AssetHeader& asset, const TreeHeader& tree) noexcept
+      : header(&tree), top(static_cast<int>(tree.level_count) - 1) {
+    for (int i = 0; i <= top; ++i) {
+      const LevelHeader& from = tree.level[i];
+      level[i] = {at<BallBlock>(asset, from.blocks), at<Origin>(asset, from.origins),
+                  at<NodeBlock>(asset, from.nodes), from.count};
+    }
+    sphere_cover = tree.sphere_cover != 0 ? at<float>(asset, tree.sphere_cover) : nullptr;
+  }
+
+  /// Unit frame, at full precision.
+  NodeBall ball(int at_level, std::uint32_t block) const noexcept {
+    if (at_level == top)
+      return {{header->root[0], header->root[1], header->root[2]}, header->root[3]};
+    const Level& above = level[at_level + 1];
+    const BallBlock& b = above.blocks[block / kWidth];
+    const Origin& o = above.origins[block / kWidth];
+    const std::uint32_t lane = block % kWidth;
+    return {{o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
+             o.z + static_cast<double>(b.z[lane])},
+            static_cast<double>(b.r[lane])};
+  }
+
+  NodeBall sphere(std::uint32_t block, std::uint32_t lane) const noexcept {
+    const BallBlock& b = level[0].blocks[block];
+    const Origin& o = level[0].origins[block];
+    return {{o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
+             o.z + static_cast<double>(b.z[lane])},
+            static_cast<double>(b.r[lane])};
+  }
+
+  NodeSums sums(int at_level, std::uint32_t block) const noexcept {
+    if (at_level == kSphereLevel) {
+      const double r = ball(at_level, block).r;
+      return {4 * M_PI / 3 * (r * r * r), 1};
+    }
+    if (at_level == top) return {header->volume_sum, static_cast<double>(header->overlap)};
+    const NodeBlock& n = level[at_level + 1].nodes[block / kWidth];
+    const std::uint32_t lane = block % kWidth;
+    return {static_cast<double>(n.volume[lane]), static_cast<double>(n.overlap[lane])};
+  }
+
+  /// Inner tree: radius about the node's centre that holds every cover ball below it.
+  double cover(int at_level, std::uint32_t block) const noexcept {
+    if (at_level == top) return header->root_cover;
+    return static_cast<double>(level[at_level + 1].nodes[block / kWidth].cover[block % kWidth]);
+  }
+
+  /// Cube of the typical radius of a level's nodes, up to a factor that all trees share: blocks
+  /// tile the root ball.
+  double typical_cube(int at_level) const noexcept {
+    return header->root[3] * header->root[3] * header->root[3] / count(at_level);
+  }
+
+  /// The leaf blocks [begin, end) below a node.
+  struct Leaves {
+    std::uint32_t begin, end;
+  };
+  Leaves leaves_below(int at_level, std::uint32_t block) const noexcept {
+    const std::uint64_t full = std::uint64_t{1} << (4 * at_level);
+    const std::uint64_t all = level[0].count;
+    return {static_cast<std::uint32_t>(std::min(all, full * block)),
+            static_cast<std::uint32_t>(std::min(all, full * (block + 1)))};
+  }
+
+  /// Nodes of a level.
+  std::uint32_t count(int at_level) const noexcept {
+    return at_level == kSphereLevel ? header->sphere_count : level[at_level].count;
+  }
+
+  const TreeHeader* header;
+  int top;  ///< the level of one block
+  Level level[kMaxLevels];
+  const float* sphere_cover;  ///< inner tree: a cover radius a lane of level 0
+};
+
+inline SphereTree sphere_tree(const TreeView& view, Measure measure) noexcept {
+  const AssetHeader& asset = view.header();
+  return SphereTree(asset, measure == Measure::inner ? asset.inner_tree : asset.matched_tree);
+}
+
+}  // namespace ist

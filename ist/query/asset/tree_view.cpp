@@ -1,0 +1,177 @@
+#include <ist/tree_view.h>
+
+#include <cmath>
+#include <cstring>
+
+#include <ist/asset_layout.h>
+#include "query/asset/content_hash.h"
+
+namespace ist {
+namespace {
+
+// Comparisons are written so that NaN fails them.
+bool in_range(double value, double low, double high) noexcept {
+  return value >= low && value <= high;
+}
+bool is_offset(double value) noexcept { return in_range(value, -kMaxExtent, kMaxExtent); }
+bool is_radius(double value) noexcept { return in_range(value, 0, kMaxExtent); }
+bool is_finite_sum(double value) noexcept { return in_range(value, 0, 1e18); }
+
+/// The first `used` lanes hold balls, the rest are marked empty.
+bool sound_block(const BallBlock& block, std::uint64_t used) noexcept {
+  bool sound = true;
+  for (std::uint32_t l = 0; l < kWidth; ++l) {
+    if (l < used)
+      sound &= is_offset(block.x[l]) && is_offset(block.y[l]) && is_offset(block.z[l]) &&
+               is_radius(block.r[l]);
+    else
+      sound &= block.x[l] == 0 && block.y[l] == 0 && block.z[l] == 0 && block.r[l] == kEmptyRadius;
+  }
+  return sound;
+}
+
+bool sound_nodes(const NodeBlock& nodes, std::uint64_t used, bool covers) noexcept {
+  bool sound = true;
+  for (std::uint32_t l = 0; l < kWidth; ++l) {
+    if (l < used)
+      sound &= is_finite_sum(nodes.volume[l]) && is_radius(nodes.cover[l]) &&
+               in_range(nodes.overlap[l], 1, kMaxSpheres);
+    else
+      sound &= nodes.volume[l] == 0 && nodes.cover[l] == (covers ? kEmptyRadius : 0.0f) &&
+               nodes.overlap[l] == 0;
+  }
+  return sound;
+}
+
+bool sound_spheres(const AssetHeader& header, std::uint64_t offset, std::uint64_t count) noexcept {
+  const Sphere* spheres = at<Sphere>(header, offset);
+  bool sound = true;
+  for (std::uint64_t i = 0; i < count; ++i)
+    sound &= is_offset(spheres[i].x) && is_offset(spheres[i].y) && is_offset(spheres[i].z) &&
+             is_radius(spheres[i].r);
+  return sound;
+}
+
+bool sound_tree(const AssetHeader& header, const TreeHeader& tree) noexcept {
+  const bool covers = tree.sphere_cover != 0;
+  bool sound = is_offset(tree.root[0]) && is_offset(tree.root[1]) && is_offset(tree.root[2]) &&
+               is_radius(tree.root[3]) && is_radius(tree.root_cover) &&
+               is_finite_sum(tree.volume_sum) && is_radius(tree.mean_radius) &&
+               in_range(tree.overlap, 1, kMaxSpheres);
+
+  const std::uint32_t* index = at<std::uint32_t>(header, tree.sphere_index);
+  const std::uint64_t lanes = std::uint64_t{kWidth} * tree.level[0].count;
+  for (std::uint64_t i = 0; i < lanes; ++i)
+    sound &= i < tree.sphere_count ? index[i] < tree.sphere_count : index[i] == 0;
+  if (covers) {
+    const float* cover = at<float>(header, tree.sphere_cover);
+    for (std::uint64_t i = 0; i < lanes; ++i)
+      sound &= i < tree.sphere_count ? is_radius(cover[i]) : cover[i] == kEmptyRadius;
+  }
+
+  std::uint64_t below = tree.sphere_count;  // what the lanes of this level stand for
+  for (std::uint32_t k = 0; k < tree.level_count && sound; ++k) {
+    const LevelHeader& level = tree.level[k];
+    const BallBlock* blocks = at<BallBlock>(header, level.blocks);
+    const Origin* origins = at<Origin>(header, level.origins);
+    for (std::uint32_t b = 0; b < level.count; ++b) {
+      const std::uint64_t used = below - std::uint64_t{kWidth} * b;
+      sound &= sound_block(blocks[b], used);
+      sound &= is_offset(origins[b].x) && is_offset(origins[b].y) && is_offset(origins[b].z);
+      if (k > 0) sound &= sound_nodes(at<NodeBlock>(header, level.nodes)[b], used, covers);
+    }
+    below = level.count;
+  }
+  return sound;
+}
+
+/// Offsets and counts are a function of the counts of spheres and details: nothing else is
+/// accepted.
+bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
+  if (header.sphere_count < 1 || header.sphere_count > kMaxSpheres) return false;
+  if (header.detail_count > kMaxDetails) return false;
+  if (detail_spheres(header.sphere_count, header.detail_count) < 1) return false;
+  AssetHeader expected;
+  DetailLevel details[kMaxDetails];
+  expected.sphere_count = header.sphere_count;
+  expected.detail_count = header.detail_count;
+  place_sections(expected, details);
+  const auto same_tree = [](const TreeHeader& a, const TreeHeader& b) {
+    return a.sphere_index == b.sphere_index && a.sphere_cover == b.sphere_cover &&
+           a.sphere_count == b.sphere_count && a.level_count == b.level_count &&
+           std::memcmp(a.level, b.level, sizeof(a.level)) == 0;
+  };
+  if (expected.file_bytes != bytes || expected.details != header.details) return false;
+  const DetailLevel* const found = at<DetailLevel>(header, header.details);
+  for (std::uint32_t i = 0; i < header.detail_count; ++i)
+    if (details[i].effective_spheres != found[i].effective_spheres ||
+        !same_tree(details[i].matched_tree, found[i].matched_tree))
+      return false;
+  return expected.inner_spheres == header.inner_spheres &&
+         expected.cover_radii == header.cover_radii &&
+         expected.effective_spheres == header.effective_spheres &&
+         same_tree(expected.inner_tree, header.inner_tree) &&
+         same_tree(expected.matched_tree, header.matched_tree);
+}
+
+bool sound_values(const AssetHeader& header) noexcept {
+  for (const double c : header.centre)
+    if (!std::isfinite(c)) return false;
+  if (!in_range(header.exponent, -kMaxExponent, kMaxExponent)) return false;
+  if (!is_finite_sum(header.volume) || !is_finite_sum(header.volume_error) ||
+      !in_range(header.coverage, 0, 1) || !is_radius(header.protrusion))
+    return false;
+  const float* covers = at<float>(header, header.cover_radii);
+  for (std::uint64_t i = 0; i < header.sphere_count; ++i)
+    if (!is_radius(covers[i])) return false;
+  for (const double error : header.predicted_error)
+    if (!is_finite_sum(error)) return false;
+  const DetailLevel* const details = at<DetailLevel>(header, header.details);
+  for (std::uint32_t i = 0; i < header.detail_count; ++i) {
+    const TreeHeader& tree = details[i].matched_tree;
+    if (!is_radius(details[i].protrusion) || !sound_tree(header, tree) ||
+        !sound_spheres(header, details[i].effective_spheres, tree.sphere_count))
+      return false;
+  }
+  return sound_spheres(header, header.inner_spheres, header.sphere_count) &&
+         sound_spheres(header, header.effective_spheres, header.sphere_count) &&
+         sound_tree(header, header.inner_tree) && sound_tree(header, header.matched_tree);
+}
+
+}  // namespace
+
+AssetStatus TreeView::from_bytes(std::span<const std::byte> bytes, TreeView& out) noexcept {
+  out = TreeView();
+  if (reinterpret_cast<std::uintptr_t>(bytes.data()) % kAssetAlignment != 0)
+    return AssetStatus::misaligned;
+  if (bytes.size() < sizeof(kAssetMagic)) return AssetStatus::too_short;
+  if (std::memcmp(bytes.data(), kAssetMagic, sizeof(kAssetMagic)) != 0)
+    return AssetStatus::not_an_asset;
+  if (bytes.size() < sizeof(AssetHeader)) return AssetStatus::too_short;
+  const auto* header = reinterpret_cast<const AssetHeader*>(bytes.data());
+  if (header->format_major != kFormatMajor || header->format_minor != kFormatMinor)
+    return AssetStatus::other_version;
+  if (bytes.size() < header->file_bytes) return AssetStatus::too_short;
+  if (bytes.size() > header->file_bytes) return AssetStatus::corrupt_layout;
+  if (content_hash(bytes) != header->content_hash) return AssetStatus::corrupt_hash;
+  if (!sound_sections(*header, bytes.size()) || !sound_values(*header))
+    return AssetStatus::corrupt_layout;
+  out.header_ = header;
+  return AssetStatus::ok;
+}
+
+std::size_t TreeView::sphere_count() const noexcept {
+  return header_ == nullptr ? 0 : static_cast<std::size_t>(header_->sphere_count);
+}
+
+double TreeView::volume() const noexcept {
+  return header_ == nullptr ? 0 : std::ldexp(header_->volume, 3 * header_->exponent);
+}
+
+double TreeView::coverage() const noexcept { return header_ == nullptr ? 0 : header_->coverage; }
+
+double TreeView::soft_skin() const noexcept {
+  return header_ == nullptr ? 0 : std::ldexp(header_->protrusion, header_->exponent);
+}
+
+}  // namespace ist

@@ -1,0 +1,74 @@
+#include "query/base/relative_pose.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include <ist/asset_layout.h>
+
+namespace ist {
+namespace {
+
+// Beyond this many sizes of A nothing is told apart, and squares of squares stay finite below it.
+constexpr double kFarthest = 1e60;
+
+struct Frame {
+  Eigen::Quaterniond rotation;
+  Eigen::Vector3d translation;  ///< [u] of the object's origin
+  Eigen::Vector3d offset;       ///< [u] from the object's origin to its unit frame's, own axes
+  double unit;                  ///< [u]
+};
+
+std::optional<Frame> frame_of(const PlacedTree& placed) {
+  if (placed.tree.empty()) return std::nullopt;
+  const double* q = placed.pose.q;
+  const double* t = placed.pose.t;
+  const double norm = std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
+  if (!(std::abs(norm - 1) <= 1e-3)) return std::nullopt;
+  if (!std::isfinite(t[0]) || !std::isfinite(t[1]) || !std::isfinite(t[2])) return std::nullopt;
+  if (!(placed.scale > 0) || !std::isfinite(placed.scale)) return std::nullopt;
+
+  const AssetHeader& header = placed.tree.header();
+  Frame frame;
+  frame.rotation = Eigen::Quaterniond(q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm);
+  frame.translation = Eigen::Vector3d(t[0], t[1], t[2]);
+  frame.offset =
+      placed.scale * Eigen::Vector3d(header.centre[0], header.centre[1], header.centre[2]);
+  frame.unit = std::ldexp(placed.scale, header.exponent);
+  return frame;
+}
+
+Similarity similarity(double scale, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& t) {
+  Similarity s;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) s.m[3 * i + j] = scale * rotation(i, j);
+    s.t[i] = t[i];
+  }
+  s.scale = scale;
+  return s;
+}
+
+}  // namespace
+
+std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree& b) noexcept {
+  const std::optional<Frame> fa = frame_of(a);
+  const std::optional<Frame> fb = frame_of(b);
+  if (!fa || !fb) return std::nullopt;
+
+  const Eigen::Matrix3d rotation = (fa->rotation.conjugate() * fb->rotation).toRotationMatrix();
+  const Eigen::Vector3d between = fa->rotation.conjugate() * (fb->translation - fa->translation);
+  const Eigen::Vector3d t = (between + (rotation * fb->offset - fa->offset)) / fa->unit;
+  const double scale = fb->unit / fa->unit;
+  if (!(t.norm() <= kFarthest) || !(scale <= kFarthest) || !(scale >= 1 / kFarthest))
+    return std::nullopt;
+
+  RelativePose pose;
+  pose.a_from_b = similarity(scale, rotation, t);
+  pose.b_from_a = similarity(1 / scale, rotation.transpose(), -(rotation.transpose() * t) / scale);
+  pose.rotation_a = fa->rotation.toRotationMatrix();
+  pose.unit_origin_a = fa->translation + fa->rotation * fa->offset;
+  pose.unit_offset_b = fb->rotation * fb->offset;
+  pose.unit_a = fa->unit;
+  return pose;
+}
+
+}  // namespace ist

@@ -1,0 +1,81 @@
+#include "query/contact/contact_bins.h"
+
+#include <bit>
+
+namespace ist {
+namespace {
+
+template <class T>
+T* storage(std::size_t count) {
+  return static_cast<T*>(::operator new(count * sizeof(T), std::align_val_t(alignof(T))));
+}
+
+/// Calls f(bin) for every set bit, in order.
+template <class F>
+void for_each_bit(const std::uint64_t (&words)[ContactBins::kBins / 64], F f) {
+  for (std::uint32_t w = 0; w < ContactBins::kBins / 64; ++w)
+    for (std::uint64_t left = words[w]; left != 0; left &= left - 1)
+      f(64 * w + static_cast<std::uint32_t>(std::countr_zero(left)));
+}
+
+}  // namespace
+
+ContactBins::ContactBins()
+    : sums_(storage<LeafSums>(kBins)),
+      guesses_(storage<Overlap>(kBins)),
+      bins_(storage<ContactBin>(kBins)),
+      parts_(storage<ContactPart>(kBins)),
+      order_(storage<std::uint32_t>(kBins)),
+      spare_(storage<std::uint32_t>(kBins)) {}
+
+void ContactBins::start(const SphereTree& tree, bool of_b) noexcept {
+  for (std::uint64_t& word : marked_) word = 0;
+  tree_ = &tree;
+  of_b_ = of_b;
+  level_ = 0;
+  while (tree.level[level_].count > kBins) ++level_;
+}
+
+void ContactBins::mark(std::uint32_t bin) noexcept {
+  const std::uint64_t bit = std::uint64_t{1} << (bin % 64);
+  if ((marked_[bin / 64] & bit) != 0) return;
+  marked_[bin / 64] |= bit;
+  new (&sums_[bin]) LeafSums();
+  new (&guesses_[bin]) Overlap();
+}
+
+LeafBinning ContactBins::touch(int level_a, const std::uint32_t* a, int level_b,
+                               const std::uint32_t* b, std::size_t n) noexcept {
+  const std::uint32_t* const nodes = of_b_ ? b : a;
+  const int shift = 4 * (level_ - (of_b_ ? level_b : level_a));
+  for (std::size_t i = 0; i < n; ++i) mark(nodes[i] >> shift);
+  return {sums_.get(), nodes, shift};
+}
+
+void ContactBins::add_guess(int level_a, std::uint32_t a, int level_b, std::uint32_t b,
+                            const Overlap& guess) noexcept {
+  const int at = of_b_ ? level_b : level_a;
+  const std::uint32_t block = of_b_ ? b : a;
+  const std::uint32_t bin =
+      at >= level_ ? block << (4 * (at - level_)) : block >> (4 * (level_ - at));
+  mark(bin);
+  guesses_[bin].add(guess);
+}
+
+void ContactBins::forget_sums() noexcept {
+  for_each_bit(marked_, [&](std::uint32_t bin) { sums_[bin] = LeafSums(); });
+}
+
+std::uint32_t ContactBins::collect(Precision precision) noexcept {
+  std::uint32_t count = 0;
+  for_each_bit(marked_, [&](std::uint32_t node) {
+    ContactBin bin{node, finish(sums_[node], precision), 0, Eigen::Vector3d::Zero()};
+    bin.sum.add(guesses_[node]);
+    bin.pull = bin.sum.force.norm();
+    if (bin.sum.volume > 0) bin.centre = bin.sum.moment / bin.sum.volume;
+    if (bin.sum.volume > 0 || bin.pull > 0) new (&bins_[count++]) ContactBin(bin);
+  });
+  return count;
+}
+
+}  // namespace ist

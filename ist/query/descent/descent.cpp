@@ -1,0 +1,333 @@
+#include "query/descent/descent.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "query/base/precision.h"
+#include "query/kernel/node_kernel.h"
+
+namespace ist {
+namespace {
+
+// Leaf pairs between two looks at the error that is left, a few microseconds.
+constexpr std::size_t kLeafChunk = 256;
+
+// Shares of the time that a deadline gives: sums are taken again in double only before the one, and
+// no more guesses are made after the other.
+constexpr double kEarly = 0.3, kLate = 0.85;
+constexpr std::size_t kGuesses = 32;  ///< between two looks at the clock, evenly over what is left
+
+// Sums whose rounding may exceed this share are taken again in double. The bound is at least fifty
+// times what rounding does, so float keeps 1e-5 (property_query, NoGrazingPairIsLost).
+constexpr double kGrazing = 5e-4;
+
+/// Larger bounds first; no two pairs are alike.
+bool before(const RankedPair& l, const RankedPair& r) {
+  if (l.bound != r.bound) return l.bound > r.bound;
+  return l.a != r.a ? l.a < r.a : l.b < r.b;
+}
+
+}  // namespace
+
+Descent::Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
+                 const QuerySettings& settings, Workspace::Impl& scratch, ContactBins* bins)
+    : a_(a),
+      b_(b),
+      pose_(pose),
+      map_(pose.a_from_b),
+      precision_(precision_for(a, b, pose)),
+      settings_(settings),
+      min_radius_(settings.min_radius / pose.unit_a),
+      scratch_(scratch),
+      bins_(bins),
+      budget_(settings) {}
+
+void Descent::run() noexcept {
+  level_a_ = a_.top;
+  level_b_ = b_.top;
+  scratch_.now.a[0] = scratch_.now.b[0] = 0;
+  scratch_.now.size = estimate(level_a_, 0, level_b_, 0).bound > 0 ? 1 : 0;
+  while (level_a_ > 0 || level_b_ > 0) {
+    if (!open_level()) return;
+  }
+  open_leaves();
+}
+
+Overlap Descent::overlap() const {
+  Overlap result = sure();
+  result.add(left_);
+  return result;
+}
+
+Overlap Descent::sure() const {
+  Overlap result = finish(sums_, precision_);
+  Overlap held = held_overlap(true, held_a_);
+  held.add(held_overlap(false, held_b_));
+  result.add(held);
+  result.error += sum_rounding(precision_) * held.volume;
+  return result;
+}
+
+bool Descent::open_level() {
+  const double cube = map_.scale * map_.scale * map_.scale;
+  const bool open_a =
+      level_b_ == kSphereLevel ||
+      (level_a_ != kSphereLevel && a_.typical_cube(level_a_) >= cube * b_.typical_cube(level_b_));
+  if (min_radius_ > 0) drop_small([&](double ra, double rb) { return open_a ? ra : rb; });
+  PairList& now = scratch_.now;
+  PairList& next = scratch_.next;
+  choose();
+  const NodeStage stage =
+      open_a ? NodeStage{&a_, &b_, level_a_, level_b_, &map_, precision_}
+             : NodeStage{&b_, &a_, level_b_, level_a_, &pose_.b_from_a, precision_};
+  next.size = 0;
+  std::size_t done = 0;
+  while (done < now.size) {
+    const std::size_t room = (scratch_.capacity - next.size) / kWidth;
+    const std::size_t n = budget_.grant(std::min({kNodePairs, now.size - done, room}));
+    if (n == 0) break;
+    open_pairs(stage, open_a, done, n);
+    done += n;
+  }
+  const bool finished = done == now.size;
+  if (!finished) leave(now, done);
+  --(open_a ? level_a_ : level_b_);
+  std::swap(now, next);
+  if (!finished) leave(now, 0);
+  return finished;
+}
+
+void Descent::open_pairs(const NodeStage& stage, bool open_a, std::size_t from, std::size_t n) {
+  const PairList& now = scratch_.now;
+  PairList& next = scratch_.next;
+  const std::uint32_t* const x = (open_a ? now.a : now.b).get() + from;
+  const std::uint32_t* const y = (open_a ? now.b : now.a).get() + from;
+  std::uint32_t* const out_x = (open_a ? next.a : next.b).get() + next.size;
+  std::uint32_t* const out_y = (open_a ? next.b : next.a).get() + next.size;
+  if (stage.level_y != kSphereLevel) {
+    next.size += open_nodes(stage, x, y, n, out_x, out_y);
+    return;
+  }
+  std::uint32_t held_x[kWidth * (kNodePairs + 1)], held_y[kWidth * (kNodePairs + 1)];
+  HeldNodes held{held_x, held_y};
+  next.size += open_under_spheres(stage, x, y, n, out_x, out_y, held);
+  hold(open_a, stage.level_x - 1, held);
+}
+
+void Descent::hold(bool of_a, int level, const HeldNodes& held) {
+  const SphereTree& tree = of_a ? a_ : b_;
+  add_subtrees(tree, level, held.x, held.size, of_a ? held_a_ : held_b_);
+  if (bins_ == nullptr) return;
+  for (std::size_t i = 0; i < held.size; ++i) {
+    SubtreeSums sums;
+    add_subtrees(tree, level, held.x + i, 1, sums);
+    bins_->add_guess(of_a ? level : kSphereLevel, of_a ? held.x[i] : held.y[i],
+                     of_a ? kSphereLevel : level, of_a ? held.y[i] : held.x[i],
+                     held_overlap(of_a, sums));
+  }
+}
+
+Overlap Descent::held_overlap(bool of_a, const SubtreeSums& held) const {
+  Overlap overlap;
+  if (held.spheres == 0) return overlap;
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  for (std::size_t lane = 0; lane < kWidth; ++lane) {
+    overlap.volume += held.cubes[lane];
+    for (int k = 0; k < 3; ++k) moment[k] += held.moment[k][lane];
+  }
+  overlap.volume *= 4 * M_PI / 3;
+  moment *= 4 * M_PI / 3;
+  if (of_a) {
+    overlap.moment = moment - overlap.volume * Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]);
+  } else {
+    const double cube = map_.scale * map_.scale * map_.scale;
+    overlap.volume *= cube;
+    for (int k = 0; k < 3; ++k)
+      overlap.moment[k] = cube * ((map_.m[3 * k] * moment[0] + map_.m[3 * k + 1] * moment[1]) +
+                                  map_.m[3 * k + 2] * moment[2]);
+  }
+  return overlap;
+}
+
+void Descent::open_leaves() {
+  if (min_radius_ > 0) drop_small([](double ra, double rb) { return std::max(ra, rb); });
+  PairList& now = scratch_.now;
+  const bool by_error = settings_.relative_error > 0;
+  double waiting = 0;  // bound on the pairs still to come
+  if (by_error)
+    waiting = rank();
+  else
+    choose();
+  if (now.size > 0) scratch_.leaves->forget(precision_);
+  std::size_t done = 0;
+  while (done < now.size) {
+    if (by_error && accurate(waiting)) break;
+    const std::size_t granted =
+        budget_.grant(by_error ? std::min(kLeafChunk, now.size - done) : now.size - done);
+    const std::size_t n = add_leaves(done, granted, &budget_);
+    budget_.give_back(granted - n);
+    if (n == 0) break;
+    if (by_error)
+      for (std::size_t i = done; i < done + n; ++i) waiting -= scratch_.ranked[i].bound;
+    done += n;
+  }
+  leave(now, done);
+
+  // A few grazing lenses are all rounding in float; they are as few as they are shallow.
+  const Overlap sum = sure();
+  if (precision_ == Precision::single && !keep_rounding_ && sum.error > kGrazing * sum.volume &&
+      !budget_.spent(kEarly)) {
+    precision_ = Precision::twice;
+    scratch_.leaves->forget(precision_);
+    sums_ = LeafSums();
+    if (bins_ != nullptr) bins_->forget_sums();
+    add_leaves(0, done, nullptr);
+  }
+}
+
+std::size_t Descent::add_leaves(std::size_t from, std::size_t n, const Budget* budget) {
+  if (n == 0) return 0;
+  const std::uint32_t* const a = scratch_.now.a.get() + from;
+  const std::uint32_t* const b = scratch_.now.b.get() + from;
+  LeafStage stage{&a_, &b_, level_a_, level_b_, &map_, precision_, budget};
+  if (bins_ != nullptr) stage.bins = bins_->touch(level_a_, a, level_b_, b, n);
+  return add_leaf_pairs(stage, *scratch_.leaves, a, b, n, sums_);
+}
+
+bool Descent::accurate(double waiting) const {
+  const Overlap sum = sure();
+  const double spread = 2 * sum.error + waiting + left_bound_;
+  return spread <= settings_.relative_error * (sum.volume + sum.error + waiting + left_bound_);
+}
+
+double Descent::bound(std::size_t i) const {
+  return bound_pair(a_, level_a_, scratch_.now.a[i], b_, level_b_, scratch_.now.b[i], map_);
+}
+
+double Descent::rank() {
+  PairList& now = scratch_.now;
+  RankedPair* ranked = scratch_.ranked.get();
+  for (std::size_t i = 0; i < now.size; ++i) ranked[i] = {bound(i), now.a[i], now.b[i]};
+  std::sort(ranked, ranked + now.size, before);
+  double sum = 0;
+  for (std::size_t i = 0; i < now.size; ++i) {
+    now.a[i] = ranked[i].a;
+    now.b[i] = ranked[i].b;
+    sum += ranked[i].bound;
+  }
+  return sum;
+}
+
+void Descent::choose() {
+  const std::size_t left = budget_.left();
+  PairList& now = scratch_.now;
+  PairList& next = scratch_.next;
+  if (left == 0 || now.size <= left) return;
+  RankedPair* ranked = scratch_.ranked.get();
+  double* bounds = scratch_.bounds.get();
+  for (std::size_t i = 0; i < now.size; ++i) {
+    bounds[i] = bound(i);
+    ranked[i] = {bounds[i], now.a[i], now.b[i]};
+  }
+  RankedPair* const last = ranked + left - 1;
+  std::nth_element(ranked, last, ranked + now.size, before);
+  std::size_t chosen = 0, others = left;
+  for (std::size_t i = 0; i < now.size; ++i) {
+    // (both lists stay within their room even if a damaged asset's bounds are no numbers)
+    const bool is_other =
+        others < now.size && (chosen == left || before(*last, {bounds[i], now.a[i], now.b[i]}));
+    std::size_t& to = is_other ? others : chosen;
+    next.a[to] = now.a[i];
+    next.b[to++] = now.b[i];
+  }
+  next.size = now.size;
+  std::swap(now, next);
+}
+
+template <class Measured>
+void Descent::drop_small(Measured measured) {
+  PairList& now = scratch_.now;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < now.size; ++i) {
+    const double ra = a_.ball(level_a_, now.a[i]).r;
+    const double rb = b_.ball(level_b_, now.b[i]).r * map_.scale;
+    if (measured(ra, rb) < min_radius_) {
+      left_.add(leave_pair(now.a[i], now.b[i]));
+    } else {
+      now.a[kept] = now.a[i];
+      now.b[kept++] = now.b[i];
+    }
+  }
+  now.size = kept;
+}
+
+void Descent::leave(const PairList& list, std::size_t from) {
+  const std::size_t count = list.size - from;
+  // Bins must add up to the whole, so theirs are all guessed.
+  const std::size_t step =
+      budget_.timed() && bins_ == nullptr ? std::max<std::size_t>(1, count / kGuesses) : 1;
+  Overlap guesses;
+  std::size_t guessed = 0;
+  for (std::size_t first = 0; first < step; ++first) {
+    if (first > 0 && budget_.spent(kLate)) {
+      // The others are taken for as large as these on average; penetration() caps the bound.
+      guesses.scale(static_cast<double>(count) / static_cast<double>(guessed));
+      left_bound_ = std::numeric_limits<double>::infinity();
+      break;
+    }
+    for (std::size_t i = from + first; i < list.size; i += step, ++guessed)
+      guesses.add(leave_pair(list.a[i], list.b[i]));
+  }
+  left_.add(guesses);
+}
+
+Overlap Descent::leave_pair(std::uint32_t a, std::uint32_t b) {
+  const PairEstimate pair = estimate(level_a_, a, level_b_, b);
+  const Eigen::Vector3d lever = pair.centre - Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]);
+  stopped_ = true;
+  left_bound_ += pair.bound;
+  Overlap guess;
+  guess.volume = pair.volume;
+  guess.force = pair.force;
+  guess.torque = lever.cross(pair.force);
+  guess.moment = pair.volume * lever;
+  if (bins_ != nullptr) bins_->add_guess(level_a_, a, level_b_, b, guess);
+  return guess;
+}
+
+Penetration Descent::penetration() const noexcept {
+  Penetration result;
+  const Overlap overlap = this->overlap();
+
+  // No point is counted more often than κ A's κ B, nor beyond either tree's own volume.
+  const double scale = pose_.a_from_b.scale;
+  const double volume_a = a_.header->volume_sum;
+  const double volume_b = b_.header->volume_sum * (scale * scale * scale);
+  const double cap = (1 + 1e-9) * std::min(volume_a * static_cast<double>(b_.header->overlap),
+                                           volume_b * static_cast<double>(a_.header->overlap));
+  const double sure = overlap.volume - left_.volume;
+  const double lowest = std::max(0.0, sure - overlap.error);
+  const double highest = std::max(lowest, std::min(cap, sure + overlap.error + left_bound_));
+
+  const double unit = pose_.unit_a;
+  const double unit3 = unit * unit * unit;
+  result.volume = unit3 * std::clamp(overlap.volume, lowest, highest);
+  result.volume_min = unit3 * lowest;
+  result.volume_max = unit3 * highest;
+  result.node_visits = budget_.visits();
+  result.sphere_pairs = sums_.lenses + held_a_.spheres + held_b_.spheres;
+  if (stopped_) result.status = QueryStatus::budget_exhausted;
+  if (overlap.volume > 0) {
+    const Eigen::Vector3d origin_b(pose_.a_from_b.t[0], pose_.a_from_b.t[1], pose_.a_from_b.t[2]);
+    result.centroid = pose_.to_world(overlap.moment / overlap.volume + origin_b);
+  }
+  result.translation_gradient = unit * unit * (pose_.rotation_a * overlap.force);
+  result.rotation_gradient = unit3 * (pose_.rotation_a * overlap.torque) +
+                             pose_.unit_offset_b.cross(result.translation_gradient);
+  return result;
+}
+
+}  // namespace ist

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include <ist/query.h>
+
+#include "query/asset/sphere_tree.h"
+#include "query/base/budget.h"
+#include "query/base/relative_pose.h"
+#include "query/contact/contact_bins.h"
+#include "query/descent/unresolved.h"
+#include "query/descent/workspace.h"
+#include "query/kernel/leaf_kernel.h"
+#include "query/kernel/overlap.h"
+#include "query/kernel/subtree_kernel.h"
+
+namespace ist {
+
+/// The staged descent of DESIGN 7: node pairs level by level, then pairs of leaf blocks.
+class Descent {
+ public:
+  /// All arguments must outlive the descent. With `bins`, what is summed is sorted into them too.
+  Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
+          const QuerySettings& settings, Workspace::Impl& scratch, ContactBins* bins = nullptr);
+
+  /// Takes rounding as it comes: lenses that graze are not summed again in double.
+  void keep_rounding() noexcept { keep_rounding_ = true; }
+
+  void run() noexcept;
+
+  /// The answer in world units, from what has been summed.
+  Penetration penetration() const noexcept;
+
+  Precision precision() const { return precision_; }
+
+ private:
+  PairEstimate estimate(int level_a, std::uint32_t a, int level_b, std::uint32_t b) const {
+    return estimate_pair(a_, level_a, a, b_, level_b, b, map_);
+  }
+
+  /// Best answer: what was summed and a guess of the rest.
+  Overlap overlap() const;
+
+  /// What was summed, without guesses.
+  Overlap sure() const;
+
+  /// Opens one side of every pair of the current list. False if the budget stopped it.
+  bool open_level();
+
+  /// Opens pairs [from, from + n) of the current list into the next. Nodes that a sphere of the
+  /// standing side holds are added up instead.
+  void open_pairs(const NodeStage& stage, bool open_a, std::size_t from, std::size_t n);
+
+  /// Adds the spheres below nodes of A, or of B: each node lies in one sphere of the other side.
+  void hold(bool of_a, int level, const HeldNodes& held);
+
+  /// What spheres of A, or of B, add that lie in one of the other side.
+  Overlap held_overlap(bool of_a, const SubtreeSums& held) const;
+
+  void open_leaves();
+
+  /// Sums pairs [from, from + n) of the current list, or as many as a budget has time for.
+  std::size_t add_leaves(std::size_t from, std::size_t n, const Budget* budget);
+
+  bool accurate(double waiting) const;
+
+  /// Sorts the current list, largest bound first; returns the sum of the bounds.
+  double rank();
+
+  /// Puts the pairs of largest bound that visits are left for first in the current list, if there
+  /// are more. Otherwise they stay in order, as neighbours share nodes.
+  void choose();
+
+  /// What ranks the pairs of the current list, from the largest bound down.
+  double bound(std::size_t i) const;
+
+  /// Leaves the pairs unopened of which `measured(radius_a, radius_b)` is under the limit.
+  template <class Measured>
+  void drop_small(Measured measured);
+
+  /// Guesses the pairs from `from` on; if the time is over, from an even choice of them.
+  void leave(const PairList& list, std::size_t from);
+
+  /// Guesses one pair that stays unopened.
+  Overlap leave_pair(std::uint32_t a, std::uint32_t b);
+
+  const SphereTree& a_;
+  const SphereTree& b_;
+  const RelativePose& pose_;
+  const Similarity& map_;
+  Precision precision_;
+  const QuerySettings& settings_;
+  const double min_radius_;  ///< A's unit frame
+  Workspace::Impl& scratch_;
+  ContactBins* const bins_;
+  Budget budget_;
+  int level_a_ = 0, level_b_ = 0;  ///< of the current list
+  LeafSums sums_;
+  SubtreeSums held_a_, held_b_;  ///< nodes that lie in a sphere of the other tree
+  Overlap left_;                 ///< guess of what was not opened
+  double left_bound_ = 0;        ///< what that can add at most
+  bool stopped_ = false;
+  bool keep_rounding_ = false;
+};
+
+}  // namespace ist

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include <ist/query.h>
+
+#include <ist/asset_layout.h>
+#include "query/contact/contact_bins.h"
+#include "query/kernel/placed_blocks.h"
+
+namespace ist {
+
+/// A pair of nodes with the bound by which it is ranked.
+struct RankedPair {
+  double bound;
+  std::uint32_t a, b;
+};
+
+/// A pair of nodes whose gap is still to be looked at.
+struct WaitingPair {
+  double gap;    ///< no spheres below are nearer than this, but for rounding
+  double cover;  ///< likewise no cover balls
+  std::uint32_t a, b;
+  std::int32_t level_a, level_b;
+};
+
+/// List of node pairs, one block index a side.
+struct PairList {
+  std::unique_ptr<std::uint32_t[]> a, b;
+  std::size_t size = 0;
+};
+
+/// Depth-first, a descent of two trees of seven levels waits on 15 children a level at most.
+inline constexpr std::size_t kWaiting = 16 * 2 * kMaxLevels;
+
+struct Workspace::Impl {
+  explicit Impl(std::size_t capacity);
+
+  std::size_t capacity;  ///< pairs in each list
+  PairList now, next;    ///< pairs of the current pair of levels; those of the next
+  std::unique_ptr<RankedPair[]> ranked;
+  std::unique_ptr<double[]> bounds;        ///< of the pairs of `now`, while some are chosen
+  std::unique_ptr<WaitingPair[]> waiting;  ///< [kWaiting] a stack
+  std::unique_ptr<LeafScratch> leaves;
+  ContactBins contact;
+};
+
+}  // namespace ist

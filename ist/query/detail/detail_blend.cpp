@@ -1,0 +1,163 @@
+#include "query/detail/detail_blend.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "query/descent/descent.h"
+#include "query/detail/coincident.h"
+#include "query/detail/detail_chain.h"
+
+namespace ist {
+namespace {
+
+/// Asks pairs of levels one after another under the limits that they share.
+class DetailQueries {
+ public:
+  DetailQueries(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+                const QuerySettings& settings, Workspace& workspace) noexcept
+      : a_(a.tree.header()),
+        b_(b.tree.header()),
+        pose_(pose),
+        settings_(settings),
+        workspace_(workspace),
+        twins_(are_twins(a_, b_)),
+        start_(settings.deadline_us > 0 ? Clock::now() : Clock::time_point()) {}
+
+  /// The whole sum of a pair of levels, rounded as it may be: where lenses graze they are few, and
+  /// the finest level is taken anyway.
+  Penetration gauge(const DetailPair& pair) noexcept { return descend(pair, 0, 0, true); }
+
+  /// The sum of a pair of levels; of twins that all but coincide, that of unlike levels instead.
+  Penetration ask(const DetailPair& pair, double relative_error, double min_radius) noexcept {
+    const TwinWeight twins = twin_weight_of(pair);
+    if (twins.weight == 0) return descend(pair, relative_error, min_radius);
+    DetailPair unlike[2] = {pair, pair};
+    unlike[0].b = unlike[1].a = pair.a < a_.detail_count ? pair.a + 1 : pair.a - 1;
+    Penetration other = mix(descend(unlike[0], relative_error, min_radius),
+                            descend(unlike[1], relative_error, min_radius), 0.5);
+    if (twins.weight == 1) return other;
+    const Penetration alike = descend(pair, relative_error, min_radius);
+    Penetration mixed = mix(alike, other, twins.weight);
+    add_slope(twins, other.volume - alike.volume, pose_, mixed);
+    return mixed;
+  }
+
+  TwinWeight twin_weight_of(const DetailPair& pair) const noexcept {
+    return twins_ && pair.a == pair.b ? twin_weight(matched_tree(a_, pair.a), pose_.a_from_b)
+                                      : TwinWeight{};
+  }
+
+  std::uint32_t visits() const noexcept { return visits_; }
+  std::uint32_t pairs() const noexcept { return pairs_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  // [µs] A deadline that is over before anything is opened: nothing but the roots is looked at.
+  static constexpr double kNoTime = 1e-6;
+
+  Penetration descend(const DetailPair& pair, double relative_error, double min_radius,
+                      bool keep_rounding = false) noexcept {
+    QuerySettings limits = settings_;
+    limits.relative_error = relative_error;
+    limits.min_radius = min_radius;
+    if (settings_.deadline_us > 0) {
+      const std::chrono::duration<double, std::micro> gone = Clock::now() - start_;
+      limits.deadline_us = std::max(kNoTime, settings_.deadline_us - gone.count());
+    }
+    if (settings_.max_visits > 0) {
+      limits.max_visits = settings_.max_visits - visits_;
+      if (limits.max_visits == 0) limits.deadline_us = kNoTime;
+    }
+    const SphereTree tree_a(a_, matched_tree(a_, pair.a));
+    const SphereTree tree_b(b_, matched_tree(b_, pair.b));
+    Descent descent(tree_a, tree_b, pose_, limits, workspace_.impl());
+    if (keep_rounding) descent.keep_rounding();
+    descent.run();
+    Penetration answer = descent.penetration();
+    visits_ += answer.node_visits;
+    pairs_ += answer.sphere_pairs;
+    return answer;
+  }
+
+  const AssetHeader& a_;
+  const AssetHeader& b_;
+  const RelativePose& pose_;
+  const QuerySettings& settings_;
+  Workspace& workspace_;
+  const bool twins_;
+  const Clock::time_point start_;
+  std::uint32_t visits_ = 0, pairs_ = 0;
+};
+
+// A gauge whose bounds are further apart than this part of it is too rough for an answer.
+constexpr double kRough = 5e-4;
+
+}  // namespace
+
+Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+                          const QuerySettings& settings, Workspace& workspace) noexcept {
+  DetailQueries queries(a, b, pose, settings, workspace);
+  if (settings.pair_budget == 0)
+    return queries.ask(DetailPair(), settings.relative_error, settings.min_radius);
+  const DetailChain chain(a.tree.header(), b.tree.header(), pose.a_from_b.scale);
+  // Nothing to choose, or nothing dear: no gauge can exceed either solid's sum, κ times over.
+  const TreeHeader& coarse_a = matched_tree(a.tree.header(), chain.coarsest().a);
+  const TreeHeader& coarse_b = matched_tree(b.tree.header(), chain.coarsest().b);
+  const double scale = pose.a_from_b.scale;
+  const double most =
+      std::min(coarse_a.volume_sum * double{coarse_b.overlap},
+               coarse_b.volume_sum * (scale * scale * scale) * double{coarse_a.overlap});
+  if (chain.size() == 1 || chain.weights(most, settings.pair_budget)[0].weight == 1)
+    return queries.ask(chain[0], settings.relative_error, settings.min_radius);
+
+  // Whatever else is asked, the gauge is the whole sum: only that is smooth.
+  const Penetration gauge = queries.gauge(chain.coarsest());
+  Penetration result;
+  if (gauge.status != QueryStatus::ok) {
+    // Stopped here, any level might have been meant.
+    result = gauge;
+    for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
+      const Penetration bounds = queries.ask(chain[i], 0, 0);
+      result.volume_min = std::min(result.volume_min, bounds.volume_min);
+      result.volume_max = std::max(result.volume_max, bounds.volume_max);
+    }
+  } else {
+    const double unit3 = pose.unit_a * pose.unit_a * pose.unit_a;
+    const DetailChain::Weights weights = chain.weights(gauge.volume / unit3, settings.pair_budget);
+    const bool rough = gauge.volume_max - gauge.volume_min > kRough * gauge.volume;
+    double slope = 0;                               // of the blend by the gauge
+    for (std::size_t i = chain.size(); i-- > 0;) {  // the coarse ones first: they are sure to end
+      const double weight = weights[i].weight;
+      if (weight == 0 && weights[i].slope == 0) continue;
+      const Penetration part =
+          i + 1 == chain.size() && !rough && queries.twin_weight_of(chain[i]).weight == 0
+              ? gauge
+              : queries.ask(chain[i], settings.relative_error, settings.min_radius);
+      result.volume += weight * part.volume;
+      result.volume_min += weight * part.volume_min;
+      result.volume_max += weight * part.volume_max;
+      if (result.volume > 0)
+        result.centroid +=
+            (weight * part.volume / result.volume) * (part.centroid - result.centroid);
+      result.translation_gradient += weight * part.translation_gradient;
+      result.rotation_gradient += weight * part.rotation_gradient;
+      result.status = std::max(result.status, part.status);
+      // At extreme sizes nought times the volume need not be nought.
+      if (weights[i].slope != 0) slope += weights[i].slope / unit3 * part.volume;
+    }
+    // The gauge is rounded too, and with it the weights.
+    if (slope != 0) {
+      const double doubt = std::abs(slope) * (gauge.volume_max - gauge.volume_min);
+      result.volume_min = std::max(0.0, result.volume_min - doubt);
+      result.volume_max += doubt;
+      result.translation_gradient += slope * gauge.translation_gradient;
+      result.rotation_gradient += slope * gauge.rotation_gradient;
+    }
+  }
+  result.node_visits = queries.visits();
+  result.sphere_pairs = queries.pairs();
+  return result;
+}
+
+}  // namespace ist

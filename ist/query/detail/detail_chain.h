@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include <ist/asset_layout.h>
+
+namespace ist {
+
+/// Levels of detail of two assets that are asked together.
+struct DetailPair {
+  std::uint32_t a = 0, b = 0;  ///< 0: the finest
+
+  // What the expected number of sphere pairs is made of, A's unit frame.
+  double density = 0;  ///< pairs over volume of overlap
+  double skin = 0;     ///< √volume: makes up for the rim of a shallow contact
+};
+
+/// Part of an answer that one pair of levels gives.
+struct DetailWeight {
+  double weight = 0;  ///< [0, 1]
+  double slope = 0;   ///< d weight / d gauge
+};
+
+/// The pairs of levels with which two assets may be asked, from the finest to the coarsest of both
+/// (DESIGN 5). Each step takes a coarser level on the side of the smaller spheres, which cost most
+/// and tell least, or on both sides where spheres are about as large.
+///
+/// How many sphere pairs a level needs is told from the overlap of the coarsest levels, the
+/// *gauge*: a smooth function of the pose, so that an answer may be blended by it.
+class DetailChain {
+ public:
+  static constexpr std::size_t kMost = 2 * kMaxDetails + 1;
+  using Weights = std::array<DetailWeight, kMost>;
+
+  /// `scale`: of B in A's unit frame.
+  DetailChain(const AssetHeader& a, const AssetHeader& b, double scale) noexcept;
+
+  std::size_t size() const noexcept { return size_; }
+  const DetailPair& operator[](std::size_t i) const noexcept { return pairs_[i]; }
+  const DetailPair& coarsest() const noexcept { return pairs_[size_ - 1]; }
+
+  /// Weights of the pairs, which sum to 1: all of it is the finest pair's while that needs no more
+  /// than half of `budget` sphere pairs, none where it needs the whole; what is left goes to the
+  /// next pair by the same rule, and what none can afford to the coarsest. Continuous in the gauge,
+  /// with the slope. Gauge 0: the finest.
+  Weights weights(double gauge, double budget) const noexcept;
+
+ private:
+  std::array<DetailPair, kMost> pairs_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace ist

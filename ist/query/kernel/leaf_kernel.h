@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "query/base/budget.h"
+#include "query/kernel/node_kernel.h"
+#include "query/kernel/placed_blocks.h"
+
+namespace ist {
+
+/// Half of the virtual lanes: what the sums of a list of lenses are folded to before they are added
+/// up.
+inline constexpr std::size_t kSumLanes = 8;
+
+/// Running sums over leaf pairs, in A's unit frame, positions relative to B's unit-frame origin.
+/// Factors of π are left to the end. Lanes keep the order of additions the same for every vector
+/// width, and thus the bits.
+struct alignas(64) LeafSums {
+  double caps[kSumLanes] = {};       ///< 3/π · volume
+  double force[3][kSumLanes] = {};   ///< −1/2π · dV/d(translation of B)
+  double torque[3][kSumLanes] = {};  ///< likewise about B's unit-frame origin
+  double moment[3][kSumLanes] = {};  ///< 3/π · ∫ x dV
+  double error[kSumLanes] = {};      ///< 1/2π · bound on what rounded distances change in V
+  std::uint32_t lenses = 0;          ///< that are not empty
+};
+
+/// Where the sums of single pairs go besides the whole's: pair i to sums[node[i] >> shift].
+struct LeafBinning {
+  LeafSums* sums = nullptr;
+  const std::uint32_t* node = nullptr;  ///< one a pair
+  int shift = 0;
+};
+
+/// One stage of leaf pairs: of each pair one side at least is a leaf block (level 0), the other one
+/// too or a single sphere (kSphereLevel).
+struct LeafStage {
+  const SphereTree* a;
+  const SphereTree* b;
+  int level_a;
+  int level_b;
+  const Similarity* a_from_b;
+  Precision precision;
+  const Budget* budget = nullptr;  ///< whose deadline ends the stage, between batches
+  LeafBinning bins = {};
+};
+
+/// Adds the lenses of every sphere of a[i] with every sphere of b[i]. Returns how many pairs it
+/// took: all n, or those that came before the deadline. The scratch keeps blocks from call to call.
+std::size_t add_leaf_pairs(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+                           const std::uint32_t* b, std::size_t n, LeafSums& sums) noexcept;
+
+}  // namespace ist

@@ -1,0 +1,227 @@
+// Lenses packed side by side, whatever pairs of blocks they come from: included once a target.
+
+#if defined(IST_QUERY_LENS_LIST_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef IST_QUERY_LENS_LIST_INL_H_
+#undef IST_QUERY_LENS_LIST_INL_H_
+#else
+#define IST_QUERY_LENS_LIST_INL_H_
+#endif
+
+#include <limits>
+
+#include "query/kernel/lanes-inl.h"
+#include "query/kernel/leaf_kernel.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
+
+/// Lenses are summed as soon as there are so many.
+inline constexpr std::size_t kFullList = 8 * kWidth;
+inline constexpr std::size_t kListRoom = kFullList + 2 * kWidth;
+
+/// Pairs of spheres i, j that may meet, in A's axes. A store writes a whole vector and counts what
+/// is valid of it, so there is room beyond the last.
+template <class T>
+struct alignas(64) LensList {
+  T dx[kListRoom], dy[kListRoom], dz[kListRoom];  ///< centre of j less centre of i
+  T rj[kListRoom], ri[kListRoom];
+  T lx[kListRoom], ly[kListRoom], lz[kListRoom];  ///< centre of i, relative to B's origin
+  T error[kListRoom];                             ///< of the distance; negative if i is B's
+  std::uint32_t bin[kListRoom];                   ///< of LeafBinning::sums
+  std::size_t size = 0;
+};
+
+/// Sums of one list, sixteen lanes each.
+template <class T>
+struct alignas(64) LaneSums {
+  T caps[kWidth];
+  T force[3][kWidth], torque[3][kWidth], moment[3][kWidth];
+  T error[kWidth];
+};
+
+/// total[l] += from[l] + from[l + 8], the last additions in double.
+template <class T>
+HWY_INLINE void fold(const T* from, double* total) {
+  const hn::CappedTag<double, kSumLanes> d;
+  for (std::size_t lane = 0; lane < kSumLanes; lane += hn::Lanes(d)) {
+    hn::Vec<decltype(d)> sum;
+    if constexpr (sizeof(T) == sizeof(float)) {
+      const hn::Rebind<float, decltype(d)> df;
+      sum = hn::PromoteTo(d, hn::Load(df, from + lane) + hn::Load(df, from + lane + kSumLanes));
+    } else {
+      sum = hn::Load(d, from + lane) + hn::Load(d, from + lane + kSumLanes);
+    }
+    hn::Store(hn::Load(d, total + lane) + sum, d, total + lane);
+  }
+}
+
+template <class T>
+HWY_INLINE void add_lanes(const LaneSums<T>& lanes, LeafSums& sums) {
+  fold(lanes.caps, sums.caps);
+  fold(lanes.error, sums.error);
+  for (int k = 0; k < 3; ++k) {
+    fold(lanes.force[k], sums.force[k]);
+    fold(lanes.torque[k], sums.torque[k]);
+    fold(lanes.moment[k], sums.moment[k]);
+  }
+}
+
+/// Adds lens `lane` of the sixteen to the sums of its bin.
+template <class T>
+HWY_INLINE void add_lens(const LaneSums<T>& lenses, std::size_t lane, LeafSums& bin) {
+  bin.caps[0] += static_cast<double>(lenses.caps[lane]);
+  bin.error[0] += static_cast<double>(lenses.error[lane]);
+  for (int k = 0; k < 3; ++k) {
+    bin.force[k][0] += static_cast<double>(lenses.force[k][lane]);
+    bin.torque[k][0] += static_cast<double>(lenses.torque[k][lane]);
+    bin.moment[k][0] += static_cast<double>(lenses.moment[k][lane]);
+  }
+}
+
+/// The quantities of LeafSums for a vector of lenses, or of many added up.
+template <class V>
+struct LensVectors {
+  V caps, error, force[3], torque[3], moment[3];
+};
+
+template <class T, class D, class V>
+HWY_INLINE void store(const LensVectors<V>& from, D d, std::size_t lane, LaneSums<T>& to) {
+  hn::Store(from.caps, d, to.caps + lane);
+  hn::Store(from.error, d, to.error + lane);
+  for (int k = 0; k < 3; ++k) {
+    hn::Store(from.force[k], d, to.force[k] + lane);
+    hn::Store(from.torque[k], d, to.torque[k] + lane);
+    hn::Store(from.moment[k], d, to.moment[k] + lane);
+  }
+}
+
+/// lens() of lens.h, a vector at a time and without branches. Counts those that are not empty.
+template <class T, class D, class V = hn::Vec<D>>
+HWY_INLINE LensVectors<V> lens_vectors(const LensList<T>& list, D d, std::size_t at,
+                                       std::uint32_t& lenses) {
+  const V zero = hn::Zero(d);
+  const V two = hn::Set(d, T(2));
+  const V three = hn::Set(d, T(3));
+  const V tiny = hn::Set(d, std::numeric_limits<T>::min());
+  const V dx = hn::Load(d, list.dx + at);
+  const V dy = hn::Load(d, list.dy + at);
+  const V dz = hn::Load(d, list.dz + at);
+  const V ri = hn::Load(d, list.ri + at);
+  const V rj = hn::Load(d, list.rj + at);
+  const V signed_error = hn::Load(d, list.error + at);
+  const V distance = hn::Sqrt((dx * dx + dy * dy) + dz * dz);
+  const V a = hn::Max(ri, rj);
+  const V b = hn::Min(ri, rj);
+  const V g = (a - distance) + b;
+  const V step = a - b;
+  const V f = hn::IfThenElse(step <= b, distance - step, (distance - a) + b);
+  const V e = step + distance;
+  const V g0 = hn::Max(g, zero);
+  const auto holds = hn::Or(f <= zero, distance < tiny);
+  const V inverse = hn::Set(d, T(0.5)) / hn::Max(distance, tiny);
+  const V ha = hn::IfThenZeroElse(holds, (f * inverse) * g0);
+  const V diameter = two * b;
+  const V hb = hn::IfThenElse(holds, diameter, hn::Min((e * inverse) * g0, diameter));
+  const V large = (ha * ha) * (three * a - ha);
+  const V small = (hb * hb) * (three * b - hb);
+  const V circle = ha * (two * a - ha);
+  const V cap_j = hn::IfThenElse(ri > rj, small, large);
+  const V pull = hn::CopySignToAbs(circle * inverse, signed_error);
+  // Within rounding of tangency the circle says nothing; b² holds it at any distance. Else it
+  // is concave between the tangencies, so within ± error it is at most doubled.
+  const V error = hn::Abs(signed_error);
+  const V near = hn::Abs(hn::Min(g, f));
+  const V lx = hn::Load(d, list.lx + at);
+  const V ly = hn::Load(d, list.ly + at);
+  const V lz = hn::Load(d, list.lz + at);
+  LensVectors<V> lens;
+  lens.caps = large + small;
+  lens.error = error * hn::IfThenElse(near < error, b * b, circle);
+  lens.force[0] = pull * dx;
+  lens.force[1] = pull * dy;
+  lens.force[2] = pull * dz;
+  // The push acts along the line of centres, so at the centre of i.
+  lens.torque[0] = ly * lens.force[2] - lz * lens.force[1];
+  lens.torque[1] = lz * lens.force[0] - lx * lens.force[2];
+  lens.torque[2] = lx * lens.force[1] - ly * lens.force[0];
+  lens.moment[0] = lens.caps * lx + cap_j * dx;
+  lens.moment[1] = lens.caps * ly + cap_j * dy;
+  lens.moment[2] = lens.caps * lz + cap_j * dz;
+  lenses += static_cast<std::uint32_t>(hn::CountTrue(d, lens.caps > zero));
+  return lens;
+}
+
+/// Adds each of lenses [0, 16 · batches) to the sums of its bin, in order.
+template <class T>
+HWY_INLINE void bin_lenses(const LensList<T>& list, std::size_t batches, LeafSums* bins) {
+  const LaneTag<T> d;
+  LaneSums<T> lenses;
+  std::uint32_t counted = 0;
+  for (std::size_t at = 0; at < kWidth * batches; at += kWidth) {
+    for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d))
+      store<T>(lens_vectors<T>(list, d, at + lane, counted), d, lane, lenses);
+    for (std::size_t lane = 0; lane < kWidth; ++lane)
+      add_lens(lenses, lane, bins[list.bin[at + lane]]);
+  }
+}
+
+/// Adds lenses [0, 16 · batches) to the sums and, if there are any, to the bins'. Lanes of any
+/// vector width add in the same order.
+template <class T>
+HWY_INLINE void sum_lenses(const LensList<T>& list, std::size_t batches, LeafSums& sums,
+                           LeafSums* bins) {
+  const LaneTag<T> d;
+  using V = hn::Vec<decltype(d)>;
+  LaneSums<T> lanes;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V zero = hn::Zero(d);
+    LensVectors<V> total{zero, zero, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
+    for (std::size_t i = 0; i < batches; ++i) {
+      const std::size_t at = kWidth * i + lane;
+      const LensVectors<V> lens = lens_vectors<T>(list, d, at, sums.lenses);
+      total.caps = total.caps + lens.caps;
+      total.error = total.error + lens.error;
+      for (int k = 0; k < 3; ++k) {
+        total.force[k] = total.force[k] + lens.force[k];
+        total.torque[k] = total.torque[k] + lens.torque[k];
+        total.moment[k] = total.moment[k] + lens.moment[k];
+      }
+    }
+    store<T>(total, d, lane, lanes);
+  }
+  add_lanes(lanes, sums);
+  if (bins != nullptr) bin_lenses(list, batches, bins);
+}
+
+/// Sums a full list's whole batches and keeps the rest.
+template <class T>
+HWY_INLINE void sum_full_list(LensList<T>& list, LeafSums& sums, LeafSums* bins) {
+  sum_lenses(list, kFullList / kWidth, sums, bins);
+  list.size -= kFullList;
+  for (std::size_t i = 0; i < list.size; ++i) {
+    const std::size_t from = kFullList + i;
+    list.dx[i] = list.dx[from], list.dy[i] = list.dy[from], list.dz[i] = list.dz[from];
+    list.rj[i] = list.rj[from], list.ri[i] = list.ri[from];
+    list.lx[i] = list.lx[from], list.ly[i] = list.ly[from], list.lz[i] = list.lz[from];
+    list.error[i] = list.error[from], list.bin[i] = list.bin[from];
+  }
+}
+
+/// Sums all that is left, filled up with points that meet nothing.
+template <class T>
+HWY_INLINE void sum_last_lenses(LensList<T>& list, LeafSums& sums, LeafSums* bins) {
+  const std::size_t batches = (list.size + kWidth - 1) / kWidth;
+  for (std::size_t i = list.size; i < kWidth * batches; ++i) {
+    list.dx[i] = 1, list.dy[i] = list.dz[i] = 0;
+    list.rj[i] = list.ri[i] = 0;
+    list.lx[i] = list.ly[i] = list.lz[i] = 0;
+    list.error[i] = 0, list.bin[i] = list.bin[list.size - 1];
+  }
+  if (batches != 0) sum_lenses(list, batches, sums, bins);
+  list.size = 0;
+}
+
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

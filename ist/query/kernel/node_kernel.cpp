@@ -1,0 +1,167 @@
+#include "query/kernel/node_kernel.h"
+
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/kernel/node_kernel.cpp"
+#include <hwy/foreach_target.h>
+
+#include "query/kernel/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
+
+/// Appends the pairs of the chosen lanes and y to two lists, whose room ends a vector later.
+template <class T, class M>
+HWY_INLINE std::size_t append(LaneTag<T> d, M chosen, std::uint32_t first, std::uint32_t y,
+                              std::uint32_t* out_x, std::uint32_t* out_y) {
+  const hn::CappedTag<std::uint32_t, kWidth> du;
+  for (std::size_t i = 0; i < hn::Lanes(d); i += hn::Lanes(du))
+    hn::StoreU(hn::Set(du, y), du, out_y + i);
+  return append_lanes<T>(d, chosen, first, out_x);
+}
+
+/// What stands still while nodes are opened: the ball of node y of each pair, from the origin of
+/// the block that is opened.
+template <class T>
+struct alignas(64) StandingBalls {
+  T x[kNodePairs], y[kNodePairs], z[kNodePairs];
+  T reach[kNodePairs];   ///< radius, more by what rounding may move a distance
+  T within[kNodePairs];  ///< less by it
+};
+
+/// Collects what the balls follow from, pair by pair, and computes them a vector at a time.
+template <class T>
+HWY_INLINE void stand(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                      std::size_t n, StandingBalls<T>& standing) {
+  const hn::CappedTag<double, 8> d;
+  using V = hn::Vec<decltype(d)>;
+  alignas(64) double centre[3][kNodePairs];
+  alignas(64) double radius[kNodePairs];
+  alignas(64) double origin[3][kNodePairs];
+  const SphereTree::Level& opened = stage.x->level[stage.level_x];
+  for (std::size_t i = 0; i < n; ++i) {
+    const NodeBall ball = stage.y->ball(stage.level_y, y[i]);
+    const Origin& o = opened.origins[x[i]];
+    centre[0][i] = ball.centre[0], centre[1][i] = ball.centre[1], centre[2][i] = ball.centre[2];
+    radius[i] = ball.r;
+    origin[0][i] = o.x, origin[1][i] = o.y, origin[2][i] = o.z;
+  }
+  const Similarity& map = *stage.x_from_y;
+  const V scale = hn::Set(d, map.scale);
+  for (std::size_t i = 0; i < n; i += hn::Lanes(d)) {
+    const auto pairs = hn::FirstN(d, n - i);  // beyond are no numbers
+    const V cx = hn::MaskedLoad(pairs, d, centre[0] + i);
+    const V cy = hn::MaskedLoad(pairs, d, centre[1] + i);
+    const V cz = hn::MaskedLoad(pairs, d, centre[2] + i);
+    const V r = hn::MaskedLoad(pairs, d, radius + i) * scale;
+    V q[3];
+    V magnitude = r;
+    for (int k = 0; k < 3; ++k) {
+      const V moved = ((hn::Set(d, map.m[3 * k]) * cx + hn::Set(d, map.m[3 * k + 1]) * cy) +
+                       hn::Set(d, map.m[3 * k + 2]) * cz) +
+                      hn::Set(d, map.t[k]);
+      q[k] = moved - hn::MaskedLoad(pairs, d, origin[k] + i);
+      magnitude = magnitude + hn::Abs(q[k]);
+    }
+    const V error = magnitude * hn::Set(d, distance_error<T>(2));
+    store_as(q[0], d, standing.x + i);
+    store_as(q[1], d, standing.y + i);
+    store_as(q[2], d, standing.z + i);
+    store_as(r + error, d, standing.reach + i);
+    store_as(r - error, d, standing.within + i);
+  }
+}
+
+/// With kHeld, children inside of y[i] go to `held`.
+template <class T, bool kHeld>
+HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
+                               const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
+                               std::uint32_t* out_y, HeldNodes* held) {
+  const LaneTag<T> d;
+  const SphereTree::Level& opened = stage.x->level[stage.level_x];
+  const auto grow = hn::Set(d, static_cast<T>(1 + distance_error<T>(1)));
+  StandingBalls<T> standing;
+  stand(stage, x, y, n, standing);
+  std::size_t found = 0;
+  const std::uint32_t below = stage.x->count(stage.level_x - 1);
+  for (std::size_t i = 0; i < n; ++i) {
+    const BallBlock& block = opened.blocks[x[i]];
+    const std::uint32_t first_child = kWidth * x[i];
+    for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+      const auto dx = load_as<T>(d, block.x + lane) - hn::Set(d, standing.x[i]);
+      const auto dy = load_as<T>(d, block.y + lane) - hn::Set(d, standing.y[i]);
+      const auto dz = load_as<T>(d, block.z + lane) - hn::Set(d, standing.z[i]);
+      const auto d2 = (dx * dx + dy * dy) + dz * dz;
+      // Negative for an unused lane, whose square must not count.
+      const auto r = load_as<T>(d, block.r + lane) * grow;
+      const auto sum = hn::Max(r + hn::Set(d, standing.reach[i]), hn::Zero(d));
+      auto near = d2 < sum * sum;
+      const std::uint32_t child = first_child + static_cast<std::uint32_t>(lane);
+      if constexpr (kHeld) {
+        // Zero but near: an unused lane's square is no float.
+        const auto spare =
+            hn::IfThenElseZero(near, hn::Max(hn::Set(d, standing.within[i]) - r, hn::Zero(d)));
+        const auto inside = d2 < spare * spare;
+        held->size += append<T>(d, inside, child, y[i], held->x + held->size, held->y + held->size);
+        near = hn::AndNot(inside, near);
+      }
+      found += append<T>(d, near, child, y[i], out_x + found, out_y + found);
+    }
+    // Unused lanes, which a large enough ball would reach all the same.
+    while (found > 0 && out_x[found - 1] >= below) --found;
+    if constexpr (kHeld)
+      while (held->size > 0 && held->x[held->size - 1] >= below) --held->size;
+  }
+  return found;
+}
+
+std::size_t open_single(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
+  return open_as<float, false>(stage, x, y, n, out_x, out_y, nullptr);
+}
+
+std::size_t open_twice(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
+  return open_as<double, false>(stage, x, y, n, out_x, out_y, nullptr);
+}
+
+std::size_t hold_single(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y,
+                        HeldNodes& held) {
+  return open_as<float, true>(stage, x, y, n, out_x, out_y, &held);
+}
+
+std::size_t hold_twice(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y, HeldNodes& held) {
+  return open_as<double, true>(stage, x, y, n, out_x, out_y, &held);
+}
+
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ist {
+
+HWY_EXPORT(open_single);
+HWY_EXPORT(open_twice);
+HWY_EXPORT(hold_single);
+HWY_EXPORT(hold_twice);
+
+std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept {
+  return stage.precision == Precision::single
+             ? HWY_DYNAMIC_DISPATCH(open_single)(stage, x, y, n, out_x, out_y)
+             : HWY_DYNAMIC_DISPATCH(open_twice)(stage, x, y, n, out_x, out_y);
+}
+
+std::size_t open_under_spheres(const NodeStage& stage, const std::uint32_t* x,
+                               const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
+                               std::uint32_t* out_y, HeldNodes& held) noexcept {
+  return stage.precision == Precision::single
+             ? HWY_DYNAMIC_DISPATCH(hold_single)(stage, x, y, n, out_x, out_y, held)
+             : HWY_DYNAMIC_DISPATCH(hold_twice)(stage, x, y, n, out_x, out_y, held);
+}
+
+}  // namespace ist
+#endif

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "query/asset/sphere_tree.h"
+#include "query/base/precision.h"
+#include "query/base/relative_pose.h"
+
+namespace ist {
+
+/// Pairs that are opened together.
+inline constexpr std::size_t kNodePairs = 64;
+
+/// One stage of the descent: nodes of tree x are opened, those of y stand still.
+struct NodeStage {
+  const SphereTree* x;
+  const SphereTree* y;
+  int level_x;  ///< of the blocks that are opened, ≥ 0
+  int level_y;  ///< ≥ kSphereLevel
+  const Similarity* x_from_y;
+  Precision precision;
+};
+
+/// Opens node x[i] of each of n ≤ kNodePairs pairs and keeps its children that come within reach of
+/// node y[i], never losing one to rounding. Writes at most 16 n pairs and up to 16 entries of
+/// scratch beyond them; returns how many pairs. Same output on every instruction set.
+std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept;
+
+/// Nodes of x that lie in a sphere of y.
+struct HeldNodes {
+  std::uint32_t* x;
+  std::uint32_t* y;
+  std::size_t size = 0;
+};
+
+/// The same where y are single spheres, but children that lie altogether in sphere y[i] are
+/// appended to `held` instead: at most 16 n, and up to 16 entries beyond.
+std::size_t open_under_spheres(const NodeStage& stage, const std::uint32_t* x,
+                               const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
+                               std::uint32_t* out_y, HeldNodes& held) noexcept;
+
+}  // namespace ist

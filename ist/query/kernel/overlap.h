@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "query/kernel/leaf_kernel.h"
+
+namespace ist {
+
+/// Overlap of two trees or of parts of them, in A's unit frame; positions relative to B's
+/// unit-frame origin.
+struct Overlap {
+  double volume = 0;
+  double error = 0;                                  ///< bound on the rounding of `volume`
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< d(volume)/d(translation of B)
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< likewise about B's unit-frame origin
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();  ///< ∫ x dV
+
+  /// All but `error`.
+  void add(const Overlap& other) noexcept {
+    volume += other.volume;
+    force += other.force;
+    torque += other.torque;
+    moment += other.moment;
+  }
+
+  /// All but `error`.
+  void scale(double factor) noexcept {
+    volume *= factor;
+    force *= factor;
+    torque *= factor;
+    moment *= factor;
+  }
+};
+
+/// Relative rounding of a sum of lenses. A lens is good to a few units in the last place, and at
+/// most 18 of them meet in one lane before the sum goes on in double.
+constexpr double sum_rounding(Precision precision) {
+  return precision == Precision::single ? 4e-6 : 1e-14;
+}
+
+/// Adds up the lanes and sets in the factors of π.
+Overlap finish(const LeafSums& sums, Precision precision) noexcept;
+
+}  // namespace ist

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#include "numerics/float3.h"
+
+// Names for things that no order of work can change: hashes of their coordinates' bits.
+
+namespace ist {
+
+IST_HD inline std::uint32_t bits_of(float x) {
+  std::uint32_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  return bits;
+}
+
+IST_HD inline float float_of(std::uint32_t bits) {
+  float x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+IST_HD inline std::uint64_t mixed(std::uint64_t x) {  // the finaliser of SplitMix64
+  x ^= x >> 30;
+  x *= 0xBF58476D1CE4E5B9ull;
+  x ^= x >> 27;
+  x *= 0x94D049BB133111EBull;
+  return x ^ (x >> 31);
+}
+
+/// Hash of a point's bits.
+IST_HD inline std::uint32_t point_hash(Float3 point, std::uint64_t seed) {
+  std::uint64_t hash = mixed(seed + 0x9E3779B97F4A7C15ull);
+  hash = mixed(hash ^ (bits_of(point.x) | std::uint64_t{bits_of(point.y)} << 32));
+  hash = mixed(hash ^ bits_of(point.z));
+  return static_cast<std::uint32_t>(hash >> 32);
+}
+
+}  // namespace ist

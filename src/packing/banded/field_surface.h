@@ -1,0 +1,78 @@
+#pragma once
+
+#include <ist/solid.h>
+
+#include "packing/banded/sample.h"
+
+namespace ist::packing {
+
+/// The surface of any Solid, known by its signed distance alone. Features are balls: a value s at q
+/// bounds the field by |x − q| + s everywhere (it is 1-Lipschitz), which is the ball {q, −s}; taken
+/// where the gradient leads to the surface, it is a surface point.
+class FieldSurface {
+ public:
+  /// A search of a field finds one feature, so an ascent must take more steps to know them all.
+  static constexpr int kAscentSteps = 8;
+
+  struct Feature {
+    Float3 centre;
+    float radius = 0;
+  };
+
+  FieldSurface(const Solid& solid, const UnitFrame& frame)
+      : solid_(solid), frame_(frame), scale_(frame.scale()) {}
+
+  /// Unsigned distance to the surface, and the feature there, if it is less than `limit`.
+  template <class Team>
+  NearestFeature<Feature> nearest(const Team&, Float3 x, float limit) const {
+    const double s = value(x);
+    if (!(std::fabs(s) < limit)) return {{}, limit, false};
+    // Central differences over a step that float coordinates resolve.
+    const double step = 0x1p-20;
+    const Eigen::Vector3d at(x.x, x.y, x.z);
+    Eigen::Vector3d g;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d e = step * Eigen::Vector3d::Unit(k);
+      g[k] = value(at + e) - value(at - e);
+    }
+    const double length = std::sqrt(g.dot(g));
+    const Eigen::Vector3d q = length > 0 ? Eigen::Vector3d(at - s / length * g) : at;
+    Feature feature;
+    feature.centre = {static_cast<float>(q.x()), static_cast<float>(q.y()),
+                      static_cast<float>(q.z())};
+    feature.radius = static_cast<float>(-value(feature.centre));
+    return {feature, static_cast<float>(std::fabs(s)), true};
+  }
+
+  /// Where x stands to a remembered feature.
+  FeatureOffset offset(const Feature& feature, Float3 x) const {
+    return ball_offset(feature.centre, feature.radius, kSurfaceTag, x);
+  }
+
+  /// Nothing is known of faces.
+  template <class Team>
+  int convex_planes(const Team&, Float3, float, bool, Feature*, int, SampleMemory*, int) const {
+    return 0;
+  }
+
+  template <class Team>
+  bool inside(const Team&, Float3 x) const {
+    return value(x) > 0;
+  }
+  template <class Team>
+  double clearance(const Team&, Float3 x, double) const {
+    return value(x);
+  }
+
+ private:
+  double value(Float3 x) const { return value(Eigen::Vector3d(x.x, x.y, x.z)); }
+  double value(const Eigen::Vector3d& x) const {
+    return solid_.signed_distance(frame_.from_unit(x)) / scale_;
+  }
+
+  const Solid& solid_;
+  UnitFrame frame_;
+  double scale_;
+};
+
+}  // namespace ist::packing

@@ -1,0 +1,95 @@
+#include "packing/banded/selection.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "packing/spheres/certificate.h"
+
+namespace ist::packing {
+namespace {
+
+/// Candidates sorted into buckets.
+class Buckets {
+ public:
+  explicit Buckets(const std::vector<Candidate>& candidates) : candidates_(candidates) {
+    float largest = 0;
+    for (const Candidate& c : candidates) largest = std::max(largest, c.radius);
+    buckets_ = candidate_buckets(largest, candidates.size());
+    start_.assign(std::size_t{buckets_.mask} + 2, 0);
+    std::vector<std::uint32_t> bucket(candidates.size());
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      bucket[i] = buckets_.bucket_of(candidates[i].centre, 0, 0, 0);
+      ++start_[bucket[i] + 1];
+    }
+    for (std::size_t b = 0; b + 1 < start_.size(); ++b) start_[b + 1] += start_[b];
+    std::vector<std::uint32_t> fill(start_.begin(), start_.end() - 1);
+    members_.resize(candidates.size());
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+      members_[fill[bucket[i]]++] = static_cast<std::uint32_t>(i);
+  }
+
+  /// Calls visit(other) for candidates about the i-th, itself included, until it returns true.
+  template <class Visit>
+  bool any_near(std::size_t i, Visit&& visit) const {
+    const Candidate& a = candidates_[i];
+    for (int dz = -1; dz <= 1; ++dz)
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx) {
+          const std::uint32_t b = buckets_.bucket_of(a.centre, dx, dy, dz);
+          for (std::uint32_t m = start_[b]; m < start_[b + 1]; ++m)
+            if (visit(members_[m])) return true;
+        }
+    return false;
+  }
+
+  bool dominated(std::size_t i) const {
+    const Candidate& a = candidates_[i];
+    return any_near(i, [&](std::uint32_t m) {
+      return goes_before(candidates_[m], a) && overlap(a, candidates_[m]);
+    });
+  }
+
+ private:
+  const std::vector<Candidate>& candidates_;
+  CandidateBuckets buckets_;
+  std::vector<std::uint32_t> start_, members_;
+};
+
+template <class Work>
+void for_each_index(std::size_t count, const Work& work) {
+  oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, count, 64),
+                            [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
+                              for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
+                            });
+}
+
+}  // namespace
+
+std::vector<Winner> select_independent(const std::vector<Candidate>& candidates) {
+  const Buckets buckets(candidates);
+  std::vector<std::uint8_t> wins(candidates.size());
+  for_each_index(candidates.size(), [&](std::size_t i) { wins[i] = !buckets.dominated(i); });
+  std::vector<Winner> winners;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    if (wins[i]) winners.push_back({static_cast<std::uint32_t>(i)});
+  std::sort(winners.begin(), winners.end(), [&](const Winner& a, const Winner& b) {
+    return goes_before(candidates[a.index], candidates[b.index]);
+  });
+  for_each_index(winners.size(), [&](std::size_t i) {
+    const Candidate& a = candidates[winners[i].index];
+    winners[i].gap = a.radius;
+    buckets.any_near(winners[i].index, [&](std::uint32_t m) {
+      const Candidate& b = candidates[m];
+      if (wins[m] && goes_before(b, a))
+        winners[i].gap =
+            std::min(winners[i].gap,
+                     gap_to_sphere(a.centre, {b.centre.x, b.centre.y, b.centre.z, b.radius}));
+      return false;
+    });
+  });
+  return winners;
+}
+
+}  // namespace ist::packing

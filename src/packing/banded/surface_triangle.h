@@ -1,0 +1,90 @@
+#pragma once
+
+#include "mesh/mesh_view.h"
+#include "mesh/triangle_frame.h"
+#include "packing/banded/sample.h"
+
+namespace ist::packing {
+
+/// A triangle in its frame (TriangleFrame<float>), as the cell work reads it from any hierarchy.
+struct SurfaceTriangle {
+  Float3 origin, u, v, n;
+  float length = 0, apex = 0, height = 0;
+  std::uint32_t index = 0;  ///< in the mesh
+};
+
+/// The triangle in a lane of a hierarchy's block (TriangleBlock, WideBlock).
+template <class Block>
+IST_HD SurfaceTriangle triangle_of(const Block& b, std::uint32_t lane) {
+  return {{b.origin[0][lane], b.origin[1][lane], b.origin[2][lane]},
+          {b.u[0][lane], b.u[1][lane], b.u[2][lane]},
+          {b.v[0][lane], b.v[1][lane], b.v[2][lane]},
+          {b.n[0][lane], b.n[1][lane], b.n[2][lane]},
+          b.length[lane],
+          b.apex[lane],
+          b.height[lane],
+          b.triangle[lane]};
+}
+
+/// Where x stands to the triangle's closest point; range2 is what a search compares.
+IST_HD inline FeatureOffset triangle_offset(const SurfaceTriangle& t, Float3 x) {
+  const Float3 d = x - t.origin;
+  const float along_u = dot(d, t.u), along_v = dot(d, t.v), along_n = dot(d, t.n);
+  const FramePoint<float> q =
+      closest_in_frame(along_u, along_v, along_n, t.length, t.apex, t.height);
+  return {(along_u - q.x) * t.u + (along_v - q.y) * t.v + along_n * t.n, q.distance2, 0,
+          kSurfaceTag | t.index};
+}
+
+/// Where the solid is locally an intersection of half-spaces, its faces' planes bound the clearance
+/// in a whole cell, however large the cell is next to its distance from them. Let S be all
+/// triangles within 3h of x. If each lies on the inner side of every other one's plane, the surface
+/// being closed, the solid near x is the intersection P of the half-spaces of S: beyond one of them
+/// there is none of it, and from a point of P within h of x the way straight to a plane no further
+/// than h from x meets the surface before that plane. Writes these planes as constraints behind the
+/// first `from` of `out`; returns how many, 0 if S is not so, too large, or they do not fit.
+///
+/// `surface`: triangles_within(), triangle(), inside_once(). `triangles`: room for `most` of them.
+template <class Team, class Surface>
+IST_HD int convex_planes(const Team& team, const Surface& surface, Float3 x, float h, bool x_inside,
+                         typename Surface::Feature* triangles, int most, SampleMemory* out,
+                         int from) {
+  constexpr float kTolerance = 4e-7f;  // rounding of the frames
+  const int count = surface.triangles_within(team, x, 9 * h * h, triangles, most);
+  if (count <= 0) return 0;
+  bool convex = true;
+  for (int i = team.lane(); i < count && convex; i += Team::kWidth) {
+    const SurfaceTriangle mine = surface.triangle(triangles[i]);
+    convex = mine.height > 1e-9f * mine.length;
+    for (int j = 0; j < count && convex; ++j) {
+      const SurfaceTriangle t = surface.triangle(triangles[j]);
+      const Float3 corner[3] = {t.origin, t.origin + t.length * t.u,
+                                t.origin + t.apex * t.u + t.height * t.v};
+      for (int k = 0; k < 3; ++k)
+        convex = convex && dot(-1.0f * mine.n, corner[k] - mine.origin) >= -kTolerance;
+    }
+  }
+  if (!team.all(convex)) return 0;
+  if (x_inside && !surface.inside_once(team, x)) return 0;
+  int written = 0;
+  for (int base = 0; base < count; base += Team::kWidth) {
+    const int i = base + team.lane();
+    Constraint c;
+    bool near = i < count;
+    if (near) {
+      const SurfaceTriangle t = surface.triangle(triangles[i]);
+      const float distance = dot(-1.0f * t.n, x - t.origin);
+      near = distance < h;
+      c = {-1.0f * t.n, distance + kTolerance, 0, kPlaneTag | t.index};
+    }
+    int total = 0;
+    const int place = from + written + team.exclusive_count(near, total);
+    if (from + written + total > kSampleCapacity) return 0;
+    if (near) put(team, out, place, c);
+    written += total;
+  }
+  team.sync();
+  return written;
+}
+
+}  // namespace ist::packing

@@ -1,0 +1,17 @@
+#include <ist/packing.h>
+
+#include "backend/solid_backend.h"
+#include "packing/packing_settings.h"
+#include "stage/thread_arena.h"
+
+namespace ist {
+
+SpherePacking pack(const Solid& solid, const PackingSettings& settings,
+                   const ProgressCallback& progress) {
+  packing::check_settings(settings);
+  return thread_arena(settings.threads).execute([&] {
+    return make_backend(solid, {settings.device, settings.gpu})->pack(settings, progress);
+  });
+}
+
+}  // namespace ist

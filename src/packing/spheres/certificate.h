@@ -1,0 +1,63 @@
+#pragma once
+
+#include <ist/sphere.h>
+
+#include <cmath>
+
+#include "numerics/float3.h"
+#include "numerics/rounding.h"
+
+namespace ist::packing {
+
+/// Gap that a certified sphere keeps to the surface and to other spheres, unit frame (DESIGN 3.2).
+constexpr double kClearance = 1e-12;
+/// The same with what the square root and the sum round by: some 2⁻⁵³ of their size (≤ 4).
+constexpr double kGap = kClearance + 1e-14;
+
+/// Radius under which float noise wins: spheres stay certified, the greedy promise ends
+/// (docs/design.md 4.2).
+constexpr float kFloatNoise = 1e-4f;
+
+/// The largest radius that a sphere about `centre` may have next to another one, before rounding.
+IST_HD inline double gap_to_sphere(Float3 centre, const Sphere& s) {
+  const double x = double{centre.x} - double{s.x};
+  const double y = double{centre.y} - double{s.y};
+  const double z = double{centre.z} - double{s.z};
+  return std::sqrt(x * x + y * y + z * z) - double{s.r} - kGap;
+}
+
+/// The same next to the surface at the exact distance `clearance`, positive inside. To certify a
+/// candidate only distances below clearance_limit() of its radius matter.
+IST_HD inline double gap_to_surface(double clearance) { return clearance - kGap; }
+IST_HD inline double clearance_limit(float radius) { return 1.001 * double{radius}; }
+
+/// Certified radius of a candidate: no more than its own radius and all its gaps; ≤ 0 if there is
+/// no room. `gap`: least of those to the surface and to the winners of the same round that go
+/// before it, each taken with its candidate's radius. The grid's reach must not be less than
+/// `radius`.
+template <class Team, class Spheres>
+IST_HD float certified_radius(const Team& team, Float3 centre, float radius, double gap,
+                              const Spheres& spheres) {
+  double r = double{radius} < gap ? double{radius} : gap;
+  spheres.for_near(team, centre, [&](bool valid, std::uint32_t, const Sphere& s) {
+    const double room = gap_to_sphere(centre, s);
+    if (valid && room < r) r = room;
+  });
+  return rounded_down(team.min(r));
+}
+
+/// Volumes are summed as integers, so that no order changes a sum. Their unit [unit-frame³] is a
+/// power of two that the solid's volume is 2^60 to 2^61 of: a needle's spheres count as well as
+/// a ball's.
+inline double volume_unit_of(double solid_volume) {
+  int exponent = 0;
+  std::frexp(solid_volume, &exponent);
+  return std::ldexp(1.0, exponent - 61);
+}
+
+IST_HD inline std::uint64_t fixed_ball_volume(float r, double volume_unit) {
+  const double radius = r;
+  return static_cast<std::uint64_t>(4.18879020478639098 * radius * radius * radius / volume_unit);
+}
+
+}  // namespace ist::packing

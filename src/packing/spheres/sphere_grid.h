@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "packing/spheres/sphere_grid_layout.h"
+
+namespace ist::packing {
+
+/// The lists of a SphereGridLayout on the host. Blocks exist where a sphere's reach touches them.
+/// Reading is thread-safe between insertions.
+class SphereGrid {
+ public:
+  SphereGrid(const std::vector<Sphere>& spheres, const SphereGridLayout& layout);
+
+  const SphereGridLayout& layout() const { return layout_; }
+
+  /// Lists sphere `index` = s.
+  void insert(std::uint32_t index, const Sphere& s);
+
+  /// Calls visit(index) for the spheres that x's cell lists: all within reach of x, or the one that
+  /// covers the cell, and perhaps others.
+  template <class Visit>
+  void for_near(Float3 x, Visit&& visit) const {
+    const int i = grid_coordinate(layout_, x.x), j = grid_coordinate(layout_, x.y),
+              k = grid_coordinate(layout_, x.z);
+    const Block& block = blocks_[block_index(i >> 3, j >> 3, k >> 3)];
+    if (block.owner != kNone) return visit(block.owner);
+    if (block.cells == kNone) return;
+    const Cell& cell = cells_[block.cells + cell_index(i & 7, j & 7, k & 7)];
+    for (std::uint32_t chunk = cell.head; chunk != kNone; chunk = chunks_[chunk].next)
+      for (std::uint32_t n = 0; n < chunks_[chunk].size; ++n) visit(chunks_[chunk].index[n]);
+  }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+  static constexpr std::uint32_t kChunk = 14;
+  struct Chunk {
+    std::uint32_t next = kNone;
+    std::uint32_t size = 0;
+    std::uint32_t index[kChunk];
+  };
+  struct Cell {
+    std::uint32_t head = kNone, tail = kNone;
+    bool covered = false;
+  };
+  struct Block {
+    std::uint32_t cells = kNone;  ///< first of its 512 cells
+    std::uint32_t owner = kNone;  ///< a sphere that covers the whole block
+  };
+
+  std::size_t block_index(int i, int j, int k) const {
+    const auto side = static_cast<std::size_t>(layout_.blocks_per_side);
+    return (static_cast<std::size_t>(k) * side + static_cast<std::size_t>(j)) * side +
+           static_cast<std::size_t>(i);
+  }
+  static std::uint32_t cell_index(int i, int j, int k) {
+    return static_cast<std::uint32_t>((k * 8 + j) * 8 + i);
+  }
+  void append(Cell& cell, std::uint32_t index);
+
+  SphereGridLayout layout_;
+  std::vector<Block> blocks_;
+  std::vector<Cell> cells_;
+  std::vector<Chunk> chunks_;
+};
+
+/// The spheres as a PrototypeField sees them, on the host.
+class GridSpheres {
+ public:
+  GridSpheres(const std::vector<Sphere>& spheres, const SphereGrid& grid)
+      : spheres_(spheres), grid_(grid) {}
+
+  std::uint32_t count() const { return static_cast<std::uint32_t>(spheres_.size()); }
+  float reach() const { return grid_.layout().reach; }
+
+  /// Calls visit(valid, index, sphere) for the spheres that x's cell lists, each on one lane; all
+  /// lanes make the same number of calls, those without a sphere with valid = false.
+  template <class Team, class Visit>
+  void for_near(const Team& team, Float3 x, Visit&& visit) const {
+    if constexpr (Team::kWidth == 1) {
+      grid_.for_near(x, [&](std::uint32_t i) { visit(true, i, spheres_[i]); });
+    } else {  // a team of the tests
+      std::uint32_t mine = 0;
+      int count = 0;
+      const auto hand_out = [&] {
+        if (count > 0) visit(team.lane() < count, mine, spheres_[mine]);
+        count = 0;
+      };
+      grid_.for_near(x, [&](std::uint32_t i) {
+        if (count++ == team.lane()) mine = i;
+        if (count == Team::kWidth) hand_out();
+      });
+      hand_out();
+    }
+  }
+
+ private:
+  const std::vector<Sphere>& spheres_;
+  const SphereGrid& grid_;
+};
+
+}  // namespace ist::packing

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <ist/packing.h>
+
+#include "bake/calibrate/calibration.h"
+#include "bake/cover/cover.h"
+#include "stage/thread_arena.h"
+
+namespace ist::testing {
+
+/// A solid's host backend.
+inline std::unique_ptr<SolidBackend> host_backend(const MeshSolid& solid) {
+  return make_backend(solid, {Device::cpu, {}});
+}
+
+/// calibrate() on so many host threads, 0 = all.
+inline Calibration calibrate_on_host(const MeshSolid& solid, std::span<const Sphere> inner,
+                                     unsigned threads = 0, const ProgressCallback& progress = {}) {
+  return thread_arena(threads).execute(
+      [&] { return calibrate(solid, *host_backend(solid), inner, progress); });
+}
+
+/// cover_radii() on so many host threads, 0 = all.
+inline std::vector<float> cover_on_host(const MeshSolid& solid, std::span<const Sphere> inner,
+                                        unsigned threads = 0,
+                                        const ProgressCallback& progress = {}) {
+  return thread_arena(threads).execute(
+      [&] { return cover_radii(solid, *host_backend(solid), inner, progress); });
+}
+
+}  // namespace ist::testing
