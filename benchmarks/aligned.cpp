@@ -143,7 +143,7 @@ void ask_faces(Report& report, const std::string& name, std::size_t spheres) {
     const ist::PlacedTree a{baked.asset->view(), {}, 1};
     const ist::PlacedTree b{baked.asset->view(), {{1, 0, 0, 0}, {shifts[k], 0, 0}}, 1};
     const ist::Penetration raw = ist::penetration(a, b, {}, workspace);
-    const ist::Penetration sharp = ist::without_soft_skin(raw, a, b);
+    const ist::Penetration sharp = ist::without_protrusion(raw, a, b);
     const double layer = face * radius;
     if (gaps[k] >= -0.1) {
       worst_raw = std::max(worst_raw, std::abs(raw.volume - exact[k]));
@@ -156,15 +156,15 @@ void ask_faces(Report& report, const std::string& name, std::size_t spheres) {
                 {"gap / side", gaps[k] * radius / side},
                 {"exact volume", exact[k] / layer},
                 {"volume", raw.volume / layer},
-                {"without soft skin", sharp.volume / layer},
+                {"without protrusion", sharp.volume / layer},
                 {"force", raw.translation_gradient.norm() / face},
-                {"force without soft skin", sharp.translation_gradient.norm() / face},
+                {"force without protrusion", sharp.translation_gradient.norm() / face},
                 {"µs", microseconds([&] { return ist::penetration(a, b, {}, workspace); })},
-                {"µs without soft skin", microseconds([&] {
-                   return ist::without_soft_skin(ist::penetration(a, b, {}, workspace), a, b);
+                {"µs without protrusion", microseconds([&] {
+                   return ist::without_protrusion(ist::penetration(a, b, {}, workspace), a, b);
                  })}});
   }
-  report.target("wrong volume about contact over that with the soft skin, " + name + ", " +
+  report.target("wrong volume about contact over that with protrusion, " + name + ", " +
                     std::to_string(spheres) + " spheres",
                 worst / worst_raw, 0.7, true);
 }
@@ -181,8 +181,8 @@ int main(int argc, char** argv) {
   report.remark(
       "Face to face: volumes in faces times mean radii of a sphere, forces in faces; the face is "
       "the "
-      "area that meets, and exact forces are 1 below gap 0 and 0 above. Without soft skin: "
-      "without_soft_skin().");
+      "area that meets, and exact forces are 1 below gap 0 and 0 above. Without protrusion: "
+      "without_protrusion().");
   const std::vector<std::size_t> counts = report.quick()
                                               ? std::vector<std::size_t>{1'000}
                                               : std::vector<std::size_t>{1'000, 4'000, 16'000};

@@ -63,7 +63,7 @@ void one_bake(const ClosedMesh& mesh, const PackingSettings& settings, Stages& s
   const auto covers =
       stages.time("6 cover", [&] { return cover_radii(*solid, *backend, inner, {}); });
   stages.time("7 inner tree", [&] { return build_tree(inner, covers); });
-  stages.time("8 matched tree", [&] { return build_tree(calibration.effective, {}); });
+  stages.time("8 matched tree", [&] { return build_tree(calibration.matched, {}); });
 }
 
 }  // namespace

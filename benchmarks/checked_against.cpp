@@ -56,11 +56,11 @@ class Findings {
     }
     if (!c.meet())
       widths_.push_back(verdict.interval_width / c.a->closed->report.bounds.diagonal().norm());
-    if (verdict.soft_skin) {
-      ++soft_skin_;
+    if (verdict.protrusion) {
+      ++protrusion_;
       char reason[160];
       std::snprintf(reason, sizeof reason,
-                    "soft skin: the gap, %.3g u, is below the protrusions' sum, %.3g u",
+                    "protrusion: the gap, %.3g u, is below the protrusions' sum, %.3g u",
                     c.surface_distance, c.a->protrusion + c.b->protrusion);
       list(c, verdict, reason);
     }
@@ -85,7 +85,7 @@ class Findings {
                                     {"cases", cases_},
                                     {"meet", meet_},
                                     {"wrong answers of ist", wrong_},
-                                    {"gaps within the soft skin", soft_skin_},
+                                    {"gaps within the protrusions", protrusion_},
                                     {"crossings in the shallow band", shallow_},
                                     {"of them read 0", unfound_},
                                     {"Bullet: contact at a gap", bullet_false_},
@@ -125,7 +125,7 @@ class Findings {
   Report& report_;
   std::string pair_;
   std::vector<Report::Json>& disagreements_;
-  std::size_t cases_ = 0, meet_ = 0, wrong_ = 0, soft_skin_ = 0, shallow_ = 0, unfound_ = 0;
+  std::size_t cases_ = 0, meet_ = 0, wrong_ = 0, protrusion_ = 0, shallow_ = 0, unfound_ = 0;
   std::size_t bullet_false_ = 0, bullet_missed_ = 0;
   std::size_t held_ = 0, held_found_ = 0, held_by_fcl_ = 0, held_by_bullet_ = 0;
   double held_low_ = 1, held_high_ = 0;

@@ -369,7 +369,7 @@ int main(int argc, char** argv) {
   report.remark(
       "FCL 0.7 (OBBRSS) and Bullet 3.24 (double precision, GImpact, margin 0) know "
       "surfaces only: they answer 'no contact' for an object held by another. 'Contact "
-      "at a gap' of ist penetration is the soft skin of the matched measure; of Bullet, "
+      "at a gap' of ist penetration is what the matched spheres protrude by; of Bullet, "
       "triangle pairs that cross each other's planes without touching.");
   report.remark(
       "The voxel sum samples both signed distances at every voxel of B's grid; 'voxels inside "

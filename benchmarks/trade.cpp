@@ -61,7 +61,7 @@ std::vector<Method> methods_of(const Sweep& sweep, const std::vector<Baked>& bak
                                ist::Workspace& workspace) {
   std::vector<Method> methods;
   const auto add = [&](const std::string& curve, const std::string& setting, const Baked& assets,
-                       const ist::QuerySettings& settings) {
+                       const ist::PenetrationSettings& settings) {
     methods.push_back({curve, setting, [&assets, &workspace, settings](const Row& row) {
                          return ist::penetration({assets.a.view(), {}, 1},
                                                  {assets.b.view(), row.pose, row.scale_b}, settings,

@@ -41,10 +41,10 @@ Asset rebuilt(const Asset& asset, const Builder& builder) {
   arrays.header = header;
   arrays.inner_spheres = copy(at<Sphere>(header, header.inner_spheres));
   arrays.cover_radii = copy(at<float>(header, header.cover_radii));
-  arrays.effective_spheres = copy(at<Sphere>(header, header.effective_spheres));
+  arrays.matched_spheres = copy(at<Sphere>(header, header.matched_spheres));
   arrays.inner_tree =
       build_tree(arrays.inner_spheres, arrays.cover_radii, builder.clustering, builder.swaps);
-  arrays.matched_tree = build_tree(arrays.effective_spheres, {}, builder.clustering, builder.swaps);
+  arrays.matched_tree = build_tree(arrays.matched_spheres, {}, builder.clustering, builder.swaps);
   return Asset(asset_bytes(arrays), builder.name);
 }
 

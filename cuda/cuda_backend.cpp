@@ -13,7 +13,7 @@
 #include "cuda/queue.h"
 #include "mesh/mesh_solid.h"
 #include "packing/grids/medial_grids.h"
-#include "packing/packing_settings.h"
+#include "packing/base/packing_settings.h"
 #include "stage/stage.h"
 
 namespace ist::gpu {

@@ -91,7 +91,7 @@ class BandedBuffers {
 
   BandedState state() const { return state_.to_host(1)[0]; }
 
-  /// Makes larger what stopped the crew, so that it can go on. `state` is the present one.
+  /// Makes larger what stopped the coop, so that it can go on. `state` is the present one.
   void provide(BandedState state) {
     switch (state.need) {
       case Need::nothing:

@@ -6,7 +6,7 @@
 #include "packing/banded/prototype.h"
 
 // The steps of a band that deal with cells (BandedPacker on the CPU). Every one is written for a
-// crew; `a` are the arrays, `s` = *a.state. What depends on an order of threads is only where in an
+// coop; `a` are the arrays, `s` = *a.state. What depends on an order of threads is only where in an
 // array a thing stands.
 
 namespace ist::gpu {
@@ -22,29 +22,29 @@ IST_HD void put_cell(const Team& team, const BandedArrays& a, const packing::Cel
 }
 
 /// Begins with the root cell alone; spheres and grid stay.
-template <class Crew, class Surface>
-IST_HD void plant_root(Crew& crew, const BandedArrays& a, const Surface& surface) {
+template <class CoopGrid, class Surface>
+IST_HD void plant_root(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
-  share_out_to_lanes(crew, s.slots, [&](std::uint32_t i) {
+  distribute_to_lanes(coop, s.slots, [&](std::uint32_t i) {
     if (i > 0 && i < s.slots) a.bounds[i] = 0;
   });
-  if (crew.index() == 0) {
+  if (coop.index() == 0) {
     packing::Cell root = packing::Cell{};
-    root.inside = surface.inside(crew.team(), root.centre);
-    for (int i = crew.team().lane(); i < packing::kRingCapacity; i += Crew::Team::kWidth)
-      crew.scratch().ring[i] = 0;
-    put_cell(crew.team(), a, root, crew.scratch(), 0);
+    root.inside = surface.inside(coop.team(), root.centre);
+    for (int i = coop.team().lane(); i < packing::kRingCapacity; i += CoopGrid::Team::kWidth)
+      coop.scratch().ring[i] = 0;
+    put_cell(coop.team(), a, root, coop.scratch(), 0);
   }
 }
 
 /// Frees the cells below the floor; finds the largest bound of the others.
-template <class Crew>
-IST_HD void sweep_cells(Crew& crew, const BandedArrays& a) {
+template <class CoopGrid>
+IST_HD void sweep_cells(CoopGrid& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
   const float floor = s.schedule.floor;
   float top = 0, dropped = 0;
   int live = 0;
-  share_out_to_lanes(crew, s.slots, [&](std::uint32_t i) {
+  distribute_to_lanes(coop, s.slots, [&](std::uint32_t i) {
     const float bound = i < s.slots ? a.bounds[i] : 0;
     const bool dead = i < s.slots && bound < floor;
     if (dead) {
@@ -54,13 +54,13 @@ IST_HD void sweep_cells(Crew& crew, const BandedArrays& a) {
       top = bound > top ? bound : top;
       ++live;
     }
-    const std::uint32_t place = append(crew.team(), dead, &s.free);
+    const std::uint32_t place = append(coop.team(), dead, &s.free);
     if (dead) a.free_list[place] = i;
   });
-  top = crew.team().max(top);
-  dropped = crew.team().max(dropped);
-  live = crew.team().sum(live);
-  if (crew.team().lane() == 0) {
+  top = coop.team().max(top);
+  dropped = coop.team().max(dropped);
+  live = coop.team().sum(live);
+  if (coop.team().lane() == 0) {
     atomic_max(&s.top, bits_of(top));
     atomic_max(&s.dropped, bits_of(dropped));
     atomic_add(&s.live, static_cast<std::uint32_t>(live));
@@ -68,14 +68,14 @@ IST_HD void sweep_cells(Crew& crew, const BandedArrays& a) {
 }
 
 /// The cells that reach the margin become the frontier.
-template <class Crew>
-IST_HD void activate_cells(Crew& crew, const BandedArrays& a) {
+template <class CoopGrid>
+IST_HD void activate_cells(CoopGrid& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
   const float margin = s.schedule.margin;
   std::uint32_t* const frontier = a.lists[s.frontier_array];
-  share_out_to_lanes(crew, s.slots, [&](std::uint32_t i) {
+  distribute_to_lanes(coop, s.slots, [&](std::uint32_t i) {
     const bool active = i < s.slots && a.bounds[i] >= margin;
-    const std::uint32_t place = append(crew.team(), active, &s.frontier);
+    const std::uint32_t place = append(coop.team(), active, &s.frontier);
     if (active) frontier[place] = i;
   });
 }
@@ -137,20 +137,21 @@ IST_HD void queue_children(const Team& team, const BandedArrays& a, ChildCode fi
 }
 
 /// Waits for the entry of the queue that is this team's; kNone if none will come.
-template <class Crew>
-IST_HD std::uint32_t wait_for_child(const Crew& crew, const BandedArrays& a, std::uint32_t place) {
+template <class CoopGrid>
+IST_HD std::uint32_t wait_for_child(const CoopGrid& coop, const BandedArrays& a,
+                                    std::uint32_t place) {
   std::uint32_t code = ChildCode::kNone;
-  if (crew.team().lane() == 0 && place < a.queue_capacity) {
+  if (coop.team().lane() == 0 && place < a.queue_capacity) {
     // `pending` is one word for all teams: looked at seldom, not to hold up those that count in it.
     constexpr std::uint32_t kSeldom = 8;
     for (std::uint32_t looks = 1; (code = atomic_load(&a.queue[place])) == ChildCode::kNone;
          ++looks) {
       if (looks % kSeldom == 0 && atomic_load(&a.state->pending) == 0) break;
-      crew.pause();
+      coop.pause();
     }
     if (code != ChildCode::kNone) atomic_exchange(&a.queue[place], ChildCode::kNone);
   }
-  return crew.team().broadcast(code, 0);
+  return coop.team().broadcast(code, 0);
 }
 
 /// Notes the largest radius and bound, in bits, of cells that hold candidates.
@@ -162,17 +163,17 @@ IST_HD inline void note_candidates(BandedState& s, std::uint32_t radius, std::ui
 /// The first part of the work on the frontier's cells of one class, a lane a cell: what the spheres
 /// and the remembered triangles tell has little to share among lanes. Where the bound is attained
 /// is kept in place of the prototype, which an open cell does not have.
-template <class Crew, class Surface>
-IST_HD void refresh_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
+template <class CoopGrid, class Surface>
+IST_HD void refresh_cells(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
-  const auto& team = crew.team();
+  const auto& team = coop.team();
   const ListedSpheres spheres = listed_spheres(a);
   const packing::PrototypeField field(surface, spheres);
   const float threshold = s.schedule.threshold, margin = s.schedule.margin;
   const std::uint32_t* const frontier = a.lists[s.frontier_array];
   std::uint32_t* const active = a.lists[1 - s.frontier_array];
   std::uint32_t radius = 0, bound = 0;  // largest, bits
-  share_out_to_lanes(crew, s.frontier, [&](std::uint32_t i) {
+  distribute_to_lanes(coop, s.frontier, [&](std::uint32_t i) {
     const std::uint32_t slot = i < s.frontier ? frontier[i] : 0;
     packing::Cell cell;
     CellState state = CellState::settled;
@@ -183,7 +184,7 @@ IST_HD void refresh_cells(Crew& crew, const BandedArrays& a, const Surface& surf
       packing::SampleMemory memory;
       typename decltype(field)::Bounded seen;
       cell = a.cells[slot].cell;
-      state = field.refresh(typename Crew::Lane{}, cell, a.cells[slot].ring, &memory, threshold,
+      state = field.refresh(typename CoopGrid::Lane{}, cell, a.cells[slot].ring, &memory, threshold,
                             margin, seen);
       if (state == CellState::open) cell.prototype = seen.y;
       a.cells[slot].cell = cell;
@@ -212,20 +213,20 @@ IST_HD inline void note_splitting(const BandedArrays& a, std::uint32_t slot) {
 }
 
 /// The second part, of the cells that the first left open.
-template <class Crew, class Surface>
-IST_HD void confine_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
+template <class CoopGrid, class Surface>
+IST_HD void confine_cells(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
-  const auto& team = crew.team();
+  const auto& team = coop.team();
   const ListedSpheres spheres = listed_spheres(a);
   const packing::PrototypeField field(surface, spheres);
   const float margin = s.schedule.margin, largest = s.schedule.largest_half(s.frontier);
-  take_turns(crew, s.refreshed, &s.taken, [&](std::uint32_t i) {
+  distribute_dynamically(coop, s.refreshed, &s.taken, [&](std::uint32_t i) {
     const std::uint32_t slot = a.refreshed[i];
-    packing::Cell cell = packing::load_cell(team, a.cells[slot], crew.scratch());
+    packing::Cell cell = packing::load_cell(team, a.cells[slot], coop.scratch());
     const CellState outcome = field.confine(
-        team, cell, crew.scratch(), field.look_again(team, cell, crew.scratch(), cell.prototype),
+        team, cell, coop.scratch(), field.look_again(team, cell, coop.scratch(), cell.prototype),
         margin, largest);
-    put_cell(team, a, cell, crew.scratch(), slot);
+    put_cell(team, a, cell, coop.scratch(), slot);
     if (team.lane() != 0) return;
     if (outcome == CellState::open) a.confined[atomic_add(&s.confined, 1)] = slot;
     if (outcome == CellState::split) note_splitting(a, slot);
@@ -236,10 +237,10 @@ IST_HD void confine_cells(Crew& crew, const BandedArrays& a, const Surface& surf
 /// still open. Where the schedule says that no rule can come between (state.depth), cells that are
 /// to be split are split in the same step, and so on for that many levels: a chain of splits then
 /// waits for itself alone.
-template <class Crew, class Surface>
-IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
+template <class CoopGrid, class Surface>
+IST_HD void work_on_cells(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
-  const auto& team = crew.team();
+  const auto& team = coop.team();
   const ListedSpheres spheres = listed_spheres(a);
   const packing::PrototypeField field(surface, spheres);
   const float threshold = s.schedule.threshold, margin = s.schedule.margin;
@@ -248,25 +249,25 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
   const std::uint32_t frontier_size = in_parts ? s.confined : s.frontier, deepest = s.depth;
   const std::uint32_t* const frontier = in_parts ? a.confined : a.lists[s.frontier_array];
   std::uint32_t* const active = a.lists[1 - s.frontier_array];
-  if (a.mailbox != nullptr && crew.index() + 1 == crew.size() && team.lane() == 0)
+  if (a.mailbox != nullptr && coop.index() + 1 == coop.size() && team.lane() == 0)
     s.stop_asked = a.mailbox->stop;
-  for (std::uint32_t item = crew.index();;) {
+  for (std::uint32_t item = coop.index();;) {
     std::uint32_t slot = 0, depth = 0;
     packing::Cell cell;
     bool works = true;
     if (item < frontier_size) {
       slot = frontier[item];
-      cell = packing::load_cell(team, a.cells[slot], crew.scratch());
+      cell = packing::load_cell(team, a.cells[slot], coop.scratch());
       works = in_parts || s.classes == 1 ||
               packing::BandSchedule::class_of(cell.centre, s.classes) == s.cell_class;
     } else {
       if (deepest == 0) return;
-      const std::uint32_t code = wait_for_child(crew, a, item - frontier_size);
+      const std::uint32_t code = wait_for_child(coop, a, item - frontier_size);
       if (code == ChildCode::kNone) return;
       const ChildCode child = ChildCode::of(code);
-      const packing::Cell parent = load_fresh_cell(team, a.cells[child.parent], crew.scratch());
-      cell = field.child(team, parent, static_cast<int>(child.octant), crew.scratch().ring,
-                         &crew.scratch().sample[0], margin);
+      const packing::Cell parent = load_fresh_cell(team, a.cells[child.parent], coop.scratch());
+      cell = field.child(team, parent, static_cast<int>(child.octant), coop.scratch().ring,
+                         &coop.scratch().sample[0], margin);
       depth = child.depth;
       works = cell.bound >= margin;
       if (team.lane() == 0) {
@@ -278,15 +279,15 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
         }
       }
       slot = team.broadcast(slot, 0);
-      if (cell.bound >= floor && !works) put_cell(team, a, cell, crew.scratch(), slot);
+      if (cell.bound >= floor && !works) put_cell(team, a, cell, coop.scratch(), slot);
     }
     bool queues = false;
     if (works) {
       const CellState outcome =
           in_parts && item < frontier_size
-              ? field.climb(team, cell, crew.scratch(), threshold)
-              : field.work(team, cell, crew.scratch(), threshold, margin, largest);
-      put_cell(team, a, cell, crew.scratch(), slot);
+              ? field.climb(team, cell, coop.scratch(), threshold)
+              : field.work(team, cell, coop.scratch(), threshold, margin, largest);
+      put_cell(team, a, cell, coop.scratch(), slot);
       queues = outcome == CellState::split && depth < deepest;
       if (team.lane() == 0) {
         if (outcome == CellState::candidate) {
@@ -301,10 +302,10 @@ IST_HD void work_on_cells(Crew& crew, const BandedArrays& a, const Surface& surf
     std::uint32_t next = 0;
     if (team.lane() == 0) {
       if (!queues && deepest > 0) atomic_add(&s.pending, 0xFFFFFFFFu);
-      if (deepest > 0 || frontier_size > crew.size()) next = atomic_add(&s.taken, 1);
+      if (deepest > 0 || frontier_size > coop.size()) next = atomic_add(&s.taken, 1);
     }
-    if (deepest == 0 && frontier_size <= crew.size()) return;
-    item = crew.size() + team.broadcast(next, 0);
+    if (deepest == 0 && frontier_size <= coop.size()) return;
+    item = coop.size() + team.broadcast(next, 0);
   }
 }
 

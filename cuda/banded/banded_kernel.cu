@@ -1,7 +1,7 @@
 #include "cuda/banded/banded_kernel.h"
 
 #include "cuda/banded/banded_loop.h"
-#include "cuda/banded/warp_crew.h"
+#include "cuda/banded/warp_grid.h"
 #include "cuda/check.h"
 #include "packing/banded/wide_mesh_surface.h"
 
@@ -13,16 +13,16 @@ using Scratch = packing::CellScratch<std::uint32_t>;
 constexpr int kThreads = 512;  // a block; one block a multiprocessor
 
 __global__ void __launch_bounds__(kThreads, 1)
-    banded_kernel(const BandedArrays arrays, const WideTree mesh, MeetingPlace* place) {
+    banded_kernel(const BandedArrays arrays, const WideTree mesh, GridBarrier* place) {
   extern __shared__ Scratch scratch[];
-  WarpCrew<Scratch> crew(place, scratch);
-  pack_banded(crew, arrays, packing::WideMeshSurface(mesh));
+  WarpCoopGrid<Scratch> coop(place, scratch);
+  pack_banded(coop, arrays, packing::WideMeshSurface(mesh));
 }
 
 }  // namespace
 
 void launch_banded(Queue& queue, const BandedArrays& arrays, const WideTree& mesh,
-                   MeetingPlace* place) {
+                   GridBarrier* place) {
   constexpr std::size_t kShared = sizeof(Scratch) * (kThreads / 32);
   check(cudaFuncSetAttribute(banded_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                              static_cast<int>(kShared)),

@@ -8,17 +8,17 @@
 namespace ist::gpu {
 
 /// Zeroes the sphere grid for its new layout.
-template <class Crew>
-IST_HD void clear_grid(Crew& crew, const BandedArrays& a) {
+template <class CoopGrid>
+IST_HD void clear_grid(CoopGrid& coop, const BandedArrays& a) {
   const SphereLists grid = a.grid();
   const std::uint32_t blocks = grid.block_count();
-  share_out_to_lanes(crew, blocks, [&](std::uint32_t i) {
+  distribute_to_lanes(coop, blocks, [&](std::uint32_t i) {
     if (i < blocks) grid.blocks[i] = 0;
   });
   const std::uint32_t used =
       grid.use->cell_blocks < grid.block_capacity ? grid.use->cell_blocks : grid.block_capacity;
   const std::uint32_t cells = used * SphereLists::kCellsPerBlock;
-  share_out_to_lanes(crew, cells, [&](std::uint32_t i) {
+  distribute_to_lanes(coop, cells, [&](std::uint32_t i) {
     if (i < cells) grid.cells[i] = {0, 0};
   });
 }
@@ -26,11 +26,11 @@ IST_HD void clear_grid(Crew& crew, const BandedArrays& a) {
 /// Calls pass(pair, sphere, share) for all shares of all pairs that were noted. Few pairs are
 /// shared by teams that would have none: what a pass takes is the time of its longest chain of
 /// atomics.
-template <class Crew, class Pass>
-IST_HD void for_pairs(Crew& crew, const BandedArrays& a, const SphereLists& grid,
+template <class CoopGrid, class Pass>
+IST_HD void for_pairs(CoopGrid& coop, const BandedArrays& a, const SphereLists& grid,
                       const Pass& pass) {
-  const std::uint32_t shares = grid.use->pairs < crew.size() ? 8 : 1;
-  share_out(crew, shares * grid.use->pairs, [&](std::uint32_t i) {
+  const std::uint32_t shares = grid.use->pairs < coop.size() ? 8 : 1;
+  distribute_statically(coop, shares * grid.use->pairs, [&](std::uint32_t i) {
     const SphereLists::Pair pair = grid.pairs[i / shares];
     pass(pair, a.spheres[pair.sphere].sphere(), SphereLists::Share{i % shares, shares});
   });
@@ -38,33 +38,34 @@ IST_HD void for_pairs(Crew& crew, const BandedArrays& a, const SphereLists& grid
 
 /// The whole packing (BandedPacker on the CPU, the same spheres bit for bit), from the step that
 /// the state says until it is finished or needs something of the host.
-template <class Crew, class Surface>
-IST_HD void pack_banded(Crew& crew, const BandedArrays& a, const Surface& surface) {
+template <class CoopGrid, class Surface>
+IST_HD void pack_banded(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
-  const auto& team = crew.team();
+  const auto& team = coop.team();
   for (;;) {
     const Step step = s.step;
     if (step == Step::finished || s.need != Need::nothing) return;
     switch (step) {
       case Step::start:
-        plant_root(crew, a, surface);
+        plant_root(coop, a, surface);
         break;
       case Step::sweep:
-        sweep_cells(crew, a);
+        sweep_cells(coop, a);
         break;
       case Step::clear_grid:
-        clear_grid(crew, a);
+        clear_grid(coop, a);
         break;
       case Step::touch_all: {
         const SphereLists grid = a.grid();
-        take_turns(crew, static_cast<std::uint32_t>(s.schedule.spheres), &s.taken,
-                   [&](std::uint32_t i) { grid.touch_blocks(team, i, a.spheres[i].sphere()); });
+        distribute_dynamically(
+            coop, static_cast<std::uint32_t>(s.schedule.spheres), &s.taken,
+            [&](std::uint32_t i) { grid.touch_blocks(team, i, a.spheres[i].sphere()); });
         break;
       }
       case Step::count: {
         const SphereLists grid = a.grid();
         for_pairs(
-            crew, a, grid,
+            coop, a, grid,
             [&](const SphereLists::Pair& pair, const Sphere& sphere, SphereLists::Share share) {
               grid.count_in_cells(team, pair, sphere, share);
             });
@@ -72,53 +73,53 @@ IST_HD void pack_banded(Crew& crew, const BandedArrays& a, const Surface& surfac
       }
       case Step::make_room: {
         const SphereLists grid = a.grid();
-        for_pairs(crew, a, grid,
+        for_pairs(coop, a, grid,
                   [&](const SphereLists::Pair& pair, const Sphere& sphere,
                       SphereLists::Share share) { grid.make_room(team, pair, sphere, share); });
         break;
       }
       case Step::fill: {
         const SphereLists grid = a.grid();
-        for_pairs(crew, a, grid,
+        for_pairs(coop, a, grid,
                   [&](const SphereLists::Pair& pair, const Sphere& sphere,
                       SphereLists::Share share) { grid.fill_cells(team, pair, sphere, share); });
         break;
       }
       case Step::activate:
-        activate_cells(crew, a);
+        activate_cells(coop, a);
         break;
       case Step::refresh:
-        refresh_cells(crew, a, surface);
+        refresh_cells(coop, a, surface);
         break;
       case Step::confine:
-        confine_cells(crew, a, surface);
+        confine_cells(coop, a, surface);
         break;
       case Step::work:
-        work_on_cells(crew, a, surface);
+        work_on_cells(coop, a, surface);
         break;
       case Step::split:
-        split_cells(crew, a, surface);
+        split_cells(coop, a, surface);
         break;
       case Step::collect:
-        collect_candidates(crew, a);
+        collect_candidates(coop, a);
         break;
       case Step::dominate:
-        find_winners(crew, a);
+        find_winners(coop, a);
         break;
       case Step::certify:
-        certify_winners(crew, a, surface);
+        certify_winners(coop, a, surface);
         break;
       case Step::insert:
-        insert_winners(crew, a);
+        insert_winners(coop, a);
         break;
       case Step::finished:
         break;
     }
-    crew.sync([&] {
+    coop.sync([&] {
       s.taken = 0;
       ++s.steps;
       if (a.timed) {
-        const std::uint64_t now = crew.now();
+        const std::uint64_t now = coop.now();
         if (s.since != 0) s.time[static_cast<int>(step)] += now - s.since;
         s.since = now;
       }

@@ -7,7 +7,7 @@
 #include "cuda/banded/banded_buffers.h"
 #include "cuda/banded/banded_kernel.h"
 #include "cuda/device_array.h"
-#include "packing/packing_settings.h"
+#include "packing/base/packing_settings.h"
 
 namespace ist::gpu {
 namespace {
@@ -115,7 +115,7 @@ SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::Pac
                           Stage& stage, BandedCost* cost) {
   BandedBuffers<DeviceArray, Queue> buffers(queue, packing::BandSchedule(limits),
                                             banded_sizes(limits.max_spheres));
-  DeviceArray<MeetingPlace> place(queue, 1);
+  DeviceArray<GridBarrier> place(queue, 1);
   place.fill_bytes(0);
   Watch watch(limits, stage);
   BandedState state;

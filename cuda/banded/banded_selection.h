@@ -1,7 +1,7 @@
 #pragma once
 
 #include "cuda/banded/banded_control.h"
-#include "packing/spheres/certificate.h"
+#include "packing/base/certificate.h"
 
 // The steps of a round that choose among the candidates of the active cells, certify the winners
 // and insert them. A step's teams do not wait for each other: certification takes the other winners
@@ -12,12 +12,12 @@ namespace ist::gpu {
 using packing::Candidate;
 
 /// Hangs the active cells' candidates into the chains of their buckets.
-template <class Crew>
-IST_HD void collect_candidates(Crew& crew, const BandedArrays& a) {
+template <class CoopGrid>
+IST_HD void collect_candidates(CoopGrid& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
   const std::uint32_t* const active = a.lists[1 - s.frontier_array];
   const std::uint64_t seed = s.schedule.limits.seed;
-  share_out_to_lanes(crew, s.active, [&](std::uint32_t i) {
+  distribute_to_lanes(coop, s.active, [&](std::uint32_t i) {
     if (i >= s.active) return;
     const packing::Cell& cell = a.cells[active[i]].cell;
     BucketNode node;
@@ -29,7 +29,7 @@ IST_HD void collect_candidates(Crew& crew, const BandedArrays& a) {
     a.nodes[i] = node;
     a.won[i] = 0;
   });
-  share_out_to_lanes(crew, RankBuckets::kCount, [&](std::uint32_t i) {
+  distribute_to_lanes(coop, RankBuckets::kCount, [&](std::uint32_t i) {
     if (i < RankBuckets::kCount) a.ranks->size[i] = a.ranks->head[i] = 0;
   });
 }
@@ -48,11 +48,11 @@ IST_HD void for_neighbours(const Team& team, const BandedArrays& a, Float3 centr
 }
 
 /// Finds the candidates that no overlapping one goes before.
-template <class Crew>
-IST_HD void find_winners(Crew& crew, const BandedArrays& a) {
+template <class CoopGrid>
+IST_HD void find_winners(CoopGrid& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
-  const auto& team = crew.team();
-  share_out(crew, s.active, [&](std::uint32_t i) {
+  const auto& team = coop.team();
+  distribute_statically(coop, s.active, [&](std::uint32_t i) {
     const Candidate me = a.nodes[i].candidate;
     bool lost = false;
     for_neighbours(team, a, me.centre, [&](std::uint32_t place, const Candidate& other) {
@@ -97,12 +97,12 @@ IST_HD inline void judge_winner(const BandedArrays& a, std::uint32_t w, bool ins
 /// Works out what radius the winners may keep. Three teams a winner: one finds on which side of the
 /// surface it lies, one how far it is from it, one how far from spheres and other winners; who
 /// comes last judges.
-template <class Crew, class Surface>
-IST_HD void certify_winners(Crew& crew, const BandedArrays& a, const Surface& surface) {
+template <class CoopGrid, class Surface>
+IST_HD void certify_winners(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
-  const auto& team = crew.team();
+  const auto& team = coop.team();
   const ListedSpheres spheres = listed_spheres(a);
-  take_turns(crew, 3 * s.winners, &s.taken, [&](std::uint32_t item) {
+  distribute_dynamically(coop, 3 * s.winners, &s.taken, [&](std::uint32_t item) {
     Winner& winner = a.winners[item / 3];
     const Candidate me = a.nodes[winner.node].candidate;
     std::uint32_t found = 0;
@@ -138,22 +138,22 @@ IST_HD void certify_winners(Crew& crew, const BandedArrays& a, const Surface& su
 
 /// Inserts the accepted winners in their order, as many as may still come, and notes the blocks of
 /// the sphere grid that they touch.
-template <class Crew>
-IST_HD void insert_winners(Crew& crew, const BandedArrays& a) {
+template <class CoopGrid>
+IST_HD void insert_winners(CoopGrid& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
-  const auto& team = crew.team();
+  const auto& team = coop.team();
   const SphereLists grid = a.grid();
   const std::uint64_t most = spheres_left(s);
   const float top =
       bits_of(s.schedule.margin) > s.largest_bound ? s.schedule.margin : float_of(s.largest_bound);
-  share_out(crew, s.winners, [&](std::uint32_t w) {
+  distribute_statically(coop, s.winners, [&](std::uint32_t w) {
     const Winner winner = a.winners[w];
     if (winner.key == 0) return;
     const Candidate me = a.nodes[winner.node].candidate;
     const std::uint32_t bucket = rank_bucket(s, me.radius);
     int before = 0;
     for (std::uint32_t b = bucket + 1 + static_cast<std::uint32_t>(team.lane());
-         b < RankBuckets::kCount; b += Crew::Team::kWidth)
+         b < RankBuckets::kCount; b += CoopGrid::Team::kWidth)
       before += static_cast<int>(a.ranks->size[b]);
     before = team.sum(before);
     for (std::uint32_t at = a.ranks->head[bucket]; at != 0; at = a.winners[at - 1].next) {
@@ -173,7 +173,7 @@ IST_HD void insert_winners(Crew& crew, const BandedArrays& a) {
     }
     grid.touch_blocks(team, index, {me.centre.x, me.centre.y, me.centre.z, r});
   });
-  share_out_to_lanes(crew, s.active, [&](std::uint32_t i) {
+  distribute_to_lanes(coop, s.active, [&](std::uint32_t i) {
     if (i >= s.active) return;
     const std::uint32_t bucket = s.buckets.bucket_of(a.nodes[i].candidate.centre, 0, 0, 0);
     atomic_exchange(&a.heads[bucket], 0);  // that of several, maybe

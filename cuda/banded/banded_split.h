@@ -18,11 +18,11 @@ IST_HD std::uint32_t take_slots(const Team& team, const BandedArrays& a, bool ke
 }
 
 /// split_cells() with a team a child, for so few that no team has a second one.
-template <class Crew, class Field>
-IST_HD void split_few(Crew& crew, const BandedArrays& a, const Field& field) {
+template <class CoopGrid, class Field>
+IST_HD void split_few(CoopGrid& coop, const BandedArrays& a, const Field& field) {
   BandedState& s = *a.state;
-  const auto& team = crew.team();
-  const std::uint32_t i = crew.index();
+  const auto& team = coop.team();
+  const std::uint32_t i = coop.index();
   if (i >= 8 * s.splitting) return;
   const std::uint32_t entry = atomic_load(&a.splitting[i / 8]);
   const std::uint32_t parent_slot = entry & ((1u << BandedArrays::kCellBits) - 1);
@@ -32,10 +32,10 @@ IST_HD void split_few(Crew& crew, const BandedArrays& a, const Field& field) {
     a.free_list[(s.free + i / 8) % a.cell_capacity] = parent_slot;
   }
   if ((entry & bit) == 0) return;
-  const packing::Cell parent = packing::load_cell(team, a.cells[parent_slot], crew.scratch());
+  const packing::Cell parent = packing::load_cell(team, a.cells[parent_slot], coop.scratch());
   const packing::Cell child =
-      field.child(team, parent, static_cast<int>(i % 8), crew.scratch().ring,
-                  &crew.scratch().sample[0], s.schedule.margin);
+      field.child(team, parent, static_cast<int>(i % 8), coop.scratch().ring,
+                  &coop.scratch().sample[0], s.schedule.margin);
   const bool keeps = child.bound >= s.schedule.floor;
   std::uint32_t slot = 0;
   if (team.lane() == 0) {
@@ -46,7 +46,7 @@ IST_HD void split_few(Crew& crew, const BandedArrays& a, const Field& field) {
   }
   slot = team.broadcast(slot, 0);
   const bool stored = keeps && slot < a.cell_capacity;
-  if (stored) put_cell(team, a, child, crew.scratch(), slot);
+  if (stored) put_cell(team, a, child, coop.scratch(), slot);
   if (team.lane() != 0) return;
   if (stored) {
     atomic_add(&s.live, 1);
@@ -60,18 +60,18 @@ IST_HD void split_few(Crew& crew, const BandedArrays& a, const Field& field) {
 /// little to share among lanes. Slots come from the free list, a queue; the parents' own go to its
 /// end, for later steps. A child for which there is no slot stays to be made, and the step is done
 /// again when there are more.
-template <class Crew, class Surface>
-IST_HD void split_cells(Crew& crew, const BandedArrays& a, const Surface& surface) {
+template <class CoopGrid, class Surface>
+IST_HD void split_cells(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
-  const auto& team = crew.team();
+  const auto& team = coop.team();
   const ListedSpheres spheres = listed_spheres(a);
   const packing::PrototypeField field(surface, spheres);
-  if (8 * s.splitting <= crew.size()) return split_few(crew, a, field);
+  if (8 * s.splitting <= coop.size()) return split_few(coop, a, field);
   const float margin = s.schedule.margin, floor = s.schedule.floor;
   std::uint32_t* const frontier = a.lists[s.frontier_array];
   float dropped = 0;
   int live = 0;
-  share_out_to_lanes(crew, 8 * s.splitting, [&](std::uint32_t i) {
+  distribute_to_lanes(coop, 8 * s.splitting, [&](std::uint32_t i) {
     const bool valid = i < 8 * s.splitting;
     const std::uint32_t entry = valid ? atomic_load(&a.splitting[i / 8]) : 0;
     const std::uint32_t parent_slot = entry & ((1u << BandedArrays::kCellBits) - 1);
@@ -87,7 +87,7 @@ IST_HD void split_cells(Crew& crew, const BandedArrays& a, const Surface& surfac
       const BandedArrays::Cell& parent = a.cells[parent_slot];
       packing::SampleMemory memory;
       for (int k = 0; k < packing::kRingCapacity; ++k) child.ring[k] = parent.ring[k];
-      child.cell = field.child(typename Crew::Lane{}, parent.cell, static_cast<int>(i % 8),
+      child.cell = field.child(typename CoopGrid::Lane{}, parent.cell, static_cast<int>(i % 8),
                                child.ring, &memory, margin);
       if (child.cell.bound < floor && child.cell.bound > dropped) dropped = child.cell.bound;
     }

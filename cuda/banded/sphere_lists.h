@@ -1,12 +1,12 @@
 #pragma once
 
 #include "cuda/atomics.h"
-#include "cuda/banded/crew.h"
-#include "packing/spheres/sphere_grid_layout.h"
+#include "cuda/banded/cooperative_grid.h"
+#include "packing/base/sphere_grid_layout.h"
 
 namespace ist::gpu {
 
-/// The sphere grid in device memory: lists as sets (packing/spheres/sphere_grid_layout.h), filled
+/// The sphere grid in device memory: lists as sets (packing/base/sphere_grid_layout.h), filled
 /// by many teams at once. A table of blocks of 8³ cells; cells where a sphere comes near; a cell's
 /// list is a segment of one pool of words, its length first. Filling goes in passes with a meeting
 /// of all teams between them: touch_blocks of every sphere, then count_in_cells, make_room and

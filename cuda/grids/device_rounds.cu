@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "cuda/grids/search_crew.h"
+#include "cuda/grids/search_block.h"
 #include "cuda/launch.h"
 #include "cuda/warp_team.h"
 #include "packing/grids/discrete_distance.h"
@@ -80,19 +80,19 @@ __global__ void converge_prototypes(const __grid_constant__ GridScene scene,
 }
 
 /// The same, a block a prototype.
-__global__ void converge_by_crews(const __grid_constant__ GridScene scene,
-                                  const __grid_constant__ packing::AscentSettings settings,
-                                  const std::uint32_t* cells, std::uint32_t end,
-                                  std::uint32_t* next, GridCandidate* candidates) {
-  __shared__ SearchCrew::Memory memory;
-  const SearchCrew crew(&memory);
+__global__ void converge_by_blocks(const __grid_constant__ GridScene scene,
+                                   const __grid_constant__ packing::AscentSettings settings,
+                                   const std::uint32_t* cells, std::uint32_t end,
+                                   std::uint32_t* next, GridCandidate* candidates) {
+  __shared__ SearchBlock::Memory memory;
+  const SearchBlock block(&memory);
   for (;;) {
     __syncthreads();
     if (threadIdx.x == 0) memory.next = atomicAdd(next, 1u);
     __syncthreads();
     const std::uint32_t n = memory.next;
     if (n >= end) return;
-    const GridCandidate c = packing::converged_prototype(crew, scene, settings, cells[n]);
+    const GridCandidate c = packing::converged_prototype(block, scene, settings, cells[n]);
     if (threadIdx.x == 0) candidates[n] = c;
   }
 }
@@ -149,7 +149,7 @@ __global__ void certify(const __grid_constant__ GridScene scene, const GridCandi
 }
 
 /// Prototypes up to which a block works on each.
-constexpr std::size_t kMostCrews = 1024;
+constexpr std::size_t kMostBlocks = 1024;
 
 enum Counter { kKept, kNext, kAhead, kWinners };
 
@@ -213,10 +213,10 @@ bool DevicePrototypes::converge(const GridScene& scene, const packing::AscentSet
                           stream),
           "starting a round");
     const auto last = static_cast<std::uint32_t>(end);
-    if (count_ <= kMostCrews) {
-      converge_by_crews<<<static_cast<unsigned>(std::min(most, count_)), SearchCrew::kThreads, 0,
-                          stream>>>(scene, settings, cells_.data(), last, counters_.data() + kNext,
-                                    candidates_.data());
+    if (count_ <= kMostBlocks) {
+      converge_by_blocks<<<static_cast<unsigned>(std::min(most, count_)), SearchBlock::kThreads, 0,
+                           stream>>>(scene, settings, cells_.data(), last, counters_.data() + kNext,
+                                     candidates_.data());
     } else {
       const std::size_t blocks = std::min<std::size_t>(most, blocks_for(end - from, kWarps));
       converge_prototypes<<<static_cast<unsigned>(blocks), kThreads, 0, stream>>>(

@@ -196,7 +196,7 @@ int main(int argc, char** argv) {
   const ist::TreeView object = map_asset(options.object), probe = map_asset(options.probe);
   ist::Workspace scratch;
   ist::QuerySettings settings;
-  settings.deadline_us = options.deadline_us;
+  settings.penetration.deadline_us = settings.separation.deadline_us = options.deadline_us;
   Hand hand(object.volume(), probe.volume() * std::pow(options.scale, 3));
   const double period = 1e6 / options.rate;  // [µs]
   const auto ticks = static_cast<std::size_t>(std::ceil(options.seconds * options.rate));

@@ -8,11 +8,11 @@
 //   details                           DetailLevel[d]
 //   inner spheres                     Sphere[n]   centre and radius, insertion (greedy) order
 //   cover radii                       float[n]     the solid lies in ∪ B(inner centre, cover)
-//   effective spheres                 Sphere[n]   centre and radius of the matched set, same order
+//   matched spheres                 Sphere[n]   centre and radius of the matched set, same order
 //   inner tree                        as below
 //   matched tree                      as below, without sphere covers
 //   for each detail i = 1 … d, of m = ⌊n / 4^i⌋ spheres
-//     effective spheres               Sphere[m]   the matched set of the first m inner spheres
+//     matched spheres               Sphere[m]   the matched set of the first m inner spheres
 //     matched tree                    as below, without sphere covers
 //
 // The matched set of all n inner spheres is detail 0 and stands in AssetHeader; the coarser ones
@@ -113,8 +113,8 @@ static_assert(sizeof(TreeHeader) == 312);
 
 /// A matched set of fewer spheres: a prefix of the greedy order, calibrated by itself (DESIGN 5).
 struct DetailLevel {
-  std::uint64_t effective_spheres = 0;  ///< offset of Sphere[matched_tree.sphere_count]
-  double protrusion = 0;                ///< as AssetHeader::protrusion
+  std::uint64_t matched_spheres = 0;  ///< offset of Sphere[matched_tree.sphere_count]
+  double protrusion = 0;              ///< as AssetHeader::protrusion
   TreeHeader matched_tree;
 };
 static_assert(sizeof(DetailLevel) == 328);
@@ -135,7 +135,7 @@ struct alignas(64) AssetHeader {
   double volume = 0;        ///< unit frame, of the solid
   double volume_error = 0;  ///< unit frame, bound on the error of `volume`
   double coverage = 0;      ///< [0, 1] by inner spheres
-  double protrusion = 0;    ///< unit frame: no effective sphere sticks further out of the solid
+  double protrusion = 0;    ///< unit frame: no matched sphere sticks further out of the solid
 
   // What was asked for, so that a cache can tell whether to bake again.
   std::uint64_t asked_spheres = 0;
@@ -150,12 +150,12 @@ struct alignas(64) AssetHeader {
   std::uint32_t asked_grid_rounds = 0;
   std::uint32_t stop_reason = 0;
 
-  std::uint64_t inner_spheres = 0;      ///< offset of Sphere[sphere_count]
-  std::uint64_t cover_radii = 0;        ///< offset of float[sphere_count]
-  std::uint64_t effective_spheres = 0;  ///< offset of Sphere[sphere_count]
-  std::uint64_t details = 0;            ///< offset of DetailLevel[detail_count]
-  std::uint32_t detail_count = 0;       ///< coarser matched sets, ≤ kMaxDetails
-  std::uint32_t predicted_poses = 0;    ///< behind predicted_error; 0: no prediction
+  std::uint64_t inner_spheres = 0;    ///< offset of Sphere[sphere_count]
+  std::uint64_t cover_radii = 0;      ///< offset of float[sphere_count]
+  std::uint64_t matched_spheres = 0;  ///< offset of Sphere[sphere_count]
+  std::uint64_t details = 0;          ///< offset of DetailLevel[detail_count]
+  std::uint32_t detail_count = 0;     ///< coarser matched sets, ≤ kMaxDetails
+  std::uint32_t predicted_poses = 0;  ///< behind predicted_error; 0: no prediction
   /// Median relative error of the volume in each class of overlap, of two copies of the solid.
   double predicted_error[kOverlapClasses] = {};
   double asked_error = 0;       ///< relative error asked for; 0: none
@@ -217,13 +217,13 @@ constexpr void place_sections(AssetHeader& header, DetailLevel* details) noexcep
       header.detail_count > 0 ? detail::take<DetailLevel>(end, header.detail_count) : 0;
   header.inner_spheres = detail::take<Sphere>(end, n);
   header.cover_radii = detail::take<float>(end, n);
-  header.effective_spheres = detail::take<Sphere>(end, n);
+  header.matched_spheres = detail::take<Sphere>(end, n);
   header.inner_tree.sphere_count = header.matched_tree.sphere_count = static_cast<std::uint32_t>(n);
   detail::place_tree(header.inner_tree, true, end);
   detail::place_tree(header.matched_tree, false, end);
   for (std::uint32_t i = 0; i < header.detail_count; ++i) {
     const std::uint64_t m = detail_spheres(n, i + 1);
-    details[i].effective_spheres = detail::take<Sphere>(end, m);
+    details[i].matched_spheres = detail::take<Sphere>(end, m);
     details[i].matched_tree.sphere_count = static_cast<std::uint32_t>(m);
     detail::place_tree(details[i].matched_tree, false, end);
   }
@@ -241,10 +241,10 @@ inline const TreeHeader& matched_tree(const AssetHeader& asset, std::uint32_t de
                      : at<DetailLevel>(asset, asset.details)[detail - 1].matched_tree;
 }
 
-inline const Sphere* effective_spheres(const AssetHeader& asset, std::uint32_t detail) noexcept {
-  return at<Sphere>(
-      asset, detail == 0 ? asset.effective_spheres
-                         : at<DetailLevel>(asset, asset.details)[detail - 1].effective_spheres);
+inline const Sphere* matched_spheres(const AssetHeader& asset, std::uint32_t detail) noexcept {
+  return at<Sphere>(asset, detail == 0
+                               ? asset.matched_spheres
+                               : at<DetailLevel>(asset, asset.details)[detail - 1].matched_spheres);
 }
 
 }  // namespace ist

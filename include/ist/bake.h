@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <ist/mesh.h>
@@ -13,11 +14,19 @@
 
 namespace ist {
 
-/// The bytes of an asset in memory that owns them, aligned to 64 bytes.
+/// The bytes of an asset in memory that owns them, aligned to 64 bytes. Once moved from it is
+/// empty.
 class Asset {
  public:
   /// Copies the bytes. Throws Error, naming `name`, unless TreeView::from_bytes accepts them.
   Asset(std::span<const std::byte> bytes, const std::string& name);
+
+  Asset(Asset&& other) noexcept : Asset() { swap(other); }
+  Asset& operator=(Asset&& other) noexcept {
+    Asset taken(std::move(other));
+    swap(taken);
+    return *this;
+  }
 
   /// Reads a file written by save(). Throws Error (file, what is wrong, way out).
   static Asset load(const std::filesystem::path& path);
@@ -30,6 +39,13 @@ class Asset {
   const TreeView& view() const noexcept { return view_; }
 
  private:
+  Asset() = default;
+  void swap(Asset& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    std::swap(view_, other.view_);
+  }
+
   struct AlignedDelete {
     void operator()(std::byte* p) const noexcept;
   };

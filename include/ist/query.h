@@ -13,37 +13,69 @@ namespace ist {
 
 enum class QueryStatus : std::uint32_t {
   ok = 0,  ///< finished: the gradients are exactly those of the returned volume
-  /// A limit of QuerySettings or the workspace's capacity stopped the descent: bounds still hold.
+  /// A limit of the settings or the workspace's capacity stopped the descent: bounds still hold.
   budget_exhausted = 1,
-  /// NaN, Inf, a quaternion off unit length by > 1e-3, a scale ≤ 0, an empty tree, or sizes or
-  /// distances more than 1e60 : 1 apart; all zero.
-  invalid_pose = 2,
+  /// The answer is all zero. A pose with NaN or Inf, a quaternion off unit length by > 1e-3, a
+  /// scale ≤ 0, an empty tree, sizes or distances more than 1e60 : 1 apart, or a workspace that was
+  /// moved from.
+  invalid_input = 2,
 };
 
 /// Which spheres stand for the solid.
 enum class Measure : std::uint32_t {
-  matched = 0,  ///< effective spheres whose volumes sum to the solid's: the accurate one
+  matched = 0,  ///< matched spheres whose volumes sum to the solid's: the accurate one
   inner = 1,    ///< inner spheres: a certified lower bound of the true volume
 };
 
-/// Limits on one query. Zero, a negative value or NaN means no limit; with none set the answer is
-/// the finished sum. A stopped penetration guesses what is left from the densities of the nodes
-/// that were not opened.
-struct QuerySettings {
+/// What a penetration may cost. Zero, a negative value or NaN means no limit; with none set the
+/// answer is the finished sum.
+///
+/// A penetration that is stopped estimates what is left from the densities of the nodes that were
+/// not opened, and says budget_exhausted.
+struct PenetrationSettings {
   Measure measure = Measure::matched;
-  /// Count of sphere pairs to spend, 0 = as many as it takes. Above 0 the answer comes from the
-  /// finest level of detail that is expected to need no more, and is blended with the next coarser
-  /// one from 0.7 of that on: volume and force stay continuous, gradients are the blended sum's,
-  /// and shallow contacts keep all spheres. Aimed at, not kept; never less than the coarsest level
-  /// takes. penetration() and penetration_batch() in the matched measure only.
+
+  /// Count of sphere pairs to spend; matched measure only (the inner one has no levels of detail).
+  ///
+  /// The answer comes from the finest level of detail that is expected to need no more.
+  /// From 0.7 of the budget on it is blended with the next coarser level: volume and force stay
+  /// continuous, gradients are the blended sum's.
+  /// Shallow contacts keep all spheres.
+  /// Aimed at, not kept; never less than the coarsest level takes.
   std::uint32_t pair_budget = 0;
+
   std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
-  /// [µs] wall clock from the call. Visits end at 0.6 of it; then what is left is guessed, as far
-  /// as time allows. Kept to a few µs while the system lets the thread run; contact_patches()
-  /// guesses all that is left, at 0.1 µs a pair.
+
+  /// [µs] wall clock from the call.
+  /// Visits end at 0.6 of it; then what is left is estimated, as far as time allows.
+  /// Kept to a few µs while the system lets the thread run.
+  double deadline_us = 0;
+
+  double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
+  double min_radius = 0;      ///< [u] nodes smaller than this are not opened
+};
+
+/// What contact patches may cost; each limit as in PenetrationSettings.
+struct ContactSettings {
+  Measure measure = Measure::matched;
+  std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
+  /// [µs] wall clock from the call. All that is left when visits end is estimated, at 0.1 µs a
+  /// pair.
   double deadline_us = 0;
   double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
-  double min_radius = 0;      ///< [u] nodes smaller than this are not opened; penetration only
+  double min_radius = 0;      ///< [u] nodes smaller than this are not opened
+};
+
+/// What a separation may cost. Zero, a negative value or NaN means no limit.
+struct SeparationSettings {
+  std::uint32_t max_visits = 0;  ///< count of node pairs opened, the nearest first
+  double deadline_us = 0;        ///< [µs] wall clock from the call
+};
+
+/// What each half of query() may cost.
+struct QuerySettings {
+  PenetrationSettings penetration;
+  SeparationSettings separation;
 };
 
 /// A tree at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
@@ -95,7 +127,7 @@ class Workspace {
   Workspace& operator=(Workspace&&) noexcept;
 
   struct Impl;
-  Impl& impl() noexcept { return *impl_; }
+  Impl* impl() noexcept { return impl_.get(); }  ///< null once moved from
 
  private:
   std::unique_ptr<Impl> impl_;
@@ -104,8 +136,8 @@ class Workspace {
 /// Volume, wrench and centroid of the overlap (DESIGN 7). Copies of one asset at nearly the same
 /// pose are asked as unlike levels of detail, whose spheres do not repeat each other (DESIGN 5). No
 /// allocation, lock or exception. Trees may be shared by threads; the workspace may not.
-Penetration penetration(const PlacedTree& a, const PlacedTree& b, const QuerySettings& settings,
-                        Workspace& workspace) noexcept;
+Penetration penetration(const PlacedTree& a, const PlacedTree& b,
+                        const PenetrationSettings& settings, Workspace& workspace) noexcept;
 
 /// `whole`, what penetration() answered for these two in the matched measure without a pair budget,
 /// freed of the soft skin where flat faces meet: nothing across a gap of a fifth of a mean sphere
@@ -114,13 +146,13 @@ Penetration penetration(const PlacedTree& a, const PlacedTree& b, const QuerySet
 /// as they are, and a large ball that touches lightly may pass for flat. Both stay continuous in
 /// the pose; the force is the volume's gradient but for 15 %, so use it for contacts, not where
 /// energy must be kept. volume_min is lowered to hold the new volume. A few nanoseconds.
-Penetration without_soft_skin(const Penetration& whole, const PlacedTree& a,
-                              const PlacedTree& b) noexcept;
+Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
+                               const PlacedTree& b) noexcept;
 
 /// Distance of the inner spheres, with a certified interval for the solids and witness points, to
-/// about 1e-6 of the objects' size. Of the settings, max_visits and deadline_us apply. Once one
+/// about 1e-6 of the objects' size. Once one
 /// object's spheres overlap the other's all is zero. No allocation, lock or exception.
-Separation separation(const PlacedTree& a, const PlacedTree& b, const QuerySettings& settings,
+Separation separation(const PlacedTree& a, const PlacedTree& b, const SeparationSettings& settings,
                       Workspace& workspace) noexcept;
 
 struct PenetrationAndSeparation {
@@ -128,7 +160,7 @@ struct PenetrationAndSeparation {
   Separation separation;
 };
 
-/// Both in one call: the unified query of the Inner Sphere Trees papers. Limits apply to each.
+/// Both in one call: the unified query of the Inner Sphere Trees papers.
 PenetrationAndSeparation query(const PlacedTree& a, const PlacedTree& b,
                                const QuerySettings& settings, Workspace& workspace) noexcept;
 
@@ -165,7 +197,7 @@ struct ContactPatches {
 /// not open is shared out too. Costs 1.7 (one patch) to 2.4 (32) times a penetration. No
 /// allocation, lock or exception.
 ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
-                               const QuerySettings& settings, Workspace& workspace,
+                               const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept;
 
 /// Two placed solids of a batch.
@@ -186,7 +218,7 @@ struct ParallelFor {
 /// workers as workspaces; pairs are handed out by an atomic counter, so that a pool need not
 /// balance them. Without a workspace every answer is budget_exhausted with no upper bound. No
 /// allocation or lock but the pool's own; an exception of `run` ends the program.
-void penetration_batch(std::span<const PlacedPair> pairs, const QuerySettings& settings,
+void penetration_batch(std::span<const PlacedPair> pairs, const PenetrationSettings& settings,
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel = {}) noexcept;
 

@@ -6,7 +6,11 @@
 
 namespace ist {
 
-struct AssetHeader;  // the layout: ist/query/asset_layout.h
+struct AssetHeader;  // the layout: ist/asset_layout.h
+
+namespace detail {
+extern const AssetHeader kEmptyAsset;  // no spheres, no volume
+}
 
 /// Why bytes were not accepted as an asset.
 enum class AssetStatus : std::uint32_t {
@@ -34,12 +38,15 @@ class TreeView {
 
   bool empty() const noexcept { return header_ == nullptr; }
   std::size_t sphere_count() const noexcept;
-  double volume() const noexcept;     ///< [u³] of the solid
-  double coverage() const noexcept;   ///< [0, 1] share of it in inner spheres
-  double soft_skin() const noexcept;  ///< [u] no effective sphere sticks further out of the solid
+  double volume() const noexcept;      ///< [u³] of the solid
+  double coverage() const noexcept;    ///< [0, 1] share of it in inner spheres
+  double protrusion() const noexcept;  ///< [u] no matched sphere sticks further out of the solid
 
-  /// The checked bytes behind the view.
-  const AssetHeader& header() const noexcept { return *header_; }
+  /// The checked bytes behind the view (ist/asset_layout.h); of an empty view a header without
+  /// spheres.
+  const AssetHeader& header() const noexcept {
+    return header_ != nullptr ? *header_ : detail::kEmptyAsset;
+  }
 
  private:
   const AssetHeader* header_ = nullptr;

@@ -14,7 +14,7 @@
 #include "bake/cluster/tree_builder.h"
 #include "bake/cover/cover.h"
 #include "mesh/mesh_solid.h"
-#include "packing/packing_settings.h"
+#include "packing/base/packing_settings.h"
 #include "stage/stage.h"
 #include "stage/thread_arena.h"
 
@@ -112,14 +112,14 @@ AssetArrays baked(const ClosedMesh& mesh, const PackingSettings& settings,
 
   std::vector<Calibration> details =
       calibrate_prefixes(solid, *backend, packing.spheres, detail_counts(count), progress);
-  arrays.effective_spheres = std::move(details.front().effective);
+  arrays.matched_spheres = std::move(details.front().matched);
   arrays.header.protrusion = details.front().protrusion;
   for (std::size_t i = 1; i < details.size(); ++i)
-    arrays.details.push_back({std::move(details[i].effective), details[i].protrusion, {}});
-  trees.add([&] { arrays.matched_tree = build_tree(arrays.effective_spheres, {}); });
+    arrays.details.push_back({std::move(details[i].matched), details[i].protrusion, {}});
+  trees.add([&] { arrays.matched_tree = build_tree(arrays.matched_spheres, {}); });
   trees.add([&] {
     for (DetailArrays& detail : arrays.details)
-      detail.matched_tree = build_tree(detail.effective_spheres, {});
+      detail.matched_tree = build_tree(detail.matched_spheres, {});
   });
 
   arrays.cover_radii = cover_radii(solid, *backend, packing.spheres, progress);

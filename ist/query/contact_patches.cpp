@@ -39,22 +39,22 @@ void complete(std::span<ContactPatch> patches, std::size_t largest, const T& who
 }  // namespace
 
 ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
-                               const QuerySettings& settings, Workspace& workspace,
+                               const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept {
   ContactPatches result;
   const std::optional<RelativePose> pose = relative_pose(a, b);
-  if (!pose) {
-    result.penetration.status = QueryStatus::invalid_pose;
+  if (!pose || workspace.impl() == nullptr) {
+    result.penetration.status = QueryStatus::invalid_input;
     return result;
   }
   const SphereTree tree_a = sphere_tree(a.tree, settings.measure);
   const SphereTree tree_b = sphere_tree(b.tree, settings.measure);
   const double radius_a = tree_a.header->root[3];
   const double radius_b = tree_b.header->root[3] * pose->a_from_b.scale;
-  ContactBins& bins = workspace.impl().contact;
+  ContactBins& bins = workspace.impl()->contact;
   const bool of_b = divides_b(tree_a, radius_a, tree_b, radius_b);
   bins.start(of_b ? tree_b : tree_a, of_b);
-  Descent descent(tree_a, tree_b, *pose, settings, workspace.impl(), &bins);
+  Descent descent(tree_a, tree_b, *pose, limits_of(settings), *workspace.impl(), &bins);
   descent.run();
   result.penetration = descent.penetration();
   const Penetration& whole = result.penetration;

@@ -12,7 +12,7 @@ constexpr std::size_t kTaken = 4;
 
 struct Batch {
   std::span<const PlacedPair> pairs;
-  const QuerySettings& settings;
+  const PenetrationSettings& settings;
   std::span<Workspace> workspaces;
   std::span<Penetration> answers;
   std::atomic<std::size_t> next = 0;
@@ -33,7 +33,7 @@ void work(void* context, std::size_t worker) {
 
 }  // namespace
 
-void penetration_batch(std::span<const PlacedPair> pairs, const QuerySettings& settings,
+void penetration_batch(std::span<const PlacedPair> pairs, const PenetrationSettings& settings,
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel) noexcept {
   const std::size_t count = std::min(pairs.size(), answers.size());

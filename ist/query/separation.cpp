@@ -20,7 +20,7 @@ namespace {
 class GapDescent {
  public:
   GapDescent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
-             const QuerySettings& settings, Workspace::Impl& scratch)
+             const SeparationSettings& settings, Workspace::Impl& scratch)
       : a_(a),
         b_(b),
         a_side_(a, b, pose.a_from_b),
@@ -28,7 +28,7 @@ class GapDescent {
         scale_(pose.a_from_b.scale),
         precision_(precision_for_gap(a, b, pose)),
         stack_(scratch.waiting.get()),
-        budget_(settings) {}
+        budget_(limits_of(settings)) {}
 
   void run() {
     measure(a_.sphere(0, 0), b_.sphere(0, 0));
@@ -160,17 +160,17 @@ class GapDescent {
 
 }  // namespace
 
-Separation separation(const PlacedTree& a, const PlacedTree& b, const QuerySettings& settings,
+Separation separation(const PlacedTree& a, const PlacedTree& b, const SeparationSettings& settings,
                       Workspace& workspace) noexcept {
   Separation result;
   const std::optional<RelativePose> pose = relative_pose(a, b);
-  if (!pose) {
-    result.status = QueryStatus::invalid_pose;
+  if (!pose || workspace.impl() == nullptr) {
+    result.status = QueryStatus::invalid_input;
     return result;
   }
   const SphereTree tree_a = sphere_tree(a.tree, Measure::inner);
   const SphereTree tree_b = sphere_tree(b.tree, Measure::inner);
-  GapDescent descent(tree_a, tree_b, *pose, settings, workspace.impl());
+  GapDescent descent(tree_a, tree_b, *pose, settings, *workspace.impl());
   descent.run();
   result.node_visits = descent.visits();
   result.sphere_pairs = descent.pairs();
@@ -181,7 +181,7 @@ Separation separation(const PlacedTree& a, const PlacedTree& b, const QuerySetti
   const double length = span(tree_a, tree_b, *pose);
   const double kernel_error = distance_error(descent.precision(), length);
   const double world_error =
-      distance_error(Precision::twice, length) + 1e-15 * pose->unit_origin_a.norm() / unit;
+      distance_error(Precision::float64, length) + 1e-15 * pose->unit_origin_a.norm() / unit;
   const double gap = descent.gap();
   result.distance = unit * gap;
   result.distance_min = unit * std::max(0.0, descent.cover() - kernel_error - world_error);
@@ -195,7 +195,8 @@ Separation separation(const PlacedTree& a, const PlacedTree& b, const QuerySetti
 
 PenetrationAndSeparation query(const PlacedTree& a, const PlacedTree& b,
                                const QuerySettings& settings, Workspace& workspace) noexcept {
-  return {penetration(a, b, settings, workspace), separation(a, b, settings, workspace)};
+  return {penetration(a, b, settings.penetration, workspace),
+          separation(a, b, settings.separation, workspace)};
 }
 
 }  // namespace ist

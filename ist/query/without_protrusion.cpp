@@ -21,7 +21,7 @@ constexpr double kStiffening = 0.42;
 constexpr double kRound = 1500;
 constexpr double kFlat = 4500;
 
-/// [u] Scale of the layer in which a solid's effective spheres stick out and leave room: their mean
+/// [u] Scale of the layer in which a solid's matched spheres stick out and leave room: their mean
 /// radius, but for balls and the like, whose few large spheres fit better than that.
 double skin_of(const PlacedTree& placed) {
   const AssetHeader& asset = placed.tree.header();
@@ -31,8 +31,8 @@ double skin_of(const PlacedTree& placed) {
 
 }  // namespace
 
-Penetration without_soft_skin(const Penetration& whole, const PlacedTree& a,
-                              const PlacedTree& b) noexcept {
+Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
+                               const PlacedTree& b) noexcept {
   if (a.tree.empty() || b.tree.empty() || !(whole.volume > 0)) return whole;
   const double area = whole.translation_gradient.norm();
   const double of_a = skin_of(a), of_b = skin_of(b);

@@ -60,12 +60,12 @@ std::string describe_asset(const TreeView& tree) {
   line("volume", fmt::format("{:.9g} ± {:.1g} u³", h.volume * cube, h.volume_error * cube));
   line("frame", fmt::format("centre ({:.9g}, {:.9g}, {:.9g}) u, scale 2^{}", h.centre[0],
                             h.centre[1], h.centre[2], h.exponent));
-  line("soft skin", fmt::format("{:.4g} u: no effective sphere sticks further out of the solid",
-                                h.protrusion * scale));
+  line("protrusion", fmt::format("{:.4g} u: no matched sphere sticks further out of the solid",
+                                 h.protrusion * scale));
   for (std::uint32_t i = 1; i <= h.detail_count; ++i) {
     const DetailLevel& detail = at<DetailLevel>(h, h.details)[i - 1];
     line("detail",
-         fmt::format("{} spheres, soft skin {:.4g} u", grouped(detail.matched_tree.sphere_count),
+         fmt::format("{} spheres, protrusion {:.4g} u", grouped(detail.matched_tree.sphere_count),
                      detail.protrusion * scale));
   }
   line("asked", fmt::format("{} spheres, coverage {:g}, min radius {:g} u, epsilon {:g}, grid {}, "

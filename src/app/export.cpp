@@ -55,7 +55,7 @@ void add_export(CLI::App& app) {
   command->footer(
       "A row a sphere, in greedy order, in the mesh's own unit and frame: x,y,z,r the inner "
       "sphere\n"
-      "(r rounded down: it stays inside), ex,ey,ez,er the effective sphere, c the cover radius "
+      "(r rounded down: it stays inside), ex,ey,ez,er the matched sphere, c the cover radius "
       "about\n"
       "x,y,z (rounded up).\n"
       "Example: ist export bolt.ist -o bolt.csv");

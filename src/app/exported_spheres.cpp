@@ -37,10 +37,9 @@ Moved to_mesh_frame(const Sphere& s, const double origin[3], double scale) {
 }
 
 std::array<double, kColumns.size()> row(const ExportedSphere& s) {
-  return {
-      s.centre.x(),           s.centre.y(),           s.centre.z(),           s.radius,
-      s.effective_centre.x(), s.effective_centre.y(), s.effective_centre.z(), s.effective_radius,
-      s.cover_radius};
+  return {s.centre.x(),         s.centre.y(),         s.centre.z(),         s.radius,
+          s.matched_centre.x(), s.matched_centre.y(), s.matched_centre.z(), s.matched_radius,
+          s.cover_radius};
 }
 
 void append_row(std::string& out, const ExportedSphere& sphere, char separator) {
@@ -65,7 +64,7 @@ std::vector<ExportedSphere> exported_spheres(const TreeView& tree, std::uint32_t
   const AssetHeader& header = tree.header();
   const double scale = std::ldexp(1.0, header.exponent);
   const Sphere* const inner = at<Sphere>(header, header.inner_spheres);
-  const Sphere* const effective = effective_spheres(header, detail);
+  const Sphere* const matched = matched_spheres(header, detail);
   const float* const cover = at<float>(header, header.cover_radii);
   std::vector<ExportedSphere> result(matched_tree(header, detail).sphere_count);
   for (std::size_t i = 0; i < result.size(); ++i) {
@@ -78,8 +77,8 @@ std::vector<ExportedSphere> exported_spheres(const TreeView& tree, std::uint32_t
         moved.error == 0 ? radius : std::max(0.0, std::nextafter(radius - moved.error, -kInfinity));
     s.cover_radius =
         moved.error == 0 ? cover_radius : std::nextafter(cover_radius + moved.error, kInfinity);
-    s.effective_centre = to_mesh_frame(effective[i], header.centre, scale).centre;
-    s.effective_radius = effective[i].r * scale;
+    s.matched_centre = to_mesh_frame(matched[i], header.centre, scale).centre;
+    s.matched_radius = matched[i].r * scale;
   }
   return result;
 }

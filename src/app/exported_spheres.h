@@ -11,15 +11,15 @@ namespace ist::app {
 
 /// A sphere of an asset in the mesh's own unit and frame.
 struct ExportedSphere {
-  Eigen::Vector3d centre;            ///< [u] of the inner sphere
-  double radius = 0;                 ///< [u] rounded down: certified around the rounded centre
-  Eigen::Vector3d effective_centre;  ///< [u]
-  double effective_radius = 0;       ///< [u]
-  double cover_radius = 0;           ///< [u] about `centre`, rounded up
+  Eigen::Vector3d centre;          ///< [u] of the inner sphere
+  double radius = 0;               ///< [u] rounded down: certified around the rounded centre
+  Eigen::Vector3d matched_centre;  ///< [u]
+  double matched_radius = 0;       ///< [u]
+  double cover_radius = 0;         ///< [u] about `centre`, rounded up
 };
 
 /// Those of a detail in [0, header().detail_count]: the first of the inner spheres, with the
-/// effective spheres that stand for them.
+/// matched spheres that stand for them.
 std::vector<ExportedSphere> exported_spheres(const TreeView& tree, std::uint32_t detail);
 
 // Text of a whole file: columns x,y,z,r,ex,ey,ez,er,c, 17 digits.

@@ -23,6 +23,8 @@ struct QueryOptions {
   std::vector<std::string> classes;
   double scale_b = 1;
   QuerySettings settings;
+  std::uint32_t max_visits = 0;
+  double deadline_us = 0;
   std::size_t repeat = 1;
   bool json = false, csv = false;
 };
@@ -85,7 +87,7 @@ void run_query(const QueryOptions& options) {
     fmt::print("{}", answers_csv(answers));
   } else {
     fmt::print("A = {}, B = {}\n{}", options.asset_a, options.asset_b,
-               answer_text(answers.front(), options.settings.measure));
+               answer_text(answers.front(), options.settings.penetration.measure));
   }
 }
 
@@ -114,24 +116,25 @@ void add_query(CLI::App& app) {
       ->add_option_function<std::string>(
           "--measure",
           [options](const std::string& name) {
-            options->settings.measure = name == "inner" ? Measure::inner : Measure::matched;
+            options->settings.penetration.measure =
+                name == "inner" ? Measure::inner : Measure::matched;
           },
           "Which spheres stand for the solid")
       ->check(CLI::IsMember({"matched", "inner"}))
       ->default_str("matched");
   command
-      ->add_option("--pair-budget", options->settings.pair_budget,
+      ->add_option("--pair-budget", options->settings.penetration.pair_budget,
                    "Answer from the level of detail that needs about so many sphere pairs, "
                    "0 = from the finest; matched measure only")
       ->check(is_count)
       ->capture_default_str();
   command
-      ->add_option("--max-visits", options->settings.max_visits,
+      ->add_option("--max-visits", options->max_visits,
                    "Stop penetration and separation after so many node pairs each, 0 = no limit")
       ->check(is_count)
       ->capture_default_str();
   command
-      ->add_option("--deadline-us", options->settings.deadline_us,
+      ->add_option("--deadline-us", options->deadline_us,
                    "[µs] Stop penetration and separation after this each, 0 = no limit")
       ->check(is_not_negative)
       ->capture_default_str();
@@ -148,7 +151,12 @@ void add_query(CLI::App& app) {
       "k·V\n"
       "pushes B by −k·dVdt and turns it by −k·dVdr about its origin.\n"
       "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9");
-  command->callback([options] { run_query(*options); });
+  command->callback([options] {
+    QuerySettings& settings = options->settings;
+    settings.penetration.max_visits = settings.separation.max_visits = options->max_visits;
+    settings.penetration.deadline_us = settings.separation.deadline_us = options->deadline_us;
+    run_query(*options);
+  });
 }
 
 }  // namespace ist::app

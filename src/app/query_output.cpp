@@ -69,8 +69,8 @@ std::string answers_json(std::span<const Answer> answers) {
 std::string answer_text(const Answer& answer, Measure measure) {
   const Penetration& p = answer.result.penetration;
   const Separation& s = answer.result.separation;
-  if (answer.status() == QueryStatus::invalid_pose)
-    return "  no answer: invalid_pose. The quaternion must be within 1e-3 of unit length, every "
+  if (answer.status() == QueryStatus::invalid_input)
+    return "  no answer: invalid_input. The quaternion must be within 1e-3 of unit length, every "
            "number finite\n";
   std::string text;
   const auto line = [&](const char* name, const std::string& value, const char* meaning) {

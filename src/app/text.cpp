@@ -68,8 +68,8 @@ const char* name_of(QueryStatus status) noexcept {
       return "ok";
     case QueryStatus::budget_exhausted:
       return "budget_exhausted";
-    case QueryStatus::invalid_pose:
-      return "invalid_pose";
+    case QueryStatus::invalid_input:
+      return "invalid_input";
   }
   return "unknown";
 }

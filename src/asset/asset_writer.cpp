@@ -70,14 +70,13 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
   SectionWriter writer(bytes);
   writer.write(header.inner_spheres, arrays.inner_spheres, header.sphere_count);
   writer.write(header.cover_radii, arrays.cover_radii, header.sphere_count);
-  writer.write(header.effective_spheres, arrays.effective_spheres, header.sphere_count);
+  writer.write(header.matched_spheres, arrays.matched_spheres, header.sphere_count);
   writer.write(header.inner_tree, arrays.inner_tree);
   writer.write(header.matched_tree, arrays.matched_tree);
   writer.write(header.details, details, header.detail_count);
   for (std::size_t i = 0; i < details.size(); ++i) {
     const TreeHeader& tree = details[i].matched_tree;
-    writer.write(details[i].effective_spheres, arrays.details[i].effective_spheres,
-                 tree.sphere_count);
+    writer.write(details[i].matched_spheres, arrays.details[i].matched_spheres, tree.sphere_count);
     writer.write(tree, arrays.details[i].matched_tree);
   }
   seal(bytes);

@@ -29,7 +29,7 @@ struct TreeArrays {
 
 /// A coarser matched set.
 struct DetailArrays {
-  std::vector<Sphere> effective_spheres;
+  std::vector<Sphere> matched_spheres;
   double protrusion = 0;  ///< unit frame
   TreeArrays matched_tree;
 };
@@ -38,8 +38,8 @@ struct DetailArrays {
 struct AssetArrays {
   AssetHeader header;  ///< scalar fields; offsets, counts, magic and hash are filled in by writing
   std::vector<Sphere> inner_spheres;
-  std::vector<float> cover_radii;         ///< the same length
-  std::vector<Sphere> effective_spheres;  ///< the same length
+  std::vector<float> cover_radii;       ///< the same length
+  std::vector<Sphere> matched_spheres;  ///< the same length
   TreeArrays inner_tree;
   TreeArrays matched_tree;
   std::vector<DetailArrays> details;  ///< the i-th from 1 of ⌊n / 4^i⌋ spheres

@@ -1,7 +1,7 @@
 #include <ist/packing.h>
 
 #include "backend/solid_backend.h"
-#include "packing/packing_settings.h"
+#include "packing/base/packing_settings.h"
 #include "stage/thread_arena.h"
 
 namespace ist {

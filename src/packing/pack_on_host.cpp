@@ -6,7 +6,7 @@
 #include "packing/banded/field_surface.h"
 #include "packing/banded/mesh_surface.h"
 #include "packing/grids/pack_grids.h"
-#include "packing/packing_settings.h"
+#include "packing/base/packing_settings.h"
 
 namespace ist::packing {
 namespace {

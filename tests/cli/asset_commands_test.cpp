@@ -100,7 +100,7 @@ TEST_F(AssetCommands, ExportsTheSameSpheresInEveryFormat) {
   ASSERT_EQ(ply.size(), 13u + 100u);
   EXPECT_EQ(ply[2], "element vertex 100");
 
-  double effective_volume = 0;
+  double matched_volume = 0;
   for (std::size_t i = 0; i < csv.size(); ++i) {
     const std::vector<double> row = numbers_of(csv[i]);
     ASSERT_EQ(row.size(), 9u);
@@ -110,9 +110,9 @@ TEST_F(AssetCommands, ExportsTheSameSpheresInEveryFormat) {
     EXPECT_EQ(ply[13 + i], spaced);
     for (int k = 0; k < 3; ++k) EXPECT_LE(std::abs(row[static_cast<std::size_t>(k)]) + row[3], 0.5);
     EXPECT_GE(row[8], row[3]);
-    effective_volume += 4 * M_PI / 3 * std::pow(row[7], 3);
+    matched_volume += 4 * M_PI / 3 * std::pow(row[7], 3);
   }
-  EXPECT_NEAR(effective_volume, 1, 1e-6);
+  EXPECT_NEAR(matched_volume, 1, 1e-6);
 }
 
 /// Far from the origin the centres are rounded on export; the radii make up for it.

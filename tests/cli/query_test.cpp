@@ -114,7 +114,7 @@ TEST_F(QueryCommand, AnswersARowForARow) {
   EXPECT_EQ(numbers_of(all[1])[volume], 0);
   EXPECT_GT(numbers_of(all[2])[volume], 0) << "the row's own scale overrides";
   EXPECT_NE(all[0].find(",ok,"), std::string::npos);
-  EXPECT_NE(all[3].find(",invalid_pose,"), std::string::npos);
+  EXPECT_NE(all[3].find(",invalid_input,"), std::string::npos);
   // 17 digits bring every double back.
   EXPECT_EQ(numbers_of(all[0])[volume], row("1,0,0,0,0.5,0,0")[volume]);
 
@@ -197,7 +197,7 @@ TEST_F(QueryCommand, WrongUsageExitsWith2) {
 TEST_F(QueryCommand, AnInvalidPoseIsNoZeroForAPerson) {
   const Outcome outcome = ist({"query", "cube.ist", "cube.ist", "--pose", "2,0,0,0,0,0,0"});
   EXPECT_EQ(outcome.exit_code, 0);
-  EXPECT_NE(outcome.out.find("invalid_pose"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("invalid_input"), std::string::npos) << outcome.out;
   EXPECT_EQ(outcome.out.find("volume"), std::string::npos) << outcome.out;
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "support/asset_bytes.h"
+#include "support/query_settings.h"
 
 // Bytes are refused as an asset, or answer queries with finite numbers. An input whose first byte
 // is even is taken as it comes; an odd one is a list of changes to a sound asset, whose hash is
@@ -22,11 +23,11 @@ void use(const TreeView& view, const TreeView& sound) {
   pose.t[0] = 0.2;
   for (const auto& [measure, pair_budget] :
        {std::pair(Measure::matched, 0u), {Measure::matched, 20u}, {Measure::inner, 0u}}) {
-    QuerySettings settings;
+    PenetrationSettings settings;
     settings.measure = measure;
     settings.pair_budget = pair_budget;
     const auto [penetration, separation] =
-        query({view, {}, 1}, {sound, pose, 1}, settings, workspace);
+        query({view, {}, 1}, {sound, pose, 1}, ist::testing::for_both(settings), workspace);
     if (!(penetration.volume >= 0) || !std::isfinite(penetration.volume_max)) std::abort();
     if (!penetration.translation_gradient.allFinite()) std::abort();
     // An asset that lies may lie about distances, too, but not without end.

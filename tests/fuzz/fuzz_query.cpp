@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "support/query_settings.h"
 #include "support/random_assets.h"
 
 // Any pose, scale and limits: the answer is not NaN, lies within its bounds, and is the same when
@@ -77,7 +78,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static Workspace large(1u << 16), small(64);
   Input input(data, size);
   const auto flags = input.next<std::uint8_t>();
-  QuerySettings settings;
+  PenetrationSettings settings;
   settings.measure = (flags & 1) != 0 ? Measure::inner : Measure::matched;
   if ((flags & 2) != 0) settings.max_visits = input.next<std::uint8_t>();
   if ((flags & 4) != 0) settings.relative_error = input.next<double>();
@@ -89,11 +90,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if ((flags & 128) != 0) placed_b.tree = a.view();
   settings.pair_budget = input.next<std::uint16_t>();
 
-  const auto [penetration, separation] = query(placed_a, placed_b, settings, workspace);
+  const auto [penetration, separation] =
+      query(placed_a, placed_b, ist::testing::for_both(settings), workspace);
   look_at(penetration);
   if (settings.measure == Measure::matched && settings.pair_budget == 0)
-    look_at(without_soft_skin(penetration, placed_a, placed_b));
+    look_at(without_protrusion(penetration, placed_a, placed_b));
   require(separation.distance_min >= 0 && separation.distance_min <= separation.distance_max);
-  require(same_bits(penetration, query(placed_a, placed_b, settings, workspace).penetration));
+  require(same_bits(
+      penetration,
+      query(placed_a, placed_b, ist::testing::for_both(settings), workspace).penetration));
   return 0;
 }

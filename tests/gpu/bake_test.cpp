@@ -36,9 +36,9 @@ void expect_same(const ClosedMesh& mesh, std::size_t count) {
   const auto on_gpu = make_backend(solid, {Device::cuda, {}});
   const Calibration host = testing::calibrate_on_host(solid, inner);
   const Calibration card = calibrate(solid, *on_gpu, inner, {});
-  EXPECT_EQ(std::memcmp(host.effective.data(), card.effective.data(),
-                        host.effective.size() * sizeof(Sphere)),
-            0);
+  EXPECT_EQ(
+      std::memcmp(host.matched.data(), card.matched.data(), host.matched.size() * sizeof(Sphere)),
+      0);
   EXPECT_EQ(host.protrusion, card.protrusion);
   EXPECT_EQ(testing::cover_on_host(solid, inner), cover_radii(solid, *on_gpu, inner, {}));
 }

@@ -10,7 +10,7 @@
 
 #include "cuda/device_mesh.h"
 #include "mesh/mesh_solid.h"
-#include "packing/packing_settings.h"
+#include "packing/base/packing_settings.h"
 #include "samples/samples.h"
 #include "support/gpu_test.h"
 #include "support/same_packing.h"

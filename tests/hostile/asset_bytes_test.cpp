@@ -11,6 +11,7 @@
 
 #include "samples/samples.h"
 #include "support/asset_bytes.h"
+#include "support/query_settings.h"
 
 // Assets that were cut, damaged or made to harm.
 
@@ -93,11 +94,11 @@ void use(const AlignedBytes& bytes, const TreeView& sound) {
   Pose pose;
   pose.t[0] = 0.2;
   for (const Measure measure : {Measure::matched, Measure::inner}) {
-    QuerySettings settings;
+    PenetrationSettings settings;
     settings.measure = measure;
     for (const auto& [penetration, separation] :
-         {query({view, {}, 1}, {sound, pose, 1}, settings, workspace),
-          query({sound, {}, 1}, {view, pose, 1}, settings, workspace)}) {
+         {query({view, {}, 1}, {sound, pose, 1}, testing::for_both(settings), workspace),
+          query({sound, {}, 1}, {view, pose, 1}, testing::for_both(settings), workspace)}) {
       EXPECT_GE(penetration.volume, 0);
       EXPECT_TRUE(std::isfinite(penetration.volume_max));
       EXPECT_TRUE(penetration.translation_gradient.allFinite());
@@ -225,7 +226,7 @@ TEST(AssetBytes, EveryOffsetAndCountIsLookedAt) {
   std::vector<std::size_t> fields = {
       offsetof(AssetHeader, file_bytes), offsetof(AssetHeader, sphere_count),
       offsetof(AssetHeader, inner_spheres), offsetof(AssetHeader, cover_radii),
-      offsetof(AssetHeader, effective_spheres)};
+      offsetof(AssetHeader, matched_spheres)};
   for (const std::size_t tree :
        {offsetof(AssetHeader, inner_tree), offsetof(AssetHeader, matched_tree)})
     for (const std::size_t field : tree_fields(tree)) fields.push_back(field);
@@ -234,7 +235,7 @@ TEST(AssetBytes, EveryOffsetAndCountIsLookedAt) {
   AssetHeader header;
   std::memcpy(&header, bytes.data(), sizeof(header));
   const std::size_t first_detail = header.details;
-  fields.push_back(first_detail + offsetof(DetailLevel, effective_spheres));
+  fields.push_back(first_detail + offsetof(DetailLevel, matched_spheres));
   for (const std::size_t field : tree_fields(first_detail + offsetof(DetailLevel, matched_tree)))
     fields.push_back(field);
   for (const std::size_t field : fields)
@@ -264,7 +265,7 @@ TEST(AssetBytes, ValuesOutOfRangeAreRefused) {
   refused(offsetof(AssetHeader, centre), kNan);
   refused(offsetof(AssetHeader, exponent), 4000);
   refused(offsetof(AssetHeader, volume), -1.0);
-  for (const std::uint64_t spheres : {header.inner_spheres, header.effective_spheres}) {
+  for (const std::uint64_t spheres : {header.inner_spheres, header.matched_spheres}) {
     refused(spheres, kNanf);
     refused(spheres + 12, -1.0f);
     refused(spheres + 12, kEmptyRadius);
@@ -301,7 +302,7 @@ TEST(AssetBytes, DetailsAreLookedAt) {
     const std::uint64_t detail = header.details + i * sizeof(DetailLevel);
     refused(detail + offsetof(DetailLevel, protrusion), -1.0);
     refused(detail + offsetof(DetailLevel, matched_tree) + offsetof(TreeHeader, mean_radius), kNan);
-    refused(at<DetailLevel>(header, header.details)[i].effective_spheres, kNan);
+    refused(at<DetailLevel>(header, header.details)[i].matched_spheres, kNan);
     const TreeHeader& tree = matched_tree(header, i + 1);
     refused(tree.sphere_index, tree.sphere_count);  // no such sphere
     refused(tree.level[0].blocks + 12, 1e30f);

@@ -72,7 +72,7 @@ TEST(BoxOverlap, VolumesGradientsAndTheLowerBound) {
     ASSERT_EQ(matched.status, QueryStatus::ok);
     (exact > 0.1 * smaller ? deep : shallow).push_back(std::abs(matched.volume / exact - 1));
 
-    QuerySettings inner;
+    PenetrationSettings inner;
     inner.measure = Measure::inner;
     EXPECT_LE(penetration(placed_a, placed_b, inner, workspace).volume_min, exact * (1 + 1e-9));
 

@@ -59,7 +59,7 @@ TEST(VolumeOracle, VolumesAndForcesByClass) {
     angles[name].push_back(
         name == "contain" ? 0 : angle(answer.translation_gradient, row.translation_gradient));
     // The inner spheres are a certified lower bound.
-    QuerySettings inner;
+    PenetrationSettings inner;
     inner.measure = Measure::inner;
     EXPECT_LE(penetration(a, b, inner, workspace).volume_min, row.volume * (1 + 1e-9)) << row.id;
   }

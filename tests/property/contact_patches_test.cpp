@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
 
@@ -15,11 +16,12 @@ using testing::make_random_asset;
 using testing::random_pose;
 
 /// Every promise about the patches of one query.
-void expect_patches(const PlacedTree& a, const PlacedTree& b, const QuerySettings& settings,
+void expect_patches(const PlacedTree& a, const PlacedTree& b, const PenetrationSettings& settings,
                     std::size_t most, Workspace& workspace) {
   const Penetration whole = penetration(a, b, settings, workspace);
   std::vector<ContactPatch> patches(most);
-  const ContactPatches found = contact_patches(a, b, settings, workspace, patches);
+  const ContactPatches found =
+      contact_patches(a, b, testing::for_contacts(settings), workspace, patches);
   EXPECT_EQ(found.penetration.volume, whole.volume);
   EXPECT_EQ(found.penetration.volume_max, whole.volume_max);
   EXPECT_EQ(found.penetration.translation_gradient, whole.translation_gradient);
@@ -70,7 +72,7 @@ TEST(ContactPatchesTest, SumToTheWhole) {
     const Asset a = make_random_asset({n, 0.1, {1, 2, 3}, 2}, 10);
     const Asset b = make_random_asset({n / 2 + 1, 0.3, {}, 0}, 11);
     for (int i = 0; i < 24; ++i) {
-      QuerySettings settings;
+      PenetrationSettings settings;
       settings.measure = i % 2 == 0 ? Measure::matched : Measure::inner;
       if (i % 4 == 1) settings.max_visits = 1 + 3 * static_cast<std::uint32_t>(i);
       if (i % 8 == 2) settings.min_radius = 0.3;
@@ -104,13 +106,13 @@ TEST(ContactPatchesTest, SumOfGrazingSpheresIsTakenAgainInDouble) {
   EXPECT_NEAR(patch.depth, 0.5 * 2e-6 * r, 1e-4 * 2e-6 * r);
 }
 
-/// An asset of these spheres, inner and effective.
+/// An asset of these spheres, inner and matched.
 Asset make_asset(const std::vector<Sphere>& spheres) {
   AssetArrays arrays;
-  arrays.inner_spheres = arrays.effective_spheres = spheres;
+  arrays.inner_spheres = arrays.matched_spheres = spheres;
   for (const Sphere& s : spheres) arrays.cover_radii.push_back(2 * s.r);
   arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
-  arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  arrays.matched_tree = build_tree(arrays.matched_spheres, {});
   arrays.header.volume = arrays.matched_tree.volume_sum;
   return Asset(asset_bytes(arrays), "made-up asset");
 }
@@ -194,15 +196,15 @@ TEST(ContactPatchesTest, LargeTreesAreBinnedByLargerNodes) {
     arrays.cover_radii.push_back(0.04f);
     order.push_back(i);
   }
-  arrays.effective_spheres = arrays.inner_spheres;
+  arrays.matched_spheres = arrays.inner_spheres;
   arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, order);
-  arrays.matched_tree = tree_from_order(arrays.effective_spheres, {}, order);
+  arrays.matched_tree = tree_from_order(arrays.matched_spheres, {}, order);
   arrays.header.volume = arrays.matched_tree.volume_sum;
   const Asset a(asset_bytes(arrays), "lattice");
   const Asset b = make_random_asset({100, 0.5, {}, 0}, 71);
   const PlacedTree pa{a.view(), {}, 1.0}, pb{b.view(), {{1, 0, 0, 0}, {2, 0.1, 0}}, 1.5};
   expect_patches(pa, pb, {}, 16, workspace);
-  QuerySettings stopped;
+  PenetrationSettings stopped;
   stopped.max_visits = 40;
   expect_patches(pa, pb, stopped, 16, workspace);
 }
@@ -215,7 +217,7 @@ TEST(ContactPatchesTest, RefusesWhatPenetrationRefuses) {
   ContactPatch patch;
   const ContactPatches answer = contact_patches({a.view(), {}, 1}, bad, {}, workspace, {&patch, 1});
   EXPECT_EQ(answer.count, 0u);
-  EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_pose);
+  EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_input);
 }
 
 }  // namespace

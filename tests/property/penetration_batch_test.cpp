@@ -27,7 +27,7 @@ class PenetrationBatch : public ::testing::Test {
 
   /// The batch's answers are those of single queries, bit for bit.
   void expect_same(const ParallelFor& parallel, std::size_t workspaces,
-                   const QuerySettings& settings = {}) {
+                   const PenetrationSettings& settings = {}) {
     std::vector<Workspace> scratch;
     for (std::size_t i = 0; i < workspaces; ++i) scratch.emplace_back(1 << 16);
     std::vector<Penetration> answers(pairs_.size());
@@ -67,7 +67,7 @@ TEST_F(PenetrationBatch, OnThreadsOfTheCaller) {
   };
   expect_same(threads, 4);
   EXPECT_EQ(started, 4u);
-  QuerySettings stopped;
+  PenetrationSettings stopped;
   stopped.max_visits = 30;
   expect_same(threads, 3, stopped);
 }

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <ist/query.h>
 
+#include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
 
@@ -40,7 +41,7 @@ TEST_F(QueryBudget, VisitsAreKeptAndBoundsHold) {
     for (int i = 0; i < 40; ++i) {
       const PlacedTree a = placed_a(), b = placed_b(0.05 * i);
       const Penetration finished = penetration(a, b, {}, workspace_);
-      QuerySettings settings;
+      PenetrationSettings settings;
       settings.max_visits = visits;
       settings.measure = Measure::matched;
       const Penetration stopped = penetration(a, b, settings, workspace_);
@@ -87,7 +88,7 @@ TEST_F(QueryBudget, RelativeErrorIsMet) {
     for (int i = 0; i < 30; ++i) {
       const PlacedTree a = placed_a(), b = placed_b(0.06 * i);
       const Penetration finished = penetration(a, b, {}, workspace_);
-      QuerySettings settings;
+      PenetrationSettings settings;
       settings.relative_error = accepted;
       const Penetration answer = penetration(a, b, settings, workspace_);
       expect_bounds(answer, finished);
@@ -101,7 +102,7 @@ TEST_F(QueryBudget, SmallNodesStayShut) {
   for (const double radius : {0.4, 0.1, 0.02}) {
     for (int i = 0; i < 20; ++i) {
       const PlacedTree a = placed_a(), b = placed_b(0.09 * i);
-      QuerySettings settings;
+      PenetrationSettings settings;
       settings.min_radius = radius;
       const Penetration answer = penetration(a, b, settings, workspace_);
       expect_bounds(answer, penetration(a, b, {}, workspace_));
@@ -112,7 +113,7 @@ TEST_F(QueryBudget, SmallNodesStayShut) {
 TEST_F(QueryBudget, DeadlineStopsWithBounds) {
   const PlacedTree a = placed_a(), b = placed_b(0.1);
   const Penetration finished = penetration(a, b, {}, workspace_);
-  QuerySettings settings;
+  PenetrationSettings settings;
   settings.deadline_us = 1e-3;  // over before the first look at the clock
   const Penetration stopped = penetration(a, b, settings, workspace_);
   EXPECT_EQ(stopped.status, QueryStatus::budget_exhausted);
@@ -147,9 +148,9 @@ TEST_F(QueryBudget, AStoppedSeparationStillHoldsTheGap) {
     for (int i = 0; i < 20; ++i) {
       const PlacedTree a = placed_a(), b = placed_b(1.6 + 0.1 * i);
       const testing::ReferenceGap gap = testing::reference_gap(a, b);
-      QuerySettings settings;
+      PenetrationSettings settings;
       settings.max_visits = visits;
-      const Separation answer = separation(a, b, settings, workspace_);
+      const Separation answer = separation(a, b, testing::for_separation(settings), workspace_);
       EXPECT_LE(answer.node_visits, visits);
       EXPECT_LE(answer.distance_min, std::max(0.0, gap.covered));
       EXPECT_GE(answer.distance_max, std::max(0.0, gap.distance));

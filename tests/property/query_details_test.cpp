@@ -87,7 +87,7 @@ TEST_F(QueryDetails, ATinyBudgetTakesTheCoarsestLevel) {
   }
 }
 
-TEST_F(QueryDetails, WeightsSumToOneAndFallWithTheGauge) {
+TEST_F(QueryDetails, WeightsSumToOneAndFallWithTheCoarseEstimate) {
   const DetailChain chain = chain_of(placed_a(), placed_b(0));
   EXPECT_EQ(chain[0].a, 0u);
   EXPECT_EQ(chain[0].b, 0u);
@@ -95,19 +95,19 @@ TEST_F(QueryDetails, WeightsSumToOneAndFallWithTheGauge) {
   EXPECT_EQ(chain.coarsest().b, 2u);
   EXPECT_EQ(chain.weights(0, 100)[0].weight, 1);
   double before = 1;
-  for (double gauge = 1e-9; gauge < 10; gauge *= 1.01) {
-    const auto weights = chain.weights(gauge, 300);
-    const auto further = chain.weights(gauge * (1 + 1e-6), 300);
+  for (double coarse = 1e-9; coarse < 10; coarse *= 1.01) {
+    const auto weights = chain.weights(coarse, 300);
+    const auto further = chain.weights(coarse * (1 + 1e-6), 300);
     double sum = 0, slope = 0;
     for (std::size_t i = 0; i < chain.size(); ++i) {
       sum += weights[i].weight;
       slope += weights[i].slope;
       EXPECT_GE(weights[i].weight, 0);
-      const double difference = (further[i].weight - weights[i].weight) / (gauge * 1e-6);
-      EXPECT_NEAR(weights[i].slope * gauge, difference * gauge, 1e-4);
+      const double difference = (further[i].weight - weights[i].weight) / (coarse * 1e-6);
+      EXPECT_NEAR(weights[i].slope * coarse, difference * coarse, 1e-4);
     }
     EXPECT_NEAR(sum, 1, 1e-12);
-    EXPECT_NEAR(slope * gauge, 0, 1e-9);
+    EXPECT_NEAR(slope * coarse, 0, 1e-9);
     EXPECT_LE(weights[0].weight, before);
     before = weights[0].weight;
   }
@@ -115,9 +115,9 @@ TEST_F(QueryDetails, WeightsSumToOneAndFallWithTheGauge) {
 }
 
 /// From `least` on, the first budget under which two levels share an answer; 0 if there is none.
-std::uint32_t sharing_budget(const DetailChain& chain, double gauge, std::uint32_t least) {
+std::uint32_t sharing_budget(const DetailChain& chain, double coarse, std::uint32_t least) {
   for (std::uint32_t budget = least; budget < 10'000'000; budget += 1 + budget / 16)
-    for (const DetailWeight& w : chain.weights(gauge, budget))
+    for (const DetailWeight& w : chain.weights(coarse, budget))
       if (w.weight > 0.2 && w.weight < 0.8) return budget;
   return 0;
 }
@@ -128,9 +128,9 @@ TEST_F(QueryDetails, AnswerTheBlendedSumAndItsGradient) {
   for (int i = 0; i < 24; ++i) {
     const PlacedTree a = placed_a(), b = placed_b(0.13 * i);
     const DetailChain chain = chain_of(a, b);
-    const double gauge =
+    const double coarse =
         reference_sum(a, b, Measure::matched, chain.coarsest().a, chain.coarsest().b).volume;
-    const std::uint32_t budget = sharing_budget(chain, gauge / unit3(a), 10u << (2 * (i % 6)));
+    const std::uint32_t budget = sharing_budget(chain, coarse / unit3(a), 10u << (2 * (i % 6)));
     if (budget == 0) continue;
     ++blended;
     const Penetration answer = ask(a, b, budget);
@@ -183,20 +183,20 @@ TEST_F(QueryDetails, NothingJumpsAlongAPath) {
 }
 
 // What the coarsest level does not see is not lost.
-TEST(QueryDetailsAlone, WithoutAGaugeTheFinestAnswers) {
+TEST(QueryDetailsAlone, WithoutACoarseEstimateTheFinestAnswers) {
   // The finest reaches out to x = 1, the coarser level stops far short of it.
   AssetArrays arrays;
   for (int i = 0; i < 8; ++i) {
     const Sphere s = {static_cast<float>(i) / 4 - 0.9f, 0, 0, 0.15f};
     arrays.inner_spheres.push_back(s);
-    arrays.effective_spheres.push_back(s);
+    arrays.matched_spheres.push_back(s);
     arrays.cover_radii.push_back(0.3f);
   }
   arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
-  arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  arrays.matched_tree = build_tree(arrays.matched_spheres, {});
   arrays.details.resize(1);
-  arrays.details[0].effective_spheres = {{-0.5f, 0, 0, 0.3f}, {-0.4f, 0, 0, 0.3f}};
-  arrays.details[0].matched_tree = build_tree(arrays.details[0].effective_spheres, {});
+  arrays.details[0].matched_spheres = {{-0.5f, 0, 0, 0.3f}, {-0.4f, 0, 0, 0.3f}};
+  arrays.details[0].matched_tree = build_tree(arrays.details[0].matched_spheres, {});
   arrays.header.volume = arrays.matched_tree.volume_sum;
   const Asset asset(asset_bytes(arrays), "two levels");
   Workspace workspace;
@@ -220,7 +220,7 @@ TEST_F(QueryDetails, OtherLimitsHoldOnTop) {
   int stopped = 0;
   for (int i = 0; i < 600; ++i) {
     const PlacedTree a = placed_a(), b = placed_b(0.05 * (i % 60));
-    QuerySettings settings;
+    PenetrationSettings settings;
     settings.pair_budget = 3000;
     const Penetration finished = penetration(a, b, settings, workspace_);
     settings.max_visits = 1u << (i % 11);

@@ -42,7 +42,7 @@ TEST(Query, MatchesTheSumOverAllPairs) {
       for (const Measure measure : {Measure::matched, Measure::inner}) {
         const PlacedTree pa{a.view(), random_pose(random, 0.3), 1.0};
         PlacedTree pb{b.view(), random_pose(random, distance), 1.0};
-        QuerySettings settings;
+        PenetrationSettings settings;
         settings.measure = measure;
         const Penetration answer = penetration(pa, pb, settings, workspace);
         SCOPED_TRACE(::testing::Message() << n << " spheres, distance " << distance);
@@ -321,10 +321,10 @@ TEST(Query, RefusesPosesThatAreNone) {
   for (const PlacedTree& wrong : bad) {
     for (const auto& answer :
          {query(good, wrong, {}, workspace), query(wrong, good, {}, workspace)}) {
-      EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_pose);
+      EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_input);
       EXPECT_EQ(answer.penetration.volume, 0);
       EXPECT_EQ(answer.penetration.volume_max, 0);
-      EXPECT_EQ(answer.separation.status, QueryStatus::invalid_pose);
+      EXPECT_EQ(answer.separation.status, QueryStatus::invalid_input);
       EXPECT_EQ(answer.separation.distance_max, 0);
     }
   }

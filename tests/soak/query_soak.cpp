@@ -24,6 +24,7 @@
 
 #include "report.h"
 #include "samples/samples.h"
+#include "support/query_settings.h"
 #include "support/random_assets.h"
 
 namespace {
@@ -137,8 +138,8 @@ class Chunk {
     return tree;
   }
 
-  QuerySettings limits() {
-    QuerySettings settings;
+  PenetrationSettings limits() {
+    PenetrationSettings settings;
     settings.measure = one_in(3) ? Measure::inner : Measure::matched;
     if (one_in(3)) return settings;
     if (one_in(2)) settings.max_visits = static_cast<std::uint32_t>(std::pow(10, uniform(0, 2)));
@@ -158,19 +159,19 @@ class Chunk {
       b = a;
       b.pose.t[random_() % 3] += std::pow(10, uniform(-9, 0));
     }
-    const QuerySettings settings = limits();
+    const PenetrationSettings settings = limits();
     Workspace& workspace = one_in(8) ? worker_.small : worker_.large;
     // A clock's answer is not repeated: of a deadline only what always holds is looked at.
     const bool repeatable = settings.deadline_us == 0;
     switch (random_() % 8) {
       case 0: {
-        const Separation answer = separation(a, b, settings, workspace);
+        const Separation answer = separation(a, b, testing::for_separation(settings), workspace);
         look_at(answer);
         if (repeatable) bits_.add(answer);
         break;
       }
       case 1: {
-        const auto [volume, gap] = query(a, b, settings, workspace);
+        const auto [volume, gap] = query(a, b, testing::for_both(settings), workspace);
         look_at(volume);
         look_at(gap);
         if (repeatable) bits_.add(volume), bits_.add(gap);
@@ -179,7 +180,8 @@ class Chunk {
       case 2: {
         ContactPatch patches[8];
         const std::span<ContactPatch> room(patches, 1 + random_() % 8);
-        const ContactPatches answer = contact_patches(a, b, settings, workspace, room);
+        const ContactPatches answer =
+            contact_patches(a, b, testing::for_contacts(settings), workspace, room);
         look_at(answer, room);
         if (repeatable) bits_.add(answer.penetration), bits_.add(std::uint64_t{answer.count});
         break;
@@ -190,7 +192,7 @@ class Chunk {
         look_at(answer);
         if (repeatable) bits_.add(answer);
         if (settings.measure == Measure::matched && settings.pair_budget == 0) {
-          const Penetration hard = without_soft_skin(answer, a, b);
+          const Penetration hard = without_protrusion(answer, a, b);
           look_at(hard);
           if (repeatable) bits_.add(hard);
         }
@@ -244,7 +246,7 @@ class Chunk {
 
   void look_at_finished(const Penetration& stopped, const PlacedTree& a, const PlacedTree& b,
                         Measure measure) {
-    QuerySettings no_limits;
+    PenetrationSettings no_limits;
     no_limits.measure = measure;
     const Penetration finished = penetration(a, b, no_limits, worker_.large);
     if (finished.status != QueryStatus::ok) return;

@@ -23,17 +23,17 @@ inline std::vector<std::byte> small_asset(std::size_t n, std::uint32_t details =
     const float y = static_cast<float>(i / 4 % 4) / 4 - 0.5f;
     const float z = static_cast<float>(i / 16) / 4 - 0.5f;
     arrays.inner_spheres.push_back({x, y, z, 0.1f});
-    arrays.effective_spheres.push_back({x, y, z, 0.12f});
+    arrays.matched_spheres.push_back({x, y, z, 0.12f});
     arrays.cover_radii.push_back(0.3f);
   }
   arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
-  arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  arrays.matched_tree = build_tree(arrays.matched_spheres, {});
   for (std::uint32_t i = 1; i <= details; ++i) {
     DetailArrays& detail = arrays.details.emplace_back();
     const auto count = static_cast<std::ptrdiff_t>(detail_spheres(n, i));
-    detail.effective_spheres.assign(arrays.effective_spheres.begin(),
-                                    arrays.effective_spheres.begin() + count);
-    detail.matched_tree = build_tree(detail.effective_spheres, {});
+    detail.matched_spheres.assign(arrays.matched_spheres.begin(),
+                                  arrays.matched_spheres.begin() + count);
+    detail.matched_tree = build_tree(detail.matched_spheres, {});
   }
   arrays.header.volume = 1;
   return asset_bytes(arrays);

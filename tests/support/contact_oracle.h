@@ -60,7 +60,7 @@ struct Body {
 
   PlacedTree at(const Pose& pose) const { return {asset->view(), pose, scale}; }
   double volume() const { return asset->view().volume() * std::pow(scale, 3); }
-  /// [u] of a ball with the mean volume of the effective spheres
+  /// [u] of a ball with the mean volume of the matched spheres
   double leaf_radius() const {
     const auto spheres = static_cast<double>(asset->view().sphere_count());
     return std::cbrt(3 * volume() / (4 * std::numbers::pi * spheres));
@@ -76,7 +76,7 @@ struct Body {
   FclMesh fcl;
   BulletMesh bullet;
   double missed_layer = 0;  ///< [u] g: the solid lies within this of the inner spheres
-  double protrusion = 0;    ///< [u] p: no effective sphere sticks out further
+  double protrusion = 0;    ///< [u] p: no matched sphere sticks out further
 };
 
 /// A mesh, baked once, at every scale it is asked for.
@@ -122,7 +122,7 @@ struct ContactCase {
 struct ContactVerdict {
   std::vector<std::string> wrong;  ///< statements above that are false: none may be
   bool matched = false;            ///< overlap > 0 in that measure
-  bool soft_skin = false;          ///< matched, though the solids are apart
+  bool protrusion = false;         ///< matched, though the solids are apart
   bool shallow = false;            ///< crossing, within the band
   bool fcl = false, bullet = false;
   double interval_width = 0;  ///< [u] of the certified distances
@@ -162,7 +162,7 @@ class ContactJudge {
       require(inner.volume == 0, "inner spheres overlap, the solids are apart");
       require(gap.distance_min <= d, "the solids are closer than distance_min");
       require(gap.distance_max >= d, "the solids are further apart than distance_max");
-      verdict.soft_skin = verdict.matched;
+      verdict.protrusion = verdict.matched;
       require(!verdict.matched || d <= a.protrusion + b.protrusion,
               "matched overlap beyond both protrusions");
       return verdict;

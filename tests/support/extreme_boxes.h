@@ -59,7 +59,7 @@ inline double violations(const Asset& asset, const ClosedMesh& mesh) {
   return static_cast<double>(sum);
 }
 
-/// Effective volumes must sum to the solid's.
+/// Matched volumes must sum to the solid's.
 inline double calibration_error(const Asset& asset) {
   double sum = 0;
   for (const WorldSphere& s : world_spheres({asset.view(), {}, 1}, Measure::matched))

@@ -50,7 +50,7 @@ std::vector<Claim> of_size_ratio() {
     mean += share / kPlaces;
     missed += share == 0;
     interval.add(separation(boxes.a(), boxes.b(inside), {}, workspace).distance_min);
-    // Across A's effective spheres, where the sum is a part of B's.
+    // Across A's matched spheres, where the sum is a part of B's.
     const auto spheres = world_spheres(boxes.a(), Measure::matched);
     const WorldSphere& sphere = spheres[static_cast<std::size_t>(i) % spheres.size()];
     const Vector3d on = sphere.centre + sphere.r * shift.normalized();
@@ -88,7 +88,7 @@ std::vector<Claim> of_touching_faces() {
   return {{"inner volume [u³]", inner.value(), 0},
           {"distance_min [u]", low.value(), 0},
           {"distance_max [u]", high.value(), 0.05},
-          {"matched volume of the soft skin [u³]", matched.value(), 0.01}};
+          {"matched volume of the protrusion [u³]", matched.value(), 0.01}};
 }
 
 std::vector<Claim> of_coincident_copies() {

@@ -23,7 +23,7 @@ std::vector<Claim> of_thin_box(const Vector3d& half, bool turned) {
   const Penetration got = penetration({cube.view(), {}, 1}, {thin.view(), pose, 1}, {}, workspace);
   const Penetration inner = penetration({cube.view(), {}, 1}, {thin.view(), pose, 1},
                                         {.measure = Measure::inner}, workspace);
-  return {{"effective volumes against the solid's", calibration_error(thin), 1e-6},
+  return {{"matched volumes against the solid's", calibration_error(thin), 1e-6},
           {"volume error, a fifth of its length in a cube", std::abs(got.volume / exact - 1), 0.1},
           {"inner measure beyond the exact volume", std::max(0.0, inner.volume_min / exact - 1), 0},
           {"violations that `ist check` finds", violations(thin, closed_mesh), 0}};

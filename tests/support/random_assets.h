@@ -21,7 +21,7 @@ struct RandomAsset {
   std::uint32_t details = 0;  ///< coarser levels: the first spheres, each as large as four
 };
 
-/// An asset of random spheres in the unit ball: inner ones with covers, and effective ones that
+/// An asset of random spheres in the unit ball: inner ones with covers, and matched ones that
 /// overlap each other a little, as calibrated ones do. No solid stands behind it.
 inline Asset make_random_asset(const RandomAsset& like, unsigned seed) {
   std::mt19937_64 random(seed);
@@ -37,19 +37,19 @@ inline Asset make_random_asset(const RandomAsset& like, unsigned seed) {
         x + 0.3 * r * Eigen::Vector3d(uniform(random), uniform(random), uniform(random));
     arrays.inner_spheres.push_back({static_cast<float>(x.x()), static_cast<float>(x.y()),
                                     static_cast<float>(x.z()), static_cast<float>(0.8 * r)});
-    arrays.effective_spheres.push_back({static_cast<float>(e.x()), static_cast<float>(e.y()),
-                                        static_cast<float>(e.z()), static_cast<float>(r)});
+    arrays.matched_spheres.push_back({static_cast<float>(e.x()), static_cast<float>(e.y()),
+                                      static_cast<float>(e.z()), static_cast<float>(r)});
     arrays.cover_radii.push_back(static_cast<float>(2 * r));
   }
   arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
-  arrays.matched_tree = build_tree(arrays.effective_spheres, {});
+  arrays.matched_tree = build_tree(arrays.matched_spheres, {});
   for (std::uint32_t i = 1; i <= like.details; ++i) {
     DetailArrays& detail = arrays.details.emplace_back();
     const auto count = static_cast<std::ptrdiff_t>(detail_spheres(like.spheres, i));
-    detail.effective_spheres.assign(arrays.effective_spheres.begin(),
-                                    arrays.effective_spheres.begin() + count);
-    for (Sphere& s : detail.effective_spheres) s.r *= static_cast<float>(std::cbrt(std::pow(4, i)));
-    detail.matched_tree = build_tree(detail.effective_spheres, {});
+    detail.matched_spheres.assign(arrays.matched_spheres.begin(),
+                                  arrays.matched_spheres.begin() + count);
+    for (Sphere& s : detail.matched_spheres) s.r *= static_cast<float>(std::cbrt(std::pow(4, i)));
+    detail.matched_tree = build_tree(detail.matched_spheres, {});
   }
   for (int k = 0; k < 3; ++k) arrays.header.centre[k] = like.centre[k];
   arrays.header.exponent = like.exponent;

@@ -28,7 +28,7 @@ inline std::vector<WorldSphere> world_spheres(const PlacedTree& placed, Measure 
   const AssetHeader& header = placed.tree.header();
   const bool inner = measure == Measure::inner;
   const Sphere* spheres =
-      inner ? at<Sphere>(header, header.inner_spheres) : effective_spheres(header, detail);
+      inner ? at<Sphere>(header, header.inner_spheres) : matched_spheres(header, detail);
   const std::uint64_t count = detail_spheres(header.sphere_count, inner ? 0 : detail);
   const float* covers = at<float>(header, header.cover_radii);
   const Eigen::Quaterniond q =

@@ -68,7 +68,7 @@ TEST(Asset, SectionsAreAlignedAndInOrder) {
     std::vector<std::uint64_t> offsets;
     if (header.detail_count > 0) offsets.push_back(header.details);
     offsets.insert(offsets.end(),
-                   {header.inner_spheres, header.cover_radii, header.effective_spheres});
+                   {header.inner_spheres, header.cover_radii, header.matched_spheres});
     const auto add_tree = [&](const TreeHeader* tree) {
       offsets.push_back(tree->sphere_index);
       if (tree->sphere_cover != 0) offsets.push_back(tree->sphere_cover);
@@ -83,7 +83,7 @@ TEST(Asset, SectionsAreAlignedAndInOrder) {
     add_tree(&header.inner_tree);
     add_tree(&header.matched_tree);
     for (std::uint32_t i = 0; i < header.detail_count; ++i) {
-      offsets.push_back(details[i].effective_spheres);
+      offsets.push_back(details[i].matched_spheres);
       add_tree(&details[i].matched_tree);
     }
     offsets.push_back(header.file_bytes);

@@ -78,9 +78,7 @@ T* writable(AssetHeader& header, std::uint64_t offset) {
 }
 
 Sphere& inner(AssetHeader& h, std::size_t i) { return writable<Sphere>(h, h.inner_spheres)[i]; }
-Sphere& effective(AssetHeader& h, std::size_t i) {
-  return writable<Sphere>(h, h.effective_spheres)[i];
-}
+Sphere& matched(AssetHeader& h, std::size_t i) { return writable<Sphere>(h, h.matched_spheres)[i]; }
 BallBlock& block(AssetHeader& h, const TreeHeader& tree, std::size_t level) {
   return *writable<BallBlock>(h, tree.level[level].blocks);
 }
@@ -106,8 +104,8 @@ TEST(Check, TurnsRedForEveryInvariant) {
       {"spheres disjoint", [](AssetHeader& h) { inner(h, 0).r *= 1.0001f; }},
       {"spheres disjoint", [](AssetHeader& h) { inner(h, 20) = inner(h, 21); }},
       {"coverage", [](AssetHeader& h) { h.coverage += 1e-6; }},
-      {"effective volumes sum to the solid", [](AssetHeader& h) { effective(h, 0).r *= 1.001f; }},
-      {"effective protrusion", [](AssetHeader& h) { h.protrusion *= 0.999; }},
+      {"matched volumes sum to the solid", [](AssetHeader& h) { matched(h, 0).r *= 1.001f; }},
+      {"matched protrusion", [](AssetHeader& h) { h.protrusion *= 0.999; }},
       {"cover holds sphere",
        [](AssetHeader& h) { writable<float>(h, h.cover_radii)[0] = 0.9f * inner(h, 0).r; }},
       {"solid covered",
@@ -171,9 +169,9 @@ TEST(Check, TurnsRedForEveryInvariantOfADetail) {
     return *writable<DetailLevel>(h, h.details);
   };
   const std::vector<Tampering> cases = {
-      {"detail 1: effective volumes sum to the solid",
-       [&](AssetHeader& h) { writable<Sphere>(h, detail(h).effective_spheres)->r *= 1.001f; }},
-      {"detail 1: effective protrusion", [&](AssetHeader& h) { detail(h).protrusion *= 0.999; }},
+      {"detail 1: matched volumes sum to the solid",
+       [&](AssetHeader& h) { writable<Sphere>(h, detail(h).matched_spheres)->r *= 1.001f; }},
+      {"detail 1: matched protrusion", [&](AssetHeader& h) { detail(h).protrusion *= 0.999; }},
       {"detail 1: matched tree: leaves are the table",
        [&](AssetHeader& h) { block(h, detail(h).matched_tree, 0).r[2] *= 1.000001f; }},
       {"detail 1: matched tree: mean radius",
@@ -243,12 +241,12 @@ TEST(Bake, AViewSpeaksInTheMeshsUnit) {
   for (auto& v : torus.vertices) v *= 8;
   const Asset large = bake(testing::closed(torus, "torus"), of_size(100));
   EXPECT_EQ(large.view().volume(), 512 * small.view().volume());
-  EXPECT_EQ(large.view().soft_skin(), 8 * small.view().soft_skin());
+  EXPECT_EQ(large.view().protrusion(), 8 * small.view().protrusion());
   EXPECT_EQ(large.view().coverage(), small.view().coverage());
   EXPECT_GT(small.view().coverage(), 0.5);
   EXPECT_LT(small.view().coverage(), 1);
-  EXPECT_GT(small.view().soft_skin(), 0);
-  EXPECT_LT(small.view().soft_skin(), 0.375);  // the tube's radius
+  EXPECT_GT(small.view().protrusion(), 0);
+  EXPECT_LT(small.view().protrusion(), 0.375);  // the tube's radius
 }
 
 TEST(Bake, CancelKeepsWhatIsPacked) {

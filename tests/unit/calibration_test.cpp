@@ -30,13 +30,13 @@ Vector3d centre(const Sphere& s) { return {s.x, s.y, s.z}; }
 
 double volume_sum(const Calibration& calibration) {
   double sum = 0;
-  for (const Sphere& s : calibration.effective) sum += ball_volume(s.r);
+  for (const Sphere& s : calibration.matched) sum += ball_volume(s.r);
   return sum;
 }
 
 Vector3d centre_of_mass(const Calibration& calibration) {
   Vector3d sum = Vector3d::Zero();
-  for (const Sphere& s : calibration.effective) sum += ball_volume(s.r) * centre(s);
+  for (const Sphere& s : calibration.matched) sum += ball_volume(s.r) * centre(s);
   return sum / volume_sum(calibration);
 }
 
@@ -138,9 +138,9 @@ TEST(Calibration, OneSphereStandsForABall) {
   const MeshSolid solid(closed(testing::icosphere_mesh(4), "ball"));
   const Sphere off = {0.1f, -0.05f, 0.02f, 0.3f};  // wherever the inner sphere is
   const Calibration result = calibrate_on_host(solid, {&off, 1});
-  ASSERT_EQ(result.effective.size(), 1u);
-  EXPECT_NEAR(centre(result.effective[0]).norm(), 0, 2e-4);
-  EXPECT_NEAR(ball_volume(result.effective[0].r) / solid.unit_volume(), 1, 1e-6);
+  ASSERT_EQ(result.matched.size(), 1u);
+  EXPECT_NEAR(centre(result.matched[0]).norm(), 0, 2e-4);
+  EXPECT_NEAR(ball_volume(result.matched[0].r) / solid.unit_volume(), 1, 1e-6);
   EXPECT_GT(result.protrusion, 0);     // the ball of equal volume crosses the facets
   EXPECT_LT(result.protrusion, 3e-3);  // by less than their sagitta and the lattice's error
 }
@@ -154,9 +154,9 @@ TEST(Calibration, EightSpheresQuarterACube) {
   const Calibration result = calibrate_on_host(solid, inner);
   const double half = 0.5 / solid.frame().scale();
   for (int k = 0; k < 8; ++k) {
-    EXPECT_NEAR(ball_volume(result.effective[k].r) / solid.unit_volume(), 0.125, 2e-3);
+    EXPECT_NEAR(ball_volume(result.matched[k].r) / solid.unit_volume(), 0.125, 2e-3);
     const Vector3d expected(inner[k].x, inner[k].y, inner[k].z);
-    EXPECT_LT((centre(result.effective[k]) - expected.cwiseSign() * half / 2).norm(), 5e-3);
+    EXPECT_LT((centre(result.matched[k]) - expected.cwiseSign() * half / 2).norm(), 5e-3);
   }
 }
 
@@ -181,7 +181,7 @@ TEST(Calibration, KeepsVolumeAndCentreOfMass) {
     const double allowed = 1e-6 + solid.unit_volume_error() / solid.unit_volume();
     EXPECT_NEAR(volume_sum(result) / solid.unit_volume(), 1, allowed);
     EXPECT_LT((centre_of_mass(result) - solid.frame().to_unit(c.centre)).norm(), 1e-3);
-    for (const Sphere& s : result.effective) EXPECT_GT(s.r, 0);
+    for (const Sphere& s : result.matched) EXPECT_GT(s.r, 0);
   }
 }
 
@@ -191,7 +191,7 @@ TEST(Calibration, ProtrusionHoldsOnTheSurfacesOfSpheres) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   double farthest = 0;
-  for (const Sphere& s : result.effective)
+  for (const Sphere& s : result.matched)
     for (int k = 0; k < 100; ++k) {
       const Vector3d x =
           centre(s) +
@@ -208,9 +208,9 @@ TEST(Calibration, SameBytesForAnyThreadCount) {
   const Calibration one = calibrate_on_host(solid, inner, 1);
   for (const unsigned threads : {2u, 3u, 8u}) {
     const Calibration many = calibrate_on_host(solid, inner, threads);
-    EXPECT_EQ(std::memcmp(one.effective.data(), many.effective.data(),
-                          one.effective.size() * sizeof(Sphere)),
-              0);
+    EXPECT_EQ(
+        std::memcmp(one.matched.data(), many.matched.data(), one.matched.size() * sizeof(Sphere)),
+        0);
     EXPECT_EQ(one.protrusion, many.protrusion);
   }
 }
@@ -221,7 +221,7 @@ TEST(Calibration, ScaleByAPowerOfTwoChangesNothing) {
   const MeshSolid large(closed(moved(mesh, Eigen::Affine3d(Eigen::UniformScaling(0x1p30))), "big"));
   const std::vector<Sphere> inner = packed(solid, 100);
   const Calibration a = calibrate_on_host(solid, inner), b = calibrate_on_host(large, inner);
-  EXPECT_EQ(std::memcmp(a.effective.data(), b.effective.data(), 100 * sizeof(Sphere)), 0);
+  EXPECT_EQ(std::memcmp(a.matched.data(), b.matched.data(), 100 * sizeof(Sphere)), 0);
 }
 
 /// A plate of any thickness, turned any way, is shared out evenly among an even grid of spheres.
@@ -241,9 +241,9 @@ TEST(Calibration, MeasuresThinPlates) {
       EXPECT_NEAR(volume_sum(result) / solid.unit_volume(), 1, 1e-6);
       for (std::size_t i = 0; i < inner.size(); ++i) {
         const Vector3d expected(inner[i].x, inner[i].y, inner[i].z);
-        EXPECT_NEAR(25 * ball_volume(result.effective[i].r) / solid.unit_volume(), 1, 0.05)
+        EXPECT_NEAR(25 * ball_volume(result.matched[i].r) / solid.unit_volume(), 1, 0.05)
             << "thickness " << thickness << ", turn " << k;
-        EXPECT_LT((centre(result.effective[i]) - expected).norm(), 0.01)
+        EXPECT_LT((centre(result.matched[i]) - expected).norm(), 0.01)
             << "thickness " << thickness << ", turn " << k;
       }
     }
@@ -262,8 +262,8 @@ TEST(Calibration, MeasuresNeedles) {
     const Calibration result = calibrate_on_host(solid, inner);
     EXPECT_NEAR(volume_sum(result) / solid.unit_volume(), 1, 1e-6);
     for (std::size_t i = 0; i < inner.size(); ++i) {
-      EXPECT_NEAR(10 * ball_volume(result.effective[i].r) / solid.unit_volume(), 1, 0.05) << k;
-      EXPECT_LT((centre(result.effective[i]) - Vector3d(inner[i].x, inner[i].y, inner[i].z)).norm(),
+      EXPECT_NEAR(10 * ball_volume(result.matched[i].r) / solid.unit_volume(), 1, 0.05) << k;
+      EXPECT_LT((centre(result.matched[i]) - Vector3d(inner[i].x, inner[i].y, inner[i].z)).norm(),
                 0.01)
           << k;
     }
@@ -276,8 +276,8 @@ TEST(Calibration, EmptyCellsAreLegal) {
   const std::vector<Sphere> inner = {{0, 0, 0, 0.3f}, {0, 0, 0, 0.3f}, {0, 0, 0, 0.1f}};
   const Calibration result = calibrate_on_host(solid, inner);
   EXPECT_NEAR(volume_sum(result) / solid.unit_volume(), 1, 1e-6);
-  EXPECT_GT(result.effective[1].r, 0);
-  EXPECT_GT(result.effective[2].r, 0);
+  EXPECT_GT(result.matched[1].r, 0);
+  EXPECT_GT(result.matched[2].r, 0);
 }
 
 TEST(Calibration, CancelAndNoSpheresAreErrors) {

@@ -5,6 +5,7 @@
 
 #include <cstring>
 
+#include "support/query_settings.h"
 #include "support/random_assets.h"
 
 namespace ist {
@@ -23,14 +24,14 @@ std::vector<unsigned char> answers(const Asset& a, const Asset& b) {
     bytes.insert(bytes.end(), p, p + sizeof(value));
   };
   for (int i = 0; i < 60; ++i) {
-    QuerySettings settings;
+    PenetrationSettings settings;
     settings.measure = i % 2 == 0 ? Measure::matched : Measure::inner;
     settings.max_visits = i % 5 == 4 ? 50 : 0;
     settings.pair_budget = i % 7 >= 4 ? 300 : 0;
     const double scale = i % 3 == 0 ? 1 : i % 3 == 1 ? 0.3 : 0.001;
     const PlacedTree pa{a.view(), random_pose(random, 0.2), 1.0};
     const PlacedTree pb{b.view(), random_pose(random, 0.05 * i), scale};
-    const PenetrationAndSeparation both = query(pa, pb, settings, workspace);
+    const PenetrationAndSeparation both = query(pa, pb, testing::for_both(settings), workspace);
     const Penetration& p = both.penetration;
     const Separation& s = both.separation;
     keep(p.volume), keep(p.volume_min), keep(p.volume_max), keep(p.node_visits);
@@ -40,7 +41,8 @@ std::vector<unsigned char> answers(const Asset& a, const Asset& b) {
          {p.centroid, p.translation_gradient, p.rotation_gradient, s.point_a, s.point_b, s.normal})
       for (int k = 0; k < 3; ++k) keep(v[k]);
     ContactPatch patches[6];
-    const std::size_t count = contact_patches(pa, pb, settings, workspace, patches).count;
+    const std::size_t count =
+        contact_patches(pa, pb, testing::for_contacts(settings), workspace, patches).count;
     for (const ContactPatch& patch : std::span(patches, count)) {
       keep(patch.id), keep(patch.volume), keep(patch.area), keep(patch.depth);
       for (const Eigen::Vector3d& v : {patch.centroid, patch.normal, patch.force, patch.torque})

@@ -5,6 +5,7 @@
 
 #include <cstdio>
 
+#include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/real_time_traps.h"
 
@@ -16,13 +17,13 @@ using testing::Trapped;
 class RealTime : public ::testing::Test {
  protected:
   /// One query of each kind, at a pose that depends on `i`.
-  void ask(int i, const QuerySettings& settings) {
+  void ask(int i, const PenetrationSettings& settings) {
     const PlacedTree a{a_.view(), poses_a_[i], 1.0};
     const PlacedTree b{b_.view(), poses_b_[i], i % 3 == 0 ? 0.01 : 1.0};
     volume_[i] = penetration(a, b, settings, workspaces_[0]).volume;
-    separation(a, b, settings, workspaces_[0]);
-    query(a, b, settings, workspaces_[0]);
-    contact_patches(a, b, settings, workspaces_[0], patches_);
+    separation(a, b, testing::for_separation(settings), workspaces_[0]);
+    query(a, b, testing::for_both(settings), workspaces_[0]);
+    contact_patches(a, b, testing::for_contacts(settings), workspaces_[0], patches_);
     const PlacedPair pairs[] = {{a, b}, {b, a}};
     penetration_batch(pairs, settings, workspaces_, answers_);
   }
@@ -50,7 +51,7 @@ TEST_F(RealTime, QueriesMakeNoSystemCall) {
   if (!testing::kTrapsWork) GTEST_SKIP() << "the sanitizer owns the traps";
   const auto all = [&] {
     for (int i = 0; i < kPoses; ++i) {
-      QuerySettings settings;  // no deadline: what reads the clock may enter the system
+      PenetrationSettings settings;  // no deadline: what reads the clock may enter the system
       if (i % 3 == 1) settings.max_visits = 40;
       if (i % 3 == 2) settings.relative_error = 0.1;
       if (i % 2 == 1) settings.pair_budget = 200;
@@ -72,7 +73,7 @@ TEST_F(RealTime, QueriesMakeNoSystemCall) {
 TEST_F(RealTime, QueriesTouchNeitherHeapNorLock) {
   if (!testing::kTrapsWork) GTEST_SKIP() << "the sanitizer owns the traps";
   for (int i = 0; i < kPoses; ++i) {
-    QuerySettings settings;
+    PenetrationSettings settings;
     if (i % 4 == 1) settings.max_visits = 40;
     if (i % 4 == 2) settings.relative_error = 0.1;
     if (i % 4 == 3) settings.deadline_us = 5;

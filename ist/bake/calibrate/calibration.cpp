@@ -60,15 +60,15 @@ class Calibrator {
     }
 
     Calibration result;
-    result.effective.resize(inner.size());
+    result.matched.resize(inner.size());
     for (std::size_t k = 0; k < sites.size(); ++k) {
       const double radius = shares[k] > 0 ? radius_of(shares[k] * solid_.unit_volume())
                                           : kEmptyCellRadius * mean_radius * turned_.scale();
       const Eigen::Vector3d x = turned_.turn_back({sites[k].x, sites[k].y, sites[k].z});
-      result.effective[k] = {static_cast<float>(x.x()), static_cast<float>(x.y()),
-                             static_cast<float>(x.z()), static_cast<float>(radius)};
+      result.matched[k] = {static_cast<float>(x.x()), static_cast<float>(x.y()),
+                           static_cast<float>(x.z()), static_cast<float>(radius)};
     }
-    result.protrusion = backend_.largest_protrusion(result.effective);
+    result.protrusion = backend_.largest_protrusion(result.matched);
     return result;
   }
 

@@ -10,13 +10,13 @@
 
 namespace ist {
 
-/// The effective spheres of a solid: one ball for each cell of a partition of the solid, with the
+/// The matched spheres of a solid: one ball for each cell of a partition of the solid, with the
 /// cell's volume and centre of mass (docs/design.md 5).
 struct Calibration {
   /// Unit frame, one for each inner sphere and in their order. Σ 4/3 π r³ is the solid's volume
   /// within 1e-6; every radius is > 0.
-  std::vector<Sphere> effective;
-  /// Unit frame, proven: no effective sphere sticks further out of the solid than this.
+  std::vector<Sphere> matched;
+  /// Unit frame, proven: no matched sphere sticks further out of the solid than this.
   double protrusion = 0;
 };
 

@@ -27,8 +27,8 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mes
                          at<float>(asset, asset.cover_radii), "inner tree"));
   for (std::uint32_t i = 0; i <= asset.detail_count; ++i) {
     const std::string name = i == 0 ? "" : "detail " + std::to_string(i) + ": ";
-    append(all, check_effective(asset, i, surface, name));
-    append(all, check_tree(asset, matched_tree(asset, i), effective_spheres(asset, i), nullptr,
+    append(all, check_matched(asset, i, surface, name));
+    append(all, check_tree(asset, matched_tree(asset, i), matched_spheres(asset, i), nullptr,
                            name + "matched tree"));
   }
   return all;

@@ -114,27 +114,27 @@ std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckSurfac
   return out;
 }
 
-std::vector<Invariant> check_effective(const AssetHeader& asset, std::uint32_t detail,
-                                       const CheckSurface& surface, const std::string& name) {
+std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t detail,
+                                     const CheckSurface& surface, const std::string& name) {
   const std::size_t n = matched_tree(asset, detail).sphere_count;
-  const Sphere* const effective = effective_spheres(asset, detail);
+  const Sphere* const matched = matched_spheres(asset, detail);
   const double protrusion =
       detail == 0 ? asset.protrusion : at<DetailLevel>(asset, asset.details)[detail - 1].protrusion;
   std::vector<Invariant> out;
   Tally sum;
-  sum.add(std::fabs(volume_of(effective, n) / asset.volume - 1) - 1e-6, 0);
-  out.push_back(sum.named(name + "effective volumes sum to the solid",
-                          "relative difference of Σ effective volumes and the solid, above 1e-6"));
+  sum.add(std::fabs(volume_of(matched, n) / asset.volume - 1) - 1e-6, 0);
+  out.push_back(sum.named(name + "matched volumes sum to the solid",
+                          "relative difference of Σ matched volumes and the solid, above 1e-6"));
   out.push_back(
       tally_all(n,
                 [&](std::size_t i, Tally& tally) {
-                  const Eigen::Vector3d c = centre(effective[i]);
+                  const Eigen::Vector3d c = centre(matched[i]);
                   const double d = surface.distance(c, 100);
                   const double depth = surface.winding(c) >= 1 ? d : -d;
-                  tally.add(effective[i].r - depth - protrusion - 1e-12, i);
+                  tally.add(matched[i].r - depth - protrusion - 1e-12, i);
                 })
-          .named(name + "effective protrusion",
-                 "reach of an effective sphere out of the solid − the asset's bound, unit frame"));
+          .named(name + "matched protrusion",
+                 "reach of an matched sphere out of the solid − the asset's bound, unit frame"));
   return out;
 }
 

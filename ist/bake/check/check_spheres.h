@@ -15,9 +15,9 @@ namespace ist {
 /// Inner spheres lie in the solid and apart; covers hold spheres.
 std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckSurface& surface);
 
-/// The effective spheres of a detail (0: the finest) stand for the solid. Names start with `name`.
-std::vector<Invariant> check_effective(const AssetHeader& asset, std::uint32_t detail,
-                                       const CheckSurface& surface, const std::string& name);
+/// The matched spheres of a detail (0: the finest) stand for the solid. Names start with `name`.
+std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t detail,
+                                     const CheckSurface& surface, const std::string& name);
 
 /// The header's frame and volumes are those of the mesh.
 std::vector<Invariant> check_header(const AssetHeader& asset, const CheckSurface& surface,

@@ -104,12 +104,12 @@ bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
   if (expected.file_bytes != bytes || expected.details != header.details) return false;
   const DetailLevel* const found = at<DetailLevel>(header, header.details);
   for (std::uint32_t i = 0; i < header.detail_count; ++i)
-    if (details[i].effective_spheres != found[i].effective_spheres ||
+    if (details[i].matched_spheres != found[i].matched_spheres ||
         !same_tree(details[i].matched_tree, found[i].matched_tree))
       return false;
   return expected.inner_spheres == header.inner_spheres &&
          expected.cover_radii == header.cover_radii &&
-         expected.effective_spheres == header.effective_spheres &&
+         expected.matched_spheres == header.matched_spheres &&
          same_tree(expected.inner_tree, header.inner_tree) &&
          same_tree(expected.matched_tree, header.matched_tree);
 }
@@ -130,15 +130,17 @@ bool sound_values(const AssetHeader& header) noexcept {
   for (std::uint32_t i = 0; i < header.detail_count; ++i) {
     const TreeHeader& tree = details[i].matched_tree;
     if (!is_radius(details[i].protrusion) || !sound_tree(header, tree) ||
-        !sound_spheres(header, details[i].effective_spheres, tree.sphere_count))
+        !sound_spheres(header, details[i].matched_spheres, tree.sphere_count))
       return false;
   }
   return sound_spheres(header, header.inner_spheres, header.sphere_count) &&
-         sound_spheres(header, header.effective_spheres, header.sphere_count) &&
+         sound_spheres(header, header.matched_spheres, header.sphere_count) &&
          sound_tree(header, header.inner_tree) && sound_tree(header, header.matched_tree);
 }
 
 }  // namespace
+
+const AssetHeader detail::kEmptyAsset;
 
 AssetStatus TreeView::from_bytes(std::span<const std::byte> bytes, TreeView& out) noexcept {
   out = TreeView();
@@ -170,7 +172,7 @@ double TreeView::volume() const noexcept {
 
 double TreeView::coverage() const noexcept { return header_ == nullptr ? 0 : header_->coverage; }
 
-double TreeView::soft_skin() const noexcept {
+double TreeView::protrusion() const noexcept {
   return header_ == nullptr ? 0 : std::ldexp(header_->protrusion, header_->exponent);
 }
 

@@ -9,17 +9,34 @@
 
 namespace ist {
 
+/// Where a descent ends early; 0 = no limit.
+struct DescentLimits {
+  std::uint32_t max_visits = 0;
+  double deadline_us = 0;  ///< [µs] from now
+  double relative_error = 0;
+  double min_radius = 0;  ///< [u]
+};
+
+/// The limits that a query's settings set; a separation has fewer.
+template <class Settings>
+DescentLimits limits_of(const Settings& settings) noexcept {
+  return {settings.max_visits, settings.deadline_us, settings.relative_error, settings.min_radius};
+}
+inline DescentLimits limits_of(const SeparationSettings& settings) noexcept {
+  return {settings.max_visits, settings.deadline_us, 0, 0};
+}
+
 /// Counts visits and watches the clock, if there is a deadline: at most once in 16 visits. Visits
 /// end at a part of the time, what is left being for a guess of what was not visited.
 class Budget {
  public:
-  explicit Budget(const QuerySettings& settings) noexcept
-      : max_visits_(settings.max_visits != 0 ? settings.max_visits : ~0u),
-        timed_(settings.deadline_us > 0) {
+  explicit Budget(const DescentLimits& limits) noexcept
+      : max_visits_(limits.max_visits != 0 ? limits.max_visits : ~0u),
+        timed_(limits.deadline_us > 0) {
     if (timed_) {
       start_ = Clock::now();
       allowed_ = std::chrono::nanoseconds(
-          static_cast<std::int64_t>(std::min(settings.deadline_us, 1e12) * 1e3));
+          static_cast<std::int64_t>(std::min(limits.deadline_us, 1e12) * 1e3));
     }
   }
 
@@ -36,10 +53,10 @@ class Budget {
   }
 
   /// Whether visits are to end now.
-  bool visits_end() const noexcept { return spent(kForVisits); }
+  bool visits_end() const noexcept { return elapsed_beyond(kForVisits); }
 
   /// Whether such a part of the time is over; never without a deadline.
-  bool spent(double part) const noexcept {
+  bool elapsed_beyond(double part) const noexcept {
     return timed_ && Clock::now() - start_ >= allowed_ * part;
   }
 

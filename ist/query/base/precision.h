@@ -10,16 +10,16 @@ namespace ist {
 
 /// Digits of the arithmetic inside a block. Float serves unless one object is far smaller than the
 /// other.
-enum class Precision { single, twice };
+enum class Precision { float32, float64 };
 
 /// How far rounding may move a distance that is computed from coordinates of this magnitude: each
 /// coordinate comes out of a three-term product, a sum and a difference, then a norm.
 constexpr double distance_error(Precision precision, double magnitude) {
-  return 12 * (precision == Precision::single ? 0x1p-24 : 0x1p-53) * magnitude;
+  return 12 * (precision == Precision::float32 ? 0x1p-24 : 0x1p-53) * magnitude;
 }
 template <class T>
 constexpr double distance_error(double magnitude) {
-  return distance_error(sizeof(T) == sizeof(float) ? Precision::single : Precision::twice,
+  return distance_error(sizeof(T) == sizeof(float) ? Precision::float32 : Precision::float64,
                         magnitude);
 }
 
@@ -31,7 +31,8 @@ inline Precision precision_for(const SphereTree& a, const SphereTree& b,
                                const RelativePose& pose) noexcept {
   const double ra = a.header->root[3];
   const double rb = b.header->root[3] * pose.a_from_b.scale;
-  return rb <= kSingleRatio * ra && ra <= kSingleRatio * rb ? Precision::single : Precision::twice;
+  return rb <= kSingleRatio * ra && ra <= kSingleRatio * rb ? Precision::float32
+                                                            : Precision::float64;
 }
 
 /// Length within which all of both trees and the way between them lie, A's unit frame.
@@ -49,7 +50,7 @@ inline double span(const SphereTree& a, const SphereTree& b, const RelativePose&
 inline Precision precision_for_gap(const SphereTree& a, const SphereTree& b,
                                    const RelativePose& pose) noexcept {
   const double sizes = a.header->root[3] + pose.a_from_b.scale * b.header->root[3];
-  return span(a, b, pose) <= kSingleRatio * sizes ? precision_for(a, b, pose) : Precision::twice;
+  return span(a, b, pose) <= kSingleRatio * sizes ? precision_for(a, b, pose) : Precision::float64;
 }
 
 }  // namespace ist

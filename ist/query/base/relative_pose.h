@@ -34,7 +34,7 @@ struct RelativePose {
   }
 };
 
-/// Empty if a pose or scale is not usable (QueryStatus::invalid_pose) or a tree is empty.
+/// Empty if a pose or scale is not usable (QueryStatus::invalid_input) or a tree is empty.
 std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree& b) noexcept;
 
 }  // namespace ist

@@ -33,17 +33,17 @@ bool before(const RankedPair& l, const RankedPair& r) {
 }  // namespace
 
 Descent::Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
-                 const QuerySettings& settings, Workspace::Impl& scratch, ContactBins* bins)
+                 const DescentLimits& limits, Workspace::Impl& scratch, ContactBins* bins)
     : a_(a),
       b_(b),
       pose_(pose),
       map_(pose.a_from_b),
       precision_(precision_for(a, b, pose)),
-      settings_(settings),
-      min_radius_(settings.min_radius / pose.unit_a),
+      limits_(limits),
+      min_radius_(limits.min_radius / pose.unit_a),
       scratch_(scratch),
       bins_(bins),
-      budget_(settings) {}
+      budget_(limits) {}
 
 void Descent::run() noexcept {
   level_a_ = a_.top;
@@ -58,16 +58,16 @@ void Descent::run() noexcept {
 
 Overlap Descent::overlap() const {
   Overlap result = sure();
-  result.add(left_);
+  result.add(unopened_);
   return result;
 }
 
 Overlap Descent::sure() const {
   Overlap result = finish(sums_, precision_);
-  Overlap held = held_overlap(true, held_a_);
-  held.add(held_overlap(false, held_b_));
-  result.add(held);
-  result.error += sum_rounding(precision_) * held.volume;
+  Overlap contained = contained_overlap(true, contained_a_);
+  contained.add(contained_overlap(false, contained_b_));
+  result.add(contained);
+  result.error += sum_rounding(precision_) * contained.volume;
   return result;
 }
 
@@ -93,10 +93,10 @@ bool Descent::open_level() {
     done += n;
   }
   const bool finished = done == now.size;
-  if (!finished) leave(now, done);
+  if (!finished) estimate_unopened(now, done);
   --(open_a ? level_a_ : level_b_);
   std::swap(now, next);
-  if (!finished) leave(now, 0);
+  if (!finished) estimate_unopened(now, 0);
   return finished;
 }
 
@@ -111,32 +111,32 @@ void Descent::open_pairs(const NodeStage& stage, bool open_a, std::size_t from, 
     next.size += open_nodes(stage, x, y, n, out_x, out_y);
     return;
   }
-  std::uint32_t held_x[kWidth * (kNodePairs + 1)], held_y[kWidth * (kNodePairs + 1)];
-  HeldNodes held{held_x, held_y};
-  next.size += open_under_spheres(stage, x, y, n, out_x, out_y, held);
-  hold(open_a, stage.level_x - 1, held);
+  std::uint32_t contained_x[kWidth * (kNodePairs + 1)], contained_y[kWidth * (kNodePairs + 1)];
+  ContainedNodes contained{contained_x, contained_y};
+  next.size += open_under_spheres(stage, x, y, n, out_x, out_y, contained);
+  add_contained(open_a, stage.level_x - 1, contained);
 }
 
-void Descent::hold(bool of_a, int level, const HeldNodes& held) {
+void Descent::add_contained(bool of_a, int level, const ContainedNodes& contained) {
   const SphereTree& tree = of_a ? a_ : b_;
-  add_subtrees(tree, level, held.x, held.size, of_a ? held_a_ : held_b_);
+  add_subtrees(tree, level, contained.x, contained.size, of_a ? contained_a_ : contained_b_);
   if (bins_ == nullptr) return;
-  for (std::size_t i = 0; i < held.size; ++i) {
+  for (std::size_t i = 0; i < contained.size; ++i) {
     SubtreeSums sums;
-    add_subtrees(tree, level, held.x + i, 1, sums);
-    bins_->add_guess(of_a ? level : kSphereLevel, of_a ? held.x[i] : held.y[i],
-                     of_a ? kSphereLevel : level, of_a ? held.y[i] : held.x[i],
-                     held_overlap(of_a, sums));
+    add_subtrees(tree, level, contained.x + i, 1, sums);
+    bins_->add_guess(of_a ? level : kSphereLevel, of_a ? contained.x[i] : contained.y[i],
+                     of_a ? kSphereLevel : level, of_a ? contained.y[i] : contained.x[i],
+                     contained_overlap(of_a, sums));
   }
 }
 
-Overlap Descent::held_overlap(bool of_a, const SubtreeSums& held) const {
+Overlap Descent::contained_overlap(bool of_a, const SubtreeSums& contained) const {
   Overlap overlap;
-  if (held.spheres == 0) return overlap;
+  if (contained.spheres == 0) return overlap;
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();
   for (std::size_t lane = 0; lane < kWidth; ++lane) {
-    overlap.volume += held.cubes[lane];
-    for (int k = 0; k < 3; ++k) moment[k] += held.moment[k][lane];
+    overlap.volume += contained.cubes[lane];
+    for (int k = 0; k < 3; ++k) moment[k] += contained.moment[k][lane];
   }
   overlap.volume *= 4 * M_PI / 3;
   moment *= 4 * M_PI / 3;
@@ -155,7 +155,7 @@ Overlap Descent::held_overlap(bool of_a, const SubtreeSums& held) const {
 void Descent::open_leaves() {
   if (min_radius_ > 0) drop_small([](double ra, double rb) { return std::max(ra, rb); });
   PairList& now = scratch_.now;
-  const bool by_error = settings_.relative_error > 0;
+  const bool by_error = limits_.relative_error > 0;
   double waiting = 0;  // bound on the pairs still to come
   if (by_error)
     waiting = rank();
@@ -174,13 +174,13 @@ void Descent::open_leaves() {
       for (std::size_t i = done; i < done + n; ++i) waiting -= scratch_.ranked[i].bound;
     done += n;
   }
-  leave(now, done);
+  estimate_unopened(now, done);
 
   // A few grazing lenses are all rounding in float; they are as few as they are shallow.
   const Overlap sum = sure();
-  if (precision_ == Precision::single && !keep_rounding_ && sum.error > kGrazing * sum.volume &&
-      !budget_.spent(kEarly)) {
-    precision_ = Precision::twice;
+  if (precision_ == Precision::float32 && !keep_rounding_ && sum.error > kGrazing * sum.volume &&
+      !budget_.elapsed_beyond(kEarly)) {
+    precision_ = Precision::float64;
     scratch_.leaves->forget(precision_);
     sums_ = LeafSums();
     if (bins_ != nullptr) bins_->forget_sums();
@@ -199,8 +199,8 @@ std::size_t Descent::add_leaves(std::size_t from, std::size_t n, const Budget* b
 
 bool Descent::accurate(double waiting) const {
   const Overlap sum = sure();
-  const double spread = 2 * sum.error + waiting + left_bound_;
-  return spread <= settings_.relative_error * (sum.volume + sum.error + waiting + left_bound_);
+  const double spread = 2 * sum.error + waiting + unopened_bound_;
+  return spread <= limits_.relative_error * (sum.volume + sum.error + waiting + unopened_bound_);
 }
 
 double Descent::bound(std::size_t i) const {
@@ -255,7 +255,7 @@ void Descent::drop_small(Measured measured) {
     const double ra = a_.ball(level_a_, now.a[i]).r;
     const double rb = b_.ball(level_b_, now.b[i]).r * map_.scale;
     if (measured(ra, rb) < min_radius_) {
-      left_.add(leave_pair(now.a[i], now.b[i]));
+      unopened_.add(estimate_unopened_pair(now.a[i], now.b[i]));
     } else {
       now.a[kept] = now.a[i];
       now.b[kept++] = now.b[i];
@@ -264,7 +264,7 @@ void Descent::drop_small(Measured measured) {
   now.size = kept;
 }
 
-void Descent::leave(const PairList& list, std::size_t from) {
+void Descent::estimate_unopened(const PairList& list, std::size_t from) {
   const std::size_t count = list.size - from;
   // Bins must add up to the whole, so theirs are all guessed.
   const std::size_t step =
@@ -272,23 +272,23 @@ void Descent::leave(const PairList& list, std::size_t from) {
   Overlap guesses;
   std::size_t guessed = 0;
   for (std::size_t first = 0; first < step; ++first) {
-    if (first > 0 && budget_.spent(kLate)) {
+    if (first > 0 && budget_.elapsed_beyond(kLate)) {
       // The others are taken for as large as these on average; penetration() caps the bound.
       guesses.scale(static_cast<double>(count) / static_cast<double>(guessed));
-      left_bound_ = std::numeric_limits<double>::infinity();
+      unopened_bound_ = std::numeric_limits<double>::infinity();
       break;
     }
     for (std::size_t i = from + first; i < list.size; i += step, ++guessed)
-      guesses.add(leave_pair(list.a[i], list.b[i]));
+      guesses.add(estimate_unopened_pair(list.a[i], list.b[i]));
   }
-  left_.add(guesses);
+  unopened_.add(guesses);
 }
 
-Overlap Descent::leave_pair(std::uint32_t a, std::uint32_t b) {
+Overlap Descent::estimate_unopened_pair(std::uint32_t a, std::uint32_t b) {
   const PairEstimate pair = estimate(level_a_, a, level_b_, b);
   const Eigen::Vector3d lever = pair.centre - Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]);
   stopped_ = true;
-  left_bound_ += pair.bound;
+  unopened_bound_ += pair.bound;
   Overlap guess;
   guess.volume = pair.volume;
   guess.force = pair.force;
@@ -308,9 +308,9 @@ Penetration Descent::penetration() const noexcept {
   const double volume_b = b_.header->volume_sum * (scale * scale * scale);
   const double cap = (1 + 1e-9) * std::min(volume_a * static_cast<double>(b_.header->overlap),
                                            volume_b * static_cast<double>(a_.header->overlap));
-  const double sure = overlap.volume - left_.volume;
+  const double sure = overlap.volume - unopened_.volume;
   const double lowest = std::max(0.0, sure - overlap.error);
-  const double highest = std::max(lowest, std::min(cap, sure + overlap.error + left_bound_));
+  const double highest = std::max(lowest, std::min(cap, sure + overlap.error + unopened_bound_));
 
   const double unit = pose_.unit_a;
   const double unit3 = unit * unit * unit;
@@ -318,7 +318,7 @@ Penetration Descent::penetration() const noexcept {
   result.volume_min = unit3 * lowest;
   result.volume_max = unit3 * highest;
   result.node_visits = budget_.visits();
-  result.sphere_pairs = sums_.lenses + held_a_.spheres + held_b_.spheres;
+  result.sphere_pairs = sums_.lenses + contained_a_.spheres + contained_b_.spheres;
   if (stopped_) result.status = QueryStatus::budget_exhausted;
   if (overlap.volume > 0) {
     const Eigen::Vector3d origin_b(pose_.a_from_b.t[0], pose_.a_from_b.t[1], pose_.a_from_b.t[2]);

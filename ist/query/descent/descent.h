@@ -22,7 +22,7 @@ class Descent {
  public:
   /// All arguments must outlive the descent. With `bins`, what is summed is sorted into them too.
   Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
-          const QuerySettings& settings, Workspace::Impl& scratch, ContactBins* bins = nullptr);
+          const DescentLimits& limits, Workspace::Impl& scratch, ContactBins* bins = nullptr);
 
   /// Takes rounding as it comes: lenses that graze are not summed again in double.
   void keep_rounding() noexcept { keep_rounding_ = true; }
@@ -53,10 +53,10 @@ class Descent {
   void open_pairs(const NodeStage& stage, bool open_a, std::size_t from, std::size_t n);
 
   /// Adds the spheres below nodes of A, or of B: each node lies in one sphere of the other side.
-  void hold(bool of_a, int level, const HeldNodes& held);
+  void add_contained(bool of_a, int level, const ContainedNodes& contained);
 
   /// What spheres of A, or of B, add that lie in one of the other side.
-  Overlap held_overlap(bool of_a, const SubtreeSums& held) const;
+  Overlap contained_overlap(bool of_a, const SubtreeSums& contained) const;
 
   void open_leaves();
 
@@ -80,26 +80,26 @@ class Descent {
   void drop_small(Measured measured);
 
   /// Guesses the pairs from `from` on; if the time is over, from an even choice of them.
-  void leave(const PairList& list, std::size_t from);
+  void estimate_unopened(const PairList& list, std::size_t from);
 
   /// Guesses one pair that stays unopened.
-  Overlap leave_pair(std::uint32_t a, std::uint32_t b);
+  Overlap estimate_unopened_pair(std::uint32_t a, std::uint32_t b);
 
   const SphereTree& a_;
   const SphereTree& b_;
   const RelativePose& pose_;
   const Similarity& map_;
   Precision precision_;
-  const QuerySettings& settings_;
+  const DescentLimits limits_;
   const double min_radius_;  ///< A's unit frame
   Workspace::Impl& scratch_;
   ContactBins* const bins_;
   Budget budget_;
   int level_a_ = 0, level_b_ = 0;  ///< of the current list
   LeafSums sums_;
-  SubtreeSums held_a_, held_b_;  ///< nodes that lie in a sphere of the other tree
-  Overlap left_;                 ///< guess of what was not opened
-  double left_bound_ = 0;        ///< what that can add at most
+  SubtreeSums contained_a_, contained_b_;  ///< nodes that lie in a sphere of the other tree
+  Overlap unopened_;                       ///< guess of what was not opened
+  double unopened_bound_ = 0;              ///< what that can add at most
   bool stopped_ = false;
   bool keep_rounding_ = false;
 };

@@ -16,7 +16,7 @@ constexpr double kApart = 1.6;
 
 }  // namespace
 
-TwinWeight twin_weight(const TreeHeader& tree, const Similarity& a_from_b) noexcept {
+CoincidenceWeight coincidence_weight(const TreeHeader& tree, const Similarity& a_from_b) noexcept {
   const double(&m)[9] = a_from_b.m;
   const double centre[3] = {tree.root[0], tree.root[1], tree.root[2]};
   double moved[3];
@@ -30,7 +30,7 @@ TwinWeight twin_weight(const TreeHeader& tree, const Similarity& a_from_b) noexc
   const double turned = 3 * (scale * scale + 1) - 2 * ((m[0] + m[4]) + m[8]);
   const double square = way.squaredNorm() + spread * std::max(turned, 0.0);
   const double radius = tree.mean_radius;
-  TwinWeight result;
+  CoincidenceWeight result;
   if (!(square < (kApart * kApart) * (radius * radius))) return result;
   const double distance = std::sqrt(square);
   const double t = std::min((kApart - distance / radius) / (kApart - kAlone), 1.0);
@@ -59,7 +59,7 @@ Penetration mix(const Penetration& x, const Penetration& y, double weight) noexc
   return result;
 }
 
-void add_slope(const TwinWeight& weight, double step, const RelativePose& pose,
+void add_slope(const CoincidenceWeight& weight, double step, const RelativePose& pose,
                Penetration& mixed) noexcept {
   const Eigen::Vector3d push = step / pose.unit_a * (pose.rotation_a * weight.by_translation);
   mixed.translation_gradient += push;

@@ -15,37 +15,39 @@ namespace {
 class DetailQueries {
  public:
   DetailQueries(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
-                const QuerySettings& settings, Workspace& workspace) noexcept
+                const PenetrationSettings& settings, Workspace& workspace) noexcept
       : a_(a.tree.header()),
         b_(b.tree.header()),
         pose_(pose),
         settings_(settings),
         workspace_(workspace),
-        twins_(are_twins(a_, b_)),
+        same_asset_(are_one_asset(a_, b_)),
         start_(settings.deadline_us > 0 ? Clock::now() : Clock::time_point()) {}
 
   /// The whole sum of a pair of levels, rounded as it may be: where lenses graze they are few, and
   /// the finest level is taken anyway.
-  Penetration gauge(const DetailPair& pair) noexcept { return descend(pair, 0, 0, true); }
+  Penetration coarse_estimate(const DetailPair& pair) noexcept { return descend(pair, 0, 0, true); }
 
-  /// The sum of a pair of levels; of twins that all but coincide, that of unlike levels instead.
+  /// The sum of a pair of levels; of copies of one asset that all but coincide, that of unlike
+  /// levels instead.
   Penetration ask(const DetailPair& pair, double relative_error, double min_radius) noexcept {
-    const TwinWeight twins = twin_weight_of(pair);
-    if (twins.weight == 0) return descend(pair, relative_error, min_radius);
+    const CoincidenceWeight coincidence = coincidence_weight_of(pair);
+    if (coincidence.weight == 0) return descend(pair, relative_error, min_radius);
     DetailPair unlike[2] = {pair, pair};
     unlike[0].b = unlike[1].a = pair.a < a_.detail_count ? pair.a + 1 : pair.a - 1;
     Penetration other = mix(descend(unlike[0], relative_error, min_radius),
                             descend(unlike[1], relative_error, min_radius), 0.5);
-    if (twins.weight == 1) return other;
+    if (coincidence.weight == 1) return other;
     const Penetration alike = descend(pair, relative_error, min_radius);
-    Penetration mixed = mix(alike, other, twins.weight);
-    add_slope(twins, other.volume - alike.volume, pose_, mixed);
+    Penetration mixed = mix(alike, other, coincidence.weight);
+    add_slope(coincidence, other.volume - alike.volume, pose_, mixed);
     return mixed;
   }
 
-  TwinWeight twin_weight_of(const DetailPair& pair) const noexcept {
-    return twins_ && pair.a == pair.b ? twin_weight(matched_tree(a_, pair.a), pose_.a_from_b)
-                                      : TwinWeight{};
+  CoincidenceWeight coincidence_weight_of(const DetailPair& pair) const noexcept {
+    return same_asset_ && pair.a == pair.b
+               ? coincidence_weight(matched_tree(a_, pair.a), pose_.a_from_b)
+               : CoincidenceWeight{};
   }
 
   std::uint32_t visits() const noexcept { return visits_; }
@@ -58,7 +60,7 @@ class DetailQueries {
 
   Penetration descend(const DetailPair& pair, double relative_error, double min_radius,
                       bool keep_rounding = false) noexcept {
-    QuerySettings limits = settings_;
+    DescentLimits limits = limits_of(settings_);
     limits.relative_error = relative_error;
     limits.min_radius = min_radius;
     if (settings_.deadline_us > 0) {
@@ -71,7 +73,7 @@ class DetailQueries {
     }
     const SphereTree tree_a(a_, matched_tree(a_, pair.a));
     const SphereTree tree_b(b_, matched_tree(b_, pair.b));
-    Descent descent(tree_a, tree_b, pose_, limits, workspace_.impl());
+    Descent descent(tree_a, tree_b, pose_, limits, *workspace_.impl());
     if (keep_rounding) descent.keep_rounding();
     descent.run();
     Penetration answer = descent.penetration();
@@ -83,25 +85,25 @@ class DetailQueries {
   const AssetHeader& a_;
   const AssetHeader& b_;
   const RelativePose& pose_;
-  const QuerySettings& settings_;
+  const PenetrationSettings& settings_;
   Workspace& workspace_;
-  const bool twins_;
+  const bool same_asset_;
   const Clock::time_point start_;
   std::uint32_t visits_ = 0, pairs_ = 0;
 };
 
-// A gauge whose bounds are further apart than this part of it is too rough for an answer.
+// A coarse estimate whose bounds are further apart than this part of it is too rough for an answer.
 constexpr double kRough = 5e-4;
 
 }  // namespace
 
 Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
-                          const QuerySettings& settings, Workspace& workspace) noexcept {
+                          const PenetrationSettings& settings, Workspace& workspace) noexcept {
   DetailQueries queries(a, b, pose, settings, workspace);
   if (settings.pair_budget == 0)
     return queries.ask(DetailPair(), settings.relative_error, settings.min_radius);
   const DetailChain chain(a.tree.header(), b.tree.header(), pose.a_from_b.scale);
-  // Nothing to choose, or nothing dear: no gauge can exceed either solid's sum, κ times over.
+  // Nothing to choose, or nothing dear: no estimate can exceed either solid's sum, κ times over.
   const TreeHeader& coarse_a = matched_tree(a.tree.header(), chain.coarsest().a);
   const TreeHeader& coarse_b = matched_tree(b.tree.header(), chain.coarsest().b);
   const double scale = pose.a_from_b.scale;
@@ -111,12 +113,12 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
   if (chain.size() == 1 || chain.weights(most, settings.pair_budget)[0].weight == 1)
     return queries.ask(chain[0], settings.relative_error, settings.min_radius);
 
-  // Whatever else is asked, the gauge is the whole sum: only that is smooth.
-  const Penetration gauge = queries.gauge(chain.coarsest());
+  // Whatever else is asked, the coarse estimate is the whole sum: only that is smooth.
+  const Penetration coarse = queries.coarse_estimate(chain.coarsest());
   Penetration result;
-  if (gauge.status != QueryStatus::ok) {
+  if (coarse.status != QueryStatus::ok) {
     // Stopped here, any level might have been meant.
-    result = gauge;
+    result = coarse;
     for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
       const Penetration bounds = queries.ask(chain[i], 0, 0);
       result.volume_min = std::min(result.volume_min, bounds.volume_min);
@@ -124,15 +126,15 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
     }
   } else {
     const double unit3 = pose.unit_a * pose.unit_a * pose.unit_a;
-    const DetailChain::Weights weights = chain.weights(gauge.volume / unit3, settings.pair_budget);
-    const bool rough = gauge.volume_max - gauge.volume_min > kRough * gauge.volume;
-    double slope = 0;                               // of the blend by the gauge
+    const DetailChain::Weights weights = chain.weights(coarse.volume / unit3, settings.pair_budget);
+    const bool rough = coarse.volume_max - coarse.volume_min > kRough * coarse.volume;
+    double slope = 0;                               // of the blend by the coarse estimate
     for (std::size_t i = chain.size(); i-- > 0;) {  // the coarse ones first: they are sure to end
       const double weight = weights[i].weight;
       if (weight == 0 && weights[i].slope == 0) continue;
       const Penetration part =
-          i + 1 == chain.size() && !rough && queries.twin_weight_of(chain[i]).weight == 0
-              ? gauge
+          i + 1 == chain.size() && !rough && queries.coincidence_weight_of(chain[i]).weight == 0
+              ? coarse
               : queries.ask(chain[i], settings.relative_error, settings.min_radius);
       result.volume += weight * part.volume;
       result.volume_min += weight * part.volume_min;
@@ -146,13 +148,13 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       // At extreme sizes nought times the volume need not be nought.
       if (weights[i].slope != 0) slope += weights[i].slope / unit3 * part.volume;
     }
-    // The gauge is rounded too, and with it the weights.
+    // The coarse estimate is rounded too, and with it the weights.
     if (slope != 0) {
-      const double doubt = std::abs(slope) * (gauge.volume_max - gauge.volume_min);
+      const double doubt = std::abs(slope) * (coarse.volume_max - coarse.volume_min);
       result.volume_min = std::max(0.0, result.volume_min - doubt);
       result.volume_max += doubt;
-      result.translation_gradient += slope * gauge.translation_gradient;
-      result.rotation_gradient += slope * gauge.rotation_gradient;
+      result.translation_gradient += slope * coarse.translation_gradient;
+      result.rotation_gradient += slope * coarse.rotation_gradient;
     }
   }
   result.node_visits = queries.visits();

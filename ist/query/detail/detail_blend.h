@@ -8,9 +8,9 @@ namespace ist {
 
 /// The penetration from levels of detail. Under a pair budget they are blended by what they need
 /// (DetailChain), and without one the finest answers; copies of one asset that all but coincide are
-/// asked as unlike levels (TwinWeight). The gradients are those of the blended sum. Two assets
-/// without coarser levels have but one answer. No allocation, lock or exception.
+/// asked as unlike levels (CoincidenceWeight). The gradients are those of the blended sum. Two
+/// assets without coarser levels have but one answer. No allocation, lock or exception.
 Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
-                          const QuerySettings& settings, Workspace& workspace) noexcept;
+                          const PenetrationSettings& settings, Workspace& workspace) noexcept;
 
 }  // namespace ist

@@ -60,13 +60,13 @@ DetailChain::DetailChain(const AssetHeader& a, const AssetHeader& b, double scal
   }
 }
 
-DetailChain::Weights DetailChain::weights(double gauge, double budget) const noexcept {
+DetailChain::Weights DetailChain::weights(double coarse, double budget) const noexcept {
   Weights weights;
   DetailWeight rest{1, 0};
   for (std::size_t i = 0; i + 1 < size_; ++i) {
     const DetailPair& pair = pairs_[i];
-    const double root = std::sqrt(gauge);
-    const double expected = pair.density * (gauge + pair.skin * root);
+    const double root = std::sqrt(coarse);
+    const double expected = pair.density * (coarse + pair.skin * root);
     // (written so that a damaged asset's NaN takes the coarsest level)
     const double t = expected < budget ? std::min((1 - expected / budget) / (1 - kFading), 1.0) : 0;
     DetailWeight part{smooth_step(t), 0};

@@ -20,7 +20,7 @@ struct DetailPair {
 /// Part of an answer that one pair of levels gives.
 struct DetailWeight {
   double weight = 0;  ///< [0, 1]
-  double slope = 0;   ///< d weight / d gauge
+  double slope = 0;   ///< d weight / d coarse estimate
 };
 
 /// The pairs of levels with which two assets may be asked, from the finest to the coarsest of both
@@ -28,7 +28,7 @@ struct DetailWeight {
 /// and tell least, or on both sides where spheres are about as large.
 ///
 /// How many sphere pairs a level needs is told from the overlap of the coarsest levels, the
-/// *gauge*: a smooth function of the pose, so that an answer may be blended by it.
+/// *coarse estimate*: a smooth function of the pose, so that an answer may be blended by it.
 class DetailChain {
  public:
   static constexpr std::size_t kMost = 2 * kMaxDetails + 1;
@@ -43,9 +43,9 @@ class DetailChain {
 
   /// Weights of the pairs, which sum to 1: all of it is the finest pair's while that needs no more
   /// than half of `budget` sphere pairs, none where it needs the whole; what is left goes to the
-  /// next pair by the same rule, and what none can afford to the coarsest. Continuous in the gauge,
-  /// with the slope. Gauge 0: the finest.
-  Weights weights(double gauge, double budget) const noexcept;
+  /// next pair by the same rule, and what none can afford to the coarsest. Continuous in `coarse`,
+  /// with the slope. An estimate of 0: the finest.
+  Weights weights(double coarse, double budget) const noexcept;
 
  private:
   std::array<DetailPair, kMost> pairs_;

@@ -92,7 +92,7 @@ HWY_INLINE LeafGap leaf_gap_as(const GapSide& side, std::uint32_t block_x, std::
   V m[9];
   for (int i = 0; i < 9; ++i) {
     if constexpr (sizeof(T) == sizeof(float)) {
-      m[i] = hn::Set(d, side.single[i]);
+      m[i] = hn::Set(d, side.float32[i]);
     } else {
       m[i] = hn::Set(d, map.m[i]);
     }
@@ -158,20 +158,20 @@ HWY_INLINE void child_gaps_to(const GapSide& side, int level_x, std::uint32_t bl
   }
 }
 
-void child_single(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-                  std::uint32_t block_y, double gap_limit, double cover_limit, ChildGaps& out) {
+void child_float32(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
+                   std::uint32_t block_y, double gap_limit, double cover_limit, ChildGaps& out) {
   child_gaps_to<float>(side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
 }
-void child_twice(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-                 std::uint32_t block_y, double gap_limit, double cover_limit, ChildGaps& out) {
+void child_float64(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
+                   std::uint32_t block_y, double gap_limit, double cover_limit, ChildGaps& out) {
   child_gaps_to<double>(side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
 }
-LeafGap leaf_single(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
-                    double gap_limit, double cover_limit) {
+LeafGap leaf_float32(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
+                     double gap_limit, double cover_limit) {
   return leaf_gap_as<float>(side, block_x, block_y, gap_limit, cover_limit);
 }
-LeafGap leaf_twice(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
-                   double gap_limit, double cover_limit) {
+LeafGap leaf_float64(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
+                     double gap_limit, double cover_limit) {
   return leaf_gap_as<double>(side, block_x, block_y, gap_limit, cover_limit);
 }
 
@@ -181,28 +181,28 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
-HWY_EXPORT(child_single);
-HWY_EXPORT(child_twice);
-HWY_EXPORT(leaf_single);
-HWY_EXPORT(leaf_twice);
+HWY_EXPORT(child_float32);
+HWY_EXPORT(child_float64);
+HWY_EXPORT(leaf_float32);
+HWY_EXPORT(leaf_float64);
 
 void child_gaps(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
                 std::uint32_t block_y, double gap_limit, double cover_limit, Precision precision,
                 ChildGaps& out) noexcept {
-  if (precision == Precision::single) {
-    HWY_DYNAMIC_DISPATCH(child_single)
+  if (precision == Precision::float32) {
+    HWY_DYNAMIC_DISPATCH(child_float32)
     (side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
   } else {
-    HWY_DYNAMIC_DISPATCH(child_twice)
+    HWY_DYNAMIC_DISPATCH(child_float64)
     (side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
   }
 }
 
 LeafGap leaf_gap(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
                  double gap_limit, double cover_limit, Precision precision) noexcept {
-  return precision == Precision::single
-             ? HWY_DYNAMIC_DISPATCH(leaf_single)(side, block_x, block_y, gap_limit, cover_limit)
-             : HWY_DYNAMIC_DISPATCH(leaf_twice)(side, block_x, block_y, gap_limit, cover_limit);
+  return precision == Precision::float32
+             ? HWY_DYNAMIC_DISPATCH(leaf_float32)(side, block_x, block_y, gap_limit, cover_limit)
+             : HWY_DYNAMIC_DISPATCH(leaf_float64)(side, block_x, block_y, gap_limit, cover_limit);
 }
 
 }  // namespace ist

@@ -12,12 +12,12 @@ namespace ist {
 struct GapSide {
   GapSide(const SphereTree& x_tree, const SphereTree& y_tree, const Similarity& map)
       : x(&x_tree), y(&y_tree), x_from_y(&map) {
-    for (int i = 0; i < 9; ++i) single[i] = static_cast<float>(map.m[i]);
+    for (int i = 0; i < 9; ++i) float32[i] = static_cast<float>(map.m[i]);
   }
   const SphereTree* x;
   const SphereTree* y;
   const Similarity* x_from_y;
-  float single[9];  ///< x_from_y->m, as most queries need it
+  float float32[9];  ///< x_from_y->m, as most queries need it
 };
 
 /// Gaps of the sixteen children of a node of x and a node of y, in x's unit frame: between the

@@ -181,14 +181,14 @@ std::size_t add_as(const LeafStage& stage, PlacedBlocks<T>& blocks, const std::u
   return done;
 }
 
-std::size_t add_single(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
-                       const std::uint32_t* b, std::size_t n, LeafSums& sums) {
-  return add_as<float>(stage, scratch.single, a, b, n, sums);
+std::size_t add_float32(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+                        const std::uint32_t* b, std::size_t n, LeafSums& sums) {
+  return add_as<float>(stage, scratch.float32, a, b, n, sums);
 }
 
-std::size_t add_twice(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
-                      const std::uint32_t* b, std::size_t n, LeafSums& sums) {
-  return add_as<double>(stage, scratch.twice, a, b, n, sums);
+std::size_t add_float64(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+                        const std::uint32_t* b, std::size_t n, LeafSums& sums) {
+  return add_as<double>(stage, scratch.float64, a, b, n, sums);
 }
 
 }  // namespace ist::HWY_NAMESPACE
@@ -197,15 +197,15 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
-HWY_EXPORT(add_single);
-HWY_EXPORT(add_twice);
+HWY_EXPORT(add_float32);
+HWY_EXPORT(add_float64);
 
 std::size_t add_leaf_pairs(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
                            const std::uint32_t* b, std::size_t n, LeafSums& sums) noexcept {
-  if (stage.precision == Precision::single) {
-    return HWY_DYNAMIC_DISPATCH(add_single)(stage, scratch, a, b, n, sums);
+  if (stage.precision == Precision::float32) {
+    return HWY_DYNAMIC_DISPATCH(add_float32)(stage, scratch, a, b, n, sums);
   }
-  return HWY_DYNAMIC_DISPATCH(add_twice)(stage, scratch, a, b, n, sums);
+  return HWY_DYNAMIC_DISPATCH(add_float64)(stage, scratch, a, b, n, sums);
 }
 
 }  // namespace ist

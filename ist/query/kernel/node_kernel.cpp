@@ -73,11 +73,11 @@ HWY_INLINE void stand(const NodeStage& stage, const std::uint32_t* x, const std:
   }
 }
 
-/// With kHeld, children inside of y[i] go to `held`.
-template <class T, bool kHeld>
+/// With kContained, children inside of y[i] go to `contained`.
+template <class T, bool kContained>
 HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
                                const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
-                               std::uint32_t* out_y, HeldNodes* held) {
+                               std::uint32_t* out_y, ContainedNodes* contained) {
   const LaneTag<T> d;
   const SphereTree::Level& opened = stage.x->level[stage.level_x];
   const auto grow = hn::Set(d, static_cast<T>(1 + distance_error<T>(1)));
@@ -98,43 +98,45 @@ HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
       const auto sum = hn::Max(r + hn::Set(d, standing.reach[i]), hn::Zero(d));
       auto near = d2 < sum * sum;
       const std::uint32_t child = first_child + static_cast<std::uint32_t>(lane);
-      if constexpr (kHeld) {
+      if constexpr (kContained) {
         // Zero but near: an unused lane's square is no float.
         const auto spare =
             hn::IfThenElseZero(near, hn::Max(hn::Set(d, standing.within[i]) - r, hn::Zero(d)));
         const auto inside = d2 < spare * spare;
-        held->size += append<T>(d, inside, child, y[i], held->x + held->size, held->y + held->size);
+        contained->size += append<T>(d, inside, child, y[i], contained->x + contained->size,
+                                     contained->y + contained->size);
         near = hn::AndNot(inside, near);
       }
       found += append<T>(d, near, child, y[i], out_x + found, out_y + found);
     }
     // Unused lanes, which a large enough ball would reach all the same.
     while (found > 0 && out_x[found - 1] >= below) --found;
-    if constexpr (kHeld)
-      while (held->size > 0 && held->x[held->size - 1] >= below) --held->size;
+    if constexpr (kContained)
+      while (contained->size > 0 && contained->x[contained->size - 1] >= below) --contained->size;
   }
   return found;
 }
 
-std::size_t open_single(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
+std::size_t open_float32(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                         std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
   return open_as<float, false>(stage, x, y, n, out_x, out_y, nullptr);
 }
 
-std::size_t open_twice(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
+std::size_t open_float64(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                         std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
   return open_as<double, false>(stage, x, y, n, out_x, out_y, nullptr);
 }
 
-std::size_t hold_single(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y,
-                        HeldNodes& held) {
-  return open_as<float, true>(stage, x, y, n, out_x, out_y, &held);
+std::size_t open_holding_float32(const NodeStage& stage, const std::uint32_t* x,
+                                 const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
+                                 std::uint32_t* out_y, ContainedNodes& contained) {
+  return open_as<float, true>(stage, x, y, n, out_x, out_y, &contained);
 }
 
-std::size_t hold_twice(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y, HeldNodes& held) {
-  return open_as<double, true>(stage, x, y, n, out_x, out_y, &held);
+std::size_t open_holding_float64(const NodeStage& stage, const std::uint32_t* x,
+                                 const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
+                                 std::uint32_t* out_y, ContainedNodes& contained) {
+  return open_as<double, true>(stage, x, y, n, out_x, out_y, &contained);
 }
 
 }  // namespace ist::HWY_NAMESPACE
@@ -143,24 +145,24 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
-HWY_EXPORT(open_single);
-HWY_EXPORT(open_twice);
-HWY_EXPORT(hold_single);
-HWY_EXPORT(hold_twice);
+HWY_EXPORT(open_float32);
+HWY_EXPORT(open_float64);
+HWY_EXPORT(open_holding_float32);
+HWY_EXPORT(open_holding_float64);
 
 std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept {
-  return stage.precision == Precision::single
-             ? HWY_DYNAMIC_DISPATCH(open_single)(stage, x, y, n, out_x, out_y)
-             : HWY_DYNAMIC_DISPATCH(open_twice)(stage, x, y, n, out_x, out_y);
+  return stage.precision == Precision::float32
+             ? HWY_DYNAMIC_DISPATCH(open_float32)(stage, x, y, n, out_x, out_y)
+             : HWY_DYNAMIC_DISPATCH(open_float64)(stage, x, y, n, out_x, out_y);
 }
 
 std::size_t open_under_spheres(const NodeStage& stage, const std::uint32_t* x,
                                const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
-                               std::uint32_t* out_y, HeldNodes& held) noexcept {
-  return stage.precision == Precision::single
-             ? HWY_DYNAMIC_DISPATCH(hold_single)(stage, x, y, n, out_x, out_y, held)
-             : HWY_DYNAMIC_DISPATCH(hold_twice)(stage, x, y, n, out_x, out_y, held);
+                               std::uint32_t* out_y, ContainedNodes& contained) noexcept {
+  return stage.precision == Precision::float32
+             ? HWY_DYNAMIC_DISPATCH(open_holding_float32)(stage, x, y, n, out_x, out_y, contained)
+             : HWY_DYNAMIC_DISPATCH(open_holding_float64)(stage, x, y, n, out_x, out_y, contained);
 }
 
 }  // namespace ist

@@ -29,16 +29,16 @@ std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std
                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept;
 
 /// Nodes of x that lie in a sphere of y.
-struct HeldNodes {
+struct ContainedNodes {
   std::uint32_t* x;
   std::uint32_t* y;
   std::size_t size = 0;
 };
 
 /// The same where y are single spheres, but children that lie altogether in sphere y[i] are
-/// appended to `held` instead: at most 16 n, and up to 16 entries beyond.
+/// appended to `contained` instead: at most 16 n, and up to 16 entries beyond.
 std::size_t open_under_spheres(const NodeStage& stage, const std::uint32_t* x,
                                const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
-                               std::uint32_t* out_y, HeldNodes& held) noexcept;
+                               std::uint32_t* out_y, ContainedNodes& contained) noexcept;
 
 }  // namespace ist

@@ -35,7 +35,7 @@ struct Overlap {
 /// Relative rounding of a sum of lenses. A lens is good to a few units in the last place, and at
 /// most 18 of them meet in one lane before the sum goes on in double.
 constexpr double sum_rounding(Precision precision) {
-  return precision == Precision::single ? 4e-6 : 1e-14;
+  return precision == Precision::float32 ? 4e-6 : 1e-14;
 }
 
 /// Adds up the lanes and sets in the factors of π.

@@ -65,14 +65,14 @@ struct PlacedBlocks {
 
 /// In either precision; forget() that before its first use, and for other trees or another pose.
 struct LeafScratch {
-  PlacedBlocks<float> single;
-  PlacedBlocks<double> twice;
+  PlacedBlocks<float> float32;
+  PlacedBlocks<double> float64;
 
   void forget(Precision precision) noexcept {
-    if (precision == Precision::single) {
-      single.a.forget(), single.b.forget();
+    if (precision == Precision::float32) {
+      float32.a.forget(), float32.b.forget();
     } else {
-      twice.a.forget(), twice.b.forget();
+      float64.a.forget(), float64.b.forget();
     }
   }
 };

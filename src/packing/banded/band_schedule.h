@@ -4,8 +4,8 @@
 
 #include "numerics/hashing.h"
 #include "numerics/roots.h"
-#include "packing/spheres/certificate.h"
-#include "packing/spheres/packing_limits.h"
+#include "packing/base/certificate.h"
+#include "packing/base/packing_limits.h"
 
 namespace ist::packing {
 

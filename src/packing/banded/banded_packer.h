@@ -10,8 +10,8 @@
 #include "packing/banded/band_schedule.h"
 #include "packing/banded/prototype.h"
 #include "packing/banded/selection.h"
-#include "packing/packing_settings.h"
-#include "packing/spheres/sphere_grid.h"
+#include "packing/base/packing_settings.h"
+#include "packing/base/sphere_grid.h"
 #include "stage/stage.h"
 
 namespace ist::packing {

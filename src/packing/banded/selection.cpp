@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "packing/spheres/certificate.h"
+#include "packing/base/certificate.h"
 
 namespace ist::packing {
 namespace {

@@ -3,7 +3,7 @@
 #include "packing/grids/grid_candidate.h"
 #include "packing/grids/local_winding.h"
 #include "packing/grids/nearest_primitive.h"
-#include "packing/spheres/certificate.h"
+#include "packing/base/certificate.h"
 
 namespace ist::packing {
 

@@ -6,8 +6,8 @@
 
 #include "packing/grids/grid_rounds.h"
 #include "packing/grids/grid_schedule.h"
-#include "packing/packing_settings.h"
-#include "packing/spheres/certificate.h"
+#include "packing/base/packing_settings.h"
+#include "packing/base/certificate.h"
 #include "stage/stage.h"
 
 namespace ist::packing {

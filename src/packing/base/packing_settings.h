@@ -2,7 +2,7 @@
 
 #include <ist/packing.h>
 
-#include "packing/spheres/packing_limits.h"
+#include "packing/base/packing_limits.h"
 
 namespace ist::packing {
 

@@ -39,7 +39,7 @@ Pose moved(const Pose& pose, const Vector3d& shift, const Vector3d& turn) {
   return result;
 }
 
-class Twins : public ::testing::Test {
+class CoincidentInstances : public ::testing::Test {
  protected:
   // Off centre and of another size than its unit frame, so that no frame passes for another.
   const Asset asset_ = make_random_asset({1200, 0.3, {0.3, -0.2, 0.1}, 1, 2}, 3);
@@ -51,8 +51,8 @@ class Twins : public ::testing::Test {
   PlacedTree placed(const Pose& pose, double scale = 1) const {
     return {asset_.view(), pose, scale};
   }
-  TwinWeight weight(const PlacedTree& b) const {
-    return twin_weight(tree_, relative_pose(still(), b)->a_from_b);
+  CoincidenceWeight weight(const PlacedTree& b) const {
+    return coincidence_weight(tree_, relative_pose(still(), b)->a_from_b);
   }
   /// What is answered, over all pairs of spheres in double.
   double reference(const PlacedTree& b) const {
@@ -63,7 +63,7 @@ class Twins : public ::testing::Test {
   }
 };
 
-TEST_F(Twins, TheWeightFollowsTheMeanSquareWay) {
+TEST_F(CoincidentInstances, TheWeightFollowsTheMeanSquareDisplacement) {
   const Vector3d centre(0.3 + 2 * tree_.root[0], -0.2 + 2 * tree_.root[1], 0.1 + 2 * tree_.root[2]);
   const double reach = 2 * tree_.root[3];
   int between = 0;
@@ -93,7 +93,7 @@ TEST_F(Twins, TheWeightFollowsTheMeanSquareWay) {
   EXPECT_GE(between, 8);
 }
 
-TEST_F(Twins, AnswerTheBlendedSumAndItsGradient) {
+TEST_F(CoincidentInstances, AnswerTheBlendedSumAndItsGradient) {
   const double h = 1e-6;
   for (int i = 0; i < 12; ++i) {
     const double size = 0.11 * i * radius_;
@@ -128,7 +128,7 @@ TEST_F(Twins, AnswerTheBlendedSumAndItsGradient) {
 }
 
 // Half the step, half the largest change: a jump would not shrink.
-TEST_F(Twins, NothingJumpsAsTheyPart) {
+TEST_F(CoincidentInstances, NothingJumpsAsTheyPart) {
   const Vector3d direction = Vector3d(1, 0.3, -0.2).normalized();
   for (const std::uint32_t budget : {0u, 3'000u}) {
     const auto largest_changes = [&](int steps) {
@@ -153,11 +153,11 @@ TEST_F(Twins, NothingJumpsAsTheyPart) {
   }
 }
 
-TEST_F(Twins, LimitsHold) {
+TEST_F(CoincidentInstances, LimitsHold) {
   int stopped = 0;
   for (int i = 0; i < 200; ++i) {
     const PlacedTree b = placed(small_pose(0.01 * i * radius_ * Vector3d(1, 1, 0), {0, 0, 0}));
-    QuerySettings settings;
+    PenetrationSettings settings;
     if (i % 2 == 1) settings.pair_budget = 2'000;
     const Penetration finished = penetration(still(), b, settings, workspace_);
     settings.max_visits = 1u << (i % 12);
@@ -170,7 +170,7 @@ TEST_F(Twins, LimitsHold) {
   EXPECT_GT(stopped, 50);
 }
 
-TEST(TwinsOfASolid, ACopyOnItselfReadsItsVolume) {
+TEST(CoincidentInstancesOfASolid, ACopyOnItselfReadsItsVolume) {
   for (const char* const name : {"cube", "gear"}) {
     const Asset asset = bake(close_mesh(make_sample(name), name), {.max_spheres = 4'000});
     const double volume = asset.view().volume();

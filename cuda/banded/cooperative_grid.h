@@ -4,8 +4,8 @@
 
 #include "cuda/atomics.h"
 
-// A crew is all the teams that do one packing together: the warps of a kernel, or a few threads of
-// the host (tests). Steps are templates over it. It has
+// A cooperative grid is all the teams that do one packing together: the warps of a kernel, or a few
+// threads of the host (tests). Steps are templates over it. It has
 //
 //   using Team;             const Team& team() const;
 //   using Lane;             a team of one of its lanes
@@ -19,32 +19,33 @@
 namespace ist::gpu {
 
 /// Calls work(i) for all i < count, a team an item, a fixed share each: for items of equal work.
-template <class Crew, class Work>
-IST_HD void share_out(Crew& crew, std::uint32_t count, const Work& work) {
-  for (std::uint32_t i = crew.index(); i < count; i += crew.size()) work(i);
+template <class CoopGrid, class Work>
+IST_HD void distribute_statically(CoopGrid& coop, std::uint32_t count, const Work& work) {
+  for (std::uint32_t i = coop.index(); i < count; i += coop.size()) work(i);
 }
 
 /// The same, each team taking the next item when it is done with one. `taken` starts at 0.
-template <class Crew, class Work>
-IST_HD void take_turns(Crew& crew, std::uint32_t count, std::uint32_t* taken, const Work& work) {
-  std::uint32_t i = crew.index();
+template <class CoopGrid, class Work>
+IST_HD void distribute_dynamically(CoopGrid& coop, std::uint32_t count, std::uint32_t* taken,
+                                   const Work& work) {
+  std::uint32_t i = coop.index();
   while (i < count) {
     work(i);
-    if (count <= crew.size()) return;
+    if (count <= coop.size()) return;
     std::uint32_t next = 0;
-    if (crew.team().lane() == 0) next = atomic_add(taken, 1);
-    i = crew.size() + crew.team().broadcast(next, 0);
+    if (coop.team().lane() == 0) next = atomic_add(taken, 1);
+    i = coop.size() + coop.team().broadcast(next, 0);
   }
 }
 
 /// Calls work(i) for all i < count, a lane an item. A team's lanes come together: where i ≥ count,
 /// `work` is called all the same and must only take part in what the team does together.
-template <class Crew, class Work>
-IST_HD void share_out_to_lanes(Crew& crew, std::uint32_t count, const Work& work) {
-  constexpr auto kWidth = static_cast<std::uint32_t>(Crew::Team::kWidth);
-  const std::uint32_t stride = crew.size() * kWidth;
-  for (std::uint32_t base = crew.index() * kWidth; base < count; base += stride)
-    work(base + static_cast<std::uint32_t>(crew.team().lane()));
+template <class CoopGrid, class Work>
+IST_HD void distribute_to_lanes(CoopGrid& coop, std::uint32_t count, const Work& work) {
+  constexpr auto kWidth = static_cast<std::uint32_t>(CoopGrid::Team::kWidth);
+  const std::uint32_t stride = coop.size() * kWidth;
+  for (std::uint32_t base = coop.index() * kWidth; base < count; base += stride)
+    work(base + static_cast<std::uint32_t>(coop.team().lane()));
 }
 
 /// Place of this lane's item in a list to which the lanes with `adds` append one each.

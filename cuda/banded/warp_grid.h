@@ -5,22 +5,22 @@
 #include <cstdint>
 
 #include "cuda/banded/banded_kernel.h"
-#include "cuda/banded/crew.h"
+#include "cuda/banded/cooperative_grid.h"
 #include "cuda/warp_team.h"
 
 namespace ist::gpu {
 
-/// The crew of a cooperative kernel (crew.h): all its warps. Successive numbers stand in different
-/// blocks, so that little work spreads over many multiprocessors.
+/// The cooperative grid of a cooperative kernel (cooperative_grid.h): all its warps. Successive
+/// numbers stand in different blocks, so that little work spreads over many multiprocessors.
 template <class Scratch_>
-class WarpCrew {
+class WarpCoopGrid {
  public:
   using Team = WarpTeam;
   using Lane = LaneTeam;
   using Scratch = Scratch_;
 
   /// `scratch`: shared memory, one a warp.
-  __device__ WarpCrew(MeetingPlace* place, Scratch* scratch)
+  __device__ WarpCoopGrid(GridBarrier* place, Scratch* scratch)
       : place_(place), scratch_(scratch + threadIdx.x / 32) {
     generation_ = atomic_load(&place->generation);
   }
@@ -60,7 +60,7 @@ class WarpCrew {
   }
 
  private:
-  MeetingPlace* place_;
+  GridBarrier* place_;
   Scratch* scratch_;
   std::uint32_t generation_;
   Team team_;

@@ -6,14 +6,14 @@
 #include <thread>
 #include <vector>
 
-#include "cuda/banded/crew.h"
+#include "cuda/banded/cooperative_grid.h"
 #include "numerics/team.h"
 
 namespace ist::testing {
 
-/// A crew (cuda/banded/crew.h) of host threads, each a team of one.
+/// A cooperative grid (cuda/banded/cooperative_grid.h) of host threads, each a team of one.
 template <class Scratch_>
-class HostCrew {
+class HostCoopGrid {
  public:
   using Team = SerialTeam;
   using Lane = SerialTeam;
@@ -25,7 +25,7 @@ class HostCrew {
     std::uint32_t here = 0, generation = 0;
   };
 
-  HostCrew(Meeting& meeting, std::uint32_t index, std::uint32_t size)
+  HostCoopGrid(Meeting& meeting, std::uint32_t index, std::uint32_t size)
       : meeting_(meeting), index_(index), size_(size) {}
 
   const Team& team() const { return team_; }
@@ -57,15 +57,15 @@ class HostCrew {
   Scratch scratch_{};
 };
 
-/// Calls work(crew) in `size` threads.
+/// Calls work(coop) in `size` threads.
 template <class Scratch, class Work>
-void run_crew(std::uint32_t size, const Work& work) {
-  typename HostCrew<Scratch>::Meeting meeting;
+void run_grid(std::uint32_t size, const Work& work) {
+  typename HostCoopGrid<Scratch>::Meeting meeting;
   std::vector<std::thread> threads;
   for (std::uint32_t i = 0; i < size; ++i)
     threads.emplace_back([&, i] {
-      HostCrew<Scratch> crew(meeting, i, size);
-      work(crew);
+      HostCoopGrid<Scratch> coop(meeting, i, size);
+      work(coop);
     });
   for (std::thread& thread : threads) thread.join();
 }

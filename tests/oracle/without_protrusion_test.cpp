@@ -9,7 +9,7 @@
 #include "support/oracle_assets.h"
 #include "support/shared_data.h"
 
-// Flat faces that meet, without the soft skin.
+// Flat faces that meet, without protrusion.
 
 namespace ist {
 namespace {
@@ -36,7 +36,7 @@ class FlatFaces : public ::testing::Test {
         {{std::cos(turn), std::sin(turn), 0, 0}, {side_ + gap, 0.1 * side_, -0.05 * side_}},
         1};
     const Penetration raw = penetration(a, b, {}, workspace_);
-    return {raw, without_soft_skin(raw, a, b)};
+    return {raw, without_protrusion(raw, a, b)};
   }
 };
 
@@ -86,7 +86,7 @@ TEST(RoundContacts, KeepTheirVolume) {
     if (row.pose_class != "pen") continue;
     const auto [a, b] = testing::placed(row, 2'000);
     const Penetration raw = penetration(a, b, {}, workspace);
-    EXPECT_EQ(without_soft_skin(raw, a, b).volume, raw.volume) << row.id;
+    EXPECT_EQ(without_protrusion(raw, a, b).volume, raw.volume) << row.id;
   }
 }
 

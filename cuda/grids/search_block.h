@@ -8,7 +8,7 @@ namespace ist::gpu {
 
 /// The warps of a block that search together for one prototype (packing/grids/nearest_primitive.h):
 /// where there are few prototypes, this is what fills the card.
-struct SearchCrew : WarpTeam {
+struct SearchBlock : WarpTeam {
   static constexpr unsigned kWarps = 8;
   static constexpr unsigned kThreads = 32 * kWarps;
 
@@ -19,7 +19,7 @@ struct SearchCrew : WarpTeam {
   };
   Memory* memory = nullptr;  ///< shared by the block
 
-  __device__ explicit SearchCrew(Memory* shared) : memory(shared) {}
+  __device__ explicit SearchBlock(Memory* shared) : memory(shared) {}
 
   __device__ int part() const { return static_cast<int>(threadIdx.x / 32); }
   __device__ int parts() const { return static_cast<int>(kWarps); }

@@ -8,14 +8,14 @@
 
 #include "cuda/banded/banded_buffers.h"
 #include "packing/banded/mesh_surface.h"
-#include "packing/packing_settings.h"
+#include "packing/base/packing_settings.h"
 #include "samples/samples.h"
-#include "support/host_crew.h"
+#include "support/host_grid_of_teams.h"
 #include "support/same_packing.h"
 #include "support/test_meshes.h"
 
-// The GPU's banded packing, run by a crew of host threads: the same spheres as the CPU's packer,
-// whatever the number of teams and however small its arrays are at first.
+// The GPU's banded packing, run by a cooperative grid of host threads: the same spheres as the
+// CPU's packer, whatever the number of teams and however small its arrays are at first.
 
 namespace ist::testing {
 namespace {
@@ -50,13 +50,13 @@ class HostArray {
   std::size_t size_ = 0;
 };
 
-struct CrewPacking {
+struct GridOfTeams {
   SpherePacking packing;
   gpu::BandedState state;
   int launches = 0;
 };
 
-CrewPacking pack_by_crew(const MeshSolid& solid, const PackingSettings& settings,
+GridOfTeams pack_by_grid(const MeshSolid& solid, const PackingSettings& settings,
                          std::uint32_t teams, const gpu::BandedSizes& sizes,
                          std::uint32_t many = gpu::BandedArrays::kMany) {
   const packing::MeshSurface surface(solid);
@@ -64,12 +64,12 @@ CrewPacking pack_by_crew(const MeshSolid& solid, const PackingSettings& settings
   gpu::BandedBuffers<HostArray, Host> buffers(
       host, packing::BandSchedule(packing::packing_limits(solid, solid.frame().scale(), settings)),
       sizes);
-  CrewPacking out;
+  GridOfTeams out;
   for (;;) {
     gpu::BandedArrays arrays = buffers.arrays();
     arrays.many = many;
-    run_crew<packing::CellScratch<std::uint32_t>>(
-        teams, [&](auto& crew) { gpu::pack_banded(crew, arrays, surface); });
+    run_grid<packing::CellScratch<std::uint32_t>>(
+        teams, [&](auto& coop) { gpu::pack_banded(coop, arrays, surface); });
     ++out.launches;
     out.state = buffers.state();
     if (out.state.need == gpu::Need::nothing) break;
@@ -79,7 +79,7 @@ CrewPacking pack_by_crew(const MeshSolid& solid, const PackingSettings& settings
   return out;
 }
 
-TEST(BandedCrew, PacksLikeTheCpuWhateverItsSize) {
+TEST(BandedGrid, PacksLikeTheCpuWhateverItsSize) {
   for (const char* name : {"bolt", "gear"}) {
     const MeshSolid solid(close_mesh(make_sample(name), name));
     for (const unsigned count : {30u, 300u, 2000u}) {
@@ -89,15 +89,15 @@ TEST(BandedCrew, PacksLikeTheCpuWhateverItsSize) {
       for (const std::uint32_t teams : {1u, 3u}) {
         SCOPED_TRACE(std::string(name) + " " + std::to_string(count) + " by " +
                      std::to_string(teams));
-        const CrewPacking got =
-            pack_by_crew(solid, settings, teams, gpu::banded_sizes(settings.max_spheres));
+        const GridOfTeams got =
+            pack_by_grid(solid, settings, teams, gpu::banded_sizes(settings.max_spheres));
         expect_same(got.packing, expected);
       }
     }
   }
 }
 
-TEST(BandedCrew, WorkInPartsIsTheSameWork) {
+TEST(BandedGrid, WorkInPartsIsTheSameWork) {
   const MeshSolid solid(close_mesh(make_sample("bolt"), "bolt"));
   for (const unsigned count : {100u, 1000u}) {
     PackingSettings settings;
@@ -105,23 +105,23 @@ TEST(BandedCrew, WorkInPartsIsTheSameWork) {
     const SpherePacking expected = pack(solid, settings);
     for (const std::uint32_t many : {1u, 100u}) {
       SCOPED_TRACE(std::to_string(count) + " in parts from " + std::to_string(many));
-      expect_same(pack_by_crew(solid, settings, 2, gpu::banded_sizes(count), many).packing,
+      expect_same(pack_by_grid(solid, settings, 2, gpu::banded_sizes(count), many).packing,
                   expected);
     }
   }
 }
 
-TEST(BandedCrew, ArraysThatAreTooSmallGrow) {
+TEST(BandedGrid, ArraysThatAreTooSmallGrow) {
   const MeshSolid solid(close_mesh(make_sample("bolt"), "bolt"));
   PackingSettings settings;
   settings.max_spheres = 500;
   const SpherePacking expected = pack(solid, settings);
-  const CrewPacking got = pack_by_crew(solid, settings, 2, {64, 64, 10, 1, 16, 64});
+  const GridOfTeams got = pack_by_grid(solid, settings, 2, {64, 64, 10, 1, 16, 64});
   EXPECT_GT(got.launches, 20);
   expect_same(got.packing, expected);
 }
 
-TEST(BandedCrew, StopsLikeTheCpu) {
+TEST(BandedGrid, StopsLikeTheCpu) {
   const MeshSolid solid(closed(icosphere_mesh(2), "icosphere"));
   std::vector<PackingSettings> cases(4);
   cases[0].max_spheres = 0;
@@ -134,7 +134,7 @@ TEST(BandedCrew, StopsLikeTheCpu) {
   cases[3].seed = 7;
   for (const PackingSettings& settings : cases) {
     SCOPED_TRACE(&settings - cases.data());
-    expect_same(pack_by_crew(solid, settings, 2, gpu::banded_sizes(1000)).packing,
+    expect_same(pack_by_grid(solid, settings, 2, gpu::banded_sizes(1000)).packing,
                 pack(solid, settings));
   }
 }

@@ -1,4 +1,4 @@
-#include "packing/packing_settings.h"
+#include "packing/base/packing_settings.h"
 
 #include <ist/error.h>
 

@@ -1,4 +1,4 @@
-#include "packing/spheres/sphere_grid.h"
+#include "packing/base/sphere_grid.h"
 
 #include <algorithm>
 

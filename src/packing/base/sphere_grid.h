@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "packing/spheres/sphere_grid_layout.h"
+#include "packing/base/sphere_grid_layout.h"
 
 namespace ist::packing {
 

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <ist/query.h>
+
+namespace ist::testing {
+
+/// The same limits for contact patches.
+inline ContactSettings for_contacts(const PenetrationSettings& s) {
+  return {s.measure, s.max_visits, s.deadline_us, s.relative_error, s.min_radius};
+}
+
+/// The same limits for a separation.
+inline SeparationSettings for_separation(const PenetrationSettings& s) {
+  return {s.max_visits, s.deadline_us};
+}
+
+/// The same limits for both halves of query().
+inline QuerySettings for_both(const PenetrationSettings& s) { return {s, for_separation(s)}; }
+
+}  // namespace ist::testing
