@@ -14,6 +14,7 @@
 #include "samples/samples.h"
 #include "support/float_traps.h"
 #include "support/same_packing.h"
+#include "packing/base/packing_settings.h"
 #include "support/shared_data.h"
 
 namespace ist {
@@ -209,6 +210,40 @@ TEST(Packing, OtherStopsAreMet) {
   packing = pack(*solid, settings);
   EXPECT_EQ(packing.stop, StopReason::time_limit);
   expect_certified(packing, *solid);
+}
+
+/// A legal setting means the same in every mode: a coverage of 0 is met by the first sphere, and
+/// what is reported on the way is a number in [0, 1].
+TEST(Packing, ACoverageOfNothingIsMetByTheFirstSphere) {
+  const auto solid = make_solid(box_mesh({0, 0, 0}, {1, 1, 1}));
+  for (const GridMode mode :
+       {GridMode::banded, GridMode::uniform, GridMode::explicit_refinement,
+        GridMode::implicit_refinement, GridMode::hybrid}) {
+    SCOPED_TRACE(static_cast<int>(mode));
+    PackingSettings settings = count(100);
+    settings.grid = mode;
+    settings.target_coverage = 0;
+    const SpherePacking packing = pack(*solid, settings);
+    EXPECT_EQ(packing.spheres.size(), 1u);
+    EXPECT_EQ(packing.stop, StopReason::coverage);
+  }
+}
+
+TEST(Packing, ProgressIsAShareWhateverTheLimits) {
+  for (const double coverage : {0.0, 0.5, 1.0})
+    for (const std::size_t most : {0u, 100u})
+      for (const std::size_t spheres : {0u, 1u, 99u, 100u}) {
+        packing::PackingLimits limits;
+        limits.target_coverage = coverage;
+        limits.max_spheres = most;
+        limits.length_unit = 4;
+        Progress now;
+        packing::set_progress(now, limits, spheres, spheres > 0 ? 0.6 : 0, 0.25);
+        EXPECT_GE(now.fraction, 0);
+        EXPECT_LE(now.fraction, 1);
+        EXPECT_EQ(now.fraction == 1, spheres > 0 && (coverage < 0.6 || spheres == most));
+        EXPECT_EQ(now.radius, 1);
+      }
 }
 
 TEST(Packing, CubeFollowsTheExactGreedySequence) {

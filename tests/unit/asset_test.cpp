@@ -56,6 +56,38 @@ TEST(Asset, RoundTrip) {
   EXPECT_EQ(folder.files(), 1u);
 }
 
+/// What was moved from is empty, and may be asked anything.
+TEST(Asset, MovedFromAssetsAndWorkspacesAreSafe) {
+  Asset asset(small_asset(40), "memory");
+  Asset taken = std::move(asset);
+  EXPECT_TRUE(asset.view().empty());  // NOLINT(bugprone-use-after-move): what is tested
+  EXPECT_TRUE(asset.bytes().empty());
+  EXPECT_EQ(taken.view().sphere_count(), 40u);
+  asset = std::move(taken);
+  EXPECT_EQ(asset.view().sphere_count(), 40u);
+  EXPECT_TRUE(taken.view().empty());  // NOLINT(bugprone-use-after-move)
+  EXPECT_EQ(TreeView().header().sphere_count, 0u);
+  EXPECT_EQ(TreeView().header().detail_count, 0u);
+
+  const PlacedTree placed{asset.view(), {}, 1};
+  Workspace workspace;
+  Workspace other = std::move(workspace);
+  // NOLINTNEXTLINE(bugprone-use-after-move)
+  const PenetrationAndSeparation none = query(placed, placed, {}, workspace);
+  EXPECT_EQ(none.penetration.status, QueryStatus::invalid_input);
+  EXPECT_EQ(none.separation.status, QueryStatus::invalid_input);
+  ContactPatch patch;
+  EXPECT_EQ(contact_patches(placed, placed, {}, workspace, {&patch, 1}).count, 0u);
+  Penetration answer;
+  const PlacedPair pair{placed, placed};
+  penetration_batch({&pair, 1}, {}, {&workspace, 1}, {&answer, 1});
+  EXPECT_EQ(answer.status, QueryStatus::invalid_input);
+  EXPECT_EQ(penetration(placed, placed, {}, other).status, QueryStatus::ok);
+  const PlacedTree nothing{TreeView(), {}, 1};
+  EXPECT_EQ(penetration(placed, nothing, {}, other).status, QueryStatus::invalid_input);
+  EXPECT_EQ(without_protrusion({}, placed, nothing).volume, 0);
+}
+
 TEST(Asset, SectionsAreAlignedAndInOrder) {
   for (const std::uint64_t n :
        {std::uint64_t{1}, std::uint64_t{17}, std::uint64_t{70'000}, kMaxSpheres}) {

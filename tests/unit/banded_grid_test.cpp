@@ -10,7 +10,7 @@
 #include "packing/banded/mesh_surface.h"
 #include "packing/base/packing_settings.h"
 #include "samples/samples.h"
-#include "support/host_grid_of_teams.h"
+#include "support/host_coop_grid.h"
 #include "support/same_packing.h"
 #include "support/test_meshes.h"
 

@@ -78,7 +78,7 @@ TEST(DistanceGridTest, InsideAgreesWithTheExactWindingNumber) {
   for (const ClosedMesh& mesh : meshes()) {
     const MeshSolid solid(mesh);
     for (const int cells : {1, 5, 16, 40}) {
-      HostCoopGrid grid(solid.view());
+      HostGrid grid(solid.view());
       grid.build(layout_of(solid, cells), {});
       const std::vector<Sphere> none;
       const GridScene scene = grid.scene(none);
@@ -105,7 +105,7 @@ TEST(DistanceGridTest, NearestIsTheLeastOverAllPrimitives) {
     const MeshSolid solid(mesh);
     const std::vector<Sphere> spheres = some_spheres(random, solid, 40);
     for (const int cells : {1, 6, 33}) {
-      HostCoopGrid grid(solid.view());
+      HostGrid grid(solid.view());
       grid.build(layout_of(solid, cells), {});
       grid.update(spheres, 0);
       const GridScene scene = grid.scene(spheres);
@@ -135,7 +135,7 @@ TEST(DistanceGridTest, DiscreteDistancesAreManhattanDistances) {
   std::mt19937 random(3);
   const MeshSolid solid(testing::closed(testing::torus_mesh(1, 0.45, 24, 12), "torus"));
   const std::vector<Sphere> spheres = some_spheres(random, solid, 10);
-  HostCoopGrid grid(solid.view());
+  HostGrid grid(solid.view());
   grid.build(layout_of(solid, 24), spheres);
   const DistanceGrid d = grid.scene(spheres).grid;
   std::vector<std::array<int, 3>> border;
@@ -165,7 +165,7 @@ TEST(DistanceGridTest, DiscreteDistancesAreManhattanDistances) {
 
 TEST(DistanceGridTest, CoveredCellsAreGivenBackAndAFewStandInAHashTable) {
   const MeshSolid solid(testing::closed(testing::icosphere_mesh(3), "icosphere"));
-  HostCoopGrid grid(solid.view());
+  HostGrid grid(solid.view());
   grid.build(layout_of(solid, 112), {});
   const std::size_t before = grid.bytes(), active = grid.active_cells();
   EXPECT_FALSE(grid.hashed());
