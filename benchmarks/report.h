@@ -69,7 +69,7 @@ class Report {
     std::cerr << entry.dump() << "\n";
   }
 
-  /// tables.py makes this report a page of its own, docs/NAME.md, under the given title.
+  /// tables.py makes this report a page of its own, NAME.md beside it, under the given title.
   void page(const std::string& title) { json_["page"] = title; }
 
   /// One sentence that a reader of the figures must know.

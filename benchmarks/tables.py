@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes tables.md and the plots of a folder of benchmark reports (JSON, see report.h)."""
+"""Makes the pages and plots of a folder of benchmark reports (JSON, see report.h), in that folder."""
 import json
 import pathlib
 import sys
@@ -37,10 +37,10 @@ def section(report):
     return "\n".join(parts)
 
 
-def write_page(report, docs):
+def write_page(report, folder):
     name = report["benchmark"]
     text = f"# {report['page']}\n\nMade by `benchmarks/run.sh {name}`; do not edit.\n\n"
-    (docs / f"{name}.md").write_text(text + section(report).partition("\n")[2])
+    (folder / f"{name}.md").write_text(text + section(report).partition("\n")[2])
 
 
 def main(folder):
@@ -50,7 +50,7 @@ def main(folder):
     (folder / "tables.md").write_text(text + "\n".join(section(r) for r in of_tables))
     for report in reports:
         if "page" in report:
-            write_page(report, folder.parents[1] / "docs")
+            write_page(report, folder)
     for report in reports:
         plot = getattr(plots, report["benchmark"], None)
         if plot:

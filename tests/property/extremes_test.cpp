@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-// Every promise that docs/extremes.md makes.
+// Every promise that benchmarks/results/extremes.md makes.
 
 namespace ist {
 namespace {

@@ -20,7 +20,7 @@ struct Extreme {
   std::vector<Claim> (*claims)();
 };
 
-/// Every extreme that docs/extremes.md lists, in its order. Needs no data.
+/// Every extreme that benchmarks/results/extremes.md lists, in its order. Needs no data.
 const std::vector<Extreme>& extremes();
 
 }  // namespace ist::testing
