@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds every benchmark, or the NAMEs alone, runs them one after another and writes
-# benchmarks/results: a JSON file each, tables.md and the plots. Nothing else should run meanwhile.
+# benchmarks/results: a JSON file each, pages and plots. Nothing else should run meanwhile.
 # usage: benchmarks/run.sh [--quick] [--build DIR] [--results DIR] [NAME…]
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)

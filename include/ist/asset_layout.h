@@ -7,16 +7,16 @@
 //   AssetHeader                       960 B
 //   details                           DetailLevel[d]
 //   inner spheres                     Sphere[n]   centre and radius, insertion (greedy) order
-//   cover radii                       float[n]     the solid lies in ∪ B(inner centre, cover)
-//   matched spheres                 Sphere[n]   centre and radius of the matched set, same order
+//   cover radii                       float[n]    the solid lies in ∪ B(inner centre, cover)
+//   matched spheres                   Sphere[n]   centre and radius of the matched set, same order
 //   inner tree                        as below
 //   matched tree                      as below, without sphere covers
 //   for each detail i = 1 … d, of m = ⌊n / 4^i⌋ spheres
-//     matched spheres               Sphere[m]   the matched set of the first m inner spheres
+//     matched spheres                 Sphere[m]   the matched set of the first m inner spheres
 //     matched tree                    as below, without sphere covers
 //
 // The matched set of all n inner spheres is detail 0 and stands in AssetHeader; the coarser ones
-// are what a query may answer from instead (detail_chain.h).
+// are what a query may answer from instead, under PenetrationSettings::pair_budget.
 //
 // A tree, with m(k) = ⌈n / 16^(k+1)⌉ blocks at level k, up to the first level of one block:
 //
@@ -61,7 +61,7 @@ inline constexpr std::int32_t kMaxExponent = 300;
 static_assert(sizeof(Sphere) == 16);
 
 /// Sixteen balls, structure of arrays. Centres are relative to the block's Origin, so that a small
-/// block keeps all digits of its floats (DESIGN 3.4).
+/// block keeps all digits of its floats.
 struct alignas(64) BallBlock {
   float x[kWidth], y[kWidth], z[kWidth];  ///< unit frame, relative to the block's origin
   float r[kWidth];  ///< radius; rounded up above level 0; kEmptyRadius if unused
@@ -111,7 +111,7 @@ struct TreeHeader {
 };
 static_assert(sizeof(TreeHeader) == 312);
 
-/// A matched set of fewer spheres: a prefix of the greedy order, calibrated by itself (DESIGN 5).
+/// A matched set of fewer spheres: a prefix of the greedy order, calibrated by itself.
 struct DetailLevel {
   std::uint64_t matched_spheres = 0;  ///< offset of Sphere[matched_tree.sphere_count]
   double protrusion = 0;              ///< as AssetHeader::protrusion

@@ -54,9 +54,13 @@ class Asset {
   TreeView view_;
 };
 
-/// Packs, calibrates and clusters a closed mesh (DESIGN 1). Same mesh, settings and seed give the
-/// same bytes on any machine and for any number of threads. Cancelling during packing keeps what is
-/// packed; later it throws Error. Throws Error if not one sphere fits.
+/// Makes the asset of a closed mesh: inner spheres, matched spheres, cover radii and trees.
+///
+/// Same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number of
+/// threads.
+/// Cancelling during packing keeps what is packed; later it throws Error.
+///
+/// Throws Error if not one sphere fits, and on settings out of range.
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
            const ProgressCallback& progress = {});
 
@@ -85,8 +89,11 @@ struct Invariant {
   std::size_t violations = 0;
 };
 
-/// Proves every invariant of an asset again, in double, from its bytes and the mesh alone: it
-/// shares no code with packing but the mesh. Throws Error if the asset is of another mesh.
+/// Proves every invariant of an asset again, in double, from its bytes and the mesh alone.
+///
+/// It shares no code with packing but the mesh.
+///
+/// `threads`: 0 = all cores. Throws Error if the asset is of another mesh.
 std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigned threads = 0);
 
 }  // namespace ist

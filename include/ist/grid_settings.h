@@ -2,10 +2,12 @@
 
 namespace ist {
 
-/// Grids of the modes after Weller and Zachmann (GridMode other than banded). 0, or a negative
-/// count of refinements, is automatic: sizes are picked from how much of its box the solid fills,
-/// and the distance grid's also from the memory that is free. What is packed depends on `start`,
-/// `refinements`, `rounds_per_level` and, for uniform, `resolution`; the rest is speed and memory.
+/// Grids of the modes after Weller and Zachmann (GridMode other than banded).
+///
+/// 0, or a negative count of refinements, is automatic: sizes are picked from how much of its box
+/// the solid fills, and the distance grid's also from the memory that is free.
+/// What is packed depends on `start`, `refinements`, `rounds_per_level` and, for uniform,
+/// `resolution`; the rest is speed and memory.
 struct GridSettings {
   unsigned start = 0;  ///< cells on the solid's longest side, first prototype grid; 1 … 1024
   /// Cells on the longest side of the fixed grid (uniform: both grids; implicit: the distance grid)

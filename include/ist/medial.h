@@ -28,11 +28,14 @@ struct MedialSettings {
   GpuSettings gpu = {};  ///< where `device` is a GPU
 };
 
-/// The first round of the grid packing (DESIGN 4.1) as an approximation of the medial axis: one
-/// prototype a grid cell flees from the surface, confined to its cell. Those that come to rest
-/// between surface points over 45° apart are the nodes: Voronoi nodes where they meet four, else
-/// points of the axis' sheets and seams. Ordered by cell; the same for any device and number of
-/// threads. Throws Error on settings out of range, and for a Solid that is not a mesh.
+/// An approximation of the medial axis: the first round of a grid packing.
+///
+/// One prototype a grid cell flees from the surface, confined to its cell.
+/// Those that come to rest between surface points over 45° apart are the nodes: Voronoi nodes where
+/// they meet four, else points of the axis' sheets and seams.
+/// Ordered by cell; the same for any device and number of threads.
+///
+/// Throws Error on settings out of range, and for a Solid that is not a mesh.
 std::vector<MedialNode> medial_nodes(const Solid& solid, const MedialSettings& settings = {});
 
 }  // namespace ist

@@ -36,7 +36,7 @@ struct MeshReport {
   std::size_t flipped_components = 0;    ///< shells turned outward by validation
   std::size_t cavities = 0;              ///< inward shells that lie inside an outward one
   std::size_t degenerate_triangles = 0;  ///< zero area or repeated corners
-  std::size_t coincident_triangles = 0;  ///< removed as copies or cancelled pairs (DESIGN 3.6)
+  std::size_t coincident_triangles = 0;  ///< removed as copies or cancelled pairs
   std::size_t self_intersections =
       0;  ///< triangle pairs that meet elsewhere than in shared corners
   bool self_intersections_counted = false;  ///< false: too many triangles, not looked for
@@ -50,8 +50,8 @@ struct MeshReport {
   std::vector<std::string> notes;  ///< one sentence a finding, ready to print
 };
 
-/// A mesh that bounds a solid: every edge balanced, every shell oriented (DESIGN 3.6). A point is
-/// inside where the winding number is ≥ 1.
+/// A mesh that bounds a solid: every edge balanced, every shell oriented.
+/// A point is inside where the winding number is ≥ 1.
 struct ClosedMesh {
   TriangleMesh mesh;
   MeshReport report;
@@ -70,7 +70,7 @@ enum class OpenMeshPolicy {
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings = {});
 
 /// Validates and orients a mesh: reduces coincident faces to their signed sum, drops degenerate
-/// triangles, orients every shell (DESIGN 3.6, 10). Throws Error for a mesh that is flat, empty,
+/// triangles, orients every shell. Throws Error for a mesh that is flat, empty,
 /// not finite, non-orientable, or open under OpenMeshPolicy::refuse. Thread-safe.
 ClosedMesh close_mesh(TriangleMesh mesh, const std::string& name,
                       OpenMeshPolicy policy = OpenMeshPolicy::refuse);

@@ -13,7 +13,7 @@
 
 namespace ist {
 
-/// How the space is searched for the next spheres (DESIGN 4.1).
+/// How the space is searched for the next spheres. All modes but `banded` are the paper's.
 enum class GridMode : std::uint32_t {
   banded = 0,               ///< ours: a greedy packing with a guarantee
   uniform = 1,              ///< original ProtoSphere: one fixed, fine grid
@@ -47,8 +47,9 @@ struct PackingSettings {
   GpuSettings gpu = {};               ///< where `device` is a GPU
 };
 
-/// Certified, non-overlapping spheres inside a solid, in insertion order: every prefix is a valid
-/// packing, and under the greedy order a good one of its size.
+/// Certified, non-overlapping spheres inside a solid, in insertion order.
+///
+/// Every prefix is a valid packing, and under the greedy order a good one of its size.
 struct SpherePacking {
   UnitFrame frame;
   std::vector<Sphere> spheres;
@@ -62,8 +63,13 @@ struct SpherePacking {
   std::size_t rounds = 0;
 };
 
-/// Packs a solid (DESIGN 4.2). Same solid and settings give the same spheres, bit for bit, for any
-/// number of threads (a time limit or cancel excepted). Throws Error on settings out of range.
+/// Fills a solid with certified spheres, large ones first.
+///
+/// Same solid and settings give the same spheres, bit for bit, for any number of threads (a time
+/// limit or cancel excepted).
+/// A cancelled packing ends with what is packed so far.
+///
+/// Throws Error on settings out of range.
 SpherePacking pack(const Solid& solid, const PackingSettings& settings = {},
                    const ProgressCallback& progress = {});
 

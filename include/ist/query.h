@@ -15,9 +15,9 @@ enum class QueryStatus : std::uint32_t {
   ok = 0,  ///< finished: the gradients are exactly those of the returned volume
   /// A limit of the settings or the workspace's capacity stopped the descent: bounds still hold.
   budget_exhausted = 1,
-  /// The answer is all zero. A pose with NaN or Inf, a quaternion off unit length by > 1e-3, a
-  /// scale ≤ 0, an empty tree, sizes or distances more than 1e60 : 1 apart, or a workspace that was
-  /// moved from.
+  /// The answer is all zero. One of: a pose with NaN or Inf; a quaternion off unit length by more
+  /// than 1e-3; a scale ≤ 0; an empty tree; sizes or distances more than 1e60 : 1 apart; a
+  /// workspace that was moved from.
   invalid_input = 2,
 };
 
@@ -115,12 +115,16 @@ struct Separation {
   std::uint32_t sphere_pairs = 0;  ///< sphere pairs measured
 };
 
-/// Scratch memory of a query: make one a thread, once. It never changes an answer; a query that
-/// needs more than its capacity stops with budget_exhausted.
+/// Scratch memory of a query: make one a thread, once.
+///
+/// It never changes an answer.
+/// A query that needs more than its capacity stops with budget_exhausted.
 class Workspace {
  public:
-  /// `capacity`: node pairs that may wait at once; the default serves two trees of 64,000 spheres
-  /// at any pose. Throws std::bad_alloc.
+  /// `capacity`: count of node pairs that may wait at once. The default serves two trees of 64,000
+  /// spheres at any pose.
+  ///
+  /// Throws std::bad_alloc.
   explicit Workspace(std::size_t capacity = 1u << 20);
   ~Workspace();
   Workspace(Workspace&&) noexcept;
@@ -133,25 +137,37 @@ class Workspace {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Volume, wrench and centroid of the overlap (DESIGN 7). Copies of one asset at nearly the same
-/// pose are asked as unlike levels of detail, whose spheres do not repeat each other (DESIGN 5). No
-/// allocation, lock or exception. Trees may be shared by threads; the workspace may not.
+/// Volume, wrench and centroid of the overlap.
+///
+/// The gradients of a finished query are those of the returned volume.
+/// Copies of one asset at nearly the same pose are asked as unlike levels of detail, since equal
+/// spheres on top of each other would count too much.
+///
+/// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 Penetration penetration(const PlacedTree& a, const PlacedTree& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept;
 
-/// `whole`, what penetration() answered for these two in the matched measure without a pair budget,
-/// freed of the soft skin where flat faces meet: nothing across a gap of a fifth of a mean sphere
-/// radius and more, less volume nearer and in the first fifth of depth, where the spheres that
-/// stick out count too much. Told from volume and force alone: round or deeper contacts come back
-/// as they are, and a large ball that touches lightly may pass for flat. Both stay continuous in
-/// the pose; the force is the volume's gradient but for 15 %, so use it for contacts, not where
-/// energy must be kept. volume_min is lowered to hold the new volume. A few nanoseconds.
+/// An answer without what protruding spheres add where flat faces meet.
+///
+/// Nothing is left across a gap of a fifth of a mean sphere radius and more.
+/// Nearer, and in the first fifth of depth, the volume is less.
+/// Round and deeper contacts come back as they are. All is told from volume and force alone, so a
+/// large ball that touches lightly may pass for flat.
+/// Volume and force stay continuous in the pose. The force is the volume's gradient but for 15 %:
+/// use it for contacts, not where energy must be kept.
+/// volume_min is lowered to hold the new volume.
+///
+/// `whole`: what penetration() answered for these two in the matched measure without a pair budget.
+/// Takes a few nanoseconds.
 Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
                                const PlacedTree& b) noexcept;
 
-/// Distance of the inner spheres, with a certified interval for the solids and witness points, to
-/// about 1e-6 of the objects' size. Once one
-/// object's spheres overlap the other's all is zero. No allocation, lock or exception.
+/// Distance of the inner spheres, witness points, and a certified interval for the solids.
+///
+/// Exact to about 1e-6 of the objects' size.
+/// Once one object's spheres overlap the other's all is zero.
+///
+/// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 Separation separation(const PlacedTree& a, const PlacedTree& b, const SeparationSettings& settings,
                       Workspace& workspace) noexcept;
 
@@ -168,7 +184,8 @@ PenetrationAndSeparation query(const PlacedTree& a, const PlacedTree& b,
 /// the smaller solid.
 struct ContactPatch {
   /// Names the region: the same in every query of the same two trees in the same measure, so that a
-  /// solver finds what it kept of the patch. Other pairs of trees use the same names.
+  /// solver finds what it kept of the patch.
+  /// Other pairs of trees use the same names.
   std::uint64_t id = 0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the patch's overlap, world
   /// Unit, world: the direction in which the patch pushes B, from A to B; zero if the area is.
@@ -191,11 +208,15 @@ struct ContactPatches {
   std::size_t count = 0;  ///< patches written
 };
 
-/// The contact condensed into at most patches.size() patches; volumes, forces and torques sum to
-/// the whole's to about 1e-15. The contact is divided along the tree of the smaller solid (B's if
-/// equal or if A is too coarse), always at the same places; a budgeted query's guess of what it did
-/// not open is shared out too. Costs 1.7 (one patch) to 2.4 (32) times a penetration. No
-/// allocation, lock or exception.
+/// The contact condensed into at most patches.size() patches.
+///
+/// Volumes, forces and torques sum to the whole's to about 1e-15.
+/// The contact is divided along the tree of the smaller solid (B's if equal or if A is too coarse),
+/// always at the same places.
+/// What a stopped query estimates of unopened nodes is divided too.
+/// Costs 1.7 (one patch) to 2.4 (32) times a penetration.
+///
+/// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept;
@@ -214,10 +235,13 @@ struct ParallelFor {
   void* pool = nullptr;  ///< handed to `run`
 };
 
-/// answers[i] = penetration(pairs[i]), the same bits, for as many as there are answers. As many
-/// workers as workspaces; pairs are handed out by an atomic counter, so that a pool need not
-/// balance them. Without a workspace every answer is budget_exhausted with no upper bound. No
-/// allocation or lock but the pool's own; an exception of `run` ends the program.
+/// answers[i] = penetration(pairs[i]), the same bits, for as many as there are answers.
+///
+/// There are as many workers as workspaces; without any, every answer is budget_exhausted with no
+/// upper bound.
+/// Pairs are handed out by an atomic counter, so that a pool need not balance them.
+///
+/// No allocation or lock but the pool's own. An exception of `run` ends the program.
 void penetration_batch(std::span<const PlacedPair> pairs, const PenetrationSettings& settings,
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel = {}) noexcept;

@@ -11,7 +11,7 @@
 namespace ist {
 
 /// Places a solid in the unit cube by a shift and a power of two, so that nothing downstream
-/// depends on the mesh's unit or offset: x_unit = (x − centre) · 2^−exponent (DESIGN 3.1).
+/// depends on the mesh's unit or offset: x_unit = (x − centre) · 2^−exponent.
 struct UnitFrame {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< [u]
   int exponent = 0;                                  ///< half-extent in (½, 1] after scaling
@@ -46,7 +46,8 @@ class Solid {
   virtual const MeshSolid* mesh() const noexcept { return nullptr; }
 };
 
-/// The solid of a closed mesh: where its winding number is ≥ 1 (DESIGN 3.6). Copies the mesh.
+/// The solid of a closed mesh: where its winding number is ≥ 1, so that what two shells share
+/// counts once. Copies the mesh.
 std::unique_ptr<Solid> make_solid(const ClosedMesh& mesh);
 
 /// Analytic solids. Radii and half-extents [u] must be finite and > 0, else Error.
@@ -56,9 +57,13 @@ std::unique_ptr<Solid> make_box(const Eigen::Vector3d& centre, const Eigen::Vect
 /// of the tube.
 std::unique_ptr<Solid> make_torus(const Eigen::Vector3d& centre, double major, double minor);
 
-/// Boolean combinations by min and max of signed distances. Their volume is integrated on first
-/// use (some 0.1 s); volume_error() is then an estimate with room (six times the error or more on
-/// smooth solids), not a proof. Error for an intersection of solids whose bounds do not meet.
+/// Boolean combinations by min and max of signed distances.
+///
+/// Their volume is integrated on first use (some 0.1 s).
+/// volume_error() is then an estimate with room (six times the error or more on smooth solids), not
+/// a proof.
+///
+/// Throws Error for an intersection of solids whose bounds do not meet.
 std::unique_ptr<Solid> make_union(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b);
 std::unique_ptr<Solid> make_intersection(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b);
 std::unique_ptr<Solid> make_difference(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b);
