@@ -1,6 +1,8 @@
-# Warnings, floating-point rules and sanitizers of every target of this project. A warning ends the
+# Language, warnings, floating-point rules and sanitizers of every target of this project. A warning ends the
 # build, but not that of a project that this one is a part of.
 function(ist_compile_options target)
+  set_target_properties(${target} PROPERTIES
+    CXX_STANDARD 20 CXX_STANDARD_REQUIRED ON CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
   target_compile_options(${target} PRIVATE
     # The same bytes on any machine (docs/design.md 3.3): nothing is fused or re-associated.
     $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wconversion;-ffp-contract=off>

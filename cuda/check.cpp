@@ -18,6 +18,7 @@ const char* way_out(cudaError_t status) {
       return "the driver is older than CUDA 13: update it, or bake on the CPU";
     case cudaErrorNoKernelImageForDevice:
     case cudaErrorUnsupportedPtxVersion:
+    case cudaErrorJitCompilerNotFound:
       return "this build has no code for this GPU: build with its CMAKE_CUDA_ARCHITECTURES, or "
              "bake on the CPU";
     default:

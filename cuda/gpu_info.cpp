@@ -2,37 +2,77 @@
 #include <ist/error.h>
 #include <ist/gpu.h>
 
+#include <string>
+
 #include "cuda/check.h"
+#include "cuda/device_code.h"
 
 namespace ist {
 namespace {
 
-/// nullptr if device `device` can run this build's kernels.
-const char* obstacle(int device) {
+constexpr int kOldest = 75;  // compute capability; CUDA 13 has none older
+
+/// What the device answers to `find_device_code()`.
+cudaError_t code_for(int device) {
+  int previous = 0;
+  cudaError_t status = cudaGetDevice(&previous);
+  if (status == cudaSuccess) status = cudaSetDevice(device);
+  if (status == cudaSuccess) status = gpu::find_device_code();
+  if (previous != device) cudaSetDevice(previous);
+  return status;
+}
+
+std::string with_point(int capability) {
+  return std::to_string(capability / 10) + "." + std::to_string(capability % 10);
+}
+
+/// Why device `device` cannot run this build's kernels; empty if it can.
+std::string obstacle(int device) {
   int count = 0;
-  const cudaError_t status = cudaGetDeviceCount(&count);
-  cudaGetLastError();
+  const cudaError_t found = cudaGetDeviceCount(&count);
   int driver = 0;
-  if (status == cudaErrorInsufficientDriver && cudaDriverGetVersion(&driver) == cudaSuccess &&
+  if (found == cudaErrorInsufficientDriver && cudaDriverGetVersion(&driver) == cudaSuccess &&
       driver != 0)
     return "the GPU driver is older than CUDA 13";
-  if (status != cudaSuccess || count == 0) return "there is no GPU here, or no driver for it";
+  if (found != cudaSuccess || count == 0) return "there is no GPU here, or no driver for it";
   if (device < 0 || device >= count) return "there is no GPU of that index";
-  cudaDeviceProp properties{};
-  if (cudaGetDeviceProperties(&properties, device) != cudaSuccess) {
-    cudaGetLastError();
-    return "the GPU does not answer";
+  const auto attribute = [device](cudaDeviceAttr which) {
+    int value = 0;
+    return cudaDeviceGetAttribute(&value, which, device) == cudaSuccess ? value : 0;
+  };
+  const int capability = 10 * attribute(cudaDevAttrComputeCapabilityMajor) +
+                         attribute(cudaDevAttrComputeCapabilityMinor);
+  if (capability == 0) return "the GPU does not answer";
+  if (capability < kOldest)
+    return "the GPU has compute capability " + with_point(capability) + ", and " +
+           with_point(kOldest) + " is the oldest that ist runs on";
+  if (attribute(cudaDevAttrCooperativeLaunch) == 0)
+    return "the GPU or its driver's mode has no cooperative launch";
+  if (attribute(cudaDevAttrMemoryPoolsSupported) == 0)
+    return "the GPU or its driver's mode has no memory pools (cudaMallocAsync)";
+  switch (const cudaError_t code = code_for(device)) {
+    case cudaSuccess:
+      return {};
+    case cudaErrorNoKernelImageForDevice:
+    case cudaErrorInvalidDeviceFunction:
+    case cudaErrorUnsupportedPtxVersion:
+    case cudaErrorJitCompilerNotFound:
+      return "this build has no code for compute capability " + with_point(capability) + " (" +
+             cudaGetErrorName(code) +
+             "): build it with -DCMAKE_CUDA_ARCHITECTURES=" + std::to_string(capability);
+    default:
+      return std::string("the GPU cannot be used: ") + cudaGetErrorString(code) + " (" +
+             cudaGetErrorName(code) + ")";
   }
-  if (properties.major < 9) return "the GPU is older than compute capability 9.0";
-  return nullptr;
 }
 
 }  // namespace
 
 bool gpu_available(int device, std::string* why) {
-  const char* const found = obstacle(device);
-  if (found != nullptr && why != nullptr) *why = found;
-  return found == nullptr;
+  const std::string found = obstacle(device);
+  cudaGetLastError();  // an error that is not sticky must not be met again by the next call
+  if (!found.empty() && why != nullptr) *why = found;
+  return found.empty();
 }
 
 GpuInfo gpu_info(int device) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "cuda/warp_reduce.h"
 #include "numerics/team.h"
 
 namespace ist::gpu {
@@ -11,7 +12,7 @@ namespace ist::gpu {
 /// The 32 threads of a warp (mesh/team.h). All of them must be converged at every call.
 struct WarpTeam {
   static constexpr int kWidth = 32;
-  static constexpr unsigned kAll = 0xFFFFFFFFu;
+  static constexpr unsigned kAll = kWholeWarp;
 
   __device__ int lane() const { return static_cast<int>(threadIdx.x & 31u); }
   static constexpr int kBatch = 1;
@@ -25,10 +26,10 @@ struct WarpTeam {
     return p;
   }
 
-  __device__ std::uint32_t min(std::uint32_t value) const { return __reduce_min_sync(kAll, value); }
-  __device__ std::uint32_t max(std::uint32_t value) const { return __reduce_max_sync(kAll, value); }
-  __device__ int min(int value) const { return __reduce_min_sync(kAll, value); }
-  __device__ int max(int value) const { return __reduce_max_sync(kAll, value); }
+  __device__ std::uint32_t min(std::uint32_t value) const { return warp_min(value); }
+  __device__ std::uint32_t max(std::uint32_t value) const { return warp_max(value); }
+  __device__ int min(int value) const { return warp_min(value); }
+  __device__ int max(int value) const { return warp_max(value); }
   __device__ float min(float value) const { return from_ordered_bits(min(ordered_bits(value))); }
   __device__ float max(float value) const { return from_ordered_bits(max(ordered_bits(value))); }
   __device__ std::uint64_t min(std::uint64_t value) const {
@@ -42,7 +43,9 @@ struct WarpTeam {
   __device__ double min(double value) const { return from_ordered_bits(min(ordered_bits(value))); }
   __device__ double max(double value) const { return from_ordered_bits(max(ordered_bits(value))); }
 
-  __device__ int sum(int value) const { return __reduce_add_sync(kAll, value); }
+  __device__ int sum(int value) const {
+    return static_cast<int>(warp_sum(static_cast<std::uint32_t>(value)));
+  }
   __device__ bool any(bool flag) const { return __any_sync(kAll, flag) != 0; }
   __device__ bool all(bool flag) const { return __all_sync(kAll, flag) != 0; }
 

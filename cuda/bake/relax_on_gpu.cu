@@ -1,6 +1,7 @@
 #include "cuda/bake/relax_on_gpu.h"
 
 #include "cuda/block_team.h"
+#include "cuda/warp_reduce.h"
 #include "cuda/warp_team.h"
 
 namespace ist::gpu {
@@ -41,13 +42,12 @@ __device__ void add_sums(PowerSums& sums, const PowerSums& piece) {
 }
 
 /// Sum over the warp, modulo 2^64: in three parts whose sums fit 32 bits.
-__device__ unsigned long long warp_sum(unsigned long long value) {
-  constexpr unsigned kAll = 0xFFFFFFFFu;
+__device__ unsigned long long wide_warp_sum(unsigned long long value) {
   constexpr int kBits = 22;
   constexpr unsigned kMask = (1u << kBits) - 1;
-  const unsigned low = __reduce_add_sync(kAll, static_cast<unsigned>(value) & kMask);
-  const unsigned middle = __reduce_add_sync(kAll, static_cast<unsigned>(value >> kBits) & kMask);
-  const unsigned high = __reduce_add_sync(kAll, static_cast<unsigned>(value >> 2 * kBits));
+  const unsigned low = warp_sum(static_cast<unsigned>(value) & kMask);
+  const unsigned middle = warp_sum(static_cast<unsigned>(value >> kBits) & kMask);
+  const unsigned high = warp_sum(static_cast<unsigned>(value >> 2 * kBits));
   return low + (static_cast<unsigned long long>(middle) << kBits) +
          (static_cast<unsigned long long>(high) << 2 * kBits);
 }
@@ -73,7 +73,7 @@ __device__ void walk_short(const WarpTeam& team, const PowerRound& round, const 
   for (std::uint32_t at = 0; at < count; ++at) {
     if (!team.any(mine[at].length != 0)) continue;
     const auto sum = [](std::int64_t value) {
-      return static_cast<std::int64_t>(warp_sum(static_cast<unsigned long long>(value)));
+      return static_cast<std::int64_t>(wide_warp_sum(static_cast<unsigned long long>(value)));
     };
     const PowerSums all = {sum(mine[at].length), sum(mine[at].x), sum(mine[at].y), sum(mine[at].z)};
     if (team.lane() == 0) add_sums(round.sums[list[at]], all);

@@ -1,0 +1,26 @@
+# ist::ist is all of it: import, solid, packing, calibration, trees, assets, queries.
+include(cmake/ist_cuda.cmake)
+find_package(assimp QUIET)
+find_package(TBB QUIET)
+find_path(NLOHMANN_JSON_INCLUDE_DIR nlohmann/json.hpp)  # header only
+if(NOT assimp_FOUND OR NOT TBB_FOUND OR NOT NLOHMANN_JSON_INCLUDE_DIR)
+  message(FATAL_ERROR "ist: baking needs assimp (found: ${assimp_FOUND}), oneTBB (${TBB_FOUND}) and "
+    "nlohmann-json (${NLOHMANN_JSON_INCLUDE_DIR}): install them, or configure with "
+    "-DIST_QUERY_ONLY=ON to build ist::query, which needs none of them")
+endif()
+
+add_subdirectory(src)
+add_subdirectory(src/asset)
+add_subdirectory(ist/bake)
+
+get_property(objects GLOBAL PROPERTY IST_ROOM_OBJECTS)
+add_library(ist STATIC ${objects})
+add_library(ist::ist ALIAS ist)
+set_target_properties(ist PROPERTIES LINKER_LANGUAGE CXX)
+target_link_libraries(ist PUBLIC ist_query PRIVATE assimp::assimp TBB::tbb)
+if(IST_HAVE_CUDA)
+  target_link_libraries(ist PRIVATE CUDA::cudart_static)
+endif()
+if(PROJECT_IS_TOP_LEVEL)
+  add_subdirectory(src/app)
+endif()
