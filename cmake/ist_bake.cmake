@@ -1,5 +1,4 @@
 # ist::ist is all of it: import, solid, packing, calibration, trees, assets, queries.
-include(cmake/ist_cuda.cmake)
 find_package(assimp QUIET)
 find_package(TBB QUIET)
 find_path(NLOHMANN_JSON_INCLUDE_DIR nlohmann/json.hpp)  # header only
@@ -8,6 +7,7 @@ if(NOT assimp_FOUND OR NOT TBB_FOUND OR NOT NLOHMANN_JSON_INCLUDE_DIR)
     "nlohmann-json (${NLOHMANN_JSON_INCLUDE_DIR}): install them, or configure with "
     "-DIST_QUERY_ONLY=ON to build ist::query, which needs none of them")
 endif()
+include(cmake/ist_cuda.cmake)
 
 add_subdirectory(src)
 add_subdirectory(src/asset)

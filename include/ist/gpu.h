@@ -37,7 +37,8 @@ struct GpuInfo {
 };
 
 /// Whether this build can bake on device `device` here; if not, `why` says what is missing (no GPU
-/// backend in this build, no device, a driver that is too old, …).
+/// backend in this build, no device, no code for it, a driver that is too old, …). Makes the
+/// device's CUDA context, if there is a device.
 bool gpu_available(int device = 0, std::string* why = nullptr);
 
 /// Throws Error, with the way out, where gpu_available() is false.
