@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/backend/make_backend.h"
 #include "bake/calibrate/calibration.h"
 #include "bake/cluster/tree_builder.h"
 #include "bake/cover/cover.h"

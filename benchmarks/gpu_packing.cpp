@@ -32,7 +32,7 @@ struct Run {
 Run run_once(const ist::MeshSolid& solid, std::size_t count, bool split) {
   const ist::MeshView& view = solid.view();
   const ist::gpu::HostMesh mesh{
-      view.vertices_exact, view.triangles, view.vertex_count, view.triangle_count, {}, 1};
+      view.vertices, view.triangles, view.vertex_count, view.triangle_count, {}, 1};
   ist::packing::PackingLimits limits;
   limits.volume = solid.unit_volume();
   limits.max_spheres = count;

@@ -6,7 +6,7 @@
 
 namespace ist::gpu {
 
-/// The threads of a block (mesh/team.h). All of them must make the same calls.
+/// The threads of a block (numerics/team.h). All of them must make the same calls.
 template <int kThreads>
 class BlockTeam {
   static constexpr int kWarps = kThreads / 32;

@@ -12,8 +12,8 @@
 #include "cuda/grids/device_grid_rounds.h"
 #include "cuda/queue.h"
 #include "mesh/mesh_solid.h"
-#include "packing/grids/medial_grids.h"
 #include "packing/base/packing_settings.h"
+#include "packing/grids/medial_grids.h"
 #include "stage/stage.h"
 
 namespace ist::gpu {
@@ -27,7 +27,7 @@ const GpuSettings& usable(const GpuSettings& settings) {
 
 HostMesh host_mesh(const MeshView& arrays) {
   HostMesh mesh;  // in the unit frame already
-  mesh.vertices = arrays.vertices_exact;
+  mesh.vertices = arrays.vertices;
   mesh.triangles = arrays.triangles;
   mesh.vertex_count = arrays.vertex_count;
   mesh.triangle_count = arrays.triangle_count;

@@ -9,7 +9,7 @@
 
 namespace ist::gpu {
 
-/// The 32 threads of a warp (mesh/team.h). All of them must be converged at every call.
+/// The 32 threads of a warp (numerics/team.h). All of them must be converged at every call.
 struct WarpTeam {
   static constexpr int kWidth = 32;
   static constexpr unsigned kAll = kWholeWarp;

@@ -10,8 +10,8 @@
 
 namespace ist::gpu {
 
-/// A mesh cut into columns and the octree over them, in device memory (build/column_lattice.h,
-/// build/power_cells.h).
+/// A mesh cut into columns and the octree over them, in device memory
+/// (bake/calibrate/column_lattice.h, bake/calibrate/power_cells.h).
 class ColumnsOnGpu {
  public:
   ColumnsOnGpu(Queue& queue, const WideTree& mesh, const ColumnPlan& plan);

@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-#include "bake/cover/cover_cells.h"
+#include "backend/tasks.h"
 #include "cuda/queue.h"
 #include "mesh/wide_tree.h"
 

@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include <ist/asset_layout.h>
+#include <ist/sphere.h>
 #include "cuda/queue.h"
 #include "mesh/wide_tree.h"
 

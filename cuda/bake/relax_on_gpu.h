@@ -3,7 +3,7 @@
 #include <functional>
 #include <span>
 
-#include "bake/calibrate/power_relaxation.h"
+#include "backend/tasks.h"
 #include "cuda/bake/columns_on_gpu.h"
 
 namespace ist::gpu {

@@ -17,9 +17,9 @@ constexpr std::size_t kShared = sizeof(Scratch) * (kThreads / 32);  // bytes a b
 static_assert(kShared <= 64 << 10, "what compute capability 7.5 gives a block");
 
 __global__ void __launch_bounds__(kThreads, 1)
-    banded_kernel(const BandedArrays arrays, const WideTree mesh, GridBarrier* place) {
+    banded_kernel(const BandedArrays arrays, const WideTree mesh, GridBarrier* barrier) {
   extern __shared__ Scratch scratch[];
-  WarpCoopGrid<Scratch> coop(place, scratch);
+  WarpCoopGrid<Scratch> coop(barrier, scratch);
   pack_banded(coop, arrays, packing::WideMeshSurface(mesh));
 }
 
@@ -37,7 +37,7 @@ unsigned resident_blocks(const Queue& queue) {
 }  // namespace
 
 void launch_banded(Queue& queue, const BandedArrays& arrays, const WideTree& mesh,
-                   GridBarrier* place) {
+                   GridBarrier* barrier) {
   check(cudaFuncSetAttribute(banded_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                              static_cast<int>(kShared)),
         "preparing the packing kernel");
@@ -51,7 +51,7 @@ void launch_banded(Queue& queue, const BandedArrays& arrays, const WideTree& mes
   together.val.cooperative = 1;
   config.attrs = &together;
   config.numAttrs = 1;
-  check(cudaLaunchKernelEx(&config, banded_kernel, arrays, mesh, place),
+  check(cudaLaunchKernelEx(&config, banded_kernel, arrays, mesh, barrier),
         "starting the packing kernel");
 }
 

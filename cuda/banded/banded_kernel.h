@@ -15,6 +15,6 @@ struct GridBarrier {
 /// Enqueues a cooperative grid that packs from the step that the state says until it is finished or
 /// needs something (banded_loop.h).
 void launch_banded(Queue& queue, const BandedArrays& arrays, const WideTree& mesh,
-                   GridBarrier* place);
+                   GridBarrier* barrier);
 
 }  // namespace ist::gpu

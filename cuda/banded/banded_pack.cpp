@@ -115,8 +115,8 @@ SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::Pac
                           Stage& stage, BandedCost* cost) {
   BandedBuffers<DeviceArray, Queue> buffers(queue, packing::BandSchedule(limits),
                                             banded_sizes(limits.max_spheres));
-  DeviceArray<GridBarrier> place(queue, 1);
-  place.fill_bytes(0);
+  DeviceArray<GridBarrier> barrier(queue, 1);
+  barrier.fill_bytes(0);
   Watch watch(limits, stage);
   BandedState state;
   std::uint32_t launches = 0;
@@ -125,7 +125,7 @@ SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::Pac
       BandedArrays arrays = buffers.arrays();
       arrays.mailbox = watch.mailbox();
       arrays.timed = cost != nullptr;
-      launch_banded(queue, arrays, mesh, place.data());
+      launch_banded(queue, arrays, mesh, barrier.data());
       ++launches;
       watch.wait(queue);
       state = buffers.state();

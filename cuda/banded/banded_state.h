@@ -70,13 +70,6 @@ struct RankBuckets {
   std::uint32_t head[kCount];  ///< 1 + a winner, 0: none
 };
 
-/// The float of these bits.
-IST_HD inline float float_of(std::uint32_t bits) {
-  float x;
-  std::memcpy(&x, &bits, sizeof x);
-  return x;
-}
-
 /// A sphere in one load.
 struct alignas(16) StoredSphere {
   float x, y, z, r;

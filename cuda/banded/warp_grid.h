@@ -20,9 +20,9 @@ class WarpCoopGrid {
   using Scratch = Scratch_;
 
   /// `scratch`: shared memory, one a warp.
-  __device__ WarpCoopGrid(GridBarrier* place, Scratch* scratch)
-      : place_(place), scratch_(scratch + threadIdx.x / 32) {
-    generation_ = atomic_load(&place->generation);
+  __device__ WarpCoopGrid(GridBarrier* barrier, Scratch* scratch)
+      : barrier_(barrier), scratch_(scratch + threadIdx.x / 32) {
+    generation_ = atomic_load(&barrier->generation);
   }
 
   __device__ const Team& team() const { return team_; }
@@ -43,14 +43,14 @@ class WarpCoopGrid {
     __syncthreads();
     if (threadIdx.x == 0) {
       __threadfence();
-      if (atomicAdd(&place_->here, 1u) == gridDim.x - 1) {
+      if (atomicAdd(&barrier_->here, 1u) == gridDim.x - 1) {
         __threadfence();
-        place_->here = 0;
+        barrier_->here = 0;
         last();
         __threadfence();
-        atomicExch(&place_->generation, generation_ + 1);
+        atomicExch(&barrier_->generation, generation_ + 1);
       } else {
-        while (atomic_load(&place_->generation) == generation_) {
+        while (atomic_load(&barrier_->generation) == generation_) {
         }
         __threadfence();
       }
@@ -60,7 +60,7 @@ class WarpCoopGrid {
   }
 
  private:
-  GridBarrier* place_;
+  GridBarrier* barrier_;
   Scratch* scratch_;
   std::uint32_t generation_;
   Team team_;

@@ -157,7 +157,7 @@ DeviceGrid::DeviceGrid(Queue& queue, const MeshView& mesh)
       corners_(queue, 3 * std::size_t{mesh.triangle_count}),
       triangles_(queue, mesh.triangle_count),
       counter_(queue, 1) {
-  vertices_.upload(std::span(mesh.vertices_exact, vertices_.size()));
+  vertices_.upload(std::span(mesh.vertices, vertices_.size()));
   corners_.upload(std::span(mesh.triangles, corners_.size()));
   prepare_triangles(queue, vertices_, corners_, triangles_);
 }

@@ -9,7 +9,7 @@
 #include <ist/error.h>
 
 #include "asset/asset_writer.h"
-#include "backend/solid_backend.h"
+#include "bake/backend/make_backend.h"
 #include "bake/calibrate/calibration.h"
 #include "bake/cluster/tree_builder.h"
 #include "bake/cover/cover.h"

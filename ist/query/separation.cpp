@@ -15,6 +15,9 @@
 namespace ist {
 namespace {
 
+// Part of a deadline for visits. Nothing is estimated afterwards; the rest is for the witness.
+constexpr double kForVisits = 0.95;
+
 /// Depth-first branch and bound, nearest child first, for two minima at once: the gap of the inner
 /// spheres and that of their cover balls. All in A's unit frame.
 class GapDescent {
@@ -28,7 +31,7 @@ class GapDescent {
         scale_(pose.a_from_b.scale),
         precision_(precision_for_gap(a, b, pose)),
         stack_(scratch.waiting.get()),
-        budget_(limits_of(settings)) {}
+        budget_(limits_of(settings), kForVisits) {}
 
   void run() {
     measure(a_.sphere(0, 0), b_.sphere(0, 0));
@@ -191,12 +194,6 @@ Separation separation(const PlacedTree& a, const PlacedTree& b, const Separation
   result.point_b = pose->to_world(descent.centre_b() - descent.radius_b() * axis);
   result.normal = pose->rotation_a * axis;
   return result;
-}
-
-PenetrationAndSeparation query(const PlacedTree& a, const PlacedTree& b,
-                               const QuerySettings& settings, Workspace& workspace) noexcept {
-  return {penetration(a, b, settings.penetration, workspace),
-          separation(a, b, settings.separation, workspace)};
 }
 
 }  // namespace ist

@@ -153,7 +153,7 @@ void note_findings(MeshReport& report) {
                            " in which sheets only touch");
 }
 
-/// Degenerate and coincident triangles (DESIGN 3.6).
+/// Degenerate and coincident triangles (docs/design.md 3.6).
 void reduce(TriangleMesh& mesh, MeshReport& report) {
   const std::size_t dropped = drop_degenerate(mesh.vertices, mesh.triangles);
   if (dropped > 0) report.notes.push_back(counted(dropped, "degenerate triangle") + " dropped");

@@ -16,7 +16,7 @@ ClosestPoint exact_closest_point(const MeshView& mesh, const Eigen::Vector3d& p,
   float radius2 = reach.reach2(best2);
   for_triangles_near(mesh, reach.p, radius2, [&](const NearTriangle& near) {
     const std::uint32_t* t = mesh.triangles + 3 * std::size_t{near.triangle};
-    const auto corner = [&](int i) { return mesh.vertices_exact + 3 * std::size_t{t[i]}; };
+    const auto corner = [&](int i) { return mesh.vertices + 3 * std::size_t{t[i]}; };
     double point[3];
     const double distance2 = exact_closest_in({corner(0), corner(1), corner(2)}, p.data(), point);
     if (distance2 < best2 ||

@@ -16,7 +16,7 @@ struct Corners {
 
 IST_HD inline Corners corners_of(const MeshView& mesh, std::uint32_t triangle) {
   const std::uint32_t* t = mesh.triangles + 3 * std::size_t{triangle};
-  const auto at = [&](int i) { return mesh.vertices_exact + 3 * std::size_t{t[i]}; };
+  const auto at = [&](int i) { return mesh.vertices + 3 * std::size_t{t[i]}; };
   return {{at(0), at(1), at(2)}};
 }
 

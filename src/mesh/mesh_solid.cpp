@@ -23,7 +23,6 @@ struct MeshSolid::Impl {
   UnitFrame frame;
   Eigen::AlignedBox3d bounds;
   std::vector<double> vertices;  // unit frame
-  std::vector<float> vertices_float;
   std::vector<std::uint32_t> triangles;
   MeshView arrays;
   std::uint64_t hash = 0;
@@ -105,27 +104,12 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
   }
   impl_->frame = unit_frame(impl_->bounds);
   impl_->vertices.resize(3 * std::size_t{count});
-  impl_->vertices_float.resize(3 * std::size_t{count});
-  using Range = tbb::blocked_range<std::size_t>;
-  impl_->arrays.vertex_error = tbb::parallel_reduce(
-      Range(0, mesh.vertices.size()), 0.0f,
-      [&](const Range& range, float largest) {
-        for (std::size_t v = range.begin(); v != range.end(); ++v) {
-          if (place[v] == kUnused) continue;
-          const Eigen::Vector3d x = impl_->frame.to_unit(mesh.vertices[v]);
-          for (std::size_t k = 0; k < 3; ++k) {
-            const double exact = x[static_cast<int>(k)];
-            const auto rounded = static_cast<float>(exact);
-            impl_->vertices[3 * std::size_t{place[v]} + k] = exact;
-            impl_->vertices_float[3 * std::size_t{place[v]} + k] = rounded;
-            const auto error = static_cast<float>(std::abs(static_cast<double>(rounded) - exact));
-            // Largest error of a coordinate times √3, generously rounded.
-            largest = std::max(largest, 1.8f * error);
-          }
-        }
-        return largest;
-      },
-      [](float a, float b) { return std::max(a, b); });
+  tbb::parallel_for(std::size_t{0}, mesh.vertices.size(), [&](std::size_t v) {
+    if (place[v] == kUnused) return;
+    const Eigen::Vector3d x = impl_->frame.to_unit(mesh.vertices[v]);
+    for (std::size_t k = 0; k < 3; ++k)
+      impl_->vertices[3 * std::size_t{place[v]} + k] = x[static_cast<int>(k)];
+  });
   impl_->triangles.resize(3 * mesh.triangles.size());
   tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
     for (std::size_t k = 0; k < 3; ++k) impl_->triangles[3 * t + k] = place[mesh.triangles[t][k]];
@@ -133,8 +117,7 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
 
   impl_->hash = hash_mesh(impl_->frame, impl_->vertices, impl_->triangles);
   MeshView& arrays = impl_->arrays;
-  arrays.vertices = impl_->vertices_float.data();
-  arrays.vertices_exact = impl_->vertices.data();
+  arrays.vertices = impl_->vertices.data();
   arrays.triangles = impl_->triangles.data();
   arrays.vertex_count = count;
   arrays.triangle_count = static_cast<std::uint32_t>(mesh.triangles.size());

@@ -51,7 +51,7 @@ struct MeshBox {
 };
 
 MeshBox box_of(const MeshView& mesh) {
-  const double* p = mesh.vertices_exact;
+  const double* p = mesh.vertices;
   MeshBox box = {{p[0], p[1], p[2]}, {p[0], p[1], p[2]}};
   for (const double* end = p + 3 * std::size_t{mesh.vertex_count}; p != end; p += 3)
     for (int k = 0; k < 3; ++k) {

@@ -18,9 +18,9 @@ using HierarchyMaker = std::function<const MeshView&()>;
 /// rounding. Where the winding number is only 0 or 1, this is the volume of the solid.
 MeshVolume enclosed_volume(const MeshView& mesh);
 
-/// Volume of the set where the winding number is ≥ 1 (DESIGN 3.6): the enclosed volume less the
-/// excess ∫ (winding − [winding ≥ 1]), integrated exactly along x and adaptively along y and z. No
-/// excess, no loss of accuracy. The error of the excess is estimated: the bends of the last
+/// Volume of the set where the winding number is ≥ 1 (docs/design.md 3.6): the enclosed volume less
+/// the excess ∫ (winding − [winding ≥ 1]), integrated exactly along x and adaptively along y and z.
+/// No excess, no loss of accuracy. The error of the excess is estimated: the bends of the last
 /// intervals, summed without signs, and, unless `meets_itself` is false, what folds of the surface
 /// may hide between the columns. The same for any number of threads. Of `mesh` the arrays suffice;
 /// the hierarchy is asked for only where there is an excess.

@@ -66,7 +66,7 @@ struct Nesting {
 
 /// Turns every shell outward, except that an inward shell within solid is a cavity and stays. An
 /// outermost shell that turns takes along what lies in it, so that a mesh which is inside out as a
-/// whole keeps its cavities (DESIGN 3.6).
+/// whole keeps its cavities (docs/design.md 3.6).
 Nesting orient_shells(const std::vector<Eigen::Vector3d>& vertices,
                       std::vector<Triangle>& triangles, const Shells& shells);
 

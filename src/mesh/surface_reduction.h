@@ -20,9 +20,9 @@ std::size_t count_odd_edges(const EdgeTable& edges);
 std::size_t drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
                             std::vector<Triangle>& triangles);
 
-/// Replaces triangles with the same three corners by their signed sum (DESIGN 3.6): copies become
-/// one, opposite ones vanish. Where that leaves a border and one copy does not, one copy stays; the
-/// choice is made for each edge-connected group of them. Returns the number removed.
+/// Replaces triangles with the same three corners by their signed sum (docs/design.md 3.6): copies
+/// become one, opposite ones vanish. Where that leaves a border and one copy does not, one copy
+/// stays; the choice is made for each edge-connected group of them. Returns the number removed.
 std::size_t reduce_coincident(std::vector<Triangle>& triangles);
 
 }  // namespace ist

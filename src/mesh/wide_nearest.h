@@ -7,9 +7,9 @@
 #include "mesh/exact_triangle.h"
 #include "mesh/wide_traversal.h"
 
-// Distance queries of a WideTree, by a team: one thread or a warp (mesh/team.h). The answers are
-// those of closest_point.h and exact_closest_point.h, bit for bit. All lanes ask the same and get
-// the same.
+// Distance queries of a WideTree, by a team: one thread or a warp (numerics/team.h). The answers
+// are those of closest_point.h and exact_closest_point.h, bit for bit. All lanes ask the same and
+// get the same.
 
 namespace ist {
 

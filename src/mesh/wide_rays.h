@@ -4,8 +4,8 @@
 #include "mesh/wide_nearest.h"
 #include "mesh/wide_traversal.h"
 
-// Winding numbers and line crossings of a WideTree, by a team (mesh/team.h); the answers are those
-// of winding.h. All lanes ask the same and get the same.
+// Winding numbers and line crossings of a WideTree, by a team (numerics/team.h); the answers are
+// those of winding.h. All lanes ask the same and get the same.
 
 namespace ist {
 

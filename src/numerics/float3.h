@@ -16,6 +16,5 @@ IST_HD inline Float3 operator-(Float3 a, Float3 b) { return {a.x - b.x, a.y - b.
 IST_HD inline Float3 operator*(float s, Float3 a) { return {s * a.x, s * a.y, s * a.z}; }
 IST_HD inline float dot(Float3 a, Float3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 IST_HD inline float norm(Float3 a) { return sqrtf(dot(a, a)); }
-IST_HD inline float norm1(Float3 a) { return fabsf(a.x) + fabsf(a.y) + fabsf(a.z); }
 
 }  // namespace ist

@@ -1,9 +1,10 @@
 #pragma once
 
-// Functions shared by the CPU and the GPU backend carry IST_HD (DESIGN 3.3); IST_HD_COLD those that
-// hardly ever run and must not cost their callers registers; IST_HD_ONCE those of which the device
-// is to have one copy, called: inlined wherever they are used they would overflow its instruction
-// cache, which costs more than the calls. IST_ROLLED goes before a short loop, for the same reason.
+// Functions shared by the CPU and the GPU backend carry IST_HD (docs/design.md 3.3); IST_HD_COLD
+// those that hardly ever run and must not cost their callers registers; IST_HD_ONCE those of which
+// the device is to have one copy, called: inlined wherever they are used they would overflow its
+// instruction cache, which costs more than the calls. IST_ROLLED goes before a short loop, for the
+// same reason.
 #ifdef __CUDACC__
 #define IST_HD __host__ __device__
 #define IST_HD_COLD __host__ __device__ __noinline__ inline

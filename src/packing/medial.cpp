@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "backend/solid_backend.h"
+#include "bake/backend/make_backend.h"
 #include "packing/grids/grid_layout.h"
 #include "stage/thread_arena.h"
 

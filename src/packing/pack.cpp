@@ -1,6 +1,6 @@
 #include <ist/packing.h>
 
-#include "backend/solid_backend.h"
+#include "bake/backend/make_backend.h"
 #include "packing/base/packing_settings.h"
 #include "stage/thread_arena.h"
 

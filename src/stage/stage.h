@@ -17,8 +17,10 @@ class Stage {
   Stage(const char* name, ProgressCallback progress, double time_limit = 0)
       : name_(name), progress_(std::move(progress)), time_limit_(time_limit) {}
 
-  double elapsed() const;                                        ///< [s] since the stage was made
-  bool watched() const { return progress_ || time_limit_ > 0; }  ///< stop() may ever say so
+  double elapsed() const;  ///< [s] since the stage was made
+  bool watched() const {
+    return progress_ || time_limit_ > 0;
+  }  ///< a callback or a time limit is set
 
   /// Reports a step of a stage that cannot be cut short. Throws Error if the callback cancels.
   void step(std::size_t spheres, double fraction);

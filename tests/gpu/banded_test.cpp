@@ -30,7 +30,7 @@ SpherePacking pack_on_gpu(const MeshSolid& solid, const PackingSettings& setting
   const MeshView& view = solid.view();
   gpu::Queue queue(settings.gpu);
   const gpu::DeviceMesh mesh(
-      queue, {view.vertices_exact, view.triangles, view.vertex_count, view.triangle_count, {}, 1});
+      queue, {view.vertices, view.triangles, view.vertex_count, view.triangle_count, {}, 1});
   Stage stage("pack", progress, settings.time_limit);
   return gpu::pack_banded(queue, mesh.tree(),
                           packing::packing_limits(solid, solid.frame().scale(), settings), stage);

@@ -80,9 +80,7 @@ std::vector<Vector3d> points_about(const MeshView& mesh, int count) {
       continue;
     }
     const std::uint32_t* t = mesh.triangles + 3 * (random() % mesh.triangle_count);
-    const auto corner = [&](int k) {
-      return Vector3d(mesh.vertices_exact + 3 * std::size_t{t[k]});
-    };
+    const auto corner = [&](int k) { return Vector3d(mesh.vertices + 3 * std::size_t{t[k]}); };
     Vector3d p = corner(0);
     if (i % 3 == 1) p = (p + corner(1)) / 2;
     if (i % 3 == 2) p = (p + corner(1) + corner(2)) / 3;

@@ -11,10 +11,10 @@
 #include <random>
 
 #include "mesh/mesh_solid.h"
+#include "packing/base/packing_settings.h"
 #include "samples/samples.h"
 #include "support/float_traps.h"
 #include "support/same_packing.h"
-#include "packing/base/packing_settings.h"
 #include "support/shared_data.h"
 
 namespace ist {
@@ -55,8 +55,8 @@ ClosedMesh wavy_torus(std::mt19937& random, int around, int across) {
   return torus;
 }
 
-/// Every pair and every sphere, in double, in the unit frame (DESIGN 3.2). `rounding`: of the
-/// solid's own signed distance when it is asked in the mesh's unit.
+/// Every pair and every sphere, in double, in the unit frame (docs/design.md 3.2). `rounding`: of
+/// the solid's own signed distance when it is asked in the mesh's unit.
 void expect_certified(const SpherePacking& packing, const Solid& solid, double rounding = 1e-13) {
   const double scale = packing.frame.scale();
   for (std::size_t i = 0; i < packing.spheres.size(); ++i) {
@@ -216,9 +216,8 @@ TEST(Packing, OtherStopsAreMet) {
 /// what is reported on the way is a number in [0, 1].
 TEST(Packing, ACoverageOfNothingIsMetByTheFirstSphere) {
   const auto solid = make_solid(box_mesh({0, 0, 0}, {1, 1, 1}));
-  for (const GridMode mode :
-       {GridMode::banded, GridMode::uniform, GridMode::explicit_refinement,
-        GridMode::implicit_refinement, GridMode::hybrid}) {
+  for (const GridMode mode : {GridMode::banded, GridMode::uniform, GridMode::explicit_refinement,
+                              GridMode::implicit_refinement, GridMode::hybrid}) {
     SCOPED_TRACE(static_cast<int>(mode));
     PackingSettings settings = count(100);
     settings.grid = mode;

@@ -1,5 +1,6 @@
 // Bakes every row of a table and compares two hashes with the table's: the same mesh and settings
-// give the same bytes on any machine, for any number of threads, on CPU and GPU alike (DESIGN 3.3).
+// give the same bytes on any machine, for any number of threads, on CPU and GPU alike
+// (docs/design.md 3.3).
 // `./dev soak` runs it.
 
 #define XXH_INLINE_ALL

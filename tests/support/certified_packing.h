@@ -9,7 +9,7 @@
 
 namespace ist::testing {
 
-/// Every pair and every sphere, by brute force in double, in the unit frame (DESIGN 3.2).
+/// Every pair and every sphere, by brute force in double, in the unit frame (docs/design.md 3.2).
 inline void expect_certified(const SpherePacking& packing, const MeshSolid& solid) {
   for (std::size_t i = 0; i < packing.spheres.size(); ++i) {
     const Sphere& a = packing.spheres[i];

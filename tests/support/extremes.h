@@ -13,7 +13,7 @@ struct Claim {
   bool is_kept() const { return worst <= limit; }  ///< NaN is not
 };
 
-/// An extreme input (DESIGN 3.1, 3.4, 3.6, 7) and all that is promised for it.
+/// An extreme input (docs/design.md 3.1, 3.4, 3.6, 7) and all that is promised for it.
 struct Extreme {
   const char* name;
   const char* input;

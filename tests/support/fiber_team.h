@@ -84,7 +84,7 @@ class Fibers {
   unsigned round_ = 0;
 };
 
-/// A team (mesh/team.h) whose lanes are Fibers.
+/// A team (numerics/team.h) whose lanes are Fibers.
 template <int Width>
 class FiberTeam {
  public:

@@ -26,7 +26,7 @@ class HostWideTree {
   HostWideTree(const MeshView& mesh, const Order& order) {
     tree_.triangle_count = mesh.triangle_count;
     tree_.vertex_count = mesh.vertex_count;
-    tree_.vertices = mesh.vertices_exact;
+    tree_.vertices = mesh.vertices;
     tree_.block_count = (mesh.triangle_count + kWideWidth - 1) / kWideWidth;
     const int depth = wide_depth(tree_.block_count);
     tree_.first_leaf = first_wide_node(depth);
@@ -49,7 +49,7 @@ class HostWideTree {
         continue;
       }
       const std::uint32_t t = order[slot];
-      write_lane(block, lane, mesh.vertices_exact, t, mesh.triangles + 3 * std::size_t{t});
+      write_lane(block, lane, mesh.vertices, t, mesh.triangles + 3 * std::size_t{t});
       for (const double* corner : corners(mesh, t).p) boxes[slot / kWideWidth].extend(corner);
     }
     std::uint32_t first = tree_.first_leaf;
@@ -128,7 +128,7 @@ class HostWideTree {
 
   static Corners corners(const MeshView& mesh, std::uint32_t triangle) {
     const std::uint32_t* t = mesh.triangles + 3 * std::size_t{triangle};
-    const auto at = [&](int i) { return mesh.vertices_exact + 3 * std::size_t{t[i]}; };
+    const auto at = [&](int i) { return mesh.vertices + 3 * std::size_t{t[i]}; };
     return {{at(0), at(1), at(2)}};
   }
 

@@ -2,6 +2,7 @@
 
 #include <ist/packing.h>
 
+#include "bake/backend/make_backend.h"
 #include "bake/calibrate/calibration.h"
 #include "bake/cover/cover.h"
 #include "stage/thread_arena.h"

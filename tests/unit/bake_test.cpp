@@ -219,8 +219,8 @@ std::vector<std::byte> frameless(const Asset& asset) {
   return bytes;
 }
 
-// DESIGN 3.1: nothing depends on the mesh's unit, and a shift by whole units costs nothing where
-// doubles carry it.
+// docs/design.md 3.1: nothing depends on the mesh's unit, and a shift by whole units costs nothing
+// where doubles carry it.
 TEST(Bake, SameBytesAtAnyScaleAndOffset) {
   const TriangleMesh torus = testing::torus_mesh(1.0, 0.375, 24, 12);
   TriangleMesh snapped = torus;  // on a grid that the shifts below keep

@@ -281,13 +281,12 @@ TEST(ClosestPoint, IsTheMinimumOverAllTriangles) {
       if (i % 4 == 0) p = (p * 4).array().round() / 8;
       if (i % 4 == 1) p *= 1e4;
       if (i % 4 == 2)  // on the surface, all but 1e-9
-        p = Vector3d(mesh.vertices_exact + 3 * (std::size_t(i) % mesh.vertex_count)) +
-            shapes.point(1e-9);
+        p = Vector3d(mesh.vertices + 3 * (std::size_t(i) % mesh.vertex_count)) + shapes.point(1e-9);
       double best2 = std::numeric_limits<double>::infinity();
       std::uint32_t best = 0;
       for (std::uint32_t t = 0; t < mesh.triangle_count; ++t) {
         const auto corner = [&](std::size_t k) {
-          return mesh.vertices_exact + 3 * std::size_t{mesh.triangles[3 * std::size_t{t} + k]};
+          return mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{t} + k]};
         };
         const auto frame = ist::make_triangle_frame(corner(0), corner(1), corner(2));
         const double distance2 = ist::closest_in_frame(frame, p.data()).distance2;

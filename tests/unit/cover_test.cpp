@@ -61,7 +61,7 @@ std::vector<Vector3d> points_of(const MeshSolid& solid, int count) {
     if (solid.inside(x)) points.push_back(x);
   }
   for (std::uint32_t v = 0; v < solid.view().vertex_count; ++v)
-    points.emplace_back(solid.view().vertices_exact + 3 * std::size_t{v});
+    points.emplace_back(solid.view().vertices + 3 * std::size_t{v});
   return points;
 }
 

@@ -105,7 +105,7 @@ TEST(MeshSolid, OneSimpleShellNeedsNoIntegration) {
 }
 
 /// A power of two changes no bit in the unit frame; any other scale, and an offset of 1e7 sizes,
-/// only what their own rounding does (DESIGN 3.1).
+/// only what their own rounding does (docs/design.md 3.1).
 TEST(MeshSolid, ScaleAndOffsetDoNotMatter) {
   const ist::TriangleMesh torus = torus_mesh(2, 0.5, 40, 20);
   const MeshSolid plain(closed(torus, "plain"));

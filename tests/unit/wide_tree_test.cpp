@@ -84,9 +84,7 @@ std::vector<Vector3d> points_about(const ist::MeshView& mesh, std::uint64_t seed
     points.push_back(Vector3d(i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2) / 4);
   for (int i = 0; i < 300; ++i) {
     const std::uint32_t* t = mesh.triangles + 3 * (random() % mesh.triangle_count);
-    const auto corner = [&](int k) {
-      return Vector3d(mesh.vertices_exact + 3 * std::size_t{t[k]});
-    };
+    const auto corner = [&](int k) { return Vector3d(mesh.vertices + 3 * std::size_t{t[k]}); };
     Vector3d p = corner(0);
     if (i % 3 == 1) p = (p + corner(1)) / 2;
     if (i % 3 == 2) p = (p + corner(1) + corner(2)) / 3;
@@ -117,7 +115,7 @@ TEST_P(WideTree, HoldsEveryTriangleOnceInBoxesThatHoldIt) {
     const ist::Corners corners = corners_in(tree_, slot);
     for (std::size_t k = 0; k < 3; ++k) {
       const double* corner = corners.p[k];
-      ASSERT_EQ(corner, mesh.vertices_exact + 3 * std::size_t{mesh.triangles[3 * t + k]});
+      ASSERT_EQ(corner, mesh.vertices + 3 * std::size_t{mesh.triangles[3 * t + k]});
       std::uint32_t place = tree_.first_leaf + slot / ist::kWideWidth;
       while (place > 0) {
         const ist::WideNode& parent = tree_.nodes[(place - 1) / ist::kWideWidth];

@@ -24,7 +24,7 @@ double solid_angle_winding(const ist::MeshView& mesh, const Vector3d& p) {
   for (std::size_t t = 0; t < mesh.triangle_count; ++t) {
     Vector3d c[3];
     for (std::size_t i = 0; i < 3; ++i)
-      c[i] = Vector3d(mesh.vertices_exact + 3 * std::size_t{mesh.triangles[3 * t + i]}) - p;
+      c[i] = Vector3d(mesh.vertices + 3 * std::size_t{mesh.triangles[3 * t + i]}) - p;
     const double a = c[0].norm(), b = c[1].norm(), d = c[2].norm();
     sum += std::atan2(c[0].dot(c[1].cross(c[2])),
                       a * b * d + c[0].dot(c[1]) * d + c[1].dot(c[2]) * a + c[2].dot(c[0]) * b);
@@ -117,7 +117,7 @@ TEST(Winding, IsRightCloseToTheSurface) {
     for (std::size_t i = 0; i < 3000; ++i) {
       const std::size_t t = i % view.triangle_count;
       const auto corner = [&](std::size_t k) {
-        return Vector3d(view.vertices_exact + 3 * std::size_t{view.triangles[3 * t + k]});
+        return Vector3d(view.vertices + 3 * std::size_t{view.triangles[3 * t + k]});
       };
       const Vector3d a = corner(0), b = corner(1), c = corner(2);
       const double u = weight(random), v = weight(random), w = weight(random);
@@ -139,7 +139,7 @@ TEST(LineCrossings, SumToZeroAndAgreeWithTheWindingNumber) {
       if (i % 3 == 1) {  // straight through a corner
         const auto& view = solid.view();
         const double* corner =
-            view.vertices_exact + 3 * (static_cast<std::size_t>(i) % view.vertex_count);
+            view.vertices + 3 * (static_cast<std::size_t>(i) % view.vertex_count);
         y = corner[1];
         z = corner[2];
       }

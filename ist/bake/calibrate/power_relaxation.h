@@ -7,7 +7,7 @@
 #include "bake/calibrate/power_grid.h"
 #include "numerics/roots.h"
 
-// Relaxation of power cells (DESIGN 5, 3), shared by host and device.
+// Relaxation of power cells (docs/design.md 5, 3), shared by host and device.
 
 namespace ist {
 

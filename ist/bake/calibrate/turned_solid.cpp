@@ -114,7 +114,7 @@ TurnedSolid::TurnedSolid(const MeshSolid& solid) : original_(solid) {
   mesh.name = "turned mesh";
   mesh.report.closed = true;
   for (std::size_t v = 0; v < view.vertex_count; ++v)
-    mesh.mesh.vertices.push_back(axes_ * Vector3d(view.vertices_exact + 3 * v));
+    mesh.mesh.vertices.push_back(axes_ * Vector3d(view.vertices + 3 * v));
   for (std::size_t t = 0; t < view.triangle_count; ++t) {
     const std::uint32_t* corner = view.triangles + 3 * t;
     mesh.mesh.triangles.push_back({corner[0], corner[1], corner[2]});

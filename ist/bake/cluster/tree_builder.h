@@ -9,10 +9,10 @@
 
 namespace ist {
 
-/// Clusters spheres into an implicit 16-wide tree (asset_layout.h, DESIGN 6). `covers` are the
-/// cover radii of disjoint inner spheres; it is empty for matched spheres, which may overlap, and
-/// κ is bounded for them. Every ball of the tree holds the spheres below it for certain: radii are
-/// rounded up. Same input, same tree, for any number of threads. The set must not be empty.
+/// Clusters spheres into an implicit 16-wide tree (asset_layout.h, docs/design.md 6). `covers` are
+/// the cover radii of disjoint inner spheres; it is empty for matched spheres, which may overlap,
+/// and κ is bounded for them. Every ball of the tree holds the spheres below it for certain: radii
+/// are rounded up. Same input, same tree, for any number of threads. The set must not be empty.
 TreeArrays build_tree(std::span<const Sphere> spheres, std::span<const float> covers,
                       Clustering clustering = Clustering::neural_gas, bool swaps = true);
 

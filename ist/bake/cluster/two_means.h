@@ -10,8 +10,8 @@ namespace ist {
 
 /// Orders balls so that consecutive groups of 16, of 16², … are compact: recursive weighted 2-means
 /// (weights r³), every cut at a multiple of the largest power of 16 below the number of balls, so
-/// that all groups but the last are full (DESIGN 6). With `last_stays` the last ball keeps its
-/// place: it stands for a group that is not full.
+/// that all groups but the last are full (docs/design.md 6). With `last_stays` the last ball keeps
+/// its place: it stands for a group that is not full.
 std::vector<std::uint32_t> two_means_order(std::span<const Ball> balls, bool last_stays);
 
 }  // namespace ist

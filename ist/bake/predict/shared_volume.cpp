@@ -24,11 +24,11 @@ class MovedMesh {
   MovedMesh(const MeshSolid& solid, const Move& move) : view_(solid.arrays()) {
     vertices_.resize(3 * std::size_t{view_.vertex_count});
     tbb::parallel_for(std::uint32_t{0}, view_.vertex_count, [&](std::uint32_t v) {
-      const Vector3d x = move(Vector3d(view_.vertices_exact + 3 * std::size_t{v}));
+      const Vector3d x = move(Vector3d(view_.vertices + 3 * std::size_t{v}));
       for (int k = 0; k < 3; ++k)
         vertices_[3 * std::size_t{v} + static_cast<std::size_t>(k)] = x[k];
     });
-    view_.vertices_exact = vertices_.data();
+    view_.vertices = vertices_.data();
     for (std::size_t v = 0; v < view_.vertex_count; ++v)
       bounds_.extend(Vector3d(vertices_.data() + 3 * v));
   }

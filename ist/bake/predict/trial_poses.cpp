@@ -140,7 +140,7 @@ class Trials {
     const Vector3d shift(out.b_in_a.t[0], out.b_in_a.t[1], out.b_in_a.t[2]);
     const MeshView& mesh = b_.solid.arrays();
     for (std::size_t v = 0; v < mesh.vertex_count; ++v) {
-      const Vector3d x = b_.solid.frame().from_unit(Vector3d(mesh.vertices_exact + 3 * v));
+      const Vector3d x = b_.solid.frame().from_unit(Vector3d(mesh.vertices + 3 * v));
       if (a_.solid.signed_distance(rotation * (out.scale_b * x) + shift) <= 0) return false;
     }
     out.volume = out.scale_b * out.scale_b * out.scale_b * b_.solid.volume();

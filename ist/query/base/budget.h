@@ -30,8 +30,10 @@ inline DescentLimits limits_of(const SeparationSettings& settings) noexcept {
 /// end at a part of the time, what is left being for a guess of what was not visited.
 class Budget {
  public:
-  explicit Budget(const DescentLimits& limits) noexcept
-      : max_visits_(limits.max_visits != 0 ? limits.max_visits : ~0u),
+  /// `for_visits`: the part of the time that visits may take.
+  explicit Budget(const DescentLimits& limits, double for_visits = 0.6) noexcept
+      : for_visits_(for_visits),
+        max_visits_(limits.max_visits != 0 ? limits.max_visits : ~0u),
         timed_(limits.deadline_us > 0) {
     if (timed_) {
       start_ = Clock::now();
@@ -53,7 +55,7 @@ class Budget {
   }
 
   /// Whether visits are to end now.
-  bool visits_end() const noexcept { return elapsed_beyond(kForVisits); }
+  bool visits_end() const noexcept { return elapsed_beyond(for_visits_); }
 
   /// Whether such a part of the time is over; never without a deadline.
   bool elapsed_beyond(double part) const noexcept {
@@ -70,7 +72,7 @@ class Budget {
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr double kForVisits = 0.6;
+  double for_visits_;
   std::uint32_t max_visits_;
   std::uint32_t visits_ = 0;
   std::uint32_t next_look_ = 0;

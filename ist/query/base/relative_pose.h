@@ -19,8 +19,8 @@ struct Similarity {
   }
 };
 
-/// Two placed trees, seen from A's unit frame (DESIGN 3.4): poses, scales and both unit frames are
-/// folded into one map, in double.
+/// Two placed trees, seen from A's unit frame (docs/design.md 3.4): poses, scales and both unit
+/// frames are folded into one map, in double.
 struct RelativePose {
   Similarity a_from_b;  ///< unit frame of B → unit frame of A
   Similarity b_from_a;

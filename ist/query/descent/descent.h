@@ -9,7 +9,7 @@
 #include "query/base/budget.h"
 #include "query/base/relative_pose.h"
 #include "query/contact/contact_bins.h"
-#include "query/descent/unresolved.h"
+#include "query/descent/unopened.h"
 #include "query/descent/workspace.h"
 #include "query/kernel/leaf_kernel.h"
 #include "query/kernel/overlap.h"
@@ -17,7 +17,7 @@
 
 namespace ist {
 
-/// The staged descent of DESIGN 7: node pairs level by level, then pairs of leaf blocks.
+/// The staged descent of docs/design.md 7: node pairs level by level, then pairs of leaf blocks.
 class Descent {
  public:
   /// All arguments must outlive the descent. With `bins`, what is summed is sorted into them too.

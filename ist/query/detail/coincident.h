@@ -11,9 +11,9 @@ namespace ist {
 
 /// How nearly two copies of one asset coincide. Sphere upon equal sphere, the sum of lenses counts
 /// ∫ρ² where ρ, the number of spheres at a point, is 1 in the mean but not everywhere: 5 to 10 %
-/// too much (DESIGN 5). A level of detail against the next coarser one has nothing of the kind: its
-/// spheres are others. So as copies come to coincide, such unlike levels take over: the mean of
-/// both ways round, which has no force where the copies coincide.
+/// too much (docs/design.md 5). A level of detail against the next coarser one has nothing of the
+/// kind: its spheres are others. So as copies come to coincide, such unlike levels take over: the
+/// mean of both ways round, which has no force where the copies coincide.
 struct CoincidenceWeight {
   double weight = 0;  ///< [0, 1] part of the unlike levels; 0 from 1.6 mean radii of way on
   Eigen::Vector3d by_translation = Eigen::Vector3d::Zero();  ///< slope, A's unit frame

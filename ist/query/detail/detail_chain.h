@@ -24,8 +24,8 @@ struct DetailWeight {
 };
 
 /// The pairs of levels with which two assets may be asked, from the finest to the coarsest of both
-/// (DESIGN 5). Each step takes a coarser level on the side of the smaller spheres, which cost most
-/// and tell least, or on both sides where spheres are about as large.
+/// (docs/design.md 5). Each step takes a coarser level on the side of the smaller spheres, which
+/// cost most and tell least, or on both sides where spheres are about as large.
 ///
 /// How many sphere pairs a level needs is told from the overlap of the coarsest levels, the
 /// *coarse estimate*: a smooth function of the pose, so that an answer may be blended by it.
@@ -42,7 +42,7 @@ class DetailChain {
   const DetailPair& coarsest() const noexcept { return pairs_[size_ - 1]; }
 
   /// Weights of the pairs, which sum to 1: all of it is the finest pair's while that needs no more
-  /// than half of `budget` sphere pairs, none where it needs the whole; what is left goes to the
+  /// than 0.7 of `budget` sphere pairs, none where it needs the whole; what is left goes to the
   /// next pair by the same rule, and what none can afford to the coarsest. Continuous in `coarse`,
   /// with the slope. An estimate of 0: the finest.
   Weights weights(double coarse, double budget) const noexcept;

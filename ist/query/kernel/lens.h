@@ -20,10 +20,10 @@ struct Lens {
 
 /// Lens of balls of radii `ra`, `rb` ≥ 0 at centre distance `d` ≥ 0. The sums g, f, e must never be
 /// re-associated: in this order each loses no digit at any ratio of radii, near tangency or near
-/// coincidence (DESIGN 3.5; f goes two ways, because d − a is exact only where d is of a's size,
-/// and a − b only where b is). The moment of a cap about its ball's centre is π/4 · circle² along
-/// the axis, the same for both caps and opposite, so the lens's centroid is (cap_a · centre_a +
-/// cap_b · centre_b) / (cap_a + cap_b).
+/// coincidence (docs/design.md 3.5; f goes two ways, because d − a is exact only where d is of a's
+/// size, and a − b only where b is). The moment of a cap about its ball's centre is π/4 · circle²
+/// along the axis, the same for both caps and opposite, so the lens's centroid is (cap_a · centre_a
+/// + cap_b · centre_b) / (cap_a + cap_b).
 template <class T>
 Lens<T> lens(T ra, T rb, T d) {
   const T a = ra > rb ? ra : rb;

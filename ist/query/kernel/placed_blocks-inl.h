@@ -32,7 +32,7 @@ struct alignas(32) TurnedAxes {
 
 using FourDoubles = hn::CappedTag<double, 4>;
 
-/// Differences are taken in double (DESIGN 3.4).
+/// Differences are taken in double (docs/design.md 3.4).
 template <class T>
 HWY_INLINE void subtract(const double (&x)[4], const double (&y)[4], T (&difference)[4]) {
   const FourDoubles d;

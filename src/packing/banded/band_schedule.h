@@ -16,8 +16,8 @@ enum class BandStep : std::uint32_t {
   stop,
 };
 
-/// All decisions of the banded packing (DESIGN 4.2) as one plain state that the CPU loop and a GPU
-/// kernel drive alike. Everything it is told is a maximum or a count of a set.
+/// All decisions of the banded packing (docs/design.md 4.2) as one plain state that the CPU loop
+/// and a GPU kernel drive alike. Everything it is told is a maximum or a count of a set.
 ///
 ///   rebuild the grid for (grid_spheres, grid_reach); cells = {root}
 ///   loop:
@@ -189,7 +189,7 @@ struct BandSchedule {
 
  private:
   /// The smallest radius that the user allows, rounded up.
-  IST_HD float smallest_wanted() const { return -rounded_down(-limits.min_radius); }
+  IST_HD float smallest_wanted() const { return rounded_up(limits.min_radius); }
 
   /// ε of the next band. Near the target count bands get thinner, so that the last spheres are the
   /// largest ones: with radius ~ count^(−3/8), a band of ε adds n ((1−ε)^(−8/3) − 1) spheres.

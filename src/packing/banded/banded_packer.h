@@ -22,7 +22,7 @@ struct AsFound {
   static void arrange(std::vector<std::uint32_t>&) {}
 };
 
-/// The greedy packing with a guarantee of DESIGN 4.2 over one kind of surface, on the host.
+/// The greedy packing with a guarantee of docs/design.md 4.2 over one kind of surface, on the host.
 template <class Surface, class Order = AsFound>
 class BandedPacker {
  public:

@@ -6,7 +6,7 @@
 #include "numerics/team.h"
 #include "packing/banded/constraint.h"
 
-// What is seen from a point. Written for a team (mesh/team.h) whose lanes share a SampleMemory;
+// What is seen from a point. Written for a team (numerics/team.h) whose lanes share a SampleMemory;
 // everything here is a function of the *set* of features, in whatever order a team meets them.
 
 namespace ist::packing {

@@ -9,7 +9,8 @@
 
 namespace ist::packing {
 
-/// Gap that a certified sphere keeps to the surface and to other spheres, unit frame (DESIGN 3.2).
+/// Gap that a certified sphere keeps to the surface and to other spheres, unit frame
+/// (docs/design.md 3.2).
 constexpr double kClearance = 1e-12;
 /// The same with what the square root and the sum round by: some 2⁻⁵³ of their size (≤ 4).
 constexpr double kGap = kClearance + 1e-14;

@@ -1,14 +1,15 @@
 #pragma once
 
+#include "packing/base/certificate.h"
 #include "packing/grids/grid_candidate.h"
 #include "packing/grids/local_winding.h"
 #include "packing/grids/nearest_primitive.h"
-#include "packing/base/certificate.h"
 
 namespace ist::packing {
 
-/// The radius that a candidate may keep next to surface and spheres, in double (DESIGN 3.2); 0 if
-/// its centre is not in the solid. Other winners of its round leave it its room (overlap()).
+/// The radius that a candidate may keep next to surface and spheres, in double
+/// (docs/design.md 3.2); 0 if its centre is not in the solid. Other winners of its round leave it
+/// its room (overlap()).
 template <class Team>
 IST_HD double certified_room(const Team& team, const GridScene& scene,
                              const GridCandidate& candidate) {

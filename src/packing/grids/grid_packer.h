@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
+#include "packing/base/certificate.h"
+#include "packing/base/packing_settings.h"
 #include "packing/grids/grid_rounds.h"
 #include "packing/grids/grid_schedule.h"
-#include "packing/base/packing_settings.h"
-#include "packing/base/certificate.h"
 #include "stage/stage.h"
 
 namespace ist::packing {
@@ -58,7 +58,8 @@ class GridPacker {
       } else if (any) {
         rounds_.update();
       } else if (idle == kIdleRounds) {
-        stop(too_small_ ? StopReason::min_radius : StopReason::exhausted);
+        stop(rounded_up(limits_.min_radius) > kSmallestGridRadius ? StopReason::min_radius
+                                                                  : StopReason::exhausted);
       }
     }
     result_.stop = reason_;
@@ -69,8 +70,7 @@ class GridPacker {
  private:
   /// Inserts what one set of prototypes finds; false if that is nothing.
   bool round() {
-    const float smallest = std::max(
-        kSmallestGridRadius, limits_.min_radius > 0 ? -rounded_down(-limits_.min_radius) : 0.0f);
+    const float smallest = std::max(kSmallestGridRadius, rounded_up(limits_.min_radius));
     std::vector<GridWinner> winners = rounds_.round(
         {prototypes_, limits_.seed, static_cast<std::uint32_t>(result_.rounds), smallest},
         [this] { return goes_on(); });
@@ -93,7 +93,6 @@ class GridPacker {
         stop(StopReason::coverage);
       if (stopped_) break;
     }
-    too_small_ = smallest > kSmallestGridRadius;
     ++result_.rounds;
     if (!stopped_) rounds_.append(inserted);
     record(inserted.empty() ? 0 : double{inserted.front().r});
@@ -148,7 +147,6 @@ class GridPacker {
   double volume_unit_ = volume_unit_of(limits_.volume);
   std::uint64_t covered_ = 0;  ///< in volume_unit_
   float radius_ = 0;
-  bool too_small_ = false;  ///< a smallest radius was asked for
   bool stopped_ = false;
   StopReason reason_ = StopReason::exhausted;
 };

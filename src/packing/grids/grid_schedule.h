@@ -16,9 +16,9 @@ struct GridFigures {
   std::size_t memory = 0;  ///< bytes that the grids may take
 };
 
-/// The two grids of a mode over the rounds (DESIGN 4.1): levels of one first grid's refinements.
-/// The prototype grid's alone decide what is packed, so they depend on mesh and settings only; the
-/// distance grid's decide how fast, and also on the memory that is free.
+/// The two grids of a mode over the rounds (docs/design.md 4.1): levels of one first grid's
+/// refinements. The prototype grid's alone decide what is packed, so they depend on mesh and
+/// settings only; the distance grid's decide how fast, and also on the memory that is free.
 struct GridSchedule {
   GridLayout first;           ///< level 0
   int prototypes = 0;         ///< level of the prototype grid at the start

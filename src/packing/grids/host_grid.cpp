@@ -38,7 +38,7 @@ void for_rows(const CellRange& range, const Visit& visit) {
 HostGrid::HostGrid(const MeshView& mesh) : mesh_(mesh), triangles_(mesh.triangle_count) {
   GridScene scene;
   scene.corners = mesh.triangles;
-  scene.vertices = mesh.vertices_exact;
+  scene.vertices = mesh.vertices;
   for_each_index(triangles_.size(), 256, [&](std::size_t t) {
     const Corners c = corners_of(scene, static_cast<std::uint32_t>(t));
     triangles_[t] = make_grid_triangle(c.p[0], c.p[1], c.p[2]);
@@ -56,7 +56,7 @@ GridScene HostGrid::scene(const std::vector<Sphere>& spheres) const {
                 sphere_lists_.data()};
   scene.triangles = triangles_.data();
   scene.corners = mesh_.triangles;
-  scene.vertices = mesh_.vertices_exact;
+  scene.vertices = mesh_.vertices;
   scene.spheres = spheres.data();
   return scene;
 }

@@ -1,12 +1,12 @@
-#include "bake/host_backend.h"
+#include "bake/backend/host_backend.h"
 
 #include <ist/error.h>
 
+#include "bake/backend/pack_on_host.h"
 #include "bake/calibrate/host_calibration.h"
 #include "bake/cover/host_cover.h"
 #include "packing/grids/host_rounds.h"
 #include "packing/grids/medial_grids.h"
-#include "packing/pack_on_host.h"
 
 namespace ist {
 namespace {
@@ -45,7 +45,8 @@ class HostBackend final : public SolidBackend {
 
  private:
   const MeshSolid& mesh() const {
-    if (solid_.mesh() == nullptr) throw Error("bake: the solid is no mesh");
+    if (solid_.mesh() == nullptr)
+      throw Error("only meshes have grids, cells and covers here, and this solid is none");
     return *solid_.mesh();
   }
 

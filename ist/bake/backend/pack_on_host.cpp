@@ -1,12 +1,12 @@
-#include "packing/pack_on_host.h"
+#include "bake/backend/pack_on_host.h"
 
 #include <ist/error.h>
 
 #include "packing/banded/banded_packer.h"
 #include "packing/banded/field_surface.h"
 #include "packing/banded/mesh_surface.h"
-#include "packing/grids/pack_grids.h"
 #include "packing/base/packing_settings.h"
+#include "packing/grids/pack_grids.h"
 
 namespace ist::packing {
 namespace {

@@ -1,4 +1,4 @@
-#include "query/descent/unresolved.h"
+#include "query/descent/unopened.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,7 +9,7 @@ namespace ist {
 
 /// What a pair of nodes that was not opened may hold, in A's unit frame.
 struct PairEstimate {
-  double bound = 0;   ///< the sum over all sphere pairs below is at most this (DESIGN 7)
+  double bound = 0;   ///< the sum over all sphere pairs below is at most this (docs/design.md 7)
   double volume = 0;  ///< best guess: both nodes as balls of uniform density
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< d(volume)/d(translation of B)
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of the guessed overlap

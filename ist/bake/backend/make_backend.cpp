@@ -1,9 +1,11 @@
-// The one place that knows which backends there are.
-#include "bake/host_backend.h"
+#include "bake/backend/make_backend.h"
+
+#include "bake/backend/host_backend.h"
 #include "cuda/cuda_backend.h"
 
 namespace ist {
 
+// The one place that knows which backends there are.
 std::unique_ptr<SolidBackend> make_backend(const Solid& solid, const BackendChoice& choice) {
   const bool on_gpu = solid.mesh() != nullptr &&
                       (choice.device == Device::cuda ||

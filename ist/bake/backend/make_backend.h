@@ -1,0 +1,20 @@
+#pragma once
+
+#include <memory>
+
+#include "backend/solid_backend.h"
+
+namespace ist {
+
+/// Where a solid's work is to be done.
+struct BackendChoice {
+  Device device = Device::automatic;
+  GpuSettings gpu = {};
+};
+
+/// The backend for a solid, which must outlive it: a GPU's where one is asked for, or left open
+/// and there, and the solid is a mesh; else the host's. Throws Error where a GPU is asked for by
+/// name and cannot be used, with the way out.
+std::unique_ptr<SolidBackend> make_backend(const Solid& solid, const BackendChoice& choice);
+
+}  // namespace ist
