@@ -1,10 +1,11 @@
 // Two mesh files in, the volume by which they overlap out. Links ist::ist.
 #include <ist/bake.h>
+#include <ist/error.h>
 #include <ist/query.h>
 
 #include <cstdio>
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   if (argc != 3) return std::fprintf(stderr, "usage: bake_and_query MESH_A MESH_B\n"), 2;
   const ist::PackingSettings settings{.max_spheres = 2'000};
   const ist::Asset a = ist::bake(ist::close_mesh(ist::load_mesh(argv[1]), argv[1]), settings);
@@ -15,4 +16,6 @@ int main(int argc, char** argv) {
   const Eigen::Vector3d push_on_b = -p.translation_gradient;  // times your stiffness
   std::printf("overlap %g, push B along (%g, %g, %g)\n", p.volume, push_on_b.x(), push_on_b.y(),
               push_on_b.z());
+} catch (const ist::Error& error) {  // names the file and the way out; queries never throw
+  return std::fprintf(stderr, "%s\n", error.what()), 1;
 }

@@ -12,4 +12,11 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What close_mesh() throws for an open mesh that it was not asked to repair, so that a caller can
+/// say how to ask.
+class OpenMeshError : public Error {
+ public:
+  using Error::Error;
+};
+
 }  // namespace ist

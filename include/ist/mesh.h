@@ -10,10 +10,17 @@
 
 namespace ist {
 
+/// What a file says of its axes and its unit. No coordinate is turned by it.
+struct DeclaredFrame {
+  char up_axis = 0;  ///< 'X', 'Y' or 'Z'; 0: the file does not say
+  double unit = 0;   ///< [m] length of the file's unit; 0: the file does not say
+};
+
 /// Triangles over shared vertices, in the file's own unit [u] and frame, in double.
 struct TriangleMesh {
   std::vector<Eigen::Vector3d> vertices;                ///< [u]
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from outside
+  DeclaredFrame declared = {};                          ///< as loaded; nothing later reads it
 };
 
 /// How a file becomes a TriangleMesh.
@@ -60,18 +67,20 @@ struct ClosedMesh {
 
 /// What to do with a mesh that does not bound a solid.
 enum class OpenMeshPolicy {
-  refuse,  ///< throw Error that names the first open edge
+  refuse,  ///< throw OpenMeshError that names the first open edge
   repair,  ///< weld cracks, fill holes, drop what cannot bound a solid; say so in the report
 };
 
 /// Reads a mesh file: OBJ, STL, PLY, OFF, GLB/glTF and DAE by readers of this library, the rest
-/// through assimp. The file's own node transforms are applied; units and axes are left as they are
-/// (DAE: metres, y up). Vertices are welded. Throws Error (file, place, way out). Thread-safe.
+/// through assimp. The file's own node transforms are applied; axes are left as they are, whichever
+/// the file declares to be up, and so are units (DAE alone comes out in metres, as its readers
+/// expect). Vertices are welded. Throws Error (file, place, way out). Thread-safe.
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings = {});
 
 /// Validates and orients a mesh: reduces coincident faces to their signed sum, drops degenerate
 /// triangles, orients every shell. Throws Error for a mesh that is flat, empty,
-/// not finite, non-orientable, or open under OpenMeshPolicy::refuse. Thread-safe.
+/// not finite, non-orientable, or, as OpenMeshError, open under OpenMeshPolicy::refuse.
+/// Thread-safe.
 ClosedMesh close_mesh(TriangleMesh mesh, const std::string& name,
                       OpenMeshPolicy policy = OpenMeshPolicy::refuse);
 

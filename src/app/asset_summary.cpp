@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 
 #include <ist/asset_layout.h>
@@ -10,6 +11,13 @@
 
 namespace ist::app {
 namespace {
+
+/// Whether the mode knows the largest sphere that would fit; the header of others says 1.
+bool keeps_bound(GridMode mode) { return mode == GridMode::banded; }
+
+/// Keys of JSON for kOverlapClassNames, in ASCII.
+constexpr std::array<const char*, kOverlapClasses> kOverlapClassKeys = {
+    "contained", "10-50%", "1-10%", "0.1-1%", "0.01-0.1%"};
 
 std::string hex(std::uint64_t hash) { return fmt::format("{:016x}", hash); }
 
@@ -28,7 +36,7 @@ nlohmann::ordered_json predicted_json(const AssetHeader& h) {
   if (h.predicted_poses == 0) return result;
   result["poses"] = h.predicted_poses;
   for (std::uint32_t k = 0; k < kOverlapClasses; ++k)
-    result["error"][kOverlapClassNames[k]] = h.predicted_error[k];
+    result["error"][kOverlapClassKeys[k]] = h.predicted_error[k];
   return result;
 }
 
@@ -55,8 +63,14 @@ std::string describe_asset(const TreeView& tree) {
   line("spheres",
        fmt::format("{}, {:.3f} % of the volume (stopped by: {})", grouped(h.sphere_count),
                    100 * h.coverage, name_of(static_cast<StopReason>(h.stop_reason))));
-  line("greedy", fmt::format("radius at least {:.3f} of the largest that would fit, median {:.3f}",
-                             h.kept_ratio_worst, h.kept_ratio_median));
+  const auto grid = static_cast<GridMode>(h.asked_grid);
+  line("greedy", keeps_bound(grid)
+                     ? fmt::format("radius at least {:.3f} of the largest that would fit, median "
+                                   "{:.3f}",
+                                   h.kept_ratio_worst, h.kept_ratio_median)
+                     : fmt::format("no promise: grid {} keeps no bound on the largest that would "
+                                   "fit",
+                                   name_of(grid)));
   line("volume", fmt::format("{:.9g} ± {:.1g} u³", h.volume * cube, h.volume_error * cube));
   line("frame", fmt::format("centre ({:.9g}, {:.9g}, {:.9g}) u, scale 2^{}", h.centre[0],
                             h.centre[1], h.centre[2], h.exponent));
@@ -68,11 +82,11 @@ std::string describe_asset(const TreeView& tree) {
          fmt::format("{} spheres, protrusion {:.4g} u", grouped(detail.matched_tree.sphere_count),
                      detail.protrusion * scale));
   }
-  line("asked", fmt::format("{} spheres, coverage {:g}, min radius {:g} u, epsilon {:g}, grid {}, "
-                            "seed {}",
-                            h.asked_spheres == 0 ? "unlimited" : grouped(h.asked_spheres),
-                            h.asked_coverage, h.asked_min_radius, h.asked_epsilon,
-                            name_of(static_cast<GridMode>(h.asked_grid)), h.asked_seed));
+  line("asked",
+       fmt::format("{} spheres, coverage {:g}, min radius {:g} u, epsilon {:g}, grid {}, "
+                   "seed {}",
+                   h.asked_spheres == 0 ? "unlimited" : grouped(h.asked_spheres), h.asked_coverage,
+                   h.asked_min_radius, h.asked_epsilon, name_of(grid), h.asked_seed));
   if (h.predicted_poses > 0) {
     std::string errors;
     for (std::uint32_t k = 0; k < kOverlapClasses; ++k)
@@ -94,6 +108,10 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
   const AssetHeader& h = tree.header();
   const double scale = std::ldexp(1.0, h.exponent);
   const double cube = scale * scale * scale;
+  const auto grid = static_cast<GridMode>(h.asked_grid);
+  const auto kept = [&](double ratio) {
+    return keeps_bound(grid) ? nlohmann::ordered_json(ratio) : nlohmann::ordered_json();
+  };
   return {
       {"format", fmt::format("{}.{}", h.format_major, h.format_minor)},
       {"bytes", h.file_bytes},
@@ -101,8 +119,8 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
       {"mesh_hash", hex(h.mesh_hash)},
       {"spheres", h.sphere_count},
       {"coverage", h.coverage},
-      {"kept_ratio_worst", h.kept_ratio_worst},
-      {"kept_ratio_median", h.kept_ratio_median},
+      {"kept_ratio_worst", kept(h.kept_ratio_worst)},
+      {"kept_ratio_median", kept(h.kept_ratio_median)},
       {"stop", name_of(static_cast<StopReason>(h.stop_reason))},
       {"volume", h.volume * cube},
       {"volume_error", h.volume_error * cube},
@@ -115,7 +133,7 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
         {"coverage", h.asked_coverage},
         {"min_radius", h.asked_min_radius},
         {"epsilon", h.asked_epsilon},
-        {"grid", name_of(static_cast<GridMode>(h.asked_grid))},
+        {"grid", name_of(grid)},
         {"grid_start", h.asked_grid_start},
         {"grid_resolution", h.asked_grid_resolution},
         {"grid_refinements", h.asked_grid_refinements},

@@ -8,7 +8,8 @@
 
 #include <ist/asset_layout.h>
 #include "app/commands.h"
-#include "app/number_checks.h"
+#include "app/file_options.h"
+#include "app/number_options.h"
 #include "app/text.h"
 
 namespace ist::app {
@@ -67,11 +68,9 @@ void add_check(CLI::App& app) {
   const auto options = std::make_shared<CheckOptions>();
   CLI::App* const command =
       app.add_subcommand("check", "Prove every invariant again, from asset and mesh alone");
-  command->add_option("ASSET", options->asset, "An .ist file")->required();
-  command->add_option("--mesh", options->mesh, "The MESH it was baked from")->required();
-  command->add_option("--threads", options->threads, "0 = all cores")
-      ->check(is_count)
-      ->capture_default_str();
+  add_input(command, "ASSET", options->asset, "An .ist file");
+  add_input(command, "--mesh", options->mesh, "The MESH it was baked from");
+  add_whole(command, "--threads", options->threads, "0 = all cores");
   command->add_flag("--json", options->json, "The invariants as JSON");
   command->footer(
       "Exits 3 if an invariant is violated.\nExample: ist check bolt.ist --mesh bolt.obj");

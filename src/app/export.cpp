@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <memory>
 
 #include <ist/bake.h>
@@ -9,33 +8,39 @@
 #include <ist/asset_layout.h>
 #include "app/commands.h"
 #include "app/exported_spheres.h"
+#include "app/file_options.h"
 #include "app/interrupt.h"
-#include "app/number_checks.h"
-#include "asset/atomic_file.h"
+#include "app/number_options.h"
 
 namespace ist::app {
 namespace {
 
 struct ExportOptions {
-  std::string asset;
-  std::filesystem::path output;
+  std::string asset, output;
   std::uint32_t detail = 0;
 };
 
+using Format = std::string (*)(std::span<const ExportedSphere>);
+
+/// By the file's ending; standard output gets CSV. Throws Error.
+Format format_of(const std::string& output) {
+  const std::string ending = ending_of(output);
+  if (ending == ".csv" || is_standard_output(output)) return spheres_csv;
+  if (ending == ".ply") return spheres_ply;
+  if (ending == ".json") return spheres_json;
+  throw Error(output + ": nothing is exported as '" + ending + "'; use .csv, .ply or .json");
+}
+
 void run_export(const ExportOptions& options) {
+  const Format format = format_of(options.output);
   const Asset asset = Asset::load(options.asset);
   const std::uint32_t details = asset.view().header().detail_count;
   if (options.detail > details)
     throw Error(fmt::format("{}: it has {} coarser level(s) of detail, not {}", options.asset,
                             details, options.detail));
   const std::vector<ExportedSphere> spheres = exported_spheres(asset.view(), options.detail);
-  const std::string extension = options.output.extension().string();
   const InterruptGuard guard;
-  if (extension == ".csv") return write_atomically(options.output, spheres_csv(spheres));
-  if (extension == ".ply") return write_atomically(options.output, spheres_ply(spheres));
-  if (extension == ".json") return write_atomically(options.output, spheres_json(spheres));
-  throw Error(options.output.string() + ": nothing is exported as '" + extension +
-              "'; use .csv, .ply or .json");
+  write_text(options.output, format(spheres));
 }
 
 }  // namespace
@@ -44,14 +49,12 @@ void add_export(CLI::App& app) {
   const auto options = std::make_shared<ExportOptions>();
   CLI::App* const command =
       app.add_subcommand("export", "Write an asset's spheres for other tools");
-  command->add_option("ASSET", options->asset, "An .ist file")->required();
-  command->add_option("-o,--output", options->output, "The .csv, .ply or .json file to write")
-      ->required();
-  command
-      ->add_option("--detail", options->detail,
-                   "0: all spheres; i: the i-th coarser level of detail")
-      ->check(is_count)
-      ->capture_default_str();
+  add_input(command, "ASSET", options->asset, "An .ist file");
+  add_output(command, options->output,
+             "The .csv, .ply or .json file to write; - for CSV on standard output",
+             Dash::standard_output);
+  add_whole(command, "--detail", options->detail,
+            "0: all spheres; i: the i-th coarser level of detail");
   command->footer(
       "A row a sphere, in greedy order, in the mesh's own unit and frame: x,y,z,r the inner "
       "sphere\n"

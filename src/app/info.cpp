@@ -6,6 +6,7 @@
 
 #include "app/asset_summary.h"
 #include "app/commands.h"
+#include "app/file_options.h"
 
 namespace ist::app {
 namespace {
@@ -28,7 +29,7 @@ void info(const InfoOptions& options) {
 void add_info(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
   CLI::App* const command = app.add_subcommand("info", "Show what an asset holds");
-  command->add_option("ASSET", options->asset, "An .ist file")->required();
+  add_input(command, "ASSET", options->asset, "An .ist file");
   command->add_flag("--json", options->json, "Every header field, as JSON");
   command->footer("Example: ist info bolt.ist --json");
   command->callback([options] { info(*options); });

@@ -9,13 +9,15 @@
 #include <ist/error.h>
 
 #include "app/commands.h"
-#include "app/number_checks.h"
-#include "app/output_file.h"
-#include "app/text.h"
-#include "asset/atomic_file.h"
+#include "app/device_option.h"
+#include "app/file_options.h"
+#include "app/input_mesh.h"
+#include "app/number_options.h"
 
 namespace ist::app {
 namespace {
+
+constexpr unsigned kMostCells = 1024;  ///< on a side: what the library takes
 
 struct MedialOptions {
   std::string mesh, output, device = "auto";
@@ -35,18 +37,14 @@ void run_medial(const MedialOptions& options) {
   if (options.quiet) spdlog::set_level(spdlog::level::err);
   require_output(options.output, options.mesh, "the nodes");
   MedialSettings settings = options.settings;
-  settings.device = device_named(options.device);
-  const ClosedMesh mesh =
-      close_mesh(load_mesh(options.mesh), options.mesh,
-                 options.repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
-  for (const std::string& note : mesh.report.notes) spdlog::warn("{}: {}", options.mesh, note);
-  const auto solid = make_solid(mesh);
+  settings.device = usable_device(options.device);
+  const auto solid = make_solid(read_input_mesh(options.mesh, options.repair).closed);
   const auto start = std::chrono::steady_clock::now();
   const std::vector<MedialNode> nodes = medial_nodes(*solid, settings);
   const std::chrono::duration<double, std::milli> elapsed =
       std::chrono::steady_clock::now() - start;
-  write_atomically(options.output, table_of(nodes));
-  if (!options.quiet)
+  write_text(options.output, table_of(nodes));
+  if (!options.quiet && !is_standard_output(options.output))
     fmt::print("{}\n  nodes {}, {:.1f} ms\n", options.output, nodes.size(), elapsed.count());
 }
 
@@ -56,27 +54,17 @@ void add_medial(CLI::App& app) {
   const auto options = std::make_shared<MedialOptions>();
   CLI::App* const command = app.add_subcommand(
       "medial", "Write points of a closed mesh's medial axis with their distance to the surface");
-  command->add_option("MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, …")->required();
-  command
-      ->add_option("-o,--output", options->output,
-                   "The CSV file to write: x,y,z,r in the mesh's own unit and frame")
-      ->required();
-  command
-      ->add_option("--resolution", options->settings.resolution,
-                   "Grid cells on the longest side, a node each at most; 0 = automatic")
-      ->check(is_count)
-      ->capture_default_str();
-  command->add_option("--seed", options->settings.seed, "Another seed, other points")
-      ->check(is_count)
-      ->capture_default_str();
-  command->add_option("--device", options->device, "Where it runs")
-      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
-      ->capture_default_str();
-  command
-      ->add_option("--threads", options->settings.threads,
-                   "0 = all cores; never changes the result")
-      ->check(is_count)
-      ->capture_default_str();
+  add_input(command, "MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, …");
+  add_output(command, options->output,
+             "The CSV file to write, - for standard output: x,y,z,r in the mesh's own unit and "
+             "frame",
+             Dash::standard_output);
+  add_whole(command, "--resolution", options->settings.resolution,
+            "Grid cells on the longest side, a node each at most; 0 = automatic", 0u, kMostCells);
+  add_whole(command, "--seed", options->settings.seed, "Another seed, other points");
+  add_device_option(command, options->device, "Where it runs");
+  add_whole(command, "--threads", options->settings.threads,
+            "0 = all cores; never changes the result");
   command->add_flag("--repair", options->repair, "Close an open mesh, and say what was done");
   command->add_flag("--quiet", options->quiet, "Only errors");
   command->footer("Example: ist medial bolt.obj -o nodes.csv");

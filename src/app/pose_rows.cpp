@@ -3,115 +3,147 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cctype>
 #include <cerrno>
-#include <charconv>
+#include <cmath>
 #include <fstream>
+#include <iostream>
 #include <optional>
+#include <sstream>
 #include <string_view>
 #include <system_error>
 
 #include <ist/error.h>
 
+#include "app/csv_reader.h"
+#include "app/number_options.h"
+
 namespace ist::app {
 namespace {
 
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r\"");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r\"") - first + 1);
+constexpr std::array kPose = {"qw", "qx", "qy", "qz", "tx", "ty", "tz"};
+
+double& component(Pose& pose, std::size_t k) { return k < 4 ? pose.q[k] : pose.t[k - 4]; }
+
+/// Without what spellings differ in: "Scale B" and "scale_b" are one.
+std::string plain(const std::string& name) {
+  std::string result;
+  for (const char c : name)
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0)
+      result += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return result;
 }
 
-std::vector<std::string_view> split(std::string_view line) {
-  std::vector<std::string_view> fields;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(',', begin), line.size());
-    fields.push_back(trimmed(line.substr(begin, end - begin)));
-    begin = end + 1;
+/// Where a column stands. One that is there twice, or in another spelling, is an error: to pass it
+/// over would answer another question than was asked.
+std::optional<std::size_t> find_column(const std::vector<std::string>& header,
+                                       const std::string& name, const CsvReader& file) {
+  std::optional<std::size_t> found;
+  for (std::size_t i = 0; i < header.size(); ++i) {
+    if (plain(header[i]) != plain(name)) continue;
+    if (header[i] != name)
+      file.fail(
+          fmt::format("column '{}': it must be spelled '{}', or named otherwise", header[i], name));
+    if (found) file.fail(fmt::format("column '{}' is there twice", name));
+    found = i;
   }
-  return fields;
+  return found;
 }
 
-/// Any number that the C locale writes, nan and inf included: judging a pose is the query's part.
-std::optional<double> number(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
+/// Column numbers.
+struct Columns {
+  std::array<std::size_t, kPose.size()> pose;
+  std::optional<std::size_t> id, label, scale;
 
-/// Where the columns stand in a file.
-struct Header {
-  static constexpr std::array kPose = {"qw", "qx", "qy", "qz", "tx", "ty", "tz"};
-
-  std::vector<std::string> names;
-
-  std::optional<std::size_t> find(std::string_view name) const {
-    for (std::size_t i = 0; i < names.size(); ++i)
-      if (names[i] == name) return i;
-    return std::nullopt;
+  Columns(const std::vector<std::string>& header, const CsvReader& file)
+      : id(find_column(header, "id", file)),
+        label(find_column(header, "class", file)),
+        scale(find_column(header, "scale_b", file)) {
+    for (std::size_t k = 0; k < kPose.size(); ++k) {
+      const std::optional<std::size_t> column = find_column(header, kPose[k], file);
+      if (!column)
+        file.fail(
+            fmt::format("no column '{}'; the header row must name qw,qx,qy,qz,tx,ty,tz", kPose[k]));
+      pose[k] = *column;
+    }
   }
 };
 
-void set_component(Pose& pose, std::size_t k, double value) {
-  (k < 4 ? pose.q[k] : pose.t[k - 4]) = value;
+PoseTable read(std::istream& text, const std::string& name) {
+  CsvReader file(text, name);
+  std::vector<std::string> header, fields;
+  if (!file.next(header)) throw Error(name + ": empty; there is no header row");
+  const Columns columns(header, file);
+  PoseTable table{{}, columns.label.has_value(), columns.scale.has_value()};
+  while (file.next(fields)) {
+    if (fields.size() != header.size())
+      file.fail(fmt::format("{} fields, but the header has {}", fields.size(), header.size()));
+    // nan and inf are numbers here: judging a pose is the query's part.
+    const auto number = [&](std::size_t column) {
+      const std::optional<double> value = parse_number(fields[column]);
+      if (!value)
+        file.fail(
+            fmt::format("'{}' in column '{}' is not a number", fields[column], header[column]));
+      return *value;
+    };
+    PoseRow row;
+    row.id = columns.id ? fields[*columns.id] : std::to_string(table.rows.size());
+    if (columns.label) row.label = fields[*columns.label];
+    for (std::size_t k = 0; k < kPose.size(); ++k) component(row.pose, k) = number(columns.pose[k]);
+    if (columns.scale) row.scale_b = number(*columns.scale);
+    table.rows.push_back(std::move(row));
+  }
+  if (text.bad()) throw Error(name + ": cannot be read to its end");
+  if (table.rows.empty()) throw Error(name + ": no row after the header; there is nothing to ask");
+  return table;
 }
 
 }  // namespace
 
 Pose parse_pose(const std::string& text) {
-  const std::vector<std::string_view> fields = split(text);
+  std::istringstream line(text);
+  std::vector<std::string> fields;
+  CsvReader(line, text).next(fields);
+  if (fields.size() != kPose.size())
+    throw Error(fmt::format("'{}' is not a pose; write seven numbers qw,qx,qy,qz,tx,ty,tz", text));
   Pose pose;
-  for (std::size_t k = 0; k < fields.size() || k < 7; ++k) {
-    const std::optional<double> value =
-        k < fields.size() && fields.size() == 7 ? number(fields[k]) : std::nullopt;
+  for (std::size_t k = 0; k < kPose.size(); ++k) {
+    const std::optional<double> value = parse_number(fields[k]);
     if (!value)
-      throw Error("'" + text + "' is not a pose; write seven numbers qw,qx,qy,qz,tx,ty,tz");
-    set_component(pose, k, *value);
+      throw Error(
+          fmt::format("'{}' is not a pose: {} = '{}' is not a number; write seven numbers "
+                      "qw,qx,qy,qz,tx,ty,tz",
+                      text, kPose[k], fields[k]));
+    component(pose, k) = *value;
   }
   return pose;
 }
 
-std::vector<PoseRow> read_pose_rows(const std::filesystem::path& path, double scale_b) {
+PoseTable read_pose_table(const std::string& path) {
+  if (path == "-") return read(std::cin, "standard input");
   std::ifstream file(path);
-  if (!file)
-    throw Error(path.string() + ": cannot open: " + std::generic_category().message(errno));
-  std::string line;
-  if (!std::getline(file, line)) throw Error(path.string() + ": cannot read a header row");
-  if (line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // the mark of UTF-8, as Excel writes
-  Header header;
-  for (const std::string_view name : split(line)) header.names.emplace_back(name);
-  for (const char* name : Header::kPose)
-    if (!header.find(name))
-      throw Error(fmt::format("{}: no column '{}'; the header row must name qw,qx,qy,qz,tx,ty,tz",
-                              path.string(), name));
-  const auto id = header.find("id"), label = header.find("class"), scale = header.find("scale_b");
+  if (!file) throw Error(path + ": cannot open: " + std::generic_category().message(errno));
+  return read(file, path);
+}
 
-  std::vector<PoseRow> rows;
-  for (std::size_t line_number = 2; std::getline(file, line); ++line_number) {
-    if (trimmed(line).empty()) continue;
-    const std::vector<std::string_view> fields = split(line);
-    const auto fail = [&](const std::string& what) {
-      throw Error(fmt::format("{}:{}: {}", path.string(), line_number, what));
-    };
-    if (fields.size() != header.names.size())
-      fail(fmt::format("{} fields, but the header has {}", fields.size(), header.names.size()));
-    const auto value = [&](std::size_t column) {
-      const std::optional<double> result = number(fields[column]);
-      if (!result)
-        fail(fmt::format("'{}' in column '{}' is not a number", fields[column],
-                         header.names[column]));
-      return *result;
-    };
-    PoseRow row;
-    row.id = id ? std::string(fields[*id]) : std::to_string(rows.size());
-    if (label) row.label = fields[*label];
-    for (std::size_t k = 0; k < Header::kPose.size(); ++k)
-      set_component(row.pose, k, value(*header.find(Header::kPose[k])));
-    row.scale_b = scale ? value(*scale) : scale_b;
-    rows.push_back(std::move(row));
-  }
-  return rows;
+std::string pose_fault(const PoseRow& row) {
+  Pose pose = row.pose;
+  for (std::size_t k = 0; k < kPose.size(); ++k)
+    if (!std::isfinite(component(pose, k)))
+      return fmt::format("{} is {}, not a finite number", kPose[k], component(pose, k));
+  if (!(row.scale_b > 0) || !std::isfinite(row.scale_b))
+    return fmt::format("scale_b is {}, not a finite number above 0", row.scale_b);
+  const double* const q = pose.q;
+  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (!(std::abs(length - 1) <= 1e-3))
+    return fmt::format("the quaternion qw,qx,qy,qz has length {:.6g}, not 1 within 1e-3", length);
+  std::string name = "scale_b";
+  double worst = row.scale_b, size = std::max(row.scale_b, 1 / row.scale_b);
+  for (std::size_t k = 4; k < kPose.size(); ++k)
+    if (const double value = component(pose, k); std::abs(value) > size)
+      name = kPose[k], worst = value, size = std::abs(value);
+  return fmt::format("{} is {:g}, too far: sizes and distances may be 1e60 : 1 apart at most", name,
+                     worst);
 }
 
 }  // namespace ist::app

@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <string>
+#include <string_view>
 
 namespace ist::app {
 namespace {
@@ -18,9 +20,12 @@ ProgressLine::~ProgressLine() {
 
 void ProgressLine::show(const Progress& progress) {
   if (!active_) return;
-  fmt::print(stderr, "{}{:<9} {:3.0f} %  {} spheres  coverage {:.2f} %  radius {:.3g}  {:.1f} s",
-             kWipe, progress.stage, 100 * progress.fraction, progress.spheres,
-             100 * progress.coverage, progress.radius, progress.elapsed);
+  std::string packed;  // the other stages know neither
+  if (std::string_view(progress.stage) == "pack")
+    packed =
+        fmt::format("coverage {:.2f} %  radius {:.3g}  ", 100 * progress.coverage, progress.radius);
+  fmt::print(stderr, "{}{:<9} {:3.0f} %  {} spheres  {}{:.1f} s", kWipe, progress.stage,
+             100 * progress.fraction, progress.spheres, packed, progress.elapsed);
   std::fflush(stderr);
 }
 

@@ -1,7 +1,6 @@
 #include <ist/query.h>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
@@ -12,7 +11,8 @@
 #include <ist/error.h>
 
 #include "app/commands.h"
-#include "app/number_checks.h"
+#include "app/file_options.h"
+#include "app/number_options.h"
 #include "app/query_output.h"
 
 namespace ist::app {
@@ -22,6 +22,7 @@ struct QueryOptions {
   std::string asset_a, asset_b, pose, poses;
   std::vector<std::string> classes;
   double scale_b = 1;
+  bool scale_b_given = false;
   QuerySettings settings;
   std::uint32_t max_visits = 0;
   double deadline_us = 0;
@@ -39,17 +40,32 @@ std::string is_pose(const std::string& text) {
   }
 }
 
+/// Throws Error if no row is of one of the classes: most likely it is misspelled.
+void keep_classes(PoseTable& table, const QueryOptions& options) {
+  if (!table.has_labels) throw Error(options.poses + ": no column 'class' to select rows by");
+  const auto is_of = [](const std::string& name) {
+    return [&name](const PoseRow& row) { return row.label == name; };
+  };
+  for (const std::string& name : options.classes)
+    if (std::none_of(table.rows.begin(), table.rows.end(), is_of(name)))
+      throw Error(fmt::format("{}: none of its {} rows is of class '{}'", options.poses,
+                              table.rows.size(), name));
+  std::erase_if(table.rows, [&](const PoseRow& row) {
+    return std::find(options.classes.begin(), options.classes.end(), row.label) ==
+           options.classes.end();
+  });
+}
+
 std::vector<PoseRow> asked_rows(const QueryOptions& options) {
   if (!options.pose.empty()) return {{"0", "", parse_pose(options.pose), options.scale_b}};
-  std::vector<PoseRow> rows = read_pose_rows(options.poses, options.scale_b);
-  const std::size_t all = rows.size();
-  if (!options.classes.empty())
-    std::erase_if(rows, [&](const PoseRow& row) {
-      return std::find(options.classes.begin(), options.classes.end(), row.label) ==
-             options.classes.end();
-    });
-  if (rows.empty()) spdlog::warn("{}: none of its {} rows is asked for", options.poses, all);
-  return rows;
+  PoseTable table = read_pose_table(options.poses);
+  if (table.has_scales && options.scale_b_given)
+    throw CLI::ValidationError(
+        "--scale-b", "the rows of " + options.poses + " have a scale_b of their own; give one");
+  if (!table.has_scales)
+    for (PoseRow& row : table.rows) row.scale_b = options.scale_b;
+  if (!options.classes.empty()) keep_classes(table, options);
+  return table.rows;
 }
 
 /// Answers every row, `repeat` rounds over all rows in turn, so that no row finds the branch
@@ -77,6 +93,10 @@ std::vector<Answer> answer(const TreeView& a, const TreeView& b, const std::vect
 }
 
 void run_query(const QueryOptions& options) {
+  if (options.settings.penetration.measure == Measure::inner &&
+      options.settings.penetration.pair_budget != 0)
+    throw CLI::ValidationError("--pair-budget",
+                               "has no effect with --measure inner, only with matched");
   const std::vector<PoseRow> rows = asked_rows(options);
   const Asset a = Asset::load(options.asset_a);
   const Asset b = Asset::load(options.asset_b);
@@ -97,17 +117,19 @@ void add_query(CLI::App& app) {
   const auto options = std::make_shared<QueryOptions>();
   CLI::App* const command =
       app.add_subcommand("query", "Overlap and distance of two assets, B placed in A's frame");
-  command->add_option("A", options->asset_a, "An .ist file")->required();
-  command->add_option("B", options->asset_b, "An .ist file")->required();
+  add_input(command, "A", options->asset_a, "An .ist file");
+  add_input(command, "B", options->asset_b, "An .ist file");
   CLI::Option_group* const poses = command->add_option_group("Poses", "Where B stands");
   poses->add_option("--pose", options->pose, "qw,qx,qy,qz,tx,ty,tz: x_A = R (scale · x_B) + t")
       ->check(is_pose);
   CLI::Option* const file = poses->add_option("--poses", options->poses,
-                                              "CSV with those columns, and id, class, scale_b");
+                                              "CSV with those columns, and id, class, scale_b; "
+                                              "- for standard input");
+  file->check([](const std::string& text) { return text.empty() ? "'' names no file" : ""; });
   poses->require_option(1);
-  command->add_option("--scale-b", options->scale_b, "Uniform scale of B about its own origin")
-      ->check(is_positive)
-      ->capture_default_str();
+  CLI::Option* const scale =
+      add_real(command, "--scale-b", options->scale_b, {.least = 0, .without_least = true},
+               "Uniform scale of B about its own origin");
   command->add_option("--class", options->classes, "Only rows of this class; may be repeated")
       ->take_all()
       ->allow_extra_args(false)
@@ -122,27 +144,15 @@ void add_query(CLI::App& app) {
           "Which spheres stand for the solid")
       ->check(CLI::IsMember({"matched", "inner"}))
       ->default_str("matched");
-  command
-      ->add_option("--pair-budget", options->settings.penetration.pair_budget,
-                   "Answer from the level of detail that needs about so many sphere pairs, "
-                   "0 = from the finest; matched measure only")
-      ->check(is_count)
-      ->capture_default_str();
-  command
-      ->add_option("--max-visits", options->max_visits,
-                   "Stop penetration and separation after so many node pairs each, 0 = no limit")
-      ->check(is_count)
-      ->capture_default_str();
-  command
-      ->add_option("--deadline-us", options->deadline_us,
-                   "[µs] Stop penetration and separation after this each, 0 = no limit")
-      ->check(is_not_negative)
-      ->capture_default_str();
-  command
-      ->add_option("--repeat", options->repeat,
-                   "Rounds over all rows in turn; time_us is a row's least")
-      ->check(is_positive)
-      ->capture_default_str();
+  add_whole(command, "--pair-budget", options->settings.penetration.pair_budget,
+            "Answer from the level of detail that needs about so many sphere pairs, "
+            "0 = from the finest; matched measure only");
+  add_whole(command, "--max-visits", options->max_visits,
+            "Stop penetration and separation after so many node pairs each, 0 = no limit");
+  add_real(command, "--deadline-us", options->deadline_us, {},
+           "[µs] Stop penetration and separation after this each, 0 = no limit");
+  add_whole<std::size_t>(command, "--repeat", options->repeat,
+                         "Rounds over all rows in turn; time_us is a row's least", 1);
   CLI::Option* const json = command->add_flag("--json", options->json, "Answers as JSON");
   command->add_flag("--csv", options->csv, "Answers as CSV (the default with --poses)")
       ->excludes(json);
@@ -151,7 +161,8 @@ void add_query(CLI::App& app) {
       "k·V\n"
       "pushes B by −k·dVdt and turns it by −k·dVdr about its origin.\n"
       "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9");
-  command->callback([options] {
+  command->callback([options, scale] {
+    options->scale_b_given = scale->count() > 0;
     QuerySettings& settings = options->settings;
     settings.penetration.max_visits = settings.separation.max_visits = options->max_visits;
     settings.penetration.deadline_us = settings.separation.deadline_us = options->deadline_us;

@@ -27,6 +27,14 @@ std::array<double, kNumbers.size()> numbers(const PenetrationAndSeparation& r) {
           w.y(),    w.z(),        s.distance,   s.distance_min, s.distance_max};
 }
 
+/// In quotes where it would be more than one field.
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + '"';
+}
+
 }  // namespace
 
 std::uint64_t Answer::node_visits() const {
@@ -42,7 +50,7 @@ std::string answers_csv(std::span<const Answer> answers) {
   for (const char* name : kNumbers) (out += ',') += name;
   out += ",status,node_visits,sphere_pairs,time_us\n";
   for (const Answer& answer : answers) {
-    out += answer.row.id;
+    out += csv_field(answer.row.id);
     for (const double value : numbers(answer.result))
       fmt::format_to(std::back_inserter(out), ",{:.17g}", value);
     fmt::format_to(std::back_inserter(out), ",{},{},{},{:.17g}\n", name_of(answer.status()),
@@ -70,8 +78,7 @@ std::string answer_text(const Answer& answer, Measure measure) {
   const Penetration& p = answer.result.penetration;
   const Separation& s = answer.result.separation;
   if (answer.status() == QueryStatus::invalid_input)
-    return "  no answer: invalid_input. The quaternion must be within 1e-3 of unit length, every "
-           "number finite\n";
+    return fmt::format("  no answer: {}: {}\n", name_of(answer.status()), pose_fault(answer.row));
   std::string text;
   const auto line = [&](const char* name, const std::string& value, const char* meaning) {
     text += fmt::format("  {:<10} {:<36} {}\n", name, value, meaning);

@@ -2,19 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <memory>
 #include <string>
 
 #include "app/commands.h"
+#include "app/file_options.h"
 #include "app/write_mesh.h"
 
 namespace ist::app {
 namespace {
 
 struct SampleOptions {
-  std::string name;
-  std::filesystem::path output;
+  std::string name, output;
 };
 
 std::string list_of_samples() {
@@ -30,8 +29,7 @@ void add_sample(CLI::App& app) {
   const auto options = std::make_shared<SampleOptions>();
   CLI::App* const command = app.add_subcommand("sample", "Write a closed mesh made on the spot");
   command->add_option("NAME", options->name, "Which one, see below")->required();
-  command->add_option("-o,--output", options->output, "MESH to write: .obj, .ply, .off or .stl")
-      ->required();
+  add_output(command, options->output, "MESH to write: .obj, .ply, .off or .stl", Dash::refused);
   command->footer(list_of_samples());
   command->callback([options] { write_mesh(make_sample(options->name), options->output); });
 }

@@ -15,11 +15,6 @@ std::string short_vector(const Eigen::Vector3d& v) {
   return fmt::format("({:.5g}, {:.5g}, {:.5g})", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);
 }
 
-Device device_named(const std::string& name) noexcept {
-  if (name == "cpu") return Device::cpu;
-  return name == "cuda" ? Device::cuda : Device::automatic;
-}
-
 GridMode grid_named(const std::string& name) noexcept {
   if (name == "uniform") return GridMode::uniform;
   if (name == "explicit") return GridMode::explicit_refinement;

@@ -15,7 +15,6 @@ std::string grouped(std::uint64_t count);  ///< 10,000
 std::string short_vector(const Eigen::Vector3d& v);
 
 /// The one whose name it is; the command line has let no other through.
-Device device_named(const std::string& name) noexcept;
 GridMode grid_named(const std::string& name) noexcept;
 
 const char* name_of(StopReason reason) noexcept;

@@ -8,6 +8,7 @@
 
 #include <ist/error.h>
 
+#include "app/file_options.h"
 #include "asset/atomic_file.h"
 
 namespace ist::app {
@@ -71,14 +72,13 @@ std::string stl(const TriangleMesh& mesh) {
 
 }  // namespace
 
-void write_mesh(const TriangleMesh& mesh, const std::filesystem::path& path) {
-  const std::string extension = path.extension().string();
-  if (extension == ".obj") return write_atomically(path, obj(mesh));
-  if (extension == ".off") return write_atomically(path, off(mesh));
-  if (extension == ".ply") return write_atomically(path, ply(mesh));
-  if (extension == ".stl") return write_atomically(path, stl(mesh));
-  throw Error(path.string() + ": no mesh format is called '" + extension +
-              "'; use .obj, .ply, .off or .stl");
+void write_mesh(const TriangleMesh& mesh, const std::string& path) {
+  const std::string ending = ending_of(path);
+  if (ending == ".obj") return write_atomically(path, obj(mesh));
+  if (ending == ".off") return write_atomically(path, off(mesh));
+  if (ending == ".ply") return write_atomically(path, ply(mesh));
+  if (ending == ".stl") return write_atomically(path, stl(mesh));
+  throw Error(path + ": no mesh format is called '" + ending + "'; use .obj, .ply, .off or .stl");
 }
 
 }  // namespace ist::app

@@ -67,8 +67,10 @@ TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings) {
   const PolygonMesh polygons = reader_of(file.path)(file);
   if (polygons.ends.empty()) fail(file, "no faces. There is nothing to bound a solid");
   const Eigen::AlignedBox3d bounds = finite_bounds(file, polygons);
-  TriangleMesh mesh{polygons.vertices, triangulate(polygons)};
-  return weld(mesh, settings.weld_tolerance * bounds.diagonal().norm());
+  const TriangleMesh mesh{polygons.vertices, triangulate(polygons)};
+  TriangleMesh welded = weld(mesh, settings.weld_tolerance * bounds.diagonal().norm());
+  welded.declared = polygons.declared;
+  return welded;
 }
 
 }  // namespace ist

@@ -1,6 +1,7 @@
 #include <ist/gpu.h>
 
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "cli/program.h"
 
@@ -55,7 +56,7 @@ TEST_F(BakeCommand, ATargetPicksTheSphereCount) {
   EXPECT_EQ(json.at("asked").at("error"), 0.2);
   EXPECT_EQ(json.at("asked").at("at_overlap"), 0.01);
   EXPECT_GE(json.at("predicted").at("poses"), 100);
-  EXPECT_LE(json.at("predicted").at("error").at("10–50 %"), 0.2);
+  EXPECT_LE(json.at("predicted").at("error").at("10-50%"), 0.2);
   EXPECT_NE(ist({"info", "new.ist"}).out.find("asked: 20 % at 1 %"), std::string::npos);
   for (const char* bad : {"0", "100%", "1x", "-1%"})
     EXPECT_EQ(ist({"bake", "cube.obj", "-o", "n.ist", "--target-error", bad}).exit_code, 2) << bad;
@@ -97,6 +98,9 @@ TEST_F(BakeCommand, AnOpenMeshIsRefusedUnlessRepaired) {
   EXPECT_NE(refused.err.find("open.obj"), std::string::npos) << refused.err;
   EXPECT_NE(refused.err.find("--repair"), std::string::npos) << refused.err;
   EXPECT_FALSE(exists("new.ist"));
+  const Outcome medial = ist({"medial", "open.obj", "-o", "new.csv"});
+  EXPECT_EQ(medial.exit_code, 1);
+  EXPECT_NE(medial.err.find("--repair"), std::string::npos) << medial.err;
 
   const Outcome repaired =
       ist({"bake", "open.obj", "-o", "new.ist", "--spheres", "20", "--repair", "--json"});
@@ -133,6 +137,29 @@ TEST_F(BakeCommand, AFailedBakeKeepsTheOldFile) {
   const std::string before = read("cube.ist");
   EXPECT_EQ(ist({"bake", "none.obj", "-o", "cube.ist"}).exit_code, 1);
   EXPECT_EQ(read("cube.ist"), before);
+}
+
+/// Coverage and radius are the packing's; the later stages know neither.
+TEST_F(BakeCommand, AStageShowsItsOwnProgress) {
+  ist::testing::RunOptions options;
+  options.terminal = true;
+  const Outcome outcome =
+      ist({"bake", "capsule.obj", "-o", "new.ist", "--spheres", "2000"}, options);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  std::size_t packing = 0, later = 0;
+  std::istringstream lines(outcome.err);
+  for (std::string line; std::getline(lines, line, '\r');) {
+    const bool shows_packing = line.find("coverage") != std::string::npos;
+    if (line.find("pack ") != std::string::npos) {
+      EXPECT_TRUE(shows_packing) << line;
+      ++packing;
+    } else if (line.find(" %") != std::string::npos) {
+      EXPECT_FALSE(shows_packing) << line;
+      ++later;
+    }
+  }
+  EXPECT_GT(packing, 0u) << outcome.err;
+  EXPECT_GT(later, 0u) << outcome.err;
 }
 
 TEST_F(BakeCommand, CtrlCEndsWith130AndWritesNothing) {

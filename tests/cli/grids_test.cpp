@@ -1,3 +1,4 @@
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "cli/program.h"
@@ -11,8 +12,11 @@ class GridCommands : public CommandLine {};
 
 TEST_F(GridCommands, EveryGridBakesAnAssetThatChecks) {
   for (const std::string grid : {"banded", "uniform", "explicit", "implicit", "hybrid"}) {
-    const Outcome bake = ist({"bake", "cube.obj", "-o", grid + ".ist", "--spheres", "60", "--grid",
-                              grid, "--grid-resolution", "16", "--quiet"});
+    std::vector<std::string> arguments = {"bake", "cube.obj", "-o", grid + ".ist", "--spheres",
+                                          "60",   "--grid",   grid, "--quiet"};
+    if (grid != "banded" && grid != "explicit")
+      arguments.insert(arguments.end(), {"--grid-resolution", "16"});
+    const Outcome bake = ist(arguments);
     EXPECT_EQ(bake.exit_code, 0) << grid << ": " << bake.err;
     const Outcome check = ist({"check", grid + ".ist", "--mesh", "cube.obj"});
     EXPECT_EQ(check.exit_code, 0) << grid << ": " << check.out << check.err;
@@ -31,6 +35,55 @@ TEST_F(GridCommands, GridOptionsAreTakenAndChecked) {
   EXPECT_EQ(large.exit_code, 1);
   EXPECT_NE(large.err.find("grid"), std::string::npos) << large.err;
   EXPECT_EQ(ist({"bake", "cube.obj", "-o", "b.ist", "--grid", "quadtree"}).exit_code, 2);
+}
+
+/// They would change nothing but the hash of the asset.
+TEST_F(GridCommands, OptionsThatTheGridHasNoUseForAreRefused) {
+  const auto bake = [&](const std::string& grid, std::vector<std::string> options) {
+    options.insert(options.begin(),
+                   {"bake", "cube.obj", "-o", "a.ist", "--spheres", "5", "--grid", grid});
+    return ist(options);
+  };
+  const auto expect_refused = [&](const std::string& grid, const std::string& option,
+                                  const std::string& value) {
+    const Outcome outcome = bake(grid, {option, value});
+    EXPECT_EQ(outcome.exit_code, 2) << grid << " " << option;
+    EXPECT_NE(outcome.err.find(option + ": has no effect with --grid " + grid), std::string::npos)
+        << outcome.err;
+    EXPECT_FALSE(exists("a.ist"));
+  };
+  for (const char* option :
+       {"--grid-resolution", "--grid-start", "--grid-refinements", "--grid-rounds"})
+    expect_refused("banded", option, "2");
+  expect_refused("uniform", "--grid-refinements", "2");
+  expect_refused("uniform", "--grid-rounds", "2");
+  expect_refused("explicit", "--grid-resolution", "16");
+  for (const char* grid : {"uniform", "explicit", "implicit", "hybrid"})
+    expect_refused(grid, "--epsilon", "0.1");
+  EXPECT_EQ(bake("uniform", {"--grid-start", "4", "--grid-resolution", "16"}).exit_code, 2);
+  // What is automatic may be said, and what is used has an effect.
+  EXPECT_EQ(bake("banded", {"--grid-resolution", "0", "--grid-refinements", "-1"}).exit_code, 0);
+  for (const char* grid : {"implicit", "hybrid"})
+    EXPECT_EQ(bake(grid, {"--grid-start", "4", "--grid-resolution", "16", "--grid-refinements", "1",
+                          "--grid-rounds", "3"})
+                  .exit_code,
+              0);
+}
+
+/// Only the banded packing is greedy and knows by how much.
+TEST_F(GridCommands, NoPromiseIsPrintedWhereNoneIsKept) {
+  for (const std::string grid : {"uniform", "explicit", "implicit", "hybrid"}) {
+    const Outcome bake =
+        ist({"bake", "cube.obj", "-o", "g.ist", "--spheres", "10", "--grid", grid});
+    EXPECT_EQ(bake.out.find("at least"), std::string::npos) << bake.out;
+    EXPECT_NE(bake.out.find("no promise: grid " + grid), std::string::npos) << bake.out;
+    const auto json = nlohmann::json::parse(ist({"info", "g.ist", "--json"}).out);
+    EXPECT_TRUE(json.at("kept_ratio_worst").is_null()) << grid;
+    EXPECT_TRUE(json.at("kept_ratio_median").is_null()) << grid;
+  }
+  EXPECT_NE(ist({"info", "cube.ist"}).out.find("radius at least"), std::string::npos);
+  EXPECT_GT(nlohmann::json::parse(ist({"info", "cube.ist", "--json"}).out).at("kept_ratio_worst"),
+            0.5);
 }
 
 TEST_F(GridCommands, MedialWritesPointsInsideTheMesh) {

@@ -43,6 +43,15 @@ bool drain(int descriptor, std::string& text) {
   return true;
 }
 
+/// A terminal's two ends, as pipe2() gives a pipe's.
+void open_terminal(int (&ends)[2]) {
+  ends[0] = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+  EXPECT_EQ(grantpt(ends[0]), 0);
+  EXPECT_EQ(unlockpt(ends[0]), 0);
+  ends[1] = open(ptsname(ends[0]), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  EXPECT_GE(ends[1], 0);
+}
+
 }  // namespace
 
 Outcome run_ist(const std::filesystem::path& folder, const std::vector<std::string>& arguments,
@@ -55,17 +64,26 @@ Outcome run_ist(const std::filesystem::path& folder, const std::vector<std::stri
 
   int out_pipe[2], err_pipe[2];
   EXPECT_EQ(pipe2(out_pipe, O_CLOEXEC), 0);
-  EXPECT_EQ(pipe2(err_pipe, O_CLOEXEC), 0);
+  if (options.terminal)
+    open_terminal(err_pipe);
+  else
+    EXPECT_EQ(pipe2(err_pipe, O_CLOEXEC), 0);
+  int in_pipe[2];
+  EXPECT_EQ(pipe2(in_pipe, O_CLOEXEC), 0);
+  const auto input_size = static_cast<ssize_t>(options.input.size());
+  EXPECT_EQ(write(in_pipe[1], options.input.data(), options.input.size()), input_size);
+  close(in_pipe[1]);
   const Clock::time_point start = Clock::now();
   const pid_t child = fork();
   if (child == 0) {
     if (options.in_child) options.in_child();
-    if (dup2(out_pipe[1], STDOUT_FILENO) >= 0 && dup2(err_pipe[1], STDERR_FILENO) >= 0 &&
-        chdir(folder.c_str()) == 0)
+    if (dup2(in_pipe[0], STDIN_FILENO) >= 0 && dup2(out_pipe[1], STDOUT_FILENO) >= 0 &&
+        dup2(err_pipe[1], STDERR_FILENO) >= 0 && chdir(folder.c_str()) == 0)
       execve(IST_BINARY, argv.data(), env.data());
     _exit(127);
   }
   EXPECT_GT(child, 0);
+  close(in_pipe[0]);
   close(out_pipe[1]);
   close(err_pipe[1]);
 

@@ -25,6 +25,8 @@ struct RunOptions {
   std::string interrupt_after = {};
   double stop_after = 0;      ///< [s] send stop_signal if it still runs then; 0 = never
   int stop_signal = SIGKILL;  ///< which
+  bool terminal = false;      ///< stderr is a terminal
+  std::string input = {};     ///< what it reads from standard input, 64 kB at most
   /// Called in the new process before `ist` starts in it.
   std::function<void()> in_child = nullptr;
 };

@@ -20,6 +20,7 @@ struct PolygonMesh {
   std::vector<std::size_t> ends;          ///< polygon i ends before corners[ends[i]]
   /// Text files only: the line of each vertex that is not finite.
   std::map<std::uint32_t, std::size_t> line_of_nonfinite;
+  DeclaredFrame declared;
 
   void add_triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     corners.insert(corners.end(), {a, b, c});
@@ -37,12 +38,12 @@ PolygonMesh read_off(const SourceFile& file);
 /// glTF 2.0: the default scene with its node transforms, skins in their bind pose.
 PolygonMesh read_gltf(const SourceFile& file);
 
-/// COLLADA: the visual scene with its node transforms, in metres with y up; skins in their bind
-/// pose.
+/// COLLADA: the visual scene with its node transforms, in metres and on the file's own axes; skins
+/// in their bind pose.
 PolygonMesh read_collada(const SourceFile& file);
 
-/// Any other format that assimp reads, the transforms of root and nodes applied. Coordinates pass
-/// through float.
+/// Any other format that assimp reads, the transforms of root and nodes applied, on the file's own
+/// axes. Coordinates pass through float.
 PolygonMesh read_with_assimp(const SourceFile& file);
 
 /// Polygons into triangles: a fan where it is valid, else ears cut off in the polygon's own plane

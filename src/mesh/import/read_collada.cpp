@@ -50,6 +50,7 @@ class SceneReader {
 
   PolygonMesh read() {
     const Index scene = visual_scene();
+    out_.declared = declared_frame();
     open_nodes_below(scene, root_transform());
     while (!open_.empty()) {
       const auto [node, parent] = open_.back();
@@ -91,22 +92,28 @@ class SceneReader {
     return first;
   }
 
-  /// Metres, y up: what glTF has, too.
-  Transform root_transform() const {
-    Transform transform = Transform::Identity();
+  /// Reads <asset>. What is up there is reported and no coordinate turned by it: a robot's visual
+  /// DAE has to stand as its collision STL does.
+  DeclaredFrame declared_frame() const {
+    DeclaredFrame frame;
     const Index asset = xml_.child(0, "asset");
-    if (asset == kNone) return transform;
+    if (asset == kNone) return frame;
     const Index axis = xml_.child(asset, "up_axis"), unit = xml_.child(asset, "unit");
-    const std::string_view up = axis == kNone ? "Y_UP" : xml_[axis].text;
-    if (up.find("Z_UP") != std::string_view::npos)
-      transform.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-    else if (up.find("X_UP") != std::string_view::npos)
-      transform.linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+    const std::string_view up = axis == kNone ? "" : xml_[axis].text;
+    for (const char letter : {'X', 'Y', 'Z'})
+      if (up.find(std::string{letter} + "_UP") != std::string_view::npos) frame.up_axis = letter;
     const std::string_view meter = unit == kNone ? "" : xml_.attribute(unit, "meter");
-    if (meter.empty()) return transform;
+    if (meter.empty()) return frame;
     const std::optional<double> scale = parse_real(meter);
     if (!scale || !(*scale > 0)) xml_.fail(unit, in_quotes(meter) + " is no length in metres");
-    transform.linear() *= *scale;
+    frame.unit = *scale;
+    return frame;
+  }
+
+  /// Metres.
+  Transform root_transform() const {
+    Transform transform = Transform::Identity();
+    if (out_.declared.unit != 0) transform.linear() *= out_.declared.unit;
     return transform;
   }
 

@@ -120,6 +120,7 @@ PolygonMesh read_scene(const SourceFile& file) {
   // A small file can ask for many copies of its meshes: more than this is no accident.
   const std::size_t most_corners = 12'000'000 + file.bytes.size();
   PolygonMesh mesh;
+  mesh.declared = {.up_axis = 'Y', .unit = 1};  // every glTF file, by its specification
   std::vector<bool> seen(document.root().value("nodes", Json::array()).size(), false);
   std::vector<std::pair<std::size_t, Transform>> open;
   const auto visit_later = [&](const std::vector<std::size_t>& nodes, const Transform& parent,

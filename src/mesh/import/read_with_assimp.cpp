@@ -1,9 +1,14 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <algorithm>
+#include <array>
 #include <assimp/Importer.hpp>
+#include <cctype>
+#include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -43,11 +48,30 @@ void append(const aiMesh& mesh, const Transform& world, PolygonMesh& out) {
   }
 }
 
+/// assimp turns the z axis of these formats to y in front of the scene; this turns it back.
+Transform own_axes(const std::string& ending) {
+  constexpr std::array<std::string_view, 10> kTurned = {".3ds", ".prj", ".ase", ".ask",     ".dxf",
+                                                        ".iqm", ".md2", ".md3", ".md5mesh", ".mdc"};
+  Transform back = Transform::Identity();
+  if (std::find(kTurned.begin(), kTurned.end(), ending) != kTurned.end())
+    back << 1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1;
+  return back;
+}
+
+/// FBX files say which axis is up, and assimp leaves it at that.
+DeclaredFrame declared_frame(const aiScene& scene) {
+  std::int32_t up = 0;
+  if (scene.mMetaData == nullptr || !scene.mMetaData->Get("UpAxis", up) || up < 0 || up > 2)
+    return {};
+  return {.up_axis = "XYZ"[up], .unit = 0};
+}
+
 }  // namespace
 
 PolygonMesh read_with_assimp(const SourceFile& file) {
   Assimp::Importer importer;
-  const std::string ending = std::filesystem::path(file.path).extension().string();
+  std::string ending = std::filesystem::path(file.path).extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (ending.empty() || !importer.IsExtensionSupported(ending))
     fail(file, "no mesh format ends in " + in_quotes(ending) +
                    ". Known are obj, stl, ply, off, glb, gltf, dae and what assimp reads");
@@ -56,8 +80,9 @@ PolygonMesh read_with_assimp(const SourceFile& file) {
   if (scene == nullptr || scene->mRootNode == nullptr)
     fail(file, "cannot be read as a mesh: " + std::string(importer.GetErrorString()));
   PolygonMesh mesh;
+  mesh.declared = declared_frame(*scene);
   std::vector<std::pair<const aiNode*, Transform>> open{
-      {scene->mRootNode, to_double(scene->mRootNode->mTransformation)}};
+      {scene->mRootNode, own_axes(ending) * to_double(scene->mRootNode->mTransformation)}};
   while (!open.empty()) {
     const auto [node, world] = open.back();
     open.pop_back();

@@ -1,0 +1,80 @@
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "cli/program.h"
+
+// Every JSON that the program prints holds the fields of docs/json.md, those and no others.
+
+namespace {
+
+using ist::testing::CommandLine;
+using ist::testing::Outcome;
+using Paths = std::set<std::string>;
+
+/// "a.b", "list[].c": what docs/json.md calls the leaves. A list of plain values is a leaf.
+void add_paths(const nlohmann::json& json, const std::string& prefix, Paths& paths) {
+  if (json.is_object()) {
+    for (const auto& [key, value] : json.items())
+      add_paths(value, prefix.empty() ? key : prefix + "." + key, paths);
+  } else if (json.is_array() && !json.empty() && json[0].is_object()) {
+    for (const auto& entry : json) add_paths(entry, prefix + "[]", paths);
+  } else if (!json.is_array() || !json.empty() || prefix == "notes") {
+    paths.insert(prefix);
+  }
+}
+
+/// The first cells of the table below the heading that begins so.
+Paths documented(const std::string& heading) {
+  std::ifstream page(IST_SOURCE_DIR "/docs/json.md");
+  Paths paths;
+  bool within = false;
+  for (std::string line; std::getline(page, line);) {
+    if (line.starts_with("## ")) within = line.starts_with("## " + heading);
+    if (!within || !line.starts_with("| `")) continue;
+    const std::string field = line.substr(3, line.find('`', 3) - 3);
+    EXPECT_TRUE(paths.insert(field).second) << field << " is described twice";
+  }
+  EXPECT_FALSE(paths.empty()) << heading;
+  return paths;
+}
+
+class JsonSchema : public CommandLine {
+ protected:
+  /// Adds what the command prints, after a look that every key is ASCII.
+  void add(const std::vector<std::string>& arguments, Paths& paths) {
+    const Outcome outcome = ist(arguments);
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    add_paths(nlohmann::json::parse(outcome.out), "", paths);
+    for (const std::string& path : paths)
+      for (const char c : path) EXPECT_TRUE(c > ' ' && c <= '~') << path;
+  }
+};
+
+TEST_F(JsonSchema, InfoAndBake) {
+  Paths info, bake;
+  // One has levels of detail, the other a prediction.
+  add({"bake", "cube.obj", "-o", "fine.ist", "--spheres", "1000", "--json"}, bake);
+  add({"bake", "cube.obj", "-o", "error.ist", "--target-error", "20%", "--at-overlap", "1%",
+       "--json"},
+      bake);
+  add({"info", "fine.ist", "--json"}, info);
+  add({"info", "error.ist", "--json"}, info);
+  Paths expected = documented("An asset");
+  EXPECT_EQ(info, expected);
+  expected.merge(documented("What `ist bake --json` adds"));
+  EXPECT_EQ(bake, expected);
+}
+
+TEST_F(JsonSchema, CheckQueryAndExport) {
+  Paths check, query, exported;
+  add({"check", "cube.ist", "--mesh", "cube.obj", "--json"}, check);
+  EXPECT_EQ(check, documented("`ist check --json`"));
+  add({"query", "cube.ist", "cube.ist", "--pose", "1,0,0,0,0.5,0,0", "--json"}, query);
+  EXPECT_EQ(query, documented("`ist query --json`"));
+  ASSERT_EQ(ist({"export", "cube.ist", "-o", "s.json"}).exit_code, 0);
+  add_paths(nlohmann::json::parse(read("s.json")), "", exported);
+  EXPECT_EQ(exported, documented("`ist export -o F.json`"));
+}
+
+}  // namespace
