@@ -49,8 +49,7 @@ TEST(CloseMesh, OpenCubeIsRefusedWithPlaceAndWayOut) {
   TriangleMesh open = box_mesh(kZero, Eigen::Vector3d::Ones());
   open.triangles.pop_back();  // {1, 7, 5}
   EXPECT_EQ(error_of(open),
-            "part: 3 boundary edges, first at vertex 1 (1 0 0): not closed. Bake with --repair, or "
-            "close it");
+            "part: 3 boundary edges, first at vertex 1 (1 0 0): not closed. Repair or close it");
 }
 
 TEST(CloseMesh, UnweldedSoupIsWelded) {

@@ -91,11 +91,28 @@ TEST(ImportCollada, KeepsTheDigitsOfDoubles) {
   EXPECT_EQ(mesh.report.bounds.max().x(), 1000000.000123456789);
 }
 
-TEST(ImportCollada, UnitAndUpAxis) {
-  const std::string node = std::string("<node>") + kInstance + "</node>";
-  expect_corner(closed(collada(node, "", "<unit meter='0.5'/><up_axis>Z_UP</up_axis>")),
-                {0, 0, -0.5}, {0.5, 0.5, 0});
-  expect_corner(closed(collada(node, "", "<up_axis>X_UP</up_axis>")), {-1, 0, 0}, {0, 1, 1});
+TEST(ImportCollada, TheUnitScalesAndTheUpAxisTurnsNothing) {
+  const std::string node =
+      "<node><translate>1 2 3</translate>" + std::string(kInstance) + "</node>";
+  for (const char up : {'X', 'Y', 'Z'}) {
+    const TempFile file(
+        "a.dae",
+        collada(node, "", std::string("<unit meter='0.5'/><up_axis> ") + up + "_UP\n</up_axis>"));
+    const TriangleMesh mesh = load_mesh(file.path());
+    EXPECT_EQ(mesh.declared.up_axis, up);
+    EXPECT_EQ(mesh.declared.unit, 0.5);
+    expect_corner(close_mesh(mesh, "a.dae"), {0.5, 1, 1.5}, {1, 1.5, 2});
+  }
+  // A skin is placed by its own matrix, on the same axes.
+  const std::string skin =
+      "<library_controllers><controller id='c'><skin source='#g'><bind_shape_matrix>1 0 0 9 0 1 0 "
+      "0 0 0 1 0 0 0 0 1</bind_shape_matrix></skin></controller></library_controllers>";
+  expect_corner(closed(collada("<node><instance_controller url='#c'/></node>", skin,
+                               "<unit meter='0.5'/><up_axis>Z_UP</up_axis>")),
+                {4.5, 0, 0}, {5, 0.5, 0.5});
+  const TempFile file("a.dae", collada(node, "", ""));
+  EXPECT_EQ(load_mesh(file.path()).declared.up_axis, 0);
+  EXPECT_EQ(load_mesh(file.path()).declared.unit, 0);
 }
 
 TEST(ImportCollada, PrimitivesOfEveryKind) {

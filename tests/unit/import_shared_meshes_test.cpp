@@ -21,13 +21,15 @@ bool has_node_transforms(const MeshRow& row) {
   return row.at("format") == "dae" || row.at("format") == "glb";
 }
 
-/// The table's tool read DAE through float, ours does not: its triangles that just touch are these
-/// only once they are rounded likewise.
+/// The table's tool turned DAE to y up and read it through float, ours does neither: its triangles
+/// that just touch are these only once they are turned and rounded likewise.
 TriangleMesh load_as_the_table_did(const MeshRow& row, const std::string& path) {
   TriangleMesh mesh = load_mesh(path);
   if (row.at("format") == "dae")
-    for (Eigen::Vector3d& v : mesh.vertices)
+    for (Eigen::Vector3d& v : mesh.vertices) {
+      if (mesh.declared.up_axis == 'Z') v = Eigen::Vector3d(v.x(), v.z(), -v.y());
       for (double& x : v) x = static_cast<float>(x);
+    }
   return mesh;
 }
 
@@ -85,6 +87,29 @@ TEST(SharedMeshes, ReportMatchesTheTable) {
     EXPECT_EQ(mesh.report.cavities, number(row, "inward_components"));
     expect_volume(row, mesh.report);
   }
+}
+
+/// A robot's description puts both at the same place.
+TEST(SharedMeshes, ALinksVisualDaeStandsAsItsCollisionStl) {
+  IST_NEEDS_SHARED("meshes/dev/robots/ur_description/meshes/ur5");
+  const std::filesystem::path robot = shared_path("meshes/dev/robots/ur_description/meshes/ur5");
+  std::size_t links = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(robot / "visual")) {
+    SCOPED_TRACE(entry.path().filename());
+    const auto bounds = [](const std::filesystem::path& path) {
+      Eigen::AlignedBox3d box;
+      for (const Eigen::Vector3d& v : load_mesh(path.string()).vertices) box.extend(v);
+      return box;
+    };
+    const Eigen::AlignedBox3d visual = bounds(entry.path());
+    const Eigen::AlignedBox3d collision =
+        bounds(robot / "collision" / (entry.path().stem().string() + ".stl"));
+    const double tolerance = 0.01 * collision.diagonal().norm();  // two models of one part
+    EXPECT_LT((visual.min() - collision.min()).norm(), tolerance);
+    EXPECT_LT((visual.max() - collision.max()).norm(), tolerance);
+    ++links;
+  }
+  EXPECT_EQ(links, 7u);
 }
 
 TEST(SharedMeshes, BrokenOnesMeetTheExpectation) {
