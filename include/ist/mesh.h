@@ -73,8 +73,8 @@ enum class OpenMeshPolicy {
 
 /// Reads a mesh file: OBJ, STL, PLY, OFF, GLB/glTF and DAE by readers of this library, the rest
 /// through assimp. The file's own node transforms are applied; axes are left as they are, whichever
-/// the file declares to be up, and so are units (DAE alone comes out in metres, as its readers
-/// expect). Vertices are welded. Throws Error (file, place, way out). Thread-safe.
+/// the file declares to be up, and so are units (a DAE alone comes out in metres, by the
+/// unit that it declares). Vertices are welded. Throws Error (file, place, way out). Thread-safe.
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings = {});
 
 /// Validates and orients a mesh: reduces coincident faces to their signed sum, drops degenerate

@@ -100,10 +100,9 @@ MeshReport survey(const TriangleMesh& mesh) {
     first = e;
   }
   const std::string kind = boundary == odd ? "boundary edge" : "boundary or odd edge";
-  throw OpenMeshError(name + ": " + counted(odd, kind) + ", first at vertex " +
-                      std::to_string(edges.low(first)) + " " +
-                      position_text(mesh.vertices[edges.low(first)]) +
-                      ": not closed. Repair or close it");
+  throw OpenMeshError(
+      name + ": " + counted(odd, kind) + ", first at vertex " + std::to_string(edges.low(first)) +
+      " " + position_text(mesh.vertices[edges.low(first)]) + ": not closed. Repair or close it");
 }
 
 double largest_coordinate(const Eigen::AlignedBox3d& bounds) {
