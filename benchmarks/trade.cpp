@@ -246,7 +246,8 @@ void report_prediction(Report& report, const PairOfBodies& pair) {
         },
         [&] {
           return ist::bake_to_error(body.closed, kTarget,
-                                    {.max_spheres = 0, .device = ist::Device::cpu});
+                                    {.max_spheres = 0, .device = ist::Device::cpu})
+              .asset;
         });
   };
   const ist::Asset a = bake(*pair.a), b = bake(*pair.b);

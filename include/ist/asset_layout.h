@@ -48,9 +48,11 @@ inline constexpr std::size_t kAssetAlignment = 64;
 inline constexpr std::uint32_t kWidth = 16;       ///< balls in a block
 inline constexpr std::uint32_t kMaxLevels = 7;    ///< 16^7 spheres
 inline constexpr std::uint32_t kMaxDetails = 10;  ///< coarser matched sets of an asset
-/// Classes of overlap by which errors are predicted, from the whole of the smaller solid down:
-/// contained, then parts of its volume down to 0.1, 0.01, 0.001 and 0.0001.
+/// Classes of overlap by which errors are predicted.
 inline constexpr std::uint32_t kOverlapClasses = 5;
+/// Lowest overlap of a class, part of the smaller solid's volume: contained by itself, then from a
+/// half down.
+inline constexpr double kOverlapClassFloor[kOverlapClasses] = {1, 1e-1, 1e-2, 1e-3, 1e-4};
 /// Radius and cover radius of an unused lane: no distance makes it overlap anything.
 inline constexpr float kEmptyRadius = -1e30f;
 /// No coordinate, offset or radius of a checked asset is larger than this, unit frame.
@@ -165,7 +167,11 @@ struct alignas(64) AssetHeader {
 
   double kept_ratio_worst = 0;   ///< SpherePacking's: inserted radius over the largest live bound
   double kept_ratio_median = 0;  ///< likewise
-  std::uint64_t reserved[6] = {};
+
+  double measured_error = 0;         ///< median near asked_at_overlap, of two copies of the solid
+  std::uint32_t measured_poses = 0;  ///< behind it; 0: nothing was measured
+  std::uint32_t search_stop = 0;     ///< StopReason of the search for the target
+  std::uint64_t reserved[4] = {};
 };
 static_assert(sizeof(AssetHeader) == 960);
 

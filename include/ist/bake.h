@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <span>
@@ -70,19 +71,37 @@ struct ErrorTarget {
   double at_overlap = 0.001;     ///< [1e-4, 0.5] of the solid's volume, within half a decade
 };
 
+/// What bake_to_error() made of its target. TreeView::predicted_errors() tells more.
+struct TargetedAsset {
+  Asset asset;
+  double measured_error = 0;  ///< relative, median over `poses` near the overlap asked about
+  std::uint32_t poses = 0;    ///< 0: none was tried, for want of time or of room
+  bool met = false;           ///< poses > 0 and measured_error ≤ the one asked for
+  /// What ended the search. sphere_count where met: few spheres do; where missed: as many as are
+  /// allowed do not. time_limit: the best asset until then, met or not. Else the limit by which the
+  /// packing could not grow.
+  StopReason stop = StopReason::sphere_count;
+};
+
 /// bake() with about as few spheres as the target needs, at most settings.max_spheres (0 =
-/// 200,000); where those are not enough, with all of them. The truth is integrated over both
-/// meshes at some 250 poses with independent random rotations, an order more exact than the
-/// target. The asset holds the medians by class of overlap (AssetHeader::predicted_error). Packs
-/// several times: takes a few times a bake of the final count. Throws Error as bake() does.
-Asset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
-                    const PackingSettings& settings = {}, const ProgressCallback& progress = {});
+/// 200,000). Where those are not enough: the best asset, and the result says so.
+///
+/// The truth is integrated over both meshes at some 200 poses with independent random rotations,
+/// an order more exact than the target; the asset holds the medians.
+/// settings.time_limit bounds all of it, but for its first bake, of a few hundred spheres.
+/// Takes up to about six times a bake of the final count.
+/// Reports the stages of each bake, and "predict".
+///
+/// Throws Error as bake() does, and whenever the callback cancels.
+TargetedAsset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
+                            const PackingSettings& settings = {},
+                            const ProgressCallback& progress = {});
 
 /// One proven property of an asset.
 struct Invariant {
   std::string name;  ///< "sphere inside solid", …
-  double worst =
-      0;  ///< largest violation measure, unit as in `meaning`; ≤ 0 is sound unless stated
+  /// Largest violation measure, unit as in `meaning`; ≤ 0 is sound unless stated.
+  double worst = 0;
   std::string meaning;      ///< what `worst` measures, with its unit
   std::size_t where = 0;    ///< index of the sphere or node that is worst
   std::size_t checked = 0;  ///< how many spheres, pairs or nodes were looked at

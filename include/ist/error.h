@@ -5,8 +5,11 @@
 
 namespace ist {
 
-/// The one exception of the offline stages (import … bake). Its message names the file, the place
-/// and the way out. Queries never throw; they answer with a QueryStatus.
+/// The one exception type of the offline stages (import … bake).
+///
+/// Its message names the file, the place and the way out.
+/// Besides it only std::bad_alloc, and what the caller's own callback throws, leave a stage.
+/// Queries never throw; they answer with a QueryStatus.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -7,7 +7,7 @@ namespace ist {
 
 /// Where a long offline stage stands.
 struct Progress {
-  const char* stage = "";   ///< "pack", "calibrate", "cover", "tree"
+  const char* stage = "";   ///< "pack", "calibrate", "cover", "tree", "predict"
   std::size_t spheres = 0;  ///< count so far
   double coverage = 0;      ///< [0, 1] of the solid's volume in inner spheres; "pack" only
   double radius = 0;        ///< [u] of the spheres being inserted now; "pack" only
@@ -15,9 +15,12 @@ struct Progress {
   double elapsed = 0;       ///< [s] since the stage began
 };
 
-/// Called from the thread that started the stage: ten times a second at most while packing, after
-/// every step of the shorter stages.
-/// Return false to cancel: packing ends with what is packed so far, which is valid.
+/// Called from the thread that started the stage: ten times a second at most while packing and
+/// predicting, after every step of the shorter stages.
+///
+/// Return false to cancel: packing ends with what is packed so far, which is valid; other stages
+/// throw Error.
+/// What it throws ends the stage and reaches the caller.
 using ProgressCallback = std::function<bool(const Progress&)>;
 
 }  // namespace ist

@@ -37,9 +37,11 @@ class Solid {
   /// underestimate the true distance (as CSG by min and max does), never overestimate it.
   virtual double signed_distance(const Eigen::Vector3d& x) const = 0;
 
-  virtual Eigen::AlignedBox3d bounds() const = 0;    ///< [u] holds the whole solid
-  virtual double volume() const = 0;                 ///< [u³]
-  virtual double volume_error() const { return 0; }  ///< [u³] on volume(), see the maker
+  virtual Eigen::AlignedBox3d bounds() const = 0;  ///< [u] holds the whole solid
+  virtual double volume() const = 0;               ///< [u³]
+  virtual double volume_error() const {
+    return 0;
+  }  ///< [u³] on volume(); each make_… says how sure
 
   /// The mesh that bounds the solid, where one does (make_solid): it is then packed by its
   /// triangles, on a GPU too. Null for every other solid.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -26,6 +27,24 @@ enum class AssetStatus : std::uint32_t {
 /// One English sentence for a status; never null.
 const char* describe(AssetStatus status) noexcept;
 
+/// By how much penetration volumes are wrong, measured on trial poses of two copies of the solid by
+/// bake_to_error(). Overlaps are shares of the smaller solid's volume, errors are shares of the
+/// overlap's.
+struct PredictedErrors {
+  struct OverlapClass {
+    double from = 0, to = 0;  ///< [0, 1] overlaps of the class; both 1: the smaller lies inside
+    double median = 0;        ///< ≥ 0, 0.01 = 1 %; 0 too where no such pose was found
+  };
+  std::uint32_t poses = 0;              ///< behind all classes together; 0: nothing is predicted
+  std::array<OverlapClass, 5> classes;  ///< deepest first
+  double target_error = 0;              ///< asked for; 0: none was
+  double target_overlap = 0;            ///< where it was asked for
+  double measured_error = 0;            ///< median within half a decade of target_overlap
+  std::uint32_t measured_poses = 0;     ///< behind it; 0: nothing was measured there
+  /// The target was asked for, measured and reached.
+  bool target_met() const noexcept { return measured_poses > 0 && measured_error <= target_error; }
+};
+
 /// A checked, read-only view of an asset's bytes: file, mapped memory or buffer. A value of one
 /// pointer; the bytes must outlive it. Copy freely, share between threads.
 class TreeView {
@@ -41,6 +60,8 @@ class TreeView {
   double volume() const noexcept;      ///< [u³] of the solid
   double coverage() const noexcept;    ///< [0, 1] share of it in inner spheres
   double protrusion() const noexcept;  ///< [u] no matched sphere sticks further out of the solid
+  /// No poses for an asset of bake(), which predicts nothing, and for an empty view.
+  PredictedErrors predicted_errors() const noexcept;
 
   /// The checked bytes behind the view (ist/asset_layout.h); of an empty view a header without
   /// spheres.

@@ -1,4 +1,4 @@
-#include <ist/bake.h>
+#include "bake/bake_solid.h"
 
 #include <tbb/task_group.h>
 
@@ -13,7 +13,6 @@
 #include "bake/calibrate/calibration.h"
 #include "bake/cluster/tree_builder.h"
 #include "bake/cover/cover.h"
-#include "mesh/mesh_solid.h"
 #include "packing/base/packing_settings.h"
 #include "stage/stage.h"
 #include "stage/thread_arena.h"
@@ -91,12 +90,10 @@ class TreeWork {
   tbb::task_group group_;
 };
 
-/// Everything of the asset but its bytes, on the threads of the current arena.
-AssetArrays baked(const ClosedMesh& mesh, const PackingSettings& settings,
-                  const ProgressCallback& progress) {
-  const MeshSolid solid(mesh);
-  const auto backend = make_backend(solid, {settings.device, settings.gpu});
-  const SpherePacking packing = backend->pack(settings, progress);
+/// Everything of the asset but its bytes.
+AssetArrays baked(const ClosedMesh& mesh, const MeshSolid& solid, SolidBackend& backend,
+                  const PackingSettings& settings, const ProgressCallback& progress) {
+  const SpherePacking packing = backend.pack(settings, progress);
   const std::size_t count = packing.spheres.size();
   if (count == 0)
     throw Error(mesh.name +
@@ -107,11 +104,11 @@ AssetArrays baked(const ClosedMesh& mesh, const PackingSettings& settings,
   arrays.inner_spheres = packing.spheres;
 
   std::vector<std::uint32_t> inner_order;
-  TreeWork trees(backend->leaves_threads_idle());
+  TreeWork trees(backend.leaves_threads_idle());
   trees.add([&] { inner_order = sphere_order(arrays.inner_spheres); });
 
   std::vector<Calibration> details =
-      calibrate_prefixes(solid, *backend, packing.spheres, detail_counts(count), progress);
+      calibrate_prefixes(solid, backend, packing.spheres, detail_counts(count), progress);
   arrays.matched_spheres = std::move(details.front().matched);
   arrays.header.protrusion = details.front().protrusion;
   for (std::size_t i = 1; i < details.size(); ++i)
@@ -122,7 +119,7 @@ AssetArrays baked(const ClosedMesh& mesh, const PackingSettings& settings,
       detail.matched_tree = build_tree(detail.matched_spheres, {});
   });
 
-  arrays.cover_radii = cover_radii(solid, *backend, packing.spheres, progress);
+  arrays.cover_radii = cover_radii(solid, backend, packing.spheres, progress);
 
   Stage stage("tree", progress);
   stage.step(count, 0);
@@ -135,13 +132,19 @@ AssetArrays baked(const ClosedMesh& mesh, const PackingSettings& settings,
 
 }  // namespace
 
+Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidBackend& backend,
+                 const PackingSettings& settings, const ProgressCallback& progress) {
+  return Asset(asset_bytes(baked(mesh, solid, backend, settings, progress)), mesh.name);
+}
+
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
            const ProgressCallback& progress) {
   packing::check_settings(settings);
-  return Asset(asset_bytes(thread_arena(settings.threads).execute([&] {
-                 return baked(mesh, settings, progress);
-               })),
-               mesh.name);
+  return thread_arena(settings.threads).execute([&] {
+    const MeshSolid solid(mesh);
+    const auto backend = make_backend(solid, {settings.device, settings.gpu});
+    return bake_solid(mesh, solid, *backend, settings, progress);
+  });
 }
 
 }  // namespace ist

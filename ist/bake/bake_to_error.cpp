@@ -1,29 +1,34 @@
-#include <ist/bake.h>
 #include <ist/error.h>
 #include <ist/query.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "asset/asset_writer.h"
+#include "bake/backend/make_backend.h"
+#include "bake/bake_solid.h"
+#include "bake/count_search.h"
 #include "bake/predict/trial_poses.h"
-#include "mesh/mesh_solid.h"
+#include "packing/base/packing_settings.h"
+#include "stage/stage.h"
 #include "stage/thread_arena.h"
 
 namespace ist {
 namespace {
 
-constexpr std::uint32_t kPosesPerClass = 50;
+constexpr std::uint32_t kNearPoses = 40;      // at the overlap that was asked about, for the search
+constexpr std::uint32_t kPosesPerClass = 30;  // besides, for the prediction
+constexpr std::size_t kFewPoses = 10;         // fewer near ones: the spheres did not find them
+constexpr std::size_t kManySpheres = 4'000;   // with so many they would have
 constexpr double kTruthShare = 0.1;           // of the target: what the truth may be off
 constexpr double kTruthBest = 1e-4;           // no truth is asked to be better than this
-constexpr double kNear = 3.1622776601683795;  // overlaps within this factor of the one asked about
-constexpr std::size_t kFirst = 1'000;         // spheres: the first guess
-constexpr std::size_t kFewest = 16;
-constexpr std::size_t kMost = 200'000;  // where the caller sets no limit
-constexpr double kCloseEnough = 1.25;   // between a count that does and one that does not
-constexpr int kMostBakes = 10;
+constexpr std::size_t kMost = 200'000;        // where the caller sets no limit
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -32,54 +37,230 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Relative errors of an asset's volumes at the poses.
-std::vector<double> errors_at(const TreeView& tree, const std::vector<TrialPose>& poses) {
-  Workspace workspace;
-  std::vector<double> errors;
-  for (const TrialPose& pose : poses) {
-    const double volume =
-        penetration({tree, {}, 1}, {tree, pose.b_in_a, pose.scale_b}, {}, workspace).volume;
-    errors.push_back(std::abs(volume / pose.volume - 1));
+/// The caller's word and the clock, for all stages of a search together.
+class Watch {
+ public:
+  Watch(const ProgressCallback& progress, double time_limit)
+      : progress_(progress), time_limit_(time_limit) {}
+
+  /// For a stage that only the caller may stop.
+  ProgressCallback patient() {
+    return [this](const Progress& now) {
+      if (progress_ && !progress_(now)) cancelled_ = true;
+      return !cancelled_;
+    };
   }
-  return errors;
-}
-
-/// What is asked and what is known to answer it.
-struct Trials {
-  ErrorTarget target;
-  std::vector<TrialPose> poses;
-
-  /// Median error near the overlap that was asked about.
-  double error_of(const Asset& asset) const {
-    const std::vector<double> errors = errors_at(asset.view(), poses);
-    std::vector<double> near;
-    for (std::size_t i = 0; i < poses.size(); ++i)
-      if (poses[i].overlap_class != 0 && poses[i].fraction >= target.at_overlap / kNear &&
-          poses[i].fraction <= target.at_overlap * kNear)
-        near.push_back(errors[i]);
-    return median(near);
+  /// For one that ends with the time as well.
+  ProgressCallback strict() {
+    return [this](const Progress& now) { return patient()(now) && !late(); };
   }
 
-  /// The asset with the predicted errors in its header.
-  Asset with_prediction(const Asset& asset, std::size_t asked_spheres,
-                        const std::string& name) const {
-    std::vector<std::byte> bytes(asset.bytes().begin(), asset.bytes().end());
-    AssetHeader header = asset.view().header();
-    const std::vector<double> errors = errors_at(asset.view(), poses);
-    for (std::uint32_t k = 0; k < kOverlapClasses; ++k) {
-      std::vector<double> of_class;
-      for (std::size_t i = 0; i < poses.size(); ++i)
-        if (poses[i].overlap_class == k) of_class.push_back(errors[i]);
-      header.predicted_error[k] = median(std::move(of_class));
+  double time_left() const {  ///< [s] 0: no limit
+    return time_limit_ > 0 ? std::max(1e-3, time_limit_ - elapsed()) : 0;
+  }
+  bool late() {
+    if (time_limit_ > 0 && elapsed() >= time_limit_) late_ = true;
+    return late_;
+  }
+  bool is_late() const { return late_; }  ///< some stage was ended by it
+  void throw_if_cancelled() const {
+    if (cancelled_) throw Error("bake to an error: cancelled");
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  double elapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+  const ProgressCallback& progress_;
+  const double time_limit_;
+  const Clock::time_point start_ = Clock::now();
+  bool cancelled_ = false, late_ = false;
+};
+
+/// An asset and how it answers.
+struct Candidate {
+  Asset asset;
+  std::vector<double> errors = {};  ///< relative, of the volumes at the first poses
+  double error = 0;                 ///< median of those near the overlap asked about
+  std::uint32_t poses = 0;          ///< behind that median
+
+  std::size_t spheres() const { return asset.view().sphere_count(); }
+  StopReason packing_stop() const {
+    return static_cast<StopReason>(asset.view().header().stop_reason);
+  }
+};
+
+class TargetBake {
+ public:
+  TargetBake(const ClosedMesh& mesh, const ErrorTarget& target, const PackingSettings& settings,
+             const ProgressCallback& progress)
+      : mesh_(mesh),
+        target_(target),
+        settings_(settings),
+        most_(settings.max_spheres == 0 ? kMost : settings.max_spheres),
+        watch_(progress, settings.time_limit),
+        solid_(mesh),
+        backend_(make_backend(solid_, {settings.device, settings.gpu})) {}
+
+  TargetedAsset run() {
+    find_near_poses();
+    if (!poses_.empty()) {
+      search();
+      const bool did = does(*best_);
+      if (add_other_poses() && judge(*best_) && did && !does(*best_)) search();
     }
-    header.predicted_poses = static_cast<std::uint32_t>(poses.size());
-    header.asked_error = target.relative_error;
-    header.asked_at_overlap = target.at_overlap;
-    header.asked_spheres = asked_spheres;
+    return result();
+  }
+
+ private:
+  bool does(const Candidate& candidate) const {
+    return candidate.poses > 0 && candidate.error <= target_.relative_error;
+  }
+
+  /// Reports; false: the time is over.
+  bool go_on(Stage& stage, double part) {
+    stage.stop([&](Progress& now) {
+      now.spheres = best_ ? best_->spheres() : 0;
+      now.fraction = part;
+    });
+    watch_.throw_if_cancelled();
+    return !watch_.is_late();
+  }
+
+  /// None: the time is over. The first one has to come to its end, for want of another.
+  std::optional<Asset> baked(std::size_t spheres) {
+    PackingSettings of_size = settings_;
+    of_size.max_spheres = spheres;
+    of_size.time_limit = best_ ? 0 : watch_.time_left();
+    try {
+      return bake_solid(mesh_, solid_, *backend_, of_size,
+                        best_ ? watch_.strict() : watch_.patient());
+    } catch (const Error&) {
+      watch_.throw_if_cancelled();
+      if (watch_.is_late()) return std::nullopt;
+      throw;
+    }
+  }
+
+  double truth_error() const { return std::max(kTruthBest, kTruthShare * target_.relative_error); }
+
+  /// A first asset, and by its spheres poses at the overlap asked about.
+  void find_near_poses() {
+    for (std::size_t spheres = CountSearch::first(most_);; spheres = std::min(4 * spheres, most_)) {
+      std::optional<Asset> asset = baked(spheres);
+      if (!asset) return;
+      best_ = Candidate{std::move(*asset)};
+      const TrialBody body = {solid_, best_->asset.view()};
+      Stage stage("predict", watch_.strict());
+      poses_ = trial_poses_near(target_.at_overlap, body, body, kNearPoses, truth_error(),
+                                settings_.seed, [&](double part) { return go_on(stage, part); });
+      if (poses_.size() >= kFewPoses || watch_.is_late() || best_->spheres() < spheres ||
+          spheres >= std::min(most_, kManySpheres))
+        return;
+    }
+  }
+
+  /// Poses of all classes, other ones than the search has seen; false: the time is over.
+  bool add_other_poses() {
+    const TrialBody body = {solid_, best_->asset.view()};
+    Stage stage("predict", watch_.strict());
+    const std::vector<TrialPose> others =
+        trial_poses(body, body, kPosesPerClass, truth_error(), settings_.seed + 1,
+                    [&](double part) { return go_on(stage, part); });
+    if (watch_.is_late()) return false;
+    first_of_classes_ = poses_.size();
+    poses_.insert(poses_.end(), others.begin(), others.end());
+    return true;
+  }
+
+  /// Asks a candidate about the poses that it has not been asked about; false: the time is over.
+  bool judge(Candidate& candidate) {
+    Stage stage("predict", watch_.strict());
+    const TreeView& tree = candidate.asset.view();
+    while (candidate.errors.size() < poses_.size()) {
+      if (!go_on(stage,
+                 static_cast<double>(candidate.errors.size()) / static_cast<double>(poses_.size())))
+        return false;
+      const TrialPose& pose = poses_[candidate.errors.size()];
+      const double volume =
+          penetration({tree, {}, 1}, {tree, pose.b_in_a, pose.scale_b}, {}, workspace_).volume;
+      candidate.errors.push_back(std::abs(volume / pose.volume - 1));
+    }
+    std::vector<double> near;
+    for (std::size_t i = 0; i < poses_.size(); ++i)
+      if (is_near(poses_[i], target_.at_overlap)) near.push_back(candidate.errors[i]);
+    candidate.poses = static_cast<std::uint32_t>(near.size());
+    candidate.error = median(std::move(near));
+    return true;
+  }
+
+  /// Of two that do the one of fewer spheres, else the one that errs less.
+  bool is_better(const Candidate& candidate, const Candidate& than) const {
+    if (does(candidate) && does(than)) return candidate.spheres() < than.spheres();
+    return candidate.error < than.error;
+  }
+
+  /// Bakes until the count is found, a limit is met, or the time is over. Starts from the best.
+  void search() {
+    CountSearch counts(target_.relative_error, most_);
+    if (!judge(*best_)) return;
+    double error = best_->error;
+    std::size_t spheres = best_->spheres();
+    StopReason stop = best_->packing_stop();
+    for (;;) {
+      // A limit other than the count leaves no room for more.
+      if (stop != StopReason::sphere_count && error > target_.relative_error) return;
+      const std::optional<std::size_t> next = counts.next(spheres, error);
+      std::optional<Asset> asset = next ? baked(*next) : std::nullopt;
+      if (!asset) return;
+      Candidate candidate = {std::move(*asset)};
+      if (!judge(candidate)) return;
+      error = candidate.error;
+      spheres = candidate.spheres();
+      stop = candidate.packing_stop();
+      if (is_better(candidate, *best_)) best_ = std::move(candidate);
+    }
+  }
+
+  TargetedAsset result() const {
+    const Candidate& best = *best_;
+    const bool met = does(best);
+    const StopReason stop = watch_.is_late() ? StopReason::time_limit
+                            : met            ? StopReason::sphere_count
+                                             : best.packing_stop();
+    std::vector<std::byte> bytes(best.asset.bytes().begin(), best.asset.bytes().end());
+    AssetHeader header = best.asset.view().header();
+    header.asked_error = target_.relative_error;
+    header.asked_at_overlap = target_.at_overlap;
+    header.asked_spheres = settings_.max_spheres;
+    header.measured_error = best.error;
+    header.measured_poses = best.poses;
+    header.search_stop = static_cast<std::uint32_t>(stop);
+    if (first_of_classes_ && best.errors.size() == poses_.size()) {
+      header.predicted_poses = static_cast<std::uint32_t>(poses_.size() - *first_of_classes_);
+      for (std::uint32_t k = 0; k < kOverlapClasses; ++k) {
+        std::vector<double> of_class;
+        for (std::size_t i = *first_of_classes_; i < poses_.size(); ++i)
+          if (poses_[i].overlap_class == k) of_class.push_back(best.errors[i]);
+        header.predicted_error[k] = median(std::move(of_class));
+      }
+    }
     std::memcpy(bytes.data(), &header, sizeof(header));
     seal(bytes);
-    return Asset(bytes, name);
+    return {Asset(bytes, mesh_.name), best.error, best.poses, met, stop};
   }
+
+  const ClosedMesh& mesh_;
+  const ErrorTarget target_;
+  const PackingSettings settings_;
+  const std::size_t most_;
+  Watch watch_;
+  const MeshSolid solid_;
+  const std::unique_ptr<SolidBackend> backend_;
+  std::vector<TrialPose> poses_;                 ///< near ones, then those of all classes
+  std::optional<std::size_t> first_of_classes_;  ///< among them, once they are there
+  std::optional<Candidate> best_;
+  Workspace workspace_;
 };
 
 void check_target(const ErrorTarget& target) {
@@ -91,52 +272,15 @@ void check_target(const ErrorTarget& target) {
 
 }  // namespace
 
-Asset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
-                    const PackingSettings& settings, const ProgressCallback& progress) {
+TargetedAsset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
+                            const PackingSettings& settings, const ProgressCallback& progress) {
   check_target(target);
-  const std::size_t most = settings.max_spheres == 0 ? kMost : settings.max_spheres;
-  const auto bake_of = [&](std::size_t spheres) {
-    PackingSettings of_size = settings;
-    of_size.max_spheres = spheres;
-    return bake(mesh, of_size, progress);
-  };
-
-  std::size_t count = std::min(kFirst, most);
-  Asset asset = bake_of(count);
-  Trials trials{target, {}};
-  const MeshSolid solid(mesh);
-  thread_arena(settings.threads).execute([&] {
-    trials.poses =
-        trial_poses({solid, asset.view()}, {solid, asset.view()}, kPosesPerClass,
-                    std::max(kTruthBest, kTruthShare * target.relative_error), settings.seed);
+  PackingSettings largest = settings;
+  if (largest.max_spheres == 0) largest.max_spheres = kMost;
+  packing::check_settings(largest);
+  return thread_arena(settings.threads).execute([&] {
+    return TargetBake(mesh, target, settings, progress).run();
   });
-
-  // Between a count that fails and one that does, the next is guessed: error falls as 1 / count.
-  std::size_t fails = 0, does = 0;
-  std::optional<Asset> best;
-  for (int bakes = 1;; ++bakes) {
-    const double error = trials.error_of(asset);
-    const AssetHeader& header = asset.view().header();
-    const bool cancelled = header.stop_reason == static_cast<std::uint32_t>(StopReason::cancelled);
-    const std::size_t packed = header.sphere_count;
-    const bool enough = error <= target.relative_error;
-    (enough ? does : fails) = count;
-    // Another limit than the count ended it, or there is no room for more.
-    const bool last = cancelled || packed < count || count >= most;
-    if (enough || (does == 0 && last)) best = std::move(asset);
-    if (cancelled || (does == 0 && last)) break;
-    const double ratio = static_cast<double>(does) / static_cast<double>(std::max(fails, kFewest));
-    if (bakes >= kMostBakes && best) break;
-    if (does > 0 && (ratio <= kCloseEnough || does <= kFewest)) break;
-    const double guess =
-        static_cast<double>(count) * std::clamp(1.1 * error / target.relative_error, 0.1, 8.0);
-    const double low = 1.15 * static_cast<double>(std::max(fails, kFewest));
-    const double high = does > 0 ? static_cast<double>(does) / 1.15 : static_cast<double>(most);
-    count = std::clamp(static_cast<std::size_t>(std::clamp(guess, low, std::max(low, high))),
-                       kFewest, most);
-    asset = bake_of(count);
-  }
-  return trials.with_prediction(*best, settings.max_spheres, mesh.name);
 }
 
 }  // namespace ist

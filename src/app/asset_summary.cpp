@@ -40,6 +40,37 @@ nlohmann::ordered_json predicted_json(const AssetHeader& h) {
   return result;
 }
 
+/// What was asked of the error and what became of it; empty where nothing was.
+nlohmann::ordered_json target_json(const TreeView& tree) {
+  nlohmann::ordered_json result = nlohmann::ordered_json::object();
+  const PredictedErrors errors = tree.predicted_errors();
+  if (errors.target_error == 0) return result;
+  result["target_error"] = errors.target_error;
+  result["target_overlap"] = errors.target_overlap;
+  result["target_met"] = errors.target_met();
+  result["measured_error"] = errors.measured_poses > 0
+                                 ? nlohmann::ordered_json(errors.measured_error)
+                                 : nlohmann::ordered_json(nullptr);
+  result["measured_poses"] = errors.measured_poses;
+  result["search_stop"] = name_of(static_cast<StopReason>(tree.header().search_stop));
+  return result;
+}
+
+const char* why_missed(StopReason stop) {
+  switch (stop) {
+    case StopReason::coverage:
+      return "the coverage asked for ended the packing";
+    case StopReason::min_radius:
+      return "the smallest radius asked for ended the packing";
+    case StopReason::time_limit:
+      return "the time limit ended the search";
+    case StopReason::exhausted:
+      return "no more spheres fit";
+    default:
+      return "no more spheres are allowed";
+  }
+}
+
 nlohmann::ordered_json details_json(const AssetHeader& h, double scale) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (std::uint32_t i = 1; i <= h.detail_count; ++i) {
@@ -94,8 +125,9 @@ std::string describe_asset(const TreeView& tree) {
                             100 * h.predicted_error[k]);
     line("error",
          fmt::format("median by overlap of two copies, {} poses: {}", h.predicted_poses, errors));
-    line("", fmt::format("asked: {:g} % at {:g} %", 100 * h.asked_error, 100 * h.asked_at_overlap));
   }
+  if (const std::string target = describe_target(tree); !target.empty())
+    text += "  " + target + "\n";
   if ((h.flags & kFlagRepaired) != 0) line("note", "the mesh was open and was repaired");
   if ((h.flags & kFlagBelowNoise) != 0)
     line("note", "the smallest spheres lie under float noise: certified, not in greedy order");
@@ -112,7 +144,7 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
   const auto kept = [&](double ratio) {
     return keeps_bound(grid) ? nlohmann::ordered_json(ratio) : nlohmann::ordered_json();
   };
-  return {
+  nlohmann::ordered_json json = {
       {"format", fmt::format("{}.{}", h.format_major, h.format_minor)},
       {"bytes", h.file_bytes},
       {"content_hash", hex(h.content_hash)},
@@ -146,6 +178,22 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
       {"matched_tree", tree_json(h.matched_tree, scale)},
       {"details", details_json(h, scale)},
   };
+  json.update(target_json(tree));
+  return json;
+}
+
+std::string describe_target(const TreeView& tree) {
+  const PredictedErrors errors = tree.predicted_errors();
+  if (errors.target_error == 0) return "";
+  const std::string asked = fmt::format("target {:.4g} % at {:.4g} % overlap",
+                                        100 * errors.target_error, 100 * errors.target_overlap);
+  const std::string measured =
+      errors.measured_poses == 0 ? "nothing measured"
+                                 : fmt::format("{:.3g} % measured at {} poses",
+                                               100 * errors.measured_error, errors.measured_poses);
+  if (errors.target_met()) return fmt::format("{}: met, {}", asked, measured);
+  return fmt::format("{}: missed, {}; {}", asked, measured,
+                     why_missed(static_cast<StopReason>(tree.header().search_stop)));
 }
 
 }  // namespace ist::app

@@ -47,14 +47,15 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 Asset bake_interruptibly(const ClosedMesh& mesh, const ErrorTarget& target,
                          const PackingSettings& settings, bool quiet) {
-  const InterruptGuard guard;
+  constexpr double kPatience = 0.15;  // [s] some steps take seconds, and leave nothing half done
+  const InterruptGuard guard(kPatience);
   ProgressLine line(quiet);
   try {
     const auto show = [&](const Progress& progress) {
       line.show(progress);
       return !interrupted();
     };
-    Asset asset = target.relative_error > 0 ? bake_to_error(mesh, target, settings, show)
+    Asset asset = target.relative_error > 0 ? bake_to_error(mesh, target, settings, show).asset
                                             : bake(mesh, settings, show);
     exit_if_interrupted();
     return asset;
@@ -84,6 +85,8 @@ void run_bake(const BakeOptions& options) {
   }
   exit_if_interrupted();
 
+  if (options.target.relative_error > 0 && !asset.view().predicted_errors().target_met())
+    spdlog::warn("{}: {}", options.output, describe_target(asset.view()));
   if (options.json) {
     nlohmann::ordered_json result = {{"asset", options.output}, {"mesh", options.mesh}};
     result.update(asset_json(asset.view()));
@@ -125,7 +128,8 @@ void add_bake(CLI::App& app) {
   add_share(command, "--coverage", packing.target_coverage, {.least = 0, .most = 1},
             "Stop at this share of the volume");
   add_real(command, "--min-radius", packing.min_radius, {}, "[u] Insert nothing smaller");
-  add_real(command, "--time", packing.time_limit, {}, "[s] Stop packing after this, 0 = no limit");
+  add_real(command, "--time", packing.time_limit, {},
+           "[s] Stop packing after this, 0 = no limit; with --target-error: the whole search");
   add_share(command, "--epsilon", packing.epsilon, {.least = 0, .most = 1, .without_most = true},
             "Every sphere is at least 1 − E times the largest that would fit; 0 = the "
             "library's own schedule");

@@ -1,5 +1,6 @@
 #include "app/interrupt.h"
 
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -11,18 +12,39 @@ namespace {
 
 volatile std::sig_atomic_t guarded = 0;
 volatile std::sig_atomic_t pressed = 0;
+volatile std::sig_atomic_t patience_us = 0;
+
+void on_timer(int) { _exit(kExitInterrupted); }
+
+/// 0: no timer.
+void set_timer(std::sig_atomic_t microseconds) {
+  itimerval timer = {};
+  timer.it_value.tv_usec = microseconds;
+  setitimer(ITIMER_REAL, &timer, nullptr);
+}
 
 void on_interrupt(int) {
   if (guarded == 0 || pressed != 0) _exit(kExitInterrupted);
   pressed = 1;
+  if (patience_us != 0) set_timer(patience_us);
 }
 
 }  // namespace
 
-void install_interrupt_handler() { std::signal(SIGINT, on_interrupt); }
+void install_interrupt_handler() {
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGALRM, on_timer);
+}
 
-InterruptGuard::InterruptGuard() { guarded = 1; }
-InterruptGuard::~InterruptGuard() { guarded = 0; }
+InterruptGuard::InterruptGuard(double patience) {
+  patience_us = static_cast<std::sig_atomic_t>(1e6 * patience);
+  guarded = 1;
+}
+InterruptGuard::~InterruptGuard() {
+  guarded = 0;
+  patience_us = 0;
+  set_timer(0);
+}
 
 bool interrupted() { return pressed != 0; }
 

@@ -7,9 +7,12 @@ void install_interrupt_handler();
 
 /// While one is alive, the first Ctrl-C only sets interrupted(), so that a long stage can end
 /// cleanly and no temporary file stays behind; the second ends the program.
+///
+/// `patience` [s]: a stage that has not ended so long after the first is ended as by the second;
+/// 0: it is waited for. Not for stages that write files.
 class InterruptGuard {
  public:
-  InterruptGuard();
+  explicit InterruptGuard(double patience = 0);
   ~InterruptGuard();
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;

@@ -57,10 +57,39 @@ TEST_F(BakeCommand, ATargetPicksTheSphereCount) {
   EXPECT_EQ(json.at("asked").at("at_overlap"), 0.01);
   EXPECT_GE(json.at("predicted").at("poses"), 100);
   EXPECT_LE(json.at("predicted").at("error").at("10-50%"), 0.2);
-  EXPECT_NE(ist({"info", "new.ist"}).out.find("asked: 20 % at 1 %"), std::string::npos);
+  EXPECT_EQ(json.at("target_error"), 0.2);
+  EXPECT_EQ(json.at("target_overlap"), 0.01);
+  EXPECT_EQ(json.at("target_met"), true);
+  EXPECT_LE(json.at("measured_error"), 0.2);
+  EXPECT_EQ(outcome.err.find("warning"), std::string::npos) << outcome.err;
+  EXPECT_NE(ist({"info", "new.ist"}).out.find("target 20 % at 1 % overlap: met, "),
+            std::string::npos);
   for (const char* bad : {"0", "100%", "1x", "-1%"})
     EXPECT_EQ(ist({"bake", "cube.obj", "-o", "n.ist", "--target-error", bad}).exit_code, 2) << bad;
   EXPECT_EQ(ist({"bake", "cube.obj", "-o", "n.ist", "--at-overlap", "1%"}).exit_code, 2);
+}
+
+TEST_F(BakeCommand, AMissedTargetIsAWarning) {
+  const Outcome outcome = ist(
+      {"bake", "cube.obj", "-o", "new.ist", "--target-error", "5%", "--coverage", "0.5", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("warning"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("missed"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("coverage"), std::string::npos) << outcome.err;
+  const nlohmann::json json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json.at("target_met"), false);
+  EXPECT_GT(json.at("measured_error"), 0.05);
+  EXPECT_EQ(json.at("search_stop"), "coverage");
+  EXPECT_NE(ist({"info", "new.ist"}).out.find("missed, "), std::string::npos);
+}
+
+TEST_F(BakeCommand, CtrlCEndsASearchForATargetToo) {
+  const Outcome outcome =
+      ist({"bake", "cube.obj", "-o", "new.ist", "--target-error", "0.02%", "--at-overlap", "0.01%"},
+          {.environment = {}, .interrupt_after = "CPU"});
+  EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_TRUE(new_files().empty()) << new_files().front();
 }
 
 TEST_F(BakeCommand, EveryLimitStopsThePacking) {

@@ -75,7 +75,7 @@ TEST(TrialPoses, AreTheSameForAnyNumberOfThreads) {
 // A ball takes few spheres, a cube many, and a harder target more.
 TEST(BakeToError, TakesAsManySpheresAsItNeeds) {
   const ClosedMesh ball = testing::closed(testing::icosphere_mesh(4), "ball");
-  const Asset easy = bake_to_error(ball, {0.03, 0.01});
+  const Asset easy = bake_to_error(ball, {0.03, 0.01}).asset;
   const AssetHeader& header = easy.view().header();
   EXPECT_LE(header.sphere_count, 60u);
   EXPECT_LE(header.predicted_error[2], 0.03);
@@ -83,14 +83,16 @@ TEST(BakeToError, TakesAsManySpheresAsItNeeds) {
   EXPECT_EQ(header.asked_error, 0.03);
   EXPECT_EQ(header.asked_at_overlap, 0.01);
 
-  const Asset coarse = bake_to_error(cube().mesh, {0.1, 0.01}, {.max_spheres = 0, .threads = 1});
-  const Asset fine = bake_to_error(cube().mesh, {0.04, 0.01}, {.max_spheres = 0});
+  const Asset coarse =
+      bake_to_error(cube().mesh, {0.1, 0.01}, {.max_spheres = 0, .threads = 1}).asset;
+  const Asset fine = bake_to_error(cube().mesh, {0.04, 0.01}, {.max_spheres = 0}).asset;
   EXPECT_GT(coarse.view().sphere_count(), header.sphere_count);
   EXPECT_GT(fine.view().sphere_count(), coarse.view().sphere_count());
   EXPECT_LT(fine.view().header().predicted_error[2], coarse.view().header().predicted_error[2]);
 
   // Any number of threads finds the same.
-  const Asset again = bake_to_error(cube().mesh, {0.1, 0.01}, {.max_spheres = 0, .threads = 3});
+  const Asset again =
+      bake_to_error(cube().mesh, {0.1, 0.01}, {.max_spheres = 0, .threads = 3}).asset;
   EXPECT_TRUE(std::equal(again.bytes().begin(), again.bytes().end(), coarse.bytes().begin(),
                          coarse.bytes().end()));
 }
@@ -102,7 +104,7 @@ TEST(BakeToError, RefusesSenseless) {
 
 // Where the most is not enough, all of it is taken.
 TEST(BakeToError, StopsAtTheMostThatIsAllowed) {
-  const Asset asset = bake_to_error(cube().mesh, {0.01, 0.001}, {.max_spheres = 80});
+  const Asset asset = bake_to_error(cube().mesh, {0.01, 0.001}, {.max_spheres = 80}).asset;
   EXPECT_EQ(asset.view().sphere_count(), 80u);
   EXPECT_GT(asset.view().header().predicted_error[3], 0.01);
 }

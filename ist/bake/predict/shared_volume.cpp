@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "mesh/line_lattice.h"
@@ -16,6 +17,8 @@ using Eigen::Vector3d;
 
 constexpr std::uint32_t kFirstLines = 128;  // on a side of the lattice
 constexpr std::uint32_t kMostLines = 1024;
+constexpr std::uint32_t kBandRows = 128;  // cut at once: a tenth of a second at most, even (parts)
+constexpr double kRoom = 1e-9;            // around boxes that cull, unit frame: far above rounding
 
 /// A mesh moved to where lines run along x.
 class MovedMesh {
@@ -33,24 +36,62 @@ class MovedMesh {
       bounds_.extend(Vector3d(vertices_.data() + 3 * v));
   }
 
+  /// Forgets the triangles that lines in `box` (y, z) do not cross before x_end.
+  void keep(const Eigen::AlignedBox2d& box, double x_end) {
+    kept_ = triangles_at(box, x_end);
+    view_.triangles = kept_.data();
+    view_.triangle_count = static_cast<std::uint32_t>(kept_.size() / 3);
+  }
+
+  /// Crossings with a lattice in that box.
   LatticeCrossings cross(const LineLattice& lattice) const { return cross_lattice(view_, lattice); }
+
+  /// The same of a lattice that fills but a part of it.
+  LatticeCrossings cross(const LineLattice& lattice, const Eigen::AlignedBox2d& part,
+                         double x_end) const {
+    const std::vector<std::uint32_t> triangles = triangles_at(part, x_end);
+    MeshView view = view_;
+    view.triangles = triangles.data();
+    view.triangle_count = static_cast<std::uint32_t>(triangles.size() / 3);
+    return cross_lattice(view, lattice);
+  }
   const Eigen::AlignedBox3d& bounds() const { return bounds_; }
 
  private:
+  /// Corners of the triangles that lines in the box may cross before x_end.
+  std::vector<std::uint32_t> triangles_at(const Eigen::AlignedBox2d& box, double x_end) const {
+    std::vector<std::uint32_t> found;
+    for (std::size_t t = 0; t < view_.triangle_count; ++t) {
+      const std::uint32_t* const corners = view_.triangles + 3 * t;
+      const double* const p[3] = {vertices_.data() + 3 * std::size_t{corners[0]},
+                                  vertices_.data() + 3 * std::size_t{corners[1]},
+                                  vertices_.data() + 3 * std::size_t{corners[2]}};
+      const auto low = [&](int k) { return std::min({p[0][k], p[1][k], p[2][k]}) - kRoom; };
+      const auto high = [&](int k) { return std::max({p[0][k], p[1][k], p[2][k]}) + kRoom; };
+      if (low(0) > x_end || low(1) > box.max().x() || high(1) < box.min().x() ||
+          low(2) > box.max().y() || high(2) < box.min().y())
+        continue;
+      found.insert(found.end(), corners, corners + 3);
+    }
+    return found;
+  }
+
   std::vector<double> vertices_;
+  std::vector<std::uint32_t> kept_;
   MeshView view_;
   Eigen::AlignedBox3d bounds_;
 };
 
-/// Length of a line inside both solids: where both winding numbers are at least 1. Behind the last
-/// crossing with one of them that one's is 0.
+/// Length of a line inside both solids: where both winding numbers are at least 1.
 double common_length(const LatticeCrossings& a, const LatticeCrossings& b, std::size_t line) {
   std::uint32_t i = a.first[line], j = b.first[line];
+  const std::uint32_t end_a = a.first[line + 1], end_b = b.first[line + 1];
+  if (i == end_a || j == end_b) return 0;
   int winding_a = 0, winding_b = 0;
   double length = 0, since = 0;
-  while (i < a.first[line + 1] && j < b.first[line + 1]) {
+  while (i < end_a || j < end_b) {
     const bool inside = winding_a >= 1 && winding_b >= 1;
-    const bool of_a = comes_before(a.crossings[i], b.crossings[j]);
+    const bool of_a = j == end_b || (i < end_a && comes_before(a.crossings[i], b.crossings[j]));
     const Crossing& next = of_a ? a.crossings[i++] : b.crossings[j++];
     if (inside) length += next.x - since;
     (of_a ? winding_a : winding_b) += next.sign;
@@ -64,47 +105,86 @@ struct Sums {
   Eigen::AlignedBox2d seen;  ///< (y, z) around the lines that meet the overlap, empty if none
 };
 
-Sums integrate(const MovedMesh& a, const MovedMesh& b, const Eigen::AlignedBox2d& box,
-               std::uint32_t lines) {
-  LineLattice lattice;
-  lattice.y0 = box.min().x();
-  lattice.z0 = box.min().y();
-  lattice.ny = lattice.nz = lines;
-  lattice.step_y = box.sizes().x() / lines;
-  lattice.step_z = box.sizes().y() / lines;
-  lattice.offset = kGoldenRatio / 2;
-  lattice.shift = kGoldenRatio;
-  const LatticeCrossings in_a = a.cross(lattice), in_b = b.cross(lattice);
-  std::vector<double> lengths(lattice.lines());
-  tbb::parallel_for(std::size_t{0}, lengths.size(),
-                    [&](std::size_t line) { lengths[line] = common_length(in_a, in_b, line); });
+/// Two solids where lines run along x, and what they have in common.
+class Pair {
+ public:
+  Pair(MovedMesh a, MovedMesh b, const std::function<bool()>& go_on)
+      : a_(std::move(a)),
+        b_(std::move(b)),
+        common_(a_.bounds().intersection(b_.bounds())),
+        go_on_(go_on) {}
 
-  Sums sums;
-  double part[4] = {};
-  for (std::uint32_t j = 0; j < lines; ++j)
-    for (std::uint32_t i = 0; i < lines; ++i) {
-      const double length = lengths[std::size_t{j} * lines + i];
-      if (!(length > 0)) continue;
-      part[2 * (j % 2) + i % 2] += length;
-      const Eigen::Vector2d at(lattice.y(i, j), lattice.z(j));
-      const Eigen::Vector2d step(lattice.step_y, lattice.step_z);
-      sums.seen.extend(Eigen::AlignedBox2d(at - step, at + step));
+  const Eigen::AlignedBox3d& common() const { return common_; }
+
+  /// Each box must lie in the one before. None: it is not to go on.
+  std::optional<Sums> integrate(const Eigen::AlignedBox2d& box, std::uint32_t lines) {
+    a_.keep(box, common_.max().x());
+    b_.keep(box, common_.max().x());
+    LineLattice lattice;
+    lattice.y0 = box.min().x();
+    lattice.ny = lines;
+    lattice.step_y = box.sizes().x() / lines;
+    lattice.step_z = box.sizes().y() / lines;
+    lattice.offset = kGoldenRatio / 2;
+    lattice.shift = kGoldenRatio;
+    Sums sums;
+    double part[4] = {};
+    for (std::uint32_t row = 0; row < lines; row += kBandRows) {
+      lattice.z0 = box.min().y() + row * lattice.step_z;
+      lattice.nz = std::min(kBandRows, lines - row);
+      if (!add_band(lattice, box, part, sums.seen)) return std::nullopt;
     }
-  const double area = lattice.step_y * lattice.step_z;
-  const double mean = ((part[0] + part[1]) + (part[2] + part[3])) / 4;
-  double squares = 0;
-  for (const double p : part) squares += (p - mean) * (p - mean);
-  // Each part is a lattice of twice the step, by chance off by about their spread; the four
-  // together err less.
-  sums.volume = 4 * area * mean;
-  sums.error = 4 * area * std::sqrt(squares / 3);
-  return sums;
-}
+    const double area = lattice.step_y * lattice.step_z;
+    const double mean = ((part[0] + part[1]) + (part[2] + part[3])) / 4;
+    double squares = 0;
+    for (const double p : part) squares += (p - mean) * (p - mean);
+    // Each part is a lattice of twice the step, by chance off by about their spread; the four
+    // together err less.
+    sums.volume = 4 * area * mean;
+    sums.error = 4 * area * std::sqrt(squares / 3);
+    return sums;
+  }
+
+ private:
+  /// Adds the lengths of a band's lines to the four parts; false: it is not to go on.
+  bool add_band(const LineLattice& lattice, const Eigen::AlignedBox2d& box, double* part,
+                Eigen::AlignedBox2d& seen) const {
+    Eigen::AlignedBox2d band = box;
+    band.min().y() = lattice.z0;
+    band.max().y() = lattice.z0 + lattice.nz * lattice.step_z;
+    const auto crossings = [&](const MovedMesh& mesh) {
+      return lattice.nz == lattice.ny ? mesh.cross(lattice)
+                                      : mesh.cross(lattice, band, common_.max().x());
+    };
+    if (go_on_ && !go_on_()) return false;
+    const LatticeCrossings in_a = crossings(a_);
+    if (go_on_ && !go_on_()) return false;
+    const LatticeCrossings in_b = crossings(b_);
+    std::vector<double> lengths(lattice.lines());
+    tbb::parallel_for(std::size_t{0}, lengths.size(),
+                      [&](std::size_t line) { lengths[line] = common_length(in_a, in_b, line); });
+    for (std::uint32_t j = 0; j < lattice.nz; ++j)
+      for (std::uint32_t i = 0; i < lattice.ny; ++i) {
+        const double length = lengths[std::size_t{j} * lattice.ny + i];
+        if (!(length > 0)) continue;
+        part[2 * (j % 2) + i % 2] += length;
+        const Eigen::Vector2d at(lattice.y(i, j), lattice.z(j));
+        const Eigen::Vector2d step(lattice.step_y, lattice.step_z);
+        seen.extend(Eigen::AlignedBox2d(at - step, at + step));
+      }
+    return true;
+  }
+
+  MovedMesh a_, b_;
+  const Eigen::AlignedBox3d common_;
+  const std::function<bool()>& go_on_;
+};
 
 }  // namespace
 
 SharedVolume shared_volume(const MeshSolid& a, const MeshSolid& b, const Pose& b_in_a,
-                           double scale_b, const Vector3d& along, double relative_error) {
+                           double scale_b, const Vector3d& along, double relative_error,
+                           const std::function<bool()>& go_on) {
   const double unit = a.frame().scale();
   const Vector3d axis = along.normalized();
   Eigen::Matrix3d turn;  // of lines along `along` to lines along x
@@ -114,18 +194,22 @@ SharedVolume shared_volume(const MeshSolid& a, const MeshSolid& b, const Pose& b
   const Eigen::Matrix3d rotation =
       Eigen::Quaterniond(b_in_a.q[0], b_in_a.q[1], b_in_a.q[2], b_in_a.q[3]).toRotationMatrix();
   const Vector3d shift(b_in_a.t[0], b_in_a.t[1], b_in_a.t[2]);
-  const MovedMesh moved_a(a, [&](const Vector3d& x) { return Vector3d(turn * x); });
-  const MovedMesh moved_b(b, [&](const Vector3d& x) {
-    const Vector3d in_a = rotation * (scale_b * b.frame().from_unit(x)) + shift;
-    return Vector3d(turn * a.frame().to_unit(in_a));
-  });
+  Pair pair(MovedMesh(a, [&](const Vector3d& x) { return Vector3d(turn * x); }),
+            MovedMesh(b,
+                      [&](const Vector3d& x) {
+                        const Vector3d in_a = rotation * (scale_b * b.frame().from_unit(x)) + shift;
+                        return Vector3d(turn * a.frame().to_unit(in_a));
+                      }),
+            go_on);
 
-  const Eigen::AlignedBox3d common = moved_a.bounds().intersection(moved_b.bounds());
+  const Eigen::AlignedBox3d& common = pair.common();
   SharedVolume result;
   if (common.isEmpty()) return result;
   Eigen::AlignedBox2d box(common.min().tail<2>(), common.max().tail<2>());
   for (std::uint32_t lines = kFirstLines; lines <= kMostLines;) {
-    const Sums sums = integrate(moved_a, moved_b, box, lines);
+    const std::optional<Sums> found = pair.integrate(box, lines);
+    if (!found) return {};
+    const Sums& sums = *found;
     const double unit3 = unit * unit * unit;
     result = {unit3 * sums.volume, unit3 * sums.error};
     const Eigen::AlignedBox2d closer = box.intersection(sums.seen);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 
 #include <ist/pose.h>
 
@@ -20,7 +21,9 @@ struct SharedVolume {
 /// overlap and is refined until the error is no more than `relative_error` of the volume. Very
 /// small overlaps between the first lines, a few thousandths of the solids' common extent apart,
 /// are not seen. Same bits for any number of threads; runs on the caller's TBB threads.
+/// `go_on`, if any, is asked every few milliseconds of work; once it says no, the result is empty.
 SharedVolume shared_volume(const MeshSolid& a, const MeshSolid& b, const Pose& b_in_a,
-                           double scale_b, const Eigen::Vector3d& along, double relative_error);
+                           double scale_b, const Eigen::Vector3d& along, double relative_error,
+                           const std::function<bool()>& go_on = {});
 
 }  // namespace ist

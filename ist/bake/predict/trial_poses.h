@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <ist/pose.h>
@@ -25,10 +26,6 @@ struct TrialPose {
 inline constexpr std::array<const char*, kOverlapClasses> kOverlapClassNames = {
     "contained", "10–50 %", "1–10 %", "0.1–1 %", "0.01–0.1 %"};
 
-/// Lowest overlap of a class, part of the smaller solid; `contained` counts by itself.
-inline constexpr std::array<double, kOverlapClasses> kOverlapClassFloor = {1, 1e-1, 1e-2, 1e-3,
-                                                                           1e-4};
-
 /// A solid with an asset of it, by which poses are found; the truth comes from the solid alone.
 struct TrialBody {
   const MeshSolid& solid;
@@ -40,7 +37,19 @@ struct TrialBody {
 /// `contained` ones hold a smaller B whole. Volumes are integrated over the meshes to
 /// `relative_error`; a pose for which that cannot be done is left out. Same poses for the same
 /// seed, on any machine and for any number of threads. Runs on the caller's TBB threads.
+/// `go_on(part)`, if any, is told every few milliseconds which part of [0, 1] is done; once it says
+/// no, the poses so far are all.
 std::vector<TrialPose> trial_poses(const TrialBody& a, const TrialBody& b, std::uint32_t per_class,
-                                   double relative_error, std::uint64_t seed);
+                                   double relative_error, std::uint64_t seed,
+                                   const std::function<bool(double)>& go_on = {});
+
+/// Likewise about `count` poses within half a decade of one overlap in [1e-4, 0.5].
+std::vector<TrialPose> trial_poses_near(double overlap, const TrialBody& a, const TrialBody& b,
+                                        std::uint32_t count, double relative_error,
+                                        std::uint64_t seed,
+                                        const std::function<bool(double)>& go_on = {});
+
+/// Whether a pose's overlap lies within half a decade of another.
+bool is_near(const TrialPose& pose, double overlap);
 
 }  // namespace ist

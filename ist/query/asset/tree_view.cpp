@@ -126,6 +126,7 @@ bool sound_values(const AssetHeader& header) noexcept {
     if (!is_radius(covers[i])) return false;
   for (const double error : header.predicted_error)
     if (!is_finite_sum(error)) return false;
+  if (!is_finite_sum(header.measured_error)) return false;
   const DetailLevel* const details = at<DetailLevel>(header, header.details);
   for (std::uint32_t i = 0; i < header.detail_count; ++i) {
     const TreeHeader& tree = details[i].matched_tree;
@@ -140,7 +141,7 @@ bool sound_values(const AssetHeader& header) noexcept {
 
 }  // namespace
 
-const AssetHeader detail::kEmptyAsset;
+constinit const AssetHeader detail::kEmptyAsset;
 
 AssetStatus TreeView::from_bytes(std::span<const std::byte> bytes, TreeView& out) noexcept {
   out = TreeView();
@@ -174,6 +175,22 @@ double TreeView::coverage() const noexcept { return header_ == nullptr ? 0 : hea
 
 double TreeView::protrusion() const noexcept {
   return header_ == nullptr ? 0 : std::ldexp(header_->protrusion, header_->exponent);
+}
+
+PredictedErrors TreeView::predicted_errors() const noexcept {
+  PredictedErrors result;
+  if (header_ == nullptr) return result;
+  static_assert(std::tuple_size_v<decltype(result.classes)> == kOverlapClasses);
+  for (std::uint32_t k = 0; k < kOverlapClasses; ++k)
+    result.classes[k] = {kOverlapClassFloor[k],
+                         k <= 1 ? k == 0 ? 1 : 0.5 : kOverlapClassFloor[k - 1],
+                         header_->predicted_error[k]};
+  result.poses = header_->predicted_poses;
+  result.target_error = header_->asked_error;
+  result.target_overlap = header_->asked_at_overlap;
+  result.measured_error = header_->measured_error;
+  result.measured_poses = header_->measured_poses;
+  return result;
 }
 
 }  // namespace ist
