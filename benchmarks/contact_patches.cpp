@@ -138,7 +138,7 @@ int main(int argc, char** argv) {
   const std::vector<Step> steps = read_trajectory();
   ist::Workspace workspace;
   double worst = 0;
-  for (const std::size_t most : {1, 4, 8, 16, 32}) {
+  for (const std::size_t most : {1u, 4u, 8u, 16u, 32u}) {
     const Persistence p = follow(pa, pb, steps, most, workspace);
     const double error = wrench_error(pa, pb, steps, most, workspace);
     worst = std::max(worst, error);

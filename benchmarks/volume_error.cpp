@@ -102,7 +102,7 @@ std::map<std::size_t, double> ask_oracle_rows(Report& report, const std::string&
   const std::string of = key + ", " + std::to_string(spheres) + " spheres";
   if (key == "eledino" && spheres >= 4'000) {
     std::vector<double> angles;  // of all rows that overlap by 0.1 % or more
-    for (const std::size_t k : {1, 2, 3})
+    for (const std::size_t k : {1u, 2u, 3u})
       angles.insert(angles.end(), errors[k].angle.begin(), errors[k].angle.end());
     report.target("force angle p95 °, 0.1–50 %, " + of, quantile(angles, 0.95), 4, true);
   }

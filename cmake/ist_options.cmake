@@ -9,6 +9,10 @@ function(ist_compile_options target)
     $<$<COMPILE_LANGUAGE:CUDA>:-fmad=false;-Xcompiler=-Wall,-Wextra,-ffp-contract=off>
     # Code for six generations, packed, takes the room of one that is not.
     $<$<COMPILE_LANGUAGE:CUDA>:-compress-mode=size>)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
+    # Eigen's products for NEON are fused by hand where this macro is defined.
+    target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-U__ARM_FEATURE_FMA>)
+  endif()
   if(PROJECT_IS_TOP_LEVEL)
     target_compile_options(${target} PRIVATE
       $<$<COMPILE_LANGUAGE:CXX>:-Werror> $<$<COMPILE_LANGUAGE:CUDA>:--Werror=all-warnings>)

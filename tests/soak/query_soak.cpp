@@ -2,9 +2,6 @@
 // by other threads in another order: the same bits both times, nothing that is not a number, bounds
 // in order, and no memory that grows. `./dev soak queries` runs it and writes its report.
 
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
 #include <ist/bake.h>
 #include <ist/query.h>
 
@@ -24,6 +21,7 @@
 
 #include "report.h"
 #include "samples/samples.h"
+#include "support/answer_bits.h"
 #include "support/query_settings.h"
 #include "support/random_assets.h"
 
@@ -77,33 +75,6 @@ std::vector<Asset> make_assets() {
   }
   return assets;
 }
-
-/// Bits of an answer: every member by itself, since padding holds anything.
-class Bits {
- public:
-  Bits() { XXH3_64bits_reset(&state_); }
-  void add(double x) { XXH3_64bits_update(&state_, &x, sizeof x); }
-  void add(std::uint64_t x) { XXH3_64bits_update(&state_, &x, sizeof x); }
-  void add(const Eigen::Vector3d& x) { XXH3_64bits_update(&state_, x.data(), 3 * sizeof(double)); }
-  void add(const Penetration& p) {
-    for (const double x : {p.volume, p.volume_min, p.volume_max}) add(x);
-    for (const Eigen::Vector3d* const x :
-         {&p.centroid, &p.translation_gradient, &p.rotation_gradient})
-      add(*x);
-    add(std::uint64_t{p.node_visits} << 32 | p.sphere_pairs);
-    add(static_cast<std::uint64_t>(p.status));
-  }
-  void add(const Separation& s) {
-    for (const double x : {s.distance, s.distance_min, s.distance_max}) add(x);
-    for (const Eigen::Vector3d* const x : {&s.point_a, &s.point_b, &s.normal}) add(*x);
-    add(std::uint64_t{s.node_visits} << 32 | s.sphere_pairs);
-    add(static_cast<std::uint64_t>(s.status));
-  }
-  std::uint64_t value() const { return XXH3_64bits_digest(&state_); }
-
- private:
-  XXH3_state_t state_;
-};
 
 /// One thread's scratch. The small workspace stops queries half way.
 struct Worker {
@@ -257,7 +228,7 @@ class Chunk {
   const std::vector<Asset>& assets_;
   std::mt19937_64 random_;
   Worker& worker_;
-  Bits bits_;
+  testing::AnswerBits bits_;
 };
 
 /// The hashes of chunks [first, first + hashes.size()), by as many threads as workers; backwards

@@ -1,6 +1,7 @@
 // Linked into a test program: an operation without a number for an answer (0/0, ∞ − ∞, √−1), a
 // division by zero or an overflow ends the program where it happens (SIGFPE), instead of going on
 // as NaN or Inf that a later comparison may hide. Threads inherit it from the one that starts them.
+// Most ARM64 processors have no such traps: there the programs only run.
 #include <gtest/gtest.h>
 
 #include <cfenv>

@@ -21,20 +21,28 @@ struct RandomAsset {
   std::uint32_t details = 0;  ///< coarser levels: the first spheres, each as large as four
 };
 
+/// Three draws in an order of their own: that of arguments is each compiler's choice.
+template <class Draw>
+Eigen::Vector3d random_vector(const Draw& draw) {
+  Eigen::Vector3d v;
+  for (int k = 2; k >= 0; --k) v[k] = draw();
+  return v;
+}
+
 /// An asset of random spheres in the unit ball: inner ones with covers, and matched ones that
 /// overlap each other a little, as calibrated ones do. No solid stands behind it.
 inline Asset make_random_asset(const RandomAsset& like, unsigned seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto draw = [&] { return uniform(random); };
   const double n = static_cast<double>(like.spheres);
   const double largest = 0.8 * std::cbrt(1 / n);
   AssetArrays arrays;
   while (arrays.inner_spheres.size() < like.spheres) {
-    const Eigen::Vector3d x(uniform(random), uniform(random), uniform(random));
+    const Eigen::Vector3d x = random_vector(draw);
     if (x.norm() > 1) continue;
     const double r = largest * std::pow(like.smallest, std::abs(uniform(random)));
-    const Eigen::Vector3d e =
-        x + 0.3 * r * Eigen::Vector3d(uniform(random), uniform(random), uniform(random));
+    const Eigen::Vector3d e = x + 0.3 * r * random_vector(draw);
     arrays.inner_spheres.push_back({static_cast<float>(x.x()), static_cast<float>(x.y()),
                                     static_cast<float>(x.z()), static_cast<float>(0.8 * r)});
     arrays.matched_spheres.push_back({static_cast<float>(e.x()), static_cast<float>(e.y()),
@@ -67,8 +75,7 @@ inline Pose random_pose(std::mt19937_64& random, double distance) {
     norm += q * q;
   }
   for (double& q : pose.q) q /= std::sqrt(norm);
-  const Eigen::Vector3d direction =
-      Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
+  const Eigen::Vector3d direction = random_vector([&] { return normal(random); }).normalized();
   for (int k = 0; k < 3; ++k) pose.t[k] = distance * direction[k];
   return pose;
 }

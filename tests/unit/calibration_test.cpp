@@ -153,7 +153,7 @@ TEST(Calibration, EightSpheresQuarterACube) {
                      (k & 4) != 0 ? 0.25f : -0.25f, 0.2f});
   const Calibration result = calibrate_on_host(solid, inner);
   const double half = 0.5 / solid.frame().scale();
-  for (int k = 0; k < 8; ++k) {
+  for (std::size_t k = 0; k < 8; ++k) {
     EXPECT_NEAR(ball_volume(result.matched[k].r) / solid.unit_volume(), 0.125, 2e-3);
     const Vector3d expected(inner[k].x, inner[k].y, inner[k].z);
     EXPECT_LT((centre(result.matched[k]) - expected.cwiseSign() * half / 2).norm(), 5e-3);

@@ -10,6 +10,7 @@
 
 #include "mesh/closest_point.h"
 #include "mesh/mesh_solid.h"
+#include "support/quad.h"
 #include "support/test_meshes.h"
 
 namespace {
@@ -22,11 +23,7 @@ struct Triangle {
   Vector3d a, b, c;
 };
 
-#ifdef __SIZEOF_FLOAT128__
-using Wide = __float128;
-#else
-using Wide = long double;  // 128 bits where there is no __float128
-#endif
+using Wide = ist::testing::Quad;
 
 struct WideVector {
   explicit WideVector(const Vector3d& v) : x(v.x()), y(v.y()), z(v.z()) {}

@@ -92,7 +92,7 @@ std::vector<Case> cases() {
 TEST(Cover, HoldsEveryPointOfTheSolid) {
   for (const Case& c : cases()) {
     const MeshSolid solid(closed(c.mesh, c.name));
-    for (const std::size_t count : {1, 30, 300}) {
+    for (const std::size_t count : {1u, 30u, 300u}) {
       const std::vector<Sphere> inner = packed(solid, count);
       const std::vector<float> covers = cover_on_host(solid, inner);
       ASSERT_EQ(covers.size(), inner.size());
@@ -116,7 +116,7 @@ TEST(Cover, ShrunkRadiiLeaveGaps) {
 TEST(Cover, IsTight) {
   const MeshSolid solid(closed(testing::torus_mesh(1, 0.3, 64, 32), "torus"));
   double before = 1;
-  for (const std::size_t count : {100, 1'000}) {
+  for (const std::size_t count : {100u, 1'000u}) {
     const std::vector<Sphere> inner = packed(solid, count);
     const std::vector<float> covers = cover_on_host(solid, inner);
     double sum = 0;  // how far cover balls stick out of the solid

@@ -5,11 +5,12 @@
 
 #include "query/kernel/lens.h"
 #include "support/float_traps.h"
+#include "support/quad.h"
 
 namespace ist {
 namespace {
 
-using Quad = __float128;
+using testing::Quad;
 
 /// The textbook volume, which loses digits where the balls are near tangency or of unlike size.
 Quad textbook_volume(Quad a, Quad b, Quad d) {

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
+#include <numbers>
 
 #include <ist/query.h>
 
@@ -68,7 +68,7 @@ struct SphereTree {
   NodeSums sums(int at_level, std::uint32_t block) const noexcept {
     if (at_level == kSphereLevel) {
       const double r = ball(at_level, block).r;
-      return {4 * M_PI / 3 * (r * r * r), 1};
+      return {4 * std::numbers::pi / 3 * (r * r * r), 1};
     }
     if (at_level == top) return {header->volume_sum, static_cast<double>(header->overlap)};
     const NodeBlock& n = level[at_level + 1].nodes[block / kWidth];

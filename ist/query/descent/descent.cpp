@@ -2,8 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "query/base/precision.h"
@@ -138,8 +138,8 @@ Overlap Descent::contained_overlap(bool of_a, const SubtreeSums& contained) cons
     overlap.volume += contained.cubes[lane];
     for (int k = 0; k < 3; ++k) moment[k] += contained.moment[k][lane];
   }
-  overlap.volume *= 4 * M_PI / 3;
-  moment *= 4 * M_PI / 3;
+  overlap.volume *= 4 * std::numbers::pi / 3;
+  moment *= 4 * std::numbers::pi / 3;
   if (of_a) {
     overlap.moment = moment - overlap.volume * Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]);
   } else {

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace ist {
 
@@ -14,8 +14,8 @@ struct Lens {
   T cap_b = 0;   ///< likewise of ball B's; the lens is both caps
   T circle = 0;  ///< squared radius
 
-  T volume() const { return T(M_PI / 3) * (cap_a + cap_b); }
-  T derivative() const { return -T(M_PI) * circle; }  ///< dV/d(centre distance)
+  T volume() const { return T(std::numbers::pi / 3) * (cap_a + cap_b); }
+  T derivative() const { return -T(std::numbers::pi) * circle; }  ///< dV/d(centre distance)
 };
 
 /// Lens of balls of radii `ra`, `rb` ≥ 0 at centre distance `d` ≥ 0. The sums g, f, e must never be

@@ -1,6 +1,6 @@
 #include "query/kernel/overlap.h"
 
-#include <cmath>
+#include <numbers>
 
 namespace ist {
 namespace {
@@ -19,11 +19,12 @@ Eigen::Vector3d total(const double (&lanes)[3][kSumLanes]) {
 
 Overlap finish(const LeafSums& sums, Precision precision) noexcept {
   Overlap overlap;
-  overlap.volume = M_PI / 3 * total(sums.caps);
-  overlap.error = 2 * M_PI * total(sums.error) + sum_rounding(precision) * overlap.volume;
-  overlap.force = -2 * M_PI * total(sums.force);
-  overlap.torque = -2 * M_PI * total(sums.torque);
-  overlap.moment = M_PI / 3 * total(sums.moment);
+  overlap.volume = std::numbers::pi / 3 * total(sums.caps);
+  overlap.error =
+      2 * std::numbers::pi * total(sums.error) + sum_rounding(precision) * overlap.volume;
+  overlap.force = -2 * std::numbers::pi * total(sums.force);
+  overlap.torque = -2 * std::numbers::pi * total(sums.torque);
+  overlap.moment = std::numbers::pi / 3 * total(sums.moment);
   return overlap;
 }
 

@@ -1,0 +1,46 @@
+#pragma once
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <cstdint>
+
+#include <ist/query.h>
+
+namespace ist::testing {
+
+/// Hash of the bits of answers: every member by itself, since padding holds anything.
+class AnswerBits {
+ public:
+  AnswerBits() { XXH3_64bits_reset(&state_); }
+  void add(double x) { XXH3_64bits_update(&state_, &x, sizeof x); }
+  void add(std::uint64_t x) { XXH3_64bits_update(&state_, &x, sizeof x); }
+  void add(const Eigen::Vector3d& x) { XXH3_64bits_update(&state_, x.data(), 3 * sizeof(double)); }
+  void add(const Penetration& p) {
+    for (const double x : {p.volume, p.volume_min, p.volume_max}) add(x);
+    for (const Eigen::Vector3d* const x :
+         {&p.centroid, &p.translation_gradient, &p.rotation_gradient})
+      add(*x);
+    add(std::uint64_t{p.node_visits} << 32 | p.sphere_pairs);
+    add(static_cast<std::uint64_t>(p.status));
+  }
+  void add(const Separation& s) {
+    for (const double x : {s.distance, s.distance_min, s.distance_max}) add(x);
+    for (const Eigen::Vector3d* const x : {&s.point_a, &s.point_b, &s.normal}) add(*x);
+    add(std::uint64_t{s.node_visits} << 32 | s.sphere_pairs);
+    add(static_cast<std::uint64_t>(s.status));
+  }
+  void add(const ContactPatch& patch) {
+    add(patch.id);
+    for (const double x : {patch.volume, patch.area, patch.depth}) add(x);
+    for (const Eigen::Vector3d* const x :
+         {&patch.centroid, &patch.normal, &patch.force, &patch.torque})
+      add(*x);
+  }
+  std::uint64_t value() const { return XXH3_64bits_digest(&state_); }
+
+ private:
+  XXH3_state_t state_;
+};
+
+}  // namespace ist::testing
