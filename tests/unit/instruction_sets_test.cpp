@@ -93,7 +93,7 @@ void ask(const std::string& asked, const PlacedTree& a, const PlacedTree& b, Wor
   const PenetrationAndSeparation both = query(a, b, testing::for_both(settings), workspace);
   bits.add(both.penetration);
   bits.add(both.separation);
-  if (asked == "matched") bits.add(without_soft_skin(both.penetration, a, b));
+  if (asked == "matched") bits.add(without_protrusion(both.penetration, a, b));
 }
 
 std::string hash_of(const Row& row) {
