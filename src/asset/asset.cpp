@@ -44,6 +44,9 @@ Asset Asset::load(const std::filesystem::path& path) {
   return Asset(bytes, path.string());
 }
 
-void Asset::save(const std::filesystem::path& path) const { write_atomically(path, bytes()); }
+void Asset::save(const std::filesystem::path& path) const {
+  if (view_.empty()) throw Error(path.string() + ": nothing to save: the asset was moved from");
+  write_atomically(path, bytes());
+}
 
 }  // namespace ist

@@ -62,6 +62,8 @@ TEST(Asset, MovedFromAssetsAndWorkspacesAreSafe) {
   Asset taken = std::move(asset);
   EXPECT_TRUE(asset.view().empty());  // NOLINT(bugprone-use-after-move): what is tested
   EXPECT_TRUE(asset.bytes().empty());
+  EXPECT_THROW(asset.save(::testing::TempDir() + "/moved_from.ist"), Error);
+  EXPECT_FALSE(std::filesystem::exists(::testing::TempDir() + "/moved_from.ist"));
   EXPECT_EQ(taken.view().sphere_count(), 40u);
   asset = std::move(taken);
   EXPECT_EQ(asset.view().sphere_count(), 40u);
