@@ -14,6 +14,7 @@
 //   for each detail i = 1 … d, of m = ⌊n / 4^i⌋ spheres
 //     matched spheres                 Sphere[m]   the matched set of the first m inner spheres
 //     matched tree                    as below, without sphere covers
+//   field, if there is one            as below
 //
 // The matched set of all n inner spheres is detail 0 and stands in AssetHeader; the coarser ones
 // are what a query may answer from instead, under PenetrationSettings::pair_budget.
@@ -30,6 +31,17 @@
 // but the last of each level is full. Sections follow each other in this order without a gap but
 // the padding to 64 bytes, so that n and d alone give every offset (place_sections).
 //
+// The field, the solid's surface as a query looks at it: triangles, a tree of balls over them, and a
+// grid that tells inside from outside.
+//
+//   FieldHeader
+//   level 0                           SurfaceBlock[m(0)]
+//   level k ≥ 1                       BallBlock[m(k)], Origin[m(k)]   balls around blocks below
+//   brick index                       uint32[bricks[0] · bricks[1] · bricks[2]], x runs fastest
+//   bricks                            CellBrick[brick_count]
+//   cell first                        uint32[cell_count + 1]
+//   cell triangles                    uint32[entry_count]   16 · block + lane
+//
 // Centres of spheres and balls are floats of the unit frame. A block's origin is chosen so that the
 // difference of every centre in it and the origin is a float too: origin + offset is the centre
 // exactly, and the leaf spheres are the spheres of the table bit for bit.
@@ -42,7 +54,7 @@
 namespace ist {
 
 inline constexpr std::uint32_t kFormatMajor = 0;
-inline constexpr std::uint32_t kFormatMinor = 2;
+inline constexpr std::uint32_t kFormatMinor = 3;
 inline constexpr char kAssetMagic[8] = {'I', 'S', 'T', 'R', 'E', 'E', '\r', '\n'};
 inline constexpr std::size_t kAssetAlignment = 64;
 inline constexpr std::uint32_t kWidth = 16;       ///< balls in a block
@@ -87,7 +99,7 @@ struct alignas(64) NodeBlock {
 static_assert(sizeof(NodeBlock) == 192);
 
 struct LevelHeader {
-  std::uint64_t blocks = 0;   ///< offset of BallBlock[count]
+  std::uint64_t blocks = 0;   ///< offset of BallBlock[count], of the field's level 0 SurfaceBlock
   std::uint64_t origins = 0;  ///< offset of Origin[count]
   std::uint64_t nodes = 0;    ///< offset of NodeBlock[count]; 0 at level 0
   std::uint32_t count = 0;    ///< blocks at this level
@@ -120,6 +132,56 @@ struct DetailLevel {
   TreeHeader matched_tree;
 };
 static_assert(sizeof(DetailLevel) == 328);
+
+/// Up to sixteen triangles of the field over up to sixteen vertices of their own.
+///
+/// All blocks together are a closed, oriented surface: a vertex that blocks share has the same
+/// floats in each.
+struct alignas(64) SurfaceBlock {
+  float x[kWidth], y[kWidth], z[kWidth];  ///< vertices, unit frame; unused ones repeat the first
+  std::uint8_t corner[3][kWidth];  ///< vertices of a triangle, counter-clockwise from outside; 0 if
+                                   ///< unused
+  std::uint32_t triangles;         ///< 1 … 16
+  std::uint32_t vertices;          ///< 3 … 16
+  std::uint32_t reserved[2];
+};
+static_assert(sizeof(SurfaceBlock) == 256);
+
+inline constexpr std::uint32_t kBrickWidth = 4;           ///< cells along an edge of a brick
+inline constexpr std::uint32_t kOutsideBrick = ~0u;       ///< brick index: no cell is inside
+inline constexpr std::uint32_t kInsideBrick = ~0u - 1;    ///< all cells are
+/// Where in a cell its reference point is, in edges of the cell: off the planes that meshes like.
+inline constexpr double kCellReference[3] = {0.5239, 0.4517, 0.5371};
+
+/// 4 × 4 × 4 cells, bit x + 4 y + 16 z.
+struct CellBrick {
+  std::uint64_t surface = 0;  ///< cells that a triangle meets, and perhaps others
+  std::uint64_t inside = 0;   ///< cells whose reference point is inside
+  std::uint32_t first = 0;    ///< surface cells of the bricks before
+  std::uint32_t reserved = 0;
+};
+static_assert(sizeof(CellBrick) == 24);
+
+/// The solid's surface for queries: exact for a mesh of few triangles, else one near it.
+struct FieldHeader {
+  /// Unit frame, proven: this surface and the solid's lie within `error` of each other, and both
+  /// solids agree on every point further from them.
+  double error = 0;
+  double low[3] = {};             ///< lower corner of the grid, unit frame; outside it is outside
+  double cell = 0;                ///< edge of a cell, unit frame
+  std::uint32_t bricks[3] = {};   ///< along x, y, z
+  std::uint32_t brick_count = 0;  ///< bricks that hold surface, or cells of both kinds
+  std::uint32_t cell_count = 0;   ///< surface cells
+  std::uint32_t entry_count = 0;  ///< triangles of all surface cells
+  std::uint32_t triangle_count = 0;
+  std::uint32_t level_count = 0;     ///< ≥ 1; the last has one block
+  std::uint64_t brick_index = 0;     ///< offset of uint32[bricks[0] · bricks[1] · bricks[2]]
+  std::uint64_t brick_data = 0;      ///< offset of CellBrick[brick_count]
+  std::uint64_t cell_first = 0;      ///< offset of uint32[cell_count + 1] into the cell triangles
+  std::uint64_t cell_triangles = 0;  ///< offset of uint32[entry_count]: 16 · block + lane
+  LevelHeader level[kMaxLevels];     ///< level 0: SurfaceBlock, above: BallBlock and Origin
+};
+static_assert(sizeof(FieldHeader) == 328);
 
 struct alignas(64) AssetHeader {
   char magic[8] = {};
@@ -171,7 +233,10 @@ struct alignas(64) AssetHeader {
   double measured_error = 0;         ///< median near asked_at_overlap, of two copies of the solid
   std::uint32_t measured_poses = 0;  ///< behind it; 0: nothing was measured
   std::uint32_t search_stop = 0;     ///< StopReason of the search for the target
-  std::uint64_t reserved[4] = {};
+
+  std::uint64_t field = 0;       ///< offset of FieldHeader; 0: baked without one
+  double asked_field_error = 0;  ///< [u] 0: none was asked for
+  std::uint64_t reserved[2] = {};
 };
 static_assert(sizeof(AssetHeader) == 960);
 
@@ -204,6 +269,26 @@ constexpr void place_tree(TreeHeader& tree, bool with_covers, std::uint64_t& end
   }
 }
 
+constexpr void place_field(FieldHeader& field, std::uint64_t& end) noexcept {
+  std::uint32_t count = field.level[0].count;
+  field.level_count = 0;
+  for (;; count = (count + kWidth - 1) / kWidth) {
+    LevelHeader& level = field.level[field.level_count];
+    level.count = count;
+    level.blocks = field.level_count == 0 ? take<SurfaceBlock>(end, count)
+                                          : take<BallBlock>(end, count);
+    level.origins = field.level_count == 0 ? 0 : take<Origin>(end, count);
+    level.nodes = 0;
+    ++field.level_count;
+    if (count == 1) break;
+  }
+  field.brick_index = take<std::uint32_t>(
+      end, std::uint64_t{field.bricks[0]} * field.bricks[1] * field.bricks[2]);
+  field.brick_data = take<CellBrick>(end, field.brick_count);
+  field.cell_first = take<std::uint32_t>(end, std::uint64_t{field.cell_count} + 1);
+  field.cell_triangles = take<std::uint32_t>(end, field.entry_count);
+}
+
 }  // namespace detail
 
 /// Most spheres an asset holds: kMaxLevels levels.
@@ -215,8 +300,10 @@ constexpr std::uint64_t detail_spheres(std::uint64_t n, std::uint32_t i) noexcep
 }
 
 /// Sets every offset, count and the file size from `sphere_count` in [1, kMaxSpheres] and
-/// `detail_count`, all of whose sets must have a sphere; `details` are those of the file.
-constexpr void place_sections(AssetHeader& header, DetailLevel* details) noexcept {
+/// `detail_count`, all of whose sets must have a sphere; `details` are those of the file. `field`,
+/// if there is one, knows its counts: level[0].count and those of bricks, cells and entries.
+constexpr void place_sections(AssetHeader& header, DetailLevel* details,
+                              FieldHeader* field = nullptr) noexcept {
   const std::uint64_t n = header.sphere_count;
   std::uint64_t end = sizeof(AssetHeader);
   header.details =
@@ -233,6 +320,8 @@ constexpr void place_sections(AssetHeader& header, DetailLevel* details) noexcep
     details[i].matched_tree.sphere_count = static_cast<std::uint32_t>(m);
     detail::place_tree(details[i].matched_tree, false, end);
   }
+  header.field = field != nullptr ? detail::take<FieldHeader>(end, 1) : 0;
+  if (field != nullptr) detail::place_field(*field, end);
   header.file_bytes = end;
 }
 
