@@ -60,6 +60,11 @@ class TreeView {
   double volume() const noexcept;      ///< [u³] of the solid
   double coverage() const noexcept;    ///< [0, 1] share of it in inner spheres
   double protrusion() const noexcept;  ///< [u] no matched sphere sticks further out of the solid
+  /// The asset holds the solid's surface, so that queries can be exact.
+  bool has_field() const noexcept;
+  /// [u] that surface and the solid's lie within this of each other; 0 without a field.
+  double field_error() const noexcept;
+  std::uint32_t field_triangles() const noexcept;  ///< of that surface; 0 without a field
   /// No poses for an asset of bake(), which predicts nothing, and for an empty view.
   PredictedErrors predicted_errors() const noexcept;
 

@@ -32,6 +32,22 @@ class SectionWriter {
     }
   }
 
+  void write(const FieldHeader& header, const FieldArrays& field) {
+    write(header.level[0].blocks, field.blocks, header.level[0].count);
+    if (field.levels.size() + 1 != header.level_count)
+      throw Error("asset: the field has a wrong number of levels");
+    for (std::uint32_t k = 1; k < header.level_count; ++k) {
+      const LevelHeader& level = header.level[k];
+      write(level.blocks, field.levels[k - 1].blocks, level.count);
+      write(level.origins, field.levels[k - 1].origins, level.count);
+    }
+    write(header.brick_index, field.brick_index,
+          std::uint64_t{header.bricks[0]} * header.bricks[1] * header.bricks[2]);
+    write(header.brick_data, field.bricks, header.brick_count);
+    write(header.cell_first, field.cell_first, std::uint64_t{header.cell_count} + 1);
+    write(header.cell_triangles, field.cell_triangles, header.entry_count);
+  }
+
  private:
   std::vector<std::byte>& bytes_;
 };
@@ -42,6 +58,19 @@ void fill_scalars(TreeHeader& header, const TreeArrays& tree) {
   header.volume_sum = tree.volume_sum;
   header.mean_radius = tree.mean_radius;
   header.overlap = tree.overlap;
+}
+
+/// The header of a field with the counts that place_sections asks for.
+FieldHeader placeable(const FieldArrays& arrays) {
+  constexpr std::size_t kMostBlocks = std::size_t{1} << 4 * (kMaxLevels - 1);
+  if (arrays.blocks.empty() || arrays.blocks.size() > kMostBlocks)
+    throw Error("asset: the field must hold at least one triangle and at most 16^6 blocks of them");
+  FieldHeader header = arrays.header;
+  header.level[0].count = static_cast<std::uint32_t>(arrays.blocks.size());
+  header.brick_count = static_cast<std::uint32_t>(arrays.bricks.size());
+  header.cell_count = static_cast<std::uint32_t>(arrays.cell_first.size() - 1);
+  header.entry_count = static_cast<std::uint32_t>(arrays.cell_triangles.size());
+  return header;
 }
 
 }  // namespace
@@ -57,7 +86,9 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
     throw Error("asset: the last level of detail has no spheres");
   std::vector<DetailLevel> details(arrays.details.size());
   std::memcpy(header.magic, kAssetMagic, sizeof(kAssetMagic));
-  place_sections(header, details.data());
+  FieldHeader field;
+  if (arrays.field) field = placeable(*arrays.field);
+  place_sections(header, details.data(), arrays.field ? &field : nullptr);
   fill_scalars(header.inner_tree, arrays.inner_tree);
   fill_scalars(header.matched_tree, arrays.matched_tree);
   for (std::size_t i = 0; i < details.size(); ++i) {
@@ -78,6 +109,10 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
     const TreeHeader& tree = details[i].matched_tree;
     writer.write(details[i].matched_spheres, arrays.details[i].matched_spheres, tree.sphere_count);
     writer.write(tree, arrays.details[i].matched_tree);
+  }
+  if (arrays.field) {
+    writer.write(header.field, std::vector<FieldHeader>{field}, 1);
+    writer.write(field, *arrays.field);
   }
   seal(bytes);
   return bytes;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include <ist/asset_layout.h>
@@ -34,6 +35,17 @@ struct DetailArrays {
   TreeArrays matched_tree;
 };
 
+/// The solid's surface for queries as it will lie in the file.
+struct FieldArrays {
+  FieldHeader header;  ///< offsets and the counts of levels are filled in by writing
+  std::vector<SurfaceBlock> blocks;
+  std::vector<TreeLevelArrays> levels;  ///< balls around blocks, from level 1 up; no nodes
+  std::vector<std::uint32_t> brick_index;
+  std::vector<CellBrick> bricks;
+  std::vector<std::uint32_t> cell_first;
+  std::vector<std::uint32_t> cell_triangles;
+};
+
 /// What an asset is made of.
 struct AssetArrays {
   AssetHeader header;  ///< scalar fields; offsets, counts, magic and hash are filled in by writing
@@ -42,7 +54,8 @@ struct AssetArrays {
   std::vector<Sphere> matched_spheres;  ///< the same length
   TreeArrays inner_tree;
   TreeArrays matched_tree;
-  std::vector<DetailArrays> details;  ///< the i-th from 1 of ⌊n / 4^i⌋ spheres
+  std::vector<DetailArrays> details;         ///< the i-th from 1 of ⌊n / 4^i⌋ spheres
+  std::shared_ptr<const FieldArrays> field;  ///< null: none
 };
 
 /// The bytes of the asset. Throws Error unless the arrays' lengths fit each other.

@@ -1,34 +1,18 @@
 #include <ist/tree_view.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
 #include <ist/asset_layout.h>
 #include "query/asset/content_hash.h"
+#include "query/asset/sound_field.h"
+#include "query/asset/sound_values.h"
 
 namespace ist {
 namespace {
 
-// Comparisons are written so that NaN fails them.
-bool in_range(double value, double low, double high) noexcept {
-  return value >= low && value <= high;
-}
-bool is_offset(double value) noexcept { return in_range(value, -kMaxExtent, kMaxExtent); }
-bool is_radius(double value) noexcept { return in_range(value, 0, kMaxExtent); }
 bool is_finite_sum(double value) noexcept { return in_range(value, 0, 1e18); }
-
-/// The first `used` lanes hold balls, the rest are marked empty.
-bool sound_block(const BallBlock& block, std::uint64_t used) noexcept {
-  bool sound = true;
-  for (std::uint32_t l = 0; l < kWidth; ++l) {
-    if (l < used)
-      sound &= is_offset(block.x[l]) && is_offset(block.y[l]) && is_offset(block.z[l]) &&
-               is_radius(block.r[l]);
-    else
-      sound &= block.x[l] == 0 && block.y[l] == 0 && block.z[l] == 0 && block.r[l] == kEmptyRadius;
-  }
-  return sound;
-}
 
 bool sound_nodes(const NodeBlock& nodes, std::uint64_t used, bool covers) noexcept {
   bool sound = true;
@@ -77,7 +61,7 @@ bool sound_tree(const AssetHeader& header, const TreeHeader& tree) noexcept {
     for (std::uint32_t b = 0; b < level.count; ++b) {
       const std::uint64_t used = below - std::uint64_t{kWidth} * b;
       sound &= sound_block(blocks[b], used);
-      sound &= is_offset(origins[b].x) && is_offset(origins[b].y) && is_offset(origins[b].z);
+      sound &= sound_origin(origins[b]);
       if (k > 0) sound &= sound_nodes(at<NodeBlock>(header, level.nodes)[b], used, covers);
     }
     below = level.count;
@@ -85,8 +69,32 @@ bool sound_tree(const AssetHeader& header, const TreeHeader& tree) noexcept {
   return sound;
 }
 
-/// Offsets and counts are a function of the counts of spheres and details: nothing else is
-/// accepted.
+bool same_levels(const LevelHeader (&a)[kMaxLevels], const LevelHeader (&b)[kMaxLevels]) noexcept {
+  return std::memcmp(a, b, sizeof(a)) == 0;
+}
+
+/// As sound_sections, of the field; `expected` has been laid out without one.
+bool sound_field_sections(const AssetHeader& header, AssetHeader& expected,
+                          DetailLevel* details) noexcept {
+  if (header.field != expected.file_bytes ||
+      header.file_bytes < expected.file_bytes + sizeof(FieldHeader))
+    return false;
+  const FieldHeader& found = *at<FieldHeader>(header, header.field);
+  if (!sound_field_counts(found)) return false;
+  FieldHeader field;
+  std::copy_n(found.bricks, 3, field.bricks);
+  field.brick_count = found.brick_count;
+  field.cell_count = found.cell_count;
+  field.entry_count = found.entry_count;
+  field.level[0].count = found.level[0].count;
+  place_sections(expected, details, &field);
+  return field.level_count == found.level_count && same_levels(field.level, found.level) &&
+         field.brick_index == found.brick_index && field.brick_data == found.brick_data &&
+         field.cell_first == found.cell_first && field.cell_triangles == found.cell_triangles;
+}
+
+/// Offsets and counts are a function of the counts of spheres and details and those of the field:
+/// nothing else is accepted.
 bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
   if (header.sphere_count < 1 || header.sphere_count > kMaxSpheres) return false;
   if (header.detail_count > kMaxDetails) return false;
@@ -99,8 +107,9 @@ bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
   const auto same_tree = [](const TreeHeader& a, const TreeHeader& b) {
     return a.sphere_index == b.sphere_index && a.sphere_cover == b.sphere_cover &&
            a.sphere_count == b.sphere_count && a.level_count == b.level_count &&
-           std::memcmp(a.level, b.level, sizeof(a.level)) == 0;
+           same_levels(a.level, b.level);
   };
+  if (header.field != 0 && !sound_field_sections(header, expected, details)) return false;
   if (expected.file_bytes != bytes || expected.details != header.details) return false;
   const DetailLevel* const found = at<DetailLevel>(header, header.details);
   for (std::uint32_t i = 0; i < header.detail_count; ++i)
@@ -127,6 +136,8 @@ bool sound_values(const AssetHeader& header) noexcept {
   for (const double error : header.predicted_error)
     if (!is_finite_sum(error)) return false;
   if (!is_finite_sum(header.measured_error)) return false;
+  if (header.field != 0 && !sound_field(header, *at<FieldHeader>(header, header.field)))
+    return false;
   const DetailLevel* const details = at<DetailLevel>(header, header.details);
   for (std::uint32_t i = 0; i < header.detail_count; ++i) {
     const TreeHeader& tree = details[i].matched_tree;
@@ -175,6 +186,18 @@ double TreeView::coverage() const noexcept { return header_ == nullptr ? 0 : hea
 
 double TreeView::protrusion() const noexcept {
   return header_ == nullptr ? 0 : std::ldexp(header_->protrusion, header_->exponent);
+}
+
+bool TreeView::has_field() const noexcept { return header_ != nullptr && header_->field != 0; }
+
+double TreeView::field_error() const noexcept {
+  return has_field()
+             ? std::ldexp(at<FieldHeader>(*header_, header_->field)->error, header_->exponent)
+             : 0;
+}
+
+std::uint32_t TreeView::field_triangles() const noexcept {
+  return has_field() ? at<FieldHeader>(*header_, header_->field)->triangle_count : 0;
 }
 
 PredictedErrors TreeView::predicted_errors() const noexcept {

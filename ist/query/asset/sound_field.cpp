@@ -1,0 +1,98 @@
+#include "query/asset/sound_field.h"
+
+#include <bit>
+
+#include "query/asset/sound_values.h"
+
+namespace ist {
+namespace {
+
+constexpr std::uint32_t kMostBlocks = 1u << 4 * (kMaxLevels - 1);
+constexpr std::uint32_t kMostBricks = 1u << 20;  // along an axis
+
+bool sound_surface_block(const SurfaceBlock& block) noexcept {
+  if (block.triangles < 1 || block.triangles > kWidth) return false;
+  if (block.vertices < 3 || block.vertices > kWidth) return false;
+  bool sound = true;
+  for (std::uint32_t v = 0; v < kWidth; ++v) {
+    sound &= is_offset(block.x[v]) && is_offset(block.y[v]) && is_offset(block.z[v]);
+    if (v >= block.vertices)
+      sound &= block.x[v] == block.x[0] && block.y[v] == block.y[0] && block.z[v] == block.z[0];
+  }
+  for (const auto& corners : block.corner)
+    for (std::uint32_t l = 0; l < kWidth; ++l)
+      sound &= l < block.triangles ? corners[l] < block.vertices : corners[l] == 0;
+  return sound;
+}
+
+bool sound_surface(const AssetHeader& header, const FieldHeader& field) noexcept {
+  const SurfaceBlock* blocks = at<SurfaceBlock>(header, field.level[0].blocks);
+  std::uint64_t triangles = 0;
+  bool sound = true;
+  for (std::uint32_t b = 0; b < field.level[0].count; ++b) {
+    sound &= sound_surface_block(blocks[b]);
+    triangles += blocks[b].triangles;
+  }
+  return sound && triangles == field.triangle_count;
+}
+
+bool sound_balls(const AssetHeader& header, const FieldHeader& field) noexcept {
+  bool sound = true;
+  for (std::uint32_t k = 1; k < field.level_count; ++k) {
+    const LevelHeader& level = field.level[k];
+    const BallBlock* balls = at<BallBlock>(header, level.blocks);
+    const Origin* origins = at<Origin>(header, level.origins);
+    for (std::uint32_t b = 0; b < level.count; ++b)
+      sound &= sound_block(balls[b], field.level[k - 1].count - std::uint64_t{kWidth} * b) &&
+               sound_origin(origins[b]);
+  }
+  return sound;
+}
+
+bool sound_bricks(const AssetHeader& header, const FieldHeader& field) noexcept {
+  const std::uint64_t places = std::uint64_t{field.bricks[0]} * field.bricks[1] * field.bricks[2];
+  const std::uint32_t* index = at<std::uint32_t>(header, field.brick_index);
+  bool sound = true;
+  for (std::uint64_t i = 0; i < places; ++i)
+    sound &= index[i] < field.brick_count || index[i] == kOutsideBrick || index[i] == kInsideBrick;
+  const CellBrick* bricks = at<CellBrick>(header, field.brick_data);
+  std::uint64_t cells = 0;
+  for (std::uint32_t i = 0; i < field.brick_count; ++i) {
+    sound &= bricks[i].first == cells;
+    cells += static_cast<std::uint64_t>(std::popcount(bricks[i].surface));
+  }
+  return sound && cells == field.cell_count;
+}
+
+bool sound_cells(const AssetHeader& header, const FieldHeader& field) noexcept {
+  const std::uint32_t* first = at<std::uint32_t>(header, field.cell_first);
+  bool sound = first[0] == 0 && first[field.cell_count] == field.entry_count;
+  for (std::uint32_t c = 0; c < field.cell_count; ++c) sound &= first[c] <= first[c + 1];
+  const std::uint32_t* triangles = at<std::uint32_t>(header, field.cell_triangles);
+  const SurfaceBlock* blocks = at<SurfaceBlock>(header, field.level[0].blocks);
+  for (std::uint32_t i = 0; i < field.entry_count && sound; ++i) {
+    const std::uint32_t block = triangles[i] / kWidth;
+    sound = block < field.level[0].count && triangles[i] % kWidth < blocks[block].triangles;
+  }
+  return sound;
+}
+
+}  // namespace
+
+bool sound_field_counts(const FieldHeader& field) noexcept {
+  for (const std::uint32_t along : field.bricks)
+    if (along < 1 || along > kMostBricks) return false;
+  return field.level[0].count >= 1 && field.level[0].count <= kMostBlocks;
+}
+
+bool sound_field(const AssetHeader& header, const FieldHeader& field) noexcept {
+  if (!is_radius(field.error) || !in_range(field.cell, 1e-9, kMaxExtent)) return false;
+  for (int k = 0; k < 3; ++k) {
+    const double high = field.low[k] + field.cell * kBrickWidth * field.bricks[k];
+    if (!is_offset(field.low[k]) || !is_offset(high)) return false;
+  }
+  return sound_surface(header, field) && sound_balls(header, field) &&
+         sound_bricks(header, field) && sound_cells(header, field);
+}
+
+}  // namespace ist
