@@ -44,6 +44,10 @@ struct SphereTree {
     sphere_cover = tree.sphere_cover != 0 ? at<float>(asset, tree.sphere_cover) : nullptr;
   }
 
+  /// A tree of balls that stand for something else than spheres: levels are set by the caller.
+  explicit SphereTree(const TreeHeader& tree) noexcept
+      : header(&tree), top(static_cast<int>(tree.level_count) - 1), sphere_cover(nullptr) {}
+
   /// Unit frame, at full precision.
   NodeBall ball(int at_level, std::uint32_t block) const noexcept {
     if (at_level == top)

@@ -13,6 +13,8 @@ struct Similarity {
   double t[3] = {};
   double scale = 1;
 
+  static Similarity identity() noexcept { return {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {}, 1}; }
+
   void apply(const double (&x)[3], double (&y)[3]) const {
     for (int i = 0; i < 3; ++i)
       y[i] = (m[3 * i] * x[0] + m[3 * i + 1] * x[1]) + m[3 * i + 2] * x[2] + t[i];

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "query/base/precision.h"
+#include "query/descent/answer.h"
 #include "query/kernel/node_kernel.h"
 
 namespace ist {
@@ -131,24 +132,9 @@ void Descent::add_contained(bool of_a, int level, const ContainedNodes& containe
 }
 
 Overlap Descent::contained_overlap(bool of_a, const SubtreeSums& contained) const {
-  Overlap overlap;
-  if (contained.spheres == 0) return overlap;
-  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
-  for (std::size_t lane = 0; lane < kWidth; ++lane) {
-    overlap.volume += contained.cubes[lane];
-    for (int k = 0; k < 3; ++k) moment[k] += contained.moment[k][lane];
-  }
-  overlap.volume *= 4 * std::numbers::pi / 3;
-  moment *= 4 * std::numbers::pi / 3;
-  if (of_a) {
-    overlap.moment = moment - overlap.volume * Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]);
-  } else {
-    const double cube = map_.scale * map_.scale * map_.scale;
-    overlap.volume *= cube;
-    for (int k = 0; k < 3; ++k)
-      overlap.moment[k] = cube * ((map_.m[3 * k] * moment[0] + map_.m[3 * k + 1] * moment[1]) +
-                                  map_.m[3 * k + 2] * moment[2]);
-  }
+  if (!of_a) return whole_spheres(contained, map_);
+  Overlap overlap = whole_spheres(contained, Similarity::identity());
+  overlap.moment -= overlap.volume * Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]);
   return overlap;
 }
 
@@ -299,7 +285,6 @@ Overlap Descent::estimate_unopened_pair(std::uint32_t a, std::uint32_t b) {
 }
 
 Penetration Descent::penetration() const noexcept {
-  Penetration result;
   const Overlap overlap = this->overlap();
 
   // No point is counted more often than κ A's κ B, nor beyond either tree's own volume.
@@ -312,21 +297,10 @@ Penetration Descent::penetration() const noexcept {
   const double lowest = std::max(0.0, sure - overlap.error);
   const double highest = std::max(lowest, std::min(cap, sure + overlap.error + unopened_bound_));
 
-  const double unit = pose_.unit_a;
-  const double unit3 = unit * unit * unit;
-  result.volume = unit3 * std::clamp(overlap.volume, lowest, highest);
-  result.volume_min = unit3 * lowest;
-  result.volume_max = unit3 * highest;
+  Penetration result = world_answer(overlap, lowest, highest, pose_);
   result.node_visits = budget_.visits();
   result.sphere_pairs = sums_.lenses + contained_a_.spheres + contained_b_.spheres;
   if (stopped_) result.status = QueryStatus::budget_exhausted;
-  if (overlap.volume > 0) {
-    const Eigen::Vector3d origin_b(pose_.a_from_b.t[0], pose_.a_from_b.t[1], pose_.a_from_b.t[2]);
-    result.centroid = pose_.to_world(overlap.moment / overlap.volume + origin_b);
-  }
-  result.translation_gradient = unit * unit * (pose_.rotation_a * overlap.force);
-  result.rotation_gradient = unit3 * (pose_.rotation_a * overlap.torque) +
-                             pose_.unit_offset_b.cross(result.translation_gradient);
   return result;
 }
 

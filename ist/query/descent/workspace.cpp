@@ -25,7 +25,9 @@ Workspace::Impl::Impl(std::size_t wanted)
       ranked(std::make_unique_for_overwrite<RankedPair[]>(capacity)),
       bounds(std::make_unique_for_overwrite<double[]>(capacity)),
       waiting(std::make_unique_for_overwrite<WaitingPair[]>(kWaiting)),
-      leaves(std::make_unique_for_overwrite<LeafScratch>()) {}
+      leaves(std::make_unique_for_overwrite<LeafScratch>()),
+      masks(std::make_unique_for_overwrite<std::uint16_t[]>(capacity)),
+      patches(std::make_unique_for_overwrite<PatchCache>()) {}
 
 Workspace::Workspace(std::size_t capacity) : impl_(std::make_unique<Impl>(capacity)) {}
 Workspace::~Workspace() = default;

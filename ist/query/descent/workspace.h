@@ -9,6 +9,7 @@
 #include <ist/asset_layout.h>
 #include "query/contact/contact_bins.h"
 #include "query/kernel/placed_blocks.h"
+#include "query/probe/patch_cache.h"
 
 namespace ist {
 
@@ -44,6 +45,8 @@ struct Workspace::Impl {
   std::unique_ptr<double[]> bounds;        ///< of the pairs of `now`, while some are chosen
   std::unique_ptr<WaitingPair[]> waiting;  ///< [kWaiting] a stack
   std::unique_ptr<LeafScratch> leaves;
+  std::unique_ptr<std::uint16_t[]> masks;  ///< children of a pair's node that meet the other one
+  std::unique_ptr<PatchCache> patches;
   ContactBins contact;
 };
 

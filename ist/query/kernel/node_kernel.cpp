@@ -1,5 +1,6 @@
 #include "query/kernel/node_kernel.h"
 
+#include <algorithm>
 #include <cmath>
 
 #undef HWY_TARGET_INCLUDE
@@ -117,6 +118,42 @@ HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
   return found;
 }
 
+template <class T>
+HWY_INLINE void masks_as(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                         std::size_t n, std::uint16_t* masks) {
+  const LaneTag<T> d;
+  const SphereTree::Level& opened = stage.x->level[stage.level_x];
+  const auto grow = hn::Set(d, static_cast<T>(1 + distance_error<T>(1)));
+  StandingBalls<T> standing;
+  stand(stage, x, y, n, standing);
+  const std::uint32_t below = stage.x->count(stage.level_x - 1);
+  for (std::size_t i = 0; i < n; ++i) {
+    const BallBlock& block = opened.blocks[x[i]];
+    std::uint32_t near = 0;
+    for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+      const auto dx = load_as<T>(d, block.x + lane) - hn::Set(d, standing.x[i]);
+      const auto dy = load_as<T>(d, block.y + lane) - hn::Set(d, standing.y[i]);
+      const auto dz = load_as<T>(d, block.z + lane) - hn::Set(d, standing.z[i]);
+      const auto d2 = (dx * dx + dy * dy) + dz * dz;
+      const auto r = load_as<T>(d, block.r + lane) * grow;
+      const auto sum = hn::Max(r + hn::Set(d, standing.reach[i]), hn::Zero(d));
+      near |= mask_bits(d, d2 < sum * sum) << lane;
+    }
+    const std::uint32_t used = std::min(kWidth, below - kWidth * x[i]);
+    masks[i] = static_cast<std::uint16_t>(near & ((1u << used) - 1));
+  }
+}
+
+void masks_float32(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                   std::size_t n, std::uint16_t* masks) {
+  masks_as<float>(stage, x, y, n, masks);
+}
+
+void masks_float64(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                   std::size_t n, std::uint16_t* masks) {
+  masks_as<double>(stage, x, y, n, masks);
+}
+
 std::size_t open_float32(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
                          std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
   return open_as<float, false>(stage, x, y, n, out_x, out_y, nullptr);
@@ -149,6 +186,8 @@ HWY_EXPORT(open_float32);
 HWY_EXPORT(open_float64);
 HWY_EXPORT(open_holding_float32);
 HWY_EXPORT(open_holding_float64);
+HWY_EXPORT(masks_float32);
+HWY_EXPORT(masks_float64);
 
 std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept {
@@ -163,6 +202,13 @@ std::size_t open_under_spheres(const NodeStage& stage, const std::uint32_t* x,
   return stage.precision == Precision::float32
              ? HWY_DYNAMIC_DISPATCH(open_holding_float32)(stage, x, y, n, out_x, out_y, contained)
              : HWY_DYNAMIC_DISPATCH(open_holding_float64)(stage, x, y, n, out_x, out_y, contained);
+}
+
+void reach_masks(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                 std::size_t n, std::uint16_t* masks) noexcept {
+  stage.precision == Precision::float32
+      ? HWY_DYNAMIC_DISPATCH(masks_float32)(stage, x, y, n, masks)
+      : HWY_DYNAMIC_DISPATCH(masks_float64)(stage, x, y, n, masks);
 }
 
 }  // namespace ist

@@ -28,4 +28,23 @@ Overlap finish(const LeafSums& sums, Precision precision) noexcept {
   return overlap;
 }
 
+Overlap whole_spheres(const SubtreeSums& spheres, const Similarity& a_from_b) noexcept {
+  Overlap overlap;
+  if (spheres.spheres == 0) return overlap;
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  for (std::size_t lane = 0; lane < kWidth; ++lane) {
+    overlap.volume += spheres.cubes[lane];
+    for (int k = 0; k < 3; ++k) moment[k] += spheres.moment[k][lane];
+  }
+  const double cube = a_from_b.scale * a_from_b.scale * a_from_b.scale;
+  overlap.volume *= 4 * std::numbers::pi / 3;
+  overlap.volume *= cube;
+  moment *= 4 * std::numbers::pi / 3;
+  const double* const m = a_from_b.m;
+  for (int k = 0; k < 3; ++k)
+    overlap.moment[k] =
+        cube * ((m[3 * k] * moment[0] + m[3 * k + 1] * moment[1]) + m[3 * k + 2] * moment[2]);
+  return overlap;
+}
+
 }  // namespace ist

@@ -2,7 +2,9 @@
 
 #include <Eigen/Core>
 
+#include "query/base/relative_pose.h"
 #include "query/kernel/leaf_kernel.h"
+#include "query/kernel/subtree_kernel.h"
 
 namespace ist {
 
@@ -40,5 +42,8 @@ constexpr double sum_rounding(Precision precision) {
 
 /// Adds up the lanes and sets in the factors of π.
 Overlap finish(const LeafSums& sums, Precision precision) noexcept;
+
+/// Whole spheres of B, whose sums are in its own unit frame.
+Overlap whole_spheres(const SubtreeSums& spheres, const Similarity& a_from_b) noexcept;
 
 }  // namespace ist

@@ -276,16 +276,37 @@ void add_patch_to(const SurfacePatch& patch, const ProbeBalls& balls, ProbeSums&
   using V = hn::Vec<decltype(d)>;
   Chords chords;
   Corners corners;
-  for (std::size_t t = 0; t < patch.size; ++t) {
+  std::uint32_t triangles = 0;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V px = hn::Set(d, balls.origin[0]) - hn::Load(d, patch.corner[0] + lane);
+    const V py = hn::Set(d, balls.origin[1]) - hn::Load(d, patch.corner[1] + lane);
+    const V pz = hn::Set(d, balls.origin[2]) - hn::Load(d, patch.corner[2] + lane);
+    const V reach = hn::Set(d, balls.reach);
+    const auto dot = [&](const double (&axis)[3][kWidth]) -> V {
+      return (px * hn::Load(d, axis[0] + lane) + py * hn::Load(d, axis[1] + lane)) +
+             pz * hn::Load(d, axis[2] + lane);
+    };
+    const V fx = dot(patch.u), fy = dot(patch.v);
+    const auto beside = hn::And(fx > hn::Load(d, patch.left + lane) - reach,
+                                fx < hn::Load(d, patch.right + lane) + reach);
+    const auto along =
+        hn::And(fy > hn::Zero(d) - reach, fy < hn::Load(d, patch.top + lane) + reach);
+    triangles |= mask_bits(d, hn::And(hn::Abs(dot(patch.n)) < reach, hn::And(beside, along)))
+                 << lane;
+  }
+  for (; triangles != 0; triangles &= triangles - 1) {
+    const std::size_t t = hwy::Num0BitsBelowLS1Bit_Nonzero32(triangles);
+    double corner[3];
+    for (int k = 0; k < 3; ++k) corner[k] = patch.corner[k][t] - balls.origin[k];
     const auto of = [&](double value) -> V { return hn::Set(d, value); };
     alignas(64) double height[kWidth], x[kWidth], y[kWidth];
     std::uint32_t near = 0;
     for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-      const V px = hn::Load(d, balls.x + lane) - of(patch.corner[0][t]);
-      const V py = hn::Load(d, balls.y + lane) - of(patch.corner[1][t]);
-      const V pz = hn::Load(d, balls.z + lane) - of(patch.corner[2][t]);
+      const V px = hn::Load(d, balls.x + lane) - of(corner[0]);
+      const V py = hn::Load(d, balls.y + lane) - of(corner[1]);
+      const V pz = hn::Load(d, balls.z + lane) - of(corner[2]);
       const V r = hn::Load(d, balls.r + lane);
-      const auto dot = [&](const double (&axis)[3][SurfacePatch::kMost]) -> V {
+      const auto dot = [&](const double (&axis)[3][kWidth]) -> V {
         return (px * of(axis[0][t]) + py * of(axis[1][t])) + pz * of(axis[2][t]);
       };
       const V h = dot(patch.n);
@@ -307,6 +328,59 @@ void add_patch_to(const SurfacePatch& patch, const ProbeBalls& balls, ProbeSums&
   if (corners.size > 0) take_corners(patch, corners, sums);
 }
 
+void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const V zero = hn::Zero(d);
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    V a[3], e[3], f[3];
+    const auto take = [&](int k, const double (&of)[3][kWidth]) {
+      a[k] = hn::Load(d, of[0] + lane);
+      e[k] = hn::Load(d, of[1] + lane) - a[k];
+      f[k] = hn::Load(d, of[2] + lane) - a[k];
+    };
+    take(0, corners.x), take(1, corners.y), take(2, corners.z);
+    const V cross[3] = {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2],
+                        e[0] * f[1] - e[1] * f[0]};
+    const V area =
+        hn::Sqrt((cross[0] * cross[0] + cross[1] * cross[1]) + cross[2] * cross[2]);
+    const V base = hn::Sqrt((e[0] * e[0] + e[1] * e[1]) + e[2] * e[2]);
+    const auto flat = hn::Not(area > zero);
+    const V one_area = hn::IfThenElse(flat, hn::Set(d, 1.0), area);
+    const V one_base = hn::IfThenElse(flat, hn::Set(d, 1.0), base);
+    V u[3], n[3];
+    for (int k = 0; k < 3; ++k) {
+      u[k] = e[k] / one_base;
+      n[k] = cross[k] / one_area;
+      hn::Store(a[k], d, patch.corner[k] + lane);
+      hn::Store(u[k], d, patch.u[k] + lane);
+      hn::Store(n[k], d, patch.n[k] + lane);
+    }
+    for (int k = 0; k < 3; ++k) {
+      const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+      hn::Store(n[k1] * u[k2] - n[k2] * u[k1], d, patch.v[k] + lane);
+    }
+    const V apex_x = (f[0] * u[0] + f[1] * u[1]) + f[2] * u[2];
+    const V apex_y = area / one_base;
+    hn::Store(hn::Set(d, 1.0), d, patch.edge_x[0] + lane);
+    hn::Store(zero, d, patch.edge_y[0] + lane);
+    hn::Store(base, d, patch.length[0] + lane);
+    const auto set_edge = [&](int k, V x, V y) {
+      const V length = hn::Sqrt(x * x + y * y);
+      const V one = hn::IfThenElse(flat, hn::Set(d, 1.0), length);
+      hn::Store(length, d, patch.length[k] + lane);
+      hn::Store(x / one, d, patch.edge_x[k] + lane);
+      hn::Store(y / one, d, patch.edge_y[k] + lane);
+    };
+    set_edge(1, apex_x - base, apex_y);
+    set_edge(2, zero - apex_x, zero - apex_y);
+    const V never = hn::Set(d, -1e300);
+    hn::Store(hn::Min(zero, apex_x), d, patch.left + lane);
+    hn::Store(hn::IfThenElse(flat, never, hn::Max(base, apex_x)), d, patch.right + lane);
+    hn::Store(hn::IfThenElse(flat, never, apex_y), d, patch.top + lane);
+  }
+}
+
 }  // namespace ist::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -314,44 +388,23 @@ HWY_AFTER_NAMESPACE();
 namespace ist {
 
 HWY_EXPORT(add_patch_to);
+HWY_EXPORT(make_patch_of);
 
-void SurfacePatch::add(const double (&a)[3], const double (&b)[3], const double (&c)[3]) noexcept {
-  double e[3], f[3];
-  for (int k = 0; k < 3; ++k) {
-    e[k] = b[k] - a[k];
-    f[k] = c[k] - a[k];
+void make_patch(const TriangleCorners& corners, SurfacePatch& patch) noexcept {
+  HWY_DYNAMIC_DISPATCH(make_patch_of)(corners, patch);
+}
+
+void make_patch(const SurfaceBlock& block, SurfacePatch& patch) noexcept {
+  TriangleCorners corners;
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t lane = 0; lane < kWidth; ++lane) {
+      const std::size_t v = block.corner[k][lane];
+      corners.x[k][lane] = static_cast<double>(block.x[v]);
+      corners.y[k][lane] = static_cast<double>(block.y[v]);
+      corners.z[k][lane] = static_cast<double>(block.z[v]);
+    }
   }
-  const double cross[3] = {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2],
-                           e[0] * f[1] - e[1] * f[0]};
-  const double area =
-      std::sqrt((cross[0] * cross[0] + cross[1] * cross[1]) + cross[2] * cross[2]);
-  const double length = std::sqrt((e[0] * e[0] + e[1] * e[1]) + e[2] * e[2]);
-  if (!(area > 0) || !(length > 0)) return;
-  const std::size_t i = size;
-  for (int k = 0; k < 3; ++k) {
-    corner[k][i] = a[k];
-    u[k][i] = e[k] / length;
-    n[k][i] = cross[k] / area;
-  }
-  for (int k = 0; k < 3; ++k) {
-    const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-    v[k][i] = n[k1][i] * u[k2][i] - n[k2][i] * u[k1][i];
-  }
-  const double apex_x = (f[0] * u[0][i] + f[1] * u[1][i]) + f[2] * u[2][i];
-  const double apex_y = area / length;
-  edge_x[0][i] = 1, edge_y[0][i] = 0;
-  this->length[0][i] = length;
-  const auto set_edge = [&](int k, double x, double y) {
-    this->length[k][i] = std::sqrt(x * x + y * y);
-    edge_x[k][i] = x / this->length[k][i];
-    edge_y[k][i] = y / this->length[k][i];
-  };
-  set_edge(1, apex_x - length, apex_y);
-  set_edge(2, -apex_x, -apex_y);
-  left[i] = std::min(0.0, apex_x);
-  right[i] = std::max(length, apex_x);
-  top[i] = apex_y;
-  ++size;
+  make_patch(corners, patch);
 }
 
 void add_patch(const SurfacePatch& patch, const ProbeBalls& balls, ProbeSums& sums) noexcept {

@@ -7,29 +7,32 @@
 
 namespace ist {
 
-/// Triangles near a block of balls, as the balls meet them. Positions are relative to an origin
-/// near them all, in the surface's frame; (x, y) are coordinates in a triangle's plane from its
-/// first corner, the first edge lying along x.
+/// Up to sixteen triangles as balls meet them. Positions are in the surface's frame; (x, y) are
+/// coordinates in a triangle's plane from its first corner, its first edge lying along x.
 struct alignas(64) SurfacePatch {
-  static constexpr std::size_t kMost = 64;
-
-  double corner[3][kMost];                 ///< the first one
-  double u[3][kMost], v[3][kMost];         ///< unit axes of x and y
-  double n[3][kMost];                      ///< unit normal, outward
-  double edge_x[3][kMost], edge_y[3][kMost];  ///< unit directions of the edges
-  double length[3][kMost];                    ///< of the edges
-  double left[kMost], right[kMost], top[kMost];  ///< extent: x from left to right, y from 0 to top
-  std::size_t size = 0;
-
-  bool full() const noexcept { return size == kMost; }
-
-  /// Adds a triangle; one without an area adds nothing.
-  void add(const double (&a)[3], const double (&b)[3], const double (&c)[3]) noexcept;
+  double corner[3][kWidth];                   ///< the first one
+  double u[3][kWidth], v[3][kWidth];          ///< unit axes of x and y
+  double n[3][kWidth];                        ///< unit normal, outward
+  double edge_x[3][kWidth], edge_y[3][kWidth];  ///< unit directions of the edges
+  double length[3][kWidth];                     ///< of the edges
+  /// Extent: x from left to right, y from 0 to top. Negative where there is no area.
+  double left[kWidth], right[kWidth], top[kWidth];
 };
 
-/// Sixteen balls around the same origin. A radius of 0 meets nothing.
+/// Corners of sixteen triangles, counter-clockwise from outside; three equal ones are none.
+struct alignas(64) TriangleCorners {
+  double x[3][kWidth], y[3][kWidth], z[3][kWidth];
+};
+
+void make_patch(const TriangleCorners& corners, SurfacePatch& patch) noexcept;
+
+void make_patch(const SurfaceBlock& block, SurfacePatch& patch) noexcept;
+
+/// Sixteen balls relative to an origin near them all. A radius of 0 meets nothing.
 struct alignas(64) ProbeBalls {
   double x[kWidth], y[kWidth], z[kWidth], r[kWidth];
+  double origin[3];  ///< in the surface's frame
+  double reach = 0;  ///< all of them lie within this of the origin
 };
 
 /// What the surface does to each of sixteen balls; all factors included.
@@ -44,10 +47,10 @@ struct ProbeSums {
   std::uint32_t pairs = 0;       ///< balls and triangles that were put together
 };
 
-/// Adds the patch's share to the sums. The part of a ball of volume v inside a closed surface has
-/// the volume [centre inside] · v + cones, the gradient −pull by the centre, and the first moment
-/// −shift about the centre, once all triangles that reach the ball are added. Exact but for
-/// rounding, some 1e-15 of r³. Same bits on every instruction set.
+/// Adds the patch's share to the sums. Once all triangles that reach a ball are added, the part of
+/// it inside the closed surface has the volume [centre inside] · v + cones, the gradient −pull by
+/// the centre, and the first moment −shift about the centre. Exact but for rounding, some 1e-15 of
+/// r³. Same bits on every instruction set.
 ///
 /// By rays from the centre: each triangle takes away, or adds where it is seen from outside, the
 /// part of its cone between itself and the sphere, (r³ Ω − h A) / 3 over the part within the ball.

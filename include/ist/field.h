@@ -1,0 +1,138 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <variant>
+
+#include <ist/query.h>
+
+// Fields: solids that a sphere tree meets without having a tree themselves: grounds, walls,
+// terrains, primitives, and whatever says how far its surface is. Plain views: nothing is copied or
+// allocated, memory they point to must outlive them. Everywhere a distance is positive inside the
+// solid and negative outside, as Solid's is. Lengths are [u] in the field's own frame.
+
+namespace ist {
+
+/// The solid normal · x ≤ offset. Exact.
+struct HalfSpaceField {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit length within 1e-3, outward
+  double offset = 0;                                  ///< [u]
+};
+
+/// A box around the origin. Exact at edges and corners too, and for balls thicker than it.
+struct BoxField {
+  Eigen::Vector3d half_extents = Eigen::Vector3d::Ones();  ///< [u] > 0
+};
+
+/// A ball around the origin. Exact.
+struct BallField {
+  double radius = 1;  ///< [u] > 0
+};
+
+/// All points within `radius` of the segment from −half_height to +half_height on the z axis.
+///
+/// A ball meets it as if its surface went on flat from the closest point: relative error about the
+/// ball's radius over the capsule's.
+struct CapsuleField {
+  double radius = 1;       ///< [u] > 0
+  double half_height = 1;  ///< [u] ≥ 0, of the segment
+};
+
+/// A cylinder about the z axis. Its mantle is taken for flat as the capsule's is; a ball at the rim
+/// has the share of the mantle times that of the ends.
+struct CylinderField {
+  double radius = 1;       ///< [u] > 0
+  double half_height = 1;  ///< [u] > 0
+};
+
+/// Terrain: the solid under a grid of heights along z, two triangles a cell, cut from (i, j) to
+/// (i + 1, j + 1). Exact. Beyond its border it goes on level.
+struct HeightField {
+  const float* heights = nullptr;  ///< [u] [rows · columns], columns (x) run fastest
+  std::uint32_t columns = 0;       ///< ≥ 2, along x
+  std::uint32_t rows = 0;          ///< ≥ 2, along y
+  double spacing[2] = {1, 1};      ///< [u] > 0, along x and y; heights[0] stands at the origin
+  /// [u] No height is lower or higher: far objects are then told at once. Defaults are always true.
+  double lowest = -1e300, highest = 1e300;
+};
+
+/// Distances at the points of a grid, interpolated linearly in each cell: its gradient jumps from
+/// cell to cell. Outside of the grid is outside of the solid.
+struct DistanceGridField {
+  const float* distances = nullptr;  ///< [u] [size[0] · size[1] · size[2]], x runs fastest
+  std::uint32_t size[3] = {};        ///< points along x, y, z, each ≥ 2
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< [u] of the first point
+  double spacing = 1;                                ///< [u] > 0
+  double error = 0;  ///< [u] the interpolated distance is off by at most this
+};
+
+/// What a look at a field tells.
+struct FieldSample {
+  double distance = 0;  ///< [u] to the surface, positive inside; at most the true one in magnitude
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< of the distance
+};
+
+/// A field that the caller answers for. Called once for every node and ball that is looked at, on
+/// the thread of the query. A sample that is not finite gives QueryStatus::invalid_input; the answer
+/// is no better than the samples.
+struct FunctionField {
+  FieldSample (*look)(const void* context, const Eigen::Vector3d& x) noexcept = nullptr;
+  const void* context = nullptr;  ///< handed to `look`
+  double error = 0;               ///< [u] distances are off by at most this
+};
+
+/// The surface in an asset (TreeView::has_field), without its spheres. Exact within
+/// TreeView::field_error.
+struct MeshField {
+  TreeView tree;
+};
+
+using Field = std::variant<HalfSpaceField, BoxField, BallField, CapsuleField, CylinderField,
+                           HeightField, DistanceGridField, FunctionField, MeshField>;
+
+/// A field at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
+struct PlacedField {
+  Field field;
+  Pose pose;
+  double scale = 1;  ///< > 0
+};
+
+/// Overlap of a field, held still, and a placed tree: Σ over B's spheres of the part that lies
+/// inside the field. The gradients are those of that sum. Bounds hold the field's error.
+///
+/// A limit of the settings stops it as it stops a pair of trees; pair_budget has no effect.
+/// invalid_input also where the field's numbers are out of range.
+///
+/// No allocation, lock or exception. Fields and trees may be shared by threads; the workspace may
+/// not.
+Penetration penetration(const PlacedField& a, const PlacedTree& b,
+                        const PenetrationSettings& settings, Workspace& workspace) noexcept;
+
+/// Distance between the field and B's inner spheres, and a certified interval for the solids.
+///
+/// Certified as far as the field's distances are: see each field.
+Separation separation(const PlacedField& a, const PlacedTree& b, const SeparationSettings& settings,
+                      Workspace& workspace) noexcept;
+
+/// Both in one call.
+PenetrationAndSeparation query(const PlacedField& a, const PlacedTree& b,
+                               const QuerySettings& settings, Workspace& workspace) noexcept;
+
+/// The contact condensed into at most patches.size() patches, divided along B's tree.
+ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
+                               const ContactSettings& settings, Workspace& workspace,
+                               std::span<ContactPatch> patches) noexcept;
+
+/// A field and a tree of a batch.
+struct PlacedFieldPair {
+  PlacedField a;
+  PlacedTree b;
+};
+
+/// answers[i] = penetration(pairs[i]), as the batch of trees does it.
+void penetration_batch(std::span<const PlacedFieldPair> pairs, const PenetrationSettings& settings,
+                       std::span<Workspace> workspaces, std::span<Penetration> answers,
+                       const ParallelFor& parallel = {}) noexcept;
+
+}  // namespace ist

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <ist/query.h>
+
+#include "query/base/relative_pose.h"
+#include "query/kernel/overlap.h"
+
+namespace ist {
+
+/// An overlap in world units, its volume held within the bounds on it, A's unit frame.
+Penetration world_answer(const Overlap& overlap, double lowest, double highest,
+                         const RelativePose& pose) noexcept;
+
+}  // namespace ist

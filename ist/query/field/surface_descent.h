@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstdint>
+
+#include <ist/query.h>
+
+#include "query/asset/sphere_tree.h"
+#include "query/asset/surface_tree.h"
+#include "query/base/budget.h"
+#include "query/base/precision.h"
+#include "query/base/relative_pose.h"
+#include "query/contact/contact_bins.h"
+#include "query/descent/workspace.h"
+#include "query/field/probe_sum.h"
+#include "query/kernel/node_kernel.h"
+#include "query/kernel/subtree_kernel.h"
+
+namespace ist {
+
+/// The volume that the spheres of B have inside the surface of A, each sphere's part being exact:
+/// V = Σ_j |b_j ∩ A| (docs/design.md 7).
+///
+/// Level by level, pairs of a node of B and a node of A's surface; those of one node of B stand
+/// together. A node of B that is left without a partner is all inside or all outside.
+class SurfaceDescent {
+ public:
+  /// All arguments must outlive the descent; `pose`: of A, which has the surface, and B, which
+  /// probes. With `bins`, which are B's, what is summed is sorted into them too.
+  SurfaceDescent(const SurfaceTree& surface, const SphereTree& probes, const RelativePose& pose,
+                 const DescentLimits& limits, Workspace::Impl& scratch,
+                 ContactBins* bins = nullptr) noexcept;
+
+  void run() noexcept;
+
+  /// The answer in world units.
+  Penetration penetration() const noexcept;
+
+  /// A's unit frame, without what was not opened.
+  Overlap overlap() const noexcept;
+
+ private:
+  bool open_surface() noexcept;
+  bool open_probes() noexcept;
+  void sum_leaves() noexcept;
+
+  /// The sums of a leaf block of B with blocks of the surface, pairs [from, to) of the list.
+  ProbeTotal sum_block(std::uint32_t block, std::size_t from, std::size_t to) noexcept;
+
+  /// A node of B that meets no surface.
+  void settle(int level, std::uint32_t block) noexcept;
+  void flush() noexcept;
+
+  /// First pair of the next node of B.
+  std::size_t group_end(std::size_t from) const noexcept;
+
+  /// Volume of all nodes of B in the current list, A's unit frame.
+  double waiting() const noexcept;
+
+  /// Leaves what is in the list from a pair on unopened.
+  void leave(std::size_t from) noexcept;
+  void drop_small() noexcept;
+
+  const SurfaceTree& surface_;
+  const SphereTree& probes_;
+  const RelativePose& pose_;
+  const Similarity& map_;
+  TreeHeader ball_header_;
+  SphereTree balls_;  ///< of the surface; its "spheres" are blocks of triangles
+  const Precision precision_;
+  const DescentLimits limits_;
+  const double min_radius_;  ///< A's unit frame
+  Workspace::Impl& scratch_;
+  ContactBins* const bins_;
+  Budget budget_;
+  int surface_level_, probe_level_;
+  ProbeTotal total_;
+  SubtreeSums held_;  ///< nodes of B that are inside
+  static constexpr std::size_t kSettled = 64;
+  std::uint32_t settled_[kSettled];
+  std::size_t settled_count_ = 0;
+  int settled_level_ = 0;
+  double unopened_ = 0;  ///< volume of the nodes that were not opened
+  std::uint32_t pairs_ = 0;
+  bool stopped_ = false;
+};
+
+}  // namespace ist

@@ -1,0 +1,79 @@
+#include "query/probe/membership.h"
+
+#include <bit>
+
+namespace ist {
+namespace {
+
+struct Vec {
+  double x, y, z;
+};
+
+Vec operator-(const Vec& a, const Vec& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+double dot(const Vec& a, const Vec& b) { return (a.x * b.x + a.y * b.y) + a.z * b.z; }
+Vec cross(const Vec& a, const Vec& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+bool before(const Vec& a, const Vec& b) {
+  if (a.x != b.x) return a.x < b.x;
+  return a.y != b.y ? a.y < b.y : a.z < b.z;
+}
+
+/// On which side of the line along `d` through the origin the edge from a to b passes. Two triangles
+/// that share an edge see it from opposite sides whatever the rounding: the products change sign
+/// exactly, and of the edge that meets the line the corners decide.
+bool passes_left(const Vec& d, const Vec& a, const Vec& b) {
+  const double side = dot(d, cross(a, b));
+  return side != 0 ? side > 0 : before(a, b);
+}
+
+/// Whether the way from the origin to `d` goes through a triangle.
+bool steps_through(const Vec& d, const Vec& a, const Vec& b, const Vec& c) {
+  const bool left = passes_left(d, a, b);
+  if (passes_left(d, b, c) != left || passes_left(d, c, a) != left) return false;
+  const Vec n = cross(b - a, c - a);
+  return (dot(n, a) > 0) != (dot(n, a - d) > 0);
+}
+
+}  // namespace
+
+bool inside_surface(const SurfaceTree& surface, const double (&point)[3]) noexcept {
+  const FieldHeader& field = *surface.header;
+  double cell[3];  // the cell's number along each axis
+  std::uint32_t brick = 0, bit = 0;
+  for (int k = 2; k >= 0; --k) {
+    const double at = (point[k] - field.low[k]) / field.cell;
+    if (!(at >= 0 && at < static_cast<double>(kBrickWidth * field.bricks[k]))) return false;
+    const auto number = static_cast<std::uint32_t>(at);
+    cell[k] = static_cast<double>(number);
+    brick = brick * field.bricks[k] + number / kBrickWidth;
+    bit = bit * kBrickWidth + number % kBrickWidth;
+  }
+  const std::uint32_t index = surface.brick_index[brick];
+  if (index >= kInsideBrick) return index == kInsideBrick;
+  const CellBrick& cells = surface.bricks[index];
+  bool inside = (cells.inside >> bit & 1) != 0;
+  if ((cells.surface >> bit & 1) == 0) return inside;
+
+  const Vec x{point[0], point[1], point[2]};
+  const Vec reference{field.low[0] + (cell[0] + kCellReference[0]) * field.cell,
+                      field.low[1] + (cell[1] + kCellReference[1]) * field.cell,
+                      field.low[2] + (cell[2] + kCellReference[2]) * field.cell};
+  const Vec way = reference - x;
+  const std::uint64_t below = cells.surface & ((std::uint64_t{1} << bit) - 1);
+  const std::uint32_t number = cells.first + static_cast<std::uint32_t>(std::popcount(below));
+  for (std::uint32_t i = surface.cell_first[number]; i < surface.cell_first[number + 1]; ++i) {
+    const std::uint32_t triangle = surface.cell_triangles[i];
+    const SurfaceBlock& block = surface.blocks[triangle / kWidth];
+    const auto corner = [&](int k) -> Vec {
+      const std::uint32_t v = block.corner[k][triangle % kWidth];
+      return Vec{static_cast<double>(block.x[v]), static_cast<double>(block.y[v]),
+                 static_cast<double>(block.z[v])} -
+             x;
+    };
+    if (steps_through(way, corner(0), corner(1), corner(2))) inside = !inside;
+  }
+  return inside;
+}
+
+}  // namespace ist

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "query/asset/surface_tree.h"
+
+namespace ist {
+
+/// Whether a point of the field's unit frame is inside its surface: from the reference point of its
+/// cell, counting the steps through the cell's triangles. A point on the surface may be either.
+bool inside_surface(const SurfaceTree& surface, const double (&point)[3]) noexcept;
+
+}  // namespace ist
