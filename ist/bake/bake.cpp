@@ -13,6 +13,7 @@
 #include "bake/calibrate/calibration.h"
 #include "bake/cluster/tree_builder.h"
 #include "bake/cover/cover.h"
+#include "bake/field/field.h"
 #include "packing/base/packing_settings.h"
 #include "stage/stage.h"
 #include "stage/thread_arena.h"
@@ -41,6 +42,7 @@ AssetHeader describe_bake(const ClosedMesh& mesh, const MeshSolid& solid,
   header.asked_grid_resolution = settings.grids.resolution;
   header.asked_grid_refinements = settings.grids.refinements;
   header.asked_grid_rounds = settings.grids.rounds_per_level;
+  header.asked_field_error = settings.field.wanted ? settings.field.error : 0;
   header.stop_reason = static_cast<std::uint32_t>(packing.stop);
   header.kept_ratio_worst = packing.kept_ratio_worst;
   header.kept_ratio_median = packing.kept_ratio_median;
@@ -57,20 +59,21 @@ std::vector<std::size_t> detail_counts(std::size_t spheres) {
   return counts;
 }
 
-/// Work on trees, done while a backend leaves the caller's threads idle, or when they are free.
-class TreeWork {
+/// Work on trees and the field, done while a backend leaves the caller's threads idle, or when they
+/// are free.
+class HostWork {
  public:
-  explicit TreeWork(bool threads_are_idle) : at_once_(threads_are_idle) {}
+  explicit HostWork(bool threads_are_idle) : at_once_(threads_are_idle) {}
   /// Waits, whichever way the scope is left: a group that is left alone would be cancelled, and
   /// with it, unseen, the loops inside its tasks.
-  ~TreeWork() {
+  ~HostWork() {
     try {
       group_.wait();
     } catch (...) {  // the scope is left by an exception already
     }
   }
-  TreeWork(const TreeWork&) = delete;
-  TreeWork& operator=(const TreeWork&) = delete;
+  HostWork(const HostWork&) = delete;
+  HostWork& operator=(const HostWork&) = delete;
 
   void add(std::function<void()> work) {
     if (at_once_)
@@ -91,21 +94,24 @@ class TreeWork {
 };
 
 /// Everything of the asset but its bytes.
-AssetArrays baked(const ClosedMesh& mesh, const MeshSolid& solid, SolidBackend& backend,
-                  const PackingSettings& settings, const ProgressCallback& progress) {
+AssetArrays baked(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
+                  SolidBackend& backend, const PackingSettings& settings,
+                  const ProgressCallback& progress) {
+  AssetArrays arrays;
+  std::vector<std::uint32_t> inner_order;
+  HostWork host(backend.leaves_threads_idle());
+  host.add([&] { arrays.field = field.arrays(); });
+
   const SpherePacking packing = backend.pack(settings, progress);
   const std::size_t count = packing.spheres.size();
   if (count == 0)
     throw Error(mesh.name +
                 ": not one sphere fits within the limits; lower the smallest radius or the "
                 "coverage, or allow more time");
-  AssetArrays arrays;
   arrays.header = describe_bake(mesh, solid, settings, packing);
   arrays.inner_spheres = packing.spheres;
 
-  std::vector<std::uint32_t> inner_order;
-  TreeWork trees(backend.leaves_threads_idle());
-  trees.add([&] { inner_order = sphere_order(arrays.inner_spheres); });
+  host.add([&] { inner_order = sphere_order(arrays.inner_spheres); });
 
   std::vector<Calibration> details =
       calibrate_prefixes(solid, backend, packing.spheres, detail_counts(count), progress);
@@ -113,8 +119,8 @@ AssetArrays baked(const ClosedMesh& mesh, const MeshSolid& solid, SolidBackend& 
   arrays.header.protrusion = details.front().protrusion;
   for (std::size_t i = 1; i < details.size(); ++i)
     arrays.details.push_back({std::move(details[i].matched), details[i].protrusion, {}});
-  trees.add([&] { arrays.matched_tree = build_tree(arrays.matched_spheres, {}); });
-  trees.add([&] {
+  host.add([&] { arrays.matched_tree = build_tree(arrays.matched_spheres, {}); });
+  host.add([&] {
     for (DetailArrays& detail : arrays.details)
       detail.matched_tree = build_tree(detail.matched_spheres, {});
   });
@@ -123,7 +129,7 @@ AssetArrays baked(const ClosedMesh& mesh, const MeshSolid& solid, SolidBackend& 
 
   Stage stage("tree", progress);
   stage.step(count, 0);
-  trees.finish();
+  host.finish();
   arrays.inner_tree =
       tree_from_order(arrays.inner_spheres, arrays.cover_radii, std::move(inner_order));
   stage.step(count, 1);
@@ -132,9 +138,19 @@ AssetArrays baked(const ClosedMesh& mesh, const MeshSolid& solid, SolidBackend& 
 
 }  // namespace
 
-Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidBackend& backend,
-                 const PackingSettings& settings, const ProgressCallback& progress) {
-  return Asset(asset_bytes(baked(mesh, solid, backend, settings, progress)), mesh.name);
+std::shared_ptr<const FieldArrays> SolidField::arrays() {
+  oneapi::tbb::collaborative_call_once(made_, [this] {
+    if (!settings_.wanted) return;
+    if (auto built = build_field(solid_, settings_.error / solid_.frame().scale()))
+      arrays_ = std::make_shared<const FieldArrays>(*std::move(built));
+  });
+  return arrays_;
+}
+
+Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
+                 SolidBackend& backend, const PackingSettings& settings,
+                 const ProgressCallback& progress) {
+  return Asset(asset_bytes(baked(mesh, solid, field, backend, settings, progress)), mesh.name);
 }
 
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
@@ -143,7 +159,8 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   return thread_arena(settings.threads).execute([&] {
     const MeshSolid solid(mesh);
     const auto backend = make_backend(solid, {settings.device, settings.gpu});
-    return bake_solid(mesh, solid, *backend, settings, progress);
+    SolidField field(solid, settings.field);
+    return bake_solid(mesh, solid, field, *backend, settings, progress);
   });
 }
 

@@ -148,6 +148,8 @@ double MeshSolid::volume_error() const {
 const UnitFrame& MeshSolid::frame() const { return impl_->frame; }
 double MeshSolid::unit_volume() const { return impl_->with_volume().value; }
 double MeshSolid::unit_volume_error() const { return impl_->with_volume().error; }
+bool MeshSolid::meets_itself() const { return impl_->meets_itself; }
+bool MeshSolid::may_overlap() const { return impl_->may_overlap; }
 std::uint64_t MeshSolid::hash() const { return impl_->hash; }
 const MeshView& MeshSolid::view() const { return impl_->with_hierarchy(); }
 const MeshView& MeshSolid::arrays() const { return impl_->arrays; }

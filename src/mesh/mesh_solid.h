@@ -36,8 +36,11 @@ class MeshSolid final : public Solid {
   const UnitFrame& frame() const;
   double unit_volume() const;        ///< unit frame³
   double unit_volume_error() const;  ///< unit frame³
-  std::uint64_t hash() const;        ///< XXH3-64 of vertices and triangles
-  const MeshView& view() const;      ///< plain arrays for host code, the hierarchy included
+  /// Triangles of the mesh intersect, or may: they were not looked for.
+  bool meets_itself() const;
+  bool may_overlap() const;      ///< it winds around some point twice, or may: several shells
+  std::uint64_t hash() const;    ///< XXH3-64 of vertices and triangles
+  const MeshView& view() const;  ///< plain arrays for host code, the hierarchy included
   /// The vertices and triangles of view() alone, without the hierarchy: nodes and blocks are null.
   const MeshView& arrays() const;
 

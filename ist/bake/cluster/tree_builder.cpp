@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "bake/cluster/ball_blocks.h"
 #include "bake/cluster/bounding_ball.h"
 #include "bake/cluster/overlap_bound.h"
 #include "bake/cluster/tree_order.h"
@@ -18,57 +19,6 @@ namespace {
 constexpr double kBallVolume = 4 * std::numbers::pi / 3;
 
 Ball to_ball(const Sphere& s) { return {s.x, s.y, s.z, s.r}; }
-
-/// An origin for coordinates in [low, high] such that x − origin is exact in float for every float
-/// x between them: within a factor of two by Sterbenz' lemma; otherwise zero, when the coordinates
-/// are no larger than twice their spread, so that zero is as near as any.
-double exact_origin(float low, float high) {
-  const bool same_sign = (low > 0 && high > 0) || (low < 0 && high < 0);
-  const float smaller = std::fmin(std::fabs(low), std::fabs(high));
-  const float larger = std::fmax(std::fabs(low), std::fabs(high));
-  if (!same_sign || larger > 2 * smaller) return 0;
-  return static_cast<double>(low + (high - low) / 2);
-}
-
-/// Packs float balls, sixteen to a block.
-void fill_blocks(std::span<const Sphere> balls, TreeLevelArrays& level) {
-  const std::size_t count = (balls.size() + kWidth - 1) / kWidth;
-  level.blocks.resize(count);
-  level.origins.resize(count);
-  for (std::size_t b = 0; b < count; ++b) {
-    const auto used =
-        balls.subspan(b * kWidth, std::min<std::size_t>(kWidth, balls.size() - b * kWidth));
-    Sphere low = used.front();
-    Sphere high = used.front();
-    for (const Sphere& s : used) {
-      low = {std::fmin(low.x, s.x), std::fmin(low.y, s.y), std::fmin(low.z, s.z), 0};
-      high = {std::fmax(high.x, s.x), std::fmax(high.y, s.y), std::fmax(high.z, s.z), 0};
-    }
-    const Origin origin = {exact_origin(low.x, high.x), exact_origin(low.y, high.y),
-                           exact_origin(low.z, high.z)};
-    BallBlock& block = level.blocks[b];
-    block = {};
-    std::fill(std::begin(block.r), std::end(block.r), kEmptyRadius);
-    for (std::size_t l = 0; l < used.size(); ++l) {
-      block.x[l] = static_cast<float>(used[l].x - origin.x);
-      block.y[l] = static_cast<float>(used[l].y - origin.y);
-      block.z[l] = static_cast<float>(used[l].z - origin.z);
-      block.r[l] = used[l].r;
-    }
-    level.origins[b] = origin;
-  }
-}
-
-/// A float ball around spheres; the centre is rounded first, the radius about it rounded up.
-Sphere ball_around(std::span<const Ball> spheres) {
-  const Ball ball = bounding_ball(spheres);
-  Sphere out = {static_cast<float>(ball.x), static_cast<float>(ball.y), static_cast<float>(ball.z),
-                0};
-  double radius = 0;
-  for (const Ball& s : spheres) radius = std::fmax(radius, reach(out.x, out.y, out.z, s));
-  out.r = padded_up(radius);
-  return out;
-}
 
 float cover_about(const Sphere& centre, std::span<const Ball> spheres,
                   std::span<const float> covers) {
@@ -129,7 +79,8 @@ TreeArrays tree_from_order(std::span<const Sphere> spheres, std::span<const floa
   }
 
   TreeArrays tree;
-  fill_blocks(lanes, tree.levels.emplace_back());
+  TreeLevelArrays& leaves = tree.levels.emplace_back();
+  fill_blocks(lanes, leaves.blocks, leaves.origins);
   const std::size_t padded = tree.levels.back().blocks.size() * kWidth;
   order.resize(padded, 0);
   tree.sphere_index = std::move(order);
@@ -143,7 +94,7 @@ TreeArrays tree_from_order(std::span<const Sphere> spheres, std::span<const floa
   std::size_t span = kWidth;
   for (std::size_t k = 0; k < levels.size(); ++k, span *= kWidth) {
     TreeLevelArrays& level = tree.levels.emplace_back();
-    fill_blocks(levels[k], level);
+    fill_blocks(levels[k], level.blocks, level.origins);
     level.nodes.resize(level.blocks.size());
     if (!covers.empty())
       for (NodeBlock& nodes : level.nodes)

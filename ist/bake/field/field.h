@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "asset/asset_writer.h"
+#include "mesh/mesh_solid.h"
+
+namespace ist {
+
+/// Triangles of a field, unless another error is asked for.
+inline constexpr std::uint32_t kFieldTriangles = 30'000;
+
+/// The surface of a mesh's solid for queries: the mesh's own triangles where they are few, else
+/// fewer near them (asset_layout.h draws it). Its error is proven.
+///
+/// `max_error`: unit frame, > 0; of a mesh of many triangles as few stay as that allows. 0:
+/// kFieldTriangles at most.
+/// Nothing for a mesh that meets itself. Throws Error where floats cannot be as exact as
+/// `max_error`. Same bytes for any number of threads and on any machine.
+std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error);
+
+}  // namespace ist

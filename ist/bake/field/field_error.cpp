@@ -1,0 +1,145 @@
+#include "bake/field/field_error.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include "bake/field/swept_error.h"
+#include "mesh/exact_closest_point.h"
+#include "mesh/triangle_frame.h"
+
+namespace ist {
+namespace {
+
+constexpr double kRounding = 1e-12;  // of a distance in the unit frame, with room
+constexpr double kSlack = 1.25;      // of the bound that is tried over what is seen at samples
+
+using Point = std::array<double, 3>;
+
+double between(const Point& a, const Point& b) {
+  const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  return std::sqrt(dot3(d, d));
+}
+
+Point half_way(const Point& a, const Point& b) {
+  return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
+}
+
+template <class Value>
+double largest(std::size_t count, const Value& value) {
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, count, 64), 0.0,
+      [&](const tbb::blocked_range<std::size_t>& range, double most) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) most = std::max(most, value(i));
+        return most;
+      },
+      [](double a, double b) { return std::max(a, b); });
+}
+
+/// A part of a field's triangle.
+struct Part {
+  Point corner[3];
+
+  Point centre() const {
+    Point c;
+    for (std::size_t k = 0; k < 3; ++k) c[k] = (corner[0][k] + corner[1][k] + corner[2][k]) / 3;
+    return c;
+  }
+  double radius(const Point& centre) const {
+    return std::max(
+        {between(centre, corner[0]), between(centre, corner[1]), between(centre, corner[2])});
+  }
+};
+
+/// The field's surface within a bound of the mesh's.
+class FieldNearMesh {
+ public:
+  explicit FieldNearMesh(const MeshView& mesh) : mesh_(mesh) {}
+
+  double distance(const Point& p) const {
+    return exact_closest_point(mesh_, {p[0], p[1], p[2]}, kFar).distance;
+  }
+
+  /// A bound on the distance of all points of the part, at most `target` where that can be shown.
+  /// `reach`: no point of the mesh nearest to the centre is further than this.
+  double bound(const Part& part, double target, double reach) const {
+    const Point c = part.centre();
+    const ClosestPoint closest =
+        exact_closest_point(mesh_, {c[0], c[1], c[2]}, reach * (1 + 1e-9) + kRounding);
+    const double radius = part.radius(c);
+    if (closest.distance + radius <= target) return closest.distance + radius;
+    if (closest.triangle != kNoTriangle) {
+      const double whole = from_triangle(part, closest.triangle);
+      if (whole <= target) return whole;
+    }
+    if (radius <= 0.1 * target) return closest.distance + radius;
+    target = std::max(target, kSlack * closest.distance);
+    // Halved across the longest side.
+    int from = 0;
+    for (int k = 1; k < 3; ++k)
+      if (side(part, k) > side(part, from)) from = k;
+    const Point middle = half_way(part.corner[from], part.corner[(from + 1) % 3]);
+    Part first = part, second = part;
+    first.corner[(from + 1) % 3] = middle;
+    second.corner[from] = middle;
+    double most = 0;
+    for (const Part& half : {first, second})
+      most = std::max(most, bound(half, target, closest.distance + between(c, half.centre())));
+    return most;
+  }
+
+ private:
+  static constexpr double kFar = 1e3;
+
+  static double side(const Part& part, int from) {
+    return between(part.corner[from], part.corner[(from + 1) % 3]);
+  }
+
+  /// The distance to a triangle is convex: it is largest at a corner.
+  double from_triangle(const Part& part, std::uint32_t triangle) const {
+    const std::uint32_t* t = mesh_.triangles + 3 * std::size_t{triangle};
+    const auto vertex = [&](int i) { return mesh_.vertices + 3 * std::size_t{t[i]}; };
+    const TriangleFrame<double> frame = make_triangle_frame(vertex(0), vertex(1), vertex(2));
+    double most2 = 0;
+    for (const Point& p : part.corner)
+      most2 = std::max(most2, closest_in_frame(frame, p.data()).distance2);
+    return std::sqrt(most2);
+  }
+
+  const MeshView& mesh_;
+};
+
+}  // namespace
+
+double proven_error(const MeshView& mesh, const FieldMesh& field, const FieldHierarchy& hierarchy,
+                    const std::vector<std::uint32_t>& vertex_of) {
+  const FieldNearMesh near_mesh(mesh);
+  const SweptError swept(mesh, field, hierarchy, vertex_of);
+  std::vector<Part> parts(field.triangles.size());
+  std::vector<double> middle(parts.size());
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t t) {
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        parts[t].corner[i][k] = field.vertices[field.triangles[t][i]][k];
+    middle[t] = near_mesh.distance(parts[t].centre());
+  });
+  const double sampled = std::max(largest(parts.size(), [&](std::size_t t) { return middle[t]; }),
+                                  largest(mesh.vertex_count, [&](std::size_t v) {
+                                    return swept.at_vertex(static_cast<std::uint32_t>(v));
+                                  }));
+  const double target = kSlack * sampled + kRounding;
+  const double of_field = largest(
+      parts.size(), [&](std::size_t t) { return near_mesh.bound(parts[t], target, middle[t]); });
+  const double of_mesh = largest(mesh.triangle_count, [&](std::size_t t) {
+    return swept.bound(static_cast<std::uint32_t>(t), target);
+  });
+  return std::max(of_field, of_mesh) + kRounding;
+}
+
+}  // namespace ist

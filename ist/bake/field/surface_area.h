@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+
+#include "mesh/mesh_view.h"
+#include "mesh/triangle_frame.h"
+
+namespace ist {
+
+/// Of all triangles, unit frame². Of `mesh` the arrays suffice.
+inline double surface_area(const MeshView& mesh) {
+  double area = 0;
+  for (std::size_t t = 0; t < mesh.triangle_count; ++t) {
+    const auto corner = [&](std::size_t i) {
+      return mesh.vertices + 3 * std::size_t{mesh.triangles[3 * t + i]};
+    };
+    double u[3], v[3], n[3];
+    for (int k = 0; k < 3; ++k) {
+      u[k] = corner(1)[k] - corner(0)[k];
+      v[k] = corner(2)[k] - corner(0)[k];
+    }
+    cross3(u, v, n);
+    area += std::sqrt(dot3(n, n)) / 2;
+  }
+  return area;
+}
+
+}  // namespace ist

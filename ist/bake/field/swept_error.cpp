@@ -1,0 +1,171 @@
+#include "bake/field/swept_error.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mesh/exact_closest_point.h"
+
+namespace ist {
+namespace {
+
+constexpr double kSmallestPart = 0.2;  // of the target: smaller prisms are taken for their centres
+constexpr double kSlack = 1.25;        // of a target over the distance of a centre
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+double between(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  return std::sqrt(dot3(d, d));
+}
+
+std::array<double, 3> half_way(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
+}
+
+}  // namespace
+
+SweptError::Point SweptError::Prism::centre() const {
+  Point c = {};
+  for (const Point& p : corner)
+    for (std::size_t k = 0; k < 3; ++k) c[k] += p[k] / 6;
+  return c;
+}
+
+double SweptError::Prism::radius(const Point& centre) const {
+  double most = 0;
+  for (const Point& p : corner) most = std::max(most, between(centre, p));
+  return most;
+}
+
+std::array<SweptError::Prism, 2> SweptError::Prism::halves() const {
+  double way = 0, longest = 0;
+  std::size_t from = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    way = std::max(way, between(corner[k], corner[k + 3]));
+    const std::size_t next = (k + 1) % 3;
+    const double side =
+        std::max(between(corner[k], corner[next]), between(corner[k + 3], corner[next + 3]));
+    if (side > longest) {
+      longest = side;
+      from = k;
+    }
+  }
+  std::array<Prism, 2> out = {*this, *this};
+  if (way > longest) {
+    for (std::size_t k = 0; k < 3; ++k)
+      out[0].corner[k + 3] = out[1].corner[k] = half_way(corner[k], corner[k + 3]);
+    return out;
+  }
+  const std::size_t to = (from + 1) % 3;
+  for (const std::size_t at : {std::size_t{0}, std::size_t{3}})
+    out[0].corner[to + at] = out[1].corner[from + at] =
+        half_way(corner[from + at], corner[to + at]);
+  return out;
+}
+
+SweptError::SweptError(const MeshView& mesh, const FieldMesh& field,
+                       const FieldHierarchy& hierarchy, const std::vector<std::uint32_t>& vertex_of)
+    : mesh_(mesh),
+      field_(field),
+      hierarchy_(hierarchy),
+      vertex_of_(vertex_of),
+      frames_(field.triangles.size()),
+      first_(field.vertices.size() + 1),
+      around_(3 * field.triangles.size()) {
+  const MeshView& view = hierarchy.view();
+  tbb::parallel_for(std::size_t{0}, frames_.size(), [&](std::size_t t) {
+    const auto vertex = [&](std::size_t i) {
+      return view.vertices + 3 * std::size_t{field.triangles[t][i]};
+    };
+    frames_[t] = make_triangle_frame(vertex(0), vertex(1), vertex(2));
+  });
+  for (const FieldMesh::Triangle& t : field.triangles)
+    for (const std::uint32_t v : t) ++first_[v + 1];
+  for (std::size_t v = 1; v < first_.size(); ++v) first_[v] += first_[v - 1];
+  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+  for (std::uint32_t t = 0; t < field.triangles.size(); ++t)
+    for (const std::uint32_t v : field.triangles[t]) around_[next[v]++] = t;
+}
+
+std::span<const std::uint32_t> SweptError::star(std::uint32_t field_vertex) const {
+  return {around_.data() + first_[field_vertex], around_.data() + first_[field_vertex + 1]};
+}
+
+double SweptError::at_vertex(std::uint32_t vertex) const {
+  const double* x = mesh_.vertices + 3 * std::size_t{vertex};
+  double least2 = kInfinite;
+  for (const std::uint32_t t : star(vertex_of_[vertex]))
+    least2 = std::min(least2, distance2(t, {x[0], x[1], x[2]}));
+  return least2 < kInfinite ? std::sqrt(least2) : 0;
+}
+
+double SweptError::farthest2(std::uint32_t field_triangle, const Prism& prism,
+                             double limit2) const {
+  double most2 = 0;
+  for (const Point& p : prism.corner) {
+    most2 = std::max(most2, distance2(field_triangle, p));
+    if (most2 > limit2) break;
+  }
+  return most2;
+}
+
+double SweptError::bound(const Prism& prism, std::span<const std::uint32_t> candidates,
+                         double target) const {
+  const Point c = prism.centre();
+  double least2 = kInfinite;
+  std::uint32_t nearest = kNoTriangle;
+  for (const std::uint32_t t : candidates) {
+    const double d2 = distance2(t, c);
+    if (d2 < least2) {
+      least2 = d2;
+      nearest = t;
+    }
+  }
+  const double radius = prism.radius(c);
+  const double target2 = target * target;
+  if (nearest != kNoTriangle) {
+    if (std::sqrt(least2) + radius <= target) return std::sqrt(least2) + radius;
+    double whole2 = farthest2(nearest, prism, target2);
+    for (const std::uint32_t t : candidates) {
+      if (whole2 <= target2) return std::sqrt(whole2);
+      if (t != nearest) whole2 = farthest2(t, prism, target2);
+    }
+    if (whole2 <= target2) return std::sqrt(whole2);
+  }
+  // The field may have another triangle that is nearer.
+  const ClosestPoint closest = exact_closest_point(
+      hierarchy_.view(), {c[0], c[1], c[2]}, nearest != kNoTriangle ? std::sqrt(least2) : 1e3);
+  const double distance = closest.distance;
+  if (distance + radius <= target) return distance + radius;
+  if (closest.triangle != kNoTriangle) {
+    const double whole2 = farthest2(closest.triangle, prism, target2);
+    if (whole2 <= target2) return std::sqrt(whole2);
+  }
+  if (radius <= kSmallestPart * target) return distance + radius;
+  target = std::max(target, kSlack * distance);
+  double most = 0;
+  for (const Prism& half : prism.halves()) most = std::max(most, bound(half, candidates, target));
+  return most;
+}
+
+double SweptError::bound(std::uint32_t triangle, double target) const {
+  Prism prism;
+  std::vector<std::uint32_t> candidates;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::uint32_t v = mesh_.triangles[3 * std::size_t{triangle} + i];
+    const std::uint32_t to = vertex_of_[v];
+    for (std::size_t k = 0; k < 3; ++k) {
+      prism.corner[i][k] = mesh_.vertices[3 * std::size_t{v} + k];
+      prism.corner[i + 3][k] = field_.vertices[to][k];
+    }
+    bool seen = false;
+    for (std::size_t j = 0; j < i; ++j)
+      seen |= vertex_of_[mesh_.triangles[3 * std::size_t{triangle} + j]] == to;
+    if (!seen) candidates.insert(candidates.end(), star(to).begin(), star(to).end());
+  }
+  return bound(prism, candidates, target);
+}
+
+}  // namespace ist
