@@ -13,6 +13,10 @@ namespace {
 // What is not opened may be in or out.
 constexpr double kUnknownShare = 0.5;
 
+// Triangles of a block, or a ball that is to be placed, up to which each is looked at with all of
+// sixteen balls.
+constexpr int kFewTriangles = 4;
+
 /// The balls of a surface as a tree whose spheres are blocks of triangles.
 SphereTree tree_of(const SurfaceTree& surface, const TreeHeader& header) {
   SphereTree tree(header);
@@ -130,31 +134,34 @@ bool SurfaceDescent::open_surface() noexcept {
 bool SurfaceDescent::open_probes() noexcept {
   PairList& now = scratch_.now;
   PairList& next = scratch_.next;
-  const NodeStage stage{&probes_,       &balls_, probe_level_, surface_level_, &pose_.b_from_a,
-                        precision_};
-  std::uint16_t* const masks = scratch_.masks.get();
-  std::size_t wanted = 0;
-  for (std::size_t done = 0; done < now.size;) {
-    const std::size_t n = budget_.grant(std::min(kNodePairs, now.size - done));
-    if (n == 0) return false;
-    reach_masks(stage, now.b.get() + done, now.a.get() + done, n, masks + done);
-    for (std::size_t i = done; i < done + n; ++i)
-      wanted += static_cast<std::size_t>(std::popcount(masks[i]));
-    done += n;
+  if (surface_level_ != kSphereLevel) {
+    if (!reach_children()) return false;
   }
-  if (wanted > scratch_.capacity) return false;
+  std::uint16_t* const masks = scratch_.masks.get();
   next.size = 0;
   for (std::size_t from = 0; from < now.size;) {
     const std::size_t end = group_end(from);
-    const std::uint32_t first = kWidth * now.b[from];
-    std::uint32_t met = 0;
-    for (std::size_t i = from; i < end; ++i) met |= masks[i];
-    const std::uint32_t used = std::min(kWidth, probes_.count(probe_level_ - 1) - first);
-    for (std::uint32_t lane = 0; lane < used; ++lane) {
-      if ((met >> lane & 1) == 0) {
-        settle(probe_level_ - 1, first + lane);
-        continue;
+    if (surface_level_ == kSphereLevel) {
+      const std::size_t granted = budget_.grant(end - from);
+      if (granted < end - from) {
+        budget_.give_back(granted);
+        return false;
       }
+    }
+    const std::uint32_t first = kWidth * now.b[from];
+    const std::uint32_t used =
+        (1u << std::min(kWidth, probes_.count(probe_level_ - 1) - first)) - 1;
+    const std::uint32_t met =
+        surface_level_ == kSphereLevel ? sort_children(from, end, used) : used & any_of(from, end);
+    if (surface_level_ != kSphereLevel)
+      for (std::uint32_t left = used & ~met; left != 0; left &= left - 1)
+        settle(probe_level_ - 1, first + static_cast<std::uint32_t>(std::countr_zero(left)));
+    std::size_t wanted = 0;
+    for (std::size_t i = from; i < end; ++i)
+      wanted += static_cast<std::size_t>(std::popcount(masks[i]));
+    if (wanted > scratch_.capacity - next.size) return false;
+    for (std::uint32_t left = met; left != 0; left &= left - 1) {
+      const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
       for (std::size_t i = from; i < end; ++i) {
         next.a[next.size] = now.a[i];
         next.b[next.size] = first + lane;
@@ -169,11 +176,105 @@ bool SurfaceDescent::open_probes() noexcept {
   return true;
 }
 
+bool SurfaceDescent::reach_children() noexcept {
+  const PairList& now = scratch_.now;
+  const NodeStage stage{&probes_,       &balls_, probe_level_, surface_level_, &pose_.b_from_a,
+                        precision_};
+  for (std::size_t done = 0; done < now.size;) {
+    const std::size_t n = budget_.grant(std::min(kNodePairs, now.size - done));
+    if (n == 0) return false;
+    reach_masks(stage, now.b.get() + done, now.a.get() + done, n, scratch_.masks.get() + done);
+    done += n;
+  }
+  return true;
+}
+
+std::uint32_t SurfaceDescent::any_of(std::size_t from, std::size_t to) const noexcept {
+  std::uint32_t any = 0;
+  for (std::size_t i = from; i < to; ++i) any |= scratch_.masks[i];
+  return any;
+}
+
+std::uint32_t SurfaceDescent::sort_children(std::size_t from, std::size_t to,
+                                            std::uint32_t used) noexcept {
+  const PairList& now = scratch_.now;
+  std::uint16_t* const masks = scratch_.masks.get();
+  const std::uint32_t block = now.b[from];
+  ProbeBalls balls;
+  place_probes(probes_, probe_level_, block, map_, balls);
+  std::uint32_t met = 0;
+  int count = 0;  // of triangles that come near
+  for (std::size_t i = from; i < to; ++i) {
+    const SurfacePatch& patch = scratch_.patches->find(surface_, now.a[i]);
+    const std::uint32_t near = triangles_near(patch, balls.origin, balls.reach);
+    masks[i] = 0;
+    if (near == 0) continue;
+    count += std::popcount(near);
+    masks[i] = static_cast<std::uint16_t>(
+        used & (std::popcount(near) <= kFewTriangles ? balls_near(patch, near, balls)
+                                                     : near_block(balls, now.a[i])));
+    met |= masks[i];
+  }
+  if (count == 0) {
+    settle(probe_level_, block);
+    return 0;
+  }
+  const std::uint32_t alone = used & ~met;
+  if (alone == 0) return met;
+  if (count > kFewTriangles * std::popcount(alone)) {
+    for (std::uint32_t left = alone; left != 0; left &= left - 1)
+      settle(probe_level_ - 1,
+             kWidth * block + static_cast<std::uint32_t>(std::countr_zero(left)));
+  } else {
+    settle_children(balls, block, alone, from, to);
+  }
+  return met;
+}
+
+double SurfaceDescent::clear_radius(int level, std::uint32_t block) const noexcept {
+  // Partners are those of every ancestor's ball, beyond which a node's own ball may reach.
+  const NodeBall ball = probes_.ball(level, block);
+  const Eigen::Vector3d centre(ball.centre[0], ball.centre[1], ball.centre[2]);
+  double radius = ball.r;
+  for (int above = level + 1; above <= probes_.top; ++above) {
+    block /= kWidth;
+    const NodeBall outer = probes_.ball(above, block);
+    const Eigen::Vector3d middle(outer.centre[0], outer.centre[1], outer.centre[2]);
+    radius = std::min(radius, outer.r - (centre - middle).norm());
+  }
+  return std::max(0.0, radius) * map_.scale * (1 - 1e-12);
+}
+
 void SurfaceDescent::settle(int level, std::uint32_t block) noexcept {
   const NodeBall ball = probes_.ball(level, block);
   double centre[3];
   map_.apply(ball.centre, centre);
-  if (!inside_surface(surface_, centre)) return;
+  if (inside_surface(surface_, centre, clear_radius(level, block))) keep(level, block);
+}
+
+void SurfaceDescent::settle_children(const ProbeBalls& balls, std::uint32_t block,
+                                     std::uint32_t children, std::size_t from,
+                                     std::size_t to) noexcept {
+  // One of them is looked up, the others are reached from it.
+  const auto first = static_cast<std::size_t>(std::countr_zero(children));
+  const double start[3] = {balls.origin[0] + balls.x[first], balls.origin[1] + balls.y[first],
+                           balls.origin[2] + balls.z[first]};
+  std::uint32_t inside = 0;
+  const auto named = kWidth * block + static_cast<std::uint32_t>(first);
+  if (inside_surface(surface_, start, clear_radius(probe_level_ - 1, named))) inside = children;
+  if (!std::has_single_bit(children)) {
+    for (std::size_t i = from; i < to; ++i) {
+      const SurfacePatch& patch = scratch_.patches->find(surface_, scratch_.now.a[i]);
+      const std::uint32_t near = triangles_near(patch, balls.origin, balls.reach);
+      if (near != 0) inside ^= odd_ways(patch, near, start, balls, children);
+    }
+  }
+  for (std::uint32_t left = inside & children; left != 0; left &= left - 1)
+    keep(probe_level_ - 1, kWidth * block + static_cast<std::uint32_t>(std::countr_zero(left)));
+}
+
+void SurfaceDescent::keep(int level, std::uint32_t block) noexcept {
+  if (level != settled_level_) flush();
   settled_level_ = level;
   settled_[settled_count_++] = block;
   if (settled_count_ == kSettled || bins_ != nullptr) flush();
@@ -219,13 +320,70 @@ void SurfaceDescent::sum_leaves() noexcept {
 ProbeTotal SurfaceDescent::sum_block(std::uint32_t block, std::size_t from,
                                      std::size_t to) noexcept {
   ProbeBalls balls;
-  place_probes(probes_, block, map_, balls);
+  place_probes(probes_, 0, block, map_, balls);
   ProbeSums sums;
-  for (std::size_t i = from; i < to; ++i)
-    add_patch(scratch_.patches->find(surface_, scratch_.now.a[i]), balls, sums);
+  const std::uint32_t used =
+      (1u << std::min(kWidth, probes_.header->sphere_count - kWidth * block)) - 1;
+  std::uint16_t* const near = scratch_.masks.get();
+  int count = 0;  // of triangles that come near
+  for (std::size_t i = from; i < to; ++i) {
+    const std::uint32_t a = scratch_.now.a[i];
+    const SurfacePatch& patch = scratch_.patches->find(surface_, a);
+    near[i] = static_cast<std::uint16_t>(triangles_near(patch, balls.origin, balls.reach));
+    if (near[i] == 0) continue;
+    count += std::popcount(near[i]);
+    const std::uint32_t chosen =
+        std::popcount(near[i]) <= kFewTriangles ? used : used & near_block(balls, a);
+    if (chosen != 0) add_patch(patch, near[i], balls, chosen, sums);
+  }
   pairs_ += sums.pairs;
-  return total_of(balls, sums, map_.t,
-                  [&](const double(&x)[3]) { return inside_surface(surface_, x); });
+  if (count == 0) {
+    const bool all = inside_surface(surface_, balls.origin, clear_radius(0, block));
+    return total_of(balls, sums, all ? used : 0, map_.t);
+  }
+  std::uint32_t inside;
+  const std::uint32_t told = told_sides(sums, inside);
+  if (const std::uint32_t untold = used & ~told; untold != 0)
+    inside |= untold & sides(balls, untold, sums.met, told, inside, count, from, to);
+  return total_of(balls, sums, inside, map_.t);
+}
+
+std::uint32_t SurfaceDescent::near_block(const ProbeBalls& balls, std::uint32_t a) const noexcept {
+  if (balls_.top < 0) return 0xffff;
+  const NodeBall ball = balls_.ball(kSphereLevel, a);
+  return balls_within(balls, ball.centre, ball.r);
+}
+
+std::uint32_t SurfaceDescent::sides(const ProbeBalls& balls, std::uint32_t wanted,
+                                    std::uint32_t met, std::uint32_t told,
+                                    std::uint32_t inside, int triangles, std::size_t from,
+                                    std::size_t to) const noexcept {
+  const auto centre_of = [&](std::size_t i, double(&x)[3]) {
+    x[0] = balls.origin[0] + balls.x[i];
+    x[1] = balls.origin[1] + balls.y[i];
+    x[2] = balls.origin[2] + balls.z[i];
+  };
+  double x[3];
+  std::uint32_t result = 0;
+  if (triangles > kFewTriangles * std::popcount(wanted)) {
+    for (std::uint32_t left = wanted; left != 0; left &= left - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(left));
+      centre_of(i, x);
+      const bool clear = (met >> i & 1) == 0;
+      if (inside_surface(surface_, x, clear ? balls.r[i] * (1 - 1e-12) : 0)) result |= 1u << i;
+    }
+    return result;
+  }
+  // From a centre whose side is known, through the triangles between.
+  const auto known = static_cast<std::size_t>(std::countr_zero(told != 0 ? told : wanted));
+  centre_of(known, x);
+  const bool here = told != 0 ? (inside >> known & 1) != 0 : inside_surface(surface_, x, 0);
+  result = here ? 0xffff : 0;
+  for (std::size_t i = from; i < to; ++i)
+    if (scratch_.masks[i] != 0)
+      result ^= odd_ways(scratch_.patches->find(surface_, scratch_.now.a[i]), scratch_.masks[i], x,
+                         balls, wanted);
+  return result;
 }
 
 double SurfaceDescent::waiting() const noexcept {

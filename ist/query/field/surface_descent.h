@@ -46,8 +46,35 @@ class SurfaceDescent {
   /// The sums of a leaf block of B with blocks of the surface, pairs [from, to) of the list.
   ProbeTotal sum_block(std::uint32_t block, std::size_t from, std::size_t to) noexcept;
 
+  /// Which children of the nodes of B come near their partners; false if the budget ends.
+  bool reach_children() noexcept;
+  std::uint32_t any_of(std::size_t from, std::size_t to) const noexcept;
+
+  /// The same, triangle by triangle, for the pairs [from, to) of one node of B; children that meet
+  /// nothing are settled. Returns those that do, a bit each.
+  std::uint32_t sort_children(std::size_t from, std::size_t to, std::uint32_t used) noexcept;
+
+  /// No surface is nearer than this to the centre of a node of B without partners.
+  double clear_radius(int level, std::uint32_t block) const noexcept;
+
+  /// The balls that come near a block of triangles, a bit each.
+  std::uint32_t near_block(const ProbeBalls& balls, std::uint32_t a) const noexcept;
+
+  /// Which of the `wanted` balls have their centres inside. `met`, `told`, `inside`: what is known
+  /// of all; pairs [from, to) are theirs, and masks of the triangles that come near.
+  std::uint32_t sides(const ProbeBalls& balls, std::uint32_t wanted, std::uint32_t met,
+                      std::uint32_t told, std::uint32_t inside, int triangles, std::size_t from,
+                      std::size_t to) const noexcept;
+
   /// A node of B that meets no surface.
   void settle(int level, std::uint32_t block) noexcept;
+
+  /// Children of a node of B that meet no surface; pairs [from, to) are the node's.
+  void settle_children(const ProbeBalls& balls, std::uint32_t block, std::uint32_t children,
+                       std::size_t from, std::size_t to) noexcept;
+
+  /// A node of B that is inside.
+  void keep(int level, std::uint32_t block) noexcept;
   void flush() noexcept;
 
   /// First pair of the next node of B.

@@ -37,7 +37,7 @@ bool steps_through(const Vec& d, const Vec& a, const Vec& b, const Vec& c) {
 
 }  // namespace
 
-bool inside_surface(const SurfaceTree& surface, const double (&point)[3]) noexcept {
+bool inside_surface(const SurfaceTree& surface, const double (&point)[3], double clear) noexcept {
   const FieldHeader& field = *surface.header;
   double cell[3];  // the cell's number along each axis
   std::uint32_t brick = 0, bit = 0;
@@ -60,6 +60,7 @@ bool inside_surface(const SurfaceTree& surface, const double (&point)[3]) noexce
                       field.low[1] + (cell[1] + kCellReference[1]) * field.cell,
                       field.low[2] + (cell[2] + kCellReference[2]) * field.cell};
   const Vec way = reference - x;
+  if (dot(way, way) < clear * clear) return inside;
   const std::uint64_t below = cells.surface & ((std::uint64_t{1} << bit) - 1);
   const std::uint32_t number = cells.first + static_cast<std::uint32_t>(std::popcount(below));
   for (std::uint32_t i = surface.cell_first[number]; i < surface.cell_first[number + 1]; ++i) {

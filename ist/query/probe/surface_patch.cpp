@@ -271,17 +271,15 @@ HWY_INLINE void sort_disc(const SurfacePatch& patch, std::size_t t, std::size_t 
   }
 }
 
-void add_patch_to(const SurfacePatch& patch, const ProbeBalls& balls, ProbeSums& sums) {
+std::uint32_t near_of(const SurfacePatch& patch, const double (&centre)[3], double radius) {
   const LaneTag<double> d;
   using V = hn::Vec<decltype(d)>;
-  Chords chords;
-  Corners corners;
+  const V reach = hn::Set(d, radius);
   std::uint32_t triangles = 0;
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    const V px = hn::Set(d, balls.origin[0]) - hn::Load(d, patch.corner[0] + lane);
-    const V py = hn::Set(d, balls.origin[1]) - hn::Load(d, patch.corner[1] + lane);
-    const V pz = hn::Set(d, balls.origin[2]) - hn::Load(d, patch.corner[2] + lane);
-    const V reach = hn::Set(d, balls.reach);
+    const V px = hn::Set(d, centre[0]) - hn::Load(d, patch.corner[0][0] + lane);
+    const V py = hn::Set(d, centre[1]) - hn::Load(d, patch.corner[0][1] + lane);
+    const V pz = hn::Set(d, centre[2]) - hn::Load(d, patch.corner[0][2] + lane);
     const auto dot = [&](const double (&axis)[3][kWidth]) -> V {
       return (px * hn::Load(d, axis[0] + lane) + py * hn::Load(d, axis[1] + lane)) +
              pz * hn::Load(d, axis[2] + lane);
@@ -294,38 +292,207 @@ void add_patch_to(const SurfacePatch& patch, const ProbeBalls& balls, ProbeSums&
     triangles |= mask_bits(d, hn::And(hn::Abs(dot(patch.n)) < reach, hn::And(beside, along)))
                  << lane;
   }
+  return triangles;
+}
+
+std::uint32_t odd_ways_of(const SurfacePatch& patch, std::uint32_t triangles,
+                          const double (&start)[3], const ProbeBalls& balls,
+                          std::uint32_t wanted) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const V zero = hn::Zero(d);
+  double way[3];  // from the start to the balls' origin
+  for (int k = 0; k < 3; ++k) way[k] = balls.origin[k] - start[k];
+  std::uint32_t odd = 0;
   for (; triangles != 0; triangles &= triangles - 1) {
     const std::size_t t = hwy::Num0BitsBelowLS1Bit_Nonzero32(triangles);
-    double corner[3];
-    for (int k = 0; k < 3; ++k) corner[k] = patch.corner[k][t] - balls.origin[k];
-    const auto of = [&](double value) -> V { return hn::Set(d, value); };
-    alignas(64) double height[kWidth], x[kWidth], y[kWidth];
-    std::uint32_t near = 0;
+    double p[3][3];
+    for (int c = 0; c < 3; ++c)
+      for (int k = 0; k < 3; ++k) p[c][k] = patch.corner[c][k][t] - start[k];
+    const double nx = patch.n[0][t], ny = patch.n[1][t], nz = patch.n[2][t];
+    const double h0 = -((p[0][0] * nx + p[0][1] * ny) + p[0][2] * nz);  // of the start
+    const double height = h0 + ((way[0] * nx + way[1] * ny) + way[2] * nz);  // of the origin
+    std::uint32_t above = 0;
     for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-      const V px = hn::Load(d, balls.x + lane) - of(corner[0]);
-      const V py = hn::Load(d, balls.y + lane) - of(corner[1]);
-      const V pz = hn::Load(d, balls.z + lane) - of(corner[2]);
-      const V r = hn::Load(d, balls.r + lane);
-      const auto dot = [&](const double (&axis)[3][kWidth]) -> V {
-        return (px * of(axis[0][t]) + py * of(axis[1][t])) + pz * of(axis[2][t]);
-      };
-      const V h = dot(patch.n);
-      const V fx = dot(patch.u);
-      const V fy = dot(patch.v);
-      const auto beside = hn::And(fx > of(patch.left[t]) - r, fx < of(patch.right[t]) + r);
-      const auto along = hn::And(fy > hn::Zero(d) - r, fy < of(patch.top[t]) + r);
-      near |= mask_bits(d, hn::And(hn::Abs(h) < r, hn::And(beside, along))) << lane;
+      const V h = hn::Set(d, height) + ((hn::Load(d, balls.x + lane) * hn::Set(d, nx) +
+                                         hn::Load(d, balls.y + lane) * hn::Set(d, ny)) +
+                                        hn::Load(d, balls.z + lane) * hn::Set(d, nz));
+      above |= mask_bits(d, h > zero) << lane;
+    }
+    const std::uint32_t across = (h0 > 0 ? ~above : above) & wanted;
+    if (across == 0) continue;
+    // Planes through the start and an edge: those of two triangles that share it are opposite, digit
+    // for digit. Of a way in the plane the corners decide.
+    std::uint32_t all = 0xffff, none = 0xffff;
+    for (int c = 0; c < 3; ++c) {
+      const double* const a = p[c];
+      const double* const b = p[(c + 1) % 3];
+      V plane[3];
+      for (int k = 0; k < 3; ++k)
+        plane[k] = hn::Set(
+            d, a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
+      const bool tie = a[0] != b[0] ? a[0] < b[0] : a[1] != b[1] ? a[1] < b[1] : a[2] < b[2];
+      std::uint32_t left = 0;
+      for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+        const V x = hn::Load(d, balls.x + lane) + hn::Set(d, way[0]);
+        const V y = hn::Load(d, balls.y + lane) + hn::Set(d, way[1]);
+        const V z = hn::Load(d, balls.z + lane) + hn::Set(d, way[2]);
+        const V side = (x * plane[0] + y * plane[1]) + z * plane[2];
+        left |= mask_bits(d, tie ? side >= zero : side > zero) << lane;
+      }
+      all &= left;
+      none &= ~left;
+      if (((all | none) & across) == 0) break;
+    }
+    odd ^= (all | none) & across;
+  }
+  return odd;
+}
+
+/// The balls that triangle t comes near; with kFeet, where their centres' feet in its plane are and
+/// how high they stand.
+template <bool kFeet>
+HWY_INLINE std::uint32_t feet_near(const SurfacePatch& patch, std::size_t t,
+                                   const ProbeBalls& balls, double* height, double* x, double* y) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const auto of = [&](double value) -> V { return hn::Set(d, value); };
+  V from[3], u[3], v[3], n[3];
+  for (int k = 0; k < 3; ++k) {
+    from[k] = of(patch.corner[0][k][t] - balls.origin[k]);
+    u[k] = of(patch.u[k][t]), v[k] = of(patch.v[k][t]), n[k] = of(patch.n[k][t]);
+  }
+  const V left = of(patch.left[t]), right = of(patch.right[t]), top = of(patch.top[t]);
+  std::uint32_t near = 0;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V px = hn::Load(d, balls.x + lane) - from[0];
+    const V py = hn::Load(d, balls.y + lane) - from[1];
+    const V pz = hn::Load(d, balls.z + lane) - from[2];
+    const V r = hn::Load(d, balls.r + lane);
+    const auto dot = [&](const V(&axis)[3]) -> V {
+      return (px * axis[0] + py * axis[1]) + pz * axis[2];
+    };
+    const V h = dot(n), fx = dot(u), fy = dot(v);
+    const auto beside = hn::And(fx > left - r, fx < right + r);
+    const auto along = hn::And(fy > hn::Zero(d) - r, fy < top + r);
+    near |= mask_bits(d, hn::And(hn::Abs(h) < r, hn::And(beside, along))) << lane;
+    if constexpr (kFeet) {
       hn::Store(h, d, height + lane);
       hn::Store(fx, d, x + lane);
       hn::Store(fy, d, y + lane);
     }
-    for (; near != 0; near &= near - 1) {
-      const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(near);
-      sort_disc(patch, t, b, height[b], x[b], y[b], balls.r[b], chords, corners, sums);
+  }
+  return near;
+}
+
+std::uint32_t balls_near_of(const SurfacePatch& patch, std::uint32_t triangles,
+                            const ProbeBalls& balls) {
+  std::uint32_t near = 0;
+  for (; triangles != 0; triangles &= triangles - 1)
+    near |= feet_near<false>(patch, hwy::Num0BitsBelowLS1Bit_Nonzero32(triangles), balls, nullptr,
+                             nullptr, nullptr);
+  return near;
+}
+
+void place_probes_of(const SphereTree& probes, int level, std::uint32_t block,
+                     const Similarity& map, ProbeBalls& balls) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const NodeBall ball = probes.ball(level, block);
+  const BallBlock& from = probes.level[level].blocks[block];
+  const Origin& o = probes.level[level].origins[block];
+  map.apply(ball.centre, balls.origin);
+  balls.reach = ball.r * map.scale * (1 + 1e-12);
+  V m[9];
+  for (int k = 0; k < 9; ++k) m[k] = hn::Set(d, map.m[k]);
+  const V ox = hn::Set(d, o.x - ball.centre[0]);
+  const V oy = hn::Set(d, o.y - ball.centre[1]);
+  const V oz = hn::Set(d, o.z - ball.centre[2]);
+  const V scale = hn::Set(d, map.scale);
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V x = ox + load_as<double>(d, from.x + lane);
+    const V y = oy + load_as<double>(d, from.y + lane);
+    const V z = oz + load_as<double>(d, from.z + lane);
+    hn::Store((m[0] * x + m[1] * y) + m[2] * z, d, balls.x + lane);
+    hn::Store((m[3] * x + m[4] * y) + m[5] * z, d, balls.y + lane);
+    hn::Store((m[6] * x + m[7] * y) + m[8] * z, d, balls.z + lane);
+    hn::Store(hn::Max(load_as<double>(d, from.r + lane), hn::Zero(d)) * scale, d, balls.r + lane);
+  }
+}
+
+/// As feet_near, for one ball and the triangles of a patch.
+HWY_INLINE std::uint32_t feet_of(const SurfacePatch& patch, const ProbeBalls& balls, std::size_t b,
+                                 double* height, double* x, double* y) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const V cx = hn::Set(d, balls.origin[0] + balls.x[b]);
+  const V cy = hn::Set(d, balls.origin[1] + balls.y[b]);
+  const V cz = hn::Set(d, balls.origin[2] + balls.z[b]);
+  const V r = hn::Set(d, balls.r[b]);
+  std::uint32_t near = 0;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V px = cx - hn::Load(d, patch.corner[0][0] + lane);
+    const V py = cy - hn::Load(d, patch.corner[0][1] + lane);
+    const V pz = cz - hn::Load(d, patch.corner[0][2] + lane);
+    const auto dot = [&](const double (&axis)[3][kWidth]) -> V {
+      return (px * hn::Load(d, axis[0] + lane) + py * hn::Load(d, axis[1] + lane)) +
+             pz * hn::Load(d, axis[2] + lane);
+    };
+    const V h = dot(patch.n), fx = dot(patch.u), fy = dot(patch.v);
+    const auto beside = hn::And(fx > hn::Load(d, patch.left + lane) - r,
+                                fx < hn::Load(d, patch.right + lane) + r);
+    const auto along = hn::And(fy > hn::Zero(d) - r, fy < hn::Load(d, patch.top + lane) + r);
+    near |= mask_bits(d, hn::And(hn::Abs(h) < r, hn::And(beside, along))) << lane;
+    hn::Store(h, d, height + lane);
+    hn::Store(fx, d, x + lane);
+    hn::Store(fy, d, y + lane);
+  }
+  return near;
+}
+
+void add_patch_to(const SurfacePatch& patch, std::uint32_t triangles, const ProbeBalls& balls,
+                  std::uint32_t chosen, ProbeSums& sums) {
+  Chords chords;
+  Corners corners;
+  alignas(64) double height[kWidth], x[kWidth], y[kWidth];
+  if (hwy::PopCount(triangles) <= hwy::PopCount(chosen)) {
+    for (; triangles != 0; triangles &= triangles - 1) {
+      const std::size_t t = hwy::Num0BitsBelowLS1Bit_Nonzero32(triangles);
+      std::uint32_t near = chosen & feet_near<true>(patch, t, balls, height, x, y);
+      for (; near != 0; near &= near - 1) {
+        const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(near);
+        sort_disc(patch, t, b, height[b], x[b], y[b], balls.r[b], chords, corners, sums);
+      }
+    }
+  } else {
+    for (; chosen != 0; chosen &= chosen - 1) {
+      const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(chosen);
+      std::uint32_t near = triangles & feet_of(patch, balls, b, height, x, y);
+      for (; near != 0; near &= near - 1) {
+        const std::size_t t = hwy::Num0BitsBelowLS1Bit_Nonzero32(near);
+        sort_disc(patch, t, b, height[t], x[t], y[t], balls.r[b], chords, corners, sums);
+      }
     }
   }
   if (chords.size > 0) take_chords(patch, chords, sums);
   if (corners.size > 0) take_corners(patch, corners, sums);
+}
+
+std::uint32_t balls_within_of(const ProbeBalls& balls, const double (&point)[3], double distance) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const V px = hn::Set(d, point[0] - balls.origin[0]);
+  const V py = hn::Set(d, point[1] - balls.origin[1]);
+  const V pz = hn::Set(d, point[2] - balls.origin[2]);
+  std::uint32_t near = 0;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V x = hn::Load(d, balls.x + lane) - px;
+    const V y = hn::Load(d, balls.y + lane) - py;
+    const V z = hn::Load(d, balls.z + lane) - pz;
+    const V reach = hn::Load(d, balls.r + lane) + hn::Set(d, distance);
+    near |= mask_bits(d, ((x * x + y * y) + z * z) <= reach * reach) << lane;
+  }
+  return near;
 }
 
 void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
@@ -333,11 +500,16 @@ void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
   using V = hn::Vec<decltype(d)>;
   const V zero = hn::Zero(d);
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    V a[3], e[3], f[3];
+    V e[3], f[3];
     const auto take = [&](int k, const double (&of)[3][kWidth]) {
-      a[k] = hn::Load(d, of[0] + lane);
-      e[k] = hn::Load(d, of[1] + lane) - a[k];
-      f[k] = hn::Load(d, of[2] + lane) - a[k];
+      const V a = hn::Load(d, of[0] + lane);
+      const V b = hn::Load(d, of[1] + lane);
+      const V c = hn::Load(d, of[2] + lane);
+      e[k] = b - a;
+      f[k] = c - a;
+      hn::Store(a, d, patch.corner[0][k] + lane);
+      hn::Store(b, d, patch.corner[1][k] + lane);
+      hn::Store(c, d, patch.corner[2][k] + lane);
     };
     take(0, corners.x), take(1, corners.y), take(2, corners.z);
     const V cross[3] = {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2],
@@ -352,7 +524,6 @@ void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
     for (int k = 0; k < 3; ++k) {
       u[k] = e[k] / one_base;
       n[k] = cross[k] / one_area;
-      hn::Store(a[k], d, patch.corner[k] + lane);
       hn::Store(u[k], d, patch.u[k] + lane);
       hn::Store(n[k], d, patch.n[k] + lane);
     }
@@ -389,6 +560,37 @@ namespace ist {
 
 HWY_EXPORT(add_patch_to);
 HWY_EXPORT(make_patch_of);
+HWY_EXPORT(near_of);
+HWY_EXPORT(odd_ways_of);
+HWY_EXPORT(balls_near_of);
+HWY_EXPORT(balls_within_of);
+HWY_EXPORT(place_probes_of);
+
+std::uint32_t balls_within(const ProbeBalls& balls, const double (&point)[3],
+                           double distance) noexcept {
+  return HWY_DYNAMIC_DISPATCH(balls_within_of)(balls, point, distance);
+}
+
+std::uint32_t balls_near(const SurfacePatch& patch, std::uint32_t triangles,
+                         const ProbeBalls& balls) noexcept {
+  return HWY_DYNAMIC_DISPATCH(balls_near_of)(patch, triangles, balls);
+}
+
+void place_probes(const SphereTree& probes, int level, std::uint32_t block, const Similarity& map,
+                  ProbeBalls& balls) noexcept {
+  HWY_DYNAMIC_DISPATCH(place_probes_of)(probes, level, block, map, balls);
+}
+
+std::uint32_t triangles_near(const SurfacePatch& patch, const double (&centre)[3],
+                             double radius) noexcept {
+  return HWY_DYNAMIC_DISPATCH(near_of)(patch, centre, radius);
+}
+
+std::uint32_t odd_ways(const SurfacePatch& patch, std::uint32_t triangles,
+                       const double (&start)[3], const ProbeBalls& balls,
+                       std::uint32_t wanted) noexcept {
+  return HWY_DYNAMIC_DISPATCH(odd_ways_of)(patch, triangles, start, balls, wanted);
+}
 
 void make_patch(const TriangleCorners& corners, SurfacePatch& patch) noexcept {
   HWY_DYNAMIC_DISPATCH(make_patch_of)(corners, patch);
@@ -407,8 +609,9 @@ void make_patch(const SurfaceBlock& block, SurfacePatch& patch) noexcept {
   make_patch(corners, patch);
 }
 
-void add_patch(const SurfacePatch& patch, const ProbeBalls& balls, ProbeSums& sums) noexcept {
-  HWY_DYNAMIC_DISPATCH(add_patch_to)(patch, balls, sums);
+void add_patch(const SurfacePatch& patch, std::uint32_t triangles, const ProbeBalls& balls,
+               std::uint32_t chosen, ProbeSums& sums) noexcept {
+  HWY_DYNAMIC_DISPATCH(add_patch_to)(patch, triangles, balls, chosen, sums);
 }
 
 }  // namespace ist

@@ -5,12 +5,15 @@
 
 #include <ist/asset_layout.h>
 
+#include "query/asset/sphere_tree.h"
+#include "query/base/relative_pose.h"
+
 namespace ist {
 
 /// Up to sixteen triangles as balls meet them. Positions are in the surface's frame; (x, y) are
 /// coordinates in a triangle's plane from its first corner, its first edge lying along x.
 struct alignas(64) SurfacePatch {
-  double corner[3][kWidth];                   ///< the first one
+  double corner[3][3][kWidth];                ///< [corner][axis]
   double u[3][kWidth], v[3][kWidth];          ///< unit axes of x and y
   double n[3][kWidth];                        ///< unit normal, outward
   double edge_x[3][kWidth], edge_y[3][kWidth];  ///< unit directions of the edges
@@ -28,12 +31,21 @@ void make_patch(const TriangleCorners& corners, SurfacePatch& patch) noexcept;
 
 void make_patch(const SurfaceBlock& block, SurfacePatch& patch) noexcept;
 
+/// The triangles that come near a ball, a bit each: all that reach it, and perhaps others.
+std::uint32_t triangles_near(const SurfacePatch& patch, const double (&centre)[3],
+                             double radius) noexcept;
+
 /// Sixteen balls relative to an origin near them all. A radius of 0 meets nothing.
 struct alignas(64) ProbeBalls {
   double x[kWidth], y[kWidth], z[kWidth], r[kWidth];
   double origin[3];  ///< in the surface's frame
   double reach = 0;  ///< all of them lie within this of the origin
 };
+
+/// The balls of a block of any level, the spheres themselves at level 0, placed by a map around the
+/// centre of the node; balls that are not there get a radius of 0.
+void place_probes(const SphereTree& probes, int level, std::uint32_t block, const Similarity& map,
+                  ProbeBalls& balls) noexcept;
 
 /// What the surface does to each of sixteen balls; all factors included.
 struct ProbeSums {
@@ -54,6 +66,26 @@ struct ProbeSums {
 ///
 /// By rays from the centre: each triangle takes away, or adds where it is seen from outside, the
 /// part of its cone between itself and the sphere, (r³ Ω − h A) / 3 over the part within the ball.
-void add_patch(const SurfacePatch& patch, const ProbeBalls& balls, ProbeSums& sums) noexcept;
+///
+/// `triangles`: those to look at, a bit each; all that come near one of the balls. `chosen`: the
+/// balls to look at. A vector goes over the balls or over the triangles, whichever are more.
+void add_patch(const SurfacePatch& patch, std::uint32_t triangles, const ProbeBalls& balls,
+               std::uint32_t chosen, ProbeSums& sums) noexcept;
+
+/// The balls that come within a distance of a point, a bit each, and perhaps others.
+std::uint32_t balls_within(const ProbeBalls& balls, const double (&point)[3],
+                           double distance) noexcept;
+
+/// The balls that one of the chosen triangles comes near, a bit each: all that it meets, and perhaps
+/// others.
+std::uint32_t balls_near(const SurfacePatch& patch, std::uint32_t triangles,
+                         const ProbeBalls& balls) noexcept;
+
+/// Which ways from `start`, in the surface's frame, to the centres of the `wanted` balls step through
+/// an odd number of the chosen triangles, a bit each. Triangles that share an edge agree on which of them a way
+/// goes through, whatever the rounding.
+std::uint32_t odd_ways(const SurfacePatch& patch, std::uint32_t triangles,
+                       const double (&start)[3], const ProbeBalls& balls,
+                       std::uint32_t wanted) noexcept;
 
 }  // namespace ist
