@@ -71,6 +71,18 @@ const char* why_missed(StopReason stop) {
   }
 }
 
+/// The file ends with the field.
+std::uint64_t field_bytes(const AssetHeader& h) {
+  return h.field == 0 ? 0 : h.file_bytes - h.field;
+}
+
+nlohmann::ordered_json field_json(const TreeView& tree) {
+  return {{"triangles", tree.field_triangles()},
+          {"bytes", field_bytes(tree.header())},
+          {"error", tree.has_field() ? nlohmann::ordered_json(tree.field_error())
+                                     : nlohmann::ordered_json(nullptr)}};
+}
+
 nlohmann::ordered_json details_json(const AssetHeader& h, double scale) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (std::uint32_t i = 1; i <= h.detail_count; ++i) {
@@ -113,6 +125,11 @@ std::string describe_asset(const TreeView& tree) {
          fmt::format("{} spheres, protrusion {:.4g} u", grouped(detail.matched_tree.sphere_count),
                      detail.protrusion * scale));
   }
+  line("field", tree.has_field()
+                    ? fmt::format("{} triangles within {:.4g} u of the surface, {} bytes",
+                                  grouped(tree.field_triangles()), tree.field_error(),
+                                  grouped(field_bytes(h)))
+                    : "none");
   line("asked",
        fmt::format("{} spheres, coverage {:g}, min radius {:g} u, epsilon {:g}, grid {}, "
                    "seed {}",
@@ -171,12 +188,14 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
         {"grid_refinements", h.asked_grid_refinements},
         {"grid_rounds", h.asked_grid_rounds},
         {"seed", h.asked_seed},
+        {"field_error", h.asked_field_error},
         {"error", h.asked_error},
         {"at_overlap", h.asked_at_overlap}}},
       {"predicted", predicted_json(h)},
       {"inner_tree", tree_json(h.inner_tree, scale)},
       {"matched_tree", tree_json(h.matched_tree, scale)},
       {"details", details_json(h, scale)},
+      {"field", field_json(tree)},
   };
   json.update(target_json(tree));
   return json;

@@ -133,6 +133,17 @@ void add_bake(CLI::App& app) {
   add_share(command, "--epsilon", packing.epsilon, {.least = 0, .most = 1, .without_most = true},
             "Every sphere is at least 1 − E times the largest that would fit; 0 = the "
             "library's own schedule");
+  CLI::Option* const field_error =
+      add_real(command, "--field-error", packing.field.error, {.least = 0, .without_least = true},
+               "[u] How far the surface kept for exact queries may be from the mesh's; as few "
+               "triangles as that allows. Default: the mesh's own where they are at most 30,000, "
+               "else that many");
+  field_error->default_str("");
+  command
+      ->add_flag_callback(
+          "--no-field", [&packing] { packing.field.wanted = false; },
+          "Keep no surface: a smaller file, whose volumes are those of spheres")
+      ->excludes(field_error);
   add_grid_options(command, options->grid, packing.grids);
   add_device_option(command, options->device,
                     "Where the bake runs; auto: on the GPU if there is one");

@@ -2,6 +2,7 @@
 #include <ist/error.h>
 
 #include <ist/asset_layout.h>
+#include "bake/check/check_field.h"
 #include "bake/check/check_spheres.h"
 #include "bake/check/check_surface.h"
 #include "bake/check/check_tree.h"
@@ -31,6 +32,7 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mes
     append(all, check_tree(asset, matched_tree(asset, i), matched_spheres(asset, i), nullptr,
                            name + "matched tree"));
   }
+  append(all, check_field(asset, surface, mesh.report.shells != 1));
   return all;
 }
 

@@ -17,27 +17,6 @@ double squared_distance_to_segment(const Eigen::Vector3d& p, const Eigen::Vector
   return (p - (a + t * ab)).squaredNorm();
 }
 
-/// The edges, and the foot of the perpendicular where that lies inside. Every candidate is a point
-/// of the triangle, so that a sliver's poor normal cannot make the distance too small.
-double squared_distance_to_triangle(const Eigen::Vector3d& p,
-                                    const std::array<Eigen::Vector3d, 3>& t) {
-  double best = std::min({squared_distance_to_segment(p, t[0], t[1]),
-                          squared_distance_to_segment(p, t[1], t[2]),
-                          squared_distance_to_segment(p, t[2], t[0])});
-  const Eigen::Vector3d u = t[1] - t[0];
-  const Eigen::Vector3d v = t[2] - t[0];
-  const Eigen::Vector3d w = p - t[0];
-  const Eigen::Vector3d n = u.cross(v);
-  const double area = n.squaredNorm();
-  if (area > 0) {
-    const double beta = w.cross(v).dot(n) / area;
-    const double gamma = u.cross(w).dot(n) / area;
-    if (beta >= 0 && gamma >= 0 && beta + gamma <= 1)
-      best = std::min(best, (w - (beta * u + gamma * v)).squaredNorm());
-  }
-  return best;
-}
-
 /// An orthonormal frame whose third axis is the ray.
 const std::array<Eigen::Vector3d, 3>& ray_frame() {
   static const std::array<Eigen::Vector3d, 3> frame = [] {
@@ -103,6 +82,26 @@ Hit cross(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& triang
 
 }  // namespace
 
+/// The edges, and the foot of the perpendicular where that lies inside. Every candidate is a point
+/// of the triangle, so that a sliver's poor normal cannot make the distance too small.
+double squared_distance_to_triangle(const Eigen::Vector3d& p, const CheckSurface::Corners& t) {
+  double best = std::min({squared_distance_to_segment(p, t[0], t[1]),
+                          squared_distance_to_segment(p, t[1], t[2]),
+                          squared_distance_to_segment(p, t[2], t[0])});
+  const Eigen::Vector3d u = t[1] - t[0];
+  const Eigen::Vector3d v = t[2] - t[0];
+  const Eigen::Vector3d w = p - t[0];
+  const Eigen::Vector3d n = u.cross(v);
+  const double area = n.squaredNorm();
+  if (area > 0) {
+    const double beta = w.cross(v).dot(n) / area;
+    const double gamma = u.cross(w).dot(n) / area;
+    if (beta >= 0 && gamma >= 0 && beta + gamma <= 1)
+      best = std::min(best, (w - (beta * u + gamma * v)).squaredNorm());
+  }
+  return best;
+}
+
 CheckSurface::CheckSurface(const ClosedMesh& mesh, const UnitFrame& frame) {
   triangles_.reserve(mesh.mesh.triangles.size());
   for (const auto& triangle : mesh.mesh.triangles) {
@@ -136,8 +135,27 @@ void CheckSurface::build(std::uint32_t begin, std::uint32_t end) {
   build(middle, end);
 }
 
+CheckSurface::CheckSurface(std::vector<Corners> triangles) : triangles_(std::move(triangles)) {
+  for (const Corners& corners : triangles_)
+    for (const Eigen::Vector3d& corner : corners) bounds_.extend(corner);
+  build(0, static_cast<std::uint32_t>(triangles_.size()));
+}
+
 double CheckSurface::distance(const Eigen::Vector3d& p, double limit) const {
   double best = limit * limit;
+  std::uint32_t triangle = 0;
+  search(p, best, triangle);
+  return std::sqrt(best);
+}
+
+std::pair<double, std::uint32_t> CheckSurface::nearest(const Eigen::Vector3d& p) const {
+  double best = 1e30;
+  std::uint32_t triangle = 0;
+  search(p, best, triangle);
+  return {std::sqrt(best), triangle};
+}
+
+void CheckSurface::search(const Eigen::Vector3d& p, double& best, std::uint32_t& triangle) const {
   struct Entry {
     std::uint32_t node;
     double squared;
@@ -150,8 +168,13 @@ double CheckSurface::distance(const Eigen::Vector3d& p, double limit) const {
     if (entry.squared >= best) continue;
     const Node& node = nodes_[entry.node];
     if (node.right == 0) {
-      for (std::uint32_t i = node.begin; i < node.end; ++i)
-        best = std::min(best, squared_distance_to_triangle(p, triangles_[i]));
+      for (std::uint32_t i = node.begin; i < node.end; ++i) {
+        const double squared = squared_distance_to_triangle(p, triangles_[i]);
+        if (squared < best) {
+          best = squared;
+          triangle = i;
+        }
+      }
       continue;
     }
     Entry near = {entry.node + 1, nodes_[entry.node + 1].box.squaredExteriorDistance(p)};
@@ -160,7 +183,6 @@ double CheckSurface::distance(const Eigen::Vector3d& p, double limit) const {
     stack[size++] = far;
     stack[size++] = near;
   }
-  return std::sqrt(best);
 }
 
 int CheckSurface::winding(const Eigen::Vector3d& p) const {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <ist/mesh.h>
@@ -13,10 +14,20 @@ namespace ist {
 /// in the solid that packing asked is not repeated here. Immutable.
 class CheckSurface {
  public:
+  using Corners = std::array<Eigen::Vector3d, 3>;
+
   CheckSurface(const ClosedMesh& mesh, const UnitFrame& frame);
+  /// Of triangles in the unit frame; at least one.
+  explicit CheckSurface(std::vector<Corners> triangles);
 
   /// Unit frame, to the nearest triangle; once nothing is nearer than `limit`, any value ≥ limit.
   double distance(const Eigen::Vector3d& p, double limit) const;
+
+  /// The nearest triangle, as an index of triangles(), and its distance, unit frame.
+  std::pair<double, std::uint32_t> nearest(const Eigen::Vector3d& p) const;
+
+  /// In an order of its own.
+  const std::vector<Corners>& triangles() const { return triangles_; }
 
   /// Winding number of a point off the surface, by a ray in a direction that no mesh was modelled
   /// along; where rounding leaves a sign open, by the sum of all solid angles.
@@ -25,13 +36,15 @@ class CheckSurface {
   const Eigen::AlignedBox3d& bounds() const { return bounds_; }  ///< unit frame
 
  private:
-  using Corners = std::array<Eigen::Vector3d, 3>;
   struct Node {
     Eigen::AlignedBox3d box;
     std::uint32_t begin = 0, end = 0;  ///< triangles
     std::uint32_t right = 0;           ///< second child; the first is the next node; 0 at a leaf
   };
 
+  /// `best`: squared distance beyond which nothing is of interest; becomes the least. The triangle
+  /// stays where nothing is nearer.
+  void search(const Eigen::Vector3d& p, double& best, std::uint32_t& triangle) const;
   void build(std::uint32_t begin, std::uint32_t end);
   int winding_by_solid_angle(const Eigen::Vector3d& p) const;
 
@@ -39,5 +52,8 @@ class CheckSurface {
   std::vector<Node> nodes_;
   Eigen::AlignedBox3d bounds_;
 };
+
+/// Unit frame, squared.
+double squared_distance_to_triangle(const Eigen::Vector3d& p, const CheckSurface::Corners& t);
 
 }  // namespace ist

@@ -46,62 +46,79 @@ Approximation own_triangles(const MeshView& surface) {
   return out;
 }
 
-/// The cell that leaves at most, and nearly, so many triangles.
-double cell_for(const MeshView& surface, std::size_t triangles) {
-  // A surface of area A spans about 3 A / cell² triangles; none that fit: the whole solid.
-  double cell = std::sqrt(3 * surface_area(surface) / static_cast<double>(triangles));
-  double best = 4;
-  for (int attempt = 0; attempt < 8; ++attempt) {
-    cell = std::clamp(cell, kSmallestCell, 4.0);
-    const auto found = static_cast<double>(clustered_triangles(surface, cell));
-    const double ratio = found / static_cast<double>(triangles);
-    if (ratio <= 1) best = std::min(best, cell);
-    if (ratio <= 1 && ratio > 0.93) break;
-    cell *= std::clamp(std::sqrt(ratio / 0.97), 0.5, 2.0);
+/// The least tolerance found that leaves at most, and nearly, so many triangles.
+double tolerance_for(const VertexClusters& clusters, std::size_t triangles, double guess) {
+  double fine = 0, coarse = HUGE_VAL;
+  for (int attempt = 0; attempt < 16; ++attempt) {
+    const std::size_t found = clusters.triangles_within(guess);
+    (found <= triangles ? coarse : fine) = guess;
+    if (found <= triangles && found > triangles - triangles / 32) break;
+    guess = coarse == HUGE_VAL ? 2 * fine : fine == 0 ? coarse / 2 : std::sqrt(fine * coarse);
   }
-  return best;
+  return coarse;
 }
 
-Approximation clustered(SolidSurface& surface, double cell) {
-  Clustered clusters = cluster_vertices(surface.arrays(), cell);
-  if (clusters.mesh.triangles.empty()) return {std::move(clusters.mesh), HUGE_VAL};
-  const FieldHierarchy hierarchy(clusters.mesh);
-  const double error = proven_error(surface.view(), clusters.mesh, hierarchy, clusters.vertex_of);
-  return {std::move(clusters.mesh), error};
+/// Clusters within a tolerance, or nearly: those that turn out to be further off are divided, a few
+/// times over. `choose`: the tolerance for the clusters as they are.
+template <class Choose>
+Approximation clustered(VertexClusters& clusters, SolidSurface& surface, const Choose& choose) {
+  constexpr int kRounds = 5;
+  for (int round = 1;; ++round) {
+    const double tolerance = choose();
+    Clustered found = clusters.within(tolerance);
+    if (found.mesh.triangles.empty()) return {std::move(found.mesh), HUGE_VAL};
+    const FieldHierarchy hierarchy(found.mesh);
+    const FieldError error(surface.view(), found.mesh, hierarchy, found.vertex_of);
+    const std::vector<double> seen = error.seen(tolerance);
+    const double most = *std::max_element(seen.begin(), seen.end());
+    if (most <= 1.25 * tolerance || round == kRounds) {
+      const double proven = error.proven(most);
+      return {std::move(found.mesh), proven};
+    }
+    clusters.raise(seen, tolerance);
+  }
 }
 
 /// The coarsest clusters found that keep within the error; nothing where none were.
-std::optional<Approximation> clustered_within(SolidSurface& surface, double max_error) {
+std::optional<Approximation> clustered_within(VertexClusters& clusters, SolidSurface& surface,
+                                              double max_error) {
   std::optional<Approximation> best;
-  double fine = 0, coarse = HUGE_VAL;
-  double cell = cell_for(surface.arrays(), kFieldTriangles);
-  for (int attempt = 0; attempt < 8 && cell >= kSmallestCell && coarse > 1.05 * fine; ++attempt) {
-    Approximation tried = clustered(surface, cell);
+  double fine = 0, coarse = HUGE_VAL, tolerance = max_error / 2;
+  for (int attempt = 0; attempt < 8 && coarse > 1.05 * fine; ++attempt) {
+    Approximation tried = clustered(clusters, surface, [&] { return tolerance; });
     const double ratio = max_error / tried.error;
     if (tried.error <= max_error) {
-      fine = cell;
+      fine = tolerance;
       best = std::move(tried);
     } else {
-      coarse = cell;
+      coarse = tolerance;
     }
-    // The error of a smooth surface goes with the square of the cell.
-    cell *= std::clamp(0.97 * std::sqrt(ratio), 0.125, 8.0);
-    if (fine > 0 && coarse < HUGE_VAL && !(cell > fine && cell < coarse))
-      cell = std::sqrt(fine * coarse);
-    cell = std::min(cell, 4.0);
+    tolerance *= std::clamp(0.97 * ratio, 0.125, 4.0);
+    if (fine > 0 && coarse < HUGE_VAL && !(tolerance > fine && tolerance < coarse))
+      tolerance = std::sqrt(fine * coarse);
   }
   return best;
+}
+
+/// Fewer triangles than the surface has; nothing where they cannot be as exact as is asked for.
+std::optional<Approximation> simplified(SolidSurface& surface, double max_error) {
+  // Cells of edge c span about 3 area / c² triangles.
+  const double cell = std::sqrt(3 * surface_area(surface.arrays()) / kFieldTriangles);
+  const int levels = max_error > 0 ? 10 : 7;
+  VertexClusters clusters(surface.arrays(), 8 * cell, levels);
+  if (max_error > 0) return clustered_within(clusters, surface, max_error);
+  double guess = cell / 32;
+  return clustered(clusters, surface,
+                   [&] { return guess = tolerance_for(clusters, kFieldTriangles, guess); });
 }
 
 Approximation approximate(SolidSurface& surface, double max_error) {
   const std::size_t triangles = surface.arrays().triangle_count;
-  if (triangles > kFieldTriangles && max_error == 0) {
-    Approximation few = clustered(surface, cell_for(surface.arrays(), kFieldTriangles));
-    if (!few.mesh.triangles.empty()) return few;
+  if (triangles > kFieldTriangles) {
+    std::optional<Approximation> few = simplified(surface, max_error);
+    if (few && !few->mesh.triangles.empty() && few->mesh.triangles.size() < triangles)
+      return std::move(*few);
   }
-  if (triangles > kFieldTriangles && max_error > 0)
-    if (std::optional<Approximation> few = clustered_within(surface, max_error))
-      if (few->mesh.triangles.size() < triangles) return std::move(*few);
   Approximation own = own_triangles(surface.arrays());
   if (max_error > 0 && !(own.error <= max_error))
     throw Error("the field's error asked for is finer than floats can be; ask for at least " +

@@ -115,29 +115,48 @@ class FieldNearMesh {
   const MeshView& mesh_;
 };
 
+Part part_of(const FieldMesh& field, std::size_t triangle) {
+  Part part;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t k = 0; k < 3; ++k)
+      part.corner[i][k] = field.vertices[field.triangles[triangle][i]][k];
+  return part;
+}
+
 }  // namespace
 
-double proven_error(const MeshView& mesh, const FieldMesh& field, const FieldHierarchy& hierarchy,
-                    const std::vector<std::uint32_t>& vertex_of) {
+FieldError::FieldError(const MeshView& mesh, const FieldMesh& field,
+                       const FieldHierarchy& hierarchy, const std::vector<std::uint32_t>& vertex_of)
+    : mesh_(mesh),
+      field_(field),
+      vertex_of_(vertex_of),
+      swept_(mesh, field, hierarchy, vertex_of),
+      middle_(field.triangles.size()) {
   const FieldNearMesh near_mesh(mesh);
-  const SweptError swept(mesh, field, hierarchy, vertex_of);
-  std::vector<Part> parts(field.triangles.size());
-  std::vector<double> middle(parts.size());
-  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t t) {
-    for (std::size_t i = 0; i < 3; ++i)
-      for (std::size_t k = 0; k < 3; ++k)
-        parts[t].corner[i][k] = field.vertices[field.triangles[t][i]][k];
-    middle[t] = near_mesh.distance(parts[t].centre());
+  tbb::parallel_for(std::size_t{0}, middle_.size(), [&](std::size_t t) {
+    middle_[t] = near_mesh.distance(part_of(field, t).centre());
   });
-  const double sampled = std::max(largest(parts.size(), [&](std::size_t t) { return middle[t]; }),
-                                  largest(mesh.vertex_count, [&](std::size_t v) {
-                                    return swept.at_vertex(static_cast<std::uint32_t>(v));
-                                  }));
-  const double target = kSlack * sampled + kRounding;
-  const double of_field = largest(
-      parts.size(), [&](std::size_t t) { return near_mesh.bound(parts[t], target, middle[t]); });
-  const double of_mesh = largest(mesh.triangle_count, [&](std::size_t t) {
-    return swept.bound(static_cast<std::uint32_t>(t), target);
+}
+
+std::vector<double> FieldError::seen(double enough) const {
+  std::vector<double> around(field_.vertices.size());
+  for (std::size_t t = 0; t < middle_.size(); ++t)
+    for (const std::uint32_t v : field_.triangles[t]) around[v] = std::max(around[v], middle_[t]);
+  std::vector<double> seen(mesh_.vertex_count);
+  tbb::parallel_for(std::uint32_t{0}, mesh_.vertex_count, [&](std::uint32_t v) {
+    seen[v] = std::max(around[vertex_of_[v]], swept_.at_vertex(v, enough));
+  });
+  return seen;
+}
+
+double FieldError::proven(double seen) const {
+  const FieldNearMesh near_mesh(mesh_);
+  const double target = kSlack * seen + kRounding;
+  const double of_field = largest(middle_.size(), [&](std::size_t t) {
+    return near_mesh.bound(part_of(field_, t), target, middle_[t]);
+  });
+  const double of_mesh = largest(mesh_.triangle_count, [&](std::size_t t) {
+    return swept_.bound(static_cast<std::uint32_t>(t), target);
   });
   return std::max(of_field, of_mesh) + kRounding;
 }

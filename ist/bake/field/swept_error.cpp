@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kSmallestPart = 0.2;  // of the target: smaller prisms are taken for their centres
 constexpr double kSlack = 1.25;        // of a target over the distance of a centre
+constexpr double kFar = 1e3;           // further than anything in the unit frame
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 double between(const std::array<double, 3>& a, const std::array<double, 3>& b) {
@@ -93,12 +94,14 @@ std::span<const std::uint32_t> SweptError::star(std::uint32_t field_vertex) cons
   return {around_.data() + first_[field_vertex], around_.data() + first_[field_vertex + 1]};
 }
 
-double SweptError::at_vertex(std::uint32_t vertex) const {
+double SweptError::at_vertex(std::uint32_t vertex, double enough) const {
   const double* x = mesh_.vertices + 3 * std::size_t{vertex};
-  double least2 = kInfinite;
+  double least2 = kFar * kFar;
   for (const std::uint32_t t : star(vertex_of_[vertex]))
     least2 = std::min(least2, distance2(t, {x[0], x[1], x[2]}));
-  return least2 < kInfinite ? std::sqrt(least2) : 0;
+  const double least = std::sqrt(least2);
+  if (least <= enough) return least;
+  return exact_closest_point(hierarchy_.view(), {x[0], x[1], x[2]}, least).distance;
 }
 
 double SweptError::farthest2(std::uint32_t field_triangle, const Prism& prism,
@@ -136,7 +139,7 @@ double SweptError::bound(const Prism& prism, std::span<const std::uint32_t> cand
   }
   // The field may have another triangle that is nearer.
   const ClosestPoint closest = exact_closest_point(
-      hierarchy_.view(), {c[0], c[1], c[2]}, nearest != kNoTriangle ? std::sqrt(least2) : 1e3);
+      hierarchy_.view(), {c[0], c[1], c[2]}, nearest != kNoTriangle ? std::sqrt(least2) : kFar);
   const double distance = closest.distance;
   if (distance + radius <= target) return distance + radius;
   if (closest.triangle != kNoTriangle) {

@@ -20,9 +20,8 @@ class SweptError {
   SweptError(const MeshView& mesh, const FieldMesh& field, const FieldHierarchy& hierarchy,
              const std::vector<std::uint32_t>& vertex_of);
 
-  /// A vertex of the mesh from the field's triangles about its place there: no less than its
-  /// distance. 0 where the field has none there.
-  double at_vertex(std::uint32_t vertex) const;
+  /// Of a used vertex of the mesh where it starts from; exact where above `enough`, else no less.
+  double at_vertex(std::uint32_t vertex, double enough) const;
 
   /// A bound for all points that a triangle of the mesh sweeps, at most `target` where that can be
   /// shown.

@@ -46,18 +46,6 @@ Clusters find_clusters(const MeshView& mesh, double cell) {
   return clusters;
 }
 
-/// The triangles over clusters of three different corners.
-std::vector<FieldMesh::Triangle> spanning(const MeshView& mesh, const Clusters& clusters) {
-  std::vector<FieldMesh::Triangle> triangles;
-  for (std::size_t t = 0; t < mesh.triangle_count; ++t) {
-    FieldMesh::Triangle corners;
-    for (std::size_t k = 0; k < 3; ++k) corners[k] = clusters.of_vertex[mesh.triangles[3 * t + k]];
-    if (corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0])
-      triangles.push_back(corners);
-  }
-  return triangles;
-}
-
 /// The corners 3t + k of each cluster in ascending order.
 struct CornerLists {
   std::vector<std::uint32_t> first, corner;
@@ -104,8 +92,8 @@ void solve(const double a[3][3], const double b[3], double x[3]) {
 
 /// Where a cluster of these corners goes: as near as can be to the planes of their triangles,
 /// weighted by area.
-std::array<double, 3> place(const MeshView& mesh, const std::uint32_t* corners, std::size_t count,
-                            const std::vector<std::array<double, 3>>& areas) {
+std::array<double, 3> placed(const MeshView& mesh, const std::uint32_t* corners, std::size_t count,
+                             const std::vector<std::array<double, 3>>& areas) {
   double weight = 0, mean[3] = {};
   for (std::size_t i = 0; i < count; ++i) {
     const double* n = areas[corners[i] / 3].data();
@@ -140,35 +128,129 @@ std::array<double, 3> place(const MeshView& mesh, const std::uint32_t* corners, 
   return {mean[0] + y[0], mean[1] + y[1], mean[2] + y[2]};
 }
 
-}  // namespace
-
-std::size_t clustered_triangles(const MeshView& mesh, double cell) {
-  return reduced(spanning(mesh, find_clusters(mesh, cell))).size();
+/// Of the plane of a corner's triangle that passes farthest from p.
+double farthest_plane(const MeshView& mesh, const std::array<double, 3>& p,
+                      const std::uint32_t* corners, std::size_t count,
+                      const std::vector<std::array<double, 3>>& areas) {
+  double most = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double* n = areas[corners[i] / 3].data();
+    const double area = std::sqrt(dot3(n, n));
+    if (!(area > 0)) continue;
+    const double* x = mesh.vertices + 3 * std::size_t{mesh.triangles[corners[i]]};
+    const double off[3] = {x[0] - p[0], x[1] - p[1], x[2] - p[2]};
+    most = std::max(most, std::fabs(dot3(n, off)) / area);
+  }
+  return most;
 }
 
-Clustered cluster_vertices(const MeshView& mesh, double cell) {
-  const Clusters clusters = find_clusters(mesh, cell);
-  const CornerLists lists(mesh, clusters);
+}  // namespace
+
+VertexClusters::VertexClusters(const MeshView& mesh, double coarsest, int levels) : mesh_(mesh) {
   std::vector<std::array<double, 3>> areas(mesh.triangle_count);
   tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count,
                     [&](std::uint32_t t) { areas[t] = doubled_area(mesh, t); });
-  Clustered out;
-  out.mesh.vertices.resize(clusters.cell.size());
-  tbb::parallel_for(std::size_t{0}, clusters.cell.size(), [&](std::size_t c) {
-    const std::size_t count = lists.first[c + 1] - lists.first[c];
-    if (count == 0) return;
-    const std::array<double, 3> x = place(mesh, lists.corner.data() + lists.first[c], count, areas);
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double low = (clusters.cell[c][k] - kShift[k] - 0.5) * cell;
-      out.mesh.vertices[c][k] = static_cast<float>(std::clamp(x[k], low, low + 2 * cell));
+  double cell = coarsest;
+  for (int l = 0; l < levels; ++l, cell /= 2) {
+    Clusters clusters = find_clusters(mesh, cell);
+    const CornerLists lists(mesh, clusters);
+    Level& level = levels_.emplace_back();
+    level.place.resize(clusters.cell.size());
+    level.off.resize(clusters.cell.size());
+    tbb::parallel_for(std::size_t{0}, clusters.cell.size(), [&](std::size_t c) {
+      const std::uint32_t* const corners = lists.corner.data() + lists.first[c];
+      const std::size_t count = lists.first[c + 1] - lists.first[c];
+      if (count == 0) return;
+      std::array<double, 3> x = placed(mesh, corners, count, areas);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double low = (clusters.cell[c][k] - kShift[k] - 0.5) * cell;
+        x[k] = std::clamp(x[k], low, low + 2 * cell);
+      }
+      level.place[c] = x;
+      level.off[c] = farthest_plane(mesh, x, corners, count, areas);
+    });
+    level.of_vertex = std::move(clusters.of_vertex);
+  }
+}
+
+std::vector<std::uint32_t> VertexClusters::chosen(double tolerance) const {
+  std::vector<std::uint32_t> cluster_of(mesh_.vertex_count);
+  tbb::parallel_for(std::uint32_t{0}, mesh_.vertex_count, [&](std::uint32_t v) {
+    std::size_t before = 0;
+    for (const Level& level : levels_) {
+      const std::uint32_t cluster = level.of_vertex[v];
+      if (level.off[cluster] <= tolerance) {
+        cluster_of[v] = static_cast<std::uint32_t>(before + cluster);
+        return;
+      }
+      before += level.place.size();
     }
+    cluster_of[v] = static_cast<std::uint32_t>(before + v);
   });
-  out.mesh.triangles = spanning(mesh, clusters);
+  return cluster_of;
+}
+
+void VertexClusters::raise(const std::vector<double>& distance_of_vertex, double tolerance) {
+  const std::vector<std::uint32_t> cluster_of = chosen(tolerance);
+  for (std::size_t v = 0; v < cluster_of.size(); ++v) {
+    std::size_t cluster = cluster_of[v];
+    for (Level& level : levels_) {
+      if (cluster < level.off.size()) {
+        level.off[cluster] = std::max(level.off[cluster], distance_of_vertex[v]);
+        break;
+      }
+      cluster -= level.off.size();
+    }
+  }
+}
+
+std::vector<FieldMesh::Triangle> VertexClusters::spanning(
+    const std::vector<std::uint32_t>& cluster_of) const {
+  std::vector<FieldMesh::Triangle> triangles;
+  for (std::size_t t = 0; t < mesh_.triangle_count; ++t) {
+    FieldMesh::Triangle corners;
+    for (std::size_t k = 0; k < 3; ++k) corners[k] = cluster_of[mesh_.triangles[3 * t + k]];
+    if (corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0])
+      triangles.push_back(corners);
+  }
+  return triangles;
+}
+
+std::size_t VertexClusters::triangles_within(double tolerance) const {
+  return reduced(spanning(chosen(tolerance))).size();
+}
+
+Clustered VertexClusters::within(double tolerance) const {
+  const std::vector<std::uint32_t> cluster_of = chosen(tolerance);
+  Clustered out;
+  // Only clusters that are chosen become vertices.
+  std::size_t names = mesh_.vertex_count;
+  for (const Level& level : levels_) names += level.place.size();
+  std::vector<std::uint32_t> vertex_of_cluster(names, kNoTriangle);
+  out.vertex_of.resize(mesh_.vertex_count);
+  for (std::uint32_t v = 0; v < mesh_.vertex_count; ++v) {
+    std::uint32_t& vertex = vertex_of_cluster[cluster_of[v]];
+    if (vertex == kNoTriangle) {
+      vertex = static_cast<std::uint32_t>(out.mesh.vertices.size());
+      const std::array<double, 3> x = place_of(cluster_of[v], v);
+      out.mesh.vertices.push_back(
+          {static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])});
+    }
+    out.vertex_of[v] = vertex;
+  }
+  out.mesh.triangles = spanning(out.vertex_of);
   const std::vector<std::uint32_t> merged = reduce(out.mesh);
-  out.vertex_of.resize(mesh.vertex_count);
-  for (std::size_t v = 0; v < out.vertex_of.size(); ++v)
-    out.vertex_of[v] = merged[clusters.of_vertex[v]];
+  for (std::uint32_t& vertex : out.vertex_of) vertex = merged[vertex];
   return out;
+}
+
+std::array<double, 3> VertexClusters::place_of(std::size_t cluster, std::uint32_t vertex) const {
+  for (const Level& level : levels_) {
+    if (cluster < level.place.size()) return level.place[cluster];
+    cluster -= level.place.size();
+  }
+  const double* x = mesh_.vertices + 3 * std::size_t{vertex};
+  return {x[0], x[1], x[2]};
 }
 
 }  // namespace ist

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -15,16 +16,40 @@ struct Clustered {
   std::vector<std::uint32_t> vertex_of;  ///< a mesh vertex's place in `mesh`
 };
 
-/// Smallest cell of the grid of clusters, unit frame.
-inline constexpr double kSmallestCell = 0x1p-18;
+/// Clusters of a closed mesh's vertices: those in one cell of an octree become one, in cells as
+/// large as a tolerance allows. What is left of the triangles is closed, and as a chain the image
+/// of the mesh. Deterministic.
+class VertexClusters {
+ public:
+  /// `mesh`: arrays alone; its vertices must outlive this. `coarsest`: edge of the largest cells,
+  /// unit frame, > 0; halved from level to level.
+  VertexClusters(const MeshView& mesh, double coarsest, int levels);
 
-/// Vertices of a closed mesh (arrays alone) in one cell of a uniform grid become one, placed near
-/// the planes of the triangles there, at most half a cell outside of the cell. What is left of the
-/// triangles is closed, and as a chain the image of the mesh. `cell`: edge, unit frame, ≥
-/// kSmallestCell. Deterministic.
-Clustered cluster_vertices(const MeshView& mesh, double cell);
+  /// Vertices go to the largest cell in which the planes of all triangles pass within `tolerance`
+  /// (unit frame) of the cluster's place; where no cell is small enough, they stay.
+  Clustered within(double tolerance) const;
 
-/// How many triangles cluster_vertices() leaves before coordinates are rounded.
-std::size_t clustered_triangles(const MeshView& mesh, double cell);
+  /// Counts a vertex as so far (unit frame) from the cluster that within() put it into, if that is
+  /// further than its planes are.
+  void raise(const std::vector<double>& distance_of_vertex, double tolerance);
+
+  /// How many triangles within() leaves before coordinates are rounded.
+  std::size_t triangles_within(double tolerance) const;
+
+ private:
+  struct Level {
+    std::vector<std::uint32_t> of_vertex;
+    std::vector<std::array<double, 3>> place;  ///< [cluster] unit frame
+    std::vector<double> off;                   ///< [cluster] of the farthest plane, unit frame
+  };
+
+  /// Names of clusters of all levels, and of single vertices after them.
+  std::vector<std::uint32_t> chosen(double tolerance) const;
+  std::array<double, 3> place_of(std::size_t cluster, std::uint32_t vertex) const;
+  std::vector<FieldMesh::Triangle> spanning(const std::vector<std::uint32_t>& cluster_of) const;
+
+  const MeshView mesh_;
+  std::vector<Level> levels_;
+};
 
 }  // namespace ist

@@ -35,6 +35,8 @@ void check_settings(const PackingSettings& s) {
           "at most 1024 (0 = automatic)");
   require(s.grids.refinements <= 10, "grids.refinements", s.grids.refinements,
           "at most 10 (negative = automatic)");
+  require(s.field.error >= 0 && std::isfinite(s.field.error), "field.error", s.field.error,
+          "finite and not negative (0 = none is asked for)");
   if (s.max_spheres == 0 && s.target_coverage >= 1 && s.min_radius <= 0 && s.time_limit <= 0)
     throw Error(
         "packing: no limit is set; give a sphere count, a coverage below 1, a smallest radius or a "

@@ -1,0 +1,149 @@
+#include "bake/check/check_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "bake/check/check_tally.h"
+
+namespace ist {
+namespace {
+
+using Corners = CheckSurface::Corners;
+using Point = Eigen::Vector3d;
+
+/// Every edge is run as often one way as the other.
+Invariant closed(const std::vector<Corners>& triangles) {
+  using Key = std::array<double, 6>;
+  std::map<Key, std::ptrdiff_t> balance;
+  for (const Corners& t : triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Point &a = t[k], &b = t[(k + 1) % 3];
+      const bool up = std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+      const Point &low = up ? a : b, &high = up ? b : a;
+      balance[{low[0], low[1], low[2], high[0], high[1], high[2]}] += up ? 1 : -1;
+    }
+  Tally tally;
+  std::size_t edge = 0;
+  for (const auto& [key, sum] : balance) tally.add(static_cast<double>(std::abs(sum)), edge++);
+  return tally.named("field closed", "runs of an edge one way less those the other way");
+}
+
+/// Proves triangles within `error` of a surface: a part lies as near as its centre and its radius
+/// say, or as its farthest corner from one triangle; else its halves are proven.
+class NearProof {
+ public:
+  NearProof(const CheckSurface& to, double error)
+      : to_(to), error_(error * (1 + 1e-6) + 1e-11), smallest_(std::max(1e-3 * error, 1e-9)) {}
+
+  void prove(const Corners& part, std::size_t index, Tally& tally) const {
+    int left = kMostParts;
+    tally.add(beyond(part, left) - error_, index);
+  }
+
+ private:
+  static constexpr int kMostParts = 100'000;
+
+  /// A distance of the part's points that is ≤ error_ if all are.
+  double beyond(const Corners& part, int& left) const {
+    const Point centre = (part[0] + part[1] + part[2]) / 3;
+    double radius = 0;
+    for (const Point& p : part) radius = std::max(radius, (p - centre).norm());
+    const auto [distance, triangle] = to_.nearest(centre);
+    if (distance > error_ || distance + radius <= error_ || radius <= smallest_) return distance;
+    double farthest = 0;
+    for (const Point& p : part)
+      farthest = std::max(farthest, squared_distance_to_triangle(p, to_.triangles()[triangle]));
+    if (std::sqrt(farthest) <= error_) return std::sqrt(farthest);
+    if (--left < 0) return distance + radius;
+    std::size_t from = 0;
+    for (std::size_t k = 1; k < 3; ++k)
+      if (side(part, k) > side(part, from)) from = k;
+    const std::size_t to = (from + 1) % 3;
+    Corners first = part, second = part;
+    first[to] = second[from] = (part[from] + part[to]) / 2;
+    return std::max(beyond(first, left), beyond(second, left));
+  }
+
+  static double side(const Corners& part, std::size_t from) {
+    return (part[(from + 1) % 3] - part[from]).norm();
+  }
+
+  const CheckSurface& to_;
+  double error_, smallest_;
+};
+
+Invariant near(const char* name, const char* of, const std::vector<Corners>& triangles,
+               const CheckSurface& to, double error) {
+  const NearProof proof(to, error);
+  return tally_all(triangles.size(),
+                   [&](std::size_t i, Tally& tally) { proof.prove(triangles[i], i, tally); })
+      .named(name,
+             std::string("distance of a point of the ") + of + " − the field's error, unit frame");
+}
+
+/// Those triangles between inside and outside: others are of shells within the solid.
+std::vector<Corners> boundary(const CheckSurface& surface) {
+  const std::vector<Corners>& all = surface.triangles();
+  std::vector<char> bounds(all.size());
+  tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
+    const Point normal = (all[i][1] - all[i][0]).cross(all[i][2] - all[i][0]);
+    const Point step = normal.normalized() * 1e-9;
+    const Point middle = (all[i][0] + all[i][1] + all[i][2]) / 3;
+    bounds[i] = surface.winding(middle + step) <= 0 && surface.winding(middle - step) >= 1;
+  });
+  std::vector<Corners> kept;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (bounds[i] != 0) kept.push_back(all[i]);
+  return kept;
+}
+
+/// Every ball holds the triangles below it.
+Invariant balls(const AssetHeader& asset, const FieldHeader& field,
+                const FieldTriangles& triangles) {
+  Tally sum;
+  std::size_t number = 0;
+  for (std::uint32_t k = 1; k < field.level_count; ++k) {
+    const std::size_t count = field.level[k - 1].count;
+    sum.add(tally_all(count, [&](std::size_t i, Tally& tally) {
+      const BallBlock& block = at<BallBlock>(asset, field.level[k].blocks)[i / kWidth];
+      const Origin& origin = at<Origin>(asset, field.level[k].origins)[i / kWidth];
+      const std::size_t lane = i % kWidth;
+      const Point centre(origin.x + block.x[lane], origin.y + block.y[lane],
+                         origin.z + block.z[lane]);
+      double reach = 0;
+      const std::size_t end = std::min(triangles.blocks(), (i + 1) << (4 * (k - 1)));
+      for (std::size_t b = i << (4 * (k - 1)); b < end; ++b)
+        for (std::uint32_t l = 0; l < triangles.lanes(b); ++l)
+          for (const Point& p : triangles.corners(b, l))
+            reach = std::max(reach, (p - centre).norm());
+      tally.add(reach - double{block.r[lane]}, number + i);
+    }));
+    number += count;
+  }
+  return sum.named("field balls", "reach of the triangles below a ball − its radius, unit frame");
+}
+
+}  // namespace
+
+std::vector<Invariant> check_field(const AssetHeader& asset, const CheckSurface& surface,
+                                   bool several_shells) {
+  if (asset.field == 0) return {};
+  const FieldHeader& field = *at<FieldHeader>(asset, asset.field);
+  const FieldTriangles triangles(asset, field);
+  const CheckSurface of_field(triangles.all());
+  std::optional<CheckSurface> kept;
+  if (several_shells) kept.emplace(boundary(surface));
+  const CheckSurface& solid = kept ? *kept : surface;
+  std::vector<Invariant> out = {
+      closed(of_field.triangles()),
+      near("field near mesh", "field from the mesh", of_field.triangles(), solid, field.error),
+      near("mesh near field", "mesh from the field", solid.triangles(), of_field, field.error),
+      balls(asset, field, triangles)};
+  for (Invariant& one : check_field_cells(asset, field, of_field, solid))
+    out.push_back(std::move(one));
+  return out;
+}
+
+}  // namespace ist

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <vector>
+
+#include <ist/bake.h>
+
+#include <ist/asset_layout.h>
+#include "bake/check/check_surface.h"
+
+namespace ist {
+
+/// The field of an asset that has one, against the mesh and by itself: closed, near the solid's
+/// surface, its balls and its cells. `several_shells`: some may lie within the solid.
+std::vector<Invariant> check_field(const AssetHeader& asset, const CheckSurface& surface,
+                                   bool several_shells);
+
+/// The triangles of a field by block and lane.
+class FieldTriangles {
+ public:
+  FieldTriangles(const AssetHeader& asset, const FieldHeader& field)
+      : blocks_(at<SurfaceBlock>(asset, field.level[0].blocks)), count_(field.level[0].count) {}
+
+  std::size_t blocks() const { return count_; }
+  std::uint32_t lanes(std::size_t block) const { return blocks_[block].triangles; }
+  CheckSurface::Corners corners(std::size_t block, std::uint32_t lane) const {
+    CheckSurface::Corners out;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t v = blocks_[block].corner[k][lane];
+      out[k] = {blocks_[block].x[v], blocks_[block].y[v], blocks_[block].z[v]};
+    }
+    return out;
+  }
+  std::vector<CheckSurface::Corners> all() const {
+    std::vector<CheckSurface::Corners> out;
+    for (std::size_t b = 0; b < count_; ++b)
+      for (std::uint32_t l = 0; l < lanes(b); ++l) out.push_back(corners(b, l));
+    return out;
+  }
+
+ private:
+  const SurfaceBlock* blocks_;
+  std::size_t count_;
+};
+
+/// Cells hold what meets them, and their bits are true. `surface`: the boundary of the solid.
+std::vector<Invariant> check_field_cells(const AssetHeader& asset, const FieldHeader& field,
+                                         const CheckSurface& of_field, const CheckSurface& surface);
+
+}  // namespace ist

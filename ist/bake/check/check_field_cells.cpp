@@ -1,0 +1,155 @@
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "bake/check/check_field.h"
+#include "bake/check/check_tally.h"
+
+namespace ist {
+namespace {
+
+using Point = Eigen::Vector3d;
+using Polygon = std::vector<Point>;
+
+/// The part of a polygon where sign · (p[axis] − bound) ≥ 0.
+Polygon cut(const Polygon& polygon, int axis, double bound, double sign) {
+  Polygon out;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Point &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const double from = sign * (a[axis] - bound), to = sign * (b[axis] - bound);
+    if (from >= 0) out.push_back(a);
+    if ((from > 0 && to < 0) || (from < 0 && to > 0))
+      out.push_back(a + (b - a) * (from / (from - to)));
+  }
+  return out;
+}
+
+/// The cells as the file has them.
+class Cells {
+ public:
+  Cells(const AssetHeader& asset, const FieldHeader& field)
+      : field_(field),
+        index_(at<std::uint32_t>(asset, field.brick_index)),
+        bricks_(at<CellBrick>(asset, field.brick_data)),
+        first_(at<std::uint32_t>(asset, field.cell_first)),
+        triangles_(at<std::uint32_t>(asset, field.cell_triangles)) {}
+
+  /// Whether the cell lists the triangle.
+  bool lists(const std::array<std::int64_t, 3>& cell, std::uint32_t triangle) const {
+    for (std::size_t k = 0; k < 3; ++k)
+      if (cell[k] < 0 || cell[k] >= std::int64_t{kBrickWidth} * field_.bricks[k]) return false;
+    const auto x = static_cast<std::uint64_t>(cell[0]), y = static_cast<std::uint64_t>(cell[1]),
+               z = static_cast<std::uint64_t>(cell[2]);
+    const std::uint32_t code =
+        index_[x / 4 + field_.bricks[0] * (y / 4 + std::uint64_t{field_.bricks[1]} * (z / 4))];
+    if (code >= field_.brick_count) return false;
+    const CellBrick& brick = bricks_[code];
+    const std::uint64_t bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
+    if ((brick.surface >> bit & 1) == 0) return false;
+    const std::uint64_t below = brick.surface & ((std::uint64_t{1} << bit) - 1);
+    const std::uint32_t at = brick.first + static_cast<std::uint32_t>(std::popcount(below));
+    return std::find(triangles_ + first_[at], triangles_ + first_[at + 1], triangle) !=
+           triangles_ + first_[at + 1];
+  }
+
+  std::size_t places() const {
+    return std::size_t{field_.bricks[0]} * field_.bricks[1] * field_.bricks[2];
+  }
+
+  /// Runs visit(reference point, holds surface, inside) on the cells of a place; on one of them
+  /// where all are alike.
+  template <class Visit>
+  void visit(std::size_t place, const Visit& visit) const {
+    const std::uint32_t code = index_[place];
+    if (code >= field_.brick_count) return visit(reference(place, 0), false, code == kInsideBrick);
+    for (std::uint32_t bit = 0; bit < 64; ++bit)
+      visit(reference(place, bit), (bricks_[code].surface >> bit & 1) != 0,
+            (bricks_[code].inside >> bit & 1) != 0);
+  }
+
+ private:
+  Point reference(std::size_t place, std::uint32_t bit) const {
+    const std::size_t at[3] = {4 * (place % field_.bricks[0]) + bit % 4,
+                               4 * (place / field_.bricks[0] % field_.bricks[1]) + bit / 4 % 4,
+                               4 * (place / field_.bricks[0] / field_.bricks[1]) + bit / 16};
+    Point p;
+    for (int k = 0; k < 3; ++k)
+      p[k] = field_.low[k] + (static_cast<double>(at[k]) + kCellReference[k]) * field_.cell;
+    return p;
+  }
+
+  const FieldHeader& field_;
+  const std::uint32_t* index_;
+  const CellBrick* bricks_;
+  const std::uint32_t* first_;
+  const std::uint32_t* triangles_;
+};
+
+/// Cuts a triangle along the cells' sides and looks its pieces up.
+class Listing {
+ public:
+  Listing(const FieldHeader& field, const Cells& cells, std::uint32_t triangle, Tally& tally)
+      : field_(field), cells_(cells), triangle_(triangle), tally_(tally) {}
+
+  void look_up(const Polygon& piece, int axis) {
+    if (piece.empty()) return;
+    if (axis == 3) return tally_.add(cells_.lists(cell_, triangle_) ? 0 : 1, triangle_);
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (const Point& p : piece) {
+      low = std::min(low, p[axis]);
+      high = std::max(high, p[axis]);
+    }
+    const auto slab = [&](double x) {
+      return static_cast<std::int64_t>(std::floor((x - field_.low[axis]) / field_.cell));
+    };
+    for (std::int64_t i = slab(low); i <= slab(high); ++i) {
+      cell_[static_cast<std::size_t>(axis)] = i;
+      const double from = field_.low[axis] + static_cast<double>(i) * field_.cell;
+      look_up(cut(cut(piece, axis, from, 1), axis, from + field_.cell, -1), axis + 1);
+    }
+  }
+
+ private:
+  const FieldHeader& field_;
+  const Cells& cells_;
+  const std::uint32_t triangle_;
+  Tally& tally_;
+  std::array<std::int64_t, 3> cell_ = {};
+};
+
+}  // namespace
+
+std::vector<Invariant> check_field_cells(const AssetHeader& asset, const FieldHeader& field,
+                                         const CheckSurface& of_field,
+                                         const CheckSurface& surface) {
+  const FieldTriangles triangles(asset, field);
+  const Cells cells(asset, field);
+  std::vector<Invariant> out;
+  out.push_back(tally_all(triangles.blocks(), [&](std::size_t b, Tally& tally) {
+                  for (std::uint32_t l = 0; l < triangles.lanes(b); ++l) {
+                    const CheckSurface::Corners t = triangles.corners(b, l);
+                    Listing(field, cells, static_cast<std::uint32_t>(kWidth * b + l), tally)
+                        .look_up({t.begin(), t.end()}, 0);
+                  }
+                }).named("field cells", "1 for a cell that does not list a triangle it meets"));
+  out.push_back(tally_all(cells.places(), [&](std::size_t place, Tally& tally) {
+                  cells.visit(place, [&](const Point& p, bool, bool inside) {
+                    tally.add((of_field.winding(p) % 2 != 0) != inside ? 1 : 0, place);
+                  });
+                }).named("field signs", "1 for a cell whose bit is not its reference point's"));
+  out.push_back(
+      tally_all(cells.places(),
+                [&](std::size_t place, Tally& tally) {
+                  cells.visit(place, [&](const Point& p, bool holds_surface, bool inside) {
+                    if (holds_surface || surface.distance(p, 2 * field.error) <= field.error)
+                      return;
+                    tally.add((surface.winding(p) >= 1) != inside ? 1 : 0, place);
+                  });
+                })
+          .named("field inside",
+                 "1 for a cell without surface that lies further than the error from the mesh and "
+                 "on its other side"));
+  return out;
+}
+
+}  // namespace ist
