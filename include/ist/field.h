@@ -69,7 +69,7 @@ struct DistanceGridField {
 
 /// What a look at a field tells.
 struct FieldSample {
-  double distance = 0;  ///< [u] to the surface, positive inside; at most the true one in magnitude
+  double distance = 0;  ///< [u] to the surface, positive inside
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< of the distance
 };
 

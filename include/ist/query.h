@@ -27,6 +27,19 @@ enum class Measure : std::uint32_t {
   inner = 1,    ///< inner spheres: a certified lower bound of the true volume
 };
 
+/// Whether the surface that an asset holds (TreeView::has_field) is used.
+///
+/// A sphere that meets the other solid's surface has an exact part inside it; a lens of two spheres
+/// knows nothing of the surface between a sphere and its neighbours.
+enum class FieldUse : std::uint32_t {
+  /// The finer tree's spheres meet the coarser one's surface where its spheres are too coarse for
+  /// the contact; trees of like size in deeper contact are summed by lenses, and what is between is
+  /// blended smoothly. Without a field in the coarser asset: lenses.
+  automatic = 0,
+  never = 1,   ///< lenses alone
+  always = 2,  ///< the surface alone, whatever it costs
+};
+
 /// What a penetration may cost. Zero, a negative value or NaN means no limit; with none set the
 /// answer is the finished sum.
 ///
@@ -34,6 +47,7 @@ enum class Measure : std::uint32_t {
 /// not opened, and says budget_exhausted.
 struct PenetrationSettings {
   Measure measure = Measure::matched;
+  FieldUse field = FieldUse::automatic;  ///< matched measure only
 
   /// Count of sphere pairs to spend; matched measure only (the inner one has no levels of detail).
   ///
@@ -58,6 +72,7 @@ struct PenetrationSettings {
 /// What contact patches may cost; each limit as in PenetrationSettings.
 struct ContactSettings {
   Measure measure = Measure::matched;
+  FieldUse field = FieldUse::automatic;  ///< matched measure only
   std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
   /// [µs] wall clock from the call. All that is left when visits end is estimated, at 0.1 µs a
   /// pair.

@@ -5,9 +5,10 @@
 
 #include "query/asset/sphere_tree.h"
 #include "query/contact/contact_bins.h"
-#include "query/contact/contact_division.h"
+#include "query/contact/write_patches.h"
 #include "query/descent/descent.h"
 #include "query/descent/workspace.h"
+#include "query/field/pair_overlap.h"
 
 namespace ist {
 namespace {
@@ -25,81 +26,111 @@ bool divides_b(const SphereTree& a, double radius_a, const SphereTree& b, double
   return radius_b <= radius_a;
 }
 
-/// Adds what is missing to the sum of `value(patch)` over the patches to the largest of them, so
-/// that the shares give `whole` but for the last digit.
-template <class T, class Value>
-void complete(std::span<ContactPatch> patches, std::size_t largest, const T& whole, Value value) {
-  for (int round = 0; round < 2; ++round) {
-    T missing = whole;
-    for (ContactPatch& patch : patches) missing -= value(patch);
-    value(patches[largest]) += missing;
+/// Contact patches of two trees, by the method that penetration() takes.
+class PairPatches {
+ public:
+  PairPatches(const PlacedTree& a, const PlacedTree& b, const ContactSettings& settings,
+              const RelativePose& pose, Workspace::Impl& scratch)
+      : a_(a),
+        b_(b),
+        pose_(pose),
+        limits_(limits_of(settings)),
+        scratch_(scratch),
+        tree_a_(sphere_tree(a.tree, settings.measure)),
+        tree_b_(sphere_tree(b.tree, settings.measure)),
+        both_(a, *tree_a_.header, b, *tree_b_.header, pose, scratch),
+        method_(pair_method(
+            a, *tree_a_.header, b, *tree_b_.header, pose,
+            settings.measure == Measure::inner ? FieldUse::never : settings.field)) {}
+
+  ContactPatches run(std::span<ContactPatch> patches) {
+    ContactPatches result;
+    ExactWeight weight;
+    Penetration lenses;
+    if (method_.lenses) {
+      const double radius_a = tree_a_.header->root[3];
+      const double radius_b = tree_b_.header->root[3] * pose_.a_from_b.scale;
+      const bool of_b = divides_b(tree_a_, radius_a, tree_b_, radius_b);
+      scratch_.contact.start(of_b ? tree_b_ : tree_a_, of_b);
+      Descent descent(tree_a_, tree_b_, pose_, limits_, scratch_, &scratch_.contact);
+      descent.run();
+      lenses = descent.penetration();
+      const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
+      weight = exact_weight(method_, lenses.volume / unit3);
+      result.penetration =
+          weight.weight == 0
+              ? lenses
+              : blended(lenses, both_.exact(method_.b_probes, limits_), weight, unit3);
+      // The patches are those of the larger part.
+      if (weight.weight < 0.5) {
+        if (weight.weight > 0) {  // the surface's descent has used the scratch
+          scratch_.contact.start(of_b ? tree_b_ : tree_a_, of_b);
+          Descent again(tree_a_, tree_b_, pose_, limits_, scratch_, &scratch_.contact);
+          again.run();
+        }
+        result.count = write_patches({scratch_.contact,
+                                      scratch_.contact.collect(descent.precision()), pose_,
+                                      of_b ? radius_b : radius_a},
+                                     result.penetration, patches);
+        return result;
+      }
+    }
+    const bool b_probes = method_.b_probes;
+    scratch_.contact.start(b_probes ? tree_b_ : tree_a_, true);
+    const Penetration sum = both_.exact(b_probes, limits_, &scratch_.contact);
+    if (!method_.lenses) result.penetration = sum;
+    const std::uint32_t filled = scratch_.contact.collect(Precision::float64);
+    if (b_probes) {
+      result.count = write_patches({scratch_.contact, filled, pose_,
+                                    tree_b_.header->root[3] * pose_.a_from_b.scale},
+                                   result.penetration, patches);
+      return result;
+    }
+    // A's spheres probe B: the patches come as pushes on A.
+    const std::optional<RelativePose> turned = relative_pose(b_, a_);
+    if (!turned) return result;
+    result.count = write_patches({scratch_.contact, filled, *turned,
+                                  tree_a_.header->root[3] * turned->a_from_b.scale},
+                                 turned_over(result.penetration, b_, a_), patches);
+    Eigen::Vector3d between;
+    for (int k = 0; k < 3; ++k) between[k] = a_.pose.t[k] - b_.pose.t[k];
+    for (ContactPatch& patch : patches.first(result.count)) {
+      patch.torque = -(patch.torque + between.cross(patch.force));
+      patch.force = -patch.force;
+    }
+    return result;
   }
-}
+
+  double deepest() const {
+    return 2 * pose_.unit_a *
+           std::min(tree_a_.header->root[3], tree_b_.header->root[3] * pose_.a_from_b.scale);
+  }
+
+ private:
+  const PlacedTree& a_;
+  const PlacedTree& b_;
+  const RelativePose& pose_;
+  const DescentLimits limits_;
+  Workspace::Impl& scratch_;
+  const SphereTree tree_a_, tree_b_;
+  PairOverlap both_;
+  const PairMethod method_;
+};
 
 }  // namespace
 
 ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept {
-  ContactPatches result;
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) {
-    result.penetration.status = QueryStatus::invalid_input;
-    return result;
+    ContactPatches refused;
+    refused.penetration.status = QueryStatus::invalid_input;
+    return refused;
   }
-  const SphereTree tree_a = sphere_tree(a.tree, settings.measure);
-  const SphereTree tree_b = sphere_tree(b.tree, settings.measure);
-  const double radius_a = tree_a.header->root[3];
-  const double radius_b = tree_b.header->root[3] * pose->a_from_b.scale;
-  ContactBins& bins = workspace.impl()->contact;
-  const bool of_b = divides_b(tree_a, radius_a, tree_b, radius_b);
-  bins.start(of_b ? tree_b : tree_a, of_b);
-  Descent descent(tree_a, tree_b, *pose, limits_of(settings), *workspace.impl(), &bins);
-  descent.run();
-  result.penetration = descent.penetration();
-  const Penetration& whole = result.penetration;
-
-  if (patches.empty()) return result;
-  ContactDivision division(bins, bins.collect(descent.precision()), of_b ? radius_b : radius_a);
-  division.run(patches.size());
-  result.count = division.size();
-  if (result.count == 0) return result;
-  const std::span<ContactPatch> out = patches.first(result.count);
-
-  const double unit = pose->unit_a;
-  const Eigen::Vector3d origin_b(pose->a_from_b.t[0], pose->a_from_b.t[1], pose->a_from_b.t[2]);
-  double volume = 0;
-  std::size_t largest = 0;
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    const ContactPart& part = bins.parts()[i];
-    const Overlap sum = division.sum(part);
-    ContactPatch& patch = out[i];
-    patch = ContactPatch();
-    patch.id = part.id;
-    patch.volume = unit * unit * unit * sum.volume;
-    patch.centroid = sum.volume > 0 ? pose->to_world(sum.moment / sum.volume + origin_b)
-                                    : Eigen::Vector3d(whole.centroid);
-    patch.force = -(unit * unit) * (pose->rotation_a * sum.force);
-    patch.torque = -(unit * unit * unit) * (pose->rotation_a * sum.torque) +
-                   pose->unit_offset_b.cross(patch.force);
-    volume += patch.volume;
-    if (patch.volume > out[largest].volume) largest = i;
-  }
-
-  // The whole is summed in another order, and bounded.
-  for (ContactPatch& patch : out) patch.volume *= volume > 0 ? whole.volume / volume : 0;
-  complete(out, largest, whole.volume, [](ContactPatch& p) -> double& { return p.volume; });
-  complete<Eigen::Vector3d>(out, largest, -whole.translation_gradient,
-                            [](ContactPatch& p) -> Eigen::Vector3d& { return p.force; });
-  complete<Eigen::Vector3d>(out, largest, -whole.rotation_gradient,
-                            [](ContactPatch& p) -> Eigen::Vector3d& { return p.torque; });
-  const double deepest = 2 * unit * std::min(radius_a, radius_b);
-  for (ContactPatch& patch : out) {
-    patch.area = patch.force.norm();
-    if (!(patch.area > 0)) continue;
-    patch.normal = patch.force / patch.area;
-    patch.depth = std::min(patch.volume / patch.area, deepest);
-  }
+  PairPatches both(a, b, settings, *pose, *workspace.impl());
+  const ContactPatches result = both.run(patches);
+  finish_patches(patches.first(result.count), both.deepest());
   return result;
 }
 

@@ -1,8 +1,8 @@
 #include <ist/query.h>
 
-#include "query/descent/descent.h"
 #include "query/detail/coincident.h"
 #include "query/detail/detail_blend.h"
+#include "query/field/pair_overlap.h"
 
 namespace ist {
 
@@ -17,11 +17,14 @@ Penetration penetration(const PlacedTree& a, const PlacedTree& b,
   if (settings.measure == Measure::matched &&
       (settings.pair_budget > 0 || are_one_asset(a.tree.header(), b.tree.header())))
     return blend_details(a, b, *pose, settings, workspace);
-  const SphereTree tree_a = sphere_tree(a.tree, settings.measure);
-  const SphereTree tree_b = sphere_tree(b.tree, settings.measure);
-  Descent descent(tree_a, tree_b, *pose, limits_of(settings), *workspace.impl());
-  descent.run();
-  return descent.penetration();
+  const AssetHeader& header_a = a.tree.header();
+  const AssetHeader& header_b = b.tree.header();
+  const bool inner = settings.measure == Measure::inner;
+  const TreeHeader& tree_a = inner ? header_a.inner_tree : header_a.matched_tree;
+  const TreeHeader& tree_b = inner ? header_b.inner_tree : header_b.matched_tree;
+  PairOverlap both(a, tree_a, b, tree_b, *pose, *workspace.impl());
+  const FieldUse use = inner ? FieldUse::never : settings.field;
+  return both.by(pair_method(a, tree_a, b, tree_b, *pose, use), limits_of(settings));
 }
 
 }  // namespace ist

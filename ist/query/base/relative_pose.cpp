@@ -18,22 +18,29 @@ struct Frame {
   double unit;                  ///< [u]
 };
 
-std::optional<Frame> frame_of(const PlacedTree& placed) {
-  if (placed.tree.empty()) return std::nullopt;
-  const double* q = placed.pose.q;
-  const double* t = placed.pose.t;
+std::optional<Frame> frame_of(const Pose& pose, double scale) {
+  const double* q = pose.q;
+  const double* t = pose.t;
   const double norm = std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
   if (!(std::abs(norm - 1) <= 1e-3)) return std::nullopt;
   if (!std::isfinite(t[0]) || !std::isfinite(t[1]) || !std::isfinite(t[2])) return std::nullopt;
-  if (!(placed.scale > 0) || !std::isfinite(placed.scale)) return std::nullopt;
-
-  const AssetHeader& header = placed.tree.header();
+  if (!(scale > 0) || !std::isfinite(scale)) return std::nullopt;
   Frame frame;
   frame.rotation = Eigen::Quaterniond(q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm);
   frame.translation = Eigen::Vector3d(t[0], t[1], t[2]);
-  frame.offset =
+  frame.offset = Eigen::Vector3d::Zero();
+  frame.unit = scale;
+  return frame;
+}
+
+std::optional<Frame> frame_of(const PlacedTree& placed) {
+  if (placed.tree.empty()) return std::nullopt;
+  std::optional<Frame> frame = frame_of(placed.pose, placed.scale);
+  if (!frame) return std::nullopt;
+  const AssetHeader& header = placed.tree.header();
+  frame->offset =
       placed.scale * Eigen::Vector3d(header.centre[0], header.centre[1], header.centre[2]);
-  frame.unit = std::ldexp(placed.scale, header.exponent);
+  frame->unit = std::ldexp(placed.scale, header.exponent);
   return frame;
 }
 
@@ -47,11 +54,8 @@ Similarity similarity(double scale, const Eigen::Matrix3d& rotation, const Eigen
   return s;
 }
 
-}  // namespace
-
-std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree& b) noexcept {
-  const std::optional<Frame> fa = frame_of(a);
-  const std::optional<Frame> fb = frame_of(b);
+std::optional<RelativePose> relative(const std::optional<Frame>& fa,
+                                     const std::optional<Frame>& fb) {
   if (!fa || !fb) return std::nullopt;
 
   const Eigen::Matrix3d rotation = (fa->rotation.conjugate() * fb->rotation).toRotationMatrix();
@@ -69,6 +73,17 @@ std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree&
   pose.unit_offset_b = fb->rotation * fb->offset;
   pose.unit_a = fa->unit;
   return pose;
+}
+
+}  // namespace
+
+std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree& b) noexcept {
+  return relative(frame_of(a), frame_of(b));
+}
+
+std::optional<RelativePose> relative_pose(const Pose& a, double scale_a,
+                                          const PlacedTree& b) noexcept {
+  return relative(frame_of(a, scale_a), frame_of(b));
 }
 
 }  // namespace ist

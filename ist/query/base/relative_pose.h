@@ -39,4 +39,8 @@ struct RelativePose {
 /// Empty if a pose or scale is not usable (QueryStatus::invalid_input) or a tree is empty.
 std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree& b) noexcept;
 
+/// The same where A is no tree: its unit frame is its own.
+std::optional<RelativePose> relative_pose(const Pose& a, double scale_a,
+                                          const PlacedTree& b) noexcept;
+
 }  // namespace ist

@@ -4,9 +4,9 @@
 #include <chrono>
 #include <cmath>
 
-#include "query/descent/descent.h"
 #include "query/detail/coincident.h"
 #include "query/detail/detail_chain.h"
+#include "query/field/pair_overlap.h"
 
 namespace ist {
 namespace {
@@ -16,7 +16,9 @@ class DetailQueries {
  public:
   DetailQueries(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
                 const PenetrationSettings& settings, Workspace& workspace) noexcept
-      : a_(a.tree.header()),
+      : placed_a_(a),
+        placed_b_(b),
+        a_(a.tree.header()),
         b_(b.tree.header()),
         pose_(pose),
         settings_(settings),
@@ -44,6 +46,11 @@ class DetailQueries {
     return mixed;
   }
 
+  /// Whether asking a pair of levels is no more than its sum of lenses.
+  bool by_lenses_alone(const DetailPair& pair) const noexcept {
+    return coincidence_weight_of(pair).weight == 0 && !method_of(pair).exact;
+  }
+
   CoincidenceWeight coincidence_weight_of(const DetailPair& pair) const noexcept {
     return same_asset_ && pair.a == pair.b
                ? coincidence_weight(matched_tree(a_, pair.a), pose_.a_from_b)
@@ -58,6 +65,11 @@ class DetailQueries {
   // [µs] A deadline that is over before anything is opened: nothing but the roots is looked at.
   static constexpr double kNoTime = 1e-6;
 
+  PairMethod method_of(const DetailPair& pair) const noexcept {
+    return pair_method(placed_a_, matched_tree(a_, pair.a), placed_b_, matched_tree(b_, pair.b),
+                       pose_, settings_.field);
+  }
+
   Penetration descend(const DetailPair& pair, double relative_error, double min_radius,
                       bool keep_rounding = false) noexcept {
     DescentLimits limits = limits_of(settings_);
@@ -71,17 +83,19 @@ class DetailQueries {
       limits.max_visits = settings_.max_visits - visits_;
       if (limits.max_visits == 0) limits.deadline_us = kNoTime;
     }
-    const SphereTree tree_a(a_, matched_tree(a_, pair.a));
-    const SphereTree tree_b(b_, matched_tree(b_, pair.b));
-    Descent descent(tree_a, tree_b, pose_, limits, *workspace_.impl());
-    if (keep_rounding) descent.keep_rounding();
-    descent.run();
-    Penetration answer = descent.penetration();
+    const TreeHeader& tree_a = matched_tree(a_, pair.a);
+    const TreeHeader& tree_b = matched_tree(b_, pair.b);
+    PairOverlap both(placed_a_, tree_a, placed_b_, tree_b, pose_, *workspace_.impl());
+    const Penetration answer =
+        keep_rounding ? both.by_lenses(limits, true)
+                      : both.by(method_of(pair), limits);
     visits_ += answer.node_visits;
     pairs_ += answer.sphere_pairs;
     return answer;
   }
 
+  const PlacedTree& placed_a_;
+  const PlacedTree& placed_b_;
   const AssetHeader& a_;
   const AssetHeader& b_;
   const RelativePose& pose_;
@@ -133,7 +147,7 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       const double weight = weights[i].weight;
       if (weight == 0 && weights[i].slope == 0) continue;
       const Penetration part =
-          i + 1 == chain.size() && !rough && queries.coincidence_weight_of(chain[i]).weight == 0
+          i + 1 == chain.size() && !rough && queries.by_lenses_alone(chain[i])
               ? coarse
               : queries.ask(chain[i], settings.relative_error, settings.min_radius);
       result.volume += weight * part.volume;

@@ -54,6 +54,13 @@ inline std::uint32_t told_sides(const ProbeSums& sums, std::uint32_t& inside) no
   return told;
 }
 
+/// Sides as the surface inside the balls tells them, and as they are told otherwise.
+inline std::uint32_t settled_sides(const ProbeSums& sums, std::uint32_t otherwise) noexcept {
+  std::uint32_t inside;
+  const std::uint32_t told = told_sides(sums, inside);
+  return inside | (otherwise & ~told);
+}
+
 /// The sums of a block of balls once every triangle that reaches them is added. `inside`: whose
 /// centres are, a bit each. `origin`: of the probing tree.
 inline ProbeTotal total_of(const ProbeBalls& balls, const ProbeSums& sums, std::uint32_t inside,

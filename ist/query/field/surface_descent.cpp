@@ -80,17 +80,14 @@ void SurfaceDescent::run() noexcept {
         (surface_level_ > kSphereLevel &&
          typical_cube(balls_, surface_level_) >= cube * probes_.typical_cube(probe_level_));
     if (min_radius_ > 0) drop_small();
-    if (limits_.relative_error > 0 && total_.overlap.volume + held_.cubes[0] > 0) {
+    if (limits_.relative_error > 0 && held_.spheres > 0) {
       const double undecided = waiting() + unopened_;
       if (undecided <= limits_.relative_error * (overlap().volume + undecided)) {
         leave(0);
         return;
       }
     }
-    if (!(open_surface_now ? open_surface() : open_probes())) {
-      leave(0);
-      return;
-    }
+    if (!(open_surface_now ? open_surface() : open_probes())) return;
   }
   if (now.size > 0) sum_leaves();
 }
@@ -110,7 +107,10 @@ bool SurfaceDescent::open_surface() noexcept {
   for (std::size_t done = 0; done < now.size;) {
     const std::size_t room = (scratch_.capacity - next.size) / kWidth;
     const std::size_t n = budget_.grant(std::min({kNodePairs, now.size - done, room}));
-    if (n == 0) return false;
+    if (n == 0) {
+      leave(0);
+      return false;
+    }
     next.size += open_nodes(stage, now.a.get() + done, now.b.get() + done, n,
                             next.a.get() + next.size, next.b.get() + next.size);
     done += n;
@@ -135,16 +135,24 @@ bool SurfaceDescent::open_probes() noexcept {
   PairList& now = scratch_.now;
   PairList& next = scratch_.next;
   if (surface_level_ != kSphereLevel) {
-    if (!reach_children()) return false;
+    if (!reach_children()) {
+      leave(0);
+      return false;
+    }
   }
   std::uint16_t* const masks = scratch_.masks.get();
   next.size = 0;
   for (std::size_t from = 0; from < now.size;) {
     const std::size_t end = group_end(from);
+    if (kWidth * (end - from) > scratch_.capacity - next.size) {
+      leave_both(from);
+      return false;
+    }
     if (surface_level_ == kSphereLevel) {
       const std::size_t granted = budget_.grant(end - from);
       if (granted < end - from) {
         budget_.give_back(granted);
+        leave_both(from);
         return false;
       }
     }
@@ -156,10 +164,6 @@ bool SurfaceDescent::open_probes() noexcept {
     if (surface_level_ != kSphereLevel)
       for (std::uint32_t left = used & ~met; left != 0; left &= left - 1)
         settle(probe_level_ - 1, first + static_cast<std::uint32_t>(std::countr_zero(left)));
-    std::size_t wanted = 0;
-    for (std::size_t i = from; i < end; ++i)
-      wanted += static_cast<std::size_t>(std::popcount(masks[i]));
-    if (wanted > scratch_.capacity - next.size) return false;
     for (std::uint32_t left = met; left != 0; left &= left - 1) {
       const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
       for (std::size_t i = from; i < end; ++i) {
@@ -420,6 +424,14 @@ void SurfaceDescent::leave(std::size_t from) noexcept {
   for (; from < now.size; from = group_end(from))
     unopened_ += probes_.sums(probe_level_, now.b[from]).volume * cube;
   stopped_ = true;
+}
+
+void SurfaceDescent::leave_both(std::size_t from) noexcept {
+  flush();
+  leave(from);
+  std::swap(scratch_.now, scratch_.next);
+  --probe_level_;
+  leave(0);
 }
 
 Overlap SurfaceDescent::overlap() const noexcept {

@@ -85,6 +85,10 @@ class SurfaceDescent {
 
   /// Leaves what is in the list from a pair on unopened.
   void leave(std::size_t from) noexcept;
+
+  /// The same, and all of the next list, which is a level of B further down.
+  void leave_both(std::size_t from) noexcept;
+
   void drop_small() noexcept;
 
   const SurfaceTree& surface_;

@@ -1,0 +1,72 @@
+#include "query/contact/write_patches.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "query/contact/contact_division.h"
+
+namespace ist {
+namespace {
+
+/// Adds what is missing to the sum of `value(patch)` over the patches to the largest of them, so
+/// that the shares give `whole` but for the last digit.
+template <class T, class Value>
+void complete(std::span<ContactPatch> patches, std::size_t largest, const T& whole, Value value) {
+  for (int round = 0; round < 2; ++round) {
+    T missing = whole;
+    for (ContactPatch& patch : patches) missing -= value(patch);
+    value(patches[largest]) += missing;
+  }
+}
+
+}  // namespace
+
+std::size_t write_patches(const Binned& binned, const Penetration& whole,
+                          std::span<ContactPatch> patches) noexcept {
+  if (patches.empty()) return 0;
+  ContactDivision division(binned.bins, binned.filled, binned.radius);
+  division.run(patches.size());
+  if (division.size() == 0) return 0;
+  const std::span<ContactPatch> out = patches.first(division.size());
+
+  const RelativePose& pose = binned.pose;
+  const double unit = pose.unit_a;
+  const Eigen::Vector3d origin_b(pose.a_from_b.t[0], pose.a_from_b.t[1], pose.a_from_b.t[2]);
+  double volume = 0;
+  std::size_t largest = 0;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const ContactPart& part = binned.bins.parts()[i];
+    const Overlap sum = division.sum(part);
+    ContactPatch& patch = out[i];
+    patch = ContactPatch();
+    patch.id = part.id;
+    patch.volume = unit * unit * unit * sum.volume;
+    patch.centroid = sum.volume > 0 ? pose.to_world(sum.moment / sum.volume + origin_b)
+                                    : Eigen::Vector3d(whole.centroid);
+    patch.force = -(unit * unit) * (pose.rotation_a * sum.force);
+    patch.torque = -(unit * unit * unit) * (pose.rotation_a * sum.torque) +
+                   pose.unit_offset_b.cross(patch.force);
+    volume += patch.volume;
+    if (patch.volume > out[largest].volume) largest = i;
+  }
+
+  // The whole is summed in another order, and bounded.
+  for (ContactPatch& patch : out) patch.volume *= volume > 0 ? whole.volume / volume : 0;
+  complete(out, largest, whole.volume, [](ContactPatch& p) -> double& { return p.volume; });
+  complete<Eigen::Vector3d>(out, largest, -whole.translation_gradient,
+                            [](ContactPatch& p) -> Eigen::Vector3d& { return p.force; });
+  complete<Eigen::Vector3d>(out, largest, -whole.rotation_gradient,
+                            [](ContactPatch& p) -> Eigen::Vector3d& { return p.torque; });
+  return out.size();
+}
+
+void finish_patches(std::span<ContactPatch> patches, double deepest) noexcept {
+  for (ContactPatch& patch : patches) {
+    patch.area = patch.force.norm();
+    if (!(patch.area > 0)) continue;
+    patch.normal = patch.force / patch.area;
+    patch.depth = std::min(patch.volume / patch.area, deepest);
+  }
+}
+
+}  // namespace ist

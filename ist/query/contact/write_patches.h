@@ -1,0 +1,25 @@
+#pragma once
+
+#include <ist/query.h>
+
+#include "query/base/relative_pose.h"
+#include "query/contact/contact_bins.h"
+
+namespace ist {
+
+/// How patches are written: what the bins hold, in which frame, and how many bins are filled.
+struct Binned {
+  ContactBins& bins;
+  std::uint32_t filled;
+  const RelativePose& pose;
+  double radius;  ///< of the binned tree's root, A's unit frame
+};
+
+/// Divides what is binned; the patches' shares sum to those of the whole.
+std::size_t write_patches(const Binned& binned, const Penetration& whole,
+                          std::span<ContactPatch> patches) noexcept;
+
+/// Normals, areas and depths of patches whose forces are known.
+void finish_patches(std::span<ContactPatch> patches, double deepest) noexcept;
+
+}  // namespace ist

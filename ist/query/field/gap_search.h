@@ -1,0 +1,131 @@
+#pragma once
+
+#include <algorithm>
+#include <limits>
+
+#include <ist/field.h>
+
+#include "query/base/budget.h"
+#include "query/base/precision.h"
+#include "query/base/relative_pose.h"
+#include "query/descent/workspace.h"
+#include "query/field/shapes.h"
+
+namespace ist {
+
+/// Depth first, nearest child first, for two minima at once: the gap between a field and a tree's
+/// inner spheres, and that of their cover balls. All in the field's frame.
+template <class Shape>
+class GapSearch {
+ public:
+  GapSearch(Shape& shape, const SphereTree& tree, const RelativePose& pose,
+            const SeparationSettings& settings, Workspace::Impl& scratch) noexcept
+      : shape_(shape),
+        tree_(tree),
+        pose_(pose),
+        map_(pose.a_from_b),
+        stack_(scratch.waiting.get()),
+        budget_(limits_of(settings), 0.95) {}
+
+  Separation run() noexcept {
+    const double none = -std::numeric_limits<double>::infinity();
+    push({none, none, 0, 0, tree_.top, 0});
+    while (size_ > 0 && !(gap_ <= 0)) {
+      const WaitingPair pair = stack_[size_ - 1];
+      if (!wanted(pair.gap, pair.cover)) {
+        --size_;
+        continue;
+      }
+      if (budget_.grant(1) == 0) break;
+      --size_;
+      open(pair);
+    }
+    return answer();
+  }
+
+ private:
+  bool wanted(double gap, double cover) const noexcept {
+    return gap < gap_ || (cover_ > 0 && cover < cover_);
+  }
+
+  void push(const WaitingPair& pair) noexcept { stack_[size_++] = pair; }
+
+  void open(const WaitingPair& pair) noexcept {
+    const int level = pair.level_a;
+    const std::uint32_t below = tree_.count(level - 1);
+    const std::size_t first = size_;
+    for (std::uint32_t lane = 0; lane < kWidth && kWidth * pair.a + lane < below; ++lane) {
+      const std::uint32_t child = kWidth * pair.a + lane;
+      const NodeBall ball = tree_.ball(level - 1, child);
+      const double cover_radius =
+          level == 0 ? static_cast<double>(tree_.sphere_cover[child]) : tree_.cover(level - 1, child);
+      double at[3];
+      map_.apply(ball.centre, at);
+      const Eigen::Vector3d x(at[0], at[1], at[2]);
+      const FieldSample sample = shape_.nearest(x);
+      const double gap = -sample.distance - ball.r * map_.scale;
+      const double cover = -sample.distance - cover_radius * map_.scale;
+      if (!wanted(gap, cover)) continue;
+      if (level == 0) {
+        ++pairs_;
+        cover_ = std::min(cover_, cover);
+        if (gap >= gap_) continue;
+        gap_ = gap;
+        centre_ = x;
+        radius_ = ball.r * map_.scale;
+        inward_ = sample.gradient;
+        continue;
+      }
+      std::size_t place = size_++;
+      for (; place > first && stack_[place - 1].gap < gap; --place) stack_[place] = stack_[place - 1];
+      stack_[place] = {gap, cover, child, 0, level - 1, 0};
+    }
+  }
+
+  Separation answer() noexcept {
+    Separation result;
+    result.node_visits = budget_.visits();
+    result.sphere_pairs = pairs_;
+    const bool stopped = size_ > 0 && !(gap_ <= 0);
+    if (stopped) {
+      result.status = QueryStatus::budget_exhausted;
+      for (std::size_t i = 0; i < size_; ++i) cover_ = std::min(cover_, stack_[i].cover);
+    }
+    if (gap_ <= 0) return result;
+    const double unit = pose_.unit_a;
+    const double reach = map_.scale * std::max(tree_.header->root[3], tree_.header->root_cover) +
+                         Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]).norm();
+    const double off = shape_.error() + distance_error(Precision::float64, reach) +
+                       1e-15 * pose_.unit_origin_a.norm() / unit;
+    result.distance_min = unit * std::max(0.0, cover_ - off);
+    if (!(gap_ < std::numeric_limits<double>::infinity())) {  // stopped before any sphere
+      result.distance = result.distance_max = std::numeric_limits<double>::infinity();
+      return result;
+    }
+    result.distance = unit * gap_;
+    result.distance_max = unit * (gap_ + off);
+    const double length = inward_.norm();
+    const Eigen::Vector3d out =
+        length > 0 ? Eigen::Vector3d(-inward_ / length) : Eigen::Vector3d::Zero().eval();
+    result.point_b = pose_.to_world(centre_ - radius_ * out);
+    result.point_a = pose_.to_world(centre_ - (radius_ + gap_) * out);
+    result.normal = pose_.rotation_a * out;
+    return result;
+  }
+
+  Shape& shape_;
+  const SphereTree& tree_;
+  const RelativePose& pose_;
+  const Similarity& map_;
+  WaitingPair* const stack_;
+  std::size_t size_ = 0;
+  Budget budget_;
+  double gap_ = std::numeric_limits<double>::infinity();
+  double cover_ = std::numeric_limits<double>::infinity();
+  Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d inward_ = Eigen::Vector3d::Zero();
+  double radius_ = 0;
+  std::uint32_t pairs_ = 0;
+};
+
+}  // namespace ist

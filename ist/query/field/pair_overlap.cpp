@@ -1,0 +1,150 @@
+#include "query/field/pair_overlap.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "query/base/smooth_step.h"
+#include "query/descent/descent.h"
+#include "query/field/surface_descent.h"
+
+namespace ist {
+namespace {
+
+// Ratio of mean radii from which on the exact sum answers alone.
+constexpr double kUnlike = 4;
+// Overlap in spheres of the coarser tree up to which trees of like size are summed exactly. There
+// lenses are 2 % and more in error, and few spheres meet the surface.
+constexpr double kFewSpheres = 2;
+// The lenses answer alone from so many times that on.
+constexpr double kHandover = 4;
+// [µs] a deadline that is over.
+constexpr double kNoTime = 1e-6;
+
+}  // namespace
+
+Penetration turned_over(Penetration answer, const PlacedTree& moving,
+                        const PlacedTree& other) noexcept {
+  Eigen::Vector3d between;
+  for (int k = 0; k < 3; ++k) between[k] = moving.pose.t[k] - other.pose.t[k];
+  answer.rotation_gradient =
+      -(answer.rotation_gradient + between.cross(answer.translation_gradient));
+  answer.translation_gradient = -answer.translation_gradient;
+  return answer;
+}
+
+PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
+                       const TreeHeader& tree_b, const RelativePose& pose, FieldUse use) noexcept {
+  PairMethod method;
+  const double radius_b = tree_b.mean_radius * pose.a_from_b.scale;
+  method.b_probes = radius_b <= tree_a.mean_radius;
+  const double coarse = std::max(tree_a.mean_radius, radius_b);
+  const double ratio = coarse / std::min(tree_a.mean_radius, radius_b);
+  const bool has_field = (method.b_probes ? a : b).tree.header().field != 0;
+  if (use == FieldUse::never || !has_field || !(ratio >= 1)) return method;
+  method.exact = true;
+  if (use == FieldUse::always || ratio >= kUnlike) {
+    method.lenses = false;
+    return method;
+  }
+  // Grows without bound as the ratio does towards kUnlike.
+  const double unlike = smooth_step((ratio - 1) / (kUnlike - 1));
+  method.full = kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) * ratio /
+                (1 - unlike);
+  method.none = kHandover * method.full;
+  return method;
+}
+
+ExactWeight exact_weight(const PairMethod& method, double volume) noexcept {
+  if (!method.exact) return {0, 0};
+  if (!method.lenses || !(volume > method.full)) return {1, 0};
+  const double width = method.none - method.full;
+  const double t = (volume - method.full) / width;
+  if (!(t < 1)) return {0, 0};
+  return {1 - smooth_step(t), -6 * t * (1 - t) / width};
+}
+
+Penetration blended(const Penetration& lenses, Penetration sum, const ExactWeight& weight,
+                    double unit3) noexcept {
+  if (weight.weight == 1) return sum;
+  const double w = weight.weight;
+  const double slope = weight.slope / unit3 * (sum.volume - lenses.volume);
+  const double volume = w * sum.volume + (1 - w) * lenses.volume;
+  // The weight is as sure as the lenses' volume.
+  const double doubt =
+      std::abs(slope) * std::max(0.0, lenses.volume_max - lenses.volume_min);
+  if (volume > 0)
+    sum.centroid = (w * sum.volume / volume) * sum.centroid +
+                   ((1 - w) * lenses.volume / volume) * lenses.centroid;
+  sum.volume_min = std::max(0.0, w * sum.volume_min + (1 - w) * lenses.volume_min - doubt);
+  sum.volume_max = w * sum.volume_max + (1 - w) * lenses.volume_max + doubt;
+  sum.volume = std::clamp(volume, sum.volume_min, sum.volume_max);
+  sum.translation_gradient = w * sum.translation_gradient +
+                             (1 - w + slope) * lenses.translation_gradient;
+  sum.rotation_gradient =
+      w * sum.rotation_gradient + (1 - w + slope) * lenses.rotation_gradient;
+  return sum;
+}
+
+Penetration PairOverlap::by_lenses(const DescentLimits& limits, bool keep_rounding,
+                                   ContactBins* bins) noexcept {
+  const SphereTree a(a_.tree.header(), tree_a_);
+  const SphereTree b(b_.tree.header(), tree_b_);
+  Descent descent(a, b, pose_, limits, scratch_, bins);
+  if (keep_rounding) descent.keep_rounding();
+  descent.run();
+  return descent.penetration();
+}
+
+Penetration PairOverlap::exact(bool b_probes, const DescentLimits& limits,
+                               ContactBins* bins) noexcept {
+  const PlacedTree& owner = b_probes ? a_ : b_;
+  const PlacedTree& prober = b_probes ? b_ : a_;
+  const SurfaceTree surface = surface_tree(owner.tree);
+  const SphereTree probes(prober.tree.header(), b_probes ? tree_b_ : tree_a_);
+  if (b_probes) {
+    SurfaceDescent descent(surface, probes, pose_, limits, scratch_, bins);
+    descent.run();
+    return descent.penetration();
+  }
+  const std::optional<RelativePose> turned = relative_pose(owner, prober);
+  if (!turned) {
+    Penetration refused;
+    refused.status = QueryStatus::invalid_input;
+    return refused;
+  }
+  SurfaceDescent descent(surface, probes, *turned, limits, scratch_, bins);
+  descent.run();
+  return turned_over(descent.penetration(), a_, b_);
+}
+
+Penetration PairOverlap::by(const PairMethod& method, const DescentLimits& limits) noexcept {
+  if (!method.exact) return by_lenses(limits);
+  if (!method.lenses) return exact(method.b_probes, limits);
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start =
+      limits.deadline_us > 0 ? Clock::now() : Clock::time_point();
+  const Penetration lenses = by_lenses(limits);
+  const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
+  const ExactWeight weight = exact_weight(method, lenses.volume / unit3);
+  if (weight.weight == 0) return lenses;
+  DescentLimits left = limits;
+  if (limits.deadline_us > 0) {
+    const std::chrono::duration<double, std::micro> gone = Clock::now() - start;
+    left.deadline_us = std::max(kNoTime, limits.deadline_us - gone.count());
+  }
+  if (limits.max_visits > 0) {
+    if (lenses.node_visits >= limits.max_visits) return lenses;
+    left.max_visits = limits.max_visits - lenses.node_visits;
+  }
+  Penetration sum = exact(method.b_probes, left);
+  sum.node_visits += lenses.node_visits;
+  sum.sphere_pairs += lenses.sphere_pairs;
+  sum.status = std::max(sum.status, lenses.status);
+  return blended(lenses, sum, weight, unit3);
+}
+
+}  // namespace ist

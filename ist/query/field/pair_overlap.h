@@ -1,0 +1,63 @@
+#pragma once
+
+#include <ist/query.h>
+
+#include "query/base/budget.h"
+#include "query/base/relative_pose.h"
+#include "query/contact/contact_bins.h"
+#include "query/descent/workspace.h"
+
+namespace ist {
+
+/// How two trees are to be asked (docs/design.md 7). The pose has no say in it.
+struct PairMethod {
+  bool lenses = true;
+  bool exact = false;    ///< the finer tree's spheres in the coarser one's surface
+  bool b_probes = true;  ///< whose spheres those are
+  /// Overlap by lenses, A's unit frame: up to `full` the exact sum answers alone, from `none` on the
+  /// lenses do.
+  double full = 0, none = 0;
+};
+
+/// An answer whose gradients are by a motion of `moving` about its origin, as one by a motion of
+/// `other` about its own.
+Penetration turned_over(Penetration answer, const PlacedTree& moving,
+                        const PlacedTree& other) noexcept;
+
+PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
+                       const TreeHeader& tree_b, const RelativePose& pose, FieldUse use) noexcept;
+
+/// What two trees of placed assets overlap by: a sum of lenses, the exact sum, or both blended by
+/// the lenses' volume. Gradients are the returned sum's.
+class PairOverlap {
+ public:
+  PairOverlap(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
+              const TreeHeader& tree_b, const RelativePose& pose, Workspace::Impl& scratch) noexcept
+      : a_(a), b_(b), tree_a_(tree_a), tree_b_(tree_b), pose_(pose), scratch_(scratch) {}
+
+  Penetration by_lenses(const DescentLimits& limits, bool keep_rounding = false,
+                        ContactBins* bins = nullptr) noexcept;
+  Penetration exact(bool b_probes, const DescentLimits& limits,
+                    ContactBins* bins = nullptr) noexcept;
+  Penetration by(const PairMethod& method, const DescentLimits& limits) noexcept;
+
+ private:
+  const PlacedTree& a_;
+  const PlacedTree& b_;
+  const TreeHeader& tree_a_;
+  const TreeHeader& tree_b_;
+  const RelativePose& pose_;
+  Workspace::Impl& scratch_;
+};
+
+/// Weight of the exact sum where lenses say `volume`, A's unit frame, and its slope by that.
+struct ExactWeight {
+  double weight = 1, slope = 0;
+};
+ExactWeight exact_weight(const PairMethod& method, double volume) noexcept;
+
+/// Both sums by weight, counts and status being the exact one's. `unit3`: volume of A's unit.
+Penetration blended(const Penetration& lenses, Penetration exact, const ExactWeight& weight,
+                    double unit3) noexcept;
+
+}  // namespace ist

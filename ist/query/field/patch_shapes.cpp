@@ -1,0 +1,264 @@
+#include "query/field/patch_shapes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "query/probe/surface_distance.h"
+
+namespace ist {
+namespace {
+
+/// Triangles that go to add_patch sixteen at a time.
+class PatchFiller {
+ public:
+  PatchFiller(const ProbeBalls& balls, std::uint32_t used, ProbeSums& sums) noexcept
+      : balls_(balls), used_(used), sums_(sums) {}
+
+  void add(const double (&a)[3], const double (&b)[3], const double (&c)[3]) noexcept {
+    const double* const corners[3] = {a, b, c};
+    for (std::size_t k = 0; k < 3; ++k) {
+      corners_.x[k][size_] = corners[k][0];
+      corners_.y[k][size_] = corners[k][1];
+      corners_.z[k][size_] = corners[k][2];
+    }
+    if (++size_ == kWidth) flush();
+  }
+
+  void flush() noexcept {
+    if (size_ == 0) return;
+    for (std::size_t i = size_; i < kWidth; ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        corners_.x[k][i] = corners_.y[k][i] = corners_.z[k][i] = 0;
+    SurfacePatch patch;
+    make_patch(corners_, patch);
+    const std::uint32_t near = triangles_near(patch, balls_.origin, balls_.reach);
+    if (near != 0) add_patch(patch, near, balls_, used_, sums_);
+    size_ = 0;
+  }
+
+ private:
+  const ProbeBalls& balls_;
+  const std::uint32_t used_;
+  ProbeSums& sums_;
+  TriangleCorners corners_;
+  std::size_t size_ = 0;
+};
+
+constexpr std::uint32_t kAllBalls = 0xffff;
+
+}  // namespace
+
+BoxShape::BoxShape(const BoxField& f) noexcept : half(f.half_extents) {
+  sound = is_length(half.x()) && is_length(half.y()) && is_length(half.z());
+}
+
+FieldSample BoxShape::look(const Eigen::Vector3d& x) const noexcept {
+  const Eigen::Vector3d beyond = x.cwiseAbs() - half;
+  Eigen::Index face;
+  const double deepest = beyond.maxCoeff(&face);
+  Eigen::Vector3d out = Eigen::Vector3d::Zero();
+  double distance = -deepest;
+  if (deepest <= 0) {
+    out[face] = 1;
+  } else {
+    out = beyond.cwiseMax(0.0);
+    distance = -out.norm();
+    out /= -distance;
+  }
+  for (int k = 0; k < 3; ++k) out[k] = x[k] < 0 ? -out[k] : out[k];
+  return {distance, -out};
+}
+
+ProbeTotal BoxShape::block(const ProbeBalls& balls, std::uint32_t used, const double (&origin)[3],
+                           std::uint32_t& pairs) noexcept {
+  // Faces within reach: six half-spaces, each x[axis] · side ≤ half[axis].
+  int faces = 0, axis = 0;
+  double side = 1;
+  for (int k = 0; k < 3; ++k) {
+    for (const double s : {1.0, -1.0}) {
+      if (half[k] - s * balls.origin[k] >= balls.reach) continue;
+      ++faces;
+      axis = k, side = s;
+    }
+  }
+  if (faces == 1) {
+    ProbeTotal total;
+    Eigen::Vector3d inward = Eigen::Vector3d::Zero();
+    inward[axis] = -side;
+    const double* const at[3] = {balls.x, balls.y, balls.z};
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      if ((used >> i & 1) == 0) continue;
+      const double r = balls.r[i];
+      const FieldSample sample{half[axis] - side * (balls.origin[axis] + at[axis][i]), inward};
+      if (!(sample.distance > -r)) continue;
+      const Eigen::Vector3d x(balls.origin[0] + balls.x[i] - origin[0],
+                              balls.origin[1] + balls.y[i] - origin[1],
+                              balls.origin[2] + balls.z[i] - origin[2]);
+      const BallPart part = flat_part(sample, r);
+      ++pairs;
+      add_part(x, part.volume, part.gradient, part.moment, total.overlap);
+      total.area += part.area;
+      total.crossed += part.area > 0 ? 4 * std::numbers::pi / 3 * (r * r * r) : 0;
+    }
+    return total;
+  }
+  if (!has_patch_) {
+    double v[8][3];
+    for (int i = 0; i < 8; ++i)
+      for (int k = 0; k < 3; ++k) v[i][k] = (i >> k & 1) != 0 ? half[k] : -half[k];
+    constexpr int kFaces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                  {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+    TriangleCorners corners{};
+    std::size_t n = 0;
+    for (const auto& f : kFaces) {
+      for (const int first : {1, 2}) {
+        const int corner[3] = {f[0], f[first], f[first + 1]};
+        for (std::size_t k = 0; k < 3; ++k) {
+          corners.x[k][n] = v[corner[k]][0];
+          corners.y[k][n] = v[corner[k]][1];
+          corners.z[k][n] = v[corner[k]][2];
+        }
+        ++n;
+      }
+    }
+    make_patch(corners, patch_);
+    has_patch_ = true;
+  }
+  ProbeSums sums;
+  const std::uint32_t near = triangles_near(patch_, balls.origin, balls.reach);
+  if (near != 0) add_patch(patch_, near, balls, used, sums);
+  pairs += sums.pairs;
+  std::uint32_t inside = 0;
+  for (std::uint32_t i = 0; i < kWidth; ++i) {
+    const bool in = std::abs(balls.origin[0] + balls.x[i]) < half.x() &&
+                    std::abs(balls.origin[1] + balls.y[i]) < half.y() &&
+                    std::abs(balls.origin[2] + balls.z[i]) < half.z();
+    inside |= in ? 1u << i : 0u;
+  }
+  return total_of(balls, sums, settled_sides(sums, inside) & used, origin);
+}
+
+HeightShape::HeightShape(const HeightField& f) noexcept : field_(f) {
+  sound = f.heights != nullptr && f.columns >= 2 && f.rows >= 2 && f.columns <= 1u << 20 &&
+          f.rows <= 1u << 20 && is_length(f.spacing[0]) && is_length(f.spacing[1]) &&
+          f.lowest <= f.highest;
+}
+
+double HeightShape::height(std::int64_t i, std::int64_t j) const noexcept {
+  i = std::clamp<std::int64_t>(i, 0, std::int64_t{field_.columns} - 1);
+  j = std::clamp<std::int64_t>(j, 0, std::int64_t{field_.rows} - 1);
+  return field_.heights[static_cast<std::size_t>(j) * field_.columns + static_cast<std::size_t>(i)];
+}
+
+FieldSample HeightShape::look(const Eigen::Vector3d& x) const noexcept {
+  // Only what is beyond all heights is told at once; the rest is looked at ball by ball.
+  FieldSample at;
+  if (x.z() > field_.highest) at.distance = field_.highest - x.z();
+  if (x.z() < field_.lowest) at.distance = 0;  // the surface may be steep
+  return at;
+}
+
+double HeightShape::surface(double x, double y) const noexcept {
+  const double u = std::clamp(x / field_.spacing[0], -1.0, static_cast<double>(field_.columns));
+  const double v = std::clamp(y / field_.spacing[1], -1.0, static_cast<double>(field_.rows));
+  const double i = std::floor(u), j = std::floor(v);
+  const double s = u - i, t = v - j;
+  const auto a = static_cast<std::int64_t>(i), b = static_cast<std::int64_t>(j);
+  const double h00 = height(a, b), h11 = height(a + 1, b + 1);
+  return s >= t ? h00 + s * (height(a + 1, b) - h00) + t * (h11 - height(a + 1, b))
+                : h00 + t * (height(a, b + 1) - h00) + s * (h11 - height(a, b + 1));
+}
+
+FieldSample HeightShape::nearest(const Eigen::Vector3d& x) const noexcept {
+  const double gap = x.z() - surface(x.x(), x.y());
+  const double at[3] = {x.x(), x.y(), x.z()};
+  Eigen::Vector3d point(x.x(), x.y(), x.z() - gap);
+  double best2 = gap * gap;
+  const std::int64_t last[2] = {std::int64_t{field_.columns} - 2, std::int64_t{field_.rows} - 2};
+  std::int64_t middle[2];
+  for (int k = 0; k < 2; ++k)
+    middle[k] = static_cast<std::int64_t>(
+        std::clamp(std::floor(x[k] / field_.spacing[k]), 0.0, static_cast<double>(last[k])));
+  const auto try_cell = [&](std::int64_t i, std::int64_t j) {
+    if (i < 0 || j < 0 || i > last[0] || j > last[1]) return;
+    const auto corner = [&](std::int64_t a, std::int64_t b, double(&p)[3]) {
+      p[0] = static_cast<double>(a) * field_.spacing[0];
+      p[1] = static_cast<double>(b) * field_.spacing[1];
+      p[2] = height(a, b);
+    };
+    double c[4][3], found[3];
+    corner(i, j, c[0]), corner(i + 1, j, c[1]), corner(i + 1, j + 1, c[2]), corner(i, j + 1, c[3]);
+    for (const int other : {1, 2}) {
+      const double d2 = nearest_in_triangle(at, c[0], c[other], c[other + 1], found);
+      if (d2 >= best2) continue;
+      best2 = d2;
+      point = Eigen::Vector3d(found[0], found[1], found[2]);
+    }
+  };
+  // Ring by ring, as long as one may come nearer.
+  const double step = std::min(field_.spacing[0], field_.spacing[1]);
+  const std::int64_t most = std::max(last[0], last[1]) + 1;
+  for (std::int64_t ring = 0; ring <= most; ++ring) {
+    const double least = static_cast<double>(ring - 1) * step;
+    if (least > 0 && least * least >= best2) break;
+    for (std::int64_t i = -ring; i <= ring; ++i) {
+      const bool side = i == -ring || i == ring;
+      for (std::int64_t j = -ring; j <= ring; j += side || ring == 0 ? 1 : 2 * ring)
+        try_cell(middle[0] + i, middle[1] + j);
+    }
+  }
+  const double distance = std::sqrt(best2);
+  const Eigen::Vector3d up = distance > 0 ? Eigen::Vector3d((x - point) / distance)
+                                          : Eigen::Vector3d::UnitZ().eval();
+  return gap > 0 ? FieldSample{-distance, -up} : FieldSample{distance, up};
+}
+
+ProbeTotal HeightShape::block(const ProbeBalls& balls, std::uint32_t used,
+                              const double (&origin)[3], std::uint32_t& pairs) noexcept {
+  ProbeSums sums;
+  PatchFiller filler(balls, used, sums);
+  std::int64_t from[2], to[2];
+  for (int k = 0; k < 2; ++k) {
+    const double low = (balls.origin[k] - balls.reach) / field_.spacing[k];
+    const double high = (balls.origin[k] + balls.reach) / field_.spacing[k];
+    const double last = (k == 0 ? field_.columns : field_.rows) - 1;
+    // Beyond the border one cell is as good as any number: it is level across it.
+    from[k] = static_cast<std::int64_t>(std::floor(std::clamp(low, -1.0, last)));
+    to[k] = static_cast<std::int64_t>(std::floor(std::clamp(high, -1.0, last)));
+  }
+  const auto corner = [&](std::int64_t i, std::int64_t j, double(&p)[3]) {
+    // The cells at the border reach as far as the balls do.
+    const auto place = [&](std::int64_t n, int k) {
+      const std::int64_t last = (k == 0 ? field_.columns : field_.rows) - 1;
+      const double at = static_cast<double>(n) * field_.spacing[k];
+      if (n < 0) return std::min(at, balls.origin[k] - 2 * balls.reach);
+      if (n > last) return std::max(at, balls.origin[k] + 2 * balls.reach);
+      return at;
+    };
+    p[0] = place(i, 0);
+    p[1] = place(j, 1);
+    p[2] = height(i, j);
+  };
+  for (std::int64_t j = from[1]; j <= to[1]; ++j) {
+    for (std::int64_t i = from[0]; i <= to[0]; ++i) {
+      double a[3], b[3], c[3], d[3];
+      corner(i, j, a), corner(i + 1, j, b), corner(i + 1, j + 1, c), corner(i, j + 1, d);
+      const double top = std::max(std::max(a[2], b[2]), std::max(c[2], d[2]));
+      const double bottom = std::min(std::min(a[2], b[2]), std::min(c[2], d[2]));
+      if (balls.origin[2] - balls.reach > top || balls.origin[2] + balls.reach < bottom) continue;
+      filler.add(a, b, c);
+      filler.add(a, c, d);
+    }
+  }
+  filler.flush();
+  pairs += sums.pairs;
+  std::uint32_t inside = 0;
+  for (std::uint32_t i = 0; i < kWidth; ++i)
+    inside |= balls.origin[2] + balls.z[i] <
+                      surface(balls.origin[0] + balls.x[i], balls.origin[1] + balls.y[i])
+                  ? 1u << i
+                  : 0u;
+  return total_of(balls, sums, settled_sides(sums, inside) & used & kAllBalls, origin);
+}
+
+}  // namespace ist

@@ -1,0 +1,164 @@
+#include <algorithm>
+#include <atomic>
+#include <optional>
+
+#include <ist/field.h>
+
+#include "query/base/batch.h"
+#include "query/contact/write_patches.h"
+#include "query/field/field_descent.h"
+#include "query/field/gap_search.h"
+#include "query/field/surface_descent.h"
+#include "query/probe/membership.h"
+#include "query/probe/surface_distance.h"
+
+namespace ist {
+namespace {
+
+/// The surface in an asset as a field of distances.
+struct MeshShape {
+  explicit MeshShape(const MeshField& f) noexcept : surface(surface_tree(f.tree)) {}
+  FieldSample nearest(const Eigen::Vector3d& x) const noexcept {
+    const double at[3] = {x.x(), x.y(), x.z()};
+    const NearestSurface found = nearest_surface(surface, at, 1e300);
+    const Eigen::Vector3d point(found.point[0], found.point[1], found.point[2]);
+    const Eigen::Vector3d way =
+        found.distance > 0 ? Eigen::Vector3d((point - x) / found.distance)
+                           : Eigen::Vector3d::Zero().eval();
+    return inside_surface(surface, at, found.distance * (1 - 1e-12))
+               ? FieldSample{found.distance, -way}
+               : FieldSample{-found.distance, way};
+  }
+  double error() const noexcept { return surface.header->error; }
+
+  SurfaceTree surface;
+};
+
+/// Runs `use(shape)` with the field's shape; `refuse()` where its numbers are out of range.
+template <class Use, class Refuse>
+auto with_shape(const Field& field, const Use& use, const Refuse& refuse) noexcept {
+  const auto run = [&](auto shape) {
+    if (!shape.sound) return refuse();
+    auto result = use(shape);
+    return shape.sound ? result : refuse();
+  };
+  switch (field.index()) {
+    case 0: return run(HalfSpaceShape(*std::get_if<0>(&field)));
+    case 1: return run(BoxShape(*std::get_if<1>(&field)));
+    case 2: return run(BallShape(*std::get_if<2>(&field)));
+    case 3: return run(CapsuleShape(*std::get_if<3>(&field)));
+    case 4: return run(CylinderShape(*std::get_if<4>(&field)));
+    case 5: return run(HeightShape(*std::get_if<5>(&field)));
+    case 6: return run(GridShape(*std::get_if<6>(&field)));
+    case 7: return run(FunctionShape(*std::get_if<7>(&field)));
+    default: return refuse();
+  }
+}
+
+const MeshField* mesh_of(const PlacedField& placed) noexcept {
+  return std::get_if<MeshField>(&placed.field);
+}
+
+/// Of a mesh field in its asset's unit frame, of all others in their own.
+std::optional<RelativePose> pose_of(const PlacedField& a, const PlacedTree& b) noexcept {
+  if (const MeshField* const mesh = mesh_of(a)) {
+    if (!mesh->tree.has_field()) return std::nullopt;
+    return relative_pose(PlacedTree{mesh->tree, a.pose, a.scale}, b);
+  }
+  return relative_pose(a.pose, a.scale, b);
+}
+
+QueryStatus invalid() noexcept { return QueryStatus::invalid_input; }
+
+Penetration penetrate(const PlacedField& a, const PlacedTree& b, Measure measure,
+                      const DescentLimits& limits, Workspace& workspace,
+                      ContactBins* bins) noexcept {
+  const auto refused = [] {
+    Penetration result;
+    result.status = invalid();
+    return result;
+  };
+  const std::optional<RelativePose> pose = pose_of(a, b);
+  if (!pose || workspace.impl() == nullptr) return refused();
+  const SphereTree tree = sphere_tree(b.tree, measure);
+  if (bins != nullptr) bins->start(tree, true);
+  const auto run = [&](auto& descent) {
+    descent.run();
+    return descent.penetration();
+  };
+  if (const MeshField* const mesh = mesh_of(a)) {
+    const SurfaceTree surface = surface_tree(mesh->tree);
+    SurfaceDescent descent(surface, tree, *pose, limits, *workspace.impl(), bins);
+    return run(descent);
+  }
+  return with_shape(
+      a.field,
+      [&](auto& shape) {
+        FieldDescent descent(shape, tree, *pose, limits, *workspace.impl(), bins);
+        return run(descent);
+      },
+      refused);
+}
+
+}  // namespace
+
+Penetration penetration(const PlacedField& a, const PlacedTree& b,
+                        const PenetrationSettings& settings, Workspace& workspace) noexcept {
+  return penetrate(a, b, settings.measure, limits_of(settings), workspace, nullptr);
+}
+
+Separation separation(const PlacedField& a, const PlacedTree& b, const SeparationSettings& settings,
+                      Workspace& workspace) noexcept {
+  const auto refused = [] {
+    Separation result;
+    result.status = invalid();
+    return result;
+  };
+  const std::optional<RelativePose> pose = pose_of(a, b);
+  if (!pose || workspace.impl() == nullptr) return refused();
+  const SphereTree tree = sphere_tree(b.tree, Measure::inner);
+  const auto search = [&](auto& shape) {
+    return GapSearch(shape, tree, *pose, settings, *workspace.impl()).run();
+  };
+  if (const MeshField* const mesh = mesh_of(a)) {
+    MeshShape shape(*mesh);
+    return search(shape);
+  }
+  return with_shape(a.field, search, refused);
+}
+
+PenetrationAndSeparation query(const PlacedField& a, const PlacedTree& b,
+                               const QuerySettings& settings, Workspace& workspace) noexcept {
+  return {penetration(a, b, settings.penetration, workspace),
+          separation(a, b, settings.separation, workspace)};
+}
+
+ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
+                               const ContactSettings& settings, Workspace& workspace,
+                               std::span<ContactPatch> patches) noexcept {
+  ContactPatches result;
+  if (workspace.impl() == nullptr) {
+    result.penetration.status = invalid();
+    return result;
+  }
+  ContactBins& bins = workspace.impl()->contact;
+  result.penetration =
+      penetrate(a, b, settings.measure, limits_of(settings), workspace, &bins);
+  if (result.penetration.status == invalid()) return result;
+  const std::optional<RelativePose> pose = pose_of(a, b);
+  if (!pose) return result;
+  const double radius =
+      sphere_tree(b.tree, settings.measure).header->root[3] * pose->a_from_b.scale;
+  result.count = write_patches({bins, bins.collect(Precision::float64), *pose, radius},
+                               result.penetration, patches);
+  finish_patches(patches.first(result.count), 2 * pose->unit_a * radius);
+  return result;
+}
+
+void penetration_batch(std::span<const PlacedFieldPair> pairs, const PenetrationSettings& settings,
+                       std::span<Workspace> workspaces, std::span<Penetration> answers,
+                       const ParallelFor& parallel) noexcept {
+  answer_batch(pairs, settings, workspaces, answers, parallel);
+}
+
+}  // namespace ist
