@@ -14,7 +14,7 @@
 namespace ist {
 namespace {
 
-// Ratio of mean radii from which on the exact sum answers alone.
+// Ratio of grains from which on the exact sum answers alone.
 constexpr double kUnlike = 4;
 // Overlap in spheres of the coarser tree up to which trees of like size are summed exactly. There
 // lenses are 2 % and more in error, and few spheres meet the surface.
@@ -23,6 +23,12 @@ constexpr double kFewSpheres = 2;
 constexpr double kHandover = 4;
 // [µs] a deadline that is over.
 constexpr double kNoTime = 1e-6;
+
+/// How coarse a tree's spheres are for their solid, its unit frame: the mean radius, and more where
+/// inner spheres cover little of it, the solid being thinner than its matched spheres.
+double grain(const TreeHeader& tree, const AssetHeader& asset) {
+  return tree.mean_radius / std::max(asset.coverage, 0.01);
+}
 
 }  // namespace
 
@@ -39,10 +45,11 @@ Penetration turned_over(Penetration answer, const PlacedTree& moving,
 PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
                        const TreeHeader& tree_b, const RelativePose& pose, FieldUse use) noexcept {
   PairMethod method;
-  const double radius_b = tree_b.mean_radius * pose.a_from_b.scale;
-  method.b_probes = radius_b <= tree_a.mean_radius;
-  const double coarse = std::max(tree_a.mean_radius, radius_b);
-  const double ratio = coarse / std::min(tree_a.mean_radius, radius_b);
+  const double grain_a = grain(tree_a, a.tree.header());
+  const double grain_b = grain(tree_b, b.tree.header()) * pose.a_from_b.scale;
+  method.b_probes = grain_b <= grain_a;
+  const double coarse = std::max(grain_a, grain_b);
+  const double ratio = coarse / std::min(grain_a, grain_b);
   const bool has_field = (method.b_probes ? a : b).tree.header().field != 0;
   if (use == FieldUse::never || !has_field || !(ratio >= 1)) return method;
   method.exact = true;

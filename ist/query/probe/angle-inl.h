@@ -42,9 +42,12 @@ HWY_INLINE V angle_of(D d, V x, V y) {
   const V below = hn::IfThenElse(wide, more + less, more);
   const V t = hn::IfThenElse(wide, less - more, less) / hn::Max(below, hn::Set(d, 1e-300));
   const V t2 = t * t;
-  V sum = hn::Set(d, kTerms[10]);
-  for (int k = 9; k >= 0; --k) sum = sum * t2 + hn::Set(d, kTerms[k]);
-  V angle = t * sum;
+  // Even and odd terms apart: half as long to wait for.
+  const V t4 = t2 * t2;
+  V even = hn::Set(d, kTerms[10]), odd = hn::Set(d, kTerms[9]);
+  for (int k = 8; k >= 0; k -= 2) even = even * t4 + hn::Set(d, kTerms[k]);
+  for (int k = 7; k >= 1; k -= 2) odd = odd * t4 + hn::Set(d, kTerms[k]);
+  V angle = t * (even + t2 * odd);
   angle = hn::IfThenElse(wide, hn::Set(d, kQuarter) + angle, angle);
   angle = hn::IfThenElse(ay > ax, hn::Set(d, kHalf) - angle, angle);
   angle = hn::IfThenElse(x < zero, hn::Set(d, kPi) - angle, angle);

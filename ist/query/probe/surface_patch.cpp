@@ -518,12 +518,13 @@ void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
         hn::Sqrt((cross[0] * cross[0] + cross[1] * cross[1]) + cross[2] * cross[2]);
     const V base = hn::Sqrt((e[0] * e[0] + e[1] * e[1]) + e[2] * e[2]);
     const auto flat = hn::Not(area > zero);
-    const V one_area = hn::IfThenElse(flat, hn::Set(d, 1.0), area);
-    const V one_base = hn::IfThenElse(flat, hn::Set(d, 1.0), base);
+    const V one = hn::Set(d, 1.0);
+    const V per_area = one / hn::IfThenElse(flat, one, area);
+    const V per_base = one / hn::IfThenElse(flat, one, base);
     V u[3], n[3];
     for (int k = 0; k < 3; ++k) {
-      u[k] = e[k] / one_base;
-      n[k] = cross[k] / one_area;
+      u[k] = e[k] * per_base;
+      n[k] = cross[k] * per_area;
       hn::Store(u[k], d, patch.u[k] + lane);
       hn::Store(n[k], d, patch.n[k] + lane);
     }
@@ -532,16 +533,16 @@ void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
       hn::Store(n[k1] * u[k2] - n[k2] * u[k1], d, patch.v[k] + lane);
     }
     const V apex_x = (f[0] * u[0] + f[1] * u[1]) + f[2] * u[2];
-    const V apex_y = area / one_base;
+    const V apex_y = area * per_base;
     hn::Store(hn::Set(d, 1.0), d, patch.edge_x[0] + lane);
     hn::Store(zero, d, patch.edge_y[0] + lane);
     hn::Store(base, d, patch.length[0] + lane);
     const auto set_edge = [&](int k, V x, V y) {
       const V length = hn::Sqrt(x * x + y * y);
-      const V one = hn::IfThenElse(flat, hn::Set(d, 1.0), length);
+      const V per_length = one / hn::IfThenElse(flat, one, length);
       hn::Store(length, d, patch.length[k] + lane);
-      hn::Store(x / one, d, patch.edge_x[k] + lane);
-      hn::Store(y / one, d, patch.edge_y[k] + lane);
+      hn::Store(x * per_length, d, patch.edge_x[k] + lane);
+      hn::Store(y * per_length, d, patch.edge_y[k] + lane);
     };
     set_edge(1, apex_x - base, apex_y);
     set_edge(2, zero - apex_x, zero - apex_y);
