@@ -55,13 +55,17 @@ class Asset {
   TreeView view_;
 };
 
-/// Makes the asset of a closed mesh: inner spheres, matched spheres, cover radii and trees.
+/// Makes the asset of a closed mesh: inner spheres, matched spheres, cover radii, trees and the
+/// field.
 ///
 /// Same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number of
 /// threads.
 /// Cancelling during packing keeps what is packed; later it throws Error.
 ///
-/// Throws Error if not one sphere fits, and on settings out of range.
+/// A mesh that meets itself gets no field.
+///
+/// Throws Error if not one sphere fits, on settings out of range, and where floats cannot be as
+/// exact as the field's error asked for.
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
            const ProgressCallback& progress = {});
 
@@ -103,8 +107,8 @@ struct Invariant {
   /// Largest violation measure, unit as in `meaning`; ≤ 0 is sound unless stated.
   double worst = 0;
   std::string meaning;      ///< what `worst` measures, with its unit
-  std::size_t where = 0;    ///< index of the sphere or node that is worst
-  std::size_t checked = 0;  ///< how many spheres, pairs or nodes were looked at
+  std::size_t where = 0;    ///< index of the sphere, node, triangle or place of cells that is worst
+  std::size_t checked = 0;  ///< how many of them, or pairs, were looked at
   std::size_t violations = 0;
 };
 

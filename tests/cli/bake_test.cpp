@@ -47,6 +47,24 @@ TEST_F(BakeCommand, JsonHoldsTheResult) {
   EXPECT_GE(json.at("seconds").at("bake"), 0);
 }
 
+TEST_F(BakeCommand, TheFieldIsToldOfOrLeftOut) {
+  const std::vector<std::string> bake = {"bake",      "cube.obj", "-o",    "new.ist",
+                                         "--spheres", "5",        "--json"};
+  const auto field = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), bake.begin(), bake.end());
+    return nlohmann::json::parse(ist(more).out);
+  };
+  EXPECT_EQ(field({}).at("field").at("triangles"), 12);
+  EXPECT_EQ(field({"--field-error", "0.5"}).at("asked").at("field_error"), 0.5);
+  const nlohmann::json none = field({"--no-field"});
+  EXPECT_EQ(none.at("field").at("bytes"), 0);
+  EXPECT_TRUE(none.at("field").at("error").is_null());
+  EXPECT_LT(none.at("bytes"), field({}).at("bytes"));
+  EXPECT_EQ(
+      ist({"bake", "cube.obj", "-o", "new.ist", "--no-field", "--field-error", "1"}).exit_code, 2);
+  EXPECT_EQ(ist({"bake", "cube.obj", "-o", "new.ist", "--field-error", "0"}).exit_code, 2);
+}
+
 TEST_F(BakeCommand, ATargetPicksTheSphereCount) {
   const Outcome outcome = ist({"bake", "cube.obj", "-o", "new.ist", "--target-error", "20%",
                                "--at-overlap", "1%", "--json"});

@@ -187,6 +187,43 @@ TEST(Check, TurnsRedForEveryInvariantOfADetail) {
   }
 }
 
+FieldHeader& field(AssetHeader& h) { return *writable<FieldHeader>(h, h.field); }
+SurfaceBlock* surface(AssetHeader& h) {
+  return writable<SurfaceBlock>(h, field(h).level[0].blocks);
+}
+CellBrick* bricks(AssetHeader& h) { return writable<CellBrick>(h, field(h).brick_data); }
+
+// So is the field.
+TEST(Check, TurnsRedForEveryInvariantOfTheField) {
+  const ClosedMesh torus = close_mesh(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
+  const Asset asset = bake(torus, of_size(60));
+  ASSERT_TRUE(asset.view().has_field());
+  expect_sound(check(asset, torus));
+  const std::vector<Tampering> cases = {
+      {"field closed", [](AssetHeader& h) { surface(h)->x[0] += 1e-7f; }},
+      {"field closed",
+       [](AssetHeader& h) { std::swap(surface(h)->corner[0][2], surface(h)->corner[1][2]); }},
+      {"field near mesh", [](AssetHeader& h) { surface(h)->z[1] += 1e-4f; }},
+      {"mesh near field", [](AssetHeader& h) { surface(h)->z[1] += 1e-4f; }},
+      {"field near mesh", [](AssetHeader& h) { field(h).error *= 0.1; }},
+      {"field balls",
+       [](AssetHeader& h) { writable<BallBlock>(h, field(h).level[1].blocks)->r[2] *= 0.999f; }},
+      {"field cells",
+       [](AssetHeader& h) {
+         auto* triangles = writable<std::uint32_t>(h, field(h).cell_triangles);
+         triangles[5] = triangles[5] == 0 ? 1 : 0;
+       }},
+      {"field signs", [](AssetHeader& h) { bricks(h)->inside ^= 1u << 7; }},
+      {"field inside", [](AssetHeader& h) { bricks(h)->inside ^= ~bricks(h)->surface; }},
+  };
+  for (const Tampering& one : cases) {
+    bool red = false;
+    for (const Invariant& invariant : check(tampered(one.change, asset), torus))
+      if (invariant.name == one.invariant) red |= invariant.violations > 0;
+    EXPECT_TRUE(red) << one.invariant;
+  }
+}
+
 // The whole asset, for any number of threads and in a second run.
 TEST(Bake, SameBytesForAnyThreadCount) {
   const ClosedMesh meshes[] = {cube(),

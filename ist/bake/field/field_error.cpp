@@ -10,7 +10,7 @@
 #include <limits>
 #include <span>
 
-#include "bake/field/swept_error.h"
+#include "bake/field/slab_proof.h"
 #include "mesh/exact_closest_point.h"
 #include "mesh/triangle_frame.h"
 
@@ -79,6 +79,7 @@ class FieldNearMesh {
       if (whole <= target) return whole;
     }
     if (radius <= 0.1 * target) return closest.distance + radius;
+    if (radius > target && is_in_slab(part, target)) return target;
     target = std::max(target, kSlack * closest.distance);
     // Halved across the longest side.
     int from = 0;
@@ -99,6 +100,12 @@ class FieldNearMesh {
 
   static double side(const Part& part, int from) {
     return between(part.corner[from], part.corner[(from + 1) % 3]);
+  }
+
+  bool is_in_slab(const Part& part, double distance) const {
+    const TriangleFrame<double> frame =
+        make_triangle_frame(part.corner[0].data(), part.corner[1].data(), part.corner[2].data());
+    return within_slab(mesh_, part.corner, frame.n, distance);
   }
 
   /// The distance to a triangle is convex: it is largest at a corner.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "bake/field/slab_proof.h"
 #include "mesh/exact_closest_point.h"
 
 namespace ist {
@@ -136,6 +137,8 @@ double SweptError::bound(const Prism& prism, std::span<const std::uint32_t> cand
       if (t != nearest) whole2 = farthest2(t, prism, target2);
     }
     if (whole2 <= target2) return std::sqrt(whole2);
+    if (radius > target && within_slab(hierarchy_.view(), prism.corner, frames_[nearest].n, target))
+      return target;
   }
   // The field may have another triangle that is nearer.
   const ClosestPoint closest = exact_closest_point(

@@ -1,0 +1,265 @@
+#include <gtest/gtest.h>
+#include <ist/bake.h>
+#include <ist/error.h>
+
+#include <cmath>
+#include <random>
+
+#include "bake/check/check_field.h"
+#include "bake/field/field.h"
+#include "bake/field/field_mesh.h"
+#include "mesh/exact_sign.h"
+#include "query/asset/surface_tree.h"
+#include "support/shared_data.h"
+#include "support/test_meshes.h"
+
+// The surface that an asset holds for exact queries.
+
+namespace ist {
+namespace {
+
+using Corners = CheckSurface::Corners;
+using Point = Eigen::Vector3d;
+
+ClosedMesh closed(TriangleMesh mesh, const char* name) { return close_mesh(std::move(mesh), name); }
+
+PackingSettings settings_of(double error, unsigned threads = 0) {
+  PackingSettings settings;
+  settings.max_spheres = 20;
+  settings.threads = threads;
+  settings.field.error = error;
+  return settings;
+}
+
+Asset baked(const ClosedMesh& mesh, double error = 0, unsigned threads = 0) {
+  return bake(mesh, settings_of(error, threads));
+}
+
+void expect_sound_field(const Asset& asset, const ClosedMesh& mesh) {
+  ASSERT_TRUE(asset.view().has_field());
+  std::size_t looked_at = 0;
+  for (const Invariant& one : check(asset, mesh)) {
+    if (one.name.find("field") == std::string::npos) continue;
+    ++looked_at;
+    EXPECT_EQ(one.violations, 0u) << one.name << ": " << one.worst << " at " << one.where;
+  }
+  EXPECT_GE(looked_at, 6u);
+}
+
+Point on_triangle(const Corners& t, std::mt19937_64& random) {
+  double a = static_cast<double>(random() >> 11) * 0x1p-53;
+  double b = static_cast<double>(random() >> 11) * 0x1p-53;
+  if (a + b > 1) {
+    a = 1 - a;
+    b = 1 - b;
+  }
+  return t[0] + a * (t[1] - t[0]) + b * (t[2] - t[0]);
+}
+
+/// Distances of random points of either surface from the other, by other code than the proof.
+void expect_near(const Asset& asset, const ClosedMesh& mesh) {
+  const AssetHeader& header = asset.view().header();
+  const FieldHeader& field = *at<FieldHeader>(header, header.field);
+  const MeshSolid solid(mesh);
+  const CheckSurface of_mesh(mesh, solid.frame());
+  const CheckSurface of_field(FieldTriangles(header, field).all());
+  std::mt19937_64 random(4);
+  double worst = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const auto from = [&](const CheckSurface& surface) {
+      return on_triangle(surface.triangles()[random() % surface.triangles().size()], random);
+    };
+    worst = std::max(worst, of_mesh.nearest(from(of_field)).first);
+    worst = std::max(worst, of_field.nearest(from(of_mesh)).first);
+  }
+  EXPECT_LE(worst, field.error);
+  const Point low = solid.frame().to_unit(mesh.report.bounds.min());
+  const Point high = solid.frame().to_unit(mesh.report.bounds.max());
+  for (int i = 0; i < 5'000; ++i) {
+    Point p;
+    for (int k = 0; k < 3; ++k)
+      p[k] = low[k] + (high[k] - low[k]) * (static_cast<double>(random() >> 11) * 0x1p-53);
+    if (of_field.distance(p, 2 * field.error) <= field.error) continue;
+    EXPECT_EQ(of_field.winding(p), of_mesh.winding(p) >= 1 ? 1 : 0);
+  }
+  std::printf("%s: %u triangles, error %.2g, %.2g seen, unit frame; %llu bytes\n",
+              mesh.name.c_str(), field.triangle_count, field.error, worst,
+              static_cast<unsigned long long>(header.file_bytes - header.field));
+}
+
+TEST(Field, FewTrianglesAreTheMeshsOwn) {
+  const ClosedMesh torus = closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
+  const Asset asset = baked(torus);
+  EXPECT_EQ(asset.view().field_triangles(), torus.mesh.triangles.size());
+  EXPECT_LT(asset.view().field_error(), 2e-7);
+  expect_sound_field(asset, torus);
+  expect_near(asset, torus);
+}
+
+TEST(Field, ManyTrianglesBecomeFewNearThem) {
+  const ClosedMesh ball = closed(testing::icosphere_mesh(6), "ball");
+  const Asset asset = baked(ball);
+  EXPECT_LE(asset.view().field_triangles(), kFieldTriangles);
+  EXPECT_GT(asset.view().field_triangles(), kFieldTriangles / 2);
+  EXPECT_LT(asset.view().field_error(), 1e-3);
+  expect_sound_field(asset, ball);
+  expect_near(asset, ball);
+}
+
+TEST(Field, SharedMeshes) {
+  for (const char* name : {"oracle/meshes/ico20k.off", "oracle/meshes/dino200k.off"}) {
+    IST_NEEDS_SHARED(name);
+    const ClosedMesh mesh = close_mesh(load_mesh(testing::shared_path(name)), name);
+    const Asset asset = baked(mesh);
+    EXPECT_LT(at<FieldHeader>(asset.view().header(), asset.view().header().field)->error, 5e-3);
+    expect_sound_field(asset, mesh);
+    expect_near(asset, mesh);
+  }
+}
+
+TEST(Field, ErrorIsKeptByAsFewTrianglesAsItAllows) {
+  const ClosedMesh ball = closed(testing::icosphere_mesh(6), "ball");
+  std::uint32_t last = 0;
+  for (const double error : {0.05, 0.005, 5e-4}) {
+    const Asset asset = baked(ball, error);
+    EXPECT_LE(asset.view().field_error(), error);
+    EXPECT_EQ(asset.view().header().asked_field_error, error);
+    EXPECT_GT(asset.view().field_triangles(), 2 * last) << error;
+    last = asset.view().field_triangles();
+    expect_near(asset, ball);
+  }
+  EXPECT_LT(last, ball.mesh.triangles.size());
+  EXPECT_THROW(baked(ball, 1e-12), Error);
+  EXPECT_THROW(baked(ball, -1), Error);
+}
+
+TEST(Field, NoneWhereNoneIsWanted) {
+  PackingSettings settings = settings_of(0);
+  settings.field.wanted = false;
+  const Asset asset = bake(closed(testing::cube_mesh(), "cube"), settings);
+  EXPECT_FALSE(asset.view().has_field());
+  EXPECT_EQ(asset.view().field_triangles(), 0u);
+  EXPECT_EQ(asset.view().field_error(), 0);
+}
+
+TEST(Field, OfSeveralShellsThoseThatBoundTheSolid) {
+  const Point one = Point::Ones();
+  const TriangleMesh outer = testing::box_mesh(-one, one);
+  const TriangleMesh inner = testing::box_mesh(-one / 2, one / 2);
+  const ClosedMesh cavity = closed(testing::joined(outer, testing::inverted(inner)), "cavity");
+  const ClosedMesh nested = closed(testing::joined(outer, inner), "nested");
+  const ClosedMesh apart =
+      closed(testing::joined(outer, testing::box_mesh(2 * one, 3 * one)), "apart");
+  for (const auto& [mesh, triangles] : {std::pair(&cavity, 24u), {&nested, 12u}, {&apart, 24u}}) {
+    const Asset asset = baked(*mesh);
+    EXPECT_EQ(asset.view().field_triangles(), triangles) << mesh->name;
+    expect_sound_field(asset, *mesh);
+  }
+}
+
+TEST(Field, SameBytesForAnyNumberOfThreads) {
+  const ClosedMesh ball = closed(testing::icosphere_mesh(6), "ball");
+  const ClosedMesh torus = closed(testing::torus_mesh(1.0, 0.4, 100, 60), "torus");
+  for (const ClosedMesh* mesh : {&ball, &torus}) {
+    const Asset one = baked(*mesh, 0, 1);
+    for (const unsigned threads : {2u, 5u}) {
+      const Asset other = baked(*mesh, 0, threads);
+      EXPECT_TRUE(std::equal(one.bytes().begin(), one.bytes().end(), other.bytes().begin(),
+                             other.bytes().end()));
+    }
+  }
+}
+
+TEST(Field, VertexMapsKeepASurfaceClosed) {
+  FieldMesh mesh;
+  // A tetrahedron with a copy of its first vertex, and a flat pair of triangles on its base.
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-0.0f, 0, 0}, {1, 1, 0}};
+  mesh.triangles = {{0, 2, 1}, {4, 1, 3}, {1, 2, 3}, {2, 0, 3},
+                    {1, 2, 5}, {1, 5, 2}, {0, 4, 5}, {5, 4, 0}};
+  const std::vector<std::uint32_t> place = reduce(mesh);
+  EXPECT_EQ(place[4], place[0]);
+  EXPECT_EQ(mesh.triangles.size(), 4u);
+  mesh.vertices[3] = {0, 0, 0};  // flat: its base and what covers it cancel
+  reduce(mesh);
+  EXPECT_TRUE(mesh.triangles.empty());
+}
+
+/// Crossings of a segment and a triangle, 0 or 1; nothing where a sign is 0.
+std::optional<int> crossings(const Point& p, const Point& q, const Corners& t) {
+  const auto side = [](const Point& a, const Point& b, const Point& c, const Point& d) {
+    return orient3d_sign(a.data(), b.data(), c.data(), d.data());
+  };
+  const int from = side(t[0], t[1], t[2], p), to = side(t[0], t[1], t[2], q);
+  if (from == 0 || to == 0) return std::nullopt;
+  if (from == to) return 0;
+  const int a = side(p, q, t[0], t[1]), b = side(p, q, t[1], t[2]), c = side(p, q, t[2], t[0]);
+  if (a == 0 || b == 0 || c == 0) return std::nullopt;
+  return a == b && b == c ? 1 : 0;
+}
+
+// What a query does: from the cell's reference point to the point asked about, through the cell's
+// triangles.
+TEST(Field, GridTellsInsideFromOutside) {
+  const ClosedMesh torus = closed(testing::torus_mesh(1.0, 0.4, 70, 40), "torus");
+  const ClosedMesh cube = closed(testing::cube_mesh(), "cube");
+  for (const ClosedMesh* mesh : {&torus, &cube}) {
+    const Asset asset = baked(*mesh);
+    const SurfaceTree tree = surface_tree(asset.view());
+    const FieldHeader& field = *tree.header;
+    const MeshSolid solid(*mesh);
+    std::mt19937_64 random(8);
+    std::size_t in_surface_cells = 0;
+    for (int i = 0; i < 20'000; ++i) {
+      Point p, reference;
+      std::uint64_t cell[3];
+      for (int k = 0; k < 3; ++k) {
+        const double cells = kBrickWidth * field.bricks[k];
+        const double x = cells * (static_cast<double>(random() >> 11) * 0x1p-53);
+        cell[k] = static_cast<std::uint64_t>(x);
+        p[k] = field.low[k] + x * field.cell;
+        reference[k] =
+            field.low[k] + (static_cast<double>(cell[k]) + kCellReference[k]) * field.cell;
+      }
+      if (solid.closest_point(p).distance <= field.error) continue;
+      const std::uint32_t code =
+          tree.brick_index[cell[0] / 4 +
+                           field.bricks[0] * (cell[1] / 4 + field.bricks[1] * (cell[2] / 4))];
+      bool inside = code == kInsideBrick;
+      if (code < field.brick_count) {
+        const CellBrick& brick = tree.bricks[code];
+        const std::uint64_t bit = cell[0] % 4 + 4 * (cell[1] % 4) + 16 * (cell[2] % 4);
+        inside = (brick.inside >> bit & 1) != 0;
+        if ((brick.surface >> bit & 1) != 0) {
+          ++in_surface_cells;
+          const std::uint64_t below = brick.surface & ((std::uint64_t{1} << bit) - 1);
+          const std::uint32_t at = brick.first + static_cast<std::uint32_t>(std::popcount(below));
+          std::optional<int> steps = 0;
+          for (std::uint32_t e = tree.cell_first[at]; e < tree.cell_first[at + 1] && steps; ++e) {
+            const std::uint32_t triangle = tree.cell_triangles[e];
+            Corners t;
+            for (int k = 0; k < 3; ++k) {
+              float corner[3];
+              tree.corner(triangle / kWidth, triangle % kWidth, k, corner);
+              t[static_cast<std::size_t>(k)] = {corner[0], corner[1], corner[2]};
+            }
+            const std::optional<int> more = crossings(reference, p, t);
+            steps = more ? std::optional(*steps + *more) : std::nullopt;
+          }
+          if (!steps) continue;
+          inside = inside != (*steps % 2 != 0);
+        }
+      }
+      ASSERT_EQ(inside, solid.inside(p)) << mesh->name << " " << p.transpose();
+    }
+    EXPECT_GT(in_surface_cells, 1000u);
+  }
+}
+
+// A mesh that meets itself has no surface of whole triangles.
+TEST(Field, NoneYetOfAMeshThatMeetsItself) {
+  const ClosedMesh two = closed(testing::overlapping_cubes_mesh(), "two cubes");
+  EXPECT_FALSE(baked(two).view().has_field());
+}
+
+}  // namespace
+}  // namespace ist
