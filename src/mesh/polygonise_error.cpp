@@ -1,0 +1,217 @@
+#include "mesh/polygonise_error.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "mesh/exact_triangle.h"
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+
+// Part of a cell's edge: what is proven to be nearer needs no closer look.
+constexpr double kNearEnough = 0.125;
+constexpr double kMargin = 1 + 1e-12;  // above relative roundings
+
+double dot(const Vector3d& a, const Vector3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double length(const Vector3d& a) { return std::sqrt(dot(a, a)); }
+
+double largest(const std::vector<double>& values) {
+  double most = 0;
+  for (const double v : values) most = std::max(most, v);
+  return most;
+}
+
+/// Bounds the distance of a triangle's points from the surface. Whatever is within |s| of a point
+/// of signed distance s is on its side. So the normals through the triangle lead from a ball
+/// outside to one inside, and cross the surface in between.
+class TriangleError {
+ public:
+  TriangleError(const Solid& solid, double edge, const Vector3d& normal)
+      : solid_(solid), edge_(edge), normal_(normal) {}
+
+  double bound(const Vector3d& a, const Vector3d& b, const Vector3d& c, int depth) const {
+    const Vector3d middle = (a + b + c) / 3;
+    const double reach =
+        kMargin * std::max({length(a - middle), length(b - middle), length(c - middle)});
+    double best = between_balls(middle, reach);
+    if (best <= kNearEnough * edge_) return best;
+    if (depth == 0) return std::min(best, to_change(middle) + reach);
+    const Vector3d ab = 0.5 * a + 0.5 * b, bc = 0.5 * b + 0.5 * c, ca = 0.5 * c + 0.5 * a;
+    const double parts = std::max({bound(a, ab, ca, depth - 1), bound(ab, b, bc, depth - 1),
+                                   bound(ca, bc, c, depth - 1), bound(ab, bc, ca, depth - 1)});
+    return std::min(best, parts);
+  }
+
+ private:
+  double between_balls(const Vector3d& middle, double reach) const {
+    double best = farthest();
+    for (double s = 0.5 * edge_; s > 0.02 * edge_; s *= 0.25) {
+      const double outside = -solid_.signed_distance(middle + s * normal_);
+      const double inside = solid_.signed_distance(middle - s * normal_);
+      if (!(outside > reach && inside > reach)) continue;
+      const double above = s - std::sqrt(outside * outside - reach * reach);
+      const double below = s - std::sqrt(inside * inside - reach * reach);
+      best = std::min(best, std::max(std::abs(above), std::abs(below)));
+    }
+    return best;
+  }
+
+  /// Length of a way at whose ends the signs differ: along the normal, or across it.
+  double to_change(const Vector3d& middle) const {
+    const double here = solid_.signed_distance(middle);
+    const auto changes = [&](const Vector3d& way) {
+      return (solid_.signed_distance(middle + way) > 0) != (here > 0);
+    };
+    for (double s = std::max(kMargin * std::abs(here), 0x1p-20 * edge_); s < edge_; s *= 1.5) {
+      if (changes(s * normal_) || changes(-s * normal_)) return s;
+      for (int k = 0; k < 3; ++k) {
+        Vector3d way = Vector3d::Zero();
+        way[k] = s;
+        if (changes(way) || changes(-way)) return s;
+      }
+      for (int i = 0; i < 8; ++i) {
+        const double part = 0.5773502691896257 * s;  // of the diagonal
+        if (changes({(i & 1) != 0 ? part : -part, (i & 2) != 0 ? part : -part,
+                     (i & 4) != 0 ? part : -part}))
+          return s;
+      }
+    }
+    return farthest();
+  }
+
+  /// A quad lies in the four cells around an edge that the surface crosses.
+  double farthest() const { return 1.7320508075688774 * edge_; }
+
+  const Solid& solid_;
+  const double edge_;
+  const Vector3d normal_;
+};
+
+/// Bounds the distance of the surface in a cell from some triangles.
+class CellError {
+ public:
+  CellError(const Solid& solid, const CellGrid& grid, std::vector<TriangleFrame<double>> triangles)
+      : solid_(solid), grid_(grid), triangles_(std::move(triangles)) {}
+
+  /// `half`: half edge; infinite if there is surface, perhaps, and there are no triangles.
+  double bound(const Vector3d& middle, double half, int depth) const {
+    const double reach = 1.7320508075688774 * half * kMargin + grid_.rounding();
+    if (std::abs(solid_.signed_distance(middle)) > reach) return 0;
+    const double best = distance(middle) + reach;
+    if (best <= kNearEnough * grid_.edge || depth == 0) return best;
+    double parts = 0;
+    for (int i = 0; i < 8; ++i) {
+      const double h = 0.5 * half;
+      const Vector3d shift((i & 1) != 0 ? h : -h, (i & 2) != 0 ? h : -h, (i & 4) != 0 ? h : -h);
+      parts = std::max(parts, bound(middle + shift, h, depth - 1));
+    }
+    return std::min(best, parts);
+  }
+
+ private:
+  double distance(const Vector3d& x) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const TriangleFrame<double>& t : triangles_)
+      least = std::min(least, closest_in_frame(t, x.data()).distance2);
+    return std::sqrt(least) * kMargin;
+  }
+
+  const Solid& solid_;
+  const CellGrid& grid_;
+  const std::vector<TriangleFrame<double>> triangles_;
+};
+
+/// The triangles at every vertex.
+struct Fans {
+  std::vector<std::uint32_t> first, triangles;
+
+  explicit Fans(const TriangleMesh& mesh) : first(mesh.vertices.size() + 1, 0) {
+    for (const auto& t : mesh.triangles)
+      for (const std::uint32_t v : t) ++first[v + 1];
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) first[v + 1] += first[v];
+    std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+    triangles.resize(first.back());
+    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+      for (const std::uint32_t v : mesh.triangles[t]) triangles[next[v]++] = t;
+  }
+};
+
+/// Triangles at the vertices of a cell and, where those are none or `around`, of its neighbours.
+std::vector<TriangleFrame<double>> triangles_near(const std::vector<SurfaceCell>& cells,
+                                                  const SurfaceCell& cell, bool around,
+                                                  const Fans& fans, const TriangleMesh& mesh) {
+  std::vector<std::uint32_t> found;
+  const auto take = [&](const SurfaceCell* from) {
+    if (from == nullptr) return;
+    for (std::uint32_t v = from->first_vertex; v < from->first_vertex + from->loops; ++v)
+      found.insert(found.end(), fans.triangles.begin() + fans.first[v],
+                   fans.triangles.begin() + fans.first[v + 1]);
+  };
+  take(&cell);
+  if (around)
+    for (int i = 0; i < 27; ++i)
+      if (i != 13)
+        take(cell_at(cells,
+                     {cell.at[0] + i % 3 - 1, cell.at[1] + i / 3 % 3 - 1, cell.at[2] + i / 9 - 1}));
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  std::vector<TriangleFrame<double>> frames;
+  for (const std::uint32_t t : found) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    frames.push_back(make_triangle_frame(mesh.vertices[a].data(), mesh.vertices[b].data(),
+                                         mesh.vertices[c].data()));
+  }
+  return frames;
+}
+
+double to_any_vertex(const TriangleMesh& mesh, const Vector3d& x) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Vector3d& v : mesh.vertices) least = std::min(least, dot(v - x, v - x));
+  return std::sqrt(least) * kMargin;
+}
+
+}  // namespace
+
+double mesh_to_surface(const Solid& solid, const CellGrid& grid, const TriangleMesh& mesh) {
+  constexpr int kDepth = 5;
+  std::vector<double> bounds(mesh.triangles.size());
+  tbb::parallel_for(std::size_t{0}, bounds.size(), [&](std::size_t t) {
+    const Vector3d &a = mesh.vertices[mesh.triangles[t][0]],
+                   &b = mesh.vertices[mesh.triangles[t][1]],
+                   &c = mesh.vertices[mesh.triangles[t][2]];
+    const Vector3d u = b - a, v = c - a;
+    const Vector3d normal(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                          u[0] * v[1] - u[1] * v[0]);
+    const double size = length(normal);
+    const Vector3d unit = size > 0 ? Vector3d(normal / size) : Vector3d(Vector3d::UnitX());
+    bounds[t] = TriangleError(solid, grid.edge, unit).bound(a, b, c, kDepth);
+  });
+  return largest(bounds) + grid.rounding();
+}
+
+double surface_to_mesh(const Solid& solid, const CellGrid& grid,
+                       const std::vector<SurfaceCell>& cells, const TriangleMesh& mesh) {
+  constexpr int kDepth = 5;
+  const Fans fans(mesh);
+  std::vector<double> bounds(cells.size());
+  tbb::parallel_for(std::size_t{0}, bounds.size(), [&](std::size_t c) {
+    const SurfaceCell& cell = cells[c];
+    const Vector3d middle = grid.point(cell.at[0] + 0.5, cell.at[1] + 0.5, cell.at[2] + 0.5);
+    const auto bound_by = [&](bool around) {
+      return CellError(solid, grid, triangles_near(cells, cell, around, fans, mesh))
+          .bound(middle, 0.5 * grid.edge, kDepth);
+    };
+    bounds[c] = bound_by(cell.loops == 0);
+    if (bounds[c] > kNearEnough * grid.edge && cell.loops != 0)
+      bounds[c] = std::min(bounds[c], bound_by(true));
+    if (bounds[c] > 3 * grid.edge)
+      bounds[c] = to_any_vertex(mesh, middle) + grid.half_diagonal() * kMargin;
+  });
+  return largest(bounds) + grid.rounding();
+}
+
+}  // namespace ist
