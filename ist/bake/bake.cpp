@@ -90,9 +90,10 @@ class TreeWork {
   tbb::task_group group_;
 };
 
-/// Everything of the asset but its bytes.
-AssetArrays baked(const ClosedMesh& mesh, const MeshSolid& solid, SolidBackend& backend,
-                  const PackingSettings& settings, const ProgressCallback& progress) {
+}  // namespace
+
+AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidBackend& backend,
+                        const PackingSettings& settings, const ProgressCallback& progress) {
   const SpherePacking packing = backend.pack(settings, progress);
   const std::size_t count = packing.spheres.size();
   if (count == 0)
@@ -130,11 +131,9 @@ AssetArrays baked(const ClosedMesh& mesh, const MeshSolid& solid, SolidBackend& 
   return arrays;
 }
 
-}  // namespace
-
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidBackend& backend,
                  const PackingSettings& settings, const ProgressCallback& progress) {
-  return Asset(asset_bytes(baked(mesh, solid, backend, settings, progress)), mesh.name);
+  return Asset(asset_bytes(bake_arrays(mesh, solid, backend, settings, progress)), mesh.name);
 }
 
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,

@@ -7,22 +7,24 @@
 #include <ist/mesh.h>
 #include <ist/solid.h>
 
+#include "bake/check/checked_solid.h"
+
 namespace ist {
 
 /// A mesh's surface as `check` sees it: plain, in double, and of its own making, so that a mistake
 /// in the solid that packing asked is not repeated here. Immutable.
-class CheckSurface {
+class CheckSurface final : public CheckedSolid {
  public:
   CheckSurface(const ClosedMesh& mesh, const UnitFrame& frame);
 
   /// Unit frame, to the nearest triangle; once nothing is nearer than `limit`, any value ≥ limit.
-  double distance(const Eigen::Vector3d& p, double limit) const;
+  double distance(const Eigen::Vector3d& p, double limit) const override;
 
   /// Winding number of a point off the surface, by a ray in a direction that no mesh was modelled
   /// along; where rounding leaves a sign open, by the sum of all solid angles.
-  int winding(const Eigen::Vector3d& p) const;
+  int winding(const Eigen::Vector3d& p) const override;
 
-  const Eigen::AlignedBox3d& bounds() const { return bounds_; }  ///< unit frame
+  const Eigen::AlignedBox3d& bounds() const override { return bounds_; }
 
  private:
   using Corners = std::array<Eigen::Vector3d, 3>;
