@@ -3,7 +3,10 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "mesh/exact_triangle.h"
 
@@ -15,6 +18,10 @@ using Eigen::Vector3d;
 // Part of a cell's edge: what is proven to be nearer needs no closer look.
 constexpr double kNearEnough = 0.125;
 constexpr double kMargin = 1 + 1e-12;  // above relative roundings
+// How far triangles and cells are divided, and how many parts a level may have: more are only
+// needed where the signed distance underestimates much, and would take too long.
+constexpr int kTriangleDepth = 5, kCellDepth = 5;
+constexpr std::size_t kMostPieces = 256, kMostParts = 4096;
 
 double dot(const Vector3d& a, const Vector3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 double length(const Vector3d& a) { return std::sqrt(dot(a, a)); }
@@ -33,20 +40,34 @@ class TriangleError {
   TriangleError(const Solid& solid, double edge, const Vector3d& normal)
       : solid_(solid), edge_(edge), normal_(normal) {}
 
-  double bound(const Vector3d& a, const Vector3d& b, const Vector3d& c, int depth) const {
-    const Vector3d middle = (a + b + c) / 3;
-    const double reach =
-        kMargin * std::max({length(a - middle), length(b - middle), length(c - middle)});
-    double best = between_balls(middle, reach);
-    if (best <= kNearEnough * edge_) return best;
-    if (depth == 0) return std::min(best, to_change(middle) + reach);
-    const Vector3d ab = 0.5 * a + 0.5 * b, bc = 0.5 * b + 0.5 * c, ca = 0.5 * c + 0.5 * a;
-    const double parts = std::max({bound(a, ab, ca, depth - 1), bound(ab, b, bc, depth - 1),
-                                   bound(ca, bc, c, depth - 1), bound(ab, bc, ca, depth - 1)});
-    return std::min(best, parts);
+  double bound(const Vector3d& a, const Vector3d& b, const Vector3d& c) const {
+    std::vector<Piece> open = {{a, b, c}}, next;
+    double most = 0;
+    for (int depth = 0; !open.empty(); ++depth) {
+      const bool last = depth == kTriangleDepth || 4 * open.size() > kMostPieces;
+      for (const auto& [p, q, r] : open) {
+        const Vector3d middle = (p + q + r) / 3;
+        const double reach =
+            kMargin * std::max({length(p - middle), length(q - middle), length(r - middle)});
+        const double best = between_balls(middle, reach);
+        if (best <= kNearEnough * edge_) {
+          most = std::max(most, best);
+        } else if (last) {
+          most = std::max(most, std::min(best, to_change(middle) + reach));
+        } else {
+          const Vector3d pq = 0.5 * p + 0.5 * q, qr = 0.5 * q + 0.5 * r, rp = 0.5 * r + 0.5 * p;
+          next.insert(next.end(), {{p, pq, rp}, {pq, q, qr}, {rp, qr, r}, {pq, qr, rp}});
+        }
+      }
+      open.swap(next);
+      next.clear();
+    }
+    return most;
   }
 
  private:
+  using Piece = std::array<Vector3d, 3>;
+
   double between_balls(const Vector3d& middle, double reach) const {
     double best = farthest();
     for (double s = 0.5 * edge_; s > 0.02 * edge_; s *= 0.25) {
@@ -97,19 +118,29 @@ class CellError {
   CellError(const Solid& solid, const CellGrid& grid, std::vector<TriangleFrame<double>> triangles)
       : solid_(solid), grid_(grid), triangles_(std::move(triangles)) {}
 
-  /// `half`: half edge; infinite if there is surface, perhaps, and there are no triangles.
-  double bound(const Vector3d& middle, double half, int depth) const {
-    const double reach = 1.7320508075688774 * half * kMargin + grid_.rounding();
-    if (std::abs(solid_.signed_distance(middle)) > reach) return 0;
-    const double best = distance(middle) + reach;
-    if (best <= kNearEnough * grid_.edge || depth == 0) return best;
-    double parts = 0;
-    for (int i = 0; i < 8; ++i) {
-      const double h = 0.5 * half;
-      const Vector3d shift((i & 1) != 0 ? h : -h, (i & 2) != 0 ? h : -h, (i & 4) != 0 ? h : -h);
-      parts = std::max(parts, bound(middle + shift, h, depth - 1));
+  /// Of the cell around `middle`; infinite if there may be surface, and there are no triangles.
+  double bound(const Vector3d& middle) const {
+    std::vector<Vector3d> open = {middle}, next;
+    double half = 0.5 * grid_.edge, most = 0;
+    for (int depth = 0; !open.empty(); ++depth, half *= 0.5) {
+      const bool last = depth == kCellDepth || 8 * open.size() > kMostParts;
+      const double reach = 1.7320508075688774 * half * kMargin + grid_.rounding();
+      for (const Vector3d& x : open) {
+        if (std::abs(solid_.signed_distance(x)) > reach) continue;
+        const double best = distance(x) + reach;
+        if (last || best <= kNearEnough * grid_.edge) {
+          most = std::max(most, best);
+          continue;
+        }
+        const double h = 0.5 * half;
+        for (int i = 0; i < 8; ++i)
+          next.push_back(
+              x + Vector3d((i & 1) != 0 ? h : -h, (i & 2) != 0 ? h : -h, (i & 4) != 0 ? h : -h));
+      }
+      open.swap(next);
+      next.clear();
     }
-    return std::min(best, parts);
+    return most;
   }
 
  private:
@@ -177,7 +208,6 @@ double to_any_vertex(const TriangleMesh& mesh, const Vector3d& x) {
 }  // namespace
 
 double mesh_to_surface(const Solid& solid, const CellGrid& grid, const TriangleMesh& mesh) {
-  constexpr int kDepth = 5;
   std::vector<double> bounds(mesh.triangles.size());
   tbb::parallel_for(std::size_t{0}, bounds.size(), [&](std::size_t t) {
     const Vector3d &a = mesh.vertices[mesh.triangles[t][0]],
@@ -188,22 +218,20 @@ double mesh_to_surface(const Solid& solid, const CellGrid& grid, const TriangleM
                           u[0] * v[1] - u[1] * v[0]);
     const double size = length(normal);
     const Vector3d unit = size > 0 ? Vector3d(normal / size) : Vector3d(Vector3d::UnitX());
-    bounds[t] = TriangleError(solid, grid.edge, unit).bound(a, b, c, kDepth);
+    bounds[t] = TriangleError(solid, grid.edge, unit).bound(a, b, c);
   });
   return largest(bounds) + grid.rounding();
 }
 
 double surface_to_mesh(const Solid& solid, const CellGrid& grid,
                        const std::vector<SurfaceCell>& cells, const TriangleMesh& mesh) {
-  constexpr int kDepth = 5;
   const Fans fans(mesh);
   std::vector<double> bounds(cells.size());
   tbb::parallel_for(std::size_t{0}, bounds.size(), [&](std::size_t c) {
     const SurfaceCell& cell = cells[c];
     const Vector3d middle = grid.point(cell.at[0] + 0.5, cell.at[1] + 0.5, cell.at[2] + 0.5);
     const auto bound_by = [&](bool around) {
-      return CellError(solid, grid, triangles_near(cells, cell, around, fans, mesh))
-          .bound(middle, 0.5 * grid.edge, kDepth);
+      return CellError(solid, grid, triangles_near(cells, cell, around, fans, mesh)).bound(middle);
     };
     bounds[c] = bound_by(cell.loops == 0);
     if (bounds[c] > kNearEnough * grid.edge && cell.loops != 0)

@@ -21,13 +21,14 @@ std::uint64_t spread_bits(std::uint64_t v) {
   return (v | v << 2) & 0x1249249249249249u;
 }
 
+}  // namespace
+
 std::uint64_t morton_code(const std::array<std::int32_t, 3>& at) {
   std::uint64_t code = 0;
   for (std::size_t k = 0; k < 3; ++k) code |= spread_bits(static_cast<std::uint64_t>(at[k])) << k;
   return code;
 }
 
-/// Numbers the loops of a cell's edges.
 void find_loops(SurfaceCell& cell) {
   std::array<int, 12> next{};  // a forest: the loop's smallest edge is the root
   for (int e = 0; e < 12; ++e) next[static_cast<std::size_t>(e)] = e;
@@ -67,8 +68,6 @@ void find_loops(SurfaceCell& cell) {
     cell.loop_of[static_cast<std::size_t>(e)] = number[r];
   }
 }
-
-}  // namespace
 
 double CellGrid::rounding() const {
   double far = 0;

@@ -55,6 +55,12 @@ CellGrid grid_around(const Solid& solid, unsigned cells);
 std::vector<SurfaceCell> find_surface_cells(const Solid& solid, const CellGrid& grid,
                                             const std::function<void(int, int)>& report);
 
+/// SurfaceCell::key of a cell; coordinates in [0, 2^20].
+std::uint64_t morton_code(const std::array<std::int32_t, 3>& at);
+
+/// Numbers the loops of a cell whose `inside` is set.
+void find_loops(SurfaceCell& cell);
+
 /// The cell at a place; null if it is not listed.
 const SurfaceCell* cell_at(const std::vector<SurfaceCell>& cells,
                            const std::array<std::int32_t, 3>& at);

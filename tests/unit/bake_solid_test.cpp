@@ -117,6 +117,43 @@ TEST(BakeSolid, AMeshesSolidIsBakedAsTheMesh) {
   EXPECT_THROW(check(ball_asset(), mesh), Error);
 }
 
+TEST(BakeSolid, BakesFunctions) {
+  const Eigen::AlignedBox3d box(Vector3d::Constant(-1.2), Vector3d::Constant(1.2));
+  // A gyroid in a ball: its slope is at most that of three products, over the wave number.
+  const auto gyroid = make_function_solid(
+      [](const Vector3d& x) {
+        const Vector3d p = 5 * x;
+        const double wave = std::sin(p.x()) * std::cos(p.y()) + std::sin(p.y()) * std::cos(p.z()) +
+                            std::sin(p.z()) * std::cos(p.x());
+        return std::min((0.8 - std::abs(wave)) / (5 * std::sqrt(3.0)), 1 - x.norm());
+      },
+      box);
+  const Asset asset = bake(*gyroid, of_size(400));
+  EXPECT_GT(asset.view().header().coverage, 0.3);
+  expect_sound(check(asset, *gyroid));
+  const auto ball = make_function_solid([](const Vector3d& x) { return 1 - x.norm(); }, box);
+  EXPECT_EQ(bake(*ball, of_size(20)).view().header().volume_error > 0, true);
+}
+
+TEST(BakeSolid, RefusesFunctionsThatAreNoDistances) {
+  const Eigen::AlignedBox3d box(Vector3d::Constant(-1.2), Vector3d::Constant(1.2));
+  const auto refused = [&](auto function, const Eigen::AlignedBox3d& bounds, const char* why) {
+    try {
+      bake(*make_function_solid(function, bounds), of_size(20));
+      ADD_FAILURE() << "accepted: " << why;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
+    }
+  };
+  refused([](const Vector3d& x) { return 2 - 2 * x.norm(); }, box, "times the way near (");
+  refused([](const Vector3d& x) { return x.x() > 0.3 ? 0.1 : -0.1; }, box, "times the way near (");
+  refused([](const Vector3d&) { return std::nan(""); }, box, "not finite");
+  refused([](const Vector3d&) { return -0.01; }, box, "nothing of it is seen");
+  refused([](const Vector3d& x) { return 2 - x.norm(); }, box, "out of its bounds");
+  refused([](const Vector3d& x) { return 1 - x.norm(); }, {}, "no solid");
+  EXPECT_THROW(make_function_solid({}, box), Error);
+}
+
 TEST(BakeSolid, RefusesWhatCannotBeDone) {
   const auto ball = make_ball({0, 0, 0}, 1);
   PackingSettings grids = of_size(50);
