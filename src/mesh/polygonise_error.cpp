@@ -15,8 +15,12 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Part of a cell's edge: what is proven to be nearer needs no closer look.
-constexpr double kNearEnough = 0.125;
+/// Part of a cell's edge: what is proven to be nearer needs no closer look. A closer look takes
+/// four times as long, which many cells do not need: they are small.
+double near_enough(std::size_t cells_or_triangles) {
+  constexpr std::size_t kMany = 100'000;
+  return cells_or_triangles > kMany ? 0.25 : 0.125;
+}
 constexpr double kMargin = 1 + 1e-12;  // above relative roundings
 // How far triangles and cells are divided, and how many parts a level may have: more are only
 // needed where the signed distance underestimates much, and would take too long.
@@ -37,8 +41,8 @@ double largest(const std::vector<double>& values) {
 /// outside to one inside, and cross the surface in between.
 class TriangleError {
  public:
-  TriangleError(const Solid& solid, double edge, const Vector3d& normal)
-      : solid_(solid), edge_(edge), normal_(normal) {}
+  TriangleError(const Solid& solid, double edge, double near, const Vector3d& normal)
+      : solid_(solid), edge_(edge), near_(near), normal_(normal) {}
 
   double bound(const Vector3d& a, const Vector3d& b, const Vector3d& c) const {
     std::vector<Piece> open = {{a, b, c}}, next;
@@ -50,7 +54,7 @@ class TriangleError {
         const double reach =
             kMargin * std::max({length(p - middle), length(q - middle), length(r - middle)});
         const double best = between_balls(middle, reach);
-        if (best <= kNearEnough * edge_) {
+        if (best <= near_) {
           most = std::max(most, best);
         } else if (last) {
           most = std::max(most, std::min(best, to_change(middle) + reach));
@@ -108,15 +112,16 @@ class TriangleError {
   double farthest() const { return 1.7320508075688774 * edge_; }
 
   const Solid& solid_;
-  const double edge_;
+  const double edge_, near_;
   const Vector3d normal_;
 };
 
 /// Bounds the distance of the surface in a cell from some triangles.
 class CellError {
  public:
-  CellError(const Solid& solid, const CellGrid& grid, std::vector<TriangleFrame<double>> triangles)
-      : solid_(solid), grid_(grid), triangles_(std::move(triangles)) {}
+  CellError(const Solid& solid, const CellGrid& grid, double near,
+            std::vector<TriangleFrame<double>> triangles)
+      : solid_(solid), grid_(grid), near_(near), triangles_(std::move(triangles)) {}
 
   /// Of the cell around `middle`; infinite if there may be surface, and there are no triangles.
   double bound(const Vector3d& middle) const {
@@ -128,7 +133,7 @@ class CellError {
       for (const Vector3d& x : open) {
         if (std::abs(solid_.signed_distance(x)) > reach) continue;
         const double best = distance(x) + reach;
-        if (last || best <= kNearEnough * grid_.edge) {
+        if (last || best <= near_) {
           most = std::max(most, best);
           continue;
         }
@@ -153,6 +158,7 @@ class CellError {
 
   const Solid& solid_;
   const CellGrid& grid_;
+  const double near_;  ///< [u]
   const std::vector<TriangleFrame<double>> triangles_;
 };
 
@@ -209,6 +215,7 @@ double to_any_vertex(const TriangleMesh& mesh, const Vector3d& x) {
 
 double mesh_to_surface(const Solid& solid, const CellGrid& grid, const TriangleMesh& mesh) {
   std::vector<double> bounds(mesh.triangles.size());
+  const double near = grid.edge * near_enough(bounds.size());
   tbb::parallel_for(std::size_t{0}, bounds.size(), [&](std::size_t t) {
     const Vector3d &a = mesh.vertices[mesh.triangles[t][0]],
                    &b = mesh.vertices[mesh.triangles[t][1]],
@@ -218,7 +225,7 @@ double mesh_to_surface(const Solid& solid, const CellGrid& grid, const TriangleM
                           u[0] * v[1] - u[1] * v[0]);
     const double size = length(normal);
     const Vector3d unit = size > 0 ? Vector3d(normal / size) : Vector3d(Vector3d::UnitX());
-    bounds[t] = TriangleError(solid, grid.edge, unit).bound(a, b, c);
+    bounds[t] = TriangleError(solid, grid.edge, near, unit).bound(a, b, c);
   });
   return largest(bounds) + grid.rounding();
 }
@@ -227,15 +234,16 @@ double surface_to_mesh(const Solid& solid, const CellGrid& grid,
                        const std::vector<SurfaceCell>& cells, const TriangleMesh& mesh) {
   const Fans fans(mesh);
   std::vector<double> bounds(cells.size());
+  const double near = grid.edge * near_enough(bounds.size());
   tbb::parallel_for(std::size_t{0}, bounds.size(), [&](std::size_t c) {
     const SurfaceCell& cell = cells[c];
     const Vector3d middle = grid.point(cell.at[0] + 0.5, cell.at[1] + 0.5, cell.at[2] + 0.5);
     const auto bound_by = [&](bool around) {
-      return CellError(solid, grid, triangles_near(cells, cell, around, fans, mesh)).bound(middle);
+      return CellError(solid, grid, near, triangles_near(cells, cell, around, fans, mesh))
+          .bound(middle);
     };
     bounds[c] = bound_by(cell.loops == 0);
-    if (bounds[c] > kNearEnough * grid.edge && cell.loops != 0)
-      bounds[c] = std::min(bounds[c], bound_by(true));
+    if (bounds[c] > near && cell.loops != 0) bounds[c] = std::min(bounds[c], bound_by(true));
     if (bounds[c] > 3 * grid.edge)
       bounds[c] = to_any_vertex(mesh, middle) + grid.half_diagonal() * kMargin;
   });
