@@ -31,8 +31,8 @@
 // but the last of each level is full. Sections follow each other in this order without a gap but
 // the padding to 64 bytes, so that n and d alone give every offset (place_sections).
 //
-// The field, the solid's surface as a query looks at it: triangles, a tree of balls over them, and a
-// grid that tells inside from outside.
+// The field, the solid's surface as a query looks at it: triangles, a tree of balls over them, and
+// a grid that tells inside from outside.
 //
 //   FieldHeader
 //   level 0                           SurfaceBlock[m(0)]
@@ -147,9 +147,9 @@ struct alignas(64) SurfaceBlock {
 };
 static_assert(sizeof(SurfaceBlock) == 256);
 
-inline constexpr std::uint32_t kBrickWidth = 4;           ///< cells along an edge of a brick
-inline constexpr std::uint32_t kOutsideBrick = ~0u;       ///< brick index: no cell is inside
-inline constexpr std::uint32_t kInsideBrick = ~0u - 1;    ///< all cells are
+inline constexpr std::uint32_t kBrickWidth = 4;         ///< cells along an edge of a brick
+inline constexpr std::uint32_t kOutsideBrick = ~0u;     ///< brick index: no cell is inside
+inline constexpr std::uint32_t kInsideBrick = ~0u - 1;  ///< all cells are
 /// Where in a cell its reference point is, in edges of the cell: off the planes that meshes like.
 inline constexpr double kCellReference[3] = {0.5239, 0.4517, 0.5371};
 
@@ -236,12 +236,20 @@ struct alignas(64) AssetHeader {
 
   std::uint64_t field = 0;       ///< offset of FieldHeader; 0: baked without one
   double asked_field_error = 0;  ///< [u] 0: none was asked for
-  std::uint64_t reserved[2] = {};
+
+  /// Unit frame, proven: the mesh in the solid's place and the solid lie within it
+  /// (kFlagPolygonised).
+  double polygonise_error = 0;
+  std::uint32_t polygonise_cells = 0;  ///< along the longest side; 0: the solid is a mesh
+  std::uint32_t reserved = 0;
 };
 static_assert(sizeof(AssetHeader) == 960);
 
 inline constexpr std::uint32_t kFlagRepaired = 1u << 0;    ///< the mesh was open and repaired
 inline constexpr std::uint32_t kFlagBelowNoise = 1u << 1;  ///< greedy order ends under float noise
+/// The solid is known by its signed distance, and the mesh was made of it: polygonise_cells tells
+/// how. Inner spheres and covers are the solid's, volumes and matched spheres the mesh's.
+inline constexpr std::uint32_t kFlagPolygonised = 1u << 2;
 
 namespace detail {
 
@@ -275,15 +283,15 @@ constexpr void place_field(FieldHeader& field, std::uint64_t& end) noexcept {
   for (;; count = (count + kWidth - 1) / kWidth) {
     LevelHeader& level = field.level[field.level_count];
     level.count = count;
-    level.blocks = field.level_count == 0 ? take<SurfaceBlock>(end, count)
-                                          : take<BallBlock>(end, count);
+    level.blocks =
+        field.level_count == 0 ? take<SurfaceBlock>(end, count) : take<BallBlock>(end, count);
     level.origins = field.level_count == 0 ? 0 : take<Origin>(end, count);
     level.nodes = 0;
     ++field.level_count;
     if (count == 1) break;
   }
-  field.brick_index = take<std::uint32_t>(
-      end, std::uint64_t{field.bricks[0]} * field.bricks[1] * field.bricks[2]);
+  field.brick_index =
+      take<std::uint32_t>(end, std::uint64_t{field.bricks[0]} * field.bricks[1] * field.bricks[2]);
   field.brick_data = take<CellBrick>(end, field.brick_count);
   field.cell_first = take<std::uint32_t>(end, std::uint64_t{field.cell_count} + 1);
   field.cell_triangles = take<std::uint32_t>(end, field.entry_count);

@@ -69,6 +69,36 @@ class Asset {
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
            const ProgressCallback& progress = {});
 
+/// How the mesh in the place of a solid is made, which calibration needs.
+struct PolygoniseSettings {
+  /// Cells along the longest side of the bounds, [8, 1024]. Time and memory grow by the square.
+  /// 0: as many as the sphere count needs, 32 to 256, for an error of some 5 % of the mean radius,
+  /// and up to four times that where curved faces meet at an edge.
+  unsigned cells = 0;
+  std::string name = "solid";  ///< for messages; no part of the asset
+};
+
+/// Makes the asset of any solid known by its signed distance: CSG, functions, distance grids.
+///
+/// Inner spheres and cover radii are certified against the solid itself, on the CPU, by the banded
+/// mode alone. Matched spheres and the volume are those of a mesh in its place, whose surface and
+/// the solid's lie within a proven distance of each other: it is in the asset
+/// (AssetHeader::polygonise_error, kFlagPolygonised), and counts into the protrusion.
+/// The volume's error is what the mesh's differs from solid.volume(), and that one's error.
+///
+/// Where solid.mesh() is a mesh, this is the bake of that mesh.
+///
+/// Same solid, settings and cells give the same bytes for any number of threads; on any machine as
+/// far as signed_distance() does.
+/// The solid is asked from many threads at once, and at some points outside its bounds.
+/// Progress tells of the stage "polygonise" first. Cancelling it throws Error.
+///
+/// Throws Error as the bake of a mesh does, and where the signed distance is found not to be
+/// 1-Lipschitz or not finite, where the solid reaches out of its bounds, where no cell sees it, and
+/// for a grid mode other than banded.
+Asset bake(const Solid& solid, const PackingSettings& settings = {},
+           const ProgressCallback& progress = {}, const PolygoniseSettings& meshing = {});
+
 /// How exact an asset's volumes are to be.
 struct ErrorTarget {
   double relative_error = 0.01;  ///< (0, 1) median over random poses of two copies of the solid
@@ -118,5 +148,13 @@ struct Invariant {
 ///
 /// `threads`: 0 = all cores. Throws Error if the asset is of another mesh.
 std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigned threads = 0);
+
+/// The same for an asset of any solid, from its bytes and the solid's signed distance alone.
+///
+/// What was calibrated by a mesh in the solid's place is proven by that mesh, made again.
+///
+/// Throws Error if the asset is of another solid, as far as that mesh shows it, or the solid is a
+/// mesh: its ClosedMesh serves then.
+std::vector<Invariant> check(const Asset& asset, const Solid& solid, unsigned threads = 0);
 
 }  // namespace ist

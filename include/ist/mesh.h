@@ -71,10 +71,11 @@ enum class OpenMeshPolicy {
   repair,  ///< weld cracks, fill holes, drop what cannot bound a solid; say so in the report
 };
 
-/// Reads a mesh file: OBJ, STL, PLY, OFF, GLB/glTF and DAE by readers of this library, the rest
-/// through assimp. The file's own node transforms are applied; axes are left as they are, whichever
-/// the file declares to be up, and so are units (a DAE alone comes out in metres, by the
-/// unit that it declares). Vertices are welded. Throws Error (file, place, way out). Thread-safe.
+/// Reads a mesh file: OBJ, STL, PLY, OFF, GLB/glTF and DAE by readers of this library, level sets
+/// of OpenVDB as load_vdb() does, the rest through assimp. The file's own node transforms are
+/// applied; axes are left as they are, whichever the file declares to be up, and so are units (a
+/// DAE alone comes out in metres, by the unit that it declares). Vertices are welded. Throws Error
+/// (file, place, way out). Thread-safe.
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings = {});
 
 /// Validates and orients a mesh: reduces coincident faces to their signed sum, drops degenerate

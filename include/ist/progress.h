@@ -7,7 +7,7 @@ namespace ist {
 
 /// Where a long offline stage stands.
 struct Progress {
-  const char* stage = "";   ///< "pack", "calibrate", "cover", "tree", "predict"
+  const char* stage = "";   ///< "polygonise", "pack", "calibrate", "cover", "tree", "predict"
   std::size_t spheres = 0;  ///< count so far
   double coverage = 0;      ///< [0, 1] of the solid's volume in inner spheres; "pack" only
   double radius = 0;        ///< [u] of the spheres being inserted now; "pack" only

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -58,6 +59,17 @@ std::unique_ptr<Solid> make_box(const Eigen::Vector3d& centre, const Eigen::Vect
 /// Torus about the z axis: `major` is the radius of the tube's centre line, `minor` ≤ `major` that
 /// of the tube.
 std::unique_ptr<Solid> make_torus(const Eigen::Vector3d& centre, double major, double minor);
+
+/// The solid where a function [u] is > 0.
+///
+/// The caller vouches that the function is 1-Lipschitz, is 0 or less outside `bounds` [u] and may
+/// be called from many threads at once. A smooth function divided by a bound of its slope will do.
+/// Where it changes by more than the way, spheres may stick out and parts may be missed: bake()
+/// tries some thousand pairs of points and throws Error naming a place; pack() tries nothing.
+/// The volume is as for the boolean combinations below. Throws Error for no function or no box.
+std::unique_ptr<Solid> make_function_solid(
+    std::function<double(const Eigen::Vector3d&)> signed_distance,
+    const Eigen::AlignedBox3d& bounds);
 
 /// Boolean combinations by min and max of signed distances.
 ///

@@ -93,10 +93,11 @@ class HostWork {
   tbb::task_group group_;
 };
 
-/// Everything of the asset but its bytes.
-AssetArrays baked(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
-                  SolidBackend& backend, const PackingSettings& settings,
-                  const ProgressCallback& progress) {
+}  // namespace
+
+AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
+                        SolidBackend& backend, const PackingSettings& settings,
+                        const ProgressCallback& progress) {
   AssetArrays arrays;
   std::vector<std::uint32_t> inner_order;
   HostWork host(backend.leaves_threads_idle());
@@ -136,8 +137,6 @@ AssetArrays baked(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& fi
   return arrays;
 }
 
-}  // namespace
-
 std::shared_ptr<const FieldArrays> SolidField::arrays() {
   oneapi::tbb::collaborative_call_once(made_, [this] {
     if (!settings_.wanted) return;
@@ -150,7 +149,7 @@ std::shared_ptr<const FieldArrays> SolidField::arrays() {
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
                  SolidBackend& backend, const PackingSettings& settings,
                  const ProgressCallback& progress) {
-  return Asset(asset_bytes(baked(mesh, solid, field, backend, settings, progress)), mesh.name);
+  return Asset(asset_bytes(bake_arrays(mesh, solid, field, backend, settings, progress)), mesh.name);
 }
 
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,

@@ -34,4 +34,9 @@ Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& fie
                  SolidBackend& backend, const PackingSettings& settings,
                  const ProgressCallback& progress);
 
+/// Everything of that asset but its bytes.
+AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
+                        SolidBackend& backend, const PackingSettings& settings,
+                        const ProgressCallback& progress);
+
 }  // namespace ist

@@ -146,6 +146,10 @@ std::string describe_asset(const TreeView& tree) {
   if (const std::string target = describe_target(tree); !target.empty())
     text += "  " + target + "\n";
   if ((h.flags & kFlagRepaired) != 0) line("note", "the mesh was open and was repaired");
+  if ((h.flags & kFlagPolygonised) != 0)
+    line("solid", fmt::format("by its signed distance; calibrated by a mesh within {:.4g} u of it, "
+                              "of {} cells along the longest side",
+                              h.polygonise_error * scale, h.polygonise_cells));
   if ((h.flags & kFlagBelowNoise) != 0)
     line("note", "the smallest spheres lie under float noise: certified, not in greedy order");
   line("file", fmt::format("{} bytes, format {}.{}, content {}, mesh {}", grouped(h.file_bytes),

@@ -109,7 +109,7 @@ void add_bake(CLI::App& app) {
   PackingSettings& packing = options->packing;
   CLI::App* const command =
       app.add_subcommand("bake", "Pack a closed mesh with spheres and write an .ist asset");
-  add_input(command, "MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, …");
+  add_input(command, "MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …");
   add_output(command, options->output, "The .ist file to write", Dash::refused);
   add_whole<std::size_t>(
       command, "--spheres", packing.max_spheres,

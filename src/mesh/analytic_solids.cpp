@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
-#include <mutex>
 #include <utility>
 
-#include "mesh/solid_volume.h"
+#include "mesh/integrated_solid.h"
 
 namespace ist {
 namespace {
@@ -90,7 +90,7 @@ class Torus final : public Solid {
 
 enum class Combination { join, meet, subtract };
 
-class Combined final : public Solid {
+class Combined final : public IntegratedSolid {
  public:
   Combined(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b, Combination combination)
       : a_(std::move(a)), b_(std::move(b)), combination_(combination) {
@@ -120,19 +120,26 @@ class Combined final : public Solid {
     }
     return a_->bounds();
   }
-  double volume() const override { return integrated().value; }
-  double volume_error() const override { return integrated().error; }
 
  private:
-  const IntegratedVolume& integrated() const {
-    std::call_once(integrate_once_, [this] { volume_ = integrate_volume(*this); });
-    return volume_;
-  }
-
   std::unique_ptr<Solid> a_, b_;
   Combination combination_;
-  mutable std::once_flag integrate_once_;  // only the outermost of nested solids is ever asked
-  mutable IntegratedVolume volume_;
+};
+
+class FunctionSolid final : public IntegratedSolid {
+ public:
+  FunctionSolid(std::function<double(const Eigen::Vector3d&)> signed_distance,
+                const Eigen::AlignedBox3d& bounds)
+      : signed_distance_(std::move(signed_distance)), bounds_(bounds) {
+    if (!signed_distance_) throw Error("a solid by a function needs the function");
+    unit_frame(bounds);  // throws where there is no box
+  }
+  double signed_distance(const Eigen::Vector3d& x) const override { return signed_distance_(x); }
+  Eigen::AlignedBox3d bounds() const override { return bounds_; }
+
+ private:
+  std::function<double(const Eigen::Vector3d&)> signed_distance_;
+  Eigen::AlignedBox3d bounds_;
 };
 
 }  // namespace
@@ -147,6 +154,12 @@ std::unique_ptr<Solid> make_box(const Eigen::Vector3d& centre, const Eigen::Vect
 
 std::unique_ptr<Solid> make_torus(const Eigen::Vector3d& centre, double major, double minor) {
   return std::make_unique<Torus>(centre, major, minor);
+}
+
+std::unique_ptr<Solid> make_function_solid(
+    std::function<double(const Eigen::Vector3d&)> signed_distance,
+    const Eigen::AlignedBox3d& bounds) {
+  return std::make_unique<FunctionSolid>(std::move(signed_distance), bounds);
 }
 
 std::unique_ptr<Solid> make_union(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b) {

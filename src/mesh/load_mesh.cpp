@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <ist/error.h>
+#include <ist/level_set.h>
 #include <ist/mesh.h>
 
 #include "mesh/import/polygon_mesh.h"
@@ -28,9 +29,14 @@ constexpr std::array<std::pair<std::string_view, Reader>, 7> kReaders{{
     {".dae", read_collada},
 }};
 
-Reader reader_of(const std::string& path) {
+std::string ending_of(const std::string& path) {
   std::string ending = std::filesystem::path(path).extension().string();
   for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return ending;
+}
+
+Reader reader_of(const std::string& path) {
+  const std::string ending = ending_of(path);
   for (const auto& [known, reader] : kReaders)
     if (ending == known) return reader;
   return read_with_assimp;
@@ -59,6 +65,11 @@ Eigen::AlignedBox3d finite_bounds(const SourceFile& file, const PolygonMesh& mes
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings) {
   if (!(settings.weld_tolerance >= 0) || settings.weld_tolerance > 0.1)
     throw Error(path + ": the weld tolerance must lie in 0 … 0.1 of the diagonal");
+  if (ending_of(path) == ".vdb") {
+    const ClosedMesh level_set = load_vdb(path).mesh;
+    return weld(level_set.mesh,
+                settings.weld_tolerance * level_set.report.bounds.diagonal().norm());
+  }
   return read_mesh(read_source_file(path), settings);
 }
 

@@ -1,12 +1,16 @@
 #include <ist/bake.h>
 #include <ist/error.h>
 
+#include <cmath>
+
 #include <ist/asset_layout.h>
 #include "bake/check/check_field.h"
 #include "bake/check/check_spheres.h"
 #include "bake/check/check_surface.h"
 #include "bake/check/check_tree.h"
+#include "bake/check/distance_solid.h"
 #include "mesh/mesh_solid.h"
+#include "mesh/polygonise.h"
 #include "stage/thread_arena.h"
 
 namespace ist {
@@ -16,14 +20,14 @@ void append(std::vector<Invariant>& all, std::vector<Invariant> more) {
   for (Invariant& one : more) all.push_back(std::move(one));
 }
 
-std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mesh) {
-  const MeshSolid solid(mesh);
-  if (solid.hash() != asset.mesh_hash)
-    throw Error(mesh.name + ": the asset was baked from another mesh; bake again");
-  const CheckSurface surface(mesh, solid.frame());
-  std::vector<Invariant> all = check_header(asset, surface, solid);
-  append(all, check_spheres(asset, surface));
-  all.push_back(check_cover(asset, surface));
+/// `solid`: what spheres and covers are certified against; `surface`: what matched spheres are
+/// calibrated by; of a mesh's asset they are the same.
+std::vector<Invariant> check_all(const AssetHeader& asset, const CheckedSolid& solid,
+                                 const CheckSurface& surface, const MeshSolid& mesh,
+                                 double volume_error, bool several_shells) {
+  std::vector<Invariant> all = check_header(asset, solid, mesh, volume_error);
+  append(all, check_spheres(asset, solid));
+  all.push_back(check_cover(asset, solid));
   append(all, check_tree(asset, asset.inner_tree, at<Sphere>(asset, asset.inner_spheres),
                          at<float>(asset, asset.cover_radii), "inner tree"));
   for (std::uint32_t i = 0; i <= asset.detail_count; ++i) {
@@ -32,15 +36,46 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mes
     append(all, check_tree(asset, matched_tree(asset, i), matched_spheres(asset, i), nullptr,
                            name + "matched tree"));
   }
-  append(all, check_field(asset, surface, mesh.report.shells != 1));
+  append(all, check_field(asset, surface, several_shells));
   return all;
+}
+
+std::vector<Invariant> check_mesh(const AssetHeader& asset, const ClosedMesh& mesh) {
+  const MeshSolid solid(mesh);
+  if (solid.hash() != asset.mesh_hash || (asset.flags & kFlagPolygonised) != 0)
+    throw Error(mesh.name + ": the asset was baked from another mesh; bake again");
+  const CheckSurface surface(mesh, solid.frame());
+  return check_all(asset, surface, surface, solid, solid.unit_volume_error(),
+                   mesh.report.shells != 1);
+}
+
+std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid) {
+  if ((asset.flags & kFlagPolygonised) == 0)
+    throw Error("solid: the asset was baked from a mesh; check it against that");
+  const Polygonised made = polygonise(solid, asset.polygonise_cells);
+  const ClosedMesh closed = close_mesh(made.mesh, "solid");
+  const MeshSolid mesh(closed);
+  const double scale = mesh.frame().scale();
+  if (mesh.hash() != asset.mesh_hash || made.error / scale != asset.polygonise_error)
+    throw Error("solid: the asset was baked from another solid; bake again");
+  const double off = std::abs(mesh.volume() - solid.volume()) + solid.volume_error();
+  return check_all(asset, DistanceSolid(solid, mesh.frame()), CheckSurface(closed, mesh.frame()), mesh,
+                   mesh.unit_volume_error() + off / scale / scale / scale,
+                   closed.report.shells != 1);
 }
 
 }  // namespace
 
 std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigned threads) {
   tbb::task_arena arena = thread_arena(threads);
-  return arena.execute([&] { return check_all(asset.view().header(), mesh); });
+  return arena.execute([&] { return check_mesh(asset.view().header(), mesh); });
+}
+
+std::vector<Invariant> check(const Asset& asset, const Solid& solid, unsigned threads) {
+  if (solid.mesh() != nullptr)
+    throw Error("solid: it is a mesh; check the asset against its ClosedMesh");
+  tbb::task_arena arena = thread_arena(threads);
+  return arena.execute([&] { return check_solid(asset.view().header(), solid); });
 }
 
 }  // namespace ist

@@ -26,7 +26,7 @@ using BallList = std::vector<std::uint32_t>;
 /// proven. A point in the solid that no ball holds, or a cell too small to divide, is a violation.
 class CoverProof {
  public:
-  CoverProof(const AssetHeader& asset, const CheckSurface& surface)
+  CoverProof(const AssetHeader& asset, const CheckedSolid& surface)
       : spheres_(at<Sphere>(asset, asset.inner_spheres)),
         covers_(at<float>(asset, asset.cover_radii)),
         surface_(surface) {}
@@ -77,12 +77,12 @@ class CoverProof {
  private:
   const Sphere* spheres_;
   const float* covers_;
-  const CheckSurface& surface_;
+  const CheckedSolid& surface_;
 };
 
 }  // namespace
 
-Invariant check_cover(const AssetHeader& asset, const CheckSurface& surface) {
+Invariant check_cover(const AssetHeader& asset, const CheckedSolid& surface) {
   const CoverProof proof(asset, surface);
   BallList all(asset.sphere_count);
   std::iota(all.begin(), all.end(), 0u);

@@ -13,18 +13,19 @@
 namespace ist {
 
 /// Inner spheres lie in the solid and apart; covers hold spheres.
-std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckSurface& surface);
+std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSolid& surface);
 
 /// The matched spheres of a detail (0: the finest) stand for the solid. Names start with `name`.
 std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t detail,
                                      const CheckSurface& surface, const std::string& name);
 
-/// The header's frame and volumes are those of the mesh.
-std::vector<Invariant> check_header(const AssetHeader& asset, const CheckSurface& surface,
-                                    const MeshSolid& solid);
+/// The header's frame and volumes are those of the mesh, and the volume is about that of the solid
+/// `surface`; `volume_error`: what the header is to say of it, unit frame.
+std::vector<Invariant> check_header(const AssetHeader& asset, const CheckedSolid& surface,
+                                    const MeshSolid& solid, double volume_error);
 
 /// Every point of the solid lies in some cover ball: proven by subdivision.
-Invariant check_cover(const AssetHeader& asset, const CheckSurface& surface);
+Invariant check_cover(const AssetHeader& asset, const CheckedSolid& surface);
 
 /// For every sphere, the others that it overlaps.
 std::vector<std::vector<std::uint32_t>> overlapping_pairs(const Sphere* spheres, std::size_t count);

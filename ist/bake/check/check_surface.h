@@ -8,11 +8,13 @@
 #include <ist/mesh.h>
 #include <ist/solid.h>
 
+#include "bake/check/checked_solid.h"
+
 namespace ist {
 
 /// A mesh's surface as `check` sees it: plain, in double, and of its own making, so that a mistake
 /// in the solid that packing asked is not repeated here. Immutable.
-class CheckSurface {
+class CheckSurface final : public CheckedSolid {
  public:
   using Corners = std::array<Eigen::Vector3d, 3>;
 
@@ -21,7 +23,7 @@ class CheckSurface {
   explicit CheckSurface(std::vector<Corners> triangles);
 
   /// Unit frame, to the nearest triangle; once nothing is nearer than `limit`, any value ≥ limit.
-  double distance(const Eigen::Vector3d& p, double limit) const;
+  double distance(const Eigen::Vector3d& p, double limit) const override;
 
   /// The nearest triangle, as an index of triangles(), and its distance, unit frame.
   std::pair<double, std::uint32_t> nearest(const Eigen::Vector3d& p) const;
@@ -31,9 +33,9 @@ class CheckSurface {
 
   /// Winding number of a point off the surface, by a ray in a direction that no mesh was modelled
   /// along; where rounding leaves a sign open, by the sum of all solid angles.
-  int winding(const Eigen::Vector3d& p) const;
+  int winding(const Eigen::Vector3d& p) const override;
 
-  const Eigen::AlignedBox3d& bounds() const { return bounds_; }  ///< unit frame
+  const Eigen::AlignedBox3d& bounds() const override { return bounds_; }
 
  private:
   struct Node {

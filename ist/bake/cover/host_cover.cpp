@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <numeric>
 
 #include "bake/cover/cover_cells.h"
@@ -14,10 +15,10 @@
 namespace ist {
 namespace {
 
-/// The solid, as cover_cell() asks it.
-class CoverSurface {
+/// A mesh, as cover_cell() asks it.
+class MeshCover {
  public:
-  explicit CoverSurface(const MeshSolid& solid) : solid_(solid), view_(solid.view()) {}
+  explicit MeshCover(const MeshSolid& solid) : solid_(solid), view_(solid.view()) {}
 
   bool nearest(const double point[3], double radius, double q[3]) const {
     const ExactReach reach(point);
@@ -28,10 +29,50 @@ class CoverSurface {
   bool inside(const double point[3]) const {
     return solid_.inside(Eigen::Vector3d(point[0], point[1], point[2]));
   }
+  /// Distance from the surface of a point inside, else 0.
+  double depth(const Eigen::Vector3d& point) const {
+    return solid_.inside(point) ? solid_.closest_point(point).distance : 0;
+  }
 
  private:
   const MeshSolid& solid_;
   const MeshView& view_;
+};
+
+/// A signed distance, as cover_cell() asks it.
+class FieldCover {
+ public:
+  FieldCover(const Solid& solid, const UnitFrame& frame)
+      : solid_(solid), frame_(frame), scale_(frame.scale()) {}
+
+  bool nearest(const double point[3], double radius, double q[3]) const {
+    const Eigen::Vector3d x(point[0], point[1], point[2]);
+    const double s = value(x);
+    if (std::abs(s) > radius) return false;
+    const double step = 0x1p-20;
+    Eigen::Vector3d g;
+    for (int k = 0; k < 3; ++k) {
+      Eigen::Vector3d e = Eigen::Vector3d::Zero();
+      e[k] = step;
+      g[k] = value(x + e) - value(x - e);
+    }
+    const double length = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    for (int k = 0; k < 3; ++k) q[k] = length > 0 ? x[k] - s / length * g[k] : x[k];
+    return true;
+  }
+  bool inside(const double point[3]) const {
+    return value(Eigen::Vector3d(point[0], point[1], point[2])) > 0;
+  }
+  double depth(const Eigen::Vector3d& point) const { return std::max(0.0, value(point)); }
+
+ private:
+  double value(const Eigen::Vector3d& x) const {
+    return solid_.signed_distance(frame_.from_unit(x)) / scale_;
+  }
+
+  const Solid& solid_;
+  UnitFrame frame_;
+  double scale_;
 };
 
 /// Cells to divide, and the lists that their children filter.
@@ -48,7 +89,8 @@ void raise_to(double& extension, double value) {
 }
 
 /// One level of the subdivision: the children of every cell of `from`, on all threads.
-Frontier divide(const Frontier& from, const CoverLevel& level, const CoverSurface& surface,
+template <class Surface>
+Frontier divide(const Frontier& from, const CoverLevel& level, const Surface& surface,
                 std::vector<double>& raised) {
   tbb::enumerable_thread_specific<Frontier> parts;
   tbb::parallel_for(std::size_t{0}, from.cells.size(), [&](std::size_t c) {
@@ -81,19 +123,16 @@ Frontier divide(const Frontier& from, const CoverLevel& level, const CoverSurfac
   return all;
 }
 
-}  // namespace
-
-std::vector<double> cover_on_host(const MeshSolid& solid, const CoverTask& task,
-                                  const std::function<void(int)>& report) {
+template <class Surface>
+std::vector<double> cover(const Surface& surface, const CoverTask& task,
+                          const std::function<void(int)>& report) {
   std::vector<CoverBall> balls(task.balls.begin(), task.balls.end());
   tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t k) {
     CoverBall& ball = balls[k];
     const Eigen::Vector3d centre(ball.x, ball.y, ball.z);
     // A ball up to the surface is part of the solid: it costs the separation bound nothing.
-    const double clear = solid.inside(centre) ? solid.closest_point(centre).distance : 0;
-    ball.radius = std::max(ball.radius, clear) + task.slack;
+    ball.radius = std::max(ball.radius, surface.depth(centre)) + task.slack;
   });
-  const CoverSurface surface(solid);
   const auto count = static_cast<std::uint32_t>(balls.size());
   Frontier frontier;
   frontier.cells.push_back({task.middle[0], task.middle[1], task.middle[2], 0, count, false});
@@ -113,6 +152,18 @@ std::vector<double> cover_on_host(const MeshSolid& solid, const CoverTask& task,
   }
   for (std::size_t k = 0; k < count; ++k) extensions[k] = balls[k].radius + extensions[k];
   return extensions;
+}
+
+}  // namespace
+
+std::vector<double> cover_on_host(const MeshSolid& solid, const CoverTask& task,
+                                  const std::function<void(int)>& report) {
+  return cover(MeshCover(solid), task, report);
+}
+
+std::vector<double> cover_on_host(const Solid& solid, const UnitFrame& frame, const CoverTask& task,
+                                  const std::function<void(int)>& report) {
+  return cover(FieldCover(solid, frame), task, report);
 }
 
 }  // namespace ist

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <ist/mesh.h>
+#include <ist/progress.h>
+#include <ist/solid.h>
+
+namespace ist {
+
+/// Signed distances at the points of a lattice, positive inside. A band around the surface
+/// suffices: beyond it any value of the right sign will do.
+struct DistanceGrid {
+  std::array<std::uint32_t, 3> size = {};            ///< points along x, y, z, each ≥ 2
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< [u] of the first point
+  double spacing = 0;                                ///< [u] of neighbours, > 0
+  std::vector<float> values;                         ///< [u] x runs fastest, then y
+};
+
+/// The mesh of a level set.
+struct LevelSetMesh {
+  ClosedMesh mesh;   ///< [u]
+  double error = 0;  ///< [u] proven: its surface and the level set lie within this of each other
+};
+
+/// The solid where the trilinear interpolation of a grid is > 0, as a mesh: a vertex in every cell
+/// of eight points of two signs, edges and corners kept sharp. From there on it is a mesh like any
+/// other: bake() takes it, on a GPU too, and check() proves against it.
+///
+/// What distances there are inside is found from the mesh, so that a narrow band costs nothing. The
+/// values need not be distances: their zero alone counts. The error is proven from the steepest
+/// slope near the surface, and comes out larger where slopes there differ much.
+/// On the current threads of TBB. Same bytes for any number of them.
+///
+/// Throws Error, naming `name`, for sizes that do not fit, values that are not finite, a grid that
+/// is nowhere inside, a solid that reaches the grid's border, and if progress cancels (stage
+/// "polygonise").
+LevelSetMesh mesh_level_set(const DistanceGrid& grid, const std::string& name,
+                            const ProgressCallback& progress = {});
+
+/// The same as a Solid, by its mesh.
+std::unique_ptr<Solid> make_grid_solid(const DistanceGrid& grid);
+
+/// True where this library was built with OpenVDB.
+bool vdb_available() noexcept;
+
+/// The level set of an OpenVDB file: its one grid, of floats and marked as a level set (negative
+/// inside, as OpenVDB has it), any linear transform. [u] is the file's world unit.
+///
+/// load_mesh() reads a .vdb this way too, so that whatever takes a mesh file takes such a file.
+/// OpenVDB reads the file: not for files that nobody vouches for.
+///
+/// Throws Error (file, what is wrong, way out) for a file of several grids or none, a grid of
+/// another kind, a fog volume, as mesh_level_set() does, and without OpenVDB.
+LevelSetMesh load_vdb(const std::string& path, const ProgressCallback& progress = {});
+
+/// The same as a Solid, by its mesh.
+std::unique_ptr<Solid> load_vdb_solid(const std::string& path);
+
+}  // namespace ist

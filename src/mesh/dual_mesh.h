@@ -1,0 +1,17 @@
+#pragma once
+
+#include <vector>
+
+#include "mesh/polygonise.h"
+#include "mesh/surface_cells.h"
+#include "stage/stage.h"
+
+namespace ist {
+
+/// The mesh of a solid from the cells that its surface crosses, all of them listed by Morton code
+/// with their loops, and its error. Tells `stage` of the second 60 % of the work. Throws Error as
+/// polygonise() does.
+Polygonised dual_mesh(const Solid& solid, const CellGrid& grid, std::vector<SurfaceCell> cells,
+                      Stage& stage);
+
+}  // namespace ist

@@ -1,0 +1,14 @@
+#include <ist/error.h>
+#include <ist/level_set.h>
+
+namespace ist {
+
+bool vdb_available() noexcept { return false; }
+
+LevelSetMesh load_vdb(const std::string& path, const ProgressCallback&) {
+  throw Error(path +
+              ": this library was built without OpenVDB. Install libopenvdb-dev (dev setup "
+              "--vdb) and build it again, or export a mesh");
+}
+
+}  // namespace ist

@@ -1,0 +1,32 @@
+#include "mesh/polygonise.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include <ist/error.h>
+
+#include "mesh/dual_mesh.h"
+#include "mesh/surface_cells.h"
+#include "stage/stage.h"
+
+namespace ist {
+
+Polygonised polygonise(const Solid& solid, unsigned cells, const ProgressCallback& progress) {
+  if (cells < kFewestCells || cells > kMostCells)
+    throw Error("polygonise: " + std::to_string(cells) + " cells, not " +
+                std::to_string(kFewestCells) + " to " + std::to_string(kMostCells));
+  Stage stage("polygonise", progress);
+  stage.step(0, 0);
+  const CellGrid grid = grid_around(solid, cells);
+  std::vector<SurfaceCell> listed = find_surface_cells(
+      solid, grid, [&](int level, int levels) { stage.step(0, 0.2 * level / levels); });
+  const bool seen = std::any_of(listed.begin(), listed.end(),
+                                [](const SurfaceCell& cell) { return cell.loops > 0; });
+  if (!seen)
+    throw Error("solid: nothing of it is seen by a grid of " + std::to_string(cells) +
+                " cells. Polygonise it with more, or give bounds that fit");
+  return dual_mesh(solid, grid, std::move(listed), stage);
+}
+
+}  // namespace ist

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <ist/mesh.h>
+#include <ist/progress.h>
+#include <ist/solid.h>
+
+namespace ist {
+
+/// A mesh in place of a solid.
+struct Polygonised {
+  TriangleMesh mesh;  ///< [u] a closed, oriented surface: every edge is run both ways equally often
+  /// [u] proven: every point of the mesh is this near to the solid's surface, and the reverse.
+  double error = 0;
+};
+
+constexpr unsigned kFewestCells = 8, kMostCells = 1024;
+
+/// The surface of a solid as triangles, by dual contouring: a vertex in every cell that the surface
+/// crosses, where its tangent planes meet, so that edges and corners stay sharp.
+///
+/// `cells`: along the longest side of the bounds, [8, 1024]. Time grows with the surface, by the
+/// square of it. Same bytes for any number of threads, which are those of the current arena.
+///
+/// The surface is where signed_distance() is 0. The error is proven from its being 1-Lipschitz and
+/// of the right sign alone: where it underestimates distances, as CSG's does, the proof takes
+/// longer and the error may come out larger, never too small. Walls of zero inside the solid (two
+/// boxes united that share a face) are surface by that measure; the mesh has none there, and the
+/// error says how far they are from it.
+///
+/// Mesh and solid agree about every point further from both surfaces than the error, as far as the
+/// mesh does not meet itself.
+///
+/// Throws Error where no cell sees both sides of the surface, where the solid reaches out of its
+/// bounds, where the signed distance is not 1-Lipschitz or not a number, as far as that is met, and
+/// if progress cancels (stage "polygonise").
+Polygonised polygonise(const Solid& solid, unsigned cells, const ProgressCallback& progress = {});
+
+}  // namespace ist
