@@ -69,13 +69,13 @@ struct DistanceGridField {
 
 /// What a look at a field tells.
 struct FieldSample {
-  double distance = 0;  ///< [u] to the surface, positive inside
+  double distance = 0;                                 ///< [u] to the surface, positive inside
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< of the distance
 };
 
 /// A field that the caller answers for. Called once for every node and ball that is looked at, on
-/// the thread of the query. A sample that is not finite gives QueryStatus::invalid_input; the answer
-/// is no better than the samples.
+/// the thread of the query. A sample that is not finite gives QueryStatus::invalid_input; the
+/// answer is no better than the samples.
 struct FunctionField {
   FieldSample (*look)(const void* context, const Eigen::Vector3d& x) noexcept = nullptr;
   const void* context = nullptr;  ///< handed to `look`

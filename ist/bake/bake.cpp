@@ -149,7 +149,8 @@ std::shared_ptr<const FieldArrays> SolidField::arrays() {
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
                  SolidBackend& backend, const PackingSettings& settings,
                  const ProgressCallback& progress) {
-  return Asset(asset_bytes(bake_arrays(mesh, solid, field, backend, settings, progress)), mesh.name);
+  return Asset(asset_bytes(bake_arrays(mesh, solid, field, backend, settings, progress)),
+               mesh.name);
 }
 
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,

@@ -39,9 +39,9 @@ class PairPatches {
         tree_a_(sphere_tree(a.tree, settings.measure)),
         tree_b_(sphere_tree(b.tree, settings.measure)),
         both_(a, *tree_a_.header, b, *tree_b_.header, pose, scratch),
-        method_(pair_method(
-            a, *tree_a_.header, b, *tree_b_.header, pose,
-            settings.measure == Measure::inner ? FieldUse::never : settings.field)) {}
+        method_(
+            pair_method(a, *tree_a_.header, b, *tree_b_.header, pose,
+                        settings.measure == Measure::inner ? FieldUse::never : settings.field)) {}
 
   ContactPatches run(std::span<ContactPatch> patches) {
     ContactPatches result;
@@ -68,10 +68,10 @@ class PairPatches {
           Descent again(tree_a_, tree_b_, pose_, limits_, scratch_, &scratch_.contact);
           again.run();
         }
-        result.count = write_patches({scratch_.contact,
-                                      scratch_.contact.collect(descent.precision()), pose_,
-                                      of_b ? radius_b : radius_a},
-                                     result.penetration, patches);
+        result.count =
+            write_patches({scratch_.contact, scratch_.contact.collect(descent.precision()), pose_,
+                           of_b ? radius_b : radius_a},
+                          result.penetration, patches);
         return result;
       }
     }
@@ -81,17 +81,17 @@ class PairPatches {
     if (!method_.lenses) result.penetration = sum;
     const std::uint32_t filled = scratch_.contact.collect(Precision::float64);
     if (b_probes) {
-      result.count = write_patches({scratch_.contact, filled, pose_,
-                                    tree_b_.header->root[3] * pose_.a_from_b.scale},
-                                   result.penetration, patches);
+      result.count = write_patches(
+          {scratch_.contact, filled, pose_, tree_b_.header->root[3] * pose_.a_from_b.scale},
+          result.penetration, patches);
       return result;
     }
     // A's spheres probe B: the patches come as pushes on A.
     const std::optional<RelativePose> turned = relative_pose(b_, a_);
     if (!turned) return result;
-    result.count = write_patches({scratch_.contact, filled, *turned,
-                                  tree_a_.header->root[3] * turned->a_from_b.scale},
-                                 turned_over(result.penetration, b_, a_), patches);
+    result.count = write_patches(
+        {scratch_.contact, filled, *turned, tree_a_.header->root[3] * turned->a_from_b.scale},
+        turned_over(result.penetration, b_, a_), patches);
     Eigen::Vector3d between;
     for (int k = 0; k < 3; ++k) between[k] = a_.pose.t[k] - b_.pose.t[k];
     for (ContactPatch& patch : patches.first(result.count)) {

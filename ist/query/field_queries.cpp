@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <atomic>
 #include <optional>
 
 #include <ist/field.h>
@@ -8,31 +6,11 @@
 #include "query/contact/write_patches.h"
 #include "query/field/field_descent.h"
 #include "query/field/gap_search.h"
+#include "query/field/mesh_shape.h"
 #include "query/field/surface_descent.h"
-#include "query/probe/membership.h"
-#include "query/probe/surface_distance.h"
 
 namespace ist {
 namespace {
-
-/// The surface in an asset as a field of distances.
-struct MeshShape {
-  explicit MeshShape(const MeshField& f) noexcept : surface(surface_tree(f.tree)) {}
-  FieldSample nearest(const Eigen::Vector3d& x) const noexcept {
-    const double at[3] = {x.x(), x.y(), x.z()};
-    const NearestSurface found = nearest_surface(surface, at, 1e300);
-    const Eigen::Vector3d point(found.point[0], found.point[1], found.point[2]);
-    const Eigen::Vector3d way =
-        found.distance > 0 ? Eigen::Vector3d((point - x) / found.distance)
-                           : Eigen::Vector3d::Zero().eval();
-    return inside_surface(surface, at, found.distance * (1 - 1e-12))
-               ? FieldSample{found.distance, -way}
-               : FieldSample{-found.distance, way};
-  }
-  double error() const noexcept { return surface.header->error; }
-
-  SurfaceTree surface;
-};
 
 /// Runs `use(shape)` with the field's shape; `refuse()` where its numbers are out of range.
 template <class Use, class Refuse>
@@ -43,15 +21,24 @@ auto with_shape(const Field& field, const Use& use, const Refuse& refuse) noexce
     return shape.sound ? result : refuse();
   };
   switch (field.index()) {
-    case 0: return run(HalfSpaceShape(*std::get_if<0>(&field)));
-    case 1: return run(BoxShape(*std::get_if<1>(&field)));
-    case 2: return run(BallShape(*std::get_if<2>(&field)));
-    case 3: return run(CapsuleShape(*std::get_if<3>(&field)));
-    case 4: return run(CylinderShape(*std::get_if<4>(&field)));
-    case 5: return run(HeightShape(*std::get_if<5>(&field)));
-    case 6: return run(GridShape(*std::get_if<6>(&field)));
-    case 7: return run(FunctionShape(*std::get_if<7>(&field)));
-    default: return refuse();
+    case 0:
+      return run(HalfSpaceShape(*std::get_if<0>(&field)));
+    case 1:
+      return run(BoxShape(*std::get_if<1>(&field)));
+    case 2:
+      return run(BallShape(*std::get_if<2>(&field)));
+    case 3:
+      return run(CapsuleShape(*std::get_if<3>(&field)));
+    case 4:
+      return run(CylinderShape(*std::get_if<4>(&field)));
+    case 5:
+      return run(HeightShape(*std::get_if<5>(&field)));
+    case 6:
+      return run(GridShape(*std::get_if<6>(&field)));
+    case 7:
+      return run(FunctionShape(*std::get_if<7>(&field)));
+    default:
+      return refuse();
   }
 }
 
@@ -142,8 +129,7 @@ ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
     return result;
   }
   ContactBins& bins = workspace.impl()->contact;
-  result.penetration =
-      penetrate(a, b, settings.measure, limits_of(settings), workspace, &bins);
+  result.penetration = penetrate(a, b, settings.measure, limits_of(settings), workspace, &bins);
   if (result.penetration.status == invalid()) return result;
   const std::optional<RelativePose> pose = pose_of(a, b);
   if (!pose) return result;

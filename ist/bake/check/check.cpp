@@ -59,8 +59,8 @@ std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid)
   if (mesh.hash() != asset.mesh_hash || made.error / scale != asset.polygonise_error)
     throw Error("solid: the asset was baked from another solid; bake again");
   const double off = std::abs(mesh.volume() - solid.volume()) + solid.volume_error();
-  return check_all(asset, DistanceSolid(solid, mesh.frame()), CheckSurface(closed, mesh.frame()), mesh,
-                   mesh.unit_volume_error() + off / scale / scale / scale,
+  return check_all(asset, DistanceSolid(solid, mesh.frame()), CheckSurface(closed, mesh.frame()),
+                   mesh, mesh.unit_volume_error() + off / scale / scale / scale,
                    closed.report.shells != 1);
 }
 

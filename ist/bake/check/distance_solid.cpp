@@ -9,7 +9,9 @@ DistanceSolid::DistanceSolid(const Solid& solid, const UnitFrame& frame)
       frame_(frame),
       bounds_(frame.to_unit(solid.bounds().min()), frame.to_unit(solid.bounds().max())) {}
 
-double DistanceSolid::distance(const Eigen::Vector3d& p, double) const { return std::abs(value(p)); }
+double DistanceSolid::distance(const Eigen::Vector3d& p, double) const {
+  return std::abs(value(p));
+}
 
 int DistanceSolid::winding(const Eigen::Vector3d& p) const { return value(p) > 0 ? 1 : 0; }
 

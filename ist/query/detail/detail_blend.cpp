@@ -87,8 +87,7 @@ class DetailQueries {
     const TreeHeader& tree_b = matched_tree(b_, pair.b);
     PairOverlap both(placed_a_, tree_a, placed_b_, tree_b, pose_, *workspace_.impl());
     const Penetration answer =
-        keep_rounding ? both.by_lenses(limits, true)
-                      : both.by(method_of(pair), limits);
+        keep_rounding ? both.by_lenses(limits, true) : both.by(method_of(pair), limits);
     visits_ += answer.node_visits;
     pairs_ += answer.sphere_pairs;
     return answer;

@@ -14,7 +14,8 @@ namespace ist {
 template <class Shape>
 class FieldDescent {
  public:
-  /// `pose`: of the field, in its own frame, and of the tree. All arguments must outlive the descent.
+  /// `pose`: of the field, in its own frame, and of the tree. All arguments must outlive the
+  /// descent.
   FieldDescent(Shape& shape, const SphereTree& probes, const RelativePose& pose,
                const DescentLimits& limits, Workspace::Impl& scratch,
                ContactBins* bins = nullptr) noexcept
@@ -99,8 +100,7 @@ class FieldDescent {
       }
       ProbeBalls balls;
       place_probes(probes_, level, block, map_, balls);
-      const std::uint32_t used =
-          std::min(kWidth, probes_.count(level - 1) - kWidth * block);
+      const std::uint32_t used = std::min(kWidth, probes_.count(level - 1) - kWidth * block);
       std::size_t count = 0;
       for (std::uint32_t lane = 0; lane < used; ++lane) {
         const Eigen::Vector3d x(balls.origin[0] + balls.x[lane], balls.origin[1] + balls.y[lane],

@@ -57,8 +57,8 @@ class GapSearch {
     for (std::uint32_t lane = 0; lane < kWidth && kWidth * pair.a + lane < below; ++lane) {
       const std::uint32_t child = kWidth * pair.a + lane;
       const NodeBall ball = tree_.ball(level - 1, child);
-      const double cover_radius =
-          level == 0 ? static_cast<double>(tree_.sphere_cover[child]) : tree_.cover(level - 1, child);
+      const double cover_radius = level == 0 ? static_cast<double>(tree_.sphere_cover[child])
+                                             : tree_.cover(level - 1, child);
       double at[3];
       map_.apply(ball.centre, at);
       const Eigen::Vector3d x(at[0], at[1], at[2]);
@@ -77,7 +77,8 @@ class GapSearch {
         continue;
       }
       std::size_t place = size_++;
-      for (; place > first && stack_[place - 1].gap < gap; --place) stack_[place] = stack_[place - 1];
+      for (; place > first && stack_[place - 1].gap < gap; --place)
+        stack_[place] = stack_[place - 1];
       stack_[place] = {gap, cover, child, 0, level - 1, 0};
     }
   }

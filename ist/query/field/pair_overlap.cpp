@@ -59,8 +59,8 @@ PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const Plac
   }
   // Grows without bound as the ratio does towards kUnlike.
   const double unlike = smooth_step((ratio - 1) / (kUnlike - 1));
-  method.full = kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) * ratio /
-                (1 - unlike);
+  method.full =
+      kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) * ratio / (1 - unlike);
   method.none = kHandover * method.full;
   return method;
 }
@@ -81,18 +81,16 @@ Penetration blended(const Penetration& lenses, Penetration sum, const ExactWeigh
   const double slope = weight.slope / unit3 * (sum.volume - lenses.volume);
   const double volume = w * sum.volume + (1 - w) * lenses.volume;
   // The weight is as sure as the lenses' volume.
-  const double doubt =
-      std::abs(slope) * std::max(0.0, lenses.volume_max - lenses.volume_min);
+  const double doubt = std::abs(slope) * std::max(0.0, lenses.volume_max - lenses.volume_min);
   if (volume > 0)
     sum.centroid = (w * sum.volume / volume) * sum.centroid +
                    ((1 - w) * lenses.volume / volume) * lenses.centroid;
   sum.volume_min = std::max(0.0, w * sum.volume_min + (1 - w) * lenses.volume_min - doubt);
   sum.volume_max = w * sum.volume_max + (1 - w) * lenses.volume_max + doubt;
   sum.volume = std::clamp(volume, sum.volume_min, sum.volume_max);
-  sum.translation_gradient = w * sum.translation_gradient +
-                             (1 - w + slope) * lenses.translation_gradient;
-  sum.rotation_gradient =
-      w * sum.rotation_gradient + (1 - w + slope) * lenses.rotation_gradient;
+  sum.translation_gradient =
+      w * sum.translation_gradient + (1 - w + slope) * lenses.translation_gradient;
+  sum.rotation_gradient = w * sum.rotation_gradient + (1 - w + slope) * lenses.rotation_gradient;
   return sum;
 }
 
@@ -132,8 +130,7 @@ Penetration PairOverlap::by(const PairMethod& method, const DescentLimits& limit
   if (!method.exact) return by_lenses(limits);
   if (!method.lenses) return exact(method.b_probes, limits);
   using Clock = std::chrono::steady_clock;
-  const Clock::time_point start =
-      limits.deadline_us > 0 ? Clock::now() : Clock::time_point();
+  const Clock::time_point start = limits.deadline_us > 0 ? Clock::now() : Clock::time_point();
   const Penetration lenses = by_lenses(limits);
   const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
   const ExactWeight weight = exact_weight(method, lenses.volume / unit3);

@@ -14,8 +14,8 @@ struct PairMethod {
   bool lenses = true;
   bool exact = false;    ///< the finer tree's spheres in the coarser one's surface
   bool b_probes = true;  ///< whose spheres those are
-  /// Overlap by lenses, A's unit frame: up to `full` the exact sum answers alone, from `none` on the
-  /// lenses do.
+  /// Overlap by lenses, A's unit frame: up to `full` the exact sum answers alone, from `none` on
+  /// the lenses do.
   double full = 0, none = 0;
 };
 

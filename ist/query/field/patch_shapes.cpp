@@ -208,8 +208,8 @@ FieldSample HeightShape::nearest(const Eigen::Vector3d& x) const noexcept {
     }
   }
   const double distance = std::sqrt(best2);
-  const Eigen::Vector3d up = distance > 0 ? Eigen::Vector3d((x - point) / distance)
-                                          : Eigen::Vector3d::UnitZ().eval();
+  const Eigen::Vector3d up =
+      distance > 0 ? Eigen::Vector3d((x - point) / distance) : Eigen::Vector3d::UnitZ().eval();
   return gap > 0 ? FieldSample{-distance, -up} : FieldSample{distance, up};
 }
 

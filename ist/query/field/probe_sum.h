@@ -81,8 +81,7 @@ inline ProbeTotal total_of(const ProbeBalls& balls, const ProbeSums& sums, std::
     }
     const double volume = std::clamp(held + sums.cones[i], 0.0, whole);
     add_part(x, volume, -Eigen::Vector3d(sums.pull[0][i], sums.pull[1][i], sums.pull[2][i]),
-             -Eigen::Vector3d(sums.shift[0][i], sums.shift[1][i], sums.shift[2][i]),
-             total.overlap);
+             -Eigen::Vector3d(sums.shift[0][i], sums.shift[1][i], sums.shift[2][i]), total.overlap);
     total.area += sums.area[i];
     total.crossed += whole;
   }

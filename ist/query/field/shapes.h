@@ -20,7 +20,7 @@ namespace ist {
 /// What of a ball is inside a field.
 struct BallPart {
   double volume = 0;
-  double area = 0;                                      ///< of the surface in the ball
+  double area = 0;                                     ///< of the surface in the ball
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< of the volume by the centre
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();    ///< ∫ (y − centre) dV
 };
@@ -65,8 +65,7 @@ struct BallShape {
     const Lens<double> both = lens(radius, r, d);
     const double scale = d > 0 ? both.derivative() / d : 0;
     // Centroid: (cap_a · centre_a + cap_b · centre_b) / (cap_a + cap_b), from the ball's centre.
-    return {both.volume(), -both.derivative(), scale * x,
-            -(std::numbers::pi / 3) * both.cap_a * x};
+    return {both.volume(), -both.derivative(), scale * x, -(std::numbers::pi / 3) * both.cap_a * x};
   }
   double error() const noexcept { return 0; }
 
@@ -76,7 +75,9 @@ struct BallShape {
 
 struct CapsuleShape {
   explicit CapsuleShape(const CapsuleField& f) noexcept
-      : radius(f.radius), half(f.half_height), sound(is_length(radius) && half >= 0 && half <= 1e150) {}
+      : radius(f.radius),
+        half(f.half_height),
+        sound(is_length(radius) && half >= 0 && half <= 1e150) {}
   FieldSample look(const Eigen::Vector3d& x) const noexcept {
     const Eigen::Vector3d away(x.x(), x.y(), x.z() - std::clamp(x.z(), -half, half));
     const double d = away.norm();
@@ -171,7 +172,8 @@ struct GridShape {
       return at;
     }
     const auto slope = [&](int k, int j) { return c[k][j][1] - c[k][j][0]; };
-    at.gradient.x() = mix(mix(slope(0, 0), slope(0, 1), t[1]), mix(slope(1, 0), slope(1, 1), t[1]), t[2]);
+    at.gradient.x() =
+        mix(mix(slope(0, 0), slope(0, 1), t[1]), mix(slope(1, 0), slope(1, 1), t[1]), t[2]);
     at.gradient.y() = mix(e[0][1] - e[0][0], e[1][1] - e[1][0], t[2]);
     at.gradient.z() = f[1] - f[0];
     at.gradient /= grid.spacing;

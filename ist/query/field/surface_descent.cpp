@@ -182,8 +182,8 @@ bool SurfaceDescent::open_probes() noexcept {
 
 bool SurfaceDescent::reach_children() noexcept {
   const PairList& now = scratch_.now;
-  const NodeStage stage{&probes_,       &balls_, probe_level_, surface_level_, &pose_.b_from_a,
-                        precision_};
+  const NodeStage stage{&probes_,       &balls_,         probe_level_,
+                        surface_level_, &pose_.b_from_a, precision_};
   for (std::size_t done = 0; done < now.size;) {
     const std::size_t n = budget_.grant(std::min(kNodePairs, now.size - done));
     if (n == 0) return false;
@@ -214,9 +214,9 @@ std::uint32_t SurfaceDescent::sort_children(std::size_t from, std::size_t to,
     masks[i] = 0;
     if (near == 0) continue;
     count += std::popcount(near);
-    masks[i] = static_cast<std::uint16_t>(
-        used & (std::popcount(near) <= kFewTriangles ? balls_near(patch, near, balls)
-                                                     : near_block(balls, now.a[i])));
+    masks[i] = static_cast<std::uint16_t>(used & (std::popcount(near) <= kFewTriangles
+                                                      ? balls_near(patch, near, balls)
+                                                      : near_block(balls, now.a[i])));
     met |= masks[i];
   }
   if (count == 0) {
@@ -227,8 +227,7 @@ std::uint32_t SurfaceDescent::sort_children(std::size_t from, std::size_t to,
   if (alone == 0) return met;
   if (count > kFewTriangles * std::popcount(alone)) {
     for (std::uint32_t left = alone; left != 0; left &= left - 1)
-      settle(probe_level_ - 1,
-             kWidth * block + static_cast<std::uint32_t>(std::countr_zero(left)));
+      settle(probe_level_ - 1, kWidth * block + static_cast<std::uint32_t>(std::countr_zero(left)));
   } else {
     settle_children(balls, block, alone, from, to);
   }
@@ -307,8 +306,8 @@ void SurfaceDescent::sum_leaves() noexcept {
       leave(from);
       return;
     }
-    if (by_error && left + unopened_ <=
-                        limits_.relative_error * (overlap().volume + left + unopened_)) {
+    if (by_error &&
+        left + unopened_ <= limits_.relative_error * (overlap().volume + left + unopened_)) {
       leave(from);
       return;
     }
@@ -359,8 +358,8 @@ std::uint32_t SurfaceDescent::near_block(const ProbeBalls& balls, std::uint32_t 
 }
 
 std::uint32_t SurfaceDescent::sides(const ProbeBalls& balls, std::uint32_t wanted,
-                                    std::uint32_t met, std::uint32_t told,
-                                    std::uint32_t inside, int triangles, std::size_t from,
+                                    std::uint32_t met, std::uint32_t told, std::uint32_t inside,
+                                    int triangles, std::size_t from,
                                     std::size_t to) const noexcept {
   const auto centre_of = [&](std::size_t i, double(&x)[3]) {
     x[0] = balls.origin[0] + balls.x[i];
@@ -443,18 +442,20 @@ Overlap SurfaceDescent::overlap() const noexcept {
 Penetration SurfaceDescent::penetration() const noexcept {
   Overlap sum = overlap();
   // Both surfaces lie within the field's error of each other; centres are rounded too.
-  const double off = surface_.header->error + distance_error(Precision::float64, span(balls_, probes_, pose_));
+  const double off =
+      surface_.header->error + distance_error(Precision::float64, span(balls_, probes_, pose_));
   sum.error = 2 * off * total_.area + 1e-13 * (total_.crossed + sum.volume);
   const double scale = map_.scale;
   const double most = probes_.header->volume_sum * (scale * scale * scale) * (1 + 1e-9);
   const double lowest = std::max(0.0, sum.volume - sum.error);
-  const double highest =
-      std::max(lowest, std::min(most, sum.volume + sum.error + unopened_));
+  const double highest = std::max(lowest, std::min(most, sum.volume + sum.error + unopened_));
   if (unopened_ > 0) {
     // The push grows with the volume, as far as anybody can tell.
     const double guess = kUnknownShare * unopened_;
-    if (sum.volume > 0) sum.scale(1 + guess / sum.volume);
-    else sum.volume = guess;
+    if (sum.volume > 0)
+      sum.scale(1 + guess / sum.volume);
+    else
+      sum.volume = guess;
   }
   Penetration result = world_answer(sum, lowest, highest, pose_);
   result.node_visits = budget_.visits();

@@ -34,7 +34,8 @@ HWY_INLINE V angle_of(D d, V x, V y) {
       0.021135373157693246,
   };
   constexpr double kTanEighth = 0.41421356237309503;  // tan(π/8)
-  constexpr double kQuarter = 0.7853981633974483, kHalf = 1.5707963267948966, kPi = 3.141592653589793;
+  constexpr double kQuarter = 0.7853981633974483, kHalf = 1.5707963267948966,
+                   kPi = 3.141592653589793;
   const V zero = hn::Zero(d);
   const V ax = hn::Abs(x), ay = hn::Abs(y);
   const V more = hn::Max(ax, ay), less = hn::Min(ax, ay);

@@ -19,9 +19,9 @@ bool before(const Vec& a, const Vec& b) {
   return a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
-/// On which side of the line along `d` through the origin the edge from a to b passes. Two triangles
-/// that share an edge see it from opposite sides whatever the rounding: the products change sign
-/// exactly, and of the edge that meets the line the corners decide.
+/// On which side of the line along `d` through the origin the edge from a to b passes. Two
+/// triangles that share an edge see it from opposite sides whatever the rounding: the products
+/// change sign exactly, and of the edge that meets the line the corners decide.
 bool passes_left(const Vec& d, const Vec& a, const Vec& b) {
   const double side = dot(d, cross(a, b));
   return side != 0 ? side > 0 : before(a, b);

@@ -81,7 +81,8 @@ class NearestSearch {
 
 double nearest_in_triangle(const double (&x)[3], const double (&a)[3], const double (&b)[3],
                            const double (&c)[3], double (&point)[3]) noexcept {
-  // By the regions of Voronoi of corners, edges and inside (Ericson, Real-Time Collision Detection).
+  // By the regions of Voronoi of corners, edges and inside (Ericson, Real-Time Collision
+  // Detection).
   const Vec p(x[0], x[1], x[2]), A(a[0], a[1], a[2]), B(b[0], b[1], b[2]), C(c[0], c[1], c[2]);
   const Vec ab = B - A, ac = C - A, ap = p - A;
   Vec nearest;

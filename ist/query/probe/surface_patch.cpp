@@ -125,9 +125,8 @@ HWY_INLINE void add_edge(DiscTag d, const DiscShape& disc, Disc m, Disc t1, Disc
   add_sector(disc, angle_of(d, x1 * x2 - y1 * y2, x1 * y2 + y1 * x2), sums);
   const Disc flat = m2 + disc.h2;
   const Disc a = hn::Sqrt(low * low + flat), b = hn::Sqrt(high * high + flat);
-  const Disc omega =
-      hn::Set(d, 2.0) *
-      angle_of(d, (a * b + disc.h * (a + b)) + (low * high + flat), m * (high - low));
+  const Disc omega = hn::Set(d, 2.0) * angle_of(d, (a * b + disc.h * (a + b)) + (low * high + flat),
+                                                m * (high - low));
   add_triangle(d, disc, omega, m, low, high, sums);
 }
 
@@ -159,8 +158,7 @@ HWY_INLINE void measure_corners(const SurfacePatch& patch, Corners& corners) {
 
 /// Adds `share` of triangle t inside ball b.
 HWY_INLINE void add_share(const SurfacePatch& patch, std::size_t t, std::size_t b, double sign,
-                          double cones, double angle, double area, double second,
-                          ProbeSums& sums) {
+                          double cones, double angle, double area, double second, ProbeSums& sums) {
   sums.cones[b] += sign * cones;
   sums.angle[b] += sign * angle;
   sums.area[b] += area;
@@ -280,7 +278,7 @@ std::uint32_t near_of(const SurfacePatch& patch, const double (&centre)[3], doub
     const V px = hn::Set(d, centre[0]) - hn::Load(d, patch.corner[0][0] + lane);
     const V py = hn::Set(d, centre[1]) - hn::Load(d, patch.corner[0][1] + lane);
     const V pz = hn::Set(d, centre[2]) - hn::Load(d, patch.corner[0][2] + lane);
-    const auto dot = [&](const double (&axis)[3][kWidth]) -> V {
+    const auto dot = [&](const double(&axis)[3][kWidth]) -> V {
       return (px * hn::Load(d, axis[0] + lane) + py * hn::Load(d, axis[1] + lane)) +
              pz * hn::Load(d, axis[2] + lane);
     };
@@ -296,8 +294,7 @@ std::uint32_t near_of(const SurfacePatch& patch, const double (&centre)[3], doub
 }
 
 std::uint32_t odd_ways_of(const SurfacePatch& patch, std::uint32_t triangles,
-                          const double (&start)[3], const ProbeBalls& balls,
-                          std::uint32_t wanted) {
+                          const double (&start)[3], const ProbeBalls& balls, std::uint32_t wanted) {
   const LaneTag<double> d;
   using V = hn::Vec<decltype(d)>;
   const V zero = hn::Zero(d);
@@ -310,7 +307,7 @@ std::uint32_t odd_ways_of(const SurfacePatch& patch, std::uint32_t triangles,
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < 3; ++k) p[c][k] = patch.corner[c][k][t] - start[k];
     const double nx = patch.n[0][t], ny = patch.n[1][t], nz = patch.n[2][t];
-    const double h0 = -((p[0][0] * nx + p[0][1] * ny) + p[0][2] * nz);  // of the start
+    const double h0 = -((p[0][0] * nx + p[0][1] * ny) + p[0][2] * nz);       // of the start
     const double height = h0 + ((way[0] * nx + way[1] * ny) + way[2] * nz);  // of the origin
     std::uint32_t above = 0;
     for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
@@ -321,16 +318,15 @@ std::uint32_t odd_ways_of(const SurfacePatch& patch, std::uint32_t triangles,
     }
     const std::uint32_t across = (h0 > 0 ? ~above : above) & wanted;
     if (across == 0) continue;
-    // Planes through the start and an edge: those of two triangles that share it are opposite, digit
-    // for digit. Of a way in the plane the corners decide.
+    // Planes through the start and an edge: those of two triangles that share it are opposite,
+    // digit for digit. Of a way in the plane the corners decide.
     std::uint32_t all = 0xffff, none = 0xffff;
     for (int c = 0; c < 3; ++c) {
       const double* const a = p[c];
       const double* const b = p[(c + 1) % 3];
       V plane[3];
       for (int k = 0; k < 3; ++k)
-        plane[k] = hn::Set(
-            d, a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
+        plane[k] = hn::Set(d, a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
       const bool tie = a[0] != b[0] ? a[0] < b[0] : a[1] != b[1] ? a[1] < b[1] : a[2] < b[2];
       std::uint32_t left = 0;
       for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
@@ -434,13 +430,13 @@ HWY_INLINE std::uint32_t feet_of(const SurfacePatch& patch, const ProbeBalls& ba
     const V px = cx - hn::Load(d, patch.corner[0][0] + lane);
     const V py = cy - hn::Load(d, patch.corner[0][1] + lane);
     const V pz = cz - hn::Load(d, patch.corner[0][2] + lane);
-    const auto dot = [&](const double (&axis)[3][kWidth]) -> V {
+    const auto dot = [&](const double(&axis)[3][kWidth]) -> V {
       return (px * hn::Load(d, axis[0] + lane) + py * hn::Load(d, axis[1] + lane)) +
              pz * hn::Load(d, axis[2] + lane);
     };
     const V h = dot(patch.n), fx = dot(patch.u), fy = dot(patch.v);
-    const auto beside = hn::And(fx > hn::Load(d, patch.left + lane) - r,
-                                fx < hn::Load(d, patch.right + lane) + r);
+    const auto beside =
+        hn::And(fx > hn::Load(d, patch.left + lane) - r, fx < hn::Load(d, patch.right + lane) + r);
     const auto along = hn::And(fy > hn::Zero(d) - r, fy < hn::Load(d, patch.top + lane) + r);
     near |= mask_bits(d, hn::And(hn::Abs(h) < r, hn::And(beside, along))) << lane;
     hn::Store(h, d, height + lane);
@@ -501,7 +497,7 @@ void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
   const V zero = hn::Zero(d);
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
     V e[3], f[3];
-    const auto take = [&](int k, const double (&of)[3][kWidth]) {
+    const auto take = [&](int k, const double(&of)[3][kWidth]) {
       const V a = hn::Load(d, of[0] + lane);
       const V b = hn::Load(d, of[1] + lane);
       const V c = hn::Load(d, of[2] + lane);
@@ -514,8 +510,7 @@ void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
     take(0, corners.x), take(1, corners.y), take(2, corners.z);
     const V cross[3] = {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2],
                         e[0] * f[1] - e[1] * f[0]};
-    const V area =
-        hn::Sqrt((cross[0] * cross[0] + cross[1] * cross[1]) + cross[2] * cross[2]);
+    const V area = hn::Sqrt((cross[0] * cross[0] + cross[1] * cross[1]) + cross[2] * cross[2]);
     const V base = hn::Sqrt((e[0] * e[0] + e[1] * e[1]) + e[2] * e[2]);
     const auto flat = hn::Not(area > zero);
     const V one = hn::Set(d, 1.0);
@@ -587,9 +582,8 @@ std::uint32_t triangles_near(const SurfacePatch& patch, const double (&centre)[3
   return HWY_DYNAMIC_DISPATCH(near_of)(patch, centre, radius);
 }
 
-std::uint32_t odd_ways(const SurfacePatch& patch, std::uint32_t triangles,
-                       const double (&start)[3], const ProbeBalls& balls,
-                       std::uint32_t wanted) noexcept {
+std::uint32_t odd_ways(const SurfacePatch& patch, std::uint32_t triangles, const double (&start)[3],
+                       const ProbeBalls& balls, std::uint32_t wanted) noexcept {
   return HWY_DYNAMIC_DISPATCH(odd_ways_of)(patch, triangles, start, balls, wanted);
 }
 

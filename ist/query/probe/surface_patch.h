@@ -13,9 +13,9 @@ namespace ist {
 /// Up to sixteen triangles as balls meet them. Positions are in the surface's frame; (x, y) are
 /// coordinates in a triangle's plane from its first corner, its first edge lying along x.
 struct alignas(64) SurfacePatch {
-  double corner[3][3][kWidth];                ///< [corner][axis]
-  double u[3][kWidth], v[3][kWidth];          ///< unit axes of x and y
-  double n[3][kWidth];                        ///< unit normal, outward
+  double corner[3][3][kWidth];                  ///< [corner][axis]
+  double u[3][kWidth], v[3][kWidth];            ///< unit axes of x and y
+  double n[3][kWidth];                          ///< unit normal, outward
   double edge_x[3][kWidth], edge_y[3][kWidth];  ///< unit directions of the edges
   double length[3][kWidth];                     ///< of the edges
   /// Extent: x from left to right, y from 0 to top. Negative where there is no area.
@@ -76,16 +76,15 @@ void add_patch(const SurfacePatch& patch, std::uint32_t triangles, const ProbeBa
 std::uint32_t balls_within(const ProbeBalls& balls, const double (&point)[3],
                            double distance) noexcept;
 
-/// The balls that one of the chosen triangles comes near, a bit each: all that it meets, and perhaps
-/// others.
+/// The balls that one of the chosen triangles comes near, a bit each: all that it meets, and
+/// perhaps others.
 std::uint32_t balls_near(const SurfacePatch& patch, std::uint32_t triangles,
                          const ProbeBalls& balls) noexcept;
 
-/// Which ways from `start`, in the surface's frame, to the centres of the `wanted` balls step through
-/// an odd number of the chosen triangles, a bit each. Triangles that share an edge agree on which of them a way
-/// goes through, whatever the rounding.
-std::uint32_t odd_ways(const SurfacePatch& patch, std::uint32_t triangles,
-                       const double (&start)[3], const ProbeBalls& balls,
-                       std::uint32_t wanted) noexcept;
+/// Which ways from `start`, in the surface's frame, to the centres of the `wanted` balls step
+/// through an odd number of the chosen triangles, a bit each. Triangles that share an edge agree on
+/// which of them a way goes through, whatever the rounding.
+std::uint32_t odd_ways(const SurfacePatch& patch, std::uint32_t triangles, const double (&start)[3],
+                       const ProbeBalls& balls, std::uint32_t wanted) noexcept;
 
 }  // namespace ist
