@@ -46,7 +46,8 @@ inline constexpr double kLeastAngle = 1e-6;
 inline std::uint32_t told_sides(const ProbeSums& sums, std::uint32_t& inside) noexcept {
   std::uint32_t told = 0;
   inside = 0;
-  for (std::uint32_t i = 0; i < kWidth; ++i) {
+  for (std::uint32_t left = sums.met; left != 0; left &= left - 1) {
+    const auto i = static_cast<std::uint32_t>(std::countr_zero(left));
     if (!(std::abs(sums.angle[i]) > kLeastAngle)) continue;
     told |= 1u << i;
     inside |= sums.angle[i] < 0 ? 1u << i : 0u;

@@ -239,7 +239,7 @@ HWY_INLINE void sort_disc(const SurfacePatch& patch, std::size_t t, std::size_t 
     corner |= begin[k] * begin[k] < half2 || end[k] * end[k] < half2;
   }
   if (away) return;
-  sums.met |= 1u << b;
+  sums.meet(b);
   ++sums.pairs;
   const double sign = height > 0 ? 1 : -1;
   if (corner) {

@@ -47,16 +47,24 @@ struct alignas(64) ProbeBalls {
 void place_probes(const SphereTree& probes, int level, std::uint32_t block, const Similarity& map,
                   ProbeBalls& balls) noexcept;
 
-/// What the surface does to each of sixteen balls; all factors included.
+/// What the surface does to each of sixteen balls; all factors included. Valid for those that are
+/// met.
 struct ProbeSums {
-  double cones[kWidth] = {};     ///< volume between the surface inside the ball and the ball's own
-  double angle[kWidth] = {};     ///< solid angle of that surface, seen from the centre: > 0 if it
-                                 ///< is seen from outside
-  double area[kWidth] = {};      ///< of that surface
-  double pull[3][kWidth] = {};   ///< ∫ n dA over it
-  double shift[3][kWidth] = {};  ///< ½ ∫ (r² − |y − centre|²) n dA over it
-  std::uint32_t met = 0;         ///< a bit a ball that a triangle may meet
-  std::uint32_t pairs = 0;       ///< balls and triangles that were put together
+  double cones[kWidth];     ///< volume between the surface inside the ball and the ball's own
+  double angle[kWidth];     ///< solid angle of that surface, seen from the centre: > 0 if it is seen
+                            ///< from outside
+  double area[kWidth];      ///< of that surface
+  double pull[3][kWidth];   ///< ∫ n dA over it
+  double shift[3][kWidth];  ///< ½ ∫ (r² − |y − centre|²) n dA over it
+  std::uint32_t met = 0;    ///< a bit a ball that a triangle may meet
+  std::uint32_t pairs = 0;  ///< balls and triangles that were put together
+
+  void meet(std::size_t ball) noexcept {
+    if ((met >> ball & 1) != 0) return;
+    met |= 1u << ball;
+    cones[ball] = angle[ball] = area[ball] = 0;
+    for (int k = 0; k < 3; ++k) pull[k][ball] = shift[k][ball] = 0;
+  }
 };
 
 /// Adds the patch's share to the sums. Once all triangles that reach a ball are added, the part of
