@@ -58,7 +58,9 @@ struct PenetrationSettings {
   /// Aimed at, not kept; never less than the coarsest level takes.
   std::uint32_t pair_budget = 0;
 
-  std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
+  /// Count of node pairs opened. Of pairs of trees the largest bounds go first; what meets a surface
+  /// goes in the order of the tree.
+  std::uint32_t max_visits = 0;
 
   /// [µs] wall clock from the call.
   /// Visits end at 0.6 of it; then what is left is estimated, as far as time allows.
@@ -114,7 +116,9 @@ struct Penetration {
   Eigen::Vector3d rotation_gradient = Eigen::Vector3d::Zero();
   QueryStatus status = QueryStatus::ok;
   std::uint32_t node_visits = 0;   ///< node pairs opened
-  std::uint32_t sphere_pairs = 0;  ///< lenses summed that are not empty
+  /// Lenses summed that are not empty, spheres put together with triangles of a surface, and spheres
+  /// that lie in the other solid as a whole.
+  std::uint32_t sphere_pairs = 0;
 };
 
 /// Gap of two placed solids; all zero once inner spheres overlap.
@@ -154,6 +158,8 @@ class Workspace {
 
 /// Volume, wrench and centroid of the overlap.
 ///
+/// The sum is Σ over spheres of the finer tree of their exact part inside the other's surface, or one
+/// of lenses, as PenetrationSettings::field says.
 /// The gradients of a finished query are those of the returned volume.
 /// Copies of one asset at nearly the same pose are asked as unlike levels of detail, since equal
 /// spheres on top of each other would count too much.
@@ -172,7 +178,8 @@ Penetration penetration(const PlacedTree& a, const PlacedTree& b,
 /// use it for contacts, not where energy must be kept.
 /// volume_min is lowered to hold the new volume.
 ///
-/// `whole`: what penetration() answered for these two in the matched measure without a pair budget.
+/// `whole`: what penetration() answered for these two by lenses (FieldUse::never), in the matched
+/// measure, without a pair budget.
 /// Takes a few nanoseconds.
 Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
                                const PlacedTree& b) noexcept;

@@ -57,17 +57,12 @@ class PairPatches {
       lenses = descent.penetration();
       const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
       weight = exact_weight(method_, lenses.volume / unit3);
-      result.penetration =
-          weight.weight == 0
-              ? lenses
-              : blended(lenses, both_.exact(method_.b_probes, limits_), weight, unit3);
       // The patches are those of the larger part.
       if (weight.weight < 0.5) {
-        if (weight.weight > 0) {  // the surface's descent has used the scratch
-          scratch_.contact.start(of_b ? tree_b_ : tree_a_, of_b);
-          Descent again(tree_a_, tree_b_, pose_, limits_, scratch_, &scratch_.contact);
-          again.run();
-        }
+        result.penetration =
+            weight.weight == 0
+                ? lenses
+                : blended(lenses, both_.exact(method_.b_probes, limits_), weight, unit3);
         result.count =
             write_patches({scratch_.contact, scratch_.contact.collect(descent.precision()), pose_,
                            of_b ? radius_b : radius_a},
@@ -78,7 +73,9 @@ class PairPatches {
     const bool b_probes = method_.b_probes;
     scratch_.contact.start(b_probes ? tree_b_ : tree_a_, true);
     const Penetration sum = both_.exact(b_probes, limits_, &scratch_.contact);
-    if (!method_.lenses) result.penetration = sum;
+    result.penetration =
+        method_.lenses ? blended(lenses, sum, weight, pose_.unit_a * pose_.unit_a * pose_.unit_a)
+                       : sum;
     const std::uint32_t filled = scratch_.contact.collect(Precision::float64);
     if (b_probes) {
       result.count = write_patches(

@@ -35,7 +35,7 @@ class FlatFaces : public ::testing::Test {
         cube().view(),
         {{std::cos(turn), std::sin(turn), 0, 0}, {side_ + gap, 0.1 * side_, -0.05 * side_}},
         1};
-    const Penetration raw = penetration(a, b, {}, workspace_);
+    const Penetration raw = penetration(a, b, {.field = FieldUse::never}, workspace_);
     return {raw, without_protrusion(raw, a, b)};
   }
 };

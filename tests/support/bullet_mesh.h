@@ -76,8 +76,11 @@ class BulletNarrowPhase {
 
   /// Every contact, with normals and depths.
   MeshContacts contacts(BulletMesh& a, const Pose& pose_a, BulletMesh& b, const Pose& pose_b) {
-    const btCollisionObject& object_a = a.at(pose_a);
-    const btCollisionObject& object_b = b.at(pose_b);
+    return contacts(a.at(pose_a), b.at(pose_b));
+  }
+
+  /// The same for objects of any shape.
+  MeshContacts contacts(const btCollisionObject& object_a, const btCollisionObject& object_b) {
     const btCollisionObjectWrapper wrap_a(nullptr, object_a.getCollisionShape(), &object_a,
                                           object_a.getWorldTransform(), -1, -1);
     const btCollisionObjectWrapper wrap_b(nullptr, object_b.getCollisionShape(), &object_b,

@@ -17,8 +17,10 @@ namespace {
 // Ratio of grains from which on the exact sum answers alone.
 constexpr double kUnlike = 4;
 // Overlap in spheres of the coarser tree up to which trees of like size are summed exactly. There
-// lenses are 2 % and more in error, and few spheres meet the surface.
+// lenses are 2 % and more in error, and few spheres meet the surface …
 constexpr double kFewSpheres = 2;
+// … if a sphere meets no more triangles than the one; never if it meets more than the other.
+constexpr double kFewTriangles = 10, kManyTriangles = 20;
 // The lenses answer alone from so many times that on.
 constexpr double kHandover = 4;
 // [µs] a deadline that is over.
@@ -28,6 +30,20 @@ constexpr double kNoTime = 1e-6;
 /// inner spheres cover little of it, the solid being thinner than its matched spheres.
 double grain(const TreeHeader& tree, const AssetHeader& asset) {
   return tree.mean_radius / std::max(asset.coverage, 0.01);
+}
+
+/// About how many triangles of a field a ball on its surface meets: those that a disc covers, and
+/// those at its rim.
+double triangles_met(const AssetHeader& asset, double radius) {
+  const FieldHeader& field = *at<FieldHeader>(asset, asset.field);
+  double side[3];
+  for (int k = 0; k < 3; ++k)
+    side[k] = field.cell * static_cast<double>(kBrickWidth * field.bricks[k]);
+  // About the surface of a solid in such a box.
+  const double area = side[0] * side[1] + side[1] * side[2] + side[2] * side[0];
+  const double covered = std::numbers::pi * (radius * radius) * field.triangle_count / area;
+  const double root = 1 + 1.6 * std::sqrt(covered);
+  return root * root;
 }
 
 }  // namespace
@@ -59,8 +75,14 @@ PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const Plac
   }
   // Grows without bound as the ratio does towards kUnlike.
   const double unlike = smooth_step((ratio - 1) / (kUnlike - 1));
-  method.full =
-      kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) * ratio / (1 - unlike);
+  const double triangles =
+      method.b_probes ? triangles_met(a.tree.header(), tree_b.mean_radius * pose.a_from_b.scale)
+                      : triangles_met(b.tree.header(), tree_a.mean_radius / pose.a_from_b.scale);
+  const double worth =
+      1 - smooth_step((triangles - kFewTriangles) / (kManyTriangles - kFewTriangles));
+  method.exact = worth > 0;
+  method.full = worth * kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) *
+                ratio / (1 - unlike);
   method.none = kHandover * method.full;
   return method;
 }
@@ -76,17 +98,26 @@ ExactWeight exact_weight(const PairMethod& method, double volume) noexcept {
 
 Penetration blended(const Penetration& lenses, Penetration sum, const ExactWeight& weight,
                     double unit3) noexcept {
-  if (weight.weight == 1) return sum;
+  sum.node_visits += lenses.node_visits;
+  sum.sphere_pairs += lenses.sphere_pairs;
+  const bool stopped = lenses.status != QueryStatus::ok || sum.status != QueryStatus::ok;
+  if (weight.weight == 1 && !stopped) return sum;
   const double w = weight.weight;
   const double slope = weight.slope / unit3 * (sum.volume - lenses.volume);
   const double volume = w * sum.volume + (1 - w) * lenses.volume;
-  // The weight is as sure as the lenses' volume.
+  // The weight is as sure as the lenses' volume; that of a sum that was stopped may be any.
   const double doubt = std::abs(slope) * std::max(0.0, lenses.volume_max - lenses.volume_min);
   if (volume > 0)
     sum.centroid = (w * sum.volume / volume) * sum.centroid +
                    ((1 - w) * lenses.volume / volume) * lenses.centroid;
-  sum.volume_min = std::max(0.0, w * sum.volume_min + (1 - w) * lenses.volume_min - doubt);
-  sum.volume_max = w * sum.volume_max + (1 - w) * lenses.volume_max + doubt;
+  if (stopped) {
+    sum.volume_min = std::min(sum.volume_min, lenses.volume_min);
+    sum.volume_max = std::max(sum.volume_max, lenses.volume_max);
+    sum.status = QueryStatus::budget_exhausted;
+  } else {
+    sum.volume_min = std::max(0.0, w * sum.volume_min + (1 - w) * lenses.volume_min - doubt);
+    sum.volume_max = w * sum.volume_max + (1 - w) * lenses.volume_max + doubt;
+  }
   sum.volume = std::clamp(volume, sum.volume_min, sum.volume_max);
   sum.translation_gradient =
       w * sum.translation_gradient + (1 - w + slope) * lenses.translation_gradient;
@@ -133,22 +164,23 @@ Penetration PairOverlap::by(const PairMethod& method, const DescentLimits& limit
   const Clock::time_point start = limits.deadline_us > 0 ? Clock::now() : Clock::time_point();
   const Penetration lenses = by_lenses(limits);
   const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
-  const ExactWeight weight = exact_weight(method, lenses.volume / unit3);
-  if (weight.weight == 0) return lenses;
+  ExactWeight weight = exact_weight(method, lenses.volume / unit3);
+  if (weight.weight == 0 && lenses.status == QueryStatus::ok) return lenses;
   DescentLimits left = limits;
   if (limits.deadline_us > 0) {
     const std::chrono::duration<double, std::micro> gone = Clock::now() - start;
     left.deadline_us = std::max(kNoTime, limits.deadline_us - gone.count());
   }
   if (limits.max_visits > 0) {
-    if (lenses.node_visits >= limits.max_visits) return lenses;
-    left.max_visits = limits.max_visits - lenses.node_visits;
+    if (lenses.node_visits >= limits.max_visits) {
+      // Nothing but the bounds is asked for.
+      left.deadline_us = kNoTime;
+      weight = {0, 0};
+    } else {
+      left.max_visits = limits.max_visits - lenses.node_visits;
+    }
   }
-  Penetration sum = exact(method.b_probes, left);
-  sum.node_visits += lenses.node_visits;
-  sum.sphere_pairs += lenses.sphere_pairs;
-  sum.status = std::max(sum.status, lenses.status);
-  return blended(lenses, sum, weight, unit3);
+  return blended(lenses, exact(method.b_probes, left), weight, unit3);
 }
 
 }  // namespace ist

@@ -56,7 +56,7 @@ struct ExactWeight {
 };
 ExactWeight exact_weight(const PairMethod& method, double volume) noexcept;
 
-/// Both sums by weight, counts and status being the exact one's. `unit3`: volume of A's unit.
+/// Both sums by weight; counts are of both. `unit3`: volume of A's unit.
 Penetration blended(const Penetration& lenses, Penetration exact, const ExactWeight& weight,
                     double unit3) noexcept;
 
