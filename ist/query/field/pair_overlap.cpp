@@ -16,8 +16,9 @@ namespace {
 
 // Ratio of grains from which on the exact sum answers alone.
 constexpr double kUnlike = 4;
-// Overlap in spheres of the coarser tree up to which trees of like size are summed exactly. There
-// lenses are 2 % and more in error, and few spheres meet the surface …
+// Overlap in spheres of the coarser grain up to which trees of twice the other's grain are summed
+// exactly, more or less as they are more or less unlike: there lenses are 2 % and more in error, and
+// few spheres meet the surface …
 constexpr double kFewSpheres = 2;
 // … if a sphere meets no more triangles than the one; never if it meets more than the other.
 constexpr double kFewTriangles = 10, kManyTriangles = 20;
@@ -80,9 +81,9 @@ PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const Plac
                       : triangles_met(b.tree.header(), tree_a.mean_radius / pose.a_from_b.scale);
   const double worth =
       1 - smooth_step((triangles - kFewTriangles) / (kManyTriangles - kFewTriangles));
-  method.exact = worth > 0;
+  method.exact = worth * (ratio - 1) > 0;
   method.full = worth * kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) *
-                ratio / (1 - unlike);
+                (ratio - 1) / (1 - unlike);
   method.none = kHandover * method.full;
   return method;
 }
