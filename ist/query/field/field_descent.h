@@ -57,7 +57,8 @@ class FieldDescent {
     const double cube = map_.scale * map_.scale * map_.scale;
     const double most = probes_.header->volume_sum * cube * (1 + 1e-9);
     const double lowest = std::max(0.0, sum.volume - sum.error);
-    const double highest = std::max(lowest, std::min(most, sum.volume + sum.error + unopened_));
+    const double highest =
+        std::max(lowest, std::min(most, sum.volume + sum.error + (1 + 1e-9) * unopened_));
     if (unopened_ > 0) {
       // In or out, who knows; the push grows with the volume, as far as anybody can tell.
       const double guess = 0.5 * unopened_;

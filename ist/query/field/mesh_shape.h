@@ -15,9 +15,8 @@ struct MeshShape {
     const double at[3] = {x.x(), x.y(), x.z()};
     const NearestSurface found = nearest_surface(surface, at, 1e300);
     const Eigen::Vector3d point(found.point[0], found.point[1], found.point[2]);
-    const Eigen::Vector3d way =
-        found.distance > 0 ? Eigen::Vector3d((point - x) / found.distance)
-                           : Eigen::Vector3d::Zero().eval();
+    const Eigen::Vector3d way = found.distance > 0 ? Eigen::Vector3d((point - x) / found.distance)
+                                                   : Eigen::Vector3d::Zero().eval();
     return inside_surface(surface, at, found.distance * (1 - 1e-12))
                ? FieldSample{found.distance, -way}
                : FieldSample{-found.distance, way};

@@ -14,11 +14,11 @@
 namespace ist {
 namespace {
 
-// Ratio of grains from which on the exact sum answers alone.
-constexpr double kUnlike = 4;
+// Ratio of grains up to which trees are summed by lenses alone, and from which on exactly alone.
+constexpr double kAlike = 1.25, kUnlike = 4;
 // Overlap in spheres of the coarser grain up to which trees of twice the other's grain are summed
-// exactly, more or less as they are more or less unlike: there lenses are 2 % and more in error, and
-// few spheres meet the surface …
+// exactly, more or less as they are more or less unlike: there lenses are 2 % and more in error,
+// and few spheres meet the surface …
 constexpr double kFewSpheres = 2;
 // … if a sphere meets no more triangles than the one; never if it meets more than the other.
 constexpr double kFewTriangles = 10, kManyTriangles = 20;
@@ -68,22 +68,23 @@ PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const Plac
   const double coarse = std::max(grain_a, grain_b);
   const double ratio = coarse / std::min(grain_a, grain_b);
   const bool has_field = (method.b_probes ? a : b).tree.header().field != 0;
-  if (use == FieldUse::never || !has_field || !(ratio >= 1)) return method;
-  method.exact = true;
+  if (use == FieldUse::never || !has_field) return method;
   if (use == FieldUse::always || ratio >= kUnlike) {
+    method.exact = true;
     method.lenses = false;
     return method;
   }
+  if (!(ratio > kAlike)) return method;
   // Grows without bound as the ratio does towards kUnlike.
-  const double unlike = smooth_step((ratio - 1) / (kUnlike - 1));
+  const double unlike = smooth_step((ratio - kAlike) / (kUnlike - kAlike));
   const double triangles =
       method.b_probes ? triangles_met(a.tree.header(), tree_b.mean_radius * pose.a_from_b.scale)
                       : triangles_met(b.tree.header(), tree_a.mean_radius / pose.a_from_b.scale);
   const double worth =
       1 - smooth_step((triangles - kFewTriangles) / (kManyTriangles - kFewTriangles));
-  method.exact = worth * (ratio - 1) > 0;
+  method.exact = worth > 0;
   method.full = worth * kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) *
-                (ratio - 1) / (1 - unlike);
+                (ratio / kAlike - 1) / (1 - unlike);
   method.none = kHandover * method.full;
   return method;
 }

@@ -448,7 +448,8 @@ Penetration SurfaceDescent::penetration() const noexcept {
   const double scale = map_.scale;
   const double most = probes_.header->volume_sum * (scale * scale * scale) * (1 + 1e-9);
   const double lowest = std::max(0.0, sum.volume - sum.error);
-  const double highest = std::max(lowest, std::min(most, sum.volume + sum.error + unopened_));
+  const double highest =
+      std::max(lowest, std::min(most, sum.volume + sum.error + (1 + 1e-9) * unopened_));
   if (unopened_ > 0) {
     // The push grows with the volume, as far as anybody can tell.
     const double guess = kUnknownShare * unopened_;
