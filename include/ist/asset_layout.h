@@ -230,8 +230,8 @@ struct alignas(64) AssetHeader {
   double kept_ratio_worst = 0;   ///< SpherePacking's: inserted radius over the largest live bound
   double kept_ratio_median = 0;  ///< likewise
 
-  double measured_error = 0;         ///< median near asked_at_overlap, of two copies of the solid
-  std::uint32_t measured_poses = 0;  ///< behind it; 0: nothing was measured
+  double measured_error = 0;         ///< median near asked_at_overlap, of the worst partner
+  std::uint32_t measured_poses = 0;  ///< of all partners; 0: nothing was measured
   std::uint32_t search_stop = 0;     ///< StopReason of the search for the target
 
   std::uint64_t field = 0;       ///< offset of FieldHeader; 0: baked without one
@@ -241,7 +241,7 @@ struct alignas(64) AssetHeader {
   /// (kFlagPolygonised).
   double polygonise_error = 0;
   std::uint32_t polygonise_cells = 0;  ///< along the longest side; 0: the solid is a mesh
-  std::uint32_t reserved = 0;
+  std::uint32_t worst_partner = 0;     ///< TrialPartner behind measured_error
 };
 static_assert(sizeof(AssetHeader) == 960);
 

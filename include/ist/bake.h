@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -101,16 +102,24 @@ Asset bake(const Solid& solid, const PackingSettings& settings = {},
 
 /// How exact an asset's volumes are to be.
 struct ErrorTarget {
-  double relative_error = 0.01;  ///< (0, 1) median over random poses of two copies of the solid
+  double relative_error = 0.01;  ///< (0, 1) median over random poses, for every TrialPartner
   double at_overlap = 0.001;     ///< [1e-4, 0.5] of the solid's volume, within half a decade
+};
+
+/// How an asset answers where one kind of partner meets it, near the overlap asked about.
+struct PartnerError {
+  TrialPartner partner = TrialPartner::copy;
+  double median = 0;        ///< relative
+  std::uint32_t poses = 0;  ///< behind it; too few to count where the overlap is too much for it
 };
 
 /// What bake_to_error() made of its target. TreeView::predicted_errors() tells more.
 struct TargetedAsset {
   Asset asset;
-  double measured_error = 0;  ///< relative, median over `poses` near the overlap asked about
-  std::uint32_t poses = 0;    ///< 0: none was tried, for want of time or of room
-  bool met = false;           ///< poses > 0 and measured_error ≤ the one asked for
+  double measured_error = 0;  ///< relative, median near the overlap asked about, worst partner's
+  std::uint32_t poses = 0;    ///< of all partners; 0: none was tried, for want of time or of room
+  std::array<PartnerError, kTrialPartners> partners = {};  ///< what each erred
+  bool met = false;  ///< poses > 0 and measured_error ≤ the one asked for
   /// What ended the search. sphere_count where met: few spheres do; where missed: as many as are
   /// allowed do not. time_limit: the best asset until then, met or not. Else the limit by which the
   /// packing could not grow.
@@ -120,8 +129,10 @@ struct TargetedAsset {
 /// bake() with about as few spheres as the target needs, at most settings.max_spheres (0 =
 /// 200,000). Where those are not enough: the best asset, and the result says so.
 ///
-/// The truth is integrated over both meshes at some 200 poses with independent random rotations,
-/// an order more exact than the target; the asset holds the medians.
+/// The asset meets a copy of itself and, as an analytic field, each other TrialPartner: the target
+/// is met if the worst one's median is. The truth is integrated over the meshes at some 300 poses
+/// with independent random rotations, several times as exact as the target; the asset holds the
+/// medians of the copies and which partner is worst.
 /// settings.time_limit bounds all of it, but for its first bake, of a few hundred spheres.
 /// Takes up to about six times a bake of the final count.
 /// Reports the stages of each bake, and "predict".

@@ -27,9 +27,20 @@ enum class AssetStatus : std::uint32_t {
 /// One English sentence for a status; never null.
 const char* describe(AssetStatus status) noexcept;
 
-/// By how much penetration volumes are wrong, measured on trial poses of two copies of the solid by
-/// bake_to_error(). Overlaps are shares of the smaller solid's volume, errors are shares of the
-/// overlap's.
+/// What a solid meets in the trials of bake_to_error().
+enum class TrialPartner : std::uint32_t {
+  copy = 0,    ///< of itself
+  plane = 1,   ///< HalfSpaceField
+  ball = 2,    ///< 0.1 to 0.3 of the solid's diagonal across
+  edge = 3,    ///< of a box as large, which it meets with an edge first
+  corner = 4,  ///< likewise with a corner first
+  plate = 5,   ///< as large, and 0.02 of the diagonal thick; any side first
+};
+inline constexpr std::uint32_t kTrialPartners = 6;
+
+/// By how much penetration volumes are wrong, measured by bake_to_error() on trial poses: by class
+/// of overlap of two copies of the solid, and near one overlap of other partners too. Overlaps are
+/// shares of the smaller copy's volume, errors are shares of the overlap's.
 struct PredictedErrors {
   struct OverlapClass {
     double from = 0, to = 0;  ///< [0, 1] overlaps of the class; both 1: the smaller lies inside
@@ -39,8 +50,10 @@ struct PredictedErrors {
   std::array<OverlapClass, 5> classes;  ///< deepest first
   double target_error = 0;              ///< asked for; 0: none was
   double target_overlap = 0;            ///< where it was asked for
-  double measured_error = 0;            ///< median within half a decade of target_overlap
-  std::uint32_t measured_poses = 0;     ///< behind it; 0: nothing was measured there
+  /// Median within half a decade of target_overlap, of the partner that is worst there.
+  double measured_error = 0;
+  std::uint32_t measured_poses = 0;  ///< of all partners; 0: nothing was measured there
+  TrialPartner worst_partner = TrialPartner::copy;
   /// The target was asked for, measured and reached.
   bool target_met() const noexcept { return measured_poses > 0 && measured_error <= target_error; }
 };

@@ -1,10 +1,12 @@
 #include <ist/error.h>
-#include <ist/query.h>
+#include <ist/field.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -14,6 +16,7 @@
 #include "bake/backend/make_backend.h"
 #include "bake/bake_solid.h"
 #include "bake/count_search.h"
+#include "bake/predict/partner_trials.h"
 #include "bake/predict/trial_poses.h"
 #include "packing/base/packing_settings.h"
 #include "stage/stage.h"
@@ -23,10 +26,13 @@ namespace ist {
 namespace {
 
 constexpr std::uint32_t kNearPoses = 40;      // at the overlap that was asked about, for the search
+constexpr std::uint32_t kPartnerPoses = 24;   // likewise, of each partner but the copy
+constexpr std::uint32_t kFewTrials = 8;       // fewer say nothing of a partner
 constexpr std::uint32_t kPosesPerClass = 30;  // besides, for the prediction
 constexpr std::size_t kFewPoses = 10;         // fewer near ones: the spheres did not find them
 constexpr std::size_t kManySpheres = 4'000;   // with so many they would have
 constexpr double kTruthShare = 0.1;           // of the target: what the truth may be off
+constexpr double kPartnerTruthShare = 0.2;    // the same of partners other than the copy
 constexpr double kTruthBest = 1e-4;           // no truth is asked to be better than this
 constexpr std::size_t kMost = 200'000;        // where the caller sets no limit
 
@@ -77,13 +83,22 @@ class Watch {
   bool cancelled_ = false, late_ = false;
 };
 
+/// A trial of a partner other than the copy.
+struct OtherTrial {
+  TrialPartner partner;
+  PartnerTrial trial;
+};
+
 /// An asset and how it answers.
 struct Candidate {
   Asset asset;
-  std::vector<double> errors = {};  ///< relative, of the volumes at the first poses
-  double error = 0;                 ///< median of those near the overlap asked about
-  std::uint32_t poses = 0;          ///< behind that median
+  std::vector<double> errors = {};        ///< relative, of the volumes at the first poses of copies
+  std::vector<double> other_errors = {};  ///< likewise at the first trials of other partners
+  std::array<PartnerError, kTrialPartners> partners = {};  ///< near the overlap asked about
+  PartnerError worst = {};                                 ///< among them
+  std::uint32_t poses = 0;                                 ///< of all of them
 
+  double error() const { return worst.median; }
   std::size_t spheres() const { return asset.view().sphere_count(); }
   StopReason packing_stop() const {
     return static_cast<StopReason>(asset.view().header().stop_reason);
@@ -105,7 +120,8 @@ class TargetBake {
 
   TargetedAsset run() {
     find_near_poses();
-    if (!poses_.empty()) {
+    if (!watch_.is_late()) find_other_trials();
+    if (!poses_.empty() || !others_.empty()) {
       search();
       const bool did = does(*best_);
       if (add_other_poses() && judge(*best_) && did && !does(*best_)) search();
@@ -115,7 +131,7 @@ class TargetBake {
 
  private:
   bool does(const Candidate& candidate) const {
-    return candidate.poses > 0 && candidate.error <= target_.relative_error;
+    return candidate.poses > 0 && candidate.error() <= target_.relative_error;
   }
 
   /// Reports; false: the time is over.
@@ -143,7 +159,9 @@ class TargetBake {
     }
   }
 
-  double truth_error() const { return std::max(kTruthBest, kTruthShare * target_.relative_error); }
+  double truth_error(double share = kTruthShare) const {
+    return std::max(kTruthBest, share * target_.relative_error);
+  }
 
   /// A first asset, and by its spheres poses at the overlap asked about.
   void find_near_poses() {
@@ -161,6 +179,23 @@ class TargetBake {
     }
   }
 
+  /// Trials of partners other than the copy.
+  void find_other_trials() {
+    Stage stage("predict", watch_.strict());
+    const PartnerTrials trials(solid_);
+    double done = 0;
+    for (const TrialPartner partner : kOtherPartners) {
+      for (const PartnerTrial& trial :
+           trials.find(partner, target_.at_overlap, kPartnerPoses, truth_error(kPartnerTruthShare),
+                       settings_.seed, [&](double part) {
+                         return go_on(stage, (done + part) / std::size(kOtherPartners));
+                       }))
+        others_.push_back({partner, trial});
+      if (watch_.is_late()) return;
+      ++done;
+    }
+  }
+
   /// Poses of all classes, other ones than the search has seen; false: the time is over.
   bool add_other_poses() {
     const TrialBody body = {solid_, best_->asset.view()};
@@ -174,38 +209,63 @@ class TargetBake {
     return true;
   }
 
-  /// Asks a candidate about the poses that it has not been asked about; false: the time is over.
+  /// Asks a candidate about what it has not been asked about; false: the time is over.
   bool judge(Candidate& candidate) {
     Stage stage("predict", watch_.strict());
     const TreeView& tree = candidate.asset.view();
+    const std::size_t all = poses_.size() + others_.size();
+    const auto next = [&] {
+      const std::size_t done = candidate.errors.size() + candidate.other_errors.size();
+      return go_on(stage, static_cast<double>(done) / static_cast<double>(all));
+    };
     while (candidate.errors.size() < poses_.size()) {
-      if (!go_on(stage,
-                 static_cast<double>(candidate.errors.size()) / static_cast<double>(poses_.size())))
-        return false;
+      if (!next()) return false;
       const TrialPose& pose = poses_[candidate.errors.size()];
       const double volume =
           penetration({tree, {}, 1}, {tree, pose.b_in_a, pose.scale_b}, {}, workspace_).volume;
       candidate.errors.push_back(std::abs(volume / pose.volume - 1));
     }
-    std::vector<double> near;
-    for (std::size_t i = 0; i < poses_.size(); ++i)
-      if (is_near(poses_[i], target_.at_overlap)) near.push_back(candidate.errors[i]);
-    candidate.poses = static_cast<std::uint32_t>(near.size());
-    candidate.error = median(std::move(near));
+    while (candidate.other_errors.size() < others_.size()) {
+      if (!next()) return false;
+      const PartnerTrial& trial = others_[candidate.other_errors.size()].trial;
+      const double volume = penetration(trial.partner, {tree, {}, 1}, {}, workspace_).volume;
+      candidate.other_errors.push_back(std::abs(volume / trial.volume - 1));
+    }
+    sum_up(candidate);
     return true;
+  }
+
+  /// Medians of each partner near the overlap asked about, and the worst of them.
+  void sum_up(Candidate& candidate) const {
+    candidate.poses = 0;
+    candidate.worst = {};
+    for (std::uint32_t k = 0; k < kTrialPartners; ++k) {
+      const auto partner = static_cast<TrialPartner>(k);
+      std::vector<double> errors;
+      for (std::size_t i = 0; i < poses_.size() && partner == TrialPartner::copy; ++i)
+        if (is_near(poses_[i], target_.at_overlap)) errors.push_back(candidate.errors[i]);
+      for (std::size_t i = 0; i < others_.size(); ++i)
+        if (others_[i].partner == partner) errors.push_back(candidate.other_errors[i]);
+      const auto poses = static_cast<std::uint32_t>(errors.size());
+      candidate.partners[k] = {partner, median(std::move(errors)), poses};
+      if (poses < (partner == TrialPartner::copy ? 1 : kFewTrials)) continue;
+      candidate.poses += poses;
+      if (candidate.partners[k].median >= candidate.worst.median)
+        candidate.worst = candidate.partners[k];
+    }
   }
 
   /// Of two that do the one of fewer spheres, else the one that errs less.
   bool is_better(const Candidate& candidate, const Candidate& than) const {
     if (does(candidate) && does(than)) return candidate.spheres() < than.spheres();
-    return candidate.error < than.error;
+    return candidate.error() < than.error();
   }
 
   /// Bakes until the count is found, a limit is met, or the time is over. Starts from the best.
   void search() {
     CountSearch counts(target_.relative_error, most_);
     if (!judge(*best_)) return;
-    double error = best_->error;
+    double error = best_->error();
     std::size_t spheres = best_->spheres();
     StopReason stop = best_->packing_stop();
     for (;;) {
@@ -216,7 +276,7 @@ class TargetBake {
       if (!asset) return;
       Candidate candidate = {std::move(*asset)};
       if (!judge(candidate)) return;
-      error = candidate.error;
+      error = candidate.error();
       spheres = candidate.spheres();
       stop = candidate.packing_stop();
       if (is_better(candidate, *best_)) best_ = std::move(candidate);
@@ -234,8 +294,9 @@ class TargetBake {
     header.asked_error = target_.relative_error;
     header.asked_at_overlap = target_.at_overlap;
     header.asked_spheres = settings_.max_spheres;
-    header.measured_error = best.error;
+    header.measured_error = best.error();
     header.measured_poses = best.poses;
+    header.worst_partner = static_cast<std::uint32_t>(best.worst.partner);
     header.search_stop = static_cast<std::uint32_t>(stop);
     if (first_of_classes_ && best.errors.size() == poses_.size()) {
       header.predicted_poses = static_cast<std::uint32_t>(poses_.size() - *first_of_classes_);
@@ -248,7 +309,7 @@ class TargetBake {
     }
     std::memcpy(bytes.data(), &header, sizeof(header));
     seal(bytes);
-    return {Asset(bytes, mesh_.name), best.error, best.poses, met, stop};
+    return {Asset(bytes, mesh_.name), best.error(), best.poses, best.partners, met, stop};
   }
 
   const ClosedMesh& mesh_;
@@ -261,6 +322,7 @@ class TargetBake {
   const std::unique_ptr<SolidBackend> backend_;
   std::vector<TrialPose> poses_;                 ///< near ones, then those of all classes
   std::optional<std::size_t> first_of_classes_;  ///< among them, once they are there
+  std::vector<OtherTrial> others_;
   std::optional<Candidate> best_;
   Workspace workspace_;
 };

@@ -53,6 +53,9 @@ nlohmann::ordered_json target_json(const TreeView& tree) {
                                  : nlohmann::ordered_json(nullptr);
   result["measured_poses"] = errors.measured_poses;
   result["search_stop"] = name_of(static_cast<StopReason>(tree.header().search_stop));
+  result["worst_partner"] = errors.measured_poses > 0
+                                ? nlohmann::ordered_json(name_of(errors.worst_partner))
+                                : nlohmann::ordered_json(nullptr);
   return result;
 }
 
@@ -211,9 +214,12 @@ std::string describe_target(const TreeView& tree) {
   const std::string asked = fmt::format("target {:.4g} % at {:.4g} % overlap",
                                         100 * errors.target_error, 100 * errors.target_overlap);
   const std::string measured =
-      errors.measured_poses == 0 ? "nothing measured"
-                                 : fmt::format("{:.3g} % measured at {} poses",
-                                               100 * errors.measured_error, errors.measured_poses);
+      errors.measured_poses == 0
+          ? "nothing measured"
+          : fmt::format(
+                "{:.3g} % measured against the worst partner, {}, "
+                "of {} poses in all",
+                100 * errors.measured_error, name_of(errors.worst_partner), errors.measured_poses);
   if (errors.target_met()) return fmt::format("{}: met, {}", asked, measured);
   return fmt::format("{}: missed, {}; {}", asked, measured,
                      why_missed(static_cast<StopReason>(tree.header().search_stop)));

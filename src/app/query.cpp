@@ -1,4 +1,4 @@
-#include <ist/query.h>
+#include <ist/field.h>
 
 #include <fmt/format.h>
 
@@ -11,6 +11,7 @@
 #include <ist/error.h>
 
 #include "app/commands.h"
+#include "app/field_spec.h"
 #include "app/file_options.h"
 #include "app/number_options.h"
 #include "app/query_output.h"
@@ -19,7 +20,7 @@ namespace ist::app {
 namespace {
 
 struct QueryOptions {
-  std::string asset_a, asset_b, pose, poses;
+  std::string a, asset_b, pose, poses;
   std::vector<std::string> classes;
   double scale_b = 1;
   bool scale_b_given = false;
@@ -34,6 +35,16 @@ struct QueryOptions {
 std::string is_pose(const std::string& text) {
   try {
     parse_pose(text);
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+/// "", or what is wrong with a description of a field; file names are none.
+std::string field_fault(const std::string& text) {
+  try {
+    if (is_field_spec(text)) parse_field(text);
     return "";
   } catch (const Error& error) {
     return error.what();
@@ -70,7 +81,8 @@ std::vector<PoseRow> asked_rows(const QueryOptions& options) {
 
 /// Answers every row, `repeat` rounds over all rows in turn, so that no row finds the branch
 /// predictor trained by itself. A row's time is the least of its rounds.
-std::vector<Answer> answer(const TreeView& a, const TreeView& b, const std::vector<PoseRow>& rows,
+template <class PlacedA>
+std::vector<Answer> answer(const PlacedA& a, const TreeView& b, const std::vector<PoseRow>& rows,
                            const QueryOptions& options) {
   using Clock = std::chrono::steady_clock;
   std::vector<Answer> answers;
@@ -80,10 +92,9 @@ std::vector<Answer> answer(const TreeView& a, const TreeView& b, const std::vect
   Workspace workspace;
   for (std::size_t round = 0; round < options.repeat; ++round)
     for (Answer& answer : answers) {
-      const PlacedTree placed_a{a, {}, 1}, placed_b{b, answer.row.pose, answer.row.scale_b};
+      const PlacedTree placed_b{b, answer.row.pose, answer.row.scale_b};
       const Clock::time_point start = Clock::now();
-      const PenetrationAndSeparation result =
-          query(placed_a, placed_b, options.settings, workspace);
+      const PenetrationAndSeparation result = query(a, placed_b, options.settings, workspace);
       const Clock::time_point end = Clock::now();
       answer.result = result;
       answer.time_us =
@@ -92,21 +103,57 @@ std::vector<Answer> answer(const TreeView& a, const TreeView& b, const std::vect
   return answers;
 }
 
-void run_query(const QueryOptions& options) {
-  if (options.settings.penetration.measure == Measure::inner &&
-      options.settings.penetration.pair_budget != 0)
+/// Throws CLI::ValidationError where settings exclude each other.
+void check_settings(const QueryOptions& options) {
+  const PenetrationSettings& settings = options.settings.penetration;
+  const bool inner = settings.measure == Measure::inner;
+  if (inner && settings.pair_budget != 0)
     throw CLI::ValidationError("--pair-budget",
                                "has no effect with --measure inner, only with matched");
-  const std::vector<PoseRow> rows = asked_rows(options);
-  const Asset a = Asset::load(options.asset_a);
+  if (inner && settings.field == FieldUse::always)
+    throw CLI::ValidationError("--field",
+                               "always has no effect with --measure inner, only with matched");
+  if (!is_field_spec(options.a)) return;
+  if (settings.field == FieldUse::never)
+    throw CLI::ValidationError(
+        "--field",
+        "never leaves nothing to ask: " + options.a +
+            " is a field and has no spheres; leave the option out, or name an .ist file");
+  if (settings.pair_budget != 0)
+    throw CLI::ValidationError("--pair-budget", "has no effect where A is a field: " + options.a);
+}
+
+/// Throws Error if the surface that --field always asks for is not there.
+void require_surface(const std::string& path, const TreeView& tree) {
+  if (!tree.has_field())
+    throw Error(path +
+                ": holds no field, which --field always needs; bake it again without --no-field, "
+                "or ask with --field auto");
+}
+
+std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions& options) {
+  if (is_field_spec(options.a)) {
+    const Asset b = Asset::load(options.asset_b);
+    return answer(PlacedField{parse_field(options.a), {}, 1}, b.view(), rows, options);
+  }
+  const Asset a = Asset::load(options.a);
   const Asset b = Asset::load(options.asset_b);
-  const std::vector<Answer> answers = answer(a.view(), b.view(), rows, options);
+  if (options.settings.penetration.field == FieldUse::always) {
+    require_surface(options.a, a.view());
+    require_surface(options.asset_b, b.view());
+  }
+  return answer(PlacedTree{a.view(), {}, 1}, b.view(), rows, options);
+}
+
+void run_query(const QueryOptions& options) {
+  check_settings(options);
+  const std::vector<Answer> answers = answer(asked_rows(options), options);
   if (options.json) {
     fmt::print("{}", answers_json(answers));
   } else if (options.csv || options.pose.empty()) {
     fmt::print("{}", answers_csv(answers));
   } else {
-    fmt::print("A = {}, B = {}\n{}", options.asset_a, options.asset_b,
+    fmt::print("A = {}, B = {}\n{}", options.a, options.asset_b,
                answer_text(answers.front(), options.settings.penetration.measure));
   }
 }
@@ -116,8 +163,11 @@ void run_query(const QueryOptions& options) {
 void add_query(CLI::App& app) {
   const auto options = std::make_shared<QueryOptions>();
   CLI::App* const command =
-      app.add_subcommand("query", "Overlap and distance of two assets, B placed in A's frame");
-  add_input(command, "A", options->asset_a, "An .ist file");
+      app.add_subcommand("query", "Overlap and distance of two solids, B placed in A's frame");
+  add_input(command, "A", options->a,
+            "An .ist file or a field: plane:nx,ny,nz,d (the solid n·x ≤ d), box:hx,hy,hz, ball:r, "
+            "capsule:r,h, cylinder:r,h; [u], half extents, h half the height along z")
+      ->check(field_fault);
   add_input(command, "B", options->asset_b, "An .ist file");
   CLI::Option_group* const poses = command->add_option_group("Poses", "Where B stands");
   poses->add_option("--pose", options->pose, "qw,qx,qy,qz,tx,ty,tz: x_A = R (scale · x_B) + t")
@@ -144,6 +194,18 @@ void add_query(CLI::App& app) {
           "Which spheres stand for the solid")
       ->check(CLI::IsMember({"matched", "inner"}))
       ->default_str("matched");
+  command
+      ->add_option_function<std::string>(
+          "--field",
+          [options](const std::string& name) {
+            options->settings.penetration.field = name == "never"    ? FieldUse::never
+                                                  : name == "always" ? FieldUse::always
+                                                                     : FieldUse::automatic;
+          },
+          "Whether spheres meet the surface that the other asset holds; auto: where spheres alone "
+          "are too coarse; never: spheres alone; always: the surface alone. Matched measure only")
+      ->check(CLI::IsMember({"auto", "never", "always"}))
+      ->default_str("auto");
   add_whole(command, "--pair-budget", options->settings.penetration.pair_budget,
             "Answer from the level of detail that needs about so many sphere pairs, "
             "0 = from the finest; matched measure only");
@@ -160,7 +222,9 @@ void add_query(CLI::App& app) {
       "Gradients are taken with respect to a motion of B, all in A's frame; a penalty potential "
       "k·V\n"
       "pushes B by −k·dVdt and turns it by −k·dVdr about its origin.\n"
-      "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9");
+      "A field stands in its own frame; ./box:1,1,1 names a file of that name.\n"
+      "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9\n"
+      "         ist query plane:0,0,1,0 bolt.ist --pose 1,0,0,0,0,0,-0.5");
   command->callback([options, scale] {
     options->scale_b_given = scale->count() > 0;
     QuerySettings& settings = options->settings;

@@ -69,4 +69,22 @@ const char* name_of(QueryStatus status) noexcept {
   return "unknown";
 }
 
+const char* name_of(TrialPartner partner) noexcept {
+  switch (partner) {
+    case TrialPartner::copy:
+      return "copy";
+    case TrialPartner::plane:
+      return "plane";
+    case TrialPartner::ball:
+      return "ball";
+    case TrialPartner::edge:
+      return "edge";
+    case TrialPartner::corner:
+      return "corner";
+    case TrialPartner::plate:
+      return "plate";
+  }
+  return "unknown";
+}
+
 }  // namespace ist::app

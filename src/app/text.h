@@ -20,5 +20,6 @@ GridMode grid_named(const std::string& name) noexcept;
 const char* name_of(StopReason reason) noexcept;
 const char* name_of(GridMode mode) noexcept;
 const char* name_of(QueryStatus status) noexcept;
+const char* name_of(TrialPartner partner) noexcept;
 
 }  // namespace ist::app

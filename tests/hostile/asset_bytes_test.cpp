@@ -299,6 +299,7 @@ TEST(AssetBytes, DetailsAreLookedAt) {
   refused(offsetof(AssetHeader, detail_count), kMaxDetails + 1);
   refused(offsetof(AssetHeader, predicted_error), kNan);
   refused(offsetof(AssetHeader, measured_error), kNan);
+  refused(offsetof(AssetHeader, worst_partner), kTrialPartners);
   for (std::uint32_t i = 0; i < 2; ++i) {
     const std::uint64_t detail = header.details + i * sizeof(DetailLevel);
     refused(detail + offsetof(DetailLevel, protrusion), -1.0);

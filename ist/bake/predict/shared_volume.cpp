@@ -82,6 +82,36 @@ class MovedMesh {
   Eigen::AlignedBox3d bounds_;
 };
 
+/// A convex body where lines run along x.
+class MovedConvex {
+ public:
+  explicit MovedConvex(const ConvexBody& body) : body_(body), bounds_(body.bounds()) {}
+
+  void keep(const Eigen::AlignedBox2d&, double) {}
+  LatticeCrossings cross(const LineLattice& lattice) const {
+    LatticeCrossings result;
+    result.first.push_back(0);
+    for (std::uint32_t j = 0; j < lattice.nz; ++j)
+      for (std::uint32_t i = 0; i < lattice.ny; ++i) {
+        const Vector3d on_line(0, lattice.y(i, j), lattice.z(j));
+        if (const auto part = body_.part_of(on_line, Vector3d::UnitX())) {
+          result.crossings.push_back({part->from, 1});
+          result.crossings.push_back({part->to, -1});
+        }
+        result.first.push_back(static_cast<std::uint32_t>(result.crossings.size()));
+      }
+    return result;
+  }
+  LatticeCrossings cross(const LineLattice& lattice, const Eigen::AlignedBox2d&, double) const {
+    return cross(lattice);
+  }
+  const Eigen::AlignedBox3d& bounds() const { return bounds_; }
+
+ private:
+  ConvexBody body_;
+  Eigen::AlignedBox3d bounds_;
+};
+
 /// Length of a line inside both solids: where both winding numbers are at least 1.
 double common_length(const LatticeCrossings& a, const LatticeCrossings& b, std::size_t line) {
   std::uint32_t i = a.first[line], j = b.first[line];
@@ -106,9 +136,10 @@ struct Sums {
 };
 
 /// Two solids where lines run along x, and what they have in common.
+template <class MovedB>
 class Pair {
  public:
-  Pair(MovedMesh a, MovedMesh b, const std::function<bool()>& go_on)
+  Pair(MovedMesh a, MovedB b, const std::function<bool()>& go_on)
       : a_(std::move(a)),
         b_(std::move(b)),
         common_(a_.bounds().intersection(b_.bounds())),
@@ -152,7 +183,7 @@ class Pair {
     Eigen::AlignedBox2d band = box;
     band.min().y() = lattice.z0;
     band.max().y() = lattice.z0 + lattice.nz * lattice.step_z;
-    const auto crossings = [&](const MovedMesh& mesh) {
+    const auto crossings = [&](const auto& mesh) {
       return lattice.nz == lattice.ny ? mesh.cross(lattice)
                                       : mesh.cross(lattice, band, common_.max().x());
     };
@@ -175,33 +206,29 @@ class Pair {
     return true;
   }
 
-  MovedMesh a_, b_;
+  MovedMesh a_;
+  MovedB b_;
   const Eigen::AlignedBox3d common_;
   const std::function<bool()>& go_on_;
 };
 
-}  // namespace
-
-SharedVolume shared_volume(const MeshSolid& a, const MeshSolid& b, const Pose& b_in_a,
-                           double scale_b, const Vector3d& along, double relative_error,
-                           const std::function<bool()>& go_on) {
-  const double unit = a.frame().scale();
+/// Of lines along `along` to lines along x.
+Eigen::Matrix3d turn_of(const Vector3d& along) {
   const Vector3d axis = along.normalized();
-  Eigen::Matrix3d turn;  // of lines along `along` to lines along x
+  Eigen::Matrix3d turn;
   turn.row(0) = axis;
   turn.row(1) = axis.unitOrthogonal();
   turn.row(2) = axis.cross(Vector3d(turn.row(1)));
-  const Eigen::Matrix3d rotation =
-      Eigen::Quaterniond(b_in_a.q[0], b_in_a.q[1], b_in_a.q[2], b_in_a.q[3]).toRotationMatrix();
-  const Vector3d shift(b_in_a.t[0], b_in_a.t[1], b_in_a.t[2]);
-  Pair pair(MovedMesh(a, [&](const Vector3d& x) { return Vector3d(turn * x); }),
-            MovedMesh(b,
-                      [&](const Vector3d& x) {
-                        const Vector3d in_a = rotation * (scale_b * b.frame().from_unit(x)) + shift;
-                        return Vector3d(turn * a.frame().to_unit(in_a));
-                      }),
-            go_on);
+  return turn;
+}
 
+MovedMesh turned(const MeshSolid& solid, const Eigen::Matrix3d& turn) {
+  return MovedMesh(solid, [&](const Vector3d& x) { return Vector3d(turn * x); });
+}
+
+/// Closes in on the overlap and refines, as shared_volume() says; `unit`: [u] of the unit frame.
+template <class MovedB>
+SharedVolume integrate(Pair<MovedB> pair, double unit, double relative_error) {
   const Eigen::AlignedBox3d& common = pair.common();
   SharedVolume result;
   if (common.isEmpty()) return result;
@@ -222,6 +249,30 @@ SharedVolume shared_volume(const MeshSolid& a, const MeshSolid& b, const Pose& b
     lines *= 2;
   }
   return result;
+}
+
+}  // namespace
+
+SharedVolume shared_volume(const MeshSolid& a, const MeshSolid& b, const Pose& b_in_a,
+                           double scale_b, const Vector3d& along, double relative_error,
+                           const std::function<bool()>& go_on) {
+  const Eigen::Matrix3d turn = turn_of(along);
+  const Eigen::Matrix3d rotation =
+      Eigen::Quaterniond(b_in_a.q[0], b_in_a.q[1], b_in_a.q[2], b_in_a.q[3]).toRotationMatrix();
+  const Vector3d shift(b_in_a.t[0], b_in_a.t[1], b_in_a.t[2]);
+  MovedMesh moved_b(b, [&](const Vector3d& x) {
+    const Vector3d in_a = rotation * (scale_b * b.frame().from_unit(x)) + shift;
+    return Vector3d(turn * a.frame().to_unit(in_a));
+  });
+  return integrate(Pair(turned(a, turn), std::move(moved_b), go_on), a.frame().scale(),
+                   relative_error);
+}
+
+SharedVolume shared_volume(const MeshSolid& a, const ConvexBody& b, const Vector3d& along,
+                           double relative_error, const std::function<bool()>& go_on) {
+  const Eigen::Matrix3d turn = turn_of(along);
+  return integrate(Pair(turned(a, turn), MovedConvex(b.to_unit(a.frame()).turned(turn)), go_on),
+                   a.frame().scale(), relative_error);
 }
 
 }  // namespace ist

@@ -5,6 +5,7 @@
 
 #include <ist/pose.h>
 
+#include "bake/predict/convex_body.h"
 #include "mesh/mesh_solid.h"
 
 namespace ist {
@@ -25,5 +26,9 @@ struct SharedVolume {
 SharedVolume shared_volume(const MeshSolid& a, const MeshSolid& b, const Pose& b_in_a,
                            double scale_b, const Eigen::Vector3d& along, double relative_error,
                            const std::function<bool()>& go_on = {});
+
+/// Likewise of A and of a body in A's frame.
+SharedVolume shared_volume(const MeshSolid& a, const ConvexBody& b, const Eigen::Vector3d& along,
+                           double relative_error, const std::function<bool()>& go_on = {});
 
 }  // namespace ist

@@ -7,7 +7,7 @@
 #include <ist/query.h>
 
 #include "bake/predict/shared_volume.h"
-#include "numerics/hashing.h"
+#include "bake/predict/trial_random.h"
 
 namespace ist {
 namespace {
@@ -21,39 +21,6 @@ constexpr double kContainedSize = 0.15;
 constexpr std::uint32_t kContainedTries = 400;  // for each pose
 constexpr int kApproachSteps = 24;
 constexpr int kBisections = 40;
-constexpr double kHalfDecade = 3.1622776601683795;
-
-/// Random numbers by + − × ÷ sqrt, so that poses are the same everywhere.
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
-
-  std::uint64_t bits() { return mixed(state_ += 0x9E3779B97F4A7C15ull); }
-  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }  ///< [0, 1)
-  double symmetric() { return 2 * uniform() - 1; }
-
-  Vector3d direction() {
-    for (;;) {
-      const Vector3d v(symmetric(), symmetric(), symmetric());
-      const double squared = v.squaredNorm();
-      if (squared <= 1 && squared > 1e-4) return v / std::sqrt(squared);
-    }
-  }
-
-  /// Evenly spread over all rotations: a point of the ball in four dimensions, brought to length 1.
-  Eigen::Quaterniond rotation() {
-    for (;;) {
-      const double q[4] = {symmetric(), symmetric(), symmetric(), symmetric()};
-      const double squared = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
-      if (squared > 1 || squared < 1e-4) continue;
-      const double norm = std::sqrt(squared);
-      return {q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm};
-    }
-  }
-
- private:
-  std::uint64_t state_;
-};
 
 /// Ball around a solid's spheres in the mesh's frame.
 struct Ball {
@@ -155,7 +122,7 @@ class Trials {
     return std::abs(shared.volume - out.volume) <= 3 * shared.error;
   }
 
-  Random& random() { return random_; }
+  TrialRandom& random() { return random_; }
 
  private:
   /// Whether all vertices of B lie in A. What is nearer to a place inside than the surface is
@@ -194,20 +161,11 @@ class Trials {
   const TrialBody& b_;
   const Ball ball_a_, ball_b_;
   const double smaller_, relative_error_;
-  Random random_;
+  TrialRandom random_;
   double done_ = 0;
   const std::function<bool()> go_on_;
   Workspace workspace_;
 };
-
-/// Somewhere in [floor, 10 floor), evenly on the logarithm.
-double in_decade(double floor, Random& random) {
-  constexpr std::uint64_t kSteps = 100;         // of a decade
-  constexpr double kStep = 1.0232929922807541;  // 10^(1/100)
-  const std::uint64_t steps = random.bits() % kSteps;
-  for (std::uint64_t step = 0; step < steps; ++step) floor *= kStep;
-  return floor;
-}
 
 }  // namespace
 
@@ -237,7 +195,7 @@ std::vector<TrialPose> trial_poses(const TrialBody& a, const TrialBody& b, std::
       if (!next()) return poses;
       // From the class's floor up a decade, evenly on the logarithm; deep ones evenly up to 0.5.
       const double fraction = k == 1 ? kOverlapClassFloor[k] + 0.4 * trials.random().uniform()
-                                     : in_decade(kOverlapClassFloor[k], trials.random());
+                                     : random_in_decade(kOverlapClassFloor[k], trials.random());
       TrialPose pose;
       if (!trials.approach(fraction, pose)) continue;
       poses.push_back(pose);
@@ -255,7 +213,7 @@ std::vector<TrialPose> trial_poses_near(double overlap, const TrialBody& a, cons
   std::vector<TrialPose> poses;
   for (std::uint32_t i = 0; i < kTriesPerPose * count && poses.size() < count; ++i) {
     if (!trials.next(poses.size(), count)) return poses;
-    const double fraction = in_decade(overlap / kHalfDecade, trials.random());
+    const double fraction = random_in_decade(overlap / kHalfDecade, trials.random());
     TrialPose pose;
     if (fraction <= 0.5 && trials.approach(fraction, pose) && is_near(pose, overlap))
       poses.push_back(pose);

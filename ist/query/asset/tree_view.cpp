@@ -135,7 +135,7 @@ bool sound_values(const AssetHeader& header) noexcept {
     if (!is_radius(covers[i])) return false;
   for (const double error : header.predicted_error)
     if (!is_finite_sum(error)) return false;
-  if (!is_finite_sum(header.measured_error)) return false;
+  if (!is_finite_sum(header.measured_error) || header.worst_partner >= kTrialPartners) return false;
   if (header.field != 0 && !sound_field(header, *at<FieldHeader>(header, header.field)))
     return false;
   const DetailLevel* const details = at<DetailLevel>(header, header.details);
@@ -213,6 +213,7 @@ PredictedErrors TreeView::predicted_errors() const noexcept {
   result.target_overlap = header_->asked_at_overlap;
   result.measured_error = header_->measured_error;
   result.measured_poses = header_->measured_poses;
+  result.worst_partner = static_cast<TrialPartner>(header_->worst_partner);
   return result;
 }
 

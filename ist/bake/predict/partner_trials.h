@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include <ist/field.h>
+#include <ist/tree_view.h>
+
+#include "mesh/mesh_solid.h"
+
+namespace ist {
+
+/// A solid, at rest, and a partner of another shape and size that meets it.
+struct PartnerTrial {
+  PlacedField partner;  ///< in the solid's frame
+  double volume = 0;    ///< [u³] of the overlap
+};
+
+/// What the solid meets but a copy of itself.
+inline constexpr TrialPartner kOtherPartners[] = {TrialPartner::plane, TrialPartner::ball,
+                                                  TrialPartner::edge, TrialPartner::corner,
+                                                  TrialPartner::plate};
+
+/// Finds trials of partners other than a copy.
+///
+/// Balls and boxes measure 0.1 to 0.3 of the solid's diagonal, plates are 0.02 of it thick. Each
+/// comes from outside along a random direction, towards a random point of the solid, until it
+/// shares a volume within half a decade of the one wanted. Places are found by points of the solid
+/// alone, so that they favour no packing; volumes are integrated over the mesh.
+///
+/// Same trials for the same seed, on any machine and for any number of threads. Runs on the
+/// caller's TBB threads.
+class PartnerTrials {
+ public:
+  explicit PartnerTrials(const MeshSolid& solid);
+
+  /// About `count` with overlaps near `overlap` of the solid's volume, true to `relative_error`;
+  /// fewer or none where the partner has no room for so much.
+  /// `go_on(part)`, if any, is told every few milliseconds which part of [0, 1] is done; once it
+  /// says no, the trials so far are all.
+  std::vector<PartnerTrial> find(TrialPartner partner, double overlap, std::uint32_t count,
+                                 double relative_error, std::uint64_t seed,
+                                 const std::function<bool(double)>& go_on = {}) const;
+
+ private:
+  const MeshSolid& solid_;
+  const std::vector<Eigen::Vector3d> points_;
+  double diagonal_ = 0;  ///< [u] of the solid's bounds
+};
+
+}  // namespace ist
