@@ -39,8 +39,11 @@
 //   level k ≥ 1                       BallBlock[m(k)], Origin[m(k)]   balls around blocks below
 //   brick index                       uint32[bricks[0] · bricks[1] · bricks[2]], x runs fastest
 //   bricks                            CellBrick[brick_count]
-//   cell first                        uint32[cell_count + 1]
-//   cell triangles                    uint32[entry_count]   16 · block + lane
+//   cell ends                         uint16 or uint32[cell_count], as list_bytes says
+//   cell triangles                    uint16 or uint32[entry_count]   16 · block + lane
+//
+// The list of a cell starts where that of the cell before ends, its brick's first where the brick's
+// lists do.
 //
 // Centres of spheres and balls are floats of the unit frame. A block's origin is chosen so that the
 // difference of every centre in it and the origin is a float too: origin + offset is the centre
@@ -158,7 +161,7 @@ struct CellBrick {
   std::uint64_t surface = 0;  ///< cells that a triangle meets, and perhaps others
   std::uint64_t inside = 0;   ///< cells whose reference point is inside
   std::uint32_t first = 0;    ///< surface cells of the bricks before
-  std::uint32_t reserved = 0;
+  std::uint32_t list = 0;     ///< triangles in the cells of the bricks before
 };
 static_assert(sizeof(CellBrick) == 24);
 
@@ -174,14 +177,16 @@ struct FieldHeader {
   std::uint32_t cell_count = 0;   ///< surface cells
   std::uint32_t entry_count = 0;  ///< triangles of all surface cells
   std::uint32_t triangle_count = 0;
-  std::uint32_t level_count = 0;     ///< ≥ 1; the last has one block
+  std::uint32_t level_count = 0;  ///< ≥ 1; the last has one block
+  std::uint32_t list_bytes = 4;   ///< of a number in the cells' ends and triangles: 2 or 4
+  std::uint32_t reserved = 0;
   std::uint64_t brick_index = 0;     ///< offset of uint32[bricks[0] · bricks[1] · bricks[2]]
   std::uint64_t brick_data = 0;      ///< offset of CellBrick[brick_count]
-  std::uint64_t cell_first = 0;      ///< offset of uint32[cell_count + 1] into the cell triangles
-  std::uint64_t cell_triangles = 0;  ///< offset of uint32[entry_count]: 16 · block + lane
+  std::uint64_t cell_ends = 0;       ///< offset of [cell_count]: from CellBrick::list
+  std::uint64_t cell_triangles = 0;  ///< offset of [entry_count]: 16 · block + lane
   LevelHeader level[kMaxLevels];     ///< level 0: SurfaceBlock, above: BallBlock and Origin
 };
-static_assert(sizeof(FieldHeader) == 328);
+static_assert(sizeof(FieldHeader) == 336);
 
 struct alignas(64) AssetHeader {
   char magic[8] = {};
@@ -293,8 +298,9 @@ constexpr void place_field(FieldHeader& field, std::uint64_t& end) noexcept {
   field.brick_index =
       take<std::uint32_t>(end, std::uint64_t{field.bricks[0]} * field.bricks[1] * field.bricks[2]);
   field.brick_data = take<CellBrick>(end, field.brick_count);
-  field.cell_first = take<std::uint32_t>(end, std::uint64_t{field.cell_count} + 1);
-  field.cell_triangles = take<std::uint32_t>(end, field.entry_count);
+  const std::uint64_t width = field.list_bytes;
+  field.cell_ends = take<std::byte>(end, width * field.cell_count);
+  field.cell_triangles = take<std::byte>(end, width * field.entry_count);
 }
 
 }  // namespace detail
@@ -309,7 +315,8 @@ constexpr std::uint64_t detail_spheres(std::uint64_t n, std::uint32_t i) noexcep
 
 /// Sets every offset, count and the file size from `sphere_count` in [1, kMaxSpheres] and
 /// `detail_count`, all of whose sets must have a sphere; `details` are those of the file. `field`,
-/// if there is one, knows its counts: level[0].count and those of bricks, cells and entries.
+/// if there is one, knows list_bytes and its counts: level[0].count, those of bricks, cells and
+/// entries.
 constexpr void place_sections(AssetHeader& header, DetailLevel* details,
                               FieldHeader* field = nullptr) noexcept {
   const std::uint64_t n = header.sphere_count;

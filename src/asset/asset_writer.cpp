@@ -19,6 +19,18 @@ class SectionWriter {
     if (count > 0) std::memcpy(bytes_.data() + offset, values.data(), count * sizeof(T));
   }
 
+  /// Of two or four bytes each.
+  void write(std::uint64_t offset, const std::vector<std::uint32_t>& values, std::uint64_t count,
+             std::uint32_t width) {
+    if (width == 4) return write(offset, values, count);
+    std::vector<std::uint16_t> narrow(values.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      narrow[i] = static_cast<std::uint16_t>(values[i]);
+      if (narrow[i] != values[i]) throw Error("asset: a number of the field's lists is too large");
+    }
+    write(offset, narrow, count);
+  }
+
   void write(const TreeHeader& header, const TreeArrays& tree) {
     const std::uint64_t lanes = std::uint64_t{kWidth} * header.level[0].count;
     write(header.sphere_index, tree.sphere_index, lanes);
@@ -44,8 +56,8 @@ class SectionWriter {
     write(header.brick_index, field.brick_index,
           std::uint64_t{header.bricks[0]} * header.bricks[1] * header.bricks[2]);
     write(header.brick_data, field.bricks, header.brick_count);
-    write(header.cell_first, field.cell_first, std::uint64_t{header.cell_count} + 1);
-    write(header.cell_triangles, field.cell_triangles, header.entry_count);
+    write(header.cell_ends, field.cell_ends, header.cell_count, header.list_bytes);
+    write(header.cell_triangles, field.cell_triangles, header.entry_count, header.list_bytes);
   }
 
  private:
@@ -68,7 +80,7 @@ FieldHeader placeable(const FieldArrays& arrays) {
   FieldHeader header = arrays.header;
   header.level[0].count = static_cast<std::uint32_t>(arrays.blocks.size());
   header.brick_count = static_cast<std::uint32_t>(arrays.bricks.size());
-  header.cell_count = static_cast<std::uint32_t>(arrays.cell_first.size() - 1);
+  header.cell_count = static_cast<std::uint32_t>(arrays.cell_ends.size());
   header.entry_count = static_cast<std::uint32_t>(arrays.cell_triangles.size());
   return header;
 }

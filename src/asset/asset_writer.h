@@ -37,12 +37,12 @@ struct DetailArrays {
 
 /// The solid's surface for queries as it will lie in the file.
 struct FieldArrays {
-  FieldHeader header;  ///< offsets and the counts of levels are filled in by writing
+  FieldHeader header;  ///< offsets and counts of arrays are filled in by writing
   std::vector<SurfaceBlock> blocks;
   std::vector<TreeLevelArrays> levels;  ///< balls around blocks, from level 1 up; no nodes
   std::vector<std::uint32_t> brick_index;
   std::vector<CellBrick> bricks;
-  std::vector<std::uint32_t> cell_first;
+  std::vector<std::uint32_t> cell_ends;  ///< this and the next as wide as the header says
   std::vector<std::uint32_t> cell_triangles;
 };
 

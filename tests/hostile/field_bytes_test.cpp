@@ -45,10 +45,11 @@ void walk(const AlignedBytes& bytes) {
     const std::uint32_t code = tree.brick_index[i];
     if (code == kOutsideBrick || code == kInsideBrick) continue;
     const CellBrick& brick = tree.bricks[code];
-    for (std::uint32_t c = 0; c < static_cast<std::uint32_t>(std::popcount(brick.surface)); ++c) {
+    for (std::uint64_t left = brick.surface; left != 0; left &= left - 1) {
       ++cells;
-      for (std::uint32_t e = tree.cell_first[brick.first + c];
-           e < tree.cell_first[brick.first + c + 1]; ++e)
+      const SurfaceTree::CellList list =
+          tree.cell_list(brick, static_cast<std::uint32_t>(std::countr_zero(left)));
+      for (std::uint32_t e = list.begin; e < list.end; ++e)
         for (int k = 0; k < 3; ++k) {
           float corner[3];
           tree.corner(tree.cell_triangles[e] / kWidth, tree.cell_triangles[e] % kWidth, k, corner);
@@ -121,7 +122,8 @@ TEST(FieldBytes, EveryOffsetCountAndRangeIsLookedAt) {
     moved(of_field(offsetof(FieldHeader, level_count)), field.level_count);
     moved(of_field(offsetof(FieldHeader, brick_index)), field.brick_index);
     moved(of_field(offsetof(FieldHeader, brick_data)), field.brick_data);
-    moved(of_field(offsetof(FieldHeader, cell_first)), field.cell_first);
+    moved(of_field(offsetof(FieldHeader, list_bytes)), field.list_bytes);
+    moved(of_field(offsetof(FieldHeader, cell_ends)), field.cell_ends);
     moved(of_field(offsetof(FieldHeader, cell_triangles)), field.cell_triangles);
     for (std::size_t k = 0; k < kMaxLevels; ++k) {
       const std::size_t level = of_field(offsetof(FieldHeader, level) + k * sizeof(LevelHeader));
@@ -152,9 +154,13 @@ TEST(FieldBytes, EveryOffsetCountAndRangeIsLookedAt) {
   refused(field.brick_index, field.brick_count);
   refused(field.brick_data + offsetof(CellBrick, first), 1u);
   refused(field.brick_data + offsetof(CellBrick, surface), ~std::uint64_t{0});
-  refused(field.cell_first, 1u);
-  refused(field.cell_first + 4, field.entry_count + 1);
-  refused(field.cell_triangles, kWidth * field.level[0].count);
+  refused(field.brick_data + offsetof(CellBrick, list), 1u);
+  ASSERT_EQ(field.list_bytes, 2u);
+  refused(of_field(offsetof(FieldHeader, list_bytes)), 4u);
+  refused(field.cell_ends, std::uint16_t{0xffff});
+  refused(field.cell_ends + 2 * (field.cell_count - 1),
+          static_cast<std::uint16_t>(field.entry_count + 1));
+  refused(field.cell_triangles, static_cast<std::uint16_t>(kWidth * field.level[0].count));
 }
 
 }  // namespace

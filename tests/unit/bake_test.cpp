@@ -210,7 +210,7 @@ TEST(Check, TurnsRedForEveryInvariantOfTheField) {
        [](AssetHeader& h) { writable<BallBlock>(h, field(h).level[1].blocks)->r[2] *= 0.999f; }},
       {"field cells",
        [](AssetHeader& h) {
-         auto* triangles = writable<std::uint32_t>(h, field(h).cell_triangles);
+         auto* triangles = writable<std::uint16_t>(h, field(h).cell_triangles);
          triangles[5] = triangles[5] == 0 ? 1 : 0;
        }},
       {"field signs", [](AssetHeader& h) { bricks(h)->inside ^= 1u << 7; }},

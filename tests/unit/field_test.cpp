@@ -231,10 +231,9 @@ TEST(Field, GridTellsInsideFromOutside) {
         inside = (brick.inside >> bit & 1) != 0;
         if ((brick.surface >> bit & 1) != 0) {
           ++in_surface_cells;
-          const std::uint64_t below = brick.surface & ((std::uint64_t{1} << bit) - 1);
-          const std::uint32_t at = brick.first + static_cast<std::uint32_t>(std::popcount(below));
+          const auto [begin, end] = tree.cell_list(brick, static_cast<std::uint32_t>(bit));
           std::optional<int> steps = 0;
-          for (std::uint32_t e = tree.cell_first[at]; e < tree.cell_first[at + 1] && steps; ++e) {
+          for (std::uint32_t e = begin; e < end && steps; ++e) {
             const std::uint32_t triangle = tree.cell_triangles[e];
             Corners t;
             for (int k = 0; k < 3; ++k) {

@@ -24,6 +24,14 @@ Polygon cut(const Polygon& polygon, int axis, double bound, double sign) {
   return out;
 }
 
+/// Numbers of `width` bytes.
+std::vector<std::uint32_t> wide(const AssetHeader& asset, std::uint64_t offset, std::size_t count,
+                                std::uint32_t width) {
+  if (width == 4)
+    return {at<std::uint32_t>(asset, offset), at<std::uint32_t>(asset, offset) + count};
+  return {at<std::uint16_t>(asset, offset), at<std::uint16_t>(asset, offset) + count};
+}
+
 /// The cells as the file has them.
 class Cells {
  public:
@@ -31,8 +39,8 @@ class Cells {
       : field_(field),
         index_(at<std::uint32_t>(asset, field.brick_index)),
         bricks_(at<CellBrick>(asset, field.brick_data)),
-        first_(at<std::uint32_t>(asset, field.cell_first)),
-        triangles_(at<std::uint32_t>(asset, field.cell_triangles)) {}
+        ends_(wide(asset, field.cell_ends, field.cell_count, field.list_bytes)),
+        triangles_(wide(asset, field.cell_triangles, field.entry_count, field.list_bytes)) {}
 
   /// Whether the cell lists the triangle.
   bool lists(const std::array<std::int64_t, 3>& cell, std::uint32_t triangle) const {
@@ -44,12 +52,15 @@ class Cells {
         index_[x / 4 + field_.bricks[0] * (y / 4 + std::uint64_t{field_.bricks[1]} * (z / 4))];
     if (code >= field_.brick_count) return false;
     const CellBrick& brick = bricks_[code];
-    const std::uint64_t bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
+    const auto bit = static_cast<std::uint32_t>(x % 4 + 4 * (y % 4) + 16 * (z % 4));
     if ((brick.surface >> bit & 1) == 0) return false;
-    const std::uint64_t below = brick.surface & ((std::uint64_t{1} << bit) - 1);
-    const std::uint32_t at = brick.first + static_cast<std::uint32_t>(std::popcount(below));
-    return std::find(triangles_ + first_[at], triangles_ + first_[at + 1], triangle) !=
-           triangles_ + first_[at + 1];
+    const std::uint64_t before = brick.surface & ((std::uint64_t{1} << bit) - 1);
+    const std::uint32_t at = brick.first + static_cast<std::uint32_t>(std::popcount(before));
+    const std::uint32_t* const list = triangles_.data() + brick.list;
+    const std::uint32_t *const begin = list + (before == 0 ? 0 : ends_[at - 1]), *const end =
+                                                                                     list +
+                                                                                     ends_[at];
+    return std::find(begin, end, triangle) != end;
   }
 
   std::size_t places() const {
@@ -81,8 +92,7 @@ class Cells {
   const FieldHeader& field_;
   const std::uint32_t* index_;
   const CellBrick* bricks_;
-  const std::uint32_t* first_;
-  const std::uint32_t* triangles_;
+  const std::vector<std::uint32_t> ends_, triangles_;
 };
 
 /// Cuts a triangle along the cells' sides and looks its pieces up.

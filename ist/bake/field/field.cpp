@@ -126,6 +126,21 @@ Approximation approximate(SolidSurface& surface, double max_error) {
   return own;
 }
 
+/// What the grid of a surface may take.
+std::size_t grid_bytes(const FieldArrays& arrays) {
+  // A small surface's grid is fine, a large one's coarse; beyond kFieldTriangles it is as coarse as
+  // there.
+  const std::size_t triangles = arrays.header.triangle_count;
+  const std::size_t whole = std::min(
+      16'384 + 50 * triangles, std::max(kFieldBytes, kFieldBytes / kFieldTriangles * triangles));
+  std::size_t surface = sizeof(FieldHeader) + 16 * kAssetAlignment;
+  surface += arrays.blocks.size() * sizeof(SurfaceBlock);
+  for (const TreeLevelArrays& level : arrays.levels)
+    surface += level.blocks.size() * (sizeof(BallBlock) + sizeof(Origin));
+  const std::size_t least = 12 * triangles;
+  return whole > surface + least ? whole - surface : least;
+}
+
 }  // namespace
 
 std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error) {
@@ -139,7 +154,7 @@ std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error)
   arrays.header.triangle_count = static_cast<std::uint32_t>(near.mesh.triangles.size());
   cut_into_blocks(near.mesh, arrays);
   const FieldHierarchy hierarchy(near.mesh);
-  lay_sign_grid(hierarchy.view(), arrays);
+  lay_sign_grid(hierarchy.view(), grid_bytes(arrays), arrays);
   return arrays;
 }
 

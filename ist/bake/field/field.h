@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -9,7 +10,10 @@
 namespace ist {
 
 /// Triangles of a field, unless another error is asked for.
-inline constexpr std::uint32_t kFieldTriangles = 30'000;
+inline constexpr std::uint32_t kFieldTriangles = 25'000;
+
+/// Bytes of a field unless another error is asked for: what the spheres take in an asset of 10,000.
+inline constexpr std::size_t kFieldBytes = 1'000'000;
 
 /// The surface of a mesh's solid for queries: the mesh's own triangles where they are few, else
 /// fewer near them (asset_layout.h draws it). Its error is proven.

@@ -8,74 +8,36 @@
 
 #include "bake/cluster/ball_blocks.h"
 #include "bake/field/spatial_order.h"
+#include "bake/field/surface_patches.h"
 
 namespace ist {
 namespace {
 
-std::array<float, 3> middle(const FieldMesh& mesh, const FieldMesh::Triangle& t) {
-  std::array<float, 3> sum = {};
-  for (const std::uint32_t v : t)
-    for (std::size_t k = 0; k < 3; ++k) sum[k] += mesh.vertices[v][k];
-  return sum;
+/// A patch as a block.
+SurfaceBlock block_of(const FieldMesh& mesh, const BlockPatch& patch) {
+  SurfaceBlock block = {};
+  block.triangles = static_cast<std::uint32_t>(patch.triangles.size());
+  block.vertices = static_cast<std::uint32_t>(patch.vertices.size());
+  for (std::size_t v = 0; v < kWidth; ++v) {
+    const FieldMesh::Vertex& x = mesh.vertices[patch.vertices[v < patch.vertices.size() ? v : 0]];
+    block.x[v] = x[0];
+    block.y[v] = x[1];
+    block.z[v] = x[2];
+  }
+  for (std::size_t i = 0; i < patch.triangles.size(); ++i)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t vertex = mesh.triangles[patch.triangles[i]][k];
+      block.corner[k][i] = static_cast<std::uint8_t>(
+          std::find(patch.vertices.begin(), patch.vertices.end(), vertex) - patch.vertices.begin());
+    }
+  return block;
 }
 
-/// A block that takes triangles as long as there is room for them and their vertices.
-class OpenBlock {
- public:
-  explicit OpenBlock(const FieldMesh& mesh) : mesh_(&mesh) {}
-
-  /// False: there is no room.
-  bool take(const FieldMesh::Triangle& t) {
-    if (block_.triangles == kWidth) return false;
-    std::uint32_t vertices = block_.vertices;
-    std::array<std::uint8_t, 3> corner = {};
-    for (std::size_t k = 0; k < 3; ++k) {
-      std::uint32_t at = 0;
-      while (at < vertices && vertex_[at] != t[k]) ++at;
-      if (at == kWidth) return false;
-      if (at == vertices) vertex_[vertices++] = t[k];
-      corner[k] = static_cast<std::uint8_t>(at);
-    }
-    for (std::size_t k = 0; k < 3; ++k) block_.corner[k][block_.triangles] = corner[k];
-    ++block_.triangles;
-    block_.vertices = vertices;
-    return true;
-  }
-
-  SurfaceBlock closed() {
-    for (std::uint32_t v = 0; v < kWidth; ++v) {
-      const FieldMesh::Vertex& x = mesh_->vertices[vertex_[v < block_.vertices ? v : 0]];
-      block_.x[v] = x[0];
-      block_.y[v] = x[1];
-      block_.z[v] = x[2];
-    }
-    return block_;
-  }
-
- private:
-  const FieldMesh* mesh_;
-  SurfaceBlock block_ = {};
-  std::array<std::uint32_t, kWidth> vertex_ = {};
-};
-
-/// Sixteen neighbours are a block, or more where they have too many vertices.
 std::vector<SurfaceBlock> blocks_of(const FieldMesh& mesh) {
-  std::vector<std::array<float, 3>> middles(mesh.triangles.size());
-  tbb::parallel_for(std::size_t{0}, middles.size(),
-                    [&](std::size_t i) { middles[i] = middle(mesh, mesh.triangles[i]); });
-  const std::vector<std::uint32_t> order = spatial_order(middles);
-  std::vector<SurfaceBlock> blocks;
-  for (std::size_t begin = 0; begin < order.size(); begin += kWidth) {
-    OpenBlock block(mesh);
-    for (std::size_t i = begin; i < std::min<std::size_t>(begin + kWidth, order.size()); ++i) {
-      const FieldMesh::Triangle& t = mesh.triangles[order[i]];
-      if (block.take(t)) continue;
-      blocks.push_back(block.closed());
-      block = OpenBlock(mesh);
-      block.take(t);
-    }
-    blocks.push_back(block.closed());
-  }
+  const std::vector<BlockPatch> patches = cut_into_patches(mesh);
+  std::vector<SurfaceBlock> blocks(patches.size());
+  tbb::parallel_for(std::size_t{0}, blocks.size(),
+                    [&](std::size_t b) { blocks[b] = block_of(mesh, patches[b]); });
   return blocks;
 }
 

@@ -3,6 +3,7 @@
 #include <bit>
 
 #include "query/asset/sound_values.h"
+#include "query/asset/surface_tree.h"
 
 namespace ist {
 namespace {
@@ -64,15 +65,33 @@ bool sound_bricks(const AssetHeader& header, const FieldHeader& field) noexcept 
   return sound && cells == field.cell_count;
 }
 
+/// The lists of each brick's cells follow each other, and those of the bricks do.
+bool sound_ends(const SurfaceTree& field) noexcept {
+  std::uint32_t end = 0;
+  bool sound = true;
+  for (std::uint32_t i = 0; i < field.header->brick_count; ++i) {
+    const CellBrick& brick = field.bricks[i];
+    sound &= brick.list == end;
+    std::uint32_t in_brick = 0;
+    const auto cells = static_cast<std::uint32_t>(std::popcount(brick.surface));
+    for (std::uint32_t c = brick.first; c < brick.first + cells; ++c) {
+      sound &= in_brick <= field.cell_ends[c];
+      in_brick = field.cell_ends[c];
+    }
+    sound &= in_brick <= field.header->entry_count - end;
+    end += in_brick;
+    if (!sound) return false;
+  }
+  return end == field.header->entry_count;
+}
+
 bool sound_cells(const AssetHeader& header, const FieldHeader& field) noexcept {
-  const std::uint32_t* first = at<std::uint32_t>(header, field.cell_first);
-  bool sound = first[0] == 0 && first[field.cell_count] == field.entry_count;
-  for (std::uint32_t c = 0; c < field.cell_count; ++c) sound &= first[c] <= first[c + 1];
-  const std::uint32_t* triangles = at<std::uint32_t>(header, field.cell_triangles);
-  const SurfaceBlock* blocks = at<SurfaceBlock>(header, field.level[0].blocks);
+  const SurfaceTree tree(header, field);
+  if (!sound_ends(tree)) return false;
+  bool sound = true;
   for (std::uint32_t i = 0; i < field.entry_count && sound; ++i) {
-    const std::uint32_t block = triangles[i] / kWidth;
-    sound = block < field.level[0].count && triangles[i] % kWidth < blocks[block].triangles;
+    const std::uint32_t triangle = tree.cell_triangles[i], block = triangle / kWidth;
+    sound = block < field.level[0].count && triangle % kWidth < tree.blocks[block].triangles;
   }
   return sound;
 }
@@ -82,6 +101,7 @@ bool sound_cells(const AssetHeader& header, const FieldHeader& field) noexcept {
 bool sound_field_counts(const FieldHeader& field) noexcept {
   for (const std::uint32_t along : field.bricks)
     if (along < 1 || along > kMostBricks) return false;
+  if (field.list_bytes != 2 && field.list_bytes != 4) return false;
   return field.level[0].count >= 1 && field.level[0].count <= kMostBlocks;
 }
 

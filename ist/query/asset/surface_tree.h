@@ -1,5 +1,7 @@
 #pragma once
 
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 
 #include <ist/tree_view.h>
@@ -7,6 +9,22 @@
 #include <ist/asset_layout.h>
 
 namespace ist {
+
+/// Numbers of two or four bytes.
+class NarrowArray {
+ public:
+  NarrowArray(const AssetHeader& asset, std::uint64_t offset, std::uint32_t width) noexcept
+      : two_(width == 2 ? at<std::uint16_t>(asset, offset) : nullptr),
+        four_(width == 2 ? nullptr : at<std::uint32_t>(asset, offset)) {}
+
+  std::uint32_t operator[](std::size_t i) const noexcept {
+    return two_ != nullptr ? two_[i] : four_[i];
+  }
+
+ private:
+  const std::uint16_t* two_;
+  const std::uint32_t* four_;
+};
 
 /// The field of an asset with its offsets resolved: the surface as a tree of balls over blocks of
 /// triangles, and the grid that tells inside from outside. All in the unit frame.
@@ -30,8 +48,8 @@ struct SurfaceTree {
         blocks(at<SurfaceBlock>(asset, field.level[0].blocks)),
         brick_index(at<std::uint32_t>(asset, field.brick_index)),
         bricks(at<CellBrick>(asset, field.brick_data)),
-        cell_first(at<std::uint32_t>(asset, field.cell_first)),
-        cell_triangles(at<std::uint32_t>(asset, field.cell_triangles)) {
+        cell_ends(asset, field.cell_ends, field.list_bytes),
+        cell_triangles(asset, field.cell_triangles, field.list_bytes) {
     level[0].count = field.level[0].count;
     for (int i = 1; i <= top; ++i) {
       const LevelHeader& from = field.level[i];
@@ -48,14 +66,26 @@ struct SurfaceTree {
     out[2] = b.z[vertex];
   }
 
+  /// A cell's triangles are cell_triangles[begin … end).
+  struct CellList {
+    std::uint32_t begin, end;
+  };
+
+  /// Of a cell whose bit is among the brick's `surface`.
+  CellList cell_list(const CellBrick& brick, std::uint32_t bit) const noexcept {
+    const std::uint64_t before = brick.surface & ((std::uint64_t{1} << bit) - 1);
+    const std::uint32_t cell = brick.first + static_cast<std::uint32_t>(std::popcount(before));
+    return {brick.list + (before == 0 ? 0 : cell_ends[cell - 1]), brick.list + cell_ends[cell]};
+  }
+
   const FieldHeader* header;
   int top;  ///< the level of one block
   const SurfaceBlock* blocks;
   Level level[kMaxLevels];
-  const std::uint32_t* brick_index;     ///< [bricks[0] · bricks[1] · bricks[2]], x runs fastest
-  const CellBrick* bricks;              ///< [brick_count]
-  const std::uint32_t* cell_first;      ///< [cell_count + 1]
-  const std::uint32_t* cell_triangles;  ///< [entry_count] 16 · block + lane
+  const std::uint32_t* brick_index;  ///< [bricks[0] · bricks[1] · bricks[2]], x runs fastest
+  const CellBrick* bricks;           ///< [brick_count]
+  NarrowArray cell_ends;             ///< [cell_count] from CellBrick::list
+  NarrowArray cell_triangles;        ///< [entry_count] 16 · block + lane
 };
 
 /// The field of a view that has one (TreeView::has_field).

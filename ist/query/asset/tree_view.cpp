@@ -86,11 +86,12 @@ bool sound_field_sections(const AssetHeader& header, AssetHeader& expected,
   field.brick_count = found.brick_count;
   field.cell_count = found.cell_count;
   field.entry_count = found.entry_count;
+  field.list_bytes = found.list_bytes;
   field.level[0].count = found.level[0].count;
   place_sections(expected, details, &field);
   return field.level_count == found.level_count && same_levels(field.level, found.level) &&
          field.brick_index == found.brick_index && field.brick_data == found.brick_data &&
-         field.cell_first == found.cell_first && field.cell_triangles == found.cell_triangles;
+         field.cell_ends == found.cell_ends && field.cell_triangles == found.cell_triangles;
 }
 
 /// Offsets and counts are a function of the counts of spheres and details and those of the field:

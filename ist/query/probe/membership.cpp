@@ -1,7 +1,5 @@
 #include "query/probe/membership.h"
 
-#include <bit>
-
 namespace ist {
 namespace {
 
@@ -61,9 +59,8 @@ bool inside_surface(const SurfaceTree& surface, const double (&point)[3], double
                       field.low[2] + (cell[2] + kCellReference[2]) * field.cell};
   const Vec way = reference - x;
   if (dot(way, way) < clear * clear) return inside;
-  const std::uint64_t below = cells.surface & ((std::uint64_t{1} << bit) - 1);
-  const std::uint32_t number = cells.first + static_cast<std::uint32_t>(std::popcount(below));
-  for (std::uint32_t i = surface.cell_first[number]; i < surface.cell_first[number + 1]; ++i) {
+  const SurfaceTree::CellList list = surface.cell_list(cells, bit);
+  for (std::uint32_t i = list.begin; i < list.end; ++i) {
     const std::uint32_t triangle = surface.cell_triangles[i];
     const SurfaceBlock& block = surface.blocks[triangle / kWidth];
     const auto corner = [&](int k) -> Vec {

@@ -1,0 +1,219 @@
+#include "bake/field/surface_patches.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <tuple>
+#include <utility>
+
+#include <ist/asset_layout.h>
+
+#include "bake/field/spatial_order.h"
+
+namespace ist {
+namespace {
+
+using Point = std::array<float, 3>;
+
+constexpr std::uint32_t kNone = ~0u;
+/// Patches are joined where the result is not larger than this, in radii of the larger.
+constexpr double kJoinedRadius = 1.5;
+
+double distance2(const Point& a, const Point& b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double d = double{a[k]} - double{b[k]};
+    sum += d * d;
+  }
+  return sum;
+}
+
+/// The triangles around each vertex, and how many of them are in no patch yet.
+struct Stars {
+  std::vector<std::uint32_t> first, triangle, left;
+
+  explicit Stars(const FieldMesh& mesh)
+      : first(mesh.vertices.size() + 1), triangle(3 * mesh.triangles.size()) {
+    for (const FieldMesh::Triangle& t : mesh.triangles)
+      for (const std::uint32_t v : t) ++first[v + 1];
+    left.assign(first.begin() + 1, first.end());
+    for (std::size_t v = 1; v < first.size(); ++v) first[v] += first[v - 1];
+    std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
+      for (const std::uint32_t v : mesh.triangles[t]) triangle[next[v]++] = t;
+  }
+
+  std::span<const std::uint32_t> around(std::uint32_t v) const {
+    return {triangle.data() + first[v], triangle.data() + first[v + 1]};
+  }
+};
+
+/// Grows patches one after the other.
+class Growth {
+ public:
+  explicit Growth(const FieldMesh& mesh)
+      : mesh_(mesh), stars_(mesh), taken_(mesh.triangles.size()), middle_(mesh.triangles.size()) {
+    for (std::size_t t = 0; t < middle_.size(); ++t)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const FieldMesh::Triangle& corners = mesh.triangles[t];
+        middle_[t][k] = (mesh.vertices[corners[0]][k] + mesh.vertices[corners[1]][k] +
+                         mesh.vertices[corners[2]][k]) /
+                        3;
+      }
+  }
+
+  std::vector<BlockPatch> all() {
+    std::vector<BlockPatch> patches;
+    std::uint32_t seed = kNone;
+    for (const std::uint32_t next : spatial_order(middle_)) {
+      // From beside the last patch as long as there is something.
+      while (seed != kNone || taken_[next] == 0) {
+        patches.push_back(grown(seed != kNone ? seed : next));
+        seed = beside(patches.back());
+      }
+    }
+    return patches;
+  }
+
+ private:
+  BlockPatch grown(std::uint32_t seed) {
+    BlockPatch patch;
+    for (std::uint32_t t = seed; t != kNone; t = best_neighbour(patch)) take(t, patch);
+    return patch;
+  }
+
+  void take(std::uint32_t t, BlockPatch& patch) {
+    taken_[t] = 1;
+    patch.triangles.push_back(t);
+    for (const std::uint32_t v : mesh_.triangles[t]) {
+      --stars_.left[v];
+      if (!has(patch, v)) patch.vertices.push_back(v);
+    }
+  }
+
+  static bool has(const BlockPatch& patch, std::uint32_t vertex) {
+    return std::find(patch.vertices.begin(), patch.vertices.end(), vertex) != patch.vertices.end();
+  }
+
+  /// Of the triangles that touch the patch and fit, the one that adds fewest vertices, those that
+  /// would be left alone counted less; then the one nearest to the patch's middle.
+  std::uint32_t best_neighbour(const BlockPatch& patch) const {
+    if (patch.triangles.size() == kWidth) return kNone;
+    Point middle = {};
+    for (const std::uint32_t t : patch.triangles)
+      for (std::size_t k = 0; k < 3; ++k)
+        middle[k] += middle_[t][k] / static_cast<float>(patch.triangles.size());
+    using Score = std::tuple<int, double, std::uint32_t>;
+    Score best{4, 0, kNone};
+    for (const std::uint32_t v : patch.vertices) {
+      if (stars_.left[v] == 0) continue;
+      for (const std::uint32_t t : stars_.around(v)) {
+        if (taken_[t] != 0) continue;
+        int added = 0, last = 0;
+        for (const std::uint32_t corner : mesh_.triangles[t]) {
+          added += has(patch, corner) ? 0 : 1;
+          last |= stars_.left[corner] == 1 ? 1 : 0;
+        }
+        if (patch.vertices.size() + static_cast<std::size_t>(added) > kWidth) continue;
+        best = std::min(best, Score{std::max(0, added - last), distance2(middle_[t], middle), t});
+      }
+    }
+    return std::get<2>(best);
+  }
+
+  /// A triangle that touches the patch: of those with the fewest others left around them the
+  /// nearest to where it started.
+  std::uint32_t beside(const BlockPatch& patch) const {
+    using Score = std::tuple<std::uint32_t, double, std::uint32_t>;
+    Score best{kNone, 0, kNone};
+    for (const std::uint32_t v : patch.vertices)
+      for (const std::uint32_t t : stars_.around(v)) {
+        if (taken_[t] != 0) continue;
+        std::uint32_t left = 0;
+        for (const std::uint32_t corner : mesh_.triangles[t]) left += stars_.left[corner];
+        best =
+            std::min(best, Score{left, distance2(middle_[t], middle_[patch.triangles.front()]), t});
+      }
+    return std::get<2>(best);
+  }
+
+  const FieldMesh& mesh_;
+  Stars stars_;
+  std::vector<std::uint8_t> taken_;
+  std::vector<Point> middle_;
+};
+
+/// A ball around a patch: the middle of its box and the farthest vertex.
+struct Extent {
+  Point middle;
+  double radius;
+};
+
+Extent extent_of(const FieldMesh& mesh, const std::vector<std::uint32_t>& vertices) {
+  Point low = mesh.vertices[vertices[0]], high = low;
+  for (const std::uint32_t v : vertices)
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], mesh.vertices[v][k]);
+      high[k] = std::max(high[k], mesh.vertices[v][k]);
+    }
+  Extent out{{}, 0};
+  for (std::size_t k = 0; k < 3; ++k) out.middle[k] = (low[k] + high[k]) / 2;
+  for (const std::uint32_t v : vertices)
+    out.radius = std::max(out.radius, distance2(mesh.vertices[v], out.middle));
+  out.radius = std::sqrt(out.radius);
+  return out;
+}
+
+std::vector<std::uint32_t> united(const BlockPatch& a, const BlockPatch& b) {
+  std::vector<std::uint32_t> all = a.vertices;
+  for (const std::uint32_t v : b.vertices)
+    if (std::find(a.vertices.begin(), a.vertices.end(), v) == a.vertices.end()) all.push_back(v);
+  return all;
+}
+
+/// Joins patches that are not full to others near them in space.
+std::vector<BlockPatch> joined(const FieldMesh& mesh, std::vector<BlockPatch> patches) {
+  std::vector<Point> middles(patches.size());
+  std::vector<double> radii(patches.size());
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    const Extent extent = extent_of(mesh, patches[p].vertices);
+    middles[p] = extent.middle;
+    radii[p] = extent.radius;
+  }
+  constexpr std::size_t kWindow = 24;  // patches behind in the order that are tried
+  const std::vector<std::uint32_t> order = spatial_order(middles);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    BlockPatch& patch = patches[order[i]];
+    double best = HUGE_VAL;
+    std::uint32_t into = kNone;
+    for (std::size_t j = i + 1; j < std::min(order.size(), i + kWindow); ++j) {
+      const BlockPatch& other = patches[order[j]];
+      if (patch.triangles.size() + other.triangles.size() > kWidth) continue;
+      const std::vector<std::uint32_t> vertices = united(patch, other);
+      if (vertices.size() > kWidth) continue;
+      const double radius = extent_of(mesh, vertices).radius;
+      if (radius < best && radius <= kJoinedRadius * std::max(radii[order[i]], radii[order[j]])) {
+        best = radius;
+        into = order[j];
+      }
+    }
+    if (into == kNone) continue;
+    patches[into].vertices = united(patches[into], patch);
+    patches[into].triangles.insert(patches[into].triangles.end(), patch.triangles.begin(),
+                                   patch.triangles.end());
+    radii[into] = best;
+    patch = {};
+  }
+  std::erase_if(patches, [](const BlockPatch& p) { return p.triangles.empty(); });
+  return patches;
+}
+
+}  // namespace
+
+std::vector<BlockPatch> cut_into_patches(const FieldMesh& mesh) {
+  return joined(mesh, Growth(mesh).all());
+}
+
+}  // namespace ist

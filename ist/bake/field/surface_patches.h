@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "bake/field/field_mesh.h"
+
+namespace ist {
+
+/// Triangles that go into one block: at most kWidth, of at most kWidth vertices.
+struct BlockPatch {
+  std::vector<std::uint32_t> triangles;
+  std::vector<std::uint32_t> vertices;  ///< theirs, each once
+};
+
+/// Cuts a surface into patches that are full and compact: each grows from a triangle by neighbours
+/// that add few vertices and lie near its middle; what is left in small pieces goes together where
+/// it is near. Every triangle is in one patch. Deterministic.
+std::vector<BlockPatch> cut_into_patches(const FieldMesh& mesh);
+
+}  // namespace ist
