@@ -13,7 +13,7 @@ struct MeshShape {
   explicit MeshShape(const MeshField& f) noexcept : surface(surface_tree(f.tree)) {}
   FieldSample nearest(const Eigen::Vector3d& x) const noexcept {
     const double at[3] = {x.x(), x.y(), x.z()};
-    const NearestSurface found = nearest_surface(surface, at, 1e300);
+    const NearestSurface found = nearest_surface(surface, at, 1e150);
     const Eigen::Vector3d point(found.point[0], found.point[1], found.point[2]);
     const Eigen::Vector3d way = found.distance > 0 ? Eigen::Vector3d((point - x) / found.distance)
                                                    : Eigen::Vector3d::Zero().eval();

@@ -128,11 +128,18 @@ ProbeTotal BoxShape::block(const ProbeBalls& balls, std::uint32_t used, const do
   const std::uint32_t near = triangles_near(patch_, balls.origin, balls.reach);
   if (near != 0) add_patch(patch_, near, balls, used, sums);
   pairs += sums.pairs;
+  ProbeBalls seen = balls;
+  if (sums.on_edge != 0) {
+    seen = away_from_edges(balls, sums.on_edge);
+    ProbeSums there;
+    add_patch(patch_, (1u << 12) - 1, seen, sums.on_edge, there);
+    put_right(there, balls, sums);
+  }
   std::uint32_t inside = 0;
   for (std::uint32_t i = 0; i < kWidth; ++i) {
-    const bool in = std::abs(balls.origin[0] + balls.x[i]) < half.x() &&
-                    std::abs(balls.origin[1] + balls.y[i]) < half.y() &&
-                    std::abs(balls.origin[2] + balls.z[i]) < half.z();
+    const bool in = std::abs(seen.origin[0] + seen.x[i]) < half.x() &&
+                    std::abs(seen.origin[1] + seen.y[i]) < half.y() &&
+                    std::abs(seen.origin[2] + seen.z[i]) < half.z();
     inside |= in ? 1u << i : 0u;
   }
   return total_of(balls, sums, settled_sides(sums, inside) & used, origin);
@@ -213,9 +220,8 @@ FieldSample HeightShape::nearest(const Eigen::Vector3d& x) const noexcept {
   return gap > 0 ? FieldSample{-distance, -up} : FieldSample{distance, up};
 }
 
-ProbeTotal HeightShape::block(const ProbeBalls& balls, std::uint32_t used,
-                              const double (&origin)[3], std::uint32_t& pairs) noexcept {
-  ProbeSums sums;
+void HeightShape::add_cells(const ProbeBalls& balls, std::uint32_t used,
+                            ProbeSums& sums) const noexcept {
   PatchFiller filler(balls, used, sums);
   std::int64_t from[2], to[2];
   for (int k = 0; k < 2; ++k) {
@@ -251,13 +257,26 @@ ProbeTotal HeightShape::block(const ProbeBalls& balls, std::uint32_t used,
     }
   }
   filler.flush();
+}
+
+ProbeTotal HeightShape::block(const ProbeBalls& balls, std::uint32_t used,
+                              const double (&origin)[3], std::uint32_t& pairs) noexcept {
+  ProbeSums sums;
+  add_cells(balls, used, sums);
   pairs += sums.pairs;
+  ProbeBalls seen = balls;
+  if (sums.on_edge != 0) {
+    seen = away_from_edges(balls, sums.on_edge);
+    ProbeSums there;
+    add_cells(seen, sums.on_edge, there);
+    put_right(there, balls, sums);
+  }
   std::uint32_t inside = 0;
   for (std::uint32_t i = 0; i < kWidth; ++i)
-    inside |= balls.origin[2] + balls.z[i] <
-                      surface(balls.origin[0] + balls.x[i], balls.origin[1] + balls.y[i])
-                  ? 1u << i
-                  : 0u;
+    inside |=
+        seen.origin[2] + seen.z[i] < surface(seen.origin[0] + seen.x[i], seen.origin[1] + seen.y[i])
+            ? 1u << i
+            : 0u;
   return total_of(balls, sums, settled_sides(sums, inside) & used & kAllBalls, origin);
 }
 

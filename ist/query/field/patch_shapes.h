@@ -47,6 +47,9 @@ class HeightShape {
   /// Height of the surface over a point.
   double surface(double x, double y) const noexcept;
 
+  /// Adds the triangles that come near a block of balls.
+  void add_cells(const ProbeBalls& balls, std::uint32_t used, ProbeSums& sums) const noexcept;
+
   const HeightField& field_;
 };
 

@@ -95,7 +95,7 @@ struct CapsuleShape {
 struct CylinderShape {
   explicit CylinderShape(const CylinderField& f) noexcept
       : radius(f.radius), half(f.half_height), sound(is_length(radius) && is_length(half)) {}
-  FieldSample look(const Eigen::Vector3d& x) const noexcept {
+  FieldSample nearest(const Eigen::Vector3d& x) const noexcept {
     const double d = std::sqrt(x.x() * x.x() + x.y() * x.y());
     const Eigen::Vector3d mantle =
         d > 0 ? Eigen::Vector3d(x.x() / d, x.y() / d, 0) : Eigen::Vector3d::UnitX().eval();
@@ -106,7 +106,14 @@ struct CylinderShape {
       return {-away, -(std::max(side, 0.0) * mantle + std::max(above, 0.0) * end) / away};
     return side > above ? FieldSample{-side, -mantle} : FieldSample{-above, -end};
   }
-  FieldSample nearest(const Eigen::Vector3d& x) const noexcept { return look(x); }
+  /// Past the rim the farther of mantle and end: a ball that reaches both has a part of each,
+  /// though it may miss the rim.
+  FieldSample look(const Eigen::Vector3d& x) const noexcept {
+    const double side = std::sqrt(x.x() * x.x() + x.y() * x.y()) - radius;
+    FieldSample at;
+    at.distance = -std::max(side, std::abs(x.z()) - half);
+    return at;
+  }
   BallPart part(const Eigen::Vector3d& x, double r) const noexcept {
     const double whole = 4 * std::numbers::pi / 3 * (r * r * r);
     const double d = std::sqrt(x.x() * x.x() + x.y() * x.y());
@@ -132,14 +139,22 @@ struct CylinderShape {
 };
 
 /// Linear interpolation in the grid's cells; outside, the nearest point of the grid and the way to
-/// it.
+/// it. What is no number there makes the query's input invalid, once it is looked at.
 struct GridShape {
   explicit GridShape(const DistanceGridField& f) noexcept : grid(f) {
     sound = f.distances != nullptr && is_length(f.spacing) && f.error >= 0 && f.error <= 1e150 &&
             f.origin.allFinite();
     for (const std::uint32_t n : f.size) sound = sound && n >= 2 && n <= 1u << 20;
   }
-  FieldSample look(const Eigen::Vector3d& x) const noexcept {
+  FieldSample look(const Eigen::Vector3d& x) noexcept {
+    FieldSample at = interpolated(x);
+    if (!(std::abs(at.distance) <= 1e150) || !(at.gradient.squaredNorm() <= 1e300)) {
+      sound = false;
+      at = FieldSample{-1e150, Eigen::Vector3d::Zero()};
+    }
+    return at;
+  }
+  FieldSample interpolated(const Eigen::Vector3d& x) const noexcept {
     double t[3];
     std::size_t cell[3];
     Eigen::Vector3d beyond = Eigen::Vector3d::Zero();
@@ -179,8 +194,8 @@ struct GridShape {
     at.gradient /= grid.spacing;
     return at;
   }
-  FieldSample nearest(const Eigen::Vector3d& x) const noexcept { return look(x); }
-  BallPart part(const Eigen::Vector3d& x, double r) const noexcept { return flat_part(look(x), r); }
+  FieldSample nearest(const Eigen::Vector3d& x) noexcept { return look(x); }
+  BallPart part(const Eigen::Vector3d& x, double r) noexcept { return flat_part(look(x), r); }
   double error() const noexcept { return grid.error; }
 
   const DistanceGridField& grid;

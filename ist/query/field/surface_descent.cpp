@@ -344,10 +344,25 @@ ProbeTotal SurfaceDescent::sum_block(std::uint32_t block, std::size_t from,
     const bool all = inside_surface(surface_, balls.origin, clear_radius(0, block));
     return total_of(balls, sums, all ? used : 0, map_.t);
   }
+  ProbeBalls seen = balls;
+  if (sums.on_edge != 0) {
+    const ProbeBalls moved = away_from_edges(balls, sums.on_edge);
+    ProbeSums there;
+    for (std::size_t i = from; i < to; ++i) {
+      const SurfacePatch& patch = scratch_.patches->find(surface_, scratch_.now.a[i]);
+      near[i] = static_cast<std::uint16_t>(triangles_near(patch, moved.origin, moved.reach));
+      if (near[i] != 0) add_patch(patch, near[i], moved, sums.on_edge, there);
+    }
+    put_right(there, balls, sums);
+    for (std::uint32_t left = sums.on_edge; left != 0; left &= left - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(left));
+      seen.x[i] = moved.x[i], seen.y[i] = moved.y[i], seen.z[i] = moved.z[i];
+    }
+  }
   std::uint32_t inside;
   const std::uint32_t told = told_sides(sums, inside);
   if (const std::uint32_t untold = used & ~told; untold != 0)
-    inside |= untold & sides(balls, untold, sums.met, told, inside, count, from, to);
+    inside |= untold & sides(seen, untold, sums.met, told, inside, count, from, to);
   return total_of(balls, sums, inside, map_.t);
 }
 

@@ -1,5 +1,8 @@
 #include "query/probe/membership.h"
 
+
+#include "query/probe/passes_left.h"
+
 namespace ist {
 namespace {
 
@@ -12,23 +15,14 @@ double dot(const Vec& a, const Vec& b) { return (a.x * b.x + a.y * b.y) + a.z * 
 Vec cross(const Vec& a, const Vec& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-bool before(const Vec& a, const Vec& b) {
-  if (a.x != b.x) return a.x < b.x;
-  return a.y != b.y ? a.y < b.y : a.z < b.z;
-}
-
-/// On which side of the line along `d` through the origin the edge from a to b passes. Two
-/// triangles that share an edge see it from opposite sides whatever the rounding: the products
-/// change sign exactly, and of the edge that meets the line the corners decide.
-bool passes_left(const Vec& d, const Vec& a, const Vec& b) {
-  const double side = dot(d, cross(a, b));
-  return side != 0 ? side > 0 : before(a, b);
-}
-
 /// Whether the way from the origin to `d` goes through a triangle.
 bool steps_through(const Vec& d, const Vec& a, const Vec& b, const Vec& c) {
-  const bool left = passes_left(d, a, b);
-  if (passes_left(d, b, c) != left || passes_left(d, c, a) != left) return false;
+  const double to[3] = {d.x, d.y, d.z};
+  const double corner[3][3] = {{a.x, a.y, a.z}, {b.x, b.y, b.z}, {c.x, c.y, c.z}};
+  const bool left = passes_left(to, corner[0], corner[1]);
+  if (passes_left(to, corner[1], corner[2]) != left ||
+      passes_left(to, corner[2], corner[0]) != left)
+    return false;
   const Vec n = cross(b - a, c - a);
   return (dot(n, a) > 0) != (dot(n, a - d) > 0);
 }

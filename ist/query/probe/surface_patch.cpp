@@ -10,9 +10,14 @@
 
 #include "query/kernel/lanes-inl.h"
 #include "query/probe/angle-inl.h"
+#include "query/probe/passes_left.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
+
+// Part of a ball's radius, squared, within which an edge is too near its centre: the angle under
+// which the edge is seen is as wrong as the rounding of positions over the way to it.
+inline constexpr double kOnEdge2 = 0x1p-28;
 
 using DiscTag = hn::CappedTag<double, 8>;
 using Disc = hn::Vec<DiscTag>;
@@ -218,6 +223,8 @@ HWY_INLINE void sort_disc(const SurfacePatch& patch, std::size_t t, std::size_t 
   const double t1 = px * ex1 - y * ey1, t2 = -(x * ex2 + y * ey2);
   const double begin[3] = {-x, t1, t2 - patch.length[2][t]};
   const double end[3] = {px, t1 + patch.length[1][t], t2};
+  if (std::min(std::min(m[0] * m[0], m[1] * m[1]), m[2] * m[2]) + h * h < kOnEdge2 * (r * r))
+    sums.on_edge |= 1u << b;
   unsigned cut = 0, outside = 0;
   bool corner = false, away = false;
   for (unsigned k = 0; k < 3; ++k) {
@@ -319,16 +326,31 @@ std::uint32_t odd_ways_of(const SurfacePatch& patch, std::uint32_t triangles,
     const std::uint32_t across = (h0 > 0 ? ~above : above) & wanted;
     if (across == 0) continue;
     // Planes through the start and an edge: those of two triangles that share it are opposite,
-    // digit for digit. Of a way in the plane the corners decide.
+    // digit for digit. A way in the plane is taken for one that ends a little further along x,
+    // less along y, least along z; that is one way for all triangles, even around a corner.
     std::uint32_t all = 0xffff, none = 0xffff;
     for (int c = 0; c < 3; ++c) {
       const double* const a = p[c];
       const double* const b = p[(c + 1) % 3];
-      V plane[3];
+      double normal[3];
       for (int k = 0; k < 3; ++k)
-        plane[k] = hn::Set(d, a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
-      const bool tie = a[0] != b[0] ? a[0] < b[0] : a[1] != b[1] ? a[1] < b[1] : a[2] < b[2];
+        normal[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
       std::uint32_t left = 0;
+      if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) {
+        // The start is in line with the edge: it is moved likewise, by still less.
+        for (std::size_t i = 0; i < kWidth; ++i) {
+          const double to[3] = {balls.x[i] + way[0], balls.y[i] + way[1], balls.z[i] + way[2]};
+          left |= passes_left_in_line(to, a, b) ? 1u << i : 0u;
+        }
+        all &= left;
+        none &= ~left;
+        if (((all | none) & across) == 0) break;
+        continue;
+      }
+      const bool tie = normal[0] != 0   ? normal[0] > 0
+                       : normal[1] != 0 ? normal[1] > 0
+                                        : normal[2] > 0;
+      const V plane[3] = {hn::Set(d, normal[0]), hn::Set(d, normal[1]), hn::Set(d, normal[2])};
       for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
         const V x = hn::Load(d, balls.x + lane) + hn::Set(d, way[0]);
         const V y = hn::Load(d, balls.y + lane) + hn::Set(d, way[1]);
@@ -553,6 +575,12 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace ist {
+namespace {
+
+// 2^-12 in a direction in which no edge of a made thing lies.
+constexpr double kAway[3] = {0x1p-12 * 0.43877, 0x1p-12 * 0.61803, 0x1p-12 * 0.65236};
+
+}  // namespace
 
 HWY_EXPORT(add_patch_to);
 HWY_EXPORT(make_patch_of);
@@ -561,6 +589,34 @@ HWY_EXPORT(odd_ways_of);
 HWY_EXPORT(balls_near_of);
 HWY_EXPORT(balls_within_of);
 HWY_EXPORT(place_probes_of);
+
+ProbeBalls away_from_edges(const ProbeBalls& balls, std::uint32_t chosen) noexcept {
+  ProbeBalls moved = balls;
+  double most = 0;
+  for (std::size_t i = 0; i < kWidth; ++i) {
+    if ((chosen >> i & 1) == 0) {
+      moved.r[i] = 0;
+      continue;
+    }
+    moved.x[i] += kAway[0] * balls.r[i];
+    moved.y[i] += kAway[1] * balls.r[i];
+    moved.z[i] += kAway[2] * balls.r[i];
+    most = std::max(most, balls.r[i]);
+  }
+  moved.reach += 0x1p-11 * most;
+  return moved;
+}
+
+void put_right(const ProbeSums& moved, const ProbeBalls& balls, ProbeSums& sums) noexcept {
+  for (std::size_t i = 0; i < kWidth; ++i) {
+    if ((sums.on_edge >> i & 1) == 0) continue;
+    double change = 0;  // of the volume, on the way back
+    for (std::size_t k = 0; k < 3; ++k)
+      change += 0.5 * (sums.pull[k][i] + moved.pull[k][i]) * (kAway[k] * balls.r[i]);
+    sums.cones[i] = moved.cones[i] + change;
+    sums.angle[i] = moved.angle[i];
+  }
+}
 
 std::uint32_t balls_within(const ProbeBalls& balls, const double (&point)[3],
                            double distance) noexcept {
