@@ -7,8 +7,8 @@ bool vdb_available() noexcept { return false; }
 
 LevelSetMesh load_vdb(const std::string& path, const ProgressCallback&) {
   throw Error(path +
-              ": this library was built without OpenVDB. Install libopenvdb-dev (dev setup "
-              "--vdb) and build it again, or export a mesh");
+              ": this library was built without OpenVDB. Install libopenvdb-dev "
+              "and build it again, or export a mesh");
 }
 
 }  // namespace ist
