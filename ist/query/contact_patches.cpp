@@ -56,14 +56,13 @@ class PairPatches {
       descent.run();
       lenses = descent.penetration();
       const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
-      weight = exact_weight(method_, lenses.volume / unit3);
+      weight = exact_weight(method_, lenses, unit3);
       result.penetration =
-          weight.weight == 0
-              ? lenses
-              : blended(lenses, both_.exact(method_.b_probes, limits_), weight, unit3);
+          weight.most == 0 ? lenses
+                           : blended(lenses, both_.exact(method_.b_probes, limits_), weight, unit3);
       // The patches are those of the larger part.
       if (weight.weight < 0.5) {
-        if (weight.weight > 0) {  // the surface's descent has used the scratch
+        if (weight.most > 0) {  // the surface's descent has used the scratch
           scratch_.contact.start(of_b ? tree_b_ : tree_a_, of_b);
           Descent again(tree_a_, tree_b_, pose_, limits_, scratch_, &scratch_.contact);
           again.run();

@@ -507,9 +507,9 @@ TEST(FieldPairs, LimitsKeepTrueBounds) {
   Workspace large, tiny(64);
   for (const Pair& pair : pairs()) {
     for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
-      for (int i = 0; i < 8; ++i) {
+      for (int i = 0; i < 60; ++i) {
         const PlacedTree a{pair.a.view(), random_pose(random, 0), 1};
-        const PlacedTree b{pair.b.view(), random_pose(random, (0.5 + 0.1 * i) * pair.distance),
+        const PlacedTree b{pair.b.view(), random_pose(random, (0.5 + 0.0133 * i) * pair.distance),
                            pair.scale_b};
         PenetrationSettings plain;
         plain.field = use;
@@ -518,6 +518,15 @@ TEST(FieldPairs, LimitsKeepTrueBounds) {
           settings.field = use;
           expect_bounds(pair.name, limit, penetration(a, b, settings, large), full,
                         settings.relative_error);
+        }
+        // As many visits as the lenses take, or about: none is left for the exact sum.
+        PenetrationSettings lenses = plain;
+        lenses.field = FieldUse::never;
+        const std::uint32_t visits = penetration(a, b, lenses, large).node_visits;
+        for (const std::uint32_t more : {0u, 1u, 2u, 3u, 5u}) {
+          PenetrationSettings settings = plain;
+          settings.max_visits = std::max(1u, visits + more - 1);
+          expect_bounds(pair.name, "lenses' visits", penetration(a, b, settings, large), full, 0);
         }
         expect_bounds(pair.name, "tiny", penetration(a, b, plain, tiny), full, 0);
       }

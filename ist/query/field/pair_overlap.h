@@ -42,6 +42,9 @@ class PairOverlap {
   Penetration by(const PairMethod& method, const DescentLimits& limits) noexcept;
 
  private:
+  /// What the lenses say, where no visits are left for the exact sum.
+  Penetration without_exact(const PairMethod& method, Penetration lenses) const noexcept;
+
   const PlacedTree& a_;
   const PlacedTree& b_;
   const TreeHeader& tree_a_;
@@ -50,11 +53,14 @@ class PairOverlap {
   Workspace::Impl& scratch_;
 };
 
-/// Weight of the exact sum where lenses say `volume`, A's unit frame, and its slope by that.
+/// Weight of the exact sum by what lenses say, A's unit frame, and its slope by that. The finished
+/// sum's weight lies from `least` to `most`.
 struct ExactWeight {
   double weight = 1, slope = 0;
+  double least = 1, most = 1;
 };
-ExactWeight exact_weight(const PairMethod& method, double volume) noexcept;
+ExactWeight exact_weight(const PairMethod& method, const Penetration& lenses,
+                         double unit3) noexcept;
 
 /// Both sums by weight, counts and status being the exact one's. `unit3`: volume of A's unit.
 Penetration blended(const Penetration& lenses, Penetration exact, const ExactWeight& weight,
