@@ -164,7 +164,11 @@ std::map<std::string, Both> measure(const std::vector<Row>& rows, Assets& assets
       m.nothing += got.volume > 0 ? 0 : 1;
       if (row.kind == "contain") continue;  // feels no force
       m.angle.push_back(degrees_between(got.translation_gradient, row.force));
-      m.torque.push_back(100 * (got.rotation_gradient - row.torque).norm() / row.torque.norm());
+      // A ball has no torque about its own centre: a tenth of what the force has at B's rim is the
+      // least that an error is measured by. The meshes' diameter is 1.
+      const double least = 0.1 * row.force.norm() * 0.5 * row.scale_b;
+      m.torque.push_back(100 * (got.rotation_gradient - row.torque).norm() /
+                         std::max(row.torque.norm(), least));
     }
   }
   return by_class;

@@ -144,6 +144,23 @@ Penetration PairOverlap::exact(bool b_probes, const DescentLimits& limits,
   return turned_over(descent.penetration(), a_, b_);
 }
 
+std::optional<DescentLimits> PairOverlap::left_by(const Penetration& lenses,
+                                                  DescentLimits limits) noexcept {
+  if (limits.max_visits == 0) return limits;
+  if (lenses.node_visits >= limits.max_visits) return std::nullopt;
+  limits.max_visits -= lenses.node_visits;
+  return limits;
+}
+
+Penetration PairOverlap::with_exact(const PairMethod& method, const Penetration& lenses,
+                                    const ExactWeight& weight, const DescentLimits& left) noexcept {
+  Penetration sum = exact(method.b_probes, left);
+  sum.node_visits += lenses.node_visits;
+  sum.sphere_pairs += lenses.sphere_pairs;
+  sum.status = std::max(sum.status, lenses.status);
+  return blended(lenses, sum, weight, pose_.unit_a * pose_.unit_a * pose_.unit_a);
+}
+
 Penetration PairOverlap::without_exact(const PairMethod& method,
                                        Penetration lenses) const noexcept {
   // Of the exact sum nothing is known but that it is no more than all that probes.
@@ -164,20 +181,13 @@ Penetration PairOverlap::by(const PairMethod& method, const DescentLimits& limit
   const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
   const ExactWeight weight = exact_weight(method, lenses, unit3);
   if (weight.most == 0) return lenses;
-  DescentLimits left = limits;
+  std::optional<DescentLimits> left = left_by(lenses, limits);
+  if (!left) return without_exact(method, lenses);
   if (limits.deadline_us > 0) {
     const std::chrono::duration<double, std::micro> gone = Clock::now() - start;
-    left.deadline_us = std::max(kNoTime, limits.deadline_us - gone.count());
+    left->deadline_us = std::max(kNoTime, limits.deadline_us - gone.count());
   }
-  if (limits.max_visits > 0) {
-    if (lenses.node_visits >= limits.max_visits) return without_exact(method, lenses);
-    left.max_visits = limits.max_visits - lenses.node_visits;
-  }
-  Penetration sum = exact(method.b_probes, left);
-  sum.node_visits += lenses.node_visits;
-  sum.sphere_pairs += lenses.sphere_pairs;
-  sum.status = std::max(sum.status, lenses.status);
-  return blended(lenses, sum, weight, unit3);
+  return with_exact(method, lenses, weight, *left);
 }
 
 }  // namespace ist
