@@ -83,6 +83,29 @@ def volume_error(report, path):
     save(figure, path)
 
 
+def small_large(report, path):
+    """Error of the volume over the ratio of sizes: a panel a pair, a colour a depth."""
+    rows = [row for row in report["tables"]["Small against large"]
+            if row["pair"].startswith("small_")]
+    pairs = list(dict.fromkeys(row["pair"] for row in rows))
+    figure, axes = plt.subplots(1, len(pairs), figsize=(4.5 * len(pairs), 4), squeeze=False,
+                                sharey=True)
+    for axis, pair in zip(axes[0], pairs):
+        for depth in sorted({row["depth"] for row in rows}):
+            mine = sorted((row for row in rows if (row["pair"], row["depth"]) == (pair, depth)),
+                          key=lambda row: row["ratio"])
+            ratios = [row["ratio"] for row in mine]
+            line, = axis.loglog(ratios, [row["fields volume median %"] for row in mine], "o-",
+                                label=f"depth {depth:g}, fields")
+            axis.loglog(ratios, [row["lenses volume median %"] for row in mine], "s--",
+                        color=line.get_color(), label=f"depth {depth:g}, lenses")
+        axis.set(title=pair, xlabel="size of B over A's")
+        axis.grid(True, which="major", alpha=0.3)
+    axes[0, 0].set_ylabel("error of the volume, median, %")
+    axes[0, -1].legend(fontsize=7, loc="center left", bbox_to_anchor=(1, 0.5))
+    save(figure, path)
+
+
 def grids(report, path):
     """The paper's Figure 9: a column a mesh, a curve a grid; coverage above, spheres below."""
     rows = report["tables"]["Rounds"]

@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <optional>
 
 #include <ist/query.h>
 
@@ -47,6 +48,7 @@ class PairPatches {
     ContactPatches result;
     ExactWeight weight;
     Penetration lenses;
+    std::optional<DescentLimits> left = limits_;  // for the exact sum
     if (method_.lenses) {
       const double radius_a = tree_a_.header->root[3];
       const double radius_b = tree_b_.header->root[3] * pose_.a_from_b.scale;
@@ -56,13 +58,18 @@ class PairPatches {
       descent.run();
       lenses = descent.penetration();
       const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
-      weight = exact_weight(method_, lenses.volume / unit3);
+      weight = exact_weight(method_, lenses, unit3);
+      left = PairOverlap::left_by(lenses, limits_);
+      result.penetration = weight.most == 0 ? lenses
+                           : left           ? both_.with_exact(method_, lenses, weight, *left)
+                                            : both_.without_exact(method_, lenses);
       // The patches are those of the larger part.
-      if (weight.weight < 0.5) {
-        result.penetration =
-            weight.weight == 0
-                ? lenses
-                : blended(lenses, both_.exact(method_.b_probes, limits_), weight, unit3);
+      if (weight.weight < 0.5 || !left) {
+        if (weight.most > 0 && left) {  // the surface's descent has used the scratch
+          scratch_.contact.start(of_b ? tree_b_ : tree_a_, of_b);
+          Descent again(tree_a_, tree_b_, pose_, limits_, scratch_, &scratch_.contact);
+          again.run();
+        }
         result.count =
             write_patches({scratch_.contact, scratch_.contact.collect(descent.precision()), pose_,
                            of_b ? radius_b : radius_a},
@@ -72,10 +79,8 @@ class PairPatches {
     }
     const bool b_probes = method_.b_probes;
     scratch_.contact.start(b_probes ? tree_b_ : tree_a_, true);
-    const Penetration sum = both_.exact(b_probes, limits_, &scratch_.contact);
-    result.penetration =
-        method_.lenses ? blended(lenses, sum, weight, pose_.unit_a * pose_.unit_a * pose_.unit_a)
-                       : sum;
+    const Penetration sum = both_.exact(b_probes, *left, &scratch_.contact);
+    if (!method_.lenses) result.penetration = sum;
     const std::uint32_t filled = scratch_.contact.collect(Precision::float64);
     if (b_probes) {
       result.count = write_patches(

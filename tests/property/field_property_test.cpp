@@ -507,9 +507,9 @@ TEST(FieldPairs, LimitsKeepTrueBounds) {
   Workspace large, tiny(64);
   for (const Pair& pair : pairs()) {
     for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
-      for (int i = 0; i < 8; ++i) {
+      for (int i = 0; i < 60; ++i) {
         const PlacedTree a{pair.a.view(), random_pose(random, 0), 1};
-        const PlacedTree b{pair.b.view(), random_pose(random, (0.5 + 0.1 * i) * pair.distance),
+        const PlacedTree b{pair.b.view(), random_pose(random, (0.5 + 0.0133 * i) * pair.distance),
                            pair.scale_b};
         PenetrationSettings plain;
         plain.field = use;
@@ -518,6 +518,15 @@ TEST(FieldPairs, LimitsKeepTrueBounds) {
           settings.field = use;
           expect_bounds(pair.name, limit, penetration(a, b, settings, large), full,
                         settings.relative_error);
+        }
+        // As many visits as the lenses take, or about: none is left for the exact sum.
+        PenetrationSettings lenses = plain;
+        lenses.field = FieldUse::never;
+        const std::uint32_t visits = penetration(a, b, lenses, large).node_visits;
+        for (const std::uint32_t more : {0u, 1u, 2u, 3u, 5u}) {
+          PenetrationSettings settings = plain;
+          settings.max_visits = std::max(1u, visits + more - 1);
+          expect_bounds(pair.name, "lenses' visits", penetration(a, b, settings, large), full, 0);
         }
         expect_bounds(pair.name, "tiny", penetration(a, b, plain, tiny), full, 0);
       }
@@ -528,9 +537,14 @@ TEST(FieldPairs, LimitsKeepTrueBounds) {
 void expect_shares(const char* name, const ContactPatches& got, const Penetration& whole,
                    std::span<const ContactPatch> patches) {
   EXPECT_EQ(got.penetration.volume, whole.volume) << name;
+  EXPECT_EQ(got.penetration.status, whole.status) << name;
+  EXPECT_EQ(got.penetration.node_visits, whole.node_visits) << name;
   EXPECT_EQ(got.penetration.translation_gradient, whole.translation_gradient) << name;
   EXPECT_EQ(got.penetration.rotation_gradient, whole.rotation_gradient) << name;
-  EXPECT_EQ(got.count > 0, whole.volume > 0) << name;
+  // Where a stopped query has summed nothing yet there is nothing to divide.
+  if (whole.status == QueryStatus::ok) {
+    EXPECT_EQ(got.count > 0, whole.volume > 0) << name;
+  }
   if (got.count == 0) return;
   double volume = 0, pull = 0, turn = 0;
   Vector3d force = Vector3d::Zero(), torque = force;
@@ -577,6 +591,8 @@ TEST(FieldPairs, PatchesAddUpToTheWhole) {
         settings.field = use;
         ContactSettings contact;
         contact.field = use;
+        // A stopped query is divided too.
+        settings.max_visits = contact.max_visits = i % 3 == 0 ? 10u * static_cast<unsigned>(i) : 0;
         const Penetration whole = penetration(a, b, settings, workspace);
         expect_shares(pair.name, contact_patches(a, b, contact, workspace, patches), whole,
                       patches);

@@ -1,13 +1,17 @@
 // Nothing inside a query may wait: every way to the heap, to a lock and to the system is trapped
 // while queries of all kinds run, and every trap is shown to spring.
 #include <gtest/gtest.h>
+#include <ist/bake.h>
+#include <ist/field.h>
 #include <ist/query.h>
 
 #include <cstdio>
+#include <vector>
 
 #include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/real_time_traps.h"
+#include "support/test_meshes.h"
 
 namespace ist {
 namespace {
@@ -26,11 +30,43 @@ class RealTime : public ::testing::Test {
     contact_patches(a, b, testing::for_contacts(settings), workspaces_[0], patches_);
     const PlacedPair pairs[] = {{a, b}, {b, a}};
     penetration_batch(pairs, settings, workspaces_, answers_);
+
+    // What meets a surface: a field and a tree, and trees by the surface of either.
+    const PlacedField field{fields_[static_cast<std::size_t>(i) % fields_.size()], poses_a_[i], 1};
+    volume_[i] += penetration(field, b, settings, workspaces_[0]).volume;
+    query(field, b, testing::for_both(settings), workspaces_[0]);
+    contact_patches(field, b, testing::for_contacts(settings), workspaces_[0], patches_);
+    const PlacedFieldPair field_pairs[] = {{field, b}, {field, a}};
+    penetration_batch(field_pairs, settings, workspaces_, answers_);
+    const PlacedTree solid{box_.view(), poses_a_[i], 1.0};
+    for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
+      PenetrationSettings with_field = settings;
+      with_field.field = use;
+      volume_[i] += penetration(solid, b, with_field, workspaces_[0]).volume;
+      volume_[i] += penetration(b, solid, with_field, workspaces_[0]).volume;
+      contact_patches(solid, b, testing::for_contacts(with_field), workspaces_[0], patches_);
+    }
+  }
+
+  static FieldSample look(const void*, const Eigen::Vector3d& x) noexcept {
+    return {0.2 - x.z(), -Eigen::Vector3d::UnitZ()};
   }
 
   static constexpr int kPoses = 40;
   const Asset a_ = testing::make_random_asset({600, 0.2, {}, 0, 2}, 1);
   const Asset b_ = testing::make_random_asset({600, 0.2, {}, 0, 1}, 2);
+  const Asset box_ = bake(close_mesh(testing::cube_mesh(), "cube"), {.max_spheres = 60});
+  const std::vector<float> numbers_ = std::vector<float>(125, 0.1f);
+  const std::vector<Field> fields_ = {
+      HalfSpaceField{},
+      BoxField{{0.5, 0.4, 0.05}},
+      BallField{0.6},
+      CapsuleField{0.4, 0.4},
+      CylinderField{0.4, 0.4},
+      HeightField{numbers_.data(), 5, 5, {0.3, 0.3}},
+      DistanceGridField{numbers_.data(), {5, 5, 5}, Eigen::Vector3d::Constant(-1), 0.5, 0},
+      FunctionField{look, nullptr, 0},
+      MeshField{box_.view()}};
   Workspace workspaces_[1];
   ContactPatch patches_[8];
   Penetration answers_[2];

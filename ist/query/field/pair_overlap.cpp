@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "query/base/smooth_step.h"
 #include "query/descent/descent.h"
@@ -17,8 +18,8 @@ namespace {
 // Ratio of grains up to which trees are summed by lenses alone, and from which on exactly alone.
 constexpr double kAlike = 1.25, kUnlike = 4;
 // Overlap in spheres of the coarser grain up to which trees of twice the other's grain are summed
-// exactly, more or less as they are more or less unlike: there lenses are 2 % and more in error,
-// and few spheres meet the surface …
+// exactly, more or less as they are more or less unlike: there lenses are 2 % and more in error, and
+// few spheres meet the surface …
 constexpr double kFewSpheres = 2;
 // … if a sphere meets no more triangles than the one; never if it meets more than the other.
 constexpr double kFewTriangles = 10, kManyTriangles = 20;
@@ -89,7 +90,10 @@ PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const Plac
   return method;
 }
 
-ExactWeight exact_weight(const PairMethod& method, double volume) noexcept {
+namespace {
+
+/// Weight and slope where lenses say `volume`, A's unit frame.
+std::pair<double, double> weight_at(const PairMethod& method, double volume) noexcept {
   if (!method.exact) return {0, 0};
   if (!method.lenses || !(volume > method.full)) return {1, 0};
   const double width = method.none - method.full;
@@ -98,28 +102,33 @@ ExactWeight exact_weight(const PairMethod& method, double volume) noexcept {
   return {1 - smooth_step(t), -6 * t * (1 - t) / width};
 }
 
+}  // namespace
+
+ExactWeight exact_weight(const PairMethod& method, const Penetration& lenses,
+                         double unit3) noexcept {
+  const auto [weight, slope] = weight_at(method, lenses.volume / unit3);
+  // It falls with the volume.
+  return {weight, slope, weight_at(method, lenses.volume_max / unit3).first,
+          weight_at(method, lenses.volume_min / unit3).first};
+}
+
 Penetration blended(const Penetration& lenses, Penetration sum, const ExactWeight& weight,
                     double unit3) noexcept {
-  sum.node_visits += lenses.node_visits;
-  sum.sphere_pairs += lenses.sphere_pairs;
-  const bool stopped = lenses.status != QueryStatus::ok || sum.status != QueryStatus::ok;
-  if (weight.weight == 1 && !stopped) return sum;
+  if (weight.least == 1) return sum;
   const double w = weight.weight;
   const double slope = weight.slope / unit3 * (sum.volume - lenses.volume);
   const double volume = w * sum.volume + (1 - w) * lenses.volume;
-  // The weight is as sure as the lenses' volume; that of a sum that was stopped may be any.
-  const double doubt = std::abs(slope) * std::max(0.0, lenses.volume_max - lenses.volume_min);
+  // The weight is as sure as the lenses' volume; a blend is largest and least at its ends.
+  const auto at = [](double part, double x, double y) { return part * x + (1 - part) * y; };
+  const double lowest = std::min(at(weight.least, sum.volume_min, lenses.volume_min),
+                                 at(weight.most, sum.volume_min, lenses.volume_min));
+  const double highest = std::max(at(weight.least, sum.volume_max, lenses.volume_max),
+                                  at(weight.most, sum.volume_max, lenses.volume_max));
   if (volume > 0)
     sum.centroid = (w * sum.volume / volume) * sum.centroid +
                    ((1 - w) * lenses.volume / volume) * lenses.centroid;
-  if (stopped) {
-    sum.volume_min = std::min(sum.volume_min, lenses.volume_min);
-    sum.volume_max = std::max(sum.volume_max, lenses.volume_max);
-    sum.status = QueryStatus::budget_exhausted;
-  } else {
-    sum.volume_min = std::max(0.0, w * sum.volume_min + (1 - w) * lenses.volume_min - doubt);
-    sum.volume_max = w * sum.volume_max + (1 - w) * lenses.volume_max + doubt;
-  }
+  sum.volume_min = std::max(0.0, lowest);
+  sum.volume_max = highest;
   sum.volume = std::clamp(volume, sum.volume_min, sum.volume_max);
   sum.translation_gradient =
       w * sum.translation_gradient + (1 - w + slope) * lenses.translation_gradient;
@@ -159,6 +168,34 @@ Penetration PairOverlap::exact(bool b_probes, const DescentLimits& limits,
   return turned_over(descent.penetration(), a_, b_);
 }
 
+std::optional<DescentLimits> PairOverlap::left_by(const Penetration& lenses,
+                                                  DescentLimits limits) noexcept {
+  if (limits.max_visits == 0) return limits;
+  if (lenses.node_visits >= limits.max_visits) return std::nullopt;
+  limits.max_visits -= lenses.node_visits;
+  return limits;
+}
+
+Penetration PairOverlap::with_exact(const PairMethod& method, const Penetration& lenses,
+                                    const ExactWeight& weight, const DescentLimits& left) noexcept {
+  Penetration sum = exact(method.b_probes, left);
+  sum.node_visits += lenses.node_visits;
+  sum.sphere_pairs += lenses.sphere_pairs;
+  sum.status = std::max(sum.status, lenses.status);
+  return blended(lenses, sum, weight, pose_.unit_a * pose_.unit_a * pose_.unit_a);
+}
+
+Penetration PairOverlap::without_exact(const PairMethod& method,
+                                       Penetration lenses) const noexcept {
+  // Of the exact sum nothing is known but that it is no more than all that probes.
+  const double scale = pose_.unit_a * (method.b_probes ? pose_.a_from_b.scale : 1.0);
+  const double most = (method.b_probes ? tree_b_ : tree_a_).volume_sum * (scale * scale * scale);
+  lenses.volume_min = 0;
+  lenses.volume_max = std::max(lenses.volume_max, most * (1 + 1e-9));
+  lenses.status = QueryStatus::budget_exhausted;
+  return lenses;
+}
+
 Penetration PairOverlap::by(const PairMethod& method, const DescentLimits& limits) noexcept {
   if (!method.exact) return by_lenses(limits);
   if (!method.lenses) return exact(method.b_probes, limits);
@@ -166,23 +203,15 @@ Penetration PairOverlap::by(const PairMethod& method, const DescentLimits& limit
   const Clock::time_point start = limits.deadline_us > 0 ? Clock::now() : Clock::time_point();
   const Penetration lenses = by_lenses(limits);
   const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
-  ExactWeight weight = exact_weight(method, lenses.volume / unit3);
-  if (weight.weight == 0 && lenses.status == QueryStatus::ok) return lenses;
-  DescentLimits left = limits;
+  const ExactWeight weight = exact_weight(method, lenses, unit3);
+  if (weight.most == 0) return lenses;
+  std::optional<DescentLimits> left = left_by(lenses, limits);
+  if (!left) return without_exact(method, lenses);
   if (limits.deadline_us > 0) {
     const std::chrono::duration<double, std::micro> gone = Clock::now() - start;
-    left.deadline_us = std::max(kNoTime, limits.deadline_us - gone.count());
+    left->deadline_us = std::max(kNoTime, limits.deadline_us - gone.count());
   }
-  if (limits.max_visits > 0) {
-    if (lenses.node_visits >= limits.max_visits) {
-      // Nothing but the bounds is asked for.
-      left.deadline_us = kNoTime;
-      weight = {0, 0};
-    } else {
-      left.max_visits = limits.max_visits - lenses.node_visits;
-    }
-  }
-  return blended(lenses, exact(method.b_probes, left), weight, unit3);
+  return with_exact(method, lenses, weight, *left);
 }
 
 }  // namespace ist

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include <ist/query.h>
 
 #include "query/base/budget.h"
@@ -27,6 +29,15 @@ Penetration turned_over(Penetration answer, const PlacedTree& moving,
 PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
                        const TreeHeader& tree_b, const RelativePose& pose, FieldUse use) noexcept;
 
+/// Weight of the exact sum by what lenses say, A's unit frame, and its slope by that. The finished
+/// sum's weight lies from `least` to `most`.
+struct ExactWeight {
+  double weight = 1, slope = 0;
+  double least = 1, most = 1;
+};
+ExactWeight exact_weight(const PairMethod& method, const Penetration& lenses,
+                         double unit3) noexcept;
+
 /// What two trees of placed assets overlap by: a sum of lenses, the exact sum, or both blended by
 /// the lenses' volume. Gradients are the returned sum's.
 class PairOverlap {
@@ -41,6 +52,17 @@ class PairOverlap {
                     ContactBins* bins = nullptr) noexcept;
   Penetration by(const PairMethod& method, const DescentLimits& limits) noexcept;
 
+  /// Visits that the lenses leave of the limits for the exact sum; nothing if there are none.
+  static std::optional<DescentLimits> left_by(const Penetration& lenses,
+                                              DescentLimits limits) noexcept;
+
+  /// The lenses' sum blended with the exact one, which is summed within what is left.
+  Penetration with_exact(const PairMethod& method, const Penetration& lenses,
+                         const ExactWeight& weight, const DescentLimits& left) noexcept;
+
+  /// What the lenses say, where no visits are left for the exact sum.
+  Penetration without_exact(const PairMethod& method, Penetration lenses) const noexcept;
+
  private:
   const PlacedTree& a_;
   const PlacedTree& b_;
@@ -50,13 +72,7 @@ class PairOverlap {
   Workspace::Impl& scratch_;
 };
 
-/// Weight of the exact sum where lenses say `volume`, A's unit frame, and its slope by that.
-struct ExactWeight {
-  double weight = 1, slope = 0;
-};
-ExactWeight exact_weight(const PairMethod& method, double volume) noexcept;
-
-/// Both sums by weight; counts are of both. `unit3`: volume of A's unit.
+/// Both sums by weight, counts and status being the exact one's. `unit3`: volume of A's unit.
 Penetration blended(const Penetration& lenses, Penetration exact, const ExactWeight& weight,
                     double unit3) noexcept;
 
