@@ -6,7 +6,7 @@ namespace ist::testing {
 
 /// The same limits for contact patches.
 inline ContactSettings for_contacts(const PenetrationSettings& s) {
-  return {s.measure, s.max_visits, s.deadline_us, s.relative_error, s.min_radius};
+  return {s.measure, s.field, s.max_visits, s.deadline_us, s.relative_error, s.min_radius};
 }
 
 /// The same limits for a separation.

@@ -4,34 +4,49 @@
 #include <optional>
 #include <vector>
 
+#include "bake/field/overlaps.h"
 #include "mesh/bvh.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/mesh_view.h"
 
 namespace ist {
 
-/// The boundary of a mesh's solid: closed, with winding number 1 inside and 0 outside. It refers to
-/// the solid's vertices.
+/// A closed surface that tells a mesh's solid: inside the winding number about it is odd, outside
+/// it is even, but for points that a triangle of it is near to.
 class SolidSurface {
  public:
-  /// Nothing for a mesh that meets itself, or may: its boundary is not made of whole triangles.
-  static std::optional<SolidSurface> of(const MeshSolid& solid);
+  /// The boundary of the solid where that is made of whole triangles, else a surface near it:
+  /// triangles that meet others, and inner walls about them, stay where they reach at most
+  /// `enough` (unit frame); where they reach further, the solid is polygonised.
+  /// `max_error`: unit frame; 0: none was asked for, else off() is at most half of it, or Error.
+  /// Nothing where no surface is found. It refers to the solid.
+  static std::optional<SolidSurface> of(const MeshSolid& solid, double enough, double max_error);
 
   SolidSurface(SolidSurface&&) = default;
   SolidSurface& operator=(SolidSurface&&) = default;
 
-  /// Vertices (all of the mesh's) and the triangles of the boundary, in the mesh's order.
+  /// Vertices and triangles.
   const MeshView& arrays() const { return arrays_; }
   /// The same with a hierarchy, made when it is first asked for. Not for several threads at once.
   const MeshView& view();
 
+  /// Unit frame, proven: this surface and the solid's lie within it of each other, and where the
+  /// winding number here and the solid differ, a triangle is as near.
+  double off() const { return off_; }
+
  private:
   explicit SolidSurface(const MeshSolid& solid) : solid_(&solid), arrays_(solid.arrays()) {}
 
-  const MeshSolid* solid_;
-  std::vector<std::uint32_t> kept_;  ///< corners of the triangles, where not all are kept
+  static std::optional<SolidSurface> of_shells(const MeshSolid& solid);
+  static std::optional<SolidSurface> polygonised(const MeshSolid& solid, const Overlaps& overlaps,
+                                                 double max_error);
+
+  const MeshSolid* solid_;                ///< its hierarchy serves where all its triangles are kept
+  std::vector<double> vertices_;          ///< where they are not the solid's
+  std::vector<std::uint32_t> triangles_;  ///< corners, where they are not all of the solid's
   MeshView arrays_;
-  std::optional<Bvh> hierarchy_;  ///< of the kept triangles
+  double off_ = 0;
+  std::optional<Bvh> hierarchy_;
   MeshView view_;
 };
 
