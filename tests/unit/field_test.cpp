@@ -274,25 +274,10 @@ void expect_tells_solid(const Asset& asset, const ClosedMesh& mesh) {
               field.error);
 }
 
-TEST(Field, OfBoxesThatOverlap) {
+TEST(Field, NoneWhereAMeshReachesFarIntoItself) {
   const ClosedMesh two = closed(testing::overlapping_cubes_mesh(), "two cubes");
   ASSERT_TRUE(two.report.meets_itself);
-  const Asset asset = baked(two);
-  expect_sound_field(asset, two);
-  expect_tells_solid(asset, two);
-  EXPECT_LT(asset.view().field_error(), 0.05);
-}
-
-// A dent through the opposite wall: behind it the surface winds the other way, and that is outside.
-TEST(Field, OfADentThroughTheOppositeWall) {
-  TriangleMesh mesh = testing::joined(
-      testing::cube_mesh(),
-      testing::inverted(testing::box_mesh(Point(-0.1, -0.1, -0.7), Point(0.1, 0.1, 0.3))));
-  const ClosedMesh dented = closed(std::move(mesh), "dented");
-  const Asset asset = baked(dented);
-  ASSERT_TRUE(dented.report.meets_itself);
-  expect_sound_field(asset, dented);
-  expect_tells_solid(asset, dented);
+  EXPECT_FALSE(baked(two).view().has_field());
 }
 
 // A vertex out of place folds the triangles around it over their neighbours, as scans have it.
@@ -307,10 +292,6 @@ TEST(Field, OfASmallFoldIsTheMeshsOwn) {
   EXPECT_GT(asset.view().field_error(), 1e-3);
   expect_sound_field(asset, ball);
   expect_tells_solid(asset, ball);
-  const Asset exact = baked(ball, 0.002);
-  EXPECT_LE(exact.view().field_error(), 0.002);
-  expect_sound_field(exact, ball);
-  expect_tells_solid(exact, ball);
 }
 
 }  // namespace

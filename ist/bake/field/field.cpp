@@ -155,7 +155,8 @@ std::size_t grid_bytes(const FieldArrays& arrays) {
 }  // namespace
 
 std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error) {
-  std::optional<SolidSurface> surface = SolidSurface::of(solid, kOverlapWidth, max_error);
+  std::optional<SolidSurface> surface = SolidSurface::of(
+      solid, max_error > 0 ? std::min(kOverlapWidth, max_error / 2) : kOverlapWidth);
   if (!surface) return std::nullopt;
   // The surface's own distance from the solid comes on top.
   Approximation near = approximate(*surface, max_error > 0 ? max_error - surface->off() : 0);

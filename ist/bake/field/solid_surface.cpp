@@ -1,27 +1,17 @@
 #include "bake/field/solid_surface.h"
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <utility>
 
-#include <ist/error.h>
-
-#include "bake/field/boundary_solid.h"
 #include "bake/field/overlaps.h"
 #include "bake/field/winding_sides.h"
-#include "mesh/polygonise.h"
 
 namespace ist {
 
-std::optional<SolidSurface> SolidSurface::of(const MeshSolid& solid, double enough,
-                                             double max_error) {
+std::optional<SolidSurface> SolidSurface::of(const MeshSolid& solid, double enough) {
   if (!solid.may_overlap()) return SolidSurface(solid);
   if (!solid.meets_itself()) return of_shells(solid);
   const std::optional<Overlaps> overlaps = find_overlaps(solid);
-  if (!overlaps) return std::nullopt;
-  if (overlaps->off > (max_error > 0 ? max_error / 4 : enough))
-    return polygonised(solid, *overlaps, max_error);
+  if (!overlaps || overlaps->off > enough) return std::nullopt;
   SolidSurface surface(solid);
   surface.off_ = overlaps->off;
   return surface;
@@ -44,32 +34,6 @@ std::optional<SolidSurface> SolidSurface::of_shells(const MeshSolid& solid) {
   if (surface.arrays_.triangle_count == mesh.triangle_count) kept.clear();
   if (!kept.empty()) surface.arrays_.triangles = kept.data();
   return surface;
-}
-
-std::optional<SolidSurface> SolidSurface::polygonised(const MeshSolid& solid,
-                                                      const Overlaps& overlaps, double max_error) {
-  constexpr unsigned kCells = 64;
-  constexpr double kPiece = 0.25;  // of a cell
-  SolidSurface surface(solid);
-  for (unsigned cells = kCells;; cells *= 2) {
-    const BoundarySolid boundary(solid, overlaps, kPiece * 2 / cells);
-    const Polygonised made = polygonise(boundary, cells);
-    surface.off_ = made.error;
-    if (max_error > 0 && made.error > max_error / 2) {
-      if (2 * cells <= kMostCells) continue;
-      throw Error("the field of a mesh that meets itself cannot be as exact as is asked for");
-    }
-    surface.vertices_.clear();
-    surface.triangles_.clear();
-    for (const Eigen::Vector3d& v : made.mesh.vertices)
-      surface.vertices_.insert(surface.vertices_.end(), v.begin(), v.end());
-    for (const auto& t : made.mesh.triangles)
-      surface.triangles_.insert(surface.triangles_.end(), t.begin(), t.end());
-    surface.arrays_ = {surface.vertices_.data(), surface.triangles_.data(),
-                       static_cast<std::uint32_t>(made.mesh.vertices.size()),
-                       static_cast<std::uint32_t>(made.mesh.triangles.size())};
-    return surface;
-  }
 }
 
 const MeshView& SolidSurface::view() {

@@ -4,7 +4,6 @@
 #include <optional>
 #include <vector>
 
-#include "bake/field/overlaps.h"
 #include "mesh/bvh.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/mesh_view.h"
@@ -15,12 +14,10 @@ namespace ist {
 /// it is even, but for points that a triangle of it is near to.
 class SolidSurface {
  public:
-  /// The boundary of the solid where that is made of whole triangles, else a surface near it:
-  /// triangles that meet others, and inner walls about them, stay where they reach at most
-  /// `enough` (unit frame); where they reach further, the solid is polygonised.
-  /// `max_error`: unit frame; 0: none was asked for, else off() is at most half of it, or Error.
-  /// Nothing where no surface is found. It refers to the solid.
-  static std::optional<SolidSurface> of(const MeshSolid& solid, double enough, double max_error);
+  /// The boundary of the solid where that is made of whole triangles. Triangles that meet others,
+  /// and inner walls about them, stay where they reach at most `enough` (unit frame). Nothing where
+  /// they reach further, or that is not known. It refers to the solid.
+  static std::optional<SolidSurface> of(const MeshSolid& solid, double enough);
 
   SolidSurface(SolidSurface&&) = default;
   SolidSurface& operator=(SolidSurface&&) = default;
@@ -38,11 +35,8 @@ class SolidSurface {
   explicit SolidSurface(const MeshSolid& solid) : solid_(&solid), arrays_(solid.arrays()) {}
 
   static std::optional<SolidSurface> of_shells(const MeshSolid& solid);
-  static std::optional<SolidSurface> polygonised(const MeshSolid& solid, const Overlaps& overlaps,
-                                                 double max_error);
 
   const MeshSolid* solid_;                ///< its hierarchy serves where all its triangles are kept
-  std::vector<double> vertices_;          ///< where they are not the solid's
   std::vector<std::uint32_t> triangles_;  ///< corners, where they are not all of the solid's
   MeshView arrays_;
   double off_ = 0;
