@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include <ist/asset_layout.h>
+#include "app/coarseness.h"
 #include "app/text.h"
 #include "bake/predict/trial_poses.h"
 
@@ -109,6 +110,8 @@ std::string describe_asset(const TreeView& tree) {
   line("spheres",
        fmt::format("{}, {:.3f} % of the volume (stopped by: {})", grouped(h.sphere_count),
                    100 * h.coverage, name_of(static_cast<StopReason>(h.stop_reason))));
+  if (const std::string coarse = describe_coarseness(tree); !coarse.empty())
+    line("warning", coarse);
   const auto grid = static_cast<GridMode>(h.asked_grid);
   line("greedy", keeps_bound(grid)
                      ? fmt::format("radius at least {:.3f} of the largest that would fit, median "
@@ -168,6 +171,7 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
   const auto kept = [&](double ratio) {
     return keeps_bound(grid) ? nlohmann::ordered_json(ratio) : nlohmann::ordered_json();
   };
+  const std::optional<std::uint64_t> enough = enough_spheres(tree);
   nlohmann::ordered_json json = {
       {"format", fmt::format("{}.{}", h.format_major, h.format_minor)},
       {"bytes", h.file_bytes},
@@ -175,6 +179,7 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
       {"mesh_hash", hex(h.mesh_hash)},
       {"spheres", h.sphere_count},
       {"coverage", h.coverage},
+      {"enough_spheres", enough ? nlohmann::ordered_json(*enough) : nlohmann::ordered_json()},
       {"kept_ratio_worst", kept(h.kept_ratio_worst)},
       {"kept_ratio_median", kept(h.kept_ratio_median)},
       {"stop", name_of(static_cast<StopReason>(h.stop_reason))},

@@ -8,6 +8,7 @@
 #include <ist/error.h>
 
 #include "app/asset_summary.h"
+#include "app/coarseness.h"
 #include "app/commands.h"
 #include "app/device_option.h"
 #include "app/file_options.h"
@@ -118,6 +119,8 @@ void run_bake(const BakeOptions& options) {
 
   if (options.target.relative_error > 0 && !asset.view().predicted_errors().target_met())
     spdlog::warn("{}: {}", options.output, describe_target(asset.view()));
+  if (const std::string coarse = describe_coarseness(asset.view()); !coarse.empty())
+    spdlog::warn("{}: {}", options.output, coarse);
   if (options.json) {
     nlohmann::ordered_json result = {{"asset", options.output}, {"mesh", options.mesh}};
     result.update(asset_json(asset.view()));

@@ -1,5 +1,6 @@
 #include "mesh/self_intersections.h"
 
+#include <tbb/concurrent_vector.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
@@ -87,28 +88,50 @@ class BoxPyramid {
   std::vector<std::vector<Box>> levels_;  ///< [0]: of each triangle
 };
 
+/// Calls met(i, j) for pairs of triangles that meet elsewhere, from many threads. False: given up.
+template <class Met>
+bool for_each_pair(const std::vector<Eigen::Vector3d>& vertices,
+                   const std::vector<Triangle>& triangles, const Met& met) {
+  constexpr std::size_t kMostTriangles = 2'000'000, kMostPairs = 50'000'000;
+  if (triangles.size() > kMostTriangles) return false;
+  const BoxPyramid pyramid(vertices, triangles);
+  // Integers only: their sums do not depend on the order.
+  std::atomic<std::size_t> pairs{0};
+  tbb::parallel_for(std::size_t{0}, pyramid.size(), [&](const std::size_t place) {
+    if (pairs > kMostPairs) return;
+    std::size_t pairs_here = 0;
+    const std::uint32_t a = pyramid.triangle(place);
+    pyramid.for_each_neighbour_after(place, [&](const std::size_t other) {
+      ++pairs_here;
+      const std::uint32_t b = pyramid.triangle(other);
+      if (meet_elsewhere(vertices, triangles[a], triangles[b])) met(a, b);
+    });
+    pairs += pairs_here;
+  });
+  return pairs <= kMostPairs;
+}
+
 }  // namespace
 
 std::optional<std::size_t> count_self_intersections(const std::vector<Eigen::Vector3d>& vertices,
                                                     const std::vector<Triangle>& triangles) {
-  constexpr std::size_t kMostTriangles = 2'000'000, kMostPairs = 50'000'000;
-  if (triangles.size() > kMostTriangles) return std::nullopt;
-  const BoxPyramid pyramid(vertices, triangles);
-  // Integers only: their sums do not depend on the order.
-  std::atomic<std::size_t> met{0}, pairs{0};
-  tbb::parallel_for(std::size_t{0}, pyramid.size(), [&](const std::size_t place) {
-    if (pairs > kMostPairs) return;
-    std::size_t met_here = 0, pairs_here = 0;
-    const Triangle& a = triangles[pyramid.triangle(place)];
-    pyramid.for_each_neighbour_after(place, [&](const std::size_t other) {
-      ++pairs_here;
-      met_here += meet_elsewhere(vertices, a, triangles[pyramid.triangle(other)]) ? 1 : 0;
-    });
-    met += met_here;
-    pairs += pairs_here;
-  });
-  if (pairs > kMostPairs) return std::nullopt;
-  return met;
+  std::atomic<std::size_t> count{0};
+  if (!for_each_pair(vertices, triangles, [&](std::uint32_t, std::uint32_t) { ++count; }))
+    return std::nullopt;
+  return count;
+}
+
+std::optional<std::vector<std::array<std::uint32_t, 2>>> find_self_intersections(
+    const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles) {
+  constexpr std::size_t kMost = 10'000'000;
+  tbb::concurrent_vector<std::array<std::uint32_t, 2>> found;
+  const auto add = [&](std::uint32_t a, std::uint32_t b) {
+    if (found.size() <= kMost) found.push_back({std::min(a, b), std::max(a, b)});
+  };
+  if (!for_each_pair(vertices, triangles, add) || found.size() > kMost) return std::nullopt;
+  std::vector<std::array<std::uint32_t, 2>> pairs(found.begin(), found.end());
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
 }
 
 }  // namespace ist

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -20,5 +22,10 @@ bool meet_elsewhere(const std::vector<Eigen::Vector3d>& vertices, const Triangle
 /// number.
 std::optional<std::size_t> count_self_intersections(const std::vector<Eigen::Vector3d>& vertices,
                                                     const std::vector<Triangle>& triangles);
+
+/// Those pairs, the smaller index first, sorted. Nothing where there are too many or counting would
+/// take too long.
+std::optional<std::vector<std::array<std::uint32_t, 2>>> find_self_intersections(
+    const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles);
 
 }  // namespace ist

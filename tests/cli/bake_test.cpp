@@ -65,6 +65,22 @@ TEST_F(BakeCommand, TheFieldIsToldOfOrLeftOut) {
   EXPECT_EQ(ist({"bake", "cube.obj", "-o", "new.ist", "--field-error", "0"}).exit_code, 2);
 }
 
+TEST_F(BakeCommand, SpheresTooCoarseForThinPartsAreToldOf) {
+  const Outcome thin = ist({"bake", "cube.obj", "-o", "new.ist", "--spheres", "1", "--json"});
+  EXPECT_TRUE(nlohmann::json::parse(thin.out).at("enough_spheres").is_null());
+  // A plate a hundred times as wide as thick: about 17,000 spheres fill half of it.
+  write("plate.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 .01\nv 1 0 .01\nv 1 1 .01\nv 0 1 .01\n"
+        "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+  const Outcome outcome =
+      ist({"bake", "plate.obj", "-o", "plate.ist", "--spheres", "200", "--json"});
+  EXPECT_NE(outcome.err.find("too coarse for thin parts"), std::string::npos) << outcome.err;
+  const nlohmann::json enough = nlohmann::json::parse(outcome.out).at("enough_spheres");
+  EXPECT_GT(enough, 8'000);
+  EXPECT_LT(enough, 40'000);
+  EXPECT_NE(ist({"info", "plate.ist"}).out.find("spheres would do"), std::string::npos);
+}
+
 TEST_F(BakeCommand, ATargetPicksTheSphereCount) {
   const Outcome outcome = ist({"bake", "cube.obj", "-o", "new.ist", "--target-error", "20%",
                                "--at-overlap", "1%", "--json"});

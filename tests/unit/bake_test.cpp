@@ -200,7 +200,7 @@ TEST(Check, TurnsRedForEveryInvariantOfTheField) {
   ASSERT_TRUE(asset.view().has_field());
   expect_sound(check(asset, torus));
   const std::vector<Tampering> cases = {
-      {"field closed", [](AssetHeader& h) { surface(h)->x[0] += 1e-7f; }},
+      {"field closed", [](AssetHeader& h) { surface(h)->x[1] += 1e-7f; }},
       {"field closed",
        [](AssetHeader& h) { std::swap(surface(h)->corner[0][2], surface(h)->corner[1][2]); }},
       {"field near mesh", [](AssetHeader& h) { surface(h)->z[1] += 1e-4f; }},

@@ -254,10 +254,44 @@ TEST(Field, GridTellsInsideFromOutside) {
   }
 }
 
-// A mesh that meets itself has no surface of whole triangles.
-TEST(Field, NoneYetOfAMeshThatMeetsItself) {
+/// The field of a mesh that meets itself tells its solid: away from the error for certain.
+void expect_tells_solid(const Asset& asset, const ClosedMesh& mesh) {
+  const AssetHeader& header = asset.view().header();
+  const FieldHeader& field = *at<FieldHeader>(header, header.field);
+  const CheckSurface of_field(FieldTriangles(header, field).all());
+  const MeshSolid solid(mesh);
+  std::mt19937_64 random(3);
+  std::size_t clear = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    Point p;
+    for (int k = 0; k < 3; ++k) p[k] = 2 * (static_cast<double>(random() >> 11) * 0x1p-53) - 1;
+    if (of_field.distance(p, 2 * field.error) <= field.error) continue;
+    ++clear;
+    ASSERT_EQ(of_field.winding(p) % 2 != 0, solid.inside(p)) << p.transpose();
+  }
+  EXPECT_GT(clear, 10'000u);
+  std::printf("%s: %u triangles, error %.2g, unit frame\n", mesh.name.c_str(), field.triangle_count,
+              field.error);
+}
+
+TEST(Field, NoneWhereAMeshReachesFarIntoItself) {
   const ClosedMesh two = closed(testing::overlapping_cubes_mesh(), "two cubes");
+  ASSERT_TRUE(two.report.meets_itself);
   EXPECT_FALSE(baked(two).view().has_field());
+}
+
+// A vertex out of place folds the triangles around it over their neighbours, as scans have it.
+TEST(Field, OfASmallFoldIsTheMeshsOwn) {
+  TriangleMesh mesh = testing::icosphere_mesh(5);
+  mesh.vertices[5000] +=
+      2.5 * (mesh.vertices[mesh.triangles[0][0]] - mesh.vertices[5000]).normalized() * 0.03;
+  const ClosedMesh ball = closed(std::move(mesh), "folded ball");
+  ASSERT_TRUE(ball.report.meets_itself);
+  const Asset asset = baked(ball);
+  EXPECT_EQ(asset.view().field_triangles(), ball.mesh.triangles.size());
+  EXPECT_GT(asset.view().field_error(), 1e-3);
+  expect_sound_field(asset, ball);
+  expect_tells_solid(asset, ball);
 }
 
 }  // namespace

@@ -20,11 +20,16 @@ void append(std::vector<Invariant>& all, std::vector<Invariant> more) {
   for (Invariant& one : more) all.push_back(std::move(one));
 }
 
+Bounding bounding_of(const ClosedMesh& mesh) {
+  if (mesh.report.meets_itself) return Bounding::parts;
+  return mesh.report.shells != 1 ? Bounding::shells : Bounding::all;
+}
+
 /// `solid`: what spheres and covers are certified against; `surface`: what matched spheres are
 /// calibrated by; of a mesh's asset they are the same.
 std::vector<Invariant> check_all(const AssetHeader& asset, const CheckedSolid& solid,
                                  const CheckSurface& surface, const MeshSolid& mesh,
-                                 double volume_error, bool several_shells) {
+                                 double volume_error, Bounding bounding) {
   std::vector<Invariant> all = check_header(asset, solid, mesh, volume_error);
   append(all, check_spheres(asset, solid));
   all.push_back(check_cover(asset, solid));
@@ -36,7 +41,7 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const CheckedSolid& s
     append(all, check_tree(asset, matched_tree(asset, i), matched_spheres(asset, i), nullptr,
                            name + "matched tree"));
   }
-  append(all, check_field(asset, surface, several_shells));
+  append(all, check_field(asset, surface, bounding));
   return all;
 }
 
@@ -45,8 +50,7 @@ std::vector<Invariant> check_mesh(const AssetHeader& asset, const ClosedMesh& me
   if (solid.hash() != asset.mesh_hash || (asset.flags & kFlagPolygonised) != 0)
     throw Error(mesh.name + ": the asset was baked from another mesh; bake again");
   const CheckSurface surface(mesh, solid.frame());
-  return check_all(asset, surface, surface, solid, solid.unit_volume_error(),
-                   mesh.report.shells != 1);
+  return check_all(asset, surface, surface, solid, solid.unit_volume_error(), bounding_of(mesh));
 }
 
 std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid) {
@@ -61,7 +65,7 @@ std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid)
   const double off = std::abs(mesh.volume() - solid.volume()) + solid.volume_error();
   return check_all(asset, DistanceSolid(solid, mesh.frame()), CheckSurface(closed, mesh.frame()),
                    mesh, mesh.unit_volume_error() + off / scale / scale / scale,
-                   closed.report.shells != 1);
+                   bounding_of(closed));
 }
 
 }  // namespace

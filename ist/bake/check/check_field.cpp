@@ -84,20 +84,49 @@ Invariant near(const char* name, const char* of, const std::vector<Corners>& tri
              std::string("distance of a point of the ") + of + " − the field's error, unit frame");
 }
 
-/// Those triangles between inside and outside: others are of shells within the solid.
+/// Whether a point of a triangle is between inside and outside, not between shells of the solid.
+bool bounds_at(const CheckSurface& surface, const Corners& triangle, const Point& p) {
+  const Point step =
+      (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalized() * 1e-9;
+  return surface.winding(p + step) <= 0 && surface.winding(p - step) >= 1;
+}
+
+/// Those triangles that bound the solid as a whole.
 std::vector<Corners> boundary(const CheckSurface& surface) {
   const std::vector<Corners>& all = surface.triangles();
   std::vector<char> bounds(all.size());
   tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
-    const Point normal = (all[i][1] - all[i][0]).cross(all[i][2] - all[i][0]);
-    const Point step = normal.normalized() * 1e-9;
-    const Point middle = (all[i][0] + all[i][1] + all[i][2]) / 3;
-    bounds[i] = surface.winding(middle + step) <= 0 && surface.winding(middle - step) >= 1;
+    bounds[i] = bounds_at(surface, all[i], (all[i][0] + all[i][1] + all[i][2]) / 3);
   });
   std::vector<Corners> kept;
   for (std::size_t i = 0; i < all.size(); ++i)
     if (bounds[i] != 0) kept.push_back(all[i]);
   return kept;
+}
+
+/// Of triangles of which parts bound the solid those parts are near, by points spread over them:
+/// a million at most.
+Invariant parts_near(const CheckSurface& mesh, const CheckSurface& field, double error) {
+  constexpr std::size_t kPoints = 1'000'000;
+  const std::size_t count = mesh.triangles().size();
+  int rows = 1;
+  while (rows < 16 && 4 * static_cast<std::size_t>(rows * rows) * count <= kPoints) rows *= 2;
+  return tally_all(count,
+                   [&](std::size_t i, Tally& tally) {
+                     const Corners& t = mesh.triangles()[i];
+                     double worst = -error;
+                     for (int j = 0; j < rows; ++j)
+                       for (int k = 0; j + k < rows; ++k) {
+                         const double u = (j + 1.0 / 3) / rows, v = (k + 1.0 / 3) / rows;
+                         const Point p = t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0]);
+                         const double off = field.distance(p, 2 * error + 1e-9) - error - 1e-11;
+                         if (off > worst && (off <= 0 || bounds_at(mesh, t, p))) worst = off;
+                       }
+                     tally.add(worst, i);
+                   })
+      .named("mesh near field",
+             "distance of a point of the mesh that bounds the solid from the field − the field's "
+             "error, unit frame");
 }
 
 /// Every ball holds the triangles below it.
@@ -129,18 +158,20 @@ Invariant balls(const AssetHeader& asset, const FieldHeader& field,
 }  // namespace
 
 std::vector<Invariant> check_field(const AssetHeader& asset, const CheckSurface& surface,
-                                   bool several_shells) {
+                                   Bounding bounding) {
   if (asset.field == 0) return {};
   const FieldHeader& field = *at<FieldHeader>(asset, asset.field);
   const FieldTriangles triangles(asset, field);
   const CheckSurface of_field(triangles.all());
   std::optional<CheckSurface> kept;
-  if (several_shells) kept.emplace(boundary(surface));
+  if (bounding == Bounding::shells) kept.emplace(boundary(surface));
   const CheckSurface& solid = kept ? *kept : surface;
   std::vector<Invariant> out = {
       closed(of_field.triangles()),
       near("field near mesh", "field from the mesh", of_field.triangles(), solid, field.error),
-      near("mesh near field", "mesh from the field", solid.triangles(), of_field, field.error)};
+      bounding == Bounding::parts ? parts_near(solid, of_field, field.error)
+                                  : near("mesh near field", "mesh from the field",
+                                         solid.triangles(), of_field, field.error)};
   if (field.level_count > 1) out.push_back(balls(asset, field, triangles));
   for (Invariant& one : check_field_cells(asset, field, of_field, solid))
     out.push_back(std::move(one));

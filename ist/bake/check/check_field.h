@@ -9,10 +9,17 @@
 
 namespace ist {
 
+/// What of a mesh bounds its solid.
+enum class Bounding {
+  all,     ///< all triangles
+  shells,  ///< some of them, shell by shell: others lie within it
+  parts    ///< parts of them: they meet each other
+};
+
 /// The field of an asset that has one, against the mesh and by itself: closed, near the solid's
-/// surface, its balls and its cells. `several_shells`: some may lie within the solid.
+/// surface, its balls and its cells.
 std::vector<Invariant> check_field(const AssetHeader& asset, const CheckSurface& surface,
-                                   bool several_shells);
+                                   Bounding bounding);
 
 /// The triangles of a field by block and lane.
 class FieldTriangles {

@@ -22,7 +22,7 @@ struct CellRange {
 
 /// Calls visit(x, y, z) for the cells of a range that the triangle meets, by halves.
 template <class Visit>
-void for_cells(const CellGrid& grid, const CellOverlap& triangle, const CellRange& range,
+void for_cells(const BrickGrid& grid, const CellOverlap& triangle, const CellRange& range,
                const Visit& visit) {
   double centre[3], half[3];
   int longest = 0;
@@ -45,7 +45,7 @@ void for_cells(const CellGrid& grid, const CellOverlap& triangle, const CellRang
 }
 
 /// The cells that may hold a point of a triangle's box.
-CellRange range_of(const CellGrid& grid, const TriangleCorners& t) {
+CellRange range_of(const BrickGrid& grid, const LaneCorners& t) {
   CellRange range;
   const double room = kEnlarged * grid.cell + kEnlargedBy;
   for (int k = 0; k < 3; ++k) {
@@ -62,13 +62,13 @@ CellRange range_of(const CellGrid& grid, const TriangleCorners& t) {
 
 }  // namespace
 
-std::optional<std::vector<CellEntry>> find_entries(const CellGrid& grid,
+std::optional<std::vector<CellEntry>> find_entries(const BrickGrid& grid,
                                                    const std::vector<SurfaceBlock>& blocks,
                                                    std::size_t most) {
   std::vector<std::vector<CellEntry>> of_block(blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
     for (std::uint32_t lane = 0; lane < blocks[b].triangles; ++lane) {
-      const TriangleCorners t = corners_of(blocks[b], lane);
+      const LaneCorners t = corners_of(blocks[b], lane);
       const auto code = static_cast<std::uint32_t>(kWidth * b + lane);
       for_cells(grid, CellOverlap(t.p[0], t.p[1], t.p[2]), range_of(grid, t),
                 [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {

@@ -8,16 +8,17 @@
 
 #include <ist/asset_layout.h>
 
-#include "bake/field/cell_grid.h"
+#include "bake/field/brick_grid.h"
 
 namespace ist {
 
-struct TriangleCorners {
+/// Of the triangle in a lane of a block.
+struct LaneCorners {
   double p[3][3];
 };
 
-inline TriangleCorners corners_of(const SurfaceBlock& block, std::uint32_t lane) {
-  TriangleCorners out;
+inline LaneCorners corners_of(const SurfaceBlock& block, std::uint32_t lane) {
+  LaneCorners out;
   for (int i = 0; i < 3; ++i) {
     const std::uint32_t v = block.corner[i][lane];
     out.p[i][0] = block.x[v];
@@ -29,7 +30,7 @@ inline TriangleCorners corners_of(const SurfaceBlock& block, std::uint32_t lane)
 
 /// A triangle in a cell.
 struct CellEntry {
-  std::uint64_t cell;      ///< CellGrid::name
+  std::uint64_t cell;      ///< BrickGrid::name
   std::uint32_t triangle;  ///< 16 · block + lane
   friend auto operator<=>(const CellEntry&, const CellEntry&) = default;
 };
@@ -37,7 +38,7 @@ struct CellEntry {
 /// Which triangles of the blocks are in which cells: all pairs, sorted; nothing where there are
 /// more than `most`. Cells are taken to be a little larger than they are: a query may round
 /// coordinates to float.
-std::optional<std::vector<CellEntry>> find_entries(const CellGrid& grid,
+std::optional<std::vector<CellEntry>> find_entries(const BrickGrid& grid,
                                                    const std::vector<SurfaceBlock>& blocks,
                                                    std::size_t most);
 

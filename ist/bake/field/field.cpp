@@ -19,6 +19,10 @@
 namespace ist {
 namespace {
 
+/// Where a mesh meets itself and reaches no further than this, the mesh is the surface: unit frame,
+/// 0.5 % of a solid's size.
+constexpr double kOverlapWidth = 0.01;
+
 /// A surface and how far it is from the solid's, unit frame.
 struct Approximation {
   FieldMesh mesh;
@@ -59,23 +63,30 @@ double tolerance_for(const VertexClusters& clusters, std::size_t triangles, doub
 }
 
 /// Clusters within a tolerance, or nearly: those that turn out to be further off are divided, a few
-/// times over. `choose`: the tolerance for the clusters as they are.
+/// times over, and so are those for which nothing better can be proven. `choose`: the tolerance for
+/// the clusters as they are.
 template <class Choose>
 Approximation clustered(VertexClusters& clusters, SolidSurface& surface, const Choose& choose) {
-  constexpr int kRounds = 5;
+  constexpr int kRounds = 5, kProofs = 3;
+  constexpr double kLoose = 1.75;  // of what is seen: proven more, it is worth another proof
+  Approximation best{{}, HUGE_VAL};
+  int proofs = 0;
   for (int round = 1;; ++round) {
     const double tolerance = choose();
     Clustered found = clusters.within(tolerance);
-    if (found.mesh.triangles.empty()) return {std::move(found.mesh), HUGE_VAL};
+    if (found.mesh.triangles.empty()) return best;
     const FieldHierarchy hierarchy(found.mesh);
     const FieldError error(surface.view(), found.mesh, hierarchy, found.vertex_of);
-    const std::vector<double> seen = error.seen(tolerance);
-    const double most = *std::max_element(seen.begin(), seen.end());
-    if (most <= 1.25 * tolerance || round == kRounds) {
-      const double proven = error.proven(most);
-      return {std::move(found.mesh), proven};
+    std::vector<double> off = error.seen(tolerance);
+    const double seen = *std::max_element(off.begin(), off.end());
+    if (seen <= 1.25 * tolerance || round >= kRounds) {
+      FieldError::Proven proven = error.proven(seen);
+      if (proven.most < best.error) best = {std::move(found.mesh), proven.most};
+      if (proven.most <= kLoose * seen || ++proofs == kProofs) return best;
+      off = std::move(proven.at_vertex);
+      for (double& at : off) at = at > kLoose * seen ? at : 0;
     }
-    clusters.raise(seen, tolerance);
+    clusters.raise(off, tolerance);
   }
 }
 
@@ -144,10 +155,12 @@ std::size_t grid_bytes(const FieldArrays& arrays) {
 }  // namespace
 
 std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error) {
-  std::optional<SolidSurface> surface = SolidSurface::of(solid);
-  // A mesh that meets itself: here its solid will be given a surface of its own, polygonise().
+  std::optional<SolidSurface> surface = SolidSurface::of(
+      solid, max_error > 0 ? std::min(kOverlapWidth, max_error / 2) : kOverlapWidth);
   if (!surface) return std::nullopt;
-  const Approximation near = approximate(*surface, max_error);
+  // The surface's own distance from the solid comes on top.
+  Approximation near = approximate(*surface, max_error > 0 ? max_error - surface->off() : 0);
+  near.error += surface->off();
   if (near.mesh.triangles.empty()) return std::nullopt;
   FieldArrays arrays;
   arrays.header.error = near.error;

@@ -20,8 +20,10 @@ inline constexpr std::size_t kFieldBytes = 1'000'000;
 ///
 /// `max_error`: unit frame, > 0; of a mesh of many triangles as few stay as that allows. 0:
 /// kFieldTriangles at most.
-/// Nothing for a mesh that meets itself. Throws Error where floats cannot be as exact as
-/// `max_error`. Same bytes for any number of threads and on any machine.
+/// Nothing for a mesh that meets itself, where that reaches further than 0.5 % of the solid's size
+/// or half of `max_error`. Throws Error
+/// where floats cannot be as exact as `max_error`. Same bytes for any number of threads and on any
+/// machine.
 std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error);
 
 }  // namespace ist

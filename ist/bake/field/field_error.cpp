@@ -1,8 +1,6 @@
 #include "bake/field/field_error.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
@@ -29,17 +27,6 @@ double between(const Point& a, const Point& b) {
 
 Point half_way(const Point& a, const Point& b) {
   return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
-}
-
-template <class Value>
-double largest(std::size_t count, const Value& value) {
-  return tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, count, 64), 0.0,
-      [&](const tbb::blocked_range<std::size_t>& range, double most) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) most = std::max(most, value(i));
-        return most;
-      },
-      [](double a, double b) { return std::max(a, b); });
 }
 
 /// A part of a field's triangle.
@@ -156,16 +143,30 @@ std::vector<double> FieldError::seen(double enough) const {
   return seen;
 }
 
-double FieldError::proven(double seen) const {
+FieldError::Proven FieldError::proven(double seen) const {
   const FieldNearMesh near_mesh(mesh_);
   const double target = kSlack * seen + kRounding;
-  const double of_field = largest(middle_.size(), [&](std::size_t t) {
-    return near_mesh.bound(part_of(field_, t), target, middle_[t]);
+  std::vector<double> of_field(middle_.size()), of_mesh(mesh_.triangle_count);
+  tbb::parallel_for(std::size_t{0}, of_field.size(), [&](std::size_t t) {
+    of_field[t] = near_mesh.bound(part_of(field_, t), target, middle_[t]);
   });
-  const double of_mesh = largest(mesh_.triangle_count, [&](std::size_t t) {
-    return swept_.bound(static_cast<std::uint32_t>(t), target);
+  tbb::parallel_for(std::size_t{0}, of_mesh.size(), [&](std::size_t t) {
+    of_mesh[t] = swept_.bound(static_cast<std::uint32_t>(t), target);
   });
-  return std::max(of_field, of_mesh) + kRounding;
+  std::vector<double> around(field_.vertices.size());
+  for (std::size_t t = 0; t < of_field.size(); ++t)
+    for (const std::uint32_t v : field_.triangles[t]) around[v] = std::max(around[v], of_field[t]);
+  Proven out;
+  out.at_vertex.resize(mesh_.vertex_count);
+  for (std::size_t v = 0; v < out.at_vertex.size(); ++v) out.at_vertex[v] = around[vertex_of_[v]];
+  for (std::size_t t = 0; t < of_mesh.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      double& at = out.at_vertex[mesh_.triangles[3 * t + k]];
+      at = std::max(at, of_mesh[t]);
+    }
+  for (const std::vector<double>* all : {&of_field, &of_mesh})
+    for (const double bound : *all) out.most = std::max(out.most, bound + kRounding);
+  return out;
 }
 
 }  // namespace ist

@@ -29,7 +29,11 @@ class FieldError {
   /// The second is proven by moving every vertex of the mesh straight to its place in the field:
   /// the triangles on their way sweep all points at which the winding numbers differ, and lie
   /// within e of the field all along. Rounding is included. `seen`: the largest error seen.
-  double proven(double seen) const;
+  struct Proven {
+    double most = 0;                ///< e
+    std::vector<double> at_vertex;  ///< what is shown about each vertex of the mesh
+  };
+  Proven proven(double seen) const;
 
  private:
   const MeshView& mesh_;

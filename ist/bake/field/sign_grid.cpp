@@ -12,8 +12,8 @@
 
 #include <ist/error.h>
 
+#include "bake/field/brick_grid.h"
 #include "bake/field/cell_entries.h"
-#include "bake/field/cell_grid.h"
 #include "bake/field/surface_area.h"
 #include "mesh/triangle_frame.h"
 #include "mesh/winding.h"
@@ -29,7 +29,7 @@ constexpr int kTries = 1000;
 struct DenseBricks {
   std::vector<std::uint64_t> surface, inside;
 
-  explicit DenseBricks(const CellGrid& grid)
+  explicit DenseBricks(const BrickGrid& grid)
       : surface(static_cast<std::size_t>(grid.brick_places())), inside(surface.size()) {}
   static bool bit(const std::vector<std::uint64_t>& of, std::uint64_t cell) {
     return (of[cell / 64] >> cell % 64 & 1) != 0;
@@ -40,7 +40,7 @@ struct DenseBricks {
 };
 
 /// The reference point of no cell is too near to one of the cell's triangles.
-bool references_are_clear(const CellGrid& grid, const std::vector<SurfaceBlock>& blocks,
+bool references_are_clear(const BrickGrid& grid, const std::vector<SurfaceBlock>& blocks,
                           const std::vector<CellEntry>& entries) {
   std::vector<std::uint8_t> clear(entries.size());
   const double least2 = kNearest * grid.cell * (kNearest * grid.cell);
@@ -52,7 +52,7 @@ bool references_are_clear(const CellGrid& grid, const std::vector<SurfaceBlock>&
         grid.reference(static_cast<std::uint32_t>(kBrickWidth * x + bit % 4),
                        static_cast<std::uint32_t>(kBrickWidth * y + bit / 4 % 4),
                        static_cast<std::uint32_t>(kBrickWidth * z + bit / 16));
-    const TriangleCorners t =
+    const LaneCorners t =
         corners_of(blocks[entries[i].triangle / kWidth], entries[i].triangle % kWidth);
     const TriangleFrame<double> frame = make_triangle_frame(t.p[0], t.p[1], t.p[2]);
     clear[i] = closest_in_frame(frame, p.data()).distance2 > least2;
@@ -62,7 +62,7 @@ bool references_are_clear(const CellGrid& grid, const std::vector<SurfaceBlock>&
 
 /// Sets the inside bits, a plane of bricks at a time. From a cell without surface to the next along
 /// x the winding number does not change.
-void find_inside(const CellGrid& grid, const MeshView& surface, DenseBricks& bricks) {
+void find_inside(const BrickGrid& grid, const MeshView& surface, DenseBricks& bricks) {
   tbb::parallel_for(std::uint32_t{0}, grid.bricks[2], [&](std::uint32_t plane) {
     for (std::uint32_t z = kBrickWidth * plane; z < kBrickWidth * (plane + 1); ++z)
       for (std::uint32_t y = 0; y < grid.cells(1); ++y) {
@@ -90,7 +90,7 @@ std::uint32_t list_bytes(std::size_t blocks, const std::vector<CellEntry>& entri
 }
 
 /// What write_grid() will fill.
-std::size_t bytes_of(const CellGrid& grid, std::size_t blocks,
+std::size_t bytes_of(const BrickGrid& grid, std::size_t blocks,
                      const std::vector<CellEntry>& entries) {
   std::size_t cells = 0, bricks = 0;
   for (std::size_t i = 0; i < entries.size(); ++i) {
@@ -101,7 +101,7 @@ std::size_t bytes_of(const CellGrid& grid, std::size_t blocks,
          bricks * sizeof(CellBrick) + (cells + entries.size()) * list_bytes(blocks, entries);
 }
 
-void write_grid(const CellGrid& grid, const DenseBricks& bricks,
+void write_grid(const BrickGrid& grid, const DenseBricks& bricks,
                 const std::vector<CellEntry>& entries, FieldArrays& arrays) {
   std::copy_n(grid.low, 3, arrays.header.low);
   std::copy_n(grid.bricks, 3, arrays.header.bricks);
@@ -159,7 +159,7 @@ struct Measures {
 /// What a grid of such cells takes; infinite where that is more than `most` by far.
 double bytes_for(const Measures& measures, double edge, const std::vector<SurfaceBlock>& blocks,
                  std::size_t most) {
-  const CellGrid grid(measures.low, measures.high, edge);
+  const BrickGrid grid(measures.low, measures.high, edge);
   const double places = grid.brick_places() * sizeof(std::uint32_t);
   if (places > 2.0 * static_cast<double>(most)) return HUGE_VAL;
   const auto entries = find_entries(grid, blocks, most);
@@ -190,7 +190,7 @@ void lay_sign_grid(const MeshView& surface, std::size_t bytes, FieldArrays& arra
   const Measures measures(surface);
   double edge = edge_for(measures, arrays.blocks, bytes);
   for (int attempt = 0; attempt < kTries; ++attempt) {
-    const CellGrid grid(measures.low, measures.high, edge);
+    const BrickGrid grid(measures.low, measures.high, edge);
     const bool coarsest = edge > measures.largest_side();
     const auto entries = find_entries(grid, arrays.blocks,
                                       coarsest ? std::numeric_limits<std::uint32_t>::max() : bytes);

@@ -9,13 +9,13 @@
 namespace ist {
 
 /// Cubes of cells, four along an edge, over the bounds of the surface.
-struct CellGrid {
+struct BrickGrid {
   static constexpr double kMargin = 0.0625;  ///< of a cell, from the lowest corner of the surface
 
   double low[3], cell;
   std::uint32_t bricks[3];
 
-  CellGrid(const double from[3], const double to[3], double edge) : cell(edge) {
+  BrickGrid(const double from[3], const double to[3], double edge) : cell(edge) {
     for (int k = 0; k < 3; ++k) {
       low[k] = from[k] - kMargin * cell;
       bricks[k] = static_cast<std::uint32_t>(

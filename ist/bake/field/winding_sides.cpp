@@ -1,0 +1,89 @@
+#include "bake/field/winding_sides.h"
+
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+#include <cstddef>
+
+#include "mesh/disjoint_sets.h"
+#include "mesh/edge_table.h"
+
+namespace ist {
+namespace {
+
+using Point = Eigen::Vector3d;
+
+/// Triangles that hang together across edges of two sides, those `apart` by themselves. Where they
+/// meet no others, the winding number on either side of such a group is the same everywhere.
+struct Groups {
+  std::vector<std::uint32_t> of_triangle;     ///< named by its first triangle
+  std::vector<std::uint32_t> representative;  ///< [group] a triangle of largest area
+};
+
+Groups find_groups(const MeshView& mesh, const std::vector<std::uint8_t>& apart) {
+  std::vector<Triangle> triangles(mesh.triangle_count);
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    triangles[t] = {mesh.triangles[3 * t], mesh.triangles[3 * t + 1], mesh.triangles[3 * t + 2]};
+  const EdgeTable edges(triangles);
+  DisjointSets sets(triangles.size());
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    if (const auto sides = edges.sides(e);
+        sides.size() == 2 && apart[sides[0] / 3] == 0 && apart[sides[1] / 3] == 0)
+      sets.unite(sides[0] / 3, sides[1] / 3);
+  Groups groups;
+  groups.of_triangle.resize(triangles.size());
+  groups.representative.resize(triangles.size(), kNoTriangle);
+  std::vector<double> largest(triangles.size(), -1);
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    const std::uint32_t group = groups.of_triangle[t] = sets.find(t);
+    const auto [a, b, c] = corners_in(mesh, t);
+    const double area = (b - a).cross(c - a).squaredNorm();
+    if (area > largest[group]) {
+      largest[group] = area;
+      groups.representative[group] = t;
+    }
+  }
+  return groups;
+}
+
+}  // namespace
+
+std::array<Eigen::Vector3d, 3> corners_in(const MeshView& mesh, std::uint32_t triangle) {
+  std::array<Point, 3> corners;
+  for (std::size_t k = 0; k < 3; ++k)
+    corners[k] = Eigen::Map<const Point>(
+        mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{triangle} + k]});
+  return corners;
+}
+
+std::optional<int> winding_outside(const MeshSolid& solid, std::uint32_t triangle,
+                                   const std::array<Eigen::Vector3d, 3>& part) {
+  const auto& [a, b, c] = part;
+  const Point normal = (b - a).cross(c - a);
+  const double length = std::sqrt(normal.squaredNorm());
+  if (!(length > 0)) return std::nullopt;
+  const Point middle = (a + b + c) / 3;
+  for (double away = 0x1p-8; away > 0x1p-44; away /= 4) {
+    const Point p = middle + normal * (away / length);
+    if (solid.closest_point(p).triangle == triangle) return solid.winding_number(p);
+  }
+  return std::nullopt;
+}
+
+std::vector<std::optional<int>> windings_outside(const MeshSolid& solid,
+                                                 const std::vector<std::uint8_t>& apart) {
+  const MeshView& mesh = solid.arrays();
+  const Groups groups = find_groups(mesh, apart);
+  std::vector<std::optional<int>> outside(mesh.triangle_count);
+  tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t t) {
+    const std::uint32_t of = groups.representative[t];
+    if (of != kNoTriangle && apart[of] == 0)
+      outside[t] = winding_outside(solid, of, corners_in(mesh, of));
+  });
+  // Groups are named by their first triangle.
+  for (std::uint32_t t = 0; t < mesh.triangle_count; ++t)
+    outside[t] = outside[groups.of_triangle[t]];
+  return outside;
+}
+
+}  // namespace ist
