@@ -163,7 +163,8 @@ std::map<std::string, Both> measure(const std::vector<Row>& rows, Assets& assets
       m.volume.push_back(100 * std::abs(got.volume / row.volume - 1));
       m.nothing += got.volume > 0 ? 0 : 1;
       if (row.kind == "contain") continue;  // feels no force
-      m.angle.push_back(degrees_between(got.translation_gradient, row.force));
+      // Who reads 0 has no direction: that is counted by itself.
+      if (got.volume > 0) m.angle.push_back(degrees_between(got.translation_gradient, row.force));
       // A ball has no torque about its own centre: a tenth of what the force has at B's rim is the
       // least that an error is measured by. The meshes' diameter is 1.
       const double least = 0.1 * row.force.norm() * 0.5 * row.scale_b;

@@ -682,6 +682,28 @@ TEST(FieldQuery, SeparationIsTheNearestSpheres) {
   }
 }
 
+// Far over a large terrain whose heights are known to lie within bounds, nobody looks at all of it.
+TEST(FieldQuery, SeparationFromALargeTerrain) {
+  Workspace workspace;
+  std::vector<float> heights(1000 * 1000);
+  for (std::size_t i = 0; i < heights.size(); ++i) heights[i] = static_cast<float>(i % 7) * 0.001f;
+  HeightField terrain;
+  terrain.heights = heights.data();
+  terrain.columns = terrain.rows = 1000;
+  terrain.spacing[0] = terrain.spacing[1] = 0.01;
+  terrain.lowest = 0, terrain.highest = 0.0061;
+  for (const double z : {1.0, 3.0, 50.0}) {
+    const PlacedTree b{cube().view(), pose_of(Quaterniond::Identity(), {5, 5, z}), 1};
+    const Separation got = separation(PlacedField{terrain, {}, 1}, b, {}, workspace);
+    double lowest = std::numeric_limits<double>::infinity();
+    for (const testing::WorldSphere& s : testing::world_spheres(b, Measure::inner))
+      lowest = std::min(lowest, s.centre.z() - s.r);
+    // A ridge of triangles runs under every sphere, to within the grid's own spacing.
+    EXPECT_GE(got.distance, lowest - 0.0061);
+    EXPECT_LE(got.distance, lowest);
+  }
+}
+
 // ---- what nobody should hand in
 
 struct Garbage {

@@ -202,12 +202,13 @@ FieldSample HeightShape::nearest(const Eigen::Vector3d& x) const noexcept {
       point = Eigen::Vector3d(found[0], found[1], found[2]);
     }
   };
-  // Ring by ring, as long as one may come nearer.
+  // Ring by ring, as long as one may come nearer, all heights being within their bounds.
+  const double apart = std::max({0.0, x.z() - field_.highest, field_.lowest - x.z()});
   const double step = std::min(field_.spacing[0], field_.spacing[1]);
   const std::int64_t most = std::max(last[0], last[1]) + 1;
   for (std::int64_t ring = 0; ring <= most; ++ring) {
     const double least = static_cast<double>(ring - 1) * step;
-    if (least > 0 && least * least >= best2) break;
+    if (least > 0 && least * least + apart * apart >= best2) break;
     for (std::int64_t i = -ring; i <= ring; ++i) {
       const bool side = i == -ring || i == ring;
       for (std::int64_t j = -ring; j <= ring; j += side || ring == 0 ? 1 : 2 * ring)
