@@ -3,6 +3,7 @@
 #include <tbb/task_group.h>
 
 #include <algorithm>
+#include <chrono>
 #include <functional>
 #include <utility>
 
@@ -59,8 +60,7 @@ std::vector<std::size_t> detail_counts(std::size_t spheres) {
   return counts;
 }
 
-/// Work on trees and the field, done while a backend leaves the caller's threads idle, or when they
-/// are free.
+/// Work on trees, done while a backend leaves the caller's threads idle, or when they are free.
 class HostWork {
  public:
   explicit HostWork(bool threads_are_idle) : at_once_(threads_are_idle) {}
@@ -101,7 +101,7 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   AssetArrays arrays;
   std::vector<std::uint32_t> inner_order;
   HostWork host(backend.leaves_threads_idle());
-  host.add([&] { arrays.field = field.arrays(); });
+  if (backend.leaves_threads_idle()) field.start();
 
   const SpherePacking packing = backend.pack(settings, progress);
   const std::size_t count = packing.spheres.size();
@@ -130,20 +130,34 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
 
   Stage stage("tree", progress);
   stage.step(count, 0);
+  field.start();
   host.finish();
+  arrays.field = field.wait([&] { stage.step(count, 0.5); });
   arrays.inner_tree =
       tree_from_order(arrays.inner_spheres, arrays.cover_radii, std::move(inner_order));
   stage.step(count, 1);
   return arrays;
 }
 
-std::shared_ptr<const FieldArrays> SolidField::arrays() {
-  oneapi::tbb::collaborative_call_once(made_, [this] {
-    if (!settings_.wanted) return;
-    if (auto built = build_field(solid_, settings_.error / solid_.frame().scale()))
-      arrays_ = std::make_shared<const FieldArrays>(*std::move(built));
-  });
-  return arrays_;
+void SolidField::start() {
+  if (made_.valid()) return;
+  made_ = std::async(std::launch::async, [this]() -> std::shared_ptr<const FieldArrays> {
+            if (!settings_.wanted) return nullptr;
+            try {
+              return thread_arena(threads_).execute([this]() -> std::shared_ptr<const FieldArrays> {
+                auto built = build_field(solid_, settings_.error / solid_.frame().scale(), stop_);
+                return built ? std::make_shared<const FieldArrays>(*std::move(built)) : nullptr;
+              });
+            } catch (const WorkStop::Stopped&) {
+              return nullptr;
+            }
+          }).share();
+}
+
+std::shared_ptr<const FieldArrays> SolidField::wait(const std::function<void()>& meanwhile) {
+  start();
+  while (made_.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) meanwhile();
+  return made_.get();
 }
 
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
@@ -159,7 +173,7 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   return thread_arena(settings.threads).execute([&] {
     const MeshSolid solid(mesh);
     const auto backend = make_backend(solid, {settings.device, settings.gpu});
-    SolidField field(solid, settings.field);
+    SolidField field(solid, settings.field, settings.threads);
     return bake_solid(mesh, solid, field, *backend, settings, progress);
   });
 }

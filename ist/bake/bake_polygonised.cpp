@@ -34,7 +34,7 @@ Asset bake_mesh_of(const MeshSolid& solid, const PackingSettings& settings, cons
   ClosedMesh described;  // the solid holds its geometry
   described.name = name;
   const auto backend = make_backend(solid, {settings.device, settings.gpu});
-  SolidField field(solid, settings.field);
+  SolidField field(solid, settings.field, settings.threads);
   return bake_solid(described, solid, field, *backend, settings, progress);
 }
 
@@ -50,7 +50,7 @@ Asset bake_field(const Solid& solid, const PackingSettings& settings,
   const ClosedMesh mesh = close_mesh(std::move(made.mesh), meshing.name);
   const MeshSolid mesh_solid(mesh);
   const auto backend = make_polygonised_backend(solid, mesh_solid, made.error);
-  SolidField field(mesh_solid, settings.field);
+  SolidField field(mesh_solid, settings.field, settings.threads);
   AssetArrays arrays = bake_arrays(mesh, mesh_solid, field, *backend, settings, progress);
   const double scale = mesh_solid.frame().scale();
   if (arrays.field != nullptr) {

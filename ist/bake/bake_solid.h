@@ -2,30 +2,42 @@
 
 #include <ist/bake.h>
 
-#include <oneapi/tbb/collaborative_call_once.h>
-
+#include <functional>
+#include <future>
 #include <memory>
 
 #include "asset/asset_writer.h"
 #include "backend/solid_backend.h"
 #include "mesh/mesh_solid.h"
+#include "stage/work_stop.h"
 
 namespace ist {
 
-/// A solid's field, made when it is first asked for and shared by all its assets.
+/// A solid's field, made once on threads of its own and shared by all its assets. It ends with
+/// this.
 class SolidField {
  public:
-  SolidField(const MeshSolid& solid, const FieldSettings& settings)
-      : solid_(solid), settings_(settings) {}
+  /// `threads`: 0 = all cores. `time_limit` [s] from now, after which there is none; 0: no limit.
+  SolidField(const MeshSolid& solid, const FieldSettings& settings, unsigned threads,
+             double time_limit = 0)
+      : solid_(solid), settings_(settings), threads_(threads), stop_(time_limit) {}
+  ~SolidField() { stop_.stop(); }
+  SolidField(const SolidField&) = delete;
+  SolidField& operator=(const SolidField&) = delete;
 
-  /// Null: not wanted, or the mesh meets itself. From any thread.
-  std::shared_ptr<const FieldArrays> arrays();
+  void start();
+
+  /// Starts it if nobody has, and asks `meanwhile` twenty times a second until it is there. Null:
+  /// not wanted, the mesh reaches far into itself, or there was no time. Throws Error as
+  /// build_field() does.
+  std::shared_ptr<const FieldArrays> wait(const std::function<void()>& meanwhile);
 
  private:
   const MeshSolid& solid_;
   const FieldSettings settings_;
-  oneapi::tbb::collaborative_once_flag made_;
-  std::shared_ptr<const FieldArrays> arrays_;
+  const unsigned threads_;
+  WorkStop stop_;
+  std::shared_future<std::shared_ptr<const FieldArrays>> made_;  ///< last: waits for the thread
 };
 
 /// bake() of a mesh whose solid, field and backend are at hand, on the threads of the current

@@ -66,17 +66,19 @@ double tolerance_for(const VertexClusters& clusters, std::size_t triangles, doub
 /// times over, and so are those for which nothing better can be proven. `choose`: the tolerance for
 /// the clusters as they are.
 template <class Choose>
-Approximation clustered(VertexClusters& clusters, SolidSurface& surface, const Choose& choose) {
-  constexpr int kRounds = 5, kProofs = 3;
-  constexpr double kLoose = 1.75;  // of what is seen: proven more, it is worth another proof
+Approximation clustered(VertexClusters& clusters, SolidSurface& surface, const WorkStop& stop,
+                        const Choose& choose) {
+  constexpr int kRounds = 5, kProofs = 2;
+  constexpr double kLoose = 3;  // of what is seen: proven more, it is worth another proof
   Approximation best{{}, HUGE_VAL};
   int proofs = 0;
   for (int round = 1;; ++round) {
+    stop.look();
     const double tolerance = choose();
     Clustered found = clusters.within(tolerance);
     if (found.mesh.triangles.empty()) return best;
     const FieldHierarchy hierarchy(found.mesh);
-    const FieldError error(surface.view(), found.mesh, hierarchy, found.vertex_of);
+    const FieldError error(surface.view(), found.mesh, hierarchy, found.vertex_of, stop);
     std::vector<double> off = error.seen(tolerance);
     const double seen = *std::max_element(off.begin(), off.end());
     if (seen <= 1.25 * tolerance || round >= kRounds) {
@@ -92,11 +94,11 @@ Approximation clustered(VertexClusters& clusters, SolidSurface& surface, const C
 
 /// The coarsest clusters found that keep within the error; nothing where none were.
 std::optional<Approximation> clustered_within(VertexClusters& clusters, SolidSurface& surface,
-                                              double max_error) {
+                                              double max_error, const WorkStop& stop) {
   std::optional<Approximation> best;
   double fine = 0, coarse = HUGE_VAL, tolerance = max_error / 2;
   for (int attempt = 0; attempt < 8 && coarse > 1.05 * fine; ++attempt) {
-    Approximation tried = clustered(clusters, surface, [&] { return tolerance; });
+    Approximation tried = clustered(clusters, surface, stop, [&] { return tolerance; });
     const double ratio = max_error / tried.error;
     if (tried.error <= max_error) {
       fine = tolerance;
@@ -112,21 +114,22 @@ std::optional<Approximation> clustered_within(VertexClusters& clusters, SolidSur
 }
 
 /// Fewer triangles than the surface has; nothing where they cannot be as exact as is asked for.
-std::optional<Approximation> simplified(SolidSurface& surface, double max_error) {
+std::optional<Approximation> simplified(SolidSurface& surface, double max_error,
+                                        const WorkStop& stop) {
   // Cells of edge c span about 3 area / c² triangles.
   const double cell = std::sqrt(3 * surface_area(surface.arrays()) / kFieldTriangles);
   const int levels = max_error > 0 ? 10 : 7;
   VertexClusters clusters(surface.arrays(), 8 * cell, levels);
-  if (max_error > 0) return clustered_within(clusters, surface, max_error);
+  if (max_error > 0) return clustered_within(clusters, surface, max_error, stop);
   double guess = cell / 32;
-  return clustered(clusters, surface,
+  return clustered(clusters, surface, stop,
                    [&] { return guess = tolerance_for(clusters, kFieldTriangles, guess); });
 }
 
-Approximation approximate(SolidSurface& surface, double max_error) {
+Approximation approximate(SolidSurface& surface, double max_error, const WorkStop& stop) {
   const std::size_t triangles = surface.arrays().triangle_count;
   if (triangles > kFieldTriangles) {
-    std::optional<Approximation> few = simplified(surface, max_error);
+    std::optional<Approximation> few = simplified(surface, max_error, stop);
     if (few && !few->mesh.triangles.empty() && few->mesh.triangles.size() < triangles)
       return std::move(*few);
   }
@@ -154,12 +157,13 @@ std::size_t grid_bytes(const FieldArrays& arrays) {
 
 }  // namespace
 
-std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error) {
+std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error,
+                                       const WorkStop& stop) {
   std::optional<SolidSurface> surface = SolidSurface::of(
       solid, max_error > 0 ? std::min(kOverlapWidth, max_error / 2) : kOverlapWidth);
   if (!surface) return std::nullopt;
   // The surface's own distance from the solid comes on top.
-  Approximation near = approximate(*surface, max_error > 0 ? max_error - surface->off() : 0);
+  Approximation near = approximate(*surface, max_error > 0 ? max_error - surface->off() : 0, stop);
   near.error += surface->off();
   if (near.mesh.triangles.empty()) return std::nullopt;
   FieldArrays arrays;

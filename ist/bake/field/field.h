@@ -6,6 +6,7 @@
 
 #include "asset/asset_writer.h"
 #include "mesh/mesh_solid.h"
+#include "stage/work_stop.h"
 
 namespace ist {
 
@@ -22,8 +23,9 @@ inline constexpr std::size_t kFieldBytes = 1'000'000;
 /// kFieldTriangles at most.
 /// Nothing for a mesh that meets itself, where that reaches further than 0.5 % of the solid's size
 /// or half of `max_error`. Throws Error
-/// where floats cannot be as exact as `max_error`. Same bytes for any number of threads and on any
-/// machine.
-std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error);
+/// where floats cannot be as exact as `max_error`, WorkStop::Stopped if `stop` ends it. Same bytes
+/// for any number of threads and on any machine.
+std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error,
+                                       const WorkStop& stop = WorkStop());
 
 }  // namespace ist

@@ -120,14 +120,17 @@ Part part_of(const FieldMesh& field, std::size_t triangle) {
 }  // namespace
 
 FieldError::FieldError(const MeshView& mesh, const FieldMesh& field,
-                       const FieldHierarchy& hierarchy, const std::vector<std::uint32_t>& vertex_of)
+                       const FieldHierarchy& hierarchy, const std::vector<std::uint32_t>& vertex_of,
+                       const WorkStop& stop)
     : mesh_(mesh),
       field_(field),
       vertex_of_(vertex_of),
+      stop_(stop),
       swept_(mesh, field, hierarchy, vertex_of),
       middle_(field.triangles.size()) {
   const FieldNearMesh near_mesh(mesh);
   tbb::parallel_for(std::size_t{0}, middle_.size(), [&](std::size_t t) {
+    stop_.look();
     middle_[t] = near_mesh.distance(part_of(field, t).centre());
   });
 }
@@ -138,6 +141,7 @@ std::vector<double> FieldError::seen(double enough) const {
     for (const std::uint32_t v : field_.triangles[t]) around[v] = std::max(around[v], middle_[t]);
   std::vector<double> seen(mesh_.vertex_count);
   tbb::parallel_for(std::uint32_t{0}, mesh_.vertex_count, [&](std::uint32_t v) {
+    stop_.look();
     seen[v] = std::max(around[vertex_of_[v]], swept_.at_vertex(v, enough));
   });
   return seen;
@@ -148,9 +152,11 @@ FieldError::Proven FieldError::proven(double seen) const {
   const double target = kSlack * seen + kRounding;
   std::vector<double> of_field(middle_.size()), of_mesh(mesh_.triangle_count);
   tbb::parallel_for(std::size_t{0}, of_field.size(), [&](std::size_t t) {
+    stop_.look();
     of_field[t] = near_mesh.bound(part_of(field_, t), target, middle_[t]);
   });
   tbb::parallel_for(std::size_t{0}, of_mesh.size(), [&](std::size_t t) {
+    stop_.look();
     of_mesh[t] = swept_.bound(static_cast<std::uint32_t>(t), target);
   });
   std::vector<double> around(field_.vertices.size());

@@ -7,6 +7,7 @@
 #include "bake/field/field_mesh.h"
 #include "bake/field/swept_error.h"
 #include "mesh/mesh_view.h"
+#include "stage/work_stop.h"
 
 namespace ist {
 
@@ -15,8 +16,9 @@ class FieldError {
  public:
   /// All must outlive this. `mesh` has a hierarchy; `vertex_of`: a mesh vertex's place in the
   /// field.
+  /// What is asked of it may be ended by `stop`.
   FieldError(const MeshView& mesh, const FieldMesh& field, const FieldHierarchy& hierarchy,
-             const std::vector<std::uint32_t>& vertex_of);
+             const std::vector<std::uint32_t>& vertex_of, const WorkStop& stop);
 
   /// What is seen at samples, by vertex of the mesh: its distance from the field, or that of the
   /// middle of a field's triangle about its place from the mesh. Exact where above `enough`.
@@ -39,6 +41,7 @@ class FieldError {
   const MeshView& mesh_;
   const FieldMesh& field_;
   const std::vector<std::uint32_t>& vertex_of_;
+  const WorkStop& stop_;
   SweptError swept_;
   std::vector<double> middle_;  ///< [field triangle] its middle's distance from the mesh
 };

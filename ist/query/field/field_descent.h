@@ -58,16 +58,8 @@ class FieldDescent {
     const double most = probes_.header->volume_sum * cube * (1 + 1e-9);
     const double lowest = std::max(0.0, sum.volume - sum.error);
     const double highest =
-        std::max(lowest, std::min(most, sum.volume + sum.error + (1 + 1e-9) * unopened_));
-    if (unopened_ > 0) {
-      // In or out, who knows; the push grows with the volume, as far as anybody can tell.
-      const double guess = 0.5 * unopened_;
-      if (sum.volume > 0) {
-        sum.scale(1 + guess / sum.volume);
-      } else {
-        sum.volume = guess;
-      }
-    }
+        std::max(lowest, std::min(most, sum.volume + sum.error + (1 + 1e-9) * left_.volume));
+    left_.add_to(sum);
     Penetration result = world_answer(sum, lowest, highest, pose_);
     result.node_visits = budget_.visits();
     result.sphere_pairs = pairs_ + held_.spheres;
@@ -90,13 +82,14 @@ class FieldDescent {
     for (std::size_t i = 0; i < now.size; ++i) {
       const std::uint32_t block = now.a[i];
       if (min_radius_ > 0 && probes_.ball(level, block).r * map_.scale < min_radius_) {
-        unopened_ += volume_of(level, block);
+        left_.add(probes_, level, block, map_, bins_);
         stopped_ = true;
         continue;
       }
       if (budget_.grant(1) == 0 || next.size + kWidth > scratch_.capacity) {
         leave(level, i);
-        unopened_ += waiting_;
+        for (std::size_t k = 0; k < next.size; ++k)
+          left_.add(probes_, level - 1, next.a[k], map_, bins_);
         return false;
       }
       ProbeBalls balls;
@@ -159,14 +152,14 @@ class FieldDescent {
 
   bool accurate(int level) const noexcept {
     if (!(limits_.relative_error > 0) || level == probes_.top) return false;
-    const double left = waiting_ + unopened_;
+    const double left = waiting_ + left_.volume;
     const double sure = total_.overlap.volume + whole_spheres(held_, map_).volume;
     return left <= limits_.relative_error * (sure + left);
   }
 
   void leave(int level, std::size_t from) noexcept {
     const PairList& now = scratch_.now;
-    for (std::size_t i = from; i < now.size; ++i) unopened_ += volume_of(level, now.a[i]);
+    for (std::size_t i = from; i < now.size; ++i) left_.add(probes_, level, now.a[i], map_, bins_);
     stopped_ = true;
   }
 
@@ -181,8 +174,8 @@ class FieldDescent {
   Budget budget_;
   ProbeTotal total_;
   SubtreeSums held_;
-  double waiting_ = 0;   ///< volume of the nodes of the current list
-  double unopened_ = 0;  ///< of those that were left
+  double waiting_ = 0;  ///< volume of the nodes of the current list
+  LeftNodes left_;
   std::uint32_t pairs_ = 0;
   bool stopped_ = false;
 };

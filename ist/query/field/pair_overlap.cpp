@@ -15,11 +15,11 @@
 namespace ist {
 namespace {
 
-// Ratio of grains up to which trees are summed by lenses alone, and from which on exactly alone.
-constexpr double kAlike = 1.25, kUnlike = 4;
-// Overlap in spheres of the coarser grain up to which trees of twice the other's grain are summed
-// exactly, more or less as they are more or less unlike: there lenses are 2 % and more in error, and
-// few spheres meet the surface …
+// Ratio of grains up to which trees are summed by lenses alone, however light the contact; from
+// which on light ones are summed exactly; and from which on all are.
+constexpr double kAlike = 1.25, kOther = 2, kUnlike = 4;
+// A contact is light up to an overlap of so many spheres of the coarser grain: there lenses are 2 %
+// and more in error, and few spheres meet the surface …
 constexpr double kFewSpheres = 2;
 // … if a sphere meets no more triangles than the one; never if it meets more than the other.
 constexpr double kFewTriangles = 10, kManyTriangles = 20;
@@ -84,8 +84,9 @@ PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const Plac
   const double worth =
       1 - smooth_step((triangles - kFewTriangles) / (kManyTriangles - kFewTriangles));
   method.exact = worth > 0;
-  method.full = worth * kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) *
-                (ratio / kAlike - 1) / (1 - unlike);
+  method.share = smooth_step((ratio - kAlike) / (kOther - kAlike));
+  method.full =
+      worth * kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) / (1 - unlike);
   method.none = kHandover * method.full;
   return method;
 }
@@ -95,11 +96,11 @@ namespace {
 /// Weight and slope where lenses say `volume`, A's unit frame.
 std::pair<double, double> weight_at(const PairMethod& method, double volume) noexcept {
   if (!method.exact) return {0, 0};
-  if (!method.lenses || !(volume > method.full)) return {1, 0};
+  if (!method.lenses || !(volume > method.full)) return {method.share, 0};
   const double width = method.none - method.full;
   const double t = (volume - method.full) / width;
   if (!(t < 1)) return {0, 0};
-  return {1 - smooth_step(t), -6 * t * (1 - t) / width};
+  return {method.share * (1 - smooth_step(t)), method.share * (-6 * t * (1 - t) / width)};
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ struct PairMethod {
   /// Overlap by lenses, A's unit frame: up to `full` the exact sum answers alone, from `none` on
   /// the lenses do.
   double full = 0, none = 0;
+  double share = 1;  ///< what "alone" is of trees that are all but alike: the rest is the lenses'
 };
 
 /// An answer whose gradients are by a motion of `moving` about its origin, as one by a motion of

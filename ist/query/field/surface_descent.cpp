@@ -10,9 +10,6 @@
 namespace ist {
 namespace {
 
-// What is not opened may be in or out.
-constexpr double kUnknownShare = 0.5;
-
 // Triangles of a block, or a ball that is to be placed, up to which each is looked at with all of
 // sixteen balls.
 constexpr int kFewTriangles = 4;
@@ -81,7 +78,7 @@ void SurfaceDescent::run() noexcept {
          typical_cube(balls_, surface_level_) >= cube * probes_.typical_cube(probe_level_));
     if (min_radius_ > 0) drop_small();
     if (limits_.relative_error > 0 && held_.spheres > 0) {
-      const double undecided = waiting() + unopened_;
+      const double undecided = waiting() + left_.volume;
       if (undecided <= limits_.relative_error * (overlap().volume + undecided)) {
         leave(0);
         return;
@@ -307,7 +304,7 @@ void SurfaceDescent::sum_leaves() noexcept {
       return;
     }
     if (by_error &&
-        left + unopened_ <= limits_.relative_error * (overlap().volume + left + unopened_)) {
+        left + left_.volume <= limits_.relative_error * (overlap().volume + left + left_.volume)) {
       leave(from);
       return;
     }
@@ -414,12 +411,11 @@ double SurfaceDescent::waiting() const noexcept {
 
 void SurfaceDescent::drop_small() noexcept {
   PairList& now = scratch_.now;
-  const double cube = map_.scale * map_.scale * map_.scale;
   std::size_t kept = 0;
   for (std::size_t from = 0; from < now.size;) {
     const std::size_t end = group_end(from);
     if (probes_.ball(probe_level_, now.b[from]).r * map_.scale < min_radius_) {
-      unopened_ += probes_.sums(probe_level_, now.b[from]).volume * cube;
+      left_.add(probes_, probe_level_, now.b[from], map_, bins_);
       stopped_ = true;
       from = end;
       continue;
@@ -434,9 +430,8 @@ void SurfaceDescent::drop_small() noexcept {
 
 void SurfaceDescent::leave(std::size_t from) noexcept {
   const PairList& now = scratch_.now;
-  const double cube = map_.scale * map_.scale * map_.scale;
   for (; from < now.size; from = group_end(from))
-    unopened_ += probes_.sums(probe_level_, now.b[from]).volume * cube;
+    left_.add(probes_, probe_level_, now.b[from], map_, bins_);
   stopped_ = true;
 }
 
@@ -464,15 +459,8 @@ Penetration SurfaceDescent::penetration() const noexcept {
   const double most = probes_.header->volume_sum * (scale * scale * scale) * (1 + 1e-9);
   const double lowest = std::max(0.0, sum.volume - sum.error);
   const double highest =
-      std::max(lowest, std::min(most, sum.volume + sum.error + (1 + 1e-9) * unopened_));
-  if (unopened_ > 0) {
-    // The push grows with the volume, as far as anybody can tell.
-    const double guess = kUnknownShare * unopened_;
-    if (sum.volume > 0)
-      sum.scale(1 + guess / sum.volume);
-    else
-      sum.volume = guess;
-  }
+      std::max(lowest, std::min(most, sum.volume + sum.error + (1 + 1e-9) * left_.volume));
+  left_.add_to(sum);
   Penetration result = world_answer(sum, lowest, highest, pose_);
   result.node_visits = budget_.visits();
   result.sphere_pairs = pairs_ + held_.spheres;

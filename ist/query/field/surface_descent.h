@@ -110,7 +110,7 @@ class SurfaceDescent {
   std::uint32_t settled_[kSettled];
   std::size_t settled_count_ = 0;
   int settled_level_ = 0;
-  double unopened_ = 0;  ///< volume of the nodes that were not opened
+  LeftNodes left_;
   std::uint32_t pairs_ = 0;
   bool stopped_ = false;
 };
