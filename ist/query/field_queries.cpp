@@ -57,7 +57,8 @@ std::optional<RelativePose> pose_of(const PlacedField& a, const PlacedTree& b) n
 
 QueryStatus invalid() noexcept { return QueryStatus::invalid_input; }
 
-Penetration penetrate(const PlacedField& a, const PlacedTree& b, Measure measure,
+/// `tree`: of B, which bins refer to.
+Penetration penetrate(const PlacedField& a, const PlacedTree& b, const SphereTree& tree,
                       const DescentLimits& limits, Workspace& workspace,
                       ContactBins* bins) noexcept {
   const auto refused = [] {
@@ -67,7 +68,6 @@ Penetration penetrate(const PlacedField& a, const PlacedTree& b, Measure measure
   };
   const std::optional<RelativePose> pose = pose_of(a, b);
   if (!pose || workspace.impl() == nullptr) return refused();
-  const SphereTree tree = sphere_tree(b.tree, measure);
   if (bins != nullptr) bins->start(tree, true);
   const auto run = [&](auto& descent) {
     descent.run();
@@ -91,7 +91,8 @@ Penetration penetrate(const PlacedField& a, const PlacedTree& b, Measure measure
 
 Penetration penetration(const PlacedField& a, const PlacedTree& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept {
-  return penetrate(a, b, settings.measure, limits_of(settings), workspace, nullptr);
+  const SphereTree tree = sphere_tree(b.tree, settings.measure);
+  return penetrate(a, b, tree, limits_of(settings), workspace, nullptr);
 }
 
 Separation separation(const PlacedField& a, const PlacedTree& b, const SeparationSettings& settings,
@@ -129,12 +130,12 @@ ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
     return result;
   }
   ContactBins& bins = workspace.impl()->contact;
-  result.penetration = penetrate(a, b, settings.measure, limits_of(settings), workspace, &bins);
+  const SphereTree tree = sphere_tree(b.tree, settings.measure);
+  result.penetration = penetrate(a, b, tree, limits_of(settings), workspace, &bins);
   if (result.penetration.status == invalid()) return result;
   const std::optional<RelativePose> pose = pose_of(a, b);
   if (!pose) return result;
-  const double radius =
-      sphere_tree(b.tree, settings.measure).header->root[3] * pose->a_from_b.scale;
+  const double radius = tree.header->root[3] * pose->a_from_b.scale;
   result.count = write_patches({bins, bins.collect(Precision::float64), *pose, radius},
                                result.penetration, patches);
   finish_patches(patches.first(result.count), 2 * pose->unit_a * radius);
