@@ -11,7 +11,7 @@
 
 #include "query/field/probe_sum.h"
 #include "query/probe/cap.h"
-#include "query/probe/surface_patch.h"
+#include "query/probe/patch_sums.h"
 #include "support/test_meshes.h"
 
 // Balls against planes and closed surfaces of triangles: against arithmetic of 100 digits, against

@@ -11,7 +11,7 @@
 #include "query/base/relative_pose.h"
 #include "query/contact/contact_bins.h"
 #include "query/kernel/overlap.h"
-#include "query/probe/surface_patch.h"
+#include "query/probe/patch_sums.h"
 
 namespace ist {
 

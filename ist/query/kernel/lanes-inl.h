@@ -47,12 +47,11 @@ HWY_INLINE void store_as(hn::Vec<D> v, D d, T* to) {
 /// One bit a lane.
 template <class D>
 HWY_INLINE std::uint32_t mask_bits(D d, hn::Mask<D> mask) {
-  std::uint8_t bytes[8];
-  const std::size_t stored = hn::StoreMaskBits(d, mask, bytes);
-  // A load wider than the store before would have to wait for it.
-  std::uint32_t bits = bytes[0];
-  if (stored > 1) bits |= std::uint32_t{bytes[1]} << 8;
-  return hn::Lanes(d) < 8 ? bits & ((1u << hn::Lanes(d)) - 1) : bits;
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(d, mask, bytes);
+  std::uint16_t bits;  // x86 and ARM are little-endian, as assets are
+  std::memcpy(&bits, bytes, sizeof(bits));
+  return hn::Lanes(d) < 16 ? bits & ((1u << hn::Lanes(d)) - 1) : bits;
 }
 
 /// The mask of the lowest bits, one a lane.

@@ -1,6 +1,5 @@
 #include "query/probe/membership.h"
 
-
 #include "query/probe/passes_left.h"
 
 namespace ist {
