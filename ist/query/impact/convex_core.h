@@ -8,9 +8,10 @@
 #include "query/field/patch_shapes.h"
 #include "query/field/shapes.h"
 #include "query/impact/convex_pair.h"
+#include "query/impact/way_between.h"
 
 // Convex fields as all points within a radius of a core whose furthest point in a direction is
-// known, and their distance from triangles (Gilbert, Johnson and Keerthi 1988).
+// known, and their distance from triangles.
 
 namespace ist {
 
@@ -55,23 +56,6 @@ struct PlaneBetween {
   double apart = 0;     ///< > 0: they lie so far apart along it, a proof; else they may meet
   double distance = 0;  ///< they are no further apart than this
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< of the triangle, so near
-};
-
-/// The way between a triangle and a convex core, from differences of their points.
-class WayBetween {
- public:
-  /// Adds the difference of a point of the triangle and one of the core. False if it leads no
-  /// nearer.
-  bool add(const Eigen::Vector3d& difference, const Eigen::Vector3d& of_triangle) noexcept;
-
-  const Eigen::Vector3d& way() const noexcept { return way_; }
-  /// The point of the triangle that the way leads to.
-  const Eigen::Vector3d& point() const noexcept { return point_; }
-
- private:
-  int count_ = 0;  ///< differences kept, whose hull the way leads to
-  Eigen::Vector3d difference_[4], of_triangle_[4];
-  Eigen::Vector3d way_ = Eigen::Vector3d::Zero(), point_ = Eigen::Vector3d::Zero();
 };
 
 template <class Shape>

@@ -84,19 +84,19 @@ class FieldSearch {
 
   /// For how long a part of B keeps a gap: in any direction.
   double any_step(double gap, const TurningPoint& point, double way) const noexcept {
-    const double speed = point.velocity.norm(), spin_a = frame_.a.spin.norm();
-    const double most = (1 + 1e-12) * (frame_.velocity.norm() + speed);
+    const double speed = point.velocity.norm(), spin_a = frame_.a.spin_speed;
+    const double most = (1 + 1e-12) * (frame_.speed + speed);
     double step = safe_step(gap, most + spin_a * way, spin_a * most);
     if (spin_a == 0) {
       const double now = (frame_.velocity + point.velocity).norm() + 1e-12 * most;
-      step = std::max(step, safe_step(gap, now, frame_.b.spin.norm() * speed));
+      step = std::max(step, safe_step(gap, now, frame_.b.spin_speed * speed));
     }
     return step;
   }
 
   /// Likewise of a ball around a point of B.
   double ball_step(double gap, const Sight& seen, const TurningPoint& point) const noexcept {
-    if (kConvex<Shape> && frame_.a.spin.isZero(0) && !seen.normal.isZero(0))
+    if (kConvex<Shape> && frame_.a.spin_speed == 0 && !seen.normal.isZero(0))
       return clear_step(frame_, seen.normal, gap, -seen.normal.dot(point.velocity), 0,
                         point.velocity.norm());
     return any_step(gap, point, point.place.norm());
@@ -196,7 +196,7 @@ class FieldSearch {
       nearing = std::max(nearing, rate(normal, c));
     }
     const double more = gap - half_left(gap);
-    const double step = frame_.a.spin.isZero(0)
+    const double step = frame_.a.spin_speed == 0
                             ? clear_step(frame_, normal, more, turning, 0, fastest.velocity.norm())
                             : any_step(more, fastest, way);
     decide({gap, plane.distance + error + lost(at), step, nearing, point, normal}, 0, node, at);
@@ -218,7 +218,7 @@ class FieldSearch {
     const double gap = seen.distance - size - error - lost(at);
     const bool small =
         size <= kSmallPart * loop_.tolerance || TrianglePart::cuts(part) == TrianglePart::kMostCuts;
-    if (!small && gap - loop_.tolerance / 2 <= kFarApart * size) {
+    if (!small && gap <= kReported * loop_.tolerance + kFarApart * size) {
       for (std::uint32_t i = 0; i < 4; ++i)
         loop_.look_again(TrianglePart::quarter(part, i), node.bits());
       return;

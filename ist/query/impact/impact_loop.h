@@ -14,7 +14,7 @@ namespace ist {
 
 // Balls that are further apart than this part of the larger radius go on as they are; nearer ones
 // are opened.
-inline constexpr double kFarApart = 0.3;
+inline constexpr double kFarApart = 0.05;
 
 // An impact is reported once the gap is this part of the tolerance. Steps end at a half, so none is
 // too short to get on.
@@ -60,7 +60,7 @@ class ImpactLoop {
         full_ = true;
         break;
       }
-      std::pop_heap(waiting_, waiting_ + size_--, later);
+      std::pop_heap(waiting_, waiting_ + size_--, Later());
       now_ = pair.bound;
       if (at.time != now_) at = place(frame_, now_);
       look(pair.a, pair.b, at);
@@ -96,10 +96,13 @@ class ImpactLoop {
   void count_surface_pair() noexcept { ++surface_pairs_; }
 
  private:
-  static bool later(const RankedPair& x, const RankedPair& y) noexcept {
-    if (x.bound != y.bound) return x.bound > y.bound;
-    return x.a != y.a ? x.a > y.a : x.b > y.b;
-  }
+  /// An order of all pairs, so that it is the same whatever the heap does.
+  struct Later {
+    bool operator()(const RankedPair& x, const RankedPair& y) const noexcept {
+      if (x.bound != y.bound) return x.bound > y.bound;
+      return x.a != y.a ? x.a > y.a : x.b > y.b;
+    }
+  };
 
   void push(double time, std::uint32_t a, std::uint32_t b) noexcept {
     if (size_ == capacity_) {
@@ -108,7 +111,7 @@ class ImpactLoop {
       return;
     }
     waiting_[size_++] = {time, a, b};
-    std::push_heap(waiting_, waiting_ + size_, later);
+    std::push_heap(waiting_, waiting_ + size_, Later());
   }
 
   TimeOfImpact answer() const noexcept {

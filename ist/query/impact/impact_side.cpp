@@ -89,6 +89,33 @@ NodeBall ImpactSide::ball(int level, std::uint32_t number) const noexcept {
           static_cast<double>(balls.r[lane]) + error_};
 }
 
+PointHull ImpactSide::hull(int level, std::uint32_t number) const noexcept {
+  PointHull hull;
+  if (level == kSphereLevel) {
+    const ConvexPiece one = piece(number);
+    hull.count = static_cast<std::uint32_t>(one.corners);
+    for (int k = 0; k < one.corners; ++k) {
+      hull.x[k] = one.corner[k].x();
+      hull.y[k] = one.corner[k].y();
+      hull.z[k] = one.corner[k].z();
+    }
+    return hull;
+  }
+  const SurfaceBlock& block = surface_->blocks[number];
+  hull.count = block.vertices;
+  for (std::uint32_t k = 0; k < block.vertices; ++k) {
+    hull.x[k] = static_cast<double>(block.x[k]);
+    hull.y[k] = static_cast<double>(block.y[k]);
+    hull.z[k] = static_cast<double>(block.z[k]);
+  }
+  return hull;
+}
+
+double ImpactSide::beyond(int level, std::uint32_t number) const noexcept {
+  return surface_ || level != kSphereLevel ? error_
+                                           : static_cast<double>(spheres_.sphere_cover[number]);
+}
+
 ConvexPiece ImpactSide::piece(std::uint32_t number) const noexcept {
   ConvexPiece piece;
   if (!surface_) {

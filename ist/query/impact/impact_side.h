@@ -20,6 +20,12 @@ struct ConvexPiece {
   double behind = 0;
 };
 
+/// The convex hull of up to sixteen points.
+struct PointHull {
+  double x[kWidth], y[kWidth], z[kWidth];
+  std::uint32_t count = 0;
+};
+
 /// What of a solid is looked at while it moves, as a tree of balls: the triangles of the surface in
 /// its asset, or the cover balls of its inner spheres. Unit frame.
 ///
@@ -40,6 +46,12 @@ class ImpactSide {
 
   /// A ball around all that the solid has at a node.
   NodeBall ball(int level, std::uint32_t number) const noexcept;
+
+  /// Whether a node is known by a hull too: blocks of triangles, single triangles and spheres.
+  bool has_hull(int level) const noexcept { return level <= (surface_ ? 0 : kSphereLevel); }
+  /// What the solid has at such a node lies within beyond(…) of the hull.
+  PointHull hull(int level, std::uint32_t number) const noexcept;
+  double beyond(int level, std::uint32_t number) const noexcept;
 
   /// Of a node of kSphereLevel.
   ConvexPiece piece(std::uint32_t number) const noexcept;

@@ -52,6 +52,7 @@ MovingBody body(const Pose& pose, double scale, const Motion& motion, const Asse
   MovingBody body;
   body.turning = Turning(unit_rotation(pose), motion.angular_velocity);
   body.spin = motion.angular_velocity;
+  body.spin_speed = body.spin.stableNorm();
   body.centre = motion.about;
   body.unit = scale / unit;
   if (asset == nullptr) {
@@ -89,11 +90,12 @@ std::optional<MovingFrame> frame_of(const Pose& pose_a, double scale_a, const As
                    (lever(b.pose, b.scale, motions.b.about) - lever_a)) /
                   frame.unit;
   frame.velocity = (motions.b.velocity - motions.a.velocity) / frame.unit;
+  frame.speed = frame.velocity.stableNorm();
   frame.world = translation(pose_a) + lever_a;
   frame.drift = motions.a.velocity;
   const double farthest =
-      frame.between.norm() + frame.velocity.norm() * duration + frame.a.reach + frame.b.reach;
-  const double angles = (frame.a.spin.norm() + frame.b.spin.norm()) * duration;
+      frame.between.norm() + frame.speed * duration + frame.a.reach + frame.b.reach;
+  const double angles = (frame.a.spin_speed + frame.b.spin_speed) * duration;
   if (!(farthest <= kFarthest) || !(angles <= kFarthest)) return std::nullopt;
   return frame;
 }
@@ -132,11 +134,11 @@ Placement place(const MovingFrame& frame, double time) noexcept {
   at.a = frame.a.unit * frame.a.turning.at(time).toRotationMatrix();
   at.b = frame.b.unit * frame.b.turning.at(time).toRotationMatrix();
   at.between = frame.between + frame.velocity * time;
-  const double way = frame.between.norm() + frame.velocity.norm() * time;
+  const double way = frame.between.norm() + frame.speed * time;
   // B's coordinates may be turned into A's frame too.
   const double around_a = frame.a.reach + at.between.norm() + frame.b.reach;
-  at.error = kWayRounding * way + kTurnRounding * (around_a * (1 + frame.a.spin.norm() * time) +
-                                                   frame.b.reach * frame.b.spin.norm() * time);
+  at.error = kWayRounding * way + kTurnRounding * (around_a * (1 + frame.a.spin_speed * time) +
+                                                   frame.b.reach * frame.b.spin_speed * time);
   return at;
 }
 

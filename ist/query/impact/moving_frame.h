@@ -36,6 +36,7 @@ class Turning {
 struct MovingBody {
   Turning turning;
   Eigen::Vector3d spin = Eigen::Vector3d::Zero();  ///< angular velocity, world
+  double spin_speed = 0;                           ///< its length
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double unit = 1;
   double reach = 0;  ///< no point of the body is further from its centre
@@ -47,6 +48,7 @@ struct MovingFrame {
   MovingBody a, b;
   Eigen::Vector3d between = Eigen::Vector3d::Zero();   ///< from A's straight point to B's at 0
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of B's straight point
+  double speed = 0;                                    ///< its length
   double unit = 1;                                     ///< [u]
   Eigen::Vector3d world = Eigen::Vector3d::Zero();     ///< [u] A's straight point at time 0
   Eigen::Vector3d drift = Eigen::Vector3d::Zero();     ///< [u/T] its velocity

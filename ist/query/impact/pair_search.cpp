@@ -9,6 +9,9 @@ namespace {
 
 using Eigen::Vector3d;
 
+// Hulls that are further apart than this part of the smaller radius go on as they are.
+constexpr double kHullsApart = 0.01;
+
 // Speeds are rounded: a part of them that what slides may seem to approach.
 constexpr double kSpeedRounding = 16 * 0x1p-53;
 
@@ -17,25 +20,27 @@ constexpr double kSpeedRounding = 16 * 0x1p-53;
 TurningPoint turning_point(const MovingBody& body, const Eigen::Matrix3d& turned,
                            const Vector3d& base, const Vector3d& x, double radius) noexcept {
   const Vector3d arm = turned * (x - body.centre);
-  return {base + arm, body.spin.cross(arm), body.unit * radius};
+  return {base + arm, body.spin_speed > 0 ? body.spin.cross(arm) : Vector3d::Zero().eval(),
+          body.unit * radius};
 }
 
 double clear_step(const MovingFrame& frame, const Vector3d& n, double gap, double turning,
                   double speed_a, double speed_b) noexcept {
-  const double slack = kSpeedRounding * (frame.velocity.norm() + speed_a + speed_b);
+  const double slack = kSpeedRounding * (frame.speed + speed_a + speed_b);
   const double straight = slack - n.dot(frame.velocity);
   double bend = 0, most = straight;
   if (speed_a > 0) {
     const double across = n.cross(frame.a.spin).norm();
     bend += across * speed_a;
-    most += across * (speed_a / frame.a.spin.norm());
+    most += across * (speed_a / frame.a.spin_speed);
   }
   if (speed_b > 0) {
     const double across = n.cross(frame.b.spin).norm();
     bend += across * speed_b;
-    most += across * (speed_b / frame.b.spin.norm());
+    most += across * (speed_b / frame.b.spin_speed);
   }
-  return std::max(safe_step(gap, straight + turning, bend), safe_step(gap, most, 0));
+  const double now = safe_step(gap, straight + turning, bend);
+  return bend > 0 ? std::max(now, safe_step(gap, most, 0)) : now;
 }
 
 TurningPoint PairSearch::ball_a(NodeKey node, const Placement& at) const noexcept {
@@ -57,7 +62,7 @@ PairSearch::Approach PairSearch::approach(const TurningPoint& a, const TurningPo
   const double gap = length - a.radius - b.radius - at.error - loop_.tolerance / 2;
   if (!(gap > 0)) return {gap, 0};
   const Vector3d n = way / length;
-  return {gap, clear_step(frame_, n, gap, n.dot(a.velocity) - n.dot(b.velocity), a.velocity.norm(),
+  return {gap, clear_step(frame_, n, gap, n.dot(a.velocity - b.velocity), a.velocity.norm(),
                           b.velocity.norm())};
 }
 
@@ -84,12 +89,53 @@ void PairSearch::look(NodeKey a, NodeKey b, const Placement& at) noexcept {
     loop_.clear_for(now.step, a.bits(), b.bits());
   } else if (a.level == kSphereLevel && b.level == kSphereLevel) {
     look_at_pieces(a, b, at);
+  } else if (a_.has_hull(a.level) && b_.has_hull(b.level) &&
+             look_at_hulls(a, b, ball_of_a, ball_of_b, at)) {
+    return;
   } else if (b.level == kSphereLevel ||
              (a.level != kSphereLevel && ball_of_a.radius >= ball_of_b.radius)) {
     open(a, b, true, ball_of_b, at);
   } else {
     open(a, b, false, ball_of_a, at);
   }
+}
+
+/// Whether a plane between the hulls leads on.
+bool PairSearch::look_at_hulls(NodeKey key_a, NodeKey key_b, const TurningPoint& ball_of_a,
+                               const TurningPoint& ball_of_b, const Placement& at) noexcept {
+  const auto placed = [](PointHull hull, const MovingBody& body, const Eigen::Matrix3d& turned,
+                         const Vector3d& base) {
+    const Vector3d shift = base - turned * body.centre;
+    for (std::uint32_t k = 0; k < hull.count; ++k) {
+      const Vector3d x = turned * Vector3d(hull.x[k], hull.y[k], hull.z[k]) + shift;
+      hull.x[k] = x.x();
+      hull.y[k] = x.y();
+      hull.z[k] = x.z();
+    }
+    return hull;
+  };
+  const PointHull a = placed(a_.hull(key_a.level, key_a.number), frame_.a, at.a, Vector3d::Zero());
+  const PointHull b = placed(b_.hull(key_b.level, key_b.number), frame_.b, at.b, at.between);
+  const double lost = frame_.a.unit * a_.beyond(key_a.level, key_a.number) +
+                      frame_.b.unit * b_.beyond(key_b.level, key_b.number) + at.error +
+                      loop_.tolerance / 2;
+  const HullPlane plane = plane_between(a, b, ball_of_b.place - ball_of_a.place, lost);
+  const double gap = plane.apart - lost;
+  if (!(gap > 0)) return false;
+  // n · (ω × x) = (n × ω) · x
+  const Vector3d& n = plane.normal;
+  const Vector3d turn_a = n.cross(frame_.a.spin), turn_b = n.cross(frame_.b.spin);
+  const double turning =
+      turn_a.dot(furthest(a, turn_a)) - turn_b.dot(furthest(b, -turn_b)) + turn_b.dot(at.between);
+  const double step = clear_step(
+      frame_, n, gap, turning, ball_of_a.velocity.norm() + frame_.a.spin_speed * ball_of_a.radius,
+      ball_of_b.velocity.norm() + frame_.b.spin_speed * ball_of_b.radius);
+  if (gap <= kHullsApart * std::min(ball_of_a.radius, ball_of_b.radius) &&
+      at.time + step < loop_.end)
+    return false;
+  if (!loop_.leads_on(step)) return false;
+  loop_.clear_for(step, key_a.bits(), key_b.bits());
+  return true;
 }
 
 void PairSearch::open(NodeKey a, NodeKey b, bool open_a, const TurningPoint& other,

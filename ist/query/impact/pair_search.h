@@ -1,6 +1,7 @@
 #pragma once
 
 #include "query/impact/convex_pair.h"
+#include "query/impact/hull_pair.h"
 #include "query/impact/impact_loop.h"
 #include "query/impact/impact_side.h"
 #include "query/impact/node_key.h"
@@ -51,6 +52,8 @@ class PairSearch {
   Approach approach(const TurningPoint& a, const TurningPoint& b,
                     const Placement& at) const noexcept;
   void look(NodeKey a, NodeKey b, const Placement& at) noexcept;
+  bool look_at_hulls(NodeKey a, NodeKey b, const TurningPoint& ball_of_a,
+                     const TurningPoint& ball_of_b, const Placement& at) noexcept;
   void open(NodeKey a, NodeKey b, bool open_a, const TurningPoint& other,
             const Placement& at) noexcept;
   void offer(NodeKey a, NodeKey b, const Approach& approach) noexcept;

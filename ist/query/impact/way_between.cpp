@@ -1,6 +1,10 @@
-#include "query/impact/convex_core.h"
+#include "query/impact/way_between.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <limits>
+
+#include "query/impact/convex_pair.h"
 
 namespace ist {
 namespace {
@@ -39,11 +43,11 @@ bool same_side(const Vector3d& a, const Vector3d& b, const Vector3d& c,
 
 }  // namespace
 
-bool WayBetween::add(const Vector3d& difference, const Vector3d& of_triangle) noexcept {
+bool WayBetween::add(const Vector3d& difference, const Vector3d& of_b) noexcept {
   const double before = count_ > 0 ? way_.squaredNorm() : std::numeric_limits<double>::infinity();
   const Vector3d* const x = difference_;
   difference_[count_] = difference;
-  of_triangle_[count_++] = of_triangle;
+  of_b_[count_++] = of_b;
   double part[4] = {1, 0, 0, 0};
   if (count_ == 2) {
     part[1] = nearest_part(x[0], x[1]);
@@ -72,9 +76,9 @@ bool WayBetween::add(const Vector3d& difference, const Vector3d& of_triangle) no
   for (int i = 0; i < count_; ++i) {
     if (!(part[i] > 0)) continue;
     way_ += part[i] * x[i];
-    point_ += part[i] * of_triangle_[i];
+    point_ += part[i] * of_b_[i];
     difference_[kept] = x[i];
-    of_triangle_[kept++] = of_triangle_[i];
+    of_b_[kept++] = of_b_[i];
   }
   count_ = kept;
   return way_.squaredNorm() < (1 - 1e-12) * before;
