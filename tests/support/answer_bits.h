@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include <ist/query.h>
+#include <ist/time_of_impact.h>
 
 namespace ist::testing {
 
@@ -29,6 +30,12 @@ class AnswerBits {
     for (const Eigen::Vector3d* const x : {&s.point_a, &s.point_b, &s.normal}) add(*x);
     add(std::uint64_t{s.node_visits} << 32 | s.sphere_pairs);
     add(static_cast<std::uint64_t>(s.status));
+  }
+  void add(const TimeOfImpact& t) {
+    for (const double x : {t.time, t.distance_min, t.distance_max}) add(x);
+    for (const Eigen::Vector3d* const x : {&t.point_a, &t.point_b, &t.normal}) add(*x);
+    add(std::uint64_t{t.node_visits} << 32 | t.surface_pairs);
+    add(static_cast<std::uint64_t>(t.status));
   }
   void add(const ContactPatch& patch) {
     add(patch.id);

@@ -2,6 +2,7 @@
 #include <ist/bake.h>
 #include <ist/field.h>
 #include <ist/query.h>
+#include <ist/time_of_impact.h>
 
 #include <hwy/highway.h>
 
@@ -136,6 +137,15 @@ void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& w
         contact_patches(a, b, testing::for_contacts(settings), workspace, patches);
     bits.add(answer.penetration);
     for (std::size_t i = 0; i < answer.count; ++i) bits.add(patches[i]);
+    return;
+  }
+  if (asked == "time_of_impact") {
+    Motions motions;
+    motions.a.angular_velocity = {0.5, 0.25, -1};
+    motions.b = {{-1, 0.5, -0.75}, {3, -2, 1}, {0.125, 0, 0.25}};
+    ImpactSettings until;
+    until.max_visits = 3000;
+    bits.add(time_of_impact(a, b, motions, until, workspace));
     return;
   }
   const PenetrationAndSeparation both = query(a, b, testing::for_both(settings), workspace);

@@ -5,6 +5,7 @@
 #include <ist/field.h>
 #include <ist/overlap.h>
 #include <ist/query.h>
+#include <ist/time_of_impact.h>
 
 #include <cstdio>
 #include <vector>
@@ -40,7 +41,16 @@ class RealTime : public ::testing::Test {
     contact_patches(field, b, testing::for_contacts(settings), workspaces_[0], patches_);
     const PlacedFieldPair field_pairs[] = {{field, b}, {field, a}};
     penetration_batch(field_pairs, settings, workspaces_, answers_);
+    const Motions motions{{{0.1, 0.2, 0}, {1, 0, 2}, {}}, {{-1, 0, 1}, {0, 1, 0}, {0.1, 0, 0}}};
+    ImpactSettings until;
+    until.max_visits = settings.max_visits != 0 ? settings.max_visits : 3000;
+    until.deadline_us = settings.deadline_us;
+    time_of_impact(a, b, motions, until, workspaces_[0]);
+    time_of_impact(field, b, motions, until, workspaces_[0]);
     const PlacedTree solid{box_.view(), poses_a_[i], 1.0};
+    const PlacedTree other{box_.view(), poses_b_[(i + 20) % kPoses], 1.0};
+    time_of_impact(solid, other, motions, until, workspaces_[0]);
+    time_of_impact(field, other, motions, until, workspaces_[0]);
     for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
       PenetrationSettings with_field = settings;
       with_field.field = use;
