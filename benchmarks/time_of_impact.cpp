@@ -28,10 +28,10 @@ using ist::benchmark::quantile;
 using ist::benchmark::Report;
 using ist::benchmark::thread_seconds;
 
-constexpr double kTolerance = 1e-3;      ///< of B's bounding radius
-constexpr int kSamples = 2000;           ///< of a motion, for the truth
-constexpr std::size_t kFewMotions = 10;  ///< what takes long is asked of these
-constexpr double kEnough = 1e-6;         ///< [T] where bisection ends
+constexpr double kTolerance = 1e-3;     ///< of B's bounding radius
+constexpr int kSamples = 2000;          ///< of a motion, for the truth
+constexpr std::size_t kFewMotions = 5;  ///< what takes long is asked of these
+constexpr double kEnough = 1e-6;        ///< [T] where bisection ends
 
 struct Body {
   Body(const std::string& path, std::size_t spheres)
@@ -270,7 +270,7 @@ int main(int argc, char** argv) {
   Report report("time_of_impact", argc, argv);
   report.page("Times of impact, beside FCL's continuous collision");
   const std::size_t spheres = 4'000;
-  const int count = report.quick() ? 10 : 60;
+  const int count = report.quick() ? 10 : 40;
   report.remark(
       "B comes from outside, goes through A's bounding ball and out again while it turns about its "
       "origin at constant speed (FCL's `InterpMotion`); a step is one of 2 % of that way, begun "
@@ -287,7 +287,7 @@ int main(int argc, char** argv) {
       "inner spheres touch first.");
   report.remark(
       "FCL conservative advancement: `CCDC_CONSERVATIVE_ADVANCEMENT` on OBBRSS trees with its "
-      "default error of 1e-4, on the first 10 motions, for it takes long; FCL samples: "
+      "default error of 1e-4, on the first 5 motions, for it takes long; FCL samples: "
       "`CCDC_NAIVE` "
       "with 100 samples, a motion's first that meets is the time. One thread.");
   report.remark(
@@ -295,10 +295,8 @@ int main(int argc, char** argv) {
       "small "
       "cube that goes straight through a large one too: a known fault of it with meshes "
       "(flexible-collision-library/fcl#120, #555), so its times tell little.");
-  const std::vector<Kind> kinds = {{"straight", 0, 1},
-                                   {"turning up to 1 rad", 1, 1},
-                                   {"turning up to 3 rad", 3, 1},
-                                   {"a step", 3, 0.02}};
+  const std::vector<Kind> kinds = {
+      {"straight", 0, 1}, {"turning up to 3 rad", 3, 1}, {"a step", 3, 0.02}};
   const auto dev = [](const char* name) {
     return ist::testing::shared_path(std::string("meshes/dev/") + name).string();
   };

@@ -1,6 +1,7 @@
 #include "query/impact/impact_side.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "query/probe/membership.h"
 #include "query/probe/surface_distance.h"
@@ -26,12 +27,8 @@ class PartSearch {
     map_.apply(ball.centre, at);
     const double reach = kMore * (map_.scale * ball.r + a_.header->error);
     if (!(nearest_surface(a_, at, reach).distance < reach)) return inside_surface(a_, at, reach);
-    if (level == kSphereLevel) {
-      const ConvexPiece piece = b_.piece(number);
-      const double corner[3] = {piece.corner[0].x(), piece.corner[0].y(), piece.corner[0].z()};
-      map_.apply(corner, at);
-      return inside_surface(a_, at, 0);
-    }
+    if (level == 0 && b_.surface() != nullptr) return holds_part_of(b_.surface()->blocks[number]);
+    if (level == kSphereLevel) return holds(b_.piece(number).corner[0]);
     const std::uint32_t count = b_.children(level, number);
     for (std::uint32_t i = 0; i < count; ++i)
       if (open(level - 1, kWidth * number + i)) return true;
@@ -39,6 +36,35 @@ class PartSearch {
   }
 
  private:
+  bool holds(const Vector3d& x) const noexcept {
+    const double from[3] = {x.x(), x.y(), x.z()};
+    double at[3];
+    map_.apply(from, at);
+    return inside_surface(a_, at, 0);
+  }
+
+  /// What hangs together and meets no surface lies on one side of it: a corner of each is asked.
+  bool holds_part_of(const SurfaceBlock& block) const noexcept {
+    std::uint32_t left = (1u << block.vertices) - 1;
+    while (left != 0) {
+      std::uint32_t part = left & (0 - left), before = 0;
+      const auto first = static_cast<std::uint32_t>(std::countr_zero(left));
+      while (part != before) {
+        before = part;
+        for (std::uint32_t t = 0; t < block.triangles; ++t) {
+          const std::uint32_t corners =
+              1u << block.corner[0][t] | 1u << block.corner[1][t] | 1u << block.corner[2][t];
+          if ((part & corners) != 0) part |= corners;
+        }
+      }
+      left &= ~part;
+      if (holds({static_cast<double>(block.x[first]), static_cast<double>(block.y[first]),
+                 static_cast<double>(block.z[first])}))
+        return true;
+    }
+    return false;
+  }
+
   const SurfaceTree& a_;
   const ImpactSide& b_;
   const Similarity& map_;

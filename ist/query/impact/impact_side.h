@@ -62,8 +62,7 @@ class ImpactSide {
   double error_ = 0;  ///< of the surface
 };
 
-/// Whether something of B lies inside A's surface, where they do not meet: a node of B that the
-/// surface passes by, or a corner of one that it does not. `error`: of the surface, A's unit frame.
+/// Whether something of B lies inside A's surface, where B's own meets it nowhere.
 bool holds_part(const SurfaceTree& a, const ImpactSide& b, const Similarity& a_from_b) noexcept;
 
 }  // namespace ist
