@@ -61,7 +61,7 @@ struct ImpactSettings {
 
   /// [u] An impact is reported when the gap has come down to between a half of this and this. Zero,
   /// a negative value or NaN: a thousandth of the smaller solid's bounding radius (of B's, where A
-  /// is a field).
+  /// is a field), or ten times what the assets' fields may err if that is more.
   ///
   /// What starts nearer is an impact only if it approaches.
   double tolerance = 0;

@@ -127,6 +127,14 @@ PointHull ImpactSide::hull(int level, std::uint32_t number) const noexcept {
     }
     return hull;
   }
+  if (!has_hull(level)) {
+    const NodeBall around = ball(level, number);
+    hull.count = 1;
+    hull.x[0] = around.centre[0];
+    hull.y[0] = around.centre[1];
+    hull.z[0] = around.centre[2];
+    return hull;
+  }
   const SurfaceBlock& block = surface_->blocks[number];
   hull.count = block.vertices;
   for (std::uint32_t k = 0; k < block.vertices; ++k) {
@@ -138,8 +146,8 @@ PointHull ImpactSide::hull(int level, std::uint32_t number) const noexcept {
 }
 
 double ImpactSide::beyond(int level, std::uint32_t number) const noexcept {
-  return surface_ || level != kSphereLevel ? error_
-                                           : static_cast<double>(spheres_.sphere_cover[number]);
+  if (!has_hull(level)) return ball(level, number).r;
+  return surface_ ? error_ : static_cast<double>(spheres_.sphere_cover[number]);
 }
 
 ConvexPiece ImpactSide::piece(std::uint32_t number) const noexcept {

@@ -47,9 +47,10 @@ class ImpactSide {
   /// A ball around all that the solid has at a node.
   NodeBall ball(int level, std::uint32_t number) const noexcept;
 
-  /// Whether a node is known by a hull too: blocks of triangles, single triangles and spheres.
+  /// Whether a node is known by more than its ball: blocks of triangles, single ones, spheres.
   bool has_hull(int level) const noexcept { return level <= (surface_ ? 0 : kSphereLevel); }
-  /// What the solid has at such a node lies within beyond(…) of the hull.
+  /// What the solid has at a node lies within beyond(…) of this hull, the ball's centre if there is
+  /// none.
   PointHull hull(int level, std::uint32_t number) const noexcept;
   double beyond(int level, std::uint32_t number) const noexcept;
 
