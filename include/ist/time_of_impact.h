@@ -78,7 +78,8 @@ struct TimeOfImpact {
   /// [u] The solids' distance at `time` lies in here, certified. Of no_impact and budget_exhausted
   /// only the lower end is known, the upper one is infinite; all zero if overlapping.
   double distance_min = 0, distance_max = 0;
-  /// Of impact and unresolved: [u] the nearest points on A and B at `time`, world.
+  /// Of impact and unresolved: [u] points of A and B at `time`, world, no further apart than
+  /// distance_max. Others may be nearer by a part of the tolerance.
   Eigen::Vector3d point_a = Eigen::Vector3d::Zero();
   Eigen::Vector3d point_b = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< likewise: unit, from A to B, world
