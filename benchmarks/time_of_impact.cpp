@@ -291,7 +291,8 @@ int main(int argc, char** argv) {
       "`CCDC_NAIVE` "
       "with 100 samples, a motion's first that meets is the time. One thread.");
   report.remark(
-      "FCL 0.7.0's conservative advancement says of every motion here that it is free, and of a "
+      "FCL 0.7.0's conservative advancement says of nearly every motion here that it is free, and "
+      "of a "
       "small "
       "cube that goes straight through a large one too: a known fault of it with meshes "
       "(flexible-collision-library/fcl#120, #555), so its times tell little.");
