@@ -61,7 +61,7 @@ struct ImpactSettings {
 
   /// [u] An impact is reported when the gap has come down to between a half of this and this. Zero,
   /// a negative value or NaN: a thousandth of the smaller solid's bounding radius (of B's, where A
-  /// is a field).
+  /// is a field), or ten times what the assets' fields may err if that is more.
   ///
   /// What starts nearer is an impact only if it approaches.
   double tolerance = 0;
@@ -78,7 +78,8 @@ struct TimeOfImpact {
   /// [u] The solids' distance at `time` lies in here, certified. Of no_impact and budget_exhausted
   /// only the lower end is known, the upper one is infinite; all zero if overlapping.
   double distance_min = 0, distance_max = 0;
-  /// Of impact and unresolved: [u] the nearest points on A and B at `time`, world.
+  /// Of impact and unresolved: [u] points of A and B at `time`, world, no further apart than
+  /// distance_max. Others may be nearer by a part of the tolerance.
   Eigen::Vector3d point_a = Eigen::Vector3d::Zero();
   Eigen::Vector3d point_b = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< likewise: unit, from A to B, world

@@ -8,8 +8,10 @@
 namespace ist {
 namespace {
 
-// Of the smaller solid's bounding radius, where no tolerance is asked for.
+// Where no tolerance is asked for: of the smaller solid's bounding radius, and of the fields'
+// errors, which may be what is left of an impact's gap at either end.
 constexpr double kTolerance = 1e-3;
+constexpr double kErrors = 10;
 
 TimeOfImpact refused() noexcept {
   TimeOfImpact result;
@@ -24,8 +26,10 @@ TimeOfImpact overlap() noexcept {
 }
 
 /// Of the frame's lengths.
-double tolerance_of(const ImpactSettings& settings, double smaller, double unit) noexcept {
-  return settings.tolerance > 0 ? settings.tolerance / unit : kTolerance * smaller;
+double tolerance_of(const ImpactSettings& settings, double smaller, double errors,
+                    double unit) noexcept {
+  return settings.tolerance > 0 ? settings.tolerance / unit
+                                : std::max(kTolerance * smaller, kErrors * errors);
 }
 
 double bounding_radius(const PlacedTree& placed) noexcept {
@@ -48,7 +52,9 @@ TimeOfImpact time_of_impact(const PlacedTree& a, const PlacedTree& b, const Moti
   if (hold(side_a, side_b, frame->start)) return overlap();
   const double smaller =
       std::min(bounding_radius(a) * frame->a.unit, bounding_radius(b) * frame->b.unit);
-  ImpactLoop loop(*frame, tolerance_of(settings, smaller, frame->unit), settings,
+  const double errors =
+      side_a.surface_error() * frame->a.unit + side_b.surface_error() * frame->b.unit;
+  ImpactLoop loop(*frame, tolerance_of(settings, smaller, errors, frame->unit), settings,
                   *workspace.impl());
   return PairSearch(*frame, side_a, side_b, loop).run();
 }
@@ -62,7 +68,8 @@ TimeOfImpact time_of_impact(const PlacedField& a, const PlacedTree& b, const Mot
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
   if (!frame || workspace.impl() == nullptr) return refused();
   const ImpactSide side(b.tree);
-  const double tolerance = tolerance_of(settings, bounding_radius(b) * frame->b.unit, frame->unit);
+  const double tolerance = tolerance_of(settings, bounding_radius(b) * frame->b.unit,
+                                        side.surface_error() * frame->b.unit, frame->unit);
   return with_shape(
       a.field,
       [&]<class Shape>(Shape& shape) {

@@ -1,6 +1,7 @@
 #include "query/impact/impact_side.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "query/probe/membership.h"
 #include "query/probe/surface_distance.h"
@@ -26,12 +27,8 @@ class PartSearch {
     map_.apply(ball.centre, at);
     const double reach = kMore * (map_.scale * ball.r + a_.header->error);
     if (!(nearest_surface(a_, at, reach).distance < reach)) return inside_surface(a_, at, reach);
-    if (level == kSphereLevel) {
-      const ConvexPiece piece = b_.piece(number);
-      const double corner[3] = {piece.corner[0].x(), piece.corner[0].y(), piece.corner[0].z()};
-      map_.apply(corner, at);
-      return inside_surface(a_, at, 0);
-    }
+    if (level == 0 && b_.surface() != nullptr) return holds_part_of(b_.surface()->blocks[number]);
+    if (level == kSphereLevel) return holds(b_.piece(number).corner[0]);
     const std::uint32_t count = b_.children(level, number);
     for (std::uint32_t i = 0; i < count; ++i)
       if (open(level - 1, kWidth * number + i)) return true;
@@ -39,6 +36,35 @@ class PartSearch {
   }
 
  private:
+  bool holds(const Vector3d& x) const noexcept {
+    const double from[3] = {x.x(), x.y(), x.z()};
+    double at[3];
+    map_.apply(from, at);
+    return inside_surface(a_, at, 0);
+  }
+
+  /// What hangs together and meets no surface lies on one side of it: a corner of each is asked.
+  bool holds_part_of(const SurfaceBlock& block) const noexcept {
+    std::uint32_t left = (1u << block.vertices) - 1;
+    while (left != 0) {
+      std::uint32_t part = left & (0 - left), before = 0;
+      const auto first = static_cast<std::uint32_t>(std::countr_zero(left));
+      while (part != before) {
+        before = part;
+        for (std::uint32_t t = 0; t < block.triangles; ++t) {
+          const std::uint32_t corners =
+              1u << block.corner[0][t] | 1u << block.corner[1][t] | 1u << block.corner[2][t];
+          if ((part & corners) != 0) part |= corners;
+        }
+      }
+      left &= ~part;
+      if (holds({static_cast<double>(block.x[first]), static_cast<double>(block.y[first]),
+                 static_cast<double>(block.z[first])}))
+        return true;
+    }
+    return false;
+  }
+
   const SurfaceTree& a_;
   const ImpactSide& b_;
   const Similarity& map_;
@@ -101,6 +127,14 @@ PointHull ImpactSide::hull(int level, std::uint32_t number) const noexcept {
     }
     return hull;
   }
+  if (!has_hull(level)) {
+    const NodeBall around = ball(level, number);
+    hull.count = 1;
+    hull.x[0] = around.centre[0];
+    hull.y[0] = around.centre[1];
+    hull.z[0] = around.centre[2];
+    return hull;
+  }
   const SurfaceBlock& block = surface_->blocks[number];
   hull.count = block.vertices;
   for (std::uint32_t k = 0; k < block.vertices; ++k) {
@@ -112,8 +146,8 @@ PointHull ImpactSide::hull(int level, std::uint32_t number) const noexcept {
 }
 
 double ImpactSide::beyond(int level, std::uint32_t number) const noexcept {
-  return surface_ || level != kSphereLevel ? error_
-                                           : static_cast<double>(spheres_.sphere_cover[number]);
+  if (!has_hull(level)) return ball(level, number).r;
+  return surface_ ? error_ : static_cast<double>(spheres_.sphere_cover[number]);
 }
 
 ConvexPiece ImpactSide::piece(std::uint32_t number) const noexcept {

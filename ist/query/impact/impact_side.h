@@ -47,9 +47,10 @@ class ImpactSide {
   /// A ball around all that the solid has at a node.
   NodeBall ball(int level, std::uint32_t number) const noexcept;
 
-  /// Whether a node is known by a hull too: blocks of triangles, single triangles and spheres.
+  /// Whether a node is known by more than its ball: blocks of triangles, single ones, spheres.
   bool has_hull(int level) const noexcept { return level <= (surface_ ? 0 : kSphereLevel); }
-  /// What the solid has at such a node lies within beyond(…) of the hull.
+  /// What the solid has at a node lies within beyond(…) of this hull, the ball's centre if there is
+  /// none.
   PointHull hull(int level, std::uint32_t number) const noexcept;
   double beyond(int level, std::uint32_t number) const noexcept;
 
@@ -62,8 +63,7 @@ class ImpactSide {
   double error_ = 0;  ///< of the surface
 };
 
-/// Whether something of B lies inside A's surface, where they do not meet: a node of B that the
-/// surface passes by, or a corner of one that it does not. `error`: of the surface, A's unit frame.
+/// Whether something of B lies inside A's surface, where B's own meets it nowhere.
 bool holds_part(const SurfaceTree& a, const ImpactSide& b, const Similarity& a_from_b) noexcept;
 
 }  // namespace ist

@@ -89,7 +89,7 @@ void PairSearch::look(NodeKey a, NodeKey b, const Placement& at) noexcept {
     loop_.clear_for(now.step, a.bits(), b.bits());
   } else if (a.level == kSphereLevel && b.level == kSphereLevel) {
     look_at_pieces(a, b, at);
-  } else if (a_.has_hull(a.level) && b_.has_hull(b.level) &&
+  } else if ((a_.has_hull(a.level) || b_.has_hull(b.level)) &&
              look_at_hulls(a, b, ball_of_a, ball_of_b, at)) {
     return;
   } else if (b.level == kSphereLevel ||
