@@ -8,6 +8,7 @@
 
 #include "query/base/precision.h"
 #include "query/descent/answer.h"
+#include "query/descent/shares.h"
 #include "query/kernel/node_kernel.h"
 
 namespace ist {
@@ -19,6 +20,10 @@ constexpr std::size_t kLeafChunk = 256;
 // Shares of the time that a deadline gives: sums are taken again in double only before the one, and
 // no more guesses are made after the other.
 constexpr double kEarly = 0.3, kLate = 0.85;
+// Shares are summed up to the one, and none goes on beyond the other.
+constexpr double kPlanned = 0.85, kLatest = 0.95;
+// [µs] no pair of leaves takes longer where time is ample.
+constexpr double kDearest = 1;
 constexpr std::size_t kGuesses = 32;  ///< between two looks at the clock, evenly over what is left
 
 // Sums whose rounding may exceed this share are taken again in double. The bound is at least fifty
@@ -141,46 +146,124 @@ Overlap Descent::contained_overlap(bool of_a, const SubtreeSums& contained) cons
 void Descent::open_leaves() {
   if (min_radius_ > 0) drop_small([](double ra, double rb) { return std::max(ra, rb); });
   PairList& now = scratch_.now;
-  const bool by_error = limits_.relative_error > 0;
-  double waiting = 0;  // bound on the pairs still to come
-  if (by_error)
-    waiting = rank();
-  else
-    choose();
   if (now.size > 0) scratch_.leaves->forget(precision_);
-  std::size_t done = 0;
-  while (done < now.size) {
-    if (by_error && accurate(waiting)) break;
-    const std::size_t granted =
-        budget_.grant(by_error ? std::min(kLeafChunk, now.size - done) : now.size - done);
-    const std::size_t n = add_leaves(done, granted, &budget_);
-    budget_.give_back(granted - n);
-    if (n == 0) break;
-    if (by_error)
-      for (std::size_t i = done; i < done + n; ++i) waiting -= scratch_.ranked[i].bound;
-    done += n;
+  if (limits_.relative_error > 0 || !may_be_stopped() || !add_by_shares()) {
+    const std::size_t done = limits_.relative_error > 0 ? add_by_bound() : add_in_order();
+    estimate_unopened(now, done);
+    now.size = done;
   }
-  estimate_unopened(now, done);
 
   // A few grazing lenses are all rounding in float; they are as few as they are shallow.
   const Overlap sum = sure();
   if (precision_ == Precision::float32 && !keep_rounding_ && sum.error > kGrazing * sum.volume &&
-      !budget_.elapsed_beyond(kEarly)) {
+      now.size > 0 && !budget_.elapsed_beyond(kEarly)) {
     precision_ = Precision::float64;
     scratch_.leaves->forget(precision_);
     sums_ = LeafSums();
     if (bins_ != nullptr) bins_->forget_sums();
-    add_leaves(0, done, nullptr);
+    add_leaves(0, now.size, nullptr, sums_);
   }
 }
 
-std::size_t Descent::add_leaves(std::size_t from, std::size_t n, const Budget* budget) {
+std::size_t Descent::add_by_bound() {
+  PairList& now = scratch_.now;
+  double waiting = rank();  // bound on the pairs still to come
+  std::size_t done = 0;
+  while (done < now.size && !accurate(waiting)) {
+    const std::size_t granted = budget_.grant(std::min(kLeafChunk, now.size - done));
+    const std::size_t n = add_leaves(done, granted, &budget_, sums_);
+    budget_.give_back(granted - n);
+    if (n == 0) break;
+    for (std::size_t i = done; i < done + n; ++i) waiting -= scratch_.ranked[i].bound;
+    done += n;
+  }
+  return done;
+}
+
+std::size_t Descent::add_in_order() {
+  choose();
+  PairList& now = scratch_.now;
+  std::size_t done = 0;
+  while (done < now.size) {
+    const std::size_t granted = budget_.grant(now.size - done);
+    const std::size_t n = add_leaves(done, granted, &budget_, sums_);
+    budget_.give_back(granted - n);
+    if (n == 0) break;
+    done += n;
+  }
+  return done;
+}
+
+bool Descent::may_be_stopped() {
+  const auto pairs = static_cast<double>(scratch_.now.size);
+  return pairs > budget_.left() ||
+         (budget_.timed() &&
+          pairs * kDearest > limits_.deadline_us * (kPlanned - budget_.elapsed()));
+}
+
+bool Descent::add_by_shares() {
+  PairList& now = scratch_.now;
+  const bool of_b = b_.header->root[3] * map_.scale <= a_.header->root[3];
+  const ShareBounds bounds = sort_by_shares(now, of_b, scratch_.next);
+  const double by_visits = static_cast<double>(kShares) * static_cast<double>(budget_.left()) /
+                           static_cast<double>(now.size);
+  const double start = budget_.timed() ? budget_.elapsed() : 0;
+  budget_.extend(kLatest);
+  std::swap(now, scratch_.next);
+  LeafSums sums[kShares];
+  double room = by_visits;  // shares that limits allow for
+  std::size_t done = 0;
+  while (done < kShares && room >= static_cast<double>(done + 1)) {
+    const std::size_t pairs = bounds[done + 1] - bounds[done];
+    if (pairs > budget_.left()) break;
+    const std::size_t granted = budget_.grant(pairs);
+    const std::size_t summed = add_leaves(bounds[done], granted, &budget_, sums[done]);
+    if (summed < pairs) {  // the time is over
+      budget_.give_back(granted - summed);
+      break;
+    }
+    ++done;
+    if (budget_.timed())
+      room = std::min(by_visits, static_cast<double>(done) * (kPlanned - start) /
+                                     std::max(budget_.elapsed() - start, 1e-9));
+  }
+  if (done == 0) {
+    std::swap(now, scratch_.next);
+    return false;
+  }
+  for (std::size_t i = 0; i < done; ++i) sums_.add(sums[i]);
+  if (done == kShares && room >= static_cast<double>(kShares)) return true;
+  take_shares_for_all(sums, done, room);
+  if (budget_.timed()) {
+    unopened_bound_ = std::numeric_limits<double>::infinity();
+  } else {
+    for (std::size_t i = bounds[done]; i < now.size; ++i) unopened_bound_ += bound(i);
+  }
+  now.size = 0;
+  return true;
+}
+
+void Descent::take_shares_for_all(const LeafSums* sums, std::size_t done, double room) {
+  ShareWeights weights = share_weights(std::min(room, static_cast<double>(done + 1)), done);
+  if (bins_ != nullptr) {  // which share a bin's sums are of is not kept
+    weights.fill(static_cast<double>(kShares) / static_cast<double>(done));
+    bins_->scale_sums(weights[0]);
+  }
+  stopped_ = true;
+  for (std::size_t i = 0; i < done; ++i) {
+    Overlap beyond = finish(sums[i], precision_);
+    beyond.scale(weights[i] - 1);
+    unopened_.add(beyond);
+  }
+}
+
+std::size_t Descent::add_leaves(std::size_t from, std::size_t n, Budget* budget, LeafSums& sums) {
   if (n == 0) return 0;
   const std::uint32_t* const a = scratch_.now.a.get() + from;
   const std::uint32_t* const b = scratch_.now.b.get() + from;
   LeafStage stage{&a_, &b_, level_a_, level_b_, &map_, precision_, budget};
   if (bins_ != nullptr) stage.bins = bins_->touch(level_a_, a, level_b_, b, n);
-  return add_leaf_pairs(stage, *scratch_.leaves, a, b, n, sums_);
+  return add_leaf_pairs(stage, *scratch_.leaves, a, b, n, sums);
 }
 
 bool Descent::accurate(double waiting) const {

@@ -61,7 +61,24 @@ class Descent {
   void open_leaves();
 
   /// Sums pairs [from, from + n) of the current list, or as many as a budget has time for.
-  std::size_t add_leaves(std::size_t from, std::size_t n, const Budget* budget);
+  std::size_t add_leaves(std::size_t from, std::size_t n, Budget* budget, LeafSums& sums);
+
+  /// Sums pairs from those of the largest bound down until the error is accepted; returns how many.
+  std::size_t add_by_bound();
+
+  /// Sums pairs in the order of the list; returns how many.
+  std::size_t add_in_order();
+
+  /// Whether visits or time may not do for all pairs.
+  bool may_be_stopped();
+
+  /// Sums as many shares of the pairs as limits allow, and takes the others for like them. False
+  /// if not even the first could be finished: then nothing is summed.
+  bool add_by_shares();
+
+  /// Takes the shares that are summed, by weight, for the whole. `room`: how many shares limits
+  /// would do for.
+  void take_shares_for_all(const LeafSums* sums, std::size_t done, double room);
 
   bool accurate(double waiting) const;
 
