@@ -46,60 +46,37 @@ class PairPatches {
 
   ContactPatches run(std::span<ContactPatch> patches) {
     ContactPatches result;
-    ExactWeight weight;
-    Penetration lenses;
-    std::optional<DescentLimits> left = limits_;  // for the exact sum
-    if (method_.lenses) {
-      const double radius_a = tree_a_.header->root[3];
-      const double radius_b = tree_b_.header->root[3] * pose_.a_from_b.scale;
-      const bool of_b = divides_b(tree_a_, radius_a, tree_b_, radius_b);
-      scratch_.contact.start(of_b ? tree_b_ : tree_a_, of_b);
-      Descent descent(tree_a_, tree_b_, pose_, limits_, scratch_, &scratch_.contact);
-      descent.run();
-      lenses = descent.penetration();
-      const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
-      weight = exact_weight(method_, lenses, unit3);
-      left = PairOverlap::left_by(lenses, limits_);
-      result.penetration = weight.most == 0 ? lenses
-                           : left           ? both_.with_exact(method_, lenses, weight, *left)
-                                            : both_.without_exact(method_, lenses);
-      // The patches are those of the larger part.
-      if (weight.weight < 0.5 || !left) {
-        if (weight.most > 0 && left) {  // the surface's descent has used the scratch
-          scratch_.contact.start(of_b ? tree_b_ : tree_a_, of_b);
-          Descent again(tree_a_, tree_b_, pose_, limits_, scratch_, &scratch_.contact);
-          again.run();
-        }
-        result.count =
-            write_patches({scratch_.contact, scratch_.contact.collect(descent.precision()), pose_,
-                           of_b ? radius_b : radius_a},
-                          result.penetration, patches);
-        return result;
-      }
-    }
-    const bool b_probes = method_.b_probes;
-    scratch_.contact.start(b_probes ? tree_b_ : tree_a_, true);
-    const Penetration sum = both_.exact(b_probes, *left, &scratch_.contact);
-    if (!method_.lenses) result.penetration = sum;
-    const std::uint32_t filled = scratch_.contact.collect(Precision::float64);
-    if (b_probes) {
-      result.count = write_patches(
-          {scratch_.contact, filled, pose_, tree_b_.header->root[3] * pose_.a_from_b.scale},
-          result.penetration, patches);
+    ContactBins& bins = scratch_.contact;
+    if (!method_.lenses) {
+      start_probed();
+      result.penetration = both_.exact(method_.b_probes, limits_, &bins);
+      result.count = write_probed(result.penetration, patches);
       return result;
     }
-    // A's spheres probe B: the patches come as pushes on A.
-    const std::optional<RelativePose> turned = relative_pose(b_, a_);
-    if (!turned) return result;
-    result.count = write_patches(
-        {scratch_.contact, filled, *turned, tree_a_.header->root[3] * turned->a_from_b.scale},
-        turned_over(result.penetration, b_, a_), patches);
-    Eigen::Vector3d between;
-    for (int k = 0; k < 3; ++k) between[k] = a_.pose.t[k] - b_.pose.t[k];
-    for (ContactPatch& patch : patches.first(result.count)) {
-      patch.torque = -(patch.torque + between.cross(patch.force));
-      patch.force = -patch.force;
+    const Stopwatch time(limits_);
+    const double radius_a = tree_a_.header->root[3];
+    const double radius_b = tree_b_.header->root[3] * pose_.a_from_b.scale;
+    const bool of_b = divides_b(tree_a_, radius_a, tree_b_, radius_b);
+    bins.start(of_b ? tree_b_ : tree_a_, of_b);
+    Descent descent(tree_a_, tree_b_, pose_, limits_, scratch_, &bins);
+    descent.run();
+    const std::uint32_t filled = bins.collect(descent.precision());
+    const Penetration lenses = descent.penetration();
+    const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
+    const ExactWeight weight = exact_weight(method_, lenses, unit3);
+    const std::optional<DescentLimits> left = PairOverlap::left_by(lenses, limits_, time);
+    // The patches are those of the larger part.
+    if (left && weight.weight >= 0.5) {
+      start_probed();
+      result.penetration = both_.with_exact(method_, lenses, weight, *left, &bins);
+      result.count = write_probed(result.penetration, patches);
+      return result;
     }
+    result.penetration = weight.most == 0 ? lenses
+                         : left           ? both_.with_exact(method_, lenses, weight, *left)
+                                          : both_.without_exact(method_, lenses);
+    result.count = write_patches({bins, filled, pose_, of_b ? radius_b : radius_a},
+                                 result.penetration, patches);
     return result;
   }
 
@@ -109,6 +86,31 @@ class PairPatches {
   }
 
  private:
+  /// Bins for the spheres that probe.
+  void start_probed() { scratch_.contact.start(method_.b_probes ? tree_b_ : tree_a_, true); }
+
+  /// The patches of the spheres that probed.
+  std::size_t write_probed(const Penetration& whole, std::span<ContactPatch> patches) {
+    const std::uint32_t filled = scratch_.contact.collect(Precision::float64);
+    if (method_.b_probes)
+      return write_patches(
+          {scratch_.contact, filled, pose_, tree_b_.header->root[3] * pose_.a_from_b.scale}, whole,
+          patches);
+    // A's spheres probe B: the patches come as pushes on A.
+    const std::optional<RelativePose> turned = relative_pose(b_, a_);
+    if (!turned) return 0;
+    const std::size_t count = write_patches(
+        {scratch_.contact, filled, *turned, tree_a_.header->root[3] * turned->a_from_b.scale},
+        turned_over(whole, b_, a_), patches);
+    Eigen::Vector3d between;
+    for (int k = 0; k < 3; ++k) between[k] = a_.pose.t[k] - b_.pose.t[k];
+    for (ContactPatch& patch : patches.first(count)) {
+      patch.torque = -(patch.torque + between.cross(patch.force));
+      patch.force = -patch.force;
+    }
+    return count;
+  }
+
   const PlacedTree& a_;
   const PlacedTree& b_;
   const RelativePose& pose_;

@@ -55,19 +55,19 @@ std::optional<RelativePose> pose_of(const PlacedField& a, const PlacedTree& b) n
   return relative_pose(a.pose, a.scale, b);
 }
 
-QueryStatus invalid() noexcept { return QueryStatus::invalid_input; }
+template <class Answer>
+Answer refused() noexcept {
+  Answer answer;
+  answer.status = QueryStatus::invalid_input;
+  return answer;
+}
 
 /// `tree`: of B, which bins refer to.
 Penetration penetrate(const PlacedField& a, const PlacedTree& b, const SphereTree& tree,
                       const DescentLimits& limits, Workspace& workspace,
                       ContactBins* bins) noexcept {
-  const auto refused = [] {
-    Penetration result;
-    result.status = invalid();
-    return result;
-  };
   const std::optional<RelativePose> pose = pose_of(a, b);
-  if (!pose || workspace.impl() == nullptr) return refused();
+  if (!pose || workspace.impl() == nullptr) return refused<Penetration>();
   if (bins != nullptr) bins->start(tree, true);
   const auto run = [&](auto& descent) {
     descent.run();
@@ -84,7 +84,7 @@ Penetration penetrate(const PlacedField& a, const PlacedTree& b, const SphereTre
         FieldDescent descent(shape, tree, *pose, limits, *workspace.impl(), bins);
         return run(descent);
       },
-      refused);
+      refused<Penetration>);
 }
 
 }  // namespace
@@ -97,13 +97,8 @@ Penetration penetration(const PlacedField& a, const PlacedTree& b,
 
 Separation separation(const PlacedField& a, const PlacedTree& b, const SeparationSettings& settings,
                       Workspace& workspace) noexcept {
-  const auto refused = [] {
-    Separation result;
-    result.status = invalid();
-    return result;
-  };
   const std::optional<RelativePose> pose = pose_of(a, b);
-  if (!pose || workspace.impl() == nullptr) return refused();
+  if (!pose || workspace.impl() == nullptr) return refused<Separation>();
   const SphereTree tree = sphere_tree(b.tree, Measure::inner);
   const auto search = [&](auto& shape) {
     return GapSearch(shape, tree, *pose, settings, *workspace.impl()).run();
@@ -112,7 +107,7 @@ Separation separation(const PlacedField& a, const PlacedTree& b, const Separatio
     MeshShape shape(*mesh);
     return search(shape);
   }
-  return with_shape(a.field, search, refused);
+  return with_shape(a.field, search, refused<Separation>);
 }
 
 PenetrationAndSeparation query(const PlacedField& a, const PlacedTree& b,
@@ -126,13 +121,13 @@ ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
                                std::span<ContactPatch> patches) noexcept {
   ContactPatches result;
   if (workspace.impl() == nullptr) {
-    result.penetration.status = invalid();
+    result.penetration = refused<Penetration>();
     return result;
   }
   ContactBins& bins = workspace.impl()->contact;
   const SphereTree tree = sphere_tree(b.tree, settings.measure);
   result.penetration = penetrate(a, b, tree, limits_of(settings), workspace, &bins);
-  if (result.penetration.status == invalid()) return result;
+  if (result.penetration.status == QueryStatus::invalid_input) return result;
   const std::optional<RelativePose> pose = pose_of(a, b);
   if (!pose) return result;
   const double radius = tree.header->root[3] * pose->a_from_b.scale;

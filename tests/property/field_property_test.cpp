@@ -1,106 +1,22 @@
 #include <gtest/gtest.h>
-#include <ist/bake.h>
-#include <ist/field.h>
-#include <ist/query.h>
 
-#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numbers>
-#include <random>
-#include <vector>
 
 #include "query/probe/cap.h"
 #include "support/box_overlap.h"
-#include "support/float_traps.h"
-#include "support/random_assets.h"
 #include "support/reference_sum.h"
-#include "support/test_meshes.h"
+#include "support/surface_queries.h"
 
-// Queries that meet a surface: of fields and trees, and of two trees by the surface of the coarser.
+// Sums of queries that meet a surface, of fields and trees, and of two trees by the surface of the
+// coarser: closed forms, gradients, energy, nothing that jumps.
 
 namespace ist {
 namespace {
 
-using Eigen::Quaterniond;
-using Eigen::Vector3d;
-using testing::random_pose;
-
-Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres) {
-  PackingSettings settings;
-  settings.max_spheres = spheres;
-  return bake(close_mesh(std::move(mesh), name), settings);
-}
-
-const Asset& cube() {
-  static const Asset asset = baked(testing::cube_mesh(), "cube", 1000);
-  return asset;
-}
-const Asset& torus() {
-  static const Asset asset = baked(testing::torus_mesh(0.35, 0.14, 40, 20), "torus", 800);
-  return asset;
-}
-const Asset& coarse_torus() {
-  static const Asset asset = baked(testing::torus_mesh(0.35, 0.14, 40, 20), "torus", 60);
-  return asset;
-}
-const Asset& plate() {
-  static const Asset asset = baked(testing::box_mesh({-1, -1, -0.01}, {1, 1, 0.01}), "plate", 1000);
-  return asset;
-}
-const Asset& slab() {
-  static const Asset asset = baked(testing::box_mesh({-1, -1, -0.2}, {1, 1, 0.2}), "slab", 1000);
-  return asset;
-}
-
-Vector3d position(const Pose& pose) { return {pose.t[0], pose.t[1], pose.t[2]}; }
-Quaterniond rotation(const Pose& pose) { return {pose.q[0], pose.q[1], pose.q[2], pose.q[3]}; }
-Pose pose_of(const Quaterniond& q, const Vector3d& t) {
-  return {{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}};
-}
-
-/// A motion of a body from a pose on: along `v` and about `w`, by s.
-struct Motion {
-  Pose start;
-  Vector3d v = Vector3d::Zero(), w = Vector3d::Zero();
-  Pose at(double s) const {
-    const double angle = w.norm();
-    const Quaterniond turn =
-        angle > 0 ? Quaterniond(Eigen::AngleAxisd(angle * s, w / angle)) : Quaterniond::Identity();
-    return pose_of(turn * rotation(start), position(start) + s * v);
-  }
-};
-
-using Ask = std::function<Penetration(const Pose&)>;
-
-struct Work {
-  double done = 0;    ///< ∫ of the forces and torques
-  double moved = 0;   ///< ∫ of their magnitudes, whatever the direction
-  double change = 0;  ///< of the volume
-  double most = 0;    ///< largest volume on the way
-};
-
-/// By Simpson's rule from s = 0 to 1.
-Work work_of(const Ask& ask, const Motion& motion, int steps) {
-  Work work;
-  for (int i = 0; i <= 2 * steps; ++i) {
-    const double weight = (i == 0 || i == 2 * steps ? 1.0 : i % 2 == 1 ? 4.0 : 2.0) / (6.0 * steps);
-    const Penetration p = ask(motion.at(0.5 * i / steps));
-    work.most = std::max(work.most, p.volume);
-    work.done +=
-        weight * (p.translation_gradient.dot(motion.v) + p.rotation_gradient.dot(motion.w));
-    work.moved += weight * (p.translation_gradient.norm() * motion.v.norm() +
-                            p.rotation_gradient.norm() * motion.w.norm());
-  }
-  work.change = ask(motion.at(1)).volume - ask(motion.at(0)).volume;
-  return work;
-}
-
-Vector3d random_direction(std::mt19937_64& random) {
-  const Pose pose = random_pose(random, 1);
-  return position(pose);
-}
+using namespace testing;
 
 /// The volume changes by what its gradients say, along short ways in all directions. `rounding`:
 /// relative, of a volume.
@@ -119,50 +35,6 @@ void expect_gradients(const char* name, const Ask& ask, const Pose& pose, double
                                                                                       : " both")
                                                                       << ", volume " << work.most;
   }
-}
-
-std::vector<std::pair<const char*, Field>> fields() {
-  static const std::vector<float> heights = [] {
-    std::vector<float> h;
-    for (int j = 0; j < 9; ++j)
-      for (int i = 0; i < 9; ++i)
-        h.push_back(static_cast<float>(0.1 * std::sin(1.3 * i) * std::cos(0.9 * j)));
-    return h;
-  }();
-  static const std::vector<float> distances = [] {
-    std::vector<float> d;
-    for (int k = 0; k < 21; ++k)
-      for (int j = 0; j < 21; ++j)
-        for (int i = 0; i < 21; ++i)
-          d.push_back(
-              static_cast<float>(0.5 - 0.1 * Vector3d(i - 10.0, j - 10.0, k - 10.0).norm()));
-    return d;
-  }();
-  HeightField terrain;
-  terrain.heights = heights.data();
-  terrain.columns = terrain.rows = 9;
-  terrain.spacing[0] = terrain.spacing[1] = 0.25;
-  terrain.lowest = -0.11, terrain.highest = 0.11;
-  DistanceGridField grid;
-  grid.distances = distances.data();
-  for (std::uint32_t& n : grid.size) n = 21;
-  grid.origin = Vector3d::Constant(-1);
-  grid.spacing = 0.1;
-  FunctionField function;
-  function.look = [](const void*, const Vector3d& x) noexcept {
-    const double d = x.norm();
-    return FieldSample{0.5 - d, d > 0 ? Vector3d(-x / d) : Vector3d::Zero().eval()};
-  };
-  return {{"half-space", HalfSpaceField{Vector3d(0.6, 0, 0.8), 0.1}},
-          {"box", BoxField{Vector3d(0.5, 0.4, 0.3)}},
-          {"thin box", BoxField{Vector3d(0.5, 0.4, 0.01)}},
-          {"ball", BallField{0.5}},
-          {"capsule", CapsuleField{0.3, 0.4}},
-          {"cylinder", CylinderField{0.4, 0.3}},
-          {"terrain", terrain},
-          {"grid", grid},
-          {"function", function},
-          {"mesh", MeshField{torus().view()}}};
 }
 
 TEST(FieldQuery, GradientsAreThoseOfTheVolume) {
@@ -187,7 +59,7 @@ TEST(FieldQuery, CylindersRimIsMetByEveryBall) {
   // Past the rim a ball is beside the mantle and above the end, and has a part of either: nodes may
   // not be left out by their way to the rim.
   Workspace workspace;
-  const Asset one = testing::make_random_asset({300, 0.3, {}, 0}, 5);
+  const Asset one = make_random_asset({300, 0.3, {}, 0}, 5);
   const PlacedField a{CylinderField{0.4, 0.3}, {}, 1};
   std::mt19937_64 random(31);
   std::uniform_real_distribution<double> uniform(0, 0.5);
@@ -196,7 +68,7 @@ TEST(FieldQuery, CylindersRimIsMetByEveryBall) {
     pose.t[0] = 0.4 + uniform(random), pose.t[2] = 0.3 + uniform(random);
     const PlacedTree b{one.view(), pose, 0.5};
     double want = 0;
-    for (const testing::WorldSphere& s : testing::world_spheres(b, Measure::matched)) {
+    for (const WorldSphere& s : world_spheres(b, Measure::matched)) {
       const double whole = 4 * std::numbers::pi / 3 * s.r * s.r * s.r;
       const double slab =
           cap(s.r, 0.3 - s.centre.z()).volume + cap(s.r, 0.3 + s.centre.z()).volume - whole;
@@ -206,26 +78,10 @@ TEST(FieldQuery, CylindersRimIsMetByEveryBall) {
   }
 }
 
-struct Pair {
-  const char* name;
-  const Asset &a, &b;
-  double scale_b;
-  double distance;
-};
-
-std::vector<Pair> pairs() {
-  return {{"fine on coarse", cube(), torus(), 0.2, 0.5},
-          {"coarse on fine", coarse_torus(), cube(), 1.0, 0.5},
-          {"like sizes", cube(), torus(), 1.0, 0.7},
-          {"like sizes turned", torus(), cube(), 1.0, 0.7},
-          {"large on small", torus(), cube(), 6.0, 2.9},
-          {"thin", plate(), torus(), 0.5, 0.1}};
-}
-
 TEST(FieldPairs, GradientsAreThoseOfTheVolume) {
   Workspace workspace;
   std::mt19937_64 random(22);
-  for (const Pair& pair : pairs()) {
+  for (const SurfacePair& pair : pairs()) {
     for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
       int met = 0;
       for (int i = 0; i < 8; ++i) {
@@ -250,7 +106,7 @@ TEST(FieldPairs, GradientsAreThoseOfTheVolume) {
 TEST(FieldPairs, AnswersAreSound) {
   Workspace workspace;
   std::mt19937_64 random(23);
-  for (const Pair& pair : pairs()) {
+  for (const SurfacePair& pair : pairs()) {
     for (const FieldUse use : {FieldUse::automatic, FieldUse::always, FieldUse::never}) {
       for (int i = 0; i < 20; ++i) {
         PenetrationSettings settings;
@@ -352,9 +208,9 @@ TEST(FieldPairs, CarriedThroughAWall) {
                                                          body, {}, workspace)
                                   : way == 1 ? penetration(wall, body, exact, workspace)
                                              : penetration(body, wall, exact, workspace);
-          const double want = testing::overlap_volume(
-              {Vector3d::Zero(), {1, 1, half}, Eigen::Matrix3d::Identity()},
-              {{0.05, -0.1, z}, Vector3d::Constant(0.25), q.toRotationMatrix()});
+          const double want =
+              overlap_volume({Vector3d::Zero(), {1, 1, half}, Eigen::Matrix3d::Identity()},
+                             {{0.05, -0.1, z}, Vector3d::Constant(0.25), q.toRotationMatrix()});
           most = std::max(most, want);
           error = std::max(error, std::abs(got.volume - want));
           if (i > 0) worst_jump = std::max(worst_jump, std::abs(got.volume - last));
@@ -411,7 +267,7 @@ TEST(FieldPairs, NoJumpWhereMethodsChangeHands) {
 TEST(FieldQuery, HalfSpaceIsASumOfCaps) {
   Workspace workspace;
   std::mt19937_64 random(24);
-  const Asset off = testing::make_random_asset({500, 0.1, {3, -2, 1}, 2}, 6);
+  const Asset off = make_random_asset({500, 0.1, {3, -2, 1}, 2}, 6);
   for (int i = 0; i < 60; ++i) {
     const double scale = std::pow(10.0, i % 7 - 3);
     const Vector3d normal = random_direction(random);
@@ -420,7 +276,7 @@ TEST(FieldQuery, HalfSpaceIsASumOfCaps) {
     const Vector3d n = rotation(a.pose) * normal;
     double volume = 0, scale_of_force = 0;
     Vector3d force = Vector3d::Zero(), torque = force, moment = force;
-    for (const testing::WorldSphere& s : testing::world_spheres(b, Measure::matched)) {
+    for (const WorldSphere& s : world_spheres(b, Measure::matched)) {
       const double d = 0.07 * scale - n.dot(s.centre - position(a.pose));
       const Cap c = cap(s.r, d);
       volume += c.volume;
@@ -440,437 +296,6 @@ TEST(FieldQuery, HalfSpaceIsASumOfCaps) {
     }
     EXPECT_LE(p.volume_min, volume * (1 + 1e-12));
     EXPECT_GE(p.volume_max, volume * (1 - 1e-12));
-  }
-}
-
-std::vector<std::pair<const char*, PenetrationSettings>> limits() {
-  std::vector<std::pair<const char*, PenetrationSettings>> all;
-  for (const std::uint32_t visits : {1u, 3u, 10u, 40u, 200u, 1000u}) {
-    PenetrationSettings s;
-    s.max_visits = visits;
-    all.emplace_back("max_visits", s);
-  }
-  for (const double us : {1e-3, 1.0, 5.0, 20.0}) {
-    PenetrationSettings s;
-    s.deadline_us = us;
-    all.emplace_back("deadline_us", s);
-  }
-  for (const double error : {0.5, 0.1, 0.01}) {
-    PenetrationSettings s;
-    s.relative_error = error;
-    all.emplace_back("relative_error", s);
-  }
-  for (const double radius : {0.5, 0.1, 0.02}) {
-    PenetrationSettings s;
-    s.min_radius = radius;
-    all.emplace_back("min_radius", s);
-  }
-  return all;
-}
-
-void expect_bounds(const char* name, const char* limit, const Penetration& got,
-                   const Penetration& full, double relative_error) {
-  EXPECT_NE(got.status, QueryStatus::invalid_input);
-  EXPECT_LE(got.volume_min, full.volume * (1 + 1e-6)) << name << ' ' << limit;
-  EXPECT_GE(got.volume_max, full.volume * (1 - 1e-6)) << name << ' ' << limit;
-  EXPECT_LE(got.volume_min, got.volume) << name << ' ' << limit;
-  EXPECT_GE(got.volume_max, got.volume) << name << ' ' << limit;
-  EXPECT_TRUE(std::isfinite(got.volume_max) && got.translation_gradient.allFinite() &&
-              got.rotation_gradient.allFinite() && got.centroid.allFinite())
-      << name << ' ' << limit;
-  if (relative_error > 0) {
-    EXPECT_LE(got.volume_max - got.volume_min, (relative_error + 1e-4) * got.volume_max + 1e-15)
-        << name;
-  }
-  if (got.status == QueryStatus::ok) {
-    EXPECT_NEAR(got.volume, full.volume, 1e-6 * full.volume) << name << ' ' << limit;
-  }
-}
-
-TEST(FieldQuery, LimitsKeepTrueBounds) {
-  std::mt19937_64 random(25);
-  Workspace large, tiny(64);
-  for (const auto& [name, field] : fields()) {
-    for (int i = 0; i < 6; ++i) {
-      const PlacedField a{field, random_pose(random, 0.1), 1};
-      const PlacedTree b{(i % 2 == 0 ? cube() : torus()).view(), random_pose(random, 0.15 * i),
-                         0.8};
-      const Penetration full = penetration(a, b, {}, large);
-      for (const auto& [limit, settings] : limits())
-        expect_bounds(name, limit, penetration(a, b, settings, large), full,
-                      settings.relative_error);
-      expect_bounds(name, "tiny", penetration(a, b, {}, tiny), full, 0);
-    }
-  }
-}
-
-TEST(FieldPairs, LimitsKeepTrueBounds) {
-  std::mt19937_64 random(26);
-  Workspace large, tiny(64);
-  for (const Pair& pair : pairs()) {
-    for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
-      for (int i = 0; i < 60; ++i) {
-        const PlacedTree a{pair.a.view(), random_pose(random, 0), 1};
-        const PlacedTree b{pair.b.view(), random_pose(random, (0.5 + 0.0133 * i) * pair.distance),
-                           pair.scale_b};
-        PenetrationSettings plain;
-        plain.field = use;
-        const Penetration full = penetration(a, b, plain, large);
-        for (auto [limit, settings] : limits()) {
-          settings.field = use;
-          expect_bounds(pair.name, limit, penetration(a, b, settings, large), full,
-                        settings.relative_error);
-        }
-        // As many visits as the lenses take, or about: none is left for the exact sum.
-        PenetrationSettings lenses = plain;
-        lenses.field = FieldUse::never;
-        const std::uint32_t visits = penetration(a, b, lenses, large).node_visits;
-        for (const std::uint32_t more : {0u, 1u, 2u, 3u, 5u}) {
-          PenetrationSettings settings = plain;
-          settings.max_visits = std::max(1u, visits + more - 1);
-          expect_bounds(pair.name, "lenses' visits", penetration(a, b, settings, large), full, 0);
-        }
-        expect_bounds(pair.name, "tiny", penetration(a, b, plain, tiny), full, 0);
-      }
-    }
-  }
-}
-
-void expect_shares(const char* name, const ContactPatches& got, const Penetration& whole,
-                   std::span<const ContactPatch> patches) {
-  EXPECT_EQ(got.penetration.volume, whole.volume) << name;
-  EXPECT_EQ(got.penetration.status, whole.status) << name;
-  EXPECT_EQ(got.penetration.node_visits, whole.node_visits) << name;
-  EXPECT_EQ(got.penetration.translation_gradient, whole.translation_gradient) << name;
-  EXPECT_EQ(got.penetration.rotation_gradient, whole.rotation_gradient) << name;
-  // Where a stopped query has summed nothing yet there is nothing to divide.
-  if (whole.status == QueryStatus::ok) {
-    EXPECT_EQ(got.count > 0, whole.volume > 0) << name;
-  }
-  if (got.count == 0) return;
-  double volume = 0, pull = 0, turn = 0;
-  Vector3d force = Vector3d::Zero(), torque = force;
-  for (const ContactPatch& patch : patches.first(got.count)) {
-    volume += patch.volume;
-    force += patch.force;
-    torque += patch.torque;
-    pull += patch.force.norm();
-    turn += patch.torque.norm();
-    EXPECT_TRUE(patch.normal.allFinite() && patch.centroid.allFinite());
-    EXPECT_GE(patch.volume, 0) << name;
-  }
-  EXPECT_NEAR(volume, whole.volume, 1e-12 * whole.volume) << name;
-  EXPECT_LE((force + whole.translation_gradient).norm(), 1e-12 * pull) << name;
-  EXPECT_LE((torque + whole.rotation_gradient).norm(), 1e-12 * (turn + 2 * pull)) << name;
-}
-
-TEST(FieldQuery, PatchesAddUpToTheWhole) {
-  Workspace workspace;
-  std::mt19937_64 random(27);
-  ContactPatch patches[12];
-  for (const auto& [name, field] : fields()) {
-    for (int i = 0; i < 8; ++i) {
-      const PlacedField a{field, random_pose(random, 0.1), 1};
-      const PlacedTree b{cube().view(), random_pose(random, 0.12 * i), 0.8};
-      const Penetration whole = penetration(a, b, {}, workspace);
-      const ContactPatches got = contact_patches(a, b, {}, workspace, patches);
-      expect_shares(name, got, whole, patches);
-    }
-  }
-}
-
-TEST(FieldPairs, PatchesAddUpToTheWhole) {
-  Workspace workspace;
-  std::mt19937_64 random(28);
-  ContactPatch patches[12];
-  for (const Pair& pair : pairs()) {
-    for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
-      for (int i = 0; i < 12; ++i) {
-        const PlacedTree a{pair.a.view(), random_pose(random, 0.1), 1};
-        const PlacedTree b{pair.b.view(), random_pose(random, (0.2 + 0.08 * i) * pair.distance),
-                           pair.scale_b};
-        PenetrationSettings settings;
-        settings.field = use;
-        ContactSettings contact;
-        contact.field = use;
-        // A stopped query is divided too.
-        settings.max_visits = contact.max_visits = i % 3 == 0 ? 10u * static_cast<unsigned>(i) : 0;
-        const Penetration whole = penetration(a, b, settings, workspace);
-        expect_shares(pair.name, contact_patches(a, b, contact, workspace, patches), whole,
-                      patches);
-      }
-    }
-  }
-}
-
-/// Distance of a point from a field in its own frame, positive outside.
-double outside_of(const Field& field, const Vector3d& x) {
-  if (const auto* f = std::get_if<HalfSpaceField>(&field)) return f->normal.dot(x) - f->offset;
-  if (const auto* f = std::get_if<BallField>(&field)) return x.norm() - f->radius;
-  if (const auto* f = std::get_if<BoxField>(&field)) {
-    const Vector3d q = x.cwiseAbs() - f->half_extents;
-    return q.cwiseMax(0.0).norm() + std::min(0.0, q.maxCoeff());
-  }
-  if (const auto* f = std::get_if<CapsuleField>(&field)) {
-    const double z = std::clamp(x.z(), -f->half_height, f->half_height);
-    return (x - Vector3d(0, 0, z)).norm() - f->radius;
-  }
-  const auto& f = std::get<CylinderField>(field);
-  const double side = x.head<2>().norm() - f.radius, end = std::abs(x.z()) - f.half_height;
-  return std::hypot(std::max(side, 0.0), std::max(end, 0.0)) + std::min(0.0, std::max(side, end));
-}
-
-TEST(FieldQuery, SeparationIsTheNearestSpheres) {
-  Workspace workspace;
-  std::mt19937_64 random(29);
-  for (const auto& [name, field] : fields()) {
-    const std::string kind = name;
-    if (kind == "terrain" || kind == "grid" || kind == "function") continue;
-    const bool mesh = kind == "mesh";
-    const double scale = 1.3;
-    int apart = 0;
-    for (int i = 0; i < 30; ++i) {
-      const PlacedField a{field, random_pose(random, 0.3), scale};
-      const PlacedTree b{cube().view(), random_pose(random, 0.1 + 0.08 * i), 0.5};
-      const Separation got = separation(a, b, {}, workspace);
-      ASSERT_EQ(got.status, QueryStatus::ok) << name;
-      const Quaterniond q = rotation(a.pose).conjugate();
-      const auto local = [&](const Vector3d& x) -> Vector3d {
-        return q * (x - position(a.pose)) / scale;
-      };
-      double gap = std::numeric_limits<double>::infinity();
-      if (mesh) {
-        // The torus as its segments: by another query, against a ball field of its own.
-        const Separation trees =
-            separation(PlacedTree{torus().view(), a.pose, scale}, b, {}, workspace);
-        EXPECT_LE(got.distance_min, trees.distance_max + 1e-9);
-        EXPECT_GE(got.distance_max, trees.distance_min - 1e-9);
-      } else {
-        for (const testing::WorldSphere& s : testing::world_spheres(b, Measure::inner))
-          gap = std::min(gap, scale * outside_of(field, local(s.centre)) - s.r);
-        EXPECT_NEAR(got.distance, std::max(0.0, gap), 1e-9) << name;
-        EXPECT_GE(got.distance_max, std::max(0.0, gap) - 1e-12) << name;
-        // The cube's own corners tell the solids' distance from above, faces aside.
-        double corners = std::numeric_limits<double>::infinity();
-        for (int c = 0; c < 8; ++c) {
-          const Vector3d x((c & 1) - 0.5, (c >> 1 & 1) - 0.5, (c >> 2) - 0.5);
-          corners = std::min(corners, scale * outside_of(field, local(rotation(b.pose) * (0.5 * x) +
-                                                                      position(b.pose))));
-        }
-        EXPECT_LE(got.distance_min, std::max(0.0, corners) + 1e-9) << name;
-        if (kind == "half-space") {
-          EXPECT_GE(got.distance_max, std::max(0.0, corners) - 1e-9);
-        }
-      }
-      EXPECT_LE(got.distance_min, got.distance);
-      if (!(got.distance > 0)) {
-        EXPECT_EQ(got.normal, Vector3d::Zero()) << name;
-        EXPECT_EQ(got.point_a, Vector3d::Zero()) << name;
-        EXPECT_EQ(got.distance_max, 0) << name;
-        continue;
-      }
-      ++apart;
-      EXPECT_NEAR((got.point_b - got.point_a).norm(), got.distance, 1e-9) << name;
-      EXPECT_NEAR(got.normal.dot(got.point_b - got.point_a), got.distance, 1e-9) << name;
-      if (!mesh) {
-        EXPECT_NEAR(scale * outside_of(field, local(got.point_a)), 0, 1e-9) << name;
-      }
-      double on = std::numeric_limits<double>::infinity();
-      for (const testing::WorldSphere& s : testing::world_spheres(b, Measure::inner))
-        on = std::min(on, std::abs((got.point_b - s.centre).norm() - s.r));
-      EXPECT_LE(on, 1e-9) << name;
-    }
-    EXPECT_GT(apart, 3) << name;
-  }
-}
-
-// Far over a large terrain whose heights are known to lie within bounds, nobody looks at all of it.
-TEST(FieldQuery, SeparationFromALargeTerrain) {
-  Workspace workspace;
-  std::vector<float> heights(1000 * 1000);
-  for (std::size_t i = 0; i < heights.size(); ++i) heights[i] = static_cast<float>(i % 7) * 0.001f;
-  HeightField terrain;
-  terrain.heights = heights.data();
-  terrain.columns = terrain.rows = 1000;
-  terrain.spacing[0] = terrain.spacing[1] = 0.01;
-  terrain.lowest = 0, terrain.highest = 0.0061;
-  for (const double z : {1.0, 3.0, 50.0}) {
-    const PlacedTree b{cube().view(), pose_of(Quaterniond::Identity(), {5, 5, z}), 1};
-    const Separation got = separation(PlacedField{terrain, {}, 1}, b, {}, workspace);
-    double lowest = std::numeric_limits<double>::infinity();
-    for (const testing::WorldSphere& s : testing::world_spheres(b, Measure::inner))
-      lowest = std::min(lowest, s.centre.z() - s.r);
-    // A ridge of triangles runs under every sphere, to within the grid's own spacing.
-    EXPECT_GE(got.distance, lowest - 0.0061);
-    EXPECT_LE(got.distance, lowest);
-  }
-}
-
-// ---- what nobody should hand in
-
-struct Garbage {
-  double distance;
-  Vector3d gradient;
-  std::uint64_t after;  ///< looks that are answered well
-  mutable std::uint64_t looks = 0;
-};
-
-FieldSample answer_garbage(const void* context, const Vector3d& x) noexcept {
-  const Garbage& garbage = *static_cast<const Garbage*>(context);
-  if (garbage.looks++ < garbage.after) return {0.1 - x.z(), Vector3d(0, 0, -1)};
-  return {garbage.distance, garbage.gradient};
-}
-
-TEST(FieldHostile, FunctionsThatAnswerGarbage) {
-  const testing::NoFloatTraps with_nan;
-  Workspace workspace;
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const double inf = std::numeric_limits<double>::infinity();
-  const Vector3d up = Vector3d::UnitZ();
-  ContactPatch patches[4];
-  for (const std::uint64_t after : {0ull, 5ull, 40ull}) {
-    for (const Garbage& kind :
-         {Garbage{nan, up, after}, Garbage{inf, up, after}, Garbage{-inf, up, after},
-          Garbage{1e300, up, after}, Garbage{0, nan * up, after}, Garbage{0, inf * up, after},
-          Garbage{0, Vector3d::Constant(1e300), after}, Garbage{-1e-3, 500 * up, after},
-          Garbage{1e100, up, after}, Garbage{0, Vector3d::Zero(), after}}) {
-      const PlacedField a{FunctionField{answer_garbage, &kind, 0}, {}, 1};
-      const PlacedTree b{cube().view(), {}, 1};
-      const bool sound = std::abs(kind.distance) <= 1e150 && kind.gradient.norm() <= 1e3;
-      const Penetration p = penetration(a, b, {}, workspace);
-      if (!sound) {
-        EXPECT_EQ(p.status, QueryStatus::invalid_input) << kind.distance;
-        EXPECT_EQ(p.volume, 0);
-        EXPECT_EQ(p.volume_max, 0);
-      }
-      EXPECT_TRUE(std::isfinite(p.volume) && p.rotation_gradient.allFinite());
-      kind.looks = 0;
-      const Separation s = separation(a, b, {}, workspace);
-      EXPECT_FALSE(std::isnan(s.distance) || std::isnan(s.distance_max)) << kind.distance;
-      kind.looks = 0;
-      const ContactPatches c = contact_patches(a, b, {}, workspace, patches);
-      if (!sound) {
-        EXPECT_EQ(c.count, 0u);
-      }
-      EXPECT_LE(c.count, 4u);
-      kind.looks = 0;
-    }
-  }
-}
-
-TEST(FieldHostile, NumbersOutOfRange) {
-  const testing::NoFloatTraps with_nan;
-  Workspace workspace;
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const double inf = std::numeric_limits<double>::infinity();
-  const float four[4] = {};
-  HeightField terrain;
-  terrain.heights = four, terrain.columns = terrain.rows = 2;
-  DistanceGridField grid;
-  const float eight[8] = {};
-  grid.distances = eight;
-  for (std::uint32_t& n : grid.size) n = 2;
-  std::vector<Field> bad = {HalfSpaceField{Vector3d::Zero(), 0},
-                            HalfSpaceField{Vector3d::Constant(nan), 0},
-                            HalfSpaceField{Vector3d(0, 0, 2), 0},
-                            HalfSpaceField{Vector3d::UnitZ(), nan},
-                            HalfSpaceField{Vector3d::UnitZ(), inf},
-                            BoxField{Vector3d(1, 0, 1)},
-                            BoxField{Vector3d(1, -1, 1)},
-                            BoxField{Vector3d(1, nan, 1)},
-                            BoxField{Vector3d(1, inf, 1)},
-                            BallField{0},
-                            BallField{-1},
-                            BallField{nan},
-                            BallField{inf},
-                            CapsuleField{-1, 1},
-                            CapsuleField{1, -1},
-                            CapsuleField{1, nan},
-                            CapsuleField{nan, 1},
-                            CylinderField{0, 1},
-                            CylinderField{1, 0},
-                            CylinderField{1, nan},
-                            HeightField{},
-                            DistanceGridField{},
-                            FunctionField{},
-                            MeshField{},
-                            MeshField{testing::make_random_asset({10, 0.5, {}, 0}, 3).view()}};
-  const Asset fieldless = testing::make_random_asset({10, 0.5, {}, 0}, 3);
-  bad.back() = MeshField{fieldless.view()};
-  const auto with = [&](auto base, auto change) {
-    change(base);
-    bad.push_back(base);
-  };
-  with(terrain, [](HeightField& f) { f.columns = 1; });
-  with(terrain, [](HeightField& f) { f.rows = 0; });
-  with(terrain, [](HeightField& f) { f.spacing[0] = 0; });
-  with(terrain, [&](HeightField& f) { f.spacing[1] = nan; });
-  with(terrain, [](HeightField& f) { f.lowest = 1, f.highest = 0; });
-  with(terrain, [](HeightField& f) { f.heights = nullptr; });
-  with(grid, [](DistanceGridField& f) { f.size[1] = 1; });
-  with(grid, [](DistanceGridField& f) { f.spacing = -1; });
-  with(grid, [&](DistanceGridField& f) { f.origin.x() = nan; });
-  with(grid, [&](DistanceGridField& f) { f.error = nan; });
-  with(grid, [](DistanceGridField& f) { f.distances = nullptr; });
-  ContactPatch patches[4];
-  const PlacedTree b{cube().view(), {}, 1};
-  for (std::size_t i = 0; i < bad.size(); ++i) {
-    const PlacedField a{bad[i], {}, 1};
-    const PenetrationAndSeparation both = query(a, b, {}, workspace);
-    EXPECT_EQ(both.penetration.status, QueryStatus::invalid_input) << i;
-    EXPECT_EQ(both.separation.status, QueryStatus::invalid_input) << i;
-    EXPECT_EQ(both.penetration.volume_max, 0) << i;
-    EXPECT_EQ(contact_patches(a, b, {}, workspace, patches).count, 0u) << i;
-  }
-  const PlacedField good{BallField{1}, {}, 1};
-  for (const double scale : {0.0, -1.0, nan, inf}) {
-    EXPECT_EQ(penetration(PlacedField{BallField{1}, {}, scale}, b, {}, workspace).status,
-              QueryStatus::invalid_input);
-    EXPECT_EQ(penetration(good, {cube().view(), {}, scale}, {}, workspace).status,
-              QueryStatus::invalid_input);
-  }
-  EXPECT_EQ(penetration(good, {TreeView(), {}, 1}, {}, workspace).status,
-            QueryStatus::invalid_input);
-  EXPECT_EQ(penetration(PlacedField{BallField{1}, {{nan, 0, 0, 0}, {0, 0, 0}}, 1}, b, {}, workspace)
-                .status,
-            QueryStatus::invalid_input);
-  Workspace gone = std::move(workspace);
-  EXPECT_EQ(penetration(good, b, {}, workspace).status, QueryStatus::invalid_input);
-}
-
-TEST(FieldHostile, TablesOfNoNumbers) {
-  const testing::NoFloatTraps with_nan;
-  Workspace workspace;
-  for (const float value :
-       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
-        -std::numeric_limits<float>::infinity(), 3e38f}) {
-    for (const bool all : {true, false}) {
-      std::vector<float> values(125, all ? value : 0.1f);
-      values[62] = values[12] = value;
-      DistanceGridField grid;
-      grid.distances = values.data();
-      for (std::uint32_t& n : grid.size) n = 5;
-      grid.origin = Vector3d::Constant(-1);
-      grid.spacing = 0.5;
-      HeightField terrain;
-      terrain.heights = values.data();
-      terrain.columns = terrain.rows = 5;
-      terrain.spacing[0] = terrain.spacing[1] = 0.25;
-      for (const Field& field : {Field(grid), Field(terrain)}) {
-        const PlacedField a{field, {}, 1};
-        for (const double z : {0.0, 0.5, -3.0}) {
-          const PlacedTree b{cube().view(), pose_of(Quaterniond::Identity(), {0.1, 0.2, z}), 0.5};
-          const Penetration p = penetration(a, b, {}, workspace);
-          // Never a NaN that says it is an answer.
-          const bool plain = std::isfinite(p.volume) && p.translation_gradient.allFinite() &&
-                             p.rotation_gradient.allFinite() && p.centroid.allFinite();
-          EXPECT_TRUE(plain || p.status == QueryStatus::invalid_input)
-              << field.index() << ' ' << value << ' ' << all << ' ' << z;
-          const Separation s = separation(a, b, {}, workspace);
-          EXPECT_TRUE(!std::isnan(s.distance) || s.status == QueryStatus::invalid_input);
-        }
-      }
-    }
   }
 }
 

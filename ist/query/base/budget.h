@@ -26,6 +26,26 @@ inline DescentLimits limits_of(const SeparationSettings& settings) noexcept {
   return {settings.max_visits, settings.deadline_us, 0, 0};
 }
 
+/// The time since a query began; read only if there is a deadline.
+class Stopwatch {
+ public:
+  explicit Stopwatch(const DescentLimits& limits) noexcept {
+    if (limits.deadline_us > 0) start_ = Clock::now();
+  }
+
+  /// What is left of the limits' deadline: one that is over, if nothing is.
+  double left_of(const DescentLimits& limits) const noexcept {
+    if (!(limits.deadline_us > 0)) return 0;
+    const std::chrono::duration<double, std::micro> gone = Clock::now() - start_;
+    return std::max(kOver, limits.deadline_us - gone.count());
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr double kOver = 1e-6;  // [µs]
+  Clock::time_point start_;
+};
+
 /// Counts visits and watches the clock, if there is a deadline: at most once in 16 visits. Visits
 /// end at a part of the time, what is left being for a guess of what was not visited. Time for
 /// which the system takes the thread away is not counted, three times at most.

@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -25,8 +24,6 @@ constexpr double kFewSpheres = 2;
 constexpr double kFewTriangles = 10, kManyTriangles = 20;
 // The lenses answer alone from so many times that on.
 constexpr double kHandover = 4;
-// [µs] a deadline that is over.
-constexpr double kNoTime = 1e-6;
 
 /// How coarse a tree's spheres are for their solid, its unit frame: the mean radius, and more where
 /// inner spheres cover little of it, the solid being thinner than its matched spheres.
@@ -137,11 +134,10 @@ Penetration blended(const Penetration& lenses, Penetration sum, const ExactWeigh
   return sum;
 }
 
-Penetration PairOverlap::by_lenses(const DescentLimits& limits, bool keep_rounding,
-                                   ContactBins* bins) noexcept {
+Penetration PairOverlap::by_lenses(const DescentLimits& limits, bool keep_rounding) noexcept {
   const SphereTree a(a_.tree.header(), tree_a_);
   const SphereTree b(b_.tree.header(), tree_b_);
-  Descent descent(a, b, pose_, limits, scratch_, bins);
+  Descent descent(a, b, pose_, limits, scratch_);
   if (keep_rounding) descent.keep_rounding();
   descent.run();
   return descent.penetration();
@@ -169,8 +165,9 @@ Penetration PairOverlap::exact(bool b_probes, const DescentLimits& limits,
   return turned_over(descent.penetration(), a_, b_);
 }
 
-std::optional<DescentLimits> PairOverlap::left_by(const Penetration& lenses,
-                                                  DescentLimits limits) noexcept {
+std::optional<DescentLimits> PairOverlap::left_by(const Penetration& lenses, DescentLimits limits,
+                                                  const Stopwatch& time) noexcept {
+  limits.deadline_us = time.left_of(limits);
   if (limits.max_visits == 0) return limits;
   if (lenses.node_visits >= limits.max_visits) return std::nullopt;
   limits.max_visits -= lenses.node_visits;
@@ -178,8 +175,9 @@ std::optional<DescentLimits> PairOverlap::left_by(const Penetration& lenses,
 }
 
 Penetration PairOverlap::with_exact(const PairMethod& method, const Penetration& lenses,
-                                    const ExactWeight& weight, const DescentLimits& left) noexcept {
-  Penetration sum = exact(method.b_probes, left);
+                                    const ExactWeight& weight, const DescentLimits& left,
+                                    ContactBins* bins) noexcept {
+  Penetration sum = exact(method.b_probes, left, bins);
   sum.node_visits += lenses.node_visits;
   sum.sphere_pairs += lenses.sphere_pairs;
   sum.status = std::max(sum.status, lenses.status);
@@ -200,18 +198,13 @@ Penetration PairOverlap::without_exact(const PairMethod& method,
 Penetration PairOverlap::by(const PairMethod& method, const DescentLimits& limits) noexcept {
   if (!method.exact) return by_lenses(limits);
   if (!method.lenses) return exact(method.b_probes, limits);
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point start = limits.deadline_us > 0 ? Clock::now() : Clock::time_point();
+  const Stopwatch time(limits);
   const Penetration lenses = by_lenses(limits);
   const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
   const ExactWeight weight = exact_weight(method, lenses, unit3);
   if (weight.most == 0) return lenses;
-  std::optional<DescentLimits> left = left_by(lenses, limits);
+  const std::optional<DescentLimits> left = left_by(lenses, limits, time);
   if (!left) return without_exact(method, lenses);
-  if (limits.deadline_us > 0) {
-    const std::chrono::duration<double, std::micro> gone = Clock::now() - start;
-    left->deadline_us = std::max(kNoTime, limits.deadline_us - gone.count());
-  }
   return with_exact(method, lenses, weight, *left);
 }
 

@@ -11,7 +11,7 @@
 
 namespace ist {
 
-/// How two trees are to be asked (docs/design.md 7). The pose has no say in it.
+/// How two trees are to be asked (docs/design.md 7.1). The pose has no say in it.
 struct PairMethod {
   bool lenses = true;
   bool exact = false;    ///< the finer tree's spheres in the coarser one's surface
@@ -47,19 +47,21 @@ class PairOverlap {
               const TreeHeader& tree_b, const RelativePose& pose, Workspace::Impl& scratch) noexcept
       : a_(a), b_(b), tree_a_(tree_a), tree_b_(tree_b), pose_(pose), scratch_(scratch) {}
 
-  Penetration by_lenses(const DescentLimits& limits, bool keep_rounding = false,
-                        ContactBins* bins = nullptr) noexcept;
+  Penetration by_lenses(const DescentLimits& limits, bool keep_rounding = false) noexcept;
   Penetration exact(bool b_probes, const DescentLimits& limits,
                     ContactBins* bins = nullptr) noexcept;
   Penetration by(const PairMethod& method, const DescentLimits& limits) noexcept;
 
-  /// Visits that the lenses leave of the limits for the exact sum; nothing if there are none.
-  static std::optional<DescentLimits> left_by(const Penetration& lenses,
-                                              DescentLimits limits) noexcept;
+  /// What the lenses leave of the limits for the exact sum; nothing if no visits are left. `time`:
+  /// since they began.
+  static std::optional<DescentLimits> left_by(const Penetration& lenses, DescentLimits limits,
+                                              const Stopwatch& time) noexcept;
 
-  /// The lenses' sum blended with the exact one, which is summed within what is left.
+  /// The lenses' sum blended with the exact one, which is summed within what is left. With `bins`,
+  /// those of what probes, it is sorted into them too.
   Penetration with_exact(const PairMethod& method, const Penetration& lenses,
-                         const ExactWeight& weight, const DescentLimits& left) noexcept;
+                         const ExactWeight& weight, const DescentLimits& left,
+                         ContactBins* bins = nullptr) noexcept;
 
   /// What the lenses say, where no visits are left for the exact sum.
   Penetration without_exact(const PairMethod& method, Penetration lenses) const noexcept;

@@ -44,8 +44,6 @@ class PatchFiller {
   std::size_t size_ = 0;
 };
 
-constexpr std::uint32_t kAllBalls = 0xffff;
-
 }  // namespace
 
 BoxShape::BoxShape(const BoxField& f) noexcept : half(f.half_extents) {
@@ -128,13 +126,9 @@ ProbeTotal BoxShape::block(const ProbeBalls& balls, std::uint32_t used, const do
   const std::uint32_t near = triangles_near(patch_, balls.origin, balls.reach);
   if (near != 0) add_patch(patch_, near, balls, used, sums);
   pairs += sums.pairs;
-  ProbeBalls seen = balls;
-  if (sums.on_edge != 0) {
-    seen = away_from_edges(balls, sums.on_edge);
-    ProbeSums there;
-    add_patch(patch_, (1u << 12) - 1, seen, sums.on_edge, there);
-    put_right(there, balls, sums);
-  }
+  const ProbeBalls seen = off_edges(balls, sums, [&](const ProbeBalls& moved, ProbeSums& there) {
+    add_patch(patch_, (1u << 12) - 1, moved, sums.on_edge, there);
+  });
   std::uint32_t inside = 0;
   for (std::uint32_t i = 0; i < kWidth; ++i) {
     const bool in = std::abs(seen.origin[0] + seen.x[i]) < half.x() &&
@@ -161,7 +155,7 @@ FieldSample HeightShape::look(const Eigen::Vector3d& x) const noexcept {
   // Only what is beyond all heights is told at once; the rest is looked at ball by ball.
   FieldSample at;
   if (x.z() > field_.highest) at.distance = field_.highest - x.z();
-  if (x.z() < field_.lowest) at.distance = 0;  // the surface may be steep
+  if (x.z() < field_.lowest) at.distance = field_.lowest - x.z();
   return at;
 }
 
@@ -265,20 +259,16 @@ ProbeTotal HeightShape::block(const ProbeBalls& balls, std::uint32_t used,
   ProbeSums sums;
   add_cells(balls, used, sums);
   pairs += sums.pairs;
-  ProbeBalls seen = balls;
-  if (sums.on_edge != 0) {
-    seen = away_from_edges(balls, sums.on_edge);
-    ProbeSums there;
-    add_cells(seen, sums.on_edge, there);
-    put_right(there, balls, sums);
-  }
+  const ProbeBalls seen = off_edges(balls, sums, [&](const ProbeBalls& moved, ProbeSums& there) {
+    add_cells(moved, sums.on_edge, there);
+  });
   std::uint32_t inside = 0;
   for (std::uint32_t i = 0; i < kWidth; ++i)
     inside |=
         seen.origin[2] + seen.z[i] < surface(seen.origin[0] + seen.x[i], seen.origin[1] + seen.y[i])
             ? 1u << i
             : 0u;
-  return total_of(balls, sums, settled_sides(sums, inside) & used & kAllBalls, origin);
+  return total_of(balls, sums, settled_sides(sums, inside) & used, origin);
 }
 
 }  // namespace ist

@@ -7,9 +7,6 @@
 #include <cstdint>
 #include <numbers>
 
-#include "query/asset/sphere_tree.h"
-#include "query/base/relative_pose.h"
-#include "query/contact/contact_bins.h"
 #include "query/kernel/overlap.h"
 #include "query/probe/patch_sums.h"
 
@@ -26,38 +23,6 @@ struct ProbeTotal {
     overlap.add(other.overlap);
     area += other.area;
     crossed += other.crossed;
-  }
-};
-
-/// Nodes of the probing tree that were not opened: in or out, nobody knows.
-struct LeftNodes {
-  double volume = 0;  ///< of their spheres: the sum may be more by this
-  Overlap guess;      ///< half of it, where the nodes are
-
-  void add(const SphereTree& probes, int level, std::uint32_t block, const Similarity& map,
-           ContactBins* bins) noexcept {
-    const NodeBall ball = probes.ball(level, block);
-    double centre[3];
-    map.apply(ball.centre, centre);
-    const double whole = probes.sums(level, block).volume * (map.scale * map.scale * map.scale);
-    Overlap part;
-    part.volume = 0.5 * whole;
-    part.moment = part.volume *
-                  Eigen::Vector3d(centre[0] - map.t[0], centre[1] - map.t[1], centre[2] - map.t[2]);
-    volume += whole;
-    guess.add(part);
-    if (bins != nullptr) bins->add_guess(0, 0, level, block, part);
-  }
-
-  /// Adds the guess to what is sure. The push grows with the volume, as far as anybody can tell.
-  void add_to(Overlap& sure) const noexcept {
-    if (!(volume > 0)) return;
-    if (sure.volume > 0) {
-      const double factor = 1 + guess.volume / sure.volume;
-      sure.force *= factor;
-      sure.torque *= factor;
-    }
-    sure.add(guess);
   }
 };
 

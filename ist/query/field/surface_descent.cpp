@@ -4,7 +4,6 @@
 #include <bit>
 #include <utility>
 
-#include "query/descent/answer.h"
 #include "query/probe/membership.h"
 
 namespace ist {
@@ -60,10 +59,10 @@ SurfaceDescent::SurfaceDescent(const SurfaceTree& surface, const SphereTree& pro
       limits_(limits),
       min_radius_(limits.min_radius / pose.unit_a),
       scratch_(scratch),
-      bins_(bins),
       budget_(limits),
       surface_level_(balls_.top),
-      probe_level_(probes.top) {}
+      probe_level_(probes.top),
+      tally_(probes, pose, bins) {}
 
 void SurfaceDescent::run() noexcept {
   PairList& now = scratch_.now;
@@ -77,12 +76,10 @@ void SurfaceDescent::run() noexcept {
         (surface_level_ > kSphereLevel &&
          typical_cube(balls_, surface_level_) >= cube * probes_.typical_cube(probe_level_));
     if (min_radius_ > 0) drop_small();
-    if (limits_.relative_error > 0 && held_.spheres > 0) {
-      const double undecided = waiting() + left_.volume;
-      if (undecided <= limits_.relative_error * (overlap().volume + undecided)) {
-        leave(0);
-        return;
-      }
+    if (limits_.relative_error > 0 && tally_.has_held() &&
+        tally_.accurate(waiting(), limits_.relative_error)) {
+      leave(0);
+      return;
     }
     if (!(open_surface_now ? open_surface() : open_probes())) return;
   }
@@ -277,17 +274,12 @@ void SurfaceDescent::keep(int level, std::uint32_t block) noexcept {
   if (level != settled_level_) flush();
   settled_level_ = level;
   settled_[settled_count_++] = block;
-  if (settled_count_ == kSettled || bins_ != nullptr) flush();
+  if (settled_count_ == kSettled || tally_.has_bins()) flush();
 }
 
 void SurfaceDescent::flush() noexcept {
   if (settled_count_ == 0) return;
-  add_subtrees(probes_, settled_level_, settled_, settled_count_, held_);
-  if (bins_ != nullptr) {
-    SubtreeSums sums;
-    add_subtrees(probes_, settled_level_, settled_, 1, sums);
-    bins_->add_guess(0, 0, settled_level_, settled_[0], whole_spheres(sums, map_));
-  }
+  tally_.hold(settled_level_, settled_, settled_count_);
   settled_count_ = 0;
 }
 
@@ -303,16 +295,12 @@ void SurfaceDescent::sum_leaves() noexcept {
       leave(from);
       return;
     }
-    if (by_error &&
-        left + left_.volume <= limits_.relative_error * (overlap().volume + left + left_.volume)) {
+    if (by_error && tally_.accurate(left, limits_.relative_error)) {
       leave(from);
       return;
     }
-    const ProbeTotal part = sum_block(now.b[from], from, end);
-    total_.add(part);
-    if (bins_ != nullptr) bins_->add_guess(0, 0, 0, now.b[from], part.overlap);
-    if (by_error)
-      left -= probes_.sums(0, now.b[from]).volume * (map_.scale * map_.scale * map_.scale);
+    tally_.add(now.b[from], sum_block(now.b[from], from, end));
+    if (by_error) left -= tally_.volume_of(0, now.b[from]);
     from = end;
   }
 }
@@ -336,26 +324,18 @@ ProbeTotal SurfaceDescent::sum_block(std::uint32_t block, std::size_t from,
         std::popcount(near[i]) <= kFewTriangles ? used : used & near_block(balls, a);
     if (chosen != 0) add_patch(patch, near[i], balls, chosen, sums);
   }
-  pairs_ += sums.pairs;
+  tally_.count(sums.pairs);
   if (count == 0) {
     const bool all = inside_surface(surface_, balls.origin, clear_radius(0, block));
     return total_of(balls, sums, all ? used : 0, map_.t);
   }
-  ProbeBalls seen = balls;
-  if (sums.on_edge != 0) {
-    const ProbeBalls moved = away_from_edges(balls, sums.on_edge);
-    ProbeSums there;
+  const ProbeBalls seen = off_edges(balls, sums, [&](const ProbeBalls& moved, ProbeSums& there) {
     for (std::size_t i = from; i < to; ++i) {
       const SurfacePatch& patch = scratch_.patches->find(surface_, scratch_.now.a[i]);
       near[i] = static_cast<std::uint16_t>(triangles_near(patch, moved.origin, moved.reach));
       if (near[i] != 0) add_patch(patch, near[i], moved, sums.on_edge, there);
     }
-    put_right(there, balls, sums);
-    for (std::uint32_t left = sums.on_edge; left != 0; left &= left - 1) {
-      const auto i = static_cast<std::size_t>(std::countr_zero(left));
-      seen.x[i] = moved.x[i], seen.y[i] = moved.y[i], seen.z[i] = moved.z[i];
-    }
-  }
+  });
   std::uint32_t inside;
   const std::uint32_t told = told_sides(sums, inside);
   if (const std::uint32_t untold = used & ~told; untold != 0)
@@ -405,8 +385,8 @@ double SurfaceDescent::waiting() const noexcept {
   const PairList& now = scratch_.now;
   double sum = 0;
   for (std::size_t from = 0; from < now.size; from = group_end(from))
-    sum += probes_.sums(probe_level_, now.b[from]).volume;
-  return sum * (map_.scale * map_.scale * map_.scale);
+    sum += tally_.volume_of(probe_level_, now.b[from]);
+  return sum;
 }
 
 void SurfaceDescent::drop_small() noexcept {
@@ -415,8 +395,7 @@ void SurfaceDescent::drop_small() noexcept {
   for (std::size_t from = 0; from < now.size;) {
     const std::size_t end = group_end(from);
     if (probes_.ball(probe_level_, now.b[from]).r * map_.scale < min_radius_) {
-      left_.add(probes_, probe_level_, now.b[from], map_, bins_);
-      stopped_ = true;
+      tally_.leave(probe_level_, now.b[from]);
       from = end;
       continue;
     }
@@ -430,9 +409,7 @@ void SurfaceDescent::drop_small() noexcept {
 
 void SurfaceDescent::leave(std::size_t from) noexcept {
   const PairList& now = scratch_.now;
-  for (; from < now.size; from = group_end(from))
-    left_.add(probes_, probe_level_, now.b[from], map_, bins_);
-  stopped_ = true;
+  for (; from < now.size; from = group_end(from)) tally_.leave(probe_level_, now.b[from]);
 }
 
 void SurfaceDescent::leave_both(std::size_t from) noexcept {
@@ -443,29 +420,11 @@ void SurfaceDescent::leave_both(std::size_t from) noexcept {
   leave(0);
 }
 
-Overlap SurfaceDescent::overlap() const noexcept {
-  Overlap sum = total_.overlap;
-  sum.add(whole_spheres(held_, map_));
-  return sum;
-}
-
 Penetration SurfaceDescent::penetration() const noexcept {
-  Overlap sum = overlap();
   // Both surfaces lie within the field's error of each other; centres are rounded too.
   const double off =
       surface_.header->error + distance_error(Precision::float64, span(balls_, probes_, pose_));
-  sum.error = 2 * off * total_.area + 1e-13 * (total_.crossed + sum.volume);
-  const double scale = map_.scale;
-  const double most = probes_.header->volume_sum * (scale * scale * scale) * (1 + 1e-9);
-  const double lowest = std::max(0.0, sum.volume - sum.error);
-  const double highest =
-      std::max(lowest, std::min(most, sum.volume + sum.error + (1 + 1e-9) * left_.volume));
-  left_.add_to(sum);
-  Penetration result = world_answer(sum, lowest, highest, pose_);
-  result.node_visits = budget_.visits();
-  result.sphere_pairs = pairs_ + held_.spheres;
-  if (stopped_) result.status = QueryStatus::budget_exhausted;
-  return result;
+  return tally_.answer(off, budget_.visits());
 }
 
 }  // namespace ist

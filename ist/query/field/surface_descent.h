@@ -11,9 +11,8 @@
 #include "query/base/relative_pose.h"
 #include "query/contact/contact_bins.h"
 #include "query/descent/workspace.h"
-#include "query/field/probe_sum.h"
+#include "query/field/probe_tally.h"
 #include "query/kernel/node_kernel.h"
-#include "query/kernel/subtree_kernel.h"
 
 namespace ist {
 
@@ -34,9 +33,6 @@ class SurfaceDescent {
 
   /// The answer in world units.
   Penetration penetration() const noexcept;
-
-  /// A's unit frame, without what was not opened.
-  Overlap overlap() const noexcept;
 
  private:
   bool open_surface() noexcept;
@@ -101,18 +97,13 @@ class SurfaceDescent {
   const DescentLimits limits_;
   const double min_radius_;  ///< A's unit frame
   Workspace::Impl& scratch_;
-  ContactBins* const bins_;
   Budget budget_;
   int surface_level_, probe_level_;
-  ProbeTotal total_;
-  SubtreeSums held_;  ///< nodes of B that are inside
+  ProbeTally tally_;
   static constexpr std::size_t kSettled = 64;
   std::uint32_t settled_[kSettled];
   std::size_t settled_count_ = 0;
   int settled_level_ = 0;
-  LeftNodes left_;
-  std::uint32_t pairs_ = 0;
-  bool stopped_ = false;
 };
 
 }  // namespace ist

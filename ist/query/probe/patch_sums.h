@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
@@ -51,5 +52,21 @@ ProbeBalls away_from_edges(const ProbeBalls& balls, std::uint32_t chosen) noexce
 /// angle is that of the moved ball; the volume is good to some 1e-11 of r³, being smooth in the
 /// centre: by the mean of both gradients it misses no more than the third derivative.
 void put_right(const ProbeSums& moved, const ProbeBalls& balls, ProbeSums& sums) noexcept;
+
+/// Puts the balls on edges right, once all triangles are added. `add(moved, there)` adds to `there`
+/// all that comes near them where they were moved to. Returns the balls with the centres by which
+/// their sides are to be told.
+template <class Add>
+ProbeBalls off_edges(const ProbeBalls& balls, ProbeSums& sums, const Add& add) noexcept {
+  if (sums.on_edge == 0) return balls;
+  const ProbeBalls moved = away_from_edges(balls, sums.on_edge);
+  ProbeSums there;
+  add(moved, there);
+  put_right(there, balls, sums);
+  ProbeBalls seen = moved;
+  std::copy(balls.r, balls.r + kWidth, seen.r);
+  seen.reach = balls.reach;
+  return seen;
+}
 
 }  // namespace ist

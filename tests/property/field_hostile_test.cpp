@@ -1,0 +1,183 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "support/float_traps.h"
+#include "support/surface_queries.h"
+
+// Fields whose numbers are none.
+
+namespace ist {
+namespace {
+
+using namespace testing;
+
+struct Garbage {
+  double distance;
+  Vector3d gradient;
+  std::uint64_t after;  ///< looks that are answered well
+  mutable std::uint64_t looks = 0;
+};
+
+FieldSample answer_garbage(const void* context, const Vector3d& x) noexcept {
+  const Garbage& garbage = *static_cast<const Garbage*>(context);
+  if (garbage.looks++ < garbage.after) return {0.1 - x.z(), Vector3d(0, 0, -1)};
+  return {garbage.distance, garbage.gradient};
+}
+
+TEST(FieldHostile, FunctionsThatAnswerGarbage) {
+  const NoFloatTraps with_nan;
+  Workspace workspace;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  const Vector3d up = Vector3d::UnitZ();
+  ContactPatch patches[4];
+  for (const std::uint64_t after : {0ull, 5ull, 40ull}) {
+    for (const Garbage& kind :
+         {Garbage{nan, up, after}, Garbage{inf, up, after}, Garbage{-inf, up, after},
+          Garbage{1e300, up, after}, Garbage{0, nan * up, after}, Garbage{0, inf * up, after},
+          Garbage{0, Vector3d::Constant(1e300), after}, Garbage{-1e-3, 500 * up, after},
+          Garbage{1e100, up, after}, Garbage{0, Vector3d::Zero(), after}}) {
+      const PlacedField a{FunctionField{answer_garbage, &kind, 0}, {}, 1};
+      const PlacedTree b{cube().view(), {}, 1};
+      const bool sound = std::abs(kind.distance) <= 1e150 && kind.gradient.norm() <= 1e3;
+      const Penetration p = penetration(a, b, {}, workspace);
+      if (!sound) {
+        EXPECT_EQ(p.status, QueryStatus::invalid_input) << kind.distance;
+        EXPECT_EQ(p.volume, 0);
+        EXPECT_EQ(p.volume_max, 0);
+      }
+      EXPECT_TRUE(std::isfinite(p.volume) && p.rotation_gradient.allFinite());
+      kind.looks = 0;
+      const Separation s = separation(a, b, {}, workspace);
+      EXPECT_FALSE(std::isnan(s.distance) || std::isnan(s.distance_max)) << kind.distance;
+      kind.looks = 0;
+      const ContactPatches c = contact_patches(a, b, {}, workspace, patches);
+      if (!sound) {
+        EXPECT_EQ(c.count, 0u);
+      }
+      EXPECT_LE(c.count, 4u);
+      kind.looks = 0;
+    }
+  }
+}
+
+TEST(FieldHostile, NumbersOutOfRange) {
+  const NoFloatTraps with_nan;
+  Workspace workspace;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  const float four[4] = {};
+  HeightField terrain;
+  terrain.heights = four, terrain.columns = terrain.rows = 2;
+  DistanceGridField grid;
+  const float eight[8] = {};
+  grid.distances = eight;
+  for (std::uint32_t& n : grid.size) n = 2;
+  std::vector<Field> bad = {HalfSpaceField{Vector3d::Zero(), 0},
+                            HalfSpaceField{Vector3d::Constant(nan), 0},
+                            HalfSpaceField{Vector3d(0, 0, 2), 0},
+                            HalfSpaceField{Vector3d::UnitZ(), nan},
+                            HalfSpaceField{Vector3d::UnitZ(), inf},
+                            BoxField{Vector3d(1, 0, 1)},
+                            BoxField{Vector3d(1, -1, 1)},
+                            BoxField{Vector3d(1, nan, 1)},
+                            BoxField{Vector3d(1, inf, 1)},
+                            BallField{0},
+                            BallField{-1},
+                            BallField{nan},
+                            BallField{inf},
+                            CapsuleField{-1, 1},
+                            CapsuleField{1, -1},
+                            CapsuleField{1, nan},
+                            CapsuleField{nan, 1},
+                            CylinderField{0, 1},
+                            CylinderField{1, 0},
+                            CylinderField{1, nan},
+                            HeightField{},
+                            DistanceGridField{},
+                            FunctionField{},
+                            MeshField{},
+                            MeshField{make_random_asset({10, 0.5, {}, 0}, 3).view()}};
+  const Asset fieldless = make_random_asset({10, 0.5, {}, 0}, 3);
+  bad.back() = MeshField{fieldless.view()};
+  const auto with = [&](auto base, auto change) {
+    change(base);
+    bad.push_back(base);
+  };
+  with(terrain, [](HeightField& f) { f.columns = 1; });
+  with(terrain, [](HeightField& f) { f.rows = 0; });
+  with(terrain, [](HeightField& f) { f.spacing[0] = 0; });
+  with(terrain, [&](HeightField& f) { f.spacing[1] = nan; });
+  with(terrain, [](HeightField& f) { f.lowest = 1, f.highest = 0; });
+  with(terrain, [](HeightField& f) { f.heights = nullptr; });
+  with(grid, [](DistanceGridField& f) { f.size[1] = 1; });
+  with(grid, [](DistanceGridField& f) { f.spacing = -1; });
+  with(grid, [&](DistanceGridField& f) { f.origin.x() = nan; });
+  with(grid, [&](DistanceGridField& f) { f.error = nan; });
+  with(grid, [](DistanceGridField& f) { f.distances = nullptr; });
+  ContactPatch patches[4];
+  const PlacedTree b{cube().view(), {}, 1};
+  for (std::size_t i = 0; i < bad.size(); ++i) {
+    const PlacedField a{bad[i], {}, 1};
+    const PenetrationAndSeparation both = query(a, b, {}, workspace);
+    EXPECT_EQ(both.penetration.status, QueryStatus::invalid_input) << i;
+    EXPECT_EQ(both.separation.status, QueryStatus::invalid_input) << i;
+    EXPECT_EQ(both.penetration.volume_max, 0) << i;
+    EXPECT_EQ(contact_patches(a, b, {}, workspace, patches).count, 0u) << i;
+  }
+  const PlacedField good{BallField{1}, {}, 1};
+  for (const double scale : {0.0, -1.0, nan, inf}) {
+    EXPECT_EQ(penetration(PlacedField{BallField{1}, {}, scale}, b, {}, workspace).status,
+              QueryStatus::invalid_input);
+    EXPECT_EQ(penetration(good, {cube().view(), {}, scale}, {}, workspace).status,
+              QueryStatus::invalid_input);
+  }
+  EXPECT_EQ(penetration(good, {TreeView(), {}, 1}, {}, workspace).status,
+            QueryStatus::invalid_input);
+  EXPECT_EQ(penetration(PlacedField{BallField{1}, {{nan, 0, 0, 0}, {0, 0, 0}}, 1}, b, {}, workspace)
+                .status,
+            QueryStatus::invalid_input);
+  Workspace gone = std::move(workspace);
+  EXPECT_EQ(penetration(good, b, {}, workspace).status, QueryStatus::invalid_input);
+}
+
+TEST(FieldHostile, TablesOfNoNumbers) {
+  const NoFloatTraps with_nan;
+  Workspace workspace;
+  for (const float value :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+        -std::numeric_limits<float>::infinity(), 3e38f}) {
+    for (const bool all : {true, false}) {
+      std::vector<float> values(125, all ? value : 0.1f);
+      values[62] = values[12] = value;
+      DistanceGridField grid;
+      grid.distances = values.data();
+      for (std::uint32_t& n : grid.size) n = 5;
+      grid.origin = Vector3d::Constant(-1);
+      grid.spacing = 0.5;
+      HeightField terrain;
+      terrain.heights = values.data();
+      terrain.columns = terrain.rows = 5;
+      terrain.spacing[0] = terrain.spacing[1] = 0.25;
+      for (const Field& field : {Field(grid), Field(terrain)}) {
+        const PlacedField a{field, {}, 1};
+        for (const double z : {0.0, 0.5, -3.0}) {
+          const PlacedTree b{cube().view(), pose_of(Quaterniond::Identity(), {0.1, 0.2, z}), 0.5};
+          const Penetration p = penetration(a, b, {}, workspace);
+          // Never a NaN that says it is an answer.
+          const bool plain = std::isfinite(p.volume) && p.translation_gradient.allFinite() &&
+                             p.rotation_gradient.allFinite() && p.centroid.allFinite();
+          EXPECT_TRUE(plain || p.status == QueryStatus::invalid_input)
+              << field.index() << ' ' << value << ' ' << all << ' ' << z;
+          const Separation s = separation(a, b, {}, workspace);
+          EXPECT_TRUE(!std::isnan(s.distance) || s.status == QueryStatus::invalid_input);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,177 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "support/surface_queries.h"
+
+// Queries that meet a surface, stopped by limits and divided into patches.
+
+namespace ist {
+namespace {
+
+using namespace testing;
+
+std::vector<std::pair<const char*, PenetrationSettings>> limits() {
+  std::vector<std::pair<const char*, PenetrationSettings>> all;
+  for (const std::uint32_t visits : {1u, 3u, 10u, 40u, 200u, 1000u}) {
+    PenetrationSettings s;
+    s.max_visits = visits;
+    all.emplace_back("max_visits", s);
+  }
+  for (const double us : {1e-3, 1.0, 5.0, 20.0}) {
+    PenetrationSettings s;
+    s.deadline_us = us;
+    all.emplace_back("deadline_us", s);
+  }
+  for (const double error : {0.5, 0.1, 0.01}) {
+    PenetrationSettings s;
+    s.relative_error = error;
+    all.emplace_back("relative_error", s);
+  }
+  for (const double radius : {0.5, 0.1, 0.02}) {
+    PenetrationSettings s;
+    s.min_radius = radius;
+    all.emplace_back("min_radius", s);
+  }
+  return all;
+}
+
+void expect_bounds(const char* name, const char* limit, const Penetration& got,
+                   const Penetration& full, double relative_error) {
+  EXPECT_NE(got.status, QueryStatus::invalid_input);
+  EXPECT_LE(got.volume_min, full.volume * (1 + 1e-6)) << name << ' ' << limit;
+  EXPECT_GE(got.volume_max, full.volume * (1 - 1e-6)) << name << ' ' << limit;
+  EXPECT_LE(got.volume_min, got.volume) << name << ' ' << limit;
+  EXPECT_GE(got.volume_max, got.volume) << name << ' ' << limit;
+  EXPECT_TRUE(std::isfinite(got.volume_max) && got.translation_gradient.allFinite() &&
+              got.rotation_gradient.allFinite() && got.centroid.allFinite())
+      << name << ' ' << limit;
+  if (relative_error > 0) {
+    EXPECT_LE(got.volume_max - got.volume_min, (relative_error + 1e-4) * got.volume_max + 1e-15)
+        << name;
+  }
+  if (got.status == QueryStatus::ok) {
+    EXPECT_NEAR(got.volume, full.volume, 1e-6 * full.volume) << name << ' ' << limit;
+  }
+}
+
+TEST(FieldQuery, LimitsKeepTrueBounds) {
+  std::mt19937_64 random(25);
+  Workspace large, tiny(64);
+  for (const auto& [name, field] : fields()) {
+    for (int i = 0; i < 6; ++i) {
+      const PlacedField a{field, random_pose(random, 0.1), 1};
+      const PlacedTree b{(i % 2 == 0 ? cube() : torus()).view(), random_pose(random, 0.15 * i),
+                         0.8};
+      const Penetration full = penetration(a, b, {}, large);
+      for (const auto& [limit, settings] : limits())
+        expect_bounds(name, limit, penetration(a, b, settings, large), full,
+                      settings.relative_error);
+      expect_bounds(name, "tiny", penetration(a, b, {}, tiny), full, 0);
+    }
+  }
+}
+
+TEST(FieldPairs, LimitsKeepTrueBounds) {
+  std::mt19937_64 random(26);
+  Workspace large, tiny(64);
+  for (const SurfacePair& pair : pairs()) {
+    for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
+      for (int i = 0; i < 60; ++i) {
+        const PlacedTree a{pair.a.view(), random_pose(random, 0), 1};
+        const PlacedTree b{pair.b.view(), random_pose(random, (0.5 + 0.0133 * i) * pair.distance),
+                           pair.scale_b};
+        PenetrationSettings plain;
+        plain.field = use;
+        const Penetration full = penetration(a, b, plain, large);
+        for (auto [limit, settings] : limits()) {
+          settings.field = use;
+          expect_bounds(pair.name, limit, penetration(a, b, settings, large), full,
+                        settings.relative_error);
+        }
+        // As many visits as the lenses take, or about: none is left for the exact sum.
+        PenetrationSettings lenses = plain;
+        lenses.field = FieldUse::never;
+        const std::uint32_t visits = penetration(a, b, lenses, large).node_visits;
+        for (const std::uint32_t more : {0u, 1u, 2u, 3u, 5u}) {
+          PenetrationSettings settings = plain;
+          settings.max_visits = std::max(1u, visits + more - 1);
+          expect_bounds(pair.name, "lenses' visits", penetration(a, b, settings, large), full, 0);
+        }
+        expect_bounds(pair.name, "tiny", penetration(a, b, plain, tiny), full, 0);
+      }
+    }
+  }
+}
+
+void expect_shares(const char* name, const ContactPatches& got, const Penetration& whole,
+                   std::span<const ContactPatch> patches) {
+  EXPECT_EQ(got.penetration.volume, whole.volume) << name;
+  EXPECT_EQ(got.penetration.status, whole.status) << name;
+  EXPECT_EQ(got.penetration.node_visits, whole.node_visits) << name;
+  EXPECT_EQ(got.penetration.translation_gradient, whole.translation_gradient) << name;
+  EXPECT_EQ(got.penetration.rotation_gradient, whole.rotation_gradient) << name;
+  // Where a stopped query has summed nothing yet there is nothing to divide.
+  if (whole.status == QueryStatus::ok) {
+    EXPECT_EQ(got.count > 0, whole.volume > 0) << name;
+  }
+  if (got.count == 0) return;
+  double volume = 0, pull = 0, turn = 0;
+  Vector3d force = Vector3d::Zero(), torque = force;
+  for (const ContactPatch& patch : patches.first(got.count)) {
+    volume += patch.volume;
+    force += patch.force;
+    torque += patch.torque;
+    pull += patch.force.norm();
+    turn += patch.torque.norm();
+    EXPECT_TRUE(patch.normal.allFinite() && patch.centroid.allFinite());
+    EXPECT_GE(patch.volume, 0) << name;
+  }
+  EXPECT_NEAR(volume, whole.volume, 1e-12 * whole.volume) << name;
+  EXPECT_LE((force + whole.translation_gradient).norm(), 1e-12 * pull) << name;
+  EXPECT_LE((torque + whole.rotation_gradient).norm(), 1e-12 * (turn + 2 * pull)) << name;
+}
+
+TEST(FieldQuery, PatchesAddUpToTheWhole) {
+  Workspace workspace;
+  std::mt19937_64 random(27);
+  ContactPatch patches[12];
+  for (const auto& [name, field] : fields()) {
+    for (int i = 0; i < 8; ++i) {
+      const PlacedField a{field, random_pose(random, 0.1), 1};
+      const PlacedTree b{cube().view(), random_pose(random, 0.12 * i), 0.8};
+      const Penetration whole = penetration(a, b, {}, workspace);
+      const ContactPatches got = contact_patches(a, b, {}, workspace, patches);
+      expect_shares(name, got, whole, patches);
+    }
+  }
+}
+
+TEST(FieldPairs, PatchesAddUpToTheWhole) {
+  Workspace workspace;
+  std::mt19937_64 random(28);
+  ContactPatch patches[12];
+  for (const SurfacePair& pair : pairs()) {
+    for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
+      for (int i = 0; i < 12; ++i) {
+        const PlacedTree a{pair.a.view(), random_pose(random, 0.1), 1};
+        const PlacedTree b{pair.b.view(), random_pose(random, (0.2 + 0.08 * i) * pair.distance),
+                           pair.scale_b};
+        PenetrationSettings settings;
+        settings.field = use;
+        ContactSettings contact;
+        contact.field = use;
+        // A stopped query is divided too.
+        settings.max_visits = contact.max_visits = i % 3 == 0 ? 10u * static_cast<unsigned>(i) : 0;
+        const Penetration whole = penetration(a, b, settings, workspace);
+        expect_shares(pair.name, contact_patches(a, b, contact, workspace, patches), whole,
+                      patches);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ist
