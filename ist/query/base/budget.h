@@ -14,16 +14,18 @@ struct DescentLimits {
   std::uint32_t max_visits = 0;
   double deadline_us = 0;  ///< [µs] from now
   double relative_error = 0;
-  double min_radius = 0;  ///< [u]
+  double min_radius = 0;       ///< [u]
+  bool keep_rounding = false;  ///< lenses that graze are not summed again in double
 };
 
 /// The limits that a query's settings set; a separation has fewer.
 template <class Settings>
 DescentLimits limits_of(const Settings& settings) noexcept {
-  return {settings.max_visits, settings.deadline_us, settings.relative_error, settings.min_radius};
+  return {settings.max_visits, settings.deadline_us, settings.relative_error, settings.min_radius,
+          false};
 }
 inline DescentLimits limits_of(const SeparationSettings& settings) noexcept {
-  return {settings.max_visits, settings.deadline_us, 0, 0};
+  return {settings.max_visits, settings.deadline_us, 0, 0, false};
 }
 
 /// The time since a query began; read only if there is a deadline.

@@ -155,8 +155,8 @@ void Descent::open_leaves() {
 
   // A few grazing lenses are all rounding in float; they are as few as they are shallow.
   const Overlap sum = sure();
-  if (precision_ == Precision::float32 && !keep_rounding_ && sum.error > kGrazing * sum.volume &&
-      now.size > 0 && !budget_.elapsed_beyond(kEarly)) {
+  if (precision_ == Precision::float32 && !limits_.keep_rounding &&
+      sum.error > kGrazing * sum.volume && now.size > 0 && !budget_.elapsed_beyond(kEarly)) {
     precision_ = Precision::float64;
     scratch_.leaves->forget(precision_);
     sums_ = LeafSums();

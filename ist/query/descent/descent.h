@@ -24,9 +24,6 @@ class Descent {
   Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
           const DescentLimits& limits, Workspace::Impl& scratch, ContactBins* bins = nullptr);
 
-  /// Takes rounding as it comes: lenses that graze are not summed again in double.
-  void keep_rounding() noexcept { keep_rounding_ = true; }
-
   void run() noexcept;
 
   /// The answer in world units, from what has been summed.
@@ -118,7 +115,6 @@ class Descent {
   Overlap unopened_;                       ///< guess of what was not opened
   double unopened_bound_ = 0;              ///< what that can add at most
   bool stopped_ = false;
-  bool keep_rounding_ = false;
 };
 
 }  // namespace ist
