@@ -98,6 +98,7 @@ struct NutRun {
   double stored = 0;     ///< largest contact energy
 };
 
+inline constexpr double kSteel = 7.85e-6;                            ///< [kg/mm³]
 inline constexpr double kNutPitch = 2, kNutStart = 11, kNutEnd = 4;  ///< [mm]
 
 /// Runs until the nut reaches the end of the thread or `seconds` are over. `ask(nut's pose)`

@@ -14,18 +14,23 @@ struct DescentLimits {
   std::uint32_t max_visits = 0;
   double deadline_us = 0;  ///< [µs] from now
   double relative_error = 0;
-  double min_radius = 0;       ///< [u]
+  double min_radius = 0;  ///< [u]
+  double shares = 0;      ///< of the leaves (descent/shares.h), at most; 0: as many as time allows
   bool keep_rounding = false;  ///< lenses that graze are not summed again in double
 };
 
 /// The limits that a query's settings set; a separation has fewer.
 template <class Settings>
 DescentLimits limits_of(const Settings& settings) noexcept {
-  return {settings.max_visits, settings.deadline_us, settings.relative_error, settings.min_radius,
+  return {settings.max_visits,
+          settings.deadline_us,
+          settings.relative_error,
+          settings.min_radius,
+          0,
           false};
 }
 inline DescentLimits limits_of(const SeparationSettings& settings) noexcept {
-  return {settings.max_visits, settings.deadline_us, 0, 0, false};
+  return {settings.max_visits, settings.deadline_us, 0, 0, 0, false};
 }
 
 /// The time since a query began; read only if there is a deadline.
@@ -54,7 +59,7 @@ class Stopwatch {
 class Budget {
  public:
   /// `for_visits`: the part of the time that visits may take.
-  explicit Budget(const DescentLimits& limits, double for_visits = 0.75) noexcept
+  explicit Budget(const DescentLimits& limits, double for_visits = 0.6) noexcept
       : for_visits_(for_visits),
         max_visits_(limits.max_visits != 0 ? limits.max_visits : ~0u),
         timed_(limits.deadline_us > 0) {
@@ -74,6 +79,12 @@ class Budget {
     }
     visits_ += static_cast<std::uint32_t>(granted);
     return granted;
+  }
+
+  /// Counts visits that are made whatever the time; there must be so many left.
+  std::size_t take(std::size_t visits) noexcept {
+    visits_ += static_cast<std::uint32_t>(visits);
+    return visits;
   }
 
   /// Whether visits are to end now.

@@ -66,16 +66,16 @@ class Descent {
   /// Sums pairs in the order of the list; returns how many.
   std::size_t add_in_order();
 
-  /// Whether visits or time may not do for all pairs.
-  bool may_be_stopped();
+  /// Whether the time may not do for all pairs.
+  bool by_shares();
 
-  /// Sums as many shares of the pairs as limits allow, and takes the others for like them. False
-  /// if not even the first could be finished: then nothing is summed.
+  /// Sums as many shares of the pairs as there is time for, and takes the others for like them.
+  /// False if not even the first could be finished: then nothing is summed.
   bool add_by_shares();
 
-  /// Takes the shares that are summed, by weight, for the whole. `room`: how many shares limits
-  /// would do for.
-  void take_shares_for_all(const LeafSums* sums, std::size_t done, double room);
+  /// Sums pairs [from, to) of the current list; false if limits do not do for all of them.
+  /// `surely`: whatever the time.
+  bool add_group(std::size_t from, std::size_t to, bool surely, LeafSums& sums);
 
   bool accurate(double waiting) const;
 
