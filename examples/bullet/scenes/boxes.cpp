@@ -70,7 +70,7 @@ SceneResult run_cube_on_cube(const SceneOptions& options) {
   SceneWorld world(settings_of(options, 1));
   btRigidBody& below = world.add(cube(), 0, place({0, 0, kSide / 2}), kFriction);
   btRigidBody& above = world.add(
-      cube(), kDensity, place({0.05, 0.03, 1.5 * kSide + 0.01}, turn(0.2, {0, 0, 1})), kFriction);
+      cube(), kDensity, place({0, 0, 1.5 * kSide + 0.01}, turn(0.2, {0, 0, 1})), kFriction);
   return come_to_rest(world, below, above, 1.5 * kSide, options);
 }
 
@@ -107,7 +107,8 @@ SceneResult run_pile(const SceneOptions& options) {
   const auto draw = [&] { return static_cast<double>(random()) / 4294967296.0; };
   for (int i = 0; i < 10; ++i) {
     const double angle = 6 * draw(), x = draw() - 0.5, y = draw() - 0.5, z = draw() - 0.5;
-    const Eigen::Vector3d at(0.9 * (i % 2) + 0.3 * x, 0.9 * (i / 2 % 2) + 0.3 * y, 1 + 1.8 * i);
+    const Eigen::Vector3d at(1.8 * (i % 2) + 0.3 * x, 1.8 * (i / 2 % 2) + 0.3 * y,
+                             1 + 1.8 * (i / 4));
     world.add(cube(), kDensity, place(at, turn(angle, {x, y, z + 0.01})), kFriction);
   }
   Run run(world, options);
