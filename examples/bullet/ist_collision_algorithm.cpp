@@ -140,15 +140,12 @@ void IstCollisionAlgorithm::push(const btCollisionObject& first, const btCollisi
   const Eigen::Vector3d origin(contact.pair.tree_b.pose.t);
   btRigidBody* const a = movable(contact.pair.a);
   btRigidBody* const b = movable(contact.pair.b);
-  ist::RelativeMotion motion;
-  const auto add = [&](const btRigidBody* body, double sign) {
-    if (body == nullptr) return;
-    motion.velocity += sign * to_eigen(body->getVelocityInLocalPoint(
-                                  to_bullet(origin) - body->getCenterOfMassPosition()));
-    motion.angular_velocity += sign * to_eigen(body->getAngularVelocity());
+  const auto twist_of = [](const btRigidBody* body) {
+    if (body == nullptr) return ist::Twist();
+    return ist::Twist{to_eigen(body->getCenterOfMassPosition()),
+                      to_eigen(body->getLinearVelocity()), to_eigen(body->getAngularVelocity())};
   };
-  add(b, 1);
-  add(a, -1);
+  const ist::RelativeMotion motion = ist::relative_motion(twist_of(a), twist_of(b), origin);
   ist::ContactLaw law = settings.law;
   law.friction = btManifoldResult::calculateCombinedFriction(&first, &second);
   state_->pushed = ist::contact_force(law, std::span(contact.patches).first(contact.count), motion,

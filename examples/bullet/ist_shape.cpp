@@ -1,15 +1,36 @@
 #include "ist_shape.h"
 
 #include <LinearMath/btAabbUtil2.h>
+#include <ist/mass_properties.h>
+
+#include <Eigen/Eigenvalues>
 
 #include "to_bullet.h"
 
-IstShape::IstShape(const ist::TreeView& tree, const Eigen::AlignedBox3d& bounds,
-                   const btTransform& mesh_in_body, const btVector3& unit_inertia)
-    : tree_(tree), mesh_in_body_(mesh_in_body), unit_inertia_(unit_inertia) {
+IstBodyFrame body_frame(const ist::TreeView& tree) {
+  const ist::MassProperties mass = ist::mass_properties(tree);
+  IstBodyFrame frame{Eigen::Isometry3d::Identity(), mass.inertia.diagonal() / mass.volume};
+  const Eigen::Matrix3d diagonal = mass.inertia.diagonal().asDiagonal();
+  if ((mass.inertia - diagonal).norm() > 1e-6 * mass.inertia.norm()) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(mass.inertia);
+    Eigen::Matrix3d axes = solver.eigenvectors();
+    if (axes.determinant() < 0) axes.col(2) *= -1;
+    frame.in_mesh.linear() = axes;
+    frame.unit_inertia = solver.eigenvalues() / mass.volume;
+  }
+  frame.in_mesh.translation() = mass.centre_of_mass;
+  return frame;
+}
+
+IstShape::IstShape(const ist::TreeView& tree) : tree_(tree) {
   m_shapeType = kType;
-  btTransformAabb(to_bullet(Eigen::Vector3d(bounds.min())),
-                  to_bullet(Eigen::Vector3d(bounds.max())), 0, mesh_in_body, lower_, upper_);
+  const IstBodyFrame frame = body_frame(tree);
+  mesh_in_body_ = to_bullet(Eigen::Isometry3d(frame.in_mesh.inverse()));
+  unit_inertia_ = to_bullet(frame.unit_inertia);
+  // Matched spheres stick out of the solid by this: what they meet there is a contact.
+  const ist::Bounds bounds = ist::bounds(tree);
+  btTransformAabb(to_bullet(bounds.lower), to_bullet(bounds.upper), tree.protrusion(),
+                  mesh_in_body_, lower_, upper_);
 }
 
 void IstShape::getAabb(const btTransform& t, btVector3& lower, btVector3& upper) const {

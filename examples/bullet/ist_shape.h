@@ -11,16 +11,23 @@
 // What Bullet knows of an ist asset: a shape of a type of its own, which no algorithm of Bullet's
 // takes for a triangle mesh. register_ist_algorithm() says who answers for it.
 
+/// Bullet's body frame of a baked solid: at its centre of mass, along principal axes. Those of the
+/// asset's frame, where they are.
+struct IstBodyFrame {
+  Eigen::Isometry3d in_mesh;     ///< body's frame to mesh's
+  Eigen::Vector3d unit_inertia;  ///< [u²] about the body's axes, of a mass of 1
+};
+IstBodyFrame body_frame(const ist::TreeView& tree);
+
 /// A baked solid. The asset's bytes must outlive it.
 ///
-/// Bullet turns bodies about their own origin and wants principal axes there, so the asset's frame
-/// stands in the body's at `mesh_in_body`: see body_frame() in scenes/part.h.
+/// Bullet turns bodies about their own origin and wants principal axes there: the body's transform
+/// is that of body_frame(), not the mesh's.
 class IstShape : public btConcaveShape {
  public:
   static constexpr int kType = CUSTOM_CONCAVE_SHAPE_TYPE;
 
-  IstShape(const ist::TreeView& tree, const Eigen::AlignedBox3d& bounds,
-           const btTransform& mesh_in_body, const btVector3& unit_inertia);
+  explicit IstShape(const ist::TreeView& tree);
 
   const ist::TreeView& tree() const { return tree_; }
   const btTransform& mesh_in_body() const { return mesh_in_body_; }

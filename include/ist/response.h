@@ -10,6 +10,7 @@
 #include <span>
 
 #include <ist/query.h>
+#include <ist/wrench.h>
 
 // From a volume to a force: the laws that loops and engines without a contact solver of their own
 // need. docs/engines.md says which to choose and why.
@@ -67,6 +68,15 @@ struct RelativeMotion {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/s] B's less A's
 };
+
+/// Of two bodies whose motions are known. `origin_b`: [u] of B's pose, world.
+inline RelativeMotion relative_motion(const Twist& a, const Twist& b,
+                                      const Eigen::Vector3d& origin_b) noexcept {
+  const auto at_origin = [&](const Twist& t) -> Eigen::Vector3d {
+    return t.velocity + t.angular_velocity.cross(origin_b - t.point);
+  };
+  return {at_origin(b) - at_origin(a), b.angular_velocity - a.angular_velocity};
+}
 
 /// What a contact does to B; to A the opposite, about the same point.
 struct ContactForce {

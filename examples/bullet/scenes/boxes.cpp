@@ -101,7 +101,7 @@ SceneResult run_stack(const SceneOptions& options) {
 }
 
 SceneResult run_pile(const SceneOptions& options) {
-  SceneWorld world(settings_of(options, 3));
+  SceneWorld world(settings_of(options, 20));
   btRigidBody& ground = add_ground(world, kFriction);
   std::mt19937 random(5);
   const auto draw = [&] { return static_cast<double>(random()) / 4294967296.0; };

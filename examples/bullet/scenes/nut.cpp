@@ -42,7 +42,7 @@ SceneResult run_nut(const SceneOptions& options) {
   b.setFriction(0.5);
 
   // Without friction the nut goes down the helix as a bead on a wire.
-  const double inertia = nut.unit_inertia().maxCoeff();
+  const double inertia = nut.frame().unit_inertia.maxCoeff();
   const double acceleration = kGravity / (1 + inertia / (kLead * kLead));
 
   Run run(world, options);

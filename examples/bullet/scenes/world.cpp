@@ -43,7 +43,7 @@ SceneWorld::~SceneWorld() {
 btCollisionShape* SceneWorld::shape_of(const Part& part) {
   if (settings_.way == Way::solver || settings_.way == Way::wrench) {
     std::unique_ptr<IstShape>& shape = ist_shapes_[&part];
-    if (shape == nullptr) shape = part.make_ist_shape();
+    if (shape == nullptr) shape = std::make_unique<IstShape>(part.tree());
     return shape.get();
   }
   std::unique_ptr<PeerShape>& shape = peer_shapes_[&part];
@@ -60,7 +60,7 @@ btCollisionShape* SceneWorld::shape_of(const Part& part) {
 btRigidBody& SceneWorld::add(Body body, btCollisionShape* shape, double mass, const btTransform& at,
                              double friction) {
   btVector3 inertia(0, 0, 0);
-  if (mass > 0) inertia = mass * to_bullet(body.part->unit_inertia());
+  if (mass > 0) inertia = mass * to_bullet(body.part->frame().unit_inertia);
   btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, shape, inertia);
   info.m_startWorldTransform = at;
   info.m_friction = friction;
@@ -77,9 +77,9 @@ btRigidBody& SceneWorld::add(const Part& part, double density, const Eigen::Isom
                              double friction) {
   Body body;
   body.part = &part;
-  body.proxy_shape = part.make_ist_shape();
+  body.proxy_shape = std::make_unique<IstShape>(part.tree());
   return add(std::move(body), shape_of(part), density * part.volume(),
-             to_bullet(Eigen::Isometry3d(at * part.body_frame())), friction);
+             to_bullet(Eigen::Isometry3d(at * part.frame().in_mesh)), friction);
 }
 
 btRigidBody& SceneWorld::add_still(std::unique_ptr<btCollisionShape> shape,
@@ -100,7 +100,7 @@ void SceneWorld::step() {
 Eigen::Isometry3d SceneWorld::mesh_frame(const btRigidBody& body) const {
   for (const Body& known : bodies_) {
     if (known.rigid.get() != &body || known.part == nullptr) continue;
-    return to_eigen(body.getWorldTransform()) * known.part->body_frame().inverse();
+    return to_eigen(body.getWorldTransform()) * known.part->frame().in_mesh.inverse();
   }
   return to_eigen(body.getWorldTransform());
 }
