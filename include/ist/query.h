@@ -43,8 +43,8 @@ enum class FieldUse : std::uint32_t {
 /// What a penetration may cost. Zero, a negative value or NaN means no limit; with none set the
 /// answer is the finished sum.
 ///
-/// A penetration that is stopped estimates what is left from the densities of the nodes that were
-/// not opened, and says budget_exhausted.
+/// A penetration that is stopped estimates what is left, by what it summed under a deadline and
+/// else from the densities of the nodes that were not opened, and says budget_exhausted.
 struct PenetrationSettings {
   Measure measure = Measure::matched;
   FieldUse field = FieldUse::automatic;  ///< matched measure only
@@ -58,13 +58,16 @@ struct PenetrationSettings {
   /// Aimed at, not kept; never less than the coarsest level takes.
   std::uint32_t pair_budget = 0;
 
-  /// Count of node pairs opened. Of pairs of trees the largest bounds go first; what meets a surface
-  /// goes in the order of the tree.
+  /// Count of node pairs opened. Of pairs of trees the largest bounds go first; what meets a
+  /// surface goes in the order of the tree.
   std::uint32_t max_visits = 0;
 
   /// [µs] wall clock from the call.
-  /// Visits end at 0.6 of it; then what is left is estimated, as far as time allows.
-  /// Kept to a few µs while the system lets the thread run.
+  /// Of pairs of trees as many sixteenths of the leaves are summed as there is time for, the same
+  /// ones at every pose, and stand for all: volume and force then change smoothly with the pose,
+  /// and a loop gains little energy. If not even one can be summed, or a surface is met, visits end
+  /// at 0.6 to 0.75 of the time and what is left is estimated. Kept to a few µs while the system
+  /// lets the thread run; what the system takes is not counted.
   double deadline_us = 0;
 
   double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
@@ -76,8 +79,8 @@ struct ContactSettings {
   Measure measure = Measure::matched;
   FieldUse field = FieldUse::automatic;  ///< matched measure only
   std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
-  /// [µs] wall clock from the call. All that is left when visits end is estimated, at 0.1 µs a
-  /// pair.
+  /// [µs] wall clock from the call, as in PenetrationSettings. Where nothing can stand for all, all
+  /// that is left when visits end is estimated, at 0.1 µs a pair.
   double deadline_us = 0;
   double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
   double min_radius = 0;      ///< [u] nodes smaller than this are not opened
@@ -115,9 +118,9 @@ struct Penetration {
   /// [u³/rad] dV/d(rotation vector of B about B's origin), world.
   Eigen::Vector3d rotation_gradient = Eigen::Vector3d::Zero();
   QueryStatus status = QueryStatus::ok;
-  std::uint32_t node_visits = 0;   ///< node pairs opened
-  /// Lenses summed that are not empty, spheres put together with triangles of a surface, and spheres
-  /// that lie in the other solid as a whole.
+  std::uint32_t node_visits = 0;  ///< node pairs opened
+  /// Lenses summed that are not empty, spheres put together with triangles of a surface, and
+  /// spheres that lie in the other solid as a whole.
   std::uint32_t sphere_pairs = 0;
 };
 
@@ -158,11 +161,10 @@ class Workspace {
 
 /// Volume, wrench and centroid of the overlap.
 ///
-/// The sum is Σ over spheres of the finer tree of their exact part inside the other's surface, or one
-/// of lenses, as PenetrationSettings::field says.
-/// The gradients of a finished query are those of the returned volume.
-/// Copies of one asset at nearly the same pose are asked as unlike levels of detail, since equal
-/// spheres on top of each other would count too much.
+/// The sum is Σ over spheres of the finer tree of their exact part inside the other's surface, or
+/// one of lenses, as PenetrationSettings::field says. The gradients of a finished query are those
+/// of the returned volume. Copies of one asset at nearly the same pose are asked as unlike levels
+/// of detail, since equal spheres on top of each other would count too much.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 Penetration penetration(const PlacedTree& a, const PlacedTree& b,

@@ -15,15 +15,22 @@ struct DescentLimits {
   double deadline_us = 0;  ///< [µs] from now
   double relative_error = 0;
   double min_radius = 0;  ///< [u]
+  double shares = 0;      ///< of the leaves (descent/shares.h), at most; 0: as many as time allows
+  bool keep_rounding = false;  ///< lenses that graze are not summed again in double
 };
 
 /// The limits that a query's settings set; a separation has fewer.
 template <class Settings>
 DescentLimits limits_of(const Settings& settings) noexcept {
-  return {settings.max_visits, settings.deadline_us, settings.relative_error, settings.min_radius};
+  return {settings.max_visits,
+          settings.deadline_us,
+          settings.relative_error,
+          settings.min_radius,
+          0,
+          false};
 }
 inline DescentLimits limits_of(const SeparationSettings& settings) noexcept {
-  return {settings.max_visits, settings.deadline_us, 0, 0};
+  return {settings.max_visits, settings.deadline_us, 0, 0, 0, false};
 }
 
 /// The time since a query began; read only if there is a deadline.
@@ -47,7 +54,8 @@ class Stopwatch {
 };
 
 /// Counts visits and watches the clock, if there is a deadline: at most once in 16 visits. Visits
-/// end at a part of the time, what is left being for a guess of what was not visited.
+/// end at a part of the time, what is left being for a guess of what was not visited. Time for
+/// which the system takes the thread away is not counted, three times at most.
 class Budget {
  public:
   /// `for_visits`: the part of the time that visits may take.
@@ -56,9 +64,8 @@ class Budget {
         max_visits_(limits.max_visits != 0 ? limits.max_visits : ~0u),
         timed_(limits.deadline_us > 0) {
     if (timed_) {
-      start_ = Clock::now();
-      allowed_ = std::chrono::nanoseconds(
-          static_cast<std::int64_t>(std::min(limits.deadline_us, 1e12) * 1e3));
+      start_ = last_look_ = Clock::now();
+      allowed_ = std::chrono::duration<double>(std::max(limits.deadline_us, 1e-6) * 1e-6);
     }
   }
 
@@ -74,13 +81,31 @@ class Budget {
     return granted;
   }
 
+  /// Counts visits that are made whatever the time; there must be so many left.
+  std::size_t take(std::size_t visits) noexcept {
+    visits_ += static_cast<std::uint32_t>(visits);
+    return visits;
+  }
+
   /// Whether visits are to end now.
-  bool visits_end() const noexcept { return elapsed_beyond(for_visits_); }
+  bool visits_end() noexcept { return elapsed_beyond(for_visits_); }
 
   /// Whether such a part of the time is over; never without a deadline.
-  bool elapsed_beyond(double part) const noexcept {
-    return timed_ && Clock::now() - start_ >= allowed_ * part;
+  bool elapsed_beyond(double part) noexcept { return timed_ && elapsed() >= part; }
+
+  /// The part of the time that is over; only with a deadline.
+  double elapsed() noexcept {
+    const Clock::time_point now = Clock::now();
+    if (now - last_look_ > kStall && stalls_ < kMostStalls) {
+      ++stalls_;
+      start_ += now - last_look_;
+    }
+    last_look_ = now;
+    return std::chrono::duration<double>(now - start_) / allowed_;
   }
+
+  /// Visits may go on up to another part of the time.
+  void extend(double for_visits) noexcept { for_visits_ = for_visits; }
 
   bool timed() const noexcept { return timed_; }
 
@@ -92,13 +117,19 @@ class Budget {
 
  private:
   using Clock = std::chrono::steady_clock;
+  // Work between two looks takes a few microseconds: for longer the system had the thread away. The
+  // answer is late then whatever is done, and a poor one besides would be felt as a jolt.
+  static constexpr std::chrono::microseconds kStall{8};
+  static constexpr int kMostStalls = 3;
+
   double for_visits_;
   std::uint32_t max_visits_;
   std::uint32_t visits_ = 0;
   std::uint32_t next_look_ = 0;
   bool timed_;
-  Clock::time_point start_;
-  std::chrono::nanoseconds allowed_{0};
+  int stalls_ = 0;
+  Clock::time_point start_, last_look_;
+  std::chrono::duration<double> allowed_{0};
 };
 
 }  // namespace ist

@@ -24,9 +24,6 @@ class Descent {
   Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
           const DescentLimits& limits, Workspace::Impl& scratch, ContactBins* bins = nullptr);
 
-  /// Takes rounding as it comes: lenses that graze are not summed again in double.
-  void keep_rounding() noexcept { keep_rounding_ = true; }
-
   void run() noexcept;
 
   /// The answer in world units, from what has been summed.
@@ -61,7 +58,24 @@ class Descent {
   void open_leaves();
 
   /// Sums pairs [from, from + n) of the current list, or as many as a budget has time for.
-  std::size_t add_leaves(std::size_t from, std::size_t n, const Budget* budget);
+  std::size_t add_leaves(std::size_t from, std::size_t n, Budget* budget, LeafSums& sums);
+
+  /// Sums pairs from those of the largest bound down until the error is accepted; returns how many.
+  std::size_t add_by_bound();
+
+  /// Sums pairs in the order of the list; returns how many.
+  std::size_t add_in_order();
+
+  /// Whether the time may not do for all pairs.
+  bool by_shares();
+
+  /// Sums as many shares of the pairs as there is time for, and takes the others for like them.
+  /// False if not even the first could be finished: then nothing is summed.
+  bool add_by_shares();
+
+  /// Sums pairs [from, to) of the current list; false if limits do not do for all of them.
+  /// `surely`: whatever the time.
+  bool add_group(std::size_t from, std::size_t to, bool surely, LeafSums& sums);
 
   bool accurate(double waiting) const;
 
@@ -101,7 +115,6 @@ class Descent {
   Overlap unopened_;                       ///< guess of what was not opened
   double unopened_bound_ = 0;              ///< what that can add at most
   bool stopped_ = false;
-  bool keep_rounding_ = false;
 };
 
 }  // namespace ist

@@ -11,6 +11,12 @@
 namespace ist {
 namespace {
 
+/// How the sum of a pair of levels is asked for.
+struct AskedFor {
+  double relative_error = 0, min_radius = 0;
+  bool keep_rounding = false;
+};
+
 /// Asks pairs of levels one after another under the limits that they share.
 class DetailQueries {
  public:
@@ -28,19 +34,23 @@ class DetailQueries {
 
   /// The whole sum of a pair of levels, rounded as it may be: where lenses graze they are few, and
   /// the finest level is taken anyway.
-  Penetration coarse_estimate(const DetailPair& pair) noexcept { return descend(pair, 0, 0, true); }
+  Penetration coarse_estimate(const DetailPair& pair) noexcept {
+    DescentLimits limits = limits_left();
+    limits.relative_error = limits.min_radius = 0;
+    limits.keep_rounding = true;
+    return counted(overlap(pair).by_lenses(limits));
+  }
 
   /// The sum of a pair of levels; of copies of one asset that all but coincide, that of unlike
   /// levels instead.
-  Penetration ask(const DetailPair& pair, double relative_error, double min_radius) noexcept {
+  Penetration ask(const DetailPair& pair, const AskedFor& how) noexcept {
     const CoincidenceWeight coincidence = coincidence_weight_of(pair);
-    if (coincidence.weight == 0) return descend(pair, relative_error, min_radius);
+    if (coincidence.weight == 0) return descend(pair, how);
     DetailPair unlike[2] = {pair, pair};
     unlike[0].b = unlike[1].a = pair.a < a_.detail_count ? pair.a + 1 : pair.a - 1;
-    Penetration other = mix(descend(unlike[0], relative_error, min_radius),
-                            descend(unlike[1], relative_error, min_radius), 0.5);
+    Penetration other = mix(descend(unlike[0], how), descend(unlike[1], how), 0.5);
     if (coincidence.weight == 1) return other;
-    const Penetration alike = descend(pair, relative_error, min_radius);
+    const Penetration alike = descend(pair, how);
     Penetration mixed = mix(alike, other, coincidence.weight);
     add_slope(coincidence, other.volume - alike.volume, pose_, mixed);
     return mixed;
@@ -70,11 +80,9 @@ class DetailQueries {
                        pose_, settings_.field);
   }
 
-  Penetration descend(const DetailPair& pair, double relative_error, double min_radius,
-                      bool keep_rounding = false) noexcept {
+  /// Nothing but the roots is looked at once visits are spent.
+  DescentLimits limits_left() const noexcept {
     DescentLimits limits = limits_of(settings_);
-    limits.relative_error = relative_error;
-    limits.min_radius = min_radius;
     if (settings_.deadline_us > 0) {
       const std::chrono::duration<double, std::micro> gone = Clock::now() - start_;
       limits.deadline_us = std::max(kNoTime, settings_.deadline_us - gone.count());
@@ -83,14 +91,26 @@ class DetailQueries {
       limits.max_visits = settings_.max_visits - visits_;
       if (limits.max_visits == 0) limits.deadline_us = kNoTime;
     }
-    const TreeHeader& tree_a = matched_tree(a_, pair.a);
-    const TreeHeader& tree_b = matched_tree(b_, pair.b);
-    PairOverlap both(placed_a_, tree_a, placed_b_, tree_b, pose_, *workspace_.impl());
-    const Penetration answer =
-        keep_rounding ? both.by_lenses(limits, true) : both.by(method_of(pair), limits);
+    return limits;
+  }
+
+  PairOverlap overlap(const DetailPair& pair) const noexcept {
+    return {placed_a_, matched_tree(a_, pair.a), placed_b_, matched_tree(b_, pair.b),
+            pose_,     *workspace_.impl()};
+  }
+
+  Penetration counted(const Penetration& answer) noexcept {
     visits_ += answer.node_visits;
     pairs_ += answer.sphere_pairs;
     return answer;
+  }
+
+  Penetration descend(const DetailPair& pair, const AskedFor& how) noexcept {
+    DescentLimits limits = limits_left();
+    limits.relative_error = how.relative_error;
+    limits.min_radius = how.min_radius;
+    limits.keep_rounding = how.keep_rounding;
+    return counted(overlap(pair).by(method_of(pair), limits));
   }
 
   const PlacedTree& placed_a_;
@@ -113,8 +133,8 @@ constexpr double kRough = 5e-4;
 Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
                           const PenetrationSettings& settings, Workspace& workspace) noexcept {
   DetailQueries queries(a, b, pose, settings, workspace);
-  if (settings.pair_budget == 0)
-    return queries.ask(DetailPair(), settings.relative_error, settings.min_radius);
+  AskedFor how{settings.relative_error, settings.min_radius, false};
+  if (settings.pair_budget == 0) return queries.ask(DetailPair(), how);
   const DetailChain chain(a.tree.header(), b.tree.header(), pose.a_from_b.scale);
   // Nothing to choose, or nothing dear: no estimate can exceed either solid's sum, κ times over.
   const TreeHeader& coarse_a = matched_tree(a.tree.header(), chain.coarsest().a);
@@ -124,7 +144,7 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       std::min(coarse_a.volume_sum * double{coarse_b.overlap},
                coarse_b.volume_sum * (scale * scale * scale) * double{coarse_a.overlap});
   if (chain.size() == 1 || chain.weights(most, settings.pair_budget)[0].weight == 1)
-    return queries.ask(chain[0], settings.relative_error, settings.min_radius);
+    return queries.ask(chain[0], how);
 
   // Whatever else is asked, the coarse estimate is the whole sum: only that is smooth.
   const Penetration coarse = queries.coarse_estimate(chain.coarsest());
@@ -133,7 +153,7 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
     // Stopped here, any level might have been meant.
     result = coarse;
     for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
-      const Penetration bounds = queries.ask(chain[i], 0, 0);
+      const Penetration bounds = queries.ask(chain[i], {});
       result.volume_min = std::min(result.volume_min, bounds.volume_min);
       result.volume_max = std::max(result.volume_max, bounds.volume_max);
     }
@@ -141,14 +161,15 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
     const double unit3 = pose.unit_a * pose.unit_a * pose.unit_a;
     const DetailChain::Weights weights = chain.weights(coarse.volume / unit3, settings.pair_budget);
     const bool rough = coarse.volume_max - coarse.volume_min > kRough * coarse.volume;
+    // Where lenses graze, to sum them again in double takes longer than a coarser level saves.
+    how.keep_rounding = weights[0].weight < 1;
     double slope = 0;                               // of the blend by the coarse estimate
     for (std::size_t i = chain.size(); i-- > 0;) {  // the coarse ones first: they are sure to end
       const double weight = weights[i].weight;
       if (weight == 0 && weights[i].slope == 0) continue;
-      const Penetration part =
-          i + 1 == chain.size() && !rough && queries.by_lenses_alone(chain[i])
-              ? coarse
-              : queries.ask(chain[i], settings.relative_error, settings.min_radius);
+      const Penetration part = i + 1 == chain.size() && !rough && queries.by_lenses_alone(chain[i])
+                                   ? coarse
+                                   : queries.ask(chain[i], how);
       result.volume += weight * part.volume;
       result.volume_min += weight * part.volume_min;
       result.volume_max += weight * part.volume_max;

@@ -152,11 +152,10 @@ Penetration blended(const Penetration& lenses, Penetration sum, const ExactWeigh
   return sum;
 }
 
-Penetration PairOverlap::by_lenses(const DescentLimits& limits, bool keep_rounding) noexcept {
+Penetration PairOverlap::by_lenses(const DescentLimits& limits) noexcept {
   const SphereTree a(a_.tree.header(), tree_a_);
   const SphereTree b(b_.tree.header(), tree_b_);
   Descent descent(a, b, pose_, limits, scratch_);
-  if (keep_rounding) descent.keep_rounding();
   descent.run();
   return descent.penetration();
 }

@@ -47,7 +47,7 @@ class PairOverlap {
               const TreeHeader& tree_b, const RelativePose& pose, Workspace::Impl& scratch) noexcept
       : a_(a), b_(b), tree_a_(tree_a), tree_b_(tree_b), pose_(pose), scratch_(scratch) {}
 
-  Penetration by_lenses(const DescentLimits& limits, bool keep_rounding = false) noexcept;
+  Penetration by_lenses(const DescentLimits& limits) noexcept;
   Penetration exact(bool b_probes, const DescentLimits& limits,
                     ContactBins* bins = nullptr) noexcept;
   Penetration by(const PairMethod& method, const DescentLimits& limits) noexcept;

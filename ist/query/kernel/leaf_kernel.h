@@ -23,6 +23,11 @@ struct alignas(64) LeafSums {
   double moment[3][kSumLanes] = {};  ///< 3/π · ∫ x dV
   double error[kSumLanes] = {};      ///< 1/2π · bound on what rounded distances change in V
   std::uint32_t lenses = 0;          ///< that are not empty
+
+  void add(const LeafSums& other) noexcept;
+
+  /// All but the count.
+  void scale(double factor) noexcept;
 };
 
 /// Where the sums of single pairs go besides the whole's: pair i to sums[node[i] >> shift].
@@ -41,7 +46,7 @@ struct LeafStage {
   int level_b;
   const Similarity* a_from_b;
   Precision precision;
-  const Budget* budget = nullptr;  ///< whose deadline ends the stage, between batches
+  Budget* budget = nullptr;  ///< whose deadline ends the stage, between batches
   LeafBinning bins = {};
 };
 

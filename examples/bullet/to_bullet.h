@@ -1,0 +1,32 @@
+#pragma once
+
+#include <LinearMath/btTransform.h>
+#include <ist/pose.h>
+
+#include <Eigen/Geometry>
+
+// Between Bullet's vectors and Eigen's.
+
+static_assert(sizeof(btScalar) == sizeof(double), "Bullet must be its double-precision build");
+
+inline btVector3 to_bullet(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+inline Eigen::Vector3d to_eigen(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
+
+inline btTransform to_bullet(const Eigen::Isometry3d& x) {
+  const Eigen::Quaterniond q(x.rotation());
+  return btTransform(btQuaternion(q.x(), q.y(), q.z(), q.w()),
+                     to_bullet(Eigen::Vector3d(x.translation())));
+}
+inline Eigen::Isometry3d to_eigen(const btTransform& x) {
+  const btQuaternion q = x.getRotation();
+  Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
+  out.linear() = Eigen::Quaterniond(q.w(), q.x(), q.y(), q.z()).toRotationMatrix();
+  out.translation() = to_eigen(x.getOrigin());
+  return out;
+}
+
+inline ist::Pose to_pose(const btTransform& x) {
+  const btQuaternion q = x.getRotation();
+  const btVector3& t = x.getOrigin();
+  return {{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}};
+}

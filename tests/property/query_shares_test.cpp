@@ -1,0 +1,132 @@
+#include <gtest/gtest.h>
+#include <ist/bake.h>
+#include <ist/query.h>
+
+#include <memory>
+
+#include "query/base/relative_pose.h"
+#include "query/descent/descent.h"
+#include "query/descent/shares.h"
+#include "samples/samples.h"
+#include "support/nut_on_bolt.h"
+#include "support/sanitizers.h"
+
+// What a deadline leaves of a sum: shares of its leaves that stand for all. Here they are counted,
+// not timed, so that every machine answers the same.
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+
+Asset bake_sample(const char* name) {
+  return bake(close_mesh(make_sample(name), name), {.max_spheres = 4000});
+}
+
+class QueryShares : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    bolt_ = std::make_unique<Asset>(bake_sample("bolt"));
+    nut_ = std::make_unique<Asset>(bake_sample("nut"));
+  }
+  static void TearDownTestSuite() {
+    bolt_.reset();
+    nut_.reset();
+  }
+
+  /// The nut into the bolt, by no more than so many shares of sixteen.
+  Penetration ask(const Pose& nut, double shares) {
+    const PlacedTree a{bolt_->view(), {}, 1}, b{nut_->view(), nut, 1};
+    const std::optional<RelativePose> pose = relative_pose(a, b);
+    const SphereTree tree_a = sphere_tree(a.tree, Measure::matched);
+    const SphereTree tree_b = sphere_tree(b.tree, Measure::matched);
+    DescentLimits limits;
+    limits.shares = shares;
+    Descent descent(tree_a, tree_b, *pose, limits, *workspace_.impl());
+    descent.run();
+    return descent.penetration();
+  }
+
+  /// In the thread, a little off and tilted: all flanks touch somewhere.
+  static Pose engaged(double down) {
+    const double lead = testing::kNutPitch / (2 * std::numbers::pi);
+    const Eigen::Quaterniond q = Eigen::AngleAxisd(0.004, Vector3d::UnitX()) *
+                                 Eigen::AngleAxisd((3 - down) / lead, Vector3d::UnitZ());
+    return {{q.w(), q.x(), q.y(), q.z()}, {0.03, 0.02, 11.03 - down}};
+  }
+
+  static std::unique_ptr<Asset> bolt_, nut_;
+  Workspace workspace_;
+};
+std::unique_ptr<Asset> QueryShares::bolt_, QueryShares::nut_;
+
+TEST_F(QueryShares, GradientsAreThoseOfTheAnswer) {
+  const double h = 1e-4;
+  for (const double shares : {1.0, 2.4, 5.5, 13.2, 16.7}) {
+    for (double down = 0; down < 6; down += 1.3) {
+      const Pose pose = engaged(down);
+      const Penetration answer = ask(pose, shares);
+      ASSERT_EQ(answer.status, QueryStatus::budget_exhausted);
+      for (int k = 0; k < 3; ++k) {
+        Pose more = pose, less = pose;
+        more.t[k] += h;
+        less.t[k] -= h;
+        const double slope = (ask(more, shares).volume - ask(less, shares).volume) / (2 * h);
+        EXPECT_NEAR(answer.translation_gradient[k], slope,
+                    2e-3 * (1 + answer.translation_gradient.norm()))
+            << shares << " " << down;
+      }
+    }
+  }
+}
+
+TEST_F(QueryShares, AnswersAreContinuousInTheRoomForThem) {
+  const Pose pose = engaged(1);
+  double before = ask(pose, 1).volume;
+  for (double shares = 1; shares <= 17; shares += 0.01) {
+    const Penetration answer = ask(pose, shares);
+    EXPECT_NEAR(answer.volume, before, 0.02 * before) << shares;
+    EXPECT_LE(answer.volume_min, answer.volume);
+    EXPECT_GE(answer.volume_max, answer.volume);
+    before = answer.volume;
+  }
+  const Penetration finished = penetration({bolt_->view(), {}, 1}, {nut_->view(), pose, 1},
+                                           {.field = FieldUse::never}, workspace_);
+  const Penetration all = ask(pose, 17);
+  EXPECT_EQ(all.status, QueryStatus::ok);
+  EXPECT_NEAR(all.volume, finished.volume, 1e-5 * finished.volume);
+  EXPECT_NEAR(before, finished.volume, 1e-3 * finished.volume);
+}
+
+TEST_F(QueryShares, StandForAllOfADeepContact) {
+  // The nut beside the bolt's axis, where walls run through each other.
+  double error = 0;
+  int asked = 0;
+  for (double x = 1; x < 9; x += 0.5, ++asked) {
+    const Pose pose{{1, 0, 0, 0}, {x, 0.3, 10}};
+    const double whole = ask(pose, 17).volume;
+    const double part = ask(pose, 5).volume;
+    error += std::abs(part / whole - 1);
+    EXPECT_NEAR(part, whole, 0.5 * whole) << x;
+  }
+  EXPECT_LT(error / asked, 0.15);
+}
+
+// Without friction or damping energy can only stay: what the contact gives to a nut that turns down
+// a bolt was there before.
+TEST_F(QueryShares, ANutTurnsDownABoltWithoutGainingEnergy) {
+  if (testing::kSanitized) GTEST_SKIP() << "takes minutes";
+  const testing::MassProperties mass =
+      testing::mass_properties(make_sample("nut"), testing::kSteel);
+  constexpr double kStiffness = 3;  // [mN/mm³]
+  for (const double shares : {17.0, 11.5, 6.6, 4.2}) {
+    const testing::NutRun run = testing::run_nut(
+        mass, kStiffness, 1000, 1.5, [&](const Pose& pose) { return ask(pose, shares); });
+    EXPECT_GT(run.travel, 6.9) << shares;
+    EXPECT_NEAR(run.turns, -3.5, 0.1) << shares;
+    EXPECT_LT(run.grown, 0.02) << shares;
+  }
+}
+
+}  // namespace
+}  // namespace ist
