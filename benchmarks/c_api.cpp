@@ -55,6 +55,14 @@ Times measure(std::size_t rows, int rounds, const Cpp& cpp, const C& c) {
 
 std::uint64_t bits(double value) { return std::bit_cast<std::uint64_t>(value); }
 
+/// A struct of the C functions, set up.
+template <class T>
+T sized() {
+  T result = {};
+  result.size = sizeof result;
+  return result;
+}
+
 ist_placed_tree_t in_c(const ist_tree_t& tree, const ist::PlacedTree& like) {
   return {sizeof(ist_placed_tree_t), &tree, std::bit_cast<ist_pose_t>(like.pose), like.scale};
 }
@@ -102,7 +110,7 @@ int main(int argc, char** argv) {
                             [&](std::size_t i) {
                               const ist_placed_tree_t a = in_c(rows[i].tree_a, rows[i].a);
                               const ist_placed_tree_t b = in_c(rows[i].tree_b, rows[i].b);
-                              ist_penetration_t answer = {.size = sizeof answer};
+                              auto answer = sized<ist_penetration_t>();
                               ist_penetration(&a, &b, nullptr, &c_workspace, &answer);
                               sum -= bits(answer.volume);
                             }));
@@ -114,7 +122,7 @@ int main(int argc, char** argv) {
                            [&](std::size_t i) {
                              const ist_placed_tree_t a = in_c(rows[i].tree_a, rows[i].a);
                              const ist_placed_tree_t b = in_c(rows[i].tree_b, rows[i].b);
-                             ist_separation_t answer = {.size = sizeof answer};
+                             auto answer = sized<ist_separation_t>();
                              ist_separation(&a, &b, nullptr, &c_workspace, &answer);
                              sum -= bits(answer.distance);
                            }));
@@ -127,12 +135,13 @@ int main(int argc, char** argv) {
                            },
                            [&](std::size_t i) {
                              const ist_placed_tree_t b = in_c(rows[i].tree_b, rows[i].b);
-                             ist_field_t field = {.size = sizeof field, .kind = IST_HALF_SPACE};
+                             auto field = sized<ist_field_t>();
+                             field.kind = IST_HALF_SPACE;
                              field.as.half_space.normal[2] = 1;
                              const ist_placed_field_t plane = {
                                  sizeof plane, &field, std::bit_cast<ist_pose_t>(rows[i].a.pose),
                                  1};
-                             ist_penetration_t answer = {.size = sizeof answer};
+                             auto answer = sized<ist_penetration_t>();
                              ist_field_penetration(&plane, &b, nullptr, &c_workspace, &answer);
                              sum -= bits(answer.volume);
                            }));

@@ -33,6 +33,14 @@ ist_tree_t viewed(const Asset& asset) {
   return tree;
 }
 
+/// A struct of the C functions, set up.
+template <class T>
+T sized() {
+  T result = {};
+  result.size = sizeof result;
+  return result;
+}
+
 ist_placed_tree_t placed_in_c(const ist_tree_t& tree, const PlacedTree& like) {
   return {sizeof(ist_placed_tree_t), &tree, std::bit_cast<ist_pose_t>(like.pose), like.scale};
 }
@@ -101,8 +109,8 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
                                                    0,
                                                    0,
                                                    0};
-    ist_penetration_t c_penetration = {.size = sizeof c_penetration};
-    ist_separation_t c_separation = {.size = sizeof c_separation};
+    auto c_penetration = sized<ist_penetration_t>();
+    auto c_separation = sized<ist_separation_t>();
     ASSERT_GE(
         ist_query(&c_a, &c_b, &c_settings, nullptr, &c_workspace_, &c_penetration, &c_separation),
         0);
@@ -111,7 +119,8 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
 
     // The surface in A's asset as a field.
     const PlacedField field{MeshField{a.tree}, a.pose, a.scale};
-    ist_field_t c_field = {.size = sizeof c_field, .kind = IST_MESH};
+    auto c_field = sized<ist_field_t>();
+    c_field.kind = IST_MESH;
     c_field.as.mesh.tree = &tree_a;
     const ist_placed_field_t c_placed = {sizeof c_placed, &c_field, c_a.pose, c_a.scale};
     ASSERT_GE(ist_field_query(&c_placed, &c_b, nullptr, nullptr, &c_workspace_, &c_penetration,
@@ -160,7 +169,7 @@ TEST(MemoryHooks, HoldAWorkspace) {
       },
       &count};
   const Asset asset = testing::make_random_asset({600, 0.2, {}, 0, 2}, 1);
-  const PlacedTree a{asset.view()}, b{asset.view(), {{1, 0, 0, 0}, {0.3, 0, 0}}};
+  const PlacedTree a{asset.view(), {}, 1}, b{asset.view(), {{1, 0, 0, 0}, {0.3, 0, 0}}, 1};
   {
     Workspace hooked(1 << 12, hooks), plain(1 << 12);
     EXPECT_GT(count.taken, std::size_t{40} << 12);

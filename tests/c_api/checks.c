@@ -112,7 +112,7 @@ static int trees_are_checked(const char* path) {
 
   CHECK(ist_tree_view(bytes, size, &tree) == IST_OK);
   CHECK(ist_tree_get_info(&tree, &info) == IST_OK);
-  CHECK(info.spheres > 0 && info.volume > 0 && info.coverage > 0 && info.coverage <= 1);
+  CHECK(info.spheres > 0 && info.volume > 0 && info.coverage >= 0 && info.coverage <= 1);
   CHECK(info.has_field == (info.field_triangles > 0));
   copy = tree; /* it owns nothing */
   CHECK(ist_tree_release(&copy) == IST_OK && ist_tree_release(&copy) == IST_NO_HANDLE);

@@ -25,6 +25,7 @@ done
 dpkg-deb -f "$(deb libist-dev)" Depends | grep -q '^libist (= '
 if dpkg-deb -f "$(deb ist)" Depends | grep -q libist; then exit 1; fi
 
+dpkg-query -W -f '${binary:Package} ,${Provides},\n' | sed 's/ *([^)]*)//g' >"$work/provided"
 # Names of all packages that those named depend on, as they are installed here.
 closure() {
   seen=" " queue="$*"
@@ -35,19 +36,25 @@ closure() {
     queue="$*"
     case $seen in *" $package "*) continue ;; esac
     seen="$seen$package "
-    queue="$queue $(depends "$(dpkg-query -W -f '${Depends}, ${Pre-Depends}' "$(installed "$package")")")"
+    queue="$queue $(depends "$(dpkg-query -W -f '${Depends}, ${Pre-Depends}' "$package")")"
   done
   echo "$seen"
 }
-# pkg or pkg:arch, as dpkg knows it.
+# The installed package of that name, or one that provides it, as dpkg knows it: pkg or pkg:arch.
 installed() {
-  dpkg-query -W -f '${binary:Package}\n' "$1:$arch" 2>/dev/null || dpkg-query -W -f '${binary:Package}\n' "$1"
+  for name in "$1:$arch" "$1"; do
+    case $(dpkg-query -W -f '${db:Status-Abbrev}' "$name" 2>/dev/null) in
+      ii*) dpkg-query -W -f '${binary:Package}\n' "$name" && return ;;
+    esac
+  done
+  sed -n "s/^\([^ ]*\) .*[ ,]$1[ ,].*/\1/p" "$work/provided" | head -n 1
 }
 # Of a list of dependencies the first alternative that is installed.
 depends() {
   printf '%s\n' "$1" | tr ',' '\n' | while read -r alternatives; do
     printf '%s\n' "$alternatives" | tr '|' '\n' | sed 's/ *\([^ (:]*\).*/\1/' | while read -r name; do
-      if [ -n "$name" ] && installed "$name" >/dev/null 2>&1; then echo "$name"; break; fi
+      found=$([ -z "$name" ] || installed "$name")
+      if [ -n "$found" ]; then echo "$found"; break; fi
     done
   done
 }
@@ -57,8 +64,8 @@ mkdir -p "$root/usr/lib" "$root/usr/lib64" "$root/usr/bin" "$root/usr/sbin" "$ro
   "$root/var/lib/dpkg/info" "$root/var/lib/dpkg/updates"
 for folder in lib lib64 bin sbin; do ln -s usr/$folder "$root/$folder"; done
 wanted=$(depends "$(dpkg-deb -f "$(deb libist)" Depends), $(dpkg-deb -f "$(deb ist)" Depends)")
-for package in $(closure $wanted); do
-  name=$(installed "$package")
+# A shell and ldconfig are on every Debian system, and no package names them.
+for name in $(closure $wanted $(installed dash) $(installed libc-bin)); do
   dpkg-query -s "$name" >>"$root/var/lib/dpkg/status"
   echo >>"$root/var/lib/dpkg/status"
   cp /var/lib/dpkg/info/"$name".list "$root/var/lib/dpkg/info" 2>/dev/null ||
