@@ -4,7 +4,7 @@
 // memory and the device buffer are the same bytes. Offsets count bytes from the start of the file
 // and are multiples of 64; 0 means the array is absent. Unused bytes are zero.
 //
-//   AssetHeader                       960 B
+//   AssetHeader                       1152 B
 //   details                           DetailLevel[d]
 //   inner spheres                     Sphere[n]   centre and radius, insertion (greedy) order
 //   cover radii                       float[n]    the solid lies in ∪ B(inner centre, cover)
@@ -58,7 +58,7 @@
 namespace IST_API ist {
 
 inline constexpr std::uint32_t kFormatMajor = 0;
-inline constexpr std::uint32_t kFormatMinor = 3;
+inline constexpr std::uint32_t kFormatMinor = 4;
 inline constexpr char kAssetMagic[8] = {'I', 'S', 'T', 'R', 'E', 'E', '\r', '\n'};
 inline constexpr std::size_t kAssetAlignment = 64;
 inline constexpr std::uint32_t kWidth = 16;       ///< balls in a block
@@ -248,8 +248,20 @@ struct alignas(64) AssetHeader {
   double polygonise_error = 0;
   std::uint32_t polygonise_cells = 0;  ///< along the longest side; 0: the solid is a mesh
   std::uint32_t worst_partner = 0;     ///< TrialPartner behind measured_error
+
+  // The solid at density 1, and what holds it (<ist/mass_properties.h>).
+  double centre_of_mass[3] = {};    ///< unit frame
+  double centre_of_mass_error = 0;  ///< unit frame, bound on the error of each component
+  /// Unit frame, about the centre of mass: entries xx, yy, zz, xy, xz, yz of ∫ (|y|² 1 − y yᵀ).
+  double inertia[6] = {};
+  double inertia_error = 0;    ///< unit frame, bound on the error of each entry
+  double box_lower[3] = {};    ///< [u] no point of the solid lies outside the box
+  double box_upper[3] = {};    ///< [u]
+  double ball_centre[3] = {};  ///< [u] inside the box
+  double ball_radius = 0;      ///< [u] no point of the solid is further from ball_centre
+  double reserved[3] = {};
 };
-static_assert(sizeof(AssetHeader) == 960);
+static_assert(sizeof(AssetHeader) == 1152);
 
 inline constexpr std::uint32_t kFlagRepaired = 1u << 0;    ///< the mesh was open and repaired
 inline constexpr std::uint32_t kFlagBelowNoise = 1u << 1;  ///< greedy order ends under float noise

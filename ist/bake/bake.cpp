@@ -15,6 +15,7 @@
 #include "bake/cluster/tree_builder.h"
 #include "bake/cover/cover.h"
 #include "bake/field/field.h"
+#include "bake/mass_and_bounds.h"
 #include "packing/base/packing_settings.h"
 #include "stage/stage.h"
 #include "stage/thread_arena.h"
@@ -30,8 +31,7 @@ AssetHeader describe_bake(const ClosedMesh& mesh, const MeshSolid& solid,
   header.exponent = packing.frame.exponent;
   header.flags = (mesh.report.repaired ? kFlagRepaired : 0) |
                  (packing.below_float_noise ? kFlagBelowNoise : 0);
-  header.volume = solid.unit_volume();
-  header.volume_error = solid.unit_volume_error();
+  describe_mass(solid.unit_moments(), header);
   header.coverage = std::min(packing.coverage, 1.0);
   header.asked_spheres = settings.max_spheres;
   header.asked_coverage = settings.target_coverage;
@@ -113,6 +113,7 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   arrays.inner_spheres = packing.spheres;
 
   host.add([&] { inner_order = sphere_order(arrays.inner_spheres); });
+  host.add([&] { describe_bounds(solid, 0, arrays.header); });
 
   std::vector<Calibration> details =
       calibrate_prefixes(solid, backend, packing.spheres, detail_counts(count), progress);

@@ -7,6 +7,7 @@
 #include "bake/backend/make_backend.h"
 #include "bake/backend/polygonised_backend.h"
 #include "bake/bake_solid.h"
+#include "bake/mass_and_bounds.h"
 #include "mesh/lipschitz.h"
 #include "mesh/polygonise.h"
 #include "numerics/roots.h"
@@ -61,7 +62,11 @@ Asset bake_field(const Solid& solid, const PackingSettings& settings,
   }
   const double off = std::abs(mesh_solid.volume() - solid.volume()) + solid.volume_error();
   arrays.header.flags |= kFlagPolygonised;
-  arrays.header.volume_error += off / scale / scale / scale;
+  MeshMoments moments =
+      moments_near(mesh_solid.arrays(), mesh_solid.unit_moments(), made.error / scale);
+  moments.volume_error += off / scale / scale / scale;
+  describe_mass(moments, arrays.header);
+  describe_bounds(mesh_solid, made.error / scale, arrays.header);
   arrays.header.polygonise_error = made.error / scale;
   arrays.header.polygonise_cells = cells;
   return Asset(asset_bytes(arrays), meshing.name);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include <ist/asset_layout.h>
+#include <ist/mass_properties.h>
 #include "app/coarseness.h"
 #include "app/text.h"
 #include "bake/predict/trial_poses.h"
@@ -87,6 +88,31 @@ nlohmann::ordered_json field_json(const TreeView& tree) {
                                      : nlohmann::ordered_json(nullptr)}};
 }
 
+nlohmann::ordered_json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+nlohmann::ordered_json mass_json(const TreeView& tree) {
+  const MassProperties mass = mass_properties(tree);
+  const Eigen::Matrix3d& m = mass.inertia;
+  return {{"volume", mass.volume},
+          {"volume_error", mass.volume_error},
+          {"centre_of_mass", json_of(mass.centre_of_mass)},
+          {"centre_of_mass_error", mass.centre_of_mass_error},
+          {"inertia", {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2)}},
+          {"inertia_error", mass.inertia_error}};
+}
+
+nlohmann::ordered_json bounds_json(const TreeView& tree) {
+  const Bounds held = bounds(tree);
+  return {{"lower", json_of(held.lower)},
+          {"upper", json_of(held.upper)},
+          {"ball_centre", json_of(held.centre)},
+          {"ball_radius", held.radius}};
+}
+
+std::string text_of(const Eigen::Vector3d& v) {
+  return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x(), v.y(), v.z());
+}
+
 nlohmann::ordered_json details_json(const AssetHeader& h, double scale) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (std::uint32_t i = 1; i <= h.detail_count; ++i) {
@@ -102,7 +128,6 @@ nlohmann::ordered_json details_json(const AssetHeader& h, double scale) {
 std::string describe_asset(const TreeView& tree) {
   const AssetHeader& h = tree.header();
   const double scale = std::ldexp(1.0, h.exponent);
-  const double cube = scale * scale * scale;
   std::string text;
   const auto line = [&](const char* name, const std::string& value) {
     text += fmt::format("  {:<12} {}\n", name, value);
@@ -120,7 +145,18 @@ std::string describe_asset(const TreeView& tree) {
                      : fmt::format("no promise: grid {} keeps no bound on the largest that would "
                                    "fit",
                                    name_of(grid)));
-  line("volume", fmt::format("{:.9g} ± {:.1g} u³", h.volume * cube, h.volume_error * cube));
+  const MassProperties mass = mass_properties(tree);
+  line("volume", fmt::format("{:.9g} ± {:.1g} u³", mass.volume, mass.volume_error));
+  line("mass centre",
+       fmt::format("{} ± {:.1g} u", text_of(mass.centre_of_mass), mass.centre_of_mass_error));
+  const Eigen::Matrix3d& m = mass.inertia;
+  line("inertia",
+       fmt::format("xx {:.9g}, yy {:.9g}, zz {:.9g}, xy {:.9g}, xz {:.9g}, yz {:.9g} ± {:.1g} u⁵ "
+                   "about the mass centre, density 1",
+                   m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2), mass.inertia_error));
+  const Bounds held = bounds(tree);
+  line("box", fmt::format("{} to {} u", text_of(held.lower), text_of(held.upper)));
+  line("ball", fmt::format("radius {:.9g} u about {} u", held.radius, text_of(held.centre)));
   line("frame", fmt::format("centre ({:.9g}, {:.9g}, {:.9g}) u, scale 2^{}", h.centre[0],
                             h.centre[1], h.centre[2], h.exponent));
   line("protrusion", fmt::format("{:.4g} u: no matched sphere sticks further out of the solid",
@@ -166,7 +202,6 @@ std::string describe_asset(const TreeView& tree) {
 nlohmann::ordered_json asset_json(const TreeView& tree) {
   const AssetHeader& h = tree.header();
   const double scale = std::ldexp(1.0, h.exponent);
-  const double cube = scale * scale * scale;
   const auto grid = static_cast<GridMode>(h.asked_grid);
   const auto kept = [&](double ratio) {
     return keeps_bound(grid) ? nlohmann::ordered_json(ratio) : nlohmann::ordered_json();
@@ -183,8 +218,7 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
       {"kept_ratio_worst", kept(h.kept_ratio_worst)},
       {"kept_ratio_median", kept(h.kept_ratio_median)},
       {"stop", name_of(static_cast<StopReason>(h.stop_reason))},
-      {"volume", h.volume * cube},
-      {"volume_error", h.volume_error * cube},
+      {"bounds", bounds_json(tree)},
       {"protrusion", h.protrusion * scale},
       {"frame", {{"centre", h.centre}, {"exponent", h.exponent}}},
       {"repaired", (h.flags & kFlagRepaired) != 0},
@@ -209,6 +243,7 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
       {"details", details_json(h, scale)},
       {"field", field_json(tree)},
   };
+  json.update(mass_json(tree));
   json.update(target_json(tree));
   return json;
 }

@@ -14,7 +14,6 @@
 
 #include "mesh/bvh.h"
 #include "mesh/exact_closest_point.h"
-#include "mesh/mesh_volume.h"
 #include "mesh/winding.h"
 
 namespace ist {
@@ -28,10 +27,10 @@ struct MeshSolid::Impl {
   std::uint64_t hash = 0;
   bool meets_itself = false, may_overlap = false;
 
-  oneapi::tbb::collaborative_once_flag hierarchy_made, volume_made;
+  oneapi::tbb::collaborative_once_flag hierarchy_made, moments_made;
   Bvh bvh;
   MeshView view;  // arrays and bvh
-  MeshVolume volume;
+  MeshMoments moments;
 
   const MeshView& with_hierarchy() {
     oneapi::tbb::collaborative_call_once(hierarchy_made, [this] {
@@ -44,14 +43,14 @@ struct MeshSolid::Impl {
     return view;
   }
 
-  const MeshVolume& with_volume() {
+  const MeshMoments& with_moments() {
     // One shell that does not meet itself winds around no point twice.
-    oneapi::tbb::collaborative_call_once(volume_made, [this] {
+    oneapi::tbb::collaborative_call_once(moments_made, [this] {
       const HierarchyMaker hierarchy = [this]() -> const MeshView& { return with_hierarchy(); };
-      volume = may_overlap ? winding_set_volume(arrays, meets_itself, hierarchy)
-                           : enclosed_volume(arrays);
+      moments = may_overlap ? winding_set_moments(arrays, meets_itself, hierarchy)
+                            : enclosed_moments(arrays);
     });
-    return volume;
+    return moments;
   }
 };
 
@@ -137,17 +136,18 @@ Eigen::AlignedBox3d MeshSolid::bounds() const { return impl_->bounds; }
 
 double MeshSolid::volume() const {
   const double scale = impl_->frame.scale();
-  return impl_->with_volume().value * scale * scale * scale;
+  return impl_->with_moments().volume * scale * scale * scale;
 }
 
 double MeshSolid::volume_error() const {
   const double scale = impl_->frame.scale();
-  return impl_->with_volume().error * scale * scale * scale;
+  return impl_->with_moments().volume_error * scale * scale * scale;
 }
 
 const UnitFrame& MeshSolid::frame() const { return impl_->frame; }
-double MeshSolid::unit_volume() const { return impl_->with_volume().value; }
-double MeshSolid::unit_volume_error() const { return impl_->with_volume().error; }
+double MeshSolid::unit_volume() const { return impl_->with_moments().volume; }
+double MeshSolid::unit_volume_error() const { return impl_->with_moments().volume_error; }
+const MeshMoments& MeshSolid::unit_moments() const { return impl_->with_moments(); }
 bool MeshSolid::meets_itself() const { return impl_->meets_itself; }
 bool MeshSolid::may_overlap() const { return impl_->may_overlap; }
 std::uint64_t MeshSolid::hash() const { return impl_->hash; }

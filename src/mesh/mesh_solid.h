@@ -7,6 +7,7 @@
 
 #include <ist/solid.h>
 
+#include "mesh/mesh_moments.h"
 #include "mesh/mesh_view.h"
 
 namespace ist {
@@ -20,7 +21,7 @@ struct ClosestPoint {
 
 /// The solid of a closed mesh. All internals live in the unit frame, in double; view() adds float
 /// copies for packing. Immutable; every function may be called from many threads at once. The
-/// hierarchy and the volume are made when they are first asked for, on the caller's TBB threads: a
+/// hierarchy and the moments are made when they are first asked for, on the caller's TBB threads: a
 /// bake on the GPU never asks for the hierarchy.
 class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
  public:
@@ -36,6 +37,7 @@ class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
   const UnitFrame& frame() const;
   double unit_volume() const;        ///< unit frame³
   double unit_volume_error() const;  ///< unit frame³
+  const MeshMoments& unit_moments() const;
   /// Triangles of the mesh intersect, or may: they were not looked for.
   bool meets_itself() const;
   bool may_overlap() const;      ///< it winds around some point twice, or may: several shells

@@ -265,6 +265,30 @@ TEST(AssetBytes, ValuesOutOfRangeAreRefused) {
   refused(offsetof(AssetHeader, centre), kNan);
   refused(offsetof(AssetHeader, exponent), 4000);
   refused(offsetof(AssetHeader, volume), -1.0);
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  for (const double value : {kNan, kInf, -kInf, 1e300, -1e300}) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      refused(offsetof(AssetHeader, centre_of_mass) + 8 * k, value);
+      refused(offsetof(AssetHeader, box_lower) + 8 * k, value);
+      refused(offsetof(AssetHeader, box_upper) + 8 * k, value);
+      refused(offsetof(AssetHeader, ball_centre) + 8 * k, value);
+    }
+    for (std::size_t k = 0; k < 6; ++k) refused(offsetof(AssetHeader, inertia) + 8 * k, value);
+    for (const std::size_t field :
+         {offsetof(AssetHeader, centre_of_mass_error), offsetof(AssetHeader, inertia_error),
+          offsetof(AssetHeader, ball_radius)})
+      refused(field, value);
+  }
+  refused(offsetof(AssetHeader, box_lower), 2.0);   // above the upper corner
+  refused(offsetof(AssetHeader, box_upper), -0.3);  // the ball's centre is outside
+  refused(offsetof(AssetHeader, centre_of_mass), 1.0);
+  refused(offsetof(AssetHeader, ball_radius), 0.2);
+  refused(offsetof(AssetHeader, ball_radius), 5.0);
+  // No body has these: a negative moment, one larger than the other two together, a product of
+  // inertia larger than moments allow.
+  refused(offsetof(AssetHeader, inertia), -1e-9);
+  refused(offsetof(AssetHeader, inertia), header.inertia[1] + header.inertia[2] + 1e-6);
+  refused(offsetof(AssetHeader, inertia) + 8 * 3, header.inertia[0]);
   for (const std::uint64_t spheres : {header.inner_spheres, header.matched_spheres}) {
     refused(spheres, kNanf);
     refused(spheres + 12, -1.0f);

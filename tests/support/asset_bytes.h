@@ -10,6 +10,7 @@
 #include "asset/asset_writer.h"
 #include "bake/cluster/tree_builder.h"
 #include "query/asset/content_hash.h"
+#include "support/mass_of_spheres.h"
 
 // Small assets without a mesh, and bytes to damage.
 
@@ -36,6 +37,7 @@ inline std::vector<std::byte> small_asset(std::size_t n, std::uint32_t details =
     detail.matched_tree = build_tree(detail.matched_spheres, {});
   }
   arrays.header.volume = 1;
+  describe_spheres(arrays);
   return asset_bytes(arrays);
 }
 

@@ -9,6 +9,7 @@
 
 #include "asset/asset_writer.h"
 #include "bake/cluster/tree_builder.h"
+#include "support/mass_of_spheres.h"
 
 namespace ist::testing {
 
@@ -62,6 +63,7 @@ inline Asset make_random_asset(const RandomAsset& like, unsigned seed) {
   for (int k = 0; k < 3; ++k) arrays.header.centre[k] = like.centre[k];
   arrays.header.exponent = like.exponent;
   arrays.header.volume = arrays.matched_tree.volume_sum;
+  describe_spheres(arrays);
   return Asset(asset_bytes(arrays), "random asset");
 }
 

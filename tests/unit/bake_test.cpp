@@ -38,7 +38,8 @@ void expect_sound(const std::vector<Invariant>& invariants) {
   for (const Invariant& one : invariants) {
     EXPECT_EQ(one.violations, 0u) << one.name << ": " << one.worst << " at " << one.where;
     EXPECT_LE(one.worst, 0) << one.name;
-    EXPECT_TRUE(one.checked > 0 || one.name == "spheres disjoint" || one.name == "field inside") << one.name;
+    EXPECT_TRUE(one.checked > 0 || one.name == "spheres disjoint" || one.name == "field inside")
+        << one.name;
   }
 }
 
@@ -98,6 +99,16 @@ TEST(Check, TurnsRedForEveryInvariant) {
       {"frame", [](AssetHeader& h) { h.centre[1] += 1e-9; }},
       {"solid volume", [](AssetHeader& h) { h.volume *= 1 + 1e-9; }},
       {"sampled volume", [](AssetHeader& h) { h.volume *= 0.9; }},
+      {"centre of mass", [](AssetHeader& h) { h.centre_of_mass[2] += 1e-9; }},
+      {"centre of mass", [](AssetHeader& h) { h.centre_of_mass_error += 1e-9; }},
+      {"inertia", [](AssetHeader& h) { h.inertia[1] *= 1 + 1e-9; }},
+      {"inertia", [](AssetHeader& h) { h.inertia[5] += 1e-9; }},
+      {"sampled mass", [](AssetHeader& h) { h.centre_of_mass[0] += 0.05; }},
+      {"sampled mass", [](AssetHeader& h) { h.inertia[2] *= 1.1; }},
+      {"box holds solid", [](AssetHeader& h) { h.box_lower[1] += 1e-9; }},
+      {"box is tight", [](AssetHeader& h) { h.box_upper[0] += 1e-9; }},
+      {"ball holds solid", [](AssetHeader& h) { h.ball_radius *= 1 - 1e-9; }},
+      {"ball holds solid", [](AssetHeader& h) { h.ball_centre[0] += 1e-9; }},
       {"centre inside solid", [](AssetHeader& h) { inner(h, 7).x += 2; }},
       {"sphere clear of surface", [](AssetHeader& h) { inner(h, 3).r *= 1.01f; }},
       {"sphere clear of surface", [](AssetHeader& h) { inner(h, 0).x += 1e-6f; }},

@@ -11,7 +11,7 @@
 
 #include <ist/error.h>
 
-#include "mesh/mesh_volume.h"
+#include "mesh/mesh_moments.h"
 #include "support/float_traps.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
@@ -182,7 +182,7 @@ TEST(MeshSolid, VolumesOfRealMeshes) {
     EXPECT_LT(solid.volume_error(), 1e-9 * row.volume) << row.file;
     // Integration finds no excess either.
     const auto hierarchy = [&]() -> const ist::MeshView& { return solid.view(); };
-    EXPECT_NEAR(ist::winding_set_volume(solid.arrays(), false, hierarchy).value,
+    EXPECT_NEAR(ist::winding_set_moments(solid.arrays(), false, hierarchy).volume,
                 solid.unit_volume(), 1e-12 * solid.unit_volume())
         << row.file;
   }

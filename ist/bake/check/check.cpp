@@ -5,6 +5,7 @@
 
 #include <ist/asset_layout.h>
 #include "bake/check/check_field.h"
+#include "bake/check/check_mass.h"
 #include "bake/check/check_spheres.h"
 #include "bake/check/check_surface.h"
 #include "bake/check/check_tree.h"
@@ -28,9 +29,12 @@ Bounding bounding_of(const ClosedMesh& mesh) {
 /// `solid`: what spheres and covers are certified against; `surface`: what matched spheres are
 /// calibrated by; of a mesh's asset they are the same.
 std::vector<Invariant> check_all(const AssetHeader& asset, const CheckedSolid& solid,
-                                 const CheckSurface& surface, const MeshSolid& mesh,
-                                 double volume_error, Bounding bounding) {
-  std::vector<Invariant> all = check_header(asset, solid, mesh, volume_error);
+                                 const CheckSurface& surface, const UnitFrame& frame,
+                                 const MeshMoments& moments, Bounding bounding) {
+  std::vector<Invariant> all;
+  all.push_back(check_frame(asset, frame));
+  append(all, check_mass(asset, moments, solid));
+  append(all, check_bounds(asset, surface));
   append(all, check_spheres(asset, solid));
   all.push_back(check_cover(asset, solid));
   append(all, check_tree(asset, asset.inner_tree, at<Sphere>(asset, asset.inner_spheres),
@@ -50,7 +54,7 @@ std::vector<Invariant> check_mesh(const AssetHeader& asset, const ClosedMesh& me
   if (solid.hash() != asset.mesh_hash || (asset.flags & kFlagPolygonised) != 0)
     throw Error(mesh.name + ": the asset was baked from another mesh; bake again");
   const CheckSurface surface(mesh, solid.frame());
-  return check_all(asset, surface, surface, solid, solid.unit_volume_error(), bounding_of(mesh));
+  return check_all(asset, surface, surface, solid.frame(), solid.unit_moments(), bounding_of(mesh));
 }
 
 std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid) {
@@ -63,9 +67,10 @@ std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid)
   if (mesh.hash() != asset.mesh_hash || made.error / scale != asset.polygonise_error)
     throw Error("solid: the asset was baked from another solid; bake again");
   const double off = std::abs(mesh.volume() - solid.volume()) + solid.volume_error();
+  MeshMoments moments = moments_near(mesh.arrays(), mesh.unit_moments(), made.error / scale);
+  moments.volume_error += off / scale / scale / scale;
   return check_all(asset, DistanceSolid(solid, mesh.frame()), CheckSurface(closed, mesh.frame()),
-                   mesh, mesh.unit_volume_error() + off / scale / scale / scale,
-                   bounding_of(closed));
+                   mesh.frame(), moments, bounding_of(closed));
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
-#include <random>
 
 #include "bake/check/check_tally.h"
 
@@ -39,31 +38,6 @@ Tally sweep(const Sphere* spheres, std::size_t count, const Visit& visit) {
     const double high = double{spheres[i].x} + double{spheres[i].r};
     for (std::size_t m = k + 1; m < count && low(order[m]) <= high; ++m) visit(i, order[m], tally);
   });
-}
-
-/// Share of fixed random points of the bounding box that are inside, against the header's volume:
-/// blind to small errors, but it sees the set itself, where the winding number is ≥ 1.
-Invariant sampled_volume(const AssetHeader& asset, const CheckedSolid& surface) {
-  constexpr std::size_t kPoints = 50'000;
-  std::mt19937_64 bits(1);
-  std::vector<Eigen::Vector3d> points(kPoints);
-  const Eigen::Vector3d size = surface.bounds().sizes();
-  for (Eigen::Vector3d& p : points)
-    for (int k = 0; k < 3; ++k)
-      p[k] = surface.bounds().min()[k] + size[k] * (static_cast<double>(bits() >> 11) * 0x1p-53);
-  std::vector<char> inside(kPoints);
-  tbb::parallel_for(std::size_t{0}, kPoints,
-                    [&](std::size_t i) { inside[i] = surface.winding(points[i]) >= 1; });
-  const double share = static_cast<double>(std::count(inside.begin(), inside.end(), 1)) / kPoints;
-  const double expected = asset.volume / size.prod();
-  const double deviation = std::sqrt(expected * std::fabs(1 - expected) / kPoints);
-  Tally tally;
-  tally.add(std::fabs(share - expected) - 6 * deviation - 1.0 / kPoints -
-                asset.volume_error / size.prod(),
-            0);
-  return tally.named("sampled volume",
-                     "difference of the share of points inside and the header's volume, above six "
-                     "standard deviations and the volume's error, of the bounding box");
 }
 
 }  // namespace
@@ -141,26 +115,6 @@ std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t det
                 })
           .named(name + "matched protrusion",
                  "reach of an matched sphere out of the solid − the asset's bound, unit frame"));
-  return out;
-}
-
-std::vector<Invariant> check_header(const AssetHeader& asset, const CheckedSolid& surface,
-                                    const MeshSolid& solid, double volume_error) {
-  std::vector<Invariant> out;
-  const UnitFrame& frame = solid.frame();
-  Tally same;
-  same.add(std::abs(asset.exponent - frame.exponent), 0);
-  for (int k = 0; k < 3; ++k) same.add(std::fabs(asset.centre[k] - frame.centre[k]), 0);
-  out.push_back(same.named("frame", "difference of the header's frame and the mesh's, [u]"));
-
-  Tally volume;
-  const double scale = solid.unit_volume();
-  volume.add(std::fabs(asset.volume - solid.unit_volume()) / scale - 1e-12, 0);
-  volume.add(std::fabs(asset.volume_error - volume_error) / scale - 1e-12, 0);
-  out.push_back(volume.named("solid volume",
-                             "relative difference of the header's volume and the mesh's, above "
-                             "1e-12"));
-  out.push_back(sampled_volume(asset, surface));
   return out;
 }
 

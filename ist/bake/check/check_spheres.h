@@ -8,7 +8,6 @@
 
 #include <ist/asset_layout.h>
 #include "bake/check/check_surface.h"
-#include "mesh/mesh_solid.h"
 
 namespace ist {
 
@@ -18,11 +17,6 @@ std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSoli
 /// The matched spheres of a detail (0: the finest) stand for the solid. Names start with `name`.
 std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t detail,
                                      const CheckSurface& surface, const std::string& name);
-
-/// The header's frame and volumes are those of the mesh, and the volume is about that of the solid
-/// `surface`; `volume_error`: what the header is to say of it, unit frame.
-std::vector<Invariant> check_header(const AssetHeader& asset, const CheckedSolid& surface,
-                                    const MeshSolid& solid, double volume_error);
 
 /// Every point of the solid lies in some cover ball: proven by subdivision.
 Invariant check_cover(const AssetHeader& asset, const CheckedSolid& surface);

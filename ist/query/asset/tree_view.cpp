@@ -7,6 +7,7 @@
 #include <ist/asset_layout.h>
 #include "query/asset/content_hash.h"
 #include "query/asset/sound_field.h"
+#include "query/asset/sound_mass.h"
 #include "query/asset/sound_values.h"
 
 namespace ist {
@@ -131,6 +132,7 @@ bool sound_values(const AssetHeader& header) noexcept {
   if (!is_finite_sum(header.volume) || !is_finite_sum(header.volume_error) ||
       !in_range(header.coverage, 0, 1) || !is_radius(header.protrusion))
     return false;
+  if (!sound_mass(header)) return false;
   const float* covers = at<float>(header, header.cover_radii);
   for (std::uint64_t i = 0; i < header.sphere_count; ++i)
     if (!is_radius(covers[i])) return false;

@@ -1,6 +1,5 @@
 #include "query/base/relative_pose.h"
 
-#include <Eigen/Geometry>
 #include <cmath>
 
 #include <ist/asset_layout.h>
@@ -19,15 +18,11 @@ struct Frame {
 };
 
 std::optional<Frame> frame_of(const Pose& pose, double scale) {
-  const double* q = pose.q;
-  const double* t = pose.t;
-  const double norm = std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
-  if (!(std::abs(norm - 1) <= 1e-3)) return std::nullopt;
-  if (!std::isfinite(t[0]) || !std::isfinite(t[1]) || !std::isfinite(t[2])) return std::nullopt;
-  if (!(scale > 0) || !std::isfinite(scale)) return std::nullopt;
+  const std::optional<Eigen::Quaterniond> rotation = usable_rotation(pose, scale);
+  if (!rotation) return std::nullopt;
   Frame frame;
-  frame.rotation = Eigen::Quaterniond(q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm);
-  frame.translation = Eigen::Vector3d(t[0], t[1], t[2]);
+  frame.rotation = *rotation;
+  frame.translation = Eigen::Vector3d(pose.t[0], pose.t[1], pose.t[2]);
   frame.offset = Eigen::Vector3d::Zero();
   frame.unit = scale;
   return frame;
@@ -76,6 +71,16 @@ std::optional<RelativePose> relative(const std::optional<Frame>& fa,
 }
 
 }  // namespace
+
+std::optional<Eigen::Quaterniond> usable_rotation(const Pose& pose, double scale) noexcept {
+  const double* q = pose.q;
+  const double* t = pose.t;
+  const double norm = std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
+  if (!(std::abs(norm - 1) <= 1e-3)) return std::nullopt;
+  if (!std::isfinite(t[0]) || !std::isfinite(t[1]) || !std::isfinite(t[2])) return std::nullopt;
+  if (!(scale > 0) || !std::isfinite(scale)) return std::nullopt;
+  return Eigen::Quaterniond(q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm);
+}
 
 std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree& b) noexcept {
   return relative(frame_of(a), frame_of(b));

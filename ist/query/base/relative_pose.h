@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <optional>
 
 #include <ist/query.h>
@@ -35,6 +36,9 @@ struct RelativePose {
     return rotation_a * (x_unit_a * unit_a) + unit_origin_a;
   }
 };
+
+/// Normalised; empty if pose or scale is not usable (QueryStatus::invalid_input).
+std::optional<Eigen::Quaterniond> usable_rotation(const Pose& pose, double scale) noexcept;
 
 /// Empty if a pose or scale is not usable (QueryStatus::invalid_input) or a tree is empty.
 std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree& b) noexcept;

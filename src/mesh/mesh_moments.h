@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "mesh/winding_excess.h"
+
+namespace ist {
+
+/// Volume, centre of mass and inertia of a solid of density 1, unit frame, each with a bound on its
+/// error.
+struct MeshMoments {
+  double volume = 0;
+  double volume_error = 0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double centre_error = 0;  ///< of each component
+  /// ∫ (|y|² 1 − y yᵀ), y from the centre.
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  double inertia_error = 0;  ///< of each entry
+};
+
+/// Those of a mesh by the divergence theorem: ∫ winding number. The errors are proven bounds on the
+/// rounding. Where the winding number is only 0 or 1, they are those of the solid. The same for any
+/// number of threads.
+MeshMoments enclosed_moments(const MeshView& mesh);
+
+/// Those of the set where the winding number is ≥ 1 (docs/design.md 3.6): the enclosed ones less
+/// those of the excess.
+/// No excess, no loss of accuracy. The errors hold what the excess's integral estimates and, unless
+/// `meets_itself` is false, what folds of the surface may hide between its columns. The same for
+/// any number of threads. Of `mesh` the arrays suffice; the hierarchy is asked for only where there
+/// is an excess.
+MeshMoments winding_set_moments(const MeshView& mesh, bool meets_itself,
+                                const HierarchyMaker& hierarchy);
+
+/// The same for a solid that agrees with the mesh's at all points further than `distance` from its
+/// surface: the errors of centre and inertia grow by what may lie within it. The volume's does not.
+MeshMoments moments_near(const MeshView& mesh, MeshMoments moments, double distance);
+
+}  // namespace ist
