@@ -1,0 +1,127 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "query/field/patch_shapes.h"
+#include "query/field/shapes.h"
+#include "query/impact/convex_pair.h"
+
+// Convex fields as all points within a radius of a core whose furthest point in a direction is
+// known, and their distance from triangles (Gilbert, Johnson and Keerthi 1988).
+
+namespace ist {
+
+/// Shapes whose tangent plane at the nearest point has all of them on one side.
+template <class Shape>
+inline constexpr bool kConvex = false;
+template <>
+inline constexpr bool kConvex<HalfSpaceShape> = true;
+template <>
+inline constexpr bool kConvex<BoxShape> = true;
+template <>
+inline constexpr bool kConvex<BallShape> = true;
+template <>
+inline constexpr bool kConvex<CapsuleShape> = true;
+template <>
+inline constexpr bool kConvex<CylinderShape> = true;
+
+inline double core_radius(const BoxShape&) noexcept { return 0; }
+inline double core_radius(const BallShape& s) noexcept { return s.radius; }
+inline double core_radius(const CapsuleShape& s) noexcept { return s.radius; }
+inline double core_radius(const CylinderShape&) noexcept { return 0; }
+
+inline Eigen::Vector3d furthest(const BoxShape& s, const Eigen::Vector3d& n) noexcept {
+  return {std::copysign(s.half.x(), n.x()), std::copysign(s.half.y(), n.y()),
+          std::copysign(s.half.z(), n.z())};
+}
+inline Eigen::Vector3d furthest(const BallShape&, const Eigen::Vector3d&) noexcept {
+  return Eigen::Vector3d::Zero();
+}
+inline Eigen::Vector3d furthest(const CapsuleShape& s, const Eigen::Vector3d& n) noexcept {
+  return {0, 0, std::copysign(s.half, n.z())};
+}
+inline Eigen::Vector3d furthest(const CylinderShape& s, const Eigen::Vector3d& n) noexcept {
+  const double across = std::sqrt(n.x() * n.x() + n.y() * n.y());
+  const double to = across > 0 ? s.radius / across : 0;
+  return {to * n.x(), to * n.y(), std::copysign(s.half, n.z())};
+}
+
+/// A plane between a convex field and a triangle, all in one frame.
+struct PlaneBetween {
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit, from the field to the triangle
+  double apart = 0;     ///< > 0: they lie so far apart along it, a proof; else they may meet
+  double distance = 0;  ///< they are no further apart than this
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< of the triangle, so near
+};
+
+/// The way between a triangle and a convex core, from differences of their points.
+class WayBetween {
+ public:
+  /// Adds the difference of a point of the triangle and one of the core. False if it leads no
+  /// nearer.
+  bool add(const Eigen::Vector3d& difference, const Eigen::Vector3d& of_triangle) noexcept;
+
+  const Eigen::Vector3d& way() const noexcept { return way_; }
+  /// The point of the triangle that the way leads to.
+  const Eigen::Vector3d& point() const noexcept { return point_; }
+
+ private:
+  int count_ = 0;  ///< differences kept, whose hull the way leads to
+  Eigen::Vector3d difference_[4], of_triangle_[4];
+  Eigen::Vector3d way_ = Eigen::Vector3d::Zero(), point_ = Eigen::Vector3d::Zero();
+};
+
+template <class Shape>
+PlaneBetween plane_between(const Shape& shape, const ConvexPiece& triangle) noexcept {
+  // A plane that is tilted by as much as costs so little of the gap is good enough.
+  constexpr double kEnough = 0.995;
+  constexpr int kSteps = 60;
+  const double radius = core_radius(shape);
+  PlaneBetween best;
+  best.apart = -std::numeric_limits<double>::infinity();
+  WayBetween between;
+  best.point = (triangle.corner[0] + triangle.corner[1] + triangle.corner[2]) / 3;
+  Eigen::Vector3d way = best.point;  // the core holds the origin
+  for (int i = 0; i < kSteps; ++i) {
+    const double length = way.norm();
+    best.distance = std::max(0.0, length - radius);
+    if (!(best.distance > 0)) return best;
+    const Eigen::Vector3d n = way / length;
+    int nearest = 0;
+    for (int k = 1; k < 3; ++k)
+      if (n.dot(triangle.corner[k]) < n.dot(triangle.corner[nearest])) nearest = k;
+    const Eigen::Vector3d difference = triangle.corner[nearest] - furthest(shape, n);
+    const double apart = n.dot(difference) - radius;
+    if (apart > best.apart) {
+      best.apart = apart;
+      best.normal = n;
+    }
+    if (best.apart >= kEnough * best.distance) break;
+    const bool nearer = between.add(difference, triangle.corner[nearest]);
+    if (!nearer && i > 0) break;
+    way = between.way();
+    best.point = between.point();
+  }
+  return best;
+}
+
+/// Of a half-space there is one plane.
+inline PlaneBetween plane_between(const HalfSpaceShape& shape,
+                                  const ConvexPiece& triangle) noexcept {
+  PlaneBetween between;
+  between.normal = shape.normal;
+  between.apart = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector3d& corner : triangle.corner) {
+    const double height = shape.normal.dot(corner) - shape.offset;
+    if (height >= between.apart) continue;
+    between.apart = between.distance = height;
+    between.point = corner;
+  }
+  between.distance = std::max(0.0, between.distance);
+  return between;
+}
+
+}  // namespace ist

@@ -1,0 +1,154 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+
+#include <ist/time_of_impact.h>
+
+#include "query/base/budget.h"
+#include "query/descent/workspace.h"
+#include "query/impact/moving_frame.h"
+
+namespace ist {
+
+// Balls that are further apart than this part of the larger radius go on as they are; nearer ones
+// are opened.
+inline constexpr double kFarApart = 0.3;
+
+// An impact is reported once the gap is this part of the tolerance. Steps end at a half, so none is
+// too short to get on.
+inline constexpr double kReported = 0.75;
+
+/// What a pair was found to do, of the frame's lengths.
+struct ImpactFound {
+  ImpactStatus status = ImpactStatus::no_impact;
+  double time = 0;
+  double gap = 0;       ///< the solids' distance is at least this, as far as the pair tells
+  double distance = 0;  ///< and at most this
+  Eigen::Vector3d point_a = Eigen::Vector3d::Zero(), point_b = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+};
+
+/// Pairs of nodes, each known to stay clear up to a time of its own: the earliest is looked at
+/// next, so that all are clear up to that time. A pair that stays clear to the end is dropped.
+class ImpactLoop {
+ public:
+  ImpactLoop(const MovingFrame& frame, double tolerance, const ImpactSettings& settings,
+             Workspace::Impl& scratch) noexcept
+      : end(settings.duration),
+        tolerance(tolerance),
+        frame_(frame),
+        waiting_(scratch.ranked.get()),
+        capacity_(scratch.capacity),
+        budget_({settings.max_visits, settings.deadline_us, 0, 0}, 0.95),
+        floor_(tolerance / 2) {}
+
+  const double end;
+  const double tolerance;
+
+  /// `look(a, b, at)` looks at a pair at a time; what it calls of the following decides.
+  template <class Look>
+  TimeOfImpact run(const Look& look) noexcept {
+    Placement at;
+    while (size_ > 0 && !full_) {
+      const RankedPair pair = waiting_[0];
+      // At the start all is weighed, for an overlap counts more than an impact.
+      if (found_.status != ImpactStatus::no_impact && pair.bound > 0) break;
+      if (found_.status == ImpactStatus::overlapping) break;
+      if (budget_.grant(1) == 0) {
+        full_ = true;
+        break;
+      }
+      std::pop_heap(waiting_, waiting_ + size_--, later);
+      now_ = pair.bound;
+      if (at.time != now_) at = place(frame_, now_);
+      look(pair.a, pair.b, at);
+    }
+    if (size_ > 0 && full_) now_ = waiting_[0].bound;
+    return answer();
+  }
+
+  /// The pair is clear for `step` more, but for no less than `left` of its gap.
+  void clear_for(double step, std::uint32_t a, std::uint32_t b, double left) noexcept {
+    floor_ = std::min(floor_, left);
+    if (!(now_ + step < end)) return;
+    push(now_ + step, a, b);
+  }
+  void clear_for(double step, std::uint32_t a, std::uint32_t b) noexcept {
+    if (!(now_ + step < end)) return;
+    push(now_ + step, a, b);
+  }
+
+  /// Nothing more is known of the pair now.
+  void look_again(std::uint32_t a, std::uint32_t b) noexcept { push(now_, a, b); }
+
+  /// Whether a step leads on, as far as time has digits.
+  bool leads_on(double step) const noexcept { return now_ + step > now_; }
+
+  void found(const ImpactFound& what) noexcept {
+    if (found_.status != ImpactStatus::overlapping &&
+        (what.status != ImpactStatus::impact || found_.status == ImpactStatus::no_impact))
+      found_ = what;
+    found_.time = now_;
+  }
+
+  void count_surface_pair() noexcept { ++surface_pairs_; }
+
+ private:
+  static bool later(const RankedPair& x, const RankedPair& y) noexcept {
+    if (x.bound != y.bound) return x.bound > y.bound;
+    return x.a != y.a ? x.a > y.a : x.b > y.b;
+  }
+
+  void push(double time, std::uint32_t a, std::uint32_t b) noexcept {
+    if (size_ == capacity_) {
+      full_ = true;
+      lost_ = std::min(lost_, time);
+      return;
+    }
+    waiting_[size_++] = {time, a, b};
+    std::push_heap(waiting_, waiting_ + size_, later);
+  }
+
+  TimeOfImpact answer() const noexcept {
+    TimeOfImpact result;
+    result.node_visits = budget_.visits();
+    result.surface_pairs = surface_pairs_;
+    result.status = found_.status;
+    const bool decided = found_.status != ImpactStatus::no_impact;
+    if (decided) {
+      result.time = found_.time;
+      if (found_.status == ImpactStatus::overlapping) return result;
+      result.distance_min = frame_.unit * std::clamp(found_.gap, 0.0, floor_);
+      result.distance_max = frame_.unit * std::max(0.0, found_.distance);
+      result.point_a = frame_.to_world(found_.point_a, result.time);
+      result.point_b = frame_.to_world(found_.point_b, result.time);
+      result.normal = found_.normal;
+      return result;
+    }
+    result.time = end;
+    if (full_) {
+      result.status = ImpactStatus::budget_exhausted;
+      result.time = std::min(now_, lost_);
+    }
+    // At the start nothing may have been looked at.
+    result.distance_min = full_ && result.time == 0 ? 0 : frame_.unit * floor_;
+    result.distance_max = std::numeric_limits<double>::infinity();
+    return result;
+  }
+
+  const MovingFrame& frame_;
+  RankedPair* const waiting_;  ///< a heap, the earliest first
+  const std::size_t capacity_;
+  std::size_t size_ = 0;
+  Budget budget_;
+  double now_ = 0;
+  double floor_;  ///< no gap has become less than this, but those that were found
+  double lost_ = std::numeric_limits<double>::infinity();
+  bool full_ = false;
+  std::uint32_t surface_pairs_ = 0;
+  ImpactFound found_;
+};
+
+}  // namespace ist

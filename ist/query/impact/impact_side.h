@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+
+#include "query/asset/sphere_tree.h"
+#include "query/asset/surface_tree.h"
+#include "query/base/relative_pose.h"
+
+namespace ist {
+
+/// A triangle or a point, and what it tells of the solid around it.
+struct ConvexPiece {
+  Eigen::Vector3d corner[3];
+  int corners = 1;    ///< 1 or 3
+  double beyond = 0;  ///< ≥ 0: what the solid has here lies within this of the piece
+  /// Of two points, one of the piece, the solid has one whose distance to the other is more by no
+  /// more than this; it is less where this is negative.
+  double behind = 0;
+};
+
+/// What of a solid is looked at while it moves, as a tree of balls: the triangles of the surface in
+/// its asset, or the cover balls of its inner spheres. Unit frame.
+///
+/// A node is named by a level and a number, as in SphereTree; at kSphereLevel it is one triangle or
+/// sphere, and the node of the top level is the whole.
+class ImpactSide {
+ public:
+  explicit ImpactSide(const TreeView& view) noexcept;
+
+  /// Null if the asset has none.
+  const SurfaceTree* surface() const noexcept { return surface_ ? &*surface_ : nullptr; }
+  double surface_error() const noexcept { return error_; }
+
+  int top() const noexcept { return surface_ ? surface_->top : spheres_.top; }
+
+  /// Nodes below a node, at most kWidth, whose numbers go on from kWidth · number.
+  std::uint32_t children(int level, std::uint32_t number) const noexcept;
+
+  /// A ball around all that the solid has at a node.
+  NodeBall ball(int level, std::uint32_t number) const noexcept;
+
+  /// Of a node of kSphereLevel.
+  ConvexPiece piece(std::uint32_t number) const noexcept;
+
+ private:
+  SphereTree spheres_;
+  std::optional<SurfaceTree> surface_;
+  double error_ = 0;  ///< of the surface
+};
+
+/// Whether something of B lies inside A's surface, where they do not meet: a node of B that the
+/// surface passes by, or a corner of one that it does not. `error`: of the surface, A's unit frame.
+bool holds_part(const SurfaceTree& a, const ImpactSide& b, const Similarity& a_from_b) noexcept;
+
+}  // namespace ist

@@ -1,0 +1,195 @@
+#include "query/impact/moving_frame.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <ist/asset_layout.h>
+
+namespace ist {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+// As far as poses may be apart, in sizes of A.
+constexpr double kFarthest = 1e60;
+
+// Of a straight way: a product, a sum and the rounded time.
+constexpr double kWayRounding = 6 * 0x1p-53;
+// Of what is turned: a polynomial's sine and the angle that it is of, three-term products and sums.
+constexpr double kTurnRounding = 32 * 0x1p-53;
+
+/// As queries take it.
+bool is_rotation(const Pose& pose) noexcept {
+  const double* const q = pose.q;
+  return std::abs(std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3])) - 1) <= 1e-3;
+}
+
+Quaterniond unit_rotation(const Pose& pose) noexcept {
+  const double* const q = pose.q;
+  const double norm = std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
+  return {q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm};
+}
+
+Vector3d translation(const Pose& pose) noexcept { return {pose.t[0], pose.t[1], pose.t[2]}; }
+
+/// [u] from the object's origin to its straight point, world.
+Vector3d lever(const Pose& pose, double scale, const Vector3d& about) noexcept {
+  return unit_rotation(pose) * (scale * about);
+}
+
+Pose moved(const Pose& start, double scale, const Motion& motion, double time) noexcept {
+  const Quaterniond rotation = Turning(unit_rotation(start), motion.angular_velocity).at(time);
+  const Vector3d place = translation(start) + lever(start, scale, motion.about) +
+                         motion.velocity * time - rotation * (scale * motion.about);
+  return {{rotation.w(), rotation.x(), rotation.y(), rotation.z()},
+          {place.x(), place.y(), place.z()}};
+}
+
+MovingBody body(const Pose& pose, double scale, const Motion& motion, const AssetHeader* asset,
+                double unit) noexcept {
+  MovingBody body;
+  body.turning = Turning(unit_rotation(pose), motion.angular_velocity);
+  body.spin = motion.angular_velocity;
+  body.centre = motion.about;
+  body.unit = scale / unit;
+  if (asset == nullptr) {
+    body.reach = body.unit * body.centre.norm();  // of its origin; the other body adds its distance
+    return body;
+  }
+  body.unit = std::ldexp(scale, asset->exponent) / unit;
+  for (int k = 0; k < 3; ++k)
+    body.centre[k] = std::ldexp(motion.about[k] - asset->centre[k], -asset->exponent);
+  const TreeHeader& tree = asset->inner_tree;
+  const Vector3d middle(tree.root[0], tree.root[1], tree.root[2]);
+  const double error = asset->field != 0 ? at<FieldHeader>(*asset, asset->field)->error : 0;
+  body.reach =
+      body.unit * ((middle - body.centre).norm() + std::max(tree.root[3], tree.root_cover) + error);
+  return body;
+}
+
+bool usable(const Motion& motion) noexcept {
+  return motion.velocity.allFinite() && motion.angular_velocity.allFinite() &&
+         motion.about.allFinite();
+}
+
+/// `asset_a`: null for a field that is no mesh.
+std::optional<MovingFrame> frame_of(const Pose& pose_a, double scale_a, const AssetHeader* asset_a,
+                                    const PlacedTree& b, const std::optional<RelativePose>& start,
+                                    const Motions& motions, double duration) noexcept {
+  if (!start || !usable(motions.a) || !usable(motions.b) || !(duration >= 0)) return std::nullopt;
+  MovingFrame frame;
+  frame.start = *start;
+  frame.unit = start->unit_a;
+  frame.a = body(pose_a, scale_a, motions.a, asset_a, frame.unit);
+  frame.b = body(b.pose, b.scale, motions.b, &b.tree.header(), frame.unit);
+  const Vector3d lever_a = lever(pose_a, scale_a, motions.a.about);
+  frame.between = ((translation(b.pose) - translation(pose_a)) +
+                   (lever(b.pose, b.scale, motions.b.about) - lever_a)) /
+                  frame.unit;
+  frame.velocity = (motions.b.velocity - motions.a.velocity) / frame.unit;
+  frame.world = translation(pose_a) + lever_a;
+  frame.drift = motions.a.velocity;
+  const double farthest =
+      frame.between.norm() + frame.velocity.norm() * duration + frame.a.reach + frame.b.reach;
+  const double angles = (frame.a.spin.norm() + frame.b.spin.norm()) * duration;
+  if (!(farthest <= kFarthest) || !(angles <= kFarthest)) return std::nullopt;
+  return frame;
+}
+
+}  // namespace
+
+SineCosine sine_cosine(double h) noexcept {
+  const double x = h * h;
+  double sine = 0, cosine = 0;
+  for (int n = 22; n >= 2; n -= 2) {
+    sine = (1 + sine) * -x / (n * (n + 1));
+    cosine = (1 + cosine) * -x / (n * (n - 1));
+  }
+  return {h + h * sine, 1 + cosine};
+}
+
+Turning::Turning(const Quaterniond& start, const Vector3d& angular_velocity) noexcept
+    : start_(start) {
+  const double speed = angular_velocity.stableNorm();
+  if (!(speed > 0)) return;
+  axis_ = angular_velocity / speed;
+  turns_ = speed / (2 * std::numbers::pi);
+}
+
+Quaterniond Turning::at(double time) const noexcept {
+  if (turns_ == 0) return start_;
+  const double turns = turns_ * time;
+  const SineCosine half = sine_cosine(std::numbers::pi * (turns - std::floor(turns + 0.5)));
+  const Vector3d v = half.sine * axis_;
+  return Quaterniond(half.cosine, v.x(), v.y(), v.z()) * start_;
+}
+
+Placement place(const MovingFrame& frame, double time) noexcept {
+  Placement at;
+  at.time = time;
+  at.a = frame.a.unit * frame.a.turning.at(time).toRotationMatrix();
+  at.b = frame.b.unit * frame.b.turning.at(time).toRotationMatrix();
+  at.between = frame.between + frame.velocity * time;
+  const double way = frame.between.norm() + frame.velocity.norm() * time;
+  // B's coordinates may be turned into A's frame too.
+  const double around_a = frame.a.reach + at.between.norm() + frame.b.reach;
+  at.error = kWayRounding * way + kTurnRounding * (around_a * (1 + frame.a.spin.norm() * time) +
+                                                   frame.b.reach * frame.b.spin.norm() * time);
+  return at;
+}
+
+std::optional<MovingFrame> moving_frame(const PlacedTree& a, const PlacedTree& b,
+                                        const Motions& motions, double duration) noexcept {
+  return frame_of(a.pose, a.scale, &a.tree.header(), b, relative_pose(a, b), motions, duration);
+}
+
+std::optional<MovingFrame> moving_frame(const PlacedField& a, const PlacedTree& b,
+                                        const Motions& motions, double duration) noexcept {
+  return frame_of(a.pose, a.scale, nullptr, b, relative_pose(a.pose, a.scale, b), motions,
+                  duration);
+}
+
+double safe_step(double gap, double rate, double bend) noexcept {
+  constexpr double kLess = 1 - 1e-12;
+  if (!(gap > 0)) return 0;
+  if (!(bend > 0)) return rate > 0 ? kLess * gap / rate : std::numeric_limits<double>::infinity();
+  const double root = std::sqrt(rate * rate + 2 * bend * gap);
+  return kLess * (rate >= 0 ? 2 * gap / (rate + root) : (root - rate) / bend);
+}
+
+Motion motion_between(const Pose& from, const Pose& to, double duration, const Vector3d& about,
+                      double scale) noexcept {
+  Motion motion;
+  motion.about = about;
+  if (!(duration > 0) || !is_rotation(from) || !is_rotation(to)) {
+    motion.velocity.setConstant(std::numeric_limits<double>::quiet_NaN());
+    return motion;
+  }
+  const Vector3d straight =
+      (translation(to) - translation(from)) + (lever(to, scale, about) - lever(from, scale, about));
+  motion.velocity = straight / duration;
+  Quaterniond turn = unit_rotation(to) * unit_rotation(from).conjugate();
+  if (turn.w() < 0) turn.coeffs() *= -1;
+  const double sine = turn.vec().norm();
+  if (!(sine > 0)) return motion;
+  // Half the angle, between 0 and π/2, by steps that triple its digits.
+  double half = sine * (std::numbers::pi / 2 - turn.w() * (std::numbers::pi / 2 - 1));
+  for (int i = 0; i < 4; ++i) {
+    const SineCosine at = sine_cosine(half);
+    half += sine * at.cosine - turn.w() * at.sine;
+  }
+  motion.angular_velocity = turn.vec() / sine * (2 * half / duration);
+  return motion;
+}
+
+PlacedTree moved(const PlacedTree& start, const Motion& motion, double time) noexcept {
+  return {start.tree, moved(start.pose, start.scale, motion, time), start.scale};
+}
+
+PlacedField moved(const PlacedField& start, const Motion& motion, double time) noexcept {
+  return {start.field, moved(start.pose, start.scale, motion, time), start.scale};
+}
+
+}  // namespace ist

@@ -1,0 +1,82 @@
+#include <ist/time_of_impact.h>
+
+#include "query/field/with_shape.h"
+#include "query/impact/field_search.h"
+#include "query/impact/pair_search.h"
+#include "query/probe/membership.h"
+
+namespace ist {
+namespace {
+
+// Of the smaller solid's bounding radius, where no tolerance is asked for.
+constexpr double kTolerance = 1e-3;
+
+TimeOfImpact refused() noexcept {
+  TimeOfImpact result;
+  result.status = ImpactStatus::invalid_input;
+  return result;
+}
+
+TimeOfImpact overlap() noexcept {
+  TimeOfImpact result;
+  result.status = ImpactStatus::overlapping;
+  return result;
+}
+
+/// Of the frame's lengths.
+double tolerance_of(const ImpactSettings& settings, double smaller, double unit) noexcept {
+  return settings.tolerance > 0 ? settings.tolerance / unit : kTolerance * smaller;
+}
+
+double bounding_radius(const PlacedTree& placed) noexcept {
+  return placed.tree.header().inner_tree.root[3];
+}
+
+/// Whether one solid holds a part of the other without their surfaces meeting there.
+bool hold(const ImpactSide& a, const ImpactSide& b, const RelativePose& pose) noexcept {
+  return (a.surface() != nullptr && holds_part(*a.surface(), b, pose.a_from_b)) ||
+         (b.surface() != nullptr && holds_part(*b.surface(), a, pose.b_from_a));
+}
+
+}  // namespace
+
+TimeOfImpact time_of_impact(const PlacedTree& a, const PlacedTree& b, const Motions& motions,
+                            const ImpactSettings& settings, Workspace& workspace) noexcept {
+  const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
+  if (!frame || workspace.impl() == nullptr) return refused();
+  const ImpactSide side_a(a.tree), side_b(b.tree);
+  if (hold(side_a, side_b, frame->start)) return overlap();
+  const double smaller =
+      std::min(bounding_radius(a) * frame->a.unit, bounding_radius(b) * frame->b.unit);
+  ImpactLoop loop(*frame, tolerance_of(settings, smaller, frame->unit), settings,
+                  *workspace.impl());
+  return PairSearch(*frame, side_a, side_b, loop).run();
+}
+
+TimeOfImpact time_of_impact(const PlacedField& a, const PlacedTree& b, const Motions& motions,
+                            const ImpactSettings& settings, Workspace& workspace) noexcept {
+  if (const MeshField* const mesh = std::get_if<MeshField>(&a.field)) {
+    if (!mesh->tree.has_field()) return refused();
+    return time_of_impact(PlacedTree{mesh->tree, a.pose, a.scale}, b, motions, settings, workspace);
+  }
+  const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
+  if (!frame || workspace.impl() == nullptr) return refused();
+  const ImpactSide side(b.tree);
+  const double tolerance = tolerance_of(settings, bounding_radius(b) * frame->b.unit, frame->unit);
+  return with_shape(
+      a.field,
+      [&]<class Shape>(Shape& shape) {
+        if constexpr (kConvex<Shape> && !std::is_same_v<Shape, HalfSpaceShape>) {
+          // All of it is inside B, if its middle is and the surfaces do not meet.
+          double middle[3];
+          frame->start.b_from_a.apply({0, 0, 0}, middle);
+          if (side.surface() != nullptr && inside_surface(*side.surface(), middle, 0))
+            return overlap();
+        }
+        ImpactLoop loop(*frame, tolerance, settings, *workspace.impl());
+        return FieldSearch<Shape>(shape, *frame, side, loop).run();
+      },
+      refused);
+}
+
+}  // namespace ist
