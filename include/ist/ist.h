@@ -108,6 +108,31 @@ typedef struct ist_tree_info {
 
 ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info);
 
+/* MassProperties: of a solid of density 1. Times a density: mass, and inertia of that mass. */
+typedef struct ist_mass_properties {
+  uint32_t size;
+  ist_status_t status;
+  double volume;               /* [u³] */
+  double centre_of_mass[3];    /* [u] */
+  double inertia[3][3];        /* [u⁵] about the centre of mass; symmetric */
+  double volume_error;         /* [u³] */
+  double centre_of_mass_error; /* [u] of each component */
+  double inertia_error;        /* [u⁵] of each entry */
+} ist_mass_properties_t;
+
+/* Bounds: what holds a solid. */
+typedef struct ist_bounds {
+  uint32_t size;
+  ist_status_t status;
+  double lower[3], upper[3]; /* [u] corners of the box along the axes */
+  double centre[3], radius;  /* [u] of a ball */
+} ist_bounds_t;
+
+/* In the asset's own frame. Stored by the bake: takes nanoseconds. */
+ist_status_t ist_tree_get_mass_properties(const ist_tree_t* tree,
+                                          ist_mass_properties_t* properties);
+ist_status_t ist_tree_get_bounds(const ist_tree_t* tree, ist_bounds_t* bounds);
+
 /* --- Places ----------------------------------------------------------------------------------- */
 
 /* x_world = R(q) x + t */
@@ -127,6 +152,11 @@ typedef struct ist_placed_tree {
   ist_pose_t pose;
   double scale; /* > 0; 0 is taken for 1 */
 } ist_placed_tree_t;
+
+/* In the world, axes and scale included. */
+ist_status_t ist_placed_mass_properties(const ist_placed_tree_t* placed,
+                                        ist_mass_properties_t* properties);
+ist_status_t ist_placed_bounds(const ist_placed_tree_t* placed, ist_bounds_t* bounds);
 
 /* --- Fields: solids without spheres (field.h). Distances are positive inside. ----------------- */
 
@@ -355,6 +385,100 @@ ist_status_t ist_field_contact_patches(const ist_placed_field_t* a, const ist_pl
                                        const ist_contact_settings_t* settings,
                                        ist_workspace_t* workspace, ist_contact_patches_t* patches,
                                        ist_penetration_t* whole);
+
+/* --- Wrenches (wrench.h): what a contact does to both bodies. They need no workspace. ----------
+ */
+
+/* Of a pressure of 1: −dV by the body's motion. */
+typedef struct ist_wrench {
+  double force[3];  /* [u²] out of the other body */
+  double torque[3]; /* [u³] about the point that was named */
+} ist_wrench_t;
+
+typedef struct ist_wrenches {
+  uint32_t size;
+  ist_wrench_t on_a, on_b;
+} ist_wrenches_t;
+
+/* A body's velocity. */
+typedef struct ist_twist {
+  double point[3];            /* [u] a point of the body, now */
+  double velocity[3];         /* [u/s] of that point */
+  double angular_velocity[3]; /* [rad/s] */
+} ist_twist_t;
+
+/* On A about `point_a`, on B about `point_b`; `b` is B's pose in the query. */
+ist_status_t ist_wrenches(const ist_penetration_t* contact, const ist_pose_t* b,
+                          const double point_a[3], const double point_b[3],
+                          ist_wrenches_t* wrenches);
+ist_status_t ist_patch_wrenches(const ist_contact_patch_t* patch, const ist_pose_t* b,
+                                const double point_a[3], const double point_b[3],
+                                ist_wrenches_t* wrenches);
+
+/* [u³/s] dV/dt while both move; a null twist is at rest. */
+ist_status_t ist_volume_rate(const ist_penetration_t* contact, const ist_pose_t* b,
+                             const ist_twist_t* motion_a, const ist_twist_t* motion_b,
+                             double* rate);
+ist_status_t ist_patch_volume_rate(const ist_contact_patch_t* patch, const ist_pose_t* b,
+                                   const ist_twist_t* motion_a, const ist_twist_t* motion_b,
+                                   double* rate);
+
+/* --- Time of impact (time_of_impact.h). [T] is a unit of time of the caller's own ------------- */
+
+/* Of constant velocity: one point goes straight on, and the object turns about it. */
+typedef struct ist_motion {
+  double velocity[3];         /* [u/T] of `about`, world */
+  double angular_velocity[3]; /* [rad/T] world */
+  double about[3];            /* [u] in the object's own frame, before its scale */
+} ist_motion_t;
+
+/* The motion from one pose to another in `duration` > 0 [T]. `about`: null is the origin.
+ * `scale`: the object's; 0 is taken for 1. */
+ist_status_t ist_motion_between(const ist_pose_t* from, const ist_pose_t* to, double duration,
+                                const double about[3], double scale, ist_motion_t* motion);
+
+/* Where an object of that scale is at a time of its motion. */
+ist_status_t ist_moved(const ist_pose_t* start, double scale, const ist_motion_t* motion,
+                       double time, ist_pose_t* pose);
+
+typedef int32_t ist_impact_kind_t;
+enum {
+  IST_NO_IMPACT = 0,         /* clear of each other over the whole interval */
+  IST_IMPACT = 1,            /* at `time` no further apart than the tolerance, and approaching */
+  IST_IMPACT_UNRESOLVED = 2, /* clear up to `time`; what comes then cannot be told so finely */
+  IST_IMPACT_OVERLAPPING = 3 /* they meet at the start */
+};
+
+/* ImpactSettings; a null pointer is a duration of 1 and defaults. */
+typedef struct ist_impact_settings {
+  uint32_t size;
+  uint32_t max_visits; /* count of pairs of nodes looked at; 0: any */
+  double duration;     /* [T] ≥ 0, as it stands: what happens in [0, duration] is asked */
+  double tolerance;    /* [u] 0: a thousandth of the smaller solid's bounding radius */
+  double deadline_us;  /* [µs] 0: none */
+} ist_impact_settings_t;
+
+/* TimeOfImpact */
+typedef struct ist_impact {
+  uint32_t size;
+  ist_status_t status; /* IST_BUDGET_EXHAUSTED: clear up to `time`, which a limit ended */
+  ist_impact_kind_t kind;
+  uint32_t node_visits, surface_pairs;
+  double time;                       /* [T] certified: the solids do not touch before */
+  double distance_min, distance_max; /* [u] the solids' distance then, certified */
+  double point_a[3], point_b[3];     /* [u] the nearest points then, world */
+  double normal[3];                  /* unit, from A to B, world */
+} ist_impact_t;
+
+/* Null motions are at rest. */
+ist_status_t ist_time_of_impact(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                const ist_motion_t* motion_a, const ist_motion_t* motion_b,
+                                const ist_impact_settings_t* settings, ist_workspace_t* workspace,
+                                ist_impact_t* answer);
+ist_status_t ist_field_time_of_impact(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                                      const ist_motion_t* motion_a, const ist_motion_t* motion_b,
+                                      const ist_impact_settings_t* settings,
+                                      ist_workspace_t* workspace, ist_impact_t* answer);
 
 /* --- Batches ---------------------------------------------------------------------------------- */
 

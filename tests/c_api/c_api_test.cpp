@@ -2,7 +2,10 @@
 #include <ist/bake.h>
 #include <ist/field.h>
 #include <ist/ist.h>
+#include <ist/mass_properties.h>
 #include <ist/query.h>
+#include <ist/time_of_impact.h>
+#include <ist/wrench.h>
 
 #include <bit>
 
@@ -148,6 +151,52 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
       expect_same(c_room[i].force, patches[i].force);
       expect_same(c_room[i].torque, patches[i].torque);
     }
+
+    const Eigen::Vector3d point(0.1, 0.2, 0.3);
+    auto c_wrenches = sized<ist_wrenches_t>();
+    ASSERT_EQ(ist_wrenches(&c_penetration, &c_b.pose, point.data(), point.data(), &c_wrenches),
+              IST_OK);
+    const Wrenches both_wrenches = wrenches(found.penetration, b.pose, point, point);
+    expect_same(c_wrenches.on_a.force, both_wrenches.on_a.force);
+    expect_same(c_wrenches.on_a.torque, both_wrenches.on_a.torque);
+    expect_same(c_wrenches.on_b.torque, both_wrenches.on_b.torque);
+
+    PlacedTree away = b;
+    away.pose.t[0] += 3;
+    ist_placed_tree_t c_away = placed_in_c(tree_b, away);
+    const Motion motion{{-6, 0.1, 0.2}, {0.5, 0.6, 0.7}, {0.01, 0.02, 0.03}};
+    const ist_motion_t c_motion = {{-6, 0.1, 0.2}, {0.5, 0.6, 0.7}, {0.01, 0.02, 0.03}};
+    const TimeOfImpact impact = time_of_impact(a, away, {{}, motion}, {}, workspace_);
+    auto c_impact = sized<ist_impact_t>();
+    ASSERT_GE(
+        ist_time_of_impact(&c_a, &c_away, nullptr, &c_motion, nullptr, &c_workspace_, &c_impact),
+        0);
+    EXPECT_EQ(c_impact.kind, static_cast<int>(impact.status));
+    EXPECT_SAME(c_impact.time, impact.time);
+    EXPECT_SAME(c_impact.distance_min, impact.distance_min);
+    EXPECT_SAME(c_impact.distance_max, impact.distance_max);
+    expect_same(c_impact.point_a, impact.point_a);
+    expect_same(c_impact.point_b, impact.point_b);
+    expect_same(c_impact.normal, impact.normal);
+    EXPECT_EQ(c_impact.node_visits, impact.node_visits);
+    EXPECT_EQ(c_impact.surface_pairs, impact.surface_pairs);
+
+    const MassProperties mass = mass_properties(b);
+    const Bounds box = bounds(b);
+    auto c_mass = sized<ist_mass_properties_t>();
+    auto c_box = sized<ist_bounds_t>();
+    ASSERT_EQ(ist_placed_mass_properties(&c_b, &c_mass), IST_OK);
+    ASSERT_EQ(ist_placed_bounds(&c_b, &c_box), IST_OK);
+    EXPECT_SAME(c_mass.volume, mass.volume);
+    EXPECT_SAME(c_mass.volume_error, mass.volume_error);
+    EXPECT_SAME(c_mass.centre_of_mass_error, mass.centre_of_mass_error);
+    EXPECT_SAME(c_mass.inertia_error, mass.inertia_error);
+    expect_same(c_mass.centre_of_mass, mass.centre_of_mass);
+    for (int k = 0; k < 3; ++k) expect_same(c_mass.inertia[k], mass.inertia.row(k).transpose());
+    expect_same(c_box.lower, box.lower);
+    expect_same(c_box.upper, box.upper);
+    expect_same(c_box.centre, box.centre);
+    EXPECT_SAME(c_box.radius, box.radius);
     ++answered;
   }
   EXPECT_GT(answered, 20);

@@ -2,39 +2,11 @@
 #include <span>
 
 #include "query/base/batch.h"
+#include "query/c_api/ask.h"
 #include "query/c_api/structs.h"
 
 namespace ist::c_api {
 namespace {
-
-/// What stands for the first solid of a query: a tree or a field.
-struct TreeArgument {
-  ist_status_t read(const ist_placed_tree_t* given) noexcept { return c_api::read(given, tree); }
-  const PlacedTree& placed() const noexcept { return tree; }
-  PlacedTree tree;
-};
-TreeArgument argument_for(const ist_placed_tree_t*) noexcept { return {}; }
-FieldArgument argument_for(const ist_placed_field_t*) noexcept { return {}; }
-
-/// Reads what every query has, then runs `ask(a, b, workspace)`, which returns its status.
-template <class Solid, class Ask>
-ist_status_t ask_about(const Solid* a, const ist_placed_tree_t* b, ist_workspace_t* workspace,
-                       const Ask& ask) noexcept {
-  auto first = argument_for(a);
-  PlacedTree second;
-  ist_status_t status = first.read(a);
-  if (status == IST_OK) status = read(b, second);
-  if (status != IST_OK) return status;
-  Workspace* const scratch = workspace_of(workspace, status);
-  return scratch == nullptr ? status : ask(first.placed(), second, *scratch);
-}
-
-/// Notes an error in an answer, which is all zero else.
-template <class Answer>
-ist_status_t noted(ist_status_t status, Answer& answer) noexcept {
-  answer.status = status;
-  return status;
-}
 
 template <class Solid>
 ist_status_t find_penetration(const Solid* a, const ist_placed_tree_t* b,
