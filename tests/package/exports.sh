@@ -8,7 +8,7 @@ text=$(cat "$headers"/*.h)
 declared() { printf '%s\n' "$text" | grep -qE "$1"; }
 
 for library; do
-  names=$(nm -D --defined-only -C "$library" | sed 's/^[0-9a-f]* *[A-Za-z] //; s/\[abi:[a-z0-9]*\]//')
+  names=$(nm -D --defined-only -C "$library" | sed 's/^[0-9a-f]* *[A-Za-z] //; s/\[abi:[a-z0-9]*\]//; s/^[a-z]* ist::/ist::/')
   others=$(printf '%s\n' "$names" | sed -E 's/^(typeinfo name|typeinfo|vtable) for //' |
     while read -r name; do
       scope=${name%%(*}
