@@ -8,6 +8,7 @@
 
 #include <ist/field.h>
 #include <ist/ist.h>
+#include <ist/overlap.h>
 #include <ist/query.h>
 
 #include "report.h"
@@ -126,7 +127,20 @@ int main(int argc, char** argv) {
                              ist_separation(&a, &b, nullptr, &c_workspace, &answer);
                              sum -= bits(answer.distance);
                            }));
-    // The cheapest query there is: a half-space that cuts off a little.
+    note("overlap", measure(
+                        rows.size(), rounds,
+                        [&](std::size_t i) {
+                          sum +=
+                              static_cast<std::uint64_t>(overlap(rows[i].a, rows[i].b, workspace));
+                        },
+                        [&](std::size_t i) {
+                          const ist_placed_tree_t a = in_c(rows[i].tree_a, rows[i].a);
+                          const ist_placed_tree_t b = in_c(rows[i].tree_b, rows[i].b);
+                          ist_overlapping_t answer;
+                          ist_overlap(&a, &b, &c_workspace, &answer);
+                          sum -= static_cast<std::uint64_t>(answer);
+                        }));
+    // A field: what is asked is made anew each time, as of the trees.
     note("half-space", measure(
                            rows.size(), rounds,
                            [&](std::size_t i) {

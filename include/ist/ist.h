@@ -353,6 +353,30 @@ ist_status_t ist_separation(const ist_placed_tree_t* a, const ist_placed_tree_t*
                             const ist_separation_settings_t* settings, ist_workspace_t* workspace,
                             ist_separation_t* answer);
 
+/* Whether two placed solids share a point (overlap.h). Yes and no are certain. */
+typedef int32_t ist_overlapping_t;
+enum { IST_OVERLAP_NO = 0, IST_OVERLAP_YES = 1, IST_OVERLAP_UNKNOWN = 2 };
+
+/* A fraction of what a penetration takes. On an error, and for invalid input: unknown. */
+ist_status_t ist_overlap(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                         ist_workspace_t* workspace, ist_overlapping_t* answer);
+
+/* PairFit: how two assets suit each other, whatever their poses. */
+typedef struct ist_pair_fit {
+  uint32_t size;
+  ist_status_t status;
+  double grain_a, grain_b; /* [u] what is finer than that, the spheres do not know */
+  double ratio;            /* ≥ 1, of the coarser grain over the finer */
+  uint32_t a_is_coarser;   /* 0 or 1, as are the others */
+  uint32_t has_surface;    /* the coarser asset holds its surface */
+  uint32_t needs_surface;  /* volumes and forces by spheres alone mislead */
+  uint32_t fits;           /* has_surface or not needs_surface */
+} ist_pair_fit_t;
+
+/* Needs no workspace: takes nanoseconds. */
+ist_status_t ist_get_pair_fit(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                              ist_pair_fit_t* fit);
+
 /* Both in one call. Returns the worse status: the more negative one, or else the larger. */
 ist_status_t ist_query(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
                        const ist_penetration_settings_t* penetration_settings,
@@ -374,6 +398,9 @@ ist_status_t ist_field_penetration(const ist_placed_field_t* a, const ist_placed
 ist_status_t ist_field_separation(const ist_placed_field_t* a, const ist_placed_tree_t* b,
                                   const ist_separation_settings_t* settings,
                                   ist_workspace_t* workspace, ist_separation_t* answer);
+
+ist_status_t ist_field_overlap(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                               ist_workspace_t* workspace, ist_overlapping_t* answer);
 
 ist_status_t ist_field_query(const ist_placed_field_t* a, const ist_placed_tree_t* b,
                              const ist_penetration_settings_t* penetration_settings,

@@ -1,11 +1,13 @@
 #include <optional>
 
 #include <ist/field.h>
+#include <ist/overlap.h>
 
 #include "query/base/batch.h"
 #include "query/contact/write_patches.h"
 #include "query/field/field_descent.h"
 #include "query/field/gap_search.h"
+#include "query/field/meeting_search.h"
 #include "query/field/mesh_shape.h"
 #include "query/field/surface_descent.h"
 #include "query/field/with_shape.h"
@@ -84,6 +86,20 @@ Separation separation(const PlacedField& a, const PlacedTree& b, const Separatio
     return search(shape);
   }
   return with_shape(a.field, search, refused);
+}
+
+Overlapping overlap(const PlacedField& a, const PlacedTree& b, Workspace& workspace) noexcept {
+  const std::optional<RelativePose> pose = pose_of(a, b);
+  if (!pose || workspace.impl() == nullptr) return Overlapping::unknown;
+  const SphereTree tree = sphere_tree(b.tree, Measure::inner);
+  const auto search = [&](auto& shape) {
+    return FieldMeetingSearch(shape, tree, *pose, *workspace.impl()).run();
+  };
+  if (const MeshField* const mesh = mesh_of(a)) {
+    MeshShape shape(*mesh);
+    return search(shape);
+  }
+  return with_shape(a.field, search, [] { return Overlapping::unknown; });
 }
 
 PenetrationAndSeparation query(const PlacedField& a, const PlacedTree& b,

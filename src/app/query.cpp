@@ -1,6 +1,7 @@
 #include <ist/field.h>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
@@ -9,6 +10,7 @@
 
 #include <ist/bake.h>
 #include <ist/error.h>
+#include <ist/pair_fit.h>
 
 #include "app/commands.h"
 #include "app/field_spec.h"
@@ -131,6 +133,23 @@ void require_surface(const std::string& path, const TreeView& tree) {
                 "or ask with --field auto");
 }
 
+/// Says once on stderr where spheres alone are asked for what they cannot tell.
+void warn_of_misfit(const TreeView& a, const TreeView& b, const std::vector<PoseRow>& rows,
+                    const QueryOptions& options) {
+  const PenetrationSettings& settings = options.settings.penetration;
+  if (settings.measure == Measure::inner || settings.field != FieldUse::automatic) return;
+  for (const PoseRow& row : rows) {
+    const PairFit fit = pair_fit({a, {}, 1}, {b, {}, row.scale_b});
+    if (fit.fits()) continue;
+    spdlog::warn(
+        "the spheres of {} are {:.2g} times as coarse as those of {}, and it "
+        "holds no field: volumes and forces may be far off. Bake it again with a field",
+        fit.a_is_coarser ? options.a : options.asset_b, fit.ratio,
+        fit.a_is_coarser ? options.asset_b : options.a);
+    return;
+  }
+}
+
 std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions& options) {
   if (is_field_spec(options.a)) {
     const Asset b = Asset::load(options.asset_b);
@@ -142,6 +161,7 @@ std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions&
     require_surface(options.a, a.view());
     require_surface(options.asset_b, b.view());
   }
+  warn_of_misfit(a.view(), b.view(), rows, options);
   return answer(PlacedTree{a.view(), {}, 1}, b.view(), rows, options);
 }
 

@@ -3,6 +3,7 @@
 #include <ist/field.h>
 #include <ist/ist.h>
 #include <ist/mass_properties.h>
+#include <ist/overlap.h>
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
 #include <ist/wrench.h>
@@ -180,6 +181,10 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
     expect_same(c_impact.normal, impact.normal);
     EXPECT_EQ(c_impact.node_visits, impact.node_visits);
     EXPECT_EQ(c_impact.surface_pairs, impact.surface_pairs);
+
+    ist_overlapping_t c_overlap;
+    ASSERT_EQ(ist_overlap(&c_a, &c_b, &c_workspace_, &c_overlap), IST_OK);
+    EXPECT_EQ(c_overlap, static_cast<int>(overlap(a, b, workspace_)));
 
     const MassProperties mass = mass_properties(b);
     const Bounds box = bounds(b);

@@ -295,6 +295,41 @@ static int separations_answer(scene_t* s) {
   return 0;
 }
 
+static int overlaps_answer(scene_t* s) {
+  ist_overlapping_t answer = 77;
+  ist_pair_fit_t fit = {.size = sizeof fit};
+  ist_field_t field = {.size = sizeof field, .kind = IST_HALF_SPACE};
+  ist_placed_field_t floor = {.size = sizeof floor, .field = &field, .pose = s->a.pose};
+  ist_placed_tree_t far_away = s->b;
+  ist_workspace_t none = {0};
+  field.as.half_space.normal[0] = 1;
+  far_away.pose.t[0] = 20;
+  CHECK(ist_overlap(&s->a, &s->b, &s->workspace, &answer) == IST_OK && answer == IST_OVERLAP_YES);
+  CHECK(ist_overlap(&s->a, &far_away, &s->workspace, &answer) == IST_OK);
+  CHECK(answer == IST_OVERLAP_NO);
+  CHECK(ist_field_overlap(&floor, &s->b, &s->workspace, &answer) == IST_OK);
+  CHECK(answer == IST_OVERLAP_YES);
+  CHECK(ist_field_overlap(&floor, &far_away, &s->workspace, &answer) == IST_OK);
+  CHECK(answer == IST_OVERLAP_NO);
+  CHECK(ist_overlap(NULL, &s->b, &s->workspace, &answer) == IST_NULL_POINTER);
+  CHECK(answer == IST_OVERLAP_UNKNOWN);
+  CHECK(ist_overlap(&s->a, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
+  CHECK(ist_overlap(&s->a, &s->b, NULL, &answer) == IST_NULL_POINTER);
+  CHECK(ist_overlap(&s->a, &s->b, &none, &answer) == IST_NO_HANDLE);
+  CHECK(ist_overlap(&s->a, &s->b, &s->workspace, NULL) == IST_NULL_POINTER);
+  CHECK(ist_field_overlap(NULL, &s->b, &s->workspace, &answer) == IST_NULL_POINTER);
+  CHECK(ist_field_overlap(&floor, &s->b, &s->workspace, NULL) == IST_NULL_POINTER);
+
+  CHECK(ist_get_pair_fit(&s->a, &s->b, &fit) == IST_OK && fit.ratio >= 1 && fit.grain_a > 0);
+  CHECK(ist_get_pair_fit(NULL, &s->b, &fit) == IST_NULL_POINTER);
+  CHECK(is_empty(&fit, sizeof fit, IST_NULL_POINTER));
+  CHECK(ist_get_pair_fit(&s->a, NULL, &fit) == IST_NULL_POINTER);
+  CHECK(ist_get_pair_fit(&s->a, &s->b, NULL) == IST_NULL_POINTER);
+  fit.size = 0;
+  CHECK(ist_get_pair_fit(&s->a, &s->b, &fit) == IST_WRONG_SIZE);
+  return 0;
+}
+
 static int patches_answer(scene_t* s) {
   ist_contact_patch_t room[8];
   ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
@@ -701,7 +736,8 @@ int c_api_checks(const char* path_a, const char* path_b) {
       trees_are_checked(path_a) != 0 || make_scene(&scene, path_a, path_b) != 0)
     return 1;
   return penetrations_answer(&scene) != 0 || separations_answer(&scene) != 0 ||
-         patches_answer(&scene) != 0 || fields_answer(&scene) != 0 ||
-         bodies_are_told(&scene) != 0 || impacts_are_found(&scene) != 0 ||
-         batches_answer(&scene) != 0 || released_handles_are_known(&scene) != 0;
+         overlaps_answer(&scene) != 0 || patches_answer(&scene) != 0 ||
+         fields_answer(&scene) != 0 || bodies_are_told(&scene) != 0 ||
+         impacts_are_found(&scene) != 0 || batches_answer(&scene) != 0 ||
+         released_handles_are_known(&scene) != 0;
 }

@@ -154,4 +154,31 @@ TEST_F(FieldQuery, SettingsThatHaveNoEffectAreRefused) {
               "bare.ist: holds no field");
 }
 
+/// Once, and only where the coarser one could have had a surface.
+TEST_F(FieldQuery, WarnsOfSpheresThatDoNotFit) {
+  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "100", "--no-field"}).exit_code,
+            0);
+  const std::vector<std::string> asked = {"query", "bare.ist", "cube.ist", "--pose", kAtOrigin};
+  const auto warnings = [&](std::vector<std::string> arguments,
+                            const std::vector<std::string>& more) {
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = ist(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    std::size_t count = 0;
+    for (std::size_t at = outcome.err.find("warning"); at != std::string::npos;
+         at = outcome.err.find("warning", at + 1))
+      ++count;
+    return count;
+  };
+  EXPECT_EQ(warnings(asked, {}), 0u);
+  EXPECT_EQ(warnings(asked, {"--scale-b", "0.3"}), 0u);
+  EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--repeat", "3"}), 1u);
+  EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--field", "never"}), 0u);
+  EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--measure", "inner"}), 0u);
+  EXPECT_EQ(warnings(asked, {"--scale-b", "5"}), 0u);  // the coarser one has a field
+  EXPECT_NE(ist({"query", "bare.ist", "cube.ist", "--pose", kAtOrigin, "--scale-b", "0.1"})
+                .err.find("the spheres of bare.ist are 10 times as coarse"),
+            std::string::npos);
+}
+
 }  // namespace

@@ -4,6 +4,7 @@
 #include <ist/bake.h>
 #include <ist/field.h>
 #include <ist/ist.h>
+#include <ist/overlap.h>
 #include <ist/query.h>
 
 #include <bit>
@@ -28,6 +29,7 @@ class RealTime : public ::testing::Test {
     const PlacedTree b{b_.view(), poses_b_[i], i % 3 == 0 ? 0.01 : 1.0};
     volume_[i] = penetration(a, b, settings, workspaces_[0]).volume;
     separation(a, b, testing::for_separation(settings), workspaces_[0]);
+    overlap(a, b, workspaces_[0]);
     query(a, b, testing::for_both(settings), workspaces_[0]);
     contact_patches(a, b, testing::for_contacts(settings), workspaces_[0], patches_);
     const PlacedPair pairs[] = {{a, b}, {b, a}};

@@ -1,4 +1,5 @@
 #include <ist/mass_properties.h>
+#include <ist/pair_fit.h>
 #include <ist/wrench.h>
 
 #include "query/base/relative_pose.h"
@@ -148,4 +149,24 @@ ist_status_t ist_patch_volume_rate(const ist_contact_patch_t* patch, const ist_p
                                    const ist_twist_t* motion_a, const ist_twist_t* motion_b,
                                    double* rate) {
   return find_rate(patch, b, motion_a, motion_b, rate);
+}
+
+ist_status_t ist_get_pair_fit(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                              ist_pair_fit_t* fit) {
+  ist_status_t status = clear(fit);
+  if (status != IST_OK) return status;
+  ist::PlacedTree first, second;
+  status = read_usable(a, first);
+  if (status == IST_OK) status = read_usable(b, second);
+  fit->status = status;
+  if (status != IST_OK) return status;
+  const ist::PairFit found = ist::pair_fit(first, second);
+  fit->grain_a = found.grain_a;
+  fit->grain_b = found.grain_b;
+  fit->ratio = found.ratio;
+  fit->a_is_coarser = found.a_is_coarser ? 1 : 0;
+  fit->has_surface = found.has_surface ? 1 : 0;
+  fit->needs_surface = found.needs_surface ? 1 : 0;
+  fit->fits = found.fits() ? 1 : 0;
+  return IST_OK;
 }

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <span>
 
+#include <ist/overlap.h>
+
 #include "query/base/batch.h"
 #include "query/c_api/ask.h"
 #include "query/c_api/structs.h"
@@ -43,6 +45,18 @@ ist_status_t find_separation(const Solid* a, const ist_placed_tree_t* b,
 /// The worse of two.
 ist_status_t worse(ist_status_t a, ist_status_t b) noexcept {
   return std::min(a, b) < 0 ? std::min(a, b) : std::max(a, b);
+}
+
+template <class Solid>
+ist_status_t find_overlap(const Solid* a, const ist_placed_tree_t* b, ist_workspace_t* workspace,
+                          ist_overlapping_t* answer) noexcept {
+  static_assert(IST_OVERLAP_UNKNOWN == static_cast<int>(Overlapping::unknown));
+  if (answer == nullptr) return IST_NULL_POINTER;
+  *answer = IST_OVERLAP_UNKNOWN;
+  return ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
+    *answer = static_cast<ist_overlapping_t>(overlap(x, y, scratch));
+    return ist_status_t{IST_OK};
+  });
 }
 
 template <class Solid>
@@ -164,6 +178,16 @@ ist_status_t ist_field_separation(const ist_placed_field_t* a, const ist_placed_
                                   const ist_separation_settings_t* settings,
                                   ist_workspace_t* workspace, ist_separation_t* answer) {
   return find_separation(a, b, settings, workspace, answer);
+}
+
+ist_status_t ist_overlap(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                         ist_workspace_t* workspace, ist_overlapping_t* answer) {
+  return find_overlap(a, b, workspace, answer);
+}
+
+ist_status_t ist_field_overlap(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                               ist_workspace_t* workspace, ist_overlapping_t* answer) {
+  return find_overlap(a, b, workspace, answer);
 }
 
 ist_status_t ist_query(const ist_placed_tree_t* a, const ist_placed_tree_t* b,

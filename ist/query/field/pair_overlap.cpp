@@ -1,5 +1,7 @@
 #include "query/field/pair_overlap.h"
 
+#include <ist/pair_fit.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
@@ -89,6 +91,22 @@ PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const Plac
       worth * kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) / (1 - unlike);
   method.none = kHandover * method.full;
   return method;
+}
+
+PairFit pair_fit(const PlacedTree& a, const PlacedTree& b) noexcept {
+  PairFit fit;
+  if (a.tree.empty() || b.tree.empty() || !(a.scale > 0) || !(b.scale > 0)) return fit;
+  const auto placed_grain = [](const PlacedTree& placed) {
+    const AssetHeader& header = placed.tree.header();
+    return std::ldexp(placed.scale * grain(header.matched_tree, header), header.exponent);
+  };
+  fit.grain_a = placed_grain(a);
+  fit.grain_b = placed_grain(b);
+  fit.a_is_coarser = fit.grain_b <= fit.grain_a;
+  fit.ratio = std::max(fit.grain_a, fit.grain_b) / std::min(fit.grain_a, fit.grain_b);
+  fit.has_surface = (fit.a_is_coarser ? a : b).tree.has_field();
+  fit.needs_surface = fit.ratio >= kUnlike;
+  return fit;
 }
 
 namespace {

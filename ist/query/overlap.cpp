@@ -1,0 +1,119 @@
+#include <ist/overlap.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "query/asset/sphere_tree.h"
+#include "query/base/precision.h"
+#include "query/base/relative_pose.h"
+#include "query/descent/open_runs.h"
+#include "query/kernel/gap_kernel.h"
+
+namespace ist {
+namespace {
+
+/// Best first: the pair of nodes whose balls share most, for their size, is opened next. All in A's
+/// unit frame.
+class MeetingSearch {
+ public:
+  MeetingSearch(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
+                Workspace::Impl& scratch)
+      : a_(a),
+        b_(b),
+        a_side_(a, b, pose.a_from_b),
+        b_side_(b, a, pose.b_from_a),
+        scale_(pose.a_from_b.scale),
+        precision_(precision_for_gap(a, b, pose)),
+        waiting_(scratch) {
+    const double length = span(a, b, pose);
+    error_ = distance_error(precision_, length) + distance_error(Precision::float64, length) +
+             1e-15 * pose.unit_origin_a.norm() / pose.unit_a;
+  }
+
+  Overlapping run() {
+    NodePair pair{0, 0, a_.top, b_.top};
+    if (root_cover_gap() > error_) return Overlapping::no;
+    do {
+      if (!waiting_.grant()) return Overlapping::unknown;
+      if (pair.level_a == 0 && pair.level_b == 0) {
+        const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, error_, cover_limit(), precision_);
+        if (leaf.gap < -error_) return Overlapping::yes;
+        covers_meet_ |= leaf.cover <= error_;
+      } else {
+        open(pair);
+      }
+    } while (waiting_.take_best(covers_meet_, pair));
+    return covers_meet_ ? Overlapping::unknown : Overlapping::no;
+  }
+
+ private:
+  /// Covers are looked at until some meet: from then on the answer is not `no`.
+  double cover_limit() const {
+    return covers_meet_ ? -std::numeric_limits<double>::infinity() : error_;
+  }
+
+  double root_cover_gap() const {
+    const NodeBall ball = b_.ball(b_.top, 0);
+    double moved[3];
+    a_side_.x_from_y->apply(ball.centre, moved);
+    double squares = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double d = moved[k] - a_.header->root[k];
+      squares += d * d;
+    }
+    return std::sqrt(squares) - a_.header->root_cover - scale_ * b_.header->root_cover;
+  }
+
+  void open(const NodePair& pair) {
+    const double radius_a = a_.ball(pair.level_a, pair.a).r;
+    const double radius_b = scale_ * b_.ball(pair.level_b, pair.b).r;
+    const bool open_a = pair.level_b == 0 || (pair.level_a > 0 && radius_a >= radius_b);
+    // Of the side that is opened, in that side's unit frame.
+    const GapSide& side = open_a ? a_side_ : b_side_;
+    const int level = open_a ? pair.level_a : pair.level_b;
+    const std::uint32_t block = open_a ? pair.a : pair.b;
+    const double unit = open_a ? 1 : scale_;
+    const double still = (open_a ? radius_b : radius_a) / unit;
+    ChildGaps gaps;
+    child_gaps(side, level, block, open_a ? pair.level_b : pair.level_a, open_a ? pair.b : pair.a,
+               error_ / unit, cover_limit() / unit, precision_, gaps);
+    const std::uint32_t below = side.x->count(level - 1) - kWidth * block;
+    const std::uint32_t used = (1u << std::min(kWidth, below)) - 1;
+    const float* radii = side.x->level[level].blocks[block].r;
+    waiting_.start(pair, open_a);
+    for (std::uint32_t left = gaps.near & used; left != 0; left &= left - 1) {
+      const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
+      if (unit * gaps.gap[lane] <= error_) {
+        // Distance over the sum of radii.
+        waiting_.add(lane, 1 + gaps.gap[lane] / (radii[lane] + still), true);
+      } else if (!covers_meet_ && unit * gaps.cover[lane] <= error_) {
+        waiting_.add(lane, unit * gaps.cover[lane], false);
+      }
+    }
+    waiting_.finish();
+  }
+
+  const SphereTree& a_;
+  const SphereTree& b_;
+  const GapSide a_side_, b_side_;
+  const double scale_;
+  const Precision precision_;
+  double error_;  ///< of a gap, by rounding
+  OpenRuns waiting_;
+  bool covers_meet_ = false;
+};
+
+}  // namespace
+
+Overlapping overlap(const PlacedTree& a, const PlacedTree& b, Workspace& workspace) noexcept {
+  const std::optional<RelativePose> pose = relative_pose(a, b);
+  if (!pose || workspace.impl() == nullptr) return Overlapping::unknown;
+  const SphereTree tree_a = sphere_tree(a.tree, Measure::inner);
+  const SphereTree tree_b = sphere_tree(b.tree, Measure::inner);
+  return MeetingSearch(tree_a, tree_b, *pose, *workspace.impl()).run();
+}
+
+}  // namespace ist

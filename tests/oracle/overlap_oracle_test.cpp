@@ -1,0 +1,33 @@
+#include <gtest/gtest.h>
+#include <ist/overlap.h>
+
+#include "support/oracle_assets.h"
+#include "support/oracle_rows.h"
+
+namespace ist {
+namespace {
+
+/// Never yes where the exact volume is 0, never no where it is not; and seldom unknown.
+TEST(OverlapOracle, IsNeverWrong) {
+  IST_NEEDS_SHARED("oracle/poses");
+  Workspace workspace;
+  for (const std::string key : {"eledino", "ico1k"}) {
+    int unknown = 0, rows = 0;
+    for (const testing::OracleRow& row : testing::read_oracle_rows(key)) {
+      const auto [a, b] = testing::placed(row, 2000);
+      const Overlapping answer = overlap(a, b, workspace);
+      EXPECT_NE(answer, row.volume > 0 ? Overlapping::no : Overlapping::yes)
+          << key << " " << row.id;
+      unknown += answer == Overlapping::unknown;
+      ++rows;
+      // The surface of A and the spheres of B are as sure.
+      const Overlapping by_field = overlap(PlacedField{MeshField{a.tree}, {}}, b, workspace);
+      EXPECT_NE(by_field, row.volume > 0 ? Overlapping::no : Overlapping::yes)
+          << key << " " << row.id;
+    }
+    EXPECT_LE(unknown, rows / 20) << key;
+  }
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,68 @@
+#include <gtest/gtest.h>
+#include <ist/bake.h>
+#include <ist/pair_fit.h>
+
+#include <limits>
+
+#include "support/float_traps.h"
+#include "support/random_assets.h"
+#include "support/test_meshes.h"
+
+namespace ist {
+namespace {
+
+Asset cube(bool with_field) {
+  PackingSettings settings;
+  settings.max_spheres = 200;
+  settings.field.wanted = with_field;
+  return bake(close_mesh(testing::cube_mesh(), "cube"), settings);
+}
+
+/// What is said of a pair is how the pair is asked.
+TEST(PairFit, TellsWhatIsAskedOfAPair) {
+  Workspace workspace;
+  const Asset bare = cube(false), whole = cube(true);
+  for (const Asset* large : {&bare, &whole})
+    for (const double ratio : {1.0, 1.2, 3.9, 4.1, 30.0})
+      for (const bool turned : {false, true}) {
+        const Pose near = {{0.6, 0, 0.8, 0}, {0.5, 0.1, 0.4 / ratio}};
+        const PlacedTree a{large->view(), {}, 3}, b{whole.view(), near, 3 / ratio};
+        const PlacedTree &first = turned ? b : a, &second = turned ? a : b;
+        const PairFit fit = pair_fit(first, second);
+        EXPECT_NEAR(fit.ratio, ratio, 1e-12 * ratio);
+        EXPECT_GT(fit.grain_a, 0);
+        EXPECT_EQ(fit.needs_surface, ratio > 4);
+        if (ratio > 1) {
+          EXPECT_EQ(fit.a_is_coarser, !turned);
+          EXPECT_EQ(fit.has_surface, large == &whole);
+        }
+        const auto volume = [&](FieldUse use) {
+          PenetrationSettings settings;
+          settings.field = use;
+          return penetration(first, second, settings, workspace).volume;
+        };
+        ASSERT_GT(volume(FieldUse::never), 0);
+        if (fit.needs_surface && fit.has_surface) {
+          EXPECT_EQ(volume(FieldUse::automatic), volume(FieldUse::always));
+        } else if (!fit.fits()) {
+          EXPECT_EQ(volume(FieldUse::automatic), volume(FieldUse::never));
+        }
+      }
+}
+
+TEST(PairFit, SaysNothingOfNothing) {
+  const testing::NoFloatTraps with_nan;
+  const Asset asset = testing::make_random_asset({40, 0.2, {}, 0}, 1);
+  const PlacedTree sound{asset.view(), {}, 1};
+  PlacedTree wrong = sound;
+  for (const double scale : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    wrong.scale = scale;
+    EXPECT_TRUE(pair_fit(sound, wrong).fits());
+  }
+  EXPECT_TRUE(pair_fit(sound, PlacedTree()).fits());
+  wrong.scale = 10;
+  EXPECT_FALSE(pair_fit(sound, wrong).fits());
+}
+
+}  // namespace
+}  // namespace ist
