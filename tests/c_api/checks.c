@@ -39,7 +39,7 @@ typedef struct counted {
 static void* take(void* context, size_t bytes, size_t alignment) {
   counted_t* counted = (counted_t*)context;
   void* memory;
-  if (counted->blocks_left == 0) return NULL;
+  if (counted->blocks_left == 0 || bytes > (size_t)1 << 40) return NULL;
   --counted->blocks_left;
   memory = aligned_alloc(alignment < sizeof(void*) ? sizeof(void*) : alignment,
                          (bytes + 4095) / 4096 * 4096);
@@ -82,7 +82,9 @@ static int memory_is_the_callers(const char* path) {
   CHECK(ist_tree_load(path, &allocator, &tree) == IST_NO_MEMORY);
   CHECK(ist_tree_release(&tree) == IST_NO_HANDLE);
   CHECK(ist_workspace_make(SIZE_MAX, NULL, &workspace) == IST_NO_MEMORY);
-  CHECK(ist_workspace_make(SIZE_MAX / 16, NULL, &workspace) == IST_NO_MEMORY);
+  counted.blocks_left = 1000;
+  CHECK(ist_workspace_make(SIZE_MAX / 16, &allocator, &workspace) == IST_NO_MEMORY);
+  CHECK(counted.taken == counted.given_back);
 
   allocator.release = NULL;
   CHECK(ist_tree_load(path, &allocator, &tree) == IST_NULL_POINTER);
