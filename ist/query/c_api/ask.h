@@ -28,10 +28,15 @@ ist_status_t ask_about(const Solid* a, const ist_placed_tree_t* b, ist_workspace
   return scratch == nullptr ? status : ask(first.placed(), second, *scratch);
 }
 
-/// Notes an error in an answer, which is all zero else.
+/// An answer's status. On an error the answer is all zero else; what is written anyway is not
+/// cleared before, which would cost more than all else here.
 template <class Answer>
 ist_status_t noted(ist_status_t status, Answer& answer) noexcept {
-  answer.status = status;
+  if (status < 0) {
+    answer = Answer{};
+    answer.size = sizeof(Answer);
+    answer.status = status;
+  }
   return status;
 }
 

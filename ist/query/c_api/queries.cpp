@@ -14,7 +14,7 @@ template <class Solid>
 ist_status_t find_penetration(const Solid* a, const ist_placed_tree_t* b,
                               const ist_penetration_settings_t* given, ist_workspace_t* workspace,
                               ist_penetration_t* answer) noexcept {
-  ist_status_t status = clear(answer);
+  ist_status_t status = check_size(answer);
   if (status != IST_OK) return status;
   PenetrationSettings settings;
   status = read(given, settings);
@@ -30,7 +30,7 @@ template <class Solid>
 ist_status_t find_separation(const Solid* a, const ist_placed_tree_t* b,
                              const ist_separation_settings_t* given, ist_workspace_t* workspace,
                              ist_separation_t* answer) noexcept {
-  ist_status_t status = clear(answer);
+  ist_status_t status = check_size(answer);
   if (status != IST_OK) return status;
   SeparationSettings settings;
   status = read(given, settings);
@@ -64,7 +64,7 @@ ist_status_t find_both(const Solid* a, const ist_placed_tree_t* b,
                        const ist_penetration_settings_t* for_penetration,
                        const ist_separation_settings_t* for_separation, ist_workspace_t* workspace,
                        ist_penetration_t* penetration, ist_separation_t* separation) noexcept {
-  const ist_status_t room = clear(penetration), other_room = clear(separation);
+  const ist_status_t room = check_size(penetration), other_room = check_size(separation);
   ist_status_t status = worse(room, other_room);
   QuerySettings settings;
   if (status == IST_OK)
@@ -77,8 +77,8 @@ ist_status_t find_both(const Solid* a, const ist_placed_tree_t* b,
       write(both.separation, *separation);
       return worse(penetration->status, separation->status);
     });
-  if (status < 0 && room == IST_OK) penetration->status = status;
-  if (status < 0 && other_room == IST_OK) separation->status = status;
+  if (room == IST_OK) noted(status, *penetration);
+  if (other_room == IST_OK) noted(status, *separation);
   return status;
 }
 
@@ -86,7 +86,7 @@ template <class Solid>
 ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
                           const ist_contact_settings_t* given, ist_workspace_t* workspace,
                           ist_contact_patches_t* patches, ist_penetration_t* whole) noexcept {
-  ist_status_t status = whole == nullptr ? IST_OK : clear(whole);
+  ist_status_t status = whole == nullptr ? IST_OK : check_size(whole);
   if (status == IST_OK) status = check_size(patches);
   if (status == IST_OK) {
     patches->count = 0;
@@ -104,7 +104,7 @@ ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
       if (whole != nullptr) write(found.penetration, *whole);
       return status_of(found.penetration.status);
     });
-  if (whole != nullptr && whole->size == sizeof *whole) whole->status = status;
+  if (whole != nullptr && whole->size == sizeof *whole) noted(status, *whole);
   return status;
 }
 
