@@ -15,17 +15,23 @@ add_subdirectory(src/asset)
 add_subdirectory(ist/bake)
 
 get_property(objects GLOBAL PROPERTY IST_ROOM_OBJECTS)
-add_library(ist STATIC ${objects})
-add_library(ist::ist ALIAS ist)
-set_target_properties(ist PROPERTIES LINKER_LANGUAGE CXX)
-target_link_libraries(ist PUBLIC ist_query PRIVATE assimp::assimp TBB::tbb)
-if(IST_HAVE_CUDA)
-  target_link_libraries(ist PRIVATE CUDA::cudart_static)
-endif()
-if(IST_HAVE_OPENVDB)
-  target_link_libraries(ist PRIVATE
-    $<BUILD_INTERFACE:${IST_OPENVDB_LIBRARY}> $<BUILD_INTERFACE:${IST_IMATH_LIBRARY}>
-    $<INSTALL_INTERFACE:-lopenvdb> $<INSTALL_INTERFACE:${IST_IMATH_LIBRARY}>)
+ist_add_library(ist ist ${objects})
+foreach(library IN LISTS ist_LIBRARIES)
+  string(REPLACE ist ist_query query ${library})
+  target_link_libraries(${library} PUBLIC ${query} PRIVATE assimp::assimp TBB::tbb)
+  if(IST_HAVE_CUDA)
+    target_link_libraries(${library} PRIVATE CUDA::cudart_static)
+  endif()
+  if(IST_HAVE_OPENVDB)
+    target_link_libraries(${library} PRIVATE
+      $<BUILD_INTERFACE:${IST_OPENVDB_LIBRARY}> $<BUILD_INTERFACE:${IST_IMATH_LIBRARY}>
+      $<INSTALL_INTERFACE:-lopenvdb> $<INSTALL_INTERFACE:${IST_IMATH_LIBRARY}>)
+  endif()
+endforeach()
+if(TARGET ist_shared)
+  # The hash of an asset, which writing it needs too, is nobody's to see: both libraries hold it.
+  target_sources(ist_shared PRIVATE
+    $<FILTER:$<TARGET_OBJECTS:ist_room_query>,INCLUDE,content_hash>)
 endif()
 if(PROJECT_IS_TOP_LEVEL)
   add_subdirectory(src/app)

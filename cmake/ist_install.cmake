@@ -1,19 +1,27 @@
-# Installs the headers, the libraries, the command line and the CMake package `ist`.
+# Installs the headers, the libraries, the command line, the CMake package `ist` and the pkg-config
+# files. Three components, which are Debian packages too (ist_deb.cmake): libist, libist-dev, ist.
 include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/ist)
 
-install(DIRECTORY include/ist DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-# Two export sets, so that a project that only asks needs nothing that only baking needs.
-install(TARGETS ist_query EXPORT ist-query-targets
-  INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(EXPORT ist-query-targets NAMESPACE ist:: DESTINATION ${package_dir})
-if(TARGET ist)
-  install(TARGETS ist EXPORT ist-targets)
-  install(EXPORT ist-targets NAMESPACE ist:: DESTINATION ${package_dir})
-endif()
+install(DIRECTORY include/ist DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT libist-dev)
+# An export set for each library and kind, so that a project that only asks needs nothing that only
+# baking needs, and one that links the shared library nothing that only the static one needs.
+foreach(as query ist)
+  string(REPLACE ist_ist ist name ist_${as})
+  foreach(library IN LISTS ${name}_LIBRARIES)
+    string(REGEX REPLACE "^${name}$" static kind ${library})
+    string(REPLACE ${name}_shared shared kind ${kind})
+    install(TARGETS ${library} EXPORT ist-${as}-${kind}
+      LIBRARY COMPONENT libist NAMELINK_COMPONENT libist-dev
+      ARCHIVE COMPONENT libist-dev
+      INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+    install(EXPORT ist-${as}-${kind} NAMESPACE ist:: DESTINATION ${package_dir}
+      COMPONENT libist-dev)
+  endforeach()
+endforeach()
 if(TARGET ist_app)
-  install(TARGETS ist_app)
+  install(TARGETS ist_app COMPONENT ist)
 endif()
 
 # A machine without the CUDA Toolkit can link the installed library: the runtime comes with it.
@@ -22,7 +30,8 @@ set(cudart ${CMAKE_INSTALL_LIBDIR}/ist/libcudart_static.a)
 if(IST_HAVE_CUDA)
   set(ist_cuda ${CUDAToolkit_VERSION_MAJOR})
   file(REAL_PATH ${CUDA_cudart_static_LIBRARY} cudart_here)
-  install(FILES ${cudart_here} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ist RENAME libcudart_static.a)
+  install(FILES ${cudart_here} DESTINATION ${CMAKE_INSTALL_LIBDIR}/ist RENAME libcudart_static.a
+    COMPONENT libist-dev)
 endif()
 
 configure_package_config_file(cmake/ist-config.cmake.in ${PROJECT_BINARY_DIR}/ist-config.cmake
@@ -30,4 +39,40 @@ configure_package_config_file(cmake/ist-config.cmake.in ${PROJECT_BINARY_DIR}/is
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/ist-config-version.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/ist-config.cmake ${PROJECT_BINARY_DIR}/ist-config-version.cmake
-  DESTINATION ${package_dir})
+  DESTINATION ${package_dir} COMPONENT libist-dev)
+
+# pkg-config. What only a static library needs is private where there is a shared one.
+# ist_install_pc(name description requires library private…)
+function(ist_install_pc pc description requires library)
+  cmake_path(RELATIVE_PATH CMAKE_INSTALL_FULL_LIBDIR BASE_DIRECTORY ${CMAKE_INSTALL_PREFIX}
+    OUTPUT_VARIABLE libdir)
+  cmake_path(RELATIVE_PATH CMAKE_INSTALL_FULL_INCLUDEDIR BASE_DIRECTORY ${CMAKE_INSTALL_PREFIX}
+    OUTPUT_VARIABLE includedir)
+  cmake_path(RELATIVE_PATH CMAKE_INSTALL_PREFIX
+    BASE_DIRECTORY ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig OUTPUT_VARIABLE up)
+  list(JOIN ARGN " " private)
+  set(libs "-L\${libdir} -l${library}")
+  if(TARGET ${library}_shared)
+    string(APPEND libs "\nLibs.private: ${private}")
+  else()
+    string(APPEND libs " ${private}")
+  endif()
+  configure_file(cmake/ist.pc.in ${PROJECT_BINARY_DIR}/${pc}.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/${pc}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
+    COMPONENT libist-dev)
+endfunction()
+ist_install_pc(ist-query "Queries of inner sphere trees: overlap volume, force, distance" eigen3
+  ist_query -lhwy -lstdc++ -lm)
+if(NOT IST_QUERY_ONLY)
+  set(private -lassimp -ltbb)
+  if(IST_HAVE_CUDA)
+    list(APPEND private "\${libdir}/ist/libcudart_static.a" -lpthread -ldl -lrt)
+  endif()
+  if(IST_HAVE_OPENVDB)
+    cmake_path(GET IST_IMATH_LIBRARY STEM imath)
+    string(REGEX REPLACE "^lib" "-l" imath ${imath})
+    list(APPEND private -lopenvdb ${imath})
+  endif()
+  ist_install_pc(ist "Sphere packings and inner sphere trees: bakes and queries" ist-query ist
+    ${private} -lstdc++ -lm)
+endif()

@@ -52,9 +52,10 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <ist/api.h>
 #include <ist/sphere.h>
 
-namespace ist {
+namespace IST_API ist {
 
 inline constexpr std::uint32_t kFormatMajor = 0;
 inline constexpr std::uint32_t kFormatMinor = 4;

@@ -10,11 +10,12 @@
 #include <utility>
 #include <vector>
 
+#include <ist/api.h>
 #include <ist/mesh.h>
 #include <ist/packing.h>
 #include <ist/tree_view.h>
 
-namespace ist {
+namespace IST_API ist {
 
 /// The bytes of an asset in memory that owns them, aligned to 64 bytes. Once moved from it is
 /// empty.

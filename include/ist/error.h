@@ -3,7 +3,9 @@
 #include <stdexcept>
 #include <string>
 
-namespace ist {
+#include <ist/api.h>
+
+namespace IST_API ist {
 
 /// The one exception type of the offline stages (import … bake).
 ///

@@ -5,6 +5,7 @@
 #include <span>
 #include <variant>
 
+#include <ist/api.h>
 #include <ist/query.h>
 
 // Fields: solids that a sphere tree meets without having a tree themselves: grounds, walls,
@@ -12,7 +13,7 @@
 // allocated, memory they point to must outlive them. Everywhere a distance is positive inside the
 // solid and negative outside, as Solid's is. Lengths are [u] in the field's own frame.
 
-namespace ist {
+namespace IST_API ist {
 
 /// The solid normal · x ≤ offset. Exact.
 struct HalfSpaceField {

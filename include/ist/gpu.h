@@ -3,11 +3,13 @@
 #include <cstddef>
 #include <string>
 
+#include <ist/api.h>
+
 // How packing and baking use a GPU. Needs no CUDA header: cudaStream_t is a pointer to CUstream_st.
 
 struct CUstream_st;
 
-namespace ist {
+namespace IST_API ist {
 
 /// Where device memory comes from, in stream order: what is freed on a stream may be handed out to
 /// later work of that stream without waiting. May be called from any host thread that bakes.

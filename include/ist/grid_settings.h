@@ -1,6 +1,8 @@
 #pragma once
 
-namespace ist {
+#include <ist/api.h>
+
+namespace IST_API ist {
 
 /// Grids of the modes after Weller and Zachmann (GridMode other than banded).
 ///

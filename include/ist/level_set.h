@@ -6,11 +6,12 @@
 #include <string>
 #include <vector>
 
+#include <ist/api.h>
 #include <ist/mesh.h>
 #include <ist/progress.h>
 #include <ist/solid.h>
 
-namespace ist {
+namespace IST_API ist {
 
 /// Signed distances at the points of a lattice, positive inside. A band around the surface
 /// suffices: beyond it any value of the right sign will do.

@@ -2,9 +2,10 @@
 
 #include <Eigen/Core>
 
+#include <ist/api.h>
 #include <ist/query.h>
 
-namespace ist {
+namespace IST_API ist {
 
 /// A solid of density 1 as a rigid body. Times a density: mass, and inertia of that mass.
 ///

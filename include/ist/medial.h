@@ -4,12 +4,13 @@
 #include <cstdint>
 #include <vector>
 
+#include <ist/api.h>
 #include <ist/gpu.h>
 #include <ist/packing.h>
 #include <ist/progress.h>
 #include <ist/solid.h>
 
-namespace ist {
+namespace IST_API ist {
 
 /// A point of a solid's medial axis, where a ball touches the surface from several sides.
 struct MedialNode {

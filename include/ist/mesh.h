@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
-namespace ist {
+#include <ist/api.h>
+
+namespace IST_API ist {
 
 /// What a file says of its axes and its unit. No coordinate is turned by it.
 struct DeclaredFrame {

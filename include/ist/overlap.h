@@ -2,10 +2,11 @@
 
 #include <cstdint>
 
+#include <ist/api.h>
 #include <ist/field.h>
 #include <ist/query.h>
 
-namespace ist {
+namespace IST_API ist {
 
 /// Whether two placed solids share a point. Yes and no are certain, as inner spheres lie in the
 /// solids and cover balls hold them.

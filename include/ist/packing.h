@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <ist/api.h>
 #include <ist/gpu.h>
 #include <ist/grid_settings.h>
 #include <ist/progress.h>
@@ -11,7 +12,7 @@
 #include <ist/sphere.h>
 #include <ist/stop_reason.h>
 
-namespace ist {
+namespace IST_API ist {
 
 /// How the space is searched for the next spheres. All modes but `banded` are the paper's.
 enum class GridMode : std::uint32_t {

@@ -1,8 +1,9 @@
 #pragma once
 
+#include <ist/api.h>
 #include <ist/query.h>
 
-namespace ist {
+namespace IST_API ist {
 
 /// How two assets suit each other, whatever their poses.
 struct PairFit {

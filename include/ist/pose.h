@@ -1,6 +1,8 @@
 #pragma once
 
-namespace ist {
+#include <ist/api.h>
+
+namespace IST_API ist {
 
 /// Rigid motion that takes an object's own frame into the world: x_world = R(q) x + t.
 /// Plain data of 56 bytes under every compiler flag. `pose_eigen.h` converts from and to Eigen.

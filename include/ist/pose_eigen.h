@@ -2,9 +2,10 @@
 
 #include <Eigen/Geometry>
 
+#include <ist/api.h>
 #include <ist/pose.h>
 
-namespace ist {
+namespace IST_API ist {
 
 /// Pose of a rigid Eigen transform; `x` must hold a rotation (no scale or shear).
 inline Pose to_pose(const Eigen::Isometry3d& x) {

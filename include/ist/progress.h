@@ -3,7 +3,9 @@
 #include <cstddef>
 #include <functional>
 
-namespace ist {
+#include <ist/api.h>
+
+namespace IST_API ist {
 
 /// Where a long offline stage stands.
 struct Progress {

@@ -6,10 +6,11 @@
 #include <memory>
 #include <span>
 
+#include <ist/api.h>
 #include <ist/pose.h>
 #include <ist/tree_view.h>
 
-namespace ist {
+namespace IST_API ist {
 
 enum class QueryStatus : std::uint32_t {
   ok = 0,  ///< finished: the gradients are exactly those of the returned volume
@@ -137,6 +138,15 @@ struct Separation {
   std::uint32_t sphere_pairs = 0;  ///< sphere pairs measured
 };
 
+/// Where a workspace takes its memory: plain functions, called while it is made and when it ends.
+struct MemoryHooks {
+  /// At least `bytes` bytes at a multiple of `alignment`, a power of two, or null if there are none.
+  /// Null here: operator new.
+  void* (*allocate)(void* context, std::size_t bytes, std::size_t alignment) = nullptr;
+  void (*release)(void* context, void* memory, std::size_t bytes, std::size_t alignment) = nullptr;
+  void* context = nullptr;  ///< handed to both
+};
+
 /// Scratch memory of a query: make one a thread, once.
 ///
 /// It never changes an answer.
@@ -147,7 +157,7 @@ class Workspace {
   /// spheres at any pose. Takes 40 bytes each, in pages that are touched as they are needed.
   ///
   /// Throws std::bad_alloc.
-  explicit Workspace(std::size_t capacity = 1u << 20);
+  explicit Workspace(std::size_t capacity = 1u << 20, const MemoryHooks& memory = {});
   ~Workspace();
   Workspace(Workspace&&) noexcept;
   Workspace& operator=(Workspace&&) noexcept;
@@ -156,7 +166,10 @@ class Workspace {
   Impl* impl() noexcept { return impl_.get(); }  ///< null once moved from
 
  private:
-  std::unique_ptr<Impl> impl_;
+  struct Release {
+    void operator()(Impl* impl) const noexcept;
+  };
+  std::unique_ptr<Impl, Release> impl_;
 };
 
 /// Volume, wrench and centroid of the overlap.

@@ -1,8 +1,9 @@
 #pragma once
 
+#include <ist/api.h>
 #include <ist/query.h>
 
-namespace ist {
+namespace IST_API ist {
 
 /// Threads of the calling task arena of oneTBB for penetration_batch. Part of ist::ist: ist::query
 /// does not link TBB.

@@ -7,9 +7,10 @@
 #include <memory>
 #include <vector>
 
+#include <ist/api.h>
 #include <ist/mesh.h>
 
-namespace ist {
+namespace IST_API ist {
 
 /// Places a solid in the unit cube by a shift and a power of two, so that nothing downstream
 /// depends on the mesh's unit or offset: x_unit = (x − centre) · 2^−exponent.

@@ -1,6 +1,8 @@
 #pragma once
 
-namespace ist {
+#include <ist/api.h>
+
+namespace IST_API ist {
 
 /// A sphere in the unit frame of its solid (half-extent of the solid in (½, 1]).
 struct Sphere {

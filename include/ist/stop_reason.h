@@ -2,7 +2,9 @@
 
 #include <cstdint>
 
-namespace ist {
+#include <ist/api.h>
+
+namespace IST_API ist {
 
 /// What ended a packing.
 enum class StopReason : std::uint32_t {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 
+#include <ist/api.h>
 #include <ist/field.h>
 #include <ist/pose.h>
 #include <ist/query.h>
@@ -10,7 +11,7 @@
 // How long two moving solids stay clear of each other. Lengths are [u], times [T], a unit of the
 // caller's own (a second, a step); angles are radians.
 
-namespace ist {
+namespace IST_API ist {
 
 /// A rigid motion of constant velocity: one point of the object goes straight on, and the object
 /// turns about it.

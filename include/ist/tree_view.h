@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <span>
 
-namespace ist {
+#include <ist/api.h>
+
+namespace IST_API ist {
 
 struct AssetHeader;  // the layout: ist/asset_layout.h
 

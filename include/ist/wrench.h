@@ -3,12 +3,13 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <ist/api.h>
 #include <ist/query.h>
 
 // What a contact does to both of its bodies, about points of the caller's choice. All is in the
 // world. Nothing here allocates or throws; values of a query that was stopped carry its error.
 
-namespace ist {
+namespace IST_API ist {
 
 /// Force and moment on one body for a pressure of 1: −dV by its motion. Times a pressure
 /// [force/u²], they are the force and the moment that a penalty potential pressure · V exerts.

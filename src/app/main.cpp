@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include <ist/error.h>
+#include <ist/version.h>
 
 #include "app/commands.h"
 #include "app/interrupt.h"
@@ -20,7 +21,7 @@ int main(int argc, char** argv) {
       "Sphere packings, inner sphere trees and the volume by which two solids overlap.\n"
       "Lengths are [u], the mesh's own unit.",
       "ist");
-  app.set_version_flag("--version", "ist " IST_VERSION);
+  app.set_version_flag("--version", "ist " IST_VERSION_STRING);
   app.footer(
       "Exit codes: 0 done, 1 error, 2 wrong usage, 3 check found a violation, 130 interrupted.");
   add_bake(app);

@@ -23,7 +23,7 @@ struct ClosestPoint {
 /// copies for packing. Immutable; every function may be called from many threads at once. The
 /// hierarchy and the moments are made when they are first asked for, on the caller's TBB threads: a
 /// bake on the GPU never asks for the hierarchy.
-class MeshSolid final : public Solid {
+class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
  public:
   explicit MeshSolid(const ClosedMesh& mesh);
   ~MeshSolid() override;

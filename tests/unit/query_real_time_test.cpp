@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 #include <ist/bake.h>
 #include <ist/field.h>
+#include <ist/ist.h>
 #include <ist/overlap.h>
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
 
+#include <bit>
 #include <cstdio>
 #include <vector>
 
@@ -33,6 +35,16 @@ class RealTime : public ::testing::Test {
     contact_patches(a, b, testing::for_contacts(settings), workspaces_[0], patches_);
     const PlacedPair pairs[] = {{a, b}, {b, a}};
     penetration_batch(pairs, settings, workspaces_, answers_);
+
+    // The C functions.
+    const ist_placed_tree_t c_a = {sizeof c_a, &c_tree_a_, std::bit_cast<ist_pose_t>(a.pose), 1};
+    const ist_placed_tree_t c_b = {sizeof c_b, &c_tree_b_, std::bit_cast<ist_pose_t>(b.pose), 1};
+    ist_penetration_t c_penetration = {};
+    ist_separation_t c_separation = {};
+    c_penetration.size = sizeof c_penetration;
+    c_separation.size = sizeof c_separation;
+    if (ist_query(&c_a, &c_b, nullptr, nullptr, &c_workspace_, &c_penetration, &c_separation) < 0)
+      ADD_FAILURE() << ist_describe(c_penetration.status);
 
     // What meets a surface: a field and a tree, and trees by the surface of either.
     const PlacedField field{fields_[static_cast<std::size_t>(i) % fields_.size()], poses_a_[i], 1};
@@ -80,18 +92,24 @@ class RealTime : public ::testing::Test {
       FunctionField{look, nullptr, 0},
       MeshField{box_.view()}};
   Workspace workspaces_[1];
+  ist_workspace_t c_workspace_ = {};
+  ist_tree_t c_tree_a_ = {}, c_tree_b_ = {};
   ContactPatch patches_[8];
   Penetration answers_[2];
   double volume_[kPoses] = {};
   Pose poses_a_[kPoses], poses_b_[kPoses];
 
   RealTime() {
+    ist_workspace_make(0, nullptr, &c_workspace_);
+    ist_tree_view(a_.bytes().data(), a_.bytes().size(), &c_tree_a_);
+    ist_tree_view(b_.bytes().data(), b_.bytes().size(), &c_tree_b_);
     std::mt19937_64 random(4);
     for (int i = 0; i < kPoses; ++i) {
       poses_a_[i] = testing::random_pose(random, 0.0);
       poses_b_[i] = testing::random_pose(random, 0.06 * i);
     }
   }
+  ~RealTime() override { ist_workspace_release(&c_workspace_); }
 };
 
 // The first one, so that a process's first query is among what it looks at.

@@ -1,14 +1,10 @@
 #include "query/contact/contact_bins.h"
 
 #include <bit>
+#include <new>
 
 namespace ist {
 namespace {
-
-template <class T>
-T* storage(std::size_t count) {
-  return static_cast<T*>(::operator new(count * sizeof(T), std::align_val_t(alignof(T))));
-}
 
 /// Calls f(bin) for every set bit, in order.
 template <class F>
@@ -20,13 +16,13 @@ void for_each_bit(const std::uint64_t (&words)[ContactBins::kBins / 64], F f) {
 
 }  // namespace
 
-ContactBins::ContactBins()
-    : sums_(storage<LeafSums>(kBins)),
-      guesses_(storage<Overlap>(kBins)),
-      bins_(storage<ContactBin>(kBins)),
-      parts_(storage<ContactPart>(kBins)),
-      order_(storage<std::uint32_t>(kBins)),
-      spare_(storage<std::uint32_t>(kBins)) {}
+ContactBins::ContactBins(const MemoryHooks& memory)
+    : sums_(hooked_array<LeafSums>(memory, kBins)),
+      guesses_(hooked_array<Overlap>(memory, kBins)),
+      bins_(hooked_array<ContactBin>(memory, kBins)),
+      parts_(hooked_array<ContactPart>(memory, kBins)),
+      order_(hooked_array<std::uint32_t>(memory, kBins)),
+      spare_(hooked_array<std::uint32_t>(memory, kBins)) {}
 
 void ContactBins::start(const SphereTree& tree, bool of_b) noexcept {
   for (std::uint64_t& word : marked_) word = 0;

@@ -2,10 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <new>
 
 #include "query/asset/sphere_tree.h"
+#include "query/base/hooked_memory.h"
 #include "query/kernel/leaf_kernel.h"
 #include "query/kernel/overlap.h"
 
@@ -36,7 +35,7 @@ class ContactBins {
  public:
   static constexpr std::uint32_t kBins = 4096;  ///< 65,536 spheres by leaf blocks
 
-  ContactBins();
+  explicit ContactBins(const MemoryHooks& memory);
 
   /// Empties the bins. They are those of B if `of_b`: its leaf blocks, or the nodes of the first
   /// level of no more than kBins.
@@ -70,20 +69,13 @@ class ContactBins {
   std::uint32_t* spare() noexcept { return spare_.get(); }
 
  private:
-  template <class T>
-  struct Free {
-    void operator()(T* p) const noexcept { ::operator delete(p, std::align_val_t(alignof(T))); }
-  };
-  template <class T>
-  using Storage = std::unique_ptr<T[], Free<T>>;
-
   void mark(std::uint32_t bin) noexcept;
 
-  Storage<LeafSums> sums_;    ///< [kBins] made when a bin is first marked, as are
-  Storage<Overlap> guesses_;  ///< [kBins]
-  Storage<ContactBin> bins_;  ///< [kBins]
-  Storage<ContactPart> parts_;
-  Storage<std::uint32_t> order_, spare_;
+  HookedArray<LeafSums> sums_;    ///< [kBins] made when a bin is first marked, as are
+  HookedArray<Overlap> guesses_;  ///< [kBins]
+  HookedArray<ContactBin> bins_;  ///< [kBins]
+  HookedArray<ContactPart> parts_;
+  HookedArray<std::uint32_t> order_, spare_;
   std::uint64_t marked_[kBins / 64] = {};
   const SphereTree* tree_ = nullptr;
   bool of_b_ = false;

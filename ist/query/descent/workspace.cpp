@@ -8,28 +8,43 @@ namespace {
 // A vector of survivors is stored whole, sixteen at a time, beyond the last one that counts.
 constexpr std::size_t kSlack = 32;
 
-PairList make_list(std::size_t capacity) {
-  // Not touched before use: a large capacity costs address space, not memory.
-  PairList list;
-  list.a = std::make_unique_for_overwrite<std::uint32_t[]>(capacity + kSlack);
-  list.b = std::make_unique_for_overwrite<std::uint32_t[]>(capacity + kSlack);
-  return list;
+PairList make_list(const MemoryHooks& memory, std::size_t capacity) {
+  return {hooked_array<std::uint32_t>(memory, capacity + kSlack),
+          hooked_array<std::uint32_t>(memory, capacity + kSlack)};
 }
 
 }  // namespace
 
-Workspace::Impl::Impl(std::size_t wanted)
-    : capacity(std::max<std::size_t>(wanted, 64)),
-      now(make_list(capacity)),
-      next(make_list(capacity)),
-      ranked(std::make_unique_for_overwrite<RankedPair[]>(capacity)),
-      bounds(std::make_unique_for_overwrite<double[]>(capacity)),
-      waiting(std::make_unique_for_overwrite<WaitingPair[]>(kWaiting)),
-      leaves(std::make_unique_for_overwrite<LeafScratch>()),
-      masks(std::make_unique_for_overwrite<std::uint16_t[]>(capacity)),
-      patches(std::make_unique_for_overwrite<PatchCache>()) {}
+Workspace::Impl::Impl(std::size_t wanted, const MemoryHooks& hooks)
+    : memory(hooks),
+      capacity(std::max<std::size_t>(wanted, 64)),
+      now(make_list(memory, capacity)),
+      next(make_list(memory, capacity)),
+      ranked(hooked_array<RankedPair>(memory, capacity)),
+      bounds(hooked_array<double>(memory, capacity)),
+      waiting(hooked_array<WaitingPair>(memory, kWaiting)),
+      leaves(hooked<LeafScratch>(memory)),
+      masks(hooked_array<std::uint16_t>(memory, capacity)),
+      patches(hooked<PatchCache>(memory)),
+      contact(memory) {}
 
-Workspace::Workspace(std::size_t capacity) : impl_(std::make_unique<Impl>(capacity)) {}
+Workspace::Workspace(std::size_t capacity, const MemoryHooks& memory) {
+  // The Impl lies in memory of the hooks too.
+  const auto release = [&memory](void* p) {
+    give_memory_back(memory, p, sizeof(Impl), alignof(Impl));
+  };
+  std::unique_ptr<void, decltype(release)> room(take_memory(memory, sizeof(Impl), alignof(Impl)),
+                                                release);
+  impl_.reset(new (room.get()) Impl(capacity, memory));
+  room.release();
+}
+
+void Workspace::Release::operator()(Impl* impl) const noexcept {
+  const MemoryHooks memory = impl->memory;
+  impl->~Impl();
+  give_memory_back(memory, impl, sizeof(Impl), alignof(Impl));
+}
+
 Workspace::~Workspace() = default;
 Workspace::Workspace(Workspace&&) noexcept = default;
 Workspace& Workspace::operator=(Workspace&&) noexcept = default;

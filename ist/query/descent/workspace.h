@@ -2,11 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 
 #include <ist/query.h>
 
 #include <ist/asset_layout.h>
+#include "query/base/hooked_memory.h"
 #include "query/contact/contact_bins.h"
 #include "query/kernel/placed_blocks.h"
 #include "query/probe/patch_cache.h"
@@ -29,24 +29,25 @@ struct WaitingPair {
 
 /// List of node pairs, one block index a side.
 struct PairList {
-  std::unique_ptr<std::uint32_t[]> a, b;
+  HookedArray<std::uint32_t> a, b;
   std::size_t size = 0;
 };
 
 /// Depth-first, a descent of two trees of seven levels waits on 15 children a level at most.
 inline constexpr std::size_t kWaiting = 16 * 2 * kMaxLevels;
 
-struct Workspace::Impl {
-  explicit Impl(std::size_t capacity);
+struct [[gnu::visibility("hidden")]] Workspace::Impl {
+  Impl(std::size_t capacity, const MemoryHooks& memory);
 
+  MemoryHooks memory;    ///< of all of this, and of this itself
   std::size_t capacity;  ///< pairs in each list
   PairList now, next;    ///< pairs of the current pair of levels; those of the next
-  std::unique_ptr<RankedPair[]> ranked;
-  std::unique_ptr<double[]> bounds;        ///< of the pairs of `now`, while some are chosen
-  std::unique_ptr<WaitingPair[]> waiting;  ///< [kWaiting] a stack
-  std::unique_ptr<LeafScratch> leaves;
-  std::unique_ptr<std::uint16_t[]> masks;  ///< children of a pair's node that meet the other one
-  std::unique_ptr<PatchCache> patches;
+  HookedArray<RankedPair> ranked;
+  HookedArray<double> bounds;        ///< of the pairs of `now`, while some are chosen
+  HookedArray<WaitingPair> waiting;  ///< [kWaiting] a stack
+  Hooked<LeafScratch> leaves;
+  HookedArray<std::uint16_t> masks;  ///< children of a pair's node that meet the other one
+  Hooked<PatchCache> patches;
   ContactBins contact;
 };
 

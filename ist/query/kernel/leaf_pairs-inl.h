@@ -42,8 +42,6 @@ struct alignas(64) PairsOfBlocks {
 struct Tasks {
   std::size_t of_larger, of_b;  ///< 0 or 1; both 0: A's
 };
-template <class T>
-inline constexpr T kSign[2] = {1, -1};
 
 /// Chooses whose spheres are tasks, and says where the two blocks are.
 template <class T>
@@ -60,7 +58,8 @@ HWY_INLINE void describe_pair(Tasks tasks, std::size_t i, PairsOfBlocks<T>& pair
   subtract(one.origin, many.origin, pairs.offset[i]);
   const T error = one.error + many.error;
   pairs.ball_reach[i] = many.radius + error;
-  pairs.error[i] = error * kSign<T>[of_b];
+  static constexpr T kSign[2] = {1, -1};
+  pairs.error[i] = error * kSign[of_b];
 }
 
 /// Places the spheres of pair `i` and lists those that come within reach of the other's leaf ball,

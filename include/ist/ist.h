@@ -1,0 +1,555 @@
+#ifndef IST_IST_H
+#define IST_IST_H
+
+/* The queries in C11: what ist::query answers, with the same bits (query.h and field.h say more of
+ * each answer). Link as C++ does: the shared library needs nothing else.
+ *
+ * Errors: every function that can fail returns a status; negative is an error, which
+ * ist_describe() puts in words. Nothing is thrown or printed, and an argument that is null, of
+ * another size or no handle gives a code.
+ * Results: on an error of a call its answers are all zero but for `size` and `status`, where there
+ * is room for them.
+ * Sizes: a struct that starts with `size` is set up as `ist_penetration_t x = {.size = sizeof x}`;
+ * all else may be 0, which is the default. A library serves the sizes of the headers it serves.
+ * Handles: ist_tree_t and ist_workspace_t lie in memory of the caller's and are empty where all
+ * zero. One that owns memory must be released once, and not be copied. Released ones are known and
+ * refused; a copy of one, or memory freed under it, cannot be.
+ * Threads: functions may be called from any thread. What is pointed to as const may be shared
+ * while nobody changes it; all else, workspaces first, belongs to one call at a time.
+ * Hot path: what takes a workspace neither allocates nor locks.
+ * Units: lengths are [u], the unit of the mesh that was baked. */
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <ist/version.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+#ifdef __GNUC__
+#pragma GCC visibility push(default)
+#endif
+
+/* --- Status ----------------------------------------------------------------------------------- */
+
+typedef int32_t ist_status_t;
+enum {
+  IST_OK = 0,
+  IST_BUDGET_EXHAUSTED = 1, /* a limit or the workspace's capacity: bounds still hold */
+  /* A pose with NaN or Inf or no unit quaternion, a scale < 0, sizes or distances more than 1e60 :
+   * 1 apart, a field's number or an enum out of range. */
+  IST_INVALID_INPUT = -1,
+  IST_NULL_POINTER = -2,
+  IST_WRONG_SIZE = -3,    /* a struct's size is none that this library knows */
+  IST_WRONG_VERSION = -4, /* headers that this library does not serve */
+  IST_NO_HANDLE = -5,     /* empty, released, or never made */
+  IST_NO_MEMORY = -6,
+  IST_CANNOT_READ = -7, /* the file; errno may say why */
+  /* Bytes that are no asset. */
+  IST_TOO_SHORT = -8,      /* fewer than their header says */
+  IST_MISALIGNED = -9,     /* not on a 64-byte boundary */
+  IST_NOT_AN_ASSET = -10,  /* wrong magic */
+  IST_OTHER_FORMAT = -11,  /* another 0.x format: bake again */
+  IST_CORRUPT_HASH = -12,  /* content differs from its hash */
+  IST_CORRUPT_LAYOUT = -13 /* an offset, count or field out of range */
+};
+
+/* One English sentence, never null; of any number. */
+const char* ist_describe(ist_status_t status);
+
+/* IST_VERSION of the library. */
+uint32_t ist_version(void);
+
+/* ist_check_version(IST_VERSION), before anything else: IST_OK or IST_WRONG_VERSION. */
+ist_status_t ist_check_version(uint32_t headers);
+
+/* --- Memory ----------------------------------------------------------------------------------- */
+
+/* Where memory comes from; a null ist_allocator_t* is the C++ heap. Called by the functions that
+ * take one, and by the release of what they made. Neither may throw. */
+typedef struct ist_allocator {
+  uint32_t size;
+  /* At least `bytes` bytes, at a multiple of `alignment` (a power of two), or null. */
+  void* (*allocate)(void* context, size_t bytes, size_t alignment);
+  void (*release)(void* context, void* memory, size_t bytes, size_t alignment);
+  void* context; /* handed to both */
+} ist_allocator_t;
+
+/* --- Trees ------------------------------------------------------------------------------------ */
+
+/* A checked asset. All zero: empty. */
+typedef struct ist_tree {
+  uint64_t opaque[8];
+} ist_tree_t;
+
+/* Views an asset in memory of the caller's: a mapped file, say. Nothing is copied or allocated.
+ * `bytes`: on a 64-byte boundary; they must outlive the view and stay as they are.
+ * What `tree` held before is forgotten. It need not be released, and may be copied. */
+ist_status_t ist_tree_view(const void* bytes, size_t size, ist_tree_t* tree);
+
+/* Reads an asset from a file into memory of `allocator` (null: the heap), which the tree owns. */
+ist_status_t ist_tree_load(const char* path, const ist_allocator_t* allocator, ist_tree_t* tree);
+
+/* Empties the tree; frees its memory if it owns it. No query may be using it. What still points to
+ * the ist_tree_t is told IST_NO_HANDLE from then on. */
+ist_status_t ist_tree_release(ist_tree_t* tree);
+
+typedef struct ist_tree_info {
+  uint32_t size;
+  uint32_t has_field; /* 1: the asset holds the solid's surface, so that queries can be exact */
+  uint64_t spheres;   /* count */
+  double volume;      /* [u³] of the solid */
+  double coverage;    /* [0, 1] share of it in inner spheres */
+  double protrusion;  /* [u] no matched sphere sticks further out of the solid */
+  double field_error; /* [u] the stored surface and the solid's lie within this of each other */
+  uint32_t field_triangles; /* of that surface */
+} ist_tree_info_t;
+
+ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info);
+
+/* MassProperties: of a solid of density 1. Times a density: mass, and inertia of that mass. */
+typedef struct ist_mass_properties {
+  uint32_t size;
+  ist_status_t status;
+  double volume;               /* [u³] */
+  double centre_of_mass[3];    /* [u] */
+  double inertia[3][3];        /* [u⁵] about the centre of mass; symmetric */
+  double volume_error;         /* [u³] */
+  double centre_of_mass_error; /* [u] of each component */
+  double inertia_error;        /* [u⁵] of each entry */
+} ist_mass_properties_t;
+
+/* Bounds: what holds a solid. */
+typedef struct ist_bounds {
+  uint32_t size;
+  ist_status_t status;
+  double lower[3], upper[3]; /* [u] corners of the box along the axes */
+  double centre[3], radius;  /* [u] of a ball */
+} ist_bounds_t;
+
+/* In the asset's own frame. Stored by the bake: takes nanoseconds. */
+ist_status_t ist_tree_get_mass_properties(const ist_tree_t* tree,
+                                          ist_mass_properties_t* properties);
+ist_status_t ist_tree_get_bounds(const ist_tree_t* tree, ist_bounds_t* bounds);
+
+/* --- Places ----------------------------------------------------------------------------------- */
+
+/* x_world = R(q) x + t */
+typedef struct ist_pose {
+  double q[4]; /* w, x, y, z; within 1e-3 of unit length */
+  double t[3]; /* [u] */
+} ist_pose_t;
+
+/* clang-format off */
+#define IST_POSE_IDENTITY {{1, 0, 0, 0}, {0, 0, 0}}
+/* clang-format on */
+
+/* x_world = R (scale · x) + t */
+typedef struct ist_placed_tree {
+  uint32_t size;
+  const ist_tree_t* tree;
+  ist_pose_t pose;
+  double scale; /* > 0; 0 is taken for 1 */
+} ist_placed_tree_t;
+
+/* In the world, axes and scale included. */
+ist_status_t ist_placed_mass_properties(const ist_placed_tree_t* placed,
+                                        ist_mass_properties_t* properties);
+ist_status_t ist_placed_bounds(const ist_placed_tree_t* placed, ist_bounds_t* bounds);
+
+/* --- Fields: solids without spheres (field.h). Distances are positive inside. ----------------- */
+
+typedef int32_t ist_field_kind_t;
+enum {
+  IST_HALF_SPACE = 1,
+  IST_BOX = 2,
+  IST_BALL = 3,
+  IST_CAPSULE = 4,
+  IST_CYLINDER = 5,
+  IST_HEIGHTS = 6,
+  IST_DISTANCE_GRID = 7,
+  IST_FUNCTION = 8,
+  IST_MESH = 9
+};
+
+/* What a look at a field tells. */
+typedef struct ist_field_sample {
+  double distance;    /* [u] to the surface, positive inside */
+  double gradient[3]; /* of the distance */
+} ist_field_sample_t;
+
+/* A plain view: what it points to must outlive its use. */
+typedef struct ist_field {
+  uint32_t size;
+  ist_field_kind_t kind;
+  union {
+    /* normal · x ≤ offset */
+    struct {
+      double normal[3]; /* unit length within 1e-3, outward */
+      double offset;    /* [u] */
+    } half_space;
+    /* around the origin */
+    struct {
+      double half_extents[3]; /* [u] > 0 */
+    } box;
+    struct {
+      double radius; /* [u] > 0, around the origin */
+    } ball;
+    /* about the z axis; of a capsule half_height is the segment's */
+    struct {
+      double radius;      /* [u] > 0 */
+      double half_height; /* [u] > 0; of a capsule ≥ 0 */
+    } capsule, cylinder;
+    /* the solid under a grid of heights along z; beyond its border it goes on level */
+    struct {
+      const float* heights;   /* [u] [rows · columns], columns (x) run fastest */
+      uint32_t columns, rows; /* ≥ 2 */
+      double spacing[2];      /* [u] > 0, along x and y; heights[0] stands at the origin */
+      double lowest, highest; /* [u] no height is lower or higher; both 0: not told */
+    } heights;
+    /* distances at the points of a grid; outside of it is outside of the solid */
+    struct {
+      const float* distances; /* [u] x runs fastest */
+      uint32_t points[3];     /* along x, y, z, each ≥ 2 */
+      double origin[3];       /* [u] of the first point */
+      double spacing;         /* [u] > 0 */
+      double error;           /* [u] the interpolated distance is off by at most this */
+    } distance_grid;
+    /* whatever answers; called on the thread of the query, and may not throw */
+    struct {
+      void (*look)(const void* context, const double x[3], ist_field_sample_t* sample);
+      const void* context; /* handed to `look` */
+      double error;        /* [u] distances are off by at most this */
+    } function;
+    /* the surface in an asset, without its spheres */
+    struct {
+      const ist_tree_t* tree;
+    } mesh;
+    double reserved[16];
+  } as;
+} ist_field_t;
+
+/* x_world = R (scale · x) + t */
+typedef struct ist_placed_field {
+  uint32_t size;
+  const ist_field_t* field;
+  ist_pose_t pose;
+  double scale; /* > 0; 0 is taken for 1 */
+} ist_placed_field_t;
+
+/* --- Workspaces ------------------------------------------------------------------------------- */
+
+/* Scratch memory of queries, one a thread. All zero: empty. */
+typedef struct ist_workspace {
+  uint64_t opaque[8];
+} ist_workspace_t;
+
+/* `capacity`: count of node pairs that may wait at once; 0 is the default, 1,048,576, which serves
+ * two trees of 64,000 spheres at any pose. Takes 40 bytes each, touched as they are needed.
+ * `allocator`: null is the heap. What `workspace` held before is forgotten. */
+ist_status_t ist_workspace_make(size_t capacity, const ist_allocator_t* allocator,
+                                ist_workspace_t* workspace);
+ist_status_t ist_workspace_release(ist_workspace_t* workspace);
+
+/* --- Settings: a null pointer means the defaults, all 0 but for `size` ------------------------ */
+
+typedef int32_t ist_measure_t;
+enum { IST_MATCHED = 0, IST_INNER = 1 };
+
+typedef int32_t ist_field_use_t;
+enum { IST_FIELD_AUTOMATIC = 0, IST_FIELD_NEVER = 1, IST_FIELD_ALWAYS = 2 };
+
+/* PenetrationSettings */
+typedef struct ist_penetration_settings {
+  uint32_t size;
+  ist_measure_t measure;
+  ist_field_use_t field;
+  uint32_t pair_budget;  /* count of sphere pairs to spend; 0: no limit, as in all that follow */
+  uint32_t max_visits;   /* count of node pairs opened */
+  double deadline_us;    /* [µs] wall clock from the call */
+  double relative_error; /* stop once (volume_max − volume_min) ≤ this · volume_max */
+  double min_radius;     /* [u] nodes smaller than this are not opened */
+} ist_penetration_settings_t;
+
+/* ContactSettings */
+typedef struct ist_contact_settings {
+  uint32_t size;
+  ist_measure_t measure;
+  ist_field_use_t field;
+  uint32_t max_visits;
+  double deadline_us;
+  double relative_error;
+  double min_radius;
+} ist_contact_settings_t;
+
+/* SeparationSettings */
+typedef struct ist_separation_settings {
+  uint32_t size;
+  uint32_t max_visits;
+  double deadline_us;
+} ist_separation_settings_t;
+
+/* --- Answers ---------------------------------------------------------------------------------- */
+
+/* Penetration: derivatives are with respect to a motion of B, A held still. */
+typedef struct ist_penetration {
+  uint32_t size;
+  ist_status_t status;
+  double volume;                  /* [u³] */
+  double volume_min, volume_max;  /* [u³] bounds on that sum */
+  double centroid[3];             /* [u] of the overlap, world */
+  double translation_gradient[3]; /* [u²] dV/d(translation of B), world */
+  double rotation_gradient[3];    /* [u³/rad] dV/d(rotation vector of B about B's origin), world */
+  uint32_t node_visits, sphere_pairs;
+} ist_penetration_t;
+
+/* Separation: all zero once inner spheres overlap. */
+typedef struct ist_separation {
+  uint32_t size;
+  ist_status_t status;
+  double distance;                   /* [u] between the inner spheres */
+  double distance_min, distance_max; /* [u] the solids' distance lies within, certified */
+  double point_a[3], point_b[3];     /* [u] on the inner spheres, world */
+  double normal[3];                  /* unit, from A to B, world */
+  uint32_t node_visits, sphere_pairs;
+} ist_separation_t;
+
+/* ContactPatch */
+typedef struct ist_contact_patch {
+  uint64_t id;        /* the same region in every query of the same two trees */
+  double centroid[3]; /* [u] world */
+  double normal[3];   /* unit, the direction in which the patch pushes B; zero if the area is */
+  double area;        /* [u²] */
+  double depth;       /* [u] volume/area */
+  double volume;      /* [u³] */
+  double force[3];    /* [u²] the push on B of a penalty of 1 · volume */
+  double torque[3];   /* [u³/rad] about B's origin */
+} ist_contact_patch_t;
+
+/* Room for patches. */
+typedef struct ist_contact_patches {
+  uint32_t size;
+  uint32_t patch_size;          /* sizeof(ist_contact_patch_t) */
+  ist_contact_patch_t* patches; /* [capacity] */
+  size_t capacity;
+  size_t count; /* answer: patches written */
+} ist_contact_patches_t;
+
+/* --- Queries of two trees. Trees may be shared by threads; the workspace may not. ------------- */
+
+/* Each returns the status that its answer holds, or an error of the call. */
+
+ist_status_t ist_penetration(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                             const ist_penetration_settings_t* settings, ist_workspace_t* workspace,
+                             ist_penetration_t* answer);
+
+/* `answer` without what protruding spheres add where flat faces meet; `whole` is what
+ * ist_penetration() answered by lenses (IST_FIELD_NEVER) and may be the same struct. */
+ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_placed_tree_t* a,
+                                    const ist_placed_tree_t* b, ist_penetration_t* answer);
+
+ist_status_t ist_separation(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                            const ist_separation_settings_t* settings, ist_workspace_t* workspace,
+                            ist_separation_t* answer);
+
+/* Whether two placed solids share a point (overlap.h). Yes and no are certain. */
+typedef int32_t ist_overlapping_t;
+enum { IST_OVERLAP_NO = 0, IST_OVERLAP_YES = 1, IST_OVERLAP_UNKNOWN = 2 };
+
+/* A fraction of what a penetration takes. On an error, and for invalid input: unknown. */
+ist_status_t ist_overlap(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                         ist_workspace_t* workspace, ist_overlapping_t* answer);
+
+/* PairFit: how two assets suit each other, whatever their poses. */
+typedef struct ist_pair_fit {
+  uint32_t size;
+  ist_status_t status;
+  double grain_a, grain_b; /* [u] what is finer than that, the spheres do not know */
+  double ratio;            /* ≥ 1, of the coarser grain over the finer */
+  uint32_t a_is_coarser;   /* 0 or 1, as are the others */
+  uint32_t has_surface;    /* the coarser asset holds its surface */
+  uint32_t needs_surface;  /* volumes and forces by spheres alone mislead */
+  uint32_t fits;           /* has_surface or not needs_surface */
+} ist_pair_fit_t;
+
+/* Needs no workspace: takes nanoseconds. */
+ist_status_t ist_get_pair_fit(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                              ist_pair_fit_t* fit);
+
+/* Both in one call. Returns the worse status: the more negative one, or else the larger. */
+ist_status_t ist_query(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                       const ist_penetration_settings_t* penetration_settings,
+                       const ist_separation_settings_t* separation_settings,
+                       ist_workspace_t* workspace, ist_penetration_t* penetration,
+                       ist_separation_t* separation);
+
+/* `whole`: the whole contact; may be null. */
+ist_status_t ist_contact_patches(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                 const ist_contact_settings_t* settings, ist_workspace_t* workspace,
+                                 ist_contact_patches_t* patches, ist_penetration_t* whole);
+
+/* --- The same of a field, held still, and a tree ---------------------------------------------- */
+
+ist_status_t ist_field_penetration(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                                   const ist_penetration_settings_t* settings,
+                                   ist_workspace_t* workspace, ist_penetration_t* answer);
+
+ist_status_t ist_field_separation(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                                  const ist_separation_settings_t* settings,
+                                  ist_workspace_t* workspace, ist_separation_t* answer);
+
+ist_status_t ist_field_overlap(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                               ist_workspace_t* workspace, ist_overlapping_t* answer);
+
+ist_status_t ist_field_query(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                             const ist_penetration_settings_t* penetration_settings,
+                             const ist_separation_settings_t* separation_settings,
+                             ist_workspace_t* workspace, ist_penetration_t* penetration,
+                             ist_separation_t* separation);
+
+ist_status_t ist_field_contact_patches(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                                       const ist_contact_settings_t* settings,
+                                       ist_workspace_t* workspace, ist_contact_patches_t* patches,
+                                       ist_penetration_t* whole);
+
+/* --- Wrenches (wrench.h): what a contact does to both bodies. They need no workspace. ----------
+ */
+
+/* Of a pressure of 1: −dV by the body's motion. */
+typedef struct ist_wrench {
+  double force[3];  /* [u²] out of the other body */
+  double torque[3]; /* [u³] about the point that was named */
+} ist_wrench_t;
+
+typedef struct ist_wrenches {
+  uint32_t size;
+  ist_wrench_t on_a, on_b;
+} ist_wrenches_t;
+
+/* A body's velocity. */
+typedef struct ist_twist {
+  double point[3];            /* [u] a point of the body, now */
+  double velocity[3];         /* [u/s] of that point */
+  double angular_velocity[3]; /* [rad/s] */
+} ist_twist_t;
+
+/* On A about `point_a`, on B about `point_b`; `b` is B's pose in the query. */
+ist_status_t ist_wrenches(const ist_penetration_t* contact, const ist_pose_t* b,
+                          const double point_a[3], const double point_b[3],
+                          ist_wrenches_t* wrenches);
+ist_status_t ist_patch_wrenches(const ist_contact_patch_t* patch, const ist_pose_t* b,
+                                const double point_a[3], const double point_b[3],
+                                ist_wrenches_t* wrenches);
+
+/* [u³/s] dV/dt while both move; a null twist is at rest. */
+ist_status_t ist_volume_rate(const ist_penetration_t* contact, const ist_pose_t* b,
+                             const ist_twist_t* motion_a, const ist_twist_t* motion_b,
+                             double* rate);
+ist_status_t ist_patch_volume_rate(const ist_contact_patch_t* patch, const ist_pose_t* b,
+                                   const ist_twist_t* motion_a, const ist_twist_t* motion_b,
+                                   double* rate);
+
+/* --- Time of impact (time_of_impact.h). [T] is a unit of time of the caller's own ------------- */
+
+/* Of constant velocity: one point goes straight on, and the object turns about it. */
+typedef struct ist_motion {
+  double velocity[3];         /* [u/T] of `about`, world */
+  double angular_velocity[3]; /* [rad/T] world */
+  double about[3];            /* [u] in the object's own frame, before its scale */
+} ist_motion_t;
+
+/* The motion from one pose to another in `duration` > 0 [T]. `about`: null is the origin.
+ * `scale`: the object's; 0 is taken for 1. */
+ist_status_t ist_motion_between(const ist_pose_t* from, const ist_pose_t* to, double duration,
+                                const double about[3], double scale, ist_motion_t* motion);
+
+/* Where an object of that scale is at a time of its motion. */
+ist_status_t ist_moved(const ist_pose_t* start, double scale, const ist_motion_t* motion,
+                       double time, ist_pose_t* pose);
+
+typedef int32_t ist_impact_kind_t;
+enum {
+  IST_NO_IMPACT = 0,         /* clear of each other over the whole interval */
+  IST_IMPACT = 1,            /* at `time` no further apart than the tolerance, and approaching */
+  IST_IMPACT_UNRESOLVED = 2, /* clear up to `time`; what comes then cannot be told so finely */
+  IST_IMPACT_OVERLAPPING = 3 /* they meet at the start */
+};
+
+/* ImpactSettings; a null pointer is a duration of 1 and defaults. */
+typedef struct ist_impact_settings {
+  uint32_t size;
+  uint32_t max_visits; /* count of pairs of nodes looked at; 0: any */
+  double duration;     /* [T] ≥ 0, as it stands: what happens in [0, duration] is asked */
+  double tolerance;    /* [u] 0: a thousandth of the smaller solid's bounding radius */
+  double deadline_us;  /* [µs] 0: none */
+} ist_impact_settings_t;
+
+/* TimeOfImpact */
+typedef struct ist_impact {
+  uint32_t size;
+  ist_status_t status; /* IST_BUDGET_EXHAUSTED: clear up to `time`, which a limit ended */
+  ist_impact_kind_t kind;
+  uint32_t node_visits, surface_pairs;
+  double time;                       /* [T] certified: the solids do not touch before */
+  double distance_min, distance_max; /* [u] the solids' distance then, certified */
+  double point_a[3], point_b[3];     /* [u] the nearest points then, world */
+  double normal[3];                  /* unit, from A to B, world */
+} ist_impact_t;
+
+/* Null motions are at rest. */
+ist_status_t ist_time_of_impact(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                const ist_motion_t* motion_a, const ist_motion_t* motion_b,
+                                const ist_impact_settings_t* settings, ist_workspace_t* workspace,
+                                ist_impact_t* answer);
+ist_status_t ist_field_time_of_impact(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                                      const ist_motion_t* motion_a, const ist_motion_t* motion_b,
+                                      const ist_impact_settings_t* settings,
+                                      ist_workspace_t* workspace, ist_impact_t* answer);
+
+/* --- Batches ---------------------------------------------------------------------------------- */
+
+typedef struct ist_pair {
+  const ist_placed_tree_t *a, *b;
+} ist_pair_t;
+
+typedef struct ist_field_pair {
+  const ist_placed_field_t* a;
+  const ist_placed_tree_t* b;
+} ist_field_pair_t;
+
+/* The caller's threads. */
+typedef struct ist_parallel {
+  uint32_t size;
+  /* Calls work(batch, i) once for each i in [0, workers), on any threads, at the same time or one
+   * after another, and returns when all calls have. Null: the calling thread does it all. */
+  void (*run)(void* pool, size_t workers, void (*work)(void* batch, size_t worker), void* batch);
+  void* pool; /* handed to `run` */
+} ist_parallel_t;
+
+/* answers[i] is that of ist_penetration(pairs[i]), with its status, errors included.
+ * `answer_size`: sizeof(ist_penetration_t); the answers' own `size` is written, not read.
+ * `workspaces`: [workers], one a worker, each made; none: every answer is IST_BUDGET_EXHAUSTED with
+ * no upper bound.
+ * `parallel`: null is the calling thread. No lock or allocation but its own.
+ * Returns an error of the call, in which case no pair was looked at, or IST_OK. */
+ist_status_t ist_penetration_batch(const ist_pair_t* pairs, size_t count,
+                                   const ist_penetration_settings_t* settings,
+                                   ist_workspace_t* workspaces, size_t workers,
+                                   ist_penetration_t* answers, size_t answer_size,
+                                   const ist_parallel_t* parallel);
+
+ist_status_t ist_field_penetration_batch(const ist_field_pair_t* pairs, size_t count,
+                                         const ist_penetration_settings_t* settings,
+                                         ist_workspace_t* workspaces, size_t workers,
+                                         ist_penetration_t* answers, size_t answer_size,
+                                         const ist_parallel_t* parallel);
+
+#ifdef __GNUC__
+#pragma GCC visibility pop
+#endif
+#ifdef __cplusplus
+}
+#endif
+
+#endif

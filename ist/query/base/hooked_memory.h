@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <new>
+#include <type_traits>
+
+#include <ist/query.h>
+
+namespace ist {
+
+/// Memory of a caller's hooks, or of operator new. Throws std::bad_alloc.
+inline void* take_memory(const MemoryHooks& hooks, std::size_t bytes, std::size_t alignment) {
+  if (hooks.allocate == nullptr) return ::operator new(bytes, std::align_val_t(alignment));
+  void* const memory = hooks.allocate(hooks.context, bytes, alignment);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+inline void give_memory_back(const MemoryHooks& hooks, void* memory, std::size_t bytes,
+                             std::size_t alignment) noexcept {
+  if (hooks.allocate == nullptr) {
+    ::operator delete(memory, std::align_val_t(alignment));
+  } else if (hooks.release != nullptr) {
+    hooks.release(hooks.context, memory, bytes, alignment);
+  }
+}
+
+struct HookedRelease {
+  MemoryHooks hooks;
+  std::size_t bytes = 0, alignment = 1;
+  void operator()(void* memory) const noexcept {
+    give_memory_back(hooks, memory, bytes, alignment);
+  }
+};
+
+template <class T>
+using HookedArray = std::unique_ptr<T[], HookedRelease>;
+
+/// Room for `count` values, not touched before use: what is large costs address space, not memory.
+template <class T>
+HookedArray<T> hooked_array(const MemoryHooks& hooks, std::size_t count) {
+  static_assert(std::is_trivially_destructible_v<T>);
+  if (count > std::numeric_limits<std::size_t>::max() / sizeof(T)) throw std::bad_alloc();
+  const std::size_t bytes = count * sizeof(T);
+  return {static_cast<T*>(take_memory(hooks, bytes, alignof(T))), {hooks, bytes, alignof(T)}};
+}
+
+template <class T>
+using Hooked = std::unique_ptr<T, HookedRelease>;
+
+/// One value, made as the defaults of its members have it.
+template <class T>
+Hooked<T> hooked(const MemoryHooks& hooks) {
+  T* const value = new (hooked_array<T>(hooks, 1).release()) T;
+  return {value, {hooks, sizeof(T), alignof(T)}};
+}
+
+}  // namespace ist

@@ -1,0 +1,43 @@
+#pragma once
+
+#include "query/c_api/structs.h"
+
+// What all queries of the C functions have in common.
+
+namespace ist::c_api {
+
+/// What stands for the first solid of a query: a tree or a field.
+struct TreeArgument {
+  ist_status_t read(const ist_placed_tree_t* given) noexcept { return c_api::read(given, tree); }
+  const PlacedTree& placed() const noexcept { return tree; }
+  PlacedTree tree;
+};
+inline TreeArgument argument_for(const ist_placed_tree_t*) noexcept { return {}; }
+inline FieldArgument argument_for(const ist_placed_field_t*) noexcept { return {}; }
+
+/// Reads what every query has, then runs `ask(a, b, workspace)`, which returns its status.
+template <class Solid, class Ask>
+ist_status_t ask_about(const Solid* a, const ist_placed_tree_t* b, ist_workspace_t* workspace,
+                       const Ask& ask) noexcept {
+  auto first = argument_for(a);
+  PlacedTree second;
+  ist_status_t status = first.read(a);
+  if (status == IST_OK) status = read(b, second);
+  if (status != IST_OK) return status;
+  Workspace* const scratch = workspace_of(workspace, status);
+  return scratch == nullptr ? status : ask(first.placed(), second, *scratch);
+}
+
+/// An answer's status. On an error the answer is all zero else; what is written anyway is not
+/// cleared before, which would cost more than all else here.
+template <class Answer>
+ist_status_t noted(ist_status_t status, Answer& answer) noexcept {
+  if (status < 0) {
+    answer = Answer{};
+    answer.size = sizeof(Answer);
+    answer.status = status;
+  }
+  return status;
+}
+
+}  // namespace ist::c_api

@@ -1,0 +1,172 @@
+#include <ist/mass_properties.h>
+#include <ist/pair_fit.h>
+#include <ist/wrench.h>
+
+#include "query/base/relative_pose.h"
+#include "query/c_api/structs.h"
+
+// Rigid bodies: mass, bounds, wrenches.
+
+namespace ist::c_api {
+namespace {
+
+using c_api::write;
+
+void write(const MassProperties& found, ist_mass_properties_t& out) noexcept {
+  out.volume = found.volume;
+  write(found.centre_of_mass, out.centre_of_mass);
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k) out.inertia[i][k] = found.inertia(i, k);
+  out.volume_error = found.volume_error;
+  out.centre_of_mass_error = found.centre_of_mass_error;
+  out.inertia_error = found.inertia_error;
+}
+
+void write(const Bounds& found, ist_bounds_t& out) noexcept {
+  write(found.lower, out.lower);
+  write(found.upper, out.upper);
+  write(found.centre, out.centre);
+  out.radius = found.radius;
+}
+
+/// As queries read it, and refused for a pose that they refuse.
+ist_status_t read_usable(const ist_placed_tree_t* given, PlacedTree& placed) noexcept {
+  const ist_status_t status = c_api::read(given, placed);
+  if (status != IST_OK) return status;
+  return usable_rotation(placed.pose, placed.scale) ? IST_OK : IST_INVALID_INPUT;
+}
+
+/// Writes what `find(solid)` finds of a solid that `read(given, solid)` reads.
+template <class Solid, class Given, class Read, class Find, class Answer>
+ist_status_t tell(const Given* given, const Read& read, const Find& find, Answer* answer) noexcept {
+  ist_status_t status = clear(answer);
+  if (status != IST_OK) return status;
+  Solid solid;
+  status = read(given, solid);
+  if (status == IST_OK) write(find(solid), *answer);
+  return answer->status = status;
+}
+
+const auto kMassProperties = [](const auto& solid) noexcept { return mass_properties(solid); };
+const auto kBounds = [](const auto& solid) noexcept { return bounds(solid); };
+
+Wrench wrench_on_b(const ist_penetration_t& contact) noexcept {
+  return {-vector(contact.translation_gradient), -vector(contact.rotation_gradient)};
+}
+Wrench wrench_on_b(const ist_contact_patch_t& patch) noexcept {
+  return {vector(patch.force), vector(patch.torque)};
+}
+
+ist_status_t check(const ist_penetration_t* contact) noexcept { return check_size(contact); }
+ist_status_t check(const ist_contact_patch_t* patch) noexcept {
+  return patch == nullptr ? IST_NULL_POINTER : IST_OK;
+}
+
+template <class Contact>
+ist_status_t find_wrenches(const Contact* contact, const ist_pose_t* b, const double* point_a,
+                           const double* point_b, ist_wrenches_t* out) noexcept {
+  ist_status_t status = clear(out);
+  if (status == IST_OK) status = check(contact);
+  if (status != IST_OK) return status;
+  if (b == nullptr || point_a == nullptr || point_b == nullptr) return IST_NULL_POINTER;
+  const Wrenches found = both_wrenches(wrench_on_b(*contact), vector(b->t),
+                                       Eigen::Vector3d(point_a), Eigen::Vector3d(point_b));
+  write(found.on_a.force, out->on_a.force);
+  write(found.on_a.torque, out->on_a.torque);
+  write(found.on_b.force, out->on_b.force);
+  write(found.on_b.torque, out->on_b.torque);
+  return IST_OK;
+}
+
+Twist twist(const ist_twist_t* given) noexcept {
+  if (given == nullptr) return {};
+  return {vector(given->point), vector(given->velocity), vector(given->angular_velocity)};
+}
+
+/// The contact of C++ that has this wrench.
+Penetration with_wrench(const Wrench& on_b) noexcept {
+  Penetration contact;
+  contact.translation_gradient = -on_b.force;
+  contact.rotation_gradient = -on_b.torque;
+  return contact;
+}
+
+template <class Contact>
+ist_status_t find_rate(const Contact* contact, const ist_pose_t* b, const ist_twist_t* motion_a,
+                       const ist_twist_t* motion_b, double* rate) noexcept {
+  if (rate == nullptr) return IST_NULL_POINTER;
+  *rate = 0;
+  const ist_status_t status = check(contact);
+  if (status != IST_OK) return status;
+  if (b == nullptr) return IST_NULL_POINTER;
+  *rate = volume_rate(with_wrench(wrench_on_b(*contact)), std::bit_cast<Pose>(*b), twist(motion_a),
+                      twist(motion_b));
+  return IST_OK;
+}
+
+}  // namespace
+}  // namespace ist::c_api
+
+using namespace ist::c_api;
+
+ist_status_t ist_tree_get_mass_properties(const ist_tree_t* tree,
+                                          ist_mass_properties_t* properties) {
+  return tell<ist::TreeView>(tree, view_of, kMassProperties, properties);
+}
+
+ist_status_t ist_tree_get_bounds(const ist_tree_t* tree, ist_bounds_t* bounds) {
+  return tell<ist::TreeView>(tree, view_of, kBounds, bounds);
+}
+
+ist_status_t ist_placed_mass_properties(const ist_placed_tree_t* placed,
+                                        ist_mass_properties_t* properties) {
+  return tell<ist::PlacedTree>(placed, read_usable, kMassProperties, properties);
+}
+
+ist_status_t ist_placed_bounds(const ist_placed_tree_t* placed, ist_bounds_t* bounds) {
+  return tell<ist::PlacedTree>(placed, read_usable, kBounds, bounds);
+}
+
+ist_status_t ist_wrenches(const ist_penetration_t* contact, const ist_pose_t* b,
+                          const double point_a[3], const double point_b[3],
+                          ist_wrenches_t* wrenches) {
+  return find_wrenches(contact, b, point_a, point_b, wrenches);
+}
+
+ist_status_t ist_patch_wrenches(const ist_contact_patch_t* patch, const ist_pose_t* b,
+                                const double point_a[3], const double point_b[3],
+                                ist_wrenches_t* wrenches) {
+  return find_wrenches(patch, b, point_a, point_b, wrenches);
+}
+
+ist_status_t ist_volume_rate(const ist_penetration_t* contact, const ist_pose_t* b,
+                             const ist_twist_t* motion_a, const ist_twist_t* motion_b,
+                             double* rate) {
+  return find_rate(contact, b, motion_a, motion_b, rate);
+}
+
+ist_status_t ist_patch_volume_rate(const ist_contact_patch_t* patch, const ist_pose_t* b,
+                                   const ist_twist_t* motion_a, const ist_twist_t* motion_b,
+                                   double* rate) {
+  return find_rate(patch, b, motion_a, motion_b, rate);
+}
+
+ist_status_t ist_get_pair_fit(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                              ist_pair_fit_t* fit) {
+  ist_status_t status = clear(fit);
+  if (status != IST_OK) return status;
+  ist::PlacedTree first, second;
+  status = read_usable(a, first);
+  if (status == IST_OK) status = read_usable(b, second);
+  fit->status = status;
+  if (status != IST_OK) return status;
+  const ist::PairFit found = ist::pair_fit(first, second);
+  fit->grain_a = found.grain_a;
+  fit->grain_b = found.grain_b;
+  fit->ratio = found.ratio;
+  fit->a_is_coarser = found.a_is_coarser ? 1 : 0;
+  fit->has_surface = found.has_surface ? 1 : 0;
+  fit->needs_surface = found.needs_surface ? 1 : 0;
+  fit->fits = found.fits() ? 1 : 0;
+  return IST_OK;
+}

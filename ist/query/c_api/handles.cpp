@@ -1,0 +1,159 @@
+#include "query/c_api/handles.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+
+#include <ist/asset_layout.h>
+
+#include "query/base/hooked_memory.h"
+#include "query/c_api/structs.h"
+
+namespace ist::c_api {
+namespace {
+
+ist_status_t status_of(AssetStatus status) noexcept {
+  switch (status) {
+    case AssetStatus::ok:
+      return IST_OK;
+    case AssetStatus::too_short:
+      return IST_TOO_SHORT;
+    case AssetStatus::misaligned:
+      return IST_MISALIGNED;
+    case AssetStatus::not_an_asset:
+      return IST_NOT_AN_ASSET;
+    case AssetStatus::other_version:
+      return IST_OTHER_FORMAT;
+    case AssetStatus::corrupt_hash:
+      return IST_CORRUPT_HASH;
+    case AssetStatus::corrupt_layout:
+      break;
+  }
+  return IST_CORRUPT_LAYOUT;
+}
+
+ist_status_t make_tree(const void* bytes, std::size_t size, ist_tree_t& tree) noexcept {
+  TreeHandle& handle = *new (&tree) TreeHandle{};
+  const AssetStatus status =
+      TreeView::from_bytes({static_cast<const std::byte*>(bytes), size}, handle.view);
+  if (status == AssetStatus::ok) handle.mark = handle.expected_mark();
+  return status_of(status);
+}
+
+struct CloseFile {
+  void operator()(std::FILE* file) const noexcept { std::fclose(file); }
+};
+
+/// Reads all of a file into memory of the hooks. No pipe or device: its size must be known.
+ist_status_t read_file(const char* path, const MemoryHooks& hooks, HookedArray<std::byte>& out) {
+  const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path, "rb"));
+  // A folder can be opened, but nothing can be read of it, and its size is not one.
+  if (!file || (std::fgetc(file.get()) == EOF && std::ferror(file.get()) != 0) ||
+      std::fseek(file.get(), 0, SEEK_END) != 0)
+    return IST_CANNOT_READ;
+  const long size = std::ftell(file.get());
+  if (size < 0 || std::fseek(file.get(), 0, SEEK_SET) != 0) return IST_CANNOT_READ;
+  if (size == 0) return IST_TOO_SHORT;
+  const auto bytes = static_cast<std::size_t>(size);
+  out = {static_cast<std::byte*>(take_memory(hooks, bytes, kAssetAlignment)),
+         {hooks, bytes, kAssetAlignment}};
+  return std::fread(out.get(), 1, bytes, file.get()) == bytes ? IST_OK : IST_CANNOT_READ;
+}
+
+}  // namespace
+
+ist_status_t Allocator::from(const ist_allocator_t* given, Allocator& out) noexcept {
+  if (given == nullptr) return IST_OK;
+  if (given->size != sizeof *given) return IST_WRONG_SIZE;
+  if (given->allocate == nullptr || given->release == nullptr) return IST_NULL_POINTER;
+  out.hooks = {given->allocate, given->release, given->context};
+  return IST_OK;
+}
+
+}  // namespace ist::c_api
+
+using namespace ist;
+using namespace ist::c_api;
+
+ist_status_t ist_tree_view(const void* bytes, std::size_t size, ist_tree_t* tree) {
+  if (tree == nullptr) return IST_NULL_POINTER;
+  *tree = {};
+  if (bytes == nullptr) return IST_NULL_POINTER;
+  return make_tree(bytes, size, *tree);
+}
+
+ist_status_t ist_tree_load(const char* path, const ist_allocator_t* allocator, ist_tree_t* tree) {
+  if (tree == nullptr) return IST_NULL_POINTER;
+  *tree = {};
+  if (path == nullptr) return IST_NULL_POINTER;
+  Allocator memory;
+  ist_status_t status = Allocator::from(allocator, memory);
+  if (status != IST_OK) return status;
+  try {
+    HookedArray<std::byte> bytes;
+    status = read_file(path, memory.hooks, bytes);
+    if (status != IST_OK) return status;
+    const HookedRelease& owned = bytes.get_deleter();
+    status = make_tree(bytes.get(), owned.bytes, *tree);
+    if (status != IST_OK) return status;
+    TreeHandle& handle = TreeHandle::in(*tree);
+    handle.memory = memory.hooks;
+    handle.size = owned.bytes;
+    handle.bytes = bytes.release();
+    return IST_OK;
+  } catch (const std::bad_alloc&) {
+    return IST_NO_MEMORY;
+  }
+}
+
+ist_status_t ist_tree_release(ist_tree_t* tree) {
+  if (tree == nullptr) return IST_NULL_POINTER;
+  const TreeHandle handle = TreeHandle::in(*tree);
+  if (!handle.made()) return IST_NO_HANDLE;
+  *tree = {};
+  if (handle.bytes != nullptr)
+    give_memory_back(handle.memory, handle.bytes, handle.size, kAssetAlignment);
+  return IST_OK;
+}
+
+ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info) {
+  const ist_status_t room = clear(info);
+  if (room != IST_OK) return room;
+  TreeView view;
+  const ist_status_t status = view_of(tree, view);
+  if (status != IST_OK) return status;
+  info->has_field = view.has_field() ? 1 : 0;
+  info->spheres = view.sphere_count();
+  info->volume = view.volume();
+  info->coverage = view.coverage();
+  info->protrusion = view.protrusion();
+  info->field_error = view.field_error();
+  info->field_triangles = view.field_triangles();
+  return IST_OK;
+}
+
+ist_status_t ist_workspace_make(std::size_t capacity, const ist_allocator_t* allocator,
+                                ist_workspace_t* workspace) {
+  if (workspace == nullptr) return IST_NULL_POINTER;
+  *workspace = {};
+  Allocator memory;
+  const ist_status_t status = Allocator::from(allocator, memory);
+  if (status != IST_OK) return status;
+  constexpr std::size_t kDefault = 1u << 20;
+  try {
+    Workspace made(capacity == 0 ? kDefault : capacity, memory.hooks);
+    new (workspace) WorkspaceHandle{WorkspaceHandle::kMark, std::move(made)};
+    return IST_OK;
+  } catch (const std::bad_alloc&) {
+    return IST_NO_MEMORY;
+  }
+}
+
+ist_status_t ist_workspace_release(ist_workspace_t* workspace) {
+  if (workspace == nullptr) return IST_NULL_POINTER;
+  WorkspaceHandle& handle = WorkspaceHandle::in(*workspace);
+  if (!handle.made()) return IST_NO_HANDLE;
+  handle.~WorkspaceHandle();
+  *workspace = {};
+  return IST_OK;
+}

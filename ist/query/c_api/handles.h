@@ -1,0 +1,81 @@
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <new>
+
+#include <ist/ist.h>
+#include <ist/query.h>
+
+// What lies in the memory of the caller's handles.
+
+namespace ist::c_api {
+
+/// Memory of a C caller's; null is the heap.
+struct Allocator {
+  MemoryHooks hooks;
+
+  /// Checks what the caller gave.
+  static ist_status_t from(const ist_allocator_t* given, Allocator& out) noexcept;
+};
+
+/// A tree's handle. The mark tells one from what was never made without following a pointer.
+struct TreeHandle {
+  std::uint64_t mark;
+  TreeView view;
+  void* bytes;  ///< that it owns, or null
+  std::size_t size;
+  MemoryHooks memory;
+
+  static constexpr std::uint64_t kMark = 0x7473692d65657274;  // "tree-ist"
+
+  static TreeHandle& in(ist_tree_t& tree) noexcept { return *reinterpret_cast<TreeHandle*>(&tree); }
+  static const TreeHandle& in(const ist_tree_t& tree) noexcept {
+    return *reinterpret_cast<const TreeHandle*>(&tree);
+  }
+  std::uint64_t expected_mark() const noexcept {
+    return kMark ^ std::bit_cast<std::uintptr_t>(view);
+  }
+  bool made() const noexcept { return mark == expected_mark(); }
+};
+static_assert(sizeof(TreeHandle) <= sizeof(ist_tree_t) && sizeof(TreeView) == sizeof(void*));
+
+/// A workspace's handle.
+struct WorkspaceHandle {
+  std::uint64_t mark;
+  Workspace workspace;
+
+  static constexpr std::uint64_t kMark = 0x7473692d6b726f77;  // "work-ist"
+
+  static WorkspaceHandle& in(ist_workspace_t& workspace) noexcept {
+    return *reinterpret_cast<WorkspaceHandle*>(&workspace);
+  }
+  bool made() const noexcept { return mark == kMark; }
+};
+static_assert(sizeof(WorkspaceHandle) <= sizeof(ist_workspace_t));
+
+/// The checked view behind a handle.
+inline ist_status_t view_of(const ist_tree_t* tree, TreeView& view) noexcept {
+  if (tree == nullptr) return IST_NULL_POINTER;
+  const TreeHandle& handle = TreeHandle::in(*tree);
+  if (!handle.made()) return IST_NO_HANDLE;
+  view = handle.view;
+  return IST_OK;
+}
+
+/// The workspace behind a handle, or null with `status` set.
+inline Workspace* workspace_of(ist_workspace_t* workspace, ist_status_t& status) noexcept {
+  if (workspace == nullptr) {
+    status = IST_NULL_POINTER;
+    return nullptr;
+  }
+  WorkspaceHandle& handle = WorkspaceHandle::in(*workspace);
+  if (!handle.made()) {
+    status = IST_NO_HANDLE;
+    return nullptr;
+  }
+  return &handle.workspace;
+}
+
+}  // namespace ist::c_api

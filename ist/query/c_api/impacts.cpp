@@ -1,0 +1,116 @@
+#include <ist/time_of_impact.h>
+
+#include "query/base/relative_pose.h"
+#include "query/c_api/ask.h"
+
+namespace ist::c_api {
+namespace {
+
+using c_api::read;
+using c_api::write;
+
+static_assert(IST_IMPACT_OVERLAPPING == static_cast<int>(ImpactStatus::overlapping));
+
+Motion read(const ist_motion_t* given) noexcept {
+  if (given == nullptr) return {};
+  return {vector(given->velocity), vector(given->angular_velocity), vector(given->about)};
+}
+
+ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) noexcept {
+  if (given == nullptr) return IST_OK;
+  if (given->size != sizeof *given) return IST_WRONG_SIZE;
+  settings.duration = given->duration;
+  settings.tolerance = given->tolerance;
+  settings.max_visits = given->max_visits;
+  settings.deadline_us = given->deadline_us;
+  return IST_OK;
+}
+
+void write(const TimeOfImpact& found, ist_impact_t& answer) noexcept {
+  switch (found.status) {
+    case ImpactStatus::invalid_input:
+      answer.status = IST_INVALID_INPUT;
+      return;  // all zero
+    case ImpactStatus::budget_exhausted:
+      answer.status = IST_BUDGET_EXHAUSTED;
+      break;
+    default:
+      answer.kind = static_cast<ist_impact_kind_t>(found.status);
+  }
+  answer.time = found.time;
+  answer.distance_min = found.distance_min;
+  answer.distance_max = found.distance_max;
+  write(found.point_a, answer.point_a);
+  write(found.point_b, answer.point_b);
+  write(found.normal, answer.normal);
+  answer.node_visits = found.node_visits;
+  answer.surface_pairs = found.surface_pairs;
+}
+
+template <class Solid>
+ist_status_t find_impact(const Solid* a, const ist_placed_tree_t* b, const ist_motion_t* motion_a,
+                         const ist_motion_t* motion_b, const ist_impact_settings_t* given,
+                         ist_workspace_t* workspace, ist_impact_t* answer) noexcept {
+  ist_status_t status = clear(answer);
+  if (status != IST_OK) return status;
+  ImpactSettings settings;
+  status = read(given, settings);
+  if (status == IST_OK)
+    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
+      write(time_of_impact(x, y, {read(motion_a), read(motion_b)}, settings, scratch), *answer);
+      return answer->status;
+    });
+  return noted(status, *answer);
+}
+
+bool is_finite(const Motion& motion) noexcept {
+  return motion.velocity.allFinite() && motion.angular_velocity.allFinite() &&
+         motion.about.allFinite();
+}
+
+}  // namespace
+}  // namespace ist::c_api
+
+using namespace ist::c_api;
+
+ist_status_t ist_motion_between(const ist_pose_t* from, const ist_pose_t* to, double duration,
+                                const double about[3], double scale, ist_motion_t* motion) {
+  if (motion == nullptr) return IST_NULL_POINTER;
+  *motion = {};
+  if (from == nullptr || to == nullptr) return IST_NULL_POINTER;
+  const Eigen::Vector3d centre =
+      about == nullptr ? Eigen::Vector3d::Zero() : Eigen::Vector3d(about);
+  const ist::Motion found =
+      ist::motion_between(std::bit_cast<ist::Pose>(*from), std::bit_cast<ist::Pose>(*to), duration,
+                          centre, scale == 0 ? 1 : scale);
+  if (!is_finite(found)) return IST_INVALID_INPUT;
+  write(found.velocity, motion->velocity);
+  write(found.angular_velocity, motion->angular_velocity);
+  write(found.about, motion->about);
+  return IST_OK;
+}
+
+ist_status_t ist_moved(const ist_pose_t* start, double scale, const ist_motion_t* motion,
+                       double time, ist_pose_t* pose) {
+  if (start == nullptr || motion == nullptr || pose == nullptr) return IST_NULL_POINTER;
+  ist::PlacedTree object;
+  object.pose = std::bit_cast<ist::Pose>(*start);
+  object.scale = scale == 0 ? 1 : scale;
+  object = ist::moved(object, read(motion), time);
+  *pose = std::bit_cast<ist_pose_t>(object.pose);
+  return ist::usable_rotation(object.pose, object.scale) ? IST_OK : IST_INVALID_INPUT;
+}
+
+ist_status_t ist_time_of_impact(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                const ist_motion_t* motion_a, const ist_motion_t* motion_b,
+                                const ist_impact_settings_t* settings, ist_workspace_t* workspace,
+                                ist_impact_t* answer) {
+  return find_impact(a, b, motion_a, motion_b, settings, workspace, answer);
+}
+
+ist_status_t ist_field_time_of_impact(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                                      const ist_motion_t* motion_a, const ist_motion_t* motion_b,
+                                      const ist_impact_settings_t* settings,
+                                      ist_workspace_t* workspace, ist_impact_t* answer) {
+  return find_impact(a, b, motion_a, motion_b, settings, workspace, answer);
+}

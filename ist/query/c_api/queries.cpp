@@ -1,0 +1,238 @@
+#include <algorithm>
+#include <span>
+
+#include <ist/overlap.h>
+
+#include "query/base/batch.h"
+#include "query/c_api/ask.h"
+#include "query/c_api/structs.h"
+
+namespace ist::c_api {
+namespace {
+
+template <class Solid>
+ist_status_t find_penetration(const Solid* a, const ist_placed_tree_t* b,
+                              const ist_penetration_settings_t* given, ist_workspace_t* workspace,
+                              ist_penetration_t* answer) noexcept {
+  ist_status_t status = check_size(answer);
+  if (status != IST_OK) return status;
+  PenetrationSettings settings;
+  status = read(given, settings);
+  if (status == IST_OK)
+    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
+      write(penetration(x, y, settings, scratch), *answer);
+      return answer->status;
+    });
+  return noted(status, *answer);
+}
+
+template <class Solid>
+ist_status_t find_separation(const Solid* a, const ist_placed_tree_t* b,
+                             const ist_separation_settings_t* given, ist_workspace_t* workspace,
+                             ist_separation_t* answer) noexcept {
+  ist_status_t status = check_size(answer);
+  if (status != IST_OK) return status;
+  SeparationSettings settings;
+  status = read(given, settings);
+  if (status == IST_OK)
+    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
+      write(separation(x, y, settings, scratch), *answer);
+      return answer->status;
+    });
+  return noted(status, *answer);
+}
+
+/// The worse of two.
+ist_status_t worse(ist_status_t a, ist_status_t b) noexcept {
+  return std::min(a, b) < 0 ? std::min(a, b) : std::max(a, b);
+}
+
+template <class Solid>
+ist_status_t find_overlap(const Solid* a, const ist_placed_tree_t* b, ist_workspace_t* workspace,
+                          ist_overlapping_t* answer) noexcept {
+  static_assert(IST_OVERLAP_UNKNOWN == static_cast<int>(Overlapping::unknown));
+  if (answer == nullptr) return IST_NULL_POINTER;
+  *answer = IST_OVERLAP_UNKNOWN;
+  return ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
+    *answer = static_cast<ist_overlapping_t>(overlap(x, y, scratch));
+    return ist_status_t{IST_OK};
+  });
+}
+
+template <class Solid>
+ist_status_t find_both(const Solid* a, const ist_placed_tree_t* b,
+                       const ist_penetration_settings_t* for_penetration,
+                       const ist_separation_settings_t* for_separation, ist_workspace_t* workspace,
+                       ist_penetration_t* penetration, ist_separation_t* separation) noexcept {
+  const ist_status_t room = check_size(penetration), other_room = check_size(separation);
+  ist_status_t status = worse(room, other_room);
+  QuerySettings settings;
+  if (status == IST_OK)
+    status = worse(read(for_penetration, settings.penetration),
+                   read(for_separation, settings.separation));
+  if (status == IST_OK)
+    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
+      const PenetrationAndSeparation both = query(x, y, settings, scratch);
+      write(both.penetration, *penetration);
+      write(both.separation, *separation);
+      return worse(penetration->status, separation->status);
+    });
+  if (room == IST_OK) noted(status, *penetration);
+  if (other_room == IST_OK) noted(status, *separation);
+  return status;
+}
+
+template <class Solid>
+ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
+                          const ist_contact_settings_t* given, ist_workspace_t* workspace,
+                          ist_contact_patches_t* patches, ist_penetration_t* whole) noexcept {
+  ist_status_t status = whole == nullptr ? IST_OK : check_size(whole);
+  if (status == IST_OK) status = check_size(patches);
+  if (status == IST_OK) {
+    patches->count = 0;
+    if (patches->patch_size != sizeof(ist_contact_patch_t)) status = IST_WRONG_SIZE;
+    if (patches->patches == nullptr && patches->capacity > 0) status = IST_NULL_POINTER;
+  }
+  ContactSettings settings;
+  if (status == IST_OK) status = read(given, settings);
+  if (status == IST_OK)
+    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
+      const std::span<ContactPatch> room(reinterpret_cast<ContactPatch*>(patches->patches),
+                                         patches->capacity);
+      const ContactPatches found = contact_patches(x, y, settings, scratch, room);
+      patches->count = found.count;
+      if (whole != nullptr) write(found.penetration, *whole);
+      return status_of(found.penetration.status);
+    });
+  if (whole != nullptr && whole->size == sizeof *whole) noted(status, *whole);
+  return status;
+}
+
+template <class Pair>
+ist_status_t find_batch(const Pair* pairs, std::size_t count,
+                        const ist_penetration_settings_t* given, ist_workspace_t* workspaces,
+                        std::size_t workers, ist_penetration_t* answers, std::size_t answer_size,
+                        const ist_parallel_t* parallel) noexcept {
+  if (count > 0 && (pairs == nullptr || answers == nullptr)) return IST_NULL_POINTER;
+  if (answer_size != sizeof(ist_penetration_t)) return IST_WRONG_SIZE;
+  if (workers > 0 && workspaces == nullptr) return IST_NULL_POINTER;
+  PenetrationSettings settings;
+  ist_status_t status = read(given, settings);
+  if (status == IST_OK && parallel != nullptr) status = check_size(parallel);
+  for (std::size_t i = 0; i < workers && status == IST_OK; ++i)
+    workspace_of(workspaces + i, status);
+  if (status != IST_OK) return status;
+  if (workers == 0) {
+    for (std::size_t i = 0; i < count; ++i) write(unknown_penetration(), answers[i]);
+    return IST_OK;
+  }
+  const ParallelFor threads =
+      parallel == nullptr ? ParallelFor{} : ParallelFor{parallel->run, parallel->pool};
+  answer_all(count, workers, threads, [&](std::size_t i, std::size_t worker) {
+    answers[i].size = sizeof answers[i];
+    // A pool that counts wrongly is told by the answer.
+    ist_workspace_t* const scratch = worker < workers ? workspaces + worker : nullptr;
+    find_penetration(pairs[i].a, pairs[i].b, given, scratch, answers + i);
+  });
+  return IST_OK;
+}
+
+}  // namespace
+}  // namespace ist::c_api
+
+using namespace ist::c_api;
+
+ist_status_t ist_penetration(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                             const ist_penetration_settings_t* settings, ist_workspace_t* workspace,
+                             ist_penetration_t* answer) {
+  return find_penetration(a, b, settings, workspace, answer);
+}
+
+ist_status_t ist_field_penetration(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                                   const ist_penetration_settings_t* settings,
+                                   ist_workspace_t* workspace, ist_penetration_t* answer) {
+  return find_penetration(a, b, settings, workspace, answer);
+}
+
+ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_placed_tree_t* a,
+                                    const ist_placed_tree_t* b, ist_penetration_t* answer) {
+  ist_status_t status = check_size(whole);
+  const ist::Penetration before = status == IST_OK ? read(*whole) : ist::Penetration{};
+  const ist_status_t room = clear(answer);  // which may be `whole`
+  if (room != IST_OK) return room;
+  ist::PlacedTree first, second;
+  if (status == IST_OK) status = read(a, first);
+  if (status == IST_OK) status = read(b, second);
+  if (status != IST_OK) return noted(status, *answer);
+  write(ist::without_protrusion(before, first, second), *answer);
+  return answer->status;
+}
+
+ist_status_t ist_separation(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                            const ist_separation_settings_t* settings, ist_workspace_t* workspace,
+                            ist_separation_t* answer) {
+  return find_separation(a, b, settings, workspace, answer);
+}
+
+ist_status_t ist_field_separation(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                                  const ist_separation_settings_t* settings,
+                                  ist_workspace_t* workspace, ist_separation_t* answer) {
+  return find_separation(a, b, settings, workspace, answer);
+}
+
+ist_status_t ist_overlap(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                         ist_workspace_t* workspace, ist_overlapping_t* answer) {
+  return find_overlap(a, b, workspace, answer);
+}
+
+ist_status_t ist_field_overlap(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                               ist_workspace_t* workspace, ist_overlapping_t* answer) {
+  return find_overlap(a, b, workspace, answer);
+}
+
+ist_status_t ist_query(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                       const ist_penetration_settings_t* penetration_settings,
+                       const ist_separation_settings_t* separation_settings,
+                       ist_workspace_t* workspace, ist_penetration_t* penetration,
+                       ist_separation_t* separation) {
+  return find_both(a, b, penetration_settings, separation_settings, workspace, penetration,
+                   separation);
+}
+
+ist_status_t ist_field_query(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                             const ist_penetration_settings_t* penetration_settings,
+                             const ist_separation_settings_t* separation_settings,
+                             ist_workspace_t* workspace, ist_penetration_t* penetration,
+                             ist_separation_t* separation) {
+  return find_both(a, b, penetration_settings, separation_settings, workspace, penetration,
+                   separation);
+}
+
+ist_status_t ist_contact_patches(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                 const ist_contact_settings_t* settings, ist_workspace_t* workspace,
+                                 ist_contact_patches_t* patches, ist_penetration_t* whole) {
+  return find_patches(a, b, settings, workspace, patches, whole);
+}
+
+ist_status_t ist_field_contact_patches(const ist_placed_field_t* a, const ist_placed_tree_t* b,
+                                       const ist_contact_settings_t* settings,
+                                       ist_workspace_t* workspace, ist_contact_patches_t* patches,
+                                       ist_penetration_t* whole) {
+  return find_patches(a, b, settings, workspace, patches, whole);
+}
+
+ist_status_t ist_penetration_batch(const ist_pair_t* pairs, std::size_t count,
+                                   const ist_penetration_settings_t* settings,
+                                   ist_workspace_t* workspaces, std::size_t workers,
+                                   ist_penetration_t* answers, std::size_t answer_size,
+                                   const ist_parallel_t* parallel) {
+  return find_batch(pairs, count, settings, workspaces, workers, answers, answer_size, parallel);
+}
+
+ist_status_t ist_field_penetration_batch(const ist_field_pair_t* pairs, std::size_t count,
+                                         const ist_penetration_settings_t* settings,
+                                         ist_workspace_t* workspaces, std::size_t workers,
+                                         ist_penetration_t* answers, std::size_t answer_size,
+                                         const ist_parallel_t* parallel) {
+  return find_batch(pairs, count, settings, workspaces, workers, answers, answer_size, parallel);
+}

@@ -1,0 +1,154 @@
+#include "query/c_api/structs.h"
+
+namespace ist::c_api {
+namespace {
+
+/// Settings that both kinds of penetration have.
+template <class Given, class Settings>
+ist_status_t read_limits(const Given& given, Settings& settings) noexcept {
+  if (given.measure < IST_MATCHED || given.measure > IST_INNER ||
+      given.field < IST_FIELD_AUTOMATIC || given.field > IST_FIELD_ALWAYS)
+    return IST_INVALID_INPUT;
+  settings.measure = static_cast<Measure>(given.measure);
+  settings.field = static_cast<FieldUse>(given.field);
+  settings.max_visits = given.max_visits;
+  settings.deadline_us = given.deadline_us;
+  settings.relative_error = given.relative_error;
+  settings.min_radius = given.min_radius;
+  return IST_OK;
+}
+
+}  // namespace
+
+ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& settings) noexcept {
+  if (given == nullptr) return IST_OK;
+  if (given->size != sizeof *given) return IST_WRONG_SIZE;
+  settings.pair_budget = given->pair_budget;
+  return read_limits(*given, settings);
+}
+
+ist_status_t read(const ist_contact_settings_t* given, ContactSettings& settings) noexcept {
+  if (given == nullptr) return IST_OK;
+  if (given->size != sizeof *given) return IST_WRONG_SIZE;
+  return read_limits(*given, settings);
+}
+
+ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& settings) noexcept {
+  if (given == nullptr) return IST_OK;
+  if (given->size != sizeof *given) return IST_WRONG_SIZE;
+  settings.max_visits = given->max_visits;
+  settings.deadline_us = given->deadline_us;
+  return IST_OK;
+}
+
+void write(const Penetration& found, ist_penetration_t& answer) noexcept {
+  answer.size = sizeof answer;
+  answer.status = status_of(found.status);
+  answer.volume = found.volume;
+  answer.volume_min = found.volume_min;
+  answer.volume_max = found.volume_max;
+  write(found.centroid, answer.centroid);
+  write(found.translation_gradient, answer.translation_gradient);
+  write(found.rotation_gradient, answer.rotation_gradient);
+  answer.node_visits = found.node_visits;
+  answer.sphere_pairs = found.sphere_pairs;
+}
+
+Penetration read(const ist_penetration_t& given) noexcept {
+  Penetration result;
+  result.volume = given.volume;
+  result.volume_min = given.volume_min;
+  result.volume_max = given.volume_max;
+  result.centroid = vector(given.centroid);
+  result.translation_gradient = vector(given.translation_gradient);
+  result.rotation_gradient = vector(given.rotation_gradient);
+  result.status = query_status(given.status);
+  result.node_visits = given.node_visits;
+  result.sphere_pairs = given.sphere_pairs;
+  return result;
+}
+
+void write(const Separation& found, ist_separation_t& answer) noexcept {
+  answer.size = sizeof answer;
+  answer.status = status_of(found.status);
+  answer.distance = found.distance;
+  answer.distance_min = found.distance_min;
+  answer.distance_max = found.distance_max;
+  write(found.point_a, answer.point_a);
+  write(found.point_b, answer.point_b);
+  write(found.normal, answer.normal);
+  answer.node_visits = found.node_visits;
+  answer.sphere_pairs = found.sphere_pairs;
+}
+
+FieldSample FieldArgument::look(const void* context, const Eigen::Vector3d& x) noexcept {
+  const auto& function = static_cast<const ist_field_t*>(context)->as.function;
+  ist_field_sample_t sample = {};
+  function.look(function.context, x.data(), &sample);
+  return {sample.distance, vector(sample.gradient)};
+}
+
+ist_status_t FieldArgument::read(const ist_placed_field_t* given) noexcept {
+  ist_status_t status = check_size(given);
+  if (status == IST_OK) status = check_size(given->field);
+  if (status == IST_OK) status = read(*given->field);
+  if (status == IST_OK) place(*given, placed_);
+  return status;
+}
+
+ist_status_t FieldArgument::read(const ist_field_t& given) noexcept {
+  Field& field = placed_.field;
+  switch (given.kind) {
+    case IST_HALF_SPACE:
+      field = HalfSpaceField{vector(given.as.half_space.normal), given.as.half_space.offset};
+      return IST_OK;
+    case IST_BOX:
+      field = BoxField{vector(given.as.box.half_extents)};
+      return IST_OK;
+    case IST_BALL:
+      field = BallField{given.as.ball.radius};
+      return IST_OK;
+    case IST_CAPSULE:
+      field = CapsuleField{given.as.capsule.radius, given.as.capsule.half_height};
+      return IST_OK;
+    case IST_CYLINDER:
+      field = CylinderField{given.as.cylinder.radius, given.as.cylinder.half_height};
+      return IST_OK;
+    case IST_HEIGHTS: {
+      const auto& from = given.as.heights;
+      if (from.heights == nullptr) return IST_NULL_POINTER;
+      HeightField heights{
+          from.heights, from.columns, from.rows, {from.spacing[0], from.spacing[1]}};
+      if (from.lowest != 0 || from.highest != 0) {
+        heights.lowest = from.lowest;
+        heights.highest = from.highest;
+      }
+      field = heights;
+      return IST_OK;
+    }
+    case IST_DISTANCE_GRID: {
+      const auto& from = given.as.distance_grid;
+      if (from.distances == nullptr) return IST_NULL_POINTER;
+      field = DistanceGridField{from.distances,
+                                {from.points[0], from.points[1], from.points[2]},
+                                vector(from.origin),
+                                from.spacing,
+                                from.error};
+      return IST_OK;
+    }
+    case IST_FUNCTION:
+      if (given.as.function.look == nullptr) return IST_NULL_POINTER;
+      field = FunctionField{look, &given, given.as.function.error};
+      return IST_OK;
+    case IST_MESH: {
+      MeshField mesh;
+      const ist_status_t status = view_of(given.as.mesh.tree, mesh.tree);
+      field = mesh;
+      return status;
+    }
+    default:
+      return IST_INVALID_INPUT;
+  }
+}
+
+}  // namespace ist::c_api

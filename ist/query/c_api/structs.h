@@ -1,0 +1,99 @@
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <type_traits>
+
+#include <ist/field.h>
+#include <ist/ist.h>
+#include <ist/query.h>
+
+#include "query/c_api/handles.h"
+
+// C structs to and from those of C++: checked, then copied number by number.
+
+namespace ist::c_api {
+
+/// Whether a struct is there and of a size that this library knows.
+template <class T>
+ist_status_t check_size(const T* given) noexcept {
+  if (given == nullptr) return IST_NULL_POINTER;
+  return given->size == sizeof(T) ? IST_OK : IST_WRONG_SIZE;
+}
+
+/// Makes room for an answer: all zero but its size.
+template <class T>
+ist_status_t clear(T* answer) noexcept {
+  const ist_status_t status = check_size(answer);
+  if (status == IST_OK) {
+    *answer = T{};
+    answer->size = sizeof(T);
+  }
+  return status;
+}
+
+inline Eigen::Vector3d vector(const double (&v)[3]) noexcept { return {v[0], v[1], v[2]}; }
+inline void write(const Eigen::Vector3d& v, double (&out)[3]) noexcept {
+  for (int k = 0; k < 3; ++k) out[k] = v[k];
+}
+
+inline ist_status_t status_of(QueryStatus status) noexcept {
+  return status == QueryStatus::ok                 ? IST_OK
+         : status == QueryStatus::budget_exhausted ? IST_BUDGET_EXHAUSTED
+                                                   : IST_INVALID_INPUT;
+}
+inline QueryStatus query_status(ist_status_t status) noexcept {
+  return status == IST_OK                 ? QueryStatus::ok
+         : status == IST_BUDGET_EXHAUSTED ? QueryStatus::budget_exhausted
+                                          : QueryStatus::invalid_input;
+}
+
+/// The pose and scale of a placed tree or field.
+template <class Given, class Placed>
+void place(const Given& given, Placed& placed) noexcept {
+  placed.pose = std::bit_cast<Pose>(given.pose);
+  placed.scale = given.scale == 0 ? 1 : given.scale;
+}
+
+inline ist_status_t read(const ist_placed_tree_t* given, PlacedTree& placed) noexcept {
+  ist_status_t status = check_size(given);
+  if (status == IST_OK) status = view_of(given->tree, placed.tree);
+  if (status == IST_OK) place(*given, placed);
+  return status;
+}
+
+/// A field as C++ has it. Of a function the caller's struct is looked into at every look.
+class FieldArgument {
+ public:
+  ist_status_t read(const ist_placed_field_t* given) noexcept;
+  const PlacedField& placed() const noexcept { return placed_; }
+
+ private:
+  static FieldSample look(const void* context, const Eigen::Vector3d& x) noexcept;
+
+  ist_status_t read(const ist_field_t& field) noexcept;
+
+  PlacedField placed_;
+};
+
+ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& settings) noexcept;
+ist_status_t read(const ist_contact_settings_t* given, ContactSettings& settings) noexcept;
+ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& settings) noexcept;
+
+void write(const Penetration& found, ist_penetration_t& answer) noexcept;
+void write(const Separation& found, ist_separation_t& answer) noexcept;
+Penetration read(const ist_penetration_t& given) noexcept;
+
+// Patches are written where the caller has room for them.
+static_assert(std::is_standard_layout_v<ContactPatch>);
+static_assert(sizeof(ist_contact_patch_t) == sizeof(ContactPatch));
+static_assert(offsetof(ist_contact_patch_t, id) == offsetof(ContactPatch, id));
+static_assert(offsetof(ist_contact_patch_t, centroid) == offsetof(ContactPatch, centroid));
+static_assert(offsetof(ist_contact_patch_t, normal) == offsetof(ContactPatch, normal));
+static_assert(offsetof(ist_contact_patch_t, area) == offsetof(ContactPatch, area));
+static_assert(offsetof(ist_contact_patch_t, depth) == offsetof(ContactPatch, depth));
+static_assert(offsetof(ist_contact_patch_t, volume) == offsetof(ContactPatch, volume));
+static_assert(offsetof(ist_contact_patch_t, force) == offsetof(ContactPatch, force));
+static_assert(offsetof(ist_contact_patch_t, torque) == offsetof(ContactPatch, torque));
+
+}  // namespace ist::c_api

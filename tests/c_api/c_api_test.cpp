@@ -1,0 +1,240 @@
+#include <gtest/gtest.h>
+#include <ist/bake.h>
+#include <ist/field.h>
+#include <ist/ist.h>
+#include <ist/mass_properties.h>
+#include <ist/overlap.h>
+#include <ist/query.h>
+#include <ist/time_of_impact.h>
+#include <ist/wrench.h>
+
+#include <bit>
+
+#include "c_api/checks.h"
+#include "support/oracle_assets.h"
+#include "support/random_assets.h"
+#include "support/temp_file.h"
+#include "support/test_meshes.h"
+
+namespace ist {
+namespace {
+
+TEST(CApi, EveryFunctionFromC) {
+  const Asset cube = bake(close_mesh(testing::cube_mesh(), "cube"), {.max_spheres = 200});
+  const Asset other = testing::make_random_asset({600, 0.2, {}, 0, 2}, 1);
+  const auto text = [](const Asset& asset) {
+    return std::string_view(reinterpret_cast<const char*>(asset.bytes().data()),
+                            asset.bytes().size());
+  };
+  const testing::TempFile file_a("a.ist", text(cube)), file_b("b.ist", text(other));
+  EXPECT_EQ(c_api_checks(file_a.path().c_str(), file_b.path().c_str()), 0);
+  EXPECT_EQ(c_api_checks(file_b.path().c_str(), file_a.path().c_str()), 0);
+}
+
+ist_tree_t viewed(const Asset& asset) {
+  ist_tree_t tree;
+  EXPECT_EQ(ist_tree_view(asset.bytes().data(), asset.bytes().size(), &tree), IST_OK);
+  return tree;
+}
+
+/// A struct of the C functions, set up.
+template <class T>
+T sized() {
+  T result = {};
+  result.size = sizeof result;
+  return result;
+}
+
+ist_placed_tree_t placed_in_c(const ist_tree_t& tree, const PlacedTree& like) {
+  return {sizeof(ist_placed_tree_t), &tree, std::bit_cast<ist_pose_t>(like.pose), like.scale};
+}
+
+#define EXPECT_SAME(a, b) \
+  EXPECT_EQ(std::bit_cast<std::uint64_t>(a), std::bit_cast<std::uint64_t>(b))
+
+void expect_same(const double (&c)[3], const Eigen::Vector3d& cpp) {
+  for (int k = 0; k < 3; ++k) EXPECT_SAME(c[k], cpp[k]);
+}
+
+void expect_same(const ist_penetration_t& c, const Penetration& cpp) {
+  EXPECT_SAME(c.volume, cpp.volume);
+  EXPECT_SAME(c.volume_min, cpp.volume_min);
+  EXPECT_SAME(c.volume_max, cpp.volume_max);
+  expect_same(c.centroid, cpp.centroid);
+  expect_same(c.translation_gradient, cpp.translation_gradient);
+  expect_same(c.rotation_gradient, cpp.rotation_gradient);
+  EXPECT_EQ(c.status, static_cast<int>(cpp.status));
+  EXPECT_EQ(c.node_visits, cpp.node_visits);
+  EXPECT_EQ(c.sphere_pairs, cpp.sphere_pairs);
+}
+
+void expect_same(const ist_separation_t& c, const Separation& cpp) {
+  EXPECT_SAME(c.distance, cpp.distance);
+  EXPECT_SAME(c.distance_min, cpp.distance_min);
+  EXPECT_SAME(c.distance_max, cpp.distance_max);
+  expect_same(c.point_a, cpp.point_a);
+  expect_same(c.point_b, cpp.point_b);
+  expect_same(c.normal, cpp.normal);
+  EXPECT_EQ(c.status, static_cast<int>(cpp.status));
+  EXPECT_EQ(c.node_visits, cpp.node_visits);
+  EXPECT_EQ(c.sphere_pairs, cpp.sphere_pairs);
+}
+
+class OracleRows : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
+    ASSERT_EQ(ist_workspace_make(0, nullptr, &c_workspace_), IST_OK);
+  }
+  void TearDown() override { ist_workspace_release(&c_workspace_); }
+
+  Workspace workspace_;
+  ist_workspace_t c_workspace_ = {};
+};
+
+TEST_F(OracleRows, HaveTheBitsOfCpp) {
+  int answered = 0;
+  for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
+    if (row.id % 8 != 0) continue;
+    const auto [a, b] = testing::placed(row, 1000);
+    const ist_tree_t tree_a = viewed(testing::oracle_asset(row.mesh_a, 1000));
+    const ist_tree_t tree_b = viewed(testing::oracle_asset(row.mesh_b, 1000));
+    const ist_placed_tree_t c_a = placed_in_c(tree_a, a), c_b = placed_in_c(tree_b, b);
+
+    PenetrationSettings settings;
+    settings.measure = row.id % 16 == 0 ? Measure::matched : Measure::inner;
+    settings.max_visits = row.id % 24 == 0 ? 40 : 0;
+    settings.pair_budget = row.id % 40 == 0 ? 200 : 0;
+    const ist_penetration_settings_t c_settings = {sizeof c_settings,
+                                                   static_cast<ist_measure_t>(settings.measure),
+                                                   IST_FIELD_AUTOMATIC,
+                                                   settings.pair_budget,
+                                                   settings.max_visits,
+                                                   0,
+                                                   0,
+                                                   0};
+    auto c_penetration = sized<ist_penetration_t>();
+    auto c_separation = sized<ist_separation_t>();
+    ASSERT_GE(
+        ist_query(&c_a, &c_b, &c_settings, nullptr, &c_workspace_, &c_penetration, &c_separation),
+        0);
+    expect_same(c_penetration, penetration(a, b, settings, workspace_));
+    expect_same(c_separation, separation(a, b, {}, workspace_));
+
+    // The surface in A's asset as a field.
+    const PlacedField field{MeshField{a.tree}, a.pose, a.scale};
+    auto c_field = sized<ist_field_t>();
+    c_field.kind = IST_MESH;
+    c_field.as.mesh.tree = &tree_a;
+    const ist_placed_field_t c_placed = {sizeof c_placed, &c_field, c_a.pose, c_a.scale};
+    ASSERT_GE(ist_field_query(&c_placed, &c_b, nullptr, nullptr, &c_workspace_, &c_penetration,
+                              &c_separation),
+              0);
+    const PenetrationAndSeparation both = query(field, b, {}, workspace_);
+    expect_same(c_penetration, both.penetration);
+    expect_same(c_separation, both.separation);
+
+    ContactPatch patches[16];
+    ist_contact_patch_t c_room[16];
+    ist_contact_patches_t c_patches = {sizeof c_patches, sizeof c_room[0], c_room, 16, 0};
+    const ContactPatches found = contact_patches(a, b, {}, workspace_, patches);
+    ASSERT_GE(ist_contact_patches(&c_a, &c_b, nullptr, &c_workspace_, &c_patches, &c_penetration),
+              0);
+    expect_same(c_penetration, found.penetration);
+    ASSERT_EQ(c_patches.count, found.count);
+    for (std::size_t i = 0; i < found.count; ++i) {
+      EXPECT_EQ(c_room[i].id, patches[i].id);
+      expect_same(c_room[i].centroid, patches[i].centroid);
+      expect_same(c_room[i].normal, patches[i].normal);
+      EXPECT_SAME(c_room[i].area, patches[i].area);
+      EXPECT_SAME(c_room[i].depth, patches[i].depth);
+      EXPECT_SAME(c_room[i].volume, patches[i].volume);
+      expect_same(c_room[i].force, patches[i].force);
+      expect_same(c_room[i].torque, patches[i].torque);
+    }
+
+    const Eigen::Vector3d point(0.1, 0.2, 0.3);
+    auto c_wrenches = sized<ist_wrenches_t>();
+    ASSERT_EQ(ist_wrenches(&c_penetration, &c_b.pose, point.data(), point.data(), &c_wrenches),
+              IST_OK);
+    const Wrenches both_wrenches = wrenches(found.penetration, b.pose, point, point);
+    expect_same(c_wrenches.on_a.force, both_wrenches.on_a.force);
+    expect_same(c_wrenches.on_a.torque, both_wrenches.on_a.torque);
+    expect_same(c_wrenches.on_b.torque, both_wrenches.on_b.torque);
+
+    PlacedTree away = b;
+    away.pose.t[0] += 3;
+    ist_placed_tree_t c_away = placed_in_c(tree_b, away);
+    const Motion motion{{-6, 0.1, 0.2}, {0.5, 0.6, 0.7}, {0.01, 0.02, 0.03}};
+    const ist_motion_t c_motion = {{-6, 0.1, 0.2}, {0.5, 0.6, 0.7}, {0.01, 0.02, 0.03}};
+    const TimeOfImpact impact = time_of_impact(a, away, {{}, motion}, {}, workspace_);
+    auto c_impact = sized<ist_impact_t>();
+    ASSERT_GE(
+        ist_time_of_impact(&c_a, &c_away, nullptr, &c_motion, nullptr, &c_workspace_, &c_impact),
+        0);
+    EXPECT_EQ(c_impact.kind, static_cast<int>(impact.status));
+    EXPECT_SAME(c_impact.time, impact.time);
+    EXPECT_SAME(c_impact.distance_min, impact.distance_min);
+    EXPECT_SAME(c_impact.distance_max, impact.distance_max);
+    expect_same(c_impact.point_a, impact.point_a);
+    expect_same(c_impact.point_b, impact.point_b);
+    expect_same(c_impact.normal, impact.normal);
+    EXPECT_EQ(c_impact.node_visits, impact.node_visits);
+    EXPECT_EQ(c_impact.surface_pairs, impact.surface_pairs);
+
+    ist_overlapping_t c_overlap;
+    ASSERT_EQ(ist_overlap(&c_a, &c_b, &c_workspace_, &c_overlap), IST_OK);
+    EXPECT_EQ(c_overlap, static_cast<int>(overlap(a, b, workspace_)));
+
+    const MassProperties mass = mass_properties(b);
+    const Bounds box = bounds(b);
+    auto c_mass = sized<ist_mass_properties_t>();
+    auto c_box = sized<ist_bounds_t>();
+    ASSERT_EQ(ist_placed_mass_properties(&c_b, &c_mass), IST_OK);
+    ASSERT_EQ(ist_placed_bounds(&c_b, &c_box), IST_OK);
+    EXPECT_SAME(c_mass.volume, mass.volume);
+    EXPECT_SAME(c_mass.volume_error, mass.volume_error);
+    EXPECT_SAME(c_mass.centre_of_mass_error, mass.centre_of_mass_error);
+    EXPECT_SAME(c_mass.inertia_error, mass.inertia_error);
+    expect_same(c_mass.centre_of_mass, mass.centre_of_mass);
+    for (int k = 0; k < 3; ++k) expect_same(c_mass.inertia[k], mass.inertia.row(k).transpose());
+    expect_same(c_box.lower, box.lower);
+    expect_same(c_box.upper, box.upper);
+    expect_same(c_box.centre, box.centre);
+    EXPECT_SAME(c_box.radius, box.radius);
+    ++answered;
+  }
+  EXPECT_GT(answered, 20);
+}
+
+// A caller's memory serves the C++ workspace too, and no answer depends on it.
+TEST(MemoryHooks, HoldAWorkspace) {
+  struct Count {
+    std::size_t taken = 0, given_back = 0;
+  } count;
+  const MemoryHooks hooks{
+      [](void* context, std::size_t bytes, std::size_t alignment) {
+        static_cast<Count*>(context)->taken += bytes;
+        return ::operator new(bytes, std::align_val_t(alignment));
+      },
+      [](void* context, void* memory, std::size_t bytes, std::size_t alignment) {
+        static_cast<Count*>(context)->given_back += bytes;
+        ::operator delete(memory, std::align_val_t(alignment));
+      },
+      &count};
+  const Asset asset = testing::make_random_asset({600, 0.2, {}, 0, 2}, 1);
+  const PlacedTree a{asset.view(), {}, 1}, b{asset.view(), {{1, 0, 0, 0}, {0.3, 0, 0}}, 1};
+  {
+    Workspace hooked(1 << 12, hooks), plain(1 << 12);
+    EXPECT_GT(count.taken, std::size_t{40} << 12);
+    EXPECT_EQ(penetration(a, b, {}, hooked).volume, penetration(a, b, {}, plain).volume);
+    Workspace moved = std::move(hooked);
+    EXPECT_EQ(count.given_back, 0u);
+  }
+  EXPECT_EQ(count.taken, count.given_back);
+  const MemoryHooks none{[](void*, std::size_t, std::size_t) -> void* { return nullptr; }};
+  EXPECT_THROW(Workspace(64, none), std::bad_alloc);
+}
+
+}  // namespace
+}  // namespace ist

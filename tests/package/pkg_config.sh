@@ -1,0 +1,40 @@
+#!/bin/sh
+# pkg_config.sh SOURCE CXX CC WHOLE STATIC_ONLY A.ist B.ist MESH MESH
+# Programs built by pkg-config alone: WHOLE is an install tree with both kinds of libraries,
+# STATIC_ONLY one of ist::query that has no shared one.
+set -eu
+source=$1 cxx=$2 cc=$3 whole=$4 static_only=$5 a=$6 b=$7
+shift 7
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+use() { export PKG_CONFIG_PATH="$1/lib/pkgconfig:$1/lib/$(cc -dumpmachine)/pkgconfig"; }
+
+use "$whole"
+version=$(sed -n 's/^project.*//; s/^#define IST_VERSION_[A-Z]* \([0-9]*\)$/\1/p' \
+  "$source/include/ist/version.h" | paste -sd.)
+[ "$(pkg-config --modversion ist-query)" = "$version" ]
+[ "$(pkg-config --modversion ist)" = "$version" ]
+case $(pkg-config --libs ist-query) in *hwy*) echo "-lhwy is the static library's" >&2; exit 1 ;; esac
+rpath="-Wl,-rpath,$(pkg-config --variable=libdir ist-query)"
+"$cxx" -std=c++20 "$source/examples/engine/engine.cpp" \
+  $(pkg-config --cflags --libs ist-query) "$rpath" -o "$work/engine"
+"$work/engine" "$a" "$b"
+"$cc" -std=c11 -Wall -Wextra -pedantic -Werror "$source/examples/c/c.c" \
+  $(pkg-config --cflags --libs ist-query) "$rpath" -o "$work/c"
+"$work/c" "$a" "$b"
+"$cxx" -std=c++20 "$source/examples/bake_and_query/bake_and_query.cpp" \
+  $(pkg-config --cflags --libs ist) "$rpath" -o "$work/bake_and_query"
+"$work/bake_and_query" "$@"
+readelf -d "$work/bake_and_query" | grep -q 'libist\.so'
+
+# The static libraries of the same tree, by name.
+"$cxx" -std=c++20 "$source/examples/bake_and_query/bake_and_query.cpp" \
+  $(pkg-config --static --cflags --libs ist | sed 's/-list_query/-l:libist_query.a/; s/-list /-l:libist.a /') \
+  -o "$work/bake_and_query"
+"$work/bake_and_query" "$@"
+if readelf -d "$work/bake_and_query" | grep 'libist'; then exit 1; fi
+
+use "$static_only"
+"$cc" -std=c11 "$source/examples/c/c.c" $(pkg-config --cflags --libs ist-query) -o "$work/c"
+"$work/c" "$a" "$b"
