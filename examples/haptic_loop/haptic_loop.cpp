@@ -235,7 +235,7 @@ int main(int argc, char** argv) {
     late.push_back(done - due);
     if (contact.penetration.volume > 0) ++touching;
     if (contact.penetration.status != ist::QueryStatus::ok) ++cut_short;
-    hand.move(contact, 1e-6 * period);  // a device would be sent stiffness · −translation_gradient
+    hand.move(contact, 1e-6 * period);  // a device would be sent pressure · −translation_gradient
     due += period;
     if (done > due) {  // the next tick was due before this one was answered
       missed.count(computed.back(), taken.back(), period);
