@@ -13,7 +13,7 @@ int main(int argc, char** argv) try {
   const ist::Pose pose_b{.t = {0.5, 0, 0}};  // x_world = R x + t; A stays at the origin
   ist::Workspace scratch;
   const ist::Penetration p = ist::penetration({a.view(), {}}, {b.view(), pose_b}, {}, scratch);
-  const Eigen::Vector3d push_on_b = -p.translation_gradient;  // times your stiffness
+  const Eigen::Vector3d push_on_b = -p.translation_gradient;  // times a pressure [force/u²]
   std::printf("overlap %g, push B along (%g, %g, %g)\n", p.volume, push_on_b.x(), push_on_b.y(),
               push_on_b.z());
 } catch (const ist::Error& error) {  // names the file and the way out; queries never throw

@@ -136,4 +136,10 @@ void penetration_batch(std::span<const PlacedFieldPair> pairs, const Penetration
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel = {}) noexcept;
 
+/// answers[i] = contact_patches(pairs[i]), as the batch of trees does it.
+void contact_patches_batch(std::span<const PlacedFieldPair> pairs, const ContactSettings& settings,
+                           std::span<Workspace> workspaces, std::span<ContactPatches> answers,
+                           std::span<ContactPatch> patches,
+                           const ParallelFor& parallel = {}) noexcept;
+
 }  // namespace ist

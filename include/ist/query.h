@@ -113,8 +113,8 @@ struct Penetration {
   double volume_min = 0;
   double volume_max = 0;                               ///< [u³] upper bound on that sum, likewise
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the overlap, world; zero if none
-  /// [u²] dV/d(translation of B), world. A k·V penalty pushes B by −k times this, A by the
-  /// opposite.
+  /// [u²] dV/d(translation of B), world. A pressure [force/u²] pushes B by −pressure times this, A
+  /// by the opposite: <ist/response.h> has pressures that grow with depth.
   Eigen::Vector3d translation_gradient = Eigen::Vector3d::Zero();
   /// [u³/rad] dV/d(rotation vector of B about B's origin), world.
   Eigen::Vector3d rotation_gradient = Eigen::Vector3d::Zero();
@@ -230,7 +230,7 @@ struct ContactPatch {
   double area = 0;    ///< [u²] |force|: what the contact surface measures, seen along the normal
   double depth = 0;   ///< [u] volume/area, ≤ the smaller solid's bounding diameter; 0 if no area
   double volume = 0;  ///< [u³] share of Penetration::volume
-  /// [u²] share of −translation_gradient: the push on B of a penalty of 1 · volume. A's is
+  /// [u²] share of −translation_gradient: the push on B of a pressure of 1 [force/u²]. A's is
   /// opposite.
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
   /// [u³/rad] share of −rotation_gradient, about B's origin: not the moment of `force` at
@@ -258,6 +258,19 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept;
 
+/// Patches without what protruding spheres add where flat faces meet, as without_protrusion() of a
+/// penetration: each by its own depth, so that faces that lean against each other lose it where
+/// they hardly touch and keep the rest.
+///
+/// Volumes, areas, forces and torques become less; a patch of which nothing is left stays, with
+/// zeros and no normal. Patches whose spheres met a surface, and those of the inner measure, are as
+/// they should be and stay. So may stay what the Penetration of the same answer says: it is another
+/// sum now.
+///
+/// `patches`: what contact_patches() wrote for these two under these settings.
+void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, const PlacedTree& b,
+                        const ContactSettings& settings) noexcept;
+
 /// Two placed solids of a batch.
 struct PlacedPair {
   PlacedTree a, b;
@@ -282,5 +295,17 @@ struct ParallelFor {
 void penetration_batch(std::span<const PlacedPair> pairs, const PenetrationSettings& settings,
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel = {}) noexcept;
+
+/// answers[i] = contact_patches(pairs[i]), the same bits, for as many as there are answers.
+///
+/// `patches` are shared out evenly: with m = patches.size() / count, where count is the lesser of
+/// pairs and answers, those of pair i begin at patches[i · m], and answers[i].count of them are
+/// written.
+///
+/// Workspaces, pool and limits as penetration_batch() has them.
+void contact_patches_batch(std::span<const PlacedPair> pairs, const ContactSettings& settings,
+                           std::span<Workspace> workspaces, std::span<ContactPatches> answers,
+                           std::span<ContactPatch> patches,
+                           const ParallelFor& parallel = {}) noexcept;
 
 }  // namespace ist

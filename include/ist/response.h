@@ -9,6 +9,7 @@
 #include <limits>
 #include <span>
 
+#include <ist/api.h>
 #include <ist/query.h>
 #include <ist/wrench.h>
 
@@ -22,7 +23,7 @@
 // on a flat face sinks or floats, and falls through once its energy exceeds k · area · thickness.
 // Here the *pressure* grows with depth, as on a bed of springs.
 
-namespace ist {
+namespace IST_API ist {
 
 /// How a contact pushes, patch by patch.
 ///

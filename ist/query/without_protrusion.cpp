@@ -1,10 +1,14 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
 
 #include <ist/query.h>
 
 #include <ist/asset_layout.h>
+#include "query/base/relative_pose.h"
 #include "query/base/smooth_step.h"
+#include "query/field/pair_overlap.h"
 
 namespace ist {
 namespace {
@@ -29,28 +33,83 @@ double skin_of(const PlacedTree& placed) {
          std::min(asset.matched_tree.mean_radius, 3 * asset.protrusion);
 }
 
+/// [u] Of two solids' layers together.
+double skin_of(const PlacedTree& a, const PlacedTree& b) {
+  const double of_a = skin_of(a), of_b = skin_of(b);
+  return std::sqrt((of_a * of_a + of_b * of_b) / 2);
+}
+
+/// [0, 1] whether faces meet that are flat. `depth`: over the skin.
+double flatness(double volume, double area, double depth) {
+  const double ratio = area / volume;
+  return smooth_step((ratio * ratio * area / depth - kRound) / (kFlat - kRound));
+}
+
+/// What of volume and force is left at a depth < kDeep, over the skin.
+struct Left {
+  double volume, force;
+};
+Left left_at(double depth, double flat) {
+  const double t = std::max((depth - kTouching) / (kDeep - kTouching), 0.0);
+  const double volume = smooth_step(t);
+  const double force =
+      volume + kStiffening * depth * (6 * t * (1 - t) / (kDeep - kTouching));  // t < 1
+  return {1 - flat * (1 - volume), 1 - flat * (1 - force)};
+}
+
 }  // namespace
 
 Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
                                const PlacedTree& b) noexcept {
   if (a.tree.empty() || b.tree.empty() || !(whole.volume > 0)) return whole;
   const double area = whole.translation_gradient.norm();
-  const double of_a = skin_of(a), of_b = skin_of(b);
-  const double skin = std::sqrt((of_a * of_a + of_b * of_b) / 2);
+  const double skin = skin_of(a, b);
   if (!(whole.volume < kDeep * (skin * area))) return whole;
   const double depth = whole.volume / (skin * area);
-  const double ratio = area / whole.volume;
-  const double flat = smooth_step((ratio * ratio * area / depth - kRound) / (kFlat - kRound));
-  const double t = std::max((depth - kTouching) / (kDeep - kTouching), 0.0);
-  const double volume = smooth_step(t);
-  const double force =
-      volume + kStiffening * depth * (6 * t * (1 - t) / (kDeep - kTouching));  // t < 1
+  const Left left = left_at(depth, flatness(whole.volume, area, depth));
   Penetration result = whole;
-  result.volume *= 1 - flat * (1 - volume);
+  result.volume *= left.volume;
   result.volume_min = std::min(result.volume_min, result.volume);
-  result.translation_gradient *= 1 - flat * (1 - force);
-  result.rotation_gradient *= 1 - flat * (1 - force);
+  result.translation_gradient *= left.force;
+  result.rotation_gradient *= left.force;
   return result;
+}
+
+void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, const PlacedTree& b,
+                        const ContactSettings& settings) noexcept {
+  if (a.tree.empty() || b.tree.empty() || settings.measure == Measure::inner) return;
+  const std::optional<RelativePose> pose = relative_pose(a, b);
+  if (!pose) return;
+  // What meets a surface is exact.
+  if (pair_method(a, a.tree.header().matched_tree, b, b.tree.header().matched_tree, *pose,
+                  settings.field)
+          .exact)
+    return;
+  const double skin = skin_of(a, b);
+  const auto is_light = [&](const ContactPatch& patch) {
+    return patch.volume < kDeep * (skin * patch.area);
+  };
+  // The light patches are one contact, flat or not, and each has its depth.
+  double volume = 0;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  for (const ContactPatch& patch : patches)
+    if (is_light(patch)) {
+      volume += patch.volume;
+      force += patch.force;
+    }
+  const double area = force.norm();
+  if (!(volume > 0) || !(area > 0)) return;
+  const double flat = flatness(volume, area, volume / (skin * area));
+  for (ContactPatch& patch : patches) {
+    if (!is_light(patch)) continue;
+    const Left left = left_at(patch.volume / (skin * patch.area), flat);
+    patch.volume *= left.volume;
+    patch.area *= left.force;
+    patch.force *= left.force;
+    patch.torque *= left.force;
+    patch.depth = patch.area > 0 ? patch.volume / patch.area : 0;
+    if (!(patch.area > 0)) patch.normal.setZero();
+  }
 }
 
 }  // namespace ist

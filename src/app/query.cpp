@@ -239,8 +239,8 @@ void add_query(CLI::App& app) {
   command->add_flag("--csv", options->csv, "Answers as CSV (the default with --poses)")
       ->excludes(json);
   command->footer(
-      "Gradients are taken with respect to a motion of B, all in A's frame; a penalty potential "
-      "k·V\n"
+      "Gradients are taken with respect to a motion of B, all in A's frame; a pressure k "
+      "[force/u²]\n"
       "pushes B by −k·dVdt and turns it by −k·dVdr about its origin.\n"
       "A field stands in its own frame; ./box:1,1,1 names a file of that name.\n"
       "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9\n"

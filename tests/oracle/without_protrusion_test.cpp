@@ -79,6 +79,58 @@ TEST_F(FlatFaces, VolumeAndForceGrowSmoothlyWithTheDepth) {
   EXPECT_LT(largest_step, 0.1 * before.translation_gradient.norm());
 }
 
+/// Patches of a face lose what the whole loses, and where faces lean against each other those that
+/// hardly touch lose more.
+TEST_F(FlatFaces, PatchesLoseIt) {
+  ContactSettings settings;
+  settings.field = FieldUse::never;
+  const PlacedTree a{cube().view(), {}, 1};
+  const auto asked = [&](const PlacedTree& b, ContactSettings how) {
+    std::vector<ContactPatch> patches(16);
+    patches.resize(contact_patches(a, b, how, workspace_, patches).count);
+    std::vector<ContactPatch> sharp = patches;
+    without_protrusion(sharp, a, b, how);
+    return std::pair(patches, sharp);
+  };
+  const auto volume_of = [](const std::vector<ContactPatch>& patches) {
+    double sum = 0;
+    for (const ContactPatch& patch : patches) sum += patch.volume;
+    return sum;
+  };
+  PlacedTree b = a;
+  b.pose = {{std::cos(0.3), std::sin(0.3), 0, 0}, {0, 0.1 * side_, -0.05 * side_}};  // as at()
+  const double layer = radius_ * side_ * side_;
+  for (double gap = -1; gap < 0.3; gap += 0.05) {
+    b.pose.t[0] = side_ + gap * radius_;
+    const auto [raw, sharp] = asked(b, settings);
+    EXPECT_NEAR(volume_of(sharp), at(gap * radius_).sharp.volume, 0.02 * layer) << gap;
+    if (gap < -0.5) {
+      EXPECT_EQ(volume_of(sharp), volume_of(raw));
+    }
+    if (gap > 0.1) {
+      EXPECT_LT(volume_of(sharp), 0.002 * layer);
+    }
+    for (std::size_t i = 0; i < raw.size(); ++i) {
+      EXPECT_LE(sharp[i].volume, raw[i].volume);
+      EXPECT_EQ(sharp[i].id, raw[i].id);
+      EXPECT_NEAR(sharp[i].area, sharp[i].force.norm(), 1e-12 * raw[i].area);
+      EXPECT_LE(sharp[i].depth, raw[i].depth * (1 + 1e-12));
+    }
+  }
+
+  // By the surface, and by inner spheres, nothing sticks out.
+  b.pose.t[0] = side_ + 0.05 * radius_;
+  b.scale = 0.1;
+  b.pose.t[0] -= 0.45 * side_;
+  for (const bool inner : {false, true}) {
+    ContactSettings exact;
+    if (inner) exact.measure = Measure::inner;
+    b.pose.t[0] -= inner ? radius_ : 0;
+    const auto [raw, sharp] = asked(b, exact);
+    EXPECT_EQ(volume_of(sharp), volume_of(raw));
+  }
+}
+
 TEST(RoundContacts, KeepTheirVolume) {
   IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
   Workspace workspace;

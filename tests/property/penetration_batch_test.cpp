@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <ist/field.h>
 #include <ist/query.h>
 #include <ist/query_tbb.h>
 
@@ -53,6 +54,50 @@ class PenetrationBatch : public ::testing::Test {
   std::vector<PlacedPair> pairs_;
 };
 
+/// Patches too are those of single queries, each pair's where they belong.
+TEST_F(PenetrationBatch, Patches) {
+  std::vector<Workspace> scratch;
+  for (int i = 0; i < 3; ++i) scratch.emplace_back(1 << 16);
+  constexpr std::size_t kEach = 5;
+  const auto expect_same_patches = [&](const auto& pairs) {
+    for (const ParallelFor& parallel : {ParallelFor{}, tbb_parallel_for()}) {
+      std::vector<ContactPatches> answers(pairs.size());
+      std::vector<ContactPatch> patches(kEach * pairs.size() + 3);
+      contact_patches_batch(pairs, {}, scratch, answers, patches, parallel);
+      std::size_t met = 0;
+      for (std::size_t i = 0; i < pairs.size(); ++i) {
+        std::vector<ContactPatch> own(kEach);
+        const ContactPatches one = contact_patches(pairs[i].a, pairs[i].b, {}, scratch[0], own);
+        ASSERT_EQ(answers[i].count, one.count) << "pair " << i;
+        ASSERT_EQ(answers[i].penetration.volume, one.penetration.volume);
+        ASSERT_EQ(answers[i].penetration.status, one.penetration.status);
+        for (std::size_t k = 0; k < one.count; ++k) {
+          const ContactPatch& found = patches[kEach * i + k];
+          ASSERT_EQ(found.id, own[k].id);
+          ASSERT_EQ(found.volume, own[k].volume);
+          ASSERT_EQ(found.force, own[k].force);
+          ASSERT_EQ(found.torque, own[k].torque);
+        }
+        met += one.count > 0;
+      }
+      EXPECT_GT(met, pairs.size() / 2);
+    }
+  };
+  expect_same_patches(std::span<const PlacedPair>(pairs_));
+  std::vector<PlacedFieldPair> fields;
+  for (const PlacedPair& pair : pairs_) fields.push_back({{BallField{0.8}, pair.a.pose}, pair.b});
+  expect_same_patches(std::span<const PlacedFieldPair>(fields));
+
+  std::vector<ContactPatches> answers(3);
+  contact_patches_batch(pairs_, {}, {}, answers, {});
+  EXPECT_EQ(answers[2].penetration.status, QueryStatus::budget_exhausted);
+  EXPECT_EQ(answers[2].count, 0u);
+  contact_patches_batch(std::span<const PlacedPair>(), {}, scratch, answers, {});
+  contact_patches_batch(pairs_, {}, scratch, answers, {});
+  EXPECT_EQ(answers[2].penetration.volume,
+            penetration(pairs_[2].a, pairs_[2].b, {}, scratch[0]).volume);
+}
+
 TEST_F(PenetrationBatch, OnTheCallingThread) { expect_same({}, 1); }
 
 TEST_F(PenetrationBatch, OnThreadsOfTheCaller) {
@@ -94,7 +139,7 @@ TEST_F(PenetrationBatch, AnswersNoMoreThanThereIsRoomFor) {
   penetration_batch(pairs_, {}, scratch, answers);
   for (std::size_t i = 0; i < answers.size(); ++i)
     EXPECT_EQ(answers[i].volume, penetration(pairs_[i].a, pairs_[i].b, {}, scratch[0]).volume);
-  penetration_batch({}, {}, scratch, answers, tbb_parallel_for());
+  penetration_batch(std::span<const PlacedPair>(), {}, scratch, answers, tbb_parallel_for());
 }
 
 }  // namespace
