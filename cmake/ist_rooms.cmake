@@ -36,9 +36,6 @@ function(ist_add_room name)
     target_include_directories(${target} PUBLIC ${root})
     target_link_libraries(${target} PUBLIC ist_public ${arg_USES} PRIVATE ${arg_LIBS})
     ist_compile_options(${target})
-    # Of a shared library only what the public headers declare is seen (ist/api.h).
-    set_target_properties(${target} PROPERTIES
-      CXX_VISIBILITY_PRESET hidden CUDA_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
     if(NOT arg_APART)
       set_property(GLOBAL APPEND PROPERTY IST_ROOM_OBJECTS $<TARGET_OBJECTS:${target}>)
     endif()

@@ -1,0 +1,88 @@
+#include <gtest/gtest.h>
+#include <ist/bake.h>
+#include <ist/field.h>
+#include <ist/query.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "support/test_meshes.h"
+
+// Cubes face to face: what pushes sideways beyond the exact gradient of the overlap's volume.
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+
+const Asset& cube() {
+  static const Asset asset = [] {
+    PackingSettings settings;
+    settings.max_spheres = 4000;
+    return bake(close_mesh(testing::cube_mesh(), "cube"), settings);
+  }();
+  return asset;
+}
+
+Pose turned(double x, double y, double z, double yaw) {
+  return {{std::cos(yaw / 2), 0, 0, std::sin(yaw / 2)}, {x, y, z}};
+}
+
+TEST(AlignedFlats, AFieldsFaceDoesNotPushSideways) {
+  Workspace workspace;
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (const double depth : {0.0, 0.002, 0.01, 0.05}) {
+    for (int i = 0; i < 20; ++i) {
+      const double x = uniform(random), y = uniform(random), yaw = 3 * uniform(random);
+      for (const Field& field : {Field(HalfSpaceField{}), Field(BoxField{{3, 3, 0.25}})}) {
+        const double top = std::holds_alternative<BoxField>(field) ? 0.25 : 0;
+        const Penetration p =
+            penetration(PlacedField{field, {}},
+                        {cube().view(), turned(x, y, top + 0.5 - depth, yaw)}, {}, workspace);
+        EXPECT_GT(-p.translation_gradient.z(), 0.3);
+        EXPECT_LE(p.translation_gradient.head<2>().norm(), -0.003 * p.translation_gradient.z());
+      }
+    }
+  }
+}
+
+// Faces that overlap in part are pushed apart by the exact gradient, depth times edge: what is
+// beyond it is the spheres'. By the surface it is a third of what it is by lenses.
+TEST(AlignedFlats, CubesOnCubesPushSidewaysAsTheExactGradientDoes) {
+  Workspace workspace;
+  const auto beyond = [&](FieldUse use, double depth) {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> uniform(-0.5, 0.5);
+    PenetrationSettings settings;
+    settings.field = use;
+    std::vector<double> shares;
+    for (int i = 0; i < 100; ++i) {
+      const double x = uniform(random), y = uniform(random);
+      const Penetration p = penetration(
+          {cube().view(), {}}, {cube().view(), turned(x, y, 1 - depth, 0)}, settings, workspace);
+      const Eigen::Vector2d exact(std::copysign((1 - std::abs(y)) * depth, x),
+                                  std::copysign((1 - std::abs(x)) * depth, y));
+      const Vector3d push = -p.translation_gradient;
+      shares.push_back((push.head<2>() - exact).norm() / push.z());
+    }
+    std::sort(shares.begin(), shares.end());
+    return shares;
+  };
+  for (const double depth : {0.01, 0.02}) {
+    const std::vector<double> surface = beyond(FieldUse::always, depth);
+    const std::vector<double> lenses = beyond(FieldUse::never, depth);
+    std::printf(
+        "depth %g: by the surface median %.4f, p95 %.4f, worst %.4f; by lenses %.4f, %.4f, %.4f\n",
+        depth, surface[50], surface[95], surface[99], lenses[50], lenses[95], lenses[99]);
+    EXPECT_LE(surface[50], 0.005);
+    EXPECT_LE(surface[95], 0.01);
+    EXPECT_LE(surface[99], 0.02);
+    EXPECT_LT(surface[50], 0.6 * lenses[50]);
+  }
+}
+
+}  // namespace
+}  // namespace ist
