@@ -17,3 +17,5 @@ if(IST_OPENVDB)
       "libopenvdb-dev (dev setup --vdb), or configure with -DIST_OPENVDB=OFF")
   endif()
 endif()
+# Templates of OpenVDB keep statics that those who use it have to share with it.
+set(IST_OPENVDB_VISIBILITY -fvisibility=default -fno-visibility-inlines-hidden)
