@@ -140,8 +140,8 @@ struct Separation {
 
 /// Where a workspace takes its memory: plain functions, called while it is made and when it ends.
 struct MemoryHooks {
-  /// At least `bytes` bytes at a multiple of `alignment`, a power of two, or null if there are none.
-  /// Null here: operator new.
+  /// At least `bytes` bytes at a multiple of `alignment`, a power of two, or null if there are
+  /// none. Null here: operator new.
   void* (*allocate)(void* context, std::size_t bytes, std::size_t alignment) = nullptr;
   void (*release)(void* context, void* memory, std::size_t bytes, std::size_t alignment) = nullptr;
   void* context = nullptr;  ///< handed to both
@@ -227,7 +227,9 @@ struct ContactPatch {
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the patch's overlap, world
   /// Unit, world: the direction in which the patch pushes B, from A to B; zero if the area is.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  double area = 0;    ///< [u²] |force|: what the contact surface measures, seen along the normal
+  /// [u²] |force|: what the contact surface measures, seen along the normal; 0 where that is
+  /// rounding, as of a patch that lies wholly inside the other solid.
+  double area = 0;
   double depth = 0;   ///< [u] volume/area, ≤ the smaller solid's bounding diameter; 0 if no area
   double volume = 0;  ///< [u³] share of Penetration::volume
   /// [u²] share of −translation_gradient: the push on B of a pressure of 1 [force/u²]. A's is

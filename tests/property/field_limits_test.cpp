@@ -173,5 +173,25 @@ TEST(FieldPairs, PatchesAddUpToTheWhole) {
   }
 }
 
+TEST(FieldQuery, PatchesInsideHaveNoNormal) {
+  Workspace workspace;
+  std::mt19937_64 random(29);
+  ContactPatch patches[8];
+  for (const Field& field : {Field(BoxField{Vector3d(2, 2, 2)}), Field(MeshField{slab().view()})}) {
+    for (int i = 0; i < 20; ++i) {
+      const PlacedField a{field, random_pose(random, 0.3), 1.7};
+      const PlacedTree b{cube().view(), a.pose, 0.05 + 0.01 * i};
+      const ContactPatches got = contact_patches(a, b, {}, workspace, patches);
+      ASSERT_GT(got.count, 0u);
+      for (const ContactPatch& patch : std::span(patches).first(got.count)) {
+        EXPECT_EQ(patch.area, 0);
+        EXPECT_EQ(patch.depth, 0);
+        EXPECT_EQ(patch.normal, Vector3d::Zero());
+        EXPECT_GT(patch.volume, 0);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace ist
