@@ -173,23 +173,29 @@ TEST(FieldPairs, PatchesAddUpToTheWhole) {
   }
 }
 
-TEST(FieldQuery, PatchesInsideHaveNoNormal) {
+void expect_no_normals(const PlacedField& a, const PlacedTree& b, const ContactSettings& settings) {
   Workspace workspace;
-  std::mt19937_64 random(29);
   ContactPatch patches[8];
-  for (const Field& field : {Field(BoxField{Vector3d(2, 2, 2)}), Field(MeshField{slab().view()})}) {
-    for (int i = 0; i < 20; ++i) {
-      const PlacedField a{field, random_pose(random, 0.3), 1.7};
-      const PlacedTree b{cube().view(), a.pose, 0.05 + 0.01 * i};
-      const ContactPatches got = contact_patches(a, b, {}, workspace, patches);
-      ASSERT_GT(got.count, 0u);
-      for (const ContactPatch& patch : std::span(patches).first(got.count)) {
-        EXPECT_EQ(patch.area, 0);
-        EXPECT_EQ(patch.depth, 0);
-        EXPECT_EQ(patch.normal, Vector3d::Zero());
-        EXPECT_GT(patch.volume, 0);
-      }
-    }
+  const ContactPatches got = contact_patches(a, b, settings, workspace, patches);
+  ASSERT_GT(got.count, 0u);
+  for (const ContactPatch& patch : std::span(patches).first(got.count)) {
+    EXPECT_EQ(patch.area, 0);
+    EXPECT_EQ(patch.depth, 0);
+    EXPECT_EQ(patch.normal, Vector3d::Zero());
+    EXPECT_GT(patch.volume, 0);
+  }
+}
+
+TEST(FieldQuery, PatchesInsideHaveNoNormal) {
+  std::mt19937_64 random(29);
+  for (int i = 0; i < 20; ++i) {
+    // A body in a field, and a field in one ball of a body: the surface pushes from all sides.
+    const PlacedField box{BoxField{Vector3d(2, 2, 2)}, random_pose(random, 0.3), 1.7};
+    expect_no_normals(box, {cube().view(), box.pose, 0.05 + 0.01 * i}, {});
+    const PlacedField ring{MeshField{torus().view()}, random_pose(random, 0.05), 0.5};
+    ContactSettings inner;
+    inner.measure = Measure::inner;
+    expect_no_normals(ring, {cube().view(), {}, 1}, inner);
   }
 }
 
