@@ -10,7 +10,8 @@
  * Results: on an error of a call its answers are all zero but for `size` and `status`, where there
  * is room for them.
  * Sizes: a struct that starts with `size` is set up as `ist_penetration_t x = {.size = sizeof x}`;
- * all else may be 0, which is the default. A library serves the sizes of the headers it serves.
+ * all else may be 0, the default but of ist_impact_settings_t::duration. A library serves the sizes
+ * of the headers it serves.
  * Handles: ist_tree_t and ist_workspace_t lie in memory of the caller's and are empty where all
  * zero. One that owns memory must be released once, and not be copied. Released ones are known and
  * refused; a copy of one, or memory freed under it, cannot be.
@@ -323,7 +324,7 @@ typedef struct ist_contact_patch {
   double area;        /* [u²] */
   double depth;       /* [u] volume/area */
   double volume;      /* [u³] */
-  double force[3];    /* [u²] the push on B of a penalty of 1 · volume */
+  double force[3];    /* [u²] the push on B of a pressure of 1 [force/u²] */
   double torque[3];   /* [u³/rad] about B's origin */
 } ist_contact_patch_t;
 
@@ -481,7 +482,8 @@ typedef struct ist_impact_settings {
   uint32_t size;
   uint32_t max_visits; /* count of pairs of nodes looked at; 0: any */
   double duration;     /* [T] ≥ 0, as it stands: what happens in [0, duration] is asked */
-  double tolerance;    /* [u] 0: a thousandth of the smaller solid's bounding radius */
+  double tolerance;    /* [u] 0: a thousandth of the smaller solid's bounding radius,
+                          or ten times what fields may err if that is more */
   double deadline_us;  /* [µs] 0: none */
 } ist_impact_settings_t;
 
@@ -493,8 +495,9 @@ typedef struct ist_impact {
   uint32_t node_visits, surface_pairs;
   double time;                       /* [T] certified: the solids do not touch before */
   double distance_min, distance_max; /* [u] the solids' distance then, certified */
-  double point_a[3], point_b[3];     /* [u] the nearest points then, world */
-  double normal[3];                  /* unit, from A to B, world */
+  double point_a[3], point_b[3]; /* [u] the nearest points then, world; others may be nearer by a
+                                    part of the tolerance */
+  double normal[3];              /* unit, from A to B, world */
 } ist_impact_t;
 
 /* Null motions are at rest. */

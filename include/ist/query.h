@@ -230,7 +230,9 @@ struct ContactPatch {
   /// [u²] |force|: what the contact surface measures, seen along the normal; 0 where that is
   /// rounding, as of a patch that lies wholly inside the other solid.
   double area = 0;
-  double depth = 0;   ///< [u] volume/area, ≤ the smaller solid's bounding diameter; 0 if no area
+  /// [u] volume/area, ≤ the smaller solid's bounding diameter; 0 if no area. A mean: patches of one
+  /// level face differ by a factor of two and more, as spheres fall to them.
+  double depth = 0;
   double volume = 0;  ///< [u³] share of Penetration::volume
   /// [u²] share of −translation_gradient: the push on B of a pressure of 1 [force/u²]. A's is
   /// opposite.

@@ -64,7 +64,8 @@ struct ImpactSettings {
   /// a negative value or NaN: a thousandth of the smaller solid's bounding radius (of B's, where A
   /// is a field), or ten times what the assets' fields may err if that is more.
   ///
-  /// What starts nearer is an impact only if it approaches.
+  /// What starts nearer is an impact only if it approaches; over several calls it may come nearer
+  /// than a half of this, never to nought.
   double tolerance = 0;
 
   std::uint32_t max_visits = 0;  ///< count of pairs of nodes looked at, the earliest first; 0: any

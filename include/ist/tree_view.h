@@ -68,6 +68,8 @@ class TreeView {
 
   /// Checks everything before use (hash, offsets, counts, finiteness) without allocating. On any
   /// status but ok, `out` is left empty.
+  ///
+  /// `bytes` must start on a 64-byte boundary, as mapped files do.
   static AssetStatus from_bytes(std::span<const std::byte> bytes, TreeView& out) noexcept;
 
   bool empty() const noexcept { return header_ == nullptr; }
