@@ -40,4 +40,20 @@ ist_status_t noted(ist_status_t status, Answer& answer) noexcept {
   return status;
 }
 
+/// A query with settings and one answer: `ask(a, b, settings, workspace)` finds it.
+template <class Settings, class Solid, class Given, class Answer, class Ask>
+ist_status_t answer_with(const Solid* a, const ist_placed_tree_t* b, const Given* given,
+                         ist_workspace_t* workspace, Answer* answer, const Ask& ask) noexcept {
+  ist_status_t status = check_size(answer);
+  if (status != IST_OK) return status;
+  Settings settings;
+  status = read(given, settings);
+  if (status == IST_OK)
+    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
+      write(ask(x, y, settings, scratch), *answer);
+      return answer->status;
+    });
+  return noted(status, *answer);
+}
+
 }  // namespace ist::c_api

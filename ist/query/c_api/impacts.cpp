@@ -7,60 +7,21 @@ namespace ist::c_api {
 namespace {
 
 using c_api::read;
-using c_api::write;
-
-static_assert(IST_IMPACT_OVERLAPPING == static_cast<int>(ImpactStatus::overlapping));
 
 Motion read(const ist_motion_t* given) noexcept {
   if (given == nullptr) return {};
   return {vector(given->velocity), vector(given->angular_velocity), vector(given->about)};
 }
 
-ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) noexcept {
-  if (given == nullptr) return IST_OK;
-  if (given->size != sizeof *given) return IST_WRONG_SIZE;
-  settings.duration = given->duration;
-  settings.tolerance = given->tolerance;
-  settings.max_visits = given->max_visits;
-  settings.deadline_us = given->deadline_us;
-  return IST_OK;
-}
-
-void write(const TimeOfImpact& found, ist_impact_t& answer) noexcept {
-  switch (found.status) {
-    case ImpactStatus::invalid_input:
-      answer.status = IST_INVALID_INPUT;
-      return;  // all zero
-    case ImpactStatus::budget_exhausted:
-      answer.status = IST_BUDGET_EXHAUSTED;
-      break;
-    default:
-      answer.kind = static_cast<ist_impact_kind_t>(found.status);
-  }
-  answer.time = found.time;
-  answer.distance_min = found.distance_min;
-  answer.distance_max = found.distance_max;
-  write(found.point_a, answer.point_a);
-  write(found.point_b, answer.point_b);
-  write(found.normal, answer.normal);
-  answer.node_visits = found.node_visits;
-  answer.surface_pairs = found.surface_pairs;
-}
-
 template <class Solid>
 ist_status_t find_impact(const Solid* a, const ist_placed_tree_t* b, const ist_motion_t* motion_a,
                          const ist_motion_t* motion_b, const ist_impact_settings_t* given,
                          ist_workspace_t* workspace, ist_impact_t* answer) noexcept {
-  ist_status_t status = clear(answer);
-  if (status != IST_OK) return status;
-  ImpactSettings settings;
-  status = read(given, settings);
-  if (status == IST_OK)
-    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
-      write(time_of_impact(x, y, {read(motion_a), read(motion_b)}, settings, scratch), *answer);
-      return answer->status;
-    });
-  return noted(status, *answer);
+  return answer_with<ImpactSettings>(
+      a, b, given, workspace, answer,
+      [&](const auto& x, const auto& y, const ImpactSettings& settings, Workspace& scratch) {
+        return time_of_impact(x, y, {read(motion_a), read(motion_b)}, settings, scratch);
+      });
 }
 
 bool is_finite(const Motion& motion) noexcept {

@@ -14,32 +14,22 @@ template <class Solid>
 ist_status_t find_penetration(const Solid* a, const ist_placed_tree_t* b,
                               const ist_penetration_settings_t* given, ist_workspace_t* workspace,
                               ist_penetration_t* answer) noexcept {
-  ist_status_t status = check_size(answer);
-  if (status != IST_OK) return status;
-  PenetrationSettings settings;
-  status = read(given, settings);
-  if (status == IST_OK)
-    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
-      write(penetration(x, y, settings, scratch), *answer);
-      return answer->status;
-    });
-  return noted(status, *answer);
+  return answer_with<PenetrationSettings>(
+      a, b, given, workspace, answer,
+      [](const auto& x, const auto& y, const PenetrationSettings& settings, Workspace& scratch) {
+        return penetration(x, y, settings, scratch);
+      });
 }
 
 template <class Solid>
 ist_status_t find_separation(const Solid* a, const ist_placed_tree_t* b,
                              const ist_separation_settings_t* given, ist_workspace_t* workspace,
                              ist_separation_t* answer) noexcept {
-  ist_status_t status = check_size(answer);
-  if (status != IST_OK) return status;
-  SeparationSettings settings;
-  status = read(given, settings);
-  if (status == IST_OK)
-    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
-      write(separation(x, y, settings, scratch), *answer);
-      return answer->status;
-    });
-  return noted(status, *answer);
+  return answer_with<SeparationSettings>(
+      a, b, given, workspace, answer,
+      [](const auto& x, const auto& y, const SeparationSettings& settings, Workspace& scratch) {
+        return separation(x, y, settings, scratch);
+      });
 }
 
 /// The worse of two.

@@ -41,6 +41,16 @@ ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& se
   return IST_OK;
 }
 
+ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) noexcept {
+  if (given == nullptr) return IST_OK;
+  if (given->size != sizeof *given) return IST_WRONG_SIZE;
+  settings.duration = given->duration;
+  settings.tolerance = given->tolerance;
+  settings.max_visits = given->max_visits;
+  settings.deadline_us = given->deadline_us;
+  return IST_OK;
+}
+
 void write(const Penetration& found, ist_penetration_t& answer) noexcept {
   answer.size = sizeof answer;
   answer.status = status_of(found.status);
@@ -79,6 +89,30 @@ void write(const Separation& found, ist_separation_t& answer) noexcept {
   write(found.normal, answer.normal);
   answer.node_visits = found.node_visits;
   answer.sphere_pairs = found.sphere_pairs;
+}
+
+void write(const TimeOfImpact& found, ist_impact_t& answer) noexcept {
+  static_assert(IST_IMPACT_OVERLAPPING == static_cast<int>(ImpactStatus::overlapping));
+  answer = {};
+  answer.size = sizeof answer;
+  switch (found.status) {
+    case ImpactStatus::invalid_input:
+      answer.status = IST_INVALID_INPUT;
+      return;  // all zero
+    case ImpactStatus::budget_exhausted:
+      answer.status = IST_BUDGET_EXHAUSTED;
+      break;
+    default:
+      answer.kind = static_cast<ist_impact_kind_t>(found.status);
+  }
+  answer.time = found.time;
+  answer.distance_min = found.distance_min;
+  answer.distance_max = found.distance_max;
+  write(found.point_a, answer.point_a);
+  write(found.point_b, answer.point_b);
+  write(found.normal, answer.normal);
+  answer.node_visits = found.node_visits;
+  answer.surface_pairs = found.surface_pairs;
 }
 
 FieldSample FieldArgument::look(const void* context, const Eigen::Vector3d& x) noexcept {

@@ -7,6 +7,7 @@
 #include <ist/field.h>
 #include <ist/ist.h>
 #include <ist/query.h>
+#include <ist/time_of_impact.h>
 
 #include "query/c_api/handles.h"
 
@@ -79,9 +80,11 @@ class FieldArgument {
 ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& settings) noexcept;
 ist_status_t read(const ist_contact_settings_t* given, ContactSettings& settings) noexcept;
 ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& settings) noexcept;
+ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) noexcept;
 
 void write(const Penetration& found, ist_penetration_t& answer) noexcept;
 void write(const Separation& found, ist_separation_t& answer) noexcept;
+void write(const TimeOfImpact& found, ist_impact_t& answer) noexcept;
 Penetration read(const ist_penetration_t& given) noexcept;
 
 // Patches are written where the caller has room for them.

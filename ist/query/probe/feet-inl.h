@@ -13,6 +13,28 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
+/// A vector of centres as triangles see them: height over their planes, and where the foot is.
+template <class V>
+struct Feet {
+  V height, x, y;
+};
+
+/// The lanes whose balls come near their triangles, which lie from `left` to `right` and from 0 to
+/// `top` of their planes; with kFeet the feet are kept, from `lane` on.
+template <bool kFeet, class V>
+HWY_INLINE std::uint32_t near_lanes(const Feet<V>& feet, V left, V right, V top, V r,
+                                    std::size_t lane, double* height, double* x, double* y) {
+  const LaneTag<double> d;
+  const auto beside = hn::And(feet.x > left - r, feet.x < right + r);
+  const auto along = hn::And(feet.y > hn::Zero(d) - r, feet.y < top + r);
+  if constexpr (kFeet) {
+    hn::Store(feet.height, d, height + lane);
+    hn::Store(feet.x, d, x + lane);
+    hn::Store(feet.y, d, y + lane);
+  }
+  return mask_bits(d, hn::And(hn::Abs(feet.height) < r, hn::And(beside, along)));
+}
+
 /// The balls that triangle t comes near; with kFeet, where their centres' feet in its plane are and
 /// how high they stand.
 template <bool kFeet>
@@ -36,15 +58,9 @@ HWY_INLINE std::uint32_t feet_near(const SurfacePatch& patch, std::size_t t,
     const auto dot = [&](const V(&axis)[3]) -> V {
       return (px * axis[0] + py * axis[1]) + pz * axis[2];
     };
-    const V h = dot(n), fx = dot(u), fy = dot(v);
-    const auto beside = hn::And(fx > left - r, fx < right + r);
-    const auto along = hn::And(fy > hn::Zero(d) - r, fy < top + r);
-    near |= mask_bits(d, hn::And(hn::Abs(h) < r, hn::And(beside, along))) << lane;
-    if constexpr (kFeet) {
-      hn::Store(h, d, height + lane);
-      hn::Store(fx, d, x + lane);
-      hn::Store(fy, d, y + lane);
-    }
+    near |=
+        near_lanes<kFeet>(Feet<V>{dot(n), dot(u), dot(v)}, left, right, top, r, lane, height, x, y)
+        << lane;
   }
   return near;
 }
@@ -65,16 +81,10 @@ HWY_INLINE std::uint32_t feet_of(const SurfacePatch& patch, const double (&centr
       return (px * hn::Load(d, axis[0] + lane) + py * hn::Load(d, axis[1] + lane)) +
              pz * hn::Load(d, axis[2] + lane);
     };
-    const V h = dot(patch.n), fx = dot(patch.u), fy = dot(patch.v);
-    const auto beside =
-        hn::And(fx > hn::Load(d, patch.left + lane) - r, fx < hn::Load(d, patch.right + lane) + r);
-    const auto along = hn::And(fy > hn::Zero(d) - r, fy < hn::Load(d, patch.top + lane) + r);
-    near |= mask_bits(d, hn::And(hn::Abs(h) < r, hn::And(beside, along))) << lane;
-    if constexpr (kFeet) {
-      hn::Store(h, d, height + lane);
-      hn::Store(fx, d, x + lane);
-      hn::Store(fy, d, y + lane);
-    }
+    near |= near_lanes<kFeet>(Feet<V>{dot(patch.n), dot(patch.u), dot(patch.v)},
+                              hn::Load(d, patch.left + lane), hn::Load(d, patch.right + lane),
+                              hn::Load(d, patch.top + lane), r, lane, height, x, y)
+            << lane;
   }
   return near;
 }
