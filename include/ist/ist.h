@@ -109,6 +109,40 @@ typedef struct ist_tree_info {
 
 ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info);
 
+/* What a solid meets in the trials of a bake to an error (tree_view.h). */
+typedef int32_t ist_trial_partner_t;
+enum {
+  IST_TRIAL_COPY = 0,
+  IST_TRIAL_PLANE = 1,
+  IST_TRIAL_BALL = 2,
+  IST_TRIAL_EDGE = 3,
+  IST_TRIAL_CORNER = 4,
+  IST_TRIAL_PLATE = 5
+};
+
+/* Overlaps of a class, and by how much their volumes are wrong. */
+typedef struct ist_overlap_class {
+  double from, to; /* [0, 1] of the smaller solid's volume; both 1: it lies inside */
+  double median;   /* ≥ 0, 0.01 = 1 %; 0 too where no such pose was found */
+} ist_overlap_class_t;
+
+/* PredictedErrors: of penetration volumes, as the bake measured them. Errors are shares of the
+ * overlap's volume. */
+typedef struct ist_predicted_errors {
+  uint32_t size;
+  uint32_t poses;                 /* behind all classes together; 0: nothing is predicted */
+  ist_overlap_class_t classes[5]; /* of two copies of the solid, deepest first */
+  double target_error;            /* asked for; 0: none was */
+  double target_overlap;          /* where it was asked for */
+  double measured_error;          /* median near target_overlap, of the partner worst there */
+  uint32_t measured_poses;        /* of all partners; 0: nothing was measured there */
+  ist_trial_partner_t worst_partner;
+  uint32_t target_met; /* 0 or 1: asked for, measured and reached */
+} ist_predicted_errors_t;
+
+/* No poses for an asset that was baked without asking for an error. */
+ist_status_t ist_tree_get_predicted_errors(const ist_tree_t* tree, ist_predicted_errors_t* errors);
+
 /* MassProperties: of a solid of density 1. Times a density: mass, and inertia of that mass. */
 typedef struct ist_mass_properties {
   uint32_t size;
@@ -390,6 +424,13 @@ ist_status_t ist_contact_patches(const ist_placed_tree_t* a, const ist_placed_tr
                                  const ist_contact_settings_t* settings, ist_workspace_t* workspace,
                                  ist_contact_patches_t* patches, ist_penetration_t* whole);
 
+/* Takes out of patches, in their place, what protruding spheres add where flat faces meet: each by
+ * its own depth. A patch of which nothing is left stays, with zeros.
+ * `patches`: as ist_contact_patches() wrote them for these two under these settings. */
+ist_status_t ist_patches_without_protrusion(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                            const ist_contact_settings_t* settings,
+                                            ist_contact_patches_t* patches);
+
 /* --- The same of a field, held still, and a tree ---------------------------------------------- */
 
 ist_status_t ist_field_penetration(const ist_placed_field_t* a, const ist_placed_tree_t* b,
@@ -547,6 +588,24 @@ ist_status_t ist_field_penetration_batch(const ist_field_pair_t* pairs, size_t c
                                          ist_workspace_t* workspaces, size_t workers,
                                          ist_penetration_t* answers, size_t answer_size,
                                          const ist_parallel_t* parallel);
+
+/* patches[i] and wholes[i] are what ist_contact_patches(pairs[i]) writes; wholes[i] has its status,
+ * errors included.
+ * `patches`: [count], each set up with room of its own.
+ * `whole_size`: sizeof(ist_penetration_t); the wholes' own `size` is written, not read.
+ * All else as ist_penetration_batch() has it. */
+ist_status_t ist_contact_patches_batch(const ist_pair_t* pairs, size_t count,
+                                       const ist_contact_settings_t* settings,
+                                       ist_workspace_t* workspaces, size_t workers,
+                                       ist_contact_patches_t* patches, ist_penetration_t* wholes,
+                                       size_t whole_size, const ist_parallel_t* parallel);
+
+ist_status_t ist_field_contact_patches_batch(const ist_field_pair_t* pairs, size_t count,
+                                             const ist_contact_settings_t* settings,
+                                             ist_workspace_t* workspaces, size_t workers,
+                                             ist_contact_patches_t* patches,
+                                             ist_penetration_t* wholes, size_t whole_size,
+                                             const ist_parallel_t* parallel);
 
 #ifdef __GNUC__
 #pragma GCC visibility pop
