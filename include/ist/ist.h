@@ -10,8 +10,8 @@
  * Results: on an error of a call its answers are all zero but for `size` and `status`, where there
  * is room for them.
  * Sizes: a struct that starts with `size` is set up as `ist_penetration_t x = {.size = sizeof x}`;
- * all else may be 0, the default but of ist_impact_settings_t::duration. A library serves the sizes
- * of the headers it serves.
+ * all else may be 0, the default; only ist_impact_settings_t::duration has none. A library serves
+ * the sizes of the headers it serves.
  * Handles: ist_tree_t and ist_workspace_t lie in memory of the caller's and are empty where all
  * zero. One that owns memory must be released once, and not be copied. Released ones are known and
  * refused; a copy of one, or memory freed under it, cannot be.
@@ -48,12 +48,13 @@ enum {
   IST_NO_MEMORY = -6,
   IST_CANNOT_READ = -7, /* the file; errno may say why */
   /* Bytes that are no asset. */
-  IST_TOO_SHORT = -8,      /* fewer than their header says */
-  IST_MISALIGNED = -9,     /* not on a 64-byte boundary */
-  IST_NOT_AN_ASSET = -10,  /* wrong magic */
-  IST_OTHER_FORMAT = -11,  /* another 0.x format: bake again */
-  IST_CORRUPT_HASH = -12,  /* content differs from its hash */
-  IST_CORRUPT_LAYOUT = -13 /* an offset, count or field out of range */
+  IST_TOO_SHORT = -8,       /* fewer than their header says */
+  IST_MISALIGNED = -9,      /* not on a 64-byte boundary */
+  IST_NOT_AN_ASSET = -10,   /* wrong magic */
+  IST_OTHER_FORMAT = -11,   /* another 0.x format: bake again */
+  IST_CORRUPT_HASH = -12,   /* content differs from its hash */
+  IST_CORRUPT_LAYOUT = -13, /* an offset, count or field out of range */
+  IST_NO_DURATION = -14     /* ist_impact_settings_t::duration is 0: no time is asked about */
 };
 
 /* One English sentence, never null; of any number. */
@@ -522,7 +523,7 @@ enum {
 typedef struct ist_impact_settings {
   uint32_t size;
   uint32_t max_visits; /* count of pairs of nodes looked at; 0: any */
-  double duration;     /* [T] ≥ 0, as it stands: what happens in [0, duration] is asked */
+  double duration;     /* [T] > 0: what happens in [0, duration] is asked */
   double tolerance;    /* [u] 0: a thousandth of the smaller solid's bounding radius,
                           or ten times what fields may err if that is more */
   double deadline_us;  /* [µs] 0: none */
@@ -534,8 +535,10 @@ typedef struct ist_impact {
   ist_status_t status; /* IST_BUDGET_EXHAUSTED: clear up to `time`, which a limit ended */
   ist_impact_kind_t kind;
   uint32_t node_visits, surface_pairs;
-  double time;                       /* [T] certified: the solids do not touch before */
-  double distance_min, distance_max; /* [u] the solids' distance then, certified */
+  double time; /* [T] certified: the solids do not touch before */
+  /* [u] The solids' distance then lies within, certified; distance_min may be next to 0 of an
+   * impact too. That they do not touch before is what `time` says. */
+  double distance_min, distance_max;
   double point_a[3], point_b[3]; /* [u] the nearest points then, world; others may be nearer by a
                                     part of the tolerance */
   double normal[3];              /* unit, from A to B, world */

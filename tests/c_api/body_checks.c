@@ -122,6 +122,10 @@ int impacts_are_found(scene_t* s) {
   CHECK(ist_time_of_impact(&s->a, &b, NULL, &motion, NULL, &none, &impact) == IST_NO_HANDLE);
   CHECK(ist_field_time_of_impact(NULL, &b, NULL, &motion, NULL, &s->workspace, &impact) ==
         IST_NULL_POINTER);
+  settings.duration = 0; /* as a zeroed struct has it */
+  CHECK(ist_time_of_impact(&s->a, &b, NULL, &motion, &settings, &s->workspace, &impact) ==
+        IST_NO_DURATION);
+  CHECK(is_empty(&impact, sizeof impact, IST_NO_DURATION));
   settings.duration = -1;
   CHECK(ist_time_of_impact(&s->a, &b, NULL, &motion, &settings, &s->workspace, &impact) ==
         IST_INVALID_INPUT);
