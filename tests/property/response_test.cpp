@@ -10,6 +10,7 @@
 #include <random>
 #include <vector>
 
+#include "support/baked.h"
 #include "support/random_assets.h"
 #include "support/test_meshes.h"
 
@@ -20,12 +21,7 @@ namespace {
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-
-Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres) {
-  PackingSettings settings;
-  settings.max_spheres = spheres;
-  return bake(close_mesh(std::move(mesh), name), settings);
-}
+using testing::baked;
 
 const Asset& cube() {
   static const Asset asset = baked(testing::cube_mesh(), "cube", 1000);
