@@ -456,8 +456,9 @@ ist_status_t ist_field_contact_patches(const ist_placed_field_t* a, const ist_pl
                                        ist_workspace_t* workspace, ist_contact_patches_t* patches,
                                        ist_penetration_t* whole);
 
-/* --- Wrenches (wrench.h): what a contact does to both bodies. They need no workspace. ----------
- */
+/* --- Wrenches (wrench.h): what a contact does to both bodies ---------------------------------- */
+
+/* They need no workspace. */
 
 /* Of a pressure of 1: −dV by the body's motion. */
 typedef struct ist_wrench {

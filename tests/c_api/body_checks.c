@@ -144,5 +144,10 @@ int impacts_are_found(scene_t* s) {
   CHECK(ist_moved(&here, 0, NULL, 1, &at) == IST_NULL_POINTER);
   CHECK(ist_moved(&here, 0, &motion, 1, NULL) == IST_NULL_POINTER);
   CHECK(ist_moved(&here, 0, &motion, NAN, &at) == IST_INVALID_INPUT);
+  CHECK(at.q[0] == 0 && at.t[2] == 0);
+  at = here;
+  CHECK(ist_motion_between(&here, &there, 1, NULL, 0, &motion) == IST_OK);
+  CHECK(ist_moved(&at, 0, &motion, 0.5, &at) == IST_OK && at.t[2] == -10); /* in its place */
+  CHECK(ist_moved(NULL, 0, &motion, 1, &at) == IST_NULL_POINTER && at.q[0] == 0);
   return 0;
 }
