@@ -35,8 +35,8 @@ class HapticPassivity : public ::testing::Test {
     return passivity;
   }
 
-  const Asset cube_ = testing::baked(make_sample("cube"), "cube", 500),
-              capsule_ = testing::baked(make_sample("capsule"), "capsule", 500);
+  const Asset cube_ = testing::baked(make_sample("cube"), "cube", 500);
+  const Asset capsule_ = testing::baked(make_sample("capsule"), "capsule", 500);
   Workspace workspace_;
   int touched_ = 0;
 };
