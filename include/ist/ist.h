@@ -46,15 +46,15 @@ enum {
   IST_WRONG_VERSION = -4, /* headers that this library does not serve */
   IST_NO_HANDLE = -5,     /* empty, released, or never made */
   IST_NO_MEMORY = -6,
-  IST_CANNOT_READ = -7, /* the file; errno may say why */
+  IST_CANNOT_READ = -7,  /* the file; errno may say why */
+  IST_NO_DURATION = -14, /* ist_impact_settings_t::duration is 0: no time is asked about */
   /* Bytes that are no asset. */
-  IST_TOO_SHORT = -8,       /* fewer than their header says */
-  IST_MISALIGNED = -9,      /* not on a 64-byte boundary */
-  IST_NOT_AN_ASSET = -10,   /* wrong magic */
-  IST_OTHER_FORMAT = -11,   /* another 0.x format: bake again */
-  IST_CORRUPT_HASH = -12,   /* content differs from its hash */
-  IST_CORRUPT_LAYOUT = -13, /* an offset, count or field out of range */
-  IST_NO_DURATION = -14     /* ist_impact_settings_t::duration is 0: no time is asked about */
+  IST_TOO_SHORT = -8,      /* fewer than their header says */
+  IST_MISALIGNED = -9,     /* not on a 64-byte boundary */
+  IST_NOT_AN_ASSET = -10,  /* wrong magic */
+  IST_OTHER_FORMAT = -11,  /* another 0.x format: bake again */
+  IST_CORRUPT_HASH = -12,  /* content differs from its hash */
+  IST_CORRUPT_LAYOUT = -13 /* an offset, count or field out of range */
 };
 
 /* One English sentence, never null; of any number. */
