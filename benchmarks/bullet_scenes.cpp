@@ -164,6 +164,7 @@ int main(int argc, char** argv) {
         report.row("Truths, ist", told_of);
       }
     }
+    report.write();  // what is known so far
     all_work = all_work && ist && ist->at("works").get<bool>();
   }
   std::filesystem::remove_all(meshes);

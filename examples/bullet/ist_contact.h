@@ -32,7 +32,7 @@ struct IstSettings {
   double relaxation = 0;
   /// [u] ≥ 0, solver only: two objects are asked about again once a point of one has moved by more
   /// than this against the other. Until then their patches move along, as much deeper as that
-  /// motion makes them: exact but for the square of it. A contact that begins is seen this late.
+  /// motion makes them, of the same areas. A contact that begins is seen this late.
   /// 0: asked in every step.
   double follow = 0;
 };
