@@ -164,7 +164,6 @@ int main(int argc, char** argv) {
         report.row("Truths, ist", told_of);
       }
     }
-    report.write();  // what is known so far
     all_work = all_work && ist && ist->at("works").get<bool>();
   }
   std::filesystem::remove_all(meshes);
