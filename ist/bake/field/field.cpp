@@ -51,7 +51,7 @@ Approximation own_triangles(const MeshView& surface) {
 }
 
 /// The least tolerance found that leaves at most, and nearly, so many triangles.
-double tolerance_for(const VertexClusters& clusters, std::size_t triangles, double guess) {
+double tolerance_for(VertexClusters& clusters, std::size_t triangles, double guess) {
   double fine = 0, coarse = HUGE_VAL;
   for (int attempt = 0; attempt < 16; ++attempt) {
     const std::size_t found = clusters.triangles_within(guess);
