@@ -78,17 +78,17 @@ Approximation clustered(VertexClusters& clusters, SolidSurface& surface, const W
     Clustered found = clusters.within(tolerance);
     if (found.mesh.triangles.empty()) return best;
     const FieldHierarchy hierarchy(found.mesh);
-    const FieldError error(surface.view(), found.mesh, hierarchy, found.vertex_of, stop);
+    FieldError error(surface.view(), found, hierarchy, stop);
     std::vector<double> off = error.seen(tolerance);
     const double seen = *std::max_element(off.begin(), off.end());
     if (seen <= 1.25 * tolerance || round >= kRounds) {
-      FieldError::Proven proven = error.proven(seen);
+      FieldError::Proven proven = error.proven(seen, kLoose * seen);
       if (proven.most < best.error) best = {std::move(found.mesh), proven.most};
       if (proven.most <= kLoose * seen || ++proofs == kProofs) return best;
-      off = std::move(proven.at_vertex);
+      off = std::move(proven.at_cluster);
       for (double& at : off) at = at > kLoose * seen ? at : 0;
     }
-    clusters.raise(off, tolerance);
+    clusters.raise(off);
   }
 }
 

@@ -169,13 +169,12 @@ const std::vector<std::uint32_t>& VertexClusters::chosen(double tolerance) {
   return chosen_;
 }
 
-void VertexClusters::raise(const std::vector<double>& distance_of_vertex, double tolerance) {
-  const std::vector<std::uint32_t>& cluster_of = chosen(tolerance);
-  for (std::size_t v = 0; v < cluster_of.size(); ++v) {
-    std::size_t cluster = cluster_of[v];
+void VertexClusters::raise(const std::vector<double>& distance_of_cluster) {
+  for (std::size_t i = 0; i < names_.size(); ++i) {
+    std::size_t cluster = names_[i];
     for (Level& level : levels_) {
       if (cluster < level.off.size()) {
-        level.off[cluster] = std::max(level.off[cluster], distance_of_vertex[v]);
+        level.off[cluster] = std::max(level.off[cluster], distance_of_cluster[i]);
         break;
       }
       cluster -= level.off.size();
@@ -216,23 +215,24 @@ Clustered VertexClusters::within(double tolerance) {
   });
   std::partial_sum(before.begin(), before.end(), before.begin());
   Clustered out;
-  out.vertex_of.resize(mesh_.vertex_count);
+  out.cluster_of.resize(mesh_.vertex_count);
   out.mesh.vertices.resize(before.back());
+  names_.resize(before.back());
   for_chunks(cluster_of.size(), [&](std::size_t chunk, std::size_t v) {
     if (first[cluster_of[v]] != v) return;
+    const std::uint32_t number = before[chunk]++;
     const std::array<double, 3> x = place_of(cluster_of[v], static_cast<std::uint32_t>(v));
-    out.mesh.vertices[before[chunk]] = {static_cast<float>(x[0]), static_cast<float>(x[1]),
-                                        static_cast<float>(x[2])};
-    out.vertex_of[v] = before[chunk]++;
+    out.mesh.vertices[number] = {static_cast<float>(x[0]), static_cast<float>(x[1]),
+                                 static_cast<float>(x[2])};
+    out.cluster_of[v] = number;
+    names_[number] = cluster_of[v];
   });
   for_chunks(cluster_of.size(), [&](std::size_t, std::size_t v) {
     const std::uint32_t at = first[cluster_of[v]];
-    if (at != v) out.vertex_of[v] = out.vertex_of[at];
+    if (at != v) out.cluster_of[v] = out.cluster_of[at];
   });
-  out.mesh.triangles = spanning(out.vertex_of);
-  const std::vector<std::uint32_t> merged = reduce(out.mesh);
-  for_chunks(cluster_of.size(),
-             [&](std::size_t, std::size_t v) { out.vertex_of[v] = merged[out.vertex_of[v]]; });
+  out.mesh.triangles = spanning(out.cluster_of);
+  out.vertex_of = reduce(out.mesh);
   return out;
 }
 

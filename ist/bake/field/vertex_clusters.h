@@ -15,7 +15,12 @@ namespace ist {
 /// A surface with its vertices clustered.
 struct Clustered {
   FieldMesh mesh;
-  std::vector<std::uint32_t> vertex_of;  ///< a mesh vertex's place in `mesh`
+  std::vector<std::uint32_t> cluster_of;  ///< [mesh vertex]
+  std::vector<std::uint32_t> vertex_of;   ///< [cluster] its place in `mesh`; some share one
+
+  std::uint32_t image(std::uint32_t mesh_vertex) const {
+    return vertex_of[cluster_of[mesh_vertex]];
+  }
 };
 
 /// Clusters of a closed mesh's vertices: those in one cell of an octree become one, in cells as
@@ -31,9 +36,9 @@ class VertexClusters {
   /// (unit frame) of the cluster's place; where no cell is small enough, they stay.
   Clustered within(double tolerance);
 
-  /// Counts a vertex as so far (unit frame) from the cluster that within() put it into, if that is
-  /// further than its planes are.
-  void raise(const std::vector<double>& distance_of_vertex, double tolerance);
+  /// Counts the clusters of the last within() as so far (unit frame) from their vertices, where
+  /// that is further than their planes are.
+  void raise(const std::vector<double>& distance_of_cluster);
 
   /// How many triangles within() leaves before coordinates are rounded.
   std::size_t triangles_within(double tolerance);
@@ -66,7 +71,8 @@ class VertexClusters {
   std::vector<AreaVector> areas_;  ///< [triangle]
   std::vector<Level> levels_;
   std::vector<std::uint32_t> chosen_;
-  double chosen_within_ = -1;  ///< the tolerance of chosen_
+  double chosen_within_ = -1;         ///< the tolerance of chosen_
+  std::vector<std::uint32_t> names_;  ///< of the clusters of the last within()
 };
 
 }  // namespace ist
