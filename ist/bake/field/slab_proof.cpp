@@ -5,9 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "mesh/closest_point.h"
+#include "bake/field/triangles_in_box.h"
 #include "mesh/exact_sign.h"
-#include "mesh/exact_triangle.h"
 #include "mesh/triangle_frame.h"
 #include "mesh/winding.h"
 #include "numerics/rounding.h"
@@ -65,35 +64,9 @@ struct MovedHull {
   }
 };
 
-/// Calls visit(corners) for the triangles in leaves that meet a box until one returns false:
-/// whether none did.
-template <class Visit>
-bool for_triangles_in(const MeshView& surface, const float low[3], const float high[3],
-                      const Visit& visit) {
-  std::uint32_t stack[kBvhStackSize];
-  int top = 0;
-  stack[top++] = surface.root;
-  while (top > 0) {
-    const std::uint32_t at = stack[--top];
-    if ((at & kBvhLeaf) != 0) {
-      for (const std::uint32_t triangle : surface.blocks[at & ~kBvhLeaf].triangle)
-        if (triangle != kNoTriangle && !visit(corners_of(surface, triangle))) return false;
-      continue;
-    }
-    const BvhNode& node = surface.nodes[at];
-    int hit[kBvhWidth] = {1, 1, 1, 1};
-    for (int k = 0; k < 3; ++k)
-      for (int i = 0; i < kBvhWidth; ++i)
-        hit[i] &= (node.lower[k][i] <= high[k]) & (node.upper[k][i] >= low[k]);
-    for (int i = 0; i < kBvhWidth; ++i)
-      if (hit[i] != 0 && node.child[i] != kBvhEmpty) stack[top++] = node.child[i];
-  }
-  return true;
-}
-
 bool meets_none(const MeshView& surface, const MovedHull& hull, const double direction[3]) {
-  return for_triangles_in(surface, hull.low, hull.high, [&](const Corners& triangle) {
-    return hull.is_apart_from(triangle.p, direction);
+  return none_in_box(surface, hull.low, hull.high, [&](const Corners& triangle) {
+    return !hull.is_apart_from(triangle.p, direction);
   });
 }
 
@@ -106,17 +79,17 @@ bool windings_differ(const MeshView& surface, const double p[3], const double q[
     high[k] = rounded_up(std::max(p[k], q[k]));
   }
   int difference = 0;
-  const bool clear = for_triangles_in(surface, low, high, [&](const Corners& t) {
+  const bool clear = none_in_box(surface, low, high, [&](const Corners& t) {
     int turns[3];  // of the way about the sides
     for (int i = 0; i < 3; ++i) turns[i] = orient3d_sign(p, q, t.p[i], t.p[(i + 1) % 3]);
     const auto [least, most] = std::minmax({turns[0], turns[1], turns[2]});
-    if (least < 0 && most > 0) return true;
+    if (least < 0 && most > 0) return false;
     const int from = orient3d_sign(t.p[0], t.p[1], t.p[2], p);
     const int to = orient3d_sign(t.p[0], t.p[1], t.p[2], q);
-    if (from == to && from != 0) return true;
-    if (turns[0] == 0 || turns[1] == 0 || turns[2] == 0 || from == 0 || to == 0) return false;
+    if (from == to && from != 0) return false;
+    if (turns[0] == 0 || turns[1] == 0 || turns[2] == 0 || from == 0 || to == 0) return true;
     difference += from;
-    return true;
+    return false;
   });
   return clear ? difference != 0 : winding_number(surface, p) != winding_number(surface, q);
 }
