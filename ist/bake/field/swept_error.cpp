@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -76,7 +77,8 @@ SweptError::SweptError(const MeshView& mesh, const Clustered& field,
       frames_(field.mesh.triangles.size()),
       first_(field.mesh.vertices.size() + 1),
       around_(3 * field.mesh.triangles.size()),
-      near_(mesh.vertex_count, kNoTriangle) {
+      near_(mesh.vertex_count, kNoTriangle),
+      last_near_(field.vertex_of.size(), kNoTriangle) {
   const MeshView& view = hierarchy.view();
   tbb::parallel_for(std::size_t{0}, frames_.size(), [&](std::size_t t) {
     const auto vertex = [&](std::size_t i) {
@@ -100,13 +102,22 @@ double SweptError::at_vertex(std::uint32_t vertex, double known, double enough) 
   const double* x = mesh_.vertices + 3 * std::size_t{vertex};
   const double known2 = known * known * (1 - kRounding);
   double least2 = kFar * kFar;
-  for (const std::uint32_t t : star(field_.image(vertex))) {
+  const auto is_near = [&](std::uint32_t t) {
     const double d2 = distance2(t, {x[0], x[1], x[2]});
-    if (d2 >= least2) continue;
+    if (d2 >= least2) return false;
     least2 = d2;
     near_[vertex] = t;
-    if (d2 <= known2) return known;
-  }
+    return d2 <= known2;
+  };
+  // What was near to the vertex before is, more often than not.
+  const std::atomic_ref<std::uint32_t> last(last_near_[field_.cluster_of[vertex]]);
+  const std::uint32_t first = last.load(std::memory_order_relaxed);
+  if (first != kNoTriangle && is_near(first)) return known;
+  for (const std::uint32_t t : star(field_.image(vertex)))
+    if (t != first && is_near(t)) {
+      last.store(t, std::memory_order_relaxed);
+      return known;
+    }
   const double least = std::sqrt(least2);
   if (least <= enough) return least;
   return exact_closest_point(hierarchy_.view(), {x[0], x[1], x[2]}, least).distance;

@@ -20,7 +20,7 @@ class SweptError {
   SweptError(const MeshView& mesh, const Clustered& field, const FieldHierarchy& hierarchy);
 
   /// Of a used vertex of the mesh where it starts from: exact where above `enough`, else no less;
-  /// at most `known` where it is not more. For each vertex on one thread at a time.
+  /// at most `known` where it is not more. Safe from several threads for different vertices.
   double at_vertex(std::uint32_t vertex, double known, double enough);
 
   /// All that a triangle of the mesh sweeps is within `distance` of one triangle near its vertices'
@@ -62,7 +62,8 @@ class SweptError {
   const FieldHierarchy& hierarchy_;
   std::vector<TriangleFrame<double>> frames_;  ///< [field triangle]
   std::vector<std::uint32_t> first_, around_;  ///< the triangles around each field vertex
-  std::vector<std::uint32_t> near_;  ///< [mesh vertex] a triangle that it is near to, if known
+  std::vector<std::uint32_t> near_;       ///< [mesh vertex] a triangle that it is near to, if known
+  std::vector<std::uint32_t> last_near_;  ///< [cluster] the last such; a hint alone
 };
 
 }  // namespace ist

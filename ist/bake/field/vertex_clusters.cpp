@@ -107,20 +107,25 @@ void VertexClusters::settle(Level& level, std::uint32_t cluster, double toleranc
   const std::span<const std::uint32_t> vertices = level.vertices[cluster];
   double& off = level.off[cluster];
   thread_local std::vector<CornerPlane> planes;
-  planes.clear();
-  for (std::size_t i = 0; i < kSamples; ++i) {
-    const std::uint32_t v = vertices[i * vertices.size() / kSamples];
-    const auto corners = corners_[v];
-    if (!corners.empty()) planes.push_back(plane_of(corners[i % corners.size()], v));
+  if (vertices.size() >= 4 * kSamples) {  // else to look at all takes no longer
+    planes.clear();
+    for (std::size_t i = 0; i < kSamples; ++i) {
+      const std::uint32_t v = vertices[i * vertices.size() / kSamples];
+      const auto corners = corners_[v];
+      if (!corners.empty()) planes.push_back(plane_of(corners[i % corners.size()], v));
+    }
+    off = std::max(off, nearest_of_any(planes, 4 * level.cell));
   }
-  off = std::max(off, nearest_of_any(planes, 4 * level.cell));
   level.known[cluster] = off > tolerance ? kUnknown : kKnown;
   if (off > tolerance) return;
   // What is summed is summed in the order of corners.
   thread_local std::vector<std::uint64_t> corners;
   corners.clear();
   for (const std::uint32_t v : vertices)
-    for (const std::uint64_t corner : corners_[v]) corners.push_back(corner << 32 | v);
+    for (const std::uint64_t corner : corners_[v]) {
+      __builtin_prefetch(&areas_[corner / 3]);
+      corners.push_back(corner << 32 | v);
+    }
   if (corners.empty()) return;
   std::sort(corners.begin(), corners.end());
   planes.clear();
