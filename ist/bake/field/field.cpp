@@ -1,5 +1,7 @@
 #include "bake/field/field.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -169,9 +171,10 @@ std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error,
   FieldArrays arrays;
   arrays.header.error = near.error;
   arrays.header.triangle_count = static_cast<std::uint32_t>(near.mesh.triangles.size());
-  cut_into_blocks(near.mesh, arrays);
-  const FieldHierarchy hierarchy(near.mesh);
-  lay_sign_grid(hierarchy.view(), grid_bytes(arrays), arrays);
+  std::optional<FieldHierarchy> hierarchy;
+  tbb::parallel_invoke([&] { cut_into_blocks(near.mesh, arrays); },
+                       [&] { hierarchy.emplace(near.mesh); });
+  lay_sign_grid(hierarchy->view(), grid_bytes(arrays), arrays);
   return arrays;
 }
 
