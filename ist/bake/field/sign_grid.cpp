@@ -77,21 +77,15 @@ bool references_are_clear(const BrickGrid& grid, const std::vector<SurfaceBlock>
 /// Winding numbers on a line parallel to x, modulo 2: the triangles that lie beyond a point.
 class RowParity {
  public:
-  RowParity(const MeshView& surface, double y, double z) : yz_{y, z} {
-    const RayBox box = RayBox::line(y, z);
-    none_in_box(surface, box.lower, box.upper, [&](const Corners& t) {
-      const int facing = pierced(t, yz_);
-      if (facing != 0) pierced_.push_back({t, facing, Extent(t)});
-      return false;
-    });
-  }
+  explicit RowParity(const MeshView& surface) : surface_(surface) {}
 
-  bool is_odd(double x) const {
-    const double p[3] = {x, yz_[0], yz_[1]};
+  /// Of a point of the line of the last point, or of another.
+  bool is_odd(const std::array<double, 3>& p) {
+    if (p[1] != yz_[0] || p[2] != yz_[1]) look_along(p[1], p[2]);
     bool odd = false;
     for (const auto& [t, facing, extent] : pierced_)
-      odd ^= x < extent.low ||
-             (x <= extent.high && orient3d_sign(t.p[0], t.p[1], t.p[2], p) * facing > 0);
+      odd ^= p[0] < extent.low ||
+             (p[0] <= extent.high && orient3d_sign(t.p[0], t.p[1], t.p[2], p.data()) * facing > 0);
     return odd;
   }
 
@@ -101,7 +95,21 @@ class RowParity {
     int facing;
     Extent extent;
   };
-  const double yz_[2];
+
+  void look_along(double y, double z) {
+    yz_[0] = y;
+    yz_[1] = z;
+    pierced_.clear();
+    const RayBox box = RayBox::line(y, z);
+    none_in_box(surface_, box.lower, box.upper, [&](const Corners& t) {
+      const int facing = pierced(t, yz_);
+      if (facing != 0) pierced_.push_back({t, facing, Extent(t)});
+      return false;
+    });
+  }
+
+  const MeshView& surface_;
+  double yz_[2] = {HUGE_VAL, HUGE_VAL};
   std::vector<Pierced> pierced_;
 };
 
@@ -111,15 +119,15 @@ void find_inside(const BrickGrid& grid, const MeshView& surface, DenseBricks& br
   tbb::parallel_for(std::uint32_t{0}, grid.bricks[1] * grid.bricks[2], [&](std::uint32_t row) {
     const std::uint32_t from_y = kBrickWidth * (row % grid.bricks[1]);
     const std::uint32_t from_z = kBrickWidth * (row / grid.bricks[1]);
+    RowParity parity(surface);
     for (std::uint32_t z = from_z; z < from_z + kBrickWidth; ++z)
       for (std::uint32_t y = from_y; y < from_y + kBrickWidth; ++y) {
-        const std::array<double, 3> first = grid.reference(0, y, z);
-        const RowParity parity(surface, first[1], first[2]);
-        bool inside = false, known = false;
+        // Before a row's first cell with surface it is outside.
+        bool inside = false, known = true;
         for (std::uint32_t x = 0; x < grid.cells(0); ++x) {
           const std::uint64_t cell = grid.name(x, y, z);
           const bool holds_surface = DenseBricks::bit(bricks.surface, cell);
-          if (holds_surface || !known) inside = parity.is_odd(grid.reference(x, y, z)[0]);
+          if (holds_surface || !known) inside = parity.is_odd(grid.reference(x, y, z));
           known = !holds_surface;
           if (inside) DenseBricks::set(bricks.inside, cell);
         }
