@@ -25,6 +25,8 @@ int main(int argc, char** argv) {
   app.footer(
       "Exit codes: 0 done, 1 error, 2 wrong usage, 3 check found a violation, 130 interrupted.");
   add_bake(app);
+  add_cache(app);
+  add_summary(app);
   add_query(app);
   add_info(app);
   add_check(app);
