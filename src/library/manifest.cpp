@@ -93,7 +93,16 @@ class Reader {
   explicit Reader(const std::string& path) : path_(path), folder_(fs::path(path).parent_path()) {}
 
   Manifest read() {
-    const toml::table root = parse();
+    const std::string text = content();
+    toml::table root;
+    try {
+      root = toml::parse(text, path_);
+    } catch (const toml::parse_error& error) {
+      fault(
+          error.source().begin.line,
+          fmt::format("no TOML: {}. https://toml.io shows how it is written", error.description()));
+      return finish();
+    }
     for (const auto& [key, value] : root) {
       if (key.str() != "defaults" && key.str() != "asset")
         fault(key.source().begin.line,
@@ -103,27 +112,26 @@ class Reader {
     }
     read_defaults(root);
     read_assets(root);
-    std::sort(manifest_.jobs.begin(), manifest_.jobs.end(),
-              [](const Job& a, const Job& b) { return a.name < b.name; });
-    for (auto& [line, what] : faults_)
-      manifest_.faults.push_back(fmt::format("{}:{}: {}", path_, line, what));
-    return std::move(manifest_);
+    return finish();
   }
 
  private:
-  toml::table parse() const {
+  std::string content() const {
     std::error_code none;
     if (fs::is_directory(path_, none)) throw Error(path_ + ": is a folder, no manifest");
     std::ifstream file(path_, std::ios::binary);
     if (!file) throw Error(path_ + ": cannot be opened. Check the path and its permissions");
     std::ostringstream text;
     text << file.rdbuf();
-    try {
-      return toml::parse(text.str(), path_);
-    } catch (const toml::parse_error& error) {
-      throw Error(fmt::format("{}:{}: no TOML: {}. https://toml.io shows how it is written", path_,
-                              error.source().begin.line, error.description()));
-    }
+    return text.str();
+  }
+
+  Manifest finish() {
+    std::sort(manifest_.jobs.begin(), manifest_.jobs.end(),
+              [](const Job& a, const Job& b) { return a.name < b.name; });
+    for (auto& [line, what] : faults_)
+      manifest_.faults.push_back(fmt::format("{}:{}: {}", path_, line, what));
+    return std::move(manifest_);
   }
 
   void fault(Line line, const std::string& what) { faults_.emplace(line, what); }

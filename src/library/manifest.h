@@ -13,7 +13,7 @@ struct Manifest {
   std::vector<std::string> faults;  ///< "scene.toml:12: …": all that can be told without baking
 };
 
-/// Paths in it are relative to its folder. Throws Error where it cannot be read or is no TOML.
+/// Paths in it are relative to its folder. Throws Error where it cannot be read.
 Manifest read_manifest(const std::string& path);
 
 }  // namespace ist
