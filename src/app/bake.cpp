@@ -32,16 +32,6 @@ struct BakeOptions {
   LibraryOptions library;
 };
 
-/// Says where the bake runs, if that was left open.
-void announce_device(Device device) {
-  if (device != Device::automatic) return;
-  std::string why;
-  if (gpu_available(0, &why))
-    spdlog::info("baking on the GPU: {}", gpu_info().name);
-  else
-    spdlog::info("baking on the CPU: {}", why);
-}
-
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }

@@ -123,8 +123,10 @@ void add_library_options(CLI::App* command, LibraryOptions& options) {
       "together")
       ->type_name("I/N")
       ->needs(manifest);
+  constexpr unsigned kMostJobs = 1024;
   add_whole(command, "--jobs", options.jobs,
-            "With --manifest: assets at once, 0 = as many as threads; never changes the result")
+            "With --manifest: assets at once, 0 = as many as threads; never changes the result", 0u,
+            kMostJobs)
       ->needs(manifest);
   add_bytes(command, "--memory", options.memory,
             "With --manifest: let jobs wait for each other above this, e.g. 16G. Default: 80 % of "
@@ -141,6 +143,7 @@ void run_library(const LibraryRun& run) {
   if (cache.empty() && run.library.cache_size != 0)
     throw CLI::ValidationError("--cache-size", "has no effect without --cache or IST_CACHE");
   make_folder(run.output);
+  announce_device(settings.device);
   if (!cache.empty()) settings.cache = std::make_shared<AssetCache>(cache, run.library.cache_size);
 
   Summary summary;

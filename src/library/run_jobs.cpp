@@ -45,15 +45,15 @@ std::vector<std::uint64_t> needs_of(const std::vector<Job>& jobs) {
 /// What is available is an estimate too, and so are the needs.
 std::uint64_t most_of_memory() { return available_memory() / 10 * 8; }
 
+unsigned all_cores() { return static_cast<unsigned>(oneapi::tbb::info::default_concurrency()); }
+
 /// All that threads share; it lives as long as the last of them.
 class Run {
  public:
   Run(const std::vector<Job>& jobs, const RunSettings& settings)
       : jobs_(jobs),
         settings_(settings),
-        threads_(settings.threads != 0
-                     ? settings.threads
-                     : static_cast<unsigned>(oneapi::tbb::info::default_concurrency())),
+        threads_(settings.threads != 0 ? std::min(settings.threads, all_cores()) : all_cores()),
         limit_(oneapi::tbb::global_control::max_allowed_parallelism, threads_),
         at_once_(std::max<std::size_t>(
             1, std::min<std::size_t>(settings.jobs != 0 ? settings.jobs : threads_, jobs.size()))),

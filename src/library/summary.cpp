@@ -98,9 +98,13 @@ bool Summary::complete() const {
 }
 
 std::uint64_t hash_of_library(const std::vector<Job>& jobs) {
-  std::string text;
-  for (const Job& job : jobs) text += job.name + '\0' + describe_exactly(job.settings) + '\0';
-  return XXH3_64bits(text.data(), text.size());
+  XXH3_state_t state;
+  XXH3_64bits_reset(&state);
+  for (const Job& job : jobs) {
+    const std::string text = job.name + '\0' + describe_exactly(job.settings) + '\0';
+    XXH3_64bits_update(&state, text.data(), text.size());
+  }
+  return XXH3_64bits_digest(&state);
 }
 
 Json to_json(const Summary& summary) {
