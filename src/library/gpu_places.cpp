@@ -16,10 +16,17 @@ int GpuPlaces::take() {
   }
 }
 
+void GpuPlaces::take_on(int gpu) {
+  int& free = free_[static_cast<std::size_t>(gpu)];
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return free > 0; });
+  --free;
+}
+
 void GpuPlaces::give_back(int gpu) {
   const std::lock_guard lock(mutex_);
   ++free_[static_cast<std::size_t>(gpu)];
-  changed_.notify_one();
+  changed_.notify_all();
 }
 
 }  // namespace ist

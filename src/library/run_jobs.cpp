@@ -10,6 +10,7 @@
 #include <mutex>
 #include <new>
 #include <optional>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -26,8 +27,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Bakes at once on a GPU: what one leaves of it while it waits for the host, others take.
+/// Bakes that have work for a GPU at once: what one leaves of it while it waits for the host,
+/// others take. Their host threads are mostly idle.
 constexpr int kBakesOnGpu = 3;
+
+/// Whether a bake has work for its GPU, by the stage that it reports.
+bool is_of_gpu(const Progress& progress) {
+  const std::string_view stage = progress.stage;
+  return stage == "pack" || stage == "calibrate" || stage == "cover";
+}
 
 int gpus_for(Device device) {
   int count = 0;
@@ -55,9 +63,9 @@ class Run {
         settings_(settings),
         threads_(settings.threads != 0 ? std::min(settings.threads, all_cores()) : all_cores()),
         limit_(oneapi::tbb::global_control::max_allowed_parallelism, threads_),
-        at_once_(std::max<std::size_t>(
-            1, std::min<std::size_t>(settings.jobs != 0 ? settings.jobs : threads_, jobs.size()))),
         gpus_(gpus_for(settings.device), kBakesOnGpu),
+        at_once_(std::clamp<std::size_t>(
+            jobs.size(), 1, settings.jobs != 0 ? settings.jobs : threads_ + gpus_.places())),
         queue_(needs_of(jobs), settings.memory != 0 ? settings.memory : most_of_memory()),
         working_(at_once_) {}
 
@@ -129,13 +137,16 @@ class Run {
     packing.device = Device::cpu;
     packing.threads = threads_of_a_job();
     std::optional<GpuPlaces::Place> place;
-    if (!gpus_.none()) {
+    if (gpus_.places() != 0) {
       place.emplace(gpus_);
       packing.device = Device::cuda;
       packing.gpu.device = place->gpu();
     }
     if (cancelled_) throw Cancelled();
-    const ProgressCallback go_on = [this](const Progress&) { return !cancelled_; };
+    const ProgressCallback go_on = [&](const Progress& progress) {
+      if (place) place->hold(is_of_gpu(progress));
+      return !cancelled_;
+    };
     Asset asset = settings.target.relative_error > 0
                       ? bake_to_error(mesh, settings.target, packing, go_on).asset
                       : bake(mesh, packing, go_on);
@@ -148,8 +159,8 @@ class Run {
   const RunSettings settings_;
   const unsigned threads_;
   const oneapi::tbb::global_control limit_;
-  const std::size_t at_once_;
   GpuPlaces gpus_;
+  const std::size_t at_once_;
   JobQueue queue_;
   std::atomic<bool> cancelled_ = false;
   std::mutex mutex_;

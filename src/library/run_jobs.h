@@ -21,7 +21,7 @@ struct RunSettings {
   std::shared_ptr<AssetCache> cache;  ///< null: none
   Device device = Device::automatic;
   unsigned threads = 0;      ///< of all jobs together; 0: all cores
-  unsigned jobs = 0;         ///< at once; 0: as many as threads
+  unsigned jobs = 0;         ///< at once; 0: as many as threads, and besides those that are on GPUs
   std::uint64_t memory = 0;  ///< [bytes] of all jobs together; 0: most of what is available
   /// What is to be said of an asset; called from any thread.
   std::function<std::vector<std::string>(const TreeView&)> warnings_of;

@@ -70,9 +70,9 @@ TEST(JobQueue, KeepsToTheMemory) {
 }
 
 TEST(GpuPlaces, AreSpreadOverTheGpus) {
-  EXPECT_TRUE(GpuPlaces(0, 2).none());
+  EXPECT_EQ(GpuPlaces(0, 2).places(), 0u);
   GpuPlaces places(2, 2);
-  EXPECT_FALSE(places.none());
+  EXPECT_EQ(places.places(), 4u);
   const GpuPlaces::Place a(places), b(places);
   EXPECT_NE(a.gpu(), b.gpu());
   const GpuPlaces::Place c(places);
@@ -88,8 +88,9 @@ TEST(GpuPlaces, AreSpreadOverTheGpus) {
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   EXPECT_FALSE(taken);
   waited = true;
-  d.reset();
+  d->hold(false);
   other.join();
+  d->hold(true);
 }
 
 TEST(Memory, IsThereAndJobsTakeSome) {
