@@ -46,6 +46,7 @@ int gpus_for(Device device) {
 
 std::vector<std::uint64_t> needs_of(const std::vector<Job>& jobs) {
   std::vector<std::uint64_t> needs;
+  needs.reserve(jobs.size());
   for (const Job& job : jobs) needs.push_back(memory_of(job));
   return needs;
 }

@@ -97,7 +97,7 @@ Setting flag(const char* name, Of of, bool when, const char* help) {
 Setting grid() {
   std::string words;
   for (const auto& [word, mode] : kGridModes)
-    words += (words.empty() ? "" : "|") + std::string(word);
+    words += fmt::format("{}{}", words.empty() ? "" : "|", word);
   return {"grid",
           words,
           "one of " + words,
@@ -139,61 +139,78 @@ Setting without_default(Setting setting, const char* shown = "") {
   return setting;
 }
 
-#define IST_MEMBER(path) \
-  [](BakeSettings & s) -> auto& { return s.path; }
+/// From settings to a member of `part`, itself a member of BakeSettings.
+template <class Part, class T>
+auto member_of(Part BakeSettings::*part, T Part::*member) {
+  return [part, member](BakeSettings& settings) -> T& { return (settings.*part).*member; };
+}
+/// The same, one step further.
+template <class Part, class T>
+auto member_of(Part PackingSettings::*part, T Part::*member) {
+  return [part, member](BakeSettings& settings) -> T& { return (settings.packing.*part).*member; };
+}
 
 std::vector<Setting> make_settings() {
   const Range from_zero = {};
   return {
-      whole("spheres", IST_MEMBER(packing.max_spheres), 0, kMostSpheres,
+      whole("spheres", member_of(&BakeSettings::packing, &PackingSettings::max_spheres), 0,
+            kMostSpheres,
             "Stop at this count, 0 = no limit (with target-error: 200,000, as by default)"),
       without_default(
-          share("target-error", IST_MEMBER(target.relative_error),
+          share("target-error", member_of(&BakeSettings::target, &ErrorTarget::relative_error),
                 {.least = 0, .most = 1, .without_least = true, .without_most = true},
                 "As many spheres as this median error of the volume needs, e.g. 1%; at most "
                 "spheres where given, else 200,000")),
       without_default(
-          share("at-overlap", IST_MEMBER(target.at_overlap), {.least = 1e-4, .most = 0.5},
+          share("at-overlap", member_of(&BakeSettings::target, &ErrorTarget::at_overlap),
+                {.least = 1e-4, .most = 0.5},
                 "Overlap, part of the volume, at which target-error is to hold"),
           "0.1%"),
-      share("coverage", IST_MEMBER(packing.target_coverage), {.least = 0, .most = 1},
-            "Stop at this share of the volume"),
-      real("min-radius", IST_MEMBER(packing.min_radius), from_zero, "[u] Insert nothing smaller"),
-      real("time", IST_MEMBER(packing.time_limit), from_zero,
+      share("coverage", member_of(&BakeSettings::packing, &PackingSettings::target_coverage),
+            {.least = 0, .most = 1}, "Stop at this share of the volume"),
+      real("min-radius", member_of(&BakeSettings::packing, &PackingSettings::min_radius), from_zero,
+           "[u] Insert nothing smaller"),
+      real("time", member_of(&BakeSettings::packing, &PackingSettings::time_limit), from_zero,
            "[s] Stop packing after this, 0 = no limit; with target-error: the whole search"),
-      share("epsilon", IST_MEMBER(packing.epsilon), {.least = 0, .most = 1, .without_most = true},
+      share("epsilon", member_of(&BakeSettings::packing, &PackingSettings::epsilon),
+            {.least = 0, .most = 1, .without_most = true},
             "Every sphere is at least 1 − E times the largest that would fit; 0 = the library's "
             "own schedule"),
       without_default(
-          real("field-error", IST_MEMBER(packing.field.error), {.least = 0, .without_least = true},
+          real("field-error", member_of(&PackingSettings::field, &FieldSettings::error),
+               {.least = 0, .without_least = true},
                "[u] How far the surface kept for exact queries may be from the mesh's; as few "
                "triangles as that allows. Default: the mesh's own where they are at most 30,000, "
                "else that many")),
-      flag("no-field", IST_MEMBER(packing.field.wanted), false,
+      flag("no-field", member_of(&PackingSettings::field, &FieldSettings::wanted), false,
            "Keep no surface: a smaller file, whose volumes are those of spheres"),
       grid(),
-      whole("grid-resolution", IST_MEMBER(packing.grids.resolution), 0, kMostCells,
+      whole("grid-resolution", member_of(&PackingSettings::grids, &GridSettings::resolution), 0,
+            kMostCells,
             "Cells on the longest side of the fixed grid (uniform, implicit), or of hybrid's first "
             "distance grid; 0 = automatic"),
-      whole("grid-start", IST_MEMBER(packing.grids.start), 0, kMostCells,
+      whole("grid-start", member_of(&PackingSettings::grids, &GridSettings::start), 0, kMostCells,
             "Cells on the longest side of the first grid of prototypes (not banded); 0 = "
             "automatic"),
-      whole("grid-refinements", IST_MEMBER(packing.grids.refinements), -1, kMostRefinements,
+      whole("grid-refinements", member_of(&PackingSettings::grids, &GridSettings::refinements), -1,
+            kMostRefinements,
             "How often that grid is split in 8 (explicit, implicit, hybrid); -1 = automatic"),
-      whole("grid-rounds", IST_MEMBER(packing.grids.rounds_per_level), 0,
+      whole("grid-rounds", member_of(&PackingSettings::grids, &GridSettings::rounds_per_level), 0,
             std::numeric_limits<unsigned>::max(),
             "Rounds before each split (explicit, implicit, hybrid); 0 = automatic"),
-      whole("seed", IST_MEMBER(packing.seed), 0, std::numeric_limits<std::uint64_t>::max(),
-            "Breaks ties; any value packs equally well"),
-      flag("repair", IST_MEMBER(mesh.repair), true, "Close an open mesh, and say what was done"),
-      real("scale", IST_MEMBER(mesh.scale), {.least = 0, .without_least = true},
+      whole("seed", member_of(&BakeSettings::packing, &PackingSettings::seed), 0,
+            std::numeric_limits<std::uint64_t>::max(), "Breaks ties; any value packs equally well"),
+      flag("repair", member_of(&BakeSettings::mesh, &MeshSettings::repair), true,
+           "Close an open mesh, and say what was done"),
+      real("scale", member_of(&BakeSettings::mesh, &MeshSettings::scale),
+           {.least = 0, .without_least = true},
            "Every coordinate of the mesh times this: [u] is the unit that comes out"),
-      axis("up-axis", IST_MEMBER(mesh.up_axis), "",
+      axis("up-axis", member_of(&BakeSettings::mesh, &MeshSettings::up_axis), "",
            "Which of the mesh's axes is up; it is turned to world-up. Default: nothing is turned"),
-      axis("world-up", IST_MEMBER(mesh.world_up), "Z", "Which axis is to be up, with up-axis"),
+      axis("world-up", member_of(&BakeSettings::mesh, &MeshSettings::world_up), "Z",
+           "Which axis is to be up, with up-axis"),
   };
 }
-#undef IST_MEMBER
 
 const std::vector<Setting>& settings_list() {
   static const std::vector<Setting> list = make_settings();
