@@ -18,6 +18,8 @@ struct ExitCode {
 };
 
 void add_bake(CLI::App& app);
+void add_cache(CLI::App& app);
+void add_summary(CLI::App& app);
 void add_query(CLI::App& app);
 void add_info(CLI::App& app);
 void add_check(CLI::App& app);

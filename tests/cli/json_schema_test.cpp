@@ -66,6 +66,23 @@ TEST_F(JsonSchema, InfoAndBake) {
   EXPECT_EQ(bake, expected);
 }
 
+TEST_F(JsonSchema, LibraryAndCache) {
+  Paths library, summary, cache;
+  write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n");
+  write("library.toml",
+        "[[asset]]\nmesh = 'open.obj'\nspheres = 9\nrepair = true\n"
+        "[[asset]]\nmesh = 'cube.obj'\nspheres = 9\n");
+  const std::vector<std::string> bake = {"bake", "--manifest", "library.toml", "-o",
+                                         "out",  "--cache",    "cache",        "--json"};
+  add(bake, library);
+  EXPECT_EQ(library, documented("A library"));
+  write("summary.json", ist(bake).out);
+  add({"summary", "summary.json", "--json"}, summary);
+  EXPECT_EQ(summary, library);
+  add({"cache", "cache", "--json"}, cache);
+  EXPECT_EQ(cache, documented("`ist cache --json`"));
+}
+
 TEST_F(JsonSchema, CheckQueryAndExport) {
   Paths check, query, exported;
   add({"check", "cube.ist", "--mesh", "cube.obj", "--json"}, check);

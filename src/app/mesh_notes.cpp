@@ -1,26 +1,21 @@
-#include "app/input_mesh.h"
+#include "app/mesh_notes.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-
-#include <utility>
 
 #include <ist/error.h>
 
 namespace ist::app {
 
-InputMesh read_input_mesh(const std::string& path, bool repair) {
-  TriangleMesh mesh = load_mesh(path);
-  InputMesh result{mesh.declared, {}};
+InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings) {
   try {
-    result.closed =
-        close_mesh(std::move(mesh), path, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+    InputMesh mesh = read_input_mesh(path, settings);
+    for (const std::string& note : mesh.closed.report.notes) spdlog::warn("{}: {}", path, note);
+    return mesh;
   } catch (const OpenMeshError& error) {
-    if (repair) throw;
+    if (settings.repair) throw;
     throw OpenMeshError(std::string(error.what()) + "; --repair closes what can be closed");
   }
-  for (const std::string& note : result.closed.report.notes) spdlog::warn("{}: {}", path, note);
-  return result;
 }
 
 std::string describe_declared(const DeclaredFrame& declared) {
