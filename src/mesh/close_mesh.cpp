@@ -83,9 +83,9 @@ MeshReport survey(const TriangleMesh& mesh) {
     if (sides.size() == 2 && runs_up(mesh.triangles, sides[0]) == runs_up(mesh.triangles, sides[1]))
       ++report.inconsistent_edges;
   }
-  const auto self_intersections = count_self_intersections(mesh.vertices, mesh.triangles);
-  report.self_intersections = self_intersections.value_or(0);
-  report.self_intersections_counted = self_intersections.has_value();
+  const auto found = find_self_intersections(mesh.vertices, mesh.triangles);
+  report.self_intersections = found ? found->count : 0;
+  report.self_intersections_counted = found.has_value();
   return report;
 }
 
@@ -223,7 +223,10 @@ ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMes
   // Dropped degenerate triangles never counted; other changes may add or remove intersections.
   report.meets_itself = !report.self_intersections_counted || report.self_intersections > 0;
   if (report.repaired || report.coincident_triangles > 0)
-    report.meets_itself = count_self_intersections(mesh.vertices, mesh.triangles) != 0;
+  {
+    const auto found = find_self_intersections(mesh.vertices, mesh.triangles);
+    report.meets_itself = !found || found->count > 0;
+  }
   report.closed = true;
   return {weld(mesh, 0), std::move(report), name};
 }

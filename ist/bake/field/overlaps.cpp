@@ -112,10 +112,10 @@ std::optional<Overlaps> find_overlaps(const MeshSolid& solid) {
   std::vector<Triangle> triangles(mesh.triangle_count);
   for (std::size_t t = 0; t < triangles.size(); ++t)
     std::copy_n(mesh.triangles + 3 * t, 3, triangles[t].begin());
-  auto pairs = find_self_intersections(vertices, triangles);
-  if (!pairs) return std::nullopt;
+  auto found = find_self_intersections(vertices, triangles);
+  if (!found || !found->pairs) return std::nullopt;
   Overlaps out;
-  out.pairs = *std::move(pairs);
+  out.pairs = *std::move(found->pairs);
   std::vector<std::uint8_t> apart(triangles.size());
   for (std::size_t t = 0; t < triangles.size(); ++t)
     apart[t] = is_degenerate(vertices, triangles[t]) ? 1 : 0;
