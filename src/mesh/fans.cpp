@@ -3,7 +3,9 @@
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -21,11 +23,22 @@ struct Incidence {
 
   Incidence(const std::size_t vertices, const std::vector<Triangle>& triangles)
       : begin(vertices + 2, 0), listed(3 * triangles.size()) {
-    for (const Triangle& t : triangles)
-      for (const std::uint32_t v : t) ++begin[v + 2];
+    const auto for_each_corner = [&](const auto& visit) {
+      tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
+        for (const std::uint32_t v : triangles[t]) visit(static_cast<std::uint32_t>(t), v);
+      });
+    };
+    const auto one_more = [](std::uint32_t& count) {
+      return std::atomic_ref<std::uint32_t>(count).fetch_add(1, std::memory_order_relaxed);
+    };
+    for_each_corner([&](std::uint32_t, const std::uint32_t v) { one_more(begin[v + 2]); });
     for (std::size_t v = 2; v < begin.size(); ++v) begin[v] += begin[v - 1];
-    for (std::uint32_t t = 0; t < triangles.size(); ++t)
-      for (const std::uint32_t v : triangles[t]) listed[begin[v + 1]++] = t;
+    for_each_corner(
+        [&](const std::uint32_t t, const std::uint32_t v) { listed[one_more(begin[v + 1])] = t; });
+    // In whichever order the threads came.
+    tbb::parallel_for(std::size_t{0}, vertices, [&](const std::size_t v) {
+      std::sort(listed.begin() + begin[v], listed.begin() + begin[v + 1]);
+    });
   }
 };
 

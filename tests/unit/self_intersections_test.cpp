@@ -7,12 +7,15 @@
 #include <cmath>
 #include <random>
 
+#include <ist/error.h>
 #include <ist/mesh.h>
 
 #include "mesh/fans.h"
+#include "mesh/mesh_solid.h"
 #include "mesh/surface_reduction.h"
 #include "mesh/triangle_separation.h"
 #include "mesh/weld.h"
+#include "support/test_meshes.h"
 
 namespace ist {
 namespace {
@@ -96,6 +99,47 @@ TEST(SelfIntersections, FindsWhatAllPairsFind) {
       for (Eigen::Vector3d& v : sheet.vertices) v = turn * v;
       expect_all_found(sheet);
     }
+}
+
+void expect_handed_over(const TriangleMesh& mesh, const std::size_t at_least) {
+  const ClosedMesh closed = close_mesh(mesh, "mesh", OpenMeshPolicy::repair);
+  ASSERT_TRUE(closed.meeting_pairs);
+  EXPECT_EQ(*closed.meeting_pairs, all_pairs(closed.mesh));
+  EXPECT_EQ(closed.report.meets_itself, !closed.meeting_pairs->empty());
+  EXPECT_GE(closed.meeting_pairs->size(), at_least);
+}
+
+TEST(SelfIntersections, TheClosedMeshKeepsThem) {
+  const TriangleMesh two = testing::overlapping_cubes_mesh();
+  expect_handed_over(two, 1);
+  expect_handed_over(testing::box_mesh({0, 0, 0}, {1, 1, 1}), 0);
+  // Triangles without area come first and are dropped.
+  TriangleMesh dropped = two;
+  dropped.triangles.insert(dropped.triangles.begin(), {{0, 0, 1}, {1, 2, 1}});
+  dropped.triangles.insert(dropped.triangles.begin() + 7, {3, 3, 3});
+  expect_handed_over(dropped, 1);
+  // One face twice; one face missing.
+  TriangleMesh copied = two;
+  copied.triangles.insert(copied.triangles.begin(), two.triangles[3]);
+  expect_handed_over(copied, 1);
+  TriangleMesh open = two;
+  open.triangles.erase(open.triangles.begin());
+  expect_handed_over(open, 1);
+}
+
+TEST(SelfIntersections, TheSolidTakesThemWhereNothingIsRounded) {
+  TriangleMesh two = testing::overlapping_cubes_mesh();
+  ClosedMesh closed = close_mesh(two, "two cubes");
+  const MeshSolid exact(closed);
+  ASSERT_NE(exact.meeting_pairs(), nullptr);
+  EXPECT_EQ(*exact.meeting_pairs(), *closed.meeting_pairs);
+  two.vertices[0][0] += 1e-20;
+  two.vertices[0][1] += 1e-20;
+  EXPECT_EQ(MeshSolid(close_mesh(two, "rounded")).meeting_pairs(), nullptr);
+  closed.meeting_pairs->push_back({0, static_cast<std::uint32_t>(closed.mesh.triangles.size())});
+  EXPECT_THROW(MeshSolid{closed}, Error);
+  closed.meeting_pairs.reset();
+  EXPECT_EQ(MeshSolid(closed).meeting_pairs(), nullptr);
 }
 
 TEST(SelfIntersections, FansThatGoOnceAround) {
