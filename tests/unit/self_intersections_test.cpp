@@ -133,8 +133,8 @@ TEST(SelfIntersections, TheSolidTakesThemWhereNothingIsRounded) {
   const MeshSolid exact(closed);
   ASSERT_NE(exact.meeting_pairs(), nullptr);
   EXPECT_EQ(*exact.meeting_pairs(), *closed.meeting_pairs);
-  two.vertices[0][0] += 1e-20;
-  two.vertices[0][1] += 1e-20;
+  for (Eigen::Vector3d& v : two.vertices)
+    if (v[0] == 0) v[0] = 1e-20;
   EXPECT_EQ(MeshSolid(close_mesh(two, "rounded")).meeting_pairs(), nullptr);
   closed.meeting_pairs->push_back({0, static_cast<std::uint32_t>(closed.mesh.triangles.size())});
   EXPECT_THROW(MeshSolid{closed}, Error);
