@@ -59,12 +59,12 @@ struct MeshSolid::Impl {
 namespace {
 
 /// Whether to_unit() does not round: the difference and its scaling, a power of two.
-bool is_exact(const UnitFrame& frame, const Eigen::Vector3d& x) {
+bool is_exact(const UnitFrame& frame, const double scale, const Eigen::Vector3d& x) {
   for (int k = 0; k < 3; ++k) {
     const double difference = x[k] - frame.centre[k];
     const double centre_part = difference - x[k];  // −centre, as far as it got in (Knuth's two-sum)
     if (x[k] != difference - centre_part || centre_part != -frame.centre[k] ||
-        difference / frame.scale() * frame.scale() != difference)
+        difference / scale * scale != difference)
       return false;
   }
   return true;
@@ -140,8 +140,9 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
       if (pair[0] >= mesh.triangles.size() || pair[1] >= mesh.triangles.size())
         throw Error(closed.name + ": meeting pairs name a triangle that is not there");
     std::atomic<bool> exact{true};
+    const double scale = impl_->frame.scale();
     tbb::parallel_for(std::size_t{0}, mesh.vertices.size(), [&](std::size_t v) {
-      if (place[v] != kUnused && !is_exact(impl_->frame, mesh.vertices[v])) exact = false;
+      if (place[v] != kUnused && !is_exact(impl_->frame, scale, mesh.vertices[v])) exact = false;
     });
     if (exact) impl_->meeting_pairs = closed.meeting_pairs;
   }
