@@ -91,7 +91,10 @@ in_root() { chroot "$root" "$@"; }
 in_root /usr/bin/ist --version
 for file in man/man1/ist.1 man/man1/ist-bake.1 bash-completion/completions/ist \
   zsh/vendor-completions/_ist fish/vendor_completions.d/ist.fish; do
-  [[ -s $root/usr/share/$file || -s $root/usr/share/$file.gz ]] || { echo "no $file" >&2; exit 1; }
+  [ -s "$root/usr/share/$file" ] || [ -s "$root/usr/share/$file.gz" ] || {
+    echo "no $file" >&2
+    exit 1
+  }
 done
 in_root /usr/bin/ist sample cube -o /tmp/cube.obj
 in_root /usr/bin/ist bake /tmp/cube.obj -o /tmp/cube.ist --spheres 100 --device cpu --quiet
