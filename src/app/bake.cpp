@@ -8,6 +8,7 @@
 #include <ist/error.h>
 
 #include "app/asset_summary.h"
+#include "app/bake_robot.h"
 #include "app/coarseness.h"
 #include "app/commands.h"
 #include "app/device_option.h"
@@ -27,6 +28,7 @@ struct BakeOptions {
   PackingSettings packing;
   std::string grid = "banded", device = "auto";
   ErrorTarget target = {0, ErrorTarget().at_overlap};  ///< error 0: none is asked for
+  RobotOptions robot;
   bool repair = false, json = false, quiet = false;
 };
 
@@ -102,9 +104,12 @@ void run_bake(const BakeOptions& options) {
   PackingSettings settings = options.packing;
   settings.grid = grid_named(options.grid);
   refuse_idle_options(settings);
-  require_output(options.output, options.mesh, "the asset");
+  if (!is_robot_file(options.mesh)) require_output(options.output, options.mesh, "the asset");
   settings.device = usable_device(options.device);
   announce_device(settings.device);
+  if (is_robot_file(options.mesh))
+    return bake_robot({options.mesh, options.output, settings, options.robot, options.repair,
+                       options.json, options.quiet});
 
   const auto start = std::chrono::steady_clock::now();
   const auto [declared, mesh] = read_input_mesh(options.mesh, options.repair);
@@ -147,8 +152,10 @@ void add_bake(CLI::App& app) {
   PackingSettings& packing = options->packing;
   CLI::App* const command =
       app.add_subcommand("bake", "Pack a closed mesh with spheres and write an .ist asset");
-  add_input(command, "MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …");
-  add_output(command, options->output, "The .ist file to write", Dash::refused);
+  add_input(command, "MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf");
+  add_output(command, options->output,
+             "The .ist file to write; of a robot the folder, for an asset a mesh and an index",
+             Dash::refused);
   add_whole<std::size_t>(
       command, "--spheres", packing.max_spheres,
       "Stop at this count, 0 = no limit (with --target-error: 200,000, as by default)", 0,
@@ -188,6 +195,7 @@ void add_bake(CLI::App& app) {
   add_whole(command, "--threads", packing.threads, "0 = all cores; never changes the result");
   add_whole(command, "--seed", packing.seed, "Breaks ties; any value packs equally well");
   command->add_flag("--repair", options->repair, "Close an open mesh, and say what was done");
+  add_robot_options(command, options->robot);
   command->add_flag("--json", options->json, "The result as JSON on stdout");
   command->add_flag("--quiet", options->quiet, "Only errors");
   command->footer(

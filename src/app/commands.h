@@ -24,5 +24,6 @@ void add_check(CLI::App& app);
 void add_medial(CLI::App& app);
 void add_export(CLI::App& app);
 void add_sample(CLI::App& app);
+void add_spheres(CLI::App& app);
 
 }  // namespace ist::app

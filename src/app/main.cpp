@@ -31,6 +31,7 @@ int main(int argc, char** argv) {
   add_export(app);
   add_medial(app);
   add_sample(app);
+  add_spheres(app);
   try {
     app.parse(argc, argv);
     if (app.get_subcommands().empty()) throw CLI::RequiredError("A subcommand");

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "spheres/point_tree.h"
+#include "spheres/sampled_solid.h"
+
+namespace ist {
+
+/// Centres, and the level at which the largest balls around them (OffsetSurface::radius) hold all
+/// targets.
+struct LevelCover {
+  std::vector<Eigen::Vector3d> centres;  ///< unit frame
+  double level = 0;                      ///< unit frame
+};
+
+/// Moves centres so that the level falls. One ball at a time: of the targets that no other ball
+/// holds at a level a little lower, its farthest is brought as near as can be.
+class CoverDescent {
+ public:
+  CoverDescent(std::span<const OutwardRay> rays, const std::vector<Eigen::Vector3d>& targets)
+      : rays_(rays), targets_(targets), tree_(targets) {}
+
+  /// The level of centres, no better than `least`: a guess from that level, which grows by as much
+  /// as the farthest target is short of its ball.
+  double level_of(const std::vector<Eigen::Vector3d>& centres, double least) const;
+
+  /// Lowers the level, at first by the share `step` of it, until a few thousandths fail, in `rounds`
+  /// over all balls at most.
+  LevelCover improve(LevelCover cover, double step, int rounds) const;
+
+ private:
+  class Round;
+  std::span<const OutwardRay> rays_;
+  const std::vector<Eigen::Vector3d>& targets_;
+  PointTree tree_;
+};
+
+}  // namespace ist
