@@ -30,7 +30,8 @@ struct Incidence {
   }
 };
 
-/// The state of the search: what a candidate would bring, and what a chosen one would be missed for.
+/// The state of the search: what a candidate would bring, and what a chosen one would be missed
+/// for.
 class Choice {
  public:
   explicit Choice(const Incidence& incidence)
@@ -70,15 +71,18 @@ class Choice {
     return best;
   }
 
-  std::uint32_t least_missed(std::int64_t now) const {
+  /// Of the chosen ones but `kept`, those that are free to go first.
+  std::uint32_t least_missed(std::int64_t now, std::uint32_t kept) const {
     std::uint32_t best = kNone;
-    for (const std::uint32_t j : chosen_) {
-      if (since_[j] > now) continue;
-      if (best == kNone || loss_[j] < loss_[best] ||
-          (loss_[j] == loss_[best] && (since_[j] < since_[best] ||
-                                       (since_[j] == since_[best] && j < best))))
-        best = j;
-    }
+    const auto before = [&](std::uint32_t j, std::uint32_t k) {
+      const bool bound_j = since_[j] > now, bound_k = since_[k] > now;
+      if (bound_j != bound_k) return bound_k;
+      if (loss_[j] != loss_[k]) return loss_[j] < loss_[k];
+      if (since_[j] != since_[k]) return since_[j] < since_[k];
+      return j < k;
+    };
+    for (const std::uint32_t j : chosen_)
+      if (j != kept && (best == kNone || before(j, best))) best = j;
     return best;
   }
 
@@ -138,11 +142,11 @@ class Choice {
   }
 
   const Incidence& incidence_;
-  std::vector<std::int64_t> weight_;     ///< of a target
-  std::vector<std::uint32_t> holders_;   ///< how many chosen ones hold a target
-  std::vector<std::int64_t> gain_;       ///< weight of the open targets a candidate holds
-  std::vector<std::int64_t> loss_;       ///< weight of the targets a chosen one alone holds
-  std::vector<std::int64_t> since_;      ///< it stays as it is until this exchange
+  std::vector<std::int64_t> weight_;    ///< of a target
+  std::vector<std::uint32_t> holders_;  ///< how many chosen ones hold a target
+  std::vector<std::int64_t> gain_;      ///< weight of the open targets a candidate holds
+  std::vector<std::int64_t> loss_;      ///< weight of the targets a chosen one alone holds
+  std::vector<std::int64_t> since_;     ///< it stays as it is until this exchange
   std::vector<char> in_;
   std::vector<std::uint32_t> chosen_, open_, place_;
 };
@@ -150,10 +154,12 @@ class Choice {
 }  // namespace
 
 std::vector<std::uint32_t> choose_cover(std::span<const CoverSphere> candidates,
-                                        std::span<const Eigen::Vector3d> targets,
-                                        std::size_t count, std::size_t exchanges,
-                                        std::uint64_t seed) {
+                                        std::span<const Eigen::Vector3d> targets, std::size_t count,
+                                        std::size_t exchanges, std::uint64_t seed) {
   const Incidence incidence(candidates, targets);
+  const auto unheld = std::count_if(incidence.holders.begin(), incidence.holders.end(),
+                                    [](const auto& holders) { return holders.empty(); });
+  if (50 * static_cast<std::size_t>(unheld) > targets.size()) return {};
   Choice choice(incidence);
   while (choice.chosen().size() < count) {
     const std::uint32_t best = choice.most_helpful();
@@ -163,14 +169,15 @@ std::vector<std::uint32_t> choose_cover(std::span<const CoverSphere> candidates,
   std::int64_t now = 0;
   while (!choice.open().empty() && static_cast<std::size_t>(now) < exchanges) {
     ++now;
-    const std::uint64_t random = mixed(seed + static_cast<std::uint64_t>(now) * 0x9E3779B97F4A7C15ull);
+    const std::uint64_t random =
+        mixed(seed + static_cast<std::uint64_t>(now) * 0x9E3779B97F4A7C15ull);
     const std::uint32_t target = choice.open()[random % choice.open().size()];
     const std::uint32_t in = choice.most_helpful_for(target, now);
     if (in == kNone) continue;
     choice.put_in(in, now + 3 + static_cast<std::int64_t>((random >> 40) % 5));
-    const std::uint32_t out = choice.least_missed(now);
-    if (out != kNone && choice.chosen().size() > count)
-      choice.take_out(out, now + 1 + static_cast<std::int64_t>((random >> 50) % 5));
+    if (choice.chosen().size() > count)
+      choice.take_out(choice.least_missed(now, in),
+                      now + 1 + static_cast<std::int64_t>((random >> 50) % 5));
     choice.make_open_heavier();
   }
   if (!choice.open().empty()) return {};

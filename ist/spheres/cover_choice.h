@@ -16,9 +16,8 @@ namespace ist {
 /// tabu search: an open target is picked, the candidate that would help most comes in, the one that
 /// is missed least goes out, and targets that stay open weigh more.
 std::vector<std::uint32_t> choose_cover(std::span<const CoverSphere> candidates,
-                                        std::span<const Eigen::Vector3d> targets,
-                                        std::size_t count, std::size_t exchanges,
-                                        std::uint64_t seed);
+                                        std::span<const Eigen::Vector3d> targets, std::size_t count,
+                                        std::size_t exchanges, std::uint64_t seed);
 
 /// The same without exchanges and with as many as it takes: the plain greedy choice.
 std::vector<std::uint32_t> choose_greedily(std::span<const CoverSphere> candidates,

@@ -13,20 +13,23 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kLastStep = 0.003;
-constexpr int kPatience = 5;          ///< rounds at a level without gain
+constexpr int kPatience = 5;  ///< rounds at a level without gain
 
 }  // namespace
 
-/// All balls at one level.
+/// All balls at one level, a little below that of the surface: where the solid is convex, the
+/// largest ball shrinks as the level falls, and elsewhere nearly.
 class CoverDescent::Round {
  public:
-  Round(const CoverDescent& descent, const OffsetSurface& surface, std::vector<Vector3d> centres)
+  Round(const CoverDescent& descent, const OffsetSurface& surface, double level,
+        std::vector<Vector3d> centres)
       : descent_(descent),
         surface_(surface),
+        level_(level),
         centres_(std::move(centres)),
-        trust_(centres_.size(), 0.5 * surface.level()),
+        trust_(centres_.size(), 0.5 * level),
         holders_(descent.targets_.size(), 0) {
-    for (const Vector3d& c : centres_) radii_.push_back(surface.radius(c));
+    for (const Vector3d& c : centres_) radii_.push_back(radius_at(c));
     for (std::size_t i = 0; i < centres_.size(); ++i) count(i, 1);
   }
 
@@ -56,21 +59,27 @@ class CoverDescent::Round {
                           [&](std::uint32_t x, double) { holders_[x] += by; });
   }
 
+  double radius_at(const Vector3d& c) const {
+    return surface_.radius(c) - (surface_.level() - level_);
+  }
+
   void move(std::size_t i) {
-    const double level = surface_.level();
+    const double level = level_;
+    if (!(radii_[i] > 0)) return;
     const double within2 = radii_[i] * radii_[i];
     needed_.clear();
-    descent_.tree_.within(centres_[i], radii_[i] + kReach * level,
-                          [&](std::uint32_t x, double d2) {
-                            if (holders_[x] == (d2 <= within2 ? 1 : 0))
-                              needed_.push_back(descent_.targets_[x]);
-                          });
-    if (needed_.empty()) return;
+    bool short_of_one = false;
+    descent_.tree_.within(centres_[i], radii_[i] + kReach * level, [&](std::uint32_t x, double d2) {
+      if (holders_[x] != (d2 <= within2 ? 1 : 0)) return;
+      needed_.push_back(descent_.targets_[x]);
+      short_of_one = short_of_one || d2 > within2;
+    });
+    if (!short_of_one) return;
     const double trust = trust_[i];
     walls_.clear();
-    surface_.walls(centres_[i], radii_[i] + 2 * trust, walls_);
+    surface_.walls(centres_[i], radii_[i] + (surface_.level() - level) + 2 * trust, walls_);
     const Recentred moved = recentre(centres_[i], needed_, walls_, trust);
-    const double radius = surface_.radius(moved.centre);
+    const double radius = radius_at(moved.centre);
     const double way = std::sqrt((moved.centre - centres_[i]).squaredNorm());
     trust_[i] = std::clamp(way > 0 ? 2 * way : 0.5 * trust, 0.02 * level, 0.7 * level);
     if (!(radius > 0) || !(way > 0)) return;
@@ -84,31 +93,28 @@ class CoverDescent::Round {
 
   const CoverDescent& descent_;
   const OffsetSurface& surface_;
+  const double level_;
   std::vector<Vector3d> centres_;
   std::vector<double> radii_, trust_;
   std::vector<int> holders_;  ///< balls that hold a target
   std::vector<Vector3d> needed_, walls_;
 };
 
-double CoverDescent::level_of(const std::vector<Vector3d>& centres, double least) const {
-  const OffsetSurface surface(rays_, least);
-  return least + Round(*this, surface, centres).worst();
-}
-
 LevelCover CoverDescent::improve(LevelCover cover, double step, int rounds) const {
+  const OffsetSurface surface(solid_, sampled_, cover.level);
   while (step > kLastStep && rounds > 0) {
-    const OffsetSurface surface(rays_, cover.level * (1 - step));
-    Round round(*this, surface, cover.centres);
+    const double aim = cover.level * (1 - step);
+    Round round(*this, surface, aim, cover.centres);
     double best_here = std::numeric_limits<double>::infinity();
     bool gained = false;
     for (int idle = 0; idle < kPatience && rounds > 0; --rounds) {
       round.move_all();
-      const double level = surface.level() + round.worst();
+      const double level = aim + round.worst();
       if (level < cover.level * (1 - 1e-4)) {
         cover = {round.centres(), level};
         gained = true;
       }
-      if (level <= surface.level()) break;
+      if (level <= aim) break;
       if (level < best_here * (1 - 1e-3)) {
         best_here = level;
         idle = 0;

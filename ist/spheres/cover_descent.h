@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <span>
 #include <vector>
 
 #include "spheres/point_tree.h"
@@ -18,22 +17,19 @@ struct LevelCover {
 
 /// Moves centres so that the level falls. One ball at a time: of the targets that no other ball
 /// holds at a level a little lower, its farthest is brought as near as can be.
-class CoverDescent {
+class [[gnu::visibility("hidden")]] CoverDescent {
  public:
-  CoverDescent(std::span<const OutwardRay> rays, const std::vector<Eigen::Vector3d>& targets)
-      : rays_(rays), targets_(targets), tree_(targets) {}
+  CoverDescent(const MeshSolid& solid, const SampledSolid& sampled)
+      : solid_(solid), sampled_(sampled), targets_(sampled.targets), tree_(sampled.targets) {}
 
-  /// The level of centres, no better than `least`: a guess from that level, which grows by as much
-  /// as the farthest target is short of its ball.
-  double level_of(const std::vector<Eigen::Vector3d>& centres, double least) const;
-
-  /// Lowers the level, at first by the share `step` of it, until a few thousandths fail, in `rounds`
-  /// over all balls at most.
+  /// Lowers the level, at first by the share `step` of it, until a few thousandths fail, in
+  /// `rounds` over all balls at most.
   LevelCover improve(LevelCover cover, double step, int rounds) const;
 
  private:
   class Round;
-  std::span<const OutwardRay> rays_;
+  const MeshSolid& solid_;
+  const SampledSolid& sampled_;
   const std::vector<Eigen::Vector3d>& targets_;
   PointTree tree_;
 };

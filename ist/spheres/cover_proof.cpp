@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kMargin = 1e-12;      ///< unit frame, above the rounding of any distance here
+constexpr double kMargin = 1e-12;       ///< unit frame, above the rounding of any distance here
 constexpr double kSmallestCube = 1e-9;  ///< unit frame: smaller ones stay unproven
 constexpr double kSmallBesideGap = 0.25;
 
@@ -22,11 +22,12 @@ double distance(const Vector3d& a, const Vector3d& b) { return std::sqrt((a - b)
 
 class SurfaceSearch {
  public:
-  SurfaceSearch(std::span<const CoverSphere> balls, double finest)
-      : balls_(balls), finest_(finest) {}
+  SurfaceSearch(std::span<const CoverSphere> balls, double finest, std::size_t most)
+      : balls_(balls), finest_(finest), most_(most) {}
 
   void search(const std::array<Vector3d, 3>& t, const BallList& from, int depth,
               std::vector<OpenPart>& out) {
+    if (out.size() >= most_) return;
     const Vector3d middle = (t[0] + t[1] + t[2]) / 3;
     double reach = 0;
     for (const Vector3d& corner : t) reach = std::max(reach, distance(corner, middle));
@@ -47,7 +48,8 @@ class SurfaceSearch {
       }
     }
     part.gap = std::max(0.0, gap);
-    if (reach <= finest_ || reach <= kSmallBesideGap * gap || depth >= kDeepest) {
+    // No ball need grow less for a smaller part, but for `finest`.
+    if (least - part.gap <= finest_ || reach <= kSmallBesideGap * gap || depth >= kDeepest) {
       out.push_back(part);
       return;
     }
@@ -74,6 +76,7 @@ class SurfaceSearch {
   static constexpr int kDeepest = 120;
   std::span<const CoverSphere> balls_;
   const double finest_;
+  const std::size_t most_;
 };
 
 class VoidSearch {
@@ -103,7 +106,7 @@ class VoidSearch {
       ++crossing;
       kept.push_back(i);
     }
-    if (crossing < 3) return Verdict::settled;
+    if (crossing < 3 || may_rise(cube, kept)) return Verdict::settled;
     if (gap > 0) {
       const double corner = 1.7320508075688774 * cube.half + kMargin;
       if (!solid_.inside(cube.middle)) {
@@ -132,12 +135,29 @@ class VoidSearch {
 
   static Cube part(const Cube& cube, int k) {
     const double h = cube.half / 2;
-    return {cube.middle + Vector3d((k & 1) != 0 ? h : -h, (k & 2) != 0 ? h : -h,
-                                   (k & 4) != 0 ? h : -h),
-            h};
+    return {
+        cube.middle + Vector3d((k & 1) != 0 ? h : -h, (k & 2) != 0 ? h : -h, (k & 4) != 0 ? h : -h),
+        h};
   }
 
  private:
+  /// Whether every point of the cube that is on spheres can go a little way out of all of them and
+  /// up, so that none is the highest of a void.
+  bool may_rise(const Cube& cube, const BallList& crossing) const {
+    const Vector3d up(0.36, 0.48, 0.8);
+    Vector3d out = Vector3d::Zero();
+    for (const std::uint32_t i : crossing) {
+      const Vector3d d = cube.middle - balls_[i].centre;
+      out += d / std::max(std::sqrt(d.squaredNorm()), kMargin);
+    }
+    Vector3d way = out - out.dot(up) * up;
+    way += 1e-3 * std::sqrt(way.squaredNorm()) * up;
+    const double slack = cube.half * way.cwiseAbs().sum() + kMargin;
+    return way.dot(up) > 0 && std::all_of(crossing.begin(), crossing.end(), [&](std::uint32_t i) {
+             return way.dot(cube.middle - balls_[i].centre) > slack;
+           });
+  }
+
   const MeshSolid& solid_;
   std::span<const CoverSphere> balls_;
 };
@@ -151,16 +171,17 @@ BallList all_of(std::size_t count) {
 }  // namespace
 
 std::vector<OpenPart> open_surface(const MeshView& mesh, std::span<const CoverSphere> balls,
-                                   double finest) {
+                                   double finest, std::size_t most) {
   const BallList all = all_of(balls.size());
   std::vector<std::vector<OpenPart>> found(mesh.triangle_count);
   tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t t) {
     std::array<Vector3d, 3> corners;
     for (std::size_t k = 0; k < 3; ++k) {
-      const double* const v = mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{t} + k]};
+      const double* const v =
+          mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{t} + k]};
       corners[k] = {v[0], v[1], v[2]};
     }
-    SurfaceSearch(balls, finest).search(corners, all, 0, found[t]);
+    SurfaceSearch(balls, finest, most).search(corners, all, 0, found[t]);
   });
   std::vector<OpenPart> out;
   for (const auto& parts : found) out.insert(out.end(), parts.begin(), parts.end());
@@ -191,6 +212,28 @@ OpenPlace open_void(const MeshSolid& solid, std::span<const CoverSphere> balls) 
   for (const OpenPlace& open : found)
     if (open.found) return open;
   return {};
+}
+
+void grow_to_cover(const MeshSolid& solid, std::vector<CoverSphere>& balls, double finest) {
+  for (int round = 0; round < 50; ++round) {
+    const std::vector<OpenPart> parts = open_surface(solid.view(), balls, finest);
+    if (!parts.empty()) {
+      for (const OpenPart& part : parts) {
+        double& radius = balls[part.ball].radius;
+        radius = std::max(radius, part.radius);
+      }
+      continue;
+    }
+    const OpenPlace open = open_void(solid, balls);
+    if (!open.found) return;
+    CoverSphere* nearest = &balls.front();
+    double least = 1e300;
+    for (CoverSphere& ball : balls) {
+      const double lacks = std::sqrt((open.place - ball.centre).squaredNorm()) - ball.radius;
+      if (lacks < least) least = lacks, nearest = &ball;
+    }
+    nearest->radius += std::max(least, 0.0) + finest;
+  }
 }
 
 }  // namespace ist

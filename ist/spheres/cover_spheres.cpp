@@ -56,11 +56,13 @@ class Watch {
 /// The sphere in the mesh's frame, made larger by what rounding moves its centre.
 CoverSphere in_mesh_frame(const CoverSphere& ball, const UnitFrame& frame) {
   const Vector3d centre = frame.from_unit(ball.centre);
-  const double moved = 0x1p-51 * (std::abs(centre.x()) + std::abs(centre.y()) + std::abs(centre.z()));
+  const double moved =
+      0x1p-51 * (std::abs(centre.x()) + std::abs(centre.y()) + std::abs(centre.z()));
   return {centre, ball.radius * frame.scale() + moved};
 }
 
-std::vector<CoverSphere> in_unit_frame(std::span<const CoverSphere> spheres, const UnitFrame& frame) {
+std::vector<CoverSphere> in_unit_frame(std::span<const CoverSphere> spheres,
+                                       const UnitFrame& frame) {
   std::vector<CoverSphere> balls;
   for (const CoverSphere& s : spheres) {
     if (!(s.radius > 0) || !std::isfinite(s.radius) || !s.centre.allFinite()) continue;
@@ -90,7 +92,7 @@ SphereCover finished(const MeshSolid& solid, const std::vector<CoverSphere>& bal
 }
 
 /// As few spheres as reach no further than asked: more and more until it is enough, then fewer.
-SphereCover fewest(const MeshSolid& solid, CoverSearch& search,
+SphereCover fewest(const MeshSolid& solid, const CoverSearch& search,
                    const SphereCoverSettings& settings) {
   const auto with = [&](std::size_t count) { return finished(solid, search.with_count(count)); };
   const double level = settings.max_protrusion / solid.frame().scale();
@@ -107,8 +109,8 @@ SphereCover fewest(const MeshSolid& solid, CoverSearch& search,
     best = with(high);
   }
   while (high - low > std::max<std::size_t>(1, high / 32)) {
-    const std::size_t middle = low == 0 ? high - std::max<std::size_t>(1, high / 4)
-                                        : (low + high) / 2;
+    const std::size_t middle =
+        low == 0 ? high - std::max<std::size_t>(1, high / 4) : (low + high) / 2;
     if (middle == 0) break;
     SphereCover fewer = with(middle);
     if (fewer.protrusion.largest <= settings.max_protrusion) {
@@ -124,18 +126,17 @@ SphereCover fewest(const MeshSolid& solid, CoverSearch& search,
 SphereCover cover_one(const ClosedMesh& mesh, const SphereCoverSettings& settings, Watch& watch) {
   const auto start = std::chrono::steady_clock::now();
   const MeshSolid solid(mesh);
-  double done = 0;
-  CoverSearch search(solid, settings.seed, [&](double share) {
-    const double now = std::max(done, share);
-    watch.look(done, now);
-    done = now;
+  std::atomic<double> done = 0;
+  const CoverSearch search(solid, settings.seed, [&](double share) {
+    const double before = done.load();
+    if (share > before) done = share;  // one thread at a time gets further
+    watch.look(before, std::max(before, share));
   });
   SphereCover cover = settings.max_protrusion > 0
                           ? fewest(solid, search, settings)
                           : finished(solid, search.with_count(settings.count));
   watch.look(done, 1);
-  cover.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  cover.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return cover;
 }
 
@@ -177,11 +178,11 @@ SphereCoverProof prove_cover(const ClosedMesh& mesh, std::span<const CoverSphere
     proof.gap = gap * solid.frame().scale();
     return proof;
   };
-  const std::vector<OpenPart> parts = open_surface(solid.view(), balls, 1e-9);
+  const std::vector<OpenPart> parts = open_surface(solid.view(), balls, 1e-9, 1);
   if (!parts.empty()) {
-    const auto worst = std::max_element(
-        parts.begin(), parts.end(),
-        [](const OpenPart& a, const OpenPart& b) { return a.gap < b.gap; });
+    const auto worst =
+        std::max_element(parts.begin(), parts.end(),
+                         [](const OpenPart& a, const OpenPart& b) { return a.gap < b.gap; });
     return refuted(worst->middle, worst->gap);
   }
   const OpenPlace open = open_void(solid, balls);

@@ -14,9 +14,9 @@ constexpr double kLargest = 4;  ///< unit frame, of a ball
 
 }  // namespace
 
-OffsetSurface::OffsetSurface(std::span<const OutwardRay> rays, double level)
-    : level_(level) {
-  for (const OutwardRay& ray : rays) {
+OffsetSurface::OffsetSurface(const MeshSolid& solid, const SampledSolid& sampled, double level)
+    : solid_(solid), level_(level), spacing_(sampled.spacing) {
+  for (const OutwardRay& ray : sampled.rays) {
     if (ray.reach < level) continue;
     points_.push_back(ray.foot + level * ray.direction);
     normals_.push_back(ray.direction);
@@ -26,9 +26,19 @@ OffsetSurface::OffsetSurface(std::span<const OutwardRay> rays, double level)
 
 double OffsetSurface::radius(const Vector3d& centre) const {
   const PointTree::Nearest near = tree_.nearest(centre);
-  if (near.index == UINT32_MAX) return kLargest;
-  if ((points_[near.index] - centre).dot(normals_[near.index]) < 0) return 0;
-  return std::sqrt(near.distance2);
+  const double seen = near.index == UINT32_MAX ? kLargest : std::sqrt(near.distance2);
+  if (near.index != UINT32_MAX && (points_[near.index] - centre).dot(normals_[near.index]) < 0)
+    return 0;
+  const double sure = sure_radius(centre);
+  // By so much a point beside the nearest place is further than that.
+  const double coarse = spacing_ * spacing_ / (2 * seen);
+  return std::max(sure, seen - coarse);
+}
+
+double OffsetSurface::sure_radius(const Vector3d& centre) const {
+  const double depth = solid_.closest_point(centre).distance;
+  if (solid_.inside(centre)) return level_ + depth;
+  return std::max(0.0, level_ - depth);
 }
 
 void OffsetSurface::walls(const Vector3d& centre, double reach, std::vector<Vector3d>& out) const {
@@ -36,7 +46,8 @@ void OffsetSurface::walls(const Vector3d& centre, double reach, std::vector<Vect
 }
 
 std::vector<Vector3d> OffsetSurface::medial_centres(std::size_t most) const {
-  const std::size_t stride = std::max<std::size_t>(1, points_.size() / std::max<std::size_t>(most, 1));
+  const std::size_t stride =
+      std::max<std::size_t>(1, points_.size() / std::max<std::size_t>(most, 1));
   const std::size_t count = points_.size() / stride;
   std::vector<Vector3d> centres(count);
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {

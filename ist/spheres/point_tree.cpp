@@ -72,8 +72,8 @@ PointTree::Nearest PointTree::nearest(const Eigen::Vector3d& p, double limit2) c
     }
     for (std::uint32_t i = node.first; i < node.last; ++i) {
       const double d2 = (points_[i] - p).squaredNorm();
-      if (d2 < best.distance2 || (d2 == best.distance2 && order_[i] < best.index &&
-                                  best.index != UINT32_MAX)) {
+      if (d2 < best.distance2 ||
+          (d2 == best.distance2 && order_[i] < best.index && best.index != UINT32_MAX)) {
         best.distance2 = d2;
         best.index = order_[i];
       }

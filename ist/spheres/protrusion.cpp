@@ -20,10 +20,19 @@ constexpr double kTolerance = 0.01;
 /// Divides the cube around a ball until no part can hold a point further out than was seen.
 class ProtrusionSearch {
  public:
-  ProtrusionSearch(const MeshSolid& solid, const CoverSphere& ball, double tolerance, double enough)
-      : solid_(solid), ball_(ball), tolerance_(tolerance), enough_(enough) {}
+  ProtrusionSearch(const MeshSolid& solid, const CoverSphere& ball, double tolerance, double enough,
+                   std::vector<Vector3d>* beyond)
+      : solid_(solid), ball_(ball), tolerance_(tolerance), enough_(enough), beyond_(beyond) {}
 
   BallProtrusion found() {
+    const ClosestPoint near = solid_.closest_point(ball_.centre);
+    const bool inside = solid_.inside(ball_.centre);
+    // No point of the ball is further out than its centre and its radius together.
+    whole_ = std::max(0.0, ball_.radius + (inside ? -near.distance : near.distance)) + kMargin;
+    // Where the solid is convex, this is the furthest.
+    if (near.distance > 0)
+      see(ball_.centre +
+          (near.point - ball_.centre) * ((inside ? 1 : -1) * 2 * ball_.radius / near.distance));
     look(ball_.centre, ball_.radius);
     return result_;
   }
@@ -39,12 +48,13 @@ class ProtrusionSearch {
     const Eigen::Array3d off = (middle - ball_.centre).array().abs();
     const double nearest = std::sqrt((off - half).max(0.0).matrix().squaredNorm());
     if (nearest > ball_.radius) return;  // not of the ball
+    if (whole_ <= threshold()) return settle(whole_);
     const double corner = 1.7320508075688774 * half;
     const ClosestPoint near = solid_.closest_point(middle);
     const bool inside = solid_.inside(middle);
     const double away = inside ? -near.distance : near.distance;
     see(middle);
-    double bound = std::max(0.0, away + corner);
+    double bound = std::min(whole_, std::max(0.0, away + corner));
     if (bound <= threshold()) return settle(bound);
     if (!inside && near.distance > 0) bound = std::min(bound, by_plane(middle, corner, near));
     if (bound <= threshold()) return settle(bound);
@@ -61,7 +71,9 @@ class ProtrusionSearch {
     const double length = std::sqrt(d.squaredNorm());
     if (length > ball_.radius) point = ball_.centre + d * (ball_.radius / length) * (1 - 1e-12);
     if (solid_.inside(point)) return;
-    result_.least = std::max(result_.least, solid_.closest_point(point).distance);
+    const double distance = solid_.closest_point(point).distance;
+    result_.least = std::max(result_.least, distance);
+    if (beyond_ != nullptr && distance > enough_) beyond_->push_back(point);
   }
 
   /// Distance of the ball's points in the cube from the one point `near`, which is of the solid:
@@ -69,8 +81,8 @@ class ProtrusionSearch {
   /// than the cube does.
   double by_plane(const Vector3d& middle, double corner, const ClosestPoint& near) const {
     const Vector3d n = (middle - near.point) / near.distance;
-    const double ahead = std::min(n.dot(ball_.centre - near.point) + ball_.radius,
-                                  near.distance + corner);
+    const double ahead =
+        std::min(n.dot(ball_.centre - near.point) + ball_.radius, near.distance + corner);
     const double behind = near.distance - corner;
     const double along = std::max(std::abs(ahead), std::abs(behind));
     return std::sqrt(along * along + corner * corner) + kMargin;
@@ -81,6 +93,8 @@ class ProtrusionSearch {
   const MeshSolid& solid_;
   const CoverSphere& ball_;
   const double tolerance_, enough_;
+  std::vector<Vector3d>* const beyond_;
+  double whole_ = 0;  ///< a bound for the whole ball
   BallProtrusion result_;
 };
 
@@ -151,8 +165,8 @@ double union_volume(std::span<const CoverSphere> balls, int lines) {
 }  // namespace
 
 BallProtrusion ball_protrusion(const MeshSolid& solid, const CoverSphere& ball, double tolerance,
-                               double enough) {
-  return ProtrusionSearch(solid, ball, tolerance, enough).found();
+                               double enough, std::vector<Vector3d>* beyond) {
+  return ProtrusionSearch(solid, ball, tolerance, enough, beyond).found();
 }
 
 SphereProtrusion protrusion_of(const MeshSolid& solid, std::span<const CoverSphere> balls) {
@@ -161,7 +175,8 @@ SphereProtrusion protrusion_of(const MeshSolid& solid, std::span<const CoverSphe
   if (count == 0) return out;
 
   // Points of the union's surface.
-  const int side = std::clamp(static_cast<int>(std::sqrt(40000.0 / (6.0 * static_cast<double>(count)))), 4, 40);
+  const int side =
+      std::clamp(static_cast<int>(std::sqrt(40000.0 / (6.0 * static_cast<double>(count)))), 4, 40);
   const std::vector<SpherePoint> pattern = sphere_points(side);
   struct Seen {
     double distance, area;

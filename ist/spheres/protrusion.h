@@ -1,6 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <span>
+#include <vector>
 
 #include <ist/cover_spheres.h>
 
@@ -14,9 +16,9 @@ struct BallProtrusion {
 };
 
 /// `tolerance`: the interval's width over its upper end is at most about this, or the upper end is
-/// at most `enough`.
+/// at most `enough`. `beyond`, if it is given, takes points of the ball further out than `enough`.
 BallProtrusion ball_protrusion(const MeshSolid& solid, const CoverSphere& ball, double tolerance,
-                               double enough);
+                               double enough, std::vector<Eigen::Vector3d>* beyond = nullptr);
 
 /// The same of all, by their largest, and what sampling says of the union; unit frame.
 SphereProtrusion protrusion_of(const MeshSolid& solid, std::span<const CoverSphere> balls);

@@ -17,10 +17,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kLongestRay = 4;       ///< unit frame: beyond any protrusion
-constexpr double kSharp = 0.85;         ///< cosine between faces whose edge is an edge of the solid
-constexpr double kOff = 1e-6;           ///< unit frame: a step off the surface
-constexpr std::size_t kMostInside = 3000;
+constexpr double kLongestRay = 4;  ///< unit frame: beyond any protrusion
+constexpr double kSharp = 0.85;    ///< cosine between faces whose edge is an edge of the solid
+constexpr double kOff = 1e-6;      ///< unit frame: a step off the surface
+constexpr std::size_t kMostInside = 1500;
 
 struct Face {
   std::array<Vector3d, 3> corners;
@@ -33,7 +33,8 @@ std::vector<Face> faces_of(const MeshView& mesh) {
   for (std::uint32_t t = 0; t < mesh.triangle_count; ++t) {
     Face& face = faces[t];
     for (std::size_t k = 0; k < 3; ++k) {
-      const double* const v = mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{t} + k]};
+      const double* const v =
+          mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{t} + k]};
       face.corners[k] = {v[0], v[1], v[2]};
     }
     const Vector3d across =
@@ -136,8 +137,8 @@ EdgeSamples sample_edges(const MeshView& mesh, const std::vector<Face>& faces, d
 double reach_of(const MeshSolid& solid, const Sample& sample) {
   double radius = kLongestRay;
   for (int step = 0; step < 12; ++step) {
-    const ClosestPoint near = solid.closest_point(sample.point + radius * sample.normal,
-                                                  radius * (1 - 1e-7));
+    const ClosestPoint near =
+        solid.closest_point(sample.point + radius * sample.normal, radius * (1 - 1e-7));
     if (near.triangle == kNoTriangle) return radius;
     const Vector3d d = near.point - sample.point;
     const double along = d.dot(sample.normal);
@@ -165,7 +166,8 @@ std::vector<OutwardRay> rays_of(const MeshSolid& solid, const std::vector<Sample
 /// Points of a lattice that lie inside.
 std::vector<Vector3d> points_inside(const MeshSolid& solid, double spacing) {
   const Eigen::AlignedBox3d bounds = solid.bounds();
-  const Vector3d low = solid.frame().to_unit(bounds.min()), high = solid.frame().to_unit(bounds.max());
+  const Vector3d low = solid.frame().to_unit(bounds.min()),
+                 high = solid.frame().to_unit(bounds.max());
   const Vector3d size = high - low;
   double step = spacing;
   while (size.x() / step * (size.y() / step) * (size.z() / step) > 2.0 * kMostInside) step *= 1.1;
@@ -193,7 +195,7 @@ SampledSolid sample_solid(const MeshSolid& solid, std::size_t targets) {
   out.spacing = std::sqrt(area / static_cast<double>(targets));
   const EdgeSamples edges = sample_edges(mesh, faces, out.spacing / 2);
   std::vector<Sample> coarse, fine;
-  Thinning thin_coarse(0.7 * out.spacing), thin_fine(0.35 * out.spacing);
+  Thinning thin_coarse(out.spacing), thin_fine(out.spacing / 2);
   for (const Face& face : faces) {
     sample_face(face, out.spacing, thin_coarse, coarse);
     sample_face(face, out.spacing / 2, thin_fine, fine);

@@ -152,7 +152,8 @@ void add_bake(CLI::App& app) {
   PackingSettings& packing = options->packing;
   CLI::App* const command =
       app.add_subcommand("bake", "Pack a closed mesh with spheres and write an .ist asset");
-  add_input(command, "MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf");
+  add_input(command, "MESH", options->mesh,
+            "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf");
   add_output(command, options->output,
              "The .ist file to write; of a robot the folder, for an asset a mesh and an index",
              Dash::refused);

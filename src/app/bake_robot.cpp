@@ -30,8 +30,8 @@ using Json = nlohmann::ordered_json;
 std::string file_name(const std::string& name) {
   std::string out;
   for (const char c : name)
-    out += (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                   c == '_' || c == '-' || (c == '.' && !out.empty())
+    out += (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+                   c == '-' || (c == '.' && !out.empty())
                ? c
                : '_';
   return out.empty() ? "robot" : out;
@@ -53,8 +53,8 @@ Json pose_json(const Eigen::Quaterniond& q, const Eigen::Vector3d& t) {
 
 ClosedMesh close_shape(TriangleMesh mesh, const std::string& name, bool repair) {
   try {
-    ClosedMesh closed = close_mesh(std::move(mesh), name,
-                                   repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+    ClosedMesh closed =
+        close_mesh(std::move(mesh), name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
     for (const std::string& note : closed.report.notes) spdlog::warn("{}: {}", name, note);
     return closed;
   } catch (const OpenMeshError& error) {
@@ -118,10 +118,9 @@ void bake_robot(const RobotBake& what) {
       for (int k = 1; !taken.insert(file).second; ++k)
         file = fmt::format("{}_{}", file_name(link.name), k);
       file += ".ist";
-      const ClosedMesh mesh =
-          close_shape(mesh_of(placed, paths, what.robot).mesh,
-                      fmt::format("{}: line {}: link {}", what.robot, placed.line, link.name),
-                      what.repair);
+      const ClosedMesh mesh = close_shape(
+          mesh_of(placed, paths, what.robot).mesh,
+          fmt::format("{}: line {}: link {}", what.robot, placed.line, link.name), what.repair);
       assets.push_back({file, bake_shape(mesh, what)});
       // The asset is in the link's frame already.
       shapes.push_back(

@@ -55,8 +55,8 @@ struct Input {
 ClosedMesh close_link(TriangleMesh mesh, const std::string& name, bool repair) {
   ClosedMesh closed;
   try {
-    closed = close_mesh(std::move(mesh), name,
-                        repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+    closed =
+        close_mesh(std::move(mesh), name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
   } catch (const OpenMeshError& error) {
     if (repair) throw;
     throw OpenMeshError(std::string(error.what()) + "; --repair closes what can be closed");
@@ -126,8 +126,7 @@ std::vector<SphereCover> make_spheres(const Input& input, const SpheresOptions& 
     SphereCover cover;
     cover.spheres = baked_spheres(mesh, options, progress);
     cover.protrusion = sphere_protrusion(mesh, cover.spheres);
-    cover.seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    cover.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     covers.push_back(std::move(cover));
   }
   return covers;
@@ -159,10 +158,11 @@ void fill_links(Input& input, const SpheresOptions& options) {
     }
     link.cover.spheres.insert(link.cover.spheres.begin(), link.given.begin(), link.given.end());
     if (options.kind == Kind::cover && !link.proof.covered)
-      throw Error(fmt::format("{}: link {}: the spheres could not be proven to hold it near ({:g}, "
-                              "{:g}, {:g})",
-                              options.input, link.name, link.proof.where.x(), link.proof.where.y(),
-                              link.proof.where.z()));
+      throw Error(
+          fmt::format("{}: link {}: the spheres could not be proven to hold it near ({:g}, "
+                      "{:g}, {:g})",
+                      options.input, link.name, link.proof.where.x(), link.proof.where.y(),
+                      link.proof.where.z()));
     if (!link.cover.reached)
       spdlog::warn("{}: link {}: {} spheres still protrude by {:g}; allow more with --count",
                    options.input, link.name, link.cover.spheres.size(),
@@ -235,9 +235,8 @@ void print_report(const Input& input, const SpheresOptions& options, double seco
   for (const Link& link : input.links) {
     const SphereProtrusion& p = link.cover.protrusion;
     fmt::print("  {:<{}} {:>7} {:>8} {:>10.4g} {:>10.4g} {:>10.4g} {:>7.3f} {:>5.2f} s\n",
-               link.name, width, link.cover.spheres.size(),
-               link.proof.covered ? "proven" : "no", p.mean, p.p95, p.largest,
-               link.has_mesh ? p.volume_ratio : 1.0, link.cover.seconds);
+               link.name, width, link.cover.spheres.size(), link.proof.covered ? "proven" : "no",
+               p.mean, p.p95, p.largest, link.has_mesh ? p.volume_ratio : 1.0, link.cover.seconds);
   }
   fmt::print("  time {:.2f} s\n", seconds);
 }

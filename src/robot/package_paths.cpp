@@ -54,7 +54,7 @@ std::string PackagePaths::find(const std::string& name) const {
     return path.string();
   }
   std::vector<fs::path> folders = ros_path_;
-  for (fs::path up = folder_; ; up = up.parent_path()) {
+  for (fs::path up = folder_;; up = up.parent_path()) {
     folders.push_back(up);
     if (up == up.parent_path()) break;
   }
@@ -67,7 +67,7 @@ std::string PackagePaths::find(const std::string& name) const {
       return (folder / inside).string();
   }
   // Without any manifest, a folder above the URDF that holds the file.
-  for (fs::path up = folder_; ; up = up.parent_path()) {
+  for (fs::path up = folder_;; up = up.parent_path()) {
     if (is_file(up / inside)) return (up / inside).string();
     if (up == up.parent_path()) break;
   }

@@ -22,9 +22,9 @@ std::string decoded(std::string_view text) {
       {{"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&apos;", '\''}}};
   std::string out;
   while (!text.empty()) {
-    const auto entity =
-        std::find_if(kEntities.begin(), kEntities.end(),
-                     [&](const auto& e) { return text.substr(0, e.first.size()) == e.first; });
+    const auto entity = std::find_if(kEntities.begin(), kEntities.end(), [&](const auto& e) {
+      return text.substr(0, e.first.size()) == e.first;
+    });
     out += entity == kEntities.end() ? text.front() : entity->second;
     text.remove_prefix(entity == kEntities.end() ? 1 : entity->first.size());
   }
@@ -36,8 +36,7 @@ class RobotReader {
   explicit RobotReader(RobotModel& robot) : robot_(robot), xml_(robot.file) {}
 
   void read() {
-    if (xml_[0].name != "robot")
-      xml_.fail(0, "is no robot: a URDF begins with <robot name=\"…\">");
+    if (xml_[0].name != "robot") xml_.fail(0, "is no robot: a URDF begins with <robot name=\"…\">");
     robot_.name = decoded(xml_.attribute(0, "name"));
     for (std::uint32_t e = xml_[0].first_child; e != kNone; e = xml_[e].next_sibling) {
       if (xml_[e].name == "link") read_link(e);

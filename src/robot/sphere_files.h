@@ -8,8 +8,8 @@
 
 #include "robot/robot_model.h"
 
-// Files in which other tools expect a robot's spheres. Numbers have all their digits: they come back
-// as they were.
+// Files in which other tools expect a robot's spheres. Numbers have all their digits: they come
+// back as they were.
 
 namespace ist {
 
