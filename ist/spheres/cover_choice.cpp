@@ -11,6 +11,7 @@ namespace ist {
 namespace {
 
 constexpr std::uint32_t kNone = UINT32_MAX;
+constexpr double kMostWork = 1e8;  ///< steps of all exchanges together
 
 /// Which candidate holds which targets, both ways.
 struct Incidence {
@@ -160,6 +161,11 @@ std::vector<std::uint32_t> choose_cover(std::span<const CoverSphere> candidates,
   const auto unheld = std::count_if(incidence.holders.begin(), incidence.holders.end(),
                                     [](const auto& holders) { return holders.empty(); });
   if (50 * static_cast<std::size_t>(unheld) > targets.size()) return {};
+  // Where each candidate holds much, an exchange is dear, and few are needed.
+  double pairs = 0;
+  for (const auto& held : incidence.held) pairs += static_cast<double>(held.size());
+  const double work = pairs * pairs / (static_cast<double>(candidates.size() * targets.size()) + 1);
+  exchanges = std::min(exchanges, static_cast<std::size_t>(kMostWork / (work + 1)) + 1);
   Choice choice(incidence);
   while (choice.chosen().size() < count) {
     const std::uint32_t best = choice.most_helpful();
