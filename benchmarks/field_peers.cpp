@@ -10,13 +10,13 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <numbers>
 #include <random>
 
 #include "report.h"
 #include "support/bullet_mesh.h"
 #include "support/fcl_mesh.h"
 #include "support/oracle_rows.h"
+#include "support/turns.h"
 #include "timing.h"
 
 namespace {
@@ -24,6 +24,7 @@ namespace {
 using Eigen::Vector3d;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
+using ist::testing::degrees_between;
 using ist::testing::MeshContacts;
 
 /// The corner of planes n · (x − apex) ≤ 0, up to three.
@@ -71,12 +72,6 @@ struct Rows {
   std::vector<double> angle[3], time[3];  ///< [°] and [µs] of ist, FCL, Bullet
   std::size_t none[3] = {};               ///< rows without a contact
 };
-
-double degrees_between(const Vector3d& a, const Vector3d& b) {
-  if (!(a.norm() > 0) || !(b.norm() > 0)) return 180;
-  return std::acos(std::clamp(a.dot(b) / (a.norm() * b.norm()), -1.0, 1.0)) * 180 /
-         std::numbers::pi;
-}
 
 class Scene {
  public:
@@ -169,8 +164,9 @@ class Scene {
     const Vector3d truth = -exact.gradient;
     const Vector3d pushes[3] = {-found.translation_gradient, by_fcl.push_b, by_bullet.push_b};
     for (int k = 0; k < 3; ++k) {
-      if (!(pushes[k].norm() > 0)) ++rows.none[k];
-      rows.angle[k].push_back(degrees_between(pushes[k], truth));
+      const bool none = !(pushes[k].norm() > 0);
+      rows.none[k] += none ? 1 : 0;
+      rows.angle[k].push_back(none ? 180 : degrees_between(pushes[k], truth));
     }
   }
 

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <functional>
 #include <map>
-#include <numbers>
 #include <optional>
 
 #include <ist/bake.h>
@@ -20,14 +19,17 @@
 #include "support/bullet_mesh.h"
 #include "support/fcl_mesh.h"
 #include "support/oracle_rows.h"
+#include "support/turns.h"
 #include "timing.h"
 
 namespace {
 
 using Eigen::Vector3d;
+using ist::benchmark::clock_cost;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
 using ist::benchmark::thread_seconds;
+using ist::testing::degrees_between;
 using ist::testing::OracleRow;
 
 constexpr std::size_t kSpheres = 4000;
@@ -157,16 +159,6 @@ std::vector<Query> all_queries(PairOfBodies& pair) {
   return queries;
 }
 
-/// [s] what reading the clock twice costs by itself; taken off every measurement.
-double clock_cost() {
-  std::vector<double> costs;
-  for (int i = 0; i < 1001; ++i) {
-    const double start = thread_seconds();
-    costs.push_back(thread_seconds() - start);
-  }
-  return quantile(costs, 0.5);
-}
-
 void measure(std::vector<Query>& queries, const std::vector<OracleRow>& rows, int rounds) {
   const double clock = clock_cost();
   for (Query& query : queries) {
@@ -257,11 +249,6 @@ struct OverlapClass {
 const std::vector<OverlapClass> kClasses = {
     {"1–10 %", 1e-2, 1e-1, 0.2}, {"0.1–1 %", 1e-3, 1e-2, 0.6}, {"0.01–0.1 %", 1e-4, 1e-3, 7}};
 
-double degrees(const Vector3d& u, const Vector3d& v) {
-  return std::acos(std::clamp(u.normalized().dot(v.normalized()), -1.0, 1.0)) * 180 /
-         std::numbers::pi;
-}
-
 void report_answers(Report& report, const std::string& key, const std::vector<Query>& queries,
                     const std::vector<OracleRow>& rows) {
   for (const Query& query : queries) {
@@ -288,7 +275,7 @@ void report_answers(Report& report, const std::string& key, const std::vector<Qu
         deep_error.push_back(100 * std::abs(*answer.volume / row.volume - 1));
       }
       if (answer.push_b.norm() > 0 && row.pose_class == "pen") {
-        angle.push_back(degrees(answer.push_b, -row.translation_gradient));
+        angle.push_back(degrees_between(answer.push_b, -row.translation_gradient));
       }
       if (answer.interval) {
         const auto [low, high] = *answer.interval;

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <random>
 
 #include <ist/bake.h>
@@ -16,6 +15,7 @@
 #include "report.h"
 #include "support/oracle_rows.h"
 #include "support/test_meshes.h"
+#include "support/turns.h"
 #include "timing.h"
 
 namespace {
@@ -25,6 +25,7 @@ using ist::FieldUse;
 using ist::PlacedTree;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
+using ist::testing::degrees_between;
 
 /// A pose with the exact answer; volume 0 where the solids are apart.
 struct Row {
@@ -35,10 +36,6 @@ struct Row {
   double volume = 0;
   Vector3d force = Vector3d::Zero(), torque = Vector3d::Zero();
 };
-
-double degrees_between(const Vector3d& a, const Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
-}
 
 std::string mesh_path(const std::string& name) {
   for (const char* const folder : {"oracle/meshes/", "meshes/dev/"}) {

@@ -37,4 +37,14 @@ inline double quantile(std::vector<double> values, double p) {
   return values[rank];
 }
 
+/// [s] what reading the clock twice costs by itself.
+inline double clock_cost() {
+  std::vector<double> costs;
+  for (int i = 0; i < 1001; ++i) {
+    const double start = thread_seconds();
+    costs.push_back(thread_seconds() - start);
+  }
+  return quantile(costs, 0.5);
+}
+
 }  // namespace ist::benchmark

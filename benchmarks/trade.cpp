@@ -8,12 +8,12 @@
 #include <array>
 #include <cmath>
 #include <iostream>
-#include <numbers>
 
 #include <ist/bake.h>
 #include <ist/query.h>
 
 #include "report.h"
+#include "support/turns.h"
 #include "trade_methods.h"
 #include "trade_rows.h"
 
@@ -21,6 +21,7 @@ namespace {
 
 using Eigen::Vector3d;
 using namespace ist::benchmark;
+using ist::testing::degrees_between;
 
 const auto& kClasses = ist::kOverlapClassNames;
 constexpr std::size_t kClassCount = ist::kOverlapClasses;
@@ -176,10 +177,6 @@ void report_pen_rows(Report& report, const PairOfBodies& pair, const std::vector
   if (report.quick()) return;
   report.target("pair budgets of ≤ 10 µs on pen rows: median error %, 0.1–1 %", best, 0.2, true);
   report.target("the same one, 0.01–0.1 %", shallow_of_best, 2, true);
-}
-
-double degrees_between(const Vector3d& a, const Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
 }
 
 /// Along the oracle's trajectory: steps in direction and volume where both ends overlap by 1e-4.

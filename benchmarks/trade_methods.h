@@ -29,16 +29,6 @@ struct Measured {
   std::vector<double> volume;  ///< a row each
 };
 
-/// [s] what reading the clock twice costs by itself.
-inline double clock_cost() {
-  std::vector<double> costs;
-  for (int i = 0; i < 1001; ++i) {
-    const double start = thread_seconds();
-    costs.push_back(thread_seconds() - start);
-  }
-  return quantile(costs, 0.5);
-}
-
 inline Measured measure(const Method& method, const std::vector<Row>& rows, int rounds) {
   static const double clock = clock_cost();
   Measured result;

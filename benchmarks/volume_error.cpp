@@ -4,13 +4,13 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numbers>
 
 #include <ist/bake.h>
 #include <ist/query.h>
 
 #include "report.h"
 #include "support/oracle_rows.h"
+#include "support/turns.h"
 #include "timing.h"
 
 namespace {
@@ -18,6 +18,7 @@ namespace {
 using Eigen::Vector3d;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
+using ist::testing::degrees_between;
 using ist::testing::OracleRow;
 
 const std::array<std::string, 5> kClasses = {"contained", "10–50 %", "1–10 %", "0.1–1 %",
@@ -29,10 +30,6 @@ std::size_t class_of(const OracleRow& row) {
   if (row.fraction_of_smaller >= 0.1) return 1;
   if (row.fraction_of_smaller >= 0.01) return 2;
   return row.fraction_of_smaller >= 0.001 ? 3 : 4;
-}
-
-double degrees_between(const Vector3d& a, const Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
 }
 
 /// What is asked of pair key `eledino`: median relative volume error a class, 0 where nothing is.

@@ -25,8 +25,10 @@ foreach(library IN LISTS ist_LIBRARIES)
   endif()
   if(IST_HAVE_OPENVDB)
     target_link_libraries(${library} PRIVATE
-      $<BUILD_INTERFACE:${IST_OPENVDB_LIBRARY}> $<BUILD_INTERFACE:${IST_IMATH_LIBRARY}>
-      $<INSTALL_INTERFACE:-lopenvdb> $<INSTALL_INTERFACE:${IST_IMATH_LIBRARY}>)
+      $<BUILD_INTERFACE:${IST_OPENVDB_LIBRARY}> $<BUILD_INTERFACE:${IST_IMATH_LIBRARY}>)
+    foreach(flag IN LISTS IST_OPENVDB_LINK)
+      target_link_libraries(${library} PRIVATE $<INSTALL_INTERFACE:${flag}>)
+    endforeach()
   endif()
 endforeach()
 if(TARGET ist_shared)

@@ -23,6 +23,19 @@ endforeach()
 if(TARGET ist_app)
   install(TARGETS ist_app COMPONENT ist)
 endif()
+if(TARGET ist_reference)
+  set(reference ${PROJECT_BINARY_DIR}/share)
+  install(DIRECTORY ${reference}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT ist)
+  install(FILES ${reference}/bash/ist COMPONENT ist
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+  install(FILES ${reference}/fish/ist.fish COMPONENT ist
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
+  # Below /usr zsh reads the one folder of Debian, below /usr/local the other.
+  foreach(folder vendor-completions site-functions)
+    install(FILES ${reference}/zsh/_ist DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/${folder}
+      COMPONENT ist)
+  endforeach()
+endif()
 
 # A machine without the CUDA Toolkit can link the installed library: the runtime comes with it.
 set(ist_cuda "")
@@ -69,9 +82,7 @@ if(NOT IST_QUERY_ONLY)
     list(APPEND private "\${libdir}/ist/libcudart_static.a" -lpthread -ldl -lrt)
   endif()
   if(IST_HAVE_OPENVDB)
-    cmake_path(GET IST_IMATH_LIBRARY STEM imath)
-    string(REGEX REPLACE "^lib" "-l" imath ${imath})
-    list(APPEND private -lopenvdb ${imath})
+    list(APPEND private ${IST_OPENVDB_LINK})
   endif()
   ist_install_pc(ist "Sphere packings and inner sphere trees: bakes and queries" ist-query ist
     ${private} -lstdc++ -lm)

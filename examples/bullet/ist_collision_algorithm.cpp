@@ -58,10 +58,39 @@ void IstCollisionAlgorithm::processCollision(const btCollisionObjectWrapper* a,
                                              const btCollisionObjectWrapper* b,
                                              const btDispatcherInfo&, btManifoldResult*) {
   if (contacts_.settings.response != IstSettings::Response::solver) return;
+  const btCollisionObject& first = *a->getCollisionObject();
+  const btCollisionObject& second = *b->getCollisionObject();
+  const IstPair pair = pair_of(first, second);
+  if (pair.b == nullptr) return;
+  const btTransform b_in_a = pair.a->getWorldTransform().inverseTimes(pair.b->getWorldTransform());
+  if (state_->still > 0 && largest_motion(pair, state_->b_in_a, b_in_a) <= state_->still) {
+    move_points(first, second);
+    return;
+  }
   IstContact contact;
-  if (find_contact(*a->getCollisionObject(), *b->getCollisionObject(), contacts_.settings.patches,
-                   contacts_.settings.query, contacts_.workspace, contact)) {
-    fill_manifolds(a->getCollisionObject(), b->getCollisionObject(), contact);
+  if (find_contact(first, second, contacts_.settings.patches, contacts_.settings.query,
+                   contacts_.workspace, contact)) {
+    fill_manifolds(&first, &second, contact);
+    state_->b_in_a = b_in_a;
+    state_->still = std::max(contacts_.settings.follow, contact.clearance);
+  }
+}
+
+void IstCollisionAlgorithm::move_points(const btCollisionObject& first,
+                                        const btCollisionObject& second) {
+  const btTransform& to_world_first = first.getWorldTransform();
+  const btTransform& to_world_second = second.getWorldTransform();
+  std::size_t at = 0;
+  for (btPersistentManifold* manifold : state_->manifolds) {
+    for (int i = 0; i < manifold->getNumContacts(); ++i) {
+      btManifoldPoint& point = manifold->getContactPoint(i);
+      point.m_positionWorldOnA = to_world_first * point.m_localPointA;
+      point.m_positionWorldOnB = to_world_second * point.m_localPointB;
+      point.m_normalWorldOnB = to_world_first.getBasis() * state_->normals[at++];
+      point.m_distance1 =
+          (point.m_positionWorldOnA - point.m_positionWorldOnB).dot(point.m_normalWorldOnB);
+      ++point.m_lifeTime;
+    }
   }
 }
 
@@ -108,6 +137,7 @@ void IstCollisionAlgorithm::fill_manifolds(const btCollisionObject* first,
       point.m_lateralFrictionDir2 = old[k].m_lateralFrictionDir2;
       point.m_lifeTime = old[k].m_lifeTime + 1;
     }
+    state_->normals[used] = to_first.getBasis() * normal;
     const std::size_t at = used++ / kPointsOfAManifold;
     if (at == state_->manifolds.size()) {
       state_->manifolds.push_back(m_dispatcher->getNewManifold(first, second));

@@ -36,7 +36,8 @@ class IstCollisionAlgorithm : public btActivatingCollisionAlgorithm {
   IstCollisionAlgorithm(const btCollisionAlgorithmConstructionInfo& info, IstContacts& contacts);
   ~IstCollisionAlgorithm() override;
 
-  /// Fills the manifolds where the solver is to answer; else does nothing.
+  /// Fills the manifolds where the solver is to answer, or moves what is in them
+  /// (IstSettings::follow); else does nothing.
   void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
                         const btDispatcherInfo& info, btManifoldResult* result) override;
 
@@ -57,6 +58,9 @@ class IstCollisionAlgorithm : public btActivatingCollisionAlgorithm {
   // Bullet's pool of algorithms has places of a fixed size, which nobody checks in a release build.
   struct State {
     std::vector<btPersistentManifold*> manifolds;
+    std::array<btVector3, IstSettings::kPatches> normals;  // of all points, in the first's frame
+    btTransform b_in_a;                                    // when last asked
+    double still = -1;  // [u] until a point has moved by more than this that answer holds
     ist::ContactMemory memory;
     ist::ContactForce pushed;
     const btCollisionObject* pushed_body = nullptr;
@@ -64,6 +68,7 @@ class IstCollisionAlgorithm : public btActivatingCollisionAlgorithm {
 
   void fill_manifolds(const btCollisionObject* first, const btCollisionObject* second,
                       const IstContact& contact);
+  void move_points(const btCollisionObject& first, const btCollisionObject& second);
 
   IstContacts& contacts_;
   std::unique_ptr<State> state_;

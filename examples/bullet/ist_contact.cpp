@@ -4,6 +4,7 @@
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 
+#include <cmath>
 #include <optional>
 
 #include "ist_shape.h"
@@ -54,24 +55,44 @@ bool is_known(const btCollisionShape& shape) {
          as_field(shape, btTransform::getIdentity()).has_value();
 }
 
+IstPair pair_of(const btCollisionObject& first, const btCollisionObject& second) {
+  if (as_ist(second) != nullptr) return {&first, &second, {}};
+  if (as_ist(first) != nullptr) return {&second, &first, {}};
+  return {};
+}
+
+double largest_motion(const IstPair& pair, const btTransform& before, const btTransform& now) {
+  // A turn by θ moves what is R away by 2 R sin(θ/2), and two bases differ by √8 sin(θ/2).
+  double turned = 0;
+  for (int i = 0; i < 3; ++i) turned += (now.getBasis()[i] - before.getBasis()[i]).length2();
+  return (now.getOrigin() - before.getOrigin()).length() +
+         as_ist(*pair.b)->reach() * std::sqrt(0.5 * turned);
+}
+
 bool find_contact(const btCollisionObject& first, const btCollisionObject& second,
                   std::size_t patches, const ist::ContactSettings& settings,
                   ist::Workspace& workspace, IstContact& contact) {
-  const bool swapped = as_ist(second) == nullptr;
-  contact.pair.a = swapped ? &second : &first;
-  contact.pair.b = swapped ? &first : &second;
-  const IstShape* const b = as_ist(*contact.pair.b);
-  if (b == nullptr) return false;
-  contact.pair.tree_b = placed(*contact.pair.b, *b);
+  contact.pair = pair_of(first, second);
+  if (contact.pair.b == nullptr) return false;
+  const IstShape& b = *as_ist(*contact.pair.b);
+  contact.pair.tree_b = placed(*contact.pair.b, b);
   const std::span<ist::ContactPatch> room(contact.patches.data(), patches);
   const auto keep = [&](const ist::ContactPatches& found) {
     contact.whole = found.penetration;
     contact.count = found.count;
     return true;
   };
+  contact.clearance = 0;
   if (const IstShape* const a = as_ist(*contact.pair.a)) {
-    return keep(ist::contact_patches(placed(*contact.pair.a, *a), contact.pair.tree_b, settings,
-                                     workspace, room));
+    const ist::PlacedTree tree_a = placed(*contact.pair.a, *a);
+    keep(ist::contact_patches(tree_a, contact.pair.tree_b, settings, workspace, room));
+    if (contact.whole.volume_max <= 0) {
+      // A bound tells enough: the first few nodes give one.
+      constexpr ist::SeparationSettings kGlance{.max_visits = 8};
+      const ist::Separation gap = ist::separation(tree_a, contact.pair.tree_b, kGlance, workspace);
+      contact.clearance = gap.distance_min - a->tree().protrusion() - b.tree().protrusion();
+    }
+    return true;
   }
   const auto field =
       as_field(*contact.pair.a->getCollisionShape(), contact.pair.a->getWorldTransform());

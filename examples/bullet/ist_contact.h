@@ -30,6 +30,11 @@ struct IstSettings {
   ist::ContactLaw law;
   /// [s] ≥ 0, solver only: a contact's damper over its spring, about the time in which it settles.
   double relaxation = 0;
+  /// [u] ≥ 0, solver only: two objects are asked about again once a point of one has moved by more
+  /// than this against the other. Until then their patches move along, as much deeper as that
+  /// motion makes them, of the same areas. A contact that begins is seen this late.
+  /// 0: asked in every step.
+  double follow = 0;
 };
 
 /// Who is A and who is B to ist, and where they are.
@@ -39,6 +44,13 @@ struct IstPair {
   ist::PlacedTree tree_b;
 };
 
+/// Either order. Both null if neither is an IstShape; `tree_b` is not set.
+IstPair pair_of(const btCollisionObject& first, const btCollisionObject& second);
+
+/// [u] No point of pair.b has moved by more than this against pair.a since its transform there was
+/// `before`.
+double largest_motion(const IstPair& pair, const btTransform& before, const btTransform& now);
+
 /// A shape that ist can meet: an IstShape, or a plane, box, ball or IstTerrain as a field.
 bool is_known(const btCollisionShape& shape);
 
@@ -47,6 +59,8 @@ struct IstContact {
   IstPair pair;
   ist::Penetration whole;
   std::size_t count = 0;
+  /// [u] Of objects that do not touch: nor do they while no point has moved by more than this.
+  double clearance = 0;
   std::array<ist::ContactPatch, IstSettings::kPatches> patches;
 };
 

@@ -31,6 +31,7 @@ IstShape::IstShape(const ist::TreeView& tree) : tree_(tree) {
   const ist::Bounds bounds = ist::bounds(tree);
   btTransformAabb(to_bullet(bounds.lower), to_bullet(bounds.upper), tree.protrusion(),
                   mesh_in_body_, lower_, upper_);
+  reach_ = (mesh_in_body_ * to_bullet(bounds.centre)).length() + bounds.radius + tree.protrusion();
 }
 
 void IstShape::getAabb(const btTransform& t, btVector3& lower, btVector3& upper) const {

@@ -31,6 +31,7 @@ class IstShape : public btConcaveShape {
 
   const ist::TreeView& tree() const { return tree_; }
   const btTransform& mesh_in_body() const { return mesh_in_body_; }
+  double reach() const { return reach_; }  ///< [u] no point is further from the body's origin
 
   void getAabb(const btTransform& t, btVector3& lower, btVector3& upper) const override;
   void calculateLocalInertia(btScalar mass, btVector3& inertia) const override;
@@ -49,6 +50,7 @@ class IstShape : public btConcaveShape {
  private:
   ist::TreeView tree_;
   btTransform mesh_in_body_;
+  double reach_;
   btVector3 lower_, upper_;  // in the body's frame
   btVector3 unit_inertia_;   // [u²] about the body's axes, of a mass of 1
   btVector3 one_{1, 1, 1};

@@ -4,6 +4,7 @@
 #include <ist/query.h>
 #include <pthread.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 
 #include <cmath>
 #include <cstdio>
@@ -165,8 +166,8 @@ int main(int argc, char** argv) {
   Session session(options, object, probe, options.coupling_hz);
   const double period = 1e6 / options.rate;  // [µs]
   const auto ticks = static_cast<std::size_t>(std::ceil(options.seconds * options.rate));
-  std::vector<double> overslept, computed, taken, late;  // [µs] one a tick
-  for (std::vector<double>* const times : {&overslept, &computed, &taken, &late})
+  std::vector<double> overslept, asked, ticked, late;  // [µs] one a tick
+  for (std::vector<double>* const times : {&overslept, &asked, &ticked, &late})
     times->reserve(ticks);
   std::vector<Row> rows;
   if (options.trace != nullptr) rows.reserve(ticks);
@@ -181,36 +182,40 @@ int main(int argc, char** argv) {
     if (!fifo) std::fputs("haptic_loop: no permission for real-time priority\n", stderr);
     mlockall(MCL_CURRENT);
   }
+  prctl(PR_SET_TIMERSLACK, 1UL);  // else the system wakes what has no priority 50 µs late
 
   Missed missed;
-  std::size_t skipped = 0, touching = 0, cut_short = 0;
+  std::size_t made = 0, skipped = 0, touching = 0, cut_short = 0;
   double largest_force = 0, largest_torque = 0;
   double due = now_us() + period;
-  for (std::size_t i = 0; i < ticks; ++i) {
+  for (; made + skipped < ticks; ++made) {
     if (options.offline)
       due = now_us();
     else
       sleep_until(due);
     const double woken = now_us();
     const double ran = clock_us(CLOCK_THREAD_CPUTIME_ID);
+    const HandPose hand = session.hand(), proxy = session.proxy().pose();
+    const double time = session.time();
+    const double called = now_us();
     const ist::PenetrationAndSeparation contact = session.ask();
-    computed.push_back(clock_us(CLOCK_THREAD_CPUTIME_ID) - ran);
+    const double answered = now_us();
+    const Felt felt = session.step(contact);  // a device would be sent felt.force and felt.torque
+    const double computed = clock_us(CLOCK_THREAD_CPUTIME_ID) - ran;
     const double done = now_us();
     overslept.push_back(woken - due);
-    taken.push_back(done - woken);
+    asked.push_back(answered - called);
+    ticked.push_back(done - woken);
     late.push_back(done - due);
     if (contact.penetration.volume > 0) ++touching;
     if (contact.penetration.status != ist::QueryStatus::ok) ++cut_short;
-    const HandPose hand = session.hand(), proxy = session.proxy().pose();
-    const double time = session.time();
-    const Felt felt = session.step(contact);  // a device would be sent felt.force and felt.torque
     largest_force = std::max(largest_force, felt.force.norm());
     largest_torque = std::max(largest_torque, felt.torque.norm());
     if (options.trace != nullptr)
       rows.push_back({time, hand, proxy, felt, contact.penetration.volume});
     due += period;
-    if (done > due) {  // the next tick was due before this one was answered
-      missed.count(computed.back(), taken.back(), period);
+    if (done > due) {  // the next tick was due before this one had its force
+      missed.count(computed, ticked.back(), period);
       const double behind = std::floor((done - due) / period);
       skipped += static_cast<std::size_t>(behind);
       due += behind * period;
@@ -224,22 +229,22 @@ int main(int argc, char** argv) {
     Quantiles us;
   } times[] = {
       {"timer", "overslept_us", "from the tick to being woken", quantiles(overslept)},
-      {"query", "computed_us", "this thread's time for the answer", quantiles(computed)},
-      {"wall", "query_us", "from call to answer", quantiles(taken)},
-      {"late", "late_us", "from the tick to the answer", quantiles(late)},
+      {"query", "query_us", "from call to answer", quantiles(asked)},
+      {"tick", "tick_us", "from being woken to the force", quantiles(ticked)},
+      {"late", "late_us", "from the tick to the force", quantiles(late)},
   };
   const Passivity& passivity = session.passivity();
-  std::printf("%zu ticks at %g Hz, %zu in contact, %d load threads%s\n", ticks, options.rate,
+  std::printf("%zu ticks at %g Hz, %zu in contact, %d load threads%s\n", made, options.rate,
               touching, options.load, fifo ? ", real-time priority" : "");
   std::printf("[us]      p50      p99    p99.9      max\n");
   for (const auto& row : times)
     std::printf("%-5s %7.1f  %7.1f  %7.1f  %7.1f   %s\n", row.name, row.us.p50, row.us.p99,
                 row.us.p999, row.us.max, row.text);
   std::printf(
-      "missed deadlines: %zu, of them %zu by the query, %zu by an overslept timer, %zu "
+      "missed deadlines: %zu, of them %zu by the tick's own work, %zu by an overslept timer, %zu "
       "interrupted;\n"
       "ticks skipped after them: %zu, answers cut short: %zu\n",
-      missed.all(), missed.query, missed.timer, missed.interrupted, skipped, cut_short);
+      missed.all(), missed.work, missed.timer, missed.interrupted, skipped, cut_short);
   std::printf("%s: the hand got %.3g more than it had put in, of %.3g stored at most\n",
               passivity.kept() ? "passive" : "not passive", passivity.deficit, passivity.peak);
   if (options.trace != nullptr && !write_trace(options.trace, rows)) return 1;
@@ -249,10 +254,10 @@ int main(int argc, char** argv) {
   std::fprintf(file,
                "{\"ticks\": %zu, \"rate_hz\": %g, \"load_threads\": %d, \"fifo\": %s,\n"
                " \"object_spheres\": %zu, \"probe_spheres\": %zu, \"in_contact\": %zu,\n"
-               " \"missed\": %zu, \"missed_by_query\": %zu, \"missed_by_timer\": %zu,\n"
+               " \"missed\": %zu, \"missed_by_work\": %zu, \"missed_by_timer\": %zu,\n"
                " \"interrupted\": %zu, \"skipped\": %zu, \"cut_short\": %zu",
-               ticks, options.rate, options.load, fifo ? "true" : "false", object.sphere_count(),
-               probe.sphere_count(), touching, missed.all(), missed.query, missed.timer,
+               made, options.rate, options.load, fifo ? "true" : "false", object.sphere_count(),
+               probe.sphere_count(), touching, missed.all(), missed.work, missed.timer,
                missed.interrupted, skipped, cut_short);
   std::fprintf(file,
                ",\n \"coupling_hz\": %g, \"stiffness\": %g, \"turning_stiffness\": %g,\n"

@@ -35,17 +35,17 @@ inline void sleep_until(double us) {
   }
 }
 
-/// Answers that came after the next tick was due, by what is to blame.
+/// Forces that came after the next tick was due, by what is to blame.
 struct Missed {
-  std::size_t query = 0;        ///< the query itself ran for longer than a period
-  std::size_t timer = 0;        ///< the loop was woken late; the query then took less than a period
+  std::size_t work = 0;         ///< the tick itself ran for longer than a period
+  std::size_t timer = 0;        ///< the loop was woken late; the tick then took less than a period
   std::size_t interrupted = 0;  ///< in time by its own work, but something else ran in its midst
 
-  std::size_t all() const { return query + timer + interrupted; }
+  std::size_t all() const { return work + timer + interrupted; }
 
-  /// `computed`: time this thread ran for the answer; `taken`: wall time from call to answer.
+  /// [µs] `computed`: time this thread ran for the tick; `taken`: from being woken to the force.
   void count(double computed, double taken, double period) {
-    ++(computed > period ? query : taken > period ? interrupted : timer);
+    ++(computed > period ? work : taken > period ? interrupted : timer);
   }
 };
 

@@ -53,7 +53,7 @@ struct SphereProtrusion {
 struct SphereCover {
   std::vector<CoverSphere> spheres;
   SphereProtrusion protrusion;
-  bool reached = true;  ///< false: max_protrusion needs more than `count` spheres; these are the best
+  bool reached = true;  ///< false: max_protrusion was not reached; these are the best
   double seconds = 0;   ///< [s] that the search took
 };
 

@@ -10,8 +10,8 @@
  * Results: on an error of a call its answers are all zero but for `size` and `status`, where there
  * is room for them.
  * Sizes: a struct that starts with `size` is set up as `ist_penetration_t x = {.size = sizeof x}`;
- * all else may be 0, the default but of ist_impact_settings_t::duration. A library serves the sizes
- * of the headers it serves.
+ * all else may be 0, the default; only ist_impact_settings_t::duration has none. A library serves
+ * the sizes of the headers it serves.
  * Handles: ist_tree_t and ist_workspace_t lie in memory of the caller's and are empty where all
  * zero. One that owns memory must be released once, and not be copied. Released ones are known and
  * refused; a copy of one, or memory freed under it, cannot be.
@@ -46,7 +46,8 @@ enum {
   IST_WRONG_VERSION = -4, /* headers that this library does not serve */
   IST_NO_HANDLE = -5,     /* empty, released, or never made */
   IST_NO_MEMORY = -6,
-  IST_CANNOT_READ = -7, /* the file; errno may say why */
+  IST_CANNOT_READ = -7,  /* the file; errno may say why */
+  IST_NO_DURATION = -14, /* ist_impact_settings_t::duration is 0: no time is asked about */
   /* Bytes that are no asset. */
   IST_TOO_SHORT = -8,      /* fewer than their header says */
   IST_MISALIGNED = -9,     /* not on a 64-byte boundary */
@@ -108,6 +109,40 @@ typedef struct ist_tree_info {
 } ist_tree_info_t;
 
 ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info);
+
+/* What a solid meets in the trials of a bake to an error (tree_view.h). */
+typedef int32_t ist_trial_partner_t;
+enum {
+  IST_TRIAL_COPY = 0,
+  IST_TRIAL_PLANE = 1,
+  IST_TRIAL_BALL = 2,
+  IST_TRIAL_EDGE = 3,
+  IST_TRIAL_CORNER = 4,
+  IST_TRIAL_PLATE = 5
+};
+
+/* Overlaps of a class, and by how much their volumes are wrong. */
+typedef struct ist_overlap_class {
+  double from, to; /* [0, 1] of the smaller solid's volume; both 1: it lies inside */
+  double median;   /* ≥ 0, 0.01 = 1 %; 0 too where no such pose was found */
+} ist_overlap_class_t;
+
+/* PredictedErrors: of penetration volumes, as the bake measured them. Errors are shares of the
+ * overlap's volume. */
+typedef struct ist_predicted_errors {
+  uint32_t size;
+  uint32_t poses;                 /* behind all classes together; 0: nothing is predicted */
+  ist_overlap_class_t classes[5]; /* of two copies of the solid, deepest first */
+  double target_error;            /* asked for; 0: none was */
+  double target_overlap;          /* where it was asked for */
+  double measured_error;          /* median near target_overlap, of the partner worst there */
+  uint32_t measured_poses;        /* of all partners; 0: nothing was measured there */
+  ist_trial_partner_t worst_partner;
+  uint32_t target_met; /* 0 or 1: asked for, measured and reached */
+} ist_predicted_errors_t;
+
+/* No poses for an asset that was baked without asking for an error. */
+ist_status_t ist_tree_get_predicted_errors(const ist_tree_t* tree, ist_predicted_errors_t* errors);
 
 /* MassProperties: of a solid of density 1. Times a density: mass, and inertia of that mass. */
 typedef struct ist_mass_properties {
@@ -390,6 +425,13 @@ ist_status_t ist_contact_patches(const ist_placed_tree_t* a, const ist_placed_tr
                                  const ist_contact_settings_t* settings, ist_workspace_t* workspace,
                                  ist_contact_patches_t* patches, ist_penetration_t* whole);
 
+/* Takes out of patches, in their place, what protruding spheres add where flat faces meet: each by
+ * its own depth. A patch of which nothing is left stays, with zeros.
+ * `patches`: as ist_contact_patches() wrote them for these two under these settings. */
+ist_status_t ist_patches_without_protrusion(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                            const ist_contact_settings_t* settings,
+                                            ist_contact_patches_t* patches);
+
 /* --- The same of a field, held still, and a tree ---------------------------------------------- */
 
 ist_status_t ist_field_penetration(const ist_placed_field_t* a, const ist_placed_tree_t* b,
@@ -414,8 +456,9 @@ ist_status_t ist_field_contact_patches(const ist_placed_field_t* a, const ist_pl
                                        ist_workspace_t* workspace, ist_contact_patches_t* patches,
                                        ist_penetration_t* whole);
 
-/* --- Wrenches (wrench.h): what a contact does to both bodies. They need no workspace. ----------
- */
+/* --- Wrenches (wrench.h): what a contact does to both bodies ---------------------------------- */
+
+/* They need no workspace. */
 
 /* Of a pressure of 1: −dV by the body's motion. */
 typedef struct ist_wrench {
@@ -481,7 +524,7 @@ enum {
 typedef struct ist_impact_settings {
   uint32_t size;
   uint32_t max_visits; /* count of pairs of nodes looked at; 0: any */
-  double duration;     /* [T] ≥ 0, as it stands: what happens in [0, duration] is asked */
+  double duration;     /* [T] > 0: what happens in [0, duration] is asked */
   double tolerance;    /* [u] 0: a thousandth of the smaller solid's bounding radius,
                           or ten times what fields may err if that is more */
   double deadline_us;  /* [µs] 0: none */
@@ -493,8 +536,10 @@ typedef struct ist_impact {
   ist_status_t status; /* IST_BUDGET_EXHAUSTED: clear up to `time`, which a limit ended */
   ist_impact_kind_t kind;
   uint32_t node_visits, surface_pairs;
-  double time;                       /* [T] certified: the solids do not touch before */
-  double distance_min, distance_max; /* [u] the solids' distance then, certified */
+  double time; /* [T] certified: the solids do not touch before */
+  /* [u] The solids' distance then lies within, certified; distance_min may be next to 0 of an
+   * impact too. That they do not touch before is what `time` says. */
+  double distance_min, distance_max;
   double point_a[3], point_b[3]; /* [u] the nearest points then, world; others may be nearer by a
                                     part of the tolerance */
   double normal[3];              /* unit, from A to B, world */
@@ -547,6 +592,24 @@ ist_status_t ist_field_penetration_batch(const ist_field_pair_t* pairs, size_t c
                                          ist_workspace_t* workspaces, size_t workers,
                                          ist_penetration_t* answers, size_t answer_size,
                                          const ist_parallel_t* parallel);
+
+/* patches[i] and wholes[i] are what ist_contact_patches(pairs[i]) writes; wholes[i] has its status,
+ * errors included.
+ * `patches`: [count], each set up with room of its own.
+ * `whole_size`: sizeof(ist_penetration_t); the wholes' own `size` is written, not read.
+ * All else as ist_penetration_batch() has it. */
+ist_status_t ist_contact_patches_batch(const ist_pair_t* pairs, size_t count,
+                                       const ist_contact_settings_t* settings,
+                                       ist_workspace_t* workspaces, size_t workers,
+                                       ist_contact_patches_t* patches, ist_penetration_t* wholes,
+                                       size_t whole_size, const ist_parallel_t* parallel);
+
+ist_status_t ist_field_contact_patches_batch(const ist_field_pair_t* pairs, size_t count,
+                                             const ist_contact_settings_t* settings,
+                                             ist_workspace_t* workspaces, size_t workers,
+                                             ist_contact_patches_t* patches,
+                                             ist_penetration_t* wholes, size_t whole_size,
+                                             const ist_parallel_t* parallel);
 
 #ifdef __GNUC__
 #pragma GCC visibility pop

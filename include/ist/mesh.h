@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -65,6 +66,11 @@ struct ClosedMesh {
   TriangleMesh mesh;
   MeshReport report;
   std::string name;  ///< for messages: the file's path, or what the caller called it
+  /// Pairs of triangles of `mesh` (indices, the smaller first, sorted) that meet elsewhere than in
+  /// the corners and sides they share; degenerate triangles are in none. Saves a second search.
+  /// Nothing: not known, because they were not looked for or are more than ten million. Reset it
+  /// when you change `mesh`.
+  std::optional<std::vector<std::array<std::uint32_t, 2>>> meeting_pairs = {};
 };
 
 /// What to do with a mesh that does not bound a solid.

@@ -77,8 +77,11 @@ struct TimeOfImpact {
   /// [T] in [0, duration]. Certified for every status: the solids do not touch in [0, time], at 0
   /// not even where it is 0 but for overlapping and unresolved.
   double time = 0;
-  /// [u] The solids' distance at `time` lies in here, certified. Of no_impact and budget_exhausted
-  /// only the lower end is known, the upper one is infinite; all zero if overlapping.
+  /// [u] The solids' distance at `time` lies in here, certified.
+  /// The lower end is what was shown of all parts on the whole way, and not measured: where parts
+  /// slide past each other closely it is next to 0, of an impact too. That the solids do not touch
+  /// is what `time` says.
+  /// Of no_impact and budget_exhausted the upper end is infinite; all zero if overlapping.
   double distance_min = 0, distance_max = 0;
   /// Of impact and unresolved: [u] points of A and B at `time`, world, no further apart than
   /// distance_max. Others may be nearer by a part of the tolerance.

@@ -11,7 +11,7 @@ namespace ist {
 namespace {
 
 constexpr std::uint32_t kNone = UINT32_MAX;
-constexpr double kMostWork = 1e8;  ///< steps of all exchanges together
+constexpr std::int64_t kStepsAPair = 20;  ///< that finding and sorting it costs
 
 /// Which candidate holds which targets, both ways.
 struct Incidence {
@@ -26,9 +26,13 @@ struct Incidence {
                   [&](std::uint32_t x, double) { held[j].push_back(x); });
       std::sort(held[j].begin(), held[j].end());
     });
-    for (std::uint32_t j = 0; j < candidates.size(); ++j)
+    for (std::uint32_t j = 0; j < candidates.size(); ++j) {
       for (const std::uint32_t x : held[j]) holders[x].push_back(j);
+      pairs += static_cast<std::int64_t>(held[j].size());
+    }
   }
+
+  std::int64_t pairs = 0;  ///< of a candidate and a target it holds
 };
 
 /// The state of the search: what a candidate would bring, and what a chosen one would be missed
@@ -52,6 +56,7 @@ class Choice {
 
   const std::vector<std::uint32_t>& chosen() const { return chosen_; }
   const std::vector<std::uint32_t>& open() const { return open_; }
+  std::int64_t steps() const { return steps_; }  ///< taken so far: pairs that were looked at
 
   std::uint32_t most_helpful() const {
     std::uint32_t best = kNone;
@@ -89,13 +94,14 @@ class Choice {
 
   /// `until`: it stays in until then.
   void put_in(std::uint32_t j, std::int64_t until) {
+    count(incidence_.held[j]);
     in_[j] = 1;
     since_[j] = until;
     chosen_.push_back(j);
     for (const std::uint32_t x : incidence_.held[j]) {
       if (++holders_[x] == 1) {
         close(x);
-        for (const std::uint32_t k : incidence_.holders[x]) gain_[k] -= weight_[x];
+        change_gains(x, -weight_[x]);
         loss_[j] += weight_[x];
       } else if (holders_[x] == 2) {
         loss_[only_other(x, j)] -= weight_[x];
@@ -104,6 +110,7 @@ class Choice {
   }
 
   void take_out(std::uint32_t j, std::int64_t until) {
+    count(incidence_.held[j]);
     in_[j] = 0;
     since_[j] = until;
     loss_[j] = 0;
@@ -111,7 +118,7 @@ class Choice {
     for (const std::uint32_t x : incidence_.held[j]) {
       if (--holders_[x] == 0) {
         reopen(x);
-        for (const std::uint32_t k : incidence_.holders[x]) gain_[k] += weight_[x];
+        change_gains(x, weight_[x]);
       } else if (holders_[x] == 1) {
         loss_[only_other(x, j)] += weight_[x];
       }
@@ -121,12 +128,20 @@ class Choice {
   void make_open_heavier() {
     for (const std::uint32_t x : open_) {
       ++weight_[x];
-      for (const std::uint32_t k : incidence_.holders[x]) ++gain_[k];
+      change_gains(x, 1);
     }
   }
 
  private:
-  std::uint32_t only_other(std::uint32_t x, std::uint32_t than) const {
+  void change_gains(std::uint32_t x, std::int64_t by) {
+    for (const std::uint32_t k : incidence_.holders[x]) gain_[k] += by;
+    count(incidence_.holders[x]);
+  }
+  void count(const std::vector<std::uint32_t>& list) {
+    steps_ += static_cast<std::int64_t>(list.size());
+  }
+  std::uint32_t only_other(std::uint32_t x, std::uint32_t than) {
+    count(incidence_.holders[x]);
     for (const std::uint32_t k : incidence_.holders[x])
       if (in_[k] != 0 && k != than) return k;
     return than;
@@ -149,6 +164,7 @@ class Choice {
   std::vector<std::int64_t> loss_;      ///< weight of the targets a chosen one alone holds
   std::vector<std::int64_t> since_;     ///< it stays as it is until this exchange
   std::vector<char> in_;
+  std::int64_t steps_ = 0;
   std::vector<std::uint32_t> chosen_, open_, place_;
 };
 
@@ -156,16 +172,13 @@ class Choice {
 
 std::vector<std::uint32_t> choose_cover(std::span<const CoverSphere> candidates,
                                         std::span<const Eigen::Vector3d> targets, std::size_t count,
-                                        std::size_t exchanges, std::uint64_t seed) {
+                                        std::size_t exchanges, std::uint64_t seed,
+                                        std::int64_t& steps) {
   const Incidence incidence(candidates, targets);
+  steps -= kStepsAPair * incidence.pairs;
   const auto unheld = std::count_if(incidence.holders.begin(), incidence.holders.end(),
                                     [](const auto& holders) { return holders.empty(); });
   if (50 * static_cast<std::size_t>(unheld) > targets.size()) return {};
-  // Where each candidate holds much, an exchange is dear, and few are needed.
-  double pairs = 0;
-  for (const auto& held : incidence.held) pairs += static_cast<double>(held.size());
-  const double work = pairs * pairs / (static_cast<double>(candidates.size() * targets.size()) + 1);
-  exchanges = std::min(exchanges, static_cast<std::size_t>(kMostWork / (work + 1)) + 1);
   Choice choice(incidence);
   while (choice.chosen().size() < count) {
     const std::uint32_t best = choice.most_helpful();
@@ -173,7 +186,8 @@ std::vector<std::uint32_t> choose_cover(std::span<const CoverSphere> candidates,
     choice.put_in(best, 0);
   }
   std::int64_t now = 0;
-  while (!choice.open().empty() && static_cast<std::size_t>(now) < exchanges) {
+  while (!choice.open().empty() && static_cast<std::size_t>(now) < exchanges &&
+         choice.steps() < steps) {
     ++now;
     const std::uint64_t random =
         mixed(seed + static_cast<std::uint64_t>(now) * 0x9E3779B97F4A7C15ull);
@@ -186,6 +200,7 @@ std::vector<std::uint32_t> choose_cover(std::span<const CoverSphere> candidates,
                       now + 1 + static_cast<std::int64_t>((random >> 50) % 5));
     choice.make_open_heavier();
   }
+  steps -= choice.steps();
   if (!choice.open().empty()) return {};
   return choice.chosen();
 }

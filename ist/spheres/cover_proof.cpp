@@ -20,14 +20,16 @@ using BallList = std::vector<std::uint32_t>;
 
 double distance(const Vector3d& a, const Vector3d& b) { return std::sqrt((a - b).squaredNorm()); }
 
+/// Calls `take(part)` for every open part until it returns false; meanwhile it may make balls
+/// larger.
+template <class Take>
 class SurfaceSearch {
  public:
-  SurfaceSearch(std::span<const CoverSphere> balls, double finest, std::size_t most)
-      : balls_(balls), finest_(finest), most_(most) {}
+  SurfaceSearch(std::span<const CoverSphere> balls, double finest, const Take& take)
+      : balls_(balls), finest_(finest), take_(take) {}
 
-  void search(const std::array<Vector3d, 3>& t, const BallList& from, int depth,
-              std::vector<OpenPart>& out) {
-    if (out.size() >= most_) return;
+  void search(const std::array<Vector3d, 3>& t, const BallList& from, int depth = 0) {
+    if (ended_) return;
     const Vector3d middle = (t[0] + t[1] + t[2]) / 3;
     double reach = 0;
     for (const Vector3d& corner : t) reach = std::max(reach, distance(corner, middle));
@@ -50,7 +52,7 @@ class SurfaceSearch {
     part.gap = std::max(0.0, gap);
     // No ball need grow less for a smaller part, but for `finest`.
     if (least - part.gap <= finest_ || reach <= kSmallBesideGap * gap || depth >= kDeepest) {
-      out.push_back(part);
+      ended_ = !take_(part);
       return;
     }
     BallList list;
@@ -68,16 +70,26 @@ class SurfaceSearch {
     }
     const Vector3d &a = t[side], &b = t[(side + 1) % 3], &c = t[(side + 2) % 3];
     const Vector3d half = (a + b) / 2;
-    search({half, c, a}, list, depth + 1, out);
-    search({b, c, half}, list, depth + 1, out);
+    search({half, c, a}, list, depth + 1);
+    search({b, c, half}, list, depth + 1);
   }
 
  private:
   static constexpr int kDeepest = 120;
   std::span<const CoverSphere> balls_;
   const double finest_;
-  const std::size_t most_;
+  const Take& take_;
+  bool ended_ = false;
 };
+
+std::array<Vector3d, 3> corners_of(const MeshView& mesh, std::uint32_t t) {
+  std::array<Vector3d, 3> corners;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double* const v = mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{t} + k]};
+    corners[k] = {v[0], v[1], v[2]};
+  }
+  return corners;
+}
 
 class VoidSearch {
  public:
@@ -175,13 +187,11 @@ std::vector<OpenPart> open_surface(const MeshView& mesh, std::span<const CoverSp
   const BallList all = all_of(balls.size());
   std::vector<std::vector<OpenPart>> found(mesh.triangle_count);
   tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t t) {
-    std::array<Vector3d, 3> corners;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double* const v =
-          mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{t} + k]};
-      corners[k] = {v[0], v[1], v[2]};
-    }
-    SurfaceSearch(balls, finest, most).search(corners, all, 0, found[t]);
+    const auto take = [&](const OpenPart& part) {
+      found[t].push_back(part);
+      return found[t].size() < most;
+    };
+    SurfaceSearch(balls, finest, take).search(corners_of(mesh, t), all);
   });
   std::vector<OpenPart> out;
   for (const auto& parts : found) out.insert(out.end(), parts.begin(), parts.end());
@@ -215,15 +225,16 @@ OpenPlace open_void(const MeshSolid& solid, std::span<const CoverSphere> balls) 
 }
 
 void grow_to_cover(const MeshSolid& solid, std::vector<CoverSphere>& balls, double finest) {
+  // What a ball is grown by for one part often holds the next.
+  const auto take = [&](const OpenPart& part) {
+    double& radius = balls[part.ball].radius;
+    radius = std::max(radius, part.radius);
+    return true;
+  };
+  const BallList all = all_of(balls.size());
+  for (std::uint32_t t = 0; t < solid.view().triangle_count; ++t)
+    SurfaceSearch(balls, finest, take).search(corners_of(solid.view(), t), all);
   for (int round = 0; round < 50; ++round) {
-    const std::vector<OpenPart> parts = open_surface(solid.view(), balls, finest);
-    if (!parts.empty()) {
-      for (const OpenPart& part : parts) {
-        double& radius = balls[part.ball].radius;
-        radius = std::max(radius, part.radius);
-      }
-      continue;
-    }
     const OpenPlace open = open_void(solid, balls);
     if (!open.found) return;
     CoverSphere* nearest = &balls.front();

@@ -25,7 +25,9 @@ constexpr int kCuts = 14;         ///< rounds of descending and looking what was
 constexpr int kFirstRounds = 25;  ///< over all balls, before the first look
 constexpr int kRounds = 8;        ///< between two looks
 constexpr std::size_t kExchanges = 1500;
-constexpr int kLevels = 24;       ///< that exchanges try
+constexpr std::int64_t kSteps = 400'000'000;  ///< of all exchanges of an attempt
+constexpr std::size_t kOpenParts = 100'000;   ///< that a look takes in, about
+constexpr int kLevels = 24;                   ///< that exchanges try
 constexpr double kFinest = 1e-3;  ///< of the level: how close the last radii are to just enough
 
 std::vector<CoverSphere> balls_at(const OffsetSurface& surface,
@@ -106,12 +108,13 @@ class Attempt {
     centres.insert(centres.end(), cover.centres.begin(), cover.centres.end());
     const std::vector<Vector3d> targets = thinned(sampled_.targets, 0.7 * cover.level);
     double factor = 0.9;
-    for (int k = 0; k < kLevels && factor < 0.99; ++k) {
+    std::int64_t steps = kSteps;
+    for (int k = 0; k < kLevels && factor < 0.99 && steps > 0; ++k) {
       const double level = cover.level * factor;
       const std::vector<CoverSphere> balls =
           balls_at(OffsetSurface(solid_, sampled_, level), centres);
       const std::vector<std::uint32_t> chosen =
-          choose_cover(balls, targets, count, kExchanges, ++seed_);
+          choose_cover(balls, targets, count, kExchanges, ++seed_, steps);
       look_();
       if (chosen.empty()) {
         factor = std::sqrt(factor);
@@ -155,7 +158,8 @@ class Attempt {
 
   /// Returns how far the worst place is outside.
   double add_targets(const std::vector<CoverSphere>& balls, double level) {
-    std::vector<OpenPart> parts = open_surface(solid_.view(), balls, 0.03 * level);
+    const std::size_t most = std::max<std::size_t>(16, kOpenParts / solid_.view().triangle_count);
+    std::vector<OpenPart> parts = open_surface(solid_.view(), balls, 0.03 * level, most);
     std::stable_sort(parts.begin(), parts.end(),
                      [](const OpenPart& a, const OpenPart& b) { return a.gap > b.gap; });
     std::unordered_set<std::uint64_t> seen;

@@ -25,6 +25,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::size_t kMostSpheres = 4096;
+constexpr int kMostTries = 8;  ///< counts that are tried for a protrusion; doubling goes on
 
 /// What several searches have done together, told by the thread that started them.
 class Watch {
@@ -91,27 +92,30 @@ SphereCover finished(const MeshSolid& solid, const std::vector<CoverSphere>& bal
   return cover;
 }
 
-/// As few spheres as reach no further than asked: more and more until it is enough, then fewer.
+/// As few spheres as reach no further than asked: twice as many until it is enough, then halfway
+/// between too few and enough.
 SphereCover fewest(const MeshSolid& solid, const CoverSearch& search,
                    const SphereCoverSettings& settings) {
-  const auto with = [&](std::size_t count) { return finished(solid, search.with_count(count)); };
+  int tries = 0;
+  const auto with = [&](std::size_t count) {
+    ++tries;
+    return finished(solid, search.with_count(count));
+  };
   const double level = settings.max_protrusion / solid.frame().scale();
-  std::size_t high = std::clamp<std::size_t>(search.greedy_count(level), 1, settings.count);
-  SphereCover best = with(high);
   std::size_t low = 0;  // too few
+  std::size_t high = std::clamp<std::size_t>(search.greedy_count(level) / 2, 1, settings.count);
+  SphereCover best = with(high);
   while (best.protrusion.largest > settings.max_protrusion) {
     low = high;
     if (high == settings.count) {
       best.reached = false;
       return best;
     }
-    high = std::min(settings.count, high + std::max<std::size_t>(1, high / 4));
+    high = std::min(settings.count, 2 * high);
     best = with(high);
   }
-  while (high - low > std::max<std::size_t>(1, high / 32)) {
-    const std::size_t middle =
-        low == 0 ? high - std::max<std::size_t>(1, high / 4) : (low + high) / 2;
-    if (middle == 0) break;
+  while (high - low > std::max<std::size_t>(1, high / 16) && tries < kMostTries) {
+    const std::size_t middle = (low + high) / 2;
     SphereCover fewer = with(middle);
     if (fewer.protrusion.largest <= settings.max_protrusion) {
       best = std::move(fewer);

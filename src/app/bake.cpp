@@ -8,16 +8,17 @@
 #include <ist/error.h>
 
 #include "app/asset_summary.h"
+#include "app/bake_library.h"
 #include "app/bake_robot.h"
 #include "app/coarseness.h"
 #include "app/commands.h"
 #include "app/device_option.h"
 #include "app/file_options.h"
-#include "app/grid_options.h"
-#include "app/input_mesh.h"
 #include "app/interrupt.h"
+#include "app/mesh_notes.h"
 #include "app/number_options.h"
 #include "app/progress_line.h"
+#include "app/setting_options.h"
 #include "app/text.h"
 
 namespace ist::app {
@@ -25,24 +26,13 @@ namespace {
 
 struct BakeOptions {
   std::string mesh, output;
-  PackingSettings packing;
-  std::string grid = "banded", device = "auto";
-  ErrorTarget target = {0, ErrorTarget().at_overlap};  ///< error 0: none is asked for
+  SettingOptions asked;
+  std::string device = "auto";
+  unsigned threads = 0;
+  bool json = false, quiet = false;
+  LibraryOptions library;
   RobotOptions robot;
-  bool repair = false, json = false, quiet = false;
 };
-
-constexpr std::size_t kMostSpheres = 0x7fffffff;  ///< what the library takes
-
-/// Says where the bake runs, if that was left open.
-void announce_device(Device device) {
-  if (device != Device::automatic) return;
-  std::string why;
-  if (gpu_available(0, &why))
-    spdlog::info("baking on the GPU: {}", gpu_info().name);
-  else
-    spdlog::info("baking on the CPU: {}", why);
-}
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -101,20 +91,21 @@ Baked bake_interruptibly(const ClosedMesh& mesh, const ErrorTarget& target,
 
 void run_bake(const BakeOptions& options) {
   if (options.quiet) spdlog::set_level(spdlog::level::err);
-  PackingSettings settings = options.packing;
-  settings.grid = grid_named(options.grid);
-  refuse_idle_options(settings);
-  if (!is_robot_file(options.mesh)) require_output(options.output, options.mesh, "the asset");
+  const ErrorTarget& target = options.asked.settings.target;
+  PackingSettings settings = options.asked.settings.packing;
+  settings.threads = options.threads;
+  const bool robot = is_robot_file(options.mesh);
+  if (!robot) require_output(options.output, options.mesh, "the asset");
   settings.device = usable_device(options.device);
   announce_device(settings.device);
-  if (is_robot_file(options.mesh))
-    return bake_robot({options.mesh, options.output, settings, options.robot, options.repair,
-                       options.json, options.quiet});
+  if (robot)
+    return bake_robot({options.mesh, options.output, settings, target, options.robot,
+                       options.asked.settings.mesh.repair, options.json, options.quiet});
 
   const auto start = std::chrono::steady_clock::now();
-  const auto [declared, mesh] = read_input_mesh(options.mesh, options.repair);
+  const auto [declared, mesh] = read_mesh_aloud(options.mesh, options.asked.settings.mesh);
   const double import_seconds = seconds_since(start);
-  const auto [asset, partners] = bake_interruptibly(mesh, options.target, settings, options.quiet);
+  const auto [asset, partners] = bake_interruptibly(mesh, target, settings, options.quiet);
   const double bake_seconds = seconds_since(start) - import_seconds;
   {
     const InterruptGuard guard;  // the file is written whole, or not at all
@@ -122,7 +113,7 @@ void run_bake(const BakeOptions& options) {
   }
   exit_if_interrupted();
 
-  if (options.target.relative_error > 0 && !asset.view().predicted_errors().target_met())
+  if (target.relative_error > 0 && !asset.view().predicted_errors().target_met())
     spdlog::warn("{}: {}", options.output, describe_target(asset.view()));
   if (const std::string coarse = describe_coarseness(asset.view()); !coarse.empty())
     spdlog::warn("{}: {}", options.output, coarse);
@@ -149,63 +140,47 @@ void run_bake(const BakeOptions& options) {
 
 void add_bake(CLI::App& app) {
   const auto options = std::make_shared<BakeOptions>();
-  PackingSettings& packing = options->packing;
-  CLI::App* const command =
-      app.add_subcommand("bake", "Pack a closed mesh with spheres and write an .ist asset");
-  add_input(command, "MESH", options->mesh,
-            "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf");
+  CLI::App* const command = app.add_subcommand(
+      "bake", "Pack a closed mesh with spheres and write an .ist asset, or many with --manifest");
+  CLI::Option* const mesh =
+      add_input(command, "MESH", options->mesh,
+                "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf")
+          ->required(false);
   add_output(command, options->output,
-             "The .ist file to write; of a robot the folder, for an asset a mesh and an index",
+             "The .ist file to write; with --manifest the folder for NAME.ist, of a robot the one "
+             "for LINK.ist and an index, made if need be",
              Dash::refused);
-  add_whole<std::size_t>(
-      command, "--spheres", packing.max_spheres,
-      "Stop at this count, 0 = no limit (with --target-error: 200,000, as by default)", 0,
-      kMostSpheres);
-  CLI::Option* const target = add_share(
-      command, "--target-error", options->target.relative_error,
-      {.least = 0, .most = 1, .without_least = true, .without_most = true},
-      "As many spheres as this median error of the volume needs, e.g. 1%; at most --spheres "
-      "where given, else 200,000");
-  target->default_str("");
-  add_share(command, "--at-overlap", options->target.at_overlap, {.least = 1e-4, .most = 0.5},
-            "Overlap, part of the volume, at which it is to hold")
-      ->needs(target)
-      ->default_str("0.1%");
-  add_share(command, "--coverage", packing.target_coverage, {.least = 0, .most = 1},
-            "Stop at this share of the volume");
-  add_real(command, "--min-radius", packing.min_radius, {}, "[u] Insert nothing smaller");
-  add_real(command, "--time", packing.time_limit, {},
-           "[s] Stop packing after this, 0 = no limit; with --target-error: the whole search");
-  add_share(command, "--epsilon", packing.epsilon, {.least = 0, .most = 1, .without_most = true},
-            "Every sphere is at least 1 − E times the largest that would fit; 0 = the "
-            "library's own schedule");
-  CLI::Option* const field_error =
-      add_real(command, "--field-error", packing.field.error, {.least = 0, .without_least = true},
-               "[u] How far the surface kept for exact queries may be from the mesh's; as few "
-               "triangles as that allows. Default: the mesh's own where they are at most 30,000, "
-               "else that many");
-  field_error->default_str("");
-  command
-      ->add_flag_callback(
-          "--no-field", [&packing] { packing.field.wanted = false; },
-          "Keep no surface: a smaller file, whose volumes are those of spheres")
-      ->excludes(field_error);
-  add_grid_options(command, options->grid, packing.grids);
+  add_setting_options(command, options->asked, all_settings());
   add_device_option(command, options->device,
                     "Where the bake runs; auto: on the GPU if there is one");
-  add_whole(command, "--threads", packing.threads, "0 = all cores; never changes the result");
-  add_whole(command, "--seed", packing.seed, "Breaks ties; any value packs equally well");
-  command->add_flag("--repair", options->repair, "Close an open mesh, and say what was done");
+  add_whole(command, "--threads", options->threads, "0 = all cores; never changes the result");
   add_robot_options(command, options->robot);
+  add_library_options(command, options->library);
   command->add_flag("--json", options->json, "The result as JSON on stdout");
   command->add_flag("--quiet", options->quiet, "Only errors");
   command->footer(
       "The first limit met stops the packing. Ctrl-C ends the bake without writing a file.\n"
-      "Example: ist bake bolt.obj -o bolt.ist --spheres 4000");
-  command->callback([options, command] {
-    // Unless asked for, the default count is no limit where an error is the target.
-    if (options->target.relative_error > 0 && command->count("--spheres") == 0)
-      options->packing.max_spheres = 0;
+      "Example: ist bake bolt.obj -o bolt.ist --spheres 4000\n"
+      "Example: ist bake ur5.urdf -o ur5 --spheres 1000\n"
+      "Example: ist bake --manifest library.toml -o assets --cache ~/.cache/ist");
+  command->callback([options, mesh] {
+    if (!options->library.manifest.empty()) {
+      if (!options->mesh.empty())
+        throw CLI::ValidationError("--manifest", "excludes MESH: write the mesh into the manifest");
+      if (!options->asked.given.empty())
+        throw CLI::ValidationError("--" + *options->asked.given.begin(),
+                                   "is not combined with --manifest: write it there, without --, "
+                                   "below [defaults] or an [[asset]]");
+      return run_library({options->library, options->output, options->device, options->threads,
+                          options->json, options->quiet});
+    }
+    if (options->mesh.empty()) throw CLI::RequiredError(mesh->get_name());
+    complete_settings(options->asked);
+    if (is_robot_file(options->mesh))
+      for (const Setting& placing : placing_settings())
+        if (options->asked.given.contains(placing.name))
+          throw CLI::ValidationError("--" + placing.name,
+                                     "is not combined with a robot: its URDF places the meshes");
     run_bake(*options);
   });
 }

@@ -17,6 +17,7 @@
 #include "app/commands.h"
 #include "app/file_options.h"
 #include "app/interrupt.h"
+#include "app/mesh_notes.h"
 #include "app/progress_line.h"
 #include "robot/link_mesh.h"
 
@@ -51,27 +52,18 @@ Json pose_json(const Eigen::Quaterniond& q, const Eigen::Vector3d& t) {
   return {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()};
 }
 
-ClosedMesh close_shape(TriangleMesh mesh, const std::string& name, bool repair) {
-  try {
-    ClosedMesh closed =
-        close_mesh(std::move(mesh), name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
-    for (const std::string& note : closed.report.notes) spdlog::warn("{}: {}", name, note);
-    return closed;
-  } catch (const OpenMeshError& error) {
-    if (repair) throw;
-    throw OpenMeshError(std::string(error.what()) + "; --repair closes what can be closed");
-  }
-}
-
 Asset bake_shape(const ClosedMesh& mesh, const RobotBake& what) {
   constexpr double kPatience = 0.15;  // [s]
   const InterruptGuard guard(kPatience);
   ProgressLine line(what.quiet);
   try {
-    Asset asset = bake(mesh, what.packing, [&](const Progress& progress) {
+    const auto show = [&](const Progress& progress) {
       line.show(progress);
       return !interrupted();
-    });
+    };
+    Asset asset = what.target.relative_error > 0
+                      ? bake_to_error(mesh, what.target, what.packing, show).asset
+                      : bake(mesh, what.packing, show);
     exit_if_interrupted();
     return asset;
   } catch (const Error&) {
@@ -118,7 +110,7 @@ void bake_robot(const RobotBake& what) {
       for (int k = 1; !taken.insert(file).second; ++k)
         file = fmt::format("{}_{}", file_name(link.name), k);
       file += ".ist";
-      const ClosedMesh mesh = close_shape(
+      const ClosedMesh mesh = close_aloud(
           mesh_of(placed, paths, what.robot).mesh,
           fmt::format("{}: line {}: link {}", what.robot, placed.line, link.name), what.repair);
       assets.push_back({file, bake_shape(mesh, what)});

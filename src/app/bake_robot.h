@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include <ist/packing.h>
+#include <ist/bake.h>
 
 #include "app/robot_options.h"
 
@@ -13,6 +13,7 @@ struct RobotBake {
   std::string robot;   ///< the URDF
   std::string folder;  ///< for an asset a mesh and the index NAME.json; made if it is not there
   PackingSettings packing;
+  ErrorTarget target;  ///< of each asset; error 0: none is asked for
   RobotOptions options;
   bool repair = false, json = false, quiet = false;
 };

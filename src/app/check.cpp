@@ -10,13 +10,16 @@
 #include "app/commands.h"
 #include "app/file_options.h"
 #include "app/number_options.h"
+#include "app/setting_options.h"
 #include "app/text.h"
+#include "library/input_mesh.h"
 
 namespace ist::app {
 namespace {
 
 struct CheckOptions {
   std::string asset, mesh;
+  SettingOptions placed;
   unsigned threads = 0;
   bool json = false;
 };
@@ -53,8 +56,9 @@ void print_table(const CheckOptions& options, const std::vector<Invariant>& inva
 void run_check(const CheckOptions& options) {
   const Asset asset = Asset::load(options.asset);
   const bool repaired = (asset.view().header().flags & kFlagRepaired) != 0;
-  const ClosedMesh mesh = close_mesh(load_mesh(options.mesh), options.mesh,
-                                     repaired ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+  MeshSettings placed = options.placed.settings.mesh;
+  placed.repair = repaired;
+  const ClosedMesh mesh = read_input_mesh(options.mesh, placed).closed;
   const std::vector<Invariant> invariants = check(asset, mesh, options.threads);
   const bool sound = std::all_of(invariants.begin(), invariants.end(),
                                  [](const Invariant& i) { return i.violations == 0; });
@@ -70,11 +74,15 @@ void add_check(CLI::App& app) {
       app.add_subcommand("check", "Prove every invariant again, from asset and mesh alone");
   add_input(command, "ASSET", options->asset, "An .ist file");
   add_input(command, "--mesh", options->mesh, "The MESH it was baked from");
+  add_setting_options(command, options->placed, placing_settings());
   add_whole(command, "--threads", options->threads, "0 = all cores");
   command->add_flag("--json", options->json, "The invariants as JSON");
   command->footer(
       "Exits 3 if an invariant is violated.\nExample: ist check bolt.ist --mesh bolt.obj");
-  command->callback([options] { run_check(*options); });
+  command->callback([options] {
+    complete_settings(options->placed);
+    run_check(*options);
+  });
 }
 
 }  // namespace ist::app

@@ -18,6 +18,8 @@ struct ExitCode {
 };
 
 void add_bake(CLI::App& app);
+void add_cache(CLI::App& app);
+void add_summary(CLI::App& app);
 void add_query(CLI::App& app);
 void add_info(CLI::App& app);
 void add_check(CLI::App& app);
@@ -25,5 +27,6 @@ void add_medial(CLI::App& app);
 void add_export(CLI::App& app);
 void add_sample(CLI::App& app);
 void add_spheres(CLI::App& app);
+void add_reference(CLI::App& app);  ///< completion and manual: of all commands that were added
 
 }  // namespace ist::app

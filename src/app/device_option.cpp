@@ -1,5 +1,7 @@
 #include "app/device_option.h"
 
+#include <spdlog/spdlog.h>
+
 #include <ist/error.h>
 #include <ist/gpu.h>
 
@@ -17,6 +19,15 @@ Device usable_device(const std::string& name) {
   std::string why;
   if (!gpu_available(0, &why)) throw Error("--device cuda: " + why + "; --device cpu needs no GPU");
   return Device::cuda;
+}
+
+void announce_device(Device device) {
+  if (device != Device::automatic) return;
+  std::string why;
+  if (gpu_available(0, &why))
+    spdlog::info("baking on the GPU: {}", gpu_info().name);
+  else
+    spdlog::info("baking on the CPU: {}", why);
 }
 
 }  // namespace ist::app

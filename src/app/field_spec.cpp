@@ -11,7 +11,7 @@
 
 #include <ist/error.h>
 
-#include "app/number_options.h"
+#include "settings/numbers.h"
 
 namespace ist::app {
 namespace {

@@ -3,6 +3,7 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <system_error>
 
@@ -15,7 +16,11 @@
 int main(int argc, char** argv) {
   using namespace ist::app;
   install_interrupt_handler();
-  spdlog::set_default_logger(spdlog::stderr_color_mt("ist"));
+  // https://no-color.org
+  const char* const no_color = std::getenv("NO_COLOR");
+  spdlog::set_default_logger(spdlog::stderr_color_mt("ist", no_color != nullptr && *no_color != '\0'
+                                                                ? spdlog::color_mode::never
+                                                                : spdlog::color_mode::automatic));
   spdlog::set_pattern("ist: %^%l%$: %v");
   CLI::App app(
       "Sphere packings, inner sphere trees and the volume by which two solids overlap.\n"
@@ -23,8 +28,11 @@ int main(int argc, char** argv) {
       "ist");
   app.set_version_flag("--version", "ist " IST_VERSION_STRING);
   app.footer(
-      "Exit codes: 0 done, 1 error, 2 wrong usage, 3 check found a violation, 130 interrupted.");
+      "Exit codes: 0 done, 1 error, 2 wrong usage or mistakes in a manifest, 3 check found a "
+      "violation, 130 interrupted.");
   add_bake(app);
+  add_cache(app);
+  add_summary(app);
   add_query(app);
   add_info(app);
   add_check(app);
@@ -32,6 +40,7 @@ int main(int argc, char** argv) {
   add_medial(app);
   add_sample(app);
   add_spheres(app);
+  add_reference(app);
   try {
     app.parse(argc, argv);
     if (app.get_subcommands().empty()) throw CLI::RequiredError("A subcommand");

@@ -11,7 +11,7 @@
 #include "app/commands.h"
 #include "app/device_option.h"
 #include "app/file_options.h"
-#include "app/input_mesh.h"
+#include "app/mesh_notes.h"
 #include "app/number_options.h"
 
 namespace ist::app {
@@ -38,7 +38,7 @@ void run_medial(const MedialOptions& options) {
   require_output(options.output, options.mesh, "the nodes");
   MedialSettings settings = options.settings;
   settings.device = usable_device(options.device);
-  const auto solid = make_solid(read_input_mesh(options.mesh, options.repair).closed);
+  const auto solid = make_solid(read_mesh_aloud(options.mesh, {.repair = options.repair}).closed);
   const auto start = std::chrono::steady_clock::now();
   const std::vector<MedialNode> nodes = medial_nodes(*solid, settings);
   const std::chrono::duration<double, std::milli> elapsed =

@@ -16,7 +16,7 @@
 #include <ist/error.h>
 
 #include "app/csv_reader.h"
-#include "app/number_options.h"
+#include "settings/numbers.h"
 
 namespace ist::app {
 namespace {

@@ -53,6 +53,15 @@ std::string field_fault(const std::string& text) {
   }
 }
 
+/// "", or the way out where B is described as a field.
+std::string not_an_asset(const std::string& text) {
+  if (!is_field_spec(text)) return "";
+  return fmt::format(
+      "'{0}' is a field, and only A can be one: name it first and the .ist file second, with that "
+      "one's pose in the field's frame. ./{0} names a file",
+      text);
+}
+
 /// Throws Error if no row is of one of the classes: most likely it is misspelled.
 void keep_classes(PoseTable& table, const QueryOptions& options) {
   if (!table.has_labels) throw Error(options.poses + ": no column 'class' to select rows by");
@@ -188,7 +197,7 @@ void add_query(CLI::App& app) {
             "An .ist file or a field: plane:nx,ny,nz,d (the solid n·x ≤ d), box:hx,hy,hz, ball:r, "
             "capsule:r,h, cylinder:r,h; [u], half extents, h half the height along z")
       ->check(field_fault);
-  add_input(command, "B", options->asset_b, "An .ist file");
+  add_input(command, "B", options->asset_b, "An .ist file")->check(not_an_asset);
   CLI::Option_group* const poses = command->add_option_group("Poses", "Where B stands");
   poses->add_option("--pose", options->pose, "qw,qx,qy,qz,tx,ty,tz: x_A = R (scale · x_B) + t")
       ->check(is_pose);

@@ -13,8 +13,8 @@
 #include "app/commands.h"
 #include "app/exported_spheres.h"
 #include "app/file_options.h"
-#include "app/input_mesh.h"
 #include "app/interrupt.h"
+#include "app/mesh_notes.h"
 #include "app/number_options.h"
 #include "app/progress_line.h"
 #include "app/robot_options.h"
@@ -23,6 +23,8 @@
 
 namespace ist::app {
 namespace {
+
+constexpr std::size_t kMostSpheres = 4096;  ///< what the library takes
 
 enum class Kind { cover, inner, matched };
 
@@ -52,19 +54,6 @@ struct Input {
   RobotModel robot;  ///< no links where the input is a mesh
 };
 
-ClosedMesh close_link(TriangleMesh mesh, const std::string& name, bool repair) {
-  ClosedMesh closed;
-  try {
-    closed =
-        close_mesh(std::move(mesh), name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
-  } catch (const OpenMeshError& error) {
-    if (repair) throw;
-    throw OpenMeshError(std::string(error.what()) + "; --repair closes what can be closed");
-  }
-  for (const std::string& note : closed.report.notes) spdlog::warn("{}: {}", name, note);
-  return closed;
-}
-
 Input read_input(const SpheresOptions& options) {
   Input input;
   if (!is_robot_file(options.input)) {
@@ -72,7 +61,7 @@ Input read_input(const SpheresOptions& options) {
     input.links.emplace_back();
     input.links[0].name = input.name;
     input.links[0].has_mesh = true;
-    input.meshes.push_back(read_input_mesh(options.input, options.repair).closed);
+    input.meshes.push_back(read_mesh_aloud(options.input, {.repair = options.repair}).closed);
     return input;
   }
   input.robot = read_robot(options.input);
@@ -88,9 +77,9 @@ Input read_input(const SpheresOptions& options) {
     out.slack = geometry.slack;
     out.has_mesh = !geometry.mesh.triangles.empty();
     if (out.has_mesh)
-      input.meshes.push_back(close_link(std::move(geometry.mesh),
-                                        fmt::format("{}: link {}", options.input, link.name),
-                                        options.repair));
+      input.meshes.push_back(close_aloud(std::move(geometry.mesh),
+                                         fmt::format("{}: link {}", options.input, link.name),
+                                         options.repair));
   }
   if (input.links.empty())
     throw Error(fmt::format("{}: no link has a {} shape{}", options.input,
@@ -164,9 +153,11 @@ void fill_links(Input& input, const SpheresOptions& options) {
                       options.input, link.name, link.proof.where.x(), link.proof.where.y(),
                       link.proof.where.z()));
     if (!link.cover.reached)
-      spdlog::warn("{}: link {}: {} spheres still protrude by {:g}; allow more with --count",
-                   options.input, link.name, link.cover.spheres.size(),
-                   link.cover.protrusion.largest);
+      throw Error(fmt::format("{}: link {}: {} spheres still protrude by {:g}; {}", options.input,
+                              link.name, options.cover.count, link.cover.protrusion.largest,
+                              options.cover.count < kMostSpheres
+                                  ? "--count allows more"
+                                  : "--max-protrusion asks for too little"));
   }
 }
 
@@ -271,7 +262,7 @@ void add_spheres(CLI::App& app) {
              Dash::refused);
   add_whole<std::size_t>(command, "--count", options->cover.count,
                          "Spheres a link; with --max-protrusion the most (default then 1024)", 1,
-                         4096);
+                         kMostSpheres);
   CLI::Option* const most =
       add_real(command, "--max-protrusion", options->cover.max_protrusion,
                {.least = 0, .without_least = true},

@@ -15,14 +15,6 @@ std::string short_vector(const Eigen::Vector3d& v) {
   return fmt::format("({:.5g}, {:.5g}, {:.5g})", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);
 }
 
-GridMode grid_named(const std::string& name) noexcept {
-  if (name == "uniform") return GridMode::uniform;
-  if (name == "explicit") return GridMode::explicit_refinement;
-  if (name == "implicit") return GridMode::implicit_refinement;
-  if (name == "hybrid") return GridMode::hybrid;
-  return GridMode::banded;
-}
-
 const char* name_of(StopReason reason) noexcept {
   switch (reason) {
     case StopReason::sphere_count:
@@ -37,22 +29,6 @@ const char* name_of(StopReason reason) noexcept {
       return "cancelled";
     case StopReason::exhausted:
       return "exhausted";
-  }
-  return "unknown";
-}
-
-const char* name_of(GridMode mode) noexcept {
-  switch (mode) {
-    case GridMode::banded:
-      return "banded";
-    case GridMode::uniform:
-      return "uniform";
-    case GridMode::explicit_refinement:
-      return "explicit";
-    case GridMode::implicit_refinement:
-      return "implicit";
-    case GridMode::hybrid:
-      return "hybrid";
   }
   return "unknown";
 }

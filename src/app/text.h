@@ -7,6 +7,8 @@
 #include <ist/packing.h>
 #include <ist/query.h>
 
+#include "settings/bake_settings.h"
+
 // How numbers and names are printed for people. Files and JSON never use these but the names.
 
 namespace ist::app {
@@ -14,11 +16,8 @@ namespace ist::app {
 std::string grouped(std::uint64_t count);  ///< 10,000
 std::string short_vector(const Eigen::Vector3d& v);
 
-/// The one whose name it is; the command line has let no other through.
-GridMode grid_named(const std::string& name) noexcept;
-
+using ist::name_of;  // of a GridMode
 const char* name_of(StopReason reason) noexcept;
-const char* name_of(GridMode mode) noexcept;
 const char* name_of(QueryStatus status) noexcept;
 const char* name_of(TrialPartner partner) noexcept;
 

@@ -1,4 +1,13 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,9 +27,27 @@
 namespace ist {
 namespace {
 
+/// How many of 0 … count − 1 are so.
+template <class IsSo>
+std::size_t count_if(const std::size_t count, const IsSo& is_so) {
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, count), std::size_t{0},
+      [&](const tbb::blocked_range<std::size_t>& range, std::size_t so) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) so += is_so(i) ? 1 : 0;
+        return so;
+      },
+      std::plus<>());
+}
+
 void check_indices_and_coordinates(const TriangleMesh& mesh, const std::string& name) {
   if (mesh.triangles.empty())
     throw Error(name + ": no triangles. There is nothing to bound a solid");
+  const auto unsound = [&](const std::size_t t) {
+    return std::any_of(mesh.triangles[t].begin(), mesh.triangles[t].end(), [&](const auto v) {
+      return v >= mesh.vertices.size() || !mesh.vertices[v].allFinite();
+    });
+  };
+  if (count_if(mesh.triangles.size(), unsound) == 0) return;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     for (const std::uint32_t v : mesh.triangles[t]) {
       if (v >= mesh.vertices.size())
@@ -34,12 +61,12 @@ void check_indices_and_coordinates(const TriangleMesh& mesh, const std::string& 
 
 std::size_t count_components(const TriangleMesh& mesh, const EdgeTable& edges) {
   DisjointSets sets(mesh.triangles.size());
-  for (std::size_t e = 0; e < edges.size(); ++e)
+  tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
     for (const std::uint32_t side : edges.sides(e)) sets.unite(edges.sides(e)[0] / 3, side / 3);
-  std::size_t count = 0;
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    count += sets.find(t) == t && !has_repeated_corner(mesh.triangles[t]) ? 1 : 0;
-  return count;
+  });
+  return count_if(mesh.triangles.size(), [&](const std::size_t t) {
+    return sets.find(static_cast<std::uint32_t>(t)) == t && !has_repeated_corner(mesh.triangles[t]);
+  });
 }
 
 /// Vertices whose triangles do not all hang together by the edges there.
@@ -49,43 +76,43 @@ std::size_t count_nonmanifold_vertices(const TriangleMesh& mesh, const EdgeTable
     const std::uint32_t next = side - side % 3 + (side + 1) % 3;
     return mesh.triangles[side / 3][side % 3] == vertex ? side : next;
   };
-  for (std::size_t e = 0; e < edges.size(); ++e) {
+  tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
     const auto sides = edges.sides(e);
     for (const std::uint32_t v : {edges.low(e), edges.high(e)})
-      for (const std::uint32_t side : sides)
+      for (const std::uint32_t side : sides.subspan(1))
         corners.unite(corner_at(sides[0], v), corner_at(side, v));
-  }
-  std::vector<std::uint32_t> fan_of(mesh.vertices.size(), kNoIndex);
-  std::vector<bool> split(mesh.vertices.size(), false);
-  for (std::uint32_t c = 0; c < 3 * mesh.triangles.size(); ++c) {
-    if (has_repeated_corner(mesh.triangles[c / 3])) continue;
-    const std::uint32_t v = mesh.triangles[c / 3][c % 3];
-    if (fan_of[v] == kNoIndex) fan_of[v] = corners.find(c);
-    if (fan_of[v] != corners.find(c)) split[v] = true;
-  }
-  return static_cast<std::size_t>(std::count(split.begin(), split.end(), true));
+  });
+  // Every fan is named by one of its corners.
+  std::vector<std::uint32_t> fans(mesh.vertices.size(), 0);
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](const std::size_t t) {
+    if (has_repeated_corner(mesh.triangles[t])) return;
+    for (std::size_t c = 3 * t; c < 3 * t + 3; ++c)
+      if (corners.find(static_cast<std::uint32_t>(c)) == c)
+        std::atomic_ref<std::uint32_t>(fans[mesh.triangles[t][c % 3]]).fetch_add(1);
+  });
+  return count_if(fans.size(), [&](const std::size_t v) { return fans[v] > 1; });
 }
 
-MeshReport survey(const TriangleMesh& mesh) {
+/// All but self-intersections.
+MeshReport survey(const TriangleMesh& mesh, const EdgeTable& edges) {
   MeshReport report;
   report.vertices = mesh.vertices.size();
   report.triangles = mesh.triangles.size();
   for (const Eigen::Vector3d& v : mesh.vertices) report.bounds.extend(v);
-  for (const Triangle& t : mesh.triangles)
-    report.degenerate_triangles += is_degenerate(mesh.vertices, t) ? 1 : 0;
-  const EdgeTable edges(mesh.triangles);
+  report.degenerate_triangles = count_if(mesh.triangles.size(), [&](const std::size_t t) {
+    return is_degenerate(mesh.vertices, mesh.triangles[t]);
+  });
   report.components = count_components(mesh, edges);
   report.nonmanifold_vertices = count_nonmanifold_vertices(mesh, edges);
-  for (std::size_t e = 0; e < edges.size(); ++e) {
+  report.boundary_edges =
+      count_if(edges.size(), [&](const std::size_t e) { return edges.sides(e).size() == 1; });
+  report.nonmanifold_edges =
+      count_if(edges.size(), [&](const std::size_t e) { return edges.sides(e).size() >= 3; });
+  report.inconsistent_edges = count_if(edges.size(), [&](const std::size_t e) {
     const auto sides = edges.sides(e);
-    if (sides.size() == 1) ++report.boundary_edges;
-    if (sides.size() >= 3) ++report.nonmanifold_edges;
-    if (sides.size() == 2 && runs_up(mesh.triangles, sides[0]) == runs_up(mesh.triangles, sides[1]))
-      ++report.inconsistent_edges;
-  }
-  const auto self_intersections = count_self_intersections(mesh.vertices, mesh.triangles);
-  report.self_intersections = self_intersections.value_or(0);
-  report.self_intersections_counted = self_intersections.has_value();
+    return sides.size() == 2 &&
+           runs_up(mesh.triangles, sides[0]) == runs_up(mesh.triangles, sides[1]);
+  });
   return report;
 }
 
@@ -153,38 +180,67 @@ void note_findings(MeshReport& report) {
                            " in which sheets only touch");
 }
 
+using Pairs = std::vector<std::array<std::uint32_t, 2>>;
+
+/// Pairs by the indices that triangles have once others, which are in no pair, are dropped.
+void rename_triangles(const std::vector<std::uint32_t>& dropped, Pairs& pairs) {
+  for (auto& pair : pairs)
+    for (std::uint32_t& t : pair)
+      t -= static_cast<std::uint32_t>(std::lower_bound(dropped.begin(), dropped.end(), t) -
+                                      dropped.begin());
+}
+
+/// Triangles, their edges and what is known of how they meet, as they change on the way.
+struct Surface {
+  TriangleMesh mesh;
+  EdgeTable edges{mesh.triangles};
+  std::optional<SelfIntersections> met = {};
+
+  void triangles_changed() { edges = EdgeTable(mesh.triangles); }
+};
+
 /// Degenerate and coincident triangles (docs/design.md 3.6).
-void reduce(TriangleMesh& mesh, MeshReport& report) {
-  const std::size_t dropped = drop_degenerate(mesh.vertices, mesh.triangles);
-  if (dropped > 0) report.notes.push_back(counted(dropped, "degenerate triangle") + " dropped");
-  report.coincident_triangles = reduce_coincident(mesh.triangles);
-  if (report.coincident_triangles > 0)
-    report.notes.push_back(counted(report.coincident_triangles, "coincident triangle") +
-                           " removed as copies or cancelling pairs");
+void reduce(Surface& surface, MeshReport& report) {
+  TriangleMesh& mesh = surface.mesh;
+  if (report.degenerate_triangles > 0) {
+    const std::vector<std::uint32_t> dropped = drop_degenerate(mesh.vertices, mesh.triangles);
+    if (!dropped.empty()) {
+      report.notes.push_back(counted(dropped.size(), "degenerate triangle") + " dropped");
+      if (surface.met && surface.met->pairs) rename_triangles(dropped, *surface.met->pairs);
+      surface.triangles_changed();
+    }
+  }
+  report.coincident_triangles = reduce_coincident(mesh.triangles, surface.edges);
+  if (report.coincident_triangles == 0) return;
+  report.notes.push_back(counted(report.coincident_triangles, "coincident triangle") +
+                         " removed as copies or cancelling pairs");
+  surface.triangles_changed();
 }
 
 /// Makes the faces at every edge agree about the outside.
-void orient_faces(TriangleMesh& mesh, const std::string& name, MeshReport& report) {
+void orient_faces(Surface& surface, const std::string& name, MeshReport& report) {
+  TriangleMesh& mesh = surface.mesh;
   const auto corner = [&](const std::uint32_t side) {
     const std::uint32_t v = mesh.triangles[side / 3][side % 3];
     return "vertex " + std::to_string(v) + " " + position_text(mesh.vertices[v]);
   };
-  const EdgeTable edges(mesh.triangles);
-  if (!find_unbalanced_edge(mesh.triangles, edges)) return;
+  if (!find_unbalanced_edge(mesh.triangles, surface.edges)) return;
   report.notes.push_back("neighbouring faces disagreed about the outside: turned to agree");
-  auto conflict = make_consistent(mesh.triangles, manifold_partners(edges));
+  auto conflict = make_consistent(mesh.triangles, manifold_partners(surface.edges));
   if (!conflict) {
-    const EdgeTable turned(mesh.triangles);
-    if (!find_unbalanced_edge(mesh.triangles, turned)) return;
-    conflict = make_consistent(mesh.triangles, all_partners(mesh.vertices, mesh.triangles, turned));
-    if (!conflict) return;
+    surface.triangles_changed();
+    if (!find_unbalanced_edge(mesh.triangles, surface.edges)) return;
+    conflict =
+        make_consistent(mesh.triangles, all_partners(mesh.vertices, mesh.triangles, surface.edges));
+    if (!conflict) return surface.triangles_changed();
   }
   throw Error(name + ": not orientable, neither side of it is the outside (seen at " +
               corner(*conflict) + "). Remodel it as a closed solid");
 }
 
-void orient_outward(TriangleMesh& mesh, const std::string& name, MeshReport& report) {
-  const Shells shells = find_shells(mesh.triangles, EdgeTable(mesh.triangles));
+void orient_outward(Surface& surface, const std::string& name, MeshReport& report) {
+  TriangleMesh& mesh = surface.mesh;
+  const Shells shells = find_shells(mesh.triangles, surface.edges);
   const Nesting nesting = orient_shells(mesh.vertices, mesh.triangles, shells);
   report.shells = shells.count;
   if (nesting.volume.is_flat())
@@ -206,26 +262,36 @@ void orient_outward(TriangleMesh& mesh, const std::string& name, MeshReport& rep
 
 ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMeshPolicy policy) {
   check_indices_and_coordinates(input, name);
-  TriangleMesh mesh = weld(std::exchange(input, {}), 0);
-  refuse_unusable_size(mesh, name);
-  MeshReport report = survey(mesh);
+  weld_equal(input);
+  refuse_unusable_size(input, name);
+  Surface surface{std::move(input)};
+  TriangleMesh& mesh = surface.mesh;
+  const auto look_for_intersections = [&] {
+    surface.met = find_self_intersections(mesh.vertices, mesh.triangles);
+  };
+  MeshReport report;
+  tbb::parallel_invoke(look_for_intersections, [&] { report = survey(mesh, surface.edges); });
+  report.self_intersections = surface.met ? surface.met->count : 0;
+  report.self_intersections_counted = surface.met.has_value();
   refuse_unusable_coordinates(name, report);
   note_findings(report);
-  reduce(mesh, report);
+  reduce(surface, report);
   if (mesh.triangles.empty())
     throw Error(name + ": every face is doubled back to back: flat, it encloses no volume");
-  if (const EdgeTable edges(mesh.triangles); count_odd_edges(edges) > 0) {
-    if (policy == OpenMeshPolicy::refuse) refuse_open(mesh, edges, name);
+  if (count_odd_edges(surface.edges) > 0) {
+    if (policy == OpenMeshPolicy::refuse) refuse_open(mesh, surface.edges, name);
     mesh = repair(std::move(mesh), name, report);
+    surface.triangles_changed();
   }
-  orient_faces(mesh, name, report);
-  orient_outward(mesh, name, report);
+  orient_faces(surface, name, report);
+  orient_outward(surface, name, report);
   // Dropped degenerate triangles never counted; other changes may add or remove intersections.
-  report.meets_itself = !report.self_intersections_counted || report.self_intersections > 0;
-  if (report.repaired || report.coincident_triangles > 0)
-    report.meets_itself = count_self_intersections(mesh.vertices, mesh.triangles) != 0;
+  if (report.repaired || report.coincident_triangles > 0) look_for_intersections();
+  report.meets_itself = !surface.met || surface.met->count > 0;
   report.closed = true;
-  return {weld(mesh, 0), std::move(report), name};
+  if (mesh.triangles.size() != report.triangles || report.repaired) weld_equal(mesh);
+  return {std::move(mesh), std::move(report), name,
+          surface.met ? std::move(surface.met->pairs) : std::nullopt};
 }
 
 }  // namespace ist

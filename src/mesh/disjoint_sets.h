@@ -1,13 +1,17 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 namespace ist {
 
-/// Union–find whose representatives are the smallest members.
+/// Union–find whose representatives are the smallest members. unite() and find() may be called from
+/// many threads at once: once all have united, the representatives are what one thread would have
+/// made.
 class DisjointSets {
  public:
   explicit DisjointSets(const std::size_t size) : parent_(size) {
@@ -15,18 +19,32 @@ class DisjointSets {
   }
 
   std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    for (std::uint32_t above = parent(i).load(std::memory_order_relaxed); above != i;) {
+      const std::uint32_t next = parent(above).load(std::memory_order_relaxed);
+      // Halves the way. Parents only ever fall, and stay in the set.
+      if (next != above) parent(i).compare_exchange_weak(above, next, std::memory_order_relaxed);
+      i = above = next;
+      above = parent(i).load(std::memory_order_relaxed);
+    }
     return i;
   }
 
   void unite(std::uint32_t a, std::uint32_t b) {
-    a = find(a);
-    b = find(b);
-    if (a < b) parent_[b] = a;
-    if (b < a) parent_[a] = b;
+    for (;;) {
+      a = find(a);
+      b = find(b);
+      if (a == b) return;
+      if (a > b) std::swap(a, b);
+      std::uint32_t root = b;
+      if (parent(b).compare_exchange_strong(root, a, std::memory_order_relaxed)) return;
+    }
   }
 
  private:
+  std::atomic_ref<std::uint32_t> parent(const std::uint32_t i) {
+    return std::atomic_ref<std::uint32_t>(parent_[i]);
+  }
+
   std::vector<std::uint32_t> parent_;
 };
 

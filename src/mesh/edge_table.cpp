@@ -1,10 +1,42 @@
 #include "mesh/edge_table.h"
 
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
+#include <atomic>
 
 #include <ist/error.h>
 
 namespace ist {
+namespace {
+
+struct Entry {
+  std::uint32_t high, side;
+};
+
+std::uint32_t fetch_and_add_one(std::uint32_t& count) {
+  return std::atomic_ref<std::uint32_t>(count).fetch_add(1, std::memory_order_relaxed);
+}
+
+/// One more than the largest index; 0 where there are no triangles.
+std::uint32_t vertex_count(const std::vector<Triangle>& triangles) {
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, triangles.size()), std::uint32_t{0},
+      [&](const tbb::blocked_range<std::size_t>& range, std::uint32_t count) {
+        for (std::size_t t = range.begin(); t < range.end(); ++t)
+          count = std::max(count, *std::max_element(triangles[t].begin(), triangles[t].end()) + 1);
+        return count;
+      },
+      [](const std::uint32_t a, const std::uint32_t b) { return std::max(a, b); });
+}
+
+/// From counts to places: place[v + 1] becomes the sum of place[1] … place[v + 1].
+void sum_up(std::vector<std::uint32_t>& place) {
+  for (std::size_t v = 1; v < place.size(); ++v) place[v] += place[v - 1];
+}
+
+}  // namespace
 
 bool has_repeated_corner(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
@@ -15,44 +47,53 @@ bool runs_up(const std::vector<Triangle>& triangles, const std::uint32_t side) {
 
 EdgeTable::EdgeTable(const std::vector<Triangle>& triangles) {
   if (triangles.size() > UINT32_MAX / 3) throw Error("more than 2^32 triangle sides");
-  struct Entry {
-    std::uint32_t high, side;
-  };
-  // Buckets by the smaller vertex, each sorted by the larger one.
-  std::uint32_t vertices = 0;
-  for (const Triangle& t : triangles) vertices = std::max({vertices, t[0] + 1, t[1] + 1, t[2] + 1});
-  std::vector<std::uint32_t> begin(std::size_t{vertices} + 1, 0);
+  // Buckets by the smaller vertex, each sorted by the larger one and the side: in which order the
+  // threads fill them does not matter.
+  const std::uint32_t vertices = vertex_count(triangles);
   const auto for_each_side = [&](const auto& visit) {
-    for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t i) {
       const Triangle& t = triangles[i];
-      if (has_repeated_corner(t)) continue;
-      for (std::uint32_t k = 0; k < 3; ++k)
-        visit(3 * i + k, std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3]));
-    }
+      if (has_repeated_corner(t)) return;
+      for (std::size_t k = 0; k < 3; ++k)
+        visit(static_cast<std::uint32_t>(3 * i + k), std::min(t[k], t[(k + 1) % 3]),
+              std::max(t[k], t[(k + 1) % 3]));
+    });
   };
-  for_each_side([&](std::uint32_t, const std::uint32_t low, std::uint32_t) { ++begin[low + 1]; });
-  for (std::size_t v = 0; v < vertices; ++v) begin[v + 1] += begin[v];
+  std::vector<std::uint32_t> begin(std::size_t{vertices} + 1, 0);
+  for_each_side([&](std::uint32_t, const std::uint32_t low, std::uint32_t) {
+    fetch_and_add_one(begin[low + 1]);
+  });
+  sum_up(begin);
   std::vector<Entry> entries(begin[vertices]);
   std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
   for_each_side([&](const std::uint32_t side, const std::uint32_t low, const std::uint32_t high) {
-    entries[next[low]++] = {high, side};
+    entries[fetch_and_add_one(next[low])] = {high, side};
   });
 
-  edge_of_side_.assign(3 * triangles.size(), kNoIndex);
-  sides_.reserve(entries.size());
-  edges_.reserve(entries.size() / 2 + 1);
-  for (std::uint32_t low = 0; low < vertices; ++low) {
+  std::vector<std::uint32_t> first_edge(std::size_t{vertices} + 1, 0);
+  const auto starts_edge = [&](const std::uint32_t low, const std::uint32_t i) {
+    return i == begin[low] || entries[i].high != entries[i - 1].high;
+  };
+  tbb::parallel_for(std::uint32_t{0}, vertices, [&](const std::uint32_t low) {
     std::sort(entries.begin() + begin[low], entries.begin() + begin[low + 1],
               [](const Entry& a, const Entry& b) {
                 return a.high != b.high ? a.high < b.high : a.side < b.side;
               });
+    for (std::uint32_t i = begin[low]; i < begin[low + 1]; ++i)
+      first_edge[low + 1] += starts_edge(low, i) ? 1 : 0;
+  });
+  sum_up(first_edge);
+  edges_.resize(first_edge[vertices]);
+  sides_.resize(entries.size());
+  edge_of_side_.assign(3 * triangles.size(), kNoIndex);
+  tbb::parallel_for(std::uint32_t{0}, vertices, [&](const std::uint32_t low) {
+    std::uint32_t edge = first_edge[low];
     for (std::uint32_t i = begin[low]; i < begin[low + 1]; ++i) {
-      if (i == begin[low] || entries[i].high != entries[i - 1].high)
-        edges_.push_back({low, entries[i].high, i});
-      sides_.push_back(entries[i].side);
-      edge_of_side_[entries[i].side] = static_cast<std::uint32_t>(edges_.size() - 1);
+      if (starts_edge(low, i)) edges_[edge++] = {low, entries[i].high, i};
+      sides_[i] = entries[i].side;
+      edge_of_side_[entries[i].side] = edge - 1;
     }
-  }
+  });
 }
 
 std::span<const std::uint32_t> EdgeTable::sides(const std::size_t edge) const {

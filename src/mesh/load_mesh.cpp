@@ -75,13 +75,18 @@ TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings) 
 
 TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings) {
   refuse_other_content(file);
-  const PolygonMesh polygons = reader_of(file.path)(file);
+  PolygonMesh polygons = reader_of(file.path)(file);
   if (polygons.ends.empty()) fail(file, "no faces. There is nothing to bound a solid");
   const Eigen::AlignedBox3d bounds = finite_bounds(file, polygons);
-  const TriangleMesh mesh{polygons.vertices, triangulate(polygons)};
-  TriangleMesh welded = weld(mesh, settings.weld_tolerance * bounds.diagonal().norm());
-  welded.declared = polygons.declared;
-  return welded;
+  std::vector<std::array<std::uint32_t, 3>> triangles = triangulate(polygons);
+  TriangleMesh mesh{std::move(polygons.vertices), std::move(triangles)};
+  const double tolerance = settings.weld_tolerance * bounds.diagonal().norm();
+  if (tolerance > 0)
+    mesh = weld(mesh, tolerance);
+  else
+    weld_equal(mesh);
+  mesh.declared = polygons.declared;
+  return mesh;
 }
 
 }  // namespace ist

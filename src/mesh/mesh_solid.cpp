@@ -11,6 +11,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "mesh/bvh.h"
 #include "mesh/exact_closest_point.h"
@@ -26,6 +27,7 @@ struct MeshSolid::Impl {
   MeshView arrays;
   std::uint64_t hash = 0;
   bool meets_itself = false, may_overlap = false;
+  std::optional<std::vector<std::array<std::uint32_t, 2>>> meeting_pairs;
 
   oneapi::tbb::collaborative_once_flag hierarchy_made, moments_made;
   Bvh bvh;
@@ -55,6 +57,18 @@ struct MeshSolid::Impl {
 };
 
 namespace {
+
+/// Whether to_unit() does not round: the difference and its scaling, a power of two.
+bool is_exact(const UnitFrame& frame, const double scale, const Eigen::Vector3d& x) {
+  for (int k = 0; k < 3; ++k) {
+    const double difference = x[k] - frame.centre[k];
+    const double centre_part = difference - x[k];  // −centre, as far as it got in (Knuth's two-sum)
+    if (x[k] != difference - centre_part || centre_part != -frame.centre[k] ||
+        difference / scale * scale != difference)
+      return false;
+  }
+  return true;
+}
 
 /// Hash over the frame, the counts, the vertices and the triangles.
 std::uint64_t hash_mesh(const UnitFrame& frame, const std::vector<double>& vertices,
@@ -121,6 +135,17 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
   arrays.vertex_count = count;
   arrays.triangle_count = static_cast<std::uint32_t>(mesh.triangles.size());
   impl_->meets_itself = closed.report.meets_itself;
+  if (closed.meeting_pairs) {
+    for (const auto& pair : *closed.meeting_pairs)
+      if (pair[0] >= mesh.triangles.size() || pair[1] >= mesh.triangles.size())
+        throw Error(closed.name + ": meeting pairs name a triangle that is not there");
+    std::atomic<bool> exact{true};
+    const double scale = impl_->frame.scale();
+    tbb::parallel_for(std::size_t{0}, mesh.vertices.size(), [&](std::size_t v) {
+      if (place[v] != kUnused && !is_exact(impl_->frame, scale, mesh.vertices[v])) exact = false;
+    });
+    if (exact) impl_->meeting_pairs = closed.meeting_pairs;
+  }
   impl_->may_overlap = closed.report.meets_itself || closed.report.shells != 1;
 }
 
@@ -149,6 +174,9 @@ double MeshSolid::unit_volume() const { return impl_->with_moments().volume; }
 double MeshSolid::unit_volume_error() const { return impl_->with_moments().volume_error; }
 const MeshMoments& MeshSolid::unit_moments() const { return impl_->with_moments(); }
 bool MeshSolid::meets_itself() const { return impl_->meets_itself; }
+const std::vector<std::array<std::uint32_t, 2>>* MeshSolid::meeting_pairs() const {
+  return impl_->meeting_pairs ? &*impl_->meeting_pairs : nullptr;
+}
 bool MeshSolid::may_overlap() const { return impl_->may_overlap; }
 std::uint64_t MeshSolid::hash() const { return impl_->hash; }
 const MeshView& MeshSolid::view() const { return impl_->with_hierarchy(); }

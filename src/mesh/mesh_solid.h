@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -40,6 +41,9 @@ class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
   const MeshMoments& unit_moments() const;
   /// Triangles of the mesh intersect, or may: they were not looked for.
   bool meets_itself() const;
+  /// ClosedMesh::meeting_pairs, where they are those of the unit frame too: no coordinate was
+  /// rounded on the way there. Null where they are not known.
+  const std::vector<std::array<std::uint32_t, 2>>* meeting_pairs() const;
   bool may_overlap() const;      ///< it winds around some point twice, or may: several shells
   std::uint64_t hash() const;    ///< XXH3-64 of vertices and triangles
   const MeshView& view() const;  ///< plain arrays for host code, the hierarchy included

@@ -1,3 +1,5 @@
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <numeric>
 #include <utility>
@@ -25,12 +27,16 @@ std::vector<Shell> measure(const std::vector<Eigen::Vector3d>& vertices,
     for (const std::uint32_t v : triangles[t])
       result[shells.of_triangle[t]].box.extend(vertices[v]);
   }
+  std::vector<double> terms(triangles.size());
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
+    const Eigen::Vector3d origin = result[shells.of_triangle[t]].box.center();
+    const auto corner = [&](const std::size_t k) { return vertices[triangles[t][k]] - origin; };
+    terms[t] = corner(0).dot(corner(1).cross(corner(2))) / 6;
+  });
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     const std::uint32_t s = shells.of_triangle[t];
     Shell& shell = result[s];
-    const Eigen::Vector3d origin = shell.box.center();
-    const auto corner = [&](const std::size_t k) { return vertices[triangles[t][k]] - origin; };
-    const double term = corner(0).dot(corner(1).cross(corner(2))) / 6;
+    const double term = terms[t];
     shell.volume.volume += term;
     shell.volume.magnitude += std::abs(term);
     const std::size_t step = (sizes[s] + kProbes - 1) / kProbes;

@@ -23,7 +23,7 @@ namespace {
 
 void tidy(TriangleMesh& mesh) {
   drop_degenerate(mesh.vertices, mesh.triangles);
-  reduce_coincident(mesh.triangles);
+  reduce_coincident(mesh.triangles, EdgeTable(mesh.triangles));
 }
 
 std::size_t odd_edges(const TriangleMesh& mesh) {

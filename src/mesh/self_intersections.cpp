@@ -1,137 +1,121 @@
 #include "mesh/self_intersections.h"
 
-#include <tbb/concurrent_vector.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
-#include <cstdint>
 #include <utility>
 
-#include "mesh/surface_reduction.h"
+#include "mesh/fans.h"
+#include "mesh/triangle_boxes.h"
+#include "mesh/triangle_separation.h"
 
 namespace ist {
 namespace {
 
-using Box = Eigen::AlignedBox3d;
-
-/// The lowest 21 bits, two zeros after each.
-std::uint64_t spread(std::uint64_t x) {
-  x = (x | x << 32) & 0x001f00000000ffffu;
-  x = (x | x << 16) & 0x001f0000ff0000ffu;
-  x = (x | x << 8) & 0x100f00f00f00f00fu;
-  x = (x | x << 4) & 0x10c30c30c30c30c3u;
-  x = (x | x << 2) & 0x1249249249249249u;
-  return x;
+/// Whether the exact boxes of two triangles meet.
+bool boxes_meet(const std::vector<Eigen::Vector3d>& vertices, const Triangle& a,
+                const Triangle& b) {
+  const auto range = [&](const Triangle& t, const int k) {
+    return std::minmax({vertices[t[0]][k], vertices[t[1]][k], vertices[t[2]][k]});
+  };
+  for (const int k : {0, 1, 2}) {
+    const auto [low_a, high_a] = range(a, k);
+    const auto [low_b, high_b] = range(b, k);
+    if (low_a > high_b || low_b > high_a) return false;
+  }
+  return true;
 }
 
-/// Triangles in the order of a space-filling curve, and the boxes around each 4, 16, 64 … of them.
-class BoxPyramid {
+/// Corners with spread fans, by place; kNoIndex for others.
+std::vector<Triangle> spread_corners(const std::vector<Eigen::Vector3d>& vertices,
+                                     const std::vector<Triangle>& triangles,
+                                     const TriangleBoxes& boxes) {
+  const std::vector<std::uint8_t> spread = spread_fans(vertices, triangles);
+  std::vector<Triangle> corners(boxes.size());
+  tbb::parallel_for(std::size_t{0}, boxes.size(), [&](const std::size_t place) {
+    const Triangle& t = triangles[boxes.triangle(place)];
+    for (std::size_t k = 0; k < 3; ++k) corners[place][k] = spread[t[k]] != 0 ? t[k] : kNoIndex;
+  });
+  return corners;
+}
+
+bool share_corner(const Triangle& a, const Triangle& b) {
+  bool shared = false;
+  for (const std::uint32_t v : a)
+    shared |= ((v == b[0]) | (v == b[1]) | (v == b[2])) & (v != kNoIndex);
+  return shared;
+}
+
+constexpr std::size_t kMostTriangles = 2'000'000, kMostCandidates = 50'000'000;
+constexpr std::size_t kMostPairs = 10'000'000;
+
+/// What the parts of a search know and add to. Integers only: their sums do not depend on the
+/// order.
+struct Search {
+  const std::vector<Eigen::Vector3d>& vertices;
+  const std::vector<Triangle>& triangles;
+  const TriangleBoxes boxes{vertices, triangles};
+  const std::vector<Triangle> spread = spread_corners(vertices, triangles, boxes);
+  std::atomic<std::size_t> candidates{0}, met{0};
+};
+
+/// Looks at the candidates of one part.
+class Visitor {
  public:
-  BoxPyramid(const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles) {
-    Box bounds;
-    for (const Eigen::Vector3d& v : vertices) bounds.extend(v);
-    const double width = bounds.sizes().maxCoeff();
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
-    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-      if (is_degenerate(vertices, triangles[t])) continue;
-      std::uint64_t key = 0;
-      for (int k = 0; k < 3; ++k) {
-        constexpr double kCells = 1 << 21;
-        const double offset = (vertices[triangles[t][0]][k] - bounds.min()[k]) / width;
-        key |= spread(static_cast<std::uint64_t>(std::min(offset * kCells, kCells - 1))) << k;
-      }
-      keys.emplace_back(key, t);
-    }
-    std::sort(keys.begin(), keys.end());
-    levels_.emplace_back();
-    for (const auto& [key, t] : keys) {
-      order_.push_back(t);
-      Box box;
-      for (const std::uint32_t v : triangles[t]) box.extend(vertices[v]);
-      levels_[0].push_back(box);
-    }
-    while (levels_.back().size() > 1) {
-      std::vector<Box> above((levels_.back().size() + 3) / 4);
-      for (std::size_t i = 0; i < levels_.back().size(); ++i)
-        above[i / 4].extend(levels_.back()[i]);
-      levels_.push_back(std::move(above));
-    }
-  }
+  Visitor(Search& search, std::vector<std::array<std::uint32_t, 2>>& pairs)
+      : search_(search), pairs_(pairs) {}
+  Visitor(const Visitor&) = delete;
+  Visitor& operator=(const Visitor&) = delete;
+  ~Visitor() { search_.candidates += candidates_; }
 
-  std::size_t size() const { return order_.size(); }
-  std::uint32_t triangle(const std::size_t place) const { return order_[place]; }
+  bool done() const { return search_.candidates.load(std::memory_order_relaxed) > kMostCandidates; }
 
-  /// Calls visit(place) for every triangle after `place` in the order whose box meets its own.
-  template <class Visit>
-  void for_each_neighbour_after(const std::size_t place, const Visit& visit) const {
-    descend(levels_.size() - 1, 0, place, visit);
+  void operator()(const std::size_t i, const std::size_t j) {
+    const bool spread_out = share_corner(search_.spread[i], search_.spread[j]);
+    if (spread_out || look_at(search_.boxes.triangle(i), search_.boxes.triangle(j))) {
+      constexpr std::size_t kOften = 1024;
+      if (++candidates_ == kOften) search_.candidates += std::exchange(candidates_, 0);
+    }
   }
 
  private:
-  template <class Visit>
-  void descend(const std::size_t level, const std::size_t node, const std::size_t place,
-               const Visit& visit) const {
-    const std::size_t last = ((node + 1) << 2 * level) - 1;  // of the triangles below
-    if (last <= place || !levels_[level][node].intersects(levels_[0][place])) return;
-    if (level == 0) {
-      visit(node);
-      return;
-    }
-    const std::size_t end = std::min(4 * node + 4, levels_[level - 1].size());
-    for (std::size_t child = 4 * node; child < end; ++child)
-      descend(level - 1, child, place, visit);
+  /// Whether they are candidates.
+  bool look_at(const std::uint32_t a, const std::uint32_t b) {
+    const std::vector<Eigen::Vector3d>& vertices = search_.vertices;
+    const Triangle &of_a = search_.triangles[a], &of_b = search_.triangles[b];
+    if (!boxes_meet(vertices, of_a, of_b)) return false;
+    if (!seen_apart(vertices, of_a, of_b) && meet_elsewhere(vertices, of_a, of_b) &&
+        search_.met++ < kMostPairs)
+      pairs_.push_back({std::min(a, b), std::max(a, b)});
+    return true;
   }
 
-  std::vector<std::uint32_t> order_;
-  std::vector<std::vector<Box>> levels_;  ///< [0]: of each triangle
+  Search& search_;
+  std::vector<std::array<std::uint32_t, 2>>& pairs_;
+  std::size_t candidates_ = 0;  ///< not yet in the sum
 };
-
-/// Calls met(i, j) for pairs of triangles that meet elsewhere, from many threads. False: given up.
-template <class Met>
-bool for_each_pair(const std::vector<Eigen::Vector3d>& vertices,
-                   const std::vector<Triangle>& triangles, const Met& met) {
-  constexpr std::size_t kMostTriangles = 2'000'000, kMostPairs = 50'000'000;
-  if (triangles.size() > kMostTriangles) return false;
-  const BoxPyramid pyramid(vertices, triangles);
-  // Integers only: their sums do not depend on the order.
-  std::atomic<std::size_t> pairs{0};
-  tbb::parallel_for(std::size_t{0}, pyramid.size(), [&](const std::size_t place) {
-    if (pairs > kMostPairs) return;
-    std::size_t pairs_here = 0;
-    const std::uint32_t a = pyramid.triangle(place);
-    pyramid.for_each_neighbour_after(place, [&](const std::size_t other) {
-      ++pairs_here;
-      const std::uint32_t b = pyramid.triangle(other);
-      if (meet_elsewhere(vertices, triangles[a], triangles[b])) met(a, b);
-    });
-    pairs += pairs_here;
-  });
-  return pairs <= kMostPairs;
-}
 
 }  // namespace
 
-std::optional<std::size_t> count_self_intersections(const std::vector<Eigen::Vector3d>& vertices,
-                                                    const std::vector<Triangle>& triangles) {
-  std::atomic<std::size_t> count{0};
-  if (!for_each_pair(vertices, triangles, [&](std::uint32_t, std::uint32_t) { ++count; }))
-    return std::nullopt;
-  return count;
-}
-
-std::optional<std::vector<std::array<std::uint32_t, 2>>> find_self_intersections(
+std::optional<SelfIntersections> find_self_intersections(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles) {
-  constexpr std::size_t kMost = 10'000'000;
-  tbb::concurrent_vector<std::array<std::uint32_t, 2>> found;
-  const auto add = [&](std::uint32_t a, std::uint32_t b) {
-    if (found.size() <= kMost) found.push_back({std::min(a, b), std::max(a, b)});
-  };
-  if (!for_each_pair(vertices, triangles, add) || found.size() > kMost) return std::nullopt;
-  std::vector<std::array<std::uint32_t, 2>> pairs(found.begin(), found.end());
-  std::sort(pairs.begin(), pairs.end());
-  return pairs;
+  if (triangles.size() > kMostTriangles) return std::nullopt;
+  Search search{vertices, triangles};
+  tbb::enumerable_thread_specific<std::vector<std::array<std::uint32_t, 2>>> of_threads;
+  tbb::parallel_for(std::size_t{0}, search.boxes.parts(), [&](const std::size_t part) {
+    Visitor visitor(search, of_threads.local());
+    search.boxes.for_each_pair(part, visitor);
+  });
+  if (search.candidates > kMostCandidates) return std::nullopt;
+  SelfIntersections result{search.met, std::nullopt};
+  if (result.count > kMostPairs) return result;
+  result.pairs.emplace();
+  for (const auto& pairs : of_threads)
+    result.pairs->insert(result.pairs->end(), pairs.begin(), pairs.end());
+  std::sort(result.pairs->begin(), result.pairs->end());
+  return result;
 }
 
 }  // namespace ist

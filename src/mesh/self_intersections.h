@@ -16,16 +16,17 @@ namespace ist {
 bool meet_elsewhere(const std::vector<Eigen::Vector3d>& vertices, const Triangle& a,
                     const Triangle& b);
 
-/// Pairs of triangles that meet elsewhere than in shared corners and sides, degenerate ones left
-/// out. Nothing where counting would take too long: more than two million triangles, or a soup in
-/// which too many are close together. Runs on all cores; the answer does not depend on their
-/// number.
-std::optional<std::size_t> count_self_intersections(const std::vector<Eigen::Vector3d>& vertices,
-                                                    const std::vector<Triangle>& triangles);
+/// Pairs of triangles that meet elsewhere than in shared corners and sides.
+struct SelfIntersections {
+  std::size_t count = 0;
+  /// The smaller index first, sorted. Nothing where there are more than ten million.
+  std::optional<std::vector<std::array<std::uint32_t, 2>>> pairs;
+};
 
-/// Those pairs, the smaller index first, sorted. Nothing where there are too many or counting would
-/// take too long.
-std::optional<std::vector<std::array<std::uint32_t, 2>>> find_self_intersections(
+/// Degenerate triangles are left out. Nothing where looking would take too long: more than two
+/// million triangles, or a soup in which the boxes of more than 50 million pairs meet. Runs on the
+/// caller's TBB threads; the answer does not depend on their number.
+std::optional<SelfIntersections> find_self_intersections(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles);
 
 }  // namespace ist

@@ -1,5 +1,9 @@
 #include "mesh/shells.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -127,17 +131,23 @@ int balance(const std::vector<Triangle>& triangles, const std::span<const std::u
 
 std::optional<std::uint32_t> find_unbalanced_edge(const std::vector<Triangle>& triangles,
                                                   const EdgeTable& edges) {
-  for (std::uint32_t e = 0; e < edges.size(); ++e)
-    if (balance(triangles, edges.sides(e)) != 0) return e;
-  return std::nullopt;
+  const std::uint32_t first = tbb::parallel_reduce(
+      tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(edges.size())), kNoIndex,
+      [&](const tbb::blocked_range<std::uint32_t>& range, std::uint32_t found) {
+        for (std::uint32_t e = range.begin(); e < range.end() && found == kNoIndex; ++e)
+          if (balance(triangles, edges.sides(e)) != 0) found = e;
+        return found;
+      },
+      [](const std::uint32_t a, const std::uint32_t b) { return std::min(a, b); });
+  return first == kNoIndex ? std::nullopt : std::optional(first);
 }
 
 Shells find_shells(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
   DisjointSets pieces(triangles.size());
-  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+  tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
     const auto sides = edges.sides(e);
     if (sides.size() == 2) pieces.unite(sides[0] / 3, sides[1] / 3);
-  }
+  });
   std::vector<std::pair<std::uint32_t, int>> sums;  // piece, balance at this edge
   for (std::uint32_t e = 0; e < edges.size(); ++e) {
     const auto sides = edges.sides(e);

@@ -1,8 +1,12 @@
 #include "mesh/surface_reduction.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdlib>
+#include <functional>
 #include <utility>
 
 #include "mesh/disjoint_sets.h"
@@ -22,9 +26,13 @@ bool is_degenerate(const std::vector<Eigen::Vector3d>& vertices, const Triangle&
 }
 
 std::size_t count_odd_edges(const EdgeTable& edges) {
-  std::size_t odd = 0;
-  for (std::size_t e = 0; e < edges.size(); ++e) odd += edges.sides(e).size() % 2;
-  return odd;
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, edges.size()), std::size_t{0},
+      [&](const tbb::blocked_range<std::size_t>& range, std::size_t odd) {
+        for (std::size_t e = range.begin(); e < range.end(); ++e) odd += edges.sides(e).size() % 2;
+        return odd;
+      },
+      std::plus<>());
 }
 
 namespace {
@@ -38,33 +46,38 @@ void keep_only(std::vector<Triangle>& triangles, const std::vector<bool>& keep) 
 
 }  // namespace
 
-std::size_t drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
-                            std::vector<Triangle>& triangles) {
-  const std::size_t before = triangles.size();
-  std::erase_if(triangles, has_repeated_corner);
-  std::vector<std::uint32_t> open;
-  for (std::uint32_t t = 0; t < triangles.size(); ++t)
-    if (is_degenerate(vertices, triangles[t])) open.push_back(t);
-  if (open.empty()) return before - triangles.size();
-
-  const EdgeTable edges(triangles);
-  std::vector<std::size_t> sides(edges.size());
-  for (std::size_t e = 0; e < edges.size(); ++e) sides[e] = edges.sides(e).size();
+std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
+                                           std::vector<Triangle>& triangles) {
   std::vector<bool> keep(triangles.size(), true);
-  for (bool changed = true; changed;) {
-    changed = false;
-    for (const std::uint32_t t : open) {
-      if (!keep[t]) continue;
-      std::size_t odd = 0;
-      for (std::size_t k = 0; k < 3; ++k) odd += sides[edges.edge_of(3 * t + k)] % 2;
-      if (odd < 2) continue;
-      for (std::size_t k = 0; k < 3; ++k) --sides[edges.edge_of(3 * t + k)];
+  std::vector<std::uint32_t> open;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    if (has_repeated_corner(triangles[t]))
       keep[t] = false;
-      changed = true;
+    else if (is_degenerate(vertices, triangles[t]))
+      open.push_back(t);
+  }
+  if (!open.empty()) {
+    const EdgeTable edges(triangles);
+    std::vector<std::size_t> sides(edges.size());
+    for (std::size_t e = 0; e < edges.size(); ++e) sides[e] = edges.sides(e).size();
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (const std::uint32_t t : open) {
+        if (!keep[t]) continue;
+        std::size_t odd = 0;
+        for (std::size_t k = 0; k < 3; ++k) odd += sides[edges.edge_of(3 * std::size_t{t} + k)] % 2;
+        if (odd < 2) continue;
+        for (std::size_t k = 0; k < 3; ++k) --sides[edges.edge_of(3 * std::size_t{t} + k)];
+        keep[t] = false;
+        changed = true;
+      }
     }
   }
-  keep_only(triangles, keep);
-  return before - triangles.size();
+  std::vector<std::uint32_t> dropped;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t)
+    if (!keep[t]) dropped.push_back(t);
+  if (!dropped.empty()) keep_only(triangles, keep);
+  return dropped;
 }
 
 namespace {
@@ -84,6 +97,22 @@ bool same_direction(const Triangle& a, const Triangle& b) {
 
 std::uint32_t corner_opposite(const std::vector<Triangle>& triangles, const std::uint32_t side) {
   return triangles[side / 3][(side + 2) % 3];
+}
+
+/// False: no triangles have the same three corners.
+bool may_have_stacks(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, edges.size()), false,
+      [&](const tbb::blocked_range<std::size_t>& range, bool any) {
+        for (std::size_t e = range.begin(); e < range.end() && !any; ++e) {
+          const auto sides = edges.sides(e);
+          // Sides of a manifold edge are two; at others a stack is likely.
+          any = sides.size() > 2 || (sides.size() == 2 && corner_opposite(triangles, sides[0]) ==
+                                                              corner_opposite(triangles, sides[1]));
+        }
+        return any;
+      },
+      std::logical_or<>());
 }
 
 std::vector<Stack> find_stacks(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
@@ -115,8 +144,8 @@ std::vector<Stack> find_stacks(const std::vector<Triangle>& triangles, const Edg
 
 }  // namespace
 
-std::size_t reduce_coincident(std::vector<Triangle>& triangles) {
-  const EdgeTable edges(triangles);
+std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable& edges) {
+  if (!may_have_stacks(triangles, edges)) return 0;
   const std::vector<Stack> stacks = find_stacks(triangles, edges);
   if (stacks.empty()) return 0;
 

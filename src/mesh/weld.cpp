@@ -1,10 +1,15 @@
 #include "mesh/weld.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <vector>
+
+#include "mesh/equal_points.h"
 
 namespace ist {
 namespace {
@@ -46,22 +51,51 @@ std::uint64_t hash_of(const Cell& cell) {
   return h;
 }
 
-std::vector<bool> referenced(const TriangleMesh& mesh) {
-  std::vector<bool> used(mesh.vertices.size(), false);
-  for (const auto& triangle : mesh.triangles)
-    for (const std::uint32_t v : triangle) used[v] = true;
+/// [vertex] 1 where a triangle has it as a corner.
+std::vector<std::uint8_t> referenced(const TriangleMesh& mesh) {
+  std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](const std::size_t t) {
+    for (const std::uint32_t v : mesh.triangles[t])
+      std::atomic_ref<std::uint8_t>(used[v]).store(1, std::memory_order_relaxed);
+  });
   return used;
+}
+
+void rename_corners(TriangleMesh& mesh, const std::vector<std::uint32_t>& names) {
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](const std::size_t t) {
+    for (std::uint32_t& v : mesh.triangles[t]) v = names[v];
+  });
 }
 
 }  // namespace
 
 TriangleMesh weld(const TriangleMesh& mesh, const double tolerance) {
-  return weld_among(mesh, tolerance, std::vector<bool>(mesh.vertices.size(), true));
+  if (tolerance > 0)
+    return weld_among(mesh, tolerance, std::vector<bool>(mesh.vertices.size(), true));
+  TriangleMesh welded = mesh;
+  weld_equal(welded);
+  return welded;
+}
+
+void weld_equal(TriangleMesh& mesh) {
+  mesh.declared = {};
+  const std::vector<std::uint8_t> used = referenced(mesh);
+  std::vector<std::uint32_t> name = first_equal(mesh.vertices, used);
+  std::uint32_t kept = 0;
+  for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (used[v] == 0) continue;
+    const bool is_first = name[v] == v;
+    if (is_first) mesh.vertices[kept] = mesh.vertices[v] + Eigen::Vector3d::Zero();
+    name[v] = is_first ? kept++ : name[name[v]];  // the first's is known by now
+  }
+  const bool renamed = kept < mesh.vertices.size();
+  mesh.vertices.resize(kept);
+  if (renamed) rename_corners(mesh, name);
 }
 
 TriangleMesh weld_among(const TriangleMesh& mesh, const double tolerance,
                         const std::vector<bool>& among) {
-  const std::vector<bool> used = referenced(mesh);
+  const std::vector<std::uint8_t> used = referenced(mesh);
   TriangleMesh result;
   std::vector<std::uint32_t> kept_as(mesh.vertices.size(), kNone);
   CellTable table(mesh.vertices.size());
@@ -73,7 +107,7 @@ TriangleMesh weld_among(const TriangleMesh& mesh, const double tolerance,
   };
   const int reach = tolerance > 0 ? 1 : 0;
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    if (!used[i]) continue;
+    if (used[i] == 0) continue;
     const Eigen::Vector3d& p = mesh.vertices[i];
     std::uint32_t first = kNone;
     if (among[i]) {

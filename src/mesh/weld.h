@@ -11,6 +11,9 @@ namespace ist {
 /// order. Every referenced coordinate must be finite.
 TriangleMesh weld(const TriangleMesh& mesh, double tolerance);
 
+/// The same with tolerance 0, in place.
+void weld_equal(TriangleMesh& mesh);
+
 /// The same, but vertices that are not in `among` (by index) stay apart.
 TriangleMesh weld_among(const TriangleMesh& mesh, double tolerance, const std::vector<bool>& among);
 

@@ -9,6 +9,9 @@
 #include <ist/wrench.h>
 
 #include <bit>
+#include <cstring>
+#include <span>
+#include <vector>
 
 #include "c_api/checks.h"
 #include "support/oracle_assets.h"
@@ -80,6 +83,17 @@ void expect_same(const ist_separation_t& c, const Separation& cpp) {
   EXPECT_EQ(c.sphere_pairs, cpp.sphere_pairs);
 }
 
+void expect_same(const ist_contact_patch_t& c, const ContactPatch& cpp) {
+  EXPECT_EQ(c.id, cpp.id);
+  expect_same(c.centroid, cpp.centroid);
+  expect_same(c.normal, cpp.normal);
+  EXPECT_SAME(c.area, cpp.area);
+  EXPECT_SAME(c.depth, cpp.depth);
+  EXPECT_SAME(c.volume, cpp.volume);
+  expect_same(c.force, cpp.force);
+  expect_same(c.torque, cpp.torque);
+}
+
 class OracleRows : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -142,16 +156,10 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
               0);
     expect_same(c_penetration, found.penetration);
     ASSERT_EQ(c_patches.count, found.count);
-    for (std::size_t i = 0; i < found.count; ++i) {
-      EXPECT_EQ(c_room[i].id, patches[i].id);
-      expect_same(c_room[i].centroid, patches[i].centroid);
-      expect_same(c_room[i].normal, patches[i].normal);
-      EXPECT_SAME(c_room[i].area, patches[i].area);
-      EXPECT_SAME(c_room[i].depth, patches[i].depth);
-      EXPECT_SAME(c_room[i].volume, patches[i].volume);
-      expect_same(c_room[i].force, patches[i].force);
-      expect_same(c_room[i].torque, patches[i].torque);
-    }
+    for (std::size_t i = 0; i < found.count; ++i) expect_same(c_room[i], patches[i]);
+    without_protrusion({patches, found.count}, a, b, {});
+    ASSERT_EQ(ist_patches_without_protrusion(&c_a, &c_b, nullptr, &c_patches), IST_OK);
+    for (std::size_t i = 0; i < found.count; ++i) expect_same(c_room[i], patches[i]);
 
     const Eigen::Vector3d point(0.1, 0.2, 0.3);
     auto c_wrenches = sized<ist_wrenches_t>();
@@ -205,6 +213,53 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
     ++answered;
   }
   EXPECT_GT(answered, 20);
+}
+
+/// A floor on which a cube's spheres stand: flat faces that hardly touch lose most, from C too.
+TEST(CApi, PatchesWithoutProtrusion) {
+  const Asset cube = bake(close_mesh(testing::cube_mesh(), "cube"), {.max_spheres = 500});
+  const ist_tree_t tree = viewed(cube);
+  const PlacedTree a{cube.view(), {}, 1}, b{cube.view(), {{1, 0, 0, 0}, {0.02, 0.01, 0.999}}, 1};
+  const ist_placed_tree_t c_a = placed_in_c(tree, a), c_b = placed_in_c(tree, b);
+  Workspace workspace;
+  ContactPatch patches[16];
+  const ContactSettings settings{.field = FieldUse::never};
+  const std::size_t count = contact_patches(a, b, settings, workspace, patches).count;
+  double before = 0, after = 0;
+  std::vector<ist_contact_patch_t> c_room(count);
+  std::memcpy(c_room.data(), patches, count * sizeof c_room[0]);
+  for (const ContactPatch& patch : std::span(patches, count)) before += patch.volume;
+  without_protrusion({patches, count}, a, b, settings);
+  for (const ContactPatch& patch : std::span(patches, count)) after += patch.volume;
+  EXPECT_GT(before, 0);
+  EXPECT_LT(after, 0.9 * before);
+  ist_contact_patches_t c_patches = {sizeof c_patches, sizeof c_room[0], c_room.data(), count,
+                                     count};
+  auto c_settings = sized<ist_contact_settings_t>();
+  c_settings.field = IST_FIELD_NEVER;
+  ASSERT_EQ(ist_patches_without_protrusion(&c_a, &c_b, &c_settings, &c_patches), IST_OK);
+  for (std::size_t i = 0; i < count; ++i) expect_same(c_room[i], patches[i]);
+}
+
+TEST(CApi, PredictedErrors) {
+  const TargetedAsset baked = bake_to_error(close_mesh(testing::cube_mesh(), "cube"), {0.2, 0.01});
+  const PredictedErrors cpp = baked.asset.view().predicted_errors();
+  const ist_tree_t tree = viewed(baked.asset);
+  auto c = sized<ist_predicted_errors_t>();
+  ASSERT_EQ(ist_tree_get_predicted_errors(&tree, &c), IST_OK);
+  EXPECT_GT(c.poses, 0u);
+  EXPECT_EQ(c.poses, cpp.poses);
+  for (std::size_t i = 0; i < cpp.classes.size(); ++i) {
+    EXPECT_SAME(c.classes[i].from, cpp.classes[i].from);
+    EXPECT_SAME(c.classes[i].to, cpp.classes[i].to);
+    EXPECT_SAME(c.classes[i].median, cpp.classes[i].median);
+  }
+  EXPECT_SAME(c.target_error, cpp.target_error);
+  EXPECT_SAME(c.target_overlap, cpp.target_overlap);
+  EXPECT_SAME(c.measured_error, cpp.measured_error);
+  EXPECT_EQ(c.measured_poses, cpp.measured_poses);
+  EXPECT_EQ(c.worst_partner, static_cast<int>(cpp.worst_partner));
+  EXPECT_EQ(c.target_met, cpp.target_met() ? 1u : 0u);
 }
 
 // A caller's memory serves the C++ workspace too, and no answer depends on it.

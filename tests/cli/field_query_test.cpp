@@ -138,6 +138,15 @@ TEST_F(FieldQuery, WrongDescriptionsAreUsageErrors) {
   expect_exit(1, {"sphere:1", "cube.ist", "--pose", kAtOrigin}, "sphere:1");
 }
 
+TEST_F(FieldQuery, OnlyTheFirstMayBeAField) {
+  for (const char* const a : {"cube.ist", "ball:1"})
+    expect_exit(2, {a, "plane:0,0,1,0", "--pose", kAtOrigin},
+                "B: 'plane:0,0,1,0' is a field, and only A can be one: name it first");
+  write("ball:1", read("cube.ist"));
+  EXPECT_EQ(asked("cube.ist", "./ball:1", "1,0,0,0,0.5,0,0")["volume"],
+            asked("cube.ist", "cube.ist", "1,0,0,0,0.5,0,0")["volume"]);
+}
+
 TEST_F(FieldQuery, SettingsThatHaveNoEffectAreRefused) {
   const auto refused = [&](const std::string& a, std::vector<std::string> more,
                            const std::string& message) {

@@ -66,6 +66,43 @@ TEST_F(JsonSchema, InfoAndBake) {
   EXPECT_EQ(bake, expected);
 }
 
+TEST_F(JsonSchema, LibraryAndCache) {
+  Paths library, summary, cache;
+  write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n");
+  write("library.toml",
+        "[[asset]]\nmesh = 'open.obj'\nspheres = 9\nrepair = true\n"
+        "[[asset]]\nmesh = 'cube.obj'\nspheres = 9\n");
+  const std::vector<std::string> bake = {"bake", "--manifest", "library.toml", "-o",
+                                         "out",  "--cache",    "cache",        "--json"};
+  add(bake, library);
+  EXPECT_EQ(library, documented("A library"));
+  write("summary.json", ist(bake).out);
+  add({"summary", "summary.json", "--json"}, summary);
+  EXPECT_EQ(summary, library);
+  add({"cache", "cache", "--json"}, cache);
+  EXPECT_EQ(cache, documented("`ist cache --json`"));
+}
+
+TEST_F(JsonSchema, Robots) {
+  write("r.urdf",
+        "<robot name='r'><link name='NAME'>"
+        "<collision><geometry><mesh filename='cube.obj'/></geometry></collision>"
+        "<collision><geometry><sphere radius='1'/></geometry></collision></link></robot>");
+  Paths report, file, bake;
+  add({"spheres", "r.urdf", "-o", "s.json", "--count", "8", "--json"}, report);
+  Paths expected = documented("`ist spheres --json`");
+  EXPECT_EQ(report, expected);
+  add_paths(nlohmann::json::parse(read("s.json")), "", file);
+  for (const char* field : {"output", "input", "seconds", "links.NAME.seconds"})
+    expected.erase(field);
+  EXPECT_EQ(file, expected);
+  add({"bake", "r.urdf", "-o", "out", "--spheres", "9", "--json"}, bake);
+  // The first shape is a mesh, the second a sphere.
+  for (const auto& shape : nlohmann::json::parse(read("out/r.json"))["links"]["NAME"])
+    for (const auto& [key, value] : shape.items()) bake.insert("links.NAME[]." + key);
+  EXPECT_EQ(bake, documented("`ist bake ROBOT.urdf --json`"));
+}
+
 TEST_F(JsonSchema, CheckQueryAndExport) {
   Paths check, query, exported;
   add({"check", "cube.ist", "--mesh", "cube.obj", "--json"}, check);

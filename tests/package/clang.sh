@@ -13,8 +13,8 @@ export PKG_CONFIG_PATH="$installed/lib/pkgconfig"
 libdir=$(pkg-config --variable=libdir ist-query)
 readelf -p .comment "$libdir/libist_query.so" | grep -q GCC ||
   echo "note: the library itself is not of g++"
-clang-14 -std=c11 -Wall -Wextra -pedantic -Werror "$source/tests/c_api/checks.c" \
-  "$source/tests/c_api/main.c" $(pkg-config --cflags --libs ist-query) "-Wl,-rpath,$libdir" -lm \
+clang-14 -std=c11 -Wall -Wextra -pedantic -Werror "$source"/tests/c_api/*.c \
+  $(pkg-config --cflags --libs ist-query) "-Wl,-rpath,$libdir" -lm \
   -o "$work/checks"
 "$work/checks" "$a" "$b"
 "$work/checks" "$b" "$a"

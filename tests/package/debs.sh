@@ -89,6 +89,13 @@ cp "$a" "$root/tmp/a.ist"
 cp "$b" "$root/tmp/b.ist"
 in_root() { chroot "$root" "$@"; }
 in_root /usr/bin/ist --version
+for file in man/man1/ist.1 man/man1/ist-bake.1 bash-completion/completions/ist \
+  zsh/vendor-completions/_ist fish/vendor_completions.d/ist.fish; do
+  [ -s "$root/usr/share/$file" ] || [ -s "$root/usr/share/$file.gz" ] || {
+    echo "no $file" >&2
+    exit 1
+  }
+done
 in_root /usr/bin/ist sample cube -o /tmp/cube.obj
 in_root /usr/bin/ist bake /tmp/cube.obj -o /tmp/cube.ist --spheres 100 --device cpu --quiet
 in_root /usr/bin/ist query /tmp/cube.ist /tmp/a.ist --pose 1,0,0,0,0.1,0,0

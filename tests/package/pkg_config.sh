@@ -11,7 +11,7 @@ trap 'rm -rf "$work"' EXIT
 use() { export PKG_CONFIG_PATH="$1/lib/pkgconfig:$1/lib/$(cc -dumpmachine)/pkgconfig"; }
 
 use "$whole"
-version=$(sed -n 's/^project.*//; s/^#define IST_VERSION_[A-Z]* \([0-9]*\)$/\1/p' \
+version=$(sed -n 's/^#define IST_VERSION_[A-Z]* \([0-9]*\)$/\1/p' \
   "$source/include/ist/version.h" | paste -sd.)
 [ "$(pkg-config --modversion ist-query)" = "$version" ]
 [ "$(pkg-config --modversion ist)" = "$version" ]

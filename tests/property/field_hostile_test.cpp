@@ -152,16 +152,7 @@ TEST(FieldHostile, TablesOfNoNumbers) {
     for (const bool all : {true, false}) {
       std::vector<float> values(125, all ? value : 0.1f);
       values[62] = values[12] = value;
-      DistanceGridField grid;
-      grid.distances = values.data();
-      for (std::uint32_t& n : grid.size) n = 5;
-      grid.origin = Vector3d::Constant(-1);
-      grid.spacing = 0.5;
-      HeightField terrain;
-      terrain.heights = values.data();
-      terrain.columns = terrain.rows = 5;
-      terrain.spacing[0] = terrain.spacing[1] = 0.25;
-      for (const Field& field : {Field(grid), Field(terrain)}) {
+      for (const Field& field : {Field(grid_of(values, 5)), Field(terrain_of(values, 5))}) {
         const PlacedField a{field, {}, 1};
         for (const double z : {0.0, 0.5, -3.0}) {
           const PlacedTree b{cube().view(), pose_of(Quaterniond::Identity(), {0.1, 0.2, z}), 0.5};

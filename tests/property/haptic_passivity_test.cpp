@@ -1,18 +1,14 @@
 #include <gtest/gtest.h>
-#include <ist/bake.h>
 
 #include "haptic_loop/proxy.h"
 #include "samples/samples.h"
+#include "support/baked.h"
 
 // A hand that is held to a proxy by a virtual coupling, examples/haptic_loop: over any way it gets
 // no more than it put in, unless the coupling is too stiff for the rate.
 
 namespace ist {
 namespace {
-
-Asset bake_sample(const char* name) {
-  return bake(close_mesh(make_sample(name), name), {.max_spheres = 500});
-}
 
 class HapticPassivity : public ::testing::Test {
  protected:
@@ -39,7 +35,8 @@ class HapticPassivity : public ::testing::Test {
     return passivity;
   }
 
-  const Asset cube_ = bake_sample("cube"), capsule_ = bake_sample("capsule");
+  const Asset cube_ = testing::baked(make_sample("cube"), "cube", 500);
+  const Asset capsule_ = testing::baked(make_sample("capsule"), "capsule", 500);
   Workspace workspace_;
   int touched_ = 0;
 };

@@ -12,6 +12,7 @@
 #include "query/probe/cap.h"
 #include "query/probe/patch_sums.h"
 #include "support/test_meshes.h"
+#include "support/turns.h"
 
 // Balls against closed surfaces of triangles: against an integral over slices that shares no
 // formula with them, and against what must be so.
@@ -20,6 +21,7 @@ namespace ist {
 namespace {
 
 using Eigen::Vector3d;
+using testing::random_turn;
 
 struct Ball {
   Vector3d centre = Vector3d::Zero();
@@ -188,12 +190,6 @@ TriangleMesh tetrahedron(const Vector3d& a, const Vector3d& b, const Vector3d& c
 TriangleMesh turned(TriangleMesh mesh, const Eigen::Quaterniond& q, const Vector3d& shift) {
   for (Vector3d& v : mesh.vertices) v = q * v + shift;
   return mesh;
-}
-
-Eigen::Quaterniond random_turn(std::mt19937_64& random) {
-  std::normal_distribution<double> normal;
-  const double w = normal(random), x = normal(random), y = normal(random), z = normal(random);
-  return Eigen::Quaterniond(w, x, y, z).normalized();
 }
 
 Vector3d in_box(std::mt19937_64& random, const Vector3d& half) {

@@ -1,7 +1,13 @@
 #include <gtest/gtest.h>
 #include <ist/query.h>
 
+#include <numbers>
+
+#include "query/asset/sphere_tree.h"
+#include "query/base/relative_pose.h"
 #include "query/detail/detail_chain.h"
+#include "query/kernel/lens.h"
+#include "query/kernel/look_kernel.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
 
@@ -51,6 +57,40 @@ class QueryDetails : public ::testing::Test {
     return std::pow(std::ldexp(a.scale, a.tree.header().exponent), 3);
   }
 
+  /// The coarsest trees of both.
+  static std::array<SphereTree, 2> coarsest(const PlacedTree& a, const PlacedTree& b) {
+    const DetailPair pair = chain_of(a, b).coarsest();
+    return {SphereTree(a.tree.header(), matched_tree(a.tree.header(), pair.a)),
+            SphereTree(b.tree.header(), matched_tree(b.tree.header(), pair.b))};
+  }
+
+  /// What a quick look sees, summed in double.
+  static QuickLook look(const PlacedTree& a, const PlacedTree& b) {
+    const auto [tree_a, tree_b] = coarsest(a, b);
+    const Similarity map = relative_pose(a, b)->a_from_b;
+    const auto fill = [](const NodeBall& ball, double volume) {
+      return volume / (4 * std::numbers::pi / 3 * std::pow(ball.r, 3));
+    };
+    QuickLook sum;
+    for (std::uint32_t j = 0; j < tree_b.count(0); ++j) {
+      const NodeBall of_b = tree_b.ball(0, j);
+      double centre[3];
+      map.apply(of_b.centre, centre);
+      for (std::uint32_t k = 0; k < tree_a.count(0); ++k) {
+        const NodeBall of_a = tree_a.ball(0, k);
+        const Vector3d way = Vector3d(centre) - Vector3d(of_a.centre);
+        const Lens<double> both = lens(of_a.r, of_b.r * map.scale, way.norm());
+        const double filled =
+            fill(of_a, tree_a.sums(0, k).volume) * fill(of_b, tree_b.sums(0, j).volume);
+        const Vector3d push = filled * both.derivative() * way.normalized();
+        sum.volume += filled * both.volume();
+        sum.slope.by_translation += push;
+        sum.slope.by_rotation += (Vector3d(centre) - Vector3d(map.t)).cross(push);
+      }
+    }
+    return sum;
+  }
+
   /// The blended sum over all pairs of spheres in double.
   static double reference(const PlacedTree& a, const PlacedTree& b, std::uint32_t budget) {
     const DetailChain chain = chain_of(a, b);
@@ -58,10 +98,36 @@ class QueryDetails : public ::testing::Test {
       return reference_sum(a, b, Measure::matched, pair.a, pair.b).volume;
     };
     const auto weights = chain.weights(sum(chain.coarsest()) / unit3(a), budget);
+    const double sure = chain.quick_weight(look(a, b).volume, budget).weight;
     double volume = 0;
-    for (std::size_t i = 0; i < chain.size(); ++i)
-      if (weights[i].weight > 0) volume += weights[i].weight * sum(chain[i]);
+    for (std::size_t i = 0; i < chain.size(); ++i) {
+      const double weight = (i == 0 ? sure : 0) + (1 - sure) * weights[i].weight;
+      if (weight > 0) volume += weight * sum(chain[i]);
+    }
     return volume;
+  }
+
+  /// Volume, bounds and gradients against the reference and its differences.
+  void expect_reference(const PlacedTree& a, const PlacedTree& b, std::uint32_t budget) {
+    const double h = 1e-5;
+    const Penetration answer = ask(a, b, budget);
+    const double sum = reference(a, b, budget);
+    ASSERT_EQ(answer.status, QueryStatus::ok);
+    EXPECT_NEAR(answer.volume, sum, 1e-5 * sum);
+    EXPECT_LE(answer.volume_min, sum * (1 + 1e-12));
+    EXPECT_GE(answer.volume_max, sum * (1 - 1e-12));
+    Vector3d force, torque;
+    for (int k = 0; k < 3; ++k) {
+      const Vector3d step = h * Vector3d::Unit(k);
+      const auto at = [&](const Vector3d& shift, const Vector3d& turn) {
+        return reference(a, {b.tree, moved(b.pose, shift, turn), b.scale}, budget);
+      };
+      force[k] = (at(step, {0, 0, 0}) - at(-step, {0, 0, 0})) / (2 * h);
+      torque[k] = (at({0, 0, 0}, step) - at({0, 0, 0}, -step)) / (2 * h);
+    }
+    const double scale = reference_sum(a, b, Measure::matched).force_scale;
+    EXPECT_LE((answer.translation_gradient - force).norm(), 1e-4 * scale);
+    EXPECT_LE((answer.rotation_gradient - torque).norm(), 1e-4 * 3 * scale);
   }
 };
 
@@ -123,7 +189,6 @@ std::uint32_t sharing_budget(const DetailChain& chain, double coarse, std::uint3
 }
 
 TEST_F(QueryDetails, AnswerTheBlendedSumAndItsGradient) {
-  const double h = 1e-5;
   int blended = 0;
   for (int i = 0; i < 24; ++i) {
     const PlacedTree a = placed_a(), b = placed_b(0.13 * i);
@@ -133,26 +198,46 @@ TEST_F(QueryDetails, AnswerTheBlendedSumAndItsGradient) {
     const std::uint32_t budget = sharing_budget(chain, coarse / unit3(a), 10u << (2 * (i % 6)));
     if (budget == 0) continue;
     ++blended;
-    const Penetration answer = ask(a, b, budget);
-    const double sum = reference(a, b, budget);
-    ASSERT_EQ(answer.status, QueryStatus::ok);
-    EXPECT_NEAR(answer.volume, sum, 1e-5 * sum);
-    EXPECT_LE(answer.volume_min, sum * (1 + 1e-12));
-    EXPECT_GE(answer.volume_max, sum * (1 - 1e-12));
-    Vector3d force, torque;
-    for (int k = 0; k < 3; ++k) {
-      const Vector3d step = h * Vector3d::Unit(k);
-      const auto at = [&](const Vector3d& shift, const Vector3d& turn) {
-        return reference(a, {b.tree, moved(b.pose, shift, turn), b.scale}, budget);
-      };
-      force[k] = (at(step, {0, 0, 0}) - at(-step, {0, 0, 0})) / (2 * h);
-      torque[k] = (at({0, 0, 0}, step) - at({0, 0, 0}, -step)) / (2 * h);
-    }
-    const double scale = reference_sum(a, b, Measure::matched).force_scale;
-    EXPECT_LE((answer.translation_gradient - force).norm(), 1e-4 * scale) << i;
-    EXPECT_LE((answer.rotation_gradient - torque).norm(), 1e-4 * 3 * scale) << i;
+    SCOPED_TRACE(i);
+    expect_reference(a, b, budget);
   }
   EXPECT_GE(blended, 12) << "the poses blend nothing";
+}
+
+// Where a quick look makes half sure of the finest level, and the coarse estimate of none.
+TEST_F(QueryDetails, AnswerWhatAQuickLookBlendsAndItsGradient) {
+  int blended = 0;
+  for (int i = 0; i < 150 && blended < 12; ++i) {
+    const PlacedTree a = placed_a(), b = placed_b(0.02 * i);
+    const DetailChain chain = chain_of(a, b);
+    const double coarse =
+        reference_sum(a, b, Measure::matched, chain.coarsest().a, chain.coarsest().b).volume;
+    const double volume = look(a, b).volume;
+    for (std::uint32_t budget = 10; budget < 10'000'000; budget += 1 + budget / 16) {
+      const double sure = chain.quick_weight(volume, budget).weight;
+      if (sure < 0.2 || sure > 0.8) continue;
+      if (chain.weights(coarse / unit3(a), budget)[0].weight > 0.9) continue;
+      ++blended;
+      SCOPED_TRACE(i);
+      expect_reference(a, b, budget);
+      break;
+    }
+  }
+  EXPECT_GE(blended, 12) << "the poses blend nothing";
+}
+
+TEST_F(QueryDetails, AQuickLookIsEvenlyFilledBallsAndHasTheirSlope) {
+  for (int i = 0; i < 40; ++i) {
+    const PlacedTree a = placed_a(), b = placed_b(0.1 * i, i % 2 == 0 ? 1.6 : 0.05);
+    const auto [tree_a, tree_b] = coarsest(a, b);
+    const Similarity map = relative_pose(a, b)->a_from_b;
+    const QuickLook sum = look(a, b), seen = quick_look(tree_a, tree_b, map, true);
+    const double force = sum.slope.by_translation.norm();
+    EXPECT_EQ(seen.volume, quick_look(tree_a, tree_b, map, false).volume);
+    EXPECT_NEAR(seen.volume, sum.volume, 1e-5 * sum.volume);
+    EXPECT_LE((seen.slope.by_translation - sum.slope.by_translation).norm(), 1e-4 * force) << i;
+    EXPECT_LE((seen.slope.by_rotation - sum.slope.by_rotation).norm(), 1e-4 * force) << i;
+  }
 }
 
 // Half the step, half the largest change: a jump would not shrink.

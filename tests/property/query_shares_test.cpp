@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <ist/bake.h>
 #include <ist/query.h>
 
 #include <memory>
@@ -8,6 +7,7 @@
 #include "query/descent/descent.h"
 #include "query/descent/shares.h"
 #include "samples/samples.h"
+#include "support/baked.h"
 #include "support/nut_on_bolt.h"
 #include "support/sanitizers.h"
 
@@ -19,15 +19,11 @@ namespace {
 
 using Eigen::Vector3d;
 
-Asset bake_sample(const char* name) {
-  return bake(close_mesh(make_sample(name), name), {.max_spheres = 4000});
-}
-
 class QueryShares : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    bolt_ = std::make_unique<Asset>(bake_sample("bolt"));
-    nut_ = std::make_unique<Asset>(bake_sample("nut"));
+    bolt_ = std::make_unique<Asset>(testing::baked(make_sample("bolt"), "bolt", 4000));
+    nut_ = std::make_unique<Asset>(testing::baked(make_sample("nut"), "nut", 4000));
   }
   static void TearDownTestSuite() {
     bolt_.reset();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "support/random_assets.h"
+#include "support/surface_queries.h"
 #include "support/test_meshes.h"
 
 // The laws of response.h: what they give back is never more than what they took.
@@ -20,25 +21,10 @@ namespace {
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-
-Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres) {
-  PackingSettings settings;
-  settings.max_spheres = spheres;
-  return bake(close_mesh(std::move(mesh), name), settings);
-}
-
-const Asset& cube() {
-  static const Asset asset = baked(testing::cube_mesh(), "cube", 1000);
-  return asset;
-}
-const Asset& torus() {
-  static const Asset asset = baked(testing::torus_mesh(0.35, 0.14, 40, 20), "torus", 800);
-  return asset;
-}
-
-Pose pose_of(const Quaterniond& q, const Vector3d& t) {
-  return {{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}};
-}
+using testing::baked;
+using testing::cube;
+using testing::pose_of;
+using testing::torus;
 
 /// A flat patch under B, pressed `depth` deep.
 ContactPatch flat_patch(double area, double depth) {

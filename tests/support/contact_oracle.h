@@ -35,6 +35,7 @@
 #include "support/bullet_mesh.h"
 #include "support/fcl_mesh.h"
 #include "support/oracle_rows.h"
+#include "support/turns.h"
 
 namespace ist::testing {
 
@@ -128,10 +129,6 @@ struct ContactVerdict {
   double interval_width = 0;  ///< [u] of the certified distances
   double held_share = 0;      ///< of a held solid: matched overlap / its volume
 };
-
-inline double degrees_between(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
-  return std::atan2(u.cross(v).norm(), u.dot(v)) * 180 / std::numbers::pi;
-}
 
 /// Angles to the exit direction [degrees].
 struct ForceAngles {

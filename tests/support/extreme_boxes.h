@@ -15,6 +15,7 @@
 #include "support/extremes.h"
 #include "support/reference_sum.h"
 #include "support/test_meshes.h"
+#include "support/turns.h"
 
 // What the extremes measure with.
 
@@ -41,12 +42,6 @@ class Worst {
 inline double quantile(std::vector<double> values, double share) {
   std::sort(values.begin(), values.end());
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-}
-
-inline Eigen::Quaterniond random_turn(std::mt19937_64& random) {
-  std::normal_distribution<double> normal;
-  const double w = normal(random), x = normal(random), y = normal(random), z = normal(random);
-  return Eigen::Quaterniond(w, x, y, z).normalized();
 }
 
 inline Asset baked(const ClosedMesh& mesh, std::size_t spheres = kExtremeSpheres) {

@@ -11,6 +11,7 @@
 #include <ist/field.h>
 #include <ist/query.h>
 
+#include "support/baked.h"
 #include "support/random_assets.h"
 #include "support/test_meshes.h"
 
@@ -21,12 +22,6 @@ namespace ist::testing {
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-
-inline Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres) {
-  PackingSettings settings;
-  settings.max_spheres = spheres;
-  return bake(close_mesh(std::move(mesh), name), settings);
-}
 
 inline const Asset& cube() {
   static const Asset asset = baked(cube_mesh(), "cube", 1000);
@@ -99,6 +94,16 @@ inline Vector3d random_direction(std::mt19937_64& random) {
   return position(pose);
 }
 
+/// Terrain of `points` heights a side, a quarter apart.
+inline HeightField terrain_of(const std::vector<float>& heights, std::uint32_t points) {
+  return {heights.data(), points, points, {0.25, 0.25}};
+}
+
+/// A grid of `points` distances a side, from −1 to 1.
+inline DistanceGridField grid_of(const std::vector<float>& distances, std::uint32_t points) {
+  return {distances.data(), {points, points, points}, Vector3d::Constant(-1), 2.0 / (points - 1)};
+}
+
 inline std::vector<std::pair<const char*, Field>> fields() {
   static const std::vector<float> heights = [] {
     std::vector<float> h;
@@ -116,16 +121,8 @@ inline std::vector<std::pair<const char*, Field>> fields() {
               static_cast<float>(0.5 - 0.1 * Vector3d(i - 10.0, j - 10.0, k - 10.0).norm()));
     return d;
   }();
-  HeightField terrain;
-  terrain.heights = heights.data();
-  terrain.columns = terrain.rows = 9;
-  terrain.spacing[0] = terrain.spacing[1] = 0.25;
+  HeightField terrain = terrain_of(heights, 9);
   terrain.lowest = -0.11, terrain.highest = 0.11;
-  DistanceGridField grid;
-  grid.distances = distances.data();
-  for (std::uint32_t& n : grid.size) n = 21;
-  grid.origin = Vector3d::Constant(-1);
-  grid.spacing = 0.1;
   FunctionField function;
   function.look = [](const void*, const Vector3d& x) noexcept {
     const double d = x.norm();
@@ -138,7 +135,7 @@ inline std::vector<std::pair<const char*, Field>> fields() {
           {"capsule", CapsuleField{0.3, 0.4}},
           {"cylinder", CylinderField{0.4, 0.3}},
           {"terrain", terrain},
-          {"grid", grid},
+          {"grid", grid_of(distances, 21)},
           {"function", function},
           {"mesh", MeshField{torus().view()}}};
 }

@@ -9,7 +9,6 @@
 #include <ist/mesh.h>
 
 #include "mesh/edge_table.h"
-#include "mesh/self_intersections.h"
 #include "mesh/shells.h"
 #include "mesh/weld.h"
 #include "support/test_meshes.h"
@@ -148,51 +147,6 @@ TEST(Weld, FirstVertexWinsWithinTheTolerance) {
   EXPECT_EQ(welded.triangles,
             (std::vector<std::array<std::uint32_t, 3>>{{0, 2, 3}, {0, 2, 3}, {1, 2, 3}}));
   EXPECT_EQ(weld(mesh, 0).vertices.size(), 5u);
-}
-
-TEST(SelfIntersections, PyramidFindsWhatAllPairsFind) {
-  std::mt19937_64 random(5);
-  const auto coordinate = [&] { return static_cast<double>(random() % 9); };  // many touch exactly
-  for (int round = 0; round < 20; ++round) {
-    TriangleMesh soup;
-    for (int v = 0; v < 60; ++v)
-      soup.vertices.emplace_back(coordinate(), coordinate(), coordinate());
-    for (int t = 0; t < 80; ++t) {
-      const auto corner = [&] { return static_cast<std::uint32_t>(random() % 60); };
-      soup.triangles.push_back({corner(), corner(), corner()});
-    }
-    soup = weld(soup, 0);
-    std::erase_if(soup.triangles, [&](const Triangle& t) {
-      const Eigen::Vector3d n = (soup.vertices[t[1]] - soup.vertices[t[0]])
-                                    .cross(soup.vertices[t[2]] - soup.vertices[t[0]]);
-      return n.squaredNorm() == 0;
-    });
-    std::size_t pairs = 0;
-    for (std::size_t i = 0; i < soup.triangles.size(); ++i)
-      for (std::size_t j = 0; j < i; ++j) {
-        const bool met = meet_elsewhere(soup.vertices, soup.triangles[i], soup.triangles[j]);
-        EXPECT_EQ(met, meet_elsewhere(soup.vertices, soup.triangles[j], soup.triangles[i]));
-        pairs += met ? 1 : 0;
-      }
-    EXPECT_GT(pairs, 0u);
-    EXPECT_EQ(count_self_intersections(soup.vertices, soup.triangles), pairs);
-  }
-}
-
-TEST(SelfIntersections, PairsByHand) {
-  const std::vector<Eigen::Vector3d> v = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0},    {2, 2, 0},
-                                          {1, 1, 0}, {1, 1, 1}, {3, 3, 1},    {0, 0, 1},
-                                          {1, 0, 0}, {3, 0, 0}, {.5, .5, -1}, {-1, 0, 0}};
-  const auto meet = [&](Triangle a, Triangle b) { return meet_elsewhere(v, a, b); };
-  EXPECT_FALSE(meet({0, 1, 2}, {1, 3, 2}));   // neighbours in a plane
-  EXPECT_TRUE(meet({0, 1, 2}, {0, 1, 3}));    // folded onto each other
-  EXPECT_TRUE(meet({0, 1, 2}, {2, 1, 0}));    // the same, backwards
-  EXPECT_FALSE(meet({0, 1, 2}, {0, 1, 7}));   // a hinge
-  EXPECT_TRUE(meet({0, 1, 2}, {4, 5, 6}));    // a corner touches a side
-  EXPECT_FALSE(meet({0, 1, 2}, {5, 6, 7}));   // above
-  EXPECT_TRUE(meet({0, 1, 2}, {8, 9, 5}));    // a side lies along a side
-  EXPECT_TRUE(meet({0, 1, 2}, {0, 5, 10}));   // shares a corner and passes through
-  EXPECT_FALSE(meet({0, 1, 2}, {0, 7, 11}));  // shares a corner only
 }
 
 }  // namespace

@@ -17,6 +17,7 @@ const std::vector<Scene>& scenes() {
       {"bowl", "a ball in a bowl in a box", run_bowl},
       {"peg", "a peg slips into a hole with 0.1 mm of clearance", run_peg},
       {"bunnies", "thirty bunnies in a crate", run_bunnies},
+      {"terrain", "tori, balls and cubes in a hollow with a boulder", run_terrain},
   };
   return all;
 }

@@ -72,3 +72,4 @@ SceneResult run_screw(const SceneOptions&);
 SceneResult run_bowl(const SceneOptions&);
 SceneResult run_peg(const SceneOptions&);
 SceneResult run_bunnies(const SceneOptions&);
+SceneResult run_terrain(const SceneOptions&);

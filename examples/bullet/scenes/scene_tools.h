@@ -5,6 +5,8 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "../to_bullet.h"
 #include "scene.h"
@@ -41,6 +43,7 @@ inline void set_law(WorldSettings& settings, double mass, double area, double de
   law.friction_stiffness = 0.25 * law.stiffness;
   law.friction_damping = 0.2 * law.friction_stiffness / frequency;
   settings.ist.relaxation = 1 / frequency;  // half the critical one
+  settings.ist.follow = 0.05 * depth;
 }
 
 /// The plane z = 0, held still.
@@ -49,11 +52,12 @@ inline btRigidBody& add_ground(SceneWorld& world, double friction) {
                          Eigen::Isometry3d::Identity(), friction);
 }
 
-/// Mean of what contacts push a still body with along gravity over the samples, over the weight
-/// that stands on it: 1 at rest.
+/// Mean of what contacts push still bodies with along gravity over the samples, over the weight of
+/// all that moves: 1 at rest.
 class WeightOn {
  public:
-  WeightOn(const SceneWorld& world, const btRigidBody& ground) : world_(world), ground_(ground) {}
+  WeightOn(const SceneWorld& world, std::vector<const btRigidBody*> grounds)
+      : world_(world), grounds_(std::move(grounds)) {}
 
   void look() {
     double mass = 0;
@@ -61,8 +65,9 @@ class WeightOn {
       if (body.rigid->getInvMass() > 0) mass += 1 / body.rigid->getInvMass();
     }
     const Eigen::Vector3d& g = world_.settings().gravity;
-    const Eigen::Vector3d force = world_.contact_force(ground_) / (mass * g.norm());
-    sum_ += force;
+    for (const btRigidBody* ground : grounds_) {
+      sum_ += world_.contact_force(*ground) / (mass * g.norm());
+    }
     ++count_;
   }
   double along() const {
@@ -75,7 +80,7 @@ class WeightOn {
 
  private:
   const SceneWorld& world_;
-  const btRigidBody& ground_;
+  std::vector<const btRigidBody*> grounds_;
   Eigen::Vector3d sum_ = Eigen::Vector3d::Zero();
   int count_ = 0;
 };

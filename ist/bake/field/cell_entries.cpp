@@ -4,6 +4,8 @@
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
+#include <atomic>
+#include <bit>
 #include <cmath>
 
 #include "bake/field/cell_overlap.h"
@@ -20,28 +22,114 @@ struct CellRange {
   std::uint32_t begin[3], end[3];
 };
 
-/// Calls visit(x, y, z) for the cells of a range that the triangle meets, by halves.
+constexpr std::uint32_t kRow = 16;  ///< cells along an edge of ranges that are not halved
+
+/// Tells which cells of a small range a triangle meets: CellOverlap's axes, each looked at once for
+/// all cells that it does not tell apart.
+class RangeOverlap {
+ public:
+  RangeOverlap(const BrickGrid& grid, const LaneCorners& t) {
+    const double half = grid.cell / 2 + (kEnlarged * grid.cell + kEnlargedBy);
+    for (int k = 0; k < 3; ++k) first_[k] = grid.low[k] + grid.cell / 2;
+    step_ = grid.cell;
+    double side[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) side[i][k] = t.p[(i + 1) % 3][k] - t.p[i][k];
+    cross3(side[0], side[1], normal_);
+    const double off = dot3(normal_, t.p[0]);
+    const double reach =
+        (std::fabs(normal_[0]) + std::fabs(normal_[1]) + std::fabs(normal_[2])) * half;
+    low_ = off - reach;
+    high_ = off + reach;
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      for (int n = 0; n < 3; ++n) {
+        const double* e = side[n];
+        const auto along = [&](const double x[3]) { return e[i] * x[j] - e[j] * x[i]; };
+        const double p[3] = {along(t.p[0]), along(t.p[1]), along(t.p[2])};
+        const double room = (std::fabs(e[j]) + std::fabs(e[i])) * half;
+        across_[k][n] = {e[i], e[j], std::min({p[0], p[1], p[2]}) - room,
+                         std::max({p[0], p[1], p[2]}) + room};
+      }
+    }
+  }
+
+  /// Calls visit(x, y, z) for cells of the range, at most kRow along each edge.
+  template <class Visit>
+  void for_cells(const CellRange& range, const Visit& visit) const {
+    std::uint32_t of_y[kRow], of_z[kRow];  // bits of x
+    for (std::uint32_t y = range.begin[1]; y < range.end[1]; ++y)
+      of_y[y - range.begin[1]] = row(range, [&](std::uint32_t x) { return meets(2, x, y); });
+    for (std::uint32_t z = range.begin[2]; z < range.end[2]; ++z)
+      of_z[z - range.begin[2]] = row(range, [&](std::uint32_t x) { return meets(1, z, x); });
+    for (std::uint32_t z = range.begin[2]; z < range.end[2]; ++z)
+      for (std::uint32_t y = range.begin[1]; y < range.end[1]; ++y) {
+        std::uint32_t bits = of_y[y - range.begin[1]] & of_z[z - range.begin[2]];
+        if (bits == 0 || !meets(0, y, z)) continue;
+        const double yz = normal_[1] * middle(1, y) + normal_[2] * middle(2, z);
+        bits &= row(range, [&](std::uint32_t x) {
+          const double at = yz + normal_[0] * middle(0, x);
+          return low_ <= at && at <= high_;
+        });
+        for (; bits != 0; bits &= bits - 1)
+          visit(range.begin[0] + static_cast<std::uint32_t>(std::countr_zero(bits)), y, z);
+      }
+  }
+
+ private:
+  /// Across an edge of the cells and a side: where cells meet the triangle.
+  struct Axis {
+    double i, j, low, high;
+  };
+
+  double middle(int k, std::uint32_t at) const { return first_[k] + at * step_; }
+
+  template <class Meets>
+  static std::uint32_t row(const CellRange& range, const Meets& meets) {
+    std::uint32_t bits = 0;
+    for (std::uint32_t x = range.begin[0]; x < range.end[0]; ++x)
+      bits |= static_cast<std::uint32_t>(meets(x)) << (x - range.begin[0]);
+    return bits;
+  }
+
+  /// The axes across edge k; `i` and `j` are the cell's along the next two.
+  bool meets(int k, std::uint32_t i, std::uint32_t j) const {
+    const double x = middle((k + 1) % 3, i), y = middle((k + 2) % 3, j);
+    bool hit = true;
+    for (const Axis& axis : across_[k]) {
+      const double at = axis.i * y - axis.j * x;
+      hit &= (axis.low <= at) & (at <= axis.high);
+    }
+    return hit;
+  }
+
+  double first_[3], step_, normal_[3], low_, high_;
+  Axis across_[3][3];
+};
+
+/// Calls visit(x, y, z) for the cells of a range that the triangle meets, large ranges by halves.
 template <class Visit>
-void for_cells(const BrickGrid& grid, const CellOverlap& triangle, const CellRange& range,
-               const Visit& visit) {
-  double centre[3], half[3];
+void for_cells(const BrickGrid& grid, const CellOverlap& triangle, const RangeOverlap& cells,
+               const CellRange& range, const Visit& visit) {
   int longest = 0;
+  for (int k = 1; k < 3; ++k)
+    if (range.end[k] - range.begin[k] > range.end[longest] - range.begin[longest]) longest = k;
+  const std::uint32_t length = range.end[longest] - range.begin[longest];
+  if (length <= kRow) {
+    cells.for_cells(range, visit);
+    return;
+  }
+  double centre[3], half[3];
   for (int k = 0; k < 3; ++k) {
     centre[k] = grid.low[k] + (double{1} * range.begin[k] + range.end[k]) / 2 * grid.cell;
     half[k] = double{1} * (range.end[k] - range.begin[k]) / 2 * grid.cell +
               (kEnlarged * grid.cell + kEnlargedBy);
-    if (range.end[k] - range.begin[k] > range.end[longest] - range.begin[longest]) longest = k;
   }
   if (!triangle.meets(centre, half)) return;
-  const std::uint32_t length = range.end[longest] - range.begin[longest];
-  if (length == 1) {
-    visit(range.begin[0], range.begin[1], range.begin[2]);
-    return;
-  }
   CellRange first = range, second = range;
   first.end[longest] = second.begin[longest] = range.begin[longest] + length / 2;
-  for_cells(grid, triangle, first, visit);
-  for_cells(grid, triangle, second, visit);
+  for_cells(grid, triangle, cells, first, visit);
+  for_cells(grid, triangle, cells, second, visit);
 }
 
 /// The cells that may hold a point of a triangle's box.
@@ -60,22 +148,53 @@ CellRange range_of(const BrickGrid& grid, const LaneCorners& t) {
   return range;
 }
 
+/// Calls visit(cell) for the cells of a block's triangle.
+template <class Visit>
+void for_cells_of(const BrickGrid& grid, const SurfaceBlock& block, std::uint32_t lane,
+                  const Visit& visit) {
+  const LaneCorners t = corners_of(block, lane);
+  for_cells(grid, CellOverlap(t.p[0], t.p[1], t.p[2]), RangeOverlap(grid, t), range_of(grid, t),
+            [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) { visit(grid.name(x, y, z)); });
+}
+
 }  // namespace
+
+std::optional<EntryCounts> count_entries(const BrickGrid& grid,
+                                         const std::vector<SurfaceBlock>& blocks,
+                                         std::size_t most) {
+  const auto places = static_cast<std::size_t>(grid.brick_places());
+  std::vector<std::uint64_t> cells(places);
+  std::vector<std::uint32_t> entries(places);
+  std::vector<std::size_t> of_block(blocks.size());
+  constexpr auto kRelaxed = std::memory_order_relaxed;
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+    for (std::uint32_t lane = 0; lane < blocks[b].triangles && of_block[b] <= most; ++lane)
+      for_cells_of(grid, blocks[b], lane, [&](std::uint64_t cell) {
+        std::atomic_ref(cells[cell / 64]).fetch_or(std::uint64_t{1} << cell % 64, kRelaxed);
+        std::atomic_ref(entries[cell / 64]).fetch_add(1, kRelaxed);
+        ++of_block[b];
+      });
+  });
+  EntryCounts counts;
+  for (const std::size_t some : of_block) counts.entries += some;
+  if (counts.entries > most) return std::nullopt;
+  for (std::size_t i = 0; i < places; ++i) {
+    counts.cells += static_cast<std::size_t>(std::popcount(cells[i]));
+    counts.bricks += cells[i] != 0 ? 1 : 0;
+    counts.fullest_brick = std::max<std::size_t>(counts.fullest_brick, entries[i]);
+  }
+  return counts;
+}
 
 std::optional<std::vector<CellEntry>> find_entries(const BrickGrid& grid,
                                                    const std::vector<SurfaceBlock>& blocks,
                                                    std::size_t most) {
   std::vector<std::vector<CellEntry>> of_block(blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
-    for (std::uint32_t lane = 0; lane < blocks[b].triangles; ++lane) {
-      const LaneCorners t = corners_of(blocks[b], lane);
-      const auto code = static_cast<std::uint32_t>(kWidth * b + lane);
-      for_cells(grid, CellOverlap(t.p[0], t.p[1], t.p[2]), range_of(grid, t),
-                [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-                  of_block[b].push_back({grid.name(x, y, z), code});
-                });
-      if (of_block[b].size() > most) return;
-    }
+    for (std::uint32_t lane = 0; lane < blocks[b].triangles && of_block[b].size() <= most; ++lane)
+      for_cells_of(grid, blocks[b], lane, [&](std::uint64_t cell) {
+        of_block[b].push_back({cell, static_cast<std::uint32_t>(kWidth * b + lane)});
+      });
   });
   std::size_t count = 0;
   for (const auto& some : of_block) count += some.size();

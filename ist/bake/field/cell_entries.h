@@ -42,4 +42,14 @@ std::optional<std::vector<CellEntry>> find_entries(const BrickGrid& grid,
                                                    const std::vector<SurfaceBlock>& blocks,
                                                    std::size_t most);
 
+/// How many pairs there are, in how many cells and bricks.
+struct EntryCounts {
+  std::size_t entries = 0, cells = 0, bricks = 0;
+  std::size_t fullest_brick = 0;  ///< entries
+};
+
+/// Counts what find_entries() finds.
+std::optional<EntryCounts> count_entries(const BrickGrid& grid,
+                                         const std::vector<SurfaceBlock>& blocks, std::size_t most);
+
 }  // namespace ist

@@ -1,5 +1,7 @@
 #include "bake/field/field.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -51,7 +53,7 @@ Approximation own_triangles(const MeshView& surface) {
 }
 
 /// The least tolerance found that leaves at most, and nearly, so many triangles.
-double tolerance_for(const VertexClusters& clusters, std::size_t triangles, double guess) {
+double tolerance_for(VertexClusters& clusters, std::size_t triangles, double guess) {
   double fine = 0, coarse = HUGE_VAL;
   for (int attempt = 0; attempt < 16; ++attempt) {
     const std::size_t found = clusters.triangles_within(guess);
@@ -78,17 +80,17 @@ Approximation clustered(VertexClusters& clusters, SolidSurface& surface, const W
     Clustered found = clusters.within(tolerance);
     if (found.mesh.triangles.empty()) return best;
     const FieldHierarchy hierarchy(found.mesh);
-    const FieldError error(surface.view(), found.mesh, hierarchy, found.vertex_of, stop);
+    FieldError error(surface.view(), found, hierarchy, stop);
     std::vector<double> off = error.seen(tolerance);
     const double seen = *std::max_element(off.begin(), off.end());
     if (seen <= 1.25 * tolerance || round >= kRounds) {
-      FieldError::Proven proven = error.proven(seen);
+      FieldError::Proven proven = error.proven(seen, kLoose * seen);
       if (proven.most < best.error) best = {std::move(found.mesh), proven.most};
       if (proven.most <= kLoose * seen || ++proofs == kProofs) return best;
-      off = std::move(proven.at_vertex);
+      off = std::move(proven.at_cluster);
       for (double& at : off) at = at > kLoose * seen ? at : 0;
     }
-    clusters.raise(off, tolerance);
+    clusters.raise(off);
   }
 }
 
@@ -169,9 +171,10 @@ std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error,
   FieldArrays arrays;
   arrays.header.error = near.error;
   arrays.header.triangle_count = static_cast<std::uint32_t>(near.mesh.triangles.size());
-  cut_into_blocks(near.mesh, arrays);
-  const FieldHierarchy hierarchy(near.mesh);
-  lay_sign_grid(hierarchy.view(), grid_bytes(arrays), arrays);
+  std::optional<FieldHierarchy> hierarchy;
+  tbb::parallel_invoke([&] { cut_into_blocks(near.mesh, arrays); },
+                       [&] { hierarchy.emplace(near.mesh); });
+  lay_sign_grid(hierarchy->view(), grid_bytes(arrays), arrays);
   return arrays;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -117,61 +118,79 @@ Part part_of(const FieldMesh& field, std::size_t triangle) {
   return part;
 }
 
+void raise(const std::atomic_ref<double>& value, double to) {
+  double was = value.load(std::memory_order_relaxed);
+  while (to > was && !value.compare_exchange_weak(was, to, std::memory_order_relaxed)) {
+  }
+}
+
 }  // namespace
 
-FieldError::FieldError(const MeshView& mesh, const FieldMesh& field,
-                       const FieldHierarchy& hierarchy, const std::vector<std::uint32_t>& vertex_of,
-                       const WorkStop& stop)
+FieldError::FieldError(const MeshView& mesh, const Clustered& field,
+                       const FieldHierarchy& hierarchy, const WorkStop& stop)
     : mesh_(mesh),
       field_(field),
-      vertex_of_(vertex_of),
       stop_(stop),
-      swept_(mesh, field, hierarchy, vertex_of),
-      middle_(field.triangles.size()) {
+      swept_(mesh, field, hierarchy),
+      middle_(field.mesh.triangles.size()) {
   const FieldNearMesh near_mesh(mesh);
   tbb::parallel_for(std::size_t{0}, middle_.size(), [&](std::size_t t) {
     stop_.look();
-    middle_[t] = near_mesh.distance(part_of(field, t).centre());
+    middle_[t] = near_mesh.distance(part_of(field.mesh, t).centre());
   });
 }
 
-std::vector<double> FieldError::seen(double enough) const {
-  std::vector<double> around(field_.vertices.size());
-  for (std::size_t t = 0; t < middle_.size(); ++t)
-    for (const std::uint32_t v : field_.triangles[t]) around[v] = std::max(around[v], middle_[t]);
-  std::vector<double> seen(mesh_.vertex_count);
+std::vector<double> FieldError::by_cluster(const std::vector<double>& of_triangle) const {
+  std::vector<double> around(field_.mesh.vertices.size());
+  for (std::size_t t = 0; t < of_triangle.size(); ++t)
+    for (const std::uint32_t v : field_.mesh.triangles[t])
+      around[v] = std::max(around[v], of_triangle[t]);
+  std::vector<double> out(field_.vertex_of.size());
+  for (std::size_t c = 0; c < out.size(); ++c) out[c] = around[field_.vertex_of[c]];
+  return out;
+}
+
+std::vector<double> FieldError::seen(double enough) {
+  std::vector<double> seen = by_cluster(middle_);
   tbb::parallel_for(std::uint32_t{0}, mesh_.vertex_count, [&](std::uint32_t v) {
     stop_.look();
-    seen[v] = std::max(around[vertex_of_[v]], swept_.at_vertex(v, enough));
+    const std::atomic_ref<double> most(seen[field_.cluster_of[v]]);
+    raise(most, swept_.at_vertex(v, most.load(std::memory_order_relaxed), enough));
   });
   return seen;
 }
 
-FieldError::Proven FieldError::proven(double seen) const {
+FieldError::Proven FieldError::proven(double seen, double enough) const {
   const FieldNearMesh near_mesh(mesh_);
   const double target = kSlack * seen + kRounding;
-  std::vector<double> of_field(middle_.size()), of_mesh(mesh_.triangle_count);
+  // What lies within the target at first sight is passed over where something else does not.
+  std::vector<std::uint8_t> passed_over(mesh_.triangle_count);
+  std::vector<double> of_field(middle_.size());
   tbb::parallel_for(std::size_t{0}, of_field.size(), [&](std::size_t t) {
     stop_.look();
-    of_field[t] = near_mesh.bound(part_of(field_, t), target, middle_[t]);
+    of_field[t] = near_mesh.bound(part_of(field_.mesh, t), target, middle_[t]);
   });
-  tbb::parallel_for(std::size_t{0}, of_mesh.size(), [&](std::size_t t) {
-    stop_.look();
-    of_mesh[t] = swept_.bound(static_cast<std::uint32_t>(t), target);
-  });
-  std::vector<double> around(field_.vertices.size());
-  for (std::size_t t = 0; t < of_field.size(); ++t)
-    for (const std::uint32_t v : field_.triangles[t]) around[v] = std::max(around[v], of_field[t]);
   Proven out;
-  out.at_vertex.resize(mesh_.vertex_count);
-  for (std::size_t v = 0; v < out.at_vertex.size(); ++v) out.at_vertex[v] = around[vertex_of_[v]];
-  for (std::size_t t = 0; t < of_mesh.size(); ++t)
+  out.at_cluster = by_cluster(of_field);
+  const auto bound_swept = [&](std::uint32_t t, bool one_may_do) {
+    const double bound = swept_.bound(t, target, one_may_do);
     for (std::size_t k = 0; k < 3; ++k) {
-      double& at = out.at_vertex[mesh_.triangles[3 * t + k]];
-      at = std::max(at, of_mesh[t]);
+      const std::uint32_t v = mesh_.triangles[3 * std::size_t{t} + k];
+      raise(std::atomic_ref<double>(out.at_cluster[field_.cluster_of[v]]), bound);
     }
-  for (const std::vector<double>* all : {&of_field, &of_mesh})
-    for (const double bound : *all) out.most = std::max(out.most, bound + kRounding);
+  };
+  const auto most = [&] { return *std::max_element(out.at_cluster.begin(), out.at_cluster.end()); };
+  tbb::parallel_for(std::uint32_t{0}, mesh_.triangle_count, [&](std::uint32_t t) {
+    stop_.look();
+    passed_over[t] = swept_.is_within(t, target) ? 1 : 0;
+    if (passed_over[t] == 0) bound_swept(t, false);
+  });
+  if (most() < target || target > enough)
+    tbb::parallel_for(std::uint32_t{0}, mesh_.triangle_count, [&](std::uint32_t t) {
+      stop_.look();
+      if (passed_over[t] != 0) bound_swept(t, true);
+    });
+  out.most = most() + kRounding;
   return out;
 }
 

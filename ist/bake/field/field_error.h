@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "bake/field/field_hierarchy.h"
-#include "bake/field/field_mesh.h"
 #include "bake/field/swept_error.h"
+#include "bake/field/vertex_clusters.h"
 #include "mesh/mesh_view.h"
 #include "stage/work_stop.h"
 
@@ -14,15 +14,14 @@ namespace ist {
 /// How a field's surface differs from the mesh that it is the image of. Unit frame. Deterministic.
 class FieldError {
  public:
-  /// All must outlive this. `mesh` has a hierarchy; `vertex_of`: a mesh vertex's place in the
-  /// field.
+  /// All must outlive this. `mesh` has a hierarchy, `hierarchy` is that of the field's triangles.
   /// What is asked of it may be ended by `stop`.
-  FieldError(const MeshView& mesh, const FieldMesh& field, const FieldHierarchy& hierarchy,
-             const std::vector<std::uint32_t>& vertex_of, const WorkStop& stop);
+  FieldError(const MeshView& mesh, const Clustered& field, const FieldHierarchy& hierarchy,
+             const WorkStop& stop);
 
-  /// What is seen at samples, by vertex of the mesh: its distance from the field, or that of the
-  /// middle of a field's triangle about its place from the mesh. Exact where above `enough`.
-  std::vector<double> seen(double enough) const;
+  /// What is seen at samples, by cluster: how far a vertex of it is from the field, or the middle
+  /// of a field's triangle about its place from the mesh. Exact where above `enough`.
+  std::vector<double> seen(double enough);
 
   /// A bound e such that
   /// - either surface lies within e of the other, and
@@ -32,15 +31,18 @@ class FieldError {
   /// the triangles on their way sweep all points at which the winding numbers differ, and lie
   /// within e of the field all along. Rounding is included. `seen`: the largest error seen.
   struct Proven {
-    double most = 0;                ///< e
-    std::vector<double> at_vertex;  ///< what is shown about each vertex of the mesh
+    double most = 0;  ///< e
+    /// [cluster] What is shown about its vertices; exact where above `enough`.
+    std::vector<double> at_cluster;
   };
-  Proven proven(double seen) const;
+  Proven proven(double seen, double enough) const;
 
  private:
+  /// The largest number of a field's triangle about each cluster's place.
+  std::vector<double> by_cluster(const std::vector<double>& of_triangle) const;
+
   const MeshView& mesh_;
-  const FieldMesh& field_;
-  const std::vector<std::uint32_t>& vertex_of_;
+  const Clustered& field_;
   const WorkStop& stop_;
   SweptError swept_;
   std::vector<double> middle_;  ///< [field triangle] its middle's distance from the mesh

@@ -1,5 +1,7 @@
 #include "bake/field/overlaps.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -112,13 +114,18 @@ std::optional<Overlaps> find_overlaps(const MeshSolid& solid) {
   std::vector<Triangle> triangles(mesh.triangle_count);
   for (std::size_t t = 0; t < triangles.size(); ++t)
     std::copy_n(mesh.triangles + 3 * t, 3, triangles[t].begin());
-  auto pairs = find_self_intersections(vertices, triangles);
-  if (!pairs) return std::nullopt;
   Overlaps out;
-  out.pairs = *std::move(pairs);
+  if (solid.meeting_pairs() != nullptr) {
+    out.pairs = *solid.meeting_pairs();
+  } else {
+    auto found = find_self_intersections(vertices, triangles);
+    if (!found || !found->pairs) return std::nullopt;
+    out.pairs = *std::move(found->pairs);
+  }
   std::vector<std::uint8_t> apart(triangles.size());
-  for (std::size_t t = 0; t < triangles.size(); ++t)
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
     apart[t] = is_degenerate(vertices, triangles[t]) ? 1 : 0;
+  });
   for (const auto& [a, b] : out.pairs) apart[a] = apart[b] = 1;
   const std::vector<std::optional<int>> outside = windings_outside(solid, apart);
   out.part.resize(triangles.size());

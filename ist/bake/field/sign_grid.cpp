@@ -15,14 +15,17 @@
 #include "bake/field/brick_grid.h"
 #include "bake/field/cell_entries.h"
 #include "bake/field/surface_area.h"
+#include "bake/field/triangles_in_box.h"
+#include "mesh/exact_sign.h"
+#include "mesh/ray_crossing.h"
 #include "mesh/triangle_frame.h"
-#include "mesh/winding.h"
 
 namespace ist {
 namespace {
 
 constexpr double kNearest = 1e-9;     // of a cell: reference points keep away from triangles
 constexpr double kAnother = 1.00391;  // of a cell whose reference points do not
+constexpr double kSurely = 1e4;       // of a squared distance, so that rounding does not matter
 constexpr int kTries = 1000;
 
 /// The cells by their bricks, all of them.
@@ -54,24 +57,77 @@ bool references_are_clear(const BrickGrid& grid, const std::vector<SurfaceBlock>
                        static_cast<std::uint32_t>(kBrickWidth * z + bit / 16));
     const LaneCorners t =
         corners_of(blocks[entries[i].triangle / kWidth], entries[i].triangle % kWidth);
+    // Nearly always the plane is far enough to say so.
+    double u[3], v[3], n[3], w[3];
+    for (int k = 0; k < 3; ++k) {
+      u[k] = t.p[1][k] - t.p[0][k];
+      v[k] = t.p[2][k] - t.p[0][k];
+      w[k] = p[static_cast<std::size_t>(k)] - t.p[0][k];
+    }
+    cross3(u, v, n);
+    const double height = dot3(n, w);
+    clear[i] = height * height > kSurely * least2 * dot3(n, n);
+    if (clear[i] != 0) return;
     const TriangleFrame<double> frame = make_triangle_frame(t.p[0], t.p[1], t.p[2]);
     clear[i] = closest_in_frame(frame, p.data()).distance2 > least2;
   });
   return std::all_of(clear.begin(), clear.end(), [](std::uint8_t is) { return is != 0; });
 }
 
-/// Sets the inside bits, a plane of bricks at a time. From a cell without surface to the next along
+/// Winding numbers on a line parallel to x, modulo 2: the triangles that lie beyond a point.
+class RowParity {
+ public:
+  explicit RowParity(const MeshView& surface) : surface_(surface) {}
+
+  /// Of a point of the line of the last point, or of another.
+  bool is_odd(const std::array<double, 3>& p) {
+    if (p[1] != yz_[0] || p[2] != yz_[1]) look_along(p[1], p[2]);
+    bool odd = false;
+    for (const auto& [t, facing, extent] : pierced_)
+      odd ^= p[0] < extent.low ||
+             (p[0] <= extent.high && orient3d_sign(t.p[0], t.p[1], t.p[2], p.data()) * facing > 0);
+    return odd;
+  }
+
+ private:
+  struct Pierced {
+    Corners triangle;
+    int facing;
+    Extent extent;
+  };
+
+  void look_along(double y, double z) {
+    yz_[0] = y;
+    yz_[1] = z;
+    pierced_.clear();
+    const RayBox box = RayBox::line(y, z);
+    none_in_box(surface_, box.lower, box.upper, [&](const Corners& t) {
+      const int facing = pierced(t, yz_);
+      if (facing != 0) pierced_.push_back({t, facing, Extent(t)});
+      return false;
+    });
+  }
+
+  const MeshView& surface_;
+  double yz_[2] = {HUGE_VAL, HUGE_VAL};
+  std::vector<Pierced> pierced_;
+};
+
+/// Sets the inside bits, a row of bricks at a time. From a cell without surface to the next along
 /// x the winding number does not change.
 void find_inside(const BrickGrid& grid, const MeshView& surface, DenseBricks& bricks) {
-  tbb::parallel_for(std::uint32_t{0}, grid.bricks[2], [&](std::uint32_t plane) {
-    for (std::uint32_t z = kBrickWidth * plane; z < kBrickWidth * (plane + 1); ++z)
-      for (std::uint32_t y = 0; y < grid.cells(1); ++y) {
-        bool inside = false, known = false;
+  tbb::parallel_for(std::uint32_t{0}, grid.bricks[1] * grid.bricks[2], [&](std::uint32_t row) {
+    const std::uint32_t from_y = kBrickWidth * (row % grid.bricks[1]);
+    const std::uint32_t from_z = kBrickWidth * (row / grid.bricks[1]);
+    RowParity parity(surface);
+    for (std::uint32_t z = from_z; z < from_z + kBrickWidth; ++z)
+      for (std::uint32_t y = from_y; y < from_y + kBrickWidth; ++y) {
+        // Before a row's first cell with surface it is outside.
+        bool inside = false, known = true;
         for (std::uint32_t x = 0; x < grid.cells(0); ++x) {
           const std::uint64_t cell = grid.name(x, y, z);
           const bool holds_surface = DenseBricks::bit(bricks.surface, cell);
-          if (holds_surface || !known)
-            inside = winding_number(surface, grid.reference(x, y, z).data()) % 2 != 0;
+          if (holds_surface || !known) inside = parity.is_odd(grid.reference(x, y, z));
           known = !holds_surface;
           if (inside) DenseBricks::set(bricks.inside, cell);
         }
@@ -80,25 +136,15 @@ void find_inside(const BrickGrid& grid, const MeshView& surface, DenseBricks& br
 }
 
 /// FieldHeader::list_bytes for these lists.
-std::uint32_t list_bytes(std::size_t blocks, const std::vector<CellEntry>& entries) {
-  if (kWidth * blocks > 0x10000) return 4;
-  for (std::size_t begin = 0, end = 0; begin < entries.size(); begin = end) {
-    while (end < entries.size() && entries[end].cell / 64 == entries[begin].cell / 64) ++end;
-    if (end - begin > 0xffff) return 4;
-  }
-  return 2;
+std::uint32_t list_bytes(std::size_t blocks, std::size_t fullest_brick) {
+  return kWidth * blocks > 0x10000 || fullest_brick > 0xffff ? 4 : 2;
 }
 
 /// What write_grid() will fill.
-std::size_t bytes_of(const BrickGrid& grid, std::size_t blocks,
-                     const std::vector<CellEntry>& entries) {
-  std::size_t cells = 0, bricks = 0;
-  for (std::size_t i = 0; i < entries.size(); ++i) {
-    cells += i == 0 || entries[i].cell != entries[i - 1].cell ? 1 : 0;
-    bricks += i == 0 || entries[i].cell / 64 != entries[i - 1].cell / 64 ? 1 : 0;
-  }
+std::size_t bytes_of(const BrickGrid& grid, std::size_t blocks, const EntryCounts& counts) {
   return static_cast<std::size_t>(grid.brick_places()) * sizeof(std::uint32_t) +
-         bricks * sizeof(CellBrick) + (cells + entries.size()) * list_bytes(blocks, entries);
+         counts.bricks * sizeof(CellBrick) +
+         (counts.cells + counts.entries) * list_bytes(blocks, counts.fullest_brick);
 }
 
 void write_grid(const BrickGrid& grid, const DenseBricks& bricks,
@@ -106,9 +152,9 @@ void write_grid(const BrickGrid& grid, const DenseBricks& bricks,
   std::copy_n(grid.low, 3, arrays.header.low);
   std::copy_n(grid.bricks, 3, arrays.header.bricks);
   arrays.header.cell = grid.cell;
-  arrays.header.list_bytes = list_bytes(arrays.blocks.size(), entries);
   arrays.brick_index.resize(bricks.surface.size());
   std::uint32_t cells = 0, lists = 0;
+  std::size_t fullest = 0;
   for (std::size_t i = 0; i < bricks.surface.size(); ++i) {
     std::uint32_t& index = arrays.brick_index[i];
     const std::uint64_t surface = bricks.surface[i], inside = bricks.inside[i];
@@ -126,8 +172,10 @@ void write_grid(const BrickGrid& grid, const DenseBricks& bricks,
       arrays.cell_triangles.push_back(entries[end].triangle);
     }
     if (end > lists) arrays.cell_ends.push_back(end - lists);
+    fullest = std::max<std::size_t>(fullest, end - lists);
     lists = end;
   }
+  arrays.header.list_bytes = list_bytes(arrays.blocks.size(), fullest);
 }
 
 /// The smallest box around the surface, and edges of cells.
@@ -162,8 +210,8 @@ double bytes_for(const Measures& measures, double edge, const std::vector<Surfac
   const BrickGrid grid(measures.low, measures.high, edge);
   const double places = grid.brick_places() * sizeof(std::uint32_t);
   if (places > 2.0 * static_cast<double>(most)) return HUGE_VAL;
-  const auto entries = find_entries(grid, blocks, most);
-  return entries ? static_cast<double>(bytes_of(grid, blocks.size(), *entries)) : HUGE_VAL;
+  const auto counts = count_entries(grid, blocks, most);
+  return counts ? static_cast<double>(bytes_of(grid, blocks.size(), *counts)) : HUGE_VAL;
 }
 
 /// The edge of the smallest cells found that take at most, and nearly, so many bytes.

@@ -5,7 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "mesh/closest_point.h"
+#include "bake/field/triangles_in_box.h"
+#include "mesh/exact_sign.h"
 #include "mesh/triangle_frame.h"
 #include "mesh/winding.h"
 #include "numerics/rounding.h"
@@ -64,30 +65,33 @@ struct MovedHull {
 };
 
 bool meets_none(const MeshView& surface, const MovedHull& hull, const double direction[3]) {
-  std::uint32_t stack[kBvhStackSize];
-  int top = 0;
-  stack[top++] = surface.root;
-  while (top > 0) {
-    const std::uint32_t at = stack[--top];
-    if ((at & kBvhLeaf) != 0) {
-      for (const std::uint32_t triangle : surface.blocks[at & ~kBvhLeaf].triangle) {
-        if (triangle == kNoTriangle) continue;
-        const std::uint32_t* t = surface.triangles + 3 * std::size_t{triangle};
-        const double* p[3];
-        for (int i = 0; i < 3; ++i) p[i] = surface.vertices + 3 * std::size_t{t[i]};
-        if (!hull.is_apart_from(p, direction)) return false;
-      }
-      continue;
-    }
-    const BvhNode& node = surface.nodes[at];
-    for (int i = 0; i < kBvhWidth; ++i) {
-      bool hit = node.child[i] != kBvhEmpty;
-      for (int k = 0; k < 3; ++k)
-        hit &= node.lower[k][i] <= hull.high[k] && node.upper[k][i] >= hull.low[k];
-      if (hit) stack[top++] = node.child[i];
-    }
+  return none_in_box(surface, hull.low, hull.high, [&](const Corners& triangle) {
+    return !hull.is_apart_from(triangle.p, direction);
+  });
+}
+
+/// Whether the winding number differs between two points off the surface: the way between is short,
+/// a ray is not.
+bool windings_differ(const MeshView& surface, const double p[3], const double q[3]) {
+  float low[3], high[3];
+  for (int k = 0; k < 3; ++k) {
+    low[k] = rounded_down(std::min(p[k], q[k]));
+    high[k] = rounded_up(std::max(p[k], q[k]));
   }
-  return true;
+  int difference = 0;
+  const bool clear = none_in_box(surface, low, high, [&](const Corners& t) {
+    int turns[3];  // of the way about the sides
+    for (int i = 0; i < 3; ++i) turns[i] = orient3d_sign(p, q, t.p[i], t.p[(i + 1) % 3]);
+    const auto [least, most] = std::minmax({turns[0], turns[1], turns[2]});
+    if (least < 0 && most > 0) return false;
+    const int from = orient3d_sign(t.p[0], t.p[1], t.p[2], p);
+    const int to = orient3d_sign(t.p[0], t.p[1], t.p[2], q);
+    if (from == to && from != 0) return false;
+    if (turns[0] == 0 || turns[1] == 0 || turns[2] == 0 || from == 0 || to == 0) return true;
+    difference += from;
+    return false;
+  });
+  return clear ? difference != 0 : winding_number(surface, p) != winding_number(surface, q);
 }
 
 }  // namespace
@@ -98,8 +102,7 @@ bool within_slab(const MeshView& surface, std::span<const Point> hull, const dou
   if (!meets_none(surface, there, direction)) return false;
   const MovedHull back(hull, direction, -distance);
   if (!meets_none(surface, back, direction)) return false;
-  return winding_number(surface, there.corner[0].data()) !=
-         winding_number(surface, back.corner[0].data());
+  return windings_differ(surface, there.corner[0].data(), back.corner[0].data());
 }
 
 }  // namespace ist

@@ -54,7 +54,11 @@ struct Stars {
 class Growth {
  public:
   explicit Growth(const FieldMesh& mesh)
-      : mesh_(mesh), stars_(mesh), taken_(mesh.triangles.size()), middle_(mesh.triangles.size()) {
+      : mesh_(mesh),
+        stars_(mesh),
+        taken_(mesh.triangles.size()),
+        last_patch_(mesh.vertices.size()),
+        middle_(mesh.triangles.size()) {
     for (std::size_t t = 0; t < middle_.size(); ++t)
       for (std::size_t k = 0; k < 3; ++k) {
         const FieldMesh::Triangle& corners = mesh.triangles[t];
@@ -80,6 +84,7 @@ class Growth {
  private:
   BlockPatch grown(std::uint32_t seed) {
     BlockPatch patch;
+    ++patches_;
     for (std::uint32_t t = seed; t != kNone; t = best_neighbour(patch)) take(t, patch);
     return patch;
   }
@@ -89,13 +94,13 @@ class Growth {
     patch.triangles.push_back(t);
     for (const std::uint32_t v : mesh_.triangles[t]) {
       --stars_.left[v];
-      if (!has(patch, v)) patch.vertices.push_back(v);
+      if (!is_in_patch(v)) patch.vertices.push_back(v);
+      last_patch_[v] = patches_;
     }
   }
 
-  static bool has(const BlockPatch& patch, std::uint32_t vertex) {
-    return std::find(patch.vertices.begin(), patch.vertices.end(), vertex) != patch.vertices.end();
-  }
+  /// In the one that grows.
+  bool is_in_patch(std::uint32_t vertex) const { return last_patch_[vertex] == patches_; }
 
   /// Of the triangles that touch the patch and fit, the one that adds fewest vertices, those that
   /// would be left alone counted less; then the one nearest to the patch's middle.
@@ -113,7 +118,7 @@ class Growth {
         if (taken_[t] != 0) continue;
         int added = 0, last = 0;
         for (const std::uint32_t corner : mesh_.triangles[t]) {
-          added += has(patch, corner) ? 0 : 1;
+          added += is_in_patch(corner) ? 0 : 1;
           last |= stars_.left[corner] == 1 ? 1 : 0;
         }
         if (patch.vertices.size() + static_cast<std::size_t>(added) > kWidth) continue;
@@ -142,6 +147,8 @@ class Growth {
   const FieldMesh& mesh_;
   Stars stars_;
   std::vector<std::uint8_t> taken_;
+  std::vector<std::uint32_t> last_patch_;  ///< [vertex] the last that took it, from 1
+  std::uint32_t patches_ = 0;
   std::vector<Point> middle_;
 };
 

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -14,6 +15,7 @@ namespace {
 
 constexpr double kSmallestPart = 0.2;  // of the target: smaller prisms are taken for their centres
 constexpr double kSlack = 1.25;        // of a target over the distance of a centre
+constexpr double kRounding = 1e-15;    // of a squared distance, with room
 constexpr double kFar = 1e3;           // further than anything in the unit frame
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
@@ -67,42 +69,91 @@ std::array<SweptError::Prism, 2> SweptError::Prism::halves() const {
   return out;
 }
 
-SweptError::SweptError(const MeshView& mesh, const FieldMesh& field,
-                       const FieldHierarchy& hierarchy, const std::vector<std::uint32_t>& vertex_of)
+SweptError::SweptError(const MeshView& mesh, const Clustered& field,
+                       const FieldHierarchy& hierarchy)
     : mesh_(mesh),
       field_(field),
       hierarchy_(hierarchy),
-      vertex_of_(vertex_of),
-      frames_(field.triangles.size()),
-      first_(field.vertices.size() + 1),
-      around_(3 * field.triangles.size()) {
+      frames_(field.mesh.triangles.size()),
+      first_(field.mesh.vertices.size() + 1),
+      around_(3 * field.mesh.triangles.size()),
+      near_(mesh.vertex_count, kNoTriangle),
+      last_near_(field.vertex_of.size(), kNoTriangle) {
   const MeshView& view = hierarchy.view();
   tbb::parallel_for(std::size_t{0}, frames_.size(), [&](std::size_t t) {
     const auto vertex = [&](std::size_t i) {
-      return view.vertices + 3 * std::size_t{field.triangles[t][i]};
+      return view.vertices + 3 * std::size_t{field.mesh.triangles[t][i]};
     };
     frames_[t] = make_triangle_frame(vertex(0), vertex(1), vertex(2));
   });
-  for (const FieldMesh::Triangle& t : field.triangles)
+  for (const FieldMesh::Triangle& t : field.mesh.triangles)
     for (const std::uint32_t v : t) ++first_[v + 1];
   for (std::size_t v = 1; v < first_.size(); ++v) first_[v] += first_[v - 1];
   std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-  for (std::uint32_t t = 0; t < field.triangles.size(); ++t)
-    for (const std::uint32_t v : field.triangles[t]) around_[next[v]++] = t;
+  for (std::uint32_t t = 0; t < field.mesh.triangles.size(); ++t)
+    for (const std::uint32_t v : field.mesh.triangles[t]) around_[next[v]++] = t;
 }
 
 std::span<const std::uint32_t> SweptError::star(std::uint32_t field_vertex) const {
   return {around_.data() + first_[field_vertex], around_.data() + first_[field_vertex + 1]};
 }
 
-double SweptError::at_vertex(std::uint32_t vertex, double enough) const {
+double SweptError::at_vertex(std::uint32_t vertex, double known, double enough) {
   const double* x = mesh_.vertices + 3 * std::size_t{vertex};
+  const double known2 = known * known * (1 - kRounding);
   double least2 = kFar * kFar;
-  for (const std::uint32_t t : star(vertex_of_[vertex]))
-    least2 = std::min(least2, distance2(t, {x[0], x[1], x[2]}));
+  const auto is_near = [&](std::uint32_t t) {
+    const double d2 = distance2(t, {x[0], x[1], x[2]});
+    if (d2 >= least2) return false;
+    least2 = d2;
+    near_[vertex] = t;
+    return d2 <= known2;
+  };
+  // What was near to the vertex before is, more often than not.
+  const std::atomic_ref<std::uint32_t> last(last_near_[field_.cluster_of[vertex]]);
+  const std::uint32_t first = last.load(std::memory_order_relaxed);
+  if (first != kNoTriangle && is_near(first)) return known;
+  for (const std::uint32_t t : star(field_.image(vertex)))
+    if (t != first && is_near(t)) {
+      last.store(t, std::memory_order_relaxed);
+      return known;
+    }
   const double least = std::sqrt(least2);
   if (least <= enough) return least;
   return exact_closest_point(hierarchy_.view(), {x[0], x[1], x[2]}, least).distance;
+}
+
+bool SweptError::is_within(std::uint32_t triangle, double distance) const {
+  const double limit2 = distance * distance;
+  const std::uint32_t* const vertices = mesh_.triangles + 3 * std::size_t{triangle};
+  std::uint32_t to[3];
+  for (int i = 0; i < 3; ++i) to[i] = field_.image(vertices[i]);
+  const auto holds_all = [&](std::uint32_t t) {
+    const FieldMesh::Triangle& corners = field_.mesh.triangles[t];
+    for (int i = 0; i < 3; ++i) {
+      const double* x = mesh_.vertices + 3 * std::size_t{vertices[i]};
+      if (distance2(t, {x[0], x[1], x[2]}) > limit2) return false;
+    }
+    for (const std::uint32_t v : to)  // its own corners need no look
+      if (v != corners[0] && v != corners[1] && v != corners[2] &&
+          distance2(t, place_of(v)) > limit2)
+        return false;
+    return true;
+  };
+  for (int i = 0; i < 3; ++i) {
+    const std::uint32_t t = near_[vertices[i]];
+    bool tried = t == kNoTriangle;
+    for (int j = 0; j < i; ++j) tried |= near_[vertices[j]] == t;
+    if (!tried && holds_all(t)) return true;
+  }
+  for (int i = 0; i < 3; ++i) {
+    bool tried = false;
+    for (int j = 0; j < i; ++j) tried |= to[j] == to[i];
+    if (tried) continue;
+    for (const std::uint32_t t : star(to[i]))
+      if (holds_all(t)) return true;
+  }
+  return false;
 }
 
 double SweptError::farthest2(std::uint32_t field_triangle, const Prism& prism,
@@ -116,7 +167,7 @@ double SweptError::farthest2(std::uint32_t field_triangle, const Prism& prism,
 }
 
 double SweptError::bound(const Prism& prism, std::span<const std::uint32_t> candidates,
-                         double target) const {
+                         double target, bool one_may_do) const {
   const Point c = prism.centre();
   double least2 = kInfinite;
   std::uint32_t nearest = kNoTriangle;
@@ -131,12 +182,14 @@ double SweptError::bound(const Prism& prism, std::span<const std::uint32_t> cand
   const double target2 = target * target;
   if (nearest != kNoTriangle) {
     if (std::sqrt(least2) + radius <= target) return std::sqrt(least2) + radius;
-    double whole2 = farthest2(nearest, prism, target2);
-    for (const std::uint32_t t : candidates) {
+    if (one_may_do) {
+      double whole2 = farthest2(nearest, prism, target2);
+      for (const std::uint32_t t : candidates) {
+        if (whole2 <= target2) return std::sqrt(whole2);
+        if (t != nearest) whole2 = farthest2(t, prism, target2);
+      }
       if (whole2 <= target2) return std::sqrt(whole2);
-      if (t != nearest) whole2 = farthest2(t, prism, target2);
     }
-    if (whole2 <= target2) return std::sqrt(whole2);
     if (radius > target && within_slab(hierarchy_.view(), prism.corner, frames_[nearest].n, target))
       return target;
   }
@@ -152,26 +205,25 @@ double SweptError::bound(const Prism& prism, std::span<const std::uint32_t> cand
   if (radius <= kSmallestPart * target) return distance + radius;
   target = std::max(target, kSlack * distance);
   double most = 0;
-  for (const Prism& half : prism.halves()) most = std::max(most, bound(half, candidates, target));
+  for (const Prism& half : prism.halves())
+    most = std::max(most, bound(half, candidates, target, true));
   return most;
 }
 
-double SweptError::bound(std::uint32_t triangle, double target) const {
+double SweptError::bound(std::uint32_t triangle, double target, bool one_may_do) const {
   Prism prism;
   std::vector<std::uint32_t> candidates;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::uint32_t v = mesh_.triangles[3 * std::size_t{triangle} + i];
-    const std::uint32_t to = vertex_of_[v];
-    for (std::size_t k = 0; k < 3; ++k) {
-      prism.corner[i][k] = mesh_.vertices[3 * std::size_t{v} + k];
-      prism.corner[i + 3][k] = field_.vertices[to][k];
-    }
+    const std::uint32_t to = field_.image(v);
+    std::copy_n(mesh_.vertices + 3 * std::size_t{v}, 3, prism.corner[i].begin());
+    prism.corner[i + 3] = place_of(to);
     bool seen = false;
     for (std::size_t j = 0; j < i; ++j)
-      seen |= vertex_of_[mesh_.triangles[3 * std::size_t{triangle} + j]] == to;
+      seen |= field_.image(mesh_.triangles[3 * std::size_t{triangle} + j]) == to;
     if (!seen) candidates.insert(candidates.end(), star(to).begin(), star(to).end());
   }
-  return bound(prism, candidates, target);
+  return bound(prism, candidates, target, one_may_do);
 }
 
 }  // namespace ist

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bake/field/field_hierarchy.h"
-#include "bake/field/field_mesh.h"
+#include "bake/field/vertex_clusters.h"
 #include "mesh/mesh_view.h"
 #include "mesh/triangle_frame.h"
 
@@ -16,16 +16,20 @@ namespace ist {
 /// to their places in the field. Distances in the unit frame, before rounding.
 class SweptError {
  public:
-  /// All must outlive this. `vertex_of`: a mesh vertex's place in the field.
-  SweptError(const MeshView& mesh, const FieldMesh& field, const FieldHierarchy& hierarchy,
-             const std::vector<std::uint32_t>& vertex_of);
+  /// All must outlive this.
+  SweptError(const MeshView& mesh, const Clustered& field, const FieldHierarchy& hierarchy);
 
-  /// Of a used vertex of the mesh where it starts from; exact where above `enough`, else no less.
-  double at_vertex(std::uint32_t vertex, double enough) const;
+  /// Of a used vertex of the mesh where it starts from: exact where above `enough`, else no less;
+  /// at most `known` where it is not more. Safe from several threads for different vertices.
+  double at_vertex(std::uint32_t vertex, double known, double enough);
+
+  /// All that a triangle of the mesh sweeps is within `distance` of one triangle near its vertices'
+  /// places: bound() for that target is no more.
+  bool is_within(std::uint32_t triangle, double distance) const;
 
   /// A bound for all points that a triangle of the mesh sweeps, at most `target` where that can be
-  /// shown.
-  double bound(std::uint32_t triangle, double target) const;
+  /// shown. `one_may_do`: false where is_within() says no.
+  double bound(std::uint32_t triangle, double target, bool one_may_do) const;
 
  private:
   using Point = std::array<double, 3>;
@@ -45,15 +49,21 @@ class SweptError {
   /// Farthest corner from a triangle, squared; any value > limit2 once one is further. The distance
   /// to a triangle is convex, so that no point of the hull is further.
   double farthest2(std::uint32_t field_triangle, const Prism& prism, double limit2) const;
-  double bound(const Prism& prism, std::span<const std::uint32_t> candidates, double target) const;
+  double bound(const Prism& prism, std::span<const std::uint32_t> candidates, double target,
+               bool one_may_do) const;
+  Point place_of(std::uint32_t field_vertex) const {
+    const FieldMesh::Vertex& x = field_.mesh.vertices[field_vertex];
+    return {x[0], x[1], x[2]};
+  }
   std::span<const std::uint32_t> star(std::uint32_t field_vertex) const;
 
   const MeshView& mesh_;
-  const FieldMesh& field_;
+  const Clustered& field_;
   const FieldHierarchy& hierarchy_;
-  const std::vector<std::uint32_t>& vertex_of_;
   std::vector<TriangleFrame<double>> frames_;  ///< [field triangle]
   std::vector<std::uint32_t> first_, around_;  ///< the triangles around each field vertex
+  std::vector<std::uint32_t> near_;       ///< [mesh vertex] a triangle that it is near to, if known
+  std::vector<std::uint32_t> last_near_;  ///< [cluster] the last such; a hint alone
 };
 
 }  // namespace ist

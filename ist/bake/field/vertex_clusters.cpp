@@ -1,13 +1,15 @@
 #include "bake/field/vertex_clusters.h"
 
+#include <tbb/concurrent_vector.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
-#include <array>
+#include <atomic>
 #include <cmath>
-#include <utility>
+#include <numeric>
 
+#include "bake/field/cell_numbers.h"
 #include "mesh/triangle_frame.h"
 
 namespace ist {
@@ -15,55 +17,30 @@ namespace {
 
 /// Where the grid lies, in cells: off the planes that meshes like.
 constexpr double kShift[3] = {0.3711, 0.4393, 0.2937};
-/// How strongly the mean of a cluster's corners holds it where planes do not.
-constexpr double kPull = 1e-3;
+constexpr std::uint32_t kOpen = ~0u;  ///< no cluster, no vertex
+constexpr std::size_t kChunk = 8192;
+enum : std::uint8_t { kUnknown, kInDoubt, kKnown };  // of a cluster
 
-struct Clusters {
-  std::vector<std::uint32_t> of_vertex;
-  std::vector<std::array<std::int32_t, 3>> cell;  ///< [cluster]
-};
-
-std::array<std::int32_t, 3> cell_of(const double* x, double cell) {
-  std::array<std::int32_t, 3> at;
+CellNumbers::Cell cell_of(const double* x, double cell) {
+  CellNumbers::Cell at;
   for (std::size_t k = 0; k < 3; ++k)
     at[k] = static_cast<std::int32_t>(std::floor(x[k] / cell + kShift[k]));
   return at;
 }
 
-Clusters find_clusters(const MeshView& mesh, double cell) {
-  using Entry = std::pair<std::array<std::int32_t, 3>, std::uint32_t>;
-  std::vector<Entry> entries(mesh.vertex_count);
-  tbb::parallel_for(std::uint32_t{0}, mesh.vertex_count, [&](std::uint32_t v) {
-    entries[v] = {cell_of(mesh.vertices + 3 * std::size_t{v}, cell), v};
+std::size_t chunks_of(std::size_t count) { return (count + kChunk - 1) / kChunk; }
+
+/// Calls visit(chunk, i) for all i, in order within a chunk.
+template <class Visit>
+void for_chunks(std::size_t count, const Visit& visit) {
+  tbb::parallel_for(std::size_t{0}, chunks_of(count), [&](std::size_t chunk) {
+    const std::size_t end = std::min(count, (chunk + 1) * kChunk);
+    for (std::size_t i = chunk * kChunk; i < end; ++i) visit(chunk, i);
   });
-  tbb::parallel_sort(entries.begin(), entries.end());
-  Clusters clusters;
-  clusters.of_vertex.resize(mesh.vertex_count);
-  for (const auto& [at, v] : entries) {
-    if (clusters.cell.empty() || clusters.cell.back() != at) clusters.cell.push_back(at);
-    clusters.of_vertex[v] = static_cast<std::uint32_t>(clusters.cell.size() - 1);
-  }
-  return clusters;
 }
 
-/// The corners 3t + k of each cluster in ascending order.
-struct CornerLists {
-  std::vector<std::uint32_t> first, corner;
-
-  CornerLists(const MeshView& mesh, const Clusters& clusters)
-      : first(clusters.cell.size() + 1), corner(3 * std::size_t{mesh.triangle_count}) {
-    const auto cluster_of = [&](std::size_t c) { return clusters.of_vertex[mesh.triangles[c]]; };
-    for (std::size_t c = 0; c < corner.size(); ++c) ++first[cluster_of(c) + 1];
-    for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
-    std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
-    for (std::size_t c = 0; c < corner.size(); ++c)
-      corner[next[cluster_of(c)]++] = static_cast<std::uint32_t>(c);
-  }
-};
-
-/// Twice the area times the normal.
-std::array<double, 3> doubled_area(const MeshView& mesh, std::uint32_t triangle) {
-  const std::uint32_t* t = mesh.triangles + 3 * std::size_t{triangle};
+AreaVector area_vector(const MeshView& mesh, std::size_t triangle) {
+  const std::uint32_t* t = mesh.triangles + 3 * triangle;
   const double* p[3];
   for (int k = 0; k < 3; ++k) p[k] = mesh.vertices + 3 * std::size_t{t[k]};
   double u[3], v[3];
@@ -71,176 +48,196 @@ std::array<double, 3> doubled_area(const MeshView& mesh, std::uint32_t triangle)
     u[k] = p[1][k] - p[0][k];
     v[k] = p[2][k] - p[0][k];
   }
-  std::array<double, 3> out;
-  cross3(u, v, out.data());
-  return out;
+  AreaVector area;
+  cross3(u, v, area.n);
+  area.length = std::sqrt(dot3(area.n, area.n));
+  return area;
 }
 
-/// Solves the symmetric positive definite system a x = b.
-void solve(const double a[3][3], const double b[3], double x[3]) {
-  const double c00 = a[1][1] * a[2][2] - a[1][2] * a[1][2];
-  const double c01 = a[0][2] * a[1][2] - a[0][1] * a[2][2];
-  const double c02 = a[0][1] * a[1][2] - a[0][2] * a[1][1];
-  const double c11 = a[0][0] * a[2][2] - a[0][2] * a[0][2];
-  const double c12 = a[0][1] * a[0][2] - a[0][0] * a[1][2];
-  const double c22 = a[0][0] * a[1][1] - a[0][1] * a[0][1];
-  const double determinant = a[0][0] * c00 + a[0][1] * c01 + a[0][2] * c02;
-  x[0] = (c00 * b[0] + c01 * b[1] + c02 * b[2]) / determinant;
-  x[1] = (c01 * b[0] + c11 * b[1] + c12 * b[2]) / determinant;
-  x[2] = (c02 * b[0] + c12 * b[1] + c22 * b[2]) / determinant;
-}
-
-/// Where a cluster of these corners goes: as near as can be to the planes of their triangles,
-/// weighted by area.
-std::array<double, 3> placed(const MeshView& mesh, const std::uint32_t* corners, std::size_t count,
-                             const std::vector<std::array<double, 3>>& areas) {
-  double weight = 0, mean[3] = {};
-  for (std::size_t i = 0; i < count; ++i) {
-    const double* n = areas[corners[i] / 3].data();
-    const double area = std::sqrt(dot3(n, n));
-    const double* x = mesh.vertices + 3 * std::size_t{mesh.triangles[corners[i]]};
-    weight += area;
-    for (int k = 0; k < 3; ++k) mean[k] += area * x[k];
+void lower(std::uint32_t& value, std::uint32_t to) {
+  const std::atomic_ref<std::uint32_t> shared(value);
+  std::uint32_t was = shared.load(std::memory_order_relaxed);
+  while (to < was && !shared.compare_exchange_weak(was, to, std::memory_order_relaxed)) {
   }
-  if (!(weight > 0)) {
-    const double* x = mesh.vertices + 3 * std::size_t{mesh.triangles[corners[0]]};
-    return {x[0], x[1], x[2]};
-  }
-  for (double& m : mean) m /= weight;
-  double a[3][3] = {}, b[3] = {};
-  for (std::size_t i = 0; i < count; ++i) {
-    const double* n = areas[corners[i] / 3].data();
-    const double area = std::sqrt(dot3(n, n));
-    if (!(area > 0)) continue;
-    const double* x = mesh.vertices + 3 * std::size_t{mesh.triangles[corners[i]]};
-    const double off[3] = {x[0] - mean[0], x[1] - mean[1], x[2] - mean[2]};
-    const double height = dot3(n, off) / area;
-    for (int k = 0; k < 3; ++k) {
-      b[k] += n[k] * height;
-      for (int l = 0; l < 3; ++l) a[k][l] += n[k] * (n[l] / area);
-    }
-  }
-  for (int k = 0; k < 3; ++k) a[k][k] += kPull * weight;
-  for (int k = 0; k < 3; ++k)
-    for (int l = 0; l < k; ++l) a[k][l] = a[l][k];
-  double y[3];
-  solve(a, b, y);
-  return {mean[0] + y[0], mean[1] + y[1], mean[2] + y[2]};
-}
-
-/// Of the plane of a corner's triangle that passes farthest from p.
-double farthest_plane(const MeshView& mesh, const std::array<double, 3>& p,
-                      const std::uint32_t* corners, std::size_t count,
-                      const std::vector<std::array<double, 3>>& areas) {
-  double most = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double* n = areas[corners[i] / 3].data();
-    const double area = std::sqrt(dot3(n, n));
-    if (!(area > 0)) continue;
-    const double* x = mesh.vertices + 3 * std::size_t{mesh.triangles[corners[i]]};
-    const double off[3] = {x[0] - p[0], x[1] - p[1], x[2] - p[2]};
-    most = std::max(most, std::fabs(dot3(n, off)) / area);
-  }
-  return most;
 }
 
 }  // namespace
 
-VertexClusters::VertexClusters(const MeshView& mesh, double coarsest, int levels) : mesh_(mesh) {
-  std::vector<std::array<double, 3>> areas(mesh.triangle_count);
-  tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count,
-                    [&](std::uint32_t t) { areas[t] = doubled_area(mesh, t); });
-  double cell = coarsest;
-  for (int l = 0; l < levels; ++l, cell /= 2) {
-    Clusters clusters = find_clusters(mesh, cell);
-    const CornerLists lists(mesh, clusters);
-    Level& level = levels_.emplace_back();
-    level.place.resize(clusters.cell.size());
-    level.off.resize(clusters.cell.size());
-    tbb::parallel_for(std::size_t{0}, clusters.cell.size(), [&](std::size_t c) {
-      const std::uint32_t* const corners = lists.corner.data() + lists.first[c];
-      const std::size_t count = lists.first[c + 1] - lists.first[c];
-      if (count == 0) return;
-      std::array<double, 3> x = placed(mesh, corners, count, areas);
-      for (std::size_t k = 0; k < 3; ++k) {
-        const double low = (clusters.cell[c][k] - kShift[k] - 0.5) * cell;
-        x[k] = std::clamp(x[k], low, low + 2 * cell);
-      }
-      level.place[c] = x;
-      level.off[c] = farthest_plane(mesh, x, corners, count, areas);
-    });
-    level.of_vertex = std::move(clusters.of_vertex);
-  }
+VertexClusters::VertexClusters(const MeshView& mesh, double coarsest, int levels)
+    : mesh_(mesh), areas_(mesh.triangle_count), levels_(static_cast<std::size_t>(levels)) {
+  tbb::parallel_invoke(
+      [&] {
+        corners_ =
+            IndexLists({mesh.triangles, 3 * std::size_t{mesh.triangle_count}}, mesh.vertex_count);
+      },
+      [&] {
+        tbb::parallel_for(std::size_t{0}, levels_.size(), [&](std::size_t l) {
+          levels_[l] = level_of(std::ldexp(coarsest, -static_cast<int>(l)));
+        });
+      },
+      [&] {
+        for_chunks(areas_.size(),
+                   [&](std::size_t, std::size_t t) { areas_[t] = area_vector(mesh, t); });
+      });
 }
 
-std::vector<std::uint32_t> VertexClusters::chosen(double tolerance) const {
-  std::vector<std::uint32_t> cluster_of(mesh_.vertex_count);
-  tbb::parallel_for(std::uint32_t{0}, mesh_.vertex_count, [&](std::uint32_t v) {
-    std::size_t before = 0;
-    for (const Level& level : levels_) {
-      const std::uint32_t cluster = level.of_vertex[v];
-      if (level.off[cluster] <= tolerance) {
-        cluster_of[v] = static_cast<std::uint32_t>(before + cluster);
-        return;
-      }
-      before += level.place.size();
+VertexClusters::Level VertexClusters::level_of(double cell) const {
+  Level level;
+  level.cell = cell;
+  level.of_vertex.resize(mesh_.vertex_count);
+  CellNumbers numbers;
+  for (std::size_t v = 0; v < level.of_vertex.size(); ++v)
+    level.of_vertex[v] = numbers.of(cell_of(mesh_.vertices + 3 * v, cell));
+  level.vertices = IndexLists(level.of_vertex, numbers.count());
+  level.place.resize(numbers.count());
+  level.off.resize(numbers.count());
+  level.known.resize(numbers.count());
+  return level;
+}
+
+CornerPlane VertexClusters::plane_of(std::uint32_t corner, std::uint32_t vertex) const {
+  CornerPlane plane;
+  plane.triangle = areas_[corner / 3];
+  std::copy_n(mesh_.vertices + 3 * std::size_t{vertex}, 3, plane.x);
+  return plane;
+}
+
+void VertexClusters::settle(Level& level, std::uint32_t cluster, double tolerance) const {
+  constexpr std::size_t kSamples = 24;
+  const std::span<const std::uint32_t> vertices = level.vertices[cluster];
+  double& off = level.off[cluster];
+  thread_local std::vector<CornerPlane> planes;
+  if (vertices.size() >= 4 * kSamples) {  // else to look at all takes no longer
+    planes.clear();
+    for (std::size_t i = 0; i < kSamples; ++i) {
+      const std::uint32_t v = vertices[i * vertices.size() / kSamples];
+      const auto corners = corners_[v];
+      if (!corners.empty()) planes.push_back(plane_of(corners[i % corners.size()], v));
     }
-    cluster_of[v] = static_cast<std::uint32_t>(before + v);
-  });
-  return cluster_of;
+    off = std::max(off, nearest_of_any(planes, 4 * level.cell));
+  }
+  level.known[cluster] = off > tolerance ? kUnknown : kKnown;
+  if (off > tolerance) return;
+  // What is summed is summed in the order of corners.
+  thread_local std::vector<std::uint64_t> corners;
+  corners.clear();
+  for (const std::uint32_t v : vertices)
+    for (const std::uint64_t corner : corners_[v]) {
+      __builtin_prefetch(&areas_[corner / 3]);
+      corners.push_back(corner << 32 | v);
+    }
+  if (corners.empty()) return;
+  std::sort(corners.begin(), corners.end());
+  planes.clear();
+  for (const std::uint64_t at : corners)
+    planes.push_back(
+        plane_of(static_cast<std::uint32_t>(at >> 32), static_cast<std::uint32_t>(at)));
+  std::array<double, 3> x = placed(planes);
+  const CellNumbers::Cell at = cell_of(mesh_.vertices + 3 * std::size_t{vertices[0]}, level.cell);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double low = (at[k] - kShift[k] - 0.5) * level.cell;
+    x[k] = std::clamp(x[k], low, low + 2 * level.cell);
+  }
+  level.place[cluster] = x;
+  off = farthest_plane(planes, x);
 }
 
-void VertexClusters::raise(const std::vector<double>& distance_of_vertex, double tolerance) {
-  const std::vector<std::uint32_t> cluster_of = chosen(tolerance);
-  for (std::size_t v = 0; v < cluster_of.size(); ++v) {
-    std::size_t cluster = cluster_of[v];
+const std::vector<std::uint32_t>& VertexClusters::chosen(double tolerance) {
+  if (tolerance == chosen_within_) return chosen_;
+  chosen_.assign(mesh_.vertex_count, kOpen);
+  for (;;) {
+    tbb::concurrent_vector<Doubt> doubts;
+    for_chunks(chosen_.size(), [&](std::size_t, std::size_t v) {
+      if (chosen_[v] != kOpen) return;
+      std::size_t before = 0;
+      for (std::uint32_t l = 0; l < levels_.size(); ++l) {
+        Level& level = levels_[l];
+        const std::uint32_t cluster = level.of_vertex[v];
+        if (level.off[cluster] <= tolerance) {
+          const std::atomic_ref<std::uint8_t> known(level.known[cluster]);
+          const std::uint8_t was = known.load(std::memory_order_relaxed);
+          if (was == kKnown) chosen_[v] = static_cast<std::uint32_t>(before + cluster);
+          if (was == kUnknown && known.exchange(kInDoubt, std::memory_order_relaxed) == kUnknown)
+            doubts.push_back({l, cluster});
+          return;
+        }
+        before += level.place.size();
+      }
+      chosen_[v] = static_cast<std::uint32_t>(before + v);
+    });
+    if (doubts.empty()) break;
+    tbb::parallel_for(std::size_t{0}, doubts.size(), [&](std::size_t i) {
+      settle(levels_[doubts[i].level], doubts[i].cluster, tolerance);
+    });
+  }
+  chosen_within_ = tolerance;
+  return chosen_;
+}
+
+void VertexClusters::raise(const std::vector<double>& distance_of_cluster) {
+  for (std::size_t i = 0; i < names_.size(); ++i) {
+    std::size_t cluster = names_[i];
     for (Level& level : levels_) {
       if (cluster < level.off.size()) {
-        level.off[cluster] = std::max(level.off[cluster], distance_of_vertex[v]);
+        level.off[cluster] = std::max(level.off[cluster], distance_of_cluster[i]);
         break;
       }
       cluster -= level.off.size();
     }
   }
+  chosen_within_ = -1;
 }
 
 std::vector<FieldMesh::Triangle> VertexClusters::spanning(
     const std::vector<std::uint32_t>& cluster_of) const {
-  std::vector<FieldMesh::Triangle> triangles;
-  for (std::size_t t = 0; t < mesh_.triangle_count; ++t) {
+  std::vector<std::vector<FieldMesh::Triangle>> parts(chunks_of(mesh_.triangle_count));
+  for_chunks(mesh_.triangle_count, [&](std::size_t chunk, std::size_t t) {
     FieldMesh::Triangle corners;
     for (std::size_t k = 0; k < 3; ++k) corners[k] = cluster_of[mesh_.triangles[3 * t + k]];
     if (corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0])
-      triangles.push_back(corners);
-  }
+      parts[chunk].push_back(corners);
+  });
+  std::vector<FieldMesh::Triangle> triangles;
+  for (const auto& part : parts) triangles.insert(triangles.end(), part.begin(), part.end());
   return triangles;
 }
 
-std::size_t VertexClusters::triangles_within(double tolerance) const {
+std::size_t VertexClusters::triangles_within(double tolerance) {
   return reduced(spanning(chosen(tolerance))).size();
 }
 
-Clustered VertexClusters::within(double tolerance) const {
-  const std::vector<std::uint32_t> cluster_of = chosen(tolerance);
-  Clustered out;
-  // Only clusters that are chosen become vertices.
+Clustered VertexClusters::within(double tolerance) {
+  const std::vector<std::uint32_t>& cluster_of = chosen(tolerance);
   std::size_t names = mesh_.vertex_count;
   for (const Level& level : levels_) names += level.place.size();
-  std::vector<std::uint32_t> vertex_of_cluster(names, kNoTriangle);
-  out.vertex_of.resize(mesh_.vertex_count);
-  for (std::uint32_t v = 0; v < mesh_.vertex_count; ++v) {
-    std::uint32_t& vertex = vertex_of_cluster[cluster_of[v]];
-    if (vertex == kNoTriangle) {
-      vertex = static_cast<std::uint32_t>(out.mesh.vertices.size());
-      const std::array<double, 3> x = place_of(cluster_of[v], v);
-      out.mesh.vertices.push_back(
-          {static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2])});
-    }
-    out.vertex_of[v] = vertex;
-  }
-  out.mesh.triangles = spanning(out.vertex_of);
-  const std::vector<std::uint32_t> merged = reduce(out.mesh);
-  for (std::uint32_t& vertex : out.vertex_of) vertex = merged[vertex];
+  // Only clusters that are chosen become vertices, in the order of their first vertices.
+  std::vector<std::uint32_t> first(names, kOpen), before(chunks_of(cluster_of.size()) + 1);
+  for_chunks(cluster_of.size(), [&](std::size_t, std::size_t v) {
+    lower(first[cluster_of[v]], static_cast<std::uint32_t>(v));
+  });
+  for_chunks(cluster_of.size(), [&](std::size_t chunk, std::size_t v) {
+    if (first[cluster_of[v]] == v) ++before[chunk + 1];
+  });
+  std::partial_sum(before.begin(), before.end(), before.begin());
+  Clustered out;
+  out.cluster_of.resize(mesh_.vertex_count);
+  out.mesh.vertices.resize(before.back());
+  names_.resize(before.back());
+  for_chunks(cluster_of.size(), [&](std::size_t chunk, std::size_t v) {
+    if (first[cluster_of[v]] != v) return;
+    const std::uint32_t number = before[chunk]++;
+    const std::array<double, 3> x = place_of(cluster_of[v], static_cast<std::uint32_t>(v));
+    out.mesh.vertices[number] = {static_cast<float>(x[0]), static_cast<float>(x[1]),
+                                 static_cast<float>(x[2])};
+    out.cluster_of[v] = number;
+    names_[number] = cluster_of[v];
+  });
+  for_chunks(cluster_of.size(), [&](std::size_t, std::size_t v) {
+    const std::uint32_t at = first[cluster_of[v]];
+    if (at != v) out.cluster_of[v] = out.cluster_of[at];
+  });
+  out.mesh.triangles = spanning(out.cluster_of);
+  out.vertex_of = reduce(out.mesh);
   return out;
 }
 

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "bake/field/corner_planes.h"
 #include "bake/field/field_mesh.h"
+#include "bake/field/index_lists.h"
 #include "mesh/mesh_view.h"
 
 namespace ist {
@@ -13,7 +15,12 @@ namespace ist {
 /// A surface with its vertices clustered.
 struct Clustered {
   FieldMesh mesh;
-  std::vector<std::uint32_t> vertex_of;  ///< a mesh vertex's place in `mesh`
+  std::vector<std::uint32_t> cluster_of;  ///< [mesh vertex]
+  std::vector<std::uint32_t> vertex_of;   ///< [cluster] its place in `mesh`; some share one
+
+  std::uint32_t image(std::uint32_t mesh_vertex) const {
+    return vertex_of[cluster_of[mesh_vertex]];
+  }
 };
 
 /// Clusters of a closed mesh's vertices: those in one cell of an octree become one, in cells as
@@ -27,29 +34,45 @@ class VertexClusters {
 
   /// Vertices go to the largest cell in which the planes of all triangles pass within `tolerance`
   /// (unit frame) of the cluster's place; where no cell is small enough, they stay.
-  Clustered within(double tolerance) const;
+  Clustered within(double tolerance);
 
-  /// Counts a vertex as so far (unit frame) from the cluster that within() put it into, if that is
-  /// further than its planes are.
-  void raise(const std::vector<double>& distance_of_vertex, double tolerance);
+  /// Counts the clusters of the last within() as so far (unit frame) from their vertices, where
+  /// that is further than their planes are.
+  void raise(const std::vector<double>& distance_of_cluster);
 
   /// How many triangles within() leaves before coordinates are rounded.
-  std::size_t triangles_within(double tolerance) const;
+  std::size_t triangles_within(double tolerance);
 
  private:
+  /// What is known of a cluster comes when it is asked for: most are far too large or too small.
   struct Level {
+    double cell;  ///< edge, unit frame
     std::vector<std::uint32_t> of_vertex;
-    std::vector<std::array<double, 3>> place;  ///< [cluster] unit frame
-    std::vector<double> off;                   ///< [cluster] of the farthest plane, unit frame
+    IndexLists vertices;                       ///< [cluster]
+    std::vector<std::array<double, 3>> place;  ///< [cluster] where known; unit frame
+    std::vector<double> off;  ///< [cluster] of the farthest plane, or less until known; unit frame
+    std::vector<std::uint8_t> known;  ///< [cluster] or asked for
+  };
+  struct Doubt {
+    std::uint32_t level, cluster;
   };
 
+  Level level_of(double cell) const;
+  /// Finds out whether a cluster is within the tolerance.
+  void settle(Level& level, std::uint32_t cluster, double tolerance) const;
+  CornerPlane plane_of(std::uint32_t corner, std::uint32_t vertex) const;
   /// Names of clusters of all levels, and of single vertices after them.
-  std::vector<std::uint32_t> chosen(double tolerance) const;
+  const std::vector<std::uint32_t>& chosen(double tolerance);
   std::array<double, 3> place_of(std::size_t cluster, std::uint32_t vertex) const;
   std::vector<FieldMesh::Triangle> spanning(const std::vector<std::uint32_t>& cluster_of) const;
 
   const MeshView mesh_;
+  IndexLists corners_;             ///< [vertex] 3 triangle + k
+  std::vector<AreaVector> areas_;  ///< [triangle]
   std::vector<Level> levels_;
+  std::vector<std::uint32_t> chosen_;
+  double chosen_within_ = -1;         ///< the tolerance of chosen_
+  std::vector<std::uint32_t> names_;  ///< of the clusters of the last within()
 };
 
 }  // namespace ist

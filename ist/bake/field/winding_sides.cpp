@@ -26,10 +26,11 @@ Groups find_groups(const MeshView& mesh, const std::vector<std::uint8_t>& apart)
     triangles[t] = {mesh.triangles[3 * t], mesh.triangles[3 * t + 1], mesh.triangles[3 * t + 2]};
   const EdgeTable edges(triangles);
   DisjointSets sets(triangles.size());
-  for (std::size_t e = 0; e < edges.size(); ++e)
+  tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
     if (const auto sides = edges.sides(e);
         sides.size() == 2 && apart[sides[0] / 3] == 0 && apart[sides[1] / 3] == 0)
       sets.unite(sides[0] / 3, sides[1] / 3);
+  });
   Groups groups;
   groups.of_triangle.resize(triangles.size());
   groups.representative.resize(triangles.size(), kNoTriangle);

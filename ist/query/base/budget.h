@@ -19,6 +19,9 @@ struct DescentLimits {
   bool keep_rounding = false;  ///< lenses that graze are not summed again in double
 };
 
+/// [µs] A deadline that is over before anything is looked at.
+inline constexpr double kOver = 1e-6;
+
 /// The limits that a query's settings set; a separation has fewer.
 template <class Settings>
 DescentLimits limits_of(const Settings& settings) noexcept {
@@ -49,7 +52,6 @@ class Stopwatch {
 
  private:
   using Clock = std::chrono::steady_clock;
-  static constexpr double kOver = 1e-6;  // [µs]
   Clock::time_point start_;
 };
 
@@ -65,7 +67,11 @@ class Budget {
         timed_(limits.deadline_us > 0) {
     if (timed_) {
       start_ = last_look_ = Clock::now();
-      allowed_ = std::chrono::duration<double>(std::max(limits.deadline_us, 1e-6) * 1e-6);
+      allowed_ = std::chrono::duration<double>(std::max(limits.deadline_us, kOver) * 1e-6);
+      if (limits.deadline_us <= kOver) {  // however slow the clock, and whoever had the thread
+        start_ -= std::chrono::seconds(1);
+        stalls_ = kMostStalls;
+      }
     }
   }
 

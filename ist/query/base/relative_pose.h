@@ -37,6 +37,12 @@ struct RelativePose {
   }
 };
 
+/// How a number grows with motions of B, A's unit frame.
+struct PoseSlope {
+  Eigen::Vector3d by_translation = Eigen::Vector3d::Zero();
+  Eigen::Vector3d by_rotation = Eigen::Vector3d::Zero();  ///< about B's unit-frame origin
+};
+
 /// Normalised; empty if pose or scale is not usable (QueryStatus::invalid_input).
 std::optional<Eigen::Quaterniond> usable_rotation(const Pose& pose, double scale) noexcept;
 

@@ -132,6 +132,27 @@ ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info) {
   return IST_OK;
 }
 
+ist_status_t ist_tree_get_predicted_errors(const ist_tree_t* tree, ist_predicted_errors_t* errors) {
+  static_assert(IST_TRIAL_PLATE == static_cast<int>(ist::TrialPartner::plate));
+  const ist_status_t room = clear(errors);
+  if (room != IST_OK) return room;
+  TreeView view;
+  const ist_status_t status = view_of(tree, view);
+  if (status != IST_OK) return status;
+  const ist::PredictedErrors found = view.predicted_errors();
+  errors->poses = found.poses;
+  static_assert(std::size(ist_predicted_errors_t{}.classes) == found.classes.size());
+  for (std::size_t i = 0; i < found.classes.size(); ++i)
+    errors->classes[i] = {found.classes[i].from, found.classes[i].to, found.classes[i].median};
+  errors->target_error = found.target_error;
+  errors->target_overlap = found.target_overlap;
+  errors->measured_error = found.measured_error;
+  errors->measured_poses = found.measured_poses;
+  errors->worst_partner = static_cast<ist_trial_partner_t>(found.worst_partner);
+  errors->target_met = found.target_met() ? 1 : 0;
+  return IST_OK;
+}
+
 ist_status_t ist_workspace_make(std::size_t capacity, const ist_allocator_t* allocator,
                                 ist_workspace_t* workspace) {
   if (workspace == nullptr) return IST_NULL_POINTER;

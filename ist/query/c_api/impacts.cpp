@@ -53,13 +53,16 @@ ist_status_t ist_motion_between(const ist_pose_t* from, const ist_pose_t* to, do
 
 ist_status_t ist_moved(const ist_pose_t* start, double scale, const ist_motion_t* motion,
                        double time, ist_pose_t* pose) {
-  if (start == nullptr || motion == nullptr || pose == nullptr) return IST_NULL_POINTER;
+  if (pose == nullptr) return IST_NULL_POINTER;
   ist::PlacedTree object;
-  object.pose = std::bit_cast<ist::Pose>(*start);
+  if (start != nullptr) object.pose = std::bit_cast<ist::Pose>(*start);
+  *pose = {};  // which may be `start`
+  if (start == nullptr || motion == nullptr) return IST_NULL_POINTER;
   object.scale = scale == 0 ? 1 : scale;
   object = ist::moved(object, read(motion), time);
+  if (!ist::usable_rotation(object.pose, object.scale)) return IST_INVALID_INPUT;
   *pose = std::bit_cast<ist_pose_t>(object.pose);
-  return ist::usable_rotation(object.pose, object.scale) ? IST_OK : IST_INVALID_INPUT;
+  return IST_OK;
 }
 
 ist_status_t ist_time_of_impact(const ist_placed_tree_t* a, const ist_placed_tree_t* b,

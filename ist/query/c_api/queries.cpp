@@ -3,7 +3,7 @@
 
 #include <ist/overlap.h>
 
-#include "query/base/batch.h"
+#include "query/base/relative_pose.h"
 #include "query/c_api/ask.h"
 #include "query/c_api/structs.h"
 
@@ -72,6 +72,17 @@ ist_status_t find_both(const Solid* a, const ist_placed_tree_t* b,
   return status;
 }
 
+ist_status_t check_room(const ist_contact_patches_t* given) noexcept {
+  const ist_status_t status = check_size(given);
+  if (status != IST_OK) return status;
+  if (given->patch_size != sizeof(ist_contact_patch_t)) return IST_WRONG_SIZE;
+  return given->patches == nullptr && given->capacity > 0 ? IST_NULL_POINTER : IST_OK;
+}
+
+std::span<ContactPatch> room_of(const ist_contact_patches_t& given) noexcept {
+  return {reinterpret_cast<ContactPatch*>(given.patches), given.capacity};
+}
+
 template <class Solid>
 ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
                           const ist_contact_settings_t* given, ist_workspace_t* workspace,
@@ -80,51 +91,19 @@ ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
   if (status == IST_OK) status = check_size(patches);
   if (status == IST_OK) {
     patches->count = 0;
-    if (patches->patch_size != sizeof(ist_contact_patch_t)) status = IST_WRONG_SIZE;
-    if (patches->patches == nullptr && patches->capacity > 0) status = IST_NULL_POINTER;
+    status = check_room(patches);
   }
   ContactSettings settings;
   if (status == IST_OK) status = read(given, settings);
   if (status == IST_OK)
     status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
-      const std::span<ContactPatch> room(reinterpret_cast<ContactPatch*>(patches->patches),
-                                         patches->capacity);
-      const ContactPatches found = contact_patches(x, y, settings, scratch, room);
+      const ContactPatches found = contact_patches(x, y, settings, scratch, room_of(*patches));
       patches->count = found.count;
       if (whole != nullptr) write(found.penetration, *whole);
       return status_of(found.penetration.status);
     });
   if (whole != nullptr && whole->size == sizeof *whole) noted(status, *whole);
   return status;
-}
-
-template <class Pair>
-ist_status_t find_batch(const Pair* pairs, std::size_t count,
-                        const ist_penetration_settings_t* given, ist_workspace_t* workspaces,
-                        std::size_t workers, ist_penetration_t* answers, std::size_t answer_size,
-                        const ist_parallel_t* parallel) noexcept {
-  if (count > 0 && (pairs == nullptr || answers == nullptr)) return IST_NULL_POINTER;
-  if (answer_size != sizeof(ist_penetration_t)) return IST_WRONG_SIZE;
-  if (workers > 0 && workspaces == nullptr) return IST_NULL_POINTER;
-  PenetrationSettings settings;
-  ist_status_t status = read(given, settings);
-  if (status == IST_OK && parallel != nullptr) status = check_size(parallel);
-  for (std::size_t i = 0; i < workers && status == IST_OK; ++i)
-    workspace_of(workspaces + i, status);
-  if (status != IST_OK) return status;
-  if (workers == 0) {
-    for (std::size_t i = 0; i < count; ++i) write(unknown_penetration(), answers[i]);
-    return IST_OK;
-  }
-  const ParallelFor threads =
-      parallel == nullptr ? ParallelFor{} : ParallelFor{parallel->run, parallel->pool};
-  answer_all(count, workers, threads, [&](std::size_t i, std::size_t worker) {
-    answers[i].size = sizeof answers[i];
-    // A pool that counts wrongly is told by the answer.
-    ist_workspace_t* const scratch = worker < workers ? workspaces + worker : nullptr;
-    find_penetration(pairs[i].a, pairs[i].b, given, scratch, answers + i);
-  });
-  return IST_OK;
 }
 
 }  // namespace
@@ -211,18 +190,18 @@ ist_status_t ist_field_contact_patches(const ist_placed_field_t* a, const ist_pl
   return find_patches(a, b, settings, workspace, patches, whole);
 }
 
-ist_status_t ist_penetration_batch(const ist_pair_t* pairs, std::size_t count,
-                                   const ist_penetration_settings_t* settings,
-                                   ist_workspace_t* workspaces, std::size_t workers,
-                                   ist_penetration_t* answers, std::size_t answer_size,
-                                   const ist_parallel_t* parallel) {
-  return find_batch(pairs, count, settings, workspaces, workers, answers, answer_size, parallel);
-}
-
-ist_status_t ist_field_penetration_batch(const ist_field_pair_t* pairs, std::size_t count,
-                                         const ist_penetration_settings_t* settings,
-                                         ist_workspace_t* workspaces, std::size_t workers,
-                                         ist_penetration_t* answers, std::size_t answer_size,
-                                         const ist_parallel_t* parallel) {
-  return find_batch(pairs, count, settings, workspaces, workers, answers, answer_size, parallel);
+ist_status_t ist_patches_without_protrusion(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                            const ist_contact_settings_t* settings,
+                                            ist_contact_patches_t* patches) {
+  ist_status_t status = check_room(patches);
+  if (status == IST_OK && patches->count > patches->capacity) status = IST_INVALID_INPUT;
+  ist::PlacedTree first, second;
+  if (status == IST_OK) status = read(a, first);
+  if (status == IST_OK) status = read(b, second);
+  ist::ContactSettings found_with;
+  if (status == IST_OK) status = read(settings, found_with);
+  if (status == IST_OK && !ist::relative_pose(first, second)) status = IST_INVALID_INPUT;
+  if (status != IST_OK) return status;
+  ist::without_protrusion(room_of(*patches).first(patches->count), first, second, found_with);
+  return IST_OK;
 }

@@ -36,6 +36,8 @@ const char* ist_describe(ist_status_t status) {
       return describe(AssetStatus::corrupt_hash);
     case IST_CORRUPT_LAYOUT:
       return describe(AssetStatus::corrupt_layout);
+    case IST_NO_DURATION:
+      return "ist_impact_settings_t::duration is 0 and asks about no time: set it";
     default:
       return "no status of this library";
   }

@@ -114,7 +114,7 @@ bool ContactDivision::open(ContactPart& part) const {
 std::uint64_t ContactDivision::cut(const ContactPart& part) const {
   struct Member {
     Eigen::Vector3d centre;
-    double weight, place;
+    double weight;
     std::uint64_t bit;
   };
   Member members[kMembers];
@@ -125,7 +125,7 @@ std::uint64_t ContactDivision::cut(const ContactPart& part) const {
     const NodeBall ball =
         tree_.ball(part.level, part.first + static_cast<std::uint32_t>(std::countr_zero(left)));
     const double cube = ball.r * ball.r * ball.r;
-    members[count++] = {{ball.centre[0], ball.centre[1], ball.centre[2]}, cube, 0, left & -left};
+    members[count++] = {{ball.centre[0], ball.centre[1], ball.centre[2]}, cube, left & -left};
     weight += cube;
     moment += cube * members[count - 1].centre;
   }
@@ -133,17 +133,26 @@ std::uint64_t ContactDivision::cut(const ContactPart& part) const {
   // Along the line through two of the farthest …
   const auto farthest_from = [&](const Eigen::Vector3d& x) {
     std::uint32_t farthest = 0;
-    for (std::uint32_t i = 1; i < count; ++i)
-      if ((members[i].centre - x).squaredNorm() > (members[farthest].centre - x).squaredNorm())
-        farthest = i;
+    double most = -1;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const double square = (members[i].centre - x).squaredNorm();
+      if (!(square > most)) continue;
+      most = square;
+      farthest = i;
+    }
     return members[farthest].centre;
   };
   const Eigen::Vector3d one_end = farthest_from(moment / weight);
   const Eigen::Vector3d axis = farthest_from(one_end) - one_end;
-  for (std::uint32_t i = 0; i < count; ++i) members[i].place = axis.dot(members[i].centre);
-  for (std::uint32_t i = 1; i < count; ++i)
-    for (std::uint32_t k = i; k > 0 && members[k].place < members[k - 1].place; --k)
-      std::swap(members[k], members[k - 1]);
+  struct Place {
+    double along;
+    std::uint32_t member;
+  };
+  Place places[kMembers];
+  for (std::uint32_t i = 0; i < count; ++i) places[i] = {axis.dot(members[i].centre), i};
+  std::sort(places, places + count, [](const Place& l, const Place& r) {
+    return l.along != r.along ? l.along < r.along : l.member < r.member;
+  });
 
   // … at the least sum of squares about both sides' means: they differ only in −|Σ w x|²/Σ w.
   double best = -std::numeric_limits<double>::infinity();
@@ -151,9 +160,10 @@ std::uint64_t ContactDivision::cut(const ContactPart& part) const {
   double near = 0;
   Eigen::Vector3d near_moment = Eigen::Vector3d::Zero();
   for (std::uint32_t i = 0; i + 1 < count; ++i) {
-    side |= members[i].bit;
-    near += members[i].weight;
-    near_moment += members[i].weight * members[i].centre;
+    const Member& member = members[places[i].member];
+    side |= member.bit;
+    near += member.weight;
+    near_moment += member.weight * member.centre;
     const double gain =
         near_moment.squaredNorm() / near + (moment - near_moment).squaredNorm() / (weight - near);
     if (!(gain > best)) continue;

@@ -37,8 +37,8 @@ CoincidenceWeight coincidence_weight(const TreeHeader& tree, const Similarity& a
   result.weight = smooth_step(t);
   if (t == 1) return result;
   const double slope = -6 * t * (1 - t) / ((kApart - kAlone) * radius) / distance;
-  result.by_translation = slope * way;
-  result.by_rotation =
+  result.slope.by_translation = slope * way;
+  result.slope.by_rotation =
       slope * (lever.cross(way) - spread * Eigen::Vector3d(m[5] - m[7], m[6] - m[2], m[1] - m[3]));
   return result;
 }
@@ -59,12 +59,12 @@ Penetration mix(const Penetration& x, const Penetration& y, double weight) noexc
   return result;
 }
 
-void add_slope(const CoincidenceWeight& weight, double step, const RelativePose& pose,
+void add_slope(const PoseSlope& slope, double step, const RelativePose& pose,
                Penetration& mixed) noexcept {
-  const Eigen::Vector3d push = step / pose.unit_a * (pose.rotation_a * weight.by_translation);
+  const Eigen::Vector3d push = step / pose.unit_a * (pose.rotation_a * slope.by_translation);
   mixed.translation_gradient += push;
   mixed.rotation_gradient +=
-      step * (pose.rotation_a * weight.by_rotation) + pose.unit_offset_b.cross(push);
+      step * (pose.rotation_a * slope.by_rotation) + pose.unit_offset_b.cross(push);
 }
 
 }  // namespace ist

@@ -16,9 +16,7 @@ namespace ist {
 /// mean of both ways round, which has no force where the copies coincide.
 struct CoincidenceWeight {
   double weight = 0;  ///< [0, 1] part of the unlike levels; 0 from 1.6 mean radii of way on
-  Eigen::Vector3d by_translation = Eigen::Vector3d::Zero();  ///< slope, A's unit frame
-  /// Likewise by a rotation of B about its unit-frame origin.
-  Eigen::Vector3d by_rotation = Eigen::Vector3d::Zero();
+  PoseSlope slope;
 };
 
 /// Whether both are the same bytes, and hold a coarser level.
@@ -34,9 +32,9 @@ CoincidenceWeight coincidence_weight(const TreeHeader& tree, const Similarity& a
 /// (1 − weight) of x and the weight's part of y.
 Penetration mix(const Penetration& x, const Penetration& y, double weight) noexcept;
 
-/// Adds to the gradients of a mix of coincident copies' answers what the weight's slope makes of
-/// the step from one to the other [u³].
-void add_slope(const CoincidenceWeight& weight, double step, const RelativePose& pose,
+/// Adds `step` [u³] times a weight's slope to the gradients of a mix by it: `step` is what the mix
+/// grows by as the weight goes from 0 to 1.
+void add_slope(const PoseSlope& slope, double step, const RelativePose& pose,
                Penetration& mixed) noexcept;
 
 }  // namespace ist

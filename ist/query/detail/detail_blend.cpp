@@ -7,6 +7,7 @@
 #include "query/detail/coincident.h"
 #include "query/detail/detail_chain.h"
 #include "query/field/pair_overlap.h"
+#include "query/kernel/look_kernel.h"
 
 namespace ist {
 namespace {
@@ -52,7 +53,7 @@ class DetailQueries {
     if (coincidence.weight == 1) return other;
     const Penetration alike = descend(pair, how);
     Penetration mixed = mix(alike, other, coincidence.weight);
-    add_slope(coincidence, other.volume - alike.volume, pose_, mixed);
+    add_slope(coincidence.slope, other.volume - alike.volume, pose_, mixed);
     return mixed;
   }
 
@@ -72,8 +73,6 @@ class DetailQueries {
 
  private:
   using Clock = std::chrono::steady_clock;
-  // [µs] A deadline that is over before anything is opened: nothing but the roots is looked at.
-  static constexpr double kNoTime = 1e-6;
 
   PairMethod method_of(const DetailPair& pair) const noexcept {
     return pair_method(placed_a_, matched_tree(a_, pair.a), placed_b_, matched_tree(b_, pair.b),
@@ -85,11 +84,11 @@ class DetailQueries {
     DescentLimits limits = limits_of(settings_);
     if (settings_.deadline_us > 0) {
       const std::chrono::duration<double, std::micro> gone = Clock::now() - start_;
-      limits.deadline_us = std::max(kNoTime, settings_.deadline_us - gone.count());
+      limits.deadline_us = std::max(kOver, settings_.deadline_us - gone.count());
     }
     if (settings_.max_visits > 0) {
       limits.max_visits = settings_.max_visits - visits_;
-      if (limits.max_visits == 0) limits.deadline_us = kNoTime;
+      if (limits.max_visits == 0) limits.deadline_us = kOver;
     }
     return limits;
   }
@@ -136,15 +135,13 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
   AskedFor how{settings.relative_error, settings.min_radius, false};
   if (settings.pair_budget == 0) return queries.ask(DetailPair(), how);
   const DetailChain chain(a.tree.header(), b.tree.header(), pose.a_from_b.scale);
-  // Nothing to choose, or nothing dear: no estimate can exceed either solid's sum, κ times over.
-  const TreeHeader& coarse_a = matched_tree(a.tree.header(), chain.coarsest().a);
-  const TreeHeader& coarse_b = matched_tree(b.tree.header(), chain.coarsest().b);
-  const double scale = pose.a_from_b.scale;
-  const double most =
-      std::min(coarse_a.volume_sum * double{coarse_b.overlap},
-               coarse_b.volume_sum * (scale * scale * scale) * double{coarse_a.overlap});
-  if (chain.size() == 1 || chain.weights(most, settings.pair_budget)[0].weight == 1)
-    return queries.ask(chain[0], how);
+  // Nothing to choose, or nothing dear.
+  if (chain.size() == 1) return queries.ask(chain[0], how);
+  const SphereTree coarse_a(a.tree.header(), matched_tree(a.tree.header(), chain.coarsest().a));
+  const SphereTree coarse_b(b.tree.header(), matched_tree(b.tree.header(), chain.coarsest().b));
+  const QuickLook look = quick_look(coarse_a, coarse_b, pose.a_from_b, false);
+  const DetailWeight sure = chain.quick_weight(look.volume, settings.pair_budget);
+  if (sure.weight == 1) return queries.ask(chain[0], how);
 
   // Whatever else is asked, the coarse estimate is the whole sum: only that is smooth.
   const Penetration coarse = queries.coarse_estimate(chain.coarsest());
@@ -164,8 +161,10 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
     // Where lenses graze, to sum them again in double takes longer than a coarser level saves.
     how.keep_rounding = weights[0].weight < 1;
     double slope = 0;                               // of the blend by the coarse estimate
+    double sure_slope = 0;                          // and by the quick look
     for (std::size_t i = chain.size(); i-- > 0;) {  // the coarse ones first: they are sure to end
-      const double weight = weights[i].weight;
+      const double alone = i == 0 ? 1 : 0;
+      const double weight = sure.weight * alone + (1 - sure.weight) * weights[i].weight;
       if (weight == 0 && weights[i].slope == 0) continue;
       const Penetration part = i + 1 == chain.size() && !rough && queries.by_lenses_alone(chain[i])
                                    ? coarse
@@ -180,7 +179,9 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       result.rotation_gradient += weight * part.rotation_gradient;
       result.status = std::max(result.status, part.status);
       // At extreme sizes nought times the volume need not be nought.
-      if (weights[i].slope != 0) slope += weights[i].slope / unit3 * part.volume;
+      if (weights[i].slope != 0)
+        slope += (1 - sure.weight) * weights[i].slope / unit3 * part.volume;
+      if (sure.slope != 0) sure_slope += sure.slope * (alone - weights[i].weight) * part.volume;
     }
     // The coarse estimate is rounded too, and with it the weights.
     if (slope != 0) {
@@ -190,6 +191,9 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       result.translation_gradient += slope * coarse.translation_gradient;
       result.rotation_gradient += slope * coarse.rotation_gradient;
     }
+    if (sure_slope != 0)
+      add_slope(quick_look(coarse_a, coarse_b, pose.a_from_b, true).slope, sure_slope, pose,
+                result);
   }
   result.node_visits = queries.visits();
   result.sphere_pairs = queries.pairs();

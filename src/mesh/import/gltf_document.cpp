@@ -119,6 +119,12 @@ GltfDocument::GltfDocument(const SourceFile& file) : file_(file) {
   load_buffers();
 }
 
+std::vector<std::string> GltfDocument::files() const {
+  std::vector<std::string> paths;
+  for (const auto& [path, bytes] : files_) paths.push_back(path);
+  return paths;
+}
+
 void GltfDocument::fail(const std::string& what) const { ist::fail(file_, what); }
 
 std::string_view GltfDocument::parse_container() {

@@ -25,6 +25,7 @@ class GltfDocument {
   explicit GltfDocument(const SourceFile& file);
 
   const Json& root() const { return root_; }
+  std::vector<std::string> files() const;  ///< paths of the buffers beside the file
   /// Member `index` of the array `name` at the top level; `from` is what refers to it, for
   /// messages.
   const Json& at(const std::string& name, std::size_t index, const std::string& from) const;

@@ -1,8 +1,12 @@
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -131,23 +135,31 @@ class Body {
       if (word.empty()) fail_early();
       return text_.real(word);
     }
+    if (file_.bytes.size() - position_ < size_of(type)) fail_early();
+    const double value = value_at(position_, type);
+    position_ += size_of(type);
+    return value;
+  }
+
+  /// A value of a binary file that lies whole within it.
+  double value_at(const std::size_t position, const Scalar type) const {
     switch (type) {
       case Scalar::int8:
-        return binary<std::int8_t>();
+        return binary<std::int8_t>(position);
       case Scalar::uint8:
-        return binary<std::uint8_t>();
+        return binary<std::uint8_t>(position);
       case Scalar::int16:
-        return binary<std::int16_t>();
+        return binary<std::int16_t>(position);
       case Scalar::uint16:
-        return binary<std::uint16_t>();
+        return binary<std::uint16_t>(position);
       case Scalar::int32:
-        return binary<std::int32_t>();
+        return binary<std::int32_t>(position);
       case Scalar::uint32:
-        return binary<std::uint32_t>();
+        return binary<std::uint32_t>(position);
       case Scalar::float32:
-        return binary<float>();
+        return binary<float>(position);
       case Scalar::float64:
-        return binary<double>();
+        return binary<double>(position);
     }
     return 0;
   }
@@ -178,6 +190,13 @@ class Body {
     return sum;
   }
 
+  /// Where so many records of a binary file begin, which are then passed over; nothing in a text or
+  /// where the file is too short for them.
+  std::optional<std::size_t> pass_records(const std::uint64_t count, const std::size_t bytes) {
+    if (is_text() || count > (file_.bytes.size() - position_) / bytes) return std::nullopt;
+    return std::exchange(position_, position_ + count * bytes);
+  }
+
   bool is_text() const { return encoding_ == Encoding::ascii; }
   std::size_t line() const { return text_.line(); }
   [[noreturn]] void fail_here(const std::string& what) const {
@@ -189,13 +208,11 @@ class Body {
   [[noreturn]] void fail_early() const { fail_here("the file ends early"); }
 
   template <class T>
-  double binary() {
-    if (file_.bytes.size() - position_ < sizeof(T)) fail_early();
+  double binary(const std::size_t position) const {
     std::array<char, sizeof(T)> raw;
-    std::memcpy(raw.data(), file_.bytes.data() + position_, sizeof(T));
+    std::memcpy(raw.data(), file_.bytes.data() + position, sizeof(T));
     static_assert(std::endian::native == std::endian::little);
     if (encoding_ == Encoding::big_endian) std::reverse(raw.begin(), raw.end());
-    position_ += sizeof(T);
     return static_cast<double>(std::bit_cast<T>(raw));
   }
 
@@ -220,6 +237,22 @@ void read_vertices(Body& body, const Element& element, PolygonMesh& mesh) {
   }
   if (!found[0] || !found[1] || !found[2]) body.fail_here("vertices without x, y and z");
   if (element.count > UINT32_MAX) body.fail_here("more than 2^32 vertices");
+  const auto is_list = [](const Property& property) { return property.is_list; };
+  if (std::none_of(element.properties.begin(), element.properties.end(), is_list)) {
+    const std::size_t bytes = body.least_bytes(element);
+    if (const auto start = body.pass_records(element.count, bytes)) {
+      mesh.vertices.resize(element.count);
+      tbb::parallel_for(std::size_t{0}, mesh.vertices.size(), [&](const std::size_t i) {
+        std::size_t position = *start + bytes * i;
+        for (std::size_t p = 0; p < element.properties.size(); ++p) {
+          const Scalar type = element.properties[p].type;
+          if (axis_of[p] >= 0) mesh.vertices[i][axis_of[p]] = body.value_at(position, type);
+          position += size_of(type);
+        }
+      });
+      return;
+    }
+  }
   mesh.vertices.reserve(element.count);
   for (std::uint64_t i = 0; i < element.count; ++i) {
     Eigen::Vector3d position = Eigen::Vector3d::Zero();
@@ -237,16 +270,53 @@ void read_vertices(Body& body, const Element& element, PolygonMesh& mesh) {
   }
 }
 
+bool is_corners(const Property& property) {
+  return property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index");
+}
+
+/// Faces of a binary file that has nothing but triangles, all of them sound: records of one size.
+/// False, and nothing is read, where it is otherwise.
+bool read_triangles(Body& body, const Element& element, const std::uint64_t vertex_count,
+                    PolygonMesh& mesh) {
+  if (body.is_text() || element.properties.size() != 1 || !is_corners(element.properties[0]))
+    return false;
+  const Property& list = element.properties[0];
+  const std::size_t of_count = size_of(list.count_type), of_corner = size_of(list.type);
+  const std::size_t bytes = of_count + 3 * of_corner;
+  Body ahead = body;
+  const auto start = ahead.pass_records(element.count, bytes);
+  if (!start) return false;
+  std::vector<std::uint32_t> corners(3 * element.count);
+  std::atomic<bool> sound{true};
+  tbb::parallel_for(std::uint64_t{0}, element.count, [&](const std::uint64_t i) {
+    const std::size_t position = *start + bytes * i;
+    bool is_sound = body.value_at(position, list.count_type) == 3;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double value = body.value_at(position + of_count + of_corner * k, list.type);
+      is_sound = is_sound && value >= 0 && value < static_cast<double>(vertex_count) &&
+                 value == std::floor(value);
+      if (is_sound) corners[3 * i + k] = static_cast<std::uint32_t>(value);
+    }
+    if (!is_sound) sound.store(false, std::memory_order_relaxed);
+  });
+  if (!sound) return false;
+  body.pass_records(element.count, bytes);
+  mesh.corners = std::move(corners);
+  mesh.ends.resize(element.count);
+  for (std::size_t i = 0; i < mesh.ends.size(); ++i) mesh.ends[i] = 3 * (i + 1);
+  return true;
+}
+
 void read_faces(Body& body, const Element& element, const std::uint64_t vertex_count,
                 PolygonMesh& mesh) {
   if (element.properties.empty()) return;  // any number of nothing
+  if (read_triangles(body, element, vertex_count, mesh)) return;
   mesh.ends.reserve(element.count);
   mesh.corners.reserve(3 * element.count);
   for (std::uint64_t i = 0; i < element.count; ++i) {
     for (const Property& property : element.properties) {
       const std::uint64_t values = property.is_list ? body.read_list_count(property) : 1;
-      const bool corners = property.is_list &&
-                           (property.name == "vertex_indices" || property.name == "vertex_index");
+      const bool corners = is_corners(property);
       for (std::uint64_t k = 0; k < values; ++k) {
         const double value = body.read(property.type);
         if (!corners) continue;

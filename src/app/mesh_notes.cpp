@@ -1,4 +1,4 @@
-#include "app/input_mesh.h"
+#include "app/mesh_notes.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -9,18 +9,23 @@
 
 namespace ist::app {
 
-InputMesh read_input_mesh(const std::string& path, bool repair) {
-  TriangleMesh mesh = load_mesh(path);
-  InputMesh result{mesh.declared, {}};
+ClosedMesh close_aloud(TriangleMesh mesh, const std::string& name, bool repair) {
   try {
-    result.closed =
-        close_mesh(std::move(mesh), path, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+    ClosedMesh closed =
+        close_mesh(std::move(mesh), name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+    for (const std::string& note : closed.report.notes) spdlog::warn("{}: {}", name, note);
+    return closed;
   } catch (const OpenMeshError& error) {
     if (repair) throw;
     throw OpenMeshError(std::string(error.what()) + "; --repair closes what can be closed");
   }
-  for (const std::string& note : result.closed.report.notes) spdlog::warn("{}: {}", path, note);
-  return result;
+}
+
+InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings) {
+  TriangleMesh mesh = load_mesh(path);
+  place(mesh, settings);
+  const DeclaredFrame declared = mesh.declared;
+  return {declared, close_aloud(std::move(mesh), path, settings.repair)};
 }
 
 std::string describe_declared(const DeclaredFrame& declared) {

@@ -5,15 +5,16 @@
 
 #include <ist/mesh.h>
 
+#include "library/input_mesh.h"
+
 namespace ist::app {
 
-struct InputMesh {
-  DeclaredFrame declared;
-  ClosedMesh closed;
-};
+/// close_mesh(); what was found about the mesh goes to stderr as warnings, after its name. Throws
+/// Error.
+ClosedMesh close_aloud(TriangleMesh mesh, const std::string& name, bool repair);
 
-/// Loads and closes a mesh; what was found goes to stderr as warnings. Throws Error.
-InputMesh read_input_mesh(const std::string& path, bool repair);
+/// read_input_mesh(); what was found about the mesh goes to stderr as warnings. Throws Error.
+InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings);
 
 /// What a file declares about its axes and unit and what came of it; "" if it declares nothing.
 std::string describe_declared(const DeclaredFrame& declared);

@@ -1,0 +1,133 @@
+#include "query/base/batch.h"
+#include "query/c_api/structs.h"
+
+// Batches: every pair by the function that asks one.
+
+namespace ist::c_api {
+namespace {
+
+/// What a worker has to answer pairs with.
+struct Staff {
+  ist_workspace_t* workspaces;
+  std::size_t workers;
+  const ist_parallel_t* parallel;
+
+  ist_status_t check() const noexcept {
+    if (workers > 0 && workspaces == nullptr) return IST_NULL_POINTER;
+    ist_status_t status = parallel == nullptr ? IST_OK : check_size(parallel);
+    for (std::size_t i = 0; i < workers && status == IST_OK; ++i)
+      workspace_of(workspaces + i, status);
+    return status;
+  }
+};
+
+/// answers[i] by ask(i, workspace), or what nobody was there to find out. `Settings`: of C++, for
+/// what was `given`.
+template <class Settings, class Given, class Ask>
+ist_status_t answer_pairs(std::size_t count, const Given* given, const Staff& staff,
+                          ist_penetration_t* answers, std::size_t answer_size,
+                          const Ask& ask) noexcept {
+  if (count > 0 && answers == nullptr) return IST_NULL_POINTER;
+  if (answer_size != sizeof(ist_penetration_t)) return IST_WRONG_SIZE;
+  Settings settings;
+  ist_status_t status = read(given, settings);
+  if (status == IST_OK) status = staff.check();
+  if (status != IST_OK) return status;
+  if (staff.workers == 0) {
+    for (std::size_t i = 0; i < count; ++i) write(unknown_penetration(), answers[i]);
+    return IST_OK;
+  }
+  const ParallelFor threads = staff.parallel == nullptr
+                                  ? ParallelFor{}
+                                  : ParallelFor{staff.parallel->run, staff.parallel->pool};
+  answer_all(count, staff.workers, threads, [&](std::size_t i, std::size_t worker) {
+    answers[i].size = sizeof answers[i];
+    // A pool that counts wrongly is told by the answer.
+    ask(i, worker < staff.workers ? staff.workspaces + worker : nullptr);
+  });
+  return IST_OK;
+}
+
+// One name for trees and fields.
+const auto ask_penetration = [](const auto& pair, auto... rest) noexcept {
+  if constexpr (std::is_same_v<decltype(pair), const ist_pair_t&>)
+    return ist_penetration(pair.a, pair.b, rest...);
+  else
+    return ist_field_penetration(pair.a, pair.b, rest...);
+};
+const auto ask_patches = [](const auto& pair, auto... rest) noexcept {
+  if constexpr (std::is_same_v<decltype(pair), const ist_pair_t&>)
+    return ist_contact_patches(pair.a, pair.b, rest...);
+  else
+    return ist_field_contact_patches(pair.a, pair.b, rest...);
+};
+
+template <class Pair>
+ist_status_t find_penetrations(const Pair* pairs, std::size_t count,
+                               const ist_penetration_settings_t* given, const Staff& staff,
+                               ist_penetration_t* answers, std::size_t answer_size) noexcept {
+  if (count > 0 && pairs == nullptr) return IST_NULL_POINTER;
+  return answer_pairs<PenetrationSettings>(count, given, staff, answers, answer_size,
+                                           [&](std::size_t i, ist_workspace_t* scratch) {
+                                             ask_penetration(pairs[i], given, scratch, answers + i);
+                                           });
+}
+
+template <class Pair>
+ist_status_t find_patches(const Pair* pairs, std::size_t count, const ist_contact_settings_t* given,
+                          const Staff& staff, ist_contact_patches_t* patches,
+                          ist_penetration_t* wholes, std::size_t whole_size) noexcept {
+  if (count > 0 && (pairs == nullptr || patches == nullptr)) return IST_NULL_POINTER;
+  // All are of one size, or there is no telling where the next one begins.
+  for (std::size_t i = 0; i < count; ++i) {
+    const ist_status_t status = check_size(patches + i);
+    if (status != IST_OK) return status;
+    patches[i].count = 0;
+  }
+  return answer_pairs<ContactSettings>(
+      count, given, staff, wholes, whole_size, [&](std::size_t i, ist_workspace_t* scratch) {
+        ask_patches(pairs[i], given, scratch, patches + i, wholes + i);
+      });
+}
+
+}  // namespace
+}  // namespace ist::c_api
+
+using namespace ist::c_api;
+
+ist_status_t ist_penetration_batch(const ist_pair_t* pairs, std::size_t count,
+                                   const ist_penetration_settings_t* settings,
+                                   ist_workspace_t* workspaces, std::size_t workers,
+                                   ist_penetration_t* answers, std::size_t answer_size,
+                                   const ist_parallel_t* parallel) {
+  return find_penetrations(pairs, count, settings, {workspaces, workers, parallel}, answers,
+                           answer_size);
+}
+
+ist_status_t ist_field_penetration_batch(const ist_field_pair_t* pairs, std::size_t count,
+                                         const ist_penetration_settings_t* settings,
+                                         ist_workspace_t* workspaces, std::size_t workers,
+                                         ist_penetration_t* answers, std::size_t answer_size,
+                                         const ist_parallel_t* parallel) {
+  return find_penetrations(pairs, count, settings, {workspaces, workers, parallel}, answers,
+                           answer_size);
+}
+
+ist_status_t ist_contact_patches_batch(const ist_pair_t* pairs, std::size_t count,
+                                       const ist_contact_settings_t* settings,
+                                       ist_workspace_t* workspaces, std::size_t workers,
+                                       ist_contact_patches_t* patches, ist_penetration_t* wholes,
+                                       std::size_t whole_size, const ist_parallel_t* parallel) {
+  return find_patches(pairs, count, settings, {workspaces, workers, parallel}, patches, wholes,
+                      whole_size);
+}
+
+ist_status_t ist_field_contact_patches_batch(const ist_field_pair_t* pairs, std::size_t count,
+                                             const ist_contact_settings_t* settings,
+                                             ist_workspace_t* workspaces, std::size_t workers,
+                                             ist_contact_patches_t* patches,
+                                             ist_penetration_t* wholes, std::size_t whole_size,
+                                             const ist_parallel_t* parallel) {
+  return find_patches(pairs, count, settings, {workspaces, workers, parallel}, patches, wholes,
+                      whole_size);
+}

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <string>
+
+namespace ist::app {
+
+/// What `ist bake` takes for a manifest alone.
+struct LibraryOptions {
+  std::string manifest, cache, shard;
+  unsigned jobs = 0;
+  std::uint64_t memory = 0, cache_size = 0;
+};
+
+/// Adds --manifest and the options that need it.
+void add_library_options(CLI::App* command, LibraryOptions& options);
+
+struct LibraryRun {
+  const LibraryOptions& library;
+  const std::string& output;  ///< folder
+  const std::string& device;
+  unsigned threads;
+  bool json, quiet;
+};
+
+/// Bakes the manifest's assets. Throws Error, and ExitCode: 1 where an asset failed, 2 where the
+/// manifest has mistakes, 130 after Ctrl-C.
+void run_library(const LibraryRun& run);
+
+}  // namespace ist::app

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+// What the command line says of itself, for other places that say it: man pages and the completion
+// of shells. All of it comes from the commands' own options and help.
+
+namespace ist::app {
+
+struct OptionReference {
+  std::vector<std::string> names;  ///< "-o", "--output"; of a positional argument its name alone
+  bool positional = false, required = false;
+  bool takes_value = false;
+  std::string value;                 ///< "INT", "TEXT", …; empty without one
+  std::vector<std::string> choices;  ///< all values there are, where they are few
+  std::string standard;              ///< what it is if it is not given; empty: nothing to say
+  std::string help;
+
+  /// Whether a value may be the name of a file.
+  bool takes_text() const { return value == "TEXT" && choices.empty(); }
+};
+
+struct CommandReference {
+  std::string name, help, footer;
+  std::vector<OptionReference> options;
+};
+
+/// The commands of `app` in the order in which it lists them.
+std::vector<CommandReference> commands_of(const CLI::App& app);
+
+/// The man page of one command, and that of the program itself.
+std::string man_page(const CommandReference& command);
+std::string man_page(const CLI::App& app);
+
+// Scripts that complete a command line of `ist`: for bash, zsh and fish.
+std::string bash_completion(const std::vector<CommandReference>& commands);
+std::string zsh_completion(const std::vector<CommandReference>& commands);
+std::string fish_completion(const std::vector<CommandReference>& commands);
+
+}  // namespace ist::app

@@ -1,0 +1,42 @@
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "app/commands.h"
+#include "app/file_options.h"
+#include "app/summary_table.h"
+#include "library/summary.h"
+
+namespace ist::app {
+namespace {
+
+struct SummaryOptions {
+  std::vector<std::string> files;
+  bool json = false;
+};
+
+void run_summary(const SummaryOptions& options) {
+  std::vector<Summary> shards;
+  for (const std::string& file : options.files) shards.push_back(read_summary(file));
+  const Summary whole = merge(std::move(shards));
+  print_summary(whole, options.json, false);
+  if (!whole.complete()) throw ExitCode{kExitError};
+}
+
+}  // namespace
+
+void add_summary(CLI::App& app) {
+  const auto options = std::make_shared<SummaryOptions>();
+  CLI::App* const command = app.add_subcommand(
+      "summary", "Show what a bake of a manifest made; of one in shards, all of them together");
+  command->add_option("FILE", options->files, "What `ist bake --manifest … --json` printed")
+      ->required();
+  command->add_flag("--json", options->json, "As JSON on stdout");
+  command->footer(
+      "Exits 1 if an asset failed, or a shard is missing, there twice or of another library.\n"
+      "Example: ist summary shard-1.json shard-2.json");
+  command->callback([options] { run_summary(*options); });
+}
+
+}  // namespace ist::app

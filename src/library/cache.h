@@ -1,0 +1,66 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <ist/bake.h>
+
+#include "library/cache_key.h"
+
+// A folder of assets by what they were baked from. Any number of processes and hosts may share it,
+// and any of them may die at any moment: an entry is a file that has its name only once it is whole
+// and on the disk, nothing is locked, and what is read is held against its hash.
+//
+//   DIR/ab/abcdef….entry   the entry of the key abcdef…: notes about the mesh, and the asset
+
+namespace ist {
+
+struct CacheEntry {
+  Asset asset;
+  std::vector<std::string> notes;  ///< MeshReport::notes of the mesh
+};
+
+class AssetCache {
+ public:
+  /// `limit` [bytes]: as storing goes on, entries that were not used for longest are removed; 0:
+  /// none are. Makes the folder; throws Error where that cannot be.
+  explicit AssetCache(std::filesystem::path folder, std::uint64_t limit = 0);
+
+  /// Nothing where there is no such entry, or it is damaged: `damage` then says how. Marks it as
+  /// used. From any thread.
+  std::optional<CacheEntry> find(const CacheKey& key, std::string& damage) const;
+
+  /// In place of an entry that may be there. Throws Error. From any thread.
+  void store(const CacheKey& key, const CacheEntry& entry);
+
+ private:
+  std::filesystem::path file_of(const CacheKey& key) const;
+
+  const std::filesystem::path folder_;
+  const std::uint64_t limit_;
+  std::atomic<std::uint64_t> stored_ = 0;  ///< [bytes] since the limit was last looked after
+};
+
+/// What a cache holds.
+struct CacheUse {
+  std::uint64_t entries = 0, bytes = 0;
+  std::uint64_t left_over = 0, left_over_bytes = 0;  ///< files that a killed program left
+  double oldest = 0, newest = 0;                     ///< [s] ago, when entries were last used
+};
+
+/// Throws Error where there is no such folder.
+CacheUse look_at_cache(const std::filesystem::path& folder);
+
+struct Pruned {
+  std::uint64_t entries = 0, bytes = 0;  ///< removed
+};
+
+/// Removes what a killed program left an hour ago or more, and, until `most` bytes are left, the
+/// entries that were not used for longest; files that are no cache's stay. Throws Error as above.
+Pruned prune_cache(const std::filesystem::path& folder, std::optional<std::uint64_t> most);
+
+}  // namespace ist

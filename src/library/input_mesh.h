@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <ist/mesh.h>
+
+#include "settings/bake_settings.h"
+
+namespace ist {
+
+struct InputMesh {
+  DeclaredFrame declared;
+  ClosedMesh closed;
+};
+
+/// Loads, scales, turns and closes a mesh. Throws Error.
+InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings);
+
+/// What load_mesh() gives, scaled and turned: the quarter turn about the third axis that takes
+/// up_axis to world_up.
+void place(TriangleMesh& mesh, const MeshSettings& settings);
+
+}  // namespace ist

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "library/job.h"
+
+namespace ist {
+
+/// A library of assets as a TOML file describes it (docs/library.md).
+struct Manifest {
+  std::vector<Job> jobs;            ///< by name, sorted; complete where there are no faults
+  std::vector<std::string> faults;  ///< "scene.toml:12: …": all that can be told without baking
+};
+
+/// Paths in it are relative to its folder. Throws Error where it cannot be read.
+Manifest read_manifest(const std::string& path);
+
+}  // namespace ist

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace ist {
+
+enum class JobStatus {
+  baked,      ///< and written
+  cached,     ///< taken from the cache
+  failed,     ///< `message` says why; nothing was written
+  not_baked,  ///< the run was interrupted before or meanwhile; nothing was written
+};
+const char* name_of(JobStatus status) noexcept;
+
+/// What became of a job.
+struct JobResult {
+  std::string name, mesh;
+  JobStatus status = JobStatus::not_baked;
+  std::string message;  ///< of a failure
+  double seconds = 0;   ///< wall time from beginning to end
+  std::vector<std::string> warnings;
+
+  // Of an asset that was written; else empty.
+  std::string asset;                          ///< path
+  std::uint64_t content_hash = 0, bytes = 0;  ///< of the asset
+  std::uint64_t spheres = 0;
+  double coverage = 0;                        ///< share of the solid's volume
+  std::optional<double> target_error, error;  ///< asked for and measured, relative; see ErrorTarget
+  std::optional<bool> target_met;
+
+  bool done() const { return status == JobStatus::baked || status == JobStatus::cached; }
+};
+
+}  // namespace ist

@@ -1,0 +1,182 @@
+#include "library/summary.h"
+
+#include <fmt/format.h>
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string_view>
+
+#include <ist/error.h>
+
+namespace ist {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kSchema = 1;
+constexpr JobStatus kStatuses[] = {JobStatus::baked, JobStatus::cached, JobStatus::failed,
+                                   JobStatus::not_baked};
+
+template <class T>
+Json or_null(const std::optional<T>& value) {
+  return value ? Json(*value) : Json();
+}
+
+Json to_json(const JobResult& result) {
+  const bool done = result.done();
+  const auto if_done = [&](const auto& value) { return done ? Json(value) : Json(); };
+  return {{"name", result.name},
+          {"status", name_of(result.status)},
+          {"mesh", result.mesh},
+          {"asset", if_done(result.asset)},
+          {"content_hash", if_done(fmt::format("{:016x}", result.content_hash))},
+          {"bytes", if_done(result.bytes)},
+          {"spheres", if_done(result.spheres)},
+          {"coverage", if_done(result.coverage)},
+          {"target_error", or_null(result.target_error)},
+          {"measured_error", or_null(result.error)},
+          {"target_met", or_null(result.target_met)},
+          {"seconds", result.seconds},
+          {"warnings", result.warnings},
+          {"message", result.message.empty() ? Json() : Json(result.message)}};
+}
+
+template <class T>
+void take(const Json& from, const char* key, T& to) {
+  if (!from.at(key).is_null()) to = from.at(key).get<T>();
+}
+template <class T>
+void take(const Json& from, const char* key, std::optional<T>& to) {
+  if (!from.at(key).is_null()) to = from.at(key).get<T>();
+}
+
+JobResult result_from(const Json& json) {
+  JobResult result;
+  take(json, "name", result.name);
+  const std::string status = json.at("status");
+  const auto* const known = std::find_if(std::begin(kStatuses), std::end(kStatuses),
+                                         [&](JobStatus one) { return status == name_of(one); });
+  if (known == std::end(kStatuses)) throw Error("unknown status '" + status + "'");
+  result.status = *known;
+  take(json, "mesh", result.mesh);
+  take(json, "asset", result.asset);
+  std::string hash = "0";
+  take(json, "content_hash", hash);
+  result.content_hash = std::stoull(hash, nullptr, 16);
+  take(json, "bytes", result.bytes);
+  take(json, "spheres", result.spheres);
+  take(json, "coverage", result.coverage);
+  take(json, "target_error", result.target_error);
+  take(json, "measured_error", result.error);
+  take(json, "target_met", result.target_met);
+  take(json, "seconds", result.seconds);
+  take(json, "warnings", result.warnings);
+  take(json, "message", result.message);
+  return result;
+}
+
+}  // namespace
+
+bool Shard::holds(const std::string& name) const {
+  return XXH3_64bits(name.data(), name.size()) % count == index - 1;
+}
+
+std::size_t Summary::count(JobStatus status) const {
+  return static_cast<std::size_t>(
+      std::count_if(results.begin(), results.end(),
+                    [&](const JobResult& result) { return result.status == status; }));
+}
+
+bool Summary::complete() const {
+  return std::all_of(results.begin(), results.end(),
+                     [](const JobResult& result) { return result.done(); });
+}
+
+std::uint64_t hash_of_library(const std::vector<Job>& jobs) {
+  XXH3_state_t state;
+  XXH3_64bits_reset(&state);
+  for (const Job& job : jobs) {
+    const std::string text = job.name + '\0' + describe_exactly(job.settings) + '\0';
+    XXH3_64bits_update(&state, text.data(), text.size());
+  }
+  return XXH3_64bits_digest(&state);
+}
+
+Json to_json(const Summary& summary) {
+  Json counts, assets = Json::array();
+  for (const JobStatus status : kStatuses) counts[name_of(status)] = summary.count(status);
+  for (const JobResult& result : summary.results) assets.push_back(to_json(result));
+  return {{"schema", kSchema},
+          {"manifest", summary.manifest},
+          {"library_hash", fmt::format("{:016x}", summary.library_hash)},
+          {"shard", {{"index", summary.shard.index}, {"count", summary.shard.count}}},
+          {"complete", summary.complete()},
+          {"counts", counts},
+          {"seconds", summary.seconds},
+          {"assets", assets}};
+}
+
+Summary read_summary(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw Error(path + ": cannot be opened. Check the path and its permissions");
+  try {
+    const Json json = Json::parse(file);
+    if (json.at("schema") != kSchema)
+      throw Error(fmt::format("its schema is {}, not {}", json.at("schema").dump(), kSchema));
+    Summary summary;
+    take(json, "manifest", summary.manifest);
+    summary.library_hash = std::stoull(json.at("library_hash").get<std::string>(), nullptr, 16);
+    take(json.at("shard"), "index", summary.shard.index);
+    take(json.at("shard"), "count", summary.shard.count);
+    take(json, "seconds", summary.seconds);
+    for (const Json& asset : json.at("assets")) summary.results.push_back(result_from(asset));
+    if (summary.shard.count < 1 || summary.shard.index < 1 ||
+        summary.shard.index > summary.shard.count)
+      throw Error("its shard is none");
+    return summary;
+  } catch (const std::exception& error) {
+    throw Error(fmt::format(
+        "{}: is no summary of `ist bake --manifest … --json`, or one that was cut short: {}", path,
+        error.what()));
+  }
+}
+
+Summary merge(std::vector<Summary> shards) {
+  if (shards.empty()) throw Error("no summaries to merge");
+  std::sort(shards.begin(), shards.end(),
+            [](const Summary& a, const Summary& b) { return a.shard.index < b.shard.index; });
+  Summary whole = {.manifest = shards.front().manifest,
+                   .library_hash = shards.front().library_hash,
+                   .shard = {},
+                   .seconds = 0,
+                   .results = {}};
+  const std::uint32_t count = shards.front().shard.count;
+  std::uint32_t next = 1;
+  for (const Summary& shard : shards) {
+    const std::string name =
+        fmt::format("shard {}/{} of {}", shard.shard.index, shard.shard.count, shard.manifest);
+    if (shard.library_hash != whole.library_hash || shard.shard.count != count)
+      throw Error(
+          fmt::format("{} is not of the same library and split as shard {}/{} of {}: bake "
+                      "all shards with one manifest",
+                      name, shards.front().shard.index, count, whole.manifest));
+    if (shard.shard.index < next) throw Error(name + " is there twice");
+    if (shard.shard.index > next)
+      throw Error(fmt::format("shard {}/{} of {} is missing", next, count, whole.manifest));
+    ++next;
+    whole.seconds += shard.seconds;
+    whole.results.insert(whole.results.end(), shard.results.begin(), shard.results.end());
+  }
+  if (next <= count)
+    throw Error(fmt::format("shard {}/{} of {} is missing", next, count, whole.manifest));
+  std::sort(whole.results.begin(), whole.results.end(),
+            [](const JobResult& a, const JobResult& b) { return a.name < b.name; });
+  return whole;
+}
+
+}  // namespace ist

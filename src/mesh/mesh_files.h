@@ -1,0 +1,18 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace ist {
+
+/// Whether load_mesh() has a reader for files that end like this one.
+bool is_mesh_format(const std::string& path);
+
+/// All files that load_mesh(path) reads, `path` first: a glTF keeps its numbers beside it.
+///
+/// Nothing for a format that a third party reads, which may open others. Throws Error where `path`
+/// cannot be read; what a broken file refers to is left out.
+std::optional<std::vector<std::string>> files_of_mesh(const std::string& path);
+
+}  // namespace ist

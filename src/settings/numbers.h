@@ -1,0 +1,44 @@
+#pragma once
+
+#include <charconv>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+
+// Numbers as people write them, on a command line or in a file, under one rule: digits are decimal,
+// whatever zeros come first, and what is no number or out of range (NaN is) is refused.
+
+namespace ist {
+
+/// The finite numbers that a setting takes.
+struct Range {
+  double least = 0, most = std::numeric_limits<double>::infinity();
+  bool without_least = false, without_most = false;
+
+  bool holds(double x) const;
+};
+
+/// A number as the C locale writes it, nan and inf included.
+std::optional<double> parse_number(std::string_view text);
+
+/// A number, or a percentage: 0.5 or 50%.
+std::optional<double> parse_share(std::string_view text);
+
+/// Bytes as people write them: 4096, 512M, 10G; units K, M, G and T are powers of 1024.
+std::optional<std::uint64_t> parse_bytes(std::string_view text);
+
+/// A whole number in decimal digits.
+template <class T>
+std::optional<T> parse_whole(std::string_view text) {
+  T value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 10);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+std::string number_in_words(const Range& range);  ///< "a number from 0 to below 1"
+std::string share_in_words(const Range& range);   ///< the same, and in percent
+
+}  // namespace ist

@@ -1,0 +1,331 @@
+/* Queries of two trees, and of a field and a tree. */
+#include <math.h>
+
+#include "scene.h"
+
+int penetrations_answer(scene_t* s) {
+  ist_penetration_t whole = {.size = sizeof whole}, other = {.size = sizeof other};
+  ist_penetration_settings_t settings = {.size = sizeof settings};
+  ist_placed_tree_t wrong;
+  const ist_tree_t empty = {0};
+  ist_workspace_t none = {0};
+
+  CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, &whole) == IST_OK);
+  CHECK(whole.volume > 0 && whole.volume_min <= whole.volume && whole.volume <= whole.volume_max);
+  CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other) == IST_OK);
+  CHECK(memcmp(&whole, &other, sizeof whole) == 0);
+  s->b.scale = 1;
+  CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other) == IST_OK);
+  CHECK(memcmp(&whole, &other, sizeof whole) == 0);
+  s->b.scale = 0;
+  settings.max_visits = 1;
+  CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other) == IST_BUDGET_EXHAUSTED);
+  CHECK(other.status == IST_BUDGET_EXHAUSTED && other.volume_max > other.volume_min);
+
+  /* Each pointer null. */
+  CHECK(ist_penetration(NULL, &s->b, NULL, &s->workspace, &other) == IST_NULL_POINTER);
+  CHECK(is_empty(&other, sizeof other, IST_NULL_POINTER));
+  CHECK(ist_penetration(&s->a, NULL, NULL, &s->workspace, &other) == IST_NULL_POINTER);
+  CHECK(ist_penetration(&s->a, &s->b, NULL, NULL, &other) == IST_NULL_POINTER);
+  CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, NULL) == IST_NULL_POINTER);
+  wrong = s->a;
+  wrong.tree = NULL;
+  CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_NULL_POINTER);
+
+  /* Each size wrong. */
+  other.size = sizeof other + 8;
+  CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, &other) == IST_WRONG_SIZE);
+  other.size = sizeof other;
+  wrong = s->a;
+  wrong.size = 0;
+  CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_WRONG_SIZE);
+  CHECK(ist_penetration(&s->a, &wrong, NULL, &s->workspace, &other) == IST_WRONG_SIZE);
+  settings.size = 4;
+  CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other) == IST_WRONG_SIZE);
+  settings.size = sizeof settings;
+
+  /* Handles that are none. */
+  wrong = s->a;
+  wrong.tree = &empty;
+  CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_NO_HANDLE);
+  CHECK(is_empty(&other, sizeof other, IST_NO_HANDLE));
+  CHECK(ist_penetration(&s->a, &wrong, NULL, &s->workspace, &other) == IST_NO_HANDLE);
+  CHECK(ist_penetration(&s->a, &s->b, NULL, &none, &other) == IST_NO_HANDLE);
+
+  /* Numbers that are none. */
+  settings.measure = 2;
+  CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other) == IST_INVALID_INPUT);
+  settings.measure = IST_MATCHED;
+  settings.field = -1;
+  CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other) == IST_INVALID_INPUT);
+  wrong = s->a;
+  wrong.pose.t[1] = NAN;
+  CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_INVALID_INPUT);
+  CHECK(is_empty(&other, sizeof other, IST_INVALID_INPUT));
+  wrong = s->a;
+  wrong.scale = -1;
+  CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_INVALID_INPUT);
+
+  settings.field = IST_FIELD_NEVER;
+  settings.max_visits = 0;
+  CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &whole) == IST_OK);
+  CHECK(ist_without_protrusion(&whole, &s->a, &s->b, &other) == IST_OK);
+  CHECK(other.volume <= whole.volume);
+  CHECK(ist_without_protrusion(NULL, &s->a, &s->b, &other) == IST_NULL_POINTER);
+  CHECK(ist_without_protrusion(&whole, NULL, &s->b, &other) == IST_NULL_POINTER);
+  CHECK(ist_without_protrusion(&whole, &s->a, NULL, &other) == IST_NULL_POINTER);
+  CHECK(is_empty(&other, sizeof other, IST_NULL_POINTER));
+  CHECK(ist_without_protrusion(&whole, &s->a, &s->b, NULL) == IST_NULL_POINTER);
+  CHECK(ist_without_protrusion(&whole, &s->a, &s->b, &whole) == IST_OK); /* in its place */
+  return 0;
+}
+
+int separations_answer(scene_t* s) {
+  ist_penetration_t penetration = {.size = sizeof penetration}, lone = {.size = sizeof lone};
+  ist_separation_t separation = {.size = sizeof separation}, gap = {.size = sizeof gap};
+  ist_separation_settings_t settings = {.size = sizeof settings};
+  ist_penetration_settings_t first = {.size = sizeof first};
+  const double x = s->b.pose.t[0];
+  s->b.pose.t[0] = 10;
+  CHECK(ist_separation(&s->a, &s->b, NULL, &s->workspace, &gap) == IST_OK);
+  CHECK(gap.distance > 5 && gap.distance_min <= gap.distance && gap.normal[0] > 0.5);
+  CHECK(ist_query(&s->a, &s->b, &first, &settings, &s->workspace, &penetration, &separation) ==
+        IST_OK);
+  CHECK(memcmp(&gap, &separation, sizeof gap) == 0);
+  CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, &lone) == IST_OK);
+  CHECK(memcmp(&lone, &penetration, sizeof lone) == 0);
+  settings.max_visits = 1;
+  CHECK(ist_separation(&s->a, &s->b, &settings, &s->workspace, &gap) == IST_BUDGET_EXHAUSTED);
+  CHECK(ist_query(&s->a, &s->b, NULL, &settings, &s->workspace, &penetration, &separation) ==
+        IST_BUDGET_EXHAUSTED);
+  CHECK(penetration.status == IST_OK && separation.status == IST_BUDGET_EXHAUSTED);
+
+  CHECK(ist_separation(NULL, &s->b, NULL, &s->workspace, &gap) == IST_NULL_POINTER);
+  CHECK(is_empty(&gap, sizeof gap, IST_NULL_POINTER));
+  CHECK(ist_separation(&s->a, NULL, NULL, &s->workspace, &gap) == IST_NULL_POINTER);
+  CHECK(ist_separation(&s->a, &s->b, NULL, NULL, &gap) == IST_NULL_POINTER);
+  CHECK(ist_separation(&s->a, &s->b, NULL, &s->workspace, NULL) == IST_NULL_POINTER);
+  settings.size = 0;
+  CHECK(ist_separation(&s->a, &s->b, &settings, &s->workspace, &gap) == IST_WRONG_SIZE);
+  CHECK(ist_query(&s->a, &s->b, NULL, &settings, &s->workspace, &penetration, &separation) ==
+        IST_WRONG_SIZE);
+  CHECK(is_empty(&penetration, sizeof penetration, IST_WRONG_SIZE));
+  CHECK(ist_query(NULL, &s->b, NULL, NULL, &s->workspace, &penetration, &separation) ==
+        IST_NULL_POINTER);
+  CHECK(ist_query(&s->a, NULL, NULL, NULL, &s->workspace, &penetration, &separation) ==
+        IST_NULL_POINTER);
+  CHECK(ist_query(&s->a, &s->b, NULL, NULL, NULL, &penetration, &separation) == IST_NULL_POINTER);
+  CHECK(ist_query(&s->a, &s->b, NULL, NULL, &s->workspace, NULL, &separation) == IST_NULL_POINTER);
+  CHECK(is_empty(&separation, sizeof separation, IST_NULL_POINTER));
+  CHECK(ist_query(&s->a, &s->b, NULL, NULL, &s->workspace, &penetration, NULL) == IST_NULL_POINTER);
+  CHECK(is_empty(&penetration, sizeof penetration, IST_NULL_POINTER));
+  s->b.pose.t[0] = x;
+  return 0;
+}
+
+int overlaps_answer(scene_t* s) {
+  ist_overlapping_t answer = 77;
+  ist_pair_fit_t fit = {.size = sizeof fit};
+  ist_field_t field = {.size = sizeof field, .kind = IST_HALF_SPACE};
+  ist_placed_field_t floor = {.size = sizeof floor, .field = &field, .pose = s->a.pose};
+  ist_placed_tree_t far_away = s->b;
+  ist_workspace_t none = {0};
+  field.as.half_space.normal[0] = 1;
+  far_away.pose.t[0] = 20;
+  CHECK(ist_overlap(&s->a, &s->b, &s->workspace, &answer) == IST_OK && answer == IST_OVERLAP_YES);
+  CHECK(ist_overlap(&s->a, &far_away, &s->workspace, &answer) == IST_OK);
+  CHECK(answer == IST_OVERLAP_NO);
+  CHECK(ist_field_overlap(&floor, &s->b, &s->workspace, &answer) == IST_OK);
+  CHECK(answer == IST_OVERLAP_YES);
+  CHECK(ist_field_overlap(&floor, &far_away, &s->workspace, &answer) == IST_OK);
+  CHECK(answer == IST_OVERLAP_NO);
+  CHECK(ist_overlap(NULL, &s->b, &s->workspace, &answer) == IST_NULL_POINTER);
+  CHECK(answer == IST_OVERLAP_UNKNOWN);
+  CHECK(ist_overlap(&s->a, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
+  CHECK(ist_overlap(&s->a, &s->b, NULL, &answer) == IST_NULL_POINTER);
+  CHECK(ist_overlap(&s->a, &s->b, &none, &answer) == IST_NO_HANDLE);
+  CHECK(ist_overlap(&s->a, &s->b, &s->workspace, NULL) == IST_NULL_POINTER);
+  CHECK(ist_field_overlap(NULL, &s->b, &s->workspace, &answer) == IST_NULL_POINTER);
+  CHECK(ist_field_overlap(&floor, &s->b, &s->workspace, NULL) == IST_NULL_POINTER);
+
+  CHECK(ist_get_pair_fit(&s->a, &s->b, &fit) == IST_OK && fit.ratio >= 1 && fit.grain_a > 0);
+  CHECK(ist_get_pair_fit(NULL, &s->b, &fit) == IST_NULL_POINTER);
+  CHECK(is_empty(&fit, sizeof fit, IST_NULL_POINTER));
+  CHECK(ist_get_pair_fit(&s->a, NULL, &fit) == IST_NULL_POINTER);
+  CHECK(ist_get_pair_fit(&s->a, &s->b, NULL) == IST_NULL_POINTER);
+  fit.size = 0;
+  CHECK(ist_get_pair_fit(&s->a, &s->b, &fit) == IST_WRONG_SIZE);
+  return 0;
+}
+
+int patches_answer(scene_t* s) {
+  ist_contact_patch_t room[8];
+  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
+  ist_penetration_t whole = {.size = sizeof whole};
+  ist_contact_settings_t settings = {.size = sizeof settings};
+  ist_placed_tree_t wrong = s->b;
+  double volume = 0, left = 0;
+  size_t i;
+  patches.patches = room;
+  patches.capacity = 8;
+  CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, &whole) == IST_OK);
+  CHECK(patches.count > 0 && patches.count <= 8);
+  for (i = 0; i < patches.count; ++i) volume += room[i].volume;
+  CHECK(fabs(volume - whole.volume) <= 1e-12 * whole.volume);
+  CHECK(ist_contact_patches(&s->a, &s->b, &settings, &s->workspace, &patches, NULL) == IST_OK);
+  CHECK(ist_contact_patches(NULL, &s->b, NULL, &s->workspace, &patches, &whole) ==
+        IST_NULL_POINTER);
+  CHECK(patches.count == 0 && is_empty(&whole, sizeof whole, IST_NULL_POINTER));
+  CHECK(ist_contact_patches(&s->a, NULL, NULL, &s->workspace, &patches, NULL) == IST_NULL_POINTER);
+  CHECK(ist_contact_patches(&s->a, &s->b, NULL, NULL, &patches, NULL) == IST_NULL_POINTER);
+  CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, NULL, &whole) == IST_NULL_POINTER);
+
+  /* Without protrusion: by lenses alone, where the faces hardly touch. */
+  settings.field = IST_FIELD_NEVER;
+  CHECK(ist_contact_patches(&s->a, &s->b, &settings, &s->workspace, &patches, NULL) == IST_OK);
+  for (i = 0, volume = 0; i < patches.count; ++i) volume += room[i].volume;
+  CHECK(ist_patches_without_protrusion(&s->a, &s->b, &settings, &patches) == IST_OK);
+  for (i = 0; i < patches.count; ++i) left += room[i].volume;
+  CHECK(left <= volume * (1 + 1e-12) && left >= 0);
+  CHECK(ist_patches_without_protrusion(NULL, &s->b, &settings, &patches) == IST_NULL_POINTER);
+  CHECK(ist_patches_without_protrusion(&s->a, NULL, NULL, &patches) == IST_NULL_POINTER);
+  CHECK(ist_patches_without_protrusion(&s->a, &s->b, NULL, NULL) == IST_NULL_POINTER);
+  wrong.pose.t[0] = NAN;
+  CHECK(ist_patches_without_protrusion(&s->a, &wrong, NULL, &patches) == IST_INVALID_INPUT);
+  settings.measure = 7;
+  CHECK(ist_patches_without_protrusion(&s->a, &s->b, &settings, &patches) == IST_INVALID_INPUT);
+  settings.measure = IST_MATCHED;
+  patches.count = 9; /* more than there is room for */
+  CHECK(ist_patches_without_protrusion(&s->a, &s->b, NULL, &patches) == IST_INVALID_INPUT);
+  patches.count = 0;
+  patches.patch_size = 8;
+  CHECK(ist_patches_without_protrusion(&s->a, &s->b, NULL, &patches) == IST_WRONG_SIZE);
+  patches.patch_size = sizeof room[0];
+
+  patches.patches = NULL;
+  CHECK(ist_patches_without_protrusion(&s->a, &s->b, NULL, &patches) == IST_NULL_POINTER);
+  CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, NULL) == IST_NULL_POINTER);
+  patches.capacity = 0;
+  CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, NULL) == IST_OK);
+  patches.patch_size = 0;
+  CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, NULL) == IST_WRONG_SIZE);
+  patches.patch_size = sizeof room[0];
+  settings.size = 1;
+  CHECK(ist_contact_patches(&s->a, &s->b, &settings, &s->workspace, &patches, NULL) ==
+        IST_WRONG_SIZE);
+  whole.size = 1;
+  CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, &whole) == IST_WRONG_SIZE);
+  patches.size = 1;
+  CHECK(ist_patches_without_protrusion(&s->a, &s->b, NULL, &patches) == IST_WRONG_SIZE);
+  CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, NULL) == IST_WRONG_SIZE);
+  return 0;
+}
+
+/* --- Fields ----------------------------------------------------------------------------------- */
+
+/* The half-space z ≤ offset, as a function. */
+static void look(const void* context, const double x[3], ist_field_sample_t* sample) {
+  sample->distance = *(const double*)context - x[2];
+  sample->gradient[2] = -1;
+}
+
+int fields_answer(scene_t* s) {
+  static float numbers[125];
+  static const double offset = 0.1;
+  const ist_pose_t identity = IST_POSE_IDENTITY;
+  const ist_tree_t empty = {0};
+  ist_field_t field = {.size = sizeof field};
+  ist_placed_field_t a = {.size = sizeof a};
+  ist_penetration_t answer = {.size = sizeof answer}, again = {.size = sizeof again};
+  ist_separation_t gap = {.size = sizeof gap};
+  ist_contact_patch_t room[4];
+  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
+  ist_tree_info_t info = {.size = sizeof info};
+  double by_plane = 0;
+  int kind, i;
+  a.field = &field;
+  a.pose = identity;
+  patches.patches = room;
+  patches.capacity = 4;
+  for (i = 0; i < 125; ++i) numbers[i] = 0.1f;
+  CHECK(ist_tree_get_info(&s->tree_a, &info) == IST_OK);
+  for (kind = IST_HALF_SPACE; kind <= IST_MESH; ++kind) {
+    memset(&field.as, 0, sizeof field.as);
+    field.kind = kind;
+    if (kind == IST_HALF_SPACE) {
+      field.as.half_space.normal[2] = 1;
+      field.as.half_space.offset = offset;
+    } else if (kind == IST_BOX) {
+      for (i = 0; i < 3; ++i) field.as.box.half_extents[i] = 0.4;
+    } else if (kind == IST_BALL) {
+      field.as.ball.radius = 0.4;
+    } else if (kind == IST_CAPSULE || kind == IST_CYLINDER) {
+      field.as.capsule.radius = field.as.capsule.half_height = 0.4;
+    } else if (kind == IST_HEIGHTS) {
+      field.as.heights.heights = numbers;
+      field.as.heights.columns = field.as.heights.rows = 5;
+      field.as.heights.spacing[0] = field.as.heights.spacing[1] = 0.3;
+    } else if (kind == IST_DISTANCE_GRID) {
+      field.as.distance_grid.distances = numbers;
+      for (i = 0; i < 3; ++i) field.as.distance_grid.points[i] = 5;
+      for (i = 0; i < 3; ++i) field.as.distance_grid.origin[i] = -1;
+      field.as.distance_grid.spacing = 0.5;
+    } else if (kind == IST_FUNCTION) {
+      field.as.function.look = look;
+      field.as.function.context = &offset;
+    } else {
+      field.as.mesh.tree = &s->tree_a;
+      if (!info.has_field) {
+        CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
+        break;
+      }
+    }
+    CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_OK);
+    CHECK(answer.volume > 0);
+    CHECK(ist_field_query(&a, &s->b, NULL, NULL, &s->workspace, &again, &gap) == IST_OK);
+    CHECK(memcmp(&answer, &again, sizeof answer) == 0 && gap.distance == 0);
+    CHECK(ist_field_contact_patches(&a, &s->b, NULL, &s->workspace, &patches, &again) == IST_OK);
+    CHECK(patches.count > 0 && again.volume == answer.volume);
+    if (kind == IST_HALF_SPACE || kind == IST_HEIGHTS) {
+      if (kind == IST_HALF_SPACE) by_plane = answer.volume;
+      CHECK(fabs(answer.volume - by_plane) <= 1e-6 * by_plane);
+    }
+    s->b.pose.t[2] = 20;
+    if (kind != IST_DISTANCE_GRID) {
+      CHECK(ist_field_separation(&a, &s->b, NULL, &s->workspace, &gap) == IST_OK);
+      CHECK(gap.distance > 10);
+    }
+    s->b.pose.t[2] = 0;
+  }
+
+  /* What they point to, null. */
+  memset(&field.as, 0, sizeof field.as);
+  for (kind = IST_HEIGHTS; kind <= IST_MESH; ++kind) {
+    field.kind = kind;
+    CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
+    CHECK(is_empty(&answer, sizeof answer, IST_NULL_POINTER));
+  }
+  field.as.mesh.tree = &empty;
+  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NO_HANDLE);
+  memset(&field.as, 0, sizeof field.as);
+  for (kind = IST_HALF_SPACE; kind <= IST_CYLINDER; ++kind) { /* no length may be 0 */
+    field.kind = kind;
+    CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
+  }
+  field.kind = 0;
+  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
+  field.kind = 99;
+  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
+  field.size = 8;
+  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_WRONG_SIZE);
+  a.field = NULL;
+  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
+  a.size = 8;
+  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_WRONG_SIZE);
+  CHECK(ist_field_penetration(NULL, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
+  CHECK(ist_field_separation(NULL, &s->b, NULL, &s->workspace, &gap) == IST_NULL_POINTER);
+  CHECK(ist_field_query(NULL, &s->b, NULL, NULL, &s->workspace, &answer, &gap) == IST_NULL_POINTER);
+  CHECK(ist_field_contact_patches(NULL, &s->b, NULL, &s->workspace, &patches, NULL) ==
+        IST_NULL_POINTER);
+  return 0;
+}

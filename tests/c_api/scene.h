@@ -1,0 +1,46 @@
+#ifndef IST_TESTS_C_API_SCENE_H
+#define IST_TESTS_C_API_SCENE_H
+
+#include <ist/ist.h>
+#include <stdio.h>
+#include <string.h>
+
+#define CHECK(condition)                                              \
+  do {                                                                \
+    if (!(condition)) {                                               \
+      fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition); \
+      return 1;                                                       \
+    }                                                                 \
+  } while (0)
+
+/* All zero but the size and the status. */
+static inline int is_empty(const void* answer, size_t size, ist_status_t status) {
+  const unsigned char* bytes = (const unsigned char*)answer;
+  uint32_t own_size = 0;
+  ist_status_t own_status = 0;
+  size_t i = 2 * sizeof(uint32_t);
+  memcpy(&own_size, bytes, sizeof own_size);
+  memcpy(&own_status, bytes + sizeof own_size, sizeof own_status);
+  for (; i < size; ++i)
+    if (bytes[i] != 0) return 0;
+  return own_size == size && own_status == status;
+}
+
+/* Two trees that overlap. */
+typedef struct scene {
+  ist_tree_t tree_a, tree_b;
+  ist_placed_tree_t a, b;
+  ist_workspace_t workspace;
+} scene_t;
+
+/* Each: 0, or 1 with the first thing that is not as the header says on stderr. */
+int penetrations_answer(scene_t* s);
+int separations_answer(scene_t* s);
+int overlaps_answer(scene_t* s);
+int patches_answer(scene_t* s);
+int fields_answer(scene_t* s);
+int bodies_are_told(scene_t* s);
+int impacts_are_found(scene_t* s);
+int batches_answer(scene_t* s);
+
+#endif

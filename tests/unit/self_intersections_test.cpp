@@ -1,0 +1,203 @@
+#include "mesh/self_intersections.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <random>
+
+#include <ist/error.h>
+#include <ist/mesh.h>
+
+#include "mesh/fans.h"
+#include "mesh/mesh_solid.h"
+#include "mesh/surface_reduction.h"
+#include "mesh/triangle_separation.h"
+#include "mesh/weld.h"
+#include "support/test_meshes.h"
+
+namespace ist {
+namespace {
+
+using Pairs = std::vector<std::array<std::uint32_t, 2>>;
+
+/// By the exact test of every pair; what is said without it must agree.
+Pairs all_pairs(const TriangleMesh& mesh) {
+  const auto& [vertices, triangles, declared] = mesh;
+  const std::vector<std::uint8_t> spread = spread_fans(vertices, triangles);
+  Pairs pairs;
+  for (std::uint32_t i = 0; i < triangles.size(); ++i)
+    for (std::uint32_t j = i + 1; j < triangles.size(); ++j) {
+      if (is_degenerate(vertices, triangles[i]) || is_degenerate(vertices, triangles[j])) continue;
+      const bool met = meet_elsewhere(vertices, triangles[i], triangles[j]);
+      EXPECT_EQ(met, meet_elsewhere(vertices, triangles[j], triangles[i]));
+      if (met) {
+        pairs.push_back({i, j});
+        EXPECT_FALSE(seen_apart(vertices, triangles[i], triangles[j]));
+        EXPECT_FALSE(seen_apart(vertices, triangles[j], triangles[i]));
+        for (const std::uint32_t v : triangles[i])
+          for (const std::uint32_t w : triangles[j]) EXPECT_FALSE(v == w && spread[v] != 0);
+      }
+    }
+  return pairs;
+}
+
+void expect_all_found(const TriangleMesh& mesh) {
+  const Pairs pairs = all_pairs(mesh);
+  for (const std::size_t threads : {1, 4}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    const auto found = find_self_intersections(mesh.vertices, mesh.triangles);
+    ASSERT_TRUE(found && found->pairs);
+    EXPECT_EQ(found->count, pairs.size());
+    EXPECT_EQ(*found->pairs, pairs);
+  }
+}
+
+/// Triangles between corners of a small lattice: many touch exactly.
+TriangleMesh lattice_soup(std::mt19937_64& random, const std::size_t corners,
+                          const std::size_t triangles) {
+  TriangleMesh soup;
+  const auto coordinate = [&] { return static_cast<double>(random() % 9); };
+  for (std::size_t v = 0; v < corners; ++v)
+    soup.vertices.emplace_back(coordinate(), coordinate(), coordinate());
+  const auto corner = [&] { return static_cast<std::uint32_t>(random() % corners); };
+  for (std::size_t t = 0; t < triangles; ++t)
+    soup.triangles.push_back({corner(), corner(), corner()});
+  return weld(soup, 0);
+}
+
+/// A square grid over which heights are drawn, and drawn sideways too.
+TriangleMesh crumpled_sheet(std::mt19937_64& random, const std::uint32_t n, const double sideways) {
+  std::uniform_real_distribution<double> by(-1, 1);
+  TriangleMesh sheet;
+  for (std::uint32_t y = 0; y < n; ++y)
+    for (std::uint32_t x = 0; x < n; ++x)
+      sheet.vertices.emplace_back(x + sideways * by(random), y + sideways * by(random),
+                                  sideways * by(random));
+  for (std::uint32_t y = 0; y + 1 < n; ++y)
+    for (std::uint32_t x = 0; x + 1 < n; ++x) {
+      const std::uint32_t v = y * n + x;
+      sheet.triangles.push_back({v, v + 1, v + n + 1});
+      sheet.triangles.push_back({v, v + n + 1, v + n});
+    }
+  return sheet;
+}
+
+TEST(SelfIntersections, FindsWhatAllPairsFind) {
+  std::mt19937_64 random(5);
+  for (int round = 0; round < 20; ++round) expect_all_found(lattice_soup(random, 60, 80));
+  for (int round = 0; round < 2; ++round) expect_all_found(lattice_soup(random, 200, 300));
+  for (const double sideways : {0.0, 0.1, 0.4, 0.6, 1.0, 3.0})
+    for (const double offset : {0.0, 1e6}) {
+      TriangleMesh sheet = crumpled_sheet(random, 11, sideways);
+      for (Eigen::Vector3d& v : sheet.vertices) v.array() += offset;
+      expect_all_found(sheet);
+      // Turned, so that what was flat is so up to rounding.
+      const Eigen::Matrix3d turn =
+          Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+      for (Eigen::Vector3d& v : sheet.vertices) v = turn * v;
+      expect_all_found(sheet);
+    }
+}
+
+void expect_handed_over(const TriangleMesh& mesh, const std::size_t at_least) {
+  const ClosedMesh closed = close_mesh(mesh, "mesh", OpenMeshPolicy::repair);
+  ASSERT_TRUE(closed.meeting_pairs);
+  EXPECT_EQ(*closed.meeting_pairs, all_pairs(closed.mesh));
+  EXPECT_EQ(closed.report.meets_itself, !closed.meeting_pairs->empty());
+  EXPECT_GE(closed.meeting_pairs->size(), at_least);
+}
+
+TEST(SelfIntersections, TheClosedMeshKeepsThem) {
+  const TriangleMesh two = testing::overlapping_cubes_mesh();
+  expect_handed_over(two, 1);
+  expect_handed_over(testing::box_mesh({0, 0, 0}, {1, 1, 1}), 0);
+  // Triangles without area come first and are dropped.
+  TriangleMesh dropped = two;
+  dropped.triangles.insert(dropped.triangles.begin(), {{0, 0, 1}, {1, 2, 1}});
+  dropped.triangles.insert(dropped.triangles.begin() + 7, {3, 3, 3});
+  expect_handed_over(dropped, 1);
+  // One face twice; one face missing.
+  TriangleMesh copied = two;
+  copied.triangles.insert(copied.triangles.begin(), two.triangles[3]);
+  expect_handed_over(copied, 1);
+  TriangleMesh open = two;
+  open.triangles.erase(open.triangles.begin());
+  expect_handed_over(open, 1);
+}
+
+TEST(SelfIntersections, TheSolidTakesThemWhereNothingIsRounded) {
+  TriangleMesh two = testing::overlapping_cubes_mesh();
+  ClosedMesh closed = close_mesh(two, "two cubes");
+  const MeshSolid exact(closed);
+  ASSERT_NE(exact.meeting_pairs(), nullptr);
+  EXPECT_EQ(*exact.meeting_pairs(), *closed.meeting_pairs);
+  for (Eigen::Vector3d& v : two.vertices)
+    if (v[0] == 0) v[0] = 1e-20;
+  EXPECT_EQ(MeshSolid(close_mesh(two, "rounded")).meeting_pairs(), nullptr);
+  closed.meeting_pairs->push_back({0, static_cast<std::uint32_t>(closed.mesh.triangles.size())});
+  EXPECT_THROW(MeshSolid{closed}, Error);
+  closed.meeting_pairs.reset();
+  EXPECT_EQ(MeshSolid(closed).meeting_pairs(), nullptr);
+}
+
+TEST(SelfIntersections, FansThatGoOnceAround) {
+  // n triangles about vertex 0, `turns` times around, rising by `rise` at every other spoke.
+  const auto fan = [](const std::uint32_t n, const int turns, const double rise) {
+    TriangleMesh mesh;
+    mesh.vertices.emplace_back(0, 0, 0);
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const double angle = 2 * 3.14159265358979 * turns * i / n;
+      mesh.vertices.emplace_back(std::cos(angle), std::sin(angle), i % 2 == 0 ? rise : -rise);
+      mesh.triangles.push_back({0, 1 + i, 1 + (i + 1) % n});
+    }
+    return mesh;
+  };
+  const auto is_spread = [](const TriangleMesh& mesh) {
+    return spread_fans(mesh.vertices, mesh.triangles)[0] != 0;
+  };
+  EXPECT_TRUE(is_spread(fan(3, 1, 0.1)));
+  EXPECT_TRUE(is_spread(fan(4, 1, 0)));  // spokes opposite to the first
+  EXPECT_TRUE(is_spread(fan(6, 1, 0)));
+  EXPECT_TRUE(is_spread(fan(6, 1, 0.3)));
+  EXPECT_TRUE(is_spread(fan(32, 1, 0.1)));
+  EXPECT_FALSE(is_spread(fan(33, 1, 0.1)));  // not looked at
+  for (const std::uint32_t n : {5u, 7u, 9u, 12u, 15u, 31u}) {
+    EXPECT_FALSE(is_spread(fan(n, 2, 0.1))) << n;
+    if (n > 6) {
+      EXPECT_FALSE(is_spread(fan(n, 3, 0.1))) << n;
+    }
+  }
+  TriangleMesh open = fan(6, 1, 0);
+  open.triangles.pop_back();
+  EXPECT_FALSE(is_spread(open));
+  TriangleMesh turned = fan(6, 1, 0);
+  std::swap(turned.triangles[2][1], turned.triangles[2][2]);
+  EXPECT_FALSE(is_spread(turned));
+  TriangleMesh twice = fan(6, 1, 0);
+  for (std::size_t t = 0; t < 6; ++t) twice.triangles.push_back(twice.triangles[t]);
+  EXPECT_FALSE(is_spread(twice));
+  TriangleMesh folded = fan(6, 1, 0);
+  folded.vertices[2] = folded.vertices[4] * 0.9 + Eigen::Vector3d(0, 0, 0.1);
+  EXPECT_FALSE(is_spread(folded));
+}
+
+TEST(SelfIntersections, PairsByHand) {
+  const std::vector<Eigen::Vector3d> v = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0},    {2, 2, 0},
+                                          {1, 1, 0}, {1, 1, 1}, {3, 3, 1},    {0, 0, 1},
+                                          {1, 0, 0}, {3, 0, 0}, {.5, .5, -1}, {-1, 0, 0}};
+  const auto meet = [&](Triangle a, Triangle b) { return meet_elsewhere(v, a, b); };
+  EXPECT_FALSE(meet({0, 1, 2}, {1, 3, 2}));   // neighbours in a plane
+  EXPECT_TRUE(meet({0, 1, 2}, {0, 1, 3}));    // folded onto each other
+  EXPECT_TRUE(meet({0, 1, 2}, {2, 1, 0}));    // the same, backwards
+  EXPECT_FALSE(meet({0, 1, 2}, {0, 1, 7}));   // a hinge
+  EXPECT_TRUE(meet({0, 1, 2}, {4, 5, 6}));    // a corner touches a side
+  EXPECT_FALSE(meet({0, 1, 2}, {5, 6, 7}));   // above
+  EXPECT_TRUE(meet({0, 1, 2}, {8, 9, 5}));    // a side lies along a side
+  EXPECT_TRUE(meet({0, 1, 2}, {0, 5, 10}));   // shares a corner and passes through
+  EXPECT_FALSE(meet({0, 1, 2}, {0, 7, 11}));  // shares a corner only
+}
+
+}  // namespace
+}  // namespace ist
