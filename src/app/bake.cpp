@@ -165,6 +165,7 @@ void add_bake(CLI::App& app) {
       "Example: ist bake --manifest library.toml -o assets --cache ~/.cache/ist");
   command->callback([options, mesh] {
     if (!options->library.manifest.empty()) {
+      refuse_idle_options(options->robot, options->library.manifest);
       if (!options->mesh.empty())
         throw CLI::ValidationError("--manifest", "excludes MESH: write the mesh into the manifest");
       if (!options->asked.given.empty())
@@ -176,6 +177,7 @@ void add_bake(CLI::App& app) {
     }
     if (options->mesh.empty()) throw CLI::RequiredError(mesh->get_name());
     complete_settings(options->asked);
+    refuse_idle_options(options->robot, options->mesh);
     if (is_robot_file(options->mesh))
       for (const Setting& placing : placing_settings())
         if (options->asked.given.contains(placing.name))

@@ -27,6 +27,12 @@ void add_robot_options(CLI::App* command, RobotOptions& options) {
                     "Of a robot: its visual shapes instead of its collision shapes");
 }
 
+void refuse_idle_options(const RobotOptions& options, const std::string& input) {
+  if (is_robot_file(input) || (!options.visual && options.packages.empty())) return;
+  throw CLI::ValidationError(options.visual ? "--visual" : "--package",
+                             "has no effect: '" + input + "' is no robot (.urdf)");
+}
+
 bool is_robot_file(const std::string& path) { return ending_of(path) == ".urdf"; }
 
 PackagePaths package_paths(const std::string& urdf, const RobotOptions& options) {

@@ -294,6 +294,7 @@ void add_spheres(CLI::App& app) {
   command->callback([options, command] {
     if (options->cover.max_protrusion > 0 && command->count("--count") == 0)
       options->cover.count = 1024;
+    refuse_idle_options(options->robot, options->input);
     run_spheres(*options);
   });
 }

@@ -135,6 +135,18 @@ TEST_F(RobotCommands, AMeshAlone) {
   EXPECT_EQ(robot->getLink("cube")->collision_array.size(), 4u);
 }
 
+TEST_F(RobotCommands, AsFewAsAProtrusionNeedsOrAnError) {
+  // One sphere around the cube protrudes by 0.37.
+  const Outcome outcome = ist({"spheres", "cube.obj", "-o", "c.json", "--max-protrusion", "0.3"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const Json link = Json::parse(read("c.json"))["links"]["cube"];
+  EXPECT_LE(link["protrusion"].get<double>(), 0.3);
+  EXPECT_TRUE(link["covered"].get<bool>());
+  EXPECT_GT(link["spheres"].size(), 1u);
+  expect_error({"spheres", "cube.obj", "-o", "d.json", "--max-protrusion", "0.3", "--count", "1"},
+               1, "1 spheres still protrude by 0.36");
+}
+
 TEST_F(RobotCommands, BakesLinkByLink) {
   const Outcome outcome = ist({"bake", "r.urdf", "-o", "out/", "--spheres", "50"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
@@ -160,6 +172,9 @@ TEST_F(RobotCommands, MistakesAreNamedAndNothingIsWritten) {
   write("empty.urdf", "<robot name='r'><link name='a'/></robot>");
   expect_error({"spheres", "empty.urdf", "-o", "o.json"}, 1, "no link has a collision shape");
   expect_error({"bake", "empty.urdf", "-o", "out"}, 1, "no link has a collision shape");
+  expect_error({"bake", "r.urdf", "-o", "out", "--scale", "2"}, 2, "its URDF places the meshes");
+  expect_error({"bake", "cube.obj", "-o", "c.ist", "--visual"}, 2, "is no robot");
+  expect_error({"spheres", "cube.obj", "-o", "c.json", "--package", "p=."}, 2, "is no robot");
   expect_error({"spheres", "r.urdf", "-o", "o.txt"}, 1, "use .urdf, .yml");
   expect_error({"spheres", "r.urdf", "-o", "r.urdf"}, 1, "name another file");
   expect_error({"spheres", "r.urdf", "-o", "o.json", "--count", "0"}, 2, "1 to 4096");

@@ -123,6 +123,42 @@ TEST(CoverSpheres, TheProofSeesAVoidInside) {
   EXPECT_TRUE(prove_cover(mesh, shell).covered);
 }
 
+/// Every ball around a ball protrudes everywhere by about as much: the search has no way down.
+TEST(CoverSpheres, FewSpheresOnABallAreHardlyWorseThanOneAroundIt) {
+  const ClosedMesh mesh = close_mesh(icosphere_mesh(2), "ball");
+  const std::vector<CoverSphere> around = {{{0, 0, 0}, 1 + 1e-9}};
+  ASSERT_TRUE(prove_cover(mesh, around).covered);
+  const double largest = sphere_protrusion(mesh, around).largest;
+  for (std::size_t count = 1; count <= 4; count += 3) {
+    SphereCoverSettings settings;
+    settings.count = count;
+    const SphereCover cover = cover_with_spheres(mesh, settings);
+    EXPECT_LE(cover.spheres.size(), count);
+    EXPECT_TRUE(prove_cover(mesh, cover.spheres).covered);
+    EXPECT_LT(cover.protrusion.largest, 1.25 * largest);
+  }
+}
+
+TEST(CoverSpheres, AsFewAsReachNoFurtherThanAsked) {
+  const ClosedMesh mesh = close_mesh(box_mesh({-1, -0.3, -0.1}, {1, 0.3, 0.1}), "box");
+  SphereCoverSettings settings;
+  settings.max_protrusion = 0.25;
+  const SphereCover cover = cover_with_spheres(mesh, settings);
+  EXPECT_TRUE(cover.reached);
+  EXPECT_LE(cover.protrusion.largest, 0.25);
+  EXPECT_TRUE(prove_cover(mesh, cover.spheres).covered);
+  ASSERT_GT(cover.spheres.size(), 1u);
+  ASSERT_LE(cover.spheres.size(), 16u);  // few enough that the last one is told
+  SphereCoverSettings fewer;
+  fewer.count = cover.spheres.size() - 1;
+  EXPECT_GT(cover_with_spheres(mesh, fewer).protrusion.largest, 0.25);
+  settings.count = fewer.count;
+  const SphereCover failed = cover_with_spheres(mesh, settings);
+  EXPECT_FALSE(failed.reached);
+  EXPECT_GT(failed.protrusion.largest, 0.25);
+  EXPECT_TRUE(prove_cover(mesh, failed.spheres).covered);
+}
+
 TEST(CoverSpheres, ThreadsChangeNothing) {
   const ClosedMesh mesh = close_mesh(overlapping_cubes_mesh(), "cubes");
   SphereCoverSettings settings;
