@@ -25,9 +25,9 @@ constexpr int kCuts = 14;         ///< rounds of descending and looking what was
 constexpr int kFirstRounds = 25;  ///< over all balls, before the first look
 constexpr int kRounds = 8;        ///< between two looks
 constexpr std::size_t kExchanges = 1500;
-constexpr std::int64_t kSteps = 1'500'000'000;  ///< of all exchanges of an attempt
-constexpr std::size_t kOpenParts = 100'000;   ///< that a look takes in, about
-constexpr int kLevels = 24;                   ///< that exchanges try
+constexpr std::int64_t kSteps = 400'000'000;   ///< of all exchanges of an attempt
+constexpr std::size_t kOpenParts = 1'000'000;  ///< that a look takes in, about
+constexpr int kLevels = 24;                    ///< that exchanges try
 constexpr double kFinest = 1e-3;  ///< of the level: how close the last radii are to just enough
 
 std::vector<CoverSphere> balls_at(const OffsetSurface& surface,
