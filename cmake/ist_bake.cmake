@@ -13,6 +13,7 @@ include(cmake/ist_openvdb.cmake)
 add_subdirectory(src)
 add_subdirectory(src/asset)
 add_subdirectory(ist/bake)
+add_subdirectory(ist/spheres)
 
 get_property(objects GLOBAL PROPERTY IST_ROOM_OBJECTS)
 ist_add_library(ist ist ${objects})

@@ -9,6 +9,7 @@
 
 #include "app/asset_summary.h"
 #include "app/bake_library.h"
+#include "app/bake_robot.h"
 #include "app/coarseness.h"
 #include "app/commands.h"
 #include "app/device_option.h"
@@ -30,6 +31,7 @@ struct BakeOptions {
   unsigned threads = 0;
   bool json = false, quiet = false;
   LibraryOptions library;
+  RobotOptions robot;
 };
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -92,9 +94,13 @@ void run_bake(const BakeOptions& options) {
   const ErrorTarget& target = options.asked.settings.target;
   PackingSettings settings = options.asked.settings.packing;
   settings.threads = options.threads;
-  require_output(options.output, options.mesh, "the asset");
+  const bool robot = is_robot_file(options.mesh);
+  if (!robot) require_output(options.output, options.mesh, "the asset");
   settings.device = usable_device(options.device);
   announce_device(settings.device);
+  if (robot)
+    return bake_robot({options.mesh, options.output, settings, target, options.robot,
+                       options.asked.settings.mesh.repair, options.json, options.quiet});
 
   const auto start = std::chrono::steady_clock::now();
   const auto [declared, mesh] = read_mesh_aloud(options.mesh, options.asked.settings.mesh);
@@ -137,24 +143,29 @@ void add_bake(CLI::App& app) {
   CLI::App* const command = app.add_subcommand(
       "bake", "Pack a closed mesh with spheres and write an .ist asset, or many with --manifest");
   CLI::Option* const mesh =
-      add_input(command, "MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …")
+      add_input(command, "MESH", options->mesh,
+                "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf")
           ->required(false);
   add_output(command, options->output,
-             "The .ist file to write; with --manifest the folder for NAME.ist, made if need be",
+             "The .ist file to write; with --manifest the folder for NAME.ist, of a robot the one "
+             "for LINK.ist and an index, made if need be",
              Dash::refused);
   add_setting_options(command, options->asked, all_settings());
   add_device_option(command, options->device,
                     "Where the bake runs; auto: on the GPU if there is one");
   add_whole(command, "--threads", options->threads, "0 = all cores; never changes the result");
+  add_robot_options(command, options->robot);
   add_library_options(command, options->library);
   command->add_flag("--json", options->json, "The result as JSON on stdout");
   command->add_flag("--quiet", options->quiet, "Only errors");
   command->footer(
       "The first limit met stops the packing. Ctrl-C ends the bake without writing a file.\n"
       "Example: ist bake bolt.obj -o bolt.ist --spheres 4000\n"
+      "Example: ist bake ur5.urdf -o ur5 --spheres 1000\n"
       "Example: ist bake --manifest library.toml -o assets --cache ~/.cache/ist");
   command->callback([options, mesh] {
     if (!options->library.manifest.empty()) {
+      refuse_idle_options(options->robot, options->library.manifest);
       if (!options->mesh.empty())
         throw CLI::ValidationError("--manifest", "excludes MESH: write the mesh into the manifest");
       if (!options->asked.given.empty())
@@ -166,6 +177,12 @@ void add_bake(CLI::App& app) {
     }
     if (options->mesh.empty()) throw CLI::RequiredError(mesh->get_name());
     complete_settings(options->asked);
+    refuse_idle_options(options->robot, options->mesh);
+    if (is_robot_file(options->mesh))
+      for (const Setting& placing : placing_settings())
+        if (options->asked.given.contains(placing.name))
+          throw CLI::ValidationError("--" + placing.name,
+                                     "is not combined with a robot: its URDF places the meshes");
     run_bake(*options);
   });
 }

@@ -26,6 +26,7 @@ void add_check(CLI::App& app);
 void add_medial(CLI::App& app);
 void add_export(CLI::App& app);
 void add_sample(CLI::App& app);
+void add_spheres(CLI::App& app);
 void add_reference(CLI::App& app);  ///< completion and manual: of all commands that were added
 
 }  // namespace ist::app

@@ -39,6 +39,7 @@ int main(int argc, char** argv) {
   add_export(app);
   add_medial(app);
   add_sample(app);
+  add_spheres(app);
   add_reference(app);
   try {
     app.parse(argc, argv);

@@ -3,19 +3,29 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <utility>
+
 #include <ist/error.h>
 
 namespace ist::app {
 
-InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings) {
+ClosedMesh close_aloud(TriangleMesh mesh, const std::string& name, bool repair) {
   try {
-    InputMesh mesh = read_input_mesh(path, settings);
-    for (const std::string& note : mesh.closed.report.notes) spdlog::warn("{}: {}", path, note);
-    return mesh;
+    ClosedMesh closed =
+        close_mesh(std::move(mesh), name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+    for (const std::string& note : closed.report.notes) spdlog::warn("{}: {}", name, note);
+    return closed;
   } catch (const OpenMeshError& error) {
-    if (settings.repair) throw;
+    if (repair) throw;
     throw OpenMeshError(std::string(error.what()) + "; --repair closes what can be closed");
   }
+}
+
+InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings) {
+  TriangleMesh mesh = load_mesh(path);
+  place(mesh, settings);
+  const DeclaredFrame declared = mesh.declared;
+  return {declared, close_aloud(std::move(mesh), path, settings.repair)};
 }
 
 std::string describe_declared(const DeclaredFrame& declared) {

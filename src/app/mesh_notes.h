@@ -9,6 +9,10 @@
 
 namespace ist::app {
 
+/// close_mesh(); what was found about the mesh goes to stderr as warnings, after its name. Throws
+/// Error.
+ClosedMesh close_aloud(TriangleMesh mesh, const std::string& name, bool repair);
+
 /// read_input_mesh(); what was found about the mesh goes to stderr as warnings. Throws Error.
 InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings);
 

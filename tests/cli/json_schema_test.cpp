@@ -83,6 +83,26 @@ TEST_F(JsonSchema, LibraryAndCache) {
   EXPECT_EQ(cache, documented("`ist cache --json`"));
 }
 
+TEST_F(JsonSchema, Robots) {
+  write("r.urdf",
+        "<robot name='r'><link name='NAME'>"
+        "<collision><geometry><mesh filename='cube.obj'/></geometry></collision>"
+        "<collision><geometry><sphere radius='1'/></geometry></collision></link></robot>");
+  Paths report, file, bake;
+  add({"spheres", "r.urdf", "-o", "s.json", "--count", "8", "--json"}, report);
+  Paths expected = documented("`ist spheres --json`");
+  EXPECT_EQ(report, expected);
+  add_paths(nlohmann::json::parse(read("s.json")), "", file);
+  for (const char* field : {"output", "input", "seconds", "links.NAME.seconds"})
+    expected.erase(field);
+  EXPECT_EQ(file, expected);
+  add({"bake", "r.urdf", "-o", "out", "--spheres", "9", "--json"}, bake);
+  // The first shape is a mesh, the second a sphere.
+  for (const auto& shape : nlohmann::json::parse(read("out/r.json"))["links"]["NAME"])
+    for (const auto& [key, value] : shape.items()) bake.insert("links.NAME[]." + key);
+  EXPECT_EQ(bake, documented("`ist bake ROBOT.urdf --json`"));
+}
+
 TEST_F(JsonSchema, CheckQueryAndExport) {
   Paths check, query, exported;
   add({"check", "cube.ist", "--mesh", "cube.obj", "--json"}, check);

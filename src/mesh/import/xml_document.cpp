@@ -87,6 +87,7 @@ void XmlDocument::open_tag() {
     fail_at(element.offset, "a tag without a readable name");
   at_ = end;
   read_attributes(element);
+  element.end = at_;
   elements_.push_back(element);
   if (!open_.empty()) {
     Open& parent = open_.back();
@@ -143,7 +144,7 @@ void XmlDocument::close_tag() {
   if (element.first_child == kNone)
     element.text = bytes_.substr(closed.content, tag - closed.content);
   open_.pop_back();
-  at_ = end + 1;
+  at_ = element.end = end + 1;
 }
 
 }  // namespace ist

@@ -25,6 +25,7 @@ class XmlDocument {
     std::uint32_t first_child = kNone, next_sibling = kNone;
     std::uint32_t first_attribute = 0, attribute_count = 0;
     std::size_t offset = 0;  ///< [bytes] of its tag in the file
+    std::size_t end = 0;     ///< [bytes] behind its last tag
   };
 
   /// Keeps a reference to the file. Throws Error (file, line) unless it is one closed element.

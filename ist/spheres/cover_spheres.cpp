@@ -1,0 +1,203 @@
+#include <ist/cover_spheres.h>
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <string>
+#include <thread>
+
+#include <ist/error.h>
+
+#include "mesh/mesh_solid.h"
+#include "spheres/cover_proof.h"
+#include "spheres/cover_search.h"
+#include "spheres/protrusion.h"
+#include "stage/stage.h"
+#include "stage/thread_arena.h"
+#include "stage/work_stop.h"
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr std::size_t kMostSpheres = 4096;
+constexpr int kMostTries = 8;  ///< counts that are tried for a protrusion; doubling goes on
+
+/// What several searches have done together, told by the thread that started them.
+class Watch {
+ public:
+  Watch(const ProgressCallback& progress, std::size_t searches)
+      : stage_("spheres", progress), searches_(searches) {}
+
+  /// Of one search: its share that is done went from `before` to `now`. Throws WorkStop::Stopped.
+  void look(double before, double now) {
+    double done = done_.load();
+    while (!done_.compare_exchange_weak(done, done + (now - before))) {
+    }
+    if (std::this_thread::get_id() == caller_) {
+      const double share = std::min(1.0, done_.load() / static_cast<double>(searches_));
+      const auto stopped = stage_.stop([&](Progress& report) { report.fraction = share; });
+      if (stopped) stop_.stop();
+    }
+    stop_.look();
+  }
+
+ private:
+  Stage stage_;
+  const std::size_t searches_;
+  const std::thread::id caller_ = std::this_thread::get_id();
+  std::atomic<double> done_ = 0;
+  WorkStop stop_;
+};
+
+/// The sphere in the mesh's frame, made larger by what rounding moves its centre.
+CoverSphere in_mesh_frame(const CoverSphere& ball, const UnitFrame& frame) {
+  const Vector3d centre = frame.from_unit(ball.centre);
+  const double moved =
+      0x1p-51 * (std::abs(centre.x()) + std::abs(centre.y()) + std::abs(centre.z()));
+  return {centre, ball.radius * frame.scale() + moved};
+}
+
+std::vector<CoverSphere> in_unit_frame(std::span<const CoverSphere> spheres,
+                                       const UnitFrame& frame) {
+  std::vector<CoverSphere> balls;
+  for (const CoverSphere& s : spheres) {
+    if (!(s.radius > 0) || !std::isfinite(s.radius) || !s.centre.allFinite()) continue;
+    balls.push_back({frame.to_unit(s.centre), s.radius / frame.scale()});
+  }
+  return balls;
+}
+
+SphereProtrusion in_mesh_frame(SphereProtrusion p, const UnitFrame& frame) {
+  for (double* length : {&p.largest, &p.largest_seen, &p.mean, &p.p95}) *length *= frame.scale();
+  return p;
+}
+
+void check(const SphereCoverSettings& settings) {
+  if (settings.count < 1 || settings.count > kMostSpheres)
+    throw Error("cover: " + std::to_string(settings.count) + " spheres; 1 to " +
+                std::to_string(kMostSpheres) + " can be made");
+  if (!(settings.max_protrusion >= 0) || !std::isfinite(settings.max_protrusion))
+    throw Error("cover: the largest protrusion must be a length, 0 or more");
+}
+
+SphereCover finished(const MeshSolid& solid, const std::vector<CoverSphere>& balls) {
+  SphereCover cover;
+  for (const CoverSphere& ball : balls) cover.spheres.push_back(in_mesh_frame(ball, solid.frame()));
+  cover.protrusion = in_mesh_frame(protrusion_of(solid, balls), solid.frame());
+  return cover;
+}
+
+/// As few spheres as reach no further than asked: twice as many until it is enough, then halfway
+/// between too few and enough.
+SphereCover fewest(const MeshSolid& solid, const CoverSearch& search,
+                   const SphereCoverSettings& settings) {
+  int tries = 0;
+  const auto with = [&](std::size_t count) {
+    ++tries;
+    return finished(solid, search.with_count(count));
+  };
+  const double level = settings.max_protrusion / solid.frame().scale();
+  std::size_t low = 0;  // too few
+  std::size_t high = std::clamp<std::size_t>(search.greedy_count(level) / 2, 1, settings.count);
+  SphereCover best = with(high);
+  while (best.protrusion.largest > settings.max_protrusion) {
+    low = high;
+    if (high == settings.count) {
+      best.reached = false;
+      return best;
+    }
+    high = std::min(settings.count, 2 * high);
+    best = with(high);
+  }
+  while (high - low > std::max<std::size_t>(1, high / 16) && tries < kMostTries) {
+    const std::size_t middle = (low + high) / 2;
+    SphereCover fewer = with(middle);
+    if (fewer.protrusion.largest <= settings.max_protrusion) {
+      best = std::move(fewer);
+      high = middle;
+    } else {
+      low = middle;
+    }
+  }
+  return best;
+}
+
+SphereCover cover_one(const ClosedMesh& mesh, const SphereCoverSettings& settings, Watch& watch) {
+  const auto start = std::chrono::steady_clock::now();
+  const MeshSolid solid(mesh);
+  std::atomic<double> done = 0;
+  const CoverSearch search(solid, settings.seed, [&](double share) {
+    const double before = done.load();
+    if (share > before) done = share;  // one thread at a time gets further
+    watch.look(before, std::max(before, share));
+  });
+  SphereCover cover = settings.max_protrusion > 0
+                          ? fewest(solid, search, settings)
+                          : finished(solid, search.with_count(settings.count));
+  watch.look(done, 1);
+  cover.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return cover;
+}
+
+}  // namespace
+
+std::vector<SphereCover> cover_with_spheres(std::span<const ClosedMesh> meshes,
+                                            const SphereCoverSettings& settings,
+                                            const ProgressCallback& progress) {
+  check(settings);
+  Watch watch(progress, meshes.size());
+  std::vector<SphereCover> covers(meshes.size());
+  try {
+    thread_arena(settings.threads).execute([&] {
+      tbb::parallel_for(
+          tbb::blocked_range<std::size_t>(0, meshes.size(), 1),
+          [&](const tbb::blocked_range<std::size_t>& range) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i)
+              covers[i] = cover_one(meshes[i], settings, watch);
+          },
+          tbb::simple_partitioner());
+    });
+  } catch (const WorkStop::Stopped&) {
+    throw Error("spheres: cancelled");
+  }
+  return covers;
+}
+
+SphereCover cover_with_spheres(const ClosedMesh& mesh, const SphereCoverSettings& settings,
+                               const ProgressCallback& progress) {
+  return cover_with_spheres(std::span(&mesh, 1), settings, progress).front();
+}
+
+SphereCoverProof prove_cover(const ClosedMesh& mesh, std::span<const CoverSphere> spheres) {
+  const MeshSolid solid(mesh);
+  const std::vector<CoverSphere> balls = in_unit_frame(spheres, solid.frame());
+  SphereCoverProof proof;
+  const auto refuted = [&](const Vector3d& place, double gap) {
+    proof.where = solid.frame().from_unit(place);
+    proof.gap = gap * solid.frame().scale();
+    return proof;
+  };
+  const std::vector<OpenPart> parts = open_surface(solid.view(), balls, 1e-9, 1);
+  if (!parts.empty()) {
+    const auto worst =
+        std::max_element(parts.begin(), parts.end(),
+                         [](const OpenPart& a, const OpenPart& b) { return a.gap < b.gap; });
+    return refuted(worst->middle, worst->gap);
+  }
+  const OpenPlace open = open_void(solid, balls);
+  if (open.found) return refuted(open.place, open.gap);
+  proof.covered = true;
+  return proof;
+}
+
+SphereProtrusion sphere_protrusion(const ClosedMesh& mesh, std::span<const CoverSphere> spheres) {
+  const MeshSolid solid(mesh);
+  return in_mesh_frame(protrusion_of(solid, in_unit_frame(spheres, solid.frame())), solid.frame());
+}
+
+}  // namespace ist

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "spheres/point_tree.h"
+#include "spheres/sampled_solid.h"
+
+namespace ist {
+
+/// The places at one distance from a solid, `level`, by points. A ball within them protrudes by no
+/// more than `level`, as far as the points tell.
+class [[gnu::visibility("hidden")]] OffsetSurface {
+ public:
+  OffsetSurface(const MeshSolid& solid, const SampledSolid& sampled, double level);
+
+  double level() const { return level_; }
+
+  /// Radius of the largest ball around `centre` that protrudes by no more than the level; 0 for a
+  /// centre that is itself further out. It is the exact distance to the surface and the level, but
+  /// where the points, as coarse as they are, show that it may be more: beside a hollow.
+  double radius(const Eigen::Vector3d& centre) const;
+
+  /// What the distance to the surface alone vouches for; 0 for a centre further out.
+  double sure_radius(const Eigen::Vector3d& centre) const;
+
+  /// Points within `reach`, appended.
+  void walls(const Eigen::Vector3d& centre, double reach, std::vector<Eigen::Vector3d>& out) const;
+
+  /// Centres of largest balls: of the medial axis of what the surface holds. At most some `most`.
+  std::vector<Eigen::Vector3d> medial_centres(std::size_t most) const;
+
+ private:
+  const MeshSolid& solid_;
+  double level_, spacing_;
+  std::vector<Eigen::Vector3d> points_, normals_;
+  PointTree tree_;
+};
+
+}  // namespace ist

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include <ist/cover_spheres.h>
+#include <ist/mesh.h>
+
+#include "robot/package_paths.h"
+#include "robot/robot_model.h"
+
+namespace ist {
+
+/// The mesh of a shape in its link's frame; mirrored meshes are turned, so that they keep their
+/// outside. A box is exact. A cylinder is a prism that holds it, and is `slack` [u] wider at most.
+/// `file`: for messages. Throws Error naming the URDF's line.
+struct ShapeMesh {
+  TriangleMesh mesh;
+  double slack = 0;
+};
+ShapeMesh mesh_of(const PlacedShape& shape, const PackagePaths& paths, const std::string& file);
+
+/// Shapes of a link as one mesh; spheres are spheres and stay so.
+struct LinkGeometry {
+  TriangleMesh mesh;                 ///< empty where the link has spheres alone
+  std::vector<CoverSphere> spheres;  ///< [u], link frame
+  double slack = 0;                  ///< [u] the mesh reaches no further beyond the shapes
+};
+LinkGeometry geometry_of(std::span<const PlacedShape> shapes, const PackagePaths& paths,
+                         const std::string& file);
+
+}  // namespace ist

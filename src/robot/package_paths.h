@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace ist {
+
+/// Where packages lie that file names speak of.
+class PackagePaths {
+ public:
+  /// `urdf`: the robot's file; relative names are relative to its folder. `named`: folders of
+  /// packages by name; they come first. Then the folders of the environment's ROS_PACKAGE_PATH
+  /// (`ros_path`, parted by colons), then every folder above the URDF: each may be the package or
+  /// hold it.
+  PackagePaths(const std::filesystem::path& urdf, std::map<std::string, std::string> named,
+               const std::string& ros_path);
+
+  /// The file of a name: package://NAME/REST, file://PATH or a path. Throws Error that tells where
+  /// it was looked for; the file exists.
+  std::string find(const std::string& name) const;
+
+ private:
+  std::filesystem::path folder_;
+  std::map<std::string, std::string> named_;
+  std::vector<std::filesystem::path> ros_path_;
+};
+
+}  // namespace ist

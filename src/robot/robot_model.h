@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "mesh/import/source_file.h"
+
+// Robots as URDF files describe them: links, and the shapes that stand for them.
+
+namespace ist {
+
+struct MeshShape {
+  std::string file;  ///< as the URDF names it: a path, file://… or package://…
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< not 0; below 0 it mirrors
+};
+struct BoxShape {
+  Eigen::Vector3d half_extents = Eigen::Vector3d::Ones();  ///< [u] > 0
+};
+struct CylinderShape {
+  double radius = 1, half_height = 1;  ///< [u] > 0, along z
+};
+struct BallShape {
+  double radius = 1;  ///< [u] > 0
+};
+using Shape = std::variant<MeshShape, BoxShape, CylinderShape, BallShape>;
+
+/// A shape of a link: x_link = rotation · x + translation.
+struct PlacedShape {
+  Shape shape;
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< [u]
+  std::size_t line = 0;                                   ///< of the file, for messages
+};
+
+/// Which of a link's two sets of shapes is meant.
+enum class LinkShapes { collision, visual };
+
+struct RobotLink {
+  std::string name;
+  std::vector<PlacedShape> collision, visual;
+  /// Bytes of the file: the link's element, and each <collision> in it, first and behind the last.
+  std::size_t begin = 0, end = 0;
+  std::vector<std::pair<std::size_t, std::size_t>> collision_bytes;
+
+  const std::vector<PlacedShape>& shapes(LinkShapes which) const {
+    return which == LinkShapes::collision ? collision : visual;
+  }
+};
+
+/// Links in the order of the file; its bytes are kept.
+struct RobotModel {
+  SourceFile file;
+  std::string name;
+  std::vector<RobotLink> links;
+};
+
+/// Reads a URDF. Strict where a mistake would move or lose a shape: numbers must be finite, lengths
+/// above 0, joints must make one tree of the links. What describes no shape is not looked at.
+/// Document types are refused, and with them entities. Throws Error (file, line, what, way out).
+RobotModel read_robot(const std::string& path);
+
+/// The same of a file already in memory.
+RobotModel read_robot(SourceFile file);
+
+}  // namespace ist

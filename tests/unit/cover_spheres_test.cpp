@@ -1,0 +1,191 @@
+#include <ist/cover_spheres.h>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include <ist/error.h>
+#include <ist/solid.h>
+
+#include "support/test_meshes.h"
+
+namespace ist::testing {
+namespace {
+
+using Eigen::Vector3d;
+
+TriangleMesh turned(TriangleMesh mesh, double angle, const Vector3d& shift) {
+  const Eigen::Matrix3d r =
+      Eigen::AngleAxisd(angle, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  for (Vector3d& v : mesh.vertices) v = r * v + shift;
+  return mesh;
+}
+
+bool held(const Vector3d& x, const std::vector<CoverSphere>& spheres) {
+  for (const CoverSphere& s : spheres)
+    if ((x - s.centre).norm() <= s.radius) return true;
+  return false;
+}
+
+struct Case {
+  const char* name;
+  TriangleMesh mesh;
+};
+
+std::vector<Case> cases() {
+  return {{"ball", icosphere_mesh(2)},
+          {"torus", torus_mesh(1, 0.3, 24, 12)},
+          {"long box", turned(box_mesh({-2, -0.3, -0.1}, {2, 0.3, 0.1}), 0.7, {100, 5, -3})},
+          {"overlapping cubes", overlapping_cubes_mesh()},
+          {"small and far", turned(box_mesh({0, 0, 0}, {1e-3, 2e-3, 1e-3}), 1.1, {10, 0, 0})}};
+}
+
+TEST(CoverSpheres, HoldEveryPointOfTheSolidAndReachNoFurtherThanSaid) {
+  for (const Case& one : cases()) {
+    SCOPED_TRACE(one.name);
+    const ClosedMesh mesh = close_mesh(one.mesh, one.name);
+    SphereCoverSettings settings;
+    settings.count = 10;
+    const SphereCover cover = cover_with_spheres(mesh, settings);
+    EXPECT_LE(cover.spheres.size(), 10u);
+    EXPECT_TRUE(prove_cover(mesh, cover.spheres).covered);
+    const auto solid = make_solid(mesh);
+    const Eigen::AlignedBox3d box = solid->bounds();
+    std::mt19937_64 random(7);
+    std::uniform_real_distribution<double> share(-0.5, 1.5);
+    std::size_t inside = 0;
+    double furthest = 0;
+    for (int i = 0; i < 20'000; ++i) {
+      const Vector3d x = box.min() + box.sizes().cwiseProduct(
+                                         Vector3d(share(random), share(random), share(random)));
+      const double depth = solid->signed_distance(x);
+      if (depth > 0) {
+        ++inside;
+        ASSERT_TRUE(held(x, cover.spheres)) << x.transpose();
+      } else if (held(x, cover.spheres)) {
+        furthest = std::max(furthest, -depth);
+      }
+    }
+    EXPECT_GT(inside, 50u);
+    EXPECT_LE(furthest, cover.protrusion.largest);
+    EXPECT_LE(cover.protrusion.largest_seen, cover.protrusion.largest);
+    EXPECT_GE(cover.protrusion.largest_seen, 0.95 * cover.protrusion.largest);
+    EXPECT_LE(cover.protrusion.mean, cover.protrusion.p95);
+    EXPECT_GE(cover.protrusion.volume_ratio, 0.995);
+  }
+}
+
+TEST(CoverSpheres, TheProofFailsWithoutASphereThatIsNeeded) {
+  const ClosedMesh mesh = close_mesh(torus_mesh(1, 0.3, 24, 12), "torus");
+  SphereCoverSettings settings;
+  settings.count = 12;
+  const SphereCover cover = cover_with_spheres(mesh, settings);
+  const auto solid = make_solid(mesh);
+  std::size_t failed = 0;
+  for (std::size_t i = 0; i < cover.spheres.size(); ++i) {
+    std::vector<CoverSphere> fewer = cover.spheres;
+    fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(i));
+    const SphereCoverProof proof = prove_cover(mesh, fewer);
+    if (proof.covered) continue;
+    ++failed;
+    EXPECT_GT(proof.gap, 0);
+    EXPECT_FALSE(held(proof.where, fewer));
+    EXPECT_GT(solid->signed_distance(proof.where), -1e-9);
+  }
+  EXPECT_GT(failed, cover.spheres.size() / 2);
+}
+
+TEST(CoverSpheres, TheProofSeesSpheresThatAreALittleTooSmall) {
+  const ClosedMesh mesh = close_mesh(cube_mesh(), "cube");
+  const double reach = std::sqrt(0.75);
+  EXPECT_TRUE(prove_cover(mesh, std::vector<CoverSphere>{{{0, 0, 0}, reach * (1 + 1e-9)}}).covered);
+  EXPECT_FALSE(
+      prove_cover(mesh, std::vector<CoverSphere>{{{0, 0, 0}, reach * (1 - 1e-9)}}).covered);
+  EXPECT_FALSE(prove_cover(mesh, {}).covered);
+  EXPECT_FALSE(prove_cover(mesh, std::vector<CoverSphere>{{{0, 0, 0}, NAN}}).covered);
+}
+
+/// Spheres over the whole surface of the cube leave a void in its middle.
+TEST(CoverSpheres, TheProofSeesAVoidInside) {
+  const ClosedMesh mesh = close_mesh(cube_mesh(), "cube");
+  std::vector<CoverSphere> shell;
+  for (int i = 0; i <= 10; ++i)
+    for (int j = 0; j <= 10; ++j)
+      for (int k = 0; k <= 10; ++k)
+        if (i % 10 == 0 || j % 10 == 0 || k % 10 == 0)
+          shell.push_back({{0.1 * i - 0.5, 0.1 * j - 0.5, 0.1 * k - 0.5}, 0.12});
+  const SphereCoverProof open = prove_cover(mesh, shell);
+  EXPECT_FALSE(open.covered);
+  EXPECT_GT(open.gap, 0);
+  EXPECT_LT(open.where.cwiseAbs().maxCoeff(), 0.45);
+  shell.push_back({{0, 0, 0}, 0.87});
+  EXPECT_TRUE(prove_cover(mesh, shell).covered);
+}
+
+/// Every ball around a ball protrudes everywhere by about as much: the search has no way down.
+TEST(CoverSpheres, FewSpheresOnABallAreHardlyWorseThanOneAroundIt) {
+  const ClosedMesh mesh = close_mesh(icosphere_mesh(2), "ball");
+  const std::vector<CoverSphere> around = {{{0, 0, 0}, 1 + 1e-9}};
+  ASSERT_TRUE(prove_cover(mesh, around).covered);
+  const double largest = sphere_protrusion(mesh, around).largest;
+  for (std::size_t count = 1; count <= 4; count += 3) {
+    SphereCoverSettings settings;
+    settings.count = count;
+    const SphereCover cover = cover_with_spheres(mesh, settings);
+    EXPECT_LE(cover.spheres.size(), count);
+    EXPECT_TRUE(prove_cover(mesh, cover.spheres).covered);
+    EXPECT_LT(cover.protrusion.largest, 1.25 * largest);
+  }
+}
+
+TEST(CoverSpheres, AsFewAsReachNoFurtherThanAsked) {
+  const ClosedMesh mesh = close_mesh(box_mesh({-1, -0.3, -0.1}, {1, 0.3, 0.1}), "box");
+  SphereCoverSettings settings;
+  settings.max_protrusion = 0.25;
+  const SphereCover cover = cover_with_spheres(mesh, settings);
+  EXPECT_TRUE(cover.reached);
+  EXPECT_LE(cover.protrusion.largest, 0.25);
+  EXPECT_TRUE(prove_cover(mesh, cover.spheres).covered);
+  ASSERT_GT(cover.spheres.size(), 1u);
+  ASSERT_LE(cover.spheres.size(), 16u);  // few enough that the last one is told
+  SphereCoverSettings fewer;
+  fewer.count = cover.spheres.size() - 1;
+  EXPECT_GT(cover_with_spheres(mesh, fewer).protrusion.largest, 0.25);
+  settings.count = fewer.count;
+  const SphereCover failed = cover_with_spheres(mesh, settings);
+  EXPECT_FALSE(failed.reached);
+  EXPECT_GT(failed.protrusion.largest, 0.25);
+  EXPECT_TRUE(prove_cover(mesh, failed.spheres).covered);
+}
+
+TEST(CoverSpheres, ThreadsChangeNothing) {
+  const ClosedMesh mesh = close_mesh(overlapping_cubes_mesh(), "cubes");
+  SphereCoverSettings settings;
+  settings.count = 8;
+  settings.threads = 1;
+  const SphereCover one = cover_with_spheres(mesh, settings);
+  settings.threads = 4;
+  const SphereCover four = cover_with_spheres(mesh, settings);
+  ASSERT_EQ(one.spheres.size(), four.spheres.size());
+  for (std::size_t i = 0; i < one.spheres.size(); ++i) {
+    EXPECT_EQ(one.spheres[i].centre, four.spheres[i].centre);
+    EXPECT_EQ(one.spheres[i].radius, four.spheres[i].radius);
+  }
+  EXPECT_EQ(one.protrusion.largest, four.protrusion.largest);
+}
+
+TEST(CoverSpheres, SettingsOutOfRangeAndCancelAreErrors) {
+  const ClosedMesh mesh = close_mesh(cube_mesh(), "cube");
+  SphereCoverSettings settings;
+  settings.count = 0;
+  EXPECT_THROW(cover_with_spheres(mesh, settings), Error);
+  settings.count = 5000;
+  EXPECT_THROW(cover_with_spheres(mesh, settings), Error);
+  settings.count = 4;
+  settings.max_protrusion = NAN;
+  EXPECT_THROW(cover_with_spheres(mesh, settings), Error);
+}
+
+}  // namespace
+}  // namespace ist::testing

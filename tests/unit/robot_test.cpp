@@ -1,0 +1,132 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include <ist/error.h>
+#include <ist/solid.h>
+
+#include "robot/link_mesh.h"
+#include "robot/robot_model.h"
+#include "robot/sphere_files.h"
+#include "support/temp_file.h"
+
+namespace ist::testing {
+namespace {
+
+RobotModel robot_of(const std::string& text) { return read_robot(SourceFile{"r.urdf", text}); }
+
+std::string error_of(const std::string& text) {
+  try {
+    robot_of(text);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string with_collision(const std::string& inside) {
+  return "<robot name='r'>\n<link name='a'>\n<collision>\n" + inside +
+         "</collision></link></robot>";
+}
+
+TEST(RobotModel, ReadsShapesAndPoses) {
+  const RobotModel robot = robot_of(
+      "<?xml version='1.0'?><!-- a --><robot name='r&amp;s'><link name='base'>"
+      "<collision><origin xyz='1 2 3' rpy='0 0 1.5707963267948966'/>"
+      "<geometry><box size='2 4 6'/></geometry></collision>"
+      "<visual><geometry><mesh filename='package://p/m.stl' scale='1 -2 3'/></geometry></visual>"
+      "</link><link name='tip'><collision><geometry><cylinder radius='1' length='4'/></geometry>"
+      "</collision><collision><geometry><sphere radius='0.5'/></geometry></collision></link>"
+      "<joint name='j' type='fixed'><parent link='base'/><child link='tip'/></joint></robot>");
+  EXPECT_EQ(robot.name, "r&s");
+  ASSERT_EQ(robot.links.size(), 2u);
+  const PlacedShape& box = robot.links[0].collision[0];
+  EXPECT_EQ(std::get<BoxShape>(box.shape).half_extents, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(box.translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_TRUE((box.rotation * Eigen::Vector3d::UnitX()).isApprox(Eigen::Vector3d::UnitY()));
+  EXPECT_EQ(std::get<MeshShape>(robot.links[0].visual[0].shape).scale, Eigen::Vector3d(1, -2, 3));
+  EXPECT_EQ(std::get<CylinderShape>(robot.links[1].collision[0].shape).half_height, 2);
+  EXPECT_EQ(std::get<BallShape>(robot.links[1].collision[1].shape).radius, 0.5);
+}
+
+TEST(RobotModel, SaysWhatIsWrongAndWhere) {
+  const auto expect = [](const std::string& text, const std::string& message) {
+    EXPECT_NE(error_of(text).find(message), std::string::npos) << error_of(text);
+  };
+  expect("<robot name='r'></robot>", "holds no <link>");
+  expect("<sdf/>", "is no robot");
+  expect("<robot><link name='a'>", "line 1: <link>: the file ends early");
+  expect("<!DOCTYPE r [<!ENTITY a 'b'>]><robot/>", "entities are refused");
+  expect("<robot><link/></robot>", "has no name");
+  expect("<robot><link name='a'/><link name='a'/></robot>", "a second link");
+  expect("<robot><link name='a'/><link name='b'/></robot>", "2 links without a parent");
+  expect("<robot><link name='a'/><joint><parent link='a'/><child link='x'/></joint></robot>",
+         "its child \"x\" is no link");
+  expect("<robot><link name='a'/><joint><parent link='a'/><child link='a'/></joint></robot>",
+         "in a circle");
+  expect(with_collision(""), "line 3: <collision>: has no <geometry>");
+  expect(with_collision("<geometry><blob/></geometry>"), "not known");
+  expect(with_collision("<geometry><box size='1 1'/></geometry>"), "has 2 numbers, not 3");
+  expect(with_collision("<geometry><box size='1 1 0'/></geometry>"), "not above 0");
+  expect(with_collision("<geometry><sphere radius='-1'/></geometry>"), "not above 0");
+  expect(with_collision("<geometry><sphere radius='inf'/></geometry>"), "no finite number");
+  expect(with_collision("<geometry><sphere/></geometry>"), "has 0 numbers");
+  expect(with_collision("<origin xyz='0 nan 0'/><geometry><sphere radius='1'/></geometry>"),
+         "line 4: <origin>: xyz: \"nan\" is no finite number");
+  expect(with_collision("<geometry><mesh/></geometry>"), "names no file");
+  expect(with_collision("<geometry><mesh filename='m.stl' scale='0 1 1'/></geometry>"),
+         "scale is 0");
+}
+
+const char* const kTetrahedron =
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+TEST(RobotModel, FindsPackagesAndTurnsMirroredMeshes) {
+  const TempFile mesh("m.obj", kTetrahedron);
+  const std::filesystem::path folder = std::filesystem::path(mesh.path()).parent_path();
+  const PackagePaths here(folder / "r.urdf", {}, "");
+  EXPECT_EQ(here.find("m.obj"), mesh.path());
+  EXPECT_EQ(here.find("file://" + mesh.path()), mesh.path());
+  EXPECT_EQ(here.find("package://" + folder.filename().string() + "/m.obj"), mesh.path());
+  const PackagePaths named("/nowhere/r.urdf", {{"p", folder.string()}}, "");
+  EXPECT_EQ(named.find("package://p/m.obj"), mesh.path());
+  const PackagePaths ros("/nowhere/r.urdf", {}, "/none:" + folder.parent_path().string());
+  EXPECT_EQ(ros.find("package://" + folder.filename().string() + "/m.obj"), mesh.path());
+  EXPECT_THROW(ros.find("package://q/m.obj"), Error);
+  EXPECT_THROW(here.find("no.obj"), Error);
+  EXPECT_THROW(here.find("package://"), Error);
+
+  PlacedShape placed;
+  placed.shape = MeshShape{"m.obj", {-2, 1, 3}};
+  placed.translation = {5, 0, 0};
+  const ClosedMesh closed = close_mesh(mesh_of(placed, here, "r.urdf").mesh, "mirrored");
+  EXPECT_EQ(closed.report.flipped_components, 0u);
+  EXPECT_NEAR(make_solid(closed)->volume(), 1, 1e-12);
+  EXPECT_EQ(make_solid(closed)->bounds().min().x(), 3);
+}
+
+TEST(RobotModel, ACylindersMeshHoldsIt) {
+  PlacedShape placed;
+  placed.shape = CylinderShape{2, 3};
+  const ShapeMesh shape = mesh_of(placed, PackagePaths("r.urdf", {}, ""), "r.urdf");
+  const auto solid = make_solid(close_mesh(shape.mesh, "cylinder"));
+  for (int i = 0; i < 1000; ++i)
+    EXPECT_GE(solid->signed_distance({2 * std::cos(0.01 * i), 2 * std::sin(0.01 * i), 0}), -1e-12);
+  EXPECT_LT(shape.slack, 2e-3);
+}
+
+TEST(SphereFiles, UrdfKeepsAllButItsCollisions) {
+  const std::string text =
+      "<robot name='r'>\n  <link name='a'>\n    <inertial/>\n    <collision>\n      <geometry>"
+      "<box size='1 1 1'/></geometry>\n    </collision>\n    <collision><geometry><sphere "
+      "radius='1'/></geometry></collision>\n  </link>\n  <!-- kept -->\n</robot>\n";
+  const std::string out =
+      urdf_with_spheres(robot_of(text), std::vector<LinkSpheres>{{"a", {{{1, 2, 3}, 0.25}}}});
+  EXPECT_EQ(out,
+            "<robot name='r'>\n  <link name='a'>\n    <inertial/>\n    <collision "
+            "name=\"a_sphere_0\"><origin xyz=\"1 2 3\" rpy=\"0 0 0\"/><geometry><sphere "
+            "radius=\"0.25\"/></geometry></collision>\n  </link>\n  <!-- kept -->\n</robot>\n");
+}
+
+}  // namespace
+}  // namespace ist::testing
