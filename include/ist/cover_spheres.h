@@ -21,9 +21,13 @@ struct CoverSphere {
   double radius = 0;                                 ///< [u]
 };
 
+/// The most spheres that a cover is made of.
+inline constexpr std::size_t kMostCoverSpheres = 4096;
+
 /// How many spheres, or how close.
 struct SphereCoverSettings {
-  std::size_t count = 64;  ///< [1, 4096] spheres; with max_protrusion the most that may be used
+  std::size_t count =
+      64;  ///< [1, kMostCoverSpheres]; with max_protrusion the most that may be used
   /// [u] ≥ 0. 0: `count` spheres that protrude as little as they can. Else: as few spheres as are
   /// found to protrude by no more.
   double max_protrusion = 0;

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "spheres/halves.h"
+
 namespace ist {
 namespace {
 
@@ -59,19 +61,8 @@ class SurfaceSearch {
     for (const std::uint32_t i : from)
       if (distance(middle, balls_[i].centre) - balls_[i].radius <= gap + 2 * reach + kMargin)
         list.push_back(i);
-    std::size_t side = 0;
-    double longest2 = -1;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double d2 = (t[(k + 1) % 3] - t[k]).squaredNorm();
-      if (d2 > longest2) {
-        longest2 = d2;
-        side = k;
-      }
-    }
-    const Vector3d &a = t[side], &b = t[(side + 1) % 3], &c = t[(side + 2) % 3];
-    const Vector3d half = (a + b) / 2;
-    search({half, c, a}, list, depth + 1);
-    search({b, c, half}, list, depth + 1);
+    for (const HalvableTriangle& half : halves(t, longest_side(t).from))
+      search(half, list, depth + 1);
   }
 
  private:

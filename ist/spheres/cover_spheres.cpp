@@ -24,7 +24,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::size_t kMostSpheres = 4096;
 constexpr int kMostTries = 8;  ///< counts that are tried for a protrusion; doubling goes on
 
 /// What several searches have done together, told by the thread that started them.
@@ -78,9 +77,9 @@ SphereProtrusion in_mesh_frame(SphereProtrusion p, const UnitFrame& frame) {
 }
 
 void check(const SphereCoverSettings& settings) {
-  if (settings.count < 1 || settings.count > kMostSpheres)
+  if (settings.count < 1 || settings.count > kMostCoverSpheres)
     throw Error("cover: " + std::to_string(settings.count) + " spheres; 1 to " +
-                std::to_string(kMostSpheres) + " can be made");
+                std::to_string(kMostCoverSpheres) + " can be made");
   if (!(settings.max_protrusion >= 0) || !std::isfinite(settings.max_protrusion))
     throw Error("cover: the largest protrusion must be a length, 0 or more");
 }

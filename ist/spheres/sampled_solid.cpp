@@ -10,6 +10,7 @@
 
 #include "mesh/edge_table.h"
 #include "spheres/cell_key.h"
+#include "spheres/halves.h"
 #include "spheres/point_tree.h"
 
 namespace ist {
@@ -70,27 +71,17 @@ struct Sample {
 
 /// Middles of the parts of a face, halved across its longest side until no side is above `longest`.
 void sample_face(const Face& face, double longest, Thinning& thinning, std::vector<Sample>& out) {
-  std::vector<std::array<Vector3d, 3>> open = {face.corners};
+  std::vector<HalvableTriangle> open = {face.corners};
   while (!open.empty()) {
-    const std::array<Vector3d, 3> t = open.back();
+    const HalvableTriangle t = open.back();
     open.pop_back();
-    std::size_t side = 0;
-    double longest2 = -1;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double d2 = (t[(k + 1) % 3] - t[k]).squaredNorm();
-      if (d2 > longest2) {
-        longest2 = d2;
-        side = k;
-      }
-    }
-    if (longest2 <= longest * longest) {
+    const LongestSide side = longest_side(t);
+    if (side.length2 <= longest * longest) {
       const Vector3d middle = (t[0] + t[1] + t[2]) / 3;
       if (thinning.is_new(middle, face.normal)) out.push_back({middle, face.normal});
       continue;
     }
-    const Vector3d half = (t[side] + t[(side + 1) % 3]) / 2;
-    open.push_back({half, t[(side + 2) % 3], t[side]});
-    open.push_back({t[(side + 1) % 3], t[(side + 2) % 3], half});
+    for (const HalvableTriangle& half : halves(t, side.from)) open.push_back(half);
   }
 }
 

@@ -52,7 +52,7 @@ Manifest read_sound_manifest(const std::string& path) {
   for (const std::string& fault : manifest.faults) spdlog::error("{}", fault);
   spdlog::error("{}: {} mistake{}; nothing was baked", path, manifest.faults.size(),
                 manifest.faults.size() == 1 ? "" : "s");
-  throw ExitCode{kExitUsage};
+  throw ExitCode{kExitError};
 }
 
 void make_folder(const std::string& path) {

@@ -121,10 +121,7 @@ void bake_robot(const RobotBake& what) {
     }
     links[link.name] = shapes;
   }
-  if (assets.empty() && fields == 0)
-    throw Error(fmt::format("{}: no link has a {} shape{}", what.robot,
-                            what.options.visual ? "visual" : "collision",
-                            what.options.visual ? "" : "; --visual takes the visual ones"));
+  if (assets.empty() && fields == 0) refuse_no_shapes(what.options, what.robot);
   require_folder(what.folder);
   const Json index = {{"robot", robot.name}, {"links", links}};
   const std::string index_file = file_name(robot.name) + ".json";

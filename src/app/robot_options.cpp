@@ -2,6 +2,8 @@
 
 #include <cstdlib>
 
+#include <ist/error.h>
+
 #include "app/file_options.h"
 
 namespace ist::app {
@@ -31,6 +33,12 @@ void refuse_idle_options(const RobotOptions& options, const std::string& input) 
   if (is_robot_file(input) || (!options.visual && options.packages.empty())) return;
   throw CLI::ValidationError(options.visual ? "--visual" : "--package",
                              "has no effect: '" + input + "' is no robot (.urdf)");
+}
+
+void refuse_no_shapes(const RobotOptions& options, const std::string& input) {
+  throw Error(input + (options.visual ? ": no link has a visual shape"
+                                      : ": no link has a collision shape; --visual takes the "
+                                        "visual ones"));
 }
 
 bool is_robot_file(const std::string& path) { return ending_of(path) == ".urdf"; }

@@ -24,6 +24,9 @@ void add_robot_options(CLI::App* command, RobotOptions& options);
 /// Throws (exit code 2) where options of a robot are given with what is none.
 void refuse_idle_options(const RobotOptions& options, const std::string& input);
 
+/// Throws Error: no link has a shape of the kind that is asked for.
+[[noreturn]] void refuse_no_shapes(const RobotOptions& options, const std::string& input);
+
 bool is_robot_file(const std::string& path);  ///< it ends in .urdf
 
 /// Packages as the options, the environment and the URDF's place say.

@@ -24,8 +24,6 @@
 namespace ist::app {
 namespace {
 
-constexpr std::size_t kMostSpheres = 4096;  ///< what the library takes
-
 enum class Kind { cover, inner, matched };
 
 struct SpheresOptions {
@@ -81,10 +79,7 @@ Input read_input(const SpheresOptions& options) {
                                          fmt::format("{}: link {}", options.input, link.name),
                                          options.repair));
   }
-  if (input.links.empty())
-    throw Error(fmt::format("{}: no link has a {} shape{}", options.input,
-                            options.robot.visual ? "visual" : "collision",
-                            options.robot.visual ? "" : "; --visual takes the visual ones"));
+  if (input.links.empty()) refuse_no_shapes(options.robot, options.input);
   return input;
 }
 
@@ -155,7 +150,7 @@ void fill_links(Input& input, const SpheresOptions& options) {
     if (!link.cover.reached)
       throw Error(fmt::format("{}: link {}: {} spheres still protrude by {:g}; {}", options.input,
                               link.name, options.cover.count, link.cover.protrusion.largest,
-                              options.cover.count < kMostSpheres
+                              options.cover.count < kMostCoverSpheres
                                   ? "--count allows more"
                                   : "--max-protrusion asks for too little"));
   }
@@ -262,7 +257,7 @@ void add_spheres(CLI::App& app) {
              Dash::refused);
   add_whole<std::size_t>(command, "--count", options->cover.count,
                          "Spheres a link; with --max-protrusion the most (default then 1024)", 1,
-                         kMostSpheres);
+                         kMostCoverSpheres);
   CLI::Option* const most =
       add_real(command, "--max-protrusion", options->cover.max_protrusion,
                {.least = 0, .without_least = true},

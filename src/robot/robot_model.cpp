@@ -50,7 +50,8 @@ class RobotReader {
   std::string name_of(std::uint32_t element) const {
     const std::string name = decoded(xml_.attribute(element, "name"));
     if (name.empty()) xml_.fail(element, "has no name. Give it name=\"…\"");
-    if (std::any_of(name.begin(), name.end(), [](char c) { return c >= 0 && c < ' '; }))
+    if (std::any_of(name.begin(), name.end(),
+                    [](char c) { return static_cast<unsigned char>(c) < ' '; }))
       xml_.fail(element, "its name holds control characters");
     return name;
   }

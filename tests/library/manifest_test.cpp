@@ -12,7 +12,7 @@ class Mistakes : public LibraryFolder {
   void expect_faults(const std::string& manifest, const std::vector<std::string>& faults) {
     write("bad.toml", manifest);
     const Outcome outcome = bake("out", {}, {}, "bad.toml");
-    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
     EXPECT_EQ(outcome.out, "");
     EXPECT_FALSE(exists("out"));
     std::size_t told = 0;

@@ -25,6 +25,10 @@ namespace {
 /// 0.5 % of a solid's size.
 constexpr double kOverlapWidth = 0.01;
 
+/// Where no error is asked for, triangles are merged within this at least, unit frame: the proof of
+/// a finer surface takes ten times as long, on flat faces that are cut into many triangles.
+constexpr double kFinest = 1e-5;
+
 /// A surface and how far it is from the solid's, unit frame.
 struct Approximation {
   FieldMesh mesh;
@@ -124,8 +128,9 @@ std::optional<Approximation> simplified(SolidSurface& surface, double max_error,
   VertexClusters clusters(surface.arrays(), 8 * cell, levels);
   if (max_error > 0) return clustered_within(clusters, surface, max_error, stop);
   double guess = cell / 32;
-  return clustered(clusters, surface, stop,
-                   [&] { return guess = tolerance_for(clusters, kFieldTriangles, guess); });
+  return clustered(clusters, surface, stop, [&] {
+    return guess = std::max(kFinest, tolerance_for(clusters, kFieldTriangles, guess));
+  });
 }
 
 Approximation approximate(SolidSurface& surface, double max_error, const WorkStop& stop) {
