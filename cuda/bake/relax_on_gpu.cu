@@ -65,10 +65,7 @@ __device__ void walk_short(const WarpTeam& team, const PowerRound& round, const 
                 block.j0 + k / width, [&](std::uint32_t site, const PowerSums& piece) {
                   std::uint32_t at = 0;
                   while (list[at] != site) ++at;
-                  mine[at].length += piece.length;
-                  mine[at].x += piece.x;
-                  mine[at].y += piece.y;
-                  mine[at].z += piece.z;
+                  mine[at].add(piece);
                 });
   team.sync();
   for (std::uint32_t at = 0; at < count; ++at) {

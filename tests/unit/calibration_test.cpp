@@ -108,6 +108,10 @@ TEST(PowerCells, SubdivisionLosesNoSite) {
     all.push_back(static_cast<std::uint32_t>(sites.size()));
     sites.push_back({s.x, s.y, s.z, double{s.r} * s.r});
   }
+  for (const std::size_t twin : {std::size_t{3}, std::size_t{200}}) {  // they win nothing
+    all.push_back(static_cast<std::uint32_t>(sites.size()));
+    sites.push_back(PowerSite(sites[twin]));
+  }
   std::vector<double> lengths(sites.size());
   for (std::uint32_t j = 0; j < lattice.lines.nz; ++j)
     for (std::uint32_t i = 0; i < lattice.lines.ny; ++i)

@@ -6,13 +6,55 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <numeric>
+
+#include "bake/calibrate/power_kernel.h"
 
 namespace ist {
 namespace {
 
 constexpr std::size_t kParallelSites = 64;  // below, a cell is too small for several threads
 constexpr double kMostSteps = 4096;         // along x
+
+/// Lists of sites one after another: each cell's follows its parent's.
+class SiteLists {
+ public:
+  std::size_t size() const { return size_; }
+
+  /// The list from `first` on. Calls of make_room() and append() move it.
+  SiteArrays list(std::size_t first) {
+    return SiteArrays{coordinates_[0].data(), coordinates_[1].data(), coordinates_[2].data(),
+                      weights_.data(), numbers_.data()}
+        .from(first);
+  }
+  double* powers() { return powers_.data(); }
+
+  void make_room(std::size_t count) {
+    const std::size_t room = size_ + count + kMostPowerLanes;
+    if (room <= numbers_.size()) return;
+    for (std::vector<double>& column : coordinates_) column.resize(2 * room);
+    weights_.resize(2 * room);
+    numbers_.resize(2 * room);
+    powers_.resize(2 * room);
+  }
+
+  void resize(std::size_t size) { size_ = size; }  ///< to no more than there is room for
+
+  void append(const SiteArrays& sites, std::size_t count) {
+    make_room(count);
+    const SiteArrays to = list(size_);
+    std::copy_n(sites.x, count, to.x);
+    std::copy_n(sites.y, count, to.y);
+    std::copy_n(sites.z, count, to.z);
+    std::copy_n(sites.weight, count, to.weight);
+    std::copy_n(sites.number, count, to.number);
+    size_ += count;
+  }
+
+ private:
+  std::vector<double> coordinates_[3], weights_, powers_;
+  std::vector<std::uint32_t> numbers_;
+  std::size_t size_ = 0;
+};
 
 /// Walks down the octree with the sites that each cell is left with.
 class CellIntegrator {
@@ -21,37 +63,42 @@ class CellIntegrator {
       : grid_(grid), sites_(sites), sums_(std::vector<PowerSums>(sites.size())) {}
 
   std::vector<PowerSums> run() {
-    std::vector<std::uint32_t> lists(sites_.size());
-    std::iota(lists.begin(), lists.end(), 0u);
+    SiteLists lists;
+    lists.make_room(sites_.size());
+    const SiteArrays all = lists.list(0);
+    for (std::size_t k = 0; k < sites_.size(); ++k) {
+      all.x[k] = sites_[k].x;
+      all.y[k] = sites_[k].y;
+      all.z[k] = sites_[k].z;
+      all.weight[k] = sites_[k].weight;
+      all.number[k] = static_cast<std::uint32_t>(k);
+    }
+    lists.resize(sites_.size());
     look_into({0, 0, 0, grid_.levels - 1}, lists, 0);
     std::vector<PowerSums> total(sites_.size());
     for (const std::vector<PowerSums>& part : sums_)
-      for (std::size_t k = 0; k < total.size(); ++k) {
-        total[k].length += part[k].length;
-        total[k].x += part[k].x;
-        total[k].y += part[k].y;
-        total[k].z += part[k].z;
-      }
+      for (std::size_t k = 0; k < total.size(); ++k) total[k].add(part[k]);
     return total;
   }
 
  private:
   /// `lists` ends with the parent's list, which starts at `first`; it comes back as it was.
-  void look_into(const PowerGridCell& cell, std::vector<std::uint32_t>& lists, std::size_t first) {
+  void look_into(const PowerGridCell& cell, SiteLists& lists, std::size_t first) {
     const std::size_t end = lists.size();
-    const auto count = static_cast<std::uint32_t>(end - first);
-    const PowerFilter filter(SerialTeam(), grid_, cell, sites_.data(), lists.data() + first, count);
-    for (std::size_t i = first; i < end; ++i)
-      if (filter.keeps(sites_.data(), lists[i])) lists.push_back(lists[i]);
-    const std::size_t kept = lists.size() - end;
-    if (kept <= kPowerLeafSites || cell.level == 0) {
-      walk(cell, lists.data() + end, static_cast<std::uint32_t>(kept));
+    lists.make_room(end - first);
+    const std::size_t kept = keep_sites(PowerBox(grid_, cell), lists.list(first), end - first,
+                                        lists.list(end), lists.powers());
+    lists.resize(end + kept);
+    if (kept <= kPowerLeafSites) {
+      walk_cell(grid_, cell, lists.list(end), kept, sums_.local().data());
+    } else if (cell.level == 0) {
+      walk_among_many(cell, lists.list(end).number, static_cast<std::uint32_t>(kept));
     } else if (kept >= kParallelSites) {
       tbb::parallel_for(0u, 8u, [&](std::uint32_t octant) {
         const PowerGridCell child = child_of(cell, octant);
         if (is_empty(grid_, child)) return;
-        std::vector<std::uint32_t> own(lists.begin() + static_cast<std::ptrdiff_t>(end),
-                                       lists.end());
+        SiteLists own;
+        own.append(lists.list(end), kept);
         look_into(child, own, 0);
       });
     } else {
@@ -63,19 +110,11 @@ class CellIntegrator {
     lists.resize(end);
   }
 
-  void walk(const PowerGridCell& cell, const std::uint32_t* list, std::uint32_t count) {
+  /// A column that more sites share than a leaf has.
+  void walk_among_many(const PowerGridCell& cell, const std::uint32_t* list, std::uint32_t count) {
     std::vector<PowerSums>& sums = sums_.local();
-    const PowerBlock block(grid_, cell);
-    for (std::uint32_t j = block.j0; j < block.j1; ++j)
-      for (std::uint32_t i = block.i0; i < block.i1; ++i)
-        walk_column(grid_, block, sites_.data(), list, count, i, j,
-                    [&](std::uint32_t site, const PowerSums& piece) {
-                      PowerSums& sum = sums[site];
-                      sum.length += piece.length;
-                      sum.x += piece.x;
-                      sum.y += piece.y;
-                      sum.z += piece.z;
-                    });
+    walk_column(grid_, PowerBlock(grid_, cell), sites_.data(), list, count, cell.i, cell.j,
+                [&](std::uint32_t site, const PowerSums& piece) { sums[site].add(piece); });
   }
 
   const PowerGrid& grid_;

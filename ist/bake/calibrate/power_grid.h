@@ -101,6 +101,11 @@ struct PowerBlock {
         j0(cell.j << cell.level),
         j1(least((cell.j + 1) << cell.level, grid.columns.nz)) {}
 
+  /// What lies within; x0 ≥ x1 if nothing does.
+  IST_HD ColumnSpan part_of(const ColumnSpan& span) const {
+    return {span.x0 > x0 ? span.x0 : x0, span.x1 < x1 ? span.x1 : x1};
+  }
+
   IST_HD static std::uint32_t least(std::uint32_t a, std::uint32_t b) { return a < b ? a : b; }
 };
 
@@ -155,18 +160,11 @@ IST_HD inline bool any_child(const PowerGrid& grid, const PowerGridCell& cell) {
   return false;
 }
 
-/// The test which of a cell's sites may own a part of it: the others lose everywhere in it to the
-/// site that is best at its middle (the difference of two powers is affine).
-struct PowerFilter {
-  double x, y, z, hx, hy, hz;  ///< the cell's box: middle and half edges
-  double least = 0;            ///< power of the best site at the middle
-  std::uint32_t best = 0;
-  PowerSite winner;
+/// Middle and half edges of a cell, unit frame.
+struct PowerBox {
+  double x, y, z, hx, hy, hz;
 
-  /// Finds the winner; the smallest index among equals.
-  template <class Team>
-  IST_HD PowerFilter(const Team& team, const PowerGrid& grid, const PowerGridCell& cell,
-                     const PowerSite* sites, const std::uint32_t* list, std::uint32_t count) {
+  IST_HD PowerBox(const PowerGrid& grid, const PowerGridCell& cell) {
     const PowerBlock block(grid, cell);
     hx = 0.5 * (block.x1 - block.x0);
     hy = 0.5 * (block.i1 - block.i0) * grid.columns.step_y;
@@ -174,11 +172,28 @@ struct PowerFilter {
     x = block.x0 + hx;
     y = grid.columns.y0 + block.i0 * grid.columns.step_y + hy;
     z = grid.columns.z0 + block.j0 * grid.columns.step_z + hz;
+  }
+};
+
+/// The test which of a cell's sites may own a part of it: the others lose everywhere in it to the
+/// site that is best at its middle (the difference of two powers is affine). The host has it in
+/// vectors (power_kernel.h).
+struct PowerFilter {
+  PowerBox box;
+  double least = 0;  ///< power of the best site at the middle
+  std::uint32_t best = 0;
+  PowerSite winner;
+
+  /// Finds the winner; the smallest index among equals.
+  template <class Team>
+  IST_HD PowerFilter(const Team& team, const PowerGrid& grid, const PowerGridCell& cell,
+                     const PowerSite* sites, const std::uint32_t* list, std::uint32_t count)
+      : box(grid, cell) {
     double mine = 1e300;
     std::uint32_t mine_best = 0xFFFFFFFFu;
     for (std::uint32_t i = static_cast<std::uint32_t>(team.lane()); i < count; i += Team::kWidth) {
       const std::uint32_t k = list[i];
-      const double p = power(sites[k], x, y, z);
+      const double p = power(sites[k], box.x, box.y, box.z);
       if (p < mine || (p == mine && k < mine_best)) {
         mine = p;
         mine_best = k;
@@ -193,15 +208,22 @@ struct PowerFilter {
     if (k == best) return true;
     const PowerSite& site = sites[k];
     const auto size = [](double a) { return a < 0 ? -a : a; };
-    const double swing = 2 * (size(site.x - winner.x) * hx + size(site.y - winner.y) * hy +
-                              size(site.z - winner.z) * hz);
-    return power(site, x, y, z) - least - swing < 0;
+    const double swing = 2 * (size(site.x - winner.x) * box.hx + size(site.y - winner.y) * box.hy +
+                              size(site.z - winner.z) * box.hz);
+    return power(site, box.x, box.y, box.z) - least - swing < 0;
   }
 };
 
 /// Fixed-point sums of one power cell: ∫1, ∫x, ∫y, ∫z over its pieces of columns.
 struct PowerSums {
   std::int64_t length = 0, x = 0, y = 0, z = 0;
+
+  IST_HD void add(const PowerSums& other) {
+    length += other.length;
+    x += other.x;
+    y += other.y;
+    z += other.z;
+  }
 };
 
 /// What a piece adds to its site's sums.
@@ -221,12 +243,10 @@ IST_HD void walk_column(const PowerGrid& grid, const PowerBlock& block, const Po
   const std::uint64_t column = std::uint64_t{j} * grid.columns.ny + i;
   const std::uint32_t last = grid.first[column + 1];
   for (std::uint32_t s = grid.first[column]; s < last; ++s) {
-    const ColumnSpan span = grid.spans[s];
-    const double from = span.x0 > block.x0 ? span.x0 : block.x0;
-    const double to = span.x1 < block.x1 ? span.x1 : block.x1;
-    if (!(from < to)) continue;
+    const ColumnSpan part = block.part_of(grid.spans[s]);
+    if (!(part.x0 < part.x1)) continue;
     const double y = grid.columns.y(i, j), z = grid.columns.z(j);
-    cut_by_power_cells(sites, list, count, y, z, from, to,
+    cut_by_power_cells(sites, list, count, y, z, part.x0, part.x1,
                        [&](std::uint32_t site, double x0, double x1) {
                          add(site, piece_sums(grid, x0, x1, y, z));
                        });
