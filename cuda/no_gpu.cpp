@@ -1,6 +1,7 @@
 // What a build without CUDA says.
 #include <ist/error.h>
 #include <ist/gpu.h>
+#include <ist/gpu_query.h>
 
 #include "cuda/cuda_backend.h"
 
@@ -11,7 +12,31 @@ bool gpu_available(int, std::string* why) {
   return false;
 }
 
-GpuInfo gpu_info(int) { throw Error("GPU: this build has no GPU backend: bake on the CPU"); }
+GpuInfo gpu_info(int) { throw Error("GPU: this build has no GPU backend: use the CPU"); }
+
+struct GpuAssets::Impl {};
+GpuAssets::GpuAssets(std::span<const TreeView>, const GpuSettings& settings) {
+  gpu_info(settings.device);
+}
+GpuAssets::~GpuAssets() = default;
+GpuAssets::GpuAssets(GpuAssets&&) noexcept = default;
+GpuAssets& GpuAssets::operator=(GpuAssets&&) noexcept = default;
+std::size_t GpuAssets::size() const noexcept { return 0; }
+std::size_t GpuAssets::bytes() const noexcept { return 0; }
+int GpuAssets::device() const noexcept { return 0; }
+
+struct GpuWorkspace::Impl {};
+GpuWorkspace::GpuWorkspace(std::size_t, const GpuSettings& settings) { gpu_info(settings.device); }
+GpuWorkspace::~GpuWorkspace() = default;
+GpuWorkspace::GpuWorkspace(GpuWorkspace&&) noexcept = default;
+GpuWorkspace& GpuWorkspace::operator=(GpuWorkspace&&) noexcept = default;
+std::size_t GpuWorkspace::most_pairs() const noexcept { return 0; }
+std::size_t GpuWorkspace::bytes() const noexcept { return 0; }
+
+void penetration_batch(const GpuAssets&, const GpuPairs&, Measure, GpuWorkspace&,
+                       const GpuPenetrations&, CUstream_st*) {
+  gpu_info(0);
+}
 
 namespace gpu {
 

@@ -40,12 +40,12 @@ class DevicePool final : public DeviceMemoryResource {
 
 }  // namespace
 
-Queue::DeviceGuard::DeviceGuard(int device) {
+DeviceGuard::DeviceGuard(int device) {
   check(cudaGetDevice(&previous_), "looking for a GPU");
   check(cudaSetDevice(device), "selecting the GPU");
 }
 
-Queue::DeviceGuard::~DeviceGuard() { cudaSetDevice(previous_); }
+DeviceGuard::~DeviceGuard() { cudaSetDevice(previous_); }
 
 Queue::Queue(const GpuSettings& settings)
     : guard_(settings.device), memory_(settings.memory), stream_(settings.stream) {

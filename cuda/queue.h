@@ -8,6 +8,18 @@
 
 namespace ist::gpu {
 
+/// Makes a device current, and the previous one again at the end.
+class DeviceGuard {
+ public:
+  explicit DeviceGuard(int device);
+  ~DeviceGuard();
+  DeviceGuard(const DeviceGuard&) = delete;
+  DeviceGuard& operator=(const DeviceGuard&) = delete;
+
+ private:
+  int previous_ = 0;
+};
+
 /// The stream that a bake's device work runs on, in order, and where its memory comes from. One a
 /// bake; not shared by threads. The device it was made for must be current (DeviceGuard) wherever
 /// it is used.
@@ -34,15 +46,6 @@ class Queue {
   void wait();
 
  private:
-  class DeviceGuard {  // makes the device current, and the previous one again at the end
-   public:
-    explicit DeviceGuard(int device);
-    ~DeviceGuard();
-
-   private:
-    int previous_ = 0;
-  };
-
   DeviceGuard guard_;
   std::unique_ptr<DeviceMemoryResource> own_memory_;
   DeviceMemoryResource* memory_ = nullptr;

@@ -46,6 +46,10 @@ struct WarpTeam {
   __device__ int sum(int value) const {
     return static_cast<int>(warp_sum(static_cast<std::uint32_t>(value)));
   }
+  /// In one fixed order.
+  __device__ double sum(double value) const {
+    return warp_exchange(value, [](double a, double b) { return a + b; });
+  }
   __device__ bool any(bool flag) const { return __any_sync(kAll, flag) != 0; }
   __device__ bool all(bool flag) const { return __all_sync(kAll, flag) != 0; }
 

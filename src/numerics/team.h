@@ -69,6 +69,7 @@ struct SerialTeam {
     return value;
   }
   IST_HD int sum(int value) const { return value; }
+  IST_HD double sum(double value) const { return value; }  ///< of a width: in one fixed order
   IST_HD bool any(bool flag) const { return flag; }
   IST_HD bool all(bool flag) const { return flag; }
 

@@ -121,6 +121,17 @@ class FiberTeam {
     for (int i = 0; i < Width; ++i) total += decoded<int>(all[i]);
     return total;
   }
+  /// In the order in which a warp adds.
+  double sum(double value) const {
+    const std::uint64_t* all = fibers_.exchange(lane_, 8, coded(value));
+    double sums[Width], next[Width];
+    for (int i = 0; i < Width; ++i) sums[i] = decoded<double>(all[i]);
+    for (int apart = Width / 2; apart > 0; apart /= 2) {
+      for (int i = 0; i < Width; ++i) next[i] = sums[i] + sums[i ^ apart];
+      std::copy_n(next, Width, sums);
+    }
+    return sums[lane_];
+  }
   bool any(bool flag) const { return sum(flag ? 1 : 0) > 0; }
   bool all(bool flag) const { return sum(flag ? 1 : 0) == Width; }
   int exclusive_count(bool flag, int& total) const {

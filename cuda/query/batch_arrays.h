@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include <ist/gpu_query.h>
+
+#include "cuda/query/pair_descent.h"
+
+namespace ist::gpu {
+
+/// An asset as a batch finds it.
+struct AssetRef {
+  AssetFrame frame;
+  TreeRef tree[2];  ///< by Measure
+
+  /// `bytes`: where the asset lies for who works on the batch.
+  static AssetRef of(const AssetHeader& header, const std::byte* bytes) {
+    AssetRef ref = {};
+    ref.frame = {{header.centre[0], header.centre[1], header.centre[2]},
+                 std::ldexp(1.0, header.exponent)};
+    ref.tree[static_cast<int>(Measure::matched)] = TreeRef::of(header.matched_tree, bytes);
+    ref.tree[static_cast<int>(Measure::inner)] = TreeRef::of(header.inner_tree, bytes);
+    return ref;
+  }
+};
+
+/// What a descent left waiting, cut into tasks for whoever has time.
+struct SplitPair {
+  std::uint32_t pair;        ///< of the batch
+  std::uint32_t first_task;  ///< whose totals follow those of the descent itself
+  std::uint32_t tasks;
+  std::uint32_t left;  ///< tasks that are not done
+};
+
+struct PairTask {
+  std::uint32_t split;
+  std::uint32_t first, count;  ///< entries
+};
+
+/// Counters of a batch: zero at first.
+struct BatchCounters {
+  std::uint32_t listed[2];  ///< pairs to be summed in float, in double
+  std::uint32_t taken[2];
+  std::uint32_t splits[2], tasks[2], entries[2], tasks_taken[2];
+};
+
+/// A batch in the memory of who works on it: kernels, or a test on the host.
+struct BatchArrays {
+  const AssetRef* assets;
+  std::uint32_t asset_count;
+  Measure measure;
+  GpuPairs pairs;
+  GpuPenetrations answers;
+
+  BatchCounters* counters;
+  std::uint32_t* list[2];  ///< room for all pairs each
+  // Room for what is split; what finds none is summed by the team that met it. For float, double.
+  SplitPair* splits;
+  PairTask* tasks;
+  LensTotals* totals;  ///< of splits[0]: [split_room + task_room]
+  std::uint32_t* entries_a;
+  std::uint32_t* entries_b;
+  std::uint32_t split_room, task_room, entry_room;
+};
+
+}  // namespace ist::gpu

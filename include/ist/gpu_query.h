@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include <ist/api.h>
+#include <ist/gpu.h>
+#include <ist/pose.h>
+#include <ist/query.h>
+#include <ist/tree_view.h>
+
+// Penetrations of many pairs at once, on a GPU. Assets are uploaded once; poses and answers are
+// arrays in device memory that the caller owns.
+
+namespace IST_API ist {
+
+/// Assets in device memory: the bytes of the files as they are.
+///
+/// Threads may share it.
+class GpuAssets {
+ public:
+  /// Copies the assets to the device of `settings`; they are not needed afterwards. Pairs name them
+  /// by their place in the list.
+  ///
+  /// Throws Error where the device cannot be used or has no memory left, or an asset is empty.
+  explicit GpuAssets(std::span<const TreeView> assets, const GpuSettings& settings = {});
+  ~GpuAssets();
+  GpuAssets(GpuAssets&&) noexcept;
+  GpuAssets& operator=(GpuAssets&&) noexcept;
+
+  std::size_t size() const noexcept;   ///< assets
+  std::size_t bytes() const noexcept;  ///< of device memory
+  int device() const noexcept;
+
+  struct Impl;
+  const Impl& impl() const noexcept { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Placed pairs of assets: arrays of `count` in device memory.
+struct GpuPairs {
+  std::size_t count = 0;
+  const std::uint32_t* asset_a = nullptr;  ///< place in GpuAssets
+  const std::uint32_t* asset_b = nullptr;
+  const Pose* pose_a = nullptr;     ///< null: all at the origin, unturned
+  const Pose* pose_b = nullptr;     ///< likewise
+  const double* scale_a = nullptr;  ///< null: 1
+  const double* scale_b = nullptr;  ///< likewise
+};
+
+/// Answers, each as in Penetration: arrays in device memory; null: not wanted.
+struct GpuPenetrations {
+  double* volume = nullptr;                ///< [count] [u³]
+  double* centroid = nullptr;              ///< [count][3] [u] world
+  double* translation_gradient = nullptr;  ///< [count][3] [u²] dV/d(translation of B), world
+  /// [count][3] [u³/rad] dV/d(rotation vector of B about B's origin), world
+  double* rotation_gradient = nullptr;
+  /// [count] ok, or invalid_input of a pose, a scale or an asset's number; others are not touched
+  /// by that.
+  QueryStatus* status = nullptr;
+  std::uint32_t* node_visits = nullptr;   ///< [count]
+  std::uint32_t* sphere_pairs = nullptr;  ///< [count]
+};
+
+/// Device memory that a batch works in. One batch at a time may use it.
+class GpuWorkspace {
+ public:
+  /// For batches of up to `most_pairs`; takes 8 bytes each and a fixed 60 MB.
+  ///
+  /// Throws Error where the device cannot be used or has no memory left.
+  explicit GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings = {});
+  ~GpuWorkspace();
+  GpuWorkspace(GpuWorkspace&&) noexcept;
+  GpuWorkspace& operator=(GpuWorkspace&&) noexcept;
+
+  std::size_t most_pairs() const noexcept;
+  std::size_t bytes() const noexcept;  ///< of device memory
+
+  struct Impl;
+  Impl& impl() noexcept { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// answers[i] = penetration(pairs[i]) by lenses (FieldUse::never), finished.
+///
+/// The volume is within 1e-6 of the sum in double, gradients within 2e-6 of the lenses' single ones
+/// together or of volume^(2/3), if that is more. The same bits in every run, whatever else is in
+/// the batch.
+/// Only launches kernels on `stream`: allocates nothing and waits for nothing, so that a CUDA graph
+/// may capture it.
+///
+/// Throws Error where a batch is larger than the workspace, the devices differ or a launch fails.
+void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
+                       GpuWorkspace& workspace, const GpuPenetrations& answers,
+                       CUstream_st* stream);
+
+}  // namespace ist

@@ -1,0 +1,125 @@
+#pragma once
+
+#include <vector>
+
+#include "cuda/query/batch_steps.h"
+#include "numerics/team.h"
+#include "support/fiber_team.h"
+
+namespace ist::testing {
+
+/// A batch of the GPU's on the host: what its kernels do, by a team of one or, lane by lane, by one
+/// of 32.
+class HostBatch {
+ public:
+  /// Room for what is split: so many of each kind.
+  explicit HostBatch(std::vector<TreeView> assets, std::uint32_t room = 1 << 16) : room_(room) {
+    for (const TreeView& asset : assets) {
+      const AssetHeader& header = asset.header();
+      assets_.push_back(gpu::AssetRef::of(header, reinterpret_cast<const std::byte*>(&header)));
+    }
+  }
+
+  struct Pair {
+    std::uint32_t a = 0, b = 0;
+    Pose pose_a, pose_b;
+    double scale_a = 1, scale_b = 1;
+  };
+
+  /// `seed`: of the order in which lanes go on; 0: a team of one.
+  std::vector<Penetration> run(const std::vector<Pair>& pairs, Measure measure, unsigned seed = 0) {
+    const std::size_t n = pairs.size();
+    std::vector<std::uint32_t> a, b;
+    std::vector<Pose> pose_a, pose_b;
+    std::vector<double> scale_a, scale_b;
+    for (const Pair& pair : pairs) {
+      a.push_back(pair.a);
+      b.push_back(pair.b);
+      pose_a.push_back(pair.pose_a);
+      pose_b.push_back(pair.pose_b);
+      scale_a.push_back(pair.scale_a);
+      scale_b.push_back(pair.scale_b);
+    }
+    const double unwritten = -7;
+    std::vector<double> volume(n, unwritten), centroid(3 * n), push(3 * n), turn(3 * n);
+    std::vector<QueryStatus> status(n);
+    std::vector<std::uint32_t> visits(n), spheres(n);
+    std::vector<std::uint32_t> lists[2] = {std::vector<std::uint32_t>(n),
+                                           std::vector<std::uint32_t>(n)};
+    std::vector<gpu::SplitPair> splits(room_);
+    std::vector<gpu::PairTask> tasks(room_);
+    std::vector<gpu::LensTotals> totals(2 * std::size_t{room_});
+    std::vector<std::uint32_t> entries_a(room_), entries_b(room_);
+    counters = {};
+    const gpu::BatchArrays batch = {
+        assets_.data(),
+        static_cast<std::uint32_t>(assets_.size()),
+        measure,
+        {n, a.data(), b.data(), pose_a.data(), pose_b.data(), scale_a.data(), scale_b.data()},
+        {volume.data(), centroid.data(), push.data(), turn.data(), status.data(), visits.data(),
+         spheres.data()},
+        &counters,
+        {lists[0].data(), lists[1].data()},
+        splits.data(),
+        tasks.data(),
+        totals.data(),
+        entries_a.data(),
+        entries_b.data(),
+        room_,
+        room_,
+        room_};
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const int list = gpu::sift_pair(batch, i);
+      if (list >= 0) lists[list][counters.listed[list]++] = i;
+    }
+    sum<float>(batch, 0, seed);
+    sum<double>(batch, 1, seed);
+
+    std::vector<Penetration> answers(n);
+    const auto vector = [](const std::vector<double>& from, std::size_t i) {
+      return Eigen::Vector3d(from[3 * i], from[3 * i + 1], from[3 * i + 2]);
+    };
+    for (std::size_t i = 0; i < n; ++i) {
+      answers[i].volume = volume[i];
+      answers[i].centroid = vector(centroid, i);
+      answers[i].translation_gradient = vector(push, i);
+      answers[i].rotation_gradient = vector(turn, i);
+      answers[i].status = status[i];
+      answers[i].node_visits = visits[i];
+      answers[i].sphere_pairs = spheres[i];
+    }
+    return answers;
+  }
+
+  gpu::BatchCounters counters;  ///< of the last run
+
+ private:
+  template <class Real>
+  void sum(const gpu::BatchArrays& batch, int kind, unsigned seed) {
+    const auto memory = std::make_unique<gpu::PairMemory<Real>>();
+    for (std::uint32_t k = 0; k < counters.listed[kind]; ++k)
+      by_team(seed, [&](const auto& team) {
+        gpu::sum_pair<std::decay_t<decltype(team)>, Real>(team, batch, batch.list[kind][k],
+                                                          *memory);
+      });
+    for (std::uint32_t k = 0; k < std::min(counters.tasks[kind], room_); ++k)
+      by_team(seed, [&](const auto& team) {
+        gpu::sum_task<std::decay_t<decltype(team)>, Real>(team, batch, k, *memory);
+      });
+  }
+
+  template <class Work>
+  static void by_team(unsigned seed, const Work& work) {
+    if (seed == 0) {
+      work(SerialTeam());
+      return;
+    }
+    static Fibers<32> fibers(seed);
+    fibers.run([&](int lane) { work(FiberTeam<32>(fibers, lane)); });
+  }
+
+  std::vector<gpu::AssetRef> assets_;
+  std::uint32_t room_;
+};
+
+}  // namespace ist::testing

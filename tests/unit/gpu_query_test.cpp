@@ -1,0 +1,233 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cstring>
+#include <limits>
+#include <random>
+
+#include "query/base/relative_pose.h"
+#include "query/kernel/lens.h"
+#include "support/baked.h"
+#include "support/host_batch.h"
+#include "support/reference_sum.h"
+#include "support/test_meshes.h"
+
+// The GPU's batch of penetrations, its source run by teams of the host: of one lane, and of 32 that
+// go on in an order that nobody can count on.
+
+namespace ist::testing {
+namespace {
+
+using Eigen::Vector3d;
+using Pair = HostBatch::Pair;
+
+const std::vector<Asset>& assets() {
+  static const std::vector<Asset> made = [] {
+    std::vector<Asset> out;
+    out.push_back(baked(torus_mesh(1, 0.4, 48, 24), "torus", 1500, false));
+    out.push_back(baked(icosphere_mesh(3), "ball", 300, false));
+    out.push_back(baked(cube_mesh(), "cube", 40, false));
+    out.push_back(baked(cube_mesh(), "cube", 10, false));
+    return out;
+  }();
+  return made;
+}
+
+std::vector<TreeView> views() {
+  std::vector<TreeView> out;
+  for (const Asset& asset : assets()) out.push_back(asset.view());
+  return out;
+}
+
+class Poses {
+ public:
+  explicit Poses(unsigned seed) : random_(seed) {}
+
+  double uniform(double low, double high) {
+    return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
+  }
+  Pose pose(double reach) {
+    Eigen::Quaterniond q(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+    q.normalize();
+    return {{q.w(), q.x(), q.y(), q.z()},
+            {uniform(-reach, reach), uniform(-reach, reach), uniform(-reach, reach)}};
+  }
+  std::uint32_t asset() { return static_cast<std::uint32_t>(random_() % assets().size()); }
+
+  /// Of solids that meet more often than not, of like and unlike sizes.
+  std::vector<Pair> pairs(std::size_t count) {
+    std::vector<Pair> out;
+    for (std::size_t k = 0; k < count; ++k) {
+      Pair pair = {asset(), asset(), pose(0.2), pose(0.8), uniform(0.8, 1.2), 1};
+      pair.scale_b = std::exp(uniform(-3, 0.5));
+      out.push_back(pair);
+    }
+    return out;
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+std::pair<PlacedTree, PlacedTree> placed(const Pair& pair) {
+  return {PlacedTree{assets()[pair.a].view(), pair.pose_a, pair.scale_a},
+          PlacedTree{assets()[pair.b].view(), pair.pose_b, pair.scale_b}};
+}
+
+void expect_same_bits(const std::vector<Penetration>& x, const std::vector<Penetration>& y) {
+  ASSERT_EQ(x.size(), y.size());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    EXPECT_EQ(x[i].volume, y[i].volume) << i;
+    EXPECT_EQ(x[i].centroid, y[i].centroid) << i;
+    EXPECT_EQ(x[i].translation_gradient, y[i].translation_gradient) << i;
+    EXPECT_EQ(x[i].rotation_gradient, y[i].rotation_gradient) << i;
+    EXPECT_EQ(x[i].status, y[i].status) << i;
+    EXPECT_EQ(x[i].node_visits, y[i].node_visits) << i;
+    EXPECT_EQ(x[i].sphere_pairs, y[i].sphere_pairs) << i;
+  }
+}
+
+TEST(GpuQuery, SeesPairsAsTheCpuDoes) {
+  Poses poses(1);
+  for (const Pair& pair : poses.pairs(200)) {
+    const auto [a, b] = placed(pair);
+    const std::optional<RelativePose> cpu = relative_pose(a, b);
+    ASSERT_TRUE(cpu);
+    const auto frame = [](const PlacedTree& tree) {
+      const AssetHeader& h = tree.tree.header();
+      return gpu::AssetFrame{{h.centre[0], h.centre[1], h.centre[2]}, std::ldexp(1.0, h.exponent)};
+    };
+    gpu::PairPlace place;
+    ASSERT_TRUE(place.place(frame(a), a.pose, a.scale, frame(b), b.pose, b.scale));
+    const auto near = [](double x, double y) { EXPECT_NEAR(x, y, 1e-13 * (1 + std::abs(y))); };
+    for (int k = 0; k < 9; ++k) {
+      near(place.a_from_b.m[k], cpu->a_from_b.m[k]);
+      near(place.b_from_a.m[k], cpu->b_from_a.m[k]);
+      near(place.rotation_a[k], cpu->rotation_a(k / 3, k % 3));
+    }
+    for (int k = 0; k < 3; ++k) {
+      near(place.a_from_b.t[k], cpu->a_from_b.t[k]);
+      near(place.b_from_a.t[k], cpu->b_from_a.t[k]);
+      near(place.origin_a[k], cpu->unit_origin_a[k]);
+      near(place.offset_b[k], cpu->unit_offset_b[k]);
+    }
+    near(place.a_from_b.scale, cpu->a_from_b.scale);
+    near(place.unit_a, cpu->unit_a);
+  }
+}
+
+TEST(GpuQuery, ALensIsTheCpus) {
+  Poses random(2);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const auto ra = static_cast<float>(random.uniform(0, 1));
+    const auto rb = static_cast<float>(random.uniform(0, 1));
+    const auto d = static_cast<float>(random.uniform(0, 1.2 * (ra + rb)));
+    float sum[gpu::kTerms] = {};
+    gpu::add_lens<float>({0.5f, -1, 2, ra}, {d, 0, 0, rb}, 1e-6f, sum);
+    const Lens<float> cpu = lens(ra, rb, d);
+    EXPECT_EQ(sum[gpu::kCaps], cpu.cap_a + cpu.cap_b);
+    EXPECT_FLOAT_EQ(sum[gpu::kForce], cpu.circle / 2);
+    EXPECT_FLOAT_EQ(sum[gpu::kMoment], (cpu.cap_a + cpu.cap_b) * 0.5f + cpu.cap_b * d);
+    EXPECT_EQ(sum[gpu::kTorque], 0);
+    EXPECT_FLOAT_EQ(sum[gpu::kTorque + 1], 2 * sum[gpu::kForce]);
+    EXPECT_FLOAT_EQ(sum[gpu::kTorque + 2], sum[gpu::kForce]);
+  }
+}
+
+TEST(GpuQuery, AnswersAreTheSumsInDouble) {
+  Poses poses(3);
+  const std::vector<Pair> pairs = poses.pairs(400);
+  double worst = 0, worst_push = 0, worst_turn = 0, worst_centre = 0;
+  std::size_t met = 0;
+  for (const Measure measure : {Measure::matched, Measure::inner}) {
+    HostBatch batch(views());
+    const std::vector<Penetration> answers = batch.run(pairs, measure);
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const auto [a, b] = placed(pairs[i]);
+      const ReferenceSum sum = reference_sum(a, b, measure);
+      ASSERT_EQ(answers[i].status, QueryStatus::ok);
+      if (sum.volume == 0) {
+        EXPECT_EQ(answers[i].volume, 0);
+        continue;
+      }
+      ++met;
+      const double size = 2 * pairs[i].scale_b;
+      worst = std::max(worst, std::abs(answers[i].volume / sum.volume - 1));
+      worst_centre = std::max(worst_centre, (answers[i].centroid - sum.centroid()).norm() / size);
+      // Of a ball that all but lies in another the force is a small rest.
+      const double area = sum.force_scale + std::cbrt(sum.volume * sum.volume);
+      worst_push = std::max(
+          worst_push, (answers[i].translation_gradient - sum.translation_gradient).norm() / area);
+      worst_turn =
+          std::max(worst_turn,
+                   (answers[i].rotation_gradient - sum.rotation_gradient).norm() / (area * size));
+    }
+    RecordProperty("in_double", std::to_string(batch.counters.listed[1]));
+    std::printf(
+        "%s: worst volume %.2g, push %.2g, turn %.2g, centroid %.2g; %zu met, %u again in "
+        "double, %u split into %u\n",
+        measure == Measure::inner ? "inner" : "matched", worst, worst_push, worst_turn,
+        worst_centre, met, batch.counters.listed[1], batch.counters.splits[0],
+        batch.counters.tasks[0]);
+  }
+  EXPECT_GT(met, 500u);
+  EXPECT_LE(worst, 1e-6);
+  EXPECT_LE(worst_push, 2e-6);
+  EXPECT_LE(worst_turn, 2e-6);
+  EXPECT_LE(worst_centre, 1e-6);
+}
+
+/// Splitting, and who does what in which order, must not show.
+TEST(GpuQuery, SameBitsHoweverItIsSplit) {
+  Poses poses(4);
+  const std::vector<Pair> pairs = poses.pairs(100);
+  HostBatch roomy(views());
+  const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched);
+  EXPECT_GT(roomy.counters.tasks[0], 20u);
+  for (const std::uint32_t room : {0u, 30u, 300u}) {
+    HostBatch narrow(views(), room);
+    expect_same_bits(narrow.run(pairs, Measure::matched), expected);
+  }
+}
+
+TEST(GpuQuery, LanesOfAWarpNeedNoLuck) {
+  Poses poses(5);
+  const std::vector<Pair> pairs = poses.pairs(25);
+  HostBatch alone(views()), roomy(views()), narrow(views(), 7);
+  const std::vector<Penetration> by_one = alone.run(pairs, Measure::matched);
+  const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched, 1);
+  EXPECT_GT(roomy.counters.tasks[0], 3u);
+  expect_same_bits(roomy.run(pairs, Measure::matched, 2), expected);
+  expect_same_bits(narrow.run(pairs, Measure::matched, 3), expected);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    EXPECT_NEAR(by_one[i].volume, expected[i].volume, 2e-6 * expected[i].volume);
+    EXPECT_EQ(by_one[i].sphere_pairs, expected[i].sphere_pairs);
+  }
+}
+
+TEST(GpuQuery, InvalidPosesSpoilOnlyThemselves) {
+  Poses poses(6);
+  std::vector<Pair> pairs = poses.pairs(40);
+  const std::vector<Penetration> sound = HostBatch(views()).run(pairs, Measure::matched);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  pairs[3].pose_b.t[1] = nan;
+  pairs[7].pose_a.q[0] = inf;
+  pairs[11].scale_b = 0;
+  pairs[13].scale_a = -1;
+  pairs[17].pose_b.q[2] += 0.1;
+  pairs[19].b = 99;
+  pairs[23].scale_b = nan;
+  pairs[29].pose_a.t[0] = -inf;
+  const std::vector<std::size_t> bad = {3, 7, 11, 13, 17, 19, 23, 29};
+  const std::vector<Penetration> answers = HostBatch(views()).run(pairs, Measure::matched);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const bool is_bad = std::find(bad.begin(), bad.end(), i) != bad.end();
+    EXPECT_EQ(answers[i].status, is_bad ? QueryStatus::invalid_input : QueryStatus::ok) << i;
+    EXPECT_EQ(answers[i].volume, is_bad ? 0 : sound[i].volume) << i;
+  }
+  EXPECT_TRUE(HostBatch(views()).run({}, Measure::inner).empty());
+}
+
+}  // namespace
+}  // namespace ist::testing
