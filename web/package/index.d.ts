@@ -128,12 +128,12 @@ export class Asset {
   bounds(): Bounds;
   massProperties(): MassProperties;
 
-  /** x, y, z, radius [u] of every sphere, largest first but for the banding of the bake. */
+  /** x, y, z, radius [u] of every sphere, in the order of the packing: largest ones first. */
   spheres(set?: SphereSet): Float64Array;
 
   /** Levels of balls in the tree over a set: level 0 is the spheres, the last has up to sixteen. */
   levelCount(set?: SphereSet): number;
-  /** x, y, z, radius [u] of every ball of a level of the tree. */
+  /** x, y, z, radius [u] of every ball of a level: each around sixteen of the level below. */
   level(level: number, set?: SphereSet): Float64Array;
 
   /** The stored surface, within AssetInfo.fieldError of the solid's; null if there is none. */
@@ -278,7 +278,7 @@ export function separation(
 /** A part of a contact that a solver may take for one contact point. */
 export interface ContactPatch {
   /** Names the region: the same in every query of the same two solids. */
-  id: string;
+  id: number;
   /** [u] */
   centroid: Float64Array;
   /** Unit, the direction in which the patch pushes B; zero if the area is. */
@@ -343,9 +343,9 @@ export interface Lenses {
   /** Lenses written. */
   count: number;
   /**
-   * Ten numbers a lens: centre x, y, z; axis x, y, z (unit, from A's sphere to B's); radius of its
-   * rim [u]; thickness along the axis [u]; index of A's and of B's sphere in Asset.spheres().
-   * A sphere inside the other is a lens of its own radius, twice as thick.
+   * Ten numbers a lens: x, y, z of the middle of its thickness; its axis x, y, z (unit, from A's
+   * sphere to B's); radius where it is widest [u]; thickness along the axis [u]; index of A's and of
+   * B's sphere in Asset.spheres(). An ellipsoid of that size looks like it.
    */
   data: Float64Array;
 }

@@ -1,5 +1,5 @@
 /* The C functions as a page's JavaScript calls them: numbers lie at fixed places of one desk in
- * memory, whose layout src/core.js knows. */
+ * memory, whose layout src/desk.js knows. */
 #include <ist/ist.h>
 #include <stdlib.h>
 #include <string.h>
