@@ -186,8 +186,8 @@ typedef struct ist_ball_set {
   uint32_t size;
   ist_measure_t measure;
   uint32_t detail; /* of matched spheres: < ist_tree_info_t::details; of inner ones 0 */
-  /* 0: the spheres, in insertion order. Above, the balls around sixteen of the level below each (of
-   * spheres near each other), up to the level of at most sixteen balls. */
+  /* 0: the spheres, in insertion order. 1: balls around sixteen spheres each. Above, balls around
+   * the spheres of sixteen balls of the level below each, up to the level of sixteen or fewer. */
   uint32_t level;
 } ist_ball_set_t;
 

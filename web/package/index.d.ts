@@ -133,7 +133,10 @@ export class Asset {
 
   /** Levels of balls in the tree over a set: level 0 is the spheres, the last has up to sixteen. */
   levelCount(set?: SphereSet): number;
-  /** x, y, z, radius [u] of every ball of a level: each around sixteen of the level below. */
+  /**
+   * x, y, z, radius [u] of every ball of a level. Level 0 is the spheres; each ball of level 1 holds
+   * sixteen spheres, and ball i of a higher one those of balls 16 i … 16 i + 15 of the level below.
+   */
   level(level: number, set?: SphereSet): Float64Array;
 
   /** The stored surface, within AssetInfo.fieldError of the solid's; null if there is none. */
