@@ -102,7 +102,7 @@ export class Asset extends Owner {
     const detail = count(set?.detail, 0, 'detail');
     const status = functions('an asset').balls(this._at, measureOf(set?.measure), detail, level, room, capacity);
     if (status < 0)
-      throw new IstError(`${this._name}: there is no level ${level} of detail ${detail} in its ` +
+      throw new IstError(`ist: ${this._name}: there is no level ${level} of detail ${detail} in its ` +
           `${set?.measure ?? 'matched'} spheres`, status);
     return u32()[(desk() + kCounts) / 4];
   }

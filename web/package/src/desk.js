@@ -22,17 +22,19 @@ export function desk() {
   return start;
 }
 
-function number(value, what) {
-  if (typeof value !== 'number') throw new IstError(`ist: ${what} is ${value}, not a number`);
+// Words are put together only where something is wrong: a loop shall make no garbage.
+
+function number(value, what, part = '') {
+  if (typeof value !== 'number') throw new IstError(`ist: ${what}${part} is ${value}, not a number`);
   return value;
 }
 
 /** Writes `count` numbers, or those of `absent` where none are given. */
-export function writeNumbers(out, at, given, absent, count, what) {
+export function writeNumbers(out, at, given, absent, count, what, part = '') {
   if (given === undefined || given === null) given = absent;
   if (given.length !== count)
-    throw new IstError(`ist: ${what} has ${given.length ?? 'no'} numbers, not ${count}`);
-  for (let i = 0; i < count; ++i) out[at + i] = number(given[i], what);
+    throw new IstError(`ist: ${what}${part} has ${given.length ?? 'no'} numbers, not ${count}`);
+  for (let i = 0; i < count; ++i) out[at + i] = number(given[i], what, part);
 }
 
 const kIdentity = [1, 0, 0, 0];
@@ -40,15 +42,13 @@ const kOrigin = [0, 0, 0];
 
 /** Writes place A (0) or B (1). */
 export function writePose(which, pose, what) {
+  if (which === 1 && (pose === undefined || pose === null))
+    throw new IstError(`ist: ${what} is missing: {rotation, translation, scale}`);
   const out = f64();
   const at = desk() / 8 + 8 * which;
-  if (pose === undefined || pose === null) {
-    if (which === 1) throw new IstError(`ist: ${what} is missing: {rotation, translation, scale}`);
-    pose = undefined;
-  }
-  writeNumbers(out, at, pose?.rotation, kIdentity, 4, `${what}.rotation`);
-  writeNumbers(out, at + 4, pose?.translation, kOrigin, 3, `${what}.translation`);
-  const scale = pose?.scale === undefined ? 1 : number(pose.scale, `${what}.scale`);
+  writeNumbers(out, at, pose?.rotation, kIdentity, 4, what, '.rotation');
+  writeNumbers(out, at + 4, pose?.translation, kOrigin, 3, what, '.translation');
+  const scale = number(pose?.scale ?? 1, what, '.scale');
   if (!(scale > 0)) throw new IstError(`ist: ${what}.scale is ${scale}; it must be > 0`);
   out[at + 7] = scale;
 }

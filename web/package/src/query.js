@@ -1,8 +1,7 @@
 // The queries.
 
 import {Asset, Field} from './asset.js';
-import {copy3, count, desk, kCounts, kMostPatches, kPatchBytes, kPatches, kPenetration, kSeparation, measureOf,
-        writePose, writeSettings} from './desk.js';
+import {copy3, count, desk, kCounts, kMostPatches, kPatchBytes, kPatches, kPenetration, kSeparation, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, give, take, u32} from './memory.js';
 
@@ -10,19 +9,19 @@ const newVector = () => new Float64Array(3);
 
 function solid(given, which, query) {
   if (given instanceof Asset || (which === 'A' && given instanceof Field)) return given._at;
-  throw new IstError(`ist: ${query}(): solid ${which} must be an ${which === 'A' ? 'Asset or a Field' : 'Asset'}`);
+  throw new IstError(`ist: ${query}: solid ${which} must be an ${which === 'A' ? 'Asset or a Field' : 'Asset'}`);
 }
 
-/** Puts a question on the desk and asks it. Returns the status, no error. */
-function ask(query, a, b, poseB, options, more) {
-  const wasm = functions(`${query.name}()`);
-  const first = solid(a, 'A', query.name), second = solid(b, 'B', query.name);
+/** Puts a question on the desk and asks it: `question` names an export. Returns the status, no error. */
+function ask(question, who, a, b, poseB, options, more) {
+  const wasm = functions(who);
+  const first = solid(a, 'A', who), second = solid(b, 'B', who);
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
   writeSettings(options);
   const isTree = a instanceof Asset;
-  const status = wasm[query.export](isTree ? first : 0, isTree ? 0 : first, second, more);
-  check(status, `ist: ${query.name}()`);
+  const status = wasm[question](isTree ? first : 0, isTree ? 0 : first, second, more);
+  check(status, who);
   return status;
 }
 
@@ -49,9 +48,8 @@ function readPenetration(status, out) {
   return out;
 }
 
-const kPenetrationQuery = {name: 'penetration', export: 'penetration'};
 export function penetration(a, b, poseB, options) {
-  const status = ask(kPenetrationQuery, a, b, poseB, options, 0);
+  const status = ask('penetration', 'penetration()', a, b, poseB, options, 0);
   return readPenetration(status, options?.into ?? newPenetration());
 }
 
@@ -61,9 +59,8 @@ const newSeparation = () => ({
   nodeVisits: 0, spherePairs: 0,
 });
 
-const kSeparationQuery = {name: 'separation', export: 'separation'};
 export function separation(a, b, poseB, options) {
-  const status = ask(kSeparationQuery, a, b, poseB, options, 0);
+  const status = ask('separation', 'separation()', a, b, poseB, options, 0);
   const out = options?.into ?? newSeparation();
   const numbers = f64(), integers = u32();
   const at = (desk() + kSeparation) / 8 + 1;
@@ -84,12 +81,11 @@ const newPatch = () => ({
   force: newVector(), torque: newVector(),
 });
 
-const kPatchesQuery = {name: 'contactPatches', export: 'contact_patches'};
 export function contactPatches(a, b, poseB, options) {
   const most = options?.maxPatches ?? 16;
   if (!(Number.isInteger(most) && most >= 1 && most <= kMostPatches))
     throw new IstError(`ist: maxPatches is ${most}; it must be a whole number from 1 to ${kMostPatches}`);
-  const status = ask(kPatchesQuery, a, b, poseB, options, most);
+  const status = ask('contact_patches', 'contactPatches()', a, b, poseB, options, most);
   const out = options?.into ?? {whole: newPenetration(), count: 0, patches: []};
   readPenetration(status, out.whole);
   const numbers = f64(), integers = u32();
@@ -111,9 +107,8 @@ export function contactPatches(a, b, poseB, options) {
 }
 
 const kOverlapping = ['no', 'yes', 'unknown'];
-const kOverlapQuery = {name: 'overlap', export: 'overlap'};
 export function overlap(a, b, poseB, options) {
-  return kOverlapping[ask(kOverlapQuery, a, b, poseB, options, 0)];
+  return kOverlapping[ask('overlap', 'overlap()', a, b, poseB, options, 0)];
 }
 
 // Room that lenses are written to, kept from call to call.
@@ -122,7 +117,7 @@ let room = 0, roomFor = 0;
 export function lenses(a, b, poseB, options) {
   const wasm = functions('lenses()');
   if (!(a instanceof Asset)) throw new IstError('ist: lenses(): solid A must be an Asset: a field has no spheres');
-  const first = a._at, second = solid(b, 'B', 'lenses');
+  const first = a._at, second = solid(b, 'B', 'lenses()');
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
   writeSettings({measure: options?.measure});
@@ -135,7 +130,7 @@ export function lenses(a, b, poseB, options) {
   }
   const status = wasm.lenses(first, second, count(options?.detailA, 0, 'detailA'),
                              count(options?.detailB, 0, 'detailB'), room, most);
-  check(status, `ist: lenses(): of ${measureOf(options?.measure) === 0 ? 'matched' : 'inner'} spheres`);
+  check(status, 'lenses()');
   const out = options?.into ?? {total: 0, count: 0, data: new Float64Array(0)};
   const integers = u32(), numbers = f64(), counts = (desk() + kCounts) / 4;
   out.total = integers[counts];
