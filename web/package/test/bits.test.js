@@ -1,0 +1,16 @@
+import assert from 'node:assert/strict';
+import {test} from 'node:test';
+
+import * as ist from 'ist-query';
+
+import {firstDifference, nativeAnswers, pairs, read} from './data.js';
+import {rowsText} from './rows.js';
+
+for (const pair of pairs())
+  test(`the bits of the native library: ${pair.name}`, async () => {
+    await ist.init();
+    const wanted = nativeAnswers(pair);
+    const got = rowsText(ist, read(pair.a), read(pair.b), read(pair.csv).toString());
+    assert.ok(wanted.split('\n').length > 500);
+    assert.equal(firstDifference(wanted, got), null);
+  });
