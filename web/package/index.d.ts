@@ -163,7 +163,12 @@ export class Field {
    * Terrain under a grid of heights along z, copied: `columns` (x) run fastest, heights[0] stands at
    * the origin. Beyond its border it goes on level.
    */
-  static heights(heights: Float32Array, columns: number, rows: number, spacing: ArrayLike<number>): Field;
+  static heights(
+    heights: Float32Array,
+    columns: number,
+    rows: number,
+    spacing: ArrayLike<number>,
+  ): Field;
   /**
    * Distances, positive inside, at the points of a grid, copied: x runs fastest. Outside of the grid
    * is outside of the solid.

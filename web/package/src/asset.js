@@ -2,7 +2,7 @@
 
 import {count, desk, kBounds, kCounts, kInfo, kMass, measureOf, writeNumbers} from './desk.js';
 import {IstError} from './error.js';
-import {check, f64, functions, give, take, u8, u32, withRoom} from './memory.js';
+import {check, f64, functions, give, take, u32, u8, withRoom} from './memory.js';
 import {welded} from './weld.js';
 
 /** Gives back what nobody refers to any more. */
@@ -11,7 +11,8 @@ const forgotten = new FinalizationRegistry((places) => places.forEach(give));
 /** What owns memory: a list of places. */
 class Owner {
   constructor(places, key) {
-    if (key !== kInside) throw new IstError(`ist: ${this.constructor.name}s are made by its static functions`);
+    if (key !== kInside)
+      throw new IstError(`ist: ${this.constructor.name}s are made by its static functions`);
     this._places = places;
     forgotten.register(this, places, this);
   }
@@ -25,14 +26,19 @@ class Owner {
 }
 const kInside = Symbol('inside');
 
-function vector(at) { return f64().slice(at, at + 3); }
+function vector(at) {
+  return f64().slice(at, at + 3);
+}
 
 /** Bytes of whatever holds bytes. */
 function bytesOf(given) {
-  if (ArrayBuffer.isView(given)) return new Uint8Array(given.buffer, given.byteOffset, given.byteLength);
-  if (given instanceof ArrayBuffer || (typeof SharedArrayBuffer !== 'undefined' && given instanceof SharedArrayBuffer))
+  if (ArrayBuffer.isView(given))
+    return new Uint8Array(given.buffer, given.byteOffset, given.byteLength);
+  if (given instanceof ArrayBuffer ||
+      (typeof SharedArrayBuffer !== 'undefined' && given instanceof SharedArrayBuffer))
     return new Uint8Array(given);
-  throw new IstError('ist: Asset.from() takes an ArrayBuffer or a view of one, as ' +
+  throw new IstError(
+      'ist: Asset.from() takes an ArrayBuffer or a view of one, as ' +
       'await (await fetch(address)).arrayBuffer() gives');
 }
 
@@ -89,27 +95,43 @@ export class Asset extends Owner {
 
   bounds() {
     const numbers = this._told(), at = (desk() + kBounds) / 8 + 1;
-    return {lower: vector(at), upper: vector(at + 3), centre: vector(at + 6), radius: numbers[at + 9]};
+    return {
+      lower: vector(at),
+      upper: vector(at + 3),
+      centre: vector(at + 6),
+      radius: numbers[at + 9]
+    };
   }
 
   massProperties() {
     const numbers = this._told(), at = (desk() + kMass) / 8 + 1;
-    return {volume: numbers[at], centreOfMass: vector(at + 1), inertia: numbers.slice(at + 4, at + 13)};
+    return {
+      volume: numbers[at],
+      centreOfMass: vector(at + 1),
+      inertia: numbers.slice(at + 4, at + 13)
+    };
   }
 
   /** Writes the first `capacity` balls to `room`, and says how many there are. */
   _balls(set, level, room, capacity) {
     const detail = count(set?.detail, 0, 'detail');
-    const status = functions('an asset').balls(this._at, measureOf(set?.measure), detail, level, room, capacity);
+    const status = functions('an asset')
+                       .balls(this._at, measureOf(set?.measure), detail, level, room, capacity);
     if (status < 0)
-      throw new IstError(`ist: ${this._name}: there is no level ${level} of detail ${detail} in its ` +
-          `${set?.measure ?? 'matched'} spheres`, status);
+      throw new IstError(
+          `ist: ${this._name}: there is no level ${level} of detail ${detail} in its ` +
+              `${set?.measure ?? 'matched'} spheres`,
+          status);
     return u32()[(desk() + kCounts) / 4];
   }
 
-  _count(set, level) { return this._balls(set, level, 0, 0); }
+  _count(set, level) {
+    return this._balls(set, level, 0, 0);
+  }
 
-  spheres(set) { return this.level(0, set); }
+  spheres(set) {
+    return this.level(0, set);
+  }
 
   levelCount(set) {
     let level = 0;
@@ -134,14 +156,16 @@ export class Asset extends Owner {
     return withRoom(24 * vertices + 12 * triangles, (room) => {
       const corners = room + 24 * vertices;
       check(wasm.surface(this._at, room, vertices, corners, triangles), this._name);
-      return welded(f64().subarray(room / 8, room / 8 + 3 * vertices),
-                    u32().subarray(corners / 4, corners / 4 + 3 * triangles));
+      return welded(
+          f64().subarray(room / 8, room / 8 + 3 * vertices),
+          u32().subarray(corners / 4, corners / 4 + 3 * triangles));
     });
   }
 }
 
 // ist_field_kind_t
-const kHalfSpace = 1, kBox = 2, kBall = 3, kCapsule = 4, kCylinder = 5, kHeights = 6, kDistanceGrid = 7, kMesh = 9;
+const kHalfSpace = 1, kBox = 2, kBall = 3, kCapsule = 4, kCylinder = 5, kHeights = 6,
+      kDistanceGrid = 7, kMesh = 9;
 
 /** A field of up to eight numbers, and of `data`, whose memory it owns. */
 function made(kind, numbers, data = 0, columns = 0, rows = 0, layers = 0) {
@@ -171,7 +195,8 @@ function copied(given, points, what) {
       throw new IstError(`ist: ${what} needs two points and more along each axis, not ${along}`);
   const wanted = points.reduce((a, b) => a * b);
   if (!(given instanceof Float32Array) || given.length !== wanted)
-    throw new IstError(`ist: ${what} needs a Float32Array of ${points.join(' · ')} = ${wanted} numbers` +
+    throw new IstError(
+        `ist: ${what} needs a Float32Array of ${points.join(' · ')} = ${wanted} numbers` +
         (given?.length === undefined ? '' : `, not ${given.length}`));
   functions(what);
   const place = take(4 * wanted);
@@ -180,14 +205,25 @@ function copied(given, points, what) {
 }
 
 export class Field extends Owner {
-  static halfSpace(normal, offset = 0) { return made(kHalfSpace, [...three(normal, 'normal'), offset]); }
-  static box(halfExtents) { return made(kBox, three(halfExtents, 'halfExtents')); }
-  static ball(radius) { return made(kBall, [radius]); }
-  static capsule(radius, halfHeight) { return made(kCapsule, [radius, halfHeight]); }
-  static cylinder(radius, halfHeight) { return made(kCylinder, [radius, halfHeight]); }
+  static halfSpace(normal, offset = 0) {
+    return made(kHalfSpace, [...three(normal, 'normal'), offset]);
+  }
+  static box(halfExtents) {
+    return made(kBox, three(halfExtents, 'halfExtents'));
+  }
+  static ball(radius) {
+    return made(kBall, [radius]);
+  }
+  static capsule(radius, halfHeight) {
+    return made(kCapsule, [radius, halfHeight]);
+  }
+  static cylinder(radius, halfHeight) {
+    return made(kCylinder, [radius, halfHeight]);
+  }
 
   static heights(heights, columns, rows, spacing) {
-    if (spacing?.length !== 2) throw new IstError('ist: spacing must have two numbers, along x and y');
+    if (spacing?.length !== 2)
+      throw new IstError('ist: spacing must have two numbers, along x and y');
     const data = copied(heights, [columns, rows], 'Field.heights()');
     let lowest = Infinity, highest = -Infinity;
     for (const h of heights) {

@@ -1,7 +1,8 @@
 // For wherever a file beside the module gets lost: the WebAssembly is in the module.
 
-import {load} from './memory.js';
 import {inlined} from '../dist/inlined.js';
+
+import {load} from './memory.js';
 
 export * from './public.js';
 

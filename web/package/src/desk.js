@@ -1,5 +1,5 @@
-// The desk of src/exports.c: where questions are put and answers lie. Every place is held there by a
-// static assert. Numbers below are bytes from its start.
+// The desk of src/exports.c: where questions are put and answers lie. Every place is held there by
+// a static assert. Numbers below are bytes from its start.
 
 import {IstError} from './error.js';
 import {f64, functions, u32} from './memory.js';
@@ -25,7 +25,8 @@ export function desk() {
 // Words are put together only where something is wrong: a loop shall make no garbage.
 
 function number(value, what, part = '') {
-  if (typeof value !== 'number') throw new IstError(`ist: ${what}${part} is ${value}, not a number`);
+  if (typeof value !== 'number')
+    throw new IstError(`ist: ${what}${part} is ${value}, not a number`);
   return value;
 }
 
@@ -70,7 +71,9 @@ const kMeasures = ['matched', 'inner'];
 const kFieldUses = ['automatic', 'never', 'always'];
 const limit = (value, what) => (value === undefined ? 0 : number(value, what));
 
-export function measureOf(value) { return choice(value, kMeasures, 'measure'); }
+export function measureOf(value) {
+  return choice(value, kMeasures, 'measure');
+}
 
 /** Writes every setting that options have. */
 export function writeSettings(options) {

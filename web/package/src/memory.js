@@ -19,14 +19,20 @@ function refresh() {
 
 /** What WebAssembly asks of its host. */
 const imports = {
-  env: {emscripten_notify_memory_growth: () => { bytes = undefined; }},
+  env: {
+    emscripten_notify_memory_growth: () => {
+      bytes = undefined;
+    }
+  },
   wasi_snapshot_preview1: {
     clock_time_get(clock, precision, out) {
       const now = BigInt(Math.round(performance.now() * 1e6));
       new DataView(wasm.memory.buffer).setBigUint64(out, now, true);
       return 0;
     },
-    proc_exit() { throw new IstError('ist: the WebAssembly stopped itself: no memory is left'); },
+    proc_exit() {
+      throw new IstError('ist: the WebAssembly stopped itself: no memory is left');
+    },
   },
 };
 
@@ -36,19 +42,23 @@ async function instantiated(source) {
     try {
       given = await fetch(given);
     } catch (error) {
-      throw new IstError(`ist: ${given} cannot be fetched (${error.message}). If a bundler moved it, ` +
+      throw new IstError(
+          `ist: ${given} cannot be fetched (${error.message}). If a bundler moved it, ` +
           'name its place, init({wasm: url}), or import "ist-query/compat", which holds it.');
     }
   }
   if (given instanceof WebAssembly.Module) return WebAssembly.instantiate(given, imports);
   if (typeof Response !== 'undefined' && given instanceof Response) {
-    if (!given.ok) throw new IstError(`ist: ${given.url} cannot be fetched: ${given.status} ${given.statusText}`);
+    if (!given.ok)
+      throw new IstError(
+          `ist: ${given.url} cannot be fetched: ${given.status} ${given.statusText}`);
     const address = given.url;
     given = await given.arrayBuffer();
     // A page of a server that answers everything.
     const magic = new Uint8Array(given, 0, Math.min(4, given.byteLength));
     if (String.fromCharCode(...magic) !== '\0asm')
-      throw new IstError(`ist: what lies at ${address} is no WebAssembly. If a bundler moved it, name ` +
+      throw new IstError(
+          `ist: what lies at ${address} is no WebAssembly. If a bundler moved it, name ` +
           'its place, init({wasm: url}), or import "ist-query/compat", which holds it.');
   }
   const {instance} = await WebAssembly.instantiate(given, imports);
@@ -63,7 +73,8 @@ async function start(source) {
     instance = await instantiated(source);
   } catch (error) {
     if (error instanceof WebAssembly.CompileError)
-      throw new IstError(`ist: this WebAssembly cannot be compiled (${error.message}). It needs SIMD: ` +
+      throw new IstError(
+          `ist: this WebAssembly cannot be compiled (${error.message}). It needs SIMD: ` +
           'Chrome 91, Firefox 89, Safari 16.4, Node 16.4 or later.');
     throw error;
   }
@@ -90,15 +101,25 @@ export function load(source) {
 /** The module's functions, for what `who` is about to do. */
 export function functions(who) {
   if (wasm === null)
-    throw new IstError(`ist: ${who} was called before the WebAssembly is there: ` +
+    throw new IstError(
+        `ist: ${who} was called before the WebAssembly is there: ` +
         (loading === null ? 'call and await init() first' : 'init() was called, but not awaited'));
   return wasm;
 }
 
 // Views of the memory, as it is now.
-export function f64() { refresh(); return doubles; }
-export function u32() { refresh(); return words; }
-export function u8() { refresh(); return bytes; }
+export function f64() {
+  refresh();
+  return doubles;
+}
+export function u32() {
+  refresh();
+  return words;
+}
+export function u8() {
+  refresh();
+  return bytes;
+}
 
 /** `size` bytes on a 64-byte boundary. */
 export function take(size) {
@@ -106,7 +127,9 @@ export function take(size) {
   if (place === 0) throw new IstError(`ist: there is no memory for ${size} bytes more`);
   return place;
 }
-export function give(place) { wasm.give(place); }
+export function give(place) {
+  wasm.give(place);
+}
 
 /** Room for `size` bytes while `use(place)` runs. */
 export function withRoom(size, use) {

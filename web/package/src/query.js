@@ -9,10 +9,14 @@ const newVector = () => new Float64Array(3);
 
 function solid(given, which, query) {
   if (given instanceof Asset || (which === 'A' && given instanceof Field)) return given._at;
-  throw new IstError(`ist: ${query}: solid ${which} must be an ${which === 'A' ? 'Asset or a Field' : 'Asset'}`);
+  throw new IstError(
+      `ist: ${query}: solid ${which} must be an ${which === 'A' ? 'Asset or a Field' : 'Asset'}`);
 }
 
-/** Puts a question on the desk and asks it: `question` names an export. Returns the status, no error. */
+/**
+ * Puts a question on the desk and asks it: `question` names an export. Returns the status, no
+ * error.
+ */
 function ask(question, who, a, b, poseB, options, more) {
   const wasm = functions(who);
   const first = solid(a, 'A', who), second = solid(b, 'B', who);
@@ -28,9 +32,15 @@ function ask(question, who, a, b, poseB, options, more) {
 const statusOf = (status) => (status === 0 ? 'ok' : 'budget-exhausted');
 
 const newPenetration = () => ({
-  status: 'ok', volume: 0, volumeMin: 0, volumeMax: 0,
-  centroid: newVector(), force: newVector(), torque: newVector(),
-  nodeVisits: 0, spherePairs: 0,
+  status: 'ok',
+  volume: 0,
+  volumeMin: 0,
+  volumeMax: 0,
+  centroid: newVector(),
+  force: newVector(),
+  torque: newVector(),
+  nodeVisits: 0,
+  spherePairs: 0,
 });
 
 function readPenetration(status, out) {
@@ -54,9 +64,15 @@ export function penetration(a, b, poseB, options) {
 }
 
 const newSeparation = () => ({
-  status: 'ok', distance: 0, distanceMin: 0, distanceMax: 0,
-  pointA: newVector(), pointB: newVector(), normal: newVector(),
-  nodeVisits: 0, spherePairs: 0,
+  status: 'ok',
+  distance: 0,
+  distanceMin: 0,
+  distanceMax: 0,
+  pointA: newVector(),
+  pointB: newVector(),
+  normal: newVector(),
+  nodeVisits: 0,
+  spherePairs: 0,
 });
 
 export function separation(a, b, poseB, options) {
@@ -77,14 +93,21 @@ export function separation(a, b, poseB, options) {
 }
 
 const newPatch = () => ({
-  id: 0, centroid: newVector(), normal: newVector(), area: 0, depth: 0, volume: 0,
-  force: newVector(), torque: newVector(),
+  id: 0,
+  centroid: newVector(),
+  normal: newVector(),
+  area: 0,
+  depth: 0,
+  volume: 0,
+  force: newVector(),
+  torque: newVector(),
 });
 
 export function contactPatches(a, b, poseB, options) {
   const most = options?.maxPatches ?? 16;
   if (!(Number.isInteger(most) && most >= 1 && most <= kMostPatches))
-    throw new IstError(`ist: maxPatches is ${most}; it must be a whole number from 1 to ${kMostPatches}`);
+    throw new IstError(
+        `ist: maxPatches is ${most}; it must be a whole number from 1 to ${kMostPatches}`);
   const status = ask('contact_patches', 'contactPatches()', a, b, poseB, options, most);
   const out = options?.into ?? {whole: newPenetration(), count: 0, patches: []};
   readPenetration(status, out.whole);
@@ -116,7 +139,8 @@ let room = 0, roomFor = 0;
 
 export function lenses(a, b, poseB, options) {
   const wasm = functions('lenses()');
-  if (!(a instanceof Asset)) throw new IstError('ist: lenses(): solid A must be an Asset: a field has no spheres');
+  if (!(a instanceof Asset))
+    throw new IstError('ist: lenses(): solid A must be an Asset: a field has no spheres');
   const first = a._at, second = solid(b, 'B', 'lenses()');
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
@@ -128,14 +152,16 @@ export function lenses(a, b, poseB, options) {
     room = next;
     roomFor = most;
   }
-  const status = wasm.lenses(first, second, count(options?.detailA, 0, 'detailA'),
-                             count(options?.detailB, 0, 'detailB'), room, most);
+  const status = wasm.lenses(
+      first, second, count(options?.detailA, 0, 'detailA'), count(options?.detailB, 0, 'detailB'),
+      room, most);
   check(status, 'lenses()');
   const out = options?.into ?? {total: 0, count: 0, data: new Float64Array(0)};
   const integers = u32(), numbers = f64(), counts = (desk() + kCounts) / 4;
   out.total = integers[counts];
   out.count = integers[counts + 1];
-  if (out.data.length < 10 * out.count) out.data = new Float64Array(10 * (options?.into ? most : out.count));
+  if (out.data.length < 10 * out.count)
+    out.data = new Float64Array(10 * (options?.into ? most : out.count));
   for (let i = 0; i < out.count; ++i) {
     const from = room / 8 + 9 * i, to = 10 * i;
     for (let k = 0; k < 8; ++k) out.data[to + k] = numbers[from + k];

@@ -1,4 +1,7 @@
-/** One vertex for all that lie at the same place: the parts of a stored surface share theirs bit by bit. */
+/**
+ * One vertex for all that lie at the same place: the parts of a stored surface share theirs bit by
+ * bit.
+ */
 export function welded(vertices, corners) {
   const n = vertices.length / 3;
   let slots = 16;
@@ -10,7 +13,8 @@ export function welded(vertices, corners) {
   let kept = 0;
   for (let i = 0; i < n; ++i) {
     let hash = 0;
-    for (let k = 0; k < 6; ++k) hash = Math.imul(hash ^ bits[6 * i + k], 0x9e3779b1) ^ (hash >>> 15);
+    for (let k = 0; k < 6; ++k)
+      hash = Math.imul(hash ^ bits[6 * i + k], 0x9e3779b1) ^ (hash >>> 15);
     let slot = (hash ^ (hash >>> 16)) & (slots - 1);
     const x = vertices[3 * i], y = vertices[3 * i + 1], z = vertices[3 * i + 2];
     for (;; slot = (slot + 1) & (slots - 1)) {
@@ -27,5 +31,8 @@ export function welded(vertices, corners) {
       }
     }
   }
-  return {positions: positions.slice(0, 3 * kept), triangles: Uint32Array.from(corners, (v) => now[v])};
+  return {
+    positions: positions.slice(0, 3 * kept),
+    triangles: Uint32Array.from(corners, (v) => now[v])
+  };
 }

@@ -1,7 +1,6 @@
+import * as ist from 'ist-query';
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
-
-import * as ist from 'ist-query';
 
 import {firstDifference, nativeAnswers, pairs, read} from './data.js';
 import {rowsText} from './rows.js';

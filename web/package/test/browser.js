@@ -1,14 +1,18 @@
 // A folder served to a real browser.
 
-import {createServer} from 'node:http';
 import {readFile} from 'node:fs/promises';
+import {createServer} from 'node:http';
 import {extname, join, normalize} from 'node:path';
-
 import {chromium} from 'playwright-core';
 
 const kTypes = {
-  '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.json': 'application/json',
-  '.wasm': 'application/wasm', '.svg': 'image/svg+xml', '.png': 'image/png',
+  '.html': 'text/html',
+  '.js': 'text/javascript',
+  '.css': 'text/css',
+  '.json': 'application/json',
+  '.wasm': 'application/wasm',
+  '.svg': 'image/svg+xml',
+  '.png': 'image/png',
 };
 
 /**
@@ -23,8 +27,10 @@ export async function serve(folders, port = 0) {
     const prefix = prefixes.find((p) => path.startsWith(p));
     try {
       if (prefix === undefined) throw new Error();
-      const body = await readFile(join(folders[prefix], normalize('/' + path.slice(prefix.length))));
-      response.writeHead(200, {'content-type': kTypes[extname(path)] ?? 'application/octet-stream'}).end(body);
+      const body =
+          await readFile(join(folders[prefix], normalize('/' + path.slice(prefix.length))));
+      response.writeHead(200, {'content-type': kTypes[extname(path)] ?? 'application/octet-stream'})
+          .end(body);
     } catch {
       response.writeHead(404).end();
     }
@@ -44,7 +50,9 @@ export function browser() {
 /** A page at an address; what it complains about goes to `complaints`. */
 export async function open(chrome, url, complaints = []) {
   const page = await chrome.newPage();
-  page.on('console', (message) => { if (message.type() === 'error') complaints.push(message.text()); });
+  page.on('console', (message) => {
+    if (message.type() === 'error') complaints.push(message.text());
+  });
   page.on('pageerror', (error) => complaints.push(String(error)));
   await page.goto(url);
   return page;

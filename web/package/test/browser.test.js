@@ -42,7 +42,13 @@ test('a page that does not await init(), and one whose WebAssembly is not there'
   const told = await page.evaluate(async () => {
     const ist = await import('/src/index.js');
     const said = [];
-    const note = (call) => { try { call(); } catch (error) { said.push(String(error)); } };
+    const note = (call) => {
+      try {
+        call();
+      } catch (error) {
+        said.push(String(error));
+      }
+    };
     note(() => ist.Asset.from(new ArrayBuffer(0)));
     await ist.init({wasm: '/nowhere.wasm'}).catch((error) => said.push(String(error)));
     await ist.init({wasm: '/test/empty.html'}).catch((error) => said.push(String(error)));
@@ -62,13 +68,15 @@ test('a page that does not await init(), and one whose WebAssembly is not there'
 
 test('in a worker', async () => {
   const page = await open(chrome, `${server.url}/test/empty.html`);
-  const told = await page.evaluate(() => new Promise((done) => {
-    const text = `import * as ist from '${location.origin}/src/index.js';
+  const told = await page.evaluate(
+      () => new Promise((done) => {
+        const text = `import * as ist from '${location.origin}/src/index.js';
       await ist.init(); postMessage(ist.version());`;
-    const worker = new Worker(URL.createObjectURL(new Blob([text], {type: 'text/javascript'})), {type: 'module'});
-    worker.onmessage = (event) => done(event.data);
-    worker.onerror = (event) => done(event.message);
-  }));
+        const worker = new Worker(
+            URL.createObjectURL(new Blob([text], {type: 'text/javascript'})), {type: 'module'});
+        worker.onmessage = (event) => done(event.data);
+        worker.onerror = (event) => done(event.message);
+      }));
   assert.match(told, /^\d+\.\d+\.\d+$/);
   await page.close();
 });

@@ -1,10 +1,10 @@
-// A user's app, by Vite's server while one works on it and by its bundle; the types, by the compiler.
+// A user's app, by Vite's server while one works on it and by its bundle; the types, by the
+// compiler.
 import assert from 'node:assert/strict';
 import {execFileSync} from 'node:child_process';
 import {copyFileSync, cpSync, mkdirSync, readdirSync, rmSync} from 'node:fs';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
-
 import {build, createServer} from 'vite';
 
 import {browser, open, serve} from './browser.js';
@@ -19,7 +19,10 @@ before(async () => {
   cpSync(join(packageFolder, 'test/app'), app, {recursive: true});
   mkdirSync(join(app, 'public'), {recursive: true});
   copyFileSync(pairs()[0].a, join(app, 'public/asset.ist'));
-  const packed = execFileSync('npm', ['pack', '--silent', '--pack-destination', app], {cwd: packageFolder, encoding: 'utf8'}).trim();
+  const packed = execFileSync('npm', ['pack', '--silent', '--pack-destination', app], {
+                   cwd: packageFolder,
+                   encoding: 'utf8'
+                 }).trim();
   const installed = join(app, 'node_modules/ist-query');
   mkdirSync(installed, {recursive: true});
   execFileSync('tar', ['xf', join(app, packed), '-C', installed, '--strip-components=1']);
@@ -40,20 +43,24 @@ async function volumes(url) {
 
 test('what npm would publish', () => {
   const files = readdirSync(join(app, 'node_modules/ist-query'), {recursive: true}).map(String);
-  for (const file of ['package.json', 'index.d.ts', 'README.md', 'dist/ist.wasm', 'dist/inlined.js', 'src/index.js'])
+  for (const file
+           of ['package.json', 'index.d.ts', 'README.md', 'dist/ist.wasm', 'dist/inlined.js',
+               'src/index.js'])
     assert.ok(files.includes(file), file);
   assert.ok(!files.some((file) => /test|\.c$|\.h$|CMake/.test(file)), files.join());
 });
 
 test('Vite: a bundle', async () => {
-  await build({root: app, base: './', logLevel: 'error', build: {outDir: 'dist', target: 'es2022'}});
+  await build(
+      {root: app, base: './', logLevel: 'error', build: {outDir: 'dist', target: 'es2022'}});
   const server = await serve({'/below/': join(app, 'dist')});
   await volumes(`${server.url}/below/`);
   server.close();
 });
 
 test('Vite: its server', async () => {
-  const server = await createServer({root: app, logLevel: 'error', server: {port: 0, host: '127.0.0.1'}});
+  const server =
+      await createServer({root: app, logLevel: 'error', server: {port: 0, host: '127.0.0.1'}});
   await server.listen();
   await volumes(`http://127.0.0.1:${server.httpServer.address().port}/`);
   await server.close();
@@ -62,12 +69,18 @@ test('Vite: its server', async () => {
 test('Node, by name', () => {
   const script = `for (const name of ['ist-query', 'ist-query/compat']) {
     const ist = await import(name); await ist.init(); console.log(ist.version()); }`;
-  const told = execFileSync(process.execPath, ['--input-type=module', '-e', script], {cwd: app, encoding: 'utf8'});
+  const told = execFileSync(
+      process.execPath, ['--input-type=module', '-e', script], {cwd: app, encoding: 'utf8'});
   assert.match(told, /^(\d+\.\d+\.\d+)\n\1\n$/);
 });
 
 test('the types', () => {
-  execFileSync(process.execPath, [join(root, 'web/node_modules/typescript/bin/tsc'), '--noEmit', '--strict', '--target', 'es2022',
-    '--module', 'esnext', '--moduleResolution', 'bundler', '--lib', 'es2022,dom', 'types.ts'],
-               {cwd: app, stdio: ['ignore', 'inherit', 'inherit']});
+  execFileSync(
+      process.execPath,
+      [
+        join(root, 'web/node_modules/typescript/bin/tsc'), '--noEmit', '--strict', '--target',
+        'es2022', '--module', 'esnext', '--moduleResolution', 'bundler', '--lib', 'es2022,dom',
+        'types.ts'
+      ],
+      {cwd: app, stdio: ['ignore', 'inherit', 'inherit']});
 });

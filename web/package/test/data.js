@@ -20,7 +20,9 @@ function baked(name, spheres, mesh) {
     mesh = join(folder, `${name}.obj`);
     execFileSync(program, ['sample', name, '-o', mesh], {stdio: 'ignore'});
   }
-  execFileSync(program, ['bake', mesh, '-o', path, '--spheres', spheres, '--device', 'cpu'], {stdio: 'ignore'});
+  execFileSync(
+      program, ['bake', mesh, '-o', path, '--spheres', spheres, '--device', 'cpu'],
+      {stdio: 'ignore'});
   return path;
 }
 
@@ -30,9 +32,15 @@ function nutPoses() {
   const lines = ['id,class,meshA,meshB,qw,qx,qy,qz,tx,ty,tz,scale_b'];
   for (let i = 0; i < 60; ++i) {
     const turn = 0.05 * i, tilt = 0.02 * (i % 5);
-    const q = [Math.cos(turn) * Math.cos(tilt), Math.cos(turn) * Math.sin(tilt), 0.01 * (i % 3), Math.sin(turn)];
+    const q = [
+      Math.cos(turn) * Math.cos(tilt), Math.cos(turn) * Math.sin(tilt), 0.01 * (i % 3),
+      Math.sin(turn)
+    ];
     const size = Math.hypot(...q);
-    lines.push([i, 'nut', 'bolt', 'nut', ...q.map((x) => x / size), 0.3 * (i % 7), 0.1 * (i % 4), 6 + 0.15 * i, 1].join());
+    lines.push([
+      i, 'nut', 'bolt', 'nut', ...q.map((x) => x / size), 0.3 * (i % 7), 0.1 * (i % 4),
+      6 + 0.15 * i, 1
+    ].join());
   }
   writeFileSync(path, lines.join('\n') + '\n');
   return path;
@@ -40,13 +48,23 @@ function nutPoses() {
 
 /** Pairs of assets and their tables; those of the shared data where there are any. */
 export function pairs(spheres = 4000) {
-  const made = [{name: 'bolt and nut', a: baked('bolt', spheres), b: baked('nut', spheres), csv: nutPoses()}];
+  const made = [
+    {name: 'bolt and nut', a: baked('bolt', spheres), b: baked('nut', spheres), csv: nutPoses()}
+  ];
   if (existsSync(join(shared, 'oracle'))) {
     const oracle = (name) => baked(name, spheres, join(shared, `oracle/meshes/${name}.off`));
-    made.push({name: 'elephant and dino', a: oracle('elephant'), b: oracle('dino'),
-               csv: join(shared, 'oracle/poses/poses_eledino.csv')});
-    made.push({name: 'table and small dino', a: oracle('table'), b: oracle('dino'),
-               csv: join(shared, 'oracle/small/small_table_dino.csv')});
+    made.push({
+      name: 'elephant and dino',
+      a: oracle('elephant'),
+      b: oracle('dino'),
+      csv: join(shared, 'oracle/poses/poses_eledino.csv')
+    });
+    made.push({
+      name: 'table and small dino',
+      a: oracle('table'),
+      b: oracle('dino'),
+      csv: join(shared, 'oracle/small/small_table_dino.csv')
+    });
   } else if (process.env.IST_REQUIRE_SHARED === '1') {
     throw new Error(`no oracle in ${shared}, and IST_REQUIRE_SHARED=1 demands it`);
   }

@@ -1,9 +1,11 @@
-// Every query of a table of poses, as bits: what tests/c_api/native_rows.c prints. For Node and pages.
+// Every query of a table of poses, as bits: what tests/c_api/native_rows.c prints. For Node and
+// pages.
 
 const buffer = new DataView(new ArrayBuffer(8));
 function hex(number) {
   buffer.setFloat64(0, number);
-  return buffer.getUint32(0).toString(16).padStart(8, '0') + buffer.getUint32(4).toString(16).padStart(8, '0');
+  return buffer.getUint32(0).toString(16).padStart(8, '0') +
+      buffer.getUint32(4).toString(16).padStart(8, '0');
 }
 const hexes = (numbers) => Array.from(numbers, hex);
 const negated = (numbers) => Array.from(numbers, (x) => hex(-x));
@@ -16,12 +18,19 @@ export function parseRows(csv) {
   });
 }
 
-const kStatus = {'ok': 0, 'budget-exhausted': 1};
+const kStatus = {
+  'ok': 0,
+  'budget-exhausted': 1
+};
 
 function penetrationBits(p) {
   return [
-    kStatus[p.status], ...hexes([p.volume, p.volumeMin, p.volumeMax, ...p.centroid]),
-    ...negated(p.force), ...negated(p.torque), p.nodeVisits, p.spherePairs,
+    kStatus[p.status],
+    ...hexes([p.volume, p.volumeMin, p.volumeMax, ...p.centroid]),
+    ...negated(p.force),
+    ...negated(p.torque),
+    p.nodeVisits,
+    p.spherePairs,
   ];
 }
 
@@ -49,17 +58,29 @@ export function queries(ist, a, b) {
     'capsule': penetrationOf(capsule),
     'separation': {
       ask: (pose) => forSeparation.into = ist.separation(a, b, pose, forSeparation),
-      bits: (s) => [
-        kStatus[s.status], ...hexes([s.distance, s.distanceMin, s.distanceMax]), ...hexes(s.pointA),
-        ...hexes(s.pointB), ...hexes(s.normal), s.nodeVisits, s.spherePairs,
-      ],
+      bits: (s) =>
+          [kStatus[s.status],
+           ...hexes([s.distance, s.distanceMin, s.distanceMax]),
+           ...hexes(s.pointA),
+           ...hexes(s.pointB),
+           ...hexes(s.normal),
+           s.nodeVisits,
+           s.spherePairs,
+  ],
     },
     'patches': {
       ask: (pose) => forPatches.into = ist.contactPatches(a, b, pose, forPatches),
-      bits: (found) => penetrationBits(found.whole).concat(...found.patches.slice(0, found.count).map((p) => [
-        p.id, ...hexes(p.centroid), ...hexes(p.normal), ...hexes([p.area, p.depth, p.volume]),
-        ...hexes(p.force), ...hexes(p.torque),
-      ])),
+      bits: (found) => penetrationBits(found.whole)
+                           .concat(...found.patches.slice(0, found.count)
+                                       .map(
+                                           (p) =>
+                                               [p.id,
+                                                ...hexes(p.centroid),
+                                                ...hexes(p.normal),
+                                                ...hexes([p.area, p.depth, p.volume]),
+                                                ...hexes(p.force),
+                                                ...hexes(p.torque),
+  ])),
     },
     'overlap': {
       ask: (pose) => ist.overlap(a, b, pose),
@@ -70,7 +91,8 @@ export function queries(ist, a, b) {
       bits: ({total, count, data}) => {
         const bits = [total];
         for (let i = 0; i < count; ++i)
-          bits.push(...hexes(data.subarray(10 * i, 10 * i + 8)), data[10 * i + 8], data[10 * i + 9]);
+          bits.push(
+              ...hexes(data.subarray(10 * i, 10 * i + 8)), data[10 * i + 8], data[10 * i + 9]);
         return bits;
       },
     },
@@ -81,8 +103,9 @@ export function queries(ist, a, b) {
 export function rowsText(ist, bytesA, bytesB, csv) {
   const a = ist.Asset.from(bytesA, 'A'), b = ist.Asset.from(bytesB, 'B');
   const asked = Object.entries(queries(ist, a, b));
-  const lines = parseRows(csv).flatMap((pose, i) => asked.map(
-      ([name, {ask, bits}]) => `${i} ${name}: ${bits(ask(pose)).join(' ')}\n`));
+  const lines = parseRows(csv).flatMap(
+      (pose, i) =>
+          asked.map(([name, {ask, bits}]) => `${i} ${name}: ${bits(ask(pose)).join(' ')}\n`));
   a.free();
   b.free();
   return lines.join('');

@@ -1,6 +1,6 @@
 // What a user's app is: both builds of the package, by name.
-import * as compat from 'ist-query/compat';
 import * as plain from 'ist-query';
+import * as compat from 'ist-query/compat';
 
 async function volume(ist) {
   await ist.init();
@@ -9,4 +9,10 @@ async function volume(ist) {
 }
 
 const tell = async () => [await volume(plain), await volume(compat)];
-tell().then((told) => { window.told = told; }, (error) => { window.told = String(error); });
+tell().then(
+    (told) => {
+      window.told = told;
+    },
+    (error) => {
+      window.told = String(error);
+    });
