@@ -29,6 +29,7 @@ function baked(name, spheres, mesh) {
 /** The nut on the bolt: along and off the thread, turned and tilted. */
 function nutPoses() {
   const path = join(buildFolder, 'assets/bolt_nut.csv');
+  if (existsSync(path)) return path;
   const lines = ['id,class,meshA,meshB,qw,qx,qy,qz,tx,ty,tz,scale_b'];
   for (let i = 0; i < 60; ++i) {
     const turn = 0.05 * i, tilt = 0.02 * (i % 5);
@@ -46,12 +47,15 @@ function nutPoses() {
   return path;
 }
 
+/** Whether the oracle's tables are here. */
+export const hasOracle = existsSync(join(shared, 'oracle'));
+
 /** Pairs of assets and their tables; those of the shared data where there are any. */
 export function pairs(spheres = 4000) {
   const made = [
     {name: 'bolt and nut', a: baked('bolt', spheres), b: baked('nut', spheres), csv: nutPoses()}
   ];
-  if (existsSync(join(shared, 'oracle'))) {
+  if (hasOracle) {
     const oracle = (name) => baked(name, spheres, join(shared, `oracle/meshes/${name}.off`));
     made.push({
       name: 'elephant and dino',
