@@ -37,7 +37,7 @@ struct OverlapLenses {
 /// The lenses of two placed trees, in the order of the trees, as many as there is room for: what
 /// penetration() sums where it sums lenses.
 ///
-/// For pictures: pair by pair, and some times slower than penetration().
+/// For pictures: pair by pair, some ten times slower than penetration().
 /// No allocation, lock or exception. Trees may be shared by threads.
 OverlapLenses overlap_lenses(const PlacedTree& a, const PlacedTree& b, const LensSettings& settings,
                              std::span<OverlapLens> lenses) noexcept;
