@@ -106,6 +106,7 @@ typedef struct ist_tree_info {
   double protrusion;  /* [u] no matched sphere sticks further out of the solid */
   double field_error; /* [u] the stored surface and the solid's lie within this of each other */
   uint32_t field_triangles; /* of that surface */
+  uint32_t details;         /* levels of detail of the matched spheres, ≥ 1: 0 is the finest */
 } ist_tree_info_t;
 
 ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info);
@@ -168,6 +169,45 @@ typedef struct ist_bounds {
 ist_status_t ist_tree_get_mass_properties(const ist_tree_t* tree,
                                           ist_mass_properties_t* properties);
 ist_status_t ist_tree_get_bounds(const ist_tree_t* tree, ist_bounds_t* bounds);
+
+/* --- What a tree holds, for pictures (asset_layout.h) ------------------------------------------
+ */
+
+typedef int32_t ist_measure_t;
+enum { IST_MATCHED = 0, IST_INNER = 1 };
+
+typedef struct ist_ball {
+  double centre[3]; /* [u] in the asset's own frame */
+  double radius;    /* [u] */
+} ist_ball_t;
+
+/* Which balls. */
+typedef struct ist_ball_set {
+  uint32_t size;
+  ist_measure_t measure;
+  uint32_t detail; /* of matched spheres: < ist_tree_info_t::details; of inner ones 0 */
+  /* 0: the spheres, in insertion order. 1: balls around sixteen spheres each. Above, balls around
+   * the spheres of sixteen balls of the level below each, up to the level of sixteen or fewer. */
+  uint32_t level;
+} ist_ball_set_t;
+
+/* `count`: balls in the set, of which the first `capacity` are written; `balls` may be null if that
+ * is 0. IST_INVALID_INPUT, and a count of 0, where there is no such detail or level. */
+ist_status_t ist_tree_get_balls(const ist_tree_t* tree, const ist_ball_set_t* set,
+                                ist_ball_t* balls, size_t capacity, size_t* count);
+
+/* The surface that an asset holds: closed, oriented, triangles counter-clockwise from outside.
+ * A vertex that parts of it share stands in each with the same bits. */
+typedef struct ist_surface {
+  uint32_t size;
+  double (*vertices)[3];    /* [u] [vertex_capacity] in the asset's own frame */
+  uint32_t (*triangles)[3]; /* [triangle_capacity] three vertices each */
+  size_t vertex_capacity, triangle_capacity;
+  size_t vertex_count, triangle_count; /* answer: those there are; 0 without a surface */
+} ist_surface_t;
+
+/* Writes as many as there is room for. An array may be null if its capacity is 0. */
+ist_status_t ist_tree_get_surface(const ist_tree_t* tree, ist_surface_t* surface);
 
 /* --- Places ----------------------------------------------------------------------------------- */
 
@@ -289,9 +329,6 @@ ist_status_t ist_workspace_make(size_t capacity, const ist_allocator_t* allocato
 ist_status_t ist_workspace_release(ist_workspace_t* workspace);
 
 /* --- Settings: a null pointer means the defaults, all 0 but for `size` ------------------------ */
-
-typedef int32_t ist_measure_t;
-enum { IST_MATCHED = 0, IST_INNER = 1 };
 
 typedef int32_t ist_field_use_t;
 enum { IST_FIELD_AUTOMATIC = 0, IST_FIELD_NEVER = 1, IST_FIELD_ALWAYS = 2 };
@@ -431,6 +468,36 @@ ist_status_t ist_contact_patches(const ist_placed_tree_t* a, const ist_placed_tr
 ist_status_t ist_patches_without_protrusion(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
                                             const ist_contact_settings_t* settings,
                                             ist_contact_patches_t* patches);
+
+/* LensSettings; a null pointer means the finest matched spheres. */
+typedef struct ist_lens_settings {
+  uint32_t size;
+  ist_measure_t measure;
+  uint32_t detail_a, detail_b;
+} ist_lens_settings_t;
+
+/* OverlapLens: what two spheres share. */
+typedef struct ist_lens {
+  double centre[3];            /* [u] the middle of its thickness, world */
+  double axis[3];              /* unit, from A's sphere to B's, world */
+  double radius;               /* [u] where it is widest, across the axis */
+  double thickness;            /* [u] along the axis */
+  uint32_t sphere_a, sphere_b; /* in insertion order */
+} ist_lens_t;
+
+/* Room for lenses. */
+typedef struct ist_lenses {
+  uint32_t size;
+  uint32_t lens_size; /* sizeof(ist_lens_t) */
+  ist_lens_t* lenses; /* [capacity] */
+  size_t capacity;
+  size_t total, count; /* answer: lenses there are, and lenses written */
+} ist_lenses_t;
+
+/* For pictures (lenses.h). Needs no workspace. IST_INVALID_INPUT also for a level of detail that a
+ * tree does not have. */
+ist_status_t ist_overlap_lenses(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                const ist_lens_settings_t* settings, ist_lenses_t* lenses);
 
 /* --- The same of a field, held still, and a tree ---------------------------------------------- */
 

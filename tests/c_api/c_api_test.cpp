@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
+#include <ist/asset_layout.h>
 #include <ist/bake.h>
 #include <ist/field.h>
 #include <ist/ist.h>
+#include <ist/lenses.h>
 #include <ist/mass_properties.h>
 #include <ist/overlap.h>
 #include <ist/query.h>
@@ -9,6 +11,7 @@
 #include <ist/wrench.h>
 
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <span>
 #include <vector>
@@ -213,6 +216,87 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
     ++answered;
   }
   EXPECT_GT(answered, 20);
+}
+
+/// The spheres that the asset's layout has, at every level of detail.
+TEST(CApi, Balls) {
+  const Asset asset = bake(close_mesh(testing::cube_mesh(), "cube"), {.max_spheres = 2000});
+  const AssetHeader& header = asset.view().header();
+  const ist_tree_t tree = viewed(asset);
+  const double unit = std::ldexp(1.0, header.exponent);
+  const auto expect_spheres = [&](ist_measure_t measure, std::uint32_t detail,
+                                  const Sphere* spheres, std::size_t wanted) {
+    std::vector<ist_ball_t> balls(wanted);
+    const ist_ball_set_t set = {sizeof set, measure, detail, 0};
+    std::size_t count = 0;
+    ASSERT_EQ(ist_tree_get_balls(&tree, &set, balls.data(), wanted, &count), IST_OK);
+    ASSERT_EQ(count, wanted);
+    for (std::size_t i = 0; i < count; ++i) {
+      EXPECT_SAME(balls[i].centre[2], spheres[i].z * unit + header.centre[2]);
+      EXPECT_SAME(balls[i].radius, spheres[i].r * unit);
+    }
+  };
+  ASSERT_GT(header.detail_count, 0u);
+  expect_spheres(IST_INNER, 0, at<Sphere>(header, header.inner_spheres), header.sphere_count);
+  for (std::uint32_t detail = 0; detail <= header.detail_count; ++detail)
+    expect_spheres(IST_MATCHED, detail, matched_spheres(header, detail),
+                   detail_spheres(header.sphere_count, detail));
+}
+
+/// Lenses are those that a penetration sums, and lie where their two spheres do.
+TEST_F(OracleRows, LensesSumToTheVolume) {
+  int held = 0;
+  for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
+    if (row.id % 16 != 0) continue;
+    const auto [a, b] = testing::placed(row, 1000);
+    for (const Measure measure : {Measure::matched, Measure::inner}) {
+      const Penetration whole =
+          penetration(a, b, {.measure = measure, .field = FieldUse::never}, workspace_);
+      std::vector<OverlapLens> lenses(1 << 16);
+      const LensSettings settings{.measure = measure};
+      const OverlapLenses found = overlap_lenses(a, b, settings, lenses);
+      ASSERT_EQ(found.status, QueryStatus::ok);
+      ASSERT_EQ(found.count, found.total);
+      const auto sphere = [&](const PlacedTree& placed, std::uint32_t i) {
+        const AssetHeader& header = placed.tree.header();
+        const Sphere& s = (measure == Measure::inner ? at<Sphere>(header, header.inner_spheres)
+                                                     : matched_spheres(header, 0))[i];
+        const double unit = std::ldexp(1.0, header.exponent) * placed.scale;
+        const Eigen::Vector3d centre =
+            Eigen::Vector3d(s.x, s.y, s.z) * unit +
+            Eigen::Vector3d(header.centre[0], header.centre[1], header.centre[2]) * placed.scale;
+        const double* q = placed.pose.q;
+        return std::pair<Eigen::Vector3d, double>(
+            Eigen::Quaterniond(q[0], q[1], q[2], q[3]) * centre +
+                Eigen::Vector3d(placed.pose.t[0], placed.pose.t[1], placed.pose.t[2]),
+            s.r * unit);
+      };
+      double sum = 0;
+      for (const OverlapLens& l : std::span(lenses).first(found.count)) {
+        const auto [x, r] = sphere(a, l.sphere_a);
+        const auto [y, s] = sphere(b, l.sphere_b);
+        const double d = (y - x).norm();
+        const double caps = r + s - d;
+        sum +=
+            d <= std::abs(r - s)
+                ? 4 * M_PI / 3 * std::pow(std::min(r, s), 3)
+                : M_PI * caps * caps * (d * d + 2 * d * (r + s) - 3 * (r - s) * (r - s)) / (12 * d);
+        // The ends of its thickness lie in both spheres, on the surface of one.
+        for (const double side : {-0.5, 0.5}) {
+          const Eigen::Vector3d end = l.centre + side * l.thickness * l.axis;
+          EXPECT_NEAR(std::max((end - x).norm() - r, (end - y).norm() - s), 0, 1e-12);
+        }
+        // The rim by Heron's formula, the smaller sphere where its centre is past the rim.
+        const double p = (r + s + d) / 2;
+        const double rim = 2 * std::sqrt(std::max(0.0, p * (p - r) * (p - s) * (p - d))) / d;
+        EXPECT_NEAR(l.radius, d * d > std::abs(r * r - s * s) ? rim : std::min(r, s), 1e-9);
+      }
+      EXPECT_GE(sum, whole.volume_min * (1 - 1e-9));
+      EXPECT_LE(sum, whole.volume_max * (1 + 1e-9) + 1e-18);
+      held += sum > 0;
+    }
+  }
+  EXPECT_GT(held, 10);
 }
 
 /// A floor on which a cube's spheres stand: flat faces that hardly touch lose most, from C too.

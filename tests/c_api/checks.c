@@ -195,5 +195,6 @@ int c_api_checks(const char* path_a, const char* path_b) {
          overlaps_answer(&scene) != 0 || patches_answer(&scene) != 0 ||
          fields_answer(&scene) != 0 || bodies_are_told(&scene) != 0 ||
          impacts_are_found(&scene) != 0 || batches_answer(&scene) != 0 ||
-         released_handles_are_known(&scene) != 0;
+         balls_are_told(&scene) != 0 || surfaces_are_told(&scene) != 0 ||
+         lenses_are_told(&scene) != 0 || released_handles_are_known(&scene) != 0;
 }

@@ -42,5 +42,8 @@ int fields_answer(scene_t* s);
 int bodies_are_told(scene_t* s);
 int impacts_are_found(scene_t* s);
 int batches_answer(scene_t* s);
+int balls_are_told(scene_t* s);
+int surfaces_are_told(scene_t* s);
+int lenses_are_told(scene_t* s);
 
 #endif

@@ -99,8 +99,8 @@ ist_status_t find_rate(const Contact* contact, const ist_pose_t* b, const ist_tw
   const ist_status_t status = check(contact);
   if (status != IST_OK) return status;
   if (b == nullptr) return IST_NULL_POINTER;
-  *rate = volume_rate(with_wrench(wrench_on_b(*contact)), std::bit_cast<Pose>(*b), twist(motion_a),
-                      twist(motion_b));
+  *rate =
+      volume_rate(with_wrench(wrench_on_b(*contact)), pose(*b), twist(motion_a), twist(motion_b));
   return IST_OK;
 }
 

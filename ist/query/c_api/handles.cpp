@@ -129,6 +129,7 @@ ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info) {
   info->protrusion = view.protrusion();
   info->field_error = view.field_error();
   info->field_triangles = view.field_triangles();
+  info->details = view.header().detail_count + 1;
   return IST_OK;
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <new>
@@ -35,7 +34,9 @@ struct TreeHandle {
     return *reinterpret_cast<const TreeHandle*>(&tree);
   }
   std::uint64_t expected_mark() const noexcept {
-    return kMark ^ std::bit_cast<std::uintptr_t>(view);
+    std::uintptr_t address;
+    std::memcpy(&address, &view, sizeof address);
+    return kMark ^ address;
   }
   bool made() const noexcept { return mark == expected_mark(); }
 };

@@ -42,8 +42,7 @@ ist_status_t ist_motion_between(const ist_pose_t* from, const ist_pose_t* to, do
   const Eigen::Vector3d centre =
       about == nullptr ? Eigen::Vector3d::Zero() : Eigen::Vector3d(about);
   const ist::Motion found =
-      ist::motion_between(std::bit_cast<ist::Pose>(*from), std::bit_cast<ist::Pose>(*to), duration,
-                          centre, scale == 0 ? 1 : scale);
+      ist::motion_between(pose(*from), pose(*to), duration, centre, scale == 0 ? 1 : scale);
   if (!is_finite(found)) return IST_INVALID_INPUT;
   write(found.velocity, motion->velocity);
   write(found.angular_velocity, motion->angular_velocity);
@@ -52,16 +51,16 @@ ist_status_t ist_motion_between(const ist_pose_t* from, const ist_pose_t* to, do
 }
 
 ist_status_t ist_moved(const ist_pose_t* start, double scale, const ist_motion_t* motion,
-                       double time, ist_pose_t* pose) {
-  if (pose == nullptr) return IST_NULL_POINTER;
+                       double time, ist_pose_t* end) {
+  if (end == nullptr) return IST_NULL_POINTER;
   ist::PlacedTree object;
-  if (start != nullptr) object.pose = std::bit_cast<ist::Pose>(*start);
-  *pose = {};  // which may be `start`
+  if (start != nullptr) object.pose = pose(*start);
+  *end = {};  // which may be `start`
   if (start == nullptr || motion == nullptr) return IST_NULL_POINTER;
   object.scale = scale == 0 ? 1 : scale;
   object = ist::moved(object, read(motion), time);
   if (!ist::usable_rotation(object.pose, object.scale)) return IST_INVALID_INPUT;
-  *pose = std::bit_cast<ist_pose_t>(object.pose);
+  write(object.pose, *end);
   return IST_OK;
 }
 

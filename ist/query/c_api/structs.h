@@ -1,6 +1,6 @@
 #pragma once
 
-#include <bit>
+#include <algorithm>
 #include <cstddef>
 #include <type_traits>
 
@@ -38,6 +38,15 @@ inline void write(const Eigen::Vector3d& v, double (&out)[3]) noexcept {
   for (int k = 0; k < 3; ++k) out[k] = v[k];
 }
 
+inline Pose pose(const ist_pose_t& given) noexcept {
+  const auto& [q, t] = given;
+  return {{q[0], q[1], q[2], q[3]}, {t[0], t[1], t[2]}};
+}
+inline void write(const Pose& found, ist_pose_t& out) noexcept {
+  std::copy_n(found.q, 4, out.q);
+  std::copy_n(found.t, 3, out.t);
+}
+
 inline ist_status_t status_of(QueryStatus status) noexcept {
   return status == QueryStatus::ok                 ? IST_OK
          : status == QueryStatus::budget_exhausted ? IST_BUDGET_EXHAUSTED
@@ -52,7 +61,7 @@ inline QueryStatus query_status(ist_status_t status) noexcept {
 /// The pose and scale of a placed tree or field.
 template <class Given, class Placed>
 void place(const Given& given, Placed& placed) noexcept {
-  placed.pose = std::bit_cast<Pose>(given.pose);
+  placed.pose = pose(given.pose);
   placed.scale = given.scale == 0 ? 1 : given.scale;
 }
 

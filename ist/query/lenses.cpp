@@ -1,0 +1,124 @@
+#include <ist/lenses.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <ist/asset_layout.h>
+#include "query/asset/sphere_tree.h"
+#include "query/base/relative_pose.h"
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+
+Vector3d vector(const double (&v)[3]) noexcept { return {v[0], v[1], v[2]}; }
+
+/// The tree that settings name; none if there is no such level of detail.
+std::optional<SphereTree> tree_of(const TreeView& view, Measure measure,
+                                  std::uint32_t detail) noexcept {
+  const AssetHeader& asset = view.header();
+  if (measure == Measure::inner) {
+    if (detail != 0) return std::nullopt;
+    return SphereTree(asset, asset.inner_tree);
+  }
+  if (detail > asset.detail_count) return std::nullopt;
+  return SphereTree(asset, matched_tree(asset, detail));
+}
+
+/// A node or a sphere of a tree, seen from A's unit frame.
+struct Place {
+  int level;
+  std::uint32_t index;
+  Vector3d centre;
+  double r;
+};
+
+/// Both trees gone down together, the larger node opened first. As deep as both are high.
+class LensSearch {
+ public:
+  LensSearch(const PlacedTree& a, const SphereTree& tree_a, const PlacedTree& b,
+             const SphereTree& tree_b, const RelativePose& pose, std::span<OverlapLens> room)
+      : tree_a_(tree_a),
+        tree_b_(tree_b),
+        index_a_(at<std::uint32_t>(a.tree.header(), tree_a.header->sphere_index)),
+        index_b_(at<std::uint32_t>(b.tree.header(), tree_b.header->sphere_index)),
+        pose_(pose),
+        room_(room) {}
+
+  OverlapLenses find() {
+    visit(place_a(tree_a_.top, 0), place_b(tree_b_.top, 0));
+    return result_;
+  }
+
+ private:
+  Place place_a(int level, std::uint32_t index) const {
+    const NodeBall ball = tree_a_.ball(level, index);
+    return {level, index, vector(ball.centre), ball.r};
+  }
+  Place place_b(int level, std::uint32_t index) const {
+    const NodeBall ball = tree_b_.ball(level, index);
+    double centre[3];
+    pose_.a_from_b.apply(ball.centre, centre);
+    return {level, index, vector(centre), ball.r * pose_.a_from_b.scale};
+  }
+
+  void visit(const Place& a, const Place& b) {
+    const double reach = a.r + b.r;
+    if (!(reach > 0 && (b.centre - a.centre).squaredNorm() < reach * reach)) return;
+    if (a.level == kSphereLevel && b.level == kSphereLevel) return note(a, b);
+    const bool open_a = a.level != kSphereLevel && (b.level == kSphereLevel || a.r >= b.r);
+    const Place& opened = open_a ? a : b;
+    const SphereTree& tree = open_a ? tree_a_ : tree_b_;
+    const std::uint32_t first = opened.index * kWidth;
+    const std::uint32_t end = std::min(first + kWidth, tree.count(opened.level - 1));
+    for (std::uint32_t i = first; i < end; ++i) {
+      if (open_a)
+        visit(place_a(a.level - 1, i), b);
+      else
+        visit(a, place_b(b.level - 1, i));
+    }
+  }
+
+  void note(const Place& a, const Place& b) {
+    ++result_.total;
+    if (result_.count == room_.size()) return;
+    const Vector3d way = b.centre - a.centre;
+    const double d = way.norm();
+    // Along the way from A's centre: where the lens begins and ends, and its rim.
+    const double begin = std::max(d - b.r, -a.r), end = std::min(a.r, d + b.r);
+    const double rim = d > 0 ? (d * d + (a.r - b.r) * (a.r + b.r)) / (2 * d) : 0;
+    OverlapLens& lens = room_[result_.count++];
+    // Past a centre the rim is not where the lens is widest: that is the smaller ball itself.
+    lens.radius = rim > 0 && rim < d ? std::sqrt(std::max(0.0, (a.r - rim) * (a.r + rim)))
+                                     : std::min(a.r, b.r);
+    lens.radius *= pose_.unit_a;
+    lens.thickness = (end - begin) * pose_.unit_a;
+    const Vector3d axis = d > 0 ? Vector3d(way / d) : Vector3d::UnitZ();
+    lens.axis = pose_.rotation_a * axis;
+    lens.centre = pose_.to_world(a.centre + 0.5 * (begin + end) * axis);
+    lens.sphere_a = index_a_[a.index];
+    lens.sphere_b = index_b_[b.index];
+  }
+
+  SphereTree tree_a_, tree_b_;
+  const std::uint32_t *index_a_, *index_b_;
+  const RelativePose& pose_;
+  std::span<OverlapLens> room_;
+  OverlapLenses result_;
+};
+
+}  // namespace
+
+OverlapLenses overlap_lenses(const PlacedTree& a, const PlacedTree& b, const LensSettings& settings,
+                             std::span<OverlapLens> lenses) noexcept {
+  const std::optional<RelativePose> pose = relative_pose(a, b);
+  if (!pose) return {QueryStatus::invalid_input, 0, 0};
+  const auto tree_a = tree_of(a.tree, settings.measure, settings.detail_a);
+  const auto tree_b = tree_of(b.tree, settings.measure, settings.detail_b);
+  if (!tree_a || !tree_b) return {QueryStatus::invalid_input, 0, 0};
+  return LensSearch(a, *tree_a, b, *tree_b, *pose, lenses).find();
+}
+
+}  // namespace ist

@@ -1,0 +1,232 @@
+/* Every query of a table of poses through the C functions, as bits: what another build of the
+ * library must answer too (web/package/test). And how long they take.
+ *
+ * native_rows A.ist B.ist poses.csv > answers        or        … --time PASSES > µs, as JSON */
+#include <ist/ist.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum { kMostRows = 1024, kMostPatches = 16 };
+
+typedef struct row {
+  ist_pose_t pose;
+  double scale;
+} row_t;
+
+static row_t rows[kMostRows];
+static int row_count;
+static ist_tree_t tree_a, tree_b;
+static ist_workspace_t workspace;
+
+static void stop(const char* what) {
+  fprintf(stderr, "native_rows: %s\n", what);
+  exit(1);
+}
+
+static int read_rows(const char* path) {
+  char line[1024];
+  FILE* const file = fopen(path, "r");
+  if (file == NULL || fgets(line, sizeof line, file) == NULL) return 0;
+  while (row_count < kMostRows && fgets(line, sizeof line, file) != NULL) {
+    row_t* const row = &rows[row_count++];
+    double* const q = row->pose.q;
+    double* const t = row->pose.t;
+    if (sscanf(line, "%*[^,],%*[^,],%*[^,],%*[^,],%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", q, q + 1, q + 2,
+               q + 3, t, t + 1, t + 2, &row->scale) != 8)
+      stop("a row that is none");
+  }
+  fclose(file);
+  return row_count;
+}
+
+static void print_doubles(const double* numbers, int count) {
+  int i;
+  for (i = 0; i < count; ++i) {
+    uint64_t bits;
+    memcpy(&bits, numbers + i, sizeof bits);
+    printf(" %016llx", (unsigned long long)bits);
+  }
+}
+
+static void print_penetration(const ist_penetration_t* p) {
+  printf(" %d", p->status);
+  print_doubles(&p->volume, 12);
+  printf(" %u %u", p->node_visits, p->sphere_pairs);
+}
+
+static ist_placed_tree_t placed_a(void) {
+  const ist_placed_tree_t a = {sizeof a, &tree_a, IST_POSE_IDENTITY, 1};
+  return a;
+}
+static ist_placed_tree_t placed_b(int i) {
+  const ist_placed_tree_t b = {sizeof b, &tree_b, rows[i].pose, rows[i].scale};
+  return b;
+}
+
+/* --- Queries, by name. Each answers row i and, if asked to, prints the answer -------------------
+ */
+
+static void ask_penetration(int i, int print, ist_measure_t measure, ist_field_use_t use,
+                            uint32_t pair_budget, uint32_t max_visits) {
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_penetration_settings_t settings = {.size = sizeof settings,
+                                               .measure = measure,
+                                               .field = use,
+                                               .pair_budget = pair_budget,
+                                               .max_visits = max_visits};
+  ist_penetration_t answer = {.size = sizeof answer};
+  ist_penetration(&a, &b, &settings, &workspace, &answer);
+  if (print) print_penetration(&answer);
+}
+
+static void matched(int i, int print) {
+  ask_penetration(i, print, IST_MATCHED, IST_FIELD_AUTOMATIC, 0, 0);
+}
+static void lenses_alone(int i, int print) {
+  ask_penetration(i, print, IST_MATCHED, IST_FIELD_NEVER, 0, 0);
+}
+static void surface_alone(int i, int print) {
+  ask_penetration(i, print, IST_MATCHED, IST_FIELD_ALWAYS, 0, 0);
+}
+static void inner(int i, int print) {
+  ask_penetration(i, print, IST_INNER, IST_FIELD_AUTOMATIC, 0, 0);
+}
+static void budget(int i, int print) {
+  ask_penetration(i, print, IST_MATCHED, IST_FIELD_AUTOMATIC, 200, 300);
+}
+
+static void ask_field(int i, int print, const ist_field_t* field) {
+  const ist_placed_field_t a = {sizeof a, field, IST_POSE_IDENTITY, 1};
+  const ist_placed_tree_t b = placed_b(i);
+  ist_penetration_t answer = {.size = sizeof answer};
+  ist_field_penetration(&a, &b, NULL, &workspace, &answer);
+  if (print) print_penetration(&answer);
+}
+
+static void half_space(int i, int print) {
+  const ist_field_t field = {
+      .size = sizeof field, .kind = IST_HALF_SPACE, .as.half_space = {{0, 0.6, 0.8}, 0.0625}};
+  ask_field(i, print, &field);
+}
+static void box(int i, int print) {
+  const ist_field_t field = {.size = sizeof field, .kind = IST_BOX, .as.box = {{0.25, 0.5, 0.125}}};
+  ask_field(i, print, &field);
+}
+static void capsule(int i, int print) {
+  const ist_field_t field = {
+      .size = sizeof field, .kind = IST_CAPSULE, .as.capsule = {0.25, 0.375}};
+  ask_field(i, print, &field);
+}
+
+static void separation(int i, int print) {
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  ist_separation_t answer = {.size = sizeof answer};
+  ist_separation(&a, &b, NULL, &workspace, &answer);
+  if (!print) return;
+  printf(" %d", answer.status);
+  print_doubles(&answer.distance, 12);
+  printf(" %u %u", answer.node_visits, answer.sphere_pairs);
+}
+
+static void patches(int i, int print) {
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  ist_contact_patch_t room[kMostPatches];
+  ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
+  ist_penetration_t whole = {.size = sizeof whole};
+  size_t k;
+  ist_contact_patches(&a, &b, NULL, &workspace, &found, &whole);
+  if (!print) return;
+  print_penetration(&whole);
+  for (k = 0; k < found.count; ++k) {
+    printf(" %llu", (unsigned long long)room[k].id);
+    print_doubles(room[k].centroid, 15);
+  }
+}
+
+static void overlapping(int i, int print) {
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  ist_overlapping_t answer;
+  ist_overlap(&a, &b, &workspace, &answer);
+  if (print) printf(" %d", answer);
+}
+
+/* In the order of the trees. */
+static void lenses(int i, int print) {
+  static ist_lens_t room[8];
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  ist_lenses_t found = {
+      .size = sizeof found, .lens_size = sizeof room[0], .lenses = room, .capacity = 8};
+  size_t k;
+  ist_overlap_lenses(&a, &b, NULL, &found);
+  if (!print) return;
+  printf(" %zu", found.total);
+  for (k = 0; k < found.count; ++k) {
+    print_doubles(room[k].centre, 8);
+    printf(" %u %u", room[k].sphere_a, room[k].sphere_b);
+  }
+}
+
+static const struct {
+  const char* name;
+  void (*ask)(int i, int print);
+} kQueries[] = {
+    {"matched", matched},
+    {"lenses alone", lenses_alone},
+    {"surface alone", surface_alone},
+    {"inner", inner},
+    {"budget", budget},
+    {"half-space", half_space},
+    {"box", box},
+    {"capsule", capsule},
+    {"separation", separation},
+    {"patches", patches},
+    {"overlap", overlapping},
+    {"lenses", lenses},
+};
+enum { kQueryCount = sizeof kQueries / sizeof kQueries[0] };
+
+static double now_us(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return 1e6 * (double)now.tv_sec + 1e-3 * (double)now.tv_nsec;
+}
+
+/* Mean time of a query over all rows, of the best of so many passes. */
+static void time_queries(int passes) {
+  int q, pass, i;
+  printf("{");
+  for (q = 0; q < kQueryCount; ++q) {
+    double best = 1e300;
+    for (pass = 0; pass < passes; ++pass) {
+      const double start = now_us();
+      double time;
+      for (i = 0; i < row_count; ++i) kQueries[q].ask(i, 0);
+      time = (now_us() - start) / row_count;
+      if (time < best) best = time;
+    }
+    printf("%s\"%s\": %.3f", q > 0 ? ", " : "", kQueries[q].name, best);
+  }
+  printf("}\n");
+}
+
+int main(int argc, char** argv) {
+  int i, q;
+  if (argc != 4 && argc != 6) stop("native_rows A.ist B.ist poses.csv [--time PASSES]");
+  if (ist_tree_load(argv[1], NULL, &tree_a) != IST_OK) stop(argv[1]);
+  if (ist_tree_load(argv[2], NULL, &tree_b) != IST_OK) stop(argv[2]);
+  if (ist_workspace_make(0, NULL, &workspace) != IST_OK) stop("no memory");
+  if (read_rows(argv[3]) == 0) stop(argv[3]);
+  if (argc == 6) {
+    time_queries(atoi(argv[5]));
+    return 0;
+  }
+  for (i = 0; i < row_count; ++i)
+    for (q = 0; q < kQueryCount; ++q) {
+      printf("%d %s:", i, kQueries[q].name);
+      kQueries[q].ask(i, 1);
+      printf("\n");
+    }
+  return 0;
+}

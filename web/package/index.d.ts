@@ -1,0 +1,361 @@
+// ist in JavaScript: penetration volume, force, torque and distance of solids, from .ist assets.
+//
+// Lengths are [u], the unit of the mesh that was baked. Everything is in double precision.
+// Every function but init() is synchronous, and throws an IstError with one English sentence that
+// says what is wrong and what to do.
+// The module keeps its memory in WebAssembly: assets and fields are released by free(), or some time
+// after nothing refers to them any more.
+// A page's workers each have a module of their own and await its init().
+
+/** Where the WebAssembly comes from; the default stands beside the module, or in it (compat). */
+export interface InitOptions {
+  /** Bytes, a compiled module, or an address (or Response) to fetch them from. */
+  wasm?:
+    | BufferSource
+    | WebAssembly.Module
+    | Response
+    | URL
+    | string
+    | PromiseLike<BufferSource | WebAssembly.Module | Response>;
+}
+
+/**
+ * Loads the WebAssembly: `await init()` once, before anything else. Called again it waits for the
+ * same module; after a failure it tries again.
+ */
+export function init(options?: InitOptions): Promise<void>;
+
+/** Version of the library, `0.1.0`. */
+export function version(): string;
+
+/** Why something could not be done. */
+export class IstError extends Error {
+  /** ist_status_t of <ist/ist.h>, < 0; 0 where the module itself refuses. */
+  readonly status: number;
+}
+
+// --- Places -----------------------------------------------------------------------------------------
+
+/** Three numbers: an array, a typed array. */
+export type Vector = ArrayLike<number>;
+
+/** x_world = R(rotation) (scale · x) + translation. What is left out is the identity's. */
+export interface Pose {
+  /** Quaternion w, x, y, z, within 1e-3 of unit length. (three.js has x, y, z, w.) */
+  rotation?: ArrayLike<number>;
+  /** [u] */
+  translation?: Vector;
+  /** > 0 */
+  scale?: number;
+}
+
+// --- Assets -----------------------------------------------------------------------------------------
+
+/** `matched`: spheres whose volumes sum to the solid's. `inner`: spheres inside of it. */
+export type Measure = 'matched' | 'inner';
+
+export interface AssetInfo {
+  /** As given to Asset.from(). */
+  name: string;
+  /** Bytes of the asset. */
+  bytes: number;
+  /** Count of spheres; of each of the two sets. */
+  spheres: number;
+  /** Count of spheres of the matched set at each level of detail, finest first. */
+  details: number[];
+  /** [u³] of the solid. */
+  volume: number;
+  /** [0, 1] share of the solid in inner spheres. */
+  coverage: number;
+  /** [u] no matched sphere sticks further out of the solid. */
+  protrusion: number;
+  /** The asset holds the solid's surface, so that queries can be exact. */
+  hasField: boolean;
+  /** [u] the stored surface and the solid's lie within this of each other. */
+  fieldError: number;
+  /** Count of triangles of the stored surface. */
+  fieldTriangles: number;
+}
+
+/** What holds a solid. */
+export interface Bounds {
+  /** [u] corners of the box along the axes. */
+  lower: Float64Array;
+  upper: Float64Array;
+  /** [u] a ball. */
+  centre: Float64Array;
+  radius: number;
+}
+
+/** Of density 1: times a density, mass and inertia. */
+export interface MassProperties {
+  /** [u³] */
+  volume: number;
+  /** [u] */
+  centreOfMass: Float64Array;
+  /** [u⁵] about the centre of mass: 3 × 3, symmetric. */
+  inertia: Float64Array;
+}
+
+/** Which set of spheres is meant. */
+export interface SphereSet {
+  /** Default `matched`. */
+  measure?: Measure;
+  /** Level of detail of the matched set, 0 the finest, < AssetInfo.details.length. Default 0. */
+  detail?: number;
+}
+
+/** A closed surface, for drawing and measuring. */
+export interface Surface {
+  /** [u] x, y, z of each vertex. */
+  positions: Float64Array;
+  /** Three vertices a triangle, counter-clockwise from outside. */
+  triangles: Uint32Array;
+}
+
+/** An .ist asset: a solid as spheres, trees over them, and mostly its surface. */
+export class Asset {
+  /**
+   * Copies and checks an asset's bytes.
+   * `name`: what messages call it, a file's name say.
+   * Throws where the bytes are no asset, an old one or a broken one, and says which.
+   */
+  static from(bytes: ArrayBufferLike | ArrayBufferView, name?: string): Asset;
+
+  info(): AssetInfo;
+
+  /** In the asset's own frame. */
+  bounds(): Bounds;
+  massProperties(): MassProperties;
+
+  /** x, y, z, radius [u] of every sphere, in the order of the packing: largest ones first. */
+  spheres(set?: SphereSet): Float64Array;
+
+  /** Levels of balls in the tree over a set: level 0 is the spheres, the last has up to sixteen. */
+  levelCount(set?: SphereSet): number;
+  /**
+   * x, y, z, radius [u] of every ball of a level. Level 0 is the spheres; each ball of level 1 holds
+   * sixteen spheres, and ball i of a higher one those of balls 16 i … 16 i + 15 of the level below.
+   */
+  level(level: number, set?: SphereSet): Float64Array;
+
+  /** The stored surface, within AssetInfo.fieldError of the solid's; null if there is none. */
+  surface(): Surface | null;
+
+  /** Gives the memory back. Fields of this asset must not be asked any more. May be called twice. */
+  free(): void;
+}
+
+// --- Fields: solids without spheres -----------------------------------------------------------------
+
+/** Stands still as the first solid of a query. Made once, asked often. */
+export class Field {
+  /** normal · x ≤ offset. `normal`: unit length within 1e-3, outward. */
+  static halfSpace(normal: Vector, offset?: number): Field;
+  /** Around the origin. */
+  static box(halfExtents: Vector): Field;
+  static ball(radius: number): Field;
+  /** About the z axis; `halfHeight` ≥ 0 is the segment's. */
+  static capsule(radius: number, halfHeight: number): Field;
+  /** About the z axis. */
+  static cylinder(radius: number, halfHeight: number): Field;
+  /**
+   * Terrain under a grid of heights along z, copied: `columns` (x) run fastest, heights[0] stands at
+   * the origin. Beyond its border it goes on level.
+   */
+  static heights(
+    heights: Float32Array,
+    columns: number,
+    rows: number,
+    spacing: ArrayLike<number>,
+  ): Field;
+  /**
+   * Distances, positive inside, at the points of a grid, copied: x runs fastest. Outside of the grid
+   * is outside of the solid.
+   */
+  static distanceGrid(
+    distances: Float32Array,
+    points: ArrayLike<number>,
+    spacing: number,
+    options?: { origin?: Vector; error?: number },
+  ): Field;
+  /** The surface in an asset, without its spheres. */
+  static surface(asset: Asset): Field;
+
+  /** Gives the memory back. May be called twice. */
+  free(): void;
+}
+
+// --- Queries ----------------------------------------------------------------------------------------
+
+// Of a solid A and an asset B at a pose. All that follows is in the world's frame; `poseA` is where A
+// stands. Nothing is left over by a query that writes `into` an answer of an earlier one: a loop that
+// keeps its options and its answer makes no garbage.
+
+/** Where a query ends early. A limit that is left out, or 0, is none. */
+export interface Limits {
+  /** Count of node pairs opened. */
+  maxVisits?: number;
+  /** [µs] wall clock from the call. Browsers coarsen their clock, to 5 or 100 µs and more. */
+  deadlineUs?: number;
+}
+
+export interface ContactOptions extends Limits {
+  /** Where A stands. Default: the identity. */
+  poseA?: Pose;
+  /** Default `matched`. */
+  measure?: Measure;
+  /**
+   * Whether the surface that an asset holds is used: where spheres are too coarse for the contact
+   * (`automatic`, the default), `never`, or `always`.
+   */
+  field?: 'automatic' | 'never' | 'always';
+  /** Stop once (volumeMax − volumeMin) ≤ this · volumeMax. */
+  relativeError?: number;
+  /** [u] nodes smaller than this are not opened. */
+  minRadius?: number;
+}
+
+export interface PenetrationOptions extends ContactOptions {
+  /** Count of sphere pairs to spend: a coarser level of detail answers where all are more. */
+  pairBudget?: number;
+  /** An answer to write over, which is then returned. */
+  into?: Penetration;
+}
+
+/** `budget-exhausted`: a limit or the workspace stopped it, and bounds still hold. */
+export type Status = 'ok' | 'budget-exhausted';
+
+/** The overlap of two solids. */
+export interface Penetration {
+  status: Status;
+  /** [u³] */
+  volume: number;
+  /** [u³] bounds on that sum. */
+  volumeMin: number;
+  volumeMax: number;
+  /** [u] of the overlap; zero if there is none. */
+  centroid: Float64Array;
+  /** [u²] push on B of a pressure of 1: −dV/d(translation of B). A's is the opposite. */
+  force: Float64Array;
+  /** [u³/rad] about B's origin: −dV/d(rotation vector of B). */
+  torque: Float64Array;
+  /** Node pairs opened. */
+  nodeVisits: number;
+  /** Lenses and parts of spheres that were summed. */
+  spherePairs: number;
+}
+
+/** Throws for a pose or an option that is out of range. */
+export function penetration(
+  a: Asset | Field,
+  b: Asset,
+  poseB: Pose,
+  options?: PenetrationOptions,
+): Penetration;
+
+export interface SeparationOptions extends Limits {
+  poseA?: Pose;
+  into?: Separation;
+}
+
+/** The gap between two solids; all zero once inner spheres overlap. */
+export interface Separation {
+  status: Status;
+  /** [u] between the inner spheres. */
+  distance: number;
+  /** [u] the solids' distance lies within, certified. */
+  distanceMin: number;
+  distanceMax: number;
+  /** [u] on the inner spheres of A and B. */
+  pointA: Float64Array;
+  pointB: Float64Array;
+  /** Unit, from A to B. */
+  normal: Float64Array;
+  nodeVisits: number;
+  spherePairs: number;
+}
+
+export function separation(
+  a: Asset | Field,
+  b: Asset,
+  poseB: Pose,
+  options?: SeparationOptions,
+): Separation;
+
+/** A part of a contact that a solver may take for one contact point. */
+export interface ContactPatch {
+  /** Names the region: the same in every query of the same two solids. */
+  id: number;
+  /** [u] */
+  centroid: Float64Array;
+  /** Unit, the direction in which the patch pushes B; zero if the area is. */
+  normal: Float64Array;
+  /** [u²] |force|. */
+  area: number;
+  /** [u] volume / area. */
+  depth: number;
+  /** [u³] */
+  volume: number;
+  /** [u²] and [u³/rad] about B's origin: its share of Penetration's. */
+  force: Float64Array;
+  torque: Float64Array;
+}
+
+export interface ContactPatchesOptions extends ContactOptions {
+  /** Most patches, in [1, 64]. Default 16. */
+  maxPatches?: number;
+  into?: ContactPatches;
+}
+
+export interface ContactPatches {
+  /** The whole contact; patches sum to it. */
+  whole: Penetration;
+  /** Patches found. */
+  count: number;
+  /** The first `count` are this answer's; room for later ones may follow. */
+  patches: ContactPatch[];
+}
+
+export function contactPatches(
+  a: Asset | Field,
+  b: Asset,
+  poseB: Pose,
+  options?: ContactPatchesOptions,
+): ContactPatches;
+
+/** Whether two solids share a point. `yes` and `no` are certain. */
+export function overlap(
+  a: Asset | Field,
+  b: Asset,
+  poseB: Pose,
+  options?: { poseA?: Pose },
+): 'no' | 'yes' | 'unknown';
+
+export interface LensesOptions {
+  poseA?: Pose;
+  /** Default `matched`. */
+  measure?: Measure;
+  /** Levels of detail of the matched sets. Default 0, the finest. */
+  detailA?: number;
+  detailB?: number;
+  /** Most lenses to write. Default 4096. */
+  maxLenses?: number;
+  into?: Lenses;
+}
+
+/** The lenses in which spheres of A and B overlap, for drawing. */
+export interface Lenses {
+  /** Lenses there are; those beyond maxLenses are counted only. */
+  total: number;
+  /** Lenses written. */
+  count: number;
+  /**
+   * Ten numbers a lens: x, y, z of the middle of its thickness; its axis x, y, z (unit, from A's
+   * sphere to B's); radius where it is widest [u]; thickness along the axis [u]; index of A's and of
+   * B's sphere in Asset.spheres(). An ellipsoid of that size looks like it.
+   */
+  data: Float64Array;
+}
+
+export function lenses(a: Asset, b: Asset, poseB: Pose, options?: LensesOptions): Lenses;

@@ -1,0 +1,257 @@
+// Assets and fields: what lies in WebAssembly's memory and is given back.
+
+import {count, desk, kBounds, kCounts, kInfo, kMass, measureOf, writeNumbers} from './desk.js';
+import {IstError} from './error.js';
+import {check, f64, functions, give, take, u32, u8, withRoom} from './memory.js';
+import {welded} from './weld.js';
+
+/** Gives back what nobody refers to any more. */
+const forgotten = new FinalizationRegistry((places) => places.forEach(give));
+
+/** What owns memory: a list of places. */
+class Owner {
+  constructor(places, key) {
+    if (key !== kInside)
+      throw new IstError(`ist: ${this.constructor.name}s are made by its static functions`);
+    this._places = places;
+    forgotten.register(this, places, this);
+  }
+
+  free() {
+    if (this._places === null) return;
+    forgotten.unregister(this);
+    this._places.forEach(give);
+    this._places = null;
+  }
+}
+const kInside = Symbol('inside');
+
+function vector(at) {
+  return f64().slice(at, at + 3);
+}
+
+/** Bytes of whatever holds bytes. */
+function bytesOf(given) {
+  if (ArrayBuffer.isView(given))
+    return new Uint8Array(given.buffer, given.byteOffset, given.byteLength);
+  if (given instanceof ArrayBuffer ||
+      (typeof SharedArrayBuffer !== 'undefined' && given instanceof SharedArrayBuffer))
+    return new Uint8Array(given);
+  throw new IstError(
+      'ist: Asset.from() takes an ArrayBuffer or a view of one, as ' +
+      'await (await fetch(address)).arrayBuffer() gives');
+}
+
+export class Asset extends Owner {
+  static from(given, name = 'asset') {
+    const wasm = functions('Asset.from()');
+    const bytes = bytesOf(given);
+    const place = take(64 + bytes.length);
+    try {
+      u8().set(bytes, place + 64);
+      check(wasm.tree(place, bytes.length), name);
+    } catch (error) {
+      give(place);
+      throw error;
+    }
+    return new Asset(place, name, bytes.length, kInside);
+  }
+
+  constructor(place, name, bytes, key) {
+    super([place], key);
+    this._name = name;
+    this._bytes = bytes;
+  }
+
+  /** Its handle in WebAssembly. */
+  get _at() {
+    if (this._places === null) throw new IstError(`ist: ${this._name} is used after its free()`);
+    return this._places[0];
+  }
+
+  _told() {
+    check(functions('an asset').info(this._at), this._name);
+    return f64();
+  }
+
+  info() {
+    const numbers = this._told();
+    const integers = u32(), at = (desk() + kInfo) / 4, values = (desk() + kInfo) / 8 + 2;
+    const details = [];
+    for (let i = 0; i < integers[at + 13]; ++i) details.push(this._count({detail: i}, 0));
+    return {
+      name: this._name,
+      bytes: this._bytes,
+      spheres: integers[at + 2] + 2 ** 32 * integers[at + 3],
+      details,
+      volume: numbers[values],
+      coverage: numbers[values + 1],
+      protrusion: numbers[values + 2],
+      hasField: integers[at + 1] !== 0,
+      fieldError: numbers[values + 3],
+      fieldTriangles: integers[at + 12],
+    };
+  }
+
+  bounds() {
+    const numbers = this._told(), at = (desk() + kBounds) / 8 + 1;
+    return {
+      lower: vector(at),
+      upper: vector(at + 3),
+      centre: vector(at + 6),
+      radius: numbers[at + 9]
+    };
+  }
+
+  massProperties() {
+    const numbers = this._told(), at = (desk() + kMass) / 8 + 1;
+    return {
+      volume: numbers[at],
+      centreOfMass: vector(at + 1),
+      inertia: numbers.slice(at + 4, at + 13)
+    };
+  }
+
+  /** Writes the first `capacity` balls to `room`, and says how many there are. */
+  _balls(set, level, room, capacity) {
+    const detail = count(set?.detail, 0, 'detail');
+    const status = functions('an asset')
+                       .balls(this._at, measureOf(set?.measure), detail, level, room, capacity);
+    if (status < 0)
+      throw new IstError(
+          `ist: ${this._name}: there is no level ${level} of detail ${detail} in its ` +
+              `${set?.measure ?? 'matched'} spheres`,
+          status);
+    return u32()[(desk() + kCounts) / 4];
+  }
+
+  _count(set, level) {
+    return this._balls(set, level, 0, 0);
+  }
+
+  spheres(set) {
+    return this.level(0, set);
+  }
+
+  levelCount(set) {
+    let level = 0;
+    while (this._count(set, level) > 16) ++level;
+    return level + 1;
+  }
+
+  level(level, set) {
+    const most = this._count(set, count(level, 0, 'level'));
+    return withRoom(32 * most, (room) => {
+      this._balls(set, level, room, most);
+      return f64().slice(room / 8, room / 8 + 4 * most);
+    });
+  }
+
+  surface() {
+    const wasm = functions('an asset');
+    check(wasm.surface(this._at, 0, 0, 0, 0), this._name);
+    const counts = (desk() + kCounts) / 4;
+    const vertices = u32()[counts], triangles = u32()[counts + 1];
+    if (triangles === 0) return null;
+    return withRoom(24 * vertices + 12 * triangles, (room) => {
+      const corners = room + 24 * vertices;
+      check(wasm.surface(this._at, room, vertices, corners, triangles), this._name);
+      return welded(
+          f64().subarray(room / 8, room / 8 + 3 * vertices),
+          u32().subarray(corners / 4, corners / 4 + 3 * triangles));
+    });
+  }
+}
+
+// ist_field_kind_t
+const kHalfSpace = 1, kBox = 2, kBall = 3, kCapsule = 4, kCylinder = 5, kHeights = 6,
+      kDistanceGrid = 7, kMesh = 9;
+
+/** A field of up to eight numbers, and of `data`, whose memory it owns. */
+function made(kind, numbers, data = 0, columns = 0, rows = 0, layers = 0) {
+  const owned = data === 0 || kind === kMesh ? [] : [data];
+  try {
+    const wasm = functions('a field');
+    const absent = numbers.concat(Array(8 - numbers.length).fill(0));
+    writeNumbers(f64(), desk() / 8, absent, absent, 8, 'a field');
+    const place = wasm.field(kind, data, columns, rows, layers) >>> 0;
+    if (place === 0) throw new IstError('ist: there is no memory for a field');
+    return new Field([place, ...owned], kInside);
+  } catch (error) {
+    owned.forEach(give);
+    throw error;
+  }
+}
+
+function three(given, what) {
+  if (given?.length !== 3) throw new IstError(`ist: ${what} must have three numbers`);
+  return [given[0], given[1], given[2]];
+}
+
+/** A copy of as many floats as a grid has points. */
+function copied(given, points, what) {
+  for (const along of points)
+    if (!(Number.isInteger(along) && along >= 2))
+      throw new IstError(`ist: ${what} needs two points and more along each axis, not ${along}`);
+  const wanted = points.reduce((a, b) => a * b);
+  if (!(given instanceof Float32Array) || given.length !== wanted)
+    throw new IstError(
+        `ist: ${what} needs a Float32Array of ${points.join(' · ')} = ${wanted} numbers` +
+        (given?.length === undefined ? '' : `, not ${given.length}`));
+  functions(what);
+  const place = take(4 * wanted);
+  u8().set(new Uint8Array(given.buffer, given.byteOffset, given.byteLength), place);
+  return place;
+}
+
+export class Field extends Owner {
+  static halfSpace(normal, offset = 0) {
+    return made(kHalfSpace, [...three(normal, 'normal'), offset]);
+  }
+  static box(halfExtents) {
+    return made(kBox, three(halfExtents, 'halfExtents'));
+  }
+  static ball(radius) {
+    return made(kBall, [radius]);
+  }
+  static capsule(radius, halfHeight) {
+    return made(kCapsule, [radius, halfHeight]);
+  }
+  static cylinder(radius, halfHeight) {
+    return made(kCylinder, [radius, halfHeight]);
+  }
+
+  static heights(heights, columns, rows, spacing) {
+    if (spacing?.length !== 2)
+      throw new IstError('ist: spacing must have two numbers, along x and y');
+    const data = copied(heights, [columns, rows], 'Field.heights()');
+    let lowest = Infinity, highest = -Infinity;
+    for (const h of heights) {
+      lowest = Math.min(lowest, h);
+      highest = Math.max(highest, h);
+    }
+    // Both 0 is what says that nothing is known, which of a level ground at 0 is true enough.
+    return made(kHeights, [spacing[0], spacing[1], lowest, highest], data, columns, rows);
+  }
+
+  static distanceGrid(distances, points, spacing, options) {
+    const along = three(points, 'points');
+    const origin = three(options?.origin ?? [0, 0, 0], 'origin');
+    const data = copied(distances, along, 'Field.distanceGrid()');
+    return made(kDistanceGrid, [...origin, spacing, options?.error ?? 0], data, ...along);
+  }
+
+  static surface(asset) {
+    if (!(asset instanceof Asset)) throw new IstError('ist: Field.surface() takes an Asset');
+    const field = made(kMesh, [], asset._at);
+    field._asset = asset;
+    return field;
+  }
+
+  /** Its place in WebAssembly. */
+  get _at() {
+    if (this._places === null) throw new IstError('ist: a field is used after its free()');
+    this._asset?._at;  // which throws if it is free
+    return this._places[0];
+  }
+}

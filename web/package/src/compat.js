@@ -1,0 +1,11 @@
+// For wherever a file beside the module gets lost: the WebAssembly is in the module.
+
+import {inlined} from '../dist/inlined.js';
+
+import {load} from './memory.js';
+
+export * from './public.js';
+
+export function init(options) {
+  return load(() => options?.wasm ?? Uint8Array.from(atob(inlined), (c) => c.charCodeAt(0)));
+}

@@ -1,0 +1,98 @@
+// The desk of src/exports.c: where questions are put and answers lie. Every place is held there by
+// a static assert. Numbers below are bytes from its start.
+
+import {IstError} from './error.js';
+import {f64, functions, u32} from './memory.js';
+
+export const kSettings = 128;
+export const kPenetration = 176;
+export const kSeparation = 288;
+export const kPatches = 400;
+export const kPatchBytes = 128;
+export const kMostPatches = 64;
+export const kInfo = 8592;
+export const kBounds = 8648;
+export const kMass = 8736;
+export const kCounts = 8872;
+
+let start = 0;
+/** Where the desk stands in memory. */
+export function desk() {
+  if (start === 0) start = functions('a query').desk() >>> 0;
+  return start;
+}
+
+// Words are put together only where something is wrong: a loop shall make no garbage.
+
+function number(value, what, part = '') {
+  if (typeof value !== 'number')
+    throw new IstError(`ist: ${what}${part} is ${value}, not a number`);
+  return value;
+}
+
+/** Writes `count` numbers, or those of `absent` where none are given. */
+export function writeNumbers(out, at, given, absent, count, what, part = '') {
+  if (given === undefined || given === null) given = absent;
+  if (given.length !== count)
+    throw new IstError(`ist: ${what}${part} has ${given.length ?? 'no'} numbers, not ${count}`);
+  for (let i = 0; i < count; ++i) out[at + i] = number(given[i], what, part);
+}
+
+const kIdentity = [1, 0, 0, 0];
+const kOrigin = [0, 0, 0];
+
+/** Writes place A (0) or B (1). */
+export function writePose(which, pose, what) {
+  if (which === 1 && (pose === undefined || pose === null))
+    throw new IstError(`ist: ${what} is missing: {rotation, translation, scale}`);
+  const out = f64();
+  const at = desk() / 8 + 8 * which;
+  writeNumbers(out, at, pose?.rotation, kIdentity, 4, what, '.rotation');
+  writeNumbers(out, at + 4, pose?.translation, kOrigin, 3, what, '.translation');
+  const scale = number(pose?.scale ?? 1, what, '.scale');
+  if (!(scale > 0)) throw new IstError(`ist: ${what}.scale is ${scale}; it must be > 0`);
+  out[at + 7] = scale;
+}
+
+function choice(value, names, what) {
+  const i = value === undefined ? 0 : names.indexOf(value);
+  if (i < 0) throw new IstError(`ist: ${what} is ${value}; there are ${names.join(', ')}`);
+  return i;
+}
+
+export function count(value, absent, what) {
+  if (value === undefined) return absent;
+  if (!(Number.isInteger(value) && value >= 0 && value <= 0xffffffff))
+    throw new IstError(`ist: ${what} is ${value}; it must be a whole number from 0 to 2³² − 1`);
+  return value;
+}
+
+const kMeasures = ['matched', 'inner'];
+const kFieldUses = ['automatic', 'never', 'always'];
+const limit = (value, what) => (value === undefined ? 0 : number(value, what));
+
+export function measureOf(value) {
+  return choice(value, kMeasures, 'measure');
+}
+
+/** Writes every setting that options have. */
+export function writeSettings(options) {
+  const integers = u32();
+  const at = (desk() + kSettings) / 4;
+  integers[at + 1] = measureOf(options?.measure);
+  integers[at + 2] = choice(options?.field, kFieldUses, 'field');
+  integers[at + 3] = count(options?.pairBudget, 0, 'pairBudget');
+  integers[at + 4] = count(options?.maxVisits, 0, 'maxVisits');
+  const numbers = f64();
+  const limits = (desk() + kSettings) / 8 + 3;
+  numbers[limits] = limit(options?.deadlineUs, 'deadlineUs');
+  numbers[limits + 1] = limit(options?.relativeError, 'relativeError');
+  numbers[limits + 2] = limit(options?.minRadius, 'minRadius');
+}
+
+/** Copies three numbers, which is shorter than set() and makes no view. */
+export function copy3(from, at, to, sign = 1) {
+  to[0] = sign * from[at];
+  to[1] = sign * from[at + 1];
+  to[2] = sign * from[at + 2];
+}

@@ -1,0 +1,255 @@
+/* The C functions as a page's JavaScript calls them: numbers lie at fixed places of one desk in
+ * memory, whose layout src/desk.js knows. */
+#include <ist/ist.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define EXPORT(name) __attribute__((export_name(#name)))
+
+enum { kMostPatches = 64 };
+
+/* w, x, y, z; x, y, z; scale, where 0 is taken for 1 */
+typedef struct place {
+  ist_pose_t pose;
+  double scale;
+} place_t;
+
+static struct desk {
+  place_t a, b;
+  /* For separation and patches too, which have fewer. */
+  ist_penetration_settings_t settings;
+  ist_penetration_t penetration;
+  ist_separation_t separation;
+  ist_contact_patch_t patches[kMostPatches];
+  ist_tree_info_t info;
+  ist_bounds_t bounds;
+  ist_mass_properties_t mass;
+  uint32_t counts[2];
+  ist_workspace_t workspace;
+} desk = {
+    .settings = {.size = sizeof desk.settings},
+    .penetration = {.size = sizeof desk.penetration},
+    .separation = {.size = sizeof desk.separation},
+    .info = {.size = sizeof desk.info},
+    .bounds = {.size = sizeof desk.bounds},
+    .mass = {.size = sizeof desk.mass},
+};
+
+#define AT(member, place) _Static_assert(offsetof(struct desk, member) == (place), #member)
+AT(a, 0);
+AT(b, 64);
+AT(settings.measure, 132);
+AT(settings.field, 136);
+AT(settings.pair_budget, 140);
+AT(settings.max_visits, 144);
+AT(settings.deadline_us, 152);
+AT(settings.relative_error, 160);
+AT(settings.min_radius, 168);
+AT(penetration.status, 180);
+AT(penetration.volume, 184);
+AT(penetration.node_visits, 280);
+AT(separation.status, 292);
+AT(separation.distance, 296);
+AT(separation.node_visits, 392);
+AT(patches, 400);
+AT(info.has_field, 8596);
+AT(info.volume, 8608);
+AT(info.field_triangles, 8640);
+AT(bounds.lower, 8656);
+AT(mass.volume, 8744);
+AT(counts, 8872);
+_Static_assert(sizeof(ist_contact_patch_t) == 128, "patch");
+_Static_assert(sizeof(ist_ball_t) == 32, "ball");
+_Static_assert(sizeof(ist_lens_t) == 72, "lens");
+
+EXPORT(desk) struct desk* desk_at(void) { return &desk; }
+
+EXPORT(start) ist_status_t start(void) { return ist_workspace_make(0, NULL, &desk.workspace); }
+
+/* On a 64-byte boundary; null if there is none. */
+EXPORT(take) void* take(size_t bytes) {
+  const size_t whole = (bytes + 63) / 64 * 64;
+  return whole < bytes ? NULL : aligned_alloc(64, whole);
+}
+EXPORT(give) void give(void* memory) { free(memory); }
+
+EXPORT(describe) const char* describe(ist_status_t status) { return ist_describe(status); }
+EXPORT(version) uint32_t version(void) { return ist_version(); }
+
+/* --- Trees and fields ------------------------------------------------------------------------- */
+
+/* `block`: a handle, and on the next 64-byte boundary an asset of `size` bytes. */
+EXPORT(tree) ist_status_t tree(void* block, size_t size) {
+  _Static_assert(sizeof(ist_tree_t) == 64, "handle");
+  return ist_tree_view((char*)block + sizeof(ist_tree_t), size, (ist_tree_t*)block);
+}
+
+EXPORT(info) ist_status_t info(const ist_tree_t* tree) {
+  ist_status_t status = ist_tree_get_info(tree, &desk.info);
+  if (status == IST_OK) status = ist_tree_get_bounds(tree, &desk.bounds);
+  return status == IST_OK ? ist_tree_get_mass_properties(tree, &desk.mass) : status;
+}
+
+/* The number of balls goes to counts[0]. */
+EXPORT(balls)
+ist_status_t balls(const ist_tree_t* tree, ist_measure_t measure, uint32_t detail, uint32_t level,
+                   ist_ball_t* room, size_t capacity) {
+  const ist_ball_set_t set = {
+      .size = sizeof set, .measure = measure, .detail = detail, .level = level};
+  size_t count;
+  const ist_status_t status = ist_tree_get_balls(tree, &set, room, capacity, &count);
+  desk.counts[0] = (uint32_t)count;
+  return status;
+}
+
+/* The numbers of vertices and triangles go to counts. */
+EXPORT(surface)
+ist_status_t surface(const ist_tree_t* tree, double (*vertices)[3], size_t vertex_capacity,
+                     uint32_t (*triangles)[3], size_t triangle_capacity) {
+  ist_surface_t all = {.size = sizeof all,
+                       .vertices = vertices,
+                       .triangles = triangles,
+                       .vertex_capacity = vertex_capacity,
+                       .triangle_capacity = triangle_capacity};
+  const ist_status_t status = ist_tree_get_surface(tree, &all);
+  desk.counts[0] = (uint32_t)all.vertex_count;
+  desk.counts[1] = (uint32_t)all.triangle_count;
+  return status;
+}
+
+/* A field of the eight numbers of place A; null if there is no memory. `data`: heights, distances
+ * or a tree. `columns`, `rows`, `layers`: of data. */
+EXPORT(field)
+ist_field_t* field(ist_field_kind_t kind, const void* data, uint32_t columns, uint32_t rows,
+                   uint32_t layers) {
+  const double* const numbers = (const double*)&desk.a;
+  ist_field_t* const made = calloc(1, sizeof *made);
+  if (made == NULL) return NULL;
+  made->size = sizeof *made;
+  made->kind = kind;
+  switch (kind) {
+    case IST_HEIGHTS:
+      made->as.heights.heights = data;
+      made->as.heights.columns = columns;
+      made->as.heights.rows = rows;
+      memcpy(made->as.heights.spacing, numbers, 4 * sizeof *numbers); /* lowest, highest too */
+      break;
+    case IST_DISTANCE_GRID:
+      made->as.distance_grid.distances = data;
+      made->as.distance_grid.points[0] = columns;
+      made->as.distance_grid.points[1] = rows;
+      made->as.distance_grid.points[2] = layers;
+      memcpy(made->as.distance_grid.origin, numbers, 5 * sizeof *numbers); /* spacing, error too */
+      break;
+    case IST_MESH:
+      made->as.mesh.tree = data;
+      break;
+    default: /* at most four numbers, in the order of the header */
+      memcpy(&made->as, numbers, 4 * sizeof *numbers);
+  }
+  return made;
+}
+_Static_assert(offsetof(ist_field_t, as.heights.highest) ==
+                   offsetof(ist_field_t, as.heights.spacing) + 3 * sizeof(double),
+               "heights");
+_Static_assert(offsetof(ist_field_t, as.distance_grid.error) ==
+                   offsetof(ist_field_t, as.distance_grid.origin) + 4 * sizeof(double),
+               "grid");
+
+/* --- Queries: of two trees, or of a field and a tree where `a` is null -------------------------
+ */
+
+static ist_placed_tree_t placed(const ist_tree_t* tree, const place_t* place) {
+  const ist_placed_tree_t made = {sizeof made, tree, place->pose, place->scale};
+  return made;
+}
+static ist_placed_field_t placed_field(const ist_field_t* field) {
+  const ist_placed_field_t made = {sizeof made, field, desk.a.pose, desk.a.scale};
+  return made;
+}
+
+EXPORT(penetration)
+ist_status_t penetration(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b) {
+  const ist_placed_tree_t second = placed(b, &desk.b);
+  if (a == NULL) {
+    const ist_placed_field_t first = placed_field(field);
+    return ist_field_penetration(&first, &second, &desk.settings, &desk.workspace,
+                                 &desk.penetration);
+  }
+  const ist_placed_tree_t first = placed(a, &desk.a);
+  return ist_penetration(&first, &second, &desk.settings, &desk.workspace, &desk.penetration);
+}
+
+EXPORT(separation)
+ist_status_t separation(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b) {
+  const ist_placed_tree_t second = placed(b, &desk.b);
+  const ist_separation_settings_t settings = {.size = sizeof settings,
+                                              .max_visits = desk.settings.max_visits,
+                                              .deadline_us = desk.settings.deadline_us};
+  if (a == NULL) {
+    const ist_placed_field_t first = placed_field(field);
+    return ist_field_separation(&first, &second, &settings, &desk.workspace, &desk.separation);
+  }
+  const ist_placed_tree_t first = placed(a, &desk.a);
+  return ist_separation(&first, &second, &settings, &desk.workspace, &desk.separation);
+}
+
+/* The number of patches goes to counts[0]. */
+EXPORT(contact_patches)
+ist_status_t contact_patches(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b,
+                             uint32_t most) {
+  const ist_placed_tree_t second = placed(b, &desk.b);
+  const ist_contact_settings_t settings = {.size = sizeof settings,
+                                           .measure = desk.settings.measure,
+                                           .field = desk.settings.field,
+                                           .max_visits = desk.settings.max_visits,
+                                           .deadline_us = desk.settings.deadline_us,
+                                           .relative_error = desk.settings.relative_error,
+                                           .min_radius = desk.settings.min_radius};
+  ist_contact_patches_t found = {.size = sizeof found,
+                                 .patch_size = sizeof desk.patches[0],
+                                 .patches = desk.patches,
+                                 .capacity = most < kMostPatches ? most : kMostPatches};
+  ist_status_t status;
+  if (a == NULL) {
+    const ist_placed_field_t first = placed_field(field);
+    status = ist_field_contact_patches(&first, &second, &settings, &desk.workspace, &found,
+                                       &desk.penetration);
+  } else {
+    const ist_placed_tree_t first = placed(a, &desk.a);
+    status =
+        ist_contact_patches(&first, &second, &settings, &desk.workspace, &found, &desk.penetration);
+  }
+  desk.counts[0] = (uint32_t)found.count;
+  return status;
+}
+
+/* 0, 1, 2 as ist_overlapping_t, or an error. */
+EXPORT(overlap)
+int32_t overlap(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b) {
+  const ist_placed_tree_t second = placed(b, &desk.b);
+  ist_overlapping_t answer;
+  ist_status_t status;
+  if (a == NULL) {
+    const ist_placed_field_t first = placed_field(field);
+    status = ist_field_overlap(&first, &second, &desk.workspace, &answer);
+  } else {
+    const ist_placed_tree_t first = placed(a, &desk.a);
+    status = ist_overlap(&first, &second, &desk.workspace, &answer);
+  }
+  return status < 0 ? status : answer;
+}
+
+/* The numbers of all and of written ones go to counts. */
+EXPORT(lenses)
+ist_status_t lenses(const ist_tree_t* a, const ist_tree_t* b, uint32_t detail_a, uint32_t detail_b,
+                    ist_lens_t* room, size_t capacity) {
+  const ist_placed_tree_t first = placed(a, &desk.a), second = placed(b, &desk.b);
+  const ist_lens_settings_t settings = {sizeof settings, desk.settings.measure, detail_a, detail_b};
+  ist_lenses_t found = {
+      .size = sizeof found, .lens_size = sizeof *room, .lenses = room, .capacity = capacity};
+  const ist_status_t status = ist_overlap_lenses(&first, &second, &settings, &found);
+  desk.counts[0] = (uint32_t)found.total;
+  desk.counts[1] = (uint32_t)found.count;
+  return status;
+}

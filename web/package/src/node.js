@@ -1,0 +1,11 @@
+// For Node, whose fetch() reads no files.
+
+import {readFile} from 'node:fs/promises';
+
+import {load} from './memory.js';
+
+export * from './public.js';
+
+export function init(options) {
+  return load(() => options?.wasm ?? readFile(new URL('../dist/ist.wasm', import.meta.url)));
+}

@@ -1,0 +1,315 @@
+import * as ist from 'ist-query';
+import * as compat from 'ist-query/compat';
+import assert from 'node:assert/strict';
+import {execFileSync} from 'node:child_process';
+import {readFileSync} from 'node:fs';
+import {test} from 'node:test';
+
+import {packageFolder, pairs} from './data.js';
+
+const [{a: pathA, b: pathB}] = pairs();
+const bytesA = readFileSync(pathA), bytesB = readFileSync(pathB);
+
+function sentence(call) {
+  try {
+    call();
+  } catch (error) {
+    assert.equal(error.name, 'IstError', error.stack);
+    return error.message;
+  }
+  assert.fail('nothing was thrown');
+}
+
+test('init() that nobody called or awaited is told in a sentence', async () => {
+  assert.match(
+      sentence(() => ist.Asset.from(bytesA)),
+      /Asset\.from\(\) was called .* call and await init\(\) first/);
+  assert.match(sentence(() => ist.Field.ball(1)), /await init/);
+  assert.match(sentence(() => ist.version()), /version\(\) was called/);
+  const started = ist.init();
+  assert.match(sentence(() => ist.Asset.from(bytesA)), /init\(\) was called, but not awaited/);
+  await started;
+  await ist.init();
+  assert.match(ist.version(), /^\d+\.\d+\.\d+$/);
+});
+
+test('every build answers', async () => {
+  await compat.init();
+  const b = compat.Asset.from(bytesB), a = compat.Asset.from(bytesA);
+  assert.ok(compat.penetration(a, b, {translation: [0, 0, 9]}).volume > 0);
+});
+
+test('init() takes bytes, a module and an address, and says what failed', () => {
+  const script = `
+    import {readFileSync} from 'node:fs';
+    import * as ist from 'ist-query';
+    const fail = async (wasm) => { try { await ist.init({wasm}); } catch (e) { return e.name + ': ' + e.message; } };
+    const bytes = readFileSync(${JSON.stringify(packageFolder + '/dist/ist.wasm')});
+    console.log(JSON.stringify([
+      await fail('http://127.0.0.1:9/ist.wasm'),
+      await fail(new Response('<html>')),
+      await fail(new Response('', {status: 404})),
+      await fail(new Uint8Array([0, 97, 115, 109, 1, 0, 0, 0, 1, 99])),
+      await fail(Promise.resolve(await WebAssembly.compile(bytes))) ?? ist.version(),
+    ]));`;
+  const told = JSON.parse(execFileSync(
+      process.execPath, ['--input-type=module', '-e', script],
+      {cwd: packageFolder, encoding: 'utf8'}));
+  assert.match(told[0], /^IstError: .*127\.0\.0\.1:9.* cannot be fetched.*init\(\{wasm: url\}\)/);
+  assert.match(told[1], /^IstError: .* no WebAssembly/);
+  assert.match(told[2], /^IstError: .*404/);
+  assert.match(told[3], /^IstError: .*cannot be compiled.*SIMD/);
+  assert.match(told[4], /^\d+\.\d+\.\d+$/);
+});
+
+test('broken assets are refused in the library\'s words', () => {
+  const broken = Uint8Array.from(bytesA);
+  broken[bytesA.length >> 1] ^= 1;
+  assert.equal(
+      sentence(() => ist.Asset.from(broken, 'nut.ist')),
+      'ist: nut.ist: the content does not match its checksum; bake again');
+  assert.match(
+      sentence(() => ist.Asset.from(new TextEncoder().encode('solid something'))),
+      /not an \.ist asset/);
+  assert.match(sentence(() => ist.Asset.from(bytesA.subarray(0, 1000))), /ends early/);
+  assert.match(sentence(() => ist.Asset.from('nut.ist')), /takes an ArrayBuffer/);
+  // A view into a larger buffer, at an odd place.
+  const inside = new Uint8Array(bytesA.length + 13);
+  inside.set(bytesA, 13);
+  const asset = ist.Asset.from(inside.subarray(13));
+  assert.equal(asset.info().bytes, bytesA.length);
+  asset.free();
+});
+
+test('what an asset holds', () => {
+  const asset = ist.Asset.from(bytesA, 'bolt.ist');
+  const info = asset.info();
+  assert.equal(info.name, 'bolt.ist');
+  assert.equal(info.spheres, info.details[0]);
+  assert.ok(info.hasField && info.details.length > 1);
+  const {lower, upper} = asset.bounds();
+  const mass = asset.massProperties();
+  assert.equal(mass.volume, info.volume);
+  assert.equal(mass.inertia[1], mass.inertia[3]);
+  for (const set of [{}, {measure: 'inner'}, {detail: 1}]) {
+    const spheres = asset.spheres(set);
+    assert.equal(spheres.length, 4 * (set.detail ? info.details[1] : info.spheres));
+    let volume = 0;
+    for (let i = 0; i < spheres.length; i += 4) {
+      volume += 4 / 3 * Math.PI * spheres[i + 3] ** 3;
+      for (let k = 0; k < 3; ++k) assert.ok(spheres[i + k] > lower[k] && spheres[i + k] < upper[k]);
+    }
+    const wanted = set.measure === 'inner' ? info.coverage * info.volume : info.volume;
+    assert.ok(
+        Math.abs(volume / wanted - 1) < 1e-3, `${JSON.stringify(set)}: ${volume} of ${wanted}`);
+    const levels = asset.levelCount(set);
+    const top = asset.level(levels - 1, set).length / 4;
+    assert.ok(levels >= 3 && top >= 1 && top <= 16);
+    assert.match(sentence(() => asset.level(levels, set)), /there is no level/);
+  }
+  assert.match(
+      sentence(() => asset.spheres({detail: 99})), /bolt\.ist: there is no level 0 of detail 99/);
+  assert.match(
+      sentence(() => asset.spheres({measure: 'outer'})),
+      /measure is outer; there are matched, inner/);
+  asset.free();
+});
+
+test('the stored surface is closed and holds the volume', () => {
+  const asset = ist.Asset.from(bytesA);
+  const {positions, triangles} = asset.surface(), info = asset.info();
+  assert.equal(triangles.length, 3 * info.fieldTriangles);
+  const edges = new Set();
+  let six = 0;
+  for (let t = 0; t < triangles.length; t += 3) {
+    const [a, b, c] = [0, 1, 2].map(
+        (k) => Array.from(positions.subarray(3 * triangles[t + k], 3 * triangles[t + k] + 3)));
+    six += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+        a[2] * (b[0] * c[1] - b[1] * c[0]);
+    for (let k = 0; k < 3; ++k) {
+      const edge = triangles[t + k] * 2 ** 26 + triangles[t + (k + 1) % 3];
+      assert.ok(!edges.has(edge));
+      edges.add(edge);
+    }
+  }
+  for (const edge of edges)
+    assert.ok(edges.has(edge % 2 ** 26 * 2 ** 26 + Math.floor(edge / 2 ** 26)));
+  assert.ok(Math.abs(six / 6 / info.volume - 1) < 1e-6);
+  asset.free();
+});
+
+test('patches and lenses add up', () => {
+  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB), pose = {translation: [0, 0, 9]};
+  const whole = ist.penetration(a, b, pose);
+  const found = ist.contactPatches(a, b, pose, {maxPatches: 64});
+  assert.ok(found.count > 16 && found.patches.length === found.count);
+  assert.deepEqual(found.whole, whole);
+  const sum = found.patches.reduce((s, p) => s + p.force[2], 0);
+  assert.ok(Math.abs(sum - whole.force[2]) <= 1e-9 * whole.volume);
+  const few = ist.contactPatches(a, b, pose, {maxPatches: 3, into: found});
+  assert.ok(few === found && few.count === 3);
+
+  const apart = ist.separation(a, b, {translation: [100, 0, 0]});
+  assert.ok(
+      apart.distanceMin > 0 && apart.distanceMin <= apart.distanceMax && apart.normal[0] > 0.9);
+  assert.equal(ist.overlap(a, b, {translation: [100, 0, 0]}), 'no');
+  assert.equal(ist.overlap(a, b, pose), 'yes');
+
+  const lenses = ist.lenses(a, b, pose);
+  const summed = ist.penetration(a, b, pose, {field: 'never'});
+  assert.equal(lenses.total, summed.spherePairs);
+  const spheres = a.spheres();
+  for (let i = 0; i < lenses.count; ++i) {
+    const [x, y, z, , , , radius, thickness, sphere] = lenses.data.subarray(10 * i);
+    const [cx, cy, cz, r] = spheres.subarray(4 * sphere);
+    assert.ok(Math.hypot(x - cx, y - cy, z - cz) <= r && radius <= r && thickness <= 2 * r);
+  }
+  const coarse = ist.lenses(a, b, pose, {detailA: 1, detailB: 1, maxLenses: 2, into: lenses});
+  assert.ok(coarse === lenses && coarse.count === 2 && coarse.total < summed.spherePairs);
+  a.free();
+  b.free();
+});
+
+test('poses and scales: the world may be moved', () => {
+  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB);
+  const half = Math.SQRT1_2;
+  const still = ist.penetration(a, b, {translation: [0, 0, 9]});
+  const moved = ist.penetration(
+      a, b, {rotation: [half, 0, half, 0], translation: [9 + 5, 0, 0], scale: 1},
+      {poseA: {rotation: [half, 0, half, 0], translation: [5, 0, 0]}});
+  assert.ok(Math.abs(moved.volume / still.volume - 1) < 1e-9);
+  assert.ok(Math.abs(moved.centroid[0] - 5 - still.centroid[2]) < 1e-9);
+  const doubled = ist.penetration(a, b, {translation: [0, 0, 18], scale: 2}, {poseA: {scale: 2}});
+  assert.ok(Math.abs(doubled.volume / still.volume / 8 - 1) < 1e-9);
+  const limited = ist.penetration(a, b, {translation: [0, 0, 9]}, {maxVisits: 20});
+  assert.equal(limited.status, 'budget-exhausted');
+  assert.ok(limited.volumeMin <= still.volume && still.volume <= limited.volumeMax);
+  const hurried = ist.penetration(a, b, {translation: [0, 0, 9]}, {deadlineUs: 1e-3});
+  assert.equal(hurried.status, 'budget-exhausted');
+  a.free();
+  b.free();
+});
+
+test('fields', () => {
+  const b = ist.Asset.from(bytesB), {volume} = b.info(), {lower, upper} = b.bounds();
+  const near = (x, wanted, share) =>
+      assert.ok(Math.abs(x / wanted - 1) <= share, `${x} for ${wanted}`);
+  const floor = ist.Field.halfSpace([0, 0, 1], upper[2] + 1);
+  near(ist.penetration(floor, b, {}).volume, volume, 1e-3);
+  near(ist.separation(floor, b, {translation: [0, 0, 10 + upper[2] - lower[2]]}).distance, 9, 0.05);
+  near(ist.penetration(ist.Field.box([100, 100, 100]), b, {}).volume, volume, 1e-3);
+  near(ist.penetration(ist.Field.ball(100), b, {}).volume, volume, 1e-3);
+  near(ist.penetration(ist.Field.capsule(100, 1), b, {}).volume, volume, 1e-3);
+  near(ist.penetration(ist.Field.cylinder(100, 100), b, {}).volume, volume, 1e-3);
+  const cut = ist.penetration(ist.Field.halfSpace([0, 0, 1], 0), b, {}).volume;
+  const ground = ist.Field.heights(new Float32Array(16), 4, 4, [10, 10]);
+  near(ist.penetration(ground, b, {}).volume, cut, 1e-9);
+  const grid = new Float32Array(27).map((_, i) => 100 * (1 - Math.floor(i / 9)));  // −z
+  near(
+      ist.penetration(
+             ist.Field.distanceGrid(grid, [3, 3, 3], 100, {origin: [-100, -100, -100]}), b, {})
+          .volume,
+      cut, 1e-6);
+  const a = ist.Asset.from(bytesA), surface = ist.Field.surface(a), pose = {translation: [0, 0, 9]};
+  near(ist.penetration(surface, b, pose).volume, ist.penetration(a, b, pose).volume, 0.05);
+  assert.ok(ist.contactPatches(surface, b, pose).count > 1);
+  assert.equal(ist.overlap(surface, b, pose), 'yes');
+  assert.match(sentence(() => ist.lenses(surface, b, pose)), /a field has no spheres/);
+  a.free();
+  assert.match(sentence(() => ist.penetration(surface, b, pose)), /used after its free/);
+  assert.match(sentence(() => ist.penetration(ist.Field.ball(-1), b, {})), /out of range/);
+  assert.match(
+      sentence(() => ist.Field.heights(new Float32Array(3), 2, 2, [1, 1])),
+      /2 · 2 = 4 numbers, not 3/);
+  assert.match(
+      sentence(() => ist.Field.heights(new Float32Array(3), 3, 1, [1, 1])), /two points and more/);
+  b.free();
+});
+
+test('what is wrong is said', () => {
+  const a = ist.Asset.from(bytesA, 'bolt.ist'), b = ist.Asset.from(bytesB);
+  const ask = (pose, options) => () => ist.penetration(a, b, pose, options);
+  assert.match(sentence(ask()), /poseB is missing/);
+  assert.match(
+      sentence(ask({rotation: [1, 1, 0, 0]})), /penetration\(\): a pose, .* is out of range/);
+  assert.match(sentence(ask({rotation: [1, 0, 0]})), /poseB\.rotation has 3 numbers, not 4/);
+  assert.match(sentence(ask({translation: [NaN, 0, 0]})), /out of range/);
+  assert.match(sentence(ask({translation: ['1', 0, 0]})), /not a number/);
+  assert.match(sentence(ask({scale: 0})), /scale is 0; it must be > 0/);
+  assert.match(sentence(ask({}, {measure: 'outer'})), /measure is outer/);
+  assert.match(sentence(ask({}, {field: 'sometimes'})), /automatic, never, always/);
+  assert.match(sentence(ask({}, {pairBudget: -1})), /whole number/);
+  assert.match(sentence(() => ist.penetration({}, b, {})), /solid A must be an Asset or a Field/);
+  assert.match(
+      sentence(() => ist.penetration(a, ist.Field.ball(1), {})), /solid B must be an Asset/);
+  assert.match(sentence(() => ist.contactPatches(a, b, {}, {maxPatches: 65})), /from 1 to 64/);
+  assert.match(sentence(() => new ist.Asset()), /static functions/);
+  a.free();
+  a.free();
+  assert.match(sentence(ask({})), /bolt\.ist is used after its free\(\)/);
+  assert.match(sentence(() => a.info()), /used after its free\(\)/);
+  b.free();
+});
+
+test('memory comes back', () => {
+  const freed = () => {
+    for (let i = 0; i < 50; ++i) {
+      const asset = ist.Asset.from(bytesA);
+      ist.Field.heights(new Float32Array(1e4), 100, 100, [1, 1]).free();
+      asset.surface();
+      asset.free();
+      assert.throws(() => ist.Asset.from(bytesA.subarray(1)));
+    }
+  };
+  freed();
+  const before = process.memoryUsage().arrayBuffers + process.memoryUsage().external;
+  freed();
+  const b = ist.Asset.from(bytesB);  // after growing, what is asked next sees the new memory
+  assert.ok(ist.penetration(b, b, {translation: [0.1, 0, 0]}).volume > 0);
+  assert.ok(process.memoryUsage().arrayBuffers + process.memoryUsage().external < before + 5e7);
+  b.free();
+});
+
+test('assets that nobody refers to are released', async () => {
+  const script = `
+    import {readFileSync} from 'node:fs';
+    import * as ist from 'ist-query';
+    await ist.init();
+    const bytes = readFileSync(${JSON.stringify(pathA)});
+    for (let i = 0; i < 8000; ++i) {  // 5 GB
+      ist.Asset.from(bytes);
+      if (i % 200 == 0) { gc(); await new Promise((next) => setTimeout(next, 1)); }
+    }
+    console.log('all');`;
+  const told = execFileSync(
+      process.execPath, ['--expose-gc', '--input-type=module', '-e', script],
+      {cwd: packageFolder, encoding: 'utf8'});
+  assert.equal(told.trim(), 'all');
+});
+
+test('a loop that keeps its answers makes no garbage', () => {
+  const script = `
+    import {readFileSync} from 'node:fs';
+    import * as ist from 'ist-query';
+    await ist.init();
+    const a = ist.Asset.from(readFileSync(${
+      JSON.stringify(pathA)})), b = ist.Asset.from(readFileSync(${JSON.stringify(pathB)}));
+    const pose = {rotation: [1, 0, 0, 0], translation: [0, 0, 9], scale: 1};
+    const options = {}, gaps = {}, parts = {maxPatches: 8};
+    const step = (i) => {
+      pose.translation[2] = 9 + 1e-4 * (i % 1000);
+      options.into = ist.penetration(a, b, pose, options);
+      gaps.into = ist.separation(a, b, pose, gaps);
+      parts.into = ist.contactPatches(a, b, pose, parts);
+    };
+    for (let i = 0; i < 3000; ++i) step(i);
+    gc();
+    const before = process.memoryUsage().heapUsed;
+    for (let i = 0; i < 1000; ++i) step(i);
+    console.log((process.memoryUsage().heapUsed - before) / 1000);`;
+  const told = execFileSync(
+      process.execPath,
+      ['--expose-gc', '--max-semi-space-size=64', '--input-type=module', '-e', script],
+      {cwd: packageFolder, encoding: 'utf8'});
+  assert.ok(Number(told) < 100, `${told.trim()} bytes a step`);
+});
