@@ -71,9 +71,10 @@ IST_HD inline bool place_pair(const BatchArrays& batch, std::uint32_t i, PairPla
   const GpuPairs& pairs = batch.pairs;
   const std::uint32_t a = pairs.asset_a[i], b = pairs.asset_b[i];
   if (a >= batch.asset_count || b >= batch.asset_count) return false;
-  return place.place(batch.assets[a].frame, pairs.pose_a != nullptr ? pairs.pose_a[i] : Pose(),
+  const Pose still = {{1, 0, 0, 0}, {0, 0, 0}};
+  return place.place(batch.assets[a].frame, pairs.pose_a != nullptr ? pairs.pose_a[i] : still,
                      pairs.scale_a != nullptr ? pairs.scale_a[i] : 1, batch.assets[b].frame,
-                     pairs.pose_b != nullptr ? pairs.pose_b[i] : Pose(),
+                     pairs.pose_b != nullptr ? pairs.pose_b[i] : still,
                      pairs.scale_b != nullptr ? pairs.scale_b[i] : 1);
 }
 

@@ -17,6 +17,9 @@ enum Term {
   kTerms = 11
 };
 
+IST_HD inline float root(float x) { return sqrtf(x); }
+IST_HD inline double root(double x) { return sqrt(x); }
+
 /// Two balls that meet.
 template <class Real>
 struct alignas(4 * sizeof(Real)) LensSide {
@@ -30,7 +33,7 @@ template <class Real>
 IST_HD void add_lens(const LensSide<Real>& lever, const LensSide<Real>& apart, Real rounding,
                      Real (&sum)[kTerms]) {
   constexpr Real kTiny = sizeof(Real) == 4 ? Real(1.1754944e-38) : Real(2.2250738585072014e-308);
-  const Real d = std::sqrt((apart.x * apart.x + apart.y * apart.y) + apart.z * apart.z);
+  const Real d = root((apart.x * apart.x + apart.y * apart.y) + apart.z * apart.z);
   const bool a_is_larger = lever.r > apart.r;
   const Real a = a_is_larger ? lever.r : apart.r;
   const Real b = a_is_larger ? apart.r : lever.r;

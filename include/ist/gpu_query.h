@@ -8,7 +8,7 @@
 #include <ist/api.h>
 #include <ist/gpu.h>
 #include <ist/pose.h>
-#include <ist/query.h>
+#include <ist/query_enums.h>
 #include <ist/tree_view.h>
 
 // Penetrations of many pairs at once, on a GPU. Assets are uploaded once; poses and answers are

@@ -8,38 +8,10 @@
 
 #include <ist/api.h>
 #include <ist/pose.h>
+#include <ist/query_enums.h>
 #include <ist/tree_view.h>
 
 namespace IST_API ist {
-
-enum class QueryStatus : std::uint32_t {
-  ok = 0,  ///< finished: the gradients are exactly those of the returned volume
-  /// A limit of the settings or the workspace's capacity stopped the descent: bounds still hold.
-  budget_exhausted = 1,
-  /// The answer is all zero. One of: a pose with NaN or Inf; a quaternion off unit length by more
-  /// than 1e-3; a scale ≤ 0; an empty tree; sizes or distances more than 1e60 : 1 apart; a
-  /// workspace that was moved from.
-  invalid_input = 2,
-};
-
-/// Which spheres stand for the solid.
-enum class Measure : std::uint32_t {
-  matched = 0,  ///< matched spheres whose volumes sum to the solid's: the accurate one
-  inner = 1,    ///< inner spheres: a certified lower bound of the true volume
-};
-
-/// Whether the surface that an asset holds (TreeView::has_field) is used.
-///
-/// A sphere that meets the other solid's surface has an exact part inside it; a lens of two spheres
-/// knows nothing of the surface between a sphere and its neighbours.
-enum class FieldUse : std::uint32_t {
-  /// The finer tree's spheres meet the coarser one's surface where its spheres are too coarse for
-  /// the contact; trees of like size in deeper contact are summed by lenses, and what is between is
-  /// blended smoothly. Without a field in the coarser asset: lenses.
-  automatic = 0,
-  never = 1,   ///< lenses alone
-  always = 2,  ///< the surface alone, whatever it costs
-};
 
 /// What a penetration may cost. Zero, a negative value or NaN means no limit; with none set the
 /// answer is the finished sum.

@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include <ist/query.h>
+
 #include "cuda/query/batch_steps.h"
 #include "numerics/team.h"
 #include "support/fiber_team.h"

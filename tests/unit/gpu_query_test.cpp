@@ -7,10 +7,9 @@
 
 #include "query/base/relative_pose.h"
 #include "query/kernel/lens.h"
-#include "support/baked.h"
 #include "support/host_batch.h"
+#include "support/random_pairs.h"
 #include "support/reference_sum.h"
-#include "support/test_meshes.h"
 
 // The GPU's batch of penetrations, its source run by teams of the host: of one lane, and of 32 that
 // go on in an order that nobody can count on.
@@ -21,74 +20,8 @@ namespace {
 using Eigen::Vector3d;
 using Pair = HostBatch::Pair;
 
-const std::vector<Asset>& assets() {
-  static const std::vector<Asset> made = [] {
-    std::vector<Asset> out;
-    out.push_back(baked(torus_mesh(1, 0.4, 48, 24), "torus", 1500, false));
-    out.push_back(baked(icosphere_mesh(3), "ball", 300, false));
-    out.push_back(baked(cube_mesh(), "cube", 40, false));
-    out.push_back(baked(cube_mesh(), "cube", 10, false));
-    return out;
-  }();
-  return made;
-}
-
-std::vector<TreeView> views() {
-  std::vector<TreeView> out;
-  for (const Asset& asset : assets()) out.push_back(asset.view());
-  return out;
-}
-
-class Poses {
- public:
-  explicit Poses(unsigned seed) : random_(seed) {}
-
-  double uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
-  }
-  Pose pose(double reach) {
-    Eigen::Quaterniond q(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
-    q.normalize();
-    return {{q.w(), q.x(), q.y(), q.z()},
-            {uniform(-reach, reach), uniform(-reach, reach), uniform(-reach, reach)}};
-  }
-  std::uint32_t asset() { return static_cast<std::uint32_t>(random_() % assets().size()); }
-
-  /// Of solids that meet more often than not, of like and unlike sizes.
-  std::vector<Pair> pairs(std::size_t count) {
-    std::vector<Pair> out;
-    for (std::size_t k = 0; k < count; ++k) {
-      Pair pair = {asset(), asset(), pose(0.2), pose(0.8), uniform(0.8, 1.2), 1};
-      pair.scale_b = std::exp(uniform(-3, 0.5));
-      out.push_back(pair);
-    }
-    return out;
-  }
-
- private:
-  std::mt19937_64 random_;
-};
-
-std::pair<PlacedTree, PlacedTree> placed(const Pair& pair) {
-  return {PlacedTree{assets()[pair.a].view(), pair.pose_a, pair.scale_a},
-          PlacedTree{assets()[pair.b].view(), pair.pose_b, pair.scale_b}};
-}
-
-void expect_same_bits(const std::vector<Penetration>& x, const std::vector<Penetration>& y) {
-  ASSERT_EQ(x.size(), y.size());
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    EXPECT_EQ(x[i].volume, y[i].volume) << i;
-    EXPECT_EQ(x[i].centroid, y[i].centroid) << i;
-    EXPECT_EQ(x[i].translation_gradient, y[i].translation_gradient) << i;
-    EXPECT_EQ(x[i].rotation_gradient, y[i].rotation_gradient) << i;
-    EXPECT_EQ(x[i].status, y[i].status) << i;
-    EXPECT_EQ(x[i].node_visits, y[i].node_visits) << i;
-    EXPECT_EQ(x[i].sphere_pairs, y[i].sphere_pairs) << i;
-  }
-}
-
 TEST(GpuQuery, SeesPairsAsTheCpuDoes) {
-  Poses poses(1);
+  RandomPairs poses(1);
   for (const Pair& pair : poses.pairs(200)) {
     const auto [a, b] = placed(pair);
     const std::optional<RelativePose> cpu = relative_pose(a, b);
@@ -117,7 +50,7 @@ TEST(GpuQuery, SeesPairsAsTheCpuDoes) {
 }
 
 TEST(GpuQuery, ALensIsTheCpus) {
-  Poses random(2);
+  RandomPairs random(2);
   for (int trial = 0; trial < 2000; ++trial) {
     const auto ra = static_cast<float>(random.uniform(0, 1));
     const auto rb = static_cast<float>(random.uniform(0, 1));
@@ -135,12 +68,12 @@ TEST(GpuQuery, ALensIsTheCpus) {
 }
 
 TEST(GpuQuery, AnswersAreTheSumsInDouble) {
-  Poses poses(3);
+  RandomPairs poses(3);
   const std::vector<Pair> pairs = poses.pairs(400);
   double worst = 0, worst_push = 0, worst_turn = 0, worst_centre = 0;
   std::size_t met = 0;
   for (const Measure measure : {Measure::matched, Measure::inner}) {
-    HostBatch batch(views());
+    HostBatch batch(batch_views());
     const std::vector<Penetration> answers = batch.run(pairs, measure);
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       const auto [a, b] = placed(pairs[i]);
@@ -179,21 +112,21 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
 
 /// Splitting, and who does what in which order, must not show.
 TEST(GpuQuery, SameBitsHoweverItIsSplit) {
-  Poses poses(4);
+  RandomPairs poses(4);
   const std::vector<Pair> pairs = poses.pairs(100);
-  HostBatch roomy(views());
+  HostBatch roomy(batch_views());
   const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched);
   EXPECT_GT(roomy.counters.tasks[0], 20u);
   for (const std::uint32_t room : {0u, 30u, 300u}) {
-    HostBatch narrow(views(), room);
+    HostBatch narrow(batch_views(), room);
     expect_same_bits(narrow.run(pairs, Measure::matched), expected);
   }
 }
 
 TEST(GpuQuery, LanesOfAWarpNeedNoLuck) {
-  Poses poses(5);
+  RandomPairs poses(5);
   const std::vector<Pair> pairs = poses.pairs(25);
-  HostBatch alone(views()), roomy(views()), narrow(views(), 7);
+  HostBatch alone(batch_views()), roomy(batch_views()), narrow(batch_views(), 7);
   const std::vector<Penetration> by_one = alone.run(pairs, Measure::matched);
   const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched, 1);
   EXPECT_GT(roomy.counters.tasks[0], 3u);
@@ -206,9 +139,9 @@ TEST(GpuQuery, LanesOfAWarpNeedNoLuck) {
 }
 
 TEST(GpuQuery, InvalidPosesSpoilOnlyThemselves) {
-  Poses poses(6);
+  RandomPairs poses(6);
   std::vector<Pair> pairs = poses.pairs(40);
-  const std::vector<Penetration> sound = HostBatch(views()).run(pairs, Measure::matched);
+  const std::vector<Penetration> sound = HostBatch(batch_views()).run(pairs, Measure::matched);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double inf = std::numeric_limits<double>::infinity();
   pairs[3].pose_b.t[1] = nan;
@@ -220,13 +153,13 @@ TEST(GpuQuery, InvalidPosesSpoilOnlyThemselves) {
   pairs[23].scale_b = nan;
   pairs[29].pose_a.t[0] = -inf;
   const std::vector<std::size_t> bad = {3, 7, 11, 13, 17, 19, 23, 29};
-  const std::vector<Penetration> answers = HostBatch(views()).run(pairs, Measure::matched);
+  const std::vector<Penetration> answers = HostBatch(batch_views()).run(pairs, Measure::matched);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const bool is_bad = std::find(bad.begin(), bad.end(), i) != bad.end();
     EXPECT_EQ(answers[i].status, is_bad ? QueryStatus::invalid_input : QueryStatus::ok) << i;
     EXPECT_EQ(answers[i].volume, is_bad ? 0 : sound[i].volume) << i;
   }
-  EXPECT_TRUE(HostBatch(views()).run({}, Measure::inner).empty());
+  EXPECT_TRUE(HostBatch(batch_views()).run({}, Measure::inner).empty());
 }
 
 }  // namespace

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "support/baked.h"
+#include "support/host_batch.h"
+#include "support/test_meshes.h"
+
+namespace ist::testing {
+
+/// Solids of like and unlike sizes of spheres.
+inline const std::vector<Asset>& batch_assets() {
+  static const std::vector<Asset> made = [] {
+    std::vector<Asset> out;
+    out.push_back(baked(torus_mesh(1, 0.4, 48, 24), "torus", 1500, false));
+    out.push_back(baked(icosphere_mesh(3), "ball", 300, false));
+    out.push_back(baked(cube_mesh(), "cube", 40, false));
+    out.push_back(baked(cube_mesh(), "cube", 10, false));
+    return out;
+  }();
+  return made;
+}
+
+inline std::vector<TreeView> batch_views() {
+  std::vector<TreeView> out;
+  for (const Asset& asset : batch_assets()) out.push_back(asset.view());
+  return out;
+}
+
+/// Pairs of them, the same for a seed on every machine.
+class RandomPairs {
+ public:
+  explicit RandomPairs(unsigned seed) : random_(seed) {}
+
+  double uniform(double low, double high) {
+    return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
+  }
+  Pose pose(double reach) {
+    Eigen::Quaterniond q(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+    q.normalize();
+    return {{q.w(), q.x(), q.y(), q.z()},
+            {uniform(-reach, reach), uniform(-reach, reach), uniform(-reach, reach)}};
+  }
+  std::uint32_t asset() { return static_cast<std::uint32_t>(random_() % batch_assets().size()); }
+
+  /// Of solids that meet more often than not, of like and unlike sizes.
+  std::vector<HostBatch::Pair> pairs(std::size_t count) {
+    std::vector<HostBatch::Pair> out;
+    for (std::size_t k = 0; k < count; ++k) {
+      HostBatch::Pair pair = {asset(), asset(), pose(0.2), pose(0.8), uniform(0.8, 1.2), 1};
+      pair.scale_b = std::exp(uniform(-3, 0.5));
+      out.push_back(pair);
+    }
+    return out;
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+inline std::pair<PlacedTree, PlacedTree> placed(const HostBatch::Pair& pair) {
+  return {PlacedTree{batch_assets()[pair.a].view(), pair.pose_a, pair.scale_a},
+          PlacedTree{batch_assets()[pair.b].view(), pair.pose_b, pair.scale_b}};
+}
+
+inline void expect_same_bits(const std::vector<Penetration>& x, const std::vector<Penetration>& y) {
+  ASSERT_EQ(x.size(), y.size());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    EXPECT_EQ(x[i].volume, y[i].volume) << i;
+    EXPECT_EQ(x[i].centroid, y[i].centroid) << i;
+    EXPECT_EQ(x[i].translation_gradient, y[i].translation_gradient) << i;
+    EXPECT_EQ(x[i].rotation_gradient, y[i].rotation_gradient) << i;
+    EXPECT_EQ(x[i].status, y[i].status) << i;
+    EXPECT_EQ(x[i].node_visits, y[i].node_visits) << i;
+    EXPECT_EQ(x[i].sphere_pairs, y[i].sphere_pairs) << i;
+  }
+}
+
+}  // namespace ist::testing
