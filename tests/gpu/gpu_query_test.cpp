@@ -5,6 +5,7 @@
 #include <ist/gpu_query.h>
 
 #include "cuda/check.h"
+#include "support/device_batch.h"
 #include "support/gpu_test.h"
 #include "support/host_batch.h"
 #include "support/random_pairs.h"
@@ -17,116 +18,8 @@ namespace {
 
 class GpuQueryTest : public GpuTest {};
 
-/// An array in device memory.
-template <class T>
-class OnDevice {
- public:
-  explicit OnDevice(std::size_t size) : size_(size) {
-    void* memory = nullptr;
-    gpu::check(cudaMalloc(&memory, std::max<std::size_t>(1, size) * sizeof(T)), "allocating");
-    data_ = static_cast<T*>(memory);
-    gpu::check(cudaMemset(data_, 0xA5, size * sizeof(T)), "filling");
-  }
-  explicit OnDevice(const std::vector<T>& from) : OnDevice(from.size()) {
-    gpu::check(cudaMemcpy(data_, from.data(), size_ * sizeof(T), cudaMemcpyHostToDevice),
-               "copying to the GPU");
-  }
-  ~OnDevice() { cudaFree(data_); }
-  OnDevice(const OnDevice&) = delete;
-  OnDevice& operator=(const OnDevice&) = delete;
-
-  T* data() const { return data_; }
-  std::vector<T> get() const {
-    std::vector<T> out(size_);
-    gpu::check(cudaMemcpy(out.data(), data_, size_ * sizeof(T), cudaMemcpyDeviceToHost),
-               "copying from the GPU");
-    return out;
-  }
-
- private:
-  T* data_ = nullptr;
-  std::size_t size_;
-};
-
-class Stream {
- public:
-  Stream() { gpu::check(cudaStreamCreate(&stream_), "making a stream"); }
-  ~Stream() { cudaStreamDestroy(stream_); }
-  operator cudaStream_t() const { return stream_; }
-  void wait() const { gpu::check(cudaStreamSynchronize(stream_), "waiting"); }
-
- private:
-  cudaStream_t stream_ = nullptr;
-};
-
-/// Pairs and room for their answers on the device.
-class DeviceBatch {
- public:
-  explicit DeviceBatch(const std::vector<HostBatch::Pair>& pairs)
-      : size_(pairs.size()),
-        a_(column<std::uint32_t>(pairs, [](const auto& p) { return p.a; })),
-        b_(column<std::uint32_t>(pairs, [](const auto& p) { return p.b; })),
-        pose_a_(column<Pose>(pairs, [](const auto& p) { return p.pose_a; })),
-        pose_b_(column<Pose>(pairs, [](const auto& p) { return p.pose_b; })),
-        scale_a_(column<double>(pairs, [](const auto& p) { return p.scale_a; })),
-        scale_b_(column<double>(pairs, [](const auto& p) { return p.scale_b; })),
-        volume_(size_),
-        centroid_(3 * size_),
-        push_(3 * size_),
-        turn_(3 * size_),
-        status_(size_),
-        visits_(size_),
-        spheres_(size_) {}
-
-  GpuPairs pairs() const {
-    return {size_,          a_.data(),       b_.data(),      pose_a_.data(),
-            pose_b_.data(), scale_a_.data(), scale_b_.data()};
-  }
-  GpuPenetrations answers() const {
-    return {volume_.data(), centroid_.data(), push_.data(),   turn_.data(),
-            status_.data(), visits_.data(),   spheres_.data()};
-  }
-
-  std::vector<Penetration> get() const {
-    const auto volume = volume_.get(), centroid = centroid_.get(), push = push_.get(),
-               turn = turn_.get();
-    const auto status = status_.get();
-    const auto visits = visits_.get(), spheres = spheres_.get();
-    const auto vector = [](const std::vector<double>& from, std::size_t i) {
-      return Eigen::Vector3d(from[3 * i], from[3 * i + 1], from[3 * i + 2]);
-    };
-    std::vector<Penetration> out(size_);
-    for (std::size_t i = 0; i < size_; ++i) {
-      out[i].volume = volume[i];
-      out[i].centroid = vector(centroid, i);
-      out[i].translation_gradient = vector(push, i);
-      out[i].rotation_gradient = vector(turn, i);
-      out[i].status = status[i];
-      out[i].node_visits = visits[i];
-      out[i].sphere_pairs = spheres[i];
-    }
-    return out;
-  }
-
- private:
-  template <class T, class Get>
-  static std::vector<T> column(const std::vector<HostBatch::Pair>& pairs, const Get& get) {
-    std::vector<T> out;
-    for (const HostBatch::Pair& pair : pairs) out.push_back(get(pair));
-    return out;
-  }
-
-  std::size_t size_;
-  OnDevice<std::uint32_t> a_, b_;
-  OnDevice<Pose> pose_a_, pose_b_;
-  OnDevice<double> scale_a_, scale_b_;
-  OnDevice<double> volume_, centroid_, push_, turn_;
-  OnDevice<QueryStatus> status_;
-  OnDevice<std::uint32_t> visits_, spheres_;
-};
-
 TEST_F(GpuQueryTest, HasTheBitsOfAWarpOnTheHost) {
-  std::vector<HostBatch::Pair> pairs = RandomPairs(11).pairs(150);
+  std::vector<BatchPair> pairs = RandomPairs(11).pairs(150);
   pairs[20].pose_b.t[0] = std::nan("");
   pairs[30].scale_b = -1;
   pairs[40].a = 1000;
@@ -143,8 +36,8 @@ TEST_F(GpuQueryTest, HasTheBitsOfAWarpOnTheHost) {
 }
 
 TEST_F(GpuQueryTest, ManyPairsHaveTheSameBitsInEveryRun) {
-  const std::vector<HostBatch::Pair> some = RandomPairs(12).pairs(3000);
-  std::vector<HostBatch::Pair> pairs;
+  const std::vector<BatchPair> some = RandomPairs(12).pairs(3000);
+  std::vector<BatchPair> pairs;
   for (std::size_t i = 0; i < 300000; ++i) pairs.push_back(some[(i * 7919) % some.size()]);
   const GpuAssets assets(batch_views());
   GpuWorkspace workspace(pairs.size());
@@ -161,7 +54,7 @@ TEST_F(GpuQueryTest, ManyPairsHaveTheSameBitsInEveryRun) {
 }
 
 TEST_F(GpuQueryTest, AGraphMayCaptureIt) {
-  const std::vector<HostBatch::Pair> pairs = RandomPairs(13).pairs(500);
+  const std::vector<BatchPair> pairs = RandomPairs(13).pairs(500);
   const GpuAssets assets(batch_views());
   GpuWorkspace workspace(pairs.size());
   const Stream stream;
@@ -183,7 +76,7 @@ TEST_F(GpuQueryTest, AGraphMayCaptureIt) {
 }
 
 TEST_F(GpuQueryTest, WhatDoesNotFitIsAnError) {
-  const std::vector<HostBatch::Pair> pairs = RandomPairs(14).pairs(5);
+  const std::vector<BatchPair> pairs = RandomPairs(14).pairs(5);
   const GpuAssets assets(batch_views());
   GpuWorkspace workspace(4);
   const DeviceBatch batch(pairs);

@@ -6,6 +6,7 @@
 
 #include "cuda/query/batch_steps.h"
 #include "numerics/team.h"
+#include "support/batch_pair.h"
 #include "support/fiber_team.h"
 
 namespace ist::testing {
@@ -22,19 +23,14 @@ class HostBatch {
     }
   }
 
-  struct Pair {
-    std::uint32_t a = 0, b = 0;
-    Pose pose_a, pose_b;
-    double scale_a = 1, scale_b = 1;
-  };
-
   /// `seed`: of the order in which lanes go on; 0: a team of one.
-  std::vector<Penetration> run(const std::vector<Pair>& pairs, Measure measure, unsigned seed = 0) {
+  std::vector<Penetration> run(const std::vector<BatchPair>& pairs, Measure measure,
+                               unsigned seed = 0) {
     const std::size_t n = pairs.size();
     std::vector<std::uint32_t> a, b;
     std::vector<Pose> pose_a, pose_b;
     std::vector<double> scale_a, scale_b;
-    for (const Pair& pair : pairs) {
+    for (const BatchPair& pair : pairs) {
       a.push_back(pair.a);
       b.push_back(pair.b);
       pose_a.push_back(pair.pose_a);

@@ -50,10 +50,10 @@ class RandomPairs {
   std::uint32_t asset() { return static_cast<std::uint32_t>(random_() % batch_assets().size()); }
 
   /// Of solids that meet more often than not, of like and unlike sizes.
-  std::vector<HostBatch::Pair> pairs(std::size_t count) {
-    std::vector<HostBatch::Pair> out;
+  std::vector<BatchPair> pairs(std::size_t count) {
+    std::vector<BatchPair> out;
     for (std::size_t k = 0; k < count; ++k) {
-      HostBatch::Pair pair = {asset(), asset(), pose(0.2), pose(0.8), uniform(0.8, 1.2), 1};
+      BatchPair pair = {asset(), asset(), pose(0.2), pose(0.8), uniform(0.8, 1.2), 1};
       pair.scale_b = std::exp(uniform(-3, 0.5));
       out.push_back(pair);
     }
@@ -64,7 +64,7 @@ class RandomPairs {
   std::mt19937_64 random_;
 };
 
-inline std::pair<PlacedTree, PlacedTree> placed(const HostBatch::Pair& pair) {
+inline std::pair<PlacedTree, PlacedTree> placed(const BatchPair& pair) {
   return {PlacedTree{batch_assets()[pair.a].view(), pair.pose_a, pair.scale_a},
           PlacedTree{batch_assets()[pair.b].view(), pair.pose_b, pair.scale_b}};
 }

@@ -18,11 +18,10 @@ namespace ist::testing {
 namespace {
 
 using Eigen::Vector3d;
-using Pair = HostBatch::Pair;
 
 TEST(GpuQuery, SeesPairsAsTheCpuDoes) {
   RandomPairs poses(1);
-  for (const Pair& pair : poses.pairs(200)) {
+  for (const BatchPair& pair : poses.pairs(200)) {
     const auto [a, b] = placed(pair);
     const std::optional<RelativePose> cpu = relative_pose(a, b);
     ASSERT_TRUE(cpu);
@@ -69,7 +68,7 @@ TEST(GpuQuery, ALensIsTheCpus) {
 
 TEST(GpuQuery, AnswersAreTheSumsInDouble) {
   RandomPairs poses(3);
-  const std::vector<Pair> pairs = poses.pairs(400);
+  const std::vector<BatchPair> pairs = poses.pairs(400);
   double worst = 0, worst_push = 0, worst_turn = 0, worst_centre = 0;
   std::size_t met = 0;
   for (const Measure measure : {Measure::matched, Measure::inner}) {
@@ -113,7 +112,7 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
 /// Splitting, and who does what in which order, must not show.
 TEST(GpuQuery, SameBitsHoweverItIsSplit) {
   RandomPairs poses(4);
-  const std::vector<Pair> pairs = poses.pairs(100);
+  const std::vector<BatchPair> pairs = poses.pairs(100);
   HostBatch roomy(batch_views());
   const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched);
   EXPECT_GT(roomy.counters.tasks[0], 20u);
@@ -125,7 +124,7 @@ TEST(GpuQuery, SameBitsHoweverItIsSplit) {
 
 TEST(GpuQuery, LanesOfAWarpNeedNoLuck) {
   RandomPairs poses(5);
-  const std::vector<Pair> pairs = poses.pairs(25);
+  const std::vector<BatchPair> pairs = poses.pairs(25);
   HostBatch alone(batch_views()), roomy(batch_views()), narrow(batch_views(), 7);
   const std::vector<Penetration> by_one = alone.run(pairs, Measure::matched);
   const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched, 1);
@@ -140,7 +139,7 @@ TEST(GpuQuery, LanesOfAWarpNeedNoLuck) {
 
 TEST(GpuQuery, InvalidPosesSpoilOnlyThemselves) {
   RandomPairs poses(6);
-  std::vector<Pair> pairs = poses.pairs(40);
+  std::vector<BatchPair> pairs = poses.pairs(40);
   const std::vector<Penetration> sound = HostBatch(batch_views()).run(pairs, Measure::matched);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double inf = std::numeric_limits<double>::infinity();

@@ -1,0 +1,260 @@
+// Penetrations of many pairs at once on the GPU: rates with a million poses, the time of one step
+// of 4,096 worlds, growth with spheres and with the batch; the same by all cores of the machine.
+// Answers are compared with the CPU's.
+#include <cuda_runtime_api.h>
+
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <ist/bake.h>
+#include <ist/gpu_query.h>
+#include <ist/query_tbb.h>
+
+#include "cuda/check.h"
+#include "report.h"
+#include "samples/samples.h"
+#include "support/device_batch.h"
+#include "support/oracle_rows.h"
+#include "timing.h"
+
+namespace {
+
+using namespace ist;
+using ist::benchmark::Report;
+using ist::testing::BatchPair;
+using ist::testing::DeviceBatch;
+
+constexpr int kRepeats = 10;
+
+Asset baked(const TriangleMesh& mesh, const std::string& name, std::size_t spheres) {
+  PackingSettings settings;
+  settings.max_spheres = spheres;
+  settings.field.wanted = false;
+  return bake(close_mesh(mesh, name), settings);
+}
+
+/// Two assets and the poses at which B meets A.
+struct Scene {
+  std::string name;
+  const Asset* a;
+  const Asset* b;
+  std::vector<BatchPair> poses;
+  double rate = 0, step_ms = 0;  ///< what one H200 is to reach: M/s of a million, ms of 4,096; 0: –
+};
+
+/// A nut on its bolt at any turn, its thread pushed a little way out of the middle of the gap.
+std::vector<BatchPair> nut_poses(std::size_t count) {
+  std::mt19937_64 random(5);
+  std::vector<BatchPair> out;
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto uniform = [&](double low, double high) {
+      return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+    };
+    const double turn = uniform(0, 1);
+    const double half = std::numbers::pi * turn;
+    BatchPair pair;
+    pair.b = 1;
+    pair.pose_b = {
+        {std::cos(half), 0, 0, std::sin(half)},
+        {uniform(-0.04, 0.04), uniform(-0.04, 0.04), 8 + 2 * turn + uniform(-0.08, 0.08)}};
+    out.push_back(pair);
+  }
+  return out;
+}
+
+std::vector<BatchPair> oracle_poses(const std::string& pose_class) {
+  std::vector<BatchPair> out;
+  for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
+    if (row.pose_class != pose_class) continue;
+    BatchPair pair;
+    pair.b = 1;
+    pair.pose_b = row.pose;
+    pair.scale_b = row.scale_b;
+    out.push_back(pair);
+  }
+  return out;
+}
+
+/// `count` of the poses in random order.
+std::vector<BatchPair> drawn(const std::vector<BatchPair>& poses, std::size_t count) {
+  std::mt19937_64 random(1);
+  std::vector<BatchPair> out;
+  out.reserve(count);
+  for (std::size_t k = 0; k < count; ++k) out.push_back(poses[random() % poses.size()]);
+  return out;
+}
+
+class Stream {
+ public:
+  Stream() {
+    gpu::check(cudaStreamCreate(&stream_), "making a stream");
+    for (cudaEvent_t& event : events_) gpu::check(cudaEventCreate(&event), "making an event");
+  }
+  ~Stream() {
+    for (cudaEvent_t event : events_) cudaEventDestroy(event);
+    cudaStreamDestroy(stream_);
+  }
+  Stream(const Stream&) = delete;
+  Stream& operator=(const Stream&) = delete;
+
+  cudaStream_t get() const { return stream_; }
+
+  /// [ms] of the device's work.
+  template <class Work>
+  double time(const Work& work) const {
+    gpu::check(cudaEventRecord(events_[0], stream_), "timing");
+    work();
+    gpu::check(cudaEventRecord(events_[1], stream_), "timing");
+    gpu::check(cudaEventSynchronize(events_[1]), "timing");
+    float ms = 0;
+    gpu::check(cudaEventElapsedTime(&ms, events_[0], events_[1]), "timing");
+    return static_cast<double>(ms);
+  }
+
+ private:
+  cudaStream_t stream_ = nullptr;
+  cudaEvent_t events_[2] = {};
+};
+
+class Batches {
+ public:
+  explicit Batches(std::size_t most) : workspace_(most) {}
+
+  /// [ms], the median of ten; keeps the last answers.
+  double median_ms(const Scene& scene, std::size_t count) {
+    const TreeView views[2] = {scene.a->view(), scene.b->view()};
+    const GpuAssets assets(views);
+    const DeviceBatch batch(drawn(scene.poses, count));
+    const auto run = [&] {
+      penetration_batch(assets, batch.pairs(), Measure::matched, workspace_, batch.answers(),
+                        stream_.get());
+    };
+    run();
+    std::vector<double> ms;
+    for (int k = 0; k < kRepeats; ++k) ms.push_back(stream_.time(run));
+    answers_ = batch.get();
+    return benchmark::quantile(ms, 0.5);
+  }
+
+  const std::vector<Penetration>& answers() const { return answers_; }
+
+ private:
+  GpuWorkspace workspace_;
+  Stream stream_;
+  std::vector<Penetration> answers_;
+};
+
+std::vector<PlacedPair> placed(const Scene& scene, std::size_t count) {
+  std::vector<PlacedPair> out;
+  for (const BatchPair& pair : drawn(scene.poses, count))
+    out.push_back({{scene.a->view(), pair.pose_a, pair.scale_a},
+                   {scene.b->view(), pair.pose_b, pair.scale_b}});
+  return out;
+}
+
+/// M/s by all cores; `answers` of as many.
+double cpu_rate(const Scene& scene, std::size_t count, std::vector<Penetration>& answers) {
+  const std::vector<PlacedPair> pairs = placed(scene, count);
+  PenetrationSettings settings;
+  settings.field = FieldUse::never;
+  std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
+  answers.resize(count);
+  double best = 1e30;
+  for (int k = 0; k < 3; ++k) {
+    const double start = benchmark::wall_seconds();
+    penetration_batch(pairs, settings, workspaces, answers, tbb_parallel_for());
+    best = std::min(best, benchmark::wall_seconds() - start);
+  }
+  return static_cast<double>(count) / best * 1e-6;
+}
+
+/// The largest difference to the CPU's volumes, relative.
+double worst_volume(const std::vector<Penetration>& gpu, const std::vector<Penetration>& cpu) {
+  double worst = 0;
+  for (std::size_t i = 0; i < cpu.size(); ++i) {
+    if (cpu[i].volume == 0 && gpu[i].volume == 0) continue;
+    worst = std::max(
+        worst, std::abs(gpu[i].volume - cpu[i].volume) / std::max(cpu[i].volume, gpu[i].volume));
+  }
+  return worst;
+}
+
+int measure(Report& report) {
+  const std::size_t many = report.quick() ? 100'000 : 1'000'000;
+  const std::size_t for_cpu = report.quick() ? 2'000 : 20'000;
+  const TriangleMesh elephant = load_mesh(testing::oracle_mesh_path("elephant"));
+  const TriangleMesh dino = load_mesh(testing::oracle_mesh_path("dino"));
+  const Asset elephant4k = baked(elephant, "elephant", 4'000), dino4k = baked(dino, "dino", 4'000);
+  const Asset bolt = baked(make_sample("bolt"), "bolt", 10'000);
+  const Asset nut = baked(make_sample("nut"), "nut", 10'000);
+  std::vector<Scene> scenes;
+  const auto of_oracle = [&](const std::string& name, double rate, double step_ms) {
+    scenes.push_back({name, &elephant4k, &dino4k, oracle_poses(name), rate, step_ms});
+  };
+  of_oracle("pen", 25, 0.3);
+  of_oracle("deep", 3, 0);
+  of_oracle("contain", 8, 0);
+  of_oracle("sep", 500, 0);
+  scenes.push_back({"nut on bolt", &bolt, &nut, nut_poses(400), 2, 2});
+
+  Batches batches(many);
+  bool right = true;
+  for (const Scene& scene : scenes) {
+    const double ms = batches.median_ms(scene, many);
+    const double rate = static_cast<double>(many) / ms * 1e-3;
+    std::vector<Penetration> cpu;
+    const double by_cores = cpu_rate(scene, for_cpu, cpu);
+    const double worst = worst_volume(batches.answers(), cpu);
+    const double step = batches.median_ms(scene, 4096);
+    right = right && worst < 1e-4;
+    report.row("Batches", {{"poses", scene.name},
+                           {"spheres", scene.a->view().sphere_count()},
+                           {"pairs", many},
+                           {"M/s", rate},
+                           {"4,096 pairs, ms", step},
+                           {"M/s by all cores", by_cores},
+                           {"largest difference to the CPU", worst}});
+    if (scene.rate > 0) report.target(scene.name + ", M/s", rate, scene.rate);
+    if (scene.step_ms > 0) report.target(scene.name + ", 4,096 in ms", step, scene.step_ms, true);
+  }
+  for (std::size_t count = 1; count <= many; count *= 8)
+    report.row("Growth with the batch",
+               {{"poses", "pen"}, {"pairs", count}, {"ms", batches.median_ms(scenes[0], count)}});
+  for (const std::size_t spheres : {250u, 1'000u, 16'000u, 64'000u}) {
+    if (report.quick() && spheres > 1'000) break;
+    const Asset a = baked(elephant, "elephant", spheres), b = baked(dino, "dino", spheres);
+    const Scene scene{"pen", &a, &b, scenes[0].poses};
+    const double ms = batches.median_ms(scene, many / 10);
+    report.row("Growth with spheres", {{"poses", "pen"},
+                                       {"spheres", spheres},
+                                       {"pairs", many / 10},
+                                       {"M/s", static_cast<double>(many / 10) / ms * 1e-3}});
+  }
+  const int written = report.write();
+  if (right) return written;
+  std::fprintf(stderr, "volumes differ from the CPU's\n");
+  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Report report("gpu_batch", argc, argv);
+  report.page("Penetrations of many pairs on a GPU");
+  std::string why;
+  if (!gpu_available(0, &why)) {
+    std::fprintf(stderr, "gpu_batch: %s\n", why.c_str());
+    return 1;
+  }
+  try {
+    return measure(report);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}
