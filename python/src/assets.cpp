@@ -23,12 +23,11 @@ using SharedAsset = std::shared_ptr<Asset>;
 
 constexpr std::pair<const char*, Device> kDevices[] = {
     {"auto", Device::automatic}, {"cpu", Device::cpu}, {"cuda", Device::cuda}};
-constexpr std::pair<const char*, GridMode> kGrids[] = {
-    {"banded", GridMode::banded},
-    {"uniform", GridMode::uniform},
-    {"explicit", GridMode::explicit_refinement},
-    {"implicit", GridMode::implicit_refinement},
-    {"hybrid", GridMode::hybrid}};
+constexpr std::pair<const char*, GridMode> kGrids[] = {{"banded", GridMode::banded},
+                                                       {"uniform", GridMode::uniform},
+                                                       {"explicit", GridMode::explicit_refinement},
+                                                       {"implicit", GridMode::implicit_refinement},
+                                                       {"hybrid", GridMode::hybrid}};
 constexpr std::pair<const char*, bool> kSpheres[] = {{"matched", true}, {"inner", false}};
 
 std::string path_of(const py::object& path) {
@@ -41,9 +40,8 @@ SharedAsset asset_of_bytes(const py::buffer& buffer, const std::string& name) {
   Py_buffer view;
   if (PyObject_GetBuffer(buffer.ptr(), &view, PyBUF_SIMPLE) != 0) throw py::error_already_set();
   const std::unique_ptr<Py_buffer, decltype(&PyBuffer_Release)> held(&view, PyBuffer_Release);
-  return std::make_shared<Asset>(std::span(static_cast<const std::byte*>(view.buf),
-                                           static_cast<std::size_t>(view.len)),
-                                 name);
+  return std::make_shared<Asset>(
+      std::span(static_cast<const std::byte*>(view.buf), static_cast<std::size_t>(view.len)), name);
 }
 
 py::bytes bytes_of(const Asset& asset) {
@@ -185,8 +183,7 @@ void add_bakes(py::module_& module) {
       .def_readonly("partners", &Targeted::partners, "A PartnerError for each kind.")
       .def_readonly("met", &Targeted::met, "poses > 0 and measured_error no larger than asked.")
       .def_property_readonly(
-          "stop", [](const Targeted& t) { return app::name_of(t.stop); },
-          "What ended the search.");
+          "stop", [](const Targeted& t) { return app::name_of(t.stop); }, "What ended the search.");
   module.def(
       "bake_to_error",
       [](const SharedMesh& mesh, double relative_error, double at_overlap, std::size_t max_spheres,
@@ -197,8 +194,8 @@ void add_bakes(py::module_& module) {
             packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
                              seed, threads, device, field, field_error);
         return offline(
-            [mesh, settings, target = ErrorTarget{relative_error, at_overlap}](
-                const ProgressCallback& callback) {
+            [mesh, settings,
+             target = ErrorTarget{relative_error, at_overlap}](const ProgressCallback& callback) {
               TargetedAsset made = bake_to_error(*mesh, target, settings, callback);
               return Targeted{shared(std::move(made.asset)),
                               made.measured_error,
@@ -237,10 +234,11 @@ void add_bakes(py::module_& module) {
 
 void add_assets(py::module_& module) {
   add_bodies(module);
-  py::class_<Asset, SharedAsset>(module, "Asset", py::buffer_protocol(),
-                                 "A baked solid. Immutable, so threads may share it. "
-                                 "memoryview(asset) is a read-only view of its bytes that holds it; "
-                                 "pickle works.")
+  py::class_<Asset, SharedAsset>(
+      module, "Asset", py::buffer_protocol(),
+      "A baked solid. Immutable, so threads may share it. "
+      "memoryview(asset) is a read-only view of its bytes that holds it; "
+      "pickle works.")
       .def_static(
           "load",
           [](const py::object& path) {

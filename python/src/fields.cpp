@@ -53,12 +53,12 @@ void add_fields(py::module_& module) {
                          "A solid that an asset meets without having a tree itself. Stands first "
                          "in a query. Lengths are [u] in the field's own frame.");
   add_kind<HalfSpaceField>(module, "HalfSpaceField", "The solid normal · x ≤ offset. Exact.")
-      .def(py::init([](const py::object& normal, double offset) {
-             return OwnedKind<HalfSpaceField>(
-                 HalfSpaceField{take_vector(normal, "normal"), offset});
-           }),
-           py::arg("normal") = py::make_tuple(0.0, 0.0, 1.0), py::arg("offset") = 0.0,
-           "normal: (3,) unit length within 1e-3, outward. offset: [u].");
+      .def(
+          py::init([](const py::object& normal, double offset) {
+            return OwnedKind<HalfSpaceField>(HalfSpaceField{take_vector(normal, "normal"), offset});
+          }),
+          py::arg("normal") = py::make_tuple(0.0, 0.0, 1.0), py::arg("offset") = 0.0,
+          "normal: (3,) unit length within 1e-3, outward. offset: [u].");
   add_kind<BoxField>(module, "BoxField", "A box around the origin. Exact.")
       .def(py::init([](const py::object& half_extents) {
              return OwnedKind<BoxField>(BoxField{take_vector(half_extents, "half_extents")});
@@ -88,10 +88,13 @@ void add_fields(py::module_& module) {
              if (grid.ndim() != 2) refuse_shape(grid, "heights", "(rows, columns)");
              const Doubles steps = take_doubles(spacing, "spacing", "(2,)");
              if (steps.ndim() != 1 || steps.shape(0) != 2) refuse_shape(steps, "spacing", "(2,)");
-             return OwnedKind<HeightField>(
-                 HeightField{grid.data(), points(grid.shape(1)), points(grid.shape(0)),
-                             {steps.at(0), steps.at(1)}, lowest, highest},
-                 grid);
+             return OwnedKind<HeightField>(HeightField{grid.data(),
+                                                       points(grid.shape(1)),
+                                                       points(grid.shape(0)),
+                                                       {steps.at(0), steps.at(1)},
+                                                       lowest,
+                                                       highest},
+                                           grid);
            }),
            py::arg("heights"), py::kw_only(), py::arg("spacing") = py::make_tuple(1.0, 1.0),
            py::arg("lowest") = -1e300, py::arg("highest") = 1e300,
@@ -106,12 +109,12 @@ void add_fields(py::module_& module) {
              const Floats grid = take_floats(distances, "distances", "(z, y, x)");
              if (grid.ndim() != 3) refuse_shape(grid, "distances", "(z, y, x)");
              return OwnedKind<DistanceGridField>(
-                 DistanceGridField{grid.data(),
-                                   {points(grid.shape(2)), points(grid.shape(1)),
-                                    points(grid.shape(0))},
-                                   take_vector(origin, "origin"),
-                                   spacing,
-                                   error},
+                 DistanceGridField{
+                     grid.data(),
+                     {points(grid.shape(2)), points(grid.shape(1)), points(grid.shape(0))},
+                     take_vector(origin, "origin"),
+                     spacing,
+                     error},
                  grid);
            }),
            py::arg("distances"), py::kw_only(), py::arg("origin"), py::arg("spacing"),

@@ -69,8 +69,7 @@ void add_report(py::module_& module) {
       .def_readonly("boundary_edges", &MeshReport::boundary_edges, "Edges with one triangle.")
       .def_readonly("nonmanifold_edges", &MeshReport::nonmanifold_edges,
                     "Edges with three or more triangles.")
-      .def_readonly("flipped_components", &MeshReport::flipped_components,
-                    "Shells turned outward.")
+      .def_readonly("flipped_components", &MeshReport::flipped_components, "Shells turned outward.")
       .def_readonly("degenerate_triangles", &MeshReport::degenerate_triangles,
                     "Zero area or repeated corners.")
       .def_readonly("self_intersections", &MeshReport::self_intersections,
@@ -148,8 +147,8 @@ Raises Error (file, place, way out).)");
       "close_mesh",
       [](const std::shared_ptr<TriangleMesh>& mesh, const std::string& name, bool repair) {
         return offline([mesh, name, repair](const ProgressCallback&) {
-          return std::make_shared<ClosedMesh>(close_mesh(
-              *mesh, name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse));
+          return std::make_shared<ClosedMesh>(
+              close_mesh(*mesh, name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse));
         });
       },
       py::arg("mesh"), py::kw_only(), py::arg("name") = "mesh", py::arg("repair") = false,
@@ -162,9 +161,7 @@ Raises OpenMeshError for an open mesh, Error for one that is flat, empty, not fi
 non-orientable.)");
   module.def(
       "sample_mesh",
-      [](const std::string& name) {
-        return std::make_shared<TriangleMesh>(make_sample(name));
-      },
+      [](const std::string& name) { return std::make_shared<TriangleMesh>(make_sample(name)); },
       py::arg("name"),
       "A closed mesh made on the spot: 'bolt', 'nut', 'gear', 'cube', …\n\nAn unknown name raises "
       "Error, which lists all.");

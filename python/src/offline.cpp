@@ -20,8 +20,8 @@ constexpr auto kPatience = 100ms;  // with a stage that was told to end
 struct Job {
   std::mutex mutex;
   std::condition_variable changed;
-  bool done = false;                // guarded, as are the next two
-  std::optional<Progress> news;     // not yet handed on
+  bool done = false;             // guarded, as are the next two
+  std::optional<Progress> news;  // not yet handed on
   std::exception_ptr error;
   std::atomic<bool> cancelled = false;
 };

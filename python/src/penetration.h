@@ -15,6 +15,8 @@ inline constexpr std::pair<const char*, Measure> kMeasures[] = {{"matched", Meas
 inline constexpr std::pair<const char*, FieldUse> kFieldUses[] = {
     {"automatic", FieldUse::automatic}, {"never", FieldUse::never}, {"always", FieldUse::always}};
 
+using Vector = Eigen::Map<Eigen::Vector3d>;  ///< a row of a column
+
 /// Penetrations as columns.
 struct Penetrations {
   explicit Penetrations(const Shape& rows);

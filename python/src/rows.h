@@ -69,7 +69,7 @@ class Rows {
   Shape shape_;
   std::size_t count_ = 0;
   std::vector<Solid> solids_;
-  std::vector<py::object> owners_;    // of the solids
+  std::vector<py::object> owners_;  // of the solids
   Values pose_a_, pose_b_, scale_a_, scale_b_;
   std::optional<Integers> held_pairs_;
   const std::int64_t* pairs_ = nullptr;  // null: solid 0 and solid 1

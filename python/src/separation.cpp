@@ -9,8 +9,6 @@
 namespace ist::python {
 namespace {
 
-using Vector = Eigen::Map<Eigen::Vector3d>;
-
 struct Separations {
   explicit Separations(const Shape& rows)
       : distance(rows, {}),
@@ -104,10 +102,8 @@ std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
 py::object overlaps(const Rows& rows, unsigned threads) {
   const Column<std::uint32_t> answers(rows.shape(), {});
   for_each_row(rows.count(), threads, [&](std::size_t i, Workspace& workspace) {
-    *answers.row(i) = static_cast<std::uint32_t>(
-        rows.at(i).answer([&](const auto& a, const PlacedTree& b) {
-          return overlap(a, b, workspace);
-        }));
+    *answers.row(i) = static_cast<std::uint32_t>(rows.at(i).answer(
+        [&](const auto& a, const PlacedTree& b) { return overlap(a, b, workspace); }));
   });
   return handed_out(answers.array);
 }
@@ -140,8 +136,10 @@ void add_classes(py::module_& module) {
              "(n,) [u] the true distance of the solids is at least this, certified.");
   add_column(separation, "distance_max", &Separations::distance_max,
              "(n,) [u] and at most this, certified.");
-  add_column(separation, "point_a", &Separations::point_a, "(n, 3) [u] on A's inner spheres, world.");
-  add_column(separation, "point_b", &Separations::point_b, "(n, 3) [u] on B's inner spheres, world.");
+  add_column(separation, "point_a", &Separations::point_a,
+             "(n, 3) [u] on A's inner spheres, world.");
+  add_column(separation, "point_b", &Separations::point_b,
+             "(n, 3) [u] on B's inner spheres, world.");
   add_column(separation, "normal", &Separations::normal, "(n, 3) unit, from A to B, world.");
   add_column(separation, "status", &Separations::status, "(n,) uint32, a QueryStatus.");
   add_column(separation, "node_visits", &Separations::node_visits, "(n,) uint32.");
@@ -171,9 +169,9 @@ void add_separation(py::module_& module) {
   add_classes(module);
   module.def(
       "separation",
-      [](const py::object& a, const py::object& b, const py::object& poses, const py::object& scales,
-         const py::object& poses_a, const py::object& scales_a, std::uint32_t max_visits,
-         double deadline_us, unsigned threads) {
+      [](const py::object& a, const py::object& b, const py::object& poses,
+         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
+         std::uint32_t max_visits, double deadline_us, unsigned threads) {
         return separations(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
                            {max_visits, deadline_us}, threads);
       },
@@ -210,8 +208,9 @@ void add_separation(py::module_& module) {
       kPatchesDoc);
   module.def(
       "overlap",
-      [](const py::object& a, const py::object& b, const py::object& poses, const py::object& scales,
-         const py::object& poses_a, const py::object& scales_a, unsigned threads) {
+      [](const py::object& a, const py::object& b, const py::object& poses,
+         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
+         unsigned threads) {
         return overlaps(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), threads);
       },
       py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("scales") = py::none(),

@@ -7,8 +7,6 @@
 namespace ist::python {
 namespace {
 
-using Vector = Eigen::Map<Eigen::Vector3d>;
-
 struct Impacts {
   explicit Impacts(const Shape& rows)
       : time(rows, {}),
