@@ -3,8 +3,11 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -35,18 +38,30 @@ Shape shape_of(const py::array& array);
 [[noreturn]] void refuse_shape(const py::array& array, const std::string& name,
                                const std::string& wanted);
 
-/// A new array of shape `rows` + `each`, and where its data is.
+/// A new array of shape `rows` + `each`, all zero, and where its data is. What nobody writes to is
+/// not touched: of a long one it takes no memory and no time.
 template <class T>
 struct Column {
   Column() = default;
   Column(Shape rows, const Shape& each) : width(1) {
     for (const py::ssize_t n : each) width *= static_cast<std::size_t>(n);
     rows.insert(rows.end(), each.begin(), each.end());
-    array = py::array_t<T>(rows);
-    data = static_cast<T*>(array.mutable_data());
+    std::size_t count = 1;
+    for (const py::ssize_t n : rows) count *= static_cast<std::size_t>(n);
+    if (count * sizeof(T) < kLong) {
+      array = py::array_t<T>(rows);
+      data = static_cast<T*>(array.mutable_data());
+      std::fill_n(data, count, T());
+    } else {
+      data = static_cast<T*>(std::calloc(count, sizeof(T)));
+      if (data == nullptr) throw std::bad_alloc();
+      array = py::array_t<T>(rows, data, py::capsule(data, std::free));
+    }
   }
 
   T* row(std::size_t i) const { return data + i * width; }
+
+  static constexpr std::size_t kLong = 1 << 16;  // bytes
 
   py::array array;
   T* data = nullptr;

@@ -160,26 +160,21 @@ Penetrations::Penetrations(const Shape& rows)
       sphere_pairs(rows, {}) {}
 
 void Penetrations::write(std::size_t i, const Row& row, const Penetration& answer) const {
+  *status.row(i) = static_cast<std::uint32_t>(answer.status);
+  *node_visits.row(i) = answer.node_visits;
+  *sphere_pairs.row(i) = answer.sphere_pairs;
+  if (answer.volume_max == 0) return;  // nothing touches, or a row is invalid: all is zero
   *volume.row(i) = answer.volume;
   *volume_min.row(i) = answer.volume_min;
   *volume_max.row(i) = answer.volume_max;
   Vector(centroid.row(i)) = answer.centroid;
-  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
-  Vector(force.row(i)) = zero - answer.translation_gradient;  // 0, not −0, where there is none
-  Vector(torque.row(i)) = zero - answer.rotation_gradient;
-  *status.row(i) = static_cast<std::uint32_t>(answer.status);
-  *node_visits.row(i) = answer.node_visits;
-  *sphere_pairs.row(i) = answer.sphere_pairs;
-  if (answer.volume <= 0) {  // nothing touches, or the pose is not one
-    std::fill_n(pose_gradient.row(i), 7, 0.0);
-    std::fill_n(pose_gradient_a.row(i), 7, 0.0);
-    return;
-  }
+  const Eigen::Vector3d origin_a(row.pose_a.t), origin_b(row.b.pose.t);
+  const Wrenches push = wrenches(answer, row.b.pose, origin_a, origin_b);
+  Vector(force.row(i)) = push.on_b.force;
+  Vector(torque.row(i)) = push.on_b.torque;
   write_pose_gradient(row.b.pose, answer.translation_gradient, answer.rotation_gradient,
                       pose_gradient.row(i));
-  const Eigen::Vector3d origin_a(row.pose_a.t);
-  const Wrench on_a = wrenches(answer, row.b.pose, origin_a, origin_a).on_a;
-  write_pose_gradient(row.pose_a, -on_a.force, -on_a.torque, pose_gradient_a.row(i));
+  write_pose_gradient(row.pose_a, -push.on_a.force, -push.on_a.torque, pose_gradient_a.row(i));
 }
 
 void add_penetration(py::module_& module) {

@@ -50,7 +50,6 @@ struct Patches {
         force(rows, {each, 3}),
         torque(rows, {each, 3}) {}
 
-  /// `patches`: all that there is room for, those not written all zero.
   void write(std::size_t i, std::span<const ContactPatch> patches) const {
     for (std::size_t k = 0; k < patches.size(); ++k) {
       const ContactPatch& patch = patches[k];
@@ -88,13 +87,13 @@ std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
   for_each_row(rows.count(), threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
     thread_local std::vector<ContactPatch> found;
-    found.assign(each, {});
+    found.resize(each);
     const ContactPatches answer = row.answer([&](const auto& a, const PlacedTree& b) {
       return contact_patches(a, b, settings, workspace, found);
     });
     answers->penetration->write(i, row, answer.penetration);
     *answers->count.row(i) = static_cast<std::uint32_t>(answer.count);
-    answers->write(i, found);
+    answers->write(i, std::span(found).first(answer.count));
   });
   return answers;
 }
