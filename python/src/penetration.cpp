@@ -61,7 +61,7 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
     answers->scale_gradient = {rows.shape(), {}};
     answers->scale_gradient_a = {rows.shape(), {}};
   }
-  for_each_row(rows.count(), threads, [&](std::size_t i, Workspace& workspace) {
+  for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
     const Penetration found = row.answer(
         [&](const auto& a, const PlacedTree& b) { return penetration(a, b, settings, workspace); });

@@ -53,6 +53,14 @@ class Rows {
   std::size_t count() const { return count_; }
   Row at(std::size_t i) const;
 
+  /// The row that is asked i-th: pairs of the same assets one after another, where all of them
+  /// together are more than a cache holds.
+  std::size_t asked(std::size_t i) const {
+    if (order_.empty()) return i;
+    const std::size_t scenes = count_ / pairs_of_scene_;
+    return i % scenes * pairs_of_scene_ + order_[i / scenes];
+  }
+
  private:
   /// One or many values of `width` doubles.
   struct Values {
@@ -74,11 +82,14 @@ class Rows {
   std::optional<Integers> held_pairs_;
   const std::int64_t* pairs_ = nullptr;  // null: solid 0 and solid 1
   std::size_t pairs_of_scene_ = 0;
+  std::vector<std::size_t> order_;  ///< of the pairs; empty: as they come
+
+  void sort_by_asset();
 };
 
 /// answer(i, workspace) for each row, on `threads` threads (0: all cores), the GIL released.
 /// Ctrl-C ends it: KeyboardInterrupt.
-void for_each_row(std::size_t count, unsigned threads,
+void for_each_row(const Rows& rows, unsigned threads,
                   const std::function<void(std::size_t, Workspace&)>& answer);
 
 }  // namespace ist::python

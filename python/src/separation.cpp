@@ -73,7 +73,7 @@ struct Patches {
 std::unique_ptr<Separations> separations(const Rows& rows, const SeparationSettings& settings,
                                          unsigned threads) {
   auto answers = std::make_unique<Separations>(rows.shape());
-  for_each_row(rows.count(), threads, [&](std::size_t i, Workspace& workspace) {
+  for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     answers->write(i, rows.at(i).answer([&](const auto& a, const PlacedTree& b) {
       return separation(a, b, settings, workspace);
     }));
@@ -84,7 +84,7 @@ std::unique_ptr<Separations> separations(const Rows& rows, const SeparationSetti
 std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
                                  const ContactSettings& settings, unsigned threads) {
   auto answers = std::make_unique<Patches>(rows.shape(), static_cast<py::ssize_t>(each));
-  for_each_row(rows.count(), threads, [&](std::size_t i, Workspace& workspace) {
+  for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
     thread_local std::vector<ContactPatch> found;
     found.resize(each);
@@ -100,7 +100,7 @@ std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
 
 py::object overlaps(const Rows& rows, unsigned threads) {
   const Column<std::uint32_t> answers(rows.shape(), {});
-  for_each_row(rows.count(), threads, [&](std::size_t i, Workspace& workspace) {
+  for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     *answers.row(i) = static_cast<std::uint32_t>(rows.at(i).answer(
         [&](const auto& a, const PlacedTree& b) { return overlap(a, b, workspace); }));
   });

@@ -87,7 +87,7 @@ void add_time_of_impact(py::module_& module) {
         const Eigen::Vector3d centre = point_of(about, "about"),
                               centre_a = point_of(about_a, "about_a");
         auto answers = std::make_unique<Impacts>(from.shape());
-        for_each_row(from.count(), threads, [&](std::size_t i, Workspace& workspace) {
+        for_each_row(from, threads, [&](std::size_t i, Workspace& workspace) {
           const Row start = from.at(i), end = to.at(i);
           const Motions motions{
               motion_between(start.pose_a, end.pose_a, settings.duration, centre_a, start.scale_a),

@@ -161,6 +161,19 @@ def test_a_scene_is_its_pairs(gear, knot, cube, random_poses):
     assert np.array_equal(alone.volume, found.volume[0])
 
 
+def test_assets_that_no_cache_holds_are_asked_in_order(knot, random_poses):
+    """They are sorted; the answers are not."""
+    copies = [ist.Asset.from_bytes(knot.to_bytes())
+              for _ in range(1 + (32 << 20) // len(knot.to_bytes()))]
+    scenes = random_poses(3 * len(copies), 1).reshape(3, len(copies), 7)
+    pairs = np.random.default_rng(1).permutation(len(copies))[:20].reshape(10, 2)
+    found = ist.penetration_of_pairs(copies, scenes, pairs).volume
+    for k, (i, j) in enumerate(pairs):
+        expected = ist.penetration(knot, knot, scenes[:, j], poses_a=scenes[:, i]).volume
+        assert np.array_equal(found[:, k], expected)
+    assert (found > 0).any()
+
+
 @pytest.mark.parametrize("arguments, error, text", [
     (dict(poses=np.zeros((3, 7))), ValueError, r"poses: shape \(3, 7\); wanted \(2, 7\) or \(w, 2, 7\)"),
     (dict(pairs=[(0, 2)]), ValueError, r"pairs\[0\]: \(0, 2\): there are solids 0 to 1"),
