@@ -197,7 +197,7 @@ Run run(Poses& poses, const Ask& ask) {
     run.energy = slopes.energy;
     if (slopes.energy == 0 && swollen == 1) break;
     const double start = ist::benchmark::thread_seconds();
-    adam.step(slopes, poses);
+    if (slopes.energy > 0) adam.step(slopes, poses);
     run.seconds += ist::benchmark::thread_seconds() - start;
   }
   return run;

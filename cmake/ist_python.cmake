@@ -4,7 +4,7 @@
 # Debian's packages are for Debian's interpreter, which need not be the first in PATH; name another
 # one by -DPython_EXECUTABLE.
 set(IST_HAVE_PYTHON FALSE)
-if(IST_PYTHON STREQUAL "OFF" OR IST_SANITIZE STREQUAL "thread" OR IST_FUZZ)
+if(IST_PYTHON STREQUAL "OFF" OR IST_SANITIZE STREQUAL "thread" OR IST_FUZZ OR CMAKE_CROSSCOMPILING)
   return()
 endif()
 if(NOT DEFINED Python_EXECUTABLE AND EXISTS /usr/bin/python3)
@@ -15,7 +15,7 @@ if(IST_PYTHON STREQUAL "ON")
   set(found_how REQUIRED)
 endif()
 find_package(Python 3.9 ${found_how} COMPONENTS Interpreter Development.Module)
-if(Python_FOUND AND NOT CMAKE_CROSSCOMPILING)
+if(Python_FOUND)
   find_package(pybind11 2.10 ${found_how} CONFIG)
 endif()
 if(Python_FOUND AND pybind11_FOUND)

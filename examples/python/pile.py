@@ -47,11 +47,12 @@ def push_apart(solids, poses, pairs, scales, most_steps=2000):
         energies.append(energy.item())
         if energies[-1] == 0 and swollen == 1:
             break
-        energy.backward()
-        descent.step()
-    apart = moved.detach().numpy().copy()
-    apart[:, :4] /= np.linalg.norm(apart[:, :4], axis=1, keepdims=True)
-    return apart, energies
+        if energies[-1] > 0:
+            energy.backward()
+            descent.step()
+            with torch.no_grad():  # Adam's steps are no smaller for a longer quaternion: keep it
+                moved[:, :4] /= moved[:, :4].norm(dim=1, keepdim=True)
+    return moved.detach().numpy(), energies
 
 
 def main():
