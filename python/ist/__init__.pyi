@@ -1,0 +1,402 @@
+"""Types of package ist. Shapes, units and frames: docs/python.md, and help() of every name.
+
+[u] is the meshes' own unit; poses are rows qw, qx, qy, qz, tx, ty, tz. Of a single pose, columns have
+no leading n: numbers and (3,) arrays.
+"""
+
+import enum
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__version__: str
+
+_Path = str | os.PathLike[str]
+_Column = Any  # NDArray of one row a pose; a NumPy number for one pose
+_Measure = Literal["matched", "inner"]
+_FieldUse = Literal["automatic", "never", "always"]
+_Grid = Literal["banded", "uniform", "explicit", "implicit", "hybrid"]
+_Device = Literal["auto", "cpu", "cuda"]
+
+class Error(RuntimeError): ...
+class OpenMeshError(Error): ...
+
+class QueryStatus(enum.IntEnum):
+    ok = 0
+    budget_exhausted = 1
+    invalid_input = 2
+
+class Overlapping(enum.IntEnum):
+    no = 0
+    yes = 1
+    unknown = 2
+
+class ImpactStatus(enum.IntEnum):
+    no_impact = 0
+    impact = 1
+    unresolved = 2
+    overlapping = 3
+    budget_exhausted = 4
+    invalid_input = 5
+
+@final
+class Progress:
+    @property
+    def stage(self) -> str: ...
+    @property
+    def spheres(self) -> int: ...
+    @property
+    def coverage(self) -> float: ...  # [0, 1]
+    @property
+    def radius(self) -> float: ...  # [u]
+    @property
+    def fraction(self) -> float: ...  # [0, 1]
+    @property
+    def elapsed(self) -> float: ...  # [s]
+
+@final
+class MeshReport:
+    @property
+    def vertices(self) -> int: ...
+    @property
+    def triangles(self) -> int: ...
+    @property
+    def components(self) -> int: ...
+    @property
+    def boundary_edges(self) -> int: ...
+    @property
+    def nonmanifold_edges(self) -> int: ...
+    @property
+    def flipped_components(self) -> int: ...
+    @property
+    def degenerate_triangles(self) -> int: ...
+    @property
+    def self_intersections(self) -> int: ...
+    @property
+    def shells(self) -> int: ...
+    @property
+    def meets_itself(self) -> bool: ...
+    @property
+    def filled_holes(self) -> int: ...
+    @property
+    def repaired(self) -> bool: ...
+    @property
+    def volume(self) -> float: ...  # [u³]
+    @property
+    def notes(self) -> list[str]: ...
+
+@final
+class Mesh:
+    def __init__(self, vertices: ArrayLike, triangles: ArrayLike) -> None: ...
+    @property
+    def vertices(self) -> NDArray[np.float64]: ...  # (n, 3) [u], read-only view
+    @property
+    def triangles(self) -> NDArray[np.uint32]: ...  # (m, 3), read-only view
+    @property
+    def declared_up_axis(self) -> Literal["X", "Y", "Z"] | None: ...
+    @property
+    def declared_unit(self) -> float: ...  # [m]
+
+@final
+class ClosedMesh:
+    @property
+    def vertices(self) -> NDArray[np.float64]: ...  # (n, 3) [u], read-only view
+    @property
+    def triangles(self) -> NDArray[np.uint32]: ...  # (m, 3), read-only view
+    @property
+    def name(self) -> str: ...
+    @property
+    def report(self) -> MeshReport: ...
+
+def load_mesh(path: _Path, *, weld_tolerance: float = 0.0) -> Mesh: ...
+def close_mesh(mesh: Mesh, *, name: str = "mesh", repair: bool = False) -> ClosedMesh: ...
+def sample_mesh(name: str) -> Mesh: ...
+
+@final
+class MassProperties:
+    @property
+    def volume(self) -> float: ...  # [u³]
+    @property
+    def centre_of_mass(self) -> NDArray[np.float64]: ...  # (3,) [u]
+    @property
+    def inertia(self) -> NDArray[np.float64]: ...  # (3, 3) [u⁵]
+    @property
+    def volume_error(self) -> float: ...  # [u³]
+    @property
+    def centre_of_mass_error(self) -> float: ...  # [u]
+    @property
+    def inertia_error(self) -> float: ...  # [u⁵]
+
+@final
+class Bounds:
+    @property
+    def lower(self) -> NDArray[np.float64]: ...  # (3,) [u]
+    @property
+    def upper(self) -> NDArray[np.float64]: ...  # (3,) [u]
+    @property
+    def centre(self) -> NDArray[np.float64]: ...  # (3,) [u]
+    @property
+    def radius(self) -> float: ...  # [u]
+
+@final
+class Invariant:
+    @property
+    def name(self) -> str: ...
+    @property
+    def worst(self) -> float: ...
+    @property
+    def meaning(self) -> str: ...
+    @property
+    def where(self) -> int: ...
+    @property
+    def checked(self) -> int: ...
+    @property
+    def violations(self) -> int: ...
+
+@final
+class PartnerError:
+    @property
+    def partner(self) -> str: ...
+    @property
+    def median(self) -> float: ...
+    @property
+    def poses(self) -> int: ...
+
+@final
+class TargetedAsset:
+    @property
+    def asset(self) -> Asset: ...
+    @property
+    def measured_error(self) -> float: ...
+    @property
+    def poses(self) -> int: ...
+    @property
+    def partners(self) -> list[PartnerError]: ...
+    @property
+    def met(self) -> bool: ...
+    @property
+    def stop(self) -> str: ...
+
+@final
+class Asset:
+    @staticmethod
+    def load(path: _Path) -> Asset: ...
+    @staticmethod
+    def from_bytes(data: Any, name: str = "asset") -> Asset: ...
+    def save(self, path: _Path) -> None: ...
+    def to_bytes(self) -> bytes: ...
+    def info(self) -> dict[str, Any]: ...
+    def spheres(self, which: _Measure = "matched") -> NDArray[np.float64]: ...  # (n, 4) [u]
+    def mass_properties(self, pose: ArrayLike | None = None, scale: float = 1.0) -> MassProperties: ...
+    def bounds(self, pose: ArrayLike | None = None, scale: float = 1.0) -> Bounds: ...
+    @property
+    def sphere_count(self) -> int: ...
+    @property
+    def volume(self) -> float: ...  # [u³]
+    @property
+    def coverage(self) -> float: ...  # [0, 1]
+    @property
+    def protrusion(self) -> float: ...  # [u]
+    @property
+    def has_field(self) -> bool: ...
+    @property
+    def field_error(self) -> float: ...  # [u]
+
+def bake(
+    mesh: ClosedMesh, *, max_spheres: int = 10000, target_coverage: float = 1.0,
+    min_radius: float = 0.0, time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded",
+    seed: int = 0, threads: int = 0, device: _Device = "auto", field: bool = True,
+    field_error: float = 0.0, progress: Callable[[Progress], Any] | None = None,
+) -> Asset: ...
+def bake_to_error(
+    mesh: ClosedMesh, relative_error: float = 0.01, at_overlap: float = 0.001, *,
+    max_spheres: int = 0, target_coverage: float = 1.0, min_radius: float = 0.0,
+    time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded", seed: int = 0,
+    threads: int = 0, device: _Device = "auto", field: bool = True, field_error: float = 0.0,
+    progress: Callable[[Progress], Any] | None = None,
+) -> TargetedAsset: ...
+def check(asset: Asset, mesh: ClosedMesh, *, threads: int = 0) -> list[Invariant]: ...
+
+class Field: ...
+
+@final
+class HalfSpaceField(Field):
+    def __init__(self, normal: ArrayLike = (0.0, 0.0, 1.0), offset: float = 0.0) -> None: ...
+
+@final
+class BoxField(Field):
+    def __init__(self, half_extents: ArrayLike) -> None: ...
+
+@final
+class BallField(Field):
+    def __init__(self, radius: float) -> None: ...
+
+@final
+class CapsuleField(Field):
+    def __init__(self, radius: float, half_height: float) -> None: ...
+
+@final
+class CylinderField(Field):
+    def __init__(self, radius: float, half_height: float) -> None: ...
+
+@final
+class HeightField(Field):
+    def __init__(
+        self, heights: ArrayLike, *, spacing: ArrayLike = (1.0, 1.0), lowest: float = -1e300,
+        highest: float = 1e300,
+    ) -> None: ...
+
+@final
+class DistanceGridField(Field):
+    def __init__(
+        self, distances: ArrayLike, *, origin: ArrayLike, spacing: float, error: float = 0.0
+    ) -> None: ...
+
+@final
+class MeshField(Field):
+    def __init__(self, asset: Asset) -> None: ...
+
+@final
+class Penetration:
+    @property
+    def volume(self) -> _Column: ...  # (n,) [u³]
+    @property
+    def volume_min(self) -> _Column: ...  # (n,) [u³]
+    @property
+    def volume_max(self) -> _Column: ...  # (n,) [u³]
+    @property
+    def centroid(self) -> NDArray[np.float64]: ...  # (n, 3) [u]
+    @property
+    def force(self) -> NDArray[np.float64]: ...  # (n, 3) [u²] on B
+    @property
+    def torque(self) -> NDArray[np.float64]: ...  # (n, 3) [u³] on B, about its origin
+    @property
+    def pose_gradient(self) -> NDArray[np.float64]: ...  # (n, 7) dV/d(pose of B)
+    @property
+    def pose_gradient_a(self) -> NDArray[np.float64]: ...  # (n, 7) dV/d(pose of A)
+    @property
+    def scale_gradient(self) -> _Column | None: ...  # (n,) [u³] dV/d(scale of B)
+    @property
+    def scale_gradient_a(self) -> _Column | None: ...  # (n,) [u³] dV/d(scale of A)
+    @property
+    def status(self) -> _Column: ...  # (n,) QueryStatus
+    @property
+    def node_visits(self) -> _Column: ...  # (n,)
+    @property
+    def sphere_pairs(self) -> _Column: ...  # (n,)
+
+@final
+class Separation:
+    @property
+    def distance(self) -> _Column: ...  # (n,) [u]
+    @property
+    def distance_min(self) -> _Column: ...  # (n,) [u] certified
+    @property
+    def distance_max(self) -> _Column: ...  # (n,) [u] certified
+    @property
+    def point_a(self) -> NDArray[np.float64]: ...  # (n, 3) [u] world
+    @property
+    def point_b(self) -> NDArray[np.float64]: ...  # (n, 3) [u] world
+    @property
+    def normal(self) -> NDArray[np.float64]: ...  # (n, 3) unit, from A to B
+    @property
+    def status(self) -> _Column: ...  # (n,) QueryStatus
+    @property
+    def node_visits(self) -> _Column: ...  # (n,)
+    @property
+    def sphere_pairs(self) -> _Column: ...  # (n,)
+
+@final
+class ContactPatches:
+    @property
+    def penetration(self) -> Penetration: ...
+    @property
+    def count(self) -> _Column: ...  # (n,)
+    @property
+    def id(self) -> NDArray[np.uint64]: ...  # (n, m)
+    @property
+    def centroid(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u]
+    @property
+    def normal(self) -> NDArray[np.float64]: ...  # (n, m, 3) unit, from A to B
+    @property
+    def area(self) -> NDArray[np.float64]: ...  # (n, m) [u²]
+    @property
+    def depth(self) -> NDArray[np.float64]: ...  # (n, m) [u]
+    @property
+    def volume(self) -> NDArray[np.float64]: ...  # (n, m) [u³]
+    @property
+    def force(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u²]
+    @property
+    def torque(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u³]
+
+@final
+class TimeOfImpact:
+    @property
+    def time(self) -> _Column: ...  # (n,) [T]
+    @property
+    def distance_min(self) -> _Column: ...  # (n,) [u]
+    @property
+    def distance_max(self) -> _Column: ...  # (n,) [u]
+    @property
+    def point_a(self) -> NDArray[np.float64]: ...  # (n, 3) [u]
+    @property
+    def point_b(self) -> NDArray[np.float64]: ...  # (n, 3) [u]
+    @property
+    def normal(self) -> NDArray[np.float64]: ...  # (n, 3) unit, from A to B
+    @property
+    def status(self) -> _Column: ...  # (n,) ImpactStatus
+    @property
+    def node_visits(self) -> _Column: ...  # (n,)
+    @property
+    def surface_pairs(self) -> _Column: ...  # (n,)
+
+def penetration(
+    a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
+    poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None,
+    scale_gradients: bool = False, measure: _Measure = "matched", field: _FieldUse = "automatic",
+    pair_budget: int = 0, max_visits: int = 0, deadline_us: float = 0.0,
+    relative_error: float = 0.0, min_radius: float = 0.0, threads: int = 0,
+) -> Penetration: ...
+def penetration_of_pairs(
+    solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *,
+    scales: ArrayLike | None = None, scale_gradients: bool = False, measure: _Measure = "matched",
+    field: _FieldUse = "automatic", pair_budget: int = 0, max_visits: int = 0,
+    deadline_us: float = 0.0, relative_error: float = 0.0, min_radius: float = 0.0,
+    threads: int = 0,
+) -> Penetration: ...
+def separation(
+    a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
+    poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, max_visits: int = 0,
+    deadline_us: float = 0.0, threads: int = 0,
+) -> Separation: ...
+def separation_of_pairs(
+    solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *,
+    scales: ArrayLike | None = None, max_visits: int = 0, deadline_us: float = 0.0,
+    threads: int = 0,
+) -> Separation: ...
+def contact_patches(
+    a: Asset | Field, b: Asset, poses: ArrayLike, *, max_patches: int = 8,
+    scales: ArrayLike | None = None, poses_a: ArrayLike | None = None,
+    scales_a: ArrayLike | None = None, measure: _Measure = "matched",
+    field: _FieldUse = "automatic", max_visits: int = 0, deadline_us: float = 0.0,
+    relative_error: float = 0.0, min_radius: float = 0.0, threads: int = 0,
+) -> ContactPatches: ...
+def overlap(
+    a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
+    poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, threads: int = 0,
+) -> Any: ...  # (n,) uint32, Overlapping
+def overlap_of_pairs(
+    solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *,
+    scales: ArrayLike | None = None, threads: int = 0,
+) -> Any: ...  # (n,) uint32, Overlapping
+def time_of_impact(
+    a: Asset | Field, b: Asset, poses: ArrayLike, poses_to: ArrayLike, *,
+    about: ArrayLike = (0.0, 0.0, 0.0), scales: ArrayLike | None = None,
+    poses_a: ArrayLike | None = None, poses_a_to: ArrayLike | None = None,
+    about_a: ArrayLike = (0.0, 0.0, 0.0), scales_a: ArrayLike | None = None,
+    duration: float = 1.0, tolerance: float = 0.0, max_visits: int = 0, deadline_us: float = 0.0,
+    threads: int = 0,
+) -> TimeOfImpact: ...

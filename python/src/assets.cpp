@@ -1,0 +1,316 @@
+#include <pybind11/eigen.h>
+#include <pybind11/stl.h>
+
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include <ist/bake.h>
+#include <ist/mass_properties.h>
+
+#include "app/asset_summary.h"
+#include "app/exported_spheres.h"
+#include "app/text.h"
+#include "arrays.h"
+#include "module.h"
+#include "offline.h"
+
+namespace ist::python {
+namespace {
+
+using SharedMesh = std::shared_ptr<ClosedMesh>;
+using SharedAsset = std::shared_ptr<Asset>;
+
+constexpr std::pair<const char*, Device> kDevices[] = {
+    {"auto", Device::automatic}, {"cpu", Device::cpu}, {"cuda", Device::cuda}};
+constexpr std::pair<const char*, GridMode> kGrids[] = {{"banded", GridMode::banded},
+                                                       {"uniform", GridMode::uniform},
+                                                       {"explicit", GridMode::explicit_refinement},
+                                                       {"implicit", GridMode::implicit_refinement},
+                                                       {"hybrid", GridMode::hybrid}};
+constexpr std::pair<const char*, bool> kSpheres[] = {{"matched", true}, {"inner", false}};
+
+std::string path_of(const py::object& path) {
+  return py::module_::import("os").attr("fspath")(path).cast<std::string>();
+}
+
+SharedAsset shared(Asset asset) { return std::make_shared<Asset>(std::move(asset)); }
+
+SharedAsset asset_of_bytes(const py::buffer& buffer, const std::string& name) {
+  Py_buffer view;
+  if (PyObject_GetBuffer(buffer.ptr(), &view, PyBUF_SIMPLE) != 0) throw py::error_already_set();
+  const std::unique_ptr<Py_buffer, decltype(&PyBuffer_Release)> held(&view, PyBuffer_Release);
+  return std::make_shared<Asset>(
+      std::span(static_cast<const std::byte*>(view.buf), static_cast<std::size_t>(view.len)), name);
+}
+
+py::bytes bytes_of(const Asset& asset) {
+  return py::bytes(reinterpret_cast<const char*>(asset.bytes().data()), asset.bytes().size());
+}
+
+/// (n, 4): centre and radius in the mesh's own unit and frame.
+py::array spheres_of(const Asset& asset, const std::string& which) {
+  const bool matched = named(which, "which", kSpheres);
+  const auto spheres = app::exported_spheres(asset.view(), 0);
+  Column<double> rows({static_cast<py::ssize_t>(spheres.size())}, {4});
+  for (std::size_t i = 0; i < spheres.size(); ++i) {
+    const app::ExportedSphere& s = spheres[i];
+    Eigen::Map<Eigen::Vector4d>(rows.row(i)) << (matched ? s.matched_centre : s.centre),
+        (matched ? s.matched_radius : s.radius);
+  }
+  return rows.array;
+}
+
+PlacedTree placed(const Asset& asset, const py::object& pose, double scale) {
+  PlacedTree tree{asset.view(), {}, scale};
+  if (pose.is_none()) return tree;
+  const char* const wanted = "(7,): qw, qx, qy, qz, tx, ty, tz";
+  const Doubles values = take_doubles(pose, "pose", wanted);
+  if (values.ndim() != 1 || values.shape(0) != 7) refuse_shape(values, "pose", wanted);
+  std::memcpy(tree.pose.q, values.data(), sizeof tree.pose.q);
+  std::memcpy(tree.pose.t, values.data() + 4, sizeof tree.pose.t);
+  return tree;
+}
+
+/// Keywords that all bakes share.
+PackingSettings packing_settings(std::size_t max_spheres, double target_coverage, double min_radius,
+                                 double time_limit, double epsilon, const std::string& grid,
+                                 std::uint64_t seed, unsigned threads, const std::string& device,
+                                 bool field, double field_error) {
+  PackingSettings settings;
+  settings.max_spheres = max_spheres;
+  settings.target_coverage = target_coverage;
+  settings.min_radius = min_radius;
+  settings.time_limit = time_limit;
+  settings.epsilon = epsilon;
+  settings.grid = named(grid, "grid", kGrids);
+  settings.seed = seed;
+  settings.threads = threads;
+  settings.device = named(device, "device", kDevices);
+  settings.field = {field, field_error};
+  return settings;
+}
+
+constexpr const char* kSettingsDoc = R"(
+max_spheres: count; 0: no limit.
+target_coverage: [0, 1] of the solid's volume.
+min_radius: [u] smaller spheres are not inserted.
+time_limit: [s], 0: none; the only setting that costs repeatability.
+epsilon: greedy slack; 0: the library's schedule.
+grid: 'banded', 'uniform', 'explicit', 'implicit' or 'hybrid'.
+seed: breaks ties.
+threads: 0: all cores; never changes the result.
+device: 'auto', 'cpu' or 'cuda'; never changes the result.
+field: keep the surface, so that queries can be exact.
+field_error: [u] how far it may be off; 0: up to 30,000 of the mesh's own triangles.
+progress: called with a Progress on this thread; False cancels: packing then keeps what is packed,
+    later stages raise Error. What it raises is raised.
+
+Ctrl-C raises KeyboardInterrupt within 0.2 s.
+Raises Error if not one sphere fits, and on settings out of range.)";
+
+void add_bodies(py::module_& module) {
+  py::class_<MassProperties>(module, "MassProperties",
+                             "A solid of density 1 as a rigid body, with bounds on the errors.")
+      .def_readonly("volume", &MassProperties::volume, "[u³]")
+      .def_readonly("centre_of_mass", &MassProperties::centre_of_mass, "(3,) [u]")
+      .def_readonly("inertia", &MassProperties::inertia,
+                    "(3, 3) [u⁵] about the centre of mass: ∫ (|y|² 1 − y yᵀ).")
+      .def_readonly("volume_error", &MassProperties::volume_error, "[u³]")
+      .def_readonly("centre_of_mass_error", &MassProperties::centre_of_mass_error,
+                    "[u] of each component")
+      .def_readonly("inertia_error", &MassProperties::inertia_error, "[u⁵] of each entry");
+  py::class_<Bounds>(module, "Bounds", "What holds a solid: a box along the axes, and a ball.")
+      .def_readonly("lower", &Bounds::lower, "(3,) [u] corner of the box")
+      .def_readonly("upper", &Bounds::upper, "(3,) [u] the opposite corner")
+      .def_readonly("centre", &Bounds::centre, "(3,) [u] of the ball")
+      .def_readonly("radius", &Bounds::radius, "[u] of the ball");
+  py::class_<Invariant>(module, "Invariant", "One proven property of an asset.")
+      .def_readonly("name", &Invariant::name, "'sphere inside solid', …")
+      .def_readonly("worst", &Invariant::worst,
+                    "Largest violation measure, as `meaning` says; ≤ 0 is sound unless stated.")
+      .def_readonly("meaning", &Invariant::meaning, "What `worst` measures, with its unit.")
+      .def_readonly("where", &Invariant::where, "Number of the sphere, node, … that is worst.")
+      .def_readonly("checked", &Invariant::checked, "How many were looked at.")
+      .def_readonly("violations", &Invariant::violations, "How many do not hold.");
+  py::class_<PartnerError>(module, "PartnerError", "How an asset answers one kind of partner.")
+      .def_property_readonly(
+          "partner", [](const PartnerError& e) { return app::name_of(e.partner); },
+          "'copy', 'plane', 'ball', 'edge', 'corner' or 'plate'.")
+      .def_readonly("median", &PartnerError::median, "Relative.")
+      .def_readonly("poses", &PartnerError::poses, "Behind it.");
+}
+
+struct Targeted {
+  SharedAsset asset;
+  double measured_error = 0;
+  std::uint32_t poses = 0;
+  std::vector<PartnerError> partners;
+  bool met = false;
+  StopReason stop = StopReason::sphere_count;
+};
+
+void add_bakes(py::module_& module) {
+  module.def(
+      "bake",
+      [](const SharedMesh& mesh, std::size_t max_spheres, double target_coverage, double min_radius,
+         double time_limit, double epsilon, const std::string& grid, std::uint64_t seed,
+         unsigned threads, const std::string& device, bool field, double field_error,
+         const py::object& progress) {
+        const PackingSettings settings =
+            packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
+                             seed, threads, device, field, field_error);
+        return offline(
+            [mesh, settings](const ProgressCallback& callback) {
+              return shared(bake(*mesh, settings, callback));
+            },
+            progress);
+      },
+      py::arg("mesh"), py::kw_only(), py::arg("max_spheres") = PackingSettings().max_spheres,
+      py::arg("target_coverage") = 1.0, py::arg("min_radius") = 0.0, py::arg("time_limit") = 0.0,
+      py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
+      py::arg("threads") = 0, py::arg("device") = "auto", py::arg("field") = true,
+      py::arg("field_error") = 0.0, py::arg("progress") = py::none(),
+      (std::string("Makes the asset of a closed mesh. Same mesh and settings, same bytes, on any "
+                   "machine.\n") +
+       kSettingsDoc)
+          .c_str());
+  py::class_<Targeted>(module, "TargetedAsset", "What bake_to_error made of its target.")
+      .def_readonly("asset", &Targeted::asset, "The Asset.")
+      .def_readonly("measured_error", &Targeted::measured_error,
+                    "Relative, median near the overlap asked about, worst partner's.")
+      .def_readonly("poses", &Targeted::poses, "Of all partners; 0: none was tried.")
+      .def_readonly("partners", &Targeted::partners, "A PartnerError for each kind.")
+      .def_readonly("met", &Targeted::met, "poses > 0 and measured_error no larger than asked.")
+      .def_property_readonly(
+          "stop", [](const Targeted& t) { return app::name_of(t.stop); }, "What ended the search.");
+  module.def(
+      "bake_to_error",
+      [](const SharedMesh& mesh, double relative_error, double at_overlap, std::size_t max_spheres,
+         double target_coverage, double min_radius, double time_limit, double epsilon,
+         const std::string& grid, std::uint64_t seed, unsigned threads, const std::string& device,
+         bool field, double field_error, const py::object& progress) {
+        const PackingSettings settings =
+            packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
+                             seed, threads, device, field, field_error);
+        return offline(
+            [mesh, settings,
+             target = ErrorTarget{relative_error, at_overlap}](const ProgressCallback& callback) {
+              TargetedAsset made = bake_to_error(*mesh, target, settings, callback);
+              return Targeted{shared(std::move(made.asset)),
+                              made.measured_error,
+                              made.poses,
+                              {made.partners.begin(), made.partners.end()},
+                              made.met,
+                              made.stop};
+            },
+            progress);
+      },
+      py::arg("mesh"), py::arg("relative_error") = ErrorTarget().relative_error,
+      py::arg("at_overlap") = ErrorTarget().at_overlap, py::kw_only(), py::arg("max_spheres") = 0,
+      py::arg("target_coverage") = 1.0, py::arg("min_radius") = 0.0, py::arg("time_limit") = 0.0,
+      py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
+      py::arg("threads") = 0, py::arg("device") = "auto", py::arg("field") = true,
+      py::arg("field_error") = 0.0, py::arg("progress") = py::none(),
+      (std::string("bake() with about as few spheres as an error needs.\n\n"
+                   "relative_error: (0, 1) median over random poses, for every partner.\n"
+                   "at_overlap: [1e-4, 0.5] of the solid's volume.\n"
+                   "max_spheres: 0: 200,000. The other settings are those of bake():\n") +
+       kSettingsDoc)
+          .c_str());
+  module.def(
+      "check",
+      [](const SharedAsset& asset, const SharedMesh& mesh, unsigned threads) {
+        return offline([asset, mesh, threads](const ProgressCallback&) {
+          return check(*asset, *mesh, threads);
+        });
+      },
+      py::arg("asset"), py::arg("mesh"), py::kw_only(), py::arg("threads") = 0,
+      "Proves every invariant of an asset again, in double, from its bytes and the mesh alone.\n\n"
+      "Returns a list of Invariant. Raises Error if the asset is of another mesh.");
+}
+
+}  // namespace
+
+void add_assets(py::module_& module) {
+  add_bodies(module);
+  py::class_<Asset, SharedAsset>(
+      module, "Asset", py::buffer_protocol(),
+      "A baked solid. Immutable, so threads may share it. "
+      "memoryview(asset) is a read-only view of its bytes that holds it; "
+      "pickle works.")
+      .def_static(
+          "load",
+          [](const py::object& path) {
+            return offline([name = path_of(path)](const ProgressCallback&) {
+              return shared(Asset::load(name));
+            });
+          },
+          py::arg("path"), "Reads an .ist file. Raises Error (file, what is wrong, way out).")
+      .def_static("from_bytes", &asset_of_bytes, py::arg("data"), py::arg("name") = "asset",
+                  "Copies the bytes of an .ist file.\n\ndata: bytes, or any contiguous buffer.\n"
+                  "name: for messages. Raises Error unless every check holds.")
+      .def(
+          "save",
+          [](const SharedAsset& self, const py::object& path) {
+            offline([self, name = path_of(path)](const ProgressCallback&) {
+              self->save(name);
+              return true;
+            });
+          },
+          py::arg("path"),
+          "Writes an .ist file: the old one or the whole new one is there at every moment.")
+      .def("to_bytes", &bytes_of, "The bytes of an .ist file, a copy.")
+      .def_buffer([](const Asset& self) {
+        return py::buffer_info(const_cast<std::byte*>(self.bytes().data()), 1, "B", 1,
+                               {self.bytes().size()}, {1}, true);
+      })
+      .def(py::pickle(&bytes_of,
+                      [](const py::bytes& data) { return asset_of_bytes(data, "pickle"); }))
+      .def(
+          "info",
+          [](const Asset& self) {
+            return py::module_::import("json").attr("loads")(app::asset_json(self.view()).dump());
+          },
+          "All that `ist info --json` prints, as a dict: docs/json.md.")
+      .def("__str__", [](const Asset& self) { return app::describe_asset(self.view()); })
+      .def("spheres", &spheres_of, py::arg("which") = "matched",
+           "(n, 4) float64: centre and radius [u], in the mesh's own frame; a copy.\n\n"
+           "which: 'matched' or 'inner'.")
+      .def(
+          "mass_properties",
+          [](const Asset& self, const py::object& pose, double scale) {
+            return mass_properties(placed(self, pose, scale));
+          },
+          py::arg("pose") = py::none(), py::arg("scale") = 1.0,
+          "MassProperties, in the frame that the pose leads to; all zero for a pose that a query "
+          "calls invalid.")
+      .def(
+          "bounds",
+          [](const Asset& self, const py::object& pose, double scale) {
+            return pose.is_none() && scale == 1 ? bounds(self.view())
+                                                : bounds(placed(self, pose, scale));
+          },
+          py::arg("pose") = py::none(), py::arg("scale") = 1.0,
+          "Bounds, in the frame that the pose leads to. Matched spheres may reach out by "
+          "`protrusion`.")
+      .def_property_readonly(
+          "sphere_count", [](const Asset& self) { return self.view().sphere_count(); }, "Count.")
+      .def_property_readonly(
+          "volume", [](const Asset& self) { return self.view().volume(); }, "[u³] of the solid.")
+      .def_property_readonly(
+          "coverage", [](const Asset& self) { return self.view().coverage(); },
+          "[0, 1] share of it in inner spheres.")
+      .def_property_readonly(
+          "protrusion", [](const Asset& self) { return self.view().protrusion(); },
+          "[u] no matched sphere sticks further out of the solid.")
+      .def_property_readonly(
+          "has_field", [](const Asset& self) { return self.view().has_field(); },
+          "It holds the solid's surface.")
+      .def_property_readonly(
+          "field_error", [](const Asset& self) { return self.view().field_error(); },
+          "[u] that surface and the solid's lie within this of each other.");
+  add_bakes(module);
+}
+
+}  // namespace ist::python

@@ -1,0 +1,39 @@
+// The Python module ist._core; package ist shows it to users (../ist/__init__.py).
+
+#include "module.h"
+
+#include <ist/error.h>
+#include <ist/version.h>
+
+#include "offline.h"
+
+namespace {
+
+constexpr const char* kDoc = R"(Collision of solids by inner sphere trees.
+
+Lengths are [u], whatever unit the meshes have. Poses are rows qw, qx, qy, qz, tx, ty, tz of float64:
+x_world = R(q) (scale · x) + t.)";
+
+}  // namespace
+
+PYBIND11_MODULE(_core, module) {
+  namespace python = ist::python;
+  namespace py = python::py;
+  module.doc() = kDoc;
+  // Users know what is here by the package's name.
+  const py::object own_name = module.attr("__name__");
+  module.attr("__name__") = "ist";
+  const auto error = py::register_exception<ist::Error>(module, "Error", PyExc_RuntimeError);
+  error.doc() = "What the library refuses, in its words: file, place and way out.";
+  py::register_exception<ist::OpenMeshError>(module, "OpenMeshError", error.ptr()).doc() =
+      "An open mesh that was not asked to be repaired.";
+  module.attr("__version__") = IST_VERSION_STRING;
+  python::add_offline(module);
+  python::add_meshes(module);
+  python::add_assets(module);
+  python::add_fields(module);
+  python::add_penetration(module);
+  python::add_separation(module);
+  python::add_time_of_impact(module);
+  module.attr("__name__") = own_name;
+}

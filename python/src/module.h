@@ -1,0 +1,29 @@
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace ist::python {
+
+namespace py = pybind11;
+
+// Parts of the module, each in a file of its name.
+void add_meshes(py::module_& module);
+void add_assets(py::module_& module);
+void add_fields(py::module_& module);
+void add_penetration(py::module_& module);
+void add_separation(py::module_& module);
+void add_time_of_impact(py::module_& module);
+
+/// One of some words, else ValueError that lists them.
+template <class Enum, std::size_t kCount>
+Enum named(const std::string& word, const char* argument,
+           const std::pair<const char*, Enum> (&choices)[kCount]) {
+  std::string all;
+  for (const auto& [name, value] : choices) {
+    if (word == name) return value;
+    all += (all.empty() ? "'" : ", '") + std::string(name) + "'";
+  }
+  throw py::value_error(std::string(argument) + ": '" + word + "'; one of " + all);
+}
+
+}  // namespace ist::python

@@ -1,0 +1,138 @@
+#include "offline.h"
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+namespace ist::python {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kLook = 50ms;       // for signals
+constexpr auto kPatience = 100ms;  // with a stage that was told to end
+
+/// What both threads see.
+struct Job {
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool done = false;             // guarded, as are the next two
+  std::optional<Progress> news;  // not yet handed on
+  std::exception_ptr error;
+  std::atomic<bool> cancelled = false;
+};
+
+/// Stages that run, those included that nobody waits for any more: the interpreter does not end
+/// before them.
+class Running {
+ public:
+  void begin() {
+    const std::lock_guard lock(mutex_);
+    ++count_;
+  }
+  void end() {
+    const std::lock_guard lock(mutex_);
+    --count_;
+    ended_.notify_all();
+  }
+  void wait() {
+    std::unique_lock lock(mutex_);
+    ended_.wait(lock, [&] { return count_ == 0; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable ended_;
+  int count_ = 0;
+};
+
+Running& running() {
+  static Running* const all = new Running;  // outlives every thread
+  return *all;
+}
+
+void work_apart(OfflineWork work, const std::shared_ptr<Job>& job) {
+  std::exception_ptr error;
+  try {
+    work([&](const Progress& progress) {
+      const std::lock_guard lock(job->mutex);
+      job->news = progress;
+      job->changed.notify_all();
+      return !job->cancelled.load();
+    });
+  } catch (...) {
+    error = std::current_exception();
+  }
+  work = nullptr;  // what it owns goes before its end is told
+  {
+    const std::lock_guard lock(job->mutex);
+    job->done = true;
+    job->error = std::move(error);
+    job->changed.notify_all();
+  }
+}
+
+/// Tells the stage to end, and gives it a little time.
+void give_up(Job& job) {
+  job.cancelled = true;
+  const py::gil_scoped_release released;
+  std::unique_lock lock(job.mutex);
+  job.changed.wait_for(lock, kPatience, [&] { return job.done; });
+}
+
+}  // namespace
+
+void run_offline(OfflineWork work, const py::object& progress) {
+  const auto job = std::make_shared<Job>();
+  running().begin();
+  try {
+    std::thread([work = std::move(work), job]() mutable {
+      work_apart(std::move(work), job);
+      running().end();
+    }).detach();
+  } catch (...) {
+    running().end();
+    throw;
+  }
+  for (bool done = false; !done;) {
+    std::optional<Progress> news;
+    {
+      const py::gil_scoped_release released;
+      std::unique_lock lock(job->mutex);
+      job->changed.wait_for(lock, kLook, [&] { return job->done || job->news.has_value(); });
+      news = std::exchange(job->news, std::nullopt);
+      done = job->done;
+    }
+    try {
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      if (news && !progress.is_none() && progress(*news).ptr() == Py_False) job->cancelled = true;
+    } catch (...) {
+      give_up(*job);
+      throw;
+    }
+  }
+  if (job->error) std::rethrow_exception(job->error);
+}
+
+void add_offline(py::module_& module) {
+  py::class_<Progress>(module, "Progress", "Where a long stage stands: what `progress` is handed.")
+      .def_readonly("stage", &Progress::stage,
+                    "'polygonise', 'pack', 'calibrate', 'cover', 'tree' or 'predict'.")
+      .def_readonly("spheres", &Progress::spheres, "Count so far.")
+      .def_readonly("coverage", &Progress::coverage,
+                    "[0, 1] of the solid's volume in inner spheres; 'pack' only.")
+      .def_readonly("radius", &Progress::radius,
+                    "[u] of the spheres being inserted now; 'pack' only.")
+      .def_readonly("fraction", &Progress::fraction, "[0, 1] of this stage's work, an estimate.")
+      .def_readonly("elapsed", &Progress::elapsed, "[s] since the stage began.");
+  py::module_::import("atexit").attr("register")(py::cpp_function([] {
+    const py::gil_scoped_release released;
+    running().wait();
+  }));
+}
+
+}  // namespace ist::python

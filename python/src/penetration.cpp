@@ -1,0 +1,219 @@
+#include "penetration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include <ist/field.h>
+#include <ist/wrench.h>
+
+namespace ist::python {
+namespace {
+
+/// Rows of qw, qx, qy, qz, tx, ty, tz: the slope of a function of q/|q| and t, from its slopes by a
+/// translation and by a rotation vector about t.
+void write_pose_gradient(const Pose& pose, const Eigen::Vector3d& by_translation,
+                         const Eigen::Vector3d& by_rotation, double* out) {
+  const Eigen::Vector4d q(pose.q);
+  const double norm = q.norm();
+  const Eigen::Vector3d v = q.tail<3>() / norm;
+  const double w = q[0] / norm;
+  // A rotation vector δ moves the unit quaternion by ½ (0, δ) q, a quarter of δ's length squared,
+  // so that the slope along the sphere is 2 (0, by_rotation) q. Across it there is none.
+  Eigen::Map<Eigen::Matrix<double, 7, 1>> gradient(out);
+  gradient[0] = -2 * by_rotation.dot(v) / norm;
+  gradient.segment<3>(1) = 2 / norm * (w * by_rotation + by_rotation.cross(v));
+  gradient.tail<3>() = by_translation;
+}
+
+/// How the volume grows with the scales of B and A.
+struct ScaleGradient {
+  double b = 0, a = 0;
+};
+
+/// The library knows no such slope: it is the difference of two queries, 0.05 % of the scale to
+/// either side, where rounding and curvature err alike, some 1e-4. The whole scene under a scale
+/// has its volume by the third power, which gives A's.
+ScaleGradient scale_gradient(const Row& row, const Penetration& answer,
+                             const PenetrationSettings& settings, Workspace& workspace) {
+  const double step = row.b.scale / 2048;
+  const auto volume = [&](double scale) {
+    Row moved = row;
+    moved.b.scale = scale;
+    return moved.answer([&](const auto& a, const PlacedTree& b) {
+      return penetration(a, b, settings, workspace).volume;
+    });
+  };
+  ScaleGradient gradient;
+  gradient.b = (volume(row.b.scale + step) - volume(row.b.scale - step)) / (2 * step);
+  const Eigen::Vector3d way = Eigen::Map<const Eigen::Vector3d>(row.b.pose.t) -
+                              Eigen::Map<const Eigen::Vector3d>(row.pose_a.t);
+  gradient.a =
+      (3 * answer.volume - row.b.scale * gradient.b - way.dot(answer.translation_gradient)) /
+      row.scale_a;
+  return gradient;
+}
+
+std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings& settings,
+                                     bool scale_gradients, unsigned threads) {
+  auto answers = std::make_shared<Penetrations>(rows.shape());
+  if (scale_gradients) {
+    answers->scale_gradient = {rows.shape(), {}};
+    answers->scale_gradient_a = {rows.shape(), {}};
+  }
+  for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
+    const Row row = rows.at(i);
+    const Penetration found = row.answer(
+        [&](const auto& a, const PlacedTree& b) { return penetration(a, b, settings, workspace); });
+    answers->write(i, row, found);
+    if (!scale_gradients) return;
+    const ScaleGradient gradient =
+        found.volume > 0 ? scale_gradient(row, found, settings, workspace) : ScaleGradient();
+    *answers->scale_gradient.row(i) = gradient.b;
+    *answers->scale_gradient_a.row(i) = gradient.a;
+  });
+  return answers;
+}
+
+PenetrationSettings penetration_settings(const std::string& measure, const std::string& field,
+                                         std::uint32_t pair_budget, std::uint32_t max_visits,
+                                         double deadline_us, double relative_error,
+                                         double min_radius) {
+  return {named(measure, "measure", kMeasures),
+          named(field, "field", kFieldUses),
+          pair_budget,
+          max_visits,
+          deadline_us,
+          relative_error,
+          min_radius};
+}
+
+constexpr const char* kPairDoc =
+    R"(Volume, wrench and centroid of the overlap, for one pose or many.
+
+a: Asset or Field. b: Asset.
+poses: of B, (7,) or (n, 7): qw, qx, qy, qz, tx [u], ty, tz. A C-ordered float64 array is not copied.
+scales: of B, a number or (n,), > 0. poses_a, scales_a: of A; None: at the origin, 1.)";
+
+constexpr const char* kSceneDoc = R"(The same for pairs of the solids of a scene, or of many scenes.
+
+solids: k Assets and Fields.
+poses: (k, 7), or (w, k, 7) for w scenes. scales: (k,) or (w, k), None: 1.
+pairs: (n, 2) numbers of solids; in each the second is an Asset. Answers have shape (n,) or (w, n).)";
+
+constexpr const char* kPenetrationDoc = R"(
+scale_gradients: fill scale_gradient and scale_gradient_a, at three times the cost.
+measure: 'matched' (the accurate one) or 'inner' (certified lower bound of the true volume).
+field: 'automatic', 'never' or 'always': whether the surface in an asset is used.
+pair_budget, max_visits, deadline_us [µs], relative_error, min_radius [u]: what it may cost; 0: no
+    limit. See <ist/query.h>.
+threads: 0: all cores. The answers are the same bits for any number. The GIL is released.
+
+Invalid rows (NaN, a quaternion off unit length by more than 1e-3, a scale ≤ 0) are all zero, with
+the status invalid_input; they spoil no others.
+Ctrl-C raises KeyboardInterrupt.
+
+Returns a Penetration: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
+
+void add_class(py::module_& module) {
+  py::class_<Penetrations, std::shared_ptr<Penetrations>> type(
+      module, "Penetration",
+      "Overlaps of placed solids: columns of one row a pose, without the (n,) for one pose.");
+  add_column(type, "volume", &Penetrations::volume, "(n,) [u³] of the overlap.");
+  add_column(type, "volume_min", &Penetrations::volume_min,
+             "(n,) [u³] lower bound on that sum, rounding included; not on the true overlap.");
+  add_column(type, "volume_max", &Penetrations::volume_max, "(n,) [u³] upper bound, likewise.");
+  add_column(type, "centroid", &Penetrations::centroid,
+             "(n, 3) [u] of the overlap, world; zero if none.");
+  add_column(type, "force", &Penetrations::force,
+             "(n, 3) [u²] −dV/d(translation of B), world: the push on B of a pressure of 1. "
+             "A's is opposite.");
+  add_column(type, "torque", &Penetrations::torque,
+             "(n, 3) [u³] −dV/d(rotation vector of B) about B's origin, world.");
+  add_column(type, "pose_gradient", &Penetrations::pose_gradient,
+             "(n, 7) dV/d(row of B's pose): [u³] for the quaternion, of V(q/|q|), and [u²].");
+  add_column(type, "pose_gradient_a", &Penetrations::pose_gradient_a,
+             "(n, 7) the same for A's pose.");
+  add_column(type, "scale_gradient", &Penetrations::scale_gradient,
+             "(n,) [u³] dV/d(B's scale), by the difference of two queries; None if not asked for.");
+  add_column(type, "scale_gradient_a", &Penetrations::scale_gradient_a,
+             "(n,) [u³] the same for A's scale.");
+  add_column(type, "status", &Penetrations::status, "(n,) uint32, a QueryStatus.");
+  add_column(type, "node_visits", &Penetrations::node_visits, "(n,) uint32, node pairs opened.");
+  add_column(type, "sphere_pairs", &Penetrations::sphere_pairs,
+             "(n,) uint32, lenses summed and spheres put together with a surface.");
+}
+
+}  // namespace
+
+Penetrations::Penetrations(const Shape& rows)
+    : volume(rows, {}),
+      volume_min(rows, {}),
+      volume_max(rows, {}),
+      centroid(rows, {3}),
+      force(rows, {3}),
+      torque(rows, {3}),
+      pose_gradient(rows, {7}),
+      pose_gradient_a(rows, {7}),
+      status(rows, {}),
+      node_visits(rows, {}),
+      sphere_pairs(rows, {}) {}
+
+void Penetrations::write(std::size_t i, const Row& row, const Penetration& answer) const {
+  *status.row(i) = static_cast<std::uint32_t>(answer.status);
+  *node_visits.row(i) = answer.node_visits;
+  *sphere_pairs.row(i) = answer.sphere_pairs;
+  if (answer.volume_max == 0) return;  // nothing touches, or a row is invalid: all is zero
+  *volume.row(i) = answer.volume;
+  *volume_min.row(i) = answer.volume_min;
+  *volume_max.row(i) = answer.volume_max;
+  Vector(centroid.row(i)) = answer.centroid;
+  const Eigen::Vector3d origin_a(row.pose_a.t), origin_b(row.b.pose.t);
+  const Wrenches push = wrenches(answer, row.b.pose, origin_a, origin_b);
+  Vector(force.row(i)) = push.on_b.force;
+  Vector(torque.row(i)) = push.on_b.torque;
+  write_pose_gradient(row.b.pose, answer.translation_gradient, answer.rotation_gradient,
+                      pose_gradient.row(i));
+  write_pose_gradient(row.pose_a, -push.on_a.force, -push.on_a.torque, pose_gradient_a.row(i));
+}
+
+void add_penetration(py::module_& module) {
+  add_class(module);
+  const auto doc = [](const char* what) { return std::string(what) + kPenetrationDoc; };
+  module.def(
+      "penetration",
+      [](const py::object& a, const py::object& b, const py::object& poses,
+         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
+         bool scale_gradients, const std::string& measure, const std::string& field,
+         std::uint32_t pair_budget, std::uint32_t max_visits, double deadline_us,
+         double relative_error, double min_radius, unsigned threads) {
+        return answer(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
+                      penetration_settings(measure, field, pair_budget, max_visits, deadline_us,
+                                           relative_error, min_radius),
+                      scale_gradients, threads);
+      },
+      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("scales") = py::none(),
+      py::arg("poses_a") = py::none(), py::arg("scales_a") = py::none(),
+      py::arg("scale_gradients") = false, py::arg("measure") = "matched",
+      py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
+      py::arg("deadline_us") = 0.0, py::arg("relative_error") = 0.0, py::arg("min_radius") = 0.0,
+      py::arg("threads") = 0, doc(kPairDoc).c_str());
+  module.def(
+      "penetration_of_pairs",
+      [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
+         const py::object& scales, bool scale_gradients, const std::string& measure,
+         const std::string& field, std::uint32_t pair_budget, std::uint32_t max_visits,
+         double deadline_us, double relative_error, double min_radius, unsigned threads) {
+        return answer(Rows::of_scene(solids, poses, pairs, scales),
+                      penetration_settings(measure, field, pair_budget, max_visits, deadline_us,
+                                           relative_error, min_radius),
+                      scale_gradients, threads);
+      },
+      py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
+      py::arg("scales") = py::none(), py::arg("scale_gradients") = false,
+      py::arg("measure") = "matched", py::arg("field") = "automatic", py::arg("pair_budget") = 0,
+      py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0, py::arg("relative_error") = 0.0,
+      py::arg("min_radius") = 0.0, py::arg("threads") = 0, doc(kSceneDoc).c_str());
+}
+
+}  // namespace ist::python

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <ist/query.h>
+
+#include <string>
+
+#include "arrays.h"
+#include "module.h"
+#include "rows.h"
+
+namespace ist::python {
+
+inline constexpr std::pair<const char*, Measure> kMeasures[] = {{"matched", Measure::matched},
+                                                                {"inner", Measure::inner}};
+inline constexpr std::pair<const char*, FieldUse> kFieldUses[] = {
+    {"automatic", FieldUse::automatic}, {"never", FieldUse::never}, {"always", FieldUse::always}};
+
+using Vector = Eigen::Map<Eigen::Vector3d>;  ///< a row of a column
+
+/// Penetrations as columns.
+struct Penetrations {
+  explicit Penetrations(const Shape& rows);
+
+  /// What was answered for row i, and how it grows with both poses.
+  void write(std::size_t i, const Row& row, const Penetration& answer) const;
+
+  Column<double> volume, volume_min, volume_max, centroid, force, torque, pose_gradient,
+      pose_gradient_a;
+  Column<std::uint32_t> status, node_visits, sphere_pairs;
+  Column<double> scale_gradient, scale_gradient_a;  ///< without an array where nobody asked
+};
+
+/// A property that is a column.
+template <class Class, class Part>
+void add_column(Class& of, const char* name, Part part, const char* doc) {
+  of.def_property_readonly(
+      name,
+      [part](const typename Class::type& self) -> py::object {
+        const py::array& array = (self.*part).array;
+        if (!array || (self.*part).data == nullptr) return py::none();
+        return handed_out(array);
+      },
+      doc);
+}
+
+}  // namespace ist::python

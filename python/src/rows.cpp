@@ -1,0 +1,252 @@
+#include "rows.h"
+
+#include <ist/query_tbb.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <numeric>
+#include <set>
+#include <thread>
+
+#include <ist/asset_layout.h>
+
+#include "query/base/batch.h"
+#include "stage/thread_arena.h"
+
+namespace ist::python {
+namespace {
+
+constexpr const char* kPoses = "(7,) or (n, 7): qw, qx, qy, qz, tx, ty, tz";
+
+Pose pose_from(const double* values) {
+  Pose pose;
+  std::memcpy(pose.q, values, sizeof pose.q);
+  std::memcpy(pose.t, values + 4, sizeof pose.t);
+  return pose;
+}
+
+/// Scratch memory that calls take and give back: making it takes longer than a query.
+class Workspaces {
+ public:
+  std::vector<Workspace> take(std::size_t count) {
+    std::vector<Workspace> taken;
+    taken.reserve(count);
+    {
+      const std::lock_guard lock(mutex_);
+      for (; taken.size() < count && !idle_.empty(); idle_.pop_back())
+        taken.push_back(std::move(idle_.back()));
+    }
+    while (taken.size() < count) taken.emplace_back();
+    return taken;
+  }
+
+  void give_back(std::vector<Workspace>& taken) {
+    const std::lock_guard lock(mutex_);
+    for (Workspace& workspace : taken) idle_.push_back(std::move(workspace));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<Workspace> idle_;
+};
+
+Workspaces& workspaces() {
+  static Workspaces all;
+  return all;
+}
+
+/// Looks for Ctrl-C now and then, on the thread that Python called on; others see what it found.
+class Interrupt {
+ public:
+  bool seen() {
+    if (std::this_thread::get_id() == caller_ && ++calls_ % kCalls == 0 &&
+        Clock::now() - last_ > std::chrono::milliseconds(50)) {
+      const py::gil_scoped_acquire held;
+      if (PyErr_CheckSignals() != 0) seen_ = true;  // the exception waits in this thread's state
+      last_ = Clock::now();
+    }
+    return seen_.load(std::memory_order_relaxed);
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr unsigned kCalls = 8;  // queries between two looks at the clock
+
+  const std::thread::id caller_ = std::this_thread::get_id();
+  unsigned calls_ = 0;
+  Clock::time_point last_ = Clock::now();
+  std::atomic<bool> seen_ = false;
+};
+
+}  // namespace
+
+Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& poses,
+                   const py::object& scales, const py::object& poses_a,
+                   const py::object& scales_a) {
+  Rows rows;
+  rows.solids_ = {solid_of(a, "a"), tree_of(b, "b")};
+  rows.owners_ = {a, b};
+  py::ssize_t count = -1;  // as many rows as the arguments of many have; -1: none has
+  const auto agree = [&](const py::array& array, const char* name) {
+    if (count >= 0 && array.shape(0) != count)
+      throw py::value_error(std::string(name) + ": " + std::to_string(array.shape(0)) +
+                            " rows; the arguments before it have " + std::to_string(count));
+    count = array.shape(0);
+  };
+  const auto take = [&](const py::object& value, const char* name) -> Values {
+    if (value.is_none()) {
+      Doubles origin(7);
+      const Pose identity;
+      std::memcpy(origin.mutable_data(), identity.q, sizeof identity.q);
+      std::memcpy(origin.mutable_data() + 4, identity.t, sizeof identity.t);
+      return Values(origin, 7, false);
+    }
+    Doubles array = take_doubles(value, name, kPoses);
+    if (array.ndim() < 1 || array.ndim() > 2 || array.shape(array.ndim() - 1) != 7)
+      refuse_shape(array, name, kPoses);
+    const bool many = array.ndim() == 2;
+    if (many) agree(array, name);
+    return Values(std::move(array), 7, many);
+  };
+  const auto take_scales = [&](const py::object& value, const char* name) -> Values {
+    Doubles array = take_doubles(value.is_none() ? py::object(py::float_(1.0)) : value, name,
+                                 "a number or (n,)");
+    if (array.ndim() > 1) refuse_shape(array, name, "a number or (n,)");
+    const bool many = array.ndim() == 1;
+    if (many) agree(array, name);
+    return Values(std::move(array), 1, many);
+  };
+  rows.pose_b_ = take(poses, "poses");
+  rows.scale_b_ = take_scales(scales, "scales");
+  rows.pose_a_ = take(poses_a, "poses_a");
+  rows.scale_a_ = take_scales(scales_a, "scales_a");
+  if (count >= 0) rows.shape_ = {count};
+  rows.count_ = count >= 0 ? static_cast<std::size_t>(count) : 1;
+  return rows;
+}
+
+Rows Rows::of_scene(const py::sequence& solids, const py::object& poses, const py::object& pairs,
+                    const py::object& scales) {
+  Rows rows;
+  for (const py::handle solid : solids) {
+    rows.solids_.push_back(solid_of(solid, "solids"));
+    rows.owners_.push_back(py::reinterpret_borrow<py::object>(solid));
+  }
+  const auto k = static_cast<py::ssize_t>(rows.solids_.size());
+  const std::string of_solids = std::to_string(k);
+  const std::string wanted = "(" + of_solids + ", 7) or (w, " + of_solids + ", 7)";
+  Doubles places = take_doubles(poses, "poses", wanted);
+  const py::ssize_t d = places.ndim();
+  if (d < 2 || d > 3 || places.shape(d - 1) != 7 || places.shape(d - 2) != k)
+    refuse_shape(places, "poses", wanted);
+  rows.held_pairs_ = take_integers(pairs, "pairs", "(n, 2)");
+  const Integers& named = *rows.held_pairs_;
+  if (named.ndim() != 2 || named.shape(1) != 2) refuse_shape(named, "pairs", "(n, 2)");
+  rows.pairs_ = named.data();
+  for (py::ssize_t i = 0; i < named.shape(0); ++i) {
+    const std::int64_t first = named.at(i, 0), second = named.at(i, 1);
+    const auto refuse = [&](const std::string& why) {
+      throw py::value_error("pairs[" + std::to_string(i) + "]: (" + std::to_string(first) + ", " +
+                            std::to_string(second) + "): " + why);
+    };
+    if (std::min(first, second) < 0 || std::max(first, second) >= k)
+      refuse("there are solids 0 to " + std::to_string(k - 1));
+    if (first == second) refuse("a solid does not meet itself");
+    if (!std::holds_alternative<TreeView>(rows.solids_[static_cast<std::size_t>(second)]))
+      refuse("the second is a field; a field stands first");
+  }
+  const py::ssize_t scenes = d == 3 ? places.shape(0) : 1;
+  rows.pose_b_ = Values(std::move(places), 7, true);
+  if (scales.is_none()) {
+    rows.scale_b_ = Values(take_doubles(py::float_(1.0), "scales", ""), 1, false);
+  } else {
+    const std::string sizes = d == 3 ? "(w, " + of_solids + ")" : "(" + of_solids + ",)";
+    Doubles values = take_doubles(scales, "scales", sizes);
+    if (values.ndim() != d - 1 || values.shape(d - 2) != k || (d == 3 && values.shape(0) != scenes))
+      refuse_shape(values, "scales", sizes);
+    rows.scale_b_ = Values(std::move(values), 1, true);
+  }
+  rows.pairs_of_scene_ = static_cast<std::size_t>(named.shape(0));
+  rows.shape_ = {named.shape(0)};
+  if (d == 3) rows.shape_.insert(rows.shape_.begin(), scenes);
+  rows.count_ = rows.pairs_of_scene_ * static_cast<std::size_t>(scenes);
+  rows.sort_by_asset();
+  return rows;
+}
+
+void Rows::sort_by_asset() {
+  // Below, sorting takes longer than what it saves: 2 % of a batch over four assets, 6 to 9 % over
+  // 80 MB and more (benchmarks/run.sh cpu_batch).
+  constexpr std::uint64_t kCache = 32u << 20;
+  const auto header = [&](std::int64_t solid) -> const AssetHeader* {
+    const TreeView* const tree = std::get_if<TreeView>(&solids_[static_cast<std::size_t>(solid)]);
+    return tree != nullptr ? &tree->header() : nullptr;
+  };
+  std::set<const AssetHeader*> assets;
+  std::uint64_t bytes = 0;
+  for (std::size_t k = 0; k < solids_.size(); ++k) {
+    const AssetHeader* const asset = header(static_cast<std::int64_t>(k));
+    if (asset != nullptr && assets.insert(asset).second) bytes += asset->file_bytes;
+  }
+  if (bytes < kCache || count_ == 0) return;
+  order_.resize(pairs_of_scene_);
+  std::iota(order_.begin(), order_.end(), std::size_t{0});
+  const auto key = [&](std::size_t pair) {
+    return std::pair(header(pairs_[2 * pair]), header(pairs_[2 * pair + 1]));
+  };
+  std::stable_sort(order_.begin(), order_.end(),
+                   [&](std::size_t one, std::size_t other) { return key(one) < key(other); });
+}
+
+Row Rows::at(std::size_t i) const {
+  Row row;
+  if (pairs_ == nullptr) {
+    row.a = &solids_[0];
+    row.pose_a = pose_from(pose_a_.at(i));
+    row.scale_a = *scale_a_.at(i);
+    row.b = {std::get<TreeView>(solids_[1]), pose_from(pose_b_.at(i)), *scale_b_.at(i)};
+    return row;
+  }
+  const std::int64_t* const pair = pairs_ + 2 * (i % pairs_of_scene_);
+  const std::size_t scene = i / pairs_of_scene_ * solids_.size();
+  const auto first = static_cast<std::size_t>(pair[0]), second = static_cast<std::size_t>(pair[1]);
+  row.a = &solids_[first];
+  row.pose_a = pose_from(pose_b_.at(scene + first));
+  row.scale_a = *scale_b_.at(scene + first);
+  row.b = {std::get<TreeView>(solids_[second]), pose_from(pose_b_.at(scene + second)),
+           *scale_b_.at(scene + second)};
+  return row;
+}
+
+void for_each_row(const Rows& rows, unsigned threads,
+                  const std::function<void(std::size_t, Workspace&)>& answer) {
+  const std::size_t count = rows.count();
+  if (count == 0) return;
+  Interrupt interrupt;
+  bool interrupted = false;
+  {
+    const py::gil_scoped_release released;
+    constexpr std::size_t kFew = 8;  // rows that no second thread is called for
+    const auto ask = [&](std::vector<Workspace>& scratch, const ParallelFor& parallel) {
+      answer_all(count, scratch.size(), parallel, [&](std::size_t i, std::size_t worker) {
+        if (!interrupt.seen()) answer(rows.asked(i), scratch[worker]);
+      });
+    };
+    std::vector<Workspace> scratch;
+    if (threads == 1 || count < kFew) {
+      scratch = workspaces().take(1);
+      ask(scratch, {});
+    } else {
+      oneapi::tbb::task_arena arena = thread_arena(threads);
+      scratch = workspaces().take(static_cast<std::size_t>(arena.max_concurrency()));
+      arena.execute([&] { ask(scratch, tbb_parallel_for()); });
+    }
+    workspaces().give_back(scratch);
+    interrupted = interrupt.seen();
+  }
+  if (interrupted) throw py::error_already_set();
+}
+
+}  // namespace ist::python

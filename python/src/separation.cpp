@@ -1,0 +1,229 @@
+#include <ist/field.h>
+#include <ist/overlap.h>
+#include <ist/query.h>
+
+#include <memory>
+
+#include "penetration.h"
+
+namespace ist::python {
+namespace {
+
+struct Separations {
+  explicit Separations(const Shape& rows)
+      : distance(rows, {}),
+        distance_min(rows, {}),
+        distance_max(rows, {}),
+        point_a(rows, {3}),
+        point_b(rows, {3}),
+        normal(rows, {3}),
+        status(rows, {}),
+        node_visits(rows, {}),
+        sphere_pairs(rows, {}) {}
+
+  void write(std::size_t i, const Separation& answer) const {
+    *distance.row(i) = answer.distance;
+    *distance_min.row(i) = answer.distance_min;
+    *distance_max.row(i) = answer.distance_max;
+    Vector(point_a.row(i)) = answer.point_a;
+    Vector(point_b.row(i)) = answer.point_b;
+    Vector(normal.row(i)) = answer.normal;
+    *status.row(i) = static_cast<std::uint32_t>(answer.status);
+    *node_visits.row(i) = answer.node_visits;
+    *sphere_pairs.row(i) = answer.sphere_pairs;
+  }
+
+  Column<double> distance, distance_min, distance_max, point_a, point_b, normal;
+  Column<std::uint32_t> status, node_visits, sphere_pairs;
+};
+
+struct Patches {
+  Patches(const Shape& rows, py::ssize_t each)
+      : penetration(std::make_shared<Penetrations>(rows)),
+        count(rows, {}),
+        id(rows, {each}),
+        centroid(rows, {each, 3}),
+        normal(rows, {each, 3}),
+        area(rows, {each}),
+        depth(rows, {each}),
+        volume(rows, {each}),
+        force(rows, {each, 3}),
+        torque(rows, {each, 3}) {}
+
+  void write(std::size_t i, std::span<const ContactPatch> patches) const {
+    for (std::size_t k = 0; k < patches.size(); ++k) {
+      const ContactPatch& patch = patches[k];
+      id.row(i)[k] = patch.id;
+      Vector(centroid.row(i) + 3 * k) = patch.centroid;
+      Vector(normal.row(i) + 3 * k) = patch.normal;
+      area.row(i)[k] = patch.area;
+      depth.row(i)[k] = patch.depth;
+      volume.row(i)[k] = patch.volume;
+      Vector(force.row(i) + 3 * k) = patch.force;
+      Vector(torque.row(i) + 3 * k) = patch.torque;
+    }
+  }
+
+  std::shared_ptr<Penetrations> penetration;
+  Column<std::uint32_t> count;
+  Column<std::uint64_t> id;
+  Column<double> centroid, normal, area, depth, volume, force, torque;
+};
+
+std::unique_ptr<Separations> separations(const Rows& rows, const SeparationSettings& settings,
+                                         unsigned threads) {
+  auto answers = std::make_unique<Separations>(rows.shape());
+  for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
+    answers->write(i, rows.at(i).answer([&](const auto& a, const PlacedTree& b) {
+      return separation(a, b, settings, workspace);
+    }));
+  });
+  return answers;
+}
+
+std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
+                                 const ContactSettings& settings, unsigned threads) {
+  auto answers = std::make_unique<Patches>(rows.shape(), static_cast<py::ssize_t>(each));
+  for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
+    const Row row = rows.at(i);
+    thread_local std::vector<ContactPatch> found;
+    found.resize(each);
+    const ContactPatches answer = row.answer([&](const auto& a, const PlacedTree& b) {
+      return contact_patches(a, b, settings, workspace, found);
+    });
+    answers->penetration->write(i, row, answer.penetration);
+    *answers->count.row(i) = static_cast<std::uint32_t>(answer.count);
+    answers->write(i, std::span(found).first(answer.count));
+  });
+  return answers;
+}
+
+py::object overlaps(const Rows& rows, unsigned threads) {
+  const Column<std::uint32_t> answers(rows.shape(), {});
+  for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
+    *answers.row(i) = static_cast<std::uint32_t>(rows.at(i).answer(
+        [&](const auto& a, const PlacedTree& b) { return overlap(a, b, workspace); }));
+  });
+  return handed_out(answers.array);
+}
+
+constexpr const char* kSeparationDoc =
+    R"(Distance of the inner spheres, and a certified interval for the solids.
+
+Arguments as penetration() has them; max_visits, deadline_us [µs]: 0: no limit.
+
+Returns a Separation: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
+
+constexpr const char* kPatchesDoc =
+    R"(The contact condensed into at most max_patches patches.
+
+Arguments as penetration() has them. Patches sum to the whole.
+
+Returns ContactPatches: arrays of shape (n, max_patches), or (max_patches,) for one pose.)";
+
+constexpr const char* kOverlapDoc = R"(Whether solids share a point: yes and no are certain.
+
+Arguments as penetration() has them. A fraction of what a penetration takes.
+
+Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown; a number for one pose.)";
+
+void add_classes(py::module_& module) {
+  py::class_<Separations> separation(module, "Separation",
+                                     "Gaps of placed solids; all zero once inner spheres overlap.");
+  add_column(separation, "distance", &Separations::distance, "(n,) [u] between the inner spheres.");
+  add_column(separation, "distance_min", &Separations::distance_min,
+             "(n,) [u] the true distance of the solids is at least this, certified.");
+  add_column(separation, "distance_max", &Separations::distance_max,
+             "(n,) [u] and at most this, certified.");
+  add_column(separation, "point_a", &Separations::point_a,
+             "(n, 3) [u] on A's inner spheres, world.");
+  add_column(separation, "point_b", &Separations::point_b,
+             "(n, 3) [u] on B's inner spheres, world.");
+  add_column(separation, "normal", &Separations::normal, "(n, 3) unit, from A to B, world.");
+  add_column(separation, "status", &Separations::status, "(n,) uint32, a QueryStatus.");
+  add_column(separation, "node_visits", &Separations::node_visits, "(n,) uint32.");
+  add_column(separation, "sphere_pairs", &Separations::sphere_pairs, "(n,) uint32.");
+
+  py::class_<Patches> patch(module, "ContactPatches",
+                            "Contacts as patches; of m there is room for, the first `count` are.");
+  patch.def_readonly("penetration", &Patches::penetration, "The whole: a Penetration.");
+  add_column(patch, "count", &Patches::count, "(n,) uint32, patches written; the rest is zero.");
+  add_column(patch, "id", &Patches::id,
+             "(n, m) uint64, names a region of the smaller solid: the same in every query of the "
+             "same two assets.");
+  add_column(patch, "centroid", &Patches::centroid, "(n, m, 3) [u] of the patch's overlap, world.");
+  add_column(patch, "normal", &Patches::normal,
+             "(n, m, 3) unit, world: the patch pushes B along it.");
+  add_column(patch, "area", &Patches::area, "(n, m) [u²] seen along the normal.");
+  add_column(patch, "depth", &Patches::depth, "(n, m) [u] volume/area.");
+  add_column(patch, "volume", &Patches::volume, "(n, m) [u³]");
+  add_column(patch, "force", &Patches::force, "(n, m, 3) [u²] share of Penetration.force.");
+  add_column(patch, "torque", &Patches::torque,
+             "(n, m, 3) [u³] share of Penetration.torque, about B's origin.");
+}
+
+}  // namespace
+
+void add_separation(py::module_& module) {
+  add_classes(module);
+  module.def(
+      "separation",
+      [](const py::object& a, const py::object& b, const py::object& poses,
+         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
+         std::uint32_t max_visits, double deadline_us, unsigned threads) {
+        return separations(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
+                           {max_visits, deadline_us}, threads);
+      },
+      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("scales") = py::none(),
+      py::arg("poses_a") = py::none(), py::arg("scales_a") = py::none(), py::arg("max_visits") = 0,
+      py::arg("deadline_us") = 0.0, py::arg("threads") = 0, kSeparationDoc);
+  module.def(
+      "separation_of_pairs",
+      [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
+         const py::object& scales, std::uint32_t max_visits, double deadline_us, unsigned threads) {
+        return separations(Rows::of_scene(solids, poses, pairs, scales), {max_visits, deadline_us},
+                           threads);
+      },
+      py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
+      py::arg("scales") = py::none(), py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
+      py::arg("threads") = 0,
+      "separation() for pairs of the solids of scenes, as penetration_of_pairs() has them.");
+  module.def(
+      "contact_patches",
+      [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
+         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
+         const std::string& measure, const std::string& field, std::uint32_t max_visits,
+         double deadline_us, double relative_error, double min_radius, unsigned threads) {
+        return patches(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), max_patches,
+                       {named(measure, "measure", kMeasures), named(field, "field", kFieldUses),
+                        max_visits, deadline_us, relative_error, min_radius},
+                       threads);
+      },
+      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("max_patches") = 8,
+      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("scales_a") = py::none(), py::arg("measure") = "matched",
+      py::arg("field") = "automatic", py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
+      py::arg("relative_error") = 0.0, py::arg("min_radius") = 0.0, py::arg("threads") = 0,
+      kPatchesDoc);
+  module.def(
+      "overlap",
+      [](const py::object& a, const py::object& b, const py::object& poses,
+         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
+         unsigned threads) {
+        return overlaps(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), threads);
+      },
+      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("scales") = py::none(),
+      py::arg("poses_a") = py::none(), py::arg("scales_a") = py::none(), py::arg("threads") = 0,
+      kOverlapDoc);
+  module.def(
+      "overlap_of_pairs",
+      [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
+         const py::object& scales, unsigned threads) {
+        return overlaps(Rows::of_scene(solids, poses, pairs, scales), threads);
+      },
+      py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
+      py::arg("scales") = py::none(), py::arg("threads") = 0,
+      "overlap() for pairs of the solids of scenes, as penetration_of_pairs() has them.");
+}
+
+}  // namespace ist::python

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include <memory>
+#include <variant>
+
+#include <ist/bake.h>
+#include <ist/field.h>
+
+namespace ist::python {
+
+namespace py = pybind11;
+
+/// A field and whoever owns the memory that it points to.
+struct OwnedField {
+  Field field;
+  py::object owner;
+};
+
+/// What may stand first in a query: a view. Whoever asks holds the Python object meanwhile.
+using Solid = std::variant<TreeView, Field>;
+
+/// Of an Asset or a Field, else TypeError. `name`: of the argument.
+Solid solid_of(const py::handle& object, const char* name);
+
+/// Of an Asset, else TypeError that says why a field will not do.
+TreeView tree_of(const py::handle& object, const char* name);
+
+}  // namespace ist::python

@@ -1,0 +1,109 @@
+#include <ist/time_of_impact.h>
+
+#include <memory>
+
+#include "penetration.h"
+
+namespace ist::python {
+namespace {
+
+struct Impacts {
+  explicit Impacts(const Shape& rows)
+      : time(rows, {}),
+        distance_min(rows, {}),
+        distance_max(rows, {}),
+        point_a(rows, {3}),
+        point_b(rows, {3}),
+        normal(rows, {3}),
+        status(rows, {}),
+        node_visits(rows, {}),
+        surface_pairs(rows, {}) {}
+
+  void write(std::size_t i, const TimeOfImpact& answer) const {
+    *time.row(i) = answer.time;
+    *distance_min.row(i) = answer.distance_min;
+    *distance_max.row(i) = answer.distance_max;
+    Vector(point_a.row(i)) = answer.point_a;
+    Vector(point_b.row(i)) = answer.point_b;
+    Vector(normal.row(i)) = answer.normal;
+    *status.row(i) = static_cast<std::uint32_t>(answer.status);
+    *node_visits.row(i) = answer.node_visits;
+    *surface_pairs.row(i) = answer.surface_pairs;
+  }
+
+  Column<double> time, distance_min, distance_max, point_a, point_b, normal;
+  Column<std::uint32_t> status, node_visits, surface_pairs;
+};
+
+constexpr const char* kDoc = R"(Up to when B, on its way from pose to pose, stays clear of A.
+
+B goes from `poses` to `poses_to` in the time `duration`: `about` straight on, turning at constant
+speed about one axis, the shorter way. A stands at `poses_a`, or goes to `poses_a_to`.
+
+poses, poses_to: (7,) or (n, 7), as penetration() has them.
+about, about_a: (3,) [u] in the object's own frame, before its scale: its centre of mass for a free
+    body.
+duration: [T] > 0. tolerance: [u]; 0: a thousandth of the smaller solid.
+max_visits, deadline_us [µs]: 0: no limit.
+
+Returns a TimeOfImpact: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
+
+Eigen::Vector3d point_of(const py::object& value, const char* name) {
+  const Doubles array = take_doubles(value, name, "(3,)");
+  if (array.ndim() != 1 || array.shape(0) != 3) refuse_shape(array, name, "(3,)");
+  return Eigen::Vector3d(array.data());
+}
+
+}  // namespace
+
+void add_time_of_impact(py::module_& module) {
+  py::class_<Impacts> type(module, "TimeOfImpact", "Up to when moving solids stay clear.");
+  add_column(type, "time", &Impacts::time,
+             "(n,) [T] in [0, duration]. Certified for every status: they do not touch before.");
+  add_column(type, "distance_min", &Impacts::distance_min,
+             "(n,) [u] the solids' distance at `time` is at least this, certified.");
+  add_column(type, "distance_max", &Impacts::distance_max,
+             "(n,) [u] and at most this; infinite where no impact was found.");
+  add_column(type, "point_a", &Impacts::point_a, "(n, 3) [u] of A at `time`, world.");
+  add_column(type, "point_b", &Impacts::point_b, "(n, 3) [u] of B at `time`, world.");
+  add_column(type, "normal", &Impacts::normal, "(n, 3) unit, from A to B, world.");
+  add_column(type, "status", &Impacts::status, "(n,) uint32, an ImpactStatus.");
+  add_column(type, "node_visits", &Impacts::node_visits, "(n,) uint32.");
+  add_column(type, "surface_pairs", &Impacts::surface_pairs, "(n,) uint32.");
+  module.def(
+      "time_of_impact",
+      [](const py::object& a, const py::object& b, const py::object& poses,
+         const py::object& poses_to, const py::object& about, const py::object& scales,
+         const py::object& poses_a, const py::object& poses_a_to, const py::object& about_a,
+         const py::object& scales_a, double duration, double tolerance, std::uint32_t max_visits,
+         double deadline_us, unsigned threads) {
+        const ImpactSettings settings{duration, tolerance, max_visits, deadline_us};
+        const Rows from = Rows::of_pair(a, b, poses, scales, poses_a, scales_a);
+        const Rows to = Rows::of_pair(a, b, poses_to, scales,
+                                      poses_a_to.is_none() ? poses_a : poses_a_to, scales_a);
+        if (from.shape() != to.shape())
+          throw py::value_error("poses_to: as many rows as poses are wanted: " +
+                                text_of(from.shape()) + ", not " + text_of(to.shape()));
+        const Eigen::Vector3d centre = point_of(about, "about"),
+                              centre_a = point_of(about_a, "about_a");
+        auto answers = std::make_unique<Impacts>(from.shape());
+        for_each_row(from, threads, [&](std::size_t i, Workspace& workspace) {
+          const Row start = from.at(i), end = to.at(i);
+          const Motions motions{
+              motion_between(start.pose_a, end.pose_a, settings.duration, centre_a, start.scale_a),
+              motion_between(start.b.pose, end.b.pose, settings.duration, centre, start.b.scale)};
+          answers->write(i, start.answer([&](const auto& one, const PlacedTree& other) {
+            return time_of_impact(one, other, motions, settings, workspace);
+          }));
+        });
+        return answers;
+      },
+      py::arg("a"), py::arg("b"), py::arg("poses"), py::arg("poses_to"), py::kw_only(),
+      py::arg("about") = py::make_tuple(0.0, 0.0, 0.0), py::arg("scales") = py::none(),
+      py::arg("poses_a") = py::none(), py::arg("poses_a_to") = py::none(),
+      py::arg("about_a") = py::make_tuple(0.0, 0.0, 0.0), py::arg("scales_a") = py::none(),
+      py::arg("duration") = 1.0, py::arg("tolerance") = 0.0, py::arg("max_visits") = 0,
+      py::arg("deadline_us") = 0.0, py::arg("threads") = 0, kDoc);
+}
+
+}  // namespace ist::python

@@ -1,0 +1,57 @@
+"""What users copy from runs."""
+import importlib.util
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+import ist
+
+EXAMPLES = pathlib.Path(os.environ.get("IST_EXAMPLES", pathlib.Path(__file__).parents[2] / "examples/python"))
+
+
+ROOT = EXAMPLES.parents[1]
+
+
+def lines_of(page):
+    """The first lines of Python in a page."""
+    return re.search(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)[1]
+
+
+def run(name, *arguments):
+    return subprocess.run([sys.executable, EXAMPLES / name, *map(str, arguments)], check=True,
+                          capture_output=True, text=True, timeout=600).stdout
+
+
+def test_the_readmes_lines(tmp_path):
+    mesh = ist.sample_mesh("cube")
+    path = tmp_path / "cube.obj"
+    path.write_text("".join(f"v {x} {y} {z}\n" for x, y, z in mesh.vertices)
+                    + "".join(f"f {a} {b} {c}\n" for a, b, c in mesh.triangles + 1))
+    out = subprocess.run([sys.executable, "-c", lines_of("README.md"), path, path], check=True,
+                         capture_output=True, text=True).stdout
+    assert float(out.split()[0]) > 0.5
+
+
+def test_the_first_lines_of_the_guide():
+    exec(lines_of("docs/python.md"), {})
+
+
+def test_the_tour():
+    assert "it lands at 0.7" in run("tour.py")
+
+
+def test_parts_find_room_in_a_box(tmp_path):
+    picture = []
+    if importlib.util.find_spec("matplotlib") is not None:  # ./dev setup --bench
+        picture = ["--picture", tmp_path / "box.png"]
+    assert "4 of 4 parts found room" in run("packing.py", "--parts", 4, *picture)
+    assert not picture or picture[1].stat().st_size > 10_000
+
+
+def test_a_heap_is_pushed_apart():
+    pytest.importorskip("torch", reason="no python3-torch: ./dev setup --torch")
+    assert "0 u³ left" in run("pile.py", "--objects", 12)

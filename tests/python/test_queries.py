@@ -1,0 +1,292 @@
+"""Queries of one pose and of arrays of poses."""
+import threading
+
+import numpy as np
+import pytest
+
+import ist
+
+IDENTITY = [1, 0, 0, 0, 0, 0, 0]
+AWAY = [1, 0, 0, 0, 100, 0, 0]
+
+
+def test_boxes_overlap_by_their_volume(cube):
+    side = cube.bounds().upper[0] - cube.bounds().lower[0]
+    floor = ist.HalfSpaceField(offset=cube.bounds().lower[2] + 0.25 * side)
+    found = ist.penetration(floor, cube, IDENTITY)
+    assert found.volume == pytest.approx(0.25 * side**3, rel=0.02)
+    assert found.force == pytest.approx([0, 0, side**2], rel=0.03, abs=0.05 * side**2)
+    assert isinstance(found.volume, float) and found.force.shape == (3,)
+    assert found.status == ist.QueryStatus.ok
+
+
+def test_a_batch_is_its_single_queries(gear, knot, random_poses):
+    poses = random_poses(64, 3)
+    many = ist.penetration(gear, knot, poses, scale_gradients=True)
+    gaps = ist.separation(gear, knot, poses)
+    meet = ist.overlap(gear, knot, poses)
+    contacts = ist.contact_patches(gear, knot, poses, max_patches=4)
+    assert many.volume.shape == (64,) and many.force.shape == (64, 3)
+    assert many.pose_gradient.shape == (64, 7) and many.status.dtype == np.uint32
+    assert contacts.force.shape == (64, 4, 3)
+    columns = [name for name in dir(ist.Penetration) if not name.startswith("_")]
+    for i, pose in enumerate(poses):
+        one = ist.penetration(gear, knot, pose, scale_gradients=True)
+        for name in columns:
+            assert np.array_equal(getattr(one, name), getattr(many, name)[i]), name
+        assert ist.separation(gear, knot, pose).distance_min == gaps.distance_min[i]
+        assert ist.overlap(gear, knot, pose) == meet[i]
+        assert np.array_equal(ist.contact_patches(gear, knot, pose, max_patches=4).id,
+                              contacts.id[i])
+    assert (many.volume > 0).sum() > 30 and (gaps.distance > 0).any()
+    assert ((meet == ist.Overlapping.yes) <= (many.volume > 0)).all()
+    lone = contacts.penetration
+    assert np.allclose(contacts.force.sum(axis=1), lone.force, atol=1e-9)
+    assert np.array_equal(contacts.count > 0, lone.volume > 0)
+
+
+def test_any_number_of_threads_gives_the_same_bits(gear, knot, random_poses):
+    poses = random_poses(200, 3)
+    one = ist.penetration(gear, knot, poses, threads=1)
+    for threads in (0, 2, 5):
+        assert np.array_equal(ist.penetration(gear, knot, poses, threads=threads).volume, one.volume)
+
+
+def test_python_threads_share_assets(gear, knot, random_poses):
+    poses = random_poses(100, 3)
+    expected = ist.penetration(gear, knot, poses).volume
+    found = [None] * 6
+
+    def ask(k):
+        found[k] = ist.penetration(gear, knot, poses, threads=1 + k % 2).volume
+
+    threads = [threading.Thread(target=ask, args=(k,)) for k in range(len(found))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(np.array_equal(volume, expected) for volume in found)
+
+
+def test_batches_of_none_and_of_one(gear, knot):
+    none = ist.penetration(gear, knot, np.empty((0, 7)))
+    assert none.volume.shape == (0,) and none.force.shape == (0, 3)
+    assert ist.separation(gear, knot, np.empty((0, 7))).distance.shape == (0,)
+    assert ist.contact_patches(gear, knot, np.empty((0, 7))).id.shape == (0, 8)
+    assert ist.penetration(gear, knot, [IDENTITY]).volume.shape == (1,)
+    assert ist.contact_patches(gear, knot, IDENTITY, max_patches=0).count == 0
+    assert ist.penetration_of_pairs([gear, knot], [IDENTITY, AWAY], np.empty((0, 2), int)).volume.shape == (0,)
+
+
+def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
+    poses = random_poses(40, 2)
+    expected = ist.penetration(gear, knot, poses)
+    spoiled = poses.copy()
+    spoiled[3, 5] = np.nan
+    spoiled[7, 0] = np.inf
+    spoiled[20, :4] *= 1.01
+    spoiled[31, :4] = 0
+    bad = np.isin(np.arange(40), [3, 7, 20, 31])
+    found = ist.penetration(gear, knot, spoiled, scale_gradients=True)
+    assert np.array_equal(found.status == ist.QueryStatus.invalid_input, bad)
+    assert np.array_equal(found.volume[~bad], expected.volume[~bad])
+    for column in (found.volume, found.force, found.pose_gradient, found.scale_gradient):
+        assert (column[bad] == 0).all()
+    scales = np.ones(40)
+    scales[11] = -1
+    assert np.flatnonzero(ist.separation(gear, knot, poses, scales=scales).status
+                          == ist.QueryStatus.invalid_input).tolist() == [11]
+
+
+@pytest.mark.parametrize("arguments, error, text", [
+    (dict(poses=np.zeros((5, 6))), ValueError, r"poses: shape \(5, 6\); wanted \(7,\) or \(n, 7\): qw"),
+    (dict(poses=np.zeros((2, 5, 7))), ValueError, r"poses: shape \(2, 5, 7\)"),
+    (dict(poses=1.0), ValueError, r"poses: shape \(\)"),
+    (dict(poses=np.zeros((5, 7), complex)), TypeError, "poses: dtype complex128; wanted float64"),
+    (dict(poses=np.zeros((5, 7), bool)), TypeError, "poses: dtype bool"),
+    (dict(poses="east"), TypeError, "poses: dtype <U4"),
+    (dict(poses=[None] * 7), TypeError, "poses: dtype object"),
+    (dict(scales=[1, 2]), ValueError, "scales: 2 rows; the arguments before it have 5"),
+    (dict(scales=[[1.0]]), ValueError, r"scales: shape \(1, 1\); wanted a number or \(n,\)"),
+    (dict(poses_a=np.zeros((4, 7))), ValueError, "poses_a: 4 rows"),
+    (dict(measure="outer"), ValueError, "measure: 'outer'; one of 'matched', 'inner'"),
+    (dict(field="maybe"), ValueError, "field: 'maybe'; one of 'automatic', 'never', 'always'"),
+    (dict(a=3), TypeError, "a: a int; wanted an Asset or a Field"),
+    (dict(b=ist.BallField(1)), TypeError, "b: a Field; it stands first"),
+])
+def test_wrong_arguments_are_named(gear, knot, arguments, error, text):
+    with pytest.raises(error, match=text):
+        ist.penetration(**{**dict(a=gear, b=knot, poses=np.tile(IDENTITY, (5, 1))), **arguments})
+
+
+def test_any_real_dtype_and_layout_will_do(gear, knot, random_poses):
+    poses = random_poses(10, 2)
+    expected = ist.penetration(gear, knot, poses).volume
+    for other in (np.asfortranarray(poses), poses[::-1][::-1], poses.tolist(), poses.astype(">f8")):
+        assert np.array_equal(ist.penetration(gear, knot, other).volume, expected)
+    single = poses.astype(np.float32)
+    assert np.array_equal(ist.penetration(gear, knot, single).volume,
+                          ist.penetration(gear, knot, single.astype(float)).volume)
+
+
+def test_only_the_relative_pose_counts(gear, knot, random_poses):
+    poses = random_poses(30, 2)
+    moved_a = random_poses(1, 5)[0]
+    moved_b = np.array([compose(moved_a, pose) for pose in poses])
+    here = ist.penetration(gear, knot, poses)
+    there = ist.penetration(gear, knot, moved_b, poses_a=moved_a)
+    assert there.volume == pytest.approx(here.volume, rel=1e-6, abs=1e-9)
+    turned = here.force @ rotation(moved_a).T
+    assert there.force == pytest.approx(turned, rel=1e-5, abs=1e-5)
+
+
+def test_a_scene_is_its_pairs(gear, knot, cube, random_poses):
+    solids = [ist.HalfSpaceField(), gear, knot, cube]
+    scenes = random_poses(20, 2).reshape(5, 4, 7)
+    scales = np.random.default_rng(3).uniform(0.5, 1.5, (5, 4))
+    pairs = np.array([(0, 1), (1, 2), (3, 2), (2, 1)])
+    found = ist.penetration_of_pairs(solids, scenes, pairs, scales=scales, scale_gradients=True)
+    assert found.volume.shape == (5, 4) and found.pose_gradient.shape == (5, 4, 7)
+    gaps = ist.separation_of_pairs(solids, scenes, pairs, scales=scales)
+    meet = ist.overlap_of_pairs(solids, scenes, pairs, scales=scales)
+    for w in range(5):
+        for k, (i, j) in enumerate(pairs):
+            how = dict(poses_a=scenes[w, i], scales=scales[w, j], scales_a=scales[w, i])
+            one = ist.penetration(solids[i], solids[j], scenes[w, j], scale_gradients=True, **how)
+            for name in ("volume", "torque", "pose_gradient", "pose_gradient_a", "scale_gradient_a"):
+                assert np.array_equal(getattr(one, name), getattr(found, name)[w, k])
+            assert ist.separation(solids[i], solids[j], scenes[w, j], **how).distance == gaps.distance[w, k]
+            assert ist.overlap(solids[i], solids[j], scenes[w, j], **how) == meet[w, k]
+    alone = ist.penetration_of_pairs(solids, scenes[0], pairs, scales=scales[0])
+    assert np.array_equal(alone.volume, found.volume[0])
+
+
+def test_assets_that_no_cache_holds_are_asked_in_order(knot, random_poses):
+    """They are sorted; the answers are not."""
+    copies = [ist.Asset.from_bytes(knot.to_bytes())
+              for _ in range(1 + (32 << 20) // len(knot.to_bytes()))]
+    scenes = random_poses(3 * len(copies), 1).reshape(3, len(copies), 7)
+    pairs = np.random.default_rng(1).permutation(len(copies))[:20].reshape(10, 2)
+    found = ist.penetration_of_pairs(copies, scenes, pairs).volume
+    for k, (i, j) in enumerate(pairs):
+        expected = ist.penetration(knot, knot, scenes[:, j], poses_a=scenes[:, i]).volume
+        assert np.array_equal(found[:, k], expected)
+    assert (found > 0).any()
+
+
+@pytest.mark.parametrize("arguments, error, text", [
+    (dict(poses=np.zeros((3, 7))), ValueError, r"poses: shape \(3, 7\); wanted \(2, 7\) or \(w, 2, 7\)"),
+    (dict(pairs=[(0, 2)]), ValueError, r"pairs\[0\]: \(0, 2\): there are solids 0 to 1"),
+    (dict(pairs=[(0, 1), (-1, 1)]), ValueError, r"pairs\[1\]: \(-1, 1\)"),
+    (dict(pairs=[(1, 1)]), ValueError, "a solid does not meet itself"),
+    (dict(pairs=[(1, 0)]), ValueError, "the second is a field"),
+    (dict(pairs=[(0.0, 1.0)]), TypeError, "pairs: dtype float64; wanted int64"),
+    (dict(pairs=[0, 1]), ValueError, r"pairs: shape \(2,\)"),
+    (dict(scales=[1.0]), ValueError, r"scales: shape \(1,\); wanted \(2,\)"),
+])
+def test_wrong_scenes_are_named(gear, arguments, error, text):
+    scene = dict(solids=[ist.BallField(1), gear], poses=[IDENTITY, IDENTITY], pairs=[(0, 1)])
+    with pytest.raises(error, match=text):
+        ist.penetration_of_pairs(**{**scene, **arguments})
+
+
+def rotation(pose):
+    w, x, y, z = pose[:4] / np.linalg.norm(pose[:4])
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
+def compose(a, b):
+    """The pose x ↦ a(b(x))."""
+    (aw, *av), (bw, *bv) = a[:4], b[:4]
+    q = [aw * bw - np.dot(av, bv), *(aw * np.array(bv) + bw * np.array(av) + np.cross(av, bv))]
+    return np.concatenate((q, rotation(a) @ b[4:] + a[4:]))
+
+
+@pytest.mark.parametrize("field", ["never", "automatic", "always"])
+def test_gradients_are_those_of_the_volume(gear, knot, random_poses, field):
+    poses, poses_a = random_poses(24, 1.5), random_poses(24, 0.5)
+    scales, scales_a = np.full(24, 0.8), np.full(24, 1.2)
+    found = ist.penetration(gear, knot, poses, poses_a=poses_a, scales=scales, scales_a=scales_a,
+                            field=field, scale_gradients=True)
+    met = found.volume > 1e-2
+    assert met.sum() > 12
+
+    def volume(b, a, scale=scales, scale_a=scales_a):
+        b, a = b.copy(), a.copy()
+        for moved in (b, a):  # the function is of q/|q|
+            moved[:, :4] /= np.linalg.norm(moved[:, :4], axis=1, keepdims=True)
+        return ist.penetration(gear, knot, b, poses_a=a, scales=scale, scales_a=scale_a,
+                               field=field).volume
+
+    h = 1e-4
+    for k in range(7):
+        step = h * np.eye(7)[k]
+        by_b = (volume(poses + step, poses_a) - volume(poses - step, poses_a)) / (2 * h)
+        by_a = (volume(poses, poses_a + step) - volume(poses, poses_a - step)) / (2 * h)
+        for differences, gradient in (by_b, found.pose_gradient), (by_a, found.pose_gradient_a):
+            size = np.linalg.norm(gradient, axis=1)
+            assert (np.abs(differences - gradient[:, k])[met] < 3e-3 * size[met]).all()
+    h = 1e-3
+    by_b = (volume(poses, poses_a, scales + h) - volume(poses, poses_a, scales - h)) / (2 * h)
+    by_a = (volume(poses, poses_a, scales, scales_a + h)
+            - volume(poses, poses_a, scales, scales_a - h)) / (2 * h)
+    for differences, gradient in (by_b, found.scale_gradient), (by_a, found.scale_gradient_a):
+        error = np.abs(differences - gradient)[met]
+        assert np.median(error) < 2e-3 * np.median(np.abs(gradient[met]))
+        assert error.max() < 2e-2 * np.abs(gradient[met]).max()
+    assert ist.penetration(gear, knot, poses).scale_gradient is None
+
+
+def test_fields_meet_assets(cube):
+    side = cube.bounds().upper[0] - cube.bounds().lower[0]
+    centre = cube.mass_properties().centre_of_mass
+    grid = np.linspace(-2 * side, 2 * side, 33)
+    z, y, x = np.meshgrid(grid, grid, grid, indexing="ij")
+    ball = ist.DistanceGridField((side - np.sqrt(x**2 + y**2 + z**2)).astype(np.float32),
+                                 origin=np.full(3, grid[0]), spacing=grid[1] - grid[0])
+    pose = np.concatenate(([1, 0, 0, 0], -centre))
+    for field in (ist.HalfSpaceField(offset=side), ist.BoxField([side, side, side]),
+                  ist.BallField(side), ist.CapsuleField(side, side), ist.CylinderField(side, side),
+                  ist.MeshField(cube), ball):
+        if isinstance(field, ist.MeshField):
+            assert ist.penetration(field, cube, [1, 0, 0, 0, side / 2, 0, 0]).volume == pytest.approx(
+                cube.volume / 2, rel=0.02)
+        else:
+            assert ist.penetration(field, cube, pose).volume == pytest.approx(cube.volume, rel=1e-2)
+            assert ist.overlap(field, cube, pose) == ist.Overlapping.yes
+    with pytest.raises(ValueError, match=r"half_extents: shape \(2,\); wanted \(3,\)"):
+        ist.BoxField([1, 2])
+    with pytest.raises(ValueError, match=r"heights: shape \(4,\); wanted \(rows, columns\)"):
+        ist.HeightField(np.zeros(4))
+    with pytest.raises(TypeError, match="MeshField|Asset|asset"):
+        ist.MeshField(ist.BallField(1))
+    assert ist.penetration(ist.BallField(-1), cube, pose).status == ist.QueryStatus.invalid_input
+
+
+def test_impacts_come_in_time(cube):
+    side = cube.bounds().upper[0] - cube.bounds().lower[0]
+    wall = ist.HalfSpaceField(normal=(1, 0, 0), offset=0)  # x ≤ 0
+    start = np.tile([1, 0, 0, 0, 10 * side, 0, 0], (3, 1))
+    end = start.copy()
+    end[:, 4] = [-10 * side, 5 * side, np.nan]
+    found = ist.time_of_impact(wall, cube, start, end, duration=2)
+    assert found.status.tolist() == [ist.ImpactStatus.impact, ist.ImpactStatus.no_impact,
+                                     ist.ImpactStatus.invalid_input]
+    lower = cube.bounds().lower[0]
+    assert found.time[0] == pytest.approx((10 * side + lower) / (10 * side), rel=1e-2)
+    assert found.normal[0] == pytest.approx([1, 0, 0], abs=1e-6)
+    assert ist.time_of_impact(wall, cube, start[0], end[0]).time < 1
+    with pytest.raises(ValueError, match="poses_to: as many rows"):
+        ist.time_of_impact(wall, cube, start, end[0])
+
+
+def test_limits_are_taken(gear, knot, random_poses):
+    poses = random_poses(20, 1)
+    whole = ist.penetration(gear, knot, poses)
+    few = ist.penetration(gear, knot, poses, max_visits=20)
+    assert (few.status == ist.QueryStatus.budget_exhausted).any()
+    assert (few.volume_min <= whole.volume_max).all() and (few.volume_max >= whole.volume_min).all()
+    inner = ist.penetration(gear, knot, poses, measure="inner")
+    assert inner.volume.sum() < whole.volume.sum()

@@ -1,0 +1,120 @@
+"""ist.torch: volumes that autograd can differentiate."""
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="no python3-torch: ./dev setup --torch")
+
+import ist  # noqa: E402
+from ist.torch import overlap  # noqa: E402
+
+
+@pytest.fixture
+def scenes(random_poses):
+    """(6, 3, 7) float64, quaternions of any length."""
+    poses = random_poses(18, 1.2).reshape(6, 3, 7)
+    poses[..., :4] *= np.random.default_rng(5).uniform(0.2, 5, (6, 3, 1))
+    return torch.tensor(poses, requires_grad=True)
+
+
+def differences(function, x, h):
+    """The gradient of a sum over scenes, by central differences; scenes do not see each other."""
+    gradient = torch.zeros_like(x)
+    with torch.no_grad():
+        for index in np.ndindex(*x.shape[1:]):
+            step = torch.zeros_like(x)
+            step[(slice(None), *index)] = h
+            gradient[(slice(None), *index)] = (function(x + step) - function(x - step)) / (2 * h)
+    return gradient
+
+
+def test_volumes_are_the_librarys(gear, knot, cube, scenes):
+    solids = [gear, knot, cube]
+    volumes = overlap(solids, scenes)
+    unit = scenes.detach().numpy().copy()
+    unit[..., :4] /= np.linalg.norm(unit[..., :4], axis=-1, keepdims=True)
+    expected = ist.penetration_of_pairs(solids, unit, [(0, 1), (0, 2), (1, 2)]).volume
+    assert volumes.shape == (6, 3) and volumes.dtype == torch.float64
+    assert volumes.detach().numpy() == pytest.approx(expected, rel=1e-9)
+    assert overlap(solids, scenes[2]).tolist() == volumes[2].tolist()
+    assert overlap(solids, scenes.float()).dtype == torch.float32
+
+
+def test_pose_gradients_are_differences(gear, knot, cube, scenes):
+    solids = [gear, knot, cube]
+    weights = torch.tensor([1.0, -0.3, 2.0], dtype=torch.float64)
+
+    def energy(poses):
+        return (overlap(solids, poses) * weights).sum(-1)
+
+    energy(scenes).sum().backward()
+    expected = differences(energy, scenes.detach(), 1e-4)
+    assert expected.abs().max() > 1
+    for scene in range(6):
+        error = (scenes.grad[scene] - expected[scene]).norm() / expected[scene].norm()
+        assert error < 2e-3
+    # A step along the gradient keeps each quaternion's length.
+    along = (scenes.grad[..., :4] * scenes.detach()[..., :4]).sum(-1).abs()
+    assert along.max() < 1e-9
+
+
+def test_autograds_own_check(gear, knot):
+    pose = torch.tensor([[1.0, 0, 0, 0, 0, 0, 0], [0.9, 0.3, -0.2, 0.4, 0.6, 0.2, 0.1]],
+                        dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda p: overlap([gear, knot], p), pose, eps=1e-4, atol=5e-3,
+                                    rtol=2e-3)
+
+
+def test_scale_gradients_are_differences(gear, knot, cube, scenes):
+    solids = [gear, knot, cube]
+    scales = torch.full((6, 3), 0.9, dtype=torch.float64, requires_grad=True)
+    poses = scenes.detach()
+    overlap(solids, poses, scales=scales).sum().backward()
+    expected = differences(lambda s: overlap(solids, poses, scales=s).sum(-1), scales.detach(), 1e-3)
+    assert (scales.grad - expected).norm() < 3e-3 * expected.norm()
+
+
+def test_fields_stand_first(cube):
+    floor = ist.HalfSpaceField()
+    poses = torch.tensor([[1.0, 0, 0, 0, 0, 0, 0], [1.0, 0, 0, 0, 0, 0, 0]], dtype=torch.float64,
+                         requires_grad=True)
+    volume = overlap([floor, cube], poses)
+    assert volume.shape == (1,)
+    volume.sum().backward()
+    assert poses.grad[1, 6] < 0 < poses.grad[0, 6]  # up is out of the floor
+    assert poses.grad[1, 6] == pytest.approx(-poses.grad[0, 6])
+
+
+def test_an_invalid_pose_is_nan_where_it_is(gear, knot, cube, scenes):
+    spoiled = scenes.detach().clone()
+    spoiled[1, 2, 5] = torch.nan
+    spoiled[4, 0, :4] = 0
+    spoiled.requires_grad_()
+    volumes = overlap([gear, knot, cube], spoiled)
+    assert torch.isnan(volumes).nonzero().tolist() == [[1, 1], [1, 2], [4, 0], [4, 1]]
+    volumes.sum().backward()
+    fine = [0, 2, 3, 5]
+    assert torch.isfinite(spoiled.grad[fine]).all() and torch.isnan(spoiled.grad[1]).all()
+
+
+def test_wrong_tensors_are_named(gear, knot):
+    with pytest.raises(ValueError, match=r"poses: shape \(3, 7\); wanted \(2, 7\)"):
+        overlap([gear, knot], torch.ones(3, 7))
+    with pytest.raises(TypeError, match="poses: on meta; wanted a tensor on the CPU"):
+        overlap([gear, knot], torch.ones(2, 7, device="meta"))
+
+
+def test_descent_parts_two_solids(gear, knot):
+    pose = torch.tensor([0.5, 0.1, 0.0, 0.2, 4.5, 0.5, 1.0], dtype=torch.float64, requires_grad=True)
+    still = torch.tensor([1.0, 0, 0, 0, 0, 0, 0], dtype=torch.float64)
+    adam = torch.optim.Adam([pose], lr=0.1)
+    first = None
+    for _ in range(200):
+        adam.zero_grad()
+        volume = overlap([gear, knot], torch.stack((still, pose)))[0]
+        first = volume.item() if first is None else first
+        if volume == 0:
+            assert first > 0.1
+            return
+        volume.backward()
+        adam.step()
+    pytest.fail(f"{volume.item()} is left")
