@@ -17,6 +17,7 @@
 
 #include "mesh/disjoint_sets.h"
 #include "mesh/edge_table.h"
+#include "mesh/judge.h"
 #include "mesh/message_text.h"
 #include "mesh/repair.h"
 #include "mesh/self_intersections.h"
@@ -258,6 +259,11 @@ void orient_outward(Surface& surface, const std::string& name, MeshReport& repor
                            "winding number is 1 or more");
 }
 
+void judge_repair(const TriangleMesh& unrepaired, ClosedMesh& closed) {
+  closed.report.judged = judge(unrepaired, closed);
+  closed.report.notes.push_back("repair: " + describe(*closed.report.judged));
+}
+
 }  // namespace
 
 ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMeshPolicy policy) {
@@ -278,8 +284,10 @@ ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMes
   reduce(surface, report);
   if (mesh.triangles.empty())
     throw Error(name + ": every face is doubled back to back: flat, it encloses no volume");
+  TriangleMesh unrepaired;
   if (count_odd_edges(surface.edges) > 0) {
     if (policy == OpenMeshPolicy::refuse) refuse_open(mesh, surface.edges, name);
+    unrepaired = mesh;
     mesh = repair(std::move(mesh), name, report);
     surface.triangles_changed();
   }
@@ -290,8 +298,10 @@ ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMes
   report.meets_itself = !surface.met || surface.met->count > 0;
   report.closed = true;
   if (mesh.triangles.size() != report.triangles || report.repaired) weld_equal(mesh);
-  return {std::move(mesh), std::move(report), name,
-          surface.met ? std::move(surface.met->pairs) : std::nullopt};
+  ClosedMesh closed = {std::move(mesh), std::move(report), name,
+                       surface.met ? std::move(surface.met->pairs) : std::nullopt};
+  if (closed.report.repaired) judge_repair(unrepaired, closed);
+  return closed;
 }
 
 }  // namespace ist
