@@ -23,6 +23,7 @@
 #include "mesh/self_intersections.h"
 #include "mesh/shells.h"
 #include "mesh/surface_reduction.h"
+#include "mesh/usable_mesh.h"
 #include "mesh/weld.h"
 
 namespace ist {
@@ -38,26 +39,6 @@ std::size_t count_if(const std::size_t count, const IsSo& is_so) {
         return so;
       },
       std::plus<>());
-}
-
-void check_indices_and_coordinates(const TriangleMesh& mesh, const std::string& name) {
-  if (mesh.triangles.empty())
-    throw Error(name + ": no triangles. There is nothing to bound a solid");
-  const auto unsound = [&](const std::size_t t) {
-    return std::any_of(mesh.triangles[t].begin(), mesh.triangles[t].end(), [&](const auto v) {
-      return v >= mesh.vertices.size() || !mesh.vertices[v].allFinite();
-    });
-  };
-  if (count_if(mesh.triangles.size(), unsound) == 0) return;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (const std::uint32_t v : mesh.triangles[t]) {
-      if (v >= mesh.vertices.size())
-        throw Error(name + ": triangle " + std::to_string(t) + " names vertex " +
-                    std::to_string(v) + " of " + std::to_string(mesh.vertices.size()));
-      if (!mesh.vertices[v].allFinite())
-        throw Error(name + ": vertex " + std::to_string(v) +
-                    " has a coordinate that is infinite or not a number. Correct it");
-    }
 }
 
 std::size_t count_components(const TriangleMesh& mesh, const EdgeTable& edges) {
@@ -131,22 +112,6 @@ MeshReport survey(const TriangleMesh& mesh, const EdgeTable& edges) {
   throw OpenMeshError(
       name + ": " + counted(odd, kind) + ", first at vertex " + std::to_string(edges.low(first)) +
       " " + position_text(mesh.vertices[edges.low(first)]) + ": not closed. Repair or close it");
-}
-
-double largest_coordinate(const Eigen::AlignedBox3d& bounds) {
-  return std::max(bounds.min().cwiseAbs().maxCoeff(), bounds.max().cwiseAbs().maxCoeff());
-}
-
-/// What double cannot cube. Before anything is computed with it: exact signs of infinite products
-/// have no end. A mesh of one point has its own message.
-void refuse_unusable_size(const TriangleMesh& mesh, const std::string& name) {
-  constexpr double kSmallest = 1e-90, kLargest = 1e90, kFarthest = 1e100;
-  Eigen::AlignedBox3d bounds;
-  for (const Eigen::Vector3d& v : mesh.vertices) bounds.extend(v);
-  const double size = bounds.sizes().maxCoeff(), offset = largest_coordinate(bounds);
-  if (!(size == 0 || size > kSmallest) || !(size < kLargest && offset < kFarthest))
-    throw Error(name + ": a size of " + shortest(size) + " at an offset of " + shortest(offset) +
-                " cannot be computed with. Scale it");
 }
 
 /// Coordinates that were rounded until the shape was lost.
@@ -260,16 +225,19 @@ void orient_outward(Surface& surface, const std::string& name, MeshReport& repor
 }
 
 void judge_repair(const TriangleMesh& unrepaired, ClosedMesh& closed) {
-  closed.report.judged = judge(unrepaired, closed);
-  closed.report.notes.push_back("repair: " + describe(*closed.report.judged));
+  const Judgement judged = judge(unrepaired, closed, kKept);
+  if (judged.confidence < kLeastConfidence)
+    throw OpenMeshError(closed.name + ": repaired with a confidence below " +
+                        shortest(kLeastConfidence) + " (" + describe(judged) +
+                        "): not to be trusted. Wrap or close it");
+  closed.report.judged = judged;
+  closed.report.notes.push_back("repair: " + describe(judged));
 }
 
 }  // namespace
 
 ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMeshPolicy policy) {
-  check_indices_and_coordinates(input, name);
-  weld_equal(input);
-  refuse_unusable_size(input, name);
+  weld_usable(input, name);
   Surface surface{std::move(input)};
   TriangleMesh& mesh = surface.mesh;
   const auto look_for_intersections = [&] {

@@ -5,22 +5,21 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <memory>
 #include <vector>
 
 #include "mesh/mesh_solid.h"
-#include "mesh/orient_soup.h"
-#include "mesh/soup_winding.h"
+#include "mesh/outward_winding.h"
 
 namespace ist {
 namespace {
 
 constexpr double kAround = 0.1;         ///< of the box's sides, sampled beyond each
 constexpr std::size_t kBlock = 1024;    ///< points that are summed in order
-constexpr std::size_t kFewest = 32;     ///< blocks of volume samples
+constexpr std::size_t kFewest = 16;     ///< blocks of volume samples
 constexpr std::size_t kMost = 512;      ///< the same, where the solid fills little of its box
-constexpr double kEnough = 8192;        ///< samples in solid or winding number
+constexpr double kEnough = 4096;        ///< samples in solid or winding number
 constexpr std::size_t kSurface = 8192;  ///< samples of a surface
-constexpr double kKept = 1e-4;          ///< of the diagonal: surface this near was kept
 
 /// Part of i·step after the point: multiples of the golden ratio's kin spread evenly.
 double spread(std::size_t i, double step) {
@@ -44,9 +43,9 @@ VolumeSums operator+(const VolumeSums& a, const VolumeSums& b) {
 }
 
 /// Blocks of samples until there are enough of them in either.
-std::vector<VolumeSums> sample_volumes(const MeshSolid& soup, const SoupWinding& winding,
-                                       const MeshSolid& made) {
-  const Eigen::AlignedBox3d box = soup.bounds().merged(made.bounds());
+std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
+                                       const OutwardWinding& winding, const MeshSolid& made) {
+  const Eigen::AlignedBox3d box = bounds.merged(made.bounds());
   const Eigen::Vector3d margin = kAround * box.sizes();
   const Eigen::Vector3d low = box.min() - margin, size = box.sizes() + 2 * margin;
   std::vector<VolumeSums> blocks;
@@ -58,8 +57,7 @@ std::vector<VolumeSums> sample_volumes(const MeshSolid& soup, const SoupWinding&
       for (std::size_t i = b * kBlock; i < (b + 1) * kBlock; ++i) {
         const Eigen::Vector3d x = low + size.cwiseProduct(cube_point(i));
         const bool inside = made.inside(made.frame().to_unit(x));
-        const Eigen::Vector3d unit = soup.frame().to_unit(x);
-        const double w = std::clamp(winding.at(unit.data()), 0.0, 1.0), s = inside ? 1 : 0;
+        const double w = std::clamp(winding.at(x), 0.0, 1.0), s = inside ? 1 : 0;
         blocks[b] = blocks[b] + VolumeSums{std::min(s, w), std::max(s, w), s, w >= 0.5 ? 1.0 : 0};
       }
     });
@@ -111,15 +109,12 @@ Distances distances(const TriangleMesh& from, const MeshSolid& to, double limit)
 
 }  // namespace
 
-Judgement judge(const TriangleMesh& soup, const ClosedMesh& made) {
-  ClosedMesh oriented;
-  oriented.name = made.name;
-  oriented.mesh = soup;
-  orient_soup(oriented.mesh);
-  const MeshSolid surface(oriented), solid(made);
-  const SoupWinding winding(surface.view());
+Judgement judge(const TriangleMesh& soup, const ClosedMesh& made, double kept) {
+  const OutwardWinding winding(soup);
+  const std::unique_ptr<MeshSolid> surface = triangles_as_solid(soup);
+  const MeshSolid solid(made);
 
-  const std::vector<VolumeSums> blocks = sample_volumes(surface, winding, solid);
+  const std::vector<VolumeSums> blocks = sample_volumes(surface->bounds(), winding, solid);
   VolumeSums all;
   for (const VolumeSums& block : blocks) all = all + block;
   Judgement judged;
@@ -136,9 +131,9 @@ Judgement judge(const TriangleMesh& soup, const ClosedMesh& made) {
   }
   if (all.solid > 0) judged.volume_ratio = all.wound / all.solid;
 
-  const double diagonal = surface.bounds().diagonal().norm();
-  const Distances lost = distances(oriented.mesh, solid, kKept * diagonal);
-  const Distances added = distances(made.mesh, surface, kKept * diagonal);
+  const double diagonal = surface->bounds().diagonal().norm();
+  const Distances lost = distances(soup, solid, kept * diagonal);
+  const Distances added = distances(made.mesh, *surface, kept * diagonal);
   judged.kept_surface = lost.near;
   judged.input_mean = lost.mean;
   judged.input_max = lost.max;

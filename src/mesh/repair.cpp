@@ -201,9 +201,9 @@ TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& repo
   cap_holes(mesh, report);
   tidy(mesh);
   if (mesh.triangles.empty())
-    throw Error(name + ": cannot be repaired: nothing in it encloses a volume");
+    throw OpenMeshError(name + ": cannot be repaired: nothing in it encloses a volume");
   if (const std::size_t left = odd_edges(mesh); left > 0)
-    throw Error(name + ": cannot be repaired: " + counted(left, "edge") + " still open");
+    throw OpenMeshError(name + ": cannot be repaired: " + counted(left, "edge") + " still open");
   return mesh;
 }
 
