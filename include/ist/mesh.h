@@ -33,23 +33,25 @@ struct ImportSettings {
   double weld_tolerance = 0;
 };
 
-/// How a solid that was made of an open surface compares with that surface.
+/// How a solid that was made of a surface that is not closed compares with that surface.
 ///
-/// The measure is the surface's generalised winding number w: what its triangles enclose of the
-/// directions around a point, 1 in a closed solid, between 0 and 1 where a hole is looked through.
-/// Before it is asked, coincident triangles are reduced and patches are turned to show their fronts
-/// to the outside. Volumes are sampled in the bounding box and a tenth of it around, the same
-/// points on any machine.
+/// The measure is the surface's generalised winding number w, cut to [0, 1]: 1 in a closed solid,
+/// less where holes are looked through. Before it is asked, coincident triangles are reduced and
+/// patches turned to show their fronts to the outside.
+/// Volumes are sampled in the bounding box, at the same points on any machine.
 struct Judgement {
   double confidence = 0;  ///< [0, 1] (agreement − agreement_error) · kept_surface
-  double agreement = 0;  ///< [0, 1] ∫ min(s, w) / ∫ max(s, w), s: 1 in the solid, w cut to [0, 1]
+  /// [0, 1] ∫ w over the solid, by the volume of the solid and of where w ≥ ½ besides.
+  double agreement = 0;
   double agreement_error = 0;  ///< of it, twice the standard error and what no sample may have met
-  double kept_surface = 0;     ///< [0, 1] of the input's area: within 1e-4 diagonals of the solid's
-  double volume_ratio = 0;     ///< where w ≥ ½, over the solid
-  double input_mean = 0;       ///< [u] distance from the input's surface to the solid's, mean
-  double input_max = 0;        ///< [u] the same, largest of 8,192 points
-  double made_mean = 0;        ///< [u] from the solid's surface to the input's
-  double made_max = 0;         ///< [u] likewise
+  /// [0, 1] of the input's area: within 1e-4 diagonals of the solid's surface, of a wrapped mesh's
+  /// within twice its detail.
+  double kept_surface = 0;
+  double volume_ratio = 0;  ///< volume where w ≥ ½ over that of the solid
+  double input_mean = 0;    ///< [u] distance from the input's surface to the solid's, mean
+  double input_max = 0;     ///< [u] the same, largest of 8,192 points
+  double made_mean = 0;     ///< [u] from the solid's surface to the input's
+  double made_max = 0;      ///< [u] likewise
 };
 
 /// What import and validation found. Counts refer to the welded mesh as it came, unless they name

@@ -14,7 +14,6 @@
 namespace ist {
 namespace {
 
-constexpr double kAround = 0.1;         ///< of the box's sides, sampled beyond each
 constexpr std::size_t kBlock = 1024;    ///< points that are summed in order
 constexpr std::size_t kFewest = 16;     ///< blocks of volume samples
 constexpr std::size_t kMost = 512;      ///< the same, where the solid fills little of its box
@@ -34,20 +33,19 @@ Eigen::Vector3d cube_point(std::size_t i) {
 }
 
 struct VolumeSums {
-  double smaller = 0, larger = 0;  ///< min and max of both
-  double solid = 0, wound = 0;     ///< points in the one, and where the other is ½ or more
+  double agreed = 0, all = 0;   ///< Σ w in the solid; points there and where w ≥ ½ besides
+  double solid = 0, wound = 0;  ///< points in the one, and where the other is ½ or more
 };
 
 VolumeSums operator+(const VolumeSums& a, const VolumeSums& b) {
-  return {a.smaller + b.smaller, a.larger + b.larger, a.solid + b.solid, a.wound + b.wound};
+  return {a.agreed + b.agreed, a.all + b.all, a.solid + b.solid, a.wound + b.wound};
 }
 
 /// Blocks of samples until there are enough of them in either.
 std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
                                        const OutwardWinding& winding, const MeshSolid& made) {
   const Eigen::AlignedBox3d box = bounds.merged(made.bounds());
-  const Eigen::Vector3d margin = kAround * box.sizes();
-  const Eigen::Vector3d low = box.min() - margin, size = box.sizes() + 2 * margin;
+  const Eigen::Vector3d low = box.min(), size = box.sizes();
   std::vector<VolumeSums> blocks;
   double met = 0;
   while (blocks.size() < kMost && met < kEnough) {
@@ -57,11 +55,12 @@ std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
       for (std::size_t i = b * kBlock; i < (b + 1) * kBlock; ++i) {
         const Eigen::Vector3d x = low + size.cwiseProduct(cube_point(i));
         const bool inside = made.inside(made.frame().to_unit(x));
-        const double w = std::clamp(winding.at(x), 0.0, 1.0), s = inside ? 1 : 0;
-        blocks[b] = blocks[b] + VolumeSums{std::min(s, w), std::max(s, w), s, w >= 0.5 ? 1.0 : 0};
+        const double w = std::clamp(winding.at(x), 0.0, 1.0);
+        const double s = inside ? 1 : 0, wound = w >= 0.5 ? 1 : 0;
+        blocks[b] = blocks[b] + VolumeSums{s * w, std::max(s, wound), s, wound};
       }
     });
-    for (std::size_t b = first; b < last; ++b) met += std::max(blocks[b].solid, blocks[b].wound);
+    for (std::size_t b = first; b < last; ++b) met += blocks[b].all;
   }
   return blocks;
 }
@@ -118,14 +117,14 @@ Judgement judge(const TriangleMesh& soup, const ClosedMesh& made, double kept) {
   VolumeSums all;
   for (const VolumeSums& block : blocks) all = all + block;
   Judgement judged;
-  if (all.larger > 0) {
-    judged.agreement = all.smaller / all.larger;
+  if (all.all > 0) {
+    judged.agreement = all.agreed / all.all;
     double squares = 0;
     for (const VolumeSums& block : blocks) {
-      const double off = block.smaller - judged.agreement * block.larger;
+      const double off = block.agreed - judged.agreement * block.all;
       squares += off * off;
     }
-    judged.agreement_error = std::min(1.0, (2 * std::sqrt(squares) + 3) / all.larger);
+    judged.agreement_error = std::min(1.0, (2 * std::sqrt(squares) + 3) / all.all);
   } else {
     judged.agreement_error = 1;  // too thin for any sample
   }

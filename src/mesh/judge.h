@@ -7,7 +7,7 @@
 namespace ist {
 
 /// Repaired meshes whose confidence is less are refused.
-constexpr double kLeastConfidence = 0.7;
+constexpr double kLeastConfidence = 0.6;
 
 /// Of the diagonal of the bounds: surface that a repair left this near to where it was, it kept.
 constexpr double kKept = 1e-4;
