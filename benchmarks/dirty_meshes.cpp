@@ -199,7 +199,8 @@ void damage_samples(Report& report, double& worst_confident, double& worst_accep
   std::map<std::string, int> refused;
   for (const ist::Sample& sample : ist::samples()) {
     const TriangleMesh whole = sample.make();
-    if (whole.triangles.size() < 100 || whole.triangles.size() > 12'000) continue;
+    if (whole.triangles.size() < 100 || whole.triangles.size() > (report.quick() ? 6'000 : 12'000))
+      continue;
     const double truth = volume_of(ist::close_mesh(whole, sample.name));
     for (const auto& [damage, strengths] : damages)
       for (const double strength : strengths)
@@ -246,7 +247,7 @@ void damage_samples(Report& report, double& worst_confident, double& worst_accep
 int main(int argc, char** argv) {
   Report report("dirty_meshes", argc, argv);
   report.page("Dirty meshes");
-  const double detail = report.quick() ? 0.02 : 0.005;
+  const double detail = report.quick() ? 0.01 : 0.005;
   report.remark("Wraps have a detail of " + Report::Json(100 * detail).dump() +
                 " % of the diagonal. Their input's largest distance counts walls that lie hidden "
                 "in the solid.");
