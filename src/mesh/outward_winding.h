@@ -15,7 +15,7 @@ std::unique_ptr<MeshSolid> triangles_as_solid(TriangleMesh mesh);
 
 /// The generalised winding number of any triangles, however they face: coincident ones are reduced
 /// to their signed sum, then patches are turned outward (orient_soup). Ask it from any thread.
-class OutwardWinding {
+class [[gnu::visibility("hidden")]] OutwardWinding {
  public:
   explicit OutwardWinding(TriangleMesh mesh);
 

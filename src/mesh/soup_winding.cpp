@@ -11,7 +11,7 @@ namespace ist {
 namespace {
 
 constexpr double kFullAngle = 12.566370614359172;  ///< 4π
-constexpr double kFar = 2;  ///< distance of what counts together over its radius
+constexpr double kFar = 3;  ///< distance of what counts together over its radius
 
 /// Signed solid angle of a triangle, positive where p sees its back (van Oosterom & Strackee).
 double solid_angle(const Corners& t, const double p[3]) {

@@ -13,7 +13,7 @@ namespace ist {
 /// falls from 1 to 0 across the holes.
 ///
 /// Far triangles count together, by the first two terms of their field (Barill et al. 2018), near
-/// ones each by itself: within 3e-3 of the sum. Immutable; ask it from any thread.
+/// ones each by itself: within 0.01 of the sum. Immutable; ask it from any thread.
 class SoupWinding {
  public:
   /// `mesh`: with its hierarchy; it must outlive this.
