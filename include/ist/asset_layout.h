@@ -268,6 +268,7 @@ inline constexpr std::uint32_t kFlagBelowNoise = 1u << 1;  ///< greedy order end
 /// The solid is known by its signed distance, and the mesh was made of it: polygonise_cells tells
 /// how. Inner spheres and covers are the solid's, volumes and matched spheres the mesh's.
 inline constexpr std::uint32_t kFlagPolygonised = 1u << 2;
+inline constexpr std::uint32_t kFlagWrapped = 1u << 3;  ///< the mesh was made by wrap_mesh()
 
 namespace detail {
 

@@ -17,8 +17,8 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What close_mesh() throws for an open mesh that it was not asked to repair, so that a caller can
-/// say how to ask.
+/// What close_mesh() throws for an open mesh that it was not asked to repair, or whose repair is
+/// not to be trusted, so that a caller can say how to ask for more.
 class OpenMeshError : public Error {
  public:
   using Error::Error;

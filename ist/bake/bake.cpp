@@ -30,6 +30,7 @@ AssetHeader describe_bake(const ClosedMesh& mesh, const MeshSolid& solid,
   for (int k = 0; k < 3; ++k) header.centre[k] = packing.frame.centre[k];
   header.exponent = packing.frame.exponent;
   header.flags = (mesh.report.repaired ? kFlagRepaired : 0) |
+                 (mesh.report.wrapped ? kFlagWrapped : 0) |
                  (packing.below_float_noise ? kFlagBelowNoise : 0);
   describe_mass(solid.unit_moments(), header);
   header.coverage = std::min(packing.coverage, 1.0);

@@ -188,6 +188,7 @@ std::string describe_asset(const TreeView& tree) {
   if (const std::string target = describe_target(tree); !target.empty())
     text += "  " + target + "\n";
   if ((h.flags & kFlagRepaired) != 0) line("note", "the mesh was open and was repaired");
+  if ((h.flags & kFlagWrapped) != 0) line("note", "the mesh was not closed and was wrapped");
   if ((h.flags & kFlagPolygonised) != 0)
     line("solid", fmt::format("by its signed distance; calibrated by a mesh within {:.4g} u of it, "
                               "of {} cells along the longest side",
@@ -222,6 +223,7 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
       {"protrusion", h.protrusion * scale},
       {"frame", {{"centre", h.centre}, {"exponent", h.exponent}}},
       {"repaired", (h.flags & kFlagRepaired) != 0},
+      {"wrapped", (h.flags & kFlagWrapped) != 0},
       {"below_float_noise", (h.flags & kFlagBelowNoise) != 0},
       {"asked",
        {{"spheres", h.asked_spheres},

@@ -100,7 +100,7 @@ void run_bake(const BakeOptions& options) {
   announce_device(settings.device);
   if (robot)
     return bake_robot({options.mesh, options.output, settings, target, options.robot,
-                       options.asked.settings.mesh.repair, options.json, options.quiet});
+                       options.asked.settings.mesh, options.json, options.quiet});
 
   const auto start = std::chrono::steady_clock::now();
   const auto [declared, mesh] = read_mesh_aloud(options.mesh, options.asked.settings.mesh);
@@ -122,6 +122,7 @@ void run_bake(const BakeOptions& options) {
     result.update(asset_json(asset.view()));
     result["declared"] = declared_json(declared);
     result["notes"] = mesh.report.notes;
+    result["closing"] = closing_json(mesh.report);
     result["partners"] = partners_json(partners);
     result["seconds"] = {{"import", import_seconds}, {"bake", bake_seconds}};
     fmt::print("{}\n", result.dump(2));
@@ -132,6 +133,8 @@ void run_bake(const BakeOptions& options) {
       fmt::print("  {:<12} {}: median error there, poses\n", "partners",
                  describe_partners(partners));
     if (!declares.empty()) fmt::print("  {:<12} {}\n", "mesh says", declares);
+    if (const std::string closing = describe_closing(mesh.report); !closing.empty())
+      fmt::print("  {:<12} {}\n", "closed by", closing);
     fmt::print("  {:<12} import {:.2f} s, bake {:.2f} s\n", "time", import_seconds, bake_seconds);
   }
 }

@@ -112,7 +112,7 @@ void bake_robot(const RobotBake& what) {
       file += ".ist";
       const ClosedMesh mesh = close_aloud(
           mesh_of(placed, paths, what.robot).mesh,
-          fmt::format("{}: line {}: link {}", what.robot, placed.line, link.name), what.repair);
+          fmt::format("{}: line {}: link {}", what.robot, placed.line, link.name), what.mesh);
       assets.push_back({file, bake_shape(mesh, what)});
       // The asset is in the link's frame already.
       shapes.push_back(

@@ -5,6 +5,7 @@
 #include <ist/bake.h>
 
 #include "app/robot_options.h"
+#include "settings/bake_settings.h"
 
 namespace ist::app {
 
@@ -15,7 +16,8 @@ struct RobotBake {
   PackingSettings packing;
   ErrorTarget target;  ///< of each asset; error 0: none is asked for
   RobotOptions options;
-  bool repair = false, json = false, quiet = false;
+  MeshSettings mesh;  ///< repair and wrap alone are looked at
+  bool json = false, quiet = false;
 };
 
 /// Bakes every mesh of every link, in the link's frame, and writes assets and the index, all or

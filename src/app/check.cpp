@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include <ist/bake.h>
+#include <ist/error.h>
 
 #include <ist/asset_layout.h>
 #include "app/commands.h"
@@ -53,12 +55,22 @@ void print_table(const CheckOptions& options, const std::vector<Invariant>& inva
   fmt::print("{}\n", sound ? "sound: no violations" : "NOT SOUND");
 }
 
+/// The mesh as it was baked.
+ClosedMesh baked_mesh(std::uint32_t flags, const CheckOptions& options) {
+  MeshSettings settings = options.placed.settings.mesh;
+  settings.repair = (flags & kFlagRepaired) != 0;
+  const double detail = std::exchange(settings.wrap, 0);
+  if ((flags & kFlagWrapped) == 0) return read_input_mesh(options.mesh, settings).closed;
+  if (detail == 0)
+    throw Error(options.asset + ": its mesh was wrapped: --wrap says with what detail");
+  TriangleMesh mesh = load_mesh(options.mesh);
+  place(mesh, settings);
+  return wrap_mesh(std::move(mesh), options.mesh, detail);
+}
+
 void run_check(const CheckOptions& options) {
   const Asset asset = Asset::load(options.asset);
-  const bool repaired = (asset.view().header().flags & kFlagRepaired) != 0;
-  MeshSettings placed = options.placed.settings.mesh;
-  placed.repair = repaired;
-  const ClosedMesh mesh = read_input_mesh(options.mesh, placed).closed;
+  const ClosedMesh mesh = baked_mesh(asset.view().header().flags, options);
   const std::vector<Invariant> invariants = check(asset, mesh, options.threads);
   const bool sound = std::all_of(invariants.begin(), invariants.end(),
                                  [](const Invariant& i) { return i.violations == 0; });
@@ -74,7 +86,7 @@ void add_check(CLI::App& app) {
       app.add_subcommand("check", "Prove every invariant again, from asset and mesh alone");
   add_input(command, "ASSET", options->asset, "An .ist file");
   add_input(command, "--mesh", options->mesh, "The MESH it was baked from");
-  add_setting_options(command, options->placed, placing_settings());
+  add_setting_options(command, options->placed, checking_settings());
   add_whole(command, "--threads", options->threads, "0 = all cores");
   command->add_flag("--json", options->json, "The invariants as JSON");
   command->footer(

@@ -13,6 +13,7 @@
 #include "app/file_options.h"
 #include "app/mesh_notes.h"
 #include "app/number_options.h"
+#include "app/setting_options.h"
 
 namespace ist::app {
 namespace {
@@ -22,7 +23,8 @@ constexpr unsigned kMostCells = 1024;  ///< on a side: what the library takes
 struct MedialOptions {
   std::string mesh, output, device = "auto";
   MedialSettings settings;
-  bool repair = false, quiet = false;
+  SettingOptions closing;
+  bool quiet = false;
 };
 
 std::string table_of(const std::vector<MedialNode>& nodes) {
@@ -38,7 +40,8 @@ void run_medial(const MedialOptions& options) {
   require_output(options.output, options.mesh, "the nodes");
   MedialSettings settings = options.settings;
   settings.device = usable_device(options.device);
-  const auto solid = make_solid(read_mesh_aloud(options.mesh, {.repair = options.repair}).closed);
+  const auto solid =
+      make_solid(read_mesh_aloud(options.mesh, options.closing.settings.mesh).closed);
   const auto start = std::chrono::steady_clock::now();
   const std::vector<MedialNode> nodes = medial_nodes(*solid, settings);
   const std::chrono::duration<double, std::milli> elapsed =
@@ -65,7 +68,7 @@ void add_medial(CLI::App& app) {
   add_device_option(command, options->device, "Where it runs");
   add_whole(command, "--threads", options->settings.threads,
             "0 = all cores; never changes the result");
-  command->add_flag("--repair", options->repair, "Close an open mesh, and say what was done");
+  add_setting_options(command, options->closing, closing_settings());
   command->add_flag("--quiet", options->quiet, "Only errors");
   command->footer("Example: ist medial bolt.obj -o nodes.csv");
   command->callback([options] { run_medial(*options); });

@@ -9,15 +9,15 @@
 
 namespace ist::app {
 
-ClosedMesh close_aloud(TriangleMesh mesh, const std::string& name, bool repair) {
+ClosedMesh close_aloud(TriangleMesh mesh, const std::string& name, const MeshSettings& settings) {
   try {
-    ClosedMesh closed =
-        close_mesh(std::move(mesh), name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+    ClosedMesh closed = close_as_asked(std::move(mesh), name, settings);
     for (const std::string& note : closed.report.notes) spdlog::warn("{}: {}", name, note);
     return closed;
   } catch (const OpenMeshError& error) {
-    if (repair) throw;
-    throw OpenMeshError(std::string(error.what()) + "; --repair closes what can be closed");
+    throw OpenMeshError(std::string(error.what()) +
+                        (settings.repair ? "; --wrap 0.5% makes a closed surface around it"
+                                         : "; --repair closes what can be closed"));
   }
 }
 
@@ -25,7 +25,33 @@ InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings)
   TriangleMesh mesh = load_mesh(path);
   place(mesh, settings);
   const DeclaredFrame declared = mesh.declared;
-  return {declared, close_aloud(std::move(mesh), path, settings.repair)};
+  return {declared, close_aloud(std::move(mesh), path, settings)};
+}
+
+std::string describe_closing(const MeshReport& report) {
+  if (!report.judged) return "";
+  return fmt::format("{}, confidence {:.2f}", report.wrapped ? "wrap" : "repair",
+                     report.judged->confidence);
+}
+
+nlohmann::ordered_json closing_json(const MeshReport& report) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const char* name : {"method", "confidence", "agreement", "agreement_error", "kept_surface",
+                           "volume_ratio", "input_mean", "input_max", "made_mean", "made_max"})
+    json[name] = nullptr;
+  if (!report.judged) return json;
+  const Judgement& judged = *report.judged;
+  json["method"] = report.wrapped ? "wrap" : "repair";
+  json["confidence"] = judged.confidence;
+  json["agreement"] = judged.agreement;
+  json["agreement_error"] = judged.agreement_error;
+  json["kept_surface"] = judged.kept_surface;
+  json["volume_ratio"] = judged.volume_ratio;
+  json["input_mean"] = judged.input_mean;
+  json["input_max"] = judged.input_max;
+  json["made_mean"] = judged.made_mean;
+  json["made_max"] = judged.made_max;
+  return json;
 }
 
 std::string describe_declared(const DeclaredFrame& declared) {

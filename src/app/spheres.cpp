@@ -18,6 +18,7 @@
 #include "app/number_options.h"
 #include "app/progress_line.h"
 #include "app/robot_options.h"
+#include "app/setting_options.h"
 #include "robot/link_mesh.h"
 #include "robot/sphere_files.h"
 
@@ -31,7 +32,8 @@ struct SpheresOptions {
   SphereCoverSettings cover;
   Kind kind = Kind::cover;
   RobotOptions robot;
-  bool repair = false, json = false, quiet = false;
+  SettingOptions closing;
+  bool json = false, quiet = false;
 };
 
 /// A link, or the whole of a mesh, and what became of it.
@@ -59,7 +61,7 @@ Input read_input(const SpheresOptions& options) {
     input.links.emplace_back();
     input.links[0].name = input.name;
     input.links[0].has_mesh = true;
-    input.meshes.push_back(read_mesh_aloud(options.input, {.repair = options.repair}).closed);
+    input.meshes.push_back(read_mesh_aloud(options.input, options.closing.settings.mesh).closed);
     return input;
   }
   input.robot = read_robot(options.input);
@@ -77,7 +79,7 @@ Input read_input(const SpheresOptions& options) {
     if (out.has_mesh)
       input.meshes.push_back(close_aloud(std::move(geometry.mesh),
                                          fmt::format("{}: link {}", options.input, link.name),
-                                         options.repair));
+                                         options.closing.settings.mesh));
   }
   if (input.links.empty()) refuse_no_shapes(options.robot, options.input);
   return input;
@@ -278,7 +280,7 @@ void add_spheres(CLI::App& app) {
   add_whole(command, "--seed", options->cover.seed, "Of the search; any value serves equally well");
   add_whole(command, "--threads", options->cover.threads,
             "0 = all cores; never changes the result");
-  command->add_flag("--repair", options->repair, "Close open meshes, and say what was done");
+  add_setting_options(command, options->closing, closing_settings());
   command->add_flag("--json", options->json, "The report as JSON on stdout");
   command->add_flag("--quiet", options->quiet, "Only errors");
   command->footer(

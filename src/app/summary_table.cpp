@@ -11,12 +11,14 @@
 namespace ist::app {
 namespace {
 
-/// What is said last of an asset: why it failed, else the first warning and how many follow.
+/// What is said last of an asset: why it failed, else with what confidence its mesh was closed if
+/// it was not, the first warning and how many follow.
 std::string remark_on(const JobResult& result) {
   if (!result.message.empty()) return result.message;
   if (result.warnings.empty()) return "";
   const std::size_t more = result.warnings.size() - 1;
-  return result.warnings.front() + (more == 0 ? "" : fmt::format(" (and {} more)", more));
+  return (result.confidence ? fmt::format("confidence {:.2f}; ", *result.confidence) : "") +
+         result.warnings.front() + (more == 0 ? "" : fmt::format(" (and {} more)", more));
 }
 
 void print_table(const Summary& summary) {

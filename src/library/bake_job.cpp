@@ -49,6 +49,7 @@ void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& r
     result.target_met = errors.target_met();
     if (errors.measured_poses > 0) result.error = errors.measured_error;
   }
+  result.confidence = entry.confidence;
   for (std::string& warning : settings.warnings_of(tree))
     result.warnings.push_back(std::move(warning));
   result.warnings.insert(result.warnings.end(), entry.notes.begin(), entry.notes.end());
@@ -59,10 +60,13 @@ CacheEntry bake_entry(const Job& job, const BakeMesh& bake) {
   try {
     mesh = read_input_mesh(job.mesh, job.settings.mesh);
   } catch (const OpenMeshError& error) {
-    if (job.settings.mesh.repair) throw;
-    throw Error(std::string(error.what()) + "; repair = true closes what can be closed");
+    throw Error(std::string(error.what()) +
+                (job.settings.mesh.repair ? "; wrap = '0.5%' makes a closed surface around it"
+                                          : "; repair = true closes what can be closed"));
   }
-  return {bake(mesh.closed, job.settings), std::move(mesh.closed.report.notes)};
+  CacheEntry entry = {bake(mesh.closed, job.settings), std::move(mesh.closed.report.notes)};
+  if (const auto& judged = mesh.closed.report.judged) entry.confidence = judged->confidence;
+  return entry;
 }
 
 }  // namespace

@@ -25,15 +25,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kMagic[8] = {'I', 'S', 'T', 'C', 'A', 'C', 'H', 'E'};
-constexpr std::uint64_t kEntryVersion = 1;
+constexpr std::uint64_t kEntryVersion = 2;
 
-/// The start of an entry; the notes, a JSON list, and the asset follow.
+/// The start of an entry; a JSON object of what was found about the mesh, and the asset follow.
 struct EntryHeader {
   char magic[8];
   std::uint64_t version;
   std::uint64_t hash_high, hash_low;  ///< XXH3-128 of all that follows this field
   std::uint64_t key_high, key_low;
-  std::uint64_t notes_bytes, asset_bytes;
+  std::uint64_t found_bytes, asset_bytes;
 };
 static_assert(sizeof(EntryHeader) == 64);
 constexpr std::size_t kHashed = offsetof(EntryHeader, key_high);
@@ -53,12 +53,17 @@ CacheEntry parse(const std::vector<std::byte>& bytes, const CacheKey& key) {
   if (hash.high64 != header.hash_high || hash.low64 != header.hash_low)
     throw Error("its bytes are not those that were written");
   const std::uint64_t rest = bytes.size() - sizeof(header);
-  if (header.notes_bytes > rest || header.asset_bytes != rest - header.notes_bytes ||
+  if (header.found_bytes > rest || header.asset_bytes != rest - header.found_bytes ||
       CacheKey{header.key_high, header.key_low} != key)
     throw Error("it belongs to another mesh");
-  const auto* const notes = reinterpret_cast<const char*>(bytes.data() + sizeof(header));
-  return {Asset(std::span(bytes).subspan(sizeof(header) + header.notes_bytes), "the asset"),
-          nlohmann::json::parse(notes, notes + header.notes_bytes).get<std::vector<std::string>>()};
+  const auto* const text = reinterpret_cast<const char*>(bytes.data() + sizeof(header));
+  const nlohmann::json found = nlohmann::json::parse(text, text + header.found_bytes);
+  CacheEntry entry = {
+      Asset(std::span(bytes).subspan(sizeof(header) + header.found_bytes), "the asset"),
+      found.at("notes").get<std::vector<std::string>>()};
+  if (const auto& confidence = found.at("confidence"); !confidence.is_null())
+    entry.confidence = confidence.get<double>();
+  return entry;
 }
 
 std::optional<std::vector<std::byte>> read_file(const fs::path& path) {
@@ -156,20 +161,21 @@ std::optional<CacheEntry> AssetCache::find(const CacheKey& key, std::string& dam
 }
 
 void AssetCache::store(const CacheKey& key, const CacheEntry& entry) {
-  const std::string notes =
-      nlohmann::json(entry.notes).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  nlohmann::json about = {{"notes", entry.notes}, {"confidence", nullptr}};
+  if (entry.confidence) about["confidence"] = *entry.confidence;
+  const std::string found = about.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   const std::span<const std::byte> asset = entry.asset.bytes();
   EntryHeader header = {};
   std::memcpy(header.magic, kMagic, sizeof(kMagic));
   header.version = kEntryVersion;
   header.key_high = key.high;
   header.key_low = key.low;
-  header.notes_bytes = notes.size();
+  header.found_bytes = found.size();
   header.asset_bytes = asset.size();
-  std::vector<std::byte> bytes(sizeof(header) + notes.size() + asset.size());
+  std::vector<std::byte> bytes(sizeof(header) + found.size() + asset.size());
   std::memcpy(bytes.data(), &header, sizeof(header));
-  std::memcpy(bytes.data() + sizeof(header), notes.data(), notes.size());
-  std::memcpy(bytes.data() + sizeof(header) + notes.size(), asset.data(), asset.size());
+  std::memcpy(bytes.data() + sizeof(header), found.data(), found.size());
+  std::memcpy(bytes.data() + sizeof(header) + found.size(), asset.data(), asset.size());
   const XXH128_hash_t hash = hash_of(bytes);
   header.hash_high = hash.high64;
   header.hash_low = hash.low64;

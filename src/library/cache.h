@@ -15,13 +15,15 @@
 // and any of them may die at any moment: an entry is a file that has its name only once it is whole
 // and on the disk, nothing is locked, and what is read is held against its hash.
 //
-//   DIR/ab/abcdef….entry   the entry of the key abcdef…: notes about the mesh, and the asset
+//   DIR/ab/abcdef….entry   the entry of the key abcdef…: what was found about the mesh, and the
+//   asset
 
 namespace ist {
 
 struct CacheEntry {
   Asset asset;
-  std::vector<std::string> notes;  ///< MeshReport::notes of the mesh
+  std::vector<std::string> notes;         ///< MeshReport::notes of the mesh
+  std::optional<double> confidence = {};  ///< Judgement's, of a mesh that was not closed
 };
 
 class AssetCache {

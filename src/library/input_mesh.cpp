@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include <ist/error.h>
+
 namespace ist {
 
 void place(TriangleMesh& mesh, const MeshSettings& settings) {
@@ -17,12 +19,27 @@ void place(TriangleMesh& mesh, const MeshSettings& settings) {
   }
 }
 
+ClosedMesh close_as_asked(TriangleMesh mesh, const std::string& name,
+                          const MeshSettings& settings) {
+  const OpenMeshPolicy policy = settings.repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse;
+  if (settings.wrap == 0) return close_mesh(std::move(mesh), name, policy);
+  std::string why;
+  try {
+    return close_mesh(mesh, name, policy);
+  } catch (const Error& error) {
+    why = error.what();
+  }
+  ClosedMesh wrapped = wrap_mesh(std::move(mesh), name, settings.wrap);
+  if (why.starts_with(name + ": ")) why.erase(0, name.size() + 2);
+  wrapped.report.notes.insert(wrapped.report.notes.begin(), "wrapped, because: " + why);
+  return wrapped;
+}
+
 InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings) {
   TriangleMesh mesh = load_mesh(path);
   place(mesh, settings);
   InputMesh result{mesh.declared, {}};
-  result.closed = close_mesh(std::move(mesh), path,
-                             settings.repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+  result.closed = close_as_asked(std::move(mesh), path, settings);
   return result;
 }
 

@@ -30,6 +30,7 @@ struct JobResult {
   double coverage = 0;                        ///< share of the solid's volume
   std::optional<double> target_error, error;  ///< asked for and measured, relative; see ErrorTarget
   std::optional<bool> target_met;
+  std::optional<double> confidence;  ///< Judgement's, of a mesh that was repaired or wrapped
 
   bool done() const { return status == JobStatus::baked || status == JobStatus::cached; }
 };

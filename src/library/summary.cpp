@@ -41,6 +41,7 @@ Json to_json(const JobResult& result) {
           {"target_error", or_null(result.target_error)},
           {"measured_error", or_null(result.error)},
           {"target_met", or_null(result.target_met)},
+          {"confidence", or_null(result.confidence)},
           {"seconds", result.seconds},
           {"warnings", result.warnings},
           {"message", result.message.empty() ? Json() : Json(result.message)}};
@@ -74,6 +75,7 @@ JobResult result_from(const Json& json) {
   take(json, "target_error", result.target_error);
   take(json, "measured_error", result.error);
   take(json, "target_met", result.target_met);
+  if (json.contains("confidence")) take(json, "confidence", result.confidence);
   take(json, "seconds", result.seconds);
   take(json, "warnings", result.warnings);
   take(json, "message", result.message);

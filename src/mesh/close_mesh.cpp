@@ -17,11 +17,13 @@
 
 #include "mesh/disjoint_sets.h"
 #include "mesh/edge_table.h"
+#include "mesh/judge.h"
 #include "mesh/message_text.h"
 #include "mesh/repair.h"
 #include "mesh/self_intersections.h"
 #include "mesh/shells.h"
 #include "mesh/surface_reduction.h"
+#include "mesh/usable_mesh.h"
 #include "mesh/weld.h"
 
 namespace ist {
@@ -37,26 +39,6 @@ std::size_t count_if(const std::size_t count, const IsSo& is_so) {
         return so;
       },
       std::plus<>());
-}
-
-void check_indices_and_coordinates(const TriangleMesh& mesh, const std::string& name) {
-  if (mesh.triangles.empty())
-    throw Error(name + ": no triangles. There is nothing to bound a solid");
-  const auto unsound = [&](const std::size_t t) {
-    return std::any_of(mesh.triangles[t].begin(), mesh.triangles[t].end(), [&](const auto v) {
-      return v >= mesh.vertices.size() || !mesh.vertices[v].allFinite();
-    });
-  };
-  if (count_if(mesh.triangles.size(), unsound) == 0) return;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (const std::uint32_t v : mesh.triangles[t]) {
-      if (v >= mesh.vertices.size())
-        throw Error(name + ": triangle " + std::to_string(t) + " names vertex " +
-                    std::to_string(v) + " of " + std::to_string(mesh.vertices.size()));
-      if (!mesh.vertices[v].allFinite())
-        throw Error(name + ": vertex " + std::to_string(v) +
-                    " has a coordinate that is infinite or not a number. Correct it");
-    }
 }
 
 std::size_t count_components(const TriangleMesh& mesh, const EdgeTable& edges) {
@@ -130,22 +112,6 @@ MeshReport survey(const TriangleMesh& mesh, const EdgeTable& edges) {
   throw OpenMeshError(
       name + ": " + counted(odd, kind) + ", first at vertex " + std::to_string(edges.low(first)) +
       " " + position_text(mesh.vertices[edges.low(first)]) + ": not closed. Repair or close it");
-}
-
-double largest_coordinate(const Eigen::AlignedBox3d& bounds) {
-  return std::max(bounds.min().cwiseAbs().maxCoeff(), bounds.max().cwiseAbs().maxCoeff());
-}
-
-/// What double cannot cube. Before anything is computed with it: exact signs of infinite products
-/// have no end. A mesh of one point has its own message.
-void refuse_unusable_size(const TriangleMesh& mesh, const std::string& name) {
-  constexpr double kSmallest = 1e-90, kLargest = 1e90, kFarthest = 1e100;
-  Eigen::AlignedBox3d bounds;
-  for (const Eigen::Vector3d& v : mesh.vertices) bounds.extend(v);
-  const double size = bounds.sizes().maxCoeff(), offset = largest_coordinate(bounds);
-  if (!(size == 0 || size > kSmallest) || !(size < kLargest && offset < kFarthest))
-    throw Error(name + ": a size of " + shortest(size) + " at an offset of " + shortest(offset) +
-                " cannot be computed with. Scale it");
 }
 
 /// Coordinates that were rounded until the shape was lost.
@@ -258,12 +224,20 @@ void orient_outward(Surface& surface, const std::string& name, MeshReport& repor
                            "winding number is 1 or more");
 }
 
+void judge_repair(const TriangleMesh& unrepaired, ClosedMesh& closed) {
+  const Judgement judged = judge(unrepaired, closed, kKept);
+  if (judged.confidence < kLeastConfidence)
+    throw OpenMeshError(closed.name + ": repaired with a confidence below " +
+                        shortest(kLeastConfidence) + " (" + describe(judged) +
+                        "): not to be trusted. Wrap or close it");
+  closed.report.judged = judged;
+  closed.report.notes.push_back("repair: " + describe(judged));
+}
+
 }  // namespace
 
 ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMeshPolicy policy) {
-  check_indices_and_coordinates(input, name);
-  weld_equal(input);
-  refuse_unusable_size(input, name);
+  weld_usable(input, name);
   Surface surface{std::move(input)};
   TriangleMesh& mesh = surface.mesh;
   const auto look_for_intersections = [&] {
@@ -278,8 +252,10 @@ ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMes
   reduce(surface, report);
   if (mesh.triangles.empty())
     throw Error(name + ": every face is doubled back to back: flat, it encloses no volume");
+  TriangleMesh unrepaired;
   if (count_odd_edges(surface.edges) > 0) {
     if (policy == OpenMeshPolicy::refuse) refuse_open(mesh, surface.edges, name);
+    unrepaired = mesh;
     mesh = repair(std::move(mesh), name, report);
     surface.triangles_changed();
   }
@@ -290,8 +266,10 @@ ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMes
   report.meets_itself = !surface.met || surface.met->count > 0;
   report.closed = true;
   if (mesh.triangles.size() != report.triangles || report.repaired) weld_equal(mesh);
-  return {std::move(mesh), std::move(report), name,
-          surface.met ? std::move(surface.met->pairs) : std::nullopt};
+  ClosedMesh closed = {std::move(mesh), std::move(report), name,
+                       surface.met ? std::move(surface.met->pairs) : std::nullopt};
+  if (closed.report.repaired) judge_repair(unrepaired, closed);
+  return closed;
 }
 
 }  // namespace ist

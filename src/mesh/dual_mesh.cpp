@@ -81,13 +81,19 @@ std::vector<std::array<std::uint32_t, 3>> split(const Solid& solid, const std::v
 
 }  // namespace
 
+TriangleMesh dual_surface(const Solid& solid, const CellGrid& grid, std::vector<SurfaceCell>& cells,
+                          Stage& stage) {
+  TriangleMesh mesh;
+  mesh.vertices = place_vertices(solid, grid, cells);
+  stage.step(0, 0.4);
+  mesh.triangles = split(solid, all_quads(cells, grid), mesh.vertices);
+  stage.step(0, 0.5);
+  return mesh;
+}
+
 Polygonised dual_mesh(const Solid& solid, const CellGrid& grid, std::vector<SurfaceCell> cells,
                       Stage& stage) {
-  Polygonised result;
-  result.mesh.vertices = place_vertices(solid, grid, cells);
-  stage.step(0, 0.4);
-  result.mesh.triangles = split(solid, all_quads(cells, grid), result.mesh.vertices);
-  stage.step(0, 0.5);
+  Polygonised result = {dual_surface(solid, grid, cells, stage)};
   result.error = std::max(mesh_to_surface(solid, grid, result.mesh),
                           surface_to_mesh(solid, grid, cells, result.mesh));
   stage.step(0, 1);

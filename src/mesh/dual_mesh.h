@@ -14,4 +14,8 @@ namespace ist {
 Polygonised dual_mesh(const Solid& solid, const CellGrid& grid, std::vector<SurfaceCell> cells,
                       Stage& stage);
 
+/// The same without the error, which takes most of the time. Numbers the cells' vertices.
+TriangleMesh dual_surface(const Solid& solid, const CellGrid& grid, std::vector<SurfaceCell>& cells,
+                          Stage& stage);
+
 }  // namespace ist

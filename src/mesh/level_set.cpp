@@ -9,6 +9,7 @@
 #include <ist/error.h>
 
 #include "mesh/dual_mesh.h"
+#include "mesh/level_set_surface.h"
 #include "mesh/surface_cells.h"
 
 namespace ist {
@@ -164,6 +165,44 @@ void require_usable(const DistanceGrid& grid, const std::string& name) {
   if (!any) throw Error(name + ": no point of the grid is inside: there is no solid");
 }
 
+/// The cells of a grid that the surface crosses, and the solid that they are cells of.
+struct Crossed {
+  const Lattice lattice;
+  const CellGrid grid;
+  std::vector<SurfaceCell> cells;
+  const Interpolation solid;
+
+  explicit Crossed(const DistanceGrid& distances)
+      : lattice(distances),
+        grid(grid_of(distances, lattice)),
+        cells(crossed(lattice, grid)),
+        solid(lattice, grid, steepest_near(lattice, cells)) {}
+
+ private:
+  static CellGrid grid_of(const DistanceGrid& distances, const Lattice& lattice) {
+    CellGrid grid;
+    grid.low = distances.origin;
+    grid.edge = distances.spacing;
+    for (std::size_t k = 0; k < 3; ++k) grid.count[k] = lattice.cells(k);
+    return grid;
+  }
+  /// By their keys.
+  static std::vector<SurfaceCell> crossed(const Lattice& lattice, const CellGrid& grid) {
+    std::vector<std::vector<SurfaceCell>> layers(static_cast<std::size_t>(grid.count[2]));
+    tbb::parallel_for(std::size_t{0}, layers.size(), [&](std::size_t k) {
+      layers[k] = crossed_cells(lattice, static_cast<std::int32_t>(k));
+    });
+    std::vector<SurfaceCell> cells;
+    for (std::vector<SurfaceCell>& layer : layers) {
+      cells.insert(cells.end(), layer.begin(), layer.end());
+      layer.clear();
+    }
+    std::sort(cells.begin(), cells.end(),
+              [](const SurfaceCell& a, const SurfaceCell& b) { return a.key < b.key; });
+    return cells;
+  }
+};
+
 }  // namespace
 
 LevelSetMesh mesh_level_set(const DistanceGrid& distances, const std::string& name,
@@ -171,25 +210,16 @@ LevelSetMesh mesh_level_set(const DistanceGrid& distances, const std::string& na
   require_usable(distances, name);
   Stage stage("polygonise", progress);
   stage.step(0, 0);
-  const Lattice lattice(distances);
-  CellGrid grid;
-  grid.low = distances.origin;
-  grid.edge = distances.spacing;
-  for (std::size_t k = 0; k < 3; ++k) grid.count[k] = lattice.cells(k);
-  std::vector<std::vector<SurfaceCell>> layers(static_cast<std::size_t>(grid.count[2]));
-  tbb::parallel_for(std::size_t{0}, layers.size(), [&](std::size_t k) {
-    layers[k] = crossed_cells(lattice, static_cast<std::int32_t>(k));
-  });
-  std::vector<SurfaceCell> cells;
-  for (std::vector<SurfaceCell>& layer : layers) {
-    cells.insert(cells.end(), layer.begin(), layer.end());
-    layer.clear();
-  }
-  const double slope = steepest_near(lattice, cells);
-  std::sort(cells.begin(), cells.end(),
-            [](const SurfaceCell& a, const SurfaceCell& b) { return a.key < b.key; });
-  Polygonised made = dual_mesh(Interpolation(lattice, grid, slope), grid, std::move(cells), stage);
+  Crossed at(distances);
+  Polygonised made = dual_mesh(at.solid, at.grid, std::move(at.cells), stage);
   return {close_mesh(std::move(made.mesh), name), made.error};
+}
+
+ClosedMesh level_set_surface(const DistanceGrid& distances, const std::string& name) {
+  require_usable(distances, name);
+  Stage stage("polygonise", {});
+  Crossed at(distances);
+  return close_mesh(dual_surface(at.solid, at.grid, at.cells, stage), name);
 }
 
 std::unique_ptr<Solid> make_grid_solid(const DistanceGrid& grid) {

@@ -14,6 +14,7 @@
 #include "mesh/edge_table.h"
 #include "mesh/fill_holes.h"
 #include "mesh/message_text.h"
+#include "mesh/shells.h"
 #include "mesh/stitch.h"
 #include "mesh/surface_reduction.h"
 #include "mesh/weld.h"
@@ -53,15 +54,6 @@ void close_cracks(TriangleMesh& mesh, MeshReport& report) {
                          " fewer");
 }
 
-/// Connected by edges of exactly two sides.
-DisjointSets patches_of(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
-  DisjointSets patches(triangles.size());
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    if (const auto sides = edges.sides(e); sides.size() == 2)
-      patches.unite(sides[0] / 3, sides[1] / 3);
-  return patches;
-}
-
 /// How often each patch lies on an edge: patch, sides.
 std::vector<std::pair<std::uint32_t, std::uint32_t>> patches_at(
     DisjointSets& patches, const std::span<const std::uint32_t> sides) {
@@ -83,7 +75,7 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> patches_at(
 /// right for one changes what is right for its neighbours, so those wait. Returns how many went.
 std::size_t drop_fins_once(TriangleMesh& mesh) {
   const EdgeTable edges(mesh.triangles);
-  DisjointSets patches = patches_of(mesh.triangles, edges);
+  DisjointSets patches = manifold_patches(mesh.triangles, edges);
   std::vector<int> gain(mesh.triangles.size(), 0);  // odd edges fewer without this patch
   std::vector<std::vector<std::uint32_t>> shared_edges(mesh.triangles.size());
   for (std::uint32_t e = 0; e < edges.size(); ++e) {
@@ -209,9 +201,9 @@ TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& repo
   cap_holes(mesh, report);
   tidy(mesh);
   if (mesh.triangles.empty())
-    throw Error(name + ": cannot be repaired: nothing in it encloses a volume");
+    throw OpenMeshError(name + ": cannot be repaired: nothing in it encloses a volume");
   if (const std::size_t left = odd_edges(mesh); left > 0)
-    throw Error(name + ": cannot be repaired: " + counted(left, "edge") + " still open");
+    throw OpenMeshError(name + ": cannot be repaired: " + counted(left, "edge") + " still open");
   return mesh;
 }
 

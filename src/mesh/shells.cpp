@@ -9,8 +9,6 @@
 #include <cmath>
 #include <utility>
 
-#include "mesh/disjoint_sets.h"
-
 namespace ist {
 
 SidePartners manifold_partners(const EdgeTable& edges) {
@@ -22,6 +20,14 @@ SidePartners manifold_partners(const EdgeTable& edges) {
     partners[sides[1]] = sides[0];
   }
   return partners;
+}
+
+DisjointSets manifold_patches(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
+  DisjointSets patches(triangles.size());
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    if (const auto sides = edges.sides(e); sides.size() == 2)
+      patches.unite(sides[0] / 3, sides[1] / 3);
+  return patches;
 }
 
 namespace {

@@ -8,6 +8,7 @@
 
 #include <ist/mesh.h>
 
+#include "mesh/disjoint_sets.h"
 #include "mesh/edge_table.h"
 
 namespace ist {
@@ -30,6 +31,9 @@ SidePartners manifold_partners(const EdgeTable& edges);
 /// enclose the smaller angles.
 SidePartners all_partners(const std::vector<Eigen::Vector3d>& vertices,
                           const std::vector<Triangle>& triangles, const EdgeTable& edges);
+
+/// Triangles that hang together by edges of exactly two sides.
+DisjointSets manifold_patches(const std::vector<Triangle>& triangles, const EdgeTable& edges);
 
 /// Turns triangles so that partners agree about the outside; the smaller part of each connected
 /// piece turns. Returns a side at which that is impossible (a Möbius strip), if there is one, and

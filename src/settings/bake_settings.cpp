@@ -201,7 +201,11 @@ std::vector<Setting> make_settings() {
       whole("seed", member_of(&BakeSettings::packing, &PackingSettings::seed), 0,
             std::numeric_limits<std::uint64_t>::max(), "Breaks ties; any value packs equally well"),
       flag("repair", member_of(&BakeSettings::mesh, &MeshSettings::repair), true,
-           "Close an open mesh, and say what was done"),
+           "Close an open mesh, say what was done and how sure it is; refused where it is not"),
+      without_default(share(
+          "wrap", member_of(&BakeSettings::mesh, &MeshSettings::wrap), {.least = 1e-3, .most = 0.1},
+          "Make a closed surface around a mesh that is not closed, or not by repair; detail "
+          "over the diagonal, e.g. 0.5%")),
       real("scale", member_of(&BakeSettings::mesh, &MeshSettings::scale),
            {.least = 0, .without_least = true},
            "Every coordinate of the mesh times this: [u] is the unit that comes out"),
@@ -258,11 +262,24 @@ std::optional<SettingFault> idle_setting(const PackingSettings& settings,
 
 std::span<const Setting> all_settings() { return settings_list(); }
 
-std::span<const Setting> placing_settings() {
+namespace {
+
+std::vector<Setting>::const_iterator setting_named(const char* name) {
   const std::vector<Setting>& list = settings_list();
-  const auto first = std::find_if(list.begin(), list.end(),
-                                  [](const Setting& setting) { return setting.name == "scale"; });
-  return {first, list.end()};
+  return std::find_if(list.begin(), list.end(),
+                      [&](const Setting& setting) { return setting.name == name; });
+}
+
+}  // namespace
+
+std::span<const Setting> placing_settings() {
+  return {setting_named("scale"), settings_list().end()};
+}
+std::span<const Setting> checking_settings() {
+  return {setting_named("wrap"), settings_list().end()};
+}
+std::span<const Setting> closing_settings() {
+  return {setting_named("repair"), setting_named("scale")};
 }
 
 std::optional<SettingFault> complete(BakeSettings& settings, const std::set<std::string>& given,

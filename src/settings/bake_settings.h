@@ -17,6 +17,7 @@ namespace ist {
 /// How the mesh of a file becomes the mesh that is baked.
 struct MeshSettings {
   bool repair = false;  ///< close an open mesh
+  double wrap = 0;      ///< detail of wrap_mesh() for one that is not closed so; 0: none is wrapped
   double scale = 1;     ///< > 0; every coordinate times this
   char up_axis = 0;     ///< 'X', 'Y' or 'Z': which of the file's axes is up; 0: nothing is turned
   char world_up = 'Z';  ///< the mesh is turned so that this axis is up; where up_axis is given
@@ -51,7 +52,9 @@ struct Setting {
 
 /// In the order in which help shows them.
 std::span<const Setting> all_settings();
-std::span<const Setting> placing_settings();  ///< scale, up-axis and world-up alone
+std::span<const Setting> placing_settings();   ///< scale, up-axis and world-up alone
+std::span<const Setting> checking_settings();  ///< wrap and those
+std::span<const Setting> closing_settings();   ///< repair and wrap alone
 
 /// What is wrong with a setting, by its name.
 struct SettingFault {

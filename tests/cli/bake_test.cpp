@@ -171,6 +171,35 @@ TEST_F(BakeCommand, AnOpenMeshIsRefusedUnlessRepaired) {
   EXPECT_NE(repaired.err.find("warning"), std::string::npos) << repaired.err;
   EXPECT_EQ(nlohmann::json::parse(repaired.out).at("repaired"), true);
   EXPECT_EQ(ist({"check", "new.ist", "--mesh", "open.obj"}).exit_code, 0);
+  const nlohmann::json closing = nlohmann::json::parse(repaired.out).at("closing");
+  EXPECT_EQ(closing.at("method"), "repair");
+  EXPECT_GT(closing.at("confidence").get<double>(), 0.75);
+}
+
+TEST_F(BakeCommand, WhatRepairCannotCloseIsWrapped) {
+  write("fins.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 1\nv 0 -1 -1\nf 1 2 3\nf 1 2 4\nf 1 2 5\n");
+  const Outcome refused = ist({"bake", "fins.obj", "-o", "new.ist", "--repair"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find("--wrap"), std::string::npos) << refused.err;
+  EXPECT_FALSE(exists("new.ist"));
+  const Outcome wrapped = ist({"bake", "fins.obj", "-o", "new.ist", "--spheres", "20", "--repair",
+                               "--wrap", "3%", "--json"});
+  ASSERT_EQ(wrapped.exit_code, 0) << wrapped.err;
+  EXPECT_NE(wrapped.err.find("wrapped, because: cannot be repaired"), std::string::npos)
+      << wrapped.err;
+  const nlohmann::json json = nlohmann::json::parse(wrapped.out);
+  EXPECT_EQ(json.at("wrapped"), true);
+  EXPECT_EQ(json.at("closing").at("method"), "wrap");
+  EXPECT_GT(json.at("closing").at("input_max"), 0);
+  EXPECT_EQ(ist({"check", "new.ist", "--mesh", "fins.obj", "--wrap", "3%"}).exit_code, 0);
+  const Outcome unsaid = ist({"check", "new.ist", "--mesh", "fins.obj"});
+  EXPECT_EQ(unsaid.exit_code, 1);
+  EXPECT_NE(unsaid.err.find("--wrap"), std::string::npos) << unsaid.err;
+  // A closed mesh is left as it is.
+  const Outcome closed =
+      ist({"bake", "cube.obj", "-o", "cube2.ist", "--spheres", "20", "--wrap", "3%", "--json"});
+  ASSERT_EQ(closed.exit_code, 0) << closed.err;
+  EXPECT_EQ(nlohmann::json::parse(closed.out).at("wrapped"), false);
 }
 
 TEST_F(BakeCommand, ErrorsNameTheFileAndLeaveNothingBehind) {

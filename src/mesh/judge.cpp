@@ -1,0 +1,157 @@
+#include "mesh/judge.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include "mesh/mesh_solid.h"
+#include "mesh/outward_winding.h"
+
+namespace ist {
+namespace {
+
+constexpr std::size_t kBlock = 1024;    ///< points that are summed in order
+constexpr std::size_t kFewest = 16;     ///< blocks of volume samples
+constexpr std::size_t kMost = 512;      ///< the same, where the solid fills little of its box
+constexpr double kEnough = 4096;        ///< samples in solid or winding number
+constexpr std::size_t kSurface = 8192;  ///< samples of a surface
+
+/// Part of i·step after the point: multiples of the golden ratio's kin spread evenly.
+double spread(std::size_t i, double step) {
+  const double x = 0.5 + static_cast<double>(i) * step;
+  return x - std::floor(x);
+}
+
+/// Point i of a sequence that fills the unit cube evenly (Roberts' R₃).
+Eigen::Vector3d cube_point(std::size_t i) {
+  return {spread(i, 0.8191725133961645), spread(i, 0.6710436067037893),
+          spread(i, 0.5497004779019703)};
+}
+
+struct VolumeSums {
+  double agreed = 0, all = 0;   ///< Σ w in the solid; points there and where w ≥ ½ besides
+  double solid = 0, wound = 0;  ///< points in the one, and where the other is ½ or more
+};
+
+VolumeSums operator+(const VolumeSums& a, const VolumeSums& b) {
+  return {a.agreed + b.agreed, a.all + b.all, a.solid + b.solid, a.wound + b.wound};
+}
+
+/// Blocks of samples until there are enough of them in either.
+std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
+                                       const OutwardWinding& winding, const MeshSolid& made) {
+  const Eigen::AlignedBox3d box = bounds.merged(made.bounds());
+  const Eigen::Vector3d low = box.min(), size = box.sizes();
+  std::vector<VolumeSums> blocks;
+  double met = 0;
+  while (blocks.size() < kMost && met < kEnough) {
+    const std::size_t first = blocks.size(), last = std::max(kFewest, 2 * first);
+    blocks.resize(last);
+    tbb::parallel_for(first, last, [&](std::size_t b) {
+      for (std::size_t i = b * kBlock; i < (b + 1) * kBlock; ++i) {
+        const Eigen::Vector3d x = low + size.cwiseProduct(cube_point(i));
+        const bool inside = made.inside(made.frame().to_unit(x));
+        const double w = std::clamp(winding.at(x), 0.0, 1.0);
+        const double s = inside ? 1 : 0, wound = w >= 0.5 ? 1 : 0;
+        blocks[b] = blocks[b] + VolumeSums{s * w, std::max(s, wound), s, wound};
+      }
+    });
+    for (std::size_t b = first; b < last; ++b) met += blocks[b].all;
+  }
+  return blocks;
+}
+
+/// Distances from one surface, at points spread evenly over its area, to another.
+struct Distances {
+  double mean = 0, max = 0;  ///< [u]
+  double near = 0;           ///< share of the area within `limit`
+};
+
+Distances distances(const TriangleMesh& from, const MeshSolid& to, double limit) {
+  std::vector<double> area_to(from.triangles.size());  // of all triangles up to this one
+  double area = 0;
+  for (std::size_t t = 0; t < area_to.size(); ++t) {
+    const auto& [a, b, c] = from.triangles[t];
+    const Eigen::Vector3d& corner = from.vertices[a];
+    area += (from.vertices[b] - corner).cross(from.vertices[c] - corner).norm() / 2;
+    area_to[t] = area;
+  }
+  std::vector<double> distance(kSurface);
+  tbb::parallel_for(std::size_t{0}, kSurface, [&](std::size_t i) {
+    const double place = (static_cast<double>(i) + 0.5) / double{kSurface} * area;
+    const auto found = std::lower_bound(area_to.begin(), area_to.end(), place);
+    const auto t = static_cast<std::size_t>(
+        std::min<std::ptrdiff_t>(found - area_to.begin(), std::ssize(area_to) - 1));
+    double u = spread(i, 0.7548776662466927), v = spread(i, 0.5698402909980532);
+    if (u + v > 1) {
+      u = 1 - u;
+      v = 1 - v;
+    }
+    const auto& [a, b, c] = from.triangles[t];
+    const Eigen::Vector3d& corner = from.vertices[a];
+    const Eigen::Vector3d x =
+        corner + u * (from.vertices[b] - corner) + v * (from.vertices[c] - corner);
+    distance[i] = to.closest_point(to.frame().to_unit(x)).distance * to.frame().scale();
+  });
+  Distances result;
+  for (const double d : distance) {
+    result.mean += d / double{kSurface};
+    result.max = std::max(result.max, d);
+    result.near += d <= limit ? 1 / double{kSurface} : 0;
+  }
+  return result;
+}
+
+}  // namespace
+
+Judgement judge(const TriangleMesh& soup, const ClosedMesh& made, double kept) {
+  const OutwardWinding winding(soup);
+  const std::unique_ptr<MeshSolid> surface = triangles_as_solid(soup);
+  const MeshSolid solid(made);
+
+  const std::vector<VolumeSums> blocks = sample_volumes(surface->bounds(), winding, solid);
+  VolumeSums all;
+  for (const VolumeSums& block : blocks) all = all + block;
+  Judgement judged;
+  if (all.all > 0) {
+    judged.agreement = all.agreed / all.all;
+    double squares = 0;
+    for (const VolumeSums& block : blocks) {
+      const double off = block.agreed - judged.agreement * block.all;
+      squares += off * off;
+    }
+    judged.agreement_error = std::min(1.0, (2 * std::sqrt(squares) + 3) / all.all);
+  } else {
+    judged.agreement_error = 1;  // too thin for any sample
+  }
+  if (all.solid > 0) judged.volume_ratio = all.wound / all.solid;
+
+  const double diagonal = surface->bounds().diagonal().norm();
+  const Distances lost = distances(soup, solid, kept * diagonal);
+  const Distances added = distances(made.mesh, *surface, kept * diagonal);
+  judged.kept_surface = lost.near;
+  judged.input_mean = lost.mean;
+  judged.input_max = lost.max;
+  judged.made_mean = added.mean;
+  judged.made_max = added.max;
+  judged.confidence =
+      std::max(0.0, judged.agreement - judged.agreement_error) * judged.kept_surface;
+  return judged;
+}
+
+std::string describe(const Judgement& judged) {
+  char text[320];
+  std::snprintf(text, sizeof text,
+                "confidence %.2f: solid and winding number agree on %.1f %% (± %.1f) of the "
+                "volume, %.1f %% of the surface was kept; the input lies up to %.3g from the "
+                "solid's surface, the solid's surface up to %.3g from the input",
+                judged.confidence, 100 * judged.agreement, 100 * judged.agreement_error,
+                100 * judged.kept_surface, judged.input_max, judged.made_max);
+  return text;
+}
+
+}  // namespace ist

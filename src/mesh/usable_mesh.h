@@ -1,0 +1,18 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <string>
+
+#include <ist/mesh.h>
+
+namespace ist {
+
+/// One vertex for equal coordinates, as weld_equal() has it, of a mesh of which nothing is known.
+/// Throws Error for no triangles, indices that lead nowhere, coordinates that are not finite, and
+/// sizes and offsets that double cannot compute with.
+void weld_usable(TriangleMesh& mesh, const std::string& name);
+
+/// The largest magnitude of a coordinate.
+double largest_coordinate(const Eigen::AlignedBox3d& bounds);
+
+}  // namespace ist

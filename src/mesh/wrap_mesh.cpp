@@ -1,0 +1,214 @@
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <ist/error.h>
+
+#include "mesh/edge_table.h"
+#include "mesh/judge.h"
+#include "mesh/level_set_surface.h"
+#include "mesh/mesh_solid.h"
+#include "mesh/message_text.h"
+#include "mesh/outward_winding.h"
+#include "mesh/usable_mesh.h"
+
+namespace ist {
+namespace {
+
+constexpr double kFinest = 1e-3, kCoarsest = 0.1;  ///< of the diagonal
+constexpr double kBeyond = 3.37;   ///< steps of lattice around the bounds; no plane of it on a face
+constexpr double kFarthest = 2;    ///< steps: values beyond are cut
+constexpr double kKeptByWrap = 2;  ///< steps: thickened walls end about one from their middle
+constexpr double kClearly = 0.75;  ///< winding number of what is no hole's other side
+constexpr std::uint32_t kBlock = 16;  ///< points along a side of what is decided at once
+
+/// Whether nothing a step behind either side of a triangle is clearly inside: it is a sheet, or a
+/// wall that the lattice may miss. Of a large one, whether that is so at two of four points.
+bool is_thin(const TriangleMesh& mesh, const Triangle& t, const OutwardWinding& winding,
+             double step) {
+  const Eigen::Vector3d corners[3] = {mesh.vertices[t[0]], mesh.vertices[t[1]],
+                                      mesh.vertices[t[2]]};
+  const Eigen::Vector3d across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  const double area2 = across.norm();
+  if (!(area2 > 0)) return false;
+  const Eigen::Vector3d normal = step / area2 * across;
+  const Eigen::Vector3d middle = (corners[0] + corners[1] + corners[2]) / 3;
+  const auto thin_at = [&](const Eigen::Vector3d& x) {
+    return winding.at(x - normal) < kClearly && winding.at(x + normal) < kClearly;
+  };
+  const bool small = (corners[0] - middle).norm() < step && (corners[1] - middle).norm() < step &&
+                     (corners[2] - middle).norm() < step;
+  if (small) return thin_at(middle);
+  int thin = thin_at(middle) ? 1 : 0;
+  for (const Eigen::Vector3d& corner : corners)
+    thin += thin_at(0.7 * corner + 0.3 * middle) ? 1 : 0;
+  return thin >= 2;
+}
+
+/// What is sampled: > 0 in the solid.
+class Wrap {
+ public:
+  Wrap(const TriangleMesh& mesh, double step)
+      : winding_(mesh),
+        surface_(triangles_as_solid(mesh)),
+        bounds_(surface_->bounds()),
+        step_(step) {
+    std::vector<char> thin(mesh.triangles.size());
+    tbb::parallel_for(std::size_t{0}, thin.size(), [&](std::size_t t) {
+      thin[t] = is_thin(mesh, mesh.triangles[t], winding_, step) ? 1 : 0;
+    });
+    TriangleMesh walls;
+    walls.vertices = mesh.vertices;
+    for (std::size_t t = 0; t < thin.size(); ++t)
+      if (thin[t] != 0) walls.triangles.push_back(mesh.triangles[t]);
+    thin_count_ = walls.triangles.size();
+    if (thin_count_ > 0) walls_ = triangles_as_solid(std::move(walls));
+  }
+
+  std::size_t thin_count() const { return thin_count_; }
+
+  /// Away from holes the distance from the surface, positive inside; across a hole it passes 0
+  /// where the winding number is ½. Where there are thin walls, at least what is left of a step's
+  /// way to them. A step beyond the bounds the solid ends: triangles that face any way may wind
+  /// about what lies outside.
+  double value(const Eigen::Vector3d& x) const {
+    const double side = std::clamp(4 * (winding_.at(x) - 0.5), -1.0, 1.0);
+    const double most = kFarthest * step_;
+    double value = std::clamp(side * distance(*surface_, x), -most, most);
+    if (walls_ && value < step_) value = std::max(value, step_ - distance(*walls_, x, most));
+    return std::min(value, std::max(-most, 1.5 * step_ - beyond_bounds(x)));
+  }
+
+  /// The value's sign throughout a ball, where it is known: ±1, or 0.
+  ///
+  /// The winding number is harmonic off the surface, so that its slope is at most 3/2 of half its
+  /// range over the distance from the surface; the range is taken to be 2.
+  int sign_in(const Eigen::Vector3d& centre, double radius) const {
+    const double free = distance(*surface_, centre) - radius;
+    if (!(free > kFarthest * step_)) return 0;
+    const double above = winding_.at(centre) - 0.5;
+    if (!(std::abs(above) > 1.5 * radius / free)) return 0;
+    if (above < 0) return -1;
+    return beyond_bounds(centre) + radius < -0.5 * step_ ? 1 : 0;
+  }
+
+ private:
+  /// How far along some axis x lies outside the bounds; negative inside.
+  double beyond_bounds(const Eigen::Vector3d& x) const {
+    return std::max((bounds_.min() - x).maxCoeff(), (x - bounds_.max()).maxCoeff());
+  }
+
+  static double distance(const MeshSolid& to, const Eigen::Vector3d& x,
+                         double limit = std::numeric_limits<double>::infinity()) {
+    const double scale = to.frame().scale();
+    return to.closest_point(to.frame().to_unit(x), limit / scale).distance * scale;
+  }
+
+  OutwardWinding winding_;
+  std::unique_ptr<MeshSolid> surface_, walls_;
+  Eigen::AlignedBox3d bounds_;
+  double step_;
+  std::size_t thin_count_ = 0;
+};
+
+/// Points of a lattice, by halves of blocks down to those that must be asked one by one.
+class Sampler {
+ public:
+  Sampler(const Wrap& wrap, DistanceGrid& grid) : wrap_(wrap), grid_(grid) {}
+
+  /// All points in [first, first + size).
+  void fill(const std::array<std::uint32_t, 3>& first, std::uint32_t size) const {
+    for (std::size_t k = 0; k < 3; ++k)
+      if (first[k] >= grid_.size[k]) return;
+    if (size == 1) return set(first, wrap_.value(point(first, 0)));
+    const double half = 0.5 * (size - 1);
+    const double radius = 0.8660254037844387 * (size - 1) * grid_.spacing * (1 + 1e-9);
+    if (const int sign = wrap_.sign_in(point(first, half), radius); sign != 0)
+      return set_all(first, size, sign * kFarthest * grid_.spacing);
+    for (std::uint32_t child = 0; child < 8; ++child)
+      fill({first[0] + (child & 1) * size / 2, first[1] + (child >> 1 & 1) * size / 2,
+            first[2] + (child >> 2) * size / 2},
+           size / 2);
+  }
+
+ private:
+  Eigen::Vector3d point(const std::array<std::uint32_t, 3>& at, double beyond) const {
+    Eigen::Vector3d x = grid_.origin;
+    for (int k = 0; k < 3; ++k) x[k] += grid_.spacing * (at[static_cast<std::size_t>(k)] + beyond);
+    return x;
+  }
+  void set(const std::array<std::uint32_t, 3>& at, double value) const {
+    grid_
+        .values[at[0] + std::size_t{grid_.size[0]} * (at[1] + std::size_t{grid_.size[1]} * at[2])] =
+        static_cast<float>(value);
+  }
+  void set_all(const std::array<std::uint32_t, 3>& first, std::uint32_t size, double value) const {
+    const auto end = [&](std::size_t k) { return std::min(first[k] + size, grid_.size[k]); };
+    for (std::uint32_t z = first[2]; z < end(2); ++z)
+      for (std::uint32_t y = first[1]; y < end(1); ++y)
+        for (std::uint32_t x = first[0]; x < end(0); ++x) set({x, y, z}, value);
+  }
+
+  const Wrap& wrap_;
+  DistanceGrid& grid_;
+};
+
+DistanceGrid sample(const Wrap& wrap, const Eigen::AlignedBox3d& bounds, double step) {
+  DistanceGrid grid;
+  grid.spacing = step;
+  grid.origin = bounds.min() - Eigen::Vector3d::Constant(kBeyond * step);
+  std::size_t count = 1;
+  std::array<std::uint32_t, 3> blocks;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double extent = bounds.sizes()[static_cast<int>(k)] / step + 2 * kBeyond;
+    grid.size[k] = static_cast<std::uint32_t>(std::ceil(extent)) + 1;
+    blocks[k] = (grid.size[k] + kBlock - 1) / kBlock;
+    count *= grid.size[k];
+  }
+  grid.values.resize(count);
+  const Sampler sampler(wrap, grid);
+  tbb::parallel_for(
+      std::size_t{0}, std::size_t{blocks[0]} * blocks[1] * blocks[2], [&](std::size_t b) {
+        const auto at = [&](std::size_t of) { return static_cast<std::uint32_t>(of) * kBlock; };
+        sampler.fill(
+            {at(b % blocks[0]), at(b / blocks[0] % blocks[1]), at(b / blocks[0] / blocks[1])},
+            kBlock);
+      });
+  return grid;
+}
+
+}  // namespace
+
+ClosedMesh wrap_mesh(TriangleMesh mesh, const std::string& name, double detail) {
+  if (!(detail >= kFinest && detail <= kCoarsest))
+    throw Error(name + ": wrapped with a detail of " + shortest(detail) + ", not " +
+                shortest(kFinest) + " to " + shortest(kCoarsest) + " of the diagonal");
+  weld_usable(mesh, name);
+  Eigen::AlignedBox3d bounds;
+  for (const Eigen::Vector3d& v : mesh.vertices) bounds.extend(v);
+  const double step = detail * bounds.diagonal().norm();
+  const double offset = largest_coordinate(bounds);
+  if (!(step > 1e-12 * offset))
+    throw Error(name + ": a size of " + shortest(bounds.diagonal().norm()) + " at an offset of " +
+                shortest(offset) + " cannot be wrapped. Move it nearer to the origin");
+  const Wrap wrap(mesh, step);
+  ClosedMesh made = level_set_surface(sample(wrap, bounds, step), name);
+  made.report.wrapped = true;
+  made.report.judged = judge(mesh, made, kKeptByWrap * detail);
+  std::string note = "wrapped on a lattice of " + shortest(step);
+  if (wrap.thin_count() > 0)
+    note += ", " + counted(wrap.thin_count(), "triangle") + " of thin walls thickened";
+  made.report.notes.push_back(note);
+  made.report.notes.push_back("wrap: " + describe(*made.report.judged));
+  return made;
+}
+
+}  // namespace ist
