@@ -2,6 +2,8 @@
  * library must answer too (web/package/test). And how long they take.
  *
  * native_rows A.ist B.ist poses.csv > answers        or        … --time PASSES > µs, as JSON */
+#define _POSIX_C_SOURCE 199309L  // clock_gettime
+
 #include <ist/ist.h>
 #include <stdio.h>
 #include <stdlib.h>
