@@ -17,6 +17,7 @@ const kPairs = [
     a: 'bolt',
     b: 'nut',
     pose: {rotation: [1, 0, 0, 0], translation: [0, 0, 8.5]},
+    friction: 0.03,  // or the thread would hold it
   },
   {
     id: 'gears',
@@ -37,7 +38,7 @@ const kPairs = [
     name: 'Probe on a knot',
     a: 'torus_knot',
     b: {name: 'capsule', scale: 0.4},
-    pose: {rotation: [1, 0, 0, 0], translation: [2.2, 0, 1.1]},
+    pose: {rotation: [1, 0, 0, 0], translation: [2.2, 0, 0.62]},
   },
   {
     id: 'ball-shell',
@@ -54,7 +55,7 @@ if (hasOracle) {
     name: 'Elephant and dino',
     a: {name: 'elephant', mesh: oracleMesh('elephant')},
     b: {name: 'dino', mesh: oracleMesh('dino')},
-    pose: {rotation: [1, 0, 0, 0], translation: [0.3, 0, 0]},
+    pose: {rotation: [0.5, -0.5, -0.5, -0.5], translation: [0.4, 0.03, 0.05]},
     up: 'y',
   });
 }

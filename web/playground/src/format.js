@@ -1,10 +1,10 @@
 // Numbers as they are printed.
 
-/** As `ist query` prints them, with trailing zeros, so that columns stand still. */
+/** The digits that `ist query` prints, with trailing zeros, so that columns stand still. */
 export function digits(x, count = 6) {
   if (x === 0) return '0';
   const exponent = Number(x.toExponential(count - 1).split('e')[1]);
-  if (exponent >= -4 && exponent < count) return minus(x.toFixed(count - 1 - exponent));
+  if (exponent >= -3 && exponent < count) return minus(x.toFixed(count - 1 - exponent));
   const [mantissa, power] = x.toExponential(count - 1).split('e');
   return minus(`${mantissa}e${Number(power)}`);
 }
@@ -22,5 +22,13 @@ export function vector(v, count = 4) {
 }
 
 export const whole = (x) => Math.round(x).toLocaleString('en').replaceAll('.', ',');
+
+/** From … to, a power of ten told once. */
+export function range(low, high, count = 6) {
+  if (high === 0) return '0';
+  const [a, b] = [digits(low, count), digits(high, count)];
+  const [mantissaA, powerA] = a.split('e'), [mantissaB, powerB] = b.split('e');
+  return powerA && powerA === powerB ? `(${mantissaA} … ${mantissaB})e${powerA}` : `${a} … ${b}`;
+}
 
 const minus = (text) => text.replaceAll('-', '−').replace(/^−(0(\.0*)?)$/, '$1');

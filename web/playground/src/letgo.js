@@ -12,15 +12,16 @@ const kGravity = 8;         // [B's radii/s²]
 const kFastest = 14;        // [B's radii/s] keeps B from jumping through A in a step
 const kDepth = 0.01;        // [B's radii] how deep B rests on kArea of its squared radius
 const kArea = 0.2;
-const kFriction = 0.35;
+const kFriction = 0.35;      // unless told otherwise
 const kDrag = 0.35;         // [1/s] of air
+const kRollingDrag = 2;     // [1/s] of turns, while B touches
 const kCalmFor = 0.75;      // [s] B rests once it moved less than kCalm for so long
-const kCalm = 6e-3;         // [B's radii/s]
+const kCalm = 2e-2;         // [B's radii/s]
 const kPatches = 12;
 
 export class LetGo {
   /** `up`: unit; the floor lies at `floor` [u] along it. */
-  constructor(a, b, up, floor) {
+  constructor(a, b, {up, floor, friction = kFriction}) {
     this.a = a;
     this.b = b;
     this.up = up.clone();
@@ -37,6 +38,7 @@ export class LetGo {
     this.frictionStiffness = this.stiffness / 4;
     this.frictionDamping =
         0.2 * this.frictionStiffness / Math.sqrt(this.stiffness * this.radius ** 2 / this.mass);
+    this.friction = friction;
     this.velocity = new THREE.Vector3();
     this.spin = new THREE.Vector3();  // angular momentum
     this.contacts = [a, this.ground].map(
@@ -84,7 +86,9 @@ export class LetGo {
     force.addScaledVector(this.up, -this.mass * this.gravity);
 
     this.velocity.addScaledVector(force, kStep / this.mass).multiplyScalar(1 - kDrag * kStep);
-    this.spin.addScaledVector(torque, kStep).multiplyScalar(1 - kDrag * kStep);
+    const touching = this.contacts.some(({memory}) => memory.size > 0);
+    this.spin.addScaledVector(torque, kStep)
+        .multiplyScalar(1 - (touching ? kRollingDrag : kDrag) * kStep);
     this.velocity.clampLength(0, kFastest * this.radius);
     angular.copy(this.spin).applyMatrix3(world);
     const turning = angular.length();
@@ -107,8 +111,8 @@ export class LetGo {
   push(contact, body) {
     const {solid, options, memory} = contact;
     body.position.toArray(pose.translation);
-    body.quaternion.toArray(pose.rotation, 1);
-    pose.rotation[0] = body.quaternion.w;
+    const {x, y, z, w} = body.quaternion;
+    Object.assign(pose.rotation, [w, x, y, z]);
     if (overlap(solid, this.b, pose) === 'no') {
       memory.clear();
       return;
@@ -138,7 +142,7 @@ export class LetGo {
       sideways.copy(angular).cross(reach).add(origin);
       sideways.addScaledVector(normal, -normal.dot(sideways));
       kept.stretch.addScaledVector(normal, -normal.dot(kept.stretch)).addScaledVector(sideways, kStep);
-      const limit = kFriction * pressure * patch.area, spring = this.frictionStiffness * kept.area;
+      const limit = this.friction * pressure * patch.area, spring = this.frictionStiffness * kept.area;
       const held = spring * kept.stretch.length();
       if (held > limit) kept.stretch.multiplyScalar(limit / held);
       along.copy(kept.stretch).multiplyScalar(-spring)

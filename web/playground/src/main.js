@@ -205,8 +205,15 @@ async function start() {
   };
   $('overlays').onchange = ({target}) => {
     world.overlays.shown[target.value] = target.checked;
+    tellLegend();
     world.touched();
   };
+  function tellLegend() {
+    for (const [name, on] of Object.entries(world.overlays.shown)) {
+      document.body.classList.toggle(name, on);
+    }
+  }
+  tellLegend();
   const setHandles = (mode) => {
     document.querySelector(`input[name=gizmo][value=${mode}]`).checked = true;
     view.handles.setMode(mode);

@@ -25,7 +25,7 @@ export class Overlays {
     const {force, torque, patch, lens, gap} = this.materials;
     this.shaft = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 20).translate(0, 0.5, 0), force);
     this.head = new THREE.Mesh(new THREE.ConeGeometry(1, 1, 28).translate(0, 0.5, 0), force);
-    this.arc = new THREE.Mesh(new THREE.TorusGeometry(1, 0.045, 12, 64, kTurn), torque);
+    this.arc = new THREE.Mesh(new THREE.TorusGeometry(1, 0.05, 12, 64, kTurn), torque);
     this.arcHead = new THREE.Mesh(new THREE.ConeGeometry(0.13, 0.36, 24), torque);
     this.arcHead.position.set(Math.cos(kTurn), Math.sin(kTurn), 0);
     this.arcHead.rotation.z = kTurn;
@@ -116,8 +116,8 @@ export class Overlays {
   }
 }
 
-/** A length from a strength: nearly in proportion while small, and never off the screen. */
-const grown = (x) => 0.9 * (1 - Math.exp(-3 * x));
+/** A length from a strength: seen while it is weak, and never off the screen. */
+const grown = (x) => 0.9 * (1 - Math.exp(-2 * Math.sqrt(x)));
 
 const matrix = new THREE.Matrix4(), turn = new THREE.Quaternion();
 const at = new THREE.Vector3(), scale = new THREE.Vector3();

@@ -1,6 +1,6 @@
 // The numbers beside the view, and the same in words.
 
-import {digits, vector, whole} from './format.js';
+import {digits, range, vector, whole} from './format.js';
 
 const kRows = [
   ['volume', 'Volume', 'u³', 'main'],
@@ -15,6 +15,7 @@ const kRows = [
 ];
 const kOften = 100;   // [ms] numbers are written at most so often
 const kCalm = 900;    // [ms] words are said once nothing moved for so long
+const kFew = 10;      // queries of which a mean is taken
 const kMean = 1000;   // [ms] over which times of queries are averaged: a browser's clock is coarse
 
 export class Readouts {
@@ -67,14 +68,17 @@ export class Readouts {
       if (cells[key].textContent !== text) cells[key].textContent = text;
     };
     put('volume', digits(p.volume));
-    put('bounds', p.volume > 0 ? `${digits(p.volumeMin)} … ${digits(p.volumeMax)}` : '0');
-    put('distance', s.distanceMax > 0 ? `${digits(s.distanceMin, 5)} … ${digits(s.distanceMax, 5)}` : '0');
+    put('bounds', range(p.volumeMin, p.volumeMax));
+    put('distance', range(s.distanceMin, s.distanceMax, 5));
     put('force', digits(Math.hypot(...p.force)));
     put('forceVector', vector(p.force));
     put('torque', digits(Math.hypot(...p.torque)));
     put('torqueVector', vector(p.torque));
     put('pairs', whole(p.spherePairs));
-    if (times.count > 0 && (now - times.since > kMean || cells.query.textContent === '–')) {
+    if (this.contact !== times.of) {
+      Object.assign(times, {of: this.contact, since: now, sum: 0, count: 0});
+      put('query', whole(1000 * this.contact.usual));
+    } else if (now - times.since > kMean && times.count >= kFew) {
       put('query', whole(1000 * times.sum / times.count));
       Object.assign(times, {since: now, sum: 0, count: 0});
     }

@@ -6,6 +6,38 @@ import {toCreasedNormals} from 'three/addons/utils/BufferGeometryUtils.js';
 
 import {balls} from './balls.js';
 
+/**
+ * What a cut lays open is filled: inner sides, which only a cut shows, are painted flat, and those of
+ * balls at the depth of the plane. Where balls share a place that of the larger chord is seen.
+ */
+function fillCuts(shader) {
+  shader.vertexShader = 'varying vec4 vBall;\n' + shader.vertexShader.replace(
+      '#include <project_vertex>',
+      `#include <project_vertex>
+      vBall = vec4(0.0);
+      #ifdef USE_INSTANCING
+        vBall = vec4((modelViewMatrix * vec4(instanceMatrix[3].xyz, 1.0)).xyz, length(instanceMatrix[0].xyz));
+      #endif`);
+  shader.fragmentShader =
+      'varying vec4 vBall;\nuniform mat4 projectionMatrix;\n' + shader.fragmentShader.replace(
+      '#include <opaque_fragment>',
+      `#include <opaque_fragment>
+      #if NUM_CLIPPING_PLANES > 0
+        gl_FragDepth = gl_FragCoord.z;
+        if (!gl_FrontFacing) {
+          gl_FragColor.rgb = 0.62 * diffuseColor.rgb;
+          vec3 seen = -vClipPosition;
+          vec3 cut = -clippingPlanes[0].w / dot(seen, clippingPlanes[0].xyz) * seen;
+          vec3 off = cut - vBall.xyz;
+          float room = vBall.w * vBall.w - dot(off, off);
+          if (room > 0.0) {
+            vec4 onPlane = projectionMatrix * vec4(cut, 1.0);
+            gl_FragDepth = 0.5 + 0.5 * onPlane.z / onPlane.w - 1e-3 * sqrt(room) / length(cut);
+          }
+        }
+      #endif`);
+}
+
 /** [rad] Edges sharper than this are drawn as edges. */
 const kCrease = 0.6;
 
@@ -19,16 +51,11 @@ export class Solid {
     this.opacity = 1;
     this.group = new THREE.Group();
     this.material = new THREE.MeshStandardMaterial({color: colour, roughness: 0.55, metalness: 0.05});
-    // What a cut lays open is painted flat, as if it were filled.
     this.material.side = THREE.DoubleSide;
-    this.material.onBeforeCompile = (shader) => {
-      shader.fragmentShader = shader.fragmentShader.replace(
-          '#include <opaque_fragment>',
-          `#include <opaque_fragment>
-          if (!gl_FrontFacing) gl_FragColor.rgb = diffuse * 0.42;`);
-    };
+    this.material.onBeforeCompile = fillCuts;
     this.depth = new THREE.MeshBasicMaterial(
         {colorWrite: false, transparent: true, side: THREE.DoubleSide});
+    this.depth.onBeforeCompile = fillCuts;
     this.looks = null;
     this.shown = {mode: this.info.hasField ? 'surface' : 'spheres', level: 0};
     this.draw();

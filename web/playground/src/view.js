@@ -8,7 +8,7 @@ export class View {
   constructor(holder) {
     this.holder = holder;
     try {
-      this.renderer = new THREE.WebGLRenderer({antialias: true, alpha: true});
+      this.renderer = new THREE.WebGLRenderer({antialias: true});
     } catch {
       throw new Error('This browser shows no WebGL, which the page draws with: switch it on, or try another.');
     }
@@ -20,7 +20,7 @@ export class View {
 
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(32, 1, 0.01, 100);
-    this.ambient = new THREE.HemisphereLight(0xffffff, 0x6a7480, 1.5);
+    this.ambient = new THREE.HemisphereLight(0xffffff, 0x8a93a0, 1.7);
     this.key = new THREE.DirectionalLight(0xffffff, 2.4);
     this.rim = new THREE.DirectionalLight(0xcfe0ff, 0.9);
     this.lights = new THREE.Group().add(this.key, this.key.target, this.rim, this.rim.target);
@@ -33,6 +33,7 @@ export class View {
     this.orbit.addEventListener('change', () => this.dirty = true);
     this.handles = new TransformControls(this.camera, this.canvas);
     this.handles.setSpace('world');
+    this.handles.setColors(0xd9534f, 0x4caf6d, 0x4a86d8, 0xf2c14e);
     this.handles.addEventListener('change', () => this.dirty = true);
     this.handles.addEventListener(
         'dragging-changed', ({value}) => this.orbit.enabled = !value);
@@ -50,6 +51,7 @@ export class View {
     this.right = new THREE.Vector3(1, 0, 0);
     this.radius = radius;
     this.camera.up.copy(this.up);
+    this.ambient.position.copy(this.up);
     const eye = this.near.clone().addScaledVector(this.up, 0.42).addScaledVector(this.right, 0.38);
     const half = Math.tan(this.camera.fov * Math.PI / 360) * Math.min(1, this.camera.aspect);
     this.camera.position.copy(centre).addScaledVector(eye.normalize(), 1.06 * radius / Math.sin(Math.atan(half)));
@@ -69,16 +71,21 @@ export class View {
   }
 
   /** A grid to fall on, at a height [u] along up. */
-  setFloor(height, colour) {
+  setFloor(height) {
     this.floor?.removeFromParent();
     this.floor?.geometry.dispose();
     this.floor?.material.dispose();
-    this.floor = new THREE.GridHelper(6 * this.radius, 24, colour, colour);
+    this.floor = new THREE.GridHelper(6 * this.radius, 24, 0xffffff, 0xffffff);
     this.floor.material.transparent = true;
-    this.floor.material.opacity = 0.5;
     this.floor.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), this.up);
     this.floor.position.copy(this.up).multiplyScalar(height);
     this.scene.add(this.floor);
+  }
+
+  setColours({ground, line}) {
+    this.renderer.setClearColor(ground);
+    this.floor?.material.color.set(line);
+    this.dirty = true;
   }
 
   /** Cuts away what is nearer than a share of the way through a box; says by which planes. */
@@ -102,7 +109,7 @@ export class View {
   render(over) {
     if (!this.dirty) return;
     this.dirty = false;
-    this.place(this.key, -0.5, 0.9, 0.75);
+    this.place(this.key, -0.45, 0.7, 1);
     this.place(this.rim, 0.9, 0.35, -0.4);
     if (over) {
       over.light.position.copy(this.key.position);

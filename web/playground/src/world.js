@@ -21,8 +21,8 @@ export class World {
     view.handles.addEventListener('dragging-changed', () => this.free?.still());
   }
 
-  /** Takes two assets, which it frees when others come. `up`: 'y' or 'z'. */
-  hold(assetA, assetB, {pose, up = 'z'}) {
+  /** Takes two assets, which it frees when others come. `up`: 'y' or 'z'; `friction` once let go. */
+  hold(assetA, assetB, {pose, up = 'z', friction}) {
     const own = new Set([assetA, assetB]);
     this.letGo(false);
     for (const solid of [this.a, this.b]) {
@@ -36,8 +36,10 @@ export class World {
     this.view.handles.attach(this.b.group);
     this.home = pose;
     this.up = up;
+    this.friction = friction;
     this.size = Math.min(this.a.bounds.radius, this.b.bounds.radius);
     this.show();
+    this.contact.warm(pose);
     this.reset();
     this.frame();
   }
@@ -56,7 +58,7 @@ export class World {
     this.view.frame(whole.center, Math.max(0.86 * whole.radius, ball(this.b).radius), this.up);
     const axis = this.up === 'y' ? 1 : 2;
     this.floor = Math.min(box.min.getComponent(axis), this.a.bounds.lower[axis]) - 0.02 * whole.radius;
-    this.view.setFloor(this.floor, colour('line'));
+    this.view.setFloor(this.floor);
     this.recolour();
     this.show();
   }
@@ -69,6 +71,7 @@ export class World {
     this.hold(this.b.asset, this.a.asset, {
       pose: {rotation: [w, x, y, z], translation: translation.toArray()},
       up: this.up,
+      friction: this.friction,
     });
   }
 
@@ -112,7 +115,10 @@ export class World {
     if (free === (this.free !== undefined)) return;
     this.free?.free();
     this.free = free ?
-        new LetGo(this.a.asset, this.b.asset, this.view.up, this.floor) : undefined;
+        new LetGo(
+            this.a.asset, this.b.asset,
+            {up: this.view.up, floor: this.floor, friction: this.friction}) :
+        undefined;
     this.on.held(free);
   }
 
@@ -148,8 +154,7 @@ export class World {
       force: colour('force'), torque: colour('torque'), patch: colour('patch'),
       lens: colour('lens'), gap: colour('soft'),
     });
-    this.view.floor?.material.color.set(colour('line'));
-    this.view.dirty = true;
+    this.view.setColours({ground: colour('ground'), line: colour('line')});
   }
 
   // --- A frame ----------------------------------------------------------------------------------------
