@@ -5,30 +5,39 @@ import {join} from 'node:path';
 
 import {browser, serve} from '../package/test/browser.js';
 import {root} from '../package/test/data.js';
+
 import {siteFolder} from './build.js';
 import {chart} from './chart.js';
 
 const folder = process.argv[2] ?? join(root, 'docs/pictures');
 const server = await serve({'/': siteFolder}), chrome = await browser();
 
-/** A PNG of the solids alone. `how`: pair, spheres, mode, level, shares, overlays shown, size. */
+/**
+ * A figure of the solids alone. `how`: caption (COUNT: A's spheres), pair, spheres, mode, level,
+ * shares, overlays shown, size.
+ */
 async function shot(how) {
-  const [width, height] = how.size ?? [300, 400];
+  const [width, height] = how.size ?? [350, 430];
   const page = await chrome.newPage({viewport: {width, height}, colorScheme: 'light'});
   await page.goto(`${server.url}/`);
   await page.waitForFunction('window.playground?.world.contact?.penetration');
-  await page.evaluate(async (how) => {
+  const count = await page.evaluate(async (how) => {
     const {world, view, setMode, choose} = playground;
     document.body.classList.add('bare');
     document.getElementById('pair').value = how.pair ?? 'bolt-nut';
     document.getElementById('spheres').value = how.spheres ?? 10000;
     await choose();
     setMode(how.mode ?? 'surface');
-    Object.assign(world.overlays.shown, {arrows: false, patches: false, lenses: false, gap: false}, how.overlays);
-    world.show({level: how.level ?? 0, opacityA: how.a ?? 1, opacityB: how.b ?? 1, cut: how.cut ?? 0});
+    Object.assign(
+        world.overlays.shown, {arrows: false, patches: false, lenses: false, gap: false},
+        how.overlays);
+    world.show(
+        {level: how.level ?? 0, opacityA: how.a ?? 1, opacityB: how.b ?? 1, cut: how.cut ?? 0});
     view.resize();
     world.frame();
-    view.camera.position.sub(view.orbit.target).multiplyScalar(how.far ?? 0.86).add(view.orbit.target);
+    view.camera.position.sub(view.orbit.target)
+        .multiplyScalar(how.far ?? 0.82)
+        .add(view.orbit.target);
     view.orbit.update();
     view.handles.detach();
     view.floor.visible = false;
@@ -36,11 +45,16 @@ async function shot(how) {
     world.update(0);
     view.dirty = true;
     await new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)));
+    return world.a.levels('spheres')[how.level ?? 0];
   }, how);
   const png = await page.screenshot();
   await page.close();
-  return `<figure><img width="${width}" height="${height}" src="data:image/png;base64,${png.toString('base64')}">
-    ${how.caption ? `<figcaption>${how.caption}</figcaption>` : ''}</figure>`;
+  return `<figure><img width="${width}" height="${height}" src="data:image/png;base64,${
+      png.toString('base64')}">
+    ${
+      how.caption ?
+          `<figcaption>${how.caption.replace('COUNT', count.toLocaleString('en'))}</figcaption>` :
+          ''}</figure>`;
 }
 
 /** Figures side by side, or an SVG, as a file. */
@@ -66,23 +80,30 @@ await row('bolt_and_nut.png', [
   {caption: 'their overlap', a: 0.22, b: 0.3, overlays: {lenses: true, arrows: true}},
 ]);
 await row('packing_levels.png', [0, 1, 2].map((level) => ({
-  caption: ['10,000 spheres', '2,500', '625'][level],
-  pair: 'bolt-table', mode: 'spheres', level, cut: 0.5, size: [300, 300],
-})));
+                                                caption: 'COUNT spheres',
+                                                mode: 'spheres',
+                                                level,
+                                                cut: 0.5,
+                                                b: 0,
+                                              })));
 await row('nut_patches.png', [
-  {b: 0.25, overlays: {patches: true, arrows: true}, size: [440, 460]},
+  {b: 0.25, overlays: {patches: true, arrows: true}, size: [460, 480]},
 ]);
 
 const trade = JSON.parse(readFileSync(join(root, 'benchmarks/results/trade.json'), 'utf8'));
-await write('spheres_and_error.png', chart(
-    trade.tables.Trade
-        .filter((row) => row.pair === 'eledino' && row.curve === 'matched' && row.class !== 'contained')
-        .map((row) => ({
-               class: `overlap ${row.class}`,
-               spheres: Number(row.setting),
-               error: row['error median %'],
-             })),
-    'spheres of each solid; median error of the volume'));
+await write(
+    'spheres_and_error.png',
+    chart(
+        trade.tables.Trade
+            .filter(
+                (row) =>
+                    row.pair === 'eledino' && row.curve === 'matched' && row.class !== 'contained')
+            .map((row) => ({
+                   class: `overlap ${row.class}`,
+                   spheres: Number(row.setting),
+                   error: row['error median %'],
+                 })),
+        'spheres of each solid; median error of the volume'));
 
 await chrome.close();
 server.close();

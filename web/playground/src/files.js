@@ -18,11 +18,13 @@ export async function readFile(file) {
   const ending = file.name.toLowerCase().split('.').pop();
   const read = {ist: readSolid, obj: readObj, stl: readStl, ply: readPly, glb: readGlb}[ending];
   if (!read) {
-    throw new Error(`${file.name}: the page opens .ist, .obj, .stl, .ply and .glb files.` +
+    throw new Error(
+        `${file.name}: the page opens .ist, .obj, .stl, .ply and .glb files.` +
         (ending === 'gltf' ? ' Save it as .glb, in one file.' : ''));
   }
   if (file.size === 0) throw new Error(`${file.name} is empty.`);
-  if (file.size > kMost) throw new Error(`${file.name} is larger than 512 MB, too much for a page.`);
+  if (file.size > kMost)
+    throw new Error(`${file.name} is larger than 512 MB, too much for a page.`);
   const bytes = await file.arrayBuffer();
   try {
     return await read(bytes, file.name);
@@ -35,7 +37,8 @@ export async function readFile(file) {
 /** Already a whole sentence. */
 class Told extends Error {}
 
-const reason = (error) => String(error?.message ?? error).replace(/^THREE\.\w+: /, '').replace(/\.$/, '');
+const reason = (error) =>
+    String(error?.message ?? error).replace(/^THREE\.\w+: /, '').replace(/\.$/, '');
 
 function readSolid(bytes, name) {
   try {
@@ -69,7 +72,10 @@ function looks(model, name) {
     geometry = new THREE.BufferGeometry().setAttribute(
         'position',
         new THREE.BufferAttribute(
-            Float32Array.from({length: 3 * position.count}, (_, i) => position.getComponent(Math.floor(i / 3), i % 3)), 3));
+            Float32Array.from(
+                {length: 3 * position.count},
+                (_, i) => position.getComponent(Math.floor(i / 3), i % 3)),
+            3));
     parts.push(geometry.applyMatrix4(part.matrixWorld));
   });
   if (parts.length === 0) throw new Told(`${name} holds no triangles.`);

@@ -50,6 +50,6 @@ export class Keys {
 
   resize(factor) {
     this.step = Math.min(kMostStep, Math.max(kLeastStep, this.step * factor));
-    this.act.say(`Steps of ${+(100 * this.step).toPrecision(2)} % of B's radius.`);
+    this.act.say(`Steps of ${+ (100 * this.step).toPrecision(2)} % of B's radius.`);
   }
 }

@@ -6,17 +6,17 @@
 import {contactPatches, Field, overlap} from 'ist-query';
 import * as THREE from 'three';
 
-const kStep = 1 / 960;      // [s]
-const kBudget = 10;         // [ms] of a frame; beyond it time goes slower
-const kGravity = 8;         // [B's radii/s²]
-const kFastest = 14;        // [B's radii/s] keeps B from jumping through A in a step
-const kDepth = 0.01;        // [B's radii] how deep B rests on kArea of its squared radius
+const kStep = 1 / 960;  // [s]
+const kBudget = 10;     // [ms] of a frame; beyond it time goes slower
+const kGravity = 8;     // [B's radii/s²]
+const kFastest = 14;    // [B's radii/s] keeps B from jumping through A in a step
+const kDepth = 0.01;    // [B's radii] how deep B rests on kArea of its squared radius
 const kArea = 0.2;
-const kFriction = 0.35;      // unless told otherwise
-const kDrag = 0.35;         // [1/s] of air
-const kRollingDrag = 2;     // [1/s] of turns, while B touches
-const kCalmFor = 0.75;      // [s] B rests once it moved less than kCalm for so long
-const kCalm = 2e-2;         // [B's radii/s]
+const kFriction = 0.35;  // unless told otherwise
+const kDrag = 0.35;      // [1/s] of air
+const kRollingDrag = 2;  // [1/s] of turns, while B touches
+const kCalmFor = 0.75;   // [s] B rests once it moved less than kCalm for so long
+const kCalm = 2e-2;      // [B's radii/s]
 const kPatches = 12;
 
 export class LetGo {
@@ -64,15 +64,19 @@ export class LetGo {
     this.owed = Math.min(this.owed + seconds, 1 / 20);
     const start = performance.now();
     for (; this.owed >= kStep; this.owed -= kStep) {
-      if (performance.now() - start > kBudget) this.owed = 0;
-      else this.step(body);
+      if (performance.now() - start > kBudget)
+        this.owed = 0;
+      else
+        this.step(body);
     }
     return true;
   }
 
   step(body) {
     rotation.setFromMatrix4(matrix.makeRotationFromQuaternion(body.quaternion));
-    world.copy(this.inverseInertia).premultiply(rotation).multiply(inverse.copy(rotation).transpose());
+    world.copy(this.inverseInertia)
+        .premultiply(rotation)
+        .multiply(inverse.copy(rotation).transpose());
     angular.copy(this.spin).applyMatrix3(world);
     arm.copy(this.centre).applyMatrix3(rotation);
     centre.copy(body.position).add(arm);
@@ -133,7 +137,8 @@ export class LetGo {
       along.fromArray(patch.force);
       about.fromArray(patch.torque);
       const rate = -(along.dot(origin) + about.dot(angular)) / kept.area;
-      const pressure = this.stiffness * patch.volume / kept.area * Math.max(0, 1 + this.damping * rate);
+      const pressure =
+          this.stiffness * patch.volume / kept.area * Math.max(0, 1 + this.damping * rate);
       force.addScaledVector(along, pressure);
       torque.addScaledVector(about, pressure);
 
@@ -141,16 +146,21 @@ export class LetGo {
       reach.fromArray(patch.centroid).sub(body.position);
       sideways.copy(angular).cross(reach).add(origin);
       sideways.addScaledVector(normal, -normal.dot(sideways));
-      kept.stretch.addScaledVector(normal, -normal.dot(kept.stretch)).addScaledVector(sideways, kStep);
-      const limit = this.friction * pressure * patch.area, spring = this.frictionStiffness * kept.area;
+      kept.stretch.addScaledVector(normal, -normal.dot(kept.stretch))
+          .addScaledVector(sideways, kStep);
+      const limit = this.friction * pressure * patch.area,
+            spring = this.frictionStiffness * kept.area;
       const held = spring * kept.stretch.length();
       if (held > limit) kept.stretch.multiplyScalar(limit / held);
-      along.copy(kept.stretch).multiplyScalar(-spring)
-          .addScaledVector(sideways, -this.frictionDamping * kept.area).clampLength(0, limit);
+      along.copy(kept.stretch)
+          .multiplyScalar(-spring)
+          .addScaledVector(sideways, -this.frictionDamping * kept.area)
+          .clampLength(0, limit);
       force.add(along);
       torque.add(reach.cross(along));
     }
-    for (const id of memory.keys()) if (!seen.has(id)) memory.delete(id);
+    for (const id of memory.keys())
+      if (!seen.has(id)) memory.delete(id);
   }
 
   free() {
@@ -158,7 +168,10 @@ export class LetGo {
   }
 }
 
-const pose = {rotation: [1, 0, 0, 0], translation: [0, 0, 0]};
+const pose = {
+  rotation: [1, 0, 0, 0],
+  translation: [0, 0, 0]
+};
 const matrix = new THREE.Matrix4(), rotation = new THREE.Matrix3(), inverse = new THREE.Matrix3();
 const world = new THREE.Matrix3(), turn = new THREE.Quaternion();
 const force = new THREE.Vector3(), torque = new THREE.Vector3(), angular = new THREE.Vector3();

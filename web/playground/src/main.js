@@ -46,11 +46,18 @@ async function start() {
     },
   });
   const player = new Player(
-      {form: $('player'), play: $('play'), moment: $('moment'), told: $('moment-told'), leave: $('leave')},
+      {
+        form: $('player'),
+        play: $('play'),
+        moment: $('moment'),
+        told: $('moment-told'),
+        leave: $('leave')
+      },
       () => leavePlayer());
   theme($('theme'), () => world.recolour());
 
-  // --- Solids ------------------------------------------------------------------------------------------
+  // --- Solids
+  // ------------------------------------------------------------------------------------------
 
   await init();
   const {sphereCounts, pairs} = await fetched('demo/pairs.json', (answer) => answer.json());
@@ -87,7 +94,8 @@ async function start() {
         names.map((name, k) => `${'AB'[k]} ${name.replaceAll('_', ' ')}`);
     world.names = names;
     const [a, b] = [world.a.info, world.b.info];
-    $('note').textContent = `A: ${whole(a.spheres)} spheres, ${(100 * a.coverage).toFixed(1)} % filled. ` +
+    $('note').textContent =
+        `A: ${whole(a.spheres)} spheres, ${(100 * a.coverage).toFixed(1)} % filled. ` +
         `B: ${whole(b.spheres)} spheres, ${(100 * b.coverage).toFixed(1)} % filled. ` +
         'u is the unit of the meshes; k is a pressure.';
   }
@@ -100,7 +108,8 @@ async function start() {
     tellLevels();
   };
 
-  // --- Files -------------------------------------------------------------------------------------------
+  // --- Files
+  // -------------------------------------------------------------------------------------------
 
   async function take(files) {
     untell();
@@ -123,9 +132,11 @@ async function start() {
       // One alone is the new B.
       const a = solids.length === 2 ? solids[0].asset : world.a.asset;
       const b = solids.at(-1).asset;
-      const names = [solids.length === 2 ? stem(solids[0].name) : world.names[0], stem(solids.at(-1).name)];
+      const names =
+          [solids.length === 2 ? stem(solids[0].name) : world.names[0], stem(solids.at(-1).name)];
       hold(a, b, names, {pose: beside(a, b), up: solids.length === 2 ? 'z' : world.up});
-      if (!$('pair').querySelector(`[value=${kOwn}]`)) $('pair').append(new Option('Your files', kOwn));
+      if (!$('pair').querySelector(`[value=${kOwn}]`))
+        $('pair').append(new Option('Your files', kOwn));
       $('pair').value = kOwn;
     }
     for (const {geometry, name} of read.filter(({kind}) => kind === 'looks')) {
@@ -148,7 +159,8 @@ async function start() {
   acceptDrops($('drop'), (files) => attempt(() => take(files)));
   $('alert-close').onclick = untell;
 
-  // --- Playback ----------------------------------------------------------------------------------------
+  // --- Playback
+  // ----------------------------------------------------------------------------------------
 
   function enterPlayer(scene) {
     world.letGo(false);
@@ -168,7 +180,8 @@ async function start() {
     world.frame();
   }
 
-  // --- Settings ----------------------------------------------------------------------------------------
+  // --- Settings
+  // ----------------------------------------------------------------------------------------
 
   const chosen = (name) => document.querySelector(`input[name=${name}]:checked`).value;
   function setMode(mode) {
@@ -182,9 +195,13 @@ async function start() {
     slider.max = Math.max(0, levels.length - 1);
     slider.value = world.settings.level;
     const [a, b] = levels[slider.value] ?? [];
-    const text = mode === 'surface' ? '–' : a === b ? `${whole(a)} each` : `${whole(a)}, ${whole(b)}`;
+    const text = mode === 'surface' ? '–' :
+        a === b                     ? `${whole(a)} each` :
+                                      `${whole(a)}, ${whole(b)}`;
     $('level-told').textContent = text;
-    slider.setAttribute('aria-valuetext', mode === 'surface' ? 'none' : `${text} ${mode === 'tree' ? 'balls' : 'spheres'}`);
+    slider.setAttribute(
+        'aria-valuetext',
+        mode === 'surface' ? 'none' : `${text} ${mode === 'tree' ? 'balls' : 'spheres'}`);
   }
   $('mode').onchange = () => setMode(chosen('mode'));
   $('level').oninput = () => {
@@ -226,7 +243,8 @@ async function start() {
   $('letgo').onclick = letGo;
   $('home').onclick = () => world.reset();
   new Keys(
-      $('view'), () => ({right: view.right, up: view.up, near: view.near, radius: world.b.bounds.radius}), {
+      $('view'),
+      () => ({right: view.right, up: view.up, near: view.near, radius: world.b.bounds.radius}), {
         move: (by) => world.move(by),
         turn: (by) => world.turn(by),
         handles: setHandles,
@@ -236,12 +254,22 @@ async function start() {
         say: (words) => readouts.say(words),
       });
 
-  // --- Frames ------------------------------------------------------------------------------------------
+  // --- Frames
+  // ------------------------------------------------------------------------------------------
 
   let before = performance.now();
   function frame(now) {
     const seconds = Math.min(0.1, Math.max(0, now - before) / 1000);
     before = now;
+    requestAnimationFrame(frame);
+    try {
+      go(seconds, now);
+    } catch (error) {
+      world.letGo(false);
+      tell(error.message.replace(/^ist: /, ''));
+    }
+  }
+  function go(seconds, now) {
     if (player.open) {
       if (player.advance(seconds)) view.dirty = true;
     } else {
@@ -250,7 +278,6 @@ async function start() {
     }
     readouts.tick(now);
     view.render(player.open ? null : world.overlays);
-    requestAnimationFrame(frame);
   }
   function plotNow(now) {
     if (!world.contact?.penetration) return;

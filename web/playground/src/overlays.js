@@ -11,27 +11,32 @@ export class Overlays {
   /** They lie in a scene of their own, which is drawn last, over everything. */
   constructor() {
     this.scene = new THREE.Scene();
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8090a0, 2.2));
-    const light = new THREE.DirectionalLight(0xffffff, 1.6);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xa0a8b0, 1.8));
+    const light = new THREE.DirectionalLight(0xffffff, 1.3);
     this.light = light;
     this.scene.add(light, light.target);
     const material = () => new THREE.MeshStandardMaterial({roughness: 0.6});
     this.materials = {
-      force: material(), torque: material(), patch: material(), lens: material(), gap: material(),
+      force: material(),
+      torque: material(),
+      patch: material(),
+      lens: material(),
+      gap: material(),
     };
     this.materials.patch.side = THREE.DoubleSide;
     this.shown = {arrows: true, patches: false, lenses: true, gap: true};
 
     const {force, torque, patch, lens, gap} = this.materials;
-    this.shaft = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 20).translate(0, 0.5, 0), force);
+    this.shaft =
+        new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 20).translate(0, 0.5, 0), force);
     this.head = new THREE.Mesh(new THREE.ConeGeometry(1, 1, 28).translate(0, 0.5, 0), force);
     this.arc = new THREE.Mesh(new THREE.TorusGeometry(1, 0.05, 12, 64, kTurn), torque);
     this.arcHead = new THREE.Mesh(new THREE.ConeGeometry(0.13, 0.36, 24), torque);
     this.arcHead.position.set(Math.cos(kTurn), Math.sin(kTurn), 0);
     this.arcHead.rotation.z = kTurn;
     this.turn = new THREE.Group().add(this.arc, this.arcHead);
-    this.discs = new THREE.InstancedMesh(
-        new THREE.CylinderGeometry(1, 1, 0.12, 40), patch, kMostPatches);
+    this.discs =
+        new THREE.InstancedMesh(new THREE.CylinderGeometry(1, 1, 0.12, 40), patch, kMostPatches);
     this.lenses = new THREE.InstancedMesh(new THREE.SphereGeometry(1, 12, 8), lens, kMostLenses);
     this.bridge = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 12).translate(0, 0.5, 0), gap);
     this.ends = [0, 1].map(() => new THREE.Mesh(new THREE.SphereGeometry(1, 20, 14), gap));
@@ -43,6 +48,7 @@ export class Overlays {
   setColours(colours) {
     for (const [name, material] of Object.entries(this.materials)) {
       material.color.set(colours[name]);
+      material.emissive.set(colours[name]).multiplyScalar(0.3);
     }
   }
 
@@ -57,14 +63,17 @@ export class Overlays {
       const r = Math.sqrt(area / Math.PI);
       turn.setFromUnitVectors(kUp, at.fromArray(normal).lengthSq() > 0 ? at : kUp);
       this.discs.setMatrixAt(
-          i, matrix.compose(at.fromArray(centroid), turn, scale.set(r, Math.max(r, 0.02 * size) * 0.4, r)));
+          i,
+          matrix.compose(
+              at.fromArray(centroid), turn, scale.set(r, Math.max(r, 0.02 * size) * 0.4, r)));
     }
     this.discs.instanceMatrix.needsUpdate = true;
     this.drawLenses(touching && this.shown.lenses, lenses);
     this.drawGap(!touching && this.shown.gap, separation, size);
   }
 
-  // --- Below: one thing each --------------------------------------------------------------------------
+  // --- Below: one thing each
+  // --------------------------------------------------------------------------
 
   drawForce(visible, {force, centroid}, size) {
     const strength = Math.hypot(...force);

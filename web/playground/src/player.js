@@ -77,4 +77,4 @@ export class Player {
 }
 
 /** Colours far from each other, one after the other. */
-const bodyColour = (i) => new THREE.Color().setHSL((0.58 + 0.381966 * i) % 1, 0.42, 0.6);
+const bodyColour = (i) => new THREE.Color().setHSL((0.58 + 0.381966 * i) % 1, 0.45, 0.5);

@@ -22,8 +22,10 @@ export class Plot {
     const at = (this.first + this.count) % kMost;
     this.times[at] = now;
     this.values[at] = value;
-    if (this.count < kMost) ++this.count;
-    else this.first = (this.first + 1) % kMost;
+    if (this.count < kMost)
+      ++this.count;
+    else
+      this.first = (this.first + 1) % kMost;
     this.dirty = true;
   }
 
@@ -40,12 +42,14 @@ export class Plot {
       --this.count;
     }
     let most = 0;
-    for (let i = 0; i < this.count; ++i) most = Math.max(most, this.values[(this.first + i) % kMost]);
+    for (let i = 0; i < this.count; ++i)
+      most = Math.max(most, this.values[(this.first + i) % kMost]);
     this.told.textContent = most > 0 ? `≤ ${digits(most, 3)} ${this.unit}` : '';
     this.dirty = this.count > 0 && most > 0;
     if (this.count < 2) return;
     const x = (i) => width * (1 - (now - this.times[(this.first + i) % kMost]) / 1000 / kSeconds);
-    const y = (i) => height - ratio - (height - 4 * ratio) * this.values[(this.first + i) % kMost] / (most || 1);
+    const y = (i) =>
+        height - ratio - (height - 4 * ratio) * this.values[(this.first + i) % kMost] / (most || 1);
     pen.beginPath();
     pen.moveTo(x(0), y(0));
     for (let i = 1; i < this.count; ++i) pen.lineTo(x(i), y(i));

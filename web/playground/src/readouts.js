@@ -13,10 +13,10 @@ const kRows = [
   ['pairs', 'Sphere pairs', ''],
   ['query', 'Query', 'µs'],
 ];
-const kOften = 100;   // [ms] numbers are written at most so often
-const kCalm = 900;    // [ms] words are said once nothing moved for so long
-const kFew = 10;      // queries of which a mean is taken
-const kMean = 1000;   // [ms] over which times of queries are averaged: a browser's clock is coarse
+const kOften = 100;  // [ms] numbers are written at most so often
+const kCalm = 900;   // [ms] words are said once nothing moved for so long
+const kFew = 10;     // queries of which a mean is taken
+const kMean = 1000;  // [ms] over which times of queries are averaged: a browser's clock is coarse
 
 export class Readouts {
   constructor(list, live) {
@@ -87,7 +87,8 @@ export class Readouts {
   words() {
     const {penetration: p, separation: s} = this.contact;
     if (p.volume > 0) {
-      return `Overlap ${digits(p.volume, 4)} cubic units; force ${digits(Math.hypot(...p.force), 4)}, ` +
+      return `Overlap ${digits(p.volume, 4)} cubic units; force ${
+                 digits(Math.hypot(...p.force), 4)}, ` +
           `direction ${vector(p.force.map((x) => x / Math.hypot(...p.force)), 2)}.`;
     }
     if (s.distanceMax > 0) {

@@ -21,4 +21,4 @@ export function theme(button, changed) {
 }
 
 export const colour = (name) =>
-  getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+    getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

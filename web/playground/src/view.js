@@ -10,7 +10,8 @@ export class View {
     try {
       this.renderer = new THREE.WebGLRenderer({antialias: true});
     } catch {
-      throw new Error('This browser shows no WebGL, which the page draws with: switch it on, or try another.');
+      throw new Error(
+          'This browser shows no WebGL, which the page draws with: switch it on, or try another.');
     }
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.localClippingEnabled = true;
@@ -35,8 +36,7 @@ export class View {
     this.handles.setSpace('world');
     this.handles.setColors(0xd9534f, 0x4caf6d, 0x4a86d8, 0xf2c14e);
     this.handles.addEventListener('change', () => this.dirty = true);
-    this.handles.addEventListener(
-        'dragging-changed', ({value}) => this.orbit.enabled = !value);
+    this.handles.addEventListener('dragging-changed', ({value}) => this.orbit.enabled = !value);
     this.scene.add(this.handles.getHelper());
 
     new ResizeObserver(() => this.resize()).observe(holder);
@@ -54,7 +54,8 @@ export class View {
     this.ambient.position.copy(this.up);
     const eye = this.near.clone().addScaledVector(this.up, 0.42).addScaledVector(this.right, 0.38);
     const half = Math.tan(this.camera.fov * Math.PI / 360) * Math.min(1, this.camera.aspect);
-    this.camera.position.copy(centre).addScaledVector(eye.normalize(), 1.06 * radius / Math.sin(Math.atan(half)));
+    this.camera.position.copy(centre).addScaledVector(
+        eye.normalize(), 1.06 * radius / Math.sin(Math.atan(half)));
     this.camera.near = radius / 50;
     this.camera.far = radius * 60;
     this.camera.updateProjectionMatrix();
@@ -126,7 +127,9 @@ export class View {
   /** A light that goes with the camera, so that no side is dark: right, up, towards the eye. */
   place(light, right, up, near) {
     light.target.position.copy(this.orbit.target);
-    light.position.set(right, up, near).applyQuaternion(this.camera.quaternion)
-        .multiplyScalar(10 * (this.radius ?? 1)).add(this.orbit.target);
+    light.position.set(right, up, near)
+        .applyQuaternion(this.camera.quaternion)
+        .multiplyScalar(10 * (this.radius ?? 1))
+        .add(this.orbit.target);
   }
 }

@@ -9,7 +9,9 @@ import {Solid} from './solid.js';
 import {colour} from './theme.js';
 
 export class World {
-  /** `on`: what to call when a contact was asked (`asked`) and when B was let go or held (`held`). */
+  /**
+   * `on`: what to call when a contact was asked (`asked`) and when B was let go or held (`held`).
+   */
   constructor(view, on) {
     this.view = view;
     this.on = on;
@@ -21,7 +23,9 @@ export class World {
     view.handles.addEventListener('dragging-changed', () => this.free?.still());
   }
 
-  /** Takes two assets, which it frees when others come. `up`: 'y' or 'z'; `friction` once let go. */
+  /**
+   * Takes two assets, which it frees when others come. `up`: 'y' or 'z'; `friction` once let go.
+   */
   hold(assetA, assetB, {pose, up = 'z', friction}) {
     const own = new Set([assetA, assetB]);
     this.letGo(false);
@@ -57,7 +61,8 @@ export class World {
     const whole = box.getBoundingSphere(new THREE.Sphere());
     this.view.frame(whole.center, Math.max(0.86 * whole.radius, ball(this.b).radius), this.up);
     const axis = this.up === 'y' ? 1 : 2;
-    this.floor = Math.min(box.min.getComponent(axis), this.a.bounds.lower[axis]) - 0.02 * whole.radius;
+    this.floor =
+        Math.min(box.min.getComponent(axis), this.a.bounds.lower[axis]) - 0.02 * whole.radius;
     this.view.setFloor(this.floor);
     this.recolour();
     this.show();
@@ -67,15 +72,17 @@ export class World {
     const at = this.b.group.matrixWorld.clone().invert();
     const translation = new THREE.Vector3(), turned = new THREE.Quaternion();
     at.decompose(translation, turned, new THREE.Vector3());
-    const {x, y, z, w} = turned;
+    const {x, y, z, w} = turned, looks = [this.b.looks, this.a.looks];
     this.hold(this.b.asset, this.a.asset, {
       pose: {rotation: [w, x, y, z], translation: translation.toArray()},
       up: this.up,
       friction: this.friction,
     });
+    [this.a, this.b].forEach((solid, k) => looks[k] && solid.wear(looks[k]));
   }
 
-  // --- Where B stands -----------------------------------------------------------------------------
+  // --- Where B stands
+  // -----------------------------------------------------------------------------
 
   setPose({rotation: [w, x, y, z], translation}) {
     this.b.group.quaternion.set(x, y, z, w).normalize();
@@ -114,15 +121,15 @@ export class World {
   letGo(free) {
     if (free === (this.free !== undefined)) return;
     this.free?.free();
-    this.free = free ?
-        new LetGo(
-            this.a.asset, this.b.asset,
-            {up: this.view.up, floor: this.floor, friction: this.friction}) :
-        undefined;
+    this.free = free ? new LetGo(
+                           this.a.asset, this.b.asset,
+                           {up: this.view.up, floor: this.floor, friction: this.friction}) :
+                       undefined;
     this.on.held(free);
   }
 
-  // --- What is drawn --------------------------------------------------------------------------------
+  // --- What is drawn
+  // --------------------------------------------------------------------------------
 
   /** Takes changed settings; how many levels the solids have is then in `levels()`. */
   show(changed = {}) {
@@ -130,7 +137,7 @@ export class World {
     if (!this.a) return;
     const {mode, level, opacityA, opacityB, cut} = this.settings;
     for (const [solid, opacity] of [[this.a, opacityA], [this.b, opacityB]]) {
-      if (solid.shown.mode !== mode || solid.shown.level !== level) solid.show(mode, level);
+      if (solid.asked.mode !== mode || solid.asked.level !== level) solid.show(mode, level);
       if (solid.opacity !== opacity) solid.setOpacity(opacity);
       if (this.view.near) {
         const centre = new THREE.Vector3().fromArray(this.a.bounds.centre);
@@ -143,21 +150,28 @@ export class World {
   levels() {
     const {mode} = this.settings;
     const [a, b] = [this.a, this.b].map((solid) => solid.levels(mode));
-    return Array.from({length: Math.max(a.length, b.length)}, (_, k) => [
-      a[Math.min(k, a.length - 1)], b[Math.min(k, b.length - 1)],
+    return Array.from(
+        {length: Math.max(a.length, b.length)},
+        (_, k) =>
+            [a[Math.min(k, a.length - 1)],
+             b[Math.min(k, b.length - 1)],
     ]);
   }
 
   recolour() {
     for (const name of ['a', 'b']) this[name]?.material.color.set(colour(name));
     this.overlays.setColours({
-      force: colour('force'), torque: colour('torque'), patch: colour('patch'),
-      lens: colour('lens'), gap: colour('soft'),
+      force: colour('force'),
+      torque: colour('torque'),
+      patch: colour('patch'),
+      lens: colour('lens'),
+      gap: colour('soft'),
     });
     this.view.setColours({ground: colour('ground'), line: colour('line')});
   }
 
-  // --- A frame ----------------------------------------------------------------------------------------
+  // --- A frame
+  // ----------------------------------------------------------------------------------------
 
   /** Moves what is free, asks where anything moved, and brings the scene up to date. */
   update(seconds) {
@@ -179,4 +193,4 @@ export class World {
 }
 
 const ofBounds = ({lower, upper}) =>
-  new THREE.Box3(new THREE.Vector3().fromArray(lower), new THREE.Vector3().fromArray(upper));
+    new THREE.Box3(new THREE.Vector3().fromArray(lower), new THREE.Vector3().fromArray(upper));

@@ -5,7 +5,7 @@ export function triangleGlb() {
   const binary = Buffer.from(Float32Array.from([...corners, ...times, ...places]).buffer);
   const view = (byteOffset, count) => ({buffer: 0, byteOffset, byteLength: 4 * count});
   const accessor = (bufferView, count, type, min, max) =>
-    ({bufferView, componentType: 5126, count, type, min, max});
+      ({bufferView, componentType: 5126, count, type, min, max});
   const json = {
     asset: {version: '2.0'},
     scene: 0,
@@ -19,7 +19,8 @@ export function triangleGlb() {
     buffers: [{byteLength: binary.length}],
     bufferViews: [view(0, 9), view(36, 2), view(44, 6)],
     accessors: [
-      accessor(0, 3, 'VEC3', [0, 0, 0], [1, 1, 0]), accessor(1, 2, 'SCALAR', [0], [2]),
+      accessor(0, 3, 'VEC3', [0, 0, 0], [1, 1, 0]),
+      accessor(1, 2, 'SCALAR', [0], [2]),
       accessor(2, 2, 'VEC3'),
     ],
   };
@@ -28,6 +29,9 @@ export function triangleGlb() {
   const words = (...values) => Buffer.from(Uint32Array.from(values).buffer);
   return Buffer.concat([
     words(0x46546c67, 2, 12 + 8 + text.length + 8 + binary.length),
-    words(text.length, 0x4e4f534a), Buffer.from(text), words(binary.length, 0x004e4942), binary,
+    words(text.length, 0x4e4f534a),
+    Buffer.from(text),
+    words(binary.length, 0x004e4942),
+    binary,
   ]);
 }
