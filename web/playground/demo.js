@@ -17,7 +17,7 @@ const kPairs = [
     a: 'bolt',
     b: 'nut',
     pose: {rotation: [1, 0, 0, 0], translation: [0, 0, 8.5]},
-    friction: 0.03,  // or the thread would hold it
+    friction: 0.01,  // or the thread would hold it
   },
   {
     id: 'gears',

@@ -13,8 +13,8 @@ const kFastest = 14;    // [B's radii/s] keeps B from jumping through A in a ste
 const kDepth = 0.01;    // [B's radii] how deep B rests on kArea of its squared radius
 const kArea = 0.2;
 const kFriction = 0.35;  // unless told otherwise
-const kDrag = 0.35;      // [1/s] of air
-const kRollingDrag = 2;  // [1/s] of turns, while B touches
+const kDrag = 0.15;      // [1/s] of air
+const kRollingDrag = 6;  // [1/s] of turns, times friction, while B touches
 const kCalmFor = 0.75;   // [s] B rests once it moved less than kCalm for so long
 const kCalm = 2e-2;      // [B's radii/s]
 const kPatches = 12;
@@ -92,7 +92,7 @@ export class LetGo {
     this.velocity.addScaledVector(force, kStep / this.mass).multiplyScalar(1 - kDrag * kStep);
     const touching = this.contacts.some(({memory}) => memory.size > 0);
     this.spin.addScaledVector(torque, kStep)
-        .multiplyScalar(1 - (touching ? kRollingDrag : kDrag) * kStep);
+        .multiplyScalar(1 - (kDrag + (touching ? kRollingDrag * this.friction : 0)) * kStep);
     this.velocity.clampLength(0, kFastest * this.radius);
     angular.copy(this.spin).applyMatrix3(world);
     const turning = angular.length();
