@@ -38,7 +38,7 @@ const kPairs = [
     name: 'Probe on a knot',
     a: 'torus_knot',
     b: {name: 'capsule', scale: 0.4},
-    pose: {rotation: [1, 0, 0, 0], translation: [2.2, 0, 0.62]},
+    pose: {rotation: [1, 0, 0, 0], translation: [2.6, 0, 0.7]},
   },
   {
     id: 'ball-shell',

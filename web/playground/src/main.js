@@ -57,7 +57,6 @@ async function start() {
   theme($('theme'), () => world.recolour());
 
   // --- Solids
-  // ------------------------------------------------------------------------------------------
 
   await init();
   const {sphereCounts, pairs} = await fetched('demo/pairs.json', (answer) => answer.json());
@@ -109,7 +108,6 @@ async function start() {
   };
 
   // --- Files
-  // -------------------------------------------------------------------------------------------
 
   async function take(files) {
     untell();
@@ -121,12 +119,16 @@ async function start() {
       throw error;
     }
     const solids = read.filter(({kind}) => kind === 'solid');
+    if (!world.a && solids.length !== 2) {
+      throw new Error('There are no solids on the page yet: drop two .ist files at once.');
+    }
     if (solids.length > 2) {
       for (const {asset} of solids) asset.free();
       throw new Error(`Two solids at a time: these are ${solids.length}.`);
     }
     if (solids.length > 0) {
-      latest = {};
+      latest = {};  // what is on its way is not wanted any more
+      $('loading').hidden = true;
       leavePlayer();
       const stem = (name) => name.replace(/\.[^.]+$/, '');
       // One alone is the new B.
@@ -160,7 +162,6 @@ async function start() {
   $('alert-close').onclick = untell;
 
   // --- Playback
-  // ----------------------------------------------------------------------------------------
 
   function enterPlayer(scene) {
     world.letGo(false);
@@ -181,7 +182,6 @@ async function start() {
   }
 
   // --- Settings
-  // ----------------------------------------------------------------------------------------
 
   const chosen = (name) => document.querySelector(`input[name=${name}]:checked`).value;
   function setMode(mode) {
@@ -255,7 +255,6 @@ async function start() {
       });
 
   // --- Frames
-  // ------------------------------------------------------------------------------------------
 
   let before = performance.now();
   function frame(now) {
@@ -290,8 +289,8 @@ async function start() {
 
   // For the console, tests and pictures.
   window.playground = {world, view, player, readouts, setMode, choose};
-  await choose();
   requestAnimationFrame(frame);
+  await attempt(choose);
 }
 
 async function fetched(path, read) {

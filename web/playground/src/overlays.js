@@ -73,7 +73,6 @@ export class Overlays {
   }
 
   // --- Below: one thing each
-  // --------------------------------------------------------------------------
 
   drawForce(visible, {force, centroid}, size) {
     const strength = Math.hypot(...force);

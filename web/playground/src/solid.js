@@ -113,7 +113,6 @@ export class Solid {
   }
 
   // --- Below: what lies in the group
-  // ----------------------------------------------------------------
 
   surface() {
     if (this.looks) return this.looks;

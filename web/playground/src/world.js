@@ -82,7 +82,6 @@ export class World {
   }
 
   // --- Where B stands
-  // -----------------------------------------------------------------------------
 
   setPose({rotation: [w, x, y, z], translation}) {
     this.b.group.quaternion.set(x, y, z, w).normalize();
@@ -129,7 +128,6 @@ export class World {
   }
 
   // --- What is drawn
-  // --------------------------------------------------------------------------------
 
   /** Takes changed settings; how many levels the solids have is then in `levels()`. */
   show(changed = {}) {
@@ -171,7 +169,6 @@ export class World {
   }
 
   // --- A frame
-  // ----------------------------------------------------------------------------------------
 
   /** Moves what is free, asks where anything moved, and brings the scene up to date. */
   update(seconds) {
