@@ -99,7 +99,7 @@ test(
         assert.ok(triangles > 1000, `${mode} ${triangles}`);
       }
       assert.equal(await page.title(), 'ist playground');
-    }));
+    }, {viewport: {width: 620, height: 240}}));
 
 test(
     'a dragged nut reads what `ist query` answers',
