@@ -8,12 +8,14 @@ import {fileURLToPath} from 'node:url';
 export const root = fileURLToPath(new URL('../../..', import.meta.url));
 export const buildFolder = join(root, 'build-web');
 export const packageFolder = join(root, 'web/package');
-const program = join(root, 'build/bin/ist');
+export const program = join(root, 'build/bin/ist');
 const nativeRows = join(root, 'build/bin/native_rows');
 const shared = resolve(process.env.IST_SHARED ?? join(root, '../shared'));
 
-function baked(name, spheres, mesh) {
-  const folder = join(buildFolder, 'assets'), path = join(folder, `${name}_${spheres}.ist`);
+/** A sample, or a mesh, as an asset, larger by a factor: its path. Baked once. */
+export function baked(name, spheres, {mesh, scale = 1} = {}) {
+  const folder = join(buildFolder, 'assets');
+  const path = join(folder, `${name}${scale === 1 ? '' : `_x${scale}`}_${spheres}.ist`);
   if (existsSync(path)) return path;
   mkdirSync(folder, {recursive: true});
   if (mesh === undefined) {
@@ -21,7 +23,8 @@ function baked(name, spheres, mesh) {
     execFileSync(program, ['sample', name, '-o', mesh], {stdio: 'ignore'});
   }
   execFileSync(
-      program, ['bake', mesh, '-o', path, '--spheres', spheres, '--device', 'cpu'],
+      program,
+      ['bake', mesh, '-o', path, '--spheres', spheres, '--scale', scale, '--device', 'cpu'],
       {stdio: 'ignore'});
   return path;
 }
@@ -49,6 +52,7 @@ function nutPoses() {
 
 /** Whether the oracle's tables are here. */
 export const hasOracle = existsSync(join(shared, 'oracle'));
+export const oracleMesh = (name) => join(shared, `oracle/meshes/${name}.off`);
 
 /** Pairs of assets and their tables; those of the shared data where there are any. */
 export function pairs(spheres = 4000) {
@@ -56,7 +60,7 @@ export function pairs(spheres = 4000) {
     {name: 'bolt and nut', a: baked('bolt', spheres), b: baked('nut', spheres), csv: nutPoses()}
   ];
   if (hasOracle) {
-    const oracle = (name) => baked(name, spheres, join(shared, `oracle/meshes/${name}.off`));
+    const oracle = (name) => baked(name, spheres, {mesh: oracleMesh(name)});
     made.push({
       name: 'elephant and dino',
       a: oracle('elephant'),

@@ -1,0 +1,81 @@
+// Bakes the pairs of solids that the page offers, into a folder that its build copies: node demo.js
+
+import {copyFileSync, mkdirSync, writeFileSync} from 'node:fs';
+import {join} from 'node:path';
+
+import {baked, buildFolder, hasOracle, oracleMesh} from '../package/test/data.js';
+
+/** Beside assets: what the page fetches. */
+export const demoFolder = join(buildFolder, 'playground/public');
+export const sphereCounts = [4000, 10000];
+
+/** Poses: quaternion w, x, y, z and translation [u]. `up`: against gravity, an axis of A's. */
+const kPairs = [
+  {
+    id: 'bolt-nut',
+    name: 'Bolt and nut',
+    a: 'bolt',
+    b: 'nut',
+    pose: {rotation: [1, 0, 0, 0], translation: [0, 0, 8.5]},
+    friction: 0.01,  // or the thread would hold it
+  },
+  {
+    id: 'gears',
+    name: 'Two gears',
+    a: 'gear',
+    b: 'gear',
+    pose: {rotation: [0.99518, 0, 0, 0.09802], translation: [9.05, 0, 0]},
+  },
+  {
+    id: 'bolt-table',
+    name: 'Bolt on a table',
+    a: {name: 'slab', scale: 10},
+    b: 'bolt',
+    pose: {rotation: [0.70711, 0, 0.70711, 0], translation: [-10, 0, 8.6]},
+  },
+  {
+    id: 'probe-knot',
+    name: 'Probe on a knot',
+    a: 'torus_knot',
+    b: {name: 'capsule', scale: 0.4},
+    pose: {rotation: [1, 0, 0, 0], translation: [2.6, 0, 0.7]},
+  },
+  {
+    id: 'ball-shell',
+    name: 'Ball in a shell',
+    a: 'hollow_sphere',
+    b: {name: 'sphere', scale: 0.3},
+    pose: {rotation: [1, 0, 0, 0], translation: [0.3, 0, -0.54]},
+    cut: 0.5,
+  },
+];
+if (hasOracle) {
+  kPairs.splice(1, 0, {
+    id: 'elephant-dino',
+    name: 'Elephant and dino',
+    a: {name: 'elephant', mesh: oracleMesh('elephant')},
+    b: {name: 'dino', mesh: oracleMesh('dino')},
+    pose: {rotation: [0.5, -0.5, -0.5, -0.5], translation: [0.4, 0.03, 0.05]},
+    up: 'y',
+  });
+}
+
+/** Every asset at every count: paths by name and count. */
+export function bakeDemo() {
+  mkdirSync(join(demoFolder, 'demo'), {recursive: true});
+  const file = (solid, spheres) => {
+    const {name, ...options} = typeof solid === 'string' ? {name: solid} : solid;
+    const path = baked(name, spheres, options);
+    copyFileSync(path, join(demoFolder, 'demo', `${name}_${spheres}.ist`));
+    return name;
+  };
+  const pairs = kPairs.map((pair) => {
+    let names;
+    for (const spheres of sphereCounts) names = [pair.a, pair.b].map((s) => file(s, spheres));
+    return {...pair, a: names[0], b: names[1]};
+  });
+  writeFileSync(
+      join(demoFolder, 'demo/pairs.json'), JSON.stringify({sphereCounts, pairs}, null, 2) + '\n');
+}
+
+if (process.argv[1] === import.meta.filename) bakeDemo();

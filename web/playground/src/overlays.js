@@ -1,0 +1,131 @@
+// What is known of a contact, drawn over the solids: force and torque, patches, lenses, the gap.
+
+import * as THREE from 'three';
+
+import {kMostLenses, kMostPatches} from './contact.js';
+
+const kUp = new THREE.Vector3(0, 1, 0), kForward = new THREE.Vector3(0, 0, 1);
+const kTurn = 1.6 * Math.PI;  // [rad] of the arc that shows a torque
+
+export class Overlays {
+  /** They lie in a scene of their own, which is drawn last, over everything. */
+  constructor() {
+    this.scene = new THREE.Scene();
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xa0a8b0, 1.8));
+    const light = new THREE.DirectionalLight(0xffffff, 1.3);
+    this.light = light;
+    this.scene.add(light, light.target);
+    const material = () => new THREE.MeshStandardMaterial({roughness: 0.6});
+    this.materials = {
+      force: material(),
+      torque: material(),
+      patch: material(),
+      lens: material(),
+      gap: material(),
+    };
+    this.materials.patch.side = THREE.DoubleSide;
+    this.shown = {arrows: true, patches: false, lenses: true, gap: true};
+
+    const {force, torque, patch, lens, gap} = this.materials;
+    this.shaft =
+        new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 20).translate(0, 0.5, 0), force);
+    this.head = new THREE.Mesh(new THREE.ConeGeometry(1, 1, 28).translate(0, 0.5, 0), force);
+    this.arc = new THREE.Mesh(new THREE.TorusGeometry(1, 0.05, 12, 64, kTurn), torque);
+    this.arcHead = new THREE.Mesh(new THREE.ConeGeometry(0.13, 0.36, 24), torque);
+    this.arcHead.position.set(Math.cos(kTurn), Math.sin(kTurn), 0);
+    this.arcHead.rotation.z = kTurn;
+    this.turn = new THREE.Group().add(this.arc, this.arcHead);
+    this.discs =
+        new THREE.InstancedMesh(new THREE.CylinderGeometry(1, 1, 0.12, 40), patch, kMostPatches);
+    this.lenses = new THREE.InstancedMesh(new THREE.SphereGeometry(1, 12, 8), lens, kMostLenses);
+    this.bridge = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 12).translate(0, 0.5, 0), gap);
+    this.ends = [0, 1].map(() => new THREE.Mesh(new THREE.SphereGeometry(1, 20, 14), gap));
+    for (const mesh of [this.discs, this.lenses]) mesh.frustumCulled = false;
+    this.scene.add(
+        this.shaft, this.head, this.turn, this.discs, this.lenses, this.bridge, ...this.ends);
+  }
+
+  setColours(colours) {
+    for (const [name, material] of Object.entries(this.materials)) {
+      material.color.set(colours[name]);
+      material.emissive.set(colours[name]).multiplyScalar(0.3);
+    }
+  }
+
+  /** Of a contact that was asked; `size` [u] is that of the smaller solid, `origin` B's. */
+  update({penetration, separation, patches, lenses}, size, origin) {
+    const touching = penetration.volume > 0;
+    this.drawForce(touching && this.shown.arrows, penetration, size);
+    this.drawTorque(touching && this.shown.arrows, penetration, size, origin);
+    this.discs.count = touching && this.shown.patches ? patches.count : 0;
+    for (let i = 0; i < this.discs.count; ++i) {
+      const {centroid, normal, area} = patches.patches[i];
+      const r = Math.sqrt(area / Math.PI);
+      turn.setFromUnitVectors(kUp, at.fromArray(normal).lengthSq() > 0 ? at : kUp);
+      this.discs.setMatrixAt(
+          i,
+          matrix.compose(
+              at.fromArray(centroid), turn, scale.set(r, Math.max(r, 0.02 * size) * 0.4, r)));
+    }
+    this.discs.instanceMatrix.needsUpdate = true;
+    this.drawLenses(touching && this.shown.lenses, lenses);
+    this.drawGap(!touching && this.shown.gap, separation, size);
+  }
+
+  // --- Below: one thing each
+
+  drawForce(visible, {force, centroid}, size) {
+    const strength = Math.hypot(...force);
+    this.shaft.visible = this.head.visible = visible && strength > 0;
+    if (!this.shaft.visible) return;
+    const length = size * grown(strength / size ** 2), head = Math.min(0.16 * size, 0.45 * length);
+    const direction = at.fromArray(force).divideScalar(strength);
+    this.shaft.quaternion.setFromUnitVectors(kUp, direction);
+    this.head.quaternion.copy(this.shaft.quaternion);
+    this.shaft.position.fromArray(centroid);
+    this.head.position.fromArray(centroid).addScaledVector(direction, length - head);
+    this.shaft.scale.set(0.022 * size, length - head, 0.022 * size);
+    this.head.scale.set(0.06 * size, head, 0.06 * size);
+  }
+
+  drawTorque(visible, {torque}, size, origin) {
+    const strength = Math.hypot(...torque);
+    this.turn.visible = visible && strength > 1e-9 * size ** 3;
+    if (!this.turn.visible) return;
+    this.turn.position.copy(origin);
+    this.turn.quaternion.setFromUnitVectors(kForward, at.fromArray(torque).divideScalar(strength));
+    this.turn.scale.setScalar(0.15 * size + 0.45 * size * grown(strength / size ** 3));
+  }
+
+  drawLenses(visible, lenses) {
+    const count = this.lenses.count = visible ? lenses.count : 0;
+    for (let i = 0; i < count; ++i) {
+      const [x, y, z, ax, ay, az, radius, thickness] = lenses.data.subarray(10 * i, 10 * i + 8);
+      turn.setFromUnitVectors(kForward, at.set(ax, ay, az));
+      this.lenses.setMatrixAt(
+          i, matrix.compose(at.set(x, y, z), turn, scale.set(radius, radius, thickness / 2)));
+    }
+    this.lenses.instanceMatrix.needsUpdate = true;
+  }
+
+  drawGap(visible, {distance, pointA, pointB}, size) {
+    const shown = visible && distance > 0;
+    for (const mesh of [this.bridge, ...this.ends]) mesh.visible = shown;
+    if (!shown) return;
+    at.fromArray(pointB).sub(scale.fromArray(pointA));
+    const length = at.length();
+    this.bridge.position.fromArray(pointA);
+    this.bridge.quaternion.setFromUnitVectors(kUp, at.divideScalar(length));
+    this.bridge.scale.set(0.008 * size, length, 0.008 * size);
+    this.ends.forEach((end, k) => {
+      end.position.fromArray(k ? pointB : pointA);
+      end.scale.setScalar(0.022 * size);
+    });
+  }
+}
+
+/** A length from a strength: seen while it is weak, and never off the screen. */
+const grown = (x) => 0.9 * (1 - Math.exp(-2 * Math.sqrt(x)));
+
+const matrix = new THREE.Matrix4(), turn = new THREE.Quaternion();
+const at = new THREE.Vector3(), scale = new THREE.Vector3();

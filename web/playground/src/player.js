@@ -1,0 +1,80 @@
+// Plays an animated scene, as the examples for engines write them.
+
+import * as THREE from 'three';
+
+export class Player {
+  /** `parts`: the form with its button, slider and output. */
+  constructor({form, play, moment, told, leave}, onLeave) {
+    Object.assign(this, {form, play, moment, told});
+    play.onclick = () => this.setPlaying(!this.playing);
+    moment.oninput = () => {
+      this.setPlaying(false);
+      this.seek(Number(moment.value) * this.duration);
+    };
+    leave.onclick = onLeave;
+    form.onsubmit = () => false;
+  }
+
+  /** Whether a scene is open. */
+  get open() {
+    return this.mixer !== undefined;
+  }
+
+  /** Takes a scene into `into`; says its ball and its axis up, which glTF lays down. */
+  start({scene, animations}, into) {
+    this.stop();
+    this.scene = scene;
+    scene.traverse((part) => {
+      if (!part.isMesh) return;
+      part.frustumCulled = false;
+      // Plain default materials get a colour each, so that bodies are told apart.
+      if (!part.material.map && part.material.color?.getHex() === 0xffffff) {
+        part.material = new THREE.MeshStandardMaterial(
+            {color: bodyColour(this.count++), roughness: 0.55, metalness: 0.05});
+      }
+    });
+    into.add(scene);
+    this.mixer = new THREE.AnimationMixer(scene);
+    for (const clip of animations) this.mixer.clipAction(clip).play();
+    this.duration = Math.max(...animations.map((clip) => clip.duration), 1e-3);
+    this.form.hidden = false;
+    this.setPlaying(!matchMedia('(prefers-reduced-motion: reduce)').matches);
+    this.seek(0);
+    const ball = new THREE.Box3().setFromObject(scene).getBoundingSphere(new THREE.Sphere());
+    return {centre: ball.center, radius: ball.radius};
+  }
+
+  stop() {
+    this.scene?.removeFromParent();
+    this.scene = this.mixer = undefined;
+    this.count = 0;
+    this.form.hidden = true;
+  }
+
+  setPlaying(playing) {
+    this.playing = playing;
+    this.play.textContent = playing ? 'Pause' : 'Play';
+    this.play.setAttribute('aria-pressed', playing);
+    this.moved = true;
+  }
+
+  seek(time) {
+    this.time = time;
+    this.mixer.setTime(time);
+    this.moment.value = time / this.duration;
+    this.told.textContent = `${time.toFixed(2)} s`;
+    this.moment.setAttribute('aria-valuetext', this.told.textContent);
+    this.moved = true;
+  }
+
+  /** On by a frame's time [s]; whether the scene changed. */
+  advance(seconds) {
+    if (this.playing) this.seek((this.time + seconds) % this.duration);
+    const {moved} = this;
+    this.moved = false;
+    return moved;
+  }
+}
+
+/** Colours far from each other, one after the other. */
+const bodyColour = (i) => new THREE.Color().setHSL((0.58 + 0.381966 * i) % 1, 0.45, 0.5);

@@ -1,0 +1,193 @@
+// The two solids, where B stands, and what is known of that: everything but the page around it.
+
+import * as THREE from 'three';
+
+import {Contact} from './contact.js';
+import {LetGo} from './letgo.js';
+import {Overlays} from './overlays.js';
+import {Solid} from './solid.js';
+import {colour} from './theme.js';
+
+export class World {
+  /**
+   * `on`: what to call when a contact was asked (`asked`) and when B was let go or held (`held`).
+   */
+  constructor(view, on) {
+    this.view = view;
+    this.on = on;
+    this.overlays = new Overlays();
+    this.pose = {rotation: [1, 0, 0, 0], translation: [0, 0, 0]};
+    this.home = {rotation: [1, 0, 0, 0], translation: [0, 0, 0]};
+    this.settings = {mode: 'surface', level: 0, opacityA: 1, opacityB: 0.45, cut: 0};
+    view.handles.addEventListener('objectChange', () => this.touched());
+    view.handles.addEventListener('dragging-changed', () => this.free?.still());
+  }
+
+  /**
+   * Takes two assets, which it frees when others come. `up`: 'y' or 'z'; `friction` once let go.
+   */
+  hold(assetA, assetB, {pose, up = 'z', friction}) {
+    const own = new Set([assetA, assetB]);
+    this.letGo(false);
+    for (const solid of [this.a, this.b]) {
+      solid?.dispose();
+      if (solid && !own.has(solid.asset)) solid.asset.free();
+    }
+    this.a = new Solid(assetA, colour('a'), 0);
+    this.b = new Solid(assetB, colour('b'), 1);
+    this.contact = new Contact(assetA, assetB);
+    this.view.scene.add(this.a.group, this.b.group);
+    this.view.handles.attach(this.b.group);
+    this.home = pose;
+    this.up = up;
+    this.friction = friction;
+    this.size = Math.min(this.a.bounds.radius, this.b.bounds.radius);
+    this.show();
+    this.contact.warm(pose);
+    this.reset();
+    this.frame();
+  }
+
+  /** Sees both solids whole, on a floor below. */
+  frame() {
+    const box = new THREE.Box3();
+    const ball = (solid) => new THREE.Sphere(
+        new THREE.Vector3().fromArray(solid.bounds.centre).applyMatrix4(solid.group.matrixWorld),
+        solid.bounds.radius);
+    for (const solid of [this.a, this.b]) {
+      solid.group.updateMatrixWorld(true);
+      box.union(ofBounds(solid.bounds).applyMatrix4(solid.group.matrixWorld));
+    }
+    const whole = box.getBoundingSphere(new THREE.Sphere());
+    this.view.frame(whole.center, Math.max(0.86 * whole.radius, ball(this.b).radius), this.up);
+    const axis = this.up === 'y' ? 1 : 2;
+    this.floor =
+        Math.min(box.min.getComponent(axis), this.a.bounds.lower[axis]) - 0.02 * whole.radius;
+    this.view.setFloor(this.floor);
+    this.recolour();
+    this.show();
+  }
+
+  swap() {
+    const at = this.b.group.matrixWorld.clone().invert();
+    const translation = new THREE.Vector3(), turned = new THREE.Quaternion();
+    at.decompose(translation, turned, new THREE.Vector3());
+    const {x, y, z, w} = turned, looks = [this.b.looks, this.a.looks];
+    this.hold(this.b.asset, this.a.asset, {
+      pose: {rotation: [w, x, y, z], translation: translation.toArray()},
+      up: this.up,
+      friction: this.friction,
+    });
+    [this.a, this.b].forEach((solid, k) => looks[k] && solid.wear(looks[k]));
+  }
+
+  // --- Where B stands
+
+  setPose({rotation: [w, x, y, z], translation}) {
+    this.b.group.quaternion.set(x, y, z, w).normalize();
+    this.b.group.position.fromArray(translation);
+    this.touched();
+  }
+
+  reset() {
+    this.free?.still();
+    this.setPose(this.home);
+  }
+
+  move(by) {
+    this.b.group.position.add(by);
+    this.free?.still();
+    this.touched();
+  }
+
+  /** About the middle of B. */
+  turn(by) {
+    const middle = new THREE.Vector3().fromArray(this.b.bounds.centre);
+    const {position, quaternion} = this.b.group;
+    position.add(middle.clone().applyQuaternion(quaternion));
+    quaternion.premultiply(by).normalize();
+    position.sub(middle.applyQuaternion(quaternion));
+    this.free?.still();
+    this.touched();
+  }
+
+  touched() {
+    this.stale = true;
+    this.view.dirty = true;
+  }
+
+  /** Lets B fall, or takes it in hand again. */
+  letGo(free) {
+    if (free === (this.free !== undefined)) return;
+    this.free?.free();
+    this.free = free ? new LetGo(
+                           this.a.asset, this.b.asset,
+                           {up: this.view.up, floor: this.floor, friction: this.friction}) :
+                       undefined;
+    this.on.held(free);
+  }
+
+  // --- What is drawn
+
+  /** Takes changed settings; how many levels the solids have is then in `levels()`. */
+  show(changed = {}) {
+    Object.assign(this.settings, changed);
+    if (!this.a) return;
+    const {mode, level, opacityA, opacityB, cut} = this.settings;
+    for (const [solid, opacity] of [[this.a, opacityA], [this.b, opacityB]]) {
+      if (solid.asked.mode !== mode || solid.asked.level !== level) solid.show(mode, level);
+      if (solid.opacity !== opacity) solid.setOpacity(opacity);
+      if (this.view.near) {
+        const centre = new THREE.Vector3().fromArray(this.a.bounds.centre);
+        solid.setCut(this.view.setCut(cut, centre, this.a.bounds.radius));
+      }
+    }
+    this.touched();
+  }
+
+  levels() {
+    const {mode} = this.settings;
+    const [a, b] = [this.a, this.b].map((solid) => solid.levels(mode));
+    return Array.from(
+        {length: Math.max(a.length, b.length)},
+        (_, k) =>
+            [a[Math.min(k, a.length - 1)],
+             b[Math.min(k, b.length - 1)],
+    ]);
+  }
+
+  recolour() {
+    for (const name of ['a', 'b']) this[name]?.material.color.set(colour(name));
+    this.overlays.setColours({
+      force: colour('force'),
+      torque: colour('torque'),
+      patch: colour('patch'),
+      lens: colour('lens'),
+      gap: colour('soft'),
+    });
+    this.view.setColours({ground: colour('ground'), line: colour('line')});
+  }
+
+  // --- A frame
+
+  /** Moves what is free, asks where anything moved, and brings the scene up to date. */
+  update(seconds) {
+    if (!this.a) return;
+    const {group} = this.b;
+    if (this.free && !this.view.handles.dragging && this.free.advance(group, seconds)) {
+      this.stale = this.view.dirty = true;
+    }
+    if (!this.stale) return;
+    this.stale = false;
+    const {x, y, z, w} = group.quaternion, {pose} = this;
+    Object.assign(pose.rotation, [w, x, y, z]);
+    group.position.toArray(pose.translation);
+    const {shown} = this.overlays;
+    this.contact.ask(pose, {patches: shown.patches, lens: shown.lenses});
+    this.overlays.update(this.contact, this.size, group.position);
+    this.on.asked(this.contact);
+  }
+}
+
+const ofBounds = ({lower, upper}) =>
+    new THREE.Box3(new THREE.Vector3().fromArray(lower), new THREE.Vector3().fromArray(upper));

@@ -1,0 +1,367 @@
+// The page in a real browser, as a visitor meets it.
+import assert from 'node:assert/strict';
+import {execFileSync} from 'node:child_process';
+import {readFileSync} from 'node:fs';
+import {join} from 'node:path';
+import {after, before, test} from 'node:test';
+
+import {browser, serve} from '../../package/test/browser.js';
+import {program} from '../../package/test/data.js';
+import {buildSite, siteFolder} from '../build.js';
+
+import {triangleGlb} from './glb.js';
+
+// Small: a rasteriser in software draws it.
+const kDesk = {
+  viewport: {width: 900, height: 480}
+};
+const kPhone = {
+  viewport: {width: 390, height: 844},
+  hasTouch: true,
+  isMobile: true
+};
+
+let server, chrome;
+before(async () => {
+  await buildSite();
+  server = await serve({'/': siteFolder});
+  chrome = await browser();
+});
+after(async () => {
+  await chrome?.close();
+  server?.close();
+});
+
+const asset = (name, spheres = 4000) => join(siteFolder, `demo/${name}_${spheres}.ist`);
+
+/** Runs `act` on a fresh page that has asked its first pair; it must not have complained. */
+async function visit(act, options = kDesk) {
+  const context = await chrome.newContext(options), page = await context.newPage();
+  const complaints = [];
+  page.on('console', (message) => {
+    if (message.type() === 'error') complaints.push(message.text());
+  });
+  page.on('pageerror', (error) => complaints.push(String(error)));
+  await page.goto(`${server.url}/`);
+  await page.waitForFunction('window.playground?.world.contact?.penetration');
+  await act(page);
+  await context.close();
+  assert.deepEqual(complaints, []);
+}
+
+async function choose(page, pair, spheres = 4000) {
+  await page.evaluate(async ([pair, spheres]) => {
+    document.getElementById('pair').value = pair;
+    document.getElementById('spheres').value = spheres;
+    await playground.choose();
+  }, [pair, spheres]);
+}
+
+/** Drops files {name, bytes} on the page. */
+async function drop(page, files) {
+  const data = files.map(({name, bytes}) => ({name, text: Buffer.from(bytes).toString('base64')}));
+  await page.evaluate((data) => {
+    const dataTransfer = new DataTransfer();
+    for (const {name, text} of data) {
+      dataTransfer.items.add(new File([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))], name));
+    }
+    for (const kind of ['dragenter', 'dragover', 'drop']) {
+      document.body.dispatchEvent(
+          new DragEvent(kind, {dataTransfer, bubbles: true, cancelable: true}));
+    }
+  }, data);
+}
+
+const number = (text) => Number(text.replaceAll('−', '-'));
+const pose = (page) => page.evaluate(() => structuredClone(playground.world.pose));
+
+test(
+    'every pair; surface, spheres and tree',
+    () => visit(async (page) => {
+      const pairs =
+          await page.locator('#pair option').evaluateAll((all) => all.map((o) => o.value));
+      pairs.reverse();  // the first is there already
+      assert.ok(pairs.length >= 5, pairs.join());
+      for (const pair of pairs) {
+        await choose(page, pair);
+        assert.ok(await page.locator('#alert').isHidden());
+        assert.ok(await page.locator('#loading').isHidden());
+      }
+      for (const mode of ['spheres', 'tree', 'surface']) {
+        const triangles = await page.evaluate(async (mode) => {
+          const {renderer} = playground.view;
+          playground.setMode(mode);
+          renderer.info.autoReset = false;
+          renderer.info.reset();
+          await new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)));
+          return renderer.info.render.triangles;
+        }, mode);
+        assert.ok(triangles > 1000, `${mode} ${triangles}`);
+      }
+      assert.equal(await page.title(), 'ist playground');
+    }, {viewport: {width: 620, height: 240}}));
+
+test(
+    'a dragged nut reads what `ist query` answers',
+    () => visit(async (page) => {
+      // A point on the handle that moves B along z.
+      const [x, y] = await page.evaluate(() => {
+        const {view, world} = playground, {camera} = view;
+        const at = world.b.group.position.clone();
+        const reach =
+            at.distanceTo(camera.position) * 1.9 * Math.tan(camera.fov * Math.PI / 360) / 4;
+        at.z += 0.45 * reach;
+        at.project(camera);
+        const {left, top, width, height} = view.canvas.getBoundingClientRect();
+        return [left + (at.x + 1) / 2 * width, top + (1 - at.y) / 2 * height];
+      });
+      await page.mouse.move(x, y);
+      await page.mouse.down();
+      const seen = [];
+      for (let i = 1; i <= 12; ++i) {
+        await page.mouse.move(x + i, y - 7 * i);
+        await page.waitForTimeout(200);
+        seen.push(await page.evaluate(() => ({
+                                        ...structuredClone(playground.world.pose),
+                                        volume: playground.world.contact.penetration.volume,
+                                        told: document.getElementById('read-volume').textContent,
+                                      })));
+      }
+      await page.mouse.up();
+      assert.ok(
+          new Set(seen.map(({translation}) => translation[2])).size > 8, 'the nut was dragged');
+
+      const rows =
+          seen.map(({rotation, translation}, i) => [i, ...rotation, ...translation].join());
+      const answers =
+          execFileSync(
+              program, ['query', asset('bolt'), asset('nut'), '--poses', '-'],
+              {input: ['id,qw,qx,qy,qz,tx,ty,tz', ...rows, ''].join('\n'), encoding: 'utf8'})
+              .trim()
+              .split('\n')
+              .map((line) => line.split(','));
+      const column = answers[0].indexOf('volume');
+      seen.forEach(({volume, told}, i) => {
+        const wanted = Number(answers[i + 1][column]);
+        assert.equal(volume, wanted);
+        assert.equal(number(told), Number(wanted.toPrecision(6)));
+      });
+    }));
+
+test(
+    '10,000 spheres each at 50 frames a second and more',
+    () => visit(async (page) => {
+      await choose(page, 'bolt-nut', 10000);
+      // The query and the scene's update, everything shown; not the rasteriser, which is software
+      // here.
+      const times = await page.evaluate(() => {
+        const {world, view} = playground, times = [];
+        document.querySelector('#overlays input[value=patches]').click();
+        for (let i = 0; i < 300; ++i) {
+          const turn = 0.01 * i;
+          const start = performance.now();
+          world.setPose({
+            rotation: [Math.cos(turn / 2), 0, 0, Math.sin(turn / 2)],
+            translation: [0, 0, 8.2 + 0.002 * i],
+          });
+          world.update(1 / 60);
+          view.scene.updateMatrixWorld();
+          world.overlays.scene.updateMatrixWorld();
+          times.push(performance.now() - start);
+        }
+        return times;
+      });
+      const mean = times.reduce((a, b) => a + b) / times.length;
+      console.log(`    ${mean.toFixed(2)} ms a frame, ${(1000 / mean).toFixed(0)} frames a second`);
+      assert.ok(mean < 20, `${mean} ms`);
+    }));
+
+test(
+    'files that are broken get a sentence, and the page goes on',
+    () => visit(async (page) => {
+      const nut = readFileSync(asset('nut'));
+      const spoiled = Buffer.from(nut);
+      spoiled[spoiled.length >> 1] ^= 1;
+      const told = new Set();
+      for (const file of
+               [{name: 'cut.ist', bytes: nut.subarray(0, 5000)},
+                {name: 'spoiled.ist', bytes: spoiled},
+                {name: 'text.ist', bytes: Buffer.from('no asset')},
+                {name: 'empty.ist', bytes: Buffer.alloc(0)},
+                {name: 'text.obj', bytes: Buffer.from('v 0 0 0\n')},
+                {name: 'nan.obj', bytes: Buffer.from('v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n')},
+                {
+                  name: 'text.stl',
+                  bytes: Buffer.from(
+                      'no mesh, but some words that go on for a little while and then longer still')
+                },
+                {name: 'text.ply', bytes: Buffer.from('no mesh')},
+                {name: 'cut.glb', bytes: triangleGlb().subarray(0, 100)},
+                {name: 'what.zip', bytes: Buffer.from('PK')},
+      ]) {
+        await drop(page, [file]);
+        await page.locator('#alert').waitFor();
+        await page.waitForFunction(
+            (name) => document.getElementById('alert-told').textContent.includes(name), file.name);
+        const message = await page.locator('#alert-told').textContent();
+        assert.match(message, /^\S.{10,300}\.$/);
+        told.add(message);
+        await page.locator('#alert-close').click();
+        assert.ok(await page.locator('#alert').isHidden());
+      }
+      assert.equal(told.size, 10);
+      const before = (await pose(page)).translation[0];
+      await page.locator('#view').press('ArrowRight');
+      await page.waitForFunction((x) => playground.world.pose.translation[0] > x, before);
+    }));
+
+test(
+    'a visitor\'s solids, a mesh over one, and an animated scene',
+    () => visit(async (page) => {
+      const solid = (name) => ({name: `${name}.ist`, bytes: readFileSync(asset(name))});
+      await drop(page, [solid('gear'), solid('torus_knot')]);
+      await page.waitForFunction(() => playground.world.names?.join() === 'gear,torus_knot');
+      await drop(page, [solid('nut')]);
+      await page.waitForFunction(() => playground.world.names?.join() === 'gear,nut');
+      assert.equal(await page.locator('#pair').inputValue(), 'own');
+      assert.equal(await page.locator('#read-volume').textContent(), '0');
+      await drop(
+          page, [{name: 'gear.obj', bytes: Buffer.from('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n')}]);
+      await page.waitForFunction(
+          () => playground.world.a.looks?.getAttribute('position').count === 3);
+      await page.locator('#swap').click();
+      assert.equal(await page.evaluate(() => playground.world.names.join()), 'nut,gear');
+
+      await drop(page, [{name: 'scene.glb', bytes: triangleGlb()}]);
+      await page.locator('#player').waitFor();
+      await page.locator('#moment').fill('0.5');
+      const height = () => page.evaluate(() => playground.player.scene.children[0].position.y);
+      assert.ok(Math.abs(await height() - 1.5) < 1e-3);
+      await page.locator('#play').click();
+      await page.waitForFunction(() => Math.abs(playground.player.time - 1) > 0.05);
+      await page.locator('#leave').click();
+      assert.ok(await page.locator('#player').isHidden());
+    }));
+
+test(
+    'a phone: everything fits its width',
+    () => visit(async (page) => {
+      assert.equal(await page.evaluate('document.documentElement.scrollWidth'), 390);
+      const outside = await page.evaluate(
+          () => [...document.querySelectorAll('button, select, input, output, dd, figure')]
+                    .filter((part) => part.offsetParent)
+                    .filter((part) => {
+                      const {left, right} = part.getBoundingClientRect();
+                      return left < -0.5 || right > innerWidth + 0.5;
+                    })
+                    .map((part) => part.id || part.outerHTML));
+      assert.deepEqual(outside, []);
+      const small = await page.evaluate(
+          () => [...document.querySelectorAll('button, select')]
+                    .filter((part) => part.offsetParent && part.getBoundingClientRect().height < 32)
+                    .map((part) => part.id));
+      assert.deepEqual(small, []);
+    }, kPhone));
+
+test(
+    'keys move and turn B, and words tell what it meets',
+    () => visit(async (page) => {
+      await page.keyboard.press('Tab');
+      assert.equal(await page.evaluate('document.activeElement.id'), 'view');
+      const start = await pose(page);
+      const after = async (key, moved) => {
+        await page.keyboard.press(key);
+        await page.waitForFunction(moved, start);
+        return pose(page);
+      };
+      let at = await after(
+          'ArrowRight', ({translation: [x]}) => playground.world.pose.translation[0] > x);
+      assert.equal(at.translation[2], start.translation[2]);
+      at = await after(
+          'ArrowUp', ({translation: [, , z]}) => playground.world.pose.translation[2] > z);
+      at =
+          await after('PageUp', ({translation: [, y]}) => playground.world.pose.translation[1] > y);
+      at = await after(
+          'Shift+ArrowRight', ({rotation: [, x]}) => playground.world.pose.rotation[1] > x);
+      assert.ok(Math.abs(Math.hypot(...at.rotation) - 1) < 1e-12);
+      await after(
+          'Home', (start) => playground.world.pose.translation.join() === start.translation.join());
+      await page.keyboard.press('r');
+      assert.match(
+          await page.locator('#live').textContent(), /^Overlap 33\.\d+ cubic units; force/);
+      await page.keyboard.press('t');
+      assert.ok(await page.locator('input[value=rotate]').isChecked());
+      await page.keyboard.press('Space');
+      assert.equal(await page.locator('#letgo').getAttribute('aria-pressed'), 'true');
+
+      // Every control has a name.
+      const nameless = await page.evaluate(
+          () => [...document.querySelectorAll('button, select, input:not([hidden])')]
+                    .filter(
+                        (part) =>
+                            !(part.textContent.trim() || part.labels?.length || part.ariaLabel))
+                    .map((part) => part.outerHTML));
+      assert.deepEqual(nameless, []);
+    }));
+
+test(
+    'let go, B comes to rest or goes on falling',
+    () => visit(async (page) => {
+      for (const [pair, seconds] of [['gears', 4], ['bolt-table', 6]]) {
+        await choose(page, pair);
+        const told = await page.evaluate((seconds) => {
+          const {world} = playground;
+          world.letGo(true);
+          const {free} = world, {position, quaternion} = world.b.group, start = position.z;
+          let steps = 0, finite = true;
+          for (; steps < seconds * 960 && !free.resting; ++steps) {
+            free.step(world.b.group);
+            finite &&= [...position, ...quaternion, ...free.velocity].every(Number.isFinite);
+          }
+          const speed = free.velocity.length() / free.radius;
+          const {resting} = free, fell = (start - position.z) / free.radius;
+          world.letGo(false);
+          return {finite, resting, speed, fell};
+        }, seconds);
+        assert.ok(told.finite, pair);
+        assert.ok(told.fell > 0.01, `${pair} ${told.fell}`);
+        assert.ok(told.resting || told.speed < 0.1, `${pair} ${told.speed}`);
+      }
+      await page.locator('#letgo').click();
+      const start = await pose(page);
+      await page.waitForFunction(
+          ([x]) => playground.world.pose.translation[0] !== x, start.translation);
+      await page.locator('#home').click();
+    }));
+
+test(
+    'let go, the nut goes down its thread: 2 u a turn',
+    () => visit(async (page) => {
+      const [turns, way] = await page.evaluate(() => {
+        const {world} = playground, {group} = world.b;
+        world.letGo(true);
+        const after = (seconds) => {
+          for (let i = 0; i < 960 * seconds; ++i) world.free.step(group);
+          return [Math.atan2(group.quaternion.z, group.quaternion.w) / Math.PI, group.position.z];
+        };
+        const [from, to] = [after(1.5), after(3)];
+        world.letGo(false);
+        return [to[0] - from[0], to[1] - from[1]];
+      });
+      assert.ok(Math.abs(turns) > 0.3 && way < 0, `${turns} turns`);
+      assert.ok(Math.abs(Math.abs(way / turns) - 2) < 0.2, `${way} u by ${turns} turns`);
+    }));
+
+test(
+    'dark or light, and the choice stays',
+    () => visit(async (page) => {
+      const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+      const light = await ground();
+      await page.locator('#theme').click();
+      const dark = await ground();
+      assert.notEqual(light, dark);
+      await page.reload();
+      assert.equal(await ground(), dark);
+      await page.emulateMedia({colorScheme: 'light'});
+      assert.equal(await ground(), dark);
+    }));
