@@ -48,7 +48,7 @@ class PairDescent {
       m_.totals.clear();
       for (int i = 0; i < 9; ++i) m_.turn[i] = static_cast<Real>(m_.place.a_from_b.m[i]);
     }
-    forget();
+    for (Real& s : sum_) s = 0;
     team_.sync();
   }
 
@@ -90,13 +90,6 @@ class PairDescent {
   }
 
   IST_HD int waiting() const { return size_; }
-
-  /// Forgets what has been summed into `totals`, which is taken by then.
-  IST_HD void forget() {
-    for (Real& s : sum_) s = 0;
-    summed_ = 0;
-    spheres_ = visits_ = 0;
-  }
 
  private:
   struct Pair {

@@ -84,24 +84,9 @@ class DeviceBatch {
   }
 
   std::vector<Penetration> get() const {
-    const auto volume = volume_.get(), centroid = centroid_.get(), push = push_.get(),
-               turn = turn_.get();
-    const auto status = status_.get();
-    const auto visits = visits_.get(), spheres = spheres_.get();
-    const auto vector = [](const std::vector<double>& from, std::size_t i) {
-      return Eigen::Vector3d(from[3 * i], from[3 * i + 1], from[3 * i + 2]);
-    };
-    std::vector<Penetration> out(size_);
-    for (std::size_t i = 0; i < size_; ++i) {
-      out[i].volume = volume[i];
-      out[i].centroid = vector(centroid, i);
-      out[i].translation_gradient = vector(push, i);
-      out[i].rotation_gradient = vector(turn, i);
-      out[i].status = status[i];
-      out[i].node_visits = visits[i];
-      out[i].sphere_pairs = spheres[i];
-    }
-    return out;
+    return BatchColumns{volume_.get(), centroid_.get(), push_.get(),   turn_.get(),
+                        status_.get(), visits_.get(),   spheres_.get()}
+        .rows();
   }
 
  private:

@@ -38,10 +38,11 @@ class HostBatch {
       scale_a.push_back(pair.scale_a);
       scale_b.push_back(pair.scale_b);
     }
-    const double unwritten = -7;
-    std::vector<double> volume(n, unwritten), centroid(3 * n), push(3 * n), turn(3 * n);
-    std::vector<QueryStatus> status(n);
-    std::vector<std::uint32_t> visits(n), spheres(n);
+    constexpr double kUnwritten = -7;
+    BatchColumns to{std::vector<double>(n, kUnwritten), std::vector<double>(3 * n),
+                    std::vector<double>(3 * n),         std::vector<double>(3 * n),
+                    std::vector<QueryStatus>(n),        std::vector<std::uint32_t>(n),
+                    std::vector<std::uint32_t>(n)};
     std::vector<std::uint32_t> lists[2] = {std::vector<std::uint32_t>(n),
                                            std::vector<std::uint32_t>(n)};
     std::vector<gpu::SplitPair> splits(room_);
@@ -54,8 +55,8 @@ class HostBatch {
         static_cast<std::uint32_t>(assets_.size()),
         measure,
         {n, a.data(), b.data(), pose_a.data(), pose_b.data(), scale_a.data(), scale_b.data()},
-        {volume.data(), centroid.data(), push.data(), turn.data(), status.data(), visits.data(),
-         spheres.data()},
+        {to.volume.data(), to.centroid.data(), to.push.data(), to.turn.data(), to.status.data(),
+         to.visits.data(), to.spheres.data()},
         &counters,
         {lists[0].data(), lists[1].data()},
         splits.data(),
@@ -73,20 +74,7 @@ class HostBatch {
     sum<float>(batch, 0, seed);
     sum<double>(batch, 1, seed);
 
-    std::vector<Penetration> answers(n);
-    const auto vector = [](const std::vector<double>& from, std::size_t i) {
-      return Eigen::Vector3d(from[3 * i], from[3 * i + 1], from[3 * i + 2]);
-    };
-    for (std::size_t i = 0; i < n; ++i) {
-      answers[i].volume = volume[i];
-      answers[i].centroid = vector(centroid, i);
-      answers[i].translation_gradient = vector(push, i);
-      answers[i].rotation_gradient = vector(turn, i);
-      answers[i].status = status[i];
-      answers[i].node_visits = visits[i];
-      answers[i].sphere_pairs = spheres[i];
-    }
-    return answers;
+    return to.rows();
   }
 
   gpu::BatchCounters counters;  ///< of the last run
