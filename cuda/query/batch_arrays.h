@@ -41,9 +41,9 @@ struct PairTask {
 
 /// Counters of a batch: zero at first.
 struct BatchCounters {
-  std::uint32_t listed[2];  ///< pairs to be summed in float, in double
-  std::uint32_t taken[2];
-  std::uint32_t splits[2], tasks[2], entries[2], tasks_taken[2];
+  std::uint32_t listed;  ///< pairs whose roots meet
+  std::uint32_t taken;
+  std::uint32_t splits, tasks, entries, tasks_taken;
 };
 
 /// A batch in the memory of who works on it: kernels, or a test on the host.
@@ -55,8 +55,8 @@ struct BatchArrays {
   GpuPenetrations answers;
 
   BatchCounters* counters;
-  std::uint32_t* list[2];  ///< room for all pairs each
-  // Room for what is split; what finds none is summed by the team that met it. For float, double.
+  std::uint32_t* list;  ///< room for all pairs
+  // Room for what is split; what finds none is summed by the team that met it.
   SplitPair* splits;
   PairTask* tasks;
   LensTotals* totals;  ///< of splits[0]: [split_room + task_room]

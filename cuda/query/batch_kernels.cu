@@ -16,18 +16,15 @@ constexpr int kBlocksEach = 5;  ///< a multiprocessor; more leave too few regist
 __global__ void __launch_bounds__(kSiftThreads) sift_pairs(const BatchArrays batch) {
   const WarpTeam team;
   const std::uint64_t i = std::uint64_t{blockIdx.x} * kSiftThreads + threadIdx.x;
-  const int list = i < batch.pairs.count ? sift_pair(batch, static_cast<std::uint32_t>(i)) : -1;
-  for (int kind = 0; kind < 2; ++kind) {
-    int total = 0;
-    const int before = team.exclusive_count(list == kind, total);
-    if (total == 0) continue;
-    std::uint32_t first = 0;
-    if (team.lane() == 0)
-      first = atomic_add(&batch.counters->listed[kind], static_cast<std::uint32_t>(total));
-    first = team.broadcast(first, 0);
-    if (list == kind)
-      batch.list[kind][first + static_cast<std::uint32_t>(before)] = static_cast<std::uint32_t>(i);
-  }
+  const bool meets = i < batch.pairs.count && sift_pair(batch, static_cast<std::uint32_t>(i));
+  int total = 0;
+  const int before = team.exclusive_count(meets, total);
+  if (total == 0) return;
+  std::uint32_t first = 0;
+  if (team.lane() == 0)
+    first = atomic_add(&batch.counters->listed, static_cast<std::uint32_t>(total));
+  first = team.broadcast(first, 0);
+  if (meets) batch.list[first + static_cast<std::uint32_t>(before)] = static_cast<std::uint32_t>(i);
 }
 
 /// Calls work(k) for k < count, each warp taking the next when it is done with one.
@@ -43,65 +40,47 @@ __device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& 
   }
 }
 
-template <class Real>
-constexpr int kKind = sizeof(Real) == 4 ? 0 : 1;
-
-template <class Real>
-__global__ void __launch_bounds__(kThreads, sizeof(Real) == 4 ? kBlocksEach : 1)
-    sum_pairs(const BatchArrays batch) {
-  __shared__ PairMemory<Real> memory[kWarps];
+__global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchArrays batch) {
+  __shared__ PairMemory memory[kWarps];
   BatchCounters& counters = *batch.counters;
-  by_warps(load_fresh(&counters.listed[kKind<Real>]), &counters.taken[kKind<Real>],
+  by_warps(load_fresh(&counters.listed), &counters.taken,
            [&](const WarpTeam& team, std::uint32_t k) {
-             sum_pair<WarpTeam, Real>(team, batch, batch.list[kKind<Real>][k],
-                                      memory[threadIdx.x / 32]);
+             sum_pair(team, batch, batch.list[k], memory[threadIdx.x / 32]);
            });
 }
 
-template <class Real>
-__global__ void __launch_bounds__(kThreads, sizeof(Real) == 4 ? kBlocksEach : 1)
-    sum_tasks(const BatchArrays batch) {
-  __shared__ PairMemory<Real> memory[kWarps];
+__global__ void __launch_bounds__(kThreads, kBlocksEach) sum_tasks(const BatchArrays batch) {
+  __shared__ PairMemory memory[kWarps];
   BatchCounters& counters = *batch.counters;
-  const std::uint32_t tasks = load_fresh(&counters.tasks[kKind<Real>]);
-  by_warps(tasks < batch.task_room ? tasks : batch.task_room, &counters.tasks_taken[kKind<Real>],
+  const std::uint32_t tasks = load_fresh(&counters.tasks);
+  by_warps(tasks < batch.task_room ? tasks : batch.task_room, &counters.tasks_taken,
            [&](const WarpTeam& team, std::uint32_t k) {
-             sum_task<WarpTeam, Real>(team, batch, k, memory[threadIdx.x / 32]);
+             sum_task(team, batch, k, memory[threadIdx.x / 32]);
            });
-}
-
-template <class Real>
-int blocks_at_a_time(int multiprocessors) {
-  int each = 0;
-  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, sum_pairs<Real>, kThreads, 0),
-        "asking how many blocks run at a time");
-  return each * multiprocessors;
-}
-
-template <class Real>
-void launch_sums(const BatchArrays& batch, int blocks, cudaStream_t stream) {
-  sum_pairs<Real><<<static_cast<unsigned>(blocks), kThreads, 0, stream>>>(batch);
-  check_launch("summing pairs of trees");
-  sum_tasks<Real><<<static_cast<unsigned>(blocks), kThreads, 0, stream>>>(batch);
-  check_launch("summing what pairs left");
 }
 
 }  // namespace
 
-BatchGrids batch_grids() {
+int batch_blocks() {
   int device = 0, multiprocessors = 0;
   check(cudaGetDevice(&device), "looking for a GPU");
   check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device),
         "asking the GPU for its size");
-  return {{blocks_at_a_time<float>(multiprocessors), blocks_at_a_time<double>(multiprocessors)}};
+  int each = 0;
+  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, sum_pairs, kThreads, 0),
+        "asking how many blocks run at a time");
+  return each * multiprocessors;
 }
 
-void launch_batch(const BatchArrays& batch, const BatchGrids& grids, cudaStream_t stream) {
+void launch_batch(const BatchArrays& batch, int blocks_at_a_time, cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, sizeof(BatchCounters), stream), "starting a batch");
   sift_pairs<<<blocks_for(batch.pairs.count, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
   check_launch("placing pairs of trees");
-  launch_sums<float>(batch, grids.sum[0], stream);
-  launch_sums<double>(batch, grids.sum[1], stream);
+  const auto blocks = static_cast<unsigned>(blocks_at_a_time);
+  sum_pairs<<<blocks, kThreads, 0, stream>>>(batch);
+  check_launch("summing pairs of trees");
+  sum_tasks<<<blocks, kThreads, 0, stream>>>(batch);
+  check_launch("summing what pairs left");
 }
 
 }  // namespace ist::gpu

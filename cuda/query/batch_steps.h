@@ -15,10 +15,6 @@ namespace ist::gpu {
 /// Pairs of leaf blocks that a descent meets before it is split, and the weight of a task.
 constexpr std::uint32_t kMostAlone = 96;
 constexpr std::uint32_t kTaskWeight = 16;
-/// Sums whose rounding may exceed this share are taken again in double.
-constexpr double kGrazingPair = 1e-5;
-/// From this ratio of sizes on all is in double.
-constexpr double kFloatRatio = 64;
 
 IST_HD inline void write3(double* to, std::uint32_t i, double x, double y, double z) {
   if (to == nullptr) return;
@@ -78,12 +74,12 @@ IST_HD inline bool place_pair(const BatchArrays& batch, std::uint32_t i, PairPla
                      pairs.scale_b != nullptr ? pairs.scale_b[i] : 1);
 }
 
-/// Which list pair i goes to: 0 float, 1 double; −1: it is answered. One thread a pair.
-IST_HD inline int sift_pair(const BatchArrays& batch, std::uint32_t i) {
+/// Whether pair i is to be summed; else it is answered. One thread a pair.
+IST_HD inline bool sift_pair(const BatchArrays& batch, std::uint32_t i) {
   PairPlace place;
   if (!place_pair(batch, i, place)) {
     write_nothing(batch.answers, i, QueryStatus::invalid_input);
-    return -1;
+    return false;
   }
   const auto measure = static_cast<std::uint32_t>(batch.measure);
   const TreeRef& a = batch.assets[batch.pairs.asset_a[i]].tree[measure];
@@ -92,18 +88,18 @@ IST_HD inline int sift_pair(const BatchArrays& batch, std::uint32_t i) {
   double moved[3], d2 = 0;
   place.a_from_b.apply(centre, moved);
   for (int k = 0; k < 3; ++k) d2 += (moved[k] - a.root[k]) * (moved[k] - a.root[k]);
-  const double rb = b.root[3] * place.a_from_b.scale, reach = a.root[3] + rb;
+  const double reach = a.root[3] + b.root[3] * place.a_from_b.scale;
   if (!(d2 < reach * reach)) {
     write_nothing(batch.answers, i, QueryStatus::ok);
-    return -1;
+    return false;
   }
-  return rb <= kFloatRatio * a.root[3] && a.root[3] <= kFloatRatio * rb ? 0 : 1;
+  return true;
 }
 
 /// Readies the memory for pair i.
-template <class Team, class Real>
+template <class Team>
 IST_HD void load_pair(const Team& team, const BatchArrays& batch, std::uint32_t i,
-                      PairMemory<Real>& memory) {
+                      PairMemory& memory) {
   if (team.lane() == 0) place_pair(batch, i, memory.place);
   const auto measure = static_cast<std::uint32_t>(batch.measure);
   const std::uint32_t asset[2] = {batch.pairs.asset_a[i], batch.pairs.asset_b[i]};
@@ -117,22 +113,8 @@ IST_HD void load_pair(const Team& team, const BatchArrays& batch, std::uint32_t 
   team.sync();
 }
 
-/// Writes the answer, or lists the pair again where float is too rough. By one lane.
-template <class Real>
-IST_HD void finish_pair(const BatchArrays& batch, std::uint32_t i, const PairPlace& place,
-                        const LensTotals& totals) {
-  // 2π over π/3: the terms' factors.
-  if (sizeof(Real) == 4 && 6 * totals.term[kError] > kGrazingPair * totals.term[kCaps] &&
-      totals.term[kCaps] > 0) {
-    batch.list[1][atomic_add(&batch.counters->listed[1], 1)] = i;
-    return;
-  }
-  write_answer(batch.answers, i, place, totals);
-}
-
 /// The lowest entry of the task that begins with the topmost of `waiting` entries.
-template <class Real>
-IST_HD int task_floor(const PairMemory<Real>& memory, int waiting) {
+IST_HD inline int task_floor(const PairMemory& memory, int waiting) {
   std::uint32_t weight = 0;
   while (waiting > 0 && weight < kTaskWeight) {
     const int left =
@@ -144,18 +126,17 @@ IST_HD int task_floor(const PairMemory<Real>& memory, int waiting) {
 }
 
 /// Leaves what waits to others; false if there is no room. All of the team together.
-template <class Team, class Real>
+template <class Team>
 IST_HD bool split_pair(const Team& team, const BatchArrays& batch, std::uint32_t i,
-                       PairMemory<Real>& memory, int waiting) {
-  constexpr int kKind = sizeof(Real) == 4 ? 0 : 1;
+                       PairMemory& memory, int waiting) {
   int tasks = 0;
   for (int top = waiting; top > 0; ++tasks) top = task_floor(memory, top);
   std::uint32_t split = 0, task = 0, entry = 0;
   if (team.lane() == 0) {
     BatchCounters& counters = *batch.counters;
-    split = atomic_add(&counters.splits[kKind], 1);
-    task = atomic_add(&counters.tasks[kKind], static_cast<std::uint32_t>(tasks));
-    entry = atomic_add(&counters.entries[kKind], static_cast<std::uint32_t>(waiting));
+    split = atomic_add(&counters.splits, 1);
+    task = atomic_add(&counters.tasks, static_cast<std::uint32_t>(tasks));
+    entry = atomic_add(&counters.entries, static_cast<std::uint32_t>(waiting));
   }
   split = team.broadcast(split, 0);
   task = team.broadcast(task, 0);
@@ -189,11 +170,11 @@ IST_HD bool split_pair(const Team& team, const BatchArrays& batch, std::uint32_t
 }
 
 /// Sums pair i, or as much of it as one team is to do alone.
-template <class Team, class Real>
+template <class Team>
 IST_HD void sum_pair(const Team& team, const BatchArrays& batch, std::uint32_t i,
-                     PairMemory<Real>& memory) {
+                     PairMemory& memory) {
   load_pair(team, batch, i, memory);
-  PairDescent<Team, Real> descent(team, memory);
+  PairDescent<Team> descent(team, memory);
   descent.start();
   descent.run(0, kMostAlone);
   if (descent.waiting() > 0) {
@@ -211,19 +192,19 @@ IST_HD void sum_pair(const Team& team, const BatchArrays& batch, std::uint32_t i
     if (team.lane() == 0) memory.totals = sum;
   }
   team.sync();
-  if (team.lane() == 0) finish_pair<Real>(batch, i, memory.place, memory.totals);
+  if (team.lane() == 0) write_answer(batch.answers, i, memory.place, memory.totals);
   team.sync();
 }
 
 /// Sums a task; who does a pair's last writes the answer.
-template <class Team, class Real>
+template <class Team>
 IST_HD void sum_task(const Team& team, const BatchArrays& batch, std::uint32_t index,
-                     PairMemory<Real>& memory) {
+                     PairMemory& memory) {
   const PairTask task = batch.tasks[index];
   if (task.count == 0) return;
   SplitPair& split = batch.splits[task.split];
   load_pair(team, batch, split.pair, memory);
-  PairDescent<Team, Real> descent(team, memory);
+  PairDescent<Team> descent(team, memory);
   descent.resume(batch.entries_a + task.first, batch.entries_b + task.first,
                  static_cast<int>(task.count));
   descent.run(0, ~0u);
@@ -235,7 +216,7 @@ IST_HD void sum_task(const Team& team, const BatchArrays& batch, std::uint32_t i
       LensTotals sum = batch.totals[task.split];
       for (std::uint32_t k = 0; k < split.tasks; ++k)
         sum.add(batch.totals[batch.split_room + split.first_task + k]);
-      finish_pair<Real>(batch, split.pair, memory.place, sum);
+      write_answer(batch.answers, split.pair, memory.place, sum);
     }
   }
   team.sync();

@@ -14,7 +14,7 @@
 namespace ist {
 namespace {
 
-/// Room for what is split, a kind. A batch that needs more is answered all the same.
+/// Room for what is split. A batch that needs more is answered all the same.
 constexpr std::uint32_t kSplitRoom = 1 << 16, kTaskRoom = 1 << 19, kEntryRoom = 1 << 21;
 
 /// Device memory that outlives the queue it comes from.
@@ -117,7 +117,7 @@ int GpuAssets::device() const noexcept { return impl_->device; }
 struct GpuWorkspace::Impl {
   int device = 0;
   std::size_t most_pairs = 0;
-  gpu::BatchGrids grids{};
+  int blocks_at_a_time = 0;
   DeviceBytes memory;
   gpu::BatchArrays arrays{};  ///< what does not change from batch to batch
 
@@ -125,7 +125,7 @@ struct GpuWorkspace::Impl {
   std::size_t place(std::byte* from) {
     Parts parts(from);
     arrays.counters = parts.take<gpu::BatchCounters>(1);
-    for (std::uint32_t*& list : arrays.list) list = parts.take<std::uint32_t>(most_pairs);
+    arrays.list = parts.take<std::uint32_t>(most_pairs);
     arrays.splits = parts.take<gpu::SplitPair>(kSplitRoom);
     arrays.tasks = parts.take<gpu::PairTask>(kTaskRoom);
     arrays.totals = parts.take<gpu::LensTotals>(kSplitRoom + kTaskRoom);
@@ -145,7 +145,7 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   gpu::Queue queue(settings);
   impl_->device = settings.device;
   impl_->most_pairs = most_pairs;
-  impl_->grids = gpu::batch_grids();
+  impl_->blocks_at_a_time = gpu::batch_blocks();
   impl_->memory = DeviceBytes(queue, settings, impl_->place(nullptr));
   impl_->place(impl_->memory.data());
   queue.wait();
@@ -177,7 +177,7 @@ void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure m
   batch.pairs = pairs;
   batch.answers = answers;
   const gpu::DeviceGuard guard(all.device);
-  gpu::launch_batch(batch, room.grids, stream);
+  gpu::launch_batch(batch, room.blocks_at_a_time, stream);
 }
 
 }  // namespace ist

@@ -13,57 +13,79 @@ enum Term {
   kForce,       ///< three: −1/2π · dV/d(translation of B)
   kTorque = 4,  ///< three: likewise about B's unit-frame origin
   kMoment = 7,  ///< three: 3/π · ∫ x dV
-  kError = 10,  ///< 1/2π · bound on what rounded distances change in V
-  kTerms = 11
+  kTerms = 10
 };
 
-IST_HD inline float root(float x) { return sqrtf(x); }
-IST_HD inline double root(double x) { return sqrt(x); }
-
-/// Two balls that meet.
-template <class Real>
-struct alignas(4 * sizeof(Real)) LensSide {
-  Real x, y, z, r;
+/// A ball as a sum of lenses sees it.
+struct LensBall {
+  double at[3], r;
 };
 
-/// Adds the lens of ball A at `lever` with radius lever.r and ball B at `apart` from it with radius
-/// apart.r. `rounding`: by how much the distance may be off. The sums g, f and e are those of
-/// lens() (query/kernel/lens.h) and as little to be re-associated.
-template <class Real>
-IST_HD void add_lens(const LensSide<Real>& lever, const LensSide<Real>& apart, Real rounding,
-                     Real (&sum)[kTerms]) {
-  constexpr Real kTiny = sizeof(Real) == 4 ? Real(1.1754944e-38) : Real(2.2250738585072014e-308);
-  const Real d = root((apart.x * apart.x + apart.y * apart.y) + apart.z * apart.z);
-  const bool a_is_larger = lever.r > apart.r;
-  const Real a = a_is_larger ? lever.r : apart.r;
-  const Real b = a_is_larger ? apart.r : lever.r;
-  Real g = (a - d) + b;
-  const Real f = a - b <= b ? d - (a - b) : (d - a) + b;
-  const Real e = (a - b) + d;
-  g = g > 0 ? g : Real(0);
-  const bool holds = f <= 0 || d < kTiny;
-  const Real inverse = Real(0.5) / (holds ? Real(1) : d);
-  Real hb = (e * inverse) * g;
+/// Adds the lens of ball A at `lever` and ball B at `apart` from it, lengths times `unit`; false if
+/// they do not meet.
+///
+/// What cancels is taken in double, as products of sums: how far the balls reach into each other,
+/// and how far the smaller reaches out of the larger. The rest, lens() of query/kernel/lens.h, then
+/// keeps its digits in float, grazing or not.
+IST_HD inline bool add_lens(const LensBall& lever, const LensBall& apart, double unit,
+                            float (&sum)[kTerms]) {
+  constexpr float kTiny = 1e-18f;
+  const double d2 = std::fma(apart.at[0], apart.at[0],
+                             std::fma(apart.at[1], apart.at[1], apart.at[2] * apart.at[2]));
+  const double reach = lever.r + apart.r, rest = lever.r - apart.r;
+  const double into = std::fma(reach, reach, -d2);  // (reach − d)(reach + d)
+  if (!(into > 0)) return false;
+  const double out = std::fma(-rest, rest, d2);  // (d − |rest|)(d + |rest|)
+  const double unit2 = unit * unit;
+  const bool a_is_larger = rest > 0;
+  const auto a = static_cast<float>((a_is_larger ? lever.r : apart.r) * unit);
+  const auto b = static_cast<float>((a_is_larger ? apart.r : lever.r) * unit);
+  const float d = std::sqrt(static_cast<float>(d2 * unit2));
+  const bool holds = out <= 0 || d < kTiny;
+  const float e = holds ? 1.0f : static_cast<float>((a_is_larger ? rest : -rest) * unit) + d;
+  const float inverse = 0.5f / (holds ? 1.0f : d);
+  const float g = static_cast<float>(into * unit2) / ((a + b) + d) * inverse;
+  const float f = static_cast<float>(out * unit2) / e;
+  const float ha = holds ? 0.0f : f * g;
+  float hb = e * g;
   hb = holds || hb > 2 * b ? 2 * b : hb;
-  const Real ha = holds ? Real(0) : (f * inverse) * g;
-  const Real large = (ha * ha) * (3 * a - ha);
-  const Real small = (hb * hb) * (3 * b - hb);
-  const Real circle = ha * (2 * a - ha);
-  const Real of_b = a_is_larger ? small : large;
-  const Real caps = large + small;
-  const Real pull = circle * inverse;
-  const Real fx = pull * apart.x, fy = pull * apart.y, fz = pull * apart.z;
+  const float large = (ha * ha) * (3 * a - ha);
+  const float small = (hb * hb) * (3 * b - hb);
+  const float circle = ha * (2 * a - ha);
+  const float of_b = a_is_larger ? small : large;
+  const float caps = large + small;
+  const float pull = circle * inverse;
+  const float x = static_cast<float>(apart.at[0] * unit),
+              lx = static_cast<float>(lever.at[0] * unit);
+  const float y = static_cast<float>(apart.at[1] * unit),
+              ly = static_cast<float>(lever.at[1] * unit);
+  const float z = static_cast<float>(apart.at[2] * unit),
+              lz = static_cast<float>(lever.at[2] * unit);
+  const float fx = pull * x, fy = pull * y, fz = pull * z;
   sum[kCaps] += caps;
   sum[kForce] += fx;
   sum[kForce + 1] += fy;
   sum[kForce + 2] += fz;
-  sum[kTorque] += lever.y * fz - lever.z * fy;
-  sum[kTorque + 1] += lever.z * fx - lever.x * fz;
-  sum[kTorque + 2] += lever.x * fy - lever.y * fx;
-  sum[kMoment] += caps * lever.x + of_b * apart.x;
-  sum[kMoment + 1] += caps * lever.y + of_b * apart.y;
-  sum[kMoment + 2] += caps * lever.z + of_b * apart.z;
-  sum[kError] += (Real(0.5) * circle + b * rounding) * rounding;
+  sum[kTorque] += ly * fz - lz * fy;
+  sum[kTorque + 1] += lz * fx - lx * fz;
+  sum[kTorque + 2] += lx * fy - ly * fx;
+  sum[kMoment] += caps * lx + of_b * x;
+  sum[kMoment + 1] += caps * ly + of_b * y;
+  sum[kMoment + 2] += caps * lz + of_b * z;
+  return true;
+}
+
+/// Adds a ball that lies in another.
+IST_HD inline void add_ball(const LensBall& ball, double unit, float (&sum)[kTerms]) {
+  const double r = ball.r * unit;
+  const double caps = 4 * (r * r * r);
+  sum[kCaps] += static_cast<float>(caps);
+  for (int k = 0; k < 3; ++k) sum[kMoment + k] += static_cast<float>(caps * (ball.at[k] * unit));
+}
+
+/// How often `unit` was multiplied into a term.
+IST_HD constexpr int power_of(int term) {
+  return term < kForce ? 3 : term < kTorque ? 2 : term < kMoment ? 3 : 4;
 }
 
 /// Sums of a pair of trees or of a part of it.

@@ -1,54 +1,29 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
-#include "cuda/query/lens_sums.h"
-#include "cuda/query/pair_place.h"
-#include "cuda/query/tree_ref.h"
+#include "cuda/query/pair_memory.h"
 #include "numerics/host_device.h"
 
 // Two trees met by one team: the sum that Descent (query/descent/descent.h) makes level by level,
-// here depth first, so that what waits fits into a team's own memory. Two pairs are looked at a
-// time: item k of 32 is child, or sphere, k % 16 of pair k / 16.
+// here depth first, so that what waits fits into a team's own memory.
 
 namespace ist::gpu {
 
-constexpr int kPairsAtOnce = 2;
-constexpr int kItems = kPairsAtOnce * static_cast<int>(kWidth);
-/// A step leaves at most so many pairs more than it takes.
-constexpr int kStackRoom = OpeningSteps::kMost * (kItems - kPairsAtOnce) + kPairsAtOnce;
-constexpr int kLeafRoom = kPairsAtOnce + kItems;
-constexpr int kNodeBits = 28;  ///< of a node's number; the rest of a word is the step
-static_assert(kMaxSpheres == 1u << kNodeBits && OpeningSteps::kMost < 16);
-
-/// What a team needs for a pair of trees.
-template <class Real>
-struct PairMemory {
-  PairPlace place;
-  TreeRef tree[2];
-  OpeningSteps steps;
-  Real turn[9];  ///< place.a_from_b.m
-  LensTotals totals;
-  std::uint32_t stack_a[kStackRoom];  ///< node of A and the step, << kNodeBits, that opens the pair
-  std::uint32_t stack_b[kStackRoom];
-  std::uint32_t leaf_a[kLeafRoom], leaf_b[kLeafRoom];
-  LensSide<Real> near[2][kItems];  ///< spheres that reach the other block's ball, pair by pair
-  LensSide<Real> apart[2 * 32], lever[2 * 32];  ///< balls that meet
-  Real rounding[2 * 32];
-  LensSide<Real> block[kPairsAtOnce];  ///< A's origin from B's unit-frame origin; r: the rounding
-};
-
-template <class Team, class Real>
+template <class Team>
 class PairDescent {
  public:
   /// `memory.place` and `memory.tree` are set.
-  IST_HD PairDescent(const Team& team, PairMemory<Real>& memory) : team_(team), m_(memory) {
+  IST_HD PairDescent(const Team& team, PairMemory& memory) : team_(team), m_(memory) {
     if (team_.lane() == 0) {
       m_.steps.plan(m_.tree[0], m_.tree[1], m_.place.a_from_b.scale);
       m_.totals.clear();
-      for (int i = 0; i < 9; ++i) m_.turn[i] = static_cast<Real>(m_.place.a_from_b.m[i]);
+      for (int i = 0; i < 9; ++i) m_.turn[i] = static_cast<float>(m_.place.a_from_b.m[i]);
+      const double b = m_.tree[1].root[3] * m_.place.a_from_b.scale;
+      m_.unit = std::ldexp(1.0, -std::ilogb(b < m_.tree[0].root[3] ? b : m_.tree[0].root[3]));
     }
-    for (Real& s : sum_) s = 0;
+    for (float& s : sum_) s = 0;
     team_.sync();
   }
 
@@ -77,14 +52,13 @@ class PairDescent {
   /// met and none of them waits.
   IST_HD void run(int floor, std::uint32_t most) {
     while (size_ > floor || leaves_ > 0) {
-      if (leaves_ == 0 && met_ >= most) break;
-      if (size_ > floor && leaves_ < kPairsAtOnce) {
+      if (met_ >= most && leaves_ == 0) break;
+      if (size_ > floor && leaves_ < kAhead && met_ < most)
         open(size_ - floor);
-      } else {
+      else
         meet();
-      }
     }
-    sum_list(0);
+    sum_list(1);
     fold();
     met_ = 0;
   }
@@ -97,56 +71,85 @@ class PairDescent {
     int step;
   };
 
+  IST_HD static Pair unpacked(std::uint32_t a, std::uint32_t b) {
+    return {a & ((1u << kNodeBits) - 1), b, static_cast<int>(a >> kNodeBits)};
+  }
+
+  /// How many of the pairs on top are opened together: never more than `have` and than there is
+  /// room for what they may leave, whatever lies above them.
+  IST_HD int breadth(int have) const {
+    const int reserve = m_.steps.count * kGrowth + kPairsAtOnce;
+    const int by_stack = (kStackRoom - reserve - size_) / (static_cast<int>(kWidth) - 1);
+    const int by_leaves = (kLeafRoom - leaves_) / static_cast<int>(kWidth);
+    int most = by_stack < by_leaves ? by_stack : by_leaves;
+    most = most < kAhead ? most : kAhead;
+    most = most > kPairsAtOnce ? most : kPairsAtOnce;
+    return have < most ? have : most;
+  }
+
   /// Opens the pairs on top, no more than `have`.
   IST_HD void open(int have) {
-    have = have < kPairsAtOnce ? have : kPairsAtOnce;
-    std::uint32_t entry_a[kItemsALane], entry_b[kItemsALane];
-    for (int i = 0; i < kItemsALane; ++i) {
-      const int half = item(i) / static_cast<int>(kWidth);
-      entry_a[i] = half < have ? m_.stack_a[size_ - 1 - half] : 0;
-      entry_b[i] = half < have ? m_.stack_b[size_ - 1 - half] : 0;
-    }
+    have = breadth(have);
+    for (int k = team_.lane(); k < have; k += Team::kWidth)
+      ready_opening(k, m_.stack_a[size_ - 1 - k], m_.stack_b[size_ - 1 - k]);
     team_.sync();
     size_ -= have;
     visits_ += static_cast<std::uint32_t>(have);
-    for (int i = 0; i < kItemsALane; ++i) {
-      const bool active = item(i) / static_cast<int>(kWidth) < have;
-      const Pair pair = {entry_a[i] & ((1u << kNodeBits) - 1), entry_b[i],
-                         static_cast<int>(entry_a[i] >> kNodeBits)};
-      open_item(pair, static_cast<std::uint32_t>(item(i)) % kWidth, active);
-    }
+    IST_ROLLED
+    for (int first = 0; first < have; first += kPairsAtOnce)
+      for (int i = 0; i < kItemsALane; ++i) {
+        const int k = first + item(i) / static_cast<int>(kWidth);
+        open_item(k, static_cast<std::uint32_t>(item(i)) % kWidth, k < have);
+      }
     team_.sync();
   }
 
-  IST_HD void open_item(const Pair& pair, std::uint32_t lane, bool active) {
-    const bool of_a = m_.steps.opens_a[active ? pair.step : 0];
+  IST_HD void ready_opening(int k, std::uint32_t entry_a, std::uint32_t entry_b) {
+    const Pair pair = unpacked(entry_a, entry_b);
+    const bool of_a = m_.steps.opens_a[pair.step];
     const int level_a = m_.steps.level_a[pair.step], level_b = m_.steps.level_b[pair.step];
+    const TreeRef& x = m_.tree[of_a ? 0 : 1];
+    const int level_x = of_a ? level_a : level_b;
     const std::uint32_t opened = of_a ? pair.a : pair.b;
-    const std::uint32_t child = opened * kWidth + lane;
+    const PairMap& map = of_a ? m_.place.a_from_b : m_.place.b_from_a;
+    const NodeBall ball =
+        m_.tree[of_a ? 1 : 0].ball(of_a ? level_b : level_a, of_a ? pair.b : pair.a);
+    double moved[3];
+    map.apply(ball.centre, moved);
+    const Origin& origin = x.origins[level_x][opened];
+    m_.opening.other[k] = {
+        static_cast<float>(moved[0] - origin.x), static_cast<float>(moved[1] - origin.y),
+        static_cast<float>(moved[2] - origin.z), static_cast<float>(ball.r * map.scale)};
+    m_.opening.block[k] = x.blocks[level_x] + opened;
+    m_.opening.a[k] = entry_a;
+    m_.opening.b[k] = entry_b;
+  }
+
+  IST_HD void open_item(int k, std::uint32_t lane, bool active) {
     bool meets = false, contained = false;
+    Pair pair = {0, 0, 0};
+    bool of_a = false;
     if (active) {
-      const TreeRef& x = m_.tree[of_a ? 0 : 1];
-      const TreeRef& y = m_.tree[of_a ? 1 : 0];
-      const PairMap& map = of_a ? m_.place.a_from_b : m_.place.b_from_a;
-      const int level_x = of_a ? level_a : level_b, level_y = of_a ? level_b : level_a;
-      const NodeBall ball = y.ball(level_y, of_a ? pair.b : pair.a);
-      double moved[3];
-      map.apply(ball.centre, moved);
-      const BallBlock& block = x.blocks[level_x][opened];
-      const Origin& origin = x.origins[level_x][opened];
-      const float r = static_cast<float>(ball.r * map.scale);
-      const float dx = block.x[lane] - static_cast<float>(moved[0] - origin.x);
-      const float dy = block.y[lane] - static_cast<float>(moved[1] - origin.y);
-      const float dz = block.z[lane] - static_cast<float>(moved[2] - origin.z);
-      const float d2 = dx * dx + dy * dy + dz * dz;
+      const Ball other = m_.opening.other[k];
+      const BallBlock& block = *in_global_memory(m_.opening.block[k]);
+      pair = unpacked(m_.opening.a[k], m_.opening.b[k]);
+      of_a = m_.steps.opens_a[pair.step];
+      const float dx = block.x[lane] - other.x;
+      const float dy = block.y[lane] - other.y;
+      const float dz = block.z[lane] - other.z;
+      const float d2 = std::fma(dx, dx, std::fma(dy, dy, dz * dz));
       const float radius = block.r[lane];
-      const float reach = (radius + r) * (1 + kRoom);
+      const float reach = (radius + other.r) * (1 + kRoom);
       meets = radius > 0 && d2 < reach * reach;
-      const float within = (r - radius) * (1 - kRoom);
-      contained = meets && level_y == kSphereLevel && within > 0 && d2 < within * within;
+      const int level = of_a ? m_.steps.level_b[pair.step] : m_.steps.level_a[pair.step];
+      const float within = (other.r - radius) * (1 - kRoom);
+      contained = meets && level == kSphereLevel && within > 0 && d2 < within * within;
     }
+    const std::uint32_t child = (of_a ? pair.a : pair.b) * kWidth + lane;
     push(meets && !contained, of_a ? child : pair.a, of_a ? pair.b : child, pair.step + 1);
-    if (team_.any(contained)) add_contained(contained, of_a, of_a ? level_a : level_b, child);
+    if (team_.any(contained))
+      add_contained(contained, of_a,
+                    of_a ? m_.steps.level_a[pair.step] : m_.steps.level_b[pair.step], child);
   }
 
   /// Puts a pair where the step that comes next takes it.
@@ -183,7 +186,6 @@ class PairDescent {
 
   IST_HD void add_subtree(bool of_a, int level, std::uint32_t node) {
     const TreeRef& tree = m_.tree[of_a ? 0 : 1];
-    const PairMap& map = m_.place.a_from_b;
     const std::uint64_t full = std::uint64_t{kWidth} << (4 * level);
     const std::uint64_t all = std::uint64_t{kWidth} * tree.leaf_blocks;
     const std::uint64_t begin = full * node;
@@ -191,20 +193,9 @@ class PairDescent {
     for (std::uint64_t base = begin; base < end; base += Team::kWidth) {
       const std::uint64_t i = base + static_cast<std::uint64_t>(team_.lane());
       bool is_sphere = false;
-      if (i < end) {
-        const NodeBall ball = tree.ball(kSphereLevel, static_cast<std::uint32_t>(i));
-        if (ball.r > 0) {
-          is_sphere = true;
-          double at[3];
-          for (int k = 0; k < 3; ++k)
-            at[k] = of_a ? ball.centre[k] - map.t[k]
-                         : (map.m[3 * k] * ball.centre[0] + map.m[3 * k + 1] * ball.centre[1]) +
-                               map.m[3 * k + 2] * ball.centre[2];
-          const double r = of_a ? ball.r : ball.r * map.scale;
-          const double caps = 4 * (r * r * r);
-          sum_[kCaps] += static_cast<Real>(caps);
-          for (int k = 0; k < 3; ++k) sum_[kMoment + k] += static_cast<Real>(caps * at[k]);
-        }
+      if (i < end && tree.ball(kSphereLevel, static_cast<std::uint32_t>(i)).r > 0) {
+        is_sphere = true;
+        add_ball(seen(of_a, static_cast<std::uint32_t>(i)), m_.unit, sum_);
       }
       int total = 0;
       team_.exclusive_count(is_sphere, total);
@@ -213,140 +204,180 @@ class PairDescent {
     }
   }
 
-  /// A leaf block, or a single sphere, of one side in a pair that meets.
-  struct Side {
-    LensSide<Real> sphere;  ///< in A's axes, from A's block's origin
-    bool there = false;     ///< of this item
-  };
+  /// A sphere in A's unit frame's axes, from B's unit-frame origin.
+  IST_HD LensBall seen(bool of_a, std::uint32_t number) const {
+    const PairMap& map = m_.place.a_from_b;
+    const NodeBall ball = m_.tree[of_a ? 0 : 1].ball(kSphereLevel, number);
+    if (of_a)
+      return {{ball.centre[0] - map.t[0], ball.centre[1] - map.t[1], ball.centre[2] - map.t[2]},
+              ball.r};
+    LensBall out;
+    map.turn(ball.centre, out.at);
+    out.r = ball.r * map.scale;
+    return out;
+  }
 
-  /// Sums the pairs of leaves on top of the list.
+  /// Lists what may meet in the pairs of leaves on top.
   IST_HD void meet() {
-    const int have = leaves_ < kPairsAtOnce ? leaves_ : kPairsAtOnce;
+    const int have = leaves_ < kAhead ? leaves_ : kAhead;
+    for (int k = team_.lane(); k < have; k += Team::kWidth)
+      ready_meeting(k, m_.leaf_a[leaves_ - 1 - k], m_.leaf_b[leaves_ - 1 - k]);
+    team_.sync();
+    leaves_ -= have;
+    met_ += static_cast<std::uint32_t>(have);
+    IST_ROLLED
+    for (int first = 0; first < have; first += kPairsAtOnce) meet_two(first, have);
+  }
+
+  IST_HD void ready_meeting(int k, std::uint32_t leaf_a, std::uint32_t leaf_b) {
+    const int level_a = m_.steps.level_a[m_.steps.count];
+    const int level_b = m_.steps.level_b[m_.steps.count];
+    const bool one_a = level_a == kSphereLevel, one_b = level_b == kSphereLevel;
+    const std::uint32_t block_a = one_a ? leaf_a / kWidth : leaf_a;
+    const std::uint32_t block_b = one_b ? leaf_b / kWidth : leaf_b;
+    const Origin& origin_a = m_.tree[0].origins[0][block_a];
+    const Origin& origin_b = m_.tree[1].origins[0][block_b];
+    const PairMap& map = m_.place.a_from_b;
+    const double from[3] = {origin_b.x, origin_b.y, origin_b.z};
+    double moved[3];
+    map.apply(from, moved);
+    Ball off = {static_cast<float>(moved[0] - origin_a.x),
+                static_cast<float>(moved[1] - origin_a.y),
+                static_cast<float>(moved[2] - origin_a.z), 0};
+    const NodeBall ball_a = m_.tree[0].ball(level_a, leaf_a);
+    const NodeBall ball_b = m_.tree[1].ball(level_b, leaf_b);
+    map.apply(ball_b.centre, moved);
+    const Ball near_a = {static_cast<float>(ball_a.centre[0] - origin_a.x),
+                         static_cast<float>(ball_a.centre[1] - origin_a.y),
+                         static_cast<float>(ball_a.centre[2] - origin_a.z),
+                         static_cast<float>(ball_a.r)};
+    const Ball near_b = {
+        static_cast<float>(moved[0] - origin_a.x), static_cast<float>(moved[1] - origin_a.y),
+        static_cast<float>(moved[2] - origin_a.z), static_cast<float>(ball_b.r * map.scale)};
+    // What each sphere's coordinates are rounded by is bounded by how far the balls reach.
+    constexpr float kRounding = 32 * 0x1p-24f;
+    off.r = kRounding * ((largest(near_a) + near_a.r) + (largest(near_b) + near_b.r));
+    m_.meeting.near_a[k] = near_a;
+    m_.meeting.near_b[k] = near_b;
+    m_.meeting.off[k] = off;
+    m_.meeting.block_a[k] = block_a;
+    m_.meeting.block_b[k] = block_b;
+    m_.meeting.lanes[k] =
+        (one_a ? 1u << leaf_a % kWidth : 0xFFFFu) | (one_b ? 1u << leaf_b % kWidth : 0xFFFFu) << 16;
+  }
+
+  IST_HD void meet_two(int first, int have) {
     int near[2] = {0, 0}, of_first[2] = {0, 0};
     for (int i = 0; i < kItemsALane; ++i) {
       const int half = item(i) / static_cast<int>(kWidth);
-      Side side[2];
-      if (half < have)
-        look(m_.leaf_a[leaves_ - 1 - half], m_.leaf_b[leaves_ - 1 - half],
-             static_cast<std::uint32_t>(item(i)) % kWidth, half, side);
+      const int k = first + half;
+      const std::uint32_t lane = static_cast<std::uint32_t>(item(i)) % kWidth;
+      Ball sphere[2] = {};
+      bool there[2] = {false, false};
+      if (k < have) look(k, lane, sphere, there);
       for (int s = 0; s < 2; ++s) {
         int total = 0;
-        const int place = near[s] + team_.exclusive_count(side[s].there, total);
+        const int place = near[s] + team_.exclusive_count(there[s], total);
         near[s] += total;
-        team_.exclusive_count(side[s].there && half == 0, total);
+        team_.exclusive_count(there[s] && half == 0, total);
         of_first[s] += total;
-        if (side[s].there) m_.near[s][place] = side[s].sphere;
+        if (!there[s]) continue;
+        m_.near[s][place] = sphere[s];
+        m_.number[s][place] = (s == 0 ? m_.meeting.block_a : m_.meeting.block_b)[k] * kWidth + lane;
       }
     }
-    leaves_ -= have;
-    met_ += static_cast<std::uint32_t>(have);
-    team_.sync();
-    const int first = of_first[0] * of_first[1];
+    const int in_first = of_first[0] * of_first[1];
     const int rows = near[1] - of_first[1];  // spheres of B in the second pair
-    const int tests = first + (near[0] - of_first[0]) * rows;
+    const int tests = in_first + (near[0] - of_first[0]) * rows;
+    if (tests == 0) {
+      team_.sync();
+      return;
+    }
+    team_.sync();
+    // k · share >> 16 is k / width, for k < 256 and width ≤ 16.
+    const unsigned share[2] = {share_of(of_first[1]), share_of(rows)};
     for (int base = 0; base < tests; base += Team::kWidth) {
       const int k = base + team_.lane();
-      bool meets = false;
-      const int half = k >= first ? 1 : 0;
-      LensSide<Real> a = {}, apart = {};
+      bool may = false;
+      std::uint32_t a = 0, b = 0;
       if (k < tests) {
+        const int half = k >= in_first ? 1 : 0;
         const int width = half != 0 ? rows : of_first[1];
-        const int in_pair = half != 0 ? k - first : k;
-        const int row = in_pair / width;
-        a = m_.near[0][(half != 0 ? of_first[0] : 0) + row];
-        apart = m_.near[1][(half != 0 ? of_first[1] : 0) + in_pair - row * width];
-        apart.x -= a.x;
-        apart.y -= a.y;
-        apart.z -= a.z;
-        const Real sum = a.r + apart.r;
-        meets = (apart.x * apart.x + apart.y * apart.y) + apart.z * apart.z < sum * sum;
+        const int in_pair = half != 0 ? k - in_first : k;
+        const int row = static_cast<int>(static_cast<unsigned>(in_pair) * share[half] >> 16);
+        const int of_a = (half != 0 ? of_first[0] : 0) + row;
+        const int of_b = (half != 0 ? of_first[1] : 0) + in_pair - row * width;
+        const Ball from = m_.near[0][of_a], to = m_.near[1][of_b];
+        const float dx = to.x - from.x, dy = to.y - from.y, dz = to.z - from.z;
+        const float reach = (from.r + to.r) + m_.meeting.off[first + half].r;
+        may = std::fma(dx, dx, std::fma(dy, dy, dz * dz)) < reach * reach;
+        a = m_.number[0][of_a];
+        b = m_.number[1][of_b];
       }
       int total = 0;
-      const int place = listed_ + team_.exclusive_count(meets, total);
-      if (meets) {
-        m_.apart[place] = apart;
-        const LensSide<Real>& block = m_.block[half];
-        m_.lever[place] = {a.x + block.x, a.y + block.y, a.z + block.z, a.r};
-        m_.rounding[place] = block.r;
+      const int place = listed_ + team_.exclusive_count(may, total);
+      if (may) {
+        m_.list_a[place] = a;
+        m_.list_b[place] = b;
       }
       listed_ += total;
-      spheres_ += static_cast<std::uint32_t>(total);
       team_.sync();
       sum_list(Team::kWidth);
     }
     team_.sync();
   }
 
-  /// Sphere `lane` of both leaves of a pair, and whether it reaches the other's ball.
-  IST_HD void look(std::uint32_t leaf_a, std::uint32_t leaf_b, std::uint32_t lane, int half,
-                   Side (&side)[2]) {
-    const int level_a = m_.steps.level_a[m_.steps.count];
-    const int level_b = m_.steps.level_b[m_.steps.count];
-    const std::uint32_t block_a = level_a == kSphereLevel ? leaf_a / kWidth : leaf_a;
-    const std::uint32_t block_b = level_b == kSphereLevel ? leaf_b / kWidth : leaf_b;
-    const BallBlock& a = m_.tree[0].blocks[0][block_a];
-    const BallBlock& b = m_.tree[1].blocks[0][block_b];
-    const Origin& origin_a = m_.tree[0].origins[0][block_a];
-    const Origin& origin_b = m_.tree[1].origins[0][block_b];
-    const PairMap& map = m_.place.a_from_b;
-    const Real scale = static_cast<Real>(map.scale);
-    const double from[3] = {origin_b.x, origin_b.y, origin_b.z};
-    double moved[3];
-    map.apply(from, moved);
-    const Real off[3] = {static_cast<Real>(moved[0] - origin_a.x),
-                         static_cast<Real>(moved[1] - origin_a.y),
-                         static_cast<Real>(moved[2] - origin_a.z)};
-    const NodeBall ball_a = m_.tree[0].ball(level_a, leaf_a);
-    const NodeBall ball_b = m_.tree[1].ball(level_b, leaf_b);
-    map.apply(ball_b.centre, moved);
-    const LensSide<Real> near_a = {static_cast<Real>(ball_a.centre[0] - origin_a.x),
-                                   static_cast<Real>(ball_a.centre[1] - origin_a.y),
-                                   static_cast<Real>(ball_a.centre[2] - origin_a.z),
-                                   static_cast<Real>(ball_a.r)};
-    const LensSide<Real> near_b = {
-        static_cast<Real>(moved[0] - origin_a.x), static_cast<Real>(moved[1] - origin_a.y),
-        static_cast<Real>(moved[2] - origin_a.z), static_cast<Real>(ball_b.r * map.scale)};
-    const Real* const turn = m_.turn;
-    const Real bx = b.x[lane], by = b.y[lane], bz = b.z[lane];
-    side[0].sphere = {a.x[lane], a.y[lane], a.z[lane], a.r[lane]};
-    side[1].sphere = {((turn[0] * bx + turn[1] * by) + turn[2] * bz) + off[0],
-                      ((turn[3] * bx + turn[4] * by) + turn[5] * bz) + off[1],
-                      ((turn[6] * bx + turn[7] * by) + turn[8] * bz) + off[2], b.r[lane] * scale};
-    side[0].there =
-        (level_a != kSphereLevel || leaf_a % kWidth == lane) && reaches(side[0].sphere, near_b);
-    side[1].there =
-        (level_b != kSphereLevel || leaf_b % kWidth == lane) && reaches(side[1].sphere, near_a);
-    if (lane != 0) return;
-    // What each sphere's coordinates are rounded by is bounded by how far the balls reach.
-    constexpr Real kRounding = 12 * (sizeof(Real) == 4 ? Real(0x1p-24) : Real(0x1p-53));
-    m_.block[half] = {static_cast<Real>(origin_a.x - map.t[0]),
-                      static_cast<Real>(origin_a.y - map.t[1]),
-                      static_cast<Real>(origin_a.z - map.t[2]),
-                      kRounding * ((largest(near_a) + near_a.r) + (largest(near_b) + near_b.r))};
+  IST_HD static unsigned share_of(int width) {
+    return width > 0 ? 0xFFFFu / static_cast<unsigned>(width) + 1 : 0;
   }
 
-  IST_HD static Real largest(const LensSide<Real>& ball) {
-    const Real x = ball.x < 0 ? -ball.x : ball.x;
-    const Real y = ball.y < 0 ? -ball.y : ball.y;
-    const Real z = ball.z < 0 ? -ball.z : ball.z;
+  /// Sphere `lane` of both leaves of a pair, and whether it reaches the other's ball.
+  IST_HD void look(int k, std::uint32_t lane, Ball (&sphere)[2], bool (&there)[2]) const {
+    const MeetingPairs& pairs = m_.meeting;
+    const BallBlock& a = m_.tree[0].blocks[0][pairs.block_a[k]];
+    const BallBlock& b = m_.tree[1].blocks[0][pairs.block_b[k]];
+    const float* const turn = m_.turn;
+    const Ball off = pairs.off[k];
+    const float bx = b.x[lane], by = b.y[lane], bz = b.z[lane];
+    sphere[0] = {a.x[lane], a.y[lane], a.z[lane], a.r[lane]};
+    sphere[1] = {std::fma(turn[0], bx, std::fma(turn[1], by, std::fma(turn[2], bz, off.x))),
+                 std::fma(turn[3], bx, std::fma(turn[4], by, std::fma(turn[5], bz, off.y))),
+                 std::fma(turn[6], bx, std::fma(turn[7], by, std::fma(turn[8], bz, off.z))),
+                 b.r[lane] * static_cast<float>(m_.place.a_from_b.scale)};
+    there[0] = (pairs.lanes[k] >> lane & 1) != 0 && reaches(sphere[0], pairs.near_b[k], off.r);
+    there[1] =
+        (pairs.lanes[k] >> (16 + lane) & 1) != 0 && reaches(sphere[1], pairs.near_a[k], off.r);
+  }
+
+  IST_HD static float largest(const Ball& ball) {
+    const float x = ball.x < 0 ? -ball.x : ball.x;
+    const float y = ball.y < 0 ? -ball.y : ball.y;
+    const float z = ball.z < 0 ? -ball.z : ball.z;
     return x > y ? (x > z ? x : z) : (y > z ? y : z);
   }
 
-  IST_HD static bool reaches(const LensSide<Real>& sphere, const LensSide<Real>& ball) {
-    const Real dx = sphere.x - ball.x, dy = sphere.y - ball.y, dz = sphere.z - ball.z;
-    const Real reach = (sphere.r + ball.r) * (1 + kRoom);
-    return sphere.r > 0 && dx * dx + dy * dy + dz * dz < reach * reach;
+  IST_HD static bool reaches(const Ball& sphere, const Ball& ball, float rounding) {
+    const float dx = sphere.x - ball.x, dy = sphere.y - ball.y, dz = sphere.z - ball.z;
+    const float reach = (sphere.r + ball.r) + rounding;
+    return sphere.r > 0 && std::fma(dx, dx, std::fma(dy, dy, dz * dz)) < reach * reach;
   }
 
-  /// Sums listed lenses, as many at once as the team is wide, until fewer than `full` are left; of
-  /// 0 all.
+  /// Sums listed lenses, as many at once as the team is wide, until fewer than `full` are left.
   IST_HD void sum_list(int full) {
-    while (listed_ > 0 && listed_ >= full) {
+    while (listed_ >= full) {
       const int take = listed_ < Team::kWidth ? listed_ : Team::kWidth;
       listed_ -= take;
       const int k = listed_ + team_.lane();
-      if (team_.lane() < take) add_lens(m_.lever[k], m_.apart[k], m_.rounding[k], sum_);
-      team_.sync();
+      bool meets = false;
+      if (team_.lane() < take) {
+        const LensBall a = seen(true, m_.list_a[k]);
+        LensBall b = seen(false, m_.list_b[k]);
+        for (int i = 0; i < 3; ++i) b.at[i] -= a.at[i];
+        meets = add_lens(a, b, m_.unit, sum_);
+      }
+      int total = 0;
+      team_.exclusive_count(meets, total);
+      spheres_ += static_cast<std::uint32_t>(total);
       count_sum();
     }
   }
@@ -357,10 +388,16 @@ class PairDescent {
   }
 
   IST_HD void fold() {
-    for (int k = 0; k < kTerms; ++k) {
-      const double sum = team_.sum(static_cast<double>(sum_[k]));
-      if (team_.lane() == 0) m_.totals.term[k] += sum;
-      sum_[k] = 0;
+    if (summed_ > 0) {
+      const double back = 1 / m_.unit;
+      for (int k = 0; k < kTerms; ++k) {
+        const double sum = team_.sum(static_cast<double>(sum_[k]));
+        sum_[k] = 0;
+        if (team_.lane() != 0) continue;
+        double factor = back * back;
+        for (int p = power_of(k); p > 2; --p) factor *= back;
+        m_.totals.term[k] += sum * factor;
+      }
     }
     if (team_.lane() == 0) {
       m_.totals.spheres += spheres_;
@@ -377,10 +414,10 @@ class PairDescent {
   static constexpr float kRoom = 2e-6f;  ///< share of a distance, above its rounding
 
   const Team& team_;
-  PairMemory<Real>& m_;
+  PairMemory& m_;
   int size_ = 0, leaves_ = 0, listed_ = 0;
   std::uint32_t met_ = 0;      ///< pairs of leaves
-  Real sum_[kTerms];           ///< this lane's
+  float sum_[kTerms];          ///< this lane's
   int summed_ = 0;             ///< numbers in it, at most
   std::uint32_t spheres_ = 0;  ///< the team's
   std::uint32_t visits_ = 0;

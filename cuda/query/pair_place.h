@@ -14,8 +14,17 @@ struct PairMap {
   double m[9], t[3], scale;
 
   IST_HD void apply(const double (&x)[3], double (&y)[3]) const {
-    for (int i = 0; i < 3; ++i)
-      y[i] = (m[3 * i] * x[0] + m[3 * i + 1] * x[1]) + m[3 * i + 2] * x[2] + t[i];
+    for (int i = 0; i < 3; ++i) y[i] = along(i, x, t[i]);
+  }
+  /// Without the translation.
+  IST_HD void turn(const double (&x)[3], double (&y)[3]) const {
+    for (int i = 0; i < 3; ++i) y[i] = along(i, x, 0);
+  }
+
+ private:
+  IST_HD double along(int i, const double (&x)[3], double from) const {
+    return std::fma(m[3 * i], x[0],
+                    std::fma(m[3 * i + 1], x[1], std::fma(m[3 * i + 2], x[2], from)));
   }
 };
 

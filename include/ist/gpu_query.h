@@ -89,7 +89,7 @@ class GpuWorkspace {
 
 /// answers[i] = penetration(pairs[i]) by lenses (FieldUse::never), finished.
 ///
-/// The volume is within 1e-6 of the sum in double, gradients within 2e-6 of the lenses' single ones
+/// The volume is within 1e-6 of the sum in double, gradients within 1e-6 of the lenses' single ones
 /// together or of volume^(2/3), if that is more. The same bits in every run, whatever else is in
 /// the batch.
 /// Only launches kernels on `stream`: allocates nothing and waits for nothing, so that a CUDA graph

@@ -43,8 +43,7 @@ class HostBatch {
                     std::vector<double>(3 * n),         std::vector<double>(3 * n),
                     std::vector<QueryStatus>(n),        std::vector<std::uint32_t>(n),
                     std::vector<std::uint32_t>(n)};
-    std::vector<std::uint32_t> lists[2] = {std::vector<std::uint32_t>(n),
-                                           std::vector<std::uint32_t>(n)};
+    std::vector<std::uint32_t> list(n);
     std::vector<gpu::SplitPair> splits(room_);
     std::vector<gpu::PairTask> tasks(room_);
     std::vector<gpu::LensTotals> totals(2 * std::size_t{room_});
@@ -58,7 +57,7 @@ class HostBatch {
         {to.volume.data(), to.centroid.data(), to.push.data(), to.turn.data(), to.status.data(),
          to.visits.data(), to.spheres.data()},
         &counters,
-        {lists[0].data(), lists[1].data()},
+        list.data(),
         splits.data(),
         tasks.data(),
         totals.data(),
@@ -67,31 +66,21 @@ class HostBatch {
         room_,
         room_,
         room_};
-    for (std::uint32_t i = 0; i < n; ++i) {
-      const int list = gpu::sift_pair(batch, i);
-      if (list >= 0) lists[list][counters.listed[list]++] = i;
-    }
-    sum<float>(batch, 0, seed);
-    sum<double>(batch, 1, seed);
-
+    for (std::uint32_t i = 0; i < n; ++i)
+      if (gpu::sift_pair(batch, i)) list[counters.listed++] = i;
+    sum(batch, seed);
     return to.rows();
   }
 
   gpu::BatchCounters counters;  ///< of the last run
 
  private:
-  template <class Real>
-  void sum(const gpu::BatchArrays& batch, int kind, unsigned seed) {
-    const auto memory = std::make_unique<gpu::PairMemory<Real>>();
-    for (std::uint32_t k = 0; k < counters.listed[kind]; ++k)
-      by_team(seed, [&](const auto& team) {
-        gpu::sum_pair<std::decay_t<decltype(team)>, Real>(team, batch, batch.list[kind][k],
-                                                          *memory);
-      });
-    for (std::uint32_t k = 0; k < std::min(counters.tasks[kind], room_); ++k)
-      by_team(seed, [&](const auto& team) {
-        gpu::sum_task<std::decay_t<decltype(team)>, Real>(team, batch, k, *memory);
-      });
+  void sum(const gpu::BatchArrays& batch, unsigned seed) {
+    const auto memory = std::make_unique<gpu::PairMemory>();
+    for (std::uint32_t k = 0; k < counters.listed; ++k)
+      by_team(seed, [&](const auto& team) { gpu::sum_pair(team, batch, batch.list[k], *memory); });
+    for (std::uint32_t k = 0; k < std::min(counters.tasks, room_); ++k)
+      by_team(seed, [&](const auto& team) { gpu::sum_task(team, batch, k, *memory); });
   }
 
   template <class Work>
