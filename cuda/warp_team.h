@@ -59,6 +59,8 @@ struct WarpTeam {
     return __popc(raised & ((1u << lane()) - 1u));
   }
 
+  __device__ std::uint32_t ballot(bool flag) const { return __ballot_sync(kAll, flag); }
+
   __device__ int first(bool flag, int& total) const {
     const unsigned raised = __ballot_sync(kAll, flag);
     total = __popc(raised);

@@ -59,10 +59,13 @@ struct BatchArrays {
   // Room for what is split; what finds none is summed by the team that met it.
   SplitPair* splits;
   PairTask* tasks;
+  PairPlace* places;   ///< [split_room]
   LensTotals* totals;  ///< of splits[0]: [split_room + task_room]
   std::uint32_t* entries_a;
   std::uint32_t* entries_b;
   std::uint32_t split_room, task_room, entry_room;
+  std::uint32_t most_alone = 128;  ///< pairs of leaves that a descent meets before it is split
+  std::uint32_t task_weight = 64;  ///< of a task, as task_floor() counts
 };
 
 }  // namespace ist::gpu

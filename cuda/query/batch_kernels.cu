@@ -10,7 +10,8 @@ namespace {
 constexpr unsigned kSiftThreads = 256;
 constexpr unsigned kWarps = 4;
 constexpr unsigned kThreads = 32 * kWarps;
-constexpr int kBlocksEach = 5;  ///< a multiprocessor; more leave too few registers
+constexpr std::uint32_t kHandOut = 4;  ///< pairs a warp, of a batch's last
+constexpr int kBlocksEach = 5;         ///< a multiprocessor; more leave too few registers
 
 /// Places every pair and lists those whose roots meet.
 __global__ void __launch_bounds__(kSiftThreads) sift_pairs(const BatchArrays batch) {
@@ -43,10 +44,12 @@ __device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& 
 __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchArrays batch) {
   __shared__ PairMemory memory[kWarps];
   BatchCounters& counters = *batch.counters;
-  by_warps(load_fresh(&counters.listed), &counters.taken,
-           [&](const WarpTeam& team, std::uint32_t k) {
-             sum_pair(team, batch, batch.list[k], memory[threadIdx.x / 32]);
-           });
+  // All warps stay busy until near the end: only what is taken last is handed out.
+  const std::uint32_t listed = load_fresh(&counters.listed);
+  const std::uint32_t last = kHandOut * kWarps * gridDim.x;
+  by_warps(listed, &counters.taken, [&](const WarpTeam& team, std::uint32_t k) {
+    sum_pair(team, batch, batch.list[k], k + last >= listed, memory[threadIdx.x / 32]);
+  });
 }
 
 __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_tasks(const BatchArrays batch) {

@@ -12,10 +12,6 @@
 
 namespace ist::gpu {
 
-/// Pairs of leaf blocks that a descent meets before it is split, and the weight of a task.
-constexpr std::uint32_t kMostAlone = 96;
-constexpr std::uint32_t kTaskWeight = 16;
-
 IST_HD inline void write3(double* to, std::uint32_t i, double x, double y, double z) {
   if (to == nullptr) return;
   to[3 * std::uint64_t{i}] = x;
@@ -74,6 +70,37 @@ IST_HD inline bool place_pair(const BatchArrays& batch, std::uint32_t i, PairPla
                      pairs.scale_b != nullptr ? pairs.scale_b[i] : 1);
 }
 
+/// Whether some child of a root meets some child of the other root, to rounding.
+IST_HD inline bool children_meet(const TreeRef& a, const TreeRef& b, const PairMap& map) {
+  const BallBlock& of_a = in_global_memory(a.blocks[a.top])[0];
+  const BallBlock& of_b = in_global_memory(b.blocks[b.top])[0];
+  const Origin& from_a = a.origins[a.top][0];
+  const Origin& from_b = b.origins[b.top][0];
+  const auto scale = static_cast<float>(map.scale);
+  IST_ROLLED
+  for (std::uint32_t j = 0; j < kWidth; ++j) {
+    if (!(of_b.r[j] > 0)) continue;
+    const double centre[3] = {from_b.x + static_cast<double>(of_b.x[j]),
+                              from_b.y + static_cast<double>(of_b.y[j]),
+                              from_b.z + static_cast<double>(of_b.z[j])};
+    double moved[3];
+    map.apply(centre, moved);
+    const auto x = static_cast<float>(moved[0] - from_a.x);
+    const auto y = static_cast<float>(moved[1] - from_a.y);
+    const auto z = static_cast<float>(moved[2] - from_a.z);
+    const float r = of_b.r[j] * scale;
+    bool meets = false;
+    for (std::uint32_t i = 0; i < kWidth; ++i) {
+      const float dx = of_a.x[i] - x, dy = of_a.y[i] - y, dz = of_a.z[i] - z;
+      const float reach = (of_a.r[i] + r) * (1 + kRoom);
+      meets =
+          meets || (of_a.r[i] > 0 && std::fma(dx, dx, std::fma(dy, dy, dz * dz)) < reach * reach);
+    }
+    if (meets) return true;
+  }
+  return false;
+}
+
 /// Whether pair i is to be summed; else it is answered. One thread a pair.
 IST_HD inline bool sift_pair(const BatchArrays& batch, std::uint32_t i) {
   PairPlace place;
@@ -93,33 +120,38 @@ IST_HD inline bool sift_pair(const BatchArrays& batch, std::uint32_t i) {
     write_nothing(batch.answers, i, QueryStatus::ok);
     return false;
   }
-  return true;
+  if (children_meet(a, b, place.a_from_b)) return true;
+  write_nothing(batch.answers, i, QueryStatus::ok);
+  return false;
 }
 
-/// Readies the memory for pair i.
+/// Copies what shared and global memory hold, a word a lane.
+template <class Team, class T>
+IST_HD void copy_words(const Team& team, const T& from, T& to) {
+  static_assert(sizeof(T) % 4 == 0);
+  const auto* const words = reinterpret_cast<const std::uint32_t*>(&from);
+  auto* const copies = reinterpret_cast<std::uint32_t*>(&to);
+  for (int k = team.lane(); k < static_cast<int>(sizeof(T) / 4); k += Team::kWidth)
+    copies[k] = words[k];
+}
+
+/// Readies the memory for pair i, whose place is set or is there after the team's next sync.
 template <class Team>
-IST_HD void load_pair(const Team& team, const BatchArrays& batch, std::uint32_t i,
-                      PairMemory& memory) {
-  if (team.lane() == 0) place_pair(batch, i, memory.place);
+IST_HD void load_trees(const Team& team, const BatchArrays& batch, std::uint32_t i,
+                       PairMemory& memory) {
   const auto measure = static_cast<std::uint32_t>(batch.measure);
-  const std::uint32_t asset[2] = {batch.pairs.asset_a[i], batch.pairs.asset_b[i]};
-  for (int side = 0; side < 2; ++side) {
-    const auto* const from =
-        reinterpret_cast<const std::uint32_t*>(&batch.assets[asset[side]].tree[measure]);
-    auto* const to = reinterpret_cast<std::uint32_t*>(&memory.tree[side]);
-    for (int k = team.lane(); k < static_cast<int>(sizeof(TreeRef) / 4); k += Team::kWidth)
-      to[k] = from[k];
-  }
+  copy_words(team, batch.assets[batch.pairs.asset_a[i]].tree[measure], memory.tree[0]);
+  copy_words(team, batch.assets[batch.pairs.asset_b[i]].tree[measure], memory.tree[1]);
   team.sync();
 }
 
 /// The lowest entry of the task that begins with the topmost of `waiting` entries.
-IST_HD inline int task_floor(const PairMemory& memory, int waiting) {
+IST_HD inline int task_floor(const BatchArrays& batch, const PairMemory& memory, int waiting) {
   std::uint32_t weight = 0;
-  while (waiting > 0 && weight < kTaskWeight) {
+  while (waiting > 0 && weight < batch.task_weight) {
     const int left =
         memory.steps.count - 1 - static_cast<int>(memory.stack_a[waiting - 1] >> kNodeBits);
-    weight += left >= 2 ? kTaskWeight : 1u << 2 * left;
+    weight += left >= 2 ? batch.task_weight : 1u << 2 * left;
     --waiting;
   }
   return waiting;
@@ -130,7 +162,7 @@ template <class Team>
 IST_HD bool split_pair(const Team& team, const BatchArrays& batch, std::uint32_t i,
                        PairMemory& memory, int waiting) {
   int tasks = 0;
-  for (int top = waiting; top > 0; ++tasks) top = task_floor(memory, top);
+  for (int top = waiting; top > 0; ++tasks) top = task_floor(batch, memory, top);
   std::uint32_t split = 0, task = 0, entry = 0;
   if (team.lane() == 0) {
     BatchCounters& counters = *batch.counters;
@@ -148,7 +180,7 @@ IST_HD bool split_pair(const Team& team, const BatchArrays& batch, std::uint32_t
     // Room that was taken and does not do stays unused: its tasks hold nothing.
     int top = waiting;
     for (int k = 0; k < tasks; ++k) {
-      const int floor = task_floor(memory, top);
+      const int floor = task_floor(batch, memory, top);
       const std::uint32_t at = task + static_cast<std::uint32_t>(k);
       if (at < batch.task_room)
         batch.tasks[at] = {split, entry + static_cast<std::uint32_t>(floor),
@@ -158,10 +190,11 @@ IST_HD bool split_pair(const Team& team, const BatchArrays& batch, std::uint32_t
     if (fits) {
       batch.splits[split] = {i, task, static_cast<std::uint32_t>(tasks),
                              static_cast<std::uint32_t>(tasks)};
-      batch.totals[split] = memory.totals;
+      batch.totals[split] = memory.sum;
     }
   }
   if (!fits) return false;
+  copy_words(team, memory.place, batch.places[split]);
   for (int k = team.lane(); k < waiting; k += Team::kWidth) {
     batch.entries_a[entry + static_cast<std::uint32_t>(k)] = memory.stack_a[k];
     batch.entries_b[entry + static_cast<std::uint32_t>(k)] = memory.stack_b[k];
@@ -169,30 +202,32 @@ IST_HD bool split_pair(const Team& team, const BatchArrays& batch, std::uint32_t
   return true;
 }
 
-/// Sums pair i, or as much of it as one team is to do alone.
+/// Sums pair i, or as much of it as one team is to do alone if the rest is to be handed out.
 template <class Team>
-IST_HD void sum_pair(const Team& team, const BatchArrays& batch, std::uint32_t i,
+IST_HD void sum_pair(const Team& team, const BatchArrays& batch, std::uint32_t i, bool hand_out,
                      PairMemory& memory) {
-  load_pair(team, batch, i, memory);
+  if (team.lane() == 0) place_pair(batch, i, memory.place);
+  load_trees(team, batch, i, memory);
   PairDescent<Team> descent(team, memory);
   descent.start();
-  descent.run(0, kMostAlone);
-  if (descent.waiting() > 0) {
-    if (split_pair(team, batch, i, memory, descent.waiting())) return;
-    // The tasks one by one, and their sums added up as if others had done them.
-    LensTotals sum = memory.totals;
-    while (descent.waiting() > 0) {
-      if (team.lane() == 0) memory.totals.clear();
-      const int floor = task_floor(memory, descent.waiting());
-      team.sync();
-      descent.run(floor, ~0u);
-      sum.add(memory.totals);
-      team.sync();
+  if (team.lane() == 0) memory.sum.clear();
+  // Tasks that nobody takes are done one by one, their sums added up as if others had done them.
+  int floor = 0;
+  std::uint32_t most = batch.most_alone;
+  for (;;) {
+    descent.run(floor, most);
+    if (team.lane() == 0) {
+      memory.sum.add(memory.totals);
+      memory.totals.clear();
     }
-    if (team.lane() == 0) memory.totals = sum;
+    team.sync();
+    if (descent.waiting() == 0) break;
+    if (hand_out && most != ~0u && split_pair(team, batch, i, memory, descent.waiting())) return;
+    most = ~0u;
+    descent.divide();
+    floor = task_floor(batch, memory, descent.waiting());
   }
-  team.sync();
-  if (team.lane() == 0) write_answer(batch.answers, i, memory.place, memory.totals);
+  if (team.lane() == 0) write_answer(batch.answers, i, memory.place, memory.sum);
   team.sync();
 }
 
@@ -203,7 +238,8 @@ IST_HD void sum_task(const Team& team, const BatchArrays& batch, std::uint32_t i
   const PairTask task = batch.tasks[index];
   if (task.count == 0) return;
   SplitPair& split = batch.splits[task.split];
-  load_pair(team, batch, split.pair, memory);
+  copy_words(team, batch.places[task.split], memory.place);
+  load_trees(team, batch, split.pair, memory);
   PairDescent<Team> descent(team, memory);
   descent.resume(batch.entries_a + task.first, batch.entries_b + task.first,
                  static_cast<int>(task.count));

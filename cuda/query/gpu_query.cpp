@@ -128,6 +128,7 @@ struct GpuWorkspace::Impl {
     arrays.list = parts.take<std::uint32_t>(most_pairs);
     arrays.splits = parts.take<gpu::SplitPair>(kSplitRoom);
     arrays.tasks = parts.take<gpu::PairTask>(kTaskRoom);
+    arrays.places = parts.take<gpu::PairPlace>(kSplitRoom);
     arrays.totals = parts.take<gpu::LensTotals>(kSplitRoom + kTaskRoom);
     arrays.entries_a = parts.take<std::uint32_t>(kEntryRoom);
     arrays.entries_b = parts.take<std::uint32_t>(kEntryRoom);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -19,10 +20,17 @@ class PairDescent {
     if (team_.lane() == 0) {
       m_.steps.plan(m_.tree[0], m_.tree[1], m_.place.a_from_b.scale);
       m_.totals.clear();
-      for (int i = 0; i < 9; ++i) m_.turn[i] = static_cast<float>(m_.place.a_from_b.m[i]);
+      const PairMap& map = m_.place.a_from_b;
+      for (int i = 0; i < 3; ++i)
+        m_.turn[i] = {static_cast<float>(map.m[3 * i]), static_cast<float>(map.m[3 * i + 1]),
+                      static_cast<float>(map.m[3 * i + 2]), static_cast<float>(map.scale)};
+      m_.to_single = m_.steps.level_a[m_.steps.count] == kSphereLevel ||
+                     m_.steps.level_b[m_.steps.count] == kSphereLevel;
       const double b = m_.tree[1].root[3] * m_.place.a_from_b.scale;
       m_.unit = std::ldexp(1.0, -std::ilogb(b < m_.tree[0].root[3] ? b : m_.tree[0].root[3]));
     }
+    for (int n = team_.lane(); n <= static_cast<int>(kWidth); n += Team::kWidth)
+      m_.share[n] = n > 0 ? 0xFFFFu / static_cast<unsigned>(n) + 1 : 0;
     for (float& s : sum_) s = 0;
     team_.sync();
   }
@@ -35,6 +43,7 @@ class PairDescent {
       (no_steps ? m_.leaf_b : m_.stack_b)[0] = 0;
     }
     (no_steps ? leaves_ : size_) = 1;
+    wide_ = kFirstRoom - (m_.steps.count * kGrowth + kPairsAtOnce);
     team_.sync();
   }
 
@@ -45,15 +54,20 @@ class PairDescent {
       m_.stack_b[k] = b[k];
     }
     size_ = count;
+    divide();
     team_.sync();
   }
 
-  /// Goes on until no more than `floor` pairs wait, or `most` pairs of leaves and more have been
-  /// met and none of them waits.
+  /// From here on in tasks: what lies below the floor of one does not show in its sums.
+  IST_HD void divide() { wide_ = kTaskRoom; }
+
+  /// Goes on until no more than `floor` pairs wait, or at least `most` pairs of leaves have been
+  /// met and what waits leaves room for tasks.
   IST_HD void run(int floor, std::uint32_t most) {
     while (size_ > floor || leaves_ > 0) {
-      if (met_ >= most && leaves_ == 0) break;
-      if (size_ > floor && leaves_ < kAhead && met_ < most)
+      const bool enough = met_ >= most && size_ <= wide_;
+      if (enough && leaves_ == 0) break;
+      if (size_ > floor && leaves_ < kAhead && !enough)
         open(size_ - floor);
       else
         meet();
@@ -72,14 +86,13 @@ class PairDescent {
   };
 
   IST_HD static Pair unpacked(std::uint32_t a, std::uint32_t b) {
-    return {a & ((1u << kNodeBits) - 1), b, static_cast<int>(a >> kNodeBits)};
+    return {a & kNodeMask, b, static_cast<int>(a >> kNodeBits)};
   }
 
-  /// How many of the pairs on top are opened together: never more than `have` and than there is
-  /// room for what they may leave, whatever lies above them.
+  /// How many of the `have` pairs on top of a floor are opened together. There is room for what two
+  /// at a time leave, from any number up to wide_ on.
   IST_HD int breadth(int have) const {
-    const int reserve = m_.steps.count * kGrowth + kPairsAtOnce;
-    const int by_stack = (kStackRoom - reserve - size_) / (static_cast<int>(kWidth) - 1);
+    const int by_stack = (wide_ - have) / (static_cast<int>(kWidth) - 1);
     const int by_leaves = (kLeafRoom - leaves_) / static_cast<int>(kWidth);
     int most = by_stack < by_leaves ? by_stack : by_leaves;
     most = most < kAhead ? most : kAhead;
@@ -99,7 +112,8 @@ class PairDescent {
     for (int first = 0; first < have; first += kPairsAtOnce)
       for (int i = 0; i < kItemsALane; ++i) {
         const int k = first + item(i) / static_cast<int>(kWidth);
-        open_item(k, static_cast<std::uint32_t>(item(i)) % kWidth, k < have);
+        const auto lane = static_cast<std::uint32_t>(item(i)) % kWidth;
+        open_item(k < have ? k : first, lane, k < have);
       }
     team_.sync();
   }
@@ -121,40 +135,39 @@ class PairDescent {
         static_cast<float>(moved[0] - origin.x), static_cast<float>(moved[1] - origin.y),
         static_cast<float>(moved[2] - origin.z), static_cast<float>(ball.r * map.scale)};
     m_.opening.block[k] = x.blocks[level_x] + opened;
-    m_.opening.a[k] = entry_a;
-    m_.opening.b[k] = entry_b;
+    const bool to_leaf = pair.step + 1 >= m_.steps.count;
+    const std::uint32_t next = to_leaf ? 0 : static_cast<std::uint32_t>(pair.step + 1) << kNodeBits;
+    m_.opening.a[k] = (of_a ? pair.a * kWidth : pair.a) | next;
+    m_.opening.b[k] = of_a ? pair.b : pair.b * kWidth;
+    m_.opening.how[k] = (of_a ? kOpensA : 0) | (to_leaf ? kToLeaf : 0) |
+                        ((of_a ? level_b : level_a) == kSphereLevel ? kIntoOne : 0) |
+                        static_cast<std::uint32_t>(level_x - 1) << kLevelBit;
   }
 
+  /// Puts the pair's child where the step that comes next takes it, if it meets the other side.
   IST_HD void open_item(int k, std::uint32_t lane, bool active) {
-    bool meets = false, contained = false;
-    Pair pair = {0, 0, 0};
-    bool of_a = false;
-    if (active) {
-      const Ball other = m_.opening.other[k];
-      const BallBlock& block = *in_global_memory(m_.opening.block[k]);
-      pair = unpacked(m_.opening.a[k], m_.opening.b[k]);
-      of_a = m_.steps.opens_a[pair.step];
-      const float dx = block.x[lane] - other.x;
-      const float dy = block.y[lane] - other.y;
-      const float dz = block.z[lane] - other.z;
-      const float d2 = std::fma(dx, dx, std::fma(dy, dy, dz * dz));
-      const float radius = block.r[lane];
-      const float reach = (radius + other.r) * (1 + kRoom);
-      meets = radius > 0 && d2 < reach * reach;
-      const int level = of_a ? m_.steps.level_b[pair.step] : m_.steps.level_a[pair.step];
+    const Ball other = m_.opening.other[k];
+    const BallBlock& block = *in_global_memory(m_.opening.block[k]);
+    const std::uint32_t how = m_.opening.how[k];
+    const float dx = block.x[lane] - other.x;
+    const float dy = block.y[lane] - other.y;
+    const float dz = block.z[lane] - other.z;
+    const float radius = block.r[lane];
+    const float d2 = std::fma(dx, dx, std::fma(dy, dy, dz * dz));
+    const float reach = (radius + other.r) * (1 + kRoom);
+    bool meets = active && radius > 0 && d2 < reach * reach;
+    const bool of_a = (how & kOpensA) != 0;
+    const std::uint32_t a = m_.opening.a[k] + (of_a ? lane : 0);
+    const std::uint32_t b = m_.opening.b[k] + (of_a ? 0 : lane);
+    if (m_.to_single) {
       const float within = (other.r - radius) * (1 - kRoom);
-      contained = meets && level == kSphereLevel && within > 0 && d2 < within * within;
+      const bool contained = meets && (how & kIntoOne) != 0 && within > 0 && d2 < within * within;
+      meets = meets && !contained;
+      if (team_.any(contained))
+        add_contained(contained, of_a, static_cast<int>(how >> kLevelBit),
+                      (of_a ? a : b) & kNodeMask);
     }
-    const std::uint32_t child = (of_a ? pair.a : pair.b) * kWidth + lane;
-    push(meets && !contained, of_a ? child : pair.a, of_a ? pair.b : child, pair.step + 1);
-    if (team_.any(contained))
-      add_contained(contained, of_a,
-                    of_a ? m_.steps.level_a[pair.step] : m_.steps.level_b[pair.step], child);
-  }
-
-  /// Puts a pair where the step that comes next takes it.
-  IST_HD void push(bool waits, std::uint32_t a, std::uint32_t b, int step) {
-    const bool leaf = waits && step >= m_.steps.count;
+    const bool leaf = meets && (how & kToLeaf) != 0;
     int total = 0;
     int place = leaves_ + team_.exclusive_count(leaf, total);
     leaves_ += total;
@@ -162,17 +175,17 @@ class PairDescent {
       m_.leaf_a[place] = a;
       m_.leaf_b[place] = b;
     }
-    const bool node = waits && !leaf;
+    const bool node = meets && !leaf;
     place = size_ + team_.exclusive_count(node, total);
     size_ += total;
     if (node) {
-      m_.stack_a[place] = a | static_cast<std::uint32_t>(step) << kNodeBits;
+      m_.stack_a[place] = a;
       m_.stack_b[place] = b;
     }
   }
 
-  /// Adds up the spheres below the children of level − 1 that lanes flag: each child lies in one
-  /// sphere of the other side.
+  /// Adds up the spheres below the nodes that lanes flag: each lies in one sphere of the other
+  /// side.
   IST_HD void add_contained(bool flag, bool of_a, int level, std::uint32_t child) {
     for (;;) {
       int total = 0;
@@ -180,7 +193,7 @@ class PairDescent {
       if (total == 0) return;
       if (team_.lane() == lane) flag = false;
       const bool a = team_.broadcast(of_a ? 1 : 0, lane) != 0;
-      add_subtree(a, team_.broadcast(level, lane) - 1, team_.broadcast(child, lane));
+      add_subtree(a, team_.broadcast(level, lane), team_.broadcast(child, lane));
     }
   }
 
@@ -267,86 +280,87 @@ class PairDescent {
   }
 
   IST_HD void meet_two(int first, int have) {
-    int near[2] = {0, 0}, of_first[2] = {0, 0};
+    Ball sphere[2][kItemsALane];
+    std::uint32_t there[2] = {0, 0};  // bit k: item k's
     for (int i = 0; i < kItemsALane; ++i) {
-      const int half = item(i) / static_cast<int>(kWidth);
-      const int k = first + half;
-      const std::uint32_t lane = static_cast<std::uint32_t>(item(i)) % kWidth;
-      Ball sphere[2] = {};
-      bool there[2] = {false, false};
-      if (k < have) look(k, lane, sphere, there);
-      for (int s = 0; s < 2; ++s) {
-        int total = 0;
-        const int place = near[s] + team_.exclusive_count(there[s], total);
-        near[s] += total;
-        team_.exclusive_count(there[s] && half == 0, total);
-        of_first[s] += total;
-        if (!there[s]) continue;
-        m_.near[s][place] = sphere[s];
-        m_.number[s][place] = (s == 0 ? m_.meeting.block_a : m_.meeting.block_b)[k] * kWidth + lane;
-      }
+      const int k = first + item(i) / static_cast<int>(kWidth);
+      const auto lane = static_cast<std::uint32_t>(item(i)) % kWidth;
+      bool near[2];
+      look(k < have ? k : first, lane, sphere[0][i], sphere[1][i], near);
+      for (int s = 0; s < 2; ++s)
+        there[s] |= team_.ballot(near[s] && k < have) << (i * Team::kWidth);
     }
-    const int in_first = of_first[0] * of_first[1];
-    const int rows = near[1] - of_first[1];  // spheres of B in the second pair
-    const int tests = in_first + (near[0] - of_first[0]) * rows;
-    if (tests == 0) {
-      team_.sync();
-      return;
+    if (there[0] == 0 || there[1] == 0) return;
+    for (int i = 0; i < kItemsALane; ++i) {
+      const int k = first + item(i) / static_cast<int>(kWidth);
+      const std::uint32_t bit = 1u << item(i);
+      for (int s = 0; s < 2; ++s) {
+        if ((there[s] & bit) == 0) continue;
+        const int place = bits(there[s] & (bit - 1));
+        m_.near[s][place] = sphere[s][i];
+        m_.number[s][place] = (s == 0 ? m_.meeting.block_a : m_.meeting.block_b)[k] * kWidth +
+                              static_cast<std::uint32_t>(item(i)) % kWidth;
+      }
     }
     team_.sync();
-    // k · share >> 16 is k / width, for k < 256 and width ≤ 16.
-    const unsigned share[2] = {share_of(of_first[1]), share_of(rows)};
+    // Spheres of A and B in the first pair and in the second.
+    constexpr std::uint32_t kFirst = (1u << kWidth) - 1;
+    const int a0 = bits(there[0] & kFirst), b0 = bits(there[1] & kFirst);
+    const int a1 = bits(there[0]) - a0, b1 = bits(there[1]) - b0;
+    const int in_first = a0 * b0, tests = in_first + a1 * b1;
+    const int last = first + 1 < have ? first + 1 : first;
+    const float rounding[2] = {m_.meeting.off[first].r, m_.meeting.off[last].r};
+    const std::uint32_t share[2] = {m_.share[b0], m_.share[b1]};
+    IST_ROLLED
     for (int base = 0; base < tests; base += Team::kWidth) {
       const int k = base + team_.lane();
-      bool may = false;
-      std::uint32_t a = 0, b = 0;
-      if (k < tests) {
-        const int half = k >= in_first ? 1 : 0;
-        const int width = half != 0 ? rows : of_first[1];
-        const int in_pair = half != 0 ? k - in_first : k;
-        const int row = static_cast<int>(static_cast<unsigned>(in_pair) * share[half] >> 16);
-        const int of_a = (half != 0 ? of_first[0] : 0) + row;
-        const int of_b = (half != 0 ? of_first[1] : 0) + in_pair - row * width;
-        const Ball from = m_.near[0][of_a], to = m_.near[1][of_b];
-        const float dx = to.x - from.x, dy = to.y - from.y, dz = to.z - from.z;
-        const float reach = (from.r + to.r) + m_.meeting.off[first + half].r;
-        may = std::fma(dx, dx, std::fma(dy, dy, dz * dz)) < reach * reach;
-        a = m_.number[0][of_a];
-        b = m_.number[1][of_b];
-      }
+      const bool second = k >= in_first;
+      const int in_pair = second ? k - in_first : k;
+      const int row =
+          static_cast<int>(static_cast<unsigned>(in_pair) * (second ? share[1] : share[0]) >> 16);
+      const int column = in_pair - row * (second ? b1 : b0);
+      const int of_a = k < tests ? row + (second ? a0 : 0) : 0;
+      const int of_b = k < tests ? column + (second ? b0 : 0) : 0;
+      const Ball from = m_.near[0][of_a], to = m_.near[1][of_b];
+      const float dx = to.x - from.x, dy = to.y - from.y, dz = to.z - from.z;
+      const float reach = (from.r + to.r) + (second ? rounding[1] : rounding[0]);
+      const bool may = k < tests && std::fma(dx, dx, std::fma(dy, dy, dz * dz)) < reach * reach;
       int total = 0;
       const int place = listed_ + team_.exclusive_count(may, total);
       if (may) {
-        m_.list_a[place] = a;
-        m_.list_b[place] = b;
+        m_.list_a[place] = m_.number[0][of_a];
+        m_.list_b[place] = m_.number[1][of_b];
       }
       listed_ += total;
+      if (listed_ < Team::kWidth) continue;
       team_.sync();
       sum_list(Team::kWidth);
     }
     team_.sync();
   }
 
-  IST_HD static unsigned share_of(int width) {
-    return width > 0 ? 0xFFFFu / static_cast<unsigned>(width) + 1 : 0;
+  /// Sphere `lane` of both leaves of a pair, and whether it reaches the other's ball.
+  IST_HD void look(int k, std::uint32_t lane, Ball& of_a, Ball& of_b, bool (&near)[2]) const {
+    const MeetingPairs& pairs = m_.meeting;
+    const BallBlock& a = in_global_memory(m_.tree[0].blocks[0])[pairs.block_a[k]];
+    const BallBlock& b = in_global_memory(m_.tree[1].blocks[0])[pairs.block_b[k]];
+    const Ball off = pairs.off[k], x = m_.turn[0], y = m_.turn[1], z = m_.turn[2];
+    const float bx = b.x[lane], by = b.y[lane], bz = b.z[lane];
+    of_a = {a.x[lane], a.y[lane], a.z[lane], a.r[lane]};
+    of_b = {std::fma(x.x, bx, std::fma(x.y, by, std::fma(x.z, bz, off.x))),
+            std::fma(y.x, bx, std::fma(y.y, by, std::fma(y.z, bz, off.y))),
+            std::fma(z.x, bx, std::fma(z.y, by, std::fma(z.z, bz, off.z))), b.r[lane] * x.r};
+    const std::uint32_t lanes = pairs.lanes[k] >> lane;
+    near[0] = (lanes & 1) != 0 && reaches(of_a, pairs.near_b[k], off.r);
+    near[1] = (lanes & 0x10000) != 0 && reaches(of_b, pairs.near_a[k], off.r);
   }
 
-  /// Sphere `lane` of both leaves of a pair, and whether it reaches the other's ball.
-  IST_HD void look(int k, std::uint32_t lane, Ball (&sphere)[2], bool (&there)[2]) const {
-    const MeetingPairs& pairs = m_.meeting;
-    const BallBlock& a = m_.tree[0].blocks[0][pairs.block_a[k]];
-    const BallBlock& b = m_.tree[1].blocks[0][pairs.block_b[k]];
-    const float* const turn = m_.turn;
-    const Ball off = pairs.off[k];
-    const float bx = b.x[lane], by = b.y[lane], bz = b.z[lane];
-    sphere[0] = {a.x[lane], a.y[lane], a.z[lane], a.r[lane]};
-    sphere[1] = {std::fma(turn[0], bx, std::fma(turn[1], by, std::fma(turn[2], bz, off.x))),
-                 std::fma(turn[3], bx, std::fma(turn[4], by, std::fma(turn[5], bz, off.y))),
-                 std::fma(turn[6], bx, std::fma(turn[7], by, std::fma(turn[8], bz, off.z))),
-                 b.r[lane] * static_cast<float>(m_.place.a_from_b.scale)};
-    there[0] = (pairs.lanes[k] >> lane & 1) != 0 && reaches(sphere[0], pairs.near_b[k], off.r);
-    there[1] =
-        (pairs.lanes[k] >> (16 + lane) & 1) != 0 && reaches(sphere[1], pairs.near_a[k], off.r);
+  IST_HD static int bits(std::uint32_t word) {
+#ifdef __CUDA_ARCH__
+    return __popc(word);
+#else
+    return std::popcount(word);
+#endif
   }
 
   IST_HD static float largest(const Ball& ball) {
@@ -411,11 +425,10 @@ class PairDescent {
   static constexpr int kItemsALane = kItems / Team::kWidth;
   IST_HD int item(int i) const { return i * Team::kWidth + team_.lane(); }
 
-  static constexpr float kRoom = 2e-6f;  ///< share of a distance, above its rounding
-
   const Team& team_;
   PairMemory& m_;
   int size_ = 0, leaves_ = 0, listed_ = 0;
+  int wide_ = 0;               ///< pairs on top of a floor that opening many at once may leave
   std::uint32_t met_ = 0;      ///< pairs of leaves
   float sum_[kTerms];          ///< this lane's
   int summed_ = 0;             ///< numbers in it, at most

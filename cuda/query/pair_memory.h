@@ -10,15 +10,20 @@ namespace ist::gpu {
 
 constexpr int kPairsAtOnce = 2;  ///< item k of 32 is child, or sphere, k % 16 of pair k / 16
 constexpr int kItems = kPairsAtOnce * static_cast<int>(kWidth);
-constexpr int kAhead = 16;  ///< pairs readied together, a lane each
-/// A step leaves at most so many pairs more than it takes.
+constexpr int kAhead = 24;  ///< pairs readied together, a lane each
+/// Taking two pairs at a time leaves at most so many pairs more a step.
 constexpr int kGrowth = kItems - kPairsAtOnce;
-constexpr int kStackRoom = OpeningSteps::kMost * kGrowth + kPairsAtOnce;
+constexpr int kFirstRoom = OpeningSteps::kMost * kGrowth + kPairsAtOnce;
+constexpr int kTaskRoom = 120;  ///< on top of what waits for other tasks
+constexpr int kStackRoom = kFirstRoom + kTaskRoom;
 /// Pairs of leaves are met before kAhead and more wait.
-constexpr int kLeafRoom = 192;
+constexpr int kLeafRoom = 224;
 static_assert(kLeafRoom >= kAhead + kItems);
 constexpr int kNodeBits = 28;  ///< of a node's number; the rest of a word is the step
+constexpr std::uint32_t kNodeMask = (1u << kNodeBits) - 1;
 static_assert(kMaxSpheres == 1u << kNodeBits && OpeningSteps::kMost < 16);
+
+constexpr float kRoom = 2e-6f;  ///< share of a distance, above its rounding
 
 struct alignas(16) Ball {
   float x, y, z, r;
@@ -28,8 +33,14 @@ struct alignas(16) Ball {
 struct OpeningPairs {
   Ball other[kAhead];  ///< the side that stays whole, seen from the block that is opened
   const BallBlock* block[kAhead];
-  std::uint32_t a[kAhead], b[kAhead];  ///< as on the stack
+  /// What child 0 leaves on the stack, or in the list of leaves.
+  std::uint32_t a[kAhead], b[kAhead];
+  std::uint32_t how[kAhead];  ///< flags, and from kLevelBit on the children's level
 };
+constexpr int kLevelBit = 8;
+constexpr std::uint32_t kOpensA = 1;
+constexpr std::uint32_t kToLeaf = 2;   ///< children are leaves
+constexpr std::uint32_t kIntoOne = 4;  ///< the other side is a single sphere
 
 /// Pairs of leaves about to be met, in A's axes from A's block's origin.
 struct MeetingPairs {
@@ -44,11 +55,14 @@ struct PairMemory {
   PairPlace place;
   TreeRef tree[2];
   OpeningSteps steps;
-  float turn[9];  ///< place.a_from_b.m
+  Ball turn[3];                     ///< rows of place.a_from_b.m; r of the first: its scale
+  std::uint32_t share[kWidth + 1];  ///< k · share[n] >> 16 is k / n, for k < 256
   /// Lengths are summed times this power of two, about the smaller tree's size to 1: their powers
   /// then fit into floats.
   double unit;
-  LensTotals totals;
+  bool to_single;                     ///< some leaves are single spheres
+  LensTotals totals;                  ///< of the task in hand
+  LensTotals sum;                     ///< of those that are done
   std::uint32_t stack_a[kStackRoom];  ///< node of A and the step, << kNodeBits, that opens the pair
   std::uint32_t stack_b[kStackRoom];
   std::uint32_t leaf_a[kLeafRoom], leaf_b[kLeafRoom];

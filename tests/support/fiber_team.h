@@ -144,6 +144,12 @@ class FiberTeam {
     }
     return before;
   }
+  std::uint32_t ballot(bool flag) const {
+    const std::uint64_t* all = fibers_.exchange(lane_, 9, flag ? 1 : 0);
+    std::uint32_t raised = 0;
+    for (int i = 0; i < Width; ++i) raised |= static_cast<std::uint32_t>(all[i]) << i;
+    return raised;
+  }
   int first(bool flag, int& total) const {
     const std::uint64_t* all = fibers_.exchange(lane_, 7, flag ? 1 : 0);
     int found = -1;

@@ -46,6 +46,7 @@ class HostBatch {
     std::vector<std::uint32_t> list(n);
     std::vector<gpu::SplitPair> splits(room_);
     std::vector<gpu::PairTask> tasks(room_);
+    std::vector<gpu::PairPlace> places(room_);
     std::vector<gpu::LensTotals> totals(2 * std::size_t{room_});
     std::vector<std::uint32_t> entries_a(room_), entries_b(room_);
     counters = {};
@@ -60,12 +61,15 @@ class HostBatch {
         list.data(),
         splits.data(),
         tasks.data(),
+        places.data(),
         totals.data(),
         entries_a.data(),
         entries_b.data(),
         room_,
         room_,
-        room_};
+        room_,
+        most_alone,
+        task_weight};
     for (std::uint32_t i = 0; i < n; ++i)
       if (gpu::sift_pair(batch, i)) list[counters.listed++] = i;
     sum(batch, seed);
@@ -73,12 +77,16 @@ class HostBatch {
   }
 
   gpu::BatchCounters counters;  ///< of the last run
+  std::uint32_t most_alone = gpu::BatchArrays().most_alone;
+  std::uint32_t task_weight = gpu::BatchArrays().task_weight;
 
  private:
   void sum(const gpu::BatchArrays& batch, unsigned seed) {
     const auto memory = std::make_unique<gpu::PairMemory>();
     for (std::uint32_t k = 0; k < counters.listed; ++k)
-      by_team(seed, [&](const auto& team) { gpu::sum_pair(team, batch, batch.list[k], *memory); });
+      by_team(seed, [&](const auto& team) {
+        gpu::sum_pair(team, batch, batch.list[k], k % 3 != 0, *memory);
+      });
     for (std::uint32_t k = 0; k < std::min(counters.tasks, room_); ++k)
       by_team(seed, [&](const auto& team) { gpu::sum_task(team, batch, k, *memory); });
   }

@@ -116,26 +116,34 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
   EXPECT_LE(worst_centre, 1e-6);
 }
 
+/// Splits early, into small tasks.
+HostBatch splitting(std::uint32_t room = 1 << 16) {
+  HostBatch batch(batch_views(), room);
+  batch.most_alone = 16;
+  batch.task_weight = 4;
+  return batch;
+}
+
 /// Splitting, and who does what in which order, must not show.
 TEST(GpuQuery, SameBitsHoweverItIsSplit) {
   RandomPairs poses(4);
   const std::vector<BatchPair> pairs = poses.pairs(100);
-  HostBatch roomy(batch_views());
+  HostBatch roomy = splitting();
   const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched);
   EXPECT_GT(roomy.counters.tasks, 20u);
   for (const std::uint32_t room : {0u, 30u, 300u}) {
-    HostBatch narrow(batch_views(), room);
+    HostBatch narrow = splitting(room);
     expect_same_bits(narrow.run(pairs, Measure::matched), expected);
   }
 }
 
 TEST(GpuQuery, LanesOfAWarpNeedNoLuck) {
   RandomPairs poses(5);
-  const std::vector<BatchPair> pairs = poses.pairs(40);
-  HostBatch alone(batch_views()), roomy(batch_views()), narrow(batch_views(), 7);
+  const std::vector<BatchPair> pairs = poses.pairs(60);
+  HostBatch alone = splitting(), roomy = splitting(), narrow = splitting(7);
   const std::vector<Penetration> by_one = alone.run(pairs, Measure::matched);
   const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched, 1);
-  EXPECT_GT(roomy.counters.tasks, 3u);
+  EXPECT_GT(roomy.counters.tasks, 2u);
   expect_same_bits(roomy.run(pairs, Measure::matched, 2), expected);
   expect_same_bits(narrow.run(pairs, Measure::matched, 3), expected);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
