@@ -86,7 +86,8 @@ void write_ply(const ist::TriangleMesh& mesh, const fs::path& path) {
 /// Bakes a manifest into `out` as a user would.
 class Bake {
  public:
-  Bake(const fs::path& folder, std::vector<std::string> options) {
+  /// `cards`: how many GPUs it sees; 0: all.
+  Bake(const fs::path& folder, std::vector<std::string> options, int cards = 0) {
     std::vector<std::string> arguments = {IST_PROGRAM, "bake", "--manifest", "library.toml",
                                           "-o",        "out",  "--quiet",    "--json"};
     arguments.insert(arguments.end(), options.begin(), options.end());
@@ -96,6 +97,7 @@ class Bake {
     start_ = std::chrono::steady_clock::now();
     child_ = fork();
     if (child_ != 0) return;
+    if (cards == 1) setenv("CUDA_VISIBLE_DEVICES", "0", 1);
     if (chdir(folder.c_str()) != 0 || std::freopen("summary.json", "w", stdout) == nullptr)
       _exit(126);
     execv(argv[0], argv.data());
@@ -103,6 +105,14 @@ class Bake {
   }
 
   void kill() const { ::kill(child_, SIGKILL); }
+
+  /// [MB] that it holds now; 0 once it has ended.
+  double memory_now_mb() const {
+    std::ifstream file("/proc/" + std::to_string(child_) + "/statm");
+    double size = 0, resident = 0;
+    file >> size >> resident;
+    return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
+  }
 
   /// Throws if it failed, unless it was killed.
   void wait() {
@@ -147,7 +157,8 @@ void write_manifest(const fs::path& folder, std::size_t spheres, const std::stri
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report("asset_library", argc, argv);
+  std::size_t restarted = 0;
+  Report report("asset_library", argc, argv, {{"assets", restarted}});
   report.page("Libraries of assets");
   report.remark(
       "Meshes: gear, bolt, nut and torus_knot of `ist sample`, cut finer, each stretched and "
@@ -155,11 +166,13 @@ int main(int argc, char** argv) {
       "`ist bake --manifest`, from its start to its end.");
   report.remark(
       "Restarted: killed with SIGKILL once half of the assets are there, started again with the "
-      "same cache; time and assets of both runs.");
+      "same cache; time and assets of both runs. `--assets N` says how many.");
   const fs::path folder = fs::temp_directory_path() / ("ist_library_" + std::to_string(getpid()));
   fs::create_directories(folder / "meshes");
   const std::size_t count = report.quick() ? 8 : 400;
   const std::size_t few = std::min<std::size_t>(count, 40);
+  if (restarted == 0) restarted = std::max(few, count / 10);
+  const std::size_t meshes = std::max(count, restarted);
   std::vector<ist::TriangleMesh> kinds;
   for (const auto& [name, cuts] :
        {std::pair("gear", 2), {"bolt", 1}, {"nut", 2}, {"torus_knot", 0}}) {
@@ -171,7 +184,7 @@ int main(int argc, char** argv) {
     const std::size_t workers = std::thread::hardware_concurrency();
     for (std::size_t w = 0; w < workers; ++w)
       threads.emplace_back([&, w] {
-        for (std::size_t i = w; i < count; i += workers) {
+        for (std::size_t i = w; i < meshes; i += workers) {
           ist::TriangleMesh mesh = kinds[i % kinds.size()];
           deform(mesh, i);
           write_ply(mesh, folder / mesh_name(i));
@@ -208,25 +221,58 @@ int main(int argc, char** argv) {
     }
   }
 
-  const std::size_t killed = std::max(few, count / 10);
-  write_manifest(folder, 1000, assets_of(killed));
+  std::string why;
+  if (devices[0] == "cuda" && ist::gpu_available(1, &why)) {
+    // The same library by one card and by all of them, every core of the machine for either.
+    write_manifest(folder, 4000, assets_of(count));
+    double rates[2] = {};
+    for (const int cards : {1, 0}) {
+      fs::remove_all(folder / "out");
+      Bake bake(folder, {"--device", "cuda"}, cards);
+      bake.wait();
+      rates[cards] = static_cast<double>(count) / bake.seconds;
+      report.row("Cards", {{"cards", cards == 1 ? "one" : "all"},
+                           {"spheres", 4000},
+                           {"assets", count},
+                           {"seconds", bake.seconds},
+                           {"assets a second", rates[cards]},
+                           {"peak memory [MB]", bake.memory_mb}});
+    }
+    report.target("all cards over one", rates[0] / rates[1], 1.8);
+  }
+
+  write_manifest(folder, 4000, assets_of(restarted));
   fs::remove_all(folder / "out");
+  std::vector<double> memory;
+  const auto watch = [&](const Bake& bake, std::size_t until) {
+    std::size_t next = files_in(folder / "out") + restarted / 10;
+    for (std::size_t there = 0; there < until; usleep(50'000)) {
+      there = files_in(folder / "out");
+      if (there < next) continue;
+      memory.push_back(bake.memory_now_mb());
+      next += restarted / 10;
+    }
+  };
   Bake first(folder, {"--device", devices[0], "--cache", "cache"});
-  while (files_in(folder / "out") < killed / 2) usleep(10'000);
+  watch(first, restarted / 2);
   first.kill();
   first.wait();
   const std::size_t before = files_in(folder / "out");
-  fs::remove_all(folder / "out");
   Bake second(folder, {"--device", devices[0], "--cache", "cache"});
+  watch(second, restarted - 1);
   second.wait();
-  std::size_t cached = 0;
-  for (const Json& asset : results(folder)) cached += asset.at("status") == "cached" ? 1 : 0;
-  report.row("Restarted", {{"assets", killed},
+  std::size_t kept = 0;
+  for (const Json& asset : results(folder)) kept += asset.at("status") == "cached" ? 1 : 0;
+  report.row("Restarted", {{"assets", restarted},
+                           {"spheres", 4000},
                            {"there when killed", before},
-                           {"from the cache", cached},
+                           {"from the cache", kept},
                            {"seconds until killed", first.seconds},
                            {"seconds after", second.seconds},
-                           {"assets at the end", files_in(folder / "out")}});
+                           {"assets a second",
+                            static_cast<double>(restarted) / (first.seconds + second.seconds)},
+                           {"assets at the end", files_in(folder / "out")},
+                           {"memory at every tenth [MB]", memory}});
 
   // One mesh at a time, from its file to its asset; the process is warm after the first.
   struct Alone {

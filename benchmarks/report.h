@@ -2,6 +2,7 @@
 
 #include <ist/gpu.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -20,16 +21,30 @@ class Report {
  public:
   using Json = nlohmann::ordered_json;
 
-  /// Arguments: [--out FILE] [--quick]. Ends the program with code 2 on any other.
-  Report(const std::string& name, int argc, char** argv) {
+  /// A number that a program may be told: [--NAME N].
+  struct Count {
+    std::string name;
+    std::size_t& value;
+  };
+
+  /// Arguments: [--out FILE] [--quick] and the program's counts. Ends the program with code 2 on
+  /// any other.
+  Report(const std::string& name, int argc, char** argv, const std::vector<Count>& counts = {}) {
     for (int i = 1; i < argc; ++i) {
       const std::string argument = argv[i];
       if (argument == "--quick") {
         quick_ = true;
       } else if (argument == "--out" && i + 1 < argc) {
         out_ = argv[++i];
+      } else if (const auto count = std::find_if(
+                     counts.begin(), counts.end(),
+                     [&](const Count& known) { return argument == "--" + known.name; });
+                 count != counts.end() && i + 1 < argc) {
+        count->value = std::stoul(argv[++i]);
       } else {
-        std::cerr << "usage: " << name << " [--out FILE] [--quick]\n";
+        std::cerr << "usage: " << name << " [--out FILE] [--quick]";
+        for (const Count& known : counts) std::cerr << " [--" << known.name << " N]";
+        std::cerr << "\n";
         std::exit(2);
       }
     }
