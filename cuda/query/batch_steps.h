@@ -4,6 +4,7 @@
 
 #include "cuda/atomics.h"
 #include "cuda/query/batch_arrays.h"
+#include "cuda/query/part_sums.h"
 #include "numerics/host_device.h"
 
 // A batch of pairs of trees, step by step: what a kernel's threads and warps do, and a test's
@@ -40,7 +41,6 @@ IST_HD inline void write_nothing(const GpuPenetrations& to, std::uint32_t i, Que
 /// World units, as world_answer() (query/descent/answer.h).
 IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, const PairPlace& place,
                                 const LensTotals& totals) {
-  constexpr double kPi = 3.14159265358979323846;
   const double unit = place.unit_a, unit3 = unit * unit * unit;
   const double* const t = totals.term;
   if (to.volume != nullptr) to.volume[i] = unit3 * (kPi / 3) * t[kCaps];
@@ -66,16 +66,29 @@ IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, cons
   if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = totals.spheres;
 }
 
+IST_HD inline Pose pose_of(const Pose* poses, std::uint32_t i) {
+  return poses != nullptr ? poses[i] : Pose{{1, 0, 0, 0}, {0, 0, 0}};
+}
+IST_HD inline double scale_of(const double* scales, std::uint32_t i) {
+  return scales != nullptr ? scales[i] : 1;
+}
+
+/// Copies what is plain words.
+template <class Team, class T>
+IST_HD void copy_words(const Team& team, const T& from, T& to) {
+  const auto* const source = reinterpret_cast<const std::uint32_t*>(&from);
+  auto* const target = reinterpret_cast<std::uint32_t*>(&to);
+  for (int k = team.lane(); k < static_cast<int>(sizeof(T) / 4); k += Team::kWidth)
+    target[k] = source[k];
+}
+
 /// Places pair i; false if it cannot be.
 IST_HD inline bool place_pair(const BatchArrays& batch, std::uint32_t i, PairPlace& place) {
   const GpuPairs& pairs = batch.pairs;
   const std::uint32_t a = pairs.asset_a[i], b = pairs.asset_b[i];
   if (a >= batch.asset_count || b >= batch.asset_count) return false;
-  const Pose still = {{1, 0, 0, 0}, {0, 0, 0}};
-  return place.place(batch.assets[a].frame, pairs.pose_a != nullptr ? pairs.pose_a[i] : still,
-                     pairs.scale_a != nullptr ? pairs.scale_a[i] : 1, batch.assets[b].frame,
-                     pairs.pose_b != nullptr ? pairs.pose_b[i] : still,
-                     pairs.scale_b != nullptr ? pairs.scale_b[i] : 1);
+  return place.place(batch.assets[a].frame, pose_of(pairs.pose_a, i), scale_of(pairs.scale_a, i),
+                     batch.assets[b].frame, pose_of(pairs.pose_b, i), scale_of(pairs.scale_b, i));
 }
 
 /// Which list pair i goes to: 0 float, 1 double; −1: it is answered. One thread a pair.
@@ -107,13 +120,8 @@ IST_HD void load_pair(const Team& team, const BatchArrays& batch, std::uint32_t 
   if (team.lane() == 0) place_pair(batch, i, memory.place);
   const auto measure = static_cast<std::uint32_t>(batch.measure);
   const std::uint32_t asset[2] = {batch.pairs.asset_a[i], batch.pairs.asset_b[i]};
-  for (int side = 0; side < 2; ++side) {
-    const auto* const from =
-        reinterpret_cast<const std::uint32_t*>(&batch.assets[asset[side]].tree[measure]);
-    auto* const to = reinterpret_cast<std::uint32_t*>(&memory.tree[side]);
-    for (int k = team.lane(); k < static_cast<int>(sizeof(TreeRef) / 4); k += Team::kWidth)
-      to[k] = from[k];
-  }
+  for (int side = 0; side < 2; ++side)
+    copy_words(team, batch.assets[asset[side]].tree[measure], memory.tree[side]);
   team.sync();
 }
 
