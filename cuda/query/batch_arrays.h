@@ -6,6 +6,7 @@
 
 #include <ist/gpu_query.h>
 
+#include "cuda/query/node_sums.h"
 #include "cuda/query/pair_descent.h"
 
 namespace ist::gpu {
@@ -14,6 +15,7 @@ namespace ist::gpu {
 struct AssetRef {
   AssetFrame frame;
   TreeRef tree[2];  ///< by Measure
+  SumsRef sums[2];  ///< set_sums()
 
   /// `bytes`: where the asset lies for who works on the batch.
   static AssetRef of(const AssetHeader& header, const std::byte* bytes) {
@@ -23,6 +25,13 @@ struct AssetRef {
     ref.tree[static_cast<int>(Measure::matched)] = TreeRef::of(header.matched_tree, bytes);
     ref.tree[static_cast<int>(Measure::inner)] = TreeRef::of(header.inner_tree, bytes);
     return ref;
+  }
+
+  /// `nodes`: node_sums() of the matched tree and of the inner one, one after the other.
+  void set_sums(const AssetHeader& header, const NodeSum* nodes) {
+    sums[static_cast<int>(Measure::matched)] = SumsRef::of(header.matched_tree, nodes);
+    sums[static_cast<int>(Measure::inner)] =
+        SumsRef::of(header.inner_tree, nodes + node_count(header.matched_tree));
   }
 };
 

@@ -2,7 +2,7 @@
 #include "cuda/launch.h"
 #include "cuda/query/batch_kernels.h"
 #include "cuda/query/batch_steps.h"
-#include "cuda/warp_team.h"
+#include "cuda/query/by_warps.h"
 
 namespace ist::gpu {
 namespace {
@@ -18,27 +18,8 @@ __global__ void __launch_bounds__(kSiftThreads) sift_pairs(const BatchArrays bat
   const WarpTeam team;
   const std::uint64_t i = std::uint64_t{blockIdx.x} * kSiftThreads + threadIdx.x;
   const bool meets = i < batch.pairs.count && sift_pair(batch, static_cast<std::uint32_t>(i));
-  int total = 0;
-  const int before = team.exclusive_count(meets, total);
-  if (total == 0) return;
-  std::uint32_t first = 0;
-  if (team.lane() == 0)
-    first = atomic_add(&batch.counters->listed, static_cast<std::uint32_t>(total));
-  first = team.broadcast(first, 0);
-  if (meets) batch.list[first + static_cast<std::uint32_t>(before)] = static_cast<std::uint32_t>(i);
-}
-
-/// Calls work(k) for k < count, each warp taking the next when it is done with one.
-template <class Work>
-__device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& work) {
-  const WarpTeam team;
-  for (;;) {
-    std::uint32_t k = 0;
-    if (team.lane() == 0) k = atomic_add(taken, 1);
-    k = team.broadcast(k, 0);
-    if (k >= count) return;
-    work(team, k);
-  }
+  const std::uint32_t place = list_place(team, meets, &batch.counters->listed);
+  if (meets) batch.list[place] = static_cast<std::uint32_t>(i);
 }
 
 __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchArrays batch) {

@@ -4,6 +4,7 @@
 
 #include "cuda/atomics.h"
 #include "cuda/query/batch_arrays.h"
+#include "cuda/query/part_sums.h"
 #include "numerics/host_device.h"
 
 // A batch of pairs of trees, step by step: what a kernel's threads and warps do, and a test's
@@ -32,7 +33,6 @@ IST_HD inline void write_nothing(const GpuPenetrations& to, std::uint32_t i, Que
 /// World units, as world_answer() (query/descent/answer.h).
 IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, const PairPlace& place,
                                 const LensTotals& totals) {
-  constexpr double kPi = 3.14159265358979323846;
   const double unit = place.unit_a, unit3 = unit * unit * unit;
   const double* const t = totals.term;
   if (to.volume != nullptr) to.volume[i] = unit3 * (kPi / 3) * t[kCaps];
@@ -58,16 +58,29 @@ IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, cons
   if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = totals.spheres;
 }
 
+IST_HD inline Pose pose_of(const Pose* poses, std::uint32_t i) {
+  return poses != nullptr ? poses[i] : Pose{{1, 0, 0, 0}, {0, 0, 0}};
+}
+IST_HD inline double scale_of(const double* scales, std::uint32_t i) {
+  return scales != nullptr ? scales[i] : 1;
+}
+
+/// Copies what is plain words.
+template <class Team, class T>
+IST_HD void copy_words(const Team& team, const T& from, T& to) {
+  const auto* const source = reinterpret_cast<const std::uint32_t*>(&from);
+  auto* const target = reinterpret_cast<std::uint32_t*>(&to);
+  for (int k = team.lane(); k < static_cast<int>(sizeof(T) / 4); k += Team::kWidth)
+    target[k] = source[k];
+}
+
 /// Places pair i; false if it cannot be.
 IST_HD inline bool place_pair(const BatchArrays& batch, std::uint32_t i, PairPlace& place) {
   const GpuPairs& pairs = batch.pairs;
   const std::uint32_t a = pairs.asset_a[i], b = pairs.asset_b[i];
   if (a >= batch.asset_count || b >= batch.asset_count) return false;
-  const Pose still = {{1, 0, 0, 0}, {0, 0, 0}};
-  return place.place(batch.assets[a].frame, pairs.pose_a != nullptr ? pairs.pose_a[i] : still,
-                     pairs.scale_a != nullptr ? pairs.scale_a[i] : 1, batch.assets[b].frame,
-                     pairs.pose_b != nullptr ? pairs.pose_b[i] : still,
-                     pairs.scale_b != nullptr ? pairs.scale_b[i] : 1);
+  return place.place(batch.assets[a].frame, pose_of(pairs.pose_a, i), scale_of(pairs.scale_a, i),
+                     batch.assets[b].frame, pose_of(pairs.pose_b, i), scale_of(pairs.scale_b, i));
 }
 
 /// Whether some child of a root meets some child of the other root, to rounding.
@@ -123,16 +136,6 @@ IST_HD inline bool sift_pair(const BatchArrays& batch, std::uint32_t i) {
   if (children_meet(a, b, place.a_from_b)) return true;
   write_nothing(batch.answers, i, QueryStatus::ok);
   return false;
-}
-
-/// Copies what shared and global memory hold, a word a lane.
-template <class Team, class T>
-IST_HD void copy_words(const Team& team, const T& from, T& to) {
-  static_assert(sizeof(T) % 4 == 0);
-  const auto* const words = reinterpret_cast<const std::uint32_t*>(&from);
-  auto* const copies = reinterpret_cast<std::uint32_t*>(&to);
-  for (int k = team.lane(); k < static_cast<int>(sizeof(T) / 4); k += Team::kWidth)
-    copies[k] = words[k];
 }
 
 /// Readies the memory for pair i, whose place is set or is there after the team's next sync.

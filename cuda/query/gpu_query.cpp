@@ -4,11 +4,11 @@
 
 #include <cmath>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "cuda/check.h"
-#include "cuda/query/batch_kernels.h"
+#include "cuda/query/device_bytes.h"
+#include "cuda/query/query_impl.h"
 #include "cuda/queue.h"
 
 namespace ist {
@@ -17,91 +17,46 @@ namespace {
 /// Room for what is split. A batch that needs more is answered all the same.
 constexpr std::uint32_t kSplitRoom = 1 << 16, kTaskRoom = 1 << 19, kEntryRoom = 1 << 21;
 
-/// Device memory that outlives the queue it comes from.
-class DeviceBytes {
- public:
-  DeviceBytes() = default;
-  DeviceBytes(gpu::Queue& queue, const GpuSettings& settings, std::size_t bytes)
-      : settings_(settings), data_(queue.allocate(bytes)), bytes_(bytes) {}
-  ~DeviceBytes() {
-    if (data_ == nullptr) return;
-    try {
-      gpu::Queue(settings_).deallocate(data_, bytes_);
-    } catch (const Error&) {  // a device that is gone has no memory to give back
-    }
-  }
-  DeviceBytes(DeviceBytes&& other) noexcept { *this = std::move(other); }
-  DeviceBytes& operator=(DeviceBytes&& other) noexcept {
-    std::swap(settings_, other.settings_);
-    std::swap(data_, other.data_);
-    std::swap(bytes_, other.bytes_);
-    return *this;
-  }
-
-  std::byte* data() const { return static_cast<std::byte*>(data_); }
-  std::size_t bytes() const { return bytes_; }
-
- private:
-  GpuSettings settings_;
-  void* data_ = nullptr;
-  std::size_t bytes_ = 0;
-};
-
-/// Parts of a block of memory, one after another.
-class Parts {
- public:
-  explicit Parts(std::byte* from) : from_(from) {}
-
-  template <class T>
-  T* take(std::size_t count) {
-    T* const part = reinterpret_cast<T*>(from_ + used_);
-    used_ += (count * sizeof(T) + 255) / 256 * 256;
-    return part;
-  }
-  std::size_t used() const { return used_; }
-
- private:
-  std::byte* from_;
-  std::size_t used_ = 0;
-};
-
-void copy(void* to, const void* from, std::size_t bytes, gpu::Queue& queue) {
-  gpu::check(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, queue.stream()),
-             "copying assets to the GPU");
-}
-
 }  // namespace
-
-struct GpuAssets::Impl {
-  int device = 0;
-  DeviceBytes memory;
-  const gpu::AssetRef* refs = nullptr;
-  std::size_t size = 0;
-};
 
 GpuAssets::GpuAssets(std::span<const TreeView> assets, const GpuSettings& settings)
     : impl_(std::make_unique<Impl>()) {
   gpu_info(settings.device);  // throws where there is no such device
   gpu::Queue queue(settings);
-  Parts sizes(nullptr);
+  gpu::Parts sizes(nullptr);
   sizes.take<gpu::AssetRef>(assets.size());
+  std::vector<gpu::NodeSum> sums;
   for (const TreeView& asset : assets) {
     if (asset.empty()) throw Error("GPU: an asset of the batch is empty");
-    sizes.take<std::byte>(asset.header().file_bytes);
+    const AssetHeader& header = asset.header();
+    sizes.take<std::byte>(header.file_bytes);
+    for (const TreeHeader* tree : {&header.matched_tree, &header.inner_tree}) {
+      const std::vector<gpu::NodeSum> more =
+          gpu::node_sums(*tree, reinterpret_cast<const std::byte*>(&header));
+      sums.insert(sums.end(), more.begin(), more.end());
+    }
   }
+  sizes.take<gpu::NodeSum>(sums.size());
   impl_->device = settings.device;
   impl_->size = assets.size();
-  impl_->memory = DeviceBytes(queue, settings, sizes.used());
-  Parts parts(impl_->memory.data());
+  impl_->memory = gpu::DeviceBytes(queue, settings, sizes.used());
+  gpu::Parts parts(impl_->memory.data());
   auto* const refs = parts.take<gpu::AssetRef>(assets.size());
+  auto* const nodes = parts.take<gpu::NodeSum>(sums.size());
+  if (!sums.empty())
+    gpu::copy_to_device(nodes, sums.data(), sums.size() * sizeof(gpu::NodeSum), queue);
+  const gpu::NodeSum* of_asset = nodes;
   std::vector<gpu::AssetRef> host;
   for (const TreeView& asset : assets) {
     const AssetHeader& header = asset.header();
     auto* const bytes = parts.take<std::byte>(header.file_bytes);
-    copy(bytes, &header, header.file_bytes, queue);
+    gpu::copy_to_device(bytes, &header, header.file_bytes, queue);
     host.push_back(gpu::AssetRef::of(header, bytes));
+    host.back().set_sums(header, of_asset);
+    of_asset += gpu::node_count(header.matched_tree) + gpu::node_count(header.inner_tree);
   }
-  if (!host.empty()) copy(refs, host.data(), host.size() * sizeof(gpu::AssetRef), queue);
+  if (!host.empty())
+    gpu::copy_to_device(refs, host.data(), host.size() * sizeof(gpu::AssetRef), queue);
   impl_->refs = refs;
   queue.wait();
 }
@@ -114,30 +69,23 @@ std::size_t GpuAssets::size() const noexcept { return impl_->size; }
 std::size_t GpuAssets::bytes() const noexcept { return impl_->memory.bytes(); }
 int GpuAssets::device() const noexcept { return impl_->device; }
 
-struct GpuWorkspace::Impl {
-  int device = 0;
-  std::size_t most_pairs = 0;
-  int blocks_at_a_time = 0;
-  DeviceBytes memory;
-  gpu::BatchArrays arrays{};  ///< what does not change from batch to batch
-
-  /// Sets the arrays to parts of the memory at `from`; returns the bytes they take.
-  std::size_t place(std::byte* from) {
-    Parts parts(from);
-    arrays.counters = parts.take<gpu::BatchCounters>(1);
-    arrays.list = parts.take<std::uint32_t>(most_pairs);
-    arrays.splits = parts.take<gpu::SplitPair>(kSplitRoom);
-    arrays.tasks = parts.take<gpu::PairTask>(kTaskRoom);
-    arrays.places = parts.take<gpu::PairPlace>(kSplitRoom);
-    arrays.totals = parts.take<gpu::LensTotals>(kSplitRoom + kTaskRoom);
-    arrays.entries_a = parts.take<std::uint32_t>(kEntryRoom);
-    arrays.entries_b = parts.take<std::uint32_t>(kEntryRoom);
-    arrays.split_room = kSplitRoom;
-    arrays.task_room = kTaskRoom;
-    arrays.entry_room = kEntryRoom;
-    return parts.used();
-  }
-};
+std::size_t GpuWorkspace::Impl::place(std::byte* from) {
+  gpu::Parts parts(from);
+  arrays.counters = parts.take<gpu::BatchCounters>(1);
+  field_counters = parts.take<gpu::FieldCounters>(1);
+  arrays.list = parts.take<std::uint32_t>(most_pairs);
+  field_list = parts.take<std::uint32_t>(most_pairs);
+  arrays.splits = parts.take<gpu::SplitPair>(kSplitRoom);
+  arrays.tasks = parts.take<gpu::PairTask>(kTaskRoom);
+  arrays.places = parts.take<gpu::PairPlace>(kSplitRoom);
+  arrays.totals = parts.take<gpu::LensTotals>(kSplitRoom + kTaskRoom);
+  arrays.entries_a = parts.take<std::uint32_t>(kEntryRoom);
+  arrays.entries_b = parts.take<std::uint32_t>(kEntryRoom);
+  arrays.split_room = kSplitRoom;
+  arrays.task_room = kTaskRoom;
+  arrays.entry_room = kEntryRoom;
+  return parts.used();
+}
 
 GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
     : impl_(std::make_unique<Impl>()) {
@@ -147,7 +95,8 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   impl_->device = settings.device;
   impl_->most_pairs = most_pairs;
   impl_->blocks_at_a_time = gpu::batch_blocks();
-  impl_->memory = DeviceBytes(queue, settings, impl_->place(nullptr));
+  impl_->field_grids = gpu::field_grids();
+  impl_->memory = gpu::DeviceBytes(queue, settings, impl_->place(nullptr));
   impl_->place(impl_->memory.data());
   queue.wait();
 }
@@ -159,17 +108,21 @@ GpuWorkspace& GpuWorkspace::operator=(GpuWorkspace&&) noexcept = default;
 std::size_t GpuWorkspace::most_pairs() const noexcept { return impl_->most_pairs; }
 std::size_t GpuWorkspace::bytes() const noexcept { return impl_->memory.bytes(); }
 
+void gpu::check_batch(const GpuPairs& pairs, const GpuWorkspace::Impl& room, int device) {
+  if (pairs.count > room.most_pairs)
+    throw Error("GPU: a batch of " + std::to_string(pairs.count) + " pairs; the workspace is for " +
+                std::to_string(room.most_pairs));
+  if (device != room.device)
+    throw Error("GPU: the assets are on device " + std::to_string(device) + ", the workspace on " +
+                std::to_string(room.device));
+}
+
 void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
                        GpuWorkspace& workspace, const GpuPenetrations& answers,
                        CUstream_st* stream) {
   const GpuAssets::Impl& all = assets.impl();
   const GpuWorkspace::Impl& room = workspace.impl();
-  if (pairs.count > room.most_pairs)
-    throw Error("GPU: a batch of " + std::to_string(pairs.count) + " pairs; the workspace is for " +
-                std::to_string(room.most_pairs));
-  if (all.device != room.device)
-    throw Error("GPU: the assets are on device " + std::to_string(all.device) +
-                ", the workspace on " + std::to_string(room.device));
+  gpu::check_batch(pairs, room, all.device);
   if (pairs.count == 0) return;
   gpu::BatchArrays batch = room.arrays;
   batch.assets = all.refs;

@@ -2,13 +2,15 @@
 
 #include <cuda_runtime_api.h>
 #include <ist/error.h>
-#include <ist/gpu_query.h>
+#include <ist/gpu_fields.h>
 
 #include "cuda/check.h"
 #include "support/device_batch.h"
 #include "support/gpu_test.h"
 #include "support/host_batch.h"
+#include "support/host_field_batch.h"
 #include "support/random_pairs.h"
+#include "support/surface_queries.h"
 
 // Batches of penetrations on the GPU against the same source on the host, lane by lane: the same
 // bits.
@@ -33,6 +35,64 @@ TEST_F(GpuQueryTest, HasTheBitsOfAWarpOnTheHost) {
     HostBatch host(batch_views());
     expect_same_bits(batch.get(), host.run(pairs, measure, 1));
   }
+}
+
+/// All fields that a GPU knows, one that is not sound, and one too many.
+struct FieldScene {
+  std::vector<Field> all;
+  std::vector<BatchPair> pairs;
+
+  explicit FieldScene(std::size_t count) {
+    for (const auto& [name, field] : fields())
+      if (!std::holds_alternative<FunctionField>(field)) all.push_back(field);
+    all.push_back(BallField{-1});
+    RandomPairs random(15);
+    pairs = random.pairs(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      pairs[i].a = static_cast<std::uint32_t>(i % (all.size() + 1));
+      pairs[i].scale_b *= random.uniform(0.1, 0.5);
+    }
+  }
+};
+
+TEST_F(GpuQueryTest, FieldsHaveTheBitsOfAWarpOnTheHost) {
+  FieldScene scene(400);
+  scene.pairs[21].pose_b.t[0] = std::nan("");
+  scene.pairs[31].scale_b = -1;
+  scene.pairs[41].b = 1000;
+  const GpuAssets assets(batch_views());
+  const GpuFields fields(scene.all);
+  GpuWorkspace workspace(scene.pairs.size());
+  const Stream stream;
+  for (const Measure measure : {Measure::matched, Measure::inner}) {
+    const DeviceBatch batch(scene.pairs);
+    penetration_batch(assets, fields, batch.pairs(), measure, workspace, batch.answers(), stream);
+    stream.wait();
+    HostFieldBatch host(batch_views(), scene.all);
+    expect_same_bits(batch.get(), host.run(scene.pairs, measure, 1));
+  }
+}
+
+TEST_F(GpuQueryTest, ManyPairsInFieldsHaveTheSameBitsInEveryRun) {
+  const FieldScene scene(3000);
+  std::vector<BatchPair> pairs;
+  for (std::size_t i = 0; i < 300000; ++i)
+    pairs.push_back(scene.pairs[(i * 7919) % scene.pairs.size()]);
+  const GpuAssets assets(batch_views());
+  const GpuFields fields(scene.all);
+  GpuWorkspace workspace(pairs.size());
+  const Stream stream;
+  const DeviceBatch few(scene.pairs), many(pairs);
+  penetration_batch(assets, fields, few.pairs(), Measure::matched, workspace, few.answers(),
+                    stream);
+  penetration_batch(assets, fields, many.pairs(), Measure::matched, workspace, many.answers(),
+                    stream);
+  stream.wait();
+  const std::vector<Penetration> expected = few.get();
+  std::vector<Penetration> repeated;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    repeated.push_back(expected[(i * 7919) % scene.pairs.size()]);
+  expect_same_bits(many.get(), repeated);
 }
 
 TEST_F(GpuQueryTest, ManyPairsHaveTheSameBitsInEveryRun) {
@@ -86,7 +146,15 @@ TEST_F(GpuQueryTest, WhatDoesNotFitIsAnError) {
   const TreeView none;
   EXPECT_THROW(GpuAssets({&none, 1}), Error);
   EXPECT_THROW(GpuWorkspace(std::size_t{1} << 40), Error);
+  const GpuFields fields(std::vector<Field>{HalfSpaceField{}});
+  EXPECT_THROW(penetration_batch(assets, fields, batch.pairs(), Measure::matched, workspace,
+                                 batch.answers(), nullptr),
+               Error);
+  EXPECT_THROW(GpuFields(std::vector<Field>{FunctionField{}}), Error);
+  EXPECT_EQ(GpuFields(std::vector<Field>{}).size(), 0u);
   const DeviceBatch empty({});
+  penetration_batch(assets, fields, empty.pairs(), Measure::matched, workspace, empty.answers(),
+                    nullptr);
   penetration_batch(assets, empty.pairs(), Measure::matched, workspace, empty.answers(), nullptr);
 }
 

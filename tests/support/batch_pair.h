@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <ist/gpu_query.h>
 #include <ist/pose.h>
 #include <ist/query.h>
 
@@ -16,11 +17,48 @@ struct BatchPair {
   double scale_a = 1, scale_b = 1;
 };
 
+/// Pairs of a batch, an array each, in the host's memory.
+struct PairColumns {
+  std::vector<std::uint32_t> a, b;
+  std::vector<Pose> pose_a, pose_b;
+  std::vector<double> scale_a, scale_b;
+
+  explicit PairColumns(const std::vector<BatchPair>& from) {
+    for (const BatchPair& pair : from) {
+      a.push_back(pair.a);
+      b.push_back(pair.b);
+      pose_a.push_back(pair.pose_a);
+      pose_b.push_back(pair.pose_b);
+      scale_a.push_back(pair.scale_a);
+      scale_b.push_back(pair.scale_b);
+    }
+  }
+
+  GpuPairs pairs() const {
+    return {a.size(),      a.data(),       b.data(),      pose_a.data(),
+            pose_b.data(), scale_a.data(), scale_b.data()};
+  }
+};
+
 /// A batch's answers, an array each.
 struct BatchColumns {
   std::vector<double> volume, centroid, push, turn;
   std::vector<QueryStatus> status;
   std::vector<std::uint32_t> visits, spheres;
+
+  /// Room for answers of n pairs.
+  static BatchColumns unwritten(std::size_t n) {
+    constexpr double kUnwritten = -7;
+    return {std::vector<double>(n, kUnwritten), std::vector<double>(3 * n),
+            std::vector<double>(3 * n),         std::vector<double>(3 * n),
+            std::vector<QueryStatus>(n),        std::vector<std::uint32_t>(n),
+            std::vector<std::uint32_t>(n)};
+  }
+
+  GpuPenetrations answers() {
+    return {volume.data(), centroid.data(), push.data(),   turn.data(),
+            status.data(), visits.data(),   spheres.data()};
+  }
 
   std::vector<Penetration> rows() const {
     const auto vector = [](const std::vector<double>& from, std::size_t i) {

@@ -7,7 +7,7 @@
 #include "cuda/query/batch_steps.h"
 #include "numerics/team.h"
 #include "support/batch_pair.h"
-#include "support/fiber_team.h"
+#include "support/host_assets.h"
 
 namespace ist::testing {
 
@@ -16,33 +16,15 @@ namespace ist::testing {
 class HostBatch {
  public:
   /// Room for what is split: so many of each kind.
-  explicit HostBatch(std::vector<TreeView> assets, std::uint32_t room = 1 << 16) : room_(room) {
-    for (const TreeView& asset : assets) {
-      const AssetHeader& header = asset.header();
-      assets_.push_back(gpu::AssetRef::of(header, reinterpret_cast<const std::byte*>(&header)));
-    }
-  }
+  explicit HostBatch(const std::vector<TreeView>& assets, std::uint32_t room = 1 << 16)
+      : assets_(assets), room_(room) {}
 
   /// `seed`: of the order in which lanes go on; 0: a team of one.
   std::vector<Penetration> run(const std::vector<BatchPair>& pairs, Measure measure,
                                unsigned seed = 0) {
     const std::size_t n = pairs.size();
-    std::vector<std::uint32_t> a, b;
-    std::vector<Pose> pose_a, pose_b;
-    std::vector<double> scale_a, scale_b;
-    for (const BatchPair& pair : pairs) {
-      a.push_back(pair.a);
-      b.push_back(pair.b);
-      pose_a.push_back(pair.pose_a);
-      pose_b.push_back(pair.pose_b);
-      scale_a.push_back(pair.scale_a);
-      scale_b.push_back(pair.scale_b);
-    }
-    constexpr double kUnwritten = -7;
-    BatchColumns to{std::vector<double>(n, kUnwritten), std::vector<double>(3 * n),
-                    std::vector<double>(3 * n),         std::vector<double>(3 * n),
-                    std::vector<QueryStatus>(n),        std::vector<std::uint32_t>(n),
-                    std::vector<std::uint32_t>(n)};
+    const PairColumns columns(pairs);
+    BatchColumns to = BatchColumns::unwritten(n);
     std::vector<std::uint32_t> list(n);
     std::vector<gpu::SplitPair> splits(room_);
     std::vector<gpu::PairTask> tasks(room_);
@@ -50,26 +32,24 @@ class HostBatch {
     std::vector<gpu::LensTotals> totals(2 * std::size_t{room_});
     std::vector<std::uint32_t> entries_a(room_), entries_b(room_);
     counters = {};
-    const gpu::BatchArrays batch = {
-        assets_.data(),
-        static_cast<std::uint32_t>(assets_.size()),
-        measure,
-        {n, a.data(), b.data(), pose_a.data(), pose_b.data(), scale_a.data(), scale_b.data()},
-        {to.volume.data(), to.centroid.data(), to.push.data(), to.turn.data(), to.status.data(),
-         to.visits.data(), to.spheres.data()},
-        &counters,
-        list.data(),
-        splits.data(),
-        tasks.data(),
-        places.data(),
-        totals.data(),
-        entries_a.data(),
-        entries_b.data(),
-        room_,
-        room_,
-        room_,
-        most_alone,
-        task_weight};
+    const gpu::BatchArrays batch = {assets_.refs().data(),
+                                    static_cast<std::uint32_t>(assets_.refs().size()),
+                                    measure,
+                                    columns.pairs(),
+                                    to.answers(),
+                                    &counters,
+                                    list.data(),
+                                    splits.data(),
+                                    tasks.data(),
+                                    places.data(),
+                                    totals.data(),
+                                    entries_a.data(),
+                                    entries_b.data(),
+                                    room_,
+                                    room_,
+                                    room_,
+                                    most_alone,
+                                    task_weight};
     for (std::uint32_t i = 0; i < n; ++i)
       if (gpu::sift_pair(batch, i)) list[counters.listed++] = i;
     sum(batch, seed);
@@ -91,17 +71,7 @@ class HostBatch {
       by_team(seed, [&](const auto& team) { gpu::sum_task(team, batch, k, *memory); });
   }
 
-  template <class Work>
-  static void by_team(unsigned seed, const Work& work) {
-    if (seed == 0) {
-      work(SerialTeam());
-      return;
-    }
-    static Fibers<32> fibers(seed);
-    fibers.run([&](int lane) { work(FiberTeam<32>(fibers, lane)); });
-  }
-
-  std::vector<gpu::AssetRef> assets_;
+  HostAssets assets_;
   std::uint32_t room_;
 };
 

@@ -1,0 +1,35 @@
+#pragma once
+
+// Device code only.
+
+#include <cstdint>
+
+#include "cuda/atomics.h"
+#include "cuda/warp_team.h"
+
+namespace ist::gpu {
+
+/// Calls work(team, k) for k < count, each warp taking the next when it is done with one.
+template <class Work>
+__device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& work) {
+  const WarpTeam team;
+  for (;;) {
+    std::uint32_t k = 0;
+    if (team.lane() == 0) k = atomic_add(taken, 1);
+    k = team.broadcast(k, 0);
+    if (k >= count) return;
+    work(team, k);
+  }
+}
+
+/// Where each lane that raises the flag writes into a list of which `listed` are taken.
+__device__ inline std::uint32_t list_place(const WarpTeam& team, bool flag, std::uint32_t* listed) {
+  int total = 0;
+  const int before = team.exclusive_count(flag, total);
+  if (total == 0) return 0;
+  std::uint32_t first = 0;
+  if (team.lane() == 0) first = atomic_add(listed, static_cast<std::uint32_t>(total));
+  return team.broadcast(first, 0) + static_cast<std::uint32_t>(before);
+}
+
+}  // namespace ist::gpu

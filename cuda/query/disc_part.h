@@ -1,0 +1,193 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "numerics/angle.h"
+#include "numerics/host_device.h"
+
+// What a triangle does to a ball that meets it: add_patch() (query/probe/patch_sums.h) for one of
+// each, in plain numbers.
+
+namespace ist::gpu {
+
+IST_HD inline double least(double x, double y) { return x < y ? x : y; }
+IST_HD inline double most(double x, double y) { return x > y ? x : y; }
+IST_HD inline double size_of(double x) { return x < 0 ? -x : x; }
+
+/// A triangle as balls meet it (SurfacePatch): its plane's axes, of which the first runs along the
+/// first edge, and its extent in them.
+struct TrianglePlane {
+  double corner[3];  ///< the first
+  double u[3], v[3], n[3];
+  double length[3];         ///< of the edges
+  double ex[3], ey[3];      ///< their directions
+  double left, right, top;  ///< far below 0 where there is no area
+
+  IST_HD explicit TrianglePlane(const double (&c)[3][3]) {
+    double e[3], f[3], cross[3];
+    for (int k = 0; k < 3; ++k) {
+      corner[k] = c[0][k];
+      e[k] = c[1][k] - c[0][k];
+      f[k] = c[2][k] - c[0][k];
+    }
+    cross[0] = e[1] * f[2] - e[2] * f[1];
+    cross[1] = e[2] * f[0] - e[0] * f[2];
+    cross[2] = e[0] * f[1] - e[1] * f[0];
+    const double area = norm(cross), base = norm(e);
+    const bool flat = !(area > 0);
+    const double per_area = 1 / (flat ? 1 : area), per_base = 1 / (flat ? 1 : base);
+    for (int k = 0; k < 3; ++k) {
+      u[k] = e[k] * per_base;
+      n[k] = cross[k] * per_area;
+    }
+    v[0] = n[1] * u[2] - n[2] * u[1];
+    v[1] = n[2] * u[0] - n[0] * u[2];
+    v[2] = n[0] * u[1] - n[1] * u[0];
+    const double apex_x = (f[0] * u[0] + f[1] * u[1]) + f[2] * u[2], apex_y = area * per_base;
+    length[0] = base;
+    ex[0] = 1;
+    ey[0] = 0;
+    set_edge(1, apex_x - base, apex_y, flat);
+    set_edge(2, -apex_x, -apex_y, flat);
+    left = least(0, apex_x);
+    right = flat ? -1e300 : most(base, apex_x);
+    top = flat ? -1e300 : apex_y;
+  }
+
+  /// Height over the plane, and the foot in it.
+  IST_HD void feet(const double (&x)[3], double& height, double& fx, double& fy) const {
+    const double p[3] = {x[0] - corner[0], x[1] - corner[1], x[2] - corner[2]};
+    height = (p[0] * n[0] + p[1] * n[1]) + p[2] * n[2];
+    fx = (p[0] * u[0] + p[1] * u[1]) + p[2] * u[2];
+    fy = (p[0] * v[0] + p[1] * v[1]) + p[2] * v[2];
+  }
+
+ private:
+  IST_HD static double norm(const double (&a)[3]) {
+    return sqrt((a[0] * a[0] + a[1] * a[1]) + a[2] * a[2]);
+  }
+  IST_HD void set_edge(int k, double x, double y, bool flat) {
+    length[k] = sqrt(x * x + y * y);
+    const double per_length = 1 / (flat ? 1 : length[k]);
+    ex[k] = x * per_length;
+    ey[k] = y * per_length;
+  }
+};
+
+/// Of the part of a triangle inside a ball: volume of the cones to the sphere, solid angle, area,
+/// and ∫ (r² − |y − centre|²) dA. Cones and angle are positive where it is seen from outside.
+struct DiscPart {
+  double cones, angle, area, second;
+};
+
+/// How the disc in which a triangle's plane cuts a ball lies to the triangle.
+enum class DiscKind {
+  apart,  ///< the ball misses the triangle
+  whole,  ///< inside it
+  cut     ///< crossed by edges
+};
+
+/// A ball over a triangle's plane.
+class Disc {
+ public:
+  IST_HD Disc(const TrianglePlane& t, const double (&x)[3], double r) : r_(r) {
+    t.feet(x, height_, x_, y_);
+    h_ = size_of(height_);
+    rho2_ = (r - h_) * (r + h_);
+    const double px = t.length[0] - x_;
+    const double t1 = px * t.ex[1] - y_ * t.ey[1], t2 = -(x_ * t.ex[2] + y_ * t.ey[2]);
+    edge_[0] = {y_, -x_, px};
+    edge_[1] = {px * t.ey[1] + y_ * t.ex[1], t1, t1 + t.length[1]};
+    edge_[2] = {y_ * t.ex[2] - x_ * t.ey[2], t2 - t.length[2], t2};
+  }
+
+  /// Whether the centre all but lies on an edge: rounding decides from where it sees the triangle,
+  /// and cones and angle are worth nothing.
+  IST_HD bool on_edge() const {
+    constexpr double kOnEdge2 = 0x1p-28;  // as query/probe/patch_sums.cpp
+    const double m2 =
+        least(least(edge_[0].m * edge_[0].m, edge_[1].m * edge_[1].m), edge_[2].m * edge_[2].m);
+    return m2 + h_ * h_ < kOnEdge2 * (r_ * r_);
+  }
+
+  IST_HD DiscKind kind() const {
+    if (!(h_ < r_)) return DiscKind::apart;
+    bool cut = false, outside = false;
+    for (const Edge& e : edge_) {
+      const double m2 = e.m * e.m;
+      outside = outside || e.m < 0;
+      if (m2 >= rho2_) {
+        if (e.m < 0) return DiscKind::apart;
+        continue;
+      }
+      const double half2 = rho2_ - m2;
+      const bool from_before = e.begin < 0 && e.begin * e.begin >= half2;
+      const bool to_behind = e.end > 0 && e.end * e.end >= half2;
+      // Across the disc, or with an end in it; else it is beside the disc.
+      cut = cut || (from_before && to_behind) || e.begin * e.begin < half2 || e.end * e.end < half2;
+    }
+    return cut ? DiscKind::cut : outside ? DiscKind::apart : DiscKind::whole;
+  }
+
+  IST_HD DiscPart part() const {
+    const DiscKind is = kind();
+    if (is == DiscKind::apart) return {0, 0, 0, 0};
+    return is == DiscKind::cut ? within_edges() : whole();
+  }
+
+  IST_HD DiscPart whole() const {
+    constexpr double kTurn = 2 * 3.141592653589793;
+    const double cap = r_ - h_, sign = height_ > 0 ? 1 : -1;
+    return {sign * (kTurn * ((1.0 / 6) * (cap * cap) * (r_ + (r_ + h_)))),
+            sign * (kTurn * (cap / r_)), kTurn * (0.5 * rho2_), kTurn * (0.25 * (rho2_ * rho2_))};
+  }
+
+  /// Edge by edge, what lies between it and the foot.
+  IST_HD_ONCE DiscPart within_edges() const {
+    DiscPart sum = {0, 0, 0, 0};
+    const double cap = r_ - h_, h2 = h_ * h_;
+    for (const Edge& e : edge_) {
+      const double m2 = e.m * e.m;
+      const double half = sqrt(most(rho2_ - m2, 0));
+      const double low = least(most(-half, e.begin), e.end);
+      const double high = least(most(half, e.begin), e.end);
+      // Two sectors as one angle.
+      const double x1 = m2 + e.begin * low, y1 = e.m * (low - e.begin);
+      const double x2 = m2 + high * e.end, y2 = e.m * (e.end - high);
+      const double phi = angle_of(x1 * y2 + y1 * x2, x1 * x2 - y1 * y2);
+      sum.cones += phi * ((1.0 / 6) * (cap * cap) * (r_ + (r_ + h_)));
+      sum.angle += phi * (cap / r_);
+      sum.area += phi * (0.5 * rho2_);
+      sum.second += phi * (0.25 * (rho2_ * rho2_));
+      // The triangle between them.
+      const double flat = m2 + h2;
+      const double a = sqrt(low * low + flat), b = sqrt(high * high + flat);
+      const double omega =
+          2 * angle_of(e.m * (high - low), (a * b + h_ * (a + b)) + (low * high + flat));
+      const double cross = e.m * (high - low), area = 0.5 * cross;
+      const double spread =
+          (1.0 / 12) * cross * ((low * low + low * high) + (high * high + 3.0 * m2));
+      sum.cones += (1.0 / 3) * (r_ * (r_ * r_) * omega - h_ * area);
+      sum.angle += omega;
+      sum.area += area;
+      sum.second += rho2_ * area - spread;
+    }
+    if (!(height_ > 0)) {
+      sum.cones = -sum.cones;
+      sum.angle = -sum.angle;
+    }
+    return sum;
+  }
+
+ private:
+  /// Distance of the foot, positive if it is within, and where the edge begins and ends.
+  struct Edge {
+    double m, begin, end;
+  };
+
+  double r_, height_, h_, x_, y_, rho2_;
+  Edge edge_[3];
+};
+
+}  // namespace ist::gpu

@@ -1,0 +1,221 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "cuda/query/disc_sums.h"
+#include "cuda/query/field_walk.h"
+#include "numerics/host_device.h"
+
+// Boxes and terrains: fields whose triangles are made on the spot (query/field/patch_shapes.h).
+
+namespace ist::gpu {
+
+struct FacetMemory : WalkMemory {
+  DiscMemory discs;
+};
+
+/// The triangles of a box or a terrain (DiscSums).
+class FacetSource {
+ public:
+  IST_HD explicit FacetSource(const FieldRef& field) : field_(field) {}
+
+  IST_HD void corners(const TriangleId& id, const double (&x)[3], double reach,
+                      double (&c)[3][3]) const {
+    if (field_.kind == FieldKind::box) {
+      // Corners of the faces, counter-clockwise from outside, four bits each.
+      constexpr std::uint32_t kFaces[6] = {0x2640, 0x5731, 0x4510, 0x3762, 0x1320, 0x6754};
+      const std::uint32_t face = kFaces[id.a / 2], first = 1 + id.a % 2;
+      for (std::uint32_t k = 0; k < 3; ++k) {
+        const std::uint32_t corner = face >> 4 * (k == 0 ? 0 : first + k - 1);
+        for (int axis = 0; axis < 3; ++axis)
+          c[k][axis] = (corner >> axis & 1) != 0 ? field_.box.half[axis] : -field_.box.half[axis];
+      }
+      return;
+    }
+    const std::int64_t i = std::int64_t{id.a} - 1, j = std::int64_t{id.b / 2} - 1;
+    const bool second = id.b % 2 != 0;
+    grid_point(i, j, x, reach, c[0]);
+    grid_point(i + 1, second ? j + 1 : j, x, reach, c[1]);
+    grid_point(second ? i : i + 1, j + 1, x, reach, c[2]);
+  }
+
+  /// The triangles that may come near a ball, by number.
+  class Near {
+   public:
+    IST_HD Near(const FieldRef& field, const double (&x)[3], double reach) {
+      if (field.kind == FieldKind::box) return;
+      for (int k = 0; k < 2; ++k) {
+        const double low = (x[k] - reach) / field.height.spacing[k];
+        const double high = (x[k] + reach) / field.height.spacing[k];
+        const double last = (k == 0 ? field.height.columns : field.height.rows) - 1.0;
+        // Beyond the border one cell is as good as any number: it is level across it.
+        from_[k] = static_cast<std::int64_t>(floor(clamped(low, -1, last)));
+        count_[k] = static_cast<std::int64_t>(floor(clamped(high, -1, last))) - from_[k] + 1;
+      }
+    }
+
+    IST_HD std::uint64_t size() const {
+      return from_[0] == kBox ? 12 : 2 * static_cast<std::uint64_t>(count_[0] * count_[1]);
+    }
+    IST_HD TriangleId operator[](std::uint64_t i) const {
+      if (from_[0] == kBox) return {static_cast<std::uint32_t>(i), 0};
+      const auto cell = static_cast<std::int64_t>(i / 2);
+      const std::int64_t row = cell / count_[0];
+      return {
+          static_cast<std::uint32_t>(from_[0] + (cell - row * count_[0]) + 1),
+          static_cast<std::uint32_t>(2 * (from_[1] + row + 1)) + static_cast<std::uint32_t>(i % 2)};
+    }
+
+   private:
+    static constexpr std::int64_t kBox = -2;
+    std::int64_t from_[2] = {kBox, 0}, count_[2] = {0, 0};
+  };
+
+  template <class Team, class Visit>
+  IST_HD void each_near(const Team& team, const double (&x)[3], double reach,
+                        const Visit& visit) const {
+    const Near near(field_, x, reach);
+    const std::uint64_t size = near.size();
+    for (std::uint64_t base = 0; base < size; base += Team::kWidth) {
+      const std::uint64_t i = base + static_cast<std::uint64_t>(team.lane());
+      visit(i < size, i < size ? near[i] : TriangleId{});
+    }
+  }
+
+  template <class Team>
+  IST_HD void ready_sides(const Team&, DiscMemory&, int) const {}
+
+  template <class Team>
+  IST_HD bool inside(const Team&, const DiscMemory& m, int ball, bool wanted) const {
+    if (!wanted) return false;
+    double x[3];
+    m.seen(ball, x);
+    if (field_.kind == FieldKind::height) return x[2] < surface(x[0], x[1]);
+    return size_of(x[0]) < field_.box.half[0] && size_of(x[1]) < field_.box.half[1] &&
+           size_of(x[2]) < field_.box.half[2];
+  }
+
+ private:
+  IST_HD double height(std::int64_t i, std::int64_t j) const {
+    const HeightRef& f = field_.height;
+    const std::int64_t last[2] = {std::int64_t{f.columns} - 1, std::int64_t{f.rows} - 1};
+    i = i < 0 ? 0 : i > last[0] ? last[0] : i;
+    j = j < 0 ? 0 : j > last[1] ? last[1] : j;
+    return static_cast<double>(
+        f.heights[static_cast<std::uint64_t>(j) * f.columns + static_cast<std::uint64_t>(i)]);
+  }
+
+  /// The cells at the border reach as far as the ball does.
+  IST_HD void grid_point(std::int64_t i, std::int64_t j, const double (&x)[3], double reach,
+                         double (&p)[3]) const {
+    const HeightRef& f = field_.height;
+    const std::int64_t n[2] = {i, j};
+    for (int k = 0; k < 2; ++k) {
+      const std::int64_t last = std::int64_t{k == 0 ? f.columns : f.rows} - 1;
+      const double at = static_cast<double>(n[k]) * f.spacing[k];
+      p[k] = n[k] < 0 ? least(at, x[k] - 2 * reach) : n[k] > last ? most(at, x[k] + 2 * reach) : at;
+    }
+    p[2] = height(i, j);
+  }
+
+  /// Height of the terrain over a point.
+  IST_HD double surface(double x, double y) const {
+    const HeightRef& f = field_.height;
+    const double u = clamped(x / f.spacing[0], -1, f.columns);
+    const double v = clamped(y / f.spacing[1], -1, f.rows);
+    const double i = floor(u), j = floor(v), s = u - i, t = v - j;
+    const auto a = static_cast<std::int64_t>(i), b = static_cast<std::int64_t>(j);
+    const double low = height(a, b), high = height(a + 1, b + 1);
+    const double side = s >= t ? height(a + 1, b) : height(a, b + 1);
+    return s >= t ? low + s * (side - low) + t * (high - side)
+                  : low + t * (side - low) + s * (high - side);
+  }
+
+  const FieldRef& field_;
+};
+
+static_assert(kHeldBlocks == kPairsAtOnce);
+
+/// The parts of leaf blocks inside a box or a terrain.
+template <class Team>
+class FacetSums {
+ public:
+  IST_HD FacetSums(const Team& team, FacetMemory& memory, PartSums& sums)
+      : team_(team),
+        m_(memory),
+        sums_(sums),
+        source_(memory.field),
+        discs_(team, memory.discs, source_, memory.place.a_from_b.t, sums) {}
+
+  IST_HD void add(const std::uint32_t* blocks, int have) {
+    for (int k = 0; k < have; ++k) add_block(blocks[k]);
+    discs_.finish();
+  }
+
+ private:
+  IST_HD void add_block(std::uint32_t block) {
+    const NodeBall ball = m_.tree.ball(0, block);
+    double centre[3];
+    m_.place.a_from_b.apply(ball.centre, centre);
+    const double reach = ball.r * m_.place.a_from_b.scale * (1 + 1e-12);
+    const int slot = discs_.hold(centre, reach);
+    bool facets = false;
+    for (int lane = team_.lane(); lane < static_cast<int>(kWidth); lane += Team::kWidth) {
+      double x[3], r;
+      if (!place_ball(m_, 0, block, lane, x, r) || settled(x, r)) r = 0;
+      facets = facets || r > 0;
+      discs_.set_ball(slot, lane, x, r);
+    }
+    team_.sync();
+    if (!team_.any(facets)) return;
+    const FacetSource::Near near(m_.field, centre, reach * (1 + kMoved));
+    const std::uint64_t size = near.size();
+    for (std::uint64_t base = 0; base < size; base += kStaged)
+      discs_.meet(slot, [&](int k, TriangleId& id) {
+        const std::uint64_t i = base + static_cast<std::uint64_t>(k);
+        if (i >= size) return false;
+        id = near[i];
+        return true;
+      });
+  }
+
+  /// Sums what needs no triangles: a ball that comes near one face of a box, or none.
+  IST_HD bool settled(const double (&x)[3], double r) {
+    if (m_.field.kind != FieldKind::box) return false;
+    const double(&half)[3] = m_.field.box.half;
+    int faces = 0, axis = 0;
+    double side = 1;
+    for (int k = 0; k < 3; ++k) {
+      for (int s = 1; s >= -1; s -= 2) {
+        if (half[k] - s * x[k] >= r) continue;
+        ++faces;
+        axis = k;
+        side = s;
+      }
+    }
+    if (faces > 1) return false;
+    DistanceLook at = {r, {0, 0, 0}};
+    for (int k = 0; k < 3; ++k) {
+      if (faces == 0 || k != axis) continue;
+      at.distance = half[k] - side * x[k];
+      at.gradient[k] = -side;
+    }
+    const PartInside part = flat_part(at, r);
+    const double* const t = m_.place.a_from_b.t;
+    const double from[3] = {x[0] - t[0], x[1] - t[1], x[2] - t[2]};
+    if (part.volume > 0) {
+      sums_.add(from, part.volume, part.gradient, part.moment);
+      ++sums_.spheres;
+    }
+    return true;
+  }
+
+  const Team& team_;
+  FacetMemory& m_;
+  PartSums& sums_;
+  FacetSource source_;
+  DiscSums<Team, FacetSource> discs_;
+};
+
+}  // namespace ist::gpu

@@ -1,0 +1,139 @@
+#pragma once
+
+#include <cstdint>
+
+#include "cuda/query/field_shapes.h"
+#include "cuda/query/node_sums.h"
+#include "cuda/query/pair_descent.h"
+#include "cuda/query/part_sums.h"
+#include "numerics/host_device.h"
+
+// A tree gone down against a field that tells how far its surface is: FieldDescent
+// (query/field/field_descent.h) depth first, by one team, two blocks at a time.
+
+namespace ist::gpu {
+
+/// A placed field and a placed tree in a team's memory.
+struct ProbeMemory {
+  PairPlace place;
+  TreeRef tree;
+  SumsRef sums;
+  FieldRef field;
+};
+
+/// A ball of a block of the tree, the field's frame; false if the lane holds none.
+IST_HD inline bool place_ball(const ProbeMemory& m, int level, std::uint32_t block, int lane,
+                              double (&x)[3], double& r) {
+  const BallBlock& b = m.tree.blocks[level][block];
+  const Origin& o = m.tree.origins[level][block];
+  const double at[3] = {o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
+                        o.z + static_cast<double>(b.z[lane])};
+  m.place.a_from_b.apply(at, x);
+  r = static_cast<double>(b.r[lane]) * m.place.a_from_b.scale;
+  return r > 0;
+}
+
+/// A look's distance beyond which a ball is in or out as a whole.
+IST_HD inline double sure_reach(const FieldRef& field, double r) {
+  return r * (1 + 1e-6) + distance_error(field);
+}
+
+struct WalkMemory : ProbeMemory {
+  std::uint32_t stack[kMaxLevels * (kItems - kPairsAtOnce) + kPairsAtOnce];  ///< nodes to open
+  std::uint32_t leaves[kPairsAtOnce + kItems];
+};
+
+template <class Team>
+class FieldWalk {
+ public:
+  IST_HD FieldWalk(const Team& team, WalkMemory& memory, PartSums& sums)
+      : team_(team), m_(memory), sums_(sums) {}
+
+  /// False where the field holds what is no number. leaf(blocks, have) sums one leaf block or two.
+  template <class Leaf>
+  IST_HD bool run(const Leaf& leaf) {
+    int size = 0, leaves = 0;
+    if (team_.lane() == 0) (m_.tree.top == 0 ? m_.leaves : m_.stack)[0] = node(m_.tree.top, 0);
+    (m_.tree.top == 0 ? leaves : size) = 1;
+    team_.sync();
+    while (size > 0 || leaves > 0) {
+      if (size > 0 && leaves < kPairsAtOnce) {
+        open(size, leaves);
+      } else {
+        const int have = leaves < kPairsAtOnce ? leaves : kPairsAtOnce;
+        leaves -= have;
+        sums_.visits += static_cast<std::uint32_t>(have);
+        leaf(m_.leaves + leaves, have);
+        team_.sync();
+      }
+    }
+    return !team_.any(!sound_);
+  }
+
+  /// Sums the spheres of leaf blocks by themselves: of smooth fields.
+  IST_HD void add_spheres(const std::uint32_t* blocks, int have) {
+    for (int i = 0; i < kItems / Team::kWidth; ++i) {
+      const int item = i * Team::kWidth + team_.lane();
+      const int half = item / static_cast<int>(kWidth);
+      double x[3], r;
+      if (half >= have || !place_ball(m_, 0, blocks[half], item % static_cast<int>(kWidth), x, r))
+        continue;
+      const PartInside part = part_in(m_.field, x, r, sound_);
+      if (!(part.volume > 0)) continue;
+      const double* const t = m_.place.a_from_b.t;
+      const double at[3] = {x[0] - t[0], x[1] - t[1], x[2] - t[2]};
+      sums_.add(at, part.volume, part.gradient, part.moment);
+      ++sums_.spheres;
+    }
+  }
+
+ private:
+  IST_HD static std::uint32_t node(int level, std::uint32_t block) {
+    return static_cast<std::uint32_t>(level) << kNodeBits | block;
+  }
+
+  IST_HD void open(int& size, int& leaves) {
+    const int have = size < kPairsAtOnce ? size : kPairsAtOnce;
+    constexpr int kItemsALane = kItems / Team::kWidth;
+    std::uint32_t entry[kItemsALane];
+    for (int i = 0; i < kItemsALane; ++i) {
+      const int half = (i * Team::kWidth + team_.lane()) / static_cast<int>(kWidth);
+      entry[i] = half < have ? m_.stack[size - 1 - half] : 0;
+    }
+    team_.sync();
+    size -= have;
+    sums_.visits += static_cast<std::uint32_t>(have);
+    for (int i = 0; i < kItemsALane; ++i) {
+      const int item = i * Team::kWidth + team_.lane();
+      const int half = item / static_cast<int>(kWidth), lane = item % static_cast<int>(kWidth);
+      const int level = static_cast<int>(entry[i] >> kNodeBits);
+      const std::uint32_t block = entry[i] & ((1u << kNodeBits) - 1);
+      const std::uint32_t child = block * kWidth + static_cast<std::uint32_t>(lane);
+      bool waits = false;
+      double x[3], r;
+      if (half < have && place_ball(m_, level, block, lane, x, r)) {
+        const double d = distance_in(m_.field, x, sound_), reach = sure_reach(m_.field, r);
+        waits = d > -reach && d < reach;
+        if (d >= reach)
+          sums_.add_whole(m_.sums.level[level - 1][child], m_.sums.spheres_below(level - 1, child),
+                          m_.place.a_from_b);
+      }
+      const bool leaf = waits && level == 1;
+      int total = 0;
+      int place = leaves + team_.exclusive_count(leaf, total);
+      leaves += total;
+      if (leaf) m_.leaves[place] = child;
+      place = size + team_.exclusive_count(waits && !leaf, total);
+      size += total;
+      if (waits && !leaf) m_.stack[place] = node(level - 1, child);
+    }
+    team_.sync();
+  }
+
+  const Team& team_;
+  WalkMemory& m_;
+  PartSums& sums_;
+  bool sound_ = true;
+};
+
+}  // namespace ist::gpu

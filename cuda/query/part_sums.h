@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+
+#include "cuda/query/lens_sums.h"
+#include "cuda/query/node_sums.h"
+#include "cuda/query/pair_place.h"
+#include "numerics/host_device.h"
+
+namespace ist::gpu {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// What one lane sums of the parts of balls inside a field, the field's frame; positions from the
+/// probing tree's unit-frame origin.
+struct PartSums {
+  double volume = 0;
+  double force[3] = {0, 0, 0};   ///< d(volume)/d(translation of the tree)
+  double torque[3] = {0, 0, 0};  ///< likewise about its unit-frame origin
+  double moment[3] = {0, 0, 0};  ///< ∫ x dV
+  std::uint32_t spheres = 0;
+  std::uint32_t visits = 0;  ///< the team's
+
+  /// A ball's part, its centre being at x: `push` the gradient by that, `shift` the moment about
+  /// it.
+  IST_HD void add(const double (&x)[3], double part, const double (&push)[3],
+                  const double (&shift)[3]) {
+    volume += part;
+    for (int k = 0; k < 3; ++k) {
+      force[k] += push[k];
+      moment[k] += part * x[k] + shift[k];
+    }
+    torque[0] += x[1] * push[2] - x[2] * push[1];
+    torque[1] += x[2] * push[0] - x[0] * push[2];
+    torque[2] += x[0] * push[1] - x[1] * push[0];
+  }
+
+  /// A node that is inside as a whole.
+  IST_HD void add_whole(const NodeSum& sum, std::uint32_t count, const PairMap& a_from_b) {
+    const double factor = 4 * kPi / 3 * (a_from_b.scale * a_from_b.scale * a_from_b.scale);
+    volume += factor * sum.cubes;
+    for (int k = 0; k < 3; ++k)
+      moment[k] +=
+          factor * ((a_from_b.m[3 * k] * sum.moment[0] + a_from_b.m[3 * k + 1] * sum.moment[1]) +
+                    a_from_b.m[3 * k + 2] * sum.moment[2]);
+    spheres += count;
+  }
+
+  /// The team's, as an answer is made of them.
+  template <class Team>
+  IST_HD LensTotals total(const Team& team) const {
+    LensTotals totals;
+    totals.clear();
+    totals.term[kCaps] = 3 / kPi * team.sum(volume);
+    for (int k = 0; k < 3; ++k) {
+      totals.term[kForce + k] = -1 / (2 * kPi) * team.sum(force[k]);
+      totals.term[kTorque + k] = -1 / (2 * kPi) * team.sum(torque[k]);
+      totals.term[kMoment + k] = 3 / kPi * team.sum(moment[k]);
+    }
+    totals.spheres = static_cast<std::uint32_t>(team.sum(static_cast<int>(spheres)));
+    totals.visits = visits;
+    return totals;
+  }
+};
+
+}  // namespace ist::gpu

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+
+#include <ist/gpu_query.h>
+
+#include "cuda/query/batch_kernels.h"
+#include "cuda/query/device_bytes.h"
+#include "cuda/query/field_kernels.h"
+
+// What the classes of ist/gpu_query.h hold.
+
+namespace ist {
+
+struct GpuAssets::Impl {
+  int device = 0;
+  gpu::DeviceBytes memory;
+  const gpu::AssetRef* refs = nullptr;
+  std::size_t size = 0;
+};
+
+struct GpuWorkspace::Impl {
+  int device = 0;
+  std::size_t most_pairs = 0;
+  int blocks_at_a_time = 0;
+  gpu::FieldGrids field_grids{};
+  gpu::DeviceBytes memory;
+  gpu::BatchArrays arrays{};  ///< what does not change from batch to batch
+  gpu::FieldCounters* field_counters = nullptr;
+  std::uint32_t* field_list = nullptr;  ///< as long as the other
+
+  /// Sets the arrays to parts of the memory at `from`; returns the bytes they take.
+  std::size_t place(std::byte* from);
+};
+
+namespace gpu {
+
+/// Throws where a batch does not fit the workspace, or stands on another device than its assets.
+void check_batch(const GpuPairs& pairs, const GpuWorkspace::Impl& room, int device);
+
+}  // namespace gpu
+}  // namespace ist

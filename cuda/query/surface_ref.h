@@ -1,0 +1,111 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include <ist/asset_layout.h>
+
+#include "cuda/query/tree_ref.h"
+#include "numerics/host_device.h"
+
+namespace ist::gpu {
+
+/// A node of a surface and its level in one word; level 0: a block of triangles, above it: blocks
+/// of balls.
+using SurfaceNode = std::uint32_t;
+constexpr int kSurfaceBits = 28;  ///< of a node's number
+static_assert(kMaxLevels <= 1 << (32 - kSurfaceBits));
+
+IST_HD inline int level_of(SurfaceNode node) { return static_cast<int>(node >> kSurfaceBits); }
+IST_HD inline std::uint32_t number_of(SurfaceNode node) {
+  return node & ((1u << kSurfaceBits) - 1);
+}
+IST_HD inline SurfaceNode surface_node(int level, std::uint32_t number) {
+  return static_cast<std::uint32_t>(level) << kSurfaceBits | number;
+}
+
+/// The field of an asset with its offsets resolved (SurfaceTree, query/asset/surface_tree.h, in
+/// plain numbers).
+struct SurfaceRef {
+  const SurfaceBlock* blocks;
+  const BallBlock* balls[kMaxLevels];  ///< around the blocks of the level below; none at level 0
+  const Origin* origins[kMaxLevels];
+  /// Cube of the typical radius of a level's nodes, which tile an area.
+  double cube[kMaxLevels];
+  double root[4];  ///< ball around the grid
+  double low[3], cell;
+  std::uint32_t bricks[3];
+  int top;  ///< the level of one block
+  const std::uint32_t* brick_index;
+  const CellBrick* brick_data;
+  const std::byte* cell_ends;
+  const std::byte* cell_triangles;
+  std::uint32_t list_bytes;
+
+  /// `asset`: a header that the host reads, of an asset with a field; `bytes`: where it lies.
+  static SurfaceRef of(const AssetHeader& asset, const std::byte* bytes) {
+    const FieldHeader& field = *at<FieldHeader>(asset, asset.field);
+    SurfaceRef ref = {};
+    ref.top = static_cast<int>(field.level_count) - 1;
+    ref.blocks = reinterpret_cast<const SurfaceBlock*>(bytes + field.level[0].blocks);
+    double square = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double half = 0.5 * field.cell * static_cast<double>(kBrickWidth * field.bricks[k]);
+      ref.low[k] = field.low[k];
+      ref.bricks[k] = field.bricks[k];
+      ref.root[k] = field.low[k] + half;
+      square += half * half;
+    }
+    ref.root[3] = std::sqrt(square);
+    for (int i = 0; i <= ref.top; ++i) {
+      const double count = field.level[i].count;
+      ref.cube[i] = ref.root[3] * ref.root[3] * ref.root[3] / (count * std::sqrt(count));
+      if (i == 0) continue;
+      ref.balls[i] = reinterpret_cast<const BallBlock*>(bytes + field.level[i].blocks);
+      ref.origins[i] = reinterpret_cast<const Origin*>(bytes + field.level[i].origins);
+    }
+    ref.cell = field.cell;
+    ref.brick_index = reinterpret_cast<const std::uint32_t*>(bytes + field.brick_index);
+    ref.brick_data = reinterpret_cast<const CellBrick*>(bytes + field.brick_data);
+    ref.cell_ends = bytes + field.cell_ends;
+    ref.cell_triangles = bytes + field.cell_triangles;
+    ref.list_bytes = field.list_bytes;
+    return ref;
+  }
+
+  IST_HD SurfaceNode root_node() const { return surface_node(top, 0); }
+
+  IST_HD NodeBall ball(SurfaceNode node) const {
+    const int above = level_of(node) + 1;
+    if (above > top) return {{root[0], root[1], root[2]}, root[3]};
+    return lane_ball(above, number_of(node) / kWidth, number_of(node) % kWidth);
+  }
+
+  /// The ball in a lane of a block of a level above 0; a negative radius if there is none.
+  IST_HD NodeBall lane_ball(int level, std::uint32_t block, std::uint32_t lane) const {
+    const BallBlock& b = balls[level][block];
+    const Origin& o = origins[level][block];
+    return {{o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
+             o.z + static_cast<double>(b.z[lane])},
+            static_cast<double>(b.r[lane])};
+  }
+
+  /// Corners of triangle 16 · block + lane.
+  IST_HD void corners(std::uint32_t triangle, double (&c)[3][3]) const {
+    const SurfaceBlock& b = blocks[triangle / kWidth];
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t vertex = b.corner[k][triangle % kWidth];
+      c[k][0] = static_cast<double>(b.x[vertex]);
+      c[k][1] = static_cast<double>(b.y[vertex]);
+      c[k][2] = static_cast<double>(b.z[vertex]);
+    }
+  }
+
+  IST_HD std::uint32_t listed(const std::byte* list, std::uint32_t i) const {
+    return list_bytes == 2 ? reinterpret_cast<const std::uint16_t*>(list)[i]
+                           : reinterpret_cast<const std::uint32_t*>(list)[i];
+  }
+};
+
+}  // namespace ist::gpu

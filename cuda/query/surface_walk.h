@@ -1,0 +1,350 @@
+#pragma once
+
+#include <cstdint>
+
+#include "cuda/query/disc_sums.h"
+#include "cuda/query/field_walk.h"
+#include "cuda/query/surface_sides.h"
+#include "numerics/host_device.h"
+
+// A tree gone down against the surface in an asset: SurfaceDescent (query/field/surface_descent.h)
+// depth first, by one team. Each node of the tree has a short list of nodes of the surface that
+// come near it; its children inherit what comes near them, and one without any is inside or outside
+// as a whole.
+
+namespace ist::gpu {
+
+constexpr int kListRoom = 32;
+/// Nodes of a surface that wait while a block's are opened: a list, and what opening two at a time
+/// adds on each level.
+constexpr int kOpenRoom = kListRoom + kMaxLevels * (kItems - kPairsAtOnce) + kPairsAtOnce;
+
+/// A node of the tree whose children are looked at one after another.
+struct ProbeFrame {
+  std::uint32_t block;
+  int count;
+  SurfaceNode list[kListRoom];
+  /// [half of the lanes][child] which of the list come near, a bit each.
+  std::uint32_t near[2][kWidth];
+};
+
+struct SurfaceMemory : ProbeMemory {
+  int wanted[kMaxLevels];  ///< level down to which the list of a node of a level is opened
+  ProbeFrame frame[kMaxLevels];
+  SurfaceNode open[kOpenRoom];
+  SurfaceNode ready[kPairsAtOnce];
+  DiscMemory discs;
+};
+
+/// The triangles of a surface (DiscSums): `a` is 16 · block + lane.
+class SurfaceSource {
+ public:
+  IST_HD SurfaceSource(const SurfaceRef& surface, SurfaceNode* room)
+      : surface_(surface), room_(room) {}
+
+  IST_HD void corners(const TriangleId& id, const double (&)[3], double, double (&c)[3][3]) const {
+    surface_.corners(id.a, c);
+  }
+
+  /// From the root down, since hardly ever.
+  template <class Team, class Visit>
+  IST_HD void each_near(const Team& team, const double (&x)[3], double reach,
+                        const Visit& visit) const {
+    if (team.lane() == 0) room_[0] = surface_.root_node();
+    int size = 1;
+    team.sync();
+    while (size > 0) {
+      const SurfaceNode node = room_[--size];
+      team.sync();
+      for (int lane = team.lane(); lane < round_up(Team::kWidth); lane += Team::kWidth) {
+        const bool there = lane < static_cast<int>(kWidth);
+        const std::uint32_t child = number_of(node) * kWidth + static_cast<std::uint32_t>(lane);
+        if (level_of(node) == 0) {
+          visit(there, TriangleId{there ? child : 0, 0});
+          continue;
+        }
+        const bool near = there && near_ball(level_of(node), number_of(node), lane, x, reach);
+        int total = 0;
+        const int place = size + team.exclusive_count(near, total);
+        if (near) room_[place] = surface_node(level_of(node) - 1, child);
+        size += total;
+      }
+      team.sync();
+    }
+  }
+
+  IST_HD bool near_ball(int level, std::uint32_t block, int lane, const double (&x)[3],
+                        double reach) const {
+    const NodeBall ball = surface_.lane_ball(level, block, static_cast<std::uint32_t>(lane));
+    return ball.r > 0 && balls_meet(ball, x, reach);
+  }
+
+  IST_HD static bool balls_meet(const NodeBall& ball, const double (&x)[3], double reach) {
+    const double dx = ball.centre[0] - x[0], dy = ball.centre[1] - x[1], dz = ball.centre[2] - x[2];
+    const double sum = ball.r + reach;
+    return (dx * dx + dy * dy) + dz * dz <= sum * sum;
+  }
+
+  /// Finds in each block a ball whose side is known: by the surface in it, else in the grid.
+  template <class Team>
+  IST_HD void ready_sides(const Team& team, DiscMemory& m, int held) const {
+    for (int slot = team.lane(); slot < round_up_to(held, Team::kWidth); slot += Team::kWidth) {
+      std::uint32_t known = kNoBall, first = kNoBall;
+      double least_angle = 1e300;
+      for (std::uint32_t k = 0; slot < held && k < kWidth; ++k) {
+        const std::uint32_t ball = static_cast<std::uint32_t>(slot) * kWidth + k;
+        if (!(m.r[ball] > 0)) continue;
+        if (first == kNoBall) first = ball;
+        const double angle = size_of(m.angle[ball]);
+        if (!(angle > 1e-6) || !(angle < least_angle)) continue;
+        least_angle = angle;
+        known = ball;
+      }
+      const bool look = known == kNoBall && first != kNoBall;
+      double x[3] = {0, 0, 0};
+      if (look) m.seen(static_cast<int>(first), x);
+      const bool inside = inside_surface(team, surface_, look, x);
+      if (slot >= held) continue;
+      m.block[slot].known = look ? first : known;
+      m.block[slot].known_inside = look ? inside : known != kNoBall && m.angle[known] < 0;
+    }
+    team.sync();
+  }
+
+  /// From the known ball through the triangles between, or in the grid where these are many.
+  template <class Team>
+  IST_HD bool inside(const Team& team, const DiscMemory& m, int ball, bool wanted) const {
+    double x[3] = {0, 0, 0};
+    if (wanted) m.seen(ball, x);
+    const HeldBlock& block = m.block[wanted ? ball / static_cast<int>(kWidth) : 0];
+    const bool many = block.near > kKeptNear;
+    bool result = inside_surface(team, surface_, wanted && many, x);
+    if (!wanted || many) return result;
+    result = block.known_inside;
+    if (block.known == static_cast<std::uint32_t>(ball)) return result;
+    double from[3], way[3];
+    m.seen(static_cast<int>(block.known), from);
+    for (int k = 0; k < 3; ++k) way[k] = x[k] - from[k];
+    for (std::uint32_t i = 0; i < block.near; ++i) {
+      double c[3][3];
+      surface_.corners(block.kept[i].a, c);
+      if (steps_through(from, way, c)) result = !result;
+    }
+    return result;
+  }
+
+ private:
+  IST_HD static constexpr int round_up_to(int count, int width) {
+    return (count + width - 1) / width * width;
+  }
+  IST_HD static constexpr int round_up(int width) {
+    return round_up_to(static_cast<int>(kWidth), width);
+  }
+
+  const SurfaceRef& surface_;
+  SurfaceNode* room_;
+};
+
+template <class Team>
+class SurfaceWalk {
+ public:
+  IST_HD SurfaceWalk(const Team& team, SurfaceMemory& memory, PartSums& sums)
+      : team_(team),
+        m_(memory),
+        sums_(sums),
+        source_(memory.field.mesh, memory.open + kListRoom),
+        discs_(team, memory.discs, source_, memory.place.a_from_b.t, sums) {}
+
+  IST_HD void run() {
+    if (team_.lane() == 0) {
+      plan();
+      m_.open[0] = m_.field.mesh.root_node();
+    }
+    team_.sync();
+    const bool is_leaf = m_.tree.top == 0;
+    int level = m_.tree.top, child = 0;
+    if (!is_leaf) start_frame(level, 0, 1);
+    for (bool first = true;; first = false) {
+      const bool more = is_leaf ? first : next_child(level, child);
+      if (!more || discs_.full()) discs_.finish();
+      if (!more) return;
+      if (is_leaf) {
+        meet_leaf(0, 1);
+        continue;
+      }
+      const ProbeFrame& frame = m_.frame[level];
+      const std::uint32_t number = frame.block * kWidth + static_cast<std::uint32_t>(child);
+      const int size = inherit(frame, child);
+      if (level == 1) {
+        meet_leaf(number, size);
+        ++child;
+      } else {
+        start_frame(--level, number, size);
+        child = 0;
+      }
+    }
+  }
+
+ private:
+  /// As SurfaceDescent opens the larger of both.
+  IST_HD void plan() {
+    const SurfaceRef& surface = m_.field.mesh;
+    const double scale = m_.place.a_from_b.scale, cube = scale * scale * scale;
+    for (int k = 0; k <= m_.tree.top; ++k) {
+      int at = surface.top;
+      while (at > 0 && (k == 0 || surface.cube[at] >= cube * m_.tree.cube[k + 1])) --at;
+      m_.wanted[k] = at;
+    }
+  }
+
+  /// Moves on to a child that the surface comes near, up where a node has none left; false at the
+  /// end.
+  IST_HD bool next_child(int& level, int& child) const {
+    for (;;) {
+      const ProbeFrame& frame = m_.frame[level];
+      while (child < static_cast<int>(kWidth) && (frame.near[0][child] | frame.near[1][child]) == 0)
+        ++child;
+      if (child < static_cast<int>(kWidth)) return true;
+      if (level == m_.tree.top) return false;
+      child = static_cast<int>(frame.block % kWidth) + 1;
+      ++level;
+    }
+  }
+
+  /// Opens what comes near a child; returns how many nodes.
+  IST_HD int inherit(const ProbeFrame& frame, int child) {
+    const std::uint32_t near = frame.near[0][child] | frame.near[1][child];
+    for (int k = team_.lane(); k < frame.count; k += Team::kWidth)
+      if ((near >> k & 1) != 0) m_.open[count_bits(near & ((1u << k) - 1))] = frame.list[k];
+    team_.sync();
+    return count_bits(near);
+  }
+
+  /// Goes on to the children of a node, of which m_.open[0 … size) come near: which of their nodes
+  /// come near each child. Children without any are settled.
+  IST_HD void start_frame(int level, std::uint32_t number, int size) {
+    ProbeFrame& frame = m_.frame[level];
+    if (team_.lane() == 0) {
+      frame.block = number;
+      frame.count = 0;
+    }
+    double centre[3], reach;
+    bound(level, number, centre, reach);
+    int count = 0;
+    while (size > 0) {
+      int ready = 0;
+      size = open_two(size, count, m_.wanted[level], centre, reach, frame.list + count, ready);
+      count += ready;
+    }
+    if (team_.lane() == 0) frame.count = count;
+    sums_.visits += static_cast<std::uint32_t>(count);
+    for (int i = 0; i < kItemsALane; ++i) {
+      const int half = item(i) / static_cast<int>(kWidth),
+                lane = item(i) % static_cast<int>(kWidth);
+      double x[3], r;
+      std::uint32_t near = 0;
+      if (place_ball(m_, level, number, lane, x, r))
+        for (int k = half; k < count; k += 2)
+          near |= SurfaceSource::balls_meet(m_.field.mesh.ball(frame.list[k]), x, r * (1 + kMoved))
+                      ? 1u << k
+                      : 0;
+      frame.near[half][lane] = near;
+    }
+    team_.sync();
+    for (int i = 0; i < kItemsALane; ++i) {
+      const int lane = item(i) % static_cast<int>(kWidth);
+      double x[3] = {0, 0, 0}, r = 0;
+      const bool alone = item(i) < static_cast<int>(kWidth) &&
+                         (frame.near[0][lane] | frame.near[1][lane]) == 0 &&
+                         place_ball(m_, level, number, lane, x, r);
+      if (!inside_surface(team_, m_.field.mesh, alone, x)) continue;
+      const std::uint32_t child = number * kWidth + static_cast<std::uint32_t>(lane);
+      sums_.add_whole(m_.sums.level[level - 1][child], m_.sums.spheres_below(level - 1, child),
+                      m_.place.a_from_b);
+    }
+  }
+
+  /// Puts the spheres of a leaf block together with the triangles below m_.open[0 … size).
+  IST_HD void meet_leaf(std::uint32_t number, int size) {
+    double centre[3], reach;
+    bound(0, number, centre, reach);
+    const int slot = discs_.hold(centre, reach);
+    for (int lane = team_.lane(); lane < static_cast<int>(kWidth); lane += Team::kWidth) {
+      double x[3], r;
+      discs_.set_ball(slot, lane, x, place_ball(m_, 0, number, lane, x, r) ? r : 0);
+    }
+    team_.sync();
+    while (size > 0) {
+      int ready = 0;
+      size = open_two(size, -kOpenRoom, 0, centre, reach, m_.ready, ready);
+      if (ready == 0) continue;
+      discs_.meet(slot, [&](int k, TriangleId& id) {
+        if (k / static_cast<int>(kWidth) >= ready) return false;
+        id = {number_of(m_.ready[k / static_cast<int>(kWidth)]) * kWidth +
+                  static_cast<std::uint32_t>(k) % kWidth,
+              0};
+        return true;
+      });
+    }
+  }
+
+  /// Takes two of m_.open[0 … size): what is at the wanted level is `ready`, of others the children
+  /// that come near take their places. Returns how many there are now. Where with `count` they
+  /// would be more than a list holds, nodes stay as they are and are ready.
+  IST_HD int open_two(int size, int count, int wanted, const double (&centre)[3], double reach,
+                      SurfaceNode* to, int& ready) {
+    const int have = size < kPairsAtOnce ? size : kPairsAtOnce;
+    SurfaceNode node[kItemsALane];
+    bool near[kItemsALane];
+    int more = 0;
+    for (int i = 0; i < kItemsALane; ++i) {
+      const int half = item(i) / static_cast<int>(kWidth);
+      node[i] = half < have ? m_.open[size - 1 - half] : 0;
+      near[i] = half < have && level_of(node[i]) > wanted &&
+                source_.near_ball(level_of(node[i]), number_of(node[i]),
+                                  item(i) % static_cast<int>(kWidth), centre, reach * (1 + kMoved));
+      int total = 0;
+      team_.exclusive_count(near[i], total);
+      more += total;
+    }
+    team_.sync();
+    size -= have;
+    sums_.visits += static_cast<std::uint32_t>(have);
+    const bool fits = count + size + more + have <= kListRoom;
+    for (int i = 0; i < kItemsALane; ++i) {
+      const int half = item(i) / static_cast<int>(kWidth);
+      const bool stays = half < have && item(i) % static_cast<int>(kWidth) == 0 &&
+                         (!fits || level_of(node[i]) <= wanted);
+      int total = 0;
+      int place = ready + team_.exclusive_count(stays, total);
+      if (stays) to[place] = node[i];
+      ready += total;
+      place = size + team_.exclusive_count(near[i] && fits, total);
+      if (near[i] && fits)
+        m_.open[place] =
+            surface_node(level_of(node[i]) - 1, number_of(node[i]) * kWidth +
+                                                    static_cast<std::uint32_t>(item(i)) % kWidth);
+      size += total;
+    }
+    team_.sync();
+    return size;
+  }
+
+  /// The ball of a node, the field's frame.
+  IST_HD void bound(int level, std::uint32_t number, double (&centre)[3], double& reach) const {
+    const NodeBall ball = m_.tree.ball(level, number);
+    m_.place.a_from_b.apply(ball.centre, centre);
+    reach = ball.r * m_.place.a_from_b.scale * (1 + 1e-12);
+  }
+
+  static constexpr int kItemsALane = kItems / Team::kWidth;
+  IST_HD int item(int i) const { return i * Team::kWidth + team_.lane(); }
+
+  const Team& team_;
+  SurfaceMemory& m_;
+  PartSums& sums_;
+  SurfaceSource source_;
+  DiscSums<Team, SurfaceSource> discs_;
+};
+
+}  // namespace ist::gpu

@@ -1,0 +1,245 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include <ist/error.h>
+
+#include "support/host_field_batch.h"
+#include "support/oracle_assets.h"
+#include "support/random_pairs.h"
+#include "support/surface_queries.h"
+
+// The GPU's batch of trees in fields, its source run by teams of the host, against the CPU's query.
+
+namespace ist::testing {
+namespace {
+
+/// All that a GPU knows.
+std::vector<std::pair<const char*, Field>> batch_fields() {
+  std::vector<std::pair<const char*, Field>> out = fields();
+  std::erase_if(out, [](const auto& f) { return std::holds_alternative<FunctionField>(f.second); });
+  out.emplace_back("mesh of a cube", MeshField{cube().view()});
+  return out;
+}
+
+std::vector<Field> batch_field_values() {
+  std::vector<Field> out;
+  for (const auto& [name, field] : batch_fields()) out.push_back(field);
+  return out;
+}
+
+/// Random poses of a field and random trees, near it more often than not.
+std::vector<BatchPair> pairs_with(std::uint32_t field, std::size_t count, unsigned seed) {
+  RandomPairs random(seed);
+  std::vector<BatchPair> out = random.pairs(count);
+  for (BatchPair& pair : out) {
+    pair.a = field;
+    pair.scale_b *= random.uniform(0.1, 0.5);
+    pair.pose_a = random.pose(0.3);
+  }
+  return out;
+}
+
+Penetration by_cpu(const Field& field, const BatchPair& pair, Measure measure) {
+  static Workspace workspace;
+  PenetrationSettings settings;
+  settings.measure = measure;
+  return penetration(PlacedField{field, pair.pose_a, pair.scale_a}, placed(pair).second, settings,
+                     workspace);
+}
+
+/// By how much an answer is off: parts of the volume, and of the surface or lever that go with the
+/// larger of it and of a thousandth of what the tree has.
+struct Off {
+  double volume = 0, push = 0, turn = 0, centre = 0;
+
+  void look(const Penetration& gpu, const Penetration& cpu, double size) {
+    const double volume_scale = std::max(cpu.volume, 1e-6 * size * size * size);
+    const double area =
+        std::max(std::cbrt(volume_scale * volume_scale), cpu.translation_gradient.norm());
+    volume = std::max(volume, std::abs(gpu.volume - cpu.volume) / volume_scale);
+    push = std::max(push, (gpu.translation_gradient - cpu.translation_gradient).norm() / area);
+    turn = std::max(turn, (gpu.rotation_gradient - cpu.rotation_gradient).norm() / (area * size));
+    if (cpu.volume > volume_scale / 2)
+      centre = std::max(centre, (gpu.centroid - cpu.centroid).norm() / size);
+  }
+};
+
+TEST(GpuFields, AnswersAreTheCpus) {
+  const auto named = batch_fields();
+  HostFieldBatch batch(batch_views(), batch_field_values());
+  for (std::uint32_t f = 0; f < named.size(); ++f) {
+    Off off;
+    std::size_t met = 0, crossed = 0;
+    for (const Measure measure : {Measure::matched, Measure::inner}) {
+      const std::vector<BatchPair> pairs = pairs_with(f, 300, 30 + f);
+      const std::vector<Penetration> answers = batch.run(pairs, measure);
+      for (std::size_t i = 0; i < pairs.size(); ++i) {
+        const Penetration cpu = by_cpu(named[f].second, pairs[i], measure);
+        ASSERT_EQ(answers[i].status, QueryStatus::ok);
+        off.look(answers[i], cpu, pairs[i].scale_b);
+        met += cpu.volume > 0 ? 1 : 0;
+        crossed += cpu.translation_gradient.norm() > 0 ? 1 : 0;
+      }
+    }
+    std::printf("%-15s volume %.1e push %.1e turn %.1e centroid %.1e; %zu met, %zu crossed\n",
+                named[f].first, off.volume, off.push, off.turn, off.centre, met, crossed);
+    EXPECT_GT(crossed, 50u) << named[f].first;
+    EXPECT_LE(off.volume, 1e-9) << named[f].first;
+    EXPECT_LE(off.push, 1e-9) << named[f].first;
+    EXPECT_LE(off.turn, 1e-9) << named[f].first;
+    EXPECT_LE(off.centre, 1e-9) << named[f].first;
+  }
+}
+
+/// Centres of balls on planes, edges and corners of the field.
+TEST(GpuFields, AlignedSolidsToo) {
+  static const std::vector<float> flat(81, 0.0f);
+  const std::vector<Field> fields = {BoxField{Eigen::Vector3d(0.5, 0.5, 0.5)},
+                                     MeshField{cube().view()}, terrain_of(flat, 9),
+                                     HalfSpaceField{}};
+  HostFieldBatch batch({cube().view(), batch_assets()[3].view()}, fields);
+  std::vector<BatchPair> pairs;
+  for (std::uint32_t f = 0; f < fields.size(); ++f) {
+    for (const double scale : {0.25, 0.5, 1.0, 2.0}) {
+      for (int i = 0; i < 27; ++i) {
+        BatchPair pair;
+        pair.a = f;
+        pair.b = static_cast<std::uint32_t>(i % 2);
+        pair.scale_b = scale;
+        for (int k = 0, n = i; k < 3; ++k, n /= 3) pair.pose_b.t[k] = 0.5 * (n % 3) - 0.25 * scale;
+        pairs.push_back(pair);
+      }
+    }
+  }
+  const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 7);
+  const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched);
+  Workspace workspace;
+  Off off;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const BatchPair& pair = pairs[i];
+    const Asset& body = pair.b == 0 ? cube() : batch_assets()[3];
+    const Penetration cpu =
+        penetration(PlacedField{fields[pair.a], pair.pose_a, 1},
+                    PlacedTree{body.view(), pair.pose_b, pair.scale_b}, {}, workspace);
+    off.look(by_one[i], cpu, pair.scale_b);
+    off.look(by_warp[i], cpu, pair.scale_b);
+  }
+  EXPECT_LE(off.volume, 1e-9);
+  EXPECT_LE(off.push, 1e-7);  // gradients jump where a ball's centre leaves an edge
+  EXPECT_LE(off.centre, 1e-9);
+}
+
+TEST(GpuFields, OracleRowsAreTheCpus) {
+  IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
+  constexpr std::size_t kSpheres = 1000;
+  std::vector<TreeView> trees;
+  std::vector<Field> surfaces;
+  std::map<std::string, std::uint32_t> known;
+  std::vector<OracleRow> rows = read_oracle_rows("eledino");
+  std::vector<BatchPair> pairs;
+  const auto number_of = [&](const std::string& mesh) {
+    const auto [at, fresh] = known.emplace(mesh, static_cast<std::uint32_t>(trees.size()));
+    if (fresh) {
+      trees.push_back(oracle_asset(mesh, kSpheres).view());
+      surfaces.push_back(MeshField{trees.back()});
+    }
+    return at->second;
+  };
+  for (const OracleRow& row : rows) {
+    BatchPair pair;
+    pair.a = number_of(row.mesh_a);
+    pair.b = number_of(row.mesh_b);
+    pair.pose_b = row.pose;
+    pair.scale_b = row.scale_b;
+    pairs.push_back(pair);
+  }
+  HostFieldBatch batch(trees, surfaces);
+  const std::vector<Penetration> answers = batch.run(pairs, Measure::matched);
+  Workspace workspace;
+  Off off;
+  std::size_t met = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto [a, b] = placed(rows[i], kSpheres);
+    const Penetration cpu = penetration(PlacedField{MeshField{a.tree}, a.pose, a.scale}, b,
+                                        PenetrationSettings{}, workspace);
+    ASSERT_EQ(answers[i].status, cpu.status);
+    met += cpu.volume > 0 ? 1 : 0;
+    const double size = std::cbrt(b.tree.volume()) * b.scale;
+    off.look(answers[i], cpu, size);
+  }
+  std::printf("%zu of %zu met: volume %.1e push %.1e turn %.1e centroid %.1e\n", met, rows.size(),
+              off.volume, off.push, off.turn, off.centre);
+  EXPECT_GT(met, rows.size() / 3);
+  EXPECT_LE(off.volume, 1e-9);
+  EXPECT_LE(off.push, 1e-9);
+  EXPECT_LE(off.turn, 1e-8);  // bodies stand some sizes from their origins
+  EXPECT_LE(off.centre, 1e-9);
+}
+
+TEST(GpuFields, LanesOfAWarpNeedNoLuck) {
+  HostFieldBatch batch(batch_views(), batch_field_values());
+  const auto count = static_cast<std::uint32_t>(batch_fields().size());
+  std::vector<BatchPair> pairs;
+  for (std::uint32_t f = 0; f < count; ++f)
+    for (const BatchPair& pair : pairs_with(f, 12, 50 + f)) pairs.push_back(pair);
+  const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched);
+  const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 1);
+  expect_same_bits(batch.run(pairs, Measure::matched, 2), by_warp);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const double size = pairs[i].scale_b;
+    EXPECT_NEAR(by_warp[i].volume, by_one[i].volume, 1e-11 * (by_one[i].volume + size));
+    EXPECT_EQ(by_warp[i].sphere_pairs, by_one[i].sphere_pairs) << i;
+    EXPECT_EQ(by_warp[i].node_visits, by_one[i].node_visits) << i;
+  }
+}
+
+TEST(GpuFields, InvalidInputSpoilsOnlyItself) {
+  std::vector<Field> fields = batch_field_values();
+  const auto count = static_cast<std::uint32_t>(fields.size());
+  std::vector<BatchPair> pairs;
+  for (int i = 0; i < 8; ++i)
+    for (std::uint32_t f = 0; f < count; ++f) pairs.push_back(pairs_with(f, 1, 70 + f)[0]);
+  const std::vector<Penetration> sound =
+      HostFieldBatch(batch_views(), fields).run(pairs, Measure::matched);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<float> holes(27, std::numeric_limits<float>::quiet_NaN());
+  fields.push_back(BallField{-1});                        // count
+  fields.push_back(MeshField{batch_assets()[0].view()});  // baked without one
+  fields.push_back(HalfSpaceField{Eigen::Vector3d(0, 0, 2), 0});
+  fields.push_back(HeightField{nullptr, 9, 9});
+  fields.push_back(grid_of(holes, 3));
+  fields.push_back(MeshField{});
+  std::vector<std::size_t> bad = {3, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41};
+  pairs[3].pose_b.t[1] = nan;
+  pairs[7].pose_a.q[0] = nan;
+  pairs[11].scale_b = 0;
+  pairs[13].scale_a = -1;
+  pairs[17].a = 1000;
+  pairs[19].b = 99;
+  for (std::uint32_t k = 0; k < 5; ++k) {
+    pairs[bad[6 + k]].a = count + k;
+    pairs[bad[6 + k]].pose_b = pairs[bad[6 + k]].pose_a;
+  }
+  bad.push_back(43);
+  pairs[43].a = count + 5;
+  const std::vector<Penetration> answers =
+      HostFieldBatch(batch_views(), fields).run(pairs, Measure::matched);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const bool is_bad = std::find(bad.begin(), bad.end(), i) != bad.end();
+    EXPECT_EQ(answers[i].status, is_bad ? QueryStatus::invalid_input : QueryStatus::ok) << i;
+    EXPECT_EQ(answers[i].volume, is_bad ? 0 : sound[i].volume) << i;
+    if (!is_bad || pairs[i].b >= batch_views().size() || pairs[i].a >= fields.size()) continue;
+    const Penetration cpu = by_cpu(fields[pairs[i].a], pairs[i], Measure::matched);
+    EXPECT_EQ(cpu.status, QueryStatus::invalid_input) << i;
+  }
+  EXPECT_TRUE(HostFieldBatch(batch_views(), fields).run({}, Measure::inner).empty());
+  FunctionField function;
+  function.look = [](const void*, const Eigen::Vector3d&) noexcept { return FieldSample{}; };
+  EXPECT_THROW(HostFieldBatch(batch_views(), {function}), Error);
+}
+
+}  // namespace
+}  // namespace ist::testing
