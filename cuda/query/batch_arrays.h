@@ -6,6 +6,7 @@
 
 #include <ist/gpu_query.h>
 
+#include "cuda/query/cover_ref.h"
 #include "cuda/query/pair_descent.h"
 
 namespace ist::gpu {
@@ -14,6 +15,7 @@ namespace ist::gpu {
 struct AssetRef {
   AssetFrame frame;
   TreeRef tree[2];  ///< by Measure
+  CoverRef cover;   ///< of the inner tree
 
   /// `bytes`: where the asset lies for who works on the batch.
   static AssetRef of(const AssetHeader& header, const std::byte* bytes) {
@@ -22,6 +24,7 @@ struct AssetRef {
                  std::ldexp(1.0, header.exponent)};
     ref.tree[static_cast<int>(Measure::matched)] = TreeRef::of(header.matched_tree, bytes);
     ref.tree[static_cast<int>(Measure::inner)] = TreeRef::of(header.inner_tree, bytes);
+    ref.cover = CoverRef::of(header.inner_tree, bytes);
     return ref;
   }
 };

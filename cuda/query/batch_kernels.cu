@@ -2,6 +2,7 @@
 #include "cuda/launch.h"
 #include "cuda/query/batch_kernels.h"
 #include "cuda/query/batch_steps.h"
+#include "cuda/query/by_warps.h"
 #include "cuda/warp_team.h"
 
 namespace ist::gpu {
@@ -14,33 +15,9 @@ constexpr int kBlocksEach = 5;  ///< a multiprocessor; more leave too few regist
 
 /// Places every pair and lists those whose roots meet.
 __global__ void __launch_bounds__(kSiftThreads) sift_pairs(const BatchArrays batch) {
-  const WarpTeam team;
   const std::uint64_t i = std::uint64_t{blockIdx.x} * kSiftThreads + threadIdx.x;
-  const int list = i < batch.pairs.count ? sift_pair(batch, static_cast<std::uint32_t>(i)) : -1;
-  for (int kind = 0; kind < 2; ++kind) {
-    int total = 0;
-    const int before = team.exclusive_count(list == kind, total);
-    if (total == 0) continue;
-    std::uint32_t first = 0;
-    if (team.lane() == 0)
-      first = atomic_add(&batch.counters->listed[kind], static_cast<std::uint32_t>(total));
-    first = team.broadcast(first, 0);
-    if (list == kind)
-      batch.list[kind][first + static_cast<std::uint32_t>(before)] = static_cast<std::uint32_t>(i);
-  }
-}
-
-/// Calls work(k) for k < count, each warp taking the next when it is done with one.
-template <class Work>
-__device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& work) {
-  const WarpTeam team;
-  for (;;) {
-    std::uint32_t k = 0;
-    if (team.lane() == 0) k = atomic_add(taken, 1);
-    k = team.broadcast(k, 0);
-    if (k >= count) return;
-    work(team, k);
-  }
+  const auto pair = static_cast<std::uint32_t>(i);
+  list_pair(batch, pair, i < batch.pairs.count ? sift_pair(batch, pair) : -1);
 }
 
 template <class Real>

@@ -4,6 +4,7 @@
 
 #include "cuda/atomics.h"
 #include "cuda/query/batch_arrays.h"
+#include "cuda/query/split_room.h"
 #include "numerics/host_device.h"
 
 // A batch of pairs of trees, step by step: what a kernel's threads and warps do, and a test's
@@ -101,9 +102,8 @@ IST_HD inline int sift_pair(const BatchArrays& batch, std::uint32_t i) {
 }
 
 /// Readies the memory for pair i.
-template <class Team, class Real>
-IST_HD void load_pair(const Team& team, const BatchArrays& batch, std::uint32_t i,
-                      PairMemory<Real>& memory) {
+template <class Team, class Memory>
+IST_HD void load_pair(const Team& team, const BatchArrays& batch, std::uint32_t i, Memory& memory) {
   if (team.lane() == 0) place_pair(batch, i, memory.place);
   const auto measure = static_cast<std::uint32_t>(batch.measure);
   const std::uint32_t asset[2] = {batch.pairs.asset_a[i], batch.pairs.asset_b[i]};
@@ -147,43 +147,13 @@ IST_HD int task_floor(const PairMemory<Real>& memory, int waiting) {
 template <class Team, class Real>
 IST_HD bool split_pair(const Team& team, const BatchArrays& batch, std::uint32_t i,
                        PairMemory<Real>& memory, int waiting) {
-  constexpr int kKind = sizeof(Real) == 4 ? 0 : 1;
-  int tasks = 0;
-  for (int top = waiting; top > 0; ++tasks) top = task_floor(memory, top);
-  std::uint32_t split = 0, task = 0, entry = 0;
-  if (team.lane() == 0) {
-    BatchCounters& counters = *batch.counters;
-    split = atomic_add(&counters.splits[kKind], 1);
-    task = atomic_add(&counters.tasks[kKind], static_cast<std::uint32_t>(tasks));
-    entry = atomic_add(&counters.entries[kKind], static_cast<std::uint32_t>(waiting));
-  }
-  split = team.broadcast(split, 0);
-  task = team.broadcast(task, 0);
-  entry = team.broadcast(entry, 0);
-  const bool fits = split < batch.split_room &&
-                    task + static_cast<std::uint32_t>(tasks) <= batch.task_room &&
-                    entry + static_cast<std::uint32_t>(waiting) <= batch.entry_room;
-  if (team.lane() == 0) {
-    // Room that was taken and does not do stays unused: its tasks hold nothing.
-    int top = waiting;
-    for (int k = 0; k < tasks; ++k) {
-      const int floor = task_floor(memory, top);
-      const std::uint32_t at = task + static_cast<std::uint32_t>(k);
-      if (at < batch.task_room)
-        batch.tasks[at] = {split, entry + static_cast<std::uint32_t>(floor),
-                           fits ? static_cast<std::uint32_t>(top - floor) : 0};
-      top = floor;
-    }
-    if (fits) {
-      batch.splits[split] = {i, task, static_cast<std::uint32_t>(tasks),
-                             static_cast<std::uint32_t>(tasks)};
-      batch.totals[split] = memory.totals;
-    }
-  }
-  if (!fits) return false;
+  const SplitRoom room = take_room(team, batch, sizeof(Real) == 4 ? 0 : 1, i, waiting,
+                                   [&](int top) { return task_floor(memory, top); });
+  if (!room.fits) return false;
+  if (team.lane() == 0) batch.totals[room.split] = memory.totals;
   for (int k = team.lane(); k < waiting; k += Team::kWidth) {
-    batch.entries_a[entry + static_cast<std::uint32_t>(k)] = memory.stack_a[k];
-    batch.entries_b[entry + static_cast<std::uint32_t>(k)] = memory.stack_b[k];
+    batch.entries_a[room.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_a[k];
+    batch.entries_b[room.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_b[k];
   }
   return true;
 }

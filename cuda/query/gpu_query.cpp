@@ -2,6 +2,7 @@
 
 #include <ist/error.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -9,6 +10,7 @@
 
 #include "cuda/check.h"
 #include "cuda/query/batch_kernels.h"
+#include "cuda/query/separation_kernels.h"
 #include "cuda/queue.h"
 
 namespace ist {
@@ -16,6 +18,7 @@ namespace {
 
 /// Room for what is split, a kind. A batch that needs more is answered all the same.
 constexpr std::uint32_t kSplitRoom = 1 << 16, kTaskRoom = 1 << 19, kEntryRoom = 1 << 21;
+constexpr std::uint32_t kGapEntryRoom = 1 << 20;  ///< of separations, whose entries are larger
 
 /// Device memory that outlives the queue it comes from.
 class DeviceBytes {
@@ -118,22 +121,47 @@ struct GpuWorkspace::Impl {
   int device = 0;
   std::size_t most_pairs = 0;
   gpu::BatchGrids grids{};
+  gpu::SeparationGrids separation_grids{};
   DeviceBytes memory;
-  gpu::BatchArrays arrays{};  ///< what does not change from batch to batch
+  // What does not change from batch to batch; both lie in the same memory.
+  gpu::BatchArrays arrays{};
+  gpu::SeparationArrays separations{};
 
   /// Sets the arrays to parts of the memory at `from`; returns the bytes they take.
   std::size_t place(std::byte* from) {
-    Parts parts(from);
+    return std::max(place_penetrations(from), place_separations(from));
+  }
+
+ private:
+  void place_common(Parts& parts, gpu::BatchArrays& arrays) const {
     arrays.counters = parts.take<gpu::BatchCounters>(1);
     for (std::uint32_t*& list : arrays.list) list = parts.take<std::uint32_t>(most_pairs);
     arrays.splits = parts.take<gpu::SplitPair>(kSplitRoom);
     arrays.tasks = parts.take<gpu::PairTask>(kTaskRoom);
+    arrays.split_room = kSplitRoom;
+    arrays.task_room = kTaskRoom;
+  }
+
+  std::size_t place_penetrations(std::byte* from) {
+    Parts parts(from);
+    place_common(parts, arrays);
     arrays.totals = parts.take<gpu::LensTotals>(kSplitRoom + kTaskRoom);
     arrays.entries_a = parts.take<std::uint32_t>(kEntryRoom);
     arrays.entries_b = parts.take<std::uint32_t>(kEntryRoom);
-    arrays.split_room = kSplitRoom;
-    arrays.task_room = kTaskRoom;
     arrays.entry_room = kEntryRoom;
+    return parts.used();
+  }
+
+  std::size_t place_separations(std::byte* from) {
+    Parts parts(from);
+    gpu::BatchArrays& pairs = separations.pairs;
+    place_common(parts, pairs);
+    separations.totals = parts.take<gpu::GapTotals>(kSplitRoom + kTaskRoom);
+    separations.entries = {parts.take<std::uint32_t>(kGapEntryRoom),
+                           parts.take<std::uint32_t>(kGapEntryRoom),
+                           parts.take<double>(kGapEntryRoom), parts.take<double>(kGapEntryRoom)};
+    pairs.entry_room = kGapEntryRoom;
+    pairs.measure = Measure::inner;
     return parts.used();
   }
 };
@@ -146,6 +174,7 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   impl_->device = settings.device;
   impl_->most_pairs = most_pairs;
   impl_->grids = gpu::batch_grids();
+  impl_->separation_grids = gpu::separation_grids();
   impl_->memory = DeviceBytes(queue, settings, impl_->place(nullptr));
   impl_->place(impl_->memory.data());
   queue.wait();
@@ -158,26 +187,51 @@ GpuWorkspace& GpuWorkspace::operator=(GpuWorkspace&&) noexcept = default;
 std::size_t GpuWorkspace::most_pairs() const noexcept { return impl_->most_pairs; }
 std::size_t GpuWorkspace::bytes() const noexcept { return impl_->memory.bytes(); }
 
-void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
-                       GpuWorkspace& workspace, const GpuPenetrations& answers,
-                       CUstream_st* stream) {
-  const GpuAssets::Impl& all = assets.impl();
-  const GpuWorkspace::Impl& room = workspace.impl();
+namespace {
+
+/// Throws where a batch does not fit.
+void check_batch(const GpuAssets& assets, const GpuPairs& pairs, const GpuWorkspace::Impl& room) {
   if (pairs.count > room.most_pairs)
     throw Error("GPU: a batch of " + std::to_string(pairs.count) + " pairs; the workspace is for " +
                 std::to_string(room.most_pairs));
-  if (all.device != room.device)
-    throw Error("GPU: the assets are on device " + std::to_string(all.device) +
+  if (assets.device() != room.device)
+    throw Error("GPU: the assets are on device " + std::to_string(assets.device()) +
                 ", the workspace on " + std::to_string(room.device));
+}
+
+void set_pairs(const GpuAssets::Impl& assets, const GpuPairs& pairs, gpu::BatchArrays& batch) {
+  batch.assets = assets.refs;
+  batch.asset_count = static_cast<std::uint32_t>(assets.size);
+  batch.pairs = pairs;
+}
+
+}  // namespace
+
+void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
+                       GpuWorkspace& workspace, const GpuPenetrations& answers,
+                       CUstream_st* stream) {
+  const GpuWorkspace::Impl& room = workspace.impl();
+  check_batch(assets, pairs, room);
   if (pairs.count == 0) return;
   gpu::BatchArrays batch = room.arrays;
-  batch.assets = all.refs;
-  batch.asset_count = static_cast<std::uint32_t>(all.size);
+  set_pairs(assets.impl(), pairs, batch);
   batch.measure = measure;
-  batch.pairs = pairs;
   batch.answers = answers;
-  const gpu::DeviceGuard guard(all.device);
+  const gpu::DeviceGuard guard(room.device);
   gpu::launch_batch(batch, room.grids, stream);
+}
+
+void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint32_t max_visits,
+                      GpuWorkspace& workspace, const GpuSeparations& answers, CUstream_st* stream) {
+  const GpuWorkspace::Impl& room = workspace.impl();
+  check_batch(assets, pairs, room);
+  if (pairs.count == 0) return;
+  gpu::SeparationArrays batch = room.separations;
+  set_pairs(assets.impl(), pairs, batch.pairs);
+  batch.answers = answers;
+  batch.max_visits = max_visits == 0 ? ~0u : max_visits;
+  const gpu::DeviceGuard guard(room.device);
+  gpu::launch_separations(batch, room.separation_grids, stream);
 }
 
 }  // namespace ist

@@ -5,9 +5,9 @@
 #include <ist/query.h>
 
 #include "cuda/query/batch_steps.h"
-#include "numerics/team.h"
 #include "support/batch_pair.h"
-#include "support/fiber_team.h"
+#include "support/host_team.h"
+#include "support/pair_columns.h"
 
 namespace ist::testing {
 
@@ -27,17 +27,7 @@ class HostBatch {
   std::vector<Penetration> run(const std::vector<BatchPair>& pairs, Measure measure,
                                unsigned seed = 0) {
     const std::size_t n = pairs.size();
-    std::vector<std::uint32_t> a, b;
-    std::vector<Pose> pose_a, pose_b;
-    std::vector<double> scale_a, scale_b;
-    for (const BatchPair& pair : pairs) {
-      a.push_back(pair.a);
-      b.push_back(pair.b);
-      pose_a.push_back(pair.pose_a);
-      pose_b.push_back(pair.pose_b);
-      scale_a.push_back(pair.scale_a);
-      scale_b.push_back(pair.scale_b);
-    }
+    const PairColumns columns(pairs);
     constexpr double kUnwritten = -7;
     BatchColumns to{std::vector<double>(n, kUnwritten), std::vector<double>(3 * n),
                     std::vector<double>(3 * n),         std::vector<double>(3 * n),
@@ -54,7 +44,7 @@ class HostBatch {
         assets_.data(),
         static_cast<std::uint32_t>(assets_.size()),
         measure,
-        {n, a.data(), b.data(), pose_a.data(), pose_b.data(), scale_a.data(), scale_b.data()},
+        columns.pairs(),
         {to.volume.data(), to.centroid.data(), to.push.data(), to.turn.data(), to.status.data(),
          to.visits.data(), to.spheres.data()},
         &counters,
@@ -92,16 +82,6 @@ class HostBatch {
       by_team(seed, [&](const auto& team) {
         gpu::sum_task<std::decay_t<decltype(team)>, Real>(team, batch, k, *memory);
       });
-  }
-
-  template <class Work>
-  static void by_team(unsigned seed, const Work& work) {
-    if (seed == 0) {
-      work(SerialTeam());
-      return;
-    }
-    static Fibers<32> fibers(seed);
-    fibers.run([&](int lane) { work(FiberTeam<32>(fibers, lane)); });
   }
 
   std::vector<gpu::AssetRef> assets_;
