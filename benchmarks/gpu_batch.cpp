@@ -251,6 +251,24 @@ SeparationDifference difference(const std::vector<Separation>& gpu,
   return out;
 }
 
+/// Reports a scene's separations; false where they are not the CPU's.
+bool separates(Report& report, Batches& batches, const Scene& scene, std::size_t many,
+               std::size_t for_cpu) {
+  const double ms = batches.median_separation_ms(scene, many);
+  std::vector<Separation> cpu;
+  const double by_cores = cpu_separation_rate(scene, for_cpu, cpu);
+  const SeparationDifference from_cpu = difference(batches.separations(), cpu);
+  report.row("Separations", {{"poses", scene.name},
+                             {"spheres", scene.a->view().sphere_count()},
+                             {"pairs", many},
+                             {"M/s", static_cast<double>(many) / ms * 1e-3},
+                             {"4,096 pairs, ms", batches.median_separation_ms(scene, 4096)},
+                             {"node pairs opened, mean", from_cpu.visits},
+                             {"M/s by all cores", by_cores},
+                             {"largest difference to the CPU", from_cpu.distance}});
+  return from_cpu.certified && from_cpu.distance < 1e-6;
+}
+
 int measure(Report& report) {
   const std::size_t many = report.quick() ? 100'000 : 1'000'000;
   const std::size_t for_cpu = report.quick() ? 2'000 : 20'000;
@@ -289,27 +307,13 @@ int measure(Report& report) {
     if (scene.rate > 0) report.target(scene.name + ", M/s", rate, scene.rate);
     if (scene.step_ms > 0) report.target(scene.name + ", 4,096 in ms", step, scene.step_ms, true);
   }
-  scenes[3].name = "near each other";
-  Scene far = scenes[3];
+  Scene near = scenes[3], far = near;
+  near.name = "near each other";
   far.name = "ten times as far";
   for (BatchPair& pair : far.poses)
     for (double& t : pair.pose_b.t) t *= 10;
-  for (const Scene& scene : {scenes[3], far, scenes[0], scenes[1], scenes[4]}) {
-    const double ms = batches.median_separation_ms(scene, many);
-    std::vector<Separation> cpu;
-    const double by_cores = cpu_separation_rate(scene, for_cpu, cpu);
-    const SeparationDifference from_cpu = difference(batches.separations(), cpu);
-    const double step = batches.median_separation_ms(scene, 4096);
-    right = right && from_cpu.certified && from_cpu.distance < 1e-6;
-    report.row("Separations", {{"poses", scene.name},
-                               {"spheres", scene.a->view().sphere_count()},
-                               {"pairs", many},
-                               {"M/s", static_cast<double>(many) / ms * 1e-3},
-                               {"4,096 pairs, ms", step},
-                               {"node pairs opened, mean", from_cpu.visits},
-                               {"M/s by all cores", by_cores},
-                               {"largest difference to the CPU", from_cpu.distance}});
-  }
+  for (const Scene& scene : {near, far, scenes[0], scenes[1], scenes[4]})
+    right = separates(report, batches, scene, many, for_cpu) && right;
   for (std::size_t count = 1; count <= many; count *= 8)
     report.row("Growth with the batch",
                {{"poses", "pen"}, {"pairs", count}, {"ms", batches.median_ms(scenes[0], count)}});
