@@ -1,5 +1,6 @@
-// Penetrations of many pairs at once on the GPU: rates with a million poses, the time of one step
-// of 4,096 worlds, growth with spheres and with the batch, trees in fields; the same by all cores
+// Penetrations and separations of many pairs at once on the GPU: rates with a million poses, the
+// time of one step of 4,096 worlds, growth with spheres and with the batch, trees in fields; the
+// same by all cores
 // of the machine. Answers are compared with the CPU's.
 #include <cuda_runtime_api.h>
 
@@ -19,7 +20,7 @@
 #include "cuda/check.h"
 #include "report.h"
 #include "samples/samples.h"
-#include "support/device_batch.h"
+#include "support/device_separations.h"
 #include "support/oracle_rows.h"
 #include "support/reference_sum.h"
 #include "timing.h"
@@ -30,6 +31,7 @@ using namespace ist;
 using ist::benchmark::Report;
 using ist::testing::BatchPair;
 using ist::testing::DeviceBatch;
+using ist::testing::DeviceSeparations;
 
 constexpr int kRepeats = 10;
 
@@ -203,27 +205,46 @@ class Batches {
     const GpuAssets assets(views);
     const GpuFields fields({scene.field, in_field ? 1u : 0u});
     const DeviceBatch batch(drawn(scene.poses, count));
-    const auto run = [&] {
+    const double ms = median_ms([&] {
       if (in_field)
         penetration_batch(assets, fields, batch.pairs(), Measure::matched, workspace_,
                           batch.answers(), stream_.get());
       else
         penetration_batch(assets, batch.pairs(), Measure::matched, workspace_, batch.answers(),
                           stream_.get());
-    };
-    run();
-    std::vector<double> ms;
-    for (int k = 0; k < kRepeats; ++k) ms.push_back(stream_.time(run));
+    });
     answers_ = batch.get();
-    return benchmark::quantile(ms, 0.5);
+    return ms;
+  }
+  /// Likewise.
+  double median_separation_ms(const Scene& scene, std::size_t count) {
+    const TreeView views[2] = {scene.a->view(), scene.b->view()};
+    const GpuAssets assets(views);
+    const DeviceBatch batch(drawn(scene.poses, count));
+    const DeviceSeparations answers(count);
+    const double ms = median_ms([&] {
+      separation_batch(assets, batch.pairs(), 0, workspace_, answers.answers(), stream_.get());
+    });
+    separations_ = answers.get();
+    return ms;
   }
 
   const std::vector<Penetration>& answers() const { return answers_; }
+  const std::vector<Separation>& separations() const { return separations_; }
 
  private:
+  template <class Run>
+  double median_ms(const Run& run) {
+    run();
+    std::vector<double> ms;
+    for (int k = 0; k < kRepeats; ++k) ms.push_back(stream_.time(run));
+    return benchmark::quantile(ms, 0.5);
+  }
+
   GpuWorkspace workspace_;
   Stream stream_;
   std::vector<Penetration> answers_;
+  std::vector<Separation> separations_;
 };
 
 std::vector<PlacedPair> placed(const Scene& scene, std::size_t count) {
@@ -266,6 +287,32 @@ double cpu_rate(const Scene& scene, std::size_t count, std::vector<Penetration>&
   return static_cast<double>(count) / best * 1e-6;
 }
 
+/// Separations by all cores, M/s; `answers` of as many.
+double cpu_separation_rate(const Scene& scene, std::size_t count,
+                           std::vector<Separation>& answers) {
+  struct Batch {
+    std::vector<PlacedPair> pairs;
+    std::vector<Workspace> workspaces;
+    std::vector<Separation>& answers;
+  };
+  answers.resize(count);
+  Batch batch{placed(scene, count), std::vector<Workspace>(std::thread::hardware_concurrency()),
+              answers};
+  const auto work = [](void* of, std::size_t worker) {
+    Batch& all = *static_cast<Batch*>(of);
+    for (std::size_t i = worker; i < all.pairs.size(); i += all.workspaces.size())
+      all.answers[i] = separation(all.pairs[i].a, all.pairs[i].b, {}, all.workspaces[worker]);
+  };
+  const ParallelFor threads = tbb_parallel_for();
+  double best = 1e30;
+  for (int k = 0; k < 3; ++k) {
+    const double start = benchmark::wall_seconds();
+    threads.run(threads.pool, batch.workspaces.size(), work, &batch);
+    best = std::min(best, benchmark::wall_seconds() - start);
+  }
+  return static_cast<double>(count) / best * 1e-6;
+}
+
 /// The largest difference to the CPU's volumes, relative.
 double worst_volume(const std::vector<Penetration>& gpu, const std::vector<Penetration>& cpu) {
   double worst = 0;
@@ -275,6 +322,45 @@ double worst_volume(const std::vector<Penetration>& gpu, const std::vector<Penet
         worst, std::abs(gpu[i].volume - cpu[i].volume) / std::max(cpu[i].volume, gpu[i].volume));
   }
   return worst;
+}
+
+/// What separations differ by from the CPU's.
+struct SeparationDifference {
+  double distance = 0;    ///< largest, relative
+  double visits = 0;      ///< mean, on the GPU
+  bool certified = true;  ///< no lower end is less than the CPU's, nor is one above the distance
+};
+
+SeparationDifference difference(const std::vector<Separation>& gpu,
+                                const std::vector<Separation>& cpu) {
+  SeparationDifference out;
+  for (std::size_t i = 0; i < cpu.size(); ++i) {
+    out.visits += gpu[i].node_visits / static_cast<double>(cpu.size());
+    const double most = std::max(cpu[i].distance, gpu[i].distance);
+    if (most > 0)
+      out.distance = std::max(out.distance, std::abs(gpu[i].distance - cpu[i].distance) / most);
+    out.certified = out.certified && gpu[i].distance_min >= cpu[i].distance_min - 1e-12 * most &&
+                    gpu[i].distance_min <= gpu[i].distance_max;
+  }
+  return out;
+}
+
+/// Reports a scene's separations; false where they are not the CPU's.
+bool separates(Report& report, Batches& batches, const Scene& scene, std::size_t many,
+               std::size_t for_cpu) {
+  const double ms = batches.median_separation_ms(scene, many);
+  std::vector<Separation> cpu;
+  const double by_cores = cpu_separation_rate(scene, for_cpu, cpu);
+  const SeparationDifference from_cpu = difference(batches.separations(), cpu);
+  report.row("Separations", {{"poses", scene.name},
+                             {"spheres", scene.a->view().sphere_count()},
+                             {"pairs", many},
+                             {"M/s", static_cast<double>(many) / ms * 1e-3},
+                             {"4,096 pairs, ms", batches.median_separation_ms(scene, 4096)},
+                             {"node pairs opened, mean", from_cpu.visits},
+                             {"M/s by all cores", by_cores},
+                             {"largest difference to the CPU", from_cpu.distance}});
+  return from_cpu.certified && from_cpu.distance < 1e-6;
 }
 
 int measure(Report& report) {
@@ -340,6 +426,13 @@ int measure(Report& report) {
     ask("Fields",
         {std::string("in a mesh, ") + name, nullptr, &dino4k, oracle_poses(name), 0, 0, &mesh},
         1e-6);
+  Scene near = scenes[3], far = near;
+  near.name = "near each other";
+  far.name = "ten times as far";
+  for (BatchPair& pair : far.poses)
+    for (double& t : pair.pose_b.t) t *= 10;
+  for (const Scene& scene : {near, far, scenes[0], scenes[1], scenes[4]})
+    right = separates(report, batches, scene, many, for_cpu) && right;
   for (std::size_t count = 1; count <= many; count *= 8)
     report.row("Growth with the batch",
                {{"poses", "pen"}, {"pairs", count}, {"ms", batches.median_ms(scenes[0], count)}});
@@ -355,7 +448,7 @@ int measure(Report& report) {
   }
   const int written = report.write();
   if (right) return written;
-  std::fprintf(stderr, "volumes differ from the CPU's\n");
+  std::fprintf(stderr, "answers differ from the CPU's\n");
   return 1;
 }
 
@@ -363,7 +456,7 @@ int measure(Report& report) {
 
 int main(int argc, char** argv) {
   Report report("gpu_batch", argc, argv);
-  report.page("Penetrations of many pairs on a GPU");
+  report.page("Penetrations and separations of many pairs on a GPU");
   std::string why;
   if (!gpu_available(0, &why)) {
     std::fprintf(stderr, "gpu_batch: %s\n", why.c_str());

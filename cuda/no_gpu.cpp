@@ -38,6 +38,11 @@ void penetration_batch(const GpuAssets&, const GpuPairs&, Measure, GpuWorkspace&
   gpu_info(0);
 }
 
+void separation_batch(const GpuAssets&, const GpuPairs&, std::uint32_t, GpuWorkspace&,
+                      const GpuSeparations&, CUstream_st*) {
+  gpu_info(0);
+}
+
 namespace gpu {
 
 std::unique_ptr<SolidBackend> make_cuda_backend(const MeshSolid&, const GpuSettings& settings) {

@@ -6,6 +6,7 @@
 
 #include <ist/gpu_query.h>
 
+#include "cuda/query/cover_ref.h"
 #include "cuda/query/node_sums.h"
 #include "cuda/query/pair_descent.h"
 
@@ -16,6 +17,7 @@ struct AssetRef {
   AssetFrame frame;
   TreeRef tree[2];  ///< by Measure
   SumsRef sums[2];  ///< set_sums()
+  CoverRef cover;   ///< of the inner tree
 
   /// `bytes`: where the asset lies for who works on the batch.
   static AssetRef of(const AssetHeader& header, const std::byte* bytes) {
@@ -24,6 +26,7 @@ struct AssetRef {
                  std::ldexp(1.0, header.exponent)};
     ref.tree[static_cast<int>(Measure::matched)] = TreeRef::of(header.matched_tree, bytes);
     ref.tree[static_cast<int>(Measure::inner)] = TreeRef::of(header.inner_tree, bytes);
+    ref.cover = CoverRef::of(header.inner_tree, bytes);
     return ref;
   }
 

@@ -3,6 +3,7 @@
 #include "cuda/query/batch_kernels.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/by_warps.h"
+#include "cuda/warp_team.h"
 
 namespace ist::gpu {
 namespace {

@@ -5,6 +5,7 @@
 #include "cuda/atomics.h"
 #include "cuda/query/batch_arrays.h"
 #include "cuda/query/part_sums.h"
+#include "cuda/query/split_room.h"
 #include "numerics/host_device.h"
 
 // A batch of pairs of trees, step by step: what a kernel's threads and warps do, and a test's
@@ -139,9 +140,9 @@ IST_HD inline bool sift_pair(const BatchArrays& batch, std::uint32_t i) {
 }
 
 /// Readies the memory for pair i, whose place is set or is there after the team's next sync.
-template <class Team>
+template <class Team, class Memory>
 IST_HD void load_trees(const Team& team, const BatchArrays& batch, std::uint32_t i,
-                       PairMemory& memory) {
+                       Memory& memory) {
   const auto measure = static_cast<std::uint32_t>(batch.measure);
   copy_words(team, batch.assets[batch.pairs.asset_a[i]].tree[measure], memory.tree[0]);
   copy_words(team, batch.assets[batch.pairs.asset_b[i]].tree[measure], memory.tree[1]);
@@ -164,43 +165,14 @@ IST_HD inline int task_floor(const BatchArrays& batch, const PairMemory& memory,
 template <class Team>
 IST_HD bool split_pair(const Team& team, const BatchArrays& batch, std::uint32_t i,
                        PairMemory& memory, int waiting) {
-  int tasks = 0;
-  for (int top = waiting; top > 0; ++tasks) top = task_floor(batch, memory, top);
-  std::uint32_t split = 0, task = 0, entry = 0;
-  if (team.lane() == 0) {
-    BatchCounters& counters = *batch.counters;
-    split = atomic_add(&counters.splits, 1);
-    task = atomic_add(&counters.tasks, static_cast<std::uint32_t>(tasks));
-    entry = atomic_add(&counters.entries, static_cast<std::uint32_t>(waiting));
-  }
-  split = team.broadcast(split, 0);
-  task = team.broadcast(task, 0);
-  entry = team.broadcast(entry, 0);
-  const bool fits = split < batch.split_room &&
-                    task + static_cast<std::uint32_t>(tasks) <= batch.task_room &&
-                    entry + static_cast<std::uint32_t>(waiting) <= batch.entry_room;
-  if (team.lane() == 0) {
-    // Room that was taken and does not do stays unused: its tasks hold nothing.
-    int top = waiting;
-    for (int k = 0; k < tasks; ++k) {
-      const int floor = task_floor(batch, memory, top);
-      const std::uint32_t at = task + static_cast<std::uint32_t>(k);
-      if (at < batch.task_room)
-        batch.tasks[at] = {split, entry + static_cast<std::uint32_t>(floor),
-                           fits ? static_cast<std::uint32_t>(top - floor) : 0};
-      top = floor;
-    }
-    if (fits) {
-      batch.splits[split] = {i, task, static_cast<std::uint32_t>(tasks),
-                             static_cast<std::uint32_t>(tasks)};
-      batch.totals[split] = memory.sum;
-    }
-  }
-  if (!fits) return false;
-  copy_words(team, memory.place, batch.places[split]);
+  const SplitRoom room = take_room(team, batch, *batch.counters, i, waiting,
+                                   [&](int top) { return task_floor(batch, memory, top); });
+  if (!room.fits) return false;
+  if (team.lane() == 0) batch.totals[room.split] = memory.sum;
+  copy_words(team, memory.place, batch.places[room.split]);
   for (int k = team.lane(); k < waiting; k += Team::kWidth) {
-    batch.entries_a[entry + static_cast<std::uint32_t>(k)] = memory.stack_a[k];
-    batch.entries_b[entry + static_cast<std::uint32_t>(k)] = memory.stack_b[k];
+    batch.entries_a[room.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_a[k];
+    batch.entries_b[room.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_b[k];
   }
   return true;
 }

@@ -2,6 +2,7 @@
 
 #include <ist/error.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -16,6 +17,7 @@ namespace {
 
 /// Room for what is split. A batch that needs more is answered all the same.
 constexpr std::uint32_t kSplitRoom = 1 << 16, kTaskRoom = 1 << 19, kEntryRoom = 1 << 21;
+constexpr std::uint32_t kGapEntryRoom = 1 << 20;  ///< of separations, whose entries are larger
 
 }  // namespace
 
@@ -70,20 +72,42 @@ std::size_t GpuAssets::bytes() const noexcept { return impl_->memory.bytes(); }
 int GpuAssets::device() const noexcept { return impl_->device; }
 
 std::size_t GpuWorkspace::Impl::place(std::byte* from) {
+  return std::max(place_penetrations(from), place_separations(from));
+}
+
+void GpuWorkspace::Impl::place_splits(gpu::Parts& parts, gpu::BatchArrays& batch) {
+  batch.splits = parts.take<gpu::SplitPair>(kSplitRoom);
+  batch.tasks = parts.take<gpu::PairTask>(kTaskRoom);
+  batch.split_room = kSplitRoom;
+  batch.task_room = kTaskRoom;
+}
+
+std::size_t GpuWorkspace::Impl::place_penetrations(std::byte* from) {
   gpu::Parts parts(from);
   arrays.counters = parts.take<gpu::BatchCounters>(1);
   field_counters = parts.take<gpu::FieldCounters>(1);
   arrays.list = parts.take<std::uint32_t>(most_pairs);
   field_list = parts.take<std::uint32_t>(most_pairs);
-  arrays.splits = parts.take<gpu::SplitPair>(kSplitRoom);
-  arrays.tasks = parts.take<gpu::PairTask>(kTaskRoom);
+  place_splits(parts, arrays);
   arrays.places = parts.take<gpu::PairPlace>(kSplitRoom);
   arrays.totals = parts.take<gpu::LensTotals>(kSplitRoom + kTaskRoom);
   arrays.entries_a = parts.take<std::uint32_t>(kEntryRoom);
   arrays.entries_b = parts.take<std::uint32_t>(kEntryRoom);
-  arrays.split_room = kSplitRoom;
-  arrays.task_room = kTaskRoom;
   arrays.entry_room = kEntryRoom;
+  return parts.used();
+}
+
+std::size_t GpuWorkspace::Impl::place_separations(std::byte* from) {
+  gpu::Parts parts(from);
+  separations.counters = parts.take<gpu::BatchCounters>(2);
+  for (std::uint32_t*& list : separations.list) list = parts.take<std::uint32_t>(most_pairs);
+  place_splits(parts, separations.pairs);
+  separations.totals = parts.take<gpu::GapTotals>(kSplitRoom + kTaskRoom);
+  separations.entries = {parts.take<std::uint32_t>(kGapEntryRoom),
+                         parts.take<std::uint32_t>(kGapEntryRoom),
+                         parts.take<double>(kGapEntryRoom), parts.take<double>(kGapEntryRoom)};
+  separations.pairs.entry_room = kGapEntryRoom;
+  separations.pairs.measure = Measure::inner;
   return parts.used();
 }
 
@@ -95,6 +119,7 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   impl_->device = settings.device;
   impl_->most_pairs = most_pairs;
   impl_->blocks_at_a_time = gpu::batch_blocks();
+  impl_->separation_grids = gpu::separation_grids();
   impl_->field_grids = gpu::field_grids();
   impl_->memory = gpu::DeviceBytes(queue, settings, impl_->place(nullptr));
   impl_->place(impl_->memory.data());
@@ -117,21 +142,41 @@ void gpu::check_batch(const GpuPairs& pairs, const GpuWorkspace::Impl& room, int
                 std::to_string(room.device));
 }
 
+namespace {
+
+void set_pairs(const GpuAssets::Impl& assets, const GpuPairs& pairs, gpu::BatchArrays& batch) {
+  batch.assets = assets.refs;
+  batch.asset_count = static_cast<std::uint32_t>(assets.size);
+  batch.pairs = pairs;
+}
+
+}  // namespace
+
 void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
                        GpuWorkspace& workspace, const GpuPenetrations& answers,
                        CUstream_st* stream) {
-  const GpuAssets::Impl& all = assets.impl();
   const GpuWorkspace::Impl& room = workspace.impl();
-  gpu::check_batch(pairs, room, all.device);
+  gpu::check_batch(pairs, room, assets.device());
   if (pairs.count == 0) return;
   gpu::BatchArrays batch = room.arrays;
-  batch.assets = all.refs;
-  batch.asset_count = static_cast<std::uint32_t>(all.size);
+  set_pairs(assets.impl(), pairs, batch);
   batch.measure = measure;
-  batch.pairs = pairs;
   batch.answers = answers;
-  const gpu::DeviceGuard guard(all.device);
+  const gpu::DeviceGuard guard(room.device);
   gpu::launch_batch(batch, room.blocks_at_a_time, stream);
+}
+
+void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint32_t max_visits,
+                      GpuWorkspace& workspace, const GpuSeparations& answers, CUstream_st* stream) {
+  const GpuWorkspace::Impl& room = workspace.impl();
+  gpu::check_batch(pairs, room, assets.device());
+  if (pairs.count == 0) return;
+  gpu::SeparationArrays batch = room.separations;
+  set_pairs(assets.impl(), pairs, batch.pairs);
+  batch.answers = answers;
+  batch.max_visits = max_visits == 0 ? ~0u : max_visits;
+  const gpu::DeviceGuard guard(room.device);
+  gpu::launch_separations(batch, room.separation_grids, stream);
 }
 
 }  // namespace ist

@@ -7,6 +7,7 @@
 #include "cuda/query/batch_kernels.h"
 #include "cuda/query/device_bytes.h"
 #include "cuda/query/field_kernels.h"
+#include "cuda/query/separation_kernels.h"
 
 // What the classes of ist/gpu_query.h hold.
 
@@ -23,14 +24,22 @@ struct GpuWorkspace::Impl {
   int device = 0;
   std::size_t most_pairs = 0;
   int blocks_at_a_time = 0;
+  gpu::SeparationGrids separation_grids{};
   gpu::FieldGrids field_grids{};
   gpu::DeviceBytes memory;
-  gpu::BatchArrays arrays{};  ///< what does not change from batch to batch
+  // What does not change from batch to batch; penetrations and separations lie in the same memory.
+  gpu::BatchArrays arrays{};
+  gpu::SeparationArrays separations{};
   gpu::FieldCounters* field_counters = nullptr;
   std::uint32_t* field_list = nullptr;  ///< as long as the other
 
   /// Sets the arrays to parts of the memory at `from`; returns the bytes they take.
   std::size_t place(std::byte* from);
+
+ private:
+  static void place_splits(gpu::Parts& parts, gpu::BatchArrays& batch);
+  std::size_t place_penetrations(std::byte* from);
+  std::size_t place_separations(std::byte* from);
 };
 
 namespace gpu {

@@ -11,8 +11,8 @@
 #include <ist/query_enums.h>
 #include <ist/tree_view.h>
 
-// Penetrations of many pairs at once, on a GPU. Assets are uploaded once; poses and answers are
-// arrays in device memory that the caller owns.
+// Penetrations and separations of many pairs at once, on a GPU. Assets are uploaded once; poses and
+// answers are arrays in device memory that the caller owns.
 
 namespace IST_API ist {
 
@@ -99,5 +99,33 @@ class GpuWorkspace {
 void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
                        GpuWorkspace& workspace, const GpuPenetrations& answers,
                        CUstream_st* stream);
+
+/// Answers, each as in Separation: arrays in device memory; null: not wanted.
+struct GpuSeparations {
+  double* distance = nullptr;      ///< [count] [u] between the inner spheres
+  double* distance_min = nullptr;  ///< [count] [u] of the solids at least, certified
+  double* distance_max = nullptr;  ///< [count] [u] and at most, certified
+  double* point_a = nullptr;       ///< [count][3] [u] on A's inner spheres, world
+  double* point_b = nullptr;       ///< [count][3] [u] on B's inner spheres, world
+  double* normal = nullptr;        ///< [count][3] unit, from A to B, world
+  /// [count] ok; budget_exhausted under max_visits; invalid_input as in GpuPenetrations.
+  QueryStatus* status = nullptr;
+  std::uint32_t* node_visits = nullptr;   ///< [count]
+  std::uint32_t* sphere_pairs = nullptr;  ///< [count] measured
+};
+
+/// answers[i] = separation(pairs[i]).
+///
+/// The distance is the least of all pairs of inner spheres in double. separation() picks that pair
+/// in float, so that its distance may be more by 1e-6 of the objects' size; of several pairs as
+/// near it may have picked another. The interval is certified as there, its lower end never less.
+/// `max_visits` as in SeparationSettings; 0: no limit. Under a limit that binds the interval is
+/// certified too, yet another one than separation()'s.
+/// The same bits in every run, whatever else is in the batch.
+/// Only launches kernels on `stream`, as penetration_batch().
+///
+/// Throws Error where a batch is larger than the workspace, the devices differ or a launch fails.
+void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint32_t max_visits,
+                      GpuWorkspace& workspace, const GpuSeparations& answers, CUstream_st* stream);
 
 }  // namespace ist

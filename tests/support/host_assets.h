@@ -5,7 +5,6 @@
 #include <ist/query.h>
 
 #include "cuda/query/batch_arrays.h"
-#include "support/fiber_team.h"
 
 namespace ist::testing {
 
@@ -32,17 +31,5 @@ class HostAssets {
   std::vector<gpu::AssetRef> refs_;
   std::vector<std::vector<gpu::NodeSum>> nodes_;
 };
-
-/// Calls work(team) by a team of one or, where there is a seed for the order of its lanes, by every
-/// lane of one of 32.
-template <class Work>
-void by_team(unsigned seed, const Work& work) {
-  if (seed == 0) {
-    work(SerialTeam());
-    return;
-  }
-  static Fibers<32> fibers(seed);
-  fibers.run([&](int lane) { work(FiberTeam<32>(fibers, lane)); });
-}
 
 }  // namespace ist::testing

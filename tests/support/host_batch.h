@@ -5,9 +5,9 @@
 #include <ist/query.h>
 
 #include "cuda/query/batch_steps.h"
-#include "numerics/team.h"
 #include "support/batch_pair.h"
 #include "support/host_assets.h"
+#include "support/host_team.h"
 
 namespace ist::testing {
 

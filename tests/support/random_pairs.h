@@ -60,6 +60,17 @@ class RandomPairs {
     return out;
   }
 
+  /// Of solids that are apart, near, in touch and in each other.
+  std::vector<BatchPair> pairs_at_all_distances(std::size_t count) {
+    std::vector<BatchPair> out = pairs(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double far = std::exp(uniform(0, 2.5));
+      if (i % 4 != 0)
+        for (double& t : out[i].pose_b.t) t *= far;
+    }
+    return out;
+  }
+
  private:
   std::mt19937_64 random_;
 };
@@ -76,6 +87,21 @@ inline void expect_same_bits(const std::vector<Penetration>& x, const std::vecto
     EXPECT_EQ(x[i].centroid, y[i].centroid) << i;
     EXPECT_EQ(x[i].translation_gradient, y[i].translation_gradient) << i;
     EXPECT_EQ(x[i].rotation_gradient, y[i].rotation_gradient) << i;
+    EXPECT_EQ(x[i].status, y[i].status) << i;
+    EXPECT_EQ(x[i].node_visits, y[i].node_visits) << i;
+    EXPECT_EQ(x[i].sphere_pairs, y[i].sphere_pairs) << i;
+  }
+}
+
+inline void expect_same_bits(const std::vector<Separation>& x, const std::vector<Separation>& y) {
+  ASSERT_EQ(x.size(), y.size());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    EXPECT_EQ(x[i].distance, y[i].distance) << i;
+    EXPECT_EQ(x[i].distance_min, y[i].distance_min) << i;
+    EXPECT_EQ(x[i].distance_max, y[i].distance_max) << i;
+    EXPECT_EQ(x[i].point_a, y[i].point_a) << i;
+    EXPECT_EQ(x[i].point_b, y[i].point_b) << i;
+    EXPECT_EQ(x[i].normal, y[i].normal) << i;
     EXPECT_EQ(x[i].status, y[i].status) << i;
     EXPECT_EQ(x[i].node_visits, y[i].node_visits) << i;
     EXPECT_EQ(x[i].sphere_pairs, y[i].sphere_pairs) << i;
