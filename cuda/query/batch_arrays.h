@@ -6,6 +6,7 @@
 
 #include <ist/gpu_query.h>
 
+#include "cuda/query/detail_ref.h"
 #include "cuda/query/node_sums.h"
 #include "cuda/query/pair_descent.h"
 
@@ -16,6 +17,7 @@ struct AssetRef {
   AssetFrame frame;
   TreeRef tree[2];  ///< by Measure
   SumsRef sums[2];  ///< set_sums()
+  AssetDetails details;
 
   /// `bytes`: where the asset lies for who works on the batch.
   static AssetRef of(const AssetHeader& header, const std::byte* bytes) {
@@ -52,6 +54,7 @@ struct PairTask {
 struct BatchCounters {
   std::uint32_t listed[2];  ///< pairs to be summed in float, in double
   std::uint32_t taken[2];
+  std::uint32_t detailed, details_taken;  ///< pairs that are asked at several levels of detail
   std::uint32_t splits[2], tasks[2], entries[2], tasks_taken[2];
 };
 
@@ -60,6 +63,8 @@ struct BatchArrays {
   const AssetRef* assets;
   std::uint32_t asset_count;
   Measure measure;
+  std::uint32_t pair_budget;  ///< 0: none
+  bool has_details;           ///< some asset has coarser levels
   GpuPairs pairs;
   GpuPenetrations answers;
 

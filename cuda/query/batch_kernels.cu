@@ -3,6 +3,7 @@
 #include "cuda/query/batch_kernels.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/by_warps.h"
+#include "cuda/query/detail_sums.h"
 
 namespace ist::gpu {
 namespace {
@@ -21,6 +22,19 @@ __global__ void __launch_bounds__(kSiftThreads) sift_pairs(const BatchArrays bat
     const std::uint32_t place = list_place(team, list == kind, &batch.counters->listed[kind]);
     if (list == kind) batch.list[kind][place] = static_cast<std::uint32_t>(i);
   }
+  const std::uint32_t place = list_place(team, list == kDetailed, &batch.counters->detailed);
+  if (list == kDetailed) detailed_pair(batch, place) = static_cast<std::uint32_t>(i);
+}
+
+constexpr unsigned kDetailWarps = 2;
+
+__global__ void __launch_bounds__(32 * kDetailWarps) sum_detailed_pairs(const BatchArrays batch) {
+  __shared__ DetailMemory memory[kDetailWarps];
+  BatchCounters& counters = *batch.counters;
+  by_warps(load_fresh(&counters.detailed), &counters.details_taken,
+           [&](const WarpTeam& team, std::uint32_t k) {
+             sum_details(team, batch, detailed_pair(batch, k), memory[threadIdx.x / 32]);
+           });
 }
 
 template <class Real>
@@ -50,10 +64,10 @@ __global__ void __launch_bounds__(kThreads, sizeof(Real) == 4 ? kBlocksEach : 1)
            });
 }
 
-template <class Real>
-int blocks_at_a_time(int multiprocessors) {
+template <class Kernel>
+int blocks_at_a_time(const Kernel& kernel, unsigned threads, int multiprocessors) {
   int each = 0;
-  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, sum_pairs<Real>, kThreads, 0),
+  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, kernel, static_cast<int>(threads), 0),
         "asking how many blocks run at a time");
   return each * multiprocessors;
 }
@@ -73,13 +87,20 @@ BatchGrids batch_grids() {
   check(cudaGetDevice(&device), "looking for a GPU");
   check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device),
         "asking the GPU for its size");
-  return {{blocks_at_a_time<float>(multiprocessors), blocks_at_a_time<double>(multiprocessors)}};
+  return {{blocks_at_a_time(sum_pairs<float>, kThreads, multiprocessors),
+           blocks_at_a_time(sum_pairs<double>, kThreads, multiprocessors)},
+          blocks_at_a_time(sum_detailed_pairs, 32 * kDetailWarps, multiprocessors)};
 }
 
 void launch_batch(const BatchArrays& batch, const BatchGrids& grids, cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, sizeof(BatchCounters), stream), "starting a batch");
   sift_pairs<<<blocks_for(batch.pairs.count, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
   check_launch("placing pairs of trees");
+  if (batch.measure == Measure::matched && batch.has_details) {
+    sum_detailed_pairs<<<static_cast<unsigned>(grids.details), 32 * kDetailWarps, 0, stream>>>(
+        batch);
+    check_launch("summing pairs of trees at several levels of detail");
+  }
   launch_sums<float>(batch, grids.sum[0], stream);
   launch_sums<double>(batch, grids.sum[1], stream);
 }

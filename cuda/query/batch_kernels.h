@@ -9,6 +9,7 @@ namespace ist::gpu {
 /// Blocks of each kernel that the current device runs at a time.
 struct BatchGrids {
   int sum[2];  ///< in float, in double
+  int details;
 };
 
 BatchGrids batch_grids();

@@ -4,6 +4,7 @@
 
 #include "cuda/atomics.h"
 #include "cuda/query/batch_arrays.h"
+#include "cuda/query/coincidence.h"
 #include "cuda/query/part_sums.h"
 #include "numerics/host_device.h"
 
@@ -91,26 +92,56 @@ IST_HD inline bool place_pair(const BatchArrays& batch, std::uint32_t i, PairPla
                      batch.assets[b].frame, pose_of(pairs.pose_b, i), scale_of(pairs.scale_b, i));
 }
 
-/// Which list pair i goes to: 0 float, 1 double; −1: it is answered. One thread a pair.
+/// Square of the distance of B's finest root from A's, A's unit frame.
+IST_HD inline double root_distance2(const TreeRef& a, const TreeRef& b, const PairPlace& place) {
+  const double centre[3] = {b.root[0], b.root[1], b.root[2]};
+  double moved[3], d2 = 0;
+  place.a_from_b.apply(centre, moved);
+  for (int k = 0; k < 3; ++k) d2 += (moved[k] - a.root[k]) * (moved[k] - a.root[k]);
+  return d2;
+}
+
+/// Which list pair i goes to when the finest trees are asked: 0 float, 1 double; −1: it is
+/// answered.
+IST_HD inline int sift_finest(const BatchArrays& batch, std::uint32_t i, const PairPlace& place) {
+  const auto measure = static_cast<std::uint32_t>(batch.measure);
+  const TreeRef& a = batch.assets[batch.pairs.asset_a[i]].tree[measure];
+  const TreeRef& b = batch.assets[batch.pairs.asset_b[i]].tree[measure];
+  const double rb = b.root[3] * place.a_from_b.scale, reach = a.root[3] + rb;
+  if (!(root_distance2(a, b, place) < reach * reach)) {
+    write_nothing(batch.answers, i, QueryStatus::ok);
+    return -1;
+  }
+  return rb <= kFloatRatio * a.root[3] && a.root[3] <= kFloatRatio * rb ? 0 : 1;
+}
+
+/// Whether pair i may ask for other levels of detail than the finest: under a budget, as long as
+/// any levels may meet; without one, copies of an asset that all but coincide.
+IST_HD inline bool needs_details(const BatchArrays& batch, std::uint32_t i,
+                                 const PairPlace& place) {
+  if (batch.measure != Measure::matched) return false;
+  const AssetRef& a = batch.assets[batch.pairs.asset_a[i]];
+  const AssetRef& b = batch.assets[batch.pairs.asset_b[i]];
+  if (a.details.coarser == 0 && b.details.coarser == 0) return false;
+  if (batch.pair_budget > 0) {
+    const double reach = a.details.reach + b.details.reach * place.a_from_b.scale;
+    return root_distance2(a.tree[0], b.tree[0], place) < reach * reach;
+  }
+  return a.details.first_alike == b.details.first_alike &&
+         Coincidence(a.tree[0].root, a.details.mean_radius, place.a_from_b).weight > 0;
+}
+
+/// The lists of pairs.
+constexpr int kInFloat = 0, kInDouble = 1, kDetailed = 2;
+
+/// Which list pair i goes to; −1: it is answered. One thread a pair.
 IST_HD inline int sift_pair(const BatchArrays& batch, std::uint32_t i) {
   PairPlace place;
   if (!place_pair(batch, i, place)) {
     write_nothing(batch.answers, i, QueryStatus::invalid_input);
     return -1;
   }
-  const auto measure = static_cast<std::uint32_t>(batch.measure);
-  const TreeRef& a = batch.assets[batch.pairs.asset_a[i]].tree[measure];
-  const TreeRef& b = batch.assets[batch.pairs.asset_b[i]].tree[measure];
-  const double centre[3] = {b.root[0], b.root[1], b.root[2]};
-  double moved[3], d2 = 0;
-  place.a_from_b.apply(centre, moved);
-  for (int k = 0; k < 3; ++k) d2 += (moved[k] - a.root[k]) * (moved[k] - a.root[k]);
-  const double rb = b.root[3] * place.a_from_b.scale, reach = a.root[3] + rb;
-  if (!(d2 < reach * reach)) {
-    write_nothing(batch.answers, i, QueryStatus::ok);
-    return -1;
-  }
-  return rb <= kFloatRatio * a.root[3] && a.root[3] <= kFloatRatio * rb ? 0 : 1;
+  return needs_details(batch, i, place) ? kDetailed : sift_finest(batch, i, place);
 }
 
 /// Readies the memory for pair i.

@@ -17,6 +17,7 @@ struct GpuAssets::Impl {
   gpu::DeviceBytes memory;
   const gpu::AssetRef* refs = nullptr;
   std::size_t size = 0;
+  bool has_details = false;  ///< some asset has coarser levels
 };
 
 struct GpuWorkspace::Impl {

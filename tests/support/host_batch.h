@@ -5,6 +5,7 @@
 #include <ist/query.h>
 
 #include "cuda/query/batch_steps.h"
+#include "cuda/query/detail_sums.h"
 #include "numerics/team.h"
 #include "support/batch_pair.h"
 #include "support/host_assets.h"
@@ -21,7 +22,7 @@ class HostBatch {
 
   /// `seed`: of the order in which lanes go on; 0: a team of one.
   std::vector<Penetration> run(const std::vector<BatchPair>& pairs, Measure measure,
-                               unsigned seed = 0) {
+                               unsigned seed = 0, std::uint32_t pair_budget = 0) {
     const std::size_t n = pairs.size();
     const PairColumns columns(pairs);
     BatchColumns to = BatchColumns::unwritten(n);
@@ -35,6 +36,8 @@ class HostBatch {
     const gpu::BatchArrays batch = {assets_.refs().data(),
                                     static_cast<std::uint32_t>(assets_.refs().size()),
                                     measure,
+                                    pair_budget,
+                                    true,
                                     columns.pairs(),
                                     to.answers(),
                                     &counters,
@@ -49,8 +52,16 @@ class HostBatch {
                                     room_};
     for (std::uint32_t i = 0; i < n; ++i) {
       const int list = gpu::sift_pair(batch, i);
-      if (list >= 0) lists[list][counters.listed[list]++] = i;
+      if (list == gpu::kDetailed)
+        gpu::detailed_pair(batch, counters.detailed++) = i;
+      else if (list >= 0)
+        lists[list][counters.listed[list]++] = i;
     }
+    const auto details = std::make_unique<gpu::DetailMemory>();
+    for (std::uint32_t k = 0; k < counters.detailed; ++k)
+      by_team(seed, [&](const auto& team) {
+        gpu::sum_details(team, batch, gpu::detailed_pair(batch, k), *details);
+      });
     sum<float>(batch, 0, seed);
     sum<double>(batch, 1, seed);
     return to.rows();
