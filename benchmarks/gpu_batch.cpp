@@ -51,6 +51,7 @@ struct Scene {
   std::vector<BatchPair> poses;
   double rate = 0, step_ms = 0;  ///< what one H200 is to reach: M/s of a million, ms of 4,096; 0: –
   const Field* field = nullptr;  ///< in A's place
+  std::uint32_t pair_budget = 0;
 };
 
 /// A nut on its bolt at any turn, its thread pushed a little way out of the middle of the gap.
@@ -139,6 +140,21 @@ std::vector<BatchPair> small_poses(const std::string& key, const std::string& ra
   return out;
 }
 
+/// Copies of a solid that stand apart by up to a part of its size, in any direction.
+std::vector<BatchPair> poses_of_copies(const Asset& body, double most) {
+  std::mt19937_64 random(9);
+  std::vector<BatchPair> out;
+  for (int i = 0; i < 400; ++i) {
+    BatchPair pair;
+    pair.b = 1;
+    for (double& t : pair.pose_b.t)
+      t = most * std::cbrt(body.view().volume()) *
+          (static_cast<double>(random() >> 11) * 0x1p-52 - 1);
+    out.push_back(pair);
+  }
+  return out;
+}
+
 std::vector<BatchPair> oracle_poses(const std::string& pose_class) {
   std::vector<BatchPair> out;
   for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
@@ -210,8 +226,8 @@ class Batches {
         penetration_batch(assets, fields, batch.pairs(), Measure::matched, workspace_,
                           batch.answers(), stream_.get());
       else
-        penetration_batch(assets, batch.pairs(), Measure::matched, workspace_, batch.answers(),
-                          stream_.get());
+        penetration_batch(assets, batch.pairs(), {Measure::matched, scene.pair_budget}, workspace_,
+                          batch.answers(), stream_.get());
     });
     answers_ = batch.get();
     return ms;
@@ -273,6 +289,7 @@ double cpu_rate(const Scene& scene, std::size_t count, std::vector<Penetration>&
     pairs = placed(scene, count);
   PenetrationSettings settings;
   settings.field = FieldUse::never;
+  settings.pair_budget = scene.pair_budget;
   std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
   answers.resize(count);
   double best = 1e30;
@@ -402,6 +419,15 @@ int measure(Report& report) {
     if (scene.step_ms > 0) report.target(scene.name + ", 4,096 in ms", step, scene.step_ms, true);
   };
   for (const Scene& scene : scenes) ask("Batches", scene, 1e-4);
+  for (const std::uint32_t budget : {250u, 1'000u, 4'000u})
+    ask("Pair budgets",
+        {"deep, " + std::to_string(budget), &elephant4k, &dino4k, oracle_poses("deep"), 0, 0,
+         nullptr, budget},
+        1e-4);
+  ask("Pair budgets", {"pen, 1000", &elephant4k, &dino4k, oracle_poses("pen"), 0, 0, nullptr, 1000},
+      1e-4);
+  ask("Pair budgets",
+      {"copies nearly in place, none", &dino4k, &dino4k, poses_of_copies(dino4k, 0.02)}, 1e-4);
 
   const Asset surface = baked(elephant, "elephant", 1'000, true);
   Ground ground;

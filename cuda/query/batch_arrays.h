@@ -7,6 +7,7 @@
 #include <ist/gpu_query.h>
 
 #include "cuda/query/cover_ref.h"
+#include "cuda/query/detail_ref.h"
 #include "cuda/query/node_sums.h"
 #include "cuda/query/pair_descent.h"
 
@@ -18,6 +19,7 @@ struct AssetRef {
   TreeRef tree[2];  ///< by Measure
   SumsRef sums[2];  ///< set_sums()
   CoverRef cover;   ///< of the inner tree
+  AssetDetails details;
 
   /// `bytes`: where the asset lies for who works on the batch.
   static AssetRef of(const AssetHeader& header, const std::byte* bytes) {
@@ -56,6 +58,7 @@ struct BatchCounters {
   std::uint32_t listed;  ///< pairs whose roots meet
   std::uint32_t taken;
   std::uint32_t splits, tasks, entries, tasks_taken;
+  std::uint32_t detailed, details_taken;  ///< pairs that are asked at several levels of detail
 };
 
 /// A batch in the memory of who works on it: kernels, or a test on the host.
@@ -63,11 +66,14 @@ struct BatchArrays {
   const AssetRef* assets;
   std::uint32_t asset_count;
   Measure measure;
+  std::uint32_t pair_budget;  ///< 0: none
+  bool has_details;           ///< some asset has coarser levels
   GpuPairs pairs;
   GpuPenetrations answers;
 
   BatchCounters* counters;
-  std::uint32_t* list;  ///< room for all pairs
+  std::uint32_t* list;      ///< room for all pairs
+  std::uint32_t* detailed;  ///< likewise
   // Room for what is split; what finds none is summed by the team that met it.
   SplitPair* splits;
   PairTask* tasks;

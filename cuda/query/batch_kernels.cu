@@ -3,6 +3,7 @@
 #include "cuda/query/batch_kernels.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/by_warps.h"
+#include "cuda/query/detail_sums.h"
 #include "cuda/warp_team.h"
 
 namespace ist::gpu {
@@ -18,9 +19,23 @@ constexpr int kBlocksEach = 5;         ///< a multiprocessor; more leave too few
 __global__ void __launch_bounds__(kSiftThreads) sift_pairs(const BatchArrays batch) {
   const WarpTeam team;
   const std::uint64_t i = std::uint64_t{blockIdx.x} * kSiftThreads + threadIdx.x;
-  const bool meets = i < batch.pairs.count && sift_pair(batch, static_cast<std::uint32_t>(i));
-  const std::uint32_t place = list_place(team, meets, &batch.counters->listed);
-  if (meets) batch.list[place] = static_cast<std::uint32_t>(i);
+  const PairUse use =
+      i < batch.pairs.count ? sift_pair(batch, static_cast<std::uint32_t>(i)) : PairUse::answered;
+  const std::uint32_t place = list_place(team, use == PairUse::summed, &batch.counters->listed);
+  if (use == PairUse::summed) batch.list[place] = static_cast<std::uint32_t>(i);
+  const std::uint32_t other = list_place(team, use == PairUse::detailed, &batch.counters->detailed);
+  if (use == PairUse::detailed) batch.detailed[other] = static_cast<std::uint32_t>(i);
+}
+
+constexpr unsigned kDetailWarps = 2;
+
+__global__ void __launch_bounds__(32 * kDetailWarps) sum_detailed_pairs(const BatchArrays batch) {
+  __shared__ DetailMemory memory[kDetailWarps];
+  BatchCounters& counters = *batch.counters;
+  by_warps(load_fresh(&counters.detailed), &counters.details_taken,
+           [&](const WarpTeam& team, std::uint32_t k) {
+             sum_details(team, batch, batch.detailed[k], memory[threadIdx.x / 32]);
+           });
 }
 
 __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchArrays batch) {
@@ -44,24 +59,35 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_tasks(const BatchAr
            });
 }
 
-}  // namespace
-
-int batch_blocks() {
-  int device = 0, multiprocessors = 0;
-  check(cudaGetDevice(&device), "looking for a GPU");
-  check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device),
-        "asking the GPU for its size");
+template <class Kernel>
+int blocks_of(const Kernel& kernel, unsigned threads, int multiprocessors) {
   int each = 0;
-  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, sum_pairs, kThreads, 0),
+  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, kernel, static_cast<int>(threads), 0),
         "asking how many blocks run at a time");
   return each * multiprocessors;
 }
 
-void launch_batch(const BatchArrays& batch, int blocks_at_a_time, cudaStream_t stream) {
+}  // namespace
+
+BatchGrids batch_grids() {
+  int device = 0, multiprocessors = 0;
+  check(cudaGetDevice(&device), "looking for a GPU");
+  check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device),
+        "asking the GPU for its size");
+  return {blocks_of(sum_pairs, kThreads, multiprocessors),
+          blocks_of(sum_detailed_pairs, 32 * kDetailWarps, multiprocessors)};
+}
+
+void launch_batch(const BatchArrays& batch, const BatchGrids& grids, cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, sizeof(BatchCounters), stream), "starting a batch");
   sift_pairs<<<blocks_for(batch.pairs.count, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
   check_launch("placing pairs of trees");
-  const auto blocks = static_cast<unsigned>(blocks_at_a_time);
+  if (batch.measure == Measure::matched && batch.has_details) {
+    sum_detailed_pairs<<<static_cast<unsigned>(grids.details), 32 * kDetailWarps, 0, stream>>>(
+        batch);
+    check_launch("summing pairs of trees at several levels of detail");
+  }
+  const auto blocks = static_cast<unsigned>(grids.sum);
   sum_pairs<<<blocks, kThreads, 0, stream>>>(batch);
   check_launch("summing pairs of trees");
   sum_tasks<<<blocks, kThreads, 0, stream>>>(batch);

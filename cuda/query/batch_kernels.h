@@ -6,10 +6,14 @@
 
 namespace ist::gpu {
 
-/// Blocks of a kernel that the current device runs at a time.
-int batch_blocks();
+/// Blocks of each kernel that the current device runs at a time.
+struct BatchGrids {
+  int sum, details;
+};
+
+BatchGrids batch_grids();
 
 /// Launches all that answers a batch; waits for nothing.
-void launch_batch(const BatchArrays& batch, int blocks_at_a_time, cudaStream_t stream);
+void launch_batch(const BatchArrays& batch, const BatchGrids& grids, cudaStream_t stream);
 
 }  // namespace ist::gpu

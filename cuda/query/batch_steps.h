@@ -4,6 +4,7 @@
 
 #include "cuda/atomics.h"
 #include "cuda/query/batch_arrays.h"
+#include "cuda/query/coincidence.h"
 #include "cuda/query/part_sums.h"
 #include "cuda/query/split_room.h"
 #include "numerics/host_device.h"
@@ -115,28 +116,54 @@ IST_HD inline bool children_meet(const TreeRef& a, const TreeRef& b, const PairM
   return false;
 }
 
-/// Whether pair i is to be summed; else it is answered. One thread a pair.
-IST_HD inline bool sift_pair(const BatchArrays& batch, std::uint32_t i) {
-  PairPlace place;
-  if (!place_pair(batch, i, place)) {
-    write_nothing(batch.answers, i, QueryStatus::invalid_input);
-    return false;
-  }
-  const auto measure = static_cast<std::uint32_t>(batch.measure);
-  const TreeRef& a = batch.assets[batch.pairs.asset_a[i]].tree[measure];
-  const TreeRef& b = batch.assets[batch.pairs.asset_b[i]].tree[measure];
+/// Square of the distance of B's finest root from A's, A's unit frame.
+IST_HD inline double root_distance2(const TreeRef& a, const TreeRef& b, const PairPlace& place) {
   const double centre[3] = {b.root[0], b.root[1], b.root[2]};
   double moved[3], d2 = 0;
   place.a_from_b.apply(centre, moved);
   for (int k = 0; k < 3; ++k) d2 += (moved[k] - a.root[k]) * (moved[k] - a.root[k]);
+  return d2;
+}
+
+/// Whether the finest trees of pair i are to be summed; else it is answered.
+IST_HD inline bool sift_finest(const BatchArrays& batch, std::uint32_t i, const PairPlace& place) {
+  const auto measure = static_cast<std::uint32_t>(batch.measure);
+  const TreeRef& a = batch.assets[batch.pairs.asset_a[i]].tree[measure];
+  const TreeRef& b = batch.assets[batch.pairs.asset_b[i]].tree[measure];
   const double reach = a.root[3] + b.root[3] * place.a_from_b.scale;
-  if (!(d2 < reach * reach)) {
-    write_nothing(batch.answers, i, QueryStatus::ok);
-    return false;
-  }
-  if (children_meet(a, b, place.a_from_b)) return true;
+  if (root_distance2(a, b, place) < reach * reach && children_meet(a, b, place.a_from_b))
+    return true;
   write_nothing(batch.answers, i, QueryStatus::ok);
   return false;
+}
+
+/// Whether pair i may ask for other levels of detail than the finest: under a budget, as long as
+/// any levels may meet; without one, copies of an asset that all but coincide.
+IST_HD inline bool needs_details(const BatchArrays& batch, std::uint32_t i,
+                                 const PairPlace& place) {
+  if (batch.measure != Measure::matched) return false;
+  const AssetRef& a = batch.assets[batch.pairs.asset_a[i]];
+  const AssetRef& b = batch.assets[batch.pairs.asset_b[i]];
+  if (a.details.coarser == 0 && b.details.coarser == 0) return false;
+  if (batch.pair_budget > 0) {
+    const double reach = a.details.reach + b.details.reach * place.a_from_b.scale;
+    return root_distance2(a.tree[0], b.tree[0], place) < reach * reach;
+  }
+  return a.details.first_alike == b.details.first_alike &&
+         Coincidence(a.tree[0].root, a.details.mean_radius, place.a_from_b).weight > 0;
+}
+
+enum class PairUse { answered, summed, detailed };
+
+/// What is to be done of pair i. One thread a pair.
+IST_HD inline PairUse sift_pair(const BatchArrays& batch, std::uint32_t i) {
+  PairPlace place;
+  if (!place_pair(batch, i, place)) {
+    write_nothing(batch.answers, i, QueryStatus::invalid_input);
+    return PairUse::answered;
+  }
+  if (needs_details(batch, i, place)) return PairUse::detailed;
+  return sift_finest(batch, i, place) ? PairUse::summed : PairUse::answered;
 }
 
 /// Readies the memory for pair i, whose place is set or is there after the team's next sync.

@@ -3,6 +3,7 @@
 #include <cuda_runtime_api.h>
 
 #include <cstddef>
+#include <span>
 #include <utility>
 
 #include <ist/error.h>
@@ -64,6 +65,11 @@ class Parts {
 inline void copy_to_device(void* to, const void* from, std::size_t bytes, Queue& queue) {
   check(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, queue.stream()),
         "copying to the GPU");
+}
+
+template <class T>
+void copy_to_device(T* to, std::span<const T> from, Queue& queue) {
+  if (!from.empty()) copy_to_device(to, from.data(), from.size_bytes(), queue);
 }
 
 }  // namespace ist::gpu

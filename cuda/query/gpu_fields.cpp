@@ -29,7 +29,7 @@ GpuFields::GpuFields(std::span<const Field> fields, const GpuSettings& settings)
       const std::span<const std::byte> data = gpu::pointed_to(field);
       auto* const at = parts.take<std::byte>(data.size());
       if (refs == nullptr) continue;
-      if (!data.empty()) gpu::copy_to_device(at, data.data(), data.size(), queue);
+      gpu::copy_to_device<std::byte>(at, data, queue);
       refs->push_back(gpu::field_ref(field, at));
     }
     return parts.used();
@@ -40,8 +40,7 @@ GpuFields::GpuFields(std::span<const Field> fields, const GpuSettings& settings)
   std::vector<gpu::FieldRef> refs;
   place(impl_->memory.data(), &refs);
   auto* const at = reinterpret_cast<gpu::FieldRef*>(impl_->memory.data());
-  if (!refs.empty())
-    gpu::copy_to_device(at, refs.data(), refs.size() * sizeof(gpu::FieldRef), queue);
+  gpu::copy_to_device<gpu::FieldRef>(at, refs, queue);
   impl_->refs = at;
   queue.wait();
 }
@@ -73,7 +72,7 @@ void penetration_batch(const GpuAssets& assets, const GpuFields& fields, const G
                                  pairs,
                                  answers,
                                  room.field_counters,
-                                 {room.arrays.list, room.field_list}};
+                                 {room.arrays.list, room.arrays.detailed}};
   const gpu::DeviceGuard guard(trees.device);
   gpu::launch_field_batch(batch, room.field_grids, stream);
 }

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "cuda/check.h"
+#include "cuda/query/asset_parts.h"
 #include "cuda/query/device_bytes.h"
 #include "cuda/query/query_impl.h"
 #include "cuda/queue.h"
@@ -25,41 +27,37 @@ GpuAssets::GpuAssets(std::span<const TreeView> assets, const GpuSettings& settin
     : impl_(std::make_unique<Impl>()) {
   gpu_info(settings.device);  // throws where there is no such device
   gpu::Queue queue(settings);
-  gpu::Parts sizes(nullptr);
-  sizes.take<gpu::AssetRef>(assets.size());
-  std::vector<gpu::NodeSum> sums;
-  for (const TreeView& asset : assets) {
-    if (asset.empty()) throw Error("GPU: an asset of the batch is empty");
-    const AssetHeader& header = asset.header();
-    sizes.take<std::byte>(header.file_bytes);
-    for (const TreeHeader* tree : {&header.matched_tree, &header.inner_tree}) {
-      const std::vector<gpu::NodeSum> more =
-          gpu::node_sums(*tree, reinterpret_cast<const std::byte*>(&header));
-      sums.insert(sums.end(), more.begin(), more.end());
+  std::vector<gpu::AssetRef> refs;
+  // Twice: for the sizes, then for what lies there.
+  const auto place = [&](std::byte* from) {
+    gpu::Parts parts(from);
+    parts.take<gpu::AssetRef>(assets.size());
+    for (std::size_t i = 0; i < assets.size(); ++i) {
+      const AssetHeader& header = assets[i].header();
+      auto* const bytes = parts.take<std::byte>(header.file_bytes);
+      const gpu::AssetParts more = gpu::AssetParts::of(header, bytes);
+      auto* const sums = parts.take<gpu::NodeSum>(more.sums.size());
+      auto* const levels = parts.take<gpu::DetailRef>(more.levels.size());
+      auto* const filled = parts.take<gpu::FilledBall>(more.filled.size());
+      if (from == nullptr) continue;
+      gpu::copy_to_device(bytes, &header, header.file_bytes, queue);
+      gpu::copy_to_device<gpu::NodeSum>(sums, more.sums, queue);
+      gpu::copy_to_device<gpu::DetailRef>(levels, more.levels, queue);
+      gpu::copy_to_device<gpu::FilledBall>(filled, more.filled, queue);
+      refs.push_back(more.ref(header, bytes, sums, levels, filled, gpu::first_alike(assets, i)));
+      impl_->has_details = impl_->has_details || header.detail_count > 0;
     }
-  }
-  sizes.take<gpu::NodeSum>(sums.size());
+    return parts.used();
+  };
+  for (const TreeView& asset : assets)
+    if (asset.empty()) throw Error("GPU: an asset of the batch is empty");
   impl_->device = settings.device;
   impl_->size = assets.size();
-  impl_->memory = gpu::DeviceBytes(queue, settings, sizes.used());
-  gpu::Parts parts(impl_->memory.data());
-  auto* const refs = parts.take<gpu::AssetRef>(assets.size());
-  auto* const nodes = parts.take<gpu::NodeSum>(sums.size());
-  if (!sums.empty())
-    gpu::copy_to_device(nodes, sums.data(), sums.size() * sizeof(gpu::NodeSum), queue);
-  const gpu::NodeSum* of_asset = nodes;
-  std::vector<gpu::AssetRef> host;
-  for (const TreeView& asset : assets) {
-    const AssetHeader& header = asset.header();
-    auto* const bytes = parts.take<std::byte>(header.file_bytes);
-    gpu::copy_to_device(bytes, &header, header.file_bytes, queue);
-    host.push_back(gpu::AssetRef::of(header, bytes));
-    host.back().set_sums(header, of_asset);
-    of_asset += gpu::node_count(header.matched_tree) + gpu::node_count(header.inner_tree);
-  }
-  if (!host.empty())
-    gpu::copy_to_device(refs, host.data(), host.size() * sizeof(gpu::AssetRef), queue);
-  impl_->refs = refs;
+  impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr));
+  place(impl_->memory.data());
+  auto* const at = reinterpret_cast<gpu::AssetRef*>(impl_->memory.data());
+  gpu::copy_to_device<gpu::AssetRef>(at, refs, queue);
+  impl_->refs = at;
   queue.wait();
 }
 
@@ -87,7 +85,7 @@ std::size_t GpuWorkspace::Impl::place_penetrations(std::byte* from) {
   arrays.counters = parts.take<gpu::BatchCounters>(1);
   field_counters = parts.take<gpu::FieldCounters>(1);
   arrays.list = parts.take<std::uint32_t>(most_pairs);
-  field_list = parts.take<std::uint32_t>(most_pairs);
+  arrays.detailed = parts.take<std::uint32_t>(most_pairs);
   place_splits(parts, arrays);
   arrays.places = parts.take<gpu::PairPlace>(kSplitRoom);
   arrays.totals = parts.take<gpu::LensTotals>(kSplitRoom + kTaskRoom);
@@ -118,7 +116,7 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   gpu::Queue queue(settings);
   impl_->device = settings.device;
   impl_->most_pairs = most_pairs;
-  impl_->blocks_at_a_time = gpu::batch_blocks();
+  impl_->grids = gpu::batch_grids();
   impl_->separation_grids = gpu::separation_grids();
   impl_->field_grids = gpu::field_grids();
   impl_->memory = gpu::DeviceBytes(queue, settings, impl_->place(nullptr));
@@ -152,18 +150,20 @@ void set_pairs(const GpuAssets::Impl& assets, const GpuPairs& pairs, gpu::BatchA
 
 }  // namespace
 
-void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
-                       GpuWorkspace& workspace, const GpuPenetrations& answers,
-                       CUstream_st* stream) {
+void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs,
+                       const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
+                       const GpuPenetrations& answers, CUstream_st* stream) {
   const GpuWorkspace::Impl& room = workspace.impl();
   gpu::check_batch(pairs, room, assets.device());
   if (pairs.count == 0) return;
   gpu::BatchArrays batch = room.arrays;
   set_pairs(assets.impl(), pairs, batch);
-  batch.measure = measure;
+  batch.measure = settings.measure;
+  batch.pair_budget = settings.pair_budget;
+  batch.has_details = assets.impl().has_details;
   batch.answers = answers;
   const gpu::DeviceGuard guard(room.device);
-  gpu::launch_batch(batch, room.blocks_at_a_time, stream);
+  gpu::launch_batch(batch, room.grids, stream);
 }
 
 void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint32_t max_visits,
@@ -177,6 +177,12 @@ void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint3
   batch.max_visits = max_visits == 0 ? ~0u : max_visits;
   const gpu::DeviceGuard guard(room.device);
   gpu::launch_separations(batch, room.separation_grids, stream);
+}
+
+void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
+                       GpuWorkspace& workspace, const GpuPenetrations& answers,
+                       CUstream_st* stream) {
+  penetration_batch(assets, pairs, GpuPenetrationSettings{measure}, workspace, answers, stream);
 }
 
 }  // namespace ist

@@ -18,12 +18,13 @@ struct GpuAssets::Impl {
   gpu::DeviceBytes memory;
   const gpu::AssetRef* refs = nullptr;
   std::size_t size = 0;
+  bool has_details = false;  ///< some asset has coarser levels
 };
 
 struct GpuWorkspace::Impl {
   int device = 0;
   std::size_t most_pairs = 0;
-  int blocks_at_a_time = 0;
+  gpu::BatchGrids grids{};
   gpu::SeparationGrids separation_grids{};
   gpu::FieldGrids field_grids{};
   gpu::DeviceBytes memory;
@@ -31,7 +32,6 @@ struct GpuWorkspace::Impl {
   gpu::BatchArrays arrays{};
   gpu::SeparationArrays separations{};
   gpu::FieldCounters* field_counters = nullptr;
-  std::uint32_t* field_list = nullptr;  ///< as long as the other
 
   /// Sets the arrays to parts of the memory at `from`; returns the bytes they take.
   std::size_t place(std::byte* from);

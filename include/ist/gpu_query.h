@@ -87,15 +87,31 @@ class GpuWorkspace {
   std::unique_ptr<Impl> impl_;
 };
 
+/// What a penetration of a batch may cost, as in PenetrationSettings.
+struct GpuPenetrationSettings {
+  Measure measure = Measure::matched;
+  /// Count of sphere pairs to spend on each pair of trees; matched measure only; 0: no limit.
+  ///
+  /// The answer comes from the finest levels of detail that are expected to need no more, blended
+  /// smoothly with the next coarser ones: PenetrationSettings::pair_budget says how.
+  std::uint32_t pair_budget = 0;
+};
+
 /// answers[i] = penetration(pairs[i]) by lenses (FieldUse::never), finished.
 ///
 /// The volume is within 1e-6 of the sum in double, gradients within 1e-6 of the lenses' single ones
-/// together or of volume^(2/3), if that is more. The same bits in every run, whatever else is in
-/// the batch.
+/// together or of volume^(2/3), if that is more. Under a budget, and of copies of one asset at
+/// nearly the same pose, the sum is the CPU's blend of such sums.
+/// The same bits in every run, whatever else is in the batch.
 /// Only launches kernels on `stream`: allocates nothing and waits for nothing, so that a CUDA graph
 /// may capture it.
 ///
 /// Throws Error where a batch is larger than the workspace, the devices differ or a launch fails.
+void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs,
+                       const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
+                       const GpuPenetrations& answers, CUstream_st* stream);
+
+/// Without a budget.
 void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
                        GpuWorkspace& workspace, const GpuPenetrations& answers,
                        CUstream_st* stream);

@@ -5,6 +5,7 @@
 #include <ist/gpu_fields.h>
 
 #include "cuda/check.h"
+#include "support/detailed_pairs.h"
 #include "support/device_batch.h"
 #include "support/gpu_test.h"
 #include "support/host_batch.h"
@@ -93,6 +94,22 @@ TEST_F(GpuQueryTest, ManyPairsInFieldsHaveTheSameBitsInEveryRun) {
   for (std::size_t i = 0; i < pairs.size(); ++i)
     repeated.push_back(expected[(i * 7919) % scene.pairs.size()]);
   expect_same_bits(many.get(), repeated);
+}
+
+TEST_F(GpuQueryTest, BudgetsAndCopiesHaveTheBitsOfAWarpOnTheHost) {
+  std::vector<BatchPair> pairs = detailed_pairs(60, 16);
+  for (const BatchPair& copy : copies_in_place(30, 17)) pairs.push_back(copy);
+  const GpuAssets assets(detailed_views());
+  GpuWorkspace workspace(pairs.size());
+  const Stream stream;
+  for (const std::uint32_t budget : {0u, 50u, 2000u}) {
+    const DeviceBatch batch(pairs);
+    penetration_batch(assets, batch.pairs(), {Measure::matched, budget}, workspace, batch.answers(),
+                      stream);
+    stream.wait();
+    HostBatch host(detailed_views());
+    expect_same_bits(batch.get(), host.run(pairs, Measure::matched, 1, budget));
+  }
 }
 
 TEST_F(GpuQueryTest, ManyPairsHaveTheSameBitsInEveryRun) {

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <deque>
 #include <vector>
 
 #include <ist/query.h>
 
+#include "cuda/query/asset_parts.h"
 #include "cuda/query/batch_arrays.h"
 
 namespace ist::testing {
@@ -15,13 +17,10 @@ class HostAssets {
     for (const TreeView& asset : assets) {
       const AssetHeader& header = asset.header();
       const auto* const bytes = reinterpret_cast<const std::byte*>(&header);
-      std::vector<gpu::NodeSum>& nodes = nodes_.emplace_back();
-      for (const TreeHeader* tree : {&header.matched_tree, &header.inner_tree}) {
-        const std::vector<gpu::NodeSum> more = gpu::node_sums(*tree, bytes);
-        nodes.insert(nodes.end(), more.begin(), more.end());
-      }
-      refs_.push_back(gpu::AssetRef::of(header, bytes));
-      refs_.back().set_sums(header, nodes.data());
+      parts_.push_back(gpu::AssetParts::of(header, bytes));
+      const gpu::AssetParts& parts = parts_.back();
+      refs_.push_back(parts.ref(header, bytes, parts.sums.data(), parts.levels.data(),
+                                parts.filled.data(), gpu::first_alike(assets, refs_.size())));
     }
   }
 
@@ -29,7 +28,7 @@ class HostAssets {
 
  private:
   std::vector<gpu::AssetRef> refs_;
-  std::vector<std::vector<gpu::NodeSum>> nodes_;
+  std::deque<gpu::AssetParts> parts_;
 };
 
 }  // namespace ist::testing

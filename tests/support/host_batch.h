@@ -5,6 +5,7 @@
 #include <ist/query.h>
 
 #include "cuda/query/batch_steps.h"
+#include "cuda/query/detail_sums.h"
 #include "support/batch_pair.h"
 #include "support/host_assets.h"
 #include "support/host_team.h"
@@ -21,11 +22,11 @@ class HostBatch {
 
   /// `seed`: of the order in which lanes go on; 0: a team of one.
   std::vector<Penetration> run(const std::vector<BatchPair>& pairs, Measure measure,
-                               unsigned seed = 0) {
+                               unsigned seed = 0, std::uint32_t pair_budget = 0) {
     const std::size_t n = pairs.size();
     const PairColumns columns(pairs);
     BatchColumns to = BatchColumns::unwritten(n);
-    std::vector<std::uint32_t> list(n);
+    std::vector<std::uint32_t> list(n), detailed(n);
     std::vector<gpu::SplitPair> splits(room_);
     std::vector<gpu::PairTask> tasks(room_);
     std::vector<gpu::PairPlace> places(room_);
@@ -35,10 +36,13 @@ class HostBatch {
     const gpu::BatchArrays batch = {assets_.refs().data(),
                                     static_cast<std::uint32_t>(assets_.refs().size()),
                                     measure,
+                                    pair_budget,
+                                    true,
                                     columns.pairs(),
                                     to.answers(),
                                     &counters,
                                     list.data(),
+                                    detailed.data(),
                                     splits.data(),
                                     tasks.data(),
                                     places.data(),
@@ -50,8 +54,15 @@ class HostBatch {
                                     room_,
                                     most_alone,
                                     task_weight};
-    for (std::uint32_t i = 0; i < n; ++i)
-      if (gpu::sift_pair(batch, i)) list[counters.listed++] = i;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const gpu::PairUse use = gpu::sift_pair(batch, i);
+      if (use == gpu::PairUse::summed) list[counters.listed++] = i;
+      if (use == gpu::PairUse::detailed) detailed[counters.detailed++] = i;
+    }
+    const auto details = std::make_unique<gpu::DetailMemory>();
+    for (std::uint32_t k = 0; k < counters.detailed; ++k)
+      by_team(seed,
+              [&](const auto& team) { gpu::sum_details(team, batch, detailed[k], *details); });
     sum(batch, seed);
     return to.rows();
   }

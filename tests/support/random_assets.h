@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <ist/bake.h>
+#include <ist/pose.h>
 
 #include "asset/asset_writer.h"
 #include "bake/cluster/tree_builder.h"

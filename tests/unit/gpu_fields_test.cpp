@@ -9,6 +9,7 @@
 #include "support/host_field_batch.h"
 #include "support/oracle_assets.h"
 #include "support/random_pairs.h"
+#include "support/reference_sum.h"
 #include "support/surface_queries.h"
 
 // The GPU's batch of trees in fields, its source run by teams of the host, against the CPU's query.
@@ -128,7 +129,52 @@ TEST(GpuFields, AlignedSolidsToo) {
     off.look(by_warp[i], cpu, pair.scale_b);
   }
   EXPECT_LE(off.volume, 1e-9);
-  EXPECT_LE(off.push, 1e-7);  // gradients jump where a ball's centre leaves an edge
+  EXPECT_LE(off.push, 1e-9);
+  EXPECT_LE(off.centre, 1e-9);
+}
+
+/// A ball whose centre lies on an edge cannot tell from there on which side of a triangle it is.
+TEST(GpuFields, CentresOnEdges) {
+  static const std::vector<float> slope = [] {
+    std::vector<float> h;
+    for (int j = 0; j < 9; ++j)
+      for (int i = 0; i < 9; ++i) h.push_back(static_cast<float>(0.125 * std::abs(i - 4)));
+    return h;
+  }();
+  const Asset& body = batch_assets()[3];
+  const std::vector<Field> fields = {BoxField{Eigen::Vector3d(0.5, 0.5, 0.5)},
+                                     MeshField{cube().view()}, terrain_of(slope, 9)};
+  const std::vector<std::vector<Eigen::Vector3d>> edges = {
+      {{0.5, 0.5, 0.1}, {0.5, 0.5, 0.5}, {-0.5, 0.1, 0.5}, {0.5, 0.125, 0.125}},
+      {{1, 1, 0.4}, {0, 0, 0}, {0.25, 0.25, 1}, {1, 0.3, 0}},
+      {{1, 0.3, 0}, {0.5, 0.5, 0.25}, {0.625, 0.125, 0.1875}, {1, 1, 0}}};
+  std::vector<BatchPair> pairs;
+  for (std::uint32_t f = 0; f < fields.size(); ++f) {
+    for (const Eigen::Vector3d& edge : edges[f]) {
+      for (const WorldSphere& ball : world_spheres({body.view(), Pose{}, 0.5}, Measure::matched)) {
+        BatchPair pair;
+        pair.a = f;
+        pair.scale_b = 0.5;
+        for (int k = 0; k < 3; ++k) pair.pose_b.t[k] = edge[k] - ball.centre[k];
+        pairs.push_back(pair);
+      }
+    }
+  }
+  HostFieldBatch batch({body.view()}, fields);
+  const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 7);
+  const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched);
+  Workspace workspace;
+  Off off;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Penetration cpu =
+        penetration(PlacedField{fields[pairs[i].a], {}, 1},
+                    PlacedTree{body.view(), pairs[i].pose_b, pairs[i].scale_b}, {}, workspace);
+    off.look(by_one[i], cpu, 0.5);
+    off.look(by_warp[i], cpu, 0.5);
+  }
+  EXPECT_LE(off.volume, 1e-9);
+  EXPECT_LE(off.push, 1e-9);
+  EXPECT_LE(off.turn, 1e-9);
   EXPECT_LE(off.centre, 1e-9);
 }
 

@@ -1,0 +1,102 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "support/detailed_pairs.h"
+#include "support/host_batch.h"
+
+// The GPU's batch of trees at several levels of detail, its source run by teams of the host,
+// against the CPU's query: under pair budgets, and of copies of one asset that all but coincide.
+
+namespace ist::testing {
+namespace {
+
+Penetration by_cpu(const BatchPair& pair, std::uint32_t budget) {
+  static Workspace workspace;
+  PenetrationSettings settings;
+  settings.field = FieldUse::never;
+  settings.pair_budget = budget;
+  return penetration(PlacedTree{detailed_assets()[pair.a].view(), pair.pose_a, pair.scale_a},
+                     PlacedTree{detailed_assets()[pair.b].view(), pair.pose_b, pair.scale_b},
+                     settings, workspace);
+}
+
+/// Largest differences to the CPU's answers, whose sums are in float.
+struct Off {
+  double volume = 0, push = 0, turn = 0, centre = 0;
+
+  void look(const Penetration& gpu, const Penetration& cpu, double size) {
+    ASSERT_EQ(gpu.status, cpu.status);
+    const double scale = std::max(cpu.volume, 1e-5 * size * size * size);
+    const double area = std::max(std::cbrt(scale * scale), cpu.translation_gradient.norm());
+    volume = std::max(volume, std::abs(gpu.volume - cpu.volume) / scale);
+    push = std::max(push, (gpu.translation_gradient - cpu.translation_gradient).norm() / area);
+    turn = std::max(turn, (gpu.rotation_gradient - cpu.rotation_gradient).norm() / (area * size));
+    if (cpu.volume >= scale) centre = std::max(centre, (gpu.centroid - cpu.centroid).norm() / size);
+  }
+  void expect_small(const char* what) const {
+    std::printf("%s: volume %.1e push %.1e turn %.1e centroid %.1e\n", what, volume, push, turn,
+                centre);
+    EXPECT_LE(volume, 1e-5) << what;
+    EXPECT_LE(push, 1e-4) << what;
+    EXPECT_LE(turn, 1e-4) << what;
+    EXPECT_LE(centre, 1e-5) << what;
+  }
+};
+
+TEST(GpuDetails, BudgetsAreTheCpus) {
+  HostBatch batch(detailed_views());
+  const std::vector<BatchPair> pairs = detailed_pairs(150, 81);
+  std::vector<Penetration> whole = batch.run(pairs, Measure::matched);
+  std::size_t changed = 0;
+  for (const std::uint32_t budget : {1u, 40u, 200u, 1000u, 5000u, 100000u}) {
+    const std::vector<Penetration> answers = batch.run(pairs, Measure::matched, 0, budget);
+    Off off;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      off.look(answers[i], by_cpu(pairs[i], budget), pairs[i].scale_b);
+      changed += answers[i].volume != whole[i].volume ? 1 : 0;
+    }
+    off.expect_small(("budget " + std::to_string(budget)).c_str());
+  }
+  EXPECT_GT(changed, 200u);
+  // The inner measure has no levels.
+  expect_same_bits(batch.run(pairs, Measure::inner, 0, 40), batch.run(pairs, Measure::inner));
+}
+
+TEST(GpuDetails, CoincidentCopiesAreTheCpus) {
+  HostBatch batch(detailed_views());
+  const std::vector<BatchPair> pairs = copies_in_place(120, 82);
+  const std::vector<Penetration> whole = batch.run(pairs, Measure::matched);
+  for (const std::uint32_t budget : {0u, 2000u}) {
+    const std::vector<Penetration> answers = batch.run(pairs, Measure::matched, 0, budget);
+    std::size_t changed = 0;
+    EXPECT_GT(batch.counters.detailed, 40u);
+    Off off;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      off.look(answers[i], by_cpu(pairs[i], budget), 0.9);
+      changed += answers[i].volume != whole[i].volume ? 1 : 0;
+    }
+    EXPECT_TRUE(budget == 0 ? changed == 0 : changed > 20) << changed;
+    off.expect_small(("copies, budget " + std::to_string(budget)).c_str());
+  }
+}
+
+TEST(GpuDetails, LanesOfAWarpNeedNoLuck) {
+  HostBatch batch(detailed_views());
+  std::vector<BatchPair> pairs = detailed_pairs(12, 83);
+  pairs.push_back(pairs.front());
+  pairs.back().b = pairs.back().a;
+  pairs.back().pose_b = pairs.back().pose_a;
+  pairs.back().scale_b = pairs.back().scale_a;
+  const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched, 0, 300);
+  const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 1, 300);
+  expect_same_bits(batch.run(pairs, Measure::matched, 2, 300), by_warp);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    EXPECT_NEAR(by_one[i].volume, by_warp[i].volume, 2e-6 * by_warp[i].volume);
+    EXPECT_EQ(by_one[i].sphere_pairs, by_warp[i].sphere_pairs);
+  }
+}
+
+}  // namespace
+}  // namespace ist::testing
