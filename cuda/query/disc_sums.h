@@ -42,12 +42,65 @@ struct HeldBlock {
   TriangleId kept[kKeptNear];  ///< the first of those near
 };
 
+/// Triangles as balls near a point see them: in floats, lengths being parts of a reach about it.
+struct SeenTriangles {
+  static constexpr int kNumbers = 14;
+  float plane[kNumbers][kStaged];
+
+  /// False if the triangle does not come within the reach of the point.
+  IST_HD static bool see(const TrianglePlane& t, const double (&centre)[3], double reach,
+                         float (&seen)[kNumbers]) {
+    double height, x, y;
+    t.feet(centre, height, x, y);
+    if (!(size_of(height) < reach && x > t.left - reach && x < t.right + reach && y > -reach &&
+          y < t.top + reach))
+      return false;
+    const double per = 1 / reach;
+    for (int k = 0; k < 3; ++k) {
+      seen[k] = static_cast<float>(t.n[k]);
+      seen[3 + k] = static_cast<float>(t.u[k]);
+      seen[6 + k] = static_cast<float>(t.v[k]);
+    }
+    seen[9] = static_cast<float>(height * per);
+    seen[10] = bounded((x - t.left) * per);
+    seen[11] = bounded((t.right - x) * per);
+    seen[12] = bounded(y * per);
+    seen[13] = bounded((t.top - y) * per);
+    return true;
+  }
+
+  IST_HD void set(int place, const float (&seen)[kNumbers]) {
+    for (int k = 0; k < kNumbers; ++k) plane[k][place] = seen[k];
+  }
+
+  /// Whether a triangle may meet a ball that lies within the reach.
+  IST_HD bool meets(int triangle, const double (&x)[3], double radius, const double (&centre)[3],
+                    double reach) const {
+    constexpr float kRoom = 1e-5f;
+    const double per = 1 / reach;
+    const auto r = static_cast<float>(radius * per) * (1 + kRoom) + kRoom;
+    float at[3];
+    for (int k = 0; k < 3; ++k) at[k] = static_cast<float>((x[k] - centre[k]) * per);
+    const auto along = [&](int axis) {
+      return (at[0] * plane[axis][triangle] + at[1] * plane[axis + 1][triangle]) +
+             at[2] * plane[axis + 2][triangle];
+    };
+    const float height = plane[9][triangle] + along(0), u = along(3), v = along(6);
+    return height < r && -height < r && plane[10][triangle] + u > -r &&
+           plane[11][triangle] - u > -r && plane[12][triangle] + v > -r &&
+           plane[13][triangle] - v > -r;
+  }
+
+ private:
+  IST_HD static float bounded(double x) { return static_cast<float>(x < 1e30 ? x : 1e30); }
+};
+
 struct DiscMemory {
   double x[3][kHeldBalls], r[kHeldBalls];  ///< r: 0 if there is no ball
   double cones[kHeldBalls], angle[kHeldBalls];
   std::uint32_t on_edge[kHeldBalls];
   HeldBlock block[kHeldBlocks];
-  float plane[14][kStaged];  ///< triangles seen from a block's centre, in its reach
+  SeenTriangles seen_from_block;
   TriangleId staged[kStaged];
   BallTriangle near[kDiscRoom], cut[kDiscRoom];
   double share[2][32];  ///< of the lanes: cones and angle
@@ -115,14 +168,14 @@ class DiscSums {
     int staged = 0;
     for (int i = 0; i < kStaged / Team::kWidth; ++i) {
       TriangleId id = {};
-      float seen[14];
-      const bool near = id_of(i * Team::kWidth + team_.lane(), id) && comes_near(block, id, seen);
+      float seen[SeenTriangles::kNumbers];
+      const bool near = id_of(i * Team::kWidth + team_.lane(), id) && see(block, id, seen);
       int total = 0;
       const int place = staged + team_.exclusive_count(near, total);
       staged += total;
       if (!near) continue;
       m_.staged[place] = id;
-      for (int k = 0; k < 14; ++k) m_.plane[k][place] = seen[k];
+      m_.seen_from_block.set(place, seen);
       const std::uint32_t kept = before + static_cast<std::uint32_t>(place);
       if (kept < kKeptNear) block.kept[kept] = id;
     }
@@ -133,7 +186,7 @@ class DiscSums {
       const int k = base + team_.lane();
       const int ball = slot * static_cast<int>(kWidth) + k % static_cast<int>(kWidth);
       const int triangle = k / static_cast<int>(kWidth);
-      const bool meets = k < tests && reaches(block, ball, triangle);
+      const bool meets = k < tests && may_meet(block, ball, triangle);
       int total = 0;
       const int place = near_ + team_.exclusive_count(meets, total);
       if (meets) m_.near[place] = {static_cast<std::uint32_t>(ball), m_.staged[triangle]};
@@ -175,51 +228,17 @@ class DiscSums {
   static constexpr double kLeastAngle = 1e-6;  ///< as query/field/probe_sum.h
 
  private:
-  /// A triangle as the balls of a block see it, in floats, lengths being parts of the block's
-  /// reach; false if it does not come near.
-  IST_HD bool comes_near(const HeldBlock& block, const TriangleId& id, float (&seen)[14]) const {
+  IST_HD bool see(const HeldBlock& block, const TriangleId& id,
+                  float (&seen)[SeenTriangles::kNumbers]) const {
     double c[3][3];
     source_.corners(id, block.centre, block.reach, c);
-    const TrianglePlane t(c);
-    double height, x, y;
-    t.feet(block.centre, height, x, y);
-    const double reach = block.reach;
-    if (!(size_of(height) < reach && x > t.left - reach && x < t.right + reach && y > -reach &&
-          y < t.top + reach))
-      return false;
-    const double per = 1 / reach;
-    for (int k = 0; k < 3; ++k) {
-      seen[k] = static_cast<float>(t.n[k]);
-      seen[3 + k] = static_cast<float>(t.u[k]);
-      seen[6 + k] = static_cast<float>(t.v[k]);
-    }
-    seen[9] = static_cast<float>(height * per);
-    seen[10] = bounded((x - t.left) * per);
-    seen[11] = bounded((t.right - x) * per);
-    seen[12] = bounded(y * per);
-    seen[13] = bounded((t.top - y) * per);
-    return true;
+    return SeenTriangles::see(TrianglePlane(c), block.centre, block.reach, seen);
   }
 
-  IST_HD static float bounded(double x) { return static_cast<float>(x < 1e30 ? x : 1e30); }
-
-  /// Whether a ball may meet a staged triangle.
-  IST_HD bool reaches(const HeldBlock& block, int ball, int triangle) const {
-    if (!(m_.r[ball] > 0)) return false;
-    constexpr float kRoom = 1e-5f;
-    const double per = 1 / block.reach;
-    const auto r = static_cast<float>(m_.r[ball] * per) * (1 + kRoom) + kRoom;
-    float at[3];
-    for (int k = 0; k < 3; ++k) at[k] = static_cast<float>((m_.x[k][ball] - block.centre[k]) * per);
-    const auto along = [&](int axis) {
-      return (at[0] * m_.plane[axis][triangle] + at[1] * m_.plane[axis + 1][triangle]) +
-             at[2] * m_.plane[axis + 2][triangle];
-    };
-    const float height = m_.plane[9][triangle] + along(0);
-    const float x = along(3), y = along(6);
-    return height < r && -height < r && m_.plane[10][triangle] + x > -r &&
-           m_.plane[11][triangle] - x > -r && m_.plane[12][triangle] + y > -r &&
-           m_.plane[13][triangle] - y > -r;
+  IST_HD bool may_meet(const HeldBlock& block, int ball, int triangle) const {
+    const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]};
+    return m_.r[ball] > 0 &&
+           m_.seen_from_block.meets(triangle, x, m_.r[ball], block.centre, block.reach);
   }
 
   /// Takes what is listed, as many at a time as the team is wide, until fewer than `full` are left;

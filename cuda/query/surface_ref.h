@@ -11,18 +11,20 @@
 
 namespace ist::gpu {
 
-/// A node of a surface and its level in one word; level 0: a block of triangles, above it: blocks
-/// of balls.
+/// A node of a surface, its rank and its number, in one word. Of rank 0 it is a triangle, 16 ·
+/// block
+/// + lane; of rank k + 1 a block of level k: of triangles, and from rank 2 on of balls.
 using SurfaceNode = std::uint32_t;
 constexpr int kSurfaceBits = 28;  ///< of a node's number
-static_assert(kMaxLevels <= 1 << (32 - kSurfaceBits));
+constexpr int kTriangle = 0, kTriangleBlock = 1;
+static_assert(kMaxLevels < 1 << (32 - kSurfaceBits));
 
-IST_HD inline int level_of(SurfaceNode node) { return static_cast<int>(node >> kSurfaceBits); }
+IST_HD inline int rank_of(SurfaceNode node) { return static_cast<int>(node >> kSurfaceBits); }
 IST_HD inline std::uint32_t number_of(SurfaceNode node) {
   return node & ((1u << kSurfaceBits) - 1);
 }
-IST_HD inline SurfaceNode surface_node(int level, std::uint32_t number) {
-  return static_cast<std::uint32_t>(level) << kSurfaceBits | number;
+IST_HD inline SurfaceNode surface_node(int rank, std::uint32_t number) {
+  return static_cast<std::uint32_t>(rank) << kSurfaceBits | number;
 }
 
 /// The field of an asset with its offsets resolved (SurfaceTree, query/asset/surface_tree.h, in
@@ -74,10 +76,11 @@ struct SurfaceRef {
     return ref;
   }
 
-  IST_HD SurfaceNode root_node() const { return surface_node(top, 0); }
+  IST_HD SurfaceNode root_node() const { return surface_node(top + 1, 0); }
 
+  /// Of a node that is no triangle.
   IST_HD NodeBall ball(SurfaceNode node) const {
-    const int above = level_of(node) + 1;
+    const int above = rank_of(node);
     if (above > top) return {{root[0], root[1], root[2]}, root[3]};
     return lane_ball(above, number_of(node) / kWidth, number_of(node) % kWidth);
   }

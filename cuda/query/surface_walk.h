@@ -29,10 +29,9 @@ struct ProbeFrame {
 };
 
 struct SurfaceMemory : ProbeMemory {
-  int wanted[kMaxLevels];  ///< level down to which the list of a node of a level is opened
+  int wanted[kMaxLevels];  ///< rank down to which the list of a node of a level is opened
   ProbeFrame frame[kMaxLevels];
   SurfaceNode open[kOpenRoom];
-  SurfaceNode ready[kPairsAtOnce];
   DiscMemory discs;
 };
 
@@ -59,24 +58,35 @@ class SurfaceSource {
       for (int lane = team.lane(); lane < round_up(Team::kWidth); lane += Team::kWidth) {
         const bool there = lane < static_cast<int>(kWidth);
         const std::uint32_t child = number_of(node) * kWidth + static_cast<std::uint32_t>(lane);
-        if (level_of(node) == 0) {
+        if (rank_of(node) == kTriangleBlock) {
           visit(there, TriangleId{there ? child : 0, 0});
           continue;
         }
-        const bool near = there && near_ball(level_of(node), number_of(node), lane, x, reach);
+        const bool near = there && comes_near(node, lane, x, reach);
         int total = 0;
         const int place = size + team.exclusive_count(near, total);
-        if (near) room_[place] = surface_node(level_of(node) - 1, child);
+        if (near) room_[place] = surface_node(rank_of(node) - 1, child);
         size += total;
       }
       team.sync();
     }
   }
 
-  IST_HD bool near_ball(int level, std::uint32_t block, int lane, const double (&x)[3],
-                        double reach) const {
-    const NodeBall ball = surface_.lane_ball(level, block, static_cast<std::uint32_t>(lane));
+  /// Whether a child of a node, in a lane of its block, comes near a ball.
+  IST_HD bool comes_near(SurfaceNode node, int lane, const double (&x)[3], double reach) const {
+    const auto at = static_cast<std::uint32_t>(lane);
+    if (rank_of(node) == kTriangleBlock) {
+      float seen[SeenTriangles::kNumbers];
+      return SeenTriangles::see(plane(number_of(node) * kWidth + at), x, reach, seen);
+    }
+    const NodeBall ball = surface_.lane_ball(rank_of(node) - 1, number_of(node), at);
     return ball.r > 0 && balls_meet(ball, x, reach);
+  }
+
+  IST_HD TrianglePlane plane(std::uint32_t triangle) const {
+    double c[3][3];
+    surface_.corners(triangle, c);
+    return TrianglePlane(c);
   }
 
   IST_HD static bool balls_meet(const NodeBall& ball, const double (&x)[3], double reach) {
@@ -192,8 +202,8 @@ class SurfaceWalk {
     const double scale = m_.place.a_from_b.scale, cube = scale * scale * scale;
     for (int k = 0; k <= m_.tree.top; ++k) {
       int at = surface.top;
-      while (at > 0 && (k == 0 || surface.cube[at] >= cube * m_.tree.cube[k + 1])) --at;
-      m_.wanted[k] = at;
+      while (at > 0 && surface.cube[at] >= cube * m_.tree.cube[k + 1]) --at;
+      m_.wanted[k] = at > 0 ? at + 1 : kTriangle;
     }
   }
 
@@ -233,11 +243,13 @@ class SurfaceWalk {
     int count = 0;
     while (size > 0) {
       int ready = 0;
-      size = open_two(size, count, m_.wanted[level], centre, reach, frame.list + count, ready);
+      size = open_two(size, size < kPairsAtOnce ? size : kPairsAtOnce, count, m_.wanted[level],
+                      centre, reach, frame.list + count, ready);
       count += ready;
     }
     if (team_.lane() == 0) frame.count = count;
     sums_.visits += static_cast<std::uint32_t>(count);
+    const bool triangles = stage(frame, count, centre, reach);
     for (int i = 0; i < kItemsALane; ++i) {
       const int half = item(i) / static_cast<int>(kWidth),
                 lane = item(i) % static_cast<int>(kWidth);
@@ -245,23 +257,77 @@ class SurfaceWalk {
       std::uint32_t near = 0;
       if (place_ball(m_, level, number, lane, x, r))
         for (int k = half; k < count; k += 2)
-          near |= SurfaceSource::balls_meet(m_.field.mesh.ball(frame.list[k]), x, r * (1 + kMoved))
-                      ? 1u << k
-                      : 0;
+          near |= listed_meets(frame, k, x, r * (1 + kMoved), centre, reach) ? 1u << k : 0;
       frame.near[half][lane] = near;
     }
     team_.sync();
+    settle(frame, level, count, triangles);
+  }
+
+  /// Readies what is listed of triangles to be met by the children; whether all of it is.
+  IST_HD bool stage(const ProbeFrame& frame, int count, const double (&centre)[3], double reach) {
+    bool other = false;
+    for (int k = team_.lane(); k < count; k += Team::kWidth) {
+      other = other || rank_of(frame.list[k]) != kTriangle;
+      if (rank_of(frame.list[k]) != kTriangle) continue;
+      float seen[SeenTriangles::kNumbers] = {};
+      SeenTriangles::see(source_.plane(number_of(frame.list[k])), centre, 2 * reach, seen);
+      m_.discs.seen_from_block.set(k, seen);
+    }
+    team_.sync();
+    return !team_.any(other);
+  }
+
+  IST_HD bool listed_meets(const ProbeFrame& frame, int k, const double (&x)[3], double r,
+                           const double (&centre)[3], double reach) const {
+    if (rank_of(frame.list[k]) != kTriangle)
+      return SurfaceSource::balls_meet(m_.field.mesh.ball(frame.list[k]), x, r);
+    return m_.discs.seen_from_block.meets(k, x, r, centre, 2 * reach);
+  }
+
+  /// Adds the children that no surface comes near and that are inside. Where there are but few
+  /// triangles, all are told from one of them.
+  IST_HD void settle(const ProbeFrame& frame, int level, int count, bool triangles) {
+    int alone_total = 0, first_lane = -1;
     for (int i = 0; i < kItemsALane; ++i) {
-      const int lane = item(i) % static_cast<int>(kWidth);
-      double x[3] = {0, 0, 0}, r = 0;
-      const bool alone = item(i) < static_cast<int>(kWidth) &&
-                         (frame.near[0][lane] | frame.near[1][lane]) == 0 &&
-                         place_ball(m_, level, number, lane, x, r);
-      if (!inside_surface(team_, m_.field.mesh, alone, x)) continue;
-      const std::uint32_t child = number * kWidth + static_cast<std::uint32_t>(lane);
+      int total = 0;
+      double x[3], r;
+      const int lane = team_.first(alone_child(frame, level, item(i), x, r), total);
+      if (total > 0 && first_lane < 0) first_lane = i * Team::kWidth + lane;
+      alone_total += total;
+    }
+    if (alone_total == 0) return;
+    const bool from_one = triangles && count <= alone_total;
+    double start[3] = {0, 0, 0}, r;
+    if (from_one) place_ball(m_, level, frame.block, first_lane, start, r);
+    const bool first_inside =
+        from_one && team_.any(inside_surface(team_, m_.field.mesh, team_.lane() == 0, start));
+    for (int i = 0; i < kItemsALane; ++i) {
+      double x[3] = {0, 0, 0};
+      const bool alone = alone_child(frame, level, item(i), x, r);
+      bool inside = first_inside;
+      if (!from_one) inside = inside_surface(team_, m_.field.mesh, alone, x);
+      if (!alone) continue;
+      if (from_one && item(i) != first_lane) {
+        const double way[3] = {x[0] - start[0], x[1] - start[1], x[2] - start[2]};
+        for (int k = 0; k < count; ++k) {
+          double c[3][3];
+          m_.field.mesh.corners(number_of(frame.list[k]), c);
+          if (steps_through(start, way, c)) inside = !inside;
+        }
+      }
+      if (!inside) continue;
+      const std::uint32_t child = frame.block * kWidth + static_cast<std::uint32_t>(item(i));
       sums_.add_whole(m_.sums.level[level - 1][child], m_.sums.spheres_below(level - 1, child),
                       m_.place.a_from_b);
     }
+  }
+
+  /// Whether an item is a child that nothing comes near; its ball.
+  IST_HD bool alone_child(const ProbeFrame& frame, int level, int child, double (&x)[3],
+                          double& r) const {
+    return child < static_cast<int>(kWidth) && (frame.near[0][child] | frame.near[1][child]) == 0 &&
+           place_ball(m_, level, frame.block, child, x, r);
   }
 
   /// Puts the spheres of a leaf block together with the triangles below m_.open[0 … size).
@@ -275,34 +341,45 @@ class SurfaceWalk {
     }
     team_.sync();
     while (size > 0) {
-      int ready = 0;
-      size = open_two(size, -kOpenRoom, 0, centre, reach, m_.ready, ready);
-      if (ready == 0) continue;
+      const int rank = rank_of(m_.open[size - 1]);
+      const int most = rank == kTriangle ? kStaged : kPairsAtOnce;
+      int have = 1;  // nodes of a kind, from the top
+      while (have < most && have < size && alike(rank, rank_of(m_.open[size - 1 - have]))) ++have;
+      if (rank > kTriangleBlock) {
+        int ready = 0;
+        size = open_two(size, have, -kOpenRoom, kTriangleBlock, centre, reach, nullptr, ready);
+        continue;
+      }
+      const int each = rank == kTriangle ? 1 : static_cast<int>(kWidth);
       discs_.meet(slot, [&](int k, TriangleId& id) {
-        if (k / static_cast<int>(kWidth) >= ready) return false;
-        id = {number_of(m_.ready[k / static_cast<int>(kWidth)]) * kWidth +
-                  static_cast<std::uint32_t>(k) % kWidth,
+        if (k >= have * each) return false;
+        id = {number_of(m_.open[size - 1 - k / each]) * static_cast<std::uint32_t>(each) +
+                  static_cast<std::uint32_t>(k % each),
               0};
         return true;
       });
+      size -= have;
     }
   }
 
-  /// Takes two of m_.open[0 … size): what is at the wanted level is `ready`, of others the children
-  /// that come near take their places. Returns how many there are now. Where with `count` they
-  /// would be more than a list holds, nodes stay as they are and are ready.
-  IST_HD int open_two(int size, int count, int wanted, const double (&centre)[3], double reach,
-                      SurfaceNode* to, int& ready) {
-    const int have = size < kPairsAtOnce ? size : kPairsAtOnce;
+  IST_HD static bool alike(int rank, int other) {
+    return rank > kTriangleBlock ? other > kTriangleBlock : rank == other;
+  }
+
+  /// Takes `have` of m_.open[0 … size), no more than two: what is of the wanted rank is `ready`, of
+  /// others the children that come near take their places. Returns how many there are now. Where
+  /// with `count` they would be more than a list holds, nodes stay as they are and are ready.
+  IST_HD int open_two(int size, int have, int count, int wanted, const double (&centre)[3],
+                      double reach, SurfaceNode* to, int& ready) {
     SurfaceNode node[kItemsALane];
     bool near[kItemsALane];
     int more = 0;
     for (int i = 0; i < kItemsALane; ++i) {
       const int half = item(i) / static_cast<int>(kWidth);
       node[i] = half < have ? m_.open[size - 1 - half] : 0;
-      near[i] = half < have && level_of(node[i]) > wanted &&
-                source_.near_ball(level_of(node[i]), number_of(node[i]),
-                                  item(i) % static_cast<int>(kWidth), centre, reach * (1 + kMoved));
+      near[i] = half < have && rank_of(node[i]) > wanted &&
+                source_.comes_near(node[i], item(i) % static_cast<int>(kWidth), centre,
+                                   reach * (1 + kMoved));
       int total = 0;
       team_.exclusive_count(near[i], total);
       more += total;
@@ -314,7 +391,7 @@ class SurfaceWalk {
     for (int i = 0; i < kItemsALane; ++i) {
       const int half = item(i) / static_cast<int>(kWidth);
       const bool stays = half < have && item(i) % static_cast<int>(kWidth) == 0 &&
-                         (!fits || level_of(node[i]) <= wanted);
+                         (!fits || rank_of(node[i]) <= wanted);
       int total = 0;
       int place = ready + team_.exclusive_count(stays, total);
       if (stays) to[place] = node[i];
@@ -322,8 +399,8 @@ class SurfaceWalk {
       place = size + team_.exclusive_count(near[i] && fits, total);
       if (near[i] && fits)
         m_.open[place] =
-            surface_node(level_of(node[i]) - 1, number_of(node[i]) * kWidth +
-                                                    static_cast<std::uint32_t>(item(i)) % kWidth);
+            surface_node(rank_of(node[i]) - 1, number_of(node[i]) * kWidth +
+                                                   static_cast<std::uint32_t>(item(i)) % kWidth);
       size += total;
     }
     team_.sync();
