@@ -22,14 +22,14 @@ struct LensBall {
 };
 
 /// Adds the lens of ball A at `lever` and ball B at `apart` from it, lengths times `unit`; false if
-/// they do not meet.
+/// they do not meet. Centres no farther apart than `blur`, their rounding, are one: alike balls
+/// then push nowhere, as on the CPU.
 ///
 /// What cancels is taken in double, as products of sums: how far the balls reach into each other,
 /// and how far the smaller reaches out of the larger. The rest, lens() of query/kernel/lens.h, then
 /// keeps its digits in float, grazing or not.
-IST_HD inline bool add_lens(const LensBall& lever, const LensBall& apart, double unit,
+IST_HD inline bool add_lens(const LensBall& lever, const LensBall& apart, double unit, double blur,
                             float (&sum)[kTerms]) {
-  constexpr float kTiny = 1e-18f;
   const double d2 = std::fma(apart.at[0], apart.at[0],
                              std::fma(apart.at[1], apart.at[1], apart.at[2] * apart.at[2]));
   const double reach = lever.r + apart.r, rest = lever.r - apart.r;
@@ -41,7 +41,7 @@ IST_HD inline bool add_lens(const LensBall& lever, const LensBall& apart, double
   const auto a = static_cast<float>((a_is_larger ? lever.r : apart.r) * unit);
   const auto b = static_cast<float>((a_is_larger ? apart.r : lever.r) * unit);
   const float d = std::sqrt(static_cast<float>(d2 * unit2));
-  const bool holds = out <= 0 || d < kTiny;
+  const bool holds = out <= 0 || d2 <= blur * blur;
   const float e = holds ? 1.0f : static_cast<float>((a_is_larger ? rest : -rest) * unit) + d;
   const float inverse = 0.5f / (holds ? 1.0f : d);
   const float g = static_cast<float>(into * unit2) / ((a + b) + d) * inverse;

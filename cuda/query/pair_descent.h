@@ -26,6 +26,9 @@ class PairDescent {
                       static_cast<float>(map.m[3 * i + 2]), static_cast<float>(map.scale)};
       m_.to_single = m_.steps.level_a[m_.steps.count] == kSphereLevel ||
                      m_.steps.level_b[m_.steps.count] == kSphereLevel;
+      m_.blur = 8;
+      for (const double t : map.t) m_.blur += t < 0 ? -t : t;
+      m_.blur *= 1e-15;
       const double b = m_.tree[1].root[3] * m_.place.a_from_b.scale;
       m_.unit = std::ldexp(1.0, -std::ilogb(b < m_.tree[0].root[3] ? b : m_.tree[0].root[3]));
     }
@@ -387,7 +390,7 @@ class PairDescent {
         const LensBall a = seen(true, m_.list_a[k]);
         LensBall b = seen(false, m_.list_b[k]);
         for (int i = 0; i < 3; ++i) b.at[i] -= a.at[i];
-        meets = add_lens(a, b, m_.unit, sum_);
+        meets = add_lens(a, b, m_.unit, m_.blur, sum_);
       }
       int total = 0;
       team_.exclusive_count(meets, total);

@@ -60,6 +60,7 @@ struct PairMemory {
   /// Lengths are summed times this power of two, about the smaller tree's size to 1: their powers
   /// then fit into floats.
   double unit;
+  double blur;                        ///< by how much rounding may move a centre, A's unit frame
   bool to_single;                     ///< some leaves are single spheres
   LensTotals totals;                  ///< of the task in hand
   LensTotals sum;                     ///< of those that are done

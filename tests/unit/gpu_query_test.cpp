@@ -60,7 +60,7 @@ TEST(GpuQuery, ALensIsTheCpusInDouble) {
                                       : random.uniform(0, 1.2 * (ra + rb));
     const double unit = std::ldexp(1.0, -std::ilogb(std::min(ra, rb)));
     float sum[gpu::kTerms] = {};
-    const bool met = gpu::add_lens({{0.5, -1, 2}, ra}, {{d, 0, 0}, rb}, unit, sum);
+    const bool met = gpu::add_lens({{0.5, -1, 2}, ra}, {{d, 0, 0}, rb}, unit, 1e-15, sum);
     const Lens<double> cpu = lens(ra, rb, d);
     EXPECT_EQ(met, d < ra + rb);
     const double caps = cpu.cap_a + cpu.cap_b, unit2 = unit * unit, unit3 = unit2 * unit;
