@@ -9,7 +9,7 @@
 #include <limits>
 #include <span>
 
-#include "bake/field/slab_proof.h"
+#include "bake/field/hull_cuts.h"
 #include "mesh/exact_closest_point.h"
 #include "mesh/triangle_frame.h"
 
@@ -48,7 +48,7 @@ struct Part {
 /// The field's surface within a bound of the mesh's.
 class FieldNearMesh {
  public:
-  explicit FieldNearMesh(const MeshView& mesh) : mesh_(mesh) {}
+  explicit FieldNearMesh(const MeshView& mesh) : mesh_(mesh), cuts_(mesh) {}
 
   double distance(const Point& p) const {
     return exact_closest_point(mesh_, {p[0], p[1], p[2]}, kFar).distance;
@@ -67,7 +67,8 @@ class FieldNearMesh {
       if (whole <= target) return whole;
     }
     if (radius <= 0.1 * target) return closest.distance + radius;
-    if (radius > target && is_in_slab(part, target)) return target;
+    if (radius > target && cuts_.is_within(Hull(part.corner), {}, target, {c, closest.distance}))
+      return target;
     target = std::max(target, kSlack * closest.distance);
     // Halved across the longest side.
     int from = 0;
@@ -90,12 +91,6 @@ class FieldNearMesh {
     return between(part.corner[from], part.corner[(from + 1) % 3]);
   }
 
-  bool is_in_slab(const Part& part, double distance) const {
-    const TriangleFrame<double> frame =
-        make_triangle_frame(part.corner[0].data(), part.corner[1].data(), part.corner[2].data());
-    return within_slab(mesh_, part.corner, frame.n, distance);
-  }
-
   /// The distance to a triangle is convex: it is largest at a corner.
   double from_triangle(const Part& part, std::uint32_t triangle) const {
     const std::uint32_t* t = mesh_.triangles + 3 * std::size_t{triangle};
@@ -108,6 +103,7 @@ class FieldNearMesh {
   }
 
   const MeshView& mesh_;
+  const HullCuts cuts_;
 };
 
 Part part_of(const FieldMesh& field, std::size_t triangle) {
