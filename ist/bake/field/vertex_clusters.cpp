@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "bake/field/cell_numbers.h"
@@ -142,8 +143,9 @@ void VertexClusters::settle(Level& level, std::uint32_t cluster, double toleranc
   off = farthest_plane(planes, x);
 }
 
-const std::vector<std::uint32_t>& VertexClusters::chosen(double tolerance) {
-  if (tolerance == chosen_within_) return chosen_;
+const std::vector<std::uint32_t>* VertexClusters::chosen(double tolerance, std::size_t most) {
+  if (tolerance == chosen_within_) return &chosen_;
+  chosen_within_ = -1;
   chosen_.assign(mesh_.vertex_count, kOpen);
   for (;;) {
     tbb::concurrent_vector<Doubt> doubts;
@@ -166,12 +168,16 @@ const std::vector<std::uint32_t>& VertexClusters::chosen(double tolerance) {
       chosen_[v] = static_cast<std::uint32_t>(before + v);
     });
     if (doubts.empty()) break;
+    if (doubts.size() > most) {  // in each of them there is one at least, or nearly
+      for (const Doubt& doubt : doubts) levels_[doubt.level].known[doubt.cluster] = kUnknown;
+      return nullptr;
+    }
     tbb::parallel_for(std::size_t{0}, doubts.size(), [&](std::size_t i) {
       settle(levels_[doubts[i].level], doubts[i].cluster, tolerance);
     });
   }
   chosen_within_ = tolerance;
-  return chosen_;
+  return &chosen_;
 }
 
 void VertexClusters::raise(const std::vector<double>& distance_of_cluster) {
@@ -202,12 +208,15 @@ std::vector<FieldMesh::Triangle> VertexClusters::spanning(
   return triangles;
 }
 
-std::size_t VertexClusters::triangles_within(double tolerance) {
-  return reduced(spanning(chosen(tolerance))).size();
+std::size_t VertexClusters::triangles_within(double tolerance, std::size_t enough) {
+  // Clusters are half as many as triangles.
+  const std::vector<std::uint32_t>* const cluster_of = chosen(tolerance, enough);
+  return cluster_of == nullptr ? enough + 1 : reduced(spanning(*cluster_of)).size();
 }
 
 Clustered VertexClusters::within(double tolerance) {
-  const std::vector<std::uint32_t>& cluster_of = chosen(tolerance);
+  const std::vector<std::uint32_t>& cluster_of =
+      *chosen(tolerance, std::numeric_limits<std::size_t>::max());
   std::size_t names = mesh_.vertex_count;
   for (const Level& level : levels_) names += level.place.size();
   // Only clusters that are chosen become vertices, in the order of their first vertices.
