@@ -130,7 +130,7 @@ std::optional<Approximation> simplified(SolidSurface& surface, double max_error,
   VertexClusters clusters(surface.arrays(), 8 * cell, levels);
   if (max_error > 0) return clustered_within(clusters, surface, max_error, stop);
   KnownDistances distances(surface.view());
-  double guess = cell / 32;
+  double guess = cell / 4;  // rather too coarse: fine clusters are many
   return clustered(clusters, surface, distances, stop, [&] {
     return guess = tolerance_for(clusters, kFieldTriangles, guess, kFinest);
   });

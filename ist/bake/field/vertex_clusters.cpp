@@ -55,6 +55,26 @@ AreaVector area_vector(const MeshView& mesh, std::size_t triangle) {
   return area;
 }
 
+/// Sorts numbers; `work` is overwritten.
+void sort_numbers(std::vector<std::uint32_t>& numbers, std::vector<std::uint32_t>& work) {
+  constexpr std::size_t kFew = 256;  // are sorted faster by comparing
+  if (numbers.size() < kFew) {
+    std::sort(numbers.begin(), numbers.end());
+    return;
+  }
+  const auto [least, most] = std::minmax_element(numbers.begin(), numbers.end());
+  const std::uint32_t from = *least, range = *most - *least;
+  work.resize(numbers.size());
+  for (int shift = 0; shift < 32 && range >> shift != 0; shift += 8) {
+    std::array<std::uint32_t, 257> place = {};
+    const auto digit = [&](std::uint32_t number) { return (number - from) >> shift & 0xff; };
+    for (const std::uint32_t number : numbers) ++place[digit(number) + 1];
+    std::partial_sum(place.begin(), place.end(), place.begin());
+    for (const std::uint32_t number : numbers) work[place[digit(number)]++] = number;
+    numbers.swap(work);
+  }
+}
+
 void lower(std::uint32_t& value, std::uint32_t to) {
   const std::atomic_ref<std::uint32_t> shared(value);
   std::uint32_t was = shared.load(std::memory_order_relaxed);
@@ -120,19 +140,18 @@ void VertexClusters::settle(Level& level, std::uint32_t cluster, double toleranc
   level.known[cluster] = off > tolerance ? kUnknown : kKnown;
   if (off > tolerance) return;
   // What is summed is summed in the order of corners.
-  thread_local std::vector<std::uint64_t> corners;
+  thread_local std::vector<std::uint32_t> corners, work;
   corners.clear();
   for (const std::uint32_t v : vertices)
-    for (const std::uint64_t corner : corners_[v]) {
+    for (const std::uint32_t corner : corners_[v]) {
       __builtin_prefetch(&areas_[corner / 3]);
-      corners.push_back(corner << 32 | v);
+      corners.push_back(corner);
     }
   if (corners.empty()) return;
-  std::sort(corners.begin(), corners.end());
+  sort_numbers(corners, work);
   planes.clear();
-  for (const std::uint64_t at : corners)
-    planes.push_back(
-        plane_of(static_cast<std::uint32_t>(at >> 32), static_cast<std::uint32_t>(at)));
+  for (const std::uint32_t corner : corners)
+    planes.push_back(plane_of(corner, mesh_.triangles[corner]));
   std::array<double, 3> x = placed(planes);
   const CellNumbers::Cell at = cell_of(mesh_.vertices + 3 * std::size_t{vertices[0]}, level.cell);
   for (std::size_t k = 0; k < 3; ++k) {
