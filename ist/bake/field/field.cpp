@@ -26,7 +26,7 @@ namespace {
 constexpr double kOverlapWidth = 0.01;
 
 /// Where no error is asked for, triangles are merged within this at least, unit frame: the proof of
-/// a finer surface takes ten times as long, on flat faces that are cut into many triangles.
+/// a finer surface takes up to twice as long, on flat faces that are cut into many triangles.
 constexpr double kFinest = 1e-5;
 
 /// A surface and how far it is from the solid's, unit frame.
