@@ -1,12 +1,12 @@
 #include "bake/field/cell_entries.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <numeric>
 
 #include "bake/field/cell_overlap.h"
 
@@ -186,23 +186,33 @@ std::optional<EntryCounts> count_entries(const BrickGrid& grid,
   return counts;
 }
 
+// Bricks first, then what is in them: far less to sort.
 std::optional<std::vector<CellEntry>> find_entries(const BrickGrid& grid,
                                                    const std::vector<SurfaceBlock>& blocks,
                                                    std::size_t most) {
   std::vector<std::vector<CellEntry>> of_block(blocks.size());
+  std::vector<std::uint32_t> place(static_cast<std::size_t>(grid.brick_places()) + 1);
+  constexpr auto kRelaxed = std::memory_order_relaxed;
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
     for (std::uint32_t lane = 0; lane < blocks[b].triangles && of_block[b].size() <= most; ++lane)
       for_cells_of(grid, blocks[b], lane, [&](std::uint64_t cell) {
         of_block[b].push_back({cell, static_cast<std::uint32_t>(kWidth * b + lane)});
+        std::atomic_ref(place[cell / 64 + 1]).fetch_add(1, kRelaxed);
       });
   });
   std::size_t count = 0;
   for (const auto& some : of_block) count += some.size();
   if (count > most) return std::nullopt;
-  std::vector<CellEntry> entries;
-  entries.reserve(count);
-  for (const auto& some : of_block) entries.insert(entries.end(), some.begin(), some.end());
-  tbb::parallel_sort(entries.begin(), entries.end());
+  std::partial_sum(place.begin(), place.end(), place.begin());
+  std::vector<CellEntry> entries(count);
+  std::vector<std::uint32_t> next(place.begin(), place.end() - 1);
+  tbb::parallel_for(std::size_t{0}, of_block.size(), [&](std::size_t b) {
+    for (const CellEntry& entry : of_block[b])
+      entries[std::atomic_ref(next[entry.cell / 64]).fetch_add(1, kRelaxed)] = entry;
+  });
+  tbb::parallel_for(std::size_t{0}, next.size(), [&](std::size_t brick) {
+    std::sort(entries.begin() + place[brick], entries.begin() + place[brick + 1]);
+  });
   return entries;
 }
 

@@ -26,7 +26,7 @@ namespace {
 constexpr double kOverlapWidth = 0.01;
 
 /// Where no error is asked for, triangles are merged within this at least, unit frame: the proof of
-/// a finer surface takes ten times as long, on flat faces that are cut into many triangles.
+/// a finer surface takes up to twice as long, on flat faces that are cut into many triangles.
 constexpr double kFinest = 1e-5;
 
 /// A surface and how far it is from the solid's, unit frame.
@@ -56,24 +56,25 @@ Approximation own_triangles(const MeshView& surface) {
   return out;
 }
 
-/// The least tolerance found that leaves at most, and nearly, so many triangles.
-double tolerance_for(VertexClusters& clusters, std::size_t triangles, double guess) {
+/// The least tolerance found that leaves at most, and nearly, so many triangles; `least` where that
+/// is more.
+double tolerance_for(VertexClusters& clusters, std::size_t triangles, double guess, double least) {
   double fine = 0, coarse = HUGE_VAL;
   for (int attempt = 0; attempt < 16; ++attempt) {
-    const std::size_t found = clusters.triangles_within(guess);
+    const std::size_t found = clusters.triangles_within(guess, triangles);
     (found <= triangles ? coarse : fine) = guess;
-    if (found <= triangles && found > triangles - triangles / 32) break;
+    if (found <= triangles && (found > triangles - triangles / 32 || guess <= least)) break;
     guess = coarse == HUGE_VAL ? 2 * fine : fine == 0 ? coarse / 2 : std::sqrt(fine * coarse);
   }
-  return coarse;
+  return std::max(least, coarse);
 }
 
 /// Clusters within a tolerance, or nearly: those that turn out to be further off are divided, a few
 /// times over, and so are those for which nothing better can be proven. `choose`: the tolerance for
 /// the clusters as they are.
 template <class Choose>
-Approximation clustered(VertexClusters& clusters, SolidSurface& surface, const WorkStop& stop,
-                        const Choose& choose) {
+Approximation clustered(VertexClusters& clusters, SolidSurface& surface, KnownDistances& distances,
+                        const WorkStop& stop, const Choose& choose) {
   constexpr int kRounds = 5, kProofs = 2;
   constexpr double kLoose = 3;  // of what is seen: proven more, it is worth another proof
   Approximation best{{}, HUGE_VAL};
@@ -84,7 +85,7 @@ Approximation clustered(VertexClusters& clusters, SolidSurface& surface, const W
     Clustered found = clusters.within(tolerance);
     if (found.mesh.triangles.empty()) return best;
     const FieldHierarchy hierarchy(found.mesh);
-    FieldError error(surface.view(), found, hierarchy, stop);
+    FieldError error(surface.view(), distances, found, hierarchy, stop);
     std::vector<double> off = error.seen(tolerance);
     const double seen = *std::max_element(off.begin(), off.end());
     if (seen <= 1.25 * tolerance || round >= kRounds) {
@@ -102,9 +103,10 @@ Approximation clustered(VertexClusters& clusters, SolidSurface& surface, const W
 std::optional<Approximation> clustered_within(VertexClusters& clusters, SolidSurface& surface,
                                               double max_error, const WorkStop& stop) {
   std::optional<Approximation> best;
+  KnownDistances distances(surface.view());
   double fine = 0, coarse = HUGE_VAL, tolerance = max_error / 2;
   for (int attempt = 0; attempt < 8 && coarse > 1.05 * fine; ++attempt) {
-    Approximation tried = clustered(clusters, surface, stop, [&] { return tolerance; });
+    Approximation tried = clustered(clusters, surface, distances, stop, [&] { return tolerance; });
     const double ratio = max_error / tried.error;
     if (tried.error <= max_error) {
       fine = tolerance;
@@ -127,9 +129,10 @@ std::optional<Approximation> simplified(SolidSurface& surface, double max_error,
   const int levels = max_error > 0 ? 10 : 7;
   VertexClusters clusters(surface.arrays(), 8 * cell, levels);
   if (max_error > 0) return clustered_within(clusters, surface, max_error, stop);
-  double guess = cell / 32;
-  return clustered(clusters, surface, stop, [&] {
-    return guess = std::max(kFinest, tolerance_for(clusters, kFieldTriangles, guess));
+  KnownDistances distances(surface.view());
+  double guess = cell / 4;  // rather too coarse: fine clusters are many
+  return clustered(clusters, surface, distances, stop, [&] {
+    return guess = tolerance_for(clusters, kFieldTriangles, guess, kFinest);
   });
 }
 

@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <span>
 
-#include "bake/field/slab_proof.h"
+#include "bake/field/hull_cuts.h"
 #include "mesh/exact_closest_point.h"
 #include "mesh/triangle_frame.h"
 
@@ -17,6 +18,7 @@ namespace ist {
 namespace {
 
 constexpr double kRounding = 1e-12;  // of a distance in the unit frame, with room
+constexpr double kFar = 1e3;         // further than anything in the unit frame
 constexpr double kSlack = 1.25;      // of the bound that is tried over what is seen at samples
 
 using Point = std::array<double, 3>;
@@ -48,11 +50,7 @@ struct Part {
 /// The field's surface within a bound of the mesh's.
 class FieldNearMesh {
  public:
-  explicit FieldNearMesh(const MeshView& mesh) : mesh_(mesh) {}
-
-  double distance(const Point& p) const {
-    return exact_closest_point(mesh_, {p[0], p[1], p[2]}, kFar).distance;
-  }
+  explicit FieldNearMesh(const MeshView& mesh) : mesh_(mesh), cuts_(mesh) {}
 
   /// A bound on the distance of all points of the part, at most `target` where that can be shown.
   /// `reach`: no point of the mesh nearest to the centre is further than this.
@@ -67,7 +65,8 @@ class FieldNearMesh {
       if (whole <= target) return whole;
     }
     if (radius <= 0.1 * target) return closest.distance + radius;
-    if (radius > target && is_in_slab(part, target)) return target;
+    if (radius > target && cuts_.is_within(Hull(part.corner), {}, target, {c, closest.distance}))
+      return target;
     target = std::max(target, kSlack * closest.distance);
     // Halved across the longest side.
     int from = 0;
@@ -84,16 +83,8 @@ class FieldNearMesh {
   }
 
  private:
-  static constexpr double kFar = 1e3;
-
   static double side(const Part& part, int from) {
     return between(part.corner[from], part.corner[(from + 1) % 3]);
-  }
-
-  bool is_in_slab(const Part& part, double distance) const {
-    const TriangleFrame<double> frame =
-        make_triangle_frame(part.corner[0].data(), part.corner[1].data(), part.corner[2].data());
-    return within_slab(mesh_, part.corner, frame.n, distance);
   }
 
   /// The distance to a triangle is convex: it is largest at a corner.
@@ -108,6 +99,7 @@ class FieldNearMesh {
   }
 
   const MeshView& mesh_;
+  const HullCuts cuts_;
 };
 
 Part part_of(const FieldMesh& field, std::size_t triangle) {
@@ -126,17 +118,32 @@ void raise(const std::atomic_ref<double>& value, double to) {
 
 }  // namespace
 
-FieldError::FieldError(const MeshView& mesh, const Clustered& field,
+std::size_t KnownDistances::Hash::operator()(const Point& p) const {
+  std::uint64_t hash = 0;
+  for (const double x : p) {
+    hash = (hash ^ std::bit_cast<std::uint64_t>(x)) * 0x9E3779B97F4A7C15u;
+    hash ^= hash >> 32;
+  }
+  return hash;
+}
+
+double KnownDistances::of(const Point& p) {
+  if (const auto known = known_.find(p); known != known_.end()) return known->second;
+  const double distance = exact_closest_point(mesh_, {p[0], p[1], p[2]}, kFar).distance;
+  known_.emplace(p, distance);
+  return distance;
+}
+
+FieldError::FieldError(const MeshView& mesh, KnownDistances& from_mesh, const Clustered& field,
                        const FieldHierarchy& hierarchy, const WorkStop& stop)
     : mesh_(mesh),
       field_(field),
       stop_(stop),
       swept_(mesh, field, hierarchy),
       middle_(field.mesh.triangles.size()) {
-  const FieldNearMesh near_mesh(mesh);
   tbb::parallel_for(std::size_t{0}, middle_.size(), [&](std::size_t t) {
     stop_.look();
-    middle_[t] = near_mesh.distance(part_of(field.mesh, t).centre());
+    middle_[t] = from_mesh.of(part_of(field.mesh, t).centre());
   });
 }
 

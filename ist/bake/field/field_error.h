@@ -1,6 +1,9 @@
 #pragma once
 
-#include <cstdint>
+#include <tbb/concurrent_unordered_map.h>
+
+#include <array>
+#include <cstddef>
 #include <vector>
 
 #include "bake/field/field_hierarchy.h"
@@ -11,13 +14,30 @@
 
 namespace ist {
 
+/// Distances of points from a mesh, each found once: most triangles of a field stay as they are
+/// while a few of its clusters are divided. Safe from several threads.
+class KnownDistances {
+ public:
+  /// `mesh` has a hierarchy and must outlive this.
+  explicit KnownDistances(const MeshView& mesh) : mesh_(mesh) {}
+
+  double of(const std::array<double, 3>& p);
+
+ private:
+  struct Hash {
+    std::size_t operator()(const std::array<double, 3>& p) const;
+  };
+  const MeshView& mesh_;
+  tbb::concurrent_unordered_map<std::array<double, 3>, double, Hash> known_;
+};
+
 /// How a field's surface differs from the mesh that it is the image of. Unit frame. Deterministic.
 class FieldError {
  public:
-  /// All must outlive this. `mesh` has a hierarchy, `hierarchy` is that of the field's triangles.
-  /// What is asked of it may be ended by `stop`.
-  FieldError(const MeshView& mesh, const Clustered& field, const FieldHierarchy& hierarchy,
-             const WorkStop& stop);
+  /// All must outlive this. `mesh` has a hierarchy, `hierarchy` is that of the field's triangles,
+  /// `from_mesh` are distances from the mesh. What is asked of it may be ended by `stop`.
+  FieldError(const MeshView& mesh, KnownDistances& from_mesh, const Clustered& field,
+             const FieldHierarchy& hierarchy, const WorkStop& stop);
 
   /// What is seen at samples, by cluster: how far a vertex of it is from the field, or the middle
   /// of a field's triangle about its place from the mesh. Exact where above `enough`.

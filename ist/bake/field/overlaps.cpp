@@ -109,11 +109,13 @@ double off_boundary(const MeshView& mesh, const Overlaps& overlaps) {
 std::optional<Overlaps> find_overlaps(const MeshSolid& solid) {
   const MeshView& mesh = solid.arrays();
   std::vector<Eigen::Vector3d> vertices(mesh.vertex_count);
-  for (std::size_t v = 0; v < vertices.size(); ++v)
+  tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t v) {
     vertices[v] = Eigen::Map<const Eigen::Vector3d>(mesh.vertices + 3 * v);
+  });
   std::vector<Triangle> triangles(mesh.triangle_count);
-  for (std::size_t t = 0; t < triangles.size(); ++t)
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
     std::copy_n(mesh.triangles + 3 * t, 3, triangles[t].begin());
+  });
   Overlaps out;
   if (solid.meeting_pairs() != nullptr) {
     out.pairs = *solid.meeting_pairs();

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "bake/field/hull.h"
 #include "bake/field/triangles_in_box.h"
 #include "mesh/exact_sign.h"
 #include "mesh/triangle_frame.h"
@@ -20,7 +21,7 @@ constexpr double kRounding = 1e-14;  // of a height in the unit frame, with room
 
 /// A hull moved along a direction.
 struct MovedHull {
-  std::array<Point, 6> corner;
+  std::array<Point, Hull::kMost> corner;
   std::size_t count;
   float low[3], high[3];
   double least, most;  ///< along the direction

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "bake/field/slab_proof.h"
+#include "bake/field/hull.h"
 #include "mesh/exact_closest_point.h"
 
 namespace ist {
@@ -22,6 +22,17 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 double between(const std::array<double, 3>& a, const std::array<double, 3>& b) {
   const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
   return std::sqrt(dot3(d, d));
+}
+
+std::vector<TriangleFrame<double>> frames_of(const MeshView& surface) {
+  std::vector<TriangleFrame<double>> frames(surface.triangle_count);
+  tbb::parallel_for(std::size_t{0}, frames.size(), [&](std::size_t t) {
+    const auto vertex = [&](std::size_t i) {
+      return surface.vertices + 3 * std::size_t{surface.triangles[3 * t + i]};
+    };
+    frames[t] = make_triangle_frame(vertex(0), vertex(1), vertex(2));
+  });
+  return frames;
 }
 
 std::array<double, 3> half_way(const std::array<double, 3>& a, const std::array<double, 3>& b) {
@@ -74,18 +85,11 @@ SweptError::SweptError(const MeshView& mesh, const Clustered& field,
     : mesh_(mesh),
       field_(field),
       hierarchy_(hierarchy),
-      frames_(field.mesh.triangles.size()),
+      cuts_(hierarchy.view(), frames_of(hierarchy.view())),
       first_(field.mesh.vertices.size() + 1),
       around_(3 * field.mesh.triangles.size()),
       near_(mesh.vertex_count, kNoTriangle),
       last_near_(field.vertex_of.size(), kNoTriangle) {
-  const MeshView& view = hierarchy.view();
-  tbb::parallel_for(std::size_t{0}, frames_.size(), [&](std::size_t t) {
-    const auto vertex = [&](std::size_t i) {
-      return view.vertices + 3 * std::size_t{field.mesh.triangles[t][i]};
-    };
-    frames_[t] = make_triangle_frame(vertex(0), vertex(1), vertex(2));
-  });
   for (const FieldMesh::Triangle& t : field.mesh.triangles)
     for (const std::uint32_t v : t) ++first_[v + 1];
   for (std::size_t v = 1; v < first_.size(); ++v) first_[v] += first_[v - 1];
@@ -190,7 +194,8 @@ double SweptError::bound(const Prism& prism, std::span<const std::uint32_t> cand
       }
       if (whole2 <= target2) return std::sqrt(whole2);
     }
-    if (radius > target && within_slab(hierarchy_.view(), prism.corner, frames_[nearest].n, target))
+    if (radius > target &&
+        cuts_.is_within(Hull(prism.corner), candidates, target, {c, std::sqrt(least2)}))
       return target;
   }
   // The field may have another triangle that is nearer.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bake/field/field_hierarchy.h"
+#include "bake/field/hull_cuts.h"
 #include "bake/field/vertex_clusters.h"
 #include "mesh/mesh_view.h"
 #include "mesh/triangle_frame.h"
@@ -44,7 +45,7 @@ class SweptError {
   };
 
   double distance2(std::uint32_t field_triangle, const Point& p) const {
-    return closest_in_frame(frames_[field_triangle], p.data()).distance2;
+    return closest_in_frame(cuts_.frame(field_triangle), p.data()).distance2;
   }
   /// Farthest corner from a triangle, squared; any value > limit2 once one is further. The distance
   /// to a triangle is convex, so that no point of the hull is further.
@@ -60,7 +61,7 @@ class SweptError {
   const MeshView& mesh_;
   const Clustered& field_;
   const FieldHierarchy& hierarchy_;
-  std::vector<TriangleFrame<double>> frames_;  ///< [field triangle]
+  HullCuts cuts_;                              ///< of the field
   std::vector<std::uint32_t> first_, around_;  ///< the triangles around each field vertex
   std::vector<std::uint32_t> near_;       ///< [mesh vertex] a triangle that it is near to, if known
   std::vector<std::uint32_t> last_near_;  ///< [cluster] the last such; a hint alone

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "bake/field/cell_numbers.h"
@@ -52,6 +53,26 @@ AreaVector area_vector(const MeshView& mesh, std::size_t triangle) {
   cross3(u, v, area.n);
   area.length = std::sqrt(dot3(area.n, area.n));
   return area;
+}
+
+/// Sorts numbers; `work` is overwritten.
+void sort_numbers(std::vector<std::uint32_t>& numbers, std::vector<std::uint32_t>& work) {
+  constexpr std::size_t kFew = 256;  // are sorted faster by comparing
+  if (numbers.size() < kFew) {
+    std::sort(numbers.begin(), numbers.end());
+    return;
+  }
+  const auto [least, most] = std::minmax_element(numbers.begin(), numbers.end());
+  const std::uint32_t from = *least, range = *most - *least;
+  work.resize(numbers.size());
+  for (int shift = 0; shift < 32 && range >> shift != 0; shift += 8) {
+    std::array<std::uint32_t, 257> place = {};
+    const auto digit = [&](std::uint32_t number) { return (number - from) >> shift & 0xff; };
+    for (const std::uint32_t number : numbers) ++place[digit(number) + 1];
+    std::partial_sum(place.begin(), place.end(), place.begin());
+    for (const std::uint32_t number : numbers) work[place[digit(number)]++] = number;
+    numbers.swap(work);
+  }
 }
 
 void lower(std::uint32_t& value, std::uint32_t to) {
@@ -119,19 +140,18 @@ void VertexClusters::settle(Level& level, std::uint32_t cluster, double toleranc
   level.known[cluster] = off > tolerance ? kUnknown : kKnown;
   if (off > tolerance) return;
   // What is summed is summed in the order of corners.
-  thread_local std::vector<std::uint64_t> corners;
+  thread_local std::vector<std::uint32_t> corners, work;
   corners.clear();
   for (const std::uint32_t v : vertices)
-    for (const std::uint64_t corner : corners_[v]) {
+    for (const std::uint32_t corner : corners_[v]) {
       __builtin_prefetch(&areas_[corner / 3]);
-      corners.push_back(corner << 32 | v);
+      corners.push_back(corner);
     }
   if (corners.empty()) return;
-  std::sort(corners.begin(), corners.end());
+  sort_numbers(corners, work);
   planes.clear();
-  for (const std::uint64_t at : corners)
-    planes.push_back(
-        plane_of(static_cast<std::uint32_t>(at >> 32), static_cast<std::uint32_t>(at)));
+  for (const std::uint32_t corner : corners)
+    planes.push_back(plane_of(corner, mesh_.triangles[corner]));
   std::array<double, 3> x = placed(planes);
   const CellNumbers::Cell at = cell_of(mesh_.vertices + 3 * std::size_t{vertices[0]}, level.cell);
   for (std::size_t k = 0; k < 3; ++k) {
@@ -142,8 +162,9 @@ void VertexClusters::settle(Level& level, std::uint32_t cluster, double toleranc
   off = farthest_plane(planes, x);
 }
 
-const std::vector<std::uint32_t>& VertexClusters::chosen(double tolerance) {
-  if (tolerance == chosen_within_) return chosen_;
+const std::vector<std::uint32_t>* VertexClusters::chosen(double tolerance, std::size_t most) {
+  if (tolerance == chosen_within_) return &chosen_;
+  chosen_within_ = -1;
   chosen_.assign(mesh_.vertex_count, kOpen);
   for (;;) {
     tbb::concurrent_vector<Doubt> doubts;
@@ -166,12 +187,16 @@ const std::vector<std::uint32_t>& VertexClusters::chosen(double tolerance) {
       chosen_[v] = static_cast<std::uint32_t>(before + v);
     });
     if (doubts.empty()) break;
+    if (doubts.size() > most) {  // in each of them there is one at least, or nearly
+      for (const Doubt& doubt : doubts) levels_[doubt.level].known[doubt.cluster] = kUnknown;
+      return nullptr;
+    }
     tbb::parallel_for(std::size_t{0}, doubts.size(), [&](std::size_t i) {
       settle(levels_[doubts[i].level], doubts[i].cluster, tolerance);
     });
   }
   chosen_within_ = tolerance;
-  return chosen_;
+  return &chosen_;
 }
 
 void VertexClusters::raise(const std::vector<double>& distance_of_cluster) {
@@ -202,12 +227,15 @@ std::vector<FieldMesh::Triangle> VertexClusters::spanning(
   return triangles;
 }
 
-std::size_t VertexClusters::triangles_within(double tolerance) {
-  return reduced(spanning(chosen(tolerance))).size();
+std::size_t VertexClusters::triangles_within(double tolerance, std::size_t enough) {
+  // Clusters are half as many as triangles.
+  const std::vector<std::uint32_t>* const cluster_of = chosen(tolerance, enough);
+  return cluster_of == nullptr ? enough + 1 : reduced(spanning(*cluster_of)).size();
 }
 
 Clustered VertexClusters::within(double tolerance) {
-  const std::vector<std::uint32_t>& cluster_of = chosen(tolerance);
+  const std::vector<std::uint32_t>& cluster_of =
+      *chosen(tolerance, std::numeric_limits<std::size_t>::max());
   std::size_t names = mesh_.vertex_count;
   for (const Level& level : levels_) names += level.place.size();
   // Only clusters that are chosen become vertices, in the order of their first vertices.

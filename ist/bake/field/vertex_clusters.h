@@ -40,8 +40,9 @@ class VertexClusters {
   /// that is further than their planes are.
   void raise(const std::vector<double>& distance_of_cluster);
 
-  /// How many triangles within() leaves before coordinates are rounded.
-  std::size_t triangles_within(double tolerance);
+  /// How many triangles within() leaves before coordinates are rounded. Not counted where there are
+  /// by far more than `enough`: any larger number.
+  std::size_t triangles_within(double tolerance, std::size_t enough);
 
  private:
   /// What is known of a cluster comes when it is asked for: most are far too large or too small.
@@ -61,8 +62,9 @@ class VertexClusters {
   /// Finds out whether a cluster is within the tolerance.
   void settle(Level& level, std::uint32_t cluster, double tolerance) const;
   CornerPlane plane_of(std::uint32_t corner, std::uint32_t vertex) const;
-  /// Names of clusters of all levels, and of single vertices after them.
-  const std::vector<std::uint32_t>& chosen(double tolerance);
+  /// Names of clusters of all levels, and of single vertices after them, for every vertex. Nothing
+  /// where there are more clusters than `most`, seen early.
+  const std::vector<std::uint32_t>* chosen(double tolerance, std::size_t most);
   std::array<double, 3> place_of(std::size_t cluster, std::uint32_t vertex) const;
   std::vector<FieldMesh::Triangle> spanning(const std::vector<std::uint32_t>& cluster_of) const;
 

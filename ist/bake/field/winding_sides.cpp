@@ -22,8 +22,9 @@ struct Groups {
 
 Groups find_groups(const MeshView& mesh, const std::vector<std::uint8_t>& apart) {
   std::vector<Triangle> triangles(mesh.triangle_count);
-  for (std::size_t t = 0; t < triangles.size(); ++t)
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
     triangles[t] = {mesh.triangles[3 * t], mesh.triangles[3 * t + 1], mesh.triangles[3 * t + 2]};
+  });
   const EdgeTable edges(triangles);
   DisjointSets sets(triangles.size());
   tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
@@ -34,15 +35,15 @@ Groups find_groups(const MeshView& mesh, const std::vector<std::uint8_t>& apart)
   Groups groups;
   groups.of_triangle.resize(triangles.size());
   groups.representative.resize(triangles.size(), kNoTriangle);
-  std::vector<double> largest(triangles.size(), -1);
-  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-    const std::uint32_t group = groups.of_triangle[t] = sets.find(t);
+  std::vector<double> area(triangles.size());
+  tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t t) {
+    groups.of_triangle[t] = sets.find(t);
     const auto [a, b, c] = corners_in(mesh, t);
-    const double area = (b - a).cross(c - a).squaredNorm();
-    if (area > largest[group]) {
-      largest[group] = area;
-      groups.representative[group] = t;
-    }
+    area[t] = (b - a).cross(c - a).squaredNorm();
+  });
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    std::uint32_t& largest = groups.representative[groups.of_triangle[t]];
+    if (area[t] >= 0 && (largest == kNoTriangle || area[t] > area[largest])) largest = t;
   }
   return groups;
 }

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+namespace ist {
+
+/// All points between a few corners: a convex body, or a flat one. Unit frame.
+class Hull {
+ public:
+  using Point = std::array<double, 3>;
+  static constexpr std::size_t kMost = 24;  ///< corners
+
+  /// A plane, by heights over it and two directions in it.
+  struct Plane {
+    double normal[3], offset;  ///< height = normal · x − offset; of unit length
+    double u[3], v[3];         ///< across each other and the normal; of any length
+  };
+
+  Hull() = default;
+  explicit Hull(std::span<const Point> corners);
+
+  std::span<const Point> corners() const { return {corner_.data(), count_}; }
+  bool is_empty() const { return count_ == 0; }
+
+  /// Cuts off what lies above a plane: this is what lies below, and the other part is returned.
+  /// Together they hold the whole, but for rounding. False: it has too many corners for that, and
+  /// stays as it is.
+  bool cut(const Plane& plane, Hull& above);
+
+ private:
+  void add(const Point& corner) { corner_[count_++] = corner; }
+
+  std::array<Point, kMost> corner_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace ist
