@@ -3,11 +3,10 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
-#include <limits>
 #include <numeric>
+#include <vector>
 
-#include <ist/asset_layout.h>
+#include "bake/cluster/gas_kernel.h"
 
 namespace ist {
 namespace {
@@ -15,19 +14,6 @@ namespace {
 constexpr int kEpochs = 24;
 constexpr int kSweeps = 20;
 constexpr std::size_t kPart = 256;  // balls that one thread takes
-
-struct Point {
-  double x = 0, y = 0, z = 0;
-};
-
-double squared_distance(const Ball& a, const Point& b) {
-  const double dx = a.x - b.x;
-  const double dy = a.y - b.y;
-  const double dz = a.z - b.z;
-  return dx * dx + dy * dy + dz * dz;
-}
-
-double weight(const Ball& ball) { return ball.r * ball.r * ball.r + 1e-30; }
 
 class NeuralGas {
  public:
@@ -54,53 +40,26 @@ class NeuralGas {
     });
   }
 
-  /// What the balls of one part of a range say to the prototypes.
-  struct Pull {
-    std::array<Point, kWidth> sum{};
-    std::array<double, kWidth> total{};
-  };
-
-  Pull pull_of(std::span<const std::uint32_t> part, const std::vector<Point>& at,
-               const std::array<double, kWidth>& kernel) const {
-    Pull pull;
-    const std::size_t count = std::min<std::size_t>(at.size(), kWidth);
-    for (const std::uint32_t i : part) {
-      const Ball& ball = balls_[i];
-      std::array<double, kWidth> distance;
-      distance.fill(std::numeric_limits<double>::infinity());
-      for (std::size_t p = 0; p < count; ++p) distance[p] = squared_distance(ball, at[p]);
-      for (std::size_t p = 0; p < count; ++p) {
-        std::size_t rank = 0;  // counting beats sorting: no branch depends on the data
-        for (std::size_t q = 0; q < kWidth; ++q)
-          rank += q < p ? distance[q] <= distance[p] : distance[q] < distance[p];
-        const double w = kernel[rank] * weight(ball);
-        pull.sum[p].x += w * ball.x;
-        pull.sum[p].y += w * ball.y;
-        pull.sum[p].z += w * ball.z;
-        pull.total[p] += w;
-      }
-    }
-    return pull;
-  }
-
-  std::vector<Point> prototypes(std::span<const std::uint32_t> range, std::size_t count) const {
-    std::vector<Point> at(count);  // start at balls spread over the range, which is in some order
+  Prototypes prototypes(std::span<const std::uint32_t> range, std::size_t count) const {
+    Prototypes at;  // start at balls spread over the range, which is in some order
+    at.count = count;
     for (std::size_t p = 0; p < count; ++p) {
       const Ball& ball = balls_[range[(2 * p + 1) * range.size() / (2 * count)]];
-      at[p] = {ball.x, ball.y, ball.z};
+      at.x[p] = ball.x, at.y[p] = ball.y, at.z[p] = ball.z;
     }
+    // In parts of fixed size, added in their order: the same bits for any number of threads.
+    std::vector<GasPull> pulls((range.size() + kPart - 1) / kPart);
     // Neighbourhood range λ from half the prototypes towards zero, where this is plain k-means. The
     // kernel q^rank with q = λ / (1 + λ) stands for exp(−rank / λ): five operations make it.
     double lambda = static_cast<double>(count) / 2;
     for (int epoch = 0; epoch < kEpochs; ++epoch, lambda *= 0.75) {
-      std::array<double, kWidth> kernel{};
+      PrototypeValues kernel{};
       kernel[0] = 1;
       for (std::size_t k = 1; k < count; ++k) kernel[k] = kernel[k - 1] * (lambda / (1 + lambda));
-      // In parts of fixed size, added in their order: the same bits for any number of threads.
-      std::vector<Pull> pulls((range.size() + kPart - 1) / kPart);
       const auto pull = [&](std::size_t k) {
         const std::size_t first = k * kPart;
-        pulls[k] = pull_of(range.subspan(first, std::min(kPart, range.size() - first)), at, kernel);
+        pulls[k] = pull_of(balls_, range.subspan(first, std::min(kPart, range.size() - first)), at,
+                           kernel);
       };
       if (pulls.size() > 1) {
         tbb::parallel_for(std::size_t{0}, pulls.size(), pull);
@@ -108,33 +67,38 @@ class NeuralGas {
         pull(0);
       }
       for (std::size_t p = 0; p < count; ++p) {
-        Point sum;
-        double total = 0;
-        for (const Pull& part : pulls) {
-          sum.x += part.sum[p].x;
-          sum.y += part.sum[p].y;
-          sum.z += part.sum[p].z;
+        double x = 0, y = 0, z = 0, total = 0;
+        for (const GasPull& part : pulls) {
+          x += part.x[p];
+          y += part.y[p];
+          z += part.z[p];
           total += part.total[p];
         }
-        if (total > 0) at[p] = {sum.x / total, sum.y / total, sum.z / total};
+        if (total > 0) at.x[p] = x / total, at.y[p] = y / total, at.z[p] = z / total;
       }
     }
     return at;
   }
 
+  double squared_distance(std::uint32_t ball, const Prototypes& at, std::size_t p) const {
+    const double dx = balls_[ball].x - at.x[p];
+    const double dy = balls_[ball].y - at.y[p];
+    const double dz = balls_[ball].z - at.z[p];
+    return dx * dx + dy * dy + dz * dz;
+  }
+
   /// Sorts `range` into groups of `unit`, the last of what remains; the last ball stays last if
   /// `pinned`. Starts in the order of the range; then two groups at a time share out their balls
   /// anew, each to the prototype it prefers, until nothing moves: Σ distance² falls every time.
-  void assign(std::span<std::uint32_t> range, std::vector<Point> at, std::size_t unit,
-              bool pinned) const {
-    const std::size_t groups = at.size();
+  void assign(std::span<std::uint32_t> range, Prototypes at, std::size_t unit, bool pinned) const {
+    const std::size_t groups = at.count;
     if (pinned) {
-      const Ball& last = balls_[range.back()];
-      const auto nearest =
-          std::min_element(at.begin(), at.end(), [&](const Point& a, const Point& b) {
-            return squared_distance(last, a) < squared_distance(last, b);
-          });
-      std::iter_swap(nearest, at.end() - 1);
+      std::size_t nearest = 0;
+      for (std::size_t p = 1; p < groups; ++p)
+        if (squared_distance(range.back(), at, p) < squared_distance(range.back(), at, nearest))
+          nearest = p;
+      for (PrototypeValues* const values : {&at.x, &at.y, &at.z})
+        std::swap((*values)[nearest], (*values)[groups - 1]);
     }
     // First shares along the prototypes' order, nearest first, as far as there is room.
     fill_in_turn(range.first(range.size() - pinned), at, unit);
@@ -170,19 +134,18 @@ class NeuralGas {
   }
 
   /// Group by group, the balls that are nearest to its prototype among those that are left.
-  void fill_in_turn(std::span<std::uint32_t> range, const std::vector<Point>& at,
-                    std::size_t unit) const {
+  void fill_in_turn(std::span<std::uint32_t> range, const Prototypes& at, std::size_t unit) const {
     struct Near {
       double distance2;
       std::uint32_t ball;
     };
     std::vector<Near> rest(range.size());
-    for (std::size_t p = 0; p + 1 < at.size(); ++p) {
+    for (std::size_t p = 0; p + 1 < at.count; ++p) {
       const std::size_t taken = p * unit;
       if (range.size() - taken <= unit) return;
       rest.resize(range.size() - taken);
       for (std::size_t i = 0; i < rest.size(); ++i)
-        rest[i] = {squared_distance(balls_[range[taken + i]], at[p]), range[taken + i]};
+        rest[i] = {squared_distance(range[taken + i], at, p), range[taken + i]};
       std::nth_element(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(unit), rest.end(),
                        [](const Near& a, const Near& b) {
                          return a.distance2 != b.distance2 ? a.distance2 < b.distance2
@@ -192,39 +155,41 @@ class NeuralGas {
     }
   }
 
-  bool share(std::span<std::uint32_t> range, const std::vector<Point>& at, std::size_t unit,
-             std::size_t p, std::size_t q) const {
-    const auto group = [&](std::size_t g) {
-      return range.subspan(g * unit, std::min(unit, range.size() - g * unit));
-    };
-    const auto first = group(p);
-    const auto second = group(q);
+  /// Shares out the balls of groups p and q anew. False: they stay as they are.
+  bool share(std::span<std::uint32_t> range, const Prototypes& at, std::size_t unit, std::size_t p,
+             std::size_t q) const {
     struct Member {
       double preference;  // negative: nearer to p's prototype
       std::uint32_t ball;
-      bool was_first;
-    };
-    std::vector<Member> pool;
-    pool.reserve(first.size() + second.size());
-    for (const auto part : {first, second})
-      for (const std::uint32_t i : part)
-        pool.push_back({squared_distance(balls_[i], at[p]) - squared_distance(balls_[i], at[q]), i,
-                        part.data() == first.data()});
-    std::nth_element(pool.begin(), pool.begin() + static_cast<std::ptrdiff_t>(first.size()),
-                     pool.end(), [](const Member& a, const Member& b) {
-                       return a.preference != b.preference ? a.preference < b.preference
-                                                           : a.ball < b.ball;
-                     });
-    bool moved = false;
-    for (std::size_t k = 0; k < pool.size(); ++k) {
-      if (k < first.size()) {
-        first[k] = pool[k].ball;
-        moved |= !pool[k].was_first;
-      } else {
-        second[k - first.size()] = pool[k].ball;
+      bool operator<(const Member& other) const {
+        return preference != other.preference ? preference < other.preference : ball < other.ball;
       }
-    }
-    return moved;
+    };
+    const auto group = [&](std::size_t g) {
+      return range.subspan(g * unit, std::min(unit, range.size() - g * unit));
+    };
+    const auto first = group(p), second = group(q);
+    const auto member = [&](std::uint32_t i) {
+      return Member{squared_distance(i, at, p) - squared_distance(i, at, q), i};
+    };
+    Member last = member(first[0]), foremost = member(second[0]);
+    for (const std::uint32_t i : first.subspan(1)) last = std::max(last, member(i));
+    for (const std::uint32_t i : second.subspan(1)) foremost = std::min(foremost, member(i));
+    if (last < foremost) return false;
+    // Those beyond dispute stay: what is before all of the second, what is behind all of the first.
+    std::vector<Member> pool;
+    const auto in_first = std::partition(first.begin(), first.end(),
+                                         [&](std::uint32_t i) { return member(i) < foremost; });
+    const auto in_second = std::partition(second.begin(), second.end(),
+                                          [&](std::uint32_t i) { return last < member(i); });
+    for (auto i = in_first; i != first.end(); ++i) pool.push_back(member(*i));
+    const auto middle = static_cast<std::ptrdiff_t>(pool.size());
+    for (auto i = in_second; i != second.end(); ++i) pool.push_back(member(*i));
+    std::nth_element(pool.begin(), pool.begin() + middle, pool.end());
+    std::size_t k = 0;
+    for (auto i = in_first; i != first.end(); ++i) *i = pool[k++].ball;
+    for (auto i = in_second; i != second.end(); ++i) *i = pool[k++].ball;
+    return true;
   }
 
   std::span<const Ball> balls_;
