@@ -28,4 +28,14 @@ struct GasPull {
 GasPull pull_of(std::span<const Ball> balls, std::span<const std::uint32_t> part,
                 const Prototypes& prototypes, const PrototypeValues& kernel);
 
+/// Squared distances from the centres of the balls that `part` names to the prototypes, a row a
+/// ball; infinite behind the prototypes.
+void measure_all(std::span<const Ball> balls, std::span<const std::uint32_t> part,
+                 const Prototypes& prototypes, PrototypeValues* distances2);
+
+/// By how much prototype `own` is nearer to the members than each other one, to the member that
+/// prefers it least. `members` name rows of measure_all().
+PrototypeValues least_leads(const PrototypeValues* distances2,
+                            std::span<const std::uint32_t> members, std::size_t own);
+
 }  // namespace ist

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <vector>
 
@@ -14,6 +15,123 @@ namespace {
 constexpr int kEpochs = 24;
 constexpr int kSweeps = 20;
 constexpr std::size_t kPart = 256;  // balls that one thread takes
+
+/// Calls work(first, count) for parts of fixed size, whatever the number of threads.
+template <class Work>
+void in_parts(std::size_t size, const Work& work) {
+  const auto part = [&](std::size_t k) { work(k * kPart, std::min(kPart, size - k * kPart)); };
+  const std::size_t parts = (size + kPart - 1) / kPart;
+  if (parts == 1)
+    part(0);
+  else
+    tbb::parallel_for(std::size_t{0}, parts, part);
+}
+
+/// Shares out a range of balls, which come sorted, evenly among prototypes: first along the
+/// prototypes' order, nearest first, as far as there is room; then two groups at a time share out
+/// theirs anew, each ball to the prototype that it prefers, until nothing moves. Σ distance² falls
+/// every time.
+class EvenShares {
+ public:
+  EvenShares(std::span<const Ball> balls, std::span<std::uint32_t> range, const Prototypes& at,
+             std::size_t unit)
+      : range_(range), unit_(unit), groups_(at.count), distances2_(range.size()) {
+    in_parts(range.size(), [&](std::size_t first, std::size_t count) {
+      measure_all(balls, range.subspan(first, count), at, &distances2_[first]);
+    });
+    order_.resize(range.size());
+    std::iota(order_.begin(), order_.end(), 0u);
+  }
+
+  /// Groups of `unit` one after the other, each sorted.
+  void run() {
+    fill_in_turn();
+    for (std::size_t p = 0; p < groups_; ++p)
+      leads_[p] = least_leads(distances2_.data(), group(p), p);
+    std::array<int, kWidth> changed{};  // the sweep that last moved a ball of the group
+    for (int sweep = 1; sweep <= kSweeps; ++sweep) {
+      // Every two groups meet once a sweep, in turns in which each group has one partner: one stays
+      // and the others go round.
+      const std::size_t seats = groups_ + groups_ % 2;
+      for (std::size_t turn = 0; turn + 1 < seats; ++turn)
+        for (std::size_t k = 0; k < seats / 2; ++k) {
+          const std::size_t a = k == 0 ? seats - 1 : (turn + k) % (seats - 1);
+          const std::size_t b = (turn + seats - 1 - k) % (seats - 1);
+          const std::size_t p = std::min(a, b), q = std::max(a, b);
+          if (q < groups_ && share(p, q)) changed[p] = changed[q] = sweep;
+        }
+      if (*std::max_element(changed.begin(), changed.end()) < sweep) break;
+    }
+    // Which balls are where is settled; their order within a group is not until now.
+    for (std::size_t p = 0; p < groups_; ++p) std::sort(group(p).begin(), group(p).end());
+    const std::vector<std::uint32_t> balls(range_.begin(), range_.end());
+    for (std::size_t i = 0; i < balls.size(); ++i) range_[i] = balls[order_[i]];
+  }
+
+ private:
+  /// A ball by its place in the range, and what it is sorted by.
+  struct Entry {
+    double key;
+    std::uint32_t ball;
+    bool operator<(const Entry& other) const {
+      return key != other.key ? key < other.key : ball < other.ball;
+    }
+  };
+
+  std::span<std::uint32_t> group(std::size_t p) {
+    const std::size_t begin = std::min(p * unit_, order_.size());
+    return std::span(order_).subspan(begin, std::min(unit_, order_.size() - begin));
+  }
+
+  void fill_in_turn() {
+    std::vector<Entry> rest;
+    for (std::size_t p = 0; p + 1 < groups_; ++p) {
+      const auto left = std::span(order_).subspan(p * unit_);
+      if (left.size() <= unit_) return;
+      rest.clear();
+      for (const std::uint32_t i : left) rest.push_back({distances2_[i][p], i});
+      std::nth_element(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(unit_), rest.end());
+      for (std::size_t i = 0; i < rest.size(); ++i) left[i] = rest[i].ball;
+    }
+  }
+
+  /// Shares out the balls of groups p and q anew. False: they stay as they are.
+  bool share(std::size_t p, std::size_t q) {
+    if (-leads_[p][q] < leads_[q][p]) return false;
+    const auto first = group(p), second = group(q);
+    if (first.empty() || second.empty()) return false;
+    // Those nearer to p's prototype come first.
+    const auto entry = [&](std::uint32_t i) {
+      return Entry{distances2_[i][p] - distances2_[i][q], i};
+    };
+    Entry last = entry(first[0]), foremost = entry(second[0]);
+    for (const std::uint32_t i : first) last = std::max(last, entry(i));
+    for (const std::uint32_t i : second) foremost = std::min(foremost, entry(i));
+    if (last < foremost) return false;
+    // What is before all of the second stays there, and what is behind all of the first.
+    const auto in_first = std::partition(first.begin(), first.end(),
+                                         [&](std::uint32_t i) { return entry(i) < foremost; });
+    const auto in_second = std::partition(second.begin(), second.end(),
+                                          [&](std::uint32_t i) { return last < entry(i); });
+    std::vector<Entry> pool;
+    for (auto i = in_first; i != first.end(); ++i) pool.push_back(entry(*i));
+    const auto middle = static_cast<std::ptrdiff_t>(pool.size());
+    for (auto i = in_second; i != second.end(); ++i) pool.push_back(entry(*i));
+    std::nth_element(pool.begin(), pool.begin() + middle, pool.end());
+    std::size_t k = 0;
+    for (auto i = in_first; i != first.end(); ++i) *i = pool[k++].ball;
+    for (auto i = in_second; i != second.end(); ++i) *i = pool[k++].ball;
+    leads_[p] = least_leads(distances2_.data(), first, p);
+    leads_[q] = least_leads(distances2_.data(), second, q);
+    return true;
+  }
+
+  const std::span<std::uint32_t> range_;
+  const std::size_t unit_, groups_;
+  std::vector<PrototypeValues> distances2_;  ///< [place in the range]
+  std::vector<std::uint32_t> order_;         ///< places in the range, by group
+  std::array<PrototypeValues, kWidth> leads_;
+};
 
 class NeuralGas {
  public:
@@ -56,16 +174,9 @@ class NeuralGas {
       PrototypeValues kernel{};
       kernel[0] = 1;
       for (std::size_t k = 1; k < count; ++k) kernel[k] = kernel[k - 1] * (lambda / (1 + lambda));
-      const auto pull = [&](std::size_t k) {
-        const std::size_t first = k * kPart;
-        pulls[k] = pull_of(balls_, range.subspan(first, std::min(kPart, range.size() - first)), at,
-                           kernel);
-      };
-      if (pulls.size() > 1) {
-        tbb::parallel_for(std::size_t{0}, pulls.size(), pull);
-      } else {
-        pull(0);
-      }
+      in_parts(range.size(), [&](std::size_t first, std::size_t size) {
+        pulls[first / kPart] = pull_of(balls_, range.subspan(first, size), at, kernel);
+      });
       for (std::size_t p = 0; p < count; ++p) {
         double x = 0, y = 0, z = 0, total = 0;
         for (const GasPull& part : pulls) {
@@ -80,116 +191,18 @@ class NeuralGas {
     return at;
   }
 
-  double squared_distance(std::uint32_t ball, const Prototypes& at, std::size_t p) const {
-    const double dx = balls_[ball].x - at.x[p];
-    const double dy = balls_[ball].y - at.y[p];
-    const double dz = balls_[ball].z - at.z[p];
-    return dx * dx + dy * dy + dz * dz;
-  }
-
   /// Sorts `range` into groups of `unit`, the last of what remains; the last ball stays last if
-  /// `pinned`. Starts in the order of the range; then two groups at a time share out their balls
-  /// anew, each to the prototype it prefers, until nothing moves: Σ distance² falls every time.
+  /// `pinned`.
   void assign(std::span<std::uint32_t> range, Prototypes at, std::size_t unit, bool pinned) const {
-    const std::size_t groups = at.count;
     if (pinned) {
-      std::size_t nearest = 0;
-      for (std::size_t p = 1; p < groups; ++p)
-        if (squared_distance(range.back(), at, p) < squared_distance(range.back(), at, nearest))
-          nearest = p;
+      PrototypeValues distance2;
+      measure_all(balls_, range.last(1), at, &distance2);
+      const auto nearest = static_cast<std::size_t>(
+          std::min_element(distance2.begin(), distance2.end()) - distance2.begin());
       for (PrototypeValues* const values : {&at.x, &at.y, &at.z})
-        std::swap((*values)[nearest], (*values)[groups - 1]);
+        std::swap((*values)[nearest], (*values)[at.count - 1]);
     }
-    // First shares along the prototypes' order, nearest first, as far as there is room.
-    fill_in_turn(range.first(range.size() - pinned), at, unit);
-    const auto all = range.first(range.size() - pinned);
-    std::vector<int> changed(groups, 0);  // the sweep that last moved a ball of the group
-    for (int sweep = 1; sweep <= kSweeps; ++sweep) {
-      // Every two groups meet once a sweep, in turns in which each group has one partner: one stays
-      // and the others go round.
-      const std::size_t seats = groups + groups % 2;
-      for (std::size_t turn = 0; turn + 1 < seats; ++turn) {
-        const auto meet = [&](std::size_t k) {
-          const std::size_t a = k == 0 ? seats - 1 : (turn + k) % (seats - 1);
-          const std::size_t b = (turn + seats - 1 - k) % (seats - 1);
-          const std::size_t p = std::min(a, b), q = std::max(a, b);
-          if (q >= groups) return;
-          // Two groups that are as they were when they last met have nothing to share.
-          if (changed[p] < sweep - 1 && changed[q] < sweep - 1) return;
-          if (share(all, at, unit, p, q)) changed[p] = changed[q] = sweep;
-        };
-        if (unit >= kPart) {
-          tbb::parallel_for(std::size_t{0}, seats / 2, meet);
-        } else {
-          for (std::size_t k = 0; k < seats / 2; ++k) meet(k);
-        }
-      }
-      if (*std::max_element(changed.begin(), changed.end()) < sweep) break;
-    }
-    // Which balls are where is settled; their order within a group is not until now.
-    for (std::size_t begin = 0; begin < range.size(); begin += unit) {
-      const auto group = range.subspan(begin, std::min(unit, range.size() - begin));
-      std::sort(group.begin(), group.end() - (pinned && begin + unit >= range.size()));
-    }
-  }
-
-  /// Group by group, the balls that are nearest to its prototype among those that are left.
-  void fill_in_turn(std::span<std::uint32_t> range, const Prototypes& at, std::size_t unit) const {
-    struct Near {
-      double distance2;
-      std::uint32_t ball;
-    };
-    std::vector<Near> rest(range.size());
-    for (std::size_t p = 0; p + 1 < at.count; ++p) {
-      const std::size_t taken = p * unit;
-      if (range.size() - taken <= unit) return;
-      rest.resize(range.size() - taken);
-      for (std::size_t i = 0; i < rest.size(); ++i)
-        rest[i] = {squared_distance(range[taken + i], at, p), range[taken + i]};
-      std::nth_element(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(unit), rest.end(),
-                       [](const Near& a, const Near& b) {
-                         return a.distance2 != b.distance2 ? a.distance2 < b.distance2
-                                                           : a.ball < b.ball;
-                       });
-      for (std::size_t i = 0; i < rest.size(); ++i) range[taken + i] = rest[i].ball;
-    }
-  }
-
-  /// Shares out the balls of groups p and q anew. False: they stay as they are.
-  bool share(std::span<std::uint32_t> range, const Prototypes& at, std::size_t unit, std::size_t p,
-             std::size_t q) const {
-    struct Member {
-      double preference;  // negative: nearer to p's prototype
-      std::uint32_t ball;
-      bool operator<(const Member& other) const {
-        return preference != other.preference ? preference < other.preference : ball < other.ball;
-      }
-    };
-    const auto group = [&](std::size_t g) {
-      return range.subspan(g * unit, std::min(unit, range.size() - g * unit));
-    };
-    const auto first = group(p), second = group(q);
-    const auto member = [&](std::uint32_t i) {
-      return Member{squared_distance(i, at, p) - squared_distance(i, at, q), i};
-    };
-    Member last = member(first[0]), foremost = member(second[0]);
-    for (const std::uint32_t i : first.subspan(1)) last = std::max(last, member(i));
-    for (const std::uint32_t i : second.subspan(1)) foremost = std::min(foremost, member(i));
-    if (last < foremost) return false;
-    // Those beyond dispute stay: what is before all of the second, what is behind all of the first.
-    std::vector<Member> pool;
-    const auto in_first = std::partition(first.begin(), first.end(),
-                                         [&](std::uint32_t i) { return member(i) < foremost; });
-    const auto in_second = std::partition(second.begin(), second.end(),
-                                          [&](std::uint32_t i) { return last < member(i); });
-    for (auto i = in_first; i != first.end(); ++i) pool.push_back(member(*i));
-    const auto middle = static_cast<std::ptrdiff_t>(pool.size());
-    for (auto i = in_second; i != second.end(); ++i) pool.push_back(member(*i));
-    std::nth_element(pool.begin(), pool.begin() + middle, pool.end());
-    std::size_t k = 0;
-    for (auto i = in_first; i != first.end(); ++i) *i = pool[k++].ball;
-    for (auto i = in_second; i != second.end(); ++i) *i = pool[k++].ball;
-    return true;
+    EvenShares(balls_, range.first(range.size() - pinned), at, unit).run();
   }
 
   std::span<const Ball> balls_;
