@@ -63,9 +63,13 @@ class EvenShares {
       if (*std::max_element(changed.begin(), changed.end()) < sweep) break;
     }
     // Which balls are where is settled; their order within a group is not until now.
-    for (std::size_t p = 0; p < groups_; ++p) std::sort(group(p).begin(), group(p).end());
+    std::vector<std::uint8_t> group_of(order_.size());
+    for (std::size_t p = 0; p < groups_; ++p)
+      for (const std::uint32_t i : group(p)) group_of[i] = static_cast<std::uint8_t>(p);
+    std::array<std::size_t, kWidth> next;
+    for (std::size_t p = 0; p < kWidth; ++p) next[p] = p * unit_;
     const std::vector<std::uint32_t> balls(range_.begin(), range_.end());
-    for (std::size_t i = 0; i < balls.size(); ++i) range_[i] = balls[order_[i]];
+    for (std::size_t i = 0; i < balls.size(); ++i) range_[next[group_of[i]]++] = balls[i];
   }
 
  private:
@@ -101,26 +105,24 @@ class EvenShares {
     const auto first = group(p), second = group(q);
     if (first.empty() || second.empty()) return false;
     // Those nearer to p's prototype come first.
-    const auto entry = [&](std::uint32_t i) {
-      return Entry{distances2_[i][p] - distances2_[i][q], i};
-    };
-    Entry last = entry(first[0]), foremost = entry(second[0]);
-    for (const std::uint32_t i : first) last = std::max(last, entry(i));
-    for (const std::uint32_t i : second) foremost = std::min(foremost, entry(i));
+    pool_.clear();
+    for (const auto& part : {first, second})
+      for (const std::uint32_t i : part)
+        pool_.push_back({distances2_[i][p] - distances2_[i][q], i});
+    Entry* const begin = pool_.data();
+    Entry* const middle = begin + first.size();
+    Entry* const end = middle + second.size();
+    const Entry last = *std::max_element(begin, middle);
+    const Entry foremost = *std::min_element(middle, end);
     if (last < foremost) return false;
     // What is before all of the second stays there, and what is behind all of the first.
-    const auto in_first = std::partition(first.begin(), first.end(),
-                                         [&](std::uint32_t i) { return entry(i) < foremost; });
-    const auto in_second = std::partition(second.begin(), second.end(),
-                                          [&](std::uint32_t i) { return last < entry(i); });
-    std::vector<Entry> pool;
-    for (auto i = in_first; i != first.end(); ++i) pool.push_back(entry(*i));
-    const auto middle = static_cast<std::ptrdiff_t>(pool.size());
-    for (auto i = in_second; i != second.end(); ++i) pool.push_back(entry(*i));
-    std::nth_element(pool.begin(), pool.begin() + middle, pool.end());
-    std::size_t k = 0;
-    for (auto i = in_first; i != first.end(); ++i) *i = pool[k++].ball;
-    for (auto i = in_second; i != second.end(); ++i) *i = pool[k++].ball;
+    Entry* const unsure =
+        std::partition(begin, middle, [&](const Entry& entry) { return entry < foremost; });
+    Entry* const sure =
+        std::partition(middle, end, [&](const Entry& entry) { return !(last < entry); });
+    std::nth_element(unsure, middle, sure);
+    for (std::size_t k = 0; k < first.size(); ++k) first[k] = begin[k].ball;
+    for (std::size_t k = 0; k < second.size(); ++k) second[k] = middle[k].ball;
     leads_[p] = least_leads(distances2_.data(), first, p);
     leads_[q] = least_leads(distances2_.data(), second, q);
     return true;
@@ -131,6 +133,7 @@ class EvenShares {
   std::vector<PrototypeValues> distances2_;  ///< [place in the range]
   std::vector<std::uint32_t> order_;         ///< places in the range, by group
   std::array<PrototypeValues, kWidth> leads_;
+  std::vector<Entry> pool_;
 };
 
 class NeuralGas {
@@ -193,7 +196,9 @@ class NeuralGas {
 
   /// Sorts `range` into groups of `unit`, the last of what remains; the last ball stays last if
   /// `pinned`.
-  void assign(std::span<std::uint32_t> range, Prototypes at, std::size_t unit, bool pinned) const {
+  void assign(std::span<std::uint32_t> range, const Prototypes& prototypes, std::size_t unit,
+              bool pinned) const {
+    Prototypes at = prototypes;
     if (pinned) {
       PrototypeValues distance2;
       measure_all(balls_, range.last(1), at, &distance2);

@@ -21,6 +21,7 @@ void measure_group(SwapGroup& group) {
   group.ball = smallest_ball(members, never);
   group.radius_without.fill(std::numeric_limits<double>::infinity());
   group.least_radius = group.ball.r;
+  group.touching = 0;
   for (std::size_t i = 0; i < members.count; ++i) {
     Ball& without = group.without[i];
     without = group.ball;
@@ -29,6 +30,7 @@ void measure_group(SwapGroup& group) {
       without.r = 0;
     } else if (reach(group.ball.x, group.ball.y, group.ball.z, members.ball(i)) >=
                group.ball.r * (1 - 1e-9)) {
+      group.touching |= 1u << i;
       BallLanes rest = members;
       for (std::size_t k = i; k + 1 < members.count; ++k) rest.put(k, members.ball(k + 1));
       rest.close(members.count - 1);
@@ -79,6 +81,64 @@ struct Fit {
   }
 };
 
+/// Lower bounds of a group's cost once a ball joins it in place of a member, for the members of
+/// another group. A ball of radius R that holds a set whose smallest ball has radius r has its
+/// centre within √(R² − r²) of that one's: so R ≥ (D + r²/D) / 2 if it holds a ball, too, that
+/// reaches D from there.
+class JoinCosts {
+ public:
+  JoinCosts(const SwapGroup& group, const BallLanes& added, double reach) : group_(group) {
+    if (group.members.count == 1) {  // nothing is left that would hold the centre near
+      of_ball_.fill(0);
+      return;
+    }
+    fill(group.ball, added, reach, of_ball_);
+    for (std::uint32_t left = group.touching; left != 0; left &= left - 1) {
+      const std::size_t i = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
+      fill(group.without[i], added, reach, of_touching_[i]);
+    }
+  }
+
+  /// In place of one member, by what joins.
+  const LaneValues& row(std::size_t left_out) const {
+    return (group_.touching >> left_out & 1u) != 0 ? of_touching_[left_out] : of_ball_;
+  }
+
+  /// Of one that joins, by the member whose place it takes.
+  LaneValues column(std::size_t joining) const {
+    LaneValues costs;
+    costs.fill(of_ball_[joining]);
+    for (std::uint32_t left = group_.touching; left != 0; left &= left - 1) {
+      const std::size_t i = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
+      costs[i] = of_touching_[i][joining];
+    }
+    return costs;
+  }
+
+ private:
+  static void fill(const Ball& rest, const BallLanes& added, double reach, LaneValues& costs) {
+    const BallTag d;
+    // Balls are as small as can be to rounding, or a little larger where they touch too many.
+    constexpr double kRoom = 1 - 1e-4, kSmallest = 1e-150;
+    const BallVector r = hn::Set(d, rest.r),
+                     least = hn::Set(d, rest.r > kSmallest ? rest.r : kSmallest);
+    for (std::size_t i = 0; i < kWidth; i += hn::Lanes(d)) {
+      const BallVector away = distances(hn::Load(d, added.x.data() + i) - hn::Set(d, rest.x),
+                                        hn::Load(d, added.y.data() + i) - hn::Set(d, rest.y),
+                                        hn::Load(d, added.z.data() + i) - hn::Set(d, rest.z)) +
+                              hn::Load(d, added.r.data() + i);
+      const BallVector far = hn::Max(away, least);
+      const BallVector radius = (far + r * (r / far)) * hn::Set(d, 0.5 * kRoom);
+      const BallVector with_reach = radius + hn::Set(d, reach);
+      hn::StoreU(with_reach * with_reach * with_reach, d, costs.data() + i);
+    }
+  }
+
+  const SwapGroup& group_;
+  LaneValues of_ball_;
+  std::array<LaneValues, kWidth> of_touching_;
+};
+
 class SwapSearch {
  public:
   SwapSearch(const SwapGroup& a, const SwapGroup& b, double reach, double least_gain)
@@ -91,15 +151,23 @@ class SwapSearch {
     if (!gains(cost(a_.least_radius), least_cost_b)) return {};
     const std::uint32_t free_b =
         ((1u << b_.members.count) - 1) & ~(pinned_b < kWidth ? 1u << pinned_b : 0);
+    const std::uint32_t free_a =
+        ((1u << a_.members.count) - 1) & ~(pinned_a < kWidth ? 1u << pinned_a : 0);
+    const JoinCosts into_a_at_least(a_, b_.members, reach_),
+        into_b_at_least(b_, a_.members, reach_);
     bool found = false;
     std::uint32_t fitted = 0;  // the members of b that have their fit into a
     std::array<Fit, kWidth> into_a;
-    for (std::uint32_t s = 0; s < a_.members.count; ++s) {
+    for (std::uint32_t rest = free_a; rest != 0; rest &= rest - 1) {
+      const auto s = static_cast<std::uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
+      const std::uint32_t hopeful =
+          gaining(into_a_at_least.row(s), into_b_at_least.column(s)) & free_b;
+      if (hopeful == 0) continue;
       const double without_a = cost(a_.radius_without[s]);
-      if (s == pinned_a || !gains(without_a, least_cost_b)) continue;
+      if (!gains(without_a, least_cost_b)) continue;
       const Ball from_a = a_.members.ball(s);
       const Fit into_b(b_.members, from_a);
-      for (std::uint32_t left = promising(without_a, into_b) & free_b; left != 0;
+      for (std::uint32_t left = promising(without_a, into_b) & hopeful; left != 0;
            left &= left - 1) {
         const auto t = static_cast<std::uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
         const double least_b = cost(into_b.least_radius(b_, t));
@@ -130,6 +198,18 @@ class SwapSearch {
   /// Falls as either cost rises, rounding included.
   double gain(double cost_a, double cost_b) const { return now_ - cost_a - cost_b; }
   bool gains(double cost_a, double cost_b) const { return gain(cost_a, cost_b) > best_.gain; }
+
+  /// One bit a lane.
+  std::uint32_t gaining(const LaneValues& costs_a, const LaneValues& costs_b) const {
+    const BallTag d;
+    std::uint32_t bits = 0;
+    for (std::size_t t = 0; t < kWidth; t += hn::Lanes(d))
+      bits |= bits_of((hn::Set(d, now_) - hn::LoadU(d, costs_a.data() + t)) -
+                          hn::LoadU(d, costs_b.data() + t) >
+                      hn::Set(d, best_.gain))
+              << t;
+    return bits;
+  }
 
   /// One bit a member of b: no bound yet says that it is in vain to swap it.
   std::uint32_t promising(double without_a, const Fit& into_b) const {

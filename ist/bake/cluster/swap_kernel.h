@@ -13,7 +13,8 @@ namespace ist {
 struct SwapGroup {
   BallLanes members;
   Ball ball;                         ///< around the members
-  std::array<Ball, kWidth> without;  /// around all members but one
+  std::array<Ball, kWidth> without;  ///< around all members but one
+  std::uint32_t touching = 0;  ///< one bit a member: `without` may be another ball than `ball`
   /// Radii of `without`; infinite behind the members.
   alignas(64) std::array<double, kWidth> radius_without;
   double least_radius = 0;  ///< of `without` and of `ball`
