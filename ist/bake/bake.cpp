@@ -102,7 +102,10 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   AssetArrays arrays;
   std::vector<std::uint32_t> inner_order;
   HostWork host(backend.leaves_threads_idle());
-  if (backend.leaves_threads_idle()) field.start();
+  if (backend.leaves_threads_idle()) {
+    field.start();
+    host.add([&] { solid.unit_moments(); });
+  }
 
   const SpherePacking packing = backend.pack(settings, progress);
   const std::size_t count = packing.spheres.size();
