@@ -102,7 +102,10 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   AssetArrays arrays;
   std::vector<std::uint32_t> inner_order;
   HostWork host(backend.leaves_threads_idle());
-  if (backend.leaves_threads_idle()) field.start();
+  if (backend.leaves_threads_idle()) {
+    field.start();
+    host.add([&] { solid.unit_moments(); });
+  }
 
   const SpherePacking packing = backend.pack(settings, progress);
   const std::size_t count = packing.spheres.size();
@@ -116,17 +119,18 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   host.add([&] { inner_order = sphere_order(arrays.inner_spheres); });
   host.add([&] { describe_bounds(solid, 0, arrays.header); });
 
-  std::vector<Calibration> details =
-      calibrate_prefixes(solid, backend, packing.spheres, detail_counts(count), progress);
-  arrays.matched_spheres = std::move(details.front().matched);
-  arrays.header.protrusion = details.front().protrusion;
-  for (std::size_t i = 1; i < details.size(); ++i)
-    arrays.details.push_back({std::move(details[i].matched), details[i].protrusion, {}});
-  host.add([&] { arrays.matched_tree = build_tree(arrays.matched_spheres, {}); });
-  host.add([&] {
-    for (DetailArrays& detail : arrays.details)
-      detail.matched_tree = build_tree(detail.matched_spheres, {});
-  });
+  // The finest first: while its tree grows, the largest, the others are calibrated.
+  const std::vector<std::size_t> counts = detail_counts(count);
+  arrays.details.resize(counts.size() - 1);
+  const auto grow_tree = [&](std::size_t i, Calibration made) {
+    DetailArrays* const detail = i > 0 ? &arrays.details[i - 1] : nullptr;
+    std::vector<Sphere>& spheres = detail ? detail->matched_spheres : arrays.matched_spheres;
+    TreeArrays& tree = detail ? detail->matched_tree : arrays.matched_tree;
+    spheres = std::move(made.matched);
+    (detail ? detail->protrusion : arrays.header.protrusion) = made.protrusion;
+    host.add([&spheres, &tree] { tree = build_tree(spheres, {}); });
+  };
+  calibrate_prefixes(solid, backend, packing.spheres, counts, progress, grow_tree);
 
   arrays.cover_radii = cover_radii(solid, backend, packing.spheres, progress);
 

@@ -169,7 +169,8 @@ struct Surface {
 void reduce(Surface& surface, MeshReport& report) {
   TriangleMesh& mesh = surface.mesh;
   if (report.degenerate_triangles > 0) {
-    const std::vector<std::uint32_t> dropped = drop_degenerate(mesh.vertices, mesh.triangles);
+    const std::vector<std::uint32_t> dropped =
+        drop_degenerate(mesh.vertices, mesh.triangles, surface.edges);
     if (!dropped.empty()) {
       report.notes.push_back(counted(dropped.size(), "degenerate triangle") + " dropped");
       if (surface.met && surface.met->pairs) rename_triangles(dropped, *surface.met->pairs);

@@ -1,11 +1,12 @@
 #pragma once
 
+#include <tbb/parallel_for.h>
+
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
+#include <memory>
 #include <utility>
-#include <vector>
 
 namespace ist {
 
@@ -14,8 +15,10 @@ namespace ist {
 /// made.
 class DisjointSets {
  public:
-  explicit DisjointSets(const std::size_t size) : parent_(size) {
-    std::iota(parent_.begin(), parent_.end(), std::uint32_t{0});
+  explicit DisjointSets(const std::size_t size)
+      : parent_(std::make_unique_for_overwrite<std::uint32_t[]>(size)) {
+    tbb::parallel_for(std::size_t{0}, size,
+                      [&](const std::size_t i) { parent_[i] = static_cast<std::uint32_t>(i); });
   }
 
   std::uint32_t find(std::uint32_t i) {
@@ -45,7 +48,7 @@ class DisjointSets {
     return std::atomic_ref<std::uint32_t>(parent_[i]);
   }
 
-  std::vector<std::uint32_t> parent_;
+  std::unique_ptr<std::uint32_t[]> parent_;
 };
 
 }  // namespace ist

@@ -12,6 +12,8 @@ namespace ist {
 namespace {
 
 struct Entry {
+  Entry() {}  // left as it is, for threads to fill
+  Entry(std::uint32_t high_vertex, std::uint32_t of_side) : high(high_vertex), side(of_side) {}
   std::uint32_t high, side;
 };
 

@@ -1,3 +1,6 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -44,12 +47,26 @@ Reader reader_of(const std::string& path) {
 
 /// Bounds of the referenced vertices. Throws if one of them is infinite or not a number.
 Eigen::AlignedBox3d finite_bounds(const SourceFile& file, const PolygonMesh& mesh) {
-  Eigen::AlignedBox3d bounds;
+  struct Bounds {
+    Eigen::AlignedBox3d box;
+    bool finite = true;
+  };
+  const Bounds bounds = tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, mesh.corners.size()), Bounds(),
+      [&](const tbb::blocked_range<std::size_t>& range, Bounds of_range) {
+        for (std::size_t i = range.begin(); i < range.end() && of_range.finite; ++i) {
+          const Eigen::Vector3d& x = mesh.vertices[mesh.corners[i]];
+          of_range.finite = x.allFinite();
+          if (of_range.finite) of_range.box.extend(x);
+        }
+        return of_range;
+      },
+      [](const Bounds& a, const Bounds& b) {
+        return Bounds{a.box.merged(b.box), a.finite && b.finite};
+      });
+  if (bounds.finite) return bounds.box;
   for (const std::uint32_t v : mesh.corners) {
-    if (mesh.vertices[v].allFinite()) {
-      bounds.extend(mesh.vertices[v]);
-      continue;
-    }
+    if (mesh.vertices[v].allFinite()) continue;
     const auto found = mesh.line_of_nonfinite.find(v);
     const std::string line =
         found == mesh.line_of_nonfinite.end() ? "" : "line " + std::to_string(found->second) + ": ";
@@ -57,7 +74,7 @@ Eigen::AlignedBox3d finite_bounds(const SourceFile& file, const PolygonMesh& mes
                    " (counted from 0) has a coordinate that is infinite or not a number. "
                    "Correct it, or remove the faces that use it");
   }
-  return bounds;
+  return bounds.box;
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <mutex>
 #include <numeric>
 #include <utility>
 
@@ -17,16 +19,32 @@ struct Shell {
   std::vector<std::pair<std::uint32_t, int>> containers = {};  ///< shell, its winding number here
 };
 
+/// A range of triangles at a time: those of one shell mostly follow one another.
+void find_boxes(const std::vector<Eigen::Vector3d>& vertices,
+                const std::vector<Triangle>& triangles, const Shells& shells,
+                std::vector<Shell>& result) {
+  std::mutex mutex;
+  const auto look_at = [&](const tbb::blocked_range<std::size_t>& range) {
+    for (std::size_t t = range.begin(); t < range.end();) {
+      const std::uint32_t shell = shells.of_triangle[t];
+      Eigen::AlignedBox3d box;
+      for (; t < range.end() && shells.of_triangle[t] == shell; ++t)
+        for (const std::uint32_t v : triangles[t]) box.extend(vertices[v]);
+      const std::scoped_lock lock(mutex);
+      result[shell].box.extend(box);
+    }
+  };
+  constexpr std::size_t kPart = 4096;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), kPart), look_at);
+}
+
 std::vector<Shell> measure(const std::vector<Eigen::Vector3d>& vertices,
                            const std::vector<Triangle>& triangles, const Shells& shells) {
   constexpr std::size_t kProbes = 9;
   std::vector<Shell> result(shells.count);
   std::vector<std::size_t> sizes(shells.count, 0), seen(shells.count, 0);
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    ++sizes[shells.of_triangle[t]];
-    for (const std::uint32_t v : triangles[t])
-      result[shells.of_triangle[t]].box.extend(vertices[v]);
-  }
+  for (const std::uint32_t s : shells.of_triangle) ++sizes[s];
+  find_boxes(vertices, triangles, shells, result);
   std::vector<double> terms(triangles.size());
   tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
     const Eigen::Vector3d origin = result[shells.of_triangle[t]].box.center();

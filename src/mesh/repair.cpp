@@ -23,7 +23,7 @@ namespace ist {
 namespace {
 
 void tidy(TriangleMesh& mesh) {
-  drop_degenerate(mesh.vertices, mesh.triangles);
+  drop_degenerate(mesh.vertices, mesh.triangles, EdgeTable(mesh.triangles));
   reduce_coincident(mesh.triangles, EdgeTable(mesh.triangles));
 }
 

@@ -1,6 +1,8 @@
 #include "mesh/surface_reduction.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <Eigen/Geometry>
@@ -47,17 +49,26 @@ void keep_only(std::vector<Triangle>& triangles, const std::vector<bool>& keep) 
 }  // namespace
 
 std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
-                                           std::vector<Triangle>& triangles) {
+                                           std::vector<Triangle>& triangles,
+                                           const EdgeTable& edges) {
+  tbb::enumerable_thread_specific<std::vector<std::uint32_t>> of_threads;
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
+    if (is_degenerate(vertices, triangles[t]))
+      of_threads.local().push_back(static_cast<std::uint32_t>(t));
+  });
+  std::vector<std::uint32_t> degenerate;
+  for (const auto& found : of_threads)
+    degenerate.insert(degenerate.end(), found.begin(), found.end());
+  std::sort(degenerate.begin(), degenerate.end());
   std::vector<bool> keep(triangles.size(), true);
   std::vector<std::uint32_t> open;
-  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+  for (const std::uint32_t t : degenerate) {
     if (has_repeated_corner(triangles[t]))
       keep[t] = false;
-    else if (is_degenerate(vertices, triangles[t]))
+    else
       open.push_back(t);
   }
   if (!open.empty()) {
-    const EdgeTable edges(triangles);
     std::vector<std::size_t> sides(edges.size());
     for (std::size_t e = 0; e < edges.size(); ++e) sides[e] = edges.sides(e).size();
     for (bool changed = true; changed;) {
@@ -74,7 +85,7 @@ std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& v
     }
   }
   std::vector<std::uint32_t> dropped;
-  for (std::uint32_t t = 0; t < triangles.size(); ++t)
+  for (const std::uint32_t t : degenerate)
     if (!keep[t]) dropped.push_back(t);
   if (!dropped.empty()) keep_only(triangles, keep);
   return dropped;

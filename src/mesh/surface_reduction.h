@@ -17,8 +17,10 @@ std::size_t count_odd_edges(const EdgeTable& edges);
 /// Removes triangles with repeated corners, and degenerate ones that hang on a border (two or more
 /// of their sides lie on odd edges). Those that close a crack between other triangles stay: without
 /// them the surface would be open. Returns those removed, by their indices before, ascending.
+/// `edges`: those of the triangles.
 std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
-                                           std::vector<Triangle>& triangles);
+                                           std::vector<Triangle>& triangles,
+                                           const EdgeTable& edges);
 
 /// Replaces triangles with the same three corners by their signed sum (docs/design.md 3.6): copies
 /// become one, opposite ones vanish. Where that leaves a border and one copy does not, one copy

@@ -13,6 +13,7 @@ namespace ist {
 /// Eight boxes side by side. A box that is not there is empty: lower = ∞, upper = −∞.
 struct alignas(64) EightBoxes {
   static constexpr std::size_t kWidth = 8;
+  EightBoxes() {}  // left as they are, for threads to fill
   float lower[3][kWidth], upper[3][kWidth];
 
   /// Bit k: box k meets box `lane` of `other`.

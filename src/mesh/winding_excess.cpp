@@ -1,6 +1,8 @@
 #include "mesh/winding_excess.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
@@ -184,12 +186,16 @@ class ExcessIntegral {
 
 /// The largest extent of a triangle along x.
 double longest_triangle(const MeshView& mesh) {
-  double longest = 0;
-  for (std::uint32_t t = 0; t < mesh.triangle_count; ++t) {
-    const Extent x(corners_of(mesh, t));
-    longest = std::max(longest, x.high - x.low);
-  }
-  return longest;
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::uint32_t>(0, mesh.triangle_count), 0.0,
+      [&](const tbb::blocked_range<std::uint32_t>& range, double longest) {
+        for (std::uint32_t t = range.begin(); t < range.end(); ++t) {
+          const Extent x(corners_of(mesh, t));
+          longest = std::max(longest, x.high - x.low);
+        }
+        return longest;
+      },
+      [](const double a, const double b) { return std::max(a, b); });
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 #include "bake/cluster/tree_builder.h"
 
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <set>
 
@@ -102,6 +104,41 @@ TEST(TreeOrder, SwapsShrinkBalls) {
   for (const Clustering clustering : {Clustering::two_means, Clustering::neural_gas})
     EXPECT_LT(cost(build_tree(spheres, {}, clustering, true), 1),
               0.95 * cost(build_tree(spheres, {}, clustering, false), 1));
+}
+
+/// All numbers of a tree that its order and its balls decide.
+std::vector<double> numbers_of(const TreeArrays& tree) {
+  std::vector<double> numbers(tree.sphere_index.begin(), tree.sphere_index.end());
+  for (const TreeLevelArrays& level : tree.levels)
+    for (const BallBlock& block : level.blocks)
+      for (const auto& values : {block.x, block.y, block.z, block.r})
+        numbers.insert(numbers.end(), values, values + kWidth);
+  for (const TreeLevelArrays& level : tree.levels)
+    for (const NodeBlock& nodes : level.nodes)
+      numbers.insert(numbers.end(), nodes.overlap, nodes.overlap + kWidth);
+  numbers.insert(numbers.end(), tree.root, tree.root + 4);
+  return numbers;
+}
+
+// Vectors of any width make the same tree, of spheres at random and of a lattice's, where many are
+// equally near.
+TEST(TreeOrder, IsTheSameOnEveryInstructionSet) {
+  std::vector<Sphere> lattice;
+  for (int i = 0; i < 1331; ++i)
+    lattice.push_back({static_cast<float>(i % 11) / 16, static_cast<float>(i / 11 % 11) / 16,
+                       static_cast<float>(i / 121) / 16, 1.0f / 24});
+  for (const std::vector<Sphere>& spheres : {random_spheres(1500, 5), lattice}) {
+    std::vector<double> first;
+    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+      hwy::SetSupportedTargetsForTest(target);
+      hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+      const std::vector<double> numbers = numbers_of(build_tree(spheres, {}));
+      if (first.empty()) first = numbers;
+      EXPECT_EQ(numbers, first) << hwy::TargetName(target);
+    }
+    hwy::SetSupportedTargetsForTest(0);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  }
 }
 
 // No random point lies in more spheres of a node than its κ, and κ is not idle.

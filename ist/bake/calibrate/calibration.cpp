@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <numeric>
+#include <utility>
 
 #include <ist/error.h>
 
@@ -92,10 +93,10 @@ class Calibrator {
 
 }  // namespace
 
-std::vector<Calibration> calibrate_prefixes(const MeshSolid& solid, SolidBackend& backend,
-                                            std::span<const Sphere> inner,
-                                            std::span<const std::size_t> counts,
-                                            const ProgressCallback& progress) {
+void calibrate_prefixes(const MeshSolid& solid, SolidBackend& backend,
+                        std::span<const Sphere> inner, std::span<const std::size_t> counts,
+                        const ProgressCallback& progress,
+                        const std::function<void(std::size_t, Calibration)>& take) {
   if (inner.empty()) throw Error("calibrate: no inner spheres");
   Stage stage("calibrate", progress);
   stage.step(inner.size(), 0);
@@ -103,22 +104,23 @@ std::vector<Calibration> calibrate_prefixes(const MeshSolid& solid, SolidBackend
   const double total =
       static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0}));
   double done = 0;
-  std::vector<Calibration> results;
-  for (const std::size_t count : counts) {
-    const double part = static_cast<double>(count) / total;
-    results.push_back(calibrator.run(inner.first(count), [&](double of_part) {
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const double part = static_cast<double>(counts[i]) / total;
+    take(i, calibrator.run(inner.first(counts[i]), [&](double of_part) {
       stage.step(inner.size(), 0.2 + 0.8 * (done + part * of_part));
     }));
     done += part;
   }
   stage.step(inner.size(), 1);
-  return results;
 }
 
 Calibration calibrate(const MeshSolid& solid, SolidBackend& backend, std::span<const Sphere> inner,
                       const ProgressCallback& progress) {
   const std::size_t all = inner.size();
-  return calibrate_prefixes(solid, backend, inner, {&all, 1}, progress).front();
+  Calibration result;
+  calibrate_prefixes(solid, backend, inner, {&all, 1}, progress,
+                     [&](std::size_t, Calibration made) { result = std::move(made); });
+  return result;
 }
 
 }  // namespace ist

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -27,10 +28,10 @@ Calibration calibrate(const MeshSolid& solid, SolidBackend& backend, std::span<c
                       const ProgressCallback& progress);
 
 /// The same for several prefixes of the spheres, each of `counts` by itself: what is made of the
-/// solid is shared.
-std::vector<Calibration> calibrate_prefixes(const MeshSolid& solid, SolidBackend& backend,
-                                            std::span<const Sphere> inner,
-                                            std::span<const std::size_t> counts,
-                                            const ProgressCallback& progress);
+/// solid is shared. `take(i, calibration)` is given each as soon as it is ready, in their order.
+void calibrate_prefixes(const MeshSolid& solid, SolidBackend& backend,
+                        std::span<const Sphere> inner, std::span<const std::size_t> counts,
+                        const ProgressCallback& progress,
+                        const std::function<void(std::size_t, Calibration)>& take);
 
 }  // namespace ist

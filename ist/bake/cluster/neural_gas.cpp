@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <numeric>
+#include <vector>
 
-#include <ist/asset_layout.h>
+#include "bake/cluster/gas_kernel.h"
 
 namespace ist {
 namespace {
@@ -16,18 +16,125 @@ constexpr int kEpochs = 24;
 constexpr int kSweeps = 20;
 constexpr std::size_t kPart = 256;  // balls that one thread takes
 
-struct Point {
-  double x = 0, y = 0, z = 0;
-};
-
-double squared_distance(const Ball& a, const Point& b) {
-  const double dx = a.x - b.x;
-  const double dy = a.y - b.y;
-  const double dz = a.z - b.z;
-  return dx * dx + dy * dy + dz * dz;
+/// Calls work(first, count) for parts of fixed size, whatever the number of threads.
+template <class Work>
+void in_parts(std::size_t size, const Work& work) {
+  const auto part = [&](std::size_t k) { work(k * kPart, std::min(kPart, size - k * kPart)); };
+  const std::size_t parts = (size + kPart - 1) / kPart;
+  if (parts == 1)
+    part(0);
+  else
+    tbb::parallel_for(std::size_t{0}, parts, part);
 }
 
-double weight(const Ball& ball) { return ball.r * ball.r * ball.r + 1e-30; }
+/// Shares out a range of balls, which come sorted, evenly among prototypes: first along the
+/// prototypes' order, nearest first, as far as there is room; then two groups at a time share out
+/// theirs anew, each ball to the prototype that it prefers, until nothing moves. Σ distance² falls
+/// every time.
+class EvenShares {
+ public:
+  EvenShares(std::span<const Ball> balls, std::span<std::uint32_t> range, const Prototypes& at,
+             std::size_t unit)
+      : range_(range), unit_(unit), groups_(at.count), distances2_(range.size()) {
+    in_parts(range.size(), [&](std::size_t first, std::size_t count) {
+      measure_all(balls, range.subspan(first, count), at, &distances2_[first]);
+    });
+    order_.resize(range.size());
+    std::iota(order_.begin(), order_.end(), 0u);
+  }
+
+  /// Groups of `unit` one after the other, each sorted.
+  void run() {
+    fill_in_turn();
+    for (std::size_t p = 0; p < groups_; ++p)
+      leads_[p] = least_leads(distances2_.data(), group(p), p);
+    std::array<int, kWidth> changed{};  // the sweep that last moved a ball of the group
+    for (int sweep = 1; sweep <= kSweeps; ++sweep) {
+      // Every two groups meet once a sweep, in turns in which each group has one partner: one stays
+      // and the others go round.
+      const std::size_t seats = groups_ + groups_ % 2;
+      for (std::size_t turn = 0; turn + 1 < seats; ++turn)
+        for (std::size_t k = 0; k < seats / 2; ++k) {
+          const std::size_t a = k == 0 ? seats - 1 : (turn + k) % (seats - 1);
+          const std::size_t b = (turn + seats - 1 - k) % (seats - 1);
+          const std::size_t p = std::min(a, b), q = std::max(a, b);
+          if (q < groups_ && share(p, q)) changed[p] = changed[q] = sweep;
+        }
+      if (*std::max_element(changed.begin(), changed.end()) < sweep) break;
+    }
+    // Which balls are where is settled; their order within a group is not until now.
+    std::vector<std::uint8_t> group_of(order_.size());
+    for (std::size_t p = 0; p < groups_; ++p)
+      for (const std::uint32_t i : group(p)) group_of[i] = static_cast<std::uint8_t>(p);
+    std::array<std::size_t, kWidth> next;
+    for (std::size_t p = 0; p < kWidth; ++p) next[p] = p * unit_;
+    const std::vector<std::uint32_t> balls(range_.begin(), range_.end());
+    for (std::size_t i = 0; i < balls.size(); ++i) range_[next[group_of[i]]++] = balls[i];
+  }
+
+ private:
+  /// A ball by its place in the range, and what it is sorted by.
+  struct Entry {
+    double key;
+    std::uint32_t ball;
+    bool operator<(const Entry& other) const {
+      return key != other.key ? key < other.key : ball < other.ball;
+    }
+  };
+
+  std::span<std::uint32_t> group(std::size_t p) {
+    const std::size_t begin = std::min(p * unit_, order_.size());
+    return std::span(order_).subspan(begin, std::min(unit_, order_.size() - begin));
+  }
+
+  void fill_in_turn() {
+    std::vector<Entry> rest;
+    for (std::size_t p = 0; p + 1 < groups_; ++p) {
+      const auto left = std::span(order_).subspan(p * unit_);
+      if (left.size() <= unit_) return;
+      rest.clear();
+      for (const std::uint32_t i : left) rest.push_back({distances2_[i][p], i});
+      std::nth_element(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(unit_), rest.end());
+      for (std::size_t i = 0; i < rest.size(); ++i) left[i] = rest[i].ball;
+    }
+  }
+
+  /// Shares out the balls of groups p and q anew. False: they stay as they are.
+  bool share(std::size_t p, std::size_t q) {
+    if (-leads_[p][q] < leads_[q][p]) return false;
+    const auto first = group(p), second = group(q);
+    if (first.empty() || second.empty()) return false;
+    // Those nearer to p's prototype come first.
+    pool_.clear();
+    for (const auto& part : {first, second})
+      for (const std::uint32_t i : part)
+        pool_.push_back({distances2_[i][p] - distances2_[i][q], i});
+    Entry* const begin = pool_.data();
+    Entry* const middle = begin + first.size();
+    Entry* const end = middle + second.size();
+    const Entry last = *std::max_element(begin, middle);
+    const Entry foremost = *std::min_element(middle, end);
+    if (last < foremost) return false;
+    // What is before all of the second stays there, and what is behind all of the first.
+    Entry* const unsure =
+        std::partition(begin, middle, [&](const Entry& entry) { return entry < foremost; });
+    Entry* const sure =
+        std::partition(middle, end, [&](const Entry& entry) { return !(last < entry); });
+    std::nth_element(unsure, middle, sure);
+    for (std::size_t k = 0; k < first.size(); ++k) first[k] = begin[k].ball;
+    for (std::size_t k = 0; k < second.size(); ++k) second[k] = middle[k].ball;
+    leads_[p] = least_leads(distances2_.data(), first, p);
+    leads_[q] = least_leads(distances2_.data(), second, q);
+    return true;
+  }
+
+  const std::span<std::uint32_t> range_;
+  const std::size_t unit_, groups_;
+  std::vector<PrototypeValues> distances2_;  ///< [place in the range]
+  std::vector<std::uint32_t> order_;         ///< places in the range, by group
+  std::array<PrototypeValues, kWidth> leads_;
+  std::vector<Entry> pool_;
+};
 
 class NeuralGas {
  public:
@@ -54,177 +161,53 @@ class NeuralGas {
     });
   }
 
-  /// What the balls of one part of a range say to the prototypes.
-  struct Pull {
-    std::array<Point, kWidth> sum{};
-    std::array<double, kWidth> total{};
-  };
-
-  Pull pull_of(std::span<const std::uint32_t> part, const std::vector<Point>& at,
-               const std::array<double, kWidth>& kernel) const {
-    Pull pull;
-    const std::size_t count = std::min<std::size_t>(at.size(), kWidth);
-    for (const std::uint32_t i : part) {
-      const Ball& ball = balls_[i];
-      std::array<double, kWidth> distance;
-      distance.fill(std::numeric_limits<double>::infinity());
-      for (std::size_t p = 0; p < count; ++p) distance[p] = squared_distance(ball, at[p]);
-      for (std::size_t p = 0; p < count; ++p) {
-        std::size_t rank = 0;  // counting beats sorting: no branch depends on the data
-        for (std::size_t q = 0; q < kWidth; ++q)
-          rank += q < p ? distance[q] <= distance[p] : distance[q] < distance[p];
-        const double w = kernel[rank] * weight(ball);
-        pull.sum[p].x += w * ball.x;
-        pull.sum[p].y += w * ball.y;
-        pull.sum[p].z += w * ball.z;
-        pull.total[p] += w;
-      }
-    }
-    return pull;
-  }
-
-  std::vector<Point> prototypes(std::span<const std::uint32_t> range, std::size_t count) const {
-    std::vector<Point> at(count);  // start at balls spread over the range, which is in some order
+  Prototypes prototypes(std::span<const std::uint32_t> range, std::size_t count) const {
+    Prototypes at;  // start at balls spread over the range, which is in some order
+    at.count = count;
     for (std::size_t p = 0; p < count; ++p) {
       const Ball& ball = balls_[range[(2 * p + 1) * range.size() / (2 * count)]];
-      at[p] = {ball.x, ball.y, ball.z};
+      at.x[p] = ball.x, at.y[p] = ball.y, at.z[p] = ball.z;
     }
+    // In parts of fixed size, added in their order: the same bits for any number of threads.
+    std::vector<GasPull> pulls((range.size() + kPart - 1) / kPart);
     // Neighbourhood range λ from half the prototypes towards zero, where this is plain k-means. The
     // kernel q^rank with q = λ / (1 + λ) stands for exp(−rank / λ): five operations make it.
     double lambda = static_cast<double>(count) / 2;
     for (int epoch = 0; epoch < kEpochs; ++epoch, lambda *= 0.75) {
-      std::array<double, kWidth> kernel{};
+      PrototypeValues kernel{};
       kernel[0] = 1;
       for (std::size_t k = 1; k < count; ++k) kernel[k] = kernel[k - 1] * (lambda / (1 + lambda));
-      // In parts of fixed size, added in their order: the same bits for any number of threads.
-      std::vector<Pull> pulls((range.size() + kPart - 1) / kPart);
-      const auto pull = [&](std::size_t k) {
-        const std::size_t first = k * kPart;
-        pulls[k] = pull_of(range.subspan(first, std::min(kPart, range.size() - first)), at, kernel);
-      };
-      if (pulls.size() > 1) {
-        tbb::parallel_for(std::size_t{0}, pulls.size(), pull);
-      } else {
-        pull(0);
-      }
+      in_parts(range.size(), [&](std::size_t first, std::size_t size) {
+        pulls[first / kPart] = pull_of(balls_, range.subspan(first, size), at, kernel);
+      });
       for (std::size_t p = 0; p < count; ++p) {
-        Point sum;
-        double total = 0;
-        for (const Pull& part : pulls) {
-          sum.x += part.sum[p].x;
-          sum.y += part.sum[p].y;
-          sum.z += part.sum[p].z;
+        double x = 0, y = 0, z = 0, total = 0;
+        for (const GasPull& part : pulls) {
+          x += part.x[p];
+          y += part.y[p];
+          z += part.z[p];
           total += part.total[p];
         }
-        if (total > 0) at[p] = {sum.x / total, sum.y / total, sum.z / total};
+        if (total > 0) at.x[p] = x / total, at.y[p] = y / total, at.z[p] = z / total;
       }
     }
     return at;
   }
 
   /// Sorts `range` into groups of `unit`, the last of what remains; the last ball stays last if
-  /// `pinned`. Starts in the order of the range; then two groups at a time share out their balls
-  /// anew, each to the prototype it prefers, until nothing moves: Σ distance² falls every time.
-  void assign(std::span<std::uint32_t> range, std::vector<Point> at, std::size_t unit,
+  /// `pinned`.
+  void assign(std::span<std::uint32_t> range, const Prototypes& prototypes, std::size_t unit,
               bool pinned) const {
-    const std::size_t groups = at.size();
+    Prototypes at = prototypes;
     if (pinned) {
-      const Ball& last = balls_[range.back()];
-      const auto nearest =
-          std::min_element(at.begin(), at.end(), [&](const Point& a, const Point& b) {
-            return squared_distance(last, a) < squared_distance(last, b);
-          });
-      std::iter_swap(nearest, at.end() - 1);
+      PrototypeValues distance2;
+      measure_all(balls_, range.last(1), at, &distance2);
+      const auto nearest = static_cast<std::size_t>(
+          std::min_element(distance2.begin(), distance2.end()) - distance2.begin());
+      for (PrototypeValues* const values : {&at.x, &at.y, &at.z})
+        std::swap((*values)[nearest], (*values)[at.count - 1]);
     }
-    // First shares along the prototypes' order, nearest first, as far as there is room.
-    fill_in_turn(range.first(range.size() - pinned), at, unit);
-    const auto all = range.first(range.size() - pinned);
-    std::vector<int> changed(groups, 0);  // the sweep that last moved a ball of the group
-    for (int sweep = 1; sweep <= kSweeps; ++sweep) {
-      // Every two groups meet once a sweep, in turns in which each group has one partner: one stays
-      // and the others go round.
-      const std::size_t seats = groups + groups % 2;
-      for (std::size_t turn = 0; turn + 1 < seats; ++turn) {
-        const auto meet = [&](std::size_t k) {
-          const std::size_t a = k == 0 ? seats - 1 : (turn + k) % (seats - 1);
-          const std::size_t b = (turn + seats - 1 - k) % (seats - 1);
-          const std::size_t p = std::min(a, b), q = std::max(a, b);
-          if (q >= groups) return;
-          // Two groups that are as they were when they last met have nothing to share.
-          if (changed[p] < sweep - 1 && changed[q] < sweep - 1) return;
-          if (share(all, at, unit, p, q)) changed[p] = changed[q] = sweep;
-        };
-        if (unit >= kPart) {
-          tbb::parallel_for(std::size_t{0}, seats / 2, meet);
-        } else {
-          for (std::size_t k = 0; k < seats / 2; ++k) meet(k);
-        }
-      }
-      if (*std::max_element(changed.begin(), changed.end()) < sweep) break;
-    }
-    // Which balls are where is settled; their order within a group is not until now.
-    for (std::size_t begin = 0; begin < range.size(); begin += unit) {
-      const auto group = range.subspan(begin, std::min(unit, range.size() - begin));
-      std::sort(group.begin(), group.end() - (pinned && begin + unit >= range.size()));
-    }
-  }
-
-  /// Group by group, the balls that are nearest to its prototype among those that are left.
-  void fill_in_turn(std::span<std::uint32_t> range, const std::vector<Point>& at,
-                    std::size_t unit) const {
-    struct Near {
-      double distance2;
-      std::uint32_t ball;
-    };
-    std::vector<Near> rest(range.size());
-    for (std::size_t p = 0; p + 1 < at.size(); ++p) {
-      const std::size_t taken = p * unit;
-      if (range.size() - taken <= unit) return;
-      rest.resize(range.size() - taken);
-      for (std::size_t i = 0; i < rest.size(); ++i)
-        rest[i] = {squared_distance(balls_[range[taken + i]], at[p]), range[taken + i]};
-      std::nth_element(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(unit), rest.end(),
-                       [](const Near& a, const Near& b) {
-                         return a.distance2 != b.distance2 ? a.distance2 < b.distance2
-                                                           : a.ball < b.ball;
-                       });
-      for (std::size_t i = 0; i < rest.size(); ++i) range[taken + i] = rest[i].ball;
-    }
-  }
-
-  bool share(std::span<std::uint32_t> range, const std::vector<Point>& at, std::size_t unit,
-             std::size_t p, std::size_t q) const {
-    const auto group = [&](std::size_t g) {
-      return range.subspan(g * unit, std::min(unit, range.size() - g * unit));
-    };
-    const auto first = group(p);
-    const auto second = group(q);
-    struct Member {
-      double preference;  // negative: nearer to p's prototype
-      std::uint32_t ball;
-      bool was_first;
-    };
-    std::vector<Member> pool;
-    pool.reserve(first.size() + second.size());
-    for (const auto part : {first, second})
-      for (const std::uint32_t i : part)
-        pool.push_back({squared_distance(balls_[i], at[p]) - squared_distance(balls_[i], at[q]), i,
-                        part.data() == first.data()});
-    std::nth_element(pool.begin(), pool.begin() + static_cast<std::ptrdiff_t>(first.size()),
-                     pool.end(), [](const Member& a, const Member& b) {
-                       return a.preference != b.preference ? a.preference < b.preference
-                                                           : a.ball < b.ball;
-                     });
-    bool moved = false;
-    for (std::size_t k = 0; k < pool.size(); ++k) {
-      if (k < first.size()) {
-        first[k] = pool[k].ball;
-        moved |= !pool[k].was_first;
-      } else {
-        second[k - first.size()] = pool[k].ball;
-      }
-    }
-    return moved;
+    EvenShares(balls_, range.first(range.size() - pinned), at, unit).run();
   }
 
   std::span<const Ball> balls_;

@@ -2,11 +2,12 @@
 
 #include <tbb/parallel_for.h>
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <numeric>
-#include <optional>
+#include <utility>
 
 #include <ist/asset_layout.h>
+#include "bake/cluster/swap_kernel.h"
 
 namespace ist {
 namespace {
@@ -17,49 +18,10 @@ constexpr int kMaxRounds = 40;
 constexpr double kReach = 0.25;
 constexpr double kLeastGain = 1e-4;  ///< relative to the two groups' cost; smaller ones are noise
 
-struct Swap {
-  double gain = 0;
-  std::uint32_t a = 0, b = 0;  ///< groups
-  std::uint32_t s = 0, t = 0;  ///< entries of a and of b
-};
-
-struct Group {
-  std::vector<Ball> members;
-  double x[kWidth] = {}, y[kWidth] = {}, z[kWidth] = {}, r[kWidth] = {};  ///< of the members
-  Ball ball;
-  std::vector<Ball> without;  ///< bounding ball without each member
-  double least_radius = 0;    ///< of `without`
-};
-
-/// Lower bounds of a group's radius once a ball joins it in place of a member.
-struct Fit {
-  double farthest = 0;  ///< half of the way across the ball and the member it is farthest from
-  double next = 0;      ///< and the member after that
-  std::size_t member = 0;
-
-  Fit(const Group& group, const Ball& added) {
-    double radius[kWidth];
-    for (std::size_t i = 0; i < kWidth; ++i)
-      radius[i] =
-          (reach(added.x, added.y, added.z, {group.x[i], group.y[i], group.z[i], group.r[i]}) +
-           added.r) /
-          2;
-    for (std::size_t i = 0; i < group.members.size(); ++i) {
-      if (radius[i] > farthest) {
-        next = farthest;
-        farthest = radius[i];
-        member = i;
-      } else if (radius[i] > next) {
-        next = radius[i];
-      }
-    }
-  }
-
-  double least_radius(const Group& group, std::size_t left_out) const {
-    const double across = left_out == member ? next : farthest;
-    const double rest = group.without[left_out].r;
-    return across > rest ? across : rest;
-  }
+/// Two groups, and the best swap between them as they are now.
+struct Pair {
+  std::uint32_t a = 0, b = 0;
+  MemberSwap swap = {};
 };
 
 class GroupSwaps {
@@ -69,87 +31,63 @@ class GroupSwaps {
         last_stays_(last_stays),
         order_(order),
         groups_((order.size() + kWidth - 1) / kWidth) {
-    tbb::parallel_for(std::size_t{0}, groups_.size(), [&](std::size_t g) { refresh(g); });
+    tbb::parallel_for(std::size_t{0}, groups_.size(), [&](std::size_t g) { measure(g); });
     double sum = 0;
-    for (const Group& group : groups_) sum += group.ball.r;
+    for (const SwapGroup& group : groups_) sum += group.ball.r;
     reach_ = kReach * sum / static_cast<double>(groups_.size());
   }
 
   void run() {
     find_pairs();
-    std::vector<char> changed(groups_.size(), 1);
+    std::vector<char> touched(groups_.size(), 1);
+    std::vector<std::uint32_t> stale, gaining, of_round;
     for (int round = 0; round < kMaxRounds; ++round) {
-      std::vector<Swap> swaps(pairs_.size());
-      tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t p) {
-        const auto [a, b] = pairs_[p];
-        if (changed[a] != 0 || changed[b] != 0) swaps[p] = best_swap(a, b);
+      stale.clear();
+      for (std::uint32_t p = 0; p < pairs_.size(); ++p)
+        if (touched[pairs_[p].a] != 0 || touched[pairs_[p].b] != 0) stale.push_back(p);
+      tbb::parallel_for(std::size_t{0}, stale.size(), [&](std::size_t i) {
+        Pair& pair = pairs_[stale[i]];
+        pair.swap = best_swap(groups_[pair.a], groups_[pair.b], reach_, kLeastGain, pinned(pair.a),
+                              pinned(pair.b));
       });
-      std::erase_if(swaps, [](const Swap& swap) { return swap.gain <= 0; });
-      if (swaps.empty()) return;
-      std::sort(swaps.begin(), swaps.end(), [](const Swap& x, const Swap& y) {
-        if (x.gain != y.gain) return x.gain > y.gain;
-        return x.a != y.a ? x.a < y.a : x.b < y.b;
+      // Of the others none gains: each was carried out, or lost against one that touched it.
+      gaining.clear();
+      for (const std::uint32_t p : stale)
+        if (pairs_[p].swap.gain > 0) gaining.push_back(p);
+      if (gaining.empty()) return;
+      std::sort(gaining.begin(), gaining.end(), [&](std::uint32_t p, std::uint32_t q) {
+        const double of_p = pairs_[p].swap.gain, of_q = pairs_[q].swap.gain;
+        return of_p != of_q ? of_p > of_q : p < q;
       });
       // The best swap of each group; what it blocks is found again in the next round.
-      std::vector<char> touched(groups_.size(), 0);
-      std::vector<char> retry(groups_.size(), 0);
-      for (const Swap& swap : swaps) {
-        if (touched[swap.a] != 0 || touched[swap.b] != 0) {
-          retry[swap.a] = retry[swap.b] = 1;
-          continue;
-        }
-        touched[swap.a] = touched[swap.b] = 1;
-        std::swap(order_[swap.a * kWidth + swap.s], order_[swap.b * kWidth + swap.t]);
+      std::fill(touched.begin(), touched.end(), 0);
+      of_round.clear();
+      for (const std::uint32_t p : gaining) {
+        const auto& [a, b, swap] = pairs_[p];
+        if (touched[a] != 0 || touched[b] != 0) continue;
+        touched[a] = touched[b] = 1;
+        std::swap(order_[a * kWidth + swap.s], order_[b * kWidth + swap.t]);
+        of_round.insert(of_round.end(), {a, b});
       }
-      tbb::parallel_for(std::size_t{0}, groups_.size(), [&](std::size_t g) {
-        if (touched[g] != 0) refresh(g);
-      });
-      for (std::size_t g = 0; g < groups_.size(); ++g)
-        changed[g] = touched[g] != 0 || retry[g] != 0;
+      tbb::parallel_for(std::size_t{0}, of_round.size(),
+                        [&](std::size_t i) { measure(of_round[i]); });
     }
   }
 
  private:
-  double cost(double radius) const {
-    const double r = radius + reach_;
-    return r * r * r;
+  void measure(std::size_t g) {
+    BallLanes& members = groups_[g].members;
+    const std::size_t begin = g * kWidth;
+    const std::size_t count = std::min<std::size_t>(kWidth, order_.size() - begin);
+    for (std::size_t i = 0; i < count; ++i) members.put(i, balls_[order_[begin + i]]);
+    members.close(count);
+    measure_group(groups_[g]);
   }
 
-  void refresh(std::size_t g) {
-    Group& group = groups_[g];
-    fill(group, g);
-    group.least_radius = group.ball.r;
-    for (const Ball& ball : group.without)
-      group.least_radius = std::min(group.least_radius, ball.r);
-  }
-
-  void fill(Group& group, std::size_t g) const {
-    group.members.clear();
-    const std::size_t end = std::min(order_.size(), (g + 1) * kWidth);
-    for (std::size_t i = g * kWidth; i < end; ++i) {
-      const Ball& ball = balls_[order_[i]];
-      const std::size_t lane = group.members.size();
-      group.members.push_back(ball);
-      group.x[lane] = ball.x, group.y[lane] = ball.y, group.z[lane] = ball.z,
-      group.r[lane] = ball.r;
-    }
-    group.ball = bounding_ball(group.members);
-    group.without.assign(group.members.size(), group.ball);
-    if (group.members.size() == 1) group.without[0].r = 0;
-    if (group.members.size() < 2) return;
-    for (std::size_t i = 0; i < group.members.size(); ++i) {
-      // Only a ball that touches the bounding ball from inside holds it at its size.
-      if (reach(group.ball.x, group.ball.y, group.ball.z, group.members[i]) <
-          group.ball.r * (1 - 1e-9))
-        continue;
-      std::vector<Ball> rest = group.members;
-      rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(i));
-      group.without[i] = bounding_ball(rest);
-    }
-  }
-
-  bool pinned(std::uint32_t g, std::size_t member) const {
-    return last_stays_ && g * kWidth + member + 1 == order_.size();
+  /// Which of the group's members stays.
+  std::size_t pinned(std::uint32_t g) const {
+    const bool holds_last = std::size_t{g} + 1 == groups_.size();
+    return last_stays_ && holds_last ? groups_[g].members.count - 1 : kNoMember;
   }
 
   void find_pairs() {
@@ -162,82 +100,44 @@ class GroupSwaps {
       return xg != xh ? xg < xh : g < h;
     });
     double largest = 0;
-    for (const Group& group : groups_) largest = std::max(largest, group.ball.r);
+    for (const SwapGroup& group : groups_) largest = std::max(largest, group.ball.r);
     const std::size_t count = std::min(kNeighbours, groups_.size() - 1);
     using Near = std::pair<double, std::uint32_t>;
-    std::vector<std::vector<Near>> found(groups_.size());
+    std::vector<std::uint64_t> found(groups_.size() * count);
     tbb::parallel_for(std::size_t{0}, groups_.size(), [&](std::size_t k) {
-      std::vector<Near>& near = found[k];
+      std::array<Near, kNeighbours> near;
+      std::size_t size = 0;
       const Ball& ball = groups_[along[k]].ball;
       const auto look = [&](std::size_t at) {
         const Ball& other = groups_[along[at]].ball;
         const Near here = {reach(ball.x, ball.y, ball.z, other) - 2 * other.r, along[at]};
-        if (near.size() == count) {
-          if (!(here < near.back())) return;
-          near.pop_back();
-        }
-        near.insert(std::upper_bound(near.begin(), near.end(), here), here);
+        if (size == count && !(here < near[size - 1])) return;
+        size = std::min(size + 1, count);
+        std::size_t place = size - 1;
+        for (; place > 0 && here < near[place - 1]; --place) near[place] = near[place - 1];
+        near[place] = here;
       };
       const auto beyond = [&](double away) {
-        return near.size() == count && away - largest > near.back().first + 1e-9;
+        return size == count && away - largest > near[size - 1].first + 1e-9;
       };
       for (std::size_t at = k; at-- > 0 && !beyond(x(k) - x(at));) look(at);
       for (std::size_t at = k + 1; at < along.size() && !beyond(x(at) - x(k)); ++at) look(at);
+      for (std::size_t i = 0; i < count; ++i)
+        found[k * count + i] = std::uint64_t{std::min(along[k], near[i].second)} << 32 |
+                               std::max(along[k], near[i].second);
     });
-    for (std::size_t k = 0; k < found.size(); ++k)
-      for (const Near& near : found[k])
-        pairs_.emplace_back(std::min(along[k], near.second), std::max(along[k], near.second));
-    std::sort(pairs_.begin(), pairs_.end());
-    pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
-  }
-
-  static double radius_with(const Group& group, std::size_t left_out, const Ball& added) {
-    const Ball& rest = group.without[left_out];
-    if (reach(rest.x, rest.y, rest.z, added) <= rest.r) return rest.r;
-    std::vector<Ball> members = group.members;
-    members[left_out] = added;
-    return bounding_ball(members).r;
-  }
-
-  Swap best_swap(std::uint32_t a, std::uint32_t b) const {
-    const Group& ga = groups_[a];
-    const Group& gb = groups_[b];
-    const double now = cost(ga.ball.r) + cost(gb.ball.r);
-    Swap best;
-    best.gain = kLeastGain * now;
-    const double least_cost_b = cost(gb.least_radius);
-    if (now - cost(ga.least_radius) - least_cost_b <= best.gain) return {};
-    bool found = false;
-    double without_b[kWidth] = {};
-    for (std::size_t t = 0; t < gb.members.size(); ++t) without_b[t] = cost(gb.without[t].r);
-    std::optional<Fit> into_a[kWidth];
-    for (std::uint32_t s = 0; s < ga.members.size(); ++s) {
-      const double without_a = cost(ga.without[s].r);
-      if (pinned(a, s) || now - without_a - least_cost_b <= best.gain) continue;
-      const Fit into_b(gb, ga.members[s]);
-      for (std::uint32_t t = 0; t < gb.members.size(); ++t) {
-        if (pinned(b, t) || now - without_a - without_b[t] <= best.gain) continue;
-        const double least_b = cost(into_b.least_radius(gb, t));
-        if (now - without_a - least_b <= best.gain) continue;
-        if (!into_a[t]) into_a[t].emplace(ga, gb.members[t]);
-        const double least_a = cost(into_a[t]->least_radius(ga, s));
-        if (now - least_a - least_b <= best.gain) continue;
-        const double cost_a = cost(radius_with(ga, s, gb.members[t]));
-        if (now - cost_a - least_b <= best.gain) continue;
-        const double gain = now - cost_a - cost(radius_with(gb, t, ga.members[s]));
-        if (gain <= best.gain) continue;
-        best = {gain, a, b, s, t};
-        found = true;
-      }
-    }
-    return found ? best : Swap{};
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    pairs_.reserve(found.size());
+    for (const std::uint64_t key : found)
+      pairs_.push_back({static_cast<std::uint32_t>(key >> 32), static_cast<std::uint32_t>(key)});
   }
 
   std::span<const Ball> balls_;
   bool last_stays_;
   std::vector<std::uint32_t>& order_;
-  std::vector<Group> groups_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;
+  std::vector<SwapGroup> groups_;
+  std::vector<Pair> pairs_;
   double reach_ = 0;
 };
 

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <ist/asset_layout.h>
+#include "bake/cluster/bounding_ball.h"
+
+namespace ist {
+
+/// One to sixteen balls, coordinate by coordinate; lanes behind them repeat the first.
+struct BallLanes {
+  alignas(64) std::array<double, kWidth> x, y, z, r;
+  std::size_t count = 0;
+
+  Ball ball(std::size_t lane) const { return {x[lane], y[lane], z[lane], r[lane]}; }
+
+  void put(std::size_t lane, const Ball& ball) {
+    x[lane] = ball.x;
+    y[lane] = ball.y;
+    z[lane] = ball.z;
+    r[lane] = ball.r;
+  }
+
+  /// The balls are lanes 0 … balls − 1, which are put already.
+  void close(std::size_t balls) {
+    count = balls;
+    for (std::size_t lane = balls; lane < kWidth; ++lane) put(lane, ball(0));
+  }
+};
+
+}  // namespace ist
