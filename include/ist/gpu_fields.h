@@ -44,8 +44,8 @@ class GpuFields {
 /// answers[i] = penetration(pairs[i]) of a field, held still, and a tree, finished:
 /// pairs.asset_a are places in `fields`, pairs.asset_b in `assets`.
 ///
-/// All is summed in double: the volume is within 1e-9 of the CPU's or of that part of the spheres
-/// that the surface crosses, gradients likewise.
+/// All is summed in double: the volume is within 1e-9 of the CPU's, or of a millionth of the tree's
+/// size³ where that is more, and gradients are as near.
 /// The same bits in every run, whatever else is in the batch.
 /// node_visits are nodes of the tree and of a mesh's surface that were opened.
 /// Only launches kernels on `stream`: allocates nothing and waits for nothing, so that a CUDA graph

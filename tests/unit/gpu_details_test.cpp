@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <random>
+#include <string>
 
 #include "support/detailed_pairs.h"
 #include "support/host_batch.h"
+#include "support/oracle_assets.h"
 
 // The GPU's batch of trees at several levels of detail, its source run by teams of the host,
 // against the CPU's query: under pair budgets, and of copies of one asset that all but coincide.
@@ -62,6 +65,42 @@ TEST(GpuDetails, BudgetsAreTheCpus) {
   EXPECT_GT(changed, 200u);
   // The inner measure has no levels.
   expect_same_bits(batch.run(pairs, Measure::inner, 0, 40), batch.run(pairs, Measure::inner));
+}
+
+TEST(GpuDetails, OracleRowsUnderABudgetAreTheCpus) {
+  IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
+  constexpr std::size_t kSpheres = 1000;
+  std::vector<TreeView> trees;
+  std::map<std::string, std::uint32_t> known;
+  const auto number_of = [&](const std::string& mesh) {
+    const auto [at, fresh] = known.emplace(mesh, static_cast<std::uint32_t>(trees.size()));
+    if (fresh) trees.push_back(oracle_asset(mesh, kSpheres).view());
+    return at->second;
+  };
+  const std::vector<OracleRow> rows = read_oracle_rows("eledino");
+  std::vector<BatchPair> pairs;
+  for (const OracleRow& row : rows)
+    pairs.push_back(
+        {number_of(row.mesh_a), number_of(row.mesh_b), Pose{}, row.pose, 1, row.scale_b});
+  HostBatch batch(trees);
+  Workspace workspace;
+  PenetrationSettings settings;
+  settings.field = FieldUse::never;
+  const std::vector<Penetration> whole = batch.run(pairs, Measure::matched);
+  for (const std::uint32_t budget : {0u, 150u, 600u}) {
+    settings.pair_budget = budget;
+    const std::vector<Penetration> answers = batch.run(pairs, Measure::matched, 0, budget);
+    std::size_t changed = 0;
+    Off off;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const auto [a, b] = placed(rows[i], kSpheres);
+      off.look(answers[i], penetration(a, b, settings, workspace),
+               std::cbrt(b.tree.volume()) * b.scale);
+      changed += answers[i].volume != whole[i].volume ? 1 : 0;
+    }
+    EXPECT_TRUE(budget == 0 ? changed == 0 : changed > 10) << changed;
+    off.expect_small(("oracle rows, budget " + std::to_string(budget)).c_str());
+  }
 }
 
 TEST(GpuDetails, CoincidentCopiesAreTheCpus) {
