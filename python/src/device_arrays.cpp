@@ -1,6 +1,7 @@
 #include "device_arrays.h"
 
 #include <pybind11/numpy.h>
+#include <pybind11/stl.h>
 
 #include <algorithm>
 #include <cstring>
@@ -96,7 +97,9 @@ Described by_dlpack(const py::object& value, const WantedArray& wanted, int devi
           py::arg("stream") = handle,
           py::arg("max_version") = py::make_tuple(dlpack::kVersion.major, dlpack::kVersion.minor));
     } catch (py::error_already_set& error) {
-      if (!error.matches(PyExc_TypeError)) throw;
+      const bool unknown = error.matches(PyExc_TypeError) &&
+                           std::string(error.what()).find("max_version") != std::string::npos;
+      if (!unknown) throw;
       capsule = export_by(py::arg("stream") = handle);  // of a framework that knows no versions
     }
   } catch (py::error_already_set& error) {
@@ -317,8 +320,9 @@ py::array to_numpy(const DeviceArray& self) {
                 std::vector<py::ssize_t>(self.shape.begin(), self.shape.end()));
   void* const to = out.mutable_data();
   const auto bytes = static_cast<std::size_t>(out.nbytes());
+  const DeviceArray held = self;  // another thread may have it written again meanwhile
   const py::gil_scoped_release released;
-  cuda::copy_to_host(to, self.data, bytes, self.block->device(), *self.ready);
+  cuda::copy_to_host(to, held.data, bytes, held.block->device(), *held.ready);
   return out;
 }
 

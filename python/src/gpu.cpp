@@ -60,7 +60,7 @@ class DeviceAssets {
       workspace_captured_ = true;
       return nullptr;
     }
-    while (in_flight_.size() > 1 && in_flight_.front().done->passed()) in_flight_.pop_front();
+    while (!in_flight_.empty() && in_flight_.front().done->passed()) in_flight_.pop_front();
     in_flight_.push_back({std::make_shared<cuda::Moment>(device, stream), std::move(lent)});
     return in_flight_.back().done;
   }
@@ -88,7 +88,7 @@ class DeviceAssets {
   std::unique_ptr<GpuWorkspace> workspace_;
   bool workspace_captured_ = false;
   std::vector<std::unique_ptr<GpuWorkspace>> captured_;
-  std::deque<Batch> in_flight_;  ///< and the last that was
+  std::deque<Batch> in_flight_;
 };
 
 /// A column that a batch can write.
@@ -310,10 +310,10 @@ DevicePenetrations penetrations(DeviceAssets& assets, const py::object& asset_a,
     take_columns(out, pairs.count, device, on, answers, found, arguments.lent);
   }
   const auto done = assets.launch(pairs, which, answers, on, std::move(arguments.lent));
-  for (auto& [k, array] : made) {
-    array.ready = done;
-    found.column[k] = py::cast(std::move(array));
-  }
+  for (auto& [k, array] : made) found.column[k] = py::cast(std::move(array));
+  if (done != nullptr)
+    for (const py::object& column : found.column)
+      if (column && py::isinstance<DeviceArray>(column)) column.cast<DeviceArray&>().ready = done;
   return found;
 }
 
