@@ -42,3 +42,10 @@ def random_poses():
         return poses
 
     return make
+
+
+def pytest_sessionfinish(session, exitstatus):
+    """Where every test was skipped, ctest is told so."""
+    kinds = set(session.config.pluginmanager.get_plugin("terminalreporter").stats) - {""}
+    if kinds == {"skipped"}:
+        session.exitstatus = 77
