@@ -333,7 +333,7 @@ Arrays are those of any framework, in the memory of the assets' device, in C ord
 __dlpack__ or __cuda_array_interface__, never copied, and held until the batch is done. One that
 does not fit is a TypeError or a ValueError that names it.
 
-By lenses: answers are those of ist.penetration(…, field='never') within 1e-6 of the volume. The
+By lenses, as ist.penetration(…, field='never'): volumes are within 1e-6 of the sum in double. The
 same bits in every run, whatever else is in the batch. Rows that are invalid are all zero, with the
 status invalid_input.
 Nothing waits on the host, but in the first batch that is larger than all before. A stream that is
