@@ -5,7 +5,7 @@ The energy is the sum of all overlap volumes, its gradient the library's own; Ad
 Solids swell while they go, from a third of their size: large ones that are stuck in each other pull
 both ways at once. In the end they are asked a little larger than they are, so that nothing is left
 between the real ones.
-usage: pile.py [--objects N] [--seed S] [--picture PNG]
+usage: pile.py [--objects N] [--seed S] [--device cpu|cuda] [--picture PNG]
 """
 import argparse
 import time
@@ -34,10 +34,10 @@ def heap(random, objects):
     return poses
 
 
-def push_apart(solids, poses, pairs, scales, most_steps=2000):
+def push_apart(solids, poses, pairs, scales, device="cpu", most_steps=2000):
     """Poses without overlap, and the energies [u³] on the way there."""
-    moved = torch.tensor(poses, requires_grad=True)
-    grown = torch.tensor(scales * MARGIN)
+    moved = torch.tensor(poses, device=device, requires_grad=True)
+    grown = torch.tensor(scales * MARGIN, device=device)
     descent = torch.optim.Adam([moved], lr=0.03 * SIZE, betas=(0.8, 0.9))
     energies = []
     for step in range(most_steps):
@@ -52,13 +52,14 @@ def push_apart(solids, poses, pairs, scales, most_steps=2000):
             descent.step()
             with torch.no_grad():  # Adam's steps are no smaller for a longer quaternion: keep it
                 moved[:, :4] /= moved[:, :4].norm(dim=1, keepdim=True)
-    return moved.detach().numpy(), energies
+    return moved.detach().cpu().numpy(), energies
 
 
 def main():
     options = argparse.ArgumentParser()
     options.add_argument("--objects", type=int, default=50)
     options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--device", default="cpu")
     options.add_argument("--picture")
     options = options.parse_args()
 
@@ -71,7 +72,7 @@ def main():
 
     poses = heap(np.random.default_rng(options.seed), options.objects)
     start = time.perf_counter()
-    apart, energies = push_apart(solids, poses, pairs, scales)
+    apart, energies = push_apart(solids, poses, pairs, scales, options.device)
     seconds = time.perf_counter() - start
 
     before = ist.penetration_of_pairs(solids, poses, pairs, scales=scales)

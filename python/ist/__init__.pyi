@@ -12,6 +12,8 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import gpu as gpu
+
 __version__: str
 
 _Path = str | os.PathLike[str]

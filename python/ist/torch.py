@@ -1,8 +1,9 @@
 """Overlap volumes that PyTorch can differentiate.
 
-`from ist.torch import overlap`: the library's own gradients, in float64, on the CPU.
+`from ist.torch import overlap`: the library's own gradients, in float64, on the CPU or a GPU.
 """
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -21,15 +22,20 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: torch.Tensor, *, p
     poses: (k, 7), or (w, k, 7) for w scenes: qw, qx, qy, qz, tx [u], ty, tz. Any real dtype.
         Quaternions may have any length but 0: what is meant is q/|q|, and the gradient is that of
         V(q/|q|), so that a step along it changes a rotation and hardly the length.
+        On a GPU the volumes and gradients are made there (ist.gpu), and nothing waits on the host.
     pairs: (n, 2) numbers of solids, the second of each an Asset; None: all pairs of Assets, and each
         Field with each Asset.
-    scales: (k,) or (w, k) > 0; None: 1. Their gradient is the difference of two queries, 0.05 %
-        of the scale to either side, exact to some 1e-4, and takes three times as long.
+    scales: (k,) or (w, k) > 0, where the poses are; None: 1. Their gradient is the difference of two
+        queries, 0.05 % of the scale to either side, exact to some 1e-4, and takes three times as
+        long.
     settings: measure, field, pair_budget, min_radius, threads, … of ist.penetration. Limits that
-        stop a query leave its gradient without the part that was guessed.
+        stop a query leave its gradient without the part that was guessed. On a GPU there is measure
+        alone, solids are Assets, and volumes are by lenses: those of field="never" on the CPU.
 
-    Returns a tensor (n,) or (w, n) of the dtype of `poses`. Pairs of an invalid pose or scale are
-    NaN, and so are their gradients; they spoil no others. Differentiable once.
+    Returns a tensor (n,) or (w, n) of the dtype and the device of `poses`. Pairs of an invalid pose
+    or scale are NaN, and so are their gradients; they spoil no others. Differentiable once.
+
+    The last eight lists of solids and pairs that were asked about on a GPU stay there.
     """
     if pairs is None:
         pairs = all_pairs(solids)
@@ -47,43 +53,158 @@ def all_pairs(solids):
             [(a, b) for i, a in enumerate(assets) for b in assets[i + 1:]])
 
 
-def _on_the_cpu(tensor, name):
-    if tensor.device.type != "cpu":
-        raise TypeError(f"{name}: on {tensor.device}; wanted a tensor on the CPU")
-    return tensor.detach().to(torch.float64)
-
-
 class _Overlap(torch.autograd.Function):
     @staticmethod
     def forward(ctx, poses, scales, solids, pairs, settings):
-        given = _on_the_cpu(poses, "poses")
+        given = _doubles(poses, "poses", poses.device)
         length = given[..., :4].norm(dim=-1, keepdim=True)
         placed = torch.cat((given[..., :4] / length, given[..., 4:]), dim=-1)
-        answer = ist.penetration_of_pairs(
-            solids, placed.numpy(), pairs,
-            scales=None if scales is None else _on_the_cpu(scales, "scales").numpy(),
-            scale_gradients=scales is not None and ctx.needs_input_grad[1], **settings)
-        valid = torch.from_numpy(answer.status != ist.QueryStatus.invalid_input)
-        ctx.answer, ctx.pairs, ctx.length, ctx.valid = answer, pairs, length, valid
+        sizes = None if scales is None else _doubles(scales, "scales", poses.device)
+        ask = _ask_gpu if poses.device.type == "cuda" else _ask_cpu
+        ctx.answer = ask(solids, placed, pairs, sizes, ctx.needs_input_grad[:2], settings)
+        ctx.length = length
         ctx.like = [(x.shape, x.dtype) if x is not None else None for x in (poses, scales)]
-        return torch.where(valid, torch.from_numpy(answer.volume), torch.nan).to(poses.dtype)
+        return torch.where(ctx.answer.valid, ctx.answer.volume, torch.nan).to(poses.dtype)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx, slope):
-        poses_like, scales_like = ctx.like
-        answer, (first, second) = ctx.answer, torch.from_numpy(ctx.pairs.T.copy())
-        slope = torch.where(ctx.valid, slope.to(torch.float64), torch.nan)
+        answer = ctx.answer
+        slope = torch.where(answer.valid, slope.to(torch.float64), torch.nan)
         by_pose = by_scale = None
         if ctx.needs_input_grad[0]:
-            total = torch.zeros(poses_like[0], dtype=torch.float64)
-            for solid, gradient in (first, answer.pose_gradient_a), (second, answer.pose_gradient):
-                total.index_add_(-2, solid, slope[..., None] * torch.from_numpy(gradient))
+            shape, dtype = ctx.like[0]
+            total = slope.new_zeros(shape)
+            for solid, gradient in zip(answer.pairs, answer.pose_gradients()):
+                total.index_add_(-2, solid, slope[..., None] * gradient)
             total[..., :4] /= ctx.length
-            by_pose = total.to(poses_like[1])
+            by_pose = total.to(dtype)
         if ctx.needs_input_grad[1]:
-            total = torch.zeros(scales_like[0], dtype=torch.float64)
-            for solid, gradient in (first, answer.scale_gradient_a), (second, answer.scale_gradient):
-                total.index_add_(-1, solid, slope * torch.from_numpy(gradient))
-            by_scale = total.to(scales_like[1])
+            shape, dtype = ctx.like[1]
+            total = slope.new_zeros(shape)
+            for solid, gradient in zip(answer.pairs, answer.scale_gradients()):
+                total.index_add_(-1, solid, slope * gradient)
+            by_scale = total.to(dtype)
         return by_pose, by_scale, None, None, None
+
+
+def _doubles(tensor, name, device):
+    if device.type not in ("cpu", "cuda"):
+        raise TypeError(f"{name}: on {device}; wanted a tensor on the CPU or a CUDA device")
+    if tensor.device != device:
+        raise TypeError(f"{name}: on {tensor.device}; wanted a tensor on {device}, as poses are")
+    return tensor.detach().to(torch.float64)
+
+
+class _Answer:
+    """Of pairs, shape (n,) or (w, n): volume, whether it is `valid`, and both solids' gradients."""
+
+    def __init__(self, pairs, volume, valid, pose_gradients, scale_gradients):
+        self.pairs = pairs  # two (n,) numbers of solids
+        self.volume, self.valid = volume, valid
+        # Of A and of B; functions, as not everybody wants them.
+        self.pose_gradients, self.scale_gradients = pose_gradients, scale_gradients
+
+
+def _ask_cpu(solids, placed, pairs, scales, needs_gradient, settings):
+    found = ist.penetration_of_pairs(
+        solids, placed.numpy(), pairs, scales=None if scales is None else scales.numpy(),
+        scale_gradients=scales is not None and needs_gradient[1], **settings)
+
+    def tensors(*arrays):
+        return [torch.from_numpy(array) for array in arrays]
+
+    return _Answer(
+        torch.from_numpy(pairs.T.copy()), torch.from_numpy(found.volume),
+        torch.from_numpy(found.status != ist.QueryStatus.invalid_input),
+        lambda: tensors(found.pose_gradient_a, found.pose_gradient),
+        lambda: tensors(found.scale_gradient_a, found.scale_gradient))
+
+
+class _Scene:
+    """Solids and pairs of them on a device."""
+
+    def __init__(self, solids, pairs, device):
+        for k, solid in enumerate(solids):
+            if not isinstance(solid, ist.Asset):
+                raise TypeError(f"solids[{k}]: a {type(solid).__name__}; on a GPU solids are Assets")
+        for i, (first, second) in enumerate(pairs.tolist()):
+            if not (0 <= first < len(solids) and 0 <= second < len(solids)):
+                raise ValueError(f"pairs[{i}]: ({first}, {second}): there are solids 0 to "
+                                 f"{len(solids) - 1}")
+            if first == second:
+                raise ValueError(f"pairs[{i}]: ({first}, {second}): a solid does not meet itself")
+        places = {solid: k for k, solid in enumerate(dict.fromkeys(solids))}
+        self.assets = ist.gpu.Assets(list(places), device=device.index)
+        self.pairs = torch.from_numpy(pairs.T.copy()).to(device)
+        asset = torch.tensor([places[solid] for solid in solids], dtype=torch.int32, device=device)
+        self.asset = [asset[solid] for solid in self.pairs]
+
+
+@functools.lru_cache(maxsize=8)
+def _scene(solids, pairs, device):
+    return _Scene(solids, np.frombuffer(pairs, np.int64).reshape(-1, 2), device)
+
+
+def _ask_gpu(solids, placed, pairs, scales, needs_gradient, settings):
+    settings = dict(settings)
+    measure = settings.pop("measure", "matched")
+    if settings.pop("field", "never") != "never":
+        raise ValueError("field: on a GPU volumes are by lenses: 'never'")
+    for name in settings:
+        raise TypeError(f"{name}: there is no such setting on a GPU")
+    k = len(solids)
+    if placed.ndim not in (2, 3) or tuple(placed.shape[-2:]) != (k, 7):
+        raise ValueError(f"poses: shape {tuple(placed.shape)}; wanted ({k}, 7) or (w, {k}, 7)")
+    if scales is not None and scales.shape != placed.shape[:-1]:
+        raise ValueError(f"scales: shape {tuple(scales.shape)}; wanted {tuple(placed.shape[:-1])}")
+    scene = _scene(tuple(solids), pairs.tobytes(), placed.device)
+    shape = (*placed.shape[:-2], len(pairs))
+    wants_pose, wants_scale = needs_gradient[0], scales is not None and needs_gradient[1]
+    asset_a, asset_b = (asset.expand(shape).reshape(-1) for asset in scene.asset)
+    pose_a, pose_b = (placed[..., solid, :].reshape(-1, 7) for solid in scene.pairs)
+    scale_a = scale_b = None
+    if scales is not None:
+        scale_a, scale_b = (scales[..., solid].reshape(-1) for solid in scene.pairs)
+    rows = len(asset_a)
+
+    def ask(scale_b, *wanted):
+        out = {name: placed.new_empty((rows, 3) if name.endswith("gradient") else rows)
+               for name in wanted}
+        out["status"] = torch.empty(rows, dtype=torch.int32, device=placed.device)
+        ist.gpu.penetration(scene.assets, asset_a, asset_b, pose_a, pose_b, scale_a, scale_b,
+                            measure=measure, out=out,
+                            stream=torch.cuda.current_stream(placed.device).cuda_stream)
+        return out
+
+    gradients = ["translation_gradient", "rotation_gradient"] if wants_pose or wants_scale else []
+    found = ask(scale_b, "volume", *gradients)
+    away = pose_b[:, 4:] - pose_a[:, 4:]
+
+    def pose_gradients():
+        push, turn = (found[name] for name in gradients)
+        # What turns and moves B is undone by the same about A's origin.
+        turn_a = -(turn + torch.linalg.cross(away, push))
+        return [_by_pose(pose, *by).reshape(*shape, 7)
+                for pose, by in ((pose_a, (-push, turn_a)), (pose_b, (push, turn)))]
+
+    by_scale = None
+    if wants_scale:
+        # As on the CPU (python/src/penetration.cpp).
+        step = scale_b / 2048
+        more, less = (ask(scale_b + by, "volume")["volume"] for by in (step, -step))
+        by_b = (more - less) / (2 * step)
+        by_a = (3 * found["volume"] - scale_b * by_b
+                - (away * found["translation_gradient"]).sum(-1)) / scale_a
+        by_scale = [torch.where(found["volume"] > 0, by, 0.0).reshape(shape) for by in (by_a, by_b)]
+    return _Answer(scene.pairs, found["volume"].reshape(shape),
+                   (found["status"] != ist.QueryStatus.invalid_input).reshape(shape),
+                   pose_gradients, lambda: by_scale)
+
+
+def _by_pose(pose, push, turn):
+    """(n, 7): the slope by a pose of unit quaternion, from those by its translation and turning."""
+    w, v = pose[:, :1], pose[:, 1:4]
+    # A rotation vector δ moves the unit quaternion by ½ (0, δ) q.
+    return torch.cat((-2 * (turn * v).sum(-1, keepdim=True),
+                      2 * (w * turn + torch.linalg.cross(turn, v)), push), dim=-1)

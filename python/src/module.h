@@ -10,6 +10,7 @@ namespace py = pybind11;
 void add_meshes(py::module_& module);
 void add_assets(py::module_& module);
 void add_fields(py::module_& module);
+void add_gpu(py::module_& package);
 void add_penetration(py::module_& module);
 void add_separation(py::module_& module);
 void add_time_of_impact(py::module_& module);

@@ -31,9 +31,11 @@ struct ScaleGradient {
   double b = 0, a = 0;
 };
 
-/// The library knows no such slope: it is the difference of two queries, 0.05 % of the scale to
-/// either side, where rounding and curvature err alike, some 1e-4. The whole scene under a scale
-/// has its volume by the third power, which gives A's.
+/// No answer of a query holds B's: it is 3 V / scale where a ball of B lies in a larger one of A,
+/// and 0 where one of A lies in a larger one of B, with the same volume, centroid and gradients. So
+/// it is the difference of two queries, 0.05 % of the scale to either side, where rounding and
+/// curvature err alike, 2e-5 to 2e-4. The whole scene under a scale has its volume by the third
+/// power, which gives A's.
 ScaleGradient scale_gradient(const Row& row, const Penetration& answer,
                              const PenetrationSettings& settings, Workspace& workspace) {
   const double step = row.b.scale / 2048;

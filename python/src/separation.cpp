@@ -4,37 +4,23 @@
 
 #include <memory>
 
-#include "penetration.h"
+#include "gap.h"
 
 namespace ist::python {
 namespace {
 
-struct Separations {
+struct Separations : Gaps {
   explicit Separations(const Shape& rows)
-      : distance(rows, {}),
-        distance_min(rows, {}),
-        distance_max(rows, {}),
-        point_a(rows, {3}),
-        point_b(rows, {3}),
-        normal(rows, {3}),
-        status(rows, {}),
-        node_visits(rows, {}),
-        sphere_pairs(rows, {}) {}
+      : Gaps(rows), distance(rows, {}), sphere_pairs(rows, {}) {}
 
   void write(std::size_t i, const Separation& answer) const {
+    write_gap(i, answer);
     *distance.row(i) = answer.distance;
-    *distance_min.row(i) = answer.distance_min;
-    *distance_max.row(i) = answer.distance_max;
-    Vector(point_a.row(i)) = answer.point_a;
-    Vector(point_b.row(i)) = answer.point_b;
-    Vector(normal.row(i)) = answer.normal;
-    *status.row(i) = static_cast<std::uint32_t>(answer.status);
-    *node_visits.row(i) = answer.node_visits;
     *sphere_pairs.row(i) = answer.sphere_pairs;
   }
 
-  Column<double> distance, distance_min, distance_max, point_a, point_b, normal;
-  Column<std::uint32_t> status, node_visits, sphere_pairs;
+  Column<double> distance;
+  Column<std::uint32_t> sphere_pairs;
 };
 
 struct Patches {

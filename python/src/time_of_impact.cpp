@@ -2,37 +2,22 @@
 
 #include <memory>
 
-#include "penetration.h"
+#include "gap.h"
 
 namespace ist::python {
 namespace {
 
-struct Impacts {
-  explicit Impacts(const Shape& rows)
-      : time(rows, {}),
-        distance_min(rows, {}),
-        distance_max(rows, {}),
-        point_a(rows, {3}),
-        point_b(rows, {3}),
-        normal(rows, {3}),
-        status(rows, {}),
-        node_visits(rows, {}),
-        surface_pairs(rows, {}) {}
+struct Impacts : Gaps {
+  explicit Impacts(const Shape& rows) : Gaps(rows), time(rows, {}), surface_pairs(rows, {}) {}
 
   void write(std::size_t i, const TimeOfImpact& answer) const {
+    write_gap(i, answer);
     *time.row(i) = answer.time;
-    *distance_min.row(i) = answer.distance_min;
-    *distance_max.row(i) = answer.distance_max;
-    Vector(point_a.row(i)) = answer.point_a;
-    Vector(point_b.row(i)) = answer.point_b;
-    Vector(normal.row(i)) = answer.normal;
-    *status.row(i) = static_cast<std::uint32_t>(answer.status);
-    *node_visits.row(i) = answer.node_visits;
     *surface_pairs.row(i) = answer.surface_pairs;
   }
 
-  Column<double> time, distance_min, distance_max, point_a, point_b, normal;
-  Column<std::uint32_t> status, node_visits, surface_pairs;
+  Column<double> time;
+  Column<std::uint32_t> surface_pairs;
 };
 
 constexpr const char* kDoc = R"(Up to when B, on its way from pose to pose, stays clear of A.

@@ -6,7 +6,7 @@ import ist
 
 
 def baked(name, spheres):
-    return ist.bake(ist.close_mesh(ist.sample_mesh(name), name=name), max_spheres=spheres)
+    return ist.bake(ist.close_mesh(ist.sample_mesh(name), name=name), max_spheres=spheres, device="cpu")
 
 
 @pytest.fixture(scope="session")
@@ -21,7 +21,7 @@ def knot_mesh():
 
 @pytest.fixture(scope="session")
 def knot(knot_mesh):
-    return ist.bake(knot_mesh, max_spheres=1000)
+    return ist.bake(knot_mesh, max_spheres=1000, device="cpu")
 
 
 @pytest.fixture(scope="session")
@@ -42,3 +42,10 @@ def random_poses():
         return poses
 
     return make
+
+
+def pytest_sessionfinish(session, exitstatus):
+    """Where every test was skipped, ctest is told so."""
+    kinds = set(session.config.pluginmanager.get_plugin("terminalreporter").stats) - {""}
+    if kinds == {"skipped"}:
+        session.exitstatus = 77

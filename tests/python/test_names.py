@@ -3,9 +3,21 @@ import ast
 import inspect
 import pathlib
 
+import pytest
+
 import ist
 
-STUB = ast.parse((pathlib.Path(ist.__file__).parent / "__init__.pyi").read_text())
+def stub_of(name):
+    return ast.parse((pathlib.Path(ist.__file__).parent / name).read_text())
+
+
+STUB = stub_of("__init__.pyi")
+GPU_STUB = stub_of("gpu.pyi")
+ENUMS = (ist.QueryStatus, ist.Overlapping, ist.ImpactStatus)
+
+
+def public(module):
+    return {name for name in vars(module) if not name.startswith("_")}
 
 
 def stub_names(nodes):
@@ -20,40 +32,43 @@ def stub_names(nodes):
         elif isinstance(node, (ast.Assign, ast.AnnAssign)):
             for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
                 names[target.id] = None
+        elif isinstance(node, ast.ImportFrom) and node.module is None:
+            names.update({name.asname: None for name in node.names if name.asname})
     return {name: what for name, what in names.items()
             if not name.startswith("_") or name in ("__init__", "__version__")}
 
 
-def test_the_stub_names_what_the_module_has():
+def test_the_stubs_name_what_the_modules_have():
     assert set(stub_names(STUB.body)) == set(ist.__all__)
+    assert set(stub_names(GPU_STUB.body)) == public(ist.gpu)
 
 
-def test_the_stubs_classes_name_what_theirs_have():
-    for name, members in stub_names(STUB.body).items():
-        if isinstance(members, dict) and not name.endswith("Error") and name not in (
-                "QueryStatus", "Overlapping", "ImpactStatus"):
-            cls = getattr(ist, name)
-            found = {m for m in vars(cls) if not m.startswith("_")}
-            assert {m for m in members if m != "__init__"} == found, name
-    for enum in (ist.QueryStatus, ist.Overlapping, ist.ImpactStatus):
+@pytest.mark.parametrize("stub, module", [(STUB, ist), (GPU_STUB, ist.gpu)])
+def test_the_stubs_classes_name_what_theirs_have(stub, module):
+    for name, members in stub_names(stub.body).items():
+        cls = getattr(module, name)
+        if isinstance(members, dict) and cls not in ENUMS and not name.endswith("Error"):
+            assert {m for m in members if m != "__init__"} == public(cls), name
+    for enum in ENUMS:
         assert stub_names(STUB.body)[enum.__name__].keys() == enum.__members__.keys()
 
 
-def test_the_stubs_functions_take_what_theirs_take():
+@pytest.mark.parametrize("stub, module", [(STUB, ist), (GPU_STUB, ist.gpu)])
+def test_the_stubs_functions_take_what_theirs_take(stub, module):
     """A signature stands in the first line of a compiled function's text."""
-    for name, arguments in stub_names(STUB.body).items():
+    for name, arguments in stub_names(stub.body).items():
         if isinstance(arguments, list):
-            line = getattr(ist, name).__doc__.partition("\n")[0]
+            line = getattr(module, name).__doc__.partition("\n")[0]
             assert all(f"{a}:" in line for a in arguments), (name, line)
             assert line.count(": ") == len(arguments), (name, line)
 
 
 def test_everything_is_documented():
-    for name in ist.__all__:
-        value = getattr(ist, name)
-        if inspect.isclass(value) or callable(value):
-            assert value.__doc__ and len(value.__doc__) > 10, name
-    for cls in (ist.Penetration, ist.Separation, ist.ContactPatches, ist.TimeOfImpact):
+    for value in [getattr(ist, n) for n in ist.__all__] + [getattr(ist.gpu, n) for n in public(ist.gpu)]:
+        if inspect.isclass(value) or inspect.ismodule(value) or callable(value):
+            assert value.__doc__ and len(value.__doc__) > 10, value
+    for cls in (ist.Penetration, ist.Separation, ist.ContactPatches, ist.TimeOfImpact, ist.gpu.Array,
+                ist.gpu.Assets, ist.gpu.Penetration):
         for member, value in vars(cls).items():
             if not member.startswith("_"):
                 assert value.__doc__, (cls, member)

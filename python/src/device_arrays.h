@@ -1,0 +1,70 @@
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cuda_calls.h"
+#include "dlpack.h"
+
+// Arrays in device memory: those of any framework as arguments, by DLPack or
+// __cuda_array_interface__, and ours for any framework. Nothing is copied.
+
+namespace ist::python {
+
+namespace py = pybind11;
+
+struct ElementType {
+  dlpack::TypeCode code;
+  std::uint8_t bits;
+
+  std::size_t bytes() const { return bits / 8u; }
+  bool operator==(const ElementType&) const = default;
+};
+
+inline constexpr ElementType kFloat64 = {dlpack::kFloat, 64};
+inline constexpr ElementType kUInt32 = {dlpack::kUInt, 32};
+inline constexpr ElementType kInt32 = {dlpack::kInt, 32};
+
+/// What an argument is to be.
+struct WantedArray {
+  std::string name;                ///< of the argument, for messages
+  std::vector<ElementType> types;  ///< any of them
+  int width = 0;                   ///< (n, width); 0: (n,)
+  bool written = false;
+};
+
+/// An argument's memory, which stays as long as `keep` does.
+struct LentArray {
+  void* data = nullptr;  ///< null: no rows
+  std::int64_t rows = 0;
+  std::shared_ptr<void> keep;  ///< to be dropped with the GIL held
+};
+
+/// Takes a view of an argument. What the argument's framework still does to it is done before what
+/// `stream` is given from now on.
+///
+/// What is no array of `device` in C order is a TypeError (kind, dtype, device) or a ValueError
+/// (shape, order).
+LentArray lend(const py::object& value, const WantedArray& wanted, int device, cuda::Stream stream);
+
+/// A part of a block, as an object of Python that any framework can take.
+struct DeviceArray {
+  std::shared_ptr<const cuda::Block> block;
+  std::shared_ptr<const cuda::Moment> ready;
+  std::byte* data = nullptr;
+  std::vector<std::int64_t> shape;
+  ElementType type = kFloat64;
+};
+
+/// The class of DeviceArray.
+void add_device_array(py::module_& module);
+
+/// Of None, a handle, or a stream of a framework; else TypeError.
+cuda::Stream stream_of(const py::object& stream);
+
+}  // namespace ist::python

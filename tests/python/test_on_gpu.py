@@ -1,0 +1,632 @@
+"""ist.gpu and ist.torch on a card, with the arrays of PyTorch, CuPy and JAX.
+
+`python test_on_gpu.py --benchmark FOLDER` measures: see benchmark() below.
+"""
+import gc
+import os
+import threading
+import time
+
+os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")  # or JAX takes most of the memory
+
+import numpy as np
+import pytest
+
+import ist
+
+pytestmark = pytest.mark.skipif(not ist.gpu.available(), reason=f"{ist.gpu.why_not()}")
+
+if ist.gpu.available():
+    torch = pytest.importorskip("torch", reason="no PyTorch")
+    from ist.torch import overlap
+
+COLUMNS = ["volume", "centroid", "translation_gradient", "rotation_gradient"]
+
+
+@pytest.fixture(scope="module")
+def solids(gear, knot, cube):
+    return [gear, knot, cube]
+
+
+@pytest.fixture(scope="module")
+def assets(solids):
+    return ist.gpu.Assets(solids)
+
+
+@pytest.fixture
+def pairs(random_poses):
+    """pairs(count) → host arrays of the arguments of a batch, by name."""
+
+    def make(count, reach=1.5):
+        random = np.random.default_rng(count)
+        return dict(
+            asset_a=random.integers(0, 3, count).astype(np.uint32),
+            asset_b=random.integers(0, 3, count).astype(np.uint32),
+            pose_a=random_poses(count, reach), pose_b=random_poses(count, reach)[::-1].copy(),
+            scale_a=random.uniform(0.5, 2, count), scale_b=random.uniform(0.5, 2, count))
+
+    return make
+
+
+def on_card(arguments):
+    """The same as tensors; uint32 as int32, which older versions of PyTorch do not know."""
+    return {name: torch.from_numpy(x.view(np.int32) if x.dtype == np.uint32 else x).cuda()
+            for name, x in arguments.items()}
+
+
+def on_cpu(solids, arguments, **settings):
+    """What ist.penetration says, and force and torque with the signs of gradients."""
+    rows = len(arguments["pose_b"])
+    answers = dict(volume=np.zeros(rows), centroid=np.zeros((rows, 3)),
+                   translation_gradient=np.zeros((rows, 3)), rotation_gradient=np.zeros((rows, 3)),
+                   status=np.zeros(rows, np.uint32))
+    for a in range(len(solids)):
+        for b in range(len(solids)):
+            rows = (arguments["asset_a"] == a) & (arguments["asset_b"] == b)
+            found = ist.penetration(
+                solids[a], solids[b], arguments["pose_b"][rows], poses_a=arguments["pose_a"][rows],
+                scales=arguments["scale_b"][rows], scales_a=arguments["scale_a"][rows], field="never",
+                **settings)
+            for name, column in zip([*COLUMNS, "status"], [
+                    found.volume, found.centroid, -found.force, -found.torque, found.status]):
+                answers[name][rows] = column
+    return answers
+
+
+def expect_close(ours, theirs):
+    """The GPU's volumes are within 1e-6 of sums in double; the CPU's differ by up to 4e-6 where solids
+    graze each other, and gradients likewise."""
+    volume = theirs["volume"]
+    assert ((ours["volume"] > 0) == (volume > 0)).all()
+    assert (np.abs(ours["volume"] - volume) <= 1e-5 * volume).all()
+    size = volume ** (1 / 3)
+    for name, power in (("translation_gradient", 2), ("rotation_gradient", 3)):
+        largest = np.abs(theirs[name]).max(axis=1)
+        error = np.abs(ours[name] - theirs[name]).max(axis=1)
+        assert (error <= 1e-4 * (largest + size**power)).all(), name
+        assert (error <= 1e-5 * (largest + size**power)).mean() > 0.99, name
+    assert (np.abs(ours["centroid"] - theirs["centroid"]) < 1e-5).all()
+    assert (ours["status"] == theirs["status"]).all()
+
+
+def host(found, names=(*COLUMNS, "status")):
+    return {name: getattr(found, name).numpy() for name in names}
+
+
+def expect_same_bits(one, other):
+    for name in one:
+        assert np.array_equal(one[name], other[name]), name
+
+
+@pytest.mark.parametrize("measure", ["matched", "inner"])
+def test_answers_are_those_of_the_cpu(solids, assets, pairs, measure):
+    arguments = pairs(20_000)
+    arguments["pose_b"][10, 3] = np.nan
+    arguments["scale_a"][20] = -1
+    arguments["pose_a"][30, :4] = 0
+    found = ist.gpu.penetration(assets, **on_card(arguments), measure=measure)
+    ours, theirs = host(found), on_cpu(solids, arguments, measure=measure)
+    assert (theirs["volume"] > 0).sum() > 5000
+    assert (theirs["status"] == ist.QueryStatus.invalid_input).nonzero()[0].tolist() == [10, 20, 30]
+    expect_close(ours, theirs)
+    assert found.node_visits is None and found.sphere_pairs is None
+    arguments["asset_a"][40] = 3
+    arguments["asset_b"][50] = 2**32 - 1
+    again = host(ist.gpu.penetration(assets, **on_card(arguments), measure=measure))
+    assert again["status"][[40, 50]].tolist() == [2, 2]
+    kept = np.ones(len(ours["volume"]), bool)
+    kept[[40, 50]] = False
+    expect_same_bits({n: x[kept] for n, x in again.items()}, {n: x[kept] for n, x in ours.items()})
+
+
+def test_arguments_may_be_left_out(assets, pairs):
+    arguments = on_card(pairs(500))
+    for name in ("asset_a", "asset_b"):
+        arguments[name].fill_(1)
+    for name in ("scale_a", "scale_b"):
+        arguments[name].fill_(1)
+    arguments["pose_a"].copy_(torch.tensor([1.0, 0, 0, 0, 0, 0, 0]))
+    whole = host(ist.gpu.penetration(assets, **arguments))
+    expect_same_bits(host(ist.gpu.penetration(assets, 1, 1, None, arguments["pose_b"])), whole)
+    few = ist.gpu.penetration(assets, 1, 1, None, arguments["pose_b"],
+                              wanted=["status", "node_visits", "sphere_pairs"])
+    assert few.volume is None and few.status.dtype == np.uint32
+    assert few.node_visits.numpy().max() > 0 and few.sphere_pairs.numpy().max() > 0
+    with pytest.raises(ValueError, match="asset_b: 3; there are 3 assets"):
+        ist.gpu.penetration(assets, 0, 3, None, arguments["pose_b"])
+    with pytest.raises(ValueError, match="one argument must have rows"):
+        ist.gpu.penetration(assets, 0, 1, None, None)
+    with pytest.raises(ValueError, match="wanted: 'force'; there are 'volume'"):
+        ist.gpu.penetration(assets, 0, 1, None, arguments["pose_b"], wanted=["force"])
+    with pytest.raises(ValueError, match="measure: 'outer'"):
+        ist.gpu.penetration(assets, 0, 1, None, arguments["pose_b"], measure="outer")
+
+
+@pytest.mark.parametrize("count", [0, 1, 3_000_000])
+def test_batches_of_any_size(assets, pairs, count):
+    few = on_card(pairs(min(count, 1000)))
+    found = ist.gpu.penetration(assets, **few)
+    if count > 1000:
+        many = {n: x.repeat(count // 1000, *[1] * (x.ndim - 1)) for n, x in few.items()}
+        all_of_them = host(ist.gpu.penetration(assets, **many))
+        expect_same_bits({n: x[-1000:] for n, x in all_of_them.items()}, host(found))
+    assert len(found.volume) == min(count, 1000) and found.centroid.shape[1] == 3
+    assert torch.from_dlpack(found.volume).shape == (min(count, 1000),)
+
+
+def test_frameworks_take_and_give_the_same_memory(assets, pairs):
+    arguments = pairs(2000)
+    expected = host(ist.gpu.penetration(assets, **on_card(arguments)))
+    found = ist.gpu.penetration(assets, **on_card(arguments))
+    address = found.volume.__cuda_array_interface__["data"][0]
+    assert found.volume.__dlpack_device__() == (2, 0) and found.volume.device == 0
+    tensor = torch.from_dlpack(found.volume)
+    assert tensor.data_ptr() == address and tensor.device.index == 0
+    assert torch.as_tensor(found.volume, device="cuda").data_ptr() == address
+    assert np.array_equal(tensor.cpu().numpy(), expected["volume"])
+    assert torch.from_dlpack(found.centroid).shape == (2000, 3)
+    with pytest.raises(BufferError, match="copy"):
+        found.volume.__dlpack__(copy=True)
+    with pytest.raises(BufferError, match="device"):
+        found.volume.__dlpack__(dl_device=(1, 0))
+    with pytest.raises(Exception):
+        np.from_dlpack(found.volume)
+    found.volume.__dlpack__(), found.volume.__dlpack__(max_version=(1, 0))  # nobody takes them
+
+
+def test_cupy_takes_and_gives(assets, pairs):
+    cupy = pytest.importorskip("cupy", reason="no CuPy")
+    arguments = pairs(2000)
+    expected = host(ist.gpu.penetration(assets, **on_card(arguments)))
+    arrays = {name: cupy.asarray(x) for name, x in arguments.items()}
+    stream = cupy.cuda.Stream(non_blocking=True)
+    cupy.cuda.get_current_stream().synchronize()
+    for how in (None, stream, stream.ptr):
+        found = ist.gpu.penetration(assets, **arrays, stream=how)
+        by_dlpack, by_interface = cupy.from_dlpack(found.volume), cupy.asarray(found.volume)
+        assert by_dlpack.data.ptr == by_interface.data.ptr
+        assert np.array_equal(cupy.asnumpy(by_dlpack), expected["volume"])
+        assert np.array_equal(cupy.asnumpy(cupy.from_dlpack(found.status)), expected["status"])
+
+    class Interface:  # nothing but that
+        def __init__(self, array):
+            self.array = array
+            self.__cuda_array_interface__ = array.__cuda_array_interface__
+
+    found = ist.gpu.penetration(assets, **{n: Interface(x) for n, x in arrays.items()})
+    expect_same_bits(host(found), expected)
+    out = dict(volume=cupy.empty(2000), status=cupy.empty(2000, cupy.uint32))
+    given = ist.gpu.penetration(assets, **arrays, out=out)
+    assert given.volume is out["volume"] and np.array_equal(out["volume"].get(), expected["volume"])
+
+
+def test_jax_takes_and_gives(assets, pairs):
+    jax = pytest.importorskip("jax", reason="no JAX")
+    jax.config.update("jax_enable_x64", True)
+    if jax.default_backend() != "gpu":
+        pytest.skip("JAX without a GPU")
+    arguments = pairs(2000)
+    expected = host(ist.gpu.penetration(assets, **on_card(arguments)))
+    arrays = {name: jax.numpy.asarray(x) for name, x in arguments.items()}
+    found = ist.gpu.penetration(assets, **arrays)
+    del arrays
+    volume = jax.dlpack.from_dlpack(found.volume)
+    del found
+    gc.collect()
+    assert np.array_equal(np.asarray(volume), expected["volume"])
+    assert float(jax.jit(lambda v: v.sum())(volume)) == pytest.approx(expected["volume"].sum())
+
+
+def test_arguments_that_do_not_fit_are_named(assets, pairs):
+    arguments = on_card(pairs(8))
+    cases = [
+        (dict(pose_b=arguments["pose_b"].float()), TypeError, "pose_b: dtype float32; wanted float64"),
+        (dict(pose_a=arguments["pose_a"].cpu()), TypeError, "pose_a: on the CPU; wanted float64"),
+        (dict(pose_a=arguments["pose_a"].cpu().pin_memory()), TypeError, "pose_a: on the CPU"),
+        (dict(pose_b=arguments["pose_b"][:, :6]), ValueError, r"pose_b: shape \(8, 6\); wanted"),
+        (dict(pose_b=arguments["pose_b"].T.contiguous().T), ValueError, "pose_b: not in C order"),
+        (dict(scale_b=arguments["scale_b"][::2]), ValueError, "scale_b: not in C order"),
+        (dict(scale_b=arguments["scale_b"][:5]), ValueError, "scale_b: 5 rows; the arguments before"),
+        (dict(asset_a=arguments["asset_a"].long()), TypeError,
+         "asset_a: dtype int64; wanted uint32 or int32"),
+        (dict(scale_a=2.0), TypeError, "scale_a: a float is no device array"),
+        (dict(pose_b=arguments["pose_b"].requires_grad_()), TypeError, "pose_b: .*grad"),
+        (dict(stream="mine"), TypeError, "stream: a str is no stream"),
+        (dict(out=[1]), TypeError, "out: wanted a dict of arrays"),
+        (dict(out=dict(force=1)), ValueError, "out: 'force'; there are"),
+        (dict(out=dict(volume=torch.empty(7).cuda().double())), ValueError, "out.'volume'.: 7 rows"),
+        (dict(out=dict(volume=torch.empty(8).cuda())), TypeError, "out.'volume'.: dtype float32"),
+        (dict(out=dict(), wanted=["volume"]), ValueError, "wanted: the arrays of `out`"),
+    ]
+    for wrong, error, text in cases:
+        fitting = {n: x.detach() if hasattr(x, "detach") else x for n, x in arguments.items()}
+        with pytest.raises(error, match=text):
+            ist.gpu.penetration(assets, **{**fitting, **wrong})
+
+
+def test_what_is_given_is_written(assets, pairs):
+    arguments = on_card(pairs(1000))
+    expected = host(ist.gpu.penetration(assets, **arguments))
+    out = dict(volume=torch.empty(1000, dtype=torch.float64, device="cuda"),
+               status=torch.empty(1000, dtype=torch.int32, device="cuda"))
+    found = ist.gpu.penetration(assets, **arguments, out=out)
+    assert found.volume is out["volume"] and found.status is out["status"] and found.centroid is None
+    assert np.array_equal(found.volume.cpu().numpy(), expected["volume"])
+    ours = ist.gpu.penetration(assets, **arguments)
+    arguments["pose_b"] = arguments["pose_b"].flip(0)
+    other = host(ist.gpu.penetration(assets, **arguments))
+    again = ist.gpu.penetration(assets, **arguments, out=ours)
+    assert again.volume is ours.volume
+    expect_same_bits(host(again), other)
+    torch.cuda.synchronize()
+
+
+CYCLES = 1_000_000_000  # a good part of a second
+
+
+def test_nothing_waits_on_the_host(assets, pairs):
+    arguments = on_card(pairs(1000))
+    host(ist.gpu.penetration(assets, **arguments))
+    for stream in (torch.cuda.current_stream(), torch.cuda.Stream()):
+        torch.cuda.synchronize()
+        with torch.cuda.stream(stream):
+            torch.cuda._sleep(CYCLES)
+            start = time.perf_counter()
+            for _ in range(5):
+                found = ist.gpu.penetration(assets, **arguments, stream=stream)
+                tensor = torch.from_dlpack(found.volume)
+                del found
+            took = time.perf_counter() - start
+            assert not stream.query(), "all is done: it must have waited"
+            assert took < 0.1
+            assert tensor.sum().item() > 0
+
+
+def test_streams_wait_for_each_other(assets, pairs):
+    arguments = on_card(pairs(1000))
+    expected = host(ist.gpu.penetration(assets, **arguments))
+    torch.cuda.synchronize()
+    late = torch.cuda.Stream()
+    other = torch.cuda.Stream()
+    for made_on, asked_on, read_on in (
+            (late, None, None), (late, late, None), (late, other, late), (None, late, other)):
+        poses = torch.zeros_like(arguments["pose_b"])
+        torch.cuda.synchronize()
+        with torch.cuda.stream(made_on):
+            torch.cuda._sleep(CYCLES // 4)
+            poses.copy_(arguments["pose_b"])
+            # PyTorch says on which stream it is written: the current one.
+            found = ist.gpu.penetration(assets, **{**arguments, "pose_b": poses}, stream=asked_on)
+        with torch.cuda.stream(read_on):
+            volume = torch.from_dlpack(found.volume) * 1
+            assert np.array_equal(volume.cpu().numpy(), expected["volume"])
+
+
+def test_what_a_batch_reads_stays_until_it_is_done(solids, pairs):
+    assets = ist.gpu.Assets(solids)
+    expected = host(ist.gpu.penetration(assets, **on_card(pairs(1000))))
+    side = torch.cuda.Stream()
+    for _ in range(3):
+        arguments = on_card(pairs(1000))
+        torch.cuda.synchronize()
+        side.wait_stream(torch.cuda.current_stream())
+        with torch.cuda.stream(side):
+            torch.cuda._sleep(CYCLES // 4)
+        found = ist.gpu.penetration(assets, **arguments, stream=side)
+        del arguments  # PyTorch may give the memory to others now
+        spoiled = [torch.full((1000, 7), 3.0, dtype=torch.float64, device="cuda") for _ in range(20)]
+        expect_same_bits(host(found), expected)
+        del spoiled
+    arguments = on_card(pairs(1000))
+    torch.cuda.synchronize()
+    with torch.cuda.stream(side):
+        torch.cuda._sleep(CYCLES // 4)
+    found = ist.gpu.penetration(assets, **arguments, stream=side)
+    del assets, arguments  # waits for the batch
+    gc.collect()
+    others = ist.gpu.Assets(solids[::-1])
+    expect_same_bits(host(found), expected)
+    del others
+
+
+def test_answers_outlive_what_they_came_from(assets, pairs):
+    arguments = on_card(pairs(5000))
+    expected = host(ist.gpu.penetration(assets, **arguments))
+    found = ist.gpu.penetration(assets, **arguments)
+    volume, interface = torch.from_dlpack(found.volume), torch.as_tensor(found.centroid, device="cuda")
+    status = found.status
+    del found
+    gc.collect()
+    for _ in range(20):  # would take the memory if it were free
+        ist.gpu.penetration(assets, 0, 1, None, arguments["pose_b"])
+    assert np.array_equal(volume.cpu().numpy(), expected["volume"])
+    assert np.array_equal(interface.cpu().numpy(), expected["centroid"])
+    assert np.array_equal(status.numpy(), expected["status"])
+
+
+def test_a_reader_that_drops_answers_early_is_not_disturbed(assets, pairs):
+    arguments = on_card(pairs(5000))
+    expected = host(ist.gpu.penetration(assets, **arguments))["volume"]
+    reader = torch.cuda.Stream()
+    copies = []
+    for _ in range(10):
+        volume = torch.from_dlpack(ist.gpu.penetration(assets, **arguments).volume)
+        reader.wait_stream(torch.cuda.current_stream())
+        with torch.cuda.stream(reader):
+            torch.cuda._sleep(CYCLES // 40)
+            copies.append(volume * 1)
+        del volume  # read later, on another stream
+    torch.cuda.synchronize()
+    for copy in copies:
+        assert np.array_equal(copy.cpu().numpy(), expected)
+
+
+def test_memory_is_used_again(assets, pairs):
+    arguments = on_card(pairs(100_000))
+    for _ in range(5):
+        ist.gpu.penetration(assets, **arguments)
+    torch.cuda.synchronize()
+    before = torch.cuda.mem_get_info()[0]
+    for _ in range(300):
+        ist.gpu.penetration(assets, **arguments)
+    torch.cuda.synchronize()
+    assert before - torch.cuda.mem_get_info()[0] < 600e6  # 300 of them are 2.8 GB
+
+
+def test_no_memory_left_is_an_error_with_a_way_out(assets, pairs):
+    arguments = on_card(pairs(1000))
+    many = {n: x.repeat(4000, *[1] * (x.ndim - 1)) for n, x in arguments.items()}
+    host(ist.gpu.penetration(assets, **arguments))
+    torch.cuda.synchronize()
+    free = torch.cuda.mem_get_info()[0]
+    filled = torch.empty(free - 150_000_000, dtype=torch.uint8, device="cuda")
+    with pytest.raises(ist.Error, match="no device memory left"):
+        held = [ist.gpu.penetration(assets, **many) for _ in range(100)]  # 37 GB
+        pytest.fail(f"{len(held)} batches had room")
+    del filled
+    torch.cuda.empty_cache()
+    host(ist.gpu.penetration(assets, **arguments))
+
+
+def test_graphs_capture_batches(assets, pairs):
+    arguments = on_card(pairs(3000))
+    out = {name: torch.empty((3000, 3) if name != "volume" else 3000, dtype=torch.float64,
+                             device="cuda") for name in COLUMNS}
+    expected = host(ist.gpu.penetration(assets, **arguments))
+    flipped = {**arguments, "pose_b": arguments["pose_b"].flip(0)}
+    expected_flipped = host(ist.gpu.penetration(assets, **flipped))
+    torch.cuda.synchronize()
+    graph = torch.cuda.CUDAGraph()
+    side = torch.cuda.Stream()
+    with torch.cuda.graph(graph, stream=side):
+        ist.gpu.penetration(assets, **arguments, out=out, stream=side)
+        ist.gpu.penetration(assets, 0, 1, None, arguments["pose_b"], out=dict(volume=out["volume"]),
+                            stream=side)
+        ist.gpu.penetration(assets, **arguments, out=out, stream=side)
+    for rows, answers in ((arguments["pose_b"].clone(), expected),
+                          (flipped["pose_b"], expected_flipped)):
+        arguments["pose_b"].copy_(rows)
+        graph.replay()
+        torch.cuda.synchronize()
+        for name in COLUMNS:
+            assert np.array_equal(out[name].cpu().numpy(), answers[name]), name
+    refused = torch.cuda.CUDAGraph()
+    with pytest.raises(ValueError, match="out: None; wanted arrays for the answers, as the stream"):
+        with torch.cuda.graph(refused, stream=side):
+            ist.gpu.penetration(assets, **arguments, stream=side)
+    # What was captured goes on after a larger batch.
+    host(ist.gpu.penetration(assets, **{n: x.repeat(2000, *[1] * (x.ndim - 1))
+                                        for n, x in arguments.items()}))
+    graph.replay()
+    torch.cuda.synchronize()
+    assert np.array_equal(out["volume"].cpu().numpy(), expected_flipped["volume"])
+
+
+def test_threads_share_assets(assets, pairs):
+    arguments = on_card(pairs(2000))
+    expected = host(ist.gpu.penetration(assets, **arguments))
+    torch.cuda.synchronize()
+    failed = []
+
+    def work():
+        stream = torch.cuda.Stream()
+        try:
+            for _ in range(20):
+                expect_same_bits(host(ist.gpu.penetration(assets, **arguments, stream=stream)),
+                                 expected)
+        except BaseException as error:
+            failed.append(error)
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failed, failed[0]
+
+
+def test_another_device(solids, pairs):
+    if torch.cuda.device_count() < 2:
+        pytest.skip("one card")
+    second = ist.gpu.Assets(solids, device=1)
+    assert second.device == 1
+    arguments = on_card(pairs(1000))
+    expected = host(ist.gpu.penetration(ist.gpu.Assets(solids), **arguments))
+    with pytest.raises(TypeError, match="asset_a: on CUDA device 0; wanted .* on CUDA device 1"):
+        ist.gpu.penetration(second, **arguments)
+    moved = {name: x.to("cuda:1") for name, x in arguments.items()}
+    stream = torch.cuda.current_stream(1)
+    found = ist.gpu.penetration(second, **moved, stream=stream)
+    assert torch.from_dlpack(found.volume).device.index == 1
+    expect_same_bits(host(found), expected)
+    assert torch.cuda.current_device() == 0
+
+
+def test_assets_say_what_they_take(solids, assets):
+    assert len(assets) == 3 and assets.device == 0
+    assert assets.bytes >= sum(len(solid.to_bytes()) for solid in solids)
+    assert len(ist.gpu.Assets([])) == 0
+
+
+def test_too_large_a_device_is_an_error(solids):
+    with pytest.raises(ist.Error, match="GPU"):
+        ist.gpu.Assets(solids, device=torch.cuda.device_count())
+
+
+# PyTorch's function.
+
+def gradients(solids, poses, scales, device, **settings):
+    poses = poses.to(device).requires_grad_()
+    scales = scales.to(device).requires_grad_() if scales is not None else None
+    volumes = overlap(solids, poses, scales=scales, **settings)
+    weights = torch.linspace(-1, 2, volumes.numel(), dtype=torch.float64).reshape(volumes.shape)
+    (volumes * weights.to(device)).sum().backward()
+    return [x.detach().cpu() for x in (volumes, poses.grad)] + (
+        [scales.grad.cpu()] if scales is not None else [])
+
+
+def test_overlaps_are_those_of_the_cpu(solids, random_poses):
+    poses = torch.from_numpy(random_poses(400, 1.2).reshape(100, 4, 7))
+    poses[..., :4] *= 3
+    solids = [solids[0], solids[1], solids[0], solids[2]]
+    scales = torch.linspace(0.7, 1.3, 400, dtype=torch.float64).reshape(100, 4)
+    for p, s in ((poses, None), (poses, scales), (poses[0], scales[0])):
+        ours = gradients(solids, p.clone(), s, "cuda")
+        theirs = gradients(solids, p.clone(), s, "cpu", field="never")
+        assert theirs[0].abs().max() > 0.1
+        for k, (one, other) in enumerate(zip(ours, theirs)):
+            bound = (1e-5, 1e-5, 2e-3)[k]  # scales' are differences
+            assert (one - other).abs().max() <= bound * other.abs().max(), k
+    assert overlap(solids, poses.float().cuda()).dtype == torch.float32
+
+
+def test_overlaps_gradients_are_differences(solids, random_poses):
+    poses = torch.from_numpy(random_poses(12, 1.0).reshape(4, 3, 7)).cuda()
+    _, found = gradients(solids, poses.clone(), None, "cuda")
+    weights = torch.linspace(-1, 2, 12, dtype=torch.float64).reshape(4, 3).cuda()
+    h = 1e-3
+    expected = torch.zeros_like(poses)
+    for index in np.ndindex(3, 7):
+        step = torch.zeros_like(poses)
+        step[(slice(None), *index)] = h
+        expected[(slice(None), *index)] = (
+            (overlap(solids, poses + step) - overlap(solids, poses - step)) * weights).sum(-1) / (2 * h)
+    assert expected.abs().max() > 0.1
+    assert (found.cuda() - expected).norm() < 5e-3 * expected.norm()
+
+
+def test_overlap_never_waits(solids, random_poses):
+    poses = torch.from_numpy(random_poses(300, 1.0).reshape(100, 3, 7)).cuda().requires_grad_()
+    overlap(solids, poses).sum().backward()
+    torch.cuda.synchronize()
+    torch.cuda.set_sync_debug_mode("error")
+    try:
+        torch.cuda._sleep(CYCLES)
+        start = time.perf_counter()
+        overlap(solids, poses).sum().backward()
+        took = time.perf_counter() - start
+        assert not torch.cuda.current_stream().query()
+        assert took < 0.1
+    finally:
+        torch.cuda.set_sync_debug_mode("default")
+    torch.cuda.synchronize()
+
+
+def test_an_invalid_pose_is_nan_where_it_is(solids, random_poses):
+    poses = torch.from_numpy(random_poses(18, 1.0).reshape(6, 3, 7)).cuda()
+    poses[1, 2, 5] = torch.nan
+    poses[4, 0, :4] = 0
+    poses.requires_grad_()
+    volumes = overlap(solids, poses)
+    assert torch.isnan(volumes).nonzero().tolist() == [[1, 1], [1, 2], [4, 0], [4, 1]]
+    volumes.sum().backward()
+    assert torch.isfinite(poses.grad[[0, 2, 3, 5]]).all() and torch.isnan(poses.grad[1]).all()
+
+
+def test_descent_parts_two_solids(gear, knot):
+    pose = torch.tensor([0.5, 0.1, 0.0, 0.2, 4.5, 0.5, 1.0], dtype=torch.float64, device="cuda",
+                        requires_grad=True)
+    still = torch.tensor([1.0, 0, 0, 0, 0, 0, 0], dtype=torch.float64, device="cuda")
+    adam = torch.optim.Adam([pose], lr=0.1)
+    for step in range(200):
+        adam.zero_grad()
+        volume = overlap([gear, knot], torch.stack((still, pose)))[0]
+        assert step > 0 or volume.item() > 0.1
+        if volume.item() == 0:
+            return
+        volume.backward()
+        adam.step()
+    pytest.fail(f"{volume.item()} is left")
+
+
+def benchmark(folder):
+    """ist.gpu.penetration beside what the device itself does of it, and ist.torch.overlap.
+
+    FOLDER: elephant.ist and dino.ist of 4,000 spheres, and poses_eledino.csv: the rows of
+    benchmarks/gpu_batch.cpp. "device" is by CUDA's events around ten calls into the same arrays,
+    what that program measures of the C++ batch; "wall" is from the first call to the end of the last;
+    "call" is how long a call keeps the host, with the device busy.
+    """
+    import csv
+    import json
+    import pathlib
+    folder = pathlib.Path(folder)
+    elephant, dino = (ist.Asset.load(folder / f"{name}.ist") for name in ("elephant", "dino"))
+    with open(folder / "poses_eledino.csv") as file:
+        rows = [row for row in csv.DictReader(file)]
+    assets = ist.gpu.Assets([elephant, dino])
+    for kind in ("pen", "deep", "contain", "sep"):
+        columns = "qw qx qy qz tx ty tz scale_b".split()
+        table = np.array([[float(row[c]) for c in columns] for row in rows if row["class"] == kind])
+        for count in (1_000_000, 4096):
+            drawn = torch.from_numpy(table[np.random.default_rng(1).integers(0, len(table), count)]).cuda()
+            poses, scales = drawn[:, :7].contiguous(), drawn[:, 7].contiguous()
+            numbers = [torch.full((count,), k, dtype=torch.int32, device="cuda") for k in (0, 1)]
+            kept = ist.gpu.penetration(assets, *numbers, None, poses, None, scales)
+            torch.cuda.synchronize()
+            row = dict(poses=kind, pairs=count)
+            for name, out in (("into the same arrays", kept), ("into new arrays", None)):
+                device, wall, call = [], [], []
+                for _ in range(10):
+                    events = [torch.cuda.Event(enable_timing=True) for _ in range(2)]
+                    start = time.perf_counter()
+                    events[0].record()
+                    for _ in range(10):
+                        before = time.perf_counter()
+                        found = ist.gpu.penetration(assets, *numbers, None, poses, None, scales,
+                                                    out=out)
+                        call.append(time.perf_counter() - before)
+                    events[1].record()
+                    torch.cuda.synchronize()
+                    wall.append((time.perf_counter() - start) / 10)
+                    device.append(events[0].elapsed_time(events[1]) / 10)
+                row[name] = {"device, ms": np.median(device), "wall, ms": 1e3 * np.median(wall),
+                             "call, µs": 1e6 * np.median(call),
+                             "M/s": count / np.median(wall) * 1e-6}
+            if count == 4096:
+                scene = torch.zeros(count, 2, 7, dtype=torch.float64, device="cuda")
+                scene[:, 0, 0] = 1
+                scene[:, 1] = poses
+                sizes = torch.stack((torch.ones_like(scales), scales), dim=1)
+                scene.requires_grad_()
+                times = []
+                for _ in range(20):
+                    torch.cuda.synchronize()
+                    start = time.perf_counter()
+                    overlap([elephant, dino], scene, scales=sizes).sum().backward()
+                    torch.cuda.synchronize()
+                    times.append(time.perf_counter() - start)
+                row["ist.torch.overlap and backward, ms"] = 1e3 * np.median(times)
+            cpu = ist.penetration(elephant, dino, poses[:2000].cpu().numpy(),
+                                  scales=scales[:2000].cpu().numpy(), field="never").volume
+            ours = torch.from_dlpack(kept.volume)[:2000].cpu().numpy()
+            row["largest difference to the CPU"] = float(
+                np.max(np.abs(ours - cpu) / np.maximum(np.maximum(ours, cpu), 1e-300)))
+            print(json.dumps(row, ensure_ascii=False), flush=True)
+
+
+if __name__ == "__main__":
+    import sys
+    if sys.argv[1:2] != ["--benchmark"] or len(sys.argv) != 3:
+        sys.exit(__doc__)
+    benchmark(sys.argv[2])
