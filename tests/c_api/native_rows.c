@@ -58,6 +58,14 @@ static void print_penetration(const ist_penetration_t* p) {
   printf(" %u %u", p->node_visits, p->sphere_pairs);
 }
 
+static void print_patches(const ist_contact_patches_t* found) {
+  size_t k;
+  for (k = 0; k < found->count; ++k) {
+    printf(" %llu", (unsigned long long)found->patches[k].id);
+    print_doubles(found->patches[k].centroid, 15);
+  }
+}
+
 static ist_placed_tree_t placed_a(void) {
   const ist_placed_tree_t a = {sizeof a, &tree_a, IST_POSE_IDENTITY, 1};
   return a;
@@ -137,14 +145,100 @@ static void patches(int i, int print) {
   ist_contact_patch_t room[kMostPatches];
   ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
   ist_penetration_t whole = {.size = sizeof whole};
-  size_t k;
   ist_contact_patches(&a, &b, NULL, &workspace, &found, &whole);
   if (!print) return;
   print_penetration(&whole);
-  for (k = 0; k < found.count; ++k) {
-    printf(" %llu", (unsigned long long)room[k].id);
-    print_doubles(room[k].centroid, 15);
-  }
+  print_patches(&found);
+}
+
+static void without_protrusion(int i, int print) {
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_penetration_settings_t settings = {.size = sizeof settings, .field = IST_FIELD_NEVER};
+  ist_penetration_t answer = {.size = sizeof answer};
+  ist_penetration(&a, &b, &settings, &workspace, &answer);
+  ist_without_protrusion(&answer, &a, &b, &answer);
+  if (print) print_penetration(&answer);
+}
+
+static void patches_without_protrusion(int i, int print) {
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_contact_settings_t settings = {.size = sizeof settings, .field = IST_FIELD_NEVER};
+  ist_contact_patch_t room[kMostPatches];
+  ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
+  ist_contact_patches(&a, &b, &settings, &workspace, &found, NULL);
+  ist_patches_without_protrusion(&a, &b, &settings, &found);
+  if (print) print_patches(&found);
+}
+
+static void fit(int i, int print) {
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  ist_pair_fit_t found = {.size = sizeof found};
+  ist_get_pair_fit(&a, &b, &found);
+  if (!print) return;
+  print_doubles(&found.grain_a, 3);
+  printf(" %u %u %u %u", found.a_is_coarser, found.has_surface, found.needs_surface, found.fits);
+}
+
+static void wrenches(int i, int print) {
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const double of_a[3] = {0.1, 0.2, 0.3}, of_b[3] = {-0.3, 0.2, 0.1};
+  ist_penetration_t contact = {.size = sizeof contact};
+  ist_wrenches_t found = {.size = sizeof found};
+  ist_penetration(&a, &b, NULL, &workspace, &contact);
+  ist_wrenches(&contact, &b.pose, of_a, of_b, &found);
+  if (!print) return;
+  print_doubles(found.on_a.force, 6);
+  print_doubles(found.on_b.force, 6);
+}
+
+/* From where A stands to the row's pose, and a part of that way. */
+static void motions(int i, int print) {
+  const ist_pose_t from = IST_POSE_IDENTITY;
+  const double about[3] = {0.1, -0.2, 0.3};
+  ist_motion_t motion;
+  ist_pose_t there;
+  ist_motion_between(&from, &rows[i].pose, 0.5, about, rows[i].scale, &motion);
+  ist_moved(&from, rows[i].scale, &motion, 0.2, &there);
+  if (!print) return;
+  print_doubles(motion.velocity, 9);
+  print_doubles(there.q, 7);
+}
+
+/* B on its way across A's origin while A turns. */
+static void impact(int i, int print) {
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const double* const t = rows[i].pose.t;
+  const ist_motion_t of_a = {.angular_velocity = {0, 0.25, 0}};
+  const ist_motion_t of_b = {.velocity = {-2 * t[0], -2 * t[1], -2 * t[2]},
+                             .angular_velocity = {0.5, 0, 0.25}};
+  const ist_impact_settings_t settings = {
+      .size = sizeof settings, .max_visits = 20000, .duration = 0.5};
+  ist_impact_t answer = {.size = sizeof answer};
+  ist_time_of_impact(&a, &b, &of_a, &of_b, &settings, &workspace, &answer);
+  if (!print) return;
+  printf(" %d %d", answer.status, answer.kind);
+  print_doubles(&answer.time, 12);
+  printf(" %u %u", answer.node_visits, answer.surface_pairs);
+}
+
+static void batches(int i, int print) {
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_field_t half_space = {
+      .size = sizeof half_space, .kind = IST_HALF_SPACE, .as.half_space = {{0, 0.6, 0.8}, 0.0625}};
+  const ist_placed_field_t ground = {sizeof ground, &half_space, IST_POSE_IDENTITY, 1};
+  const ist_pair_t pairs[2] = {{&a, &b}, {&b, &a}};
+  const ist_field_pair_t field_pair = {&ground, &b};
+  ist_contact_patch_t room[kMostPatches];
+  ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
+  ist_penetration_t answers[3], whole;
+  int k;
+  ist_penetration_batch(pairs, 2, NULL, &workspace, 1, answers, sizeof whole, NULL);
+  ist_field_penetration_batch(&field_pair, 1, NULL, &workspace, 1, answers + 2, sizeof whole, NULL);
+  ist_contact_patches_batch(pairs, 1, NULL, &workspace, 1, &found, &whole, sizeof whole, NULL);
+  if (!print) return;
+  for (k = 0; k < 3; ++k) print_penetration(&answers[k]);
+  print_penetration(&whole);
+  print_patches(&found);
 }
 
 static void overlapping(int i, int print) {
@@ -186,6 +280,13 @@ static const struct {
     {"patches", patches},
     {"overlap", overlapping},
     {"lenses", lenses},
+    {"without protrusion", without_protrusion},
+    {"patches without protrusion", patches_without_protrusion},
+    {"fit", fit},
+    {"wrenches", wrenches},
+    {"motions", motions},
+    {"impact", impact},
+    {"batches", batches},
 };
 enum { kQueryCount = sizeof kQueries / sizeof kQueries[0] };
 

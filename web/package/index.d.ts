@@ -359,3 +359,192 @@ export interface Lenses {
 }
 
 export function lenses(a: Asset, b: Asset, poseB: Pose, options?: LensesOptions): Lenses;
+
+// --- Contacts, looked at once more ------------------------------------------------------------------
+
+/**
+ * An answer without what protruding spheres add where flat faces meet: nothing is left across a gap
+ * of a fifth of a mean sphere radius. Round and deeper contacts come back as they are. For contacts,
+ * not where energy must be kept: the force is the volume's gradient but for 15 %.
+ *
+ * `whole`: what penetration() answered at these poses by lenses, {field: 'never'}, in the matched
+ * measure without a pair budget. `into` may be `whole`.
+ */
+export function withoutProtrusion(
+  whole: Penetration,
+  a: Asset,
+  b: Asset,
+  poseB: Pose,
+  options?: { poseA?: Pose; into?: Penetration },
+): Penetration;
+
+/**
+ * The same of patches, in their place: each by its own depth. A patch of which nothing is left stays,
+ * with zeros. `found`, `options`: as contactPatches() answered and was asked.
+ */
+export function patchesWithoutProtrusion(
+  found: ContactPatches,
+  a: Asset,
+  b: Asset,
+  poseB: Pose,
+  options?: ContactPatchesOptions,
+): ContactPatches;
+
+/** Of a pressure of 1. */
+export interface Wrench {
+  /** [u²] out of the other body. */
+  force: Float64Array;
+  /** [u³/rad] about the point that was named. */
+  torque: Float64Array;
+}
+
+export interface Wrenches {
+  onA: Wrench;
+  onB: Wrench;
+}
+
+/**
+ * What a contact, or a patch of it, does to both bodies, about a point of each [u]: their centres of
+ * mass, say. Default: the world's origin. `poseB`: of the query.
+ */
+export function wrenches(
+  contact: Penetration | ContactPatch,
+  poseB: Pose,
+  points?: { a?: Vector; b?: Vector },
+  into?: Wrenches,
+): Wrenches;
+
+/** How two assets suit each other, whatever their poses. */
+export interface PairFit {
+  /** [u] what is finer than that, the spheres do not know. */
+  grainA: number;
+  grainB: number;
+  /** ≥ 1, of the coarser grain over the finer. */
+  ratio: number;
+  aIsCoarser: boolean;
+  /** The coarser asset holds its surface. */
+  hasSurface: boolean;
+  /** Volumes and forces by spheres alone mislead. */
+  needsSurface: boolean;
+  /** hasSurface, or not needsSurface. */
+  fits: boolean;
+}
+
+export function pairFit(
+  a: Asset,
+  b: Asset,
+  options?: { scaleA?: number; scaleB?: number },
+): PairFit;
+
+// --- Time of impact ---------------------------------------------------------------------------------
+
+// [T] is a unit of time of the caller's own: a second, a frame.
+
+/** Of constant velocity: one point goes straight on, and the solid turns about it. */
+export interface Motion {
+  /** [u/T] of `about`, in the world. */
+  velocity?: Vector;
+  /** [rad/T] in the world. */
+  angularVelocity?: Vector;
+  /** [u] in the solid's own frame, before its scale: a free body's centre of mass. */
+  about?: Vector;
+}
+
+/** The motion that leads from one pose to another, the shorter way, in `duration` > 0 [T]. */
+export function motionBetween(
+  from: Pose,
+  to: Pose,
+  duration: number,
+  about?: Vector,
+): { velocity: Float64Array; angularVelocity: Float64Array; about: Float64Array };
+
+/** A pose that can be written over. */
+export interface MovedPose {
+  rotation: Float64Array;
+  translation: Float64Array;
+  scale: number;
+}
+
+/** Where a solid is at a time [T] of its motion. */
+export function moved(start: Pose, motion: Motion, time: number, into?: MovedPose): MovedPose;
+
+export interface ImpactOptions extends Limits {
+  /** Where A stands at the start. Default: the identity. */
+  poseA?: Pose;
+  /** Without one it is at rest. */
+  motionA?: Motion;
+  motionB?: Motion;
+  /** [T] > 0: what happens in [0, duration] is asked. Default 1. */
+  duration?: number;
+  /**
+   * [u] Default 0: a thousandth of the smaller solid's bounding radius, or ten times what fields may
+   * err if that is more.
+   */
+  tolerance?: number;
+  into?: Impact;
+}
+
+export interface Impact {
+  /** `budget-exhausted`: clear up to `time`, which a limit ended. */
+  status: Status;
+  /**
+   * `none`: clear of each other over the whole interval. `impact`: at `time` no further apart than
+   * the tolerance, and approaching. `unresolved`: clear up to `time`; what comes then cannot be told
+   * so finely. `overlapping`: they meet at the start.
+   */
+  kind: 'none' | 'impact' | 'unresolved' | 'overlapping';
+  /** [T] certified: the solids do not touch before. */
+  time: number;
+  /** [u] The solids' distance then lies within, certified. */
+  distanceMin: number;
+  distanceMax: number;
+  /** [u] the nearest points then; others may be nearer by a part of the tolerance. */
+  pointA: Float64Array;
+  pointB: Float64Array;
+  /** Unit, from A to B. */
+  normal: Float64Array;
+  nodeVisits: number;
+  surfacePairs: number;
+}
+
+/** When two moving solids meet: proven, at any speed. Wants the stored surface of both. */
+export function timeOfImpact(
+  a: Asset | Field,
+  b: Asset,
+  poseB: Pose,
+  options?: ImpactOptions,
+): Impact;
+
+// --- Batches ----------------------------------------------------------------------------------------
+
+/** One question among many. */
+export interface Pair {
+  a: Asset | Field;
+  b: Asset;
+  /** Default: the identity. */
+  poseA?: Pose;
+  poseB: Pose;
+}
+
+/** `invalid-input`: this pair's pose is out of range; its numbers are 0, and others are answered. */
+export interface BatchPenetration extends Omit<Penetration, 'status'> {
+  status: Status | 'invalid-input';
+}
+export interface BatchContactPatches extends Omit<ContactPatches, 'whole'> {
+  whole: BatchPenetration;
+}
+
+/**
+ * What penetration() answers for each pair under the same options, in one call. One thread does it:
+ * share pairs out among workers to use more.
+ */
+export function penetrationBatch(
+  pairs: ArrayLike<Pair>,
+  options?: Omit<PenetrationOptions, 'poseA' | 'into'> & { into?: BatchPenetration[] },
+): BatchPenetration[];
+
+/** The same of contactPatches(). */
+export function contactPatchesBatch(
+  pairs: ArrayLike<Pair>,
+  options?: Omit<ContactPatchesOptions, 'poseA' | 'into'> & { into?: BatchContactPatches[] },
+): BatchContactPatches[];

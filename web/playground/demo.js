@@ -1,15 +1,22 @@
-// Bakes the pairs of solids that the page offers, into a folder that its build copies: node demo.js
+// Bakes the pairs of solids that the page offers, and runs the scenes that it plays, into a folder
+// that its build copies: node demo.js
 
-import {copyFileSync, mkdirSync, writeFileSync} from 'node:fs';
+import {execFileSync} from 'node:child_process';
+import {copyFileSync, existsSync, mkdirSync, rmSync, writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 
-import {baked, buildFolder, hasOracle, oracleMesh} from '../package/test/data.js';
+import {baked, buildFolder, hasOracle, oracleMesh, root, sampleMesh, sharedMesh} from '../package/test/data.js';
 
 /** Beside assets: what the page fetches. */
 export const demoFolder = join(buildFolder, 'playground/public');
 export const sphereCounts = [4000, 10000];
 
-/** Poses: quaternion w, x, y, z and translation [u]. `up`: against gravity, an axis of A's. */
+const kDragon = sharedMesh('dragon_174k.ply');
+
+/**
+ * Poses: quaternion w, x, y, z and translation [u]. `up`: against gravity, an axis of A's. `look`:
+ * radii of B to see around it, instead of all.
+ */
 const kPairs = [
   {
     id: 'bolt-nut',
@@ -19,26 +26,45 @@ const kPairs = [
     pose: {rotation: [1, 0, 0, 0], translation: [0, 0, 8.5]},
     friction: 0.01,  // or the thread would hold it
   },
+  ...(hasOracle ? [{
+    id: 'elephant-dino',
+    name: 'Elephant and dino',
+    a: {name: 'elephant', mesh: oracleMesh('elephant')},
+    b: {name: 'dino', mesh: oracleMesh('dino')},
+    pose: {rotation: [0.5, -0.5, -0.5, -0.5], translation: [0.4, 0.03, 0.05]},
+    up: 'y',
+  }] :
+                  []),
+  {
+    id: 'screw-table',
+    name: 'Screw on a table',
+    a: {name: 'slab', scale: 10},
+    b: 'bolt',
+    pose: {rotation: [0.70711, 0, 0.70711, 0], translation: [-10, 0, 8.6]},
+  },
+  kDragon ? {
+    id: 'probe-dragon',
+    name: 'Probe on a dragon',
+    a: {name: 'dragon', mesh: kDragon},
+    b: {name: 'capsule', scale: 0.012},
+    pose: {rotation: [0.70711, 0.70711, 0, 0], translation: [-0.06, 0.1925, 0]},
+    up: 'y',
+    look: 3.2,
+  } :
+            {
+              id: 'probe-knot',
+              name: 'Probe on a knot',
+              a: 'torus_knot',
+              b: {name: 'capsule', scale: 0.4},
+              pose: {rotation: [1, 0, 0, 0], translation: [2.6, 0, 0.7]},
+              look: 4,
+            },
   {
     id: 'gears',
     name: 'Two gears',
     a: 'gear',
     b: 'gear',
     pose: {rotation: [0.99518, 0, 0, 0.09802], translation: [9.05, 0, 0]},
-  },
-  {
-    id: 'bolt-table',
-    name: 'Bolt on a table',
-    a: {name: 'slab', scale: 10},
-    b: 'bolt',
-    pose: {rotation: [0.70711, 0, 0.70711, 0], translation: [-10, 0, 8.6]},
-  },
-  {
-    id: 'probe-knot',
-    name: 'Probe on a knot',
-    a: 'torus_knot',
-    b: {name: 'capsule', scale: 0.4},
-    pose: {rotation: [1, 0, 0, 0], translation: [2.6, 0, 0.7]},
   },
   {
     id: 'ball-shell',
@@ -49,20 +75,31 @@ const kPairs = [
     cut: 0.5,
   },
 ];
-if (hasOracle) {
-  kPairs.splice(1, 0, {
-    id: 'elephant-dino',
-    name: 'Elephant and dino',
-    a: {name: 'elephant', mesh: oracleMesh('elephant')},
-    b: {name: 'dino', mesh: oracleMesh('dino')},
-    pose: {rotation: [0.5, -0.5, -0.5, -0.5], translation: [0.4, 0.03, 0.05]},
-    up: 'y',
-  });
+/** Scenes of examples/bullet: write_scene runs them. */
+const kScenes = [
+  {id: 'nut', name: 'A nut turns down a bolt'},
+  {id: 'bowl', name: 'A ball in a bowl in a box'},
+];
+export const sceneFile = (id) => join(buildFolder, `assets/${id}.glb`);
+
+/** Files of the scenes, each run once. */
+function runScenes() {
+  const meshes = join(buildFolder, 'assets');
+  for (const name of ['bolt', 'nut']) sampleMesh(name);
+  for (const {id} of kScenes) {
+    if (existsSync(sceneFile(id))) continue;
+    execFileSync(
+        join(root, 'build/bin/write_scene'), [id, '--meshes', meshes, '--glb', sceneFile(id)],
+        {stdio: 'ignore'});
+  }
 }
 
 /** Every asset at every count: paths by name and count. */
 export function bakeDemo() {
+  rmSync(demoFolder, {recursive: true, force: true});
   mkdirSync(join(demoFolder, 'demo'), {recursive: true});
+  runScenes();
+  for (const {id} of kScenes) copyFileSync(sceneFile(id), join(demoFolder, `demo/${id}.glb`));
   const file = (solid, spheres) => {
     const {name, ...options} = typeof solid === 'string' ? {name: solid} : solid;
     const path = baked(name, spheres, options);
@@ -75,7 +112,8 @@ export function bakeDemo() {
     return {...pair, a: names[0], b: names[1]};
   });
   writeFileSync(
-      join(demoFolder, 'demo/pairs.json'), JSON.stringify({sphereCounts, pairs}, null, 2) + '\n');
+      join(demoFolder, 'demo/pairs.json'),
+      JSON.stringify({sphereCounts, pairs, scenes: kScenes}, null, 2) + '\n');
 }
 
 if (process.argv[1] === import.meta.filename) bakeDemo();

@@ -8,12 +8,18 @@ export const kSettings = 128;
 export const kPenetration = 176;
 export const kSeparation = 288;
 export const kPatches = 400;
-export const kPatchBytes = 128;
 export const kMostPatches = 64;
 export const kInfo = 8592;
 export const kBounds = 8648;
 export const kMass = 8736;
 export const kCounts = 8872;
+export const kMotion = 8880;
+export const kMotionBytes = 72;
+export const kImpactSettings = 9024;
+export const kImpact = 9056;
+export const kFit = 9176;
+export const kWrenches = 9224;
+export const kNumbers = 9328;
 
 let start = 0;
 /** Where the desk stands in memory. */
@@ -45,8 +51,12 @@ const kOrigin = [0, 0, 0];
 export function writePose(which, pose, what) {
   if (which === 1 && (pose === undefined || pose === null))
     throw new IstError(`ist: ${what} is missing: {rotation, translation, scale}`);
-  const out = f64();
-  const at = desk() / 8 + 8 * which;
+  writePoseAt(desk() + 64 * which, pose, what);
+}
+
+/** The same anywhere in memory. */
+export function writePoseAt(place, pose, what) {
+  const out = f64(), at = place / 8;
   writeNumbers(out, at, pose?.rotation, kIdentity, 4, what, '.rotation');
   writeNumbers(out, at + 4, pose?.translation, kOrigin, 3, what, '.translation');
   const scale = number(pose?.scale ?? 1, what, '.scale');

@@ -1,68 +1,23 @@
-/* The C functions as a page's JavaScript calls them: numbers lie at fixed places of one desk in
- * memory, whose layout src/desk.js knows. */
-#include <ist/ist.h>
+/* The C functions as a page's JavaScript calls them: assets, fields, and what is asked of two. */
 #include <stdlib.h>
 #include <string.h>
 
-#define EXPORT(name) __attribute__((export_name(#name)))
+#include "desk.h"
 
-enum { kMostPatches = 64 };
-
-/* w, x, y, z; x, y, z; scale, where 0 is taken for 1 */
-typedef struct place {
-  ist_pose_t pose;
-  double scale;
-} place_t;
-
-static struct desk {
-  place_t a, b;
-  /* For separation and patches too, which have fewer. */
-  ist_penetration_settings_t settings;
-  ist_penetration_t penetration;
-  ist_separation_t separation;
-  ist_contact_patch_t patches[kMostPatches];
-  ist_tree_info_t info;
-  ist_bounds_t bounds;
-  ist_mass_properties_t mass;
-  uint32_t counts[2];
-  ist_workspace_t workspace;
-} desk = {
+desk_t desk = {
     .settings = {.size = sizeof desk.settings},
     .penetration = {.size = sizeof desk.penetration},
     .separation = {.size = sizeof desk.separation},
     .info = {.size = sizeof desk.info},
     .bounds = {.size = sizeof desk.bounds},
     .mass = {.size = sizeof desk.mass},
+    .impact_settings = {.size = sizeof desk.impact_settings},
+    .impact = {.size = sizeof desk.impact},
+    .fit = {.size = sizeof desk.fit},
+    .wrenches = {.size = sizeof desk.wrenches},
 };
 
-#define AT(member, place) _Static_assert(offsetof(struct desk, member) == (place), #member)
-AT(a, 0);
-AT(b, 64);
-AT(settings.measure, 132);
-AT(settings.field, 136);
-AT(settings.pair_budget, 140);
-AT(settings.max_visits, 144);
-AT(settings.deadline_us, 152);
-AT(settings.relative_error, 160);
-AT(settings.min_radius, 168);
-AT(penetration.status, 180);
-AT(penetration.volume, 184);
-AT(penetration.node_visits, 280);
-AT(separation.status, 292);
-AT(separation.distance, 296);
-AT(separation.node_visits, 392);
-AT(patches, 400);
-AT(info.has_field, 8596);
-AT(info.volume, 8608);
-AT(info.field_triangles, 8640);
-AT(bounds.lower, 8656);
-AT(mass.volume, 8744);
-AT(counts, 8872);
-_Static_assert(sizeof(ist_contact_patch_t) == 128, "patch");
-_Static_assert(sizeof(ist_ball_t) == 32, "ball");
-_Static_assert(sizeof(ist_lens_t) == 72, "lens");
-
-EXPORT(desk) struct desk* desk_at(void) { return &desk; }
+EXPORT(desk) desk_t* desk_at(void) { return &desk; }
 
 EXPORT(start) ist_status_t start(void) { return ist_workspace_make(0, NULL, &desk.workspace); }
 
@@ -159,20 +114,11 @@ _Static_assert(offsetof(ist_field_t, as.distance_grid.error) ==
 /* --- Queries: of two trees, or of a field and a tree where `a` is null -------------------------
  */
 
-static ist_placed_tree_t placed(const ist_tree_t* tree, const place_t* place) {
-  const ist_placed_tree_t made = {sizeof made, tree, place->pose, place->scale};
-  return made;
-}
-static ist_placed_field_t placed_field(const ist_field_t* field) {
-  const ist_placed_field_t made = {sizeof made, field, desk.a.pose, desk.a.scale};
-  return made;
-}
-
 EXPORT(penetration)
 ist_status_t penetration(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b) {
   const ist_placed_tree_t second = placed(b, &desk.b);
   if (a == NULL) {
-    const ist_placed_field_t first = placed_field(field);
+    const ist_placed_field_t first = placed_field(field, &desk.a);
     return ist_field_penetration(&first, &second, &desk.settings, &desk.workspace,
                                  &desk.penetration);
   }
@@ -187,7 +133,7 @@ ist_status_t separation(const ist_tree_t* a, const ist_field_t* field, const ist
                                               .max_visits = desk.settings.max_visits,
                                               .deadline_us = desk.settings.deadline_us};
   if (a == NULL) {
-    const ist_placed_field_t first = placed_field(field);
+    const ist_placed_field_t first = placed_field(field, &desk.a);
     return ist_field_separation(&first, &second, &settings, &desk.workspace, &desk.separation);
   }
   const ist_placed_tree_t first = placed(a, &desk.a);
@@ -199,20 +145,14 @@ EXPORT(contact_patches)
 ist_status_t contact_patches(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b,
                              uint32_t most) {
   const ist_placed_tree_t second = placed(b, &desk.b);
-  const ist_contact_settings_t settings = {.size = sizeof settings,
-                                           .measure = desk.settings.measure,
-                                           .field = desk.settings.field,
-                                           .max_visits = desk.settings.max_visits,
-                                           .deadline_us = desk.settings.deadline_us,
-                                           .relative_error = desk.settings.relative_error,
-                                           .min_radius = desk.settings.min_radius};
+  const ist_contact_settings_t settings = contact_settings();
   ist_contact_patches_t found = {.size = sizeof found,
                                  .patch_size = sizeof desk.patches[0],
                                  .patches = desk.patches,
                                  .capacity = most < kMostPatches ? most : kMostPatches};
   ist_status_t status;
   if (a == NULL) {
-    const ist_placed_field_t first = placed_field(field);
+    const ist_placed_field_t first = placed_field(field, &desk.a);
     status = ist_field_contact_patches(&first, &second, &settings, &desk.workspace, &found,
                                        &desk.penetration);
   } else {
@@ -231,7 +171,7 @@ int32_t overlap(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t*
   ist_overlapping_t answer;
   ist_status_t status;
   if (a == NULL) {
-    const ist_placed_field_t first = placed_field(field);
+    const ist_placed_field_t first = placed_field(field, &desk.a);
     status = ist_field_overlap(&first, &second, &desk.workspace, &answer);
   } else {
     const ist_placed_tree_t first = placed(a, &desk.a);

@@ -141,6 +141,22 @@ export function withRoom(size, use) {
   }
 }
 
+/** Room that is kept from call to call, as large as the largest of them asked for. */
+export class Room {
+  #place = 0;
+  #size = 0;
+
+  of(size) {
+    if (size > this.#size) {
+      const next = take(size);
+      if (this.#place !== 0) give(this.#place);
+      this.#place = next;
+      this.#size = size;
+    }
+    return this.#place;
+  }
+}
+
 /** The library's words for a status. */
 export function describe(status) {
   const memory = u8();

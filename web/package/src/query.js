@@ -1,13 +1,12 @@
 // The queries.
 
+import {newPatches, newPenetration, newVector, readPatches, readPenetration, statusOf} from './answers.js';
 import {Asset, Field} from './asset.js';
-import {copy3, count, desk, kCounts, kMostPatches, kPatchBytes, kPatches, kPenetration, kSeparation, writePose, writeSettings} from './desk.js';
+import {copy3, count, desk, kCounts, kMostPatches, kPatches, kPenetration, kSeparation, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
-import {check, f64, functions, give, take, u32} from './memory.js';
+import {check, f64, functions, Room, u32} from './memory.js';
 
-const newVector = () => new Float64Array(3);
-
-function solid(given, which, query) {
+export function solid(given, which, query) {
   if (given instanceof Asset || (which === 'A' && given instanceof Field)) return given._at;
   throw new IstError(
       `ist: ${query}: solid ${which} must be an ${which === 'A' ? 'Asset or a Field' : 'Asset'}`);
@@ -17,7 +16,7 @@ function solid(given, which, query) {
  * Puts a question on the desk and asks it: `question` names an export. Returns the status, no
  * error.
  */
-function ask(question, who, a, b, poseB, options, more) {
+export function ask(question, who, a, b, poseB, options, more) {
   const wasm = functions(who);
   const first = solid(a, 'A', who), second = solid(b, 'B', who);
   writePose(0, options?.poseA, 'poseA');
@@ -29,38 +28,9 @@ function ask(question, who, a, b, poseB, options, more) {
   return status;
 }
 
-const statusOf = (status) => (status === 0 ? 'ok' : 'budget-exhausted');
-
-const newPenetration = () => ({
-  status: 'ok',
-  volume: 0,
-  volumeMin: 0,
-  volumeMax: 0,
-  centroid: newVector(),
-  force: newVector(),
-  torque: newVector(),
-  nodeVisits: 0,
-  spherePairs: 0,
-});
-
-function readPenetration(status, out) {
-  const numbers = f64(), integers = u32();
-  const at = (desk() + kPenetration) / 8 + 1;
-  out.status = statusOf(status);
-  out.volume = numbers[at];
-  out.volumeMin = numbers[at + 1];
-  out.volumeMax = numbers[at + 2];
-  copy3(numbers, at + 3, out.centroid);
-  copy3(numbers, at + 6, out.force, -1);
-  copy3(numbers, at + 9, out.torque, -1);
-  out.nodeVisits = integers[2 * at + 24];
-  out.spherePairs = integers[2 * at + 25];
-  return out;
-}
-
 export function penetration(a, b, poseB, options) {
   const status = ask('penetration', 'penetration()', a, b, poseB, options, 0);
-  return readPenetration(status, options?.into ?? newPenetration());
+  return readPenetration(desk() + kPenetration, status, options?.into ?? newPenetration());
 }
 
 const newSeparation = () => ({
@@ -92,40 +62,20 @@ export function separation(a, b, poseB, options) {
   return out;
 }
 
-const newPatch = () => ({
-  id: 0,
-  centroid: newVector(),
-  normal: newVector(),
-  area: 0,
-  depth: 0,
-  volume: 0,
-  force: newVector(),
-  torque: newVector(),
-});
-
-export function contactPatches(a, b, poseB, options) {
+export function maxPatchesOf(options) {
   const most = options?.maxPatches ?? 16;
   if (!(Number.isInteger(most) && most >= 1 && most <= kMostPatches))
     throw new IstError(
         `ist: maxPatches is ${most}; it must be a whole number from 1 to ${kMostPatches}`);
+  return most;
+}
+
+export function contactPatches(a, b, poseB, options) {
+  const most = maxPatchesOf(options);
   const status = ask('contact_patches', 'contactPatches()', a, b, poseB, options, most);
-  const out = options?.into ?? {whole: newPenetration(), count: 0, patches: []};
-  readPenetration(status, out.whole);
-  const numbers = f64(), integers = u32();
-  out.count = integers[(desk() + kCounts) / 4];
-  for (let i = 0; i < out.count; ++i) {
-    const patch = out.patches[i] ??= newPatch();
-    const at = (desk() + kPatches + i * kPatchBytes) / 8;
-    // Exact below 2⁵³, which is what assets that fit into 32 bits of addresses stay under.
-    patch.id = integers[2 * at] + 2 ** 32 * integers[2 * at + 1];
-    copy3(numbers, at + 1, patch.centroid);
-    copy3(numbers, at + 4, patch.normal);
-    patch.area = numbers[at + 7];
-    patch.depth = numbers[at + 8];
-    patch.volume = numbers[at + 9];
-    copy3(numbers, at + 10, patch.force);
-    copy3(numbers, at + 13, patch.torque);
-  }
+  const out = options?.into ?? newPatches();
+  readPenetration(desk() + kPenetration, status, out.whole);
+  readPatches(desk() + kPatches, u32()[(desk() + kCounts) / 4], out);
   return out;
 }
 
@@ -134,8 +84,7 @@ export function overlap(a, b, poseB, options) {
   return kOverlapping[ask('overlap', 'overlap()', a, b, poseB, options, 0)];
 }
 
-// Room that lenses are written to, kept from call to call.
-let room = 0, roomFor = 0;
+const room = new Room();
 
 export function lenses(a, b, poseB, options) {
   const wasm = functions('lenses()');
@@ -146,15 +95,10 @@ export function lenses(a, b, poseB, options) {
   writePose(1, poseB, 'poseB');
   writeSettings({measure: options?.measure});
   const most = count(options?.maxLenses, 4096, 'maxLenses');
-  if (most > roomFor) {
-    const next = take(72 * most);
-    if (room !== 0) give(room);
-    room = next;
-    roomFor = most;
-  }
+  const place = room.of(72 * most);
   const status = wasm.lenses(
       first, second, count(options?.detailA, 0, 'detailA'), count(options?.detailB, 0, 'detailB'),
-      room, most);
+      place, most);
   check(status, 'lenses()');
   const out = options?.into ?? {total: 0, count: 0, data: new Float64Array(0)};
   const integers = u32(), numbers = f64(), counts = (desk() + kCounts) / 4;
@@ -163,7 +107,7 @@ export function lenses(a, b, poseB, options) {
   if (out.data.length < 10 * out.count)
     out.data = new Float64Array(10 * (options?.into ? most : out.count));
   for (let i = 0; i < out.count; ++i) {
-    const from = room / 8 + 9 * i, to = 10 * i;
+    const from = place / 8 + 9 * i, to = 10 * i;
     for (let k = 0; k < 8; ++k) out.data[to + k] = numbers[from + k];
     out.data[to + 8] = integers[2 * from + 16];
     out.data[to + 9] = integers[2 * from + 17];

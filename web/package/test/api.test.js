@@ -5,7 +5,7 @@ import {execFileSync} from 'node:child_process';
 import {readFileSync} from 'node:fs';
 import {test} from 'node:test';
 
-import {packageFolder, pairs} from './data.js';
+import {baked, packageFolder, pairs} from './data.js';
 
 const [{a: pathA, b: pathB}] = pairs();
 const bytesA = readFileSync(pathA), bytesB = readFileSync(pathB);
@@ -223,6 +223,116 @@ test('fields', () => {
       /2 · 2 = 4 numbers, not 3/);
   assert.match(
       sentence(() => ist.Field.heights(new Float32Array(3), 3, 1, [1, 1])), /two points and more/);
+  b.free();
+});
+
+test('flat faces: what protrudes is taken out', () => {
+  const a = ist.Asset.from(readFileSync(baked('cube', 1000))), b = a;
+  const gap = a.info().protrusion / 2, {lower, upper} = a.bounds();
+  const pose = {translation: [0, 0, upper[2] - lower[2] + gap]}, options = {field: 'never'};
+  const whole = ist.penetration(a, b, pose, options);
+  assert.ok(whole.volume > 0, 'spheres stick out across the gap');
+  const clean = ist.withoutProtrusion(whole, a, b, pose);
+  assert.ok(clean.volume < 0.3 * whole.volume && clean.volumeMin <= clean.volume);
+  assert.ok(Math.abs(clean.force[2]) < Math.abs(whole.force[2]));
+  const patches = ist.contactPatches(a, b, pose, options);
+  const before = patches.patches.reduce((sum, p) => sum + p.volume, 0), {count} = patches;
+  assert.equal(ist.patchesWithoutProtrusion(patches, a, b, pose, options), patches);
+  assert.ok(patches.count === count);
+  assert.ok(patches.patches.reduce((sum, p) => sum + p.volume, 0) < 0.5 * before);
+  assert.equal(ist.withoutProtrusion(whole, a, b, pose, {into: whole}), whole);
+  assert.deepEqual(whole, clean);
+  assert.match(
+      sentence(() => ist.withoutProtrusion(whole, ist.Field.ball(1), b, pose)),
+      /both solids must be Assets/);
+  assert.match(
+      sentence(() => ist.patchesWithoutProtrusion({count: 3, patches: []}, a, b, pose)),
+      /what contactPatches\(\) answered/);
+  a.free();
+});
+
+test('wrenches about any point, and how two assets suit', () => {
+  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB), pose = {translation: [0, 0, 9]};
+  const contact = ist.penetration(a, b, pose);
+  const about = [0, 0, 9], {onA, onB} = ist.wrenches(contact, pose, {b: about});
+  for (let k = 0; k < 3; ++k) {
+    assert.equal(onB.force[k], contact.force[k]);
+    assert.equal(onA.force[k], -onB.force[k]);
+    assert.ok(Math.abs(onB.torque[k] - contact.torque[k]) < 1e-9);  // B's origin lies there
+  }
+  const found = ist.contactPatches(a, b, pose), into = {onA, onB};
+  assert.equal(ist.wrenches(found.patches[0], pose, {b: about}, into), into);
+  assert.equal(onB.force[2], found.patches[0].force[2]);
+  const fit = ist.pairFit(a, b);
+  assert.ok(fit.fits && fit.ratio >= 1 && fit.grainA > 0);
+  assert.ok(ist.pairFit(a, b, {scaleB: 0.01}).needsSurface);
+  a.free();
+  b.free();
+});
+
+test('time of impact: no tunnelling at any speed', () => {
+  const b = ist.Asset.from(bytesB), {lower, upper} = b.bounds();
+  const floor = ist.Field.halfSpace([0, 0, 1], 0);
+  const start = {translation: [0, 0, 10 - lower[2]]};
+  for (const speed of [1, 1e3, 1e6]) {
+    const hit = ist.timeOfImpact(
+        floor, b, start, {motionB: {velocity: [0, 0, -speed]}, duration: 100 / speed});
+    assert.equal(hit.kind, 'impact');
+    assert.ok(hit.time * speed < 10 && hit.time * speed > 10 - 0.01 * (upper[2] - lower[2]));
+    assert.ok(hit.distanceMin <= hit.distanceMax && hit.distanceMax < 0.1 && hit.normal[2] > 0.99);
+  }
+  const away = ist.timeOfImpact(floor, b, start, {motionB: {velocity: [0, 0, 1]}});
+  assert.ok(away.kind === 'none' && away.time === 1);
+  const a = ist.Asset.from(bytesA);
+  const inside = ist.timeOfImpact(a, b, {translation: [0, 0, 9]});
+  assert.ok(inside.kind === 'overlapping' && inside.time === 0);
+  assert.equal(ist.timeOfImpact(a, b, start, {maxVisits: 1, into: away}), away);
+
+  const to = {rotation: [Math.SQRT1_2, 0, 0, Math.SQRT1_2], translation: [1, 2, 3]};
+  const motion = ist.motionBetween({}, to, 4);
+  assert.ok(Math.abs(motion.angularVelocity[2] - Math.PI / 8) < 1e-12);
+  const there = ist.moved({}, motion, 4);
+  assert.ok(Math.abs(there.rotation[3] - Math.SQRT1_2) < 1e-12 && there.translation[2] === 3);
+  assert.match(sentence(() => ist.motionBetween({}, to, 0)), /duration is 0; it must be > 0/);
+  assert.match(
+      sentence(() => ist.timeOfImpact(a, b, {}, {motionA: {velocity: [0, 0]}})),
+      /motionA\.velocity has 2 numbers, not 3/);
+  assert.match(
+      sentence(() => ist.timeOfImpact(a, b, {}, {motionA: {velocity: [NaN, 0, 0]}})),
+      /out of range/);
+  a.free();
+  b.free();
+});
+
+test('a batch: the answers of single calls, a bad pair among them', () => {
+  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB),
+        floor = ist.Field.halfSpace([0, 0, 1]);
+  const pairs = [];
+  for (let i = 0; i < 20; ++i) {
+    const poseB = {translation: [0.1 * i, 0, i === 7 ? NaN : 9]};
+    pairs.push(i % 3 ? {a, b, poseB} : {a: floor, b, poseA: {scale: 2}, poseB});
+  }
+  const options = {maxPatches: 5}, answers = ist.penetrationBatch(pairs);
+  const patches = ist.contactPatchesBatch(pairs, options);
+  pairs.forEach(({a, b, poseA, poseB}, i) => {
+    if (i === 7) {
+      assert.ok(answers[i].status === 'invalid-input' && answers[i].volume === 0);
+      assert.ok(patches[i].whole.status === 'invalid-input' && patches[i].count === 0);
+      return;
+    }
+    assert.deepEqual(answers[i], ist.penetration(a, b, poseB, {poseA}));
+    assert.deepEqual(patches[i], ist.contactPatches(a, b, poseB, {poseA, ...options}));
+  });
+  const kept = [...answers];
+  assert.equal(ist.penetrationBatch(pairs.slice(0, 4), {into: answers}), answers);
+  assert.ok(answers.length === 4 && answers.every((answer, i) => answer === kept[i]));
+  assert.deepEqual(ist.penetrationBatch([]), []);
+  assert.match(
+      sentence(() => ist.penetrationBatch([pairs[0], {a, b}])), /pair 1: poseB is missing/);
+  assert.match(
+      sentence(() => ist.contactPatchesBatch([{a, b: floor, poseB: {}}])),
+      /pair 0: contactPatchesBatch\(\): solid B must be an Asset/);
+  a.free();
   b.free();
 });
 

@@ -12,16 +12,21 @@ export const program = join(root, 'build/bin/ist');
 const nativeRows = join(root, 'build/bin/native_rows');
 const shared = resolve(process.env.IST_SHARED ?? join(root, '../shared'));
 
+/** A sample's mesh: its path. */
+export function sampleMesh(name) {
+  const path = join(buildFolder, `assets/${name}.obj`);
+  mkdirSync(join(buildFolder, 'assets'), {recursive: true});
+  if (!existsSync(path)) execFileSync(program, ['sample', name, '-o', path], {stdio: 'ignore'});
+  return path;
+}
+
 /** A sample, or a mesh, as an asset, larger by a factor: its path. Baked once. */
 export function baked(name, spheres, {mesh, scale = 1} = {}) {
   const folder = join(buildFolder, 'assets');
   const path = join(folder, `${name}${scale === 1 ? '' : `_x${scale}`}_${spheres}.ist`);
   if (existsSync(path)) return path;
   mkdirSync(folder, {recursive: true});
-  if (mesh === undefined) {
-    mesh = join(folder, `${name}.obj`);
-    execFileSync(program, ['sample', name, '-o', mesh], {stdio: 'ignore'});
-  }
+  mesh ??= sampleMesh(name);
   execFileSync(
       program,
       ['bake', mesh, '-o', path, '--spheres', spheres, '--scale', scale, '--device', 'cpu'],
@@ -52,6 +57,11 @@ function nutPoses() {
 
 /** Whether the oracle's tables are here. */
 export const hasOracle = existsSync(join(shared, 'oracle'));
+/** A mesh of the shared data; undefined where it is not. */
+export function sharedMesh(name) {
+  const path = join(shared, 'meshes/dev', name);
+  return existsSync(path) ? path : undefined;
+}
 export const oracleMesh = (name) => join(shared, `oracle/meshes/${name}.off`);
 
 /** Pairs of assets and their tables; those of the shared data where there are any. */

@@ -34,6 +34,88 @@ function penetrationBits(p) {
   ];
 }
 
+const patchBits = (patches) => patches.flatMap(
+    (p) =>
+        [p.id,
+         ...hexes(p.centroid),
+         ...hexes(p.normal),
+         ...hexes([p.area, p.depth, p.volume]),
+         ...hexes(p.force),
+         ...hexes(p.torque),
+]);
+
+/** What tests/c_api/native_rows.c asks under the same names. */
+function moreQueries(ist, a, b, halfSpace) {
+  const identity = {};
+  return {
+    'without protrusion': {
+      ask: (pose) =>
+          ist.withoutProtrusion(ist.penetration(a, b, pose, {field: 'never'}), a, b, pose),
+      bits: penetrationBits,
+    },
+    'patches without protrusion': {
+      ask: (pose) => {
+        const options = {field: 'never'};
+        const found = ist.contactPatches(a, b, pose, options);
+        return ist.patchesWithoutProtrusion(found, a, b, pose, options);
+      },
+      bits: (found) => patchBits(found.patches.slice(0, found.count)),
+    },
+    'fit': {
+      ask: (pose) => ist.pairFit(a, b, {scaleB: pose.scale}),
+      bits: (f) =>
+          [...hexes([f.grainA, f.grainB, f.ratio]), Number(f.aIsCoarser), Number(f.hasSurface),
+           Number(f.needsSurface), Number(f.fits)],
+    },
+    'wrenches': {
+      ask: (pose) => ist.wrenches(
+          ist.penetration(a, b, pose), pose, {a: [0.1, 0.2, 0.3], b: [-0.3, 0.2, 0.1]}),
+      bits: ({onA, onB}) => [onA, onB].flatMap((w) => [...hexes(w.force), ...hexes(w.torque)]),
+    },
+    'motions': {
+      ask: ({rotation, translation, scale}) => {
+        const from = {scale};
+        const motion = ist.motionBetween(from, {rotation, translation}, 0.5, [0.1, -0.2, 0.3]);
+        return [motion, ist.moved(from, motion, 0.2)];
+      },
+      bits: ([motion, there]) => [motion.velocity, motion.angularVelocity, motion.about,
+                                  there.rotation, there.translation]
+                                     .flatMap(hexes),
+    },
+    'impact': {
+      ask: (pose) => ist.timeOfImpact(a, b, pose, {
+        motionA: {angularVelocity: [0, 0.25, 0]},
+        motionB: {velocity: pose.translation.map((x) => -2 * x), angularVelocity: [0.5, 0, 0.25]},
+        maxVisits: 20000,
+        duration: 0.5,
+      }),
+      bits: (t) =>
+          [kStatus[t.status],
+           ['none', 'impact', 'unresolved', 'overlapping'].indexOf(t.kind),
+           ...hexes([t.time, t.distanceMin, t.distanceMax]),
+           ...hexes(t.pointA),
+           ...hexes(t.pointB),
+           ...hexes(t.normal),
+           t.nodeVisits,
+           t.surfacePairs,
+  ],
+    },
+    'batches': {
+      ask: (pose) => {
+        const pair = {a, b, poseB: pose};
+        const turned = {a: b, b: a, poseA: pose, poseB: identity};
+        return [
+          ist.penetrationBatch([pair, turned, {a: halfSpace, b, poseB: pose}]),
+          ist.contactPatchesBatch([pair])[0]
+        ];
+      },
+      bits: ([
+        answers, {whole, patches, count}
+      ]) => [...answers, whole].flatMap(penetrationBits).concat(patchBits(patches.slice(0, count))),
+    },
+  };
+}
+
 /** By name: what is asked of a row, and its answer as bits. `ist`: a build of the package. */
 export function queries(ist, a, b) {
   const halfSpace = ist.Field.halfSpace([0, 0.6, 0.8], 0.0625);
@@ -70,17 +152,8 @@ export function queries(ist, a, b) {
     },
     'patches': {
       ask: (pose) => forPatches.into = ist.contactPatches(a, b, pose, forPatches),
-      bits: (found) => penetrationBits(found.whole)
-                           .concat(...found.patches.slice(0, found.count)
-                                       .map(
-                                           (p) =>
-                                               [p.id,
-                                                ...hexes(p.centroid),
-                                                ...hexes(p.normal),
-                                                ...hexes([p.area, p.depth, p.volume]),
-                                                ...hexes(p.force),
-                                                ...hexes(p.torque),
-  ])),
+      bits: (found) =>
+          penetrationBits(found.whole).concat(patchBits(found.patches.slice(0, found.count))),
     },
     'overlap': {
       ask: (pose) => ist.overlap(a, b, pose),
@@ -96,6 +169,7 @@ export function queries(ist, a, b) {
         return bits;
       },
     },
+    ...moreQueries(ist, a, b, halfSpace),
   };
 }
 
@@ -104,8 +178,8 @@ export function rowsText(ist, bytesA, bytesB, csv) {
   const a = ist.Asset.from(bytesA, 'A'), b = ist.Asset.from(bytesB, 'B');
   const asked = Object.entries(queries(ist, a, b));
   const lines = parseRows(csv).flatMap(
-      (pose, i) =>
-          asked.map(([name, {ask, bits}]) => `${i} ${name}: ${bits(ask(pose)).join(' ')}\n`));
+      (pose, i) => asked.map(
+          ([name, {ask, bits}]) => `${i} ${[`${name}:`, ...bits(ask(pose))].join(' ')}\n`));
   a.free();
   b.free();
   return lines.join('');

@@ -11,7 +11,7 @@ export class Keys {
     this.act = act;
     this.step = 1 / 32;
     holder.addEventListener('keydown', (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.ctrlKey || event.metaKey || event.altKey || !act.ready()) return;
       if (this.pressed(event)) event.preventDefault();
     });
   }

@@ -3,9 +3,9 @@
 import * as THREE from 'three';
 
 export class Player {
-  /** `parts`: the form with its button, slider and output. */
-  constructor({form, play, moment, told, leave}, onLeave) {
-    Object.assign(this, {form, play, moment, told});
+  /** The form with its button, slider and output; `facts`: a list for what is known of a scene. */
+  constructor({form, play, moment, told, facts, leave}, onLeave) {
+    Object.assign(this, {form, play, moment, told, facts});
     play.onclick = () => this.setPlaying(!this.playing);
     moment.oninput = () => {
       this.setPlaying(false);
@@ -21,11 +21,15 @@ export class Player {
   }
 
   /** Takes a scene into `into`; says its ball and its axis up, which glTF lays down. */
-  start({scene, animations}, into) {
+  start({name, scene, animations}, into) {
     this.stop();
     this.scene = scene;
+    let bodies = 0;
+    const moving =
+        new Set(animations.flatMap(({tracks}) => tracks.map((track) => track.name.split('.')[0])));
     scene.traverse((part) => {
       if (!part.isMesh) return;
+      ++bodies;
       part.frustumCulled = false;
       // Plain default materials get a colour each, so that bodies are told apart.
       if (!part.material.map && part.material.color?.getHex() === 0xffffff) {
@@ -38,10 +42,24 @@ export class Player {
     for (const clip of animations) this.mixer.clipAction(clip).play();
     this.duration = Math.max(...animations.map((clip) => clip.duration), 1e-3);
     this.form.hidden = false;
+    this.tellFacts([
+      ['Scene', name],
+      ['Bodies', String(bodies)],
+      ['Moving', String(moving.size)],
+      ['Length', `${this.duration.toFixed(2)} s`],
+    ]);
     this.setPlaying(!matchMedia('(prefers-reduced-motion: reduce)').matches);
     this.seek(0);
     const ball = new THREE.Box3().setFromObject(scene).getBoundingSphere(new THREE.Sphere());
     return {centre: ball.center, radius: ball.radius};
+  }
+
+  tellFacts(rows) {
+    this.facts.replaceChildren(...rows.flatMap(
+        ([name, value]) =>
+            [Object.assign(document.createElement('dt'), {textContent: name}),
+             Object.assign(document.createElement('dd'), {textContent: value}),
+    ]));
   }
 
   stop() {
@@ -54,7 +72,6 @@ export class Player {
   setPlaying(playing) {
     this.playing = playing;
     this.play.textContent = playing ? 'Pause' : 'Play';
-    this.play.setAttribute('aria-pressed', playing);
     this.moved = true;
   }
 

@@ -45,6 +45,9 @@ export class Readouts {
     this.contact = contact;
     this.changed = now;
     this.said = false;
+    const touching = contact.penetration.volume > 0;
+    document.body.classList.toggle('touching', touching);
+    document.body.classList.toggle('apart', !touching && contact.separation.distance > 0);
     const times = this.times;
     times.sum += contact.time;
     ++times.count;

@@ -37,7 +37,9 @@ export class View {
     this.handles.setColors(0xd9534f, 0x4caf6d, 0x4a86d8, 0xf2c14e);
     this.handles.addEventListener('change', () => this.dirty = true);
     this.handles.addEventListener('dragging-changed', ({value}) => this.orbit.enabled = !value);
-    this.scene.add(this.handles.getHelper());
+    this.handles.setSize(1.25);
+    // In a scene of their own, drawn last: nothing hides them.
+    this.top = new THREE.Scene().add(this.handles.getHelper());
 
     new ResizeObserver(() => this.resize()).observe(holder);
     this.resize();
@@ -71,12 +73,12 @@ export class View {
     this.dirty = true;
   }
 
-  /** A grid to fall on, at a height [u] along up. */
-  setFloor(height) {
+  /** A grid to fall on, at a height [u] along up, for solids of a radius. */
+  setFloor(height, radius) {
     this.floor?.removeFromParent();
     this.floor?.geometry.dispose();
     this.floor?.material.dispose();
-    this.floor = new THREE.GridHelper(6 * this.radius, 24, 0xffffff, 0xffffff);
+    this.floor = new THREE.GridHelper(6 * radius, 24, 0xffffff, 0xffffff);
     this.floor.material.transparent = true;
     this.floor.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), this.up);
     this.floor.position.copy(this.up).multiplyScalar(height);
@@ -120,8 +122,10 @@ export class View {
     this.renderer.clear();
     this.renderer.render(this.scene, this.camera);
     if (!over) return;
-    this.renderer.clearDepth();
-    this.renderer.render(over.scene, this.camera);
+    for (const scene of [over.scene, this.top]) {
+      this.renderer.clearDepth();
+      this.renderer.render(scene, this.camera);
+    }
   }
 
   /** A light that goes with the camera, so that no side is dark: right, up, towards the eye. */

@@ -24,9 +24,10 @@ export class World {
   }
 
   /**
-   * Takes two assets, which it frees when others come. `up`: 'y' or 'z'; `friction` once let go.
+   * Takes two assets, which it frees when others come. `up`: 'y' or 'z'; `friction` once let go;
+   * `look`: how many radii of B are seen around it, all of both without.
    */
-  hold(assetA, assetB, {pose, up = 'z', friction}) {
+  hold(assetA, assetB, {pose, up = 'z', friction, look}) {
     const own = new Set([assetA, assetB]);
     this.letGo(false);
     for (const solid of [this.a, this.b]) {
@@ -41,6 +42,7 @@ export class World {
     this.home = pose;
     this.up = up;
     this.friction = friction;
+    this.look = look;
     this.size = Math.min(this.a.bounds.radius, this.b.bounds.radius);
     this.show();
     this.contact.warm(pose);
@@ -59,11 +61,15 @@ export class World {
       box.union(ofBounds(solid.bounds).applyMatrix4(solid.group.matrixWorld));
     }
     const whole = box.getBoundingSphere(new THREE.Sphere());
-    this.view.frame(whole.center, Math.max(0.86 * whole.radius, ball(this.b).radius), this.up);
+    const atB = ball(this.b);
+    if (this.look)
+      this.view.frame(atB.center, this.look * atB.radius, this.up);
+    else
+      this.view.frame(whole.center, Math.max(0.86 * whole.radius, atB.radius), this.up);
     const axis = this.up === 'y' ? 1 : 2;
     this.floor =
         Math.min(box.min.getComponent(axis), this.a.bounds.lower[axis]) - 0.02 * whole.radius;
-    this.view.setFloor(this.floor);
+    this.view.setFloor(this.floor, whole.radius);
     this.recolour();
     this.show();
   }

@@ -1,7 +1,12 @@
 // Compiles only if the types say what docs/web.md does.
-import {Asset, Field, IstError, contactPatches, init, lenses, overlap, penetration, separation, version} from 'ist-query';
+import {
+  Asset, Field, IstError, contactPatches, contactPatchesBatch, init, lenses, motionBetween, moved, overlap, pairFit,
+  patchesWithoutProtrusion, penetration, penetrationBatch, separation, timeOfImpact, version, withoutProtrusion, wrenches,
+} from 'ist-query';
 import * as compat from 'ist-query/compat';
-import type {ContactPatches, Penetration, PenetrationOptions, Pose, Surface} from 'ist-query';
+import type {
+  BatchPenetration, ContactPatches, ImpactOptions, Pair, Penetration, PenetrationOptions, Pose, Surface, Wrenches,
+} from 'ist-query';
 
 await init({wasm: fetch('ist.wasm')});
 await compat.init();
@@ -14,8 +19,19 @@ const surface: Surface | null = a.surface();
 const sum: number = answer.volume + separation(a, a, pose).distance + found.patches[0].area +
     lenses(a, a, pose).data[0] + a.info().details[0] + (surface?.triangles.length ?? 0) + a.spheres({detail: 1})[0];
 const words: string = version() + overlap(a, a, {}) + new IstError('x').status.toFixed(sum);
+const pairs: Pair[] = [{a, b: a, poseB: pose}, {a: Field.ball(1), b: a, poseA: {scale: 2}, poseB: moved(pose, {velocity: [1, 0, 0]}, 2)}];
+const many: {into?: BatchPenetration[]} = {};
+many.into = penetrationBatch(pairs, many);
+const way: ImpactOptions = {motionB: motionBetween(pose, {translation: [1, 0, 0]}, 2), duration: 2};
+way.into = timeOfImpact(a, a, pose, way);
+const push: Wrenches = wrenches(found.patches[0], pose, {b: a.massProperties().centreOfMass});
+const thin: number = withoutProtrusion(answer, a, a, pose, {into: answer}).volume + way.into.time + push.onB.torque[0] +
+    patchesWithoutProtrusion(found, a, a, pose).count + contactPatchesBatch(pairs, {maxPatches: 4})[0].whole.volume +
+    pairFit(a, a).ratio;
+// @ts-expect-error
+penetrationBatch([{a, b: Field.ball(1), poseB: pose}]);
 // @ts-expect-error
 penetration(a, Field.ball(1), pose);
 // @ts-expect-error
 penetration(a, a, pose, {measure: 'outer'});
-export {words};
+export {thin, words};

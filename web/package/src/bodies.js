@@ -1,0 +1,82 @@
+// What is told from answers that are there already, and of two assets at any pose.
+
+import {kPatchBytes, newPenetration, newVector, readPatches, readPenetration, writePatch, writePenetration} from './answers.js';
+import {Asset} from './asset.js';
+import {copy3, desk, kFit, kMostPatches, kNumbers, kPatches, kPenetration, kWrenches, writeNumbers, writePose, writeSettings} from './desk.js';
+import {IstError} from './error.js';
+import {check, f64, functions, u32} from './memory.js';
+
+function two(a, b, who) {
+  if (!(a instanceof Asset && b instanceof Asset))
+    throw new IstError(`ist: ${who}: both solids must be Assets`);
+}
+
+function writePlaces(a, b, poseB, options, who) {
+  two(a, b, who);
+  writePose(0, options?.poseA, 'poseA');
+  writePose(1, poseB, 'poseB');
+}
+
+export function withoutProtrusion(whole, a, b, poseB, options) {
+  const wasm = functions('withoutProtrusion()');
+  writePlaces(a, b, poseB, options, 'withoutProtrusion()');
+  writePenetration(desk() + kPenetration, whole);
+  check(wasm.without_protrusion(a._at, b._at), 'withoutProtrusion()');
+  const status = whole.status === 'ok' ? 0 : 1;
+  return readPenetration(desk() + kPenetration, status, options?.into ?? newPenetration());
+}
+
+export function patchesWithoutProtrusion(found, a, b, poseB, options) {
+  const wasm = functions('patchesWithoutProtrusion()');
+  writePlaces(a, b, poseB, options, 'patchesWithoutProtrusion()');
+  writeSettings(options);
+  const {patches, count} = found;
+  if (!(count <= Math.min(kMostPatches, patches.length)))
+    throw new IstError('ist: patchesWithoutProtrusion() takes what contactPatches() answered');
+  for (let i = 0; i < count; ++i) writePatch(desk() + kPatches + i * kPatchBytes, patches[i]);
+  check(wasm.patches_without_protrusion(a._at, b._at, count), 'patchesWithoutProtrusion()');
+  readPatches(desk() + kPatches, count, found);
+  return found;
+}
+
+export function pairFit(a, b, options) {
+  const wasm = functions('pairFit()');
+  two(a, b, 'pairFit()');
+  writePose(0, {scale: options?.scaleA}, 'scaleA');
+  writePose(1, {scale: options?.scaleB}, 'scaleB');
+  check(wasm.pair_fit(a._at, b._at), 'pairFit()');
+  const numbers = f64(), integers = u32(), at = (desk() + kFit) / 8 + 1;
+  return {
+    grainA: numbers[at],
+    grainB: numbers[at + 1],
+    ratio: numbers[at + 2],
+    aIsCoarser: integers[2 * at + 6] !== 0,
+    hasSurface: integers[2 * at + 7] !== 0,
+    needsSurface: integers[2 * at + 8] !== 0,
+    fits: integers[2 * at + 9] !== 0,
+  };
+}
+
+const kOrigin = [0, 0, 0];
+const newWrench = () => ({force: newVector(), torque: newVector()});
+
+export function wrenches(contact, poseB, points, into) {
+  const wasm = functions('wrenches()');
+  writePose(1, poseB, 'poseB');
+  const isPatch = contact.normal !== undefined;
+  if (isPatch)
+    writePatch(desk() + kPatches, contact);
+  else
+    writePenetration(desk() + kPenetration, contact);
+  const numbers = f64(), at = (desk() + kNumbers) / 8;
+  writeNumbers(numbers, at, points?.a, kOrigin, 3, 'points.a');
+  writeNumbers(numbers, at + 3, points?.b, kOrigin, 3, 'points.b');
+  check(wasm.wrenches(isPatch ? 1 : 0), 'wrenches()');
+  const out = into ?? {onA: newWrench(), onB: newWrench()};
+  const first = (desk() + kWrenches) / 8 + 1;
+  copy3(numbers, first, out.onA.force);
+  copy3(numbers, first + 3, out.onA.torque);
+  copy3(numbers, first + 6, out.onB.force);
+  copy3(numbers, first + 9, out.onB.torque);
+  return out;
+}

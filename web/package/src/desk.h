@@ -1,0 +1,92 @@
+/* The desk: numbers of questions and answers lie at fixed places of it, which src/desk.js knows. */
+#pragma once
+
+#include <ist/ist.h>
+
+#define EXPORT(name) __attribute__((export_name(#name)))
+
+enum { kMostPatches = 64 };
+
+/* w, x, y, z; x, y, z; scale, where 0 is taken for 1 */
+typedef struct place {
+  ist_pose_t pose;
+  double scale;
+} place_t;
+
+typedef struct desk {
+  place_t a, b;
+  /* For separation and patches too, which have fewer. */
+  ist_penetration_settings_t settings;
+  ist_penetration_t penetration;
+  ist_separation_t separation;
+  ist_contact_patch_t patches[kMostPatches];
+  ist_tree_info_t info;
+  ist_bounds_t bounds;
+  ist_mass_properties_t mass;
+  uint32_t counts[2];
+  ist_motion_t motion_a, motion_b;
+  ist_impact_settings_t impact_settings;
+  ist_impact_t impact;
+  ist_pair_fit_t fit;
+  ist_wrenches_t wrenches;
+  double numbers[8]; /* of whatever is asked */
+  ist_workspace_t workspace;
+} desk_t;
+extern desk_t desk;
+
+#define AT(member, place) _Static_assert(offsetof(desk_t, member) == (place), #member)
+AT(a, 0);
+AT(b, 64);
+AT(settings.measure, 132);
+AT(settings.field, 136);
+AT(settings.pair_budget, 140);
+AT(settings.max_visits, 144);
+AT(settings.deadline_us, 152);
+AT(settings.relative_error, 160);
+AT(settings.min_radius, 168);
+AT(penetration.status, 180);
+AT(penetration.volume, 184);
+AT(penetration.node_visits, 280);
+AT(separation.status, 292);
+AT(separation.distance, 296);
+AT(separation.node_visits, 392);
+AT(patches, 400);
+AT(info.has_field, 8596);
+AT(info.volume, 8608);
+AT(info.field_triangles, 8640);
+AT(bounds.lower, 8656);
+AT(mass.volume, 8744);
+AT(counts, 8872);
+AT(motion_a, 8880);
+AT(motion_b, 8952);
+AT(impact_settings.max_visits, 9028);
+AT(impact_settings.duration, 9032);
+AT(impact.kind, 9064);
+AT(impact.time, 9080);
+AT(fit.grain_a, 9184);
+AT(fit.a_is_coarser, 9208);
+AT(wrenches.on_a, 9232);
+AT(numbers, 9328);
+_Static_assert(sizeof(ist_contact_patch_t) == 128, "patch");
+_Static_assert(sizeof(ist_penetration_t) == 112, "penetration");
+_Static_assert(sizeof(ist_ball_t) == 32, "ball");
+_Static_assert(sizeof(ist_lens_t) == 72, "lens");
+
+static inline ist_placed_tree_t placed(const ist_tree_t* tree, const place_t* place) {
+  const ist_placed_tree_t made = {sizeof made, tree, place->pose, place->scale};
+  return made;
+}
+static inline ist_placed_field_t placed_field(const ist_field_t* field, const place_t* place) {
+  const ist_placed_field_t made = {sizeof made, field, place->pose, place->scale};
+  return made;
+}
+static inline ist_contact_settings_t contact_settings(void) {
+  const ist_contact_settings_t settings = {.size = sizeof settings,
+                                           .measure = desk.settings.measure,
+                                           .field = desk.settings.field,
+                                           .max_visits = desk.settings.max_visits,
+                                           .deadline_us = desk.settings.deadline_us,
+                                           .relative_error = desk.settings.relative_error,
+                                           .min_radius = desk.settings.min_radius};
+  return settings;
+}

@@ -1,0 +1,208 @@
+// What the page shows: pairs and scenes that it offers, and a visitor's own.
+
+import {Asset} from 'ist-query';
+
+import {$, untell} from './dom.js';
+import {readFile} from './files.js';
+import {whole} from './format.js';
+
+const kOwn = 'own';  // the choice that stands for a visitor's files
+
+const stem = (name) => name.replace(/\.[^.]+$/, '');
+
+export class Library {
+  /** `on.held`: what to call when solids were taken. */
+  constructor({world, view, player, settings}, on) {
+    Object.assign(this, {world, view, player, settings, on});
+    $('swap').onclick = () => {
+      if (!world.a) return;
+      this.leaveScene();
+      world.swap();
+      this.tellNames(world.names.toReversed());
+      settings.tellLevels();
+    };
+  }
+
+  async open() {
+    const {sphereCounts, pairs, scenes} =
+        await fetched('demo/pairs.json', (answer) => answer.json());
+    this.pairs = pairs;
+    this.scenes = scenes;
+    const group = (label, entries) => {
+      const made = Object.assign(document.createElement('optgroup'), {label});
+      made.append(...entries.map(({id, name}) => new Option(name, id)));
+      if (entries.length > 0) $('pair').append(made);
+    };
+    group('Solids', pairs);
+    group('Scenes from Bullet', scenes);
+    for (const count of sphereCounts) $('spheres').append(new Option(whole(count), count));
+  }
+
+  /** Shows what is chosen. What was chosen before is dropped if it arrives later. */
+  async choose() {
+    const id = $('pair').value, mine = this.latest = {};
+    const pair = this.pairs.find((p) => p.id === id), scene = this.scenes.find((s) => s.id === id);
+    if (!pair && !scene) return;
+    $('loading').hidden = false;
+    try {
+      if (scene) {
+        const bytes = await fetched(`demo/${id}.glb`, (answer) => answer.arrayBuffer());
+        const read = await readFile(new File([bytes], `${id}.glb`));
+        if (mine === this.latest) this.enterScene({...read, name: scene.name});
+        return;
+      }
+      const names = [pair.a, pair.b], count = $('spheres').value;
+      const bytes = await Promise.all(names.map(
+          (name) => fetched(`demo/${name}_${count}.ist`, (answer) => answer.arrayBuffer())));
+      if (mine !== this.latest) return;
+      this.leaveScene();
+      this.hold(...bytes.map((b, k) => Asset.from(b, names[k])), names, pair);
+      this.settings.setCut(pair.cut ?? 0);
+    } finally {
+      if (mine === this.latest) $('loading').hidden = true;
+    }
+  }
+
+  hold(a, b, names, how) {
+    untell();
+    this.world.hold(a, b, how);
+    this.tellNames(names);
+    this.settings.tellLevels();
+    this.on.held();
+  }
+
+  tellNames(names) {
+    const {world} = this;
+    [$('name-a').textContent, $('name-b').textContent] =
+        names.map((name, k) => `${'AB'[k]} ${name.replaceAll('_', ' ')}`);
+    world.names = names;
+    const [a, b] = [world.a.info, world.b.info];
+    $('note').textContent =
+        `A: ${whole(a.spheres)} spheres, ${(100 * a.coverage).toFixed(1)} % filled. ` +
+        `B: ${whole(b.spheres)} spheres, ${(100 * b.coverage).toFixed(1)} % filled. ` +
+        'u is the unit of the meshes; k is a pressure.';
+  }
+
+  // --- A visitor's files
+
+  async take(files) {
+    untell();
+    const read = [];
+    try {
+      for (const file of files) read.push(await readFile(file));
+      this.check(read.map(({kind}) => kind));
+    } catch (error) {
+      for (const {asset} of read) asset?.free();
+      throw error;
+    }
+    this.takeSolids(read.filter(({kind}) => kind === 'solid'));
+    for (const {geometry, name} of read.filter(({kind}) => kind === 'looks')) {
+      // By name, else for B.
+      const [ofA, ofB] =
+          this.world.names.map((own) => own.toLowerCase() === stem(name).toLowerCase());
+      this.settings.setMode('surface');
+      this.world[ofA && !ofB ? 'a' : 'b'].wear(geometry);
+      this.view.dirty = true;
+    }
+    const scene = read.find(({kind}) => kind === 'scene');
+    if (!scene) return;
+    this.latest = {};
+    $('loading').hidden = true;
+    this.chooseOwn();
+    this.enterScene(scene);
+  }
+
+  /** Throws where files of these kinds make nothing to show. */
+  check(kinds) {
+    const solids = kinds.filter((kind) => kind === 'solid').length;
+    if (solids > 2) throw new Error(`Two solids at a time: these are ${solids}.`);
+    if (!this.world.a && solids < 2 && kinds.some((kind) => kind !== 'scene'))
+      throw new Error('There are no solids on the page yet: drop two .ist files at once.');
+  }
+
+  takeSolids(solids) {
+    const {world} = this;
+    if (solids.length === 0) return;
+    this.latest = {};  // what is on its way is not wanted any more
+    $('loading').hidden = true;
+    this.leaveScene();
+    // One alone is the new B.
+    const a = solids.length === 2 ? solids[0].asset : world.a.asset, b = solids.at(-1).asset;
+    const names = [
+      solids.length === 2 ? stem(solids[0].name) : world.names[0],
+      stem(solids.at(-1).name),
+    ];
+    this.hold(a, b, names, {pose: beside(a, b), up: solids.length === 2 ? 'z' : world.up});
+    this.chooseOwn();
+  }
+
+  chooseOwn() {
+    if (!$('pair').querySelector(`[value=${kOwn}]`))
+      $('pair').append(new Option('Your files', kOwn));
+    $('pair').value = kOwn;
+  }
+
+  // --- Playback
+
+  enterScene(scene) {
+    const {world, view, player} = this;
+    world.letGo(false);
+    for (const solid of [world.a, world.b])
+      if (solid) solid.group.visible = false;
+    view.handles.detach();
+    const {centre, radius} = player.start(scene, view.scene);
+    view.frame(centre, radius, 'y');
+    if (view.floor) view.floor.visible = false;
+    document.body.classList.add('playing');
+  }
+
+  leaveScene() {
+    const {world, view, player} = this;
+    if (!player.open) return;
+    player.stop();
+    document.body.classList.remove('playing');
+    if (!world.a) return;
+    for (const solid of [world.a, world.b]) solid.group.visible = true;
+    view.handles.attach(world.b.group);
+    world.frame();
+  }
+
+  /** Back to the solids that were there, or to the first pair. */
+  async backToSolids() {
+    this.leaveScene();
+    const held =
+        this.pairs.find(({a, b}) => this.world.names?.[0] === a && this.world.names[1] === b);
+    if (held) {
+      $('pair').value = held.id;
+    } else if (this.world.a) {
+      this.chooseOwn();
+    } else {
+      $('pair').value = this.pairs[0].id;
+      await this.choose();
+    }
+  }
+}
+
+async function fetched(path, read) {
+  let answer;
+  try {
+    answer = await fetch(path);
+  } catch {
+    throw new Error(`${path} cannot be fetched: is the server still there?`);
+  }
+  if (!answer.ok) throw new Error(`${path} cannot be fetched: ${answer.status}.`);
+  return read(answer);
+}
+
+/** Right of A, a little apart. */
+function beside(a, b) {
+  const [boxA, boxB] = [a.bounds(), b.bounds()];
+  return {
+    rotation: [1, 0, 0, 0],
+    translation: [
+      boxA.upper[0] - boxB.lower[0] + 0.1 * boxB.radius,
+      boxA.centre[1] - boxB.centre[1],
+      boxA.centre[2] - boxB.centre[2],
+    ],
+  };
+}
