@@ -2,9 +2,12 @@
 
 #include <cmath>
 #include <map>
+#include <memory>
 #include <random>
 #include <string>
 
+#include "query/base/relative_pose.h"
+#include "query/kernel/look_kernel.h"
 #include "support/detailed_pairs.h"
 #include "support/host_batch.h"
 #include "support/oracle_assets.h"
@@ -65,6 +68,39 @@ TEST(GpuDetails, BudgetsAreTheCpus) {
   EXPECT_GT(changed, 200u);
   // The inner measure has no levels.
   expect_same_bits(batch.run(pairs, Measure::inner, 0, 40), batch.run(pairs, Measure::inner));
+}
+
+/// By which a budget's shares are told, with the slopes that go into the gradients.
+TEST(GpuDetails, QuickLooksAreTheCpus) {
+  const HostAssets assets(detailed_views());
+  const auto memory = std::make_unique<gpu::FilledMemory>();
+  std::size_t met = 0;
+  for (const BatchPair& pair : detailed_pairs(200, 84)) {
+    const gpu::AssetRef &a = assets.refs()[pair.a], &b = assets.refs()[pair.b];
+    gpu::PairPlace place;
+    ASSERT_TRUE(
+        place.place(a.frame, pair.pose_a, pair.scale_a, b.frame, pair.pose_b, pair.scale_b));
+    const SerialTeam team;
+    gpu::QuickLooker looker(team, a.details, b.details, place.a_from_b, *memory);
+    const gpu::QuickLook gpu = looker.look(true);
+    const AssetHeader& header_a = detailed_assets()[pair.a].view().header();
+    const AssetHeader& header_b = detailed_assets()[pair.b].view().header();
+    const auto pose =
+        relative_pose(PlacedTree{detailed_assets()[pair.a].view(), pair.pose_a, pair.scale_a},
+                      PlacedTree{detailed_assets()[pair.b].view(), pair.pose_b, pair.scale_b});
+    const QuickLook cpu = quick_look(
+        SphereTree(header_a, matched_tree(header_a, header_a.detail_count)),
+        SphereTree(header_b, matched_tree(header_b, header_b.detail_count)), pose->a_from_b, true);
+    met += cpu.volume > 0 ? 1 : 0;
+    // The CPU's balls stand where floats say.
+    EXPECT_NEAR(gpu.volume, cpu.volume, 1e-5 * cpu.volume + 1e-6 * cpu.slope.by_translation.norm());
+    const double slope = 1e-4 * (cpu.slope.by_translation.norm() + std::cbrt(cpu.volume) * 0.1);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(gpu.slope.by_translation[k], cpu.slope.by_translation[k], slope);
+      EXPECT_NEAR(gpu.slope.by_rotation[k], cpu.slope.by_rotation[k], slope);
+    }
+  }
+  EXPECT_GT(met, 80u);
 }
 
 TEST(GpuDetails, OracleRowsUnderABudgetAreTheCpus) {
