@@ -63,18 +63,18 @@ struct PairPlace {
       origin_a[i] = pose_a.t[i] + in_a;
       between[i] = pose_b.t[i] - pose_a.t[i];
     }
-    const double scale = unit_b / unit_a;
+    const double scale = unit_b / unit_a, per_scale = unit_a / unit_b, per_unit = 1 / unit_a;
     double far = 0;
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
         double sum = 0;
         for (int k = 0; k < 3; ++k) sum += rotation_a[3 * k + i] * rb[3 * k + j];
         a_from_b.m[3 * i + j] = scale * sum;
-        b_from_a.m[3 * j + i] = sum / scale;
+        b_from_a.m[3 * j + i] = sum * per_scale;
       }
       double sum = 0;
       for (int k = 0; k < 3; ++k) sum += rotation_a[3 * k + i] * (between[k] + offset_b[k]);
-      a_from_b.t[i] = (sum - scale_a * a.centre[i]) / unit_a;
+      a_from_b.t[i] = (sum - scale_a * a.centre[i]) * per_unit;
       const double size = a_from_b.t[i] < 0 ? -a_from_b.t[i] : a_from_b.t[i];
       far = size > far ? size : far;
     }
@@ -83,7 +83,7 @@ struct PairPlace {
           -((b_from_a.m[3 * i] * a_from_b.t[0] + b_from_a.m[3 * i + 1] * a_from_b.t[1]) +
             b_from_a.m[3 * i + 2] * a_from_b.t[2]);
     a_from_b.scale = scale;
-    b_from_a.scale = 1 / scale;
+    b_from_a.scale = per_scale;
     constexpr double kFarthest = 1e60;  // as relative_pose()
     return far <= kFarthest && scale <= kFarthest && scale >= 1 / kFarthest;
   }
@@ -96,7 +96,8 @@ struct PairPlace {
     constexpr double kLargest = 1.7976931348623157e308;
     bool good = off <= 1e-3 && scale > 0 && scale <= kLargest;
     for (int i = 0; i < 3; ++i) good = good && pose.t[i] >= -kLargest && pose.t[i] <= kLargest;
-    for (int i = 0; i < 4; ++i) q[i] = pose.q[i] / norm;
+    const double per_norm = 1 / norm;
+    for (int i = 0; i < 4; ++i) q[i] = pose.q[i] * per_norm;
     return good;
   }
 
