@@ -69,23 +69,22 @@ std::size_t GpuAssets::size() const noexcept { return impl_->size; }
 std::size_t GpuAssets::bytes() const noexcept { return impl_->memory.bytes(); }
 int GpuAssets::device() const noexcept { return impl_->device; }
 
-std::size_t GpuWorkspace::Impl::place(std::byte* from) {
-  return std::max(place_penetrations(from), place_separations(from));
-}
+namespace {
 
-void GpuWorkspace::Impl::place_splits(gpu::Parts& parts, gpu::BatchArrays& batch) {
+void place_splits(gpu::Parts& parts, gpu::BatchArrays& batch) {
   batch.splits = parts.take<gpu::SplitPair>(kSplitRoom);
   batch.tasks = parts.take<gpu::PairTask>(kTaskRoom);
   batch.split_room = kSplitRoom;
   batch.task_room = kTaskRoom;
 }
 
-std::size_t GpuWorkspace::Impl::place_penetrations(std::byte* from) {
+std::size_t place_penetrations(std::byte* from, GpuWorkspace::Impl& room) {
   gpu::Parts parts(from);
+  gpu::BatchArrays& arrays = room.arrays;
   arrays.counters = parts.take<gpu::BatchCounters>(1);
-  field_counters = parts.take<gpu::FieldCounters>(1);
-  arrays.list = parts.take<std::uint32_t>(most_pairs);
-  arrays.detailed = parts.take<std::uint32_t>(most_pairs);
+  room.field_counters = parts.take<gpu::FieldCounters>(1);
+  arrays.list = parts.take<std::uint32_t>(room.most_pairs);
+  arrays.detailed = parts.take<std::uint32_t>(room.most_pairs);
   place_splits(parts, arrays);
   arrays.places = parts.take<gpu::PairPlace>(kSplitRoom);
   arrays.totals = parts.take<gpu::LensTotals>(kSplitRoom + kTaskRoom);
@@ -95,19 +94,27 @@ std::size_t GpuWorkspace::Impl::place_penetrations(std::byte* from) {
   return parts.used();
 }
 
-std::size_t GpuWorkspace::Impl::place_separations(std::byte* from) {
+std::size_t place_separations(std::byte* from, GpuWorkspace::Impl& room) {
   gpu::Parts parts(from);
-  separations.counters = parts.take<gpu::BatchCounters>(2);
-  for (std::uint32_t*& list : separations.list) list = parts.take<std::uint32_t>(most_pairs);
-  place_splits(parts, separations.pairs);
-  separations.totals = parts.take<gpu::GapTotals>(kSplitRoom + kTaskRoom);
-  separations.entries = {parts.take<std::uint32_t>(kGapEntryRoom),
-                         parts.take<std::uint32_t>(kGapEntryRoom),
-                         parts.take<double>(kGapEntryRoom), parts.take<double>(kGapEntryRoom)};
-  separations.pairs.entry_room = kGapEntryRoom;
-  separations.pairs.measure = Measure::inner;
+  gpu::SeparationArrays& arrays = room.separations;
+  arrays.counters = parts.take<gpu::BatchCounters>(2);
+  for (std::uint32_t*& list : arrays.list) list = parts.take<std::uint32_t>(room.most_pairs);
+  place_splits(parts, arrays.pairs);
+  arrays.totals = parts.take<gpu::GapTotals>(kSplitRoom + kTaskRoom);
+  arrays.entries = {parts.take<std::uint32_t>(kGapEntryRoom),
+                    parts.take<std::uint32_t>(kGapEntryRoom), parts.take<double>(kGapEntryRoom),
+                    parts.take<double>(kGapEntryRoom)};
+  arrays.pairs.entry_room = kGapEntryRoom;
+  arrays.pairs.measure = Measure::inner;
   return parts.used();
 }
+
+/// Sets the room's arrays to parts of the memory at `from`; returns the bytes they take.
+std::size_t place(std::byte* from, GpuWorkspace::Impl& room) {
+  return std::max(place_penetrations(from, room), place_separations(from, room));
+}
+
+}  // namespace
 
 GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
     : impl_(std::make_unique<Impl>()) {
@@ -119,8 +126,8 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   impl_->grids = gpu::batch_grids();
   impl_->separation_grids = gpu::separation_grids();
   impl_->field_grids = gpu::field_grids();
-  impl_->memory = gpu::DeviceBytes(queue, settings, impl_->place(nullptr));
-  impl_->place(impl_->memory.data());
+  impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr, *impl_));
+  place(impl_->memory.data(), *impl_);
   queue.wait();
 }
 

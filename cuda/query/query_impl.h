@@ -32,14 +32,6 @@ struct GpuWorkspace::Impl {
   gpu::BatchArrays arrays{};
   gpu::SeparationArrays separations{};
   gpu::FieldCounters* field_counters = nullptr;
-
-  /// Sets the arrays to parts of the memory at `from`; returns the bytes they take.
-  std::size_t place(std::byte* from);
-
- private:
-  static void place_splits(gpu::Parts& parts, gpu::BatchArrays& batch);
-  std::size_t place_penetrations(std::byte* from);
-  std::size_t place_separations(std::byte* from);
 };
 
 namespace gpu {
