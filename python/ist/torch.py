@@ -161,7 +161,7 @@ def _ask_gpu(solids, placed, pairs, scales, needs_gradient, settings):
     scene = _scene(tuple(solids), pairs.tobytes(), placed.device)
     shape = (*placed.shape[:-2], len(pairs))
     wants_pose, wants_scale = needs_gradient[0], scales is not None and needs_gradient[1]
-    asset_a, asset_b = (asset.expand(shape).reshape(-1) for asset in scene.asset)
+    asset_a, asset_b = (asset.expand(shape).reshape(-1).contiguous() for asset in scene.asset)
     pose_a, pose_b = (placed[..., solid, :].reshape(-1, 7) for solid in scene.pairs)
     scale_a = scale_b = None
     if scales is not None:
