@@ -82,7 +82,7 @@ struct BatchArrays {
   std::uint32_t* entries_a;
   std::uint32_t* entries_b;
   std::uint32_t split_room, task_room, entry_room;
-  std::uint32_t most_alone = 128;   ///< pairs of leaves that a descent meets before it is split
+  std::uint32_t most_alone = 128;  ///< pairs of leaves that a descent meets before it is split
   std::uint32_t task_weight = 64;  ///< of a task, as task_floor() counts
 };
 
