@@ -1,6 +1,7 @@
 // What a build without CUDA says.
 #include <ist/error.h>
 #include <ist/gpu.h>
+#include <ist/gpu_fields.h>
 #include <ist/gpu_query.h>
 
 #include "cuda/cuda_backend.h"
@@ -34,6 +35,27 @@ std::size_t GpuWorkspace::most_pairs() const noexcept { return 0; }
 std::size_t GpuWorkspace::bytes() const noexcept { return 0; }
 
 void penetration_batch(const GpuAssets&, const GpuPairs&, Measure, GpuWorkspace&,
+                       const GpuPenetrations&, CUstream_st*) {
+  gpu_info(0);
+}
+
+void penetration_batch(const GpuAssets&, const GpuPairs&, const GpuPenetrationSettings&,
+                       GpuWorkspace&, const GpuPenetrations&, CUstream_st*) {
+  gpu_info(0);
+}
+
+struct GpuFields::Impl {};
+GpuFields::GpuFields(std::span<const Field>, const GpuSettings& settings) {
+  gpu_info(settings.device);
+}
+GpuFields::~GpuFields() = default;
+GpuFields::GpuFields(GpuFields&&) noexcept = default;
+GpuFields& GpuFields::operator=(GpuFields&&) noexcept = default;
+std::size_t GpuFields::size() const noexcept { return 0; }
+std::size_t GpuFields::bytes() const noexcept { return 0; }
+int GpuFields::device() const noexcept { return 0; }
+
+void penetration_batch(const GpuAssets&, const GpuFields&, const GpuPairs&, Measure, GpuWorkspace&,
                        const GpuPenetrations&, CUstream_st*) {
   gpu_info(0);
 }
