@@ -59,23 +59,11 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_tasks(const BatchAr
            });
 }
 
-template <class Kernel>
-int blocks_of(const Kernel& kernel, unsigned threads, int multiprocessors) {
-  int each = 0;
-  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, kernel, static_cast<int>(threads), 0),
-        "asking how many blocks run at a time");
-  return each * multiprocessors;
-}
-
 }  // namespace
 
 BatchGrids batch_grids() {
-  int device = 0, multiprocessors = 0;
-  check(cudaGetDevice(&device), "looking for a GPU");
-  check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device),
-        "asking the GPU for its size");
-  return {blocks_of(sum_pairs, kThreads, multiprocessors),
-          blocks_of(sum_detailed_pairs, 32 * kDetailWarps, multiprocessors)};
+  return {blocks_at_a_time(sum_pairs, kThreads),
+          blocks_at_a_time(sum_detailed_pairs, 32 * kDetailWarps)};
 }
 
 void launch_batch(const BatchArrays& batch, const BatchGrids& grids, cudaStream_t stream) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "cuda/atomics.h"
+#include "cuda/check.h"
 #include "cuda/warp_team.h"
 
 namespace ist::gpu {
@@ -30,6 +31,18 @@ __device__ inline std::uint32_t list_place(const WarpTeam& team, bool flag, std:
   std::uint32_t first = 0;
   if (team.lane() == 0) first = atomic_add(listed, static_cast<std::uint32_t>(total));
   return team.broadcast(first, 0) + static_cast<std::uint32_t>(before);
+}
+
+/// Blocks of a kernel that the current device runs at a time.
+template <class Kernel>
+int blocks_at_a_time(const Kernel& kernel, unsigned threads) {
+  int device = 0, multiprocessors = 0, each = 0;
+  check(cudaGetDevice(&device), "looking for a GPU");
+  check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device),
+        "asking the GPU for its size");
+  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, kernel, static_cast<int>(threads), 0),
+        "asking how many blocks run at a time");
+  return each * multiprocessors;
 }
 
 }  // namespace ist::gpu

@@ -48,25 +48,13 @@ void launch_sums(const FieldBatch& batch, const FieldGrids& grids, cudaStream_t 
   check_launch("summing trees in fields");
 }
 
-template <class Memory>
-int blocks_each() {
-  int each = 0;
-  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, sum_field_pairs<Memory>, kThreads, 0),
-        "asking how many blocks run at a time");
-  return each;
-}
-
 }  // namespace
 
 FieldGrids field_grids() {
-  int device = 0, multiprocessors = 0;
-  check(cudaGetDevice(&device), "looking for a GPU");
-  check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device),
-        "asking the GPU for its size");
   FieldGrids grids = {};
-  grids.sum[kSmooth] = multiprocessors * blocks_each<WalkMemory>();
-  grids.sum[kFacets] = multiprocessors * blocks_each<FacetMemory>();
-  grids.sum[kMesh] = multiprocessors * blocks_each<SurfaceMemory>();
+  grids.sum[kSmooth] = blocks_at_a_time(sum_field_pairs<WalkMemory>, kThreads);
+  grids.sum[kFacets] = blocks_at_a_time(sum_field_pairs<FacetMemory>, kThreads);
+  grids.sum[kMesh] = blocks_at_a_time(sum_field_pairs<SurfaceMemory>, kThreads);
   return grids;
 }
 

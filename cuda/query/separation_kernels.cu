@@ -58,15 +58,6 @@ __global__ void __launch_bounds__(kThreads<Real>, kBlocksEach<Real>)
 }
 
 template <class Real>
-int blocks_at_a_time(int multiprocessors) {
-  int each = 0;
-  check(
-      cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, separate_pairs<Real>, kThreads<Real>, 0),
-      "asking how many blocks run at a time");
-  return each * multiprocessors;
-}
-
-template <class Real>
 void launch_searches(const SeparationArrays& batch, int blocks, cudaStream_t stream) {
   separate_pairs<Real><<<static_cast<unsigned>(blocks), kThreads<Real>, 0, stream>>>(batch);
   check_launch("separating pairs of trees");
@@ -77,11 +68,8 @@ void launch_searches(const SeparationArrays& batch, int blocks, cudaStream_t str
 }  // namespace
 
 SeparationGrids separation_grids() {
-  int device = 0, multiprocessors = 0;
-  check(cudaGetDevice(&device), "looking for a GPU");
-  check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device),
-        "asking the GPU for its size");
-  return {{blocks_at_a_time<float>(multiprocessors), blocks_at_a_time<double>(multiprocessors)}};
+  return {{blocks_at_a_time(separate_pairs<float>, kThreads<float>),
+           blocks_at_a_time(separate_pairs<double>, kThreads<double>)}};
 }
 
 void launch_separations(const SeparationArrays& batch, const SeparationGrids& grids,

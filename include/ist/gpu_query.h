@@ -69,7 +69,7 @@ struct GpuPenetrations {
 /// Device memory that a batch works in. One batch at a time may use it.
 class GpuWorkspace {
  public:
-  /// For batches of up to `most_pairs`; takes 8 bytes each and 81 MB besides.
+  /// For batches of up to `most_pairs`; takes 8 bytes each and 98 MB besides.
   ///
   /// Throws Error where the device cannot be used or has no memory left.
   explicit GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings = {});

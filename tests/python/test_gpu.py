@@ -1,6 +1,6 @@
 """ist.gpu as far as it goes without a card: what it says, and arguments that do not fit.
 
-With a card: tests/gpu/python_gpu.py.
+With a card: tests/python/test_on_gpu.py.
 """
 import ctypes
 
@@ -206,7 +206,7 @@ def test_a_capsule_is_taken_once():
 def test_without_a_card_it_says_so(cube):
     if ist.gpu.available():
         assert ist.gpu.why_not() is None
-        pytest.skip("there is a card: tests/gpu/python_gpu.py")
+        pytest.skip("there is a card: tests/python/test_on_gpu.py")
     reason = ist.gpu.why_not()
     assert "GPU" in reason
     with pytest.raises(ist.Error, match=reason):

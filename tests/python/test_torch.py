@@ -127,7 +127,7 @@ class BatchOnTheCpu:
 
 
 def test_a_gpus_batches_are_put_together_as_on_the_cpu(gear, knot, cube, scenes, monkeypatch):
-    """All of a GPU's way but the batch itself; tests/gpu/python_gpu.py has that."""
+    """All of a GPU's way but the batch itself; tests/python/test_on_gpu.py has that."""
     import ist.torch as module
     solids = [gear, knot, gear, cube]
     poses = torch.cat((scenes, scenes[:, :1] + 0.3), dim=1).detach()
