@@ -6,7 +6,7 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from . import Asset
+from . import Asset, Field
 
 _DeviceArray = Any  # has __dlpack__ and __dlpack_device__, or __cuda_array_interface__
 _Stream = Any  # a handle, or has __cuda_stream__, cuda_stream or ptr
@@ -46,6 +46,15 @@ class Assets:
     def bytes(self) -> int: ...
 
 @final
+class Fields:
+    def __init__(self, fields: Sequence[Field], *, device: int = 0) -> None: ...
+    def __len__(self) -> int: ...
+    @property
+    def device(self) -> int: ...
+    @property
+    def bytes(self) -> int: ...
+
+@final
 class Penetration:
     @property
     def volume(self) -> _DeviceArray | None: ...  # (n,) [u³]
@@ -65,7 +74,42 @@ class Penetration:
 def penetration(
     assets: Assets, asset_a: _DeviceArray | int, asset_b: _DeviceArray | int,
     pose_a: _DeviceArray | None, pose_b: _DeviceArray | None, scale_a: _DeviceArray | None = None,
-    scale_b: _DeviceArray | None = None, *, measure: Literal["matched", "inner"] = "matched",
+    scale_b: _DeviceArray | None = None, *, fields: Fields | None = None,
+    measure: Literal["matched", "inner"] = "matched", pair_budget: int = 0,
     wanted: Sequence[_Answer] | None = None,
     out: Mapping[_Answer, _DeviceArray] | Penetration | None = None, stream: _Stream = None,
 ) -> Penetration: ...
+
+@final
+class Separation:
+    @property
+    def distance(self) -> _DeviceArray | None: ...  # (n,) [u]
+    @property
+    def distance_min(self) -> _DeviceArray | None: ...  # (n,) [u] certified
+    @property
+    def distance_max(self) -> _DeviceArray | None: ...  # (n,) [u] certified
+    @property
+    def point_a(self) -> _DeviceArray | None: ...  # (n, 3) [u]
+    @property
+    def point_b(self) -> _DeviceArray | None: ...  # (n, 3) [u]
+    @property
+    def normal(self) -> _DeviceArray | None: ...  # (n, 3) unit, from A to B
+    @property
+    def status(self) -> _DeviceArray | None: ...  # (n,) QueryStatus
+    @property
+    def node_visits(self) -> _DeviceArray | None: ...  # (n,)
+    @property
+    def sphere_pairs(self) -> _DeviceArray | None: ...  # (n,)
+
+_Gap = Literal[
+    "distance", "distance_min", "distance_max", "point_a", "point_b", "normal", "status",
+    "node_visits", "sphere_pairs",
+]
+
+def separation(
+    assets: Assets, asset_a: _DeviceArray | int, asset_b: _DeviceArray | int,
+    pose_a: _DeviceArray | None, pose_b: _DeviceArray | None, scale_a: _DeviceArray | None = None,
+    scale_b: _DeviceArray | None = None, *, max_visits: int = 0,
+    wanted: Sequence[_Gap] | None = None,
+    out: Mapping[_Gap, _DeviceArray] | Separation | None = None, stream: _Stream = None,
+) -> Separation: ...

@@ -29,13 +29,14 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: torch.Tensor, *, p
         queries, 0.05 % of the scale to either side, exact to some 1e-4, and takes three times as
         long.
     settings: measure, field, pair_budget, min_radius, threads, … of ist.penetration. Limits that
-        stop a query leave its gradient without the part that was guessed. On a GPU there is measure
-        alone, solids are Assets, and volumes are by lenses: those of field="never" on the CPU.
+        stop a query leave its gradient without the part that was guessed. On a GPU there are measure
+        and pair_budget, and volumes of two Assets are by lenses: those of field="never" on the CPU.
 
     Returns a tensor (n,) or (w, n) of the dtype and the device of `poses`. Pairs of an invalid pose
     or scale are NaN, and so are their gradients; they spoil no others. Differentiable once.
 
-    The last eight lists of solids and pairs that were asked about on a GPU stay there.
+    The last eight lists of solids and pairs that were asked about on a GPU stay there, Fields as they
+    were when the list came first.
     """
     if pairs is None:
         pairs = all_pairs(solids)
@@ -121,24 +122,61 @@ def _ask_cpu(solids, placed, pairs, scales, needs_gradient, settings):
         lambda: tensors(found.scale_gradient_a, found.scale_gradient))
 
 
+class _Group:
+    """Pairs of a scene that one batch answers: those whose first solid is an Asset, or a Field."""
+
+    def __init__(self, chosen, pairs, first, second, fields, device):
+        def on_device(array):
+            return torch.as_tensor(np.ascontiguousarray(array), device=device)
+
+        self.pairs = on_device(pairs[chosen].T)  # two (m,) numbers of solids
+        self.places = [on_device(place[solid].astype(np.int32))  # among what the device holds
+                       for place, solid in zip((first, second), pairs[chosen].T)]
+        self.fields = fields
+
+
 class _Scene:
     """Solids and pairs of them on a device."""
 
     def __init__(self, solids, pairs, device):
         for k, solid in enumerate(solids):
-            if not isinstance(solid, ist.Asset):
-                raise TypeError(f"solids[{k}]: a {type(solid).__name__}; on a GPU solids are Assets")
+            if not isinstance(solid, (ist.Asset, ist.Field)):
+                raise TypeError(f"solids[{k}]: a {type(solid).__name__}; wanted an Asset or a Field")
+        is_field = np.array([isinstance(solid, ist.Field) for solid in solids], bool)
         for i, (first, second) in enumerate(pairs.tolist()):
             if not (0 <= first < len(solids) and 0 <= second < len(solids)):
                 raise ValueError(f"pairs[{i}]: ({first}, {second}): there are solids 0 to "
                                  f"{len(solids) - 1}")
             if first == second:
                 raise ValueError(f"pairs[{i}]: ({first}, {second}): a solid does not meet itself")
-        places = {solid: k for k, solid in enumerate(dict.fromkeys(solids))}
-        self.assets = ist.gpu.Assets(list(places), device=device.index)
+            if is_field[second]:
+                raise TypeError(f"pairs[{i}]: ({first}, {second}): solids[{second}] is a Field; it "
+                                "stands first in a pair")
+        assets, asset_place = _each_once(solids, ist.Asset)
+        fields, field_place = _each_once(solids, ist.Field)
+        self.assets = ist.gpu.Assets(assets, device=device.index)
+        self.fields = ist.gpu.Fields(fields, device=device.index) if fields else None
         self.pairs = torch.from_numpy(pairs.T.copy()).to(device)
-        asset = torch.tensor([places[solid] for solid in solids], dtype=torch.int32, device=device)
-        self.asset = [asset[solid] for solid in self.pairs]
+        # Rows of one batch after those of the other, and how they come back into the pairs' order.
+        by_field = is_field[pairs[:, 0]] if len(pairs) else np.zeros(0, bool)
+        rows = [np.flatnonzero(~by_field), np.flatnonzero(by_field)]
+        self.groups = []
+        if len(rows[0]) or not len(pairs):
+            self.groups.append(_Group(rows[0], pairs, asset_place, asset_place, None, device))
+        if len(rows[1]):
+            self.groups.append(_Group(rows[1], pairs, field_place, asset_place, self.fields, device))
+        self.order = torch.from_numpy(np.argsort(np.concatenate(rows))).to(device)
+
+    def in_order(self, parts, dim):
+        """What the groups answered, along the pairs' axis."""
+        return parts[0] if len(parts) == 1 else torch.cat(parts, dim).index_select(dim, self.order)
+
+
+def _each_once(solids, kind):
+    """Those of a kind, none twice, and the place of each solid among them."""
+    places = {solid: k for k, solid in enumerate(
+        dict.fromkeys(solid for solid in solids if isinstance(solid, kind)))}
+    return list(places), np.array([places.get(solid, 0) for solid in solids], np.int32)
 
 
 @functools.lru_cache(maxsize=8)
@@ -148,9 +186,9 @@ def _scene(solids, pairs, device):
 
 def _ask_gpu(solids, placed, pairs, scales, needs_gradient, settings):
     settings = dict(settings)
-    measure = settings.pop("measure", "matched")
+    asked = {name: settings.pop(name) for name in ("measure", "pair_budget") if name in settings}
     if settings.pop("field", "never") != "never":
-        raise ValueError("field: on a GPU volumes are by lenses: 'never'")
+        raise ValueError("field: on a GPU volumes of two Assets are by lenses: 'never'")
     for name in settings:
         raise TypeError(f"{name}: there is no such setting on a GPU")
     k = len(solids)
@@ -159,21 +197,36 @@ def _ask_gpu(solids, placed, pairs, scales, needs_gradient, settings):
     if scales is not None and scales.shape != placed.shape[:-1]:
         raise ValueError(f"scales: shape {tuple(scales.shape)}; wanted {tuple(placed.shape[:-1])}")
     scene = _scene(tuple(solids), pairs.tobytes(), placed.device)
-    shape = (*placed.shape[:-2], len(pairs))
     wants_pose, wants_scale = needs_gradient[0], scales is not None and needs_gradient[1]
-    asset_a, asset_b = (asset.expand(shape).reshape(-1).contiguous() for asset in scene.asset)
-    pose_a, pose_b = (placed[..., solid, :].reshape(-1, 7) for solid in scene.pairs)
+    parts = [_ask_group(scene.assets, group, placed, scales, wants_pose, wants_scale, asked)
+             for group in scene.groups]
+
+    def joined(which, dim):
+        return [scene.in_order(side, dim) for side in zip(*(which(part) for part in parts))]
+
+    return _Answer(scene.pairs, scene.in_order([part.volume for part in parts], -1),
+                   scene.in_order([part.valid for part in parts], -1),
+                   lambda: joined(lambda part: part.pose_gradients(), -2),
+                   lambda: joined(lambda part: part.scale_gradients(), -1))
+
+
+def _ask_group(assets, group, placed, scales, wants_pose, wants_scale, settings):
+    shape = (*placed.shape[:-2], group.pairs.shape[1])
+    place_a, place_b = (place.expand(shape).reshape(-1).contiguous() for place in group.places)
+    pose_a, pose_b = (placed[..., solid, :].reshape(-1, 7) for solid in group.pairs)
     scale_a = scale_b = None
     if scales is not None:
-        scale_a, scale_b = (scales[..., solid].reshape(-1) for solid in scene.pairs)
-    rows = len(asset_a)
+        scale_a, scale_b = (scales[..., solid].reshape(-1) for solid in group.pairs)
+    rows = len(place_a)
+    if group.fields is not None:
+        settings = {name: x for name, x in settings.items() if name != "pair_budget"}
 
     def ask(scale_b, *wanted):
         out = {name: placed.new_empty((rows, 3) if name.endswith("gradient") else rows)
                for name in wanted}
         out["status"] = torch.empty(rows, dtype=torch.int32, device=placed.device)
-        ist.gpu.penetration(scene.assets, asset_a, asset_b, pose_a, pose_b, scale_a, scale_b,
-                            measure=measure, out=out,
+        ist.gpu.penetration(assets, place_a, place_b, pose_a, pose_b, scale_a, scale_b,
+                            fields=group.fields, out=out, **settings,
                             stream=torch.cuda.current_stream(placed.device).cuda_stream)
         return out
 
@@ -197,7 +250,7 @@ def _ask_gpu(solids, placed, pairs, scales, needs_gradient, settings):
         by_a = (3 * found["volume"] - scale_b * by_b
                 - (away * found["translation_gradient"]).sum(-1)) / scale_a
         by_scale = [torch.where(found["volume"] > 0, by, 0.0).reshape(shape) for by in (by_a, by_b)]
-    return _Answer(scene.pairs, found["volume"].reshape(shape),
+    return _Answer(group.pairs, found["volume"].reshape(shape),
                    (found["status"] != ist.QueryStatus.invalid_input).reshape(shape),
                    pose_gradients, lambda: by_scale)
 

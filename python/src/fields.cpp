@@ -48,6 +48,12 @@ TreeView tree_of(const py::handle& object, const char* name) {
   throw py::type_error(std::string(name) + ": a Field; it stands first in a query, as `a`");
 }
 
+Field field_of(const py::handle& object, const char* name) {
+  const Solid solid = solid_of(object, name);
+  if (const Field* const field = std::get_if<Field>(&solid)) return *field;
+  throw py::type_error(std::string(name) + ": an Asset; MeshField(asset) is its surface");
+}
+
 void add_fields(py::module_& module) {
   py::class_<OwnedField>(module, "Field",
                          "A solid that an asset meets without having a tree itself. Stands first "

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <ist/error.h>
+#include <ist/gpu_fields.h>
 #include <ist/gpu_query.h>
 
 #include <algorithm>
@@ -94,6 +95,25 @@ class DeviceAssets {
   std::deque<Batch> in_flight_;
 };
 
+/// Fields on a device. Batches that read them hold them until they are done.
+class DeviceFields {
+ public:
+  DeviceFields(const py::sequence& fields, int device) {
+    std::vector<Field> all;
+    for (const py::handle field : fields) all.push_back(field_of(field, "fields"));
+    const std::vector<py::object> held(fields.begin(), fields.end());
+    const py::gil_scoped_release released;
+    GpuSettings settings;
+    settings.device = device;
+    fields_ = std::make_unique<GpuFields>(all, settings);
+  }
+
+  const GpuFields& fields() const { return *fields_; }
+
+ private:
+  std::unique_ptr<GpuFields> fields_;
+};
+
 /// A column that a batch can write.
 template <class Answers>
 struct Answer {
@@ -141,7 +161,7 @@ struct DeviceAnswers {
 /// The arguments that describe pairs, as many rows as they have.
 class PairArguments {
  public:
-  PairArguments(const GpuAssets& assets, cuda::Stream stream) : assets_(assets), stream_(stream) {}
+  PairArguments(int device, cuda::Stream stream) : device_(device), stream_(stream) {}
 
   void take_pose(const py::object& value, const char* name, const Pose*& to) {
     if (value.is_none()) return;
@@ -152,16 +172,18 @@ class PairArguments {
     if (!value.is_none())
       to = static_cast<const double*>(take(value, {name, {kFloat64}, 0, false}));
   }
-  /// Numbers of assets; one for all is kept until the number of rows is known.
-  void take_assets(const py::object& value, const char* name, const std::uint32_t*& to) {
+  /// Numbers of solids, of which there are `size`; one for all is kept until the number of rows is
+  /// known.
+  void take_numbers(const py::object& value, const char* name, std::size_t size, const char* kind,
+                    const std::uint32_t*& to) {
     if (!py::isinstance<py::int_>(value)) {
       to = static_cast<const std::uint32_t*>(take(value, {name, {kUInt32, kInt32}, 0, false}));
       return;
     }
     const auto number = value.cast<std::int64_t>();
-    if (number < 0 || number >= static_cast<std::int64_t>(assets_.size()))
+    if (number < 0 || number >= static_cast<std::int64_t>(size))
       throw py::value_error(std::string(name) + ": " + std::to_string(number) + "; there are " +
-                            std::to_string(assets_.size()) + " assets");
+                            std::to_string(size) + " " + kind);
     same_.push_back({static_cast<std::uint32_t>(number), &to});
   }
 
@@ -172,7 +194,7 @@ class PairArguments {
     const auto count = static_cast<std::size_t>(rows_);
     for (const auto& [number, to] : same_) {
       repeated_.push_back(
-          std::make_unique<cuda::Repeated>(assets_.device(), number, count, stream_));
+          std::make_unique<cuda::Repeated>(device_, number, count, stream_));
       *to = repeated_.back()->data();
     }
     return count;
@@ -182,7 +204,7 @@ class PairArguments {
 
  private:
   void* take(const py::object& value, const WantedArray& wanted) {
-    LentArray array = lend(value, wanted, assets_.device(), stream_);
+    LentArray array = lend(value, wanted, device_, stream_);
     if (rows_ >= 0 && array.rows != rows_)
       throw py::value_error(wanted.name + ": " + std::to_string(array.rows) +
                             " rows; the arguments before it have " + std::to_string(rows_));
@@ -195,7 +217,7 @@ class PairArguments {
     std::uint32_t number;
     const std::uint32_t** to;
   };
-  const GpuAssets& assets_;
+  int device_;
   cuda::Stream stream_;
   std::int64_t rows_ = -1;
   std::vector<Same> same_;
@@ -288,24 +310,33 @@ Places<Answers> given_columns(const py::object& out, std::size_t count, int devi
   return places;
 }
 
+/// The arguments that describe pairs, as they were given.
+struct GivenPairs {
+  const py::object &asset_a, &asset_b, &pose_a, &pose_b, &scale_a, &scale_b;
+  std::shared_ptr<DeviceFields> fields;  ///< those that asset_a names; null: assets
+};
+
 /// Takes all arguments and launches a batch: launch(assets, pairs, workspace, answers, stream).
 template <class Answers, class Launch>
-DeviceAnswers<Answers> ask(DeviceAssets& assets, const py::object& asset_a,
-                           const py::object& asset_b, const py::object& pose_a,
-                           const py::object& pose_b, const py::object& scale_a,
-                           const py::object& scale_b, const py::object& wanted,
+DeviceAnswers<Answers> ask(DeviceAssets& assets, const GivenPairs& given, const py::object& wanted,
                            const py::object& out, const py::object& stream, const Launch& launch) {
   const cuda::Stream on = stream_of(stream);
   const int device = assets.assets().device();
-  PairArguments arguments(assets.assets(), on);
+  PairArguments arguments(device, on);
   GpuPairs pairs;
-  arguments.take_assets(asset_a, "asset_a", pairs.asset_a);
-  arguments.take_assets(asset_b, "asset_b", pairs.asset_b);
-  arguments.take_pose(pose_a, "pose_a", pairs.pose_a);
-  arguments.take_pose(pose_b, "pose_b", pairs.pose_b);
-  arguments.take_scale(scale_a, "scale_a", pairs.scale_a);
-  arguments.take_scale(scale_b, "scale_b", pairs.scale_b);
+  if (given.fields != nullptr)
+    arguments.take_numbers(given.asset_a, "asset_a", given.fields->fields().size(), "fields",
+                           pairs.asset_a);
+  else
+    arguments.take_numbers(given.asset_a, "asset_a", assets.assets().size(), "assets",
+                           pairs.asset_a);
+  arguments.take_numbers(given.asset_b, "asset_b", assets.assets().size(), "assets", pairs.asset_b);
+  arguments.take_pose(given.pose_a, "pose_a", pairs.pose_a);
+  arguments.take_pose(given.pose_b, "pose_b", pairs.pose_b);
+  arguments.take_scale(given.scale_a, "scale_a", pairs.scale_a);
+  arguments.take_scale(given.scale_b, "scale_b", pairs.scale_b);
   pairs.count = arguments.count();
+  if (given.fields != nullptr) arguments.lent.push_back(given.fields);
   if (!out.is_none() && !wanted.is_none())
     throw py::value_error("wanted: the arrays of `out` say what is wanted already");
   Places<Answers> places =

@@ -1,22 +1,14 @@
-// A device that is host memory, for tests of ist.gpu: what ist::ist and the module ask of CUDA.
-//
-// Work of a stream is done as late as can be, when somebody waits for it, and then no more than is
-// needed. So what is freed, spoiled or read too early is seen.
-
-#include <ist/bake.h>
-#include <ist/gpu.h>
-#include <ist/gpu_query.h>
+#include "emulated_device.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 #include <deque>
-#include <functional>
 #include <map>
 #include <memory>
-#include <vector>
+#include <utility>
 
 #include "cuda_calls.h"
-#include "support/host_batch.h"
 
 namespace {
 
@@ -72,82 +64,13 @@ std::map<void*, std::size_t>& dropped() {
 
 }  // namespace
 
+void ist::testing::do_later(CUstream_st* stream, std::function<void()> work) {
+  add(stream, {std::move(work), nullptr, nullptr});
+}
+
 struct CUevent_st {
   std::shared_ptr<Event> event;
 };
-
-namespace ist {
-
-bool gpu_available(int device, std::string*) { return device == 0; }
-GpuInfo gpu_info(int) { return {"emulated", 90, 0, 0}; }
-
-struct GpuAssets::Impl {
-  std::vector<Asset> copies;
-  std::shared_ptr<bool> there = std::make_shared<bool>(true);
-};
-
-GpuAssets::GpuAssets(std::span<const TreeView> assets, const GpuSettings&)
-    : impl_(std::make_unique<Impl>()) {
-  for (const TreeView& asset : assets)
-    impl_->copies.emplace_back(
-        std::span(reinterpret_cast<const std::byte*>(&asset.header()), asset.header().file_bytes),
-        "emulated");
-}
-GpuAssets::~GpuAssets() { *impl_->there = false; }
-std::size_t GpuAssets::size() const noexcept { return impl_->copies.size(); }
-std::size_t GpuAssets::bytes() const noexcept {
-  std::size_t sum = 0;
-  for (const Asset& asset : impl_->copies) sum += asset.bytes().size();
-  return sum;
-}
-int GpuAssets::device() const noexcept { return 0; }
-
-struct GpuWorkspace::Impl {
-  std::size_t most_pairs;
-  std::shared_ptr<bool> there = std::make_shared<bool>(true);
-};
-GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings&)
-    : impl_(std::make_unique<Impl>(Impl{most_pairs})) {}
-GpuWorkspace::~GpuWorkspace() { *impl_->there = false; }
-std::size_t GpuWorkspace::most_pairs() const noexcept { return impl_->most_pairs; }
-
-void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
-                       GpuWorkspace& workspace, const GpuPenetrations& to, CUstream_st* stream) {
-  if (pairs.count > workspace.most_pairs()) std::abort();
-  const auto work = [&impl = assets.impl(), pairs, measure, to, there = assets.impl().there,
-                     room = workspace.impl().there] {
-    if (!*there || !*room) std::abort();
-    std::vector<TreeView> views;
-    for (const Asset& asset : impl.copies) views.push_back(asset.view());
-    std::vector<testing::BatchPair> rows(pairs.count);
-    for (std::size_t i = 0; i < pairs.count; ++i) {
-      testing::BatchPair& row = rows[i];
-      row.a = pairs.asset_a[i];
-      row.b = pairs.asset_b[i];
-      if (pairs.pose_a != nullptr) row.pose_a = pairs.pose_a[i];
-      if (pairs.pose_b != nullptr) row.pose_b = pairs.pose_b[i];
-      if (pairs.scale_a != nullptr) row.scale_a = pairs.scale_a[i];
-      if (pairs.scale_b != nullptr) row.scale_b = pairs.scale_b[i];
-    }
-    const auto put = [](auto* column, std::size_t i, const auto& value) {
-      if (column != nullptr)
-        std::memcpy(column + i * (sizeof value / sizeof *column), &value, sizeof value);
-    };
-    const std::vector<Penetration> found = testing::HostBatch(views).run(rows, measure);
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      put(to.volume, i, found[i].volume);
-      put(to.centroid, i, found[i].centroid);
-      put(to.translation_gradient, i, found[i].translation_gradient);
-      put(to.rotation_gradient, i, found[i].rotation_gradient);
-      put(to.status, i, found[i].status);
-      put(to.node_visits, i, found[i].node_visits);
-      put(to.sphere_pairs, i, found[i].sphere_pairs);
-    }
-  };
-  add(stream, {work, nullptr, nullptr});
-}
-
-}  // namespace ist
 
 namespace ist::python::cuda {
 

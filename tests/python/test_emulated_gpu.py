@@ -96,6 +96,94 @@ def test_answers_are_those_of_the_cpu(solids, arguments, measure):
     assert found.volume.shape == (40,) and found.centroid.shape == (40, 3) and len(found.status) == 40
 
 
+def test_budgets_are_those_of_the_cpu(solids, arguments):
+    assets = ist.gpu.Assets(solids)
+    whole, bound = ask(assets, arguments), ask(assets, arguments, pair_budget=60)
+    expect_close(bound, expected_of(solids, arguments, pair_budget=60))
+    assert not np.array_equal(bound.volume.numpy(), whole.volume.numpy())
+    with pytest.raises(TypeError):
+        ask(assets, arguments, pair_budget=-1)
+
+
+def test_separations_are_those_of_the_cpu(solids, arguments):
+    arguments["pose_b"][:, 4:] *= 8
+    arguments["pose_b"][3, 5] = np.nan
+    lent_arguments = {n: OnDevice(x.copy()) for n, x in arguments.items()}
+    found = ist.gpu.separation(ist.gpu.Assets(solids), **lent_arguments)
+    size = 2 * max(solid.bounds().radius for solid in solids)
+    apart = 0
+    for i, (a, b, pose_a, pose_b, scale_a, scale_b) in enumerate(zip(*arguments.values())):
+        one = ist.separation(solids[a], solids[b], pose_b, poses_a=pose_a, scales=scale_b,
+                             scales_a=scale_a)
+        assert found.status.numpy()[i] == one.status
+        assert abs(found.distance.numpy()[i] - one.distance) <= 2e-6 * size
+        for name in ("distance_min", "distance_max"):
+            assert getattr(found, name).numpy()[i] == pytest.approx(getattr(one, name), abs=1e-5 * size)
+        apart += one.distance > 0
+        if one.distance > 0:
+            gap = found.point_b.numpy()[i] - found.point_a.numpy()[i]
+            assert gap == pytest.approx(found.distance.numpy()[i] * found.normal.numpy()[i], abs=1e-9)
+    assert apart > 10 and found.status.numpy()[3] == 2
+    assert found.node_visits is None and found.normal.shape == (40, 3)
+    few = ist.gpu.separation(ist.gpu.Assets(solids), 0, 1, None, OnDevice(arguments["pose_b"].copy()),
+                             max_visits=1, wanted=["status", "distance_min", "distance_max"])
+    assert few.distance is None and (few.status.numpy() == 1).any()
+    assert (few.distance_min.numpy() <= few.distance_max.numpy()).all()
+    with pytest.raises(ValueError, match="wanted: 'volume'; there are 'distance', 'distance_min'"):
+        ist.gpu.separation(ist.gpu.Assets(solids), 0, 1, None, OnDevice(arguments["pose_b"]),
+                           wanted=["volume"])
+
+
+@pytest.fixture(scope="module")
+def some_fields(knot):
+    heights = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 8)).astype(np.float32)
+    return [ist.HalfSpaceField(), ist.BoxField([1, 2, 0.5]), ist.BallField(1),
+            ist.HeightField(heights, lowest=-0.5, highest=0.5), ist.MeshField(knot)], heights
+
+
+@pytest.mark.parametrize("measure", ["matched", "inner"])
+def test_fields_are_those_of_the_cpu(solids, some_fields, arguments, measure):
+    fields, heights = some_fields
+    arguments["asset_a"] = np.random.default_rng(4).integers(0, 5, 40).astype(np.uint32)
+    arguments["pose_b"][3, 5] = np.nan
+    expected = [ist.penetration(fields[a], solids[b], pose_b, poses_a=pose_a, scales=scale_b,
+                                scales_a=scale_a, measure=measure)
+                for a, b, pose_a, pose_b, scale_a, scale_b in zip(*arguments.values())]
+    there = ist.gpu.Fields(fields)
+    assert len(there) == 5 and there.device == 0 and there.bytes > heights.nbytes
+    heights += 1000  # what was uploaded stays
+    try:
+        assets = ist.gpu.Assets(solids)
+        found = ask(assets, arguments, fields=there, measure=measure)
+        del there  # the batch holds it
+        gc.collect()
+        volume = found.volume.numpy()
+    finally:
+        heights -= 1000
+    theirs = np.array([one.volume for one in expected])
+    assert (theirs > 0).sum() > 15 and found.status.numpy()[3] == 2
+    assert volume == pytest.approx(theirs, rel=1e-9, abs=1e-9)
+    push = np.array([-one.force for one in expected])
+    assert found.translation_gradient.numpy() == pytest.approx(push, rel=1e-6, abs=1e-6)
+
+
+def test_wrong_fields_are_named(solids, some_fields, arguments):
+    assets, fields = ist.gpu.Assets(solids), ist.gpu.Fields(some_fields[0])
+    poses = arguments["pose_b"]
+    for wrong, error, text in [
+            (dict(asset_a=5), ValueError, "asset_a: 5; there are 5 fields"),
+            (dict(asset_b=3), ValueError, "asset_b: 3; there are 3 assets"),
+            (dict(pair_budget=9), ValueError, "pair_budget: 9; pairs of fields have none"),
+            (dict(fields=some_fields[0]), TypeError, "incompatible function arguments")]:
+        given = dict(asset_a=0, asset_b=2, fields=fields, pose_a=None, pose_b=OnDevice(poses.copy()))
+        with pytest.raises(error, match=text):
+            ist.gpu.penetration(assets, **{**given, **wrong})
+    with pytest.raises(TypeError, match=r"fields: an Asset; MeshField\(asset\) is its surface"):
+        ist.gpu.Fields([solids[0]])
+    with pytest.raises(TypeError, match="fields: a int; wanted an Asset or a Field"):
+        ist.gpu.Fields([3])
+
+
 def test_nothing_is_given_back_before_the_batch_is_done(solids, arguments):
     assets = ist.gpu.Assets(solids)
     expected = expected_of(solids, arguments)

@@ -1,7 +1,4 @@
-"""ist.gpu and ist.torch on a card, with the arrays of PyTorch, CuPy and JAX.
-
-`python test_on_gpu.py --benchmark FOLDER` measures: see benchmark() below.
-"""
+"""ist.gpu on a card, with the arrays of PyTorch, CuPy and JAX."""
 import functools
 import gc
 import os
@@ -19,7 +16,6 @@ pytestmark = pytest.mark.skipif(not ist.gpu.available(), reason=f"{ist.gpu.why_n
 
 if ist.gpu.available():
     torch = pytest.importorskip("torch", reason="no PyTorch")
-    from ist.torch import overlap
 
 COLUMNS = ["volume", "centroid", "translation_gradient", "rotation_gradient"]
 
@@ -59,22 +55,27 @@ def on_card(arguments):
             for name, x in arguments.items()}
 
 
-def on_cpu(solids, arguments, **settings):
-    """What ist.penetration says, and force and torque with the signs of gradients."""
+def kinds(arguments):
+    """(a, b, rows) of all pairs of the same solids."""
+    for a, b in np.unique(np.stack((arguments["asset_a"], arguments["asset_b"])), axis=1).T:
+        yield a, b, (arguments["asset_a"] == a) & (arguments["asset_b"] == b)
+
+
+def on_cpu(solids, arguments, first=None, **settings):
+    """What ist.penetration says, and force and torque with the signs of gradients; asset_a are
+    places in `first`."""
     rows = len(arguments["pose_b"])
     answers = dict(volume=np.zeros(rows), centroid=np.zeros((rows, 3)),
                    translation_gradient=np.zeros((rows, 3)), rotation_gradient=np.zeros((rows, 3)),
                    status=np.zeros(rows, np.uint32))
-    for a in range(len(solids)):
-        for b in range(len(solids)):
-            rows = (arguments["asset_a"] == a) & (arguments["asset_b"] == b)
-            found = ist.penetration(
-                solids[a], solids[b], arguments["pose_b"][rows], poses_a=arguments["pose_a"][rows],
-                scales=arguments["scale_b"][rows], scales_a=arguments["scale_a"][rows], field="never",
-                **settings)
-            for name, column in zip([*COLUMNS, "status"], [
-                    found.volume, found.centroid, -found.force, -found.torque, found.status]):
-                answers[name][rows] = column
+    for a, b, rows in kinds(arguments):
+        found = ist.penetration(
+            (first or solids)[a], solids[b], arguments["pose_b"][rows],
+            poses_a=arguments["pose_a"][rows], scales=arguments["scale_b"][rows],
+            scales_a=arguments["scale_a"][rows], field="never", **settings)
+        for name, column in zip([*COLUMNS, "status"], [
+                found.volume, found.centroid, -found.force, -found.torque, found.status]):
+            answers[name][rows] = column
     return answers
 
 
@@ -124,6 +125,53 @@ def test_answers_are_those_of_the_cpu(solids, assets, pairs, measure):
     expect_same_bits({n: x[kept] for n, x in again.items()}, {n: x[kept] for n, x in ours.items()})
 
 
+def test_budgets_are_those_of_the_cpu(solids, assets, pairs):
+    arguments = pairs(2000)
+    whole = host(ist.gpu.penetration(assets, **on_card(arguments)))
+    ours = host(ist.gpu.penetration(assets, **on_card(arguments), pair_budget=100))
+    expect_close(ours, on_cpu(solids, arguments, pair_budget=100))
+    assert not np.array_equal(ours["volume"], whole["volume"])
+
+
+def test_fields_are_those_of_the_cpu(solids, assets, pairs, knot):
+    heights = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 8)).astype(np.float32)
+    fields = [ist.HalfSpaceField(), ist.BoxField([1, 2, 0.5]), ist.BallField(1),
+              ist.CapsuleField(0.5, 0.3), ist.HeightField(heights, lowest=-0.5, highest=0.5),
+              ist.MeshField(knot)]
+    there = ist.gpu.Fields(fields)
+    arguments = pairs(3000)
+    arguments["asset_a"] = np.random.default_rng(4).integers(0, 6, 3000).astype(np.uint32)
+    arguments["pose_b"][10, 3] = np.nan
+    found = ist.gpu.penetration(assets, **on_card(arguments), fields=there)
+    del there  # the batch holds it
+    ours, theirs = host(found), on_cpu(solids, arguments, first=fields)
+    assert (theirs["volume"] > 0).sum() > 1000 and theirs["status"][10] == 2
+    assert np.abs(ours["volume"] - theirs["volume"]).max() <= 1e-9 * theirs["volume"].max()
+    for name in ("translation_gradient", "rotation_gradient"):
+        assert np.abs(ours[name] - theirs[name]).max() <= 1e-6 * np.abs(theirs[name]).max(), name
+    assert (ours["status"] == theirs["status"]).all()
+
+
+def test_separations_are_those_of_the_cpu(solids, assets, pairs):
+    arguments = pairs(3000, reach=4)
+    arguments["pose_b"][10, 3] = np.nan
+    found = ist.gpu.separation(assets, **on_card(arguments))
+    names = ("distance", "distance_min", "distance_max")
+    ours, theirs = host(found, (*names, "status")), {n: np.zeros(3000) for n in (*names, "status")}
+    for a, b, rows in kinds(arguments):
+        answer = ist.separation(
+            solids[a], solids[b], arguments["pose_b"][rows], poses_a=arguments["pose_a"][rows],
+            scales=arguments["scale_b"][rows], scales_a=arguments["scale_a"][rows])
+        for name in theirs:
+            theirs[name][rows] = getattr(answer, name)
+    size = 2 * max(solid.bounds().radius for solid in solids)
+    assert (ours["status"] == theirs["status"]).all() and theirs["status"][10] == 2
+    for name in names:
+        assert np.abs(ours[name] - theirs[name]).max() <= 1e-5 * size, name
+    assert (theirs["distance"] > 0).sum() > 500
+    assert found.normal.shape == (3000, 3) and found.node_visits is None
+
+
 def test_arguments_may_be_left_out(assets, pairs):
     arguments = on_card(pairs(500))
     for name in ("asset_a", "asset_b"):
@@ -147,7 +195,7 @@ def test_arguments_may_be_left_out(assets, pairs):
         ist.gpu.penetration(assets, 0, 1, None, arguments["pose_b"], measure="outer")
 
 
-@pytest.mark.parametrize("count", [0, 1, 3_000_000])
+@pytest.mark.parametrize("count", [0, 1, 10_000_000])
 def test_batches_of_any_size(assets, pairs, count):
     few = on_card(pairs(min(count, 1000)))
     found = ist.gpu.penetration(assets, **few)
@@ -477,162 +525,3 @@ def test_assets_say_what_they_take(solids, assets):
 def test_too_large_a_device_is_an_error(solids):
     with pytest.raises(ist.Error, match="GPU"):
         ist.gpu.Assets(solids, device=torch.cuda.device_count())
-
-
-# PyTorch's function.
-
-def gradients(solids, poses, scales, device, **settings):
-    poses = poses.to(device).requires_grad_()
-    scales = scales.to(device).requires_grad_() if scales is not None else None
-    volumes = overlap(solids, poses, scales=scales, **settings)
-    weights = torch.linspace(-1, 2, volumes.numel(), dtype=torch.float64).reshape(volumes.shape)
-    (volumes * weights.to(device)).sum().backward()
-    return [x.detach().cpu() for x in (volumes, poses.grad)] + (
-        [scales.grad.cpu()] if scales is not None else [])
-
-
-def test_overlaps_are_those_of_the_cpu(solids, random_poses):
-    poses = torch.from_numpy(random_poses(400, 1.2).reshape(100, 4, 7))
-    poses[..., :4] *= 3
-    solids = [solids[0], solids[1], solids[0], solids[2]]
-    scales = torch.linspace(0.7, 1.3, 400, dtype=torch.float64).reshape(100, 4)
-    for p, s in ((poses, None), (poses, scales), (poses[0], scales[0])):
-        ours = gradients(solids, p.clone(), s, "cuda")
-        theirs = gradients(solids, p.clone(), s, "cpu", field="never")
-        assert theirs[0].abs().max() > 0.1
-        for k, (one, other) in enumerate(zip(ours, theirs)):
-            bound = (1e-5, 1e-5, 2e-3)[k]  # scales' are differences
-            assert (one - other).abs().max() <= bound * other.abs().max(), k
-    assert overlap(solids, poses.float().cuda()).dtype == torch.float32
-
-
-def test_overlaps_gradients_are_differences(solids, random_poses):
-    poses = torch.from_numpy(random_poses(12, 1.0).reshape(4, 3, 7)).cuda()
-    _, found = gradients(solids, poses.clone(), None, "cuda")
-    weights = torch.linspace(-1, 2, 12, dtype=torch.float64).reshape(4, 3).cuda()
-    h = 1e-3
-    expected = torch.zeros_like(poses)
-    for index in np.ndindex(3, 7):
-        step = torch.zeros_like(poses)
-        step[(slice(None), *index)] = h
-        expected[(slice(None), *index)] = (
-            (overlap(solids, poses + step) - overlap(solids, poses - step)) * weights).sum(-1) / (2 * h)
-    assert expected.abs().max() > 0.1
-    assert (found.cuda() - expected).norm() < 5e-3 * expected.norm()
-
-
-def test_overlap_never_waits(solids, random_poses):
-    poses = torch.from_numpy(random_poses(300, 1.0).reshape(100, 3, 7)).cuda().requires_grad_()
-    overlap(solids, poses).sum().backward()
-    torch.cuda.synchronize()
-    torch.cuda.set_sync_debug_mode("error")
-    try:
-        torch.cuda._sleep(CYCLES)
-        start = time.perf_counter()
-        overlap(solids, poses).sum().backward()
-        took = time.perf_counter() - start
-        assert not torch.cuda.current_stream().query()
-        assert took < 0.1
-    finally:
-        torch.cuda.set_sync_debug_mode("default")
-    torch.cuda.synchronize()
-
-
-def test_an_invalid_pose_is_nan_where_it_is(solids, random_poses):
-    poses = torch.from_numpy(random_poses(18, 1.0).reshape(6, 3, 7)).cuda()
-    poses[1, 2, 5] = torch.nan
-    poses[4, 0, :4] = 0
-    poses.requires_grad_()
-    volumes = overlap(solids, poses)
-    assert torch.isnan(volumes).nonzero().tolist() == [[1, 1], [1, 2], [4, 0], [4, 1]]
-    volumes.sum().backward()
-    assert torch.isfinite(poses.grad[[0, 2, 3, 5]]).all() and torch.isnan(poses.grad[1]).all()
-
-
-def test_descent_parts_two_solids(gear, knot):
-    pose = torch.tensor([0.5, 0.1, 0.0, 0.2, 4.5, 0.5, 1.0], dtype=torch.float64, device="cuda",
-                        requires_grad=True)
-    still = torch.tensor([1.0, 0, 0, 0, 0, 0, 0], dtype=torch.float64, device="cuda")
-    adam = torch.optim.Adam([pose], lr=0.1)
-    for step in range(200):
-        adam.zero_grad()
-        volume = overlap([gear, knot], torch.stack((still, pose)))[0]
-        assert step > 0 or volume.item() > 0.1
-        if volume.item() == 0:
-            return
-        volume.backward()
-        adam.step()
-    pytest.fail(f"{volume.item()} is left")
-
-
-def benchmark(folder):
-    """ist.gpu.penetration beside what the device itself does of it, and ist.torch.overlap.
-
-    FOLDER: elephant.ist and dino.ist of 4,000 spheres, and poses_eledino.csv: the rows of
-    benchmarks/gpu_batch.cpp. "device" is by CUDA's events around ten calls into the same arrays,
-    what that program measures of the C++ batch; "wall" is from the first call to the end of the last;
-    "call" is how long a call keeps the host, with the device busy.
-    """
-    import csv
-    import json
-    import pathlib
-    folder = pathlib.Path(folder)
-    elephant, dino = (ist.Asset.load(folder / f"{name}.ist") for name in ("elephant", "dino"))
-    with open(folder / "poses_eledino.csv") as file:
-        rows = [row for row in csv.DictReader(file)]
-    assets = ist.gpu.Assets([elephant, dino])
-    for kind in ("pen", "deep", "contain", "sep"):
-        columns = "qw qx qy qz tx ty tz scale_b".split()
-        table = np.array([[float(row[c]) for c in columns] for row in rows if row["class"] == kind])
-        for count in (1_000_000, 4096):
-            drawn = torch.from_numpy(table[np.random.default_rng(1).integers(0, len(table), count)]).cuda()
-            poses, scales = drawn[:, :7].contiguous(), drawn[:, 7].contiguous()
-            numbers = [torch.full((count,), k, dtype=torch.int32, device="cuda") for k in (0, 1)]
-            kept = ist.gpu.penetration(assets, *numbers, None, poses, None, scales)
-            torch.cuda.synchronize()
-            row = dict(poses=kind, pairs=count)
-            for name, out in (("into the same arrays", kept), ("into new arrays", None)):
-                device, wall, call = [], [], []
-                for _ in range(10):
-                    events = [torch.cuda.Event(enable_timing=True) for _ in range(2)]
-                    start = time.perf_counter()
-                    events[0].record()
-                    for _ in range(10):
-                        before = time.perf_counter()
-                        found = ist.gpu.penetration(assets, *numbers, None, poses, None, scales,
-                                                    out=out)
-                        call.append(time.perf_counter() - before)
-                    events[1].record()
-                    torch.cuda.synchronize()
-                    wall.append((time.perf_counter() - start) / 10)
-                    device.append(events[0].elapsed_time(events[1]) / 10)
-                row[name] = {"device, ms": np.median(device), "wall, ms": 1e3 * np.median(wall),
-                             "call, µs": 1e6 * np.median(call),
-                             "M/s": count / np.median(wall) * 1e-6}
-            if count == 4096:
-                scene = torch.zeros(count, 2, 7, dtype=torch.float64, device="cuda")
-                scene[:, 0, 0] = 1
-                scene[:, 1] = poses
-                sizes = torch.stack((torch.ones_like(scales), scales), dim=1)
-                scene.requires_grad_()
-                times = []
-                for _ in range(20):
-                    torch.cuda.synchronize()
-                    start = time.perf_counter()
-                    overlap([elephant, dino], scene, scales=sizes).sum().backward()
-                    torch.cuda.synchronize()
-                    times.append(time.perf_counter() - start)
-                row["ist.torch.overlap and backward, ms"] = 1e3 * np.median(times)
-            cpu = ist.penetration(elephant, dino, poses[:2000].cpu().numpy(),
-                                  scales=scales[:2000].cpu().numpy(), field="never").volume
-            ours = torch.from_dlpack(kept.volume)[:2000].cpu().numpy()
-            row["largest difference to the CPU"] = float(
-                np.max(np.abs(ours - cpu) / np.maximum(np.maximum(ours, cpu), 1e-300)))
-            print(json.dumps(row, ensure_ascii=False), flush=True)
-
-
-if __name__ == "__main__":
-    import sys
-    if sys.argv[1:2] != ["--benchmark"] or len(sys.argv) != 3:
-        sys.exit(__doc__)
-    benchmark(sys.argv[2])

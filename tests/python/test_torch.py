@@ -105,66 +105,6 @@ def test_wrong_tensors_are_named(gear, knot):
         overlap([gear, knot], torch.ones(2, 7), scales=torch.ones(2, device="meta"))
 
 
-class BatchOnTheCpu:
-    """Stands in for ist.gpu where there is none: answers batches by ist.penetration."""
-
-    class Assets(list):
-        def __init__(self, assets, *, device):
-            super().__init__(assets)
-
-    @staticmethod
-    def penetration(assets, asset_a, asset_b, pose_a, pose_b, scale_a=None, scale_b=None, *,
-                    measure, out, stream):
-        for i, (a, b) in enumerate(zip(asset_a.tolist(), asset_b.tolist())):
-            found = ist.penetration(
-                assets[a], assets[b], pose_b[i], poses_a=pose_a[i], field="never", measure=measure,
-                scales=1 if scale_b is None else scale_b[i],
-                scales_a=1 if scale_a is None else scale_a[i])
-            answers = dict(volume=found.volume, status=int(found.status),
-                           translation_gradient=-found.force, rotation_gradient=-found.torque)
-            for name, array in out.items():
-                array[i] = torch.as_tensor(answers[name])
-
-
-def test_a_gpus_batches_are_put_together_as_on_the_cpu(gear, knot, cube, scenes, monkeypatch):
-    """All of a GPU's way but the batch itself; tests/python/test_on_gpu.py has that."""
-    import ist.torch as module
-    solids = [gear, knot, gear, cube]
-    poses = torch.cat((scenes, scenes[:, :1] + 0.3), dim=1).detach()
-    scales = torch.linspace(0.7, 1.3, 24, dtype=torch.float64).reshape(6, 4)
-    poses[5, 1, 6] = torch.nan
-    weights = torch.linspace(-1, 2, 36, dtype=torch.float64).reshape(6, 6)
-    arguments = [(poses, scales), (poses[0], scales[0]), (poses, None)]
-
-    def answers():
-        for poses, scales in arguments:
-            poses = poses.clone().requires_grad_()
-            scales = scales.clone().requires_grad_() if scales is not None else None
-            volumes = overlap(solids, poses, scales=scales, field="never")
-            (volumes * weights[:len(volumes)] if poses.ndim == 3 else volumes).sum().backward()
-            yield volumes.detach(), poses.grad, scales.grad if scales is not None else torch.zeros(1)
-
-    expected = list(answers())
-    monkeypatch.setattr(module.ist, "gpu", BatchOnTheCpu)
-    monkeypatch.setattr(module, "_ask_cpu", module._ask_gpu)
-    monkeypatch.setattr(torch.cuda, "current_stream", lambda device: type("", (), dict(cuda_stream=1)))
-    module._scene.cache_clear()
-    for ours, theirs in zip(answers(), expected):
-        for one, other in zip(ours, theirs):
-            assert torch.allclose(one, other, rtol=1e-9, atol=1e-9, equal_nan=True)
-    for wrong, error, text in [
-            (dict(solids=[ist.BallField(1), gear]), TypeError, r"solids\[0\]: a BallField; on a GPU"),
-            (dict(field="always"), ValueError, "field: on a GPU"),
-            (dict(max_visits=3), TypeError, "max_visits: there is no such setting"),
-            (dict(pairs=[(0, 2)]), ValueError, r"pairs\[0\]: \(0, 2\): there are solids 0 to 1"),
-            (dict(pairs=[(1, 1)]), ValueError, "a solid does not meet itself"),
-            (dict(poses=torch.ones(3, 7)), ValueError, r"poses: shape \(3, 7\); wanted \(2, 7\)"),
-            (dict(scales=torch.ones(3)), ValueError, r"scales: shape \(3,\); wanted \(2,\)")]:
-        with pytest.raises(error, match=text):
-            overlap(**{**dict(solids=[gear, knot], poses=torch.ones(2, 7)), **wrong})
-    module._scene.cache_clear()
-
-
 def test_descent_parts_two_solids(gear, knot):
     pose = torch.tensor([0.5, 0.1, 0.0, 0.2, 4.5, 0.5, 1.0], dtype=torch.float64, requires_grad=True)
     still = torch.tensor([1.0, 0, 0, 0, 0, 0, 0], dtype=torch.float64)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <ist/field.h>
@@ -20,6 +21,8 @@ class HostFieldBatch {
     for (const Field& field : fields)
       fields_.push_back(gpu::field_ref(field, gpu::pointed_to(field).data()));
   }
+  HostFieldBatch(const std::vector<TreeView>& assets, std::vector<gpu::FieldRef> fields)
+      : assets_(assets), fields_(std::move(fields)) {}
 
   /// `pairs`: a of each names a field. `seed`: of the order in which lanes go on; 0: a team of one.
   std::vector<Penetration> run(const std::vector<BatchPair>& pairs, Measure measure,

@@ -1,0 +1,97 @@
+#include "gpu_batch.h"
+#include "penetration.h"
+
+namespace ist::python {
+
+template <>
+std::span<const Answer<GpuPenetrations>> columns_of() {
+  using To = GpuPenetrations;
+  static constexpr Answer<To> kColumns[] = {
+      {"volume", kFloat64, 0, set_column<&To::volume>, "(n,) float64 [u³] of the overlap.", true},
+      {"centroid", kFloat64, 3, set_column<&To::centroid>,
+       "(n, 3) float64 [u] of the overlap, world; zero if none.", true},
+      {"translation_gradient", kFloat64, 3, set_column<&To::translation_gradient>,
+       "(n, 3) float64 [u²] dV/d(translation of B), world: the force on B is opposite.", true},
+      {"rotation_gradient", kFloat64, 3, set_column<&To::rotation_gradient>,
+       "(n, 3) float64 [u³/rad] dV/d(rotation vector of B about its origin), world.", true},
+      {"status", kUInt32, 0, set_column<&To::status>,
+       "(n,) uint32, a QueryStatus: ok or invalid_input.", true},
+      {"node_visits", kUInt32, 0, set_column<&To::node_visits>, "(n,) uint32, node pairs opened.",
+       false},
+      {"sphere_pairs", kUInt32, 0, set_column<&To::sphere_pairs>, "(n,) uint32, lenses summed.",
+       false},
+  };
+  return kColumns;
+}
+
+namespace {
+
+DeviceAnswers<GpuPenetrations> penetrations(DeviceAssets& assets, const py::object& asset_a,
+                                            const py::object& asset_b, const py::object& pose_a,
+                                            const py::object& pose_b, const py::object& scale_a,
+                                            const py::object& scale_b,
+                                            std::shared_ptr<DeviceFields> fields,
+                                            const std::string& measure, std::uint32_t pair_budget,
+                                            const py::object& wanted, const py::object& out,
+                                            const py::object& stream) {
+  const Measure which = named(measure, "measure", kMeasures);
+  if (fields != nullptr && pair_budget != 0)
+    throw py::value_error("pair_budget: " + std::to_string(pair_budget) +
+                          "; pairs of fields have none");
+  const DeviceFields* const solids = fields.get();
+  return ask<GpuPenetrations>(
+      assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, std::move(fields)}, wanted, out,
+      stream,
+      [&](const GpuAssets& all, const GpuPairs& pairs, GpuWorkspace& workspace,
+          const GpuPenetrations& to, cuda::Stream on) {
+        if (solids != nullptr)
+          penetration_batch(all, solids->fields(), pairs, which, workspace, to, on);
+        else
+          penetration_batch(all, pairs, {which, pair_budget}, workspace, to, on);
+      });
+}
+
+constexpr const char* kPenetrationDoc = R"(Penetrations of a batch of pairs, on the device.
+
+assets: Assets. asset_a, asset_b: (n,) uint32 or int32 numbers of them, or one number for all.
+pose_a, pose_b: (n, 7) float64: qw, qx, qy, qz, tx [u], ty, tz; None: at the origin, unturned.
+scale_a, scale_b: (n,) float64 > 0; None: 1.
+fields: Fields; asset_a are then numbers of those, and their frames are placed by pose_a, scale_a.
+measure: 'matched' (the accurate one) or 'inner' (certified lower bound of the true volume).
+pair_budget: count of sphere pairs to spend on each pair of assets, as in ist.penetration; matched
+    measure only; 0: no limit.
+wanted: names of answers; None: all but node_visits and sphere_pairs.
+out: a dict of arrays by the answers' names, or what an earlier call returned: answers go there, and
+    nothing is allocated. uint32 answers fit int32 arrays.
+stream: a handle, or an object with __cuda_stream__, cuda_stream (PyTorch) or ptr (CuPy); None: the
+    legacy default stream. Answers are written in its order.
+
+Arrays are those of any framework, in the memory of the assets' device, in C order: they are taken by
+__dlpack__ or __cuda_array_interface__, never copied, and held until the batch is done. One that
+does not fit is a TypeError or a ValueError that names it.
+
+By lenses, as ist.penetration(…, field='never'): volumes are within 1e-6 of the sum in double. With
+fields, volumes and gradients are the CPU's to 1e-9. The same bits in every run, whatever else is in
+the batch. Rows that are invalid are all zero, with the
+status invalid_input.
+Nothing waits on the host, but in the first batch that is larger than all before. A stream that is
+captured needs `out`; graphs and other batches of the same Assets must follow one another.
+
+Returns a Penetration.)";
+
+}  // namespace
+
+void add_gpu_penetration(py::module_& module) {
+  add_answers<GpuPenetrations>(
+      module, "Penetration",
+      "Overlaps of a batch: arrays on the device, None where not wanted; those that were given as "
+      "`out` are the same objects.");
+  module.def("penetration", &penetrations, py::arg("assets"), py::arg("asset_a"),
+             py::arg("asset_b"), py::arg("pose_a"), py::arg("pose_b"),
+             py::arg("scale_a") = py::none(), py::arg("scale_b") = py::none(), py::kw_only(),
+             py::arg("fields") = py::none(), py::arg("measure") = "matched",
+             py::arg("pair_budget") = 0, py::arg("wanted") = py::none(),
+             py::arg("out") = py::none(), py::arg("stream") = py::none(), kPenetrationDoc);
+}
+
+}  // namespace ist::python

@@ -1,0 +1,202 @@
+// What ist::ist asks of a GPU's batches, on a device that is host memory.
+
+#include <ist/bake.h>
+#include <ist/gpu.h>
+#include <ist/gpu_fields.h>
+#include <ist/gpu_query.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "emulated_device.h"
+#include "support/host_batch.h"
+#include "support/host_field_batch.h"
+#include "support/host_separations.h"
+
+namespace ist {
+namespace {
+
+/// Whether an object that a batch needs is there when its work is done.
+class Alive {
+ public:
+  Alive() = default;
+  Alive(Alive&&) = default;
+  ~Alive() {
+    if (there_ != nullptr) *there_ = false;
+  }
+
+  std::shared_ptr<const bool> shown() const { return there_; }
+
+ private:
+  std::shared_ptr<bool> there_ = std::make_shared<bool>(true);
+};
+
+void need(const std::shared_ptr<const bool>& there) {
+  if (!*there) std::abort();
+}
+
+std::vector<testing::BatchPair> rows_of(const GpuPairs& pairs) {
+  std::vector<testing::BatchPair> rows(pairs.count);
+  for (std::size_t i = 0; i < pairs.count; ++i) {
+    testing::BatchPair& row = rows[i];
+    row.a = pairs.asset_a[i];
+    row.b = pairs.asset_b[i];
+    if (pairs.pose_a != nullptr) row.pose_a = pairs.pose_a[i];
+    if (pairs.pose_b != nullptr) row.pose_b = pairs.pose_b[i];
+    if (pairs.scale_a != nullptr) row.scale_a = pairs.scale_a[i];
+    if (pairs.scale_b != nullptr) row.scale_b = pairs.scale_b[i];
+  }
+  return rows;
+}
+
+/// Row i of a column, where it is wanted.
+template <class Number, class Value>
+void put(Number* column, std::size_t i, const Value& value) {
+  if (column != nullptr)
+    std::memcpy(column + i * (sizeof value / sizeof *column), &value, sizeof value);
+}
+
+void write(const std::vector<Penetration>& found, const GpuPenetrations& to) {
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    put(to.volume, i, found[i].volume);
+    put(to.centroid, i, found[i].centroid);
+    put(to.translation_gradient, i, found[i].translation_gradient);
+    put(to.rotation_gradient, i, found[i].rotation_gradient);
+    put(to.status, i, found[i].status);
+    put(to.node_visits, i, found[i].node_visits);
+    put(to.sphere_pairs, i, found[i].sphere_pairs);
+  }
+}
+
+}  // namespace
+
+bool gpu_available(int device, std::string*) { return device == 0; }
+GpuInfo gpu_info(int) { return {"emulated", 90, 0, 0}; }
+
+struct GpuAssets::Impl {
+  std::vector<Asset> copies;
+  Alive alive;
+
+  std::vector<TreeView> views() const {
+    std::vector<TreeView> all;
+    for (const Asset& asset : copies) all.push_back(asset.view());
+    return all;
+  }
+};
+
+GpuAssets::GpuAssets(std::span<const TreeView> assets, const GpuSettings&)
+    : impl_(std::make_unique<Impl>()) {
+  for (const TreeView& asset : assets)
+    impl_->copies.emplace_back(
+        std::span(reinterpret_cast<const std::byte*>(&asset.header()), asset.header().file_bytes),
+        "emulated");
+}
+GpuAssets::~GpuAssets() = default;
+std::size_t GpuAssets::size() const noexcept { return impl_->copies.size(); }
+std::size_t GpuAssets::bytes() const noexcept {
+  std::size_t sum = 0;
+  for (const Asset& asset : impl_->copies) sum += asset.bytes().size();
+  return sum;
+}
+int GpuAssets::device() const noexcept { return 0; }
+
+struct GpuFields::Impl {
+  std::vector<std::vector<std::byte>> copies;
+  std::vector<gpu::FieldRef> refs;
+  Alive alive;
+};
+
+GpuFields::GpuFields(std::span<const Field> fields, const GpuSettings&)
+    : impl_(std::make_unique<Impl>()) {
+  for (const Field& field : fields) {
+    const std::span<const std::byte> data = gpu::pointed_to(field);
+    impl_->copies.emplace_back(data.begin(), data.end());
+    impl_->refs.push_back(gpu::field_ref(field, impl_->copies.back().data()));
+  }
+}
+GpuFields::~GpuFields() = default;
+std::size_t GpuFields::size() const noexcept { return impl_->refs.size(); }
+std::size_t GpuFields::bytes() const noexcept {
+  std::size_t sum = impl_->refs.size() * sizeof(gpu::FieldRef);
+  for (const std::vector<std::byte>& copy : impl_->copies) sum += copy.size();
+  return sum;
+}
+int GpuFields::device() const noexcept { return 0; }
+
+struct GpuWorkspace::Impl {
+  std::size_t most_pairs;
+  Alive alive;
+};
+GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings&)
+    : impl_(std::make_unique<Impl>(Impl{most_pairs, {}})) {}
+GpuWorkspace::~GpuWorkspace() = default;
+std::size_t GpuWorkspace::most_pairs() const noexcept { return impl_->most_pairs; }
+
+namespace {
+
+/// answer(assets, rows) → found, and write(found), when the stream comes to it.
+template <class Answer, class Write>
+void launch(const GpuAssets& assets, const GpuPairs& pairs, GpuWorkspace& workspace,
+            CUstream_st* stream, const Answer& answer, const Write& write) {
+  if (pairs.count > workspace.most_pairs()) std::abort();
+  testing::do_later(stream, [&impl = assets.impl(), pairs, answer, write,
+                             there = assets.impl().alive.shown(),
+                             room = workspace.impl().alive.shown()] {
+    need(there);
+    need(room);
+    write(answer(impl.views(), rows_of(pairs)));
+  });
+}
+
+}  // namespace
+
+void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs,
+                       const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
+                       const GpuPenetrations& to, CUstream_st* stream) {
+  launch(
+      assets, pairs, workspace, stream,
+      [settings](const auto& solids, const auto& rows) {
+        return testing::HostBatch(solids).run(rows, settings.measure, 0, settings.pair_budget);
+      },
+      [to](const auto& found) { write(found, to); });
+}
+
+void penetration_batch(const GpuAssets& assets, const GpuFields& fields, const GpuPairs& pairs,
+                       Measure measure, GpuWorkspace& workspace, const GpuPenetrations& to,
+                       CUstream_st* stream) {
+  launch(
+      assets, pairs, workspace, stream,
+      [&impl = fields.impl(), there = fields.impl().alive.shown(), measure](const auto& solids,
+                                                                            const auto& rows) {
+        need(there);
+        return testing::HostFieldBatch(solids, impl.refs).run(rows, measure);
+      },
+      [to](const auto& found) { write(found, to); });
+}
+
+void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint32_t max_visits,
+                      GpuWorkspace& workspace, const GpuSeparations& to, CUstream_st* stream) {
+  launch(
+      assets, pairs, workspace, stream,
+      [max_visits](const auto& solids, const auto& rows) {
+        return testing::HostSeparations(solids).run(rows, 0, max_visits);
+      },
+      [to](const std::vector<Separation>& found) {
+        for (std::size_t i = 0; i < found.size(); ++i) {
+          put(to.distance, i, found[i].distance);
+          put(to.distance_min, i, found[i].distance_min);
+          put(to.distance_max, i, found[i].distance_max);
+          put(to.point_a, i, found[i].point_a);
+          put(to.point_b, i, found[i].point_b);
+          put(to.normal, i, found[i].normal);
+          put(to.status, i, found[i].status);
+          put(to.node_visits, i, found[i].node_visits);
+          put(to.sphere_pairs, i, found[i].sphere_pairs);
+        }
+      });
+}
+
+}  // namespace ist
