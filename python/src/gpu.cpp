@@ -29,7 +29,8 @@ void add_fields_class(py::module_& module) {
   py::class_<DeviceFields, std::shared_ptr<DeviceFields>>(
       module, "Fields",
       "Fields in the memory of a device, for batches: pairs name them by their place.\n\n"
-      "All that they point to is copied. Graphs that were captured need it as long as they are used.")
+      "All that they point to is copied. Graphs that were captured need it as long as they are "
+      "used.")
       .def(py::init<const py::sequence&, int>(), py::arg("fields"), py::kw_only(),
            py::arg("device") = 0,
            "fields: ist.Field each; of an asset's surface, ist.MeshField(asset). Raises ist.Error "

@@ -193,8 +193,7 @@ class PairArguments {
       throw py::value_error("pose_b: None; one argument must have rows: poses, scales or assets");
     const auto count = static_cast<std::size_t>(rows_);
     for (const auto& [number, to] : same_) {
-      repeated_.push_back(
-          std::make_unique<cuda::Repeated>(device_, number, count, stream_));
+      repeated_.push_back(std::make_unique<cuda::Repeated>(device_, number, count, stream_));
       *to = repeated_.back()->data();
     }
     return count;

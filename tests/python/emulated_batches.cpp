@@ -142,13 +142,13 @@ template <class Answer, class Write>
 void launch(const GpuAssets& assets, const GpuPairs& pairs, GpuWorkspace& workspace,
             CUstream_st* stream, const Answer& answer, const Write& write) {
   if (pairs.count > workspace.most_pairs()) std::abort();
-  testing::do_later(stream, [&impl = assets.impl(), pairs, answer, write,
-                             there = assets.impl().alive.shown(),
-                             room = workspace.impl().alive.shown()] {
-    need(there);
-    need(room);
-    write(answer(impl.views(), rows_of(pairs)));
-  });
+  testing::do_later(
+      stream, [&impl = assets.impl(), pairs, answer, write, there = assets.impl().alive.shown(),
+               room = workspace.impl().alive.shown()] {
+        need(there);
+        need(room);
+        write(answer(impl.views(), rows_of(pairs)));
+      });
 }
 
 }  // namespace
