@@ -8,13 +8,13 @@
 #include "numerics/host_device.h"
 
 // Balls met by triangles, by one team: their parts inside the closed surface, exactly, as
-// add_patch() and total_of() (query/probe/patch_sums.h, query/field/probe_sum.h) have them. Two
-// blocks of sixteen balls are held at a time, so that a lane of a warp has a ball when their sides
-// are told; what meets goes to lists, so that lanes are full where the work is.
+// add_patch() and total_of() (query/probe/patch_sums.h, query/field/probe_sum.h) have them. Four
+// blocks of sixteen balls are held at a time, and what meets goes to lists, so that the lanes of a
+// warp are full where the work is.
 
 namespace ist::gpu {
 
-constexpr int kHeldBlocks = 2;
+constexpr int kHeldBlocks = 4;
 constexpr int kHeldBalls = kHeldBlocks * static_cast<int>(kWidth);
 constexpr int kKeptNear = 16;  ///< triangles near a block that are remembered
 constexpr int kDiscRoom = 64;
@@ -49,6 +49,7 @@ struct DiscMemory {
   HeldBlock block[kHeldBlocks];
   SeenTriangles seen_from_block;
   TriangleId staged[kStaged];
+  std::uint32_t staged_as[kStaged];  ///< its place in what is seen
   BallTriangle near[kDiscRoom], cut[kDiscRoom];
   double share[2][32];  ///< of the lanes: cones and angle
   std::uint32_t share_ball[32];
@@ -110,8 +111,7 @@ class DiscSums {
   /// k-th.
   template <class IdOf>
   IST_HD void meet(int slot, const IdOf& id_of) {
-    HeldBlock& block = m_.block[slot];
-    const std::uint32_t before = block.near;
+    const HeldBlock& block = m_.block[slot];
     int staged = 0;
     for (int i = 0; i < kStaged / Team::kWidth; ++i) {
       TriangleId id = {};
@@ -121,11 +121,29 @@ class DiscSums {
       const int place = staged + team_.exclusive_count(near, total);
       staged += total;
       if (!near) continue;
-      m_.staged[place] = id;
+      stage(place, id, place);
       m_.seen_from_block.set(place, seen);
-      const std::uint32_t kept = before + static_cast<std::uint32_t>(place);
-      if (kept < kKeptNear) block.kept[kept] = id;
     }
+    meet_staged(slot, staged, m_.seen_from_block, block.centre, block.reach);
+  }
+
+  /// Makes a triangle the next for meet_staged(), by the lane that knows it. `as`: its place in
+  /// what is seen.
+  IST_HD void stage(int place, const TriangleId& id, int as) {
+    m_.staged[place] = id;
+    m_.staged_as[place] = static_cast<std::uint32_t>(as);
+  }
+
+  /// Puts a held block together with all that is staged: the triangles that come near it, as they
+  /// are seen from a point that its balls lie within a reach of.
+  IST_HD_ONCE void meet_staged(int slot, int staged, const SeenTriangles& seen,
+                               const double (&centre)[3], double reach) {
+    team_.sync();
+    HeldBlock& block = m_.block[slot];
+    const std::uint32_t before = block.near;
+    for (int k = team_.lane(); k < staged; k += Team::kWidth)
+      if (before + static_cast<std::uint32_t>(k) < kKeptNear)
+        block.kept[before + static_cast<std::uint32_t>(k)] = m_.staged[k];
     team_.sync();
     if (team_.lane() == 0) block.near = before + static_cast<std::uint32_t>(staged);
     const int tests = staged * static_cast<int>(kWidth);
@@ -133,7 +151,10 @@ class DiscSums {
       const int k = base + team_.lane();
       const int ball = slot * static_cast<int>(kWidth) + k % static_cast<int>(kWidth);
       const int triangle = k / static_cast<int>(kWidth);
-      const bool meets = k < tests && may_meet(block, ball, triangle);
+      const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]};
+      const bool meets =
+          k < tests && m_.r[ball] > 0 &&
+          seen.meets(static_cast<int>(m_.staged_as[triangle]), x, m_.r[ball], centre, reach);
       int total = 0;
       const int place = near_ + team_.exclusive_count(meets, total);
       if (meets) m_.near[place] = {static_cast<std::uint32_t>(ball), m_.staged[triangle]};
@@ -179,18 +200,12 @@ class DiscSums {
                   float (&seen)[SeenTriangles::kNumbers]) const {
     double c[3][3];
     source_.corners(id, block.centre, block.reach, c);
-    return SeenTriangles::see(TrianglePlane(c), block.centre, block.reach, seen);
-  }
-
-  IST_HD bool may_meet(const HeldBlock& block, int ball, int triangle) const {
-    const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]};
-    return m_.r[ball] > 0 &&
-           m_.seen_from_block.meets(triangle, x, m_.r[ball], block.centre, block.reach);
+    return SeenTriangles::see(c, block.centre, block.reach, seen);
   }
 
   /// Takes what is listed, as many at a time as the team is wide, until fewer than `full` are left;
   /// of 0 all. What came near is sorted: it misses, is summed, or waits among what edges cut.
-  IST_HD void drain(int full) {
+  IST_HD_ONCE void drain(int full) {
     for (;;) {
       const bool of_cut = cut_ >= Team::kWidth || (full == 0 && near_ == 0 && cut_ > 0);
       if (!of_cut && (near_ == 0 || near_ < full)) return;

@@ -135,8 +135,6 @@ class FacetSource {
   const FieldRef& field_;
 };
 
-static_assert(kHeldBlocks == kPairsAtOnce);
-
 /// The parts of leaf blocks inside a box or a terrain.
 template <class Team>
 class FacetSums {
@@ -149,9 +147,14 @@ class FacetSums {
         discs_(team, memory.discs, source_, memory.place.a_from_b.t, sums) {}
 
   IST_HD void add(const std::uint32_t* blocks, int have) {
-    for (int k = 0; k < have; ++k) add_block(blocks[k]);
-    discs_.finish();
+    for (int k = 0; k < have; ++k) {
+      if (discs_.full()) discs_.finish();
+      add_block(blocks[k]);
+    }
   }
+
+  /// To be called when all are added.
+  IST_HD void finish() { discs_.finish(); }
 
  private:
   IST_HD void add_block(std::uint32_t block) {

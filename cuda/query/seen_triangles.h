@@ -12,9 +12,10 @@ struct SeenTriangles {
   static constexpr int kNumbers = 14;
   float plane[kNumbers][kStaged];
 
-  /// False if the triangle does not come within the reach of the point.
-  IST_HD static bool see(const TrianglePlane& t, const double (&centre)[3], double reach,
-                         float (&seen)[kNumbers]) {
+  /// False if the triangle does not come within the reach of the point. `c`: its corners.
+  IST_HD_ONCE static bool see(const double (&c)[3][3], const double (&centre)[3], double reach,
+                              float (&seen)[kNumbers]) {
+    const TrianglePlane t(c);
     double height, x, y;
     t.feet(centre, height, x, y);
     if (!(size_of(height) < reach && x > t.left - reach && x < t.right + reach && y > -reach &&

@@ -43,8 +43,8 @@ IST_HD inline bool passes_left(const double (&d)[3], const double (&a)[3], const
 }
 
 /// Whether the way from `from` by `way` goes through a triangle.
-IST_HD inline bool steps_through(const double (&from)[3], const double (&way)[3],
-                                 const double (&corner)[3][3]) {
+IST_HD_ONCE inline bool steps_through(const double (&from)[3], const double (&way)[3],
+                                      const double (&corner)[3][3]) {
   double c[3][3];
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) c[i][k] = corner[i][k] - from[k];
@@ -100,8 +100,8 @@ IST_HD inline CellLook look_into_cell(const SurfaceRef& s, const double (&x)[3])
 /// Whether each lane's point is inside the surface, as inside_surface(). The team goes through the
 /// triangles of one lane's cell after another's.
 template <class Team>
-IST_HD bool inside_surface(const Team& team, const SurfaceRef& s, bool wanted,
-                           const double (&x)[3]) {
+IST_HD_ONCE bool inside_surface(const Team& team, const SurfaceRef& s, bool wanted,
+                                const double (&x)[3]) {
   CellLook look = {};
   if (wanted) look = look_into_cell(s, x);
   bool open = look.begin < look.end;

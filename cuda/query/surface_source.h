@@ -50,16 +50,12 @@ class SurfaceSource {
     const auto at = static_cast<std::uint32_t>(lane);
     if (rank_of(node) == kTriangleBlock) {
       float seen[SeenTriangles::kNumbers];
-      return SeenTriangles::see(plane(number_of(node) * kWidth + at), x, reach, seen);
+      double c[3][3];
+      surface_.corners(number_of(node) * kWidth + at, c);
+      return SeenTriangles::see(c, x, reach, seen);
     }
     const NodeBall ball = surface_.lane_ball(rank_of(node) - 1, number_of(node), at);
     return ball.r > 0 && balls_meet(ball, x, reach);
-  }
-
-  IST_HD TrianglePlane plane(std::uint32_t triangle) const {
-    double c[3][3];
-    surface_.corners(triangle, c);
-    return TrianglePlane(c);
   }
 
   IST_HD static bool balls_meet(const NodeBall& ball, const double (&x)[3], double reach) {

@@ -23,6 +23,7 @@ constexpr int kOpenRoom = kListRoom + kMaxLevels * (kItems - kPairsAtOnce) + kPa
 struct ProbeFrame {
   std::uint32_t block;
   int count;
+  bool triangles;  ///< all of the list
   SurfaceNode list[kListRoom];
   /// [half of the lanes][child] which of the list come near, a bit each.
   std::uint32_t near[2][kWidth];
@@ -32,6 +33,7 @@ struct SurfaceMemory : ProbeMemory {
   int wanted[kMaxLevels];  ///< rank down to which the list of a node of a level is opened
   ProbeFrame frame[kMaxLevels];
   SurfaceNode open[kOpenRoom];
+  SeenTriangles seen_from_frame;  ///< those in the list of the frame in work
   DiscMemory discs;
 };
 
@@ -64,14 +66,16 @@ class SurfaceWalk {
       }
       const ProbeFrame& frame = m_.frame[level];
       const std::uint32_t number = frame.block * kWidth + static_cast<std::uint32_t>(child);
-      const int size = inherit(frame, child);
-      if (level == 1) {
-        meet_leaf(number, size);
-        ++child;
-      } else {
-        start_frame(--level, number, size);
+      if (level > 1) {
+        start_frame(--level, number, inherit(frame, child));
         child = 0;
+        continue;
       }
+      if (frame.triangles)
+        meet_leaf_in(frame, child);
+      else
+        meet_leaf(number, inherit(frame, child));
+      ++child;
     }
   }
 
@@ -112,7 +116,7 @@ class SurfaceWalk {
 
   /// Goes on to the children of a node, of which m_.open[0 … size) come near: which of their nodes
   /// come near each child. Children without any are settled.
-  IST_HD void start_frame(int level, std::uint32_t number, int size) {
+  IST_HD_ONCE void start_frame(int level, std::uint32_t number, int size) {
     ProbeFrame& frame = m_.frame[level];
     if (team_.lane() == 0) {
       frame.block = number;
@@ -127,9 +131,12 @@ class SurfaceWalk {
                       centre, reach, frame.list + count, ready);
       count += ready;
     }
-    if (team_.lane() == 0) frame.count = count;
     sums_.visits += static_cast<std::uint32_t>(count);
-    const bool triangles = stage(frame, count, centre, reach);
+    const bool triangles = see_list(frame, count, centre, reach);
+    if (team_.lane() == 0) {
+      frame.count = count;
+      frame.triangles = triangles;
+    }
     for (int i = 0; i < kItemsALane; ++i) {
       const int half = item(i) / static_cast<int>(kWidth),
                 lane = item(i) % static_cast<int>(kWidth);
@@ -145,14 +152,17 @@ class SurfaceWalk {
   }
 
   /// Readies what is listed of triangles to be met by the children; whether all of it is.
-  IST_HD bool stage(const ProbeFrame& frame, int count, const double (&centre)[3], double reach) {
+  IST_HD bool see_list(const ProbeFrame& frame, int count, const double (&centre)[3],
+                       double reach) {
     bool other = false;
     for (int k = team_.lane(); k < count; k += Team::kWidth) {
       other = other || rank_of(frame.list[k]) != kTriangle;
       if (rank_of(frame.list[k]) != kTriangle) continue;
       float seen[SeenTriangles::kNumbers] = {};
-      SeenTriangles::see(source_.plane(number_of(frame.list[k])), centre, 2 * reach, seen);
-      m_.discs.seen_from_block.set(k, seen);
+      double c[3][3];
+      m_.field.mesh.corners(number_of(frame.list[k]), c);
+      SeenTriangles::see(c, centre, 2 * reach, seen);
+      m_.seen_from_frame.set(k, seen);
     }
     team_.sync();
     return !team_.any(other);
@@ -162,7 +172,7 @@ class SurfaceWalk {
                            const double (&centre)[3], double reach) const {
     if (rank_of(frame.list[k]) != kTriangle)
       return SurfaceSource::balls_meet(m_.field.mesh.ball(frame.list[k]), x, r);
-    return m_.discs.seen_from_block.meets(k, x, r, centre, 2 * reach);
+    return m_.seen_from_frame.meets(k, x, r, centre, 2 * reach);
   }
 
   /// Adds the children that no surface comes near and that are inside. Where there are but few
@@ -210,9 +220,8 @@ class SurfaceWalk {
            place_ball(m_, level, frame.block, child, x, r);
   }
 
-  /// Puts the spheres of a leaf block together with the triangles below m_.open[0 … size).
-  IST_HD void meet_leaf(std::uint32_t number, int size) {
-    double centre[3], reach;
+  /// Holds the spheres of a leaf block; where, and the ball around them.
+  IST_HD int hold_leaf(std::uint32_t number, double (&centre)[3], double& reach) {
     bound(0, number, centre, reach);
     const int slot = discs_.hold(centre, reach);
     for (int lane = team_.lane(); lane < static_cast<int>(kWidth); lane += Team::kWidth) {
@@ -220,6 +229,27 @@ class SurfaceWalk {
       discs_.set_ball(slot, lane, x, place_ball(m_, 0, number, lane, x, r) ? r : 0);
     }
     team_.sync();
+    return slot;
+  }
+
+  /// Puts the spheres of a child, a leaf block, together with the triangles of the frame's list
+  /// that come near it.
+  IST_HD void meet_leaf_in(const ProbeFrame& frame, int child) {
+    double centre[3], reach;
+    const int slot =
+        hold_leaf(frame.block * kWidth + static_cast<std::uint32_t>(child), centre, reach);
+    const std::uint32_t near = frame.near[0][child] | frame.near[1][child];
+    for (int k = team_.lane(); k < frame.count; k += Team::kWidth)
+      if ((near >> k & 1) != 0)
+        discs_.stage(count_bits(near & ((1u << k) - 1)), {number_of(frame.list[k]), 0}, k);
+    bound(1, frame.block, centre, reach);
+    discs_.meet_staged(slot, count_bits(near), m_.seen_from_frame, centre, 2 * reach);
+  }
+
+  /// Puts the spheres of a leaf block together with the triangles below m_.open[0 … size).
+  IST_HD void meet_leaf(std::uint32_t number, int size) {
+    double centre[3], reach;
+    const int slot = hold_leaf(number, centre, reach);
     while (size > 0) {
       const int rank = rank_of(m_.open[size - 1]);
       const int most = rank == kTriangle ? kStaged : kPairsAtOnce;
@@ -249,8 +279,8 @@ class SurfaceWalk {
   /// Takes `have` of m_.open[0 … size), no more than two: what is of the wanted rank is `ready`, of
   /// others the children that come near take their places. Returns how many there are now. Where
   /// with `count` they would be more than a list holds, nodes stay as they are and are ready.
-  IST_HD int open_two(int size, int have, int count, int wanted, const double (&centre)[3],
-                      double reach, SurfaceNode* to, int& ready) {
+  IST_HD_ONCE int open_two(int size, int have, int count, int wanted, const double (&centre)[3],
+                           double reach, SurfaceNode* to, int& ready) {
     SurfaceNode node[kItemsALane];
     bool near[kItemsALane];
     int more = 0;
