@@ -20,6 +20,7 @@ namespace {
 constexpr double kRounding = 1e-12;  // of a distance in the unit frame, with room
 constexpr double kFar = 1e3;         // further than anything in the unit frame
 constexpr double kSlack = 1.25;      // of the bound that is tried over what is seen at samples
+constexpr double kPartSlack = 1.02;  // likewise, of one part
 
 using Point = std::array<double, 3>;
 
@@ -67,7 +68,14 @@ class FieldNearMesh {
     if (radius <= 0.1 * target) return closest.distance + radius;
     if (radius > target && cuts_.is_within(Hull(part.corner), {}, target, {c, closest.distance}))
       return target;
-    target = std::max(target, kSlack * closest.distance);
+    // No bound is less than what is seen, and showing a little more takes far fewer parts.
+    target = std::max(target, kPartSlack * closest.distance);
+    for (const Point& p : part.corner)
+      target = std::max(
+          target, kPartSlack * exact_closest_point(
+                                   mesh_, {p[0], p[1], p[2]},
+                                   (closest.distance + between(c, p)) * (1 + 1e-9) + kRounding)
+                                   .distance);
     // Halved across the longest side.
     int from = 0;
     for (int k = 1; k < 3; ++k)

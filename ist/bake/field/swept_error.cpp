@@ -14,7 +14,7 @@ namespace ist {
 namespace {
 
 constexpr double kSmallestPart = 0.2;  // of the target: smaller prisms are taken for their centres
-constexpr double kSlack = 1.25;        // of a target over the distance of a centre
+constexpr double kSlack = 1.02;        // of a target over what is seen of its part
 constexpr double kRounding = 1e-15;    // of a squared distance, with room
 constexpr double kFar = 1e3;           // further than anything in the unit frame
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -208,7 +208,12 @@ double SweptError::bound(const Prism& prism, std::span<const std::uint32_t> cand
     if (whole2 <= target2) return std::sqrt(whole2);
   }
   if (radius <= kSmallestPart * target) return distance + radius;
+  // No bound is less than what is seen, and showing a little more takes far fewer parts.
   target = std::max(target, kSlack * distance);
+  for (const Point& p : prism.corner)
+    target = std::max(target, kSlack * exact_closest_point(hierarchy_.view(), {p[0], p[1], p[2]},
+                                                           distance + between(c, p))
+                                           .distance);
   double most = 0;
   for (const Prism& half : prism.halves())
     most = std::max(most, bound(half, candidates, target, true));
