@@ -11,8 +11,8 @@
 #include <ist/query_enums.h>
 #include <ist/tree_view.h>
 
-// Penetrations and separations of many pairs at once, on a GPU. Assets are uploaded once; poses and
-// answers are arrays in device memory that the caller owns.
+// Penetrations, separations and contact patches of many pairs at once, on a GPU. Assets are
+// uploaded once; poses and answers are arrays in device memory that the caller owns.
 
 namespace IST_API ist {
 

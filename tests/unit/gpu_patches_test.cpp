@@ -277,21 +277,60 @@ TEST(GpuPatches, LanesOfAWarpNeedNoLuck) {
   EXPECT_LE(difference.centroid, 1e-13);
 }
 
-/// Copies on top of each other, spheres inside large ones, trees whose bins are no leaf blocks.
-TEST(GpuPatches, UnusualContactsAreThoseOfTheCpu) {
+/// An asset of these spheres, inner and matched; clustered, or in the order given.
+Asset made_of(const std::vector<Sphere>& spheres, bool clustered) {
+  AssetArrays arrays;
+  arrays.inner_spheres = arrays.matched_spheres = spheres;
   std::vector<std::uint32_t> order;
-  AssetArrays arrays;  // a lattice in its own order: clustering it would take a while
-  for (std::uint32_t i = 0; i < 42 * 40 * 40; ++i) {
-    const auto at = [](std::uint32_t k) { return 0.04f * static_cast<float>(k) - 0.8f; };
-    arrays.inner_spheres.push_back({at(i / 1600), at(i / 40 % 40), at(i % 40), 0.019f});
-    arrays.cover_radii.push_back(0.04f);
-    order.push_back(i);
+  for (const Sphere& s : spheres) {
+    arrays.cover_radii.push_back(2 * s.r);
+    order.push_back(static_cast<std::uint32_t>(order.size()));
   }
-  arrays.matched_spheres = arrays.inner_spheres;
-  arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, order);
-  arrays.matched_tree = tree_from_order(arrays.matched_spheres, {}, order);
+  if (clustered) {
+    arrays.inner_tree = build_tree(arrays.inner_spheres, arrays.cover_radii);
+    arrays.matched_tree = build_tree(arrays.matched_spheres, {});
+  } else {
+    arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, order);
+    arrays.matched_tree = tree_from_order(arrays.matched_spheres, {}, order);
+  }
   arrays.header.volume = arrays.matched_tree.volume_sum;
-  const Asset lattice(asset_bytes(arrays), "lattice");
+  return Asset(asset_bytes(arrays), "made up");
+}
+
+/// Clumps at two balls of the divided tree: spheres in each, which nothing pushes, and at its rim.
+TEST(GpuPatches, SpheresInsideABallFallToItsPatch) {
+  std::vector<Sphere> balls, clumps;
+  const auto at = [](std::uint32_t k) { return 0.25f * static_cast<float>(k) - 0.75f; };
+  for (std::uint32_t i = 0; i < 7 * 7 * 7; ++i)
+    balls.push_back({at(i / 49), at(i / 7 % 7), at(i % 7), 0.05f});
+  RandomPairs random(48);
+  const auto near = [&](double x) { return static_cast<float>(x + random.uniform(-0.01, 0.01)); };
+  for (const double corner : {0.0, 0.5})
+    for (const double x : {corner, corner + 0.05})
+      for (int k = 0; k < 16; ++k) clumps.push_back({near(x), near(corner), near(0), 0.002f});
+  const Asset a = made_of(balls, true), b = made_of(clumps, true);
+  const std::vector<BatchPair> pairs = {{0, 1, {}, {}, 1, 1}, {1, 0, {}, {}, 1, 1}};
+  for (const PatchedPair& answer :
+       HostPatches({a.view(), b.view()}).run(pairs, Measure::inner, 4)) {
+    ASSERT_EQ(answer.patches.size(), 2u);
+    for (const ContactPatch& patch : answer.patches)
+      EXPECT_NEAR(patch.volume, answer.whole.volume / 2, 0.1 * answer.whole.volume);
+  }
+  Workspace workspace;
+  AgainstCpu all;
+  all.ask({a.view(), b.view()}, pairs, Measure::inner, 4, workspace);
+  EXPECT_EQ(all.several, 2u);
+  EXPECT_EQ(all.other, 0u);
+  all.expect_near();
+}
+
+/// Copies on top of each other, single spheres, trees whose bins are no leaf blocks.
+TEST(GpuPatches, UnusualContactsAreThoseOfTheCpu) {
+  std::vector<Sphere> grid;  // in its own order: clustering it would take a while
+  const auto at = [](std::uint32_t k) { return 0.04f * static_cast<float>(k) - 0.8f; };
+  for (std::uint32_t i = 0; i < 42 * 40 * 40; ++i)
+    grid.push_back({at(i / 1600), at(i / 40 % 40), at(i % 40), 0.019f});
+  const Asset lattice = made_of(grid, false);
   const Asset one = make_random_asset({1, 1, {}, 0, 0}, 50);
   const Asset few = make_random_asset({100, 0.5, {}, 0, 0}, 51);
   const std::vector<TreeView> views = {lattice.view(), one.view(), few.view()};
