@@ -10,6 +10,7 @@
 #include "support/host_batch.h"
 #include "support/host_patches.h"
 #include "support/random_pairs.h"
+#include "support/reference_sum.h"
 
 // The GPU's batch of contact patches, its source run by teams of the host: of one lane, and of 32
 // that go on in an order that nobody can count on.
@@ -38,15 +39,16 @@ bool same_regions(std::span<const ContactPatch> x, std::span<const ContactPatch>
 struct PatchDifference {
   double volume = 0;    ///< relative
   double force = 0;     ///< of area, or of volume^(2/3) if more
-  double torque = 0;    ///< of that times the size
-  double centroid = 0;  ///< of the size
+  double torque = 0;    ///< of that times B's size
+  double centroid = 0;  ///< of both sizes
 
-  void add(const ContactPatch& x, const ContactPatch& y, double size) {
+  void add(const ContactPatch& x, const ContactPatch& y, const BatchPair& pair) {
+    const double size = 2 * pair.scale_b;
     volume = std::max(volume, std::abs(x.volume - y.volume) / y.volume);
     const double reach = y.area + std::cbrt(y.volume * y.volume);
     force = std::max(force, (x.force - y.force).norm() / reach);
     torque = std::max(torque, (x.torque - y.torque).norm() / (reach * size));
-    centroid = std::max(centroid, (x.centroid - y.centroid).norm() / size);
+    centroid = std::max(centroid, (x.centroid - y.centroid).norm() / (size + 2 * pair.scale_a));
   }
 };
 
@@ -72,7 +74,7 @@ struct AgainstCpu {
         ++other;
         continue;
       }
-      for (std::size_t k = 0; k < gpu.size(); ++k) difference.add(gpu[k], cpu[k], 2 * pair.scale_b);
+      for (std::size_t k = 0; k < gpu.size(); ++k) difference.add(gpu[k], cpu[k], pair);
     }
   }
 
@@ -268,7 +270,7 @@ TEST(GpuPatches, LanesOfAWarpNeedNoLuck) {
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     ASSERT_TRUE(same_regions(by_one[i].patches, expected[i].patches)) << i;
     for (std::size_t k = 0; k < by_one[i].patches.size(); ++k)
-      difference.add(by_one[i].patches[k], expected[i].patches[k], 2 * pairs[i].scale_b);
+      difference.add(by_one[i].patches[k], expected[i].patches[k], pairs[i]);
   }
   // The same lenses in another order, in double.
   EXPECT_LE(difference.volume, 1e-13);
@@ -346,6 +348,17 @@ TEST(GpuPatches, UnusualContactsAreThoseOfTheCpu) {
     if (pair.a == 0 && pair.b == 0) pair.scale_b = 0.2;
     pairs.push_back(pair);
   }
+  const WorldSphere ball = world_spheres({one.view(), {}, 1}, Measure::matched)[0];
+  for (const double scale : {1e-9, 1e-7, 1e-3, 1e3, 1e6})
+    for (const double far : {0.0, 1e3}) {
+      BatchPair pair = {1, 2, {}, {}, 1, scale};
+      for (int k = 0; k < 3; ++k) {
+        pair.pose_b.t[k] = ball.centre[k] + far;
+        pair.pose_a.t[k] = far;
+      }
+      pair.pose_b.t[0] += ball.r;
+      pairs.push_back(pair);
+    }
   pairs.push_back({2, 2, {}, {}, 1, 1});
   for (const PatchedPair& answer : HostPatches(views).run(pairs, Measure::matched, 12))
     expect_shares(answer, 12);
