@@ -8,26 +8,25 @@
 
 namespace ist::gpu {
 
-/// Adds value(k, term) to target(key(k))[term] for k < count, in this order; a key below 0: to
-/// none. A term stays with one lane, which reads and writes the target where the key changes.
+/// Adds value(k, term) to target(key(k))[term] for k < count, in this order. A term stays with one
+/// lane, which reads and writes the target where the key changes.
 template <class Team, class Key, class Value, class Target>
 IST_HD void add_by_runs(const Team& team, int count, const Key& key, const Value& value,
                         const Target& target) {
-  for (int term = team.lane(); term < kTerms; term += Team::kWidth) {
-    double sum = 0;
-    int run = -1;
+  for (int term = team.lane(); count > 0 && term < kTerms; term += Team::kWidth) {
+    int run = key(0);
+    double sum = value(0, term);
     IST_ROLLED
-    for (int k = 0; k < count; ++k) {
+    for (int k = 1; k < count; ++k) {
       const int next = key(k);
-      if (next < 0) continue;
       if (next != run) {
-        if (run >= 0) target(run)[term] += sum;
+        target(run)[term] += sum;
         sum = 0;
         run = next;
       }
       sum += value(k, term);
     }
-    if (run >= 0) target(run)[term] += sum;
+    target(run)[term] += sum;
   }
   team.sync();
 }
@@ -49,23 +48,24 @@ class BinSums {
   }
 
   IST_HD void end(bool flag, std::uint32_t number_a, std::uint32_t number_b) {
-    const int lane = team_.lane();
     const bool adds = flag && term_[kCaps] > 0;
+    int total = 0;
+    const int place = team_.exclusive_count(adds, total);
     const std::uint32_t bin =
         adds ? in_global_memory(rank_)[(of_b_ ? number_b : number_a) >> shift_] : 0;
     const std::uint32_t bit = 1u << bin % 32;
     const bool fresh = adds && (m_.marked[bin / 32] & bit) == 0;
-    m_.bin[lane] = adds ? static_cast<int>(bin) : -1;
-    for (int t = 0; t < kTerms; ++t) m_.term[lane][t] = term_[t];
-    if (team_.any(fresh)) {
-      if (fresh) {
-        for (double& t : in_global_memory(bins_)[bin].term) t = 0;
-        atomic_or(&m_.marked[bin / 32], bit);
-      }
+    if (adds) {
+      m_.bin[place] = static_cast<int>(bin);
+      for (int t = 0; t < kTerms; ++t) m_.term[place][t] = term_[t];
+    }
+    if (team_.any(fresh) && fresh) {
+      for (double& t : in_global_memory(bins_)[bin].term) t = 0;
+      atomic_or(&m_.marked[bin / 32], bit);
     }
     team_.sync();
     add_by_runs(
-        team_, Team::kWidth, [&](int k) { return m_.bin[k]; },
+        team_, total, [&](int k) { return m_.bin[k]; },
         [&](int k, int term) { return static_cast<double>(m_.term[k][term]); },
         [&](int run) { return in_global_memory(bins_)[run].term; });
   }

@@ -70,8 +70,8 @@ struct PatchMemory {
   PairMemory pair;
   std::uint32_t marked[kWords];           ///< bins that hold anything, by rank
   std::uint16_t bins_before[kWords + 1];  ///< marked bins of lower words
-  float term[32][kTerms + 1];             ///< what each lane adds; an odd number keeps banks apart
-  int bin[32];                            ///< to which bin; −1: none
+  float term[32][kTerms + 1];             ///< what lanes add; an odd number keeps banks apart
+  int bin[32];                            ///< to which bins
 };
 
 }  // namespace ist::gpu
