@@ -1,7 +1,6 @@
-// Penetrations and separations of many pairs at once on the GPU: rates with a million poses, the
-// time of one step of 4,096 worlds, growth with spheres and with the batch, trees in fields; the
-// same by all cores
-// of the machine. Answers are compared with the CPU's.
+// Penetrations, separations and contact patches of many pairs at once on the GPU: rates with a
+// million poses, the time of one step of 4,096 worlds, growth with spheres and with the batch,
+// trees in fields; the same by all cores of the machine. Answers are compared with the CPU's.
 #include <cuda_runtime_api.h>
 
 #include <algorithm>
@@ -20,6 +19,7 @@
 #include "cuda/check.h"
 #include "report.h"
 #include "samples/samples.h"
+#include "support/device_patches.h"
 #include "support/device_separations.h"
 #include "support/oracle_rows.h"
 #include "support/reference_sum.h"
@@ -31,6 +31,7 @@ using namespace ist;
 using ist::benchmark::Report;
 using ist::testing::BatchPair;
 using ist::testing::DeviceBatch;
+using ist::testing::DevicePatches;
 using ist::testing::DeviceSeparations;
 
 constexpr int kRepeats = 10;
@@ -245,6 +246,21 @@ class Batches {
     return ms;
   }
 
+  /// Likewise.
+  double median_patches_ms(const Scene& scene, std::size_t count, std::uint32_t most) {
+    const TreeView views[2] = {scene.a->view(), scene.b->view()};
+    const GpuAssets assets(views);
+    const DeviceBatch batch(drawn(scene.poses, count));
+    const DevicePatches patches(count, most);
+    const double ms = median_ms([&] {
+      contact_patches_batch(assets, batch.pairs(), Measure::matched, workspace_, batch.answers(),
+                            patches.patches(), stream_.get());
+    });
+    patched_ = patches.get(batch.get());
+    return ms;
+  }
+
+  const std::vector<testing::PatchedPair>& patched() const { return patched_; }
   const std::vector<Penetration>& answers() const { return answers_; }
   const std::vector<Separation>& separations() const { return separations_; }
 
@@ -261,6 +277,7 @@ class Batches {
   Stream stream_;
   std::vector<Penetration> answers_;
   std::vector<Separation> separations_;
+  std::vector<testing::PatchedPair> patched_;
 };
 
 std::vector<PlacedPair> placed(const Scene& scene, std::size_t count) {
@@ -330,6 +347,54 @@ double cpu_separation_rate(const Scene& scene, std::size_t count,
   return static_cast<double>(count) / best * 1e-6;
 }
 
+/// Contact patches by all cores.
+struct CpuPatches {
+  double rate = 0;  ///< M/s
+  std::vector<ContactPatches> answers;
+  std::vector<ContactPatch> patches;  ///< as many a pair
+
+  CpuPatches(const Scene& scene, std::size_t count, std::uint32_t most)
+      : answers(count), patches(count * most) {
+    const std::vector<PlacedPair> pairs = placed(scene, count);
+    ContactSettings settings;
+    settings.field = FieldUse::never;
+    std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
+    double best = 1e30;
+    for (int k = 0; k < 3; ++k) {
+      const double start = benchmark::wall_seconds();
+      contact_patches_batch(pairs, settings, workspaces, answers, patches, tbb_parallel_for());
+      best = std::min(best, benchmark::wall_seconds() - start);
+    }
+    rate = static_cast<double>(count) / best * 1e-6;
+  }
+};
+
+/// What contacts differ by from the CPU's.
+struct PatchDifference {
+  double of_other_regions = 0;  ///< part of the pairs
+  double volume = 0;            ///< largest of a patch, relative
+  double patches = 0;           ///< mean of a pair
+};
+
+PatchDifference difference(const std::vector<testing::PatchedPair>& gpu, const CpuPatches& cpu,
+                           std::uint32_t most) {
+  PatchDifference out;
+  const auto pairs = static_cast<double>(cpu.answers.size());
+  for (std::size_t i = 0; i < cpu.answers.size(); ++i) {
+    const ContactPatch* const from = cpu.patches.data() + i * most;
+    const std::vector<ContactPatch>& found = gpu[i].patches;
+    out.patches += static_cast<double>(found.size()) / pairs;
+    if (!std::equal(found.begin(), found.end(), from, from + cpu.answers[i].count,
+                    [](const auto& x, const auto& y) { return x.id == y.id; })) {
+      out.of_other_regions += 1 / pairs;
+      continue;
+    }
+    for (std::size_t k = 0; k < found.size(); ++k)
+      out.volume = std::max(out.volume, std::abs(found[k].volume / from[k].volume - 1));
+  }
+  return out;
+}
+
 /// The largest difference to the CPU's volumes, relative.
 double worst_volume(const std::vector<Penetration>& gpu, const std::vector<Penetration>& cpu) {
   double worst = 0;
@@ -378,6 +443,27 @@ bool separates(Report& report, Batches& batches, const Scene& scene, std::size_t
                              {"M/s by all cores", by_cores},
                              {"largest difference to the CPU", from_cpu.distance}});
   return from_cpu.certified && from_cpu.distance < 1e-6;
+}
+
+/// Reports a scene's contact patches; false where they are not the CPU's.
+bool patches_are_right(Report& report, Batches& batches, const Scene& scene, std::size_t many,
+                       std::size_t for_cpu, std::uint32_t most) {
+  const double ms = batches.median_patches_ms(scene, many, most);
+  const CpuPatches cpu(scene, for_cpu, most);
+  const PatchDifference from_cpu = difference(batches.patched(), cpu, most);
+  const double rate = static_cast<double>(many) / ms * 1e-3;
+  report.row("Contact patches", {{"poses", scene.name},
+                                 {"spheres", scene.a->view().sphere_count()},
+                                 {"patches, at most", most},
+                                 {"patches, mean", from_cpu.patches},
+                                 {"pairs", many},
+                                 {"M/s", rate},
+                                 {"times a penetration", ms / batches.median_ms(scene, many)},
+                                 {"4,096 pairs, ms", batches.median_patches_ms(scene, 4096, most)},
+                                 {"M/s by all cores", cpu.rate},
+                                 {"pairs of other regions", from_cpu.of_other_regions},
+                                 {"largest difference to the CPU", from_cpu.volume}});
+  return from_cpu.of_other_regions < 0.01 && from_cpu.volume < 1e-3;
 }
 
 int measure(Report& report) {
@@ -462,6 +548,9 @@ int measure(Report& report) {
     for (double& t : pair.pose_b.t) t *= 10;
   for (const Scene& scene : {near, far, scenes[0], scenes[1], scenes[4]})
     right = separates(report, batches, scene, many, for_cpu) && right;
+  for (const std::uint32_t most : {4u, 16u})
+    for (const Scene& scene : {scenes[0], scenes[1], scenes[4]})
+      right = patches_are_right(report, batches, scene, many, for_cpu, most) && right;
   for (std::size_t count = 1; count <= many; count *= 8)
     report.row("Growth with the batch",
                {{"poses", "pen"}, {"pairs", count}, {"ms", batches.median_ms(scenes[0], count)}});
@@ -485,7 +574,7 @@ int measure(Report& report) {
 
 int main(int argc, char** argv) {
   Report report("gpu_batch", argc, argv);
-  report.page("Penetrations and separations of many pairs on a GPU");
+  report.page("Penetrations, separations and contact patches of many pairs on a GPU");
   std::string why;
   if (!gpu_available(0, &why)) {
     std::fprintf(stderr, "gpu_batch: %s\n", why.c_str());

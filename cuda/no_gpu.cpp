@@ -65,6 +65,11 @@ void separation_batch(const GpuAssets&, const GpuPairs&, std::uint32_t, GpuWorks
   gpu_info(0);
 }
 
+void contact_patches_batch(const GpuAssets&, const GpuPairs&, Measure, GpuWorkspace&,
+                           const GpuPenetrations&, const GpuContactPatches&, CUstream_st*) {
+  gpu_info(0);
+}
+
 namespace gpu {
 
 std::unique_ptr<SolidBackend> make_cuda_backend(const MeshSolid&, const GpuSettings& settings) {

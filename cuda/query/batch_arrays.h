@@ -7,6 +7,7 @@
 #include <ist/gpu_query.h>
 
 #include "cuda/query/cover_ref.h"
+#include "cuda/query/cuts_ref.h"
 #include "cuda/query/detail_ref.h"
 #include "cuda/query/node_sums.h"
 #include "cuda/query/pair_descent.h"
@@ -18,6 +19,7 @@ struct AssetRef {
   AssetFrame frame;
   TreeRef tree[2];  ///< by Measure
   SumsRef sums[2];  ///< set_sums()
+  CutsRef cuts[2];  ///< by Measure
   CoverRef cover;   ///< of the inner tree
   AssetDetails details;
 

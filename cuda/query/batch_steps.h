@@ -5,8 +5,8 @@
 #include "cuda/atomics.h"
 #include "cuda/query/batch_arrays.h"
 #include "cuda/query/coincidence.h"
-#include "cuda/query/part_sums.h"
 #include "cuda/query/split_room.h"
+#include "cuda/query/world_sums.h"
 #include "numerics/host_device.h"
 
 // A batch of pairs of trees, step by step: what a kernel's threads and warps do, and a test's
@@ -32,29 +32,13 @@ IST_HD inline void write_nothing(const GpuPenetrations& to, std::uint32_t i, Que
   if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = 0;
 }
 
-/// World units, as world_answer() (query/descent/answer.h).
 IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, const PairPlace& place,
                                 const LensTotals& totals) {
-  const double unit = place.unit_a, unit3 = unit * unit * unit;
-  const double* const t = totals.term;
-  if (to.volume != nullptr) to.volume[i] = unit3 * (kPi / 3) * t[kCaps];
-  double centre[3] = {0, 0, 0}, push[3], turn[3];
-  for (int row = 0; row < 3; ++row) {
-    const double* const r = place.rotation_a + 3 * row;
-    push[row] =
-        -2 * kPi * unit * unit * (r[0] * t[kForce] + r[1] * t[kForce + 1] + r[2] * t[kForce + 2]);
-    turn[row] =
-        -2 * kPi * unit3 * (r[0] * t[kTorque] + r[1] * t[kTorque + 1] + r[2] * t[kTorque + 2]);
-    if (!(t[kCaps] > 0)) continue;
-    double moment = 0;
-    for (int k = 0; k < 3; ++k) moment += r[k] * (t[kMoment + k] / t[kCaps] + place.a_from_b.t[k]);
-    centre[row] = place.origin_a[row] + unit * moment;
-  }
-  const double* const o = place.offset_b;
-  write3(to.centroid, i, centre[0], centre[1], centre[2]);
-  write3(to.translation_gradient, i, push[0], push[1], push[2]);
-  write3(to.rotation_gradient, i, turn[0] + (o[1] * push[2] - o[2] * push[1]),
-         turn[1] + (o[2] * push[0] - o[0] * push[2]), turn[2] + (o[0] * push[1] - o[1] * push[0]));
+  const WorldSums sums = WorldSums::of(place, totals.term);
+  if (to.volume != nullptr) to.volume[i] = sums.volume;
+  write3(to.centroid, i, sums.centre[0], sums.centre[1], sums.centre[2]);
+  write3(to.translation_gradient, i, sums.push[0], sums.push[1], sums.push[2]);
+  write3(to.rotation_gradient, i, sums.turn[0], sums.turn[1], sums.turn[2]);
   if (to.status != nullptr) to.status[i] = QueryStatus::ok;
   if (to.node_visits != nullptr) to.node_visits[i] = totals.visits;
   if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = totals.spheres;

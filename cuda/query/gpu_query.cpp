@@ -39,12 +39,18 @@ GpuAssets::GpuAssets(std::span<const TreeView> assets, const GpuSettings& settin
       auto* const sums = parts.take<gpu::NodeSum>(more.sums.size());
       auto* const levels = parts.take<gpu::DetailRef>(more.levels.size());
       auto* const filled = parts.take<gpu::FilledBall>(more.filled.size());
+      auto* const cuts = parts.take<gpu::CutNode>(more.cuts.size());
+      auto* const ranks = parts.take<std::uint16_t>(more.ranks.size());
+      impl_->most_bins = std::max(impl_->most_bins, more.most_bins());
       if (from == nullptr) continue;
       gpu::copy_to_device(bytes, &header, header.file_bytes, queue);
       gpu::copy_to_device<gpu::NodeSum>(sums, more.sums, queue);
       gpu::copy_to_device<gpu::DetailRef>(levels, more.levels, queue);
       gpu::copy_to_device<gpu::FilledBall>(filled, more.filled, queue);
-      refs.push_back(more.ref(header, bytes, sums, levels, filled, gpu::first_alike(assets, i)));
+      gpu::copy_to_device<gpu::CutNode>(cuts, more.cuts, queue);
+      gpu::copy_to_device<std::uint16_t>(ranks, more.ranks, queue);
+      refs.push_back(more.ref(header, bytes, {sums, levels, filled, cuts, ranks},
+                              gpu::first_alike(assets, i)));
       impl_->has_details = impl_->has_details || header.detail_count > 0;
     }
     return parts.used();
@@ -109,9 +115,21 @@ std::size_t place_separations(std::byte* from, GpuWorkspace::Impl& room) {
   return parts.used();
 }
 
+/// Rooms of teams take what is left of `bytes`.
+void place_patches(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& room) {
+  gpu::Parts parts(from);
+  gpu::PatchArrays& arrays = room.patches;
+  arrays.pairs.counters = parts.take<gpu::BatchCounters>(1);
+  arrays.pairs.list = parts.take<std::uint32_t>(room.most_pairs);
+  room.patch_room = bytes - parts.used();
+  arrays.rooms = from + parts.used();
+}
+
 /// Sets the room's arrays to parts of the memory at `from`; returns the bytes they take.
 std::size_t place(std::byte* from, GpuWorkspace::Impl& room) {
-  return std::max(place_penetrations(from, room), place_separations(from, room));
+  const std::size_t bytes = std::max(place_penetrations(from, room), place_separations(from, room));
+  place_patches(from, bytes, room);
+  return bytes;
 }
 
 }  // namespace
@@ -126,6 +144,7 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   impl_->grids = gpu::batch_grids();
   impl_->separation_grids = gpu::separation_grids();
   impl_->field_grids = gpu::field_grids();
+  impl_->patch_blocks = gpu::patch_blocks();
   impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr, *impl_));
   place(impl_->memory.data(), *impl_);
   queue.wait();
@@ -184,6 +203,25 @@ void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint3
   batch.max_visits = max_visits == 0 ? ~0u : max_visits;
   const gpu::DeviceGuard guard(room.device);
   gpu::launch_separations(batch, room.separation_grids, stream);
+}
+
+void contact_patches_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
+                           GpuWorkspace& workspace, const GpuPenetrations& answers,
+                           const GpuContactPatches& patches, CUstream_st* stream) {
+  const GpuWorkspace::Impl& room = workspace.impl();
+  gpu::check_batch(pairs, room, assets.device());
+  if (patches.most > kMostGpuPatches)
+    throw Error("GPU: " + std::to_string(patches.most) + " patches a pair; at most " +
+                std::to_string(kMostGpuPatches));
+  if (pairs.count == 0) return;
+  gpu::PatchArrays batch = room.patches;
+  set_pairs(assets.impl(), pairs, batch.pairs);
+  batch.pairs.measure = measure;
+  batch.pairs.answers = answers;
+  batch.patches = patches;
+  batch.most_bins = assets.impl().most_bins;
+  const gpu::DeviceGuard guard(room.device);
+  gpu::launch_patches(batch, room.patch_blocks, room.patch_room, stream);
 }
 
 void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,

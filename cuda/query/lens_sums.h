@@ -88,6 +88,13 @@ IST_HD constexpr int power_of(int term) {
   return term < kForce ? 3 : term < kTorque ? 2 : term < kMoment ? 3 : 4;
 }
 
+/// That power of a factor.
+IST_HD inline double term_factor(double factor, int term) {
+  double out = factor * factor;
+  for (int p = power_of(term); p > 2; --p) out *= factor;
+  return out;
+}
+
 /// Sums of a pair of trees or of a part of it.
 struct LensTotals {
   double term[kTerms];

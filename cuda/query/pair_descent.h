@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "cuda/query/pair_memory.h"
+#include "cuda/query/pair_sums.h"
 #include "numerics/host_device.h"
 
 // Two trees met by one team: the sum that Descent (query/descent/descent.h) makes level by level,
@@ -12,11 +13,15 @@
 
 namespace ist::gpu {
 
-template <class Team>
+/// `Sums`: where lenses go, as PairSums.
+template <class Team, class Sums = PairSums<Team>>
 class PairDescent {
  public:
   /// `memory.place` and `memory.tree` are set.
-  IST_HD PairDescent(const Team& team, PairMemory& memory) : team_(team), m_(memory) {
+  IST_HD PairDescent(const Team& team, PairMemory& memory)
+      : PairDescent(team, memory, Sums(team, memory)) {}
+  IST_HD PairDescent(const Team& team, PairMemory& memory, const Sums& sums)
+      : team_(team), m_(memory), sums_(sums) {
     if (team_.lane() == 0) {
       m_.steps.plan(m_.tree[0], m_.tree[1], m_.place.a_from_b.scale);
       m_.totals.clear();
@@ -34,7 +39,6 @@ class PairDescent {
     }
     for (int n = team_.lane(); n <= static_cast<int>(kWidth); n += Team::kWidth)
       m_.share[n] = n > 0 ? 0xFFFFu / static_cast<unsigned>(n) + 1 : 0;
-    for (float& s : sum_) s = 0;
     team_.sync();
   }
 
@@ -167,8 +171,8 @@ class PairDescent {
       const bool contained = meets && (how & kIntoOne) != 0 && within > 0 && d2 < within * within;
       meets = meets && !contained;
       if (team_.any(contained))
-        add_contained(contained, of_a, static_cast<int>(how >> kLevelBit),
-                      (of_a ? a : b) & kNodeMask);
+        add_contained(contained, of_a, static_cast<int>(how >> kLevelBit), a & kNodeMask,
+                      b & kNodeMask);
     }
     const bool leaf = meets && (how & kToLeaf) != 0;
     int total = 0;
@@ -187,20 +191,21 @@ class PairDescent {
     }
   }
 
-  /// Adds up the spheres below the nodes that lanes flag: each lies in one sphere of the other
-  /// side.
-  IST_HD void add_contained(bool flag, bool of_a, int level, std::uint32_t child) {
+  /// Adds up the spheres below the nodes, A's or B's, that lanes flag: each lies in one sphere of
+  /// the other side.
+  IST_HD void add_contained(bool flag, bool of_a, int level, std::uint32_t a, std::uint32_t b) {
     for (;;) {
       int total = 0;
       const int lane = team_.first(flag, total);
       if (total == 0) return;
       if (team_.lane() == lane) flag = false;
-      const bool a = team_.broadcast(of_a ? 1 : 0, lane) != 0;
-      add_subtree(a, team_.broadcast(level, lane), team_.broadcast(child, lane));
+      const bool is_a = team_.broadcast(of_a ? 1 : 0, lane) != 0;
+      add_subtree(is_a, team_.broadcast(level, lane), team_.broadcast(is_a ? a : b, lane),
+                  team_.broadcast(is_a ? b : a, lane));
     }
   }
 
-  IST_HD void add_subtree(bool of_a, int level, std::uint32_t node) {
+  IST_HD void add_subtree(bool of_a, int level, std::uint32_t node, std::uint32_t other) {
     const TreeRef& tree = m_.tree[of_a ? 0 : 1];
     const std::uint64_t full = std::uint64_t{kWidth} << (4 * level);
     const std::uint64_t all = std::uint64_t{kWidth} * tree.leaf_blocks;
@@ -208,15 +213,18 @@ class PairDescent {
     const std::uint64_t end = begin + full < all ? begin + full : all;
     for (std::uint64_t base = begin; base < end; base += Team::kWidth) {
       const std::uint64_t i = base + static_cast<std::uint64_t>(team_.lane());
+      const auto number = static_cast<std::uint32_t>(i);
+      float(&sum)[kTerms] = sums_.begin();
       bool is_sphere = false;
-      if (i < end && tree.ball(kSphereLevel, static_cast<std::uint32_t>(i)).r > 0) {
+      if (i < end && tree.ball(kSphereLevel, number).r > 0) {
         is_sphere = true;
-        add_ball(seen(of_a, static_cast<std::uint32_t>(i)), m_.unit, sum_);
+        add_ball(seen(of_a, number), m_.unit, sum);
       }
       int total = 0;
       team_.exclusive_count(is_sphere, total);
       spheres_ += static_cast<std::uint32_t>(total);
-      count_sum();
+      sums_.end(is_sphere, of_a ? number : other, of_a ? other : number);
+      if (sums_.full()) fold();
     }
   }
 
@@ -384,44 +392,31 @@ class PairDescent {
     while (listed_ >= full) {
       const int take = listed_ < Team::kWidth ? listed_ : Team::kWidth;
       listed_ -= take;
-      const int k = listed_ + team_.lane();
+      const int k = listed_ + (team_.lane() < take ? team_.lane() : 0);
+      const std::uint32_t number_a = m_.list_a[k], number_b = m_.list_b[k];
+      float(&sum)[kTerms] = sums_.begin();
       bool meets = false;
       if (team_.lane() < take) {
-        const LensBall a = seen(true, m_.list_a[k]);
-        LensBall b = seen(false, m_.list_b[k]);
+        const LensBall a = seen(true, number_a);
+        LensBall b = seen(false, number_b);
         for (int i = 0; i < 3; ++i) b.at[i] -= a.at[i];
-        meets = add_lens(a, b, m_.unit, m_.blur, sum_);
+        meets = add_lens(a, b, m_.unit, m_.blur, sum);
       }
       int total = 0;
       team_.exclusive_count(meets, total);
       spheres_ += static_cast<std::uint32_t>(total);
-      count_sum();
+      sums_.end(meets, number_a, number_b);
+      if (sums_.full()) fold();
     }
-  }
-
-  /// Rounded sums stay short: a lane adds few numbers before they go on in double.
-  IST_HD void count_sum() {
-    if (++summed_ >= 16) fold();
   }
 
   IST_HD void fold() {
-    if (summed_ > 0) {
-      const double back = 1 / m_.unit;
-      for (int k = 0; k < kTerms; ++k) {
-        const double sum = team_.sum(static_cast<double>(sum_[k]));
-        sum_[k] = 0;
-        if (team_.lane() != 0) continue;
-        double factor = back * back;
-        for (int p = power_of(k); p > 2; --p) factor *= back;
-        m_.totals.term[k] += sum * factor;
-      }
-    }
+    sums_.fold();
     if (team_.lane() == 0) {
       m_.totals.spheres += spheres_;
       m_.totals.visits += visits_;
     }
     spheres_ = visits_ = 0;
-    summed_ = 0;
     team_.sync();
   }
 
@@ -431,10 +426,9 @@ class PairDescent {
   const Team& team_;
   PairMemory& m_;
   int size_ = 0, leaves_ = 0, listed_ = 0;
-  int wide_ = 0;               ///< pairs on top of a floor that opening many at once may leave
-  std::uint32_t met_ = 0;      ///< pairs of leaves
-  float sum_[kTerms];          ///< this lane's
-  int summed_ = 0;             ///< numbers in it, at most
+  int wide_ = 0;           ///< pairs on top of a floor that opening many at once may leave
+  std::uint32_t met_ = 0;  ///< pairs of leaves
+  Sums sums_;
   std::uint32_t spheres_ = 0;  ///< the team's
   std::uint32_t visits_ = 0;
 };

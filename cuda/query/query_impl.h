@@ -7,6 +7,7 @@
 #include "cuda/query/batch_kernels.h"
 #include "cuda/query/device_bytes.h"
 #include "cuda/query/field_kernels.h"
+#include "cuda/query/patch_kernels.h"
 #include "cuda/query/separation_kernels.h"
 
 // What the classes of ist/gpu_query.h hold.
@@ -18,7 +19,8 @@ struct GpuAssets::Impl {
   gpu::DeviceBytes memory;
   const gpu::AssetRef* refs = nullptr;
   std::size_t size = 0;
-  bool has_details = false;  ///< some asset has coarser levels
+  bool has_details = false;     ///< some asset has coarser levels
+  std::uint32_t most_bins = 0;  ///< of a tree's contacts
 };
 
 struct GpuWorkspace::Impl {
@@ -27,10 +29,13 @@ struct GpuWorkspace::Impl {
   gpu::BatchGrids grids{};
   gpu::SeparationGrids separation_grids{};
   gpu::FieldGrids field_grids{};
+  int patch_blocks = 0;
   gpu::DeviceBytes memory;
-  // What does not change from batch to batch; penetrations and separations lie in the same memory.
+  // What does not change from batch to batch; all kinds lie in the same memory.
   gpu::BatchArrays arrays{};
   gpu::SeparationArrays separations{};
+  gpu::PatchArrays patches{};
+  std::size_t patch_room = 0;  ///< [bytes] at patches.rooms
   gpu::FieldCounters* field_counters = nullptr;
 };
 

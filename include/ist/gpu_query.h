@@ -11,8 +11,8 @@
 #include <ist/query_enums.h>
 #include <ist/tree_view.h>
 
-// Penetrations and separations of many pairs at once, on a GPU. Assets are uploaded once; poses and
-// answers are arrays in device memory that the caller owns.
+// Penetrations, separations and contact patches of many pairs at once, on a GPU. Assets are
+// uploaded once; poses and answers are arrays in device memory that the caller owns.
 
 namespace IST_API ist {
 
@@ -143,5 +143,43 @@ struct GpuSeparations {
 /// Throws Error where a batch is larger than the workspace, the devices differ or a launch fails.
 void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint32_t max_visits,
                       GpuWorkspace& workspace, const GpuSeparations& answers, CUstream_st* stream);
+
+/// Patches that a pair may be asked for.
+inline constexpr std::uint32_t kMostGpuPatches = 32;
+
+/// Patches, each as ContactPatch: arrays in device memory; null: not wanted.
+///
+/// Those of pair i begin at [i · most], in the order of their ids; what lies beyond the last of
+/// them is not written.
+struct GpuContactPatches {
+  std::uint32_t most = 0;          ///< patches of a pair, up to kMostGpuPatches
+  std::uint32_t* count = nullptr;  ///< [count of pairs] patches written
+  std::uint64_t* id = nullptr;     ///< those of contact_patches()
+  double* centroid = nullptr;      ///< [3] [u] world
+  double* normal = nullptr;        ///< [3] unit, from A to B, world; zero if the area is
+  double* area = nullptr;          ///< [u²] |force|
+  double* depth = nullptr;         ///< [u] volume/area; 0 if no area
+  double* volume = nullptr;        ///< [u³] share of GpuPenetrations::volume
+  double* force = nullptr;         ///< [3] [u²] share of −translation_gradient
+  double* torque = nullptr;        ///< [3] [u³/rad] share of −rotation_gradient
+};
+
+/// answers[i] and its patches = contact_patches(pairs[i]) by lenses (FieldUse::never), without
+/// limits: the contact condensed into at most `patches.most`.
+///
+/// The same regions of the same tree as there, with the same names, unless two divisions are worth
+/// the same to a float's digits.
+/// Answers are those of penetration_batch() to its digits, not its bits; copies of one asset at
+/// nearly the same pose are asked as they are.
+/// Volumes, forces and torques of a pair's patches sum to its answer's to about 1e-15.
+/// The same bits in every run, whatever else is in the batch.
+/// Only launches kernels on `stream`, as penetration_batch(). One warp does a pair: a very large
+/// contact takes it long.
+///
+/// Throws Error where a batch is larger than the workspace, more patches than kMostGpuPatches are
+/// asked for, the devices differ or a launch fails.
+void contact_patches_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
+                           GpuWorkspace& workspace, const GpuPenetrations& answers,
+                           const GpuContactPatches& patches, CUstream_st* stream);
 
 }  // namespace ist

@@ -14,16 +14,13 @@
 namespace ist {
 namespace {
 
-// Solids of fewer leaf blocks than this are too coarse to be divided, if the other is finer.
-constexpr std::uint32_t kFewBlocks = 16;
-
 /// Whether contacts are divided along B's tree: the smaller solid's, whose contacts stay with its
 /// own corners while it slides, or the only one fine enough. The pose has no say.
 bool divides_b(const SphereTree& a, double radius_a, const SphereTree& b, double radius_b) {
   const std::uint32_t blocks_a = a.level[0].count;
   const std::uint32_t blocks_b = b.level[0].count;
   const std::uint32_t fewer = std::min(blocks_a, blocks_b);
-  if (fewer < kFewBlocks && blocks_a != blocks_b) return blocks_b > blocks_a;
+  if (fewer < kFewContactBlocks && blocks_a != blocks_b) return blocks_b > blocks_a;
   return radius_b <= radius_a;
 }
 

@@ -130,6 +130,90 @@ TEST_F(GpuQueryTest, ManyPairsHaveTheSameBitsInEveryRun) {
   expect_same_bits(many.get(), repeated);
 }
 
+/// Of one of a few pairs each: only what is compared is kept.
+class RepeatedPairs {
+ public:
+  RepeatedPairs(const std::vector<BatchPair>& some, std::size_t size)
+      : size_(size),
+        of_(some.size()),
+        a_(column<std::uint32_t>(some, [](const auto& p) { return p.a; })),
+        b_(column<std::uint32_t>(some, [](const auto& p) { return p.b; })),
+        pose_a_(column<Pose>(some, [](const auto& p) { return p.pose_a; })),
+        pose_b_(column<Pose>(some, [](const auto& p) { return p.pose_b; })),
+        scale_a_(column<double>(some, [](const auto& p) { return p.scale_a; })),
+        scale_b_(column<double>(some, [](const auto& p) { return p.scale_b; })) {}
+
+  GpuPairs pairs() const {
+    return {size_,          a_.data(),       b_.data(),      pose_a_.data(),
+            pose_b_.data(), scale_a_.data(), scale_b_.data()};
+  }
+  /// The pair that the i-th is.
+  std::size_t which(std::size_t i) const { return (i * 7919) % of_; }
+
+ private:
+  template <class T, class Get>
+  std::vector<T> column(const std::vector<BatchPair>& some, const Get& get) const {
+    std::vector<T> out;
+    out.reserve(size_);
+    for (std::size_t i = 0; i < size_; ++i) out.push_back(get(some[which(i)]));
+    return out;
+  }
+
+  std::size_t size_, of_;
+  OnDevice<std::uint32_t> a_, b_;
+  OnDevice<Pose> pose_a_, pose_b_;
+  OnDevice<double> scale_a_, scale_b_;
+};
+
+TEST_F(GpuQueryTest, BatchesOfOneAndOfTenMillionAreAnsweredAsOfFew) {
+  const std::vector<BatchPair> some = RandomPairs(18).pairs_at_all_distances(3000);
+  const GpuAssets assets(batch_views());
+  const Stream stream;
+  const auto ask = [&](const RepeatedPairs& of) {
+    const std::size_t n = of.pairs().count;
+    GpuWorkspace workspace(n);
+    const OnDevice<double> volume(n), distance(n), of_patch(n);
+    const OnDevice<QueryStatus> status(n);
+    const OnDevice<std::uint32_t> patches(n);
+    GpuPenetrations overlaps;
+    overlaps.volume = volume.data();
+    overlaps.status = status.data();
+    GpuSeparations gaps;
+    gaps.distance = distance.data();
+    GpuContactPatches one;
+    one.most = 1;
+    one.count = patches.data();
+    one.volume = of_patch.data();
+    penetration_batch(assets, of.pairs(), Measure::matched, workspace, overlaps, stream);
+    separation_batch(assets, of.pairs(), 0, workspace, gaps, stream);
+    contact_patches_batch(assets, of.pairs(), Measure::matched, workspace, {}, one, stream);
+    stream.wait();
+    struct Answers {
+      std::vector<double> volume, distance, of_patch;
+      std::vector<QueryStatus> status;
+      std::vector<std::uint32_t> patches;
+    };
+    return Answers{volume.get(), distance.get(), of_patch.get(), status.get(), patches.get()};
+  };
+  const RepeatedPairs few(some, some.size());
+  const auto expected = ask(few);
+  std::vector<std::size_t> place(some.size());
+  for (std::size_t i = 0; i < some.size(); ++i) place[few.which(i)] = i;
+  for (const std::size_t count : {std::size_t{1}, std::size_t{10'000'000}}) {
+    const RepeatedPairs all(some, count);
+    const auto answers = ask(all);
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t k = place[all.which(i)];
+      wrong += answers.volume[i] != expected.volume[k] ||
+               answers.distance[i] != expected.distance[k] ||
+               answers.status[i] != QueryStatus::ok || answers.patches[i] != expected.patches[k] ||
+               (answers.patches[i] > 0 && answers.of_patch[i] != expected.of_patch[k]);
+    }
+    EXPECT_EQ(wrong, 0u) << count;
+  }
+}
+
 TEST_F(GpuQueryTest, AGraphMayCaptureIt) {
   const std::vector<BatchPair> pairs = RandomPairs(13).pairs(500);
   const GpuAssets assets(batch_views());

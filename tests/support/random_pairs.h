@@ -10,6 +10,7 @@
 
 #include "support/baked.h"
 #include "support/host_batch.h"
+#include "support/patch_columns.h"
 #include "support/test_meshes.h"
 
 namespace ist::testing {
@@ -106,6 +107,28 @@ inline void expect_same_bits(const std::vector<Separation>& x, const std::vector
     EXPECT_EQ(x[i].node_visits, y[i].node_visits) << i;
     EXPECT_EQ(x[i].sphere_pairs, y[i].sphere_pairs) << i;
   }
+}
+
+inline void expect_same_bits(const std::vector<PatchedPair>& x, const std::vector<PatchedPair>& y) {
+  ASSERT_EQ(x.size(), y.size());
+  std::vector<Penetration> wholes[2];
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    wholes[0].push_back(x[i].whole);
+    wholes[1].push_back(y[i].whole);
+    ASSERT_EQ(x[i].patches.size(), y[i].patches.size()) << i;
+    for (std::size_t k = 0; k < x[i].patches.size(); ++k) {
+      const ContactPatch &p = x[i].patches[k], &q = y[i].patches[k];
+      EXPECT_EQ(p.id, q.id) << i;
+      EXPECT_EQ(p.centroid, q.centroid) << i;
+      EXPECT_EQ(p.normal, q.normal) << i;
+      EXPECT_EQ(p.area, q.area) << i;
+      EXPECT_EQ(p.depth, q.depth) << i;
+      EXPECT_EQ(p.volume, q.volume) << i;
+      EXPECT_EQ(p.force, q.force) << i;
+      EXPECT_EQ(p.torque, q.torque) << i;
+    }
+  }
+  expect_same_bits(wholes[0], wholes[1]);
 }
 
 }  // namespace ist::testing

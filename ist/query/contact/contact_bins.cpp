@@ -28,8 +28,7 @@ void ContactBins::start(const SphereTree& tree, bool of_b) noexcept {
   for (std::uint64_t& word : marked_) word = 0;
   tree_ = &tree;
   of_b_ = of_b;
-  level_ = 0;
-  while (tree.level[level_].count > kBins) ++level_;
+  level_ = TreeCuts::bin_level(tree);
 }
 
 void ContactBins::mark(std::uint32_t bin) noexcept {

@@ -5,6 +5,7 @@
 
 #include "query/asset/sphere_tree.h"
 #include "query/base/hooked_memory.h"
+#include "query/contact/tree_cuts.h"
 #include "query/kernel/leaf_kernel.h"
 #include "query/kernel/overlap.h"
 
@@ -18,14 +19,11 @@ struct ContactBin {
   Eigen::Vector3d centre;  ///< of sum's volume; zero if that is 0
 };
 
-/// Part of a contact while it is divided: nodes first + i of `level` for the bits i of `members`,
-/// and the bins below them, order[begin … end).
+/// Part of a contact while it is divided: a region of the tree, and bins, order[begin … end).
 struct ContactPart {
   double loss = 0;  ///< what taking it for one patch loses; the largest is divided next
   std::uint64_t id = 0;
-  std::uint64_t members = 0;
-  std::uint32_t first = 0;
-  int level = 0;
+  TreeRegion region;
   std::uint32_t begin = 0, end = 0;
 };
 
@@ -33,7 +31,7 @@ struct ContactPart {
 /// contact_patches, part of a Workspace. Memory is not touched before use.
 class ContactBins {
  public:
-  static constexpr std::uint32_t kBins = 4096;  ///< 65,536 spheres by leaf blocks
+  static constexpr std::uint32_t kBins = kMostContactBins;
 
   explicit ContactBins(const MemoryHooks& memory);
 

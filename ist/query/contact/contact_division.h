@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "query/contact/contact_bins.h"
+#include "query/contact/tree_cuts.h"
 
 namespace ist {
 
@@ -29,21 +30,10 @@ class ContactDivision {
   /// pulls, and what of the pulls cancels. Never less for a part than for its own parts.
   double loss(const ContactPart& part) const;
 
-  /// Goes down to the first nodes among which there is something to choose; false if none.
-  bool open(ContactPart& part) const;
-
-  /// The members on one side of where they fall apart. The tree alone decides.
-  std::uint64_t cut(const ContactPart& part) const;
-
-  /// First leaf block of the members and how many there are: unique among sets of which any two are
-  /// nested or apart.
-  std::uint64_t id(const ContactPart& part) const;
-
   /// Divides `part` into itself and `other`. False if there was nothing to divide.
   bool divide(ContactPart& part, ContactPart& other);
 
-  const SphereTree& tree_;
-  const int bin_level_;
+  const TreeCuts cuts_;
   const ContactBin* const bins_;
   ContactPart* const parts_;
   std::uint32_t* const order_;

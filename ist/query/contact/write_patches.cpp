@@ -62,11 +62,9 @@ std::size_t write_patches(const Binned& binned, const Penetration& whole,
 }
 
 void finish_patches(std::span<ContactPatch> patches, double deepest) noexcept {
-  // What lies wholly inside is pushed nowhere but by rounding.
-  constexpr double kRounding = 1e-9;
   for (ContactPatch& patch : patches) {
     const double area = patch.force.norm();
-    if (!(area > kRounding * std::cbrt(patch.volume * patch.volume))) continue;
+    if (!(area > kPushRounding * std::cbrt(patch.volume * patch.volume))) continue;
     patch.area = area;
     patch.normal = patch.force / patch.area;
     patch.depth = std::min(patch.volume / patch.area, deepest);

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+
+#include "cuda/query/pair_memory.h"
+#include "numerics/host_device.h"
+
+namespace ist::gpu {
+
+/// Where a descent's lenses go: into one sum, the pair's.
+template <class Team>
+class PairSums {
+ public:
+  IST_HD PairSums(const Team& team, PairMemory& memory) : team_(team), m_(memory) {
+    for (float& s : sum_) s = 0;
+  }
+
+  /// Where the next lenses of this lane are added to.
+  IST_HD float (&begin())[kTerms] { return sum_; }
+  /// They are the spheres of these numbers, if `flag`. Together.
+  IST_HD void end(bool, std::uint32_t, std::uint32_t) { ++summed_; }
+
+  /// Rounded sums stay short: a lane adds few numbers before they go on in double.
+  IST_HD bool full() const { return summed_ >= 16; }
+
+  IST_HD void fold() {
+    if (summed_ > 0) {
+      const double back = 1 / m_.unit;
+      for (int k = 0; k < kTerms; ++k) {
+        const double sum = team_.sum(static_cast<double>(sum_[k]));
+        sum_[k] = 0;
+        if (team_.lane() != 0) continue;
+        m_.totals.term[k] += sum * term_factor(back, k);
+      }
+    }
+    summed_ = 0;
+  }
+
+ private:
+  const Team& team_;
+  PairMemory& m_;
+  float sum_[kTerms];  ///< this lane's
+  int summed_ = 0;     ///< numbers in it, at most
+};
+
+}  // namespace ist::gpu

@@ -1,0 +1,57 @@
+#include "cuda/query/patch_kernels.h"
+
+#include <algorithm>
+
+#include "cuda/check.h"
+#include "cuda/launch.h"
+#include "cuda/query/by_warps.h"
+#include "cuda/query/patch_steps.h"
+#include "cuda/warp_team.h"
+
+namespace ist::gpu {
+namespace {
+
+constexpr unsigned kSiftThreads = 256;
+constexpr unsigned kWarps = 2;
+constexpr unsigned kThreads = 32 * kWarps;
+constexpr int kBlocksEach = 8;  ///< a multiprocessor; there is no memory for more
+
+/// Places every pair and lists those whose roots meet.
+__global__ void __launch_bounds__(kSiftThreads) sift_contacts(const PatchArrays batch) {
+  const WarpTeam team;
+  const std::uint64_t i = std::uint64_t{blockIdx.x} * kSiftThreads + threadIdx.x;
+  const bool sums =
+      i < batch.pairs.pairs.count && sift_patches(batch, static_cast<std::uint32_t>(i));
+  const std::uint32_t place = list_place(team, sums, &batch.pairs.counters->listed);
+  if (sums) batch.pairs.list[place] = static_cast<std::uint32_t>(i);
+}
+
+__global__ void __launch_bounds__(kThreads, kBlocksEach) divide_contacts(const PatchArrays batch) {
+  __shared__ PatchMemory memory[kWarps];
+  const unsigned warp = threadIdx.x / 32;
+  const PatchRoom room = batch.room(blockIdx.x * kWarps + warp);
+  BatchCounters& counters = *batch.pairs.counters;
+  by_warps(load_fresh(&counters.listed), &counters.taken,
+           [&](const WarpTeam& team, std::uint32_t k) {
+             patch_pair(team, batch, batch.pairs.list[k], room, memory[warp]);
+           });
+}
+
+}  // namespace
+
+int patch_blocks() { return blocks_at_a_time(divide_contacts, kThreads); }
+
+void launch_patches(const PatchArrays& batch, int blocks, std::size_t room_bytes,
+                    cudaStream_t stream) {
+  check(cudaMemsetAsync(batch.pairs.counters, 0, sizeof(BatchCounters), stream),
+        "starting a batch");
+  const std::size_t pairs = batch.pairs.pairs.count;
+  sift_contacts<<<blocks_for(pairs, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
+  check_launch("placing pairs of trees");
+  const std::size_t fit = room_bytes / (kWarps * PatchRoom::bytes(batch.most_bins));
+  const auto at_a_time = static_cast<unsigned>(std::min(fit, static_cast<std::size_t>(blocks)));
+  divide_contacts<<<at_a_time, kThreads, 0, stream>>>(batch);
+  check_launch("dividing contacts into patches");
+}
+
+}  // namespace ist::gpu
