@@ -113,3 +113,38 @@ def separation(
     wanted: Sequence[_Gap] | None = None,
     out: Mapping[_Gap, _DeviceArray] | Separation | None = None, stream: _Stream = None,
 ) -> Separation: ...
+
+@final
+class ContactPatches:
+    @property
+    def count(self) -> _DeviceArray | None: ...  # (n,)
+    @property
+    def id(self) -> _DeviceArray | None: ...  # (n, m) uint64
+    @property
+    def centroid(self) -> _DeviceArray | None: ...  # (n, m, 3) [u]
+    @property
+    def normal(self) -> _DeviceArray | None: ...  # (n, m, 3) unit, from A to B
+    @property
+    def area(self) -> _DeviceArray | None: ...  # (n, m) [u²]
+    @property
+    def depth(self) -> _DeviceArray | None: ...  # (n, m) [u]
+    @property
+    def volume(self) -> _DeviceArray | None: ...  # (n, m) [u³]
+    @property
+    def force(self) -> _DeviceArray | None: ...  # (n, m, 3) [u²]
+    @property
+    def torque(self) -> _DeviceArray | None: ...  # (n, m, 3) [u³/rad]
+    @property
+    def status(self) -> _DeviceArray | None: ...  # (n,) QueryStatus
+
+_Patch = Literal[
+    "count", "id", "centroid", "normal", "area", "depth", "volume", "force", "torque", "status",
+]
+
+def contact_patches(
+    assets: Assets, asset_a: _DeviceArray | int, asset_b: _DeviceArray | int,
+    pose_a: _DeviceArray | None, pose_b: _DeviceArray | None, scale_a: _DeviceArray | None = None,
+    scale_b: _DeviceArray | None = None, *, max_patches: int = 8,
+    measure: Literal["matched", "inner"] = "matched", wanted: Sequence[_Patch] | None = None,
+    out: Mapping[_Patch, _DeviceArray] | ContactPatches | None = None, stream: _Stream = None,
+) -> ContactPatches: ...

@@ -135,6 +135,11 @@ std::shared_ptr<Block> allocate(int device, std::size_t bytes, Stream stream) {
   return std::make_shared<Block>(device, allocated(bytes, stream));
 }
 
+void clear(const Block& block, std::size_t bytes, Stream stream) {
+  const DeviceGuard guard(block.device());
+  check(cudaMemsetAsync(block.data(), 0, bytes, stream), "clearing device memory");
+}
+
 Repeated::Repeated(int device, std::uint32_t number, std::size_t count, Stream stream)
     : device_(device), stream_(stream) {
   if (count == 0) return;

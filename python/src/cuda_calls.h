@@ -57,6 +57,9 @@ class Block {
 /// Usable by `stream` from now on.
 std::shared_ptr<Block> allocate(int device, std::size_t bytes, Stream stream);
 
+/// Sets so many bytes to zero, when the stream comes to it.
+void clear(const Block& block, std::size_t bytes, Stream stream);
+
 /// `count` times the same number, for work that the stream is given while this lives.
 class Repeated {
  public:

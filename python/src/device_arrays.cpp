@@ -38,8 +38,10 @@ std::string text_of(const WantedArray& wanted, int device) {
   std::string text;
   for (const ElementType& type : wanted.types)
     text += (text.empty() ? "" : " or ") + name_of(data_type(type));
-  text += wanted.width == 0 ? " (n,)" : " (n, " + std::to_string(wanted.width) + ")";
-  return text + " on CUDA device " + std::to_string(device);
+  text += " (n,";
+  for (std::size_t k = 0; k < wanted.inner_shape.size(); ++k)
+    text += (k == 0 ? " " : ", ") + std::to_string(wanted.inner_shape[k]);
+  return text + ") on CUDA device " + std::to_string(device);
 }
 
 /// An array as its framework describes it.
@@ -199,8 +201,10 @@ LentArray lend(const py::object& value, const WantedArray& wanted, int device,
   if (!right_type)
     throw py::type_error(wanted.name + ": dtype " + name_of(array.type) + "; wanted " +
                          text_of(wanted, device));
-  const std::size_t dims = wanted.width == 0 ? 1 : 2;
-  if (array.shape.size() != dims || (dims == 2 && array.shape[1] != wanted.width))
+  const bool right_shape =
+      !array.shape.empty() && std::equal(array.shape.begin() + 1, array.shape.end(),
+                                         wanted.inner_shape.begin(), wanted.inner_shape.end());
+  if (!right_shape)
     throw py::value_error(wanted.name + ": shape " +
                           text_of(Shape(array.shape.begin(), array.shape.end())) + "; wanted " +
                           text_of(wanted, device));

@@ -29,12 +29,14 @@ struct ElementType {
 inline constexpr ElementType kFloat64 = {dlpack::kFloat, 64};
 inline constexpr ElementType kUInt32 = {dlpack::kUInt, 32};
 inline constexpr ElementType kInt32 = {dlpack::kInt, 32};
+inline constexpr ElementType kUInt64 = {dlpack::kUInt, 64};
+inline constexpr ElementType kInt64 = {dlpack::kInt, 64};
 
 /// What an argument is to be.
 struct WantedArray {
-  std::string name;                ///< of the argument, for messages
-  std::vector<ElementType> types;  ///< any of them
-  int width = 0;                   ///< (n, width); 0: (n,)
+  std::string name;                       ///< of the argument, for messages
+  std::vector<ElementType> types;         ///< any of them
+  std::vector<std::int64_t> inner_shape;  ///< (n, inner shape)
   bool written = false;
 };
 

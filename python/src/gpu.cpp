@@ -68,11 +68,13 @@ void add_gpu(py::module_& package) {
       py::arg("device") = 0, "What is missing where available() is False; None where it is True.");
   add_gpu_penetration(module);
   add_gpu_separation(module);
+  add_gpu_patches(module);
   // So that arguments can be tried where there is no device.
   module.def(
       "_lend",
       [](const py::object& value, const std::string& name, int width, bool written, int device) {
-        return lend(value, {name, {kFloat64}, width, written}, device, cuda::legacy_stream()).rows;
+        return lend(value, {name, {kFloat64}, {width}, written}, device, cuda::legacy_stream())
+            .rows;
       },
       py::arg("value"), py::arg("name"), py::arg("width"), py::arg("written") = false,
       py::arg("device") = 0);

@@ -1,11 +1,6 @@
 #pragma once
 
-#include <ist/error.h>
-#include <ist/gpu_fields.h>
-#include <ist/gpu_query.h>
-
 #include <algorithm>
-#include <deque>
 #include <memory>
 #include <span>
 #include <string>
@@ -14,105 +9,11 @@
 #include <vector>
 
 #include "device_arrays.h"
-#include "solids.h"
+#include "gpu_solids.h"
 
-// What all batches on a device share: assets, arguments that describe pairs, columns of answers.
+// What all batches on a device share: arguments that describe pairs, columns of answers.
 
 namespace ist::python {
-
-/// Assets on a device, and what their batches work in.
-class DeviceAssets {
- public:
-  DeviceAssets(const py::sequence& assets, int device) {
-    std::vector<TreeView> views;
-    for (const py::handle asset : assets) views.push_back(tree_of(asset, "assets"));
-    const std::vector<py::object> held(assets.begin(), assets.end());
-    const py::gil_scoped_release released;
-    GpuSettings settings;
-    settings.device = device;
-    assets_ = std::make_unique<GpuAssets>(views, settings);
-  }
-
-  ~DeviceAssets() {
-    if (in_flight_.empty()) return;
-    const py::gil_scoped_release released;
-    in_flight_.back().done->wait();  // what they read is about to go
-  }
-
-  const GpuAssets& assets() const { return *assets_; }
-
-  /// Launches a batch after those before it, on whatever streams they were. Returns when it will
-  /// be done, or null where the stream's work goes into a graph.
-  ///
-  /// `lent`: what the batch reads and writes, kept until it is done. `batch`: launches it.
-  template <class Launch>
-  std::shared_ptr<const cuda::Moment> launch(const GpuPairs& pairs, cuda::Stream stream,
-                                             std::vector<std::shared_ptr<void>> lent,
-                                             const Launch& batch) {
-    const int device = assets_->device();
-    const bool captured = cuda::captures(device, stream);
-    if (workspace_ == nullptr || workspace_->most_pairs() < pairs.count) {
-      if (captured)
-        throw Error("GPU: a batch of " + std::to_string(pairs.count) +
-                    " pairs is captured, and none so large was asked before: ask once without "
-                    "capturing");
-      make_room(pairs.count);
-    }
-    if (!captured && !in_flight_.empty()) in_flight_.back().done->hold(stream);
-    batch(*assets_, *workspace_);
-    if (captured) {
-      workspace_captured_ = true;
-      return nullptr;
-    }
-    while (!in_flight_.empty() && in_flight_.front().done->passed()) in_flight_.pop_front();
-    in_flight_.push_back({std::make_shared<cuda::Moment>(device, stream), std::move(lent)});
-    return in_flight_.back().done;
-  }
-
- private:
-  struct Batch {
-    std::shared_ptr<const cuda::Moment> done;
-    std::vector<std::shared_ptr<void>> lent;
-  };
-
-  void make_room(std::size_t pairs) {
-    GpuSettings settings;
-    settings.device = assets_->device();
-    if (!in_flight_.empty()) in_flight_.back().done->wait();
-    // A graph that was captured uses the old one as long as these assets.
-    if (workspace_captured_) captured_.push_back(std::move(workspace_));
-    workspace_captured_ = false;
-    workspace_ = nullptr;
-    std::size_t most = 4096;
-    while (most < pairs) most *= 2;
-    workspace_ = std::make_unique<GpuWorkspace>(most, settings);
-  }
-
-  std::unique_ptr<GpuAssets> assets_;
-  std::unique_ptr<GpuWorkspace> workspace_;
-  bool workspace_captured_ = false;
-  std::vector<std::unique_ptr<GpuWorkspace>> captured_;
-  std::deque<Batch> in_flight_;
-};
-
-/// Fields on a device. Batches that read them hold them until they are done.
-class DeviceFields {
- public:
-  DeviceFields(const py::sequence& fields, int device) {
-    std::vector<Field> all;
-    for (const py::handle field : fields) all.push_back(field_of(field, "fields"));
-    const std::vector<py::object> held(fields.begin(), fields.end());
-    const py::gil_scoped_release released;
-    GpuSettings settings;
-    settings.device = device;
-    fields_ = std::make_unique<GpuFields>(all, settings);
-  }
-
-  const GpuFields& fields() const { return *fields_; }
-
- private:
-  std::unique_ptr<GpuFields> fields_;
-};
 
 /// A column that a batch can write.
 template <class Answers>
@@ -123,6 +24,16 @@ struct Answer {
   void (*set)(Answers& to, void* data);
   const char* doc;
   bool unasked;  ///< written where nobody says what is wanted
+  /// Rows for each pair; null: one, without a dimension of its own.
+  std::uint32_t (*each)(const Answers&) = nullptr;
+
+  /// Of a pair's part of the column. `to`: how it is asked.
+  std::vector<std::int64_t> inner_shape(const Answers& to) const {
+    std::vector<std::int64_t> shape;
+    if (each != nullptr) shape.push_back(each(to));
+    if (width != 0) shape.push_back(width);
+    return shape;
+  }
 };
 
 template <auto kColumn, class Answers>
@@ -166,18 +77,18 @@ class PairArguments {
   void take_pose(const py::object& value, const char* name, const Pose*& to) {
     if (value.is_none()) return;
     static_assert(sizeof(Pose) == 7 * sizeof(double));
-    to = static_cast<const Pose*>(take(value, {name, {kFloat64}, 7, false}));
+    to = static_cast<const Pose*>(take(value, {name, {kFloat64}, {7}, false}));
   }
   void take_scale(const py::object& value, const char* name, const double*& to) {
     if (!value.is_none())
-      to = static_cast<const double*>(take(value, {name, {kFloat64}, 0, false}));
+      to = static_cast<const double*>(take(value, {name, {kFloat64}, {}, false}));
   }
   /// Numbers of solids, of which there are `size`; one for all is kept until the number of rows is
   /// known.
   void take_numbers(const py::object& value, const char* name, std::size_t size, const char* kind,
                     const std::uint32_t*& to) {
     if (!py::isinstance<py::int_>(value)) {
-      to = static_cast<const std::uint32_t*>(take(value, {name, {kUInt32, kInt32}, 0, false}));
+      to = static_cast<const std::uint32_t*>(take(value, {name, {kUInt32, kInt32}, {}, false}));
       return;
     }
     const auto number = value.cast<std::int64_t>();
@@ -244,10 +155,10 @@ struct Places {
   DeviceAnswers<Answers> found;
 };
 
-/// Arrays of ours, all in one block.
+/// Arrays of ours, all in one block. `blank`: how it is asked, without arrays.
 template <class Answers>
-Places<Answers> new_columns(const std::vector<bool>& wanted, std::size_t count, int device,
-                            cuda::Stream stream) {
+Places<Answers> new_columns(const Answers& blank, const std::vector<bool>& wanted,
+                            std::size_t count, int device, cuda::Stream stream) {
   if (cuda::captures(device, stream))
     throw py::value_error(
         "out: None; wanted arrays for the answers, as the stream is captured and a graph's own "
@@ -258,19 +169,22 @@ Places<Answers> new_columns(const std::vector<bool>& wanted, std::size_t count, 
   std::vector<std::size_t> begin;
   for (std::size_t k = 0; k < columns.size(); ++k) {
     begin.push_back(bytes);
-    const auto width = static_cast<std::size_t>(std::max(1, columns[k].width));
-    if (wanted[k])
-      bytes += (count * width * columns[k].type.bytes() + kAlign - 1) / kAlign * kAlign;
+    std::size_t each = columns[k].type.bytes();
+    for (const std::int64_t n : columns[k].inner_shape(blank)) each *= static_cast<std::size_t>(n);
+    if (wanted[k]) bytes += (count * each + kAlign - 1) / kAlign * kAlign;
   }
   const auto block = cuda::allocate(device, std::max(bytes, kAlign), stream);
-  Places<Answers> places;
+  const bool all_written = std::all_of(columns.begin(), columns.end(),
+                                       [](const auto& column) { return column.each == nullptr; });
+  if (!all_written) cuda::clear(*block, bytes, stream);
+  Places<Answers> places{blank, {}};
   for (std::size_t k = 0; k < columns.size(); ++k) {
     if (!wanted[k]) continue;
     DeviceArray array;
     array.block = block;
     array.data = block->data() + begin[k];
     array.shape = {static_cast<std::int64_t>(count)};
-    if (columns[k].width != 0) array.shape.push_back(columns[k].width);
+    for (const std::int64_t n : columns[k].inner_shape(blank)) array.shape.push_back(n);
     array.type = columns[k].type;
     columns[k].set(places.to, array.data);
     places.found.column[k] = py::cast(std::move(array));
@@ -280,10 +194,11 @@ Places<Answers> new_columns(const std::vector<bool>& wanted, std::size_t count, 
 
 /// The arrays that were given.
 template <class Answers>
-Places<Answers> given_columns(const py::object& out, std::size_t count, int device,
-                              cuda::Stream stream, std::vector<std::shared_ptr<void>>& lent) {
+Places<Answers> given_columns(const Answers& blank, const py::object& out, std::size_t count,
+                              int device, cuda::Stream stream,
+                              std::vector<std::shared_ptr<void>>& lent) {
   const auto columns = columns_of<Answers>();
-  Places<Answers> places;
+  Places<Answers> places{blank, {}};
   if (py::isinstance<DeviceAnswers<Answers>>(out)) {
     places.found = out.cast<const DeviceAnswers<Answers>&>();
   } else if (py::isinstance<py::dict>(out)) {
@@ -296,9 +211,12 @@ Places<Answers> given_columns(const py::object& out, std::size_t count, int devi
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const py::object& given = places.found.column[k];
     if (!given) continue;
-    WantedArray wanted{
-        std::string("out['") + columns[k].name + "']", {columns[k].type}, columns[k].width, true};
+    WantedArray wanted{std::string("out['") + columns[k].name + "']",
+                       {columns[k].type},
+                       columns[k].inner_shape(blank),
+                       true};
     if (columns[k].type == kUInt32) wanted.types.push_back(kInt32);
+    if (columns[k].type == kUInt64) wanted.types.push_back(kInt64);
     LentArray array = lend(given, wanted, device, stream);
     if (array.rows != static_cast<std::int64_t>(count))
       throw py::value_error(wanted.name + ": " + std::to_string(array.rows) +
@@ -316,9 +234,11 @@ struct GivenPairs {
 };
 
 /// Takes all arguments and launches a batch: launch(assets, pairs, workspace, answers, stream).
+/// `blank`: answers without arrays.
 template <class Answers, class Launch>
-DeviceAnswers<Answers> ask(DeviceAssets& assets, const GivenPairs& given, const py::object& wanted,
-                           const py::object& out, const py::object& stream, const Launch& launch) {
+DeviceAnswers<Answers> ask(DeviceAssets& assets, const GivenPairs& given, const Answers& blank,
+                           const py::object& wanted, const py::object& out,
+                           const py::object& stream, const Launch& launch) {
   const cuda::Stream on = stream_of(stream);
   const int device = assets.assets().device();
   PairArguments arguments(device, on);
@@ -339,8 +259,8 @@ DeviceAnswers<Answers> ask(DeviceAssets& assets, const GivenPairs& given, const 
   if (!out.is_none() && !wanted.is_none())
     throw py::value_error("wanted: the arrays of `out` say what is wanted already");
   Places<Answers> places =
-      out.is_none() ? new_columns<Answers>(wanted_columns<Answers>(wanted), pairs.count, device, on)
-                    : given_columns<Answers>(out, pairs.count, device, on, arguments.lent);
+      out.is_none() ? new_columns(blank, wanted_columns<Answers>(wanted), pairs.count, device, on)
+                    : given_columns(blank, out, pairs.count, device, on, arguments.lent);
   const auto done = assets.launch(pairs, on, std::move(arguments.lent),
                                   [&](const GpuAssets& all, GpuWorkspace& workspace) {
                                     launch(all, pairs, workspace, places.to, on);

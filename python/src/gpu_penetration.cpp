@@ -40,8 +40,8 @@ DeviceAnswers<GpuPenetrations> penetrations(DeviceAssets& assets, const py::obje
                           "; pairs of fields have none");
   const DeviceFields* const solids = fields.get();
   return ask<GpuPenetrations>(
-      assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, std::move(fields)}, wanted, out,
-      stream,
+      assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, std::move(fields)}, {}, wanted,
+      out, stream,
       [&](const GpuAssets& all, const GpuPairs& pairs, GpuWorkspace& workspace,
           const GpuPenetrations& to, cuda::Stream on) {
         if (solids != nullptr)

@@ -36,7 +36,8 @@ DeviceAnswers<GpuSeparations> separations(DeviceAssets& assets, const py::object
                                           const py::object& wanted, const py::object& out,
                                           const py::object& stream) {
   return ask<GpuSeparations>(
-      assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, nullptr}, wanted, out, stream,
+      assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, nullptr}, {}, wanted, out,
+      stream,
       [&](const GpuAssets& all, const GpuPairs& pairs, GpuWorkspace& workspace,
           const GpuSeparations& to,
           cuda::Stream on) { separation_batch(all, pairs, max_visits, workspace, to, on); });

@@ -14,6 +14,7 @@
 #include "emulated_device.h"
 #include "support/host_batch.h"
 #include "support/host_field_batch.h"
+#include "support/host_patches.h"
 #include "support/host_separations.h"
 
 namespace ist {
@@ -196,6 +197,36 @@ void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint3
           put(to.node_visits, i, found[i].node_visits);
           put(to.sphere_pairs, i, found[i].sphere_pairs);
         }
+      });
+}
+
+void contact_patches_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
+                           GpuWorkspace& workspace, const GpuPenetrations& whole,
+                           const GpuContactPatches& to, CUstream_st* stream) {
+  launch(
+      assets, pairs, workspace, stream,
+      [measure, most = to.most](const auto& solids, const auto& rows) {
+        return testing::HostPatches(solids).run(rows, measure, most);
+      },
+      [whole, to](const std::vector<testing::PatchedPair>& found) {
+        std::vector<Penetration> wholes;
+        for (std::size_t i = 0; i < found.size(); ++i) {
+          wholes.push_back(found[i].whole);
+          put(to.count, i, static_cast<std::uint32_t>(found[i].patches.size()));
+          for (std::size_t k = 0; k < found[i].patches.size(); ++k) {
+            const ContactPatch& patch = found[i].patches[k];
+            const std::size_t at = i * to.most + k;
+            put(to.id, at, patch.id);
+            put(to.centroid, at, patch.centroid);
+            put(to.normal, at, patch.normal);
+            put(to.area, at, patch.area);
+            put(to.depth, at, patch.depth);
+            put(to.volume, at, patch.volume);
+            put(to.force, at, patch.force);
+            put(to.torque, at, patch.torque);
+          }
+        }
+        write(wholes, whole);
       });
 }
 

@@ -95,6 +95,10 @@ std::shared_ptr<Block> allocate(int device, std::size_t bytes, Stream) {
   return std::make_shared<Block>(device, data);
 }
 
+void clear(const Block& block, std::size_t bytes, Stream stream) {
+  add(stream, {[data = block.data(), bytes] { std::memset(data, 0, bytes); }, nullptr, nullptr});
+}
+
 Repeated::Repeated(int device, std::uint32_t number, std::size_t count, Stream stream)
     : device_(device), stream_(stream), data_(std::malloc(std::max<std::size_t>(1, 4 * count))) {
   std::fill_n(static_cast<std::uint32_t*>(data_), count, number);

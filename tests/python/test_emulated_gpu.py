@@ -134,6 +134,42 @@ def test_separations_are_those_of_the_cpu(solids, arguments):
                            wanted=["volume"])
 
 
+def test_patches_are_those_of_the_cpu(solids, arguments):
+    arguments["pose_b"][3, 5] = np.nan
+    assets = ist.gpu.Assets(solids)
+    given = {n: OnDevice(x.copy()) for n, x in arguments.items()}
+    found = ist.gpu.contact_patches(assets, **given, max_patches=4)
+    ours = {name: getattr(found, name).numpy() for name in (
+        "count", "id", "centroid", "normal", "area", "depth", "volume", "force", "torque", "status")}
+    assert ours["id"].shape == (40, 4) and ours["id"].dtype == np.uint64
+    assert ours["force"].shape == (40, 4, 3) and ours["count"].max() == 4 and ours["status"][3] == 2
+    whole = ask(assets, arguments)
+    assert ours["volume"].sum(1) == pytest.approx(whole.volume.numpy(), rel=1e-5)
+    for i, (a, b, pose_a, pose_b, scale_a, scale_b) in enumerate(zip(*arguments.values())):
+        one = ist.contact_patches(solids[a], solids[b], pose_b, poses_a=pose_a, scales=scale_b,
+                                  scales_a=scale_a, max_patches=4, field="never")
+        n = int(one.count)
+        assert ours["count"][i] == n
+        assert (ours["id"][i, :n] == one.id[:n]).all() and not ours["volume"][i, n:].any()
+        for name, power in dict(centroid=1, area=2, volume=3, force=2, torque=3).items():
+            size = max(1, np.abs(getattr(one, name)).max())
+            assert np.abs(ours[name][i, :n] - getattr(one, name)[:n]).max(initial=0) <= 1e-4 * size, name
+    out = dict(volume=kept(np.full((40, 2), 7.0)), id=kept(np.zeros((40, 2), np.int64)))
+    again = ist.gpu.contact_patches(assets, **given, max_patches=2, out=out)
+    assert again.volume is out["volume"] and again.count is None
+    del found
+    ask(assets, arguments).volume.numpy()
+    assert out["volume"].array[3, 0] == 7 and (out["volume"].array[:, 0] > 0).all()
+    for wrong, error, text in [
+            (dict(max_patches=0), ValueError, "max_patches: 0; wanted 1 to 32"),
+            (dict(max_patches=33), ValueError, "max_patches: 33; wanted 1 to 32"),
+            (dict(max_patches=3, out=out), ValueError,
+             r"out\['.*'\]: shape \(40, 2\); wanted .* \(n, 3\) on CUDA"),
+            (dict(wanted=["distance"]), ValueError, "wanted: 'distance'; there are 'count', 'id'")]:
+        with pytest.raises(error, match=text):
+            ist.gpu.contact_patches(assets, **given, **wrong)
+
+
 @pytest.fixture(scope="module")
 def some_fields(knot):
     heights = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 8)).astype(np.float32)

@@ -172,6 +172,29 @@ def test_separations_are_those_of_the_cpu(solids, assets, pairs):
     assert found.normal.shape == (3000, 3) and found.node_visits is None
 
 
+def test_patches_are_those_of_the_cpu(solids, assets, pairs):
+    arguments = pairs(2000)
+    arguments["pose_b"][10, 3] = np.nan
+    names = ("count", "id", "volume", "force", "centroid", "status")
+    ours = host(ist.gpu.contact_patches(assets, **on_card(arguments), max_patches=4), names)
+    assert ours["status"][10] == 2 and ours["count"][10] == 0
+    other_regions = 0
+    for a, b, rows in kinds(arguments):
+        theirs = ist.contact_patches(
+            solids[a], solids[b], arguments["pose_b"][rows], poses_a=arguments["pose_a"][rows],
+            scales=arguments["scale_b"][rows], scales_a=arguments["scale_a"][rows], max_patches=4,
+            field="never")
+        alike = (ours["id"][rows] == theirs.id).all(1)  # unless two divisions are worth the same
+        other_regions += (~alike).sum()
+        for name in ("volume", "force", "centroid"):
+            column = getattr(theirs, name)[alike]
+            error = np.abs(ours[name][rows][alike] - column).max(initial=0)
+            assert error <= 1e-4 * np.abs(column).max(initial=1), name
+    assert other_regions <= 4
+    whole = host(ist.gpu.penetration(assets, **on_card(arguments)))
+    assert np.abs(ours["volume"].sum(1) - whole["volume"]).max() <= 1e-5 * whole["volume"].max()
+
+
 def test_arguments_may_be_left_out(assets, pairs):
     arguments = on_card(pairs(500))
     for name in ("asset_a", "asset_b"):

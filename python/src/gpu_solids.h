@@ -1,0 +1,115 @@
+#pragma once
+
+#include <ist/error.h>
+#include <ist/gpu_fields.h>
+#include <ist/gpu_query.h>
+
+#include <cstddef>
+#include <deque>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cuda_calls.h"
+#include "solids.h"
+
+// What batches on a device ask about.
+
+namespace ist::python {
+
+/// Assets on a device, and what their batches work in.
+class DeviceAssets {
+ public:
+  DeviceAssets(const py::sequence& assets, int device) {
+    std::vector<TreeView> views;
+    for (const py::handle asset : assets) views.push_back(tree_of(asset, "assets"));
+    const std::vector<py::object> held(assets.begin(), assets.end());
+    const py::gil_scoped_release released;
+    GpuSettings settings;
+    settings.device = device;
+    assets_ = std::make_unique<GpuAssets>(views, settings);
+  }
+
+  ~DeviceAssets() {
+    if (in_flight_.empty()) return;
+    const py::gil_scoped_release released;
+    in_flight_.back().done->wait();  // what they read is about to go
+  }
+
+  const GpuAssets& assets() const { return *assets_; }
+
+  /// Launches a batch after those before it, on whatever streams they were. Returns when it will
+  /// be done, or null where the stream's work goes into a graph.
+  ///
+  /// `lent`: what the batch reads and writes, kept until it is done. `batch`: launches it.
+  template <class Launch>
+  std::shared_ptr<const cuda::Moment> launch(const GpuPairs& pairs, cuda::Stream stream,
+                                             std::vector<std::shared_ptr<void>> lent,
+                                             const Launch& batch) {
+    const int device = assets_->device();
+    const bool captured = cuda::captures(device, stream);
+    if (workspace_ == nullptr || workspace_->most_pairs() < pairs.count) {
+      if (captured)
+        throw Error("GPU: a batch of " + std::to_string(pairs.count) +
+                    " pairs is captured, and none so large was asked before: ask once without "
+                    "capturing");
+      make_room(pairs.count);
+    }
+    if (!captured && !in_flight_.empty()) in_flight_.back().done->hold(stream);
+    batch(*assets_, *workspace_);
+    if (captured) {
+      workspace_captured_ = true;
+      return nullptr;
+    }
+    while (!in_flight_.empty() && in_flight_.front().done->passed()) in_flight_.pop_front();
+    in_flight_.push_back({std::make_shared<cuda::Moment>(device, stream), std::move(lent)});
+    return in_flight_.back().done;
+  }
+
+ private:
+  struct Batch {
+    std::shared_ptr<const cuda::Moment> done;
+    std::vector<std::shared_ptr<void>> lent;
+  };
+
+  void make_room(std::size_t pairs) {
+    GpuSettings settings;
+    settings.device = assets_->device();
+    if (!in_flight_.empty()) in_flight_.back().done->wait();
+    // A graph that was captured uses the old one as long as these assets.
+    if (workspace_captured_) captured_.push_back(std::move(workspace_));
+    workspace_captured_ = false;
+    workspace_ = nullptr;
+    std::size_t most = 4096;
+    while (most < pairs) most *= 2;
+    workspace_ = std::make_unique<GpuWorkspace>(most, settings);
+  }
+
+  std::unique_ptr<GpuAssets> assets_;
+  std::unique_ptr<GpuWorkspace> workspace_;
+  bool workspace_captured_ = false;
+  std::vector<std::unique_ptr<GpuWorkspace>> captured_;
+  std::deque<Batch> in_flight_;
+};
+
+/// Fields on a device. Batches that read them hold them until they are done.
+class DeviceFields {
+ public:
+  DeviceFields(const py::sequence& fields, int device) {
+    std::vector<Field> all;
+    for (const py::handle field : fields) all.push_back(field_of(field, "fields"));
+    const std::vector<py::object> held(fields.begin(), fields.end());
+    const py::gil_scoped_release released;
+    GpuSettings settings;
+    settings.device = device;
+    fields_ = std::make_unique<GpuFields>(all, settings);
+  }
+
+  const GpuFields& fields() const { return *fields_; }
+
+ private:
+  std::unique_ptr<GpuFields> fields_;
+};
+
+}  // namespace ist::python
