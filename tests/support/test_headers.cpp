@@ -1,0 +1,1 @@
+// Only so that there is a target that precompiles headers for the others (tests/CMakeLists.txt).
