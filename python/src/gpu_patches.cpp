@@ -60,15 +60,15 @@ DeviceAnswers<PatchAnswers> patches_of(DeviceAssets& assets, const py::object& a
                           std::to_string(kMostGpuPatches));
   PatchAnswers blank;
   blank.patches.most = max_patches;
-  return ask<PatchAnswers>(
-      assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, nullptr}, blank, wanted, out,
-      stream,
-      [&](const GpuAssets& all, const GpuPairs& pairs, GpuWorkspace& workspace,
-          const PatchAnswers& to, cuda::Stream on) {
-        GpuPenetrations whole;
-        whole.status = to.status;
-        contact_patches_batch(all, pairs, which, workspace, whole, to.patches, on);
-      });
+  return ask<PatchAnswers>(assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, nullptr},
+                           blank, wanted, out, stream,
+                           [&](const GpuAssets& all, const GpuPairs& pairs, GpuWorkspace& workspace,
+                               const PatchAnswers& to, cuda::Stream on) {
+                             GpuPenetrations whole;
+                             whole.status = to.status;
+                             contact_patches_batch(all, pairs, which, workspace, whole, to.patches,
+                                                   on);
+                           });
 }
 
 constexpr const char* kPatchesDoc =
