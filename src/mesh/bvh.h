@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "mesh/mesh_view.h"
@@ -10,8 +11,8 @@ namespace ist {
 /// A bounding volume hierarchy over all triangles of a mesh. Built by binned surface area
 /// heuristic, the same for any number of threads. No query's answer depends on its shape.
 struct Bvh {
-  std::vector<BvhNode> nodes;
-  std::vector<TriangleBlock> blocks;
+  std::unique_ptr<BvhNode[]> nodes;
+  std::unique_ptr<TriangleBlock[]> blocks;
   std::uint32_t root = kBvhEmpty;
 };
 

@@ -38,8 +38,8 @@ struct MeshSolid::Impl {
     oneapi::tbb::collaborative_call_once(hierarchy_made, [this] {
       bvh = build_bvh(vertices, triangles);
       view = arrays;
-      view.nodes = bvh.nodes.data();
-      view.blocks = bvh.blocks.data();
+      view.nodes = bvh.nodes.get();
+      view.blocks = bvh.blocks.get();
       view.root = bvh.root;
     });
     return view;
