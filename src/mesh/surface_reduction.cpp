@@ -16,15 +16,18 @@
 
 namespace ist {
 
-bool is_degenerate(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
-  if (has_repeated_corner(t)) return true;
+bool is_on_a_line(const double* a, const double* b, const double* c) {
   for (const int skip : {0, 1, 2}) {  // seen along each axis
-    double corners[3][2];
-    for (std::size_t c = 0; c < 3; ++c)
-      for (int k = 0; k < 2; ++k) corners[c][k] = vertices[t[c]][(skip + 1 + k) % 3];
-    if (orient2d_sign(corners[0], corners[1], corners[2]) != 0) return false;
+    const int i = (skip + 1) % 3, j = (skip + 2) % 3;
+    const double of_a[2] = {a[i], a[j]}, of_b[2] = {b[i], b[j]}, of_c[2] = {c[i], c[j]};
+    if (orient2d_sign(of_a, of_b, of_c) != 0) return false;
   }
   return true;
+}
+
+bool is_degenerate(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
+  return has_repeated_corner(t) ||
+         is_on_a_line(vertices[t[0]].data(), vertices[t[1]].data(), vertices[t[2]].data());
 }
 
 std::size_t count_odd_edges(const EdgeTable& edges) {
