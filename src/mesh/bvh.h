@@ -2,7 +2,7 @@
 
 #include <cstdint>
 #include <memory>
-#include <vector>
+#include <span>
 
 #include "mesh/mesh_view.h"
 
@@ -17,6 +17,6 @@ struct Bvh {
 };
 
 /// Builds over `triangles` (three indices each) of exact unit-frame vertices (three doubles each).
-Bvh build_bvh(const std::vector<double>& vertices, const std::vector<std::uint32_t>& triangles);
+Bvh build_bvh(std::span<const double> vertices, std::span<const std::uint32_t> triangles);
 
 }  // namespace ist

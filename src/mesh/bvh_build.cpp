@@ -438,7 +438,7 @@ Tree tree_of(const Range& range) {
 
 class Triangles {
  public:
-  Triangles(const std::vector<double>& vertices, const std::vector<std::uint32_t>& corners)
+  Triangles(std::span<const double> vertices, std::span<const std::uint32_t> corners)
       : vertices_(vertices), corners_(corners) {}
 
   Item item(std::uint32_t triangle) const {
@@ -476,13 +476,13 @@ class Triangles {
     return &vertices_[3 * std::size_t{corners_[3 * std::size_t{triangle} + std::size_t(i)]}];
   }
 
-  const std::vector<double>& vertices_;
-  const std::vector<std::uint32_t>& corners_;
+  const std::span<const double> vertices_;
+  const std::span<const std::uint32_t> corners_;
 };
 
 }  // namespace
 
-Bvh build_bvh(const std::vector<double>& vertices, const std::vector<std::uint32_t>& corners) {
+Bvh build_bvh(std::span<const double> vertices, std::span<const std::uint32_t> corners) {
   const auto count = static_cast<std::uint32_t>(corners.size() / 3);
   Bvh bvh;
   if (count == 0) return bvh;
