@@ -18,21 +18,22 @@
 #include "mesh/triangle_frame.h"
 #include "numerics/rounding.h"
 
-// Many triangles are sorted into cells of a coarse grid first; the tree over the cells is cheap,
-// and what hangs below a few of them is built by one thread each.
+// Many triangles are sorted into cells of a coarse grid first; the tree over
+// the cells is cheap, and what hangs below a few of them is built by one thread
+// each.
 
 namespace ist {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-/// Below this depth ranges are halved, whatever it costs: traversal stacks are of fixed size.
+/// Below this depth ranges are halved, whatever it costs: traversal stacks are
+/// of fixed size.
 constexpr int kHeuristicDepth = 40;
 constexpr float kFlat = 1e-30f;         ///< centres no further apart are taken to be one
 constexpr std::size_t kTreelet = 1024;  ///< triangles below a few cells
 constexpr std::size_t kSerial = 8192;   ///< so many triangles are not worth a grid
 constexpr std::size_t kChunk = 16384;   ///< triangles that one thread sorts into cells in one go
-constexpr int kGrid = 16;               ///< cells along an edge
-constexpr std::size_t kCells = std::size_t{kGrid} * kGrid * kGrid;
+constexpr std::size_t kManyItems = 65'536;  ///< are worth a finer grid
 
 using Lanes [[gnu::vector_size(16)]] = float;  ///< x, y, z and one that does not count
 using Places [[gnu::vector_size(16)]] = std::int32_t;
@@ -54,21 +55,28 @@ struct Box {
   }
 };
 
-/// A triangle, or a cell of triangles, on its way to a leaf. The lanes that are left over hold
-/// bits of small numbers: as floats they lie between 0 and 2 and disturb nothing.
+/// A triangle, or a cell of triangles, on its way to a leaf. The lanes that are
+/// left over hold two numbers below 2^30, as bits of floats between 1e-38 and
+/// 8: arithmetic with subnormal ones is slow, with infinite ones it traps.
 struct Item {
   Lanes lower, upper;
 
   Item() {}  // left as it is, for threads to fill
   Item(const Box& around, std::uint32_t name, std::uint32_t count)
       : lower(around.lower), upper(around.upper) {
-    lower[3] = std::bit_cast<float>(name);
-    upper[3] = std::bit_cast<float>(count);
+    lower[3] = std::bit_cast<float>(name + kLeastNormal);
+    upper[3] = std::bit_cast<float>(count + kLeastNormal);
   }
   Box box() const { return {lower, upper}; }
-  std::uint32_t name() const { return std::bit_cast<std::uint32_t>(float{lower[3]}); }
-  std::uint32_t count() const { return std::bit_cast<std::uint32_t>(float{upper[3]}); }
+  std::uint32_t name() const { return number(lower[3]); }
+  std::uint32_t count() const { return number(upper[3]); }
   Lanes centre2() const { return lower + upper; }  // twice the centre
+
+ private:
+  static constexpr std::uint32_t kLeastNormal = 0x00800000;
+  static std::uint32_t number(float lane) {
+    return std::bit_cast<std::uint32_t>(lane) - kLeastNormal;
+  }
 };
 
 float longest_side(const Box& box) {
@@ -107,6 +115,7 @@ struct Slices {
   int last;
 
   Slices(const Box& centres, int count) : low(centres.lower), scale(all(0)), last(count - 1) {
+    low[3] = 0;
     for (int k = 0; k < 3; ++k) {
       const float size = centres.upper[k] - centres.lower[k];
       if (size > kFlat) scale[k] = static_cast<float>(count) / size;
@@ -123,7 +132,8 @@ float blocks_of(std::uint32_t triangles) {
   return static_cast<float>((triangles + kBvhWidth - 1) / kBvhWidth);
 }
 
-/// Where a range is cut: items in slices before `bin` along `axis` go left. None: axis < 0.
+/// Where a range is cut: items in slices before `bin` along `axis` go left.
+/// None: axis < 0.
 struct Cut {
   int axis = -1, bin = 0;
 };
@@ -198,7 +208,8 @@ std::array<Range, 2> halves(const Range& range) {
   if (range.depth >= kHeuristicDepth) return parted(range, count / 2);
   const Slices slices(range.extent.centres, count < kMany ? 8 : 16);
   const Cut cut = count < kMany ? cheapest_cut<8>(range, slices) : cheapest_cut<16>(range, slices);
-  if (cut.axis < 0) return parted(range, count / 2);  // all centres coincide: any half is as good
+  if (cut.axis < 0) return parted(range,
+                                  count / 2);  // all centres coincide: any half is as good
   Extent extent[2];
   std::size_t left = 0, right = count;
   const auto is_left = [&](const Item& item) {
@@ -223,8 +234,9 @@ struct Tree {
   std::uint32_t root = kBvhEmpty;
 };
 
-/// Makes the node over a range, the children of largest area opened while there is room.
-/// `is_leaf(range)`; child(range): what stands for a range, node or leaf.
+/// Makes the node over a range, the children of largest area opened while there
+/// is room. `is_leaf(range)`; child(range): what stands for a range, node or
+/// leaf.
 template <class IsLeaf, class Child>
 std::uint32_t add_node(const Range& range, std::vector<BvhNode>& nodes, const IsLeaf& is_leaf,
                        const Child& child) {
@@ -292,14 +304,16 @@ Extent extent_of_many(std::span<Item> items) {
 
 Tree tree_of(const Range& range);
 
-/// A range in the cells of a grid, and the tree over them down to groups of a few cells.
+/// A range in the cells of a grid, and the tree over them down to groups of a
+/// few cells.
 class CellTree {
  public:
-  explicit CellTree(const Range& range) : range_(range) {
+  explicit CellTree(const Range& range)
+      : range_(range), edge_(range.items.size() < kManyItems ? 8 : 16) {
     const Box& centres = range.extent.centres;
     low_ = centres.lower;
-    scale_ = all(float{kGrid} / longest_side(centres));
-    scale_[3] = 0;
+    scale_ = all(static_cast<float>(edge_) / longest_side(centres));
+    low_[3] = scale_[3] = 0;
     count_cells();
     const Extent whole = extent_of(cells_);
     add_top({cells_, whole, range.depth});
@@ -328,26 +342,26 @@ class CellTree {
 
   std::size_t cell_of(const Item& item) const {
     const Places at = __builtin_convertvector((item.centre2() - low_) * scale_, Places);
-    const auto along = [&](int k) { return static_cast<std::size_t>(std::min(at[k], kGrid - 1)); };
-    return along(0) + kGrid * (along(1) + kGrid * along(2));
+    const auto along = [&](int k) { return static_cast<std::size_t>(std::min(at[k], edge_ - 1)); };
+    return along(0) + std::size_t(edge_) * (along(1) + std::size_t(edge_) * along(2));
   }
 
   void count_cells() {
     const std::size_t chunks = chunks_of(range_.items.size());
-    of_chunk_.resize(chunks * kCells);
+    of_chunk_.resize(chunks * cells_of_grid_);
     tbb::enumerable_thread_specific<std::vector<Box>> boxes(
-        [] { return std::vector<Box>(kCells); });
+        [this] { return std::vector<Box>(cells_of_grid_); });
     tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
       std::vector<Box>& of_thread = boxes.local();
       for (const Item& item : chunk_of(range_.items, c)) {
         const std::size_t cell = cell_of(item);
-        ++of_chunk_[c * kCells + cell];
+        ++of_chunk_[c * cells_of_grid_ + cell];
         of_thread[cell].extend(item.box());
       }
     });
-    for (std::size_t cell = 0; cell < kCells; ++cell) {
+    for (std::size_t cell = 0; cell < cells_of_grid_; ++cell) {
       std::uint32_t count = 0;
-      for (std::size_t c = 0; c < chunks; ++c) count += of_chunk_[c * kCells + cell];
+      for (std::size_t c = 0; c < chunks; ++c) count += of_chunk_[c * cells_of_grid_ + cell];
       if (count == 0) continue;
       Box box;
       for (const std::vector<Box>& of_thread : boxes) box.extend(of_thread[cell]);
@@ -362,7 +376,7 @@ class CellTree {
   void add_group(const Range& range, std::uint32_t node, int lane) {
     groups_.push_back({node, lane, range.depth, placed_, range.extent.count});
     for (const Item& cell : range.items) {
-      for (std::size_t at = cell.name(); at < of_chunk_.size(); at += kCells)
+      for (std::size_t at = cell.name(); at < of_chunk_.size(); at += cells_of_grid_)
         placed_ += std::exchange(of_chunk_[at], static_cast<std::uint32_t>(placed_));
     }
   }
@@ -384,7 +398,7 @@ class CellTree {
   void sort_into(std::span<Item> sorted) {
     tbb::parallel_for(std::size_t{0}, chunks_of(range_.items.size()), [&](std::size_t c) {
       for (const Item& item : chunk_of(range_.items, c))
-        sorted[of_chunk_[c * kCells + cell_of(item)]++] = item;
+        sorted[of_chunk_[c * cells_of_grid_ + cell_of(item)]++] = item;
     });
   }
 
@@ -419,6 +433,8 @@ class CellTree {
   }
 
   const Range range_;
+  const int edge_;  ///< of the grid, in cells
+  const std::size_t cells_of_grid_ = std::size_t(edge_) * std::size_t(edge_) * std::size_t(edge_);
   Lanes low_, scale_;
   std::vector<std::uint32_t> of_chunk_;  ///< [chunk][cell] items, then the place of the first
   std::vector<Item> cells_;
