@@ -18,6 +18,7 @@
 #include "bake/calibrate/calibration.h"
 #include "bake/cluster/tree_builder.h"
 #include "bake/cover/cover.h"
+#include "bake/field/field.h"
 #include "report.h"
 #include "support/shared_data.h"
 
@@ -66,6 +67,7 @@ void one_bake(const ClosedMesh& mesh, const PackingSettings& settings, Stages& s
       stages.time("6 cover", [&] { return cover_radii(*solid, *backend, inner, {}); });
   stages.time("7 inner tree", [&] { return build_tree(inner, covers); });
   stages.time("8 matched tree", [&] { return build_tree(calibration.matched, {}); });
+  stages.time("9 field", [&] { return build_field(*solid, 0); });
 }
 
 }  // namespace

@@ -1,7 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
+#include <memory>
+#include <span>
 
 #include "mesh/mesh_view.h"
 
@@ -10,12 +11,12 @@ namespace ist {
 /// A bounding volume hierarchy over all triangles of a mesh. Built by binned surface area
 /// heuristic, the same for any number of threads. No query's answer depends on its shape.
 struct Bvh {
-  std::vector<BvhNode> nodes;
-  std::vector<TriangleBlock> blocks;
+  std::unique_ptr<BvhNode[]> nodes;
+  std::unique_ptr<TriangleBlock[]> blocks;
   std::uint32_t root = kBvhEmpty;
 };
 
 /// Builds over `triangles` (three indices each) of exact unit-frame vertices (three doubles each).
-Bvh build_bvh(const std::vector<double>& vertices, const std::vector<std::uint32_t>& triangles);
+Bvh build_bvh(std::span<const double> vertices, std::span<const std::uint32_t> triangles);
 
 }  // namespace ist

@@ -80,7 +80,7 @@ MeshReport survey(const TriangleMesh& mesh, const EdgeTable& edges) {
   MeshReport report;
   report.vertices = mesh.vertices.size();
   report.triangles = mesh.triangles.size();
-  for (const Eigen::Vector3d& v : mesh.vertices) report.bounds.extend(v);
+  report.bounds = bounds_of(mesh.vertices);
   report.degenerate_triangles = count_if(mesh.triangles.size(), [&](const std::size_t t) {
     return is_degenerate(mesh.vertices, mesh.triangles[t]);
   });
@@ -266,7 +266,10 @@ ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMes
   if (report.repaired || report.coincident_triangles > 0) look_for_intersections();
   report.meets_itself = !surface.met || surface.met->count > 0;
   report.closed = true;
-  if (mesh.triangles.size() != report.triangles || report.repaired) weld_equal(mesh);
+  if (report.repaired)
+    weld_equal(mesh);
+  else if (mesh.triangles.size() != report.triangles)
+    drop_unused(mesh);
   ClosedMesh closed = {std::move(mesh), std::move(report), name,
                        surface.met ? std::move(surface.met->pairs) : std::nullopt};
   if (closed.report.repaired) judge_repair(unrepaired, closed);

@@ -22,7 +22,7 @@ std::uint32_t fetch_and_add_one(std::uint32_t& count) {
 }
 
 /// One more than the largest index; 0 where there are no triangles.
-std::uint32_t vertex_count(const std::vector<Triangle>& triangles) {
+std::uint32_t vertex_count(std::span<const Triangle> triangles) {
   return tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, triangles.size()), std::uint32_t{0},
       [&](const tbb::blocked_range<std::size_t>& range, std::uint32_t count) {
@@ -31,6 +31,21 @@ std::uint32_t vertex_count(const std::vector<Triangle>& triangles) {
         return count;
       },
       [](const std::uint32_t a, const std::uint32_t b) { return std::max(a, b); });
+}
+
+/// Sorts by the larger vertex, then the side: most buckets hold three entries.
+void sort_few(Entry* const begin, Entry* const end) {
+  constexpr std::ptrdiff_t kFew = 16;
+  const auto is_before = [](const Entry& a, const Entry& b) {
+    return a.high != b.high ? a.high < b.high : a.side < b.side;
+  };
+  if (end - begin > kFew) return std::sort(begin, end, is_before);
+  for (Entry* at = begin; at < end; ++at) {
+    const Entry entry = *at;
+    Entry* place = at;
+    for (; place > begin && is_before(entry, place[-1]); --place) *place = place[-1];
+    *place = entry;
+  }
 }
 
 /// From counts to places: place[v + 1] becomes the sum of place[1] … place[v + 1].
@@ -47,7 +62,7 @@ bool runs_up(const std::vector<Triangle>& triangles, const std::uint32_t side) {
   return t[side % 3] < t[(side + 1) % 3];
 }
 
-EdgeTable::EdgeTable(const std::vector<Triangle>& triangles) {
+EdgeTable::EdgeTable(std::span<const Triangle> triangles) {
   if (triangles.size() > UINT32_MAX / 3) throw Error("more than 2^32 triangle sides");
   // Buckets by the smaller vertex, each sorted by the larger one and the side: in which order the
   // threads fill them does not matter.
@@ -61,12 +76,16 @@ EdgeTable::EdgeTable(const std::vector<Triangle>& triangles) {
               std::max(t[k], t[(k + 1) % 3]));
     });
   };
+  edge_of_side_ = RawArray<std::uint32_t>(3 * triangles.size());
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t i) {
+    if (has_repeated_corner(triangles[i])) std::fill_n(&edge_of_side_[3 * i], 3, kNoIndex);
+  });
   std::vector<std::uint32_t> begin(std::size_t{vertices} + 1, 0);
   for_each_side([&](std::uint32_t, const std::uint32_t low, std::uint32_t) {
     fetch_and_add_one(begin[low + 1]);
   });
   sum_up(begin);
-  std::vector<Entry> entries(begin[vertices]);
+  RawArray<Entry> entries(begin[vertices]);
   std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
   for_each_side([&](const std::uint32_t side, const std::uint32_t low, const std::uint32_t high) {
     entries[fetch_and_add_one(next[low])] = {high, side};
@@ -77,17 +96,13 @@ EdgeTable::EdgeTable(const std::vector<Triangle>& triangles) {
     return i == begin[low] || entries[i].high != entries[i - 1].high;
   };
   tbb::parallel_for(std::uint32_t{0}, vertices, [&](const std::uint32_t low) {
-    std::sort(entries.begin() + begin[low], entries.begin() + begin[low + 1],
-              [](const Entry& a, const Entry& b) {
-                return a.high != b.high ? a.high < b.high : a.side < b.side;
-              });
+    sort_few(entries.begin() + begin[low], entries.begin() + begin[low + 1]);
     for (std::uint32_t i = begin[low]; i < begin[low + 1]; ++i)
       first_edge[low + 1] += starts_edge(low, i) ? 1 : 0;
   });
   sum_up(first_edge);
-  edges_.resize(first_edge[vertices]);
-  sides_.resize(entries.size());
-  edge_of_side_.assign(3 * triangles.size(), kNoIndex);
+  edges_ = RawArray<Edge>(first_edge[vertices]);
+  sides_ = RawArray<std::uint32_t>(entries.size());
   tbb::parallel_for(std::uint32_t{0}, vertices, [&](const std::uint32_t low) {
     std::uint32_t edge = first_edge[low];
     for (std::uint32_t i = begin[low]; i < begin[low + 1]; ++i) {

@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "stage/raw_array.h"
+
 namespace ist {
 
 using Triangle = std::array<std::uint32_t, 3>;
@@ -15,7 +17,7 @@ constexpr std::uint32_t kNoIndex = UINT32_MAX;
 /// triangle t to the next. Triangles with repeated corners have no edges here: their sides cancel.
 class EdgeTable {
  public:
-  explicit EdgeTable(const std::vector<Triangle>& triangles);
+  explicit EdgeTable(std::span<const Triangle> triangles);
 
   std::size_t size() const { return edges_.size(); }
   std::size_t side_count() const { return edge_of_side_.size(); }  ///< of all triangles
@@ -34,8 +36,8 @@ class EdgeTable {
         : low(low_vertex), high(high_vertex), first_side(side) {}
     std::uint32_t low, high, first_side;
   };
-  std::vector<Edge> edges_;
-  std::vector<std::uint32_t> sides_, edge_of_side_;
+  RawArray<Edge> edges_;
+  RawArray<std::uint32_t> sides_, edge_of_side_;
 };
 
 /// Whether side 3t + k runs from the smaller to the larger vertex index.

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -51,11 +52,14 @@ Eigen::AlignedBox3d finite_bounds(const SourceFile& file, const PolygonMesh& mes
     Eigen::AlignedBox3d box;
     bool finite = true;
   };
+  const std::span<const std::uint32_t> corners =
+      mesh.triangles.empty() ? std::span(mesh.corners)
+                             : std::span(mesh.triangles[0].data(), 3 * mesh.triangles.size());
   const Bounds bounds = tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, mesh.corners.size()), Bounds(),
+      tbb::blocked_range<std::size_t>(0, corners.size()), Bounds(),
       [&](const tbb::blocked_range<std::size_t>& range, Bounds of_range) {
         for (std::size_t i = range.begin(); i < range.end() && of_range.finite; ++i) {
-          const Eigen::Vector3d& x = mesh.vertices[mesh.corners[i]];
+          const Eigen::Vector3d& x = mesh.vertices[corners[i]];
           of_range.finite = x.allFinite();
           if (of_range.finite) of_range.box.extend(x);
         }
@@ -65,7 +69,7 @@ Eigen::AlignedBox3d finite_bounds(const SourceFile& file, const PolygonMesh& mes
         return Bounds{a.box.merged(b.box), a.finite && b.finite};
       });
   if (bounds.finite) return bounds.box;
-  for (const std::uint32_t v : mesh.corners) {
+  for (const std::uint32_t v : corners) {
     if (mesh.vertices[v].allFinite()) continue;
     const auto found = mesh.line_of_nonfinite.find(v);
     const std::string line =
@@ -93,7 +97,8 @@ TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings) 
 TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings) {
   refuse_other_content(file);
   PolygonMesh polygons = reader_of(file.path)(file);
-  if (polygons.ends.empty()) fail(file, "no faces. There is nothing to bound a solid");
+  if (polygons.ends.empty() && polygons.triangles.empty())
+    fail(file, "no faces. There is nothing to bound a solid");
   const Eigen::AlignedBox3d bounds = finite_bounds(file, polygons);
   std::vector<std::array<std::uint32_t, 3>> triangles = triangulate(polygons);
   TriangleMesh mesh{std::move(polygons.vertices), std::move(triangles)};

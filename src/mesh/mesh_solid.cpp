@@ -16,20 +16,21 @@
 #include "mesh/bvh.h"
 #include "mesh/exact_closest_point.h"
 #include "mesh/winding.h"
+#include "stage/raw_array.h"
 
 namespace ist {
 
 struct MeshSolid::Impl {
   UnitFrame frame;
   Eigen::AlignedBox3d bounds;
-  std::vector<double> vertices;  // unit frame
-  std::vector<std::uint32_t> triangles;
+  RawArray<double> vertices;  // unit frame
+  RawArray<std::uint32_t> triangles;
   MeshView arrays;
-  std::uint64_t hash = 0;
   bool meets_itself = false, may_overlap = false;
   std::optional<std::vector<std::array<std::uint32_t, 2>>> meeting_pairs;
 
-  oneapi::tbb::collaborative_once_flag hierarchy_made, moments_made;
+  oneapi::tbb::collaborative_once_flag hierarchy_made, moments_made, hash_made;
+  std::uint64_t hash = 0;
   Bvh bvh;
   MeshView view;  // arrays and bvh
   MeshMoments moments;
@@ -38,8 +39,8 @@ struct MeshSolid::Impl {
     oneapi::tbb::collaborative_call_once(hierarchy_made, [this] {
       bvh = build_bvh(vertices, triangles);
       view = arrays;
-      view.nodes = bvh.nodes.data();
-      view.blocks = bvh.blocks.data();
+      view.nodes = bvh.nodes.get();
+      view.blocks = bvh.blocks.get();
       view.root = bvh.root;
     });
     return view;
@@ -71,8 +72,8 @@ bool is_exact(const UnitFrame& frame, const double scale, const Eigen::Vector3d&
 }
 
 /// Hash over the frame, the counts, the vertices and the triangles.
-std::uint64_t hash_mesh(const UnitFrame& frame, const std::vector<double>& vertices,
-                        const std::vector<std::uint32_t>& triangles) {
+std::uint64_t hash_mesh(const UnitFrame& frame, const RawArray<double>& vertices,
+                        const RawArray<std::uint32_t>& triangles) {
   struct Head {
     double centre[3];
     std::int64_t exponent;
@@ -116,19 +117,18 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
     impl_->bounds.extend(mesh.vertices[v]);
   }
   impl_->frame = unit_frame(impl_->bounds);
-  impl_->vertices.resize(3 * std::size_t{count});
+  impl_->vertices = RawArray<double>(3 * std::size_t{count});
   tbb::parallel_for(std::size_t{0}, mesh.vertices.size(), [&](std::size_t v) {
     if (place[v] == kUnused) return;
     const Eigen::Vector3d x = impl_->frame.to_unit(mesh.vertices[v]);
     for (std::size_t k = 0; k < 3; ++k)
       impl_->vertices[3 * std::size_t{place[v]} + k] = x[static_cast<int>(k)];
   });
-  impl_->triangles.resize(3 * mesh.triangles.size());
+  impl_->triangles = RawArray<std::uint32_t>(3 * mesh.triangles.size());
   tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
     for (std::size_t k = 0; k < 3; ++k) impl_->triangles[3 * t + k] = place[mesh.triangles[t][k]];
   });
 
-  impl_->hash = hash_mesh(impl_->frame, impl_->vertices, impl_->triangles);
   MeshView& arrays = impl_->arrays;
   arrays.vertices = impl_->vertices.data();
   arrays.triangles = impl_->triangles.data();
@@ -178,7 +178,12 @@ const std::vector<std::array<std::uint32_t, 2>>* MeshSolid::meeting_pairs() cons
   return impl_->meeting_pairs ? &*impl_->meeting_pairs : nullptr;
 }
 bool MeshSolid::may_overlap() const { return impl_->may_overlap; }
-std::uint64_t MeshSolid::hash() const { return impl_->hash; }
+std::uint64_t MeshSolid::hash() const {
+  oneapi::tbb::collaborative_call_once(impl_->hash_made, [this] {
+    impl_->hash = hash_mesh(impl_->frame, impl_->vertices, impl_->triangles);
+  });
+  return impl_->hash;
+}
 const MeshView& MeshSolid::view() const { return impl_->with_hierarchy(); }
 const MeshView& MeshSolid::arrays() const { return impl_->arrays; }
 

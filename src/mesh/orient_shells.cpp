@@ -8,6 +8,7 @@
 
 #include "mesh/line_winding.h"
 #include "mesh/shells.h"
+#include "stage/raw_array.h"
 
 namespace ist {
 namespace {
@@ -42,23 +43,28 @@ std::vector<Shell> measure(const std::vector<Eigen::Vector3d>& vertices,
                            const std::vector<Triangle>& triangles, const Shells& shells) {
   constexpr std::size_t kProbes = 9;
   std::vector<Shell> result(shells.count);
-  std::vector<std::size_t> sizes(shells.count, 0), seen(shells.count, 0);
-  for (const std::uint32_t s : shells.of_triangle) ++sizes[s];
+  std::vector<std::size_t> sizes(shells.count, 0);
+  if (shells.count == 1)
+    sizes[0] = triangles.size();
+  else
+    for (const std::uint32_t s : shells.of_triangle) ++sizes[s];
   find_boxes(vertices, triangles, shells, result);
-  std::vector<double> terms(triangles.size());
+  RawArray<double> terms(triangles.size());
   tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
     const Eigen::Vector3d origin = result[shells.of_triangle[t]].box.center();
     const auto corner = [&](const std::size_t k) { return vertices[triangles[t][k]] - origin; };
     terms[t] = corner(0).dot(corner(1).cross(corner(2))) / 6;
   });
+  std::vector<std::size_t> until_probe(shells.count, 0);  // triangles
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     const std::uint32_t s = shells.of_triangle[t];
     Shell& shell = result[s];
     const double term = terms[t];
     shell.volume.volume += term;
     shell.volume.magnitude += std::abs(term);
-    const std::size_t step = (sizes[s] + kProbes - 1) / kProbes;
-    if (seen[s]++ % step == 0) shell.probes.push_back(triangles[t][0]);
+    if (until_probe[s]-- != 0) continue;
+    until_probe[s] = (sizes[s] + kProbes - 1) / kProbes - 1;
+    shell.probes.push_back(triangles[t][0]);
   }
   return result;
 }
@@ -128,8 +134,10 @@ Nesting orient_shells(const std::vector<Eigen::Vector3d>& vertices,
     nesting.volume.volume += turned[s] ? -shell.volume.volume : shell.volume.volume;
     nesting.volume.magnitude += shell.volume.magnitude;
   }
-  for (std::size_t t = 0; t < triangles.size(); ++t)
+  if (std::find(turned.begin(), turned.end(), true) == turned.end()) return nesting;
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
     if (turned[shells.of_triangle[t]]) std::swap(triangles[t][1], triangles[t][2]);
+  });
   return nesting;
 }
 

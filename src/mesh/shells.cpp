@@ -1,11 +1,13 @@
 #include "mesh/shells.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <utility>
 
@@ -148,6 +150,23 @@ std::optional<std::uint32_t> find_unbalanced_edge(const std::vector<Triangle>& t
   return first == kNoIndex ? std::nullopt : std::optional(first);
 }
 
+namespace {
+
+/// Edges of more than two sides, ascending.
+std::vector<std::uint32_t> crowded_edges(const EdgeTable& edges) {
+  tbb::enumerable_thread_specific<std::vector<std::uint32_t>> of_threads;
+  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(edges.size()),
+                    [&](const std::uint32_t e) {
+                      if (edges.sides(e).size() > 2) of_threads.local().push_back(e);
+                    });
+  std::vector<std::uint32_t> crowded;
+  for (const auto& found : of_threads) crowded.insert(crowded.end(), found.begin(), found.end());
+  std::sort(crowded.begin(), crowded.end());
+  return crowded;
+}
+
+}  // namespace
+
 Shells find_shells(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
   DisjointSets pieces(triangles.size());
   tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
@@ -155,9 +174,8 @@ Shells find_shells(const std::vector<Triangle>& triangles, const EdgeTable& edge
     if (sides.size() == 2) pieces.unite(sides[0] / 3, sides[1] / 3);
   });
   std::vector<std::pair<std::uint32_t, int>> sums;  // piece, balance at this edge
-  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+  for (const std::uint32_t e : crowded_edges(edges)) {
     const auto sides = edges.sides(e);
-    if (sides.size() <= 2) continue;
     sums.clear();
     for (const std::uint32_t side : sides) {
       const std::uint32_t piece = pieces.find(side / 3);
@@ -178,11 +196,21 @@ Shells find_shells(const std::vector<Triangle>& triangles, const EdgeTable& edge
   }
   Shells shells;
   shells.of_triangle.resize(triangles.size());
+  std::atomic<bool> one{true};
+  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(triangles.size()),
+                    [&](const std::uint32_t t) {
+                      shells.of_triangle[t] = pieces.find(t);
+                      if (shells.of_triangle[t] != 0) one.store(false, std::memory_order_relaxed);
+                    });
+  if (one && !triangles.empty()) {
+    shells.count = 1;
+    return shells;
+  }
   std::vector<std::uint32_t> number(triangles.size(), kNoIndex);
-  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-    std::uint32_t& shell = number[pieces.find(t)];
+  for (std::uint32_t& of : shells.of_triangle) {
+    std::uint32_t& shell = number[of];
     if (shell == kNoIndex) shell = shells.count++;
-    shells.of_triangle[t] = shell;
+    of = shell;
   }
   return shells;
 }

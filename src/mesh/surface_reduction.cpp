@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <functional>
+#include <unordered_map>
 #include <utility>
 
 #include "mesh/disjoint_sets.h"
@@ -16,15 +17,18 @@
 
 namespace ist {
 
-bool is_degenerate(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
-  if (has_repeated_corner(t)) return true;
+bool is_on_a_line(const double* a, const double* b, const double* c) {
   for (const int skip : {0, 1, 2}) {  // seen along each axis
-    double corners[3][2];
-    for (std::size_t c = 0; c < 3; ++c)
-      for (int k = 0; k < 2; ++k) corners[c][k] = vertices[t[c]][(skip + 1 + k) % 3];
-    if (orient2d_sign(corners[0], corners[1], corners[2]) != 0) return false;
+    const int i = (skip + 1) % 3, j = (skip + 2) % 3;
+    const double of_a[2] = {a[i], a[j]}, of_b[2] = {b[i], b[j]}, of_c[2] = {c[i], c[j]};
+    if (orient2d_sign(of_a, of_b, of_c) != 0) return false;
   }
   return true;
+}
+
+bool is_degenerate(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
+  return has_repeated_corner(t) ||
+         is_on_a_line(vertices[t[0]].data(), vertices[t[1]].data(), vertices[t[2]].data());
 }
 
 std::size_t count_odd_edges(const EdgeTable& edges) {
@@ -46,6 +50,18 @@ void keep_only(std::vector<Triangle>& triangles, const std::vector<bool>& keep) 
   triangles.resize(kept);
 }
 
+/// `dropped`: ascending.
+void remove(const std::vector<std::uint32_t>& dropped, std::vector<Triangle>& triangles) {
+  if (dropped.empty()) return;
+  auto kept = triangles.begin() + dropped[0];
+  for (std::size_t i = 0; i < dropped.size(); ++i) {
+    const std::size_t end = i + 1 < dropped.size() ? dropped[i + 1] : triangles.size();
+    kept = std::copy(triangles.begin() + dropped[i] + 1,
+                     triangles.begin() + static_cast<std::ptrdiff_t>(end), kept);
+  }
+  triangles.erase(kept, triangles.end());
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
@@ -60,34 +76,29 @@ std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& v
   for (const auto& found : of_threads)
     degenerate.insert(degenerate.end(), found.begin(), found.end());
   std::sort(degenerate.begin(), degenerate.end());
-  std::vector<bool> keep(triangles.size(), true);
-  std::vector<std::uint32_t> open;
-  for (const std::uint32_t t : degenerate) {
-    if (has_repeated_corner(triangles[t]))
-      keep[t] = false;
-    else
-      open.push_back(t);
-  }
-  if (!open.empty()) {
-    std::vector<std::size_t> sides(edges.size());
-    for (std::size_t e = 0; e < edges.size(); ++e) sides[e] = edges.sides(e).size();
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (const std::uint32_t t : open) {
-        if (!keep[t]) continue;
-        std::size_t odd = 0;
-        for (std::size_t k = 0; k < 3; ++k) odd += sides[edges.edge_of(3 * std::size_t{t} + k)] % 2;
-        if (odd < 2) continue;
-        for (std::size_t k = 0; k < 3; ++k) --sides[edges.edge_of(3 * std::size_t{t} + k)];
-        keep[t] = false;
-        changed = true;
-      }
-    }
-  }
-  std::vector<std::uint32_t> dropped;
+  std::vector<std::uint32_t> dropped, open;
   for (const std::uint32_t t : degenerate)
-    if (!keep[t]) dropped.push_back(t);
-  if (!dropped.empty()) keep_only(triangles, keep);
+    (has_repeated_corner(triangles[t]) ? dropped : open).push_back(t);
+  std::unordered_map<std::uint32_t, std::size_t> sides;  // left at the edges of open ones
+  const auto edge_of = [&](const std::uint32_t t, const std::size_t k) {
+    return edges.edge_of(3 * std::size_t{t} + k);
+  };
+  for (const std::uint32_t t : open)
+    for (std::size_t k = 0; k < 3; ++k)
+      sides.emplace(edge_of(t, k), edges.sides(edge_of(t, k)).size());
+  for (std::size_t before = 0; before != dropped.size();) {
+    before = dropped.size();
+    std::erase_if(open, [&](const std::uint32_t t) {
+      std::size_t odd = 0;
+      for (std::size_t k = 0; k < 3; ++k) odd += sides[edge_of(t, k)] % 2;
+      if (odd < 2) return false;
+      for (std::size_t k = 0; k < 3; ++k) --sides[edge_of(t, k)];
+      dropped.push_back(t);
+      return true;
+    });
+  }
+  std::sort(dropped.begin(), dropped.end());
+  remove(dropped, triangles);
   return dropped;
 }
 

@@ -8,7 +8,10 @@
 
 namespace ist {
 
-/// Corners exactly on a line; repeated corners too.
+/// Corners exactly on a line.
+bool is_on_a_line(const double* a, const double* b, const double* c);
+
+/// The same of a triangle; repeated corners too.
 bool is_degenerate(const std::vector<Eigen::Vector3d>& vertices, const Triangle& triangle);
 
 /// Edges with an odd number of sides: where the surface has a border, whatever its orientation.

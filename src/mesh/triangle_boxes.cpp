@@ -7,9 +7,12 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "mesh/surface_reduction.h"
+#include "mesh/usable_mesh.h"
+#include "stage/raw_array.h"
 
 namespace ist {
 namespace {
@@ -31,12 +34,11 @@ std::uint64_t spread(std::uint64_t x) {
 }
 
 /// In [0, 1], with the order along each axis kept.
-std::vector<Point> placed(const std::vector<Eigen::Vector3d>& vertices) {
-  Eigen::AlignedBox3d bounds;
-  for (const Eigen::Vector3d& v : vertices) bounds.extend(v);
+RawArray<Point> placed(const std::vector<Eigen::Vector3d>& vertices) {
+  const Eigen::AlignedBox3d bounds = bounds_of(vertices);
   const Eigen::Vector3d corner = bounds.min();
   const double width = bounds.sizes().maxCoeff();
-  std::vector<Point> points(vertices.size());
+  RawArray<Point> points(vertices.size());
   tbb::parallel_for(std::size_t{0}, vertices.size(), [&](const std::size_t v) {
     for (int k = 0; k < 3; ++k)
       points[v][static_cast<std::size_t>(k)] =
@@ -46,13 +48,43 @@ std::vector<Point> placed(const std::vector<Eigen::Vector3d>& vertices) {
 }
 
 /// Where a triangle's middle lies along the curve.
-std::uint64_t key_of(const std::vector<Point>& points, const Triangle& t) {
+std::uint64_t key_of(const RawArray<Point>& points, const Triangle& t) {
   std::uint64_t key = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const float middle = (points[t[0]][k] + points[t[1]][k] + points[t[2]][k]) / 3;
     key |= spread(static_cast<std::uint64_t>(std::min(middle * kCells, kCells - 1))) << k;
   }
   return key;
+}
+
+/// Sorts keys that are not left out, by the curve's first cells, then within each.
+RawArray<std::uint64_t> sorted(const RawArray<std::uint64_t>& keys) {
+  constexpr std::size_t kDrawers = 4096, kChunk = 16'384;
+  constexpr int kShift = kIndexBits + 42 - 12;  // of the curve 42 bits, of a drawer 12
+  const std::size_t chunks = (keys.size() + kChunk - 1) / kChunk;
+  std::vector<std::uint32_t> place(chunks * kDrawers);
+  const auto for_each = [&](const auto& visit) {
+    tbb::parallel_for(std::size_t{0}, chunks, [&](const std::size_t c) {
+      std::uint32_t* const of_chunk = place.data() + c * kDrawers;
+      for (std::size_t i = c * kChunk; i < std::min((c + 1) * kChunk, keys.size()); ++i)
+        if (keys[i] != kLeftOut) visit(of_chunk[keys[i] >> kShift], keys[i]);
+    });
+  };
+  for_each([](std::uint32_t& count, std::uint64_t) { ++count; });
+  std::vector<std::uint32_t> begin(kDrawers + 1);
+  for (std::size_t c = 0; c < chunks; ++c)
+    for (std::size_t d = 0; d < kDrawers; ++d) begin[d + 1] += place[c * kDrawers + d];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<std::uint32_t> next = begin;
+  for (std::size_t c = 0; c < chunks; ++c)
+    for (std::size_t d = 0; d < kDrawers; ++d)
+      next[d] += std::exchange(place[c * kDrawers + d], next[d]);
+  RawArray<std::uint64_t> out(begin.back());
+  for_each([&](std::uint32_t& at, const std::uint64_t key) { out[at++] = key; });
+  tbb::parallel_for(std::size_t{0}, kDrawers, [&](const std::size_t d) {
+    tbb::parallel_sort(out.begin() + begin[d], out.begin() + begin[d + 1]);
+  });
+  return out;
 }
 
 EightBoxes no_boxes() {
@@ -86,18 +118,18 @@ std::vector<EightBoxes> in_eights(const std::size_t count, const BoxOf& box_of) 
 
 TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
                              const std::vector<Triangle>& triangles) {
-  const std::vector<Point> points = placed(vertices);
-  std::vector<std::uint64_t> keys(triangles.size());
+  const RawArray<Point> points = placed(vertices);
+  RawArray<std::uint64_t> keys(triangles.size());
   tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
     keys[t] = is_degenerate(vertices, triangles[t])
                   ? kLeftOut
                   : key_of(points, triangles[t]) << kIndexBits | t;
   });
-  tbb::parallel_sort(keys.begin(), keys.end());
-  while (!keys.empty() && keys.back() == kLeftOut) keys.pop_back();
+  keys = sorted(keys);
   order_.resize(keys.size());
-  for (std::size_t i = 0; i < keys.size(); ++i)
+  tbb::parallel_for(std::size_t{0}, keys.size(), [&](const std::size_t i) {
     order_[i] = static_cast<std::uint32_t>(keys[i] & ((std::uint64_t{1} << kIndexBits) - 1));
+  });
 
   levels_.push_back(in_eights(order_.size(), [&](const std::size_t i, const std::size_t k) {
     const Triangle& t = triangles[order_[i]];

@@ -1,6 +1,8 @@
 #include "mesh/usable_mesh.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <atomic>
@@ -41,8 +43,7 @@ void check_indices_and_coordinates(const TriangleMesh& mesh, const std::string& 
 /// have no end. A mesh of one point has its own message.
 void refuse_unusable_size(const TriangleMesh& mesh, const std::string& name) {
   constexpr double kSmallest = 1e-90, kLargest = 1e90, kFarthest = 1e100;
-  Eigen::AlignedBox3d bounds;
-  for (const Eigen::Vector3d& v : mesh.vertices) bounds.extend(v);
+  const Eigen::AlignedBox3d bounds = bounds_of(mesh.vertices);
   const double size = bounds.sizes().maxCoeff(), offset = largest_coordinate(bounds);
   if (!(size == 0 || size > kSmallest) || !(size < kLargest && offset < kFarthest))
     throw Error(name + ": a size of " + shortest(size) + " at an offset of " + shortest(offset) +
@@ -50,6 +51,16 @@ void refuse_unusable_size(const TriangleMesh& mesh, const std::string& name) {
 }
 
 }  // namespace
+
+Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& points) {
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, points.size()), Eigen::AlignedBox3d(),
+      [&](const tbb::blocked_range<std::size_t>& range, Eigen::AlignedBox3d box) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) box.extend(points[i]);
+        return box;
+      },
+      [](const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b) { return a.merged(b); });
+}
 
 double largest_coordinate(const Eigen::AlignedBox3d& bounds) {
   return std::max(bounds.min().cwiseAbs().maxCoeff(), bounds.max().cwiseAbs().maxCoeff());

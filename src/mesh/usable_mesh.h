@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <string>
+#include <vector>
 
 #include <ist/mesh.h>
 
@@ -11,6 +12,8 @@ namespace ist {
 /// Throws Error for no triangles, indices that lead nowhere, coordinates that are not finite, and
 /// sizes and offsets that double cannot compute with.
 void weld_usable(TriangleMesh& mesh, const std::string& name);
+
+Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& points);
 
 /// The largest magnitude of a coordinate.
 double largest_coordinate(const Eigen::AlignedBox3d& bounds);

@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <vector>
 
 #include "mesh/equal_points.h"
@@ -67,6 +68,27 @@ void rename_corners(TriangleMesh& mesh, const std::vector<std::uint32_t>& names)
   });
 }
 
+/// Keeps the vertices that are used and named by themselves; `name` becomes the new one of each.
+void keep_first(TriangleMesh& mesh, const std::vector<std::uint8_t>& used,
+                std::vector<std::uint32_t>& name) {
+  std::atomic<bool> all{true};
+  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(name.size()),
+                    [&](const std::uint32_t v) {
+                      mesh.vertices[v] += Eigen::Vector3d::Zero();  // one zero only
+                      if (used[v] == 0 || name[v] != v) all.store(false, std::memory_order_relaxed);
+                    });
+  if (all) return;
+  std::uint32_t kept = 0;
+  for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (used[v] == 0) continue;
+    const bool is_first = name[v] == v;
+    if (is_first) mesh.vertices[kept] = mesh.vertices[v];
+    name[v] = is_first ? kept++ : name[name[v]];  // the first's is known by now
+  }
+  mesh.vertices.resize(kept);
+  rename_corners(mesh, name);
+}
+
 }  // namespace
 
 TriangleMesh weld(const TriangleMesh& mesh, const double tolerance) {
@@ -81,16 +103,15 @@ void weld_equal(TriangleMesh& mesh) {
   mesh.declared = {};
   const std::vector<std::uint8_t> used = referenced(mesh);
   std::vector<std::uint32_t> name = first_equal(mesh.vertices, used);
-  std::uint32_t kept = 0;
-  for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
-    if (used[v] == 0) continue;
-    const bool is_first = name[v] == v;
-    if (is_first) mesh.vertices[kept] = mesh.vertices[v] + Eigen::Vector3d::Zero();
-    name[v] = is_first ? kept++ : name[name[v]];  // the first's is known by now
-  }
-  const bool renamed = kept < mesh.vertices.size();
-  mesh.vertices.resize(kept);
-  if (renamed) rename_corners(mesh, name);
+  keep_first(mesh, used, name);
+}
+
+void drop_unused(TriangleMesh& mesh) {
+  const std::vector<std::uint8_t> used = referenced(mesh);
+  if (std::find(used.begin(), used.end(), 0) == used.end()) return;
+  std::vector<std::uint32_t> name(mesh.vertices.size());
+  std::iota(name.begin(), name.end(), 0u);
+  keep_first(mesh, used, name);
 }
 
 TriangleMesh weld_among(const TriangleMesh& mesh, const double tolerance,

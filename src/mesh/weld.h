@@ -14,7 +14,10 @@ TriangleMesh weld(const TriangleMesh& mesh, double tolerance);
 /// The same with tolerance 0, in place.
 void weld_equal(TriangleMesh& mesh);
 
-/// The same, but vertices that are not in `among` (by index) stay apart.
+/// Of these the last step alone: unreferenced vertices are dropped.
+void drop_unused(TriangleMesh& mesh);
+
+/// As weld(), but vertices that are not in `among` (by index) stay apart.
 TriangleMesh weld_among(const TriangleMesh& mesh, double tolerance, const std::vector<bool>& among);
 
 }  // namespace ist

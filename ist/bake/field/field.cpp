@@ -33,7 +33,34 @@ constexpr double kFinest = 1e-5;
 struct Approximation {
   FieldMesh mesh;
   double error = 0;
+  std::optional<FieldArrays> laid_out;  ///< where that was done on the way
 };
+
+/// What the grid of a surface may take.
+std::size_t grid_bytes(const FieldArrays& arrays) {
+  // A small surface's grid is fine, a large one's coarse; beyond kFieldTriangles it is as coarse as
+  // there.
+  const std::size_t triangles = arrays.header.triangle_count;
+  const std::size_t whole = std::min(
+      16'384 + 50 * triangles, std::max(kFieldBytes, kFieldBytes / kFieldTriangles * triangles));
+  std::size_t surface = sizeof(FieldHeader) + 16 * kAssetAlignment;
+  surface += arrays.blocks.size() * sizeof(SurfaceBlock);
+  for (const TreeLevelArrays& level : arrays.levels)
+    surface += level.blocks.size() * (sizeof(BallBlock) + sizeof(Origin));
+  const std::size_t least = 12 * triangles;
+  return whole > surface + least ? whole - surface : least;
+}
+
+/// The blocks and the grid of a surface. `hierarchy()`: it as a view with a hierarchy.
+template <class Hierarchy>
+FieldArrays laid_out(const FieldMesh& mesh, const Hierarchy& hierarchy) {
+  FieldArrays arrays;
+  arrays.header.triangle_count = static_cast<std::uint32_t>(mesh.triangles.size());
+  MeshView view;
+  tbb::parallel_invoke([&] { cut_into_blocks(mesh, arrays); }, [&] { view = hierarchy(); });
+  lay_sign_grid(view, grid_bytes(arrays), arrays);
+  return arrays;
+}
 
 /// The triangles themselves over vertices rounded to float: no point moves further than a vertex.
 Approximation own_triangles(const MeshView& surface) {
@@ -72,12 +99,13 @@ double tolerance_for(VertexClusters& clusters, std::size_t triangles, double gue
 /// Clusters within a tolerance, or nearly: those that turn out to be further off are divided, a few
 /// times over, and so are those for which nothing better can be proven. `choose`: the tolerance for
 /// the clusters as they are.
+/// `lay`: what is to be proven is laid out in the meantime.
 template <class Choose>
 Approximation clustered(VertexClusters& clusters, SolidSurface& surface, KnownDistances& distances,
-                        const WorkStop& stop, const Choose& choose) {
+                        bool lay, const WorkStop& stop, const Choose& choose) {
   constexpr int kRounds = 5, kProofs = 2;
   constexpr double kLoose = 3;  // of what is seen: proven more, it is worth another proof
-  Approximation best{{}, HUGE_VAL};
+  Approximation best{{}, HUGE_VAL, {}};
   int proofs = 0;
   for (int round = 1;; ++round) {
     stop.look();
@@ -89,8 +117,13 @@ Approximation clustered(VertexClusters& clusters, SolidSurface& surface, KnownDi
     std::vector<double> off = error.seen(tolerance);
     const double seen = *std::max_element(off.begin(), off.end());
     if (seen <= 1.25 * tolerance || round >= kRounds) {
-      FieldError::Proven proven = error.proven(seen, kLoose * seen);
-      if (proven.most < best.error) best = {std::move(found.mesh), proven.most};
+      FieldError::Proven proven;
+      std::optional<FieldArrays> laid;
+      const auto lay_out = [&] {
+        if (lay) laid = laid_out(found.mesh, [&] { return hierarchy.view(); });
+      };
+      tbb::parallel_invoke([&] { proven = error.proven(seen, kLoose * seen); }, lay_out);
+      if (proven.most < best.error) best = {std::move(found.mesh), proven.most, std::move(laid)};
       if (proven.most <= kLoose * seen || ++proofs == kProofs) return best;
       off = std::move(proven.at_cluster);
       for (double& at : off) at = at > kLoose * seen ? at : 0;
@@ -106,7 +139,8 @@ std::optional<Approximation> clustered_within(VertexClusters& clusters, SolidSur
   KnownDistances distances(surface.view());
   double fine = 0, coarse = HUGE_VAL, tolerance = max_error / 2;
   for (int attempt = 0; attempt < 8 && coarse > 1.05 * fine; ++attempt) {
-    Approximation tried = clustered(clusters, surface, distances, stop, [&] { return tolerance; });
+    Approximation tried =
+        clustered(clusters, surface, distances, false, stop, [&] { return tolerance; });
     const double ratio = max_error / tried.error;
     if (tried.error <= max_error) {
       fine = tolerance;
@@ -121,25 +155,31 @@ std::optional<Approximation> clustered_within(VertexClusters& clusters, SolidSur
   return best;
 }
 
-/// Fewer triangles than the surface has; nothing where they cannot be as exact as is asked for.
-std::optional<Approximation> simplified(SolidSurface& surface, double max_error,
-                                        const WorkStop& stop) {
+/// Of a surface of too many triangles.
+VertexClusters clusters_of(const MeshView& surface, double max_error) {
   // Cells of edge c span about 3 area / c² triangles.
-  const double cell = std::sqrt(3 * surface_area(surface.arrays()) / kFieldTriangles);
-  const int levels = max_error > 0 ? 10 : 7;
-  VertexClusters clusters(surface.arrays(), 8 * cell, levels);
+  const double cell = std::sqrt(3 * surface_area(surface) / kFieldTriangles);
+  return VertexClusters(surface, 8 * cell, max_error > 0 ? 10 : 7);
+}
+
+/// Fewer triangles than the surface has; nothing where they cannot be as exact as is asked for.
+std::optional<Approximation> simplified(SolidSurface& surface, VertexClusters& clusters,
+                                        double max_error, const WorkStop& stop) {
   if (max_error > 0) return clustered_within(clusters, surface, max_error, stop);
   KnownDistances distances(surface.view());
-  double guess = cell / 4;  // rather too coarse: fine clusters are many
-  return clustered(clusters, surface, distances, stop, [&] {
+  double guess = clusters.coarsest() / 32;  // rather too coarse: fine clusters are many
+  return clustered(clusters, surface, distances, true, stop, [&] {
     return guess = tolerance_for(clusters, kFieldTriangles, guess, kFinest);
   });
 }
 
-Approximation approximate(SolidSurface& surface, double max_error, const WorkStop& stop) {
+/// `clusters`: of the surface, where they are made already.
+Approximation approximate(SolidSurface& surface, std::optional<VertexClusters> clusters,
+                          double max_error, const WorkStop& stop) {
   const std::size_t triangles = surface.arrays().triangle_count;
   if (triangles > kFieldTriangles) {
-    std::optional<Approximation> few = simplified(surface, max_error, stop);
+    if (!clusters) clusters.emplace(clusters_of(surface.arrays(), max_error));
+    std::optional<Approximation> few = simplified(surface, *clusters, max_error, stop);
     if (few && !few->mesh.triangles.empty() && few->mesh.triangles.size() < triangles)
       return std::move(*few);
   }
@@ -150,40 +190,33 @@ Approximation approximate(SolidSurface& surface, double max_error, const WorkSto
   return own;
 }
 
-/// What the grid of a surface may take.
-std::size_t grid_bytes(const FieldArrays& arrays) {
-  // A small surface's grid is fine, a large one's coarse; beyond kFieldTriangles it is as coarse as
-  // there.
-  const std::size_t triangles = arrays.header.triangle_count;
-  const std::size_t whole = std::min(
-      16'384 + 50 * triangles, std::max(kFieldBytes, kFieldBytes / kFieldTriangles * triangles));
-  std::size_t surface = sizeof(FieldHeader) + 16 * kAssetAlignment;
-  surface += arrays.blocks.size() * sizeof(SurfaceBlock);
-  for (const TreeLevelArrays& level : arrays.levels)
-    surface += level.blocks.size() * (sizeof(BallBlock) + sizeof(Origin));
-  const std::size_t least = 12 * triangles;
-  return whole > surface + least ? whole - surface : least;
-}
-
 }  // namespace
 
 std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error,
                                        const WorkStop& stop) {
-  std::optional<SolidSurface> surface = SolidSurface::of(
-      solid, max_error > 0 ? std::min(kOverlapWidth, max_error / 2) : kOverlapWidth);
+  std::optional<SolidSurface> surface;
+  std::optional<VertexClusters> clusters;
+  const auto find_surface = [&] {
+    surface = SolidSurface::of(
+        solid, max_error > 0 ? std::min(kOverlapWidth, max_error / 2) : kOverlapWidth);
+  };
+  if (SolidSurface::keeps_all(solid) && solid.arrays().triangle_count > kFieldTriangles)
+    tbb::parallel_invoke(find_surface,
+                         [&] { clusters.emplace(clusters_of(solid.arrays(), max_error)); });
+  else
+    find_surface();
   if (!surface) return std::nullopt;
   // The surface's own distance from the solid comes on top.
-  Approximation near = approximate(*surface, max_error > 0 ? max_error - surface->off() : 0, stop);
+  Approximation near = approximate(*surface, std::move(clusters),
+                                   max_error > 0 ? max_error - surface->off() : 0, stop);
   near.error += surface->off();
   if (near.mesh.triangles.empty()) return std::nullopt;
-  FieldArrays arrays;
-  arrays.header.error = near.error;
-  arrays.header.triangle_count = static_cast<std::uint32_t>(near.mesh.triangles.size());
-  std::optional<FieldHierarchy> hierarchy;
-  tbb::parallel_invoke([&] { cut_into_blocks(near.mesh, arrays); },
-                       [&] { hierarchy.emplace(near.mesh); });
-  lay_sign_grid(hierarchy->view(), grid_bytes(arrays), arrays);
-  return arrays;
+  if (!near.laid_out) {
+    std::optional<FieldHierarchy> hierarchy;
+    near.laid_out = laid_out(near.mesh, [&] { return hierarchy.emplace(near.mesh).view(); });
+  }
+  near.laid_out->header.error = near.error;
+  return std::move(*near.laid_out);
 }
 
 }  // namespace ist

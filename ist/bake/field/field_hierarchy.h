@@ -23,8 +23,8 @@ class FieldHierarchy {
              corners_.data(),
              static_cast<std::uint32_t>(mesh.vertices.size()),
              static_cast<std::uint32_t>(mesh.triangles.size()),
-             bvh_.nodes.data(),
-             bvh_.blocks.data(),
+             bvh_.nodes.get(),
+             bvh_.blocks.get(),
              bvh_.root};
   }
   FieldHierarchy(const FieldHierarchy&) = delete;

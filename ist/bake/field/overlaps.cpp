@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <map>
@@ -10,6 +11,7 @@
 
 #include "bake/field/winding_sides.h"
 #include "mesh/disjoint_sets.h"
+#include "mesh/exact_triangle.h"
 #include "mesh/self_intersections.h"
 #include "mesh/surface_reduction.h"
 
@@ -30,9 +32,11 @@ double between(const MeshView& mesh, std::uint32_t a, std::uint32_t b) {
 double farthest_from_boundary(const MeshView& mesh, const Overlaps& overlaps,
                               const std::vector<std::uint32_t>& others) {
   std::vector<double> way(mesh.vertex_count, HUGE_VAL);
-  for (std::size_t t = 0; t < overlaps.part.size(); ++t)
+  tbb::parallel_for(std::size_t{0}, overlaps.part.size(), [&](const std::size_t t) {
     if (overlaps.part[t] == Part::boundary)
-      for (std::size_t k = 0; k < 3; ++k) way[mesh.triangles[3 * t + k]] = 0;
+      for (std::size_t k = 0; k < 3; ++k)
+        std::atomic_ref(way[mesh.triangles[3 * t + k]]).store(0, std::memory_order_relaxed);
+  });
   for (bool shorter = true; shorter;) {
     shorter = false;
     for (const std::uint32_t t : others)
@@ -104,35 +108,41 @@ double off_boundary(const MeshView& mesh, const Overlaps& overlaps) {
          (1 + 1e-12);
 }
 
+std::optional<SelfIntersections> self_intersections(const MeshView& mesh) {
+  std::vector<Point> vertices(mesh.vertex_count);
+  tbb::parallel_for(std::size_t{0}, vertices.size(), [&](const std::size_t v) {
+    vertices[v] = Eigen::Map<const Point>(mesh.vertices + 3 * v);
+  });
+  std::vector<Triangle> triangles(mesh.triangle_count);
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
+    std::copy_n(mesh.triangles + 3 * t, 3, triangles[t].begin());
+  });
+  return find_self_intersections(vertices, triangles);
+}
+
 }  // namespace
 
 std::optional<Overlaps> find_overlaps(const MeshSolid& solid) {
   const MeshView& mesh = solid.arrays();
-  std::vector<Eigen::Vector3d> vertices(mesh.vertex_count);
-  tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t v) {
-    vertices[v] = Eigen::Map<const Eigen::Vector3d>(mesh.vertices + 3 * v);
-  });
-  std::vector<Triangle> triangles(mesh.triangle_count);
-  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
-    std::copy_n(mesh.triangles + 3 * t, 3, triangles[t].begin());
-  });
   Overlaps out;
   if (solid.meeting_pairs() != nullptr) {
     out.pairs = *solid.meeting_pairs();
   } else {
-    auto found = find_self_intersections(vertices, triangles);
+    auto found = self_intersections(mesh);
     if (!found || !found->pairs) return std::nullopt;
     out.pairs = *std::move(found->pairs);
   }
-  std::vector<std::uint8_t> apart(triangles.size());
-  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
-    apart[t] = is_degenerate(vertices, triangles[t]) ? 1 : 0;
+  std::vector<std::uint8_t> apart(mesh.triangle_count);
+  tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](const std::uint32_t t) {
+    const Corners at = corners_of(mesh, t);  // of equal corners too
+    apart[t] = is_on_a_line(at.p[0], at.p[1], at.p[2]) ? 1 : 0;
   });
   for (const auto& [a, b] : out.pairs) apart[a] = apart[b] = 1;
   const std::vector<std::optional<int>> outside = windings_outside(solid, apart);
-  out.part.resize(triangles.size());
-  for (std::size_t t = 0; t < triangles.size(); ++t)
+  out.part.resize(mesh.triangle_count);
+  tbb::parallel_for(std::size_t{0}, out.part.size(), [&](const std::size_t t) {
     out.part[t] = !outside[t] ? Part::mixed : *outside[t] == 0 ? Part::boundary : Part::inner;
+  });
   out.off = off_boundary(mesh, out);
   return out;
 }

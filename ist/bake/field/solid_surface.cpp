@@ -43,8 +43,8 @@ const MeshView& SolidSurface::view() {
                                        arrays_.vertices + 3 * std::size_t{arrays_.vertex_count});
     hierarchy_ = build_bvh(vertices, triangles_);
     view_ = arrays_;
-    view_.nodes = hierarchy_->nodes.data();
-    view_.blocks = hierarchy_->blocks.data();
+    view_.nodes = hierarchy_->nodes.get();
+    view_.blocks = hierarchy_->blocks.get();
     view_.root = hierarchy_->root;
   }
   return view_;

@@ -8,8 +8,17 @@
 
 namespace ist {
 
-/// Calls visit(corners) for the triangles in leaves that meet a box until one returns false:
-/// whether none did.
+/// Whether the box around a triangle meets another.
+inline bool box_meets(const Corners& t, const float low[3], const float high[3]) {
+  for (int k = 0; k < 3; ++k) {
+    if (t.p[0][k] < low[k] && t.p[1][k] < low[k] && t.p[2][k] < low[k]) return false;
+    if (t.p[0][k] > high[k] && t.p[1][k] > high[k] && t.p[2][k] > high[k]) return false;
+  }
+  return true;
+}
+
+/// Calls is(corners) for the triangles whose boxes meet a box until one is so:
+/// whether none was. The hierarchy has no say in which are asked.
 template <class Is>
 bool none_in_box(const MeshView& surface, const float low[3], const float high[3], const Is& is) {
   std::uint32_t stack[kBvhStackSize];
@@ -19,7 +28,10 @@ bool none_in_box(const MeshView& surface, const float low[3], const float high[3
     const std::uint32_t at = stack[--top];
     if ((at & kBvhLeaf) != 0) {
       for (const std::uint32_t triangle : surface.blocks[at & ~kBvhLeaf].triangle)
-        if (triangle != kNoTriangle && is(corners_of(surface, triangle))) return false;
+        if (triangle != kNoTriangle) {
+          const Corners corners = corners_of(surface, triangle);
+          if (box_meets(corners, low, high) && is(corners)) return false;
+        }
       continue;
     }
     const BvhNode& node = surface.nodes[at];

@@ -88,8 +88,8 @@ VertexClusters::VertexClusters(const MeshView& mesh, double coarsest, int levels
     : mesh_(mesh), areas_(mesh.triangle_count), levels_(static_cast<std::size_t>(levels)) {
   tbb::parallel_invoke(
       [&] {
-        corners_ =
-            IndexLists({mesh.triangles, 3 * std::size_t{mesh.triangle_count}}, mesh.vertex_count);
+        corners_ = IndexLists::of_short_lists(
+            {mesh.triangles, 3 * std::size_t{mesh.triangle_count}}, mesh.vertex_count);
       },
       [&] {
         tbb::parallel_for(std::size_t{0}, levels_.size(), [&](std::size_t l) {

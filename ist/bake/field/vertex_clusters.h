@@ -32,6 +32,8 @@ class VertexClusters {
   /// unit frame, > 0; halved from level to level.
   VertexClusters(const MeshView& mesh, double coarsest, int levels);
 
+  double coarsest() const { return levels_.front().cell; }
+
   /// Vertices go to the largest cell in which the planes of all triangles pass within `tolerance`
   /// (unit frame) of the cluster's place; where no cell is small enough, they stay.
   Clustered within(double tolerance);
@@ -69,8 +71,8 @@ class VertexClusters {
   std::vector<FieldMesh::Triangle> spanning(const std::vector<std::uint32_t>& cluster_of) const;
 
   const MeshView mesh_;
-  IndexLists corners_;             ///< [vertex] 3 triangle + k
-  std::vector<AreaVector> areas_;  ///< [triangle]
+  IndexLists corners_;          ///< [vertex] 3 triangle + k
+  RawArray<AreaVector> areas_;  ///< [triangle]
   std::vector<Level> levels_;
   std::vector<std::uint32_t> chosen_;
   double chosen_within_ = -1;         ///< the tolerance of chosen_

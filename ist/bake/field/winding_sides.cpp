@@ -1,12 +1,14 @@
 #include "bake/field/winding_sides.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <cmath>
 #include <cstddef>
 
 #include "mesh/disjoint_sets.h"
 #include "mesh/edge_table.h"
+#include "stage/raw_array.h"
 
 namespace ist {
 namespace {
@@ -21,7 +23,7 @@ struct Groups {
 };
 
 Groups find_groups(const MeshView& mesh, const std::vector<std::uint8_t>& apart) {
-  std::vector<Triangle> triangles(mesh.triangle_count);
+  RawArray<Triangle> triangles(mesh.triangle_count);
   tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
     triangles[t] = {mesh.triangles[3 * t], mesh.triangles[3 * t + 1], mesh.triangles[3 * t + 2]};
   });
@@ -35,7 +37,7 @@ Groups find_groups(const MeshView& mesh, const std::vector<std::uint8_t>& apart)
   Groups groups;
   groups.of_triangle.resize(triangles.size());
   groups.representative.resize(triangles.size(), kNoTriangle);
-  std::vector<double> area(triangles.size());
+  RawArray<double> area(triangles.size());
   tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t t) {
     groups.of_triangle[t] = sets.find(t);
     const auto [a, b, c] = corners_in(mesh, t);
@@ -75,7 +77,8 @@ std::optional<int> winding_outside(const MeshSolid& solid, std::uint32_t triangl
 std::vector<std::optional<int>> windings_outside(const MeshSolid& solid,
                                                  const std::vector<std::uint8_t>& apart) {
   const MeshView& mesh = solid.arrays();
-  const Groups groups = find_groups(mesh, apart);
+  Groups groups;
+  tbb::parallel_invoke([&] { groups = find_groups(mesh, apart); }, [&] { solid.view(); });
   std::vector<std::optional<int>> outside(mesh.triangle_count);
   tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t t) {
     const std::uint32_t of = groups.representative[t];
@@ -83,8 +86,10 @@ std::vector<std::optional<int>> windings_outside(const MeshSolid& solid,
       outside[t] = winding_outside(solid, of, corners_in(mesh, of));
   });
   // Groups are named by their first triangle.
-  for (std::uint32_t t = 0; t < mesh.triangle_count; ++t)
-    outside[t] = outside[groups.of_triangle[t]];
+  tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t t) {
+    const std::uint32_t first = groups.of_triangle[t];
+    if (first != t) outside[t] = outside[first];
+  });
   return outside;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -18,6 +19,8 @@ struct PolygonMesh {
   std::vector<Eigen::Vector3d> vertices;  ///< [u]
   std::vector<std::uint32_t> corners;     ///< of all polygons, one after the other
   std::vector<std::size_t> ends;          ///< polygon i ends before corners[ends[i]]
+  /// In place of both where a reader finds nothing but triangles.
+  std::vector<std::array<std::uint32_t, 3>> triangles;
   /// Text files only: the line of each vertex that is not finite.
   std::map<std::uint32_t, std::size_t> line_of_nonfinite;
   DeclaredFrame declared;
@@ -47,8 +50,9 @@ PolygonMesh read_collada(const SourceFile& file);
 PolygonMesh read_with_assimp(const SourceFile& file);
 
 /// Polygons into triangles: a fan where it is valid, else ears cut off in the polygon's own plane
-/// (Newell normal), so that concave polygons come out right.
-std::vector<std::array<std::uint32_t, 3>> triangulate(const PolygonMesh& mesh);
+/// (Newell normal), so that concave polygons come out right. What is triangles already is taken
+/// from the mesh.
+std::vector<std::array<std::uint32_t, 3>> triangulate(PolygonMesh& mesh);
 
 /// Appends the triangles of one polygon of three or more corners.
 void triangulate_polygon(const std::vector<Eigen::Vector3d>& vertices, const std::uint32_t* corners,

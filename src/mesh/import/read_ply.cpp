@@ -286,7 +286,7 @@ bool read_triangles(Body& body, const Element& element, const std::uint64_t vert
   Body ahead = body;
   const auto start = ahead.pass_records(element.count, bytes);
   if (!start) return false;
-  std::vector<std::uint32_t> corners(3 * element.count);
+  std::vector<std::array<std::uint32_t, 3>> triangles(element.count);
   std::atomic<bool> sound{true};
   tbb::parallel_for(std::uint64_t{0}, element.count, [&](const std::uint64_t i) {
     const std::size_t position = *start + bytes * i;
@@ -295,15 +295,13 @@ bool read_triangles(Body& body, const Element& element, const std::uint64_t vert
       const double value = body.value_at(position + of_count + of_corner * k, list.type);
       is_sound = is_sound && value >= 0 && value < static_cast<double>(vertex_count) &&
                  value == std::floor(value);
-      if (is_sound) corners[3 * i + k] = static_cast<std::uint32_t>(value);
+      if (is_sound) triangles[i][k] = static_cast<std::uint32_t>(value);
     }
     if (!is_sound) sound.store(false, std::memory_order_relaxed);
   });
   if (!sound) return false;
   body.pass_records(element.count, bytes);
-  mesh.corners = std::move(corners);
-  mesh.ends.resize(element.count);
-  for (std::size_t i = 0; i < mesh.ends.size(); ++i) mesh.ends[i] = 3 * (i + 1);
+  mesh.triangles = std::move(triangles);
   return true;
 }
 

@@ -151,7 +151,8 @@ bool has_triangles_only(const PolygonMesh& mesh) {
 
 }  // namespace
 
-Triangles triangulate(const PolygonMesh& mesh) {
+Triangles triangulate(PolygonMesh& mesh) {
+  if (!mesh.triangles.empty()) return std::move(mesh.triangles);
   if (has_triangles_only(mesh)) {
     Triangles triangles(mesh.ends.size());
     tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
