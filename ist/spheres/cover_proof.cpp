@@ -32,6 +32,8 @@ class SurfaceSearch {
 
   void search(const std::array<Vector3d, 3>& t, const BallList& from, int depth = 0) {
     if (ended_) return;
+    for (const std::uint32_t i : from)
+      if (holds(balls_[i], t)) return;
     const Vector3d middle = (t[0] + t[1] + t[2]) / 3;
     double reach = 0;
     for (const Vector3d& corner : t) reach = std::max(reach, distance(corner, middle));
@@ -43,12 +45,11 @@ class SurfaceSearch {
       double farthest = 0;
       for (const Vector3d& corner : t) farthest = std::max(farthest, distance(corner, ball.centre));
       const double lacks = farthest + kMargin - ball.radius;
-      if (lacks <= 0) return;  // held whole
       gap = std::min(gap, distance(middle, ball.centre) - ball.radius);
       if (lacks < least) {
         least = lacks;
         part.ball = i;
-        part.radius = farthest + 2 * kMargin;
+        part.radius = farthest + 4 * kMargin;
       }
     }
     part.gap = std::max(0.0, gap);
@@ -66,6 +67,14 @@ class SurfaceSearch {
   }
 
  private:
+  static bool holds(const CoverSphere& ball, const std::array<Vector3d, 3>& t) {
+    const double within = ball.radius - 2 * kMargin;
+    if (!(within > 0)) return false;
+    for (const Vector3d& corner : t)
+      if ((corner - ball.centre).squaredNorm() > within * within) return false;
+    return true;
+  }
+
   static constexpr int kDeepest = 120;
   std::span<const CoverSphere> balls_;
   const double finest_;
