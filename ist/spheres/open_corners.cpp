@@ -3,6 +3,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -36,7 +37,12 @@ bool holds(const CoverSphere& ball, const Points& points) {
 
 class Cutter {
  public:
-  explicit Cutter(std::span<const CoverSphere> balls) : balls_(balls) {}
+  /// Of triangles within a box.
+  Cutter(std::span<const CoverSphere> balls, const Eigen::AlignedBox3d& box) : balls_(balls) {
+    for (std::uint32_t i = 0; i < balls.size(); ++i)
+      if (box.squaredExteriorDistance(balls[i].centre) <= balls[i].radius * balls[i].radius)
+        touching_.push_back(i);
+  }
 
   /// `holder`: tried first, and set to what holds the triangle whole.
   void cut(const Corners& triangle, std::uint32_t& holder, std::vector<OpenCorner>& out) {
@@ -47,7 +53,7 @@ class Cutter {
       reach2 = std::max(reach2, (corner - middle).squaredNorm());
     const double reach = std::sqrt(reach2);
     near_.clear();
-    for (std::uint32_t i = 0; i < balls_.size(); ++i) {
+    for (const std::uint32_t i : touching_) {
       const double d2 = (middle - balls_[i].centre).squaredNorm();
       const double touching = balls_[i].radius + reach;
       if (!(balls_[i].radius > 0) || d2 > touching * touching) continue;
@@ -104,7 +110,7 @@ class Cutter {
   }
 
   const std::span<const CoverSphere> balls_;
-  std::vector<std::uint32_t> near_;
+  std::vector<std::uint32_t> touching_, near_;  ///< balls that reach to the box, and to a triangle
   Polygon piece_, clipped_;
 };
 
@@ -113,12 +119,15 @@ class Cutter {
 std::vector<OpenCorner> open_corners(const MeshView& mesh, std::span<const CoverSphere> balls,
                                      std::vector<std::uint32_t>& holders) {
   holders.resize(mesh.triangle_count, UINT32_MAX);
-  constexpr std::uint32_t kBlock = 128;  // triangles
+  constexpr std::uint32_t kBlock = 32;  // triangles
   const std::uint32_t blocks = (mesh.triangle_count + kBlock - 1) / kBlock;
   std::vector<std::vector<OpenCorner>> found(blocks);
   tbb::parallel_for(std::uint32_t{0}, blocks, [&](std::uint32_t block) {
-    Cutter cutter(balls);
     const std::uint32_t end = std::min(mesh.triangle_count, (block + 1) * kBlock);
+    Eigen::AlignedBox3d box;
+    for (std::uint32_t t = block * kBlock; t < end; ++t)
+      for (const Vector3d& corner : corners_of(mesh, t)) box.extend(corner);
+    Cutter cutter(balls, box);
     for (std::uint32_t t = block * kBlock; t < end; ++t)
       cutter.cut(corners_of(mesh, t), holders[t], found[block]);
   });
