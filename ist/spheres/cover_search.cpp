@@ -27,7 +27,7 @@ constexpr std::size_t kTargetsABall = 60;  ///< on faces
 constexpr std::size_t kCandidates = 1200;  ///< that exchanges choose from, about
 constexpr double kThinning = 0.3;          ///< levels between targets that exchanges look at
 constexpr std::size_t kExchanges = 1500;   ///< at a level
-constexpr std::int64_t kSteps = 400'000'000;  ///< of all exchanges of a pass
+constexpr std::int64_t kSteps = 100'000'000;  ///< of all exchanges of a pass
 constexpr int kLevels = 24;                   ///< that exchanges try
 constexpr double kFinest = 1e-3;  ///< of the level: how close the last radii are to just enough
 
