@@ -123,16 +123,6 @@ TEST(CoverSpheres, TheProofSeesAVoidInside) {
   EXPECT_TRUE(prove_cover(mesh, shell).covered);
 }
 
-/// Where two spheres are one, or nearly, their surfaces cross any third one in two circles at once.
-TEST(CoverSpheres, TheProofHoldsForSpheresThatCoincide) {
-  const ClosedMesh mesh = close_mesh(cube_mesh(), "cube");
-  for (const double apart : {0.0, 1e-14, 1e-11}) {
-    const std::vector<CoverSphere> spheres = {
-        {{0, 0, 0}, 0.88}, {{apart, 0, 0}, 0.88}, {{0.1, 0.2, 0.3}, 0.8}};
-    EXPECT_TRUE(prove_cover(mesh, spheres).covered) << apart;
-  }
-}
-
 /// Every ball around a ball protrudes everywhere by about as much: the search has no way down.
 TEST(CoverSpheres, FewSpheresOnABallAreHardlyWorseThanOneAroundIt) {
   const ClosedMesh mesh = close_mesh(icosphere_mesh(2), "ball");
