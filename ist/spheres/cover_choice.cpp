@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "numerics/hashing.h"
-#include "spheres/point_tree.h"
+#include "spheres/point_grid.h"
 
 namespace ist {
 namespace {
@@ -15,16 +15,15 @@ constexpr std::int64_t kStepsAPair = 20;  ///< that finding and sorting it costs
 
 /// Which candidate holds which targets, both ways.
 struct Incidence {
-  std::vector<std::vector<std::uint32_t>> held;     ///< targets of a candidate, ascending
+  std::vector<std::vector<std::uint32_t>> held;     ///< targets of a candidate
   std::vector<std::vector<std::uint32_t>> holders;  ///< candidates of a target, ascending
 
   Incidence(std::span<const CoverSphere> candidates, std::span<const Eigen::Vector3d> targets)
       : held(candidates.size()), holders(targets.size()) {
-    const PointTree tree(std::vector<Eigen::Vector3d>(targets.begin(), targets.end()));
+    const PointGrid grid(targets);
     tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t j) {
-      tree.within(candidates[j].centre, candidates[j].radius,
-                  [&](std::uint32_t x, double) { held[j].push_back(x); });
-      std::sort(held[j].begin(), held[j].end());
+      grid.within(candidates[j].centre, candidates[j].radius,
+                  [&](std::uint32_t x, float) { held[j].push_back(x); });
     });
     for (std::uint32_t j = 0; j < candidates.size(); ++j) {
       for (const std::uint32_t x : held[j]) holders[x].push_back(j);

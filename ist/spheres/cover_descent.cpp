@@ -1,10 +1,16 @@
 #include "spheres/cover_descent.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <unordered_set>
 
-#include "spheres/offset_surface.h"
+#include "spheres/cell_key.h"
+#include "spheres/cover_proof.h"
+#include "spheres/open_corners.h"
+#include "spheres/protrusion.h"
 #include "spheres/recentre.h"
 
 namespace ist {
@@ -12,109 +18,217 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double kFirstStep = 0.08;  ///< by which the level is lowered at a time
 constexpr double kLastStep = 0.003;
-constexpr int kPatience = 5;  ///< rounds at a level without gain
+constexpr double kHeld = 0.002;       ///< of the level: a gap so small is none
+constexpr double kBeyond = 1.005;     ///< of the level: what reaches no further needs no ray
+constexpr double kWorthwhile = 0.01;  ///< by which a level has to fall before rays are looked at
+constexpr int kPatience = 3;          ///< looks at a level without gain
+constexpr double kVouched = 0.9;  ///< of a level: further down what was seen there is not believed
+constexpr int kRoundsALook = 3;
+constexpr double kApart = 0.05;  ///< levels between targets that a look adds
+
+std::vector<CoverSphere> grown(std::vector<CoverSphere> balls, double by) {
+  for (CoverSphere& ball : balls) ball.radius += by;
+  return balls;
+}
 
 }  // namespace
+
+/// Where the balls are, and how far each may go at a time.
+struct CoverDescent::Balls {
+  Balls(const OffsetSurface& surface, double level, std::vector<Vector3d> at)
+      : centres(std::move(at)), trust(centres.size(), 0.5 * level) {
+    measure(surface, level);
+  }
+
+  void measure(const OffsetSurface& surface, double level) {
+    radii.clear();
+    for (const Vector3d& c : centres)
+      radii.push_back(surface.radius(c) - (surface.level() - level));
+  }
+
+  std::vector<CoverSphere> spheres() const {
+    std::vector<CoverSphere> spheres;
+    for (std::size_t i = 0; i < centres.size(); ++i) spheres.push_back({centres[i], radii[i]});
+    return spheres;
+  }
+
+  std::vector<Vector3d> centres;
+  std::vector<double> radii, trust;
+};
 
 /// All balls at one level, a little below that of the surface: where the solid is convex, the
 /// largest ball shrinks as the level falls, and elsewhere nearly.
 class CoverDescent::Round {
  public:
-  Round(const CoverDescent& descent, const OffsetSurface& surface, double level,
-        std::vector<Vector3d> centres)
-      : descent_(descent),
+  Round(const PointGrid& targets, const OffsetSurface& surface, double level, Balls& balls)
+      : targets_(targets),
         surface_(surface),
         level_(level),
-        centres_(std::move(centres)),
-        trust_(centres_.size(), 0.5 * level),
-        holders_(descent.targets_.size(), 0) {
-    for (const Vector3d& c : centres_) radii_.push_back(radius_at(c));
-    for (std::size_t i = 0; i < centres_.size(); ++i) count(i, 1);
+        balls_(balls),
+        holders_(targets.size(), 0) {
+    for (std::size_t i = 0; i < balls.centres.size(); ++i)
+      targets_.within(balls_.centres[i], balls_.radii[i],
+                      [&](std::uint32_t x, float) { ++holders_[x]; });
+    for (std::uint32_t x = 0; x < targets_.size(); ++x)
+      if (holders_[x] == 0) open_.push_back(x);
   }
 
-  const std::vector<Vector3d>& centres() const { return centres_; }
-
-  /// By how much the worst target is short of its nearest ball; 0 where all are held.
-  double worst() const {
-    double worst = 0;
-    for (std::size_t x = 0; x < holders_.size(); ++x) {
-      if (holders_[x] != 0) continue;
-      double least = std::numeric_limits<double>::infinity();
-      for (std::size_t i = 0; i < centres_.size(); ++i)
-        least = std::min(least,
-                         std::sqrt((descent_.targets_[x] - centres_[i]).squaredNorm()) - radii_[i]);
-      worst = std::max(worst, least);
-    }
-    return worst;
-  }
-
-  void move_all() {
-    for (std::size_t i = 0; i < centres_.size(); ++i) move(i);
+  /// Returns whether a ball moved.
+  bool move_all() {
+    bool moved = false;
+    for (std::size_t i = 0; i < balls_.centres.size(); ++i) moved |= may_help(i) && move(i);
+    return moved;
   }
 
  private:
-  void count(std::size_t i, int by) {
-    descent_.tree_.within(centres_[i], radii_[i],
-                          [&](std::uint32_t x, double) { holders_[x] += by; });
-  }
-
-  double radius_at(const Vector3d& c) const {
-    return surface_.radius(c) - (surface_.level() - level_);
-  }
-
-  void move(std::size_t i) {
-    const double level = level_;
-    if (!(radii_[i] > 0)) return;
-    const double within2 = radii_[i] * radii_[i];
-    needed_.clear();
-    bool short_of_one = false;
-    descent_.tree_.within(centres_[i], radii_[i] + kReach * level, [&](std::uint32_t x, double d2) {
-      if (holders_[x] != (d2 <= within2 ? 1 : 0)) return;
-      needed_.push_back(descent_.targets_[x]);
-      short_of_one = short_of_one || d2 > within2;
+  /// Whether an open target is within reach of the ball.
+  bool may_help(std::size_t i) {
+    std::erase_if(open_, [&](std::uint32_t x) { return holders_[x] != 0; });
+    const double reach = balls_.radii[i] + kReach * level_;
+    return std::any_of(open_.begin(), open_.end(), [&](std::uint32_t x) {
+      return (targets_.point(x) - balls_.centres[i]).squaredNorm() <= reach * reach;
     });
-    if (!short_of_one) return;
-    const double trust = trust_[i];
+  }
+
+  bool move(std::size_t i) {
+    Vector3d& centre = balls_.centres[i];
+    double& radius = balls_.radii[i];
+    if (!(radius > 0)) return false;
+    const auto within = static_cast<float>(radius);
+    const float within2 = within * within;
+    needed_.clear();
+    targets_.within(centre, radius + kReach * level_, [&](std::uint32_t x, float d2) {
+      if (holders_[x] == (d2 <= within2 ? 1 : 0)) needed_.push_back(targets_.point(x));
+    });
+    double& trust = balls_.trust[i];
     walls_.clear();
-    surface_.walls(centres_[i], radii_[i] + (surface_.level() - level) + 2 * trust, walls_);
-    const Recentred moved = recentre(centres_[i], needed_, walls_, trust);
-    const double radius = radius_at(moved.centre);
-    const double way = std::sqrt((moved.centre - centres_[i]).squaredNorm());
-    trust_[i] = std::clamp(way > 0 ? 2 * way : 0.5 * trust, 0.02 * level, 0.7 * level);
-    if (!(radius > 0) || !(way > 0)) return;
-    count(i, -1);
-    centres_[i] = moved.centre;
-    radii_[i] = radius;
-    count(i, 1);
+    surface_.walls(centre, radius + (surface_.level() - level_) + 2 * trust, walls_);
+    const Recentred moved = recentre(centre, needed_, walls_, trust);
+    const double next = surface_.radius(moved.centre) - (surface_.level() - level_);
+    const double way = std::sqrt((moved.centre - centre).squaredNorm());
+    trust = std::clamp(way > 0 ? 2 * way : 0.5 * trust, 0.02 * level_, 0.7 * level_);
+    if (!(next > 0) || !(way > 0)) return false;
+    targets_.within(centre, radius, [&](std::uint32_t x, float) {
+      if (--holders_[x] == 0) open_.push_back(x);
+    });
+    centre = moved.centre;
+    radius = next;
+    targets_.within(centre, radius, [&](std::uint32_t x, float) { ++holders_[x]; });
+    return true;
   }
 
   static constexpr double kReach = 0.7;  ///< levels beyond its surface a ball looks at
 
-  const CoverDescent& descent_;
+  const PointGrid& targets_;
   const OffsetSurface& surface_;
   const double level_;
-  std::vector<Vector3d> centres_;
-  std::vector<double> radii_, trust_;
-  std::vector<int> holders_;  ///< balls that hold a target
+  Balls& balls_;
+  std::vector<int> holders_;         ///< balls that hold a target
+  std::vector<std::uint32_t> open_;  ///< targets that none holds, and some that one does by now
   std::vector<Vector3d> needed_, walls_;
 };
 
-LevelCover CoverDescent::improve(LevelCover cover, double step, int rounds) const {
-  const OffsetSurface surface(solid_, sampled_, cover.level);
-  while (step > kLastStep && rounds > 0) {
+/// Returns how far the worst place is outside.
+double CoverDescent::add_targets(const std::vector<CoverSphere>& balls, double level) {
+  std::vector<OpenCorner> open = open_corners(solid_.arrays(), balls, holders_);
+  std::stable_sort(open.begin(), open.end(),
+                   [](const OpenCorner& a, const OpenCorner& b) { return a.gap > b.gap; });
+  std::unordered_set<std::uint64_t> seen;
+  for (const OpenCorner& corner : open) {
+    if (corner.gap <= kHeld * level) break;
+    if (seen.insert(cell_key(corner.place, kApart * level)).second)
+      sampled_.targets.push_back(corner.place);
+  }
+  return open.empty() ? 0 : open.front().gap;
+}
+
+/// Returns by how much the worst ball reaches too far.
+double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<CoverSphere>& balls,
+                              double level) {
+  std::vector<std::vector<Vector3d>> beyond(balls.size());
+  std::vector<double> further(balls.size(), 0);
+  vouched_.resize(balls.size(), {Vector3d::Zero(), 0});
+  tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t i) {
+    // What the distance alone vouches for needs no look.
+    CoverSphere& vouched = vouched_[i];
+    if (vouched.centre == balls[i].centre && level <= vouched.radius &&
+        level > kVouched * vouched.radius)
+      return;
+    // What the distance alone vouches for needs no look.
+    if (vouched_[i].centre == balls[i].centre && level <= vouched_[i].radius &&
+        level > 0.9 * vouched_[i].radius)
+      return;
+    if (balls[i].radius <=
+        (surface.sure_radius(balls[i].centre) - surface.level() + level) * (1 + 1e-9))
+      return;
+    further[i] =
+        guessed_protrusion(solid_, balls[i], 0.05, kBeyond * level, beyond[i]).least - level;
+    if (further[i] <= (kBeyond - 1) * level) {
+      further[i] = 0;
+      vouched = {balls[i].centre, level};
+    }
+  });
+  std::unordered_set<std::uint64_t> seen;
+  for (const auto& points : beyond) {
+    for (const Vector3d& p : points) {
+      if (!seen.insert(cell_key(p, 0.2 * level)).second) continue;
+      const ClosestPoint foot = solid_.closest_point(p);
+      sampled_.rays.push_back({foot.point, (p - foot.point) / foot.distance, foot.distance});
+    }
+  }
+  return std::max(0.0, *std::max_element(further.begin(), further.end()));
+}
+
+/// Returns how deep the place lies that was found, 0 if none was.
+double CoverDescent::add_void(const std::vector<CoverSphere>& balls, double level) {
+  const OpenPlace open = open_void(solid_, balls);
+  if (!open.found || open.gap <= kHeld * level) return 0;
+  sampled_.targets.push_back(open.place);
+  return open.gap;
+}
+
+LookedCover CoverDescent::improve(LevelCover start, int rounds, const std::function<void()>& look) {
+  LookedCover looked = {std::move(start), {}};
+  LevelCover& cover = looked.cover;
+  // What the samples hold at is no level yet: the first look says what it is.
+  for (double step = 0; rounds > 0 && (step == 0 || step > kLastStep);) {
+    const bool first = step == 0;
     const double aim = cover.level * (1 - step);
-    Round round(*this, surface, aim, cover.centres);
+    OffsetSurface surface(solid_, sampled_, cover.level);
+    Balls balls(surface, aim, cover.centres);
     double best_here = std::numeric_limits<double>::infinity();
     bool gained = false;
-    for (int idle = 0; idle < kPatience && rounds > 0; --rounds) {
-      round.move_all();
-      const double level = aim + round.worst();
-      if (level < cover.level * (1 - 1e-4)) {
-        cover = {round.centres(), level};
-        gained = true;
+    for (int idle = 0; idle < kPatience && rounds > 0;) {
+      if (!first) {
+        const PointGrid targets(sampled_.targets);
+        Round round(targets, surface, aim, balls);
+        for (int k = 0; k < kRoundsALook; ++k, --rounds)
+          if (!round.move_all()) break;
       }
-      if (level <= aim) break;
+      look();
+      const std::vector<CoverSphere> spheres = balls.spheres();
+      double level = aim + add_targets(spheres, aim);
+      const auto is_better = [&] {
+        return first || level < (1 - kWorthwhile) * cover.level ||
+               (level < cover.level && level <= aim * (1 + kHeld));
+      };
+      if (is_better()) {
+        level += add_void(grown(spheres, level - aim + kHeld * aim), aim);
+        const std::size_t rays = sampled_.rays.size();
+        if (is_better()) level = std::max(level, aim + add_rays(surface, spheres, aim));
+        if (is_better()) {
+          cover = {balls.centres, level};
+          looked.balls = grown(spheres, level - aim);
+          gained = true;
+        }
+        if (sampled_.rays.size() != rays) {
+          surface = OffsetSurface(solid_, sampled_, cover.level);
+          balls.measure(surface, aim);
+        }
+      }
+      if (first || level <= aim * (1 + kHeld)) break;
       if (level < best_here * (1 - 1e-3)) {
         best_here = level;
         idle = 0;
@@ -122,9 +236,12 @@ LevelCover CoverDescent::improve(LevelCover cover, double step, int rounds) cons
         ++idle;
       }
     }
-    if (!gained) step *= 0.5;
+    if (first)
+      step = kFirstStep;
+    else if (!gained)
+      step *= 0.5;
   }
-  return cover;
+  return looked;
 }
 
 }  // namespace ist

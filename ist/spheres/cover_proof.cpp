@@ -15,6 +15,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kMargin = 1e-12;       ///< unit frame, above the rounding of any distance here
+constexpr double kSmallCube = 1e-3;     ///< unit frame
 constexpr double kSmallestCube = 1e-9;  ///< unit frame: smaller ones stay unproven
 constexpr double kSmallBesideGap = 0.25;
 
@@ -32,6 +33,8 @@ class SurfaceSearch {
 
   void search(const std::array<Vector3d, 3>& t, const BallList& from, int depth = 0) {
     if (ended_) return;
+    for (const std::uint32_t i : from)
+      if (holds(balls_[i], t)) return;
     const Vector3d middle = (t[0] + t[1] + t[2]) / 3;
     double reach = 0;
     for (const Vector3d& corner : t) reach = std::max(reach, distance(corner, middle));
@@ -43,12 +46,11 @@ class SurfaceSearch {
       double farthest = 0;
       for (const Vector3d& corner : t) farthest = std::max(farthest, distance(corner, ball.centre));
       const double lacks = farthest + kMargin - ball.radius;
-      if (lacks <= 0) return;  // held whole
       gap = std::min(gap, distance(middle, ball.centre) - ball.radius);
       if (lacks < least) {
         least = lacks;
         part.ball = i;
-        part.radius = farthest + 2 * kMargin;
+        part.radius = farthest + 4 * kMargin;
       }
     }
     part.gap = std::max(0.0, gap);
@@ -66,6 +68,14 @@ class SurfaceSearch {
   }
 
  private:
+  static bool holds(const CoverSphere& ball, const std::array<Vector3d, 3>& t) {
+    const double within = ball.radius - 2 * kMargin;
+    if (!(within > 0)) return false;
+    for (const Vector3d& corner : t)
+      if ((corner - ball.centre).squaredNorm() > within * within) return false;
+    return true;
+  }
+
   static constexpr int kDeepest = 120;
   std::span<const CoverSphere> balls_;
   const double finest_;
@@ -110,12 +120,13 @@ class VoidSearch {
       kept.push_back(i);
     }
     if (crossing < 3 || may_rise(cube, kept)) return Verdict::settled;
-    if (gap > 0) {
+    // Where balls nearly coincide only this ends the division.
+    if (gap > 0 || cube.half < kSmallCube) {
       const double corner = 1.7320508075688774 * cube.half + kMargin;
       if (!solid_.inside(cube.middle)) {
         if (solid_.closest_point(cube.middle, corner).triangle == kNoTriangle)
           return Verdict::settled;
-      } else if (solid_.closest_point(cube.middle, kMargin).triangle == kNoTriangle &&
+      } else if (gap > 0 && solid_.closest_point(cube.middle, kMargin).triangle == kNoTriangle &&
                  gap > kMargin) {
         open = {true, cube.middle, gap};
         return Verdict::open;
@@ -171,6 +182,23 @@ BallList all_of(std::size_t count) {
   return all;
 }
 
+/// Those that no other ball holds whole: the union is the same without the others, and coincident
+/// spheres would cross everywhere.
+BallList outermost(std::span<const CoverSphere> balls) {
+  BallList list;
+  for (std::uint32_t i = 0; i < balls.size(); ++i) {
+    const auto is_held = [&](std::uint32_t by) {
+      const double reach = distance(balls[i].centre, balls[by].centre) + balls[i].radius;
+      const bool same = balls[i].centre == balls[by].centre && balls[i].radius == balls[by].radius;
+      return same ? by < i : by != i && reach + kMargin <= balls[by].radius;
+    };
+    bool held = false;
+    for (std::uint32_t by = 0; by < balls.size() && !held; ++by) held = is_held(by);
+    if (!held) list.push_back(i);
+  }
+  return list;
+}
+
 }  // namespace
 
 std::vector<OpenPart> open_surface(const MeshView& mesh, std::span<const CoverSphere> balls,
@@ -193,7 +221,7 @@ OpenPlace open_void(const MeshSolid& solid, std::span<const CoverSphere> balls) 
   const VoidSearch search(solid, balls);
   // Four levels at once, then a task a cube.
   std::vector<std::pair<VoidSearch::Cube, BallList>> cubes = {
-      {{Vector3d::Zero(), 1.0 + 1e-9}, all_of(balls.size())}};
+      {{Vector3d::Zero(), 1.0 + 1e-9}, outermost(balls)}};
   for (int level = 0; level < 4; ++level) {
     std::vector<std::pair<VoidSearch::Cube, BallList>> next;
     BallList kept;

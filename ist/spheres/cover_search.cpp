@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <unordered_set>
 #include <utility>
 
@@ -20,23 +21,36 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kAttempts = 2;      ///< searches, of which the best counts
-constexpr int kCuts = 14;         ///< rounds of descending and looking what was missed
-constexpr int kFirstRounds = 25;  ///< over all balls, before the first look
-constexpr int kRounds = 8;        ///< between two looks
-constexpr std::size_t kExchanges = 1500;
-constexpr std::int64_t kSteps = 400'000'000;   ///< of all exchanges of an attempt
-constexpr std::size_t kOpenParts = 1'000'000;  ///< that a look takes in, about
-constexpr int kLevels = 24;                    ///< that exchanges try
+constexpr int kPasses = 2;                 ///< of exchanges and descent, of which the best counts
+constexpr int kRounds = 120;               ///< of a descent, over all balls
+constexpr std::size_t kTargetsABall = 60;  ///< on faces
+constexpr std::size_t kCandidates = 1200;  ///< that exchanges choose from, about
+constexpr double kThinning = 0.3;          ///< levels between targets that exchanges look at
+constexpr std::size_t kExchanges = 1500;   ///< at a level
+constexpr std::int64_t kSteps = 100'000'000;  ///< of all exchanges of a pass
+constexpr int kLevels = 24;                   ///< that exchanges try
 constexpr double kFinest = 1e-3;  ///< of the level: how close the last radii are to just enough
 
-std::vector<CoverSphere> balls_at(const OffsetSurface& surface,
-                                  const std::vector<Vector3d>& centres) {
-  std::vector<CoverSphere> balls;
-  for (const Vector3d& c : centres)
-    if (const double r = surface.radius(c); r > 0) balls.push_back({c, r});
-  return balls;
-}
+/// Centres of candidates, and how deep they lie.
+struct Candidates {
+  Candidates(const MeshSolid& solid, std::vector<Vector3d> places)
+      : centres(std::move(places)), depths(centres.size()) {
+    tbb::parallel_for(std::size_t{0}, centres.size(),
+                      [&](std::size_t i) { depths[i] = depth_in(solid, centres[i]); });
+  }
+
+  /// The largest balls around them, those that there are.
+  std::vector<CoverSphere> balls_at(const OffsetSurface& surface) const {
+    std::vector<CoverSphere> balls;
+    for (std::size_t i = 0; i < centres.size(); ++i)
+      if (const double r = surface.radius(centres[i], depths[i]); r > 0)
+        balls.push_back({centres[i], r});
+    return balls;
+  }
+
+  std::vector<Vector3d> centres;
+  std::vector<double> depths;
+};
 
 std::vector<Vector3d> centres_of(const std::vector<CoverSphere>& balls,
                                  const std::vector<std::uint32_t>& chosen) {
@@ -54,26 +68,20 @@ std::vector<Vector3d> thinned(const std::vector<Vector3d>& points, double cell) 
   return some;
 }
 
-/// A cover at its level, its balls as they were looked at, and how far it may be wrong.
-struct Looked {
-  LevelCover cover;
-  std::vector<CoverSphere> balls;
-  double level = 0;  ///< that it has, but for what grows where little was missed
-};
-
 SampledSolid sampled_for(const MeshSolid& solid, std::size_t count) {
-  return sample_solid(solid, std::clamp<std::size_t>(80 * count, 4000, 60000));
+  return sample_solid(solid, std::clamp<std::size_t>(kTargetsABall * count, 1000, 60000));
 }
 
 /// The lowest level at which a greedy choice of balls around the medial axis is enough.
 LevelCover greedy_cover(const MeshSolid& solid, const SampledSolid& sampled, std::size_t count) {
-  const std::vector<Vector3d> centres = OffsetSurface(solid, sampled, 0).medial_centres(800);
+  const Candidates candidates(solid, OffsetSurface(solid, sampled, 0).medial_centres(800));
   const std::vector<Vector3d> targets = thinned(sampled.targets, 2 * sampled.spacing);
   double low = 1e-3, high = 1;
   LevelCover best;
   for (int k = 0; k < 7; ++k) {
     const double level = std::sqrt(low * high);
-    const std::vector<CoverSphere> balls = balls_at(OffsetSurface(solid, sampled, level), centres);
+    const std::vector<CoverSphere> balls =
+        candidates.balls_at(OffsetSurface(solid, sampled, level));
     const std::vector<std::uint32_t> chosen = choose_greedily(balls, targets);
     if (!chosen.empty() && chosen.size() <= count) {
       best = {centres_of(balls, chosen), level};
@@ -87,116 +95,32 @@ LevelCover greedy_cover(const MeshSolid& solid, const SampledSolid& sampled, std
   return best;
 }
 
-/// One search, on samples of its own.
-class Attempt {
- public:
-  Attempt(const MeshSolid& solid, const SampledSolid& sampled, std::uint64_t seed,
-          const std::function<void()>& look)
-      : solid_(solid), sampled_(sampled), seed_(seed), look_(look) {}
-
-  Looked found(LevelCover start, std::size_t count) {
-    Looked looked = settled(exchanged(std::move(start), count));
-    grow_to_cover(solid_, looked.balls, kFinest * looked.cover.level);
-    return looked;
+/// Lowers the level, at first by the share `step`, as long as other candidates are found that are
+/// enough.
+LevelCover exchanged(const MeshSolid& solid, const SampledSolid& sampled, LevelCover cover,
+                     std::size_t count, double step, std::uint64_t seed,
+                     const std::function<void()>& look) {
+  std::vector<Vector3d> centres =
+      OffsetSurface(solid, sampled, cover.level).medial_centres(kCandidates);
+  centres.insert(centres.end(), cover.centres.begin(), cover.centres.end());
+  const Candidates candidates(solid, std::move(centres));
+  const std::vector<Vector3d> targets = thinned(sampled.targets, kThinning * cover.level);
+  double factor = 1 - step;
+  std::int64_t steps = kSteps;
+  for (int k = 0; k < kLevels && factor < 0.99 && steps > 0; ++k) {
+    const double level = cover.level * factor;
+    const std::vector<CoverSphere> balls =
+        candidates.balls_at(OffsetSurface(solid, sampled, level));
+    const std::vector<std::uint32_t> chosen =
+        choose_cover(balls, targets, count, kExchanges, ++seed, steps);
+    look();
+    if (chosen.empty())
+      factor = std::sqrt(factor);
+    else
+      cover = {centres_of(balls, chosen), level};
   }
-
- private:
-  /// Lowers the level as long as other candidates are found that are enough.
-  LevelCover exchanged(LevelCover cover, std::size_t count) {
-    std::vector<Vector3d> centres =
-        OffsetSurface(solid_, sampled_, cover.level).medial_centres(2000);
-    centres.insert(centres.end(), cover.centres.begin(), cover.centres.end());
-    const std::vector<Vector3d> targets = thinned(sampled_.targets, 0.7 * cover.level);
-    double factor = 0.9;
-    std::int64_t steps = kSteps;
-    for (int k = 0; k < kLevels && factor < 0.99 && steps > 0; ++k) {
-      const double level = cover.level * factor;
-      const std::vector<CoverSphere> balls =
-          balls_at(OffsetSurface(solid_, sampled_, level), centres);
-      const std::vector<std::uint32_t> chosen =
-          choose_cover(balls, targets, count, kExchanges, ++seed_, steps);
-      look_();
-      if (chosen.empty()) {
-        factor = std::sqrt(factor);
-      } else {
-        cover = {centres_of(balls, chosen), level};
-      }
-    }
-    return cover;
-  }
-
-  /// Descends on samples and adds what they missed, until they miss little. The level holds then
-  /// for the whole surface.
-  Looked settled(LevelCover cover) {
-    Looked best;
-    double step = 0.08;
-    for (int k = 0; k < kCuts; ++k) {
-      cover = CoverDescent(solid_, sampled_).improve(cover, step, k == 0 ? kFirstRounds : kRounds);
-      Looked looked = looked_at(cover);
-      look_();
-      const double missed = looked.level - cover.level;
-      cover.level = looked.level;
-      if (best.balls.empty() || looked.level < best.level) best = std::move(looked);
-      if (cover.level > 1.2 * best.level)
-        cover = {best.cover.centres, best.level};  // a ball is lost
-      if (missed < 0.004 * cover.level) break;
-      step = std::clamp(missed / cover.level, 0.02, 0.08);
-    }
-    return best;
-  }
-
-  /// What samples do not tell: places of the surface outside all balls become targets, and where
-  /// balls reach further than the level, rays are added.
-  Looked looked_at(const LevelCover& cover) {
-    Looked looked{cover, {}, cover.level};
-    const OffsetSurface surface(solid_, sampled_, cover.level);
-    for (const Vector3d& c : cover.centres) looked.balls.push_back({c, surface.radius(c)});
-    looked.level += std::max(add_targets(looked.balls, cover.level),
-                             add_rays(surface, looked.balls, cover.level));
-    return looked;
-  }
-
-  /// Returns how far the worst place is outside.
-  double add_targets(const std::vector<CoverSphere>& balls, double level) {
-    const std::size_t most = std::max<std::size_t>(16, kOpenParts / solid_.view().triangle_count);
-    std::vector<OpenPart> parts = open_surface(solid_.view(), balls, 0.03 * level, most);
-    std::stable_sort(parts.begin(), parts.end(),
-                     [](const OpenPart& a, const OpenPart& b) { return a.gap > b.gap; });
-    std::unordered_set<std::uint64_t> seen;
-    for (const OpenPart& part : parts) {
-      if (part.gap <= 0.002 * level) break;
-      if (seen.insert(cell_key(part.middle, 0.15 * level)).second)
-        sampled_.targets.push_back(part.middle);
-    }
-    return parts.empty() ? 0 : parts.front().gap;
-  }
-
-  /// Returns by how much the worst ball reaches too far.
-  double add_rays(const OffsetSurface& surface, const std::vector<CoverSphere>& balls,
-                  double level) {
-    std::vector<std::vector<Vector3d>> beyond(balls.size());
-    std::vector<double> further(balls.size(), 0);
-    tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t i) {
-      // What the distance alone vouches for needs no look.
-      if (balls[i].radius <= surface.sure_radius(balls[i].centre) * (1 + 1e-9)) return;
-      further[i] = ball_protrusion(solid_, balls[i], 0.05, 1.005 * level, &beyond[i]).least - level;
-    });
-    std::unordered_set<std::uint64_t> seen;
-    for (const auto& points : beyond) {
-      for (const Vector3d& p : points) {
-        if (!seen.insert(cell_key(p, 0.2 * level)).second) continue;
-        const ClosestPoint foot = solid_.closest_point(p);
-        sampled_.rays.push_back({foot.point, (p - foot.point) / foot.distance, foot.distance});
-      }
-    }
-    return std::max(0.0, *std::max_element(further.begin(), further.end()));
-  }
-
-  const MeshSolid& solid_;
-  SampledSolid sampled_;
-  std::uint64_t seed_;
-  const std::function<void()>& look_;
-};
+  return cover;
+}
 
 /// Of the ball that reaches furthest; `enough` where none reaches so far.
 double largest_protrusion(const MeshSolid& solid, const std::vector<CoverSphere>& balls,
@@ -213,27 +137,39 @@ double largest_protrusion(const MeshSolid& solid, const std::vector<CoverSphere>
 std::size_t CoverSearch::greedy_count(double level) const {
   const SampledSolid sampled = sampled_for(solid_, 64);
   const OffsetSurface surface(solid_, sampled, level);
-  return choose_greedily(balls_at(surface, surface.medial_centres(3000)),
+  return choose_greedily(Candidates(solid_, surface.medial_centres(3000)).balls_at(surface),
                          thinned(sampled.targets, 0.5 * level))
       .size();
 }
 
 std::vector<CoverSphere> CoverSearch::with_count(std::size_t count) const {
-  const SampledSolid sampled = sampled_for(solid_, count);
+  SampledSolid sampled = sampled_for(solid_, count);
   look_(0.1);
-  const LevelCover start = greedy_cover(solid_, sampled, count);
-  look_(0.2);
-  const std::function<void()> look = [&] { look_(0.2); };
-  std::vector<Looked> found(kAttempts);
-  std::vector<double> largest(kAttempts);
-  tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t k) {
-    Attempt attempt(solid_, sampled, mixed(seed_ + k + 1), look);
-    found[k] = attempt.found(start, count);
-    largest[k] = largest_protrusion(solid_, found[k].balls, 0.95 * found[k].cover.level);
-  });
+  LevelCover start = greedy_cover(solid_, sampled, count);
+  std::vector<CoverSphere> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const double share = 0.2 + 0.7 * pass / kPasses;
+    const std::function<void()> look = [&] { look_(share); };
+    look();
+    // Samples alone know no level as low as it is called; after a descent it is that of the
+    // surface.
+    const double step = pass == 0 ? 0.1 : 0.05;
+    const double before = start.level;
+    start = exchanged(solid_, sampled, std::move(start), count, step,
+                      mixed(seed_ + static_cast<std::uint64_t>(pass) + 1), look);
+    if (start.level == before && pass > 0) break;
+    LookedCover looked = CoverDescent(solid_, sampled).improve(std::move(start), kRounds, look);
+    grow_to_cover(solid_, looked.balls, kFinest * looked.cover.level);
+    const double largest = largest_protrusion(solid_, looked.balls, 1.01 * looked.cover.level);
+    start = std::move(looked.cover);
+    if (largest < least) {
+      least = largest;
+      best = std::move(looked.balls);
+    }
+  }
   look_(0.95);
-  const auto best = std::min_element(largest.begin(), largest.end()) - largest.begin();
-  return found[static_cast<std::size_t>(best)].balls;
+  return best;
 }
 
 }  // namespace ist

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mesh/closest_point.h"
+
 namespace ist {
 namespace {
 
@@ -14,35 +16,45 @@ constexpr double kLargest = 4;  ///< unit frame, of a ball
 
 }  // namespace
 
-OffsetSurface::OffsetSurface(const MeshSolid& solid, const SampledSolid& sampled, double level)
-    : solid_(solid), level_(level), spacing_(sampled.spacing) {
-  for (const OutwardRay& ray : sampled.rays) {
-    if (ray.reach < level) continue;
-    points_.push_back(ray.foot + level * ray.direction);
-    normals_.push_back(ray.direction);
-  }
-  tree_ = PointTree(points_);
+double depth_in(const MeshSolid& solid, const Vector3d& point) {
+  const float p[3] = {static_cast<float>(point.x()), static_cast<float>(point.y()),
+                      static_cast<float>(point.z())};
+  const double distance = std::sqrt(double{nearest_triangle(solid.view(), p).distance2});
+  return solid.inside(point) ? distance : -distance;
 }
 
-double OffsetSurface::radius(const Vector3d& centre) const {
-  const PointTree::Nearest near = tree_.nearest(centre);
-  const double seen = near.index == UINT32_MAX ? kLargest : std::sqrt(near.distance2);
-  if (near.index != UINT32_MAX && (points_[near.index] - centre).dot(normals_[near.index]) < 0)
-    return 0;
-  const double sure = sure_radius(centre);
+OffsetSurface::OffsetSurface(const MeshSolid& solid, const SampledSolid& sampled, double level)
+    : solid_(&solid), level_(level), spacing_(sampled.spacing) {
+  std::vector<Vector3d> points, normals;
+  Eigen::AlignedBox3d box;
+  for (const OutwardRay& ray : sampled.rays) {
+    if (ray.reach < level) continue;
+    points.push_back(ray.foot + level * ray.direction);
+    normals.push_back(ray.direction);
+    box.extend(points.back());
+  }
+  largest_ = points.empty() ? kLargest : std::min(kLargest, 0.51 * box.sizes().minCoeff() + 1e-3);
+  points_ = PointGrid(points);
+  for (std::uint32_t i = 0; i < points_.size(); ++i) normals_.push_back(normals[points_.index(i)]);
+}
+
+double OffsetSurface::radius(const Vector3d& centre, double depth) const {
+  const double sure = std::max(0.0, level_ + depth);
+  const PointGrid::Nearest near = points_.nearest(centre, sure + 0.2 * level_, kLargest);
+  if (near.place == UINT32_MAX) return std::max(sure, kLargest);
+  if ((points_.point(near.place) - centre).dot(normals_[near.place]) < 0) return sure;
+  const double seen = std::sqrt(double{near.distance2});
   // By so much a point beside the nearest place is further than that.
   const double coarse = spacing_ * spacing_ / (2 * seen);
   return std::max(sure, seen - coarse);
 }
 
 double OffsetSurface::sure_radius(const Vector3d& centre) const {
-  const double depth = solid_.closest_point(centre).distance;
-  if (solid_.inside(centre)) return level_ + depth;
-  return std::max(0.0, level_ - depth);
+  return std::max(0.0, level_ + depth_in(*solid_, centre));
 }
 
 void OffsetSurface::walls(const Vector3d& centre, double reach, std::vector<Vector3d>& out) const {
-  tree_.within(centre, reach, [&](std::uint32_t i, double) { out.push_back(points_[i]); });
+  points_.within(centre, reach, [&](std::uint32_t i, float) { out.push_back(points_.point(i)); });
 }
 
 std::vector<Vector3d> OffsetSurface::medial_centres(std::size_t most) const {
@@ -51,19 +63,19 @@ std::vector<Vector3d> OffsetSurface::medial_centres(std::size_t most) const {
   const std::size_t count = points_.size() / stride;
   std::vector<Vector3d> centres(count);
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    const std::size_t j = i * stride;
-    const Vector3d& y = points_[j];
-    double r = kLargest;
+    const auto j = static_cast<std::uint32_t>(i * stride);
+    const Vector3d y = points_.point(j);
+    double r = largest_;
     // A ball that touches y from inside shrinks until no point is in it.
     for (int step = 0; step < 30; ++step) {
       const Vector3d c = y - r * normals_[j];
-      const PointTree::Nearest near = tree_.nearest(c, r * r * (1 - 1e-9));
-      if (near.index == UINT32_MAX) break;
-      const Vector3d d = y - points_[near.index];
+      const PointGrid::Nearest near = points_.nearest(c, r * (1 - 1e-6), r * (1 - 1e-6));
+      if (near.place == UINT32_MAX) break;
+      const Vector3d d = y - points_.point(near.place);
       const double along = d.dot(normals_[j]);
       if (!(along > 0)) break;
       const double smaller = d.squaredNorm() / (2 * along);
-      if (!(smaller < r * (1 - 1e-9))) break;
+      if (!(smaller < r * (1 - 1e-5))) break;
       r = smaller;
     }
     centres[i] = y - r * normals_[j];

@@ -2,13 +2,15 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <span>
 #include <vector>
 
-#include "spheres/point_tree.h"
+#include "spheres/point_grid.h"
 #include "spheres/sampled_solid.h"
 
 namespace ist {
+
+/// [unit frame] How deep a point lies in the solid, below 0 outside; to float rounding.
+double depth_in(const MeshSolid& solid, const Eigen::Vector3d& point);
 
 /// The places at one distance from a solid, `level`, by points. A ball within them protrudes by no
 /// more than `level`, as far as the points tell.
@@ -19,9 +21,13 @@ class [[gnu::visibility("hidden")]] OffsetSurface {
   double level() const { return level_; }
 
   /// Radius of the largest ball around `centre` that protrudes by no more than the level; 0 for a
-  /// centre that is itself further out. It is the exact distance to the surface and the level, but
-  /// where the points, as coarse as they are, show that it may be more: beside a hollow.
-  double radius(const Eigen::Vector3d& centre) const;
+  /// centre that is itself further out. It is the distance to the surface and the level, but where
+  /// the points, as coarse as they are, show that it may be more: beside a hollow.
+  double radius(const Eigen::Vector3d& centre) const {
+    return radius(centre, depth_in(*solid_, centre));
+  }
+  /// The same where depth_in() is known.
+  double radius(const Eigen::Vector3d& centre, double depth) const;
 
   /// What the distance to the surface alone vouches for; 0 for a centre further out.
   double sure_radius(const Eigen::Vector3d& centre) const;
@@ -33,10 +39,11 @@ class [[gnu::visibility("hidden")]] OffsetSurface {
   std::vector<Eigen::Vector3d> medial_centres(std::size_t most) const;
 
  private:
-  const MeshSolid& solid_;
+  const MeshSolid* solid_;
   double level_, spacing_;
-  std::vector<Eigen::Vector3d> points_, normals_;
-  PointTree tree_;
+  double largest_;  ///< no ball inside is larger
+  PointGrid points_;
+  std::vector<Eigen::Vector3d> normals_;  ///< by the grid's places
 };
 
 }  // namespace ist

@@ -7,7 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include "mesh/closest_point.h"
 #include "mesh/mesh_view.h"
+#include "spheres/offset_surface.h"
 
 namespace ist {
 namespace {
@@ -15,6 +17,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kMargin = 1e-12;  ///< unit frame, above the rounding of any distance here
+constexpr double kRounded = 1e-5;  ///< unit frame, above the rounding of distances in float
 constexpr double kTolerance = 0.01;
 
 /// Divides the cube around a ball until no part can hold a point further out than was seen.
@@ -25,7 +28,7 @@ class ProtrusionSearch {
       : solid_(solid), ball_(ball), tolerance_(tolerance), enough_(enough), beyond_(beyond) {}
 
   BallProtrusion found() {
-    const ClosestPoint near = solid_.closest_point(ball_.centre);
+    const ClosestPoint near = closest(ball_.centre);
     const bool inside = solid_.inside(ball_.centre);
     // No point of the ball is further out than its centre and its radius together.
     whole_ = std::max(0.0, ball_.radius + (inside ? -near.distance : near.distance)) + kMargin;
@@ -33,35 +36,55 @@ class ProtrusionSearch {
     if (near.distance > 0)
       see(ball_.centre +
           (near.point - ball_.centre) * ((inside ? 1 : -1) * 2 * ball_.radius / near.distance));
-    look(ball_.centre, ball_.radius);
+    look(ball_.centre, ball_.radius, false);
     return result_;
   }
 
  private:
+  /// Where points beyond are asked for, nothing is proven, and float is good enough.
+  ClosestPoint closest(const Vector3d& x) const {
+    if (beyond_ == nullptr) return solid_.closest_point(x);
+    const Eigen::Vector3f p = x.cast<float>();
+    const NearestTriangle near = nearest_triangle(solid_.view(), p.data());
+    return {{near.point[0], near.point[1], near.point[2]},
+            std::sqrt(double{near.distance2}),
+            near.triangle};
+  }
+
   double threshold() const {
     return std::max({enough_, result_.least * (1 + tolerance_), kFinest * ball_.radius});
   }
 
   void settle(double bound) { result_.most = std::max(result_.most, bound); }
 
-  void look(const Vector3d& middle, double half) {
+  /// `outside`: the whole cube is known to be.
+  void look(const Vector3d& middle, double half, bool outside) {
     const Eigen::Array3d off = (middle - ball_.centre).array().abs();
     const double nearest = std::sqrt((off - half).max(0.0).matrix().squaredNorm());
     if (nearest > ball_.radius) return;  // not of the ball
     if (whole_ <= threshold()) return settle(whole_);
     const double corner = 1.7320508075688774 * half;
-    const ClosestPoint near = solid_.closest_point(middle);
-    const bool inside = solid_.inside(middle);
-    const double away = inside ? -near.distance : near.distance;
-    see(middle);
-    double bound = std::min(whole_, std::max(0.0, away + corner));
+    const ClosestPoint near = closest(middle);
+    double bound = std::min(whole_, near.distance + corner);
     if (bound <= threshold()) return settle(bound);
-    if (!inside && near.distance > 0) bound = std::min(bound, by_plane(middle, corner, near));
+    // No surface is so near that a part of the cube could lie on its other side.
+    const bool one_sided = near.distance > corner + kMargin;
+    if (!outside && solid_.inside(middle)) {
+      if (one_sided) return;
+      bound = std::min(bound, std::max(0.0, corner - near.distance));
+    } else {
+      outside = one_sided;
+      if (near.distance > 0) bound = std::min(bound, by_plane(middle, corner, near));
+      if (off.matrix().squaredNorm() <= ball_.radius * ball_.radius)
+        count(middle, near.distance);
+      else if (bound > threshold())
+        see(middle);
+    }
     if (bound <= threshold()) return settle(bound);
     for (int k = 0; k < 8; ++k) {
       const double h = half / 2;
       look(middle + Vector3d((k & 1) != 0 ? h : -h, (k & 2) != 0 ? h : -h, (k & 4) != 0 ? h : -h),
-           h);
+           h, outside);
     }
   }
 
@@ -70,8 +93,12 @@ class ProtrusionSearch {
     const Vector3d d = point - ball_.centre;
     const double length = std::sqrt(d.squaredNorm());
     if (length > ball_.radius) point = ball_.centre + d * (ball_.radius / length) * (1 - 1e-12);
-    if (solid_.inside(point)) return;
-    const double distance = solid_.closest_point(point).distance;
+    const double distance = closest(point).distance;
+    if (distance > std::min(result_.least, enough_) && !solid_.inside(point))
+      count(point, distance);
+  }
+
+  void count(const Vector3d& point, double distance) {
     result_.least = std::max(result_.least, distance);
     if (beyond_ != nullptr && distance > enough_) beyond_->push_back(point);
   }
@@ -165,8 +192,13 @@ double union_volume(std::span<const CoverSphere> balls, int lines) {
 }  // namespace
 
 BallProtrusion ball_protrusion(const MeshSolid& solid, const CoverSphere& ball, double tolerance,
-                               double enough, std::vector<Vector3d>* beyond) {
-  return ProtrusionSearch(solid, ball, tolerance, enough, beyond).found();
+                               double enough) {
+  return ProtrusionSearch(solid, ball, tolerance, enough, nullptr).found();
+}
+
+BallProtrusion guessed_protrusion(const MeshSolid& solid, const CoverSphere& ball, double tolerance,
+                                  double enough, std::vector<Vector3d>& beyond) {
+  return ProtrusionSearch(solid, ball, tolerance, enough, &beyond).found();
 }
 
 SphereProtrusion protrusion_of(const MeshSolid& solid, std::span<const CoverSphere> balls) {
@@ -203,7 +235,7 @@ SphereProtrusion protrusion_of(const MeshSolid& solid, std::span<const CoverSphe
   for (const Seen& s : all) {
     area += s.area;
     sum += s.area * s.distance;
-    out.largest_seen = std::max(out.largest_seen, s.distance);
+    out.largest_seen = std::max(out.largest_seen, s.distance - kRounded);
   }
   if (area > 0) out.mean = sum / area;
   double below = 0;
@@ -215,9 +247,13 @@ SphereProtrusion protrusion_of(const MeshSolid& solid, std::span<const CoverSphe
 
   // Proven, ball by ball; what stays below the largest that was seen need not be told closer.
   std::vector<BallProtrusion> each(count);
-  const double enough = out.largest_seen;
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < count; ++i)
+    for (const Seen& s : seen[i])
+      if (s.distance == all.back().distance) first = i;
+  each[first] = ball_protrusion(solid, balls[first], kTolerance, out.largest_seen);
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    each[i] = ball_protrusion(solid, balls[i], kTolerance, enough);
+    if (i != first) each[i] = ball_protrusion(solid, balls[i], kTolerance, each[first].most);
   });
   for (const BallProtrusion& p : each) {
     out.largest_seen = std::max(out.largest_seen, p.least);

@@ -16,9 +16,14 @@ struct BallProtrusion {
 };
 
 /// `tolerance`: the interval's width over its upper end is at most about this, or the upper end is
-/// at most `enough`. `beyond`, if it is given, takes points of the ball further out than `enough`.
+/// at most `enough`.
 BallProtrusion ball_protrusion(const MeshSolid& solid, const CoverSphere& ball, double tolerance,
-                               double enough, std::vector<Eigen::Vector3d>* beyond = nullptr);
+                               double enough);
+
+/// The same to float rounding, proven of nothing. `beyond` takes points of the ball further out
+/// than `enough`.
+BallProtrusion guessed_protrusion(const MeshSolid& solid, const CoverSphere& ball, double tolerance,
+                                  double enough, std::vector<Eigen::Vector3d>& beyond);
 
 /// The same of all, by their largest, and what sampling says of the union; unit frame.
 SphereProtrusion protrusion_of(const MeshSolid& solid, std::span<const CoverSphere> balls);

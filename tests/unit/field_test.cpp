@@ -2,8 +2,11 @@
 #include <ist/bake.h>
 #include <ist/error.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
+#include <utility>
 
 #include "bake/check/check_field.h"
 #include "bake/field/field.h"
@@ -85,6 +88,39 @@ void expect_near(const Asset& asset, const ClosedMesh& mesh) {
   std::printf("%s: %u triangles, error %.2g, %.2g seen, unit frame; %llu bytes\n",
               mesh.name.c_str(), field.triangle_count, field.error, worst,
               static_cast<unsigned long long>(header.file_bytes - header.field));
+}
+
+/// Every triangle cut into four, over and over.
+TriangleMesh finely_cut(TriangleMesh mesh, int times) {
+  for (int k = 0; k < times; ++k) {
+    TriangleMesh cut{mesh.vertices, {}};
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
+    const auto middle = [&](std::uint32_t a, std::uint32_t b) {
+      const auto [at, is_new] =
+          middles.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(cut.vertices.size()));
+      if (is_new) cut.vertices.push_back((mesh.vertices[a] + mesh.vertices[b]) / 2);
+      return at->second;
+    };
+    for (const auto& [a, b, c] : mesh.triangles) {
+      const std::uint32_t x = middle(a, b), y = middle(b, c), z = middle(c, a);
+      cut.triangles.insert(cut.triangles.end(), {{a, x, z}, {x, b, y}, {z, y, c}, {x, y, z}});
+    }
+    mesh = std::move(cut);
+  }
+  return mesh;
+}
+
+/// Large triangles of the field lie over many of the mesh, and no part near a side of these is near
+/// one of them alone.
+TEST(Field, WhereOneTriangleLiesOverManyInItsPlaneEachHasItsPart) {
+  TriangleMesh mesh = finely_cut(testing::cube_mesh(), 6);
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(0.7, Point(1, 2, 3).normalized()).toRotationMatrix();
+  for (Point& v : mesh.vertices) v = turn * v;
+  const ClosedMesh cube = closed(std::move(mesh), "cube");
+  const Asset asset = baked(cube);
+  EXPECT_LT(asset.view().field_triangles(), cube.mesh.triangles.size() / 2);
+  expect_sound_field(asset, cube);
 }
 
 TEST(Field, FewTrianglesAreTheMeshsOwn) {

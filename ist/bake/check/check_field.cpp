@@ -1,9 +1,12 @@
 #include "bake/check/check_field.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "bake/check/check_tally.h"
 
@@ -30,8 +33,50 @@ Invariant closed(const std::vector<Corners>& triangles) {
   return tally.named("field closed", "runs of an edge one way less those the other way");
 }
 
+using Polygon = std::vector<Point>;  ///< convex
+
+/// What of a polygon lies behind a plane, and what ahead of it; what lies in it counts as behind.
+std::array<Polygon, 2> parts_by(const Polygon& polygon, const Point& on, const Point& normal) {
+  constexpr double kIn = 1e-13;  // unit frame: so near is in the plane
+  std::array<Polygon, 2> parts;
+  const auto height = [&](const Point& p) {
+    const double h = normal.dot(p - on);
+    return std::abs(h) <= kIn ? 0.0 : h;
+  };
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const Point &p = polygon[k], &q = polygon[(k + 1) % polygon.size()];
+    const double from = height(p), to = height(q);
+    if (from <= 0) parts[0].push_back(p);
+    if (from >= 0) parts[1].push_back(p);
+    if ((from < 0 && to > 0) || (from > 0 && to < 0)) {
+      const Point between = p + from / (from - to) * (q - p);
+      parts[0].push_back(between);
+      parts[1].push_back(between);
+    }
+  }
+  const auto any = [&](bool ahead) {
+    return std::any_of(polygon.begin(), polygon.end(),
+                       [&](const Point& p) { return ahead ? height(p) > 0 : height(p) < 0; });
+  };
+  if (!any(true))
+    parts[1].clear();
+  else if (!any(false))
+    parts[0].clear();
+  return parts;
+}
+
+/// Cut through the middle of its longest way across.
+std::array<Polygon, 2> halves_of(const Polygon& polygon) {
+  Point from = polygon[0], to = polygon[0];
+  for (const Point& p : polygon)
+    for (const Point& q : polygon)
+      if ((q - p).squaredNorm() > (to - from).squaredNorm()) from = p, to = q;
+  return parts_by(polygon, (from + to) / 2, (to - from).normalized());
+}
+
 /// Proves triangles within `error` of a surface: a part lies as near as its centre and its radius
-/// say, or as its farthest corner from one triangle; else its halves are proven.
+/// say, or as its farthest corner from one triangle. Else it is cut along that triangle's sides,
+/// so that where one triangle lies over several in its plane each has its part; else it is halved.
 class NearProof {
  public:
   NearProof(const CheckSurface& to, double error)
@@ -39,15 +84,16 @@ class NearProof {
 
   void prove(const Corners& part, std::size_t index, Tally& tally) const {
     int left = kMostParts;
-    tally.add(beyond(part, left) - error_, index);
+    tally.add(beyond({part.begin(), part.end()}, left) - error_, index);
   }
 
  private:
   static constexpr int kMostParts = 20'000;
 
   /// A distance of the part's points that is ≤ error_ if all are.
-  double beyond(const Corners& part, int& left) const {
-    const Point centre = (part[0] + part[1] + part[2]) / 3;
+  double beyond(const Polygon& part, int& left) const {
+    Point centre = Point::Zero();
+    for (const Point& p : part) centre += p / static_cast<double>(part.size());
     double radius = 0;
     for (const Point& p : part) radius = std::max(radius, (p - centre).norm());
     const auto [distance, triangle] = to_.nearest(centre);
@@ -57,18 +103,33 @@ class NearProof {
       farthest = std::max(farthest, squared_distance_to_triangle(p, to_.triangles()[triangle]));
     if (std::sqrt(farthest) <= error_) return std::sqrt(farthest);
     if (--left < 0) return distance + radius;
-    std::size_t from = 0;
-    for (std::size_t k = 1; k < 3; ++k)
-      if (side(part, k) > side(part, from)) from = k;
-    const std::size_t to = (from + 1) % 3;
-    Corners first = part, second = part;
-    first[to] = second[from] = (part[from] + part[to]) / 2;
-    const double of_first = beyond(first, left);
-    return of_first > error_ ? of_first : std::max(of_first, beyond(second, left));
+    double worst = 0;
+    for (const Polygon& piece : pieces(part, to_.triangles()[triangle])) {
+      if (piece.empty()) continue;
+      worst = std::max(worst, beyond(piece, left));
+      if (worst > error_) break;
+    }
+    return worst;
   }
 
-  static double side(const Corners& part, std::size_t from) {
-    return (part[(from + 1) % 3] - part[from]).norm();
+  /// The part over the triangle, and those beyond its sides; halves where there is only one.
+  static std::vector<Polygon> pieces(const Polygon& part, const Corners& t) {
+    const Point normal = (t[1] - t[0]).cross(t[2] - t[0]);
+    std::vector<Polygon> pieces;
+    Polygon over = part;
+    for (std::size_t k = 0; k < 3 && !over.empty(); ++k) {
+      const Point out = (t[(k + 1) % 3] - t[k]).cross(normal);
+      if (!(out.squaredNorm() > 0)) break;
+      auto [behind, ahead] = parts_by(over, t[k], out.normalized());
+      if (!ahead.empty()) pieces.push_back(std::move(ahead));
+      over = std::move(behind);
+    }
+    if (!over.empty() && !pieces.empty()) {
+      pieces.push_back(std::move(over));
+      return pieces;
+    }
+    auto [first, second] = halves_of(part);
+    return {std::move(first), std::move(second)};
   }
 
   const CheckSurface& to_;

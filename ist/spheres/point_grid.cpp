@@ -1,0 +1,45 @@
+#include "spheres/point_grid.h"
+
+#include <Eigen/Geometry>
+
+namespace ist {
+
+PointGrid::PointGrid(std::span<const Eigen::Vector3d> points) {
+  if (points.empty()) return;
+  constexpr double kCells = 32;  // along the longest axis
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : points) box.extend(p);
+  const double cell = std::max(box.sizes().maxCoeff() / kCells, 1e-9);
+  cell_ = static_cast<float>(cell);
+  per_cell_ = 1 / cell_;
+  std::size_t cells = 1;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto axis = static_cast<int>(k);
+    low_[k] = static_cast<float>(box.min()[axis]);
+    count_[k] = 1 + static_cast<int>((box.max()[axis] - box.min()[axis]) / cell);
+    cells *= static_cast<std::size_t>(count_[k]);
+  }
+  const auto cell_of = [&](const Eigen::Vector3d& p) {
+    std::size_t at = 0;
+    for (std::size_t k = 3; k-- > 0;) {
+      const float x = (static_cast<float>(p[static_cast<int>(k)]) - low_[k]) * per_cell_;
+      const int i = std::clamp(static_cast<int>(x), 0, count_[k] - 1);
+      at = at * static_cast<std::size_t>(count_[k]) + static_cast<std::size_t>(i);
+    }
+    return at;
+  };
+  start_.assign(cells + 1, 0);
+  for (const Eigen::Vector3d& p : points) ++start_[cell_of(p) + 1];
+  for (std::size_t c = 0; c < cells; ++c) start_[c + 1] += start_[c];
+  std::vector<std::uint32_t> next(start_.begin(), start_.end() - 1);
+  index_.resize(points.size());
+  for (auto& axis : xyz_) axis.assign(points.size() + kLanes, 1e30f);
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const std::uint32_t place = next[cell_of(points[i])]++;
+    index_[place] = i;
+    for (std::size_t k = 0; k < 3; ++k)
+      xyz_[k][place] = static_cast<float>(points[i][static_cast<int>(k)]);
+  }
+}
+
+}  // namespace ist
