@@ -7,6 +7,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <barrier>
 #include <cmath>
 #include <memory>
 #include <random>
@@ -81,7 +82,13 @@ double ceiling(std::span<const ist::PlacedPair> pairs, std::size_t threads) {
   ask(*all[0]);
   const double alone = all[0]->seconds;
   std::vector<std::thread> running;
-  for (const auto& one : all) running.emplace_back([&ask, &one] { ask(*one); });
+  std::barrier warm(static_cast<std::ptrdiff_t>(threads));
+  for (const auto& one : all)
+    running.emplace_back([&] {
+      ask(*one);
+      warm.arrive_and_wait();
+      ask(*one);
+    });
   for (std::thread& thread : running) thread.join();
   double longest = 0;
   for (const auto& one : all) longest = std::max(longest, one->seconds);

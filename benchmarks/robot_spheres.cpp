@@ -10,6 +10,7 @@
 #include "robot/link_mesh.h"
 #include "robot_sphere_rivals.h"
 #include "support/shared_data.h"
+#include "timing.h"
 
 // Few spheres that hold a robot's link, beside simpler ways to as many, all proven by the same
 // proof.
@@ -32,7 +33,7 @@ double largest_of(const MeshSolid& solid, const ClosedMesh& mesh, Balls balls) {
 }
 
 struct Total {
-  double worst_ratio = 0, cpu = 0;
+  double worst_ratio = 0, seconds = 0;
   std::vector<double> ratios;
 };
 
@@ -59,9 +60,9 @@ void measure(Report& report, const std::string& robot, const std::string& urdf, 
     const SampledSolid sampled = sample_solid(solid, 8000);
     SphereCoverSettings settings;
     settings.count = count;
-    const double start = cpu_seconds();
+    const double begun = ist::benchmark::wall_seconds(), start = cpu_seconds();
     const SphereCover ours = cover_with_spheres(mesh, settings);
-    const double cpu = cpu_seconds() - start;
+    const double cpu = cpu_seconds() - start, seconds = ist::benchmark::wall_seconds() - begun;
     const std::map<std::string, double> rivals = {
         {"greedy medial", largest_of(solid, mesh, greedy_medial(solid, sampled, count))},
         {"packing, cover radii", largest_of(solid, mesh, packing_with_covers(solid, count))},
@@ -80,10 +81,11 @@ void measure(Report& report, const std::string& robot, const std::string& urdf, 
     for (const auto& [name, largest] : rivals) row[name + " [mm]"] = 1e3 * largest;
     row["ours over the best rival"] = ratio;
     row["CPU [s]"] = cpu;
+    row["wall [s]"] = seconds;
     report.row(std::to_string(count) + " spheres a link", row);
     total.ratios.push_back(ratio);
     total.worst_ratio = std::max(total.worst_ratio, ratio);
-    total.cpu += cpu;
+    total.seconds += seconds;
   }
 }
 
@@ -114,7 +116,7 @@ int main(int argc, char** argv) {
     report.target("UR5, 64 spheres: the worst link", ur5.worst_ratio, 0.667, true);
     report.target("Solo12, 64 spheres: median link", median(solo), 0.667, true);
     report.target("Solo12, 64 spheres: the worst link", solo.worst_ratio, 0.667, true);
-    report.target("UR5, 64 spheres: CPU seconds, all links", ur5.cpu, 10, true);
+    report.target("UR5, 64 spheres: seconds of all links, one after another", ur5.seconds, 2, true);
   }
   return report.write();
 }

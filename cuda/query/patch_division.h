@@ -28,8 +28,6 @@ class PatchDivision {
     add_up_pulls();
   }
 
-  IST_HD int bins() const { return bins_; }
-
   /// Sums of all bins, A's unit frame.
   IST_HD void add_up(double (&sum)[kTerms]) const {
     for (double& s : sum) s = 0;

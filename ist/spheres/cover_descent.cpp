@@ -130,7 +130,7 @@ class CoverDescent::Round {
   std::vector<Vector3d> needed_, walls_;
 };
 
-/// Returns how far the worst place is outside.
+/// Returns how far the worst place that was found is outside.
 double CoverDescent::add_targets(const std::vector<CoverSphere>& balls, double level) {
   std::vector<OpenCorner> open = open_corners(solid_.arrays(), balls, holders_);
   std::stable_sort(open.begin(), open.end(),
@@ -151,15 +151,12 @@ double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<Co
   std::vector<double> further(balls.size(), 0);
   vouched_.resize(balls.size(), {Vector3d::Zero(), 0});
   tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t i) {
-    // What the distance alone vouches for needs no look.
+    // What was seen there before needs no look.
     CoverSphere& vouched = vouched_[i];
     if (vouched.centre == balls[i].centre && level <= vouched.radius &&
         level > kVouched * vouched.radius)
       return;
-    // What the distance alone vouches for needs no look.
-    if (vouched_[i].centre == balls[i].centre && level <= vouched_[i].radius &&
-        level > 0.9 * vouched_[i].radius)
-      return;
+    // Nor does what the distance alone vouches for.
     if (balls[i].radius <=
         (surface.sure_radius(balls[i].centre) - surface.level() + level) * (1 + 1e-9))
       return;

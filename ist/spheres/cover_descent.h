@@ -38,7 +38,7 @@ class [[gnu::visibility("hidden")]] CoverDescent {
 
   /// Starts from centres that hold the samples, at about the level given, and ends when the level
   /// falls by a few thousandths no more, or after so many rounds over all balls. The level that
-  /// comes back is that of the surface itself, but for little that rays do not tell.
+  /// comes back is about that of the surface itself (open_corners(), rays): a guess.
   /// `look` is called now and then.
   LookedCover improve(LevelCover start, int rounds, const std::function<void()>& look);
 

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "spheres/halves.h"
+#include "spheres/triangle_corners.h"
 
 namespace ist {
 namespace {
@@ -82,15 +83,6 @@ class SurfaceSearch {
   const Take& take_;
   bool ended_ = false;
 };
-
-std::array<Vector3d, 3> corners_of(const MeshView& mesh, std::uint32_t t) {
-  std::array<Vector3d, 3> corners;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double* const v = mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{t} + k]};
-    corners[k] = {v[0], v[1], v[2]};
-  }
-  return corners;
-}
 
 class VoidSearch {
  public:
@@ -210,7 +202,7 @@ std::vector<OpenPart> open_surface(const MeshView& mesh, std::span<const CoverSp
       found[t].push_back(part);
       return found[t].size() < most;
     };
-    SurfaceSearch(balls, finest, take).search(corners_of(mesh, t), all);
+    SurfaceSearch(balls, finest, take).search(triangle_corners(mesh, t), all);
   });
   std::vector<OpenPart> out;
   for (const auto& parts : found) out.insert(out.end(), parts.begin(), parts.end());
@@ -252,7 +244,7 @@ void grow_to_cover(const MeshSolid& solid, std::vector<CoverSphere>& balls, doub
   };
   const BallList all = all_of(balls.size());
   for (std::uint32_t t = 0; t < solid.view().triangle_count; ++t)
-    SurfaceSearch(balls, finest, take).search(corners_of(solid.view(), t), all);
+    SurfaceSearch(balls, finest, take).search(triangle_corners(solid.view(), t), all);
   for (int round = 0; round < 50; ++round) {
     const OpenPlace open = open_void(solid, balls);
     if (!open.found) return;

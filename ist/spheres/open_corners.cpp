@@ -11,6 +11,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "spheres/triangle_corners.h"
+
 namespace ist {
 namespace {
 
@@ -18,15 +20,6 @@ using Eigen::Vector3d;
 
 using Corners = std::array<Vector3d, 3>;
 using Polygon = std::vector<Vector3d>;
-
-Corners corners_of(const MeshView& mesh, std::uint32_t t) {
-  Corners corners;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double* const v = mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{t} + k]};
-    corners[k] = {v[0], v[1], v[2]};
-  }
-  return corners;
-}
 
 template <class Points>
 bool holds(const CoverSphere& ball, const Points& points) {
@@ -126,10 +119,10 @@ std::vector<OpenCorner> open_corners(const MeshView& mesh, std::span<const Cover
     const std::uint32_t end = std::min(mesh.triangle_count, (block + 1) * kBlock);
     Eigen::AlignedBox3d box;
     for (std::uint32_t t = block * kBlock; t < end; ++t)
-      for (const Vector3d& corner : corners_of(mesh, t)) box.extend(corner);
+      for (const Vector3d& corner : triangle_corners(mesh, t)) box.extend(corner);
     Cutter cutter(balls, box);
     for (std::uint32_t t = block * kBlock; t < end; ++t)
-      cutter.cut(corners_of(mesh, t), holders[t], found[block]);
+      cutter.cut(triangle_corners(mesh, t), holders[t], found[block]);
   });
   std::vector<OpenCorner> out;
   for (const auto& corners : found) out.insert(out.end(), corners.begin(), corners.end());

@@ -17,8 +17,9 @@ struct OpenCorner {
   double gap = 0;                                   ///< unit frame, > 0: to the nearest ball
 };
 
-/// Where the surface is furthest outside the balls, unit frame; none where it is held, but for
-/// rounding: this is for a search, open_surface() proves.
+/// Places of the surface outside the balls, unit frame; none where it is held, but for rounding:
+/// this is for a search, open_surface() proves. Others may be further outside, between balls of
+/// unlike radii by a few times as far.
 ///
 /// The balls' power diagram cuts each triangle into convex pieces, and of a piece the ball of its
 /// cell is that to which its points are nearest, by power. So the ball holds the piece if it holds

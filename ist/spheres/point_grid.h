@@ -65,7 +65,8 @@ class PointGrid {
   Nearest nearest(const Eigen::Vector3d& p, double guess, double limit) const {
     Nearest best;
     if (index_.empty()) return best;
-    for (double reach = std::min(guess, limit);; reach = std::min(1.3 * reach, limit)) {
+    for (double reach = std::min(guess, limit);;
+         reach = std::min(std::max(1.3 * reach, static_cast<double>(cell_)), limit)) {
       within(p, reach, [&](std::uint32_t i, float d2) {
         if (d2 < best.distance2) best = {d2, i};
       });

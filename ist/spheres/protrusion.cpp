@@ -17,7 +17,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kMargin = 1e-12;  ///< unit frame, above the rounding of any distance here
-constexpr double kRounded = 1e-5;  ///< unit frame, above the rounding of distances in float
+constexpr double kRounded = 1e-5;  ///< unit frame, by which the proof may end above what was seen
 constexpr double kTolerance = 0.01;
 
 /// Divides the cube around a ball until no part can hold a point further out than was seen.

@@ -218,8 +218,6 @@ def _ask_group(assets, group, placed, scales, wants_pose, wants_scale, settings)
     if scales is not None:
         scale_a, scale_b = (scales[..., solid].reshape(-1) for solid in group.pairs)
     rows = len(place_a)
-    if group.fields is not None:
-        settings = {name: x for name, x in settings.items() if name != "pair_budget"}
 
     def ask(scale_b, *wanted):
         out = {name: placed.new_empty((rows, 3) if name.endswith("gradient") else rows)

@@ -35,9 +35,6 @@ DeviceAnswers<GpuPenetrations> penetrations(DeviceAssets& assets, const py::obje
                                             const py::object& wanted, const py::object& out,
                                             const py::object& stream) {
   const Measure which = named(measure, "measure", kMeasures);
-  if (fields != nullptr && pair_budget != 0)
-    throw py::value_error("pair_budget: " + std::to_string(pair_budget) +
-                          "; pairs of fields have none");
   const DeviceFields* const solids = fields.get();
   return ask<GpuPenetrations>(
       assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, std::move(fields)}, {}, wanted,
@@ -59,7 +56,7 @@ scale_a, scale_b: (n,) float64 > 0; None: 1.
 fields: Fields; asset_a are then numbers of those, and their frames are placed by pose_a, scale_a.
 measure: 'matched' (the accurate one) or 'inner' (certified lower bound of the true volume).
 pair_budget: count of sphere pairs to spend on each pair of assets, as in ist.penetration; matched
-    measure only; 0: no limit.
+    measure only; 0: no limit. With fields it has no effect.
 wanted: names of answers; None: all but node_visits and sphere_pairs.
 out: a dict of arrays by the answers' names, or what an earlier call returned: answers go there, and
     nothing is allocated. uint32 answers fit int32 arrays.

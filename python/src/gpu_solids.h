@@ -22,9 +22,9 @@ namespace ist::python {
 class DeviceAssets {
  public:
   DeviceAssets(const py::sequence& assets, int device) {
-    std::vector<TreeView> views;
-    for (const py::handle asset : assets) views.push_back(tree_of(asset, "assets"));
     const std::vector<py::object> held(assets.begin(), assets.end());
+    std::vector<TreeView> views;
+    for (const py::object& asset : held) views.push_back(tree_of(asset, "assets"));
     const py::gil_scoped_release released;
     GpuSettings settings;
     settings.device = device;
@@ -97,9 +97,9 @@ class DeviceAssets {
 class DeviceFields {
  public:
   DeviceFields(const py::sequence& fields, int device) {
-    std::vector<Field> all;
-    for (const py::handle field : fields) all.push_back(field_of(field, "fields"));
     const std::vector<py::object> held(fields.begin(), fields.end());
+    std::vector<Field> all;
+    for (const py::object& field : held) all.push_back(field_of(field, "fields"));
     const py::gil_scoped_release released;
     GpuSettings settings;
     settings.device = device;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "mesh/bvh.h"
+#include "mesh/closest_point.h"
 #include "mesh/triangle_frame.h"
 #include "numerics/rounding.h"
 
@@ -29,6 +30,8 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 /// Below this depth ranges are halved, whatever it costs: traversal stacks are
 /// of fixed size.
 constexpr int kHeuristicDepth = 40;
+// Deeper down numbers are halved: of the cells of one grid, then of the triangles of one cell.
+static_assert(kHeuristicDepth + 12 + 28 < kBvhLevels);
 constexpr float kFlat = 1e-30f;         ///< centres no further apart are taken to be one
 constexpr std::size_t kTreelet = 1024;  ///< triangles below a few cells
 constexpr std::size_t kSerial = 8192;   ///< so many triangles are not worth a grid

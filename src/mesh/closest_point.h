@@ -22,7 +22,8 @@ struct NearestTriangle {
   float point[3] = {};                   ///< unit frame
 };
 
-constexpr int kBvhStackSize = 256;  ///< 3 entries a level, at most 72 levels (bvh_build.cpp)
+constexpr int kBvhStackSize = 256;  ///< 3 entries a level, at most kBvhLevels (bvh_build.cpp)
+constexpr int kBvhLevels = (kBvhStackSize - 1) / 3;
 
 /// Bound on |float distance − exact distance| for a query no further than `reach` from the origin
 /// (largest coordinate), the roundings of the query, the frames and the boxes included.

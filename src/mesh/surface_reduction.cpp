@@ -86,8 +86,8 @@ std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& v
   for (const std::uint32_t t : open)
     for (std::size_t k = 0; k < 3; ++k)
       sides.emplace(edge_of(t, k), edges.sides(edge_of(t, k)).size());
-  for (std::size_t before = 0; before != dropped.size();) {
-    before = dropped.size();
+  for (bool more = true; more;) {
+    const std::size_t before = dropped.size();
     std::erase_if(open, [&](const std::uint32_t t) {
       std::size_t odd = 0;
       for (std::size_t k = 0; k < 3; ++k) odd += sides[edge_of(t, k)] % 2;
@@ -96,6 +96,7 @@ std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& v
       dropped.push_back(t);
       return true;
     });
+    more = dropped.size() != before;
   }
   std::sort(dropped.begin(), dropped.end());
   remove(dropped, triangles);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <memory>
 #include <type_traits>
+#include <utility>
 
 namespace ist {
 
@@ -16,6 +17,14 @@ class RawArray {
   RawArray() = default;
   explicit RawArray(std::size_t size)
       : items_(std::make_unique_for_overwrite<T[]>(size)), size_(size) {}
+
+  RawArray(RawArray&& from) noexcept
+      : items_(std::move(from.items_)), size_(std::exchange(from.size_, 0)) {}
+  RawArray& operator=(RawArray&& from) noexcept {
+    items_ = std::move(from.items_);
+    size_ = std::exchange(from.size_, 0);
+    return *this;
+  }
 
   std::size_t size() const { return size_; }
   T* data() { return items_.get(); }

@@ -209,7 +209,6 @@ def test_wrong_fields_are_named(solids, some_fields, arguments):
     for wrong, error, text in [
             (dict(asset_a=5), ValueError, "asset_a: 5; there are 5 fields"),
             (dict(asset_b=3), ValueError, "asset_b: 3; there are 3 assets"),
-            (dict(pair_budget=9), ValueError, "pair_budget: 9; pairs of fields have none"),
             (dict(fields=some_fields[0]), TypeError, "incompatible function arguments")]:
         given = dict(asset_a=0, asset_b=2, fields=fields, pose_a=None, pose_b=OnDevice(poses.copy()))
         with pytest.raises(error, match=text):

@@ -39,9 +39,7 @@ std::optional<SolidSurface> SolidSurface::of_shells(const MeshSolid& solid) {
 const MeshView& SolidSurface::view() {
   if (triangles_.empty()) return solid_->view();
   if (!hierarchy_) {
-    const std::vector<double> vertices(arrays_.vertices,
-                                       arrays_.vertices + 3 * std::size_t{arrays_.vertex_count});
-    hierarchy_ = build_bvh(vertices, triangles_);
+    hierarchy_ = build_bvh({arrays_.vertices, 3 * std::size_t{arrays_.vertex_count}}, triangles_);
     view_ = arrays_;
     view_.nodes = hierarchy_->nodes.get();
     view_.blocks = hierarchy_->blocks.get();
