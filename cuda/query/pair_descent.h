@@ -1,9 +1,9 @@
 #pragma once
 
-#include <bit>
 #include <cmath>
 #include <cstdint>
 
+#include "cuda/query/bits.h"
 #include "cuda/query/pair_memory.h"
 #include "cuda/query/pair_sums.h"
 #include "numerics/host_device.h"
@@ -307,7 +307,7 @@ class PairDescent {
       const std::uint32_t bit = 1u << item(i);
       for (int s = 0; s < 2; ++s) {
         if ((there[s] & bit) == 0) continue;
-        const int place = bits(there[s] & (bit - 1));
+        const int place = count_bits(there[s] & (bit - 1));
         m_.near[s][place] = sphere[s][i];
         m_.number[s][place] = (s == 0 ? m_.meeting.block_a : m_.meeting.block_b)[k] * kWidth +
                               static_cast<std::uint32_t>(item(i)) % kWidth;
@@ -316,8 +316,8 @@ class PairDescent {
     team_.sync();
     // Spheres of A and B in the first pair and in the second.
     constexpr std::uint32_t kFirst = (1u << kWidth) - 1;
-    const int a0 = bits(there[0] & kFirst), b0 = bits(there[1] & kFirst);
-    const int a1 = bits(there[0]) - a0, b1 = bits(there[1]) - b0;
+    const int a0 = count_bits(there[0] & kFirst), b0 = count_bits(there[1] & kFirst);
+    const int a1 = count_bits(there[0]) - a0, b1 = count_bits(there[1]) - b0;
     const int in_first = a0 * b0, tests = in_first + a1 * b1;
     const int last = first + 1 < have ? first + 1 : first;
     const float rounding[2] = {m_.meeting.off[first].r, m_.meeting.off[last].r};
@@ -364,14 +364,6 @@ class PairDescent {
     const std::uint32_t lanes = pairs.lanes[k] >> lane;
     near[0] = (lanes & 1) != 0 && reaches(of_a, pairs.near_b[k], off.r);
     near[1] = (lanes & 0x10000) != 0 && reaches(of_b, pairs.near_a[k], off.r);
-  }
-
-  IST_HD static int bits(std::uint32_t word) {
-#ifdef __CUDA_ARCH__
-    return __popc(word);
-#else
-    return std::popcount(word);
-#endif
   }
 
   IST_HD static float largest(const Ball& ball) {

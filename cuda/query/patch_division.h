@@ -1,10 +1,10 @@
 #pragma once
 
-#include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include "cuda/query/bin_sums.h"
+#include "cuda/query/bits.h"
 #include "cuda/query/patch_memory.h"
 #include "numerics/host_device.h"
 
@@ -61,31 +61,15 @@ class PatchDivision {
  private:
   IST_HD PatchBin& bin(int k) const { return room_.bin[room_.rank[k]]; }
 
-  IST_HD static int bits(std::uint32_t word) {
-#ifdef __CUDA_ARCH__
-    return __popc(word);
-#else
-    return std::popcount(word);
-#endif
-  }
-
-  IST_HD static int lowest(std::uint32_t word) {
-#ifdef __CUDA_ARCH__
-    return __ffs(static_cast<int>(word)) - 1;
-#else
-    return std::countr_zero(word);
-#endif
-  }
-
   IST_HD void list_bins() {
     const int words = words_of(cuts_);
     team_.sync();
     for (int w = team_.lane(); w <= words; w += Team::kWidth) {
       int before = 0;
-      for (int v = 0; v < w; ++v) before += bits(m_.marked[v]);
+      for (int v = 0; v < w; ++v) before += count_bits(m_.marked[v]);
       m_.bins_before[w] = static_cast<std::uint16_t>(before);
       for (std::uint32_t left = w < words ? m_.marked[w] : 0; left != 0; left &= left - 1)
-        room_.rank[before++] = static_cast<std::uint16_t>(32 * w + lowest(left));
+        room_.rank[before++] = static_cast<std::uint16_t>(32 * w + lowest_bit(left));
     }
     team_.sync();
     bins_ = m_.bins_before[words];
@@ -124,7 +108,7 @@ class PatchDivision {
   /// How many of the bins that hold anything are of lower rank.
   IST_HD int bins_below(std::uint32_t rank) const {
     const std::uint32_t bit = rank % 32, below = bit == 0 ? 0 : m_.marked[rank / 32] << (32 - bit);
-    return m_.bins_before[rank / 32] + bits(below);
+    return m_.bins_before[rank / 32] + count_bits(below);
   }
   IST_HD double pull_below(int k) const { return k < bins_ ? bin(k).before : total_; }
 

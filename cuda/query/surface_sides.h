@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "cuda/query/bits.h"
 #include "cuda/query/surface_ref.h"
 #include "numerics/host_device.h"
 
@@ -9,14 +10,6 @@
 // (query/probe/) in plain numbers.
 
 namespace ist::gpu {
-
-IST_HD inline int count_bits(std::uint64_t bits) {
-#ifdef __CUDA_ARCH__
-  return __popcll(bits);
-#else
-  return __builtin_popcountll(bits);
-#endif
-}
 
 /// passes_left_in_line(): the edge's line goes through the way's beginning.
 IST_HD inline bool passes_left_in_line(const double (&d)[3], const double (&a)[3],
