@@ -61,6 +61,10 @@ struct WarpTeam {
 
   __device__ std::uint32_t ballot(bool flag) const { return __ballot_sync(kAll, flag); }
 
+  __device__ std::uint32_t alike(std::uint32_t value) const {
+    return __match_any_sync(kAll, value);
+  }
+
   __device__ int first(bool flag, int& total) const {
     const unsigned raised = __ballot_sync(kAll, flag);
     total = __popc(raised);

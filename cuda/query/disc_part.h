@@ -144,10 +144,12 @@ class Disc {
   }
 
   /// Edge by edge, what lies between it and the foot.
-  IST_HD_ONCE DiscPart within_edges() const {
+  IST_HD DiscPart within_edges() const {
     DiscPart sum = {0, 0, 0, 0};
     const double cap = r_ - h_, h2 = h_ * h_;
-    for (const Edge& e : edge_) {
+    IST_ROLLED
+    for (int k = 0; k < 3; ++k) {
+      const Edge e = edge(k);
       const double m2 = e.m * e.m;
       const double half = sqrt(most(rho2_ - m2, 0));
       const double low = least(most(-half, e.begin), e.end);
@@ -185,6 +187,9 @@ class Disc {
   struct Edge {
     double m, begin, end;
   };
+
+  /// Without an index into registers.
+  IST_HD Edge edge(int k) const { return k == 0 ? edge_[0] : k == 1 ? edge_[1] : edge_[2]; }
 
   double r_, height_, h_, x_, y_, rho2_;
   Edge edge_[3];

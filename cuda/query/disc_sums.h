@@ -2,19 +2,20 @@
 
 #include <cstdint>
 
+#include "cuda/query/bits.h"
 #include "cuda/query/disc_part.h"
 #include "cuda/query/part_sums.h"
 #include "cuda/query/seen_triangles.h"
 #include "numerics/host_device.h"
 
 // Balls met by triangles, by one team: their parts inside the closed surface, exactly, as
-// add_patch() and total_of() (query/probe/patch_sums.h, query/field/probe_sum.h) have them. Four
+// add_patch() and total_of() (query/probe/patch_sums.h, query/field/probe_sum.h) have them. Eight
 // blocks of sixteen balls are held at a time, and what meets goes to lists, so that the lanes of a
 // warp are full where the work is.
 
 namespace ist::gpu {
 
-constexpr int kHeldBlocks = 4;
+constexpr int kHeldBlocks = 8;
 constexpr int kHeldBalls = kHeldBlocks * static_cast<int>(kWidth);
 constexpr int kKeptNear = 16;  ///< triangles near a block that are remembered
 constexpr int kDiscRoom = 64;
@@ -47,12 +48,11 @@ struct DiscMemory {
   double cones[kHeldBalls], angle[kHeldBalls];
   std::uint32_t on_edge[kHeldBalls];
   HeldBlock block[kHeldBlocks];
-  SeenTriangles seen_from_block;
+  SeenTriangles triangles;
   TriangleId staged[kStaged];
   std::uint32_t staged_as[kStaged];  ///< its place in what is seen
+  SeenBall ball_seen[kWidth];        ///< of the block that is tested
   BallTriangle near[kDiscRoom], cut[kDiscRoom];
-  double share[2][32];  ///< of the lanes: cones and angle
-  std::uint32_t share_ball[32];
 
   /// Where a ball's side is told: its centre, or beside it where that lies on an edge.
   IST_HD void seen(int ball, double (&at)[3]) const {
@@ -75,6 +75,13 @@ struct DiscMemory {
 ///   corners(id, x, reach, c): of a triangle, which may be another one for another ball
 ///   each_near(team, x, reach, visit): visit(there, id) by all lanes for all triangles near a ball
 ///   inside(team, memory, ball, wanted): whether a lane's ball has its centre inside
+///
+/// Blocks are held, triangles staged and tested against them, and what meets is drained, a round at
+/// a time by a loop of the caller's, so that each step is in a kernel's code once:
+///
+///   if (drain(rest)) continue;
+///   if (rest) finish();  // and go on to what comes next
+///   if (tests()) test(); else …  // hold() and stage more, or set `rest`
 template <class Team, class Source>
 class DiscSums {
  public:
@@ -107,68 +114,122 @@ class DiscSums {
     m_.on_edge[ball] = 0;
   }
 
-  /// Puts a held block together with up to kStaged triangles: id_of(k, id) says whether there is a
-  /// k-th.
+  /// Stages those of up to kStaged triangles that come near a held block, to be tested against it:
+  /// id_of(k, id) says whether there is a k-th.
   template <class IdOf>
-  IST_HD void meet(int slot, const IdOf& id_of) {
+  IST_HD void stage_near(int slot, const IdOf& id_of) {
     const HeldBlock& block = m_.block[slot];
     int staged = 0;
     for (int i = 0; i < kStaged / Team::kWidth; ++i) {
+      const int k = i * Team::kWidth + team_.lane();
       TriangleId id = {};
-      float seen[SeenTriangles::kNumbers];
-      const bool near = id_of(i * Team::kWidth + team_.lane(), id) && see(block, id, seen);
+      bool near = id_of(k, id);
+      if (near) {
+        double c[3][3];
+        source_.corners(id, block.centre, block.reach, c);
+        near = m_.triangles.see(k, c, block.centre, block.reach);
+      }
       int total = 0;
       const int place = staged + team_.exclusive_count(near, total);
       staged += total;
-      if (!near) continue;
-      stage(place, id, place);
-      m_.seen_from_block.set(place, seen);
+      if (near) stage(place, id, k);
     }
-    meet_staged(slot, staged, m_.seen_from_block, block.centre, block.reach);
+    ready_tests(slot, staged, block.centre, block.reach);
   }
 
-  /// Makes a triangle the next for meet_staged(), by the lane that knows it. `as`: its place in
-  /// what is seen.
+  /// Makes a triangle the next to be tested, by the lane that knows it. `as`: its place in what is
+  /// seen.
   IST_HD void stage(int place, const TriangleId& id, int as) {
     m_.staged[place] = id;
     m_.staged_as[place] = static_cast<std::uint32_t>(as);
   }
 
-  /// Puts a held block together with all that is staged: the triangles that come near it, as they
-  /// are seen from a point that its balls lie within a reach of.
-  IST_HD_ONCE void meet_staged(int slot, int staged, const SeenTriangles& seen,
-                               const double (&centre)[3], double reach) {
+  /// Readies the tests of a held block with all that is staged: the triangles that come near it, as
+  /// they are seen from a point that its balls lie within a reach of.
+  IST_HD void ready_tests(int slot, int staged, const double (&centre)[3], double reach) {
     team_.sync();
     HeldBlock& block = m_.block[slot];
     const std::uint32_t before = block.near;
     for (int k = team_.lane(); k < staged; k += Team::kWidth)
       if (before + static_cast<std::uint32_t>(k) < kKeptNear)
         block.kept[before + static_cast<std::uint32_t>(k)] = m_.staged[k];
+    for (int lane = team_.lane(); lane < static_cast<int>(kWidth); lane += Team::kWidth) {
+      const int ball = slot * static_cast<int>(kWidth) + lane;
+      const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]};
+      m_.ball_seen[lane] = SeenTriangles::ball(x, m_.r[ball], centre, reach);
+    }
     team_.sync();
     if (team_.lane() == 0) block.near = before + static_cast<std::uint32_t>(staged);
-    const int tests = staged * static_cast<int>(kWidth);
-    for (int base = 0; base < tests; base += Team::kWidth) {
-      const int k = base + team_.lane();
-      const int ball = slot * static_cast<int>(kWidth) + k % static_cast<int>(kWidth);
-      const int triangle = k / static_cast<int>(kWidth);
-      const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]};
-      const bool meets =
-          k < tests && m_.r[ball] > 0 &&
-          seen.meets(static_cast<int>(m_.staged_as[triangle]), x, m_.r[ball], centre, reach);
+    tested_ = slot;
+    test_ = 0;
+    tests_ = staged * static_cast<int>(kWidth);
+  }
+
+  /// Whether tests are left.
+  IST_HD bool tests() const { return test_ < tests_; }
+
+  /// Tests a ball and a triangle a lane until none is left or a team's worth may meet and is
+  /// listed; drain() has left room for it.
+  IST_HD void test() {
+    IST_ROLLED
+    do {
+      const int k = test_ + team_.lane();
+      const int ball = k % static_cast<int>(kWidth);
+      const int triangle = k < tests_ ? k / static_cast<int>(kWidth) : 0;
+      const bool meets = k < tests_ && m_.triangles.meets(static_cast<int>(m_.staged_as[triangle]),
+                                                          m_.ball_seen[ball]);
       int total = 0;
       const int place = near_ + team_.exclusive_count(meets, total);
-      if (meets) m_.near[place] = {static_cast<std::uint32_t>(ball), m_.staged[triangle]};
+      if (meets)
+        m_.near[place] = {static_cast<std::uint32_t>(tested_ * static_cast<int>(kWidth) + ball),
+                          m_.staged[triangle]};
       near_ += total;
-      team_.sync();
-      drain(Team::kWidth);
-    }
+      test_ += Team::kWidth;
+    } while (tests() && near_ < Team::kWidth);
     team_.sync();
   }
 
-  /// Sums what is held.
+  /// Takes as much of what is listed as the team is wide, of the `rest` whatever is left; false if
+  /// there is not as much. What came near is sorted: it misses, is summed, or waits among what
+  /// edges cut.
+  IST_HD bool drain(bool rest) {
+    const bool of_cut = cut_ >= Team::kWidth || (rest && near_ == 0 && cut_ > 0);
+    if (!of_cut && near_ < (rest ? 1 : Team::kWidth)) return false;
+    const int listed = of_cut ? cut_ : near_;
+    const int take = listed < Team::kWidth ? listed : Team::kWidth;
+    const int left = listed - take;
+    cut_ = of_cut ? left : cut_;
+    near_ = of_cut ? near_ : left;
+    DiscKind kind = DiscKind::apart;
+    BallTriangle pair = {kNoBall, {0, 0}};
+    DiscPart part = {0, 0, 0, 0};
+    if (team_.lane() < take) {
+      pair = (of_cut ? m_.cut : m_.near)[left + team_.lane()];
+      const auto ball = static_cast<int>(pair.ball);
+      const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]};
+      const TrianglePlane t = plane_of(pair);
+      const Disc disc(t, x, m_.r[ball]);
+      kind = of_cut ? DiscKind::cut : disc.kind();
+      if (!of_cut && disc.on_edge()) m_.on_edge[ball] = 1;
+      if (of_cut || kind == DiscKind::whole) {
+        part = of_cut ? disc.within_edges() : disc.whole();
+        add_pull(t, x, part);
+      }
+    }
+    if (!of_cut) {
+      int total = 0;
+      const int place = cut_ + team_.exclusive_count(kind == DiscKind::cut, total);
+      if (kind == DiscKind::cut) m_.cut[place] = pair;
+      cut_ += total;
+      sums_.spheres += kind != DiscKind::apart ? 1 : 0;
+    }
+    share_out(of_cut || kind == DiscKind::whole ? pair.ball : kNoBall, part);
+    return true;
+  }
+
+  /// Sums what is held: nothing is listed any more.
   IST_HD void finish() {
     team_.sync();
-    drain(0);
     for (int ball = 0; ball < held_ * static_cast<int>(kWidth); ball += Team::kWidth) {
       bool on_edge = m_.on_edge[ball + team_.lane()] != 0 &&
                      ball + team_.lane() < held_ * static_cast<int>(kWidth);
@@ -181,6 +242,7 @@ class DiscSums {
       }
     }
     source_.ready_sides(team_, m_, held_);
+    IST_ROLLED
     for (int base = 0; base < held_ * static_cast<int>(kWidth); base += Team::kWidth) {
       const int ball = base + team_.lane();
       const bool there = ball < held_ * static_cast<int>(kWidth) && m_.r[ball] > 0;
@@ -196,52 +258,6 @@ class DiscSums {
   static constexpr double kLeastAngle = 1e-6;  ///< as query/field/probe_sum.h
 
  private:
-  IST_HD bool see(const HeldBlock& block, const TriangleId& id,
-                  float (&seen)[SeenTriangles::kNumbers]) const {
-    double c[3][3];
-    source_.corners(id, block.centre, block.reach, c);
-    return SeenTriangles::see(c, block.centre, block.reach, seen);
-  }
-
-  /// Takes what is listed, as many at a time as the team is wide, until fewer than `full` are left;
-  /// of 0 all. What came near is sorted: it misses, is summed, or waits among what edges cut.
-  IST_HD_ONCE void drain(int full) {
-    for (;;) {
-      const bool of_cut = cut_ >= Team::kWidth || (full == 0 && near_ == 0 && cut_ > 0);
-      if (!of_cut && (near_ == 0 || near_ < full)) return;
-      const int listed = of_cut ? cut_ : near_;
-      const int take = listed < Team::kWidth ? listed : Team::kWidth;
-      const int left = listed - take;
-      cut_ = of_cut ? left : cut_;
-      near_ = of_cut ? near_ : left;
-      DiscKind kind = DiscKind::apart;
-      BallTriangle pair = {kNoBall, {0, 0}};
-      DiscPart part = {0, 0, 0, 0};
-      if (team_.lane() < take) {
-        pair = (of_cut ? m_.cut : m_.near)[left + team_.lane()];
-        const auto ball = static_cast<int>(pair.ball);
-        const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]};
-        const TrianglePlane t = plane_of(pair);
-        const Disc disc(t, x, m_.r[ball]);
-        kind = of_cut ? DiscKind::cut : disc.kind();
-        if (!of_cut && disc.on_edge()) m_.on_edge[ball] = 1;
-        if (of_cut || kind == DiscKind::whole) {
-          part = of_cut ? disc.within_edges() : disc.whole();
-          add_pull(t, x, part);
-        }
-      }
-      if (!of_cut) {
-        int total = 0;
-        const int place = cut_ + team_.exclusive_count(kind == DiscKind::cut, total);
-        if (kind == DiscKind::cut) m_.cut[place] = pair;
-        cut_ += total;
-        sums_.spheres += kind != DiscKind::apart ? 1 : 0;
-      }
-      const bool shares = of_cut || kind == DiscKind::whole;
-      share_out(shares ? pair.ball : kNoBall, part);
-    }
-  }
-
   /// The triangle as it was when its block met it.
   IST_HD TrianglePlane plane_of(const BallTriangle& pair) const {
     const HeldBlock& block = m_.block[pair.ball / kWidth];
@@ -263,31 +279,29 @@ class DiscSums {
 
   /// Adds the lanes' cones and angles to their balls', in the order of the lanes.
   IST_HD void share_out(std::uint32_t of_ball, const DiscPart& part) {
-    if (!team_.any(of_ball != kNoBall)) {
-      team_.sync();
-      return;
+    const bool shares = of_ball != kNoBall;
+    std::uint32_t alike = team_.alike(of_ball);
+    const bool leads = shares && lowest_bit(alike) == team_.lane();
+    alike = leads ? alike : 0;
+    double cones = 0, angle = 0;
+    while (team_.any(alike != 0)) {
+      const int from = alike != 0 ? lowest_bit(alike) : team_.lane();
+      const double c = team_.broadcast(part.cones, from), a = team_.broadcast(part.angle, from);
+      if (alike == 0) continue;
+      cones += c;
+      angle += a;
+      alike &= alike - 1;
     }
-    m_.share[0][team_.lane()] = part.cones;
-    m_.share[1][team_.lane()] = part.angle;
-    m_.share_ball[team_.lane()] = of_ball;
-    team_.sync();
-    for (int ball = team_.lane(); ball < kHeldBalls; ball += Team::kWidth) {
-      double cones = 0, angle = 0;
-      for (int i = 0; i < Team::kWidth; ++i) {
-        if (m_.share_ball[i] != static_cast<std::uint32_t>(ball)) continue;
-        cones += m_.share[0][i];
-        angle += m_.share[1][i];
-      }
-      m_.cones[ball] += cones;
-      m_.angle[ball] += angle;
+    if (leads) {
+      m_.cones[of_ball] += cones;
+      m_.angle[of_ball] += angle;
     }
     team_.sync();
   }
 
   /// Cones and angle of a ball whose centre lies on an edge, from beside it: put_right()
   /// (query/probe/patch_sums.h).
-  IST_HD_ONCE static void put_right(const Team& team, DiscMemory& m, const Source source,
-                                    int ball) {
+  IST_HD_COLD static void put_right(const Team team, DiscMemory& m, const Source source, int ball) {
     const double r = m.r[ball];
     const double x[3] = {m.x[0][ball], m.x[1][ball], m.x[2][ball]};
     double moved[3] = {x[0], x[1], x[2]};
@@ -330,9 +344,11 @@ class DiscSums {
   DiscMemory& m_;
   const Source source_;
   PartSums& sums_;
-  double origin_[3];  ///< of the probing tree
-  int held_ = 0;      ///< blocks
-  int near_ = 0, cut_ = 0;
+  double origin_[3];          ///< of the probing tree
+  int held_ = 0;              ///< blocks
+  int tested_ = 0;            ///< the block that is
+  int test_ = 0, tests_ = 0;  ///< made, and to be made
+  int near_ = 0, cut_ = 0;    ///< listed
 };
 
 }  // namespace ist::gpu

@@ -43,6 +43,7 @@ class FacetSource {
   /// The triangles that may come near a ball, by number.
   class Near {
    public:
+    Near() = default;
     IST_HD Near(const FieldRef& field, const double (&x)[3], double reach) {
       if (field.kind == FieldKind::box) return;
       for (int k = 0; k < 2; ++k) {
@@ -146,41 +147,58 @@ class FacetSums {
         source_(memory.field),
         discs_(team, memory.discs, source_, memory.place.a_from_b.t, sums) {}
 
+  /// Sums leaf blocks; none: what is left.
   IST_HD void add(const std::uint32_t* blocks, int have) {
-    for (int k = 0; k < have; ++k) {
-      if (discs_.full()) discs_.finish();
-      add_block(blocks[k]);
+    bool rest = have == 0;
+    for (int next = 0;;) {
+      if (discs_.drain(rest)) continue;
+      if (rest) {
+        discs_.finish();
+        if (have == 0) return;
+        rest = false;
+      }
+      if (discs_.tests())
+        discs_.test();
+      else if (staged_ < near_size_)
+        stage_more();
+      else if (next == have)
+        return;
+      else if (discs_.full())
+        rest = true;
+      else
+        hold_block(blocks[next++]);
     }
   }
 
-  /// To be called when all are added.
-  IST_HD void finish() { discs_.finish(); }
-
  private:
-  IST_HD void add_block(std::uint32_t block) {
+  IST_HD void hold_block(std::uint32_t block) {
     const NodeBall ball = m_.tree.ball(0, block);
     double centre[3];
     m_.place.a_from_b.apply(ball.centre, centre);
     const double reach = ball.r * m_.place.a_from_b.scale * (1 + 1e-12);
-    const int slot = discs_.hold(centre, reach);
+    slot_ = discs_.hold(centre, reach);
     bool facets = false;
     for (int lane = team_.lane(); lane < static_cast<int>(kWidth); lane += Team::kWidth) {
       double x[3], r;
       if (!place_ball(m_, 0, block, lane, x, r) || settled(x, r)) r = 0;
       facets = facets || r > 0;
-      discs_.set_ball(slot, lane, x, r);
+      discs_.set_ball(slot_, lane, x, r);
     }
     team_.sync();
-    if (!team_.any(facets)) return;
-    const FacetSource::Near near(m_.field, centre, reach * (1 + kMoved));
-    const std::uint64_t size = near.size();
-    for (std::uint64_t base = 0; base < size; base += kStaged)
-      discs_.meet(slot, [&](int k, TriangleId& id) {
-        const std::uint64_t i = base + static_cast<std::uint64_t>(k);
-        if (i >= size) return false;
-        id = near[i];
-        return true;
-      });
+    near_ = FacetSource::Near(m_.field, centre, reach * (1 + kMoved));
+    near_size_ = team_.any(facets) ? near_.size() : 0;
+    staged_ = 0;
+  }
+
+  /// Stages the next of the triangles that may come near the block.
+  IST_HD void stage_more() {
+    discs_.stage_near(slot_, [&](int k, TriangleId& id) {
+      const std::uint64_t i = staged_ + static_cast<std::uint64_t>(k);
+      if (i >= near_size_) return false;
+      id = near_[i];
+      return true;
+    });
+    staged_ += kStaged;
   }
 
   /// Sums what needs no triangles: a ball that comes near one face of a box, or none.
@@ -219,6 +237,9 @@ class FacetSums {
   PartSums& sums_;
   FacetSource source_;
   DiscSums<Team, FacetSource> discs_;
+  int slot_ = 0;            ///< the block in work
+  FacetSource::Near near_;  ///< it
+  std::uint64_t near_size_ = 0, staged_ = 0;
 };
 
 }  // namespace ist::gpu

@@ -9,7 +9,7 @@ namespace {
 constexpr unsigned kSiftThreads = 256;
 constexpr unsigned kWarps = 3;  ///< whose memory is what a block may have
 constexpr unsigned kThreads = 32 * kWarps;
-constexpr int kBlocksEach = 5;  ///< a multiprocessor: 136 registers a thread
+constexpr int kBlocksEach = 4;  ///< a multiprocessor: 168 registers a thread
 
 /// Places every pair and lists those that are not told at once.
 __global__ void __launch_bounds__(kSiftThreads) sift_field_pairs(const FieldBatch batch) {

@@ -137,7 +137,6 @@ IST_HD void sum_field_pair(const Team& team, const FieldBatch& batch, std::uint3
   FieldWalk<Team> walk(team, memory, sums);
   FacetSums<Team> facets(team, memory, sums);
   walk.run([&](const std::uint32_t* blocks, int have) { facets.add(blocks, have); });
-  facets.finish();
   finish_probe(team, batch, i, memory.place, sums, true);
 }
 

@@ -24,8 +24,8 @@ struct ProbeMemory {
 /// A ball of a block of the tree, the field's frame; false if the lane holds none.
 IST_HD inline bool place_ball(const ProbeMemory& m, int level, std::uint32_t block, int lane,
                               double (&x)[3], double& r) {
-  const BallBlock& b = m.tree.blocks[level][block];
-  const Origin& o = m.tree.origins[level][block];
+  const BallBlock& b = in_global_memory(m.tree.blocks[level])[block];
+  const Origin& o = in_global_memory(m.tree.origins[level])[block];
   const double at[3] = {o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
                         o.z + static_cast<double>(b.z[lane])};
   m.place.a_from_b.apply(at, x);
@@ -49,18 +49,19 @@ class FieldWalk {
   IST_HD FieldWalk(const Team& team, WalkMemory& memory, PartSums& sums)
       : team_(team), m_(memory), sums_(sums) {}
 
-  /// False where the field holds what is no number. leaf(blocks, have) sums one leaf block or two.
+  /// False where the field holds what is no number. leaf(blocks, have) sums one leaf block or two,
+  /// and at the end none.
   template <class Leaf>
   IST_HD bool run(const Leaf& leaf) {
     int size = 0, leaves = 0;
     if (team_.lane() == 0) (m_.tree.top == 0 ? m_.leaves : m_.stack)[0] = node(m_.tree.top, 0);
     (m_.tree.top == 0 ? leaves : size) = 1;
     team_.sync();
-    while (size > 0 || leaves > 0) {
+    for (int have = 1; have > 0;) {
       if (size > 0 && leaves < kPairsAtOnce) {
         open(size, leaves);
       } else {
-        const int have = leaves < kPairsAtOnce ? leaves : kPairsAtOnce;
+        have = leaves < kPairsAtOnce ? leaves : kPairsAtOnce;
         leaves -= have;
         sums_.visits += static_cast<std::uint32_t>(have);
         leaf(m_.leaves + leaves, have);

@@ -87,8 +87,8 @@ struct SurfaceRef {
 
   /// The ball in a lane of a block of a level above 0; a negative radius if there is none.
   IST_HD NodeBall lane_ball(int level, std::uint32_t block, std::uint32_t lane) const {
-    const BallBlock& b = balls[level][block];
-    const Origin& o = origins[level][block];
+    const BallBlock& b = in_global_memory(balls[level])[block];
+    const Origin& o = in_global_memory(origins[level])[block];
     return {{o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
              o.z + static_cast<double>(b.z[lane])},
             static_cast<double>(b.r[lane])};
@@ -96,7 +96,7 @@ struct SurfaceRef {
 
   /// Corners of triangle 16 · block + lane.
   IST_HD void corners(std::uint32_t triangle, double (&c)[3][3]) const {
-    const SurfaceBlock& b = blocks[triangle / kWidth];
+    const SurfaceBlock& b = in_global_memory(blocks)[triangle / kWidth];
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t vertex = b.corner[k][triangle % kWidth];
       c[k][0] = static_cast<double>(b.x[vertex]);

@@ -35,12 +35,16 @@ IST_HD inline bool passes_left(const double (&d)[3], const double (&a)[3], const
   return passes_left_in_line(d, a, b);
 }
 
-/// Whether the way from `from` by `way` goes through a triangle.
-IST_HD_ONCE inline bool steps_through(const double (&from)[3], const double (&way)[3],
-                                      const double (&corner)[3][3]) {
+/// Whether the way from `from` by `way` goes through a triangle of a surface. All by value: what is
+/// called by reference lies in memory.
+IST_HD_ONCE inline bool steps_through(double from_x, double from_y, double from_z, double way_x,
+                                      double way_y, double way_z, const SurfaceRef& surface,
+                                      std::uint32_t triangle) {
+  const double from[3] = {from_x, from_y, from_z}, way[3] = {way_x, way_y, way_z};
   double c[3][3];
+  surface.corners(triangle, c);
   for (int i = 0; i < 3; ++i)
-    for (int k = 0; k < 3; ++k) c[i][k] = corner[i][k] - from[k];
+    for (int k = 0; k < 3; ++k) c[i][k] -= from[k];
   const bool left = passes_left(way, c[0], c[1]);
   if (passes_left(way, c[1], c[2]) != left || passes_left(way, c[2], c[0]) != left) return false;
   double e[3], f[3], n[3], before = 0, after = 0;
@@ -54,6 +58,11 @@ IST_HD_ONCE inline bool steps_through(const double (&from)[3], const double (&wa
   before = (n[0] * c[0][0] + n[1] * c[0][1]) + n[2] * c[0][2];
   after = (n[0] * (c[0][0] - way[0]) + n[1] * (c[0][1] - way[1])) + n[2] * (c[0][2] - way[2]);
   return (before > 0) != (after > 0);
+}
+
+IST_HD inline bool steps_through(const double (&from)[3], const double (&way)[3],
+                                 const SurfaceRef& surface, std::uint32_t triangle) {
+  return steps_through(from[0], from[1], from[2], way[0], way[1], way[2], surface, triangle);
 }
 
 /// What a look into the grid tells of a point.
@@ -93,8 +102,10 @@ IST_HD inline CellLook look_into_cell(const SurfaceRef& s, const double (&x)[3])
 /// Whether each lane's point is inside the surface, as inside_surface(). The team goes through the
 /// triangles of one lane's cell after another's.
 template <class Team>
-IST_HD_ONCE bool inside_surface(const Team& team, const SurfaceRef& s, bool wanted,
-                                const double (&x)[3]) {
+IST_HD_ONCE bool inside_surface(const Team team, const SurfaceRef& surface, bool wanted,
+                                double at_x, double at_y, double at_z) {
+  const SurfaceRef& s = *team.memory(&surface);
+  const double x[3] = {at_x, at_y, at_z};
   CellLook look = {};
   if (wanted) look = look_into_cell(s, x);
   bool open = look.begin < look.end;
@@ -112,9 +123,7 @@ IST_HD_ONCE bool inside_surface(const Team& team, const SurfaceRef& s, bool want
     int steps = 0;
     for (std::uint32_t i = begin + static_cast<std::uint32_t>(team.lane()); i < end;
          i += static_cast<std::uint32_t>(Team::kWidth)) {
-      double corner[3][3];
-      s.corners(s.listed(s.cell_triangles, i), corner);
-      steps += steps_through(point, way, corner) ? 1 : 0;
+      steps += steps_through(point, way, s, s.listed(s.cell_triangles, i)) ? 1 : 0;
     }
     steps = team.sum(steps);
     if (team.lane() == from) {
@@ -122,6 +131,12 @@ IST_HD_ONCE bool inside_surface(const Team& team, const SurfaceRef& s, bool want
       open = false;
     }
   }
+}
+
+template <class Team>
+IST_HD bool inside_surface(const Team& team, const SurfaceRef& surface, bool wanted,
+                           const double (&x)[3]) {
+  return inside_surface(team, surface, wanted, x[0], x[1], x[2]);
 }
 
 }  // namespace ist::gpu

@@ -49,13 +49,34 @@ class SurfaceSource {
   IST_HD bool comes_near(SurfaceNode node, int lane, const double (&x)[3], double reach) const {
     const auto at = static_cast<std::uint32_t>(lane);
     if (rank_of(node) == kTriangleBlock) {
-      float seen[SeenTriangles::kNumbers];
       double c[3][3];
       surface_.corners(number_of(node) * kWidth + at, c);
-      return SeenTriangles::see(c, x, reach, seen);
+      return triangle_comes_near(c, x, reach);
     }
     const NodeBall ball = surface_.lane_ball(rank_of(node) - 1, number_of(node), at);
     return ball.r > 0 && balls_meet(ball, x, reach);
+  }
+
+  /// True at least where it does: told by its box and by its plane.
+  IST_HD static bool triangle_comes_near(const double (&c)[3][3], const double (&x)[3],
+                                         double reach) {
+    const double reach2 = reach * reach;
+    double beyond2 = 0, p[3], e[3], f[3];
+    for (int k = 0; k < 3; ++k) {
+      p[k] = c[0][k] - x[k];
+      e[k] = c[1][k] - c[0][k];
+      f[k] = c[2][k] - c[0][k];
+      const double low = p[k] + least(least(e[k], f[k]), 0),
+                   high = p[k] + most(most(e[k], f[k]), 0);
+      const double beyond = most(most(low, -high), 0);
+      beyond2 += beyond * beyond;
+    }
+    if (beyond2 > reach2) return false;
+    const double n[3] = {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2],
+                         e[0] * f[1] - e[1] * f[0]};
+    const double height = (n[0] * p[0] + n[1] * p[1]) + n[2] * p[2];
+    const double n2 = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
+    return n2 > 0 && height * height <= n2 * reach2 * (1 + 1e-9);
   }
 
   IST_HD static bool balls_meet(const NodeBall& ball, const double (&x)[3], double reach) {
@@ -104,11 +125,8 @@ class SurfaceSource {
     double from[3], way[3];
     m.seen(static_cast<int>(block.known), from);
     for (int k = 0; k < 3; ++k) way[k] = x[k] - from[k];
-    for (std::uint32_t i = 0; i < block.near; ++i) {
-      double c[3][3];
-      surface_.corners(block.kept[i].a, c);
-      if (steps_through(from, way, c)) result = !result;
-    }
+    for (std::uint32_t i = 0; i < block.near; ++i)
+      if (steps_through(from, way, surface_, block.kept[i].a)) result = !result;
     return result;
   }
 

@@ -82,6 +82,9 @@ struct SerialTeam {
   /// Bit k: lane k raises the flag.
   IST_HD std::uint32_t ballot(bool flag) const { return flag ? 1 : 0; }
 
+  /// Bit k: lane k holds the same value.
+  IST_HD std::uint32_t alike(std::uint32_t) const { return 1; }
+
   /// The lowest lane that raises the flag, −1 if none does; `total`: how many do.
   IST_HD int first(bool flag, int& total) const {
     total = flag ? 1 : 0;

@@ -150,6 +150,12 @@ class FiberTeam {
     for (int i = 0; i < Width; ++i) raised |= static_cast<std::uint32_t>(all[i]) << i;
     return raised;
   }
+  std::uint32_t alike(std::uint32_t value) const {
+    const std::uint64_t* all = fibers_.exchange(lane_, 10, value);
+    std::uint32_t same = 0;
+    for (int i = 0; i < Width; ++i) same |= (all[i] == value ? 1u : 0u) << i;
+    return same;
+  }
   int first(bool flag, int& total) const {
     const std::uint64_t* all = fibers_.exchange(lane_, 7, flag ? 1 : 0);
     int found = -1;
