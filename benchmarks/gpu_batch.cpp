@@ -212,7 +212,7 @@ class Stream {
 
 class Batches {
  public:
-  explicit Batches(std::size_t most) : workspace_(most) {}
+  explicit Batches(std::size_t most) : large_(most), small_(kFew) {}
 
   /// [ms], the median of ten; keeps the last answers.
   double median_ms(const Scene& scene, std::size_t count) {
@@ -224,11 +224,11 @@ class Batches {
     const DeviceBatch batch(drawn(scene.poses, count));
     const double ms = median_ms([&] {
       if (in_field)
-        penetration_batch(assets, fields, batch.pairs(), Measure::matched, workspace_,
+        penetration_batch(assets, fields, batch.pairs(), Measure::matched, workspace(count),
                           batch.answers(), stream_.get());
       else
-        penetration_batch(assets, batch.pairs(), {Measure::matched, scene.pair_budget}, workspace_,
-                          batch.answers(), stream_.get());
+        penetration_batch(assets, batch.pairs(), {Measure::matched, scene.pair_budget},
+                          workspace(count), batch.answers(), stream_.get());
     });
     answers_ = batch.get();
     return ms;
@@ -240,7 +240,8 @@ class Batches {
     const DeviceBatch batch(drawn(scene.poses, count));
     const DeviceSeparations answers(count);
     const double ms = median_ms([&] {
-      separation_batch(assets, batch.pairs(), 0, workspace_, answers.answers(), stream_.get());
+      separation_batch(assets, batch.pairs(), 0, workspace(count), answers.answers(),
+                       stream_.get());
     });
     separations_ = answers.get();
     return ms;
@@ -253,8 +254,8 @@ class Batches {
     const DeviceBatch batch(drawn(scene.poses, count));
     const DevicePatches patches(count, most);
     const double ms = median_ms([&] {
-      contact_patches_batch(assets, batch.pairs(), Measure::matched, workspace_, batch.answers(),
-                            patches.patches(), stream_.get());
+      contact_patches_batch(assets, batch.pairs(), Measure::matched, workspace(count),
+                            batch.answers(), patches.patches(), stream_.get());
     });
     patched_ = patches.get(batch.get());
     return ms;
@@ -273,7 +274,11 @@ class Batches {
     return benchmark::quantile(ms, 0.5);
   }
 
-  GpuWorkspace workspace_;
+  /// A step of few pairs has a workspace of its own, as who has but few would make it.
+  GpuWorkspace& workspace(std::size_t count) { return count > kFew ? large_ : small_; }
+  static constexpr std::size_t kFew = 4096;
+
+  GpuWorkspace large_, small_;
   Stream stream_;
   std::vector<Penetration> answers_;
   std::vector<Separation> separations_;

@@ -60,6 +60,7 @@ struct BatchCounters {
   std::uint32_t listed;  ///< pairs whose roots meet
   std::uint32_t taken;
   std::uint32_t splits, tasks, entries, tasks_taken;
+  std::uint32_t handed_out;               ///< pairs that may have left tasks, and leave no more
   std::uint32_t detailed, details_taken;  ///< pairs that are asked at several levels of detail
 };
 
@@ -79,13 +80,23 @@ struct BatchArrays {
   // Room for what is split; what finds none is summed by the team that met it.
   SplitPair* splits;
   PairTask* tasks;
-  PairPlace* places;   ///< [split_room]
-  LensTotals* totals;  ///< of splits[0]: [split_room + task_room]
+  std::uint32_t* posted;  ///< [task_room] 1: the task can be taken; 0 before a batch and after it
+  PairPlace* places;      ///< [split_room]
+  LensTotals* totals;     ///< of splits[0]: [split_room + task_room]
   std::uint32_t* entries_a;
   std::uint32_t* entries_b;
   std::uint32_t split_room, task_room, entry_room;
-  std::uint32_t most_alone = 128;  ///< pairs of leaves that a descent meets before it is split
-  std::uint32_t task_weight = 64;  ///< of a task, as task_floor() counts
+  std::uint32_t most_alone;   ///< pairs of leaves that a descent meets before it is split
+  std::uint32_t task_weight;  ///< the least of a task, as task_floor() counts
+
+  /// How finely pairs are cut: where a batch is of few, for all warps to have work until its end;
+  /// where it is of many, as seldom as can be, since each cut costs.
+  void cut_for(std::size_t most_pairs) {
+    const bool few = most_pairs <= kFewPairs;
+    most_alone = few ? 80 : 512;
+    task_weight = few ? 24 : 64;
+  }
+  static constexpr std::size_t kFewPairs = 16384;  ///< GpuWorkspace() says it
 };
 
 }  // namespace ist::gpu

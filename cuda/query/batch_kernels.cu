@@ -9,7 +9,7 @@
 namespace ist::gpu {
 namespace {
 
-constexpr unsigned kSiftThreads = 256;
+constexpr unsigned kSiftThreads = 64;  ///< few pairs are placed by many multiprocessors
 constexpr unsigned kWarps = 4;
 constexpr unsigned kThreads = 32 * kWarps;
 constexpr std::uint32_t kHandOut = 4;  ///< pairs a warp, of a batch's last
@@ -32,31 +32,75 @@ constexpr unsigned kDetailWarps = 2;
 __global__ void __launch_bounds__(32 * kDetailWarps) sum_detailed_pairs(const BatchArrays batch) {
   __shared__ DetailMemory memory[kDetailWarps];
   BatchCounters& counters = *batch.counters;
-  by_warps(load_fresh(&counters.detailed), &counters.details_taken,
-           [&](const WarpTeam& team, std::uint32_t k) {
-             sum_details(team, batch, batch.detailed[k], memory[threadIdx.x / 32]);
-           });
-}
-
-__global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchArrays batch) {
-  __shared__ PairMemory memory[kWarps];
-  BatchCounters& counters = *batch.counters;
-  // All warps stay busy until near the end: only what is taken last is handed out.
-  const std::uint32_t listed = load_fresh(&counters.listed);
-  const std::uint32_t last = kHandOut * kWarps * gridDim.x;
-  by_warps(listed, &counters.taken, [&](const WarpTeam& team, std::uint32_t k) {
-    sum_pair(team, batch, batch.list[k], k + last >= listed, memory[threadIdx.x / 32]);
+  const std::uint32_t detailed = load_fresh(&counters.detailed);
+  if (detailed == 0) return;
+  by_warps(detailed, &counters.details_taken, [&](const WarpTeam& team, std::uint32_t k) {
+    sum_details(team, batch, batch.detailed[k], memory[threadIdx.x / 32]);
   });
 }
 
-__global__ void __launch_bounds__(kThreads, kBlocksEach) sum_tasks(const BatchArrays batch) {
-  __shared__ PairMemory memory[kWarps];
+/// Takes pairs of the list or, when there are none left, a task, for which it waits as long as
+/// pairs may leave some: where it is, and how many there are. By a warp's first lane.
+__device__ std::uint32_t take(const BatchArrays& batch, std::uint32_t listed, std::uint32_t most,
+                              bool& is_task, std::uint32_t& at) {
   BatchCounters& counters = *batch.counters;
-  const std::uint32_t tasks = load_fresh(&counters.tasks);
-  by_warps(tasks < batch.task_room ? tasks : batch.task_room, &counters.tasks_taken,
-           [&](const WarpTeam& team, std::uint32_t k) {
-             sum_task(team, batch, k, memory[threadIdx.x / 32]);
-           });
+  if (!is_task) {
+    // One at a time near the end, for all warps to stay busy.
+    const bool near_end = atomic_load(&counters.taken) + most >= listed;
+    const std::uint32_t count = near_end ? 1 : 1 + kPlacedAhead;
+    at = atomic_add(&counters.taken, count);
+    if (at < listed) return count < listed - at ? count : listed - at;
+    is_task = true;
+  }
+  at = atomic_add(&counters.tasks_taken, 1);
+  for (;;) {
+    const int found = look_for_task(batch, at, most);
+    if (found >= 0) return static_cast<std::uint32_t>(found);
+    __nanosleep(500);
+  }
+}
+
+/// Sums pairs, each warp taking the next when it is done with some, and then what pairs left. All
+/// in one loop: the code of a descent is there once and stays in the instruction cache.
+__global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchArrays batch) {
+  __shared__ WorkMemory memories[kWarps];
+  const WarpTeam team;
+  WorkMemory& memory = memories[threadIdx.x / 32];
+  const std::uint32_t listed = load_fresh(&batch.counters->listed);
+  const std::uint32_t most = pairs_handed_out(listed, kHandOut * kWarps * gridDim.x);
+  if (team.lane() == 0) {
+    memory.is_task = false;
+    memory.waiting = 0;
+  }
+  for (;;) {
+    team.sync();
+    if (memory.waiting > 0) {
+      take_placed(team, memory);
+    } else {
+      std::uint32_t count = 0, at = 0;
+      bool is_task = memory.is_task;
+      if (team.lane() == 0) count = take(batch, listed, most, is_task, at);
+      count = team.broadcast(count, 0);
+      if (count == 0) return;
+      at = team.broadcast(at, 0);
+      is_task = team.any(is_task);
+      if (team.lane() == 0) {
+        memory.is_task = is_task;
+        memory.at = at;
+      }
+      team.sync();
+      if (!is_task)
+        place_pairs(team, batch, at, count, memory);
+      else if (!take_task(team, batch, memory))
+        continue;
+    }
+    const bool hand_out = !memory.is_task && memory.at + most >= listed;
+    if (team.lane() == 0) memory.hand_out = hand_out;
+    const bool left = do_work(team, batch, memory);
+    if (team.lane() > 0 || memory.is_task || !memory.hand_out) continue;
+    if (left) publish();
+    atomic_add(&batch.counters->handed_out, 1);
+  }
 }
 
 }  // namespace
@@ -78,8 +122,6 @@ void launch_batch(const BatchArrays& batch, const BatchGrids& grids, cudaStream_
   const auto blocks = static_cast<unsigned>(grids.sum);
   sum_pairs<<<blocks, kThreads, 0, stream>>>(batch);
   check_launch("summing pairs of trees");
-  sum_tasks<<<blocks, kThreads, 0, stream>>>(batch);
-  check_launch("summing what pairs left");
 }
 
 }  // namespace ist::gpu

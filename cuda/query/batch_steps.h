@@ -34,7 +34,8 @@ IST_HD inline void write_nothing(const GpuPenetrations& to, std::uint32_t i, Que
 
 IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, const PairPlace& place,
                                 const LensTotals& totals) {
-  const WorldSums sums = WorldSums::of(place, totals.term);
+  // Where nothing met there is nothing to turn.
+  const WorldSums sums = totals.spheres > 0 ? WorldSums::of(place, totals.term) : WorldSums{};
   if (to.volume != nullptr) to.volume[i] = sums.volume;
   write3(to.centroid, i, sums.centre[0], sums.centre[1], sums.centre[2]);
   write3(to.translation_gradient, i, sums.push[0], sums.push[1], sums.push[2]);
@@ -160,15 +161,33 @@ IST_HD void load_trees(const Team& team, const BatchArrays& batch, std::uint32_t
   team.sync();
 }
 
+/// What waits is worth about so many pairs of leaves.
+IST_HD inline std::uint32_t weight_of(const PairMemory& memory, int entry) {
+  constexpr int kMostLeft = 8;  // for all entries' sum to be an int
+  const int left = memory.steps.count - 1 - static_cast<int>(memory.stack_a[entry] >> kNodeBits);
+  return 1u << 2 * (left < kMostLeft ? left : kMostLeft);
+}
+
+/// Decides how large the tasks are of what waits: no smaller than a batch's, and not too many. All
+/// of the team together.
+template <class Team>
+IST_HD void size_tasks(const Team& team, const BatchArrays& batch, PairMemory& memory,
+                       int waiting) {
+  constexpr std::uint32_t kMostTasks = 16;  // about
+  int weight = 0;
+  for (int k = team.lane(); k < waiting; k += Team::kWidth)
+    weight += static_cast<int>(weight_of(memory, k));
+  const std::uint32_t each = static_cast<std::uint32_t>(team.sum(weight)) / kMostTasks;
+  if (team.lane() == 0) memory.task_weight = each > batch.task_weight ? each : batch.task_weight;
+  team.sync();
+}
+
 /// The lowest entry of the task that begins with the topmost of `waiting` entries.
-IST_HD inline int task_floor(const BatchArrays& batch, const PairMemory& memory, int waiting) {
+IST_HD inline int task_floor(const PairMemory& memory, int waiting) {
+  const int top = waiting;
   std::uint32_t weight = 0;
-  while (waiting > 0 && weight < batch.task_weight) {
-    const int left =
-        memory.steps.count - 1 - static_cast<int>(memory.stack_a[waiting - 1] >> kNodeBits);
-    weight += left >= 2 ? batch.task_weight : 1u << 2 * left;
-    --waiting;
-  }
+  while (waiting > 0 && weight < memory.task_weight && top - waiting < kTaskRoom)
+    weight += weight_of(memory, --waiting);
   return waiting;
 }
 
@@ -177,71 +196,161 @@ template <class Team>
 IST_HD bool split_pair(const Team& team, const BatchArrays& batch, std::uint32_t i,
                        PairMemory& memory, int waiting) {
   const SplitRoom room = take_room(team, batch, *batch.counters, i, waiting,
-                                   [&](int top) { return task_floor(batch, memory, top); });
-  if (!room.fits) return false;
-  if (team.lane() == 0) batch.totals[room.split] = memory.sum;
-  copy_words(team, memory.place, batch.places[room.split]);
-  for (int k = team.lane(); k < waiting; k += Team::kWidth) {
-    batch.entries_a[room.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_a[k];
-    batch.entries_b[room.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_b[k];
+                                   [&](int top) { return task_floor(memory, top); });
+  if (room.fits) {
+    if (team.lane() == 0) batch.totals[room.split] = memory.sum;
+    copy_words(team, memory.place, batch.places[room.split]);
+    for (int k = team.lane(); k < waiting; k += Team::kWidth) {
+      batch.entries_a[room.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_a[k];
+      batch.entries_b[room.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_b[k];
+    }
   }
+  publish();
+  team.sync();
+  for (std::uint32_t k = room.first_task + static_cast<std::uint32_t>(team.lane());
+       k < room.first_task + room.tasks; k += static_cast<std::uint32_t>(Team::kWidth))
+    if (k < batch.task_room) atomic_exchange(&batch.posted[k], 1);
+  return room.fits;
+}
+
+/// Pairs at the end of a list that may leave tasks: before those nobody has time for them.
+IST_HD inline std::uint32_t pairs_handed_out(std::uint32_t listed, std::uint32_t last) {
+  return listed < last ? listed : last;
+}
+
+/// Whether task k can be taken; −1: not yet, 0: there is none. `most`: pairs that may leave tasks.
+IST_HD inline int look_for_task(const BatchArrays& batch, std::uint32_t k, std::uint32_t most) {
+  if (k < batch.task_room && atomic_load(&batch.posted[k]) != 0) {
+    publish();
+    return 1;
+  }
+  if (k < batch.task_room && atomic_load(&batch.counters->handed_out) < most) return -1;
+  publish();
+  const std::uint32_t tasks = atomic_load(&batch.counters->tasks);
+  return k < tasks && k < batch.task_room ? -1 : 0;
+}
+
+/// A pair of the list as a team finds it.
+struct PlacedPair {
+  PairPlace place;
+  std::uint32_t pair;  ///< of the batch
+  std::uint32_t at;    ///< in the list
+};
+
+/// Pairs that a team takes at a time: placing one or a few, a lane each, takes as long.
+constexpr int kPlacedAhead = 2;
+
+/// What a team needs to sum pairs of the list and tasks. Not in its registers, of which a descent
+/// has none to spare.
+struct WorkMemory : PairMemory {
+  bool is_task;
+  bool hand_out;       ///< of a pair: what one team is not to do alone goes to others
+  std::uint32_t pair;  ///< of the batch
+  std::uint32_t at;    ///< of a pair in the list, of a task among the tasks
+  PairTask task;
+  int waiting;  ///< pairs that are placed ahead
+  PlacedPair ahead[kPlacedAhead];
+};
+
+/// Places pairs `first` … of the list: the first is in work, the others wait.
+template <class Team>
+IST_HD void place_pairs(const Team& team, const BatchArrays& batch, std::uint32_t first,
+                        std::uint32_t count, WorkMemory& memory) {
+  for (auto k = static_cast<std::uint32_t>(team.lane()); k < count;
+       k += static_cast<std::uint32_t>(Team::kWidth)) {
+    const std::uint32_t pair = batch.list[first + k];
+    PlacedPair& waits = memory.ahead[k > 0 ? count - 1 - k : 0];
+    (k > 0 ? waits.pair : memory.pair) = pair;
+    (k > 0 ? waits.at : memory.at) = first + k;
+    place_pair(batch, pair, k > 0 ? waits.place : memory.place);
+  }
+  if (team.lane() == 0) memory.waiting = static_cast<int>(count) - 1;
+  team.sync();
+}
+
+/// Takes a pair that was placed ahead into work.
+template <class Team>
+IST_HD void take_placed(const Team& team, WorkMemory& memory) {
+  const int k = memory.waiting - 1;
+  const PlacedPair& from = memory.ahead[k];
+  copy_words(team, from.place, memory.place);
+  team.sync();
+  if (team.lane() == 0) {
+    memory.pair = from.pair;
+    memory.at = from.at;
+    memory.waiting = k;
+  }
+  team.sync();
+}
+
+/// Takes a task into work; false if it is of a pair that found no room for all of its tasks.
+template <class Team>
+IST_HD bool take_task(const Team& team, const BatchArrays& batch, WorkMemory& memory) {
+  const std::uint32_t at = memory.at;
+  const PairTask task = batch.tasks[at];
+  team.sync();
+  if (team.lane() == 0) batch.posted[at] = 0;
+  if (task.count == 0) return false;
+  const SplitPair& split = batch.splits[task.split];
+  if (team.lane() == 0) {
+    memory.task = task;
+    memory.pair = split.pair;
+  }
+  copy_words(team, batch.places[task.split], memory.place);
+  team.sync();
   return true;
 }
 
-/// Sums pair i, or as much of it as one team is to do alone if the rest is to be handed out.
+/// Adds up what a pair's tasks have come to, if this was the last; by a team's first lane.
+IST_HD inline bool end_task(const BatchArrays& batch, WorkMemory& memory) {
+  SplitPair& split = batch.splits[memory.task.split];
+  batch.totals[batch.split_room + memory.at] = memory.totals;
+  publish();
+  if (atomic_add(&split.left, ~0u) != 1) return false;
+  publish();
+  memory.sum = batch.totals[memory.task.split];
+  for (std::uint32_t k = 0; k < split.tasks; ++k)
+    memory.sum.add(batch.totals[batch.split_room + split.first_task + k]);
+  return true;
+}
+
+/// Sums what is in work: a pair, or as much of it as is not handed out, or a task; who does a
+/// pair's last writes the answer. Whether tasks were left.
 template <class Team>
-IST_HD void sum_pair(const Team& team, const BatchArrays& batch, std::uint32_t i, bool hand_out,
-                     PairMemory& memory) {
-  if (team.lane() == 0) place_pair(batch, i, memory.place);
-  load_trees(team, batch, i, memory);
+IST_HD bool do_work(const Team& team, const BatchArrays& batch, WorkMemory& memory) {
+  load_trees(team, batch, memory.pair, memory);
   PairDescent<Team> descent(team, memory);
-  descent.start();
+  if (memory.is_task)
+    descent.resume(batch.entries_a + memory.task.first, batch.entries_b + memory.task.first,
+                   static_cast<int>(memory.task.count));
+  else
+    descent.start();
   if (team.lane() == 0) memory.sum.clear();
   // Tasks that nobody takes are done one by one, their sums added up as if others had done them.
   int floor = 0;
-  std::uint32_t most = batch.most_alone;
+  bool whole = memory.is_task;  // no task is cut again
   for (;;) {
-    descent.run(floor, most);
+    descent.run(floor, whole ? ~0u : batch.most_alone);
+    if (memory.is_task) break;
     if (team.lane() == 0) {
       memory.sum.add(memory.totals);
       memory.totals.clear();
     }
     team.sync();
     if (descent.waiting() == 0) break;
-    if (hand_out && most != ~0u && split_pair(team, batch, i, memory, descent.waiting())) return;
-    most = ~0u;
-    descent.divide();
-    floor = task_floor(batch, memory, descent.waiting());
-  }
-  if (team.lane() == 0) write_answer(batch.answers, i, memory.place, memory.sum);
-  team.sync();
-}
-
-/// Sums a task; who does a pair's last writes the answer.
-template <class Team>
-IST_HD void sum_task(const Team& team, const BatchArrays& batch, std::uint32_t index,
-                     PairMemory& memory) {
-  const PairTask task = batch.tasks[index];
-  if (task.count == 0) return;
-  SplitPair& split = batch.splits[task.split];
-  copy_words(team, batch.places[task.split], memory.place);
-  load_trees(team, batch, split.pair, memory);
-  PairDescent<Team> descent(team, memory);
-  descent.resume(batch.entries_a + task.first, batch.entries_b + task.first,
-                 static_cast<int>(task.count));
-  descent.run(0, ~0u);
-  if (team.lane() == 0) {
-    batch.totals[batch.split_room + index] = memory.totals;
-    publish();
-    if (atomic_add(&split.left, ~0u) == 1) {
-      publish();
-      LensTotals sum = batch.totals[task.split];
-      for (std::uint32_t k = 0; k < split.tasks; ++k)
-        sum.add(batch.totals[batch.split_room + split.first_task + k]);
-      write_answer(batch.answers, split.pair, memory.place, sum);
+    if (!whole) {
+      size_tasks(team, batch, memory, descent.waiting());
+      if (memory.hand_out && split_pair(team, batch, memory.pair, memory, descent.waiting()))
+        return true;
+      whole = true;
     }
+    descent.divide();
+    floor = task_floor(memory, descent.waiting());
   }
+  if (team.lane() == 0 && (!memory.is_task || end_task(batch, memory)))
+    write_answer(batch.answers, memory.pair, memory.place, memory.sum);
   team.sync();
+  return false;
 }
 
 }  // namespace ist::gpu

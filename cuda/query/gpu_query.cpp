@@ -125,11 +125,17 @@ void place_patches(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& room)
   arrays.rooms = from + parts.used();
 }
 
-/// Sets the room's arrays to parts of the memory at `from`; returns the bytes they take.
+/// Sets the room's arrays to parts of the memory at `from`; returns the bytes they take. All kinds
+/// of batches have the same memory, but for flags that stay 0 between them.
 std::size_t place(std::byte* from, GpuWorkspace::Impl& room) {
-  const std::size_t bytes = std::max(place_penetrations(from, room), place_separations(from, room));
-  place_patches(from, bytes, room);
-  return bytes;
+  room.arrays.cut_for(room.most_pairs);
+  gpu::Parts flags(from);
+  room.arrays.posted = flags.take<std::uint32_t>(kTaskRoom);
+  std::byte* const shared = from + flags.used();
+  const std::size_t bytes =
+      std::max(place_penetrations(shared, room), place_separations(shared, room));
+  place_patches(shared, bytes, room);
+  return flags.used() + bytes;
 }
 
 }  // namespace
@@ -147,6 +153,9 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   impl_->patch_blocks = gpu::patch_blocks();
   impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr, *impl_));
   place(impl_->memory.data(), *impl_);
+  gpu::check(
+      cudaMemsetAsync(impl_->arrays.posted, 0, kTaskRoom * sizeof(std::uint32_t), queue.stream()),
+      "readying a workspace");
   queue.wait();
 }
 

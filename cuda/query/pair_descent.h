@@ -324,18 +324,18 @@ class PairDescent {
     const std::uint32_t share[2] = {m_.share[b0], m_.share[b1]};
     IST_ROLLED
     for (int base = 0; base < tests; base += Team::kWidth) {
-      const int k = base + team_.lane();
+      const bool there = base + team_.lane() < tests;
+      const int k = there ? base + team_.lane() : 0;
       const bool second = k >= in_first;
       const int in_pair = second ? k - in_first : k;
       const int row =
           static_cast<int>(static_cast<unsigned>(in_pair) * (second ? share[1] : share[0]) >> 16);
-      const int column = in_pair - row * (second ? b1 : b0);
-      const int of_a = k < tests ? row + (second ? a0 : 0) : 0;
-      const int of_b = k < tests ? column + (second ? b0 : 0) : 0;
+      const int of_a = second ? row + a0 : row;
+      const int of_b = second ? in_pair - row * b1 + b0 : in_pair - row * b0;
       const Ball from = m_.near[0][of_a], to = m_.near[1][of_b];
       const float dx = to.x - from.x, dy = to.y - from.y, dz = to.z - from.z;
       const float reach = (from.r + to.r) + (second ? rounding[1] : rounding[0]);
-      const bool may = k < tests && std::fma(dx, dx, std::fma(dy, dy, dz * dz)) < reach * reach;
+      const bool may = there && std::fma(dx, dx, std::fma(dy, dy, dz * dz)) < reach * reach;
       int total = 0;
       const int place = listed_ + team_.exclusive_count(may, total);
       if (may) {

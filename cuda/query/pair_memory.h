@@ -64,6 +64,7 @@ struct PairMemory {
   bool to_single;                     ///< some leaves are single spheres
   LensTotals totals;                  ///< of the task in hand
   LensTotals sum;                     ///< of those that are done
+  std::uint32_t task_weight;          ///< size_tasks()
   std::uint32_t stack_a[kStackRoom];  ///< node of A and the step, << kNodeBits, that opens the pair
   std::uint32_t stack_b[kStackRoom];
   std::uint32_t leaf_a[kLeafRoom], leaf_b[kLeafRoom];

@@ -13,6 +13,7 @@ struct SplitRoom {
   bool fits;
   std::uint32_t split;
   std::uint32_t first_entry;
+  std::uint32_t first_task, tasks;  ///< taken, whether it fits or not
 };
 
 /// Takes room for the `waiting` entries of pair i and lists their tasks. All of the team together.
@@ -24,11 +25,12 @@ IST_HD SplitRoom take_room(const Team& team, const BatchArrays& batch, BatchCoun
   std::uint32_t tasks = 0;
   for (int top = waiting; top > 0; ++tasks) top = floor_of(top);
   const auto entries = static_cast<std::uint32_t>(waiting);
-  std::uint32_t split = 0, task = 0, entry = 0, fits = 0;
+  std::uint32_t split = 0, task = 0, entry = 0, fits = 0, taken = 0;
   // Counters stop soon after the room ends, so that no batch is large enough to turn them over.
   if (team.lane() == 0 && atomic_load(&counters.splits) < batch.split_room &&
       atomic_load(&counters.tasks) < batch.task_room &&
       atomic_load(&counters.entries) < batch.entry_room) {
+    taken = tasks;
     split = atomic_add(&counters.splits, 1);
     task = atomic_add(&counters.tasks, tasks);
     entry = atomic_add(&counters.entries, entries);
@@ -46,7 +48,8 @@ IST_HD SplitRoom take_room(const Team& team, const BatchArrays& batch, BatchCoun
     }
     if (all) batch.splits[split] = {i, task, tasks, tasks};
   }
-  return {team.broadcast(fits, 0) != 0, team.broadcast(split, 0), team.broadcast(entry, 0)};
+  return {team.broadcast(fits, 0) != 0, team.broadcast(split, 0), team.broadcast(entry, 0),
+          team.broadcast(task, 0), team.broadcast(taken, 0)};
 }
 
 }  // namespace ist::gpu

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <stdexcept>
 #include <vector>
 
 #include <ist/query.h>
@@ -18,7 +19,9 @@ class HostBatch {
  public:
   /// Room for what is split: so many of each kind.
   explicit HostBatch(const std::vector<TreeView>& assets, std::uint32_t room = 1 << 16)
-      : assets_(assets), room_(room) {}
+      : assets_(assets), room_(room) {
+    cut_for(1);
+  }
 
   /// `seed`: of the order in which lanes go on; 0: a team of one.
   std::vector<Penetration> run(const std::vector<BatchPair>& pairs, Measure measure,
@@ -29,6 +32,7 @@ class HostBatch {
     std::vector<std::uint32_t> list(n), detailed(n);
     std::vector<gpu::SplitPair> splits(room_);
     std::vector<gpu::PairTask> tasks(room_);
+    std::vector<std::uint32_t> posted(room_);
     std::vector<gpu::PairPlace> places(room_);
     std::vector<gpu::LensTotals> totals(2 * std::size_t{room_});
     std::vector<std::uint32_t> entries_a(room_), entries_b(room_);
@@ -45,6 +49,7 @@ class HostBatch {
                                     detailed.data(),
                                     splits.data(),
                                     tasks.data(),
+                                    posted.data(),
                                     places.data(),
                                     totals.data(),
                                     entries_a.data(),
@@ -64,22 +69,45 @@ class HostBatch {
       by_team(seed,
               [&](const auto& team) { gpu::sum_details(team, batch, detailed[k], *details); });
     sum(batch, seed);
+    for (const std::uint32_t flag : posted)
+      if (flag != 0) throw std::logic_error("a task was not taken");
     return to.rows();
   }
 
   gpu::BatchCounters counters;  ///< of the last run
-  std::uint32_t most_alone = gpu::BatchArrays().most_alone;
-  std::uint32_t task_weight = gpu::BatchArrays().task_weight;
+  std::uint32_t most_alone = 0, task_weight = 0;
+
+  /// How pairs are cut up in a workspace for so many; for few at first.
+  void cut_for(std::size_t most_pairs) {
+    gpu::BatchArrays arrays;
+    arrays.cut_for(most_pairs);
+    most_alone = arrays.most_alone;
+    task_weight = arrays.task_weight;
+  }
 
  private:
   void sum(const gpu::BatchArrays& batch, unsigned seed) {
-    const auto memory = std::make_unique<gpu::PairMemory>();
-    for (std::uint32_t k = 0; k < counters.listed; ++k)
+    const auto memory = std::make_unique<gpu::WorkMemory>();
+    memory->is_task = false;
+    constexpr std::uint32_t kMost = 1 + gpu::kPlacedAhead;
+    for (std::uint32_t k = 0; k < counters.listed; k += kMost)
       by_team(seed, [&](const auto& team) {
-        gpu::sum_pair(team, batch, batch.list[k], k % 3 != 0, *memory);
+        gpu::place_pairs(team, batch, k, std::min(kMost, counters.listed - k), *memory);
+        for (;;) {
+          if (team.lane() == 0) memory->hand_out = memory->at % 4 != 0;
+          gpu::do_work(team, batch, *memory);
+          if (memory->waiting == 0) return;
+          team.sync();
+          gpu::take_placed(team, *memory);
+        }
       });
-    for (std::uint32_t k = 0; k < std::min(counters.tasks, room_); ++k)
-      by_team(seed, [&](const auto& team) { gpu::sum_task(team, batch, k, *memory); });
+    memory->is_task = true;
+    for (std::uint32_t k = 0; gpu::look_for_task(batch, k, 0) != 0; ++k) {
+      memory->at = k;
+      by_team(seed, [&](const auto& team) {
+        if (gpu::take_task(team, batch, *memory)) gpu::do_work(team, batch, *memory);
+      });
+    }
   }
 
   HostAssets assets_;
