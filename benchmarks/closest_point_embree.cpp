@@ -59,16 +59,17 @@ Vec closest_on_triangle(Vec p, Vec a, Vec b, Vec c) {
 }
 
 struct EmbreeAnswer {
-  const ist::MeshView* mesh;
+  const float* vertices;
+  const std::uint32_t* triangles;
   Vec point;
   unsigned triangle;
 };
 
 bool visit_triangle(RTCPointQueryFunctionArguments* arguments) {
   auto& answer = *static_cast<EmbreeAnswer*>(arguments->userPtr);
-  const std::uint32_t* t = answer.mesh->triangles + 3 * std::size_t{arguments->primID};
+  const std::uint32_t* t = answer.triangles + 3 * std::size_t{arguments->primID};
   const auto corner = [&](int i) {
-    const float* v = answer.mesh->vertices + 3 * std::size_t{t[i]};
+    const float* v = answer.vertices + 3 * std::size_t{t[i]};
     return Vec{v[0], v[1], v[2]};
   };
   const Vec p = {arguments->query->x, arguments->query->y, arguments->query->z};
@@ -92,7 +93,9 @@ class EmbreeScene {
     RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
     void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                              12, mesh.vertex_count);
-    std::copy_n(mesh.vertices, 3 * std::size_t{mesh.vertex_count}, static_cast<float*>(vertices));
+    for (std::size_t k = 0; k < 3 * std::size_t{mesh.vertex_count}; ++k)
+      vertices_.push_back(static_cast<float>(mesh.vertices[k]));
+    std::copy(vertices_.begin(), vertices_.end(), static_cast<float*>(vertices));
     void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                               12, mesh.triangle_count);
     std::copy_n(mesh.triangles, 3 * std::size_t{mesh.triangle_count},
@@ -114,13 +117,14 @@ class EmbreeScene {
     RTCPointQuery query = {p[0], p[1], p[2], 0, std::numeric_limits<float>::infinity()};
     RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
-    EmbreeAnswer answer = {&mesh_, {}, 0};
+    EmbreeAnswer answer = {vertices_.data(), mesh_.triangles, {}, 0};
     rtcPointQuery(scene_, &query, &context, nullptr, &answer);
     return query.radius;
   }
 
  private:
   const ist::MeshView& mesh_;
+  std::vector<float> vertices_;
   RTCDevice device_;
   RTCScene scene_;
 };
@@ -130,10 +134,11 @@ using Points = std::vector<std::array<float, 3>>;
 Points points_in_box(const ist::MeshView& mesh, std::size_t count) {
   float lower[3], upper[3];
   for (std::size_t k = 0; k < 3; ++k) {
-    lower[k] = upper[k] = mesh.vertices[k];
+    lower[k] = upper[k] = static_cast<float>(mesh.vertices[k]);
     for (std::size_t v = 0; v < mesh.vertex_count; ++v) {
-      lower[k] = std::min(lower[k], mesh.vertices[3 * v + k]);
-      upper[k] = std::max(upper[k], mesh.vertices[3 * v + k]);
+      const auto x = static_cast<float>(mesh.vertices[3 * v + k]);
+      lower[k] = std::min(lower[k], x);
+      upper[k] = std::max(upper[k], x);
     }
   }
   std::mt19937 random(1);
@@ -153,7 +158,7 @@ Points points_near_surface(const ist::MeshView& mesh, std::size_t count) {
   for (auto& p : points) {
     const std::uint32_t v = mesh.triangles[3 * std::size_t{pick(random)}];
     for (std::size_t k = 0; k < 3; ++k)
-      p[k] = mesh.vertices[3 * std::size_t{v} + k] + offset(random);
+      p[k] = static_cast<float>(mesh.vertices[3 * std::size_t{v} + k]) + offset(random);
   }
   return points;
 }

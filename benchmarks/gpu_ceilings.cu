@@ -1,6 +1,6 @@
-// What the card and its link can do at most: the ceilings that the packing's kernels are judged by.
-// Copies on the card and over the link, and what a dependent step costs in each of the ways to
-// order steps. Needs a GPU.
+// What the card and its link can do at most: the ceilings that kernels are judged by. Copies on the
+// card and over the link, what a dependent step costs in each of the ways to order steps, and how
+// fast instructions can be fetched. Needs a GPU.
 
 #include <cooperative_groups.h>
 #include <cuda_runtime.h>
@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <chrono>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "cuda/check.h"
@@ -55,6 +56,46 @@ __global__ void multiply(float* out, int steps) {
     d = d + 0.1f;
   }
   out[blockIdx.x * blockDim.x + threadIdx.x] = a + b + c + d;
+}
+
+/// 4 KB of instructions of which no two are merged.
+template <int Number>
+__device__ __noinline__ float4 four_kilobytes(float4 v, float c) {
+#pragma unroll
+  for (int i = 0; i < 64; ++i)
+    asm volatile(
+        "fma.rn.f32 %0, %0, %4, %4; fma.rn.f32 %1, %1, %4, %4;"
+        "fma.rn.f32 %2, %2, %4, %4; fma.rn.f32 %3, %3, %4, %4;"
+        : "+f"(v.x), "+f"(v.y), "+f"(v.z), "+f"(v.w)
+        : "f"(c));
+  v.x += Number;
+  return v;
+}
+
+constexpr int kMostPieces = 64;  ///< of code
+using PieceOfCode = float4 (*)(float4, float);
+
+template <int... Number>
+__device__ PieceOfCode piece_of_code(int k, std::integer_sequence<int, Number...>) {
+  static const PieceOfCode pieces[] = {four_kilobytes<Number>...};
+  return pieces[k];
+}
+
+/// Each warp runs through the first `pieces` of code in an order of its own.
+__global__ void run_code(int pieces, int rounds, float* out, long long* cycles) {
+  constexpr std::make_integer_sequence<int, kMostPieces> kAll;
+  float4 v = {1, 2, 3, 4};
+  const float c = 0.5f * static_cast<float>(gridDim.x);
+  unsigned state = (blockIdx.x * 37 + threadIdx.x / 32) * 2654435761u + 1;
+  for (int i = 0; i < 2 * pieces; ++i) v = piece_of_code(i % pieces, kAll)(v, c);
+  __syncthreads();
+  const long long start = clock64();
+  for (int i = 0; i < rounds; ++i) {
+    state = state * 1664525u + 1013904223u;
+    v = piece_of_code(static_cast<int>((state >> 8) % static_cast<unsigned>(pieces)), kAll)(v, c);
+  }
+  if (threadIdx.x == 0) cycles[blockIdx.x] = clock64() - start;
+  out[blockIdx.x * blockDim.x + threadIdx.x] = v.x + v.y + v.z + v.w;
 }
 
 /// Median and extremes of `rounds` host times of `work`, which waits for its own end; seconds.
@@ -198,6 +239,29 @@ class Ceilings {
                                {"TFLOP/s", 8.0 * kRounds * kBlocks * kThreads / t.median * 1e-12}});
   }
 
+  /// Warps at other places of much code: what does not fit the first cache for instructions has to
+  /// be fetched, and all warps of a multiprocessor together.
+  void code() {
+    constexpr int kBlocks = 132, kMostWarps = 16, kRounds = 256;
+    float* out = nullptr;
+    long long* cycles = nullptr;
+    check(cudaMallocManaged(&out, sizeof(float) * kBlocks * 32 * kMostWarps), "allocating");
+    check(cudaMallocManaged(&cycles, sizeof(long long) * kBlocks), "allocating");
+    for (const int warps : {1, 4, kMostWarps})
+      for (const int pieces : {2, 4, 6, 8, 10, 12, 16, 24, 32, 48, kMostPieces}) {
+        run_code<<<kBlocks, 32 * warps, 0, stream_>>>(pieces, kRounds, out, cycles);
+        wait();
+        std::sort(cycles, cycles + kBlocks);
+        const double each = static_cast<double>(cycles[kBlocks / 2]) / (kRounds * 256.0);
+        report_.row("Instructions", {{"warps on a multiprocessor", warps},
+                                     {"code [KB]", 4 * pieces},
+                                     {"cycles an instruction of a warp", each},
+                                     {"instructions a cycle and multiprocessor", warps / each}});
+      }
+    cudaFree(out);
+    cudaFree(cycles);
+  }
+
  private:
   void wait() { check(cudaStreamSynchronize(stream_), "waiting"); }
 
@@ -279,6 +343,7 @@ int main(int argc, char** argv) {
     ceilings.steps();
     ceilings.loads();
     ceilings.arithmetic();
+    ceilings.code();
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;

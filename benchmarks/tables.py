@@ -37,10 +37,12 @@ def section(report):
     return "\n".join(parts)
 
 
-def write_page(report, folder):
-    name = report["benchmark"]
-    text = f"# {report['page']}\n\nMade by `benchmarks/run.sh {name}`; do not edit.\n\n"
-    (folder / f"{name}.md").write_text(text + section(report).partition("\n")[2])
+def write_page(reports, folder):
+    """`reports`: of one benchmark, of this machine and that."""
+    name = reports[0]["benchmark"]
+    text = f"# {reports[0]['page']}\n\nMade by `benchmarks/run.sh {name}`; do not edit.\n\n"
+    parts = [section(report).partition("\n")[2] for report in reports]
+    (folder / f"{name}.md").write_text(text + "\n\n---\n".join(parts))
 
 
 def main(folder):
@@ -48,9 +50,8 @@ def main(folder):
     text = "# Benchmark results\n\nMade by `benchmarks/run.sh`; do not edit.\n\n"
     of_tables = [r for r in reports if "page" not in r]
     (folder / "tables.md").write_text(text + "\n".join(section(r) for r in of_tables))
-    for report in reports:
-        if "page" in report:
-            write_page(report, folder)
+    for name in {r["benchmark"]: None for r in reports if "page" in r}:
+        write_page([r for r in reports if r["benchmark"] == name], folder)
     for report in reports:
         plot = getattr(plots, report["benchmark"], None)
         if plot:

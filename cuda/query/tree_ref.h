@@ -49,8 +49,8 @@ struct TreeRef {
   /// Unit frame.
   IST_HD NodeBall ball(int level, std::uint32_t node) const {
     if (level == top) return {{root[0], root[1], root[2]}, root[3]};
-    const BallBlock& b = in_global_memory(blocks[level + 1])[node / kWidth];
-    const Origin& o = in_global_memory(origins[level + 1])[node / kWidth];
+    const BallBlock& b = blocks[level + 1][node / kWidth];
+    const Origin& o = origins[level + 1][node / kWidth];
     const std::uint32_t lane = node % kWidth;
     return {{o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
              o.z + static_cast<double>(b.z[lane])},

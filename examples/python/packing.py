@@ -12,8 +12,7 @@ import time
 import numpy as np
 
 import ist
-from scene import draw, palette, random_rotations
-from pile import Scaled
+from scene import Scaled, draw, palette, random_rotations
 
 SHAPES = ["gear", "nut", "torus", "capsule", "torus_knot"]
 SIZE = 1.0  # [u] radius of the ball around each part

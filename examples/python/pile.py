@@ -15,7 +15,7 @@ import torch
 
 import ist
 from ist.torch import overlap
-from scene import draw, palette, random_rotations
+from scene import Scaled, draw, palette, random_rotations
 
 SHAPES = ["gear", "torus_knot", "nut", "torus", "capsule"]
 SIZE = 1.0  # [u] radius of the ball around each solid
@@ -89,13 +89,6 @@ def main():
     if options.picture:
         picture(options.picture, meshes, kinds, scales, poses, apart, energies)
     return 0 if energies[-1] == 0 and after.distance.min() > 0 else 1
-
-
-class Scaled:
-    """A mesh under a scale, to be drawn."""
-
-    def __init__(self, mesh, scale):
-        self.vertices, self.triangles = mesh.vertices * scale, mesh.triangles
 
 
 def picture(path, meshes, kinds, scales, poses, apart, energies):

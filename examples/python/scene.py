@@ -17,6 +17,13 @@ def random_rotations(random, count):
     return q / np.linalg.norm(q, axis=1, keepdims=True)
 
 
+class Scaled:
+    """A mesh under a scale, to be drawn."""
+
+    def __init__(self, mesh, scale):
+        self.vertices, self.triangles = mesh.vertices * scale, mesh.triangles
+
+
 def draw(axes, meshes, kinds, poses, colours, up=24, turn=-58):
     """Paints the meshes into axes of matplotlib, far triangles first, shaded.
 
