@@ -72,7 +72,8 @@ IST_HD inline std::uint32_t atomic_max(std::uint32_t* at, std::uint32_t value) {
 #endif
 }
 
-/// Makes what this thread's team wrote visible to who then reads what it stores atomically.
+/// Makes what this thread's team wrote before its last sync visible to who then reads what this
+/// thread stores atomically; and, after an atomic load, what was made visible so to this one.
 IST_HD inline void publish() {
 #ifdef __CUDA_ARCH__
   __threadfence();

@@ -92,11 +92,10 @@ struct BatchArrays {
   /// How finely pairs are cut: where a batch is of few, for all warps to have work until its end;
   /// where it is of many, as seldom as can be, since each cut costs.
   void cut_for(std::size_t most_pairs) {
-    const bool few = most_pairs <= kFewPairs;
+    const bool few = most_pairs <= kFewGpuPairs;
     most_alone = few ? 80 : 512;
     task_weight = few ? 24 : 64;
   }
-  static constexpr std::size_t kFewPairs = 16384;  ///< GpuWorkspace() says it
 };
 
 }  // namespace ist::gpu

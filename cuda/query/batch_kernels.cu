@@ -46,7 +46,8 @@ __device__ std::uint32_t take(const BatchArrays& batch, std::uint32_t listed, st
   BatchCounters& counters = *batch.counters;
   if (!is_task) {
     // One at a time near the end, for all warps to stay busy.
-    const bool near_end = atomic_load(&counters.taken) + most >= listed;
+    const std::uint32_t taken = atomic_load(&counters.taken);
+    const bool near_end = taken >= listed || listed - taken <= most;
     const std::uint32_t count = near_end ? 1 : 1 + kPlacedAhead;
     at = atomic_add(&counters.taken, count);
     if (at < listed) return count < listed - at ? count : listed - at;
@@ -94,12 +95,11 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchAr
       else if (!take_task(team, batch, memory))
         continue;
     }
-    const bool hand_out = !memory.is_task && memory.at + most >= listed;
+    const bool hand_out = !memory.is_task && listed - memory.at <= most;
     if (team.lane() == 0) memory.hand_out = hand_out;
-    const bool left = do_work(team, batch, memory);
-    if (team.lane() > 0 || memory.is_task || !memory.hand_out) continue;
-    if (left) publish();
-    atomic_add(&batch.counters->handed_out, 1);
+    do_work(team, batch, memory);
+    // Tasks that it left are counted by now.
+    if (team.lane() == 0 && hand_out) atomic_add(&batch.counters->handed_out, 1);
   }
 }
 
@@ -119,7 +119,11 @@ void launch_batch(const BatchArrays& batch, const BatchGrids& grids, cudaStream_
         batch);
     check_launch("summing pairs of trees at several levels of detail");
   }
-  const auto blocks = static_cast<unsigned>(grids.sum);
+  // Of few pairs no more warps than have work: who waits for tasks keeps others from the device.
+  constexpr std::uint64_t kTasks = 16;  // of a pair, about: size_tasks()
+  const std::uint64_t wanted = (batch.pairs.count * (1 + kTasks) + kWarps - 1) / kWarps;
+  const auto most = static_cast<std::uint64_t>(grids.sum);
+  const auto blocks = static_cast<unsigned>(wanted < most ? wanted : most);
   sum_pairs<<<blocks, kThreads, 0, stream>>>(batch);
   check_launch("summing pairs of trees");
 }

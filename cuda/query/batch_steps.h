@@ -10,8 +10,8 @@
 #include "numerics/host_device.h"
 
 // A batch of pairs of trees, step by step: what a kernel's threads and warps do, and a test's
-// threads on the host. An answer depends on its pair alone: neither on the others nor on who sums
-// what.
+// threads on the host. An answer depends on its pair and on how finely the batch is cut up
+// (BatchArrays::cut_for()) alone: neither on the others nor on who sums what.
 
 namespace ist::gpu {
 
@@ -168,8 +168,8 @@ IST_HD inline std::uint32_t weight_of(const PairMemory& memory, int entry) {
   return 1u << 2 * (left < kMostLeft ? left : kMostLeft);
 }
 
-/// Decides how large the tasks are of what waits: no smaller than a batch's, and not too many. All
-/// of the team together.
+/// Decides how large the tasks are of what waits: no smaller than batch.task_weight, not too many.
+/// All of the team together.
 template <class Team>
 IST_HD void size_tasks(const Team& team, const BatchArrays& batch, PairMemory& memory,
                        int waiting) {
@@ -205,8 +205,8 @@ IST_HD bool split_pair(const Team& team, const BatchArrays& batch, std::uint32_t
       batch.entries_b[room.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_b[k];
     }
   }
-  publish();
   team.sync();
+  publish();
   for (std::uint32_t k = room.first_task + static_cast<std::uint32_t>(team.lane());
        k < room.first_task + room.tasks; k += static_cast<std::uint32_t>(Team::kWidth))
     if (k < batch.task_room) atomic_exchange(&batch.posted[k], 1);
@@ -237,7 +237,8 @@ struct PlacedPair {
   std::uint32_t at;    ///< in the list
 };
 
-/// Pairs that a team takes at a time: placing one or a few, a lane each, takes as long.
+/// Pairs that a team takes beside the one it begins with: placing one or a few, a lane each, takes
+/// as long.
 constexpr int kPlacedAhead = 2;
 
 /// What a team needs to sum pairs of the list and tasks. Not in its registers, of which a descent
@@ -315,9 +316,9 @@ IST_HD inline bool end_task(const BatchArrays& batch, WorkMemory& memory) {
 }
 
 /// Sums what is in work: a pair, or as much of it as is not handed out, or a task; who does a
-/// pair's last writes the answer. Whether tasks were left.
+/// pair's last writes the answer.
 template <class Team>
-IST_HD bool do_work(const Team& team, const BatchArrays& batch, WorkMemory& memory) {
+IST_HD void do_work(const Team& team, const BatchArrays& batch, WorkMemory& memory) {
   load_trees(team, batch, memory.pair, memory);
   PairDescent<Team> descent(team, memory);
   if (memory.is_task)
@@ -341,7 +342,7 @@ IST_HD bool do_work(const Team& team, const BatchArrays& batch, WorkMemory& memo
     if (!whole) {
       size_tasks(team, batch, memory, descent.waiting());
       if (memory.hand_out && split_pair(team, batch, memory.pair, memory, descent.waiting()))
-        return true;
+        return;
       whole = true;
     }
     descent.divide();
@@ -350,7 +351,6 @@ IST_HD bool do_work(const Team& team, const BatchArrays& batch, WorkMemory& memo
   if (team.lane() == 0 && (!memory.is_task || end_task(batch, memory)))
     write_answer(batch.answers, memory.pair, memory.place, memory.sum);
   team.sync();
-  return false;
 }
 
 }  // namespace ist::gpu

@@ -18,7 +18,9 @@ namespace ist::gpu {
 constexpr int kHeldBlocks = 8;
 constexpr int kHeldBalls = kHeldBlocks * static_cast<int>(kWidth);
 constexpr int kKeptNear = 16;  ///< triangles near a block that are remembered
-constexpr int kDiscRoom = 64;
+constexpr int kDiscRoom = 64;  ///< what is left after a round of a warp, and what a round may add
+static_assert(kDiscRoom >= 2 * 32 - 1 && kHeldBalls % 32 == 0);
+static_assert(2 * static_cast<int>(kWidth) <= kStaged);  // two blocks of triangles
 constexpr std::uint32_t kNoBall = ~0u;
 /// A ball is moved by less than this part of its radius where its centre lies on an edge: what
 /// comes near its block is looked for that much further out.

@@ -237,9 +237,9 @@ class FacetSums {
   PartSums& sums_;
   FacetSource source_;
   DiscSums<Team, FacetSource> discs_;
-  int slot_ = 0;            ///< the block in work
-  FacetSource::Near near_;  ///< it
-  std::uint64_t near_size_ = 0, staged_ = 0;
+  int slot_ = 0;                              ///< the block in work
+  FacetSource::Near near_;                    ///< triangles that may come near it
+  std::uint64_t near_size_ = 0, staged_ = 0;  ///< how many, and how many were staged
 };
 
 }  // namespace ist::gpu

@@ -9,7 +9,11 @@ namespace {
 constexpr unsigned kSiftThreads = 256;
 constexpr unsigned kWarps = 3;  ///< whose memory is what a block may have
 constexpr unsigned kThreads = 32 * kWarps;
-constexpr int kBlocksEach = 4;  ///< a multiprocessor: 168 registers a thread
+/// Blocks on a multiprocessor: what registers allow. 168 a thread for those that meet triangles.
+template <class Memory>
+constexpr int kBlocksEach = 4;
+template <>
+constexpr int kBlocksEach<WalkMemory> = 6;
 
 /// Places every pair and lists those that are not told at once.
 __global__ void __launch_bounds__(kSiftThreads) sift_field_pairs(const FieldBatch batch) {
@@ -31,7 +35,8 @@ template <>
 constexpr FieldGroup kGroup<SurfaceMemory> = kMesh;
 
 template <class Memory>
-__global__ void __launch_bounds__(kThreads, kBlocksEach) sum_field_pairs(const FieldBatch batch) {
+__global__ void __launch_bounds__(kThreads, kBlocksEach<Memory>)
+    sum_field_pairs(const FieldBatch batch) {
   __shared__ Memory memory[kWarps];
   FieldCounters& counters = *batch.counters;
   by_warps(load_fresh(&counters.listed[kGroup<Memory>]), &counters.taken[kGroup<Memory>],

@@ -18,8 +18,9 @@ namespace ist {
 namespace {
 
 /// Room for what is split. A batch that needs more is answered all the same.
-constexpr std::uint32_t kSplitRoom = 1 << 16, kTaskRoom = 1 << 19, kEntryRoom = 1 << 21;
-constexpr std::uint32_t kGapEntryRoom = 1 << 20;  ///< of separations, whose entries are larger
+constexpr std::uint32_t kRoomForSplits = 1 << 16, kRoomForTasks = 1 << 19,
+                        kRoomForEntries = 1 << 21;
+constexpr std::uint32_t kRoomForGapEntries = 1 << 20;  ///< of separations, whose entries are larger
 
 }  // namespace
 
@@ -78,10 +79,10 @@ int GpuAssets::device() const noexcept { return impl_->device; }
 namespace {
 
 void place_splits(gpu::Parts& parts, gpu::BatchArrays& batch) {
-  batch.splits = parts.take<gpu::SplitPair>(kSplitRoom);
-  batch.tasks = parts.take<gpu::PairTask>(kTaskRoom);
-  batch.split_room = kSplitRoom;
-  batch.task_room = kTaskRoom;
+  batch.splits = parts.take<gpu::SplitPair>(kRoomForSplits);
+  batch.tasks = parts.take<gpu::PairTask>(kRoomForTasks);
+  batch.split_room = kRoomForSplits;
+  batch.task_room = kRoomForTasks;
 }
 
 std::size_t place_penetrations(std::byte* from, GpuWorkspace::Impl& room) {
@@ -92,11 +93,11 @@ std::size_t place_penetrations(std::byte* from, GpuWorkspace::Impl& room) {
   arrays.list = parts.take<std::uint32_t>(room.most_pairs);
   arrays.detailed = parts.take<std::uint32_t>(room.most_pairs);
   place_splits(parts, arrays);
-  arrays.places = parts.take<gpu::PairPlace>(kSplitRoom);
-  arrays.totals = parts.take<gpu::LensTotals>(kSplitRoom + kTaskRoom);
-  arrays.entries_a = parts.take<std::uint32_t>(kEntryRoom);
-  arrays.entries_b = parts.take<std::uint32_t>(kEntryRoom);
-  arrays.entry_room = kEntryRoom;
+  arrays.places = parts.take<gpu::PairPlace>(kRoomForSplits);
+  arrays.totals = parts.take<gpu::LensTotals>(kRoomForSplits + kRoomForTasks);
+  arrays.entries_a = parts.take<std::uint32_t>(kRoomForEntries);
+  arrays.entries_b = parts.take<std::uint32_t>(kRoomForEntries);
+  arrays.entry_room = kRoomForEntries;
   return parts.used();
 }
 
@@ -106,11 +107,11 @@ std::size_t place_separations(std::byte* from, GpuWorkspace::Impl& room) {
   arrays.counters = parts.take<gpu::BatchCounters>(2);
   for (std::uint32_t*& list : arrays.list) list = parts.take<std::uint32_t>(room.most_pairs);
   place_splits(parts, arrays.pairs);
-  arrays.totals = parts.take<gpu::GapTotals>(kSplitRoom + kTaskRoom);
-  arrays.entries = {parts.take<std::uint32_t>(kGapEntryRoom),
-                    parts.take<std::uint32_t>(kGapEntryRoom), parts.take<double>(kGapEntryRoom),
-                    parts.take<double>(kGapEntryRoom)};
-  arrays.pairs.entry_room = kGapEntryRoom;
+  arrays.totals = parts.take<gpu::GapTotals>(kRoomForSplits + kRoomForTasks);
+  arrays.entries = {parts.take<std::uint32_t>(kRoomForGapEntries),
+                    parts.take<std::uint32_t>(kRoomForGapEntries),
+                    parts.take<double>(kRoomForGapEntries), parts.take<double>(kRoomForGapEntries)};
+  arrays.pairs.entry_room = kRoomForGapEntries;
   arrays.pairs.measure = Measure::inner;
   return parts.used();
 }
@@ -130,7 +131,7 @@ void place_patches(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& room)
 std::size_t place(std::byte* from, GpuWorkspace::Impl& room) {
   room.arrays.cut_for(room.most_pairs);
   gpu::Parts flags(from);
-  room.arrays.posted = flags.take<std::uint32_t>(kTaskRoom);
+  room.arrays.posted = flags.take<std::uint32_t>(kRoomForTasks);
   std::byte* const shared = from + flags.used();
   const std::size_t bytes =
       std::max(place_penetrations(shared, room), place_separations(shared, room));
@@ -153,9 +154,9 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   impl_->patch_blocks = gpu::patch_blocks();
   impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr, *impl_));
   place(impl_->memory.data(), *impl_);
-  gpu::check(
-      cudaMemsetAsync(impl_->arrays.posted, 0, kTaskRoom * sizeof(std::uint32_t), queue.stream()),
-      "readying a workspace");
+  gpu::check(cudaMemsetAsync(impl_->arrays.posted, 0, kRoomForTasks * sizeof(std::uint32_t),
+                             queue.stream()),
+             "readying a workspace");
   queue.wait();
 }
 

@@ -11,9 +11,9 @@
 
 namespace ist::gpu {
 
-/// A node of a surface, its rank and its number, in one word. Of rank 0 it is a triangle, 16 ·
-/// block
-/// + lane; of rank k + 1 a block of level k: of triangles, and from rank 2 on of balls.
+/// A node of a surface, its rank and its number, in one word. Of rank 0 it is a triangle, 16 times
+/// its block and its lane; of rank k + 1 a block of level k: of triangles, and from rank 2 on of
+/// balls.
 using SurfaceNode = std::uint32_t;
 constexpr int kSurfaceBits = 28;  ///< of a node's number
 constexpr int kTriangle = 0, kTriangleBlock = 1;

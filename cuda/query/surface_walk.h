@@ -15,6 +15,7 @@
 namespace ist::gpu {
 
 constexpr int kListRoom = 32;
+static_assert(kListRoom <= kStaged && kListRoom <= 32);  // all are seen; a bit each
 /// Nodes of a surface that wait while a block's are opened: a list, and what opening two at a time
 /// adds on each level.
 constexpr int kOpenRoom = kListRoom + kMaxLevels * (kItems - kPairsAtOnce) + kPairsAtOnce;
@@ -45,7 +46,7 @@ class SurfaceWalk {
       : team_(team),
         m_(memory),
         sums_(sums),
-        source_(memory.field.mesh, memory.open + kListRoom),
+        source_(memory.field.mesh, memory.open),
         discs_(team, memory.discs, source_, memory.place.a_from_b.t, sums) {}
 
   /// One small step after another: each is in the kernel's code once, which would overflow the

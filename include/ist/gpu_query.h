@@ -66,12 +66,15 @@ struct GpuPenetrations {
   std::uint32_t* sphere_pairs = nullptr;  ///< [count]
 };
 
+/// Pairs of a batch that is small (GpuWorkspace).
+inline constexpr std::size_t kFewGpuPairs = 16'384;
+
 /// Device memory that a batch works in. One batch at a time may use it.
 class GpuWorkspace {
  public:
   /// For batches of up to `most_pairs`; takes 8 bytes each and 100 MB besides.
   ///
-  /// One for up to 16,384 pairs cuts them up finer than a larger one: a step of few then ends
+  /// One for up to kFewGpuPairs cuts them up finer than a larger one: a step of few then ends
   /// sooner, at the cost of pairs a second. Answers of the two differ by rounding.
   ///
   /// Throws Error where the device cannot be used or has no memory left.
@@ -105,8 +108,8 @@ struct GpuPenetrationSettings {
 /// The volume is within 1e-6 of the sum in double, gradients within 1e-6 of the lenses' single ones
 /// together or of volume^(2/3), if that is more. Under a budget, and of copies of one asset at
 /// nearly the same pose, the sum is the CPU's blend of such sums.
-/// The same bits in every run, whatever else is in the batch, in any workspace for more pairs than
-/// 16,384 and in any for fewer.
+/// The same bits in every run, whatever else is in the batch, in all workspaces for up to
+/// kFewGpuPairs and in all for more.
 /// Only launches kernels on `stream`: allocates nothing and waits for nothing, so that a CUDA graph
 /// may capture it.
 ///

@@ -49,17 +49,20 @@ class DeviceAssets {
                                              const Launch& batch) {
     const int device = assets_->device();
     const bool captured = cuda::captures(device, stream);
-    if (workspace_ == nullptr || workspace_->most_pairs() < pairs.count) {
+    // Few pairs and many are cut up differently, in workspaces of their own: an answer does not
+    // depend on what was asked before.
+    Room& room = rooms_[pairs.count > kFewGpuPairs ? 1 : 0];
+    if (room.workspace == nullptr || room.workspace->most_pairs() < pairs.count) {
       if (captured)
         throw Error("GPU: a batch of " + std::to_string(pairs.count) +
                     " pairs is captured, and none so large was asked before: ask once without "
                     "capturing");
-      make_room(pairs.count);
+      make_room(room, pairs.count);
     }
     if (!captured && !in_flight_.empty()) in_flight_.back().done->hold(stream);
-    batch(*assets_, *workspace_);
+    batch(*assets_, *room.workspace);
     if (captured) {
-      workspace_captured_ = true;
+      room.captured = true;
       return nullptr;
     }
     while (!in_flight_.empty() && in_flight_.front().done->passed()) in_flight_.pop_front();
@@ -73,22 +76,25 @@ class DeviceAssets {
     std::vector<std::shared_ptr<void>> lent;
   };
 
-  void make_room(std::size_t pairs) {
+  struct Room {
+    std::unique_ptr<GpuWorkspace> workspace;
+    bool captured = false;
+  };
+
+  void make_room(Room& room, std::size_t pairs) {
     GpuSettings settings;
     settings.device = assets_->device();
     if (!in_flight_.empty()) in_flight_.back().done->wait();
     // A graph that was captured uses the old one as long as these assets.
-    if (workspace_captured_) captured_.push_back(std::move(workspace_));
-    workspace_captured_ = false;
-    workspace_ = nullptr;
+    if (room.captured) captured_.push_back(std::move(room.workspace));
+    room = {};
     std::size_t most = 4096;
     while (most < pairs) most *= 2;
-    workspace_ = std::make_unique<GpuWorkspace>(most, settings);
+    room.workspace = std::make_unique<GpuWorkspace>(most, settings);
   }
 
   std::unique_ptr<GpuAssets> assets_;
-  std::unique_ptr<GpuWorkspace> workspace_;
-  bool workspace_captured_ = false;
+  Room rooms_[2];  ///< of few pairs, and of many
   std::vector<std::unique_ptr<GpuWorkspace>> captured_;
   std::deque<Batch> in_flight_;
 };

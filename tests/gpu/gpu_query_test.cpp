@@ -27,14 +27,17 @@ TEST_F(GpuQueryTest, HasTheBitsOfAWarpOnTheHost) {
   pairs[30].scale_b = -1;
   pairs[40].a = 1000;
   const GpuAssets assets(batch_views());
-  GpuWorkspace workspace(pairs.size());
   const Stream stream;
-  for (const Measure measure : {Measure::matched, Measure::inner}) {
-    const DeviceBatch batch(pairs);
-    penetration_batch(assets, batch.pairs(), measure, workspace, batch.answers(), stream);
-    stream.wait();
-    HostBatch host(batch_views());
-    expect_same_bits(batch.get(), host.run(pairs, measure, 1));
+  for (const std::size_t most_pairs : {pairs.size(), kFewGpuPairs + 1}) {
+    GpuWorkspace workspace(most_pairs);
+    for (const Measure measure : {Measure::matched, Measure::inner}) {
+      const DeviceBatch batch(pairs);
+      penetration_batch(assets, batch.pairs(), measure, workspace, batch.answers(), stream);
+      stream.wait();
+      HostBatch host(batch_views());
+      host.cut_for(most_pairs);
+      expect_same_bits(batch.get(), host.run(pairs, measure, 1));
+    }
   }
 }
 
@@ -197,7 +200,7 @@ TEST_F(GpuQueryTest, BatchesOfOneAndOfTenMillionAreAnsweredAsOfFew) {
   };
   // A workspace for few cuts pairs up finer than one for many: the bits of a kind are the same.
   const RepeatedPairs few(some, some.size());
-  const auto finely = ask(few, some.size()), coarsely = ask(few, 20'000);
+  const auto finely = ask(few, some.size()), coarsely = ask(few, kFewGpuPairs + 1);
   for (std::size_t i = 0; i < some.size(); ++i)
     EXPECT_NEAR(finely.volume[i], coarsely.volume[i], 1e-6 * coarsely.volume[i]) << i;
   std::vector<std::size_t> place(some.size());

@@ -159,8 +159,10 @@ void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs,
                        const GpuPenetrations& to, CUstream_st* stream) {
   launch(
       assets, pairs, workspace, stream,
-      [settings](const auto& solids, const auto& rows) {
-        return testing::HostBatch(solids).run(rows, settings.measure, 0, settings.pair_budget);
+      [settings, most_pairs = workspace.most_pairs()](const auto& solids, const auto& rows) {
+        testing::HostBatch batch(solids);
+        batch.cut_for(most_pairs);
+        return batch.run(rows, settings.measure, 0, settings.pair_budget);
       },
       [to](const auto& found) { write(found, to); });
 }

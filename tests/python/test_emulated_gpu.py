@@ -256,6 +256,17 @@ def test_a_larger_batch_waits_for_its_room(solids, arguments):
     assert np.array_equal(found.volume.numpy()[:40], few.volume.numpy())
 
 
+def test_what_was_asked_before_does_not_show(solids, arguments):
+    assets = ist.gpu.Assets(solids)
+    few = ask(assets, arguments).volume.numpy()
+    many = {n: np.concatenate([x] * 500) for n, x in arguments.items()}
+    many["pose_b"][40:, 4:] = 1e6
+    of_many = ask(assets, many).volume.numpy()[:40]
+    assert np.allclose(of_many, few, rtol=1e-6, atol=0)
+    assert (of_many != few).any()  # as many are cut up otherwise
+    assert np.array_equal(ask(assets, arguments).volume.numpy(), few)
+
+
 def test_streams_are_passed_on(solids, arguments):
     assets = ist.gpu.Assets(solids)
 
