@@ -223,9 +223,13 @@ def test_batches_of_any_size(assets, pairs, count):
     few = on_card(pairs(min(count, 1000)))
     found = ist.gpu.penetration(assets, **few)
     if count > 1000:
-        many = {n: x.repeat(count // 1000, *[1] * (x.ndim - 1)) for n, x in few.items()}
-        all_of_them = host(ist.gpu.penetration(assets, **many))
-        expect_same_bits({n: x[-1000:] for n, x in all_of_them.items()}, host(found))
+        # Up to 16,384 pairs are cut up otherwise than more: their answers differ by rounding.
+        some, all_of_them = (host(ist.gpu.penetration(assets, **{
+            n: x.repeat(size // 1000, *[1] * (x.ndim - 1)) for n, x in few.items()}))
+            for size in (20_000, count))
+        expect_same_bits({n: x[-1000:] for n, x in all_of_them.items()},
+                         {n: x[-1000:] for n, x in some.items()})
+        expect_close({n: x[-1000:] for n, x in some.items()}, host(found))
     assert len(found.volume) == min(count, 1000) and found.centroid.shape[1] == 3
     assert torch.from_dlpack(found.volume).shape == (min(count, 1000),)
 
