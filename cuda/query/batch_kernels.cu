@@ -120,8 +120,8 @@ void launch_batch(const BatchArrays& batch, const BatchGrids& grids, cudaStream_
     check_launch("summing pairs of trees at several levels of detail");
   }
   // Of few pairs no more warps than have work: who waits for tasks keeps others from the device.
-  constexpr std::uint64_t kTasks = 16;  // of a pair, about: size_tasks()
-  const std::uint64_t wanted = (batch.pairs.count * (1 + kTasks) + kWarps - 1) / kWarps;
+  const std::uint64_t wanted =
+      (batch.pairs.count * (1 + std::uint64_t{kTasksOfPair}) + kWarps - 1) / kWarps;
   const auto most = static_cast<std::uint64_t>(grids.sum);
   const auto blocks = static_cast<unsigned>(wanted < most ? wanted : most);
   sum_pairs<<<blocks, kThreads, 0, stream>>>(batch);

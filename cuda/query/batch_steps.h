@@ -168,16 +168,18 @@ IST_HD inline std::uint32_t weight_of(const PairMemory& memory, int entry) {
   return 1u << 2 * (left < kMostLeft ? left : kMostLeft);
 }
 
+/// Tasks of a pair, about: no more than have warps of their own where pairs are few.
+constexpr std::uint32_t kTasksOfPair = 16;
+
 /// Decides how large the tasks are of what waits: no smaller than batch.task_weight, not too many.
 /// All of the team together.
 template <class Team>
 IST_HD void size_tasks(const Team& team, const BatchArrays& batch, PairMemory& memory,
                        int waiting) {
-  constexpr std::uint32_t kMostTasks = 16;  // about
   int weight = 0;
   for (int k = team.lane(); k < waiting; k += Team::kWidth)
     weight += static_cast<int>(weight_of(memory, k));
-  const std::uint32_t each = static_cast<std::uint32_t>(team.sum(weight)) / kMostTasks;
+  const std::uint32_t each = static_cast<std::uint32_t>(team.sum(weight)) / kTasksOfPair;
   if (team.lane() == 0) memory.task_weight = each > batch.task_weight ? each : batch.task_weight;
   team.sync();
 }

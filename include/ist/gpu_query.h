@@ -66,7 +66,7 @@ struct GpuPenetrations {
   std::uint32_t* sphere_pairs = nullptr;  ///< [count]
 };
 
-/// Pairs of a batch that is small (GpuWorkspace).
+/// Up to so many pairs a workspace is one for few (GpuWorkspace).
 inline constexpr std::size_t kFewGpuPairs = 16'384;
 
 /// Device memory that a batch works in. One batch at a time may use it.
