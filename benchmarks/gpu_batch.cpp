@@ -3,180 +3,31 @@
 // trees in fields; the same by all cores of the machine. Answers are compared with the CPU's.
 #include <cuda_runtime_api.h>
 
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <exception>
-#include <numbers>
-#include <random>
 #include <string>
 #include <vector>
 
-#include <ist/bake.h>
 #include <ist/gpu_fields.h>
-#include <ist/query_tbb.h>
 
 #include "cuda/check.h"
+#include "gpu_batch_on_cpu.h"
+#include "gpu_batch_scenes.h"
 #include "report.h"
 #include "samples/samples.h"
 #include "support/device_patches.h"
 #include "support/device_separations.h"
-#include "support/oracle_rows.h"
-#include "support/reference_sum.h"
 #include "timing.h"
 
 namespace {
 
 using namespace ist;
-using ist::benchmark::Report;
-using ist::testing::BatchPair;
+using namespace ist::benchmark;
 using ist::testing::DeviceBatch;
 using ist::testing::DevicePatches;
 using ist::testing::DeviceSeparations;
 
 constexpr int kRepeats = 10;
-
-Asset baked(const TriangleMesh& mesh, const std::string& name, std::size_t spheres,
-            bool field = false) {
-  PackingSettings settings;
-  settings.max_spheres = spheres;
-  settings.field.wanted = field;
-  return bake(close_mesh(mesh, name), settings);
-}
-
-/// Two solids and the poses at which B meets A.
-struct Scene {
-  std::string name;
-  const Asset* a;  ///< of none if there is a field
-  const Asset* b;
-  std::vector<BatchPair> poses;
-  double rate = 0, step_ms = 0;  ///< what one H200 is to reach: M/s of a million, ms of 4,096; 0: –
-  const Field* field = nullptr;  ///< in A's place
-  std::uint32_t pair_budget = 0;
-};
-
-/// A nut on its bolt at any turn, its thread pushed a little way out of the middle of the gap.
-std::vector<BatchPair> nut_poses(std::size_t count) {
-  std::mt19937_64 random(5);
-  std::vector<BatchPair> out;
-  for (std::size_t k = 0; k < count; ++k) {
-    const auto uniform = [&](double low, double high) {
-      return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
-    };
-    const double turn = uniform(0, 1);
-    const double half = std::numbers::pi * turn;
-    BatchPair pair;
-    pair.b = 1;
-    pair.pose_b = {
-        {std::cos(half), 0, 0, std::sin(half)},
-        {uniform(-0.04, 0.04), uniform(-0.04, 0.04), 8 + 2 * turn + uniform(-0.08, 0.08)}};
-    out.push_back(pair);
-  }
-  return out;
-}
-
-/// Rolling ground about z = 0, as large as all poses.
-class Ground {
- public:
-  Ground() {
-    for (std::uint32_t j = 0; j < kPoints; ++j)
-      for (std::uint32_t i = 0; i < kPoints; ++i)
-        heights_.push_back(static_cast<float>(std::sin(0.7 * i) * std::cos(0.9 * j)));
-  }
-
-  /// Cells a tenth of the body's size across.
-  Field terrain(const Asset& body) {
-    const double cell = 0.1 * std::cbrt(body.view().volume());
-    for (float& height : heights_) height *= static_cast<float>(0.2 * cell);
-    return HeightField{heights_.data(), kPoints, kPoints, {cell, cell}};
-  }
-
- private:
-  static constexpr std::uint32_t kPoints = 256;
-  std::vector<float> heights_;
-};
-
-/// A solid at any turn, so deep in the half-space z ≤ 0: parts of its height, drawn from a range.
-std::vector<BatchPair> poses_in_ground(const Asset& body, double least, double most) {
-  std::mt19937_64 random(7);
-  const auto uniform = [&](double low, double high) {
-    return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
-  };
-  std::vector<BatchPair> out;
-  while (out.size() < 400) {
-    BatchPair pair;
-    double square = 0;
-    for (double& q : pair.pose_b.q) {
-      q = uniform(-1, 1);
-      square += q * q;
-    }
-    if (!(square > 0.01 && square < 1)) continue;
-    for (double& q : pair.pose_b.q) q /= std::sqrt(square);
-    pair.b = 0;
-    double bottom = 1e300, top = -1e300;
-    for (const testing::WorldSphere& ball :
-         testing::world_spheres({body.view(), pair.pose_b, 1}, Measure::matched)) {
-      bottom = std::min(bottom, ball.centre.z() - ball.r);
-      top = std::max(top, ball.centre.z() + ball.r);
-    }
-    pair.pose_b.t[2] = -bottom - uniform(least, most) * (top - bottom);
-    out.push_back(pair);
-  }
-  return out;
-}
-
-/// Rows of a small solid on a large one (oracle/small) at a ratio of their sizes.
-std::vector<BatchPair> small_poses(const std::string& key, const std::string& ratio) {
-  std::vector<BatchPair> out;
-  for (const auto& row :
-       testing::read_csv(testing::shared_path("oracle/small/" + key + ".csv").string())) {
-    if (!row.at("class").starts_with("r" + ratio + "_")) continue;
-    const auto number = [&](const char* column) { return std::stod(row.at(column)); };
-    BatchPair pair;
-    pair.pose_b = {{number("qw"), number("qx"), number("qy"), number("qz")},
-                   {number("tx"), number("ty"), number("tz")}};
-    pair.scale_b = number("scale_b");
-    out.push_back(pair);
-  }
-  return out;
-}
-
-/// Copies of a solid that stand apart by up to a part of its size, in any direction.
-std::vector<BatchPair> poses_of_copies(const Asset& body, double most) {
-  std::mt19937_64 random(9);
-  std::vector<BatchPair> out;
-  for (int i = 0; i < 400; ++i) {
-    BatchPair pair;
-    pair.b = 1;
-    for (double& t : pair.pose_b.t)
-      t = most * std::cbrt(body.view().volume()) *
-          (static_cast<double>(random() >> 11) * 0x1p-52 - 1);
-    out.push_back(pair);
-  }
-  return out;
-}
-
-std::vector<BatchPair> oracle_poses(const std::string& pose_class) {
-  std::vector<BatchPair> out;
-  for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
-    if (row.pose_class != pose_class) continue;
-    BatchPair pair;
-    pair.b = 1;
-    pair.pose_b = row.pose;
-    pair.scale_b = row.scale_b;
-    out.push_back(pair);
-  }
-  return out;
-}
-
-/// `count` of the poses in random order.
-std::vector<BatchPair> drawn(const std::vector<BatchPair>& poses, std::size_t count) {
-  std::mt19937_64 random(1);
-  std::vector<BatchPair> out;
-  out.reserve(count);
-  for (std::size_t k = 0; k < count; ++k) out.push_back(poses[random() % poses.size()]);
-  return out;
-}
 
 class Stream {
  public:
@@ -284,153 +135,6 @@ class Batches {
   std::vector<Separation> separations_;
   std::vector<testing::PatchedPair> patched_;
 };
-
-std::vector<PlacedPair> placed(const Scene& scene, std::size_t count) {
-  std::vector<PlacedPair> out;
-  for (const BatchPair& pair : drawn(scene.poses, count))
-    out.push_back({{scene.a->view(), pair.pose_a, pair.scale_a},
-                   {scene.b->view(), pair.pose_b, pair.scale_b}});
-  return out;
-}
-
-std::vector<PlacedFieldPair> placed_in_field(const Scene& scene, std::size_t count) {
-  std::vector<PlacedFieldPair> out;
-  for (const BatchPair& pair : drawn(scene.poses, count))
-    out.push_back(
-        {{*scene.field, pair.pose_a, pair.scale_a}, {scene.b->view(), pair.pose_b, pair.scale_b}});
-  return out;
-}
-
-/// M/s by all cores; `answers` of as many.
-double cpu_rate(const Scene& scene, std::size_t count, std::vector<Penetration>& answers) {
-  std::vector<PlacedPair> pairs;
-  std::vector<PlacedFieldPair> in_field;
-  if (scene.field != nullptr)
-    in_field = placed_in_field(scene, count);
-  else
-    pairs = placed(scene, count);
-  PenetrationSettings settings;
-  settings.field = FieldUse::never;
-  settings.pair_budget = scene.pair_budget;
-  std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
-  answers.resize(count);
-  double best = 1e30;
-  for (int k = 0; k < 3; ++k) {
-    const double start = benchmark::wall_seconds();
-    if (scene.field != nullptr)
-      penetration_batch(in_field, settings, workspaces, answers, tbb_parallel_for());
-    else
-      penetration_batch(pairs, settings, workspaces, answers, tbb_parallel_for());
-    best = std::min(best, benchmark::wall_seconds() - start);
-  }
-  return static_cast<double>(count) / best * 1e-6;
-}
-
-/// Separations by all cores, M/s; `answers` of as many.
-double cpu_separation_rate(const Scene& scene, std::size_t count,
-                           std::vector<Separation>& answers) {
-  struct Batch {
-    std::vector<PlacedPair> pairs;
-    std::vector<Workspace> workspaces;
-    std::vector<Separation>& answers;
-  };
-  answers.resize(count);
-  Batch batch{placed(scene, count), std::vector<Workspace>(std::thread::hardware_concurrency()),
-              answers};
-  const auto work = [](void* of, std::size_t worker) {
-    Batch& all = *static_cast<Batch*>(of);
-    for (std::size_t i = worker; i < all.pairs.size(); i += all.workspaces.size())
-      all.answers[i] = separation(all.pairs[i].a, all.pairs[i].b, {}, all.workspaces[worker]);
-  };
-  const ParallelFor threads = tbb_parallel_for();
-  double best = 1e30;
-  for (int k = 0; k < 3; ++k) {
-    const double start = benchmark::wall_seconds();
-    threads.run(threads.pool, batch.workspaces.size(), work, &batch);
-    best = std::min(best, benchmark::wall_seconds() - start);
-  }
-  return static_cast<double>(count) / best * 1e-6;
-}
-
-/// Contact patches by all cores.
-struct CpuPatches {
-  double rate = 0;  ///< M/s
-  std::vector<ContactPatches> answers;
-  std::vector<ContactPatch> patches;  ///< as many a pair
-
-  CpuPatches(const Scene& scene, std::size_t count, std::uint32_t most)
-      : answers(count), patches(count * most) {
-    const std::vector<PlacedPair> pairs = placed(scene, count);
-    ContactSettings settings;
-    settings.field = FieldUse::never;
-    std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
-    double best = 1e30;
-    for (int k = 0; k < 3; ++k) {
-      const double start = benchmark::wall_seconds();
-      contact_patches_batch(pairs, settings, workspaces, answers, patches, tbb_parallel_for());
-      best = std::min(best, benchmark::wall_seconds() - start);
-    }
-    rate = static_cast<double>(count) / best * 1e-6;
-  }
-};
-
-/// What contacts differ by from the CPU's.
-struct PatchDifference {
-  double of_other_regions = 0;  ///< part of the pairs
-  double volume = 0;            ///< largest of a patch, relative
-  double patches = 0;           ///< mean of a pair
-};
-
-PatchDifference difference(const std::vector<testing::PatchedPair>& gpu, const CpuPatches& cpu,
-                           std::uint32_t most) {
-  PatchDifference out;
-  const auto pairs = static_cast<double>(cpu.answers.size());
-  for (std::size_t i = 0; i < cpu.answers.size(); ++i) {
-    const ContactPatch* const from = cpu.patches.data() + i * most;
-    const std::vector<ContactPatch>& found = gpu[i].patches;
-    out.patches += static_cast<double>(found.size()) / pairs;
-    if (!std::equal(found.begin(), found.end(), from, from + cpu.answers[i].count,
-                    [](const auto& x, const auto& y) { return x.id == y.id; })) {
-      out.of_other_regions += 1 / pairs;
-      continue;
-    }
-    for (std::size_t k = 0; k < found.size(); ++k)
-      out.volume = std::max(out.volume, std::abs(found[k].volume / from[k].volume - 1));
-  }
-  return out;
-}
-
-/// The largest difference to the CPU's volumes, relative.
-double worst_volume(const std::vector<Penetration>& gpu, const std::vector<Penetration>& cpu) {
-  double worst = 0;
-  for (std::size_t i = 0; i < cpu.size(); ++i) {
-    if (cpu[i].volume == 0 && gpu[i].volume == 0) continue;
-    worst = std::max(
-        worst, std::abs(gpu[i].volume - cpu[i].volume) / std::max(cpu[i].volume, gpu[i].volume));
-  }
-  return worst;
-}
-
-/// What separations differ by from the CPU's.
-struct SeparationDifference {
-  double distance = 0;    ///< largest, relative
-  double visits = 0;      ///< mean, on the GPU
-  bool certified = true;  ///< no lower end is less than the CPU's, nor is one above the distance
-};
-
-SeparationDifference difference(const std::vector<Separation>& gpu,
-                                const std::vector<Separation>& cpu) {
-  SeparationDifference out;
-  for (std::size_t i = 0; i < cpu.size(); ++i) {
-    out.visits += gpu[i].node_visits / static_cast<double>(cpu.size());
-    const double most = std::max(cpu[i].distance, gpu[i].distance);
-    if (most > 0)
-      out.distance = std::max(out.distance, std::abs(gpu[i].distance - cpu[i].distance) / most);
-    out.certified = out.certified && gpu[i].distance_min >= cpu[i].distance_min - 1e-12 * most &&
-                    gpu[i].distance_min <= gpu[i].distance_max;
-  }
-  return out;
-}
 
 /// Reports a scene's separations; false where they are not the CPU's.
 bool separates(Report& report, Batches& batches, const Scene& scene, std::size_t many,

@@ -2,7 +2,7 @@
 
     PYTHONPATH=build/python python3 benchmarks/gpu_python.py FOLDER
 
-FOLDER: elephant.ist and dino.ist of 4,000 spheres, and poses_eledino.csv: the rows of gpu_batch.cpp.
+FOLDER: elephant.ist and dino.ist of 4,000 spheres, and poses_eledino.csv: the rows of gpu_batch.
 Writes a row of JSON a class of poses and a size. "device" is by CUDA's events around ten calls into the
 same arrays, what that program measures of the C++ batch; "wall" is from the first call to the end of
 the last; "call" is how long a call keeps the host, with the device busy.

@@ -16,13 +16,13 @@ IST_HD inline double most(double x, double y) { return x > y ? x : y; }
 IST_HD inline double size_of(double x) { return x < 0 ? -x : x; }
 
 /// A triangle as balls meet it (SurfacePatch): its plane's axes, of which the first runs along the
-/// first edge, and its extent in them.
+/// first edge.
 struct TrianglePlane {
   double corner[3];  ///< the first
   double u[3], v[3], n[3];
-  double length[3];         ///< of the edges
-  double ex[3], ey[3];      ///< their directions
-  double left, right, top;  ///< far below 0 where there is no area
+  double length[3];     ///< of the edges
+  double ex[3], ey[3];  ///< their directions
+  bool flat;            ///< it has no plane: no ball is to meet it
 
   IST_HD explicit TrianglePlane(const double (&c)[3][3]) {
     double e[3], f[3], cross[3];
@@ -35,7 +35,7 @@ struct TrianglePlane {
     cross[1] = e[2] * f[0] - e[0] * f[2];
     cross[2] = e[0] * f[1] - e[1] * f[0];
     const double area = norm(cross), base = norm(e);
-    const bool flat = !(area > 0);
+    flat = !(area > 0);
     const double per_area = 1 / (flat ? 1 : area), per_base = 1 / (flat ? 1 : base);
     for (int k = 0; k < 3; ++k) {
       u[k] = e[k] * per_base;
@@ -50,9 +50,6 @@ struct TrianglePlane {
     ey[0] = 0;
     set_edge(1, apex_x - base, apex_y, flat);
     set_edge(2, -apex_x, -apex_y, flat);
-    left = least(0, apex_x);
-    right = flat ? -1e300 : most(base, apex_x);
-    top = flat ? -1e300 : apex_y;
   }
 
   /// Height over the plane, and the foot in it.

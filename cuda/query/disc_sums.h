@@ -4,26 +4,24 @@
 
 #include "cuda/query/bits.h"
 #include "cuda/query/disc_part.h"
+#include "cuda/query/field_walk.h"
 #include "cuda/query/part_sums.h"
 #include "cuda/query/seen_triangles.h"
 #include "numerics/host_device.h"
 
 // Balls met by triangles, by one team: their parts inside the closed surface, exactly, as
-// add_patch() and total_of() (query/probe/patch_sums.h, query/field/probe_sum.h) have them. Eight
-// blocks of sixteen balls are held at a time, and what meets goes to lists, so that the lanes of a
-// warp are full where the work is.
+// add_patch() and total_of() (query/probe/patch_sums.h, query/field/probe_sum.h) have them. Balls
+// that no triangle meets are inside or outside as a whole; the others are held, and what meets goes
+// to lists, so that the lanes of a warp are full where the work is.
 
 namespace ist::gpu {
 
-constexpr int kHeldBlocks = 8;
-constexpr int kHeldBalls = kHeldBlocks * static_cast<int>(kWidth);
-constexpr int kKeptNear = 16;  ///< triangles near a block that are remembered
-constexpr int kDiscRoom = 64;  ///< what is left after a round of a warp, and what a round may add
-static_assert(kDiscRoom >= 2 * 32 - 1 && kHeldBalls % 32 == 0);
-static_assert(2 * static_cast<int>(kWidth) <= kStaged);  // two blocks of triangles
+constexpr int kHeldBalls = 128;
 constexpr std::uint32_t kNoBall = ~0u;
-/// A ball is moved by less than this part of its radius where its centre lies on an edge: what
-/// comes near its block is looked for that much further out.
+constexpr int kDiscRoom = 64;  ///< what is left after a round of a warp, and what a round may add
+static_assert(kDiscRoom >= 2 * 32 - 1 && kHeldBalls % 32 == 0 && kItems == 32);
+/// By less than this part of its radius a ball is moved, to be told from beside an edge on which
+/// its centre lies.
 constexpr double kMoved = 0x1p-10;
 
 /// A triangle by whatever its source calls it.
@@ -36,31 +34,25 @@ struct BallTriangle {
   TriangleId triangle;
 };
 
-/// A block of balls in work, the field's frame.
-struct HeldBlock {
-  double centre[3], reach;  ///< all balls lie within
-  std::uint32_t near;       ///< triangles that come near
-  std::uint32_t known;      ///< a ball whose side is known, kNoBall: none yet
-  bool known_inside;
-  TriangleId kept[kKeptNear];  ///< the first of those near
+/// A leaf block that is tested. Each half of the team's items tests one; or both are the same, and
+/// the halves share its triangles.
+struct TestedBlock {
+  double from[3];  ///< a point within the block's ball, if crossings tell sides
+  bool inside;     ///< its side
+  std::uint32_t block;
+  std::uint32_t triangles;  ///< of those seen, a bit each
 };
 
 struct DiscMemory {
-  double x[3][kHeldBalls], r[kHeldBalls];  ///< r: 0 if there is no ball
+  double x[3][kHeldBalls], r[kHeldBalls];
   double cones[kHeldBalls], angle[kHeldBalls];
+  std::uint32_t inside[kHeldBalls];  ///< whether its centre is
   std::uint32_t on_edge[kHeldBalls];
-  HeldBlock block[kHeldBlocks];
-  SeenTriangles triangles;
-  TriangleId staged[kStaged];
-  std::uint32_t staged_as[kStaged];  ///< its place in what is seen
-  SeenBall ball_seen[kWidth];        ///< of the block that is tested
+  SeenTriangles seen;
+  TriangleId id[kSeen];  ///< of what is seen
+  TestedBlock tested[2];
+  std::uint8_t held_as[kItems];  ///< balls of the blocks that are tested; kNotHeld
   BallTriangle near[kDiscRoom], cut[kDiscRoom];
-
-  /// Where a ball's side is told: its centre, or beside it where that lies on an edge.
-  IST_HD void seen(int ball, double (&at)[3]) const {
-    for (int k = 0; k < 3; ++k) at[k] = x[k][ball];
-    if (on_edge[ball] != 0) move(r[ball], at);
-  }
 
   /// In a direction in which no edge of a made thing lies (kAway, query/probe/patch_sums.cpp).
   IST_HD static void move(double r, double (&at)[3]) {
@@ -72,122 +64,164 @@ struct DiscMemory {
     return 0x1p-12 * (axis == 0 ? 0.43877 : axis == 1 ? 0.61803 : 0.65236);
   }
 };
+constexpr std::uint8_t kNotHeld = 255;
+static_assert(kHeldBalls <= kNotHeld);
 
 /// Source: what has the triangles.
-///   corners(id, x, reach, c): of a triangle, which may be another one for another ball
+///   kCrossings: sides are told by the triangles on the way from TestedBlock::from, all of which
+///     come near the block; else by inside()
+///   corners(id, c): of a triangle
+///   crosses(from, x, id): whether the way goes through a triangle, exactly
+///   settles(x, r, part): whether a ball's part is told without triangles
 ///   each_near(team, x, reach, visit): visit(there, id) by all lanes for all triangles near a ball
-///   inside(team, memory, ball, wanted): whether a lane's ball has its centre inside
+///   inside(team, wanted, x): whether a lane's point is inside
 ///
-/// Blocks are held, triangles staged and tested against them, and what meets is drained, a round at
-/// a time by a loop of the caller's, so that each step is in a kernel's code once:
+/// Blocks are tested against triangles, what meets is listed and drained, a round at a time by a
+/// loop of the caller's, so that each step is in a kernel's code once:
 ///
 ///   if (drain(rest)) continue;
 ///   if (rest) finish();  // and go on to what comes next
-///   if (tests()) test(); else …  // hold() and stage more, or set `rest`
+///   if (lists()) list();
+///   else if (tests()) test();
+///   else …  // go on to stage() where there is room() for a first test, or set `rest`
+///
+/// finish() may ask the source for what comes near a ball: nothing is to wait in its room then.
 template <class Team, class Source>
 class DiscSums {
  public:
-  IST_HD DiscSums(const Team& team, DiscMemory& memory, const Source& source,
-                  const double (&origin)[3], PartSums& sums)
-      : team_(team), m_(memory), source_(source), sums_(sums) {
-    for (int k = 0; k < 3; ++k) origin_[k] = origin[k];
+  IST_HD DiscSums(const Team& team, const ProbeMemory& probe, DiscMemory& memory,
+                  const Source& source, PartSums& sums)
+      : team_(team), probe_(probe), m_(memory), source_(source), sums_(sums) {
+    for (std::uint32_t& met : met_) met = 0;
   }
 
-  /// No block more can be held until finish().
-  IST_HD bool full() const { return held_ == kHeldBlocks; }
+  /// Whether the first test of blocks finds room; if not, until finish().
+  IST_HD bool room() const { return held_ + kItems <= kHeldBalls; }
 
-  /// Room for a block whose balls lie within `reach` of `centre`; they are set next.
-  IST_HD int hold(const double (&centre)[3], double reach) {
-    const int slot = held_++;
-    if (team_.lane() == 0) {
-      HeldBlock& block = m_.block[slot];
-      for (int k = 0; k < 3; ++k) block.centre[k] = centre[k];
-      block.reach = reach * (1 + kMoved);
-      block.near = 0;
-    }
-    return slot;
+  /// Readies the test of the balls of m_.tested, two blocks or one by both halves, against what is
+  /// seen: `first` and `last` of one that has triangles for more than one test.
+  IST_HD void stage(bool two, bool first, bool last) {
+    two_ = two;
+    first_ = first;
+    last_ = last;
+    tests_ = true;
   }
+  IST_HD bool tests() const { return tests_; }
 
-  IST_HD void set_ball(int slot, int lane, const double (&x)[3], double r) {
-    const int ball = slot * static_cast<int>(kWidth) + lane;
-    for (int k = 0; k < 3; ++k) m_.x[k][ball] = x[k];
-    m_.r[ball] = r;
-    m_.cones[ball] = m_.angle[ball] = 0;
-    m_.on_edge[ball] = 0;
-  }
-
-  /// Stages those of up to kStaged triangles that come near a held block, to be tested against it:
-  /// id_of(k, id) says whether there is a k-th.
-  template <class IdOf>
-  IST_HD void stage_near(int slot, const IdOf& id_of) {
-    const HeldBlock& block = m_.block[slot];
-    int staged = 0;
-    for (int i = 0; i < kStaged / Team::kWidth; ++i) {
-      const int k = i * Team::kWidth + team_.lane();
-      TriangleId id = {};
-      bool near = id_of(k, id);
-      if (near) {
-        double c[3][3];
-        source_.corners(id, block.centre, block.reach, c);
-        near = m_.triangles.see(k, c, block.centre, block.reach);
-      }
-      int total = 0;
-      const int place = staged + team_.exclusive_count(near, total);
-      staged += total;
-      if (near) stage(place, id, k);
-    }
-    ready_tests(slot, staged, block.centre, block.reach);
-  }
-
-  /// Makes a triangle the next to be tested, by the lane that knows it. `as`: its place in what is
-  /// seen.
-  IST_HD void stage(int place, const TriangleId& id, int as) {
-    m_.staged[place] = id;
-    m_.staged_as[place] = static_cast<std::uint32_t>(as);
-  }
-
-  /// Readies the tests of a held block with all that is staged: the triangles that come near it, as
-  /// they are seen from a point that its balls lie within a reach of.
-  IST_HD void ready_tests(int slot, int staged, const double (&centre)[3], double reach) {
-    team_.sync();
-    HeldBlock& block = m_.block[slot];
-    const std::uint32_t before = block.near;
-    for (int k = team_.lane(); k < staged; k += Team::kWidth)
-      if (before + static_cast<std::uint32_t>(k) < kKeptNear)
-        block.kept[before + static_cast<std::uint32_t>(k)] = m_.staged[k];
-    for (int lane = team_.lane(); lane < static_cast<int>(kWidth); lane += Team::kWidth) {
-      const int ball = slot * static_cast<int>(kWidth) + lane;
-      const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]};
-      m_.ball_seen[lane] = SeenTriangles::ball(x, m_.r[ball], centre, reach);
-    }
-    team_.sync();
-    if (team_.lane() == 0) block.near = before + static_cast<std::uint32_t>(staged);
-    tested_ = slot;
-    test_ = 0;
-    tests_ = staged * static_cast<int>(kWidth);
-  }
-
-  /// Whether tests are left.
-  IST_HD bool tests() const { return test_ < tests_; }
-
-  /// Tests a ball and a triangle a lane until none is left or a team's worth may meet and is
-  /// listed; drain() has left room for it.
   IST_HD void test() {
+    tests_ = false;
+    double x[kItemsALane][3], r[kItemsALane];
+    PartInside part[kItemsALane] = {};
+    bool settled[kItemsALane];
+    std::uint32_t touched = 0, odd = 0;
+    for (int i = 0; i < kItemsALane; ++i) {
+      const TestedBlock& block = m_.tested[item(i) / static_cast<int>(kWidth)];
+      met_[i] = 0;
+      bool crossed = false;
+      settled[i] = true;
+      if (place_ball(probe_, 0, block.block, item(i) % static_cast<int>(kWidth), x[i], r[i])) {
+        settled[i] = source_.settles(x[i], r[i], part[i]);
+        std::uint32_t unclear = 0;
+        if (!settled[i])
+          crossed = meet(block.from, block.triangles, x[i], r[i], Share(item(i), !two_), met_[i],
+                         unclear);
+        if constexpr (Source::kCrossings)
+          if (unclear != 0)
+            crossed = crossed != crosses_odd(source_, block.from, x[i], m_.id, unclear);
+      }
+      touched |= team_.ballot(met_[i] != 0) << (i * Team::kWidth);
+      odd |= team_.ballot(crossed) << (i * Team::kWidth);
+    }
+    constexpr std::uint32_t kHalf = (1u << kWidth) - 1;
+    lists_ = touched != 0;
+    if (!two_) {
+      touched = (touched | touched >> kWidth) & kHalf;
+      odd = (odd ^ odd >> kWidth) & kHalf;
+    }
+    odd_ = first_ ? odd : odd_ ^ odd;
+    for (int i = 0; i < kItemsALane; ++i) {
+      const bool is_ball = two_ || item(i) < static_cast<int>(kWidth);
+      if (first_ && is_ball) m_.held_as[item(i)] = kNotHeld;
+      const bool fresh =
+          is_ball && (touched >> item(i) & 1) != 0 && (first_ || m_.held_as[item(i)] == kNotHeld);
+      int total = 0;
+      const int place = held_ + team_.exclusive_count(fresh, total);
+      held_ += total;
+      if (fresh) hold(place, item(i), x[i], r[i]);
+      if (!last_) continue;
+      const bool there = is_ball && r[i] > 0;
+      bool inside;
+      if constexpr (Source::kCrossings)
+        inside =
+            m_.tested[item(i) / static_cast<int>(kWidth)].inside != ((odd_ >> item(i) & 1) != 0);
+      else
+        inside = source_.inside(team_, there && !settled[i], x[i]);
+      if (!there) continue;
+      if (settled[i])
+        add_settled(x[i], part[i]);
+      else if (m_.held_as[item(i)] != kNotHeld)
+        m_.inside[m_.held_as[item(i)]] = inside ? 1 : 0;
+      else if (inside)
+        add_ball(x[i], r[i], true, 0);
+    }
+    team_.sync();
+  }
+
+  /// What an item takes of triangles: all, or every other as the other half does the rest.
+  struct Share {
+    bool shared, second;
+    IST_HD Share(int item, bool shared)
+        : shared(shared), second(shared && item >= static_cast<int>(kWidth)) {}
+    IST_HD std::uint32_t first(std::uint32_t of) const { return second ? of & (of - 1) : of; }
+    IST_HD std::uint32_t next(std::uint32_t left) const {
+      left &= left - 1;
+      return shared ? left & (left - 1) : left;
+    }
+  };
+
+  /// Which of the triangles that are seen may meet a ball. If crossings tell sides: whether its
+  /// centre is on the other side of them than `from`, but for those where that is unclear.
+  IST_HD bool meet(const double (&from)[3], std::uint32_t triangles, const double (&x)[3], double r,
+                   const Share& share, std::uint32_t& met, std::uint32_t& unclear) const {
+    float begin[3], end[3];
+    m_.seen.seen(x, end);
+    if constexpr (Source::kCrossings) m_.seen.seen(from, begin);
+    const float radius = m_.seen.seen_radius(r);
+    bool crossed = false;
     IST_ROLLED
-    do {
-      const int k = test_ + team_.lane();
-      const int ball = k % static_cast<int>(kWidth);
-      const int triangle = k < tests_ ? k / static_cast<int>(kWidth) : 0;
-      const bool meets = k < tests_ && m_.triangles.meets(static_cast<int>(m_.staged_as[triangle]),
-                                                          m_.ball_seen[ball]);
+    for (std::uint32_t left = share.first(triangles); left != 0; left = share.next(left)) {
+      const int k = lowest_bit(left);
+      const std::uint32_t bit = left & (~left + 1);
+      const SeenFrom to = m_.seen.from(k, end);
+      if (SeenTriangles::meets(to, radius)) met |= bit;
+      if constexpr (Source::kCrossings) {
+        const Crossing crossing = SeenTriangles::crosses(m_.seen.from(k, begin), to);
+        crossed = crossed != (crossing == Crossing::yes);
+        if (crossing == Crossing::unclear) unclear |= bit;
+      }
+    }
+    return crossed;
+  }
+
+  /// Whether something that meets is to be listed.
+  IST_HD bool lists() const { return lists_; }
+
+  /// Lists a triangle a ball; drain() has left room for it.
+  IST_HD void list() {
+    bool more = false;
+    for (int i = 0; i < kItemsALane; ++i) {
+      const bool meets = met_[i] != 0;
       int total = 0;
       const int place = near_ + team_.exclusive_count(meets, total);
-      if (meets)
-        m_.near[place] = {static_cast<std::uint32_t>(tested_ * static_cast<int>(kWidth) + ball),
-                          m_.staged[triangle]};
       near_ += total;
-      test_ += Team::kWidth;
-    } while (tests() && near_ < Team::kWidth);
+      if (meets) {
+        const int ball = two_ ? item(i) : item(i) % static_cast<int>(kWidth);
+        m_.near[place] = {m_.held_as[ball], m_.id[lowest_bit(met_[i])]};
+        met_[i] &= met_[i] - 1;
+      }
+      more = more || met_[i] != 0;
+    }
+    lists_ = team_.any(more);
     team_.sync();
   }
 
@@ -232,26 +266,20 @@ class DiscSums {
   /// Sums what is held: nothing is listed any more.
   IST_HD void finish() {
     team_.sync();
-    for (int ball = 0; ball < held_ * static_cast<int>(kWidth); ball += Team::kWidth) {
-      bool on_edge = m_.on_edge[ball + team_.lane()] != 0 &&
-                     ball + team_.lane() < held_ * static_cast<int>(kWidth);
-      for (;;) {
+    IST_ROLLED
+    for (int base = 0; base < held_; base += Team::kWidth) {
+      const int ball = base + team_.lane();
+      bool on_edge = ball < held_ && m_.on_edge[ball] != 0;
+      while (team_.any(on_edge)) {
         int total = 0;
         const int lane = team_.first(on_edge, total);
-        if (total == 0) break;
-        put_right(team_, m_, source_, ball + lane);
+        put_right(team_, m_, source_, base + lane);
         if (lane == team_.lane()) on_edge = false;
       }
-    }
-    source_.ready_sides(team_, m_, held_);
-    IST_ROLLED
-    for (int base = 0; base < held_ * static_cast<int>(kWidth); base += Team::kWidth) {
-      const int ball = base + team_.lane();
-      const bool there = ball < held_ * static_cast<int>(kWidth) && m_.r[ball] > 0;
-      const double angle = there ? m_.angle[ball] : 0;
+      if (ball >= held_) continue;
+      const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]}, angle = m_.angle[ball];
       const bool told = size_of(angle) > kLeastAngle;
-      const bool otherwise = source_.inside(team_, m_, ball, there && !told);
-      if (there) add_ball(ball, told ? angle < 0 : otherwise);
+      add_ball(x, m_.r[ball], told ? angle < 0 : m_.inside[ball] != 0, m_.cones[ball]);
     }
     held_ = 0;
     team_.sync();
@@ -260,18 +288,38 @@ class DiscSums {
   static constexpr double kLeastAngle = 1e-6;  ///< as query/field/probe_sum.h
 
  private:
-  /// The triangle as it was when its block met it.
+  IST_HD_COLD static bool crosses_odd(const Source source, const double (&from)[3],
+                                      const double (&x)[3], const TriangleId* ids,
+                                      std::uint32_t triangles) {
+    bool odd = false;
+    for (; triangles != 0; triangles &= triangles - 1)
+      if (source.crosses(from, x, ids[lowest_bit(triangles)])) odd = !odd;
+    return odd;
+  }
+
+  IST_HD void hold(int place, int of_item, const double (&x)[3], double r) {
+    for (int k = 0; k < 3; ++k) m_.x[k][place] = x[k];
+    m_.r[place] = r;
+    m_.cones[place] = m_.angle[place] = 0;
+    m_.on_edge[place] = 0;
+    m_.held_as[of_item] = static_cast<std::uint8_t>(place);
+  }
+
   IST_HD TrianglePlane plane_of(const BallTriangle& pair) const {
-    const HeldBlock& block = m_.block[pair.ball / kWidth];
     double c[3][3];
-    source_.corners(pair.triangle, block.centre, block.reach, c);
+    source_.corners(pair.triangle, c);
     return TrianglePlane(c);
+  }
+
+  /// From the probing tree's unit-frame origin.
+  IST_HD void from_origin(const double (&x)[3], double (&at)[3]) const {
+    for (int k = 0; k < 3; ++k) at[k] = x[k] - probe_.place.a_from_b.t[k];
   }
 
   /// What is linear in the surface: the lane's own sums.
   IST_HD void add_pull(const TrianglePlane& t, const double (&x)[3], const DiscPart& part) {
-    const double at[3] = {x[0] - origin_[0], x[1] - origin_[1], x[2] - origin_[2]};
-    double push[3], shift[3];
+    double at[3], push[3], shift[3];
+    from_origin(x, at);
     for (int k = 0; k < 3; ++k) {
       push[k] = -t.n[k] * part.area;
       shift[k] = -t.n[k] * (0.5 * part.second);
@@ -301,7 +349,7 @@ class DiscSums {
     team_.sync();
   }
 
-  /// Cones and angle of a ball whose centre lies on an edge, from beside it: put_right()
+  /// Cones, angle and side of a ball whose centre lies on an edge, from beside it: put_right()
   /// (query/probe/patch_sums.h).
   IST_HD_COLD static void put_right(const Team team, DiscMemory& m, const Source source, int ball) {
     const double r = m.r[ball];
@@ -312,8 +360,9 @@ class DiscSums {
     source.each_near(team, x, r * (1 + kMoved), [&](bool there, const TriangleId& id) {
       if (!there) return;
       double c[3][3];
-      source.corners(id, x, r * (1 + kMoved), c);
+      source.corners(id, c);
       const TrianglePlane t(c);
+      if (t.flat) return;
       const DiscPart here = Disc(t, x, r).part(), beside = Disc(t, moved, r).part();
       for (int k = 0; k < 3; ++k) pull[k] += t.n[k] * (here.area + beside.area);
       cones += beside.cones;
@@ -323,34 +372,48 @@ class DiscSums {
     for (int k = 0; k < 3; ++k) change += 0.5 * team.sum(pull[k]) * (DiscMemory::away(k) * r);
     cones = team.sum(cones);
     angle = team.sum(angle);
+    const bool inside = source.inside(team, team.lane() == 0, moved);
     if (team.lane() == 0) {
       m.cones[ball] = cones + change;
       m.angle[ball] = angle;
+      m.inside[ball] = inside ? 1 : 0;
     }
     team.sync();
   }
 
-  IST_HD void add_ball(int ball, bool inside) {
-    const double r = m_.r[ball], cones = m_.cones[ball];
+  IST_HD void add_settled(const double (&x)[3], const PartInside& part) {
+    if (!(part.volume > 0)) return;
+    double at[3];
+    from_origin(x, at);
+    sums_.add(at, part.volume, part.gradient, part.moment);
+    ++sums_.spheres;
+  }
+
+  IST_HD void add_ball(const double (&x)[3], double r, bool inside, double cones) {
     const double whole = 4 * kPi / 3 * (r * r * r);
     const double part = (inside ? whole : 0) + cones;
     const double volume = part < 0 ? 0 : part > whole ? whole : part;
-    const double at[3] = {m_.x[0][ball] - origin_[0], m_.x[1][ball] - origin_[1],
-                          m_.x[2][ball] - origin_[2]};
     const double none[3] = {0, 0, 0};
+    double at[3];
+    from_origin(x, at);
     sums_.add(at, volume, none, none);
     sums_.spheres += inside && cones == 0 ? 1 : 0;
   }
 
+  static constexpr int kItemsALane = kItems / Team::kWidth;
+  IST_HD int item(int i) const { return i * Team::kWidth + team_.lane(); }
+
   const Team& team_;
+  const ProbeMemory& probe_;
   DiscMemory& m_;
   const Source source_;
   PartSums& sums_;
-  double origin_[3];          ///< of the probing tree
-  int held_ = 0;              ///< blocks
-  int tested_ = 0;            ///< the block that is
-  int test_ = 0, tests_ = 0;  ///< made, and to be made
-  int near_ = 0, cut_ = 0;    ///< listed
+  int held_ = 0;                    ///< balls
+  std::uint32_t met_[kItemsALane];  ///< triangles that meet an item's ball and wait to be listed
+  bool two_ = false, first_ = false, last_ = false;  ///< of what is tested
+  bool tests_ = false, lists_ = false;               ///< something waits
+  std::uint32_t odd_ = 0;   ///< balls that lie on the other side of what is known
+  int near_ = 0, cut_ = 0;  ///< listed
 };
 
 }  // namespace ist::gpu

@@ -12,16 +12,20 @@
 namespace ist::gpu {
 
 struct FacetMemory : WalkMemory {
+  double whole[4];  ///< ball around the probing tree, the field's frame
   DiscMemory discs;
 };
 
 /// The triangles of a box or a terrain (DiscSums).
 class FacetSource {
  public:
-  IST_HD explicit FacetSource(const FieldRef& field) : field_(field) {}
+  static constexpr bool kCrossings = false;
 
-  IST_HD void corners(const TriangleId& id, const double (&x)[3], double reach,
-                      double (&c)[3][3]) const {
+  /// `whole`: a ball around all that is asked for.
+  IST_HD FacetSource(const FieldRef& field, const double (&whole)[4])
+      : field_(field), whole_(whole) {}
+
+  IST_HD void corners(const TriangleId& id, double (&c)[3][3]) const {
     if (field_.kind == FieldKind::box) {
       // Corners of the faces, counter-clockwise from outside, four bits each.
       constexpr std::uint32_t kFaces[6] = {0x2640, 0x5731, 0x4510, 0x3762, 0x1320, 0x6754};
@@ -35,9 +39,9 @@ class FacetSource {
     }
     const std::int64_t i = std::int64_t{id.a} - 1, j = std::int64_t{id.b / 2} - 1;
     const bool second = id.b % 2 != 0;
-    grid_point(i, j, x, reach, c[0]);
-    grid_point(i + 1, second ? j + 1 : j, x, reach, c[1]);
-    grid_point(second ? i : i + 1, j + 1, x, reach, c[2]);
+    grid_point(i, j, c[0]);
+    grid_point(i + 1, second ? j + 1 : j, c[1]);
+    grid_point(second ? i : i + 1, j + 1, c[2]);
   }
 
   /// The triangles that may come near a ball, by number.
@@ -85,16 +89,36 @@ class FacetSource {
   }
 
   template <class Team>
-  IST_HD void ready_sides(const Team&, DiscMemory&, int) const {}
-
-  template <class Team>
-  IST_HD bool inside(const Team&, const DiscMemory& m, int ball, bool wanted) const {
+  IST_HD bool inside(const Team&, bool wanted, const double (&x)[3]) const {
     if (!wanted) return false;
-    double x[3];
-    m.seen(ball, x);
     if (field_.kind == FieldKind::height) return x[2] < surface(x[0], x[1]);
     return size_of(x[0]) < field_.box.half[0] && size_of(x[1]) < field_.box.half[1] &&
            size_of(x[2]) < field_.box.half[2];
+  }
+
+  /// A ball that comes near one face of a box, or none, needs no triangles.
+  IST_HD bool settles(const double (&x)[3], double r, PartInside& part) const {
+    if (field_.kind != FieldKind::box) return false;
+    const double(&half)[3] = field_.box.half;
+    int faces = 0, axis = 0;
+    double side = 1;
+    for (int k = 0; k < 3; ++k) {
+      for (int s = 1; s >= -1; s -= 2) {
+        if (half[k] - s * x[k] >= r) continue;
+        ++faces;
+        axis = k;
+        side = s;
+      }
+    }
+    if (faces > 1) return false;
+    DistanceLook at = {r, {0, 0, 0}};
+    for (int k = 0; k < 3; ++k) {
+      if (faces == 0 || k != axis) continue;
+      at.distance = half[k] - side * x[k];
+      at.gradient[k] = -side;
+    }
+    part = flat_part(at, r);
+    return true;
   }
 
  private:
@@ -107,15 +131,17 @@ class FacetSource {
         f.heights[static_cast<std::uint64_t>(j) * f.columns + static_cast<std::uint64_t>(i)]);
   }
 
-  /// The cells at the border reach as far as the ball does.
-  IST_HD void grid_point(std::int64_t i, std::int64_t j, const double (&x)[3], double reach,
-                         double (&p)[3]) const {
+  /// The cells at the border reach as far as the balls do.
+  IST_HD void grid_point(std::int64_t i, std::int64_t j, double (&p)[3]) const {
     const HeightRef& f = field_.height;
     const std::int64_t n[2] = {i, j};
+    const double reach = 2 * whole_[3];
     for (int k = 0; k < 2; ++k) {
       const std::int64_t last = std::int64_t{k == 0 ? f.columns : f.rows} - 1;
       const double at = static_cast<double>(n[k]) * f.spacing[k];
-      p[k] = n[k] < 0 ? least(at, x[k] - 2 * reach) : n[k] > last ? most(at, x[k] + 2 * reach) : at;
+      p[k] = n[k] < 0      ? least(at, whole_[k] - reach)
+             : n[k] > last ? most(at, whole_[k] + reach)
+                           : at;
     }
     p[2] = height(i, j);
   }
@@ -134,18 +160,30 @@ class FacetSource {
   }
 
   const FieldRef& field_;
+  const double (&whole_)[4];
 };
 
 /// The parts of leaf blocks inside a box or a terrain.
 template <class Team>
 class FacetSums {
  public:
+  /// `memory` holds the tree and its place.
   IST_HD FacetSums(const Team& team, FacetMemory& memory, PartSums& sums)
       : team_(team),
         m_(memory),
         sums_(sums),
-        source_(memory.field),
-        discs_(team, memory.discs, source_, memory.place.a_from_b.t, sums) {}
+        source_(memory.field, memory.whole),
+        discs_(team, memory, memory.discs, source_, sums) {
+    const double centre[3] = {m_.tree.root[0], m_.tree.root[1], m_.tree.root[2]};
+    double whole[3];
+    m_.place.a_from_b.apply(centre, whole);
+    if (team_.lane() == 0) {
+      for (int k = 0; k < 3; ++k) m_.whole[k] = whole[k];
+      m_.whole[3] = m_.tree.root[3] * m_.place.a_from_b.scale;
+      m_.discs.seen.look_from(whole, m_.whole[3]);
+    }
+    team_.sync();
+  }
 
   /// Sums leaf blocks; none: what is left.
   IST_HD void add(const std::uint32_t* blocks, int have) {
@@ -157,89 +195,78 @@ class FacetSums {
         if (have == 0) return;
         rest = false;
       }
-      if (discs_.tests())
+      if (discs_.lists())
+        discs_.list();
+      else if (discs_.tests())
         discs_.test();
       else if (staged_ < near_size_)
         stage_more();
       else if (next == have)
         return;
-      else if (discs_.full())
-        rest = true;
+      else if (discs_.room())
+        begin(blocks[next++]);
       else
-        hold_block(blocks[next++]);
+        rest = true;
     }
   }
 
  private:
-  IST_HD void hold_block(std::uint32_t block) {
+  IST_HD void begin(std::uint32_t block) {
+    block_ = block;
+    first_ = true;
+    staged_ = 0;
     const NodeBall ball = m_.tree.ball(0, block);
     double centre[3];
     m_.place.a_from_b.apply(ball.centre, centre);
     const double reach = ball.r * m_.place.a_from_b.scale * (1 + 1e-12);
-    slot_ = discs_.hold(centre, reach);
-    bool facets = false;
-    for (int lane = team_.lane(); lane < static_cast<int>(kWidth); lane += Team::kWidth) {
-      double x[3], r;
-      if (!place_ball(m_, 0, block, lane, x, r) || settled(x, r)) r = 0;
-      facets = facets || r > 0;
-      discs_.set_ball(slot_, lane, x, r);
+    near_ = FacetSource::Near(m_.field, centre, reach);
+    near_size_ = near_.size();
+    if (m_.field.kind == FieldKind::box) return;
+    if (team_.lane() == 0) m_.discs.seen.look_from(centre, reach);
+    team_.sync();
+  }
+
+  /// Readies the block's test against the next of the triangles that may come near it.
+  IST_HD void stage_more() {
+    std::uint32_t near = 0;
+    for (int i = 0; i < kItemsALane; ++i) {
+      const int place = i * Team::kWidth + team_.lane();
+      const std::uint64_t k = staged_ + static_cast<std::uint64_t>(place);
+      bool comes = k < near_size_;
+      if (comes && !seen_) {
+        const TriangleId id = near_[k];
+        double c[3][3];
+        source_.corners(id, c);
+        m_.discs.id[place] = id;
+        m_.discs.seen.see(place, c);
+        comes = m_.field.kind == FieldKind::box ||
+                SeenTriangles::meets(m_.discs.seen.from_centre(place), 1 + kSeenRoom);
+      }
+      near |= team_.ballot(comes) << (i * Team::kWidth);
+    }
+    seen_ = m_.field.kind == FieldKind::box;
+    staged_ += kSeen;
+    for (int half = team_.lane(); half < 2; half += Team::kWidth) {
+      m_.discs.tested[half].block = block_;
+      m_.discs.tested[half].triangles = near;
     }
     team_.sync();
-    near_ = FacetSource::Near(m_.field, centre, reach * (1 + kMoved));
-    near_size_ = team_.any(facets) ? near_.size() : 0;
-    staged_ = 0;
+    discs_.stage(false, first_, staged_ >= near_size_);
+    first_ = false;
   }
 
-  /// Stages the next of the triangles that may come near the block.
-  IST_HD void stage_more() {
-    discs_.stage_near(slot_, [&](int k, TriangleId& id) {
-      const std::uint64_t i = staged_ + static_cast<std::uint64_t>(k);
-      if (i >= near_size_) return false;
-      id = near_[i];
-      return true;
-    });
-    staged_ += kStaged;
-  }
-
-  /// Sums what needs no triangles: a ball that comes near one face of a box, or none.
-  IST_HD bool settled(const double (&x)[3], double r) {
-    if (m_.field.kind != FieldKind::box) return false;
-    const double(&half)[3] = m_.field.box.half;
-    int faces = 0, axis = 0;
-    double side = 1;
-    for (int k = 0; k < 3; ++k) {
-      for (int s = 1; s >= -1; s -= 2) {
-        if (half[k] - s * x[k] >= r) continue;
-        ++faces;
-        axis = k;
-        side = s;
-      }
-    }
-    if (faces > 1) return false;
-    DistanceLook at = {r, {0, 0, 0}};
-    for (int k = 0; k < 3; ++k) {
-      if (faces == 0 || k != axis) continue;
-      at.distance = half[k] - side * x[k];
-      at.gradient[k] = -side;
-    }
-    const PartInside part = flat_part(at, r);
-    const double* const t = m_.place.a_from_b.t;
-    const double from[3] = {x[0] - t[0], x[1] - t[1], x[2] - t[2]};
-    if (part.volume > 0) {
-      sums_.add(from, part.volume, part.gradient, part.moment);
-      ++sums_.spheres;
-    }
-    return true;
-  }
+  static constexpr int kItemsALane = kItems / Team::kWidth;
 
   const Team& team_;
   FacetMemory& m_;
   PartSums& sums_;
   FacetSource source_;
   DiscSums<Team, FacetSource> discs_;
-  int slot_ = 0;                              ///< the block in work
+  std::uint32_t block_ = 0;                   ///< in work
+  bool first_ = false;                        ///< it has not been tested
+  bool seen_ = false;                         ///< the triangles of a box are, for all blocks
   FacetSource::Near near_;                    ///< triangles that may come near it
-  std::uint64_t near_size_ = 0, staged_ = 0;  ///< how many, and how many were staged
+  std::uint64_t near_size_ = 0, staged_ = 0;  ///< how many, and how many were tested
 };
 
 }  // namespace ist::gpu

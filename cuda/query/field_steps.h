@@ -8,7 +8,8 @@
 #include "numerics/host_device.h"
 #include "numerics/team.h"
 
-// A batch of fields and trees, step by step, as batch_steps.h has it of trees. All is in double.
+// A batch of fields and trees, step by step, as batch_steps.h has it of trees. What is summed is
+// in double.
 
 namespace ist::gpu {
 

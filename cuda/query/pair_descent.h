@@ -251,6 +251,7 @@ class PairDescent {
     met_ += static_cast<std::uint32_t>(have);
     IST_ROLLED
     for (int first = 0; first < have; first += kPairsAtOnce) meet_two(first, have);
+    team_.sync();  // what was readied has been read
   }
 
   IST_HD void ready_meeting(int k, std::uint32_t leaf_a, std::uint32_t leaf_b) {
@@ -346,6 +347,7 @@ class PairDescent {
       if (listed_ < Team::kWidth) continue;
       team_.sync();
       sum_list(Team::kWidth);
+      team_.sync();
     }
     team_.sync();
   }

@@ -1,75 +1,135 @@
 #pragma once
 
+#include <cmath>
+#include <cstdint>
+
 #include "cuda/query/disc_part.h"
 #include "numerics/host_device.h"
 
 namespace ist::gpu {
 
-constexpr int kStaged = 32;  ///< triangles looked at together
+constexpr int kSeen = 32;  ///< triangles looked at together, a bit each
 
-/// A ball as triangles near a point are seen: in floats, lengths being parts of a reach about it.
-struct SeenBall {
-  float at[3], r;
+/// Lengths are off by less than this part of the reach in which triangles are seen.
+constexpr float kSeenRoom = 1e-5f;
+
+/// How a point lies to a triangle: over its plane, and over its edges in that, positive within.
+struct SeenFrom {
+  float height, edge[3];
 };
 
-/// Triangles as balls near a point see them, likewise.
+enum class Crossing { no, yes, unclear };
+
+/// Triangles as they are seen near a point: in floats, lengths being parts of a reach about it.
 struct SeenTriangles {
-  static constexpr int kNumbers = 14;
-  float plane[kNumbers][kStaged];
+  struct alignas(16) Plane {
+    float n[3], at_centre;
+  };
+  double centre[3], per;  ///< 1 / reach
+  Plane plane[kSeen][4];  ///< of the triangle, and through its edges
 
-  /// False if the triangle does not come within the reach of the point; no ball meets it then.
-  /// `c`: its corners.
-  IST_HD bool see(int place, const double (&c)[3][3], const double (&centre)[3], double reach) {
-    const TrianglePlane t(c);
-    double height, x, y;
-    t.feet(centre, height, x, y);
-    if (!(size_of(height) < reach && x > t.left - reach && x < t.right + reach && y > -reach &&
-          y < t.top + reach)) {
-      for (int k = 0; k < kNumbers; ++k) plane[k][place] = 0;
-      plane[9][place] = kFar;
-      return false;
-    }
-    const double per = 1 / reach;
-    for (int k = 0; k < 3; ++k) {
-      plane[k][place] = static_cast<float>(t.n[k]);
-      plane[3 + k][place] = static_cast<float>(t.u[k]);
-      plane[6 + k][place] = static_cast<float>(t.v[k]);
-    }
-    plane[9][place] = static_cast<float>(height * per);
-    plane[10][place] = bounded((x - t.left) * per);
-    plane[11][place] = bounded((t.right - x) * per);
-    plane[12][place] = bounded(y * per);
-    plane[13][place] = bounded((t.top - y) * per);
-    return true;
+  /// From where triangles are seen, before any is.
+  IST_HD void look_from(const double (&x)[3], double reach) {
+    for (int k = 0; k < 3; ++k) centre[k] = x[k];
+    per = 1 / reach;
   }
 
-  /// A ball that lies within the reach; of radius 0 none, which meets nothing.
-  IST_HD static SeenBall ball(const double (&x)[3], double radius, const double (&centre)[3],
-                              double reach) {
-    constexpr float kRoom = 1e-5f;
-    const double per = 1 / reach;
-    SeenBall ball;
-    for (int k = 0; k < 3; ++k) ball.at[k] = static_cast<float>((x[k] - centre[k]) * per);
-    ball.r = radius > 0 ? static_cast<float>(radius * per) * (1 + kRoom) + kRoom : -kFar;
-    return ball;
+  IST_HD void see(int place, const double (&c)[3][3]) {
+    double corner[3][3], edge[3][3], length2[3], far2 = 1, diagonal[3], n[3];
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        corner[i][k] = (c[i][k] - centre[k]) * per;
+        edge[i][k] = c[i == 2 ? 0 : i + 1][k] - c[i][k];
+      }
+      length2[i] = dot(edge[i], edge[i]);
+      far2 = most(far2, dot(corner[i], corner[i]));
+    }
+    for (int k = 0; k < 3; ++k) diagonal[k] = c[2][k] - c[0][k];
+    cross(edge[0], diagonal, n);  // as TrianglePlane
+    const double n2 = dot(n, n);
+    // Of one that is too small nothing is clear, or so thin that rounding may turn its plane by
+    // more than goes unseen where it comes near.
+    constexpr double kTurn = 0x1p-50, kUnseen = kSeenRoom / 4;
+    const bool clear = n2 * (kUnseen * kUnseen) >
+                           (kTurn * kTurn) * (length2[0] * dot(diagonal, diagonal)) * far2 &&
+                       n2 > kSmallest &&
+                       least(least(length2[0], length2[1]), length2[2]) > kSmallest;
+    const double per_n = clear ? inverse_root(n2) : 0;
+    for (double& x : n) x *= per_n;
+    plane[place][0] = plane_through(corner[0], n);
+    if (!(n2 > 0)) plane[place][0].at_centre = kFar;  // it is flat: nothing meets it
+    for (int i = 0; i < 3; ++i) {
+      double inwards[3];
+      cross(n, edge[i], inwards);
+      const double per_length = clear ? inverse_root(length2[i]) : 0;
+      for (double& x : inwards) x *= per_length;
+      plane[place][i + 1] = plane_through(corner[i], inwards);
+    }
   }
 
-  /// Whether a triangle may meet a ball.
-  IST_HD bool meets(int triangle, const SeenBall& ball) const {
-    const auto along = [&](int axis) {
-      return (ball.at[0] * plane[axis][triangle] + ball.at[1] * plane[axis + 1][triangle]) +
-             ball.at[2] * plane[axis + 2][triangle];
-    };
-    const float r = ball.r;
-    const float height = plane[9][triangle] + along(0), u = along(3), v = along(6);
-    return height < r && -height < r && plane[10][triangle] + u > -r &&
-           plane[11][triangle] - u > -r && plane[12][triangle] + v > -r &&
-           plane[13][triangle] - v > -r;
+  /// A point, or a length, as it is seen.
+  IST_HD void seen(const double (&x)[3], float (&p)[3]) const {
+    for (int k = 0; k < 3; ++k) p[k] = static_cast<float>((x[k] - centre[k]) * per);
+  }
+  IST_HD float seen_radius(double r) const {
+    return static_cast<float>(r * per) * (1 + kSeenRoom) + kSeenRoom;
+  }
+
+  IST_HD SeenFrom from(int triangle, const float (&p)[3]) const {
+    const Plane(&planes)[4] = plane[triangle];
+    return {over(planes[0], p), {over(planes[1], p), over(planes[2], p), over(planes[3], p)}};
+  }
+  IST_HD SeenFrom from_centre(int triangle) const {
+    const Plane(&planes)[4] = plane[triangle];
+    return {planes[0].at_centre, {planes[1].at_centre, planes[2].at_centre, planes[3].at_centre}};
+  }
+
+  /// Whether a triangle may meet a ball of that radius.
+  IST_HD static bool meets(const SeenFrom& at, float r) {
+    return at.height < r && -at.height < r && at.edge[0] > -r && at.edge[1] > -r && at.edge[2] > -r;
+  }
+
+  /// Whether the way from one point to another goes through the triangle.
+  IST_HD static Crossing crosses(const SeenFrom& a, const SeenFrom& b) {
+    const float ha = a.height < 0 ? -a.height : a.height, hb = b.height < 0 ? -b.height : b.height;
+    const bool clear = ha > kSeenRoom && hb > kSeenRoom;
+    if (clear && (a.height > 0) == (b.height > 0)) return Crossing::no;
+    bool through = clear;
+    for (int i = 0; i < 3; ++i) {
+      const float ea = a.edge[i], eb = b.edge[i];
+      if (ea < -kSeenRoom && eb < -kSeenRoom) return Crossing::no;
+      // Where it goes through the plane, times ha + hb.
+      const float there = std::fma(ea, hb, eb * ha);
+      const float room = kSeenRoom * ((ha + hb) + ((ea < 0 ? -ea : ea) + (eb < 0 ? -eb : eb)));
+      if (clear && there < -room) return Crossing::no;
+      through = through && there > room;
+    }
+    return through ? Crossing::yes : Crossing::unclear;
   }
 
  private:
   static constexpr float kFar = 1e30f;
-  IST_HD static float bounded(double x) { return static_cast<float>(x < 1e30 ? x : 1e30); }
+  static constexpr double kSmallest = 1e-36;  ///< a float still has all its digits
+  IST_HD static float over(const Plane& plane, const float (&p)[3]) {
+    return std::fma(plane.n[0], p[0],
+                    std::fma(plane.n[1], p[1], std::fma(plane.n[2], p[2], plane.at_centre)));
+  }
+  IST_HD static Plane plane_through(const double (&x)[3], const double (&n)[3]) {
+    return {{static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])},
+            static_cast<float>(-dot(n, x))};
+  }
+  IST_HD static double dot(const double (&a)[3], const double (&b)[3]) {
+    return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+  }
+  IST_HD static void cross(const double (&a)[3], const double (&b)[3], double (&c)[3]) {
+    c[0] = a[1] * b[2] - a[2] * b[1];
+    c[1] = a[2] * b[0] - a[0] * b[2];
+    c[2] = a[0] * b[1] - a[1] * b[0];
+  }
+  /// Good to a float's digits: of a length, which scales a plane's numbers alike.
+  IST_HD static double inverse_root(double square) {
+    return static_cast<double>(1.0f / std::sqrt(static_cast<float>(square)));
+  }
 };
 
 }  // namespace ist::gpu

@@ -95,13 +95,14 @@ struct SurfaceRef {
   }
 
   /// Corners of triangle 16 · block + lane.
-  IST_HD void corners(std::uint32_t triangle, double (&c)[3][3]) const {
+  template <class Number>
+  IST_HD void corners(std::uint32_t triangle, Number (&c)[3][3]) const {
     const SurfaceBlock& b = in_global_memory(blocks)[triangle / kWidth];
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t vertex = b.corner[k][triangle % kWidth];
-      c[k][0] = static_cast<double>(b.x[vertex]);
-      c[k][1] = static_cast<double>(b.y[vertex]);
-      c[k][2] = static_cast<double>(b.z[vertex]);
+      c[k][0] = static_cast<Number>(b.x[vertex]);
+      c[k][1] = static_cast<Number>(b.y[vertex]);
+      c[k][2] = static_cast<Number>(b.z[vertex]);
     }
   }
 

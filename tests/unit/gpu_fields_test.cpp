@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
 
 #include <ist/error.h>
@@ -176,6 +178,158 @@ TEST(GpuFields, CentresOnEdges) {
   EXPECT_LE(off.push, 1e-9);
   EXPECT_LE(off.turn, 1e-9);
   EXPECT_LE(off.centre, 1e-9);
+}
+
+/// A cube of so many squares along each edge.
+TriangleMesh fine_cube(int squares) {
+  TriangleMesh mesh;
+  std::map<std::array<int, 3>, std::uint32_t> known;
+  const auto vertex = [&](std::array<int, 3> at) {
+    const auto [place, fresh] = known.emplace(at, static_cast<std::uint32_t>(mesh.vertices.size()));
+    if (fresh) mesh.vertices.emplace_back(Eigen::Vector3d(at[0], at[1], at[2]) / squares);
+    return place->second;
+  };
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int side : {0, squares})
+      for (int i = 0; i < squares; ++i)
+        for (int j = 0; j < squares; ++j) {
+          const auto corner = [&](int u, int v) {
+            std::array<int, 3> at;
+            at[static_cast<std::size_t>(axis)] = side;
+            at[static_cast<std::size_t>((axis + 1) % 3)] = i + (side > 0 ? u : v);
+            at[static_cast<std::size_t>((axis + 2) % 3)] = j + (side > 0 ? v : u);
+            return vertex(at);
+          };
+          const std::uint32_t a = corner(0, 0), b = corner(1, 0), c = corner(1, 1),
+                              d = corner(0, 1);
+          mesh.triangles.push_back({a, b, c});
+          mesh.triangles.push_back({a, c, d});
+        }
+  return mesh;
+}
+
+/// Leaves with more triangles than are tested at a time, more balls that meet them than are held,
+/// and some of these on edges: what is put right asks for the triangles again meanwhile.
+TEST(GpuFields, CentresOnEdgesOfManyTriangles) {
+  const Asset surface = baked(fine_cube(24), "cube of many triangles", 10);
+  const Asset& body = cube();
+  const std::vector<WorldSphere> balls = world_spheres({body.view(), Pose{}, 1}, Measure::matched);
+  const std::vector<Field> fields = {MeshField{surface.view()}};
+  std::vector<BatchPair> pairs;
+  for (std::size_t i = 0; i < balls.size(); i += 50) {
+    BatchPair pair;
+    const double edge[3] = {1.0 / 3, 0.25, 1};
+    for (int k = 0; k < 3; ++k) pair.pose_b.t[k] = edge[k] - balls[i].centre[k];
+    pairs.push_back(pair);
+  }
+  HostFieldBatch batch({body.view()}, fields);
+  const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 7);
+  Workspace workspace;
+  Off off;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    off.look(by_warp[i],
+             penetration(PlacedField{fields[0], {}, 1}, PlacedTree{body.view(), pairs[i].pose_b, 1},
+                         {}, workspace),
+             1);
+  EXPECT_LE(off.volume, 1e-9);
+  EXPECT_LE(off.push, 1e-9);
+  EXPECT_LE(off.turn, 1e-9);
+  EXPECT_LE(off.centre, 1e-9);
+}
+
+/// Nodes of a tree whose centres, or the points beside them from which sides are told, lie on a
+/// triangle or a corner to the last digit: which side that is must be told once, not on the way
+/// there and again on the way on.
+TEST(GpuFields, NodesOnATrianglesPlane) {
+  const Asset& body = batch_assets()[0];  // a torus of three levels
+  const std::vector<Field> fields = {MeshField{torus().view()}};
+  const gpu::FieldRef field = gpu::field_ref(fields[0], gpu::pointed_to(fields[0]).data());
+  const HostAssets assets({body.view()});
+  const gpu::AssetRef& asset = assets.refs()[0];
+  const gpu::TreeRef& tree = asset.tree[static_cast<int>(Measure::matched)];
+  RandomPairs random(23);
+  std::vector<BatchPair> pairs;
+  for (int i = 0; i < 1000; ++i) {
+    const auto node = static_cast<std::uint32_t>(random.uniform(0, 1) * tree.leaf_blocks);
+    const gpu::NodeBall ball = tree.ball(0, node);
+    double c[3][3], on[3], moved[3] = {0, 0, 0};
+    do {
+      field.mesh.corners(static_cast<std::uint32_t>(random.uniform(0, 1600)), c);
+    } while (gpu::TrianglePlane(c).flat);  // a lane without a triangle
+    const bool beside = i % 2 == 0;
+    const double u = i % 10 == 1 ? 0 : random.uniform(0, 0.5);
+    const double v = i % 10 == 1 ? 0 : random.uniform(0, 0.5);
+    if (beside) gpu::DiscMemory::move(ball.r, moved);
+    for (int k = 0; k < 3; ++k)
+      on[k] = field.frame.centre[k] +
+              field.frame.unit * ((1 - u - v) * c[0][k] + u * c[1][k] + v * c[2][k]);
+    BatchPair pair;
+    pair.scale_b = 0.1;
+    for (int k = 0; k < 3; ++k)
+      pair.pose_b.t[k] = on[k] - pair.scale_b * (asset.frame.centre[k] +
+                                                 asset.frame.unit * (ball.centre[k] + moved[k]));
+    pairs.push_back(pair);
+  }
+  HostFieldBatch batch({body.view()}, fields);
+  const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched);
+  Workspace workspace;
+  Off off;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    off.look(by_one[i],
+             penetration(PlacedField{fields[0], {}, 1},
+                         PlacedTree{body.view(), pairs[i].pose_b, pairs[i].scale_b}, {}, workspace),
+             pairs[i].scale_b);
+  EXPECT_LE(off.volume, 1e-9);
+  EXPECT_LE(off.push, 1e-9);
+  EXPECT_LE(off.turn, 1e-9);
+  EXPECT_LE(off.centre, 1e-9);
+}
+
+/// From a hair to many times the field's size, by a tree of four levels.
+TEST(GpuFields, ProbesOfAnySize) {
+  static const Asset many = baked(torus_mesh(1, 0.4, 48, 24), "torus", 4500, false);
+  const std::vector<Field> fields = {MeshField{torus().view()},
+                                     BoxField{Eigen::Vector3d(0.5, 0.4, 0.3)}};
+  HostFieldBatch batch({many.view()}, fields);
+  for (const double scale : {1e-7, 1e-5, 1e-3, 0.03, 0.1, 0.3, 3.0, 30.0}) {
+    RandomPairs random(17);
+    std::vector<BatchPair> pairs;
+    for (int i = 0; i < 40; ++i) {
+      BatchPair pair;
+      pair.a = static_cast<std::uint32_t>(i % 2);
+      pair.scale_b = scale;
+      pair.pose_b = random.pose(1);
+      const double angle = random.uniform(0, 6.3), slope = random.uniform(0, 6.3);
+      const double ring = 0.35 + 0.14 * std::cos(slope);
+      const double on[3] = {ring * std::cos(angle), ring * std::sin(angle), 0.14 * std::sin(slope)};
+      const double on_box[3] = {random.uniform(-0.5, 0.5), 0.4, random.uniform(-0.3, 0.3)};
+      for (int k = 0; k < 3; ++k)
+        pair.pose_b.t[k] = (pair.a == 0 ? on : on_box)[k] + 0.7 * scale * random.uniform(-1, 1);
+      pairs.push_back(pair);
+    }
+    const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 3);
+    const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched);
+    Workspace workspace;
+    Off off;
+    int met = 0;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const Penetration cpu =
+          penetration(PlacedField{fields[pairs[i].a], {}, 1},
+                      PlacedTree{many.view(), pairs[i].pose_b, scale}, {}, workspace);
+      off.look(by_one[i], cpu, scale);
+      off.look(by_warp[i], cpu, scale);
+      met += cpu.translation_gradient.norm() > 0 ? 1 : 0;
+    }
+    std::printf("%8g: volume %.1e push %.1e turn %.1e centroid %.1e; %d crossed\n", scale,
+                off.volume, off.push, off.turn, off.centre, met);
+    EXPECT_GE(met, 8) << scale;
+    // Where a probe is, is told in the field's digits.
+    const double allowed = std::max(1e-11, 1e-15 / scale);
+    EXPECT_LE(off.volume, allowed) << scale;
+    EXPECT_LE(off.push, allowed) << scale;
+    EXPECT_LE(off.turn, allowed) << scale;
+    EXPECT_LE(off.centre, allowed) << scale;
+  }
 }
 
 TEST(GpuFields, OracleRowsAreTheCpus) {

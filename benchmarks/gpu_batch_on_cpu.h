@@ -1,0 +1,167 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+#include <vector>
+
+#include <ist/field.h>
+#include <ist/query_tbb.h>
+
+#include "gpu_batch_scenes.h"
+#include "support/patch_columns.h"
+#include "timing.h"
+
+// The same scenes by all cores of the machine, and how far the answers differ.
+
+namespace ist::benchmark {
+
+inline std::vector<PlacedPair> placed(const Scene& scene, std::size_t count) {
+  std::vector<PlacedPair> out;
+  for (const BatchPair& pair : drawn(scene.poses, count))
+    out.push_back({{scene.a->view(), pair.pose_a, pair.scale_a},
+                   {scene.b->view(), pair.pose_b, pair.scale_b}});
+  return out;
+}
+
+inline std::vector<PlacedFieldPair> placed_in_field(const Scene& scene, std::size_t count) {
+  std::vector<PlacedFieldPair> out;
+  for (const BatchPair& pair : drawn(scene.poses, count))
+    out.push_back(
+        {{*scene.field, pair.pose_a, pair.scale_a}, {scene.b->view(), pair.pose_b, pair.scale_b}});
+  return out;
+}
+
+/// M/s by all cores; `answers` of as many.
+inline double cpu_rate(const Scene& scene, std::size_t count, std::vector<Penetration>& answers) {
+  std::vector<PlacedPair> pairs;
+  std::vector<PlacedFieldPair> in_field;
+  if (scene.field != nullptr)
+    in_field = placed_in_field(scene, count);
+  else
+    pairs = placed(scene, count);
+  PenetrationSettings settings;
+  settings.field = FieldUse::never;
+  settings.pair_budget = scene.pair_budget;
+  std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
+  answers.resize(count);
+  double best = 1e30;
+  for (int k = 0; k < 3; ++k) {
+    const double start = benchmark::wall_seconds();
+    if (scene.field != nullptr)
+      penetration_batch(in_field, settings, workspaces, answers, tbb_parallel_for());
+    else
+      penetration_batch(pairs, settings, workspaces, answers, tbb_parallel_for());
+    best = std::min(best, benchmark::wall_seconds() - start);
+  }
+  return static_cast<double>(count) / best * 1e-6;
+}
+
+/// Separations by all cores, M/s; `answers` of as many.
+inline double cpu_separation_rate(const Scene& scene, std::size_t count,
+                                  std::vector<Separation>& answers) {
+  struct Batch {
+    std::vector<PlacedPair> pairs;
+    std::vector<Workspace> workspaces;
+    std::vector<Separation>& answers;
+  };
+  answers.resize(count);
+  Batch batch{placed(scene, count), std::vector<Workspace>(std::thread::hardware_concurrency()),
+              answers};
+  const auto work = [](void* of, std::size_t worker) {
+    Batch& all = *static_cast<Batch*>(of);
+    for (std::size_t i = worker; i < all.pairs.size(); i += all.workspaces.size())
+      all.answers[i] = separation(all.pairs[i].a, all.pairs[i].b, {}, all.workspaces[worker]);
+  };
+  const ParallelFor threads = tbb_parallel_for();
+  double best = 1e30;
+  for (int k = 0; k < 3; ++k) {
+    const double start = benchmark::wall_seconds();
+    threads.run(threads.pool, batch.workspaces.size(), work, &batch);
+    best = std::min(best, benchmark::wall_seconds() - start);
+  }
+  return static_cast<double>(count) / best * 1e-6;
+}
+
+/// Contact patches by all cores.
+struct CpuPatches {
+  double rate = 0;  ///< M/s
+  std::vector<ContactPatches> answers;
+  std::vector<ContactPatch> patches;  ///< as many a pair
+
+  CpuPatches(const Scene& scene, std::size_t count, std::uint32_t most)
+      : answers(count), patches(count * most) {
+    const std::vector<PlacedPair> pairs = placed(scene, count);
+    ContactSettings settings;
+    settings.field = FieldUse::never;
+    std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
+    double best = 1e30;
+    for (int k = 0; k < 3; ++k) {
+      const double start = benchmark::wall_seconds();
+      contact_patches_batch(pairs, settings, workspaces, answers, patches, tbb_parallel_for());
+      best = std::min(best, benchmark::wall_seconds() - start);
+    }
+    rate = static_cast<double>(count) / best * 1e-6;
+  }
+};
+
+/// What contacts differ by from the CPU's.
+struct PatchDifference {
+  double of_other_regions = 0;  ///< part of the pairs
+  double volume = 0;            ///< largest of a patch, relative
+  double patches = 0;           ///< mean of a pair
+};
+
+inline PatchDifference difference(const std::vector<testing::PatchedPair>& gpu,
+                                  const CpuPatches& cpu, std::uint32_t most) {
+  PatchDifference out;
+  const auto pairs = static_cast<double>(cpu.answers.size());
+  for (std::size_t i = 0; i < cpu.answers.size(); ++i) {
+    const ContactPatch* const from = cpu.patches.data() + i * most;
+    const std::vector<ContactPatch>& found = gpu[i].patches;
+    out.patches += static_cast<double>(found.size()) / pairs;
+    if (!std::equal(found.begin(), found.end(), from, from + cpu.answers[i].count,
+                    [](const auto& x, const auto& y) { return x.id == y.id; })) {
+      out.of_other_regions += 1 / pairs;
+      continue;
+    }
+    for (std::size_t k = 0; k < found.size(); ++k)
+      out.volume = std::max(out.volume, std::abs(found[k].volume / from[k].volume - 1));
+  }
+  return out;
+}
+
+/// The largest difference to the CPU's volumes, relative.
+inline double worst_volume(const std::vector<Penetration>& gpu,
+                           const std::vector<Penetration>& cpu) {
+  double worst = 0;
+  for (std::size_t i = 0; i < cpu.size(); ++i) {
+    if (cpu[i].volume == 0 && gpu[i].volume == 0) continue;
+    worst = std::max(
+        worst, std::abs(gpu[i].volume - cpu[i].volume) / std::max(cpu[i].volume, gpu[i].volume));
+  }
+  return worst;
+}
+
+/// What separations differ by from the CPU's.
+struct SeparationDifference {
+  double distance = 0;    ///< largest, relative
+  double visits = 0;      ///< mean, on the GPU
+  bool certified = true;  ///< no lower end is less than the CPU's, nor is one above the distance
+};
+
+inline SeparationDifference difference(const std::vector<Separation>& gpu,
+                                       const std::vector<Separation>& cpu) {
+  SeparationDifference out;
+  for (std::size_t i = 0; i < cpu.size(); ++i) {
+    out.visits += gpu[i].node_visits / static_cast<double>(cpu.size());
+    const double most = std::max(cpu[i].distance, gpu[i].distance);
+    if (most > 0)
+      out.distance = std::max(out.distance, std::abs(gpu[i].distance - cpu[i].distance) / most);
+    out.certified = out.certified && gpu[i].distance_min >= cpu[i].distance_min - 1e-12 * most &&
+                    gpu[i].distance_min <= gpu[i].distance_max;
+  }
+  return out;
+}
+
+}  // namespace ist::benchmark
