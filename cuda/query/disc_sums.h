@@ -76,14 +76,11 @@ static_assert(kHeldBalls <= kNotHeld);
 ///   each_near(team, x, reach, visit): visit(there, id) by all lanes for all triangles near a ball
 ///   inside(team, wanted, x): whether a lane's point is inside
 ///
-/// Blocks are tested against triangles, what meets is listed and drained, a round at a time by a
-/// loop of the caller's, so that each step is in a kernel's code once:
+/// Blocks are staged, tested against triangles, what meets is listed and drained, a round at a time
+/// by a loop of the caller's, so that each step is in a kernel's code once:
 ///
-///   if (drain(rest)) continue;
-///   if (rest) finish();  // and go on to what comes next
-///   if (lists()) list();
-///   else if (tests()) test();
-///   else …  // go on to stage() where there is room() for a first test, or set `rest`
+///   if (step(rest)) continue;
+///   if (rest) finish(); else …  // stage() where there is room() for a first test, or set `rest`
 ///
 /// finish() may ask the source for what comes near a ball: nothing is to wait in its room then.
 template <class Team, class Source>
@@ -106,8 +103,81 @@ class DiscSums {
     last_ = last;
     tests_ = true;
   }
-  IST_HD bool tests() const { return tests_; }
 
+  /// Goes on with what is staged and listed; false where nothing is left. What is less than a
+  /// team's worth waits for more, or for the `rest`.
+  IST_HD bool step(bool rest) {
+    if (drain(rest)) return true;
+    if (rest || (!lists_ && !tests_)) return false;
+    if (lists_)
+      list();
+    else
+      test();
+    return true;
+  }
+
+  /// What an item takes of triangles: all, or every other as the other half does the rest.
+  struct Share {
+    bool shared, second;
+    IST_HD Share(int item, bool shared)
+        : shared(shared), second(shared && item >= static_cast<int>(kWidth)) {}
+    IST_HD std::uint32_t first(std::uint32_t of) const { return second ? of & (of - 1) : of; }
+    IST_HD std::uint32_t next(std::uint32_t left) const {
+      left &= left - 1;
+      return shared ? left & (left - 1) : left;
+    }
+  };
+
+  /// Which of the triangles that are seen may meet a ball. If crossings tell sides: whether its
+  /// centre is on the other side of them than `from`, but for those where that is unclear.
+  IST_HD bool meet(const double (&from)[3], std::uint32_t triangles, const double (&x)[3], double r,
+                   const Share& share, std::uint32_t& met, std::uint32_t& unclear) const {
+    float begin[3], end[3];
+    m_.seen.seen(x, end);
+    if constexpr (Source::kCrossings) m_.seen.seen(from, begin);
+    const float radius = m_.seen.seen_radius(r);
+    bool crossed = false;
+    IST_ROLLED
+    for (std::uint32_t left = share.first(triangles); left != 0; left = share.next(left)) {
+      const int k = lowest_bit(left);
+      const std::uint32_t bit = left & (~left + 1);
+      const SeenFrom to = m_.seen.from(k, end);
+      if (SeenTriangles::meets(to, radius)) met |= bit;
+      if constexpr (Source::kCrossings) {
+        const Crossing crossing = SeenTriangles::crosses(m_.seen.from(k, begin), to);
+        crossed = crossed != (crossing == Crossing::yes);
+        if (crossing == Crossing::unclear) unclear |= bit;
+      }
+    }
+    return crossed;
+  }
+
+  /// Sums what is held: nothing is listed any more.
+  IST_HD void finish() {
+    team_.sync();
+    IST_ROLLED
+    for (int base = 0; base < held_; base += Team::kWidth) {
+      const int ball = base + team_.lane();
+      bool on_edge = ball < held_ && m_.on_edge[ball] != 0;
+      while (team_.any(on_edge)) {
+        int total = 0;
+        const int lane = team_.first(on_edge, total);
+        put_right(team_, m_, source_, base + lane);
+        if (lane == team_.lane()) on_edge = false;
+      }
+      if (ball >= held_) continue;
+      const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]}, angle = m_.angle[ball];
+      const bool told = size_of(angle) > kLeastAngle;
+      add_ball(x, m_.r[ball], told ? angle < 0 : m_.inside[ball] != 0, m_.cones[ball]);
+    }
+    held_ = 0;
+    team_.sync();
+  }
+
+  static constexpr double kLeastAngle = 1e-6;  ///< as query/field/probe_sum.h
+
+ private:
+  /// Tests what is staged.
   IST_HD void test() {
     tests_ = false;
     double x[kItemsALane][3], r[kItemsALane];
@@ -167,45 +237,6 @@ class DiscSums {
     team_.sync();
   }
 
-  /// What an item takes of triangles: all, or every other as the other half does the rest.
-  struct Share {
-    bool shared, second;
-    IST_HD Share(int item, bool shared)
-        : shared(shared), second(shared && item >= static_cast<int>(kWidth)) {}
-    IST_HD std::uint32_t first(std::uint32_t of) const { return second ? of & (of - 1) : of; }
-    IST_HD std::uint32_t next(std::uint32_t left) const {
-      left &= left - 1;
-      return shared ? left & (left - 1) : left;
-    }
-  };
-
-  /// Which of the triangles that are seen may meet a ball. If crossings tell sides: whether its
-  /// centre is on the other side of them than `from`, but for those where that is unclear.
-  IST_HD bool meet(const double (&from)[3], std::uint32_t triangles, const double (&x)[3], double r,
-                   const Share& share, std::uint32_t& met, std::uint32_t& unclear) const {
-    float begin[3], end[3];
-    m_.seen.seen(x, end);
-    if constexpr (Source::kCrossings) m_.seen.seen(from, begin);
-    const float radius = m_.seen.seen_radius(r);
-    bool crossed = false;
-    IST_ROLLED
-    for (std::uint32_t left = share.first(triangles); left != 0; left = share.next(left)) {
-      const int k = lowest_bit(left);
-      const std::uint32_t bit = left & (~left + 1);
-      const SeenFrom to = m_.seen.from(k, end);
-      if (SeenTriangles::meets(to, radius)) met |= bit;
-      if constexpr (Source::kCrossings) {
-        const Crossing crossing = SeenTriangles::crosses(m_.seen.from(k, begin), to);
-        crossed = crossed != (crossing == Crossing::yes);
-        if (crossing == Crossing::unclear) unclear |= bit;
-      }
-    }
-    return crossed;
-  }
-
-  /// Whether something that meets is to be listed.
-  IST_HD bool lists() const { return lists_; }
-
   /// Lists a triangle a ball; drain() has left room for it.
   IST_HD void list() {
     bool more = false;
@@ -263,31 +294,6 @@ class DiscSums {
     return true;
   }
 
-  /// Sums what is held: nothing is listed any more.
-  IST_HD void finish() {
-    team_.sync();
-    IST_ROLLED
-    for (int base = 0; base < held_; base += Team::kWidth) {
-      const int ball = base + team_.lane();
-      bool on_edge = ball < held_ && m_.on_edge[ball] != 0;
-      while (team_.any(on_edge)) {
-        int total = 0;
-        const int lane = team_.first(on_edge, total);
-        put_right(team_, m_, source_, base + lane);
-        if (lane == team_.lane()) on_edge = false;
-      }
-      if (ball >= held_) continue;
-      const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]}, angle = m_.angle[ball];
-      const bool told = size_of(angle) > kLeastAngle;
-      add_ball(x, m_.r[ball], told ? angle < 0 : m_.inside[ball] != 0, m_.cones[ball]);
-    }
-    held_ = 0;
-    team_.sync();
-  }
-
-  static constexpr double kLeastAngle = 1e-6;  ///< as query/field/probe_sum.h
-
- private:
   IST_HD_COLD static bool crosses_odd(const Source source, const double (&from)[3],
                                       const double (&x)[3], const TriangleId* ids,
                                       std::uint32_t triangles) {

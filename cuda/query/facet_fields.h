@@ -189,24 +189,20 @@ class FacetSums {
   IST_HD void add(const std::uint32_t* blocks, int have) {
     bool rest = have == 0;
     for (int next = 0;;) {
-      if (discs_.drain(rest)) continue;
+      if (discs_.step(rest)) continue;
       if (rest) {
         discs_.finish();
         if (have == 0) return;
         rest = false;
-      }
-      if (discs_.lists())
-        discs_.list();
-      else if (discs_.tests())
-        discs_.test();
-      else if (staged_ < near_size_)
+      } else if (staged_ < near_size_) {
         stage_more();
-      else if (next == have)
+      } else if (next == have) {
         return;
-      else if (discs_.room())
+      } else if (discs_.room()) {
         begin(blocks[next++]);
-      else
+      } else {
         rest = true;
+      }
     }
   }
 

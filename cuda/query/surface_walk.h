@@ -66,22 +66,18 @@ class SurfaceWalk {
     begin_root();
     bool more = true, rest = false;
     for (;;) {
-      if (discs_.drain(rest)) continue;
+      if (discs_.step(rest)) continue;
       if (rest) {
         discs_.finish();
         if (!more) return;
         rest = false;
-      }
-      if (discs_.lists())
-        discs_.list();
-      else if (discs_.tests())
-        discs_.test();
-      else if (opening_)
+      } else if (opening_) {
         go_on();
-      else if (more && discs_.room())
+      } else if (more && discs_.room()) {
         more = next();
-      else
+      } else {
         rest = true;
+      }
     }
   }
 

@@ -216,7 +216,7 @@ TEST(GpuFields, CentresOnEdgesOfManyTriangles) {
   const std::vector<WorldSphere> balls = world_spheres({body.view(), Pose{}, 1}, Measure::matched);
   const std::vector<Field> fields = {MeshField{surface.view()}};
   std::vector<BatchPair> pairs;
-  for (std::size_t i = 0; i < balls.size(); i += 50) {
+  for (std::size_t i = 0; i < balls.size(); i += 100) {
     BatchPair pair;
     const double edge[3] = {1.0 / 3, 0.25, 1};
     for (int k = 0; k < 3; ++k) pair.pose_b.t[k] = edge[k] - balls[i].centre[k];
@@ -294,7 +294,7 @@ TEST(GpuFields, ProbesOfAnySize) {
   for (const double scale : {1e-7, 1e-5, 1e-3, 0.03, 0.1, 0.3, 3.0, 30.0}) {
     RandomPairs random(17);
     std::vector<BatchPair> pairs;
-    for (int i = 0; i < 40; ++i) {
+    for (int i = 0; i < 24; ++i) {
       BatchPair pair;
       pair.a = static_cast<std::uint32_t>(i % 2);
       pair.scale_b = scale;
@@ -322,7 +322,7 @@ TEST(GpuFields, ProbesOfAnySize) {
     }
     std::printf("%8g: volume %.1e push %.1e turn %.1e centroid %.1e; %d crossed\n", scale,
                 off.volume, off.push, off.turn, off.centre, met);
-    EXPECT_GE(met, 8) << scale;
+    EXPECT_GE(met, 5) << scale;
     // Where a probe is, is told in the field's digits.
     const double allowed = std::max(1e-11, 1e-15 / scale);
     EXPECT_LE(off.volume, allowed) << scale;
