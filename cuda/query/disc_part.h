@@ -151,20 +151,26 @@ class Disc {
       const double half = sqrt(most(rho2_ - m2, 0));
       const double low = least(most(-half, e.begin), e.end);
       const double high = least(most(half, e.begin), e.end);
-      // Two sectors as one angle.
+      // Two sectors as one angle, and the triangle between them, as it is seen: half of the angle.
       const double x1 = m2 + e.begin * low, y1 = e.m * (low - e.begin);
       const double x2 = m2 + high * e.end, y2 = e.m * (e.end - high);
-      const double phi = angle_of(x1 * y2 + y1 * x2, x1 * x2 - y1 * y2);
+      const double flat = m2 + h2;
+      const double a = sqrt(low * low + flat), b = sqrt(high * high + flat);
+      const double cross = e.m * (high - low);
+      double phi = 0, omega = 0;
+      IST_ROLLED
+      for (int seen = 0; seen < 2; ++seen) {
+        const double angle =
+            angle_of(seen != 0 ? cross : x1 * y2 + y1 * x2,
+                     seen != 0 ? (a * b + h_ * (a + b)) + (low * high + flat) : x1 * x2 - y1 * y2);
+        phi = seen != 0 ? phi : angle;
+        omega = 2 * angle;
+      }
       sum.cones += phi * ((1.0 / 6) * (cap * cap) * (r_ + (r_ + h_)));
       sum.angle += phi * (cap / r_);
       sum.area += phi * (0.5 * rho2_);
       sum.second += phi * (0.25 * (rho2_ * rho2_));
-      // The triangle between them.
-      const double flat = m2 + h2;
-      const double a = sqrt(low * low + flat), b = sqrt(high * high + flat);
-      const double omega =
-          2 * angle_of(e.m * (high - low), (a * b + h_ * (a + b)) + (low * high + flat));
-      const double cross = e.m * (high - low), area = 0.5 * cross;
+      const double area = 0.5 * cross;
       const double spread =
           (1.0 / 12) * cross * ((low * low + low * high) + (high * high + 3.0 * m2));
       sum.cones += (1.0 / 3) * (r_ * (r_ * r_) * omega - h_ * area);

@@ -16,6 +16,7 @@ IST_HD inline double angle_of(double y, double x) {
   if (!(larger > 0)) return 0;
   // The tangent of a quarter of the angle from the nearer axis: at most tan(π/16).
   double t = (steep ? ax : ay) / larger;
+  IST_ROLLED
   for (int halving = 0; halving < 2; ++halving) t /= 1 + std::sqrt(1 + t * t);
   const double square = -t * t;
   double sum = 0;
