@@ -28,8 +28,10 @@ constexpr double kVouched = 0.9;  ///< of a level: further down what was seen th
 constexpr int kRoundsALook = 3;
 constexpr double kApart = 0.05;  ///< levels between targets that a look adds
 
+/// A ball of radius 0 has its centre too far out to be one, and stays none.
 std::vector<CoverSphere> grown(std::vector<CoverSphere> balls, double by) {
-  for (CoverSphere& ball : balls) ball.radius += by;
+  for (CoverSphere& ball : balls)
+    if (ball.radius > 0) ball.radius += by;
   return balls;
 }
 
@@ -37,15 +39,14 @@ std::vector<CoverSphere> grown(std::vector<CoverSphere> balls, double by) {
 
 /// Where the balls are, and how far each may go at a time.
 struct CoverDescent::Balls {
-  Balls(const OffsetSurface& surface, double level, std::vector<Vector3d> at)
-      : centres(std::move(at)), trust(centres.size(), 0.5 * level) {
-    measure(surface, level);
+  Balls(const OffsetSurface& surface, std::vector<Vector3d> at)
+      : centres(std::move(at)), trust(centres.size(), 0.5 * surface.level()) {
+    measure(surface);
   }
 
-  void measure(const OffsetSurface& surface, double level) {
+  void measure(const OffsetSurface& surface) {
     radii.clear();
-    for (const Vector3d& c : centres)
-      radii.push_back(surface.radius(c) - (surface.level() - level));
+    for (const Vector3d& c : centres) radii.push_back(surface.radius(c));
   }
 
   std::vector<CoverSphere> spheres() const {
@@ -58,14 +59,13 @@ struct CoverDescent::Balls {
   std::vector<double> radii, trust;
 };
 
-/// All balls at one level, a little below that of the surface: where the solid is convex, the
-/// largest ball shrinks as the level falls, and elsewhere nearly.
+/// All balls at the level of the surface.
 class CoverDescent::Round {
  public:
-  Round(const PointGrid& targets, const OffsetSurface& surface, double level, Balls& balls)
+  Round(const PointGrid& targets, const OffsetSurface& surface, Balls& balls)
       : targets_(targets),
         surface_(surface),
-        level_(level),
+        reach_(kReach * surface.level()),
         balls_(balls),
         holders_(targets.size(), 0) {
     for (std::size_t i = 0; i < balls.centres.size(); ++i)
@@ -86,7 +86,7 @@ class CoverDescent::Round {
   /// Whether an open target is within reach of the ball.
   bool may_help(std::size_t i) {
     std::erase_if(open_, [&](std::uint32_t x) { return holders_[x] != 0; });
-    const double reach = balls_.radii[i] + kReach * level_;
+    const double reach = balls_.radii[i] + reach_;
     return std::any_of(open_.begin(), open_.end(), [&](std::uint32_t x) {
       return (targets_.point(x) - balls_.centres[i]).squaredNorm() <= reach * reach;
     });
@@ -99,16 +99,17 @@ class CoverDescent::Round {
     const auto within = static_cast<float>(radius);
     const float within2 = within * within;
     needed_.clear();
-    targets_.within(centre, radius + kReach * level_, [&](std::uint32_t x, float d2) {
+    targets_.within(centre, radius + reach_, [&](std::uint32_t x, float d2) {
       if (holders_[x] == (d2 <= within2 ? 1 : 0)) needed_.push_back(targets_.point(x));
     });
     double& trust = balls_.trust[i];
     walls_.clear();
-    surface_.walls(centre, radius + (surface_.level() - level_) + 2 * trust, walls_);
+    surface_.walls(centre, radius + 2 * trust, walls_);
     const Recentred moved = recentre(centre, needed_, walls_, trust);
-    const double next = surface_.radius(moved.centre) - (surface_.level() - level_);
+    const double next = surface_.radius(moved.centre);
     const double way = std::sqrt((moved.centre - centre).squaredNorm());
-    trust = std::clamp(way > 0 ? 2 * way : 0.5 * trust, 0.02 * level_, 0.7 * level_);
+    trust = std::clamp(way > 0 ? 2 * way : 0.5 * trust, 0.02 * surface_.level(),
+                       0.7 * surface_.level());
     if (!(next > 0) || !(way > 0)) return false;
     targets_.within(centre, radius, [&](std::uint32_t x, float) {
       if (--holders_[x] == 0) open_.push_back(x);
@@ -119,11 +120,13 @@ class CoverDescent::Round {
     return true;
   }
 
-  static constexpr double kReach = 0.7;  ///< levels beyond its surface a ball looks at
+  /// Levels beyond its surface a ball looks at. Where it looks further, it lets go of what it
+  /// holds, for a target that it will not reach, and gaps grow.
+  static constexpr double kReach = 0.3;
 
   const PointGrid& targets_;
   const OffsetSurface& surface_;
-  const double level_;
+  const double reach_;
   Balls& balls_;
   std::vector<int> holders_;         ///< balls that hold a target
   std::vector<std::uint32_t> open_;  ///< targets that none holds, and some that one does by now
@@ -145,8 +148,8 @@ double CoverDescent::add_targets(const std::vector<CoverSphere>& balls, double l
 }
 
 /// Returns by how much the worst ball reaches too far.
-double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<CoverSphere>& balls,
-                              double level) {
+double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<CoverSphere>& balls) {
+  const double level = surface.level();
   std::vector<std::vector<Vector3d>> beyond(balls.size());
   std::vector<double> further(balls.size(), 0);
   vouched_.resize(balls.size(), {Vector3d::Zero(), 0});
@@ -157,9 +160,7 @@ double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<Co
         level > kVouched * vouched.radius)
       return;
     // Nor does what the distance alone vouches for.
-    if (balls[i].radius <=
-        (surface.sure_radius(balls[i].centre) - surface.level() + level) * (1 + 1e-9))
-      return;
+    if (balls[i].radius <= surface.sure_radius(balls[i].centre) * (1 + 1e-9)) return;
     further[i] =
         guessed_protrusion(solid_, balls[i], 0.05, kBeyond * level, beyond[i]).least - level;
     if (further[i] <= (kBeyond - 1) * level) {
@@ -193,14 +194,15 @@ LookedCover CoverDescent::improve(LevelCover start, int rounds, const std::funct
   for (double step = 0; rounds > 0 && (step == 0 || step > kLastStep);) {
     const bool first = step == 0;
     const double aim = cover.level * (1 - step);
-    OffsetSurface surface(solid_, sampled_, cover.level);
-    Balls balls(surface, aim, cover.centres);
+    // At the aim, not at the level that was reached: rays that end between the two are walls here.
+    OffsetSurface surface(solid_, sampled_, aim);
+    Balls balls(surface, cover.centres);
     double best_here = std::numeric_limits<double>::infinity();
     bool gained = false;
     for (int idle = 0; idle < kPatience && rounds > 0;) {
       if (!first) {
         const PointGrid targets(sampled_.targets);
-        Round round(targets, surface, aim, balls);
+        Round round(targets, surface, balls);
         for (int k = 0; k < kRoundsALook; ++k, --rounds)
           if (!round.move_all()) break;
       }
@@ -214,15 +216,15 @@ LookedCover CoverDescent::improve(LevelCover start, int rounds, const std::funct
       if (is_better()) {
         level += add_void(grown(spheres, level - aim + kHeld * aim), aim);
         const std::size_t rays = sampled_.rays.size();
-        if (is_better()) level = std::max(level, aim + add_rays(surface, spheres, aim));
+        if (is_better()) level = std::max(level, aim + add_rays(surface, spheres));
         if (is_better()) {
           cover = {balls.centres, level};
           looked.balls = grown(spheres, level - aim);
           gained = true;
         }
         if (sampled_.rays.size() != rays) {
-          surface = OffsetSurface(solid_, sampled_, cover.level);
-          balls.measure(surface, aim);
+          surface = OffsetSurface(solid_, sampled_, aim);
+          balls.measure(surface);
         }
       }
       if (first || level <= aim * (1 + kHeld)) break;

@@ -47,8 +47,7 @@ class [[gnu::visibility("hidden")]] CoverDescent {
   class Round;
   double add_targets(const std::vector<CoverSphere>& balls, double level);
   double add_void(const std::vector<CoverSphere>& balls, double level);
-  double add_rays(const OffsetSurface& surface, const std::vector<CoverSphere>& balls,
-                  double level);
+  double add_rays(const OffsetSurface& surface, const std::vector<CoverSphere>& balls);
 
   const MeshSolid& solid_;
   SampledSolid& sampled_;

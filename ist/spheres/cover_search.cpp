@@ -21,7 +21,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kPasses = 2;                 ///< of exchanges and descent, of which the best counts
+constexpr int kPasses = 3;                 ///< of exchanges and descent, of which the best counts
 constexpr int kRounds = 120;               ///< of a descent, over all balls
 constexpr std::size_t kTargetsABall = 60;  ///< on faces
 constexpr std::size_t kCandidates = 1200;  ///< that exchanges choose from, about
