@@ -17,8 +17,8 @@ struct Progress {
   double elapsed = 0;       ///< [s] since the stage began
 };
 
-/// Called from the thread that started the stage: ten times a second at most while packing and
-/// predicting, after every step of the shorter stages.
+/// Called from the thread that started the stage: as packing and predicting begin and then ten
+/// times a second at most, after every step of the shorter stages.
 ///
 /// Return false to cancel: packing ends with what is packed so far, which is valid; other stages
 /// throw Error.

@@ -21,7 +21,7 @@ void Stage::step(std::size_t spheres, double fraction) {
 bool Stage::due() {
   if (!progress_) return false;
   const auto now = Clock::now();
-  if (now - last_report_ < std::chrono::milliseconds(100)) return false;
+  if (last_report_ && now - *last_report_ < std::chrono::milliseconds(100)) return false;
   last_report_ = now;
   return true;
 }

@@ -25,8 +25,9 @@ class Stage {
   /// Reports a step of a stage that cannot be cut short. Throws Error if the callback cancels.
   void step(std::size_t spheres, double fraction);
 
-  /// Why a stage that may be cut short is to stop now, if it is. Asks the callback ten times a
-  /// second at most; `fill(progress)` then says where the stage stands.
+  /// Why a stage that may be cut short is to stop now, if it is. Asks the callback at once, for the
+  /// stage before may not have for a while, and then ten times a second at most; `fill(progress)`
+  /// then says where the stage stands.
   template <class Fill>
   std::optional<StopReason> stop(const Fill& fill) {
     const bool late = time_limit_ > 0 && elapsed() >= time_limit_;
@@ -42,14 +43,14 @@ class Stage {
  private:
   using Clock = std::chrono::steady_clock;
 
-  bool due();                 ///< somebody looks on, and a tenth of a second is over
+  bool due();                 ///< somebody looks on, and has not been told for a tenth of a second
   bool report(Progress now);  ///< false: cancelled
 
   const char* const name_;
   const ProgressCallback progress_;
   const double time_limit_;
   const Clock::time_point start_ = Clock::now();
-  Clock::time_point last_report_ = start_;
+  std::optional<Clock::time_point> last_report_;
 };
 
 }  // namespace ist
