@@ -151,7 +151,8 @@ class Disc {
       const double half = sqrt(most(rho2_ - m2, 0));
       const double low = least(most(-half, e.begin), e.end);
       const double high = least(most(half, e.begin), e.end);
-      // Two sectors as one angle, and the triangle between them, as it is seen: half of the angle.
+      // Two sectors as one angle, and half of that under which the triangle between them is seen:
+      // in a loop, for angle_of() to stand in the kernel's code once.
       const double x1 = m2 + e.begin * low, y1 = e.m * (low - e.begin);
       const double x2 = m2 + high * e.end, y2 = e.m * (e.end - high);
       const double flat = m2 + h2;

@@ -235,10 +235,7 @@ class SurfaceWalk {
             number_of(m_.open[size_ - 1 - item(i) / each]) * static_cast<std::uint32_t>(each) +
                 static_cast<std::uint32_t>(item(i) % each),
             0};
-        double c[3][3];
-        source_.corners(id, c);
-        m_.discs.id[item(i)] = id;
-        m_.discs.seen.see(item(i), c);
+        see(item(i), id);
         comes = SeenTriangles::meets(m_.discs.seen.from_centre(item(i)), 1 + kSeenRoom);
       }
       near |= team_.ballot(comes) << (i * Team::kWidth);
@@ -313,6 +310,14 @@ class SurfaceWalk {
     }
   }
 
+  /// Sees a triangle, by one lane.
+  IST_HD void see(int place, const TriangleId& id) {
+    double c[3][3];
+    source_.corners(id, c);
+    m_.discs.id[place] = id;
+    m_.discs.seen.see(place, c);
+  }
+
   /// Sees what is listed of triangles; whether that is all of the list.
   IST_HD bool see_list(const ProbeFrame& frame) {
     if (team_.lane() == 0) m_.discs.seen.look_from(frame.centre, frame.reach);
@@ -322,10 +327,7 @@ class SurfaceWalk {
       const SurfaceNode node = frame.list[k];
       other = other || rank_of(node) != kTriangle;
       if (rank_of(node) != kTriangle) continue;
-      double c[3][3];
-      m_.discs.id[k] = {number_of(node), 0};
-      m_.field.mesh.corners(number_of(node), c);
-      m_.discs.seen.see(k, c);
+      see(k, {number_of(node), 0});
     }
     team_.sync();
     return !team_.any(other);

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include <Eigen/Dense>
 
 #include "cuda/query/disc_part.h"
 #include "cuda/query/seen_triangles.h"
 #include "cuda/query/surface_source.h"
+#include "support/random_pairs.h"
 
 // Triangles as the GPU's queries see them, in floats: what they tell must hold exactly.
 
@@ -30,12 +30,11 @@ struct Triangle {
   }
 };
 
-class Random {
+class Random : public RandomPairs {
  public:
-  explicit Random(unsigned seed) : random_(seed) {}
-  double uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
-  }
+  using RandomPairs::RandomPairs;
+
+  bool one_in(int n) { return uniform(0, n) < 1; }
   /// In a ball about the origin.
   Vector3d within(double reach) {
     for (;;) {
@@ -45,22 +44,18 @@ class Random {
   }
   /// Near a point, of any size beside the reach; slivers and flat ones too.
   Triangle triangle(const Vector3d& near, double reach) {
-    const double size = reach * std::exp(random_() % 4 == 0 ? uniform(6, 14) : uniform(-6, 6));
+    const double size = reach * std::exp(one_in(4) ? uniform(6, 14) : uniform(-6, 6));
     Triangle out;
     const Vector3d edge = within(size), from = near + within(reach);
-    const Vector3d other = random_() % 3 == 0
-                               ? edge * uniform(-1, 1) + within(size * std::exp(uniform(-25, 0)))
-                               : within(size);
+    const Vector3d other =
+        one_in(3) ? edge * uniform(-1, 1) + within(size * std::exp(uniform(-25, 0))) : within(size);
     const double u = uniform(-0.2, 1.2), v = uniform(-0.2, 1.2);
     const Vector3d first = from - u * edge - v * other;  // the point lies in it, or not far off
     out.set(0, first);
     out.set(1, first + edge);
-    out.set(2, random_() % 50 == 0 ? first + edge : first + other);
+    out.set(2, one_in(50) ? first + edge : first + other);
     return out;
   }
-
- private:
-  std::mt19937_64 random_;
 };
 
 Vector3d closest_point(const Triangle& t, const Vector3d& x) {
