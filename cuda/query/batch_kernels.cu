@@ -79,8 +79,11 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchAr
       take_placed(team, memory);
     } else {
       std::uint32_t count = 0, at = 0;
-      bool is_task = memory.is_task;
-      if (team.lane() == 0) count = take(batch, listed, most, is_task, at);
+      bool is_task = false;
+      if (team.lane() == 0) {
+        is_task = memory.is_task;
+        count = take(batch, listed, most, is_task, at);
+      }
       count = team.broadcast(count, 0);
       if (count == 0) return;
       at = team.broadcast(at, 0);

@@ -169,7 +169,7 @@ IST_HD inline std::uint32_t weight_of(const PairMemory& memory, int entry) {
 }
 
 /// Tasks of a pair, about: no more than have warps of their own where pairs are few.
-constexpr std::uint32_t kTasksOfPair = 16;
+constexpr std::uint32_t kTasksOfPair = 12;
 
 /// Decides how large the tasks are of what waits: no smaller than batch.task_weight, not too many.
 /// All of the team together.

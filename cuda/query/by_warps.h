@@ -10,17 +10,23 @@
 
 namespace ist::gpu {
 
-/// Calls work(team, k) for k < count, each warp taking the next when it is done with one.
-template <class Work>
-__device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& work) {
+/// Calls work(team, k) for k < count, each warp taking the next when it is done with one, as long
+/// as goes_on().
+template <class Work, class GoesOn>
+__device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& work,
+                         const GoesOn& goes_on) {
   const WarpTeam team;
   for (;;) {
-    std::uint32_t k = 0;
-    if (team.lane() == 0) k = atomic_add(taken, 1);
+    std::uint32_t k = count;
+    if (team.lane() == 0 && goes_on()) k = atomic_add(taken, 1);
     k = team.broadcast(k, 0);
     if (k >= count) return;
     work(team, k);
   }
+}
+template <class Work>
+__device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& work) {
+  by_warps(count, taken, work, [] { return true; });
 }
 
 /// Where each lane that raises the flag writes into a list of which `listed` are taken.

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "cuda/query/disc_sums.h"
+#include "cuda/query/ball_tests.h"
 #include "cuda/query/field_walk.h"
 #include "numerics/host_device.h"
 
@@ -11,21 +11,26 @@
 
 namespace ist::gpu {
 
-struct FacetMemory : WalkMemory {
-  double whole[4];  ///< ball around the probing tree, the field's frame
-  DiscMemory discs;
+/// A face of a box or of a cell of a terrain.
+struct FacetId {
+  std::uint32_t a, b;
 };
 
-/// The triangles of a box or a terrain (DiscSums).
+struct FacetWalkMemory : WalkMemory {
+  TestMemory<FacetId> tests;
+};
+
+/// The triangles of a box or a terrain (BallTests).
 class FacetSource {
  public:
+  using Id = FacetId;
   static constexpr bool kCrossings = false;
 
   /// `whole`: a ball around all that is asked for.
   IST_HD FacetSource(const FieldRef& field, const double (&whole)[4])
       : field_(field), whole_(whole) {}
 
-  IST_HD void corners(const TriangleId& id, double (&c)[3][3]) const {
+  IST_HD void corners(const FacetId& id, double (&c)[3][3]) const {
     if (field_.kind == FieldKind::box) {
       // Corners of the faces, counter-clockwise from outside, four bits each.
       constexpr std::uint32_t kFaces[6] = {0x2640, 0x5731, 0x4510, 0x3762, 0x1320, 0x6754};
@@ -63,7 +68,7 @@ class FacetSource {
     IST_HD std::uint64_t size() const {
       return from_[0] == kBox ? 12 : 2 * static_cast<std::uint64_t>(count_[0] * count_[1]);
     }
-    IST_HD TriangleId operator[](std::uint64_t i) const {
+    IST_HD FacetId operator[](std::uint64_t i) const {
       if (from_[0] == kBox) return {static_cast<std::uint32_t>(i), 0};
       const auto cell = static_cast<std::int64_t>(i / 2);
       const std::int64_t row = cell / count_[0];
@@ -84,7 +89,7 @@ class FacetSource {
     const std::uint64_t size = near.size();
     for (std::uint64_t base = 0; base < size; base += Team::kWidth) {
       const std::uint64_t i = base + static_cast<std::uint64_t>(team.lane());
-      visit(i < size, i < size ? near[i] : TriangleId{});
+      visit(i < size, i < size ? near[i] : FacetId{});
     }
   }
 
@@ -163,50 +168,56 @@ class FacetSource {
   const double (&whole_)[4];
 };
 
-/// The parts of leaf blocks inside a box or a terrain.
+/// Finds the balls that the triangles of a box or a terrain meet, part by part; sums those that
+/// lie inside as a whole or come near one face alone.
 template <class Team>
-class FacetSums {
+class FacetWalk {
  public:
   /// `memory` holds the tree and its place.
-  IST_HD FacetSums(const Team& team, FacetMemory& memory, PartSums& sums)
+  IST_HD FacetWalk(const Team& team, FacetWalkMemory& memory, PartSums& sums)
       : team_(team),
         m_(memory),
         sums_(sums),
         source_(memory.field, memory.whole),
-        discs_(team, memory, memory.discs, source_, sums) {
-    const double centre[3] = {m_.tree.root[0], m_.tree.root[1], m_.tree.root[2]};
-    double whole[3];
-    m_.place.a_from_b.apply(centre, whole);
+        tests_(team, memory, memory.tests, source_, sums) {}
+
+  /// As SurfaceWalk, which alone needs a side to begin with.
+  IST_HD void start(bool) {
     if (team_.lane() == 0) {
-      for (int k = 0; k < 3; ++k) m_.whole[k] = whole[k];
-      m_.whole[3] = m_.tree.root[3] * m_.place.a_from_b.scale;
-      m_.discs.seen.look_from(whole, m_.whole[3]);
+      const double centre[3] = {m_.whole[0], m_.whole[1], m_.whole[2]};
+      m_.tests.seen.look_from(centre, m_.whole[3]);
     }
     team_.sync();
   }
 
-  /// Sums leaf blocks; none: what is left.
-  IST_HD void add(const std::uint32_t* blocks, int have) {
-    bool rest = have == 0;
-    for (int next = 0;;) {
-      if (discs_.step(rest)) continue;
-      if (rest) {
-        discs_.finish();
-        if (have == 0) return;
-        rest = false;
-      } else if (staged_ < near_size_) {
+  /// As SurfaceWalk.
+  template <class Take>
+  IST_HD void run(const Take& take) {
+    FieldWalk<Team> walk(team_, m_, sums_);
+    walk.run([&](const std::uint32_t* blocks, int have) { add(blocks, have, take); });
+  }
+
+ private:
+  /// Tests leaf blocks; none: hands over what is left.
+  template <class Take>
+  IST_HD void add(const std::uint32_t* blocks, int have, const Take& take) {
+    for (int next = 0; goes_on_;) {
+      if (tests_.step()) continue;
+      const bool ends = !tests_.full();
+      if (ends && staged_ < near_size_) {
         stage_more();
-      } else if (next == have) {
+      } else if (ends && have > 0 && next == have) {
         return;
-      } else if (discs_.room()) {
+      } else if (ends && have > 0 && tests_.room()) {
         begin(blocks[next++]);
       } else {
-        rest = true;
+        goes_on_ = take(tests_.met(), ends);
+        tests_.forget(ends);
+        if (have == 0) return;
       }
     }
   }
 
- private:
   IST_HD void begin(std::uint32_t block) {
     block_ = block;
     first_ = true;
@@ -218,7 +229,7 @@ class FacetSums {
     near_ = FacetSource::Near(m_.field, centre, reach);
     near_size_ = near_.size();
     if (m_.field.kind == FieldKind::box) return;
-    if (team_.lane() == 0) m_.discs.seen.look_from(centre, reach);
+    if (team_.lane() == 0) m_.tests.seen.look_from(centre, reach);
     team_.sync();
   }
 
@@ -230,34 +241,35 @@ class FacetSums {
       const std::uint64_t k = staged_ + static_cast<std::uint64_t>(place);
       bool comes = k < near_size_;
       if (comes && !seen_) {
-        const TriangleId id = near_[k];
+        const FacetId id = near_[k];
         double c[3][3];
         source_.corners(id, c);
-        m_.discs.id[place] = id;
-        m_.discs.seen.see(place, c);
+        m_.tests.id[place] = id;
+        m_.tests.seen.see(place, c);
         comes = m_.field.kind == FieldKind::box ||
-                SeenTriangles::meets(m_.discs.seen.from_centre(place), 1 + kSeenRoom);
+                SeenTriangles::meets(m_.tests.seen.from_centre(place), 1 + kSeenRoom);
       }
       near |= team_.ballot(comes) << (i * Team::kWidth);
     }
     seen_ = m_.field.kind == FieldKind::box;
     staged_ += kSeen;
     for (int half = team_.lane(); half < 2; half += Team::kWidth) {
-      m_.discs.tested[half].block = block_;
-      m_.discs.tested[half].triangles = near;
+      m_.tests.tested[half].block = block_;
+      m_.tests.tested[half].triangles = near;
     }
     team_.sync();
-    discs_.stage(false, first_, staged_ >= near_size_);
+    tests_.stage(false, first_, staged_ >= near_size_);
     first_ = false;
   }
 
   static constexpr int kItemsALane = kItems / Team::kWidth;
 
   const Team& team_;
-  FacetMemory& m_;
+  FacetWalkMemory& m_;
   PartSums& sums_;
-  FacetSource source_;
-  DiscSums<Team, FacetSource> discs_;
+  const FacetSource source_;
+  BallTests<Team, FacetSource> tests_;
+  bool goes_on_ = true;
   std::uint32_t block_ = 0;                   ///< in work
   bool first_ = false;                        ///< it has not been tested
   bool seen_ = false;                         ///< the triangles of a box are, for all blocks

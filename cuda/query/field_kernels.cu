@@ -1,7 +1,8 @@
+#include "cuda/query/field_kernels.h"
+
 #include "cuda/check.h"
 #include "cuda/launch.h"
 #include "cuda/query/by_warps.h"
-#include "cuda/query/field_kernels.h"
 
 namespace ist::gpu {
 namespace {
@@ -9,11 +10,7 @@ namespace {
 constexpr unsigned kSiftThreads = 256;
 constexpr unsigned kWarps = 3;  ///< whose memory is what a block may have
 constexpr unsigned kThreads = 32 * kWarps;
-/// Blocks on a multiprocessor: what registers allow. 168 a thread for those that meet triangles.
-template <class Memory>
-constexpr int kBlocksEach = 4;
-template <>
-constexpr int kBlocksEach<WalkMemory> = 6;
+constexpr int kBlocksEach = 6;  ///< on a multiprocessor: what registers allow
 
 /// Places every pair and lists those that are not told at once.
 __global__ void __launch_bounds__(kSiftThreads) sift_field_pairs(const FieldBatch batch) {
@@ -27,49 +24,33 @@ __global__ void __launch_bounds__(kSiftThreads) sift_field_pairs(const FieldBatc
   }
 }
 
-template <class Memory>
-constexpr FieldGroup kGroup = kSmooth;
-template <>
-constexpr FieldGroup kGroup<FacetMemory> = kFacets;
-template <>
-constexpr FieldGroup kGroup<SurfaceMemory> = kMesh;
-
-template <class Memory>
-__global__ void __launch_bounds__(kThreads, kBlocksEach<Memory>)
-    sum_field_pairs(const FieldBatch batch) {
-  __shared__ Memory memory[kWarps];
+__global__ void __launch_bounds__(kThreads, kBlocksEach) sum_smooth_pairs(const FieldBatch batch) {
+  __shared__ WalkMemory memory[kWarps];
   FieldCounters& counters = *batch.counters;
-  by_warps(load_fresh(&counters.listed[kGroup<Memory>]), &counters.taken[kGroup<Memory>],
+  by_warps(load_fresh(&counters.listed[kSmooth]), &counters.taken[kSmooth],
            [&](const WarpTeam& team, std::uint32_t k) {
-             sum_field_pair(team, batch, listed_pair(batch, kGroup<Memory>, k),
-                            memory[threadIdx.x / 32]);
+             sum_field_pair(team, batch, listed_pair(batch, kSmooth, k), memory[threadIdx.x / 32]);
            });
-}
-
-template <class Memory>
-void launch_sums(const FieldBatch& batch, const FieldGrids& grids, cudaStream_t stream) {
-  sum_field_pairs<Memory>
-      <<<static_cast<unsigned>(grids.sum[kGroup<Memory>]), kThreads, 0, stream>>>(batch);
-  check_launch("summing trees in fields");
 }
 
 }  // namespace
 
 FieldGrids field_grids() {
-  FieldGrids grids = {};
-  grids.sum[kSmooth] = blocks_at_a_time(sum_field_pairs<WalkMemory>, kThreads);
-  grids.sum[kFacets] = blocks_at_a_time(sum_field_pairs<FacetMemory>, kThreads);
-  grids.sum[kMesh] = blocks_at_a_time(sum_field_pairs<SurfaceMemory>, kThreads);
-  return grids;
+  return {blocks_at_a_time(sum_smooth_pairs, kThreads), facet_grids<FacetKind>(),
+          facet_grids<MeshKind>()};
 }
 
-void launch_field_batch(const FieldBatch& batch, const FieldGrids& grids, cudaStream_t stream) {
+void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups],
+                        const FieldGrids& grids, cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, sizeof(FieldCounters), stream), "starting a batch");
   sift_field_pairs<<<blocks_for(batch.pairs.count, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
   check_launch("placing trees in fields");
-  launch_sums<WalkMemory>(batch, grids, stream);
-  launch_sums<FacetMemory>(batch, grids, stream);
-  launch_sums<SurfaceMemory>(batch, grids, stream);
+  if (has[kSmooth]) {
+    sum_smooth_pairs<<<static_cast<unsigned>(grids.smooth), kThreads, 0, stream>>>(batch);
+    check_launch("summing trees in fields");
+  }
+  if (has[kFacets]) launch_facets<FacetKind>(batch, grids.facets, stream);
+  if (has[kMesh]) launch_facets<MeshKind>(batch, grids.mesh, stream);
 }
 
 }  // namespace ist::gpu

@@ -2,18 +2,21 @@
 
 #include <cuda_runtime_api.h>
 
+#include "cuda/query/facet_kernels.h"
 #include "cuda/query/field_steps.h"
 
 namespace ist::gpu {
 
-/// Blocks that the current device runs at a time, by FieldGroup.
+/// Blocks that the current device runs at a time.
 struct FieldGrids {
-  int sum[kFieldGroups];
+  int smooth;
+  FacetGrids facets, mesh;
 };
 
 FieldGrids field_grids();
 
-/// Launches all that answers a batch; waits for nothing.
-void launch_field_batch(const FieldBatch& batch, const FieldGrids& grids, cudaStream_t stream);
+/// Launches all that answers a batch; waits for nothing. `has`: groups of which there are fields.
+void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups],
+                        const FieldGrids& grids, cudaStream_t stream);
 
 }  // namespace ist::gpu

@@ -16,6 +16,7 @@ namespace ist::gpu {
 /// A placed field and a placed tree in a team's memory.
 struct ProbeMemory {
   PairPlace place;
+  double whole[4];  ///< ball around the tree, the field's frame
   TreeRef tree;
   SumsRef sums;
   FieldRef field;

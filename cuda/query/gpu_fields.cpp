@@ -16,6 +16,7 @@ struct GpuFields::Impl {
   gpu::DeviceBytes memory;
   const gpu::FieldRef* refs = nullptr;
   std::size_t size = 0;
+  bool has_kind[gpu::kFieldGroups] = {};
 };
 
 GpuFields::GpuFields(std::span<const Field> fields, const GpuSettings& settings)
@@ -42,6 +43,7 @@ GpuFields::GpuFields(std::span<const Field> fields, const GpuSettings& settings)
   auto* const at = reinterpret_cast<gpu::FieldRef*>(impl_->memory.data());
   gpu::copy_to_device<gpu::FieldRef>(at, refs, queue);
   impl_->refs = at;
+  for (const gpu::FieldRef& field : refs) impl_->has_kind[gpu::group_of(field.kind)] = true;
   queue.wait();
 }
 
@@ -72,9 +74,10 @@ void penetration_batch(const GpuAssets& assets, const GpuFields& fields, const G
                                  pairs,
                                  answers,
                                  room.field_counters,
-                                 {room.arrays.list, room.arrays.detailed}};
+                                 {room.arrays.list, room.arrays.detailed},
+                                 room.facet_room};
   const gpu::DeviceGuard guard(trees.device);
-  gpu::launch_field_batch(batch, room.field_grids, stream);
+  gpu::launch_field_batch(batch, solids.has_kind, room.field_grids, stream);
 }
 
 }  // namespace ist

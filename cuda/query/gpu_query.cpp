@@ -20,6 +20,8 @@ namespace {
 /// Room for what is split. A batch that needs more is answered all the same.
 constexpr std::uint32_t kRoomForSplits = 1 << 16, kRoomForTasks = 1 << 19,
                         kRoomForEntries = 1 << 21;
+/// A round of pairs that triangles meet, and what they leave to be summed.
+constexpr std::uint32_t kRoomForQueries = 1 << 16, kRoomForParts = 1 << 17, kRoomForWords = 3 << 22;
 constexpr std::uint32_t kRoomForGapEntries = 1 << 20;  ///< of separations, whose entries are larger
 
 }  // namespace
@@ -85,6 +87,19 @@ void place_splits(gpu::Parts& parts, gpu::BatchArrays& batch) {
   batch.task_room = kRoomForTasks;
 }
 
+/// Room for pairs that triangles meet: trees in fields need the lists of place_penetrations(), and
+/// not its other memory.
+std::size_t place_facets(std::byte* from, gpu::FacetRoom& room) {
+  gpu::Parts parts(from);
+  room.queries = parts.take<gpu::FacetQuery>(kRoomForQueries);
+  room.parts = parts.take<gpu::MetPart>(kRoomForParts);
+  room.words = parts.take<std::uint32_t>(kRoomForWords);
+  room.query_room = kRoomForQueries;
+  room.part_room = kRoomForParts;
+  room.word_room = kRoomForWords;
+  return parts.used();
+}
+
 std::size_t place_penetrations(std::byte* from, GpuWorkspace::Impl& room) {
   gpu::Parts parts(from);
   gpu::BatchArrays& arrays = room.arrays;
@@ -92,13 +107,15 @@ std::size_t place_penetrations(std::byte* from, GpuWorkspace::Impl& room) {
   room.field_counters = parts.take<gpu::FieldCounters>(1);
   arrays.list = parts.take<std::uint32_t>(room.most_pairs);
   arrays.detailed = parts.take<std::uint32_t>(room.most_pairs);
+  const std::size_t lists = parts.used();
+  const std::size_t facets = place_facets(from + lists, room.facet_room);
   place_splits(parts, arrays);
   arrays.places = parts.take<gpu::PairPlace>(kRoomForSplits);
   arrays.totals = parts.take<gpu::LensTotals>(kRoomForSplits + kRoomForTasks);
   arrays.entries_a = parts.take<std::uint32_t>(kRoomForEntries);
   arrays.entries_b = parts.take<std::uint32_t>(kRoomForEntries);
   arrays.entry_room = kRoomForEntries;
-  return parts.used();
+  return std::max(parts.used(), lists + facets);
 }
 
 std::size_t place_separations(std::byte* from, GpuWorkspace::Impl& room) {

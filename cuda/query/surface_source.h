@@ -3,26 +3,28 @@
 #include <cmath>
 #include <cstdint>
 
-#include "cuda/query/disc_sums.h"
+#include "cuda/query/disc_part.h"
+#include "cuda/query/field_walk.h"
 #include "cuda/query/surface_sides.h"
 #include "numerics/host_device.h"
 
 namespace ist::gpu {
 
-/// The triangles of a surface (DiscSums): `a` is 16 · block + lane.
+/// The triangles of a surface (BallTests), called 16 · block + lane.
 class SurfaceSource {
  public:
+  using Id = std::uint32_t;
   static constexpr bool kCrossings = true;
 
   /// `room`: for each_near().
   IST_HD SurfaceSource(const SurfaceRef& surface, SurfaceNode* room)
       : surface_(surface), room_(room) {}
 
-  IST_HD void corners(const TriangleId& id, double (&c)[3][3]) const { surface_.corners(id.a, c); }
+  IST_HD void corners(Id id, double (&c)[3][3]) const { surface_.corners(id, c); }
 
-  IST_HD bool crosses(const double (&from)[3], const double (&x)[3], const TriangleId& id) const {
+  IST_HD bool crosses(const double (&from)[3], const double (&x)[3], Id id) const {
     const double way[3] = {x[0] - from[0], x[1] - from[1], x[2] - from[2]};
-    return steps_through(from, way, surface_, id.a);
+    return steps_through(from, way, surface_, id);
   }
 
   IST_HD static bool settles(const double (&)[3], double, PartInside&) { return false; }
@@ -46,7 +48,7 @@ class SurfaceSource {
         const bool there = lane < static_cast<int>(kWidth);
         const std::uint32_t child = number_of(node) * kWidth + static_cast<std::uint32_t>(lane);
         if (rank_of(node) == kTriangleBlock) {
-          visit(there, TriangleId{there ? child : 0, 0});
+          visit(there, there ? child : 0);
           continue;
         }
         const bool near = there && comes_near(node, lane, x, reach);

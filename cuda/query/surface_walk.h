@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "cuda/query/ball_tests.h"
 #include "cuda/query/disc_sums.h"
 #include "cuda/query/field_walk.h"
 #include "cuda/query/surface_source.h"
@@ -36,47 +37,72 @@ struct ProbeFrame {
   IST_HD std::uint32_t near_child(int child) const { return near[0][child] | near[1][child]; }
 };
 
-struct SurfaceMemory : ProbeMemory {
+struct SurfaceWalkMemory : ProbeMemory {
   int wanted[kMaxLevels];  ///< rank down to which the list of a node of a level is opened
   ProbeFrame frame[kMaxLevels];
   SurfaceNode open[kOpenRoom];
   /// Sees the triangles of the first frame on the way down whose list holds nothing else; those
   /// below it inherit them.
-  DiscMemory discs;
+  TestMemory<SurfaceSource::Id> tests;
 };
 
+/// Makes a node's ball one about it, whose centre is to tell sides: it lies on no plane, edge or
+/// corner where solids are aligned.
+IST_HD inline void moved_ball(double (&x)[3], double& r) {
+  move_away(r, x);
+  r *= 1 + kMoved;
+}
+
+/// Of a node of a tree, the field's frame: moved_ball().
+IST_HD inline void node_ball(const TreeRef& tree, int level, std::uint32_t number,
+                             const PairMap& a_from_b, double (&x)[3], double& r) {
+  const NodeBall ball = tree.ball(level, number);
+  a_from_b.apply(ball.centre, x);
+  r = ball.r * a_from_b.scale;
+  moved_ball(x, r);
+}
+
+/// Finds the balls that a surface's triangles meet, part by part; sums those that lie inside as a
+/// whole.
 template <class Team>
 class SurfaceWalk {
  public:
-  IST_HD SurfaceWalk(const Team& team, SurfaceMemory& memory, PartSums& sums)
+  IST_HD SurfaceWalk(const Team& team, SurfaceWalkMemory& memory, PartSums& sums)
       : team_(team),
         m_(memory),
         sums_(sums),
         source_(memory.field.mesh, memory.open),
-        discs_(team, memory, memory.discs, source_, sums) {}
+        tests_(team, memory, memory.tests, source_, sums) {}
 
-  /// One small step after another: each is in the kernel's code once, which would overflow the
-  /// instruction cache otherwise.
-  IST_HD void run() {
+  /// `inside`: whether the centre of the root's node_ball() is.
+  IST_HD void start(bool inside) {
     if (team_.lane() == 0) {
       plan();
       m_.open[0] = m_.field.mesh.root_node();
+      m_.frame[m_.tree.top].inside = inside;
     }
     team_.sync();
-    begin_root();
-    bool more = true, rest = false;
+    size_ = 1;
+    begin(m_.tree.top, 0);
+  }
+
+  /// Hands over what triangles meet, part by part: take(met, end), `end` being false where more of
+  /// the same part follows; stops where that is false.
+  ///
+  /// One small step after another: each is in the kernel's code once, which would overflow the
+  /// instruction cache otherwise.
+  template <class Take>
+  IST_HD void run(const Take& take) {
     for (;;) {
-      if (discs_.step(rest)) continue;
-      if (rest) {
-        discs_.finish();
-        if (!more) return;
-        rest = false;
-      } else if (opening_) {
+      if (tests_.step()) continue;
+      const bool ends = !tests_.full();
+      if (ends && opening_) {
         go_on();
-      } else if (more && discs_.room()) {
-        more = next();
+      } else if (ends && more_ && tests_.room()) {
+        more_ = next();
       } else {
-        rest = true;
+        if (!take(tests_.met(), ends) || (ends && !more_)) return;
+        tests_.forget(ends);
       }
     }
   }
@@ -93,23 +119,6 @@ class SurfaceWalk {
     }
   }
 
-  IST_HD void begin_root() {
-    const int top = m_.tree.top;
-    size_ = 1;
-    begin(top, 0);
-    const double(&centre)[3] = m_.frame[top].centre;
-    const bool inside = inside_surface(team_, m_.field.mesh, team_.lane() == 0, centre);
-    if (team_.lane() == 0) m_.frame[top].inside = inside;
-    team_.sync();
-  }
-
-  /// Makes a node's ball one about it, whose centre is to tell sides: it lies on no plane, edge or
-  /// corner where solids are aligned.
-  IST_HD static void moved_ball(double (&x)[3], double& r) {
-    DiscMemory::move(r, x);
-    r *= 1 + kMoved;
-  }
-
   /// That of a child of the frame in work.
   IST_HD bool place_child(const ProbeFrame& frame, int child, double (&x)[3], double& r) const {
     const bool there = place_ball(m_, level_, frame.block, child, x, r);
@@ -121,10 +130,8 @@ class SurfaceWalk {
   IST_HD void begin(int level, std::uint32_t number) {
     opening_ = first_ = true;
     target_ = level;
-    const NodeBall ball = m_.tree.ball(level, number);
-    double centre[3], reach = ball.r * m_.place.a_from_b.scale;
-    m_.place.a_from_b.apply(ball.centre, centre);
-    moved_ball(centre, reach);
+    double centre[3], reach;
+    node_ball(m_.tree, level, number, m_.place.a_from_b, centre, reach);
     if (team_.lane() == 0) {
       ProbeFrame& frame = m_.frame[level];
       frame.block = number;
@@ -205,7 +212,7 @@ class SurfaceWalk {
   IST_HD void stage_leaves(const ProbeFrame& frame, int child, int other) {
     for (int half = team_.lane(); half < 2; half += Team::kWidth) {
       const int at = half == 0 ? child : other;
-      TestedBlock& tested = m_.discs.tested[half];
+      TestedBlock& tested = m_.tests.tested[half];
       double r;
       place_child(frame, at, tested.from, r);
       tested.inside = (frame.sides >> at & 1) != 0;
@@ -213,14 +220,14 @@ class SurfaceWalk {
       tested.triangles = frame.near_child(at);
     }
     team_.sync();
-    discs_.stage(other != child, true, true);
+    tests_.stage(other != child, true, true);
   }
 
   /// Readies the test of a leaf with triangles of its own, from the top of what is open, alone or
   /// in blocks.
   IST_HD void stage_leaf() {
     const ProbeFrame& frame = m_.frame[0];
-    if (team_.lane() == 0) m_.discs.seen.look_from(frame.centre, frame.reach);
+    if (team_.lane() == 0) m_.tests.seen.look_from(frame.centre, frame.reach);
     const int rank = size_ > 0 ? rank_of(m_.open[size_ - 1]) : kTriangle;
     const int most = rank == kTriangle ? kSeen : kPairsAtOnce;
     const int each = rank == kTriangle ? 1 : static_cast<int>(kWidth);
@@ -231,18 +238,17 @@ class SurfaceWalk {
     for (int i = 0; i < kItemsALane; ++i) {
       bool comes = item(i) < have * each;
       if (comes) {
-        const TriangleId id = {
+        const std::uint32_t id =
             number_of(m_.open[size_ - 1 - item(i) / each]) * static_cast<std::uint32_t>(each) +
-                static_cast<std::uint32_t>(item(i) % each),
-            0};
+            static_cast<std::uint32_t>(item(i) % each);
         see(item(i), id);
-        comes = SeenTriangles::meets(m_.discs.seen.from_centre(item(i)), 1 + kSeenRoom);
+        comes = SeenTriangles::meets(m_.tests.seen.from_centre(item(i)), 1 + kSeenRoom);
       }
       near |= team_.ballot(comes) << (i * Team::kWidth);
     }
     size_ -= have;
     for (int half = team_.lane(); half < 2; half += Team::kWidth) {
-      TestedBlock& tested = m_.discs.tested[half];
+      TestedBlock& tested = m_.tests.tested[half];
       for (int k = 0; k < 3; ++k) tested.from[k] = frame.centre[k];
       tested.inside = frame.inside;
       tested.block = frame.block;
@@ -250,7 +256,7 @@ class SurfaceWalk {
     }
     team_.sync();
     opening_ = size_ > 0;
-    discs_.stage(false, first_, !opening_);
+    tests_.stage(false, first_, !opening_);
     first_ = false;
   }
 
@@ -274,7 +280,7 @@ class SurfaceWalk {
       const bool is_child = place_child(frame, lane, x, r);
       if (is_child && triangles) {
         std::uint32_t unclear = 0;
-        crossed = discs_.meet(frame.centre, seen_, x, r, {item(i), true}, near, unclear);
+        crossed = tests_.meet(frame.centre, seen_, x, r, {item(i), true}, near, unclear);
         untold = unclear != 0 ||
                  !SurfaceSource::balls_meet({{x[0], x[1], x[2]}, 0}, frame.centre, frame.reach);
       } else if (is_child) {
@@ -311,23 +317,23 @@ class SurfaceWalk {
   }
 
   /// Sees a triangle, by one lane.
-  IST_HD void see(int place, const TriangleId& id) {
+  IST_HD void see(int place, SurfaceSource::Id id) {
     double c[3][3];
     source_.corners(id, c);
-    m_.discs.id[place] = id;
-    m_.discs.seen.see(place, c);
+    m_.tests.id[place] = id;
+    m_.tests.seen.see(place, c);
   }
 
   /// Sees what is listed of triangles; whether that is all of the list.
   IST_HD bool see_list(const ProbeFrame& frame) {
-    if (team_.lane() == 0) m_.discs.seen.look_from(frame.centre, frame.reach);
+    if (team_.lane() == 0) m_.tests.seen.look_from(frame.centre, frame.reach);
     team_.sync();
     bool other = false;
     for (int k = team_.lane(); k < count_; k += Team::kWidth) {
       const SurfaceNode node = frame.list[k];
       other = other || rank_of(node) != kTriangle;
       if (rank_of(node) != kTriangle) continue;
-      see(k, {number_of(node), 0});
+      see(k, number_of(node));
     }
     team_.sync();
     return !team_.any(other);
@@ -337,14 +343,14 @@ class SurfaceWalk {
   IST_HD std::uint32_t meet_list(const ProbeFrame& frame, int half, const double (&x)[3],
                                  double r) const {
     float at[3];
-    m_.discs.seen.seen(x, at);
-    const float radius = m_.discs.seen.seen_radius(r);
+    m_.tests.seen.seen(x, at);
+    const float radius = m_.tests.seen.seen_radius(r);
     std::uint32_t near = 0;
     IST_ROLLED
     for (int k = half; k < count_; k += 2) {
       const SurfaceNode node = frame.list[k];
       const bool meets = rank_of(node) == kTriangle
-                             ? SeenTriangles::meets(m_.discs.seen.from(k, at), radius)
+                             ? SeenTriangles::meets(m_.tests.seen.from(k, at), radius)
                              : SurfaceSource::balls_meet(m_.field.mesh.ball(node), x, r);
       near |= meets ? 1u << k : 0;
     }
@@ -402,10 +408,11 @@ class SurfaceWalk {
   IST_HD int item(int i) const { return i * Team::kWidth + team_.lane(); }
 
   const Team& team_;
-  SurfaceMemory& m_;
+  SurfaceWalkMemory& m_;
   PartSums& sums_;
   SurfaceSource source_;
-  DiscSums<Team, SurfaceSource> discs_;
+  BallTests<Team, SurfaceSource> tests_;
+  bool more_ = true;          ///< nodes are left
   int level_ = 0;             ///< where it is: at the children of a frame
   bool opening_ = false;      ///< a node has begun
   int target_ = 0;            ///< its level

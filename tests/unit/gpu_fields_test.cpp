@@ -259,7 +259,7 @@ TEST(GpuFields, NodesOnATrianglesPlane) {
     const bool beside = i % 2 == 0;
     const double u = i % 10 == 1 ? 0 : random.uniform(0, 0.5);
     const double v = i % 10 == 1 ? 0 : random.uniform(0, 0.5);
-    if (beside) gpu::DiscMemory::move(ball.r, moved);
+    if (beside) gpu::move_away(ball.r, moved);
     for (int k = 0; k < 3; ++k)
       on[k] = field.frame.centre[k] +
               field.frame.unit * ((1 - u - v) * c[0][k] + u * c[1][k] + v * c[2][k]);
@@ -393,6 +393,53 @@ TEST(GpuFields, LanesOfAWarpNeedNoLuck) {
     EXPECT_NEAR(by_warp[i].volume, by_one[i].volume, 1e-11 * (by_one[i].volume + size));
     EXPECT_EQ(by_warp[i].sphere_pairs, by_one[i].sphere_pairs) << i;
     EXPECT_EQ(by_warp[i].node_visits, by_one[i].node_visits) << i;
+  }
+}
+
+/// However many rounds there are, and whether pairs find room in one.
+TEST(GpuFields, RoomChangesNoBit) {
+  const auto count = static_cast<std::uint32_t>(batch_fields().size());
+  std::vector<BatchPair> pairs;
+  for (std::uint32_t f = 0; f < count; ++f)
+    for (const BatchPair& pair : pairs_with(f, 40, 90 + f)) pairs.push_back(pair);
+  for (std::uint32_t f = 0; f < count; ++f) {  // and some of which much meets
+    BatchPair pair = pairs_with(f, 1, 90)[0];
+    pair.pose_b = pair.pose_a;
+    pair.scale_b = 2;
+    for (pair.b = 0; pair.b < batch_views().size(); ++pair.b) pairs.push_back(pair);
+  }
+  HostFieldBatch roomy(batch_views(), batch_field_values());
+  roomy.query_room = static_cast<std::uint32_t>(pairs.size());
+  roomy.part_room = 100 * roomy.query_room;
+  roomy.word_room = 10000 * roomy.query_room;
+  const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched, 1);
+  EXPECT_EQ(roomy.rounds, 2u);  // of facets and of meshes
+  const auto large = [](const HostFieldBatch& batch) {
+    return batch.counters.large[gpu::kFacets] + batch.counters.large[gpu::kMesh];
+  };
+  EXPECT_GT(roomy.counters.listed[gpu::kFacets], 30u);
+  EXPECT_GT(roomy.counters.listed[gpu::kMesh], 30u);
+  EXPECT_GT(large(roomy), 0u);  // of a leaf more is listed than there is room for
+
+  struct Room {
+    const char* of;
+    std::uint32_t queries, parts, words, most_rounds;
+    bool more_are_large, many_rounds;
+  };
+  for (const Room& room : {Room{"few pairs", 3, 300, 30000, ~0u, false, true},
+                           Room{"few parts", 40, 5, 30000, ~0u, true, false},
+                           Room{"few words", 40, 300, 520, ~0u, true, true},
+                           Room{"few rounds", 5, 300, 30000, 2, false, false},
+                           Room{"none", 5, 300, 30000, 0, false, false}}) {
+    HostFieldBatch batch(batch_views(), batch_field_values());
+    batch.query_room = room.queries;
+    batch.part_room = room.parts;
+    batch.word_room = room.words;
+    batch.most_rounds = room.most_rounds;
+    SCOPED_TRACE(room.of);
+    expect_same_bits(batch.run(pairs, Measure::matched, 1), expected);
+    EXPECT_EQ(large(batch) > large(roomy), room.more_are_large) << large(batch);
+    EXPECT_EQ(batch.rounds > 20, room.many_rounds) << batch.rounds;
   }
 }
 

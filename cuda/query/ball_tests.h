@@ -1,0 +1,258 @@
+#pragma once
+
+#include <cstdint>
+
+#include "cuda/query/bits.h"
+#include "cuda/query/field_walk.h"
+#include "cuda/query/met_balls.h"
+#include "cuda/query/part_sums.h"
+#include "cuda/query/seen_triangles.h"
+#include "numerics/host_device.h"
+
+// Balls of leaf blocks tested against triangles, by one team. Those that no triangle meets are
+// inside or outside as a whole, and summed; the others are held, with what may meet them, for
+// DiscSums.
+
+namespace ist::gpu {
+
+/// A leaf block that is tested. Each half of the team's items tests one; or both are the same, and
+/// the halves share its triangles.
+struct TestedBlock {
+  double from[3];  ///< a point within the block's ball, if crossings tell sides
+  bool inside;     ///< its side
+  std::uint32_t block;
+  std::uint32_t triangles;  ///< of those seen, a bit each
+};
+
+constexpr std::uint8_t kNotHeld = 255;
+
+template <class Id>
+struct TestMemory {
+  SeenTriangles seen;
+  Id id[kSeen];  ///< of what is seen
+  TestedBlock tested[2];
+  std::uint8_t held_as[kItems];  ///< balls of the blocks that are tested; kNotHeld
+  MetBalls<Id> met;
+};
+
+/// Source: what has the triangles.
+///   Id: what it calls one
+///   kCrossings: sides are told by the triangles on the way from TestedBlock::from, all of which
+///     come near the block; else by inside()
+///   corners(id, c): of a triangle
+///   crosses(from, x, id): whether the way goes through a triangle, exactly
+///   settles(x, r, part): whether a ball's part is told without triangles
+///   each_near(team, x, reach, visit): visit(there, id) by all lanes for all triangles near a ball
+///   inside(team, wanted, x): whether a lane's point is inside
+///
+/// Blocks are staged, tested, and what may meet is listed, a round at a time by a loop of the
+/// caller's, so that each step is in a kernel's code once:
+///
+///   if (step()) continue;
+///   if (full()) …   // take what is met(), forget(false)
+///   else …          // stage() where there is room() for a first test, else take, forget(true)
+template <class Team, class Source>
+class BallTests {
+ public:
+  using Id = typename Source::Id;
+
+  IST_HD BallTests(const Team& team, const ProbeMemory& probe, TestMemory<Id>& memory,
+                   const Source& source, PartSums& sums)
+      : team_(team), probe_(probe), m_(memory), source_(source), sums_(sums) {
+    for (std::uint32_t& met : met_) met = 0;
+  }
+
+  /// Whether the first test of blocks finds room; if not, until forget(true).
+  IST_HD bool room() const { return held_ + kItems <= kHeldBalls && pairs_ <= kPairsAtFirst; }
+
+  /// Whether what may meet no longer finds room, until forget().
+  IST_HD bool full() const { return lists_ && pairs_ + kItems > kPairRoom; }
+
+  /// What is held and listed.
+  IST_HD MetView<Id> met() const {
+    return {m_.met.balls, m_.met.triangles, m_.met.of_ball, held_, pairs_};
+  }
+  /// Makes room where that has been taken: for more of the same balls, or for others at the `end`
+  /// of a part.
+  IST_HD void forget(bool end) {
+    pairs_ = 0;
+    held_ = end ? 0 : held_;
+  }
+
+  /// Readies the test of the balls of m_.tested, two blocks or one by both halves, against what is
+  /// seen: `first` and `last` of one that has triangles for more than one test.
+  IST_HD void stage(bool two, bool first, bool last) {
+    two_ = two;
+    first_ = first;
+    last_ = last;
+    tests_ = true;
+  }
+
+  /// Goes on with what is staged; false where nothing is, or no room.
+  IST_HD bool step() {
+    if (full() || (!lists_ && !tests_)) return false;
+    if (lists_)
+      list();
+    else
+      test();
+    return true;
+  }
+
+  /// What an item takes of triangles: all, or every other as the other half does the rest.
+  struct Share {
+    bool shared, second;
+    IST_HD Share(int item, bool shared)
+        : shared(shared), second(shared && item >= static_cast<int>(kWidth)) {}
+    IST_HD std::uint32_t first(std::uint32_t of) const { return second ? of & (of - 1) : of; }
+    IST_HD std::uint32_t next(std::uint32_t left) const {
+      left &= left - 1;
+      return shared ? left & (left - 1) : left;
+    }
+  };
+
+  /// Which of the triangles that are seen may meet a ball. If crossings tell sides: whether its
+  /// centre is on the other side of them than `from`, but for those where that is unclear.
+  IST_HD bool meet(const double (&from)[3], std::uint32_t triangles, const double (&x)[3], double r,
+                   const Share& share, std::uint32_t& met, std::uint32_t& unclear) const {
+    float begin[3], end[3];
+    m_.seen.seen(x, end);
+    if constexpr (Source::kCrossings) m_.seen.seen(from, begin);
+    const float radius = m_.seen.seen_radius(r);
+    bool crossed = false;
+    IST_ROLLED
+    for (std::uint32_t left = share.first(triangles); left != 0; left = share.next(left)) {
+      const int k = lowest_bit(left);
+      const std::uint32_t bit = left & (~left + 1);
+      const SeenFrom to = m_.seen.from(k, end);
+      if (SeenTriangles::meets(to, radius)) met |= bit;
+      if constexpr (Source::kCrossings) {
+        const Crossing crossing = SeenTriangles::crosses(m_.seen.from(k, begin), to);
+        crossed = crossed != (crossing == Crossing::yes);
+        if (crossing == Crossing::unclear) unclear |= bit;
+      }
+    }
+    return crossed;
+  }
+
+ private:
+  /// Tests what is staged.
+  IST_HD void test() {
+    tests_ = false;
+    double x[kItemsALane][3], r[kItemsALane];
+    PartInside part[kItemsALane] = {};
+    bool settled[kItemsALane];
+    std::uint32_t touched = 0, odd = 0;
+    for (int i = 0; i < kItemsALane; ++i) {
+      const TestedBlock& block = tested(item(i));
+      met_[i] = 0;
+      bool crossed = false;
+      settled[i] = true;
+      if (place_ball(probe_, 0, block.block, item(i) % static_cast<int>(kWidth), x[i], r[i])) {
+        settled[i] = source_.settles(x[i], r[i], part[i]);
+        std::uint32_t unclear = 0;
+        if (!settled[i])
+          crossed = meet(block.from, block.triangles, x[i], r[i], Share(item(i), !two_), met_[i],
+                         unclear);
+        if constexpr (Source::kCrossings)
+          if (unclear != 0)
+            crossed = crossed != crosses_odd(source_, block.from, x[i], m_.id, unclear);
+      }
+      touched |= team_.ballot(met_[i] != 0) << (i * Team::kWidth);
+      odd |= team_.ballot(crossed) << (i * Team::kWidth);
+    }
+    constexpr std::uint32_t kHalf = (1u << kWidth) - 1;
+    lists_ = touched != 0;
+    if (!two_) {
+      touched = (touched | touched >> kWidth) & kHalf;
+      odd = (odd ^ odd >> kWidth) & kHalf;
+    }
+    odd_ = first_ ? odd : odd_ ^ odd;
+    for (int i = 0; i < kItemsALane; ++i) {
+      const bool is_ball = two_ || item(i) < static_cast<int>(kWidth);
+      if (first_ && is_ball) m_.held_as[item(i)] = kNotHeld;
+      const bool fresh =
+          is_ball && (touched >> item(i) & 1) != 0 && (first_ || m_.held_as[item(i)] == kNotHeld);
+      int total = 0;
+      const int place = held_ + team_.exclusive_count(fresh, total);
+      held_ += total;
+      if (fresh) hold(place, item(i));
+      if (!last_) continue;
+      const bool there = is_ball && r[i] > 0;
+      bool inside;
+      if constexpr (Source::kCrossings)
+        inside = tested(item(i)).inside != ((odd_ >> item(i) & 1) != 0);
+      else
+        inside = source_.inside(team_, there && !settled[i], x[i]);
+      if (!there) continue;
+      if (settled[i])
+        add_settled(x[i], part[i]);
+      else if (m_.held_as[item(i)] != kNotHeld)
+        m_.met.balls[m_.held_as[item(i)]] |= inside ? kCentreInside : 0;
+      else if (inside)
+        add_ball(probe_.place.a_from_b, x[i], r[i], true, 0, sums_);
+    }
+    team_.sync();
+  }
+
+  /// Lists a triangle a ball.
+  IST_HD void list() {
+    bool more = false;
+    for (int i = 0; i < kItemsALane; ++i) {
+      const bool meets = met_[i] != 0;
+      int total = 0;
+      const int place = pairs_ + team_.exclusive_count(meets, total);
+      pairs_ += total;
+      if (meets) {
+        const int ball = two_ ? item(i) : item(i) % static_cast<int>(kWidth);
+        m_.met.of_ball[place] = m_.held_as[ball];
+        m_.met.triangles[place] = m_.id[lowest_bit(met_[i])];
+        met_[i] &= met_[i] - 1;
+      }
+      more = more || met_[i] != 0;
+    }
+    lists_ = team_.any(more);
+    team_.sync();
+  }
+
+  IST_HD_COLD static bool crosses_odd(const Source source, const double (&from)[3],
+                                      const double (&x)[3], const Id* ids,
+                                      std::uint32_t triangles) {
+    bool odd = false;
+    for (; triangles != 0; triangles &= triangles - 1)
+      if (source.crosses(from, x, ids[lowest_bit(triangles)])) odd = !odd;
+    return odd;
+  }
+
+  IST_HD void hold(int place, int of_item) {
+    m_.met.balls[place] =
+        tested(of_item).block * kWidth + static_cast<std::uint32_t>(of_item) % kWidth;
+    m_.held_as[of_item] = static_cast<std::uint8_t>(place);
+  }
+
+  IST_HD void add_settled(const double (&x)[3], const PartInside& part) {
+    if (!(part.volume > 0)) return;
+    const double* const t = probe_.place.a_from_b.t;
+    const double at[3] = {x[0] - t[0], x[1] - t[1], x[2] - t[2]};
+    sums_.add(at, part.volume, part.gradient, part.moment);
+    ++sums_.spheres;
+  }
+
+  static constexpr int kItemsALane = kItems / Team::kWidth;
+  IST_HD int item(int i) const { return i * Team::kWidth + team_.lane(); }
+  IST_HD const TestedBlock& tested(int of_item) const {
+    return m_.tested[of_item / static_cast<int>(kWidth)];
+  }
+
+  const Team& team_;
+  const ProbeMemory& probe_;
+  TestMemory<Id>& m_;
+  const Source source_;
+  PartSums& sums_;
+  int held_ = 0, pairs_ = 0;
+  std::uint32_t met_[kItemsALane];  ///< triangles that meet an item's ball and wait to be listed
+  bool two_ = false, first_ = false, last_ = false;  ///< of what is tested
+  bool tests_ = false, lists_ = false;               ///< something waits
+  std::uint32_t odd_ = 0;  ///< balls that lie on the other side of what is known
+};
+
+}  // namespace ist::gpu

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <cstdint>
+
+#include "cuda/query/batch_steps.h"
+#include "cuda/query/field_ref.h"
+#include "cuda/query/field_walk.h"
+#include "cuda/query/lens_sums.h"
+#include "numerics/host_device.h"
+
+// A batch of fields and trees, as batch_arrays.h has it of trees. What is summed is in double.
+
+namespace ist::gpu {
+
+/// Counters of a round of pairs that triangles meet (facet_steps.h).
+struct FacetRound {
+  std::uint32_t first;   ///< of those listed
+  std::uint32_t walked;  ///< from there on, or more than there are
+  std::uint32_t parts, words;
+  std::uint32_t summed;  ///< parts
+};
+
+/// Counters of a batch with fields, by FieldGroup: zero at first.
+struct FieldCounters {
+  std::uint32_t listed[kFieldGroups];
+  std::uint32_t taken[kFieldGroups];
+  std::uint32_t large[kFieldGroups];  ///< pairs that found no room in their round
+  FacetRound round[kFieldGroups][2];  ///< the one in work, and the one before
+};
+
+constexpr std::uint32_t kNoPart = ~0u;
+
+/// A pair of a round.
+struct FacetQuery {
+  PairPlace place;
+  LensTotals walked;  ///< of balls that no triangle meets
+  std::uint32_t pair;
+  std::uint32_t first_part;  ///< kNoPart: none
+  bool inside;               ///< whether the centre of the root's node_ball() is; of a mesh
+  bool fits;                 ///< parts found room
+};
+
+/// Balls of a pair that triangles meet, as a walk has left them: MetView, in words.
+struct MetPart {
+  std::uint32_t query;  ///< of the round
+  std::uint32_t next;   ///< of the same pair, or kNoPart
+  std::uint32_t first_word;
+  std::uint32_t balls, pairs;
+  LensTotals totals;
+};
+
+/// Room for a round.
+struct FacetRoom {
+  FacetQuery* queries;
+  MetPart* parts;
+  std::uint32_t* words;
+  std::uint32_t query_room, part_room, word_room;
+};
+
+/// A batch of fields and trees in the memory of who works on it.
+struct FieldBatch {
+  const FieldRef* fields;
+  std::uint32_t field_count;
+  const AssetRef* assets;
+  std::uint32_t asset_count;
+  Measure measure;
+  GpuPairs pairs;  ///< asset_a: places of fields
+  GpuPenetrations answers;
+
+  FieldCounters* counters;
+  std::uint32_t* list[2];  ///< room for all pairs each
+  FacetRoom room;
+};
+
+/// Where the k-th pair of a group is listed: no pair is in two.
+IST_HD inline std::uint32_t& listed_pair(const FieldBatch& batch, int group, std::uint32_t k) {
+  if (group == kSmooth) return batch.list[0][k];
+  return batch.list[1][group == kMesh ? k : batch.pairs.count - 1 - k];
+}
+
+IST_HD inline bool place_field_pair(const FieldBatch& batch, std::uint32_t i, PairPlace& place) {
+  const GpuPairs& pairs = batch.pairs;
+  const std::uint32_t a = pairs.asset_a[i], b = pairs.asset_b[i];
+  if (a >= batch.field_count || b >= batch.asset_count) return false;
+  const FieldRef& field = batch.fields[a];
+  return field.kind != FieldKind::unusable &&
+         place.place(field.frame, pose_of(pairs.pose_a, i), scale_of(pairs.scale_a, i),
+                     batch.assets[b].frame, pose_of(pairs.pose_b, i), scale_of(pairs.scale_b, i));
+}
+
+/// Readies the memory for pair i, but for its place, which is there or after the team's next sync.
+template <class Team>
+IST_HD void load_solids(const Team& team, const FieldBatch& batch, std::uint32_t i,
+                        ProbeMemory& memory) {
+  const AssetRef& asset = batch.assets[batch.pairs.asset_b[i]];
+  copy_words(team, asset.tree[static_cast<int>(batch.measure)], memory.tree);
+  copy_words(team, asset.sums[static_cast<int>(batch.measure)], memory.sums);
+  copy_words(team, batch.fields[batch.pairs.asset_a[i]], memory.field);
+  team.sync();
+  if (team.lane() == 0) {
+    const double centre[3] = {memory.tree.root[0], memory.tree.root[1], memory.tree.root[2]};
+    double x[3];
+    memory.place.a_from_b.apply(centre, x);
+    for (int k = 0; k < 3; ++k) memory.whole[k] = x[k];
+    memory.whole[3] = memory.tree.root[3] * memory.place.a_from_b.scale;
+  }
+  team.sync();
+}
+
+}  // namespace ist::gpu

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+
+#include "cuda/query/field_walk.h"
+#include "cuda/query/part_sums.h"
+#include "numerics/host_device.h"
+
+// What a walk leaves to be summed: balls that triangles meet, each with those that may.
+
+namespace ist::gpu {
+
+constexpr int kHeldBalls = 128;
+constexpr int kPairRoom = 256;      ///< of balls and triangles
+constexpr int kPairsAtFirst = 128;  ///< no block's test begins with more
+static_assert(kHeldBalls % 32 == 0 && kHeldBalls <= 255 && kPairRoom >= 32);
+
+/// A ball of a tree, 16 · block + lane, and whether its centre is inside, in one word.
+using MetBall = std::uint32_t;
+constexpr MetBall kCentreInside = MetBall{1} << 31;
+
+/// Where they lie. `Id`: of a triangle, by whatever its source calls it.
+template <class Id>
+struct MetView {
+  const MetBall* balls;
+  const Id* triangles;          ///< [pairs]
+  const std::uint8_t* of_ball;  ///< [pairs]
+  int ball_count, pair_count;
+};
+
+template <class Id>
+struct MetBalls {
+  MetBall balls[kHeldBalls];
+  Id triangles[kPairRoom];
+  std::uint8_t of_ball[kPairRoom];
+};
+
+/// A ball that lies inside or outside but for cones over what meets it; its centre is at x, the
+/// field's frame.
+IST_HD inline void add_ball(const PairMap& a_from_b, const double (&x)[3], double r, bool inside,
+                            double cones, PartSums& sums) {
+  const double whole = 4 * kPi / 3 * (r * r * r);
+  const double part = (inside ? whole : 0) + cones;
+  const double volume = part < 0 ? 0 : part > whole ? whole : part;
+  const double none[3] = {0, 0, 0};
+  const double at[3] = {x[0] - a_from_b.t[0], x[1] - a_from_b.t[1], x[2] - a_from_b.t[2]};
+  sums.add(at, volume, none, none);
+  sums.spheres += inside && cones == 0 ? 1 : 0;
+}
+
+}  // namespace ist::gpu
