@@ -19,10 +19,11 @@ constexpr int kBlocksEach = 5;         ///< a multiprocessor; more leave too few
 __global__ void __launch_bounds__(kSiftThreads) sift_pairs(const BatchArrays batch) {
   const WarpTeam team;
   const std::uint64_t i = std::uint64_t{blockIdx.x} * kSiftThreads + threadIdx.x;
-  const PairUse use =
-      i < batch.pairs.count ? sift_pair(batch, static_cast<std::uint32_t>(i)) : PairUse::answered;
+  std::uint32_t meet = 0;
+  const PairUse use = i < batch.pairs.count ? sift_pair(batch, static_cast<std::uint32_t>(i), meet)
+                                            : PairUse::answered;
   const std::uint32_t place = list_place(team, use == PairUse::summed, &batch.counters->listed);
-  if (use == PairUse::summed) batch.list[place] = static_cast<std::uint32_t>(i);
+  if (use == PairUse::summed) list_pair(batch, static_cast<std::uint32_t>(i), meet, place);
   const std::uint32_t other = list_place(team, use == PairUse::detailed, &batch.counters->detailed);
   if (use == PairUse::detailed) batch.detailed[other] = static_cast<std::uint32_t>(i);
 }

@@ -70,15 +70,17 @@ IST_HD inline bool place_pair(const BatchArrays& batch, std::uint32_t i, PairPla
                      batch.assets[b].frame, pose_of(pairs.pose_b, i), scale_of(pairs.scale_b, i));
 }
 
-/// Whether some child of a root meets some child of the other root, to rounding.
-IST_HD inline bool children_meet(const TreeRef& a, const TreeRef& b, const PairMap& map) {
+/// How many pairs of children of two roots meet, to rounding; no more than `most` are counted.
+IST_HD inline std::uint32_t children_that_meet(const TreeRef& a, const TreeRef& b,
+                                               const PairMap& map, std::uint32_t most) {
   const BallBlock& of_a = in_global_memory(a.blocks[a.top])[0];
   const BallBlock& of_b = in_global_memory(b.blocks[b.top])[0];
   const Origin& from_a = a.origins[a.top][0];
   const Origin& from_b = b.origins[b.top][0];
   const auto scale = static_cast<float>(map.scale);
+  std::uint32_t meet = 0;
   IST_ROLLED
-  for (std::uint32_t j = 0; j < kWidth; ++j) {
+  for (std::uint32_t j = 0; j < kWidth && meet < most; ++j) {
     if (!(of_b.r[j] > 0)) continue;
     const double centre[3] = {from_b.x + static_cast<double>(of_b.x[j]),
                               from_b.y + static_cast<double>(of_b.y[j]),
@@ -89,16 +91,15 @@ IST_HD inline bool children_meet(const TreeRef& a, const TreeRef& b, const PairM
     const auto y = static_cast<float>(moved[1] - from_a.y);
     const auto z = static_cast<float>(moved[2] - from_a.z);
     const float r = of_b.r[j] * scale;
-    bool meets = false;
     for (std::uint32_t i = 0; i < kWidth; ++i) {
       const float dx = of_a.x[i] - x, dy = of_a.y[i] - y, dz = of_a.z[i] - z;
       const float reach = (of_a.r[i] + r) * (1 + kRoom);
-      meets =
-          meets || (of_a.r[i] > 0 && std::fma(dx, dx, std::fma(dy, dy, dz * dz)) < reach * reach);
+      const bool meets =
+          of_a.r[i] > 0 && std::fma(dx, dx, std::fma(dy, dy, dz * dz)) < reach * reach;
+      meet += meets ? 1 : 0;
     }
-    if (meets) return true;
   }
-  return false;
+  return meet < most ? meet : most;
 }
 
 /// Square of the distance of B's finest root from A's, A's unit frame.
@@ -110,16 +111,40 @@ IST_HD inline double root_distance2(const TreeRef& a, const TreeRef& b, const Pa
   return d2;
 }
 
-/// Whether the finest trees of pair i are to be summed; else it is answered.
-IST_HD inline bool sift_finest(const BatchArrays& batch, std::uint32_t i, const PairPlace& place) {
+/// How large the sum of pair i's finest trees is, as children_that_meet() counts; 0: it is
+/// answered.
+IST_HD inline std::uint32_t sift_finest(const BatchArrays& batch, std::uint32_t i,
+                                        const PairPlace& place) {
   const auto measure = static_cast<std::uint32_t>(batch.measure);
   const TreeRef& a = batch.assets[batch.pairs.asset_a[i]].tree[measure];
   const TreeRef& b = batch.assets[batch.pairs.asset_b[i]].tree[measure];
   const double reach = a.root[3] + b.root[3] * place.a_from_b.scale;
-  if (root_distance2(a, b, place) < reach * reach && children_meet(a, b, place.a_from_b))
-    return true;
+  if (root_distance2(a, b, place) < reach * reach) {
+    const std::uint32_t meet =
+        children_that_meet(a, b, place.a_from_b, batch.size_room > 0 ? kWidth * kWidth : 1);
+    if (meet > 0) return meet;
+  }
   write_nothing(batch.answers, i, QueryStatus::ok);
-  return false;
+  return 0;
+}
+
+/// Lists pair i as the at-th, or among those of its size: sift_finest().
+IST_HD inline void list_pair(const BatchArrays& batch, std::uint32_t i, std::uint32_t meet,
+                             std::uint32_t at) {
+  std::uint32_t size = batch.size_room > 0 ? kSizes - 1 : 0;
+  if (batch.size_room > 0) {
+    for (; meet > 1; meet /= 2) --size;
+    at = atomic_add(&batch.counters->of_size[size], 1);
+  }
+  batch.list[std::uint64_t{size} * batch.size_room + at] = i;
+}
+
+/// The k-th of the pairs that are listed.
+IST_HD inline std::uint32_t listed_pair(const BatchArrays& batch, std::uint32_t k) {
+  if (batch.size_room == 0) return batch.list[k];
+  std::uint32_t size = 0;
+  for (; k >= batch.counters->of_size[size]; ++size) k -= batch.counters->of_size[size];
+  return batch.list[std::uint64_t{size} * batch.size_room + k];
 }
 
 /// Whether pair i may ask for other levels of detail than the finest: under a budget, as long as
@@ -140,15 +165,16 @@ IST_HD inline bool needs_details(const BatchArrays& batch, std::uint32_t i,
 
 enum class PairUse { answered, summed, detailed };
 
-/// What is to be done of pair i. One thread a pair.
-IST_HD inline PairUse sift_pair(const BatchArrays& batch, std::uint32_t i) {
+/// What is to be done of pair i, and how large what is summed is. One thread a pair.
+IST_HD inline PairUse sift_pair(const BatchArrays& batch, std::uint32_t i, std::uint32_t& meet) {
   PairPlace place;
   if (!place_pair(batch, i, place)) {
     write_nothing(batch.answers, i, QueryStatus::invalid_input);
     return PairUse::answered;
   }
   if (needs_details(batch, i, place)) return PairUse::detailed;
-  return sift_finest(batch, i, place) ? PairUse::summed : PairUse::answered;
+  meet = sift_finest(batch, i, place);
+  return meet > 0 ? PairUse::summed : PairUse::answered;
 }
 
 /// Readies the memory for pair i, whose place is set or is there after the team's next sync.
@@ -261,7 +287,7 @@ IST_HD void place_pairs(const Team& team, const BatchArrays& batch, std::uint32_
                         std::uint32_t count, WorkMemory& memory) {
   for (auto k = static_cast<std::uint32_t>(team.lane()); k < count;
        k += static_cast<std::uint32_t>(Team::kWidth)) {
-    const std::uint32_t pair = batch.list[first + k];
+    const std::uint32_t pair = listed_pair(batch, first + k);
     PlacedPair& waits = memory.ahead[k > 0 ? count - 1 - k : 0];
     (k > 0 ? waits.pair : memory.pair) = pair;
     (k > 0 ? waits.at : memory.at) = first + k;

@@ -171,8 +171,10 @@ template <class Team>
 IST_HD void sum_details(const Team& team, const BatchArrays& batch, std::uint32_t i,
                         DetailMemory& memory) {
   if (DetailSums<Team>(team, batch, i, memory).run()) return;
-  if (team.lane() == 0 && sift_finest(batch, i, memory.pair.place))
-    batch.list[atomic_add(&batch.counters->listed, 1)] = i;
+  if (team.lane() == 0) {
+    const std::uint32_t meet = sift_finest(batch, i, memory.pair.place);
+    if (meet > 0) list_pair(batch, i, meet, atomic_add(&batch.counters->listed, 1));
+  }
   team.sync();
 }
 

@@ -105,7 +105,8 @@ std::size_t place_penetrations(std::byte* from, GpuWorkspace::Impl& room) {
   gpu::BatchArrays& arrays = room.arrays;
   arrays.counters = parts.take<gpu::BatchCounters>(1);
   room.field_counters = parts.take<gpu::FieldCounters>(1);
-  arrays.list = parts.take<std::uint32_t>(room.most_pairs);
+  const std::size_t sizes = arrays.size_room > 0 ? gpu::kSizes : 1;
+  arrays.list = parts.take<std::uint32_t>(sizes * room.most_pairs);
   arrays.detailed = parts.take<std::uint32_t>(room.most_pairs);
   const std::size_t lists = parts.used();
   const std::size_t facets = place_facets(from + lists, room.facet_room);

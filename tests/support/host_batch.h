@@ -31,7 +31,7 @@ class HostBatch {
     const std::size_t n = pairs.size();
     const PairColumns columns(pairs);
     BatchColumns to = BatchColumns::unwritten(n);
-    std::vector<std::uint32_t> list(n), detailed(n);
+    std::vector<std::uint32_t> list(gpu::kSizes * n), detailed(n);
     std::vector<gpu::SplitPair> splits(room_);
     std::vector<gpu::PairTask> tasks(room_);
     std::vector<std::uint32_t> posted(room_);
@@ -60,10 +60,12 @@ class HostBatch {
                                     room_,
                                     room_,
                                     most_alone,
-                                    task_weight};
+                                    task_weight,
+                                    by_size ? static_cast<std::uint32_t>(n) : 0};
     for (std::uint32_t i = 0; i < n; ++i) {
-      const gpu::PairUse use = gpu::sift_pair(batch, i);
-      if (use == gpu::PairUse::summed) list[counters.listed++] = i;
+      std::uint32_t meet = 0;
+      const gpu::PairUse use = gpu::sift_pair(batch, i, meet);
+      if (use == gpu::PairUse::summed) gpu::list_pair(batch, i, meet, counters.listed++);
       if (use == gpu::PairUse::detailed) detailed[counters.detailed++] = i;
     }
     const auto details = std::make_unique<gpu::DetailMemory>();
@@ -78,6 +80,7 @@ class HostBatch {
 
   gpu::BatchCounters counters;  ///< of the last run
   std::uint32_t most_alone = 0, task_weight = 0;
+  bool by_size = true;
 
   /// How pairs are cut up in a workspace for so many; for few at first.
   void cut_for(std::size_t most_pairs) {
@@ -85,6 +88,7 @@ class HostBatch {
     arrays.cut_for(most_pairs);
     most_alone = arrays.most_alone;
     task_weight = arrays.task_weight;
+    by_size = arrays.size_room > 0;
   }
 
  private:
