@@ -11,7 +11,9 @@ namespace {
 constexpr unsigned kWarps = 8;
 constexpr unsigned kThreads = 32 * kWarps;
 constexpr unsigned kBlocksEach = 6;  // blocks a multiprocessor
-constexpr int kBlockLevels = 4;  // coarsest levels, of few cells with long lists: a block a cell
+// The coarsest levels, of few cells with long lists: a block a cell, of so many threads.
+constexpr unsigned kLongThreads = 1024;
+constexpr int kLongLevels = 3, kBlockLevels = 5;
 
 /// A cell to look into, with its parent's list.
 struct PowerTask {
@@ -139,7 +141,7 @@ __device__ void look_into(const Team& team, const PowerRound& round, const Power
   if (needed && at < round.task_room) round.tasks[child.level % 2][at] = {child, first, kept};
 }
 
-__device__ std::uint32_t least(std::uint32_t a, std::uint32_t b) { return a < b ? a : b; }
+__host__ __device__ std::uint32_t least(std::uint32_t a, std::uint32_t b) { return a < b ? a : b; }
 
 __global__ void start_round(PowerRound round, std::uint32_t site_count) {
   const std::uint32_t k = blockIdx.x * kThreads + threadIdx.x;
@@ -156,10 +158,11 @@ __global__ void start_round(PowerRound round, std::uint32_t site_count) {
 }
 
 /// A level of few cells: a block a cell.
-__global__ void __launch_bounds__(kThreads) look_into_blocks(PowerRound round, int level) {
-  __shared__ BlockTeam<kThreads>::Shared shared;
+template <unsigned kEach>
+__global__ void __launch_bounds__(kEach) look_into_blocks(PowerRound round, int level) {
+  __shared__ typename BlockTeam<kEach>::Shared shared;
   __shared__ std::uint32_t short_list[kPowerLeafSites];
-  const BlockTeam<kThreads> team(shared);
+  const BlockTeam<kEach> team(shared);
   const std::uint32_t count = least(round.task_counts[level], round.task_room);
   for (std::uint32_t k = blockIdx.x; k < count; k += gridDim.x) {
     look_into(team, round, round.tasks[level % 2][k], short_list);
@@ -256,12 +259,14 @@ class Relaxation {
     start_round<<<(count_ + kThreads - 1) / kThreads, kThreads, 0, stream>>>(round, count_);
     unsigned most = 1;  // cells of the level
     for (int level = grid_.levels - 1; level >= 0; --level) {
-      if (level + kBlockLevels >= grid_.levels) {
-        look_into_blocks<<<most, kThreads, 0, stream>>>(round, level);
-        most *= 8;
-      } else {
+      const int above = grid_.levels - 1 - level;
+      if (above < kLongLevels)
+        look_into_blocks<kLongThreads><<<most, kLongThreads, 0, stream>>>(round, level);
+      else if (above < kBlockLevels)
+        look_into_blocks<kThreads><<<least(most, blocks), kThreads, 0, stream>>>(round, level);
+      else
         look_into_cells<<<blocks, kThreads, 0, stream>>>(round, level);
-      }
+      most = least(8 * most, blocks);
     }
     check_launch("cutting power cells");
   }
