@@ -243,7 +243,7 @@ int measure(Report& report) {
         {std::string("on a mesh, ") + ratio + " of its size", nullptr, &dino4k,
          small_poses("small_elephant_dino", ratio), ratio == std::string("0.3") ? 0.0 : 20.0, 0,
          &mesh},
-        1e-6, many / 10);
+        1e-6, many);
   for (const char* const name : {"pen", "deep", "contain", "sep"}) {
     std::vector<BatchPair> poses = oracle_poses(name);
     for (BatchPair& pair : poses) pair.b = 0;  // the only tree

@@ -263,7 +263,7 @@ class Relaxation {
       if (above < kLongLevels)
         look_into_blocks<kLongThreads><<<most, kLongThreads, 0, stream>>>(round, level);
       else if (above < kBlockLevels)
-        look_into_blocks<kThreads><<<least(most, blocks), kThreads, 0, stream>>>(round, level);
+        look_into_blocks<kThreads><<<most, kThreads, 0, stream>>>(round, level);
       else
         look_into_cells<<<blocks, kThreads, 0, stream>>>(round, level);
       most = least(8 * most, blocks);

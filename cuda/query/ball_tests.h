@@ -24,8 +24,6 @@ struct TestedBlock {
   std::uint32_t triangles;  ///< of those seen, a bit each
 };
 
-constexpr std::uint8_t kNotHeld = 255;
-
 template <class Id>
 struct TestMemory {
   SeenTriangles seen;

@@ -15,6 +15,20 @@ IST_HD inline double least(double x, double y) { return x < y ? x : y; }
 IST_HD inline double most(double x, double y) { return x > y ? x : y; }
 IST_HD inline double size_of(double x) { return x < 0 ? -x : x; }
 
+/// By less than this part of its radius a ball is moved, to be told from beside an edge on which
+/// its centre lies.
+constexpr double kMoved = 0x1p-10;
+
+/// In a direction in which no edge of a made thing lies (kAway, query/probe/patch_sums.cpp).
+IST_HD inline double moved_along(int axis) {
+  return 0x1p-12 * (axis == 0 ? 0.43877 : axis == 1 ? 0.61803 : 0.65236);
+}
+IST_HD inline void move_away(double r, double (&at)[3]) {
+  at[0] += moved_along(0) * r;
+  at[1] += moved_along(1) * r;
+  at[2] += moved_along(2) * r;
+}
+
 /// A triangle as balls meet it (SurfacePatch): its plane's axes, of which the first runs along the
 /// first edge.
 struct TrianglePlane {

@@ -18,20 +18,6 @@ namespace ist::gpu {
 constexpr std::uint32_t kNoBall = ~0u;
 constexpr int kCutRoom = 64;  ///< what is left after a round of a warp, and what a round may add
 static_assert(kCutRoom >= 2 * 32 - 1);
-/// By less than this part of its radius a ball is moved, to be told from beside an edge on which
-/// its centre lies.
-constexpr double kMoved = 0x1p-10;
-
-/// In a direction in which no edge of a made thing lies (kAway, query/probe/patch_sums.cpp).
-IST_HD inline double moved_along(int axis) {
-  return 0x1p-12 * (axis == 0 ? 0.43877 : axis == 1 ? 0.61803 : 0.65236);
-}
-IST_HD inline void move_away(double r, double (&at)[3]) {
-  at[0] += moved_along(0) * r;
-  at[1] += moved_along(1) * r;
-  at[2] += moved_along(2) * r;
-}
-
 template <class Id>
 struct BallTriangle {
   std::uint32_t ball;
@@ -57,8 +43,8 @@ class DiscSums {
                   const Source& source, PartSums& sums)
       : team_(team), probe_(probe), m_(memory), source_(source), sums_(sums) {}
 
-  /// Sums what is listed; at the `end` of a part what is held. More of the same part may follow
-  /// before.
+  /// Sums what is listed; at the `end` of a part what is held, for which the source's room is to be
+  /// free. More of the same part may follow before.
   IST_HD void add(const MetView<Id>& met, bool end) {
     load(met);
     int next = 0;

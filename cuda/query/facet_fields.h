@@ -190,7 +190,7 @@ class FacetWalk {
     team_.sync();
   }
 
-  /// As SurfaceWalk.
+  /// As SurfaceWalk, but that it goes on to the end, without tests, where take() is false.
   template <class Take>
   IST_HD void run(const Take& take) {
     FieldWalk<Team> walk(team_, m_, sums_);

@@ -84,7 +84,7 @@ FacetGrids facet_grids() {
 
 template <class Kind>
 void launch_facets(const FieldBatch& batch, const FacetGrids& grids, cudaStream_t stream) {
-  constexpr std::uint64_t kLeastOfRound = 1 << 15;  // if most leave as much as they may
+  constexpr std::uint64_t kLeastOfRound = 1 << 14;  // of pairs that keep some 700 words each
   const auto rounds =
       static_cast<std::uint32_t>((batch.pairs.count + kLeastOfRound - 1) / kLeastOfRound);
   const std::uint64_t most = batch.room.query_room;

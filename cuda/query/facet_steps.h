@@ -24,7 +24,7 @@ struct MetMemory : More {
   DiscMemory<typename Source::Id> discs;
 };
 
-/// What meshes are made of; FacetKind: boxes and terrains.
+/// Meshes: their group, what has their triangles, who walks them, and the memory of both.
 struct MeshKind {
   static constexpr FieldGroup kGroup = kMesh;
   using Source = SurfaceSource;
@@ -48,6 +48,7 @@ struct MeshKind {
   }
 };
 
+/// Boxes and terrains.
 struct FacetKind {
   static constexpr FieldGroup kGroup = kFacets;
   using Source = FacetSource;

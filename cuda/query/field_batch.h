@@ -23,7 +23,7 @@ struct FacetRound {
 /// Counters of a batch with fields, by FieldGroup: zero at first.
 struct FieldCounters {
   std::uint32_t listed[kFieldGroups];
-  std::uint32_t taken[kFieldGroups];
+  std::uint32_t taken[kFieldGroups];  ///< of smooth ones, and of those that are in no round
   std::uint32_t large[kFieldGroups];  ///< pairs that found no room in their round
   FacetRound round[kFieldGroups][2];  ///< the one in work, and the one before
 };

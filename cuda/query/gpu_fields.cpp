@@ -16,7 +16,7 @@ struct GpuFields::Impl {
   gpu::DeviceBytes memory;
   const gpu::FieldRef* refs = nullptr;
   std::size_t size = 0;
-  bool has_kind[gpu::kFieldGroups] = {};
+  bool has_group[gpu::kFieldGroups] = {};
 };
 
 GpuFields::GpuFields(std::span<const Field> fields, const GpuSettings& settings)
@@ -43,7 +43,7 @@ GpuFields::GpuFields(std::span<const Field> fields, const GpuSettings& settings)
   auto* const at = reinterpret_cast<gpu::FieldRef*>(impl_->memory.data());
   gpu::copy_to_device<gpu::FieldRef>(at, refs, queue);
   impl_->refs = at;
-  for (const gpu::FieldRef& field : refs) impl_->has_kind[gpu::group_of(field.kind)] = true;
+  for (const gpu::FieldRef& field : refs) impl_->has_group[gpu::group_of(field.kind)] = true;
   queue.wait();
 }
 
@@ -77,7 +77,7 @@ void penetration_batch(const GpuAssets& assets, const GpuFields& fields, const G
                                  {room.arrays.list, room.arrays.detailed},
                                  room.facet_room};
   const gpu::DeviceGuard guard(trees.device);
-  gpu::launch_field_batch(batch, solids.has_kind, room.field_grids, stream);
+  gpu::launch_field_batch(batch, solids.has_group, room.field_grids, stream);
 }
 
 }  // namespace ist

@@ -13,7 +13,9 @@ namespace ist::gpu {
 constexpr int kHeldBalls = 128;
 constexpr int kPairRoom = 256;      ///< of balls and triangles
 constexpr int kPairsAtFirst = 128;  ///< no block's test begins with more
-static_assert(kHeldBalls % 32 == 0 && kHeldBalls <= 255 && kPairRoom >= 32);
+constexpr std::uint8_t kNotHeld = 255;
+static_assert(kHeldBalls % 32 == 0 && kHeldBalls <= kNotHeld);
+static_assert(kItems == 32 && kPairsAtFirst + kItems <= kPairRoom);  // a word has a bit an item
 
 /// A ball of a tree, 16 · block + lane, and whether its centre is inside, in one word.
 using MetBall = std::uint32_t;

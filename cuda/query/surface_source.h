@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdint>
 
-#include "cuda/query/disc_part.h"
 #include "cuda/query/field_walk.h"
 #include "cuda/query/surface_sides.h"
 #include "numerics/host_device.h"

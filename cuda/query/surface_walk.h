@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "cuda/query/ball_tests.h"
-#include "cuda/query/disc_sums.h"
+#include "cuda/query/disc_part.h"
 #include "cuda/query/field_walk.h"
 #include "cuda/query/surface_source.h"
 #include "numerics/host_device.h"
@@ -87,7 +87,8 @@ class SurfaceWalk {
   }
 
   /// Hands over what triangles meet, part by part: take(met, end), `end` being false where more of
-  /// the same part follows; stops where that is false.
+  /// the same part follows; stops where that is false. At the end of a part nothing is open: the
+  /// source's room is free then.
   ///
   /// One small step after another: each is in the kernel's code once, which would overflow the
   /// instruction cache otherwise.

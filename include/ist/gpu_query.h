@@ -72,7 +72,8 @@ inline constexpr std::size_t kFewGpuPairs = 16'384;
 /// Device memory that a batch works in. One batch at a time may use it.
 class GpuWorkspace {
  public:
-  /// For batches of up to `most_pairs`; takes 8 bytes each and 100 MB besides.
+  /// For batches of up to `most_pairs`; takes 8 bytes each, 40 where they are few, and
+  /// 100 MB besides.
   ///
   /// One for up to kFewGpuPairs cuts them up finer than a larger one: a step of few then ends
   /// sooner, at the cost of pairs a second. Answers of the two differ by rounding.

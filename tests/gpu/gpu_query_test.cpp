@@ -99,6 +99,39 @@ TEST_F(GpuQueryTest, ManyPairsInFieldsHaveTheSameBitsInEveryRun) {
   expect_same_bits(many.get(), repeated);
 }
 
+/// More than a round has room for, and some more than any has.
+TEST_F(GpuQueryTest, LargePairsInMeshesHaveTheSameBitsHoweverManyThereAre) {
+  FieldScene scene(500);
+  std::vector<BatchPair> some;
+  for (BatchPair pair : scene.pairs) {
+    if (pair.a >= scene.all.size() || !std::holds_alternative<MeshField>(scene.all[pair.a]))
+      continue;
+    pair.pose_b = pair.pose_a;
+    pair.scale_b = 2 * pair.scale_a;
+    some.push_back(pair);
+  }
+  ASSERT_GE(some.size(), 30u);
+  std::vector<BatchPair> pairs;
+  for (std::size_t i = 0; i < 60000; ++i) pairs.push_back(some[(i * 7919) % some.size()]);
+  const GpuAssets assets(batch_views());
+  const GpuFields fields(scene.all);
+  GpuWorkspace workspace(pairs.size());
+  const Stream stream;
+  const DeviceBatch few(some), many(pairs);
+  penetration_batch(assets, fields, few.pairs(), Measure::matched, workspace, few.answers(),
+                    stream);
+  penetration_batch(assets, fields, many.pairs(), Measure::matched, workspace, many.answers(),
+                    stream);
+  stream.wait();
+  const std::vector<Penetration> expected = few.get();
+  std::vector<Penetration> repeated;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    repeated.push_back(expected[(i * 7919) % some.size()]);
+  expect_same_bits(many.get(), repeated);
+  HostFieldBatch host(batch_views(), scene.all);
+  expect_same_bits(expected, host.run(some, Measure::matched, 1));
+}
+
 TEST_F(GpuQueryTest, BudgetsAndCopiesHaveTheBitsOfAWarpOnTheHost) {
   std::vector<BatchPair> pairs = detailed_pairs(60, 16);
   for (const BatchPair& copy : copies_in_place(30, 17)) pairs.push_back(copy);

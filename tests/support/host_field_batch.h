@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -91,6 +92,7 @@ class HostFieldBatch {
       for (std::uint32_t k = 0; k < std::min(round.parts, part_room); ++k)
         by_team(seed, [&](const auto& team) { gpu::sum_part<Kind>(team, batch, k, *sums); });
       for (std::uint32_t k = 0; k < round.walked; ++k) gpu::answer_query(batch, k);
+      if (round.walked == 0) throw std::logic_error("a round has no room for a pair");
       first = gpu::end_of<Kind>(batch, round);
     }
     const std::uint32_t large = counters.large[Kind::kGroup];

@@ -140,6 +140,54 @@ TEST(GpuQuery, SameBitsHoweverItIsSplit) {
   }
 }
 
+/// Of few, within a factor of two; many keep their order.
+TEST(GpuQuery, TheLargestPairsBegin) {
+  constexpr std::uint32_t kPairs = 1000;
+  RandomPairs random(8);
+  std::vector<std::uint32_t> meet(kPairs), list(gpu::kSizes * kPairs);
+  for (std::uint32_t& m : meet) m = static_cast<std::uint32_t>(std::exp2(random.uniform(0, 8)));
+  for (const std::uint32_t room : {kPairs, 0u}) {
+    gpu::BatchCounters counters = {};
+    gpu::BatchArrays batch = {};
+    batch.counters = &counters;
+    batch.list = list.data();
+    batch.size_room = room;
+    for (std::uint32_t i = 0; i < kPairs; ++i) gpu::list_pair(batch, i, meet[i], counters.listed++);
+    std::vector<bool> seen(kPairs);
+    std::uint32_t least = 1u << gpu::kSizes;
+    for (std::uint32_t k = 0; k < kPairs; ++k) {
+      const std::uint32_t pair = gpu::listed_pair(batch, k);
+      ASSERT_LT(pair, kPairs);
+      EXPECT_FALSE(seen[pair]);
+      seen[pair] = true;
+      EXPECT_TRUE(room > 0 ? meet[pair] < 2 * least : pair == k);
+      least = std::min(least, meet[pair]);
+    }
+  }
+}
+
+/// By far fewer or more than all, children meet or do not.
+TEST(GpuQuery, CountsChildrenThatMeet) {
+  HostAssets assets(batch_views());
+  std::size_t some = 0, all = 0;
+  for (const BatchPair& pair : RandomPairs(9).pairs(300)) {
+    const gpu::AssetRef& a = assets.refs()[pair.a];
+    const gpu::AssetRef& b = assets.refs()[pair.b];
+    gpu::PairPlace place;
+    ASSERT_TRUE(
+        place.place(a.frame, pair.pose_a, pair.scale_a, b.frame, pair.pose_b, pair.scale_b));
+    const auto count = [&](std::uint32_t most) {
+      return gpu::children_that_meet(a.tree[0], b.tree[0], place.a_from_b, most);
+    };
+    const std::uint32_t meet = count(kWidth * kWidth);
+    EXPECT_EQ(count(1), meet > 0 ? 1u : 0u);
+    some += meet > 0 ? 1 : 0;
+    all += meet;
+  }
+  EXPECT_GT(some, 50u);
+  EXPECT_GT(all, 5 * some);
+}
+
 TEST(GpuQuery, LanesOfAWarpNeedNoLuck) {
   RandomPairs poses(5);
   const std::vector<BatchPair> pairs = poses.pairs(60);
