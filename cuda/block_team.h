@@ -7,12 +7,12 @@
 namespace ist::gpu {
 
 /// The threads of a block (numerics/team.h). All of them must make the same calls.
-template <unsigned kThreads>
+template <int kThreads>
 class BlockTeam {
-  static constexpr int kWarps = static_cast<int>(kThreads / 32);
+  static constexpr int kWarps = kThreads / 32;
 
  public:
-  static constexpr int kWidth = static_cast<int>(kThreads);
+  static constexpr int kWidth = kThreads;
 
   struct Shared {
     std::uint64_t words[kWarps];

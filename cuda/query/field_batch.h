@@ -12,8 +12,8 @@
 
 namespace ist::gpu {
 
-/// Counters of a round of pairs that triangles meet (facet_steps.h).
-struct FacetRound {
+/// Counters of a round of pairs that triangles meet (triangle_steps.h).
+struct TriangleRound {
   std::uint32_t first;   ///< of those listed
   std::uint32_t walked;  ///< from there on, or more than there are
   std::uint32_t parts, words;
@@ -23,15 +23,15 @@ struct FacetRound {
 /// Counters of a batch with fields, by FieldGroup: zero at first.
 struct FieldCounters {
   std::uint32_t listed[kFieldGroups];
-  std::uint32_t taken[kFieldGroups];  ///< of smooth ones, and of those that are in no round
-  std::uint32_t large[kFieldGroups];  ///< pairs that found no room in their round
-  FacetRound round[kFieldGroups][2];  ///< the one in work, and the one before
+  std::uint32_t taken[kFieldGroups];     ///< of smooth ones, and of those that are in no round
+  std::uint32_t large[kFieldGroups];     ///< pairs that found no room in their round
+  TriangleRound round[kFieldGroups][2];  ///< the one in work, and the one before
 };
 
 constexpr std::uint32_t kNoPart = ~0u;
 
 /// A pair of a round.
-struct FacetQuery {
+struct TriangleQuery {
   PairPlace place;
   LensTotals walked;  ///< of balls that no triangle meets
   std::uint32_t pair;
@@ -50,8 +50,8 @@ struct MetPart {
 };
 
 /// Room for a round.
-struct FacetRoom {
-  FacetQuery* queries;
+struct TriangleRoom {
+  TriangleQuery* queries;
   MetPart* parts;
   std::uint32_t* words;
   std::uint32_t query_room, part_room, word_room;
@@ -69,7 +69,7 @@ struct FieldBatch {
 
   FieldCounters* counters;
   std::uint32_t* list[2];  ///< room for all pairs each
-  FacetRoom room;
+  TriangleRoom room;
 };
 
 /// Where the k-th pair of a group is listed: no pair is in two.

@@ -36,8 +36,8 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_smooth_pairs(const 
 }  // namespace
 
 FieldGrids field_grids() {
-  return {blocks_at_a_time(sum_smooth_pairs, kThreads), facet_grids<FacetKind>(),
-          facet_grids<MeshKind>()};
+  return {blocks_at_a_time(sum_smooth_pairs, kThreads), triangle_grids<FacetKind>(),
+          triangle_grids<MeshKind>()};
 }
 
 void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups],
@@ -49,8 +49,8 @@ void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups]
     sum_smooth_pairs<<<static_cast<unsigned>(grids.smooth), kThreads, 0, stream>>>(batch);
     check_launch("summing trees in fields");
   }
-  if (has[kFacets]) launch_facets<FacetKind>(batch, grids.facets, stream);
-  if (has[kMesh]) launch_facets<MeshKind>(batch, grids.mesh, stream);
+  if (has[kFacets]) launch_triangle_pairs<FacetKind>(batch, grids.facets, stream);
+  if (has[kMesh]) launch_triangle_pairs<MeshKind>(batch, grids.mesh, stream);
 }
 
 }  // namespace ist::gpu

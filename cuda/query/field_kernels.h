@@ -2,15 +2,15 @@
 
 #include <cuda_runtime_api.h>
 
-#include "cuda/query/facet_kernels.h"
 #include "cuda/query/field_steps.h"
+#include "cuda/query/triangle_kernels.h"
 
 namespace ist::gpu {
 
 /// Blocks that the current device runs at a time.
 struct FieldGrids {
   int smooth;
-  FacetGrids facets, mesh;
+  TriangleGrids facets, mesh;
 };
 
 FieldGrids field_grids();

@@ -7,7 +7,7 @@
 #include "numerics/team.h"
 
 // A batch of fields and trees, step by step, as batch_steps.h has it of trees; with
-// triangles: facet_steps.h.
+// triangles: triangle_steps.h.
 
 namespace ist::gpu {
 

@@ -75,7 +75,7 @@ void penetration_batch(const GpuAssets& assets, const GpuFields& fields, const G
                                  answers,
                                  room.field_counters,
                                  {room.arrays.list, room.arrays.detailed},
-                                 room.facet_room};
+                                 room.triangle_room};
   const gpu::DeviceGuard guard(trees.device);
   gpu::launch_field_batch(batch, solids.has_group, room.field_grids, stream);
 }

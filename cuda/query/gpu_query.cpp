@@ -89,9 +89,9 @@ void place_splits(gpu::Parts& parts, gpu::BatchArrays& batch) {
 
 /// Room for pairs that triangles meet: trees in fields need the lists of place_penetrations(), and
 /// not its other memory.
-std::size_t place_facets(std::byte* from, gpu::FacetRoom& room) {
+std::size_t place_triangle_room(std::byte* from, gpu::TriangleRoom& room) {
   gpu::Parts parts(from);
-  room.queries = parts.take<gpu::FacetQuery>(kRoomForQueries);
+  room.queries = parts.take<gpu::TriangleQuery>(kRoomForQueries);
   room.parts = parts.take<gpu::MetPart>(kRoomForParts);
   room.words = parts.take<std::uint32_t>(kRoomForWords);
   room.query_room = kRoomForQueries;
@@ -109,14 +109,14 @@ std::size_t place_penetrations(std::byte* from, GpuWorkspace::Impl& room) {
   arrays.list = parts.take<std::uint32_t>(sizes * room.most_pairs);
   arrays.detailed = parts.take<std::uint32_t>(room.most_pairs);
   const std::size_t lists = parts.used();
-  const std::size_t facets = place_facets(from + lists, room.facet_room);
+  const std::size_t triangles = place_triangle_room(from + lists, room.triangle_room);
   place_splits(parts, arrays);
   arrays.places = parts.take<gpu::PairPlace>(kRoomForSplits);
   arrays.totals = parts.take<gpu::LensTotals>(kRoomForSplits + kRoomForTasks);
   arrays.entries_a = parts.take<std::uint32_t>(kRoomForEntries);
   arrays.entries_b = parts.take<std::uint32_t>(kRoomForEntries);
   arrays.entry_room = kRoomForEntries;
-  return std::max(parts.used(), lists + facets);
+  return std::max(parts.used(), lists + triangles);
 }
 
 std::size_t place_separations(std::byte* from, GpuWorkspace::Impl& room) {

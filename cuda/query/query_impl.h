@@ -37,7 +37,7 @@ struct GpuWorkspace::Impl {
   gpu::PatchArrays patches{};
   std::size_t patch_room = 0;  ///< [bytes] at patches.rooms
   gpu::FieldCounters* field_counters = nullptr;
-  gpu::FacetRoom facet_room{};
+  gpu::TriangleRoom triangle_room{};
 };
 
 namespace gpu {

@@ -77,31 +77,37 @@ TEST_F(GpuQueryTest, FieldsHaveTheBitsOfAWarpOnTheHost) {
   }
 }
 
-TEST_F(GpuQueryTest, ManyPairsInFieldsHaveTheSameBitsInEveryRun) {
-  const FieldScene scene(3000);
+/// Asks for some pairs in fields, then for `count` among which they come again and again; both
+/// have the same answers, which it returns.
+std::vector<Penetration> ask_for_few_and_many(const std::vector<Field>& all,
+                                              const std::vector<BatchPair>& some,
+                                              std::size_t count) {
   std::vector<BatchPair> pairs;
-  for (std::size_t i = 0; i < 300000; ++i)
-    pairs.push_back(scene.pairs[(i * 7919) % scene.pairs.size()]);
+  for (std::size_t i = 0; i < count; ++i) pairs.push_back(some[(i * 7919) % some.size()]);
   const GpuAssets assets(batch_views());
-  const GpuFields fields(scene.all);
+  const GpuFields fields(all);
   GpuWorkspace workspace(pairs.size());
   const Stream stream;
-  const DeviceBatch few(scene.pairs), many(pairs);
+  const DeviceBatch few(some), many(pairs);
   penetration_batch(assets, fields, few.pairs(), Measure::matched, workspace, few.answers(),
                     stream);
   penetration_batch(assets, fields, many.pairs(), Measure::matched, workspace, many.answers(),
                     stream);
   stream.wait();
-  const std::vector<Penetration> expected = few.get();
-  std::vector<Penetration> repeated;
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    repeated.push_back(expected[(i * 7919) % scene.pairs.size()]);
+  std::vector<Penetration> expected = few.get(), repeated;
+  for (std::size_t i = 0; i < count; ++i) repeated.push_back(expected[(i * 7919) % some.size()]);
   expect_same_bits(many.get(), repeated);
+  return expected;
+}
+
+TEST_F(GpuQueryTest, ManyPairsInFieldsHaveTheSameBitsInEveryRun) {
+  const FieldScene scene(3000);
+  ask_for_few_and_many(scene.all, scene.pairs, 300000);
 }
 
 /// More than a round has room for, and some more than any has.
 TEST_F(GpuQueryTest, LargePairsInMeshesHaveTheSameBitsHoweverManyThereAre) {
-  FieldScene scene(500);
+  const FieldScene scene(500);
   std::vector<BatchPair> some;
   for (BatchPair pair : scene.pairs) {
     if (pair.a >= scene.all.size() || !std::holds_alternative<MeshField>(scene.all[pair.a]))
@@ -111,25 +117,9 @@ TEST_F(GpuQueryTest, LargePairsInMeshesHaveTheSameBitsHoweverManyThereAre) {
     some.push_back(pair);
   }
   ASSERT_GE(some.size(), 30u);
-  std::vector<BatchPair> pairs;
-  for (std::size_t i = 0; i < 60000; ++i) pairs.push_back(some[(i * 7919) % some.size()]);
-  const GpuAssets assets(batch_views());
-  const GpuFields fields(scene.all);
-  GpuWorkspace workspace(pairs.size());
-  const Stream stream;
-  const DeviceBatch few(some), many(pairs);
-  penetration_batch(assets, fields, few.pairs(), Measure::matched, workspace, few.answers(),
-                    stream);
-  penetration_batch(assets, fields, many.pairs(), Measure::matched, workspace, many.answers(),
-                    stream);
-  stream.wait();
-  const std::vector<Penetration> expected = few.get();
-  std::vector<Penetration> repeated;
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    repeated.push_back(expected[(i * 7919) % some.size()]);
-  expect_same_bits(many.get(), repeated);
   HostFieldBatch host(batch_views(), scene.all);
-  expect_same_bits(expected, host.run(some, Measure::matched, 1));
+  expect_same_bits(ask_for_few_and_many(scene.all, some, 60000),
+                   host.run(some, Measure::matched, 1));
 }
 
 TEST_F(GpuQueryTest, BudgetsAndCopiesHaveTheBitsOfAWarpOnTheHost) {

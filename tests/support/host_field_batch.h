@@ -8,9 +8,9 @@
 
 #include <ist/field.h>
 
-#include "cuda/query/facet_steps.h"
 #include "cuda/query/field_steps.h"
 #include "cuda/query/make_field_ref.h"
+#include "cuda/query/triangle_steps.h"
 #include "support/host_batch.h"
 
 namespace ist::testing {
@@ -60,19 +60,19 @@ class HostFieldBatch {
   }
 
   gpu::FieldCounters counters;  ///< of the last run
-  /// gpu::FacetRoom
+  /// gpu::TriangleRoom
   std::uint32_t query_room = 7, part_room = 20, word_room = 3000, most_rounds = ~0u;
   std::uint32_t rounds = 0;  ///< of the last run
 
  private:
-  gpu::FacetRoom room() {
+  gpu::TriangleRoom room() {
     queries_.resize(query_room);
     parts_.resize(part_room);
     words_.resize(word_room);
     return {queries_.data(), parts_.data(), words_.data(), query_room, part_room, word_room};
   }
 
-  /// The kernels of facet_kernels.cu.
+  /// The kernels of triangle_kernels.cu.
   template <class Kind>
   void sum_rounds(const gpu::FieldBatch& batch, unsigned seed) {
     const auto walks = std::make_unique<typename Kind::WalkMemory>();
@@ -81,7 +81,7 @@ class HostFieldBatch {
     const std::uint32_t listed = counters.listed[Kind::kGroup];
     std::uint32_t first = 0;
     for (std::uint32_t n = 0; n < most_rounds && first < listed; ++n, ++rounds) {
-      gpu::FacetRound& round = gpu::round_of<Kind>(batch, n);
+      gpu::TriangleRound& round = gpu::round_of<Kind>(batch, n);
       round = {first, 0, 0, 0, 0};
       const std::uint32_t count = gpu::pairs_from<Kind>(batch, first);
       for (std::uint32_t k = 0; k < count; ++k) gpu::place_query<Kind>(batch, k, first + k);
@@ -105,7 +105,7 @@ class HostFieldBatch {
   }
 
   HostAssets assets_;
-  std::vector<gpu::FacetQuery> queries_;
+  std::vector<gpu::TriangleQuery> queries_;
   std::vector<gpu::MetPart> parts_;
   std::vector<std::uint32_t> words_;
   std::vector<gpu::FieldRef> fields_;

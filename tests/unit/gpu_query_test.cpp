@@ -166,7 +166,7 @@ TEST(GpuQuery, TheLargestPairsBegin) {
   }
 }
 
-/// By far fewer or more than all, children meet or do not.
+/// All that meet, or whether any does.
 TEST(GpuQuery, CountsChildrenThatMeet) {
   HostAssets assets(batch_views());
   std::size_t some = 0, all = 0;

@@ -1,4 +1,4 @@
-#include "cuda/query/facet_kernels.h"
+#include "cuda/query/triangle_kernels.h"
 
 #include "cuda/check.h"
 #include "cuda/launch.h"
@@ -29,7 +29,7 @@ template <class Kind>
 __global__ void __launch_bounds__(kThreads, kBlocksEach)
     walk_queries(const FieldBatch batch, const std::uint32_t n) {
   __shared__ typename Kind::WalkMemory memory[kWarps];
-  FacetRound& round = round_of<Kind>(batch, n);
+  TriangleRound& round = round_of<Kind>(batch, n);
   by_warps(
       pairs_from<Kind>(batch, round.first), &round.walked,
       [&](const WarpTeam& team, std::uint32_t k) {
@@ -42,7 +42,7 @@ template <class Kind>
 __global__ void __launch_bounds__(kThreads, kBlocksEach)
     sum_parts(const FieldBatch batch, const std::uint32_t n) {
   __shared__ SumMemory<Kind> memory[kWarps];
-  FacetRound& round = round_of<Kind>(batch, n);
+  TriangleRound& round = round_of<Kind>(batch, n);
   const std::uint32_t room = batch.room.part_room;
   by_warps(round.parts < room ? round.parts : room, &round.summed,
            [&](const WarpTeam& team, std::uint32_t k) {
@@ -76,14 +76,15 @@ __global__ void __launch_bounds__(kWholeThreads, kWholeBlocksEach)
 }  // namespace
 
 template <class Kind>
-FacetGrids facet_grids() {
+TriangleGrids triangle_grids() {
   return {blocks_at_a_time(walk_queries<Kind>, kThreads),
           blocks_at_a_time(sum_parts<Kind>, kThreads),
           blocks_at_a_time(sum_the_rest<Kind>, kWholeThreads)};
 }
 
 template <class Kind>
-void launch_facets(const FieldBatch& batch, const FacetGrids& grids, cudaStream_t stream) {
+void launch_triangle_pairs(const FieldBatch& batch, const TriangleGrids& grids,
+                           cudaStream_t stream) {
   constexpr std::uint64_t kLeastOfRound = 1 << 14;  // of pairs that keep some 700 words each
   const auto rounds =
       static_cast<std::uint32_t>((batch.pairs.count + kLeastOfRound - 1) / kLeastOfRound);
@@ -105,9 +106,11 @@ void launch_facets(const FieldBatch& batch, const FacetGrids& grids, cudaStream_
   check_launch("summing what is left among triangles");
 }
 
-template FacetGrids facet_grids<MeshKind>();
-template FacetGrids facet_grids<FacetKind>();
-template void launch_facets<MeshKind>(const FieldBatch&, const FacetGrids&, cudaStream_t);
-template void launch_facets<FacetKind>(const FieldBatch&, const FacetGrids&, cudaStream_t);
+template TriangleGrids triangle_grids<MeshKind>();
+template TriangleGrids triangle_grids<FacetKind>();
+template void launch_triangle_pairs<MeshKind>(const FieldBatch&, const TriangleGrids&,
+                                              cudaStream_t);
+template void launch_triangle_pairs<FacetKind>(const FieldBatch&, const TriangleGrids&,
+                                               cudaStream_t);
 
 }  // namespace ist::gpu

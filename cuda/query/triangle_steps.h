@@ -72,7 +72,7 @@ using WholeMemory = MetMemory<typename Kind::Source, typename Kind::WalkMemory>;
 
 /// The counters of the n-th round.
 template <class Kind>
-IST_HD FacetRound& round_of(const FieldBatch& batch, std::uint32_t n) {
+IST_HD TriangleRound& round_of(const FieldBatch& batch, std::uint32_t n) {
   return batch.counters->round[Kind::kGroup][n % 2];
 }
 
@@ -85,21 +85,21 @@ IST_HD std::uint32_t pairs_from(const FieldBatch& batch, std::uint32_t first) {
 
 /// Pairs of a round that were walked.
 template <class Kind>
-IST_HD std::uint32_t walked_of(const FieldBatch& batch, const FacetRound& round) {
+IST_HD std::uint32_t walked_of(const FieldBatch& batch, const TriangleRound& round) {
   const std::uint32_t most = pairs_from<Kind>(batch, round.first);
   return round.walked < most ? round.walked : most;
 }
 
 /// Where the round after this one begins.
 template <class Kind>
-IST_HD std::uint32_t end_of(const FieldBatch& batch, const FacetRound& round) {
+IST_HD std::uint32_t end_of(const FieldBatch& batch, const TriangleRound& round) {
   return round.first + walked_of<Kind>(batch, round);
 }
 
 /// Places the k-th pair of a round, `listed` among all; by one thread.
 template <class Kind>
 IST_HD void place_query(const FieldBatch& batch, std::uint32_t k, std::uint32_t listed) {
-  FacetQuery& query = batch.room.queries[k];
+  TriangleQuery& query = batch.room.queries[k];
   query.pair = listed_pair(batch, Kind::kGroup, listed);
   place_field_pair(batch, query.pair, query.place);
   query.first_part = kNoPart;
@@ -111,7 +111,8 @@ IST_HD void place_query(const FieldBatch& batch, std::uint32_t k, std::uint32_t 
 
 /// Whether a round has room for one more pair, as far as can be told. `teams`: those that walk, of
 /// which each may still need as many words as pairs took before.
-IST_HD inline bool goes_on(const FieldBatch& batch, const FacetRound& round, std::uint32_t teams) {
+IST_HD inline bool goes_on(const FieldBatch& batch, const TriangleRound& round,
+                           std::uint32_t teams) {
   constexpr std::uint32_t kLeastEach = 512;
   const std::uint32_t words = atomic_load(&round.words);
   const std::uint32_t each = words / (atomic_load(&round.walked) + 1);
@@ -122,7 +123,7 @@ IST_HD inline bool goes_on(const FieldBatch& batch, const FacetRound& round, std
 /// Takes room for a part that follows the one `before`, and keeps it there; kNoPart if there is
 /// none. All of the team together.
 template <class Team, class Id>
-IST_HD std::uint32_t keep_part(const Team& team, const FacetRoom& room, FacetRound& round,
+IST_HD std::uint32_t keep_part(const Team& team, const TriangleRoom& room, TriangleRound& round,
                                std::uint32_t query, std::uint32_t before, const MetView<Id>& met) {
   constexpr std::uint32_t kIdWords = sizeof(Id) / sizeof(std::uint32_t);
   const auto balls = static_cast<std::uint32_t>(met.ball_count);
@@ -157,7 +158,7 @@ IST_HD std::uint32_t keep_part(const Team& team, const FacetRoom& room, FacetRou
 
 /// A part as it was kept.
 template <class Id>
-IST_HD MetView<Id> met_of(const FacetRoom& room, const MetPart& part) {
+IST_HD MetView<Id> met_of(const TriangleRoom& room, const MetPart& part) {
   const MetBall* const balls = room.words + part.first_word;
   const auto* const triangles = reinterpret_cast<const Id*>(balls + part.balls);
   return {balls, triangles, reinterpret_cast<const std::uint8_t*>(triangles + part.pairs),
@@ -166,7 +167,7 @@ IST_HD MetView<Id> met_of(const FacetRoom& room, const MetPart& part) {
 
 /// Readies the memory for a query.
 template <class Team>
-IST_HD void load_query(const Team& team, const FieldBatch& batch, const FacetQuery& query,
+IST_HD void load_query(const Team& team, const FieldBatch& batch, const TriangleQuery& query,
                        ProbeMemory& memory) {
   copy_words(team, query.place, memory.place);
   load_solids(team, batch, query.pair, memory);
@@ -174,9 +175,9 @@ IST_HD void load_query(const Team& team, const FieldBatch& batch, const FacetQue
 
 /// Walks the k-th pair of a round: its parts are kept, or it is listed among the large.
 template <class Kind, class Team>
-IST_HD void walk_query(const Team& team, const FieldBatch& batch, FacetRound& round,
+IST_HD void walk_query(const Team& team, const FieldBatch& batch, TriangleRound& round,
                        std::uint32_t k, typename Kind::WalkMemory& memory) {
-  FacetQuery& query = batch.room.queries[k];
+  TriangleQuery& query = batch.room.queries[k];
   load_query(team, batch, query, memory);
   PartSums sums;
   typename Kind::template Walk<Team> walk(team, memory, sums);
@@ -218,7 +219,7 @@ IST_HD void sum_part(const Team& team, const FieldBatch& batch, std::uint32_t k,
 
 /// Answers the k-th pair of a round, by one thread.
 IST_HD inline void answer_query(const FieldBatch& batch, std::uint32_t k) {
-  const FacetQuery& query = batch.room.queries[k];
+  const TriangleQuery& query = batch.room.queries[k];
   if (!query.fits) return;
   LensTotals sum;
   sum.clear();
