@@ -23,6 +23,7 @@ struct Builder {
   const char* name;
   Clustering clustering;
   bool swaps;
+  bool like_inner = false;  ///< the matched spheres' tree from the inner ones' order, as bakes do
 };
 
 constexpr Builder kBuilders[] = {
@@ -30,6 +31,7 @@ constexpr Builder kBuilders[] = {
     {"2-means, swaps", Clustering::two_means, true},
     {"neural gas", Clustering::neural_gas, false},
     {"neural gas, swaps", Clustering::neural_gas, true},
+    {"like the inner spheres'", Clustering::neural_gas, true, true},
 };
 
 /// The asset with its trees built again.
@@ -42,9 +44,12 @@ Asset rebuilt(const Asset& asset, const Builder& builder) {
   arrays.inner_spheres = copy(at<Sphere>(header, header.inner_spheres));
   arrays.cover_radii = copy(at<float>(header, header.cover_radii));
   arrays.matched_spheres = copy(at<Sphere>(header, header.matched_spheres));
-  arrays.inner_tree =
-      build_tree(arrays.inner_spheres, arrays.cover_radii, builder.clustering, builder.swaps);
-  arrays.matched_tree = build_tree(arrays.matched_spheres, {}, builder.clustering, builder.swaps);
+  const std::vector<std::uint32_t> order =
+      sphere_order(arrays.inner_spheres, builder.clustering, builder.swaps);
+  arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, order);
+  arrays.matched_tree = builder.like_inner ? build_tree_like(arrays.matched_spheres, order)
+                                           : build_tree(arrays.matched_spheres, {},
+                                                        builder.clustering, builder.swaps);
   return Asset(asset_bytes(arrays), builder.name);
 }
 

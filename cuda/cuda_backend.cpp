@@ -39,6 +39,10 @@ class CudaBackend final : public SolidBackend {
   CudaBackend(const MeshSolid& solid, const GpuSettings& settings)
       : solid_(solid), settings_(usable(settings)), queue_(settings_) {}
 
+  /// One beside the backend that made the tree.
+  CudaBackend(const MeshSolid& solid, const GpuSettings& settings, const WideTree* tree)
+      : solid_(solid), settings_(settings), queue_(settings_, true), tree_(tree) {}
+
   SpherePacking pack(const PackingSettings& settings, const ProgressCallback& progress) override {
     const UnitFrame frame = solid_.frame();
     Stage stage("pack", progress, settings.time_limit);
@@ -73,19 +77,28 @@ class CudaBackend final : public SolidBackend {
     return std::make_unique<CudaBackend>(other, settings_);
   }
 
+  /// Of a caller's stream and memory there is one, for one thread.
+  std::function<std::unique_ptr<SolidBackend>()> beside() override {
+    if (settings_.stream != nullptr || settings_.memory != nullptr) return {};
+    tree();
+    queue_.wait();
+    return [this] { return std::make_unique<CudaBackend>(solid_, settings_, tree_); };
+  }
+
   bool leaves_threads_idle() const override { return true; }
 
  private:
   /// The mesh's hierarchy, made when it is first needed: the grids have none.
   const WideTree& tree() {
-    if (!mesh_) mesh_.emplace(queue_, host_mesh(solid_.arrays()));
-    return mesh_->tree();
+    if (tree_ == nullptr) tree_ = &mesh_.emplace(queue_, host_mesh(solid_.arrays())).tree();
+    return *tree_;
   }
 
   const MeshSolid& solid_;
   const GpuSettings settings_;
   Queue queue_;
   std::optional<DeviceMesh> mesh_;
+  const WideTree* tree_ = nullptr;
 };
 
 }  // namespace

@@ -25,8 +25,9 @@ class DeviceGuard {
 /// it is used.
 class Queue {
  public:
-  /// Throws Error if the device cannot be used.
-  explicit Queue(const GpuSettings& settings);
+  /// `waits`: where other queues have work to do at the same time, it comes first, if the stream is
+  /// the queue's own. Throws Error if the device cannot be used.
+  explicit Queue(const GpuSettings& settings, bool waits = false);
   ~Queue();
   Queue(const Queue&) = delete;
   Queue& operator=(const Queue&) = delete;

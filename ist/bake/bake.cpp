@@ -3,8 +3,11 @@
 #include <tbb/task_group.h>
 
 #include <algorithm>
-#include <chrono>
+#include <atomic>
 #include <functional>
+#include <future>
+#include <memory>
+#include <span>
 #include <utility>
 
 #include <ist/error.h>
@@ -17,6 +20,7 @@
 #include "bake/field/field.h"
 #include "bake/mass_and_bounds.h"
 #include "packing/base/packing_settings.h"
+#include "stage/aside.h"
 #include "stage/stage.h"
 #include "stage/thread_arena.h"
 
@@ -83,15 +87,48 @@ class HostWork {
       waiting_.push_back(std::move(work));
   }
 
+  /// To be called by both of two that a work has to wait for: the later adds it.
+  std::function<void()> add_after_both(std::function<void()> work) {
+    return [this, left = std::make_shared<std::atomic<int>>(2), work = std::move(work)] {
+      if (--*left == 0) add(work);
+    };
+  }
+
   void finish() {
+    at_once_ = true;
     for (std::function<void()>& work : waiting_) group_.run(std::move(work));
     group_.wait();
   }
 
  private:
-  const bool at_once_;
+  bool at_once_;
   std::vector<std::function<void()>> waiting_;
   tbb::task_group group_;
+};
+
+/// A part of a bake that is done on another thread, and stopped where the scope is left before it
+/// has come to its end.
+class Aside {
+ public:
+  Aside(unsigned threads, const std::function<void(const ProgressCallback&)>& work)
+      : done_(do_aside(threads, [this, work] {
+          work([this](const Progress&) { return !stopped_.load(std::memory_order_relaxed); });
+        })) {}
+  ~Aside() { stopped_.store(true, std::memory_order_relaxed); }
+  Aside(const Aside&) = delete;
+  Aside& operator=(const Aside&) = delete;
+
+  /// Waits for the end, as a stage of that name.
+  void finish(const char* name, std::size_t spheres, const ProgressCallback& progress) {
+    Stage stage(name, progress);
+    wait_for(done_, [&] { stage.step(spheres, 0.5); });
+    done_.get();
+    stage.step(spheres, 1);
+  }
+
+ private:
+  std::atomic<bool> stopped_ = false;
+  std::future<void> done_;  ///< last: waits for the thread
 };
 
 }  // namespace
@@ -116,23 +153,53 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   arrays.header = describe_bake(mesh, solid, settings, packing);
   arrays.inner_spheres = packing.spheres;
 
-  host.add([&] { inner_order = sphere_order(arrays.inner_spheres); });
+  // The finest matched spheres lie much as the inner ones do, whose order is found meanwhile.
+  const auto grow_finest = host.add_after_both(
+      [&] { arrays.matched_tree = build_tree_like(arrays.matched_spheres, inner_order); });
+  host.add([&, grow_finest] {
+    inner_order = sphere_order(arrays.inner_spheres);
+    grow_finest();
+  });
   host.add([&] { describe_bounds(solid, 0, arrays.header); });
 
-  // The finest first: while its tree grows, the largest, the others are calibrated.
   const std::vector<std::size_t> counts = detail_counts(count);
   arrays.details.resize(counts.size() - 1);
-  const auto grow_tree = [&](std::size_t i, Calibration made) {
-    DetailArrays* const detail = i > 0 ? &arrays.details[i - 1] : nullptr;
-    std::vector<Sphere>& spheres = detail ? detail->matched_spheres : arrays.matched_spheres;
-    TreeArrays& tree = detail ? detail->matched_tree : arrays.matched_tree;
-    spheres = std::move(made.matched);
-    (detail ? detail->protrusion : arrays.header.protrusion) = made.protrusion;
-    host.add([&spheres, &tree] { tree = build_tree(spheres, {}); });
+  const auto calibrate_levels = [&](std::size_t first, std::size_t end, SolidBackend& on,
+                                    HostWork& trees, const ProgressCallback& report) {
+    const auto take = [&](std::size_t i, Calibration made) {
+      if (first + i == 0) {
+        arrays.matched_spheres = std::move(made.matched);
+        arrays.header.protrusion = made.protrusion;
+        grow_finest();
+        return;
+      }
+      DetailArrays& detail = arrays.details[first + i - 1];
+      detail.matched_spheres = std::move(made.matched);
+      detail.protrusion = made.protrusion;
+      trees.add([&detail] { detail.matched_tree = build_tree(detail.matched_spheres, {}); });
+    };
+    if (first < end)
+      calibrate_prefixes(solid, on, packing.spheres, std::span(counts).subspan(first, end - first),
+                         report, take);
   };
-  calibrate_prefixes(solid, backend, packing.spheres, counts, progress, grow_tree);
-
-  arrays.cover_radii = cover_radii(solid, backend, packing.spheres, progress);
+  const auto cover = [&](SolidBackend& on, const ProgressCallback& report) {
+    arrays.cover_radii = cover_radii(solid, on, packing.spheres, report);
+  };
+  if (const auto beside = backend.beside()) {
+    Aside rest(settings.threads, [&](const ProgressCallback& report) {
+      const std::unique_ptr<SolidBackend> other = beside();
+      HostWork trees(true);  // a task group belongs to the threads of one arena
+      calibrate_levels(1, counts.size(), *other, trees, report);
+      cover(*other, report);
+      trees.finish();
+    });
+    calibrate_levels(0, 1, backend, host, progress);
+    rest.finish("cover", count, progress);
+  } else {
+    // The finest first: while its tree grows, the largest, the others are calibrated.
+    calibrate_levels(0, counts.size(), backend, host, progress);
+    cover(backend, progress);
+  }
 
   Stage stage("tree", progress);
   stage.step(count, 0);
@@ -147,13 +214,11 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
 
 void SolidField::start() {
   if (made_.valid()) return;
-  made_ = std::async(std::launch::async, [this]() -> std::shared_ptr<const FieldArrays> {
+  made_ = do_aside(threads_, [this]() -> std::shared_ptr<const FieldArrays> {
             if (!settings_.wanted) return nullptr;
             try {
-              return thread_arena(threads_).execute([this]() -> std::shared_ptr<const FieldArrays> {
-                auto built = build_field(solid_, settings_.error / solid_.frame().scale(), stop_);
-                return built ? std::make_shared<const FieldArrays>(*std::move(built)) : nullptr;
-              });
+              auto built = build_field(solid_, settings_.error / solid_.frame().scale(), stop_);
+              return built ? std::make_shared<const FieldArrays>(*std::move(built)) : nullptr;
             } catch (const WorkStop::Stopped&) {
               return nullptr;
             }
@@ -162,7 +227,7 @@ void SolidField::start() {
 
 std::shared_ptr<const FieldArrays> SolidField::wait(const std::function<void()>& meanwhile) {
   start();
-  while (made_.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) meanwhile();
+  wait_for(made_, meanwhile);
   return made_.get();
 }
 
