@@ -78,7 +78,7 @@ void* Queue::allocate(std::size_t bytes) {
     throw Error(
         "GPU: no device memory left for " + std::to_string(bytes) + " more bytes (" +
         std::to_string(in_use_) +
-        " in use by this bake): free device memory, ask for fewer spheres, or bake on the CPU");
+        " in use on this stream): free device memory, ask for fewer spheres, or bake on the CPU");
   in_use_ += bytes;
   peak_ = std::max(peak_, in_use_);
   return memory;

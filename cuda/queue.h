@@ -20,8 +20,8 @@ class DeviceGuard {
   int previous_ = 0;
 };
 
-/// The stream that a bake's device work runs on, in order, and where its memory comes from. One a
-/// bake; not shared by threads. The device it was made for must be current (DeviceGuard) wherever
+/// The stream that a backend's device work runs on, in order, and where its memory comes from. One
+/// a backend; not shared by threads. The device it was made for must be current (DeviceGuard) wherever
 /// it is used.
 class Queue {
  public:

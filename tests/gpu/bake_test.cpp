@@ -69,16 +69,34 @@ TEST_F(GpuBake, RealMeshesAreThoseOfTheCpu) {
   }
 }
 
+/// Without levels of detail and with two, which are made beside the finest; the plate is turned.
 TEST_F(GpuBake, AssetsAreThoseOfTheCpu) {
+  for (const ClosedMesh& mesh :
+       {closed(testing::torus_mesh(1, 0.3, 64, 32), "torus"),
+        closed(testing::box_mesh(Vector3d(0, 0, 0), Vector3d(1, 1e-2, 1)), "plate")})
+    for (const std::size_t spheres : {500, 4200}) {
+      SCOPED_TRACE(mesh.name + ", " + std::to_string(spheres));
+      PackingSettings settings;
+      settings.max_spheres = spheres;
+      settings.device = Device::cpu;
+      const Asset host = bake(mesh, settings);
+      settings.device = Device::cuda;
+      const Asset card = bake(mesh, settings);
+      ASSERT_EQ(host.bytes().size(), card.bytes().size());
+      EXPECT_EQ(std::memcmp(host.bytes().data(), card.bytes().data(), host.bytes().size()), 0);
+    }
+}
+
+TEST_F(GpuBake, CancellingEndsAWholeBake) {
   const ClosedMesh torus = closed(testing::torus_mesh(1, 0.3, 64, 32), "torus");
   PackingSettings settings;
-  settings.max_spheres = 500;
-  settings.device = Device::cpu;
-  const Asset host = bake(torus, settings);
+  settings.max_spheres = 4200;
   settings.device = Device::cuda;
-  const Asset card = bake(torus, settings);
-  ASSERT_EQ(host.bytes().size(), card.bytes().size());
-  EXPECT_EQ(std::memcmp(host.bytes().data(), card.bytes().data(), host.bytes().size()), 0);
+  for (const std::string stage : {"calibrate", "cover", "tree"})
+    EXPECT_THROW(bake(torus, settings, [&](const Progress& now) { return now.stage != stage; }),
+                 Error)
+        << stage;
+  EXPECT_FALSE(bake(torus, settings).bytes().empty());
 }
 
 TEST_F(GpuBake, CancellingEndsIt) {

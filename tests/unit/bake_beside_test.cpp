@@ -5,6 +5,7 @@
 #include <ist/error.h>
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <string>
 #include <thread>
@@ -21,14 +22,17 @@ namespace {
 struct Seen {
   std::atomic<int> beside = 0;
   std::atomic<bool> covers_fail = false;
+  std::atomic<bool> levels_wait = false;  ///< the second one's, until they are cancelled
+  std::atomic<bool> waited_in_vain = false;
+  std::atomic<int> relaxed = 0;  ///< levels, by the second one
   std::thread::id covered_by;
 };
 
 /// A host backend that pretends to leave the host's threads idle.
 class TwoAtATime final : public SolidBackend {
  public:
-  TwoAtATime(const MeshSolid& solid, Seen& seen)
-      : solid_(solid), seen_(seen), host_(testing::host_backend(solid)) {}
+  TwoAtATime(const MeshSolid& solid, Seen& seen, bool is_second = false)
+      : solid_(solid), seen_(seen), is_second_(is_second), host_(testing::host_backend(solid)) {}
 
   SpherePacking pack(const PackingSettings& settings, const ProgressCallback& progress) override {
     return host_->pack(settings, progress);
@@ -38,6 +42,12 @@ class TwoAtATime final : public SolidBackend {
   }
   RelaxedSites relax_sites(const RelaxTask& task,
                            const std::function<void(double)>& report) override {
+    if (is_second_) {
+      ++seen_.relaxed;
+      const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+      while (seen_.levels_wait && std::chrono::steady_clock::now() < end) report(0.5);
+      if (seen_.levels_wait) seen_.waited_in_vain = true;
+    }
     return host_->relax_sites(task, report);
   }
   double largest_protrusion(std::span<const Sphere> balls) override {
@@ -55,7 +65,7 @@ class TwoAtATime final : public SolidBackend {
   std::function<std::unique_ptr<SolidBackend>()> beside() override {
     return [this] {
       ++seen_.beside;
-      return std::make_unique<TwoAtATime>(solid_, seen_);
+      return std::make_unique<TwoAtATime>(solid_, seen_, true);
     };
   }
   bool leaves_threads_idle() const override { return true; }
@@ -63,6 +73,7 @@ class TwoAtATime final : public SolidBackend {
  private:
   const MeshSolid& solid_;
   Seen& seen_;
+  const bool is_second_;
   const std::unique_ptr<SolidBackend> host_;
 };
 
@@ -96,16 +107,23 @@ TEST(BakeBeside, MakesTheSameAsset) {
       EXPECT_TRUE(std::ranges::equal(alone.bytes(), beside.bytes()))
           << spheres << " spheres, " << threads << " threads";
       EXPECT_EQ(seen.beside, 1);
+      EXPECT_EQ(seen.relaxed, spheres > 1000 ? 1 : 0);
       EXPECT_NE(seen.covered_by, std::this_thread::get_id());
     }
 }
 
 TEST(BakeBeside, CancellingEndsBoth) {
+  const std::thread::id caller = std::this_thread::get_id();
   for (const std::string stage : {"calibrate", "cover", "tree"}) {
     Seen seen;
-    const auto until_then = [&](const Progress& now) { return now.stage != stage; };
+    seen.levels_wait = stage != "tree";
+    const auto until_then = [&](const Progress& now) {
+      EXPECT_EQ(std::this_thread::get_id(), caller);
+      return now.stage != stage;
+    };
     EXPECT_THROW(baked_beside(torus(), of_size(1200, 2), seen, until_then), Error) << stage;
     EXPECT_EQ(seen.beside, 1) << stage;
+    EXPECT_FALSE(seen.waited_in_vain) << stage;
   }
 }
 

@@ -135,6 +135,7 @@ TEST(TreeOrder, OfSpheresThatLieAlikeIsAsGood) {
     EXPECT_LE(whole_cost(alike), 1.03 * whole_cost(own)) << n;
     if (n > 256) {
       EXPECT_LT(cost(alike, 1), cost(as_it_is, 1)) << n;
+      EXPECT_NE(alike.sphere_index, own.sphere_index) << n;  // not one made from nothing
     }
   }
 }

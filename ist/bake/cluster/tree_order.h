@@ -22,8 +22,8 @@ std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, Clustering 
                                       bool swaps);
 
 /// An order for spheres that lie much as others do, one for one, from tree_order() of those: its
-/// groups of 16 trade members, and groups of their balls are formed anew. As good an order, and
-/// sooner.
+/// groups of 16 trade members, and groups of their balls are formed anew. Sooner than an order of
+/// their own, and about as good (docs/tree_builders.md).
 std::vector<std::uint32_t> refined_order(std::span<const Ball> spheres,
                                          std::vector<std::uint32_t> order);
 
