@@ -21,8 +21,8 @@ class DeviceGuard {
 };
 
 /// The stream that a backend's device work runs on, in order, and where its memory comes from. One
-/// a backend; not shared by threads. The device it was made for must be current (DeviceGuard) wherever
-/// it is used.
+/// a backend; not shared by threads. The device it was made for must be current (DeviceGuard)
+/// wherever it is used.
 class Queue {
  public:
   /// `waits`: where other queues have work to do at the same time, it comes first, if the stream is
