@@ -156,9 +156,13 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   // The finest matched spheres lie much as the inner ones do, whose order is found meanwhile.
   const auto grow_finest = host.add_after_both(
       [&] { arrays.matched_tree = build_tree_like(arrays.matched_spheres, inner_order); });
-  host.add([&, grow_finest] {
+  const auto grow_inner = host.add_after_both([&] {
+    arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, inner_order);
+  });
+  host.add([&, grow_finest, grow_inner] {
     inner_order = sphere_order(arrays.inner_spheres);
     grow_finest();
+    grow_inner();
   });
   host.add([&] { describe_bounds(solid, 0, arrays.header); });
 
@@ -200,14 +204,13 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
     calibrate_levels(0, counts.size(), backend, host, progress);
     cover(backend, progress);
   }
+  grow_inner();
 
   Stage stage("tree", progress);
   stage.step(count, 0);
   field.start();
   host.finish();
   arrays.field = field.wait([&] { stage.step(count, 0.5); });
-  arrays.inner_tree =
-      tree_from_order(arrays.inner_spheres, arrays.cover_radii, std::move(inner_order));
   stage.step(count, 1);
   return arrays;
 }
