@@ -7,6 +7,7 @@
 #include <functional>
 #include <future>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -118,12 +119,10 @@ class Aside {
   Aside(const Aside&) = delete;
   Aside& operator=(const Aside&) = delete;
 
-  /// Waits for the end, as a stage of that name.
-  void finish(const char* name, std::size_t spheres, const ProgressCallback& progress) {
-    Stage stage(name, progress);
-    wait_for(done_, [&] { stage.step(spheres, 0.5); });
+  /// Waits for the end, and asks `meanwhile` twenty times a second.
+  void finish(const std::function<void()>& meanwhile) {
+    wait_for(done_, meanwhile);
     done_.get();
-    stage.step(spheres, 1);
   }
 
  private:
@@ -182,33 +181,29 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
       detail.protrusion = made.protrusion;
       trees.add([&detail] { detail.matched_tree = build_tree(detail.matched_spheres, {}); });
     };
-    if (first < end)
-      calibrate_prefixes(solid, on, packing.spheres, std::span(counts).subspan(first, end - first),
-                         report, take);
+    calibrate_prefixes(solid, on, packing.spheres, std::span(counts).subspan(first, end - first),
+                       report, take);
   };
-  const auto cover = [&](SolidBackend& on, const ProgressCallback& report) {
-    arrays.cover_radii = cover_radii(solid, on, packing.spheres, report);
-  };
-  if (const auto beside = backend.beside()) {
-    Aside rest(settings.threads, [&](const ProgressCallback& report) {
+  std::optional<Aside> levels;
+  if (const auto beside = backend.beside(); beside && counts.size() > 1) {
+    levels.emplace(settings.threads, [&, beside](const ProgressCallback& report) {
       const std::unique_ptr<SolidBackend> other = beside();
       HostWork trees(true);  // a task group belongs to the threads of one arena
       calibrate_levels(1, counts.size(), *other, trees, report);
-      cover(*other, report);
       trees.finish();
     });
     calibrate_levels(0, 1, backend, host, progress);
-    rest.finish("cover", count, progress);
   } else {
     // The finest first: while its tree grows, the largest, the others are calibrated.
     calibrate_levels(0, counts.size(), backend, host, progress);
-    cover(backend, progress);
   }
+  arrays.cover_radii = cover_radii(solid, backend, packing.spheres, progress);
   grow_inner();
 
   Stage stage("tree", progress);
   stage.step(count, 0);
   field.start();
+  if (levels) levels->finish([&] { stage.step(count, 0); });
   host.finish();
   arrays.field = field.wait([&] { stage.step(count, 0.5); });
   stage.step(count, 1);

@@ -21,11 +21,11 @@ namespace {
 /// What the stand-ins of a bake saw.
 struct Seen {
   std::atomic<int> beside = 0;
-  std::atomic<bool> covers_fail = false;
+  std::atomic<bool> levels_fail = false;
   std::atomic<bool> levels_wait = false;  ///< the second one's, until they are cancelled
   std::atomic<bool> waited_in_vain = false;
   std::atomic<int> relaxed = 0;  ///< levels, by the second one
-  std::thread::id covered_by;
+  std::thread::id relaxed_by;
 };
 
 /// A host backend that pretends to leave the host's threads idle.
@@ -43,7 +43,9 @@ class TwoAtATime final : public SolidBackend {
   RelaxedSites relax_sites(const RelaxTask& task,
                            const std::function<void(double)>& report) override {
     if (is_second_) {
+      if (seen_.levels_fail) throw Error("no memory for levels");
       ++seen_.relaxed;
+      seen_.relaxed_by = std::this_thread::get_id();
       const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
       while (seen_.levels_wait && std::chrono::steady_clock::now() < end) report(0.5);
       if (seen_.levels_wait) seen_.waited_in_vain = true;
@@ -55,8 +57,6 @@ class TwoAtATime final : public SolidBackend {
   }
   std::vector<double> cover_radii(const CoverTask& task,
                                   const std::function<void(int)>& report) override {
-    if (seen_.covers_fail) throw Error("no memory for covers");
-    seen_.covered_by = std::this_thread::get_id();
     return host_->cover_radii(task, report);
   }
   std::unique_ptr<SolidBackend> with(const MeshSolid& other) const override {
@@ -106,9 +106,9 @@ TEST(BakeBeside, MakesTheSameAsset) {
       const Asset beside = baked_beside(mesh, of_size(spheres, threads), seen);
       EXPECT_TRUE(std::ranges::equal(alone.bytes(), beside.bytes()))
           << spheres << " spheres, " << threads << " threads";
-      EXPECT_EQ(seen.beside, 1);
-      EXPECT_EQ(seen.relaxed, spheres > 1000 ? 1 : 0);
-      EXPECT_NE(seen.covered_by, std::this_thread::get_id());
+      EXPECT_EQ(seen.beside, spheres > 1000 ? 1 : 0);
+      EXPECT_EQ(seen.relaxed, seen.beside);
+      EXPECT_NE(seen.relaxed_by, std::this_thread::get_id());
     }
 }
 
@@ -129,12 +129,12 @@ TEST(BakeBeside, CancellingEndsBoth) {
 
 TEST(BakeBeside, AnErrorThereReachesTheCaller) {
   Seen seen;
-  seen.covers_fail = true;
+  seen.levels_fail = true;
   try {
     baked_beside(torus(), of_size(1200, 0), seen);
     FAIL() << "no error";
   } catch (const Error& error) {
-    EXPECT_STREQ(error.what(), "no memory for covers");
+    EXPECT_STREQ(error.what(), "no memory for levels");
   }
 }
 
