@@ -8,7 +8,7 @@
 
 #include "query/base/precision.h"
 #include "query/descent/answer.h"
-#include "query/descent/shares.h"
+#include "query/kernel/guess_kernel.h"
 #include "query/kernel/node_kernel.h"
 
 namespace ist {
@@ -26,6 +26,12 @@ constexpr double kVisits = 0.75, kVisitsOfBins = 0.6;
 constexpr double kPlanned = 0.85, kLatest = 0.95;
 // [µs] no pair of leaves takes longer where time is ample.
 constexpr double kDearest = 0.25;
+// [µs] what a pair of leaves takes where time is dear: if all of them do no longer, they are
+// guessed.
+constexpr double kDear = 0.06;
+// [µs] a pair's guess, and the part of the time that guesses may take. No clock is asked: guesses
+// that come and go from tick to tick are felt.
+constexpr double kGuessTime = 0.0075, kGuessPart = 0.15;
 // Pairs of leaves that take a few microseconds.
 constexpr std::size_t kFewPairs = 160;
 constexpr std::size_t kGuesses = 32;  ///< between two looks at the clock, evenly over what is left
@@ -217,6 +223,8 @@ bool Descent::add_by_shares() {
   std::size_t done = 0;
   constexpr double kAll = kShares + 1;
   double room = limits_.shares > 0 ? limits_.shares : kAll;  // for so many limits do
+  ShareGuesses guesses;
+  if (to_be_guessed()) guess_leaves(bounds, guesses);
   // A few pairs are summed even if the time is over: there would be nothing to go by otherwise.
   const bool at_least = bounds[1] <= kFewPairs;
   bool in_time = add_group(0, bounds[0], at_least, sums_);
@@ -233,24 +241,49 @@ bool Descent::add_by_shares() {
     std::swap(now, scratch_.next);
     return false;
   }
+  Overlap answer = finish(sums_, precision_);
   for (std::size_t i = 0; i < done; ++i) sums_.add(shares[i]);
   if (done == kShares && room >= kAll) return true;
 
-  ShareWeights weights = share_weights(
-      std::clamp(room, static_cast<double>(done), static_cast<double>(done + 1)), done);
-  if (bins_ != nullptr) {  // what a bin holds is of all shares alike
-    weights.fill(static_cast<double>(kShares) / static_cast<double>(done));
-    bins_->scale_sums(weights[0]);
-  }
-  for (std::size_t i = 0; i < done; ++i) {
-    Overlap others = finish(shares[i], precision_);
-    others.scale(weights[i] - 1);
-    unopened_.add(others);
-  }
+  room = std::clamp(room, static_cast<double>(done), static_cast<double>(done + 1));
+  ShareWeights weights = share_weights(room, done);
+  if (bins_ != nullptr)  // what a bin holds is of all shares alike
+    std::fill(weights.begin(), weights.begin() + done, 1.0);
+  LeafSums part;
+  for (std::size_t i = 0; i < done; ++i) part.add(shares[i], weights[i]);
+  const Overlap large = answer, weighed = finish(part, precision_);
+  answer.add(weighed);
+  answer.add(other_shares(large, weighed, weights, guesses, precision_, room));
+  Overlap summed = finish(sums_, precision_);
+  if (bins_ != nullptr && summed.volume > 0) bins_->scale_sums(answer.volume / summed.volume);
+  summed.scale(-1);
+  unopened_.add(answer);
+  unopened_.add(summed);
   stopped_ = true;
   unopened_bound_ = std::numeric_limits<double>::infinity();  // penetration() caps it
   now.size = 0;
   return true;
+}
+
+bool Descent::to_be_guessed() {
+  if (!budget_.timed()) return true;
+  const auto pairs = static_cast<double>(scratch_.now.size);
+  return pairs * kGuessTime <= kGuessPart * limits_.deadline_us &&
+         pairs * kDear > limits_.deadline_us * (kPlanned - budget_.elapsed());
+}
+
+void Descent::guess_leaves(const ShareBounds& bounds, ShareGuesses& guesses) {
+  const LeafStage stage{&a_, &b_, level_a_, level_b_, &map_, precision_};
+  const auto guess = [&](std::size_t from, std::size_t to, LeafSums& sums) {
+    guess_leaf_pairs(stage, scratch_.now.a.get() + from, scratch_.now.b.get() + from, to - from,
+                     sums);
+  };
+  guess(0, bounds[0], guesses.large);
+  for (std::size_t i = 0; i < kShares; ++i) {
+    guess(bounds[i], bounds[i + 1], guesses.share[i]);
+    if (budget_.timed()) budget_.elapsed();  // or all of it would pass for a stall
+  }
+  guesses.made = true;
 }
 
 bool Descent::add_group(std::size_t from, std::size_t to, bool surely, LeafSums& sums) {
