@@ -36,8 +36,15 @@ HostMesh host_mesh(const MeshView& arrays) {
 
 class CudaBackend final : public SolidBackend {
  public:
-  CudaBackend(const MeshSolid& solid, const GpuSettings& settings)
-      : solid_(solid), settings_(usable(settings)), queue_(settings_) {}
+  /// `is_second`: there is one already, whose work comes first. `tree`: the solid's, if that has
+  /// it.
+  CudaBackend(const MeshSolid& solid, const GpuSettings& settings, bool is_second = false,
+              const WideTree* tree = nullptr)
+      : solid_(solid),
+        settings_(usable(settings)),
+        is_second_(is_second),
+        queue_(settings_, is_second),
+        tree_(tree) {}
 
   SpherePacking pack(const PackingSettings& settings, const ProgressCallback& progress) override {
     const UnitFrame frame = solid_.frame();
@@ -70,7 +77,15 @@ class CudaBackend final : public SolidBackend {
   }
 
   std::unique_ptr<SolidBackend> with(const MeshSolid& other) const override {
-    return std::make_unique<CudaBackend>(other, settings_);
+    return std::make_unique<CudaBackend>(other, settings_, is_second_);
+  }
+
+  /// Of a caller's stream and memory there is one, for one thread.
+  std::function<std::unique_ptr<SolidBackend>()> beside() override {
+    if (settings_.stream != nullptr || settings_.memory != nullptr) return {};
+    tree();
+    queue_.wait();
+    return [this] { return std::make_unique<CudaBackend>(solid_, settings_, true, tree_); };
   }
 
   bool leaves_threads_idle() const override { return true; }
@@ -78,14 +93,16 @@ class CudaBackend final : public SolidBackend {
  private:
   /// The mesh's hierarchy, made when it is first needed: the grids have none.
   const WideTree& tree() {
-    if (!mesh_) mesh_.emplace(queue_, host_mesh(solid_.arrays()));
-    return mesh_->tree();
+    if (tree_ == nullptr) tree_ = &mesh_.emplace(queue_, host_mesh(solid_.arrays())).tree();
+    return *tree_;
   }
 
   const MeshSolid& solid_;
   const GpuSettings settings_;
+  const bool is_second_;
   Queue queue_;
   std::optional<DeviceMesh> mesh_;
+  const WideTree* tree_;
 };
 
 }  // namespace

@@ -47,7 +47,7 @@ DeviceGuard::DeviceGuard(int device) {
 
 DeviceGuard::~DeviceGuard() { cudaSetDevice(previous_); }
 
-Queue::Queue(const GpuSettings& settings)
+Queue::Queue(const GpuSettings& settings, bool waits)
     : guard_(settings.device), memory_(settings.memory), stream_(settings.stream) {
   check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, settings.device),
         "asking the GPU for its size");
@@ -56,7 +56,11 @@ Queue::Queue(const GpuSettings& settings)
     memory_ = own_memory_.get();
   }
   if (stream_ == nullptr) {
-    check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "making a stream");
+    int least = 0, greatest = 0;
+    check(cudaDeviceGetStreamPriorityRange(&least, &greatest), "asking the GPU for priorities");
+    const int priority = waits ? least : std::max(least - 1, greatest);  // less comes first
+    check(cudaStreamCreateWithPriority(&stream_, cudaStreamNonBlocking, priority),
+          "making a stream");
     own_stream_ = true;
   }
 }
@@ -74,7 +78,7 @@ void* Queue::allocate(std::size_t bytes) {
     throw Error(
         "GPU: no device memory left for " + std::to_string(bytes) + " more bytes (" +
         std::to_string(in_use_) +
-        " in use by this bake): free device memory, ask for fewer spheres, or bake on the CPU");
+        " in use on this stream): free device memory, ask for fewer spheres, or bake on the CPU");
   in_use_ += bytes;
   peak_ = std::max(peak_, in_use_);
   return memory;

@@ -20,13 +20,14 @@ class DeviceGuard {
   int previous_ = 0;
 };
 
-/// The stream that a bake's device work runs on, in order, and where its memory comes from. One a
-/// bake; not shared by threads. The device it was made for must be current (DeviceGuard) wherever
-/// it is used.
+/// The stream that a backend's device work runs on, in order, and where its memory comes from. One
+/// a backend; not shared by threads. The device it was made for must be current (DeviceGuard)
+/// wherever it is used.
 class Queue {
  public:
-  /// Throws Error if the device cannot be used.
-  explicit Queue(const GpuSettings& settings);
+  /// `waits`: where other queues have work to do at the same time, it comes first, if the stream is
+  /// the queue's own. Throws Error if the device cannot be used.
+  explicit Queue(const GpuSettings& settings, bool waits = false);
   ~Queue();
   Queue(const Queue&) = delete;
   Queue& operator=(const Queue&) = delete;

@@ -3,8 +3,12 @@
 #include <tbb/task_group.h>
 
 #include <algorithm>
-#include <chrono>
+#include <atomic>
 #include <functional>
+#include <future>
+#include <memory>
+#include <optional>
+#include <span>
 #include <utility>
 
 #include <ist/error.h>
@@ -17,6 +21,7 @@
 #include "bake/field/field.h"
 #include "bake/mass_and_bounds.h"
 #include "packing/base/packing_settings.h"
+#include "stage/aside.h"
 #include "stage/stage.h"
 #include "stage/thread_arena.h"
 
@@ -83,15 +88,46 @@ class HostWork {
       waiting_.push_back(std::move(work));
   }
 
+  /// To be called by both of two that a work has to wait for: the later adds it.
+  std::function<void()> add_after_both(std::function<void()> work) {
+    return [this, left = std::make_shared<std::atomic<int>>(2), work = std::move(work)] {
+      if (--*left == 0) add(work);
+    };
+  }
+
   void finish() {
+    at_once_ = true;
     for (std::function<void()>& work : waiting_) group_.run(std::move(work));
     group_.wait();
   }
 
  private:
-  const bool at_once_;
+  bool at_once_;
   std::vector<std::function<void()>> waiting_;
   tbb::task_group group_;
+};
+
+/// A part of a bake that is done on another thread, and stopped where the scope is left before it
+/// has come to its end.
+class Aside {
+ public:
+  Aside(unsigned threads, const std::function<void(const ProgressCallback&)>& work)
+      : done_(do_aside(threads, [this, work] {
+          work([this](const Progress&) { return !stopped_.load(std::memory_order_relaxed); });
+        })) {}
+  ~Aside() { stopped_.store(true, std::memory_order_relaxed); }
+  Aside(const Aside&) = delete;
+  Aside& operator=(const Aside&) = delete;
+
+  /// Waits for the end, and asks `meanwhile` twenty times a second.
+  void finish(const std::function<void()>& meanwhile) {
+    wait_for(done_, meanwhile);
+    done_.get();
+  }
+
+ private:
+  std::atomic<bool> stopped_ = false;
+  std::future<void> done_;  ///< last: waits for the thread
 };
 
 }  // namespace
@@ -116,44 +152,63 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   arrays.header = describe_bake(mesh, solid, settings, packing);
   arrays.inner_spheres = packing.spheres;
 
-  host.add([&] { inner_order = sphere_order(arrays.inner_spheres); });
+  const auto grow_inner = host.add_after_both([&] {
+    arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, inner_order);
+  });
+  host.add([&, grow_inner] {
+    inner_order = sphere_order(arrays.inner_spheres);
+    grow_inner();
+  });
   host.add([&] { describe_bounds(solid, 0, arrays.header); });
 
-  // The finest first: while its tree grows, the largest, the others are calibrated.
   const std::vector<std::size_t> counts = detail_counts(count);
   arrays.details.resize(counts.size() - 1);
-  const auto grow_tree = [&](std::size_t i, Calibration made) {
-    DetailArrays* const detail = i > 0 ? &arrays.details[i - 1] : nullptr;
-    std::vector<Sphere>& spheres = detail ? detail->matched_spheres : arrays.matched_spheres;
-    TreeArrays& tree = detail ? detail->matched_tree : arrays.matched_tree;
-    spheres = std::move(made.matched);
-    (detail ? detail->protrusion : arrays.header.protrusion) = made.protrusion;
-    host.add([&spheres, &tree] { tree = build_tree(spheres, {}); });
+  const auto calibrate_levels = [&](std::size_t first, std::size_t end, SolidBackend& on,
+                                    HostWork& trees, const ProgressCallback& report) {
+    const auto take = [&](std::size_t i, Calibration made) {
+      DetailArrays* const detail = first + i > 0 ? &arrays.details[first + i - 1] : nullptr;
+      std::vector<Sphere>& spheres = detail ? detail->matched_spheres : arrays.matched_spheres;
+      TreeArrays& tree = detail ? detail->matched_tree : arrays.matched_tree;
+      spheres = std::move(made.matched);
+      (detail ? detail->protrusion : arrays.header.protrusion) = made.protrusion;
+      trees.add([&spheres, &tree] { tree = build_tree(spheres, {}); });
+    };
+    calibrate_prefixes(solid, on, packing.spheres, std::span(counts).subspan(first, end - first),
+                       report, take);
   };
-  calibrate_prefixes(solid, backend, packing.spheres, counts, progress, grow_tree);
-
+  std::optional<Aside> levels;
+  if (const auto beside = backend.beside(); beside && counts.size() > 1) {
+    levels.emplace(settings.threads, [&, beside](const ProgressCallback& report) {
+      const std::unique_ptr<SolidBackend> other = beside();
+      HostWork trees(true);  // a task group belongs to the threads of one arena
+      calibrate_levels(1, counts.size(), *other, trees, report);
+      trees.finish();
+    });
+    calibrate_levels(0, 1, backend, host, progress);
+  } else {
+    // The finest first: while its tree grows, the largest, the others are calibrated.
+    calibrate_levels(0, counts.size(), backend, host, progress);
+  }
   arrays.cover_radii = cover_radii(solid, backend, packing.spheres, progress);
+  grow_inner();
 
   Stage stage("tree", progress);
   stage.step(count, 0);
   field.start();
+  if (levels) levels->finish([&] { stage.step(count, 0); });
   host.finish();
   arrays.field = field.wait([&] { stage.step(count, 0.5); });
-  arrays.inner_tree =
-      tree_from_order(arrays.inner_spheres, arrays.cover_radii, std::move(inner_order));
   stage.step(count, 1);
   return arrays;
 }
 
 void SolidField::start() {
   if (made_.valid()) return;
-  made_ = std::async(std::launch::async, [this]() -> std::shared_ptr<const FieldArrays> {
+  made_ = do_aside(threads_, [this]() -> std::shared_ptr<const FieldArrays> {
             if (!settings_.wanted) return nullptr;
             try {
-              return thread_arena(threads_).execute([this]() -> std::shared_ptr<const FieldArrays> {
-                auto built = build_field(solid_, settings_.error / solid_.frame().scale(), stop_);
-                return built ? std::make_shared<const FieldArrays>(*std::move(built)) : nullptr;
-              });
+              auto built = build_field(solid_, settings_.error / solid_.frame().scale(), stop_);
+              return built ? std::make_shared<const FieldArrays>(*std::move(built)) : nullptr;
             } catch (const WorkStop::Stopped&) {
               return nullptr;
             }
@@ -162,7 +217,7 @@ void SolidField::start() {
 
 std::shared_ptr<const FieldArrays> SolidField::wait(const std::function<void()>& meanwhile) {
   start();
-  while (made_.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) meanwhile();
+  wait_for(made_, meanwhile);
   return made_.get();
 }
 

@@ -40,6 +40,11 @@ class SolidBackend {
   /// A backend of the same kind for another solid, which must outlive it.
   virtual std::unique_ptr<SolidBackend> with(const MeshSolid& other) const = 0;
 
+  /// What makes a backend of the same solid for another thread, which calls it and works at the
+  /// same time as this one's does. It uses what this one has and must not outlive it. Empty: there
+  /// is none.
+  virtual std::function<std::unique_ptr<SolidBackend>()> beside() = 0;
+
   /// Whether the caller's threads have nothing to do while this one works.
   virtual bool leaves_threads_idle() const = 0;
 };

@@ -69,7 +69,7 @@ TEST_F(GpuBake, RealMeshesAreThoseOfTheCpu) {
   }
 }
 
-/// Without levels of detail and with two; the plate is turned.
+/// Without levels of detail and with two, which are made beside the finest; the plate is turned.
 TEST_F(GpuBake, AssetsAreThoseOfTheCpu) {
   for (const ClosedMesh& mesh :
        {closed(testing::torus_mesh(1, 0.3, 64, 32), "torus"),

@@ -41,6 +41,8 @@ class HostBackend final : public SolidBackend {
     return make_host_backend(other);
   }
 
+  std::function<std::unique_ptr<SolidBackend>()> beside() override { return {}; }
+
   bool leaves_threads_idle() const override { return false; }
 
  private:

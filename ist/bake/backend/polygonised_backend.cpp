@@ -60,6 +60,8 @@ class PolygonisedBackend final : public SolidBackend {
     return of_mesh_->with(other);
   }
 
+  std::function<std::unique_ptr<SolidBackend>()> beside() override { return {}; }
+
   bool leaves_threads_idle() const override { return false; }
 
  private:

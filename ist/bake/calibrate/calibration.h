@@ -27,8 +27,8 @@ struct Calibration {
 Calibration calibrate(const MeshSolid& solid, SolidBackend& backend, std::span<const Sphere> inner,
                       const ProgressCallback& progress);
 
-/// The same for several prefixes of the spheres, each of `counts` by itself: what is made of the
-/// solid is shared. `take(i, calibration)` is given each as soon as it is ready, in their order.
+/// The same for several prefixes of the spheres, each of `counts` by itself; a call shares what it
+/// makes of the solid. `take(i, calibration)` is given each as soon as it is ready, in their order.
 void calibrate_prefixes(const MeshSolid& solid, SolidBackend& backend,
                         std::span<const Sphere> inner, std::span<const std::size_t> counts,
                         const ProgressCallback& progress,
