@@ -65,8 +65,11 @@ void one_bake(const ClosedMesh& mesh, const PackingSettings& settings, Stages& s
       stages.time("5 calibrate", [&] { return calibrate(*solid, *backend, inner, {}); });
   const auto covers =
       stages.time("6 cover", [&] { return cover_radii(*solid, *backend, inner, {}); });
-  stages.time("7 inner tree", [&] { return build_tree(inner, covers); });
-  stages.time("8 matched tree", [&] { return build_tree(calibration.matched, {}); });
+  const auto order = stages.time("7 order", [&] { return sphere_order(inner); });
+  stages.time("8 trees", [&] {
+    tree_from_order(inner, covers, order);
+    return build_tree_like(calibration.matched, order);
+  });
   stages.time("9 field", [&] { return build_field(*solid, 0); });
 }
 

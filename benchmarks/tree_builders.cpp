@@ -1,9 +1,11 @@
 // What each way of clustering costs to build and to query: the same spheres, every oracle row of
-// one pair, counted work. One thread.
+// one pair, and copies of other meshes at random poses; counted work. One thread.
 
 #include <ist/bake.h>
 #include <ist/query.h>
 
+#include <cmath>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -12,6 +14,7 @@
 #include "bake/cluster/tree_builder.h"
 #include "report.h"
 #include "support/oracle_rows.h"
+#include "support/shared_data.h"
 #include "timing.h"
 
 namespace {
@@ -23,6 +26,7 @@ struct Builder {
   const char* name;
   Clustering clustering;
   bool swaps;
+  bool like_inner = false;  ///< the matched spheres' tree from the inner ones' order, as bakes do
 };
 
 constexpr Builder kBuilders[] = {
@@ -30,6 +34,7 @@ constexpr Builder kBuilders[] = {
     {"2-means, swaps", Clustering::two_means, true},
     {"neural gas", Clustering::neural_gas, false},
     {"neural gas, swaps", Clustering::neural_gas, true},
+    {"like the inner spheres'", Clustering::neural_gas, true, true},
 };
 
 /// The asset with its trees built again.
@@ -42,10 +47,34 @@ Asset rebuilt(const Asset& asset, const Builder& builder) {
   arrays.inner_spheres = copy(at<Sphere>(header, header.inner_spheres));
   arrays.cover_radii = copy(at<float>(header, header.cover_radii));
   arrays.matched_spheres = copy(at<Sphere>(header, header.matched_spheres));
-  arrays.inner_tree =
-      build_tree(arrays.inner_spheres, arrays.cover_radii, builder.clustering, builder.swaps);
-  arrays.matched_tree = build_tree(arrays.matched_spheres, {}, builder.clustering, builder.swaps);
+  const std::vector<std::uint32_t> order =
+      sphere_order(arrays.inner_spheres, builder.clustering, builder.swaps);
+  arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, order);
+  arrays.matched_tree = builder.like_inner ? build_tree_like(arrays.matched_spheres, order)
+                                           : build_tree(arrays.matched_spheres, {},
+                                                        builder.clustering, builder.swaps);
   return Asset(asset_bytes(arrays), builder.name);
+}
+
+/// A copy's pose: any rotation, 5 to 50 % of the size away.
+Pose random_pose(std::mt19937& bits, double size) {
+  const auto normal = [&] {  // near enough, and the same everywhere
+    double sum = -6;
+    for (int i = 0; i < 12; ++i) sum += static_cast<double>(bits()) / 4294967296.0;
+    return sum;
+  };
+  const auto direction = [&](double* x, int count, double length) {
+    double square = 0;
+    for (int k = 0; k < count; ++k) {
+      x[k] = normal();
+      square += x[k] * x[k];
+    }
+    for (int k = 0; k < count; ++k) x[k] *= length / std::sqrt(square);
+  };
+  Pose pose;
+  direction(pose.q, 4, 1);
+  direction(pose.t, 3, size * (0.05 + 0.45 * static_cast<double>(bits()) / 4294967296.0));
+  return pose;
 }
 
 double mean(const std::vector<double>& values) {
@@ -102,6 +131,42 @@ int main(int argc, char** argv) {
                     {"sphere pairs", mean(pairs)},
                     {"separation: node visits", mean(gap_visits)},
                     {"separation: sphere pairs", mean(gap_pairs)}});
+      }
+    }
+  }
+  const std::vector<const char*> files =
+      report.quick()
+          ? std::vector<const char*>{"spot.obj"}
+          : std::vector<const char*>{"bunny_60k.ply", "spot.obj", "bolt_gen.ply", "mug.ply"};
+  for (const char* const file : files) {
+    const std::string path = testing::shared_path(std::string("meshes/dev/") + file).string();
+    const ClosedMesh mesh = close_mesh(load_mesh(path), path);
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& x : mesh.mesh.vertices) box.extend(x);
+    for (const std::size_t n : counts) {
+      PackingSettings settings;
+      settings.max_spheres = n;
+      settings.field.wanted = false;
+      const Asset asset = bake(mesh, settings);
+      double own = 0;
+      for (const Builder& builder : kBuilders) {
+        if (builder.clustering != Clustering::neural_gas || !builder.swaps) continue;
+        const Asset tree = rebuilt(asset, builder);
+        std::mt19937 bits(7);
+        Workspace workspace;
+        std::vector<double> visits;
+        for (int i = 0; i < 300; ++i) {
+          const Pose pose = random_pose(bits, box.sizes().norm());
+          visits.push_back(
+              penetration({tree.view(), {}, 1}, {tree.view(), pose, 1}, {}, workspace).node_visits);
+        }
+        if (!builder.like_inner) own = mean(visits);
+        report.row("Work of a query of two copies, mean of 300 poses",
+                   {{"mesh", file},
+                    {"spheres", n},
+                    {"builder", builder.name},
+                    {"node visits", mean(visits)},
+                    {"of its own order's", mean(visits) / own}});
       }
     }
   }

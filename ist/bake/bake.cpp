@@ -152,11 +152,15 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   arrays.header = describe_bake(mesh, solid, settings, packing);
   arrays.inner_spheres = packing.spheres;
 
+  // The finest matched spheres lie much as the inner ones do, whose order is found meanwhile.
+  const auto grow_finest = host.add_after_both(
+      [&] { arrays.matched_tree = build_tree_like(arrays.matched_spheres, inner_order); });
   const auto grow_inner = host.add_after_both([&] {
     arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, inner_order);
   });
-  host.add([&, grow_inner] {
+  host.add([&, grow_finest, grow_inner] {
     inner_order = sphere_order(arrays.inner_spheres);
+    grow_finest();
     grow_inner();
   });
   host.add([&] { describe_bounds(solid, 0, arrays.header); });
@@ -166,12 +170,16 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   const auto calibrate_levels = [&](std::size_t first, std::size_t end, SolidBackend& on,
                                     HostWork& trees, const ProgressCallback& report) {
     const auto take = [&](std::size_t i, Calibration made) {
-      DetailArrays* const detail = first + i > 0 ? &arrays.details[first + i - 1] : nullptr;
-      std::vector<Sphere>& spheres = detail ? detail->matched_spheres : arrays.matched_spheres;
-      TreeArrays& tree = detail ? detail->matched_tree : arrays.matched_tree;
-      spheres = std::move(made.matched);
-      (detail ? detail->protrusion : arrays.header.protrusion) = made.protrusion;
-      trees.add([&spheres, &tree] { tree = build_tree(spheres, {}); });
+      if (first + i == 0) {
+        arrays.matched_spheres = std::move(made.matched);
+        arrays.header.protrusion = made.protrusion;
+        grow_finest();
+        return;
+      }
+      DetailArrays& detail = arrays.details[first + i - 1];
+      detail.matched_spheres = std::move(made.matched);
+      detail.protrusion = made.protrusion;
+      trees.add([&detail] { detail.matched_tree = build_tree(detail.matched_spheres, {}); });
     };
     calibrate_prefixes(solid, on, packing.spheres, std::span(counts).subspan(first, end - first),
                        report, take);

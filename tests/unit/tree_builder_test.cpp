@@ -106,6 +106,40 @@ TEST(TreeOrder, SwapsShrinkBalls) {
               0.95 * cost(build_tree(spheres, {}, clustering, false), 1));
 }
 
+// Spheres that lie as others do but for a third of a radius, and have other radii: from the others'
+// order one that is as good as their own, and better than the others' as it is.
+TEST(TreeOrder, OfSpheresThatLieAlikeIsAsGood) {
+  for (const std::size_t n : {1u, 16u, 17u, 256u, 257u, 3000u, 4113u}) {
+    const std::vector<Sphere> others = random_spheres(n, 3);
+    const std::vector<Sphere> shifts = random_spheres(n, 4);
+    std::vector<Sphere> spheres = others;
+    for (std::size_t i = 0; i < n; ++i) {
+      const float third = spheres[i].r / 3;
+      spheres[i].x += third * shifts[i].x;
+      spheres[i].y += third * shifts[i].y;
+      spheres[i].z += third * shifts[i].z;
+      spheres[i].r *= 1 + 5 * shifts[i].r;
+    }
+    const std::vector<std::uint32_t> order = sphere_order(others);
+    const TreeArrays own = build_tree(spheres, {}), alike = build_tree_like(spheres, order),
+                     as_it_is = tree_from_order(spheres, {}, order);
+    std::set<std::uint32_t> seen(alike.sphere_index.begin(),
+                                 alike.sphere_index.begin() + static_cast<std::ptrdiff_t>(n));
+    EXPECT_EQ(seen.size(), n);
+    ASSERT_EQ(alike.levels.size(), own.levels.size());
+    const auto whole_cost = [](const TreeArrays& tree) {
+      double sum = 0;
+      for (std::size_t level = 1; level < tree.levels.size(); ++level) sum += cost(tree, level);
+      return sum;
+    };
+    EXPECT_LE(whole_cost(alike), 1.03 * whole_cost(own)) << n;
+    if (n > 256) {
+      EXPECT_LT(cost(alike, 1), cost(as_it_is, 1)) << n;
+      EXPECT_NE(alike.sphere_index, own.sphere_index) << n;  // not one made from nothing
+    }
+  }
+}
+
 /// All numbers of a tree that its order and its balls decide.
 std::vector<double> numbers_of(const TreeArrays& tree) {
   std::vector<double> numbers(tree.sphere_index.begin(), tree.sphere_index.end());

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "bake/cluster/ball_blocks.h"
 #include "bake/cluster/bounding_ball.h"
@@ -19,6 +20,13 @@ namespace {
 constexpr double kBallVolume = 4 * std::numbers::pi / 3;
 
 Ball to_ball(const Sphere& s) { return {s.x, s.y, s.z, s.r}; }
+
+std::vector<Ball> to_balls(std::span<const Sphere> spheres) {
+  std::vector<Ball> balls;
+  balls.reserve(spheres.size());
+  for (const Sphere& s : spheres) balls.push_back(to_ball(s));
+  return balls;
+}
 
 float cover_about(const Sphere& centre, std::span<const Ball> spheres,
                   std::span<const float> covers) {
@@ -52,10 +60,8 @@ std::vector<std::vector<float>> overlaps(std::span<const Ball> sorted,
                                          const std::vector<std::vector<Sphere>>& levels,
                                          bool disjoint) {
   std::vector<std::vector<Ball>> balls;
-  for (const auto& level : levels) {
-    balls.emplace_back();
-    for (const Sphere& ball : level) balls.back().push_back(to_ball(ball));
-  }
+  balls.reserve(levels.size());
+  for (const auto& level : levels) balls.push_back(to_balls(level));
   if (!disjoint) return overlap_bounds(sorted, balls);
   std::vector<std::vector<float>> kappa;
   kappa.reserve(levels.size() + 1);
@@ -127,15 +133,16 @@ TreeArrays tree_from_order(std::span<const Sphere> spheres, std::span<const floa
 
 std::vector<std::uint32_t> sphere_order(std::span<const Sphere> spheres, Clustering clustering,
                                         bool swaps) {
-  std::vector<Ball> balls;
-  balls.reserve(spheres.size());
-  for (const Sphere& s : spheres) balls.push_back(to_ball(s));
-  return tree_order(balls, clustering, swaps);
+  return tree_order(to_balls(spheres), clustering, swaps);
 }
 
 TreeArrays build_tree(std::span<const Sphere> spheres, std::span<const float> covers,
                       Clustering clustering, bool swaps) {
   return tree_from_order(spheres, covers, sphere_order(spheres, clustering, swaps));
+}
+
+TreeArrays build_tree_like(std::span<const Sphere> spheres, std::vector<std::uint32_t> order) {
+  return tree_from_order(spheres, {}, refined_order(to_balls(spheres), std::move(order)));
 }
 
 }  // namespace ist

@@ -21,6 +21,10 @@ std::vector<std::uint32_t> sphere_order(std::span<const Sphere> spheres,
                                         Clustering clustering = Clustering::neural_gas,
                                         bool swaps = true);
 
+/// The tree of matched spheres that lie much as others do, one for one, from sphere_order() of
+/// those (refined_order(), tree_order.h).
+TreeArrays build_tree_like(std::span<const Sphere> spheres, std::vector<std::uint32_t> order);
+
 /// The tree whose leaves are the spheres in a given order: lane i holds spheres[order[i]].
 TreeArrays tree_from_order(std::span<const Sphere> spheres, std::span<const float> covers,
                            std::vector<std::uint32_t> order);

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <utility>
 
 #include <ist/asset_layout.h>
 #include "bake/cluster/neural_gas.h"
@@ -34,8 +35,13 @@ std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::
 }
 
 std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays,
-                                    Clustering clustering, bool swaps) {
-  std::vector<std::uint32_t> order = group_order(balls, last_stays, clustering, swaps);
+                                    Clustering clustering, bool swaps);
+
+/// The order of balls whose groups of 16 follow one another in `order`: groups of their balls, and
+/// so on up.
+std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
+                                        std::vector<std::uint32_t> order, bool last_stays,
+                                        Clustering clustering, bool swaps) {
   if (order.size() <= std::size_t{kWidth} * kWidth) return order;
   // A group that is not full comes last, and so does any that holds one that is not.
   const std::vector<std::uint32_t> groups = order_of(
@@ -49,11 +55,23 @@ std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays
   return sorted;
 }
 
+std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays,
+                                    Clustering clustering, bool swaps) {
+  return order_groups(balls, group_order(balls, last_stays, clustering, swaps), last_stays,
+                      clustering, swaps);
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, Clustering clustering,
                                       bool swaps) {
   return order_of(spheres, false, clustering, swaps);
+}
+
+std::vector<std::uint32_t> refined_order(std::span<const Ball> spheres,
+                                         std::vector<std::uint32_t> order) {
+  improve_groups(spheres, false, order);
+  return order_groups(spheres, std::move(order), false, Clustering::neural_gas, true);
 }
 
 }  // namespace ist
