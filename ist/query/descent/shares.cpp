@@ -18,6 +18,9 @@ constexpr double kTrust = 2;
 // With room for so many shares each stands for all alike; with so many guesses do for the others.
 constexpr double kAlike = 3, kByGuess = 5;
 
+// Guesses that are so small a part of what they are held against say nothing.
+constexpr double kNothing = 1e-9;
+
 /// The golden ratio's multiples: any run of blocks is spread evenly.
 std::uint32_t share_of(std::uint32_t block) { return (block * 2654435769u) >> 28; }
 static_assert(kShares == 16);
@@ -74,7 +77,7 @@ Overlap other_shares(const Overlap& large, const Overlap& part, const ShareWeigh
   found.add(part);
   const Overlap tried = finish(tried_sums, precision);
   Overlap rest = finish(rest_sums, precision);
-  if (!(tried.volume > 0)) return alike;
+  if (!(tried.volume > kNothing * std::max(found.volume, rest.volume))) return alike;
   const double ratio = found.volume / tried.volume;
   const double trust = kTrust * ratio * ratio;
   const double counts = (ratio + trust) / (1 + trust);
