@@ -26,12 +26,11 @@ constexpr double kVisits = 0.75, kVisitsOfBins = 0.6;
 constexpr double kPlanned = 0.85, kLatest = 0.95;
 // [µs] no pair of leaves takes longer where time is ample.
 constexpr double kDearest = 0.25;
-// [µs] what a pair of leaves takes where time is dear: if all of them do no longer, they are
-// guessed.
-constexpr double kDear = 0.06;
-// [µs] a pair's guess, and the part of the time that guesses may take. No clock is asked: guesses
-// that come and go from tick to tick are felt.
-constexpr double kGuessTime = 0.0075, kGuessPart = 0.15;
+// [µs] deadline a pair of leaves that does for all, guesses or not.
+constexpr double kAmple = 0.1;
+// [µs] about what a visited node and a guess take, and the part of the time that both may. No clock
+// is asked: guesses that come and go from tick to tick are felt.
+constexpr double kVisitTime = 0.015, kGuessTime = 0.0075, kBeforeShares = 0.35;
 // Pairs of leaves that take a few microseconds.
 constexpr std::size_t kFewPairs = 160;
 constexpr std::size_t kGuesses = 32;  ///< between two looks at the clock, evenly over what is left
@@ -241,7 +240,7 @@ bool Descent::add_by_shares() {
     std::swap(now, scratch_.next);
     return false;
   }
-  Overlap answer = finish(sums_, precision_);
+  const Overlap large = finish(sums_, precision_);
   for (std::size_t i = 0; i < done; ++i) sums_.add(shares[i]);
   if (done == kShares && room >= kAll) return true;
 
@@ -249,11 +248,12 @@ bool Descent::add_by_shares() {
   ShareWeights weights = share_weights(room, done);
   if (bins_ != nullptr)  // what a bin holds is of all shares alike
     std::fill(weights.begin(), weights.begin() + done, 1.0);
-  LeafSums part;
-  for (std::size_t i = 0; i < done; ++i) part.add(shares[i], weights[i]);
-  const Overlap large = answer, weighed = finish(part, precision_);
-  answer.add(weighed);
-  answer.add(other_shares(large, weighed, weights, guesses, precision_, room));
+  LeafSums weighed;
+  for (std::size_t i = 0; i < done; ++i) weighed.add(shares[i], weights[i]);
+  const Overlap part = finish(weighed, precision_);
+  Overlap answer = large;
+  answer.add(part);
+  answer.add(other_shares(large, part, weights, guesses, precision_, room));
   Overlap summed = finish(sums_, precision_);
   if (bins_ != nullptr && summed.volume > 0) bins_->scale_sums(answer.volume / summed.volume);
   summed.scale(-1);
@@ -266,23 +266,25 @@ bool Descent::add_by_shares() {
 }
 
 bool Descent::to_be_guessed() {
+  if (bins_ != nullptr) return false;  // what they hold is scaled, all alike
   if (!budget_.timed()) return true;
   const auto pairs = static_cast<double>(scratch_.now.size);
-  return pairs * kGuessTime <= kGuessPart * limits_.deadline_us &&
-         pairs * kDear > limits_.deadline_us * (kPlanned - budget_.elapsed());
+  const double before_shares = kVisitTime * budget_.visits() + kGuessTime * pairs;
+  return limits_.deadline_us < kAmple * pairs &&
+         before_shares < kBeforeShares * limits_.deadline_us;
 }
 
 void Descent::guess_leaves(const ShareBounds& bounds, ShareGuesses& guesses) {
   const LeafStage stage{&a_, &b_, level_a_, level_b_, &map_, precision_};
   const auto guess = [&](std::size_t from, std::size_t to, LeafSums& sums) {
-    guess_leaf_pairs(stage, scratch_.now.a.get() + from, scratch_.now.b.get() + from, to - from,
-                     sums);
+    for (; from < to; from += kLeafChunk) {
+      guess_leaf_pairs(stage, scratch_.now.a.get() + from, scratch_.now.b.get() + from,
+                       std::min(kLeafChunk, to - from), sums);
+      if (budget_.timed()) budget_.elapsed();  // or all of it would pass for a stall
+    }
   };
   guess(0, bounds[0], guesses.large);
-  for (std::size_t i = 0; i < kShares; ++i) {
-    guess(bounds[i], bounds[i + 1], guesses.share[i]);
-    if (budget_.timed()) budget_.elapsed();  // or all of it would pass for a stall
-  }
+  for (std::size_t i = 0; i < kShares; ++i) guess(bounds[i], bounds[i + 1], guesses.share[i]);
   guesses.made = true;
 }
 
@@ -416,7 +418,7 @@ Penetration Descent::penetration() const noexcept {
   const double cap = (1 + 1e-9) * std::min(volume_a * static_cast<double>(b_.header->overlap),
                                            volume_b * static_cast<double>(a_.header->overlap));
   const double sure = overlap.volume - unopened_.volume;
-  // Shares that stand for all may be less than what was summed besides.
+  // What is answered by shares may be less than what was summed.
   const double lowest = std::max(0.0, std::min(sure - overlap.error, overlap.volume));
   const double highest = std::max(lowest, std::min(cap, sure + overlap.error + unopened_bound_));
 

@@ -11,14 +11,19 @@ constexpr double kLarge = 8;
 // From this part of all shares on the weights go to 1.
 constexpr double kMany = 0.75;
 
-// What R² counts in other_shares. Volumes of deep and light contacts of four pairs of solids hardly
-// change between 1 and 3, forces want more where contacts are deep and less in a thread.
+// Of R² in how much guesses count. Volumes of deep and light contacts of four pairs of solids
+// hardly change between 1 and 3; forces in deep ones would have more, in a thread less.
 constexpr double kTrust = 2;
 
-// With room for so many shares each stands for all alike; with so many guesses do for the others.
+// So much of the rest's guess is held against what was found too: where little was tried R stays
+// small and changes smoothly.
+constexpr double kUntried = 0.01;
+
+// Up to so many shares each stands for all alike, from so many on guesses do for the others, and
+// between both are blended.
 constexpr double kAlike = 3, kByGuess = 5;
 
-// Guesses that are so small a part of what they are held against say nothing.
+// Guesses that are so small a part of what was found say nothing.
 constexpr double kNothing = 1e-9;
 
 /// The golden ratio's multiples: any run of blocks is spread evenly.
@@ -75,18 +80,19 @@ Overlap other_shares(const Overlap& large, const Overlap& part, const ShareWeigh
   }
   Overlap found = large;
   found.add(part);
-  const Overlap tried = finish(tried_sums, precision);
-  Overlap rest = finish(rest_sums, precision);
-  if (!(tried.volume > kNothing * std::max(found.volume, rest.volume))) return alike;
-  const double ratio = found.volume / tried.volume;
+  Overlap rest = finish(rest_sums, precision), expected = rest;
+  expected.scale(kUntried);
+  expected.add(finish(tried_sums, precision));
+  if (!(expected.volume > kNothing * found.volume)) return alike;
+  const double ratio = found.volume / expected.volume;
   const double trust = kTrust * ratio * ratio;
   const double counts = (ratio + trust) / (1 + trust);
   // d(counts)/d(ratio)
   const double slope = (1 + 2 * kTrust * ratio * (1 - counts)) / (1 + trust);
-  const double pull = rest.volume * slope / tried.volume;
+  const double pull = rest.volume * slope / expected.volume;
   rest.scale(counts);
-  rest.force += pull * (found.force - ratio * tried.force);
-  rest.torque += pull * (found.torque - ratio * tried.torque);
+  rest.force += pull * (found.force - ratio * expected.force);
+  rest.torque += pull * (found.torque - ratio * expected.torque);
 
   const double guessed = std::clamp((room - kAlike) / (kByGuess - kAlike), 0.0, 1.0);
   rest.scale(guessed);

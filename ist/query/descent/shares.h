@@ -29,7 +29,7 @@ using ShareBounds = std::array<std::size_t, kShares + 1>;
 ShareBounds sort_by_shares(const PairList& list, const SphereTree& tree, int level, bool of_b,
                            PairList& sorted) noexcept;
 
-/// How far the sum of each share takes the place of its guess, from 1 down to 0.
+/// How far the sum of each share counts, from 1 down to 0: for the rest of it others stand.
 using ShareWeights = std::array<double, kShares>;
 
 /// Weights of the first `done` shares where limits do for `room` of them, in [done, done + 1].
@@ -45,10 +45,10 @@ struct ShareGuesses {
   LeafSums large, share[kShares];
 };
 
-/// What shares hold beyond their weights, by `part`, what they do hold within these, and by
-/// `large`, the blocks that are in none.
+/// What all shares hold less `part`: what they do hold, each by its weight. `large`: the blocks
+/// that are in none.
 ///
-/// Guesses of them, if there are any, count by R, what was found over what was guessed there:
+/// Guesses of it, if there are any, count by R, what was found over what was guessed there:
 /// (R + 2 R²) / (1 + 2 R²) of them. That is R where pairs hold far less than guessed, as in a
 /// thread or where surfaces graze, and nearly 1, whatever R, where guesses do well: then they are
 /// nearer than a ratio of few blocks. With room for few shares each stands for all alike instead.

@@ -1,7 +1,6 @@
 #include "query/kernel/guess_kernel.h"
 
 #include <algorithm>
-#include <limits>
 #include <numbers>
 
 #undef HWY_TARGET_INCLUDE
@@ -12,6 +11,15 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
+
+/// Between these no quotient is infinite. Volumes and radii of sound assets lie there; those of
+/// damaged ones need not.
+template <class T>
+inline constexpr T kMostHeld = sizeof(T) == sizeof(float) ? static_cast<T>(1e7)
+                                                          : static_cast<T>(1e100);
+template <class T>
+inline constexpr T kLeastCubes = sizeof(T) == sizeof(float) ? static_cast<T>(1e-30)
+                                                            : static_cast<T>(1e-200);
 
 /// 3/4π: one over the volume of the unit ball.
 inline constexpr double kPerBall = 0.75 / std::numbers::pi;
@@ -43,13 +51,15 @@ void guess_as(const LeafStage& stage, const std::uint32_t* a, const std::uint32_
       list.ly[i] = static_cast<T>(ball_a.centre[1] - map.t[1]);
       list.lz[i] = static_cast<T>(ball_a.centre[2] - map.t[2]);
       list.error[i] = 0;
-      held[i] = static_cast<T>((kPerBall * volume_a) * (kPerBall * volume_b));
+      list.bin[i] = 0;
+      held[i] = static_cast<T>(std::min((kPerBall * volume_a) * (kPerBall * volume_b),
+                                        static_cast<double>(kMostHeld<T>)));
     }
     const std::size_t used = list.size, batches = fill_up(list);
     std::fill(held + used, held + kWidth * batches, T(0));
     sum_lenses(list, batches, sums, [&](Lenses& lens, std::size_t at) {
       const auto r = hn::Load(d, list.ri + at) * hn::Load(d, list.rj + at);
-      const auto cubes = hn::Max((r * r) * r, hn::Set(d, std::numeric_limits<T>::min()));
+      const auto cubes = hn::Max((r * r) * r, hn::Set(d, kLeastCubes<T>));
       const auto weight = hn::Load(d, held + at) / cubes;
       lens.caps = lens.caps * weight;
       for (int k = 0; k < 3; ++k) {
