@@ -30,7 +30,7 @@ constexpr double kDearest = 0.25;
 constexpr double kAmple = 0.1;
 // [µs] about what a visited node and a guess take, and the part of the time that both may. No clock
 // is asked: guesses that come and go from tick to tick are felt.
-constexpr double kVisitTime = 0.015, kGuessTime = 0.0075, kBeforeShares = 0.35;
+constexpr double kVisitTime = 0.015, kGuessTime = 0.0075, kBeforeShares = 0.15;
 // Pairs of leaves that take a few microseconds.
 constexpr std::size_t kFewPairs = 160;
 constexpr std::size_t kGuesses = 32;  ///< between two looks at the clock, evenly over what is left
