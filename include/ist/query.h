@@ -37,11 +37,10 @@ struct PenetrationSettings {
 
   /// [µs] wall clock from the call.
   /// Of pairs of trees as many sixteenths of the leaves are summed as there is time for, the same
-  /// ones at every pose; the others are guessed, by what guesses of these are worth, or taken for
-  /// like them: volume and force then change smoothly with the pose, and a loop gains little
-  /// energy. If not even one can be summed, or a surface is met, visits end at 0.6 to 0.75 of the
-  /// time and what is left is estimated. Kept to a few µs while the system lets the thread run;
-  /// what the system takes is not counted.
+  /// ones at every pose, and stand for all: volume and force then change smoothly with the pose,
+  /// and a loop gains little energy. If not even one can be summed, or a surface is met, visits end
+  /// at 0.6 to 0.75 of the time and what is left is estimated. Kept to a few µs while the system
+  /// lets the thread run; what the system takes is not counted.
   double deadline_us = 0;
 
   double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
@@ -53,8 +52,8 @@ struct ContactSettings {
   Measure measure = Measure::matched;
   FieldUse field = FieldUse::automatic;  ///< matched measure only
   std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
-  /// [µs] wall clock from the call, as in PenetrationSettings. Where not even one share can be
-  /// summed, all that is left when visits end is estimated, at 0.1 µs a pair.
+  /// [µs] wall clock from the call, as in PenetrationSettings. Where nothing can stand for all, all
+  /// that is left when visits end is estimated, at 0.1 µs a pair.
   double deadline_us = 0;
   double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
   double min_radius = 0;      ///< [u] nodes smaller than this are not opened

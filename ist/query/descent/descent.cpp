@@ -8,7 +8,7 @@
 
 #include "query/base/precision.h"
 #include "query/descent/answer.h"
-#include "query/kernel/guess_kernel.h"
+#include "query/descent/shares.h"
 #include "query/kernel/node_kernel.h"
 
 namespace ist {
@@ -26,11 +26,6 @@ constexpr double kVisits = 0.75, kVisitsOfBins = 0.6;
 constexpr double kPlanned = 0.85, kLatest = 0.95;
 // [µs] no pair of leaves takes longer where time is ample.
 constexpr double kDearest = 0.25;
-// [µs] deadline a pair of leaves that does for all, guesses or not.
-constexpr double kAmple = 0.1;
-// [µs] about what a visited node and a guess take, and the part of the time that both may. No clock
-// is asked: guesses that come and go from tick to tick are felt.
-constexpr double kVisitTime = 0.015, kGuessTime = 0.0075, kBeforeShares = 0.15;
 // Pairs of leaves that take a few microseconds.
 constexpr std::size_t kFewPairs = 160;
 constexpr std::size_t kGuesses = 32;  ///< between two looks at the clock, evenly over what is left
@@ -222,8 +217,6 @@ bool Descent::add_by_shares() {
   std::size_t done = 0;
   constexpr double kAll = kShares + 1;
   double room = limits_.shares > 0 ? limits_.shares : kAll;  // for so many limits do
-  ShareGuesses guesses;
-  if (to_be_guessed()) guess_leaves(bounds, guesses);
   // A few pairs are summed even if the time is over: there would be nothing to go by otherwise.
   const bool at_least = bounds[1] <= kFewPairs;
   bool in_time = add_group(0, bounds[0], at_least, sums_);
@@ -240,52 +233,24 @@ bool Descent::add_by_shares() {
     std::swap(now, scratch_.next);
     return false;
   }
-  const Overlap large = finish(sums_, precision_);
   for (std::size_t i = 0; i < done; ++i) sums_.add(shares[i]);
   if (done == kShares && room >= kAll) return true;
 
-  room = std::clamp(room, static_cast<double>(done), static_cast<double>(done + 1));
-  ShareWeights weights = share_weights(room, done);
-  if (bins_ != nullptr)  // what a bin holds is of all shares alike
-    std::fill(weights.begin(), weights.begin() + done, 1.0);
-  LeafSums weighed;
-  for (std::size_t i = 0; i < done; ++i) weighed.add(shares[i], weights[i]);
-  const Overlap part = finish(weighed, precision_);
-  Overlap answer = large;
-  answer.add(part);
-  answer.add(other_shares(large, part, weights, guesses, precision_, room));
-  Overlap summed = finish(sums_, precision_);
-  if (bins_ != nullptr && summed.volume > 0) bins_->scale_sums(answer.volume / summed.volume);
-  summed.scale(-1);
-  unopened_.add(answer);
-  unopened_.add(summed);
+  ShareWeights weights = share_weights(
+      std::clamp(room, static_cast<double>(done), static_cast<double>(done + 1)), done);
+  if (bins_ != nullptr) {  // what a bin holds is of all shares alike
+    weights.fill(static_cast<double>(kShares) / static_cast<double>(done));
+    bins_->scale_sums(weights[0]);
+  }
+  for (std::size_t i = 0; i < done; ++i) {
+    Overlap others = finish(shares[i], precision_);
+    others.scale(weights[i] - 1);
+    unopened_.add(others);
+  }
   stopped_ = true;
   unopened_bound_ = std::numeric_limits<double>::infinity();  // penetration() caps it
   now.size = 0;
   return true;
-}
-
-bool Descent::to_be_guessed() {
-  if (bins_ != nullptr) return false;  // what they hold is scaled, all alike
-  if (!budget_.timed()) return true;
-  const auto pairs = static_cast<double>(scratch_.now.size);
-  const double before_shares = kVisitTime * budget_.visits() + kGuessTime * pairs;
-  return limits_.deadline_us < kAmple * pairs &&
-         before_shares < kBeforeShares * limits_.deadline_us;
-}
-
-void Descent::guess_leaves(const ShareBounds& bounds, ShareGuesses& guesses) {
-  const LeafStage stage{&a_, &b_, level_a_, level_b_, &map_, precision_};
-  const auto guess = [&](std::size_t from, std::size_t to, LeafSums& sums) {
-    for (; from < to; from += kLeafChunk) {
-      guess_leaf_pairs(stage, scratch_.now.a.get() + from, scratch_.now.b.get() + from,
-                       std::min(kLeafChunk, to - from), sums);
-      if (budget_.timed()) budget_.elapsed();  // or all of it would pass for a stall
-    }
-  };
-  guess(0, bounds[0], guesses.large);
-  for (std::size_t i = 0; i < kShares; ++i) guess(bounds[i], bounds[i + 1], guesses.share[i]);
-  guesses.made = true;
 }
 
 bool Descent::add_group(std::size_t from, std::size_t to, bool surely, LeafSums& sums) {
@@ -418,7 +383,7 @@ Penetration Descent::penetration() const noexcept {
   const double cap = (1 + 1e-9) * std::min(volume_a * static_cast<double>(b_.header->overlap),
                                            volume_b * static_cast<double>(a_.header->overlap));
   const double sure = overlap.volume - unopened_.volume;
-  // What is answered by shares may be less than what was summed.
+  // Shares that stand for all may be less than what was summed besides.
   const double lowest = std::max(0.0, std::min(sure - overlap.error, overlap.volume));
   const double highest = std::max(lowest, std::min(cap, sure + overlap.error + unopened_bound_));
 

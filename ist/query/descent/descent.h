@@ -9,7 +9,6 @@
 #include "query/base/budget.h"
 #include "query/base/relative_pose.h"
 #include "query/contact/contact_bins.h"
-#include "query/descent/shares.h"
 #include "query/descent/unopened.h"
 #include "query/descent/workspace.h"
 #include "query/kernel/leaf_kernel.h"
@@ -70,15 +69,9 @@ class Descent {
   /// Whether the time may not do for all pairs.
   bool by_shares();
 
-  /// Sums as many shares of the pairs as there is time for and guesses the others, by what guesses
-  /// of these are worth. False if not even the first could be finished: then nothing is summed.
+  /// Sums as many shares of the pairs as there is time for, and takes the others for like them.
+  /// False if not even the first could be finished: then nothing is summed.
   bool add_by_shares();
-
-  /// Whether shares are worth guessing too.
-  bool to_be_guessed();
-
-  /// Guesses the pairs of the current list.
-  void guess_leaves(const ShareBounds& bounds, ShareGuesses& guesses);
 
   /// Sums pairs [from, to) of the current list; false if limits do not do for all of them.
   /// `surely`: whatever the time.

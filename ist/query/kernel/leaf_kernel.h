@@ -24,7 +24,7 @@ struct alignas(64) LeafSums {
   double error[kSumLanes] = {};      ///< 1/2π · bound on what rounded distances change in V
   std::uint32_t lenses = 0;          ///< that are not empty
 
-  void add(const LeafSums& other, double factor = 1) noexcept;
+  void add(const LeafSums& other) noexcept;
 
   /// All but the count.
   void scale(double factor) noexcept;

@@ -165,11 +165,11 @@ HWY_INLINE void bin_lenses(const LensList<T>& list, std::size_t batches, LeafSum
   }
 }
 
-/// Adds lenses [0, 16 · batches) to the sums, each changed by `weigh(lens, at)` before. Lanes of
-/// any vector width add in the same order.
-template <class T, class Weigh>
+/// Adds lenses [0, 16 · batches) to the sums and, if there are any, to the bins'. Lanes of any
+/// vector width add in the same order.
+template <class T>
 HWY_INLINE void sum_lenses(const LensList<T>& list, std::size_t batches, LeafSums& sums,
-                           const Weigh& weigh) {
+                           LeafSums* bins) {
   const LaneTag<T> d;
   using V = hn::Vec<decltype(d)>;
   LaneSums<T> lanes;
@@ -178,8 +178,7 @@ HWY_INLINE void sum_lenses(const LensList<T>& list, std::size_t batches, LeafSum
     LensVectors<V> total{zero, zero, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
     for (std::size_t i = 0; i < batches; ++i) {
       const std::size_t at = kWidth * i + lane;
-      LensVectors<V> lens = lens_vectors<T>(list, d, at, sums.lenses);
-      weigh(lens, at);
+      const LensVectors<V> lens = lens_vectors<T>(list, d, at, sums.lenses);
       total.caps = total.caps + lens.caps;
       total.error = total.error + lens.error;
       for (int k = 0; k < 3; ++k) {
@@ -191,20 +190,13 @@ HWY_INLINE void sum_lenses(const LensList<T>& list, std::size_t batches, LeafSum
     store<T>(total, d, lane, lanes);
   }
   add_lanes(lanes, sums);
-}
-
-/// Adds lenses [0, 16 · batches) to the sums and, if there are any, to the bins'.
-template <class T>
-HWY_INLINE void sum_and_bin(const LensList<T>& list, std::size_t batches, LeafSums& sums,
-                            LeafSums* bins) {
-  sum_lenses(list, batches, sums, [](const auto&, std::size_t) {});
   if (bins != nullptr) bin_lenses(list, batches, bins);
 }
 
 /// Sums a full list's whole batches and keeps the rest.
 template <class T>
 HWY_INLINE void sum_full_list(LensList<T>& list, LeafSums& sums, LeafSums* bins) {
-  sum_and_bin(list, kFullList / kWidth, sums, bins);
+  sum_lenses(list, kFullList / kWidth, sums, bins);
   list.size -= kFullList;
   for (std::size_t i = 0; i < list.size; ++i) {
     const std::size_t from = kFullList + i;
@@ -215,9 +207,9 @@ HWY_INLINE void sum_full_list(LensList<T>& list, LeafSums& sums, LeafSums* bins)
   }
 }
 
-/// Fills the last batch up with points that meet nothing; returns how many batches there are.
+/// Sums all that is left, filled up with points that meet nothing.
 template <class T>
-HWY_INLINE std::size_t fill_up(LensList<T>& list) {
+HWY_INLINE void sum_last_lenses(LensList<T>& list, LeafSums& sums, LeafSums* bins) {
   const std::size_t batches = (list.size + kWidth - 1) / kWidth;
   for (std::size_t i = list.size; i < kWidth * batches; ++i) {
     list.dx[i] = 1, list.dy[i] = list.dz[i] = 0;
@@ -225,14 +217,7 @@ HWY_INLINE std::size_t fill_up(LensList<T>& list) {
     list.lx[i] = list.ly[i] = list.lz[i] = 0;
     list.error[i] = 0, list.bin[i] = list.bin[list.size - 1];
   }
-  return batches;
-}
-
-/// Sums all that is left.
-template <class T>
-HWY_INLINE void sum_last_lenses(LensList<T>& list, LeafSums& sums, LeafSums* bins) {
-  const std::size_t batches = fill_up(list);
-  if (batches != 0) sum_and_bin(list, batches, sums, bins);
+  if (batches != 0) sum_lenses(list, batches, sums, bins);
   list.size = 0;
 }
 

@@ -17,14 +17,14 @@ Eigen::Vector3d total(const double (&lanes)[3][kSumLanes]) {
 
 }  // namespace
 
-void LeafSums::add(const LeafSums& other, double factor) noexcept {
+void LeafSums::add(const LeafSums& other) noexcept {
   for (std::size_t lane = 0; lane < kSumLanes; ++lane) {
-    caps[lane] += factor * other.caps[lane];
-    error[lane] += factor * other.error[lane];
+    caps[lane] += other.caps[lane];
+    error[lane] += other.error[lane];
     for (int k = 0; k < 3; ++k) {
-      force[k][lane] += factor * other.force[k][lane];
-      torque[k][lane] += factor * other.torque[k][lane];
-      moment[k][lane] += factor * other.moment[k][lane];
+      force[k][lane] += other.force[k][lane];
+      torque[k][lane] += other.torque[k][lane];
+      moment[k][lane] += other.moment[k][lane];
     }
   }
   lenses += other.lenses;
