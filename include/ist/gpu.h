@@ -24,8 +24,8 @@ class DeviceMemoryResource {
 
 /// Which device, stream and memory a bake uses. Every bake that runs at the same time as another
 /// needs a stream of its own; the result does not depend on it. A bake that is given neither stream
-/// nor memory works on two streams at once, of which the first comes before a device's work of
-/// usual priority: it is done sooner, and needs some more memory.
+/// nor memory, and has levels of detail, works on two streams at once, of which the first comes
+/// before a device's work of usual priority: it is done sooner, and needs some more memory.
 struct GpuSettings {
   int device = 0;                          ///< CUDA device index
   CUstream_st* stream = nullptr;           ///< null: made for the call
