@@ -38,9 +38,9 @@ struct PenetrationSettings {
   /// [µs] wall clock from the call.
   /// Of pairs of trees as many sixteenths of the leaves are summed as there is time for, the same
   /// ones at every pose, and stand for all: volume and force then change smoothly with the pose,
-  /// and a loop gains little energy. If not even one can be summed, or a surface is met, visits end
-  /// at 0.6 to 0.75 of the time and what is left is estimated. Kept to a few µs while the system
-  /// lets the thread run; what the system takes is not counted.
+  /// and a loop gains little energy where six or more are. If not even one can be summed, or a
+  /// surface is met, visits end at 0.6 to 0.75 of the time and what is left is estimated. Kept to a
+  /// few µs while the system lets the thread run; what the system takes is not counted.
   double deadline_us = 0;
 
   double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max

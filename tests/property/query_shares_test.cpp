@@ -3,17 +3,14 @@
 
 #include <memory>
 
-#include "query/base/relative_pose.h"
-#include "query/descent/descent.h"
-#include "query/descent/shares.h"
 #include "samples/samples.h"
 #include "support/baked.h"
+#include "support/by_shares.h"
 #include "support/nut_on_bolt.h"
 #include "support/random_pairs.h"
 #include "support/sanitizers.h"
 
-// What a deadline leaves of a sum: shares of its leaves that stand for all. Here they are counted,
-// not timed, so that every machine answers the same.
+// What a deadline leaves of a sum: shares of its leaves that stand for all.
 
 namespace ist {
 namespace {
@@ -33,15 +30,8 @@ class QueryShares : public ::testing::Test {
 
   /// B against A by no more than so many shares of sixteen.
   Penetration ask(const Asset& asset_a, const Asset& asset_b, const Pose& pose_b, double shares) {
-    const PlacedTree a{asset_a.view(), {}, 1}, b{asset_b.view(), pose_b, 1};
-    const std::optional<RelativePose> pose = relative_pose(a, b);
-    const SphereTree tree_a = sphere_tree(a.tree, Measure::matched);
-    const SphereTree tree_b = sphere_tree(b.tree, Measure::matched);
-    DescentLimits limits;
-    limits.shares = shares;
-    Descent descent(tree_a, tree_b, *pose, limits, *workspace_.impl());
-    descent.run();
-    return descent.penetration();
+    return testing::by_shares({asset_a.view(), {}, 1}, {asset_b.view(), pose_b, 1}, shares,
+                              workspace_);
   }
 
   /// The nut into the bolt.

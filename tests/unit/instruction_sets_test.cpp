@@ -12,7 +12,6 @@
 #include <cstdlib>
 #include <fstream>
 #include <map>
-#include <optional>
 #include <random>
 #include <sstream>
 #include <string>
@@ -20,9 +19,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "query/base/relative_pose.h"
-#include "query/descent/descent.h"
 #include "support/answer_bits.h"
+#include "support/by_shares.h"
 #include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/test_meshes.h"
@@ -124,18 +122,6 @@ class Poses {
   std::mt19937_64 random_{3};
 };
 
-/// What a deadline with time for some of the leaves would leave, on any machine.
-Penetration by_shares(const PlacedTree& a, const PlacedTree& b, Workspace& workspace) {
-  const std::optional<RelativePose> pose = relative_pose(a, b);
-  const SphereTree tree_a = sphere_tree(a.tree, Measure::matched);
-  const SphereTree tree_b = sphere_tree(b.tree, Measure::matched);
-  DescentLimits limits;
-  limits.shares = 6.25;
-  Descent descent(tree_a, tree_b, *pose, limits, *workspace.impl());
-  descent.run();
-  return descent.penetration();
-}
-
 /// `A`: a placed tree or a placed field.
 template <class A>
 void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& workspace,
@@ -167,7 +153,7 @@ void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& w
   bits.add(both.penetration);
   bits.add(both.separation);
   if constexpr (std::is_same_v<A, PlacedTree>) {
-    if (asked == "shares") bits.add(by_shares(a, b, workspace));
+    if (asked == "shares") bits.add(testing::by_shares(a, b, 6.25, workspace));
     if (asked == "matched") bits.add(without_protrusion(both.penetration, a, b));
   }
 }
