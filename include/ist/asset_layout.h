@@ -15,6 +15,9 @@
 //     matched spheres                 Sphere[m]   the matched set of the first m inner spheres
 //     matched tree                    as below, without sphere covers
 //   field, if there is one            as below
+//   mesh, if there is one             as below
+//
+// An asset of a surface alone has no spheres: n = d = 0, neither trees nor a field, but a mesh.
 //
 // The matched set of all n inner spheres is detail 0 and stands in AssetHeader; the coarser ones
 // are what a query may answer from instead, under PenetrationSettings::pair_budget.
@@ -45,6 +48,15 @@
 // The list of a cell starts where that of the cell before ends, its brick's first where the brick's
 // lists do.
 //
+// The mesh, the solid's surface with all its digits, for Measure::exact:
+//
+//   MeshHeader
+//   vertices                          double[3 · vertex_count]   x, y, z of each, unit frame
+//   shells                            MeshShell[shell_count]
+//   neighbours                        uint32[neighbour_count]   16 · block + local vertex
+//   level 0                           MeshBlock[m(0)]
+//   level k ≥ 1                       BoxBlock[m(k)]   boxes around the blocks below; at least one
+//
 // Centres of spheres and balls are floats of the unit frame. A block's origin is chosen so that the
 // difference of every centre in it and the origin is a float too: origin + offset is the centre
 // exactly, and the leaf spheres are the spheres of the table bit for bit.
@@ -58,7 +70,7 @@
 namespace IST_API ist {
 
 inline constexpr std::uint32_t kFormatMajor = 0;
-inline constexpr std::uint32_t kFormatMinor = 4;
+inline constexpr std::uint32_t kFormatMinor = 5;
 inline constexpr char kAssetMagic[8] = {'I', 'S', 'T', 'R', 'E', 'E', '\r', '\n'};
 inline constexpr std::size_t kAssetAlignment = 64;
 inline constexpr std::uint32_t kWidth = 16;       ///< balls in a block
@@ -189,6 +201,68 @@ struct FieldHeader {
 };
 static_assert(sizeof(FieldHeader) == 336);
 
+/// Up to sixteen triangles of the mesh over up to sixteen of its vertices.
+///
+/// Every two triangles of a block are joined by triangles of it that share vertices.
+struct alignas(64) MeshBlock {
+  std::uint32_t vertex[kWidth];    ///< index into the mesh's vertices; unused ones repeat the first
+  std::uint8_t corner[3][kWidth];  ///< place in `vertex` of a triangle's corners, counter-clockwise
+                                   ///< from outside; 0 if unused
+  std::uint8_t triangles = 0;      ///< 1 … 16
+  std::uint8_t vertices = 0;       ///< 3 … 16
+  std::uint16_t reserved = 0;
+  std::uint32_t first_neighbour = 0;  ///< place in `neighbours` of the blocks that share a vertex
+  std::uint32_t neighbours = 0;       ///< of them: one entry a block, by number
+  std::uint32_t shell = 0;
+};
+static_assert(sizeof(MeshBlock) == 128);
+
+/// Boxes around sixteen blocks of the level below, rounded outward. An unused one is empty:
+/// low = +kMaxExtent · 2, high = −kMaxExtent · 2.
+struct alignas(64) BoxBlock {
+  float low[3][kWidth], high[3][kWidth];  ///< unit frame
+};
+static_assert(sizeof(BoxBlock) == 384);
+
+/// Triangles that hang together by shared vertices.
+struct MeshShell {
+  std::uint32_t block = 0;  ///< the first that belongs to it
+  std::uint32_t reserved = 0;
+  float low[3] = {}, high[3] = {};  ///< box, unit frame, rounded outward
+};
+static_assert(sizeof(MeshShell) == 32);
+
+/// The solid's surface for Measure::exact: closed, oriented, with winding numbers of 0 and 1 alone
+/// but for touching faces.
+struct MeshHeader {
+  /// Unit frame, proven: this surface and the solid's lie within it of each other. 0: the mesh's
+  /// own triangles.
+  double error = 0;
+  /// Unit frame: no vertex is further from its place in the mesh, by rounding.
+  double rounding = 0;
+  std::uint32_t vertex_count = 0;
+  std::uint32_t triangle_count = 0;
+  std::uint32_t shell_count = 0;
+  std::uint32_t neighbour_count = 0;
+  std::uint32_t level_count = 0;  ///< ≥ 2; the last has one block
+  std::uint32_t reserved = 0;
+  std::uint64_t vertices = 0;     ///< offset of double[3 · vertex_count]
+  std::uint64_t shells = 0;       ///< offset of MeshShell[shell_count]
+  std::uint64_t neighbours = 0;   ///< offset of uint32[neighbour_count]: 16 · block + the place of
+                                  ///< a shared vertex in this block
+  LevelHeader level[kMaxLevels];  ///< level 0: MeshBlock, above: BoxBlock; origins and nodes are 0
+};
+static_assert(sizeof(MeshHeader) == 288);
+
+/// Why an asset holds no mesh, or what its mesh is.
+enum class MeshState : std::uint32_t {
+  none = 0,        ///< not asked for
+  own = 1,         ///< the triangles that came
+  united = 2,      ///< components that overlap were united
+  simplified = 3,  ///< fewer triangles, within MeshHeader::error
+  unresolved = 4,  ///< no mesh: it counts volume twice, and that could not be resolved
+};
+
 struct alignas(64) AssetHeader {
   char magic[8] = {};
   std::uint32_t format_major = kFormatMajor;
@@ -259,7 +333,11 @@ struct alignas(64) AssetHeader {
   double box_upper[3] = {};    ///< [u]
   double ball_centre[3] = {};  ///< [u] inside the box
   double ball_radius = 0;      ///< [u] no point of the solid is further from ball_centre
-  double reserved[3] = {};
+
+  std::uint64_t mesh = 0;        ///< offset of MeshHeader; 0: baked without one
+  std::uint32_t mesh_state = 0;  ///< MeshState
+  std::uint32_t reserved_mesh = 0;
+  double counted_twice = 0;  ///< unit frame: ∫ (w − 1)⁺ of the mesh as it came
 };
 static_assert(sizeof(AssetHeader) == 1152);
 
@@ -317,6 +395,21 @@ constexpr void place_field(FieldHeader& field, std::uint64_t& end) noexcept {
   field.cell_triangles = take<std::byte>(end, width * field.entry_count);
 }
 
+constexpr void place_mesh(MeshHeader& mesh, std::uint64_t& end) noexcept {
+  mesh.vertices = take<double>(end, std::uint64_t{3} * mesh.vertex_count);
+  mesh.shells = take<MeshShell>(end, mesh.shell_count);
+  mesh.neighbours = take<std::uint32_t>(end, mesh.neighbour_count);
+  std::uint32_t count = mesh.level[0].count;
+  mesh.level[0].blocks = take<MeshBlock>(end, count);
+  mesh.level_count = 1;
+  do {
+    count = (count + kWidth - 1) / kWidth;
+    LevelHeader& level = mesh.level[mesh.level_count++];
+    level.count = count;
+    level.blocks = take<BoxBlock>(end, count);
+  } while (count > 1);
+}
+
 }  // namespace detail
 
 /// Most spheres an asset holds: kMaxLevels levels.
@@ -327,12 +420,12 @@ constexpr std::uint64_t detail_spheres(std::uint64_t n, std::uint32_t i) noexcep
   return n >> (2 * i);
 }
 
-/// Sets every offset, count and the file size from `sphere_count` in [1, kMaxSpheres] and
+/// Sets every offset, count and the file size from `sphere_count` in [0, kMaxSpheres] and
 /// `detail_count`, all of whose sets must have a sphere; `details` are those of the file. `field`,
 /// if there is one, knows list_bytes and its counts: level[0].count, those of bricks, cells and
-/// entries.
+/// entries; `mesh` likewise those of vertices, shells, neighbours and level[0].count.
 constexpr void place_sections(AssetHeader& header, DetailLevel* details,
-                              FieldHeader* field = nullptr) noexcept {
+                              FieldHeader* field = nullptr, MeshHeader* mesh = nullptr) noexcept {
   const std::uint64_t n = header.sphere_count;
   std::uint64_t end = sizeof(AssetHeader);
   header.details =
@@ -341,8 +434,8 @@ constexpr void place_sections(AssetHeader& header, DetailLevel* details,
   header.cover_radii = detail::take<float>(end, n);
   header.matched_spheres = detail::take<Sphere>(end, n);
   header.inner_tree.sphere_count = header.matched_tree.sphere_count = static_cast<std::uint32_t>(n);
-  detail::place_tree(header.inner_tree, true, end);
-  detail::place_tree(header.matched_tree, false, end);
+  if (n > 0) detail::place_tree(header.inner_tree, true, end);
+  if (n > 0) detail::place_tree(header.matched_tree, false, end);
   for (std::uint32_t i = 0; i < header.detail_count; ++i) {
     const std::uint64_t m = detail_spheres(n, i + 1);
     details[i].matched_spheres = detail::take<Sphere>(end, m);
@@ -351,6 +444,8 @@ constexpr void place_sections(AssetHeader& header, DetailLevel* details,
   }
   header.field = field != nullptr ? detail::take<FieldHeader>(end, 1) : 0;
   if (field != nullptr) detail::place_field(*field, end);
+  header.mesh = mesh != nullptr ? detail::take<MeshHeader>(end, 1) : 0;
+  if (mesh != nullptr) detail::place_mesh(*mesh, end);
   header.file_bytes = end;
 }
 

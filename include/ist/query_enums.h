@@ -16,12 +16,18 @@ enum class QueryStatus : std::uint32_t {
   /// than 1e-3; a scale ≤ 0; an empty tree; sizes or distances more than 1e60 : 1 apart; a
   /// workspace that was moved from.
   invalid_input = 2,
+  /// An asset does not hold what the measure needs: Measure::exact asks for both solids' meshes
+  /// (TreeView::has_mesh), the others for spheres. All numbers of the answer are NaN.
+  not_held = 3,
 };
 
 /// Which spheres stand for the solid.
 enum class Measure : std::uint32_t {
   matched = 0,  ///< matched spheres whose volumes sum to the solid's: the accurate one
   inner = 1,    ///< inner spheres: a certified lower bound of the true volume
+  /// The two meshes themselves: the true volume and its gradients, within rounding that the bounds
+  /// tell. Needs the mesh in both assets.
+  exact = 2,
 };
 
 /// Whether the surface that an asset holds (TreeView::has_field) is used.

@@ -46,6 +46,16 @@ struct FieldArrays {
   std::vector<std::uint32_t> cell_triangles;
 };
 
+/// The solid's surface with all its digits as it will lie in the file.
+struct MeshArrays {
+  MeshHeader header;  ///< error and rounding; offsets and counts are filled in by writing
+  std::vector<double> vertices;  ///< [3 · vertices] unit frame
+  std::vector<MeshShell> shells;
+  std::vector<std::uint32_t> neighbours;
+  std::vector<MeshBlock> blocks;
+  std::vector<std::vector<BoxBlock>> boxes;  ///< from level 1 up
+};
+
 /// What an asset is made of.
 struct AssetArrays {
   AssetHeader header;  ///< scalar fields; offsets, counts, magic and hash are filled in by writing
@@ -56,6 +66,7 @@ struct AssetArrays {
   TreeArrays matched_tree;
   std::vector<DetailArrays> details;         ///< the i-th from 1 of ⌊n / 4^i⌋ spheres
   std::shared_ptr<const FieldArrays> field;  ///< null: none
+  std::shared_ptr<const MeshArrays> mesh;    ///< null: none
 };
 
 /// The bytes of the asset. Throws Error unless the arrays' lengths fit each other.

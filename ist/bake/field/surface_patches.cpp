@@ -180,8 +180,9 @@ std::vector<std::uint32_t> united(const BlockPatch& a, const BlockPatch& b) {
   return all;
 }
 
-/// Joins patches that are not full to others near them in space.
-std::vector<BlockPatch> joined(const FieldMesh& mesh, std::vector<BlockPatch> patches) {
+/// Joins patches that are not full to others near them in space, `connected`: by a vertex.
+std::vector<BlockPatch> joined(const FieldMesh& mesh, std::vector<BlockPatch> patches,
+                               bool connected) {
   std::vector<Point> middles(patches.size());
   std::vector<double> radii(patches.size());
   for (std::size_t p = 0; p < patches.size(); ++p) {
@@ -200,6 +201,7 @@ std::vector<BlockPatch> joined(const FieldMesh& mesh, std::vector<BlockPatch> pa
       if (patch.triangles.size() + other.triangles.size() > kWidth) continue;
       const std::vector<std::uint32_t> vertices = united(patch, other);
       if (vertices.size() > kWidth) continue;
+      if (connected && vertices.size() == patch.vertices.size() + other.vertices.size()) continue;
       const double radius = extent_of(mesh, vertices).radius;
       if (radius < best && radius <= kJoinedRadius * std::max(radii[order[i]], radii[order[j]])) {
         best = radius;
@@ -219,8 +221,8 @@ std::vector<BlockPatch> joined(const FieldMesh& mesh, std::vector<BlockPatch> pa
 
 }  // namespace
 
-std::vector<BlockPatch> cut_into_patches(const FieldMesh& mesh) {
-  return joined(mesh, Growth(mesh).all());
+std::vector<BlockPatch> cut_into_patches(const FieldMesh& mesh, bool connected) {
+  return joined(mesh, Growth(mesh).all(), connected);
 }
 
 }  // namespace ist

@@ -15,7 +15,8 @@ struct BlockPatch {
 
 /// Cuts a surface into patches that are full and compact: each grows from a triangle by neighbours
 /// that add few vertices and lie near its middle; what is left in small pieces goes together where
-/// it is near. Every triangle is in one patch. Deterministic.
-std::vector<BlockPatch> cut_into_patches(const FieldMesh& mesh);
+/// it is near, or, where patches are to be `connected`, where they share a vertex besides. Every
+/// triangle is in one patch. Deterministic.
+std::vector<BlockPatch> cut_into_patches(const FieldMesh& mesh, bool connected = false);
 
 }  // namespace ist

@@ -1,0 +1,196 @@
+#include "bake/field/mesh_blocks.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "bake/field/spatial_order.h"
+#include "bake/field/surface_patches.h"
+
+namespace ist {
+namespace {
+
+constexpr std::uint32_t kNone = ~0u;
+
+float rounded_down(double x) {
+  const auto f = static_cast<float>(x);
+  return double{f} > x ? std::nextafterf(f, -std::numeric_limits<float>::infinity()) : f;
+}
+
+struct Box {
+  float low[3], high[3];
+
+  Box() {
+    std::fill_n(low, 3, static_cast<float>(2 * kMaxExtent));
+    std::fill_n(high, 3, static_cast<float>(-2 * kMaxExtent));
+  }
+  void add(const double* x) {
+    for (int k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], rounded_down(x[k]));
+      high[k] = std::max(high[k], -rounded_down(-x[k]));
+    }
+  }
+  void add(const Box& box) {
+    for (int k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], box.low[k]);
+      high[k] = std::max(high[k], box.high[k]);
+    }
+  }
+};
+
+FieldMesh in_floats(const MeshView& surface) {
+  FieldMesh mesh;
+  mesh.vertices.resize(surface.vertex_count);
+  mesh.triangles.resize(surface.triangle_count);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+    for (std::size_t k = 0; k < 3; ++k)
+      mesh.vertices[v][k] = static_cast<float>(surface.vertices[3 * v + k]);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    std::copy_n(surface.triangles + 3 * t, 3, mesh.triangles[t].begin());
+  return mesh;
+}
+
+/// Patches in an order whose groups of 16, 256, … lie together.
+std::vector<BlockPatch> patches_in_order(const MeshView& surface) {
+  std::vector<BlockPatch> patches = cut_into_patches(in_floats(surface), true);
+  std::vector<std::array<float, 3>> middles(patches.size());
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    Box box;
+    for (const std::uint32_t v : patches[p].vertices) box.add(surface.vertices + 3 * std::size_t{v});
+    for (std::size_t k = 0; k < 3; ++k) middles[p][k] = (box.low[k] + box.high[k]) / 2;
+  }
+  std::vector<BlockPatch> sorted;
+  sorted.reserve(patches.size());
+  for (const std::uint32_t p : spatial_order(middles)) sorted.push_back(std::move(patches[p]));
+  return sorted;
+}
+
+/// Vertices are numbered as blocks first use them.
+void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patches,
+                    MeshArrays& arrays) {
+  std::vector<std::uint32_t> number(surface.vertex_count, kNone);
+  std::uint32_t used = 0;
+  arrays.blocks.resize(patches.size());
+  for (std::size_t b = 0; b < patches.size(); ++b) {
+    const BlockPatch& patch = patches[b];
+    MeshBlock& block = arrays.blocks[b];
+    block.triangles = static_cast<std::uint8_t>(patch.triangles.size());
+    block.vertices = static_cast<std::uint8_t>(patch.vertices.size());
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      const std::uint32_t v = patch.vertices[i < patch.vertices.size() ? i : 0];
+      if (number[v] == kNone) {
+        number[v] = used++;
+        for (std::size_t k = 0; k < 3; ++k)
+          arrays.vertices.push_back(surface.vertices[3 * std::size_t{v} + k]);
+      }
+      block.vertex[i] = number[v];
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::fill_n(block.corner[k], kWidth, std::uint8_t{0});
+      for (std::size_t i = 0; i < patch.triangles.size(); ++i) {
+        const std::uint32_t v = surface.triangles[3 * std::size_t{patch.triangles[i]} + k];
+        block.corner[k][i] = static_cast<std::uint8_t>(
+            std::find(patch.vertices.begin(), patch.vertices.end(), v) - patch.vertices.begin());
+      }
+    }
+    arrays.header.triangle_count += block.triangles;
+  }
+  arrays.header.vertex_count = used;
+}
+
+void find_neighbours(MeshArrays& arrays) {
+  // The blocks around each vertex.
+  std::vector<std::uint32_t> first(arrays.header.vertex_count + 1);
+  for (const MeshBlock& block : arrays.blocks)
+    for (std::uint32_t i = 0; i < block.vertices; ++i) ++first[block.vertex[i] + 1];
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  std::vector<std::uint32_t> around(first.back());
+  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+  for (std::uint32_t b = 0; b < arrays.blocks.size(); ++b)
+    for (std::uint32_t i = 0; i < arrays.blocks[b].vertices; ++i)
+      around[next[arrays.blocks[b].vertex[i]]++] = b;
+
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> found;  // block, place of the vertex
+  for (std::uint32_t b = 0; b < arrays.blocks.size(); ++b) {
+    MeshBlock& block = arrays.blocks[b];
+    found.clear();
+    for (std::uint32_t i = 0; i < block.vertices; ++i)
+      for (std::uint32_t k = first[block.vertex[i]]; k < first[block.vertex[i] + 1]; ++k)
+        if (around[k] != b) found.emplace_back(around[k], i);
+    std::sort(found.begin(), found.end());
+    block.first_neighbour = static_cast<std::uint32_t>(arrays.neighbours.size());
+    for (std::size_t k = 0; k < found.size(); ++k)
+      if (k == 0 || found[k].first != found[k - 1].first)
+        arrays.neighbours.push_back(found[k].first * kWidth + found[k].second);
+    block.neighbours = static_cast<std::uint32_t>(arrays.neighbours.size()) - block.first_neighbour;
+  }
+}
+
+Box box_of(const MeshArrays& arrays, const MeshBlock& block) {
+  Box box;
+  for (std::uint32_t i = 0; i < block.vertices; ++i)
+    box.add(arrays.vertices.data() + 3 * std::size_t{block.vertex[i]});
+  return box;
+}
+
+void find_shells(MeshArrays& arrays, const std::vector<Box>& boxes) {
+  for (MeshBlock& block : arrays.blocks) block.shell = kNone;
+  std::vector<std::uint32_t> waiting;
+  for (std::uint32_t seed = 0; seed < arrays.blocks.size(); ++seed) {
+    if (arrays.blocks[seed].shell != kNone) continue;
+    const auto shell = static_cast<std::uint32_t>(arrays.shells.size());
+    Box box;
+    waiting = {seed};
+    arrays.blocks[seed].shell = shell;
+    while (!waiting.empty()) {
+      const std::uint32_t b = waiting.back();
+      waiting.pop_back();
+      box.add(boxes[b]);
+      const MeshBlock& block = arrays.blocks[b];
+      for (std::uint32_t k = 0; k < block.neighbours; ++k) {
+        const std::uint32_t n = arrays.neighbours[block.first_neighbour + k] / kWidth;
+        if (arrays.blocks[n].shell != kNone) continue;
+        arrays.blocks[n].shell = shell;
+        waiting.push_back(n);
+      }
+    }
+    MeshShell& made = arrays.shells.emplace_back();
+    made.block = seed;
+    std::copy_n(box.low, 3, made.low);
+    std::copy_n(box.high, 3, made.high);
+  }
+}
+
+void lay_out_boxes(std::vector<Box> below, MeshArrays& arrays) {
+  do {
+    std::vector<BoxBlock>& level = arrays.boxes.emplace_back((below.size() + kWidth - 1) / kWidth);
+    std::vector<Box> around(level.size());
+    for (std::size_t i = 0; i < level.size() * kWidth; ++i) {
+      const Box box = i < below.size() ? below[i] : Box();
+      around[i / kWidth].add(box);
+      for (int k = 0; k < 3; ++k) {
+        level[i / kWidth].low[k][i % kWidth] = box.low[k];
+        level[i / kWidth].high[k][i % kWidth] = box.high[k];
+      }
+    }
+    below = std::move(around);
+  } while (below.size() > 1);
+}
+
+}  // namespace
+
+MeshArrays lay_out_mesh(const MeshView& surface) {
+  MeshArrays arrays;
+  lay_out_blocks(surface, patches_in_order(surface), arrays);
+  find_neighbours(arrays);
+  std::vector<Box> boxes(arrays.blocks.size());
+  for (std::size_t b = 0; b < boxes.size(); ++b) boxes[b] = box_of(arrays, arrays.blocks[b]);
+  find_shells(arrays, boxes);
+  lay_out_boxes(std::move(boxes), arrays);
+  return arrays;
+}
+
+}  // namespace ist
