@@ -55,7 +55,8 @@
 //   shells                            MeshShell[shell_count]
 //   neighbours                        uint32[neighbour_count]   16 · block + local vertex
 //   level 0                           MeshBlock[m(0)]
-//   level k ≥ 1                       BoxBlock[m(k)]   boxes around the blocks below; at least one
+//   level k ≥ 1                       BoxBlock[m(k)], BoxSums[m(k)]   boxes around the blocks
+//                                     below and integrals over their surfaces; at least one level
 //
 // Centres of spheres and balls are floats of the unit frame. A block's origin is chosen so that the
 // difference of every centre in it and the origin is a float too: origin + offset is the centre
@@ -224,6 +225,16 @@ struct alignas(64) BoxBlock {
 };
 static_assert(sizeof(BoxBlock) == 384);
 
+/// Integrals over the triangles below each lane of a BoxBlock, n outward, y from the middle of the
+/// lane's box, (low + high) / 2. Unused lanes are zero.
+struct alignas(64) BoxSums {
+  double normal[3][kWidth];   ///< ∫ n dA
+  double flux[3][3][kWidth];  ///< [i][k]: ∫ yᵢ nₖ dA
+  double cone[3][kWidth];     ///< ∫ y (y · n) dA
+  double area[kWidth];        ///< ∫ dA, rounded up
+};
+static_assert(sizeof(BoxSums) == 2048);
+
 /// Triangles that hang together by shared vertices.
 struct MeshShell {
   std::uint32_t block = 0;  ///< the first that belongs to it
@@ -250,7 +261,7 @@ struct MeshHeader {
   std::uint64_t shells = 0;       ///< offset of MeshShell[shell_count]
   std::uint64_t neighbours = 0;   ///< offset of uint32[neighbour_count]: 16 · block + the place of
                                   ///< a shared vertex in this block
-  LevelHeader level[kMaxLevels];  ///< level 0: MeshBlock, above: BoxBlock; origins and nodes are 0
+  LevelHeader level[kMaxLevels];  ///< level 0: MeshBlock; above: BoxBlock, `nodes`: BoxSums
 };
 static_assert(sizeof(MeshHeader) == 288);
 
@@ -407,6 +418,7 @@ constexpr void place_mesh(MeshHeader& mesh, std::uint64_t& end) noexcept {
     LevelHeader& level = mesh.level[mesh.level_count++];
     level.count = count;
     level.blocks = take<BoxBlock>(end, count);
+    level.nodes = take<BoxSums>(end, count);
   } while (count > 1);
 }
 

@@ -54,6 +54,7 @@ struct MeshArrays {
   std::vector<std::uint32_t> neighbours;
   std::vector<MeshBlock> blocks;
   std::vector<std::vector<BoxBlock>> boxes;  ///< from level 1 up
+  std::vector<std::vector<BoxSums>> sums;    ///< of each level of boxes
 };
 
 /// What an asset is made of.

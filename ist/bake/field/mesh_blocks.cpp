@@ -180,6 +180,51 @@ void lay_out_boxes(std::vector<Box> below, MeshArrays& arrays) {
   } while (below.size() > 1);
 }
 
+/// Adds the integrals over a triangle, corners from the point that they are taken about.
+void add_integrals(const double (&p)[3][3], BoxSums& sums, std::size_t lane) {
+  double u[3], v[3], middle[3], n[3];
+  for (int k = 0; k < 3; ++k) {
+    u[k] = p[1][k] - p[0][k];
+    v[k] = p[2][k] - p[0][k];
+    middle[k] = ((p[0][k] + p[1][k]) + p[2][k]) / 3;
+  }
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    n[k] = (u[i] * v[j] - u[j] * v[i]) / 2;  // ∫ n dA
+  }
+  const double height = (middle[0] * n[0] + middle[1] * n[1]) + middle[2] * n[2];
+  for (int i = 0; i < 3; ++i) {
+    sums.normal[i][lane] += n[i];
+    sums.cone[i][lane] += middle[i] * height;  // y · n is constant on a triangle
+    for (int k = 0; k < 3; ++k) sums.flux[i][k][lane] += middle[i] * n[k];
+  }
+  sums.area[lane] +=
+      std::sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]) * (1 + 1e-12) + 1e-300;
+}
+
+/// Of each lane from the triangles themselves: sums of sums would round more.
+void find_sums(MeshArrays& arrays) {
+  std::size_t span = 1;  // blocks below a lane
+  for (const std::vector<BoxBlock>& level : arrays.boxes) {
+    std::vector<BoxSums>& sums = arrays.sums.emplace_back(level.size(), BoxSums{});
+    for (std::size_t b = 0; b < arrays.blocks.size(); ++b) {
+      const std::size_t at = b / span, lane = at % kWidth;
+      const BoxBlock& box = level[at / kWidth];
+      const MeshBlock& block = arrays.blocks[b];
+      for (std::uint32_t t = 0; t < block.triangles; ++t) {
+        double p[3][3];
+        for (int c = 0; c < 3; ++c)
+          for (int k = 0; k < 3; ++k)
+            p[c][k] = arrays.vertices[3 * std::size_t{block.vertex[block.corner[c][t]]} +
+                                      static_cast<std::size_t>(k)] -
+                      (double{box.low[k][lane]} + double{box.high[k][lane]}) / 2;
+        add_integrals(p, sums[at / kWidth], lane);
+      }
+    }
+    span *= kWidth;
+  }
+}
+
 }  // namespace
 
 MeshArrays lay_out_mesh(const MeshView& surface) {
@@ -190,6 +235,7 @@ MeshArrays lay_out_mesh(const MeshView& surface) {
   for (std::size_t b = 0; b < boxes.size(); ++b) boxes[b] = box_of(arrays, arrays.blocks[b]);
   find_shells(arrays, boxes);
   lay_out_boxes(std::move(boxes), arrays);
+  find_sums(arrays);
   return arrays;
 }
 

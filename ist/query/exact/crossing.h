@@ -1,0 +1,111 @@
+#pragma once
+
+#include <cstdint>
+
+#include "query/exact/orientation.h"
+
+namespace ist::exact {
+
+/// Where an edge of one solid goes through a triangle of the other: an end of the segment that two
+/// triangles share. All segments that end there have the same bits of it.
+struct Piercing {
+  Point x;
+  double t = 0;        ///< of the way along the edge, from its first corner in this triangle
+  double t_error = 0;  ///< of t
+  double h_error = 0;  ///< heights of the edge's ends over the triangle, times twice its area, are
+                       ///< off by this together
+  std::int8_t edge = 0;   ///< edge k goes from corner k to the next
+  bool of_b = false;      ///< the edge is B's and the triangle A's
+};
+
+/// Two triangles that cross: their common segment, from where B's side of A's triangle lies to the
+/// left of it. A's edges leave B at the start and enter it at the end; B's edges enter A at the
+/// start and leave it at the end.
+struct Crossing {
+  std::uint32_t a = 0, b = 0;  ///< triangles: 16 · block + lane
+  Point corner_a, corner_b;    ///< the first of each
+  Piercing start, end;
+};
+
+/// A triangle with the numbers of its corners, by which its edges are run the same way from
+/// whichever triangle they are met.
+struct Corners {
+  Point x[3];
+  std::uint32_t vertex[3];
+};
+
+/// +1: the edge p → q goes down through the plane, into the other solid; −1: up.
+IST_HD int direction(int sign_p) { return sign_p > 0 ? 1 : -1; }
+
+/// Where edge `edge` of a triangle pierces a plane, from heights of its ends over it.
+IST_HD Piercing piercing(const Corners& triangle, int edge, const Determinant (&height)[3],
+                         bool of_b) {
+  int p = edge, q = (edge + 1) % 3;
+  const bool turned = triangle.vertex[q] < triangle.vertex[p];
+  if (turned) {
+    const int kept = p;
+    p = q;
+    q = kept;
+  }
+  const double hp = std::abs(height[p].value), hq = std::abs(height[q].value);
+  const double whole = hp + hq;
+  // Both ends in the plane, and apart by the infinitesimal alone: the middle will do.
+  const double t = whole > 0 ? hp / whole : 0.5;
+  Piercing out;
+  out.x = triangle.x[p] + t * (triangle.x[q] - triangle.x[p]);
+  out.t = turned ? 1 - t : t;
+  out.t_error = whole > 0 ? 2 * (height[p].error + height[q].error) / whole + 1e-15 : 1;
+  out.h_error = height[p].error + height[q].error;
+  out.edge = static_cast<std::int8_t>(edge);
+  out.of_b = of_b;
+  return out;
+}
+
+/// Puts a piercing where it belongs.
+IST_HD void place(const Piercing& found, int sign_p, Crossing& out) {
+  ((direction(sign_p) > 0) != found.of_b ? out.end : out.start) = found;
+}
+
+/// Whether two triangles cross, by exact signs. `out` but for the triangles' numbers and corners.
+IST_HD bool cross_exactly(const Corners& a, const Corners& b, Crossing& out) {
+  Determinant of_b[3], of_a[3];
+  for (int k = 0; k < 3; ++k) of_b[k] = height_over_a(a.x, b.x[k]);
+  if (of_b[0].sign == of_b[1].sign && of_b[1].sign == of_b[2].sign) return false;
+  for (int k = 0; k < 3; ++k) of_a[k] = height_over_b(b.x, a.x[k]);
+  if (of_a[0].sign == of_a[1].sign && of_a[1].sign == of_a[2].sign) return false;
+  int round[3][3] = {};  // made when asked for, 0 until then
+  const auto way = [&](int i, int j) {
+    if (round[i][j] == 0)
+      round[i][j] = way_round(a.x[i], a.x[(i + 1) % 3], b.x[j], b.x[(j + 1) % 3]).sign;
+    return round[i][j];
+  };
+  int ends = 0;
+  for (int k = 0; k < 3; ++k)
+    if (of_a[k].sign != of_a[(k + 1) % 3].sign && way(k, 0) == way(k, 1) &&
+        way(k, 1) == way(k, 2)) {
+      place(piercing(a, k, of_a, false), of_a[k].sign, out);
+      ++ends;
+    }
+  for (int k = 0; k < 3; ++k)
+    if (of_b[k].sign != of_b[(k + 1) % 3].sign && way(0, k) == way(1, k) &&
+        way(1, k) == way(2, k)) {
+      place(piercing(b, k, of_b, true), of_b[k].sign, out);
+      ++ends;
+    }
+  return ends == 2;
+}
+
+/// How often the way from p to q, both B's points or both A's, enters the other solid through one
+/// of its triangles: 1, 0 or −1.
+IST_HD int enters(const Point& p, const Point& q, const Point (&t)[3], bool of_b) {
+  int sign[2], way[3];
+  for (int k = 0; k < 2; ++k)
+    sign[k] = (of_b ? height_over_a(t, k == 0 ? p : q) : height_over_b(t, k == 0 ? p : q)).sign;
+  if (sign[0] == sign[1]) return 0;
+  for (int k = 0; k < 3; ++k)
+    way[k] = (of_b ? way_round(t[k], t[(k + 1) % 3], p, q) : way_round(p, q, t[k], t[(k + 1) % 3]))
+                 .sign;
+  return way[0] == way[1] && way[1] == way[2] ? direction(sign[0]) : 0;
+}
+
+}  // namespace ist::exact

@@ -1,0 +1,550 @@
+#include "query/exact/crossing_search.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/exact/crossing_search.cpp"
+#include <hwy/foreach_target.h>
+
+#include "query/kernel/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
+
+using exact::Corners;
+using exact::Crossing;
+using exact::Determinant;
+
+/// Relative error of a few float operations.
+inline constexpr float kFloatError = 4e-7f;
+
+class Search {
+ public:
+  Search(const CrossingSearch& search, ExactScratch& scratch)
+      : search_(search), a_(*search.a), b_(*search.b), scratch_(scratch) {
+    pad_b_ = pad(search.a_from_b, b_);
+    pad_a_ = pad(search.b_from_a, a_);
+    room_b_ = static_cast<float>(search.room * search.b_from_a.scale);
+  }
+
+  CrossingsFound run() {
+    scratch_.boxes_a->forget();
+    scratch_.boxes_b->forget();
+    scratch_.triangles_a->forget();
+    scratch_.triangles_b->forget();
+    scratch_.pairs.count = 0;
+    waiting_ = 0;
+    push(a_.top, 0, b_.top, 0);
+    while (waiting_ > 0 && found_.complete) {
+      const BoxPair pair = scratch_.waiting[--waiting_];
+      if (pair.level_a == 0)
+        open_b(pair);
+      else if (pair.level_b == 0)
+        open_a(pair);
+      else
+        open_both(pair);
+      if (++found_.visits == search_.max_visits && waiting_ > 0) found_.complete = false;
+    }
+    if (found_.complete) test_pairs();
+    return found_;
+  }
+
+ private:
+  using F = LaneTag<float>;
+
+  /// What rounding may do to a box that is placed in floats.
+  static float pad(const Similarity& map, const MeshTree& tree) {
+    double extent = 0, shift = 0;
+    const BoxBlock& root = tree.level[tree.top].boxes[0];
+    for (int k = 0; k < 3; ++k) {
+      for (std::uint32_t l = 0; l < kWidth; ++l)
+        if (root.low[k][l] <= root.high[k][l])
+          extent = std::max({extent, std::abs(double{root.low[k][l]}),
+                             std::abs(double{root.high[k][l]})});
+      shift = std::max(shift, std::abs(map.t[k]));
+    }
+    return static_cast<float>(1e-6 * (2 * map.scale * extent + shift));
+  }
+
+  void push(int level_a, std::uint32_t a, int level_b, std::uint32_t b) {
+    if (level_a == 0 && level_b == 0) {
+      meet(a, b);
+    } else if (waiting_ == ExactScratch::kMostWaiting) {
+      found_.complete = false;
+    } else {
+      scratch_.waiting[waiting_++] = {a, b, static_cast<std::uint8_t>(level_a),
+                                      static_cast<std::uint8_t>(level_b)};
+    }
+  }
+
+  /// The boxes below a box block, seen from the other solid.
+  template <class Cache>
+  static const PlacedBoxes& placed(const MeshTree& tree, int level, std::uint32_t i,
+                                   const Similarity& map, float pad, Cache& cache) {
+    const std::uint32_t number = tree.level[level].first + i;
+    PlacedBoxes& out = cache.placed[number % std::size(cache.number)];
+    std::uint32_t& held = cache.number[number % std::size(cache.number)];
+    if (held == number) return out;
+    held = number;
+    const BoxBlock& from = tree.level[level].boxes[i];
+    const F d;
+    float m[9], size[9], t[3];
+    for (int k = 0; k < 9; ++k) {
+      m[k] = static_cast<float>(map.m[k]);
+      size[k] = std::abs(m[k]) * (1 + kFloatError);
+    }
+    for (int k = 0; k < 3; ++k) t[k] = static_cast<float>(map.t[k]);
+    const auto half = hn::Set(d, 0.5f);
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      hn::Vec<F> middle[3], extent[3];
+      for (int k = 0; k < 3; ++k) {
+        const auto low = hn::Load(d, from.low[k] + l), high = hn::Load(d, from.high[k] + l);
+        middle[k] = half * (low + high);
+        extent[k] = half * (high - low);
+      }
+      // Unused lanes have extents below zero, and stay empty.
+      for (int k = 0; k < 3; ++k) {
+        const auto c = (hn::Set(d, m[3 * k]) * middle[0] + hn::Set(d, m[3 * k + 1]) * middle[1]) +
+                       (hn::Set(d, m[3 * k + 2]) * middle[2] + hn::Set(d, t[k]));
+        const auto h =
+            (hn::Set(d, size[3 * k]) * extent[0] + hn::Set(d, size[3 * k + 1]) * extent[1]) +
+            (hn::Set(d, size[3 * k + 2]) * extent[2] + hn::Set(d, pad));
+        hn::Store(c - h, d, out.low[k] + l);
+        hn::Store(c + h, d, out.high[k] + l);
+      }
+    }
+    const std::uint32_t used = used_lanes(tree, level, i);
+    for (int k = 0; k < 3; ++k) {
+      for (std::uint32_t l = used; l < kWidth; ++l)
+        out.low[k][l] = HUGE_VALF, out.high[k][l] = -HUGE_VALF;
+      out.all_low[k] = lowest(out.low[k]);
+      out.all_high[k] = highest(out.high[k]);
+    }
+    return out;
+  }
+
+  static std::uint32_t used_lanes(const MeshTree& tree, int level, std::uint32_t i) {
+    return std::min(kWidth, tree.level[level - 1].count - kWidth * i);
+  }
+
+  static float lowest(const float* lanes) {
+    const F d;
+    auto least = hn::Load(d, lanes);
+    for (std::size_t l = hn::Lanes(d); l < kWidth; l += hn::Lanes(d))
+      least = hn::Min(least, hn::Load(d, lanes + l));
+    return hn::GetLane(hn::MinOfLanes(d, least));
+  }
+  static float highest(const float* lanes) {
+    const F d;
+    auto most = hn::Load(d, lanes);
+    for (std::size_t l = hn::Lanes(d); l < kWidth; l += hn::Lanes(d))
+      most = hn::Max(most, hn::Load(d, lanes + l));
+    return hn::GetLane(hn::MaxOfLanes(d, most));
+  }
+
+  /// Which of sixteen boxes meet one.
+  static HWY_INLINE std::uint32_t meeting(const float (&low)[3][kWidth],
+                                          const float (&high)[3][kWidth], const float* one_low,
+                                          const float* one_high) {
+    const F d;
+    std::uint32_t bits = 0;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      auto mask = hn::And(hn::Load(d, low[0] + l) <= hn::Set(d, one_high[0]),
+                          hn::Load(d, high[0] + l) >= hn::Set(d, one_low[0]));
+      for (int k = 1; k < 3; ++k)
+        mask = hn::And(mask, hn::And(hn::Load(d, low[k] + l) <= hn::Set(d, one_high[k]),
+                                     hn::Load(d, high[k] + l) >= hn::Set(d, one_low[k])));
+      bits |= mask_bits(d, mask) << l;
+    }
+    return bits;
+  }
+
+  struct OneBox {
+    float low[3], high[3];
+    OneBox(const float (&l)[3][kWidth], const float (&h)[3][kWidth], std::uint32_t lane,
+           float room) {
+      for (int k = 0; k < 3; ++k) low[k] = l[k][lane] - room, high[k] = h[k][lane] + room;
+    }
+  };
+
+  const PlacedBoxes& placed_a(int level, std::uint32_t i) {
+    return placed(a_, level, i, search_.b_from_a, pad_a_, *scratch_.boxes_a);
+  }
+  const PlacedBoxes& placed_b(int level, std::uint32_t i) {
+    return placed(b_, level, i, search_.a_from_b, pad_b_, *scratch_.boxes_b);
+  }
+
+  void open_both(const BoxPair& pair) {
+    const BoxBlock& boxes_a = a_.level[pair.level_a].boxes[pair.a];
+    const BoxBlock& boxes_b = b_.level[pair.level_b].boxes[pair.b];
+    const PlacedBoxes& a_in_b = placed_a(pair.level_a, pair.a);
+    const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
+    OneBox all(boxes_a.low, boxes_a.high, 0, 0);
+    for (int k = 0; k < 3; ++k) {
+      all.low[k] = b_in_a.all_low[k] - search_.room;
+      all.high[k] = b_in_a.all_high[k] + search_.room;
+    }
+    for (std::uint32_t rows = meeting(boxes_a.low, boxes_a.high, all.low, all.high); rows != 0;
+         rows &= rows - 1) {
+      const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
+      const OneBox here(boxes_a.low, boxes_a.high, i, search_.room);
+      std::uint32_t columns = meeting(b_in_a.low, b_in_a.high, here.low, here.high);
+      if (columns == 0) continue;
+      const OneBox there(a_in_b.low, a_in_b.high, i, room_b_);
+      columns &= meeting(boxes_b.low, boxes_b.high, there.low, there.high);
+      for (; columns != 0; columns &= columns - 1)
+        push(pair.level_a - 1, kWidth * pair.a + i, pair.level_b - 1,
+             kWidth * pair.b + static_cast<std::uint32_t>(std::countr_zero(columns)));
+    }
+  }
+
+  /// A's side is a block.
+  void open_b(const BoxPair& pair) {
+    const std::uint32_t lane = pair.a % kWidth, parent = pair.a / kWidth;
+    const OneBox here(a_.level[1].boxes[parent].low, a_.level[1].boxes[parent].high, lane,
+                      search_.room);
+    const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
+    for (std::uint32_t found = meeting(b_in_a.low, b_in_a.high, here.low, here.high); found != 0;
+         found &= found - 1)
+      push(0, pair.a, pair.level_b - 1,
+           kWidth * pair.b + static_cast<std::uint32_t>(std::countr_zero(found)));
+  }
+
+  void open_a(const BoxPair& pair) {
+    const PlacedBoxes& b_in_a = placed_b(1, pair.b / kWidth);
+    const OneBox there(b_in_a.low, b_in_a.high, pair.b % kWidth, search_.room);
+    const BoxBlock& boxes = a_.level[pair.level_a].boxes[pair.a];
+    for (std::uint32_t found = meeting(boxes.low, boxes.high, there.low, there.high); found != 0;
+         found &= found - 1)
+      push(pair.level_a - 1, kWidth * pair.a + static_cast<std::uint32_t>(std::countr_zero(found)),
+           0, pair.b);
+  }
+
+  /// A block's triangles in A's unit frame; `map` is null for A's own.
+  template <class Cache>
+  static const PlacedTriangles& placed(const MeshTree& tree, std::uint32_t number,
+                                       const Similarity* map, Cache& cache) {
+    PlacedTriangles& out = cache.placed[number % std::size(cache.number)];
+    std::uint32_t& held = cache.number[number % std::size(cache.number)];
+    if (held == number) return out;
+    held = number;
+    const MeshBlock& block = tree.blocks[number];
+    alignas(64) double from[3][kWidth];
+    for (std::uint32_t v = 0; v < kWidth; ++v) {
+      const double* x = tree.vertices + std::size_t{3} * block.vertex[v];
+      for (int k = 0; k < 3; ++k) from[k][v] = x[k];
+    }
+    const hn::CappedTag<double, 8> dd;
+    const hn::Rebind<float, decltype(dd)> df;
+    alignas(64) float at[3][kWidth];
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(dd)) {
+      const auto x = hn::Load(dd, from[0] + l), y = hn::Load(dd, from[1] + l),
+                 z = hn::Load(dd, from[2] + l);
+      for (int k = 0; k < 3; ++k) {
+        auto moved = hn::Load(dd, from[k] + l);
+        if (map != nullptr)
+          moved = ((hn::Set(dd, map->m[3 * k]) * x + hn::Set(dd, map->m[3 * k + 1]) * y) +
+                   hn::Set(dd, map->m[3 * k + 2]) * z) +
+                  hn::Set(dd, map->t[k]);
+        hn::Store(moved, dd, out.vertex[k] + l);
+        hn::Store(hn::DemoteTo(df, moved), df, at[k] + l);
+      }
+    }
+    const F d;
+    float reach = 0, size = 0;
+    for (int k = 0; k < 3; ++k) {
+      const float low = lowest(at[k]), high = highest(at[k]);
+      reach = std::max({reach, std::abs(low), std::abs(high)});
+      size += (high - low) * (high - low);
+      for (int c = 0; c < 3; ++c)
+        for (std::uint32_t l = 0; l < kWidth; ++l)
+          out.corner[c][k][l] = at[k][block.corner[c][l]];
+    }
+    out.reach = reach;
+    out.size = std::sqrt(size) * (1 + kFloatError) + reach * kFloatError;
+    const auto outward = hn::Set(d, reach * 2e-7f);
+    const auto tiny = hn::Set(d, 1e-30f);
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      hn::Vec<F> u[3], v[3], n[3];
+      for (int k = 0; k < 3; ++k) {
+        const auto p = hn::Load(d, out.corner[0][k] + l), q = hn::Load(d, out.corner[1][k] + l),
+                   r = hn::Load(d, out.corner[2][k] + l);
+        hn::Store(hn::Min(p, hn::Min(q, r)) - outward, d, out.low[k] + l);
+        hn::Store(hn::Max(p, hn::Max(q, r)) + outward, d, out.high[k] + l);
+        u[k] = q - p;
+        v[k] = r - p;
+      }
+      for (int k = 0; k < 3; ++k) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        n[k] = u[i] * v[j] - u[j] * v[i];
+      }
+      const auto n2 = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
+      const auto u2 = (u[0] * u[0] + u[1] * u[1]) + u[2] * u[2];
+      const auto v2 = (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2];
+      // Differences of rounded corners: what they are off by turns the normal by as much over the
+      // sides, and more where the sides are nearly parallel.
+      const auto side2 = hn::Min(u2, v2);
+      const auto good = hn::And(n2 > hn::Set(d, 1e-4f) * (u2 * v2), side2 > tiny);
+      const auto length = hn::Sqrt(hn::Max(n2, tiny * tiny));
+      for (int k = 0; k < 3; ++k)
+        hn::Store(hn::IfThenElseZero(good, n[k] / length), d, out.normal[k] + l);
+      const auto sine = length / hn::Sqrt(hn::Max(u2 * v2, tiny * tiny));
+      const auto off = (hn::Set(d, reach * 3e-7f) / hn::Sqrt(hn::Max(side2, tiny)) +
+                        hn::Set(d, kFloatError)) /
+                       hn::Max(sine, hn::Set(d, 1e-3f));
+      hn::Store(hn::IfThenElse(good, off, hn::Set(d, 1e30f)), d, out.slack + l);
+    }
+    for (int k = 0; k < 3; ++k) {
+      out.all_low[k] = lowest(out.low[k]);
+      out.all_high[k] = highest(out.high[k]);
+      for (std::uint32_t l = block.triangles; l < kWidth; ++l)
+        out.low[k][l] = HUGE_VALF, out.high[k][l] = -HUGE_VALF;
+    }
+    return out;
+  }
+
+  static void mark(HookedArray<std::uint64_t>& bits, std::uint32_t i) {
+    bits[i / 64] |= std::uint64_t{1} << i % 64;
+  }
+
+  /// Tests the triangles of two blocks by boxes and planes.
+  void meet(std::uint32_t number_a, std::uint32_t number_b) {
+    const PlacedTriangles& a = placed(a_, number_a, nullptr, *scratch_.triangles_a);
+    const PlacedTriangles& b = placed(b_, number_b, &search_.a_from_b, *scratch_.triangles_b);
+    float low[3], high[3];
+    for (int k = 0; k < 3; ++k) {
+      low[k] = b.all_low[k] - search_.room;
+      high[k] = b.all_high[k] + search_.room;
+    }
+    std::uint32_t rows = meeting(a.low, a.high, low, high);
+    bool near = false;
+    const F d;
+    // Coordinates are floats, and points of both blocks that matter are no further apart than this.
+    const float blur = 4e-7f * (a.reach + b.reach) + search_.room, size = a.size + b.size;
+    for (; rows != 0; rows &= rows - 1) {
+      const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
+      const OneBox box(a.low, a.high, i, search_.room);
+      std::uint32_t columns = meeting(b.low, b.high, box.low, box.high);
+      if (columns == 0) continue;
+      const auto over_a = hn::Set(d, blur + a.slack[i] * size);
+      for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+        if ((columns >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
+        auto low_a = hn::Set(d, HUGE_VALF), high_a = hn::Set(d, -HUGE_VALF);
+        auto low_b = low_a, high_b = high_a;
+        const hn::Vec<F> nb[3] = {hn::Load(d, b.normal[0] + l), hn::Load(d, b.normal[1] + l),
+                                  hn::Load(d, b.normal[2] + l)};
+        for (int c = 0; c < 3; ++c) {
+          auto above_a = hn::Zero(d), above_b = hn::Zero(d);
+          for (int k = 0; k < 3; ++k) {
+            above_a = above_a + hn::Set(d, a.normal[k][i]) *
+                                    (hn::Load(d, b.corner[c][k] + l) -
+                                     hn::Set(d, a.corner[0][k][i]));
+            above_b = above_b + nb[k] * (hn::Set(d, a.corner[c][k][i]) -
+                                         hn::Load(d, b.corner[0][k] + l));
+          }
+          low_a = hn::Min(low_a, above_a), high_a = hn::Max(high_a, above_a);
+          low_b = hn::Min(low_b, above_b), high_b = hn::Max(high_b, above_b);
+        }
+        const auto over_b =
+            hn::Set(d, blur) + hn::Load(d, b.slack + l) * hn::Set(d, size);
+        const auto both = hn::And(hn::And(low_a <= over_a, high_a >= hn::Neg(over_a)),
+                                  hn::And(low_b <= over_b, high_b >= hn::Neg(over_b)));
+        for (std::uint32_t left = columns >> l & mask_bits(d, both); left != 0; left &= left - 1) {
+          near = true;
+          add_pair(number_a, a, i, number_b, b,
+                   static_cast<std::uint32_t>(l) +
+                       static_cast<std::uint32_t>(std::countr_zero(left)));
+        }
+      }
+    }
+    if (near) {
+      mark(scratch_.a.near, number_a);
+      mark(scratch_.b.near, number_b);
+    }
+  }
+
+  void add_pair(std::uint32_t number_a, const PlacedTriangles& a, std::uint32_t i,
+                std::uint32_t number_b, const PlacedTriangles& b, std::uint32_t j) {
+    TrianglePairs& pairs = scratch_.pairs;
+    const std::uint32_t n = pairs.count;
+    const auto take = [&](int side, const MeshBlock& block, const PlacedTriangles& from,
+                          std::uint32_t lane) {
+      for (int c = 0; c < 3; ++c) {
+        const std::uint32_t v = block.corner[c][lane];
+        pairs.vertex[side][c][n] = block.vertex[v];
+        for (int k = 0; k < 3; ++k) pairs.corner[side][c][k][n] = from.vertex[k][v];
+      }
+    };
+    take(0, a_.blocks[number_a], a, i);
+    take(1, b_.blocks[number_b], b, j);
+    pairs.triangle[0][n] = kWidth * number_a + i;
+    pairs.triangle[1][n] = kWidth * number_b + j;
+    ++found_.tests;
+    if (++pairs.count == 8) test_pairs();
+  }
+
+  /// A determinant of eight pairs: its value, how far it may be off, and bits of its sign.
+  struct alignas(64) Heights {
+    double value[3][8], error[3][8];
+    std::uint32_t positive[3], certain[3];
+  };
+
+  using D = hn::CappedTag<double, 8>;
+  using V = hn::Vec<D>;
+
+  struct Vec3 {
+    V x, y, z;
+  };
+  static HWY_INLINE Vec3 difference(const Vec3& a, const Vec3& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+  }
+  static HWY_INLINE void product(const Vec3& u, const Vec3& v, Vec3& normal, Vec3& size) {
+    const V ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
+            bz = u.y * v.x;
+    normal = {ax - bx, ay - by, az - bz};
+    size = {hn::Abs(ax) + hn::Abs(bx), hn::Abs(ay) + hn::Abs(by), hn::Abs(az) + hn::Abs(bz)};
+  }
+  static HWY_INLINE V value_of(const Vec3& r, const Vec3& n) {
+    return (r.x * n.x + r.y * n.y) + r.z * n.z;
+  }
+  static HWY_INLINE V error_of(const Vec3& r, const Vec3& size) {
+    const D d;
+    return hn::Set(d, exact::kFilter) *
+           ((hn::Abs(r.x) * size.x + hn::Abs(r.y) * size.y) + hn::Abs(r.z) * size.z);
+  }
+
+  /// Tests what has been gathered by signs: in double, and what that leaves unclear exactly.
+  void test_pairs() {
+    TrianglePairs& pairs = scratch_.pairs;
+    const std::uint32_t count = pairs.count;
+    pairs.count = 0;
+    if (count == 0) return;
+    const D d;
+    Heights over_a = {}, over_b = {};          // B's corners over A's plane, A's over B's
+    std::uint32_t round_positive[3][3] = {};   // [A's edge][B's edge]
+    std::uint32_t round_certain[3][3] = {};
+    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
+      Vec3 corner[2][3];
+      for (int s = 0; s < 2; ++s)
+        for (int c = 0; c < 3; ++c)
+          corner[s][c] = {hn::Load(d, pairs.corner[s][c][0] + l),
+                          hn::Load(d, pairs.corner[s][c][1] + l),
+                          hn::Load(d, pairs.corner[s][c][2] + l)};
+      const auto heights = [&](const Vec3(&plane)[3], const Vec3(&points)[3], Heights& out) {
+        Vec3 normal, size;
+        product(difference(plane[1], plane[0]), difference(plane[2], plane[0]), normal, size);
+        for (int c = 0; c < 3; ++c) {
+          const Vec3 r = difference(points[c], plane[0]);
+          const V value = value_of(r, normal), error = error_of(r, size);
+          hn::Store(value, d, out.value[c] + l);
+          hn::Store(error, d, out.error[c] + l);
+          out.positive[c] |= mask_bits(d, value > hn::Zero(d)) << l;
+          out.certain[c] |= mask_bits(d, hn::Abs(value) > error) << l;
+        }
+      };
+      heights(corner[0], corner[1], over_a);
+      heights(corner[1], corner[0], over_b);
+      Vec3 edge_b[3];
+      for (int j = 0; j < 3; ++j) edge_b[j] = difference(corner[1][(j + 1) % 3], corner[1][j]);
+      for (int i = 0; i < 3; ++i) {
+        const Vec3 edge_a = difference(corner[0][(i + 1) % 3], corner[0][i]);
+        for (int j = 0; j < 3; ++j) {
+          Vec3 normal, size;
+          product(edge_a, edge_b[j], normal, size);
+          const Vec3 r = difference(corner[1][j], corner[0][i]);
+          const V value = value_of(r, normal), error = error_of(r, size);
+          round_positive[i][j] |= mask_bits(d, value > hn::Zero(d)) << l;
+          round_certain[i][j] |= mask_bits(d, hn::Abs(value) > error) << l;
+        }
+      }
+    }
+    const std::uint32_t all = (1u << count) - 1;
+    const auto alike = [](const std::uint32_t (&bits)[3]) {
+      return (bits[0] & bits[1] & bits[2]) | ~(bits[0] | bits[1] | bits[2]);
+    };
+    const auto each = [](const std::uint32_t (&bits)[3]) { return bits[0] & bits[1] & bits[2]; };
+    const std::uint32_t sure_a = each(over_a.certain), sure_b = each(over_b.certain);
+    const std::uint32_t apart =
+        (sure_a & alike(over_a.positive)) | (sure_b & alike(over_b.positive));
+    std::uint32_t sure = sure_a & sure_b;
+    for (int i = 0; i < 3; ++i) sure &= each(round_certain[i]);
+    // Bits of pairs where an edge pierces the other triangle.
+    std::uint32_t pierces_a[3], pierces_b[3], pierced = 0;
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t along_b[3] = {round_positive[0][k], round_positive[1][k],
+                                        round_positive[2][k]};
+      pierces_a[k] = (over_b.positive[k] ^ over_b.positive[(k + 1) % 3]) & alike(round_positive[k]);
+      pierces_b[k] = (over_a.positive[k] ^ over_a.positive[(k + 1) % 3]) & alike(along_b);
+      pierced |= pierces_a[k] | pierces_b[k];
+    }
+    for (std::uint32_t left = all & ~apart & (pierced | ~sure); left != 0; left &= left - 1) {
+      const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
+      Corners corners[2];
+      for (int s = 0; s < 2; ++s)
+        for (int c = 0; c < 3; ++c) {
+          corners[s].x[c] = {pairs.corner[s][c][0][n], pairs.corner[s][c][1][n],
+                             pairs.corner[s][c][2][n]};
+          corners[s].vertex[c] = pairs.vertex[s][c][n];
+        }
+      if (found_.crossings == ExactScratch::kMostCrossings) {
+        found_.complete = false;
+        return;
+      }
+      Crossing& out = scratch_.crossings[found_.crossings];
+      if (sure >> n & 1) {
+        int ends = 0;
+        const auto take = [&](const std::uint32_t (&pierces)[3], const Heights& heights, int s) {
+          if (((pierces[0] | pierces[1] | pierces[2]) >> n & 1) == 0) return;
+          Determinant height[3];
+          for (int c = 0; c < 3; ++c)
+            height[c] = {heights.value[c][n], heights.error[c][n],
+                         heights.positive[c] >> n & 1 ? 1 : -1};
+          for (int k = 0; k < 3; ++k)
+            if (pierces[k] >> n & 1) {
+              exact::place(exact::piercing(corners[s], k, height, s == 1), height[k].sign, out);
+              ++ends;
+            }
+        };
+        take(pierces_a, over_b, 0);
+        take(pierces_b, over_a, 1);
+        if (ends != 2) found_.consistent = false;
+      } else if (!exact::cross_exactly(corners[0], corners[1], out)) {
+        continue;
+      }
+      out.a = pairs.triangle[0][n];
+      out.b = pairs.triangle[1][n];
+      out.corner_a = corners[0].x[0];
+      out.corner_b = corners[1].x[0];
+      ++found_.crossings;
+    }
+  }
+
+  const CrossingSearch& search_;
+  const MeshTree& a_;
+  const MeshTree& b_;
+  ExactScratch& scratch_;
+  float pad_a_, pad_b_, room_b_;
+  std::uint32_t waiting_ = 0;
+  CrossingsFound found_;
+};
+
+CrossingsFound search_crossings(const CrossingSearch& search, ExactScratch& scratch) {
+  return Search(search, scratch).run();
+}
+
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ist {
+
+HWY_EXPORT(search_crossings);
+
+CrossingsFound find_crossings(const CrossingSearch& search, ExactScratch& scratch) noexcept {
+  return HWY_DYNAMIC_DISPATCH(search_crossings)(search, scratch);
+}
+
+}  // namespace ist
+#endif

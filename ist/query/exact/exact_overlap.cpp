@@ -1,0 +1,485 @@
+#include "query/exact/exact_overlap.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "query/exact/crossing_search.h"
+
+namespace ist {
+namespace {
+
+using exact::Crossing;
+using exact::Piercing;
+using exact::Point;
+
+/// A double's rounding: half a unit in the last place of 1.
+constexpr double kHalfUnit = 0x1p-53;
+
+bool has(const HookedArray<std::uint64_t>& bits, std::uint32_t i) {
+  return bits[i / 64] >> i % 64 & 1;
+}
+
+void set(HookedArray<std::uint64_t>& bits, std::uint32_t i) {
+  bits[i / 64] |= std::uint64_t{1} << i % 64;
+}
+
+double length_bound(const Point& p) { return (std::abs(p.x) + std::abs(p.y)) + std::abs(p.z); }
+
+Point map_vector(const Similarity& map, const Point& x) {
+  return {(map.m[0] * x.x + map.m[1] * x.y) + map.m[2] * x.z,
+          (map.m[3] * x.x + map.m[4] * x.y) + map.m[5] * x.z,
+          (map.m[6] * x.x + map.m[7] * x.y) + map.m[8] * x.z};
+}
+
+/// As Similarity::apply, and as the search moves vertices.
+Point map_point(const Similarity& map, const Point& x) {
+  const Point turned = map_vector(map, x);
+  return {turned.x + map.t[0], turned.y + map.t[1], turned.z + map.t[2]};
+}
+
+void add(exact::CarefulSum (&sum)[3], double factor, const Point& p) {
+  sum[0].add(factor * p.x);
+  sum[1].add(factor * p.y);
+  sum[2].add(factor * p.z);
+}
+
+Point value(const exact::CarefulSum (&sum)[3], double factor) {
+  return {factor * sum[0].value(), factor * sum[1].value(), factor * sum[2].value()};
+}
+
+bool is_sound(const MeshTree& mesh) {
+  return mesh.level[0].count <= ExactScratch::kMostBlocks;
+}
+
+}  // namespace
+
+Point ExactQuery::place(const Side& side, std::uint32_t vertex) const noexcept {
+  const Point x = side.mesh.vertex(vertex);
+  return side.is_b ? map_point(a_from_b_, x) : x;
+}
+
+void ExactQuery::clear_marks() noexcept {
+  for (Side& side : sides_) {
+    const std::uint32_t words = (side.mesh.level[0].count + 63) / 64;
+    std::fill_n(side.marks.near.get(), words, 0);
+    std::fill_n(side.marks.crossed.get(), words, 0);
+    std::fill_n(side.marks.inside.get(), words, 0);
+    std::fill_n(side.marks.shells.get(), (side.mesh.header->shell_count + 63) / 64, 0);
+    side.marks.count = 0;
+  }
+}
+
+/// By the numbers of their triangles: the order of sums is that of the meshes.
+void ExactQuery::sort_crossings(std::uint32_t count) noexcept {
+  const Crossing* const crossings = scratch_.crossings.get();
+  const std::uint32_t bits_b =
+      static_cast<std::uint32_t>(std::bit_width(kWidth * sides_[1].mesh.level[0].count));
+  const std::uint32_t bits =
+      bits_b + static_cast<std::uint32_t>(std::bit_width(kWidth * sides_[0].mesh.level[0].count));
+  for (std::uint32_t i = 0; i < count; ++i) {
+    scratch_.keys[i] = std::uint64_t{crossings[i].a} << bits_b | crossings[i].b;
+    scratch_.order[i] = i;
+  }
+  if (count < 200) {
+    std::sort(scratch_.order.get(), scratch_.order.get() + count,
+              [&](std::uint32_t x, std::uint32_t y) { return scratch_.keys[x] < scratch_.keys[y]; });
+    return;
+  }
+  constexpr std::uint32_t kDigit = 9;
+  for (std::uint32_t shift = 0; shift < bits; shift += kDigit) {
+    std::uint32_t ends[(1u << kDigit) + 1] = {};
+    const auto digit = [&](std::uint32_t i) {
+      return static_cast<std::uint32_t>(scratch_.keys[i] >> shift) & ((1u << kDigit) - 1);
+    };
+    for (std::uint32_t i = 0; i < count; ++i) ++ends[digit(i) + 1];
+    for (std::uint32_t i = 0; i < 1u << kDigit; ++i) ends[i + 1] += ends[i];
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const std::uint32_t which = scratch_.order[i];
+      scratch_.other_order[ends[digit(which)]++] = which;
+    }
+    std::swap(scratch_.order, scratch_.other_order);
+  }
+}
+
+CrossedBlock* ExactQuery::crossed_block(Side& side, std::uint32_t block) noexcept {
+  BlockMarks& marks = side.marks;
+  if (has(marks.crossed, block)) return &marks.blocks[marks.place[block]];
+  if (marks.count == ExactScratch::kMostCrossed) return nullptr;
+  set(marks.crossed, block);
+  marks.place[block] = marks.count;
+  CrossedBlock& made = marks.blocks[marks.count++];
+  made.block = block;
+  made.known = made.inside = 0;
+  made.crossed = 0;
+  const MeshBlock& mesh = side.mesh.blocks[block];
+  for (std::uint32_t v = 0; v < mesh.vertices; ++v)
+    made.vertex[v] = place(side, mesh.vertex[v]) - out_.origin;
+  set(marks.shells, mesh.shell);
+  return &made;
+}
+
+/// An edge of one solid pierces a triangle of the other.
+void ExactQuery::note_piercing(const Crossing& crossing, const Piercing& end,
+                               bool enters) noexcept {
+  Side& own = side(end.of_b);
+  const std::uint32_t triangle = end.of_b ? crossing.b : crossing.a, lane = triangle % kWidth;
+  CrossedBlock* const crossed = crossed_block(own, triangle / kWidth);
+  if (crossed == nullptr) {
+    out_.complete = false;
+    return;
+  }
+  const std::uint32_t edge = 3 * lane + static_cast<std::uint32_t>(end.edge);
+  const int sign = enters ? 1 : -1;
+  if (crossed->crossed >> edge & 1) {
+    crossed->sum[edge] = static_cast<std::int8_t>(crossed->sum[edge] + sign);
+    double& first = crossed->first_t[edge];
+    double& error = crossed->first_error[edge];
+    // Which comes first has to be certain.
+    if (std::abs(end.t - first) <= end.t_error + error) {
+      if (crossed->first[edge] != sign) crossed->first[edge] = 0;
+      error = std::max(error + std::abs(end.t - first), end.t_error);
+      first = std::min(first, end.t);
+    } else if (end.t < first) {
+      first = end.t;
+      error = end.t_error;
+      crossed->first[edge] = static_cast<std::int8_t>(sign);
+    }
+  } else {
+    crossed->crossed |= std::uint64_t{1} << edge;
+    crossed->sum[edge] = crossed->first[edge] = static_cast<std::int8_t>(sign);
+    crossed->first_t[edge] = end.t;
+    crossed->first_error[edge] = end.t_error;
+  }
+  rounding_ += 3 * end.h_error;
+  // The cone over the part of this edge within the other solid, from the triangle's first corner:
+  // edges that start or end there have none.
+  const MeshBlock& mesh = own.mesh.blocks[crossed->block];
+  const Point p0 = crossed->vertex[mesh.corner[0][lane]], p1 = crossed->vertex[mesh.corner[1][lane]],
+              p2 = crossed->vertex[mesh.corner[2][lane]];
+  const Point x = end.x - out_.origin;
+  if (end.edge == 1) {
+    const Point along = p2 - p0, to = x - p0;
+    add_cone(sign * dot(p0, cross(to, along)), p0 + (x + p2),
+             8 * length_bound(p0) * length_bound(to) * length_bound(along));
+  }
+  const Point corners[3] = {p0, p1, p2};
+  add(gap_, sign * (own.is_b ? -0.5 : 0.5) , cross(x, corners[(end.edge + 1) % 3]));
+}
+
+/// A tetrahedron from the origin: six times its volume, the sum of its other corners, and what the
+/// first may be off by, in roundings.
+void ExactQuery::add_cone(double six_volumes, const Point& corners, double rounding) noexcept {
+  volume_.add(six_volumes);
+  add(moment_, six_volumes, corners);
+  rounding_ += kHalfUnit * rounding;
+}
+
+/// Which vertices are inside: those of pierced edges by what pierces them, the others by edges that
+/// nothing pierces.
+void ExactQuery::settle(Side& side, CrossedBlock& crossed) noexcept {
+  const MeshBlock& mesh = side.mesh.blocks[crossed.block];
+  std::uint32_t known = 0, inside = 0;
+  for (std::uint64_t left = crossed.crossed; left != 0; left &= left - 1) {
+    const auto edge = static_cast<std::uint32_t>(std::countr_zero(left));
+    const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
+                        q = mesh.corner[(edge + 1) % 3][edge / 3];
+    const int sum = crossed.sum[edge], first = crossed.first[edge];
+    if (sum == 0 && first == 0) continue;
+    known |= 1u << p | 1u << q;
+    if (sum < 0 || (sum == 0 && first < 0)) inside |= 1u << p;
+    if (sum > 0 || (sum == 0 && first < 0)) inside |= 1u << q;
+  }
+  std::uint16_t joined[kWidth] = {};
+  for (std::uint32_t edge = 0; edge < 3u * mesh.triangles; ++edge) {
+    if (crossed.crossed >> edge & 1) continue;
+    const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
+                        q = mesh.corner[(edge + 1) % 3][edge / 3];
+    joined[p] = static_cast<std::uint16_t>(joined[p] | 1u << q);
+    joined[q] = static_cast<std::uint16_t>(joined[q] | 1u << p);
+  }
+  const std::uint32_t all = (1u << mesh.vertices) - 1;
+  const auto spread = [&](std::uint32_t from) {
+    while (from != 0) {
+      const auto v = static_cast<std::uint32_t>(std::countr_zero(from));
+      from &= from - 1;
+      const std::uint32_t reached = joined[v] & ~known;
+      known |= reached;
+      from |= reached;
+      if (inside >> v & 1) inside |= reached;
+    }
+  };
+  spread(known);
+  while (known != all) {  // where it is not clear what pierces an edge first
+    const auto v = static_cast<std::uint32_t>(std::countr_zero(all & ~known));
+    if (is_inside(side, mesh.vertex[v])) inside |= 1u << v;
+    known |= 1u << v;
+    spread(1u << v);
+  }
+  crossed.known = static_cast<std::uint16_t>(known);
+  crossed.inside = static_cast<std::uint16_t>(inside);
+}
+
+/// By the triangles of the other solid on the way out of it, along an axis of its frame.
+bool ExactQuery::is_inside(const Side& own, std::uint32_t vertex) const noexcept {
+  const Side& other = sides_[own.is_b ? 0 : 1];
+  const MeshTree& mesh = other.mesh;
+  const Point p = place(own, vertex);
+  const Point start = other.is_b ? map_point(b_from_a_, p) : p;
+  const double at[3] = {start.x, start.y, start.z};
+  double pad = 0;  // of what mapping there and back rounds
+  for (int k = 0; k < 3; ++k)
+    pad += std::abs(at[k]) + (other.is_b ? std::abs(b_from_a_.t[k]) : 0) + 1e-300;
+  pad = 1e-12 * pad;
+  float low[3], high[3];
+  const BoxBlock& root = mesh.level[mesh.top].boxes[0];
+  int axis = 0;
+  double shortest = HUGE_VAL, end = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double lowest = *std::min_element(root.low[k], root.low[k] + kWidth);
+    const double highest = *std::max_element(root.high[k], root.high[k] + kWidth);
+    if (at[k] < lowest - pad || at[k] > highest + pad) return false;
+    const double beyond = 0.25 * (highest - lowest) + 8 * pad;
+    for (const double to : {lowest - beyond, highest + beyond})
+      if (std::abs(to - at[k]) < shortest) {
+        shortest = std::abs(to - at[k]);
+        axis = k;
+        end = to;
+      }
+    low[k] = static_cast<float>(at[k] - pad);
+    low[k] -= std::abs(low[k]) * 2e-7f;
+    high[k] = static_cast<float>(at[k] + pad);
+    high[k] += std::abs(high[k]) * 2e-7f;
+  }
+  double to[3] = {at[0], at[1], at[2]};
+  to[axis] = end;
+  (end < at[axis] ? low : high)[axis] = static_cast<float>(end);
+  const Point beyond = {to[0], to[1], to[2]};
+  const Point q = other.is_b ? map_point(a_from_b_, beyond) : beyond;
+
+  int entered = 0;
+  std::pair<int, std::uint32_t> waiting[16 * kMaxLevels];
+  std::uint32_t count = 0;
+  waiting[count++] = {mesh.top, 0};
+  while (count > 0) {
+    const auto [level, i] = waiting[--count];
+    if (level == 0) {
+      const MeshBlock& block = mesh.blocks[i];
+      for (std::uint32_t t = 0; t < block.triangles; ++t) {
+        const Point corners[3] = {place(other, block.vertex[block.corner[0][t]]),
+                                  place(other, block.vertex[block.corner[1][t]]),
+                                  place(other, block.vertex[block.corner[2][t]])};
+        entered += exact::enters(p, q, corners, own.is_b);
+      }
+      continue;
+    }
+    const BoxBlock& boxes = mesh.level[level].boxes[i];
+    const std::uint32_t used = std::min(kWidth, mesh.level[level - 1].count - kWidth * i);
+    for (std::uint32_t l = 0; l < used; ++l)
+      if (boxes.low[0][l] <= high[0] && boxes.high[0][l] >= low[0] && boxes.low[1][l] <= high[1] &&
+          boxes.high[1][l] >= low[1] && boxes.low[2][l] <= high[2] && boxes.high[2][l] >= low[2])
+        waiting[count++] = {level - 1, kWidth * i + l};
+  }
+  return entered < 0;
+}
+
+/// Marks the blocks that lie inside as a whole: from those whose edges are pierced on, and whole
+/// shells.
+void ExactQuery::find_insides(Side& own) noexcept {
+  BlockMarks& marks = own.marks;
+  const MeshTree& mesh = own.mesh;
+  std::uint32_t waiting = 0;
+  const auto wait = [&](std::uint32_t block) {
+    if (has(marks.crossed, block) || has(marks.inside, block)) return;
+    set(marks.inside, block);
+    scratch_.flood[waiting++] = block;
+  };
+  for (std::uint32_t c = 0; c < marks.count; ++c) {
+    CrossedBlock& crossed = marks.blocks[c];
+    settle(own, crossed);
+    const MeshBlock& block = mesh.blocks[crossed.block];
+    for (std::uint32_t k = 0; k < block.neighbours; ++k) {
+      const std::uint32_t entry = mesh.neighbours[block.first_neighbour + k];
+      if (crossed.inside >> entry % kWidth & 1) wait(entry / kWidth);
+    }
+  }
+  for (std::uint32_t s = 0; s < mesh.header->shell_count; ++s)
+    if (!has(marks.shells, s) && is_inside(own, mesh.blocks[mesh.shells[s].block].vertex[0])) {
+      if (out_.crossings == 0 && waiting == 0)
+        out_.origin = place(own, mesh.blocks[mesh.shells[s].block].vertex[0]);
+      wait(mesh.shells[s].block);
+    }
+  while (waiting > 0) {
+    const MeshBlock& block = mesh.blocks[scratch_.flood[--waiting]];
+    for (std::uint32_t k = 0; k < block.neighbours; ++k)
+      wait(mesh.neighbours[block.first_neighbour + k] / kWidth);
+  }
+}
+
+/// What the segment that two triangles share adds as a part of the boundary of both.
+void ExactQuery::sum_crossing(const Crossing& crossing) noexcept {
+  const Point a = crossing.start.x - out_.origin, b = crossing.end.x - out_.origin;
+  const Point along = b - a, c = cross(a, along);
+  const Point of_a = crossing.corner_a - out_.origin, of_b = crossing.corner_b - out_.origin;
+  const Point both = a + b;
+  const double six_a = dot(c, of_a), six_b = dot(c, of_b);
+  volume_.add(dot(c, of_a - of_b));
+  add(moment_, six_a, of_a + both);
+  add(moment_, -six_b, of_b + both);
+  add(force_, -0.5, c);
+  const double square = (dot(a, a) + dot(a, b)) + dot(b, b);
+  add(torque_, square / 6, along);
+  rounding_ += 8 * kHalfUnit * length_bound(a) * length_bound(along) * length_bound(of_a - of_b);
+}
+
+void ExactQuery::sum_crossed_block(const Side& own, const CrossedBlock& crossed) noexcept {
+  const MeshBlock& mesh = own.mesh.blocks[crossed.block];
+  for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
+    const Point p[3] = {crossed.vertex[mesh.corner[0][t]], crossed.vertex[mesh.corner[1][t]],
+                        crossed.vertex[mesh.corner[2][t]]};
+    for (int k = 0; k < 3; ++k)
+      if (crossed.inside >> mesh.corner[k][t] & 1)
+        add(gap_, own.is_b ? -0.5 : 0.5, cross(p[k], p[(k + 1) % 3]));
+    if ((crossed.inside >> mesh.corner[1][t] & 1) == 0) continue;
+    const Point u = p[1] - p[0], v = p[2] - p[0];
+    add_cone(dot(p[0], cross(u, v)), p[0] + (p[1] + p[2]),
+             8 * length_bound(p[0]) * length_bound(u) * length_bound(v));
+  }
+}
+
+/// What lies below a lane of a box block, inside as a whole.
+void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i,
+                          std::uint32_t lane) noexcept {
+  const BoxBlock& box = own.mesh.level[level].boxes[i];
+  const BoxSums& sums = own.mesh.level[level].sums[i];
+  const auto middle = [&](int k) { return (double{box.low[k][lane]} + double{box.high[k][lane]}) / 2; };
+  const auto width = [&](int k) { return double{box.high[k][lane]} - double{box.low[k][lane]}; };
+  Point c = {middle(0), middle(1), middle(2)};
+  Point n = {sums.normal[0][lane], sums.normal[1][lane], sums.normal[2][lane]};
+  Point cone = {sums.cone[0][lane], sums.cone[1][lane], sums.cone[2][lane]};
+  double trace = (sums.flux[0][0][lane] + sums.flux[1][1][lane]) + sums.flux[2][2][lane];
+  double area = sums.area[lane], wide = (width(0) + width(1)) + width(2);
+  const auto flux = [&](const Point& d) {  // Σₖ ∫ y nₖ dA · dₖ
+    return Point{
+        (sums.flux[0][0][lane] * d.x + sums.flux[0][1][lane] * d.y) + sums.flux[0][2][lane] * d.z,
+        (sums.flux[1][0][lane] * d.x + sums.flux[1][1][lane] * d.y) + sums.flux[1][2][lane] * d.z,
+        (sums.flux[2][0][lane] * d.x + sums.flux[2][1][lane] * d.y) + sums.flux[2][2][lane] * d.z};
+  };
+  Point d = c - out_.origin, turned;
+  if (own.is_b) {
+    const double s = a_from_b_.scale;
+    d = map_point(a_from_b_, c) - out_.origin;
+    const double* m = a_from_b_.m;
+    const Point back = {(m[0] * d.x + m[3] * d.y) + m[6] * d.z,
+                        (m[1] * d.x + m[4] * d.y) + m[7] * d.z,
+                        (m[2] * d.x + m[5] * d.y) + m[8] * d.z};
+    turned = s * map_vector(a_from_b_, flux(back));
+    n = s * map_vector(a_from_b_, n);
+    cone = (s * s * s) * map_vector(a_from_b_, cone);
+    trace *= s * s * s;
+    area *= s * s;
+    wide *= s;
+  } else {
+    turned = flux(d);
+  }
+  const double out = dot(d, n);
+  volume_.add(2 * (trace + out));
+  add(moment_, 6, cone + (trace * d + (turned + out * d)));
+  rounding_ += 64 * kHalfUnit * area * (length_bound(d) + wide);
+  area_ += area;
+  rim_ += wide;
+  add(gap_, own.is_b ? -1 : 1, n);
+}
+
+/// Sums the blocks that lie inside as a whole, as few lanes as hold them.
+void ExactQuery::sum_insides(const Side& own, int level, std::uint32_t i) noexcept {
+  const std::uint32_t shift = 4 * (static_cast<std::uint32_t>(level) - 1);
+  const std::uint32_t blocks = own.mesh.level[0].count;
+  const std::uint32_t used = std::min(kWidth, own.mesh.level[level - 1].count - kWidth * i);
+  const std::uint64_t* const words = own.marks.inside.get();
+  for (std::uint32_t lane = 0; lane < used; ++lane) {
+    const std::uint32_t first = (kWidth * i + lane) << shift;
+    const std::uint32_t end = std::min(blocks, first + (1u << shift));
+    bool all = true, none = true;
+    for (std::uint32_t b = first; b < end; b += 64 - b % 64) {
+      const std::uint32_t stop = std::min(end, b + (64 - b % 64));
+      const std::uint64_t mask = (~std::uint64_t{0} >> (64 - (stop - b))) << b % 64;
+      all = all && (words[b / 64] & mask) == mask;
+      none = none && (words[b / 64] & mask) == 0;
+    }
+    if (none) continue;
+    if (all)
+      sum_lane(own, level, i, lane);
+    else
+      sum_insides(own, level - 1, kWidth * i + lane);
+  }
+}
+
+/// Blocks at the surface of the other solid: rounding and deviations there change the volume.
+void ExactQuery::bound_near(const Side& own) noexcept {
+  const std::uint32_t blocks = own.mesh.level[0].count;
+  const double scale = own.is_b ? a_from_b_.scale : 1;
+  for (std::uint32_t w = 0; w < (blocks + 63) / 64; ++w)
+    for (std::uint64_t left = own.marks.near[w] | own.marks.crossed[w]; left != 0;
+         left &= left - 1) {
+      const std::uint32_t b = 64 * w + static_cast<std::uint32_t>(std::countr_zero(left));
+      const std::uint32_t i = b / kWidth, lane = b % kWidth;
+      const BoxBlock& box = own.mesh.level[1].boxes[i];
+      area_ += scale * scale * own.mesh.level[1].sums[i].area[lane];
+      for (int k = 0; k < 3; ++k)
+        rim_ += scale * (double{box.high[k][lane]} - double{box.low[k][lane]});
+    }
+}
+
+ExactOverlap ExactQuery::run(std::uint32_t max_visits) noexcept {
+  if (!is_sound(sides_[0].mesh) || !is_sound(sides_[1].mesh)) {
+    out_.complete = false;
+    return out_;
+  }
+  clear_marks();
+  const double room = 2 * (bounds_.moved + bounds_.deviation);
+  const CrossingsFound found =
+      find_crossings({&sides_[0].mesh, &sides_[1].mesh, a_from_b_, b_from_a_,
+                      static_cast<float>(room * (1 + 1e-6)), max_visits},
+                     scratch_);
+  out_.visits = found.visits;
+  out_.crossings = found.crossings;
+  out_.complete = found.complete;
+  out_.consistent = found.consistent;
+  if (!out_.complete) return out_;
+  sort_crossings(found.crossings);
+  if (found.crossings > 0) out_.origin = scratch_.crossings[scratch_.order[0]].start.x;
+  for (std::uint32_t i = 0; i < found.crossings && out_.complete; ++i) {
+    const Crossing& crossing = scratch_.crossings[scratch_.order[i]];
+    sum_crossing(crossing);
+    note_piercing(crossing, crossing.start, crossing.start.of_b);
+    note_piercing(crossing, crossing.end, !crossing.end.of_b);
+  }
+  if (!out_.complete) return out_;
+  for (Side& side : sides_) find_insides(side);
+  for (Side& side : sides_) {
+    // In the order of the mesh, whichever was found first.
+    for (std::uint32_t w = 0; w < (side.mesh.level[0].count + 63) / 64; ++w)
+      for (std::uint64_t left = side.marks.crossed[w]; left != 0; left &= left - 1)
+        sum_crossed_block(
+            side,
+            side.marks.blocks[side.marks.place[64 * w + static_cast<std::uint32_t>(
+                                                            std::countr_zero(left))]]);
+    sum_insides(side, side.mesh.top, 0);
+    bound_near(side);
+  }
+  out_.volume = volume_.value() / 6;
+  out_.moment = value(moment_, 1.0 / 24);
+  out_.force = value(force_, 1);
+  out_.torque = value(torque_, 1);
+  out_.gap = value(gap_, 1);
+  // A surface that moves by e, or a solid that is only known beyond e from it, changes the volume
+  // by no more than a layer of that thickness to either side of it: faces, edges and corners.
+  const double moved = bounds_.moved, deviation = bounds_.deviation, e = moved + deviation;
+  out_.error = 1.01 * (rounding_ / 6 + (2 * e) * area_ + 32 * (e * e) * rim_) +
+               4 * kHalfUnit * std::abs(out_.volume);
+  return out_;
+}
+
+}  // namespace ist

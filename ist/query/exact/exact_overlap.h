@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstdint>
+
+#include <ist/query.h>
+
+#include "query/base/relative_pose.h"
+#include "query/exact/exact_scratch.h"
+#include "query/exact/mesh_tree.h"
+
+namespace ist {
+
+/// The overlap of two meshes, A's unit frame.
+struct ExactOverlap {
+  double volume = 0;
+  double error = 0;         ///< the true volume is within it of `volume`
+  exact::Point origin = {};  ///< of what follows
+  exact::Point moment = {};  ///< ∫ (x − origin) over the overlap
+  exact::Point force = {};   ///< ∫ n dA over B's surface in A: the volume's gradient by translation
+  exact::Point torque = {};  ///< ∫ (x − origin) × n dA, likewise
+  std::uint32_t visits = 0, crossings = 0;
+  bool complete = true;      ///< no limit or room was short; else nothing above is of use
+  bool consistent = true;    ///< signs agree with each other
+  /// How far the surface of the overlap is from closed, an area vector: rounding, if all is well.
+  exact::Point gap = {};
+};
+
+/// How far what is asked about may be from the numbers that are worked with, A's unit frame.
+struct ExactBounds {
+  double moved = 0;      ///< of any point, by rounding
+  double deviation = 0;  ///< of surfaces that are simplified
+};
+
+/// Volume and gradients of the overlap. Allocates, locks and throws nothing. The answer depends on
+/// the meshes and the map alone.
+class ExactQuery {
+ public:
+  ExactQuery(const MeshTree& a, const MeshTree& b, const Similarity& a_from_b,
+             const Similarity& b_from_a, const ExactBounds& bounds, ExactScratch& scratch) noexcept
+      : sides_{{a, scratch.a, false}, {b, scratch.b, true}},
+        a_from_b_(a_from_b),
+        b_from_a_(b_from_a),
+        bounds_(bounds),
+        scratch_(scratch) {}
+
+  ExactOverlap run(std::uint32_t max_visits = 0) noexcept;
+
+ private:
+  struct Side {
+    const MeshTree& mesh;
+    BlockMarks& marks;
+    bool is_b;
+  };
+
+  Side& side(bool of_b) noexcept { return sides_[of_b ? 1 : 0]; }
+  exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
+  void clear_marks() noexcept;
+  void sort_crossings(std::uint32_t count) noexcept;
+  CrossedBlock* crossed_block(Side& side, std::uint32_t block) noexcept;
+  void note_piercing(const exact::Crossing& crossing, const exact::Piercing& end,
+                     bool enters) noexcept;
+  void settle(Side& side, CrossedBlock& crossed) noexcept;
+  bool is_inside(const Side& side, std::uint32_t vertex) const noexcept;
+  void find_insides(Side& side) noexcept;
+  void flood(const Side& side, std::uint32_t waiting) noexcept;
+  void sum_crossing(const exact::Crossing& crossing) noexcept;
+  void sum_crossed_block(const Side& side, const CrossedBlock& crossed) noexcept;
+  void sum_insides(const Side& side, int level, std::uint32_t i) noexcept;
+  void sum_lane(const Side& side, int level, std::uint32_t i, std::uint32_t lane) noexcept;
+  void bound_near(const Side& side) noexcept;
+  void add_cone(double six_volumes, const exact::Point& corners, double rounding) noexcept;
+
+  Side sides_[2];
+  const Similarity& a_from_b_;
+  const Similarity& b_from_a_;
+  const ExactBounds bounds_;
+  ExactScratch& scratch_;
+  ExactOverlap out_;
+  // Sums, the volume's six times and the moment's 24 times too large.
+  exact::CarefulSum volume_, moment_[3], force_[3], torque_[3], gap_[3];
+  double rounding_ = 0;  ///< six times what the volume's terms may be off by
+  double area_ = 0;      ///< of all triangles that may be in the overlap
+  double rim_ = 0;       ///< and what their edges and corners add where surfaces deviate
+};
+
+}  // namespace ist

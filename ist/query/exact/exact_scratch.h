@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include <ist/asset_layout.h>
+
+#include "query/base/hooked_memory.h"
+#include "query/exact/crossing.h"
+
+namespace ist {
+
+/// Boxes of a box block in the other solid's frame.
+struct alignas(64) PlacedBoxes {
+  float low[3][kWidth], high[3][kWidth];
+  float all_low[3], all_high[3];
+};
+
+/// The triangles of a block in A's unit frame.
+struct alignas(64) PlacedTriangles {
+  double vertex[3][kWidth];               ///< [axis] B's: rounded once after the motion
+  float low[3][kWidth], high[3][kWidth];  ///< boxes, rounded outward; unused lanes empty
+  float corner[3][3][kWidth];             ///< [corner][axis]
+  float normal[3][kWidth];                ///< unit length; 0 where a triangle has too little area
+  float slack[kWidth];  ///< how far normals may be off, radians
+  float all_low[3], all_high[3];
+  float size;  ///< no two points are further apart
+  float reach;  ///< no coordinate is larger
+};
+
+/// Places that hold what was placed last with a number of the same remainder.
+template <class T, std::uint32_t kPlaces>
+struct PlacedCache {
+  std::uint32_t number[kPlaces];
+  T placed[kPlaces];
+
+  void forget() noexcept {
+    for (std::uint32_t& n : number) n = ~0u;
+  }
+};
+
+/// Eight pairs of triangles that are tested together.
+struct alignas(64) TrianglePairs {
+  double corner[2][3][3][8];  ///< [A, B][corner][axis]
+  std::uint32_t vertex[2][3][8];
+  std::uint32_t triangle[2][8];
+  std::uint32_t count = 0;
+};
+
+/// A pair of nodes that waits.
+struct BoxPair {
+  std::uint32_t a, b;
+  std::uint8_t level_a, level_b;
+};
+
+/// A block that crossings touch: which of its vertices are inside the other solid.
+struct CrossedBlock {
+  std::uint32_t block;
+  std::uint16_t known, inside;       ///< a bit a local vertex
+  std::uint64_t crossed;             ///< bit 3 · lane + edge: pierced edges
+  std::int8_t sum[3 * kWidth];       ///< of a pierced edge: how often it enters more than it leaves
+  std::int8_t first[3 * kWidth];     ///< whether it enters first, 1, leaves first, −1, or unclear, 0
+  double first_t[3 * kWidth], first_error[3 * kWidth];
+  exact::Point vertex[kWidth];       ///< from the origin of the sums
+};
+
+/// What a query knows of the blocks of one solid.
+struct BlockMarks {
+  HookedArray<std::uint64_t> near;     ///< a bit a block: triangles of it may be near the other
+  HookedArray<std::uint64_t> crossed;  ///< edges of it are pierced
+  HookedArray<std::uint64_t> inside;   ///< it lies inside as a whole
+  HookedArray<std::uint64_t> shells;   ///< a bit a shell: edges of it are pierced
+  HookedArray<std::uint32_t> place;    ///< of crossed blocks, in `blocks`
+  HookedArray<CrossedBlock> blocks;
+  std::uint32_t count = 0;
+};
+
+/// Scratch memory of exact queries, a part of a workspace.
+struct ExactScratch {
+  static constexpr std::uint32_t kMostBlocks = 1u << 20;    ///< of a mesh: 16 million triangles
+  static constexpr std::uint32_t kMostCrossed = 1u << 15;   ///< blocks of a mesh
+  static constexpr std::uint32_t kMostCrossings = 1u << 20; ///< pairs of triangles
+  static constexpr std::uint32_t kMostWaiting = 1u << 13;
+
+  explicit ExactScratch(const MemoryHooks& hooks)
+      : boxes_a(hooked<PlacedCache<PlacedBoxes, 256>>(hooks)),
+        boxes_b(hooked<PlacedCache<PlacedBoxes, 256>>(hooks)),
+        triangles_a(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
+        triangles_b(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
+        waiting(hooked_array<BoxPair>(hooks, kMostWaiting)),
+        crossings(hooked_array<exact::Crossing>(hooks, kMostCrossings)),
+        keys(hooked_array<std::uint64_t>(hooks, kMostCrossings)),
+        order(hooked_array<std::uint32_t>(hooks, kMostCrossings)),
+        other_order(hooked_array<std::uint32_t>(hooks, kMostCrossings)),
+        flood(hooked_array<std::uint32_t>(hooks, kMostBlocks)) {
+    for (BlockMarks* marks : {&a, &b}) {
+      marks->near = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
+      marks->crossed = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
+      marks->inside = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
+      marks->shells = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
+      marks->place = hooked_array<std::uint32_t>(hooks, kMostBlocks);
+      marks->blocks = hooked_array<CrossedBlock>(hooks, kMostCrossed);
+    }
+  }
+
+  Hooked<PlacedCache<PlacedBoxes, 256>> boxes_a, boxes_b;
+  Hooked<PlacedCache<PlacedTriangles, 256>> triangles_a, triangles_b;
+  TrianglePairs pairs;
+  HookedArray<BoxPair> waiting;
+  HookedArray<exact::Crossing> crossings;
+  HookedArray<std::uint64_t> keys;
+  HookedArray<std::uint32_t> order, other_order;
+  HookedArray<std::uint32_t> flood;
+  BlockMarks a, b;
+};
+
+}  // namespace ist

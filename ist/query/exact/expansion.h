@@ -1,0 +1,142 @@
+#pragma once
+
+#include <cmath>
+
+// Exact arithmetic with doubles: a number as a sum of doubles that do not overlap, the smallest
+// first (Shewchuk, "Adaptive Precision Floating-Point Arithmetic", 1997). Plain numbers, no library:
+// host, device and WebAssembly compile it. Nothing may be fused or re-associated here.
+
+#if defined(__CUDACC__)
+#define IST_HD __host__ __device__ __forceinline__
+#else
+#define IST_HD inline
+#endif
+
+namespace ist::exact {
+
+/// high + low = a + b exactly.
+IST_HD void two_sum(double a, double b, double& high, double& low) {
+  high = a + b;
+  const double part = high - a;
+  low = (a - (high - part)) + (b - part);
+}
+
+/// high + low = a − b exactly.
+IST_HD void two_difference(double a, double b, double& high, double& low) {
+  high = a - b;
+  const double part = a - high;
+  low = (a - (high + part)) + (part - b);
+}
+
+IST_HD void split(double a, double& high, double& low) {
+  const double c = 134217729.0 * a;  // 2^27 + 1
+  high = c - (c - a);
+  low = a - high;
+}
+
+/// high + low = a · b exactly, short of overflow and underflow.
+IST_HD void two_product(double a, double b, double& high, double& low) {
+  high = a * b;
+  double ah, al, bh, bl;
+  split(a, ah, al);
+  split(b, bh, bl);
+  low = al * bl - (((high - ah * bh) - al * bh) - ah * bl);
+}
+
+/// A sum of many numbers, nearly as exact as in twice the digits.
+class CarefulSum {
+ public:
+  IST_HD void add(double x) {
+    double rest;
+    two_sum(high_, x, high_, rest);
+    low_ += rest;
+  }
+  IST_HD double value() const { return high_ + low_; }
+
+ private:
+  double high_ = 0, low_ = 0;
+};
+
+/// A sum of at most kRoom doubles that do not overlap, without zeros; none: 0.
+template <int kRoom>
+struct Expansion {
+  int count = 0;
+  double part[kRoom];
+
+  IST_HD int sign() const { return count == 0 ? 0 : part[count - 1] > 0 ? 1 : -1; }
+  /// The nearest double, or nearly.
+  IST_HD double value() const {
+    double sum = 0;
+    for (int i = 0; i < count; ++i) sum += part[i];
+    return sum;
+  }
+};
+
+/// a + b, or a − b where `factor` is −1.
+template <int kA, int kB>
+IST_HD Expansion<kA + kB> sum(const Expansion<kA>& a, const Expansion<kB>& b, double factor = 1) {
+  Expansion<kA + kB> out;
+  int i = 0, j = 0;
+  double carried = 0;
+  for (int k = 0; k < a.count + b.count; ++k) {
+    const double next = j == b.count || (i < a.count && std::abs(a.part[i]) < std::abs(b.part[j]))
+                            ? a.part[i++]
+                            : factor * b.part[j++];
+    double rest;
+    two_sum(carried, next, carried, rest);
+    if (rest != 0) out.part[out.count++] = rest;
+  }
+  if (carried != 0) out.part[out.count++] = carried;
+  return out;
+}
+
+/// a · b.
+template <int kA>
+IST_HD Expansion<2 * kA> scaled(const Expansion<kA>& a, double b) {
+  Expansion<2 * kA> out;
+  if (a.count == 0 || b == 0) return out;
+  double carried, rest;
+  two_product(a.part[0], b, carried, rest);
+  if (rest != 0) out.part[out.count++] = rest;
+  for (int i = 1; i < a.count; ++i) {
+    double high, low, middle;
+    two_product(a.part[i], b, high, low);
+    two_sum(carried, low, middle, rest);
+    if (rest != 0) out.part[out.count++] = rest;
+    two_sum(high, middle, carried, rest);
+    if (rest != 0) out.part[out.count++] = rest;
+  }
+  if (carried != 0) out.part[out.count++] = carried;
+  return out;
+}
+
+/// a − b of two doubles.
+IST_HD Expansion<2> difference(double a, double b) {
+  Expansion<2> out;
+  double high, low;
+  two_difference(a, b, high, low);
+  if (low != 0) out.part[out.count++] = low;
+  if (high != 0) out.part[out.count++] = high;
+  return out;
+}
+
+template <int kA>
+IST_HD Expansion<4 * kA> product(const Expansion<kA>& a, const Expansion<2>& b) {
+  // One of b's parts is there at least in all but the rarest cases.
+  if (b.count < 2) {
+    Expansion<4 * kA> out;
+    const Expansion<2 * kA> one = b.count == 0 ? Expansion<2 * kA>() : scaled(a, b.part[0]);
+    out.count = one.count;
+    for (int i = 0; i < one.count; ++i) out.part[i] = one.part[i];
+    return out;
+  }
+  return sum(scaled(a, b.part[0]), scaled(a, b.part[1]));
+}
+
+/// a b − c d.
+IST_HD Expansion<16> minor(const Expansion<2>& a, const Expansion<2>& b, const Expansion<2>& c,
+                           const Expansion<2>& d) {
+  return sum(product(a, b), product(c, d), -1);
+}
+
+}  // namespace ist::exact

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+
+#include <ist/asset_layout.h>
+#include <ist/tree_view.h>
+
+#include "query/exact/orientation.h"
+
+namespace ist {
+
+/// The mesh of an asset with its offsets resolved, unit frame.
+///
+/// Lane l of box block b at level k + 1 is the box around block 16 b + l of level k.
+struct MeshTree {
+  struct Level {
+    const BoxBlock* boxes = nullptr;  ///< level 0 has none
+    const BoxSums* sums = nullptr;
+    std::uint32_t count = 0;  ///< blocks at this level, level 0 included
+    std::uint32_t first = 0;  ///< box blocks of the levels below
+  };
+
+  MeshTree(const AssetHeader& asset, const MeshHeader& mesh) noexcept
+      : header(&mesh),
+        top(static_cast<int>(mesh.level_count) - 1),
+        blocks(at<MeshBlock>(asset, mesh.level[0].blocks)),
+        vertices(at<double>(asset, mesh.vertices)),
+        shells(at<MeshShell>(asset, mesh.shells)),
+        neighbours(at<std::uint32_t>(asset, mesh.neighbours)) {
+    level[0].count = mesh.level[0].count;
+    for (int k = 1; k <= top; ++k) {
+      const LevelHeader& from = mesh.level[k];
+      level[k] = {at<BoxBlock>(asset, from.blocks), at<BoxSums>(asset, from.nodes), from.count,
+                  k > 1 ? level[k - 1].first + level[k - 1].count : 0};
+    }
+  }
+
+  exact::Point vertex(std::uint32_t v) const noexcept {
+    const double* x = vertices + std::size_t{3} * v;
+    return {x[0], x[1], x[2]};
+  }
+
+  const MeshHeader* header;
+  int top;  ///< the level of one box block, ≥ 1
+  const MeshBlock* blocks;
+  const double* vertices;
+  const MeshShell* shells;
+  const std::uint32_t* neighbours;
+  Level level[kMaxLevels];
+};
+
+}  // namespace ist
