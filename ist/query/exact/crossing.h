@@ -9,13 +9,15 @@ namespace ist::exact {
 /// Where an edge of one solid goes through a triangle of the other: an end of the segment that two
 /// triangles share. All segments that end there have the same bits of it.
 struct Piercing {
-  Point x;
+  Point from;          ///< the end of the edge that is nearer to the triangle's plane
+  Point offset;        ///< from there to the place: it keeps its digits where that is next to the end
   double t = 0;        ///< of the way along the edge, from its first corner in this triangle
   double t_error = 0;  ///< of t
   double h_error = 0;  ///< heights of the edge's ends over the triangle, times twice its area, are
                        ///< off by this together
   std::int8_t edge = 0;   ///< edge k goes from corner k to the next
-  bool of_b = false;      ///< the edge is B's and the triangle A's
+  bool from_first = true;  ///< `from` is the edge's first corner in this triangle
+  bool of_b = false;       ///< the edge is B's and the triangle A's
 };
 
 /// Two triangles that cross: their common segment, from where B's side of A's triangle lies to the
@@ -23,7 +25,6 @@ struct Piercing {
 /// start and leave it at the end.
 struct Crossing {
   std::uint32_t a = 0, b = 0;  ///< triangles: 16 · block + lane
-  Point corner_a, corner_b;    ///< the first of each
   Piercing start, end;
 };
 
@@ -41,22 +42,26 @@ IST_HD int direction(int sign_p) { return sign_p > 0 ? 1 : -1; }
 IST_HD Piercing piercing(const Corners& triangle, int edge, const Determinant (&height)[3],
                          bool of_b) {
   int p = edge, q = (edge + 1) % 3;
-  const bool turned = triangle.vertex[q] < triangle.vertex[p];
+  double hp = std::abs(height[p].value), hq = std::abs(height[q].value);
+  const bool turned = hq < hp || (hq == hp && triangle.vertex[q] < triangle.vertex[p]);
   if (turned) {
     const int kept = p;
     p = q;
     q = kept;
+    const double kept_height = hp;
+    hp = hq;
+    hq = kept_height;
   }
-  const double hp = std::abs(height[p].value), hq = std::abs(height[q].value);
-  const double whole = hp + hq;
-  // Both ends in the plane, and apart by the infinitesimal alone: the middle will do.
+  const double whole = hp + hq;  // > 0: an edge in the plane has both ends on one side
   const double t = whole > 0 ? hp / whole : 0.5;
   Piercing out;
-  out.x = triangle.x[p] + t * (triangle.x[q] - triangle.x[p]);
+  out.from = triangle.x[p];
+  out.offset = t * (triangle.x[q] - triangle.x[p]);
   out.t = turned ? 1 - t : t;
   out.t_error = whole > 0 ? 2 * (height[p].error + height[q].error) / whole + 1e-15 : 1;
   out.h_error = height[p].error + height[q].error;
   out.edge = static_cast<std::int8_t>(edge);
+  out.from_first = !turned;
   out.of_b = of_b;
   return out;
 }
@@ -66,7 +71,7 @@ IST_HD void place(const Piercing& found, int sign_p, Crossing& out) {
   ((direction(sign_p) > 0) != found.of_b ? out.end : out.start) = found;
 }
 
-/// Whether two triangles cross, by exact signs. `out` but for the triangles' numbers and corners.
+/// Whether two triangles cross, by exact signs. `out` but for the triangles' numbers.
 IST_HD bool cross_exactly(const Corners& a, const Corners& b, Crossing& out) {
   Determinant of_b[3], of_a[3];
   for (int k = 0; k < 3; ++k) of_b[k] = height_over_a(a.x, b.x[k]);

@@ -515,8 +515,6 @@ class Search {
       }
       out.a = pairs.triangle[0][n];
       out.b = pairs.triangle[1][n];
-      out.corner_a = corners[0].x[0];
-      out.corner_b = corners[1].x[0];
       ++found_.crossings;
     }
   }

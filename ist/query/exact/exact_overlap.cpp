@@ -39,15 +39,18 @@ Point map_point(const Similarity& map, const Point& x) {
   return {turned.x + map.t[0], turned.y + map.t[1], turned.z + map.t[2]};
 }
 
-void add(exact::CarefulSum (&sum)[3], double factor, const Point& p) {
-  sum[0].add(factor * p.x);
-  sum[1].add(factor * p.y);
-  sum[2].add(factor * p.z);
-}
+void add(Point& sum, double factor, const Point& p) { sum = sum + factor * p; }
 
-Point value(const exact::CarefulSum (&sum)[3], double factor) {
-  return {factor * sum[0].value(), factor * sum[1].value(), factor * sum[2].value()};
-}
+/// The corners of a triangle from the one that its cones start at.
+struct Fan {
+  Point apex, next, last;
+  Fan(const CrossedBlock& crossed, const MeshBlock& mesh, std::uint32_t lane) {
+    const int k = crossed.apex[lane];
+    apex = crossed.vertex[mesh.corner[k][lane]];
+    next = crossed.vertex[mesh.corner[(k + 1) % 3][lane]];
+    last = crossed.vertex[mesh.corner[(k + 2) % 3][lane]];
+  }
+};
 
 bool is_sound(const MeshTree& mesh) {
   return mesh.level[0].count <= ExactScratch::kMostBlocks;
@@ -65,6 +68,7 @@ void ExactQuery::clear_marks() noexcept {
     const std::uint32_t words = (side.mesh.level[0].count + 63) / 64;
     std::fill_n(side.marks.near.get(), words, 0);
     std::fill_n(side.marks.crossed.get(), words, 0);
+    std::fill_n(side.marks.pierced.get(), words, 0);
     std::fill_n(side.marks.inside.get(), words, 0);
     std::fill_n(side.marks.shells.get(), (side.mesh.header->shell_count + 63) / 64, 0);
     side.marks.count = 0;
@@ -103,69 +107,105 @@ void ExactQuery::sort_crossings(std::uint32_t count) noexcept {
   }
 }
 
-CrossedBlock* ExactQuery::crossed_block(Side& side, std::uint32_t block) noexcept {
-  BlockMarks& marks = side.marks;
+CrossedBlock* ExactQuery::crossed_block(Side& own, std::uint32_t block) noexcept {
+  BlockMarks& marks = own.marks;
   if (has(marks.crossed, block)) return &marks.blocks[marks.place[block]];
   if (marks.count == ExactScratch::kMostCrossed) return nullptr;
   set(marks.crossed, block);
   marks.place[block] = marks.count;
   CrossedBlock& made = marks.blocks[marks.count++];
   made.block = block;
-  made.known = made.inside = 0;
-  made.crossed = 0;
-  const MeshBlock& mesh = side.mesh.blocks[block];
-  for (std::uint32_t v = 0; v < mesh.vertices; ++v)
-    made.vertex[v] = place(side, mesh.vertex[v]) - out_.origin;
-  set(marks.shells, mesh.shell);
+  made.inside = 0;
+  made.pierced = 0;
+  const MeshBlock& mesh = own.mesh.blocks[block];
+  double away[kWidth];
+  for (std::uint32_t v = 0; v < mesh.vertices; ++v) {
+    made.vertex[v] = place(own, mesh.vertex[v]) - out_.origin;
+    away[v] = length_bound(made.vertex[v]);
+  }
+  for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
+    std::uint8_t apex = 0;
+    for (std::uint8_t k = 1; k < 3; ++k)
+      if (away[mesh.corner[k][t]] < away[mesh.corner[apex][t]]) apex = k;
+    made.apex[t] = apex;
+  }
   return &made;
 }
 
-/// An edge of one solid pierces a triangle of the other.
-void ExactQuery::note_piercing(const Crossing& crossing, const Piercing& end,
-                               bool enters) noexcept {
-  Side& own = side(end.of_b);
-  const std::uint32_t triangle = end.of_b ? crossing.b : crossing.a, lane = triangle % kWidth;
-  CrossedBlock* const crossed = crossed_block(own, triangle / kWidth);
-  if (crossed == nullptr) {
-    out_.complete = false;
-    return;
+/// Adds what the segment that two triangles share is to both: a part of the boundary of what each
+/// has in the other solid. A cone from the origin over a part of a triangle is made of tetrahedra
+/// with an edge from the origin to the triangle's apex.
+bool ExactQuery::add_crossing(const Crossing& crossing) noexcept {
+  CrossedBlock* const block_a = crossed_block(sides_[0], crossing.a / kWidth);
+  CrossedBlock* const block_b = crossed_block(sides_[1], crossing.b / kWidth);
+  if (block_a == nullptr || block_b == nullptr) return false;
+  const std::uint32_t lane_a = crossing.a % kWidth, lane_b = crossing.b % kWidth;
+  const auto apex_of = [](const Side& own, const CrossedBlock& block, std::uint32_t lane) {
+    return block.vertex[own.mesh.blocks[block.block].corner[block.apex[lane]][lane]];
+  };
+  const Point of_a = apex_of(sides_[0], *block_a, lane_a);
+  const Point of_b = apex_of(sides_[1], *block_b, lane_b);
+  const Point a = from_origin(crossing.start), b = from_origin(crossing.end);
+  const Point along = b - a, c = cross(a, along), both = a + b;
+  const double six_a = dot(c, of_a), six_b = dot(c, of_b);
+  volume_.add(dot(c, of_a - of_b));
+  add(moment_, six_a, of_a + both);
+  add(moment_, -six_b, of_b + both);
+  add(force_, -0.5, c);
+  add(torque_, ((dot(a, a) + dot(a, b)) + dot(b, b)) / 6, along);
+  rounding_ += 8 * kHalfUnit * length_bound(a) * length_bound(along) * length_bound(of_a - of_b);
+  for (const Piercing* end : {&crossing.start, &crossing.end}) {
+    const bool enters = (end == &crossing.start) == end->of_b;
+    add_piercing(side(end->of_b), end->of_b ? *block_b : *block_a, end->of_b ? lane_b : lane_a,
+                 *end, enters ? 1 : -1);
   }
+  return true;
+}
+
+/// An edge is pierced: notes it, and adds the cone over the edge from its nearer end to there.
+void ExactQuery::add_piercing(Side& own, CrossedBlock& crossed, std::uint32_t lane,
+                              const Piercing& end, int sign) noexcept {
   const std::uint32_t edge = 3 * lane + static_cast<std::uint32_t>(end.edge);
-  const int sign = enters ? 1 : -1;
-  if (crossed->crossed >> edge & 1) {
-    crossed->sum[edge] = static_cast<std::int8_t>(crossed->sum[edge] + sign);
-    double& first = crossed->first_t[edge];
-    double& error = crossed->first_error[edge];
-    // Which comes first has to be certain.
-    if (std::abs(end.t - first) <= end.t_error + error) {
-      if (crossed->first[edge] != sign) crossed->first[edge] = 0;
+  if (crossed.pierced >> edge & 1) {
+    crossed.sum[edge] = static_cast<std::int8_t>(crossed.sum[edge] + sign);
+    double& first = crossed.first_t[edge];
+    double& error = crossed.first_error[edge];
+    if (std::abs(end.t - first) <= end.t_error + error) {  // in no certain order
+      if (crossed.first[edge] != sign) crossed.first[edge] = 0;
       error = std::max(error + std::abs(end.t - first), end.t_error);
       first = std::min(first, end.t);
     } else if (end.t < first) {
       first = end.t;
       error = end.t_error;
-      crossed->first[edge] = static_cast<std::int8_t>(sign);
+      crossed.first[edge] = static_cast<std::int8_t>(sign);
     }
   } else {
-    crossed->crossed |= std::uint64_t{1} << edge;
-    crossed->sum[edge] = crossed->first[edge] = static_cast<std::int8_t>(sign);
-    crossed->first_t[edge] = end.t;
-    crossed->first_error[edge] = end.t_error;
+    if (crossed.pierced == 0) {
+      set(own.marks.pierced, crossed.block);
+      set(own.marks.shells, own.mesh.blocks[crossed.block].shell);
+    }
+    crossed.pierced |= std::uint64_t{1} << edge;
+    crossed.sum[edge] = crossed.first[edge] = static_cast<std::int8_t>(sign);
+    crossed.middle[edge] = 0;
+    crossed.first_t[edge] = end.t;
+    crossed.first_error[edge] = end.t_error;
   }
+  if (end.from_first) crossed.middle[edge] = static_cast<std::int8_t>(crossed.middle[edge] + sign);
   rounding_ += 3 * end.h_error;
-  // The cone over the part of this edge within the other solid, from the triangle's first corner:
-  // edges that start or end there have none.
-  const MeshBlock& mesh = own.mesh.blocks[crossed->block];
-  const Point p0 = crossed->vertex[mesh.corner[0][lane]], p1 = crossed->vertex[mesh.corner[1][lane]],
-              p2 = crossed->vertex[mesh.corner[2][lane]];
-  const Point x = end.x - out_.origin;
-  if (end.edge == 1) {
-    const Point along = p2 - p0, to = x - p0;
-    add_cone(sign * dot(p0, cross(to, along)), p0 + (x + p2),
-             8 * length_bound(p0) * length_bound(to) * length_bound(along));
+  const MeshBlock& mesh = own.mesh.blocks[crossed.block];
+  const auto k = static_cast<std::uint32_t>(end.edge);
+  if (checked_) {
+    const Point p = crossed.vertex[mesh.corner[k][lane]],
+                q = crossed.vertex[mesh.corner[(k + 1) % 3][lane]], x = from_origin(end);
+    add(gap_, sign * (own.is_b ? -0.5 : 0.5),
+        end.from_first ? cross(x, p) : cross(x, q));
   }
-  const Point corners[3] = {p0, p1, p2};
-  add(gap_, sign * (own.is_b ? -0.5 : 0.5) , cross(x, corners[(end.edge + 1) % 3]));
+  // Of an edge at the apex there is none.
+  if ((crossed.apex[lane] + 1) % 3 != end.edge) return;
+  const Fan fan(crossed, mesh, lane);
+  const Point to = (end.from_first ? fan.next : fan.last) - fan.apex;
+  add_cone(sign * dot(fan.apex, cross(end.offset, to)), fan.apex + ((end.from_first ? fan.next : fan.last) + from_origin(end)),
+           8 * length_bound(fan.apex) * length_bound(end.offset) * length_bound(to));
 }
 
 /// A tetrahedron from the origin: six times its volume, the sum of its other corners, and what the
@@ -181,7 +221,7 @@ void ExactQuery::add_cone(double six_volumes, const Point& corners, double round
 void ExactQuery::settle(Side& side, CrossedBlock& crossed) noexcept {
   const MeshBlock& mesh = side.mesh.blocks[crossed.block];
   std::uint32_t known = 0, inside = 0;
-  for (std::uint64_t left = crossed.crossed; left != 0; left &= left - 1) {
+  for (std::uint64_t left = crossed.pierced; left != 0; left &= left - 1) {
     const auto edge = static_cast<std::uint32_t>(std::countr_zero(left));
     const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
                         q = mesh.corner[(edge + 1) % 3][edge / 3];
@@ -193,7 +233,7 @@ void ExactQuery::settle(Side& side, CrossedBlock& crossed) noexcept {
   }
   std::uint16_t joined[kWidth] = {};
   for (std::uint32_t edge = 0; edge < 3u * mesh.triangles; ++edge) {
-    if (crossed.crossed >> edge & 1) continue;
+    if (crossed.pierced >> edge & 1) continue;
     const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
                         q = mesh.corner[(edge + 1) % 3][edge / 3];
     joined[p] = static_cast<std::uint16_t>(joined[p] | 1u << q);
@@ -217,7 +257,6 @@ void ExactQuery::settle(Side& side, CrossedBlock& crossed) noexcept {
     known |= 1u << v;
     spread(1u << v);
   }
-  crossed.known = static_cast<std::uint16_t>(known);
   crossed.inside = static_cast<std::uint16_t>(inside);
 }
 
@@ -291,12 +330,13 @@ void ExactQuery::find_insides(Side& own) noexcept {
   const MeshTree& mesh = own.mesh;
   std::uint32_t waiting = 0;
   const auto wait = [&](std::uint32_t block) {
-    if (has(marks.crossed, block) || has(marks.inside, block)) return;
+    if (has(marks.pierced, block) || has(marks.inside, block)) return;
     set(marks.inside, block);
     scratch_.flood[waiting++] = block;
   };
   for (std::uint32_t c = 0; c < marks.count; ++c) {
     CrossedBlock& crossed = marks.blocks[c];
+    if (crossed.pierced == 0) continue;
     settle(own, crossed);
     const MeshBlock& block = mesh.blocks[crossed.block];
     for (std::uint32_t k = 0; k < block.neighbours; ++k) {
@@ -317,34 +357,24 @@ void ExactQuery::find_insides(Side& own) noexcept {
   }
 }
 
-/// What the segment that two triangles share adds as a part of the boundary of both.
-void ExactQuery::sum_crossing(const Crossing& crossing) noexcept {
-  const Point a = crossing.start.x - out_.origin, b = crossing.end.x - out_.origin;
-  const Point along = b - a, c = cross(a, along);
-  const Point of_a = crossing.corner_a - out_.origin, of_b = crossing.corner_b - out_.origin;
-  const Point both = a + b;
-  const double six_a = dot(c, of_a), six_b = dot(c, of_b);
-  volume_.add(dot(c, of_a - of_b));
-  add(moment_, six_a, of_a + both);
-  add(moment_, -six_b, of_b + both);
-  add(force_, -0.5, c);
-  const double square = (dot(a, a) + dot(a, b)) + dot(b, b);
-  add(torque_, square / 6, along);
-  rounding_ += 8 * kHalfUnit * length_bound(a) * length_bound(along) * length_bound(of_a - of_b);
-}
-
 void ExactQuery::sum_crossed_block(const Side& own, const CrossedBlock& crossed) noexcept {
   const MeshBlock& mesh = own.mesh.blocks[crossed.block];
+  // Whether the middle of an edge is inside, as far as sums from its ends are concerned.
+  const auto middle = [&](std::uint32_t k, std::uint32_t t) {
+    const std::uint32_t edge = 3 * t + k;
+    return static_cast<int>(crossed.inside >> mesh.corner[k][t] & 1) +
+           (crossed.pierced >> edge & 1 ? crossed.middle[edge] : 0);
+  };
   for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
-    const Point p[3] = {crossed.vertex[mesh.corner[0][t]], crossed.vertex[mesh.corner[1][t]],
-                        crossed.vertex[mesh.corner[2][t]]};
-    for (int k = 0; k < 3; ++k)
-      if (crossed.inside >> mesh.corner[k][t] & 1)
-        add(gap_, own.is_b ? -0.5 : 0.5, cross(p[k], p[(k + 1) % 3]));
-    if ((crossed.inside >> mesh.corner[1][t] & 1) == 0) continue;
-    const Point u = p[1] - p[0], v = p[2] - p[0];
-    add_cone(dot(p[0], cross(u, v)), p[0] + (p[1] + p[2]),
-             8 * length_bound(p[0]) * length_bound(u) * length_bound(v));
+    for (std::uint32_t k = 0; k < 3 && checked_; ++k)
+      add(gap_, middle(k, t) * (own.is_b ? -0.5 : 0.5),
+          cross(crossed.vertex[mesh.corner[k][t]], crossed.vertex[mesh.corner[(k + 1) % 3][t]]));
+    const int whole = middle((crossed.apex[t] + 1u) % 3, t);
+    if (whole == 0) continue;
+    const Fan fan(crossed, mesh, t);
+    const Point u = fan.next - fan.apex, v = fan.last - fan.apex;
+    add_cone(whole * dot(fan.apex, cross(u, v)), fan.apex + (fan.next + fan.last),
+             8 * length_bound(fan.apex) * length_bound(u) * length_bound(v));
   }
 }
 
@@ -432,7 +462,8 @@ void ExactQuery::bound_near(const Side& own) noexcept {
     }
 }
 
-ExactOverlap ExactQuery::run(std::uint32_t max_visits) noexcept {
+ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
+  checked_ = checked;
   if (!is_sound(sides_[0].mesh) || !is_sound(sides_[1].mesh)) {
     out_.complete = false;
     return out_;
@@ -449,19 +480,15 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits) noexcept {
   out_.consistent = found.consistent;
   if (!out_.complete) return out_;
   sort_crossings(found.crossings);
-  if (found.crossings > 0) out_.origin = scratch_.crossings[scratch_.order[0]].start.x;
-  for (std::uint32_t i = 0; i < found.crossings && out_.complete; ++i) {
-    const Crossing& crossing = scratch_.crossings[scratch_.order[i]];
-    sum_crossing(crossing);
-    note_piercing(crossing, crossing.start, crossing.start.of_b);
-    note_piercing(crossing, crossing.end, !crossing.end.of_b);
-  }
+  if (found.crossings > 0) out_.origin = scratch_.crossings[scratch_.order[0]].start.from;
+  for (std::uint32_t i = 0; i < found.crossings && out_.complete; ++i)
+    out_.complete = add_crossing(scratch_.crossings[scratch_.order[i]]);
   if (!out_.complete) return out_;
   for (Side& side : sides_) find_insides(side);
   for (Side& side : sides_) {
     // In the order of the mesh, whichever was found first.
     for (std::uint32_t w = 0; w < (side.mesh.level[0].count + 63) / 64; ++w)
-      for (std::uint64_t left = side.marks.crossed[w]; left != 0; left &= left - 1)
+      for (std::uint64_t left = side.marks.pierced[w]; left != 0; left &= left - 1)
         sum_crossed_block(
             side,
             side.marks.blocks[side.marks.place[64 * w + static_cast<std::uint32_t>(
@@ -470,10 +497,10 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits) noexcept {
     bound_near(side);
   }
   out_.volume = volume_.value() / 6;
-  out_.moment = value(moment_, 1.0 / 24);
-  out_.force = value(force_, 1);
-  out_.torque = value(torque_, 1);
-  out_.gap = value(gap_, 1);
+  out_.moment = (1.0 / 24) * moment_;
+  out_.force = force_;
+  out_.torque = torque_;
+  out_.gap = gap_;
   // A surface that moves by e, or a solid that is only known beyond e from it, changes the volume
   // by no more than a layer of that thickness to either side of it: faces, edges and corners.
   const double moved = bounds_.moved, deviation = bounds_.deviation, e = moved + deviation;

@@ -43,7 +43,8 @@ class ExactQuery {
         bounds_(bounds),
         scratch_(scratch) {}
 
-  ExactOverlap run(std::uint32_t max_visits = 0) noexcept;
+  /// `max_visits`: 0: no limit. `checked`: finds the gap too.
+  ExactOverlap run(std::uint32_t max_visits = 0, bool checked = false) noexcept;
 
  private:
   struct Side {
@@ -52,18 +53,21 @@ class ExactQuery {
     bool is_b;
   };
 
+  exact::Point from_origin(const exact::Piercing& end) const noexcept {
+    return (end.from - out_.origin) + end.offset;
+  }
   Side& side(bool of_b) noexcept { return sides_[of_b ? 1 : 0]; }
   exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
   void clear_marks() noexcept;
   void sort_crossings(std::uint32_t count) noexcept;
   CrossedBlock* crossed_block(Side& side, std::uint32_t block) noexcept;
-  void note_piercing(const exact::Crossing& crossing, const exact::Piercing& end,
-                     bool enters) noexcept;
+  bool add_crossing(const exact::Crossing& crossing) noexcept;
+  void add_piercing(Side& side, CrossedBlock& crossed, std::uint32_t lane,
+                    const exact::Piercing& end, int sign) noexcept;
   void settle(Side& side, CrossedBlock& crossed) noexcept;
   bool is_inside(const Side& side, std::uint32_t vertex) const noexcept;
   void find_insides(Side& side) noexcept;
   void flood(const Side& side, std::uint32_t waiting) noexcept;
-  void sum_crossing(const exact::Crossing& crossing) noexcept;
   void sum_crossed_block(const Side& side, const CrossedBlock& crossed) noexcept;
   void sum_insides(const Side& side, int level, std::uint32_t i) noexcept;
   void sum_lane(const Side& side, int level, std::uint32_t i, std::uint32_t lane) noexcept;
@@ -77,7 +81,9 @@ class ExactQuery {
   ExactScratch& scratch_;
   ExactOverlap out_;
   // Sums, the volume's six times and the moment's 24 times too large.
-  exact::CarefulSum volume_, moment_[3], force_[3], torque_[3], gap_[3];
+  exact::CarefulSum volume_;
+  exact::Point moment_ = {}, force_ = {}, torque_ = {}, gap_ = {};
+  bool checked_ = false;
   double rounding_ = 0;  ///< six times what the volume's terms may be off by
   double area_ = 0;      ///< of all triangles that may be in the overlap
   double rim_ = 0;       ///< and what their edges and corners add where surfaces deviate

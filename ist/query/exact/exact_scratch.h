@@ -53,22 +53,26 @@ struct BoxPair {
   std::uint8_t level_a, level_b;
 };
 
-/// A block that crossings touch: which of its vertices are inside the other solid.
+/// A block whose triangles cross others: which of its vertices are inside the other solid.
 struct CrossedBlock {
   std::uint32_t block;
-  std::uint16_t known, inside;       ///< a bit a local vertex
-  std::uint64_t crossed;             ///< bit 3 · lane + edge: pierced edges
-  std::int8_t sum[3 * kWidth];       ///< of a pierced edge: how often it enters more than it leaves
-  std::int8_t first[3 * kWidth];     ///< whether it enters first, 1, leaves first, −1, or unclear, 0
+  std::uint16_t inside;         ///< a bit a local vertex
+  std::uint64_t pierced;        ///< bit 3 · lane + edge
+  exact::Point vertex[kWidth];  ///< from the origin of the sums
+  std::uint8_t apex[kWidth];    ///< of each lane the corner, 0 … 2, that is nearest to the origin
+  // Of a pierced edge:
+  std::int8_t sum[3 * kWidth];     ///< how often it enters more than it leaves
+  std::int8_t first[3 * kWidth];   ///< what comes first: 1 enters, −1 leaves, 0 unclear
+  std::int8_t middle[3 * kWidth];  ///< `sum` of places that are nearer to its first corner
   double first_t[3 * kWidth], first_error[3 * kWidth];
-  exact::Point vertex[kWidth];       ///< from the origin of the sums
 };
 
 /// What a query knows of the blocks of one solid.
 struct BlockMarks {
   HookedArray<std::uint64_t> near;     ///< a bit a block: triangles of it may be near the other
-  HookedArray<std::uint64_t> crossed;  ///< edges of it are pierced
-  HookedArray<std::uint64_t> inside;   ///< it lies inside as a whole
+  HookedArray<std::uint64_t> crossed;  ///< triangles of it cross others: it is in `blocks`
+  HookedArray<std::uint64_t> pierced;  ///< edges of it are pierced
+  HookedArray<std::uint64_t> inside;   ///< no edge is pierced, and it lies inside
   HookedArray<std::uint64_t> shells;   ///< a bit a shell: edges of it are pierced
   HookedArray<std::uint32_t> place;    ///< of crossed blocks, in `blocks`
   HookedArray<CrossedBlock> blocks;
@@ -96,6 +100,7 @@ struct ExactScratch {
     for (BlockMarks* marks : {&a, &b}) {
       marks->near = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
       marks->crossed = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
+      marks->pierced = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
       marks->inside = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
       marks->shells = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
       marks->place = hooked_array<std::uint32_t>(hooks, kMostBlocks);
