@@ -2,6 +2,7 @@
 
 #include "query/detail/coincident.h"
 #include "query/detail/detail_blend.h"
+#include "query/exact/exact_penetration.h"
 #include "query/field/pair_overlap.h"
 
 namespace ist {
@@ -14,6 +15,8 @@ Penetration penetration(const PlacedTree& a, const PlacedTree& b,
     refused.status = QueryStatus::invalid_input;
     return refused;
   }
+  if (settings.measure == Measure::exact)
+    return exact_penetration(a, b, settings, *pose, workspace);
   if (settings.measure == Measure::matched &&
       (settings.pair_budget > 0 || are_one_asset(a.tree.header(), b.tree.header())))
     return blend_details(a, b, *pose, settings, workspace);

@@ -26,7 +26,8 @@ Workspace::Impl::Impl(std::size_t wanted, const MemoryHooks& hooks)
       leaves(hooked<LeafScratch>(memory)),
       masks(hooked_array<std::uint16_t>(memory, capacity)),
       patches(hooked<PatchCache>(memory)),
-      contact(memory) {}
+      contact(memory),
+      exact(capacity, memory) {}
 
 Workspace::Workspace(std::size_t capacity, const MemoryHooks& memory) {
   // The Impl lies in memory of the hooks too.

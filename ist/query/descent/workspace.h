@@ -8,6 +8,7 @@
 #include <ist/asset_layout.h>
 #include "query/base/hooked_memory.h"
 #include "query/contact/contact_bins.h"
+#include "query/exact/exact_scratch.h"
 #include "query/kernel/placed_blocks.h"
 #include "query/probe/patch_cache.h"
 
@@ -49,6 +50,7 @@ struct [[gnu::visibility("hidden")]] Workspace::Impl {
   HookedArray<std::uint16_t> masks;  ///< children of a pair's node that meet the other one
   Hooked<PatchCache> patches;
   ContactBins contact;
+  ExactScratch exact;
 };
 
 }  // namespace ist

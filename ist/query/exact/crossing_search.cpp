@@ -34,7 +34,7 @@ class Search {
     scratch_.boxes_b->forget();
     scratch_.triangles_a->forget();
     scratch_.triangles_b->forget();
-    scratch_.pairs.count = 0;
+    scratch_.pairs->count = 0;
     waiting_ = 0;
     push(a_.top, 0, b_.top, 0);
     while (waiting_ > 0 && found_.complete) {
@@ -258,14 +258,23 @@ class Search {
       const float low = lowest(at[k]), high = highest(at[k]);
       reach = std::max({reach, std::abs(low), std::abs(high)});
       size += (high - low) * (high - low);
-      for (int c = 0; c < 3; ++c)
-        for (std::uint32_t l = 0; l < kWidth; ++l)
-          out.corner[c][k][l] = at[k][block.corner[c][l]];
     }
+    const hn::RebindToSigned<F> di;
+    for (int c = 0; c < 3; ++c)
+      for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+        const auto from_lane =
+            hn::PromoteTo(di, hn::LoadU(hn::Rebind<std::uint8_t, F>(), block.corner[c] + l));
+        for (int k = 0; k < 3; ++k) {
+          if constexpr (hn::MaxLanes(F()) == kWidth)
+            hn::Store(hn::TableLookupLanes(hn::Load(d, at[k]), hn::IndicesFromVec(d, from_lane)),
+                      d, out.corner[c][k] + l);
+          else
+            hn::Store(hn::GatherIndex(d, at[k], from_lane), d, out.corner[c][k] + l);
+        }
+      }
     out.reach = reach;
     out.size = std::sqrt(size) * (1 + kFloatError) + reach * kFloatError;
     const auto outward = hn::Set(d, reach * 2e-7f);
-    const auto tiny = hn::Set(d, 1e-30f);
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
       hn::Vec<F> u[3], v[3], n[3];
       for (int k = 0; k < 3; ++k) {
@@ -279,22 +288,20 @@ class Search {
       for (int k = 0; k < 3; ++k) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         n[k] = u[i] * v[j] - u[j] * v[i];
+        hn::Store(n[k], d, out.normal[k] + l);
       }
-      const auto n2 = (n[0] * n[0] + n[1] * n[1]) + n[2] * n[2];
-      const auto u2 = (u[0] * u[0] + u[1] * u[1]) + u[2] * u[2];
-      const auto v2 = (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2];
-      // Differences of rounded corners: what they are off by turns the normal by as much over the
-      // sides, and more where the sides are nearly parallel.
-      const auto side2 = hn::Min(u2, v2);
-      const auto good = hn::And(n2 > hn::Set(d, 1e-4f) * (u2 * v2), side2 > tiny);
-      const auto length = hn::Sqrt(hn::Max(n2, tiny * tiny));
-      for (int k = 0; k < 3; ++k)
-        hn::Store(hn::IfThenElseZero(good, n[k] / length), d, out.normal[k] + l);
-      const auto sine = length / hn::Sqrt(hn::Max(u2 * v2, tiny * tiny));
-      const auto off = (hn::Set(d, reach * 3e-7f) / hn::Sqrt(hn::Max(side2, tiny)) +
-                        hn::Set(d, kFloatError)) /
-                       hn::Max(sine, hn::Set(d, 1e-3f));
-      hn::Store(hn::IfThenElse(good, off, hn::Set(d, 1e30f)), d, out.slack + l);
+      hn::Store((n[0] * hn::Load(d, out.corner[0][0] + l) + n[1] * hn::Load(d, out.corner[0][1] + l)) +
+                    n[2] * hn::Load(d, out.corner[0][2] + l),
+                d, out.offset + l);
+      // Corners are rounded, so sides are off by some reach, and normals by that times the other
+      // side; what a product of sides loses to rounding comes on top.
+      const auto length = [](const hn::Vec<F>(&x)[3]) {
+        return hn::Abs(x[0]) + (hn::Abs(x[1]) + hn::Abs(x[2]));
+      };
+      const auto lu = length(u), lv = length(v);
+      hn::Store(length(n), d, out.length + l);
+      hn::Store(hn::Set(d, 6e-7f) * (hn::Set(d, reach) * hn::Max(lu, lv) + lu * lv), d,
+                out.slack + l);
     }
     for (int k = 0; k < 3; ++k) {
       out.all_low[k] = lowest(out.low[k]);
@@ -307,6 +314,15 @@ class Search {
 
   static void mark(HookedArray<std::uint64_t>& bits, std::uint32_t i) {
     bits[i / 64] |= std::uint64_t{1} << i % 64;
+  }
+
+  /// Lanes whose three corners do not all lie clear on one side of a plane.
+  template <class Height>
+  static HWY_INLINE std::uint32_t straddling(hn::Vec<F> over, const Height& height) {
+    const F d;
+    const auto h0 = height(0), h1 = height(1), h2 = height(2);
+    return mask_bits(d, hn::And(hn::Min(h0, hn::Min(h1, h2)) <= over,
+                                hn::Max(h0, hn::Max(h1, h2)) >= hn::Neg(over)));
   }
 
   /// Tests the triangles of two blocks by boxes and planes.
@@ -322,36 +338,35 @@ class Search {
     bool near = false;
     const F d;
     // Coordinates are floats, and points of both blocks that matter are no further apart than this.
-    const float blur = 4e-7f * (a.reach + b.reach) + search_.room, size = a.size + b.size;
+    const float blur = 1e-6f * (a.reach + b.reach) + search_.room, size = a.size + b.size;
     for (; rows != 0; rows &= rows - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
       const OneBox box(a.low, a.high, i, search_.room);
       std::uint32_t columns = meeting(b.low, b.high, box.low, box.high);
       if (columns == 0) continue;
-      const auto over_a = hn::Set(d, blur + a.slack[i] * size);
+      const auto over_a = hn::Set(d, blur * a.length[i] + a.slack[i] * size);
+      const auto na = [&](int k) { return hn::Set(d, a.normal[k][i]); };
       for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-        if ((columns >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
-        auto low_a = hn::Set(d, HUGE_VALF), high_a = hn::Set(d, -HUGE_VALF);
-        auto low_b = low_a, high_b = high_a;
-        const hn::Vec<F> nb[3] = {hn::Load(d, b.normal[0] + l), hn::Load(d, b.normal[1] + l),
-                                  hn::Load(d, b.normal[2] + l)};
-        for (int c = 0; c < 3; ++c) {
-          auto above_a = hn::Zero(d), above_b = hn::Zero(d);
-          for (int k = 0; k < 3; ++k) {
-            above_a = above_a + hn::Set(d, a.normal[k][i]) *
-                                    (hn::Load(d, b.corner[c][k] + l) -
-                                     hn::Set(d, a.corner[0][k][i]));
-            above_b = above_b + nb[k] * (hn::Set(d, a.corner[c][k][i]) -
-                                         hn::Load(d, b.corner[0][k] + l));
-          }
-          low_a = hn::Min(low_a, above_a), high_a = hn::Max(high_a, above_a);
-          low_b = hn::Min(low_b, above_b), high_b = hn::Max(high_b, above_b);
-        }
-        const auto over_b =
-            hn::Set(d, blur) + hn::Load(d, b.slack + l) * hn::Set(d, size);
-        const auto both = hn::And(hn::And(low_a <= over_a, high_a >= hn::Neg(over_a)),
-                                  hn::And(low_b <= over_b, high_b >= hn::Neg(over_b)));
-        for (std::uint32_t left = columns >> l & mask_bits(d, both); left != 0; left &= left - 1) {
+        std::uint32_t left = columns >> l & ((1u << hn::Lanes(d)) - 1);
+        if (left == 0) continue;
+        const auto plane_a = hn::Set(d, a.offset[i]);
+        left &= straddling(over_a, [&](int c) {
+          return ((na(0) * hn::Load(d, b.corner[c][0] + l) +
+                   na(1) * hn::Load(d, b.corner[c][1] + l)) +
+                  na(2) * hn::Load(d, b.corner[c][2] + l)) -
+                 plane_a;
+        });
+        if (left == 0) continue;
+        const auto over_b = hn::Set(d, blur) * hn::Load(d, b.length + l) +
+                            hn::Load(d, b.slack + l) * hn::Set(d, size);
+        const auto plane_b = hn::Load(d, b.offset + l);
+        left &= straddling(over_b, [&](int c) {
+          return ((hn::Load(d, b.normal[0] + l) * hn::Set(d, a.corner[c][0][i]) +
+                   hn::Load(d, b.normal[1] + l) * hn::Set(d, a.corner[c][1][i])) +
+                  hn::Load(d, b.normal[2] + l) * hn::Set(d, a.corner[c][2][i])) -
+                 plane_b;
+        });
+        for (; left != 0; left &= left - 1) {
           near = true;
           add_pair(number_a, a, i, number_b, b,
                    static_cast<std::uint32_t>(l) +
@@ -367,7 +382,7 @@ class Search {
 
   void add_pair(std::uint32_t number_a, const PlacedTriangles& a, std::uint32_t i,
                 std::uint32_t number_b, const PlacedTriangles& b, std::uint32_t j) {
-    TrianglePairs& pairs = scratch_.pairs;
+    TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t n = pairs.count;
     const auto take = [&](int side, const MeshBlock& block, const PlacedTriangles& from,
                           std::uint32_t lane) {
@@ -417,7 +432,7 @@ class Search {
 
   /// Tests what has been gathered by signs: in double, and what that leaves unclear exactly.
   void test_pairs() {
-    TrianglePairs& pairs = scratch_.pairs;
+    TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t count = pairs.count;
     pairs.count = 0;
     if (count == 0) return;
@@ -488,7 +503,7 @@ class Search {
                              pairs.corner[s][c][2][n]};
           corners[s].vertex[c] = pairs.vertex[s][c][n];
         }
-      if (found_.crossings == ExactScratch::kMostCrossings) {
+      if (found_.crossings == scratch_.most_crossings) {
         found_.complete = false;
         return;
       }

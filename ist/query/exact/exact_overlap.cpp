@@ -52,10 +52,6 @@ struct Fan {
   }
 };
 
-bool is_sound(const MeshTree& mesh) {
-  return mesh.level[0].count <= ExactScratch::kMostBlocks;
-}
-
 }  // namespace
 
 Point ExactQuery::place(const Side& side, std::uint32_t vertex) const noexcept {
@@ -110,7 +106,7 @@ void ExactQuery::sort_crossings(std::uint32_t count) noexcept {
 CrossedBlock* ExactQuery::crossed_block(Side& own, std::uint32_t block) noexcept {
   BlockMarks& marks = own.marks;
   if (has(marks.crossed, block)) return &marks.blocks[marks.place[block]];
-  if (marks.count == ExactScratch::kMostCrossed) return nullptr;
+  if (marks.count == scratch_.most_crossed) return nullptr;
   set(marks.crossed, block);
   marks.place[block] = marks.count;
   CrossedBlock& made = marks.blocks[marks.count++];
@@ -419,7 +415,7 @@ void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i,
   rounding_ += 64 * kHalfUnit * area * (length_bound(d) + wide);
   area_ += area;
   rim_ += wide;
-  add(gap_, own.is_b ? -1 : 1, n);
+  if (checked_) add(gap_, own.is_b ? -1 : 1, n);
 }
 
 /// Sums the blocks that lie inside as a whole, as few lanes as hold them.
@@ -464,12 +460,13 @@ void ExactQuery::bound_near(const Side& own) noexcept {
 
 ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
   checked_ = checked;
-  if (!is_sound(sides_[0].mesh) || !is_sound(sides_[1].mesh)) {
-    out_.complete = false;
-    return out_;
-  }
+  for (const Side& side : sides_)
+    if (side.mesh.level[0].count > scratch_.most_blocks) {
+      out_.complete = false;
+      return out_;
+    }
   clear_marks();
-  const double room = 2 * (bounds_.moved + bounds_.deviation);
+  const double room = 2 * moved_;
   const CrossingsFound found =
       find_crossings({&sides_[0].mesh, &sides_[1].mesh, a_from_b_, b_from_a_,
                       static_cast<float>(room * (1 + 1e-6)), max_visits},
@@ -501,10 +498,10 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
   out_.force = force_;
   out_.torque = torque_;
   out_.gap = gap_;
-  // A surface that moves by e, or a solid that is only known beyond e from it, changes the volume
-  // by no more than a layer of that thickness to either side of it: faces, edges and corners.
-  const double moved = bounds_.moved, deviation = bounds_.deviation, e = moved + deviation;
-  out_.error = 1.01 * (rounding_ / 6 + (2 * e) * area_ + 32 * (e * e) * rim_) +
+  // A surface that moves by e changes the volume by no more than a layer of that thickness over
+  // its faces, edges and corners.
+  const double e = moved_;
+  out_.error = 1.01 * (rounding_ / 6 + e * area_ + 32 * (e * e) * rim_) +
                4 * kHalfUnit * std::abs(out_.volume);
   return out_;
 }

@@ -25,22 +25,17 @@ struct ExactOverlap {
   exact::Point gap = {};
 };
 
-/// How far what is asked about may be from the numbers that are worked with, A's unit frame.
-struct ExactBounds {
-  double moved = 0;      ///< of any point, by rounding
-  double deviation = 0;  ///< of surfaces that are simplified
-};
-
 /// Volume and gradients of the overlap. Allocates, locks and throws nothing. The answer depends on
 /// the meshes and the map alone.
 class ExactQuery {
  public:
+  /// `moved`: no point of either surface is further from where it ought to be, A's unit frame.
   ExactQuery(const MeshTree& a, const MeshTree& b, const Similarity& a_from_b,
-             const Similarity& b_from_a, const ExactBounds& bounds, ExactScratch& scratch) noexcept
+             const Similarity& b_from_a, double moved, ExactScratch& scratch) noexcept
       : sides_{{a, scratch.a, false}, {b, scratch.b, true}},
         a_from_b_(a_from_b),
         b_from_a_(b_from_a),
-        bounds_(bounds),
+        moved_(moved),
         scratch_(scratch) {}
 
   /// `max_visits`: 0: no limit. `checked`: finds the gap too.
@@ -77,7 +72,7 @@ class ExactQuery {
   Side sides_[2];
   const Similarity& a_from_b_;
   const Similarity& b_from_a_;
-  const ExactBounds bounds_;
+  const double moved_;
   ExactScratch& scratch_;
   ExactOverlap out_;
   // Sums, the volume's six times and the moment's 24 times too large.

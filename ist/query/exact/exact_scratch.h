@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
@@ -21,8 +22,10 @@ struct alignas(64) PlacedTriangles {
   double vertex[3][kWidth];               ///< [axis] B's: rounded once after the motion
   float low[3][kWidth], high[3][kWidth];  ///< boxes, rounded outward; unused lanes empty
   float corner[3][3][kWidth];             ///< [corner][axis]
-  float normal[3][kWidth];                ///< unit length; 0 where a triangle has too little area
-  float slack[kWidth];  ///< how far normals may be off, radians
+  float normal[3][kWidth];                ///< product of two sides
+  float offset[kWidth];                   ///< of the plane along it
+  float length[kWidth];                   ///< of it, or more
+  float slack[kWidth];                    ///< how far it may be off
   float all_low[3], all_high[3];
   float size;  ///< no two points are further apart
   float reach;  ///< no coordinate is larger
@@ -79,38 +82,41 @@ struct BlockMarks {
   std::uint32_t count = 0;
 };
 
-/// Scratch memory of exact queries, a part of a workspace.
+/// Scratch memory of exact queries, a part of a workspace: all of it grows with its capacity.
 struct ExactScratch {
-  static constexpr std::uint32_t kMostBlocks = 1u << 20;    ///< of a mesh: 16 million triangles
-  static constexpr std::uint32_t kMostCrossed = 1u << 15;   ///< blocks of a mesh
-  static constexpr std::uint32_t kMostCrossings = 1u << 20; ///< pairs of triangles
-  static constexpr std::uint32_t kMostWaiting = 1u << 13;
-
-  explicit ExactScratch(const MemoryHooks& hooks)
-      : boxes_a(hooked<PlacedCache<PlacedBoxes, 256>>(hooks)),
+  ExactScratch(std::size_t capacity, const MemoryHooks& hooks)
+      : most_blocks(static_cast<std::uint32_t>(std::min<std::size_t>(capacity, 1u << 24))),
+        most_crossed(most_blocks / 128 + 8),
+        most_crossings(most_blocks / 8 + 8),
+        boxes_a(hooked<PlacedCache<PlacedBoxes, 256>>(hooks)),
         boxes_b(hooked<PlacedCache<PlacedBoxes, 256>>(hooks)),
         triangles_a(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
         triangles_b(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
+        pairs(hooked<TrianglePairs>(hooks)),
         waiting(hooked_array<BoxPair>(hooks, kMostWaiting)),
-        crossings(hooked_array<exact::Crossing>(hooks, kMostCrossings)),
-        keys(hooked_array<std::uint64_t>(hooks, kMostCrossings)),
-        order(hooked_array<std::uint32_t>(hooks, kMostCrossings)),
-        other_order(hooked_array<std::uint32_t>(hooks, kMostCrossings)),
-        flood(hooked_array<std::uint32_t>(hooks, kMostBlocks)) {
+        crossings(hooked_array<exact::Crossing>(hooks, most_crossings)),
+        keys(hooked_array<std::uint64_t>(hooks, most_crossings)),
+        order(hooked_array<std::uint32_t>(hooks, most_crossings)),
+        other_order(hooked_array<std::uint32_t>(hooks, most_crossings)),
+        flood(hooked_array<std::uint32_t>(hooks, most_blocks)) {
     for (BlockMarks* marks : {&a, &b}) {
-      marks->near = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
-      marks->crossed = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
-      marks->pierced = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
-      marks->inside = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
-      marks->shells = hooked_array<std::uint64_t>(hooks, kMostBlocks / 64);
-      marks->place = hooked_array<std::uint32_t>(hooks, kMostBlocks);
-      marks->blocks = hooked_array<CrossedBlock>(hooks, kMostCrossed);
+      for (HookedArray<std::uint64_t>* bits : {&marks->near, &marks->crossed, &marks->pierced,
+                                               &marks->inside, &marks->shells})
+        *bits = hooked_array<std::uint64_t>(hooks, most_blocks / 64 + 1);
+      marks->place = hooked_array<std::uint32_t>(hooks, most_blocks);
+      marks->blocks = hooked_array<CrossedBlock>(hooks, most_crossed);
     }
   }
 
+  /// Node pairs wait depth first: 255 others a level, and both trees are opened together.
+  static constexpr std::uint32_t kMostWaiting = 256 * 2 * kMaxLevels;
+
+  std::uint32_t most_blocks;     ///< of a mesh
+  std::uint32_t most_crossed;    ///< blocks of a mesh that cross the other
+  std::uint32_t most_crossings;  ///< pairs of triangles
   Hooked<PlacedCache<PlacedBoxes, 256>> boxes_a, boxes_b;
   Hooked<PlacedCache<PlacedTriangles, 256>> triangles_a, triangles_b;
-  TrianglePairs pairs;
+  Hooked<TrianglePairs> pairs;
   HookedArray<BoxPair> waiting;
   HookedArray<exact::Crossing> crossings;
   HookedArray<std::uint64_t> keys;

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <ist/query.h>
+
+#include "query/base/relative_pose.h"
+
+namespace ist {
+
+/// penetration() by Measure::exact. `pose` is that of the two.
+Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
+                              const PenetrationSettings& settings, const RelativePose& pose,
+                              Workspace& workspace) noexcept;
+
+/// All numbers NaN: an asset does not hold what the measure needs.
+Penetration not_held() noexcept;
+
+}  // namespace ist
