@@ -25,7 +25,7 @@ inline Asset baked(const TriangleMesh& mesh, const std::string& name, std::size_
                    bool field = false) {
   PackingSettings settings;
   settings.max_spheres = spheres;
-  settings.field.wanted = field;
+  settings.surface.wanted = field;
   return bake(close_mesh(mesh, name), settings);
 }
 

@@ -146,7 +146,7 @@ int main(int argc, char** argv) {
     for (const std::size_t n : counts) {
       PackingSettings settings;
       settings.max_spheres = n;
-      settings.field.wanted = false;
+      settings.surface.wanted = false;
       const Asset asset = bake(mesh, settings);
       double own = 0;
       for (const Builder& builder : kBuilders) {

@@ -59,7 +59,10 @@ GpuAssets::GpuAssets(std::span<const TreeView> assets, const GpuSettings& settin
     return parts.used();
   };
   for (const TreeView& asset : assets)
-    if (asset.empty()) throw Error("GPU: an asset of the batch is empty");
+    if (asset.sphere_count() == 0)
+      throw Error(asset.empty() ? "GPU: an asset of the batch is empty"
+                                : "GPU: an asset of the batch is a surface alone; bake it with "
+                                  "spheres");
   impl_->device = settings.device;
   impl_->size = assets.size();
   impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr));

@@ -179,7 +179,8 @@ struct CellBrick {
 };
 static_assert(sizeof(CellBrick) == 24);
 
-/// The solid's surface for queries: exact for a mesh of few triangles, else one near it.
+/// The solid's surface for queries, over floats: the mesh's own triangles or, where an error was
+/// asked for, fewer near them.
 struct FieldHeader {
   /// Unit frame, proven: this surface and the solid's lie within `error` of each other, and both
   /// solids agree on every point further from them.
@@ -265,15 +266,6 @@ struct MeshHeader {
 };
 static_assert(sizeof(MeshHeader) == 288);
 
-/// Why an asset holds no mesh, or what its mesh is.
-enum class MeshState : std::uint32_t {
-  none = 0,        ///< not asked for
-  own = 1,         ///< the triangles that came
-  united = 2,      ///< components that overlap were united
-  simplified = 3,  ///< fewer triangles, within MeshHeader::error
-  unresolved = 4,  ///< no mesh: it counts volume twice, and that could not be resolved
-};
-
 struct alignas(64) AssetHeader {
   char magic[8] = {};
   std::uint32_t format_major = kFormatMajor;
@@ -325,8 +317,8 @@ struct alignas(64) AssetHeader {
   std::uint32_t measured_poses = 0;  ///< of all partners; 0: nothing was measured
   std::uint32_t search_stop = 0;     ///< StopReason of the search for the target
 
-  std::uint64_t field = 0;       ///< offset of FieldHeader; 0: baked without one
-  double asked_field_error = 0;  ///< [u] 0: none was asked for
+  std::uint64_t field = 0;         ///< offset of FieldHeader; 0: baked without one
+  double asked_surface_error = 0;  ///< [u] of field and mesh; 0: the mesh's own triangles
 
   /// Unit frame, proven: the mesh in the solid's place and the solid lie within it
   /// (kFlagPolygonised).

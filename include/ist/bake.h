@@ -57,19 +57,31 @@ class Asset {
   TreeView view_;
 };
 
-/// Makes the asset of a closed mesh: inner spheres, matched spheres, cover radii, trees and the
-/// field.
+/// Makes the asset of a closed mesh: inner spheres, matched spheres, cover radii, trees, the mesh
+/// and the field.
 ///
 /// Same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number of
 /// threads.
 /// Cancelling during packing keeps what is packed; later it throws Error.
 ///
-/// A mesh that meets itself gets no field.
+/// A mesh that reaches far into itself gets no field, and one that counts volume twice is not kept
+/// (MeshState::unresolved).
 ///
 /// Throws Error if not one sphere fits, on settings out of range, and where floats cannot be as
-/// exact as the field's error asked for.
+/// exact as the surface's error asked for.
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
            const ProgressCallback& progress = {});
+
+/// Makes the asset of a surface alone: the mesh, mass and bounds, without spheres and field. It
+/// takes about as long as the import.
+///
+/// Measure::exact and mass_properties() are answered; what asks spheres answers
+/// QueryStatus::not_held.
+///
+/// `threads`: 0 = all cores. Throws Error where nothing is `wanted`, where the mesh counts volume
+/// twice, and as bake() does.
+Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings = {},
+                   unsigned threads = 0);
 
 /// How the mesh in the place of a solid is made, which calibration needs.
 struct PolygoniseSettings {

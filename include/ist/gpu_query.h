@@ -24,7 +24,8 @@ class GpuAssets {
   /// Copies the assets to the device of `settings`; they are not needed afterwards. Pairs name them
   /// by their place in the list.
   ///
-  /// Throws Error where the device cannot be used or has no memory left, or an asset is empty.
+  /// Throws Error where the device cannot be used or has no memory left, or an asset holds no
+  /// spheres.
   explicit GpuAssets(std::span<const TreeView> assets, const GpuSettings& settings = {});
   ~GpuAssets();
   GpuAssets(GpuAssets&&) noexcept;

@@ -46,7 +46,9 @@ enum {
   IST_WRONG_VERSION = -4, /* headers that this library does not serve */
   IST_NO_HANDLE = -5,     /* empty, released, or never made */
   IST_NO_MEMORY = -6,
-  IST_CANNOT_READ = -7,  /* the file; errno may say why */
+  IST_CANNOT_READ = -7, /* the file; errno may say why */
+  /* An asset holds no spheres, or not what the measure asks: all numbers of an answer are NaN. */
+  IST_NOT_HELD = -15,
   IST_NO_DURATION = -14, /* ist_impact_settings_t::duration is 0: no time is asked about */
   /* Bytes that are no asset. */
   IST_TOO_SHORT = -8,      /* fewer than their header says */

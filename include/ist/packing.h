@@ -30,12 +30,13 @@ enum class Device : std::uint32_t {
   cuda,  ///< an Error where gpu_available() is false
 };
 
-/// The surface that an asset holds so that queries of it can be exact.
-struct FieldSettings {
-  bool wanted = true;
-  /// [u] How far the surface may be from the mesh's. 0: the mesh's own triangles if they are at
-  /// most 30,000, else that many near them.
+/// The surface that an asset keeps: its mesh, which Measure::exact asks, and its field, by which
+/// the other measures are exact where spheres are too coarse.
+struct SurfaceSettings {
+  bool wanted = true;  ///< false: neither
+  /// [u] How far it may be from the mesh's: as few triangles as that allows. 0: all of the mesh's.
   double error = 0;
+  double share = 0;  ///< [0, 1) the same of the longest side of the mesh's bounds, if `error` is 0
 };
 
 /// What a packing may cost and how far it goes. The first limit met stops it.
@@ -54,7 +55,7 @@ struct PackingSettings {
   unsigned threads = 0;               ///< 0 = all cores; never changes the result
   Device device = Device::automatic;  ///< a Solid that is not a mesh is always packed on the CPU
   GpuSettings gpu = {};               ///< where `device` is a GPU
-  FieldSettings field = {};           ///< of an asset; packing alone makes none
+  SurfaceSettings surface = {};       ///< of an asset; packing alone makes none
 };
 
 /// Certified, non-overlapping spheres inside a solid, in insertion order.

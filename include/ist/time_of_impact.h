@@ -55,6 +55,8 @@ enum class ImpactStatus : std::uint32_t {
   /// The answer is all zero. One of: as QueryStatus::invalid_input; a motion with NaN or Inf; a
   /// duration that is negative, NaN or Inf; a motion that leads 1e60 sizes away.
   invalid_input = 5,
+  /// An asset holds no spheres (QueryStatus::not_held). All numbers of the answer are NaN.
+  not_held = 6,
 };
 
 struct ImpactSettings {

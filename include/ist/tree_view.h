@@ -40,6 +40,15 @@ enum class TrialPartner : std::uint32_t {
 };
 inline constexpr std::uint32_t kTrialPartners = 6;
 
+/// What the mesh of an asset is, or why it holds none.
+enum class MeshState : std::uint32_t {
+  none = 0,        ///< none was asked for
+  own = 1,         ///< all triangles of the mesh that was baked
+  united = 2,      ///< components that overlap were united
+  simplified = 3,  ///< other triangles near the solid: TreeView::mesh_error() tells how near
+  unresolved = 4,  ///< no mesh: it counts volume twice (TreeView::counted_twice)
+};
+
 /// By how much penetration volumes are wrong, measured by bake_to_error() on trial poses: by class
 /// of overlap of two copies of the solid, and near one overlap of other partners too. Overlaps are
 /// shares of the smaller copy's volume, errors are shares of the overlap's.
@@ -82,6 +91,17 @@ class TreeView {
   /// [u] that surface and the solid's lie within this of each other; 0 without a field.
   double field_error() const noexcept;
   std::uint32_t field_triangles() const noexcept;  ///< of that surface; 0 without a field
+  /// The asset holds the solid's mesh, which Measure::exact asks. Without spheres it is a surface
+  /// alone: what asks spheres answers QueryStatus::not_held.
+  bool has_mesh() const noexcept;
+  std::uint32_t mesh_triangles() const noexcept;  ///< 0 without a mesh
+  /// [u] the mesh's surface and the solid's lie within this of each other, its rounding included;
+  /// 0 without a mesh.
+  double mesh_error() const noexcept;
+  MeshState mesh_state() const noexcept;  ///< none for an empty view
+  /// [u³] volume that the mesh as it came counts more than once, or below zero; 0 of a mesh that
+  /// winds around every point of its solid once. An integral to about 1e-9 of the volume.
+  double counted_twice() const noexcept;
   /// No poses for an asset of bake(), which predicts nothing, and for an empty view.
   PredictedErrors predicted_errors() const noexcept;
 

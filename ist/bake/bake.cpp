@@ -18,7 +18,6 @@
 #include "bake/calibrate/calibration.h"
 #include "bake/cluster/tree_builder.h"
 #include "bake/cover/cover.h"
-#include "bake/field/field.h"
 #include "bake/mass_and_bounds.h"
 #include "packing/base/packing_settings.h"
 #include "stage/aside.h"
@@ -30,14 +29,8 @@ namespace {
 
 AssetHeader describe_bake(const ClosedMesh& mesh, const MeshSolid& solid,
                           const PackingSettings& settings, const SpherePacking& packing) {
-  AssetHeader header;
-  header.mesh_hash = solid.hash();
-  for (int k = 0; k < 3; ++k) header.centre[k] = packing.frame.centre[k];
-  header.exponent = packing.frame.exponent;
-  header.flags = (mesh.report.repaired ? kFlagRepaired : 0) |
-                 (mesh.report.wrapped ? kFlagWrapped : 0) |
-                 (packing.below_float_noise ? kFlagBelowNoise : 0);
-  describe_mass(solid.unit_moments(), header);
+  AssetHeader header = describe_solid(mesh, solid);
+  if (packing.below_float_noise) header.flags |= kFlagBelowNoise;
   header.coverage = std::min(packing.coverage, 1.0);
   header.asked_spheres = settings.max_spheres;
   header.asked_coverage = settings.target_coverage;
@@ -49,7 +42,6 @@ AssetHeader describe_bake(const ClosedMesh& mesh, const MeshSolid& solid,
   header.asked_grid_resolution = settings.grids.resolution;
   header.asked_grid_refinements = settings.grids.refinements;
   header.asked_grid_rounds = settings.grids.rounds_per_level;
-  header.asked_field_error = settings.field.wanted ? settings.field.error : 0;
   header.stop_reason = static_cast<std::uint32_t>(packing.stop);
   header.kept_ratio_worst = packing.kept_ratio_worst;
   header.kept_ratio_median = packing.kept_ratio_median;
@@ -205,28 +197,28 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   field.start();
   if (levels) levels->finish([&] { stage.step(count, 0); });
   host.finish();
-  arrays.field = field.wait([&] { stage.step(count, 0.5); });
+  keep(field.wait([&] { stage.step(count, 0.5); }), arrays);
   stage.step(count, 1);
   return arrays;
 }
 
-void SolidField::start() {
-  if (made_.valid()) return;
-  made_ = do_aside(threads_, [this]() -> std::shared_ptr<const FieldArrays> {
-            if (!settings_.wanted) return nullptr;
-            try {
-              auto built = build_field(solid_, settings_.error / solid_.frame().scale(), stop_);
-              return built ? std::make_shared<const FieldArrays>(*std::move(built)) : nullptr;
-            } catch (const WorkStop::Stopped&) {
-              return nullptr;
-            }
-          }).share();
+AssetHeader describe_solid(const ClosedMesh& mesh, const MeshSolid& solid) {
+  AssetHeader header;
+  header.mesh_hash = solid.hash();
+  for (int k = 0; k < 3; ++k) header.centre[k] = solid.frame().centre[k];
+  header.exponent = solid.frame().exponent;
+  header.flags =
+      (mesh.report.repaired ? kFlagRepaired : 0) | (mesh.report.wrapped ? kFlagWrapped : 0);
+  describe_mass(solid.unit_moments(), header);
+  return header;
 }
 
-std::shared_ptr<const FieldArrays> SolidField::wait(const std::function<void()>& meanwhile) {
-  start();
-  wait_for(made_, meanwhile);
-  return made_.get();
+void keep(const KeptSurface& surface, AssetArrays& arrays) {
+  arrays.field = surface.field;
+  arrays.mesh = surface.mesh;
+  arrays.header.mesh_state = static_cast<std::uint32_t>(surface.state);
+  arrays.header.counted_twice = surface.counted_twice;
+  arrays.header.asked_surface_error = surface.asked_error;
 }
 
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
@@ -242,8 +234,25 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   return thread_arena(settings.threads).execute([&] {
     const MeshSolid solid(mesh);
     const auto backend = make_backend(solid, {settings.device, settings.gpu});
-    SolidField field(solid, settings.field, settings.threads);
+    SolidField field(solid, settings.surface, settings.threads);
     return bake_solid(mesh, solid, field, *backend, settings, progress);
+  });
+}
+
+Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings, unsigned threads) {
+  packing::check_settings(settings);
+  if (!settings.wanted) throw Error(mesh.name + ": a surface alone without a surface is nothing");
+  return thread_arena(threads).execute([&] {
+    const MeshSolid solid(mesh);
+    AssetArrays arrays;
+    arrays.header = describe_solid(mesh, solid);
+    describe_bounds(solid, 0, arrays.header);
+    keep(keep_surface(solid, settings, false), arrays);
+    if (!arrays.mesh)
+      throw Error(mesh.name +
+                  ": the mesh counts volume twice, so that its surface alone is no solid; bake it "
+                  "with spheres, or wrap it");
+    return Asset(asset_bytes(arrays), mesh.name);
   });
 }
 

@@ -35,7 +35,7 @@ Asset bake_mesh_of(const MeshSolid& solid, const PackingSettings& settings, cons
   ClosedMesh described;  // the solid holds its geometry
   described.name = name;
   const auto backend = make_backend(solid, {settings.device, settings.gpu});
-  SolidField field(solid, settings.field, settings.threads);
+  SolidField field(solid, settings.surface, settings.threads);
   return bake_solid(described, solid, field, *backend, settings, progress);
 }
 
@@ -51,14 +51,20 @@ Asset bake_field(const Solid& solid, const PackingSettings& settings,
   const ClosedMesh mesh = close_mesh(std::move(made.mesh), meshing.name);
   const MeshSolid mesh_solid(mesh);
   const auto backend = make_polygonised_backend(solid, mesh_solid, made.error);
-  SolidField field(mesh_solid, settings.field, settings.threads);
+  SolidField field(mesh_solid, settings.surface, settings.threads);
   AssetArrays arrays = bake_arrays(mesh, mesh_solid, field, *backend, settings, progress);
   const double scale = mesh_solid.frame().scale();
+  // Field and mesh are the mesh's, and that is near the solid.
   if (arrays.field != nullptr) {
-    // The field is the mesh's, and the mesh is near the solid.
     FieldArrays of_solid = *arrays.field;
     of_solid.header.error += made.error / scale;
     arrays.field = std::make_shared<const FieldArrays>(std::move(of_solid));
+  }
+  if (arrays.mesh != nullptr) {
+    MeshArrays of_solid = *arrays.mesh;
+    of_solid.header.error += made.error / scale;
+    arrays.mesh = std::make_shared<const MeshArrays>(std::move(of_solid));
+    arrays.header.mesh_state = static_cast<std::uint32_t>(MeshState::simplified);
   }
   const double off = std::abs(mesh_solid.volume() - solid.volume()) + solid.volume_error();
   arrays.header.flags |= kFlagPolygonised;

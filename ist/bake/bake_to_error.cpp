@@ -115,7 +115,7 @@ class TargetBake {
         most_(settings.max_spheres == 0 ? kMost : settings.max_spheres),
         watch_(progress, settings.time_limit),
         solid_(mesh),
-        field_(solid_, settings.field, settings.threads, settings.time_limit),
+        field_(solid_, settings.surface, settings.threads, settings.time_limit),
         backend_(make_backend(solid_, {settings.device, settings.gpu})) {}
 
   TargetedAsset run() {

@@ -5,6 +5,7 @@
 #include <ist/query.h>
 
 #include "query/asset/sphere_tree.h"
+#include "query/base/no_answer.h"
 #include "query/contact/contact_bins.h"
 #include "query/contact/write_patches.h"
 #include "query/descent/descent.h"
@@ -123,6 +124,7 @@ class PairPatches {
 ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept {
+  if (lack_spheres(a, b)) return not_held<ContactPatches>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) {
     ContactPatches refused;

@@ -4,6 +4,7 @@
 #include <ist/overlap.h>
 
 #include "query/base/batch.h"
+#include "query/base/no_answer.h"
 #include "query/contact/write_patches.h"
 #include "query/field/field_descent.h"
 #include "query/field/gap_search.h"
@@ -64,12 +65,14 @@ Penetration penetrate(const PlacedField& a, const PlacedTree& b, const SphereTre
 
 Penetration penetration(const PlacedField& a, const PlacedTree& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept {
+  if (lack_spheres(a, b)) return not_held<Penetration>();
   const SphereTree tree = sphere_tree(b.tree, settings.measure);
   return penetrate(a, b, tree, limits_of(settings), workspace, nullptr);
 }
 
 Separation separation(const PlacedField& a, const PlacedTree& b, const SeparationSettings& settings,
                       Workspace& workspace) noexcept {
+  if (lack_spheres(a, b)) return not_held<Separation>();
   const std::optional<RelativePose> pose = pose_of(a, b);
   if (!pose || workspace.impl() == nullptr) return refused<Separation>();
   const SphereTree tree = sphere_tree(b.tree, Measure::inner);
@@ -84,6 +87,7 @@ Separation separation(const PlacedField& a, const PlacedTree& b, const Separatio
 }
 
 Overlapping overlap(const PlacedField& a, const PlacedTree& b, Workspace& workspace) noexcept {
+  if (lack_spheres(a, b)) return Overlapping::unknown;
   const std::optional<RelativePose> pose = pose_of(a, b);
   if (!pose || workspace.impl() == nullptr) return Overlapping::unknown;
   const SphereTree tree = sphere_tree(b.tree, Measure::inner);
@@ -106,6 +110,7 @@ PenetrationAndSeparation query(const PlacedField& a, const PlacedTree& b,
 ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept {
+  if (lack_spheres(a, b)) return not_held<ContactPatches>();
   ContactPatches result;
   if (workspace.impl() == nullptr) {
     result.penetration = refused<Penetration>();

@@ -6,6 +6,7 @@
 
 #include <ist/asset_layout.h>
 #include "query/asset/sphere_tree.h"
+#include "query/base/no_answer.h"
 #include "query/base/relative_pose.h"
 
 namespace ist {
@@ -113,6 +114,7 @@ class LensSearch {
 
 OverlapLenses overlap_lenses(const PlacedTree& a, const PlacedTree& b, const LensSettings& settings,
                              std::span<OverlapLens> lenses) noexcept {
+  if (lack_spheres(a, b)) return {QueryStatus::not_held, 0, 0};
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose) return {QueryStatus::invalid_input, 0, 0};
   const auto tree_a = tree_of(a.tree, settings.measure, settings.detail_a);

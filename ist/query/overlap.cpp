@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "query/asset/sphere_tree.h"
+#include "query/base/no_answer.h"
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
 #include "query/descent/open_runs.h"
@@ -109,6 +110,7 @@ class MeetingSearch {
 }  // namespace
 
 Overlapping overlap(const PlacedTree& a, const PlacedTree& b, Workspace& workspace) noexcept {
+  if (lack_spheres(a, b)) return Overlapping::unknown;
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return Overlapping::unknown;
   const SphereTree tree_a = sphere_tree(a.tree, Measure::inner);

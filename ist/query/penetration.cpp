@@ -1,5 +1,6 @@
 #include <ist/query.h>
 
+#include "query/base/no_answer.h"
 #include "query/detail/coincident.h"
 #include "query/detail/detail_blend.h"
 #include "query/exact/exact_penetration.h"
@@ -9,6 +10,7 @@ namespace ist {
 
 Penetration penetration(const PlacedTree& a, const PlacedTree& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept {
+  if (lack_spheres(a, b)) return not_held<Penetration>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) {
     Penetration refused;

@@ -7,6 +7,7 @@
 
 #include "query/asset/sphere_tree.h"
 #include "query/base/budget.h"
+#include "query/base/no_answer.h"
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
 #include "query/descent/workspace.h"
@@ -165,6 +166,7 @@ class GapDescent {
 
 Separation separation(const PlacedTree& a, const PlacedTree& b, const SeparationSettings& settings,
                       Workspace& workspace) noexcept {
+  if (lack_spheres(a, b)) return not_held<Separation>();
   Separation result;
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) {

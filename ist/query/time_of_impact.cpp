@@ -1,5 +1,6 @@
 #include <ist/time_of_impact.h>
 
+#include "query/base/no_answer.h"
 #include "query/field/with_shape.h"
 #include "query/impact/field_search.h"
 #include "query/impact/pair_search.h"
@@ -46,6 +47,7 @@ bool hold(const ImpactSide& a, const ImpactSide& b, const RelativePose& pose) no
 
 TimeOfImpact time_of_impact(const PlacedTree& a, const PlacedTree& b, const Motions& motions,
                             const ImpactSettings& settings, Workspace& workspace) noexcept {
+  if (lack_spheres(a, b)) return not_held<TimeOfImpact>();
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
   if (!frame || workspace.impl() == nullptr) return refused();
   const ImpactSide side_a(a.tree), side_b(b.tree);
@@ -61,6 +63,7 @@ TimeOfImpact time_of_impact(const PlacedTree& a, const PlacedTree& b, const Moti
 
 TimeOfImpact time_of_impact(const PlacedField& a, const PlacedTree& b, const Motions& motions,
                             const ImpactSettings& settings, Workspace& workspace) noexcept {
+  if (lack_spheres(a, b)) return not_held<TimeOfImpact>();
   if (const MeshField* const mesh = std::get_if<MeshField>(&a.field)) {
     if (!mesh->tree.has_field()) return refused();
     return time_of_impact(PlacedTree{mesh->tree, a.pose, a.scale}, b, motions, settings, workspace);

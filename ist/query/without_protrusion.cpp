@@ -61,7 +61,7 @@ Left left_at(double depth, double flat) {
 
 Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
                                const PlacedTree& b) noexcept {
-  if (a.tree.empty() || b.tree.empty() || !(whole.volume > 0)) return whole;
+  if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0 || !(whole.volume > 0)) return whole;
   const double area = whole.translation_gradient.norm();
   const double skin = skin_of(a, b);
   if (!(whole.volume < kDeep * (skin * area))) return whole;
@@ -77,7 +77,9 @@ Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
 
 void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, const PlacedTree& b,
                         const ContactSettings& settings) noexcept {
-  if (a.tree.empty() || b.tree.empty() || settings.measure == Measure::inner) return;
+  if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0 ||
+      settings.measure == Measure::inner)
+    return;
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose) return;
   // What meets a surface is exact.

@@ -18,6 +18,7 @@ class QueryStatus(enum.IntEnum):
     ok = 0
     budget_exhausted = 1  # a limit stopped it: bounds still hold
     invalid_input = 2  # the row is all zero
+    not_held = 3  # an asset does not hold what is asked: the row is all NaN
 
 
 class Overlapping(enum.IntEnum):
@@ -37,6 +38,7 @@ class ImpactStatus(enum.IntEnum):
     overlapping = 3
     budget_exhausted = 4
     invalid_input = 5
+    not_held = 6
 
 
 __all__ = sorted(

@@ -30,6 +30,7 @@ class QueryStatus(enum.IntEnum):
     ok = 0
     budget_exhausted = 1
     invalid_input = 2
+    not_held = 3
 
 class Overlapping(enum.IntEnum):
     no = 0
@@ -43,6 +44,7 @@ class ImpactStatus(enum.IntEnum):
     overlapping = 3
     budget_exhausted = 4
     invalid_input = 5
+    not_held = 6
 
 @final
 class Progress:
@@ -206,18 +208,29 @@ class Asset:
     def has_field(self) -> bool: ...
     @property
     def field_error(self) -> float: ...  # [u]
+    @property
+    def mesh_triangles(self) -> int: ...  # 0: it holds no mesh
+    @property
+    def mesh_error(self) -> float: ...  # [u]
+    @property
+    def mesh_state(self) -> Literal["none", "own", "united", "simplified", "unresolved"]: ...
+    @property
+    def counted_twice(self) -> float: ...  # [u³]
 
 def bake(
     mesh: ClosedMesh, *, max_spheres: int = 10000, target_coverage: float = 1.0,
     min_radius: float = 0.0, time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded",
-    seed: int = 0, threads: int = 0, device: _Device = "auto", field: bool = True,
-    field_error: float = 0.0, progress: Callable[[Progress], Any] | None = None,
+    seed: int = 0, threads: int = 0, device: _Device = "auto", surface: str | float = "all",
+    progress: Callable[[Progress], Any] | None = None,
+) -> Asset: ...
+def bake_surface(
+    mesh: ClosedMesh, *, surface: str | float = "all", threads: int = 0,
 ) -> Asset: ...
 def bake_to_error(
     mesh: ClosedMesh, relative_error: float = 0.01, at_overlap: float = 0.001, *,
     max_spheres: int = 0, target_coverage: float = 1.0, min_radius: float = 0.0,
     time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded", seed: int = 0,
-    threads: int = 0, device: _Device = "auto", field: bool = True, field_error: float = 0.0,
+    threads: int = 0, device: _Device = "auto", surface: str | float = "all",
     progress: Callable[[Progress], Any] | None = None,
 ) -> TargetedAsset: ...
 def check(asset: Asset, mesh: ClosedMesh, *, threads: int = 0) -> list[Invariant]: ...

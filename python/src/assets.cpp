@@ -14,6 +14,7 @@
 #include "arrays.h"
 #include "module.h"
 #include "offline.h"
+#include "settings/bake_settings.h"
 
 namespace ist::python {
 namespace {
@@ -72,11 +73,19 @@ PlacedTree placed(const Asset& asset, const py::object& pose, double scale) {
   return tree;
 }
 
+/// What is kept of the mesh, as the command line takes it; a number is as good as its text.
+SurfaceSettings surface_settings(const py::object& given) {
+  const std::optional<SurfaceSettings> surface = parse_surface(py::str(given));
+  if (!surface)
+    throw Error("surface: '" + std::string(py::str(given)) + "' is none of " + kSurfaceMeaning);
+  return *surface;
+}
+
 /// Keywords that all bakes share.
 PackingSettings packing_settings(std::size_t max_spheres, double target_coverage, double min_radius,
                                  double time_limit, double epsilon, const std::string& grid,
                                  std::uint64_t seed, unsigned threads, const std::string& device,
-                                 bool field, double field_error) {
+                                 const py::object& surface) {
   PackingSettings settings;
   settings.max_spheres = max_spheres;
   settings.target_coverage = target_coverage;
@@ -87,7 +96,7 @@ PackingSettings packing_settings(std::size_t max_spheres, double target_coverage
   settings.seed = seed;
   settings.threads = threads;
   settings.device = named(device, "device", kDevices);
-  settings.field = {field, field_error};
+  settings.surface = surface_settings(surface);
   return settings;
 }
 
@@ -101,8 +110,8 @@ grid: 'banded', 'uniform', 'explicit', 'implicit' or 'hybrid'.
 seed: breaks ties.
 threads: 0: all cores; never changes the result.
 device: 'auto', 'cpu' or 'cuda'; never changes the result.
-field: keep the surface, so that queries can be exact.
-field_error: [u] how far it may be off; 0: up to 30,000 of the mesh's own triangles.
+surface: what is kept of the mesh for exact queries: 'all' of its triangles, 'none', or as few as
+    stay within a length of it: a number [u], or a share of its longest side as '0.1%'.
 progress: called with a Progress on this thread; False cancels: packing then keeps what is packed,
     later stages raise Error. What it raises is raised.
 
@@ -155,11 +164,11 @@ void add_bakes(py::module_& module) {
       "bake",
       [](const SharedMesh& mesh, std::size_t max_spheres, double target_coverage, double min_radius,
          double time_limit, double epsilon, const std::string& grid, std::uint64_t seed,
-         unsigned threads, const std::string& device, bool field, double field_error,
+         unsigned threads, const std::string& device, const py::object& surface,
          const py::object& progress) {
         const PackingSettings settings =
             packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
-                             seed, threads, device, field, field_error);
+                             seed, threads, device, surface);
         return offline(
             [mesh, settings](const ProgressCallback& callback) {
               return shared(bake(*mesh, settings, callback));
@@ -169,8 +178,8 @@ void add_bakes(py::module_& module) {
       py::arg("mesh"), py::kw_only(), py::arg("max_spheres") = PackingSettings().max_spheres,
       py::arg("target_coverage") = 1.0, py::arg("min_radius") = 0.0, py::arg("time_limit") = 0.0,
       py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
-      py::arg("threads") = 0, py::arg("device") = "auto", py::arg("field") = true,
-      py::arg("field_error") = 0.0, py::arg("progress") = py::none(),
+      py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
+      py::arg("progress") = py::none(),
       (std::string("Makes the asset of a closed mesh. Same mesh and settings, same bytes, on any "
                    "machine.\n") +
        kSettingsDoc)
@@ -189,10 +198,10 @@ void add_bakes(py::module_& module) {
       [](const SharedMesh& mesh, double relative_error, double at_overlap, std::size_t max_spheres,
          double target_coverage, double min_radius, double time_limit, double epsilon,
          const std::string& grid, std::uint64_t seed, unsigned threads, const std::string& device,
-         bool field, double field_error, const py::object& progress) {
+         const py::object& surface, const py::object& progress) {
         const PackingSettings settings =
             packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
-                             seed, threads, device, field, field_error);
+                             seed, threads, device, surface);
         return offline(
             [mesh, settings,
              target = ErrorTarget{relative_error, at_overlap}](const ProgressCallback& callback) {
@@ -210,14 +219,26 @@ void add_bakes(py::module_& module) {
       py::arg("at_overlap") = ErrorTarget().at_overlap, py::kw_only(), py::arg("max_spheres") = 0,
       py::arg("target_coverage") = 1.0, py::arg("min_radius") = 0.0, py::arg("time_limit") = 0.0,
       py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
-      py::arg("threads") = 0, py::arg("device") = "auto", py::arg("field") = true,
-      py::arg("field_error") = 0.0, py::arg("progress") = py::none(),
+      py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
+      py::arg("progress") = py::none(),
       (std::string("bake() with about as few spheres as an error needs.\n\n"
                    "relative_error: (0, 1) median over random poses, for every partner.\n"
                    "at_overlap: [1e-4, 0.5] of the solid's volume.\n"
                    "max_spheres: 0: 200,000. The other settings are those of bake():\n") +
        kSettingsDoc)
           .c_str());
+  module.def(
+      "bake_surface",
+      [](const SharedMesh& mesh, const py::object& surface, unsigned threads) {
+        return offline(
+            [mesh, settings = surface_settings(surface), threads](const ProgressCallback&) {
+              return shared(bake_surface(*mesh, settings, threads));
+            });
+      },
+      py::arg("mesh"), py::kw_only(), py::arg("surface") = "all", py::arg("threads") = 0,
+      "Makes the asset of a surface alone: the mesh, mass and bounds, without spheres, for exact "
+      "queries.\n\nWhat asks spheres answers QueryStatus.not_held. The settings are those of "
+      "bake().\nRaises Error where the mesh counts volume twice.");
   module.def(
       "check",
       [](const SharedAsset& asset, const SharedMesh& mesh, unsigned threads) {
@@ -309,7 +330,19 @@ void add_assets(py::module_& module) {
           "It holds the solid's surface.")
       .def_property_readonly(
           "field_error", [](const Asset& self) { return self.view().field_error(); },
-          "[u] that surface and the solid's lie within this of each other.");
+          "[u] that surface and the solid's lie within this of each other.")
+      .def_property_readonly(
+          "mesh_triangles", [](const Asset& self) { return self.view().mesh_triangles(); },
+          "Of the mesh that exact queries ask; 0: it holds none.")
+      .def_property_readonly(
+          "mesh_error", [](const Asset& self) { return self.view().mesh_error(); },
+          "[u] the mesh's surface and the solid's lie within this of each other.")
+      .def_property_readonly(
+          "mesh_state", [](const Asset& self) { return app::name_of(self.view().mesh_state()); },
+          "'own', 'united', 'simplified', 'none', or 'unresolved': it counts volume twice.")
+      .def_property_readonly(
+          "counted_twice", [](const Asset& self) { return self.view().counted_twice(); },
+          "[u³] that the mesh as it came counts more than once.");
   add_bakes(module);
 }
 

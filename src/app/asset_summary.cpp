@@ -76,9 +76,30 @@ const char* why_missed(StopReason stop) {
   }
 }
 
-/// The file ends with the field.
+/// The file ends with field and mesh.
 std::uint64_t field_bytes(const AssetHeader& h) {
-  return h.field == 0 ? 0 : h.file_bytes - h.field;
+  return h.field == 0 ? 0 : (h.mesh != 0 ? h.mesh : h.file_bytes) - h.field;
+}
+std::uint64_t mesh_bytes(const AssetHeader& h) { return h.mesh == 0 ? 0 : h.file_bytes - h.mesh; }
+
+nlohmann::ordered_json mesh_json(const TreeView& tree) {
+  return {{"state", name_of(tree.mesh_state())},
+          {"triangles", tree.mesh_triangles()},
+          {"bytes", mesh_bytes(tree.header())},
+          {"error", tree.has_mesh() ? nlohmann::ordered_json(tree.mesh_error())
+                                    : nlohmann::ordered_json(nullptr)},
+          {"counted_twice", tree.counted_twice()}};
+}
+
+std::string describe_mesh(const TreeView& tree) {
+  if (!tree.has_mesh())
+    return tree.mesh_state() == MeshState::unresolved ? "none: it counts volume twice" : "none";
+  const char* const whose = tree.mesh_state() == MeshState::own      ? "all of the mesh's"
+                            : tree.mesh_state() == MeshState::united ? "of the mesh's united parts"
+                                                                     : "near the solid";
+  return fmt::format("{} triangles, {}, within {:.4g} u of its surface, {} bytes",
+                     grouped(tree.mesh_triangles()), whose, tree.mesh_error(),
+                     grouped(mesh_bytes(tree.header())));
 }
 
 nlohmann::ordered_json field_json(const TreeView& tree) {
@@ -132,19 +153,24 @@ std::string describe_asset(const TreeView& tree) {
   const auto line = [&](const char* name, const std::string& value) {
     text += fmt::format("  {:<12} {}\n", name, value);
   };
+  const bool alone = h.sphere_count == 0;
   line("spheres",
-       fmt::format("{}, {:.3f} % of the volume (stopped by: {})", grouped(h.sphere_count),
-                   100 * h.coverage, name_of(static_cast<StopReason>(h.stop_reason))));
+       alone ? "none: a surface alone, which answers exact queries only"
+             : fmt::format("{}, {:.3f} % of the volume (stopped by: {})", grouped(h.sphere_count),
+                           100 * h.coverage, name_of(static_cast<StopReason>(h.stop_reason))));
   if (const std::string coarse = describe_coarseness(tree); !coarse.empty())
     line("warning", coarse);
+  if (const std::string twice = describe_counted_twice(tree); !twice.empty())
+    line("warning", twice);
   const auto grid = static_cast<GridMode>(h.asked_grid);
-  line("greedy", keeps_bound(grid)
-                     ? fmt::format("radius at least {:.3f} of the largest that would fit, median "
-                                   "{:.3f}",
-                                   h.kept_ratio_worst, h.kept_ratio_median)
-                     : fmt::format("no promise: grid {} keeps no bound on the largest that would "
-                                   "fit",
-                                   name_of(grid)));
+  if (!alone)
+    line("greedy", keeps_bound(grid)
+                       ? fmt::format("radius at least {:.3f} of the largest that would fit, median "
+                                     "{:.3f}",
+                                     h.kept_ratio_worst, h.kept_ratio_median)
+                       : fmt::format("no promise: grid {} keeps no bound on the largest that would "
+                                     "fit",
+                                     name_of(grid)));
   const MassProperties mass = mass_properties(tree);
   line("volume", fmt::format("{:.9g} ± {:.1g} u³", mass.volume, mass.volume_error));
   line("mass centre",
@@ -159,8 +185,9 @@ std::string describe_asset(const TreeView& tree) {
   line("ball", fmt::format("radius {:.9g} u about {} u", held.radius, text_of(held.centre)));
   line("frame", fmt::format("centre ({:.9g}, {:.9g}, {:.9g}) u, scale 2^{}", h.centre[0],
                             h.centre[1], h.centre[2], h.exponent));
-  line("protrusion", fmt::format("{:.4g} u: no matched sphere sticks further out of the solid",
-                                 h.protrusion * scale));
+  if (!alone)
+    line("protrusion", fmt::format("{:.4g} u: no matched sphere sticks further out of the solid",
+                                   h.protrusion * scale));
   for (std::uint32_t i = 1; i <= h.detail_count; ++i) {
     const DetailLevel& detail = at<DetailLevel>(h, h.details)[i - 1];
     line("detail",
@@ -172,11 +199,14 @@ std::string describe_asset(const TreeView& tree) {
                                   grouped(tree.field_triangles()), tree.field_error(),
                                   grouped(field_bytes(h)))
                     : "none");
-  line("asked",
-       fmt::format("{} spheres, coverage {:g}, min radius {:g} u, epsilon {:g}, grid {}, "
-                   "seed {}",
-                   h.asked_spheres == 0 ? "unlimited" : grouped(h.asked_spheres), h.asked_coverage,
-                   h.asked_min_radius, h.asked_epsilon, name_of(grid), h.asked_seed));
+  line("mesh", describe_mesh(tree));
+  if (!alone)
+    line(
+        "asked",
+        fmt::format("{} spheres, coverage {:g}, min radius {:g} u, epsilon {:g}, grid {}, "
+                    "seed {}",
+                    h.asked_spheres == 0 ? "unlimited" : grouped(h.asked_spheres), h.asked_coverage,
+                    h.asked_min_radius, h.asked_epsilon, name_of(grid), h.asked_seed));
   if (h.predicted_poses > 0) {
     std::string errors;
     for (std::uint32_t k = 0; k < kOverlapClasses; ++k)
@@ -236,7 +266,7 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
         {"grid_refinements", h.asked_grid_refinements},
         {"grid_rounds", h.asked_grid_rounds},
         {"seed", h.asked_seed},
-        {"field_error", h.asked_field_error},
+        {"surface_error", h.asked_surface_error},
         {"error", h.asked_error},
         {"at_overlap", h.asked_at_overlap}}},
       {"predicted", predicted_json(h)},
@@ -244,10 +274,20 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
       {"matched_tree", tree_json(h.matched_tree, scale)},
       {"details", details_json(h, scale)},
       {"field", field_json(tree)},
+      {"kept_mesh", mesh_json(tree)},
   };
   json.update(mass_json(tree));
   json.update(target_json(tree));
   return json;
+}
+
+std::string describe_counted_twice(const TreeView& tree) {
+  if (tree.mesh_state() != MeshState::unresolved) return "";
+  return fmt::format(
+      "the mesh counts {:.3g} u³, {:.2g} % of the volume, more than once: it is not kept, and "
+      "exact "
+      "queries are not answered",
+      tree.counted_twice(), 100 * tree.counted_twice() / tree.volume());
 }
 
 std::string describe_target(const TreeView& tree) {

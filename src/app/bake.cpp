@@ -44,10 +44,12 @@ struct Baked {
   std::vector<PartnerError> partners = {};
 };
 
-Baked bake_now(const ClosedMesh& mesh, const ErrorTarget& target, const PackingSettings& settings,
+Baked bake_now(const ClosedMesh& mesh, const BakeSettings& asked,
                const ProgressCallback& progress) {
-  if (!(target.relative_error > 0)) return {bake(mesh, settings, progress)};
-  TargetedAsset found = bake_to_error(mesh, target, settings, progress);
+  const PackingSettings& settings = asked.packing;
+  if (asked.surface_only) return {bake_surface(mesh, settings.surface, settings.threads)};
+  if (!(asked.target.relative_error > 0)) return {bake(mesh, settings, progress)};
+  TargetedAsset found = bake_to_error(mesh, asked.target, settings, progress);
   Baked baked = {std::move(found.asset)};
   for (const PartnerError& partner : found.partners)
     if (partner.poses > 0) baked.partners.push_back(partner);
@@ -70,8 +72,7 @@ nlohmann::ordered_json partners_json(const std::vector<PartnerError>& partners) 
   return list;
 }
 
-Baked bake_interruptibly(const ClosedMesh& mesh, const ErrorTarget& target,
-                         const PackingSettings& settings, bool quiet) {
+Baked bake_interruptibly(const ClosedMesh& mesh, const BakeSettings& settings, bool quiet) {
   constexpr double kPatience = 0.15;  // [s] some steps take seconds, and leave nothing half done
   const InterruptGuard guard(kPatience);
   ProgressLine line(quiet);
@@ -80,7 +81,7 @@ Baked bake_interruptibly(const ClosedMesh& mesh, const ErrorTarget& target,
       line.show(progress);
       return !interrupted();
     };
-    Baked baked = bake_now(mesh, target, settings, show);
+    Baked baked = bake_now(mesh, settings, show);
     exit_if_interrupted();
     return baked;
   } catch (const Error&) {
@@ -91,21 +92,20 @@ Baked bake_interruptibly(const ClosedMesh& mesh, const ErrorTarget& target,
 
 void run_bake(const BakeOptions& options) {
   if (options.quiet) spdlog::set_level(spdlog::level::err);
-  const ErrorTarget& target = options.asked.settings.target;
-  PackingSettings settings = options.asked.settings.packing;
-  settings.threads = options.threads;
+  BakeSettings settings = options.asked.settings;
+  settings.packing.threads = options.threads;
   const bool robot = is_robot_file(options.mesh);
   if (!robot) require_output(options.output, options.mesh, "the asset");
-  settings.device = usable_device(options.device);
-  announce_device(settings.device);
+  settings.packing.device = usable_device(options.device);
+  if (!settings.surface_only) announce_device(settings.packing.device);
   if (robot)
-    return bake_robot({options.mesh, options.output, settings, target, options.robot,
-                       options.asked.settings.mesh, options.json, options.quiet});
+    return bake_robot(
+        {options.mesh, options.output, settings, options.robot, options.json, options.quiet});
 
   const auto start = std::chrono::steady_clock::now();
-  const auto [declared, mesh] = read_mesh_aloud(options.mesh, options.asked.settings.mesh);
+  const auto [declared, mesh] = read_mesh_aloud(options.mesh, settings.mesh);
   const double import_seconds = seconds_since(start);
-  const auto [asset, partners] = bake_interruptibly(mesh, target, settings, options.quiet);
+  const auto [asset, partners] = bake_interruptibly(mesh, settings, options.quiet);
   const double bake_seconds = seconds_since(start) - import_seconds;
   {
     const InterruptGuard guard;  // the file is written whole, or not at all
@@ -113,10 +113,12 @@ void run_bake(const BakeOptions& options) {
   }
   exit_if_interrupted();
 
-  if (target.relative_error > 0 && !asset.view().predicted_errors().target_met())
+  if (settings.target.relative_error > 0 && !asset.view().predicted_errors().target_met())
     spdlog::warn("{}: {}", options.output, describe_target(asset.view()));
   if (const std::string coarse = describe_coarseness(asset.view()); !coarse.empty())
     spdlog::warn("{}: {}", options.output, coarse);
+  if (const std::string twice = describe_counted_twice(asset.view()); !twice.empty())
+    spdlog::warn("{}: {}", options.output, twice);
   if (options.json) {
     nlohmann::ordered_json result = {{"asset", options.output}, {"mesh", options.mesh}};
     result.update(asset_json(asset.view()));

@@ -79,6 +79,8 @@ std::vector<std::string> warnings_of(const TreeView& tree) {
     warnings.push_back(describe_target(tree));
   if (std::string coarse = describe_coarseness(tree); !coarse.empty())
     warnings.push_back(std::move(coarse));
+  if (std::string twice = describe_counted_twice(tree); !twice.empty())
+    warnings.push_back(std::move(twice));
   return warnings;
 }
 

@@ -61,9 +61,11 @@ Asset bake_shape(const ClosedMesh& mesh, const RobotBake& what) {
       line.show(progress);
       return !interrupted();
     };
-    Asset asset = what.target.relative_error > 0
-                      ? bake_to_error(mesh, what.target, what.packing, show).asset
-                      : bake(mesh, what.packing, show);
+    const PackingSettings& packing = what.settings.packing;
+    Asset asset = what.settings.surface_only ? bake_surface(mesh, packing.surface, packing.threads)
+                  : what.settings.target.relative_error > 0
+                      ? bake_to_error(mesh, what.settings.target, packing, show).asset
+                      : bake(mesh, packing, show);
     exit_if_interrupted();
     return asset;
   } catch (const Error&) {
@@ -110,9 +112,10 @@ void bake_robot(const RobotBake& what) {
       for (int k = 1; !taken.insert(file).second; ++k)
         file = fmt::format("{}_{}", file_name(link.name), k);
       file += ".ist";
-      const ClosedMesh mesh = close_aloud(
-          mesh_of(placed, paths, what.robot).mesh,
-          fmt::format("{}: line {}: link {}", what.robot, placed.line, link.name), what.mesh);
+      const ClosedMesh mesh =
+          close_aloud(mesh_of(placed, paths, what.robot).mesh,
+                      fmt::format("{}: line {}: link {}", what.robot, placed.line, link.name),
+                      what.settings.mesh);
       assets.push_back({file, bake_shape(mesh, what)});
       // The asset is in the link's frame already.
       shapes.push_back(

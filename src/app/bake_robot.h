@@ -11,12 +11,10 @@ namespace ist::app {
 
 /// What `ist bake robot.urdf -o out/` is asked.
 struct RobotBake {
-  std::string robot;   ///< the URDF
-  std::string folder;  ///< for an asset a mesh and the index NAME.json; made if it is not there
-  PackingSettings packing;
-  ErrorTarget target;  ///< of each asset; error 0: none is asked for
+  std::string robot;      ///< the URDF
+  std::string folder;     ///< for an asset a mesh and the index NAME.json; made if it is not there
+  BakeSettings settings;  ///< of each asset; of its mesh repair and wrap alone are looked at
   RobotOptions options;
-  MeshSettings mesh;  ///< repair and wrap alone are looked at
   bool json = false, quiet = false;
 };
 

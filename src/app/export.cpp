@@ -37,6 +37,9 @@ Format format_of(const std::string& output) {
 void run_export(const ExportOptions& options) {
   const Format format = format_of(options.output);
   const Asset asset = Asset::load(options.asset);
+  if (asset.view().sphere_count() == 0)
+    throw Error(options.asset +
+                ": a surface alone holds no spheres; bake it without --surface-only");
   const std::uint32_t details = asset.view().header().detail_count;
   if (options.detail > details)
     throw Error(fmt::format("{}: it has {} coarser level(s) of detail, not {}", options.asset,

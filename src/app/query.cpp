@@ -138,7 +138,7 @@ void check_settings(const QueryOptions& options) {
 void require_surface(const std::string& path, const TreeView& tree) {
   if (!tree.has_field())
     throw Error(path +
-                ": holds no field, which --field always needs; bake it again without --no-field, "
+                ": holds no field, which --field always needs; bake it again with --surface all, "
                 "or ask with --field auto");
 }
 
@@ -152,7 +152,7 @@ void warn_of_misfit(const TreeView& a, const TreeView& b, const std::vector<Pose
     if (fit.fits()) continue;
     spdlog::warn(
         "the spheres of {} are {:.2g} times as coarse as those of {}, and it "
-        "holds no field: volumes and forces may be far off. Bake it again with a field",
+        "holds no field: volumes and forces may be far off. Bake it again with --surface all",
         fit.a_is_coarser ? options.a : options.asset_b, fit.ratio,
         fit.a_is_coarser ? options.asset_b : options.a);
     return;

@@ -79,6 +79,9 @@ std::string answer_text(const Answer& answer, Measure measure) {
   const Separation& s = answer.result.separation;
   if (answer.status() == QueryStatus::invalid_input)
     return fmt::format("  no answer: {}: {}\n", name_of(answer.status()), pose_fault(answer.row));
+  if (p.status == QueryStatus::not_held)
+    return fmt::format("  no answer: {}: an asset holds not what the measure asks; see ist info\n",
+                       name_of(p.status));
   std::string text;
   const auto line = [&](const char* name, const std::string& value, const char* meaning) {
     text += fmt::format("  {:<10} {:<36} {}\n", name, value, meaning);

@@ -93,7 +93,7 @@ std::vector<CoverSphere> baked_spheres(const ClosedMesh& mesh, const SpheresOpti
   settings.seed = options.cover.seed;
   settings.threads = options.cover.threads;
   settings.device = Device::cpu;
-  settings.field.wanted = false;
+  settings.surface.wanted = false;
   const Asset asset = bake(mesh, settings, progress);
   std::vector<CoverSphere> spheres;
   for (const ExportedSphere& s : exported_spheres(asset.view(), 0))

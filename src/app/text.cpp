@@ -41,8 +41,25 @@ const char* name_of(QueryStatus status) noexcept {
       return "budget_exhausted";
     case QueryStatus::invalid_input:
       return "invalid_input";
+    case QueryStatus::not_held:
+      return "not_held";
   }
   return "unknown";
+}
+
+const char* name_of(MeshState state) noexcept {
+  switch (state) {
+    case MeshState::own:
+      return "own";
+    case MeshState::united:
+      return "united";
+    case MeshState::simplified:
+      return "simplified";
+    case MeshState::unresolved:
+      return "unresolved";
+    default:
+      return "none";
+  }
 }
 
 const char* name_of(TrialPartner partner) noexcept {

@@ -19,6 +19,7 @@ std::string short_vector(const Eigen::Vector3d& v);
 using ist::name_of;  // of a GridMode
 const char* name_of(StopReason reason) noexcept;
 const char* name_of(QueryStatus status) noexcept;
+const char* name_of(MeshState state) noexcept;
 const char* name_of(TrialPartner partner) noexcept;
 
 }  // namespace ist::app

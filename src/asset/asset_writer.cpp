@@ -60,6 +60,17 @@ class SectionWriter {
     write(header.cell_triangles, field.cell_triangles, header.entry_count, header.list_bytes);
   }
 
+  void write(const MeshHeader& header, const MeshArrays& mesh) {
+    write(header.vertices, mesh.vertices, std::uint64_t{3} * header.vertex_count);
+    write(header.shells, mesh.shells, header.shell_count);
+    write(header.neighbours, mesh.neighbours, header.neighbour_count);
+    write(header.level[0].blocks, mesh.blocks, header.level[0].count);
+    if (mesh.boxes.size() + 1 != header.level_count)
+      throw Error("asset: the mesh has a wrong number of levels");
+    for (std::uint32_t k = 1; k < header.level_count; ++k)
+      write(header.level[k].blocks, mesh.boxes[k - 1], header.level[k].count);
+  }
+
  private:
   std::vector<std::byte>& bytes_;
 };
@@ -72,17 +83,38 @@ void fill_scalars(TreeHeader& header, const TreeArrays& tree) {
   header.overlap = tree.overlap;
 }
 
+std::uint32_t count_of_blocks(std::size_t blocks) {
+  constexpr std::size_t kMostBlocks = std::size_t{1} << 4 * (kMaxLevels - 1);
+  if (blocks < 1 || blocks > kMostBlocks)
+    throw Error("asset: a surface must hold at least one triangle and at most 16^6 blocks of them");
+  return static_cast<std::uint32_t>(blocks);
+}
+
 /// The header of a field with the counts that place_sections asks for.
 FieldHeader placeable(const FieldArrays& arrays) {
-  constexpr std::size_t kMostBlocks = std::size_t{1} << 4 * (kMaxLevels - 1);
-  if (arrays.blocks.empty() || arrays.blocks.size() > kMostBlocks)
-    throw Error("asset: the field must hold at least one triangle and at most 16^6 blocks of them");
   FieldHeader header = arrays.header;
-  header.level[0].count = static_cast<std::uint32_t>(arrays.blocks.size());
+  header.level[0].count = count_of_blocks(arrays.blocks.size());
   header.brick_count = static_cast<std::uint32_t>(arrays.bricks.size());
   header.cell_count = static_cast<std::uint32_t>(arrays.cell_ends.size());
   header.entry_count = static_cast<std::uint32_t>(arrays.cell_triangles.size());
   return header;
+}
+
+/// The same of a mesh.
+MeshHeader placeable(const MeshArrays& arrays) {
+  MeshHeader header = arrays.header;
+  header.level[0].count = count_of_blocks(arrays.blocks.size());
+  header.vertex_count = static_cast<std::uint32_t>(arrays.vertices.size() / 3);
+  header.shell_count = static_cast<std::uint32_t>(arrays.shells.size());
+  header.neighbour_count = static_cast<std::uint32_t>(arrays.neighbours.size());
+  return header;
+}
+
+/// A surface alone has no spheres, and nothing that is made of them.
+bool holds_enough(const AssetArrays& arrays) {
+  const std::uint64_t spheres = arrays.inner_spheres.size();
+  if (spheres == 0) return arrays.mesh != nullptr && arrays.field == nullptr;
+  return spheres <= kMaxSpheres;
 }
 
 }  // namespace
@@ -90,17 +122,20 @@ FieldHeader placeable(const FieldArrays& arrays) {
 std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
   AssetHeader header = arrays.header;
   header.sphere_count = arrays.inner_spheres.size();
-  if (header.sphere_count < 1 || header.sphere_count > kMaxSpheres)
-    throw Error("asset: it must hold at least one sphere and at most 16^7");
+  if (!holds_enough(arrays))
+    throw Error("asset: it must hold at least one sphere and at most 16^7, or a mesh alone");
   if (arrays.details.size() > kMaxDetails) throw Error("asset: too many levels of detail");
   header.detail_count = static_cast<std::uint32_t>(arrays.details.size());
-  if (detail_spheres(header.sphere_count, header.detail_count) < 1)
+  if (header.detail_count > 0 && detail_spheres(header.sphere_count, header.detail_count) < 1)
     throw Error("asset: the last level of detail has no spheres");
   std::vector<DetailLevel> details(arrays.details.size());
   std::memcpy(header.magic, kAssetMagic, sizeof(kAssetMagic));
   FieldHeader field;
   if (arrays.field) field = placeable(*arrays.field);
-  place_sections(header, details.data(), arrays.field ? &field : nullptr);
+  MeshHeader mesh;
+  if (arrays.mesh) mesh = placeable(*arrays.mesh);
+  place_sections(header, details.data(), arrays.field ? &field : nullptr,
+                 arrays.mesh ? &mesh : nullptr);
   fill_scalars(header.inner_tree, arrays.inner_tree);
   fill_scalars(header.matched_tree, arrays.matched_tree);
   for (std::size_t i = 0; i < details.size(); ++i) {
@@ -114,8 +149,10 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
   writer.write(header.inner_spheres, arrays.inner_spheres, header.sphere_count);
   writer.write(header.cover_radii, arrays.cover_radii, header.sphere_count);
   writer.write(header.matched_spheres, arrays.matched_spheres, header.sphere_count);
-  writer.write(header.inner_tree, arrays.inner_tree);
-  writer.write(header.matched_tree, arrays.matched_tree);
+  if (header.sphere_count > 0) {
+    writer.write(header.inner_tree, arrays.inner_tree);
+    writer.write(header.matched_tree, arrays.matched_tree);
+  }
   writer.write(header.details, details, header.detail_count);
   for (std::size_t i = 0; i < details.size(); ++i) {
     const TreeHeader& tree = details[i].matched_tree;
@@ -125,6 +162,10 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
   if (arrays.field) {
     writer.write(header.field, std::vector<FieldHeader>{field}, 1);
     writer.write(field, *arrays.field);
+  }
+  if (arrays.mesh) {
+    writer.write(header.mesh, std::vector<MeshHeader>{mesh}, 1);
+    writer.write(mesh, *arrays.mesh);
   }
   seal(bytes);
   return bytes;

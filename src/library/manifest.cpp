@@ -58,13 +58,15 @@ std::string other_keys(std::string key, std::vector<std::string> known) {
 
 /// A value as the command line would have it; nothing for a type that it cannot be.
 std::optional<std::string> text_of(const toml::node& value, SettingKind kind) {
-  const bool number = kind == SettingKind::real || kind == SettingKind::share;
+  const bool number =
+      kind == SettingKind::real || kind == SettingKind::share || kind == SettingKind::text;
   if (const auto* whole = value.as_integer(); whole && (number || kind == SettingKind::whole))
     return fmt::to_string(whole->get());
   if (const auto* real = value.as_floating_point(); real && number)
     return fmt::to_string(real->get());
   if (const auto* text = value.as_string();
-      text && (kind == SettingKind::share || kind == SettingKind::choice))
+      text &&
+      (kind == SettingKind::share || kind == SettingKind::choice || kind == SettingKind::text))
     return text->get();
   if (const auto* flag = value.as_boolean(); flag && kind == SettingKind::flag)
     return flag->get() ? "true" : "false";

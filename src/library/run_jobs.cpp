@@ -137,6 +137,7 @@ class Run {
     PackingSettings& packing = settings.packing;
     packing.device = Device::cpu;
     packing.threads = threads_of_a_job();
+    if (settings.surface_only) return bake_surface(mesh, packing.surface, packing.threads);
     std::optional<GpuPlaces::Place> place;
     if (gpus_.places() != 0) {
       place.emplace(gpus_);

@@ -26,6 +26,7 @@ struct MeshSolid::Impl {
   RawArray<double> vertices;  // unit frame
   RawArray<std::uint32_t> triangles;
   MeshView arrays;
+  double rounding = 0;  // unit frame
   bool meets_itself = false, may_overlap = false;
   std::optional<std::vector<std::array<std::uint32_t, 2>>> meeting_pairs;
 
@@ -59,16 +60,22 @@ struct MeshSolid::Impl {
 
 namespace {
 
-/// Whether to_unit() does not round: the difference and its scaling, a power of two.
-bool is_exact(const UnitFrame& frame, const double scale, const Eigen::Vector3d& x) {
+/// How far to_unit() moves a point by rounding, at most; 0 only where it does not round.
+double rounding_at(const UnitFrame& frame, const double scale, const Eigen::Vector3d& x) {
+  double off[3], largest = 0;
   for (int k = 0; k < 3; ++k) {
     const double difference = x[k] - frame.centre[k];
     const double centre_part = difference - x[k];  // −centre, as far as it got in (Knuth's two-sum)
-    if (x[k] != difference - centre_part || centre_part != -frame.centre[k] ||
-        difference / scale * scale != difference)
-      return false;
+    const double tail =
+        (x[k] - (difference - centre_part)) + (-frame.centre[k] - centre_part);  // exact
+    off[k] = std::abs(tail) / scale;  // by a power of two: exact but under the least number
+    if (tail != 0 || difference / scale * scale != difference)
+      off[k] += std::numeric_limits<double>::denorm_min();
+    largest = std::max(largest, off[k]);
   }
-  return true;
+  if (largest == 0) return 0;
+  for (double& part : off) part /= largest;
+  return std::sqrt(off[0] * off[0] + off[1] * off[1] + off[2] * off[2]) * largest * (1 + 1e-15);
 }
 
 /// Hash over the frame, the counts, the vertices and the triangles.
@@ -118,12 +125,21 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
   }
   impl_->frame = unit_frame(impl_->bounds);
   impl_->vertices = RawArray<double>(3 * std::size_t{count});
-  tbb::parallel_for(std::size_t{0}, mesh.vertices.size(), [&](std::size_t v) {
-    if (place[v] == kUnused) return;
-    const Eigen::Vector3d x = impl_->frame.to_unit(mesh.vertices[v]);
-    for (std::size_t k = 0; k < 3; ++k)
-      impl_->vertices[3 * std::size_t{place[v]} + k] = x[static_cast<int>(k)];
-  });
+  using Range = tbb::blocked_range<std::size_t>;
+  impl_->rounding = tbb::parallel_reduce(
+      Range(0, mesh.vertices.size()), 0.0,
+      [&](const Range& range, double most) {
+        const double scale = impl_->frame.scale();
+        for (std::size_t v = range.begin(); v != range.end(); ++v) {
+          if (place[v] == kUnused) continue;
+          const Eigen::Vector3d x = impl_->frame.to_unit(mesh.vertices[v]);
+          for (std::size_t k = 0; k < 3; ++k)
+            impl_->vertices[3 * std::size_t{place[v]} + k] = x[static_cast<int>(k)];
+          most = std::max(most, rounding_at(impl_->frame, scale, mesh.vertices[v]));
+        }
+        return most;
+      },
+      [](double a, double b) { return std::max(a, b); });
   impl_->triangles = RawArray<std::uint32_t>(3 * mesh.triangles.size());
   tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
     for (std::size_t k = 0; k < 3; ++k) impl_->triangles[3 * t + k] = place[mesh.triangles[t][k]];
@@ -139,12 +155,7 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
     for (const auto& pair : *closed.meeting_pairs)
       if (pair[0] >= mesh.triangles.size() || pair[1] >= mesh.triangles.size())
         throw Error(closed.name + ": meeting pairs name a triangle that is not there");
-    std::atomic<bool> exact{true};
-    const double scale = impl_->frame.scale();
-    tbb::parallel_for(std::size_t{0}, mesh.vertices.size(), [&](std::size_t v) {
-      if (place[v] != kUnused && !is_exact(impl_->frame, scale, mesh.vertices[v])) exact = false;
-    });
-    if (exact) impl_->meeting_pairs = closed.meeting_pairs;
+    if (impl_->rounding == 0) impl_->meeting_pairs = closed.meeting_pairs;
   }
   impl_->may_overlap = closed.report.meets_itself || closed.report.shells != 1;
 }
@@ -170,6 +181,7 @@ double MeshSolid::volume_error() const {
 }
 
 const UnitFrame& MeshSolid::frame() const { return impl_->frame; }
+double MeshSolid::rounding() const { return impl_->rounding; }
 double MeshSolid::unit_volume() const { return impl_->with_moments().volume; }
 double MeshSolid::unit_volume_error() const { return impl_->with_moments().volume_error; }
 const MeshMoments& MeshSolid::unit_moments() const { return impl_->with_moments(); }

@@ -36,6 +36,7 @@ class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
   const MeshSolid* mesh() const noexcept override { return this; }
 
   const UnitFrame& frame() const;
+  double rounding() const;           ///< unit frame: no vertex was moved further on the way there
   double unit_volume() const;        ///< unit frame³
   double unit_volume_error() const;  ///< unit frame³
   const MeshMoments& unit_moments() const;

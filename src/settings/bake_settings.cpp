@@ -115,6 +115,28 @@ Setting grid() {
           [](BakeSettings settings) { return std::string(name_of(settings.packing.grid)); }};
 }
 
+std::string show_surface(const SurfaceSettings& surface) {
+  if (!surface.wanted) return "none";
+  if (surface.error > 0) return fmt::to_string(surface.error);
+  return surface.share > 0 ? fmt::format("{}%", 100 * surface.share) : "all";
+}
+
+Setting surface() {
+  return {"surface",
+          "all|none|ERROR",
+          kSurfaceMeaning,
+          "all",
+          "What is kept of the mesh for exact queries: all of its triangles, none, or as few as "
+          "stay within ERROR of it, [u] or, as 0.1%, a share of its longest side",
+          SettingKind::text,
+          [](BakeSettings& settings, const std::string& text) {
+            const std::optional<SurfaceSettings> surface = parse_surface(text);
+            if (surface) settings.packing.surface = *surface;
+            return surface.has_value();
+          },
+          [](BakeSettings settings) { return show_surface(settings.packing.surface); }};
+}
+
 template <class Of>
 Setting axis(const char* name, Of of, const char* fallback, const char* help) {
   return {
@@ -176,14 +198,11 @@ std::vector<Setting> make_settings() {
             {.least = 0, .most = 1, .without_most = true},
             "Every sphere is at least 1 − E times the largest that would fit; 0 = the library's "
             "own schedule"),
-      without_default(
-          real("field-error", member_of(&PackingSettings::field, &FieldSettings::error),
-               {.least = 0, .without_least = true},
-               "[u] How far the surface kept for exact queries may be from the mesh's; as few "
-               "triangles as that allows. Default: the mesh's own where they are at most 30,000, "
-               "else that many")),
-      flag("no-field", member_of(&PackingSettings::field, &FieldSettings::wanted), false,
-           "Keep no surface: a smaller file, whose volumes are those of spheres"),
+      surface(),
+      flag(
+          "surface-only", [](BakeSettings& settings) -> bool& { return settings.surface_only; },
+          true,
+          "No spheres: the mesh alone, baked at once, for exact queries; all others need spheres"),
       grid(),
       whole("grid-resolution", member_of(&PackingSettings::grids, &GridSettings::resolution), 0,
             kMostCells,
@@ -258,6 +277,20 @@ std::optional<SettingFault> idle_setting(const PackingSettings& settings,
   return std::nullopt;
 }
 
+/// A surface alone is not packed.
+std::optional<SettingFault> surface_only_fault(const BakeSettings& settings,
+                                               const std::set<std::string>& own,
+                                               const std::string& prefix) {
+  if (!settings.packing.surface.wanted)
+    return SettingFault{"surface-only", "contradicts " + prefix + "surface none"};
+  for (const Setting& setting : settings_list()) {
+    if (setting.name == "surface") break;  // what stands before it, is of packing
+    if (own.count(setting.name) != 0)
+      return SettingFault{setting.name, "has no effect with " + prefix + "surface-only"};
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::span<const Setting> all_settings() { return settings_list(); }
@@ -289,8 +322,8 @@ std::optional<SettingFault> complete(BakeSettings& settings, const std::set<std:
   if (aims && given.count("spheres") == 0) settings.packing.max_spheres = 0;
   if (!aims && own.count("at-overlap") != 0)
     return SettingFault{"at-overlap", "has no effect without " + prefix + "target-error"};
-  if (!settings.packing.field.wanted && own.count("field-error") != 0)
-    return SettingFault{"field-error", "contradicts " + prefix + "no-field: leave one of them out"};
+  if (settings.surface_only)
+    if (const auto fault = surface_only_fault(settings, own, prefix)) return fault;
   if (settings.mesh.up_axis == 0 && own.count("world-up") != 0)
     return SettingFault{"world-up", "has no effect without " + prefix + "up-axis"};
   return idle_setting(settings.packing, prefix);
@@ -301,6 +334,21 @@ std::string describe_exactly(const BakeSettings& settings) {
   for (const Setting& setting : settings_list())
     text += setting.name + "=" + setting.show(settings) + "\n";
   return text;
+}
+
+std::optional<SurfaceSettings> parse_surface(const std::string& text) {
+  SurfaceSettings surface;
+  surface.wanted = text != "none";
+  if (text == "all" || text == "none") return surface;
+  const bool is_share = text.ends_with('%');
+  const std::optional<double> value = is_share ? parse_share(text) : parse_number(text);
+  const Range range = {.least = 0,
+                       .most = is_share ? 1 : std::numeric_limits<double>::infinity(),
+                       .without_least = true,
+                       .without_most = is_share};
+  if (!value || !range.holds(*value)) return std::nullopt;
+  (is_share ? surface.share : surface.error) = *value;
+  return surface;
 }
 
 const char* name_of(GridMode mode) noexcept {

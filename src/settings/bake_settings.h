@@ -27,6 +27,7 @@ struct BakeSettings {
   MeshSettings mesh;
   PackingSettings packing;  ///< device, GPU and threads are not among what is set by name
   ErrorTarget target = {0, ErrorTarget().at_overlap};  ///< error 0: none is asked for
+  bool surface_only = false;                           ///< bake_surface()
 };
 
 /// What is written for a setting.
@@ -36,6 +37,7 @@ enum class SettingKind {
   share,   ///< 0.5 or 50%
   flag,    ///< on the command line --NAME alone; in a file true or false
   choice,  ///< one of some words
+  text,    ///< a word, a number or a share
 };
 
 struct Setting {
@@ -75,5 +77,10 @@ std::optional<SettingFault> complete(BakeSettings& settings, const std::set<std:
 std::string describe_exactly(const BakeSettings& settings);
 
 const char* name_of(GridMode mode) noexcept;
+
+/// "all", "none", or how far the surface may be off: 0.5, or 0.1% of the size. Nothing for others.
+std::optional<SurfaceSettings> parse_surface(const std::string& text);
+inline constexpr const char* kSurfaceMeaning =
+    "all, none, a finite number above 0, or a share above 0% and below 100%";
 
 }  // namespace ist

@@ -55,14 +55,50 @@ TEST_F(BakeCommand, TheFieldIsToldOfOrLeftOut) {
     return nlohmann::json::parse(ist(more).out);
   };
   EXPECT_EQ(field({}).at("field").at("triangles"), 12);
-  EXPECT_EQ(field({"--field-error", "0.5"}).at("asked").at("field_error"), 0.5);
-  const nlohmann::json none = field({"--no-field"});
+  EXPECT_EQ(field({"--surface", "0.5"}).at("asked").at("surface_error"), 0.5);
+  EXPECT_EQ(field({"--surface", "25%"}).at("asked").at("surface_error"), 0.25);
+  const nlohmann::json none = field({"--surface", "none"});
   EXPECT_EQ(none.at("field").at("bytes"), 0);
   EXPECT_TRUE(none.at("field").at("error").is_null());
+  EXPECT_EQ(none.at("kept_mesh").at("state"), "none");
   EXPECT_LT(none.at("bytes"), field({}).at("bytes"));
-  EXPECT_EQ(
-      ist({"bake", "cube.obj", "-o", "new.ist", "--no-field", "--field-error", "1"}).exit_code, 2);
-  EXPECT_EQ(ist({"bake", "cube.obj", "-o", "new.ist", "--field-error", "0"}).exit_code, 2);
+  for (const char* wrong : {"0", "-1", "0%", "100%", "some", "nan", ""})
+    EXPECT_EQ(ist({"bake", "cube.obj", "-o", "new.ist", "--surface", wrong}).exit_code, 2) << wrong;
+}
+
+TEST_F(BakeCommand, KeepsTheMesh) {
+  const nlohmann::json json = nlohmann::json::parse(
+      ist({"bake", "cube.obj", "-o", "new.ist", "--spheres", "5", "--json"}).out);
+  const nlohmann::json mesh = json.at("kept_mesh");
+  EXPECT_EQ(mesh.at("state"), "own");
+  EXPECT_EQ(mesh.at("triangles"), 12);
+  EXPECT_EQ(mesh.at("error"), 0);
+  EXPECT_EQ(mesh.at("counted_twice"), 0);
+  EXPECT_NE(ist({"info", "new.ist"}).out.find("mesh         12 triangles, all of the mesh's"),
+            std::string::npos);
+  EXPECT_EQ(ist({"check", "new.ist", "--mesh", "cube.obj"}).exit_code, 0);
+}
+
+TEST_F(BakeCommand, ASurfaceAlone) {
+  const Outcome baked = ist({"bake", "cube.obj", "-o", "new.ist", "--surface-only", "--json"});
+  const nlohmann::json json = nlohmann::json::parse(baked.out);
+  EXPECT_EQ(json.at("spheres"), 0);
+  EXPECT_EQ(json.at("kept_mesh").at("triangles"), 12);
+  EXPECT_NEAR(json.at("volume"), 1, 1e-12);
+  EXPECT_EQ(ist({"check", "new.ist", "--mesh", "cube.obj"}).exit_code, 0);
+  EXPECT_NE(ist({"info", "new.ist"}).out.find("none: a surface alone"), std::string::npos);
+  const Outcome asked = ist({"query", "new.ist", "new.ist", "--pose", "1,0,0,0,0,0,0"});
+  EXPECT_NE(asked.out.find("no answer: not_held"), std::string::npos) << asked.out;
+  EXPECT_EQ(ist({"export", "new.ist", "-o", "-"}).exit_code, 1);
+  const auto refused = [&](const std::vector<std::string>& more, const std::string& message) {
+    std::vector<std::string> all = {"bake", "cube.obj", "-o", "no.ist", "--surface-only"};
+    all.insert(all.end(), more.begin(), more.end());
+    const Outcome outcome = ist(all);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_NE(outcome.err.find(message), std::string::npos) << outcome.err;
+  };
+  refused({"--spheres", "5"}, "--spheres: has no effect with --surface-only");
+  refused({"--surface", "none"}, "--surface-only: contradicts --surface none");
 }
 
 TEST_F(BakeCommand, SpheresTooCoarseForThinPartsAreToldOf) {

@@ -138,12 +138,12 @@ TEST_F(Mistakes, ButDefaultsMayBeOfNoUseToSome) {
   write("fine.toml", R"([defaults]
 at-overlap = "1%"
 world-up = "Y"
-field-error = 0.1
+surface = "0.1%"
 spheres = 20
 
 [[asset]]
 mesh = "meshes/cube.obj"
-no-field = true
+surface = "none"
 name = "{stem}-of-many"
 
 [[asset]]

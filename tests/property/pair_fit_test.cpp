@@ -14,7 +14,7 @@ namespace {
 Asset cube(bool with_field) {
   PackingSettings settings;
   settings.max_spheres = 200;
-  settings.field.wanted = with_field;
+  settings.surface.wanted = with_field;
   return bake(close_mesh(testing::cube_mesh(), "cube"), settings);
 }
 

@@ -10,7 +10,7 @@ namespace ist::testing {
 inline Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres, bool field = true) {
   PackingSettings settings;
   settings.max_spheres = spheres;
-  settings.field.wanted = field;
+  settings.surface.wanted = field;
   return bake(close_mesh(std::move(mesh), name), settings);
 }
 

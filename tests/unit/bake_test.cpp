@@ -236,6 +236,69 @@ TEST(Check, TurnsRedForEveryInvariantOfTheField) {
   }
 }
 
+MeshHeader& kept(AssetHeader& h) { return *writable<MeshHeader>(h, h.mesh); }
+MeshBlock* kept_blocks(AssetHeader& h) { return writable<MeshBlock>(h, kept(h).level[0].blocks); }
+double* kept_vertices(AssetHeader& h) { return writable<double>(h, kept(h).vertices); }
+
+// And the mesh.
+TEST(Check, TurnsRedForEveryInvariantOfTheMesh) {
+  TriangleMesh moved = testing::torus_mesh(1.0, 0.4, 40, 20);
+  for (Eigen::Vector3d& v : moved.vertices) v += Eigen::Vector3d(0.1, 0.2, 0.3);
+  const ClosedMesh torus = close_mesh(std::move(moved), "torus");
+  const Asset asset = bake(torus, of_size(60));
+  ASSERT_EQ(asset.view().mesh_state(), MeshState::own);
+  ASSERT_EQ(asset.view().mesh_triangles(), torus.mesh.triangles.size());
+  expect_sound(check(asset, torus));
+  const std::vector<Tampering> cases = {
+      {"mesh triangles", [](AssetHeader& h) { kept_vertices(h)[4] += 1e-15; }},
+      {"mesh triangles",
+       [](AssetHeader& h) {
+         MeshBlock& block = kept_blocks(h)[0];  // one is there twice, another not at all
+         for (auto& corners : block.corner) corners[2] = corners[1];
+       }},
+      {"mesh triangles",
+       [](AssetHeader& h) {
+         std::swap(kept_blocks(h)->corner[0][2], kept_blocks(h)->corner[1][2]);
+       }},
+      {"mesh closed",
+       [](AssetHeader& h) {
+         std::swap(kept_blocks(h)->corner[0][2], kept_blocks(h)->corner[1][2]);
+       }},
+      {"mesh rounding", [](AssetHeader& h) { kept(h).rounding *= 0.5; }},
+      {"mesh blocks",
+       [](AssetHeader& h) {
+         MeshBlock& block = kept_blocks(h)[0];  // all in the first corners but for one vertex
+         for (std::size_t k = 0; k < 3; ++k)
+           for (std::size_t l = 0; l < block.triangles; ++l)
+             block.corner[k][l] = static_cast<std::uint8_t>(k);
+       }},
+      {"mesh boxes",
+       [](AssetHeader& h) {
+         float& low = writable<BoxBlock>(h, kept(h).level[1].blocks)->low[1][2];
+         low = std::nextafterf(low, 16);
+       }},
+      {"mesh shell boxes",
+       [](AssetHeader& h) {
+         float& high = writable<MeshShell>(h, kept(h).shells)->high[0];
+         high = std::nextafterf(high, -16);
+       }},
+  };
+  for (const Tampering& one : cases) {
+    bool red = false;
+    for (const Invariant& invariant : check(tampered(one.change, asset), torus))
+      if (invariant.name == one.invariant) red |= invariant.violations > 0;
+    EXPECT_TRUE(red) << one.invariant;
+  }
+  // Neighbours that no longer know each other are no asset.
+  EXPECT_THROW(tampered(
+                   [](AssetHeader& h) {
+                     std::uint32_t& first = *writable<std::uint32_t>(h, kept(h).neighbours);
+                     first ^= 1;
+                   },
+                   asset),
+               Error);
+}
+
 // The whole asset, for any number of threads and in a second run.
 TEST(Bake, SameBytesForAnyThreadCount) {
   const ClosedMesh meshes[] = {cube(),

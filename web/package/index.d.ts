@@ -526,9 +526,12 @@ export interface Pair {
   poseB: Pose;
 }
 
-/** `invalid-input`: this pair's pose is out of range; its numbers are 0, and others are answered. */
+/**
+ * `invalid-input`: this pair's pose is out of range; its numbers are 0, and others are answered.
+ * `not-held`: an asset of the pair holds no spheres; its numbers are NaN.
+ */
 export interface BatchPenetration extends Omit<Penetration, 'status'> {
-  status: Status | 'invalid-input';
+  status: Status | 'invalid-input' | 'not-held';
 }
 export interface BatchContactPatches extends Omit<ContactPatches, 'whole'> {
   whole: BatchPenetration;

@@ -5,6 +5,7 @@
 
 #include <ist/asset_layout.h>
 #include "bake/check/check_field.h"
+#include "bake/check/check_kept_mesh.h"
 #include "bake/check/check_mass.h"
 #include "bake/check/check_spheres.h"
 #include "bake/check/check_surface.h"
@@ -26,15 +27,18 @@ Bounding bounding_of(const ClosedMesh& mesh) {
   return mesh.report.shells != 1 ? Bounding::shells : Bounding::all;
 }
 
-/// `solid`: what spheres and covers are certified against; `surface`: what matched spheres are
-/// calibrated by; of a mesh's asset they are the same.
-std::vector<Invariant> check_all(const AssetHeader& asset, const CheckedSolid& solid,
-                                 const CheckSurface& surface, const UnitFrame& frame,
-                                 const MeshMoments& moments, Bounding bounding) {
+/// `mesh`: what was baked, or made in the solid's place. `solid`: what spheres and covers are
+/// certified against; `surface`: what matched spheres are calibrated by; of a mesh's asset they are
+/// the same.
+std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mesh,
+                                 const CheckedSolid& solid, const CheckSurface& surface,
+                                 const UnitFrame& frame, const MeshMoments& moments) {
   std::vector<Invariant> all;
   all.push_back(check_frame(asset, frame));
   append(all, check_mass(asset, moments, solid));
   append(all, check_bounds(asset, surface));
+  append(all, check_kept_mesh(asset, mesh, frame, surface, bounding_of(mesh)));
+  if (asset.sphere_count == 0) return all;
   append(all, check_spheres(asset, solid));
   all.push_back(check_cover(asset, solid));
   append(all, check_tree(asset, asset.inner_tree, at<Sphere>(asset, asset.inner_spheres),
@@ -45,7 +49,7 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const CheckedSolid& s
     append(all, check_tree(asset, matched_tree(asset, i), matched_spheres(asset, i), nullptr,
                            name + "matched tree"));
   }
-  append(all, check_field(asset, surface, bounding));
+  append(all, check_field(asset, surface, bounding_of(mesh)));
   return all;
 }
 
@@ -54,7 +58,7 @@ std::vector<Invariant> check_mesh(const AssetHeader& asset, const ClosedMesh& me
   if (solid.hash() != asset.mesh_hash || (asset.flags & kFlagPolygonised) != 0)
     throw Error(mesh.name + ": the asset was baked from another mesh; bake again");
   const CheckSurface surface(mesh, solid.frame());
-  return check_all(asset, surface, surface, solid.frame(), solid.unit_moments(), bounding_of(mesh));
+  return check_all(asset, mesh, surface, surface, solid.frame(), solid.unit_moments());
 }
 
 std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid) {
@@ -69,8 +73,8 @@ std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid)
   const double off = std::abs(mesh.volume() - solid.volume()) + solid.volume_error();
   MeshMoments moments = moments_near(mesh.arrays(), mesh.unit_moments(), made.error / scale);
   moments.volume_error += off / scale / scale / scale;
-  return check_all(asset, DistanceSolid(solid, mesh.frame()), CheckSurface(closed, mesh.frame()),
-                   mesh.frame(), moments, bounding_of(closed));
+  return check_all(asset, closed, DistanceSolid(solid, mesh.frame()),
+                   CheckSurface(closed, mesh.frame()), mesh.frame(), moments);
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -136,13 +136,12 @@ class NearProof {
   double error_, smallest_;
 };
 
-Invariant near(const char* name, const char* of, const std::vector<Corners>& triangles,
-               const CheckSurface& to, double error) {
+Invariant near(const std::string& name, const std::string& of,
+               const std::vector<Corners>& triangles, const CheckSurface& to, double error) {
   const NearProof proof(to, error);
   return tally_all(triangles.size(),
                    [&](std::size_t i, Tally& tally) { proof.prove(triangles[i], i, tally); })
-      .named(name,
-             std::string("distance of a point of the ") + of + " − the field's error, unit frame");
+      .named(name, "distance of a point of the " + of + " − the error, unit frame");
 }
 
 /// Whether a point of a triangle is between inside and outside, not between shells of the solid.
@@ -167,7 +166,8 @@ std::vector<Corners> boundary(const CheckSurface& surface) {
 
 /// Of triangles of which parts bound the solid those parts are near, by points spread over them:
 /// a million at most.
-Invariant parts_near(const CheckSurface& mesh, const CheckSurface& field, double error) {
+Invariant parts_near(const std::string& name, const CheckSurface& mesh, const CheckSurface& kept,
+                     double error) {
   constexpr std::size_t kPoints = 1'000'000;
   const std::size_t count = mesh.triangles().size();
   int rows = 1;
@@ -180,14 +180,12 @@ Invariant parts_near(const CheckSurface& mesh, const CheckSurface& field, double
                        for (int k = 0; j + k < rows; ++k) {
                          const double u = (j + 1.0 / 3) / rows, v = (k + 1.0 / 3) / rows;
                          const Point p = t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0]);
-                         const double off = field.distance(p, 2 * error + 1e-9) - error - 1e-11;
+                         const double off = kept.distance(p, 2 * error + 1e-9) - error - 1e-11;
                          if (off > worst && (off <= 0 || bounds_at(mesh, t, p))) worst = off;
                        }
                      tally.add(worst, i);
                    })
-      .named("mesh near field",
-             "distance of a point of the mesh that bounds the solid from the field − the field's "
-             "error, unit frame");
+      .named(name, "distance of a point of the mesh that bounds the solid − the error, unit frame");
 }
 
 /// Every ball holds the triangles below it.
@@ -218,21 +216,27 @@ Invariant balls(const AssetHeader& asset, const FieldHeader& field,
 
 }  // namespace
 
+std::vector<Invariant> check_near(const std::string& what, const CheckSurface& kept,
+                                  const CheckSurface& solid, double error, Bounding bounding) {
+  const std::string back = "mesh near " + what;
+  return {near(what + " near mesh", what, kept.triangles(), solid, error),
+          bounding == Bounding::parts ? parts_near(back, solid, kept, error)
+                                      : near(back, "mesh", solid.triangles(), kept, error)};
+}
+
+CheckSurface boundary_of(const CheckSurface& surface, Bounding bounding) {
+  return bounding == Bounding::shells ? CheckSurface(boundary(surface)) : surface;
+}
+
 std::vector<Invariant> check_field(const AssetHeader& asset, const CheckSurface& surface,
                                    Bounding bounding) {
   if (asset.field == 0) return {};
   const FieldHeader& field = *at<FieldHeader>(asset, asset.field);
   const FieldTriangles triangles(asset, field);
   const CheckSurface of_field(triangles.all());
-  std::optional<CheckSurface> kept;
-  if (bounding == Bounding::shells) kept.emplace(boundary(surface));
-  const CheckSurface& solid = kept ? *kept : surface;
-  std::vector<Invariant> out = {
-      closed(of_field.triangles()),
-      near("field near mesh", "field from the mesh", of_field.triangles(), solid, field.error),
-      bounding == Bounding::parts ? parts_near(solid, of_field, field.error)
-                                  : near("mesh near field", "mesh from the field",
-                                         solid.triangles(), of_field, field.error)};
+  const CheckSurface solid = boundary_of(surface, bounding);
+  std::vector<Invariant> out = check_near("field", of_field, solid, field.error, bounding);
+  out.push_back(closed(of_field.triangles()));
   if (field.level_count > 1) out.push_back(balls(asset, field, triangles));
   for (Invariant& one : check_field_cells(asset, field, of_field, solid))
     out.push_back(std::move(one));

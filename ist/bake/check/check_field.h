@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include <ist/bake.h>
@@ -15,6 +16,13 @@ enum class Bounding {
   shells,  ///< some of them, shell by shell: others lie within it
   parts    ///< parts of them: they meet each other
 };
+
+/// The surface by itself, or what of its triangles bounds the solid shell by shell.
+CheckSurface boundary_of(const CheckSurface& surface, Bounding bounding);
+
+/// `kept` and the solid's boundary lie within `error` of each other, unit frame. `what`: its name.
+std::vector<Invariant> check_near(const std::string& what, const CheckSurface& kept,
+                                  const CheckSurface& boundary, double error, Bounding bounding);
 
 /// The field of an asset that has one, against the mesh and by itself: closed, near the solid's
 /// surface, its balls and its cells.

@@ -25,24 +25,24 @@ namespace {
 /// 0.5 % of a solid's size.
 constexpr double kOverlapWidth = 0.01;
 
-/// Where no error is asked for, triangles are merged within this at least, unit frame: the proof of
-/// a finer surface takes up to twice as long, on flat faces that are cut into many triangles.
-constexpr double kFinest = 1e-5;
+/// Up to so many triangles a surface may take as many bytes, what the spheres take in an asset of
+/// 10,000.
+constexpr std::size_t kFewTriangles = 25'000;
+constexpr std::size_t kFewBytes = 1'000'000;
 
 /// A surface and how far it is from the solid's, unit frame.
 struct Approximation {
   FieldMesh mesh;
   double error = 0;
-  std::optional<FieldArrays> laid_out;  ///< where that was done on the way
 };
 
 /// What the grid of a surface may take.
 std::size_t grid_bytes(const FieldArrays& arrays) {
-  // A small surface's grid is fine, a large one's coarse; beyond kFieldTriangles it is as coarse as
+  // A small surface's grid is fine, a large one's coarse; beyond kFewTriangles it is as coarse as
   // there.
   const std::size_t triangles = arrays.header.triangle_count;
-  const std::size_t whole = std::min(
-      16'384 + 50 * triangles, std::max(kFieldBytes, kFieldBytes / kFieldTriangles * triangles));
+  const std::size_t whole =
+      std::min(16'384 + 50 * triangles, std::max(kFewBytes, kFewBytes / kFewTriangles * triangles));
   std::size_t surface = sizeof(FieldHeader) + 16 * kAssetAlignment;
   surface += arrays.blocks.size() * sizeof(SurfaceBlock);
   for (const TreeLevelArrays& level : arrays.levels)
@@ -83,33 +83,16 @@ Approximation own_triangles(const MeshView& surface) {
   return out;
 }
 
-/// The least tolerance found that leaves at most, and nearly, so many triangles; `least` where that
-/// is more.
-double tolerance_for(VertexClusters& clusters, std::size_t triangles, double guess, double least) {
-  double fine = 0, coarse = HUGE_VAL;
-  for (int attempt = 0; attempt < 16; ++attempt) {
-    const std::size_t found = clusters.triangles_within(guess, triangles);
-    (found <= triangles ? coarse : fine) = guess;
-    if (found <= triangles && (found > triangles - triangles / 32 || guess <= least)) break;
-    guess = coarse == HUGE_VAL ? 2 * fine : fine == 0 ? coarse / 2 : std::sqrt(fine * coarse);
-  }
-  return std::max(least, coarse);
-}
-
 /// Clusters within a tolerance, or nearly: those that turn out to be further off are divided, a few
-/// times over, and so are those for which nothing better can be proven. `choose`: the tolerance for
-/// the clusters as they are.
-/// `lay`: what is to be proven is laid out in the meantime.
-template <class Choose>
+/// times over, and so are those for which nothing better can be proven.
 Approximation clustered(VertexClusters& clusters, SolidSurface& surface, KnownDistances& distances,
-                        bool lay, const WorkStop& stop, const Choose& choose) {
+                        double tolerance, const WorkStop& stop) {
   constexpr int kRounds = 5, kProofs = 2;
   constexpr double kLoose = 3;  // of what is seen: proven more, it is worth another proof
-  Approximation best{{}, HUGE_VAL, {}};
+  Approximation best{{}, HUGE_VAL};
   int proofs = 0;
   for (int round = 1;; ++round) {
     stop.look();
-    const double tolerance = choose();
     Clustered found = clusters.within(tolerance);
     if (found.mesh.triangles.empty()) return best;
     const FieldHierarchy hierarchy(found.mesh);
@@ -117,13 +100,8 @@ Approximation clustered(VertexClusters& clusters, SolidSurface& surface, KnownDi
     std::vector<double> off = error.seen(tolerance);
     const double seen = *std::max_element(off.begin(), off.end());
     if (seen <= 1.25 * tolerance || round >= kRounds) {
-      FieldError::Proven proven;
-      std::optional<FieldArrays> laid;
-      const auto lay_out = [&] {
-        if (lay) laid = laid_out(found.mesh, [&] { return hierarchy.view(); });
-      };
-      tbb::parallel_invoke([&] { proven = error.proven(seen, kLoose * seen); }, lay_out);
-      if (proven.most < best.error) best = {std::move(found.mesh), proven.most, std::move(laid)};
+      FieldError::Proven proven = error.proven(seen, kLoose * seen);
+      if (proven.most < best.error) best = {std::move(found.mesh), proven.most};
       if (proven.most <= kLoose * seen || ++proofs == kProofs) return best;
       off = std::move(proven.at_cluster);
       for (double& at : off) at = at > kLoose * seen ? at : 0;
@@ -139,8 +117,7 @@ std::optional<Approximation> clustered_within(VertexClusters& clusters, SolidSur
   KnownDistances distances(surface.view());
   double fine = 0, coarse = HUGE_VAL, tolerance = max_error / 2;
   for (int attempt = 0; attempt < 8 && coarse > 1.05 * fine; ++attempt) {
-    Approximation tried =
-        clustered(clusters, surface, distances, false, stop, [&] { return tolerance; });
+    Approximation tried = clustered(clusters, surface, distances, tolerance, stop);
     const double ratio = max_error / tried.error;
     if (tried.error <= max_error) {
       fine = tolerance;
@@ -155,68 +132,42 @@ std::optional<Approximation> clustered_within(VertexClusters& clusters, SolidSur
   return best;
 }
 
-/// Of a surface of too many triangles.
-VertexClusters clusters_of(const MeshView& surface, double max_error) {
-  // Cells of edge c span about 3 area / c² triangles.
-  const double cell = std::sqrt(3 * surface_area(surface) / kFieldTriangles);
-  return VertexClusters(surface, 8 * cell, max_error > 0 ? 10 : 7);
-}
-
 /// Fewer triangles than the surface has; nothing where they cannot be as exact as is asked for.
-std::optional<Approximation> simplified(SolidSurface& surface, VertexClusters& clusters,
-                                        double max_error, const WorkStop& stop) {
-  if (max_error > 0) return clustered_within(clusters, surface, max_error, stop);
-  KnownDistances distances(surface.view());
-  double guess = clusters.coarsest() / 32;  // rather too coarse: fine clusters are many
-  return clustered(clusters, surface, distances, true, stop, [&] {
-    return guess = tolerance_for(clusters, kFieldTriangles, guess, kFinest);
-  });
-}
-
-/// `clusters`: of the surface, where they are made already.
-Approximation approximate(SolidSurface& surface, std::optional<VertexClusters> clusters,
-                          double max_error, const WorkStop& stop) {
-  const std::size_t triangles = surface.arrays().triangle_count;
-  if (triangles > kFieldTriangles) {
-    if (!clusters) clusters.emplace(clusters_of(surface.arrays(), max_error));
-    std::optional<Approximation> few = simplified(surface, *clusters, max_error, stop);
-    if (few && !few->mesh.triangles.empty() && few->mesh.triangles.size() < triangles)
-      return std::move(*few);
-  }
-  Approximation own = own_triangles(surface.arrays());
-  if (max_error > 0 && !(own.error <= max_error))
-    throw Error("the field's error asked for is finer than floats can be; ask for at least " +
-                std::to_string(own.error / max_error) + " times as much");
-  return own;
+std::optional<Approximation> simplified(SolidSurface& surface, double max_error,
+                                        const WorkStop& stop) {
+  const MeshView& arrays = surface.arrays();
+  // Cells of edge c span about 3 area / c² triangles.
+  const double cell = std::sqrt(3 * surface_area(arrays) / kFewTriangles);
+  VertexClusters clusters(arrays, 8 * cell, 10);
+  std::optional<Approximation> few = clustered_within(clusters, surface, max_error, stop);
+  if (!few || few->mesh.triangles.empty() || few->mesh.triangles.size() >= arrays.triangle_count)
+    return std::nullopt;
+  return few;
 }
 
 }  // namespace
 
-std::optional<FieldArrays> build_field(const MeshSolid& solid, double max_error,
-                                       const WorkStop& stop) {
-  std::optional<SolidSurface> surface;
-  std::optional<VertexClusters> clusters;
-  const auto find_surface = [&] {
-    surface = SolidSurface::of(
-        solid, max_error > 0 ? std::min(kOverlapWidth, max_error / 2) : kOverlapWidth);
-  };
-  if (SolidSurface::keeps_all(solid) && solid.arrays().triangle_count > kFieldTriangles)
-    tbb::parallel_invoke(find_surface,
-                         [&] { clusters.emplace(clusters_of(solid.arrays(), max_error)); });
-  else
-    find_surface();
+std::optional<BuiltField> build_field(const MeshSolid& solid, double max_error,
+                                      const WorkStop& stop) {
+  std::optional<SolidSurface> surface = SolidSurface::of(
+      solid, max_error > 0 ? std::min(kOverlapWidth, max_error / 2) : kOverlapWidth);
   if (!surface) return std::nullopt;
   // The surface's own distance from the solid comes on top.
-  Approximation near = approximate(*surface, std::move(clusters),
-                                   max_error > 0 ? max_error - surface->off() : 0, stop);
-  near.error += surface->off();
+  const double left = max_error - surface->off();
+  std::optional<Approximation> few;
+  if (max_error > 0) few = simplified(*surface, left, stop);
+  const bool own = !few;
+  Approximation near = own ? own_triangles(surface->arrays()) : *std::move(few);
+  if (own && max_error > 0 && !(near.error <= left))
+    throw Error("the surface's error asked for is finer than floats can be; ask for at least " +
+                std::to_string(near.error / left) + " times as much");
   if (near.mesh.triangles.empty()) return std::nullopt;
-  if (!near.laid_out) {
-    std::optional<FieldHierarchy> hierarchy;
-    near.laid_out = laid_out(near.mesh, [&] { return hierarchy.emplace(near.mesh).view(); });
-  }
-  near.laid_out->header.error = near.error;
-  return std::move(*near.laid_out);
+  std::optional<FieldHierarchy> hierarchy;
+  BuiltField built = {
+      laid_out(near.mesh, [&] { return hierarchy.emplace(near.mesh).view(); }), {}, own};
+  built.arrays.header.error = near.error + surface->off();
+  built.mesh = std::move(near.mesh);
+  return built;
 }
 
 }  // namespace ist

@@ -227,12 +227,6 @@ std::vector<FieldMesh::Triangle> VertexClusters::spanning(
   return triangles;
 }
 
-std::size_t VertexClusters::triangles_within(double tolerance, std::size_t enough) {
-  // Clusters are half as many as triangles.
-  const std::vector<std::uint32_t>* const cluster_of = chosen(tolerance, enough);
-  return cluster_of == nullptr ? enough + 1 : reduced(spanning(*cluster_of)).size();
-}
-
 Clustered VertexClusters::within(double tolerance) {
   const std::vector<std::uint32_t>& cluster_of =
       *chosen(tolerance, std::numeric_limits<std::size_t>::max());

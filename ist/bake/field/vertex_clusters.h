@@ -32,8 +32,6 @@ class VertexClusters {
   /// unit frame, > 0; halved from level to level.
   VertexClusters(const MeshView& mesh, double coarsest, int levels);
 
-  double coarsest() const { return levels_.front().cell; }
-
   /// Vertices go to the largest cell in which the planes of all triangles pass within `tolerance`
   /// (unit frame) of the cluster's place; where no cell is small enough, they stay.
   Clustered within(double tolerance);
@@ -41,10 +39,6 @@ class VertexClusters {
   /// Counts the clusters of the last within() as so far (unit frame) from their vertices, where
   /// that is further than their planes are.
   void raise(const std::vector<double>& distance_of_cluster);
-
-  /// How many triangles within() leaves before coordinates are rounded. Not counted where there are
-  /// by far more than `enough`: any larger number.
-  std::size_t triangles_within(double tolerance, std::size_t enough);
 
  private:
   /// What is known of a cluster comes when it is asked for: most are far too large or too small.

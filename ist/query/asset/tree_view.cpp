@@ -8,6 +8,7 @@
 #include "query/asset/content_hash.h"
 #include "query/asset/sound_field.h"
 #include "query/asset/sound_mass.h"
+#include "query/asset/sound_mesh.h"
 #include "query/asset/sound_values.h"
 
 namespace ist {
@@ -74,15 +75,14 @@ bool same_levels(const LevelHeader (&a)[kMaxLevels], const LevelHeader (&b)[kMax
   return std::memcmp(a, b, sizeof(a)) == 0;
 }
 
-/// As sound_sections, of the field; `expected` has been laid out without one.
-bool sound_field_sections(const AssetHeader& header, AssetHeader& expected,
-                          DetailLevel* details) noexcept {
+/// As sound_sections, of the field, which is laid out too; `expected` has been without one.
+bool sound_field_sections(const AssetHeader& header, AssetHeader& expected, DetailLevel* details,
+                          FieldHeader& field) noexcept {
   if (header.field != expected.file_bytes ||
       header.file_bytes < expected.file_bytes + sizeof(FieldHeader))
     return false;
   const FieldHeader& found = *at<FieldHeader>(header, header.field);
   if (!sound_field_counts(found)) return false;
-  FieldHeader field;
   std::copy_n(found.bricks, 3, field.bricks);
   field.brick_count = found.brick_count;
   field.cell_count = found.cell_count;
@@ -95,12 +95,37 @@ bool sound_field_sections(const AssetHeader& header, AssetHeader& expected,
          field.cell_ends == found.cell_ends && field.cell_triangles == found.cell_triangles;
 }
 
-/// Offsets and counts are a function of the counts of spheres and details and those of the field:
-/// nothing else is accepted.
+/// As sound_field_sections, of the mesh; `field`: laid out before it, null if there is none.
+bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected, DetailLevel* details,
+                         FieldHeader* field) noexcept {
+  if (header.mesh != expected.file_bytes ||
+      header.file_bytes < expected.file_bytes + sizeof(MeshHeader))
+    return false;
+  const MeshHeader& found = *at<MeshHeader>(header, header.mesh);
+  if (!sound_mesh_counts(found)) return false;
+  MeshHeader mesh;
+  mesh.vertex_count = found.vertex_count;
+  mesh.shell_count = found.shell_count;
+  mesh.neighbour_count = found.neighbour_count;
+  mesh.level[0].count = found.level[0].count;
+  place_sections(expected, details, field, &mesh);
+  return mesh.level_count == found.level_count && same_levels(mesh.level, found.level) &&
+         mesh.vertices == found.vertices && mesh.shells == found.shells &&
+         mesh.neighbours == found.neighbours;
+}
+
+/// An asset holds spheres, or a mesh alone.
+bool sound_counts(const AssetHeader& header) noexcept {
+  if (header.sphere_count == 0)
+    return header.mesh != 0 && header.field == 0 && header.detail_count == 0;
+  return header.sphere_count <= kMaxSpheres && header.detail_count <= kMaxDetails &&
+         detail_spheres(header.sphere_count, header.detail_count) >= 1;
+}
+
+/// Offsets and counts are a function of the counts of spheres and details and those of the field
+/// and the mesh: nothing else is accepted.
 bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
-  if (header.sphere_count < 1 || header.sphere_count > kMaxSpheres) return false;
-  if (header.detail_count > kMaxDetails) return false;
-  if (detail_spheres(header.sphere_count, header.detail_count) < 1) return false;
+  if (!sound_counts(header)) return false;
   AssetHeader expected;
   DetailLevel details[kMaxDetails];
   expected.sphere_count = header.sphere_count;
@@ -111,7 +136,11 @@ bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
            a.sphere_count == b.sphere_count && a.level_count == b.level_count &&
            same_levels(a.level, b.level);
   };
-  if (header.field != 0 && !sound_field_sections(header, expected, details)) return false;
+  FieldHeader field;
+  if (header.field != 0 && !sound_field_sections(header, expected, details, field)) return false;
+  if (header.mesh != 0 &&
+      !sound_mesh_sections(header, expected, details, header.field != 0 ? &field : nullptr))
+    return false;
   if (expected.file_bytes != bytes || expected.details != header.details) return false;
   const DetailLevel* const found = at<DetailLevel>(header, header.details);
   for (std::uint32_t i = 0; i < header.detail_count; ++i)
@@ -123,6 +152,12 @@ bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
          expected.matched_spheres == header.matched_spheres &&
          same_tree(expected.inner_tree, header.inner_tree) &&
          same_tree(expected.matched_tree, header.matched_tree);
+}
+
+bool sound_state(const AssetHeader& header) noexcept {
+  const auto state = static_cast<MeshState>(header.mesh_state);
+  if (header.mesh == 0) return state == MeshState::none || state == MeshState::unresolved;
+  return state == MeshState::own || state == MeshState::united || state == MeshState::simplified;
 }
 
 bool sound_values(const AssetHeader& header) noexcept {
@@ -141,6 +176,8 @@ bool sound_values(const AssetHeader& header) noexcept {
   if (!is_finite_sum(header.measured_error) || header.worst_partner >= kTrialPartners) return false;
   if (header.field != 0 && !sound_field(header, *at<FieldHeader>(header, header.field)))
     return false;
+  if (!is_finite_sum(header.counted_twice) || !sound_state(header)) return false;
+  if (header.mesh != 0 && !sound_mesh(header, *at<MeshHeader>(header, header.mesh))) return false;
   const DetailLevel* const details = at<DetailLevel>(header, header.details);
   for (std::uint32_t i = 0; i < header.detail_count; ++i) {
     const TreeHeader& tree = details[i].matched_tree;
@@ -148,6 +185,7 @@ bool sound_values(const AssetHeader& header) noexcept {
         !sound_spheres(header, details[i].matched_spheres, tree.sphere_count))
       return false;
   }
+  if (header.sphere_count == 0) return true;
   return sound_spheres(header, header.inner_spheres, header.sphere_count) &&
          sound_spheres(header, header.matched_spheres, header.sphere_count) &&
          sound_tree(header, header.inner_tree) && sound_tree(header, header.matched_tree);
@@ -201,6 +239,26 @@ double TreeView::field_error() const noexcept {
 
 std::uint32_t TreeView::field_triangles() const noexcept {
   return has_field() ? at<FieldHeader>(*header_, header_->field)->triangle_count : 0;
+}
+
+bool TreeView::has_mesh() const noexcept { return header_ != nullptr && header_->mesh != 0; }
+
+std::uint32_t TreeView::mesh_triangles() const noexcept {
+  return has_mesh() ? at<MeshHeader>(*header_, header_->mesh)->triangle_count : 0;
+}
+
+double TreeView::mesh_error() const noexcept {
+  if (!has_mesh()) return 0;
+  const MeshHeader& mesh = *at<MeshHeader>(*header_, header_->mesh);
+  return std::ldexp(mesh.error + mesh.rounding, header_->exponent);
+}
+
+MeshState TreeView::mesh_state() const noexcept {
+  return static_cast<MeshState>(header().mesh_state);
+}
+
+double TreeView::counted_twice() const noexcept {
+  return std::ldexp(header().counted_twice, 3 * header().exponent);
 }
 
 PredictedErrors TreeView::predicted_errors() const noexcept {

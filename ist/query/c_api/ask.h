@@ -28,11 +28,11 @@ ist_status_t ask_about(const Solid* a, const ist_placed_tree_t* b, ist_workspace
   return scratch == nullptr ? status : ask(first.placed(), second, *scratch);
 }
 
-/// An answer's status. On an error the answer is all zero else; what is written anyway is not
-/// cleared before, which would cost more than all else here.
+/// An answer's status. On an error the answer is all zero else, or NaN as a query wrote it; what is
+/// written anyway is not cleared before, which would cost more than all else here.
 template <class Answer>
 ist_status_t noted(ist_status_t status, Answer& answer) noexcept {
-  if (status < 0) {
+  if (status < 0 && status != IST_NOT_HELD) {
     answer = Answer{};
     answer.size = sizeof(Answer);
     answer.status = status;

@@ -50,6 +50,7 @@ ist_status_t get_balls(const TreeView& view, const ist_ball_set_t& set, ist_ball
   const bool inner = set.measure == IST_INNER;
   if (!inner && set.measure != IST_MATCHED) return IST_INVALID_INPUT;
   if (set.detail > (inner ? 0 : asset.detail_count)) return IST_INVALID_INPUT;
+  if (view.sphere_count() == 0) return IST_NOT_HELD;
   const SphereTree tree(asset, inner ? asset.inner_tree : matched_tree(asset, set.detail));
   if (set.level > static_cast<std::uint32_t>(tree.top)) return IST_INVALID_INPUT;
   const OwnFrame frame(asset);

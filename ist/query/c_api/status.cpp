@@ -11,6 +11,8 @@ const char* ist_describe(ist_status_t status) {
       return "a limit or the workspace's capacity stopped the query: its bounds still hold";
     case IST_INVALID_INPUT:
       return "a pose, a scale, a field's number or a setting is out of range";
+    case IST_NOT_HELD:
+      return "an asset does not hold what is asked: bake it with spheres, or with its surface";
     case IST_NULL_POINTER:
       return "a pointer that must not be null is";
     case IST_WRONG_SIZE:

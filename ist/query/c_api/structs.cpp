@@ -103,6 +103,9 @@ void write(const TimeOfImpact& found, ist_impact_t& answer) noexcept {
     case ImpactStatus::budget_exhausted:
       answer.status = IST_BUDGET_EXHAUSTED;
       break;
+    case ImpactStatus::not_held:
+      answer.status = IST_NOT_HELD;
+      break;
     default:
       answer.kind = static_cast<ist_impact_kind_t>(found.status);
   }

@@ -92,7 +92,8 @@ PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const Plac
 
 PairFit pair_fit(const PlacedTree& a, const PlacedTree& b) noexcept {
   PairFit fit;
-  if (a.tree.empty() || b.tree.empty() || !(a.scale > 0) || !(b.scale > 0)) return fit;
+  if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0) return fit;
+  if (!(a.scale > 0) || !(b.scale > 0)) return fit;
   const auto placed_grain = [](const PlacedTree& placed) {
     const AssetHeader& header = placed.tree.header();
     return std::ldexp(placed.scale * grain(header.matched_tree, header), header.exponent);

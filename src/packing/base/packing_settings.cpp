@@ -19,6 +19,13 @@ void require(bool in_range, const char* name, double value, const char* range) {
 
 }  // namespace
 
+void check_settings(const SurfaceSettings& s) {
+  require(s.error >= 0 && std::isfinite(s.error), "surface.error", s.error,
+          "finite and not negative (0 = none is asked for)");
+  require(s.share >= 0 && s.share < 1, "surface.share", s.share,
+          "in [0, 1) (0 = none is asked for)");
+}
+
 void check_settings(const PackingSettings& s) {
   require(s.max_spheres <= std::numeric_limits<std::uint32_t>::max() / 2, "max_spheres",
           static_cast<double>(s.max_spheres), "below 2^31 (0 = no limit)");
@@ -35,8 +42,7 @@ void check_settings(const PackingSettings& s) {
           "at most 1024 (0 = automatic)");
   require(s.grids.refinements <= 10, "grids.refinements", s.grids.refinements,
           "at most 10 (negative = automatic)");
-  require(s.field.error >= 0 && std::isfinite(s.field.error), "field.error", s.field.error,
-          "finite and not negative (0 = none is asked for)");
+  check_settings(s.surface);
   if (s.max_spheres == 0 && s.target_coverage >= 1 && s.min_radius <= 0 && s.time_limit <= 0)
     throw Error(
         "packing: no limit is set; give a sphere count, a coverage below 1, a smallest radius or a "

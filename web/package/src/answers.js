@@ -5,8 +5,11 @@ import {f64, u32} from './memory.js';
 
 export const newVector = () => new Float64Array(3);
 
+const kNotHeld = -15;  // IST_NOT_HELD
+
 export const statusOf = (status) => status === 0 ? 'ok' :
     status > 0                                   ? 'budget-exhausted' :
+    status === kNotHeld                          ? 'not-held' :
                                                    'invalid-input';
 
 export const newPenetration = () => ({

@@ -1,0 +1,272 @@
+#include "bake/check/check_kept_mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include <ist/tree_view.h>
+
+#include "bake/check/check_tally.h"
+
+namespace ist {
+namespace {
+
+using Corners = CheckSurface::Corners;
+using Point = Eigen::Vector3d;
+using Edge = std::array<std::uint32_t, 2>;
+
+/// A mesh of an asset, block by block.
+class KeptMesh {
+ public:
+  KeptMesh(const AssetHeader& asset, const MeshHeader& mesh)
+      : header(mesh),
+        blocks(at<MeshBlock>(asset, mesh.level[0].blocks)),
+        count(mesh.level[0].count),
+        neighbours(at<std::uint32_t>(asset, mesh.neighbours)),
+        shells(at<MeshShell>(asset, mesh.shells)),
+        vertices_(at<double>(asset, mesh.vertices)) {}
+
+  Point vertex(std::uint32_t v) const { return Point(vertices_ + 3 * std::size_t{v}); }
+  std::uint32_t corner(std::size_t block, std::uint32_t lane, std::size_t k) const {
+    return blocks[block].vertex[blocks[block].corner[k][lane]];
+  }
+  std::vector<Corners> triangles() const {
+    std::vector<Corners> all;
+    for (std::size_t b = 0; b < count; ++b)
+      for (std::uint32_t l = 0; l < blocks[b].triangles; ++l)
+        all.push_back({vertex(corner(b, l, 0)), vertex(corner(b, l, 1)), vertex(corner(b, l, 2))});
+    return all;
+  }
+
+  const MeshHeader& header;
+  const MeshBlock* const blocks;
+  const std::size_t count;
+  const std::uint32_t* const neighbours;
+  const MeshShell* const shells;
+
+ private:
+  const double* const vertices_;
+};
+
+/// Sets that grow together.
+class Groups {
+ public:
+  explicit Groups(std::size_t count) : of_(count), left_(count) {
+    std::iota(of_.begin(), of_.end(), std::size_t{0});
+  }
+  std::size_t find(std::size_t i) {
+    while (of_[i] != i) i = of_[i] = of_[of_[i]];
+    return i;
+  }
+  void join(std::size_t a, std::size_t b) {
+    a = find(a);
+    b = find(b);
+    if (a == b) return;
+    of_[std::max(a, b)] = std::min(a, b);
+    --left_;
+  }
+  std::size_t left() const { return left_; }
+
+ private:
+  std::vector<std::size_t> of_;
+  std::size_t left_;
+};
+
+using Key = std::array<double, 9>;
+
+/// Triangles by their corners, the least corner first, in order.
+std::vector<Key> keys_of(const std::vector<Corners>& triangles) {
+  std::vector<Key> keys;
+  for (const Corners& t : triangles) {
+    const auto less = [&](std::size_t a, std::size_t b) {
+      return std::lexicographical_compare(t[a].begin(), t[a].end(), t[b].begin(), t[b].end());
+    };
+    std::size_t first = less(1, 0) ? 1 : 0;
+    if (less(2, first)) first = 2;
+    Key& key = keys.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k)
+      for (int x = 0; x < 3; ++x) key[3 * k + static_cast<std::size_t>(x)] = t[(first + k) % 3][x];
+  }
+  std::sort(keys.begin(), keys.end());
+  return keys;
+}
+
+/// The same triangles, corner for corner.
+Invariant same_triangles(const std::vector<Corners>& kept, const std::vector<Corners>& baked) {
+  const std::vector<Key> ours = keys_of(kept), theirs = keys_of(baked);
+  std::vector<Key> missing, added;
+  std::set_difference(theirs.begin(), theirs.end(), ours.begin(), ours.end(),
+                      std::back_inserter(missing));
+  std::set_difference(ours.begin(), ours.end(), theirs.begin(), theirs.end(),
+                      std::back_inserter(added));
+  Tally tally;
+  tally.checked = theirs.size();
+  tally.violations = missing.size() + added.size();
+  tally.worst = static_cast<double>(tally.violations);
+  return tally.named("mesh triangles", "triangles of one, the asset's mesh or the baked, alone");
+}
+
+/// The baked vertices went no further than `rounding` on their way into the unit frame.
+Invariant rounding(const ClosedMesh& closed, const UnitFrame& frame, double rounding) {
+  const double scale = frame.scale();
+  const std::vector<Point>& vertices = closed.mesh.vertices;
+  std::vector<char> used(vertices.size());
+  for (const auto& triangle : closed.mesh.triangles)
+    for (const std::uint32_t v : triangle) used[v] = 1;
+  return tally_all(vertices.size(),
+                   [&](std::size_t v, Tally& tally) {
+                     if (used[v] == 0) return;
+                     const Point there = frame.to_unit(vertices[v]);
+                     Point off;
+                     for (int k = 0; k < 3; ++k) {
+                       // x − c as two numbers without rounding; what is kept goes off the larger.
+                       const double x = vertices[v][k], c = frame.centre[k];
+                       const double sum = x - c, part = sum - x;
+                       const double rest = (x - (sum - part)) - (c + part);
+                       off[k] = ((sum - there[k] * scale) + rest) / scale;
+                     }
+                     tally.add(off.norm() * (1 - 1e-14) - rounding, v);
+                   })
+      .named("mesh rounding", "way of a vertex into the unit frame − the rounding, unit frame");
+}
+
+/// Every edge is run as often one way as the other.
+Invariant closed(const KeptMesh& mesh) {
+  std::vector<std::pair<Edge, int>> runs;
+  for (std::size_t b = 0; b < mesh.count; ++b)
+    for (std::uint32_t l = 0; l < mesh.blocks[b].triangles; ++l)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t from = mesh.corner(b, l, k), to = mesh.corner(b, l, (k + 1) % 3);
+        runs.push_back({{std::min(from, to), std::max(from, to)}, from < to ? 1 : -1});
+      }
+  std::sort(runs.begin(), runs.end());
+  Tally tally;
+  for (std::size_t i = 0; i < runs.size();) {
+    int sum = 0;
+    const std::size_t first = i;
+    for (; i < runs.size() && runs[i].first == runs[first].first; ++i) sum += runs[i].second;
+    tally.add(std::abs(sum), first);
+  }
+  return tally.named("mesh closed", "runs of an edge one way less those the other way");
+}
+
+/// Triangles of a block hang together.
+Invariant blocks(const KeptMesh& mesh) {
+  Tally tally;
+  for (std::size_t b = 0; b < mesh.count; ++b) {
+    const MeshBlock& block = mesh.blocks[b];
+    Groups groups(block.vertices);
+    for (std::uint32_t l = 0; l < block.triangles; ++l)
+      for (std::size_t k = 1; k < 3; ++k) groups.join(block.corner[0][l], block.corner[k][l]);
+    tally.add(static_cast<double>(groups.left()) - 1, b);
+  }
+  return tally.named("mesh blocks", "parts of a block that share no vertex, less one");
+}
+
+/// A block's list names all blocks that share a vertex with it, and no other.
+Invariant neighbours(const KeptMesh& mesh) {
+  std::vector<std::vector<std::uint32_t>> around(mesh.header.vertex_count);
+  for (std::uint32_t b = 0; b < mesh.count; ++b)
+    for (std::uint32_t i = 0; i < mesh.blocks[b].vertices; ++i)
+      around[mesh.blocks[b].vertex[i]].push_back(b);
+  return tally_all(mesh.count,
+                   [&](std::size_t b, Tally& tally) {
+                     const MeshBlock& block = mesh.blocks[b];
+                     std::vector<std::uint32_t> wanted, named;
+                     for (std::uint32_t i = 0; i < block.vertices; ++i)
+                       for (const std::uint32_t other : around[block.vertex[i]])
+                         if (other != b) wanted.push_back(other);
+                     std::sort(wanted.begin(), wanted.end());
+                     wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
+                     for (std::uint32_t k = 0; k < block.neighbours; ++k)
+                       named.push_back(mesh.neighbours[block.first_neighbour + k] / kWidth);
+                     std::sort(named.begin(), named.end());
+                     std::vector<std::uint32_t> wrong;
+                     std::set_symmetric_difference(wanted.begin(), wanted.end(), named.begin(),
+                                                   named.end(), std::back_inserter(wrong));
+                     tally.add(static_cast<double>(wrong.size()), b);
+                   })
+      .named("mesh neighbours", "blocks that share a vertex and are not listed, or the reverse");
+}
+
+/// How far a block's vertices reach out of a box; ≤ 0: not at all.
+double out_of(const KeptMesh& mesh, std::size_t b, const Point& low, const Point& high) {
+  double most = -HUGE_VAL;
+  for (std::uint32_t i = 0; i < mesh.blocks[b].vertices; ++i) {
+    const Point p = mesh.vertex(mesh.blocks[b].vertex[i]);
+    most = std::max({most, (low - p).maxCoeff(), (p - high).maxCoeff()});
+  }
+  return most;
+}
+
+Invariant boxes(const AssetHeader& asset, const KeptMesh& mesh) {
+  Tally sum;
+  std::size_t number = 0;
+  for (std::uint32_t k = 1; k < mesh.header.level_count; ++k) {
+    const std::size_t below = mesh.header.level[k - 1].count;
+    const BoxBlock* const level = at<BoxBlock>(asset, mesh.header.level[k].blocks);
+    sum.add(tally_all(below, [&](std::size_t i, Tally& tally) {
+      Point low, high;
+      for (int x = 0; x < 3; ++x) {
+        low[x] = level[i / kWidth].low[x][i % kWidth];
+        high[x] = level[i / kWidth].high[x][i % kWidth];
+      }
+      double most = -HUGE_VAL;
+      const std::size_t end = std::min(mesh.count, (i + 1) << (4 * (k - 1)));
+      for (std::size_t b = i << (4 * (k - 1)); b < end; ++b)
+        most = std::max(most, out_of(mesh, b, low, high));
+      tally.add(most, number + i);
+    }));
+    number += below;
+  }
+  return sum.named("mesh boxes", "how far what is below a box reaches out of it, unit frame");
+}
+
+/// Blocks that hang together are a shell, its box holds them, and there are no others.
+std::vector<Invariant> shells(const KeptMesh& mesh) {
+  Groups groups(mesh.header.vertex_count);
+  for (std::size_t b = 0; b < mesh.count; ++b)
+    for (std::uint32_t i = 1; i < mesh.blocks[b].vertices; ++i)
+      groups.join(mesh.blocks[b].vertex[0], mesh.blocks[b].vertex[i]);
+  Tally together, held;
+  for (std::size_t b = 0; b < mesh.count; ++b) {
+    const MeshShell& shell = mesh.shells[mesh.blocks[b].shell];
+    const bool hang_together =
+        groups.find(mesh.blocks[b].vertex[0]) == groups.find(mesh.blocks[shell.block].vertex[0]);
+    together.add(hang_together ? 0 : 1, b);
+    const Point low(double{shell.low[0]}, double{shell.low[1]}, double{shell.low[2]});
+    const Point high(double{shell.high[0]}, double{shell.high[1]}, double{shell.high[2]});
+    held.add(out_of(mesh, b, low, high), b);
+  }
+  together.add(std::abs(static_cast<double>(groups.left()) - mesh.header.shell_count), mesh.count);
+  return {together.named("mesh shells",
+                         "1 where a block hangs together with none of its shell; "
+                         "parts that hang together less shells"),
+          held.named("mesh shell boxes", "how far a block reaches out of its shell's, unit frame")};
+}
+
+}  // namespace
+
+std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMesh& baked,
+                                       const UnitFrame& frame, const CheckSurface& surface,
+                                       Bounding bounding) {
+  if (asset.mesh == 0) return {};
+  const KeptMesh mesh(asset, *at<MeshHeader>(asset, asset.mesh));
+  std::vector<Invariant> out;
+  if (static_cast<MeshState>(asset.mesh_state) == MeshState::own) {
+    out.push_back(same_triangles(mesh.triangles(), surface.triangles()));
+    out.push_back(rounding(baked, frame, mesh.header.rounding));
+  } else {
+    out = check_near("kept mesh", CheckSurface(mesh.triangles()), boundary_of(surface, bounding),
+                     mesh.header.error, bounding);
+  }
+  for (Invariant& one :
+       std::vector<Invariant>{closed(mesh), blocks(mesh), neighbours(mesh), boxes(asset, mesh)})
+    out.push_back(std::move(one));
+  for (Invariant& one : shells(mesh)) out.push_back(std::move(one));
+  return out;
+}
+
+}  // namespace ist

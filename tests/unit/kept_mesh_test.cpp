@@ -1,0 +1,256 @@
+#include <gtest/gtest.h>
+#include <ist/bake.h>
+#include <ist/error.h>
+#include <ist/field.h>
+#include <ist/lenses.h>
+#include <ist/mass_properties.h>
+#include <ist/overlap.h>
+#include <ist/pair_fit.h>
+#include <ist/query.h>
+#include <ist/time_of_impact.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <ist/asset_layout.h>
+#include "support/test_meshes.h"
+
+// The mesh that an asset holds for exact queries, and assets of a surface alone.
+
+namespace ist {
+namespace {
+
+using Point = Eigen::Vector3d;
+
+ClosedMesh closed(TriangleMesh mesh, const char* name) { return close_mesh(std::move(mesh), name); }
+
+PackingSettings few_spheres(const SurfaceSettings& surface = {}) {
+  PackingSettings settings;
+  settings.max_spheres = 20;
+  settings.surface = surface;
+  return settings;
+}
+
+SurfaceSettings within(double error, double share = 0) {
+  SurfaceSettings surface;
+  surface.error = error;
+  surface.share = share;
+  return surface;
+}
+
+void expect_sound(const Asset& asset, const ClosedMesh& mesh) {
+  std::size_t of_mesh = 0;
+  for (const Invariant& one : check(asset, mesh)) {
+    if (one.name.find("mesh") != std::string::npos) ++of_mesh;
+    EXPECT_EQ(one.violations, 0u) << one.name << ": " << one.worst << " at " << one.where;
+  }
+  EXPECT_GE(of_mesh, 8u);
+}
+
+const MeshHeader& mesh_of(const Asset& asset) {
+  return *at<MeshHeader>(asset.view().header(), asset.view().header().mesh);
+}
+
+TEST(KeptMesh, IsAllOfTheMeshsOwnTriangles) {
+  const ClosedMesh ball = closed(testing::icosphere_mesh(6), "ball");  // 81,920
+  const ClosedMesh cube = closed(testing::cube_mesh(), "cube");
+  for (const ClosedMesh* mesh : {&ball, &cube}) {
+    const Asset asset = bake(*mesh, few_spheres());
+    EXPECT_EQ(asset.view().mesh_state(), MeshState::own);
+    EXPECT_EQ(asset.view().mesh_triangles(), mesh->mesh.triangles.size());
+    EXPECT_EQ(asset.view().field_triangles(), mesh->mesh.triangles.size());
+    EXPECT_EQ(mesh_of(asset).error, 0);
+    EXPECT_EQ(asset.view().counted_twice(), 0);
+    expect_sound(asset, *mesh);
+  }
+}
+
+// Where the map into the unit frame is exact nothing was rounded; elsewhere the bound is tight.
+TEST(KeptMesh, TellsHowFarVerticesWereRounded) {
+  const Asset exact = bake_surface(closed(testing::cube_mesh(), "cube"));
+  EXPECT_EQ(exact.view().mesh_error(), 0);
+  TriangleMesh far = testing::cube_mesh();
+  for (Point& v : far.vertices) v = v / 3 + Point(1e6 / 7, 0.1, 0);
+  const ClosedMesh moved = closed(std::move(far), "moved");
+  const Asset rounded = bake_surface(moved);
+  EXPECT_GT(rounded.view().mesh_error(), 0);
+  EXPECT_LT(rounded.view().mesh_error(), 1e-10);
+  expect_sound(rounded, moved);
+}
+
+TEST(KeptMesh, IsSimplifiedWithinAnErrorOnRequest) {
+  const ClosedMesh ball = closed(testing::icosphere_mesh(5), "ball");  // 20,480
+  std::uint32_t last = 0;
+  for (const SurfaceSettings& surface : {within(0.05), within(0, 0.0025), within(5e-4)}) {
+    const Asset asset = bake(ball, few_spheres(surface));
+    EXPECT_EQ(asset.view().mesh_state(), MeshState::simplified);
+    EXPECT_EQ(asset.view().mesh_triangles(), asset.view().field_triangles());
+    EXPECT_LE(
+        asset.view().mesh_error(),
+        surface.error > 0 ? surface.error : surface.share * ball.report.bounds.sizes().maxCoeff());
+    EXPECT_GT(asset.view().mesh_triangles(), last);
+    last = asset.view().mesh_triangles();
+    expect_sound(asset, ball);
+    const Asset alone = bake_surface(ball, surface);
+    EXPECT_EQ(alone.view().mesh_triangles(), last);
+    EXPECT_EQ(alone.view().mesh_error(), asset.view().mesh_error());
+    expect_sound(alone, ball);
+  }
+  EXPECT_LT(last, ball.mesh.triangles.size());
+}
+
+TEST(KeptMesh, IsLeftOutWhereNoneIsWanted) {
+  SurfaceSettings none;
+  none.wanted = false;
+  const ClosedMesh cube = closed(testing::cube_mesh(), "cube");
+  const Asset asset = bake(cube, few_spheres(none));
+  EXPECT_FALSE(asset.view().has_mesh());
+  EXPECT_FALSE(asset.view().has_field());
+  EXPECT_EQ(asset.view().mesh_state(), MeshState::none);
+  EXPECT_EQ(asset.view().mesh_triangles(), 0u);
+  EXPECT_THROW(bake_surface(cube, none), Error);
+  EXPECT_THROW(bake(cube, few_spheres(within(-1))), Error);
+  EXPECT_THROW(bake(cube, few_spheres(within(0, 1))), Error);
+}
+
+// Never counted twice in silence.
+TEST(KeptMesh, OfWhatCountsVolumeTwiceIsNone) {
+  const Point one = Point::Ones();
+  const ClosedMesh crossing = closed(testing::overlapping_cubes_mesh(), "crossing");
+  const ClosedMesh nested =
+      closed(testing::joined(testing::box_mesh(-one, one), testing::box_mesh(-one / 2, one / 2)),
+             "nested");
+  for (const ClosedMesh* mesh : {&crossing, &nested}) {
+    const Asset asset = bake(*mesh, few_spheres());
+    EXPECT_FALSE(asset.view().has_mesh());
+    EXPECT_EQ(asset.view().mesh_state(), MeshState::unresolved);
+    EXPECT_NEAR(asset.view().counted_twice(), mesh->report.volume - asset.view().volume(),
+                1e-6 * asset.view().volume());
+    EXPECT_THROW(bake_surface(*mesh), Error);
+  }
+  EXPECT_NEAR(bake(nested, few_spheres()).view().counted_twice(), 1, 1e-6);
+  // Parts that touch, and cavities, are as they should be.
+  const ClosedMesh touching =
+      closed(testing::joined(testing::box_mesh(-one, one),
+                             testing::box_mesh(Point(1, -0.5, -0.5), Point(2, 0.5, 0.5))),
+             "touching");
+  const ClosedMesh cavity =
+      closed(testing::joined(testing::box_mesh(-one, one),
+                             testing::inverted(testing::box_mesh(-one / 2, one / 2))),
+             "cavity");
+  for (const ClosedMesh* mesh : {&touching, &cavity}) {
+    const Asset asset = bake(*mesh, few_spheres());
+    EXPECT_EQ(asset.view().mesh_state(), MeshState::own) << mesh->name;
+    EXPECT_EQ(asset.view().counted_twice(), 0);
+    EXPECT_EQ(mesh_of(asset).shell_count, 2u);
+    expect_sound(asset, *mesh);
+  }
+}
+
+TEST(KeptMesh, OfASolidByItsDistanceIsTheOneInItsPlace) {
+  PolygoniseSettings meshing;
+  meshing.cells = 24;
+  const auto ball = make_ball(Point::Zero(), 1);
+  const Asset asset = bake(*ball, few_spheres(), {}, meshing);
+  EXPECT_EQ(asset.view().mesh_state(), MeshState::simplified);
+  EXPECT_GE(asset.view().mesh_error(),
+            std::ldexp(asset.view().header().polygonise_error, asset.view().header().exponent));
+  for (const Invariant& one : check(asset, *ball)) EXPECT_EQ(one.violations, 0u) << one.name;
+}
+
+TEST(KeptMesh, SameBytesForAnyNumberOfThreads) {
+  const ClosedMesh ball = closed(testing::icosphere_mesh(5), "ball");
+  for (const SurfaceSettings& surface : {SurfaceSettings(), within(1e-3)}) {
+    const Asset one = bake_surface(ball, surface, 1);
+    for (const unsigned threads : {2u, 5u}) {
+      const Asset other = bake_surface(ball, surface, threads);
+      EXPECT_TRUE(std::equal(one.bytes().begin(), one.bytes().end(), other.bytes().begin(),
+                             other.bytes().end()));
+    }
+  }
+}
+
+class SurfaceAlone : public ::testing::Test {
+ protected:
+  const ClosedMesh mesh_ = closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
+  const Asset alone_ = bake_surface(mesh_);
+  const Asset whole_ = bake(mesh_, few_spheres());
+  Workspace workspace_;
+};
+
+TEST_F(SurfaceAlone, HoldsMeshMassAndBounds) {
+  expect_sound(alone_, mesh_);
+  EXPECT_EQ(alone_.view().sphere_count(), 0u);
+  EXPECT_FALSE(alone_.view().empty());
+  EXPECT_FALSE(alone_.view().has_field());
+  EXPECT_EQ(mass_properties(alone_.view()).inertia, mass_properties(whole_.view()).inertia);
+  EXPECT_EQ(alone_.view().volume(), whole_.view().volume());
+  EXPECT_EQ(bounds(alone_.view()).radius, bounds(whole_.view()).radius);
+}
+
+void expect_not_held(const Penetration& found) {
+  EXPECT_EQ(found.status, QueryStatus::not_held);
+  for (const double x : {found.volume, found.volume_min, found.volume_max, found.centroid[0],
+                         found.translation_gradient[1], found.rotation_gradient[2]})
+    EXPECT_TRUE(std::isnan(x));
+}
+
+void expect_not_held(const Separation& found) {
+  EXPECT_EQ(found.status, QueryStatus::not_held);
+  for (const double x : {found.distance, found.distance_min, found.distance_max, found.point_a[0],
+                         found.point_b[1], found.normal[2]})
+    EXPECT_TRUE(std::isnan(x));
+}
+
+void expect_not_held(const TimeOfImpact& found) {
+  EXPECT_EQ(found.status, ImpactStatus::not_held);
+  for (const double x : {found.time, found.distance_min, found.distance_max, found.point_a[0]})
+    EXPECT_TRUE(std::isnan(x));
+}
+
+TEST_F(SurfaceAlone, AnswersNoQueryOfSpheres) {
+  const PlacedTree alone{alone_.view(), {}, 1}, whole{whole_.view(), {}, 1};
+  for (const auto& [a, b] : {std::pair(alone, whole), {whole, alone}, {alone, alone}}) {
+    for (const Measure measure : {Measure::matched, Measure::inner}) {
+      PenetrationSettings settings;
+      settings.measure = measure;
+      expect_not_held(penetration(a, b, settings, workspace_));
+      settings.pair_budget = 100;
+      expect_not_held(penetration(a, b, settings, workspace_));
+      ContactSettings contact;
+      contact.measure = measure;
+      std::vector<ContactPatch> patches(4);
+      const ContactPatches found = contact_patches(a, b, contact, workspace_, patches);
+      expect_not_held(found.penetration);
+      EXPECT_EQ(found.count, 0u);
+      without_protrusion(std::span(patches).first(0), a, b, contact);
+    }
+    expect_not_held(separation(a, b, {}, workspace_));
+    expect_not_held(time_of_impact(a, b, {}, {}, workspace_));
+    EXPECT_EQ(overlap(a, b, workspace_), Overlapping::unknown);
+    EXPECT_EQ(overlap_lenses(a, b, {}, {}).status, QueryStatus::not_held);
+    EXPECT_TRUE(pair_fit(a, b).fits());
+    Penetration answer;
+    const PlacedPair pair{a, b};
+    penetration_batch({&pair, 1}, {}, {&workspace_, 1}, {&answer, 1});
+    expect_not_held(answer);
+    expect_not_held(without_protrusion(answer, a, b));
+  }
+}
+
+TEST_F(SurfaceAlone, MeetsNoField) {
+  const PlacedTree alone{alone_.view(), {}, 1}, whole{whole_.view(), {}, 1};
+  const PlacedField ball{BallField{1}, {}, 1}, mesh{MeshField{alone_.view()}, {}, 1};
+  for (const auto& [a, b] : {std::pair(ball, alone), {mesh, whole}, {mesh, alone}}) {
+    expect_not_held(penetration(a, b, {}, workspace_));
+    expect_not_held(separation(a, b, {}, workspace_));
+    expect_not_held(time_of_impact(a, b, {}, {}, workspace_));
+    EXPECT_EQ(overlap(a, b, workspace_), Overlapping::unknown);
+    std::vector<ContactPatch> patches(4);
+    expect_not_held(contact_patches(a, b, {}, workspace_, patches).penetration);
+  }
+}
+
+}  // namespace
+}  // namespace ist
