@@ -3,14 +3,14 @@
 #include "query/base/no_answer.h"
 #include "query/detail/coincident.h"
 #include "query/detail/detail_blend.h"
-#include "query/exact/exact_penetration.h"
+#include "query/exact_penetration.h"
 #include "query/field/pair_overlap.h"
 
 namespace ist {
 
 Penetration penetration(const PlacedTree& a, const PlacedTree& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept {
-  if (lack_spheres(a, b)) return not_held<Penetration>();
+  if (settings.measure != Measure::exact && lack_spheres(a, b)) return not_held<Penetration>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) {
     Penetration refused;

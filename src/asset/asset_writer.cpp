@@ -65,10 +65,12 @@ class SectionWriter {
     write(header.shells, mesh.shells, header.shell_count);
     write(header.neighbours, mesh.neighbours, header.neighbour_count);
     write(header.level[0].blocks, mesh.blocks, header.level[0].count);
-    if (mesh.boxes.size() + 1 != header.level_count)
+    if (mesh.boxes.size() + 1 != header.level_count || mesh.sums.size() != mesh.boxes.size())
       throw Error("asset: the mesh has a wrong number of levels");
-    for (std::uint32_t k = 1; k < header.level_count; ++k)
+    for (std::uint32_t k = 1; k < header.level_count; ++k) {
       write(header.level[k].blocks, mesh.boxes[k - 1], header.level[k].count);
+      write(header.level[k].nodes, mesh.sums[k - 1], header.level[k].count);
+    }
   }
 
  private:

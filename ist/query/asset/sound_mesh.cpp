@@ -126,6 +126,29 @@ bool sound_boxes(const AssetHeader& asset, const MeshHeader& mesh) noexcept {
   return sound;
 }
 
+/// Finite, no area below zero, and nothing in unused lanes.
+bool sound_sums(const AssetHeader& asset, const MeshHeader& mesh) noexcept {
+  constexpr double kMost = 1e18;
+  bool sound = true;
+  for (std::uint32_t level = 1; level < mesh.level_count; ++level) {
+    const BoxSums* sums = at<BoxSums>(asset, mesh.level[level].nodes);
+    const std::uint32_t used = mesh.level[level - 1].count;
+    for (std::uint64_t i = 0; i < std::uint64_t{kWidth} * mesh.level[level].count; ++i) {
+      const BoxSums& of = sums[i / kWidth];
+      const double most = i < used ? kMost : 0;
+      const std::size_t lane = i % kWidth;
+      for (int k = 0; k < 3; ++k) {
+        sound &= in_range(of.normal[k][lane], -most, most) &&
+                 in_range(of.cone[k][lane], -most, most);
+        for (const auto& flux : of.flux[k])
+          sound &= in_range(flux[lane], -most, most);
+      }
+      sound &= in_range(of.area[lane], 0, most);
+    }
+  }
+  return sound;
+}
+
 bool sound_vertices(const MeshParts& mesh) noexcept {
   bool sound = true;
   for (std::uint64_t i = 0; i < std::uint64_t{3} * mesh.header.vertex_count; ++i)
@@ -143,7 +166,7 @@ bool sound_mesh(const AssetHeader& header, const MeshHeader& mesh) noexcept {
   const MeshParts parts(header, mesh);
   return is_radius(mesh.error) && is_radius(mesh.rounding) && sound_vertices(parts) &&
          sound_blocks(parts) && sound_neighbours(parts) && sound_shells(parts) &&
-         sound_boxes(header, mesh);
+         sound_boxes(header, mesh) && sound_sums(header, mesh);
 }
 
 }  // namespace ist

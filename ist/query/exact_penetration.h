@@ -11,7 +11,4 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
                               const PenetrationSettings& settings, const RelativePose& pose,
                               Workspace& workspace) noexcept;
 
-/// All numbers NaN: an asset does not hold what the measure needs.
-Penetration not_held() noexcept;
-
 }  // namespace ist

@@ -1,12 +1,12 @@
-#include "query/exact/exact_penetration.h"
+#include "query/exact_penetration.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <ist/asset_layout.h>
 
+#include "query/base/no_answer.h"
 #include "query/descent/workspace.h"
 #include "query/exact/exact_overlap.h"
 
@@ -68,27 +68,16 @@ void bound_by_solids(const PlacedTree& a, const PlacedTree& b, Penetration& answ
 
 }  // namespace
 
-Penetration not_held() noexcept {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  Penetration answer;
-  answer.volume = answer.volume_min = answer.volume_max = kNan;
-  answer.centroid.setConstant(kNan);
-  answer.translation_gradient.setConstant(kNan);
-  answer.rotation_gradient.setConstant(kNan);
-  answer.status = QueryStatus::not_held;
-  return answer;
-}
-
 Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
                               const PenetrationSettings& settings, const RelativePose& pose,
                               Workspace& workspace) noexcept {
-  if (a.tree.header().mesh == 0 || b.tree.header().mesh == 0) return not_held();
+  if (a.tree.header().mesh == 0 || b.tree.header().mesh == 0) return not_held<Penetration>();
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   ExactQuery query(mesh_a, mesh_b, pose.a_from_b, pose.b_from_a,
                    moved_by_rounding(a, mesh_a, b, mesh_b, pose), workspace.impl()->exact);
   const ExactOverlap found = query.run(settings.max_visits);
   if (!found.complete) {
-    Penetration answer = not_held();
+    Penetration answer = not_held<Penetration>();
     if (a.tree.sphere_count() > 0 && b.tree.sphere_count() > 0) {
       PenetrationSettings by_spheres = settings;
       by_spheres.measure = Measure::matched;
