@@ -174,7 +174,10 @@ void lay_out_boxes(std::vector<Box> below, MeshArrays& arrays) {
       for (int k = 0; k < 3; ++k) {
         level[i / kWidth].low[k][i % kWidth] = box.low[k];
         level[i / kWidth].high[k][i % kWidth] = box.high[k];
+        level[i / kWidth].normal[k][i % kWidth] = 0;
       }
+      level[i / kWidth].slab_low[i % kWidth] = box.low[0];
+      level[i / kWidth].slab_high[i % kWidth] = box.high[0];
     }
     below = std::move(around);
   } while (below.size() > 1);
@@ -225,6 +228,35 @@ void find_sums(MeshArrays& arrays) {
   }
 }
 
+/// Along the mean normal, or z where there is none.
+void find_slabs(MeshArrays& arrays) {
+  std::size_t span = 1;  // blocks below a lane
+  for (std::size_t level = 0; level < arrays.boxes.size(); ++level, span *= kWidth)
+    for (std::size_t at = 0; at * span < arrays.blocks.size(); ++at) {
+      BoxBlock& box = arrays.boxes[level][at / kWidth];
+      const BoxSums& sums = arrays.sums[level][at / kWidth];
+      const std::size_t lane = at % kWidth;
+      double length = 0;
+      for (const auto& n : sums.normal) length += n[lane] * n[lane];
+      length = std::sqrt(length);
+      const bool clear = length > 1e-9 * sums.area[lane];
+      for (int k = 0; k < 3; ++k)
+        box.normal[k][lane] =
+            clear ? static_cast<float>(sums.normal[k][lane] / length) : k == 2 ? 1.0f : 0.0f;
+      double low = HUGE_VAL, high = -HUGE_VAL;
+      for (std::size_t b = at * span; b < std::min((at + 1) * span, arrays.blocks.size()); ++b)
+        for (std::uint32_t v = 0; v < arrays.blocks[b].vertices; ++v) {
+          const double* x = arrays.vertices.data() + 3 * std::size_t{arrays.blocks[b].vertex[v]};
+          const double along = (box.normal[0][lane] * x[0] + box.normal[1][lane] * x[1]) +
+                               box.normal[2][lane] * x[2];
+          low = std::min(low, along);
+          high = std::max(high, along);
+        }
+      box.slab_low[lane] = rounded_down(low - 1e-14);
+      box.slab_high[lane] = -rounded_down(-high - 1e-14);
+    }
+}
+
 }  // namespace
 
 MeshArrays lay_out_mesh(const MeshView& surface) {
@@ -236,6 +268,7 @@ MeshArrays lay_out_mesh(const MeshView& surface) {
   find_shells(arrays, boxes);
   lay_out_boxes(std::move(boxes), arrays);
   find_sums(arrays);
+  find_slabs(arrays);
   return arrays;
 }
 

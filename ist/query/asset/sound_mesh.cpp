@@ -112,16 +112,22 @@ bool sound_shells(const MeshParts& mesh) noexcept {
 }
 
 bool sound_boxes(const AssetHeader& asset, const MeshHeader& mesh) noexcept {
+  constexpr double kFarthest = 4 * kMaxExtent;  // along a normal
   bool sound = true;
   for (std::uint32_t level = 1; level < mesh.level_count; ++level) {
     const BoxBlock* boxes = at<BoxBlock>(asset, mesh.level[level].blocks);
     const std::uint32_t used = mesh.level[level - 1].count;
-    for (std::uint64_t i = 0; i < std::uint64_t{kWidth} * mesh.level[level].count; ++i)
+    for (std::uint64_t i = 0; i < std::uint64_t{kWidth} * mesh.level[level].count; ++i) {
+      sound &= in_range(boxes[i / kWidth].slab_low[i % kWidth], -kFarthest, kFarthest) &&
+               in_range(boxes[i / kWidth].slab_high[i % kWidth], -kFarthest, kFarthest);
       for (int k = 0; k < 3; ++k) {
         const float low = boxes[i / kWidth].low[k][i % kWidth];
         const float high = boxes[i / kWidth].high[k][i % kWidth];
         sound &= i < used ? sound_box(low, high) : low == kEmptyLow && high == -kEmptyLow;
+        const float normal = boxes[i / kWidth].normal[k][i % kWidth];
+        sound &= i < used ? in_range(normal, -2, 2) : normal == 0;
       }
+    }
   }
   return sound;
 }

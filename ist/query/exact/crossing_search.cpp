@@ -27,6 +27,10 @@ class Search {
     pad_b_ = pad(search.a_from_b, b_);
     pad_a_ = pad(search.b_from_a, a_);
     room_b_ = static_cast<float>(search.room * search.b_from_a.scale);
+    scale_ = static_cast<float>(search.a_from_b.scale) * (1 + kFloatError);
+    for (int k = 0; k < 9; ++k)
+      turn_[k] = static_cast<float>(search.a_from_b.m[k] / search.a_from_b.scale);
+    pad_a_here_ = pad(Similarity::identity(), a_);
   }
 
   CrossingsFound run() {
@@ -90,9 +94,10 @@ class Search {
     held = number;
     const BoxBlock& from = tree.level[level].boxes[i];
     const F d;
-    float m[9], size[9], t[3];
+    float m[9], turn[9], size[9], t[3];
     for (int k = 0; k < 9; ++k) {
       m[k] = static_cast<float>(map.m[k]);
+      turn[k] = static_cast<float>(map.m[k] / map.scale);
       size[k] = std::abs(m[k]) * (1 + kFloatError);
     }
     for (int k = 0; k < 3; ++k) t[k] = static_cast<float>(map.t[k]);
@@ -114,6 +119,17 @@ class Search {
         hn::Store(c - h, d, out.low[k] + l);
         hn::Store(c + h, d, out.high[k] + l);
       }
+      hn::Vec<F> shift = hn::Zero(d);
+      for (int k = 0; k < 3; ++k) {
+        const auto turned = (hn::Set(d, turn[3 * k]) * hn::Load(d, from.normal[0] + l) +
+                             hn::Set(d, turn[3 * k + 1]) * hn::Load(d, from.normal[1] + l)) +
+                            hn::Set(d, turn[3 * k + 2]) * hn::Load(d, from.normal[2] + l);
+        hn::Store(turned, d, out.normal[k] + l);
+        shift = shift + turned * hn::Set(d, t[k]);
+      }
+      const auto scale = hn::Set(d, static_cast<float>(map.scale)), room = hn::Set(d, 2 * pad);
+      hn::Store((scale * hn::Load(d, from.slab_low + l) + shift) - room, d, out.slab_low + l);
+      hn::Store((scale * hn::Load(d, from.slab_high + l) + shift) + room, d, out.slab_high + l);
     }
     const std::uint32_t used = used_lanes(tree, level, i);
     for (int k = 0; k < 3; ++k) {
@@ -169,6 +185,65 @@ class Search {
     }
   };
 
+  /// Which boxes of B reach into the slab of a box of A and have it reach into theirs.
+  std::uint32_t in_slabs(const BoxBlock& of_a, std::uint32_t i, const BoxBlock& of_b,
+                         const PlacedBoxes& b_in_a) const {
+    const F d;
+    const auto half = hn::Set(d, 0.5f);
+    float normal[3], middle[3], extent[3], turned[3];
+    for (int k = 0; k < 3; ++k) {
+      normal[k] = of_a.normal[k][i];
+      middle[k] = 0.5f * (of_a.low[k][i] + of_a.high[k][i]);
+      extent[k] = 0.5f * (of_a.high[k][i] - of_a.low[k][i]);
+    }
+    for (int k = 0; k < 3; ++k)
+      turned[k] = std::abs((turn_[k] * normal[0] + turn_[3 + k] * normal[1]) +
+                           turn_[6 + k] * normal[2]) +
+                  kFloatError;
+    const float slack = 2 * pad_b_ + 2 * pad_a_here_ + search_.room * 2;
+    std::uint32_t bits = 0;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      auto along = hn::Zero(d), reach = hn::Set(d, slack);
+      auto along_b = hn::Zero(d), reach_b = hn::Set(d, slack);
+      for (int k = 0; k < 3; ++k) {
+        along = along + hn::Set(d, normal[k]) *
+                            (hn::Load(d, b_in_a.low[k] + l) + hn::Load(d, b_in_a.high[k] + l));
+        reach = reach + hn::Set(d, turned[k] * scale_) * (hn::Load(d, of_b.high[k] + l) -
+                                                          hn::Load(d, of_b.low[k] + l)) * half;
+        const auto n = hn::Load(d, b_in_a.normal[k] + l);
+        along_b = along_b + n * hn::Set(d, middle[k]);
+        reach_b = reach_b + hn::Abs(n) * hn::Set(d, extent[k]);
+      }
+      along = along * half;
+      const auto in_a = hn::And(along - reach <= hn::Set(d, of_a.slab_high[i]),
+                                along + reach >= hn::Set(d, of_a.slab_low[i]));
+      const auto in_b = hn::And(along_b - reach_b <= hn::Load(d, b_in_a.slab_high + l),
+                                along_b + reach_b >= hn::Load(d, b_in_a.slab_low + l));
+      bits |= mask_bits(d, hn::And(in_a, in_b)) << l;
+    }
+    return bits;
+  }
+
+  /// Which triangles of a block reach into a slab.
+  static std::uint32_t in_slab(const PlacedTriangles& triangles, const float (&normal)[3],
+                               float low, float high) {
+    const F d;
+    std::uint32_t bits = 0;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      hn::Vec<F> along[3];
+      for (int c = 0; c < 3; ++c)
+        along[c] = (hn::Set(d, normal[0]) * hn::Load(d, triangles.corner[c][0] + l) +
+                    hn::Set(d, normal[1]) * hn::Load(d, triangles.corner[c][1] + l)) +
+                   hn::Set(d, normal[2]) * hn::Load(d, triangles.corner[c][2] + l);
+      bits |= mask_bits(d, hn::And(hn::Min(along[0], hn::Min(along[1], along[2])) <=
+                                       hn::Set(d, high),
+                                   hn::Max(along[0], hn::Max(along[1], along[2])) >=
+                                       hn::Set(d, low)))
+              << l;
+    }
+    return bits;
+  }
+
   const PlacedBoxes& placed_a(int level, std::uint32_t i) {
     return placed(a_, level, i, search_.b_from_a, pad_a_, *scratch_.boxes_a);
   }
@@ -194,6 +269,7 @@ class Search {
       if (columns == 0) continue;
       const OneBox there(a_in_b.low, a_in_b.high, i, room_b_);
       columns &= meeting(boxes_b.low, boxes_b.high, there.low, there.high);
+      if (columns != 0) columns &= in_slabs(boxes_a, i, boxes_b, b_in_a);
       for (; columns != 0; columns &= columns - 1)
         push(pair.level_a - 1, kWidth * pair.a + i, pair.level_b - 1,
              kWidth * pair.b + static_cast<std::uint32_t>(std::countr_zero(columns)));
@@ -335,6 +411,21 @@ class Search {
       high[k] = b.all_high[k] + search_.room;
     }
     std::uint32_t rows = meeting(a.low, a.high, low, high);
+    const float slack = 2 * pad_b_ + 2 * pad_a_here_ + search_.room * 2;
+    const BoxBlock& box_a = a_.level[1].boxes[number_a / kWidth];
+    const PlacedBoxes& box_b = placed_b(1, number_b / kWidth);
+    const std::uint32_t lane_a = number_a % kWidth, lane_b = number_b % kWidth;
+    const float normal_a[3] = {box_a.normal[0][lane_a], box_a.normal[1][lane_a],
+                               box_a.normal[2][lane_a]};
+    const float normal_b[3] = {box_b.normal[0][lane_b], box_b.normal[1][lane_b],
+                               box_b.normal[2][lane_b]};
+    if (rows != 0)
+      rows &= in_slab(a, normal_b, box_b.slab_low[lane_b] - slack,
+                      box_b.slab_high[lane_b] + slack);
+    if (rows == 0) return;
+    const std::uint32_t in_a = in_slab(b, normal_a, box_a.slab_low[lane_a] - slack,
+                                       box_a.slab_high[lane_a] + slack);
+    if (in_a == 0) return;
     bool near = false;
     const F d;
     // Coordinates are floats, and points of both blocks that matter are no further apart than this.
@@ -342,7 +433,7 @@ class Search {
     for (; rows != 0; rows &= rows - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
       const OneBox box(a.low, a.high, i, search_.room);
-      std::uint32_t columns = meeting(b.low, b.high, box.low, box.high);
+      const std::uint32_t columns = in_a & meeting(b.low, b.high, box.low, box.high);
       if (columns == 0) continue;
       const auto over_a = hn::Set(d, blur * a.length[i] + a.slack[i] * size);
       const auto na = [&](int k) { return hn::Set(d, a.normal[k][i]); };
@@ -538,7 +629,7 @@ class Search {
   const MeshTree& a_;
   const MeshTree& b_;
   ExactScratch& scratch_;
-  float pad_a_, pad_b_, room_b_;
+  float pad_a_, pad_b_, pad_a_here_, room_b_, scale_, turn_[9];
   std::uint32_t waiting_ = 0;
   CrossingsFound found_;
 };

@@ -14,6 +14,8 @@ namespace ist {
 /// Boxes of a box block in the other solid's frame.
 struct alignas(64) PlacedBoxes {
   float low[3][kWidth], high[3][kWidth];
+  float normal[3][kWidth];                    ///< turned
+  float slab_low[kWidth], slab_high[kWidth];  ///< along it, there
   float all_low[3], all_high[3];
 };
 
