@@ -41,6 +41,10 @@ Point map_point(const Similarity& map, const Point& x) {
 
 void add(Point& sum, double factor, const Point& p) { sum = sum + factor * p; }
 
+bool enters(const Crossing& crossing, const Piercing& end) {
+  return (&end == &crossing.start) == end.of_b;
+}
+
 /// The corners of a triangle from the one that its cones start at.
 struct Fan {
   Point apex, next, last;
@@ -103,7 +107,7 @@ void ExactQuery::sort_crossings(std::uint32_t count) noexcept {
   }
 }
 
-CrossedBlock* ExactQuery::crossed_block(Side& own, std::uint32_t block) noexcept {
+CrossedBlock* ExactQuery::make_crossed_block(Side& own, std::uint32_t block) noexcept {
   BlockMarks& marks = own.marks;
   if (has(marks.crossed, block)) return &marks.blocks[marks.place[block]];
   if (marks.count == scratch_.most_crossed) return nullptr;
@@ -128,39 +132,44 @@ CrossedBlock* ExactQuery::crossed_block(Side& own, std::uint32_t block) noexcept
   return &made;
 }
 
-/// Adds what the segment that two triangles share is to both: a part of the boundary of what each
-/// has in the other solid. A cone from the origin over a part of a triangle is made of tetrahedra
-/// with an edge from the origin to the triangle's apex.
-bool ExactQuery::add_crossing(const Crossing& crossing) noexcept {
-  CrossedBlock* const block_a = crossed_block(sides_[0], crossing.a / kWidth);
-  CrossedBlock* const block_b = crossed_block(sides_[1], crossing.b / kWidth);
-  if (block_a == nullptr || block_b == nullptr) return false;
-  const std::uint32_t lane_a = crossing.a % kWidth, lane_b = crossing.b % kWidth;
-  const auto apex_of = [](const Side& own, const CrossedBlock& block, std::uint32_t lane) {
-    return block.vertex[own.mesh.blocks[block.block].corner[block.apex[lane]][lane]];
+/// Of both triangles' boundaries the segment that they share. A cone from the origin over a part of
+/// a triangle is made of tetrahedra with an edge from the origin to the triangle's apex.
+void ExactQuery::sum_crossing(const Crossing& crossing, ExactSums& sums) noexcept {
+  const auto apex_of = [&](bool of_b, std::uint32_t triangle) {
+    const CrossedBlock& block = crossed_block(side(of_b), triangle);
+    const std::uint32_t lane = triangle % kWidth;
+    return block.vertex[side(of_b).mesh.blocks[block.block].corner[block.apex[lane]][lane]];
   };
-  const Point of_a = apex_of(sides_[0], *block_a, lane_a);
-  const Point of_b = apex_of(sides_[1], *block_b, lane_b);
+  const Point of_a = apex_of(false, crossing.a), of_b = apex_of(true, crossing.b);
   const Point a = from_origin(crossing.start), b = from_origin(crossing.end);
   const Point along = b - a, c = cross(a, along), both = a + b;
   const double six_a = dot(c, of_a), six_b = dot(c, of_b);
-  volume_.add(dot(c, of_a - of_b));
-  add(moment_, six_a, of_a + both);
-  add(moment_, -six_b, of_b + both);
-  add(force_, -0.5, c);
-  add(torque_, ((dot(a, a) + dot(a, b)) + dot(b, b)) / 6, along);
+  sums.six_volumes.add(dot(c, of_a - of_b));
+  add(sums.moment, six_a, of_a + both);
+  add(sums.moment, -six_b, of_b + both);
+  add(sums.force, -0.5, c);
+  add(sums.torque, ((dot(a, a) + dot(a, b)) + dot(b, b)) / 6, along);
   rounding_ += 8 * kHalfUnit * length_bound(a) * length_bound(along) * length_bound(of_a - of_b);
+}
+
+bool ExactQuery::add_crossing(const Crossing& crossing) noexcept {
+  CrossedBlock* const block_a = make_crossed_block(sides_[0], crossing.a / kWidth);
+  CrossedBlock* const block_b = make_crossed_block(sides_[1], crossing.b / kWidth);
+  if (block_a == nullptr || block_b == nullptr) return false;
+  sum_crossing(crossing, sums_);
   for (const Piercing* end : {&crossing.start, &crossing.end}) {
-    const bool enters = (end == &crossing.start) == end->of_b;
-    add_piercing(side(end->of_b), end->of_b ? *block_b : *block_a, end->of_b ? lane_b : lane_a,
-                 *end, enters ? 1 : -1);
+    CrossedBlock& block = end->of_b ? *block_b : *block_a;
+    const std::uint32_t lane = (end->of_b ? crossing.b : crossing.a) % kWidth;
+    const int sign = enters(crossing, *end) ? 1 : -1;
+    note_piercing(side(end->of_b), block, lane, *end, sign);
+    sum_piercing(side(end->of_b), block, lane, *end, sign, sums_);
   }
   return true;
 }
 
-/// An edge is pierced: notes it, and adds the cone over the edge from its nearer end to there.
-void ExactQuery::add_piercing(Side& own, CrossedBlock& crossed, std::uint32_t lane,
-                              const Piercing& end, int sign) noexcept {
+/// An edge is pierced: how often it enters and leaves, and which comes first.
+void ExactQuery::note_piercing(Side& own, CrossedBlock& crossed, std::uint32_t lane,
+                               const Piercing& end, int sign) noexcept {
   const std::uint32_t edge = 3 * lane + static_cast<std::uint32_t>(end.edge);
   if (crossed.pierced >> edge & 1) {
     crossed.sum[edge] = static_cast<std::int8_t>(crossed.sum[edge] + sign);
@@ -188,27 +197,31 @@ void ExactQuery::add_piercing(Side& own, CrossedBlock& crossed, std::uint32_t la
   }
   if (end.from_first) crossed.middle[edge] = static_cast<std::int8_t>(crossed.middle[edge] + sign);
   rounding_ += 3 * end.h_error;
-  const MeshBlock& mesh = own.mesh.blocks[crossed.block];
-  const auto k = static_cast<std::uint32_t>(end.edge);
   if (checked_) {
-    const Point p = crossed.vertex[mesh.corner[k][lane]],
-                q = crossed.vertex[mesh.corner[(k + 1) % 3][lane]], x = from_origin(end);
+    const MeshBlock& mesh = own.mesh.blocks[crossed.block];
+    const auto k = static_cast<std::uint32_t>(end.from_first ? end.edge : (end.edge + 1) % 3);
     add(gap_, sign * (own.is_b ? -0.5 : 0.5),
-        end.from_first ? cross(x, p) : cross(x, q));
+        cross(from_origin(end), crossed.vertex[mesh.corner[k][lane]]));
   }
-  // Of an edge at the apex there is none.
-  if ((crossed.apex[lane] + 1) % 3 != end.edge) return;
-  const Fan fan(crossed, mesh, lane);
-  const Point to = (end.from_first ? fan.next : fan.last) - fan.apex;
-  add_cone(sign * dot(fan.apex, cross(end.offset, to)), fan.apex + ((end.from_first ? fan.next : fan.last) + from_origin(end)),
-           8 * length_bound(fan.apex) * length_bound(end.offset) * length_bound(to));
+}
+
+/// The cone over an edge from its nearer end to where it is pierced.
+void ExactQuery::sum_piercing(const Side& own, const CrossedBlock& crossed, std::uint32_t lane,
+                              const Piercing& end, int sign, ExactSums& sums) noexcept {
+  if ((crossed.apex[lane] + 1) % 3 != end.edge) return;  // an edge at the apex has none
+  const Fan fan(crossed, own.mesh.blocks[crossed.block], lane);
+  const Point& near = end.from_first ? fan.next : fan.last;
+  const Point to = near - fan.apex;
+  add_cone(sign * dot(fan.apex, cross(end.offset, to)), fan.apex + (near + from_origin(end)),
+           8 * length_bound(fan.apex) * length_bound(end.offset) * length_bound(to), sums);
 }
 
 /// A tetrahedron from the origin: six times its volume, the sum of its other corners, and what the
 /// first may be off by, in roundings.
-void ExactQuery::add_cone(double six_volumes, const Point& corners, double rounding) noexcept {
-  volume_.add(six_volumes);
-  add(moment_, six_volumes, corners);
+void ExactQuery::add_cone(double six_volumes, const Point& corners, double rounding,
+                          ExactSums& sums) noexcept {
+  sums.six_volumes.add(six_volumes);
+  add(sums.moment, six_volumes, corners);
   rounding_ += kHalfUnit * rounding;
 }
 
@@ -353,30 +366,31 @@ void ExactQuery::find_insides(Side& own) noexcept {
   }
 }
 
+/// The cone over the edge opposite to the apex, where its middle is inside.
+void ExactQuery::sum_triangle(const Side& own, const CrossedBlock& crossed, std::uint32_t lane,
+                              ExactSums& sums) noexcept {
+  const MeshBlock& mesh = own.mesh.blocks[crossed.block];
+  const int whole = middle_of(mesh, crossed, 3 * lane + (crossed.apex[lane] + 1u) % 3);
+  if (whole == 0) return;
+  const Fan fan(crossed, mesh, lane);
+  const Point u = fan.next - fan.apex, v = fan.last - fan.apex;
+  add_cone(whole * dot(fan.apex, cross(u, v)), fan.apex + (fan.next + fan.last),
+           8 * length_bound(fan.apex) * length_bound(u) * length_bound(v), sums);
+}
+
 void ExactQuery::sum_crossed_block(const Side& own, const CrossedBlock& crossed) noexcept {
   const MeshBlock& mesh = own.mesh.blocks[crossed.block];
-  // Whether the middle of an edge is inside, as far as sums from its ends are concerned.
-  const auto middle = [&](std::uint32_t k, std::uint32_t t) {
-    const std::uint32_t edge = 3 * t + k;
-    return static_cast<int>(crossed.inside >> mesh.corner[k][t] & 1) +
-           (crossed.pierced >> edge & 1 ? crossed.middle[edge] : 0);
-  };
   for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
+    sum_triangle(own, crossed, t, sums_);
     for (std::uint32_t k = 0; k < 3 && checked_; ++k)
-      add(gap_, middle(k, t) * (own.is_b ? -0.5 : 0.5),
+      add(gap_, middle_of(mesh, crossed, 3 * t + k) * (own.is_b ? -0.5 : 0.5),
           cross(crossed.vertex[mesh.corner[k][t]], crossed.vertex[mesh.corner[(k + 1) % 3][t]]));
-    const int whole = middle((crossed.apex[t] + 1u) % 3, t);
-    if (whole == 0) continue;
-    const Fan fan(crossed, mesh, t);
-    const Point u = fan.next - fan.apex, v = fan.last - fan.apex;
-    add_cone(whole * dot(fan.apex, cross(u, v)), fan.apex + (fan.next + fan.last),
-             8 * length_bound(fan.apex) * length_bound(u) * length_bound(v));
   }
 }
 
 /// What lies below a lane of a box block, inside as a whole.
-void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i,
-                          std::uint32_t lane) noexcept {
+void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i, std::uint32_t lane,
+                          ExactSums& into) noexcept {
   const BoxBlock& box = own.mesh.level[level].boxes[i];
   const BoxSums& sums = own.mesh.level[level].sums[i];
   const auto middle = [&](int k) { return (double{box.low[k][lane]} + double{box.high[k][lane]}) / 2; };
@@ -410,8 +424,8 @@ void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i,
     turned = flux(d);
   }
   const double out = dot(d, n);
-  volume_.add(2 * (trace + out));
-  add(moment_, 6, cone + (trace * d + (turned + out * d)));
+  into.six_volumes.add(2 * (trace + out));
+  add(into.moment, 6, cone + (trace * d + (turned + out * d)));
   rounding_ += 64 * kHalfUnit * area * (length_bound(d) + wide);
   area_ += area;
   rim_ += wide;
@@ -436,7 +450,7 @@ void ExactQuery::sum_insides(const Side& own, int level, std::uint32_t i) noexce
     }
     if (none) continue;
     if (all)
-      sum_lane(own, level, i, lane);
+      sum_lane(own, level, i, lane, sums_);
     else
       sum_insides(own, level - 1, kWidth * i + lane);
   }
@@ -493,10 +507,10 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
     sum_insides(side, side.mesh.top, 0);
     bound_near(side);
   }
-  out_.volume = volume_.value() / 6;
-  out_.moment = (1.0 / 24) * moment_;
-  out_.force = force_;
-  out_.torque = torque_;
+  out_.volume = sums_.volume();
+  out_.moment = (1.0 / 24) * sums_.moment;
+  out_.force = sums_.force;
+  out_.torque = sums_.torque;
   out_.gap = gap_;
   // A surface that moves by e changes the volume by no more than a layer of that thickness over
   // its faces, edges and corners.

@@ -25,6 +25,15 @@ struct ExactOverlap {
   exact::Point gap = {};
 };
 
+/// What is summed of an overlap, or a part of it: from the origin, A's unit frame.
+struct ExactSums {
+  exact::CarefulSum six_volumes;
+  exact::Point moment = {};  ///< 24 ∫ x
+  exact::Point force = {}, torque = {};
+
+  double volume() const { return six_volumes.value() / 6; }
+};
+
 /// Volume and gradients of the overlap. Allocates, locks and throws nothing. The answer depends on
 /// the meshes and the map alone.
 class ExactQuery {
@@ -41,33 +50,35 @@ class ExactQuery {
   /// `max_visits`: 0: no limit. `checked`: finds the gap too.
   ExactOverlap run(std::uint32_t max_visits = 0, bool checked = false) noexcept;
 
- private:
+ protected:
   struct Side {
     const MeshTree& mesh;
     BlockMarks& marks;
     bool is_b;
   };
 
+  Side& side(bool of_b) noexcept { return sides_[of_b ? 1 : 0]; }
   exact::Point from_origin(const exact::Piercing& end) const noexcept {
     return (end.from - out_.origin) + end.offset;
   }
-  Side& side(bool of_b) noexcept { return sides_[of_b ? 1 : 0]; }
-  exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
-  void clear_marks() noexcept;
-  void sort_crossings(std::uint32_t count) noexcept;
-  CrossedBlock* crossed_block(Side& side, std::uint32_t block) noexcept;
-  bool add_crossing(const exact::Crossing& crossing) noexcept;
-  void add_piercing(Side& side, CrossedBlock& crossed, std::uint32_t lane,
-                    const exact::Piercing& end, int sign) noexcept;
-  void settle(Side& side, CrossedBlock& crossed) noexcept;
-  bool is_inside(const Side& side, std::uint32_t vertex) const noexcept;
-  void find_insides(Side& side) noexcept;
-  void flood(const Side& side, std::uint32_t waiting) noexcept;
-  void sum_crossed_block(const Side& side, const CrossedBlock& crossed) noexcept;
-  void sum_insides(const Side& side, int level, std::uint32_t i) noexcept;
-  void sum_lane(const Side& side, int level, std::uint32_t i, std::uint32_t lane) noexcept;
-  void bound_near(const Side& side) noexcept;
-  void add_cone(double six_volumes, const exact::Point& corners, double rounding) noexcept;
+  CrossedBlock& crossed_block(Side& side, std::uint32_t triangle) noexcept {
+    return side.marks.blocks[side.marks.place[triangle / kWidth]];
+  }
+  /// Whether the middle of a triangle's edge is inside: 1 or 0, if nothing pierces it on the way
+  /// from its ends but what is counted from there.
+  static int middle_of(const MeshBlock& mesh, const CrossedBlock& crossed, std::uint32_t edge) {
+    return static_cast<int>(crossed.inside >> mesh.corner[edge % 3][edge / 3] & 1) +
+           (crossed.pierced >> edge & 1 ? crossed.middle[edge] : 0);
+  }
+
+  // What parts of the boundary add to the sums.
+  void sum_crossing(const exact::Crossing& crossing, ExactSums& sums) noexcept;
+  void sum_piercing(const Side& side, const CrossedBlock& crossed, std::uint32_t lane,
+                    const exact::Piercing& end, int sign, ExactSums& sums) noexcept;
+  void sum_triangle(const Side& side, const CrossedBlock& crossed, std::uint32_t lane,
+                    ExactSums& sums) noexcept;
+  void sum_lane(const Side& side, int level, std::uint32_t i, std::uint32_t lane,
+                ExactSums& sums) noexcept;
 
   Side sides_[2];
   const Similarity& a_from_b_;
@@ -75,13 +86,30 @@ class ExactQuery {
   const double moved_;
   ExactScratch& scratch_;
   ExactOverlap out_;
-  // Sums, the volume's six times and the moment's 24 times too large.
-  exact::CarefulSum volume_;
-  exact::Point moment_ = {}, force_ = {}, torque_ = {}, gap_ = {};
+
+ private:
+  exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
+  void clear_marks() noexcept;
+  void sort_crossings(std::uint32_t count) noexcept;
+  CrossedBlock* make_crossed_block(Side& side, std::uint32_t block) noexcept;
+  bool add_crossing(const exact::Crossing& crossing) noexcept;
+  void note_piercing(Side& side, CrossedBlock& crossed, std::uint32_t lane,
+                     const exact::Piercing& end, int sign) noexcept;
+  void settle(Side& side, CrossedBlock& crossed) noexcept;
+  bool is_inside(const Side& side, std::uint32_t vertex) const noexcept;
+  void find_insides(Side& side) noexcept;
+  void sum_crossed_block(const Side& side, const CrossedBlock& crossed) noexcept;
+  void sum_insides(const Side& side, int level, std::uint32_t i) noexcept;
+  void bound_near(const Side& side) noexcept;
+  void add_cone(double six_volumes, const exact::Point& corners, double rounding,
+                ExactSums& sums) noexcept;
+
+  ExactSums sums_;
+  exact::Point gap_ = {};
   bool checked_ = false;
   double rounding_ = 0;  ///< six times what the volume's terms may be off by
   double area_ = 0;      ///< of all triangles that may be in the overlap
-  double rim_ = 0;       ///< and what their edges and corners add where surfaces deviate
+  double rim_ = 0;       ///< and what their edges and corners add where surfaces move
 };
 
 }  // namespace ist
