@@ -222,9 +222,9 @@ static_assert(sizeof(MeshBlock) == 128);
 /// Boxes and slabs around sixteen blocks of the level below, rounded outward. An unused one is
 /// empty: low = +kMaxExtent · 2, high = −kMaxExtent · 2, and its normal is zero.
 struct alignas(64) BoxBlock {
-  float low[3][kWidth], high[3][kWidth];           ///< unit frame
-  float normal[3][kWidth];                         ///< about unit length, about the mean normal
-  float slab_low[kWidth], slab_high[kWidth];       ///< slab_low ≤ normal · x ≤ slab_high below
+  float low[3][kWidth], high[3][kWidth];      ///< unit frame
+  float normal[3][kWidth];                    ///< about unit length, about the mean normal
+  float slab_low[kWidth], slab_high[kWidth];  ///< slab_low ≤ normal · x ≤ slab_high below
 };
 static_assert(sizeof(BoxBlock) == 704);
 

@@ -10,6 +10,7 @@
 #include "query/contact/write_patches.h"
 #include "query/descent/descent.h"
 #include "query/descent/workspace.h"
+#include "query/exact_penetration.h"
 #include "query/field/pair_overlap.h"
 
 namespace ist {
@@ -124,6 +125,8 @@ class PairPatches {
 ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept {
+  if (settings.measure == Measure::exact)
+    return exact_patches(a, b, settings, workspace, patches, {}).contact;
   if (lack_spheres(a, b)) return not_held<ContactPatches>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) {
@@ -135,6 +138,13 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
   const ContactPatches result = both.run(patches);
   finish_patches(patches.first(result.count), both.deepest());
   return result;
+}
+
+OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
+                               const ContactSettings& settings, Workspace& workspace,
+                               std::span<ContactPatch> patches,
+                               std::span<OutlineSegment> segments) noexcept {
+  return exact_patches(a, b, settings, workspace, patches, segments);
 }
 
 }  // namespace ist

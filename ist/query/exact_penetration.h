@@ -11,4 +11,10 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
                               const PenetrationSettings& settings, const RelativePose& pose,
                               Workspace& workspace) noexcept;
 
+/// contact_patches() and overlap_outline() by Measure::exact.
+OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
+                             const ContactSettings& settings, Workspace& workspace,
+                             std::span<ContactPatch> patches,
+                             std::span<OutlineSegment> segments) noexcept;
+
 }  // namespace ist

@@ -59,7 +59,8 @@ std::vector<BlockPatch> patches_in_order(const MeshView& surface) {
   std::vector<std::array<float, 3>> middles(patches.size());
   for (std::size_t p = 0; p < patches.size(); ++p) {
     Box box;
-    for (const std::uint32_t v : patches[p].vertices) box.add(surface.vertices + 3 * std::size_t{v});
+    for (const std::uint32_t v : patches[p].vertices)
+      box.add(surface.vertices + 3 * std::size_t{v});
     for (std::size_t k = 0; k < 3; ++k) middles[p][k] = (box.low[k] + box.high[k]) / 2;
   }
   std::vector<BlockPatch> sorted;
@@ -201,8 +202,7 @@ void add_integrals(const double (&p)[3][3], BoxSums& sums, std::size_t lane) {
     sums.cone[i][lane] += middle[i] * height;  // y · n is constant on a triangle
     for (int k = 0; k < 3; ++k) sums.flux[i][k][lane] += middle[i] * n[k];
   }
-  sums.area[lane] +=
-      std::sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]) * (1 + 1e-12) + 1e-300;
+  sums.area[lane] += std::sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]) * (1 + 1e-12) + 1e-300;
 }
 
 /// Of each lane from the triangles themselves: sums of sums would round more.
@@ -241,8 +241,9 @@ void find_slabs(MeshArrays& arrays) {
       length = std::sqrt(length);
       const bool clear = length > 1e-9 * sums.area[lane];
       for (int k = 0; k < 3; ++k)
-        box.normal[k][lane] =
-            clear ? static_cast<float>(sums.normal[k][lane] / length) : k == 2 ? 1.0f : 0.0f;
+        box.normal[k][lane] = clear    ? static_cast<float>(sums.normal[k][lane] / length)
+                              : k == 2 ? 1.0f
+                                       : 0.0f;
       double low = HUGE_VAL, high = -HUGE_VAL;
       for (std::size_t b = at * span; b < std::min((at + 1) * span, arrays.blocks.size()); ++b)
         for (std::uint32_t v = 0; v < arrays.blocks[b].vertices; ++v) {

@@ -144,10 +144,9 @@ bool sound_sums(const AssetHeader& asset, const MeshHeader& mesh) noexcept {
       const double most = i < used ? kMost : 0;
       const std::size_t lane = i % kWidth;
       for (int k = 0; k < 3; ++k) {
-        sound &= in_range(of.normal[k][lane], -most, most) &&
-                 in_range(of.cone[k][lane], -most, most);
-        for (const auto& flux : of.flux[k])
-          sound &= in_range(flux[lane], -most, most);
+        sound &=
+            in_range(of.normal[k][lane], -most, most) && in_range(of.cone[k][lane], -most, most);
+        for (const auto& flux : of.flux[k]) sound &= in_range(flux[lane], -most, most);
       }
       sound &= in_range(of.area[lane], 0, most);
     }

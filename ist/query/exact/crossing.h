@@ -9,13 +9,13 @@ namespace ist::exact {
 /// Where an edge of one solid goes through a triangle of the other: an end of the segment that two
 /// triangles share. All segments that end there have the same bits of it.
 struct Piercing {
-  Point from;          ///< the end of the edge that is nearer to the triangle's plane
-  Point offset;        ///< from there to the place: it keeps its digits where that is next to the end
-  double t = 0;        ///< of the way along the edge, from its first corner in this triangle
+  Point from;    ///< the end of the edge that is nearer to the triangle's plane
+  Point offset;  ///< from there to the place: it keeps its digits where that is next to the end
+  double t = 0;  ///< of the way along the edge, from its first corner in this triangle
   double t_error = 0;  ///< of t
   double h_error = 0;  ///< heights of the edge's ends over the triangle, times twice its area, are
                        ///< off by this together
-  std::int8_t edge = 0;   ///< edge k goes from corner k to the next
+  std::int8_t edge = 0;    ///< edge k goes from corner k to the next
   bool from_first = true;  ///< `from` is the edge's first corner in this triangle
   bool of_b = false;       ///< the edge is B's and the triangle A's
 };
@@ -108,8 +108,8 @@ IST_HD int enters(const Point& p, const Point& q, const Point (&t)[3], bool of_b
     sign[k] = (of_b ? height_over_a(t, k == 0 ? p : q) : height_over_b(t, k == 0 ? p : q)).sign;
   if (sign[0] == sign[1]) return 0;
   for (int k = 0; k < 3; ++k)
-    way[k] = (of_b ? way_round(t[k], t[(k + 1) % 3], p, q) : way_round(p, q, t[k], t[(k + 1) % 3]))
-                 .sign;
+    way[k] =
+        (of_b ? way_round(t[k], t[(k + 1) % 3], p, q) : way_round(p, q, t[k], t[(k + 1) % 3])).sign;
   return way[0] == way[1] && way[1] == way[2] ? direction(sign[0]) : 0;
 }
 

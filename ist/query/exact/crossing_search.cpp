@@ -65,8 +65,8 @@ class Search {
     for (int k = 0; k < 3; ++k) {
       for (std::uint32_t l = 0; l < kWidth; ++l)
         if (root.low[k][l] <= root.high[k][l])
-          extent = std::max({extent, std::abs(double{root.low[k][l]}),
-                             std::abs(double{root.high[k][l]})});
+          extent = std::max(
+              {extent, std::abs(double{root.low[k][l]}), std::abs(double{root.high[k][l]})});
       shift = std::max(shift, std::abs(map.t[k]));
     }
     return static_cast<float>(1e-6 * (2 * map.scale * extent + shift));
@@ -197,9 +197,9 @@ class Search {
       extent[k] = 0.5f * (of_a.high[k][i] - of_a.low[k][i]);
     }
     for (int k = 0; k < 3; ++k)
-      turned[k] = std::abs((turn_[k] * normal[0] + turn_[3 + k] * normal[1]) +
-                           turn_[6 + k] * normal[2]) +
-                  kFloatError;
+      turned[k] =
+          std::abs((turn_[k] * normal[0] + turn_[3 + k] * normal[1]) + turn_[6 + k] * normal[2]) +
+          kFloatError;
     const float slack = 2 * pad_b_ + 2 * pad_a_here_ + search_.room * 2;
     std::uint32_t bits = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
@@ -208,8 +208,8 @@ class Search {
       for (int k = 0; k < 3; ++k) {
         along = along + hn::Set(d, normal[k]) *
                             (hn::Load(d, b_in_a.low[k] + l) + hn::Load(d, b_in_a.high[k] + l));
-        reach = reach + hn::Set(d, turned[k] * scale_) * (hn::Load(d, of_b.high[k] + l) -
-                                                          hn::Load(d, of_b.low[k] + l)) * half;
+        reach = reach + hn::Set(d, turned[k] * scale_) *
+                            (hn::Load(d, of_b.high[k] + l) - hn::Load(d, of_b.low[k] + l)) * half;
         const auto n = hn::Load(d, b_in_a.normal[k] + l);
         along_b = along_b + n * hn::Set(d, middle[k]);
         reach_b = reach_b + hn::Abs(n) * hn::Set(d, extent[k]);
@@ -235,11 +235,10 @@ class Search {
         along[c] = (hn::Set(d, normal[0]) * hn::Load(d, triangles.corner[c][0] + l) +
                     hn::Set(d, normal[1]) * hn::Load(d, triangles.corner[c][1] + l)) +
                    hn::Set(d, normal[2]) * hn::Load(d, triangles.corner[c][2] + l);
-      bits |= mask_bits(d, hn::And(hn::Min(along[0], hn::Min(along[1], along[2])) <=
-                                       hn::Set(d, high),
-                                   hn::Max(along[0], hn::Max(along[1], along[2])) >=
-                                       hn::Set(d, low)))
-              << l;
+      bits |=
+          mask_bits(d, hn::And(hn::Min(along[0], hn::Min(along[1], along[2])) <= hn::Set(d, high),
+                               hn::Max(along[0], hn::Max(along[1], along[2])) >= hn::Set(d, low)))
+          << l;
     }
     return bits;
   }
@@ -342,8 +341,8 @@ class Search {
             hn::PromoteTo(di, hn::LoadU(hn::Rebind<std::uint8_t, F>(), block.corner[c] + l));
         for (int k = 0; k < 3; ++k) {
           if constexpr (hn::MaxLanes(F()) == kWidth)
-            hn::Store(hn::TableLookupLanes(hn::Load(d, at[k]), hn::IndicesFromVec(d, from_lane)),
-                      d, out.corner[c][k] + l);
+            hn::Store(hn::TableLookupLanes(hn::Load(d, at[k]), hn::IndicesFromVec(d, from_lane)), d,
+                      out.corner[c][k] + l);
           else
             hn::Store(hn::GatherIndex(d, at[k], from_lane), d, out.corner[c][k] + l);
         }
@@ -366,9 +365,10 @@ class Search {
         n[k] = u[i] * v[j] - u[j] * v[i];
         hn::Store(n[k], d, out.normal[k] + l);
       }
-      hn::Store((n[0] * hn::Load(d, out.corner[0][0] + l) + n[1] * hn::Load(d, out.corner[0][1] + l)) +
-                    n[2] * hn::Load(d, out.corner[0][2] + l),
-                d, out.offset + l);
+      hn::Store(
+          (n[0] * hn::Load(d, out.corner[0][0] + l) + n[1] * hn::Load(d, out.corner[0][1] + l)) +
+              n[2] * hn::Load(d, out.corner[0][2] + l),
+          d, out.offset + l);
       // Corners are rounded, so sides are off by some reach, and normals by that times the other
       // side; what a product of sides loses to rounding comes on top.
       const auto length = [](const hn::Vec<F>(&x)[3]) {
@@ -420,11 +420,10 @@ class Search {
     const float normal_b[3] = {box_b.normal[0][lane_b], box_b.normal[1][lane_b],
                                box_b.normal[2][lane_b]};
     if (rows != 0)
-      rows &= in_slab(a, normal_b, box_b.slab_low[lane_b] - slack,
-                      box_b.slab_high[lane_b] + slack);
+      rows &= in_slab(a, normal_b, box_b.slab_low[lane_b] - slack, box_b.slab_high[lane_b] + slack);
     if (rows == 0) return;
-    const std::uint32_t in_a = in_slab(b, normal_a, box_a.slab_low[lane_a] - slack,
-                                       box_a.slab_high[lane_a] + slack);
+    const std::uint32_t in_a =
+        in_slab(b, normal_a, box_a.slab_low[lane_a] - slack, box_a.slab_high[lane_a] + slack);
     if (in_a == 0) return;
     bool near = false;
     const F d;
@@ -459,9 +458,9 @@ class Search {
         });
         for (; left != 0; left &= left - 1) {
           near = true;
-          add_pair(number_a, a, i, number_b, b,
-                   static_cast<std::uint32_t>(l) +
-                       static_cast<std::uint32_t>(std::countr_zero(left)));
+          add_pair(
+              number_a, a, i, number_b, b,
+              static_cast<std::uint32_t>(l) + static_cast<std::uint32_t>(std::countr_zero(left)));
         }
       }
     }
@@ -528,8 +527,8 @@ class Search {
     pairs.count = 0;
     if (count == 0) return;
     const D d;
-    Heights over_a = {}, over_b = {};          // B's corners over A's plane, A's over B's
-    std::uint32_t round_positive[3][3] = {};   // [A's edge][B's edge]
+    Heights over_a = {}, over_b = {};         // B's corners over A's plane, A's over B's
+    std::uint32_t round_positive[3][3] = {};  // [A's edge][B's edge]
     std::uint32_t round_certain[3][3] = {};
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
       Vec3 corner[2][3];
@@ -567,10 +566,10 @@ class Search {
       }
     }
     const std::uint32_t all = (1u << count) - 1;
-    const auto alike = [](const std::uint32_t (&bits)[3]) {
+    const auto alike = [](const std::uint32_t(&bits)[3]) {
       return (bits[0] & bits[1] & bits[2]) | ~(bits[0] | bits[1] | bits[2]);
     };
-    const auto each = [](const std::uint32_t (&bits)[3]) { return bits[0] & bits[1] & bits[2]; };
+    const auto each = [](const std::uint32_t(&bits)[3]) { return bits[0] & bits[1] & bits[2]; };
     const std::uint32_t sure_a = each(over_a.certain), sure_b = each(over_b.certain);
     const std::uint32_t apart =
         (sure_a & alike(over_a.positive)) | (sure_b & alike(over_b.positive));
@@ -601,7 +600,7 @@ class Search {
       Crossing& out = scratch_.crossings[found_.crossings];
       if (sure >> n & 1) {
         int ends = 0;
-        const auto take = [&](const std::uint32_t (&pierces)[3], const Heights& heights, int s) {
+        const auto take = [&](const std::uint32_t(&pierces)[3], const Heights& heights, int s) {
           if (((pierces[0] | pierces[1] | pierces[2]) >> n & 1) == 0) return;
           Determinant height[3];
           for (int c = 0; c < 3; ++c)

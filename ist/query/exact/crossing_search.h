@@ -14,7 +14,7 @@ struct CrossingSearch {
   const MeshTree* b;
   Similarity a_from_b;  ///< unit frames
   Similarity b_from_a;
-  float room = 0;  ///< A's unit frame: what is this near counts as near
+  float room = 0;                ///< A's unit frame: what is this near counts as near
   std::uint32_t max_visits = 0;  ///< pairs of nodes; 0: no limit
 };
 

@@ -87,8 +87,9 @@ void ExactQuery::sort_crossings(std::uint32_t count) noexcept {
     scratch_.order[i] = i;
   }
   if (count < 200) {
-    std::sort(scratch_.order.get(), scratch_.order.get() + count,
-              [&](std::uint32_t x, std::uint32_t y) { return scratch_.keys[x] < scratch_.keys[y]; });
+    std::sort(
+        scratch_.order.get(), scratch_.order.get() + count,
+        [&](std::uint32_t x, std::uint32_t y) { return scratch_.keys[x] < scratch_.keys[y]; });
     return;
   }
   constexpr std::uint32_t kDigit = 9;
@@ -156,13 +157,13 @@ bool ExactQuery::add_crossing(const Crossing& crossing) noexcept {
   CrossedBlock* const block_a = make_crossed_block(sides_[0], crossing.a / kWidth);
   CrossedBlock* const block_b = make_crossed_block(sides_[1], crossing.b / kWidth);
   if (block_a == nullptr || block_b == nullptr) return false;
-  sum_crossing(crossing, sums_);
+  sum_crossing(crossing, out_.sums);
   for (const Piercing* end : {&crossing.start, &crossing.end}) {
     CrossedBlock& block = end->of_b ? *block_b : *block_a;
     const std::uint32_t lane = (end->of_b ? crossing.b : crossing.a) % kWidth;
     const int sign = enters(crossing, *end) ? 1 : -1;
     note_piercing(side(end->of_b), block, lane, *end, sign);
-    sum_piercing(side(end->of_b), block, lane, *end, sign, sums_);
+    sum_piercing(side(end->of_b), block, lane, *end, sign, out_.sums);
   }
   return true;
 }
@@ -200,7 +201,7 @@ void ExactQuery::note_piercing(Side& own, CrossedBlock& crossed, std::uint32_t l
   if (checked_) {
     const MeshBlock& mesh = own.mesh.blocks[crossed.block];
     const auto k = static_cast<std::uint32_t>(end.from_first ? end.edge : (end.edge + 1) % 3);
-    add(gap_, sign * (own.is_b ? -0.5 : 0.5),
+    add(out_.gap, sign * (own.is_b ? -0.5 : 0.5),
         cross(from_origin(end), crossed.vertex[mesh.corner[k][lane]]));
   }
 }
@@ -381,9 +382,9 @@ void ExactQuery::sum_triangle(const Side& own, const CrossedBlock& crossed, std:
 void ExactQuery::sum_crossed_block(const Side& own, const CrossedBlock& crossed) noexcept {
   const MeshBlock& mesh = own.mesh.blocks[crossed.block];
   for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
-    sum_triangle(own, crossed, t, sums_);
+    sum_triangle(own, crossed, t, out_.sums);
     for (std::uint32_t k = 0; k < 3 && checked_; ++k)
-      add(gap_, middle_of(mesh, crossed, 3 * t + k) * (own.is_b ? -0.5 : 0.5),
+      add(out_.gap, middle_of(mesh, crossed, 3 * t + k) * (own.is_b ? -0.5 : 0.5),
           cross(crossed.vertex[mesh.corner[k][t]], crossed.vertex[mesh.corner[(k + 1) % 3][t]]));
   }
 }
@@ -393,7 +394,9 @@ void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i, std::uint
                           ExactSums& into) noexcept {
   const BoxBlock& box = own.mesh.level[level].boxes[i];
   const BoxSums& sums = own.mesh.level[level].sums[i];
-  const auto middle = [&](int k) { return (double{box.low[k][lane]} + double{box.high[k][lane]}) / 2; };
+  const auto middle = [&](int k) {
+    return (double{box.low[k][lane]} + double{box.high[k][lane]}) / 2;
+  };
   const auto width = [&](int k) { return double{box.high[k][lane]} - double{box.low[k][lane]}; };
   Point c = {middle(0), middle(1), middle(2)};
   Point n = {sums.normal[0][lane], sums.normal[1][lane], sums.normal[2][lane]};
@@ -429,7 +432,7 @@ void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i, std::uint
   rounding_ += 64 * kHalfUnit * area * (length_bound(d) + wide);
   area_ += area;
   rim_ += wide;
-  if (checked_) add(gap_, own.is_b ? -1 : 1, n);
+  if (checked_) add(out_.gap, own.is_b ? -1 : 1, n);
 }
 
 /// Sums the blocks that lie inside as a whole, as few lanes as hold them.
@@ -450,7 +453,7 @@ void ExactQuery::sum_insides(const Side& own, int level, std::uint32_t i) noexce
     }
     if (none) continue;
     if (all)
-      sum_lane(own, level, i, lane, sums_);
+      sum_lane(own, level, i, lane, out_.sums);
     else
       sum_insides(own, level - 1, kWidth * i + lane);
   }
@@ -501,22 +504,16 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
     for (std::uint32_t w = 0; w < (side.mesh.level[0].count + 63) / 64; ++w)
       for (std::uint64_t left = side.marks.pierced[w]; left != 0; left &= left - 1)
         sum_crossed_block(
-            side,
-            side.marks.blocks[side.marks.place[64 * w + static_cast<std::uint32_t>(
-                                                            std::countr_zero(left))]]);
+            side, side.marks.blocks[side.marks.place[64 * w + static_cast<std::uint32_t>(
+                                                                  std::countr_zero(left))]]);
     sum_insides(side, side.mesh.top, 0);
     bound_near(side);
   }
-  out_.volume = sums_.volume();
-  out_.moment = (1.0 / 24) * sums_.moment;
-  out_.force = sums_.force;
-  out_.torque = sums_.torque;
-  out_.gap = gap_;
   // A surface that moves by e changes the volume by no more than a layer of that thickness over
   // its faces, edges and corners.
   const double e = moved_;
   out_.error = 1.01 * (rounding_ / 6 + e * area_ + 32 * (e * e) * rim_) +
-               4 * kHalfUnit * std::abs(out_.volume);
+               4 * kHalfUnit * std::abs(out_.sums.volume());
   return out_;
 }
 

@@ -12,26 +12,14 @@ namespace ist {
 
 /// The overlap of two meshes, A's unit frame.
 struct ExactOverlap {
-  double volume = 0;
-  double error = 0;         ///< the true volume is within it of `volume`
-  exact::Point origin = {};  ///< of what follows
-  exact::Point moment = {};  ///< ∫ (x − origin) over the overlap
-  exact::Point force = {};   ///< ∫ n dA over B's surface in A: the volume's gradient by translation
-  exact::Point torque = {};  ///< ∫ (x − origin) × n dA, likewise
+  ExactSums sums;            ///< the gradients are those by a motion of B
+  double error = 0;          ///< the true volume is within it of the sums'
+  exact::Point origin = {};  ///< of the sums
   std::uint32_t visits = 0, crossings = 0;
-  bool complete = true;      ///< no limit or room was short; else nothing above is of use
-  bool consistent = true;    ///< signs agree with each other
+  bool complete = true;    ///< no limit or room was short; else nothing above is of use
+  bool consistent = true;  ///< signs agree with each other
   /// How far the surface of the overlap is from closed, an area vector: rounding, if all is well.
   exact::Point gap = {};
-};
-
-/// What is summed of an overlap, or a part of it: from the origin, A's unit frame.
-struct ExactSums {
-  exact::CarefulSum six_volumes;
-  exact::Point moment = {};  ///< 24 ∫ x
-  exact::Point force = {}, torque = {};
-
-  double volume() const { return six_volumes.value() / 6; }
 };
 
 /// Volume and gradients of the overlap. Allocates, locks and throws nothing. The answer depends on
@@ -104,8 +92,6 @@ class ExactQuery {
   void add_cone(double six_volumes, const exact::Point& corners, double rounding,
                 ExactSums& sums) noexcept;
 
-  ExactSums sums_;
-  exact::Point gap_ = {};
   bool checked_ = false;
   double rounding_ = 0;  ///< six times what the volume's terms may be off by
   double area_ = 0;      ///< of all triangles that may be in the overlap

@@ -29,7 +29,7 @@ struct alignas(64) PlacedTriangles {
   float length[kWidth];                   ///< of it, or more
   float slack[kWidth];                    ///< how far it may be off
   float all_low[3], all_high[3];
-  float size;  ///< no two points are further apart
+  float size;   ///< no two points are further apart
   float reach;  ///< no coordinate is larger
 };
 
@@ -84,12 +84,44 @@ struct BlockMarks {
   std::uint32_t count = 0;
 };
 
+/// What is summed of an overlap, or a part of it: from the origin, A's unit frame.
+struct ExactSums {
+  exact::CarefulSum six_volumes;
+  exact::Point moment = {};  ///< 24 ∫ x
+  exact::Point force = {};  ///< ∫ n dA over B's surface in A: the volume's gradient by translation
+  exact::Point torque = {};  ///< ∫ x × n dA, likewise
+
+  double volume() const noexcept { return six_volumes.value() / 6; }
+};
+
+/// A connected part of an overlap.
+struct ExactPart {
+  ExactSums sums;          ///< from the whole's origin
+  std::uint64_t id = 0;    ///< lowest pair of triangles on its outline, from 1; 0: it has none
+  std::uint32_t kept = 0;  ///< the part that it was added to, or itself
+};
+
+/// An edge where it is pierced.
+struct PiercedEnd {
+  std::uint64_t edge;
+  double t;
+  std::uint32_t crossing, other;
+  bool of_b;
+};
+
+/// A curve where surfaces cross, if it lies in one triangle of a solid.
+struct CurveExtent {
+  std::uint32_t triangle;  ///< ~0: of several
+  exact::Point low, high;  ///< its box
+  exact::Point area;       ///< twice the vector of what it goes around
+};
+
 /// Scratch memory of exact queries, a part of a workspace: all of it grows with its capacity.
 struct ExactScratch {
   ExactScratch(std::size_t capacity, const MemoryHooks& hooks)
       : most_blocks(static_cast<std::uint32_t>(std::min<std::size_t>(capacity, 1u << 24))),
-        most_crossed(most_blocks / 128 + 8),
-        most_crossings(most_blocks / 8 + 8),
+        most_crossed(most_blocks / 256 + 8),
+        most_crossings(most_blocks / 16 + 128),
         boxes_a(hooked<PlacedCache<PlacedBoxes, 256>>(hooks)),
         boxes_b(hooked<PlacedCache<PlacedBoxes, 256>>(hooks)),
         triangles_a(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
@@ -100,10 +132,16 @@ struct ExactScratch {
         keys(hooked_array<std::uint64_t>(hooks, most_crossings)),
         order(hooked_array<std::uint32_t>(hooks, most_crossings)),
         other_order(hooked_array<std::uint32_t>(hooks, most_crossings)),
-        flood(hooked_array<std::uint32_t>(hooks, most_blocks)) {
+        flood(hooked_array<std::uint32_t>(hooks, most_blocks)),
+        ends(hooked_array<PiercedEnd>(hooks, 2 * std::size_t{most_crossings})),
+        curves(hooked_array<CurveExtent>(hooks, most_crossings)),
+        parent(hooked_array<std::uint32_t>(hooks, elements())),
+        part(hooked_array<std::uint32_t>(hooks, elements())),
+        middles(hooked_array<std::uint32_t>(hooks, 2 * 3 * kWidth * std::size_t{most_crossed})),
+        parts(hooked_array<ExactPart>(hooks, kMostParts)) {
     for (BlockMarks* marks : {&a, &b}) {
-      for (HookedArray<std::uint64_t>* bits : {&marks->near, &marks->crossed, &marks->pierced,
-                                               &marks->inside, &marks->shells})
+      for (HookedArray<std::uint64_t>* bits :
+           {&marks->near, &marks->crossed, &marks->pierced, &marks->inside, &marks->shells})
         *bits = hooked_array<std::uint64_t>(hooks, most_blocks / 64 + 1);
       marks->place = hooked_array<std::uint32_t>(hooks, most_blocks);
       marks->blocks = hooked_array<CrossedBlock>(hooks, most_crossed);
@@ -112,6 +150,13 @@ struct ExactScratch {
 
   /// Node pairs wait depth first: 255 others a level, and both trees are opened together.
   static constexpr std::uint32_t kMostWaiting = 256 * 2 * kMaxLevels;
+
+  static constexpr std::uint32_t kMostParts = 1024;
+
+  /// Crossings, vertices of crossed blocks and blocks of both solids.
+  std::size_t elements() const noexcept {
+    return most_crossings + 2 * kWidth * std::size_t{most_crossed} + 2 * std::size_t{most_blocks};
+  }
 
   std::uint32_t most_blocks;     ///< of a mesh
   std::uint32_t most_crossed;    ///< blocks of a mesh that cross the other
@@ -124,6 +169,12 @@ struct ExactScratch {
   HookedArray<std::uint64_t> keys;
   HookedArray<std::uint32_t> order, other_order;
   HookedArray<std::uint32_t> flood;
+  // Of parts:
+  HookedArray<PiercedEnd> ends;
+  HookedArray<CurveExtent> curves;
+  HookedArray<std::uint32_t> parent, part;  ///< of an element
+  HookedArray<std::uint32_t> middles;       ///< of an edge of a crossed block, A's first
+  HookedArray<ExactPart> parts;
   BlockMarks a, b;
 };
 

@@ -3,8 +3,8 @@
 #include <cmath>
 
 // Exact arithmetic with doubles: a number as a sum of doubles that do not overlap, the smallest
-// first (Shewchuk, "Adaptive Precision Floating-Point Arithmetic", 1997). Plain numbers, no library:
-// host, device and WebAssembly compile it. Nothing may be fused or re-associated here.
+// first (Shewchuk, "Adaptive Precision Floating-Point Arithmetic", 1997). Plain numbers, no
+// library: host, device and WebAssembly compile it. Nothing may be fused or re-associated here.
 
 #if defined(__CUDACC__)
 #define IST_HD __host__ __device__ __forceinline__

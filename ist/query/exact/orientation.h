@@ -12,12 +12,8 @@ struct Point {
   double x, y, z;
 };
 
-IST_HD Point operator+(const Point& a, const Point& b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-IST_HD Point operator-(const Point& a, const Point& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
+IST_HD Point operator+(const Point& a, const Point& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+IST_HD Point operator-(const Point& a, const Point& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 IST_HD Point operator*(double s, const Point& a) { return {s * a.x, s * a.y, s * a.z}; }
 IST_HD double dot(const Point& a, const Point& b) { return (a.x * b.x + a.y * b.y) + a.z * b.z; }
 IST_HD Point cross(const Point& a, const Point& b) {
@@ -38,8 +34,7 @@ inline constexpr double kFilter = 1e-15;
 /// (r1 − r0) · ((u1 − u0) × (v1 − v0)), where r1 moves along with the infinitesimal (`moved` = 1),
 /// or r0 does (−1); the others' differences stay.
 IST_HD Determinant exact_determinant(const Point& r1, const Point& r0, const Point& u1,
-                                     const Point& u0, const Point& v1, const Point& v0,
-                                     int moved) {
+                                     const Point& u0, const Point& v1, const Point& v0, int moved) {
   const Expansion<2> ux = difference(u1.x, u0.x), uy = difference(u1.y, u0.y),
                      uz = difference(u1.z, u0.z);
   const Expansion<2> vx = difference(v1.x, v0.x), vy = difference(v1.y, v0.y),
@@ -62,10 +57,9 @@ IST_HD Determinant determinant(const Point& r1, const Point& r0, const Point& u1
   const double ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
                bz = u.y * v.x;
   const double value = (r.x * (ax - bx) + r.y * (ay - by)) + r.z * (az - bz);
-  const double error =
-      kFilter * ((std::abs(r.x) * (std::abs(ax) + std::abs(bx)) +
-                  std::abs(r.y) * (std::abs(ay) + std::abs(by))) +
-                 std::abs(r.z) * (std::abs(az) + std::abs(bz)));
+  const double error = kFilter * ((std::abs(r.x) * (std::abs(ax) + std::abs(bx)) +
+                                   std::abs(r.y) * (std::abs(ay) + std::abs(by))) +
+                                  std::abs(r.z) * (std::abs(az) + std::abs(bz)));
   if (std::abs(value) > error) return {value, error, value > 0 ? 1 : -1};
   return exact_determinant(r1, r0, u1, u0, v1, v0, moved);
 }

@@ -1,0 +1,318 @@
+#include "query/exact/exact_parts.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <tuple>
+
+namespace ist {
+namespace {
+
+using exact::Crossing;
+using exact::Piercing;
+using exact::Point;
+
+constexpr std::uint32_t kNoPart = ~0u;
+
+bool has(const HookedArray<std::uint64_t>& bits, std::uint32_t i) {
+  return bits[i / 64] >> i % 64 & 1;
+}
+
+template <class Visit>
+void for_each_block(const HookedArray<std::uint64_t>& bits, std::uint32_t blocks,
+                    const Visit& visit) {
+  for (std::uint32_t w = 0; w < (blocks + 63) / 64; ++w)
+    for (std::uint64_t left = bits[w]; left != 0; left &= left - 1)
+      visit(64 * w + static_cast<std::uint32_t>(std::countr_zero(left)));
+}
+
+}  // namespace
+
+std::uint32_t ExactParts::root(std::uint32_t element) noexcept {
+  std::uint32_t* const parent = scratch_.parent.get();
+  while (parent[element] != element) {
+    parent[element] = parent[parent[element]];
+    element = parent[element];
+  }
+  return element;
+}
+
+/// The lower number stays the root, so that parts do not depend on the order.
+void ExactParts::unite(std::uint32_t x, std::uint32_t y) noexcept {
+  x = root(x);
+  y = root(y);
+  if (x != y) scratch_.parent[std::max(x, y)] = std::min(x, y);
+}
+
+std::uint32_t ExactParts::vertex_element(const Side& own, const CrossedBlock& crossed,
+                                         std::uint32_t vertex) const noexcept {
+  const auto place = static_cast<std::uint32_t>(&crossed - own.marks.blocks.get());
+  return (own.is_b ? vertices_of_b_ : out_.crossings) + kWidth * place + vertex;
+}
+
+std::uint32_t ExactParts::block_element(const Side& own, std::uint32_t block) const noexcept {
+  return (own.is_b ? blocks_of_b_ : blocks_of_a_) + block;
+}
+
+/// Each element by itself.
+void ExactParts::begin() noexcept {
+  vertices_of_b_ = out_.crossings + kWidth * sides_[0].marks.count;
+  blocks_of_a_ = vertices_of_b_ + kWidth * sides_[1].marks.count;
+  blocks_of_b_ = blocks_of_a_ + sides_[0].mesh.level[0].count;
+  const auto alone = [&](std::uint32_t element) {
+    scratch_.parent[element] = element;
+    scratch_.part[element] = kNoPart;
+  };
+  for (std::uint32_t i = 0; i < blocks_of_a_; ++i) alone(i);
+  for (const Side& own : sides_)
+    for_each_block(own.marks.inside, own.mesh.level[0].count,
+                   [&](std::uint32_t block) { alone(block_element(own, block)); });
+}
+
+/// Segments that end at the same place go on in each other: it is an edge of one triangle and
+/// another that shares the edge, against one of the other solid.
+void ExactParts::join_curves() noexcept {
+  PiercedEnd* const ends = scratch_.ends.get();
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < out_.crossings; ++i)
+    for (const Piercing* end : {&crossing(i).start, &crossing(i).end}) {
+      const std::uint32_t triangle = end->of_b ? crossing(i).b : crossing(i).a;
+      const MeshBlock& mesh = side(end->of_b).mesh.blocks[triangle / kWidth];
+      const auto k = static_cast<std::uint32_t>(end->edge);
+      const std::uint32_t p = mesh.vertex[mesh.corner[k][triangle % kWidth]],
+                          q = mesh.vertex[mesh.corner[(k + 1) % 3][triangle % kWidth]];
+      ends[count++] = {std::uint64_t{std::min(p, q)} << 32 | std::max(p, q), end->t, i,
+                       end->of_b ? crossing(i).a : crossing(i).b, end->of_b};
+    }
+  const auto place = [](const PiercedEnd& end) {
+    return std::tuple(end.of_b, end.edge, end.other, end.crossing);
+  };
+  std::sort(ends, ends + count,
+            [&](const PiercedEnd& x, const PiercedEnd& y) { return place(x) < place(y); });
+  for (std::uint32_t i = 1; i < count; ++i)
+    if (ends[i].of_b == ends[i - 1].of_b && ends[i].edge == ends[i - 1].edge &&
+        ends[i].other == ends[i - 1].other)
+      unite(ends[i].crossing, ends[i - 1].crossing);
+}
+
+/// A curve that lies in one triangle and goes round what is outside belongs to the narrowest one
+/// there that goes around it, or to the triangle's corners.
+void ExactParts::join_holes(Side& own) noexcept {
+  const auto triangle_of = [&](std::uint32_t i) {
+    return own.is_b ? crossing(i).b : crossing(i).a;
+  };
+  CurveExtent* const curves = scratch_.curves.get();
+  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
+    CurveExtent& curve = curves[root(i)];
+    Point from, to;
+    segment(i, from, to);
+    if (root(i) == i) curve = {triangle_of(i), from, from, {}};
+    if (curve.triangle != triangle_of(i)) curve.triangle = ~0u;
+    curve.low = {std::min(curve.low.x, from.x), std::min(curve.low.y, from.y),
+                 std::min(curve.low.z, from.z)};
+    curve.high = {std::max(curve.high.x, from.x), std::max(curve.high.y, from.y),
+                  std::max(curve.high.z, from.z)};
+    curve.area = curve.area + (own.is_b ? -1.0 : 1.0) * cross(from, to);
+  }
+  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
+    const CurveExtent& hole = curves[i];
+    if (root(i) != i || hole.triangle == ~0u) continue;
+    const MeshBlock& mesh = own.mesh.blocks[hole.triangle / kWidth];
+    const std::uint32_t lane = hole.triangle % kWidth;
+    const CrossedBlock& block = crossed_block(own, hole.triangle);
+    const Point corner = block.vertex[mesh.corner[0][lane]];
+    const Point normal = cross(block.vertex[mesh.corner[1][lane]] - corner,
+                               block.vertex[mesh.corner[2][lane]] - corner);
+    if (dot(hole.area, normal) >= 0) continue;
+    std::uint32_t around = ~0u;
+    double narrowest = HUGE_VAL;
+    for (std::uint32_t j = 0; j < out_.crossings; ++j) {
+      const CurveExtent& curve = curves[root(j)];
+      if (triangle_of(j) != hole.triangle || root(j) == i) continue;
+      const Point wide = curve.high - curve.low;
+      const bool holds = curve.low.x <= hole.low.x && curve.low.y <= hole.low.y &&
+                         curve.low.z <= hole.low.z && curve.high.x >= hole.high.x &&
+                         curve.high.y >= hole.high.y && curve.high.z >= hole.high.z;
+      if (!holds || !(dot(wide, wide) < narrowest)) continue;
+      narrowest = dot(wide, wide);
+      around = j;
+    }
+    if (around != ~0u)
+      unite(i, around);
+    else if (has(own.marks.inside, hole.triangle / kWidth))
+      unite(i, block_element(own, hole.triangle / kWidth));
+    else if (block.inside >> mesh.corner[0][lane] & 1)
+      unite(i, vertex_element(own, block, mesh.corner[0][lane]));
+  }
+}
+
+/// What an edge has inside joins what bounds it, end by end.
+void ExactParts::join_edges() noexcept {
+  PiercedEnd* const ends = scratch_.ends.get();
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < out_.crossings; ++i)
+    for (const Piercing* end : {&crossing(i).start, &crossing(i).end}) {
+      const std::uint32_t triangle = end->of_b ? crossing(i).b : crossing(i).a;
+      const bool enters = (end == &crossing(i).start) == end->of_b;
+      ends[count++] = {std::uint64_t{3} * triangle + static_cast<std::uint32_t>(end->edge), end->t,
+                       i, (enters ? 1u : 0u) | (end->from_first ? 2u : 0u), end->of_b};
+    }
+  std::sort(ends, ends + count, [](const PiercedEnd& x, const PiercedEnd& y) {
+    return std::tuple(x.of_b, x.edge, (x.other & 2) == 0, x.t, x.crossing) <
+           std::tuple(y.of_b, y.edge, (y.other & 2) == 0, y.t, y.crossing);
+  });
+  for (std::uint32_t i = 0; i < count;) {
+    Side& own = side(ends[i].of_b);
+    const auto triangle = static_cast<std::uint32_t>(ends[i].edge / 3);
+    const auto k = static_cast<std::uint32_t>(ends[i].edge % 3);
+    CrossedBlock& crossed = crossed_block(own, triangle);
+    const MeshBlock& mesh = own.mesh.blocks[crossed.block];
+    const std::uint32_t lane = triangle % kWidth;
+    const std::uint32_t p = mesh.corner[k][lane], q = mesh.corner[(k + 1) % 3][lane];
+    std::uint32_t inside = crossed.inside >> p & 1 ? vertex_element(own, crossed, p) : kNoPart;
+    std::uint32_t middle = inside;
+    const std::uint64_t edge = ends[i].edge;
+    const bool of_b = ends[i].of_b;
+    for (; i < count && ends[i].edge == edge && ends[i].of_b == of_b; ++i) {
+      if ((ends[i].other & 1) != 0) {
+        inside = ends[i].crossing;
+      } else {
+        if (inside != kNoPart) unite(inside, ends[i].crossing);
+        inside = kNoPart;
+      }
+      if ((ends[i].other & 2) != 0) middle = inside;
+    }
+    if (inside != kNoPart && (crossed.inside >> q & 1) != 0)
+      unite(inside, vertex_element(own, crossed, q));
+    scratch_.middles[3 * kWidth *
+                         ((own.is_b ? sides_[0].marks.count : 0) +
+                          static_cast<std::uint32_t>(&crossed - own.marks.blocks.get())) +
+                     3 * lane + k] = middle;
+  }
+}
+
+/// Vertices inside, along edges that nothing pierces and from block to block.
+void ExactParts::join_vertices(Side& own) noexcept {
+  std::uint64_t* const found = scratch_.keys.get();  // vertex and element
+  std::uint32_t count = 0;
+  for (std::uint32_t c = 0; c < own.marks.count; ++c) {
+    const CrossedBlock& crossed = own.marks.blocks[c];
+    if (crossed.pierced == 0) continue;
+    const MeshBlock& mesh = own.mesh.blocks[crossed.block];
+    for (std::uint32_t edge = 0; edge < 3u * mesh.triangles; ++edge) {
+      const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
+                          q = mesh.corner[(edge + 1) % 3][edge / 3];
+      if ((crossed.pierced >> edge & 1) == 0 && (crossed.inside >> p & 1) != 0)
+        unite(vertex_element(own, crossed, p), vertex_element(own, crossed, q));
+    }
+    for (std::uint32_t v = 0; v < mesh.vertices; ++v)
+      if (crossed.inside >> v & 1)
+        found[count++] = std::uint64_t{mesh.vertex[v]} << 32 | vertex_element(own, crossed, v);
+  }
+  std::sort(found, found + count);
+  for (std::uint32_t i = 1; i < count; ++i)
+    if (found[i] >> 32 == found[i - 1] >> 32)
+      unite(static_cast<std::uint32_t>(found[i]), static_cast<std::uint32_t>(found[i - 1]));
+}
+
+/// Blocks inside as a whole, with each other and with what is inside of crossed ones.
+void ExactParts::join_blocks(Side& own) noexcept {
+  const MeshTree& mesh = own.mesh;
+  for_each_block(own.marks.inside, mesh.level[0].count, [&](std::uint32_t b) {
+    const MeshBlock& block = mesh.blocks[b];
+    for (std::uint32_t k = 0; k < block.neighbours; ++k) {
+      const std::uint32_t other = mesh.neighbours[block.first_neighbour + k] / kWidth;
+      if (has(own.marks.inside, other)) {
+        if (other < b) unite(block_element(own, b), block_element(own, other));
+      } else if (has(own.marks.pierced, other)) {
+        const CrossedBlock& crossed = own.marks.blocks[own.marks.place[other]];
+        const MeshBlock& beside = mesh.blocks[other];
+        for (std::uint32_t v = 0; v < beside.vertices; ++v)
+          if (std::find(block.vertex, block.vertex + block.vertices, beside.vertex[v]) !=
+              block.vertex + block.vertices)
+            unite(block_element(own, b), vertex_element(own, crossed, v));
+      }
+    }
+  });
+}
+
+std::uint32_t ExactParts::part_of(std::uint32_t element) noexcept {
+  std::uint32_t& part = scratch_.part[root(element)];
+  if (part == kNoPart) {
+    part = std::min(parts_, ExactScratch::kMostParts - 1);
+    if (part == parts_) {
+      scratch_.parts[part] = {};
+      scratch_.parts[part].kept = part;
+      ++parts_;
+    }
+  }
+  return part;
+}
+
+void ExactParts::sum_parts() noexcept {
+  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
+    const Crossing& at = crossing(i);
+    ExactPart& part = scratch_.parts[part_of(i)];
+    if (part.id == 0) part.id = (std::uint64_t{at.a} << 32 | at.b) + 1;
+    sum_crossing(at, part.sums);
+    for (const Piercing* end : {&at.start, &at.end}) {
+      Side& own = side(end->of_b);
+      const std::uint32_t triangle = end->of_b ? at.b : at.a;
+      sum_piercing(own, crossed_block(own, triangle), triangle % kWidth, *end,
+                   (end == &at.start) == end->of_b ? 1 : -1, part.sums);
+    }
+  }
+  for (Side& own : sides_) {
+    for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
+      const CrossedBlock& crossed = own.marks.blocks[own.marks.place[b]];
+      const MeshBlock& mesh = own.mesh.blocks[b];
+      const std::uint32_t first =
+          3 * kWidth * ((own.is_b ? sides_[0].marks.count : 0) + own.marks.place[b]);
+      for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
+        const std::uint32_t edge = 3 * t + (crossed.apex[t] + 1u) % 3;
+        if (middle_of(mesh, crossed, edge) == 0) continue;
+        std::uint32_t element = vertex_element(own, crossed, mesh.corner[edge % 3][t]);
+        if (crossed.pierced >> edge & 1) element = scratch_.middles[first + edge];
+        if (element != kNoPart)
+          sum_triangle(own, crossed, t, scratch_.parts[part_of(element)].sums);
+      }
+    });
+    for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {
+      sum_lane(own, 1, b / kWidth, b % kWidth, scratch_.parts[part_of(block_element(own, b))].sums);
+    });
+  }
+}
+
+/// What is less than nothing is the wall of a cavity in a part: in the largest, as far as can be
+/// told from sums.
+void ExactParts::join_cavities() noexcept {
+  std::uint32_t largest = 0;
+  for (std::uint32_t p = 1; p < parts_; ++p)
+    if (scratch_.parts[p].sums.volume() > scratch_.parts[largest].sums.volume()) largest = p;
+  for (std::uint32_t p = 0; p < parts_; ++p)
+    if (scratch_.parts[p].sums.volume() < 0) scratch_.parts[p].kept = largest;
+}
+
+std::uint32_t ExactParts::divide() noexcept {
+  parts_ = 0;
+  begin();
+  join_curves();
+  for (Side& own : sides_) join_holes(own);
+  join_edges();
+  for (Side& own : sides_) join_vertices(own);
+  for (Side& own : sides_) join_blocks(own);
+  sum_parts();
+  join_cavities();
+  return parts_;
+}
+
+std::uint32_t ExactParts::part_of_crossing(std::uint32_t i) noexcept {
+  return scratch_.parts[part_of(i)].kept;
+}
+
+void ExactParts::segment(std::uint32_t i, Point& from, Point& to) const noexcept {
+  from = from_origin(crossing(i).start);
+  to = from_origin(crossing(i).end);
+}
+
+}  // namespace ist
