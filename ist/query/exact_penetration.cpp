@@ -79,8 +79,9 @@ struct WorldSums {
     const double u = pose.unit_a, found = sums.volume();
     volume = found * (u * u * u);
     force = pose.rotation_a * vector(sums.force) * (u * u);
-    centroid = found != 0 ? pose.to_world(vector(origin) + vector(sums.moment) / (24 * found))
-                          : Eigen::Vector3d::Zero();
+    centroid.setZero();
+    if (found != 0)
+      centroid = pose.to_world(vector(origin) + vector(sums.moment) / (24 * found));
     // The sums' origin from B's.
     const Eigen::Vector3d shift(pose.a_from_b.t[0], pose.a_from_b.t[1], pose.a_from_b.t[2]);
     const Eigen::Vector3d arm =
@@ -119,7 +120,7 @@ Answer stopped(const PlacedTree& a, const PlacedTree& b, Answer answer, const Sp
 std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room) {
   std::uint32_t kept = 0;
   for (const ExactPart& part : parts) kept += &parts[part.kept] == &part ? 1 : 0;
-  const auto middle = [](const ExactPart& part) {
+  const auto middle = [](const ExactPart& part) -> Eigen::Vector3d {
     return vector(part.sums.moment) / (24 * part.sums.volume());
   };
   while (kept > room) {

@@ -241,14 +241,14 @@ void ExactQuery::settle(Side& side, CrossedBlock& crossed) noexcept {
     if (sum < 0 || (sum == 0 && first < 0)) inside |= 1u << p;
     if (sum > 0 || (sum == 0 && first < 0)) inside |= 1u << q;
   }
-  std::uint16_t joined[kWidth] = {};
-  for (std::uint32_t edge = 0; edge < 3u * mesh.triangles; ++edge) {
-    if (crossed.pierced >> edge & 1) continue;
-    const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
-                        q = mesh.corner[(edge + 1) % 3][edge / 3];
-    joined[p] = static_cast<std::uint16_t>(joined[p] | 1u << q);
-    joined[q] = static_cast<std::uint16_t>(joined[q] | 1u << p);
-  }
+  std::uint32_t joined[kWidth] = {};
+  for (std::uint32_t k = 0; k < 3; ++k)
+    for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
+      const std::uint32_t p = mesh.corner[k][t], q = mesh.corner[(k + 1) % 3][t];
+      const auto whole = static_cast<std::uint32_t>(~crossed.pierced >> (3 * t + k) & 1);
+      joined[p] |= whole << q;
+      joined[q] |= whole << p;
+    }
   const std::uint32_t all = (1u << mesh.vertices) - 1;
   const auto spread = [&](std::uint32_t from) {
     while (from != 0) {

@@ -31,10 +31,37 @@ struct Determinant {
 /// values: eight roundings of each product, and some room.
 inline constexpr double kFilter = 1e-15;
 
+/// The sign of a d − b c of differences, 0 for none: in doubles where these are certain.
+IST_HD int sign_of_minor(double a1, double a0, double b1, double b0, double c1, double c0,
+                         double d1, double d0) {
+  const double ad = (a1 - a0) * (d1 - d0), bc = (b1 - b0) * (c1 - c0);
+  const double value = ad - bc;
+  if (std::abs(value) > kFilter * (std::abs(ad) + std::abs(bc))) return value > 0 ? 1 : -1;
+  if (ad == 0 && bc == 0) return 0;  // a difference is 0 only where its numbers are equal
+  return sum(product(difference(a1, a0), difference(d1, d0)),
+             product(difference(b1, b0), difference(c1, c0)), -1)
+      .sign();
+}
+
+/// The sign of a tie, from the normal u × v along which the infinitesimal goes.
+IST_HD int sign_of_tie(const Point& u1, const Point& u0, const Point& v1, const Point& v0,
+                       int moved) {
+  int sign = sign_of_minor(u1.y, u0.y, u1.z, u0.z, v1.y, v0.y, v1.z, v0.z);
+  if (sign == 0) sign = sign_of_minor(u1.z, u0.z, u1.x, u0.x, v1.z, v0.z, v1.x, v0.x);
+  if (sign == 0) sign = sign_of_minor(u1.x, u0.x, u1.y, u0.y, v1.x, v0.x, v1.y, v0.y);
+  // Of a triangle without area, or of parallel edges: any sign that is always the same will do.
+  return sign != 0 ? moved * sign : 1;
+}
+
 /// (r1 − r0) · ((u1 − u0) × (v1 − v0)), where r1 moves along with the infinitesimal (`moved` = 1),
 /// or r0 does (−1); the others' differences stay.
 IST_HD Determinant exact_determinant(const Point& r1, const Point& r0, const Point& u1,
                                      const Point& u0, const Point& v1, const Point& v0, int moved) {
+  // All in a plane across an axis: how aligned parts lie.
+  if ((r1.x == r0.x && u1.x == u0.x && v1.x == v0.x) ||
+      (r1.y == r0.y && u1.y == u0.y && v1.y == v0.y) ||
+      (r1.z == r0.z && u1.z == u0.z && v1.z == v0.z))
+    return {0, 0, sign_of_tie(u1, u0, v1, v0, moved)};
   const Expansion<2> ux = difference(u1.x, u0.x), uy = difference(u1.y, u0.y),
                      uz = difference(u1.z, u0.z);
   const Expansion<2> vx = difference(v1.x, v0.x), vy = difference(v1.y, v0.y),
@@ -44,10 +71,8 @@ IST_HD Determinant exact_determinant(const Point& r1, const Point& r0, const Poi
   const Expansion<16> z = minor(ux, vy, uy, vx);
   const auto det = sum(sum(product(x, difference(r1.x, r0.x)), product(y, difference(r1.y, r0.y))),
                        product(z, difference(r1.z, r0.z)));
-  int sign = det.sign();
-  if (sign == 0) sign = moved * (x.count != 0 ? x.sign() : y.count != 0 ? y.sign() : z.sign());
-  // Of a triangle without area, or of parallel edges: any sign that is always the same will do.
-  return {det.value(), 0, sign != 0 ? sign : 1};
+  const int sign = det.sign();
+  return {det.value(), 0, sign != 0 ? sign : sign_of_tie(u1, u0, v1, v0, moved)};
 }
 
 /// The same, in doubles where these are certain.
