@@ -59,7 +59,8 @@ std::vector<BlockPatch> patches_in_order(const MeshView& surface) {
   std::vector<std::array<float, 3>> middles(patches.size());
   for (std::size_t p = 0; p < patches.size(); ++p) {
     Box box;
-    for (const std::uint32_t v : patches[p].vertices) box.add(surface.vertices + 3 * std::size_t{v});
+    for (const std::uint32_t v : patches[p].vertices)
+      box.add(surface.vertices + 3 * std::size_t{v});
     for (std::size_t k = 0; k < 3; ++k) middles[p][k] = (box.low[k] + box.high[k]) / 2;
   }
   std::vector<BlockPatch> sorted;
@@ -84,7 +85,7 @@ void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patc
       if (number[v] == kNone) {
         number[v] = used++;
         for (std::size_t k = 0; k < 3; ++k)
-          arrays.vertices.push_back(surface.vertices[3 * std::size_t{v} + k]);
+          arrays.vertices.push_back(surface.vertices[3 * std::size_t{v} + k] + 0.0);  // −0 is 0
       }
       block.vertex[i] = number[v];
     }
