@@ -99,16 +99,30 @@ ist_status_t ist_tree_load(const char* path, const ist_allocator_t* allocator, i
  * the ist_tree_t is told IST_NO_HANDLE from then on. */
 ist_status_t ist_tree_release(ist_tree_t* tree);
 
+/* What the mesh of an asset is, or why it holds none (tree_view.h). */
+typedef int32_t ist_mesh_state_t;
+enum {
+  IST_MESH_NONE = 0,
+  IST_MESH_OWN = 1,
+  IST_MESH_UNITED = 2,
+  IST_MESH_SIMPLIFIED = 3,
+  IST_MESH_UNRESOLVED = 4
+};
+
 typedef struct ist_tree_info {
   uint32_t size;
   uint32_t has_field; /* 1: the asset holds the solid's surface, so that queries can be exact */
-  uint64_t spheres;   /* count */
+  uint64_t spheres;   /* count; 0: a surface alone, of which spheres cannot be asked */
   double volume;      /* [u³] of the solid */
   double coverage;    /* [0, 1] share of it in inner spheres */
   double protrusion;  /* [u] no matched sphere sticks further out of the solid */
   double field_error; /* [u] the stored surface and the solid's lie within this of each other */
   uint32_t field_triangles; /* of that surface */
-  uint32_t details;         /* levels of detail of the matched spheres, ≥ 1: 0 is the finest */
+  uint32_t details;         /* levels of detail of the matched spheres: 0 is the finest */
+  uint32_t mesh_triangles;  /* of the mesh kept for exact queries; 0: there is none */
+  ist_mesh_state_t mesh_state;
+  double mesh_error;    /* [u] the mesh's surface and the solid's lie within this of each other */
+  double counted_twice; /* [u³] volume that the mesh as it came counts more than once */
 } ist_tree_info_t;
 
 ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info);

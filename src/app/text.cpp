@@ -47,21 +47,6 @@ const char* name_of(QueryStatus status) noexcept {
   return "unknown";
 }
 
-const char* name_of(MeshState state) noexcept {
-  switch (state) {
-    case MeshState::own:
-      return "own";
-    case MeshState::united:
-      return "united";
-    case MeshState::simplified:
-      return "simplified";
-    case MeshState::unresolved:
-      return "unresolved";
-    default:
-      return "none";
-  }
-}
-
 const char* name_of(TrialPartner partner) noexcept {
   switch (partner) {
     case TrialPartner::copy:

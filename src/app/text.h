@@ -16,10 +16,9 @@ namespace ist::app {
 std::string grouped(std::uint64_t count);  ///< 10,000
 std::string short_vector(const Eigen::Vector3d& v);
 
-using ist::name_of;  // of a GridMode
+using ist::name_of;  // of a GridMode or a MeshState
 const char* name_of(StopReason reason) noexcept;
 const char* name_of(QueryStatus status) noexcept;
-const char* name_of(MeshState state) noexcept;
 const char* name_of(TrialPartner partner) noexcept;
 
 }  // namespace ist::app

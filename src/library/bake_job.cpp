@@ -44,6 +44,10 @@ void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& r
   result.bytes = entry.asset.bytes().size();
   result.spheres = tree.sphere_count();
   result.coverage = tree.coverage();
+  result.mesh_state = name_of(tree.mesh_state());
+  result.mesh_triangles = tree.mesh_triangles();
+  result.mesh_error = tree.mesh_error();
+  result.counted_twice = tree.counted_twice();
   if (const PredictedErrors errors = tree.predicted_errors(); errors.target_error > 0) {
     result.target_error = errors.target_error;
     result.target_met = errors.target_met();

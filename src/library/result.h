@@ -28,6 +28,9 @@ struct JobResult {
   std::uint64_t content_hash = 0, bytes = 0;  ///< of the asset
   std::uint64_t spheres = 0;
   double coverage = 0;                        ///< share of the solid's volume
+  std::string mesh_state;                     ///< name_of(TreeView::mesh_state())
+  std::uint64_t mesh_triangles = 0;           ///< kept for exact queries
+  double mesh_error = 0, counted_twice = 0;   ///< as TreeView has them
   std::optional<double> target_error, error;  ///< asked for and measured, relative; see ErrorTarget
   std::optional<bool> target_met;
   std::optional<double> confidence;  ///< Judgement's, of a mesh that was repaired or wrapped

@@ -38,6 +38,10 @@ Json to_json(const JobResult& result) {
           {"bytes", if_done(result.bytes)},
           {"spheres", if_done(result.spheres)},
           {"coverage", if_done(result.coverage)},
+          {"mesh_state", if_done(result.mesh_state)},
+          {"mesh_triangles", if_done(result.mesh_triangles)},
+          {"mesh_error", if_done(result.mesh_error)},
+          {"counted_twice", if_done(result.counted_twice)},
           {"target_error", or_null(result.target_error)},
           {"measured_error", or_null(result.error)},
           {"target_met", or_null(result.target_met)},
@@ -72,6 +76,12 @@ JobResult result_from(const Json& json) {
   take(json, "bytes", result.bytes);
   take(json, "spheres", result.spheres);
   take(json, "coverage", result.coverage);
+  if (json.contains("mesh_state")) {
+    take(json, "mesh_state", result.mesh_state);
+    take(json, "mesh_triangles", result.mesh_triangles);
+    take(json, "mesh_error", result.mesh_error);
+    take(json, "counted_twice", result.counted_twice);
+  }
   take(json, "target_error", result.target_error);
   take(json, "measured_error", result.error);
   take(json, "target_met", result.target_met);

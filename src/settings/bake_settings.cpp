@@ -357,4 +357,19 @@ const char* name_of(GridMode mode) noexcept {
   return "unknown";
 }
 
+const char* name_of(MeshState state) noexcept {
+  switch (state) {
+    case MeshState::own:
+      return "own";
+    case MeshState::united:
+      return "united";
+    case MeshState::simplified:
+      return "simplified";
+    case MeshState::unresolved:
+      return "unresolved";
+    default:
+      return "none";
+  }
+}
+
 }  // namespace ist

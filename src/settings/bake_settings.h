@@ -77,6 +77,7 @@ std::optional<SettingFault> complete(BakeSettings& settings, const std::set<std:
 std::string describe_exactly(const BakeSettings& settings);
 
 const char* name_of(GridMode mode) noexcept;
+const char* name_of(MeshState state) noexcept;
 
 /// "all", "none", or how far the surface may be off: 0.5, or 0.1% of the size. Nothing for others.
 std::optional<SurfaceSettings> parse_surface(const std::string& text);

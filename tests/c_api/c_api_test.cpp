@@ -218,6 +218,39 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
   EXPECT_GT(answered, 20);
 }
 
+/// A surface alone is told of, and answers no query of spheres.
+TEST(CApi, SurfaceAlone) {
+  const Asset asset = bake_surface(close_mesh(testing::cube_mesh(), "cube"));
+  const ist_tree_t tree = viewed(asset);
+  ist_tree_info_t info = {};
+  info.size = sizeof info;
+  ASSERT_EQ(ist_tree_get_info(&tree, &info), IST_OK);
+  EXPECT_EQ(info.spheres, 0u);
+  EXPECT_EQ(info.details, 0u);
+  EXPECT_EQ(info.mesh_triangles, 12u);
+  EXPECT_EQ(info.mesh_state, IST_MESH_OWN);
+  ist_placed_tree_t placed = {};
+  placed.size = sizeof placed;
+  placed.tree = &tree;
+  placed.pose = IST_POSE_IDENTITY;
+  ist_workspace_t workspace = {};
+  ASSERT_EQ(ist_workspace_make(0, nullptr, &workspace), IST_OK);
+  ist_penetration_t answer = {};
+  answer.size = sizeof answer;
+  EXPECT_EQ(ist_penetration(&placed, &placed, nullptr, &workspace, &answer), IST_NOT_HELD);
+  EXPECT_EQ(answer.status, IST_NOT_HELD);
+  EXPECT_TRUE(std::isnan(answer.volume) && std::isnan(answer.translation_gradient[2]));
+  ist_separation_t gap = {};
+  gap.size = sizeof gap;
+  EXPECT_EQ(ist_separation(&placed, &placed, nullptr, &workspace, &gap), IST_NOT_HELD);
+  EXPECT_TRUE(std::isnan(gap.distance));
+  const ist_ball_set_t set = {sizeof set, IST_INNER, 0, 0};
+  std::size_t count = 1;
+  EXPECT_EQ(ist_tree_get_balls(&tree, &set, nullptr, 0, &count), IST_NOT_HELD);
+  EXPECT_EQ(count, 0u);
+  EXPECT_EQ(ist_workspace_release(&workspace), IST_OK);
+}
+
 /// The spheres that the asset's layout has, at every level of detail.
 TEST(CApi, Balls) {
   const Asset asset = bake(close_mesh(testing::cube_mesh(), "cube"), {.max_spheres = 2000});

@@ -94,6 +94,7 @@ static int trees_are_checked(const char* path) {
   CHECK(ist_tree_get_info(&tree, &info) == IST_OK);
   CHECK(info.spheres > 0 && info.volume > 0 && info.coverage >= 0 && info.coverage <= 1);
   CHECK(info.has_field == (info.field_triangles > 0));
+  CHECK(info.mesh_triangles == 0 || info.mesh_state == IST_MESH_OWN);
   CHECK(ist_tree_get_predicted_errors(&tree, &errors) == IST_OK && errors.size == sizeof errors);
   CHECK(errors.poses == 0 && errors.target_met == 0 && errors.classes[0].median == 0);
   CHECK(ist_tree_get_predicted_errors(NULL, &errors) == IST_NULL_POINTER && errors.poses == 0);
@@ -178,8 +179,8 @@ static int versions_and_words(void) {
   CHECK(ist_check_version(IST_VERSION + 100) == IST_WRONG_VERSION);
   CHECK(ist_check_version(IST_VERSION + 10000) == IST_WRONG_VERSION);
   CHECK(ist_check_version(0) == IST_WRONG_VERSION);
-  for (status = IST_NO_DURATION - 1; status <= IST_BUDGET_EXHAUSTED + 1; ++status) {
-    const int known = status >= IST_NO_DURATION && status <= IST_BUDGET_EXHAUSTED;
+  for (status = IST_NOT_HELD - 1; status <= IST_BUDGET_EXHAUSTED + 1; ++status) {
+    const int known = status >= IST_NOT_HELD && status <= IST_BUDGET_EXHAUSTED;
     const int unknown = strcmp(ist_describe(status), ist_describe(12345)) == 0;
     CHECK(known != unknown);
   }

@@ -50,6 +50,29 @@ def test_views_hold_their_owner_and_are_read_only(cube):
     assert view.readonly
 
 
+def test_a_surface_alone_answers_no_query_of_spheres(cube):
+    closed = ist.close_mesh(ist.Mesh(*TETRAHEDRON))
+    alone = ist.bake_surface(closed)
+    assert (alone.sphere_count, alone.mesh_triangles, alone.mesh_state) == (0, 4, "own")
+    assert alone.mesh_error == 0 and alone.counted_twice == 0
+    assert alone.volume == pytest.approx(1 / 6, abs=1e-15)
+    assert all(one.violations == 0 for one in ist.check(alone, closed))
+    assert len(alone.spheres()) == 0
+    again = ist.Asset.from_bytes(alone.to_bytes())
+    found = ist.penetration(again, cube, [1, 0, 0, 0, 0, 0, 0])
+    assert found.status == ist.QueryStatus.not_held and np.isnan(found.volume)
+    assert np.isnan(ist.separation(cube, again, [1, 0, 0, 0, 0, 0, 0]).distance)
+
+
+@pytest.mark.parametrize("surface, state", [("all", "own"), ("none", "none"), (0.1, "own"),
+                                            ("1%", "own")])
+def test_surface_says_what_is_kept(surface, state):
+    closed = ist.close_mesh(ist.Mesh(*TETRAHEDRON))
+    assert ist.bake(closed, max_spheres=5, surface=surface).mesh_state == state
+    with pytest.raises(ist.Error, match="surface: 'some' is none of"):
+        ist.bake(closed, max_spheres=5, surface="some")
+
+
 def test_fields_hold_their_arrays_and_assets(cube):
     terrain = ist.HeightField(np.full((3, 3), 0.25, np.float32), spacing=(4, 4))
     field = ist.MeshField(ist.Asset.from_bytes(cube.to_bytes()))

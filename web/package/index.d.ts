@@ -59,7 +59,7 @@ export interface AssetInfo {
   name: string;
   /** Bytes of the asset. */
   bytes: number;
-  /** Count of spheres; of each of the two sets. */
+  /** Count of spheres; of each of the two sets. 0: a surface alone, of which none can be asked. */
   spheres: number;
   /** Count of spheres of the matched set at each level of detail, finest first. */
   details: number[];
@@ -75,6 +75,14 @@ export interface AssetInfo {
   fieldError: number;
   /** Count of triangles of the stored surface. */
   fieldTriangles: number;
+  /** What the mesh kept for exact queries is; `unresolved`: none, as it counts volume twice. */
+  meshState: 'none' | 'own' | 'united' | 'simplified' | 'unresolved';
+  /** Count of triangles of that mesh, 0: there is none. */
+  meshTriangles: number;
+  /** [u] its surface and the solid's lie within this of each other. */
+  meshError: number;
+  /** [u³] volume that the mesh as it came counts more than once. */
+  countedTwice: number;
 }
 
 /** What holds a solid. */

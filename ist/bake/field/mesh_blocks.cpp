@@ -85,7 +85,7 @@ void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patc
       if (number[v] == kNone) {
         number[v] = used++;
         for (std::size_t k = 0; k < 3; ++k)
-          arrays.vertices.push_back(surface.vertices[3 * std::size_t{v} + k]);
+          arrays.vertices.push_back(surface.vertices[3 * std::size_t{v} + k] + 0.0);  // −0 is 0
       }
       block.vertex[i] = number[v];
     }

@@ -9,8 +9,9 @@ namespace ist {
 /// an order whose groups of 16, 256, … are compact, boxes around them, shells and neighbours.
 /// Blocks that share a vertex are neighbours, and their triangles belong to one shell.
 ///
-/// `surface`: unit frame; vertices are taken bit for bit. `header.error` and `header.rounding` are
-/// the caller's to set. Same bytes for any number of threads and on any machine.
+/// `surface`: unit frame; vertices are taken bit for bit, but −0 becomes 0. `header.error` and
+/// `header.rounding` are the caller's to set. Same bytes for any number of threads and on any
+/// machine.
 MeshArrays lay_out_mesh(const MeshView& surface);
 
 }  // namespace ist

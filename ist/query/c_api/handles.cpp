@@ -129,7 +129,12 @@ ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info) {
   info->protrusion = view.protrusion();
   info->field_error = view.field_error();
   info->field_triangles = view.field_triangles();
-  info->details = view.header().detail_count + 1;
+  info->details = info->spheres == 0 ? 0 : view.header().detail_count + 1;
+  static_assert(IST_MESH_UNRESOLVED == static_cast<int>(ist::MeshState::unresolved));
+  info->mesh_triangles = view.mesh_triangles();
+  info->mesh_state = static_cast<ist_mesh_state_t>(view.mesh_state());
+  info->mesh_error = view.mesh_error();
+  info->counted_twice = view.counted_twice();
   return IST_OK;
 }
 

@@ -42,6 +42,8 @@ function bytesOf(given) {
       'await (await fetch(address)).arrayBuffer() gives');
 }
 
+const kMeshStates = ['none', 'own', 'united', 'simplified', 'unresolved'];
+
 export class Asset extends Owner {
   static from(given, name = 'asset') {
     const wasm = functions('Asset.from()');
@@ -90,6 +92,10 @@ export class Asset extends Owner {
       hasField: integers[at + 1] !== 0,
       fieldError: numbers[values + 3],
       fieldTriangles: integers[at + 12],
+      meshState: kMeshStates[integers[at + 15]],
+      meshTriangles: integers[at + 14],
+      meshError: numbers[values + 6],
+      countedTwice: numbers[values + 7],
     };
   }
 

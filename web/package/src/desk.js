@@ -10,16 +10,16 @@ export const kSeparation = 288;
 export const kPatches = 400;
 export const kMostPatches = 64;
 export const kInfo = 8592;
-export const kBounds = 8648;
-export const kMass = 8736;
-export const kCounts = 8872;
-export const kMotion = 8880;
+export const kBounds = 8672;
+export const kMass = 8760;
+export const kCounts = 8896;
+export const kMotion = 8904;
 export const kMotionBytes = 72;
-export const kImpactSettings = 9024;
-export const kImpact = 9056;
-export const kFit = 9176;
-export const kWrenches = 9224;
-export const kNumbers = 9328;
+export const kImpactSettings = 9048;
+export const kImpact = 9080;
+export const kFit = 9200;
+export const kWrenches = 9248;
+export const kNumbers = 9352;
 
 let start = 0;
 /** Where the desk stands in memory. */
