@@ -9,12 +9,14 @@
 
 #include <ist/error.h>
 
+#include "mesh/close_oriented.h"
 #include "mesh/disjoint_sets.h"
 #include "mesh/message_text.h"
 #include "mesh/resolve/arrangement.h"
 #include "mesh/resolve/patch_winding.h"
 #include "mesh/resolve/unresolvable.h"
 #include "mesh/self_intersections.h"
+#include "mesh/shells.h"
 
 namespace ist {
 namespace {
@@ -112,7 +114,9 @@ class Resolver {
 
   /// Closes the surface and holds its volume against what the mesh counts.
   ClosedMesh close(TriangleMesh surface, const Resolution& resolution) const {
-    ClosedMesh result = close_mesh(std::move(surface), closed_.name);
+    ClosedMesh result = close_oriented(std::move(surface), closed_.name);
+    if (find_unbalanced_edge(result.mesh.triangles, EdgeTable(result.mesh.triangles)))
+      throw Unresolvable{"what was made does not close"};
     const Volume before(closed_.mesh, from_), after(result.mesh, from_);
     const double expected = before.sum - resolution.counted_twice + resolution.counted_against;
     const double off = std::abs(after.sum - expected);
