@@ -69,6 +69,19 @@ std::vector<std::uint32_t> groups_of(const std::vector<Triangle>& triangles, con
   return groups;
 }
 
+/// The spacing of doubles at the mesh's largest coordinate. What differs by less is one vertex, near
+/// the origin too.
+double snap_step(const std::vector<Eigen::Vector3d>& vertices) {
+  double largest = 0;
+  for (const Eigen::Vector3d& v : vertices) largest = std::max(largest, v.cwiseAbs().maxCoeff());
+  return std::ldexp(1.0, std::ilogb(largest) - 52);
+}
+
+/// To the nearest multiples of a power of two.
+Eigen::Vector3d snapped(const Eigen::Vector3d& p, const double step) {
+  return (p / step).array().rint() * step;
+}
+
 class Resolver {
  public:
   explicit Resolver(ClosedMesh& closed)
@@ -97,16 +110,18 @@ class Resolver {
     }
     if (!any) return std::nullopt;
     TriangleMesh made;
+    const double step = snap_step(closed_.mesh.vertices);
     for (std::uint32_t v = 0; v < arrangement_.points.size(); ++v)
-      made.vertices.push_back(arrangement_.points.rounded(v));
+      made.vertices.push_back(arrangement_.points.is_given(v)
+                                  ? arrangement_.points.rounded(v)
+                                  : snapped(arrangement_.points.rounded(v), step));
     for (std::size_t t = 0; t < triangles_.size(); ++t)
       if (!changed[groups[t]]) made.triangles.push_back(triangles_[t]);
     for (std::size_t p = 0; p < arrangement_.pieces.size(); ++p) {
       if (!changed[group_of_piece(p)] || in_front(p) > 0 || behind(p) < 1) continue;
       made.triangles.push_back(arrangement_.pieces[p]);
       for (const std::uint32_t v : arrangement_.pieces[p])
-        if (!arrangement_.points.is_given(v))
-          resolution.moved = std::max(resolution.moved, 0x1.001p-53 * made.vertices[v].norm());
+        if (!arrangement_.points.is_given(v)) resolution.moved = 1.7321 * step;  // √3
     }
     if (made.triangles.empty()) throw Unresolvable{"its winding number is nowhere 1 or more"};
     return made;
