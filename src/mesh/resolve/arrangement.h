@@ -14,10 +14,10 @@ namespace ist {
 /// and corners.
 struct Arrangement {
   ExactPoints points;
-  std::vector<Triangle> pieces;        ///< corners by the points' numbers
-  std::vector<std::uint32_t> source;   ///< [piece] a triangle of the mesh in whose plane it lies
-  std::vector<int> winding_step;       ///< [piece] > 0: of the winding number, to behind it
-  std::vector<std::uint32_t> plane;    ///< [triangle] those in one plane that meet have the same
+  std::vector<Triangle> pieces;       ///< corners by the points' numbers
+  std::vector<std::uint32_t> source;  ///< [piece] a triangle of the mesh in whose plane it lies
+  std::vector<int> winding_step;      ///< [piece] > 0: of the winding number, to behind it
+  std::vector<std::uint32_t> plane;   ///< [triangle] those in one plane that meet have the same
 };
 
 /// Triangles on a line are left out, and pieces that others cancel. `pairs`: those that meet.

@@ -84,8 +84,7 @@ ExactPoint common_point(const ExactPlane& a, const ExactPlane& b, const ExactPla
   const WholeVector bc = cross(b.normal, c.normal), ca = cross(c.normal, a.normal),
                     ab = cross(a.normal, b.normal);
   WholeVector x;
-  for (std::size_t k = 0; k < 3; ++k)
-    x[k] = a.offset * bc[k] + b.offset * ca[k] + c.offset * ab[k];
+  for (std::size_t k = 0; k < 3; ++k) x[k] = a.offset * bc[k] + b.offset * ca[k] + c.offset * ab[k];
   return with_positive_w(std::move(x), dot(a.normal, bc));
 }
 
@@ -128,7 +127,8 @@ std::uint32_t ExactPoints::add(ExactPoint point, const Eigen::Vector3d& rounded)
 
 Whole ExactPoints::whole(const double coordinate) const {
   int exponent = 0;
-  const auto mantissa = static_cast<std::int64_t>(std::ldexp(std::frexp(coordinate, &exponent), 53));
+  const auto mantissa =
+      static_cast<std::int64_t>(std::ldexp(std::frexp(coordinate, &exponent), 53));
   if (mantissa == 0) return 0;
   const int shift = exponent - 53 - exponent_;
   Whole size = std::abs(mantissa);
@@ -161,6 +161,8 @@ int ExactPoints::turn(const int k, const PointView& a, const PointView& b,
   const int x = (k + 1) % 3, y = (k + 2) % 3;
   const double ax = (*a.at)[x] - (*c.at)[x], ay = (*a.at)[y] - (*c.at)[y];
   const double bx = (*b.at)[x] - (*c.at)[x], by = (*b.at)[y] - (*c.at)[y];
+  const bool given = a.exact == nullptr && b.exact == nullptr && c.exact == nullptr;
+  if (given && (ax == 0 || by == 0) && (ay == 0 || bx == 0)) return 0;
   const double left = ax * by, right = ay * bx, area = left - right;
   // What the corners were rounded by, what the differences are.
   const double corner_x = error_of(a, x) + error_of(b, x) + error_of(c, x);

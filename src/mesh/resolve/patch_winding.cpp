@@ -35,7 +35,8 @@ class Columns {
     cells_ = std::clamp<std::size_t>(
         static_cast<std::size_t>(std::sqrt(static_cast<double>(triangles.size()))), 1, 1024);
     const Eigen::Array2d size = high - low_;
-    for (const int i : {0, 1}) per_unit_[i] = size[i] > 0 ? static_cast<double>(cells_) / size[i] : 0;
+    for (const int i : {0, 1})
+      per_unit_[i] = size[i] > 0 ? static_cast<double>(cells_) / size[i] : 0;
     begin_.assign(cells_ * cells_ + 1, 0);
     const auto each_cell = [&](const auto& visit) {
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
@@ -133,8 +134,8 @@ class Rays {
       int turns[3] = {0, 0, 0};
       bool left = false, right = false;
       for (std::size_t k = 0; k < 3 && !(left && right); ++k) {
-        turns[k] = points_.turn(axis, points_.view(corner[k]), points_.view(corner[(k + 1) % 3]),
-                                from);
+        turns[k] =
+            points_.turn(axis, points_.view(corner[k]), points_.view(corner[(k + 1) % 3]), from);
         left |= turns[k] > 0;
         right |= turns[k] < 0;
       }

@@ -129,8 +129,7 @@ PlanarTriangulation::Place PlanarTriangulation::edge_between(const std::uint32_t
   return {kNoIndex, 0};
 }
 
-void PlanarTriangulation::insert(const std::uint32_t from, const std::uint32_t to,
-                                 const int step) {
+void PlanarTriangulation::insert(const std::uint32_t from, const std::uint32_t to, const int step) {
   const bool up = from < to;
   const auto [known, fresh] = steps_.try_emplace(key(std::min(from, to), std::max(from, to)), 0);
   known->second += up ? step : -step;
@@ -148,9 +147,9 @@ void PlanarTriangulation::insert(const std::uint32_t from, const std::uint32_t t
     const std::uint32_t u = cells_[at.cell].beyond[at.corner];
     const auto& corners = cells_[u].corner;
     // The side of u that is left next: across from its corner that the segment passes.
-    const std::uint32_t ahead =
-        corners[0] != right && corners[0] != left ? 0u
-        : corners[1] != right && corners[1] != left ? 1u : 2u;
+    const std::uint32_t ahead = corners[0] != right && corners[0] != left   ? 0u
+                                : corners[1] != right && corners[1] != left ? 1u
+                                                                            : 2u;
     if (corners[ahead] == to) break;
     // With the tip on the left, the segment leaves across from the old left corner.
     const std::uint32_t passed = turn(from, to, corners[ahead]) > 0 ? left : right;

@@ -44,7 +44,9 @@ class PlanarTriangulation {
   int turn(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
     return points_.turn(axis_, a, b, c);
   }
-  bool is_frame(std::uint32_t p) const { return p == frame_[0] || p == frame_[1] || p == frame_[2]; }
+  bool is_frame(std::uint32_t p) const {
+    return p == frame_[0] || p == frame_[1] || p == frame_[2];
+  }
   void insert_point(std::uint32_t p);
   std::uint32_t cell_of(std::uint32_t p);
   void flip(Place edge);

@@ -69,8 +69,8 @@ std::vector<std::uint32_t> groups_of(const std::vector<Triangle>& triangles, con
   return groups;
 }
 
-/// The spacing of doubles at the mesh's largest coordinate. What differs by less is one vertex, near
-/// the origin too.
+/// The spacing of doubles at the mesh's largest coordinate. What differs by less is one vertex,
+/// near the origin too.
 double snap_step(const std::vector<Eigen::Vector3d>& vertices) {
   double largest = 0;
   for (const Eigen::Vector3d& v : vertices) largest = std::max(largest, v.cwiseAbs().maxCoeff());

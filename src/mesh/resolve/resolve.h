@@ -14,7 +14,7 @@ struct Resolution {
     unresolved  ///< nothing was changed; the other figures are not known and 0
   };
   How how = How::as_it_is;
-  double counted_twice = 0;    ///< [u³] ∫ (w − 1)⁺ before: what the mesh's volume has too much
+  double counted_twice = 0;  ///< [u³] ∫ (w − 1)⁺ before: what the mesh's volume has too much
   double counted_against = 0;  ///< [u³] ∫ (−w)⁺ before: what it has too little
   /// [u] no vertex is further than this from where it would be without rounding. Vertices of the
   /// mesh as it came have not moved.

@@ -99,8 +99,8 @@ std::vector<std::uint32_t> number(ExactPoints& points, const std::vector<Triangl
   });
   std::vector<std::uint32_t> numbers(names.size());
   for (std::size_t i = 0; i < names.size(); ++i)
-    numbers[i] = names[i].triangle == kNoIndex ? names[i].low
-                                               : points.add(std::move(exact[i]), rounded[i]);
+    numbers[i] =
+        names[i].triangle == kNoIndex ? names[i].low : points.add(std::move(exact[i]), rounded[i]);
   return numbers;
 }
 
@@ -127,8 +127,7 @@ std::vector<Meeting> find_meetings(ExactPoints& points, const std::vector<Triang
       const std::uint32_t p = numbers[static_cast<std::size_t>(place)];
       if (meeting.from == kNoIndex) meeting.from = meeting.to = p;
       if (p == meeting.from || p == meeting.to) continue;
-      if (meeting.from != meeting.to)
-        throw Unresolvable{"two triangles meet in more than a line"};
+      if (meeting.from != meeting.to) throw Unresolvable{"two triangles meet in more than a line"};
       meeting.to = p;
     }
     if (!meeting.coplanar && meeting.from == kNoIndex)
