@@ -34,7 +34,7 @@ struct Segment {
 struct Crossing {
   std::array<std::size_t, 2> segments;
   ExactPoint exact;
-  Eigen::Vector3d rounded;
+  RoundedPoint rounded;
 };
 
 /// Triangles in one plane that meet, and what cuts them.
@@ -152,7 +152,7 @@ class ClusterWork {
     if (back_from * back_to > 0) return false;
     if (from * to < 0 && back_from * back_to < 0) {
       ExactPoint exact = crossing(a, b);
-      const Eigen::Vector3d rounded = points_.round(exact);
+      const RoundedPoint rounded = points_.round(exact);
       cluster_.crossings.push_back({{i, j}, std::move(exact), rounded});
       return true;
     }

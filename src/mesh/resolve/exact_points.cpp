@@ -13,21 +13,48 @@ namespace {
 constexpr double kHalfUlp = 0x1p-53;  ///< of a rounded coordinate, relative to it
 constexpr double kTiny = 1e-290;      ///< more than underflow costs
 
-/// The double nearest to numerator / denominator · 2^exponent.
-double quotient(const Whole& numerator, const Whole& denominator, const int exponent) {
-  if (numerator.is_zero()) return 0;
-  Whole above = abs(numerator), below = denominator, whole, rest;
-  const int shift = 66 - (static_cast<int>(msb(above)) - static_cast<int>(msb(below)));
+/// numerator / denominator · 2^exponent as the nearest double, and the rest to 2^-50 of it.
+std::array<double, 2> quotient(const Whole& numerator, const Whole& denominator,
+                               const int exponent) {
+  if (numerator.is_zero()) return {0, 0};
+  Whole above = abs(numerator), below = denominator, whole, remainder;
+  const int shift = 130 - (static_cast<int>(msb(above)) - static_cast<int>(msb(below)));
   if (shift > 0)
     above <<= shift;
   else
     below <<= -shift;
-  divide_qr(above, below, whole, rest);  // 66 or 67 bits
+  divide_qr(above, below, whole, remainder);  // 130 or 131 bits
   const auto dropped = static_cast<int>(msb(whole)) - 63;
-  const bool inexact = !rest.is_zero() || static_cast<int>(lsb(whole)) < dropped;
+  const bool inexact = !remainder.is_zero() || static_cast<int>(lsb(whole)) < dropped;
   const auto bits = static_cast<std::uint64_t>(whole >> dropped) | (inexact ? 1 : 0);
-  const double size = std::ldexp(static_cast<double>(bits), dropped - shift + exponent);
-  return numerator.sign() < 0 ? -size : size;
+  const auto nearest = static_cast<double>(bits);
+  const Whole rest = whole - (Whole(nearest) << dropped);
+  const int scale = exponent - shift, sign = numerator.sign() < 0 ? -1 : 1;
+  return {sign * std::ldexp(nearest, dropped + scale),
+          sign * std::ldexp(static_cast<double>(rest), scale)};
+}
+
+/// A sum of two doubles, the second far smaller.
+struct Double2 {
+  double high, low;
+};
+
+/// a_k − b_k, to 2^-102 of their sizes.
+Double2 difference(const PointView& a, const PointView& b, const int k) {
+  const double p = a.at(k), q = b.at(k), high = p - q, back = high - p;
+  const double lost = (p - (high - back)) - (q + back);  // Knuth's two-sum
+  return {high, lost + (a.rounded->rest[k] - b.rounded->rest[k])};
+}
+
+/// a · b − c · d.
+double determinant(const Double2& a, const Double2& b, const Double2& c, const Double2& d) {
+  const double left = a.high * b.high, right = c.high * d.high, high = left - right;
+  const double back = high - left, lost = (left - (high - back)) - (right + back);
+  const auto rest = [](const Double2& p, const Double2& q, const double product) {
+    return std::fma(p.high, q.high, -product) + (p.high * q.low + p.low * (q.high + q.low));
+  };
+  const double low = rest(a, b, left) - rest(c, d, right);
+  return high + (lost + low);
 }
 
 std::size_t hash_of(const Eigen::Vector3d& p) {
@@ -47,7 +74,7 @@ bool equal(const ExactPoint& a, const ExactPoint& b) {
 
 /// Bound on the error of p_k as it stands in double.
 double error_of(const PointView& p, const int k) {
-  return p.exact == nullptr ? 0 : std::abs((*p.at)[k]) * kHalfUlp;
+  return p.exact == nullptr ? 0 : std::abs(p.at(k)) * kHalfUlp;
 }
 
 }  // namespace
@@ -94,7 +121,8 @@ ExactPoint between(const WholeVector& p, const WholeVector& q, const Whole& heig
 }
 
 ExactPoints::ExactPoints(const std::vector<Eigen::Vector3d>& vertices)
-    : given_(static_cast<std::uint32_t>(vertices.size())), at_(vertices) {
+    : given_(static_cast<std::uint32_t>(vertices.size())), at_(vertices.size()) {
+  for (std::size_t p = 0; p < vertices.size(); ++p) at_[p].at = vertices[p];
   bool any = false;
   for (const Eigen::Vector3d& p : vertices)
     for (const double x : p) {
@@ -106,19 +134,24 @@ ExactPoints::ExactPoints(const std::vector<Eigen::Vector3d>& vertices)
       any = true;
     }
   by_place_.reserve(at_.size());
-  for (std::uint32_t p = 0; p < given_; ++p) by_place_.emplace(hash_of(at_[p]), p);
+  for (std::uint32_t p = 0; p < given_; ++p) by_place_.emplace(hash_of(at_[p].at), p);
 }
 
-Eigen::Vector3d ExactPoints::round(const ExactPoint& p) const {
-  return {quotient(p.x[0], p.w, exponent_), quotient(p.x[1], p.w, exponent_),
-          quotient(p.x[2], p.w, exponent_)};
+RoundedPoint ExactPoints::round(const ExactPoint& p) const {
+  RoundedPoint rounded;
+  for (const int k : {0, 1, 2}) {
+    const auto [at, rest] = quotient(p.x[static_cast<std::size_t>(k)], p.w, exponent_);
+    rounded.at[k] = at;
+    rounded.rest[k] = rest;
+  }
+  return rounded;
 }
 
-std::uint32_t ExactPoints::add(ExactPoint point, const Eigen::Vector3d& rounded) {
-  const std::size_t hash = hash_of(rounded);
+std::uint32_t ExactPoints::add(ExactPoint point, const RoundedPoint& rounded) {
+  const std::size_t hash = hash_of(rounded.at);
   const auto [begin, end] = by_place_.equal_range(hash);
   for (auto it = begin; it != end; ++it)
-    if (at_[it->second] == rounded && equal(exact(it->second), point)) return it->second;
+    if (at_[it->second].at == rounded.at && equal(exact(it->second), point)) return it->second;
   by_place_.emplace(hash, size());
   at_.push_back(rounded);
   made_.push_back(std::move(point));
@@ -140,13 +173,13 @@ Whole ExactPoints::whole(const double coordinate) const {
 }
 
 WholeVector ExactPoints::whole(const std::uint32_t given) const {
-  const Eigen::Vector3d& p = at_[given];
+  const Eigen::Vector3d& p = at_[given].at;
   return {whole(p[0]), whole(p[1]), whole(p[2])};
 }
 
 ExactPoint ExactPoints::exact(const PointView& p) const {
   if (p.exact != nullptr) return *p.exact;
-  return {{whole((*p.at)[0]), whole((*p.at)[1]), whole((*p.at)[2])}, 1};
+  return {{whole(p.at(0)), whole(p.at(1)), whole(p.at(2))}, 1};
 }
 
 ExactPlane ExactPoints::plane(const Triangle& given) const {
@@ -159,8 +192,8 @@ ExactPlane ExactPoints::plane(const Triangle& given) const {
 int ExactPoints::turn(const int k, const PointView& a, const PointView& b,
                       const PointView& c) const {
   const int x = (k + 1) % 3, y = (k + 2) % 3;
-  const double ax = (*a.at)[x] - (*c.at)[x], ay = (*a.at)[y] - (*c.at)[y];
-  const double bx = (*b.at)[x] - (*c.at)[x], by = (*b.at)[y] - (*c.at)[y];
+  const double ax = a.at(x) - c.at(x), ay = a.at(y) - c.at(y);
+  const double bx = b.at(x) - c.at(x), by = b.at(y) - c.at(y);
   const bool given = a.exact == nullptr && b.exact == nullptr && c.exact == nullptr;
   if (given && (ax == 0 || by == 0) && (ay == 0 || bx == 0)) return 0;
   const double left = ax * by, right = ay * bx, area = left - right;
@@ -172,6 +205,16 @@ int ExactPoints::turn(const int k, const PointView& a, const PointView& b,
                                 corner_y * (std::abs(ax) + std::abs(bx) + corner_x)) +
                        kTiny;
   if (std::abs(area) > bound) return area > 0 ? 1 : -1;
+  // Twice as many digits.
+  const double again = determinant(difference(a, c, x), difference(b, c, y), difference(a, c, y),
+                                   difference(b, c, x));
+  const double size_x = std::abs(a.at(x)) + std::abs(b.at(x)) + std::abs(c.at(x));
+  const double size_y = std::abs(a.at(y)) + std::abs(b.at(y)) + std::abs(c.at(y));
+  const double bound_again =
+      0x1p-98 * (std::abs(left) + std::abs(right) + size_x * (std::abs(ay) + std::abs(by)) +
+                 size_y * (std::abs(ax) + std::abs(bx)) + 0x1p-48 * size_x * size_y) +
+      kTiny;
+  if (std::abs(again) > bound_again) return again > 0 ? 1 : -1;
   const auto i = static_cast<std::size_t>(x), j = static_cast<std::size_t>(y);
   const ExactPoint p = exact(a), q = exact(b), r = exact(c);
   const Whole exact_area = p.x[i] * (q.x[j] * r.w - q.w * r.x[j]) -
@@ -182,7 +225,8 @@ int ExactPoints::turn(const int k, const PointView& a, const PointView& b,
 
 int ExactPoints::compare(const int k, const std::uint32_t a, const std::uint32_t b) const {
   if (a == b) return 0;
-  if (at_[a][k] != at_[b][k]) return at_[a][k] < at_[b][k] ? -1 : 1;  // rounding keeps the order
+  const double at_a = at_[a].at[k], at_b = at_[b].at[k];
+  if (at_a != at_b) return at_a < at_b ? -1 : 1;  // rounding keeps the order
   if (is_given(a) && is_given(b)) return 0;
   const ExactPoint p = exact(a), q = exact(b);
   const auto i = static_cast<std::size_t>(k);
@@ -190,8 +234,8 @@ int ExactPoints::compare(const int k, const std::uint32_t a, const std::uint32_t
 }
 
 int ExactPoints::side(const Triangle& given, const PointView& p) const {
-  const Eigen::Vector3d &a = at_[given[0]], &x = *p.at;
-  const Eigen::Vector3d ab = at_[given[1]] - a, ac = at_[given[2]] - a, ap = x - a;
+  const Eigen::Vector3d &a = at_[given[0]].at, &x = p.rounded->at;
+  const Eigen::Vector3d ab = at_[given[1]].at - a, ac = at_[given[2]].at - a, ap = x - a;
   double height = 0, magnitude = 0, moved = 0;
   for (int k = 0; k < 3; ++k) {
     const int i = (k + 1) % 3, j = (k + 2) % 3;

@@ -46,10 +46,17 @@ ExactPoint common_point(const ExactPlane& a, const ExactPlane& b, const ExactPla
 ExactPoint between(const WholeVector& p, const WholeVector& q, const Whole& height_p,
                    const Whole& height_q);
 
-/// A point to be asked about: a double vector, or what an exact point rounds to.
+/// An exact point in double: the nearest, and what is left, nearly.
+struct RoundedPoint {
+  Eigen::Vector3d at = Eigen::Vector3d::Zero(), rest = Eigen::Vector3d::Zero();
+};
+
+/// A point to be asked about.
 struct PointView {
-  const Eigen::Vector3d* at;
-  const ExactPoint* exact;  ///< null: `at` is exact
+  const RoundedPoint* rounded;
+  const ExactPoint* exact;  ///< null: `rounded->at` is exact
+
+  double at(int k) const { return rounded->at[k]; }
 };
 
 /// Points of one arrangement by number: a mesh's vertices, then points made from them. Every
@@ -63,16 +70,20 @@ class ExactPoints {
 
   std::uint32_t size() const { return static_cast<std::uint32_t>(at_.size()); }
   bool is_given(std::uint32_t p) const { return p < given_; }
-  const Eigen::Vector3d& rounded(std::uint32_t p) const { return at_[p]; }  ///< to nearest
+  const Eigen::Vector3d& rounded(std::uint32_t p) const { return at_[p].at; }  ///< to nearest
   PointView view(std::uint32_t p) const {
     return {&at_[p], is_given(p) ? nullptr : &made_[p - given_]};
   }
 
-  /// The nearest double of every coordinate; the same for equal points.
-  Eigen::Vector3d round(const ExactPoint& point) const;
+  /// `at` is the nearest double of every coordinate, the same for equal points; `rest` is within
+  /// 2^-50 of itself.
+  RoundedPoint round(const ExactPoint& point) const;
   /// The number of a point whose round() is `rounded`; that of a double on the lattice.
-  std::uint32_t add(ExactPoint point, const Eigen::Vector3d& rounded);
-  std::uint32_t add(const Eigen::Vector3d& point) { return add(exact({&point, nullptr}), point); }
+  std::uint32_t add(ExactPoint point, const RoundedPoint& rounded);
+  std::uint32_t add(const Eigen::Vector3d& point) {
+    const RoundedPoint rounded = {point};
+    return add(exact({&rounded, nullptr}), rounded);
+  }
 
   WholeVector whole(std::uint32_t given) const;  ///< of a vertex
   ExactPoint exact(std::uint32_t p) const { return exact(view(p)); }
@@ -94,7 +105,7 @@ class ExactPoints {
 
   std::uint32_t given_;
   int exponent_ = 0;  ///< of the lattice's step
-  std::vector<Eigen::Vector3d> at_;
+  std::vector<RoundedPoint> at_;
   std::vector<ExactPoint> made_;
   std::unordered_multimap<std::size_t, std::uint32_t> by_place_;
 };

@@ -101,7 +101,7 @@ class Rays {
     std::uint32_t random = 1;
     for (int tried = 0; tried < 100; ++tried) {
       const ExactPoint inside = point_within(corners, random);
-      const Eigen::Vector3d rounded = points_.round(inside);
+      const RoundedPoint rounded = points_.round(inside);
       if (const auto winding = count({&rounded, &inside}, piece, axis, facing)) return *winding;
     }
     throw Unresolvable{"every line through a piece of a triangle meets an edge"};
@@ -128,7 +128,7 @@ class Rays {
                            const int facing) {
     const std::uint32_t own = arrangement_.plane[arrangement_.source[piece]];
     int winding = 0;
-    for (const std::uint32_t t : columns(axis).about(*from.at)) {
+    for (const std::uint32_t t : columns(axis).about(from.rounded->at)) {
       if (arrangement_.plane[t] == own) continue;
       const Triangle& corner = triangles_[t];
       int turns[3] = {0, 0, 0};

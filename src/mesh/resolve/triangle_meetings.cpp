@@ -88,7 +88,7 @@ class PairOfTriangles {
 std::vector<std::uint32_t> number(ExactPoints& points, const std::vector<Triangle>& triangles,
                                   const std::vector<Named>& names) {
   std::vector<ExactPoint> exact(names.size());
-  std::vector<Eigen::Vector3d> rounded(names.size());
+  std::vector<RoundedPoint> rounded(names.size());
   tbb::parallel_for(std::size_t{0}, names.size(), [&](const std::size_t i) {
     const Named& name = names[i];
     if (name.triangle == kNoIndex) return;
