@@ -2,10 +2,12 @@
 find_package(assimp QUIET)
 find_package(TBB QUIET)
 find_path(NLOHMANN_JSON_INCLUDE_DIR nlohmann/json.hpp)  # header only
-if(NOT assimp_FOUND OR NOT TBB_FOUND OR NOT NLOHMANN_JSON_INCLUDE_DIR)
-  message(FATAL_ERROR "ist: baking needs assimp (found: ${assimp_FOUND}), oneTBB (${TBB_FOUND}) and "
-    "nlohmann-json (${NLOHMANN_JSON_INCLUDE_DIR}): install them, or configure with "
-    "-DIST_QUERY_ONLY=ON to build ist::query, which needs none of them")
+find_path(IST_BOOST_INCLUDE_DIR boost/multiprecision/cpp_int.hpp)  # header only
+if(NOT assimp_FOUND OR NOT TBB_FOUND OR NOT NLOHMANN_JSON_INCLUDE_DIR OR NOT IST_BOOST_INCLUDE_DIR)
+  message(FATAL_ERROR "ist: baking needs assimp (found: ${assimp_FOUND}), oneTBB (${TBB_FOUND}), "
+    "nlohmann-json (${NLOHMANN_JSON_INCLUDE_DIR}) and Boost's headers (${IST_BOOST_INCLUDE_DIR}): "
+    "install them, or configure with -DIST_QUERY_ONLY=ON to build ist::query, which needs none of "
+    "them")
 endif()
 include(cmake/ist_cuda.cmake)
 include(cmake/ist_openvdb.cmake)

@@ -15,6 +15,7 @@
 #include <ist/error.h>
 #include <ist/mesh.h>
 
+#include "mesh/close_oriented.h"
 #include "mesh/disjoint_sets.h"
 #include "mesh/edge_table.h"
 #include "mesh/judge.h"
@@ -225,6 +226,25 @@ void orient_outward(Surface& surface, const std::string& name, MeshReport& repor
                            "winding number is 1 or more");
 }
 
+/// What orient_outward() finds of shells that face as they should.
+void keep_facing(const Surface& surface, MeshReport& report) {
+  const TriangleMesh& mesh = surface.mesh;
+  const Shells shells = find_shells(mesh.triangles, surface.edges);
+  std::vector<double> volumes(shells.count, 0);
+  const Eigen::Vector3d from = mesh.vertices[mesh.triangles[0][0]];
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto corner = [&](const std::size_t k) {
+      return mesh.vertices[mesh.triangles[t][k]] - from;
+    };
+    volumes[shells.of_triangle[t]] += corner(0).dot(corner(1).cross(corner(2))) / 6;
+  }
+  report.shells = shells.count;
+  for (const double volume : volumes) {
+    report.volume += volume;
+    report.cavities += volume < 0 ? 1 : 0;
+  }
+}
+
 void judge_repair(const TriangleMesh& unrepaired, ClosedMesh& closed) {
   const Judgement judged = judge(unrepaired, closed, kKept);
   if (judged.confidence < kLeastConfidence)
@@ -235,9 +255,10 @@ void judge_repair(const TriangleMesh& unrepaired, ClosedMesh& closed) {
   closed.report.notes.push_back("repair: " + describe(judged));
 }
 
-}  // namespace
+enum class Facing { any, outward };
 
-ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMeshPolicy policy) {
+ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPolicy policy,
+                 const Facing facing) {
   weld_usable(input, name);
   Surface surface{std::move(input)};
   TriangleMesh& mesh = surface.mesh;
@@ -260,8 +281,12 @@ ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMes
     mesh = repair(std::move(mesh), name, report);
     surface.triangles_changed();
   }
-  orient_faces(surface, name, report);
-  orient_outward(surface, name, report);
+  if (facing == Facing::any) {
+    orient_faces(surface, name, report);
+    orient_outward(surface, name, report);
+  } else {
+    keep_facing(surface, report);
+  }
   // Dropped degenerate triangles never counted; other changes may add or remove intersections.
   if (report.repaired || report.coincident_triangles > 0) look_for_intersections();
   report.meets_itself = !surface.met || surface.met->count > 0;
@@ -274,6 +299,16 @@ ClosedMesh close_mesh(TriangleMesh input, const std::string& name, const OpenMes
                        surface.met ? std::move(surface.met->pairs) : std::nullopt};
   if (closed.report.repaired) judge_repair(unrepaired, closed);
   return closed;
+}
+
+}  // namespace
+
+ClosedMesh close_mesh(TriangleMesh mesh, const std::string& name, const OpenMeshPolicy policy) {
+  return close(std::move(mesh), name, policy, Facing::any);
+}
+
+ClosedMesh close_oriented(TriangleMesh mesh, const std::string& name) {
+  return close(std::move(mesh), name, OpenMeshPolicy::refuse, Facing::outward);
 }
 
 }  // namespace ist

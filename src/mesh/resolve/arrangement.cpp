@@ -1,0 +1,304 @@
+#include "mesh/resolve/arrangement.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <utility>
+
+#include "mesh/disjoint_sets.h"
+#include "mesh/resolve/planar_triangulation.h"
+#include "mesh/resolve/triangle_meetings.h"
+#include "mesh/resolve/unresolvable.h"
+#include "mesh/surface_reduction.h"
+
+namespace ist {
+namespace {
+
+/// Each takes some 600 bytes and 10 µs.
+constexpr std::size_t kMostCrossings = 500'000;
+
+/// A segment in the plane of a cluster: a side of a triangle of it, or what another triangle, in
+/// the plane `other`, has in common with one.
+struct Segment {
+  std::uint32_t from, to;
+  std::uint32_t other = kNoIndex;
+  std::vector<std::uint32_t> on = {};  ///< points on it, its ends among them
+
+  bool is_side() const { return other == kNoIndex; }
+};
+
+/// Where two segments cross that do so between their ends.
+struct Crossing {
+  std::array<std::size_t, 2> segments;
+  ExactPoint exact;
+  RoundedPoint rounded;
+};
+
+/// Triangles in one plane that meet, and what cuts them.
+struct Cluster {
+  std::vector<std::uint32_t> triangles;
+  std::vector<Segment> segments = {};
+  std::vector<std::uint32_t> touched = {};  ///< points where other triangles only touch
+  std::vector<Crossing> crossings = {};
+  std::vector<PlanarTriangulation::Covered> pieces = {};
+  int axis = 0;  ///< seen along it, the plane is no line
+};
+
+class ClusterWork {
+ public:
+  ClusterWork(const ExactPoints& points, const std::vector<Triangle>& triangles, Cluster& cluster)
+      : points_(points), triangles_(triangles), cluster_(cluster) {}
+
+  void choose_axis() {
+    const Triangle& t = triangles_[cluster_.triangles[0]];
+    const Eigen::Vector3d& a = points_.rounded(t[0]);
+    const Eigen::Vector3d normal =
+        (points_.rounded(t[1]) - a).cross(points_.rounded(t[2]) - a).cwiseAbs();
+    normal.maxCoeff(&cluster_.axis);
+    for (int tried = 0; points_.turn(cluster_.axis, t[0], t[1], t[2]) == 0; ++tried) {
+      if (tried == 3) throw Unresolvable{"a triangle that meets others lies on a line"};
+      cluster_.axis = (cluster_.axis + 1) % 3;
+    }
+  }
+
+  /// Puts points on the segments that hold them and finds where segments cross.
+  /// `crossings`: how many all clusters have so far.
+  void meet(std::atomic<std::size_t>& crossings) {
+    std::vector<Segment>& segments = cluster_.segments;
+    for (Segment& s : segments) s.on = {s.from, s.to};
+    std::vector<std::size_t> order(segments.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::vector<Range> x(segments.size()), y(segments.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      x[i] = range(segments[i], first());
+      y[i] = range(segments[i], second());
+    }
+    std::stable_sort(order.begin(), order.end(),
+                     [&](const std::size_t i, const std::size_t j) { return x[i].low < x[j].low; });
+    for (std::size_t place = 0; place < order.size(); ++place) {
+      const std::size_t i = order[place];
+      for (const std::uint32_t p : cluster_.touched) put(p, segments[i]);
+      for (std::size_t next = place + 1; next < order.size(); ++next) {
+        const std::size_t j = order[next];
+        if (x[j].low > x[i].high) break;
+        if (y[j].low > y[i].high || y[i].low > y[j].high || !meet(i, j)) continue;
+        if (++crossings > kMostCrossings)
+          throw Unresolvable{"too many of its triangles meet in the same places"};
+      }
+    }
+  }
+
+  void triangulate(const std::array<std::uint32_t, 3>& frame) {
+    std::vector<std::uint32_t> inner = cluster_.touched;
+    for (Segment& s : cluster_.segments) {
+      std::sort(s.on.begin(), s.on.end());
+      s.on.erase(std::unique(s.on.begin(), s.on.end()), s.on.end());
+      inner.insert(inner.end(), s.on.begin(), s.on.end());
+    }
+    std::sort(inner.begin(), inner.end());
+    inner.erase(std::unique(inner.begin(), inner.end()), inner.end());
+    PlanarTriangulation plane(points_, cluster_.axis, frame, inner);
+    for (Segment& s : cluster_.segments) {
+      const auto along = [&](const std::uint32_t p, const std::uint32_t q) {
+        const int by_first = points_.compare(first(), p, q);
+        return by_first != 0 ? by_first < 0 : points_.compare(second(), p, q) < 0;
+      };
+      std::sort(s.on.begin(), s.on.end(), along);
+      const int step = !s.is_side() ? 0 : s.on.front() == s.from ? 1 : -1;
+      for (std::size_t k = 0; k + 1 < s.on.size(); ++k) plane.insert(s.on[k], s.on[k + 1], step);
+    }
+    plane.make_round();
+    cluster_.pieces = plane.covered();
+  }
+
+ private:
+  struct Range {
+    double low, high;
+  };
+
+  int first() const { return (cluster_.axis + 1) % 3; }
+  int second() const { return (cluster_.axis + 2) % 3; }
+  int turn(const std::uint32_t a, const std::uint32_t b, const std::uint32_t c) const {
+    return points_.turn(cluster_.axis, a, b, c);
+  }
+  Range range(const Segment& s, const int k) const {
+    const auto [low, high] = std::minmax(points_.rounded(s.from)[k], points_.rounded(s.to)[k]);
+    return {low, high};
+  }
+
+  /// p lies on the line through s: does it lie on s?
+  bool within(const std::uint32_t p, const Segment& s) const {
+    for (const int k : {first(), second()})
+      if (points_.compare(k, s.from, p) * points_.compare(k, p, s.to) < 0) return false;
+    return true;
+  }
+  void put(const std::uint32_t p, Segment& s) const {
+    for (const int k : {first(), second()}) {
+      const Range r = range(s, k);
+      if (points_.rounded(p)[k] < r.low || points_.rounded(p)[k] > r.high) return;
+    }
+    if (turn(s.from, s.to, p) == 0 && within(p, s)) s.on.push_back(p);
+  }
+
+  /// Whether they cross between their ends.
+  bool meet(const std::size_t i, const std::size_t j) {
+    Segment &a = cluster_.segments[i], &b = cluster_.segments[j];
+    const int from = turn(a.from, a.to, b.from), to = turn(a.from, a.to, b.to);
+    if (from * to > 0) return false;
+    const int back_from = turn(b.from, b.to, a.from), back_to = turn(b.from, b.to, a.to);
+    if (back_from * back_to > 0) return false;
+    if (from * to < 0 && back_from * back_to < 0) {
+      ExactPoint exact = crossing(a, b);
+      const RoundedPoint rounded = points_.round(exact);
+      cluster_.crossings.push_back({{i, j}, std::move(exact), rounded});
+      return true;
+    }
+    if (from == 0 && within(b.from, a)) a.on.push_back(b.from);
+    if (to == 0 && within(b.to, a)) a.on.push_back(b.to);
+    if (back_from == 0 && within(a.from, b)) b.on.push_back(a.from);
+    if (back_to == 0 && within(a.to, b)) b.on.push_back(a.to);
+    return false;
+  }
+
+  ExactPoint crossing(const Segment& a, const Segment& b) const {
+    if (!a.is_side() && !b.is_side())
+      return common_point(points_.plane(triangles_[cluster_.triangles[0]]),
+                          points_.plane(triangles_[a.other]), points_.plane(triangles_[b.other]));
+    const Segment &side = a.is_side() ? a : b, &cut = a.is_side() ? b : a;
+    const WholeVector p = points_.whole(side.from), q = points_.whole(side.to);
+    if (!cut.is_side()) {
+      const ExactPlane plane = points_.plane(triangles_[cut.other]);
+      return between(p, q, plane.height({p, 1}), plane.height({q, 1}));
+    }
+    const WholeVector r = points_.whole(cut.from), s = points_.whole(cut.to);
+    const auto x = static_cast<std::size_t>(first()), y = static_cast<std::size_t>(second());
+    const auto area = [&](const WholeVector& c) {
+      return (s[x] - r[x]) * (c[y] - r[y]) - (s[y] - r[y]) * (c[x] - r[x]);
+    };
+    return between(p, q, area(p), area(q));
+  }
+
+  const ExactPoints& points_;
+  const std::vector<Triangle>& triangles_;
+  Cluster& cluster_;
+};
+
+using Frames = std::array<std::array<std::uint32_t, 3>, 3>;
+
+/// For each axis three points that, seen along it, are around all others.
+Frames add_frames(ExactPoints& points) {
+  double largest = 0;
+  for (std::uint32_t p = 0; p < points.size(); ++p)
+    largest = std::max(largest, points.rounded(p).cwiseAbs().maxCoeff());
+  const double reach = std::exp2(std::ceil(std::log2(largest)) + 2);
+  Frames frames;
+  for (int axis = 0; axis < 3; ++axis)
+    for (std::size_t i = 0; i < 3; ++i) {
+      Eigen::Vector3d p = Eigen::Vector3d::Constant(-4 * reach);
+      p[axis] = 0;
+      if (i > 0) p[(axis + static_cast<int>(i)) % 3] = 12 * reach;
+      frames[static_cast<std::size_t>(axis)][i] = points.add(p);
+    }
+  return frames;
+}
+
+/// Clusters of the triangles in `meetings`, with their segments; [triangle] its cluster.
+std::vector<Cluster> make_clusters(const std::vector<Triangle>& triangles,
+                                   const std::vector<Meeting>& meetings,
+                                   const std::vector<std::uint32_t>& plane,
+                                   std::vector<std::uint32_t>& cluster_of) {
+  cluster_of.assign(triangles.size(), kNoIndex);
+  for (const Meeting& m : meetings)
+    for (const std::uint32_t t : m.triangles) cluster_of[t] = 0;
+  std::vector<Cluster> clusters;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    if (cluster_of[t] == kNoIndex) continue;
+    if (plane[t] == t) {
+      cluster_of[t] = static_cast<std::uint32_t>(clusters.size());
+      clusters.emplace_back();
+    } else {
+      cluster_of[t] = cluster_of[plane[t]];
+    }
+    Cluster& cluster = clusters[cluster_of[t]];
+    cluster.triangles.push_back(t);
+    for (std::size_t k = 0; k < 3; ++k)
+      cluster.segments.push_back({triangles[t][k], triangles[t][(k + 1) % 3]});
+  }
+  for (const Meeting& m : meetings) {
+    if (m.coplanar) continue;
+    const auto [a, b] = m.triangles;
+    for (const auto& [t, other] : {std::pair(a, b), std::pair(b, a)}) {
+      Cluster& cluster = clusters[cluster_of[t]];
+      if (m.from == m.to)
+        cluster.touched.push_back(m.from);
+      else
+        cluster.segments.push_back({std::min(m.from, m.to), std::max(m.from, m.to), other});
+    }
+  }
+  return clusters;
+}
+
+/// Keeps one of several cuts with the same ends.
+void drop_copies(Cluster& cluster) {
+  std::vector<Segment>& s = cluster.segments;
+  const auto cuts = s.begin() + static_cast<std::ptrdiff_t>(3 * cluster.triangles.size());
+  const auto ends = [](const Segment& cut) { return std::pair(cut.from, cut.to); };
+  std::stable_sort(cuts, s.end(), [&](const auto& a, const auto& b) { return ends(a) < ends(b); });
+  s.erase(
+      std::unique(cuts, s.end(), [&](const auto& a, const auto& b) { return ends(a) == ends(b); }),
+      s.end());
+  std::sort(cluster.touched.begin(), cluster.touched.end());
+  cluster.touched.erase(std::unique(cluster.touched.begin(), cluster.touched.end()),
+                        cluster.touched.end());
+}
+
+}  // namespace
+
+Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
+                    const std::vector<Triangle>& triangles,
+                    const std::span<const std::array<std::uint32_t, 2>> pairs) {
+  Arrangement out{ExactPoints(vertices), {}, {}, {}, {}};
+  const std::vector<Meeting> meetings = find_meetings(out.points, triangles, pairs);
+  const Frames frames = add_frames(out.points);
+  DisjointSets planes(triangles.size());
+  for (const Meeting& m : meetings)
+    if (m.coplanar) planes.unite(m.triangles[0], m.triangles[1]);
+  out.plane.resize(triangles.size());
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) out.plane[t] = planes.find(t);
+  std::vector<std::uint32_t> cluster_of;
+  std::vector<Cluster> clusters = make_clusters(triangles, meetings, out.plane, cluster_of);
+  const auto work = [&](Cluster& cluster) { return ClusterWork(out.points, triangles, cluster); };
+  std::atomic<std::size_t> crossings{0};
+  tbb::parallel_for(std::size_t{0}, clusters.size(), [&](const std::size_t c) {
+    drop_copies(clusters[c]);
+    work(clusters[c]).choose_axis();
+    work(clusters[c]).meet(crossings);
+  });
+  for (Cluster& cluster : clusters)
+    for (Crossing& crossing : cluster.crossings) {
+      const std::uint32_t p = out.points.add(std::move(crossing.exact), crossing.rounded);
+      for (const std::size_t s : crossing.segments) cluster.segments[s].on.push_back(p);
+    }
+  tbb::parallel_for(std::size_t{0}, clusters.size(), [&](const std::size_t c) {
+    work(clusters[c]).triangulate(frames[static_cast<std::size_t>(clusters[c].axis)]);
+  });
+  const auto add = [&](const Triangle& corners, const std::uint32_t source, const int step) {
+    out.pieces.push_back(step > 0 ? corners : Triangle{corners[0], corners[2], corners[1]});
+    out.source.push_back(source);
+    out.winding_step.push_back(std::abs(step));
+  };
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    if (cluster_of[t] == kNoIndex) {
+      if (!is_degenerate(vertices, triangles[t])) add(triangles[t], t, 1);
+    } else if (out.plane[t] == t) {
+      for (const auto& [corners, winding] : clusters[cluster_of[t]].pieces)
+        add(corners, t, winding);
+    }
+  }
+  return out;
+}
+
+}  // namespace ist

@@ -1,0 +1,213 @@
+#include "mesh/resolve/resolve.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <ist/error.h>
+
+#include "mesh/close_oriented.h"
+#include "mesh/disjoint_sets.h"
+#include "mesh/message_text.h"
+#include "mesh/resolve/arrangement.h"
+#include "mesh/resolve/patch_winding.h"
+#include "mesh/resolve/unresolvable.h"
+#include "mesh/self_intersections.h"
+#include "mesh/shells.h"
+
+namespace ist {
+namespace {
+
+using Pairs = std::vector<std::array<std::uint32_t, 2>>;
+using How = Resolution::How;
+
+constexpr std::size_t kMostPairs = 2'000'000;
+
+Pairs pairs_of(ClosedMesh& closed) {
+  if (!closed.meeting_pairs) {
+    auto met = find_self_intersections(closed.mesh.vertices, closed.mesh.triangles);
+    if (met) closed.meeting_pairs = std::move(met->pairs);
+  }
+  if (!closed.meeting_pairs || closed.meeting_pairs->size() > kMostPairs)
+    throw Unresolvable{"too many triangles, or pairs of them that meet"};
+  return *closed.meeting_pairs;
+}
+
+/// Six times what a triangle adds to the volume, seen from a point.
+double volume_of(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                 const Eigen::Vector3d& from) {
+  return (a - from).dot((b - from).cross(c - from));
+}
+
+/// Volume and the sum of its terms' sizes.
+struct Volume {
+  double sum = 0, size = 0, area = 0;
+
+  Volume(const TriangleMesh& mesh, const Eigen::Vector3d& from) {
+    for (const Triangle& t : mesh.triangles) {
+      const auto &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+      const double part = volume_of(a, b, c, from) / 6;
+      sum += part;
+      size += std::abs(part);
+      area += (b - a).cross(c - a).norm() / 2;
+    }
+  }
+};
+
+/// The triangles of a mesh that hang together by edges or meet have the same number.
+std::vector<std::uint32_t> groups_of(const std::vector<Triangle>& triangles, const Pairs& pairs) {
+  DisjointSets sets(triangles.size());
+  const EdgeTable edges(triangles);
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    for (const std::uint32_t side : edges.sides(e)) sets.unite(edges.sides(e)[0] / 3, side / 3);
+  for (const auto& [a, b] : pairs) sets.unite(a, b);
+  std::vector<std::uint32_t> groups(triangles.size());
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) groups[t] = sets.find(t);
+  return groups;
+}
+
+/// The spacing of doubles at the mesh's largest coordinate. What differs by less is one vertex,
+/// near the origin too.
+double snap_step(const std::vector<Eigen::Vector3d>& vertices) {
+  double largest = 0;
+  for (const Eigen::Vector3d& v : vertices) largest = std::max(largest, v.cwiseAbs().maxCoeff());
+  return std::ldexp(1.0, std::ilogb(largest) - 52);
+}
+
+/// To the nearest multiples of a power of two.
+Eigen::Vector3d snapped(const Eigen::Vector3d& p, const double step) {
+  return (p / step).array().rint() * step;
+}
+
+class Resolver {
+ public:
+  explicit Resolver(ClosedMesh& closed)
+      : closed_(closed),
+        triangles_(closed.mesh.triangles),
+        pairs_(pairs_of(closed)),
+        arrangement_(arrange(closed.mesh.vertices, triangles_, pairs_)),
+        patches_(find_patches(triangles_, arrangement_)) {
+    if (triangles_.empty()) throw Unresolvable{"it has no triangles"};
+    from_ = closed.mesh.vertices[triangles_[0][0]];
+  }
+
+  /// The resolved surface; nothing where the mesh is one as it is.
+  std::optional<TriangleMesh> surface(Resolution& resolution) const {
+    std::vector<bool> changed(triangles_.size(), false);  // by group
+    const std::vector<std::uint32_t> groups = groups_of(triangles_, pairs_);
+    const auto group_of_piece = [&](const std::size_t p) { return groups[arrangement_.source[p]]; };
+    bool any = false;
+    for (std::size_t p = 0; p < arrangement_.pieces.size(); ++p) {
+      const int front = in_front(p), back = behind(p);
+      if (front == 0 && back == 1) continue;
+      any = changed[group_of_piece(p)] = true;
+      const double volume = volume_of(p) / 6;
+      resolution.counted_twice += (std::max(back - 1, 0) - std::max(front - 1, 0)) * volume;
+      resolution.counted_against += (std::max(-back, 0) - std::max(-front, 0)) * volume;
+    }
+    if (!any) return std::nullopt;
+    TriangleMesh made;
+    const double step = snap_step(closed_.mesh.vertices);
+    for (std::uint32_t v = 0; v < arrangement_.points.size(); ++v)
+      made.vertices.push_back(arrangement_.points.is_given(v)
+                                  ? arrangement_.points.rounded(v)
+                                  : snapped(arrangement_.points.rounded(v), step));
+    for (std::size_t t = 0; t < triangles_.size(); ++t)
+      if (!changed[groups[t]]) made.triangles.push_back(triangles_[t]);
+    for (std::size_t p = 0; p < arrangement_.pieces.size(); ++p) {
+      if (!changed[group_of_piece(p)] || in_front(p) > 0 || behind(p) < 1) continue;
+      made.triangles.push_back(arrangement_.pieces[p]);
+      for (const std::uint32_t v : arrangement_.pieces[p])
+        if (!arrangement_.points.is_given(v)) resolution.moved = 1.7321 * step;  // √3
+    }
+    if (made.triangles.empty()) throw Unresolvable{"its winding number is nowhere 1 or more"};
+    return made;
+  }
+
+  /// Closes the surface and holds its volume against what the mesh counts.
+  ClosedMesh close(TriangleMesh surface, const Resolution& resolution) const {
+    ClosedMesh result = close_oriented(std::move(surface), closed_.name);
+    if (find_unbalanced_edge(result.mesh.triangles, EdgeTable(result.mesh.triangles)))
+      throw Unresolvable{"what was made does not close"};
+    const Volume before(closed_.mesh, from_), after(result.mesh, from_);
+    const double expected = before.sum - resolution.counted_twice + resolution.counted_against;
+    const double off = std::abs(after.sum - expected);
+    if (!(off <= 2 * resolution.moved * after.area + 1e-12 * (before.size + after.size)))
+      throw Unresolvable{"the volume of what was made is " + shortest(after.sum) + ", not " +
+                         shortest(expected)};
+    MeshReport& report = result.report;
+    report.filled_holes = closed_.report.filled_holes;
+    report.repaired = closed_.report.repaired;
+    report.wrapped = closed_.report.wrapped;
+    report.judged = closed_.report.judged;
+    report.notes = closed_.report.notes;
+    return result;
+  }
+
+ private:
+  int in_front(const std::size_t piece) const {
+    return patches_.in_front[patches_.of_piece[piece]];
+  }
+  int behind(const std::size_t piece) const {
+    return in_front(piece) + arrangement_.winding_step[piece];
+  }
+  double volume_of(const std::size_t piece) const {
+    const Triangle& t = arrangement_.pieces[piece];
+    const ExactPoints& points = arrangement_.points;
+    return ist::volume_of(points.rounded(t[0]), points.rounded(t[1]), points.rounded(t[2]), from_);
+  }
+
+  const ClosedMesh& closed_;
+  const std::vector<Triangle>& triangles_;
+  Pairs pairs_;
+  Arrangement arrangement_;
+  Patches patches_;
+  Eigen::Vector3d from_;
+};
+
+std::string percent(const double part, const double of) {
+  return shortest(std::round(part / of * 1e6) / 1e4) + " %";
+}
+
+std::string describe(const Resolution& resolution, const double volume) {
+  std::string text = "parts of it overlap: " + percent(resolution.counted_twice, volume) +
+                     " of the solid's volume were counted twice and count once now";
+  if (resolution.counted_against > 0)
+    text += "; inside-out regions of " + percent(resolution.counted_against, volume) +
+            " are outside now";
+  return text;
+}
+
+}  // namespace
+
+ResolvedMesh resolve(ClosedMesh closed) {
+  ResolvedMesh result{std::move(closed), {}};
+  ClosedMesh& mesh = result.mesh;
+  const auto as_it_is = [&] {
+    result.resolution = {How::as_it_is, 0, 0, 0, "it counts nothing twice"};
+    return std::move(result);
+  };
+  if (mesh.meeting_pairs && mesh.meeting_pairs->empty() && mesh.report.shells == 1)
+    return as_it_is();
+  try {
+    Resolution resolution;
+    resolution.how = How::resolved;
+    const Resolver resolver(mesh);
+    auto surface = resolver.surface(resolution);
+    if (!surface) return as_it_is();
+    ClosedMesh made = resolver.close(std::move(*surface), resolution);
+    resolution.reason = describe(resolution, made.report.volume);
+    made.report.notes.push_back(resolution.reason);
+    return {std::move(made), std::move(resolution)};
+  } catch (const Unresolvable& failure) {
+    result.resolution = {How::unresolved, 0, 0, 0, failure.reason};
+  } catch (const Error& failure) {
+    result.resolution = {How::unresolved, 0, 0, 0, failure.what()};
+  }
+  return result;
+}
+
+}  // namespace ist
