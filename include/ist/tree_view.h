@@ -44,7 +44,7 @@ inline constexpr std::uint32_t kTrialPartners = 6;
 enum class MeshState : std::uint32_t {
   none = 0,        ///< none was asked for
   own = 1,         ///< all triangles of the mesh that was baked
-  united = 2,      ///< components that overlap were united
+  resolved = 2,    ///< what the mesh counted twice was cut away
   simplified = 3,  ///< other triangles near the solid: TreeView::mesh_error() tells how near
   unresolved = 4,  ///< no mesh: it counts volume twice (TreeView::counted_twice)
 };

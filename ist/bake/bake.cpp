@@ -232,10 +232,11 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
            const ProgressCallback& progress) {
   packing::check_settings(settings);
   return thread_arena(settings.threads).execute([&] {
-    const MeshSolid solid(mesh);
+    const ResolvedMesh resolved = resolve(mesh);
+    const MeshSolid solid(resolved.mesh);
     const auto backend = make_backend(solid, {settings.device, settings.gpu});
-    SolidField field(solid, settings.surface, settings.threads);
-    return bake_solid(mesh, solid, field, *backend, settings, progress);
+    SolidField field(solid, resolved.resolution, settings.surface, settings.threads);
+    return bake_solid(resolved.mesh, solid, field, *backend, settings, progress);
   });
 }
 
@@ -243,15 +244,16 @@ Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings, unsi
   packing::check_settings(settings);
   if (!settings.wanted) throw Error(mesh.name + ": a surface alone without a surface is nothing");
   return thread_arena(threads).execute([&] {
-    const MeshSolid solid(mesh);
+    const ResolvedMesh resolved = resolve(mesh);
+    const MeshSolid solid(resolved.mesh);
     AssetArrays arrays;
-    arrays.header = describe_solid(mesh, solid);
+    arrays.header = describe_solid(resolved.mesh, solid);
     describe_bounds(solid, 0, arrays.header);
-    keep(keep_surface(solid, settings, false), arrays);
+    keep(keep_surface(solid, resolved.resolution, settings, false), arrays);
     if (!arrays.mesh)
       throw Error(mesh.name +
-                  ": the mesh counts volume twice, so that its surface alone is no solid; bake it "
-                  "with spheres, or wrap it");
+                  ": the mesh counts volume twice, so that its surface alone is no solid. " +
+                  resolved.resolution.reason + " Bake it with spheres, or wrap it");
     return Asset(asset_bytes(arrays), mesh.name);
   });
 }

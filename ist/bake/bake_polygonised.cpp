@@ -35,7 +35,8 @@ Asset bake_mesh_of(const MeshSolid& solid, const PackingSettings& settings, cons
   ClosedMesh described;  // the solid holds its geometry
   described.name = name;
   const auto backend = make_backend(solid, {settings.device, settings.gpu});
-  SolidField field(solid, settings.surface, settings.threads);
+  const Resolution as_it_is;  // make_solid() has resolved it
+  SolidField field(solid, as_it_is, settings.surface, settings.threads);
   return bake_solid(described, solid, field, *backend, settings, progress);
 }
 
@@ -51,7 +52,9 @@ Asset bake_field(const Solid& solid, const PackingSettings& settings,
   const ClosedMesh mesh = close_mesh(std::move(made.mesh), meshing.name);
   const MeshSolid mesh_solid(mesh);
   const auto backend = make_polygonised_backend(solid, mesh_solid, made.error);
-  SolidField field(mesh_solid, settings.surface, settings.threads);
+  Resolution as_made;  // the mesh is near the solid as it is
+  if (mesh.report.meets_itself) as_made.how = Resolution::How::unresolved;
+  SolidField field(mesh_solid, as_made, settings.surface, settings.threads);
   AssetArrays arrays = bake_arrays(mesh, mesh_solid, field, *backend, settings, progress);
   const double scale = mesh_solid.frame().scale();
   // Field and mesh are the mesh's, and that is near the solid.

@@ -107,15 +107,17 @@ struct Candidate {
 
 class TargetBake {
  public:
-  TargetBake(const ClosedMesh& mesh, const ErrorTarget& target, const PackingSettings& settings,
+  TargetBake(ResolvedMesh resolved, const ErrorTarget& target, const PackingSettings& settings,
              const ProgressCallback& progress)
-      : mesh_(mesh),
+      : resolved_(std::move(resolved)),
+        mesh_(resolved_.mesh),
         target_(target),
         settings_(settings),
         most_(settings.max_spheres == 0 ? kMost : settings.max_spheres),
         watch_(progress, settings.time_limit),
-        solid_(mesh),
-        field_(solid_, settings.surface, settings.threads, settings.time_limit),
+        solid_(mesh_),
+        field_(solid_, resolved_.resolution, settings.surface, settings.threads,
+               settings.time_limit),
         backend_(make_backend(solid_, {settings.device, settings.gpu})) {}
 
   TargetedAsset run() {
@@ -312,6 +314,7 @@ class TargetBake {
     return {Asset(bytes, mesh_.name), best.error(), best.poses, best.partners, met, stop};
   }
 
+  const ResolvedMesh resolved_;
   const ClosedMesh& mesh_;
   const ErrorTarget target_;
   const PackingSettings settings_;
@@ -343,7 +346,7 @@ TargetedAsset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
   if (largest.max_spheres == 0) largest.max_spheres = kMost;
   packing::check_settings(largest);
   return thread_arena(settings.threads).execute([&] {
-    return TargetBake(mesh, target, settings, progress).run();
+    return TargetBake(resolve(mesh), target, settings, progress).run();
   });
 }
 

@@ -13,21 +13,18 @@
 namespace ist {
 namespace {
 
-/// Unit frame: ∫ |w − [w ≥ 1]| of the winding number w, as far as its signs are one. 0: the mesh
-/// is the boundary of its solid, but for faces that touch.
-///
-/// This is where a mesh that is not could be resolved: give the bake, in its place, a ClosedMesh of
-/// the same solid with winding numbers of 0 and 1 alone.
-double counted_twice(const MeshSolid& solid) {
+/// Of a mesh that could not be resolved. Unit frame: ∫ |w − [w ≥ 1]| of the winding number w, as
+/// far as its signs are one. 0: the mesh is the boundary of its solid, but for faces that touch.
+double estimate_counted_twice(const MeshSolid& solid) {
   constexpr double kNothing = 1e-9;  // of the volume: what rounding makes of faces that touch
   if (!solid.may_overlap()) return 0;
   const double more = std::abs(enclosed_moments(solid.arrays()).volume - solid.unit_volume());
   return more > kNothing * solid.unit_volume() ? more : 0;
 }
 
-std::shared_ptr<const MeshArrays> own_mesh(const MeshSolid& solid) {
+std::shared_ptr<const MeshArrays> own_mesh(const MeshSolid& solid, const Resolution& resolution) {
   MeshArrays mesh = lay_out_mesh(solid.arrays());
-  mesh.header.rounding = solid.rounding();
+  mesh.header.rounding = solid.rounding() + resolution.moved / solid.frame().scale();
   return std::make_shared<const MeshArrays>(std::move(mesh));
 }
 
@@ -58,8 +55,8 @@ std::optional<BuiltField> field_in_time(const MeshSolid& solid, double error,
 
 }  // namespace
 
-KeptSurface keep_surface(const MeshSolid& solid, const SurfaceSettings& settings, bool with_field,
-                         const WorkStop& stop) {
+KeptSurface keep_surface(const MeshSolid& solid, const Resolution& resolution,
+                         const SurfaceSettings& settings, bool with_field, const WorkStop& stop) {
   KeptSurface kept;
   if (!settings.wanted) return kept;
   kept.asked_error =
@@ -70,15 +67,21 @@ KeptSurface keep_surface(const MeshSolid& solid, const SurfaceSettings& settings
     if (with_field || error > 0) field = field_in_time(solid, error, stop);
   };
   const auto find_mesh = [&] {
-    kept.counted_twice = counted_twice(solid);
-    kept.state = kept.counted_twice > 0 ? MeshState::unresolved : MeshState::own;
-    if (kept.state == MeshState::own && error == 0) kept.mesh = own_mesh(solid);
+    using How = Resolution::How;
+    const double scale = solid.frame().scale();
+    kept.counted_twice = resolution.how == How::unresolved
+                             ? estimate_counted_twice(solid)
+                             : resolution.counted_twice / (scale * scale * scale);
+    kept.state = resolution.how == How::resolved ? MeshState::resolved : MeshState::own;
+    if (resolution.how == How::unresolved && kept.counted_twice > 0)
+      kept.state = MeshState::unresolved;
+    if (kept.state != MeshState::unresolved && error == 0) kept.mesh = own_mesh(solid, resolution);
   };
   tbb::parallel_invoke(find_field, find_mesh);
-  if (kept.state == MeshState::own && error > 0) {
-    const bool own = !field || field->own;
-    kept.mesh = own ? own_mesh(solid) : mesh_of(*field);
-    kept.state = own ? MeshState::own : MeshState::simplified;
+  if (kept.state != MeshState::unresolved && error > 0) {
+    const bool all = !field || field->own;
+    kept.mesh = all ? own_mesh(solid, resolution) : mesh_of(*field);
+    if (!all) kept.state = MeshState::simplified;
   }
   if (with_field && field) kept.field = std::make_shared<FieldArrays>(std::move(field->arrays));
   return kept;
@@ -86,8 +89,9 @@ KeptSurface keep_surface(const MeshSolid& solid, const SurfaceSettings& settings
 
 void SolidField::start() {
   if (made_.valid()) return;
-  made_ =
-      do_aside(threads_, [this] { return keep_surface(solid_, settings_, true, stop_); }).share();
+  made_ = do_aside(threads_, [this] {
+            return keep_surface(solid_, resolution_, settings_, true, stop_);
+          }).share();
 }
 
 KeptSurface SolidField::wait(const std::function<void()>& meanwhile) {

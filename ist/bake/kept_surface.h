@@ -9,6 +9,7 @@
 
 #include "asset/asset_writer.h"
 #include "mesh/mesh_solid.h"
+#include "mesh/resolve/resolve.h"
 #include "stage/work_stop.h"
 
 namespace ist {
@@ -22,9 +23,11 @@ struct KeptSurface {
   double asked_error = 0;    ///< [u] 0: the mesh's own triangles
 };
 
-/// `with_field`: false: the mesh alone. No field where the mesh reaches far into itself, or `stop`
-/// ends it. Throws Error as build_field() does. Same bytes for any number of threads.
-KeptSurface keep_surface(const MeshSolid& solid, const SurfaceSettings& settings, bool with_field,
+/// `resolution`: how the solid's mesh was made. `with_field`: false: the mesh alone. No field where
+/// the mesh reaches far into itself, or `stop` ends it. Throws Error as build_field() does. Same
+/// bytes for any number of threads.
+KeptSurface keep_surface(const MeshSolid& solid, const Resolution& resolution,
+                         const SurfaceSettings& settings, bool with_field,
                          const WorkStop& stop = WorkStop());
 
 /// A solid's surface, made once on threads of its own and shared by all its assets. It ends with
@@ -33,9 +36,13 @@ class SolidField {
  public:
   /// `threads`: 0 = all cores. `time_limit` [s] from now, after which there is no field; 0: no
   /// limit.
-  SolidField(const MeshSolid& solid, const SurfaceSettings& settings, unsigned threads,
-             double time_limit = 0)
-      : solid_(solid), settings_(settings), threads_(threads), stop_(time_limit) {}
+  SolidField(const MeshSolid& solid, const Resolution& resolution, const SurfaceSettings& settings,
+             unsigned threads, double time_limit = 0)
+      : solid_(solid),
+        resolution_(resolution),
+        settings_(settings),
+        threads_(threads),
+        stop_(time_limit) {}
   ~SolidField() { stop_.stop(); }
   SolidField(const SolidField&) = delete;
   SolidField& operator=(const SolidField&) = delete;
@@ -48,6 +55,7 @@ class SolidField {
 
  private:
   const MeshSolid& solid_;
+  const Resolution& resolution_;
   const SurfaceSettings settings_;
   const unsigned threads_;
   WorkStop stop_;

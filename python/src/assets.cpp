@@ -340,7 +340,7 @@ void add_assets(py::module_& module) {
           "[u] the mesh's surface and the solid's lie within this of each other.")
       .def_property_readonly(
           "mesh_state", [](const Asset& self) { return app::name_of(self.view().mesh_state()); },
-          "'own', 'united', 'simplified', 'none', or 'unresolved': it counts volume twice.")
+          "'own', 'resolved', 'simplified', 'none', or 'unresolved': it counts volume twice.")
       .def_property_readonly(
           "counted_twice", [](const Asset& self) { return self.view().counted_twice(); },
           "[u³] that the mesh as it came counts more than once.");

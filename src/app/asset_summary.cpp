@@ -94,9 +94,9 @@ nlohmann::ordered_json mesh_json(const TreeView& tree) {
 std::string describe_mesh(const TreeView& tree) {
   if (!tree.has_mesh())
     return tree.mesh_state() == MeshState::unresolved ? "none: it counts volume twice" : "none";
-  const char* const whose = tree.mesh_state() == MeshState::own      ? "all of the mesh's"
-                            : tree.mesh_state() == MeshState::united ? "of the mesh's united parts"
-                                                                     : "near the solid";
+  const char* const whose = tree.mesh_state() == MeshState::own        ? "all of the mesh's"
+                            : tree.mesh_state() == MeshState::resolved ? "of the mesh, resolved"
+                                                                       : "near the solid";
   return fmt::format("{} triangles, {}, within {:.4g} u of its surface, {} bytes",
                      grouped(tree.mesh_triangles()), whose, tree.mesh_error(),
                      grouped(mesh_bytes(tree.header())));

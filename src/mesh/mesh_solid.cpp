@@ -15,6 +15,7 @@
 
 #include "mesh/bvh.h"
 #include "mesh/exact_closest_point.h"
+#include "mesh/resolve/resolve.h"
 #include "mesh/winding.h"
 #include "stage/raw_array.h"
 
@@ -216,7 +217,7 @@ void MeshSolid::line_crossings(double y, double z, std::vector<Crossing>& out) c
 }
 
 std::unique_ptr<Solid> make_solid(const ClosedMesh& mesh) {
-  return std::make_unique<MeshSolid>(mesh);
+  return std::make_unique<MeshSolid>(resolve(mesh).mesh);
 }
 
 }  // namespace ist

@@ -361,8 +361,8 @@ const char* name_of(MeshState state) noexcept {
   switch (state) {
     case MeshState::own:
       return "own";
-    case MeshState::united:
-      return "united";
+    case MeshState::resolved:
+      return "resolved";
     case MeshState::simplified:
       return "simplified";
     case MeshState::unresolved:

@@ -91,7 +91,8 @@ Asset baked_beside(const ClosedMesh& mesh, const PackingSettings& settings, Seen
                    const ProgressCallback& progress = {}) {
   return thread_arena(settings.threads).execute([&] {
     const MeshSolid solid(mesh);
-    SolidField field(solid, settings.surface, settings.threads);
+    const Resolution as_it_is;
+    SolidField field(solid, as_it_is, settings.surface, settings.threads);
     TwoAtATime backend(solid, seen);
     return bake_solid(mesh, solid, field, backend, settings, progress);
   });

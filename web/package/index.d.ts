@@ -76,7 +76,7 @@ export interface AssetInfo {
   /** Count of triangles of the stored surface. */
   fieldTriangles: number;
   /** What the mesh kept for exact queries is; `unresolved`: none, as it counts volume twice. */
-  meshState: 'none' | 'own' | 'united' | 'simplified' | 'unresolved';
+  meshState: 'none' | 'own' | 'resolved' | 'simplified' | 'unresolved';
   /** Count of triangles of that mesh, 0: there is none. */
   meshTriangles: number;
   /** [u] its surface and the solid's lie within this of each other. */

@@ -13,6 +13,7 @@
 #include "bake/check/distance_solid.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/polygonise.h"
+#include "mesh/resolve/resolve.h"
 #include "stage/thread_arena.h"
 
 namespace ist {
@@ -53,7 +54,8 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mes
   return all;
 }
 
-std::vector<Invariant> check_mesh(const AssetHeader& asset, const ClosedMesh& mesh) {
+std::vector<Invariant> check_mesh(const AssetHeader& asset, const ClosedMesh& as_it_came) {
+  const ClosedMesh mesh = resolve(as_it_came).mesh;
   const MeshSolid solid(mesh);
   if (solid.hash() != asset.mesh_hash || (asset.flags & kFlagPolygonised) != 0)
     throw Error(mesh.name + ": the asset was baked from another mesh; bake again");

@@ -157,7 +157,7 @@ bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
 bool sound_state(const AssetHeader& header) noexcept {
   const auto state = static_cast<MeshState>(header.mesh_state);
   if (header.mesh == 0) return state == MeshState::none || state == MeshState::unresolved;
-  return state == MeshState::own || state == MeshState::united || state == MeshState::simplified;
+  return state == MeshState::own || state == MeshState::resolved || state == MeshState::simplified;
 }
 
 bool sound_values(const AssetHeader& header) noexcept {

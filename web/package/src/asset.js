@@ -42,7 +42,7 @@ function bytesOf(given) {
       'await (await fetch(address)).arrayBuffer() gives');
 }
 
-const kMeshStates = ['none', 'own', 'united', 'simplified', 'unresolved'];
+const kMeshStates = ['none', 'own', 'resolved', 'simplified', 'unresolved'];
 
 export class Asset extends Owner {
   static from(given, name = 'asset') {
