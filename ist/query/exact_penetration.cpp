@@ -36,21 +36,29 @@ double offset_of(const PlacedTree& placed) {
   return placed.scale * Eigen::Vector3d(c[0], c[1], c[2]).norm();
 }
 
-/// How far a vertex of B may be from where the poses put it against A, and of either from where the
-/// mesh has it: A's unit frame. A rotation is off by up to 37 roundings, what moves by it, and the
-/// shift between the frames, by 45 at most with all that follows.
-double moved_by_rounding(const PlacedTree& a, const MeshTree& mesh_a, const PlacedTree& b,
-                         const MeshTree& mesh_b, const RelativePose& pose) {
+double moved_in_mesh(const MeshTree& mesh) { return mesh.header->error + mesh.header->rounding; }
+
+/// How far a vertex of B may be from where the poses put it against A: A's unit frame. A rotation
+/// is off by up to 37 roundings, what moves by it, and the shift between the frames, by 45 at most
+/// with all that follows.
+double moved_by_poses(const PlacedTree& a, const PlacedTree& b, const MeshTree& mesh_b,
+                      const RelativePose& pose) {
   constexpr double kHalfUnit = 0x1p-53;
-  const double scale = pose.a_from_b.scale;
   const Eigen::Vector3d shift(pose.a_from_b.t[0], pose.a_from_b.t[1], pose.a_from_b.t[2]);
   const double between =
       std::hypot(b.pose.t[0] - a.pose.t[0], b.pose.t[1] - a.pose.t[1], b.pose.t[2] - a.pose.t[2]);
-  const double rounded = 45 * (1.8 * scale * extent_of(mesh_b) +
-                               (between + offset_of(a) + offset_of(b)) / pose.unit_a) +
-                         5 * shift.norm();
-  return 1.1 * kHalfUnit * rounded + (mesh_a.header->error + mesh_a.header->rounding) +
-         scale * (mesh_b.header->error + mesh_b.header->rounding);
+  return 1.1 * kHalfUnit *
+         (45 * (1.8 * pose.a_from_b.scale * extent_of(mesh_b) +
+                (between + offset_of(a) + offset_of(b)) / pose.unit_a) +
+          5 * shift.norm());
+}
+
+template <class Query>
+Query query_of(const PlacedTree& a, const MeshTree& mesh_a, const PlacedTree& b,
+               const MeshTree& mesh_b, const RelativePose& pose, ExactScratch& scratch) {
+  const double moved_b =
+      moved_by_poses(a, b, mesh_b, pose) + pose.a_from_b.scale * moved_in_mesh(mesh_b);
+  return {mesh_a, moved_in_mesh(mesh_a), mesh_b, moved_b, pose.a_from_b, pose.b_from_a, scratch};
 }
 
 Eigen::Vector3d vector(const exact::Point& p) { return {p.x, p.y, p.z}; }
@@ -80,8 +88,7 @@ struct WorldSums {
     volume = found * (u * u * u);
     force = pose.rotation_a * vector(sums.force) * (u * u);
     centroid.setZero();
-    if (found != 0)
-      centroid = pose.to_world(vector(origin) + vector(sums.moment) / (24 * found));
+    if (found != 0) centroid = pose.to_world(vector(origin) + vector(sums.moment) / (24 * found));
     // The sums' origin from B's.
     const Eigen::Vector3d shift(pose.a_from_b.t[0], pose.a_from_b.t[1], pose.a_from_b.t[2]);
     const Eigen::Vector3d arm =
@@ -177,8 +184,7 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
                               Workspace& workspace) noexcept {
   if (a.tree.header().mesh == 0 || b.tree.header().mesh == 0) return not_held<Penetration>();
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
-  ExactQuery query(mesh_a, mesh_b, pose.a_from_b, pose.b_from_a,
-                   moved_by_rounding(a, mesh_a, b, mesh_b, pose), workspace.impl()->exact);
+  auto query = query_of<ExactQuery>(a, mesh_a, b, mesh_b, pose, workspace.impl()->exact);
   const ExactOverlap found = query.run(settings.max_visits);
   if (found.complete) return whole_answer(found, pose);
   const auto by_spheres = [&] {
@@ -204,8 +210,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
     return {not_held<ContactPatches>(), 0};
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   ExactScratch& scratch = workspace.impl()->exact;
-  ExactParts query(mesh_a, mesh_b, pose->a_from_b, pose->b_from_a,
-                   moved_by_rounding(a, mesh_a, b, mesh_b, *pose), scratch);
+  auto query = query_of<ExactParts>(a, mesh_a, b, mesh_b, *pose, scratch);
   const ExactOverlap found = query.run(settings.max_visits);
   if (!found.complete) {
     const auto by_spheres = [&] {

@@ -260,8 +260,10 @@ class Search {
       all.low[k] = b_in_a.all_low[k] - search_.room;
       all.high[k] = b_in_a.all_high[k] + search_.room;
     }
-    for (std::uint32_t rows = meeting(boxes_a.low, boxes_a.high, all.low, all.high); rows != 0;
-         rows &= rows - 1) {
+    // Unused lanes meet what is large enough.
+    std::uint32_t rows = meeting(boxes_a.low, boxes_a.high, all.low, all.high) &
+                         ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
+    for (; rows != 0; rows &= rows - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
       const OneBox here(boxes_a.low, boxes_a.high, i, search_.room);
       std::uint32_t columns = meeting(b_in_a.low, b_in_a.high, here.low, here.high);
@@ -291,8 +293,9 @@ class Search {
     const PlacedBoxes& b_in_a = placed_b(1, pair.b / kWidth);
     const OneBox there(b_in_a.low, b_in_a.high, pair.b % kWidth, search_.room);
     const BoxBlock& boxes = a_.level[pair.level_a].boxes[pair.a];
-    for (std::uint32_t found = meeting(boxes.low, boxes.high, there.low, there.high); found != 0;
-         found &= found - 1)
+    std::uint32_t found = meeting(boxes.low, boxes.high, there.low, there.high) &
+                          ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
+    for (; found != 0; found &= found - 1)
       push(pair.level_a - 1, kWidth * pair.a + static_cast<std::uint32_t>(std::countr_zero(found)),
            0, pair.b);
   }

@@ -150,7 +150,11 @@ void ExactQuery::sum_crossing(const Crossing& crossing, ExactSums& sums) noexcep
   add(sums.moment, -six_b, of_b + both);
   add(sums.force, -0.5, c);
   add(sums.torque, ((dot(a, a) + dot(a, b)) + dot(b, b)) / 6, along);
-  rounding_ += 8 * kHalfUnit * length_bound(a) * length_bound(along) * length_bound(of_a - of_b);
+  // What the product rounds, and what ends that are rounded do to the triangles at them.
+  const double ends = length_bound(a) + length_bound(b);
+  rounding_ += kHalfUnit * length_bound(along) *
+               (8 * length_bound(a) * length_bound(of_a - of_b) +
+                6 * ends * (length_bound(of_a - a) + length_bound(of_b - a)));
 }
 
 bool ExactQuery::add_crossing(const Crossing& crossing) noexcept {
@@ -213,8 +217,10 @@ void ExactQuery::sum_piercing(const Side& own, const CrossedBlock& crossed, std:
   const Fan fan(crossed, own.mesh.blocks[crossed.block], lane);
   const Point& near = end.from_first ? fan.next : fan.last;
   const Point to = near - fan.apex;
-  add_cone(sign * dot(fan.apex, cross(end.offset, to)), fan.apex + (near + from_origin(end)),
-           8 * length_bound(fan.apex) * length_bound(end.offset) * length_bound(to), sums);
+  add_cone(
+      sign * dot(fan.apex, cross(end.offset, to)), fan.apex + (near + from_origin(end)),
+      (length_bound(fan.apex) + length_bound(to)) * length_bound(end.offset) * length_bound(to),
+      sums);
 }
 
 /// A tetrahedron from the origin: six times its volume, the sum of its other corners, and what the
@@ -223,7 +229,7 @@ void ExactQuery::add_cone(double six_volumes, const Point& corners, double round
                           ExactSums& sums) noexcept {
   sums.six_volumes.add(six_volumes);
   add(sums.moment, six_volumes, corners);
-  rounding_ += kHalfUnit * rounding;
+  rounding_ += 20 * kHalfUnit * rounding;  // the product's, and that of its corners
 }
 
 /// Which vertices are inside: those of pierced edges by what pierces them, the others by edges that
@@ -376,7 +382,9 @@ void ExactQuery::sum_triangle(const Side& own, const CrossedBlock& crossed, std:
   const Fan fan(crossed, mesh, lane);
   const Point u = fan.next - fan.apex, v = fan.last - fan.apex;
   add_cone(whole * dot(fan.apex, cross(u, v)), fan.apex + (fan.next + fan.last),
-           8 * length_bound(fan.apex) * length_bound(u) * length_bound(v), sums);
+           (length_bound(fan.apex) + length_bound(u) + length_bound(v)) * length_bound(u) *
+               length_bound(v),
+           sums);
 }
 
 void ExactQuery::sum_crossed_block(const Side& own, const CrossedBlock& crossed) noexcept {
@@ -430,8 +438,7 @@ void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i, std::uint
   into.six_volumes.add(2 * (trace + out));
   add(into.moment, 6, cone + (trace * d + (turned + out * d)));
   rounding_ += 64 * kHalfUnit * area * (length_bound(d) + wide);
-  area_ += area;
-  rim_ += wide;
+  add_layer(own, area, wide);
   if (checked_) add(out_.gap, own.is_b ? -1 : 1, n);
 }
 
@@ -459,6 +466,12 @@ void ExactQuery::sum_insides(const Side& own, int level, std::uint32_t i) noexce
   }
 }
 
+/// A surface that moves changes the volume by no more than a layer as thick over its faces, edges
+/// and corners. `width`: of a box around it, all sides together.
+void ExactQuery::add_layer(const Side& own, double area, double width) noexcept {
+  layers_ += own.moved * area + 32 * (own.moved * own.moved) * width;
+}
+
 /// Blocks at the surface of the other solid: rounding and deviations there change the volume.
 void ExactQuery::bound_near(const Side& own) noexcept {
   const std::uint32_t blocks = own.mesh.level[0].count;
@@ -469,9 +482,10 @@ void ExactQuery::bound_near(const Side& own) noexcept {
       const std::uint32_t b = 64 * w + static_cast<std::uint32_t>(std::countr_zero(left));
       const std::uint32_t i = b / kWidth, lane = b % kWidth;
       const BoxBlock& box = own.mesh.level[1].boxes[i];
-      area_ += scale * scale * own.mesh.level[1].sums[i].area[lane];
+      double wide = 0;
       for (int k = 0; k < 3; ++k)
-        rim_ += scale * (double{box.high[k][lane]} - double{box.low[k][lane]});
+        wide += scale * (double{box.high[k][lane]} - double{box.low[k][lane]});
+      add_layer(own, scale * scale * own.mesh.level[1].sums[i].area[lane], wide);
     }
 }
 
@@ -483,7 +497,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
       return out_;
     }
   clear_marks();
-  const double room = 2 * moved_;
+  const double room = 2 * (sides_[0].moved + sides_[1].moved);
   const CrossingsFound found =
       find_crossings({&sides_[0].mesh, &sides_[1].mesh, a_from_b_, b_from_a_,
                       static_cast<float>(room * (1 + 1e-6)), max_visits},
@@ -494,7 +508,10 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
   out_.consistent = found.consistent;
   if (!out_.complete) return out_;
   sort_crossings(found.crossings);
-  if (found.crossings > 0) out_.origin = scratch_.crossings[scratch_.order[0]].start.from;
+  if (found.crossings > 0) {
+    const Piercing& first = scratch_.crossings[scratch_.order[0]].start;
+    out_.origin = first.from + first.offset;
+  }
   for (std::uint32_t i = 0; i < found.crossings && out_.complete; ++i)
     out_.complete = add_crossing(scratch_.crossings[scratch_.order[i]]);
   if (!out_.complete) return out_;
@@ -509,11 +526,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
     sum_insides(side, side.mesh.top, 0);
     bound_near(side);
   }
-  // A surface that moves by e changes the volume by no more than a layer of that thickness over
-  // its faces, edges and corners.
-  const double e = moved_;
-  out_.error = 1.01 * (rounding_ / 6 + e * area_ + 32 * (e * e) * rim_) +
-               4 * kHalfUnit * std::abs(out_.sums.volume());
+  out_.error = 1.01 * (rounding_ / 6 + layers_) + 4 * kHalfUnit * std::abs(out_.sums.volume());
   return out_;
 }
 

@@ -26,13 +26,13 @@ struct ExactOverlap {
 /// the meshes and the map alone.
 class ExactQuery {
  public:
-  /// `moved`: no point of either surface is further from where it ought to be, A's unit frame.
-  ExactQuery(const MeshTree& a, const MeshTree& b, const Similarity& a_from_b,
-             const Similarity& b_from_a, double moved, ExactScratch& scratch) noexcept
-      : sides_{{a, scratch.a, false}, {b, scratch.b, true}},
+  /// `moved_a`, `moved_b`: no point of a surface is further from where it ought to be against the
+  /// other, A's unit frame.
+  ExactQuery(const MeshTree& a, double moved_a, const MeshTree& b, double moved_b,
+             const Similarity& a_from_b, const Similarity& b_from_a, ExactScratch& scratch) noexcept
+      : sides_{{a, scratch.a, false, moved_a}, {b, scratch.b, true, moved_b}},
         a_from_b_(a_from_b),
         b_from_a_(b_from_a),
-        moved_(moved),
         scratch_(scratch) {}
 
   /// `max_visits`: 0: no limit. `checked`: finds the gap too.
@@ -43,6 +43,7 @@ class ExactQuery {
     const MeshTree& mesh;
     BlockMarks& marks;
     bool is_b;
+    double moved;
   };
 
   Side& side(bool of_b) noexcept { return sides_[of_b ? 1 : 0]; }
@@ -71,7 +72,6 @@ class ExactQuery {
   Side sides_[2];
   const Similarity& a_from_b_;
   const Similarity& b_from_a_;
-  const double moved_;
   ExactScratch& scratch_;
   ExactOverlap out_;
 
@@ -89,13 +89,13 @@ class ExactQuery {
   void sum_crossed_block(const Side& side, const CrossedBlock& crossed) noexcept;
   void sum_insides(const Side& side, int level, std::uint32_t i) noexcept;
   void bound_near(const Side& side) noexcept;
+  void add_layer(const Side& side, double area, double width) noexcept;
   void add_cone(double six_volumes, const exact::Point& corners, double rounding,
                 ExactSums& sums) noexcept;
 
   bool checked_ = false;
   double rounding_ = 0;  ///< six times what the volume's terms may be off by
-  double area_ = 0;      ///< of all triangles that may be in the overlap
-  double rim_ = 0;       ///< and what their edges and corners add where surfaces move
+  double layers_ = 0;    ///< what surfaces may miss by having moved
 };
 
 }  // namespace ist
