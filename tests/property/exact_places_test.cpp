@@ -12,8 +12,8 @@
 #include "support/test_meshes.h"
 #include "support/turns.h"
 
-// Exact queries in places where signs vanish, and of odd sizes: what is known of the answer is known
-// without a query.
+// Exact queries in places where signs vanish, and of odd sizes: what is known of the answer is
+// known without a query.
 
 namespace ist {
 namespace {
@@ -168,8 +168,8 @@ TEST_F(ExactPlaces, SizesFromTheTinyToTheHuge) {
   for (const double size : {1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9}) {
     const Asset own = surface(box_mesh(Point::Zero(), size * Point::Ones()));
     for (const bool by_scale : {false, true}) {
-      const PlacedTree a = by_scale ? PlacedTree{cube_.view(), {}, size}
-                                    : PlacedTree{own.view(), {}, 1};
+      const PlacedTree a =
+          by_scale ? PlacedTree{cube_.view(), {}, size} : PlacedTree{own.view(), {}, 1};
       PlacedTree b = a;
       b.pose = shifted(size * Point(0.5, 0.25, 0.75));
       SCOPED_TRACE(::testing::Message() << size << ' ' << by_scale);
@@ -210,12 +210,12 @@ TEST_F(ExactPlaces, FarFromTheOrigin) {
   const Asset moved = surface(box_mesh(far, far + Point::Ones()));
   const Point t(0.5, -0.25, 0.125);
   const double truth = 0.5 * 0.75 * 0.875;
-  for (const auto& [a, b] :
-       {std::pair(PlacedTree{moved.view(), shifted(-far), 1}, PlacedTree{cube_.view(), shifted(t), 1}),
-        std::pair(PlacedTree{cube_.view(), shifted(far), 1},
-                  PlacedTree{moved.view(), shifted(t), 1}),
-        std::pair(PlacedTree{moved.view(), shifted(far), 1},
-                  PlacedTree{cube_.view(), shifted(2 * far + t), 1})}) {
+  for (const auto& [a, b] : {std::pair(PlacedTree{moved.view(), shifted(-far), 1},
+                                       PlacedTree{cube_.view(), shifted(t), 1}),
+                             std::pair(PlacedTree{cube_.view(), shifted(far), 1},
+                                       PlacedTree{moved.view(), shifted(t), 1}),
+                             std::pair(PlacedTree{moved.view(), shifted(far), 1},
+                                       PlacedTree{cube_.view(), shifted(2 * far + t), 1})}) {
     const Penetration found = ask(a, b);
     EXPECT_NEAR(found.volume, truth, 1e-14);
     EXPECT_LE(found.volume_min, truth);
@@ -238,9 +238,9 @@ class ExactMotions : public ExactPlaces {
     for (int i = 0; i < 60; ++i) {
       const Asset& a = assets_[static_cast<std::size_t>(i) % assets_.size()];
       const Asset& b = assets_[static_cast<std::size_t>(i / 2) % assets_.size()];
-      made.push_back({{a.view(), posed(testing::random_turn(random), way()), 1},
-                      {b.view(), posed(testing::random_turn(random), way()),
-                       std::pow(2, unit(random))}});
+      made.push_back(
+          {{a.view(), posed(testing::random_turn(random), way()), 1},
+           {b.view(), posed(testing::random_turn(random), way()), std::pow(2, unit(random))}});
     }
     return made;
   }
@@ -274,8 +274,8 @@ TEST_F(ExactMotions, TheSameWithAAndBExchanged) {
     EXPECT_TRUE(found.translation_gradient.isApprox(-other.translation_gradient, 1e-12) ||
                 (found.translation_gradient + other.translation_gradient).norm() < 1e-13);
     // Of the other solid, about the other origin.
-    const Point torque = other.rotation_gradient +
-                         (origin(a) - origin(b)).cross(other.translation_gradient);
+    const Point torque =
+        other.rotation_gradient + (origin(a) - origin(b)).cross(other.translation_gradient);
     EXPECT_LE((found.rotation_gradient + torque).norm(), 1e-13);
     EXPECT_LE((found.centroid - other.centroid).norm() * found.volume, 1e-13);
   }

@@ -36,8 +36,8 @@ std::vector<CubeTurn> cube_turns() {
       turns.push_back(turn);
     }
     for (int signs = 0; signs < 8; ++signs)
-      turns.push_back({{0.5, signs & 1 ? 0.5 : -0.5, signs & 2 ? 0.5 : -0.5, signs & 4 ? 0.5 : -0.5},
-                       quarter});
+      turns.push_back(
+          {{0.5, signs & 1 ? 0.5 : -0.5, signs & 2 ? 0.5 : -0.5, signs & 4 ? 0.5 : -0.5}, quarter});
   }
   return turns;
 }
@@ -131,8 +131,7 @@ TEST_F(ExactRational, CopiesAndNeighboursOfTheSameMesh) {
                           a.vertices[static_cast<std::size_t>(random.whole(0, last))];
         std::copy(way.data(), way.data() + 3, pose.t);
       }
-      compare(a, asset, a, asset, pose,
-              "neighbour " + std::to_string(i) + ' ' + std::to_string(k));
+      compare(a, asset, a, asset, pose, "neighbour " + std::to_string(i) + ' ' + std::to_string(k));
     }
   }
   EXPECT_EQ(poses_, 225);

@@ -1,6 +1,6 @@
 // A million random and a hundred thousand degenerate poses of exact queries: signs that agree, a
-// surface that closes, bounds in order, A and B exchanged, nothing that is not a number. `./dev soak
-// exact` runs it and writes its report.
+// surface that closes, bounds in order, A and B exchanged, nothing that is not a number. `./dev
+// soak exact` runs it and writes its report.
 
 #include <ist/query.h>
 
@@ -78,8 +78,7 @@ std::vector<TestSolid> make_solids() {
   for (int kind = 0; kind < testing::IntegerMeshes::kKinds; ++kind)
     for (int i = 0; i < 2; ++i) meshes.push_back(random.make(kind));
   std::vector<TestSolid> solids;
-  for (const TriangleMesh& mesh : meshes)
-    solids.push_back({testing::surface(mesh), mesh.vertices});
+  for (const TriangleMesh& mesh : meshes) solids.push_back({testing::surface(mesh), mesh.vertices});
   return solids;
 }
 
@@ -113,8 +112,8 @@ class Chunk {
 
   /// Anywhere that they may meet, at any scale.
   void scatter(PlacedTree& a, PlacedTree& b) {
-    b.scale = std::pow(10, one_in(4) ? uniform(-4, 1) : uniform(-0.3, 0.3)) *
-              testing::size_of(a) / testing::size_of(b);
+    b.scale = std::pow(10, one_in(4) ? uniform(-4, 1) : uniform(-0.3, 0.3)) * testing::size_of(a) /
+              testing::size_of(b);
     const double reach = (testing::size_of(a) + testing::size_of(b)) / 2;
     const Point way(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
     set(a.pose, testing::random_turn(random_), {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)});
@@ -122,10 +121,12 @@ class Chunk {
         Point(a.pose.t[0], a.pose.t[1], a.pose.t[2]) + 0.6 * reach * way);
   }
 
-  /// Faces, edges and corners in common, or next to that: by turns of a cube, or by parts of a whole
-  /// turn, and by differences of vertices and parts of them.
+  /// Faces, edges and corners in common, or next to that: by turns of a cube, or by parts of a
+  /// whole turn, and by differences of vertices and parts of them.
   void align(const TestSolid& a, const TestSolid& b, PlacedTree& at_a, PlacedTree& at_b) {
-    const auto vertex = [&](const TestSolid& of) { return of.vertices[random_() % of.vertices.size()]; };
+    const auto vertex = [&](const TestSolid& of) {
+      return of.vertices[random_() % of.vertices.size()];
+    };
     Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
     if (!one_in(3)) {
       const double parts[] = {2, 4, 4, 8, 12, 24};
@@ -168,14 +169,15 @@ class Chunk {
     const auto whole = [](const PlacedTree& placed) {
       return placed.tree.volume() * std::pow(placed.scale, 3);
     };
-    tally_.disordered += !(0 <= p.volume_min && p.volume_min <= p.volume &&
-                           p.volume <= p.volume_max &&
-                           p.volume_min <= std::min(whole(a), whole(b)) * (1 + 1e-12));
+    tally_.disordered +=
+        !(0 <= p.volume_min && p.volume_min <= p.volume && p.volume <= p.volume_max &&
+          p.volume_min <= std::min(whole(a), whole(b)) * (1 + 1e-12));
     tally_.open += !(gap <= 1);
     tally_.worst_gap = std::max(tally_.worst_gap, gap);
     tally_.wide += p.volume_max - p.volume_min > 1e-9 * p.volume && p.volume > 1e-9 * volume;
     const Penetration q = testing::exactly(b, a, workspace_);
-    tally_.unlike += !(std::max(p.volume_min, q.volume_min) <= std::min(p.volume_max, q.volume_max));
+    tally_.unlike +=
+        !(std::max(p.volume_min, q.volume_min) <= std::min(p.volume_max, q.volume_max));
     if (p.status != QueryStatus::ok || !check.complete || !check.consistent || gap > 1 ||
         std::max(p.volume_min, q.volume_min) > std::min(p.volume_max, q.volume_max))
       show(a, b, p, q, check);
@@ -205,11 +207,12 @@ class Chunk {
       for (const double x : placed->pose.t) std::fprintf(stderr, " %.17g", x);
       std::fprintf(stderr, " %.17g;", placed->scale);
     }
-    std::fprintf(stderr,
-                 " status %d, consistent %d, crossings %u, gap %.2g, volume %.17g in %.17g … %.17g, "
-                 "exchanged %.17g in %.17g … %.17g\n",
-                 static_cast<int>(p.status), check.consistent, check.crossings, check.gap, p.volume,
-                 p.volume_min, p.volume_max, q.volume, q.volume_min, q.volume_max);
+    std::fprintf(
+        stderr,
+        " status %d, consistent %d, crossings %u, gap %.2g, volume %.17g in %.17g … %.17g, "
+        "exchanged %.17g in %.17g … %.17g\n",
+        static_cast<int>(p.status), check.consistent, check.crossings, check.gap, p.volume,
+        p.volume_min, p.volume_max, q.volume, q.volume_min, q.volume_max);
   }
 
   const std::vector<TestSolid>& solids_;
@@ -242,7 +245,8 @@ int main(int argc, char** argv) {
   const std::vector<TestSolid> solids = make_solids();
   bool sound = true;
   for (const bool degenerate : {false, true}) {
-    const std::size_t poses = (degenerate ? 100'000 : 1'000'000) / (report.quick() ? degenerate ? 20 : 50 : 1);
+    const std::size_t poses =
+        (degenerate ? 100'000 : 1'000'000) / (report.quick() ? degenerate ? 20 : 50 : 1);
     const auto start = std::chrono::steady_clock::now();
     const Tally tally = ask(solids, poses, degenerate);
     const double seconds =
@@ -274,6 +278,7 @@ int main(int argc, char** argv) {
       "coordinates, some of several components and with cavities. Degenerate poses put corners on "
       "corners and edges, by turns that keep faces parallel or not, some of them next to that by "
       "1e-16 to 1e-3, some turned as a whole. The gap of the overlap's surface is bounded by 2e-17 "
-      "of the smaller solid's squared size for each crossing pair of triangles and a hundred more.");
+      "of the product of the solids' sizes for each crossing pair of triangles and a hundred "
+      "more.");
   return report.write() != 0 || !sound ? 1 : 0;
 }

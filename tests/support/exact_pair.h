@@ -30,8 +30,7 @@ struct ExactCheck {
   bool complete = false;
   bool consistent = false;
   std::uint32_t crossings = 0;
-  /// How far the overlap's surface is from closed, in parts of the square of the smaller solid's
-  /// size.
+  /// How far the overlap's surface is from closed, in parts of the product of both solids' sizes.
   double gap = 0;
 };
 
@@ -52,8 +51,8 @@ inline ExactCheck check_exactly(const PlacedTree& a, const PlacedTree& b, Worksp
   const MeshTree mesh_a = mesh(a), mesh_b = mesh(b);
   ExactQuery query(mesh_a, mesh_b, pose->a_from_b, pose->b_from_a, 0, workspace.impl()->exact);
   const ExactOverlap found = query.run(0, true);
-  const double size = std::min(size_of(a), size_of(b)) / pose->unit_a;
-  const double gap = std::hypot(found.gap.x, found.gap.y, found.gap.z) / (size * size);
+  const double sizes = size_of(a) / pose->unit_a * (size_of(b) / pose->unit_a);
+  const double gap = std::hypot(found.gap.x, found.gap.y, found.gap.z) / sizes;
   return {found.complete, found.consistent, found.crossings, gap};
 }
 

@@ -37,22 +37,28 @@ class IntegerMeshes {
 
   TriangleMesh plain(int kind) {
     switch (kind) {
-      case 0: return tetrahedron(-5, 5);
-      case 1: return box(-5, 5);
-      case 2: return prism({{0, 0}, {whole(1, 6), whole(-2, 2)}, {whole(-2, 2), whole(3, 6)}},
-                           {{0, 1, 2}});
+      case 0:
+        return tetrahedron(-5, 5);
+      case 1:
+        return box(-5, 5);
+      case 2:
+        return prism({{0, 0}, {whole(1, 6), whole(-2, 2)}, {whole(-2, 2), whole(3, 6)}},
+                     {{0, 1, 2}});
       case 3: {  // an L, fanned from the corner inside
         const int c = whole(1, 3), b = whole(1, 3), a = c + whole(1, 4), d = b + whole(1, 4);
         return prism({{0, 0}, {a, 0}, {a, b}, {c, b}, {c, d}, {0, d}},
                      {{3, 4, 5}, {3, 5, 0}, {3, 0, 1}, {3, 1, 2}});
       }
-      case 4: return star(false);
-      case 5: return star(true);
+      case 4:
+        return star(false);
+      case 5:
+        return star(true);
       case 6: {  // two components, which may touch
         const TriangleMesh first = box(-6, 0), second = whole(0, 1) ? box(0, 6) : tetrahedron(0, 6);
         return joined(first, second);
       }
-      case 7: return cavity();
+      case 7:
+        return cavity();
       default: {  // a shell within a cavity within a shell
         const Point low = point(-1, 0), high = low + point(1, 2);
         return joined(cavity(), box_mesh(low, high));

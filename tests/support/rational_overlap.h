@@ -18,7 +18,8 @@ using Rational = boost::multiprecision::number<boost::multiprecision::cpp_ration
 
 namespace rational {
 
-/// Coordinates are whole multiples of 2⁻²⁰ or more and below 64, so that a determinant of them fits.
+/// Coordinates are whole multiples of 2⁻²⁰ or more and below 64, so that a determinant of them
+/// fits.
 using Whole = __int128;
 
 /// How many parts of 1 all coordinates are multiples of.
@@ -105,7 +106,8 @@ inline std::vector<Signed> tetrahedra(const TriangleMesh& mesh, double parts) {
 
 /// Six volumes of the part of `t` that lies inside of planes k, k + 1, … of `other`: where a plane
 /// goes between two corners, the tetrahedron is cut in two there.
-inline Rational six_volumes_inside(const Tetrahedron<Rational>& t, const Signed& other, std::size_t k) {
+inline Rational six_volumes_inside(const Tetrahedron<Rational>& t, const Signed& other,
+                                   std::size_t k) {
   if (k == 4) return abs(six_volumes(t));
   std::array<Rational, 4> height;
   std::size_t above = 4, below = 4;
@@ -118,8 +120,7 @@ inline Rational six_volumes_inside(const Tetrahedron<Rational>& t, const Signed&
   if (below == 4) return six_volumes_inside(t, other, k + 1);
   const Rational share = height[above] / (height[above] - height[below]);
   Point<Rational> cut;
-  for (std::size_t x = 0; x < 3; ++x)
-    cut[x] = t[above][x] + share * (t[below][x] - t[above][x]);
+  for (std::size_t x = 0; x < 3; ++x) cut[x] = t[above][x] + share * (t[below][x] - t[above][x]);
   Tetrahedron<Rational> with_above = t, with_below = t;
   with_above[below] = cut;
   with_below[above] = cut;
