@@ -127,6 +127,12 @@ template <class A>
 void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& workspace,
          AnswerBits& bits) {
   PenetrationSettings settings;
+  if constexpr (std::is_same_v<A, PlacedTree>)
+    if (asked == "exact") {
+      settings.measure = Measure::exact;
+      bits.add(penetration(a, b, settings, workspace));
+      return;
+    }
   if (asked == "always") settings.field = FieldUse::always;
   if (asked == "inner") settings.measure = Measure::inner;
   if (asked == "max_visits") settings.max_visits = 50;

@@ -61,6 +61,13 @@ class RealTime : public ::testing::Test {
     time_of_impact(field, b, motions, until, workspaces_[0]);
     const PlacedTree solid{box_.view(), poses_a_[i], 1.0};
     const PlacedTree other{box_.view(), poses_b_[(i + 20) % kPoses], 1.0};
+    // By meshes: across, in place, and in little room.
+    PenetrationSettings exact = settings;
+    exact.measure = Measure::exact;
+    const PlacedTree ball{ball_.view(), poses_b_[i], 1.0};
+    volume_[i] += penetration(solid, ball, exact, workspaces_[0]).volume_max;
+    penetration(solid, solid, exact, workspaces_[0]);
+    penetration(ball, ball, exact, small_);
     time_of_impact(solid, other, motions, until, workspaces_[0]);
     time_of_impact(field, other, motions, until, workspaces_[0]);
     for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
@@ -80,6 +87,7 @@ class RealTime : public ::testing::Test {
   const Asset a_ = testing::make_random_asset({600, 0.2, {}, 0, 2}, 1);
   const Asset b_ = testing::make_random_asset({600, 0.2, {}, 0, 1}, 2);
   const Asset box_ = bake(close_mesh(testing::cube_mesh(), "cube"), {.max_spheres = 60});
+  const Asset ball_ = bake_surface(close_mesh(testing::icosphere_mesh(4), "ball"));
   const std::vector<float> numbers_ = std::vector<float>(125, 0.1f);
   const std::vector<Field> fields_ = {
       HalfSpaceField{},
@@ -91,7 +99,7 @@ class RealTime : public ::testing::Test {
       DistanceGridField{numbers_.data(), {5, 5, 5}, Eigen::Vector3d::Constant(-1), 0.5, 0},
       FunctionField{look, nullptr, 0},
       MeshField{box_.view()}};
-  Workspace workspaces_[1];
+  Workspace workspaces_[1], small_{16};
   ist_workspace_t c_workspace_ = {};
   ist_tree_t c_tree_a_ = {}, c_tree_b_ = {};
   ContactPatch patches_[8];

@@ -1,0 +1,284 @@
+// A million random and a hundred thousand degenerate poses of exact queries: signs that agree, a
+// surface that closes, bounds in order, A and B exchanged, nothing that is not a number. `./dev
+// soak exact` runs it and writes its report.
+
+#include <ist/query.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "report.h"
+#include "samples/samples.h"
+#include "support/exact_pair.h"
+#include "support/integer_meshes.h"
+#include "support/test_meshes.h"
+#include "support/turns.h"
+
+namespace {
+
+using namespace ist;
+using Point = Eigen::Vector3d;
+
+constexpr std::size_t kChunk = 250;  // poses drawn from one stream of random numbers
+/// What may not happen, and what did.
+struct Tally {
+  std::uint64_t poses = 0, crossing = 0, contained = 0, apart = 0, pairs = 0;
+  std::uint64_t unfinished = 0;    ///< status other than ok
+  std::uint64_t inconsistent = 0;  ///< signs that contradict each other
+  std::uint64_t not_numbers = 0;
+  std::uint64_t disordered = 0;  ///< a value outside its bounds, or more than the smaller solid
+  std::uint64_t open = 0;        ///< gaps above their bound
+  std::uint64_t unlike = 0;      ///< intervals of A in B and B in A that do not meet
+  std::uint64_t untrue = 0;      ///< intervals that miss a volume which is known
+  std::uint64_t wide = 0;        ///< intervals wider than 1e-9 of the volume
+  double worst_gap = 0;
+
+  void operator+=(const Tally& other) {
+    poses += other.poses;
+    crossing += other.crossing;
+    contained += other.contained;
+    apart += other.apart;
+    pairs += other.pairs;
+    unfinished += other.unfinished;
+    inconsistent += other.inconsistent;
+    not_numbers += other.not_numbers;
+    disordered += other.disordered;
+    open += other.open;
+    unlike += other.unlike;
+    untrue += other.untrue;
+    wide += other.wide;
+    worst_gap = std::max(worst_gap, other.worst_gap);
+  }
+};
+
+struct TestSolid {
+  Asset asset;
+  std::vector<Point> vertices;
+};
+
+/// Small meshes of every kind: the fewer triangles the more of them cross at vertices and edges.
+std::vector<TestSolid> make_solids() {
+  std::vector<TriangleMesh> meshes = {
+      testing::box_mesh(Point::Zero(), Point::Ones()),
+      testing::box_mesh({-2, -2, -0.0625}, {2, 2, 0.0625}),
+      testing::box_mesh({-0.001, -0.002, -1}, {0.001, 0.002, 1}),
+      testing::icosphere_mesh(1),
+      testing::icosphere_mesh(3),
+      testing::torus_mesh(1, 0.4, 24, 12),
+      make_sample("gear"),
+  };
+  testing::IntegerMeshes random(11);
+  for (int kind = 0; kind < testing::IntegerMeshes::kKinds; ++kind)
+    for (int i = 0; i < 2; ++i) meshes.push_back(random.make(kind));
+  std::vector<TestSolid> solids;
+  for (const TriangleMesh& mesh : meshes) solids.push_back({testing::surface(mesh), mesh.vertices});
+  return solids;
+}
+
+class Chunk {
+ public:
+  Chunk(const std::vector<TestSolid>& solids, std::size_t index, Workspace& workspace, Tally& tally)
+      : solids_(solids),
+        random_(0x9e3779b97f4a7c15u * (index + 1)),
+        workspace_(workspace),
+        tally_(tally) {}
+
+  void run(bool degenerate) {
+    for (std::size_t i = 0; i < kChunk; ++i) {
+      const TestSolid &a = pick(), &b = degenerate && one_in(2) ? a : pick();
+      PlacedTree at_a{a.asset.view(), {}, 1}, at_b{b.asset.view(), {}, 1};
+      degenerate ? align(a, b, at_a, at_b) : scatter(at_a, at_b);
+      look_at(at_a, at_b);
+      if (degenerate) look_at_known(a, at_a);
+    }
+  }
+
+ private:
+  bool one_in(unsigned n) { return random_() % n == 0; }
+  double uniform(double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(random_);
+  }
+  const TestSolid& pick() { return solids_[random_() % solids_.size()]; }
+  static void set(Pose& pose, const Eigen::Quaterniond& q, const Point& t) {
+    pose = {{q.w(), q.x(), q.y(), q.z()}, {t[0], t[1], t[2]}};
+  }
+
+  /// Anywhere that they may meet, at any scale.
+  void scatter(PlacedTree& a, PlacedTree& b) {
+    b.scale = std::pow(10, one_in(4) ? uniform(-4, 1) : uniform(-0.3, 0.3)) * testing::size_of(a) /
+              testing::size_of(b);
+    const double reach = (testing::size_of(a) + testing::size_of(b)) / 2;
+    const Point way(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+    set(a.pose, testing::random_turn(random_), {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)});
+    set(b.pose, testing::random_turn(random_),
+        Point(a.pose.t[0], a.pose.t[1], a.pose.t[2]) + 0.6 * reach * way);
+  }
+
+  /// Faces, edges and corners in common, or next to that: by turns of a cube, or by parts of a
+  /// whole turn, and by differences of vertices and parts of them.
+  void align(const TestSolid& a, const TestSolid& b, PlacedTree& at_a, PlacedTree& at_b) {
+    const auto vertex = [&](const TestSolid& of) {
+      return of.vertices[random_() % of.vertices.size()];
+    };
+    Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+    if (!one_in(3)) {
+      const double parts[] = {2, 4, 4, 8, 12, 24};
+      const double angle = 2 * std::numbers::pi / parts[random_() % 6];
+      turn = Eigen::AngleAxisd(angle * double(random_() % 24), Point::Unit(long(random_() % 3)));
+      if (one_in(3)) turn = turn * Eigen::Quaterniond(0.5, 0.5, 0.5, one_in(2) ? 0.5 : -0.5);
+    }
+    if (one_in(6)) at_b.scale = one_in(2) ? 0.5 : 2;
+    // A corner on a corner, the middle of an edge, or as they lie.
+    const Point from = at_b.scale * (turn * vertex(b));
+    Point t = one_in(8) ? Point(Point::Zero()) : vertex(a) - from;
+    if (one_in(4)) t = (vertex(a) + vertex(a)) / 2 - from;
+    if (one_in(4)) {
+      const double step = std::pow(10, uniform(-16, -3));
+      t[long(random_() % 3)] += one_in(2) ? step : -step;
+    }
+    set(at_b.pose, turn, t);
+    if (one_in(4)) {  // the same seen from elsewhere
+      const Eigen::Quaterniond all = testing::random_turn(random_);
+      set(at_a.pose, all, Point::Zero());
+      set(at_b.pose, all * turn, all * t);
+    }
+  }
+
+  void look_at(const PlacedTree& a, const PlacedTree& b) {
+    const Penetration p = testing::exactly(a, b, workspace_);
+    const testing::ExactCheck check = testing::check_exactly(a, b, workspace_);
+    const bool finished = p.status == QueryStatus::ok && check.complete;
+    const double size = std::min(testing::size_of(a), testing::size_of(b));
+    const double volume = size * size * size;
+    const double gap = check.gap / testing::gap_bound(check);
+    ++tally_.poses;
+    tally_.pairs += check.crossings;
+    ++(check.crossings > 0 ? tally_.crossing : p.volume > 0 ? tally_.contained : tally_.apart);
+    tally_.unfinished += !finished;
+    tally_.inconsistent += !check.consistent;
+    tally_.not_numbers += !(std::isfinite(p.volume_min) && std::isfinite(p.volume_max) &&
+                            p.centroid.allFinite() && p.translation_gradient.allFinite() &&
+                            p.rotation_gradient.allFinite() && std::isfinite(gap));
+    const auto whole = [](const PlacedTree& placed) {
+      return placed.tree.volume() * std::pow(placed.scale, 3);
+    };
+    tally_.disordered +=
+        !(0 <= p.volume_min && p.volume_min <= p.volume && p.volume <= p.volume_max &&
+          p.volume_min <= std::min(whole(a), whole(b)) * (1 + 1e-12));
+    tally_.open += !(gap <= 1);
+    tally_.worst_gap = std::max(tally_.worst_gap, gap);
+    tally_.wide += p.volume_max - p.volume_min > 1e-9 * p.volume && p.volume > 1e-9 * volume;
+    const Penetration q = testing::exactly(b, a, workspace_);
+    tally_.unlike +=
+        !(std::max(p.volume_min, q.volume_min) <= std::min(p.volume_max, q.volume_max));
+    if (p.status != QueryStatus::ok || !check.complete || !check.consistent || gap > 1 ||
+        std::max(p.volume_min, q.volume_min) > std::min(p.volume_max, q.volume_max))
+      show(a, b, p, q, check);
+  }
+
+  /// A solid on itself, in any place and turn of both: its own volume.
+  void look_at_known(const TestSolid& a, PlacedTree at_a) {
+    if (!one_in(4)) return;
+    const Penetration p = testing::exactly(at_a, at_a, workspace_);
+    const double truth = a.asset.view().volume();
+    if (p.volume_min <= truth * (1 + 1e-13) && truth * (1 - 1e-13) <= p.volume_max) return;
+    ++tally_.untrue;
+    show(at_a, at_a, p, p, {});
+  }
+
+  void show(const PlacedTree& a, const PlacedTree& b, const Penetration& p, const Penetration& q,
+            const testing::ExactCheck& check) {
+    const auto number = [&](const PlacedTree& placed) {
+      const auto found = std::find_if(solids_.begin(), solids_.end(), [&](const TestSolid& solid) {
+        return &solid.asset.view().header() == &placed.tree.header();
+      });
+      return static_cast<int>(found - solids_.begin());
+    };
+    std::fprintf(stderr, "solids %d, %d:", number(a), number(b));
+    for (const PlacedTree* placed : {&a, &b}) {
+      for (const double x : placed->pose.q) std::fprintf(stderr, " %.17g", x);
+      for (const double x : placed->pose.t) std::fprintf(stderr, " %.17g", x);
+      std::fprintf(stderr, " %.17g;", placed->scale);
+    }
+    std::fprintf(
+        stderr,
+        " status %d, consistent %d, crossings %u, gap %.2g, volume %.17g in %.17g … %.17g, "
+        "exchanged %.17g in %.17g … %.17g\n",
+        static_cast<int>(p.status), check.consistent, check.crossings, check.gap, p.volume,
+        p.volume_min, p.volume_max, q.volume, q.volume_min, q.volume_max);
+  }
+
+  const std::vector<TestSolid>& solids_;
+  std::mt19937_64 random_;
+  Workspace& workspace_;
+  Tally& tally_;
+};
+
+Tally ask(const std::vector<TestSolid>& solids, std::size_t poses, bool degenerate) {
+  const std::size_t first = degenerate ? 1u << 20 : 0;
+  std::atomic<std::size_t> next = 0;
+  std::vector<Tally> tallies(std::max(1u, std::thread::hardware_concurrency()));
+  std::vector<std::jthread> threads;
+  for (Tally& tally : tallies)
+    threads.emplace_back([&] {
+      Workspace workspace;
+      for (std::size_t i = next++; i < poses / kChunk; i = next++)
+        Chunk(solids, first + i, workspace, tally).run(degenerate);
+    });
+  threads.clear();
+  Tally sum;
+  for (const Tally& tally : tallies) sum += tally;
+  return sum;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  benchmark::Report report("exact_soak", argc, argv);
+  const std::vector<TestSolid> solids = make_solids();
+  bool sound = true;
+  for (const bool degenerate : {false, true}) {
+    const std::size_t poses =
+        (degenerate ? 100'000 : 1'000'000) / (report.quick() ? degenerate ? 20 : 50 : 1);
+    const auto start = std::chrono::steady_clock::now();
+    const Tally tally = ask(solids, poses, degenerate);
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const std::string name = degenerate ? "degenerate" : "random";
+    report.row("Poses", {{"poses", name},
+                         {"count", tally.poses},
+                         {"surfaces cross", tally.crossing},
+                         {"one in the other", tally.contained},
+                         {"apart", tally.apart},
+                         {"crossing pairs of triangles", tally.pairs},
+                         {"worst gap in units of its bound", tally.worst_gap},
+                         {"interval wider than 1e-9 of the volume", tally.wide},
+                         {"seconds", seconds}});
+    const auto none = [&](const std::string& what, std::uint64_t value) {
+      report.target(name + ": " + what, static_cast<double>(value), 0, true);
+      sound = sound && value == 0;
+    };
+    none("queries that did not finish", tally.unfinished);
+    none("signs that contradict each other", tally.inconsistent);
+    none("answers that are not numbers", tally.not_numbers);
+    none("values outside their bounds or their solids", tally.disordered);
+    none("surfaces that do not close within rounding", tally.open);
+    none("intervals that change when A and B are exchanged", tally.unlike);
+    if (degenerate) none("intervals that miss a known volume", tally.untrue);
+  }
+  report.remark(
+      "25 small meshes: boxes, plates, needles, balls, a torus, a gear, and random ones of integer "
+      "coordinates, some of several components and with cavities. Degenerate poses put corners on "
+      "corners and edges, by turns that keep faces parallel or not, some of them next to that by "
+      "1e-16 to 1e-3, some turned as a whole. The gap of the overlap's surface is bounded by 2e-17 "
+      "of the product of the solids' sizes for each crossing pair of triangles and a hundred "
+      "more.");
+  return report.write() != 0 || !sound ? 1 : 0;
+}
