@@ -130,6 +130,8 @@ ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info) {
   info->field_error = view.field_error();
   info->field_triangles = view.field_triangles();
   info->details = view.header().detail_count + 1;
+  info->mesh_error = view.mesh_error();
+  info->mesh_triangles = view.mesh_triangles();
   return IST_OK;
 }
 

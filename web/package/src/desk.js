@@ -10,16 +10,16 @@ export const kSeparation = 288;
 export const kPatches = 400;
 export const kMostPatches = 64;
 export const kInfo = 8592;
-export const kBounds = 8648;
-export const kMass = 8736;
-export const kCounts = 8872;
-export const kMotion = 8880;
+export const kBounds = 8664;
+export const kMass = 8752;
+export const kCounts = 8888;
+export const kMotion = 8896;
 export const kMotionBytes = 72;
-export const kImpactSettings = 9024;
-export const kImpact = 9056;
-export const kFit = 9176;
-export const kWrenches = 9224;
-export const kNumbers = 9328;
+export const kImpactSettings = 9040;
+export const kImpact = 9072;
+export const kFit = 9192;
+export const kWrenches = 9240;
+export const kNumbers = 9344;
 
 let start = 0;
 /** Where the desk stands in memory. */
@@ -77,19 +77,21 @@ export function count(value, absent, what) {
   return value;
 }
 
-const kMeasures = ['matched', 'inner'];
+const kSphereMeasures = ['matched', 'inner'];
+const kMeasures = [...kSphereMeasures, 'exact'];
 const kFieldUses = ['automatic', 'never', 'always'];
 const limit = (value, what) => (value === undefined ? 0 : number(value, what));
 
-export function measureOf(value) {
-  return choice(value, kMeasures, 'measure');
+/** Of what has spheres to show. */
+export function sphereMeasureOf(value) {
+  return choice(value, kSphereMeasures, 'measure');
 }
 
 /** Writes every setting that options have. */
 export function writeSettings(options) {
   const integers = u32();
   const at = (desk() + kSettings) / 4;
-  integers[at + 1] = measureOf(options?.measure);
+  integers[at + 1] = choice(options?.measure, kMeasures, 'measure');
   integers[at + 2] = choice(options?.field, kFieldUses, 'field');
   integers[at + 3] = count(options?.pairBudget, 0, 'pairBudget');
   integers[at + 4] = count(options?.maxVisits, 0, 'maxVisits');
