@@ -126,7 +126,7 @@ void check_settings(const QueryOptions& options) {
   };
   if (settings.measure != Measure::matched) {
     if (settings.pair_budget != 0) no_effect("--pair-budget");
-    if (settings.field == FieldUse::always || (exact && settings.field == FieldUse::never))
+    if (exact ? settings.field != FieldUse::automatic : settings.field == FieldUse::always)
       no_effect("--field");
   }
   if (exact && settings.deadline_us > 0)
