@@ -199,7 +199,8 @@ void gpu::check_batch(const GpuPairs& pairs, const GpuWorkspace::Impl& room, int
 
 void gpu::check_measure(Measure measure) {
   if (measure != Measure::matched && measure != Measure::inner)
-    throw Error("GPU: batches ask spheres, matched or inner ones: ask the exact measure on the CPU");
+    throw Error(
+        "GPU: batches ask spheres, matched or inner ones: ask the exact measure on the CPU");
 }
 
 namespace {

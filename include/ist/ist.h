@@ -112,8 +112,8 @@ typedef struct ist_tree_info {
   double field_error; /* [u] the stored surface and the solid's lie within this of each other */
   uint32_t field_triangles; /* of that surface */
   uint32_t details;         /* levels of detail of the matched spheres, ≥ 1: 0 is the finest */
-  double mesh_error;        /* [u] the mesh's surface and the solid's lie within this, rounding too */
-  uint32_t mesh_triangles;  /* of the mesh that IST_EXACT asks; 0: the asset holds none */
+  double mesh_error; /* [u] the mesh's surface and the solid's lie within this, rounding too */
+  uint32_t mesh_triangles; /* of the mesh that IST_EXACT asks; 0: the asset holds none */
   uint32_t reserved;
 } ist_tree_info_t;
 

@@ -126,11 +126,13 @@ void add_class(py::module_& module) {
       module, "Penetration",
       "Overlaps of placed solids: columns of one row a pose, without the (n,) for one pose.");
   add_column(type, "volume", &Penetrations::volume, "(n,) [u³] of the overlap.");
-  add_column(type, "volume_min", &Penetrations::volume_min,
-             "(n,) [u³] By measure='exact' a bound: the true volume is at least this. By spheres "
-             "the finished sum is at least this, with its rounding; how near that sum is to the true "
-             "volume it does not say.");
-  add_column(type, "volume_max", &Penetrations::volume_max, "(n,) [u³] and at most this, likewise.");
+  add_column(
+      type, "volume_min", &Penetrations::volume_min,
+      "(n,) [u³] By measure='exact' a bound: the true volume is at least this. By spheres "
+      "the finished sum is at least this, with its rounding; how near that sum is to the true "
+      "volume it does not say.");
+  add_column(type, "volume_max", &Penetrations::volume_max,
+             "(n,) [u³] and at most this, likewise.");
   add_column(type, "centroid", &Penetrations::centroid,
              "(n, 3) [u] of the overlap, world; zero if none.");
   add_column(type, "force", &Penetrations::force,

@@ -130,8 +130,7 @@ void check_settings(const QueryOptions& options) {
       no_effect("--field");
   }
   if (exact && settings.deadline_us > 0)
-    throw CLI::ValidationError("--deadline-us",
-                               "does not stop --measure exact; --max-visits does");
+    throw CLI::ValidationError("--deadline-us", "does not stop --measure exact; --max-visits does");
   if (!is_field_spec(options.a)) return;
   if (exact)
     throw CLI::ValidationError(
@@ -158,16 +157,18 @@ void require_surface(const std::string& path, const TreeView& tree) {
 void require_held(const std::string& path, const TreeView& tree, Measure measure) {
   if (measure != Measure::exact) {
     if (tree.sphere_count() > 0) return;
-    throw Error(fmt::format("{}: is a surface alone, without the spheres that --measure {} asks; "
-                            "ask with --measure exact, or bake it again without --surface-only",
-                            path, measure == Measure::inner ? "inner" : "matched"));
+    throw Error(
+        fmt::format("{}: is a surface alone, without the spheres that --measure {} asks; "
+                    "ask with --measure exact, or bake it again without --surface-only",
+                    path, measure == Measure::inner ? "inner" : "matched"));
   }
   if (tree.has_mesh()) return;
   const std::string twice = describe_counted_twice(tree);
   if (!twice.empty())
-    throw Error(fmt::format("{}: {}; ask with --measure matched, or bake a mesh whose parts do not "
-                            "overlap",
-                            path, twice));
+    throw Error(
+        fmt::format("{}: {}; ask with --measure matched, or bake a mesh whose parts do not "
+                    "overlap",
+                    path, twice));
   throw Error(path +
               ": holds no mesh, which --measure exact asks; bake it again with --surface all, or "
               "ask with --measure matched");

@@ -219,7 +219,8 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
 }
 
 /// The spheres that the asset's layout has, at every level of detail.
-// The bits of C++, one by one and in batches, of surfaces alone too; nothing else is asked of meshes.
+// The bits of C++, one by one and in batches, of surfaces alone too; nothing else is asked of
+// meshes.
 TEST(CApi, ExactHasTheBitsOfCpp) {
   const Asset solids[] = {bake_surface(close_mesh(testing::cube_mesh(), "cube")),
                           bake_surface(close_mesh(testing::icosphere_mesh(3), "ball"))};

@@ -157,15 +157,17 @@ TEST_F(FieldQuery, SettingsThatHaveNoEffectAreRefused) {
   refused("ball:1", {"--pair-budget", "10"}, "--pair-budget: has no effect where A is a field");
   refused("cube.ist", {"--field", "always", "--measure", "inner"}, "--field: has no effect");
   refused("cube.ist", {"--field", "some"}, "{auto,never,always}");
-  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
-            0);
+  ASSERT_EQ(
+      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
+      0);
   expect_exit(1, {"cube.ist", "bare.ist", "--pose", kAtOrigin, "--field", "always"},
               "bare.ist: holds no field");
 }
 
 /// Once, and only where the coarser one could have had a surface.
 TEST_F(FieldQuery, WarnsOfSpheresThatDoNotFit) {
-  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "100", "--surface", "none"}).exit_code,
+  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "100", "--surface", "none"})
+                .exit_code,
             0);
   const std::vector<std::string> asked = {"query", "bare.ist", "cube.ist", "--pose", kAtOrigin};
   const auto warnings = [&](std::vector<std::string> arguments,

@@ -167,7 +167,8 @@ TEST_F(QueryCommand, OnePoseIsAnsweredForAPerson) {
   EXPECT_EQ(outcome.out.find("bounds"), std::string::npos) << outcome.out;
 }
 
-// --- Exact ----------------------------------------------------------------------------------------
+// --- Exact
+// ----------------------------------------------------------------------------------------
 
 constexpr const char* kNutOnBolt = "1,0,0,0,0,0,8.5";
 constexpr double kTruth = 34.7409603139359;
@@ -241,9 +242,9 @@ TEST_F(ExactQueryCommand, ALimitLeavesBoundsThatHold) {
 }
 
 TEST_F(ExactQueryCommand, SaysWhatIsNotHeld) {
-  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"})
-                .exit_code,
-            0);
+  ASSERT_EQ(
+      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
+      0);
   expect_exit(1, {"cube.ist", "bare.ist", "--pose", "1,0,0,0,0,0,0", "--measure", "exact"},
               "bare.ist: holds no mesh, which --measure exact asks; bake it again with --surface "
               "all");

@@ -184,8 +184,8 @@ TEST_F(PenetrationBatch, ExactOfAFieldIsNotHeld) {
     EXPECT_TRUE(std::isnan(answer.volume) && answer.translation_gradient.hasNaN());
   }
   ContactPatch patches[2];
-  const ContactPatches found = contact_patches(pairs[0].a, pairs_[0].b, {.measure = Measure::exact},
-                                               scratch[0], patches);
+  const ContactPatches found =
+      contact_patches(pairs[0].a, pairs_[0].b, {.measure = Measure::exact}, scratch[0], patches);
   EXPECT_EQ(found.penetration.status, QueryStatus::not_held);
   EXPECT_EQ(found.count, 0u);
   EXPECT_EQ(overlap_lenses(pairs_[0].a, pairs_[0].b, {.measure = Measure::exact}, {}).status,
