@@ -84,10 +84,12 @@ std::string answer_text(const Answer& answer, Measure measure) {
   const auto line = [&](const char* name, const std::string& value, const char* meaning) {
     text += fmt::format("  {:<10} {:<{}} {}\n", name, value, exact ? 44 : 36, meaning);
   };
+  const bool known = !std::isnan(p.volume);
   if (exact) {
-    line("volume", fmt::format("{} u³", p.volume),
+    line("volume", known ? fmt::format("{} u³", p.volume) : "unknown",
          p.status == QueryStatus::ok ? "of the true overlap"
-                                     : "by matched spheres: a limit stopped the exact query");
+         : known ? "of the overlap, by matched spheres: a limit stopped the exact query"
+                 : "a limit stopped the exact query, and an asset has no spheres");
     line("bounds", fmt::format("{} … {} u³", p.volume_min, p.volume_max),
          "the true volume lies in here");
   } else {
@@ -97,10 +99,12 @@ std::string answer_text(const Answer& answer, Measure measure) {
     line("sum in", fmt::format("{:.6g} … {:.6g} u³", p.volume_min, p.volume_max),
          "rounding of that sum; it says nothing of the true volume");
   }
-  line("centroid", short_vector(p.centroid) + " u", "of the overlap, in A's frame");
-  line("force/k", short_vector(-p.translation_gradient) + " u²", "on B: −dV/d(translation of B)");
-  line("torque/k", short_vector(-p.rotation_gradient) + " u³",
-       "on B about its origin: −dV/d(rotation of B)");
+  if (known) {
+    line("centroid", short_vector(p.centroid) + " u", "of the overlap, in A's frame");
+    line("force/k", short_vector(-p.translation_gradient) + " u²", "on B: −dV/d(translation of B)");
+    line("torque/k", short_vector(-p.rotation_gradient) + " u³",
+         "on B about its origin: −dV/d(rotation of B)");
+  }
   if (answer.has_distance()) {
     line("distance", fmt::format("{:.5g} u", s.distance), "between the inner spheres");
     line("interval", fmt::format("{:.5g} … {:.5g} u", s.distance_min, s.distance_max),

@@ -239,6 +239,10 @@ TEST_F(ExactQueryCommand, ALimitLeavesBoundsThatHold) {
   EXPECT_TRUE(std::isnan(r[volume]));  // no spheres to answer instead
   EXPECT_EQ(r[volume_min], 0);
   EXPECT_GT(r[volume_max], kTruth);
+  const Outcome text = ist({"query", "bolt.ist", "nut.ist", "--pose", kNutOnBolt, "--measure",
+                            "exact", "--max-visits", "3"});
+  EXPECT_NE(text.out.find("volume     unknown"), std::string::npos) << text.out;
+  EXPECT_EQ(text.out.find("nan"), std::string::npos) << text.out;
 }
 
 TEST_F(ExactQueryCommand, SaysWhatIsNotHeld) {
