@@ -6,6 +6,7 @@
 #include <string>
 
 #include <ist/bake.h>
+#include <ist/error.h>
 #include <ist/mass_properties.h>
 
 #include "app/asset_summary.h"
