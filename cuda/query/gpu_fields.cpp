@@ -61,6 +61,7 @@ void penetration_batch(const GpuAssets& assets, const GpuFields& fields, const G
   const GpuAssets::Impl& trees = assets.impl();
   const GpuFields::Impl& solids = fields.impl();
   const GpuWorkspace::Impl& room = workspace.impl();
+  gpu::check_measure(measure);
   gpu::check_batch(pairs, room, trees.device);
   if (solids.device != trees.device)
     throw Error("GPU: the assets are on device " + std::to_string(trees.device) +

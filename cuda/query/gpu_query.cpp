@@ -197,6 +197,12 @@ void gpu::check_batch(const GpuPairs& pairs, const GpuWorkspace::Impl& room, int
                 std::to_string(room.device));
 }
 
+void gpu::check_measure(Measure measure) {
+  if (measure != Measure::matched && measure != Measure::inner)
+    throw Error(
+        "GPU: batches ask spheres, matched or inner ones: ask the exact measure on the CPU");
+}
+
 namespace {
 
 void set_pairs(const GpuAssets::Impl& assets, const GpuPairs& pairs, gpu::BatchArrays& batch) {
@@ -211,6 +217,7 @@ void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs,
                        const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
                        const GpuPenetrations& answers, CUstream_st* stream) {
   const GpuWorkspace::Impl& room = workspace.impl();
+  gpu::check_measure(settings.measure);
   gpu::check_batch(pairs, room, assets.device());
   if (pairs.count == 0) return;
   gpu::BatchArrays batch = room.arrays;
@@ -240,6 +247,7 @@ void contact_patches_batch(const GpuAssets& assets, const GpuPairs& pairs, Measu
                            GpuWorkspace& workspace, const GpuPenetrations& answers,
                            const GpuContactPatches& patches, CUstream_st* stream) {
   const GpuWorkspace::Impl& room = workspace.impl();
+  gpu::check_measure(measure);
   gpu::check_batch(pairs, room, assets.device());
   if (patches.most > kMostGpuPatches)
     throw Error("GPU: " + std::to_string(patches.most) + " patches a pair; at most " +

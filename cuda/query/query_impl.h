@@ -45,5 +45,8 @@ namespace gpu {
 /// Throws where a batch does not fit the workspace, or stands on another device than its assets.
 void check_batch(const GpuPairs& pairs, const GpuWorkspace::Impl& room, int device);
 
+/// Throws for Measure::exact, which batches do not know.
+void check_measure(Measure measure);
+
 }  // namespace gpu
 }  // namespace ist

@@ -37,7 +37,9 @@ extern "C" {
 typedef int32_t ist_status_t;
 enum {
   IST_OK = 0,
-  IST_BUDGET_EXHAUSTED = 1, /* a limit or the workspace's capacity: bounds still hold */
+  /* A limit or the workspace's capacity stopped it: volume_min and volume_max hold what they hold
+   * of a finished answer. */
+  IST_BUDGET_EXHAUSTED = 1,
   /* A pose with NaN or Inf or no unit quaternion, a scale < 0, sizes or distances more than 1e60 :
    * 1 apart, a field's number or an enum out of range. */
   IST_INVALID_INPUT = -1,
@@ -47,7 +49,8 @@ enum {
   IST_NO_HANDLE = -5,     /* empty, released, or never made */
   IST_NO_MEMORY = -6,
   IST_CANNOT_READ = -7, /* the file; errno may say why */
-  /* An asset holds no spheres, or not what the measure asks: all numbers of an answer are NaN. */
+  /* A solid does not hold what the measure asks: IST_EXACT asks for the meshes of both (a field has
+   * none), the others for spheres. All numbers of the answer are NaN. */
   IST_NOT_HELD = -15,
   IST_NO_DURATION = -14, /* ist_impact_settings_t::duration is 0: no time is asked about */
   /* Bytes that are no asset. */
@@ -189,8 +192,16 @@ ist_status_t ist_tree_get_bounds(const ist_tree_t* tree, ist_bounds_t* bounds);
 /* --- What a tree holds, for pictures (asset_layout.h) ------------------------------------------
  */
 
+/* Measure: what stands for the solid. */
 typedef int32_t ist_measure_t;
-enum { IST_MATCHED = 0, IST_INNER = 1 };
+enum {
+  IST_MATCHED = 0, /* spheres whose volumes sum to the solid's: the accurate ones */
+  IST_INNER = 1,   /* spheres inside the solid: a certified lower bound of the true volume */
+  /* The two meshes: the true volume and its gradients. For penetrations and contact patches of two
+   * trees that hold their mesh (ist_tree_info_t::mesh_triangles); what asks for balls or lenses
+   * answers IST_INVALID_INPUT. */
+  IST_EXACT = 2
+};
 
 typedef struct ist_ball {
   double centre[3]; /* [u] in the asset's own frame */
@@ -349,7 +360,8 @@ ist_status_t ist_workspace_release(ist_workspace_t* workspace);
 typedef int32_t ist_field_use_t;
 enum { IST_FIELD_AUTOMATIC = 0, IST_FIELD_NEVER = 1, IST_FIELD_ALWAYS = 2 };
 
-/* PenetrationSettings */
+/* PenetrationSettings. IST_EXACT heeds max_visits alone; where that stops it, the matched spheres
+ * answer (NaN where there are none), with bounds that hold the true volume. */
 typedef struct ist_penetration_settings {
   uint32_t size;
   ist_measure_t measure;
@@ -385,12 +397,14 @@ typedef struct ist_separation_settings {
 typedef struct ist_penetration {
   uint32_t size;
   ist_status_t status;
-  double volume;                  /* [u³] */
-  double volume_min, volume_max;  /* [u³] bounds on that sum */
+  double volume; /* [u³] */
+  /* [u³] By IST_EXACT bounds: the true volume lies within. By spheres the finished sum lies within,
+   * with its rounding; how near it is to the true volume they do not say. */
+  double volume_min, volume_max;
   double centroid[3];             /* [u] of the overlap, world */
   double translation_gradient[3]; /* [u²] dV/d(translation of B), world */
   double rotation_gradient[3];    /* [u³/rad] dV/d(rotation vector of B about B's origin), world */
-  uint32_t node_visits, sphere_pairs;
+  uint32_t node_visits, sphere_pairs; /* by IST_EXACT: triangles that cross */
 } ist_penetration_t;
 
 /* Separation: all zero once inner spheres overlap. */

@@ -65,7 +65,7 @@ Penetration penetrate(const PlacedField& a, const PlacedTree& b, const SphereTre
 
 Penetration penetration(const PlacedField& a, const PlacedTree& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept {
-  if (lack_spheres(a, b)) return not_held<Penetration>();
+  if (settings.measure == Measure::exact || lack_spheres(a, b)) return not_held<Penetration>();
   const SphereTree tree = sphere_tree(b.tree, settings.measure);
   return penetrate(a, b, tree, limits_of(settings), workspace, nullptr);
 }
@@ -110,7 +110,7 @@ PenetrationAndSeparation query(const PlacedField& a, const PlacedTree& b,
 ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept {
-  if (lack_spheres(a, b)) return not_held<ContactPatches>();
+  if (settings.measure == Measure::exact || lack_spheres(a, b)) return not_held<ContactPatches>();
   ContactPatches result;
   if (workspace.impl() == nullptr) {
     result.penetration = refused<Penetration>();

@@ -16,10 +16,11 @@ using Eigen::Vector3d;
 
 Vector3d vector(const double (&v)[3]) noexcept { return {v[0], v[1], v[2]}; }
 
-/// The tree that settings name; none if there is no such level of detail.
+/// The tree that settings name; none if there is no such level of detail or measure.
 std::optional<SphereTree> tree_of(const TreeView& view, Measure measure,
                                   std::uint32_t detail) noexcept {
   const AssetHeader& asset = view.header();
+  if (measure == Measure::exact) return std::nullopt;
   if (measure == Measure::inner) {
     if (detail != 0) return std::nullopt;
     return SphereTree(asset, asset.inner_tree);

@@ -78,7 +78,7 @@ Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
 void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, const PlacedTree& b,
                         const ContactSettings& settings) noexcept {
   if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0 ||
-      settings.measure == Measure::inner)
+      settings.measure != Measure::matched)
     return;
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose) return;

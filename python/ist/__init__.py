@@ -16,9 +16,9 @@ class QueryStatus(enum.IntEnum):
     """Codes of `status` of a Penetration or a Separation."""
 
     ok = 0
-    budget_exhausted = 1  # a limit stopped it: bounds still hold
+    budget_exhausted = 1  # a limit stopped it: volume_min, volume_max hold the finished answer's
     invalid_input = 2  # the row is all zero
-    not_held = 3  # an asset does not hold what is asked: the row is all NaN
+    not_held = 3  # a solid does not hold what is asked: the row is all NaN; one pose raises Error
 
 
 class Overlapping(enum.IntEnum):

@@ -18,7 +18,8 @@ __version__: str
 
 _Path = str | os.PathLike[str]
 _Column = Any  # NDArray of one row a pose; a NumPy number for one pose
-_Measure = Literal["matched", "inner"]
+_SphereMeasure = Literal["matched", "inner"]
+_Measure = Literal["matched", "inner", "exact"]
 _FieldUse = Literal["automatic", "never", "always"]
 _Grid = Literal["banded", "uniform", "explicit", "implicit", "hybrid"]
 _Device = Literal["auto", "cpu", "cuda"]
@@ -193,7 +194,7 @@ class Asset:
     def save(self, path: _Path) -> None: ...
     def to_bytes(self) -> bytes: ...
     def info(self) -> dict[str, Any]: ...
-    def spheres(self, which: _Measure = "matched") -> NDArray[np.float64]: ...  # (n, 4) [u]
+    def spheres(self, which: _SphereMeasure = "matched") -> NDArray[np.float64]: ...  # (n, 4) [u]
     def mass_properties(self, pose: ArrayLike | None = None, scale: float = 1.0) -> MassProperties: ...
     def bounds(self, pose: ArrayLike | None = None, scale: float = 1.0) -> Bounds: ...
     @property
@@ -279,9 +280,9 @@ class Penetration:
     @property
     def volume(self) -> _Column: ...  # (n,) [u³]
     @property
-    def volume_min(self) -> _Column: ...  # (n,) [u³]
+    def volume_min(self) -> _Column: ...  # (n,) [u³] exact: the true volume is at least this
     @property
-    def volume_max(self) -> _Column: ...  # (n,) [u³]
+    def volume_max(self) -> _Column: ...  # (n,) [u³] and at most this
     @property
     def centroid(self) -> NDArray[np.float64]: ...  # (n, 3) [u]
     @property

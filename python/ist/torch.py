@@ -29,11 +29,13 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: torch.Tensor, *, p
         queries, 0.05 % of the scale to either side, exact to some 1e-4, and takes three times as
         long.
     settings: measure, field, pair_budget, min_radius, threads, … of ist.penetration. Limits that
-        stop a query leave its gradient without the part that was guessed. On a GPU there are measure
-        and pair_budget, and volumes of two Assets are by lenses: those of field="never" on the CPU.
+        stop a query leave its gradient without the part that was guessed. By measure="exact" volumes
+        and gradients are the true ones. On a GPU there are measure ("matched", "inner") and
+        pair_budget, and volumes of two Assets are by lenses: those of field="never" on the CPU.
 
     Returns a tensor (n,) or (w, n) of the dtype and the device of `poses`. Pairs of an invalid pose
-    or scale are NaN, and so are their gradients; they spoil no others. Differentiable once.
+    or scale are NaN, and so are their gradients; they spoil no others. So are pairs of a solid that
+    does not hold what the measure asks. Differentiable once.
 
     The last eight lists of solids and pairs that were asked about on a GPU stay there, Fields as they
     were when the list came first.

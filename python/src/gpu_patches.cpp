@@ -54,7 +54,7 @@ DeviceAnswers<PatchAnswers> patches_of(DeviceAssets& assets, const py::object& a
                                        const py::object& scale_b, std::uint32_t max_patches,
                                        const std::string& measure, const py::object& wanted,
                                        const py::object& out, const py::object& stream) {
-  const Measure which = named(measure, "measure", kMeasures);
+  const Measure which = named(measure, "measure", kGpuMeasures);
   if (max_patches < 1 || max_patches > kMostGpuPatches)
     throw py::value_error("max_patches: " + std::to_string(max_patches) + "; wanted 1 to " +
                           std::to_string(kMostGpuPatches));

@@ -34,7 +34,7 @@ DeviceAnswers<GpuPenetrations> penetrations(DeviceAssets& assets, const py::obje
                                             const std::string& measure, std::uint32_t pair_budget,
                                             const py::object& wanted, const py::object& out,
                                             const py::object& stream) {
-  const Measure which = named(measure, "measure", kMeasures);
+  const Measure which = named(measure, "measure", kGpuMeasures);
   const DeviceFields* const solids = fields.get();
   return ask<GpuPenetrations>(
       assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, std::move(fields)}, {}, wanted,
@@ -54,7 +54,8 @@ assets: Assets. asset_a, asset_b: (n,) uint32 or int32 numbers of them, or one n
 pose_a, pose_b: (n, 7) float64: qw, qx, qy, qz, tx [u], ty, tz; None: at the origin, unturned.
 scale_a, scale_b: (n,) float64 > 0; None: 1.
 fields: Fields; asset_a are then numbers of those, and their frames are placed by pose_a, scale_a.
-measure: 'matched' (the accurate one) or 'inner' (certified lower bound of the true volume).
+measure: 'matched' (the accurate one) or 'inner' (certified lower bound of the true volume). 'exact'
+    is for the CPU: ist.penetration.
 pair_budget: count of sphere pairs to spend on each pair of assets, as in ist.penetration; matched
     measure only; 0: no limit. With fields it has no effect.
 wanted: names of answers; None: all but node_visits and sphere_pairs.

@@ -70,10 +70,11 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
     answers->write(i, row, found);
     if (!scale_gradients) return;
     const ScaleGradient gradient =
-        found.volume > 0 ? scale_gradient(row, found, settings, workspace) : ScaleGradient();
+        found.volume != 0 ? scale_gradient(row, found, settings, workspace) : ScaleGradient();
     *answers->scale_gradient.row(i) = gradient.b;
     *answers->scale_gradient_a.row(i) = gradient.a;
   });
+  refuse_not_held(rows, answers->status, kNotHeld, settings.measure == Measure::exact);
   return answers;
 }
 
@@ -105,14 +106,17 @@ pairs: (n, 2) numbers of solids; in each the second is an Asset. Answers have sh
 
 constexpr const char* kPenetrationDoc = R"(
 scale_gradients: fill scale_gradient and scale_gradient_a, at three times the cost.
-measure: 'matched' (the accurate one) or 'inner' (certified lower bound of the true volume).
-field: 'automatic', 'never' or 'always': whether the surface in an asset is used.
+measure: 'matched' (the accurate spheres), 'inner' (certified lower bound of the true volume) or
+    'exact' (the true volume and its gradients: of two Assets that hold their mesh, which bake()
+    keeps by default; it heeds max_visits alone).
+field: 'automatic', 'never' or 'always': whether the surface in an asset is used. Not by 'exact'.
 pair_budget, max_visits, deadline_us [µs], relative_error, min_radius [u]: what it may cost; 0: no
     limit. See <ist/query.h>.
 threads: 0: all cores. The answers are the same bits for any number. The GIL is released.
 
 Invalid rows (NaN, a quaternion off unit length by more than 1e-3, a scale ≤ 0) are all zero, with
-the status invalid_input; they spoil no others.
+the status invalid_input; they spoil no others. Rows of a solid that does not hold what the measure
+asks are NaN, with the status not_held; for one pose ist.Error is raised instead.
 Ctrl-C raises KeyboardInterrupt.
 
 Returns a Penetration: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
@@ -122,9 +126,13 @@ void add_class(py::module_& module) {
       module, "Penetration",
       "Overlaps of placed solids: columns of one row a pose, without the (n,) for one pose.");
   add_column(type, "volume", &Penetrations::volume, "(n,) [u³] of the overlap.");
-  add_column(type, "volume_min", &Penetrations::volume_min,
-             "(n,) [u³] lower bound on that sum, rounding included; not on the true overlap.");
-  add_column(type, "volume_max", &Penetrations::volume_max, "(n,) [u³] upper bound, likewise.");
+  add_column(
+      type, "volume_min", &Penetrations::volume_min,
+      "(n,) [u³] By measure='exact' a bound: the true volume is at least this. By spheres "
+      "the finished sum is at least this, with its rounding; how near that sum is to the true "
+      "volume it does not say.");
+  add_column(type, "volume_max", &Penetrations::volume_max,
+             "(n,) [u³] and at most this, likewise.");
   add_column(type, "centroid", &Penetrations::centroid,
              "(n, 3) [u] of the overlap, world; zero if none.");
   add_column(type, "force", &Penetrations::force,
@@ -143,7 +151,8 @@ void add_class(py::module_& module) {
   add_column(type, "status", &Penetrations::status, "(n,) uint32, a QueryStatus.");
   add_column(type, "node_visits", &Penetrations::node_visits, "(n,) uint32, node pairs opened.");
   add_column(type, "sphere_pairs", &Penetrations::sphere_pairs,
-             "(n,) uint32, lenses summed and spheres put together with a surface.");
+             "(n,) uint32, lenses summed and spheres put together with a surface; by "
+             "measure='exact' triangles that cross.");
 }
 
 }  // namespace

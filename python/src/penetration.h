@@ -10,10 +10,15 @@
 
 namespace ist::python {
 
-inline constexpr std::pair<const char*, Measure> kMeasures[] = {{"matched", Measure::matched},
-                                                                {"inner", Measure::inner}};
+inline constexpr std::pair<const char*, Measure> kMeasures[] = {
+    {"matched", Measure::matched}, {"inner", Measure::inner}, {"exact", Measure::exact}};
+/// What a GPU's batches answer.
+inline constexpr std::pair<const char*, Measure> kGpuMeasures[] = {{"matched", Measure::matched},
+                                                                   {"inner", Measure::inner}};
 inline constexpr std::pair<const char*, FieldUse> kFieldUses[] = {
     {"automatic", FieldUse::automatic}, {"never", FieldUse::never}, {"always", FieldUse::always}};
+
+inline constexpr auto kNotHeld = static_cast<std::uint32_t>(QueryStatus::not_held);
 
 using Vector = Eigen::Map<Eigen::Vector3d>;  ///< a row of a column
 

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include <ist/asset_layout.h>
+#include <ist/error.h>
 
 #include "query/base/batch.h"
 #include "stage/thread_arena.h"
@@ -218,6 +219,22 @@ Row Rows::at(std::size_t i) const {
   row.b = {std::get<TreeView>(solids_[second]), pose_from(pose_b_.at(scene + second)),
            *scale_b_.at(scene + second)};
   return row;
+}
+
+void refuse_not_held(const Rows& rows, const Column<std::uint32_t>& status, std::uint32_t not_held,
+                     bool exact) {
+  if (!rows.shape().empty() || *status.row(0) != not_held) return;
+  const Row row = rows.at(0);
+  const TreeView* const a = std::get_if<TreeView>(row.a);
+  if (exact && a == nullptr)
+    throw Error("a: a Field has no mesh, which measure='exact' asks of both solids");
+  if (exact)
+    throw Error(std::string(a->has_mesh() ? "b" : "a") +
+                ": holds no mesh, which measure='exact' asks of both solids; bake it with "
+                "surface='all'");
+  throw Error(std::string(row.b.tree.sphere_count() == 0 ? "b" : "a") +
+              ": is a surface alone and holds no spheres; measure='exact' of penetration() needs "
+              "none, and bake() makes them");
 }
 
 void for_each_row(const Rows& rows, unsigned threads,

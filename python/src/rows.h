@@ -87,6 +87,11 @@ class Rows {
   void sort_by_asset();
 };
 
+/// Nobody looks at the status of one pose: throws Error, with the way out, where that is all there
+/// is and a solid does not hold what was asked. `exact`: by Measure::exact.
+void refuse_not_held(const Rows& rows, const Column<std::uint32_t>& status, std::uint32_t not_held,
+                     bool exact = false);
+
 /// answer(i, workspace) for each row, on `threads` threads (0: all cores), the GIL released.
 /// Ctrl-C ends it: KeyboardInterrupt.
 void for_each_row(const Rows& rows, unsigned threads,

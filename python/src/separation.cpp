@@ -64,6 +64,7 @@ std::unique_ptr<Separations> separations(const Rows& rows, const SeparationSetti
       return separation(a, b, settings, workspace);
     }));
   });
+  refuse_not_held(rows, answers->status, kNotHeld);
   return answers;
 }
 
@@ -81,6 +82,7 @@ std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
     *answers->count.row(i) = static_cast<std::uint32_t>(answer.count);
     answers->write(i, std::span(found).first(answer.count));
   });
+  refuse_not_held(rows, answers->penetration->status, kNotHeld, settings.measure == Measure::exact);
   return answers;
 }
 

@@ -81,6 +81,7 @@ void add_time_of_impact(py::module_& module) {
             return time_of_impact(one, other, motions, settings, workspace);
           }));
         });
+        refuse_not_held(from, answers->status, static_cast<std::uint32_t>(ImpactStatus::not_held));
         return answers;
       },
       py::arg("a"), py::arg("b"), py::arg("poses"), py::arg("poses_to"), py::kw_only(),

@@ -12,6 +12,7 @@
 #include <ist/error.h>
 #include <ist/pair_fit.h>
 
+#include "app/asset_summary.h"
 #include "app/commands.h"
 #include "app/field_spec.h"
 #include "app/file_options.h"
@@ -117,14 +118,24 @@ std::vector<Answer> answer(const PlacedA& a, const TreeView& b, const std::vecto
 /// Throws CLI::ValidationError where settings exclude each other.
 void check_settings(const QueryOptions& options) {
   const PenetrationSettings& settings = options.settings.penetration;
-  const bool inner = settings.measure == Measure::inner;
-  if (inner && settings.pair_budget != 0)
-    throw CLI::ValidationError("--pair-budget",
-                               "has no effect with --measure inner, only with matched");
-  if (inner && settings.field == FieldUse::always)
-    throw CLI::ValidationError("--field",
-                               "always has no effect with --measure inner, only with matched");
+  const bool exact = settings.measure == Measure::exact;
+  const auto no_effect = [&](const char* option) {
+    throw CLI::ValidationError(option, fmt::format("has no effect with --measure {}, only with "
+                                                   "matched",
+                                                   exact ? "exact" : "inner"));
+  };
+  if (settings.measure != Measure::matched) {
+    if (settings.pair_budget != 0) no_effect("--pair-budget");
+    if (exact ? settings.field != FieldUse::automatic : settings.field == FieldUse::always)
+      no_effect("--field");
+  }
+  if (exact && settings.deadline_us > 0)
+    throw CLI::ValidationError("--deadline-us", "does not stop --measure exact; --max-visits does");
   if (!is_field_spec(options.a)) return;
+  if (exact)
+    throw CLI::ValidationError(
+        "--measure", "exact asks for two meshes, and A is a field: " + options.a +
+                         "; leave the option out, or name an .ist file of the same shape");
   if (settings.field == FieldUse::never)
     throw CLI::ValidationError(
         "--field",
@@ -142,11 +153,32 @@ void require_surface(const std::string& path, const TreeView& tree) {
                 "or ask with --field auto");
 }
 
+/// Throws Error if an asset does not hold what the measure asks.
+void require_held(const std::string& path, const TreeView& tree, Measure measure) {
+  if (measure != Measure::exact) {
+    if (tree.sphere_count() > 0) return;
+    throw Error(
+        fmt::format("{}: is a surface alone, without the spheres that --measure {} asks; "
+                    "ask with --measure exact, or bake it again without --surface-only",
+                    path, measure == Measure::inner ? "inner" : "matched"));
+  }
+  if (tree.has_mesh()) return;
+  const std::string twice = describe_counted_twice(tree);
+  if (!twice.empty())
+    throw Error(
+        fmt::format("{}: {}; ask with --measure matched, or bake a mesh whose parts do not "
+                    "overlap",
+                    path, twice));
+  throw Error(path +
+              ": holds no mesh, which --measure exact asks; bake it again with --surface all, or "
+              "ask with --measure matched");
+}
+
 /// Says once on stderr where spheres alone are asked for what they cannot tell.
 void warn_of_misfit(const TreeView& a, const TreeView& b, const std::vector<PoseRow>& rows,
                     const QueryOptions& options) {
   const PenetrationSettings& settings = options.settings.penetration;
-  if (settings.measure == Measure::inner || settings.field != FieldUse::automatic) return;
+  if (settings.measure != Measure::matched || settings.field != FieldUse::automatic) return;
   for (const PoseRow& row : rows) {
     const PairFit fit = pair_fit({a, {}, 1}, {b, {}, row.scale_b});
     if (fit.fits()) continue;
@@ -160,12 +192,16 @@ void warn_of_misfit(const TreeView& a, const TreeView& b, const std::vector<Pose
 }
 
 std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions& options) {
+  const Measure measure = options.settings.penetration.measure;
   if (is_field_spec(options.a)) {
     const Asset b = Asset::load(options.asset_b);
+    require_held(options.asset_b, b.view(), measure);
     return answer(PlacedField{parse_field(options.a), {}, 1}, b.view(), rows, options);
   }
   const Asset a = Asset::load(options.a);
   const Asset b = Asset::load(options.asset_b);
+  require_held(options.a, a.view(), measure);
+  require_held(options.asset_b, b.view(), measure);
   if (options.settings.penetration.field == FieldUse::always) {
     require_surface(options.a, a.view());
     require_surface(options.asset_b, b.view());
@@ -217,11 +253,13 @@ void add_query(CLI::App& app) {
       ->add_option_function<std::string>(
           "--measure",
           [options](const std::string& name) {
-            options->settings.penetration.measure =
-                name == "inner" ? Measure::inner : Measure::matched;
+            options->settings.penetration.measure = name == "exact"   ? Measure::exact
+                                                    : name == "inner" ? Measure::inner
+                                                                      : Measure::matched;
           },
-          "Which spheres stand for the solid")
-      ->check(CLI::IsMember({"matched", "inner"}))
+          "matched: spheres of the solid's volume, the accurate ones; inner: spheres inside it, a "
+          "lower bound; exact: the meshes that both assets hold, the true volume with its bounds")
+      ->check(CLI::IsMember({"matched", "inner", "exact"}))
       ->default_str("matched");
   command
       ->add_option_function<std::string>(
@@ -253,6 +291,7 @@ void add_query(CLI::App& app) {
       "pushes B by −k·dVdt and turns it by −k·dVdr about its origin.\n"
       "A field stands in its own frame; ./box:1,1,1 names a file of that name.\n"
       "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9\n"
+      "         ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9 --measure exact\n"
       "         ist query plane:0,0,1,0 bolt.ist --pose 1,0,0,0,0,0,-0.5");
   command->callback([options, scale] {
     options->scale_b_given = scale->count() > 0;

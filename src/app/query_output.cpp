@@ -79,28 +79,41 @@ std::string answer_text(const Answer& answer, Measure measure) {
   const Separation& s = answer.result.separation;
   if (answer.status() == QueryStatus::invalid_input)
     return fmt::format("  no answer: {}: {}\n", name_of(answer.status()), pose_fault(answer.row));
-  if (p.status == QueryStatus::not_held)
-    return fmt::format("  no answer: {}: an asset holds not what the measure asks; see ist info\n",
-                       name_of(p.status));
+  const bool exact = measure == Measure::exact;
   std::string text;
   const auto line = [&](const char* name, const std::string& value, const char* meaning) {
-    text += fmt::format("  {:<10} {:<36} {}\n", name, value, meaning);
+    text += fmt::format("  {:<10} {:<{}} {}\n", name, value, exact ? 44 : 36, meaning);
   };
-  line("volume", fmt::format("{:.6g} u³", p.volume),
-       measure == Measure::matched ? "of the overlap, by matched spheres"
-                                   : "of the overlap, by inner spheres: a lower bound");
-  line("bounds", fmt::format("{:.6g} … {:.6g} u³", p.volume_min, p.volume_max),
-       "on that sum, rounding included");
-  line("centroid", short_vector(p.centroid) + " u", "of the overlap, in A's frame");
-  line("force/k", short_vector(-p.translation_gradient) + " u²", "on B: −dV/d(translation of B)");
-  line("torque/k", short_vector(-p.rotation_gradient) + " u³",
-       "on B about its origin: −dV/d(rotation of B)");
-  line("distance", fmt::format("{:.5g} u", s.distance), "between the inner spheres");
-  line("interval", fmt::format("{:.5g} … {:.5g} u", s.distance_min, s.distance_max),
-       "the solids' distance lies in here, certified");
+  const bool known = !std::isnan(p.volume);
+  if (exact) {
+    line("volume", known ? fmt::format("{} u³", p.volume) : "unknown",
+         p.status == QueryStatus::ok ? "of the true overlap"
+         : known ? "of the overlap, by matched spheres: a limit stopped the exact query"
+                 : "a limit stopped the exact query, and an asset has no spheres");
+    line("bounds", fmt::format("{} … {} u³", p.volume_min, p.volume_max),
+         "the true volume lies in here");
+  } else {
+    line("volume", fmt::format("{:.6g} u³", p.volume),
+         measure == Measure::matched ? "of the overlap, by matched spheres"
+                                     : "of the overlap, by inner spheres: a lower bound");
+    line("sum in", fmt::format("{:.6g} … {:.6g} u³", p.volume_min, p.volume_max),
+         "rounding of that sum; it says nothing of the true volume");
+  }
+  if (known) {
+    line("centroid", short_vector(p.centroid) + " u", "of the overlap, in A's frame");
+    line("force/k", short_vector(-p.translation_gradient) + " u²", "on B: −dV/d(translation of B)");
+    line("torque/k", short_vector(-p.rotation_gradient) + " u³",
+         "on B about its origin: −dV/d(rotation of B)");
+  }
+  if (answer.has_distance()) {
+    line("distance", fmt::format("{:.5g} u", s.distance), "between the inner spheres");
+    line("interval", fmt::format("{:.5g} … {:.5g} u", s.distance_min, s.distance_max),
+         "the solids' distance lies in here, certified");
+  }
   line("query", fmt::format("{:.2f} µs", answer.time_us),
-       fmt::format("{}, {} node pairs, {} sphere pairs", name_of(answer.status()),
-                   grouped(answer.node_visits()), grouped(answer.sphere_pairs()))
+       fmt::format("{}, {} node pairs, {} {} pairs", name_of(answer.status()),
+                   grouped(answer.node_visits()), grouped(answer.sphere_pairs()),
+                   exact ? "triangle" : "sphere")
            .c_str());
   return text;
 }

@@ -14,8 +14,11 @@ struct Answer {
   PenetrationAndSeparation result;
   double time_us = 0;  ///< [µs] wall time of this one query
 
-  /// Of both halves the one that says most.
+  /// Surfaces alone have no spheres to be apart.
+  bool has_distance() const { return result.separation.status != QueryStatus::not_held; }
+  /// Of the halves that there are the one that says most.
   QueryStatus status() const {
+    if (!has_distance()) return result.penetration.status;
     return std::max(result.penetration.status, result.separation.status);
   }
   std::uint64_t node_visits() const;

@@ -252,6 +252,54 @@ TEST(CApi, SurfaceAlone) {
 }
 
 /// The spheres that the asset's layout has, at every level of detail.
+// The bits of C++, one by one and in batches, of surfaces alone too; nothing else is asked of
+// meshes.
+TEST(CApi, ExactHasTheBitsOfCpp) {
+  const Asset solids[] = {bake_surface(close_mesh(testing::cube_mesh(), "cube")),
+                          bake_surface(close_mesh(testing::icosphere_mesh(3), "ball"))};
+  const ist_tree_t trees[] = {viewed(solids[0]), viewed(solids[1])};
+  Workspace workspace;
+  ist_workspace_t scratch = {};
+  ASSERT_EQ(ist_workspace_make(0, nullptr, &scratch), IST_OK);
+  auto settings = sized<ist_penetration_settings_t>();
+  settings.measure = IST_EXACT;
+  std::vector<ist_placed_tree_t> a, b;
+  std::vector<Penetration> expected;
+  for (int i = 0; i < 40; ++i) {
+    const PlacedTree x{solids[0].view(), {}, 1};
+    PlacedTree y{solids[i % 2].view(), {}, i % 3 == 0 ? 0.5 : 1};
+    for (int k = 0; k < 3; ++k) y.pose.t[k] = 0.07 * ((i * (k + 3)) % 17 - 8);
+    a.push_back(placed_in_c(trees[0], x));
+    b.push_back(placed_in_c(trees[i % 2], y));
+    expected.push_back(penetration(x, y, {.measure = Measure::exact}, workspace));
+    auto answer = sized<ist_penetration_t>();
+    EXPECT_EQ(ist_penetration(&a.back(), &b.back(), &settings, &scratch, &answer), IST_OK);
+    expect_same(answer, expected.back());
+  }
+  std::vector<ist_pair_t> pairs;
+  for (std::size_t i = 0; i < a.size(); ++i) pairs.push_back({&a[i], &b[i]});
+  std::vector<ist_penetration_t> answers(pairs.size());
+  ASSERT_EQ(ist_penetration_batch(pairs.data(), pairs.size(), &settings, &scratch, 1,
+                                  answers.data(), sizeof answers[0], nullptr),
+            IST_OK);
+  for (std::size_t i = 0; i < answers.size(); ++i) expect_same(answers[i], expected[i]);
+
+  auto info = sized<ist_tree_info_t>();
+  EXPECT_EQ(ist_tree_get_info(&trees[0], &info), IST_OK);
+  EXPECT_EQ(info.mesh_triangles, 12u);
+  EXPECT_EQ(info.spheres, 0u);
+  auto lenses = sized<ist_lenses_t>();
+  lenses.lens_size = sizeof(ist_lens_t);
+  auto of = sized<ist_lens_settings_t>();
+  of.measure = IST_EXACT;
+  EXPECT_EQ(ist_overlap_lenses(&a[0], &b[0], &of, &lenses), IST_INVALID_INPUT);
+  settings.measure = IST_MATCHED;
+  auto answer = sized<ist_penetration_t>();
+  EXPECT_EQ(ist_penetration(&a[0], &b[0], &settings, &scratch, &answer), IST_NOT_HELD);
+  EXPECT_TRUE(std::isnan(answer.volume));
+  EXPECT_EQ(ist_workspace_release(&scratch), IST_OK);
+}
+
 TEST(CApi, Balls) {
   const Asset asset = bake(close_mesh(testing::cube_mesh(), "cube"), {.max_spheres = 2000});
   const AssetHeader& header = asset.view().header();

@@ -9,6 +9,11 @@ int penetrations_answer(scene_t* s) {
   ist_placed_tree_t wrong;
   const ist_tree_t empty = {0};
   ist_workspace_t none = {0};
+  ist_tree_info_t info = {.size = sizeof info};
+  ist_field_t field = {.size = sizeof field, .kind = IST_BALL};
+  ist_placed_field_t floor = {.size = sizeof floor};
+  ist_status_t status;
+  int meshes;
 
   CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, &whole) == IST_OK);
   CHECK(whole.volume > 0 && whole.volume_min <= whole.volume && whole.volume <= whole.volume_max);
@@ -52,8 +57,23 @@ int penetrations_answer(scene_t* s) {
   CHECK(ist_penetration(&s->a, &wrong, NULL, &s->workspace, &other) == IST_NO_HANDLE);
   CHECK(ist_penetration(&s->a, &s->b, NULL, &none, &other) == IST_NO_HANDLE);
 
+  /* The meshes of two, where both hold one; a field has none. */
+  settings.measure = IST_EXACT;
+  CHECK(ist_tree_get_info(&s->tree_a, &info) == IST_OK);
+  meshes = info.mesh_triangles > 0;
+  CHECK(ist_tree_get_info(&s->tree_b, &info) == IST_OK);
+  meshes += info.mesh_triangles > 0;
+  status = ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other);
+  CHECK(status == other.status && status == (meshes == 2 ? IST_OK : IST_NOT_HELD));
+  CHECK(meshes == 2 || (isnan(other.volume) && isnan(other.rotation_gradient[2])));
+  floor.field = &field;
+  floor.pose = s->a.pose;
+  field.as.ball.radius = 1;
+  CHECK(ist_field_penetration(&floor, &s->b, &settings, &s->workspace, &other) == IST_NOT_HELD);
+  CHECK(isnan(other.volume) && other.status == IST_NOT_HELD);
+
   /* Numbers that are none. */
-  settings.measure = 2;
+  settings.measure = 3;
   CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other) == IST_INVALID_INPUT);
   settings.measure = IST_MATCHED;
   settings.field = -1;

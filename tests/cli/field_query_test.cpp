@@ -155,7 +155,7 @@ TEST_F(FieldQuery, SettingsThatHaveNoEffectAreRefused) {
   };
   refused("ball:1", {"--field", "never"}, "ball:1 is a field and has no spheres");
   refused("ball:1", {"--pair-budget", "10"}, "--pair-budget: has no effect where A is a field");
-  refused("cube.ist", {"--field", "always", "--measure", "inner"}, "--field: always has no effect");
+  refused("cube.ist", {"--field", "always", "--measure", "inner"}, "--field: has no effect");
   refused("cube.ist", {"--field", "some"}, "{auto,never,always}");
   ASSERT_EQ(
       ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,

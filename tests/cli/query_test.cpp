@@ -161,8 +161,117 @@ TEST_F(QueryCommand, JsonHasTheColumnsOfTheCsv) {
 TEST_F(QueryCommand, OnePoseIsAnsweredForAPerson) {
   const Outcome outcome = ist({"query", "cube.ist", "capsule.ist", "--pose", "1,0,0,0,0,0,0"});
   EXPECT_EQ(outcome.exit_code, 0);
-  for (const char* word : {"volume", "bounds", "force/k", "torque/k", "distance", "µs"})
+  for (const char* word : {"volume", "sum in", "force/k", "torque/k", "distance", "µs"})
     EXPECT_NE(outcome.out.find(word), std::string::npos) << word;
+  // By spheres nothing is told that could be taken for accuracy.
+  EXPECT_EQ(outcome.out.find("bounds"), std::string::npos) << outcome.out;
+}
+
+// --- Exact
+// ----------------------------------------------------------------------------------------
+
+constexpr const char* kNutOnBolt = "1,0,0,0,0,0,8.5";
+constexpr double kTruth = 34.7409603139359;
+
+class ExactQueryCommand : public QueryCommand {
+ protected:
+  void SetUp() override {
+    QueryCommand::SetUp();
+    for (const std::string name : {"bolt", "nut"}) {
+      ASSERT_EQ(ist({"sample", name, "-o", name + ".obj"}).exit_code, 0);
+      const Outcome baked = ist({"bake", name + ".obj", "-o", name + ".ist", "--surface-only"});
+      ASSERT_EQ(baked.exit_code, 0) << baked.err;
+    }
+  }
+};
+
+TEST_F(ExactQueryCommand, TellsTheTrueVolumeOfSurfacesAlone) {
+  const std::vector<std::string> asked = {"bolt.ist", "nut.ist",   "--pose",
+                                          kNutOnBolt, "--measure", "exact"};
+  std::vector<std::string> by_csv = asked, by_json = asked;
+  by_csv.push_back("--csv");
+  const std::vector<std::string> all = rows(by_csv);
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_NE(all[0].find(",ok,"), std::string::npos) << all[0];
+  const std::vector<double> r = numbers_of(all[0]);
+  EXPECT_NEAR(r[volume], kTruth, 1e-11 * kTruth);
+  EXPECT_LE(r[volume_min], kTruth + 1e-13);  // to the digits that the truth is written with
+  EXPECT_GE(r[volume_max], kTruth - 1e-13);
+  EXPECT_LT(r[volume_max] - r[volume_min], 1e-9 * kTruth);
+  EXPECT_NEAR(r[dVdtx + 2], 71.734, 1e-3);
+  EXPECT_TRUE(std::isnan(r[distance]));
+  EXPECT_GT(r[time_us], 0);
+
+  by_json.insert(by_json.begin(), "query");
+  by_json.push_back("--json");
+  const nlohmann::ordered_json entry = nlohmann::ordered_json::parse(ist(by_json).out)[0];
+  EXPECT_EQ(entry.at("volume").get<double>(), r[volume]);
+  EXPECT_EQ(entry.at("status"), "ok");
+  EXPECT_TRUE(entry.at("distance").is_null() && entry.at("distance_max").is_null());
+
+  std::vector<std::string> by_text = asked;
+  by_text.insert(by_text.begin(), "query");
+  const Outcome text = ist(by_text);
+  EXPECT_EQ(text.exit_code, 0);
+  for (const char* words : {"34.74096031393", "of the true overlap", "bounds",
+                            "the true volume lies in here", "-71.734", "triangle pairs"})
+    EXPECT_NE(text.out.find(words), std::string::npos) << words << "\n" << text.out;
+  EXPECT_EQ(text.out.find("distance"), std::string::npos) << text.out;
+}
+
+TEST_F(ExactQueryCommand, TellsTheSpheresDistanceWhereTheyAre) {
+  const Outcome apart =
+      ist({"query", "cube.ist", "capsule.ist", "--pose", "1,0,0,0,0,0,9", "--measure", "exact"});
+  EXPECT_EQ(apart.exit_code, 0) << apart.err;
+  EXPECT_NE(apart.out.find("between the inner spheres"), std::string::npos) << apart.out;
+  EXPECT_NE(apart.out.find("volume     0 u³"), std::string::npos) << apart.out;
+  const std::vector<double> r = row("1,0,0,0,0.5,0,0", {"--measure", "exact"});
+  EXPECT_NEAR(r[volume], 0.5, 1e-12);
+  EXPECT_NEAR(r[dVdtx], -1, 1e-12);
+}
+
+TEST_F(ExactQueryCommand, ALimitLeavesBoundsThatHold) {
+  const auto all = rows({"bolt.ist", "nut.ist", "--csv", "--pose", kNutOnBolt, "--measure", "exact",
+                         "--max-visits", "3"});
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_NE(all[0].find(",budget_exhausted,"), std::string::npos) << all[0];
+  const std::vector<double> r = numbers_of(all[0]);
+  EXPECT_TRUE(std::isnan(r[volume]));  // no spheres to answer instead
+  EXPECT_EQ(r[volume_min], 0);
+  EXPECT_GT(r[volume_max], kTruth);
+  const Outcome text = ist({"query", "bolt.ist", "nut.ist", "--pose", kNutOnBolt, "--measure",
+                            "exact", "--max-visits", "3"});
+  EXPECT_NE(text.out.find("volume     unknown"), std::string::npos) << text.out;
+  EXPECT_EQ(text.out.find("nan"), std::string::npos) << text.out;
+}
+
+TEST_F(ExactQueryCommand, SaysWhatIsNotHeld) {
+  ASSERT_EQ(
+      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
+      0);
+  expect_exit(1, {"cube.ist", "bare.ist", "--pose", "1,0,0,0,0,0,0", "--measure", "exact"},
+              "bare.ist: holds no mesh, which --measure exact asks; bake it again with --surface "
+              "all");
+  for (const char* measure : {"matched", "inner"})
+    expect_exit(1, {"cube.ist", "nut.ist", "--pose", "1,0,0,0,0,0,0", "--measure", measure},
+                "nut.ist: is a surface alone, without the spheres that --measure " +
+                    std::string(measure) + " asks; ask with --measure exact");
+  expect_exit(1, {"ball:1", "nut.ist", "--pose", "1,0,0,0,0,0,0"}, "nut.ist: is a surface alone");
+}
+
+TEST_F(ExactQueryCommand, RefusesWhatItDoesNotHeed) {
+  const auto refused = [&](const std::vector<std::string>& more, const std::string& message) {
+    std::vector<std::string> all = {"bolt.ist", "nut.ist",   "--pose",
+                                    kNutOnBolt, "--measure", "exact"};
+    all.insert(all.end(), more.begin(), more.end());
+    expect_exit(2, all, message);
+  };
+  refused({"--field", "always"}, "--field: has no effect with --measure exact");
+  refused({"--field", "never"}, "--field: has no effect with --measure exact");
+  refused({"--pair-budget", "9"}, "--pair-budget: has no effect with --measure exact");
+  refused({"--deadline-us", "9"}, "--deadline-us: does not stop --measure exact");
+  expect_exit(2, {"plane:0,0,1,0", "nut.ist", "--pose", kNutOnBolt, "--measure", "exact"},
+              "exact asks for two meshes, and A is a field: plane:0,0,1,0");
 }
 
 TEST_F(QueryCommand, WrongInputIsNamed) {

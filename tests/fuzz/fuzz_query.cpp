@@ -6,8 +6,9 @@
 
 #include "support/query_settings.h"
 #include "support/random_assets.h"
+#include "support/test_meshes.h"
 
-// Any pose, scale and limits: the answer is not NaN, lies within its bounds, and is the same when
+// Any pose, scale and limits: the answer is not NaN, lies between its ends, and is the same when
 // asked again.
 
 namespace {
@@ -68,6 +69,25 @@ bool same_bits(const Penetration& a, const Penetration& b) {
          a.status == b.status && a.node_visits == b.node_visits;
 }
 
+/// The same poses and scales of two meshes.
+void ask_exact(PlacedTree a, PlacedTree b, bool copies, std::uint32_t max_visits,
+               Workspace& workspace) {
+  static const Asset ball = bake_surface(close_mesh(testing::icosphere_mesh(2), "ball"));
+  static const Asset cube = bake_surface(close_mesh(testing::cube_mesh(), "cube"));
+  a.tree = ball.view();
+  b.tree = (copies ? ball : cube).view();
+  PenetrationSettings settings{.measure = Measure::exact};
+  settings.max_visits = max_visits;
+  const Penetration answer = penetration(a, b, settings, workspace);
+  if (answer.status == QueryStatus::budget_exhausted) {
+    require(answer.volume_min == 0 && answer.volume_max > 0);
+    return;
+  }
+  require(answer.status != QueryStatus::not_held);
+  look_at(answer);
+  require(same_bits(answer, penetration(a, b, settings, workspace)));
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -89,6 +109,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if ((flags & 64) != 0) placed_a.scale = input.next<float>();
   if ((flags & 128) != 0) placed_b.tree = a.view();
   settings.pair_budget = input.next<std::uint16_t>();
+  if (input.next<std::uint8_t>() % 2 == 1)
+    ask_exact(placed_a, placed_b, (flags & 128) != 0, settings.max_visits, workspace);
 
   const auto [penetration, separation] =
       query(placed_a, placed_b, ist::testing::for_both(settings), workspace);

@@ -275,6 +275,8 @@ TEST_F(GpuQueryTest, WhatDoesNotFitIsAnError) {
                                  batch.answers(), nullptr),
                Error);
   const TreeView none;
+  EXPECT_THROW(penetration_batch(assets, GpuPairs{}, Measure::exact, workspace, {}, nullptr),
+               Error);
   EXPECT_THROW(GpuAssets({&none, 1}), Error);
   EXPECT_THROW(GpuWorkspace(std::size_t{1} << 40), Error);
   const GpuFields fields(std::vector<Field>{HalfSpaceField{}});

@@ -1,12 +1,16 @@
 #include <gtest/gtest.h>
+#include <ist/bake.h>
 #include <ist/field.h>
+#include <ist/lenses.h>
 #include <ist/query.h>
 #include <ist/query_tbb.h>
 
+#include <cmath>
 #include <limits>
 #include <thread>
 
 #include "support/random_assets.h"
+#include "support/test_meshes.h"
 
 namespace ist {
 namespace {
@@ -100,16 +104,22 @@ TEST_F(PenetrationBatch, Patches) {
 
 TEST_F(PenetrationBatch, OnTheCallingThread) { expect_same({}, 1); }
 
-TEST_F(PenetrationBatch, OnThreadsOfTheCaller) {
-  std::size_t started = 0;
+/// A thread for each worker; their number goes to `started`.
+ParallelFor on_threads(std::size_t* started = nullptr) {
   ParallelFor threads;
-  threads.pool = &started;
+  threads.pool = started;
   threads.run = [](void* pool, std::size_t workers, void (*work)(void*, std::size_t), void* batch) {
-    *static_cast<std::size_t*>(pool) = workers;
+    if (pool != nullptr) *static_cast<std::size_t*>(pool) = workers;
     std::vector<std::thread> all;
     for (std::size_t i = 0; i < workers; ++i) all.emplace_back(work, batch, i);
     for (std::thread& thread : all) thread.join();
   };
+  return threads;
+}
+
+TEST_F(PenetrationBatch, OnThreadsOfTheCaller) {
+  std::size_t started = 0;
+  const ParallelFor threads = on_threads(&started);
   expect_same(threads, 4);
   EXPECT_EQ(started, 4u);
   PenetrationSettings stopped;
@@ -123,6 +133,63 @@ TEST_F(PenetrationBatch, OnAPoolThatRunsWorkersOneByOneAndBackwards) {
     while (workers > 0) work(batch, --workers);
   };
   expect_same(serial, 5);
+}
+
+// Meshes: the same bits on many threads, and NaN where one is not held.
+TEST_F(PenetrationBatch, Exact) {
+  const Asset cube = bake_surface(close_mesh(testing::cube_mesh(), "cube"));
+  const Asset ball = bake_surface(close_mesh(testing::icosphere_mesh(4), "ball"));
+  std::size_t met = 0;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    if (i == 50) continue;  // holds spheres alone
+    pairs_[i].a.tree = (i % 2 == 0 ? cube : ball).view();
+    pairs_[i].b.tree = (i % 3 == 0 ? cube : ball).view();
+  }
+  std::vector<Workspace> scratch;
+  for (int i = 0; i < 8; ++i) scratch.emplace_back();
+  const PenetrationSettings exact{.measure = Measure::exact};
+  std::vector<Penetration> answers(pairs_.size());
+  penetration_batch(pairs_, exact, scratch, answers, on_threads());
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const Penetration one = penetration(pairs_[i].a, pairs_[i].b, exact, scratch[0]);
+    ASSERT_EQ(answers[i].status, one.status) << "pair " << i;
+    if (i == 50) {
+      EXPECT_EQ(one.status, QueryStatus::not_held);
+      EXPECT_TRUE(std::isnan(answers[i].volume));
+      continue;
+    }
+    ASSERT_EQ(one.status, i == 77 ? QueryStatus::invalid_input : QueryStatus::ok);
+    ASSERT_EQ(answers[i].volume, one.volume);
+    ASSERT_EQ(answers[i].volume_min, one.volume_min);
+    ASSERT_EQ(answers[i].volume_max, one.volume_max);
+    ASSERT_EQ(answers[i].centroid, one.centroid);
+    ASSERT_EQ(answers[i].translation_gradient, one.translation_gradient);
+    ASSERT_EQ(answers[i].rotation_gradient, one.rotation_gradient);
+    ASSERT_EQ(answers[i].node_visits, one.node_visits);
+    met += one.volume > 0;
+  }
+  EXPECT_GT(met, pairs_.size() / 2);
+}
+
+// A field has no mesh: nobody takes that for no contact.
+TEST_F(PenetrationBatch, ExactOfAFieldIsNotHeld) {
+  const Asset cube = bake_surface(close_mesh(testing::cube_mesh(), "cube"));
+  std::vector<Workspace> scratch(1);
+  const PlacedFieldPair pairs[] = {{{BallField{0.8}, {}}, {cube.view(), {}, 1}},
+                                   {{MeshField{cube.view()}, {}}, pairs_[0].b}};
+  Penetration answers[2];
+  penetration_batch(pairs, {.measure = Measure::exact}, scratch, answers);
+  for (const Penetration& answer : answers) {
+    EXPECT_EQ(answer.status, QueryStatus::not_held);
+    EXPECT_TRUE(std::isnan(answer.volume) && answer.translation_gradient.hasNaN());
+  }
+  ContactPatch patches[2];
+  const ContactPatches found =
+      contact_patches(pairs[0].a, pairs_[0].b, {.measure = Measure::exact}, scratch[0], patches);
+  EXPECT_EQ(found.penetration.status, QueryStatus::not_held);
+  EXPECT_EQ(found.count, 0u);
+  EXPECT_EQ(overlap_lenses(pairs_[0].a, pairs_[0].b, {.measure = Measure::exact}, {}).status,
+            QueryStatus::invalid_input);
 }
 
 TEST_F(PenetrationBatch, OnTbb) { expect_same(tbb_parallel_for(), 4); }

@@ -315,6 +315,7 @@ def test_arguments_may_be_left_out(solids, arguments):
             (dict(wanted=["force"]), ValueError, "wanted: 'force'; there are 'volume'"),
             (dict(wanted="volume"), TypeError, "wanted: a str; wanted a sequence"),
             (dict(measure="outer"), ValueError, "measure: 'outer'"),
+            (dict(measure="exact"), ValueError, "measure: 'exact'; one of 'matched', 'inner'"),
             (dict(assets=solids), TypeError, "incompatible function arguments")]:
         given = dict(assets=assets, asset_a=0, asset_b=2, pose_a=None, pose_b=OnDevice(poses.copy()))
         with pytest.raises(error, match=text):

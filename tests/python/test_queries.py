@@ -109,7 +109,7 @@ def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
     (dict(scales=[1, 2]), ValueError, "scales: 2 rows; the arguments before it have 5"),
     (dict(scales=[[1.0]]), ValueError, r"scales: shape \(1, 1\); wanted a number or \(n,\)"),
     (dict(poses_a=np.zeros((4, 7))), ValueError, "poses_a: 4 rows"),
-    (dict(measure="outer"), ValueError, "measure: 'outer'; one of 'matched', 'inner'"),
+    (dict(measure="outer"), ValueError, "measure: 'outer'; one of 'matched', 'inner', 'exact'"),
     (dict(field="maybe"), ValueError, "field: 'maybe'; one of 'automatic', 'never', 'always'"),
     (dict(a=3), TypeError, "a: a int; wanted an Asset or a Field"),
     (dict(b=ist.BallField(1)), TypeError, "b: a Field; it stands first"),
@@ -263,6 +263,87 @@ def test_fields_meet_assets(cube):
     with pytest.raises(TypeError, match="MeshField|Asset|asset"):
         ist.MeshField(ist.BallField(1))
     assert ist.penetration(ist.BallField(-1), cube, pose).status == ist.QueryStatus.invalid_input
+
+
+@pytest.fixture(scope="module")
+def thread():
+    """(bolt, nut): surfaces alone."""
+    return [ist.bake_surface(ist.close_mesh(ist.sample_mesh(name), name=name))
+            for name in ("bolt", "nut")]
+
+
+TRUTH = 34.7409603139359  # of nut and bolt at z = 8.5
+
+
+def test_exact_is_the_true_volume(thread):
+    bolt, nut = thread
+    found = ist.penetration(bolt, nut, [1, 0, 0, 0, 0, 0, 8.5], measure="exact")
+    assert found.volume == pytest.approx(TRUTH, rel=1e-11)
+    assert found.volume_min - 1e-13 <= TRUTH <= found.volume_max + 1e-13
+    assert found.volume_max - found.volume_min < 1e-9 * TRUTH
+    assert found.force[2] == pytest.approx(-71.734, abs=1e-3)
+    assert found.status == ist.QueryStatus.ok
+    poses = np.tile([1.0, 0, 0, 0, 0, 0, 8.5], (60, 1))
+    poses[:, 6] += np.linspace(-1, 1, 60)
+    one, many = (ist.penetration(bolt, nut, poses, measure="exact", threads=n) for n in (1, 4))
+    for name in ("volume", "volume_min", "volume_max", "force", "torque", "centroid", "pose_gradient"):
+        assert np.array_equal(getattr(one, name), getattr(many, name)), name
+
+
+def test_exact_gradients_are_differences(gear, knot, random_poses):
+    poses, poses_a = random_poses(12, 1.2), random_poses(12, 0.4)
+    scales, scales_a = np.full(12, 0.8), np.full(12, 1.2)
+    found = ist.penetration(gear, knot, poses, poses_a=poses_a, scales=scales, scales_a=scales_a,
+                            measure="exact", scale_gradients=True)
+    met = found.volume > 1e-2
+    assert met.sum() > 6
+
+    def volume(b, a, scale=scales, scale_a=scales_a):
+        b, a = b.copy(), a.copy()
+        for moved in (b, a):
+            moved[:, :4] /= np.linalg.norm(moved[:, :4], axis=1, keepdims=True)
+        return ist.penetration(gear, knot, b, poses_a=a, scales=scale, scales_a=scale_a,
+                               measure="exact").volume
+
+    h = 1e-5
+    for k in range(7):
+        step = h * np.eye(7)[k]
+        by_b = (volume(poses + step, poses_a) - volume(poses - step, poses_a)) / (2 * h)
+        by_a = (volume(poses, poses_a + step) - volume(poses, poses_a - step)) / (2 * h)
+        for differences, gradient in (by_b, found.pose_gradient), (by_a, found.pose_gradient_a):
+            size = np.linalg.norm(gradient, axis=1)
+            assert (np.abs(differences - gradient[:, k])[met] < 1e-5 * size[met]).all()
+    by_b = (volume(poses, poses_a, scales + h) - volume(poses, poses_a, scales - h)) / (2 * h)
+    assert np.abs(by_b - found.scale_gradient)[met].max() < 1e-3 * np.abs(by_b[met]).max()
+
+
+def test_what_is_not_held_is_no_zero(thread, cube, random_poses):
+    bolt, nut = thread
+    bare = ist.bake(ist.close_mesh(ist.sample_mesh("cube"), name="bare"), max_spheres=50,
+                    surface="none", device="cpu")
+    poses = random_poses(3, 1)
+    for a, b, measure in ((bolt, nut, "matched"), (cube, bare, "exact"), (bare, cube, "exact"),
+                          (ist.BallField(1), cube, "exact")):
+        found = ist.penetration(a, b, poses, measure=measure, scale_gradients=True)
+        assert (found.status == ist.QueryStatus.not_held).all()
+        for name in ("volume", "volume_min", "volume_max", "force", "torque", "pose_gradient",
+                     "pose_gradient_a", "scale_gradient", "scale_gradient_a"):
+            assert np.isnan(getattr(found, name)).all(), name
+        assert len(ist.penetration(a, b, poses[:0], measure=measure).volume) == 0
+    assert np.isnan(ist.separation(bolt, nut, poses).distance).all()
+    # Of one pose nobody looks at the status.
+    pose = poses[0]
+    for text, ask in (
+            ("b: holds no mesh, which measure='exact' asks",
+             lambda: ist.penetration(cube, bare, pose, measure="exact")),
+            ("a: holds no mesh", lambda: ist.penetration(bare, cube, pose, measure="exact")),
+            ("a: a Field has no mesh",
+             lambda: ist.penetration(ist.BallField(1), cube, pose, measure="exact")),
+            ("b: is a surface alone", lambda: ist.penetration(bolt, nut, pose)),
+            ("b: is a surface alone", lambda: ist.contact_patches(cube, nut, pose)),
+            ("a: is a surface alone", lambda: ist.separation(nut, cube, pose))):
+        with pytest.raises(ist.Error, match=text):
+            ask()
 
 
 def test_impacts_come_in_time(cube):

@@ -64,6 +64,21 @@ def test_autograds_own_check(gear, knot):
                                     rtol=2e-3)
 
 
+def test_exact_passes_autograds_own_check_tightly(gear, knot):
+    pose = torch.tensor([[1.0, 0, 0, 0, 0, 0, 0], [0.9, 0.3, -0.2, 0.4, 0.6, 0.2, 0.1]],
+                        dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda p: overlap([gear, knot], p, measure="exact"), pose,
+                                    eps=1e-5, atol=1e-6, rtol=1e-5)
+
+
+def test_exact_of_a_field_is_nan(cube):
+    poses = torch.tensor([[1.0, 0, 0, 0, 0, 0, 0]] * 2, dtype=torch.float64, requires_grad=True)
+    volume = overlap([ist.HalfSpaceField(), cube], poses, measure="exact")
+    assert torch.isnan(volume).all()
+    volume.sum().backward()
+    assert torch.isnan(poses.grad).any()
+
+
 def test_scale_gradients_are_differences(gear, knot, cube, scenes):
     solids = [gear, knot, cube]
     scales = torch.full((6, 3), 0.9, dtype=torch.float64, requires_grad=True)

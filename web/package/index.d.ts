@@ -52,7 +52,13 @@ export interface Pose {
 // --- Assets -----------------------------------------------------------------------------------------
 
 /** `matched`: spheres whose volumes sum to the solid's. `inner`: spheres inside of it. */
-export type Measure = 'matched' | 'inner';
+export type SphereMeasure = 'matched' | 'inner';
+
+/**
+ * What stands for the solid: a set of spheres, or its mesh. `exact`: the true volume and its
+ * gradients, of two assets that both hold their mesh (AssetInfo.meshTriangles > 0).
+ */
+export type Measure = SphereMeasure | 'exact';
 
 export interface AssetInfo {
   /** As given to Asset.from(). */
@@ -108,7 +114,7 @@ export interface MassProperties {
 /** Which set of spheres is meant. */
 export interface SphereSet {
   /** Default `matched`. */
-  measure?: Measure;
+  measure?: SphereMeasure;
   /** Level of detail of the matched set, 0 the finest, < AssetInfo.details.length. Default 0. */
   detail?: number;
 }
@@ -211,7 +217,7 @@ export interface Limits {
 export interface ContactOptions extends Limits {
   /** Where A stands. Default: the identity. */
   poseA?: Pose;
-  /** Default `matched`. */
+  /** Default `matched`. `exact` heeds maxVisits alone of all limits. */
   measure?: Measure;
   /**
    * Whether the surface that an asset holds is used: where spheres are too coarse for the contact
@@ -231,7 +237,10 @@ export interface PenetrationOptions extends ContactOptions {
   into?: Penetration;
 }
 
-/** `budget-exhausted`: a limit or the workspace stopped it, and bounds still hold. */
+/**
+ * `budget-exhausted`: a limit or the workspace stopped it; volumeMin and volumeMax hold what they
+ * hold of a finished answer.
+ */
 export type Status = 'ok' | 'budget-exhausted';
 
 /** The overlap of two solids. */
@@ -239,7 +248,10 @@ export interface Penetration {
   status: Status;
   /** [u³] */
   volume: number;
-  /** [u³] bounds on that sum. */
+  /**
+   * [u³] By `exact` these are bounds: the true volume lies within. By spheres the finished sum lies
+   * within, with its rounding; how near it is to the true volume they do not say.
+   */
   volumeMin: number;
   volumeMax: number;
   /** [u] of the overlap; zero if there is none. */
@@ -250,11 +262,11 @@ export interface Penetration {
   torque: Float64Array;
   /** Node pairs opened. */
   nodeVisits: number;
-  /** Lenses and parts of spheres that were summed. */
+  /** Lenses and parts of spheres that were summed; by `exact`: triangles that cross. */
   spherePairs: number;
 }
 
-/** Throws for a pose or an option that is out of range. */
+/** Throws for a pose or an option out of range, and for a solid that does not hold what is asked. */
 export function penetration(
   a: Asset | Field,
   b: Asset,
@@ -343,7 +355,7 @@ export function overlap(
 export interface LensesOptions {
   poseA?: Pose;
   /** Default `matched`. */
-  measure?: Measure;
+  measure?: SphereMeasure;
   /** Levels of detail of the matched sets. Default 0, the finest. */
   detailA?: number;
   detailB?: number;
@@ -536,7 +548,7 @@ export interface Pair {
 
 /**
  * `invalid-input`: this pair's pose is out of range; its numbers are 0, and others are answered.
- * `not-held`: an asset of the pair holds no spheres; its numbers are NaN.
+ * `not-held`: a solid of the pair does not hold what the measure asks; its numbers are NaN.
  */
 export interface BatchPenetration extends Omit<Penetration, 'status'> {
   status: Status | 'invalid-input' | 'not-held';

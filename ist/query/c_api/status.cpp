@@ -8,11 +8,13 @@ const char* ist_describe(ist_status_t status) {
     case IST_OK:
       return "done";
     case IST_BUDGET_EXHAUSTED:
-      return "a limit or the workspace's capacity stopped the query: its bounds still hold";
+      return "a limit or the workspace's capacity stopped the query: what it says of the finished "
+             "answer still holds";
     case IST_INVALID_INPUT:
       return "a pose, a scale, a field's number or a setting is out of range";
     case IST_NOT_HELD:
-      return "an asset does not hold what is asked: bake it with spheres, or with its surface";
+      return "a solid does not hold what is asked: the exact measure wants the mesh of two assets "
+             "(bake with --surface all), all else wants spheres (bake without --surface-only)";
     case IST_NULL_POINTER:
       return "a pointer that must not be null is";
     case IST_WRONG_SIZE:

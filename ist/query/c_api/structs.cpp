@@ -6,7 +6,7 @@ namespace {
 /// Settings that both kinds of penetration have.
 template <class Given, class Settings>
 ist_status_t read_limits(const Given& given, Settings& settings) noexcept {
-  if (given.measure < IST_MATCHED || given.measure > IST_INNER ||
+  if (given.measure < IST_MATCHED || given.measure > IST_EXACT ||
       given.field < IST_FIELD_AUTOMATIC || given.field > IST_FIELD_ALWAYS)
     return IST_INVALID_INPUT;
   settings.measure = static_cast<Measure>(given.measure);

@@ -5,7 +5,7 @@ import {f64, u32} from './memory.js';
 
 export const newVector = () => new Float64Array(3);
 
-const kNotHeld = -15;  // IST_NOT_HELD
+export const kNotHeld = -15;  // IST_NOT_HELD
 
 export const statusOf = (status) => status === 0 ? 'ok' :
     status > 0                                   ? 'budget-exhausted' :

@@ -1,6 +1,7 @@
 // Assets and fields: what lies in WebAssembly's memory and is given back.
 
-import {count, desk, kBounds, kCounts, kInfo, kMass, measureOf, writeNumbers} from './desk.js';
+import {kNotHeld} from './answers.js';
+import {count, desk, kBounds, kCounts, kInfo, kMass, sphereMeasureOf, writeNumbers} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, give, take, u32, u8, withRoom} from './memory.js';
 import {welded} from './weld.js';
@@ -80,11 +81,14 @@ export class Asset extends Owner {
     const numbers = this._told();
     const integers = u32(), at = (desk() + kInfo) / 4, values = (desk() + kInfo) / 8 + 2;
     const details = [];
-    for (let i = 0; i < integers[at + 13]; ++i) details.push(this._count({detail: i}, 0));
+    const spheres = integers[at + 2] + 2 ** 32 * integers[at + 3];
+    // A surface alone has no levels of spheres.
+    for (let i = 0; spheres > 0 && i < integers[at + 13]; ++i)
+      details.push(this._count({detail: i}, 0));
     return {
       name: this._name,
       bytes: this._bytes,
-      spheres: integers[at + 2] + 2 ** 32 * integers[at + 3],
+      spheres,
       details,
       volume: numbers[values],
       coverage: numbers[values + 1],
@@ -121,8 +125,10 @@ export class Asset extends Owner {
   /** Writes the first `capacity` balls to `room`, and says how many there are. */
   _balls(set, level, room, capacity) {
     const detail = count(set?.detail, 0, 'detail');
-    const status = functions('an asset')
-                       .balls(this._at, measureOf(set?.measure), detail, level, room, capacity);
+    const measure = sphereMeasureOf(set?.measure);
+    const status = functions('an asset').balls(this._at, measure, detail, level, room, capacity);
+    if (status === kNotHeld)
+      throw new IstError(`ist: ${this._name}: is a surface alone and holds no spheres`, status);
     if (status < 0)
       throw new IstError(
           `ist: ${this._name}: there is no level ${level} of detail ${detail} in its ` +

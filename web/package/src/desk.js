@@ -77,19 +77,21 @@ export function count(value, absent, what) {
   return value;
 }
 
-const kMeasures = ['matched', 'inner'];
+const kSphereMeasures = ['matched', 'inner'];
+const kMeasures = [...kSphereMeasures, 'exact'];
 const kFieldUses = ['automatic', 'never', 'always'];
 const limit = (value, what) => (value === undefined ? 0 : number(value, what));
 
-export function measureOf(value) {
-  return choice(value, kMeasures, 'measure');
+/** Of what has spheres to show. */
+export function sphereMeasureOf(value) {
+  return choice(value, kSphereMeasures, 'measure');
 }
 
 /** Writes every setting that options have. */
 export function writeSettings(options) {
   const integers = u32();
   const at = (desk() + kSettings) / 4;
-  integers[at + 1] = measureOf(options?.measure);
+  integers[at + 1] = choice(options?.measure, kMeasures, 'measure');
   integers[at + 2] = choice(options?.field, kFieldUses, 'field');
   integers[at + 3] = count(options?.pairBudget, 0, 'pairBudget');
   integers[at + 4] = count(options?.maxVisits, 0, 'maxVisits');

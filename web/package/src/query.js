@@ -2,7 +2,7 @@
 
 import {newPatches, newPenetration, newVector, readPatches, readPenetration, statusOf} from './answers.js';
 import {Asset, Field} from './asset.js';
-import {copy3, count, desk, kCounts, kMostPatches, kPatches, kPenetration, kSeparation, writePose, writeSettings} from './desk.js';
+import {copy3, count, desk, kCounts, kMostPatches, kPatches, kPenetration, kSeparation, sphereMeasureOf, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
 
@@ -93,6 +93,7 @@ export function lenses(a, b, poseB, options) {
   const first = a._at, second = solid(b, 'B', 'lenses()');
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
+  sphereMeasureOf(options?.measure);
   writeSettings({measure: options?.measure});
   const most = count(options?.maxLenses, 4096, 'maxLenses');
   const place = room.of(72 * most);

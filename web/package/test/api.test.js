@@ -115,6 +115,30 @@ test('what an asset holds', () => {
   asset.free();
 });
 
+test('exact is the true volume of two meshes, and refused where there is none', () => {
+  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB), exact = {measure: 'exact'};
+  const pose = {translation: [0, 0, 8.5]}, truth = 34.7409603139359;
+  assert.ok(a.info().meshTriangles > 0 && a.info().meshError < 1e-9);
+  const found = ist.penetration(a, b, pose, exact);
+  assert.equal(found.status, 'ok');
+  assert.ok(Math.abs(found.volume / truth - 1) < 1e-11, `${found.volume}`);
+  assert.ok(found.volumeMin - 1e-13 <= truth && truth <= found.volumeMax + 1e-13);
+  assert.ok(Math.abs(found.force[2] + 71.734) < 1e-3);
+  const floor = ist.Field.halfSpace([0, 0, 1]);
+  assert.match(
+      sentence(() => ist.penetration(floor, b, pose, exact)), /does not hold what is asked/);
+  const [one, other] =
+      ist.penetrationBatch([{a, b, poseB: pose}, {a: floor, b, poseB: pose}], exact);
+  assert.deepEqual(one, found);
+  assert.ok(other.status === 'not-held' && Number.isNaN(other.volume));
+  assert.match(
+      sentence(() => ist.lenses(a, b, pose, exact)), /measure is exact; there are matched, inner/);
+  assert.match(
+      sentence(() => ist.penetration(a, b, pose, {measure: 'outer'})),
+      /measure is outer; there are matched, inner, exact/);
+  for (const each of [a, b, floor]) each.free();
+});
+
 test('the stored surface is closed and holds the volume', () => {
   const asset = ist.Asset.from(bytesA);
   const {positions, triangles} = asset.surface(), info = asset.info();

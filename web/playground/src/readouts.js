@@ -4,7 +4,7 @@ import {digits, range, vector, whole} from './format.js';
 
 const kRows = [
   ['volume', 'Volume', 'u³', 'main'],
-  ['bounds', 'Bounds', 'u³'],
+  ['sum', 'Sum in', 'u³'],  // with its rounding; no bounds of the true volume
   ['distance', 'Distance', 'u'],
   ['force', 'Force / k', 'u²'],
   ['forceVector', '', '', 'detail'],
@@ -71,7 +71,7 @@ export class Readouts {
       if (cells[key].textContent !== text) cells[key].textContent = text;
     };
     put('volume', digits(p.volume));
-    put('bounds', range(p.volumeMin, p.volumeMax));
+    put('sum', range(p.volumeMin, p.volumeMax));
     put('distance', range(s.distanceMin, s.distanceMax, 5));
     put('force', digits(Math.hypot(...p.force)));
     put('forceVector', vector(p.force));
