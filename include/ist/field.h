@@ -100,7 +100,8 @@ struct PlacedField {
 };
 
 /// Overlap of a field, held still, and a placed tree: Σ over B's spheres of the part that lies
-/// inside the field. The gradients are those of that sum. Bounds hold the field's error.
+/// inside the field. The gradients are those of that sum. volume_min and volume_max make room for
+/// the field's error. Measure::exact is answered not_held: a field has no mesh.
 ///
 /// A limit of the settings stops it as it stops a pair of trees; pair_budget has no effect.
 /// invalid_input also where the field's numbers are out of range.

@@ -51,7 +51,8 @@ class GpuFields {
 /// Only launches kernels on `stream`: allocates nothing and waits for nothing, so that a CUDA graph
 /// may capture it.
 ///
-/// Throws Error where a batch is larger than the workspace, the devices differ or a launch fails.
+/// Throws Error for Measure::exact, where a batch is larger than the workspace, the devices differ
+/// or a launch fails.
 void penetration_batch(const GpuAssets& assets, const GpuFields& fields, const GpuPairs& pairs,
                        Measure measure, GpuWorkspace& workspace, const GpuPenetrations& answers,
                        CUstream_st* stream);

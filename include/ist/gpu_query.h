@@ -97,7 +97,7 @@ class GpuWorkspace {
 
 /// What a penetration of a batch may cost, as in PenetrationSettings.
 struct GpuPenetrationSettings {
-  Measure measure = Measure::matched;
+  Measure measure = Measure::matched;  ///< matched or inner
   /// Count of sphere pairs to spend on each pair of trees; matched measure only; 0: no limit.
   ///
   /// The answer comes from the finest levels of detail that are expected to need no more, blended
@@ -115,7 +115,8 @@ struct GpuPenetrationSettings {
 /// Only launches kernels on `stream`: allocates nothing and waits for nothing, so that a CUDA graph
 /// may capture it.
 ///
-/// Throws Error where a batch is larger than the workspace, the devices differ or a launch fails.
+/// Throws Error for Measure::exact, where a batch is larger than the workspace, the devices differ
+/// or a launch fails.
 void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs,
                        const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
                        const GpuPenetrations& answers, CUstream_st* stream);
@@ -185,8 +186,8 @@ struct GpuContactPatches {
 /// Only launches kernels on `stream`, as penetration_batch(). One warp does a pair: a very large
 /// contact takes it long.
 ///
-/// Throws Error where a batch is larger than the workspace, more patches than kMostGpuPatches are
-/// asked for, the devices differ or a launch fails.
+/// Throws Error for Measure::exact, where a batch is larger than the workspace, more patches than
+/// kMostGpuPatches are asked for, the devices differ or a launch fails.
 void contact_patches_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
                            GpuWorkspace& workspace, const GpuPenetrations& answers,
                            const GpuContactPatches& patches, CUstream_st* stream);

@@ -12,7 +12,7 @@ namespace IST_API ist {
 
 /// Which spheres of two trees are put together.
 struct LensSettings {
-  Measure measure = Measure::matched;
+  Measure measure = Measure::matched;  ///< not exact, which has no spheres
   /// Levels of detail of the matched sets, 0 the finest; 0 of inner spheres, which have one.
   std::uint32_t detail_a = 0, detail_b = 0;
 };
@@ -28,7 +28,7 @@ struct OverlapLens {
 };
 
 struct OverlapLenses {
-  /// invalid_input also for a level of detail that a tree does not have.
+  /// invalid_input also for Measure::exact and for a level of detail that a tree does not have.
   QueryStatus status = QueryStatus::ok;
   std::size_t total = 0;  ///< lenses there are
   std::size_t count = 0;  ///< lenses written

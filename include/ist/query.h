@@ -18,6 +18,10 @@ namespace IST_API ist {
 ///
 /// A penetration that is stopped estimates what is left, by what it summed under a deadline and
 /// else from the densities of the nodes that were not opened, and says budget_exhausted.
+///
+/// Measure::exact heeds max_visits alone. One that is stopped answers what the matched spheres do
+/// (NaN where an asset has none), says budget_exhausted, and bounds the true volume by 0 and the
+/// smaller solid's.
 struct PenetrationSettings {
   Measure measure = Measure::matched;
   FieldUse field = FieldUse::automatic;  ///< matched measure only
@@ -81,9 +85,11 @@ struct PlacedTree {
 /// Overlap of two placed solids. Gradients are taken with respect to a motion of B, A held still.
 struct Penetration {
   double volume = 0;  ///< [u³] in the chosen measure
-  /// [u³] lower bound on that sum, rounding included; not on the true overlap
+  /// [u³] By Measure::exact these are bounds: the true volume is at least volume_min and at most
+  /// volume_max. By spheres they hold the finished sum, with its rounding, and say nothing of how
+  /// near that sum is to the true volume.
   double volume_min = 0;
-  double volume_max = 0;                               ///< [u³] upper bound on that sum, likewise
+  double volume_max = 0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the overlap, world; zero if none
   /// [u²] dV/d(translation of B), world. A pressure [force/u²] pushes B by −pressure times this, A
   /// by the opposite: <ist/response.h> has pressures that grow with depth.
@@ -93,7 +99,7 @@ struct Penetration {
   QueryStatus status = QueryStatus::ok;
   std::uint32_t node_visits = 0;  ///< node pairs opened
   /// Lenses summed that are not empty, spheres put together with triangles of a surface, and
-  /// spheres that lie in the other solid as a whole.
+  /// spheres that lie in the other solid as a whole. By Measure::exact: triangles that cross.
   std::uint32_t sphere_pairs = 0;
 };
 
@@ -146,7 +152,7 @@ class Workspace {
 
 /// Volume, wrench and centroid of the overlap.
 ///
-/// The sum is Σ over spheres of the finer tree of their exact part inside the other's surface, or
+/// By spheres the sum is Σ over spheres of the finer tree of their exact part inside the other's surface, or
 /// one of lenses, as PenetrationSettings::field says. The gradients of a finished query are those
 /// of the returned volume. Copies of one asset at nearly the same pose are asked as unlike levels
 /// of detail, since equal spheres on top of each other would count too much.
@@ -262,8 +268,8 @@ OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
 /// they hardly touch and keep the rest.
 ///
 /// Volumes, areas, forces and torques become less; a patch of which nothing is left stays, with
-/// zeros and no normal. Patches whose spheres met a surface, and those of the inner measure, are as
-/// they should be and stay. So may stay what the Penetration of the same answer says: it is another
+/// zeros and no normal. Patches whose spheres met a surface, and those of the inner and the exact
+/// measure, are as they should be and stay. So may stay what the Penetration of the same answer says: it is another
 /// sum now.
 ///
 /// `patches`: what contact_patches() wrote for these two under these settings.

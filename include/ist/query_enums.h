@@ -10,23 +10,25 @@ namespace IST_API ist {
 
 enum class QueryStatus : std::uint32_t {
   ok = 0,  ///< finished: the gradients are exactly those of the returned volume
-  /// A limit of the settings or the workspace's capacity stopped the descent: bounds still hold.
+  /// A limit of the settings or the workspace's capacity stopped the descent: volume_min and
+  /// volume_max still hold what they hold of a finished answer.
   budget_exhausted = 1,
   /// The answer is all zero. One of: a pose with NaN or Inf; a quaternion off unit length by more
   /// than 1e-3; a scale ≤ 0; an empty tree; sizes or distances more than 1e60 : 1 apart; a
   /// workspace that was moved from.
   invalid_input = 2,
-  /// An asset does not hold what the measure needs: Measure::exact asks for both solids' meshes
-  /// (TreeView::has_mesh), the others for spheres. All numbers of the answer are NaN.
+  /// A solid does not hold what the measure needs: Measure::exact asks for both solids' meshes
+  /// (TreeView::has_mesh; a field has none), the others for spheres. All numbers of the answer are
+  /// NaN.
   not_held = 3,
 };
 
-/// Which spheres stand for the solid.
+/// What stands for the solid.
 enum class Measure : std::uint32_t {
   matched = 0,  ///< matched spheres whose volumes sum to the solid's: the accurate one
   inner = 1,    ///< inner spheres: a certified lower bound of the true volume
-  /// The two meshes themselves: the true volume and its gradients, within rounding that the bounds
-  /// tell. Needs the mesh in both assets.
+  /// The two meshes themselves: the true volume and its gradients. The true volume lies between the
+  /// bounds that the answer holds. Needs the mesh in both assets (TreeView::has_mesh).
   exact = 2,
 };
 
