@@ -55,6 +55,23 @@ def query_peers(report, path):
     save(figure, path)
 
 
+def exact_peers(report, path):
+    """Time of an exact query as each triangle is cut in four, and again."""
+    rows = report["tables"]["Growth"]
+    figure, axis = plt.subplots(figsize=(6, 4))
+    for name in dict.fromkeys(row["class"] for row in rows):
+        mine = [row for row in rows if row["class"] == name]
+        axis.loglog([row["triangles"] for row in mine], [row["median us"] for row in mine], "o-",
+                    label=name)
+    ends = [min(row["triangles"] for row in rows), max(row["triangles"] for row in rows)]
+    start = min(row["median us"] for row in rows)
+    axis.loglog(ends, [start, start * (ends[1] / ends[0]) ** 0.5], "k:", label="√n")
+    axis.set(title="Elephant in dino, ever finer", xlabel="triangles of both", ylabel="µs, median")
+    axis.grid(True, which="both", alpha=0.3)
+    axis.legend(fontsize=8)
+    save(figure, path)
+
+
 def volume_error(report, path):
     """Error of the volume by class of overlap: a panel a pair, a curve a sphere count."""
     rows = report["tables"]["Volume and force against exact booleans"]

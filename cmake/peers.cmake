@@ -1,6 +1,7 @@
 # Libraries that ist is measured and checked against: FCL and Bullet's double-precision build
 # (tests/oracle, benchmarks). Each is optional; a missing one is named when CMake runs.
-#   ist_peer_fcl, ist_peer_bullet: interface targets, there only when the library was found.
+#   ist_peer_fcl, ist_peer_bullet, ist_peer_manifold, ist_peer_cgal: interface targets, there only
+#   when the library was found.
 include_guard(GLOBAL)
 
 find_package(fcl QUIET)
@@ -25,4 +26,25 @@ if(IST_BULLET_INCLUDE_DIR AND IST_BULLET_COLLISION AND IST_BULLET_MATH)
   target_link_libraries(ist_peer_bullet INTERFACE ${IST_BULLET_COLLISION} ${IST_BULLET_MATH})
 else()
   message(STATUS "Bullet in double precision not found (libbullet-dev): no comparison with it")
+endif()
+
+# `./dev setup --bench` builds it there.
+find_package(manifold QUIET NO_DEFAULT_PATH PATHS ${PROJECT_SOURCE_DIR}/build-manifold/install)
+if(TARGET manifold::manifold)
+  add_library(ist_peer_manifold INTERFACE)
+  target_link_libraries(ist_peer_manifold INTERFACE manifold::manifold)
+else()
+  message(STATUS "Manifold not found (./dev setup --bench): no comparison with it")
+endif()
+
+find_path(IST_CGAL_INCLUDE_DIR CGAL/Surface_mesh.h)
+find_library(IST_GMP gmp)
+find_library(IST_MPFR mpfr)
+mark_as_advanced(IST_CGAL_INCLUDE_DIR IST_GMP IST_MPFR)
+if(IST_CGAL_INCLUDE_DIR AND IST_GMP AND IST_MPFR)
+  add_library(ist_peer_cgal INTERFACE)
+  target_include_directories(ist_peer_cgal SYSTEM INTERFACE ${IST_CGAL_INCLUDE_DIR})
+  target_link_libraries(ist_peer_cgal INTERFACE ${IST_MPFR} ${IST_GMP})
+else()
+  message(STATUS "CGAL not found (libcgal-dev): no comparison with it")
 endif()
