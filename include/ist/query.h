@@ -152,10 +152,10 @@ class Workspace {
 
 /// Volume, wrench and centroid of the overlap.
 ///
-/// By spheres the sum is Σ over spheres of the finer tree of their exact part inside the other's surface, or
-/// one of lenses, as PenetrationSettings::field says. The gradients of a finished query are those
-/// of the returned volume. Copies of one asset at nearly the same pose are asked as unlike levels
-/// of detail, since equal spheres on top of each other would count too much.
+/// By spheres the sum is Σ over spheres of the finer tree of their exact part inside the other's
+/// surface, or one of lenses, as PenetrationSettings::field says. The gradients of a finished query
+/// are those of the returned volume. Copies of one asset at nearly the same pose are asked as
+/// unlike levels of detail, since equal spheres on top of each other would count too much.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 Penetration penetration(const PlacedTree& a, const PlacedTree& b,
@@ -269,8 +269,8 @@ OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
 ///
 /// Volumes, areas, forces and torques become less; a patch of which nothing is left stays, with
 /// zeros and no normal. Patches whose spheres met a surface, and those of the inner and the exact
-/// measure, are as they should be and stay. So may stay what the Penetration of the same answer says: it is another
-/// sum now.
+/// measure, are as they should be and stay. So may stay what the Penetration of the same answer
+/// says: it is another sum now.
 ///
 /// `patches`: what contact_patches() wrote for these two under these settings.
 void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, const PlacedTree& b,
