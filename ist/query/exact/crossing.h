@@ -36,30 +36,29 @@ struct Corners {
 };
 
 /// +1: the edge p → q goes down through the plane, into the other solid; −1: up.
-IST_HD int direction(int sign_p) { return sign_p > 0 ? 1 : -1; }
+IST_ANYWHERE int direction(int sign_p) { return sign_p > 0 ? 1 : -1; }
 
-/// Where edge `edge` of a triangle pierces a plane, from heights of its ends over it.
-IST_HD Piercing piercing(const Corners& triangle, int edge, const Determinant (&height)[3],
-                         bool of_b) {
-  int p = edge, q = (edge + 1) % 3;
-  double hp = std::abs(height[p].value), hq = std::abs(height[q].value);
-  const bool turned = hq < hp || (hq == hp && triangle.vertex[q] < triangle.vertex[p]);
-  if (turned) {
-    const int kept = p;
-    p = q;
-    q = kept;
-    const double kept_height = hp;
-    hp = hq;
-    hq = kept_height;
-  }
+/// An end of an edge: its number in the mesh, and its height over the triangle that the edge
+/// pierces.
+struct EdgeEnd {
+  Point x;
+  std::uint32_t vertex;
+  double height, error;
+};
+
+/// Where edge `edge` of a triangle, from p to q, pierces another.
+IST_ANYWHERE Piercing piercing(const EdgeEnd& p, const EdgeEnd& q, int edge, bool of_b) {
+  const double hp = std::abs(p.height), hq = std::abs(q.height);
+  const bool turned = hq < hp || (hq == hp && q.vertex < p.vertex);
   const double whole = hp + hq;  // > 0: an edge in the plane has both ends on one side
-  const double t = whole > 0 ? hp / whole : 0.5;
+  const double t = whole > 0 ? (turned ? hq : hp) / whole : 0.5;
+  const double error = p.error + q.error;
   Piercing out;
-  out.from = triangle.x[p];
-  out.offset = t * (triangle.x[q] - triangle.x[p]);
+  out.from = turned ? q.x : p.x;
+  out.offset = turned ? t * (p.x - q.x) : t * (q.x - p.x);
   out.t = turned ? 1 - t : t;
-  out.t_error = whole > 0 ? 2 * (height[p].error + height[q].error) / whole + 1e-15 : 1;
-  out.h_error = height[p].error + height[q].error;
+  out.t_error = whole > 0 ? 2 * error / whole + 1e-15 : 1;
+  out.h_error = error;
   out.edge = static_cast<std::int8_t>(edge);
   out.from_first = !turned;
   out.of_b = of_b;
@@ -67,12 +66,12 @@ IST_HD Piercing piercing(const Corners& triangle, int edge, const Determinant (&
 }
 
 /// Puts a piercing where it belongs.
-IST_HD void place(const Piercing& found, int sign_p, Crossing& out) {
+IST_ANYWHERE void place(const Piercing& found, int sign_p, Crossing& out) {
   ((direction(sign_p) > 0) != found.of_b ? out.end : out.start) = found;
 }
 
 /// Whether two triangles cross, by exact signs. `out` but for the triangles' numbers.
-IST_HD bool cross_exactly(const Corners& a, const Corners& b, Crossing& out) {
+IST_ANYWHERE bool cross_exactly(const Corners& a, const Corners& b, Crossing& out) {
   Determinant of_b[3], of_a[3];
   for (int k = 0; k < 3; ++k) of_b[k] = height_over_a(a.x, b.x[k]);
   if (of_b[0].sign == of_b[1].sign && of_b[1].sign == of_b[2].sign) return false;
@@ -84,17 +83,20 @@ IST_HD bool cross_exactly(const Corners& a, const Corners& b, Crossing& out) {
       round[i][j] = way_round(a.x[i], a.x[(i + 1) % 3], b.x[j], b.x[(j + 1) % 3]).sign;
     return round[i][j];
   };
+  const auto end = [](const Corners& triangle, int k, const Determinant(&height)[3]) {
+    return EdgeEnd{triangle.x[k], triangle.vertex[k], height[k].value, height[k].error};
+  };
   int ends = 0;
   for (int k = 0; k < 3; ++k)
     if (of_a[k].sign != of_a[(k + 1) % 3].sign && way(k, 0) == way(k, 1) &&
         way(k, 1) == way(k, 2)) {
-      place(piercing(a, k, of_a, false), of_a[k].sign, out);
+      place(piercing(end(a, k, of_a), end(a, (k + 1) % 3, of_a), k, false), of_a[k].sign, out);
       ++ends;
     }
   for (int k = 0; k < 3; ++k)
     if (of_b[k].sign != of_b[(k + 1) % 3].sign && way(0, k) == way(1, k) &&
         way(1, k) == way(2, k)) {
-      place(piercing(b, k, of_b, true), of_b[k].sign, out);
+      place(piercing(end(b, k, of_b), end(b, (k + 1) % 3, of_b), k, true), of_b[k].sign, out);
       ++ends;
     }
   return ends == 2;
@@ -102,7 +104,7 @@ IST_HD bool cross_exactly(const Corners& a, const Corners& b, Crossing& out) {
 
 /// How often the way from p to q, both B's points or both A's, enters the other solid through one
 /// of its triangles: 1, 0 or −1.
-IST_HD int enters(const Point& p, const Point& q, const Point (&t)[3], bool of_b) {
+IST_ANYWHERE int enters(const Point& p, const Point& q, const Point (&t)[3], bool of_b) {
   int sign[2], way[3];
   for (int k = 0; k < 2; ++k)
     sign[k] = (of_b ? height_over_a(t, k == 0 ? p : q) : height_over_b(t, k == 0 ? p : q)).sign;

@@ -589,37 +589,40 @@ class Search {
     }
     for (std::uint32_t left = all & ~apart & (pierced | ~sure); left != 0; left &= left - 1) {
       const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
-      Corners corners[2];
-      for (int s = 0; s < 2; ++s)
-        for (int c = 0; c < 3; ++c) {
-          corners[s].x[c] = {pairs.corner[s][c][0][n], pairs.corner[s][c][1][n],
-                             pairs.corner[s][c][2][n]};
-          corners[s].vertex[c] = pairs.vertex[s][c][n];
-        }
       if (found_.crossings == scratch_.most_crossings) {
         found_.complete = false;
         return;
       }
       Crossing& out = scratch_.crossings[found_.crossings];
+      const auto point = [&](int side, int c) -> exact::Point {
+        const auto& x = pairs.corner[side][c];
+        return {x[0][n], x[1][n], x[2][n]};
+      };
       if (sure >> n & 1) {
         int ends = 0;
-        const auto take = [&](const std::uint32_t(&pierces)[3], const Heights& heights, int s) {
-          if (((pierces[0] | pierces[1] | pierces[2]) >> n & 1) == 0) return;
-          Determinant height[3];
-          for (int c = 0; c < 3; ++c)
-            height[c] = {heights.value[c][n], heights.error[c][n],
-                         heights.positive[c] >> n & 1 ? 1 : -1};
+        const auto take = [&](const std::uint32_t(&pierces)[3], const Heights& heights, int side) {
+          const auto end = [&](int c) -> exact::EdgeEnd {
+            return {point(side, c), pairs.vertex[side][c][n], heights.value[c][n],
+                    heights.error[c][n]};
+          };
           for (int k = 0; k < 3; ++k)
             if (pierces[k] >> n & 1) {
-              exact::place(exact::piercing(corners[s], k, height, s == 1), height[k].sign, out);
+              exact::place(exact::piercing(end(k), end((k + 1) % 3), k, side == 1),
+                           heights.positive[k] >> n & 1 ? 1 : -1, out);
               ++ends;
             }
         };
         take(pierces_a, over_b, 0);
         take(pierces_b, over_a, 1);
         if (ends != 2) found_.consistent = false;
-      } else if (!exact::cross_exactly(corners[0], corners[1], out)) {
-        continue;
+      } else {
+        Corners corners[2];
+        for (int side = 0; side < 2; ++side)
+          for (int c = 0; c < 3; ++c) {
+            corners[side].x[c] = point(side, c);
+            corners[side].vertex[c] = pairs.vertex[side][c][n];
+          }
+        if (!exact::cross_exactly(corners[0], corners[1], out)) continue;
       }
       out.a = pairs.triangle[0][n];
       out.b = pairs.triangle[1][n];
