@@ -201,6 +201,8 @@ struct ContactPatch {
   /// Names the region: the same in every query of the same two trees in the same measure, so that a
   /// solver finds what it kept of the patch.
   /// Other pairs of trees use the same names.
+  /// By Measure::exact it names the lowest pair of triangles that cross on the patch's outline, and
+  /// stays while these do; 0 for a patch that lies inside the other solid as a whole.
   std::uint64_t id = 0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the patch's overlap, world
   /// Unit, world: the direction in which the patch pushes B, from A to B; zero if the area is.

@@ -58,6 +58,7 @@ int penetrations_answer(scene_t* s) {
   CHECK(ist_penetration(&s->a, &s->b, NULL, &none, &other) == IST_NO_HANDLE);
 
   /* The meshes of two, where both hold one; a field has none. */
+  settings.max_visits = 0;
   settings.measure = IST_EXACT;
   CHECK(ist_tree_get_info(&s->tree_a, &info) == IST_OK);
   meshes = info.mesh_triangles > 0;

@@ -59,9 +59,13 @@ def test_a_surface_alone_answers_no_query_of_spheres(cube):
     assert all(one.violations == 0 for one in ist.check(alone, closed))
     assert len(alone.spheres()) == 0
     again = ist.Asset.from_bytes(alone.to_bytes())
-    found = ist.penetration(again, cube, [1, 0, 0, 0, 0, 0, 0])
-    assert found.status == ist.QueryStatus.not_held and np.isnan(found.volume)
-    assert np.isnan(ist.separation(cube, again, [1, 0, 0, 0, 0, 0, 0]).distance)
+    one = [1, 0, 0, 0, 0, 0, 0]
+    for query in (ist.penetration, ist.separation):
+        with pytest.raises(ist.Error, match="is a surface alone and holds no spheres"):
+            query(again, cube, one)
+    found = ist.penetration(again, cube, [one])
+    assert found.status[0] == ist.QueryStatus.not_held and np.isnan(found.volume[0])
+    assert np.isnan(ist.separation(cube, again, [one]).distance[0])
 
 
 @pytest.mark.parametrize("surface, state", [("all", "own"), ("none", "none"), (0.1, "own"),

@@ -57,7 +57,7 @@ inline ExactCheck check_exactly(const PlacedTree& a, const PlacedTree& b, Worksp
   const double gap = std::hypot(found.gap.x, found.gap.y, found.gap.z) / sizes;
   const double unit = pose->unit_a * pose->unit_a * pose->unit_a;
   return {found.complete,      found.consistent,  found.crossings, gap,
-          found.volume * unit, found.error * unit};
+          found.sums.volume() * unit, found.error * unit};
 }
 
 }  // namespace ist::testing

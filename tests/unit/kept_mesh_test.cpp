@@ -115,7 +115,7 @@ TEST(KeptMesh, IsLeftOutWhereNoneIsWanted) {
 }
 
 // Never counted twice in silence.
-TEST(KeptMesh, OfWhatCountsVolumeTwiceIsNone) {
+TEST(KeptMesh, OfWhatCountsVolumeTwiceIsResolved) {
   const Point one = Point::Ones();
   const ClosedMesh crossing = closed(testing::overlapping_cubes_mesh(), "crossing");
   const ClosedMesh nested =
@@ -123,11 +123,13 @@ TEST(KeptMesh, OfWhatCountsVolumeTwiceIsNone) {
              "nested");
   for (const ClosedMesh* mesh : {&crossing, &nested}) {
     const Asset asset = bake(*mesh, few_spheres());
-    EXPECT_FALSE(asset.view().has_mesh());
-    EXPECT_EQ(asset.view().mesh_state(), MeshState::unresolved);
+    EXPECT_TRUE(asset.view().has_mesh());
+    EXPECT_EQ(asset.view().mesh_state(), MeshState::resolved);
     EXPECT_NEAR(asset.view().counted_twice(), mesh->report.volume - asset.view().volume(),
-                1e-6 * asset.view().volume());
-    EXPECT_THROW(bake_surface(*mesh), Error);
+                1e-12 * asset.view().volume());
+    EXPECT_EQ(bake_surface(*mesh).view().mesh_triangles(), asset.view().mesh_triangles());
+    for (const Invariant& found : check(asset, *mesh))
+      EXPECT_EQ(found.violations, 0u) << found.name;
   }
   EXPECT_NEAR(bake(nested, few_spheres()).view().counted_twice(), 1, 1e-6);
   // Parts that touch, and cavities, are as they should be.

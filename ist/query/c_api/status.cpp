@@ -14,7 +14,7 @@ const char* ist_describe(ist_status_t status) {
       return "a pose, a scale, a field's number or a setting is out of range";
     case IST_NOT_HELD:
       return "a solid does not hold what is asked: the exact measure wants the mesh of two assets "
-             "(bake with --surface all), all else wants spheres (bake without --surface-only)";
+             "(bake one with all of its surface), all else wants spheres (bake them)";
     case IST_NULL_POINTER:
       return "a pointer that must not be null is";
     case IST_WRONG_SIZE:

@@ -19,6 +19,8 @@ using exact::Determinant;
 
 /// Relative error of a few float operations.
 inline constexpr float kFloatError = 4e-7f;
+/// Where empty boxes lie. Infinities would be subtracted from each other.
+inline constexpr float kNowhere = 1e30f;
 
 class Search {
  public:
@@ -134,7 +136,7 @@ class Search {
     const std::uint32_t used = used_lanes(tree, level, i);
     for (int k = 0; k < 3; ++k) {
       for (std::uint32_t l = used; l < kWidth; ++l)
-        out.low[k][l] = HUGE_VALF, out.high[k][l] = -HUGE_VALF;
+        out.low[k][l] = kNowhere, out.high[k][l] = -kNowhere;
       out.all_low[k] = lowest(out.low[k]);
       out.all_high[k] = highest(out.high[k]);
     }
@@ -386,7 +388,7 @@ class Search {
       out.all_low[k] = lowest(out.low[k]);
       out.all_high[k] = highest(out.high[k]);
       for (std::uint32_t l = block.triangles; l < kWidth; ++l)
-        out.low[k][l] = HUGE_VALF, out.high[k][l] = -HUGE_VALF;
+        out.low[k][l] = kNowhere, out.high[k][l] = -kNowhere;
     }
     return out;
   }
