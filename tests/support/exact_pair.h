@@ -56,8 +56,8 @@ inline ExactCheck check_exactly(const PlacedTree& a, const PlacedTree& b, Worksp
   const double sizes = size_of(a) / pose->unit_a * (size_of(b) / pose->unit_a);
   const double gap = std::hypot(found.gap.x, found.gap.y, found.gap.z) / sizes;
   const double unit = pose->unit_a * pose->unit_a * pose->unit_a;
-  return {found.complete,      found.consistent,  found.crossings, gap,
-          found.sums.volume() * unit, found.error * unit};
+  return {found.complete,    found.consistent, found.crossings, gap, found.sums.volume() * unit,
+          found.error * unit};
 }
 
 }  // namespace ist::testing
