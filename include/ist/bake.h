@@ -64,8 +64,9 @@ class Asset {
 /// threads.
 /// Cancelling during packing keeps what is packed; later it throws Error.
 ///
-/// A mesh that reaches far into itself gets no field, and one that counts volume twice is not kept
-/// (MeshState::unresolved).
+/// A mesh that counts volume twice is resolved first: the bake is that of the boundary of where its
+/// winding number is 1 or more (MeshState::resolved). If it cannot be resolved, no mesh is kept
+/// (MeshState::unresolved), and there is no field where it reaches far into itself.
 ///
 /// Throws Error if not one sphere fits, on settings out of range, and where floats cannot be as
 /// exact as the surface's error asked for.
@@ -79,7 +80,7 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
 /// QueryStatus::not_held.
 ///
 /// `threads`: 0 = all cores. Throws Error where nothing is `wanted`, where the mesh counts volume
-/// twice, and as bake() does.
+/// twice and cannot be resolved, and as bake() does.
 Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings = {},
                    unsigned threads = 0);
 

@@ -107,7 +107,7 @@ typedef int32_t ist_mesh_state_t;
 enum {
   IST_MESH_NONE = 0,
   IST_MESH_OWN = 1,
-  IST_MESH_UNITED = 2,
+  IST_MESH_RESOLVED = 2,
   IST_MESH_SIMPLIFIED = 3,
   IST_MESH_UNRESOLVED = 4
 };

@@ -100,7 +100,7 @@ class TreeView {
   double mesh_error() const noexcept;
   MeshState mesh_state() const noexcept;  ///< none for an empty view
   /// [u³] volume that the mesh as it came counts more than once, or below zero; 0 of a mesh that
-  /// winds around every point of its solid once. An integral to about 1e-9 of the volume.
+  /// winds around every point of its solid once. An estimate for MeshState::unresolved.
   double counted_twice() const noexcept;
   /// No poses for an asset of bake(), which predicts nothing, and for an empty view.
   PredictedErrors predicted_errors() const noexcept;

@@ -282,12 +282,12 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
 }
 
 std::string describe_counted_twice(const TreeView& tree) {
-  if (tree.mesh_state() != MeshState::unresolved) return "";
-  return fmt::format(
-      "the mesh counts {:.3g} u³, {:.2g} % of the volume, more than once: it is not kept, and "
-      "exact "
-      "queries are not answered",
-      tree.counted_twice(), 100 * tree.counted_twice() / tree.volume());
+  const bool resolved = tree.mesh_state() == MeshState::resolved;
+  if (!resolved && tree.mesh_state() != MeshState::unresolved) return "";
+  return fmt::format("the mesh counts {:.3g} u³, {:.2g} % of the volume, more than once: {}",
+                     tree.counted_twice(), 100 * tree.counted_twice() / tree.volume(),
+                     resolved ? "the asset is of its union"
+                              : "it is not kept, and exact queries are not answered");
 }
 
 std::string describe_target(const TreeView& tree) {

@@ -70,13 +70,19 @@ IST_ANYWHERE void place(const Piercing& found, int sign_p, Crossing& out) {
   ((direction(sign_p) > 0) != found.of_b ? out.end : out.start) = found;
 }
 
-/// Whether two triangles cross, by exact signs. `out` but for the triangles' numbers.
-IST_ANYWHERE bool cross_exactly(const Corners& a, const Corners& b, Crossing& out) {
+/// Whether the edge of an end enters the other solid there, or leaves it.
+IST_ANYWHERE bool enters(const Crossing& crossing, const Piercing& end) {
+  return (&end == &crossing.start) == end.of_b;
+}
+
+/// How many ends the common segment of two triangles has, by exact signs: two where they cross,
+/// none else. `out` but for the triangles' numbers.
+IST_ANYWHERE int cross_exactly(const Corners& a, const Corners& b, Crossing& out) {
   Determinant of_b[3], of_a[3];
   for (int k = 0; k < 3; ++k) of_b[k] = height_over_a(a.x, b.x[k]);
-  if (of_b[0].sign == of_b[1].sign && of_b[1].sign == of_b[2].sign) return false;
+  if (of_b[0].sign == of_b[1].sign && of_b[1].sign == of_b[2].sign) return 0;
   for (int k = 0; k < 3; ++k) of_a[k] = height_over_b(b.x, a.x[k]);
-  if (of_a[0].sign == of_a[1].sign && of_a[1].sign == of_a[2].sign) return false;
+  if (of_a[0].sign == of_a[1].sign && of_a[1].sign == of_a[2].sign) return 0;
   int round[3][3] = {};  // made when asked for, 0 until then
   const auto way = [&](int i, int j) {
     if (round[i][j] == 0)
@@ -99,7 +105,7 @@ IST_ANYWHERE bool cross_exactly(const Corners& a, const Corners& b, Crossing& ou
       place(piercing(end(b, k, of_b), end(b, (k + 1) % 3, of_b), k, true), of_b[k].sign, out);
       ++ends;
     }
-  return ends == 2;
+  return ends;
 }
 
 /// How often the way from p to q, both B's points or both A's, enters the other solid through one

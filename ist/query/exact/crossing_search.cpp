@@ -600,8 +600,8 @@ class Search {
         const auto& x = pairs.corner[side][c];
         return {x[0][n], x[1][n], x[2][n]};
       };
+      int ends = 0;
       if (sure >> n & 1) {
-        int ends = 0;
         const auto take = [&](const std::uint32_t(&pierces)[3], const Heights& heights, int side) {
           const auto end = [&](int c) -> exact::EdgeEnd {
             return {point(side, c), pairs.vertex[side][c][n], heights.value[c][n],
@@ -616,7 +616,6 @@ class Search {
         };
         take(pierces_a, over_b, 0);
         take(pierces_b, over_a, 1);
-        if (ends != 2) found_.consistent = false;
       } else {
         Corners corners[2];
         for (int side = 0; side < 2; ++side)
@@ -624,8 +623,10 @@ class Search {
             corners[side].x[c] = point(side, c);
             corners[side].vertex[c] = pairs.vertex[side][c][n];
           }
-        if (!exact::cross_exactly(corners[0], corners[1], out)) continue;
+        ends = exact::cross_exactly(corners[0], corners[1], out);
       }
+      if (ends == 0) continue;
+      found_.consistent &= ends == 2;
       out.a = pairs.triangle[0][n];
       out.b = pairs.triangle[1][n];
       ++found_.crossings;

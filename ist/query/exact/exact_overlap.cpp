@@ -17,10 +17,6 @@ using exact::Point;
 /// A double's rounding: half a unit in the last place of 1.
 constexpr double kHalfUnit = 0x1p-53;
 
-bool has(const HookedArray<std::uint64_t>& bits, std::uint32_t i) {
-  return bits[i / 64] >> i % 64 & 1;
-}
-
 void set(HookedArray<std::uint64_t>& bits, std::uint32_t i) {
   bits[i / 64] |= std::uint64_t{1} << i % 64;
 }
@@ -33,17 +29,13 @@ Point map_vector(const Similarity& map, const Point& x) {
           (map.m[6] * x.x + map.m[7] * x.y) + map.m[8] * x.z};
 }
 
-/// As Similarity::apply, and as the search moves vertices.
 Point map_point(const Similarity& map, const Point& x) {
-  const Point turned = map_vector(map, x);
-  return {turned.x + map.t[0], turned.y + map.t[1], turned.z + map.t[2]};
+  double moved[3];
+  map.apply({x.x, x.y, x.z}, moved);
+  return {moved[0], moved[1], moved[2]};
 }
 
 void add(Point& sum, double factor, const Point& p) { sum = sum + factor * p; }
-
-bool enters(const Crossing& crossing, const Piercing& end) {
-  return (&end == &crossing.start) == end.of_b;
-}
 
 /// The corners of a triangle from the one that its cones start at.
 struct Fan {
@@ -504,8 +496,8 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
                      scratch_);
   out_.visits = found.visits;
   out_.crossings = found.crossings;
-  out_.complete = found.complete;
   out_.consistent = found.consistent;
+  out_.complete = found.complete && found.consistent;
   if (!out_.complete) return out_;
   sort_crossings(found.crossings);
   if (found.crossings > 0) {

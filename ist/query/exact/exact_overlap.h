@@ -16,8 +16,9 @@ struct ExactOverlap {
   double error = 0;          ///< the true volume is within it of the sums'
   exact::Point origin = {};  ///< of the sums
   std::uint32_t visits = 0, crossings = 0;
-  bool complete = true;    ///< no limit or room was short; else nothing above is of use
-  bool consistent = true;  ///< signs agree with each other
+  /// No limit or room was short, and it is consistent; else nothing above is of use.
+  bool complete = true;
+  bool consistent = true;  ///< signs agree with each other, as exact ones do
   /// How far the surface of the overlap is from closed, an area vector: rounding, if all is well.
   exact::Point gap = {};
 };

@@ -14,10 +14,6 @@ using exact::Point;
 
 constexpr std::uint32_t kNoPart = ~0u;
 
-bool has(const HookedArray<std::uint64_t>& bits, std::uint32_t i) {
-  return bits[i / 64] >> i % 64 & 1;
-}
-
 template <class Visit>
 void for_each_block(const HookedArray<std::uint64_t>& bits, std::uint32_t blocks,
                     const Visit& visit) {
@@ -153,9 +149,9 @@ void ExactParts::join_edges() noexcept {
   for (std::uint32_t i = 0; i < out_.crossings; ++i)
     for (const Piercing* end : {&crossing(i).start, &crossing(i).end}) {
       const std::uint32_t triangle = end->of_b ? crossing(i).b : crossing(i).a;
-      const bool enters = (end == &crossing(i).start) == end->of_b;
       ends[count++] = {std::uint64_t{3} * triangle + static_cast<std::uint32_t>(end->edge), end->t,
-                       i, (enters ? 1u : 0u) | (end->from_first ? 2u : 0u), end->of_b};
+                       i, (enters(crossing(i), *end) ? 1u : 0u) | (end->from_first ? 2u : 0u),
+                       end->of_b};
     }
   std::sort(ends, ends + count, [](const PiercedEnd& x, const PiercedEnd& y) {
     return std::tuple(x.of_b, x.edge, (x.other & 2) == 0, x.t, x.crossing) <
@@ -259,7 +255,7 @@ void ExactParts::sum_parts() noexcept {
       Side& own = side(end->of_b);
       const std::uint32_t triangle = end->of_b ? at.b : at.a;
       sum_piercing(own, crossed_block(own, triangle), triangle % kWidth, *end,
-                   (end == &at.start) == end->of_b ? 1 : -1, part.sums);
+                   enters(at, *end) ? 1 : -1, part.sums);
     }
   }
   for (Side& own : sides_) {

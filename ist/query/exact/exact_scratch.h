@@ -72,6 +72,11 @@ struct CrossedBlock {
   double first_t[3 * kWidth], first_error[3 * kWidth];
 };
 
+/// One bit a block, or a shell.
+inline bool has(const HookedArray<std::uint64_t>& bits, std::uint32_t i) noexcept {
+  return bits[i / 64] >> i % 64 & 1;
+}
+
 /// What a query knows of the blocks of one solid.
 struct BlockMarks {
   HookedArray<std::uint64_t> near;     ///< a bit a block: triangles of it may be near the other
