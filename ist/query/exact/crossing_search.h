@@ -18,16 +18,39 @@ struct CrossingSearch {
   std::uint32_t max_visits = 0;  ///< pairs of nodes; 0: no limit
 };
 
+/// Pairs of blocks of both meshes whose boxes come within `room`.
+struct BlockPairs {
+  std::uint32_t count = 0;   ///< in ExactScratch::keys, in any order: A's block << 32 | B's block
+  std::uint32_t visits = 0;  ///< pairs of nodes opened
+  bool complete = true;      ///< no limit or room was short
+};
+
 struct CrossingsFound {
-  std::uint32_t crossings = 0;  ///< in ExactScratch::crossings, in any order
-  std::uint32_t visits = 0;     ///< pairs of nodes opened
+  std::uint32_t crossings = 0;  ///< in ExactScratch::crossings
   std::uint32_t tests = 0;      ///< pairs of triangles tested by signs
   bool complete = true;         ///< no limit or room was short
   bool consistent = true;       ///< signs agree with each other
 };
 
-/// Finds all pairs of triangles that cross, and marks blocks that may be near the other solid
-/// (`near` of both sides, which is zero before). The same crossings on every instruction set.
-CrossingsFound find_crossings(const CrossingSearch& search, ExactScratch& scratch) noexcept;
+/// Finds the pairs of blocks.
+BlockPairs find_block_pairs(const CrossingSearch& search, ExactScratch& scratch) noexcept;
+
+/// Of `count` pairs of blocks (ExactScratch::keys, in order) the rows of triangles whose boxes and
+/// planes come within `room`, in order of their blocks, then of A's triangles. Returns how many
+/// there are (ExactScratch::rows), or ~0 where these are too many.
+std::uint32_t find_rows(const CrossingSearch& search, std::uint32_t count,
+                        ExactScratch& scratch) noexcept;
+
+/// Tests rows by signs, exact ones where need be: finds all triangles that cross, in the order of
+/// the rows, and marks blocks with triangles within `room` of the other solid (`near` of both
+/// sides, which is zero before). `loose`: rows are of another pose, when `room` was larger. The
+/// same crossings and marks on every instruction set, whatever the rows hold besides.
+CrossingsFound test_rows(const CrossingSearch& search, const TriangleRow* rows, std::uint32_t count,
+                         bool loose, ExactScratch& scratch) noexcept;
+
+/// The vertices of a block in A's unit frame, B's rounded once after the motion. It stays until
+/// others are placed.
+const PlacedTriangles& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,
+                                   ExactScratch& scratch) noexcept;
 
 }  // namespace ist

@@ -10,8 +10,6 @@
 namespace ist {
 namespace {
 
-using exact::Crossing;
-using exact::Piercing;
 using exact::Point;
 
 /// A double's rounding: half a unit in the last place of 1.
@@ -37,18 +35,50 @@ Point map_point(const Similarity& map, const Point& x) {
 
 void add(Point& sum, double factor, const Point& p) { sum = sum + factor * p; }
 
-/// The corners of a triangle from the one that its cones start at.
-struct Fan {
-  Point apex, next, last;
-  Fan(const CrossedBlock& crossed, const MeshBlock& mesh, std::uint32_t lane) {
-    const int k = crossed.apex[lane];
-    apex = crossed.vertex[mesh.corner[k][lane]];
-    next = crossed.vertex[mesh.corner[(k + 1) % 3][lane]];
-    last = crossed.vertex[mesh.corner[(k + 2) % 3][lane]];
-  }
-};
-
 }  // namespace
+
+void SlotSums::add(const ExactTerms& terms) noexcept {
+  const auto into = [](double(&sums)[8], const double(&from)[8]) {
+    for (int l = 0; l < 8; ++l) sums[l] += from[l];
+  };
+  for (const double(&six_volumes)[8] : terms.six_volumes)
+    for (int l = 0; l < 8; ++l) {
+      double rest;
+      exact::two_sum(high_[l], six_volumes[l], high_[l], rest);
+      low_[l] += rest;
+    }
+  for (int k = 0; k < 3; ++k) {
+    into(moment_[k], terms.moment[k]);
+    into(force_[k], terms.force[k]);
+    into(torque_[k], terms.torque[k]);
+  }
+  into(rounding_, terms.rounding);
+}
+
+ExactSums SlotSums::total() const noexcept {
+  ExactSums out;
+  for (int l = 0; l < 8; ++l) {
+    out.six_volumes.add(high_[l]);
+    out.six_volumes.add(low_[l]);
+    out.moment = out.moment + Point{moment_[0][l], moment_[1][l], moment_[2][l]};
+    out.force = out.force + Point{force_[0][l], force_[1][l], force_[2][l]};
+    out.torque = out.torque + Point{torque_[0][l], torque_[1][l], torque_[2][l]};
+  }
+  return out;
+}
+
+double SlotSums::rounding() const noexcept {
+  double sum = 0;
+  for (const double r : rounding_) sum += r;
+  return sum;
+}
+
+void add_term(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept {
+  for (const double(&six_volumes)[8] : terms.six_volumes) sums.six_volumes.add(six_volumes[l]);
+  sums.moment = sums.moment + Point{terms.moment[0][l], terms.moment[1][l], terms.moment[2][l]};
+  sums.force = sums.force + Point{terms.force[0][l], terms.force[1][l], terms.force[2][l]};
+  sums.torque = sums.torque + Point{terms.torque[0][l], terms.torque[1][l], terms.torque[2][l]};
+}
 
 Point ExactQuery::place(const Side& side, std::uint32_t vertex) const noexcept {
   const Point x = side.mesh.vertex(vertex);
@@ -67,36 +97,27 @@ void ExactQuery::clear_marks() noexcept {
   }
 }
 
-/// By the numbers of their triangles: the order of sums is that of the meshes.
-void ExactQuery::sort_crossings(std::uint32_t count) noexcept {
-  const Crossing* const crossings = scratch_.crossings.get();
-  const std::uint32_t bits_b =
-      static_cast<std::uint32_t>(std::bit_width(kWidth * sides_[1].mesh.level[0].count));
-  const std::uint32_t bits =
-      bits_b + static_cast<std::uint32_t>(std::bit_width(kWidth * sides_[0].mesh.level[0].count));
-  for (std::uint32_t i = 0; i < count; ++i) {
-    scratch_.keys[i] = std::uint64_t{crossings[i].a} << bits_b | crossings[i].b;
-    scratch_.order[i] = i;
-  }
-  if (count < 200) {
-    std::sort(
-        scratch_.order.get(), scratch_.order.get() + count,
-        [&](std::uint32_t x, std::uint32_t y) { return scratch_.keys[x] < scratch_.keys[y]; });
+/// By the numbers of their blocks: the order of sums is that of the meshes.
+void ExactQuery::sort_pairs(std::uint32_t count) noexcept {
+  if (count < 64) {
+    std::sort(scratch_.keys.get(), scratch_.keys.get() + count);
     return;
   }
   constexpr std::uint32_t kDigit = 9;
-  for (std::uint32_t shift = 0; shift < bits; shift += kDigit) {
-    std::uint32_t ends[(1u << kDigit) + 1] = {};
-    const auto digit = [&](std::uint32_t i) {
-      return static_cast<std::uint32_t>(scratch_.keys[i] >> shift) & ((1u << kDigit) - 1);
-    };
-    for (std::uint32_t i = 0; i < count; ++i) ++ends[digit(i) + 1];
-    for (std::uint32_t i = 0; i < 1u << kDigit; ++i) ends[i + 1] += ends[i];
-    for (std::uint32_t i = 0; i < count; ++i) {
-      const std::uint32_t which = scratch_.order[i];
-      scratch_.other_order[ends[digit(which)]++] = which;
+  for (const Side& side : {sides_[1], sides_[0]}) {
+    const auto bits = static_cast<std::uint32_t>(std::bit_width(side.mesh.level[0].count - 1));
+    for (std::uint32_t shift = side.is_b ? 0 : 32, end = shift + bits; shift < end;
+         shift += kDigit) {
+      std::uint32_t ends[(1u << kDigit) + 1] = {};
+      const auto digit = [&](std::uint64_t key) {
+        return static_cast<std::uint32_t>(key >> shift) & ((1u << kDigit) - 1);
+      };
+      for (std::uint32_t i = 0; i < count; ++i) ++ends[digit(scratch_.keys[i]) + 1];
+      for (std::uint32_t i = 0; i < 1u << kDigit; ++i) ends[i + 1] += ends[i];
+      for (std::uint32_t i = 0; i < count; ++i)
+        scratch_.other_keys[ends[digit(scratch_.keys[i])]++] = scratch_.keys[i];
+      std::swap(scratch_.keys, scratch_.other_keys);
     }
-    std::swap(scratch_.order, scratch_.other_order);
   }
 }
 
@@ -112,73 +133,64 @@ CrossedBlock* ExactQuery::make_crossed_block(Side& own, std::uint32_t block) noe
   made.pierced = 0;
   const MeshBlock& mesh = own.mesh.blocks[block];
   double away[kWidth];
-  for (std::uint32_t v = 0; v < mesh.vertices; ++v) {
-    made.vertex[v] = place(own, mesh.vertex[v]) - out_.origin;
-    away[v] = length_bound(made.vertex[v]);
-  }
-  for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
-    std::uint8_t apex = 0;
-    for (std::uint8_t k = 1; k < 3; ++k)
-      if (away[mesh.corner[k][t]] < away[mesh.corner[apex][t]]) apex = k;
-    made.apex[t] = apex;
+  const PlacedTriangles& placed = place_block(search_, own.is_b, block, scratch_);
+  const double origin[3] = {out_.origin.x, out_.origin.y, out_.origin.z};
+  for (int k = 0; k < 3; ++k)
+    for (std::uint32_t v = 0; v < kWidth; ++v) made.vertex[k][v] = placed.vertex[k][v] - origin[k];
+  for (std::uint32_t v = 0; v < kWidth; ++v)
+    away[v] =
+        (std::abs(made.vertex[0][v]) + std::abs(made.vertex[1][v])) + std::abs(made.vertex[2][v]);
+  const std::uint8_t* const corner[5] = {mesh.corner[0], mesh.corner[1], mesh.corner[2],
+                                         mesh.corner[0], mesh.corner[1]};
+  for (std::uint32_t t = 0; t < kWidth; ++t) {
+    const double first = away[corner[0][t]], second = away[corner[1][t]],
+                 third = away[corner[2][t]];
+    const int apex = third < std::min(first, second) ? 2 : second < first ? 1 : 0;
+    made.apex[t] = static_cast<std::uint8_t>(apex);
+    for (int k = 0; k < 3; ++k) made.fan[k][t] = corner[apex + k][t];
   }
   return &made;
 }
 
-/// Of both triangles' boundaries the segment that they share. A cone from the origin over a part of
-/// a triangle is made of tetrahedra with an edge from the origin to the triangle's apex.
-void ExactQuery::sum_crossing(const Crossing& crossing, ExactSums& sums) noexcept {
-  const auto apex_of = [&](bool of_b, std::uint32_t triangle) {
-    const CrossedBlock& block = crossed_block(side(of_b), triangle);
-    const std::uint32_t lane = triangle % kWidth;
-    return block.vertex[side(of_b).mesh.blocks[block.block].corner[block.apex[lane]][lane]];
-  };
-  const Point of_a = apex_of(false, crossing.a), of_b = apex_of(true, crossing.b);
-  const Point a = from_origin(crossing.start), b = from_origin(crossing.end);
-  const Point along = b - a, c = cross(a, along), both = a + b;
-  const double six_a = dot(c, of_a), six_b = dot(c, of_b);
-  sums.six_volumes.add(dot(c, of_a - of_b));
-  add(sums.moment, six_a, of_a + both);
-  add(sums.moment, -six_b, of_b + both);
-  add(sums.force, -0.5, c);
-  add(sums.torque, ((dot(a, a) + dot(a, b)) + dot(b, b)) / 6, along);
-  // What the product rounds, and what ends that are rounded do to the triangles at them.
-  const double ends = length_bound(a) + length_bound(b);
-  rounding_ += kHalfUnit * length_bound(along) *
-               (8 * length_bound(a) * length_bound(of_a - of_b) +
-                6 * ends * (length_bound(of_a - a) + length_bound(of_b - a)));
-}
-
-bool ExactQuery::add_crossing(const Crossing& crossing) noexcept {
-  CrossedBlock* const block_a = make_crossed_block(sides_[0], crossing.a / kWidth);
-  CrossedBlock* const block_b = make_crossed_block(sides_[1], crossing.b / kWidth);
-  if (block_a == nullptr || block_b == nullptr) return false;
-  sum_crossing(crossing, out_.sums);
-  for (const Piercing* end : {&crossing.start, &crossing.end}) {
-    CrossedBlock& block = end->of_b ? *block_b : *block_a;
-    const std::uint32_t lane = (end->of_b ? crossing.b : crossing.a) % kWidth;
-    const int sign = enters(crossing, *end) ? 1 : -1;
-    note_piercing(side(end->of_b), block, lane, *end, sign);
-    sum_piercing(side(end->of_b), block, lane, *end, sign, out_.sums);
+bool ExactQuery::add_crossing(std::uint32_t i) noexcept {
+  Crossings& crossings = scratch_.crossings;
+  CrossedBlock* blocks[2];
+  for (int s = 0; s < 2; ++s) {
+    const std::uint32_t triangle = crossings.triangle(s, i);
+    blocks[s] = make_crossed_block(sides_[s], triangle / kWidth);
+    if (blocks[s] == nullptr) return false;
+    for (int k = 0; k < 3; ++k)
+      crossings.apex(s, k)[i] = blocks[s]->vertex[k][blocks[s]->fan[0][triangle % kWidth]];
+  }
+  for (int e = 0; e < 2; ++e) {
+    const Crossings::End end = crossings.end_of(i, e);
+    CrossedBlock& block = *blocks[end.of_b];
+    constexpr std::uint32_t kOpposite[3] = {1, 2, 0};
+    const bool opposite = kOpposite[block.apex[end.triangle % kWidth]] == end.edge;
+    crossings.opposite(e)[i] = opposite ? (end.enters ? 1.0 : -1.0) : 0.0;
+    note_piercing(side(end.of_b), block, end, crossings.end(e, Crossings::kT)[i],
+                  crossings.end(e, Crossings::kTError)[i]);
+    if (checked_) add_gap(side(end.of_b), block, i, e);
   }
   return true;
 }
 
 /// An edge is pierced: how often it enters and leaves, and which comes first.
-void ExactQuery::note_piercing(Side& own, CrossedBlock& crossed, std::uint32_t lane,
-                               const Piercing& end, int sign) noexcept {
-  const std::uint32_t edge = 3 * lane + static_cast<std::uint32_t>(end.edge);
+void ExactQuery::note_piercing(Side& own, CrossedBlock& crossed, const Crossings::End& end,
+                               double t, double t_error) noexcept {
+  const std::uint32_t edge = 3 * (end.triangle % kWidth) + end.edge;
+  const int sign = end.enters ? 1 : -1;
   if (crossed.pierced >> edge & 1) {
     crossed.sum[edge] = static_cast<std::int8_t>(crossed.sum[edge] + sign);
     double& first = crossed.first_t[edge];
     double& error = crossed.first_error[edge];
-    if (std::abs(end.t - first) <= end.t_error + error) {  // in no certain order
+    if (std::abs(t - first) <= t_error + error) {  // in no certain order
       if (crossed.first[edge] != sign) crossed.first[edge] = 0;
-      error = std::max(error + std::abs(end.t - first), end.t_error);
-      first = std::min(first, end.t);
-    } else if (end.t < first) {
-      first = end.t;
-      error = end.t_error;
+      error = std::max(error + std::abs(t - first), t_error);
+      first = std::min(first, t);
+    } else if (t < first) {
+      first = t;
+      error = t_error;
       crossed.first[edge] = static_cast<std::int8_t>(sign);
     }
   } else {
@@ -189,39 +201,21 @@ void ExactQuery::note_piercing(Side& own, CrossedBlock& crossed, std::uint32_t l
     crossed.pierced |= std::uint64_t{1} << edge;
     crossed.sum[edge] = crossed.first[edge] = static_cast<std::int8_t>(sign);
     crossed.middle[edge] = 0;
-    crossed.first_t[edge] = end.t;
-    crossed.first_error[edge] = end.t_error;
+    crossed.first_t[edge] = t;
+    crossed.first_error[edge] = t_error;
   }
   if (end.from_first) crossed.middle[edge] = static_cast<std::int8_t>(crossed.middle[edge] + sign);
-  rounding_ += 3 * end.h_error;
-  if (checked_) {
-    const MeshBlock& mesh = own.mesh.blocks[crossed.block];
-    const auto k = static_cast<std::uint32_t>(end.from_first ? end.edge : (end.edge + 1) % 3);
-    add(out_.gap, sign * (own.is_b ? -0.5 : 0.5),
-        cross(from_origin(end), crossed.vertex[mesh.corner[k][lane]]));
-  }
 }
 
-/// The cone over an edge from its nearer end to where it is pierced.
-void ExactQuery::sum_piercing(const Side& own, const CrossedBlock& crossed, std::uint32_t lane,
-                              const Piercing& end, int sign, ExactSums& sums) noexcept {
-  if ((crossed.apex[lane] + 1) % 3 != end.edge) return;  // an edge at the apex has none
-  const Fan fan(crossed, own.mesh.blocks[crossed.block], lane);
-  const Point& near = end.from_first ? fan.next : fan.last;
-  const Point to = near - fan.apex;
-  add_cone(
-      sign * dot(fan.apex, cross(end.offset, to)), fan.apex + (near + from_origin(end)),
-      (length_bound(fan.apex) + length_bound(to)) * length_bound(end.offset) * length_bound(to),
-      sums);
-}
-
-/// A tetrahedron from the origin: six times its volume, the sum of its other corners, and what the
-/// first may be off by, in roundings.
-void ExactQuery::add_cone(double six_volumes, const Point& corners, double rounding,
-                          ExactSums& sums) noexcept {
-  sums.six_volumes.add(six_volumes);
-  add(sums.moment, six_volumes, corners);
-  rounding_ += 20 * kHalfUnit * rounding;  // the product's, and that of its corners
+/// What the surface lacks to be closed: the way from the nearer end of a pierced edge.
+void ExactQuery::add_gap(const Side& own, const CrossedBlock& crossed, std::uint32_t i,
+                         int e) noexcept {
+  const Crossings::End end = scratch_.crossings.end_of(i, e);
+  const std::uint32_t k = end.from_first ? end.edge : (end.edge + 1) % 3;
+  const double half = own.is_b == end.enters ? -0.5 : 0.5;
+  add(out_.gap, half,
+      cross(scratch_.crossings.place_of(i, e, out_.origin),
+            crossed.at(own.mesh.blocks[crossed.block].corner[k][end.triangle % kWidth])));
 }
 
 /// Which vertices are inside: those of pierced edges by what pierces them, the others by edges that
@@ -365,28 +359,28 @@ void ExactQuery::find_insides(Side& own) noexcept {
   }
 }
 
-/// The cone over the edge opposite to the apex, where its middle is inside.
-void ExactQuery::sum_triangle(const Side& own, const CrossedBlock& crossed, std::uint32_t lane,
-                              ExactSums& sums) noexcept {
-  const MeshBlock& mesh = own.mesh.blocks[crossed.block];
-  const int whole = middle_of(mesh, crossed, 3 * lane + (crossed.apex[lane] + 1u) % 3);
-  if (whole == 0) return;
-  const Fan fan(crossed, mesh, lane);
-  const Point u = fan.next - fan.apex, v = fan.last - fan.apex;
-  add_cone(whole * dot(fan.apex, cross(u, v)), fan.apex + (fan.next + fan.last),
-           (length_bound(fan.apex) + length_bound(u) + length_bound(v)) * length_bound(u) *
-               length_bound(v),
-           sums);
+void ExactQuery::count_triangles(const MeshBlock& mesh, const CrossedBlock& crossed,
+                                 std::int8_t (&whole)[kWidth]) noexcept {
+  for (std::uint32_t t = 0; t < kWidth; ++t)
+    whole[t] =
+        t < mesh.triangles
+            ? static_cast<std::int8_t>(middle_of(mesh, crossed, 3 * t + (crossed.apex[t] + 1u) % 3))
+            : std::int8_t{0};
 }
 
 void ExactQuery::sum_crossed_block(const Side& own, const CrossedBlock& crossed) noexcept {
   const MeshBlock& mesh = own.mesh.blocks[crossed.block];
-  for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
-    sum_triangle(own, crossed, t, out_.sums);
-    for (std::uint32_t k = 0; k < 3 && checked_; ++k)
-      add(out_.gap, middle_of(mesh, crossed, 3 * t + k) * (own.is_b ? -0.5 : 0.5),
-          cross(crossed.vertex[mesh.corner[k][t]], crossed.vertex[mesh.corner[(k + 1) % 3][t]]));
+  std::int8_t whole[kWidth];
+  count_triangles(mesh, crossed, whole);
+  for (int h = 0; h < 2; ++h) {
+    ExactTerms terms;
+    triangle_terms(crossed, whole, h, terms);
+    slots_.add(terms);
   }
+  for (std::uint32_t t = 0; t < mesh.triangles && checked_; ++t)
+    for (std::uint32_t k = 0; k < 3; ++k)
+      add(out_.gap, middle_of(mesh, crossed, 3 * t + k) * (own.is_b ? -0.5 : 0.5),
+          cross(crossed.at(mesh.corner[k][t]), crossed.at(mesh.corner[(k + 1) % 3][t])));
 }
 
 /// What lies below a lane of a box block, inside as a whole.
@@ -489,24 +483,34 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
       return out_;
     }
   clear_marks();
+  scratch_.forget();
   const double room = 2 * (sides_[0].moved + sides_[1].moved);
-  const CrossingsFound found =
-      find_crossings({&sides_[0].mesh, &sides_[1].mesh, a_from_b_, b_from_a_,
-                      static_cast<float>(room * (1 + 1e-6)), max_visits},
-                     scratch_);
-  out_.visits = found.visits;
+  search_.room = static_cast<float>(room * (1 + 1e-6));
+  search_.max_visits = max_visits;
+  const BlockPairs pairs = find_block_pairs(search_, scratch_);
+  out_.visits = pairs.visits;
+  out_.complete = pairs.complete;
+  if (!out_.complete) return out_;
+  sort_pairs(pairs.count);
+  const std::uint32_t rows = find_rows(search_, pairs.count, scratch_);
+  out_.complete = rows != ~0u;
+  if (!out_.complete) return out_;
+  const CrossingsFound found = test_rows(search_, scratch_.rows.get(), rows, false, scratch_);
   out_.crossings = found.crossings;
   out_.consistent = found.consistent;
   out_.complete = found.complete && found.consistent;
   if (!out_.complete) return out_;
-  sort_crossings(found.crossings);
-  if (found.crossings > 0) {
-    const Piercing& first = scratch_.crossings[scratch_.order[0]].start;
-    out_.origin = first.from + first.offset;
+  if (found.crossings > 0) out_.origin = scratch_.crossings.place_of(0, 0, {0, 0, 0});
+  for (std::uint32_t i = 0; i < found.crossings; ++i)
+    if (!add_crossing(i)) {
+      out_.complete = false;
+      return out_;
+    }
+  for (std::uint32_t i = 0; i < found.crossings; i += 8) {
+    ExactTerms terms;
+    crossing_terms(scratch_.crossings, i, out_.origin, terms);
+    slots_.add(terms);
   }
-  for (std::uint32_t i = 0; i < found.crossings && out_.complete; ++i)
-    out_.complete = add_crossing(scratch_.crossings[scratch_.order[i]]);
-  if (!out_.complete) return out_;
   for (Side& side : sides_) find_insides(side);
   for (Side& side : sides_) {
     // In the order of the mesh, whichever was found first.
@@ -518,7 +522,13 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
     sum_insides(side, side.mesh.top, 0);
     bound_near(side);
   }
-  out_.error = 1.01 * (rounding_ / 6 + layers_) + 4 * kHalfUnit * std::abs(out_.sums.volume());
+  const ExactSums crossed = slots_.total();
+  out_.sums.six_volumes.add(crossed.six_volumes.value());
+  out_.sums.moment = out_.sums.moment + crossed.moment;
+  out_.sums.force = out_.sums.force + crossed.force;
+  out_.sums.torque = out_.sums.torque + crossed.torque;
+  out_.error = 1.01 * ((rounding_ + slots_.rounding()) / 6 + layers_) +
+               4 * kHalfUnit * std::abs(out_.sums.volume());
   return out_;
 }
 

@@ -5,8 +5,10 @@
 #include <ist/query.h>
 
 #include "query/base/relative_pose.h"
+#include "query/exact/crossing_search.h"
 #include "query/exact/exact_scratch.h"
 #include "query/exact/mesh_tree.h"
+#include "query/exact/overlap_terms.h"
 
 namespace ist {
 
@@ -22,6 +24,21 @@ struct ExactOverlap {
   /// How far the surface of the overlap is from closed, an area vector: rounding, if all is well.
   exact::Point gap = {};
 };
+
+/// Sums of terms in eight slots: a term's slot is its place in the order of its kind.
+class SlotSums {
+ public:
+  void add(const ExactTerms& terms) noexcept;
+  ExactSums total() const noexcept;
+  double rounding() const noexcept;
+
+ private:
+  double high_[8] = {}, low_[8] = {};
+  double moment_[3][8] = {}, force_[3][8] = {}, torque_[3][8] = {}, rounding_[8] = {};
+};
+
+/// Adds lane l of terms.
+void add_term(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept;
 
 /// Volume and gradients of the overlap. Allocates, locks and throws nothing. The answer depends on
 /// the meshes and the map alone.
@@ -48,9 +65,6 @@ class ExactQuery {
   };
 
   Side& side(bool of_b) noexcept { return sides_[of_b ? 1 : 0]; }
-  exact::Point from_origin(const exact::Piercing& end) const noexcept {
-    return (end.from - out_.origin) + end.offset;
-  }
   CrossedBlock& crossed_block(Side& side, std::uint32_t triangle) noexcept {
     return side.marks.blocks[side.marks.place[triangle / kWidth]];
   }
@@ -61,12 +75,9 @@ class ExactQuery {
            (crossed.pierced >> edge & 1 ? crossed.middle[edge] : 0);
   }
 
-  // What parts of the boundary add to the sums.
-  void sum_crossing(const exact::Crossing& crossing, ExactSums& sums) noexcept;
-  void sum_piercing(const Side& side, const CrossedBlock& crossed, std::uint32_t lane,
-                    const exact::Piercing& end, int sign, ExactSums& sums) noexcept;
-  void sum_triangle(const Side& side, const CrossedBlock& crossed, std::uint32_t lane,
-                    ExactSums& sums) noexcept;
+  /// How often the cone over the edge opposite to each lane's apex counts.
+  static void count_triangles(const MeshBlock& mesh, const CrossedBlock& crossed,
+                              std::int8_t (&whole)[kWidth]) noexcept;
   void sum_lane(const Side& side, int level, std::uint32_t i, std::uint32_t lane,
                 ExactSums& sums) noexcept;
 
@@ -79,11 +90,12 @@ class ExactQuery {
  private:
   exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
   void clear_marks() noexcept;
-  void sort_crossings(std::uint32_t count) noexcept;
+  void sort_pairs(std::uint32_t count) noexcept;
   CrossedBlock* make_crossed_block(Side& side, std::uint32_t block) noexcept;
-  bool add_crossing(const exact::Crossing& crossing) noexcept;
-  void note_piercing(Side& side, CrossedBlock& crossed, std::uint32_t lane,
-                     const exact::Piercing& end, int sign) noexcept;
+  bool add_crossing(std::uint32_t i) noexcept;
+  void note_piercing(Side& side, CrossedBlock& crossed, const Crossings::End& end, double t,
+                     double t_error) noexcept;
+  void add_gap(const Side& side, const CrossedBlock& crossed, std::uint32_t i, int e) noexcept;
   void settle(Side& side, CrossedBlock& crossed) noexcept;
   bool is_inside(const Side& side, std::uint32_t vertex) const noexcept;
   void find_insides(Side& side) noexcept;
@@ -91,9 +103,9 @@ class ExactQuery {
   void sum_insides(const Side& side, int level, std::uint32_t i) noexcept;
   void bound_near(const Side& side) noexcept;
   void add_layer(const Side& side, double area, double width) noexcept;
-  void add_cone(double six_volumes, const exact::Point& corners, double rounding,
-                ExactSums& sums) noexcept;
 
+  CrossingSearch search_ = {&sides_[0].mesh, &sides_[1].mesh, a_from_b_, b_from_a_};
+  SlotSums slots_;
   bool checked_ = false;
   double rounding_ = 0;  ///< six times what the volume's terms may be off by
   double layers_ = 0;    ///< what surfaces may miss by having moved

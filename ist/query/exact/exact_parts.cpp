@@ -8,8 +8,6 @@
 namespace ist {
 namespace {
 
-using exact::Crossing;
-using exact::Piercing;
 using exact::Point;
 
 constexpr std::uint32_t kNoPart = ~0u;
@@ -71,14 +69,15 @@ void ExactParts::join_curves() noexcept {
   PiercedEnd* const ends = scratch_.ends.get();
   std::uint32_t count = 0;
   for (std::uint32_t i = 0; i < out_.crossings; ++i)
-    for (const Piercing* end : {&crossing(i).start, &crossing(i).end}) {
-      const std::uint32_t triangle = end->of_b ? crossing(i).b : crossing(i).a;
-      const MeshBlock& mesh = side(end->of_b).mesh.blocks[triangle / kWidth];
-      const auto k = static_cast<std::uint32_t>(end->edge);
-      const std::uint32_t p = mesh.vertex[mesh.corner[k][triangle % kWidth]],
-                          q = mesh.vertex[mesh.corner[(k + 1) % 3][triangle % kWidth]];
-      ends[count++] = {std::uint64_t{std::min(p, q)} << 32 | std::max(p, q), end->t, i,
-                       end->of_b ? crossing(i).a : crossing(i).b, end->of_b};
+    for (int e = 0; e < 2; ++e) {
+      const Crossings::End end = scratch_.crossings.end_of(i, e);
+      const MeshBlock& mesh = side(end.of_b).mesh.blocks[end.triangle / kWidth];
+      const std::uint32_t lane = end.triangle % kWidth;
+      const std::uint32_t p = mesh.vertex[mesh.corner[end.edge][lane]],
+                          q = mesh.vertex[mesh.corner[(end.edge + 1) % 3][lane]];
+      ends[count++] = {std::uint64_t{std::min(p, q)} << 32 | std::max(p, q),
+                       scratch_.crossings.end(e, Crossings::kT)[i], i,
+                       scratch_.crossings.triangle(end.of_b ? 0 : 1, i), end.of_b};
     }
   const auto place = [](const PiercedEnd& end) {
     return std::tuple(end.of_b, end.edge, end.other, end.crossing);
@@ -95,7 +94,7 @@ void ExactParts::join_curves() noexcept {
 /// there that goes around it, or to the triangle's corners.
 void ExactParts::join_holes(Side& own) noexcept {
   const auto triangle_of = [&](std::uint32_t i) {
-    return own.is_b ? crossing(i).b : crossing(i).a;
+    return scratch_.crossings.triangle(own.is_b ? 1 : 0, i);
   };
   CurveExtent* const curves = scratch_.curves.get();
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
@@ -116,9 +115,9 @@ void ExactParts::join_holes(Side& own) noexcept {
     const MeshBlock& mesh = own.mesh.blocks[hole.triangle / kWidth];
     const std::uint32_t lane = hole.triangle % kWidth;
     const CrossedBlock& block = crossed_block(own, hole.triangle);
-    const Point corner = block.vertex[mesh.corner[0][lane]];
-    const Point normal = cross(block.vertex[mesh.corner[1][lane]] - corner,
-                               block.vertex[mesh.corner[2][lane]] - corner);
+    const Point corner = block.at(mesh.corner[0][lane]);
+    const Point normal =
+        cross(block.at(mesh.corner[1][lane]) - corner, block.at(mesh.corner[2][lane]) - corner);
     if (dot(hole.area, normal) >= 0) continue;
     std::uint32_t around = ~0u;
     double narrowest = HUGE_VAL;
@@ -147,11 +146,11 @@ void ExactParts::join_edges() noexcept {
   PiercedEnd* const ends = scratch_.ends.get();
   std::uint32_t count = 0;
   for (std::uint32_t i = 0; i < out_.crossings; ++i)
-    for (const Piercing* end : {&crossing(i).start, &crossing(i).end}) {
-      const std::uint32_t triangle = end->of_b ? crossing(i).b : crossing(i).a;
-      ends[count++] = {std::uint64_t{3} * triangle + static_cast<std::uint32_t>(end->edge), end->t,
-                       i, (enters(crossing(i), *end) ? 1u : 0u) | (end->from_first ? 2u : 0u),
-                       end->of_b};
+    for (int e = 0; e < 2; ++e) {
+      const Crossings::End end = scratch_.crossings.end_of(i, e);
+      ends[count++] = {std::uint64_t{3} * end.triangle + end.edge,
+                       scratch_.crossings.end(e, Crossings::kT)[i], i,
+                       (end.enters ? 1u : 0u) | (end.from_first ? 2u : 0u), end.of_b};
     }
   std::sort(ends, ends + count, [](const PiercedEnd& x, const PiercedEnd& y) {
     return std::tuple(x.of_b, x.edge, (x.other & 2) == 0, x.t, x.crossing) <
@@ -246,17 +245,15 @@ std::uint32_t ExactParts::part_of(std::uint32_t element) noexcept {
 }
 
 void ExactParts::sum_parts() noexcept {
+  ExactTerms terms;
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
-    const Crossing& at = crossing(i);
+    if (i % 8 == 0) crossing_terms(scratch_.crossings, i, out_.origin, terms);
     ExactPart& part = scratch_.parts[part_of(i)];
-    if (part.id == 0) part.id = (std::uint64_t{at.a} << 32 | at.b) + 1;
-    sum_crossing(at, part.sums);
-    for (const Piercing* end : {&at.start, &at.end}) {
-      Side& own = side(end->of_b);
-      const std::uint32_t triangle = end->of_b ? at.b : at.a;
-      sum_piercing(own, crossed_block(own, triangle), triangle % kWidth, *end,
-                   enters(at, *end) ? 1 : -1, part.sums);
-    }
+    const std::uint64_t id = (std::uint64_t{scratch_.crossings.triangle(0, i)} << 32 |
+                              scratch_.crossings.triangle(1, i)) +
+                             1;
+    part.id = part.id == 0 ? id : std::min(part.id, id);
+    add_term(terms, i % 8, part.sums);
   }
   for (Side& own : sides_) {
     for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
@@ -264,13 +261,15 @@ void ExactParts::sum_parts() noexcept {
       const MeshBlock& mesh = own.mesh.blocks[b];
       const std::uint32_t first =
           3 * kWidth * ((own.is_b ? sides_[0].marks.count : 0) + own.marks.place[b]);
+      std::int8_t whole[kWidth];
+      count_triangles(mesh, crossed, whole);
       for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
+        if (t % 8 == 0) triangle_terms(crossed, whole, static_cast<int>(t / 8), terms);
+        if (whole[t] == 0) continue;
         const std::uint32_t edge = 3 * t + (crossed.apex[t] + 1u) % 3;
-        if (middle_of(mesh, crossed, edge) == 0) continue;
         std::uint32_t element = vertex_element(own, crossed, mesh.corner[edge % 3][t]);
         if (crossed.pierced >> edge & 1) element = scratch_.middles[first + edge];
-        if (element != kNoPart)
-          sum_triangle(own, crossed, t, scratch_.parts[part_of(element)].sums);
+        if (element != kNoPart) add_term(terms, t % 8, scratch_.parts[part_of(element)].sums);
       }
     });
     for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {
@@ -307,8 +306,8 @@ std::uint32_t ExactParts::part_of_crossing(std::uint32_t i) noexcept {
 }
 
 void ExactParts::segment(std::uint32_t i, Point& from, Point& to) const noexcept {
-  from = from_origin(crossing(i).start);
-  to = from_origin(crossing(i).end);
+  from = scratch_.crossings.place_of(i, 0, out_.origin);
+  to = scratch_.crossings.place_of(i, 1, out_.origin);
 }
 
 }  // namespace ist

@@ -24,9 +24,6 @@ class ExactParts : public ExactQuery {
  private:
   std::uint32_t root(std::uint32_t element) noexcept;
   void unite(std::uint32_t x, std::uint32_t y) noexcept;
-  const exact::Crossing& crossing(std::uint32_t i) const noexcept {
-    return scratch_.crossings[scratch_.order[i]];
-  }
   // Elements: crossings, vertices of crossed blocks, and blocks inside as a whole.
   std::uint32_t vertex_element(const Side& side, const CrossedBlock& crossed,
                                std::uint32_t vertex) const noexcept;

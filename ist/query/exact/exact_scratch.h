@@ -44,10 +44,15 @@ struct PlacedCache {
   }
 };
 
+/// Triangles of a block of B that a triangle of A may cross: a bit a lane.
+struct TriangleRow {
+  std::uint32_t a, block_b;  ///< A's triangle: 16 · block + lane
+  std::uint32_t lanes;
+};
+
 /// Eight pairs of triangles that are tested together.
 struct alignas(64) TrianglePairs {
   double corner[2][3][3][8];  ///< [A, B][corner][axis]
-  std::uint32_t vertex[2][3][8];
   std::uint32_t triangle[2][8];
   std::uint32_t count = 0;
 };
@@ -63,13 +68,89 @@ struct CrossedBlock {
   std::uint32_t block;
   std::uint16_t inside;         ///< a bit a local vertex
   std::uint64_t pierced;        ///< bit 3 · lane + edge
-  exact::Point vertex[kWidth];  ///< from the origin of the sums
+  double vertex[3][kWidth];     ///< [axis] from the origin of the sums
   std::uint8_t apex[kWidth];    ///< of each lane the corner, 0 … 2, that is nearest to the origin
+  std::uint8_t fan[3][kWidth];  ///< of each lane its corners from there on, local vertices
   // Of a pierced edge:
   std::int8_t sum[3 * kWidth];     ///< how often it enters more than it leaves
   std::int8_t first[3 * kWidth];   ///< what comes first: 1 enters, −1 leaves, 0 unclear
   std::int8_t middle[3 * kWidth];  ///< `sum` of places that are nearer to its first corner
   double first_t[3 * kWidth], first_error[3 * kWidth];
+
+  exact::Point at(std::uint32_t v) const noexcept {
+    return {vertex[0][v], vertex[1][v], vertex[2][v]};
+  }
+};
+
+/// The segments that two triangles share where they cross: a number an array each, so that eight
+/// are summed together. A segment runs from where B's side of A's triangle lies to the left of it.
+/// A's edges leave B at the start (end 0) and enter it at the end (end 1); B's edges enter A at the
+/// start and leave it at the end.
+class Crossings {
+ public:
+  /// Eight are written at once, so that up to seven more are touched.
+  Crossings(std::uint32_t most, const MemoryHooks& hooks)
+      : room_((most + 15) / 8 * 8),
+        numbers_(hooked_array<double>(hooks, std::size_t{kNumbers} * room_)),
+        triangle_(hooked_array<std::uint32_t>(hooks, 2 * std::size_t{room_})) {}
+
+  /// Where an edge of one solid goes through a triangle of the other. All segments that end there
+  /// have the same bits of it.
+  enum EndNumber {
+    kFrom = 0,    ///< x, y, z of the end of the edge that is nearer to the triangle's plane
+    kOffset = 3,  ///< from there to the place: it keeps its digits where that is next to the end
+    kT = 6,       ///< of the way along the edge, from its first corner in this triangle
+    kTError = 7,  ///< of t
+    kHeightError = 8,  ///< heights of the edge's ends over the triangle, times twice its area, are
+                       ///< off by this together
+    kEdge = 9,  ///< its number: A's 0 … 2, B's 3 … 5; and 8 if `from` is its first corner
+    kEndNumbers = 10
+  };
+  double* end(int e, int number) noexcept { return at(kEndNumbers * e + number); }
+  const double* end(int e, int number) const noexcept { return at(kEndNumbers * e + number); }
+  /// The corner of a triangle that its cones start at, from the origin of the sums.
+  double* apex(int side, int axis) noexcept { return at(2 * kEndNumbers + 3 * side + axis); }
+  const double* apex(int side, int axis) const noexcept {
+    return at(2 * kEndNumbers + 3 * side + axis);
+  }
+  /// Where the edge of an end is opposite to its triangle's apex: 1 if it enters, −1 if it leaves;
+  /// else 0.
+  double* opposite(int e) noexcept { return at(2 * kEndNumbers + 6 + e); }
+  const double* opposite(int e) const noexcept { return at(2 * kEndNumbers + 6 + e); }
+  /// Triangles: 16 · block + lane.
+  std::uint32_t& triangle(int side, std::uint32_t i) noexcept { return triangle_[2 * i + side]; }
+  std::uint32_t triangle(int side, std::uint32_t i) const noexcept {
+    return triangle_[2 * i + side];
+  }
+
+  /// An end of one.
+  struct End {
+    std::uint32_t triangle;  ///< whose edge it is
+    std::uint32_t edge;      ///< edge k goes from corner k to the next
+    bool of_b, from_first, enters;
+  };
+  End end_of(std::uint32_t i, int e) const noexcept {
+    const auto code = static_cast<std::uint32_t>(static_cast<int>(end(e, kEdge)[i]));
+    const std::uint32_t of_b = (code % 8 + 1) / 4;
+    return {triangle_[2 * i + of_b], code % 8 - 3 * of_b, of_b != 0, code >= 8,
+            static_cast<std::uint32_t>(e) != of_b};
+  }
+  /// Where it is, seen from `origin`.
+  exact::Point place_of(std::uint32_t i, int e, const exact::Point& origin) const noexcept {
+    return (exact::Point{end(e, kFrom)[i], end(e, kFrom + 1)[i], end(e, kFrom + 2)[i]} - origin) +
+           exact::Point{end(e, kOffset)[i], end(e, kOffset + 1)[i], end(e, kOffset + 2)[i]};
+  }
+
+ private:
+  static constexpr int kNumbers = 2 * kEndNumbers + 8;
+  double* at(int number) noexcept { return numbers_.get() + std::size_t{room_} * number; }
+  const double* at(int number) const noexcept {
+    return numbers_.get() + std::size_t{room_} * number;
+  }
+
+  std::uint32_t room_;
+  HookedArray<double> numbers_;
+  HookedArray<std::uint32_t> triangle_;
 };
 
 /// One bit a block, or a shell.
@@ -133,10 +214,10 @@ struct ExactScratch {
         triangles_b(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
         pairs(hooked<TrianglePairs>(hooks)),
         waiting(hooked_array<BoxPair>(hooks, kMostWaiting)),
-        crossings(hooked_array<exact::Crossing>(hooks, most_crossings)),
-        keys(hooked_array<std::uint64_t>(hooks, most_crossings)),
-        order(hooked_array<std::uint32_t>(hooks, most_crossings)),
-        other_order(hooked_array<std::uint32_t>(hooks, most_crossings)),
+        rows(hooked_array<TriangleRow>(hooks, most_rows())),
+        crossings(most_crossings, hooks),
+        keys(hooked_array<std::uint64_t>(hooks, most_rows())),
+        other_keys(hooked_array<std::uint64_t>(hooks, most_rows())),
         flood(hooked_array<std::uint32_t>(hooks, most_blocks)),
         ends(hooked_array<PiercedEnd>(hooks, 2 * std::size_t{most_crossings})),
         curves(hooked_array<CurveExtent>(hooks, most_crossings)),
@@ -158,6 +239,17 @@ struct ExactScratch {
 
   static constexpr std::uint32_t kMostParts = 1024;
 
+  /// What is placed is of another pose.
+  void forget() noexcept {
+    boxes_a->forget();
+    boxes_b->forget();
+    triangles_a->forget();
+    triangles_b->forget();
+  }
+
+  /// Pairs of blocks, and rows of triangles in them.
+  std::uint32_t most_rows() const noexcept { return 4 * most_crossings; }
+
   /// Crossings, vertices of crossed blocks and blocks of both solids.
   std::size_t elements() const noexcept {
     return most_crossings + 2 * kWidth * std::size_t{most_crossed} + 2 * std::size_t{most_blocks};
@@ -170,9 +262,9 @@ struct ExactScratch {
   Hooked<PlacedCache<PlacedTriangles, 256>> triangles_a, triangles_b;
   Hooked<TrianglePairs> pairs;
   HookedArray<BoxPair> waiting;
-  HookedArray<exact::Crossing> crossings;
-  HookedArray<std::uint64_t> keys;
-  HookedArray<std::uint32_t> order, other_order;
+  HookedArray<TriangleRow> rows;
+  Crossings crossings;
+  HookedArray<std::uint64_t> keys, other_keys;
   HookedArray<std::uint32_t> flood;
   // Of parts:
   HookedArray<PiercedEnd> ends;

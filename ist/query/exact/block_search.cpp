@@ -1,0 +1,184 @@
+#include "query/exact/crossing_search.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/exact/block_search.cpp"
+#include <hwy/foreach_target.h>
+
+#include "query/exact/placed_mesh-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
+
+/// Opens both trees together, and collects the pairs of their blocks whose boxes and slabs meet.
+class BlockSearch {
+ public:
+  BlockSearch(const CrossingSearch& search, ExactScratch& scratch)
+      : search_(search),
+        a_(*search.a),
+        b_(*search.b),
+        scratch_(scratch),
+        pad_a_(pad(search.b_from_a, a_)),
+        pad_b_(pad(search.a_from_b, b_)),
+        room_b_(static_cast<float>(search.room * search.b_from_a.scale)),
+        scale_(static_cast<float>(search.a_from_b.scale) * (1 + kFloatError)),
+        slack_(2 * pad_b_ + 2 * pad(Similarity::identity(), a_) + search.room * 2) {
+    for (int k = 0; k < 9; ++k)
+      turn_[k] = static_cast<float>(search.a_from_b.m[k] / search.a_from_b.scale);
+  }
+
+  BlockPairs run() {
+    push(a_.top, 0, b_.top, 0);
+    while (waiting_ > 0 && found_.complete) {
+      const BoxPair pair = scratch_.waiting[--waiting_];
+      if (pair.level_a == 0)
+        open_b(pair);
+      else if (pair.level_b == 0)
+        open_a(pair);
+      else
+        open_both(pair);
+      if (++found_.visits == search_.max_visits && waiting_ > 0) found_.complete = false;
+    }
+    return found_;
+  }
+
+ private:
+  void push(int level_a, std::uint32_t a, int level_b, std::uint32_t b) {
+    if (level_a == 0 && level_b == 0) {
+      if (found_.count == scratch_.most_rows())
+        found_.complete = false;
+      else
+        scratch_.keys[found_.count++] = std::uint64_t{a} << 32 | b;
+    } else if (waiting_ == ExactScratch::kMostWaiting) {
+      found_.complete = false;
+    } else {
+      scratch_.waiting[waiting_++] = {a, b, static_cast<std::uint8_t>(level_a),
+                                      static_cast<std::uint8_t>(level_b)};
+    }
+  }
+
+  /// Which boxes of B reach into the slab of a box of A and have it reach into theirs.
+  std::uint32_t in_slabs(const BoxBlock& of_a, std::uint32_t i, const BoxBlock& of_b,
+                         const PlacedBoxes& b_in_a) const {
+    const F d;
+    const auto half = hn::Set(d, 0.5f);
+    float normal[3], middle[3], extent[3], turned[3];
+    for (int k = 0; k < 3; ++k) {
+      normal[k] = of_a.normal[k][i];
+      middle[k] = 0.5f * (of_a.low[k][i] + of_a.high[k][i]);
+      extent[k] = 0.5f * (of_a.high[k][i] - of_a.low[k][i]);
+    }
+    for (int k = 0; k < 3; ++k)
+      turned[k] =
+          std::abs((turn_[k] * normal[0] + turn_[3 + k] * normal[1]) + turn_[6 + k] * normal[2]) +
+          kFloatError;
+    std::uint32_t bits = 0;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      auto along = hn::Zero(d), reach = hn::Set(d, slack_);
+      auto along_b = hn::Zero(d), reach_b = hn::Set(d, slack_);
+      for (int k = 0; k < 3; ++k) {
+        along = along + hn::Set(d, normal[k]) *
+                            (hn::Load(d, b_in_a.low[k] + l) + hn::Load(d, b_in_a.high[k] + l));
+        reach = reach + hn::Set(d, turned[k] * scale_) *
+                            (hn::Load(d, of_b.high[k] + l) - hn::Load(d, of_b.low[k] + l)) * half;
+        const auto n = hn::Load(d, b_in_a.normal[k] + l);
+        along_b = along_b + n * hn::Set(d, middle[k]);
+        reach_b = reach_b + hn::Abs(n) * hn::Set(d, extent[k]);
+      }
+      along = along * half;
+      const auto in_a = hn::And(along - reach <= hn::Set(d, of_a.slab_high[i]),
+                                along + reach >= hn::Set(d, of_a.slab_low[i]));
+      const auto in_b = hn::And(along_b - reach_b <= hn::Load(d, b_in_a.slab_high + l),
+                                along_b + reach_b >= hn::Load(d, b_in_a.slab_low + l));
+      bits |= mask_bits(d, hn::And(in_a, in_b)) << l;
+    }
+    return bits;
+  }
+
+  const PlacedBoxes& placed_a(int level, std::uint32_t i) {
+    return placed_boxes(a_, level, i, search_.b_from_a, pad_a_, *scratch_.boxes_a);
+  }
+  const PlacedBoxes& placed_b(int level, std::uint32_t i) {
+    return placed_boxes(b_, level, i, search_.a_from_b, pad_b_, *scratch_.boxes_b);
+  }
+
+  void open_both(const BoxPair& pair) {
+    const BoxBlock& boxes_a = a_.level[pair.level_a].boxes[pair.a];
+    const BoxBlock& boxes_b = b_.level[pair.level_b].boxes[pair.b];
+    const PlacedBoxes& a_in_b = placed_a(pair.level_a, pair.a);
+    const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
+    OneBox all(boxes_a.low, boxes_a.high, 0, 0);
+    for (int k = 0; k < 3; ++k) {
+      all.low[k] = b_in_a.all_low[k] - search_.room;
+      all.high[k] = b_in_a.all_high[k] + search_.room;
+    }
+    // Unused lanes meet what is large enough.
+    std::uint32_t rows = meeting(boxes_a.low, boxes_a.high, all.low, all.high) &
+                         ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
+    for (; rows != 0; rows &= rows - 1) {
+      const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
+      const OneBox here(boxes_a.low, boxes_a.high, i, search_.room);
+      std::uint32_t columns = meeting(b_in_a.low, b_in_a.high, here.low, here.high);
+      if (columns == 0) continue;
+      const OneBox there(a_in_b.low, a_in_b.high, i, room_b_);
+      columns &= meeting(boxes_b.low, boxes_b.high, there.low, there.high);
+      if (columns != 0) columns &= in_slabs(boxes_a, i, boxes_b, b_in_a);
+      for (; columns != 0; columns &= columns - 1)
+        push(pair.level_a - 1, kWidth * pair.a + i, pair.level_b - 1,
+             kWidth * pair.b + static_cast<std::uint32_t>(std::countr_zero(columns)));
+    }
+  }
+
+  /// A's side is a block.
+  void open_b(const BoxPair& pair) {
+    const std::uint32_t lane = pair.a % kWidth, parent = pair.a / kWidth;
+    const OneBox here(a_.level[1].boxes[parent].low, a_.level[1].boxes[parent].high, lane,
+                      search_.room);
+    const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
+    for (std::uint32_t found = meeting(b_in_a.low, b_in_a.high, here.low, here.high); found != 0;
+         found &= found - 1)
+      push(0, pair.a, pair.level_b - 1,
+           kWidth * pair.b + static_cast<std::uint32_t>(std::countr_zero(found)));
+  }
+
+  void open_a(const BoxPair& pair) {
+    const PlacedBoxes& b_in_a = placed_b(1, pair.b / kWidth);
+    const OneBox there(b_in_a.low, b_in_a.high, pair.b % kWidth, search_.room);
+    const BoxBlock& boxes = a_.level[pair.level_a].boxes[pair.a];
+    std::uint32_t found = meeting(boxes.low, boxes.high, there.low, there.high) &
+                          ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
+    for (; found != 0; found &= found - 1)
+      push(pair.level_a - 1, kWidth * pair.a + static_cast<std::uint32_t>(std::countr_zero(found)),
+           0, pair.b);
+  }
+
+  const CrossingSearch& search_;
+  const MeshTree& a_;
+  const MeshTree& b_;
+  ExactScratch& scratch_;
+  float pad_a_, pad_b_, room_b_, scale_, slack_, turn_[9];
+  std::uint32_t waiting_ = 0;
+  BlockPairs found_;
+};
+
+BlockPairs search_blocks(const CrossingSearch& search, ExactScratch& scratch) {
+  return BlockSearch(search, scratch).run();
+}
+
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ist {
+
+HWY_EXPORT(search_blocks);
+
+BlockPairs find_block_pairs(const CrossingSearch& search, ExactScratch& scratch) noexcept {
+  return HWY_DYNAMIC_DISPATCH(search_blocks)(search, scratch);
+}
+
+}  // namespace ist
+#endif

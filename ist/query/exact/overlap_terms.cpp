@@ -1,0 +1,154 @@
+#include "query/exact/overlap_terms.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/exact/overlap_terms.cpp"
+#include <hwy/foreach_target.h>
+
+#include "query/exact/points-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
+
+/// A double's rounding: half a unit in the last place of 1.
+inline constexpr double kHalfUnit = 0x1p-53;
+
+HWY_INLINE void store(V v, double* to) { hn::Store(v, D(), to); }
+HWY_INLINE void store(const Vec3& v, double (&to)[3][8], std::size_t l) {
+  store(v.x, to[0] + l);
+  store(v.y, to[1] + l);
+  store(v.z, to[2] + l);
+}
+
+/// The tetrahedron from the origin over a triangle of apex, near and far corner, where
+/// near → far is `along`: six times its volume, and what that may be off by.
+struct Cone {
+  V six, rounding;
+  HWY_INLINE Cone(const Vec3& apex, const Vec3& to, const Vec3& along, V times) {
+    six = times * dot(apex, cross(along, to));
+    rounding = hn::Abs(times) * hn::Set(D(), 20 * kHalfUnit) * (length_bound(apex) + length_bound(to)) *
+               (length_bound(along) * length_bound(to));
+  }
+};
+
+/// A cone from the origin over a part of a triangle is made of tetrahedra with an edge from the
+/// origin to the triangle's apex. Segments that two triangles share bound both of their parts.
+void sum_crossings(const Crossings& crossings, std::uint32_t first, const exact::Point& origin,
+                   ExactTerms& out) {
+  const D d;
+  const Vec3 o = {hn::Set(d, origin.x), hn::Set(d, origin.y), hn::Set(d, origin.z)};
+  for (std::size_t l = 0; l < 8; l += hn::Lanes(d)) {
+    const auto load = [&](const double* from) { return hn::LoadU(d, from + first + l); };
+    const auto vector = [&](int e, int number) -> Vec3 {
+      return {load(crossings.end(e, number)), load(crossings.end(e, number + 1)),
+              load(crossings.end(e, number + 2))};
+    };
+    const auto apex = [&](int side) -> Vec3 {
+      return {load(crossings.apex(side, 0)), load(crossings.apex(side, 1)),
+              load(crossings.apex(side, 2))};
+    };
+    const Vec3 of_a = apex(0), of_b = apex(1);
+    Vec3 near[2], offset[2], at[2];
+    for (int e = 0; e < 2; ++e) {
+      near[e] = vector(e, Crossings::kFrom) - o;
+      offset[e] = vector(e, Crossings::kOffset);
+      at[e] = near[e] + offset[e];
+    }
+    const Vec3 &a = at[0], &b = at[1];
+    const Vec3 along = b - a, c = cross(a, along), both = a + b;
+    const V six_a = dot(c, of_a), six_b = dot(c, of_b);
+    store(dot(c, of_a - of_b), out.six_volumes[0] + l);
+    Vec3 moment = six_a * (of_a + both) - six_b * (of_b + both);
+    // What the product rounds, and what ends that are rounded do to the triangles at them.
+    V rounding =
+        hn::Set(d, kHalfUnit) * length_bound(along) *
+        (hn::Set(d, 8.0) * length_bound(a) * length_bound(of_a - of_b) +
+         hn::Set(d, 6.0) * (length_bound(a) + length_bound(b)) *
+             (length_bound(of_a - a) + length_bound(of_b - a)));
+    for (int e = 0; e < 2; ++e) {
+      const V edge = load(crossings.end(e, Crossings::kEdge));
+      const auto first_corner = edge >= hn::Set(d, 8.0);
+      const auto by_b = hn::IfThenElse(first_corner, edge - hn::Set(d, 8.0), edge) >= hn::Set(d, 3.0);
+      const Vec3 from = {hn::IfThenElse(by_b, of_b.x, of_a.x), hn::IfThenElse(by_b, of_b.y, of_a.y),
+                         hn::IfThenElse(by_b, of_b.z, of_a.z)};
+      const Cone cone(from, near[e] - from, offset[e], load(crossings.opposite(e)));
+      store(cone.six, out.six_volumes[1 + e] + l);
+      moment = moment + cone.six * (from + (near[e] + at[e]));
+      rounding = rounding + (cone.rounding +
+                             hn::Set(d, 3.0) * load(crossings.end(e, Crossings::kHeightError)));
+    }
+    store(rounding, out.rounding + l);
+    store(moment, out.moment, l);
+    store(hn::Set(d, -0.5) * c, out.force, l);
+    store((((dot(a, a) + dot(a, b)) + dot(b, b)) / hn::Set(d, 6.0)) * along, out.torque, l);
+  }
+}
+
+/// Corners of eight triangles from a block's sixteen vertices.
+HWY_INLINE Vec3 corners(const CrossedBlock& crossed, const std::uint8_t* local, std::size_t l) {
+  const D d;
+  V at[3];
+  if constexpr (hn::MaxLanes(D()) == 8) {
+    const hn::RebindToUnsigned<D> du;
+    const auto number = hn::PromoteTo(du, hn::PromoteTo(hn::Rebind<std::uint32_t, D>(),
+                                                        hn::LoadU(hn::Rebind<std::uint8_t, D>(), local)));
+    const auto lanes = hn::IndicesFromVec(d, hn::And(number, hn::Set(du, 7)));
+    const auto low = hn::RebindMask(d, number < hn::Set(du, 8));
+    for (int k = 0; k < 3; ++k)
+      at[k] = hn::IfThenElse(low, hn::TableLookupLanes(hn::LoadU(d, crossed.vertex[k]), lanes),
+                             hn::TableLookupLanes(hn::LoadU(d, crossed.vertex[k] + 8), lanes));
+  } else {
+    for (int k = 0; k < 3; ++k) {
+      HWY_ALIGN double lanes[hn::MaxLanes(D())];
+      for (std::size_t i = 0; i < hn::Lanes(d); ++i) lanes[i] = crossed.vertex[k][local[l + i]];
+      at[k] = hn::Load(d, lanes);
+    }
+  }
+  return {at[0], at[1], at[2]};
+}
+
+void sum_triangles(const CrossedBlock& crossed, const std::int8_t (&whole)[kWidth], int h,
+                   ExactTerms& out) {
+  const D d;
+  alignas(64) double times[8];
+  for (int i = 0; i < 8; ++i) times[i] = whole[8 * h + i];
+  for (std::size_t l = 0; l < 8; l += hn::Lanes(d)) {
+    const auto corner = [&](int k) { return corners(crossed, crossed.fan[k] + 8 * h, l); };
+    const Vec3 apex = corner(0), next = corner(1), last = corner(2);
+    const Vec3 u = next - apex, v = last - apex;
+    const V count = hn::Load(d, times + l);
+    const V six = count * dot(apex, cross(u, v));
+    const V zero = hn::Zero(d);
+    store(six, out.six_volumes[0] + l);
+    store(zero, out.six_volumes[1] + l);
+    store(zero, out.six_volumes[2] + l);
+    store(hn::Abs(count) * hn::Set(d, 20 * kHalfUnit) *
+              ((length_bound(apex) + length_bound(u) + length_bound(v)) *
+               (length_bound(u) * length_bound(v))),
+          out.rounding + l);
+    store(six * (apex + (next + last)), out.moment, l);
+    store({zero, zero, zero}, out.force, l);
+    store({zero, zero, zero}, out.torque, l);
+  }
+}
+
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ist {
+
+HWY_EXPORT(sum_crossings);
+HWY_EXPORT(sum_triangles);
+
+void crossing_terms(const Crossings& crossings, std::uint32_t first, const exact::Point& origin,
+                    ExactTerms& out) noexcept {
+  HWY_DYNAMIC_DISPATCH(sum_crossings)(crossings, first, origin, out);
+}
+
+void triangle_terms(const CrossedBlock& crossed, const std::int8_t (&whole)[kWidth], int h,
+                    ExactTerms& out) noexcept {
+  HWY_DYNAMIC_DISPATCH(sum_triangles)(crossed, whole, h, out);
+}
+
+}  // namespace ist
+#endif
