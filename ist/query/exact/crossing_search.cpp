@@ -35,16 +35,13 @@ class TriangleSearch {
     return rows_;
   }
 
-  CrossingsFound test_rows(const TriangleRow* rows, std::uint32_t count, bool loose) {
+  CrossingsFound test_rows(std::uint32_t count) {
     for (std::uint32_t n = 0; n < count && found_.complete; ++n) {
-      const std::uint32_t number_a = rows[n].a / kWidth, i = rows[n].a % kWidth;
-      const PlacedTriangles& a = placed_a(number_a);
-      const PlacedTriangles& b = placed_b(rows[n].block_b);
-      std::uint32_t lanes = rows[n].lanes;
-      if (loose) lanes = crossable(a, i, b, lanes);
-      for (; lanes != 0; lanes &= lanes - 1)
-        add_pair(rows[n].a, a, rows[n].block_b, b,
-                 static_cast<std::uint32_t>(std::countr_zero(lanes)));
+      const TriangleRow& row = scratch_.rows[n];
+      const PlacedTriangles& a = placed_a(row.a / kWidth);
+      const PlacedTriangles& b = placed_b(row.block_b);
+      for (std::uint32_t lanes = row.lanes; lanes != 0; lanes &= lanes - 1)
+        add_pair(row.a, a, row.block_b, b, static_cast<std::uint32_t>(std::countr_zero(lanes)));
     }
     if (found_.complete) test_pairs();
     clear_behind();
@@ -181,9 +178,8 @@ class TriangleSearch {
     double height[2][3][8], error[2][3][8];  ///< of A's corners over B's plane, of B's over A's
     std::uint32_t positive[2][3] = {};       ///< such a height
     std::uint32_t pierced[6] = {};           ///< edge: A's three, B's three
-    std::uint32_t apart = 0;                 ///< certainly, by a plane
-    std::uint32_t sure = 0;                  ///< no sign is unclear
-    std::uint32_t near = 0;                  ///< boxes and planes come within the room
+    std::uint32_t apart = 0;                 ///< likewise by a plane
+    std::uint32_t sure = 0;                  ///< no sign is unclear, wherever in the room they lie
   };
 
   static std::uint32_t each(const std::uint32_t (&bits)[3]) { return bits[0] & bits[1] & bits[2]; }
@@ -201,59 +197,44 @@ class TriangleSearch {
       for (int s = 0; s < 2; ++s)
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
       const V room = hn::Set(d, double{search_.room});
-      auto near = hn::FirstN(d, hn::Lanes(d));
-      const auto heights = [&](int s) {
-        const Vec3(&plane)[3] = corner[1 - s];
+      const V filter = hn::Set(d, exact::kFilter), two = hn::Set(d, 2.0), six = hn::Set(d, 6.0);
+      for (int side = 0; side < 2; ++side) {
+        const Vec3(&plane)[3] = corner[1 - side];
         const Vec3 u = plane[1] - plane[0], v = plane[2] - plane[0];
         const V ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
                 bz = u.y * v.x;
         const Vec3 normal = {ax - bx, ay - by, az - bz};
         const Vec3 size = {hn::Abs(ax) + hn::Abs(bx), hn::Abs(ay) + hn::Abs(by),
                            hn::Abs(az) + hn::Abs(bz)};
-        V value[3], error[3];
+        const V longest = hn::Max(largest(u), largest(v)) + room;
         for (int c = 0; c < 3; ++c) {
-          const Vec3 r = corner[s][c] - plane[0];
-          value[c] = dot(r, normal);
-          error[c] = hn::Set(d, exact::kFilter) *
-                     ((hn::Abs(r.x) * size.x + hn::Abs(r.y) * size.y) + hn::Abs(r.z) * size.z);
-          hn::Store(value[c], d, out.height[s][c] + l);
-          hn::Store(error[c], d, out.error[s][c] + l);
-          out.positive[s][c] |= mask_bits(d, value[c] > hn::Zero(d)) << l;
-          certain[s][c] |= mask_bits(d, hn::Abs(value[c]) > error[c]) << l;
+          const Vec3 r = corner[side][c] - plane[0];
+          const V value = dot(r, normal);
+          const V error =
+              filter * ((hn::Abs(r.x) * size.x + hn::Abs(r.y) * size.y) + hn::Abs(r.z) * size.z);
+          // What the room moves: six products of three numbers.
+          const V moved = six * room * longest * (two * largest(r) + longest);
+          hn::Store(value, d, out.height[side][c] + l);
+          hn::Store(error, d, out.error[side][c] + l);
+          out.positive[side][c] |= mask_bits(d, value > hn::Zero(d)) << l;
+          certain[side][c] |= mask_bits(d, hn::Abs(value) > error + moved) << l;
         }
-        const V over = max3(error[0], error[1], error[2]) + room * ((size.x + size.y) + size.z);
-        near = hn::And(near, hn::And(min3(value[0], value[1], value[2]) <= over,
-                                     max3(value[0], value[1], value[2]) >= hn::Neg(over)));
-      };
-      heights(0);
-      heights(1);
-      const auto beside = [&](V(Vec3::*axis)) {
-        const auto low = [&](int s) {
-          return min3(corner[s][0].*axis, corner[s][1].*axis, corner[s][2].*axis);
-        };
-        const auto high = [&](int s) {
-          return max3(corner[s][0].*axis, corner[s][1].*axis, corner[s][2].*axis);
-        };
-        near = hn::And(near, hn::And(low(0) <= high(1) + room, low(1) <= high(0) + room));
-      };
-      beside(&Vec3::x);
-      beside(&Vec3::y);
-      beside(&Vec3::z);
-      out.near |= mask_bits(d, near) << l;
+      }
       Vec3 edge_b[3];
       V size_b[3];
       for (int j = 0; j < 3; ++j) {
         edge_b[j] = corner[1][(j + 1) % 3] - corner[1][j];
-        size_b[j] = largest(edge_b[j]);
+        size_b[j] = largest(edge_b[j]) + room;
       }
       for (int i = 0; i < 3; ++i) {
         const Vec3 edge_a = corner[0][(i + 1) % 3] - corner[0][i];
-        // Six products of three numbers are off by no more than that of the largest.
-        const V size_a = hn::Set(d, 6 * exact::kFilter) * largest(edge_a);
+        const V size_a = largest(edge_a) + room;
+        const V error_a = six * filter * size_a, moved_a = six * room * size_a;
         for (int j = 0; j < 3; ++j) {
           const Vec3 r = corner[1][j] - corner[0][i];
-          const V value = dot(r, cross(edge_a, edge_b[j]));
-          const V error = size_a * largest(r) * size_b[j];
+          const V value = dot(r, cross(edge_a, edge_b[j])), size = largest(r);
+          const V error = error_a * size * size_b[j] + moved_a * size_b[j] +
+                          six * room * size * (size_a + size_b[j]);
           round_positive[i][j] |= mask_bits(d, value > hn::Zero(d)) << l;
           round_certain[i][j] |= mask_bits(d, hn::Abs(value) > error) << l;
         }
@@ -302,13 +283,13 @@ class TriangleSearch {
     if (count == 0) return;
     Signs signs;
     find_signs(pairs, count, signs);
-    for (std::uint32_t left = signs.near & all; left != 0; left &= left - 1) {
+    for (std::uint32_t left = all & ~signs.apart & ~signs.sure; left != 0; left &= left - 1) {
       const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
-      mark(scratch_.a.near, pairs.triangle[0][n] / kWidth);
-      mark(scratch_.b.near, pairs.triangle[1][n] / kWidth);
+      find_exactly(pairs, n, signs);
+      scratch_.keys[found_.unsure++] =
+          std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n];
+      found_.complete &= found_.unsure + 8 < scratch_.most_rows();
     }
-    for (std::uint32_t left = all & ~signs.apart & ~signs.sure; left != 0; left &= left - 1)
-      find_exactly(pairs, static_cast<std::uint32_t>(std::countr_zero(left)), signs);
     // Two edges pierce where triangles cross, none else.
     std::uint32_t once = 0, twice = 0, more = 0;
     for (const std::uint32_t pierced : signs.pierced) {
@@ -319,10 +300,6 @@ class TriangleSearch {
     }
     found_.consistent &= once == twice && more == 0;
     if (twice != 0) add_crossings(pairs, signs, twice);
-  }
-
-  static void mark(HookedArray<std::uint64_t>& bits, std::uint32_t i) {
-    bits[i / 64] |= std::uint64_t{1} << i % 64;
   }
 
   /// Where an edge, from p to q, goes through the other triangle.
@@ -443,9 +420,9 @@ std::uint32_t search_rows(const CrossingSearch& search, std::uint32_t count,
   return TriangleSearch(search, scratch).find_rows(count);
 }
 
-CrossingsFound test_all_rows(const CrossingSearch& search, const TriangleRow* rows,
-                             std::uint32_t count, bool loose, ExactScratch& scratch) {
-  return TriangleSearch(search, scratch).test_rows(rows, count, loose);
+CrossingsFound test_all_rows(const CrossingSearch& search, std::uint32_t count,
+                             ExactScratch& scratch) {
+  return TriangleSearch(search, scratch).test_rows(count);
 }
 
 const PlacedTriangles& place_one(const CrossingSearch& search, bool of_b, std::uint32_t number,
@@ -469,9 +446,9 @@ std::uint32_t find_rows(const CrossingSearch& search, std::uint32_t count,
   return HWY_DYNAMIC_DISPATCH(search_rows)(search, count, scratch);
 }
 
-CrossingsFound test_rows(const CrossingSearch& search, const TriangleRow* rows, std::uint32_t count,
-                         bool loose, ExactScratch& scratch) noexcept {
-  return HWY_DYNAMIC_DISPATCH(test_all_rows)(search, rows, count, loose, scratch);
+CrossingsFound test_rows(const CrossingSearch& search, std::uint32_t count,
+                         ExactScratch& scratch) noexcept {
+  return HWY_DYNAMIC_DISPATCH(test_all_rows)(search, count, scratch);
 }
 
 const PlacedTriangles& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,

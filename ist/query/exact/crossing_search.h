@@ -28,8 +28,11 @@ struct BlockPairs {
 struct CrossingsFound {
   std::uint32_t crossings = 0;  ///< in ExactScratch::crossings
   std::uint32_t tests = 0;      ///< pairs of triangles tested by signs
-  bool complete = true;         ///< no limit or room was short
-  bool consistent = true;       ///< signs agree with each other
+  /// Pairs of triangles whose signs might be others where points move by `room`, and some that are
+  /// far apart: in ExactScratch::keys, A's triangle << 32 | B's.
+  std::uint32_t unsure = 0;
+  bool complete = true;    ///< no limit or room was short
+  bool consistent = true;  ///< signs agree with each other
 };
 
 /// Finds the pairs of blocks.
@@ -42,11 +45,9 @@ std::uint32_t find_rows(const CrossingSearch& search, std::uint32_t count,
                         ExactScratch& scratch) noexcept;
 
 /// Tests rows by signs, exact ones where need be: finds all triangles that cross, in the order of
-/// the rows, and marks blocks with triangles within `room` of the other solid (`near` of both
-/// sides, which is zero before). `loose`: rows are of another pose, when `room` was larger. The
-/// same crossings and marks on every instruction set, whatever the rows hold besides.
-CrossingsFound test_rows(const CrossingSearch& search, const TriangleRow* rows, std::uint32_t count,
-                         bool loose, ExactScratch& scratch) noexcept;
+/// the rows. The same crossings on every instruction set.
+CrossingsFound test_rows(const CrossingSearch& search, std::uint32_t count,
+                         ExactScratch& scratch) noexcept;
 
 /// The vertices of a block in A's unit frame, B's rounded once after the motion. It stays until
 /// others are placed.

@@ -33,26 +33,36 @@ Point map_point(const Similarity& map, const Point& x) {
   return {moved[0], moved[1], moved[2]};
 }
 
+void add_to(double (&sums)[8], const double (&from)[8]) {
+  for (int l = 0; l < 8; ++l) sums[l] += from[l];
+}
+
 void add(Point& sum, double factor, const Point& p) { sum = sum + factor * p; }
 
 }  // namespace
 
-void SlotSums::add(const ExactTerms& terms) noexcept {
-  const auto into = [](double(&sums)[8], const double(&from)[8]) {
-    for (int l = 0; l < 8; ++l) sums[l] += from[l];
-  };
-  for (const double(&six_volumes)[8] : terms.six_volumes)
-    for (int l = 0; l < 8; ++l) {
-      double rest;
-      exact::two_sum(high_[l], six_volumes[l], high_[l], rest);
-      low_[l] += rest;
-    }
-  for (int k = 0; k < 3; ++k) {
-    into(moment_[k], terms.moment[k]);
-    into(force_[k], terms.force[k]);
-    into(torque_[k], terms.torque[k]);
+void SlotSums::add_volumes(const double (&six_volumes)[8]) noexcept {
+  for (int l = 0; l < 8; ++l) {
+    double rest;
+    exact::two_sum(high_[l], six_volumes[l], high_[l], rest);
+    low_[l] += rest;
   }
-  into(rounding_, terms.rounding);
+}
+
+void SlotSums::add_triangles(const ExactTerms& terms) noexcept {
+  add_volumes(terms.six_volumes[0]);
+  for (int k = 0; k < 3; ++k) add_to(moment_[k], terms.moment[k]);
+  add_to(rounding_, terms.rounding);
+}
+
+void SlotSums::add_crossings(const ExactTerms& terms) noexcept {
+  add_triangles(terms);
+  add_volumes(terms.six_volumes[1]);
+  add_volumes(terms.six_volumes[2]);
+  for (int k = 0; k < 3; ++k) {
+    add_to(force_[k], terms.force[k]);
+    add_to(torque_[k], terms.torque[k]);
+  }
 }
 
 ExactSums SlotSums::total() const noexcept {
@@ -73,9 +83,15 @@ double SlotSums::rounding() const noexcept {
   return sum;
 }
 
-void add_term(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept {
-  for (const double(&six_volumes)[8] : terms.six_volumes) sums.six_volumes.add(six_volumes[l]);
+void add_triangle(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept {
+  sums.six_volumes.add(terms.six_volumes[0][l]);
   sums.moment = sums.moment + Point{terms.moment[0][l], terms.moment[1][l], terms.moment[2][l]};
+}
+
+void add_crossing(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept {
+  add_triangle(terms, l, sums);
+  sums.six_volumes.add(terms.six_volumes[1][l]);
+  sums.six_volumes.add(terms.six_volumes[2][l]);
   sums.force = sums.force + Point{terms.force[0][l], terms.force[1][l], terms.force[2][l]};
   sums.torque = sums.torque + Point{terms.torque[0][l], terms.torque[1][l], terms.torque[2][l]};
 }
@@ -375,7 +391,7 @@ void ExactQuery::sum_crossed_block(const Side& own, const CrossedBlock& crossed)
   for (int h = 0; h < 2; ++h) {
     ExactTerms terms;
     triangle_terms(crossed, whole, h, terms);
-    slots_.add(terms);
+    slots_.add_triangles(terms);
   }
   for (std::uint32_t t = 0; t < mesh.triangles && checked_; ++t)
     for (std::uint32_t k = 0; k < 3; ++k)
@@ -458,6 +474,50 @@ void ExactQuery::add_layer(const Side& own, double area, double width) noexcept 
   layers_ += own.moved * area + 32 * (own.moved * own.moved) * width;
 }
 
+/// Whether no axis that a search goes by keeps two triangles apart: the same answer whichever
+/// search found them.
+bool ExactQuery::within_room(std::uint32_t a, std::uint32_t b) const noexcept {
+  const std::uint32_t triangles[2] = {a, b};
+  Point corner[2][3], axis[8] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int s = 0; s < 2; ++s) {
+    const Side& own = sides_[s];
+    const std::uint32_t number = triangles[s] / kWidth, lane = triangles[s] % kWidth;
+    const MeshBlock& block = own.mesh.blocks[number];
+    for (int c = 0; c < 3; ++c) corner[s][c] = place(own, block.vertex[block.corner[c][lane]]);
+    const BoxBlock& box = own.mesh.level[1].boxes[number / kWidth];
+    const Point normal = {box.normal[0][number % kWidth], box.normal[1][number % kWidth],
+                          box.normal[2][number % kWidth]};
+    axis[6 + s] = own.is_b ? (1 / a_from_b_.scale) * map_vector(a_from_b_, normal) : normal;
+  }
+  for (int k = 0; k < 3; ++k)
+    axis[3 + k] =
+        (1 / a_from_b_.scale) * Point{a_from_b_.m[k], a_from_b_.m[3 + k], a_from_b_.m[6 + k]};
+  for (const Point& n : axis) {
+    double low[2], high[2];
+    for (int s = 0; s < 2; ++s) {
+      const double at[3] = {dot(n, corner[s][0]), dot(n, corner[s][1]), dot(n, corner[s][2])};
+      low[s] = std::min({at[0], at[1], at[2]});
+      high[s] = std::max({at[0], at[1], at[2]});
+    }
+    const double room = search_.room * length_bound(n);
+    if (low[0] > high[1] + room || low[1] > high[0] + room) return false;
+  }
+  return true;
+}
+
+/// Blocks that cross the other solid, or would if their surface moved by the room.
+void ExactQuery::mark_near(std::uint32_t unsure) noexcept {
+  for (std::uint32_t i = 0; i < unsure; ++i) {
+    const auto a = static_cast<std::uint32_t>(scratch_.keys[i] >> 32),
+               b = static_cast<std::uint32_t>(scratch_.keys[i]);
+    if ((has(sides_[0].marks.crossed, a / kWidth) && has(sides_[1].marks.crossed, b / kWidth)) ||
+        !within_room(a, b))
+      continue;
+    set(sides_[0].marks.near, a / kWidth);
+    set(sides_[1].marks.near, b / kWidth);
+  }
+}
+
 /// Blocks at the surface of the other solid: rounding and deviations there change the volume.
 void ExactQuery::bound_near(const Side& own) noexcept {
   const std::uint32_t blocks = own.mesh.level[0].count;
@@ -475,6 +535,21 @@ void ExactQuery::bound_near(const Side& own) noexcept {
     }
 }
 
+/// All triangles that cross, in the order of the meshes.
+CrossingsFound ExactQuery::find_crossings(std::uint32_t max_visits) noexcept {
+  const double room = 2 * (sides_[0].moved + sides_[1].moved);
+  search_.room = static_cast<float>(room * (1 + 1e-6));
+  search_.max_visits = max_visits;
+  scratch_.forget(sides_[0].mesh.hash);
+  const BlockPairs pairs = find_block_pairs(search_, scratch_);
+  out_.visits = pairs.visits;
+  if (!pairs.complete) return {.complete = false};
+  sort_pairs(pairs.count);
+  const std::uint32_t rows = find_rows(search_, pairs.count, scratch_);
+  if (rows == ~0u) return {.complete = false};
+  return test_rows(search_, rows, scratch_);
+}
+
 ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
   checked_ = checked;
   for (const Side& side : sides_)
@@ -483,19 +558,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
       return out_;
     }
   clear_marks();
-  scratch_.forget();
-  const double room = 2 * (sides_[0].moved + sides_[1].moved);
-  search_.room = static_cast<float>(room * (1 + 1e-6));
-  search_.max_visits = max_visits;
-  const BlockPairs pairs = find_block_pairs(search_, scratch_);
-  out_.visits = pairs.visits;
-  out_.complete = pairs.complete;
-  if (!out_.complete) return out_;
-  sort_pairs(pairs.count);
-  const std::uint32_t rows = find_rows(search_, pairs.count, scratch_);
-  out_.complete = rows != ~0u;
-  if (!out_.complete) return out_;
-  const CrossingsFound found = test_rows(search_, scratch_.rows.get(), rows, false, scratch_);
+  const CrossingsFound found = find_crossings(max_visits);
   out_.crossings = found.crossings;
   out_.consistent = found.consistent;
   out_.complete = found.complete && found.consistent;
@@ -506,10 +569,11 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
       out_.complete = false;
       return out_;
     }
+  mark_near(found.unsure);
   for (std::uint32_t i = 0; i < found.crossings; i += 8) {
     ExactTerms terms;
     crossing_terms(scratch_.crossings, i, out_.origin, terms);
-    slots_.add(terms);
+    slots_.add_crossings(terms);
   }
   for (Side& side : sides_) find_insides(side);
   for (Side& side : sides_) {

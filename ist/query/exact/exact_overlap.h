@@ -28,17 +28,21 @@ struct ExactOverlap {
 /// Sums of terms in eight slots: a term's slot is its place in the order of its kind.
 class SlotSums {
  public:
-  void add(const ExactTerms& terms) noexcept;
+  void add_crossings(const ExactTerms& terms) noexcept;
+  void add_triangles(const ExactTerms& terms) noexcept;
   ExactSums total() const noexcept;
   double rounding() const noexcept;
 
  private:
+  void add_volumes(const double (&six_volumes)[8]) noexcept;
+
   double high_[8] = {}, low_[8] = {};
   double moment_[3][8] = {}, force_[3][8] = {}, torque_[3][8] = {}, rounding_[8] = {};
 };
 
 /// Adds lane l of terms.
-void add_term(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept;
+void add_crossing(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept;
+void add_triangle(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept;
 
 /// Volume and gradients of the overlap. Allocates, locks and throws nothing. The answer depends on
 /// the meshes and the map alone.
@@ -90,6 +94,7 @@ class ExactQuery {
  private:
   exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
   void clear_marks() noexcept;
+  CrossingsFound find_crossings(std::uint32_t max_visits) noexcept;
   void sort_pairs(std::uint32_t count) noexcept;
   CrossedBlock* make_crossed_block(Side& side, std::uint32_t block) noexcept;
   bool add_crossing(std::uint32_t i) noexcept;
@@ -101,6 +106,8 @@ class ExactQuery {
   void find_insides(Side& side) noexcept;
   void sum_crossed_block(const Side& side, const CrossedBlock& crossed) noexcept;
   void sum_insides(const Side& side, int level, std::uint32_t i) noexcept;
+  bool within_room(std::uint32_t a, std::uint32_t b) const noexcept;
+  void mark_near(std::uint32_t unsure) noexcept;
   void bound_near(const Side& side) noexcept;
   void add_layer(const Side& side, double area, double width) noexcept;
 

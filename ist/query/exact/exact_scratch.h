@@ -225,6 +225,7 @@ struct ExactScratch {
         part(hooked_array<std::uint32_t>(hooks, elements())),
         middles(hooked_array<std::uint32_t>(hooks, 2 * 3 * kWidth * std::size_t{most_crossed})),
         parts(hooked_array<ExactPart>(hooks, kMostParts)) {
+    triangles_a->forget();
     for (BlockMarks* marks : {&a, &b}) {
       for (HookedArray<std::uint64_t>* bits :
            {&marks->near, &marks->crossed, &marks->pierced, &marks->inside, &marks->shells})
@@ -239,12 +240,13 @@ struct ExactScratch {
 
   static constexpr std::uint32_t kMostParts = 1024;
 
-  /// What is placed is of another pose.
-  void forget() noexcept {
+  /// What is placed is of another pose: all but A's triangles in A's own frame.
+  void forget(std::uint64_t mesh_a) noexcept {
     boxes_a->forget();
     boxes_b->forget();
-    triangles_a->forget();
     triangles_b->forget();
+    if (mesh_a != placed_a) triangles_a->forget();
+    placed_a = mesh_a;
   }
 
   /// Pairs of blocks, and rows of triangles in them.
@@ -260,6 +262,7 @@ struct ExactScratch {
   std::uint32_t most_crossings;  ///< pairs of triangles
   Hooked<PlacedCache<PlacedBoxes, 256>> boxes_a, boxes_b;
   Hooked<PlacedCache<PlacedTriangles, 256>> triangles_a, triangles_b;
+  std::uint64_t placed_a = 0;  ///< hash of the asset that `triangles_a` are of
   Hooked<TrianglePairs> pairs;
   HookedArray<BoxPair> waiting;
   HookedArray<TriangleRow> rows;

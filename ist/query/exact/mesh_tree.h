@@ -22,6 +22,7 @@ struct MeshTree {
 
   MeshTree(const AssetHeader& asset, const MeshHeader& mesh) noexcept
       : header(&mesh),
+        hash(asset.content_hash),
         top(static_cast<int>(mesh.level_count) - 1),
         blocks(at<MeshBlock>(asset, mesh.level[0].blocks)),
         vertices(at<double>(asset, mesh.vertices)),
@@ -41,7 +42,8 @@ struct MeshTree {
   }
 
   const MeshHeader* header;
-  int top;  ///< the level of one box block, ≥ 1
+  std::uint64_t hash;  ///< of the asset
+  int top;             ///< the level of one box block, ≥ 1
   const MeshBlock* blocks;
   const double* vertices;
   const MeshShell* shells;

@@ -25,8 +25,8 @@ struct Cone {
   V six, rounding;
   HWY_INLINE Cone(const Vec3& apex, const Vec3& to, const Vec3& along, V times) {
     six = times * dot(apex, cross(along, to));
-    rounding = hn::Abs(times) * hn::Set(D(), 20 * kHalfUnit) * (length_bound(apex) + length_bound(to)) *
-               (length_bound(along) * length_bound(to));
+    rounding = hn::Abs(times) * hn::Set(D(), 20 * kHalfUnit) *
+               (length_bound(apex) + length_bound(to)) * (length_bound(along) * length_bound(to));
   }
 };
 
@@ -59,15 +59,15 @@ void sum_crossings(const Crossings& crossings, std::uint32_t first, const exact:
     store(dot(c, of_a - of_b), out.six_volumes[0] + l);
     Vec3 moment = six_a * (of_a + both) - six_b * (of_b + both);
     // What the product rounds, and what ends that are rounded do to the triangles at them.
-    V rounding =
-        hn::Set(d, kHalfUnit) * length_bound(along) *
-        (hn::Set(d, 8.0) * length_bound(a) * length_bound(of_a - of_b) +
-         hn::Set(d, 6.0) * (length_bound(a) + length_bound(b)) *
-             (length_bound(of_a - a) + length_bound(of_b - a)));
+    V rounding = hn::Set(d, kHalfUnit) * length_bound(along) *
+                 (hn::Set(d, 8.0) * length_bound(a) * length_bound(of_a - of_b) +
+                  hn::Set(d, 6.0) * (length_bound(a) + length_bound(b)) *
+                      (length_bound(of_a - a) + length_bound(of_b - a)));
     for (int e = 0; e < 2; ++e) {
       const V edge = load(crossings.end(e, Crossings::kEdge));
       const auto first_corner = edge >= hn::Set(d, 8.0);
-      const auto by_b = hn::IfThenElse(first_corner, edge - hn::Set(d, 8.0), edge) >= hn::Set(d, 3.0);
+      const auto by_b =
+          hn::IfThenElse(first_corner, edge - hn::Set(d, 8.0), edge) >= hn::Set(d, 3.0);
       const Vec3 from = {hn::IfThenElse(by_b, of_b.x, of_a.x), hn::IfThenElse(by_b, of_b.y, of_a.y),
                          hn::IfThenElse(by_b, of_b.z, of_a.z)};
       const Cone cone(from, near[e] - from, offset[e], load(crossings.opposite(e)));
@@ -89,8 +89,9 @@ HWY_INLINE Vec3 corners(const CrossedBlock& crossed, const std::uint8_t* local, 
   V at[3];
   if constexpr (hn::MaxLanes(D()) == 8) {
     const hn::RebindToUnsigned<D> du;
-    const auto number = hn::PromoteTo(du, hn::PromoteTo(hn::Rebind<std::uint32_t, D>(),
-                                                        hn::LoadU(hn::Rebind<std::uint8_t, D>(), local)));
+    const auto number =
+        hn::PromoteTo(du, hn::PromoteTo(hn::Rebind<std::uint32_t, D>(),
+                                        hn::LoadU(hn::Rebind<std::uint8_t, D>(), local)));
     const auto lanes = hn::IndicesFromVec(d, hn::And(number, hn::Set(du, 7)));
     const auto low = hn::RebindMask(d, number < hn::Set(du, 8));
     for (int k = 0; k < 3; ++k)
@@ -117,17 +118,12 @@ void sum_triangles(const CrossedBlock& crossed, const std::int8_t (&whole)[kWidt
     const Vec3 u = next - apex, v = last - apex;
     const V count = hn::Load(d, times + l);
     const V six = count * dot(apex, cross(u, v));
-    const V zero = hn::Zero(d);
     store(six, out.six_volumes[0] + l);
-    store(zero, out.six_volumes[1] + l);
-    store(zero, out.six_volumes[2] + l);
     store(hn::Abs(count) * hn::Set(d, 20 * kHalfUnit) *
               ((length_bound(apex) + length_bound(u) + length_bound(v)) *
                (length_bound(u) * length_bound(v))),
           out.rounding + l);
     store(six * (apex + (next + last)), out.moment, l);
-    store({zero, zero, zero}, out.force, l);
-    store({zero, zero, zero}, out.torque, l);
   }
 }
 

@@ -8,8 +8,8 @@ namespace ist {
 
 /// What eight pieces of the boundary add to the sums of an overlap, a lane each.
 struct alignas(64) ExactTerms {
-  /// Tetrahedra: those of a segment, and of an edge at each of its ends. Their sum would lose digits
-  /// where all are large and the overlap is small.
+  /// Tetrahedra: those of a segment, and of an edge at each of its ends. Their sum would lose
+  /// digits where all are large and the overlap is small.
   double six_volumes[3][8];
   double moment[3][8], force[3][8], torque[3][8];
   double rounding[8];  ///< six times what the volume may be off by
@@ -21,7 +21,7 @@ void crossing_terms(const Crossings& crossings, std::uint32_t first, const exact
                     ExactTerms& out) noexcept;
 
 /// Of a crossed block's triangles 8 h … 8 h + 7: cones over the edges opposite to their apexes,
-/// `whole` times each.
+/// `whole` times each. They have neither force nor torque, and but one tetrahedron each.
 void triangle_terms(const CrossedBlock& crossed, const std::int8_t (&whole)[kWidth], int h,
                     ExactTerms& out) noexcept;
 

@@ -31,8 +31,8 @@ inline float pad(const Similarity& map, const MeshTree& tree) {
   for (int k = 0; k < 3; ++k) {
     for (std::uint32_t l = 0; l < kWidth; ++l)
       if (root.low[k][l] <= root.high[k][l])
-        extent = std::max(
-            {extent, std::abs(double{root.low[k][l]}), std::abs(double{root.high[k][l]})});
+        extent =
+            std::max({extent, std::abs(double{root.low[k][l]}), std::abs(double{root.high[k][l]})});
     shift = std::max(shift, std::abs(map.t[k]));
   }
   return static_cast<float>(1e-6 * (2 * map.scale * extent + shift));
@@ -60,7 +60,7 @@ inline float highest(const float* lanes) {
 /// The boxes below a box block, seen from the other solid.
 template <class Cache>
 const PlacedBoxes& placed_boxes(const MeshTree& tree, int level, std::uint32_t i,
-                                 const Similarity& map, float pad, Cache& cache) {
+                                const Similarity& map, float pad, Cache& cache) {
   const std::uint32_t number = tree.level[level].first + i;
   PlacedBoxes& out = cache.placed[number % std::size(cache.number)];
   std::uint32_t& held = cache.number[number % std::size(cache.number)];
@@ -118,7 +118,7 @@ const PlacedBoxes& placed_boxes(const MeshTree& tree, int level, std::uint32_t i
 /// A block's triangles in A's unit frame; `map` is null for A's own.
 template <class Cache>
 const PlacedTriangles& placed_triangles(const MeshTree& tree, std::uint32_t number,
-                                     const Similarity* map, Cache& cache) {
+                                        const Similarity* map, Cache& cache) {
   PlacedTriangles& out = cache.placed[number % std::size(cache.number)];
   std::uint32_t& held = cache.number[number % std::size(cache.number)];
   if (held == number) return out;
@@ -209,9 +209,8 @@ const PlacedTriangles& placed_triangles(const MeshTree& tree, std::uint32_t numb
 }
 
 /// Which of sixteen boxes meet one.
-HWY_INLINE std::uint32_t meeting(const float (&low)[3][kWidth],
-                                        const float (&high)[3][kWidth], const float* one_low,
-                                        const float* one_high) {
+HWY_INLINE std::uint32_t meeting(const float (&low)[3][kWidth], const float (&high)[3][kWidth],
+                                 const float* one_low, const float* one_high) {
   const F d;
   std::uint32_t bits = 0;
   for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
@@ -227,8 +226,7 @@ HWY_INLINE std::uint32_t meeting(const float (&low)[3][kWidth],
 
 struct OneBox {
   float low[3], high[3];
-  OneBox(const float (&l)[3][kWidth], const float (&h)[3][kWidth], std::uint32_t lane,
-         float room) {
+  OneBox(const float (&l)[3][kWidth], const float (&h)[3][kWidth], std::uint32_t lane, float room) {
     for (int k = 0; k < 3; ++k) low[k] = l[k][lane] - room, high[k] = h[k][lane] + room;
   }
 };
