@@ -67,6 +67,7 @@ struct ContactSettings {
 struct SeparationSettings {
   std::uint32_t max_visits = 0;  ///< count of node pairs opened, the nearest first
   double deadline_us = 0;        ///< [µs] wall clock from the call; visits end at 0.95 of it
+  bool inner_spheres = false;    ///< asks these, even where both assets keep their meshes
 };
 
 /// What each half of query() may cost.
@@ -103,17 +104,20 @@ struct Penetration {
   std::uint32_t sphere_pairs = 0;
 };
 
-/// Gap of two placed solids; all zero once inner spheres overlap.
+/// Gap of two placed solids, between their surfaces if both assets keep a mesh, else between their
+/// inner spheres. All is zero once these overlap, and where the solids touch or one holds the other.
 struct Separation {
-  double distance = 0;      ///< [u] between the inner spheres
+  double distance = 0;      ///< [u] between surfaces or inner spheres
   double distance_min = 0;  ///< [u] the true distance of the solids is at least this, certified
-  double distance_max = 0;  ///< [u] and at most this, certified
-  Eigen::Vector3d point_a = Eigen::Vector3d::Zero();  ///< [u] on A's inner spheres, world
-  Eigen::Vector3d point_b = Eigen::Vector3d::Zero();  ///< [u] on B's inner spheres, world
+  /// [u] and at most this, certified. Where meshes that were simplified overlap, it is what they are
+  /// off by (MeshHeader::error).
+  double distance_max = 0;
+  Eigen::Vector3d point_a = Eigen::Vector3d::Zero();  ///< [u] on A's surface or spheres, world
+  Eigen::Vector3d point_b = Eigen::Vector3d::Zero();  ///< [u] on B's, world
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();   ///< unit, from A to B, world
   QueryStatus status = QueryStatus::ok;
   std::uint32_t node_visits = 0;   ///< node pairs opened
-  std::uint32_t sphere_pairs = 0;  ///< sphere pairs measured
+  std::uint32_t sphere_pairs = 0;  ///< pairs of triangles or spheres measured
 };
 
 /// Where a workspace takes its memory: plain functions, called while it is made and when it ends.
@@ -177,10 +181,14 @@ Penetration penetration(const PlacedTree& a, const PlacedTree& b,
 Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
                                const PlacedTree& b) noexcept;
 
-/// Distance of the inner spheres, witness points, and a certified interval for the solids.
+/// Distance, witness points, and a certified interval for the solids.
 ///
-/// Exact to about 1e-6 of the objects' size.
-/// Once one object's spheres overlap the other's all is zero.
+/// Where both assets keep a mesh (TreeView::has_mesh) it is that of the surfaces: the interval is as
+/// wide as rounding and what a simplified mesh is off by. Of a solid within the other it is zero.
+/// Else it is that of the inner spheres, exact to about 1e-6 of the objects' size.
+/// Batches on the GPU (<ist/gpu_query.h>) always ask the inner spheres.
+/// One that is stopped holds the nearest points found so far; its interval is certified all the
+/// same.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 Separation separation(const PlacedTree& a, const PlacedTree& b, const SeparationSettings& settings,

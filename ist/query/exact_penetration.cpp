@@ -4,54 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include <ist/asset_layout.h>
-
 #include "query/base/no_answer.h"
 #include "query/contact/write_patches.h"
 #include "query/descent/workspace.h"
 #include "query/exact/exact_parts.h"
+#include "query/exact/kept_mesh.h"
 
 namespace ist {
 namespace {
-
-MeshTree mesh_of(const PlacedTree& placed) {
-  const AssetHeader& asset = placed.tree.header();
-  return {asset, *at<MeshHeader>(asset, asset.mesh)};
-}
-
-/// No coordinate of the mesh is larger, unit frame.
-double extent_of(const MeshTree& mesh) {
-  const BoxBlock& root = mesh.level[mesh.top].boxes[0];
-  const std::uint32_t used = mesh.level[mesh.top - 1].count;
-  double extent = 0;
-  for (int k = 0; k < 3; ++k)
-    for (std::uint32_t l = 0; l < used; ++l)
-      extent =
-          std::max({extent, std::abs(double{root.low[k][l]}), std::abs(double{root.high[k][l]})});
-  return extent;
-}
-
-double offset_of(const PlacedTree& placed) {
-  const double* c = placed.tree.header().centre;
-  return placed.scale * Eigen::Vector3d(c[0], c[1], c[2]).norm();
-}
-
-double moved_in_mesh(const MeshTree& mesh) { return mesh.header->error + mesh.header->rounding; }
-
-/// How far a vertex of B may be from where the poses put it against A: A's unit frame. A rotation
-/// is off by up to 37 roundings, what moves by it, and the shift between the frames, by 45 at most
-/// with all that follows.
-double moved_by_poses(const PlacedTree& a, const PlacedTree& b, const MeshTree& mesh_b,
-                      const RelativePose& pose) {
-  constexpr double kHalfUnit = 0x1p-53;
-  const Eigen::Vector3d shift(pose.a_from_b.t[0], pose.a_from_b.t[1], pose.a_from_b.t[2]);
-  const double between =
-      std::hypot(b.pose.t[0] - a.pose.t[0], b.pose.t[1] - a.pose.t[1], b.pose.t[2] - a.pose.t[2]);
-  return 1.1 * kHalfUnit *
-         (45 * (1.8 * pose.a_from_b.scale * extent_of(mesh_b) +
-                (between + offset_of(a) + offset_of(b)) / pose.unit_a) +
-          5 * shift.norm());
-}
 
 template <class Query>
 Query query_of(const PlacedTree& a, const MeshTree& mesh_a, const PlacedTree& b,

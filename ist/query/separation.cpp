@@ -11,6 +11,8 @@
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
 #include "query/descent/workspace.h"
+#include "query/exact/kept_mesh.h"
+#include "query/exact/mesh_distance.h"
 #include "query/kernel/gap_kernel.h"
 
 namespace ist {
@@ -162,17 +164,50 @@ class GapDescent {
   bool stopped_ = false;
 };
 
+/// Between the surfaces that both assets keep.
+Separation surface_separation(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+                              const SeparationSettings& settings) noexcept {
+  const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
+  Budget budget(limits_of(settings), kForVisits);
+  const MeshGap found = mesh_gap(mesh_a, mesh_b, pose.a_from_b, pose.b_from_a, budget);
+  Separation result;
+  result.node_visits = budget.visits();
+  result.sphere_pairs = found.tests;
+  if (found.stopped) result.status = QueryStatus::budget_exhausted;
+  const double unit = pose.unit_a;
+  const double simplified = mesh_a.header->error + pose.a_from_b.scale * mesh_b.header->error;
+  if (found.overlap || found.distance == 0) {
+    result.distance_max = unit * simplified;
+    return result;
+  }
+  const double error = simplified + mesh_a.header->rounding +
+                       pose.a_from_b.scale * mesh_b.header->rounding +
+                       moved_by_poses(a, b, mesh_b, pose) +
+                       1e-15 * pose.unit_origin_a.norm() / unit;
+  const auto world = [&](const exact::Point& p) { return pose.to_world({p.x, p.y, p.z}); };
+  const exact::Point between = found.b - found.a;
+  result.distance = unit * found.distance;
+  result.distance_min = unit * std::max(0.0, found.least - error);
+  result.distance_max = unit * (found.distance * (1 + 1e-15) + error);
+  result.point_a = world(found.a);
+  result.point_b = world(found.b);
+  result.normal = pose.rotation_a * Eigen::Vector3d(between.x, between.y, between.z).normalized();
+  return result;
+}
+
 }  // namespace
 
 Separation separation(const PlacedTree& a, const PlacedTree& b, const SeparationSettings& settings,
                       Workspace& workspace) noexcept {
-  if (lack_spheres(a, b)) return not_held<Separation>();
+  const bool surfaces = !settings.inner_spheres && keeps_mesh(a) && keeps_mesh(b);
+  if (!surfaces && lack_spheres(a, b)) return not_held<Separation>();
   Separation result;
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) {
     result.status = QueryStatus::invalid_input;
     return result;
   }
+  if (surfaces) return surface_separation(a, b, *pose, settings);
   const SphereTree tree_a = sphere_tree(a.tree, Measure::inner);
   const SphereTree tree_b = sphere_tree(b.tree, Measure::inner);
   GapDescent descent(tree_a, tree_b, *pose, settings, *workspace.impl());

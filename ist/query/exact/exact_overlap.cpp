@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "query/exact/crossing_search.h"
+#include "query/exact/mesh_queries.h"
 
 namespace ist {
 namespace {
@@ -25,12 +26,6 @@ Point map_vector(const Similarity& map, const Point& x) {
   return {(map.m[0] * x.x + map.m[1] * x.y) + map.m[2] * x.z,
           (map.m[3] * x.x + map.m[4] * x.y) + map.m[5] * x.z,
           (map.m[6] * x.x + map.m[7] * x.y) + map.m[8] * x.z};
-}
-
-Point map_point(const Similarity& map, const Point& x) {
-  double moved[3];
-  map.apply({x.x, x.y, x.z}, moved);
-  return {moved[0], moved[1], moved[2]};
 }
 
 void add_to(double (&sums)[8], const double (&from)[8]) {
@@ -278,67 +273,10 @@ void ExactQuery::settle(Side& side, CrossedBlock& crossed) noexcept {
   crossed.inside = static_cast<std::uint16_t>(inside);
 }
 
-/// By the triangles of the other solid on the way out of it, along an axis of its frame.
 bool ExactQuery::is_inside(const Side& own, std::uint32_t vertex) const noexcept {
-  const Side& other = sides_[own.is_b ? 0 : 1];
-  const MeshTree& mesh = other.mesh;
-  const Point p = place(own, vertex);
-  const Point start = other.is_b ? map_point(b_from_a_, p) : p;
-  const double at[3] = {start.x, start.y, start.z};
-  double pad = 0;  // of what mapping there and back rounds
-  for (int k = 0; k < 3; ++k)
-    pad += std::abs(at[k]) + (other.is_b ? std::abs(b_from_a_.t[k]) : 0) + 1e-300;
-  pad = 1e-12 * pad;
-  float low[3], high[3];
-  const BoxBlock& root = mesh.level[mesh.top].boxes[0];
-  int axis = 0;
-  double shortest = HUGE_VAL, end = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double lowest = *std::min_element(root.low[k], root.low[k] + kWidth);
-    const double highest = *std::max_element(root.high[k], root.high[k] + kWidth);
-    if (at[k] < lowest - pad || at[k] > highest + pad) return false;
-    const double beyond = 0.25 * (highest - lowest) + 8 * pad;
-    for (const double to : {lowest - beyond, highest + beyond})
-      if (std::abs(to - at[k]) < shortest) {
-        shortest = std::abs(to - at[k]);
-        axis = k;
-        end = to;
-      }
-    low[k] = static_cast<float>(at[k] - pad);
-    low[k] -= std::abs(low[k]) * 2e-7f;
-    high[k] = static_cast<float>(at[k] + pad);
-    high[k] += std::abs(high[k]) * 2e-7f;
-  }
-  double to[3] = {at[0], at[1], at[2]};
-  to[axis] = end;
-  (end < at[axis] ? low : high)[axis] = static_cast<float>(end);
-  const Point beyond = {to[0], to[1], to[2]};
-  const Point q = other.is_b ? map_point(a_from_b_, beyond) : beyond;
-
-  int entered = 0;
-  std::pair<int, std::uint32_t> waiting[16 * kMaxLevels];
-  std::uint32_t count = 0;
-  waiting[count++] = {mesh.top, 0};
-  while (count > 0) {
-    const auto [level, i] = waiting[--count];
-    if (level == 0) {
-      const MeshBlock& block = mesh.blocks[i];
-      for (std::uint32_t t = 0; t < block.triangles; ++t) {
-        const Point corners[3] = {place(other, block.vertex[block.corner[0][t]]),
-                                  place(other, block.vertex[block.corner[1][t]]),
-                                  place(other, block.vertex[block.corner[2][t]])};
-        entered += exact::enters(p, q, corners, own.is_b);
-      }
-      continue;
-    }
-    const BoxBlock& boxes = mesh.level[level].boxes[i];
-    const std::uint32_t used = std::min(kWidth, mesh.level[level - 1].count - kWidth * i);
-    for (std::uint32_t l = 0; l < used; ++l)
-      if (boxes.low[0][l] <= high[0] && boxes.high[0][l] >= low[0] && boxes.low[1][l] <= high[1] &&
-          boxes.high[1][l] >= low[1] && boxes.low[2][l] <= high[2] && boxes.high[2][l] >= low[2])
-        waiting[count++] = {level - 1, kWidth * i + l};
-  }
-  return entered < 0;
+  const MeshTree& other = sides_[own.is_b ? 0 : 1].mesh;
+  const MeshOfPair solid = own.is_b ? MeshOfPair{other} : MeshOfPair{other, &a_from_b_, &b_from_a_};
+  return ist::is_inside(solid, place(own, vertex));
 }
 
 /// Marks the blocks that lie inside as a whole: from those whose edges are pierced on, and whole

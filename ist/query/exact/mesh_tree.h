@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include <ist/asset_layout.h>
@@ -39,6 +41,17 @@ struct MeshTree {
   exact::Point vertex(std::uint32_t v) const noexcept {
     const double* x = vertices + std::size_t{3} * v;
     return {x[0], x[1], x[2]};
+  }
+
+  /// No coordinate is larger.
+  double extent() const noexcept {
+    double extent = 0;
+    const BoxBlock& root = level[top].boxes[0];
+    for (int k = 0; k < 3; ++k)
+      for (std::uint32_t l = 0; l < level[top - 1].count; ++l)
+        extent =
+            std::max({extent, std::abs(double{root.low[k][l]}), std::abs(double{root.high[k][l]})});
+    return extent;
   }
 
   const MeshHeader* header;

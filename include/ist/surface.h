@@ -1,0 +1,87 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include <ist/api.h>
+#include <ist/field.h>
+#include <ist/query.h>
+
+// Rays and points against one solid: an asset that keeps its mesh (TreeView::has_mesh), or a field.
+//
+// Of an asset all is told by the triangles that it keeps, by exact signs where signs decide. An
+// asset without a mesh answers not_held. A pose, a scale, a ray or a point that is not usable
+// answers invalid_input. All numbers of these answers are NaN.
+//
+// Of a field: MeshField is answered as its asset. Half-space, box, ball, capsule and cylinder are
+// exact. Terrain, grids and functions tell points what they tell a query; a ray at one of them
+// answers not_held.
+//
+// No allocation, lock or exception, and no workspace: threads may share everything. Lengths are
+// [u], all vectors are in the world.
+
+namespace IST_API ist {
+
+struct Ray {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  ///< of any length but 0
+  double longest = std::numeric_limits<double>::infinity();  ///< [u] > 0: it ends there
+};
+
+/// Where a ray meets a solid's surface first. One that starts inside meets it on its way out:
+/// direction · normal > 0 there. One that starts on the surface may meet it at once.
+struct RayHit {
+  double distance = std::numeric_limits<double>::infinity();  ///< [u] ≥ 0; infinite: no hit
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();            ///< zero without a hit
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();           ///< unit, outward; likewise
+  /// Of the kept mesh: 16 · MeshBlock + lane, the same in every answer. ~0: no hit, or a field.
+  std::uint32_t triangle = ~0u;
+  QueryStatus status = QueryStatus::ok;
+
+  bool hit() const noexcept { return distance < std::numeric_limits<double>::infinity(); }
+};
+
+/// The point of a solid's surface that is nearest to a point.
+struct SurfacePoint {
+  double distance = 0;  ///< [u] signed: < 0 inside
+  double error = 0;     ///< [u] the solid's distance is within this of `distance`
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();     ///< on the surface
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< of the distance: unit, outward
+  std::uint32_t triangle = ~0u;                        ///< as RayHit has it
+  QueryStatus status = QueryStatus::ok;
+};
+
+/// Whether a point is inside. Of one on the surface either may be said, the same every time.
+struct Containment {
+  bool inside = false;  ///< false unless the status is ok
+  QueryStatus status = QueryStatus::ok;
+};
+
+/// The first hit of a ray. None slips through between triangles.
+RayHit raycast(const PlacedTree& solid, const Ray& ray) noexcept;
+RayHit raycast(const PlacedField& solid, const Ray& ray) noexcept;
+
+/// Signed distance, nearest point and gradient. At equally near points one of them answers.
+SurfacePoint closest_point(const PlacedTree& solid, const Eigen::Vector3d& point) noexcept;
+SurfacePoint closest_point(const PlacedField& solid, const Eigen::Vector3d& point) noexcept;
+
+Containment contains(const PlacedTree& solid, const Eigen::Vector3d& point) noexcept;
+Containment contains(const PlacedField& solid, const Eigen::Vector3d& point) noexcept;
+
+/// answers[i] is that of rays[i] or points[i], the same bits, for as many as there are answers.
+void raycast(const PlacedTree& solid, std::span<const Ray> rays,
+             std::span<RayHit> answers) noexcept;
+void raycast(const PlacedField& solid, std::span<const Ray> rays,
+             std::span<RayHit> answers) noexcept;
+void closest_point(const PlacedTree& solid, std::span<const Eigen::Vector3d> points,
+                   std::span<SurfacePoint> answers) noexcept;
+void closest_point(const PlacedField& solid, std::span<const Eigen::Vector3d> points,
+                   std::span<SurfacePoint> answers) noexcept;
+void contains(const PlacedTree& solid, std::span<const Eigen::Vector3d> points,
+              std::span<Containment> answers) noexcept;
+void contains(const PlacedField& solid, std::span<const Eigen::Vector3d> points,
+              std::span<Containment> answers) noexcept;
+
+}  // namespace ist

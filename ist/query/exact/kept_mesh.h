@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cmath>
+
+#include <ist/asset_layout.h>
+#include <ist/query.h>
+
+#include "query/base/relative_pose.h"
+#include "query/exact/mesh_tree.h"
+
+namespace ist {
+
+inline bool keeps_mesh(const PlacedTree& placed) noexcept {
+  return !placed.tree.empty() && placed.tree.header().mesh != 0;
+}
+
+/// Only where the asset keeps one.
+inline MeshTree mesh_of(const PlacedTree& placed) noexcept {
+  const AssetHeader& asset = placed.tree.header();
+  return {asset, *at<MeshHeader>(asset, asset.mesh)};
+}
+
+/// The solid's surface and the mesh lie within this of each other, unit frame.
+inline double moved_in_mesh(const MeshTree& mesh) noexcept {
+  return mesh.header->error + mesh.header->rounding;
+}
+
+/// How far a vertex of B may be from where the poses put it against A: A's unit frame. A rotation
+/// is off by up to 37 roundings, what moves by it, and the shift between the frames, by 45 at most
+/// with all that follows.
+inline double moved_by_poses(const PlacedTree& a, const PlacedTree& b, const MeshTree& mesh_b,
+                             const RelativePose& pose) noexcept {
+  constexpr double kHalfUnit = 0x1p-53;
+  const auto offset = [](const PlacedTree& placed) {
+    const double* c = placed.tree.header().centre;
+    return placed.scale * Eigen::Vector3d(c[0], c[1], c[2]).norm();
+  };
+  const Eigen::Vector3d shift(pose.a_from_b.t[0], pose.a_from_b.t[1], pose.a_from_b.t[2]);
+  const double between =
+      std::hypot(b.pose.t[0] - a.pose.t[0], b.pose.t[1] - a.pose.t[1], b.pose.t[2] - a.pose.t[2]);
+  return 1.1 * kHalfUnit *
+         (45 * (1.8 * pose.a_from_b.scale * mesh_b.extent() +
+                (between + offset(a) + offset(b)) / pose.unit_a) +
+          5 * shift.norm());
+}
+
+}  // namespace ist

@@ -1,0 +1,237 @@
+#include "query/exact/mesh_queries.h"
+
+#include <algorithm>
+
+#include "query/exact/crossing.h"
+#include "query/exact/nearest_points.h"
+
+namespace ist {
+namespace {
+
+using exact::Point;
+
+/// A node that waits: the nearest on top.
+struct WaitingNode {
+  double key;
+  int level;
+  std::uint32_t number;
+};
+
+/// Depth first, of sixteen below a node the one of the least key first.
+class NodeStack {
+ public:
+  explicit NodeStack(const MeshTree& mesh) noexcept { nodes_[size_++] = {0, mesh.top, 0}; }
+  bool empty() const noexcept { return size_ == 0; }
+  WaitingNode pop() noexcept { return nodes_[--size_]; }
+  /// Those below a box block whose key is less than `limit`.
+  void push(const MeshTree& mesh, const WaitingNode& of, const double (&key)[kWidth],
+            double limit) noexcept {
+    const std::uint32_t first = size_;
+    const std::uint32_t used =
+        std::min(kWidth, mesh.level[of.level - 1].count - kWidth * of.number);
+    for (std::uint32_t l = 0; l < used; ++l) {
+      if (!(key[l] < limit)) continue;
+      std::uint32_t place = size_++;
+      for (; place > first && nodes_[place - 1].key < key[l]; --place)
+        nodes_[place] = nodes_[place - 1];
+      nodes_[place] = {key[l], of.level - 1, kWidth * of.number + l};
+    }
+  }
+
+ private:
+  std::uint32_t size_ = 0;
+  WaitingNode nodes_[kWidth * kMaxLevels];
+};
+
+void corners_of(const MeshTree& mesh, const MeshBlock& block, std::uint32_t t,
+                Point (&corners)[3]) noexcept {
+  for (int k = 0; k < 3; ++k) corners[k] = mesh.vertex(block.vertex[block.corner[k][t]]);
+}
+
+/// A way from p to q, and the triangles that it may go through.
+class Way {
+ public:
+  Way(const Point& p, const Point& q) noexcept : p_(p), q_(q) {
+    const double along[3] = {q.x - p.x, q.y - p.y, q.z - p.z};
+    for (int k = 0; k < 3; ++k) {
+      from_[k] = (&p.x)[k];
+      along_[k] = along[k];
+      // Where the way does not go, what lies beside it is entered beyond its end.
+      constexpr double kLeast = 1e-150;
+      inverse_[k] = 1 / (std::abs(along[k]) > kLeast ? along[k] : kLeast);
+    }
+    main_ = std::abs(along[0]) > std::abs(along[1]) ? 0 : 1;
+    if (std::abs(along[2]) > std::abs(along[main_])) main_ = 2;
+  }
+
+  /// Where it enters sixteen boxes; HUGE_VAL for those beside it.
+  void enter(const BoxBlock& boxes, double (&key)[kWidth]) const noexcept {
+    double enter[kWidth], leave[kWidth];
+    for (std::uint32_t l = 0; l < kWidth; ++l) enter[l] = 0, leave[l] = 1;
+    for (int k = 0; k < 3; ++k)
+      for (std::uint32_t l = 0; l < kWidth; ++l) {
+        const double low = (boxes.low[k][l] - from_[k]) * inverse_[k];
+        const double high = (boxes.high[k][l] - from_[k]) * inverse_[k];
+        const double first = std::min(low, high), last = std::max(low, high);
+        constexpr double kRounding = 1e-15;
+        enter[l] = std::max(enter[l], first - kRounding * std::abs(first));
+        leave[l] = std::min(leave[l], last + kRounding * std::abs(last));
+      }
+    for (std::uint32_t l = 0; l < kWidth; ++l)
+      key[l] = enter[l] <= leave[l] ? enter[l] : HUGE_VAL;
+  }
+
+  void hit(const MeshTree& mesh, std::uint32_t number, MeshHit& best) const noexcept {
+    const MeshBlock& block = mesh.blocks[number];
+    // Vertices as the way sees them: it is the origin, and each is off by no more than `blur`.
+    const int i = (main_ + 1) % 3, j = (main_ + 2) % 3;
+    double across[2][kWidth], ahead[kWidth], reach = 0;
+    for (std::uint32_t v = 0; v < kWidth; ++v) {
+      const double* const x = mesh.vertices + std::size_t{3} * block.vertex[v];
+      ahead[v] = (x[main_] - from_[main_]) / along_[main_];
+      across[0][v] = (x[i] - from_[i]) - ahead[v] * along_[i];
+      across[1][v] = (x[j] - from_[j]) - ahead[v] * along_[j];
+      for (int k = 0; k < 3; ++k) reach = std::max(reach, std::abs(x[k]) + std::abs(from_[k]));
+    }
+    const double blur = 2e-15 * reach;
+    for (std::uint32_t t = 0; t < block.triangles; ++t) {
+      const std::uint32_t c[3] = {block.corner[0][t], block.corner[1][t], block.corner[2][t]};
+      bool beside = false;
+      for (const auto& x : across)
+        beside |= std::min({x[c[0]], x[c[1]], x[c[2]]}) > blur ||
+                  std::max({x[c[0]], x[c[1]], x[c[2]]}) < -blur;
+      const auto [first, last] = std::minmax({ahead[c[0]], ahead[c[1]], ahead[c[2]]});
+      if (beside || first - 4e-15 > std::min(1.0, best.t) || last < -4e-15) continue;
+      Point corners[3];
+      corners_of(mesh, block, t, corners);
+      if (exact::enters(p_, q_, corners, true) == 0) continue;
+      const Point normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
+      const double climbed = dot(normal, corners[0] - p_), climb = dot(normal, q_ - p_);
+      // Where it hardly climbs the corners tell better.
+      const double t_plane = climb != 0 && std::abs(climbed) <= 2 * std::abs(climb)
+                                 ? climbed / climb
+                                 : 0.5 * (first + last);
+      const double at = std::clamp(std::clamp(t_plane, first, last), 0.0, 1.0);
+      const std::uint32_t triangle = kWidth * number + t;
+      if (at < best.t || (at == best.t && triangle < best.triangle)) best = {at, triangle, normal};
+    }
+  }
+
+ private:
+  Point p_, q_;
+  double from_[3], along_[3], inverse_[3];
+  int main_;  ///< the axis along which it goes furthest
+};
+
+}  // namespace
+
+bool is_inside(const MeshOfPair& solid, const Point& p) noexcept {
+  const MeshTree& mesh = solid.mesh;
+  const Point start = solid.is_b() ? map_point(*solid.from_a, p) : p;
+  const double at[3] = {start.x, start.y, start.z};
+  double pad = 0;  // of what mapping there and back rounds
+  for (int k = 0; k < 3; ++k)
+    pad += std::abs(at[k]) + (solid.is_b() ? std::abs(solid.from_a->t[k]) : 0) + 1e-300;
+  pad = 1e-12 * pad;
+  float low[3], high[3];
+  const BoxBlock& root = mesh.level[mesh.top].boxes[0];
+  int axis = 0;
+  double shortest = HUGE_VAL, end = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double lowest = *std::min_element(root.low[k], root.low[k] + kWidth);
+    const double highest = *std::max_element(root.high[k], root.high[k] + kWidth);
+    if (at[k] < lowest - pad || at[k] > highest + pad) return false;
+    const double beyond = 0.25 * (highest - lowest) + 8 * pad;
+    for (const double to : {lowest - beyond, highest + beyond})
+      if (std::abs(to - at[k]) < shortest) {
+        shortest = std::abs(to - at[k]);
+        axis = k;
+        end = to;
+      }
+    low[k] = static_cast<float>(at[k] - pad);
+    low[k] -= std::abs(low[k]) * 2e-7f;
+    high[k] = static_cast<float>(at[k] + pad);
+    high[k] += std::abs(high[k]) * 2e-7f;
+  }
+  double to[3] = {at[0], at[1], at[2]};
+  to[axis] = end;
+  (end < at[axis] ? low : high)[axis] = static_cast<float>(end);
+  const Point beyond = {to[0], to[1], to[2]};
+  const Point q = solid.is_b() ? map_point(*solid.to_a, beyond) : beyond;
+
+  int entered = 0;
+  for (NodeStack stack(mesh); !stack.empty();) {
+    const WaitingNode node = stack.pop();
+    if (node.level == 0) {
+      const MeshBlock& block = mesh.blocks[node.number];
+      for (std::uint32_t t = 0; t < block.triangles; ++t) {
+        const Point corners[3] = {solid.place(block.vertex[block.corner[0][t]]),
+                                  solid.place(block.vertex[block.corner[1][t]]),
+                                  solid.place(block.vertex[block.corner[2][t]])};
+        entered += exact::enters(p, q, corners, !solid.is_b());
+      }
+      continue;
+    }
+    const BoxBlock& boxes = mesh.level[node.level].boxes[node.number];
+    double key[kWidth];
+    for (std::uint32_t l = 0; l < kWidth; ++l) {
+      bool meets = true;
+      for (int k = 0; k < 3; ++k)
+        meets = meets && boxes.low[k][l] <= high[k] && boxes.high[k][l] >= low[k];
+      key[l] = meets ? 0 : 1;
+    }
+    stack.push(mesh, node, key, 1);
+  }
+  return entered < 0;
+}
+
+MeshHit first_hit(const MeshTree& mesh, const Point& p, const Point& q) noexcept {
+  const Way way(p, q);
+  MeshHit best;
+  for (NodeStack stack(mesh); !stack.empty();) {
+    const WaitingNode node = stack.pop();
+    if (node.key > best.t + 4e-15) continue;
+    if (node.level == 0) {
+      way.hit(mesh, node.number, best);
+      continue;
+    }
+    double key[kWidth];
+    way.enter(mesh.level[node.level].boxes[node.number], key);
+    stack.push(mesh, node, key, std::min(2.0, best.t + 4e-15));
+  }
+  return best;
+}
+
+MeshFoot nearest_on(const MeshTree& mesh, const Point& p) noexcept {
+  // What is no further by more than roundings need not be looked at: far away all is as near.
+  constexpr double kNearer = 1 - 4e-15;
+  MeshFoot best;
+  for (NodeStack stack(mesh); !stack.empty();) {
+    const WaitingNode node = stack.pop();
+    if (!(node.key < kNearer * best.squared)) continue;
+    if (node.level == 0) {
+      const MeshBlock& block = mesh.blocks[node.number];
+      for (std::uint32_t t = 0; t < block.triangles; ++t) {
+        Point corners[3];
+        corners_of(mesh, block, t, corners);
+        const exact::FlatTriangle flat(corners[0], corners[1], corners[2]);
+        const Point at = nearest_on_triangle(p, flat);
+        const double squared = dot(p - at, p - at);
+        if (squared < best.squared) best = {squared, at, kWidth * node.number + t, flat.normal};
+      }
+      continue;
+    }
+    const BoxBlock& boxes = mesh.level[node.level].boxes[node.number];
+    double key[kWidth] = {};
+    for (int k = 0; k < 3; ++k)
+      for (std::uint32_t l = 0; l < kWidth; ++l) {
+        const double at = (&p.x)[k];
+        const double gap = std::max({boxes.low[k][l] - at, at - boxes.high[k][l], 0.0});
+        key[l] += gap * gap;
+      }
+    stack.push(mesh, node, key, kNearer * best.squared);
+  }
+  return best;
+}
+
+}  // namespace ist

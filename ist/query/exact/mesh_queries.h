@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "query/base/relative_pose.h"
+#include "query/exact/mesh_tree.h"
+
+// What a point and a ray are told by a mesh. Nothing allocates, locks or throws; the answers are
+// the same on every instruction set.
+
+namespace ist {
+
+inline exact::Point map_point(const Similarity& map, const exact::Point& x) noexcept {
+  double moved[3];
+  map.apply({x.x, x.y, x.z}, moved);
+  return {moved[0], moved[1], moved[2]};
+}
+
+/// One mesh of a pair. A's is where it is; B's vertices are moved into A's unit frame.
+struct MeshOfPair {
+  const MeshTree& mesh;
+  const Similarity* to_a = nullptr;  ///< null: it is A's
+  const Similarity* from_a = nullptr;
+
+  bool is_b() const noexcept { return to_a != nullptr; }
+  exact::Point place(std::uint32_t vertex) const noexcept {
+    const exact::Point x = mesh.vertex(vertex);
+    return is_b() ? map_point(*to_a, x) : x;
+  }
+};
+
+/// Whether a point is inside, A's unit frame: by the triangles on the way out, along an axis of the
+/// mesh's frame. Signs are exact; of points on the surface they decide one way or the other.
+bool is_inside(const MeshOfPair& solid, const exact::Point& p) noexcept;
+
+/// Where a way enters or leaves a mesh first.
+struct MeshHit {
+  double t = HUGE_VAL;           ///< of the way, 0 … 1; HUGE_VAL: nowhere
+  std::uint32_t triangle = ~0u;  ///< 16 · block + lane
+  exact::Point normal = {};      ///< outward, twice the area long
+};
+
+/// Along the way from p to q, unit frame. Signs are exact: no way slips through an edge or vertex.
+MeshHit first_hit(const MeshTree& mesh, const exact::Point& p, const exact::Point& q) noexcept;
+
+/// The point of a mesh that is nearest to p, unit frame.
+struct MeshFoot {
+  double squared = HUGE_VAL;  ///< distance
+  exact::Point at = {};
+  std::uint32_t triangle = ~0u;  ///< 16 · block + lane; of equally near ones any
+  exact::Point normal = {};      ///< outward, twice the area long
+};
+MeshFoot nearest_on(const MeshTree& mesh, const exact::Point& p) noexcept;
+
+}  // namespace ist

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "query/exact/orientation.h"
+
+// The nearest points of segments and triangles, in double. What is found lies on them to a
+// rounding, so that it bounds the distance from above however thin they are.
+
+namespace ist::exact {
+
+/// The nearest two points that were found so far.
+struct NearestPair {
+  double squared = HUGE_VAL;  ///< distance
+  Point a = {}, b = {};
+
+  /// Whether these are nearer.
+  bool take(const Point& on_a, const Point& on_b) noexcept {
+    const Point between = on_b - on_a;
+    const double s = dot(between, between);
+    if (!(s < squared)) return false;
+    squared = s;
+    a = on_a;
+    b = on_b;
+    return true;
+  }
+};
+
+inline Point nearest_on_segment(const Point& p, const Point& from, const Point& to) noexcept {
+  const Point u = to - from;
+  const double uu = dot(u, u), along = dot(p - from, u);
+  if (!(along > 0)) return from;
+  return along < uu ? from + (along / uu) * u : to;
+}
+
+/// A triangle with what its points are found by.
+struct FlatTriangle {
+  Point corner[3];
+  Point side[3];  ///< from corner k to the next
+  Point normal;   ///< twice the area long
+  double squared_normal;
+
+  explicit FlatTriangle(const Point& p, const Point& q, const Point& r) noexcept
+      : corner{p, q, r},
+        side{q - p, r - q, p - r},
+        normal(cross(side[0], side[1])),
+        squared_normal(dot(normal, normal)) {}
+};
+
+/// The nearest point of a triangle.
+inline Point nearest_on_triangle(const Point& p, const FlatTriangle& t) noexcept {
+  double weight[3];
+  bool inside = t.squared_normal > 0;
+  for (int k = 0; k < 3 && inside; ++k) {
+    weight[(k + 2) % 3] = dot(t.normal, cross(t.side[k], p - t.corner[k]));
+    inside = weight[(k + 2) % 3] >= 0;
+  }
+  if (inside) {
+    const double sum = (weight[0] + weight[1]) + weight[2];
+    if (sum > 0)
+      return t.corner[0] + ((weight[1] / sum) * t.side[0] - (weight[2] / sum) * t.side[2]);
+  }
+  NearestPair best;
+  for (int k = 0; k < 3; ++k)
+    best.take(nearest_on_segment(p, t.corner[k], t.corner[(k + 1) % 3]), p);
+  return best.a;
+}
+
+/// Takes the nearest points of two triangles that do not cross, if they are nearer.
+inline bool take_nearest(const FlatTriangle& a, const FlatTriangle& b, NearestPair& best) noexcept {
+  bool nearer = false;
+  for (int k = 0; k < 3; ++k) {
+    nearer |= best.take(a.corner[k], nearest_on_triangle(a.corner[k], b));
+    nearer |= best.take(nearest_on_triangle(b.corner[k], a), b.corner[k]);
+  }
+  // Edges whose nearest points are no corners; by products of vectors, which keep the digits of
+  // edges that are nearly parallel.
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const Point n = cross(a.side[i], b.side[j]), w = b.corner[j] - a.corner[i];
+      const double nn = dot(n, n);
+      const double s = dot(cross(w, b.side[j]), n), t = dot(cross(w, a.side[i]), n);
+      if (s > 0 && s < nn && t > 0 && t < nn)
+        nearer |= best.take(a.corner[i] + (s / nn) * a.side[i], b.corner[j] + (t / nn) * b.side[j]);
+    }
+  return nearer;
+}
+
+}  // namespace ist::exact

@@ -1,0 +1,359 @@
+#include <ist/surface.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <type_traits>
+
+#include "query/base/relative_pose.h"
+#include "query/exact/kept_mesh.h"
+#include "query/exact/mesh_queries.h"
+#include "query/field/with_shape.h"
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+/// Further from a solid, in its own lengths, nothing is told. Squares of squares stay finite.
+constexpr double kFarthest = 1e60;
+
+template <class Answer>
+Answer refused(QueryStatus status) noexcept;
+template <>
+RayHit refused(QueryStatus status) noexcept {
+  return {kNone, Vector3d::Constant(kNone), Vector3d::Constant(kNone), ~0u, status};
+}
+template <>
+SurfacePoint refused(QueryStatus status) noexcept {
+  return {kNone, kNone, Vector3d::Constant(kNone), Vector3d::Constant(kNone), ~0u, status};
+}
+template <>
+Containment refused(QueryStatus status) noexcept {
+  return {false, status};
+}
+
+/// A solid's own frame: an asset's unit frame, a field's own.
+struct OwnFrame {
+  Eigen::Matrix3d rotation;
+  Vector3d origin;  ///< [u] world
+  double unit;      ///< [u]
+
+  static std::optional<OwnFrame> of(const Pose& pose, double scale, const Vector3d& offset,
+                                    int exponent) noexcept {
+    const std::optional<Eigen::Quaterniond> turn = usable_rotation(pose, scale);
+    if (!turn || !(scale <= kFarthest) || !(scale >= 1 / kFarthest)) return std::nullopt;
+    const Eigen::Matrix3d rotation = turn->toRotationMatrix();
+    return OwnFrame{rotation,
+                    Vector3d(pose.t[0], pose.t[1], pose.t[2]) + rotation * (scale * offset),
+                    std::ldexp(scale, exponent)};
+  }
+  Vector3d world(const Vector3d& x) const noexcept { return rotation * (unit * x) + origin; }
+  /// Empty where it is too far or no place at all.
+  std::optional<Vector3d> own(const Vector3d& world) const noexcept {
+    if (!(world.cwiseAbs().maxCoeff() <= kFarthest) || !world.allFinite()) return std::nullopt;
+    const Vector3d x = rotation.transpose() * (world - origin) / unit;
+    if (!(x.cwiseAbs().maxCoeff() <= kFarthest)) return std::nullopt;
+    return x;
+  }
+};
+
+exact::Point point(const Vector3d& x) noexcept { return {x.x(), x.y(), x.z()}; }
+Vector3d vector(const exact::Point& p) noexcept { return {p.x, p.y, p.z}; }
+
+/// A ray in a solid's own frame.
+struct OwnRay {
+  Vector3d origin;
+  Vector3d direction;  ///< unit
+  double longest;
+
+  static std::optional<OwnRay> of(const Ray& ray, const OwnFrame& frame) noexcept {
+    const double largest = ray.direction.cwiseAbs().maxCoeff();
+    const std::optional<Vector3d> origin = frame.own(ray.origin);
+    if (!origin || !(largest > 0) || !ray.direction.allFinite() || !(ray.longest > 0))
+      return std::nullopt;
+    // Halves: a power of two keeps the digits, and neither it nor a square overflows.
+    const int exponent = std::ilogb(largest);
+    const Vector3d scaled = ray.direction.unaryExpr(
+        [&](double x) { return std::ldexp(std::ldexp(x, -exponent / 2), exponent / 2 - exponent); });
+    return OwnRay{*origin, (frame.rotation.transpose() * scaled).normalized(),
+                  std::min(ray.longest, kFarthest) / frame.unit};
+  }
+};
+
+RayHit hit_at(const OwnFrame& frame, const OwnRay& ray, double distance, const Vector3d& normal,
+              std::uint32_t triangle) noexcept {
+  return {frame.unit * distance, frame.world(ray.origin + distance * ray.direction),
+          (frame.rotation * normal).normalized(), triangle, QueryStatus::ok};
+}
+
+/// An asset's mesh at a place.
+class PlacedMesh {
+ public:
+  explicit PlacedMesh(const PlacedTree& placed) noexcept {
+    if (placed.tree.empty()) return;
+    if (!keeps_mesh(placed)) {
+      status_ = QueryStatus::not_held;
+      return;
+    }
+    const AssetHeader& asset = placed.tree.header();
+    frame_ = OwnFrame::of(placed.pose, placed.scale,
+                          {asset.centre[0], asset.centre[1], asset.centre[2]}, asset.exponent);
+    if (!frame_) return;
+    mesh_.emplace(mesh_of(placed));
+    extent_ = mesh_->extent();
+    status_ = QueryStatus::ok;
+  }
+
+  RayHit answer(const Ray& given) const noexcept {
+    if (status_ != QueryStatus::ok) return refused<RayHit>(status_);
+    const std::optional<OwnRay> ray = OwnRay::of(given, *frame_);
+    if (!ray) return refused<RayHit>(QueryStatus::invalid_input);
+    // Nothing is further.
+    const double length = std::min(ray->longest, ray->origin.cwiseAbs().sum() + 4 * extent_);
+    const Vector3d end = ray->origin + length * ray->direction;
+    const MeshHit hit = end == ray->origin ? MeshHit()
+                                           : first_hit(*mesh_, point(ray->origin), point(end));
+    if (hit.triangle == ~0u) return {};
+    return hit_at(*frame_, *ray, hit.t * length, vector(hit.normal).normalized(), hit.triangle);
+  }
+
+  SurfacePoint answer(const Vector3d& given, SurfacePoint) const noexcept {
+    if (status_ != QueryStatus::ok) return refused<SurfacePoint>(status_);
+    const std::optional<Vector3d> x = frame_->own(given);
+    if (!x) return refused<SurfacePoint>(QueryStatus::invalid_input);
+    const MeshFoot foot = nearest_on(*mesh_, point(*x));
+    const double away = std::sqrt(foot.squared);
+    const double side = is_inside({*mesh_}, point(*x)) ? -1 : 1;
+    // Next to the surface the way to it is rounding.
+    const double rounding = 1e-14 * (extent_ + away) +
+                            1e-15 * (frame_->origin.norm() + given.norm()) / frame_->unit;
+    const Vector3d gradient =
+        away > rounding ? side / away * (*x - vector(foot.at)) : vector(foot.normal).normalized();
+    return {side * away * frame_->unit,
+            frame_->unit * (moved_in_mesh(*mesh_) + rounding),
+            frame_->world(vector(foot.at)),
+            (frame_->rotation * gradient).normalized(),
+            foot.triangle,
+            QueryStatus::ok};
+  }
+
+  Containment answer(const Vector3d& given, Containment) const noexcept {
+    if (status_ != QueryStatus::ok) return refused<Containment>(status_);
+    const std::optional<Vector3d> x = frame_->own(given);
+    if (!x) return refused<Containment>(QueryStatus::invalid_input);
+    return {is_inside({*mesh_}, point(*x)), QueryStatus::ok};
+  }
+
+ private:
+  QueryStatus status_ = QueryStatus::invalid_input;
+  std::optional<OwnFrame> frame_;
+  std::optional<MeshTree> mesh_;
+  double extent_ = 0;
+};
+
+/// The part of a line that lies in a convex solid.
+struct Chord {
+  double first = -HUGE_VAL, last = HUGE_VAL;
+
+  static Chord none() noexcept { return {HUGE_VAL, -HUGE_VAL}; }
+  bool empty() const noexcept { return !(first <= last); }
+  Chord within(const Chord& other) const noexcept {
+    return {std::max(first, other.first), std::min(last, other.last)};
+  }
+  /// Of two solids that form a convex one.
+  Chord with(const Chord& other) const noexcept {
+    if (empty() || other.empty()) return empty() ? other : *this;
+    return {std::min(first, other.first), std::max(last, other.last)};
+  }
+};
+
+/// Where x + t d ≤ most.
+Chord below(double x, double d, double most) noexcept {
+  constexpr double kLeast = 1e-150;
+  if (std::abs(d) < kLeast) return x <= most ? Chord() : Chord::none();
+  const double t = (most - x) / d;
+  return d > 0 ? Chord{-HUGE_VAL, t} : Chord{t, HUGE_VAL};
+}
+Chord between(double x, double d, double half) noexcept {
+  return below(x, d, half).within(below(-x, -d, half));
+}
+/// Where |x + t d| ≤ radius.
+Chord within_radius(const Vector3d& x, const Vector3d& d, double radius) noexcept {
+  const double dd = d.squaredNorm();
+  if (!(dd > 1e-150)) return x.norm() <= radius ? Chord() : Chord::none();
+  const double middle = -x.dot(d) / dd;
+  const double beside = (x + middle * d).norm();
+  if (beside > radius) return Chord::none();
+  const double half = std::sqrt((radius - beside) * (radius + beside) / dd);
+  return {middle - half, middle + half};
+}
+
+Chord chord_of(const HalfSpaceShape& s, const Vector3d& x, const Vector3d& d) noexcept {
+  return below(s.normal.dot(x), s.normal.dot(d), s.offset);
+}
+Chord chord_of(const BoxShape& s, const Vector3d& x, const Vector3d& d) noexcept {
+  Chord chord;
+  for (int k = 0; k < 3; ++k) chord = chord.within(between(x[k], d[k], s.half[k]));
+  return chord;
+}
+Chord chord_of(const BallShape& s, const Vector3d& x, const Vector3d& d) noexcept {
+  return within_radius(x, d, s.radius);
+}
+Chord chord_of(const CylinderShape& s, const Vector3d& x, const Vector3d& d) noexcept {
+  return within_radius({x.x(), x.y(), 0}, {d.x(), d.y(), 0}, s.radius)
+      .within(between(x.z(), d.z(), s.half));
+}
+Chord chord_of(const CapsuleShape& s, const Vector3d& x, const Vector3d& d) noexcept {
+  const Vector3d end(0, 0, s.half);
+  return within_radius({x.x(), x.y(), 0}, {d.x(), d.y(), 0}, s.radius)
+      .within(between(x.z(), d.z(), s.half))
+      .with(within_radius(x - end, d, s.radius))
+      .with(within_radius(x + end, d, s.radius));
+}
+
+template <class Shape>
+concept HasChord = requires(const Shape& s, const Vector3d& x) { chord_of(s, x, x); };
+
+template <class Shape>
+RayHit shape_hit(Shape& shape, const OwnFrame& frame, const OwnRay& ray) noexcept {
+  if constexpr (HasChord<Shape>) {
+    const Chord chord = chord_of(shape, ray.origin, ray.direction);
+    const double distance = chord.first >= 0 ? chord.first : chord.last;
+    if (chord.empty() || !(distance >= 0) || !(distance <= ray.longest)) return {};
+    const Vector3d at = ray.origin + distance * ray.direction;
+    return hit_at(frame, ray, distance, -shape.nearest(at).gradient, ~0u);
+  } else {
+    return refused<RayHit>(QueryStatus::not_held);
+  }
+}
+
+/// A field that is no asset's, at a place.
+class PlacedShape {
+ public:
+  explicit PlacedShape(const PlacedField& placed) noexcept
+      : field_(placed.field),
+        frame_(OwnFrame::of(placed.pose, placed.scale, Vector3d::Zero(), 0)) {}
+
+  RayHit answer(const Ray& given) const noexcept {
+    const auto refuse = [] { return refused<RayHit>(QueryStatus::invalid_input); };
+    if (!frame_) return refuse();
+    const std::optional<OwnRay> ray = OwnRay::of(given, *frame_);
+    if (!ray) return refuse();
+    return with_shape(
+        field_, [&](auto& shape) { return shape_hit(shape, *frame_, *ray); }, refuse);
+  }
+
+  SurfacePoint answer(const Vector3d& given, SurfacePoint) const noexcept {
+    return look<SurfacePoint>(given, [&](const Vector3d& x, const FieldSample& at, double error) {
+      // Where all directions are alike one of them serves.
+      const double slope = at.gradient.norm();
+      const Vector3d gradient =
+          slope > 0 ? Vector3d(-at.gradient / slope) : Vector3d::UnitX().eval();
+      const double rounding = 1e-15 * (x.norm() + std::abs(at.distance)) +
+                              1e-15 * (frame_->origin.norm() + given.norm()) / frame_->unit;
+      return SurfacePoint{-at.distance * frame_->unit,
+                          frame_->unit * (error + rounding),
+                          frame_->world(x + at.distance * gradient),
+                          frame_->rotation * gradient,
+                          ~0u,
+                          QueryStatus::ok};
+    });
+  }
+
+  Containment answer(const Vector3d& given, Containment) const noexcept {
+    return look<Containment>(given, [](const Vector3d&, const FieldSample& at, double) {
+      return Containment{at.distance > 0, QueryStatus::ok};
+    });
+  }
+
+ private:
+  template <class Answer, class Use>
+  Answer look(const Vector3d& given, const Use& use) const noexcept {
+    const auto refuse = [] { return refused<Answer>(QueryStatus::invalid_input); };
+    if (!frame_) return refuse();
+    const std::optional<Vector3d> x = frame_->own(given);
+    if (!x) return refuse();
+    return with_shape(
+        field_, [&](auto& shape) { return use(*x, shape.nearest(*x), shape.error()); }, refuse);
+  }
+
+  const Field& field_;
+  std::optional<OwnFrame> frame_;
+};
+
+/// Runs `use(solid)` with what answers.
+template <class Use>
+auto with_solid(const PlacedTree& placed, const Use& use) noexcept {
+  return use(PlacedMesh(placed));
+}
+template <class Use>
+auto with_solid(const PlacedField& placed, const Use& use) noexcept {
+  if (const MeshField* const mesh = std::get_if<MeshField>(&placed.field))
+    return use(PlacedMesh({mesh->tree, placed.pose, placed.scale}));
+  return use(PlacedShape(placed));
+}
+
+template <class Placed, class Asked, class Answer, class... Kind>
+void answer_all(const Placed& placed, std::span<const Asked> asked, std::span<Answer> answers,
+                Kind... kind) noexcept {
+  with_solid(placed, [&](const auto& solid) {
+    for (std::size_t i = 0; i < std::min(asked.size(), answers.size()); ++i)
+      answers[i] = solid.answer(asked[i], kind...);
+  });
+}
+
+template <class Placed, class Asked, class Answer, class... Kind>
+Answer answer_one(const Placed& placed, const Asked& asked, Answer answer, Kind... kind) noexcept {
+  answer_all(placed, std::span(&asked, 1), std::span(&answer, 1), kind...);
+  return answer;
+}
+
+}  // namespace
+
+RayHit raycast(const PlacedTree& solid, const Ray& ray) noexcept {
+  return answer_one(solid, ray, RayHit());
+}
+RayHit raycast(const PlacedField& solid, const Ray& ray) noexcept {
+  return answer_one(solid, ray, RayHit());
+}
+SurfacePoint closest_point(const PlacedTree& solid, const Vector3d& point) noexcept {
+  return answer_one(solid, point, SurfacePoint(), SurfacePoint());
+}
+SurfacePoint closest_point(const PlacedField& solid, const Vector3d& point) noexcept {
+  return answer_one(solid, point, SurfacePoint(), SurfacePoint());
+}
+Containment contains(const PlacedTree& solid, const Vector3d& point) noexcept {
+  return answer_one(solid, point, Containment(), Containment());
+}
+Containment contains(const PlacedField& solid, const Vector3d& point) noexcept {
+  return answer_one(solid, point, Containment(), Containment());
+}
+
+void raycast(const PlacedTree& solid, std::span<const Ray> rays,
+             std::span<RayHit> answers) noexcept {
+  answer_all(solid, rays, answers);
+}
+void raycast(const PlacedField& solid, std::span<const Ray> rays,
+             std::span<RayHit> answers) noexcept {
+  answer_all(solid, rays, answers);
+}
+void closest_point(const PlacedTree& solid, std::span<const Vector3d> points,
+                   std::span<SurfacePoint> answers) noexcept {
+  answer_all(solid, points, answers, SurfacePoint());
+}
+void closest_point(const PlacedField& solid, std::span<const Vector3d> points,
+                   std::span<SurfacePoint> answers) noexcept {
+  answer_all(solid, points, answers, SurfacePoint());
+}
+void contains(const PlacedTree& solid, std::span<const Vector3d> points,
+              std::span<Containment> answers) noexcept {
+  answer_all(solid, points, answers, Containment());
+}
+void contains(const PlacedField& solid, std::span<const Vector3d> points,
+              std::span<Containment> answers) noexcept {
+  answer_all(solid, points, answers, Containment());
+}
+
+}  // namespace ist

@@ -1,0 +1,382 @@
+#include <gtest/gtest.h>
+#include <ist/surface.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "query/exact/nearest_points.h"
+#include "support/exact_pair.h"
+#include "support/random_assets.h"
+#include "support/surface_queries.h"
+#include "support/test_meshes.h"
+
+// Rays, points and gaps against all triangles of the meshes, one by one.
+
+namespace ist {
+namespace {
+
+using testing::Quaterniond;
+using testing::Vector3d;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+exact::Point point(const Vector3d& x) { return {x.x(), x.y(), x.z()}; }
+Vector3d vector(const exact::Point& p) { return {p.x, p.y, p.z}; }
+
+/// A solid and the mesh that it was made from.
+struct Body {
+  explicit Body(TriangleMesh given) : mesh(given), asset(testing::surface(std::move(given))) {}
+
+  std::vector<exact::FlatTriangle> triangles(const PlacedTree& placed) const {
+    std::vector<exact::FlatTriangle> out;
+    const auto world = [&](std::uint32_t v) {
+      return point(testing::rotation(placed.pose) * (placed.scale * mesh.vertices[v]) +
+                   testing::position(placed.pose));
+    };
+    for (const auto& t : mesh.triangles) out.emplace_back(world(t[0]), world(t[1]), world(t[2]));
+    return out;
+  }
+
+  TriangleMesh mesh;
+  Asset asset;
+};
+
+std::vector<Body> bodies() {
+  std::vector<Body> out;
+  out.emplace_back(testing::cube_mesh());
+  out.emplace_back(testing::icosphere_mesh(3));
+  out.emplace_back(testing::torus_mesh(0.35, 0.14, 40, 20));
+  // Two shells, and a cavity.
+  out.emplace_back(testing::joined(testing::box_mesh({-1, -1, -1}, {1, 1, 1}),
+                                   testing::inverted(testing::box_mesh({-0.8, -0.8, -0.8},
+                                                                       {0.8, 0.8, 0.8}))));
+  out.emplace_back(testing::joined(testing::box_mesh({-1, -1, -1}, {-0.4, 1, 1}),
+                                   testing::icosphere_mesh(2)));
+  return out;
+}
+
+double nearest(const std::vector<exact::FlatTriangle>& triangles, const Vector3d& x) {
+  double least = kInfinity;
+  for (const exact::FlatTriangle& t : triangles)
+    least = std::min(least, (vector(nearest_on_triangle(point(x), t)) - x).norm());
+  return least;
+}
+
+/// How often a surface goes around a point, by solid angles.
+double winding(const std::vector<exact::FlatTriangle>& triangles, const Vector3d& x) {
+  double sum = 0;
+  for (const exact::FlatTriangle& t : triangles) {
+    const Vector3d a = vector(t.corner[0]) - x, b = vector(t.corner[1]) - x,
+                   c = vector(t.corner[2]) - x;
+    sum += 2 * std::atan2(a.dot(b.cross(c)), a.norm() * b.norm() * c.norm() +
+                                                 a.dot(b) * c.norm() + b.dot(c) * a.norm() +
+                                                 c.dot(a) * b.norm());
+  }
+  return sum / (4 * std::numbers::pi);
+}
+
+/// Where a ray meets the triangles first, edges aside.
+double first(const std::vector<exact::FlatTriangle>& triangles, const Ray& ray) {
+  double least = kInfinity;
+  const Vector3d d = ray.direction.normalized();
+  for (const exact::FlatTriangle& t : triangles) {
+    const Vector3d n = vector(t.normal), a = vector(t.corner[0]) - ray.origin;
+    const double along = n.dot(a) / n.dot(d);
+    if (!(along >= 0) || along >= least) continue;
+    const exact::Point at = point(ray.origin + along * d);
+    bool inside = true;
+    for (int k = 0; k < 3; ++k)
+      inside = inside && dot(t.normal, cross(t.side[k], at - t.corner[k])) >= 0;
+    if (inside) least = along;
+  }
+  return least;
+}
+
+TEST(Surface, PointsAndRaysMatchAllTriangles) {
+  const testing::NoFloatTraps division_by_zero;
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  int hits = 0, inside = 0;
+  for (const Body& body : bodies())
+    for (const double scale : {1.0, 0.02, 300.0})
+      for (int i = 0; i < 60; ++i) {
+        const PlacedTree placed{body.asset.view(), testing::random_pose(random, scale), scale};
+        const auto triangles = body.triangles(placed);
+        const auto place = [&]() -> Vector3d {
+          return testing::position(placed.pose) +
+                 1.4 * scale * Vector3d(uniform(random), uniform(random), uniform(random));
+        };
+        const Vector3d x = place();
+        const SurfacePoint got = closest_point(placed, x);
+        ASSERT_EQ(got.status, QueryStatus::ok);
+        EXPECT_NEAR(std::abs(got.distance), nearest(triangles, x), 1e-13 * scale);
+        EXPECT_LE(std::abs(std::abs(got.distance) - nearest(triangles, x)), got.error);
+        EXPECT_LE(nearest(triangles, got.point), 1e-13 * scale);
+        EXPECT_NEAR(got.gradient.norm(), 1, 1e-12);
+        EXPECT_LE((got.point + got.distance * got.gradient - x).norm(), 1e-12 * scale);
+        const bool holds = winding(triangles, x) > 0.5;
+        EXPECT_EQ(got.distance < 0, holds);
+        EXPECT_EQ(contains(placed, x).inside, holds);
+        inside += holds;
+
+        const Ray ray{x, Vector3d(uniform(random), uniform(random), uniform(random)) * 7};
+        const RayHit hit = raycast(placed, ray);
+        const double want = first(triangles, ray);
+        ASSERT_EQ(hit.hit(), want < kInfinity);
+        if (!hit.hit()) continue;
+        ++hits;
+        EXPECT_NEAR(hit.distance, want, 1e-12 * scale);
+        EXPECT_LE((ray.origin + hit.distance * ray.direction.normalized() - hit.point).norm(),
+                  1e-13 * scale);
+        EXPECT_LE(nearest(triangles, hit.point), 1e-13 * scale);
+        EXPECT_NEAR(hit.normal.norm(), 1, 1e-12);
+        EXPECT_EQ(hit.normal.dot(ray.direction) > 0, holds);
+        Ray limited = ray;
+        limited.longest = 0.999 * want;
+        EXPECT_FALSE(raycast(placed, limited).hit());
+        limited.longest = 1.001 * want;
+        EXPECT_NEAR(raycast(placed, limited).distance, want, 1e-12 * scale);
+      }
+  EXPECT_GT(hits, 200);
+  EXPECT_GT(inside, 100);
+}
+
+/// Through corners and along edges and faces of a lattice: in at one side, out at the other.
+TEST(Surface, NoRaySlipsThrough) {
+  const Body cube(testing::box_mesh({-1, -1, -1}, {1, 1, 1}));
+  const Body ball(testing::icosphere_mesh(2));
+  const PlacedTree box{cube.asset.view(), {}, 1}, round{ball.asset.view(), {}, 1};
+  for (int i = -3; i <= 3; ++i)
+    for (int j = -3; j <= 3; ++j) {
+      const double x = i / 4.0, y = j / 4.0;
+      for (int k = 0; k < 3; ++k)
+        for (const double side : {-1.0, 1.0}) {
+          Vector3d from;
+          from[k] = 3 * side, from[(k + 1) % 3] = x, from[(k + 2) % 3] = y;
+          const RayHit hit = raycast(box, Ray{from, -side * Vector3d::Unit(k)});
+          EXPECT_EQ(hit.distance, 2) << from.transpose();
+          EXPECT_EQ(hit.normal, side * Vector3d::Unit(k));
+          from[k] = 0;
+          EXPECT_EQ(raycast(box, Ray{from, side * Vector3d::Unit(k)}).distance, 1);
+        }
+    }
+  // From the middle through every vertex and every edge's middle.
+  for (const Body* body : {&cube, &ball}) {
+    const PlacedTree placed{body->asset.view(), {}, 1};
+    for (const auto& t : body->mesh.triangles)
+      for (int k = 0; k < 3; ++k) {
+        const Vector3d p = body->mesh.vertices[t[k]], q = body->mesh.vertices[t[(k + 1) % 3]];
+        for (const Vector3d& to : {p, Vector3d(0.5 * (p + q)), Vector3d(p + (q - p) / 3)}) {
+          EXPECT_NEAR(raycast(placed, Ray{Vector3d::Zero(), to}).distance, to.norm(), 1e-12);
+          EXPECT_NEAR(raycast(placed, Ray{1e-3 * to.reverse(), to}).distance,
+                      raycast(placed, Ray{1e-3 * to.reverse(), to * 1e-9}).distance, 1e-12);
+          EXPECT_TRUE(raycast(placed, Ray{-2 * to, to}).hit());
+        }
+      }
+  }
+}
+
+TEST(Surface, PointsOnTheSurface) {
+  const Body body(testing::icosphere_mesh(3));
+  std::mt19937_64 random(3);
+  const PlacedTree placed{body.asset.view(), testing::random_pose(random, 5), 3};
+  for (const exact::FlatTriangle& t : body.triangles(placed)) {
+    const Vector3d middle =
+        (vector(t.corner[0]) + vector(t.corner[1]) + vector(t.corner[2])) / 3;
+    for (const Vector3d& x : {middle, vector(t.corner[0])}) {
+      const SurfacePoint got = closest_point(placed, x);
+      EXPECT_LE(std::abs(got.distance), got.error);
+      EXPECT_LE(got.error, 1e-12);
+      EXPECT_NEAR(got.gradient.norm(), 1, 1e-12);
+      EXPECT_GT(got.gradient.dot(vector(t.normal)), 0);
+      EXPECT_EQ(contains(placed, x).inside, contains(placed, x).inside);
+    }
+  }
+}
+
+TEST(Surface, BatchesHaveTheSameBits) {
+  const Body body(testing::torus_mesh(0.35, 0.14, 40, 20));
+  std::mt19937_64 random(4);
+  const PlacedTree placed{body.asset.view(), testing::random_pose(random, 0.3), 1};
+  std::vector<Vector3d> points;
+  std::vector<Ray> rays;
+  for (int i = 0; i < 50; ++i) {
+    points.push_back(testing::random_direction(random));
+    rays.push_back({points.back(), testing::random_direction(random)});
+  }
+  std::vector<SurfacePoint> feet(50);
+  std::vector<Containment> inside(50);
+  std::vector<RayHit> hits(50);
+  closest_point(placed, points, feet);
+  contains(placed, points, inside);
+  raycast(placed, rays, hits);
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_EQ(closest_point(placed, points[i]).distance, feet[i].distance);
+    EXPECT_EQ(contains(placed, points[i]).inside, inside[i].inside);
+    EXPECT_EQ(raycast(placed, rays[i]).distance, hits[i].distance);
+  }
+}
+
+TEST(Surface, WhatIsNotUsableOrHeldIsNotAnswered) {
+  const testing::NoFloatTraps with_nan;
+  const Body body(testing::cube_mesh());
+  const Asset bare = testing::make_random_asset({20, 0.5, {}, 0}, 90);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto expect = [&](const auto& placed, const Ray& ray, QueryStatus status) {
+    const RayHit hit = raycast(placed, ray);
+    EXPECT_EQ(hit.status, status);
+    EXPECT_TRUE(std::isnan(hit.distance) && !hit.hit());
+  };
+  const auto expect_point = [&](const auto& placed, const Vector3d& x, QueryStatus status) {
+    const SurfacePoint foot = closest_point(placed, x);
+    EXPECT_EQ(foot.status, status);
+    EXPECT_TRUE(std::isnan(foot.distance) && std::isnan(foot.gradient[0]));
+    EXPECT_EQ(contains(placed, x).status, status);
+    EXPECT_FALSE(contains(placed, x).inside);
+  };
+  const PlacedTree good{body.asset.view(), {}, 1};
+  const Vector3d zero = Vector3d::Zero();
+  expect(PlacedTree{bare.view(), {}, 1}, {}, QueryStatus::not_held);
+  expect_point(PlacedTree{bare.view(), {}, 1}, zero, QueryStatus::not_held);
+  expect(PlacedField{MeshField{bare.view()}, {}, 1}, {}, QueryStatus::not_held);
+  for (const Ray& ray : {Ray{zero, zero}, Ray{zero, {nan, 1, 0}}, Ray{{nan, 0, 0}}, Ray{{1e90, 0, 0}},
+                         Ray{zero, {kInfinity, 0, 0}}, Ray{zero, Vector3d::UnitX(), 0},
+                         Ray{zero, Vector3d::UnitX(), nan}}) {
+    expect(good, ray, QueryStatus::invalid_input);
+    expect(PlacedField{BallField{1}, {}, 1}, ray, QueryStatus::invalid_input);
+  }
+  for (const Vector3d& x : {Vector3d(nan, 0, 0), Vector3d(0, kInfinity, 0), Vector3d(0, 0, 1e300)}) {
+    expect_point(good, x, QueryStatus::invalid_input);
+    expect_point(PlacedField{BallField{1}, {}, 1}, x, QueryStatus::invalid_input);
+  }
+  std::vector<PlacedTree> bad(4, good);
+  bad[0].pose.q[0] = nan;
+  bad[1].scale = -1;
+  bad[2].tree = TreeView();
+  bad[3].pose.t[2] = kInfinity;
+  for (const PlacedTree& wrong : bad) {
+    expect(wrong, {}, QueryStatus::invalid_input);
+    expect_point(wrong, zero, QueryStatus::invalid_input);
+  }
+  expect_point(PlacedField{BallField{-1}, {}, 1}, zero, QueryStatus::invalid_input);
+  // Directions of any length, and origins far away.
+  for (const double length : {1e-300, 1e-10, 1e200, 1e300}) {
+    EXPECT_EQ(raycast(good, Ray{zero, Vector3d(length, 0, 0)}).distance, 0.5) << length;
+    EXPECT_EQ(raycast(PlacedField{BallField{0.5}, {}, 1}, Ray{zero, Vector3d(length, 0, 0)}).distance,
+              0.5)
+        << length;
+  }
+  EXPECT_NEAR(raycast(good, Ray{{-1e9, 0.1, 0.2}}).distance, 1e9 - 0.5, 1e-6);
+  EXPECT_NEAR(closest_point(good, {1e30, 0, 0}).distance, 1e30, 1e20);
+}
+
+// Of shapes: along the ray to the hit all is outside, or inside; distances grow by the gradient.
+TEST(Surface, ShapesAnswerByTheirDistances) {
+  std::mt19937_64 random(5);
+  int hits = 0;
+  for (const auto& [name, field] : testing::fields())
+    for (int i = 0; i < 60; ++i) {
+      const std::string kind = name;
+      const bool rough = kind == "terrain" || kind == "grid";
+      const PlacedField placed{field, testing::random_pose(random, 0.3), 1.3};
+      const Vector3d x = testing::position(testing::random_pose(random, 0.1 + 0.02 * i));
+      const SurfacePoint foot = closest_point(placed, x);
+      if (kind == "mesh") {
+        const PlacedTree tree{testing::torus().view(), placed.pose, placed.scale};
+        EXPECT_EQ(foot.distance, closest_point(tree, x).distance);
+      }
+      ASSERT_EQ(foot.status, QueryStatus::ok) << name;
+      EXPECT_NEAR(foot.gradient.norm(), 1, 1e-12) << name;
+      EXPECT_NEAR(closest_point(placed, foot.point).distance, 0, rough ? 0.05 : 1e-9) << name;
+      EXPECT_EQ(contains(placed, x).inside, foot.distance < 0) << name;
+      const Ray ray{x, testing::random_direction(random)};
+      const RayHit hit = raycast(placed, ray);
+      if (rough || kind == "function") {
+        EXPECT_EQ(hit.status, QueryStatus::not_held);
+        continue;
+      }
+      ASSERT_EQ(hit.status, QueryStatus::ok) << name;
+      const double end = hit.hit() ? hit.distance : 5;
+      for (int k = 1; k < 50; ++k) {
+        const Vector3d on = x + end * k / 50.0 * ray.direction.normalized();
+        EXPECT_EQ(contains(placed, on).inside, foot.distance < 0) << name;
+      }
+      if (!hit.hit()) continue;
+      ++hits;
+      EXPECT_NEAR(closest_point(placed, hit.point).distance, 0, 1e-12) << name;
+      EXPECT_EQ(hit.normal.dot(ray.direction) > 0, foot.distance < 0) << name;
+    }
+  EXPECT_GT(hits, 60);
+}
+
+TEST(Surface, SeparationMatchesAllPairsOfTriangles) {
+  std::mt19937_64 random(6);
+  Workspace workspace;
+  const std::vector<Body> solids = bodies();
+  int apart = 0, meet = 0;
+  for (std::size_t s = 0; s < solids.size(); ++s)
+    for (int i = 0; i < 24; ++i) {
+      const Body &of_a = solids[s], &of_b = solids[(s + 2) % solids.size()];
+      const PlacedTree a{of_a.asset.view(), testing::random_pose(random, 0.3), 1};
+      const PlacedTree b{of_b.asset.view(), testing::random_pose(random, 0.12 * i),
+                         i % 3 == 0 ? 0.05 : 0.7};
+      const auto triangles_a = of_a.triangles(a), triangles_b = of_b.triangles(b);
+      exact::NearestPair least;
+      for (const exact::FlatTriangle& x : triangles_a)
+        for (const exact::FlatTriangle& y : triangles_b) take_nearest(x, y, least);
+      const bool overlap = testing::exactly(a, b, workspace).volume > 0;
+      const double want = overlap ? 0 : std::sqrt(least.squared);
+      const Separation got = separation(a, b, {}, workspace);
+      ASSERT_EQ(got.status, QueryStatus::ok);
+      EXPECT_NEAR(got.distance, want, 1e-13);
+      EXPECT_LE(got.distance_min, want);
+      EXPECT_GE(got.distance_max, want);
+      EXPECT_LE(got.distance_max - got.distance_min, 1e-12);
+      (overlap ? meet : apart) += 1;
+      if (overlap) {
+        EXPECT_EQ(got.normal, Vector3d::Zero());
+        EXPECT_EQ(got.distance_max, 0);
+        continue;
+      }
+      EXPECT_NEAR(nearest(triangles_a, got.point_a), 0, 1e-13);
+      EXPECT_NEAR(nearest(triangles_b, got.point_b), 0, 1e-13);
+      EXPECT_LE((got.point_b - got.point_a - got.distance * got.normal).norm(), 1e-13);
+      EXPECT_NEAR(separation(b, a, {}, workspace).distance, got.distance, 1e-13);
+      for (const std::uint32_t visits : {1u, 3u, 10u}) {
+        SeparationSettings settings;
+        settings.max_visits = visits;
+        const Separation stopped = separation(a, b, settings, workspace);
+        EXPECT_LE(stopped.node_visits, visits);
+        EXPECT_LE(stopped.distance_min, want);
+        EXPECT_GE(stopped.distance_max, want);
+      }
+    }
+  EXPECT_GT(apart, 30);
+  EXPECT_GT(meet, 30);
+}
+
+/// What is held as a whole is at no distance; what lies in a cavity is.
+TEST(Surface, SeparationOfWhatIsInside) {
+  Workspace workspace;
+  const Body box(testing::box_mesh({-1, -1, -1}, {1, 1, 1}));
+  const std::vector<Body> solids = bodies();
+  const PlacedTree whole{box.asset.view(), {}, 1}, hollow{solids[3].asset.view(), {}, 1};
+  const PlacedTree small{box.asset.view(), {}, 0.5};
+  EXPECT_EQ(separation(whole, small, {}, workspace).distance_max, 0);
+  EXPECT_EQ(separation(small, whole, {}, workspace).distance_max, 0);
+  EXPECT_NEAR(separation(hollow, small, {}, workspace).distance, 0.3, 1e-15);
+  EXPECT_NEAR(separation(small, hollow, {}, workspace).distance, 0.3, 1e-15);
+  for (const double gap : {0.0, 1e-9, 1e-3, 0.5, 1e3, 1e9, 1e30, 1e50}) {
+    const PlacedTree beside{box.asset.view(), {{1, 0, 0, 0}, {2 + gap, 0, 0}}, 1};
+    const Separation got = separation(whole, beside, {}, workspace);
+    EXPECT_NEAR(got.distance, gap, 4e-16 * (2 + gap)) << gap;
+    EXPECT_LE(got.distance_min, gap);
+    EXPECT_GE(got.distance_max, gap);
+    EXPECT_LT(got.node_visits, 100u);
+  }
+}
+
+}  // namespace
+}  // namespace ist
