@@ -166,10 +166,11 @@ class GapDescent {
 
 /// Between the surfaces that both assets keep.
 Separation surface_separation(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
-                              const SeparationSettings& settings) noexcept {
+                              const SeparationSettings& settings,
+                              ExactScratch& scratch) noexcept {
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   Budget budget(limits_of(settings), kForVisits);
-  const MeshGap found = mesh_gap(mesh_a, mesh_b, pose.a_from_b, pose.b_from_a, budget);
+  const MeshGap found = mesh_gap(mesh_a, mesh_b, pose.a_from_b, pose.b_from_a, budget, scratch);
   Separation result;
   result.node_visits = budget.visits();
   result.sphere_pairs = found.tests;
@@ -207,7 +208,7 @@ Separation separation(const PlacedTree& a, const PlacedTree& b, const Separation
     result.status = QueryStatus::invalid_input;
     return result;
   }
-  if (surfaces) return surface_separation(a, b, *pose, settings);
+  if (surfaces) return surface_separation(a, b, *pose, settings, workspace.impl()->exact);
   const SphereTree tree_a = sphere_tree(a.tree, Measure::inner);
   const SphereTree tree_b = sphere_tree(b.tree, Measure::inner);
   GapDescent descent(tree_a, tree_b, *pose, settings, *workspace.impl());

@@ -63,6 +63,19 @@ struct BoxPair {
   std::uint8_t level_a, level_b;
 };
 
+/// A pair of nodes that waits to be measured, and what it is apart at least.
+struct GapPair {
+  double squared;
+  std::uint32_t a, b;
+  std::uint8_t level_a, level_b;
+
+  /// In a heap: the nearest on top, of equally near ones what is furthest down the trees.
+  bool operator<(const GapPair& other) const noexcept {
+    if (squared != other.squared) return squared > other.squared;
+    return level_a + level_b > other.level_a + other.level_b;
+  }
+};
+
 /// A block whose triangles cross others: which of its vertices are inside the other solid.
 struct CrossedBlock {
   std::uint32_t block;
@@ -214,6 +227,7 @@ struct ExactScratch {
         triangles_b(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
         pairs(hooked<TrianglePairs>(hooks)),
         waiting(hooked_array<BoxPair>(hooks, kMostWaiting)),
+        gaps(hooked_array<GapPair>(hooks, most_blocks + kMostWaiting)),
         rows(hooked_array<TriangleRow>(hooks, most_rows())),
         crossings(most_crossings, hooks),
         keys(hooked_array<std::uint64_t>(hooks, most_rows())),
@@ -265,6 +279,7 @@ struct ExactScratch {
   std::uint64_t placed_a = 0;  ///< hash of the asset that `triangles_a` are of
   Hooked<TrianglePairs> pairs;
   HookedArray<BoxPair> waiting;
+  HookedArray<GapPair> gaps;
   HookedArray<TriangleRow> rows;
   Crossings crossings;
   HookedArray<std::uint64_t> keys, other_keys;

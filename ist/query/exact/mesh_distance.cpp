@@ -14,9 +14,10 @@ using exact::Point;
 /// What is no nearer than the best by more than this, relative, need not be looked at.
 constexpr double kNearer = 1 - 1e-13;
 
-/// A box by its middle, in its own frame.
+/// A box by its middle and its slab, in its own frame.
 struct MiddleBox {
   double middle[3], half[3];
+  double normal[3] = {}, slab_low = 0, slab_high = 0;
 
   double size() const noexcept { return std::max({half[0], half[1], half[2]}); }
 };
@@ -26,36 +27,48 @@ MiddleBox box_of(const BoxBlock& boxes, std::uint32_t l) noexcept {
   for (int k = 0; k < 3; ++k) {
     box.middle[k] = 0.5 * (double{boxes.low[k][l]} + boxes.high[k][l]);
     box.half[k] = 0.5 * (double{boxes.high[k][l]} - boxes.low[k][l]);
+    box.normal[k] = boxes.normal[k][l];
   }
+  box.slab_low = boxes.slab_low[l], box.slab_high = boxes.slab_high[l];
   return box;
 }
 
-/// The box of a node: of the whole mesh, or a lane of the block above.
+/// The box of a node: a lane of the block above, or that of the whole mesh, which has no slab.
 MiddleBox box_of(const MeshTree& mesh, int level, std::uint32_t i) noexcept {
   if (level < mesh.top) return box_of(mesh.level[level + 1].boxes[i / kWidth], i % kWidth);
-  MiddleBox all = box_of(mesh.level[mesh.top].boxes[0], 0);
+  MiddleBox all;
+  const BoxBlock& root = mesh.level[mesh.top].boxes[0];
+  const std::uint32_t used = mesh.level[mesh.top - 1].count;
   for (int k = 0; k < 3; ++k) {
-    double low = HUGE_VAL, high = -HUGE_VAL;
-    for (std::uint32_t l = 0; l < mesh.level[mesh.top - 1].count; ++l) {
-      low = std::min(low, double{mesh.level[mesh.top].boxes[0].low[k][l]});
-      high = std::max(high, double{mesh.level[mesh.top].boxes[0].high[k][l]});
-    }
+    const double low = *std::min_element(root.low[k], root.low[k] + used);
+    const double high = *std::max_element(root.high[k], root.high[k] + used);
     all.middle[k] = 0.5 * (low + high);
     all.half[k] = 0.5 * (high - low);
   }
   return all;
 }
 
-/// Squared distances of sixteen boxes from one of another frame, or less: along their own axes and
-/// along its axes.
+/// Squared distances of sixteen boxes from one of another frame, or less: along their own axes,
+/// along its axes, and along the normals of all slabs.
 void gaps_of(const BoxBlock& boxes, const MiddleBox& one, const Similarity& map,
              double (&squared)[kWidth]) noexcept {
-  double middle[3], hull[3], along[kWidth] = {}, across[kWidth] = {};
+  double middle[3], hull[3], axis[3][3], reach[3], normal[3];
   map.apply(one.middle, middle);
-  for (int i = 0; i < 3; ++i)
+  for (int i = 0; i < 3; ++i) {
     hull[i] = (std::abs(map.m[3 * i]) * one.half[0] + std::abs(map.m[3 * i + 1]) * one.half[1]) +
               std::abs(map.m[3 * i + 2]) * one.half[2];
-  double away[3][kWidth], half[3][kWidth];
+    for (int k = 0; k < 3; ++k) axis[k][i] = map.m[3 * i + k] / map.scale;
+    reach[i] = map.scale * one.half[i];
+  }
+  for (int i = 0; i < 3; ++i)
+    normal[i] = (axis[0][i] * one.normal[0] + axis[1][i] * one.normal[1]) +
+                axis[2][i] * one.normal[2];
+  // Its slab from its middle; all below is told from there.
+  const double before = (one.normal[0] * one.middle[0] + one.normal[1] * one.middle[1]) +
+                        one.normal[2] * one.middle[2];
+  const double low = map.scale * (one.slab_low - before),
+               high = map.scale * (one.slab_high - before);
+  double away[3][kWidth], half[3][kWidth], along[kWidth] = {}, across[kWidth] = {};
   for (int i = 0; i < 3; ++i)
     for (std::uint32_t l = 0; l < kWidth; ++l) {
       away[i][l] = 0.5 * (double{boxes.low[i][l]} + boxes.high[i][l]) - middle[i];
@@ -63,18 +76,42 @@ void gaps_of(const BoxBlock& boxes, const MiddleBox& one, const Similarity& map,
       const double gap = std::max(0.0, std::abs(away[i][l]) - (half[i][l] + hull[i]));
       along[l] += gap * gap;
     }
-  for (int k = 0; k < 3; ++k) {
-    const double x = map.m[k] / map.scale, y = map.m[3 + k] / map.scale,
-                 z = map.m[6 + k] / map.scale, reach = map.scale * one.half[k];
+  for (int k = 0; k < 3; ++k)
     for (std::uint32_t l = 0; l < kWidth; ++l) {
-      const double between = (x * away[0][l] + y * away[1][l]) + z * away[2][l];
-      const double width = (std::abs(x) * half[0][l] + std::abs(y) * half[1][l]) +
-                           std::abs(z) * half[2][l];
-      const double gap = std::max(0.0, std::abs(between) - (width + reach));
+      const double* const u = axis[k];
+      const double between = (u[0] * away[0][l] + u[1] * away[1][l]) + u[2] * away[2][l];
+      const double width = (std::abs(u[0]) * half[0][l] + std::abs(u[1]) * half[1][l]) +
+                           std::abs(u[2]) * half[2][l];
+      const double gap = std::max(0.0, std::abs(between) - (width + reach[k]));
       across[l] += gap * gap;
     }
+  for (std::uint32_t l = 0; l < kWidth; ++l) {
+    const double n[3] = {boxes.normal[0][l], boxes.normal[1][l], boxes.normal[2][l]};
+    // n is `turn` times the other normal and a rest, by which only boxes are known.
+    const double turn = (n[0] * normal[0] + n[1] * normal[1]) + n[2] * normal[2];
+    double rest[3], other_rest[3], at_middle = 0, at_box = 0, other_at_box = 0, to_box = 0;
+    for (int i = 0; i < 3; ++i) {
+      rest[i] = n[i] - turn * normal[i];
+      other_rest[i] = normal[i] - turn * n[i];
+      at_middle += n[i] * middle[i];
+      other_at_box += std::abs(other_rest[i]) * half[i][l];
+      to_box += other_rest[i] * away[i][l];
+    }
+    for (int k = 0; k < 3; ++k)
+      at_box += reach[k] * std::abs((axis[k][0] * rest[0] + axis[k][1] * rest[1]) +
+                                    axis[k][2] * rest[2]);
+    // Along n, from the one's middle: it, and the lane's slab.
+    const double slab_low = boxes.slab_low[l] - at_middle,
+                 slab_high = boxes.slab_high[l] - at_middle;
+    const double gap = std::max(slab_low - (std::max(turn * low, turn * high) + at_box),
+                                (std::min(turn * low, turn * high) - at_box) - slab_high);
+    const double most = to_box + std::max(turn * slab_low, turn * slab_high) + other_at_box;
+    const double least = to_box + std::min(turn * slab_low, turn * slab_high) - other_at_box;
+    const double other_gap = std::max(low - most, least - high);
+    constexpr double kLength = 1 - 1e-5;  // of normals, or more
+    const double slabs = kLength * std::max({0.0, gap, other_gap});
+    squared[l] = std::max({along[l], across[l], slabs * slabs});
   }
-  for (std::uint32_t l = 0; l < kWidth; ++l) squared[l] = std::max(along[l], across[l]);
 }
 
 /// A block's triangles in A's unit frame.
@@ -123,59 +160,48 @@ double squared_gap(const double* low, const double* high, const PlacedBlock& of,
   return sum;
 }
 
-/// Squared distance of two triangles from one's plane, or less; 0 where it cuts the other.
-double squared_height(const exact::FlatTriangle& plane, const exact::FlatTriangle& other) noexcept {
-  double low = HUGE_VAL, high = -HUGE_VAL;
-  for (const Point& corner : other.corner) {
-    const double h = dot(plane.normal, corner - plane.corner[0]);
-    low = std::min(low, h);
-    high = std::max(high, h);
-  }
-  const double height = std::max({low, -high, 0.0});
-  return plane.squared_normal > 0 ? height * height / plane.squared_normal : 0;
-}
-
 class GapSearch {
  public:
   GapSearch(const MeshTree& a, const MeshTree& b, const Similarity& a_from_b,
-            const Similarity& b_from_a, Budget& budget) noexcept
-      : a_(a), b_(b), a_from_b_(a_from_b), b_from_a_(b_from_a), budget_(budget) {}
+            const Similarity& b_from_a, Budget& budget, ExactScratch& scratch) noexcept
+      : a_(a),
+        b_(b),
+        a_from_b_(a_from_b),
+        b_from_a_(b_from_a),
+        budget_(budget),
+        waiting_(scratch.gaps.get()),
+        room_(scratch.most_blocks) {}
 
   MeshGap run() noexcept {
     best_.take(a_.vertex(0), map_point(a_from_b_, b_.vertex(0)));
     out_.overlap = holds({a_}, b_, {&a_from_b_}) || holds({b_, &a_from_b_, &b_from_a_}, a_, {});
-    waiting_[size_++] = {0, a_.top, b_.top, 0, 0};
-    double least = HUGE_VAL;
-    while (size_ > 0 && !out_.overlap) {
-      const Pair pair = waiting_[size_ - 1];
-      if (!(pair.squared < kNearer * best_.squared)) {
-        --size_;
-        continue;
-      }
-      if (budget_.grant(1) == 0) {
+    push({0, 0, 0, static_cast<std::uint8_t>(a_.top), static_cast<std::uint8_t>(b_.top)});
+    while (size_ > 0 && !out_.overlap && !out_.stopped) {
+      const GapPair pair = waiting_[0];
+      if (!(pair.squared < kNearer * best_.squared)) break;
+      if (budget_.grant(1) == 0 || size_ > room_) {
         out_.stopped = true;
-        for (std::uint32_t i = 0; i < size_; ++i) least = std::min(least, waiting_[i].squared);
         break;
       }
-      --size_;
+      std::pop_heap(waiting_, waiting_ + size_--);
       if (pair.level_a == 0 && pair.level_b == 0)
         measure(pair.a, pair.b);
       else
         open(pair);
     }
+    const double least = out_.stopped ? waiting_[0].squared : best_.squared;
     if (out_.overlap) return out_;
     out_.distance = std::sqrt(best_.squared);
     out_.a = best_.a, out_.b = best_.b;
-    out_.least = std::max(0.0, (1 - 1e-12) * std::sqrt(std::min(best_.squared, least)) - slack());
+    out_.least = std::max(0.0, (1 - 1e-12) * std::sqrt(least) - slack());
     return out_;
   }
 
  private:
-  struct Pair {
-    double squared;
-    int level_a, level_b;
-    std::uint32_t a, b;
-  };
+  void push(const GapPair& pair) noexcept {
+    waiting_[size_++] = pair;
+    std::push_heap(waiting_, waiting_ + size_);
+  }
 
   /// Whether a solid holds a shell of the other.
   struct ShellMap {
@@ -197,7 +223,7 @@ class GapSearch {
   }
 
   /// The larger node's sixteen against the other's box.
-  void open(const Pair& pair) noexcept {
+  void open(const GapPair& pair) noexcept {
     const MiddleBox box_a = box_of(a_, pair.level_a, pair.a),
                     box_b = box_of(b_, pair.level_b, pair.b);
     const bool open_a = pair.level_b == 0 || (pair.level_a > 0 &&
@@ -213,17 +239,13 @@ class GapSearch {
       for (double& gap : squared) gap *= a_from_b_.scale * a_from_b_.scale;
     }
     const std::uint32_t used = std::min(kWidth, mesh.level[level - 1].count - kWidth * number);
-    const std::uint32_t first = size_;
     for (std::uint32_t l = 0; l < used; ++l) {
       if (!(squared[l] < kNearer * best_.squared)) continue;
-      Pair child = pair;
+      GapPair child = pair;
       child.squared = std::max(pair.squared, squared[l]);
       (open_a ? child.a : child.b) = kWidth * number + l;
       --(open_a ? child.level_a : child.level_b);
-      std::uint32_t place = size_++;
-      for (; place > first && waiting_[place - 1].squared < child.squared; --place)
-        waiting_[place] = waiting_[place - 1];
-      waiting_[place] = child;
+      push(child);
     }
   }
 
@@ -244,8 +266,17 @@ class GapSearch {
         }
       }
       const exact::FlatTriangle of_a = placed_a_.triangle(t);
+      const exact::Point& n = of_a.normal;
+      double height[kWidth];
+      for (std::uint32_t v = 0; v < kWidth; ++v)
+        height[v] = (n.x * (placed_b_.vertex[0][v] - of_a.corner[0].x) +
+                     n.y * (placed_b_.vertex[1][v] - of_a.corner[0].y)) +
+                    n.z * (placed_b_.vertex[2][v] - of_a.corner[0].z);
+      const auto& corner = placed_b_.block->corner;
       for (std::uint32_t l = 0; l < placed_b_.block->triangles && !out_.overlap; ++l)
-        if (squared[l] < best_.squared) measure(of_a, placed_b_.triangle(l), squared[l]);
+        if (squared[l] < best_.squared)
+          measure(of_a, l, squared[l],
+                  {height[corner[0][l]], height[corner[1][l]], height[corner[2][l]]});
     }
   }
 
@@ -264,19 +295,26 @@ class GapSearch {
     }
   }
 
-  void measure(const exact::FlatTriangle& a, const exact::FlatTriangle& b,
-               double boxes_gap) noexcept {
-    const double over_a = squared_height(a, b);
-    if (!(kNearer * over_a < best_.squared)) return;
-    const double over_b = squared_height(b, a);
-    if (!(kNearer * over_b < best_.squared)) return;
+  /// Of three heights, times the normal's length: whether a plane is further than the best.
+  bool beyond(const exact::Heights& height, double squared_normal) const noexcept {
+    const double least = std::max(std::min({height[0], height[1], height[2]}),
+                                  -std::max({height[0], height[1], height[2]}));
+    return least > 0 && kNearer * (least * least) > best_.squared * squared_normal;
+  }
+
+  void measure(const exact::FlatTriangle& a, std::uint32_t lane, double boxes_gap,
+               const exact::Heights& over_a) noexcept {
+    if (beyond(over_a, a.squared_normal)) return;
+    const exact::FlatTriangle b = placed_b_.triangle(lane);
+    exact::Heights over_b;
+    for (int k = 0; k < 3; ++k) over_b[k] = dot(b.normal, a.corner[k] - b.corner[0]);
+    if (beyond(over_b, b.squared_normal)) return;
     ++out_.tests;
-    if (boxes_gap == 0 && over_a == 0 && over_b == 0 &&
-        exact::cross_exactly(a.corner, b.corner).pierced != 0) {
+    if (boxes_gap == 0 && exact::cross_exactly(a.corner, b.corner).pierced != 0) {
       out_.overlap = true;
       return;
     }
-    exact::take_nearest(a, b, best_);
+    exact::take_nearest(a, b, over_a, over_b, best_);
     for (const exact::FlatTriangle* t : {&a, &b}) {
       const double longest = std::max({dot(t->side[0], t->side[0]), dot(t->side[1], t->side[1]),
                                        dot(t->side[2], t->side[2])});
@@ -297,15 +335,16 @@ class GapSearch {
   MeshGap out_;
   double thin_ = 0;
   PlacedBlock placed_a_, placed_b_;
+  GapPair* const waiting_;  ///< a heap
+  const std::uint32_t room_;
   std::uint32_t size_ = 0;
-  Pair waiting_[2 * kWidth * kMaxLevels];
 };
 
 }  // namespace
 
 MeshGap mesh_gap(const MeshTree& a, const MeshTree& b, const Similarity& a_from_b,
-                 const Similarity& b_from_a, Budget& budget) noexcept {
-  return GapSearch(a, b, a_from_b, b_from_a, budget).run();
+                 const Similarity& b_from_a, Budget& budget, ExactScratch& scratch) noexcept {
+  return GapSearch(a, b, a_from_b, b_from_a, budget, scratch).run();
 }
 
 }  // namespace ist

@@ -215,6 +215,8 @@ MeshFoot nearest_on(const MeshTree& mesh, const Point& p) noexcept {
         Point corners[3];
         corners_of(mesh, block, t, corners);
         const exact::FlatTriangle flat(corners[0], corners[1], corners[2]);
+        const double height = dot(flat.normal, p - corners[0]);
+        if (kNearer * (height * height) > best.squared * flat.squared_normal) continue;
         const Point at = nearest_on_triangle(p, flat);
         const double squared = dot(p - at, p - at);
         if (squared < best.squared) best = {squared, at, kWidth * node.number + t, flat.normal};
@@ -222,13 +224,21 @@ MeshFoot nearest_on(const MeshTree& mesh, const Point& p) noexcept {
       continue;
     }
     const BoxBlock& boxes = mesh.level[node.level].boxes[node.number];
-    double key[kWidth] = {};
+    double key[kWidth] = {}, along[kWidth] = {};
     for (int k = 0; k < 3; ++k)
       for (std::uint32_t l = 0; l < kWidth; ++l) {
         const double at = (&p.x)[k];
-        const double gap = std::max({boxes.low[k][l] - at, at - boxes.high[k][l], 0.0});
+        const double gap =
+            std::max(0.0, std::max(boxes.low[k][l] - at, at - boxes.high[k][l]));
         key[l] += gap * gap;
+        along[l] += boxes.normal[k][l] * at;
       }
+    for (std::uint32_t l = 0; l < kWidth; ++l) {
+      constexpr double kLength = 1 - 1e-5;  // of normals, or more
+      const double slab = kLength * std::max(0.0, std::max(boxes.slab_low[l] - along[l],
+                                                           along[l] - boxes.slab_high[l]));
+      key[l] = std::max(key[l], slab * slab);
+    }
     stack.push(mesh, node, key, kNearer * best.squared);
   }
   return best;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "query/exact/orientation.h"
@@ -67,24 +67,29 @@ inline Point nearest_on_triangle(const Point& p, const FlatTriangle& t) noexcept
   return best.a;
 }
 
+/// Of a triangle's corners over the other's plane, times the length of its normal.
+using Heights = std::array<double, 3>;
+
 /// Takes the nearest points of two triangles that do not cross, if they are nearer.
-inline bool take_nearest(const FlatTriangle& a, const FlatTriangle& b, NearestPair& best) noexcept {
-  bool nearer = false;
+inline void take_nearest(const FlatTriangle& a, const FlatTriangle& b, const Heights& over_a,
+                         const Heights& over_b, NearestPair& best) noexcept {
   for (int k = 0; k < 3; ++k) {
-    nearer |= best.take(a.corner[k], nearest_on_triangle(a.corner[k], b));
-    nearer |= best.take(nearest_on_triangle(b.corner[k], a), b.corner[k]);
+    if (over_b[k] * over_b[k] < best.squared * b.squared_normal || b.squared_normal == 0)
+      best.take(a.corner[k], nearest_on_triangle(a.corner[k], b));
+    if (over_a[k] * over_a[k] < best.squared * a.squared_normal || a.squared_normal == 0)
+      best.take(nearest_on_triangle(b.corner[k], a), b.corner[k]);
   }
   // Edges whose nearest points are no corners; by products of vectors, which keep the digits of
   // edges that are nearly parallel.
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
       const Point n = cross(a.side[i], b.side[j]), w = b.corner[j] - a.corner[i];
-      const double nn = dot(n, n);
+      const double nn = dot(n, n), between = dot(w, n);
+      if (!(between * between < best.squared * nn)) continue;  // the lines are further
       const double s = dot(cross(w, b.side[j]), n), t = dot(cross(w, a.side[i]), n);
       if (s > 0 && s < nn && t > 0 && t < nn)
-        nearer |= best.take(a.corner[i] + (s / nn) * a.side[i], b.corner[j] + (t / nn) * b.side[j]);
+        best.take(a.corner[i] + (s / nn) * a.side[i], b.corner[j] + (t / nn) * b.side[j]);
     }
-  return nearer;
 }
 
 }  // namespace ist::exact
