@@ -49,9 +49,9 @@ MiddleBox box_of(const MeshTree& mesh, int level, std::uint32_t i) noexcept {
 }
 
 /// Squared distances of sixteen boxes from one of another frame, or less: along their own axes,
-/// along its axes, and along the normals of all slabs.
+/// along its axes, along the normals of all slabs, and along the unit vector `toward` it.
 void gaps_of(const BoxBlock& boxes, const MiddleBox& one, const Similarity& map,
-             double (&squared)[kWidth]) noexcept {
+             const double (&toward)[3], double (&squared)[kWidth]) noexcept {
   double middle[3], hull[3], axis[3][3], reach[3], normal[3];
   map.apply(one.middle, middle);
   for (int i = 0; i < 3; ++i) {
@@ -68,6 +68,16 @@ void gaps_of(const BoxBlock& boxes, const MiddleBox& one, const Similarity& map,
                         one.normal[2] * one.middle[2];
   const double low = map.scale * (one.slab_low - before),
                high = map.scale * (one.slab_high - before);
+  // How far it reaches back along `toward`.
+  const double turned =
+      (toward[0] * normal[0] + toward[1] * normal[1]) + toward[2] * normal[2];
+  double by_box = 0, by_slab = std::min(turned * low, turned * high);
+  for (int k = 0; k < 3; ++k) {
+    const double x = toward[0] * axis[k][0] + toward[1] * axis[k][1] + toward[2] * axis[k][2];
+    by_box -= reach[k] * std::abs(x);
+    by_slab -= reach[k] * std::abs(x - turned * one.normal[k]);
+  }
+  const double nearest = std::max(by_box, by_slab);
   double away[3][kWidth], half[3][kWidth], along[kWidth] = {}, across[kWidth] = {};
   for (int i = 0; i < 3; ++i)
     for (std::uint32_t l = 0; l < kWidth; ++l) {
@@ -89,8 +99,13 @@ void gaps_of(const BoxBlock& boxes, const MiddleBox& one, const Similarity& map,
     const double n[3] = {boxes.normal[0][l], boxes.normal[1][l], boxes.normal[2][l]};
     // n is `turn` times the other normal and a rest, by which only boxes are known.
     const double turn = (n[0] * normal[0] + n[1] * normal[1]) + n[2] * normal[2];
+    const double steep = (n[0] * toward[0] + n[1] * toward[1]) + n[2] * toward[2];
     double rest[3], other_rest[3], at_middle = 0, at_box = 0, other_at_box = 0, to_box = 0;
+    double ahead = 0, ahead_of_slab = 0;
     for (int i = 0; i < 3; ++i) {
+      ahead += toward[i] * away[i][l] + std::abs(toward[i]) * half[i][l];
+      const double beside = toward[i] - steep * n[i];
+      ahead_of_slab += beside * away[i][l] + std::abs(beside) * half[i][l];
       rest[i] = n[i] - turn * normal[i];
       other_rest[i] = normal[i] - turn * n[i];
       at_middle += n[i] * middle[i];
@@ -110,7 +125,9 @@ void gaps_of(const BoxBlock& boxes, const MiddleBox& one, const Similarity& map,
     const double other_gap = std::max(low - most, least - high);
     constexpr double kLength = 1 - 1e-5;  // of normals, or more
     const double slabs = kLength * std::max({0.0, gap, other_gap});
-    squared[l] = std::max({along[l], across[l], slabs * slabs});
+    ahead_of_slab += std::max(steep * slab_low, steep * slab_high);
+    const double ahead_gap = std::max(0.0, nearest - std::min(ahead, ahead_of_slab));
+    squared[l] = std::max({along[l], across[l], slabs * slabs, ahead_gap * ahead_gap});
   }
 }
 
@@ -142,6 +159,10 @@ struct PlacedBlock {
       all_low[k] = *std::min_element(vertex[k], vertex[k] + kWidth);
       all_high[k] = *std::max_element(vertex[k], vertex[k] + kWidth);
     }
+  }
+  void look_along(const Point& w, double (&along)[kWidth]) const noexcept {
+    for (std::uint32_t v = 0; v < kWidth; ++v)
+      along[v] = (w.x * vertex[0][v] + w.y * vertex[1][v]) + w.z * vertex[2][v];
   }
   Point at(std::uint32_t v) const noexcept { return {vertex[0][v], vertex[1][v], vertex[2][v]}; }
   exact::FlatTriangle triangle(std::uint32_t t) const noexcept {
@@ -232,10 +253,16 @@ class GapSearch {
     const int level = open_a ? pair.level_a : pair.level_b;
     const std::uint32_t number = open_a ? pair.a : pair.b;
     double squared[kWidth];
+    const Point w = best_.direction();
     if (open_a) {
-      gaps_of(mesh.level[level].boxes[number], box_b, a_from_b_, squared);
+      gaps_of(mesh.level[level].boxes[number], box_b, a_from_b_, {w.x, w.y, w.z}, squared);
     } else {
-      gaps_of(mesh.level[level].boxes[number], box_a, b_from_a_, squared);
+      double back[3];
+      for (int i = 0; i < 3; ++i)
+        back[i] = -((b_from_a_.m[3 * i] * w.x + b_from_a_.m[3 * i + 1] * w.y) +
+                    b_from_a_.m[3 * i + 2] * w.z) /
+                  b_from_a_.scale;
+      gaps_of(mesh.level[level].boxes[number], box_a, b_from_a_, back, squared);
       for (double& gap : squared) gap *= a_from_b_.scale * a_from_b_.scale;
     }
     const std::uint32_t used = std::min(kWidth, mesh.level[level - 1].count - kWidth * number);
@@ -252,9 +279,25 @@ class GapSearch {
   void measure(std::uint32_t a, std::uint32_t b) noexcept {
     placed_a_.place(a_, a, nullptr);
     placed_b_.place(b_, b, &a_from_b_);
+    // Along the way between the nearest points so far nothing else may be nearer: then that is all.
+    const Point w = best_.direction();
+    double along_a[kWidth], along_b[kWidth];
+    placed_a_.look_along(w, along_a);
+    placed_b_.look_along(w, along_b);
+    const double first_b = *std::min_element(along_b, along_b + kWidth);
+    if (apart(first_b - *std::max_element(along_a, along_a + kWidth))) return;
     near_vertices();
+    double ahead_b[kWidth];
+    const auto& corner_a = placed_a_.block->corner;
+    const auto& corner_b = placed_b_.block->corner;
+    for (std::uint32_t l = 0; l < kWidth; ++l)
+      ahead_b[l] = std::min(
+          {along_b[corner_b[0][l]], along_b[corner_b[1][l]], along_b[corner_b[2][l]]});
     for (std::uint32_t t = 0; t < placed_a_.block->triangles && !out_.overlap; ++t) {
-      if (!(squared_gap(placed_b_.all_low, placed_b_.all_high, placed_a_, t) < best_.squared))
+      const double ahead =
+          std::max({along_a[corner_a[0][t]], along_a[corner_a[1][t]], along_a[corner_a[2][t]]});
+      if (apart(first_b - ahead) ||
+          !(squared_gap(placed_b_.all_low, placed_b_.all_high, placed_a_, t) < best_.squared))
         continue;
       double squared[kWidth] = {};
       for (int k = 0; k < 3; ++k) {
@@ -272,11 +315,10 @@ class GapSearch {
         height[v] = (n.x * (placed_b_.vertex[0][v] - of_a.corner[0].x) +
                      n.y * (placed_b_.vertex[1][v] - of_a.corner[0].y)) +
                     n.z * (placed_b_.vertex[2][v] - of_a.corner[0].z);
-      const auto& corner = placed_b_.block->corner;
       for (std::uint32_t l = 0; l < placed_b_.block->triangles && !out_.overlap; ++l)
-        if (squared[l] < best_.squared)
+        if (squared[l] < best_.squared && !apart(ahead_b[l] - ahead))
           measure(of_a, l, squared[l],
-                  {height[corner[0][l]], height[corner[1][l]], height[corner[2][l]]});
+                  {height[corner_b[0][l]], height[corner_b[1][l]], height[corner_b[2][l]]});
     }
   }
 
@@ -293,6 +335,10 @@ class GapSearch {
       if (*nearest < best_.squared)
         best_.take(placed_a_.at(v), placed_b_.at(static_cast<std::uint32_t>(nearest - squared)));
     }
+  }
+
+  bool apart(double gap) const noexcept {
+    return gap > 0 && !(kNearer * (gap * gap) < best_.squared);
   }
 
   /// Of three heights, times the normal's length: whether a plane is further than the best.

@@ -25,6 +25,10 @@ struct NearestPair {
     b = on_b;
     return true;
   }
+  /// Unit, from a to b; zero if these are one.
+  Point direction() const noexcept {
+    return squared > 0 ? 1 / std::sqrt(squared) * (b - a) : Point{0, 0, 0};
+  }
 };
 
 inline Point nearest_on_segment(const Point& p, const Point& from, const Point& to) noexcept {
