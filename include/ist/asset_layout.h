@@ -19,8 +19,8 @@
 //
 // An asset of a surface alone has no spheres: n = d = 0, neither trees nor a field, but a mesh.
 //
-// The matched set of all n inner spheres is detail 0 and stands in AssetHeader; the coarser ones
-// are what a query may answer from instead, under PenetrationSettings::pair_budget.
+// The matched set of all n inner spheres is detail 0 and stands in AssetHeader. Under
+// PenetrationSettings::pair_budget a query may answer from the coarser ones instead.
 //
 // A tree, with m(k) = ⌈n / 16^(k+1)⌉ blocks at level k, up to the first level of one block:
 //
@@ -34,8 +34,8 @@
 // but the last of each level is full. Sections follow each other in this order without a gap but
 // the padding to 64 bytes, so that n and d alone give every offset (place_sections).
 //
-// The field, the solid's surface as a query looks at it: triangles, a tree of balls over them, and
-// a grid that tells inside from outside.
+// The field, the solid's surface for queries of spheres: triangles, a tree of balls over them, and
+// a grid that separates inside from outside.
 //
 //   FieldHeader
 //   level 0                           SurfaceBlock[m(0)]
