@@ -527,7 +527,7 @@ export interface Impact {
   surfacePairs: number;
 }
 
-/** A proven time up to which two moving solids stay clear, at any speed. Needs the stored surface of both. */
+/** A proven time up to which two moving solids stay clear. Needs the stored surface of both. */
 export function timeOfImpact(
   a: Asset | Field,
   b: Asset,
