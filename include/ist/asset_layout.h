@@ -216,7 +216,7 @@ struct alignas(64) MeshBlock {
   std::uint16_t reserved = 0;
   std::uint32_t first_neighbour = 0;  ///< index into `neighbours` of the first block that shares a
                                       ///< vertex
-  std::uint32_t neighbours = 0;       ///< count: one entry a block, by number
+  std::uint32_t neighbours = 0;       ///< count: one entry per block, by number
   std::uint32_t shell = 0;
 };
 static_assert(sizeof(MeshBlock) == 128);

@@ -48,7 +48,8 @@ struct CylinderField {
   double half_height = 1;  ///< [u] > 0
 };
 
-/// Terrain: the solid under a grid of heights along z, two triangles a cell, cut from (i, j) to (i
+/// Terrain: the solid under a grid of heights along z, two triangles per cell, cut from (i, j) to
+/// (i
 /// + 1, j + 1). Exact. Beyond its border it continues level.
 struct HeightField {
   const float* heights = nullptr;  ///< [u] [rows · columns], columns (x) run fastest

@@ -73,7 +73,7 @@ inline constexpr std::size_t kFewGpuPairs = 16'384;
 /// Working memory of a batch on the device. One batch at a time may use it.
 class GpuWorkspace {
  public:
-  /// For batches of up to `most_pairs`. Takes 100 MB, plus 8 bytes a pair, or 40 bytes up to
+  /// For batches of up to `most_pairs`. Takes 100 MB, plus 8 bytes per pair, or 40 bytes up to
   /// kFewGpuPairs.
   ///
   /// Up to kFewGpuPairs pairs are partitioned more finely: a small batch ends sooner, at the cost

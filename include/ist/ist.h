@@ -343,7 +343,7 @@ typedef struct ist_placed_field {
 
 /* --- Workspaces ------------------------------------------------------------------------------- */
 
-/* Scratch memory of queries, one a thread. All zero: empty. */
+/* Scratch memory of queries, one per thread. All zero: empty. */
 typedef struct ist_workspace {
   uint64_t opaque[8];
 } ist_workspace_t;
@@ -675,7 +675,7 @@ typedef struct ist_parallel {
 
 /* answers[i] is that of ist_penetration(pairs[i]), with its status, errors included.
  * `answer_size`: sizeof(ist_penetration_t); the answers' own `size` is written, not read.
- * `workspaces`: [workers], one a worker, each made; without any, every answer is
+ * `workspaces`: [workers], one per worker, each made; without any, every answer is
  * IST_BUDGET_EXHAUSTED with no upper bound.
  * `parallel`: null is the calling thread. No lock or allocation except its own.
  * Returns IST_OK, or an error of the call; then no pair was evaluated. */

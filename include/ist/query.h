@@ -57,7 +57,7 @@ struct ContactSettings {
   FieldUse field = FieldUse::automatic;  ///< matched measure only
   std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
   /// [µs] wall clock from the call, as in PenetrationSettings. Where nothing can be extrapolated,
-  /// the rest is estimated when visits end, at 0.1 µs a pair.
+  /// the rest is estimated when visits end, at 0.1 µs per pair.
   double deadline_us = 0;
   double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
   double min_radius = 0;      ///< [u] nodes smaller than this are not opened
@@ -124,7 +124,7 @@ struct MemoryHooks {
   void* context = nullptr;  ///< passed to both
 };
 
-/// Scratch memory of a query: make one a thread, once.
+/// Scratch memory of a query: make one per thread, once.
 ///
 /// It never changes an answer. A query that needs more than its capacity stops with
 /// budget_exhausted.

@@ -56,8 +56,8 @@ struct PatchMemory {
   double stretch[3] = {0, 0, 0};  ///< [u] of the friction spring, world
 };
 
-/// State of a contact of two bodies: plain data of the caller, one a pair. Copy it to save a state.
-/// A default one is a new contact.
+/// State of a contact of two bodies: plain data of the caller, one per pair. Copy it to save a
+/// state. A default one is a new contact.
 struct ContactMemory {
   static constexpr std::size_t kPatches = 32;
   PatchMemory patches[kPatches];

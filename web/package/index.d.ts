@@ -123,7 +123,7 @@ export interface SphereSet {
 export interface Surface {
   /** [u] x, y, z of each vertex. */
   positions: Float64Array;
-  /** Three vertices a triangle, counter-clockwise from outside. */
+  /** Three vertices per triangle, counter-clockwise from outside. */
   triangles: Uint32Array;
 }
 
@@ -371,7 +371,7 @@ export interface Lenses {
   /** Lenses written. */
   count: number;
   /**
-   * Ten numbers a lens: x, y, z of the middle of its thickness; its axis x, y, z (unit, from A's
+   * Ten numbers per lens: x, y, z of the middle of its thickness; its axis x, y, z (unit, from A's
    * sphere to B's); radius where it is widest [u]; thickness along the axis [u]; index of A's and of
    * B's sphere in Asset.spheres(). An ellipsoid of that size resembles it.
    */
