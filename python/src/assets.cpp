@@ -1,5 +1,6 @@
-#include <pybind11/eigen.h>
-#include <pybind11/stl.h>
+#include <nanobind/eigen/dense.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/vector.h>
 
 #include <cstring>
 #include <memory>
@@ -32,17 +33,11 @@ constexpr std::pair<const char*, GridMode> kGrids[] = {{"banded", GridMode::band
                                                        {"hybrid", GridMode::hybrid}};
 constexpr std::pair<const char*, bool> kSpheres[] = {{"matched", true}, {"inner", false}};
 
-std::string path_of(const py::object& path) {
-  return py::module_::import("os").attr("fspath")(path).cast<std::string>();
-}
-
-SharedAsset shared(Asset asset) { return std::make_shared<Asset>(std::move(asset)); }
-
-SharedAsset asset_of_bytes(const py::buffer& buffer, const std::string& name) {
+Asset asset_of_bytes(const py::object& buffer, const std::string& name) {
   Py_buffer view;
-  if (PyObject_GetBuffer(buffer.ptr(), &view, PyBUF_SIMPLE) != 0) throw py::error_already_set();
+  if (PyObject_GetBuffer(buffer.ptr(), &view, PyBUF_SIMPLE) != 0) throw py::python_error();
   const std::unique_ptr<Py_buffer, decltype(&PyBuffer_Release)> held(&view, PyBuffer_Release);
-  return std::make_shared<Asset>(
+  return Asset(
       std::span(static_cast<const std::byte*>(view.buf), static_cast<std::size_t>(view.len)), name);
 }
 
@@ -50,17 +45,26 @@ py::bytes bytes_of(const Asset& asset) {
   return py::bytes(reinterpret_cast<const char*>(asset.bytes().data()), asset.bytes().size());
 }
 
+int show_bytes(PyObject* self, Py_buffer* view, int flags) {
+  const auto bytes = py::inst_ptr<Asset>(self)->bytes();
+  return PyBuffer_FillInfo(view, self, const_cast<std::byte*>(bytes.data()),
+                           static_cast<Py_ssize_t>(bytes.size()), 1, flags);
+}
+
+const PyType_Slot kAssetSlots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(show_bytes)},
+                                   {0, nullptr}};
+
 /// (n, 4): centre and radius in the mesh's own unit and frame.
-py::array spheres_of(const Asset& asset, const std::string& which) {
+py::object spheres_of(const Asset& asset, const std::string& which) {
   const bool matched = named(which, "which", kSpheres);
   const auto spheres = app::exported_spheres(asset.view(), 0);
-  Column<double> rows({static_cast<py::ssize_t>(spheres.size())}, {4});
+  const Column<double> rows({spheres.size()}, {4});
   for (std::size_t i = 0; i < spheres.size(); ++i) {
     const app::ExportedSphere& s = spheres[i];
     Eigen::Map<Eigen::Vector4d>(rows.row(i)) << (matched ? s.matched_centre : s.centre),
         (matched ? s.matched_radius : s.radius);
   }
-  return rows.array;
+  return rows.handed_out();
 }
 
 PlacedTree placed(const Asset& asset, const py::object& pose, double scale) {
@@ -76,9 +80,8 @@ PlacedTree placed(const Asset& asset, const py::object& pose, double scale) {
 
 /// What is kept of the mesh, as the command line takes it; a number is as good as its text.
 SurfaceSettings surface_settings(const py::object& given) {
-  const std::optional<SurfaceSettings> surface = parse_surface(py::str(given));
-  if (!surface)
-    throw Error("surface: '" + std::string(py::str(given)) + "' is none of " + kSurfaceMeaning);
+  const std::optional<SurfaceSettings> surface = parse_surface(text_of(given));
+  if (!surface) throw Error("surface: '" + text_of(given) + "' is none of " + kSurfaceMeaning);
   return *surface;
 }
 
@@ -122,33 +125,33 @@ Raises Error if not one sphere fits, and on settings out of range.)";
 void add_bodies(py::module_& module) {
   py::class_<MassProperties>(module, "MassProperties",
                              "A solid of density 1 as a rigid body, with bounds on the errors.")
-      .def_readonly("volume", &MassProperties::volume, "[u³]")
-      .def_readonly("centre_of_mass", &MassProperties::centre_of_mass, "(3,) [u]")
-      .def_readonly("inertia", &MassProperties::inertia,
-                    "(3, 3) [u⁵] about the centre of mass: ∫ (|y|² 1 − y yᵀ).")
-      .def_readonly("volume_error", &MassProperties::volume_error, "[u³]")
-      .def_readonly("centre_of_mass_error", &MassProperties::centre_of_mass_error,
-                    "[u] of each component")
-      .def_readonly("inertia_error", &MassProperties::inertia_error, "[u⁵] of each entry");
+      .def_ro("volume", &MassProperties::volume, "[u³]")
+      .def_ro("centre_of_mass", &MassProperties::centre_of_mass, "(3,) [u]")
+      .def_ro("inertia", &MassProperties::inertia,
+              "(3, 3) [u⁵] about the centre of mass: ∫ (|y|² 1 − y yᵀ).")
+      .def_ro("volume_error", &MassProperties::volume_error, "[u³]")
+      .def_ro("centre_of_mass_error", &MassProperties::centre_of_mass_error,
+              "[u] of each component")
+      .def_ro("inertia_error", &MassProperties::inertia_error, "[u⁵] of each entry");
   py::class_<Bounds>(module, "Bounds", "What holds a solid: a box along the axes, and a ball.")
-      .def_readonly("lower", &Bounds::lower, "(3,) [u] corner of the box")
-      .def_readonly("upper", &Bounds::upper, "(3,) [u] the opposite corner")
-      .def_readonly("centre", &Bounds::centre, "(3,) [u] of the ball")
-      .def_readonly("radius", &Bounds::radius, "[u] of the ball");
+      .def_ro("lower", &Bounds::lower, "(3,) [u] corner of the box")
+      .def_ro("upper", &Bounds::upper, "(3,) [u] the opposite corner")
+      .def_ro("centre", &Bounds::centre, "(3,) [u] of the ball")
+      .def_ro("radius", &Bounds::radius, "[u] of the ball");
   py::class_<Invariant>(module, "Invariant", "One proven property of an asset.")
-      .def_readonly("name", &Invariant::name, "'sphere inside solid', …")
-      .def_readonly("worst", &Invariant::worst,
-                    "Largest violation measure, as `meaning` says; ≤ 0 is sound unless stated.")
-      .def_readonly("meaning", &Invariant::meaning, "What `worst` measures, with its unit.")
-      .def_readonly("where", &Invariant::where, "Number of the sphere, node, … that is worst.")
-      .def_readonly("checked", &Invariant::checked, "How many were looked at.")
-      .def_readonly("violations", &Invariant::violations, "How many do not hold.");
+      .def_ro("name", &Invariant::name, "'sphere inside solid', …")
+      .def_ro("worst", &Invariant::worst,
+              "Largest violation measure, as `meaning` says; ≤ 0 is sound unless stated.")
+      .def_ro("meaning", &Invariant::meaning, "What `worst` measures, with its unit.")
+      .def_ro("where", &Invariant::where, "Number of the sphere, node, … that is worst.")
+      .def_ro("checked", &Invariant::checked, "How many were looked at.")
+      .def_ro("violations", &Invariant::violations, "How many do not hold.");
   py::class_<PartnerError>(module, "PartnerError", "How an asset answers one kind of partner.")
-      .def_property_readonly(
+      .def_prop_ro(
           "partner", [](const PartnerError& e) { return app::name_of(e.partner); },
           "'copy', 'plane', 'ball', 'edge', 'corner' or 'plate'.")
-      .def_readonly("median", &PartnerError::median, "Relative.")
-      .def_readonly("poses", &PartnerError::poses, "Behind it.");
+      .def_ro("median", &PartnerError::median, "Relative.")
+      .def_ro("poses", &PartnerError::poses, "Behind it.");
 }
 
 struct Targeted {
@@ -172,7 +175,7 @@ void add_bakes(py::module_& module) {
                              seed, threads, device, surface);
         return offline(
             [mesh, settings](const ProgressCallback& callback) {
-              return shared(bake(*mesh, settings, callback));
+              return bake(*mesh, settings, callback);
             },
             progress);
       },
@@ -186,13 +189,13 @@ void add_bakes(py::module_& module) {
        kSettingsDoc)
           .c_str());
   py::class_<Targeted>(module, "TargetedAsset", "What bake_to_error made of its target.")
-      .def_readonly("asset", &Targeted::asset, "The Asset.")
-      .def_readonly("measured_error", &Targeted::measured_error,
-                    "Relative, median near the overlap asked about, worst partner's.")
-      .def_readonly("poses", &Targeted::poses, "Of all partners; 0: none was tried.")
-      .def_readonly("partners", &Targeted::partners, "A PartnerError for each kind.")
-      .def_readonly("met", &Targeted::met, "poses > 0 and measured_error no larger than asked.")
-      .def_property_readonly(
+      .def_ro("asset", &Targeted::asset, "The Asset.")
+      .def_ro("measured_error", &Targeted::measured_error,
+              "Relative, median near the overlap asked about, worst partner's.")
+      .def_ro("poses", &Targeted::poses, "Of all partners; 0: none was tried.")
+      .def_ro("partners", &Targeted::partners, "A PartnerError for each kind.")
+      .def_ro("met", &Targeted::met, "poses > 0 and measured_error no larger than asked.")
+      .def_prop_ro(
           "stop", [](const Targeted& t) { return app::name_of(t.stop); }, "What ended the search.");
   module.def(
       "bake_to_error",
@@ -207,7 +210,7 @@ void add_bakes(py::module_& module) {
             [mesh, settings,
              target = ErrorTarget{relative_error, at_overlap}](const ProgressCallback& callback) {
               TargetedAsset made = bake_to_error(*mesh, target, settings, callback);
-              return Targeted{shared(std::move(made.asset)),
+              return Targeted{std::make_shared<Asset>(std::move(made.asset)),
                               made.measured_error,
                               made.poses,
                               {made.partners.begin(), made.partners.end()},
@@ -233,7 +236,7 @@ void add_bakes(py::module_& module) {
       [](const SharedMesh& mesh, const py::object& surface, unsigned threads) {
         return offline(
             [mesh, settings = surface_settings(surface), threads](const ProgressCallback&) {
-              return shared(bake_surface(*mesh, settings, threads));
+              return bake_surface(*mesh, settings, threads);
             });
       },
       py::arg("mesh"), py::kw_only(), py::arg("surface") = "all", py::arg("threads") = 0,
@@ -256,17 +259,15 @@ void add_bakes(py::module_& module) {
 
 void add_assets(py::module_& module) {
   add_bodies(module);
-  py::class_<Asset, SharedAsset>(
-      module, "Asset", py::buffer_protocol(),
-      "A baked solid. Immutable, so threads may share it. "
-      "memoryview(asset) is a read-only view of its bytes that holds it; "
-      "pickle works.")
+  py::class_<Asset>(module, "Asset", py::type_slots(kAssetSlots),
+                    "A baked solid. Immutable, so threads may share it. "
+                    "memoryview(asset) is a read-only view of its bytes that holds it; "
+                    "pickle works.")
       .def_static(
           "load",
           [](const py::object& path) {
-            return offline([name = path_of(path)](const ProgressCallback&) {
-              return shared(Asset::load(name));
-            });
+            return offline(
+                [name = path_of(path)](const ProgressCallback&) { return Asset::load(name); });
           },
           py::arg("path"), "Reads an .ist file. Raises Error (file, what is wrong, way out).")
       .def_static("from_bytes", &asset_of_bytes, py::arg("data"), py::arg("name") = "asset",
@@ -283,16 +284,17 @@ void add_assets(py::module_& module) {
           py::arg("path"),
           "Writes an .ist file: the old one or the whole new one is there at every moment.")
       .def("to_bytes", &bytes_of, "The bytes of an .ist file, a copy.")
-      .def_buffer([](const Asset& self) {
-        return py::buffer_info(const_cast<std::byte*>(self.bytes().data()), 1, "B", 1,
-                               {self.bytes().size()}, {1}, true);
-      })
-      .def(py::pickle(&bytes_of,
-                      [](const py::bytes& data) { return asset_of_bytes(data, "pickle"); }))
+      .def("__getstate__", &bytes_of)
+      .def("__setstate__",
+           [](Asset& self, const py::bytes& data) {
+             new (&self) Asset(asset_of_bytes(data, "pickle"));
+           })
+      .def("__copy__", [](const py::object& self) { return self; })
+      .def("__deepcopy__", [](const py::object& self, const py::object&) { return self; })
       .def(
           "info",
           [](const Asset& self) {
-            return py::module_::import("json").attr("loads")(app::asset_json(self.view()).dump());
+            return py::module_::import_("json").attr("loads")(app::asset_json(self.view()).dump());
           },
           "All that `ist info --json` prints, as a dict: docs/json.md.")
       .def("__str__", [](const Asset& self) { return app::describe_asset(self.view()); })
@@ -316,32 +318,32 @@ void add_assets(py::module_& module) {
           py::arg("pose") = py::none(), py::arg("scale") = 1.0,
           "Bounds, in the frame that the pose leads to. Matched spheres may reach out by "
           "`protrusion`.")
-      .def_property_readonly(
+      .def_prop_ro(
           "sphere_count", [](const Asset& self) { return self.view().sphere_count(); }, "Count.")
-      .def_property_readonly(
+      .def_prop_ro(
           "volume", [](const Asset& self) { return self.view().volume(); }, "[u³] of the solid.")
-      .def_property_readonly(
+      .def_prop_ro(
           "coverage", [](const Asset& self) { return self.view().coverage(); },
           "[0, 1] share of it in inner spheres.")
-      .def_property_readonly(
+      .def_prop_ro(
           "protrusion", [](const Asset& self) { return self.view().protrusion(); },
           "[u] no matched sphere sticks further out of the solid.")
-      .def_property_readonly(
+      .def_prop_ro(
           "has_field", [](const Asset& self) { return self.view().has_field(); },
           "It holds the solid's surface.")
-      .def_property_readonly(
+      .def_prop_ro(
           "field_error", [](const Asset& self) { return self.view().field_error(); },
           "[u] that surface and the solid's lie within this of each other.")
-      .def_property_readonly(
+      .def_prop_ro(
           "mesh_triangles", [](const Asset& self) { return self.view().mesh_triangles(); },
           "Of the mesh that exact queries ask; 0: it holds none.")
-      .def_property_readonly(
+      .def_prop_ro(
           "mesh_error", [](const Asset& self) { return self.view().mesh_error(); },
           "[u] the mesh's surface and the solid's lie within this of each other.")
-      .def_property_readonly(
+      .def_prop_ro(
           "mesh_state", [](const Asset& self) { return app::name_of(self.view().mesh_state()); },
           "'own', 'resolved', 'simplified', 'none', or 'unresolved': it counts volume twice.")
-      .def_property_readonly(
+      .def_prop_ro(
           "counted_twice", [](const Asset& self) { return self.view().counted_twice(); },
           "[u³] that the mesh as it came counts more than once.");
   add_bakes(module);

@@ -17,16 +17,16 @@ void add_assets_class(py::module_& module) {
            "assets: ist.Asset each. Raises ist.Error where the device cannot be used or has no "
            "memory left.")
       .def("__len__", [](const DeviceAssets& self) { return self.assets().size(); })
-      .def_property_readonly(
+      .def_prop_ro(
           "device", [](const DeviceAssets& self) { return self.assets().device(); },
           "CUDA's number.")
-      .def_property_readonly(
+      .def_prop_ro(
           "bytes", [](const DeviceAssets& self) { return self.assets().bytes(); },
           "Of device memory that the assets take.");
 }
 
 void add_fields_class(py::module_& module) {
-  py::class_<DeviceFields, std::shared_ptr<DeviceFields>>(
+  py::class_<DeviceFields>(
       module, "Fields",
       "Fields in the memory of a device, for batches: pairs name them by their place.\n\n"
       "All that they point to is copied. Graphs that were captured need it as long as they are "
@@ -36,10 +36,10 @@ void add_fields_class(py::module_& module) {
            "fields: ist.Field each; of an asset's surface, ist.MeshField(asset). Raises ist.Error "
            "where the device cannot be used or has no memory left.")
       .def("__len__", [](const DeviceFields& self) { return self.fields().size(); })
-      .def_property_readonly(
+      .def_prop_ro(
           "device", [](const DeviceFields& self) { return self.fields().device(); },
           "CUDA's number.")
-      .def_property_readonly(
+      .def_prop_ro(
           "bytes", [](const DeviceFields& self) { return self.fields().bytes(); },
           "Of device memory that the fields take.");
 }
@@ -63,7 +63,7 @@ void add_gpu(py::module_& package) {
       [](int device) -> py::object {
         std::string why;
         if (gpu_available(device, &why)) return py::none();
-        return py::str(why);
+        return py::str(why.c_str());
       },
       py::arg("device") = 0, "What is missing where available() is False; None where it is True.");
   add_gpu_penetration(module);

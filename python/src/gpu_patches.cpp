@@ -56,8 +56,8 @@ DeviceAnswers<PatchAnswers> patches_of(DeviceAssets& assets, const py::object& a
                                        const py::object& out, const py::object& stream) {
   const Measure which = named(measure, "measure", kGpuMeasures);
   if (max_patches < 1 || max_patches > kMostGpuPatches)
-    throw py::value_error("max_patches: " + std::to_string(max_patches) + "; wanted 1 to " +
-                          std::to_string(kMostGpuPatches));
+    throw value_error("max_patches: " + std::to_string(max_patches) + "; wanted 1 to " +
+                      std::to_string(kMostGpuPatches));
   PatchAnswers blank;
   blank.patches.most = max_patches;
   return ask<PatchAnswers>(assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, nullptr},
@@ -92,7 +92,7 @@ void add_gpu_patches(py::module_& module) {
       "Patches of a batch: arrays on the device, None where not wanted; those that were given as "
       "`out` are the same objects.");
   module.def("contact_patches", &patches_of, py::arg("assets"), py::arg("asset_a"),
-             py::arg("asset_b"), py::arg("pose_a"), py::arg("pose_b"),
+             py::arg("asset_b"), py::arg("pose_a").none(), py::arg("pose_b").none(),
              py::arg("scale_a") = py::none(), py::arg("scale_b") = py::none(), py::kw_only(),
              py::arg("max_patches") = 8, py::arg("measure") = "matched",
              py::arg("wanted") = py::none(), py::arg("out") = py::none(),

@@ -85,7 +85,7 @@ void add_gpu_penetration(py::module_& module) {
       "Overlaps of a batch: arrays on the device, None where not wanted; those that were given as "
       "`out` are the same objects.");
   module.def("penetration", &penetrations, py::arg("assets"), py::arg("asset_a"),
-             py::arg("asset_b"), py::arg("pose_a"), py::arg("pose_b"),
+             py::arg("asset_b"), py::arg("pose_a").none(), py::arg("pose_b").none(),
              py::arg("scale_a") = py::none(), py::arg("scale_b") = py::none(), py::kw_only(),
              py::arg("fields") = py::none(), py::arg("measure") = "matched",
              py::arg("pair_budget") = 0, py::arg("wanted") = py::none(),

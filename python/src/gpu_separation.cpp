@@ -63,7 +63,7 @@ void add_gpu_separation(py::module_& module) {
       "Gaps of a batch: arrays on the device, None where not wanted; those that were given as "
       "`out` are the same objects.");
   module.def("separation", &separations, py::arg("assets"), py::arg("asset_a"), py::arg("asset_b"),
-             py::arg("pose_a"), py::arg("pose_b"), py::arg("scale_a") = py::none(),
+             py::arg("pose_a").none(), py::arg("pose_b").none(), py::arg("scale_a") = py::none(),
              py::arg("scale_b") = py::none(), py::kw_only(), py::arg("max_visits") = 0,
              py::arg("wanted") = py::none(), py::arg("out") = py::none(),
              py::arg("stream") = py::none(), kSeparationDoc);

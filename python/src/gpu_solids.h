@@ -22,9 +22,9 @@ namespace ist::python {
 class DeviceAssets {
  public:
   DeviceAssets(const py::sequence& assets, int device) {
-    const std::vector<py::object> held(assets.begin(), assets.end());
     std::vector<TreeView> views;
-    for (const py::object& asset : held) views.push_back(tree_of(asset, "assets"));
+    const py::list held(assets);
+    for (const py::handle asset : held) views.push_back(tree_of(asset, "assets"));
     const py::gil_scoped_release released;
     GpuSettings settings;
     settings.device = device;
@@ -103,9 +103,9 @@ class DeviceAssets {
 class DeviceFields {
  public:
   DeviceFields(const py::sequence& fields, int device) {
-    const std::vector<py::object> held(fields.begin(), fields.end());
     std::vector<Field> all;
-    for (const py::object& field : held) all.push_back(field_of(field, "fields"));
+    const py::list held(fields);
+    for (const py::handle field : held) all.push_back(field_of(field, "fields"));
     const py::gil_scoped_release released;
     GpuSettings settings;
     settings.device = device;

@@ -16,16 +16,17 @@ x_world = R(q) (scale · x) + t.)";
 
 }  // namespace
 
-PYBIND11_MODULE(_core, module) {
+NB_MODULE(_core, module) {
   namespace python = ist::python;
   namespace py = python::py;
-  module.doc() = kDoc;
+  module.attr("__doc__") = kDoc;
   // Users know what is here by the package's name.
   const py::object own_name = module.attr("__name__");
   module.attr("__name__") = "ist";
-  const auto error = py::register_exception<ist::Error>(module, "Error", PyExc_RuntimeError);
-  error.doc() = "What the library refuses, in its words: file, place and way out.";
-  py::register_exception<ist::OpenMeshError>(module, "OpenMeshError", error.ptr()).doc() =
+  py::set_leak_warnings(false);  // what is alive at the end is the system's to free
+  const py::exception<ist::Error> error(module, "Error", PyExc_RuntimeError);
+  error.attr("__doc__") = "What the library refuses, in its words: file, place and way out.";
+  py::exception<ist::OpenMeshError>(module, "OpenMeshError", error.ptr()).attr("__doc__") =
       "An open mesh that was not asked to be repaired.";
   module.attr("__version__") = IST_VERSION_STRING;
   python::add_offline(module);

@@ -122,7 +122,7 @@ Ctrl-C raises KeyboardInterrupt.
 Returns a Penetration: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
 
 void add_class(py::module_& module) {
-  py::class_<Penetrations, std::shared_ptr<Penetrations>> type(
+  py::class_<Penetrations> type(
       module, "Penetration",
       "Overlaps of placed solids: columns of one row a pose, without the (n,) for one pose.");
   add_column(type, "volume", &Penetrations::volume, "(n,) [u³] of the overlap.");
@@ -203,12 +203,12 @@ void add_penetration(py::module_& module) {
                                            relative_error, min_radius),
                       scale_gradients, threads);
       },
-      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("scales") = py::none(),
-      py::arg("poses_a") = py::none(), py::arg("scales_a") = py::none(),
-      py::arg("scale_gradients") = false, py::arg("measure") = "matched",
-      py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
-      py::arg("deadline_us") = 0.0, py::arg("relative_error") = 0.0, py::arg("min_radius") = 0.0,
-      py::arg("threads") = 0, doc(kPairDoc).c_str());
+      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
+      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("scales_a") = py::none(), py::arg("scale_gradients") = false,
+      py::arg("measure") = "matched", py::arg("field") = "automatic", py::arg("pair_budget") = 0,
+      py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0, py::arg("relative_error") = 0.0,
+      py::arg("min_radius") = 0.0, py::arg("threads") = 0, doc(kPairDoc).c_str());
   module.def(
       "penetration_of_pairs",
       [](const py::sequence& solids, const py::object& poses, const py::object& pairs,

@@ -24,7 +24,7 @@ struct Separations : Gaps {
 };
 
 struct Patches {
-  Patches(const Shape& rows, py::ssize_t each)
+  Patches(const Shape& rows, std::size_t each)
       : penetration(std::make_shared<Penetrations>(rows)),
         count(rows, {}),
         id(rows, {each}),
@@ -70,7 +70,7 @@ std::unique_ptr<Separations> separations(const Rows& rows, const SeparationSetti
 
 std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
                                  const ContactSettings& settings, unsigned threads) {
-  auto answers = std::make_unique<Patches>(rows.shape(), static_cast<py::ssize_t>(each));
+  auto answers = std::make_unique<Patches>(rows.shape(), each);
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
     thread_local std::vector<ContactPatch> found;
@@ -92,7 +92,7 @@ py::object overlaps(const Rows& rows, unsigned threads) {
     *answers.row(i) = static_cast<std::uint32_t>(rows.at(i).answer(
         [&](const auto& a, const PlacedTree& b) { return overlap(a, b, workspace); }));
   });
-  return handed_out(answers.array);
+  return answers.handed_out();
 }
 
 constexpr const char* kSeparationDoc =
@@ -134,7 +134,7 @@ void add_classes(py::module_& module) {
 
   py::class_<Patches> patch(module, "ContactPatches",
                             "Contacts as patches; of m there is room for, the first `count` are.");
-  patch.def_readonly("penetration", &Patches::penetration, "The whole: a Penetration.");
+  patch.def_ro("penetration", &Patches::penetration, "The whole: a Penetration.");
   add_column(patch, "count", &Patches::count, "(n,) uint32, patches written; the rest is zero.");
   add_column(patch, "id", &Patches::id,
              "(n, m) uint64, names a region of the smaller solid: the same in every query of the "
@@ -162,9 +162,10 @@ void add_separation(py::module_& module) {
         return separations(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
                            {max_visits, deadline_us}, threads);
       },
-      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("scales") = py::none(),
-      py::arg("poses_a") = py::none(), py::arg("scales_a") = py::none(), py::arg("max_visits") = 0,
-      py::arg("deadline_us") = 0.0, py::arg("threads") = 0, kSeparationDoc);
+      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
+      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
+      py::arg("threads") = 0, kSeparationDoc);
   module.def(
       "separation_of_pairs",
       [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
@@ -187,8 +188,8 @@ void add_separation(py::module_& module) {
                         max_visits, deadline_us, relative_error, min_radius},
                        threads);
       },
-      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("max_patches") = 8,
-      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
+      py::arg("max_patches") = 8, py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("measure") = "matched",
       py::arg("field") = "automatic", py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
       py::arg("relative_error") = 0.0, py::arg("min_radius") = 0.0, py::arg("threads") = 0,
@@ -200,9 +201,9 @@ void add_separation(py::module_& module) {
          unsigned threads) {
         return overlaps(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), threads);
       },
-      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("scales") = py::none(),
-      py::arg("poses_a") = py::none(), py::arg("scales_a") = py::none(), py::arg("threads") = 0,
-      kOverlapDoc);
+      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
+      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("scales_a") = py::none(), py::arg("threads") = 0, kOverlapDoc);
   module.def(
       "overlap_of_pairs",
       [](const py::sequence& solids, const py::object& poses, const py::object& pairs,

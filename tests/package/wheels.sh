@@ -1,0 +1,23 @@
+#!/usr/bin/env bash
+# Wheels as users get them: each in new environments without packages of the system, with NumPy 1.26
+# and 2 where there are such. PyPI is asked for NumPy alone. usage: wheels.sh DIST FOLDER PYTHON…
+set -euo pipefail
+here=$(dirname "$(realpath "${BASH_SOURCE[0]}")")
+dist=$(realpath "$1") folder=$2
+rm -rf "$folder"
+mkdir -p "$folder"
+cd "$folder"
+for python in "${@:3}"; do
+  for numpy in '>=1.26,<2' '>=2'; do
+    environment=$("$python" -c 'import sys; print("python%d.%d" % sys.version_info[:2])')-numpy${numpy:2:1}
+    "$python" -m venv "$environment"
+    pip=("$environment/bin/python" -m pip --quiet --disable-pip-version-check)
+    if ! "${pip[@]}" install --only-binary :all: "numpy$numpy" 2>"$environment/numpy.log"; then
+      echo "$environment: skipped, there is no such NumPy"
+      continue
+    fi
+    "${pip[@]}" install --no-index --find-links "$dist" --only-binary ist ist
+    echo "== $environment"
+    "$environment/bin/python" "$here/wheel.py"
+  done
+done
