@@ -143,7 +143,7 @@ void write_contact(const ist_contact_patch_t& patch, const double (&origin)[3], 
   mju_cross(shift, patch.force, moment);
   mju_scl3(shift, shift, 1 / (patch.area * patch.area));
   // A patch that pushes both ways has a line far away, and little area.
-  const double length = mju_norm3(shift), most = std::sqrt(patch.area);
+  const double length = mju_norm3(shift), most = 2 * std::sqrt(patch.area);
   if (length > most) mju_scl3(shift, shift, most / length);
   for (int k = 0; k < 3; ++k) {
     out.pos[k] = patch.centroid[k] + shift[k];
