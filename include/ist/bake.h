@@ -62,7 +62,7 @@ class Asset {
 ///
 /// Same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number of
 /// threads.
-/// Cancelling during packing keeps what is packed; later it throws Error.
+/// Cancelling during packing keeps what is packed; before and after it throws Error.
 ///
 /// A mesh that counts volume twice is resolved first: the bake is that of the boundary of where its
 /// winding number is 1 or more (MeshState::resolved). If it cannot be resolved, no mesh is kept
@@ -79,10 +79,11 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
 /// Measure::exact and mass_properties() are answered; what asks spheres answers
 /// QueryStatus::not_held.
 ///
-/// `threads`: 0 = all cores. Throws Error where nothing is `wanted`, where the mesh counts volume
-/// twice and cannot be resolved, and as bake() does.
+/// `threads`: 0 = all cores. Progress tells of the stage "resolve" alone.
+/// Throws Error where nothing is `wanted`, where the mesh counts volume twice and cannot be
+/// resolved, if the callback cancels, and as bake() does.
 Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings = {},
-                   unsigned threads = 0);
+                   unsigned threads = 0, const ProgressCallback& progress = {});
 
 /// How the mesh in the place of a solid is made, which calibration needs.
 struct PolygoniseSettings {

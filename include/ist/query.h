@@ -247,12 +247,13 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
 struct OutlineSegment {
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  ///< [u] world
   Eigen::Vector3d to = Eigen::Vector3d::Zero();    ///< [u] world
-  std::uint32_t patch = 0;                         ///< the patch that it bounds
+  std::uint32_t patch = 0;  ///< number of the patch that it bounds; 0 without room for patches
 };
 
 struct OverlapOutline {
   ContactPatches contact;
-  std::size_t segments = 0;  ///< of the whole outline; as many as there is room for are written
+  /// Of the whole outline; as many as there is room for are written. 0 where a limit stopped it.
+  std::size_t segments = 0;
 };
 
 /// contact_patches() by Measure::exact, whatever the settings say, with the outline of each patch:

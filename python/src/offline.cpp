@@ -121,7 +121,7 @@ void run_offline(OfflineWork work, const py::object& progress) {
 void add_offline(py::module_& module) {
   py::class_<Progress>(module, "Progress", "Where a long stage stands: what `progress` is handed.")
       .def_readonly("stage", &Progress::stage,
-                    "'polygonise', 'pack', 'calibrate', 'cover', 'tree' or 'predict'.")
+                    "'resolve', 'pack', 'calibrate', 'cover', 'tree' or 'predict'.")
       .def_readonly("spheres", &Progress::spheres, "Count so far.")
       .def_readonly("coverage", &Progress::coverage,
                     "[0, 1] of the solid's volume in inner spheres; 'pack' only.")
