@@ -243,10 +243,8 @@ static_assert(sizeof(BoxSums) == 2048);
 /// Triangles that are connected by shared vertices.
 struct MeshShell {
   std::uint32_t block = 0;  ///< its first block
-  std::uint32_t reserved = 0;
-  float low[3] = {}, high[3] = {};  ///< box, unit frame, rounded outward
 };
-static_assert(sizeof(MeshShell) == 32);
+static_assert(sizeof(MeshShell) == 4);
 
 /// The solid's surface for Measure::exact: closed, oriented, with winding numbers of 0 and 1 only,
 /// except for touching faces.

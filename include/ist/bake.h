@@ -60,7 +60,8 @@ class Asset {
 /// and the field.
 ///
 /// The same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number
-/// of threads. Cancelling during packing keeps what is packed; later it throws Error.
+/// of threads. Cancelling during packing keeps what is packed; before and after
+/// it throws Error.
 ///
 /// A mesh that counts volume twice is first resolved to the boundary of the set where its winding
 /// number is 1 or more (MeshState::resolved). If that fails, no mesh is kept
@@ -76,10 +77,11 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
 ///
 /// It serves Measure::exact and mass_properties(); queries of spheres return QueryStatus::not_held.
 ///
-/// `threads`: 0 = all cores. Throws Error if `wanted` is false, if the mesh counts volume twice and
-/// cannot be resolved, and as bake() does.
+/// `threads`: 0 = all cores. The only stage of `progress` is "resolve". Throws Error if `wanted` is
+/// false, if the mesh counts volume twice and cannot be resolved, if the callback cancels, and as
+/// bake() does.
 Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings = {},
-                   unsigned threads = 0);
+                   unsigned threads = 0, const ProgressCallback& progress = {});
 
 /// Options of the mesh that is made in place of a solid, for calibration.
 struct PolygoniseSettings {

@@ -439,6 +439,21 @@ typedef struct ist_contact_patches {
   size_t count; /* answer: patches written */
 } ist_contact_patches_t;
 
+/* OutlineSegment: a piece of the curve on which two surfaces cross. */
+typedef struct ist_outline_segment {
+  double from[3], to[3]; /* [u] world */
+  uint32_t patch;        /* number of the patch that it bounds; 0 without room for patches */
+} ist_outline_segment_t;
+
+/* Room for an outline. */
+typedef struct ist_outline {
+  uint32_t size;
+  uint32_t segment_size;           /* sizeof(ist_outline_segment_t) */
+  ist_outline_segment_t* segments; /* [capacity] */
+  size_t capacity;
+  size_t total, count; /* answer: segments there are, and segments written */
+} ist_outline_t;
+
 /* --- Queries of two trees. Trees may be shared by threads; the workspace may not. ------------- */
 
 /* Each returns the status of its answer, or an error of the call. */
@@ -491,6 +506,16 @@ ist_status_t ist_query(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
 ist_status_t ist_contact_patches(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
                                  const ist_contact_settings_t* settings, ist_workspace_t* workspace,
                                  ist_contact_patches_t* patches, ist_penetration_t* whole);
+
+/* The patches of IST_EXACT, whatever the settings say, and their outlines: segments of the closed
+ * curves on which the surfaces cross, A's surface inside B to the left of each seen from outside A.
+ * A patch that lies inside the other solid as a whole has none.
+ * IST_BUDGET_EXHAUSTED: max_visits stopped it. There is no outline, and the matched spheres'
+ * patches are written. `whole`: may be null. */
+ist_status_t ist_overlap_outline(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                 const ist_contact_settings_t* settings, ist_workspace_t* workspace,
+                                 ist_contact_patches_t* patches, ist_outline_t* outline,
+                                 ist_penetration_t* whole);
 
 /* Removes from patches, in place, what protruding spheres add where flat faces meet, each by its
  * own depth. A patch of which nothing is left stays, with zeros.

@@ -9,7 +9,8 @@ namespace IST_API ist {
 
 /// State of a long offline stage.
 struct Progress {
-  const char* stage = "";   ///< "polygonise", "pack", "calibrate", "cover", "tree", "predict"
+  /// "polygonise", "resolve", "pack", "calibrate", "cover", "tree", "predict"
+  const char* stage = "";
   std::size_t spheres = 0;  ///< count so far
   double coverage = 0;      ///< [0, 1] of the solid's volume in inner spheres; "pack" only
   double radius = 0;        ///< [u] of the spheres being inserted now; "pack" only

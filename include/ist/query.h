@@ -240,12 +240,13 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
 struct OutlineSegment {
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  ///< [u] world
   Eigen::Vector3d to = Eigen::Vector3d::Zero();    ///< [u] world
-  std::uint32_t patch = 0;                         ///< the patch that it bounds
+  std::uint32_t patch = 0;  ///< number of the patch that it bounds; 0 without room for patches
 };
 
 struct OverlapOutline {
   ContactPatches contact;
-  std::size_t segments = 0;  ///< of the whole outline; written as far as they fit
+  /// Of the whole outline; written as far as they fit. 0 if a limit stopped the query.
+  std::size_t segments = 0;
 };
 
 /// contact_patches() with Measure::exact, whatever the settings say, and the outline of each patch:

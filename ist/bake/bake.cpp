@@ -232,7 +232,7 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
            const ProgressCallback& progress) {
   packing::check_settings(settings);
   return thread_arena(settings.threads).execute([&] {
-    const ResolvedMesh resolved = resolve(mesh);
+    const ResolvedMesh resolved = resolve(mesh, progress);
     const MeshSolid solid(resolved.mesh);
     const auto backend = make_backend(solid, {settings.device, settings.gpu});
     SolidField field(solid, resolved.resolution, settings.surface, settings.threads);
@@ -240,11 +240,12 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   });
 }
 
-Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings, unsigned threads) {
+Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings, unsigned threads,
+                   const ProgressCallback& progress) {
   packing::check_settings(settings);
   if (!settings.wanted) throw Error(mesh.name + ": a surface alone without a surface is nothing");
   return thread_arena(threads).execute([&] {
-    const ResolvedMesh resolved = resolve(mesh);
+    const ResolvedMesh resolved = resolve(mesh, progress);
     const MeshSolid solid(resolved.mesh);
     AssetArrays arrays;
     arrays.header = describe_solid(resolved.mesh, solid);

@@ -346,7 +346,7 @@ TargetedAsset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
   if (largest.max_spheres == 0) largest.max_spheres = kMost;
   packing::check_settings(largest);
   return thread_arena(settings.threads).execute([&] {
-    return TargetBake(resolve(mesh), target, settings, progress).run();
+    return TargetBake(resolve(mesh, progress), target, settings, progress).run();
   });
 }
 

@@ -226,6 +226,7 @@ def bake(
 ) -> Asset: ...
 def bake_surface(
     mesh: ClosedMesh, *, surface: str | float = "all", threads: int = 0,
+    progress: Callable[[Progress], Any] | None = None,
 ) -> Asset: ...
 def bake_to_error(
     mesh: ClosedMesh, relative_error: float = 0.01, at_overlap: float = 0.001, *,
@@ -349,6 +350,15 @@ class ContactPatches:
     def torque(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u³]
 
 @final
+class OverlapOutline:
+    @property
+    def contact(self) -> ContactPatches: ...  # of one pose
+    @property
+    def segments(self) -> NDArray[np.float64]: ...  # (n, 2, 3) [u] from and to, world
+    @property
+    def patch(self) -> NDArray[np.uint32]: ...  # (n,) the patch that each bounds
+
+@final
 class TimeOfImpact:
     @property
     def time(self) -> _Column: ...  # (n,) [T]
@@ -400,6 +410,11 @@ def contact_patches(
     field: _FieldUse = "automatic", max_visits: int = 0, deadline_us: float = 0.0,
     relative_error: float = 0.0, min_radius: float = 0.0, threads: int = 0,
 ) -> ContactPatches: ...
+def overlap_outline(
+    a: Asset, b: Asset, poses: ArrayLike, *, max_patches: int = 8,
+    scales: ArrayLike | None = None, poses_a: ArrayLike | None = None,
+    scales_a: ArrayLike | None = None, max_visits: int = 0,
+) -> OverlapOutline: ...
 def overlap(
     a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, threads: int = 0,

@@ -117,7 +117,7 @@ device: 'auto', 'cpu' or 'cuda'; never changes the result.
 surface: what is kept of the mesh for exact queries: 'all' of its triangles, 'none', or as few as
     stay within a length of it: a number [u], or a share of its longest side as '0.1%'.
 progress: called with a Progress on this thread; False cancels: packing then keeps what is packed,
-    later stages raise Error. What it raises is raised.
+    other stages raise Error. What it raises is raised.
 
 Ctrl-C raises KeyboardInterrupt within 0.2 s.
 Raises Error if not one sphere fits, and on settings out of range.)";
@@ -233,13 +233,17 @@ void add_bakes(py::module_& module) {
           .c_str());
   module.def(
       "bake_surface",
-      [](const SharedMesh& mesh, const py::object& surface, unsigned threads) {
+      [](const SharedMesh& mesh, const py::object& surface, unsigned threads,
+         const py::object& progress) {
         return offline(
-            [mesh, settings = surface_settings(surface), threads](const ProgressCallback&) {
-              return bake_surface(*mesh, settings, threads);
-            });
+            [mesh, settings = surface_settings(surface),
+             threads](const ProgressCallback& callback) {
+              return bake_surface(*mesh, settings, threads, callback);
+            },
+            progress);
       },
       py::arg("mesh"), py::kw_only(), py::arg("surface") = "all", py::arg("threads") = 0,
+      py::arg("progress") = py::none(),
       "Makes the asset of a surface alone: the mesh, mass and bounds, without spheres, for exact "
       "queries.\n\nWhat asks spheres answers QueryStatus.not_held. The settings are those of "
       "bake().\nRaises Error where the mesh counts volume twice.");

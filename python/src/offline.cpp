@@ -125,7 +125,7 @@ std::string path_of(const py::object& path) {
 void add_offline(py::module_& module) {
   py::class_<Progress>(module, "Progress", "Where a long stage stands: what `progress` is handed.")
       .def_ro("stage", &Progress::stage,
-              "'polygonise', 'pack', 'calibrate', 'cover', 'tree' or 'predict'.")
+              "'polygonise', 'resolve', 'pack', 'calibrate', 'cover', 'tree' or 'predict'.")
       .def_ro("spheres", &Progress::spheres, "Count so far.")
       .def_ro("coverage", &Progress::coverage,
               "[0, 1] of the solid's volume in inner spheres; 'pack' only.")

@@ -56,6 +56,12 @@ struct Patches {
   Column<double> centroid, normal, area, depth, volume, force, torque;
 };
 
+struct Outline {
+  std::shared_ptr<Patches> contact;
+  Column<double> segments;
+  Column<std::uint32_t> patch;
+};
+
 std::unique_ptr<Separations> separations(const Rows& rows, const SeparationSettings& settings,
                                          unsigned threads) {
   auto answers = std::make_unique<Separations>(rows.shape());
@@ -86,6 +92,46 @@ std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
   return answers;
 }
 
+std::unique_ptr<Outline> outline(const Rows& rows, std::size_t each,
+                                 const ContactSettings& settings) {
+  if (!rows.shape().empty())
+    throw value_error("poses: " + std::to_string(rows.count()) +
+                      " rows; an outline is that of one pose, (7,)");
+  const auto contact = std::make_shared<Patches>(rows.shape(), each);
+  std::vector<ContactPatch> patches(each);
+  std::vector<OutlineSegment> segments(1024);
+  for_each_row(rows, 1, [&](std::size_t i, Workspace& workspace) {
+    const Row row = rows.at(i);
+    const auto ask = [&] {
+      return row.answer([&](const auto& a, const PlacedTree& b) -> OverlapOutline {
+        if constexpr (std::is_same_v<decltype(a), const PlacedTree&>)
+          return overlap_outline(a, b, settings, workspace, patches, segments);
+        else  // which holds no mesh
+          return {contact_patches(a, b, settings, workspace, patches), 0};
+      });
+    };
+    OverlapOutline found = ask();
+    if (found.segments > segments.size()) {
+      segments.resize(found.segments);
+      found = ask();
+    }
+    segments.resize(found.segments);
+    contact->penetration->write(i, row, found.contact.penetration);
+    *contact->count.row(i) = static_cast<std::uint32_t>(found.contact.count);
+    contact->write(i, std::span(patches).first(found.contact.count));
+  });
+  refuse_not_held(rows, contact->penetration->status, kNotHeld, true);
+  const Shape count = {segments.size()};
+  auto answer = std::make_unique<Outline>(
+      Outline{contact, Column<double>(count, {2, 3}), Column<std::uint32_t>(count, {})});
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    Vector(answer->segments.row(i)) = segments[i].from;
+    Vector(answer->segments.row(i) + 3) = segments[i].to;
+    *answer->patch.row(i) = segments[i].patch;
+  }
+  return answer;
+}
+
 py::object overlaps(const Rows& rows, unsigned threads) {
   const Column<std::uint32_t> answers(rows.shape(), {});
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
@@ -108,6 +154,15 @@ constexpr const char* kPatchesDoc =
 Arguments as penetration() has them. Patches sum to the whole.
 
 Returns ContactPatches: arrays of shape (n, max_patches), or (max_patches,) for one pose.)";
+
+constexpr const char* kOutlineDoc =
+    R"(The patches by measure='exact', and the curves on which the two surfaces cross.
+
+Arguments as penetration() has them, of one pose; max_visits: 0: no limit.
+Both solids are Assets that hold their mesh; else ist.Error is raised.
+
+Returns an OverlapOutline. Where max_visits stopped it there is no segment, and
+contact.penetration.status says so.)";
 
 constexpr const char* kOverlapDoc = R"(Whether solids share a point: yes and no are certain.
 
@@ -148,6 +203,15 @@ void add_classes(py::module_& module) {
   add_column(patch, "force", &Patches::force, "(n, m, 3) [u²] share of Penetration.force.");
   add_column(patch, "torque", &Patches::torque,
              "(n, m, 3) [u³] share of Penetration.torque, about B's origin.");
+
+  py::class_<Outline> outline(module, "OverlapOutline", "Contact patches and their outlines.");
+  outline.def_ro("contact", &Outline::contact, "The patches: ContactPatches of one pose.");
+  add_column(
+      outline, "segments", &Outline::segments,
+      "(n, 2, 3) [u] from and to of each, world: they form closed curves. A's surface inside "
+      "B lies to the left of each, seen from outside A.");
+  add_column(outline, "patch", &Outline::patch,
+             "(n,) uint32, number of the patch that each bounds; 0 where max_patches is 0.");
 }
 
 }  // namespace
@@ -194,6 +258,20 @@ void add_separation(py::module_& module) {
       py::arg("field") = "automatic", py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
       py::arg("relative_error") = 0.0, py::arg("min_radius") = 0.0, py::arg("threads") = 0,
       kPatchesDoc);
+  module.def(
+      "overlap_outline",
+      [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
+         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
+         std::uint32_t max_visits) {
+        ContactSettings settings;
+        settings.measure = Measure::exact;
+        settings.max_visits = max_visits;
+        return outline(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), max_patches,
+                       settings);
+      },
+      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("max_patches") = 8,
+      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, kOutlineDoc);
   module.def(
       "overlap",
       [](const py::object& a, const py::object& b, const py::object& poses,

@@ -47,7 +47,7 @@ struct Baked {
 Baked bake_now(const ClosedMesh& mesh, const BakeSettings& asked,
                const ProgressCallback& progress) {
   const PackingSettings& settings = asked.packing;
-  if (asked.surface_only) return {bake_surface(mesh, settings.surface, settings.threads)};
+  if (asked.surface_only) return {bake_surface(mesh, settings.surface, settings.threads, progress)};
   if (!(asked.target.relative_error > 0)) return {bake(mesh, settings, progress)};
   TargetedAsset found = bake_to_error(mesh, asked.target, settings, progress);
   Baked baked = {std::move(found.asset)};

@@ -62,7 +62,8 @@ Asset bake_shape(const ClosedMesh& mesh, const RobotBake& what) {
       return !interrupted();
     };
     const PackingSettings& packing = what.settings.packing;
-    Asset asset = what.settings.surface_only ? bake_surface(mesh, packing.surface, packing.threads)
+    Asset asset = what.settings.surface_only
+                      ? bake_surface(mesh, packing.surface, packing.threads, show)
                   : what.settings.target.relative_error > 0
                       ? bake_to_error(mesh, what.settings.target, packing, show).asset
                       : bake(mesh, packing, show);

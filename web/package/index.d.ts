@@ -344,6 +344,40 @@ export function contactPatches(
   options?: ContactPatchesOptions,
 ): ContactPatches;
 
+export interface OverlapOutlineOptions {
+  poseA?: Pose;
+  /** Most patches, in [1, 64]. Default 16. */
+  maxPatches?: number;
+  /** Most node pairs to open. Default 0: no limit. */
+  maxVisits?: number;
+  into?: OverlapOutline;
+}
+
+export interface OverlapOutline {
+  /** The patches by the `exact` measure. */
+  contact: ContactPatches;
+  /** Segments of the outline. 0 where maxVisits stopped it, as contact.whole.status says. */
+  count: number;
+  /**
+   * [u] six numbers a segment: x, y, z of where it begins and of where it ends, in the world. Segments
+   * form closed curves; A's surface inside B lies to the left of each, seen from outside A.
+   */
+  segments: Float64Array;
+  /** Number in contact.patches of the patch that each segment bounds. */
+  patch: Uint32Array;
+}
+
+/**
+ * The curves on which the meshes of two assets cross, by patch. A patch that lies inside the other
+ * solid as a whole has none. Arrays given by `into` may be longer than the answer.
+ */
+export function overlapOutline(
+  a: Asset,
+  b: Asset,
+  poseB: Pose,
+  options?: OverlapOutlineOptions,
+): OverlapOutline;
+
 /** Whether two solids share a point. `yes` and `no` are certain. */
 export function overlap(
   a: Asset | Field,

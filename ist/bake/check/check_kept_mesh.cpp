@@ -224,27 +224,23 @@ Invariant boxes(const AssetHeader& asset, const KeptMesh& mesh) {
   return sum.named("mesh boxes", "how far what is below a box reaches out of it, unit frame");
 }
 
-/// Blocks that hang together are a shell, its box holds them, and there are no others.
-std::vector<Invariant> shells(const KeptMesh& mesh) {
+/// Blocks that hang together are a shell, and there are no others.
+Invariant shells(const KeptMesh& mesh) {
   Groups groups(mesh.header.vertex_count);
   for (std::size_t b = 0; b < mesh.count; ++b)
     for (std::uint32_t i = 1; i < mesh.blocks[b].vertices; ++i)
       groups.join(mesh.blocks[b].vertex[0], mesh.blocks[b].vertex[i]);
-  Tally together, held;
+  Tally together;
   for (std::size_t b = 0; b < mesh.count; ++b) {
-    const MeshShell& shell = mesh.shells[mesh.blocks[b].shell];
+    const MeshBlock& first = mesh.blocks[mesh.shells[mesh.blocks[b].shell].block];
     const bool hang_together =
-        groups.find(mesh.blocks[b].vertex[0]) == groups.find(mesh.blocks[shell.block].vertex[0]);
+        groups.find(mesh.blocks[b].vertex[0]) == groups.find(first.vertex[0]);
     together.add(hang_together ? 0 : 1, b);
-    const Point low(double{shell.low[0]}, double{shell.low[1]}, double{shell.low[2]});
-    const Point high(double{shell.high[0]}, double{shell.high[1]}, double{shell.high[2]});
-    held.add(out_of(mesh, b, low, high), b);
   }
   together.add(std::abs(static_cast<double>(groups.left()) - mesh.header.shell_count), mesh.count);
-  return {together.named("mesh shells",
-                         "1 where a block hangs together with none of its shell; "
-                         "parts that hang together less shells"),
-          held.named("mesh shell boxes", "how far a block reaches out of its shell's, unit frame")};
+  return together.named("mesh shells",
+                        "1 where a block hangs together with none of its shell; "
+                        "parts that hang together less shells");
 }
 
 }  // namespace
@@ -262,10 +258,9 @@ std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMes
     out = check_near("kept mesh", CheckSurface(mesh.triangles()), boundary_of(surface, bounding),
                      mesh.header.error, bounding);
   }
-  for (Invariant& one :
-       std::vector<Invariant>{closed(mesh), blocks(mesh), neighbours(mesh), boxes(asset, mesh)})
+  for (Invariant& one : std::vector<Invariant>{closed(mesh), blocks(mesh), neighbours(mesh),
+                                               boxes(asset, mesh), shells(mesh)})
     out.push_back(std::move(one));
-  for (Invariant& one : shells(mesh)) out.push_back(std::move(one));
   return out;
 }
 

@@ -1,7 +1,5 @@
 #include "mesh/resolve/patch_winding.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -16,6 +14,8 @@
 
 namespace ist {
 namespace {
+
+constexpr double kPatches = 0.1;  // share of the whole work, about
 
 /// Triangles by the cells of a grid that they may cover, seen along an axis.
 class Columns {
@@ -165,7 +165,8 @@ class Rays {
 
 }  // namespace
 
-Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& arrangement) {
+Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& arrangement,
+                     WatchedWork& work) {
   const std::vector<Triangle>& pieces = arrangement.pieces;
   const EdgeTable edges(pieces);
   for (std::size_t e = 0; e < edges.size(); ++e) {
@@ -199,7 +200,7 @@ Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& 
   }
   patches.in_front.resize(largest.size());
   Rays rays(triangles, arrangement);
-  tbb::parallel_for(std::size_t{0}, largest.size(), [&](const std::size_t patch) {
+  work.for_each(largest.size(), kPatches, [&](const std::size_t patch) {
     patches.in_front[patch] = rays.in_front(largest[patch]);
   });
   return patches;

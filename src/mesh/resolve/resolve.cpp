@@ -1,5 +1,7 @@
 #include "mesh/resolve/resolve.h"
 
+#include <tbb/task_arena.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -17,6 +19,8 @@
 #include "mesh/resolve/unresolvable.h"
 #include "mesh/self_intersections.h"
 #include "mesh/shells.h"
+#include "stage/aside.h"
+#include "stage/stage.h"
 
 namespace ist {
 namespace {
@@ -84,12 +88,12 @@ Eigen::Vector3d snapped(const Eigen::Vector3d& p, const double step) {
 
 class Resolver {
  public:
-  explicit Resolver(ClosedMesh& closed)
+  Resolver(ClosedMesh& closed, WatchedWork& work)
       : closed_(closed),
         triangles_(closed.mesh.triangles),
         pairs_(pairs_of(closed)),
-        arrangement_(arrange(closed.mesh.vertices, triangles_, pairs_)),
-        patches_(find_patches(triangles_, arrangement_)) {
+        arrangement_(arrange(closed.mesh.vertices, triangles_, pairs_, work)),
+        patches_(find_patches(triangles_, arrangement_, work)) {
     if (triangles_.empty()) throw Unresolvable{"it has no triangles"};
     from_ = closed.mesh.vertices[triangles_[0][0]];
   }
@@ -181,23 +185,18 @@ std::string describe(const Resolution& resolution, const double volume) {
   return text;
 }
 
-}  // namespace
+ResolvedMesh as_it_is(ClosedMesh closed) {
+  return {std::move(closed), {How::as_it_is, 0, 0, 0, "it counts nothing twice"}};
+}
 
-ResolvedMesh resolve(ClosedMesh closed) {
+ResolvedMesh resolve_watched(ClosedMesh closed, WatchedWork& work) {
   ResolvedMesh result{std::move(closed), {}};
-  ClosedMesh& mesh = result.mesh;
-  const auto as_it_is = [&] {
-    result.resolution = {How::as_it_is, 0, 0, 0, "it counts nothing twice"};
-    return std::move(result);
-  };
-  if (mesh.meeting_pairs && mesh.meeting_pairs->empty() && mesh.report.shells == 1)
-    return as_it_is();
   try {
     Resolution resolution;
     resolution.how = How::resolved;
-    const Resolver resolver(mesh);
+    const Resolver resolver(result.mesh, work);
     auto surface = resolver.surface(resolution);
-    if (!surface) return as_it_is();
+    if (!surface) return as_it_is(std::move(result.mesh));
     ClosedMesh made = resolver.close(std::move(*surface), resolution);
     resolution.reason = describe(resolution, made.report.volume);
     made.report.notes.push_back(resolution.reason);
@@ -208,6 +207,27 @@ ResolvedMesh resolve(ClosedMesh closed) {
     result.resolution = {How::unresolved, 0, 0, 0, failure.what()};
   }
   return result;
+}
+
+}  // namespace
+
+ResolvedMesh resolve(ClosedMesh closed, const ProgressCallback& progress) {
+  if (closed.meeting_pairs && closed.meeting_pairs->empty() && closed.report.shells == 1)
+    return as_it_is(std::move(closed));
+  WatchedWork work;
+  if (!progress) return resolve_watched(std::move(closed), work);
+  Stage stage("resolve", progress);
+  stage.step(0, 0);
+  const auto threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
+  auto made = do_aside(threads, [&] { return resolve_watched(std::move(closed), work); });
+  try {
+    wait_for(made, [&] { stage.step(0, work.done()); });
+    stage.step(0, 1);
+  } catch (...) {
+    work.stop();
+    throw;
+  }
+  return made.get();
 }
 
 }  // namespace ist

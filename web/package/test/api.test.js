@@ -194,6 +194,36 @@ test('patches and lenses add up', () => {
   b.free();
 });
 
+test('outlines: closed curves, a patch at a time', () => {
+  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB), pose = {translation: [0, 0, 8.5]};
+  const found = ist.overlapOutline(a, b, pose), {contact, count, segments, patch} = found;
+  assert.ok(count > 1024 && segments.length === 6 * count && patch.length === count);
+  assert.deepEqual(contact, ist.contactPatches(a, b, pose, {measure: 'exact'}));
+  const ends = (first) => Array.from(patch, (p, i) => [p, ...segments.subarray(6 * i + first, 6 * i + first + 3)].join());
+  assert.deepEqual(ends(0).sort(), ends(3).sort());
+  assert.ok(contact.count > 0 && patch.every((p) => p < contact.count));
+  // Stokes: the push is what the outline encloses.
+  const force = [0, 0, 0];
+  for (let i = 0; i < count; ++i) {
+    const [x, y, z, u, v, w] = segments.subarray(6 * i);
+    [y * w - z * v, z * u - x * w, x * v - y * u].forEach((part, k) => force[k] += part / 2);
+  }
+  for (let k = 0; k < 3; ++k) assert.ok(Math.abs(force[k] - contact.whole.force[k]) < 1e-9);
+  const apart = ist.overlapOutline(a, b, {translation: [100, 0, 0]}, {into: found});
+  assert.ok(apart === found && apart.count === 0 && apart.contact.count === 0);
+  const stopped = ist.overlapOutline(a, b, pose, {maxVisits: 1});
+  assert.ok(stopped.contact.whole.status === 'budget-exhausted' && stopped.count === 0);
+
+  const bare = ist.Asset.from(readFileSync(baked('nut', 500, {surface: 'none'})));
+  const without = sentence(() => ist.overlapOutline(a, bare, pose));
+  assert.match(without, /overlapOutline\(\): .*mesh/);
+  assert.match(
+      sentence(() => ist.overlapOutline(ist.Field.ball(1), b, pose)), /a field has no mesh/);
+  a.free();
+  b.free();
+  bare.free();
+});
+
 test('poses and scales: the world may be moved', () => {
   const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB);
   const half = Math.SQRT1_2;
