@@ -81,7 +81,7 @@ PlacedTree placed(const Asset& asset, const py::object& pose, double scale) {
 /// What is kept of the mesh, as the command line takes it; a number is as good as its text.
 SurfaceSettings surface_settings(const py::object& given) {
   const std::optional<SurfaceSettings> surface = parse_surface(text_of(given));
-  if (!surface) throw Error("surface: '" + text_of(given) + "' is none of " + kSurfaceMeaning);
+  if (!surface) throw Error("surface: '" + text_of(given) + "' is not one of " + kSurfaceMeaning);
   return *surface;
 }
 

@@ -36,13 +36,14 @@ Solid solid_of(const py::handle& object, const char* name) {
 TreeView tree_of(const py::handle& object, const char* name) {
   const Solid solid = solid_of(object, name);
   if (const TreeView* const tree = std::get_if<TreeView>(&solid)) return *tree;
-  throw type_error(std::string(name) + ": a Field; it stands first in a query, as `a`");
+  throw type_error(std::string(name) + ": a Field; only `a`, the first solid, can be one");
 }
 
 Field field_of(const py::handle& object, const char* name) {
   const Solid solid = solid_of(object, name);
   if (const Field* const field = std::get_if<Field>(&solid)) return *field;
-  throw type_error(std::string(name) + ": an Asset; MeshField(asset) is its surface");
+  throw type_error(std::string(name) +
+                   ": an Asset; wanted a Field, e.g. MeshField(asset), its surface");
 }
 
 void add_fields(py::module_& module) {

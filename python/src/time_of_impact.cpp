@@ -61,8 +61,8 @@ void add_time_of_impact(py::module_& module) {
         const Rows to = Rows::of_pair(a, b, poses_to, scales,
                                       poses_a_to.is_none() ? poses_a : poses_a_to, scales_a);
         if (from.shape() != to.shape())
-          throw value_error("poses_to: as many rows as poses are wanted: " + text_of(from.shape()) +
-                            ", not " + text_of(to.shape()));
+          throw value_error("poses_to: shape " + text_of(to.shape()) + " of rows; poses have " +
+                            text_of(from.shape()));
         const Eigen::Vector3d centre = take_vector(about, "about"),
                               centre_a = take_vector(about_a, "about_a");
         auto answers = std::make_unique<Impacts>(from.shape());

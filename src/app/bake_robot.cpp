@@ -83,9 +83,9 @@ struct Baked {
 void require_folder(const std::string& folder) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_directory(folder, error))
-    throw Error(folder + ": this is a file; a robot is baked into a folder");
+    throw Error(folder + ": is a file; name a folder for the robot's assets");
   fs::create_directories(folder, error);
-  if (error) throw Error(folder + ": the folder cannot be made: " + error.message());
+  if (error) throw Error(folder + ": cannot create the folder: " + error.message());
 }
 
 }  // namespace

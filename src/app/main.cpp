@@ -23,8 +23,8 @@ int main(int argc, char** argv) {
                                                                 : spdlog::color_mode::automatic));
   spdlog::set_pattern("ist: %^%l%$: %v");
   CLI::App app(
-      "Sphere packings, inner sphere trees and the volume by which two solids overlap.\n"
-      "Lengths are [u], the mesh's own unit.",
+      "Sphere packings, inner sphere trees and overlap volumes of two solids.\n"
+      "Lengths are in [u], the mesh's own unit.",
       "ist");
   app.set_version_flag("--version", "ist " IST_VERSION_STRING);
   app.footer(

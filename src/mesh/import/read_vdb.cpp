@@ -21,12 +21,12 @@ openvdb::GridBase::Ptr only_grid(const std::string& path) {
   std::vector<std::string> names;
   for (auto name = file.beginName(); name != file.endName(); ++name)
     names.push_back(name.gridName());
-  if (names.empty()) throw Error(path + ": it holds no grid");
+  if (names.empty()) throw Error(path + ": contains no grid");
   if (names.size() > 1) {
     std::string list;
     for (const std::string& name : names) list += (list.empty() ? "'" : ", '") + name + "'";
-    throw Error(path + ": it holds " + std::to_string(names.size()) + " grids (" + list +
-                "). Write the one that is meant to a file of its own");
+    throw Error(path + ": contains " + std::to_string(names.size()) + " grids (" + list +
+                "). Write the intended one to its own file");
   }
   return file.readGrid(names.front());
 }
