@@ -133,7 +133,7 @@ TEST(ReadPly, AnyNumberOfNothingIsNothing) {
               .path());
       FAIL();
     } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find("a.ply: no faces"), std::string::npos)
+      EXPECT_NE(std::string(error.what()).find("a.ply: contains no faces"), std::string::npos)
           << error.what();
     }
 }
