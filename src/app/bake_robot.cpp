@@ -40,12 +40,12 @@ std::string file_name(const std::string& name) {
 
 /// The description of a primitive, as parse_field() takes it.
 std::string field_spec_of(const Shape& shape) {
-  if (const auto* box = std::get_if<BoxShape>(&shape))
+  if (const auto* box = std::get_if<LinkBox>(&shape))
     return fmt::format("box:{:.17g},{:.17g},{:.17g}", box->half_extents.x(), box->half_extents.y(),
                        box->half_extents.z());
-  if (const auto* cylinder = std::get_if<CylinderShape>(&shape))
+  if (const auto* cylinder = std::get_if<LinkCylinder>(&shape))
     return fmt::format("cylinder:{:.17g},{:.17g}", cylinder->radius, cylinder->half_height);
-  return fmt::format("ball:{:.17g}", std::get<BallShape>(shape).radius);
+  return fmt::format("ball:{:.17g}", std::get<LinkBall>(shape).radius);
 }
 
 Json pose_json(const Eigen::Quaterniond& q, const Eigen::Vector3d& t) {
@@ -102,7 +102,7 @@ void bake_robot(const RobotBake& what) {
   for (const RobotLink& link : robot.links) {
     Json shapes = Json::array();
     for (const PlacedShape& placed : link.shapes(what.options.shapes())) {
-      if (!std::holds_alternative<MeshShape>(placed.shape)) {
+      if (!std::holds_alternative<LinkMesh>(placed.shape)) {
         shapes.push_back({{"field", field_spec_of(placed.shape)},
                           {"pose", pose_json(placed.rotation, placed.translation)}});
         ++fields;

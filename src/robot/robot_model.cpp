@@ -98,7 +98,7 @@ class RobotReader {
   Shape read_shape(std::uint32_t e) const {
     const std::string_view kind = xml_[e].name;
     if (kind == "mesh") {
-      MeshShape mesh;
+      LinkMesh mesh;
       mesh.file = decoded(xml_.attribute(e, "filename"));
       if (mesh.file.empty()) xml_.fail(e, "has no file. Add filename=\"…\"");
       mesh.scale = vector(e, "scale", Vector3d::Ones());
@@ -106,9 +106,9 @@ class RobotReader {
         xml_.fail(e, "a scale of 0 makes the mesh flat. Use nonzero factors, e.g. scale=\"1 1 1\"");
       return mesh;
     }
-    if (kind == "box") return BoxShape{0.5 * lengths(e, "size")};
-    if (kind == "cylinder") return CylinderShape{length(e, "radius"), 0.5 * length(e, "length")};
-    if (kind == "sphere") return BallShape{length(e, "radius")};
+    if (kind == "box") return LinkBox{0.5 * lengths(e, "size")};
+    if (kind == "cylinder") return LinkCylinder{length(e, "radius"), 0.5 * length(e, "length")};
+    if (kind == "sphere") return LinkBall{length(e, "radius")};
     xml_.fail(e, "is an unknown shape. Use mesh, box, cylinder or sphere");
   }
 

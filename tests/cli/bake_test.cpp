@@ -253,7 +253,8 @@ TEST_F(BakeCommand, AnOutputThatCannotBeMadeIsSaidBeforeTheWork) {
   // Before even the mesh is looked for.
   expect_error({"bake", "none.obj", "-o", "nowhere/new.ist"}, "the folder nowhere does not exist");
   expect_error({"bake", "none.obj", "-o", "."}, "is a folder; name a file in it");
-  expect_error({"medial", "none.obj", "-o", "nowhere/nodes.csv"}, "the folder nowhere does not exist");
+  expect_error({"medial", "none.obj", "-o", "nowhere/nodes.csv"},
+               "the folder nowhere does not exist");
 }
 
 TEST_F(BakeCommand, TheMeshIsNeverOverwritten) {

@@ -153,7 +153,8 @@ TEST_F(FieldQuery, SettingsThatHaveNoEffectAreRefused) {
     more.insert(more.begin(), {a, "cube.ist", "--pose", kAtOrigin});
     expect_exit(2, more, message);
   };
-  refused("ball:1", {"--field", "never"}, "never cannot be combined with ball:1, a field without spheres");
+  refused("ball:1", {"--field", "never"},
+          "never cannot be combined with ball:1, a field without spheres");
   refused("ball:1", {"--pair-budget", "10"}, "--pair-budget: has no effect where A is a field");
   refused("cube.ist", {"--field", "always", "--measure", "inner"}, "--field: has no effect");
   refused("cube.ist", {"--field", "some"}, "{auto,never,always}");

@@ -30,8 +30,10 @@ TEST_F(FileNames, NoNameIsRefusedBeforeTheWork) {
   expect_usage_error({"bake", "", "-o", "new.ist"}, "MESH: '' is not a file name");
   expect_usage_error({"info", ""}, "ASSET: '' is not a file name");
   expect_usage_error({"check", "cube.ist", "--mesh", ""}, "--mesh: '' is not a file name");
-  expect_usage_error({"query", "cube.ist", "", "--pose", "1,0,0,0,0,0,0"}, "B: '' is not a file name");
-  expect_usage_error({"query", "cube.ist", "cube.ist", "--poses", ""}, "--poses: '' is not a file name");
+  expect_usage_error({"query", "cube.ist", "", "--pose", "1,0,0,0,0,0,0"},
+                     "B: '' is not a file name");
+  expect_usage_error({"query", "cube.ist", "cube.ist", "--poses", ""},
+                     "--poses: '' is not a file name");
 }
 
 TEST_F(FileNames, ADashIsRefusedWhereItStandsForNothing) {
@@ -42,7 +44,8 @@ TEST_F(FileNames, ADashIsRefusedWhereItStandsForNothing) {
   expect_usage_error({"info", "-"}, "ASSET: '-' is not accepted");
   expect_usage_error({"check", "cube.ist", "--mesh", "-"}, "--mesh: '-' is not accepted");
   expect_usage_error({"export", "-", "-o", "new.csv"}, "ASSET: '-' is not accepted");
-  expect_usage_error({"query", "-", "cube.ist", "--pose", "1,0,0,0,0,0,0"}, "A: '-' is not accepted");
+  expect_usage_error({"query", "-", "cube.ist", "--pose", "1,0,0,0,0,0,0"},
+                     "A: '-' is not accepted");
 }
 
 TEST_F(FileNames, ADashIsStandardOutputForTables) {

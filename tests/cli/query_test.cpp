@@ -161,7 +161,7 @@ TEST_F(QueryCommand, JsonHasTheColumnsOfTheCsv) {
 TEST_F(QueryCommand, OnePoseIsAnsweredForAPerson) {
   const Outcome outcome = ist({"query", "cube.ist", "capsule.ist", "--pose", "1,0,0,0,0,0,0"});
   EXPECT_EQ(outcome.exit_code, 0);
-  for (const char* word : {"volume", "sum in", "force/k", "torque/k", "distance", "µs"})
+  for (const char* word : {"volume", "sum range", "force/k", "torque/k", "distance", "µs"})
     EXPECT_NE(outcome.out.find(word), std::string::npos) << word;
   // By spheres nothing is told that could be taken for accuracy.
   EXPECT_EQ(outcome.out.find("bounds"), std::string::npos) << outcome.out;
@@ -249,12 +249,13 @@ TEST_F(ExactQueryCommand, SaysWhatIsNotHeld) {
   ASSERT_EQ(
       ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
       0);
-  expect_exit(1, {"cube.ist", "bare.ist", "--pose", "1,0,0,0,0,0,0", "--measure", "exact"},
-              "bare.ist: has no mesh, which --measure exact needs; bake it again with --surface all");
+  expect_exit(
+      1, {"cube.ist", "bare.ist", "--pose", "1,0,0,0,0,0,0", "--measure", "exact"},
+      "bare.ist: has no mesh, which --measure exact needs; bake it again with --surface all");
   for (const char* measure : {"matched", "inner"})
     expect_exit(1, {"cube.ist", "nut.ist", "--pose", "1,0,0,0,0,0,0", "--measure", measure},
-                "nut.ist: has no spheres, which --measure " +
-                    std::string(measure) + " needs; use --measure exact");
+                "nut.ist: has no spheres, which --measure " + std::string(measure) +
+                    " needs; use --measure exact");
   expect_exit(1, {"ball:1", "nut.ist", "--pose", "1,0,0,0,0,0,0"}, "nut.ist: has no spheres");
 }
 

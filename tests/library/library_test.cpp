@@ -82,7 +82,8 @@ TEST_F(Library, ShardsAreTheWholeAndTheirSummariesToo) {
   nlohmann::json other = nlohmann::json::parse(read("shard-2.json"));
   other["library_hash"] = "0000000000000001";
   write("other.json", other.dump());
-  expect_error({"shard-1.json", "other.json", "shard-3.json"}, "does not belong to the same library");
+  expect_error({"shard-1.json", "other.json", "shard-3.json"},
+               "does not belong to the same library");
 }
 
 TEST_F(Library, AShardIsOneOfSome) {

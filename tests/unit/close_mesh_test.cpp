@@ -109,9 +109,9 @@ TEST(CloseMesh, WhatDoubleCannotCubeIsRefused) {
     EXPECT_NE(error_of(moved(mesh, scale, kZero)).find("is out of range. Scale or move it"),
               std::string::npos)
         << scale;
-  EXPECT_NE(
-      error_of(moved(mesh, 1e86, Eigen::Vector3d::Constant(1e101))).find("is out of range. Scale or move it"),
-      std::string::npos);
+  EXPECT_NE(error_of(moved(mesh, 1e86, Eigen::Vector3d::Constant(1e101)))
+                .find("is out of range. Scale or move it"),
+            std::string::npos);
 }
 
 TEST(CloseMesh, ThinSolidsAreSolids) {

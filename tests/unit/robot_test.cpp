@@ -41,12 +41,12 @@ TEST(RobotModel, ReadsShapesAndPoses) {
   EXPECT_EQ(robot.name, "r&s");
   ASSERT_EQ(robot.links.size(), 2u);
   const PlacedShape& box = robot.links[0].collision[0];
-  EXPECT_EQ(std::get<BoxShape>(box.shape).half_extents, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(std::get<LinkBox>(box.shape).half_extents, Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(box.translation, Eigen::Vector3d(1, 2, 3));
   EXPECT_TRUE((box.rotation * Eigen::Vector3d::UnitX()).isApprox(Eigen::Vector3d::UnitY()));
-  EXPECT_EQ(std::get<MeshShape>(robot.links[0].visual[0].shape).scale, Eigen::Vector3d(1, -2, 3));
-  EXPECT_EQ(std::get<CylinderShape>(robot.links[1].collision[0].shape).half_height, 2);
-  EXPECT_EQ(std::get<BallShape>(robot.links[1].collision[1].shape).radius, 0.5);
+  EXPECT_EQ(std::get<LinkMesh>(robot.links[0].visual[0].shape).scale, Eigen::Vector3d(1, -2, 3));
+  EXPECT_EQ(std::get<LinkCylinder>(robot.links[1].collision[0].shape).half_height, 2);
+  EXPECT_EQ(std::get<LinkBall>(robot.links[1].collision[1].shape).radius, 0.5);
 }
 
 TEST(RobotModel, SaysWhatIsWrongAndWhere) {
@@ -97,7 +97,7 @@ TEST(RobotModel, FindsPackagesAndTurnsMirroredMeshes) {
   EXPECT_THROW(here.find("package://"), Error);
 
   PlacedShape placed;
-  placed.shape = MeshShape{"m.obj", {-2, 1, 3}};
+  placed.shape = LinkMesh{"m.obj", {-2, 1, 3}};
   placed.translation = {5, 0, 0};
   const ClosedMesh closed = close_mesh(mesh_of(placed, here, "r.urdf").mesh, "mirrored");
   EXPECT_EQ(closed.report.flipped_components, 0u);
@@ -107,7 +107,7 @@ TEST(RobotModel, FindsPackagesAndTurnsMirroredMeshes) {
 
 TEST(RobotModel, ACylindersMeshHoldsIt) {
   PlacedShape placed;
-  placed.shape = CylinderShape{2, 3};
+  placed.shape = LinkCylinder{2, 3};
   const ShapeMesh shape = mesh_of(placed, PackagePaths("r.urdf", {}, ""), "r.urdf");
   const auto solid = make_solid(close_mesh(shape.mesh, "cylinder"));
   for (int i = 0; i < 1000; ++i)
