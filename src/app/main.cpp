@@ -28,8 +28,7 @@ int main(int argc, char** argv) {
       "ist");
   app.set_version_flag("--version", "ist " IST_VERSION_STRING);
   app.footer(
-      "Exit codes: 0 done, 1 error, 2 wrong usage or mistakes in a manifest, 3 check found a "
-      "violation, 130 interrupted.");
+      "Exit codes: 0 success, 1 error, 2 wrong usage, 3 check found a violation, 130 interrupted.");
   add_bake(app);
   add_cache(app);
   add_summary(app);

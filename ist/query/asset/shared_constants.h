@@ -11,8 +11,8 @@ inline constexpr int kSphereLevel = -1;
 /// squares of squares stay finite.
 inline constexpr double kFarthestPose = 1e60;
 
-// Overlapping sphere pairs number kPairShare · n_a n_b · ball(r_a + r_b) · (V + kPairRim (r_a + r_b)
-// √(V L)). Here n is spheres per volume, r a mean radius, V the overlap, and L the size of the
+// Overlapping sphere pairs number kPairShare · n_a n_b · ball(r_a + r_b) · (V + kPairRim (r_a +
+// r_b) √(V L)). Here n is spheres per volume, r a mean radius, V the overlap, and L the size of the
 // smaller solid. The second term counts the contact's rim, whose area grows as √(V L) for round
 // contacts. Fitted to the oracle's rows of eledino with 1,000 to 64,000 spheres, V by 250: 90 % of
 // all counts lie within a factor of two. The fit moves answers between levels and nothing else.
@@ -30,14 +30,14 @@ inline constexpr double kLookAlone = 0.35, kLookNone = 0.5;
 /// Spheres of less than this part of the other's volume are smaller.
 inline constexpr double kAlikeVolume = 0.5;
 
-// Displacements of coincident instances, in mean radii: up to the first, unlike levels answer alone;
-// from the second on, like ones do. Equal spheres lose their correlation within half a radius; the
-// rest is room for a smooth change.
+// Displacements of coincident instances, in mean radii: up to the first, unlike levels answer
+// alone; from the second on, like ones do. Equal spheres lose their correlation within half a
+// radius; the rest is room for a smooth change.
 inline constexpr double kCopyAlone = 0.4, kCopyApart = 1.6;
 
-// A quick look: the balls of nodes lie within kPokeOut root radii of the root's middle, because each
-// holds spheres of the root's ball and is itself no larger, or little. A solid smaller than kSpeck of
-// the other overlaps by nothing.
+// A quick look: the balls of nodes lie within kPokeOut root radii of the root's middle, because
+// each holds spheres of the root's ball and is itself no larger, or little. A solid smaller than
+// kSpeck of the other overlaps by nothing.
 inline constexpr double kPokeOut = 3;
 inline constexpr double kSpeck = 1e-9;
 
