@@ -174,7 +174,7 @@ bool captures(int device, Stream stream) {
   if (stream == legacy_stream()) return false;  // it cannot, and must not be asked while others do
   const DeviceGuard guard(device);
   cudaStreamCaptureStatus status = cudaStreamCaptureStatusNone;
-  check(cudaStreamIsCapturing(stream, &status), "asking a stream for its state");
+  check(cudaStreamIsCapturing(stream, &status), "querying a stream's state");
   return status != cudaStreamCaptureStatusNone;
 }
 

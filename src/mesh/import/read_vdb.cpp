@@ -41,7 +41,7 @@ FloatGrid::Ptr level_set_of(const openvdb::GridBase::Ptr& base, const std::strin
     throw Error(path + ": " + name + " is of class '" +
                 openvdb::GridBase::gridClassToString(grid->getGridClass()) +
                 "', not a level set. Convert it (tools::fogToSdf for a fog volume)");
-  if (grid->empty()) throw Error(path + ": " + name + " is empty: there is no solid");
+  if (grid->empty()) throw Error(path + ": " + name + " is empty, so there is no solid");
   if (!grid->transform().isLinear())
     throw Error(path + ": " + name + " has a transform that is not linear. Resample it");
   return grid;
@@ -103,7 +103,7 @@ LevelSetMesh read_level_set(const std::string& path, const ProgressCallback& pro
 bool vdb_available() noexcept { return true; }
 
 LevelSetMesh load_vdb(const std::string& path, const ProgressCallback& progress) {
-  if (!std::filesystem::is_regular_file(path)) throw Error(path + ": there is no such file");
+  if (!std::filesystem::is_regular_file(path)) throw Error(path + ": no such file");
   try {
     return read_level_set(path, progress);
   } catch (const openvdb::Exception& error) {
