@@ -16,8 +16,8 @@ Array<T> take_array(const py::handle& value, const std::string& name, const std:
   try {
     given = numpy.attr("asarray")(value);
   } catch (py::python_error&) {
-    throw type_error(name + ": a " + type_name_of(value) + " is no array; wanted " + type + " " +
-                     wanted);
+    throw type_error(name + ": a " + type_name_of(value) + " is not an array; wanted " + type +
+                     " " + wanted);
   }
   const py::object dtype = given.attr("dtype");
   if (std::strchr(kinds, text_of(dtype.attr("kind"))[0]) == nullptr)

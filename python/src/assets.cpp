@@ -81,7 +81,7 @@ PlacedTree placed(const Asset& asset, const py::object& pose, double scale) {
 /// What is kept of the mesh, as the command line takes it; a number is as good as its text.
 SurfaceSettings surface_settings(const py::object& given) {
   const std::optional<SurfaceSettings> surface = parse_surface(text_of(given));
-  if (!surface) throw Error("surface: '" + text_of(given) + "' is none of " + kSurfaceMeaning);
+  if (!surface) throw Error("surface: '" + text_of(given) + "' is not one of " + kSurfaceMeaning);
   return *surface;
 }
 
@@ -105,22 +105,22 @@ PackingSettings packing_settings(std::size_t max_spheres, double target_coverage
 }
 
 constexpr const char* kSettingsDoc = R"(
-max_spheres: count; 0: no limit.
-target_coverage: [0, 1] of the solid's volume.
-min_radius: [u] smaller spheres are not inserted.
-time_limit: [s], 0: none; the only setting that costs repeatability.
-epsilon: greedy slack; 0: the library's schedule.
+max_spheres: largest number of spheres; 0: no limit.
+target_coverage: [0, 1] share of the solid's volume at which packing stops.
+min_radius: [u] smallest radius of a sphere.
+time_limit: [s]; 0: no limit. The only setting that makes a bake unrepeatable.
+epsilon: greedy tolerance; 0: automatic schedule.
 grid: 'banded', 'uniform', 'explicit', 'implicit' or 'hybrid'.
 seed: breaks ties.
-threads: 0: all cores; never changes the result.
-device: 'auto', 'cpu' or 'cuda'; never changes the result.
-surface: what is kept of the mesh for exact queries: 'all' of its triangles, 'none', or as few as
+threads: 0: all cores. The result does not depend on it.
+device: 'auto', 'cpu' or 'cuda'. The result does not depend on it.
+surface: surface kept in the asset: 'all' triangles of the mesh, 'none', or as few as
     stay within a length of it: a number [u], or a share of its longest side as '0.1%'.
-progress: called with a Progress on this thread; False cancels: packing then keeps what is packed,
-    other stages raise Error. What it raises is raised.
+progress: called with a Progress on this thread; False cancels: packing then keeps its spheres,
+    other stages raise Error. An exception that it raises is passed on.
 
 Ctrl-C raises KeyboardInterrupt within 0.2 s.
-Raises Error if not one sphere fits, and on settings out of range.)";
+Raises Error if no sphere fits, or if a setting is out of range.)";
 
 void add_bodies(py::module_& module) {
   py::class_<MassProperties>(module, "MassProperties",
@@ -133,7 +133,7 @@ void add_bodies(py::module_& module) {
       .def_ro("centre_of_mass_error", &MassProperties::centre_of_mass_error,
               "[u] of each component")
       .def_ro("inertia_error", &MassProperties::inertia_error, "[u⁵] of each entry");
-  py::class_<Bounds>(module, "Bounds", "What holds a solid: a box along the axes, and a ball.")
+  py::class_<Bounds>(module, "Bounds", "Bounds of a solid: an axis-aligned box and a ball.")
       .def_ro("lower", &Bounds::lower, "(3,) [u] corner of the box")
       .def_ro("upper", &Bounds::upper, "(3,) [u] the opposite corner")
       .def_ro("centre", &Bounds::centre, "(3,) [u] of the ball")
@@ -141,17 +141,17 @@ void add_bodies(py::module_& module) {
   py::class_<Invariant>(module, "Invariant", "One proven property of an asset.")
       .def_ro("name", &Invariant::name, "'sphere inside solid', …")
       .def_ro("worst", &Invariant::worst,
-              "Largest violation measure, as `meaning` says; ≤ 0 is sound unless stated.")
-      .def_ro("meaning", &Invariant::meaning, "What `worst` measures, with its unit.")
-      .def_ro("where", &Invariant::where, "Number of the sphere, node, … that is worst.")
-      .def_ro("checked", &Invariant::checked, "How many were looked at.")
-      .def_ro("violations", &Invariant::violations, "How many do not hold.");
-  py::class_<PartnerError>(module, "PartnerError", "How an asset answers one kind of partner.")
+              "Largest violation, in the measure of `meaning`; ≤ 0 is sound unless stated.")
+      .def_ro("meaning", &Invariant::meaning, "The quantity of `worst`, with its unit.")
+      .def_ro("where", &Invariant::where, "Index of the worst sphere, node, ….")
+      .def_ro("checked", &Invariant::checked, "Number of objects checked.")
+      .def_ro("violations", &Invariant::violations, "Number of violations.");
+  py::class_<PartnerError>(module, "PartnerError", "Error of an asset against one kind of partner.")
       .def_prop_ro(
           "partner", [](const PartnerError& e) { return app::name_of(e.partner); },
           "'copy', 'plane', 'ball', 'edge', 'corner' or 'plate'.")
-      .def_ro("median", &PartnerError::median, "Relative.")
-      .def_ro("poses", &PartnerError::poses, "Behind it.");
+      .def_ro("median", &PartnerError::median, "Median relative error.")
+      .def_ro("poses", &PartnerError::poses, "Number of poses.");
 }
 
 struct Targeted {
@@ -184,19 +184,20 @@ void add_bakes(py::module_& module) {
       py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
       py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
       py::arg("progress") = py::none(),
-      (std::string("Makes the asset of a closed mesh. Same mesh and settings, same bytes, on any "
-                   "machine.\n") +
+      (std::string("Bakes the asset of a closed mesh. The same mesh and settings give the same "
+                   "bytes on any machine.\n") +
        kSettingsDoc)
           .c_str());
-  py::class_<Targeted>(module, "TargetedAsset", "What bake_to_error made of its target.")
+  py::class_<Targeted>(module, "TargetedAsset", "Result of bake_to_error().")
       .def_ro("asset", &Targeted::asset, "The Asset.")
       .def_ro("measured_error", &Targeted::measured_error,
-              "Relative, median near the overlap asked about, worst partner's.")
-      .def_ro("poses", &Targeted::poses, "Of all partners; 0: none was tried.")
+              "Median relative error near the requested overlap, of the worst partner.")
+      .def_ro("poses", &Targeted::poses, "Number of poses of all partners; 0: none was measured.")
       .def_ro("partners", &Targeted::partners, "A PartnerError for each kind.")
-      .def_ro("met", &Targeted::met, "poses > 0 and measured_error no larger than asked.")
+      .def_ro("met", &Targeted::met, "poses > 0 and measured_error is at most the requested error.")
       .def_prop_ro(
-          "stop", [](const Targeted& t) { return app::name_of(t.stop); }, "What ended the search.");
+          "stop", [](const Targeted& t) { return app::name_of(t.stop); },
+          "Reason for the end of the search.");
   module.def(
       "bake_to_error",
       [](const SharedMesh& mesh, double relative_error, double at_overlap, std::size_t max_spheres,
@@ -225,7 +226,7 @@ void add_bakes(py::module_& module) {
       py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
       py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
       py::arg("progress") = py::none(),
-      (std::string("bake() with about as few spheres as an error needs.\n\n"
+      (std::string("bake() with about the fewest spheres that reach an error.\n\n"
                    "relative_error: (0, 1) median over random poses, for every partner.\n"
                    "at_overlap: [1e-4, 0.5] of the solid's volume.\n"
                    "max_spheres: 0: 200,000. The other settings are those of bake():\n") +
@@ -244,9 +245,9 @@ void add_bakes(py::module_& module) {
       },
       py::arg("mesh"), py::kw_only(), py::arg("surface") = "all", py::arg("threads") = 0,
       py::arg("progress") = py::none(),
-      "Makes the asset of a surface alone: the mesh, mass and bounds, without spheres, for exact "
-      "queries.\n\nWhat asks spheres answers QueryStatus.not_held. The settings are those of "
-      "bake().\nRaises Error where the mesh counts volume twice.");
+      "Bakes the asset of a surface alone: the mesh, mass and bounds, without spheres, for exact "
+      "queries.\n\nQueries that need spheres return QueryStatus.not_held. The settings are those "
+      "of bake().\nRaises Error if parts of the mesh overlap.");
   module.def(
       "check",
       [](const SharedAsset& asset, const SharedMesh& mesh, unsigned threads) {
@@ -255,18 +256,18 @@ void add_bakes(py::module_& module) {
         });
       },
       py::arg("asset"), py::arg("mesh"), py::kw_only(), py::arg("threads") = 0,
-      "Proves every invariant of an asset again, in double, from its bytes and the mesh alone.\n\n"
-      "Returns a list of Invariant. Raises Error if the asset is of another mesh.");
+      "Verifies every invariant of an asset in double, from its bytes and the mesh alone.\n\n"
+      "Returns a list of Invariant. Raises Error if the asset was baked from another mesh.");
 }
 
 }  // namespace
 
 void add_assets(py::module_& module) {
   add_bodies(module);
-  py::class_<Asset>(module, "Asset", py::type_slots(kAssetSlots),
-                    "A baked solid. Immutable, so threads may share it. "
-                    "memoryview(asset) is a read-only view of its bytes that holds it; "
-                    "pickle works.")
+  py::class_<Asset>(
+      module, "Asset", py::type_slots(kAssetSlots),
+      "A baked solid. Immutable, so threads may share it. "
+      "memoryview(asset) is a read-only view of its bytes that keeps it alive; pickle works.")
       .def_static(
           "load",
           [](const py::object& path) {
@@ -276,7 +277,7 @@ void add_assets(py::module_& module) {
           py::arg("path"), "Reads an .ist file. Raises Error (file, what is wrong, way out).")
       .def_static("from_bytes", &asset_of_bytes, py::arg("data"), py::arg("name") = "asset",
                   "Copies the bytes of an .ist file.\n\ndata: bytes, or any contiguous buffer.\n"
-                  "name: for messages. Raises Error unless every check holds.")
+                  "name: used in messages. Raises Error if a check of the bytes fails.")
       .def(
           "save",
           [](const SharedAsset& self, const py::object& path) {
@@ -286,7 +287,7 @@ void add_assets(py::module_& module) {
             });
           },
           py::arg("path"),
-          "Writes an .ist file: the old one or the whole new one is there at every moment.")
+          "Writes an .ist file atomically: readers see the old file or the complete new one.")
       .def("to_bytes", &bytes_of, "The bytes of an .ist file, a copy.")
       .def("__getstate__", &bytes_of)
       .def("__setstate__",
@@ -300,7 +301,7 @@ void add_assets(py::module_& module) {
           [](const Asset& self) {
             return py::module_::import_("json").attr("loads")(app::asset_json(self.view()).dump());
           },
-          "All that `ist info --json` prints, as a dict: docs/json.md.")
+          "The output of `ist info --json` as a dict: docs/json.md.")
       .def("__str__", [](const Asset& self) { return app::describe_asset(self.view()); })
       .def("spheres", &spheres_of, py::arg("which") = "matched",
            "(n, 4) float64: centre and radius [u], in the mesh's own frame; a copy.\n\n"
@@ -311,8 +312,7 @@ void add_assets(py::module_& module) {
             return mass_properties(placed(self, pose, scale));
           },
           py::arg("pose") = py::none(), py::arg("scale") = 1.0,
-          "MassProperties, in the frame that the pose leads to; all zero for a pose that a query "
-          "calls invalid.")
+          "MassProperties in the frame of the pose; all zero for an invalid pose.")
       .def(
           "bounds",
           [](const Asset& self, const py::object& pose, double scale) {
@@ -320,36 +320,35 @@ void add_assets(py::module_& module) {
                                                 : bounds(placed(self, pose, scale));
           },
           py::arg("pose") = py::none(), py::arg("scale") = 1.0,
-          "Bounds, in the frame that the pose leads to. Matched spheres may reach out by "
-          "`protrusion`.")
+          "Bounds in the frame of the pose. Matched spheres may stick out by `protrusion`.")
       .def_prop_ro(
           "sphere_count", [](const Asset& self) { return self.view().sphere_count(); }, "Count.")
       .def_prop_ro(
           "volume", [](const Asset& self) { return self.view().volume(); }, "[u³] of the solid.")
       .def_prop_ro(
           "coverage", [](const Asset& self) { return self.view().coverage(); },
-          "[0, 1] share of it in inner spheres.")
+          "[0, 1] share of the volume in inner spheres.")
       .def_prop_ro(
           "protrusion", [](const Asset& self) { return self.view().protrusion(); },
-          "[u] no matched sphere sticks further out of the solid.")
+          "[u] bound on how far matched spheres stick out of the solid.")
       .def_prop_ro(
           "has_field", [](const Asset& self) { return self.view().has_field(); },
-          "It holds the solid's surface.")
+          "Whether the asset stores the solid's surface.")
       .def_prop_ro(
           "field_error", [](const Asset& self) { return self.view().field_error(); },
-          "[u] that surface and the solid's lie within this of each other.")
+          "[u] largest distance between that surface and the solid's.")
       .def_prop_ro(
           "mesh_triangles", [](const Asset& self) { return self.view().mesh_triangles(); },
-          "Of the mesh that exact queries ask; 0: it holds none.")
+          "Number of triangles of the kept mesh, for exact queries; 0: none.")
       .def_prop_ro(
           "mesh_error", [](const Asset& self) { return self.view().mesh_error(); },
-          "[u] the mesh's surface and the solid's lie within this of each other.")
+          "[u] largest distance between the kept mesh's surface and the solid's.")
       .def_prop_ro(
           "mesh_state", [](const Asset& self) { return app::name_of(self.view().mesh_state()); },
-          "'own', 'resolved', 'simplified', 'none', or 'unresolved': it counts volume twice.")
+          "'own', 'resolved', 'simplified', 'none', or 'unresolved' (its parts overlap).")
       .def_prop_ro(
           "counted_twice", [](const Asset& self) { return self.view().counted_twice(); },
-          "[u³] that the mesh as it came counts more than once.");
+          "[u³] volume that the input mesh counts more than once.");
   add_bakes(module);
 }
 

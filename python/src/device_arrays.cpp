@@ -108,7 +108,7 @@ Described by_dlpack(const py::object& value, const WantedArray& wanted, int devi
   }
   if (auto array = taken_out<py::ndarray<>>(capsule, wanted, device)) return *array;
   if (auto array = taken_out<py::ndarray<py::ro>>(capsule, wanted, device)) return *array;
-  throw type_error(wanted.name + ": its __dlpack__ gives no capsule of a tensor");
+  throw type_error(wanted.name + ": its __dlpack__ does not return a tensor capsule");
 }
 
 std::optional<ElementType> type_of(const std::string& typestr) {
@@ -160,7 +160,7 @@ bool in_c_order(const Described& array) {
   return true;
 }
 
-constexpr const char* kNoArray = " is no device array: wanted ";
+constexpr const char* kNoArray = " is not a device array; wanted ";
 
 }  // namespace
 
@@ -193,9 +193,9 @@ LentArray lend(const py::object& value, const WantedArray& wanted, int device,
     throw value_error(wanted.name + ": not in C order; wanted " + describe(wanted, device) +
                       " without gaps");
   if (wanted.written && array.read_only)
-    throw value_error(wanted.name + ": read-only; wanted memory that answers may go to");
+    throw value_error(wanted.name + ": read-only; wanted writable memory");
   if (reinterpret_cast<std::uintptr_t>(lent.data) % (array.type.bits / 8u) != 0)
-    throw value_error(wanted.name + ": its address is no multiple of its elements' size");
+    throw value_error(wanted.name + ": its address is not a multiple of the element size");
   const int found = cuda::device_of(lent.data);
   if (found != device)
     refuse_device(wanted, device,
@@ -212,7 +212,7 @@ cuda::Stream stream_of(const py::object& stream) {
     for (const char* const name : {"cuda_stream", "ptr"})  // PyTorch's, CuPy's
       if (py::hasattr(stream, name)) return py::cast<std::uintptr_t>(stream.attr(name));
     throw type_error("stream: a " + type_name_of(stream) +
-                     " is no stream; wanted a handle, or an object with __cuda_stream__, "
+                     " is not a stream; wanted a handle, or an object with __cuda_stream__, "
                      "cuda_stream or ptr");
   }();
   // 0 is the legacy default stream for CUDA, and no stream for DLPack.
@@ -225,12 +225,12 @@ py::object to_dlpack(const py::object& held, const py::object& stream,
                      const py::object& max_version, const py::object& dl_device,
                      const py::object& copy) {
   const DeviceArray& self = py::cast<const DeviceArray&>(held);
-  if (!copy.is_none() && py::cast<bool>(copy))
-    throw py::buffer_error("a copy is not made: copy=True");
+  if (!copy.is_none() && py::cast<bool>(copy)) throw py::buffer_error("copy=True is not supported");
   if (!dl_device.is_none()) {
     const auto [type, id] = py::cast<std::pair<py::object, int>>(dl_device);
     if (py::cast<int>(py::int_(type)) != py::device::cuda::value || id != self.block->device())
-      throw py::buffer_error("a copy on another device is not made: numpy() makes one on the host");
+      throw py::buffer_error(
+          "a copy on another device is not supported; numpy() copies to the host");
   }
   // −1: whoever asks sees to it that nothing is read before it is written.
   if (!py::isinstance<py::int_>(stream) || py::cast<std::intptr_t>(stream) != -1)

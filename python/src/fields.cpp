@@ -36,19 +36,20 @@ Solid solid_of(const py::handle& object, const char* name) {
 TreeView tree_of(const py::handle& object, const char* name) {
   const Solid solid = solid_of(object, name);
   if (const TreeView* const tree = std::get_if<TreeView>(&solid)) return *tree;
-  throw type_error(std::string(name) + ": a Field; it stands first in a query, as `a`");
+  throw type_error(std::string(name) + ": a Field; only `a`, the first solid, can be one");
 }
 
 Field field_of(const py::handle& object, const char* name) {
   const Solid solid = solid_of(object, name);
   if (const Field* const field = std::get_if<Field>(&solid)) return *field;
-  throw type_error(std::string(name) + ": an Asset; MeshField(asset) is its surface");
+  throw type_error(std::string(name) +
+                   ": an Asset; wanted a Field, e.g. MeshField(asset), its surface");
 }
 
 void add_fields(py::module_& module) {
   py::class_<OwnedField>(module, "Field",
-                         "A solid that an asset meets without having a tree itself. Stands first "
-                         "in a query. Lengths are [u] in the field's own frame.");
+                         "A shape that needs no asset. It can only be the first solid of a query. "
+                         "Lengths are [u] in the field's own frame.");
   add_kind<HalfSpaceField>(module, "HalfSpaceField", "The solid normal · x ≤ offset. Exact.")
       .def(
           py::new_([](const py::object& normal, double offset) {
@@ -77,30 +78,31 @@ void add_fields(py::module_& module) {
            }),
            py::arg("radius"), py::arg("half_height"), "radius, half_height: [u] > 0.");
   add_kind<HeightField>(module, "HeightField",
-                        "Terrain: the solid under a grid of heights along z. Beyond its border it "
-                        "goes on level.")
-      .def(py::new_([](const py::object& heights, const py::object& spacing, double lowest,
-                       double highest) {
-             const Floats grid = take_floats(heights, "heights", "(rows, columns)");
-             if (grid.ndim() != 2) refuse_shape(grid, "heights", "(rows, columns)");
-             const Doubles steps = take_doubles(spacing, "spacing", "(2,)");
-             if (steps.ndim() != 1 || steps.shape(0) != 2) refuse_shape(steps, "spacing", "(2,)");
-             return OwnedKind<HeightField>(HeightField{grid.data(),
-                                                       points(grid.shape(1)),
-                                                       points(grid.shape(0)),
-                                                       {steps.data()[0], steps.data()[1]},
-                                                       lowest,
-                                                       highest},
-                                           std::make_shared<Floats>(grid));
-           }),
-           py::arg("heights"), py::kw_only(), py::arg("spacing") = py::make_tuple(1.0, 1.0),
-           py::arg("lowest") = -1e300, py::arg("highest") = 1e300,
-           "heights: (rows along y, columns along x) [u]; a float32 array in C order is not "
-           "copied.\nspacing: (2,) [u] > 0 along x and y; heights[0, 0] stands at the origin.\n"
-           "lowest, highest: [u] no height is lower or higher: far objects are then told at once.");
+                        "Terrain: the solid under a grid of heights along z. Beyond the border the "
+                        "nearest height holds.")
+      .def(
+          py::new_([](const py::object& heights, const py::object& spacing, double lowest,
+                      double highest) {
+            const Floats grid = take_floats(heights, "heights", "(rows, columns)");
+            if (grid.ndim() != 2) refuse_shape(grid, "heights", "(rows, columns)");
+            const Doubles steps = take_doubles(spacing, "spacing", "(2,)");
+            if (steps.ndim() != 1 || steps.shape(0) != 2) refuse_shape(steps, "spacing", "(2,)");
+            return OwnedKind<HeightField>(HeightField{grid.data(),
+                                                      points(grid.shape(1)),
+                                                      points(grid.shape(0)),
+                                                      {steps.data()[0], steps.data()[1]},
+                                                      lowest,
+                                                      highest},
+                                          std::make_shared<Floats>(grid));
+          }),
+          py::arg("heights"), py::kw_only(), py::arg("spacing") = py::make_tuple(1.0, 1.0),
+          py::arg("lowest") = -1e300, py::arg("highest") = 1e300,
+          "heights: (rows along y, columns along x) [u]; a float32 array in C order is not "
+          "copied.\nspacing: (2,) [u] > 0 along x and y; heights[0, 0] is at the origin.\n"
+          "lowest, highest: [u] bounds on all heights, by which far objects are rejected quickly.");
   add_kind<DistanceGridField>(module, "DistanceGridField",
                               "Distances at the points of a grid, positive inside, interpolated "
-                              "linearly. Outside of the grid is outside of the solid.")
+                              "linearly. Points outside the grid are outside the solid.")
       .def(py::new_([](const py::object& distances, const py::object& origin, double spacing,
                        double error) {
              const Floats grid = take_floats(distances, "distances", "(z, y, x)");
@@ -118,7 +120,7 @@ void add_fields(py::module_& module) {
            py::arg("error") = 0.0,
            "distances: (points along z, y, x) [u]; a float32 array in C order is not copied.\n"
            "origin: (3,) [u] of the first point. spacing: [u] > 0.\n"
-           "error: [u] the interpolated distance is off by at most this.");
+           "error: [u] largest error of the interpolated distance.");
   add_kind<MeshField>(module, "MeshField",
                       "The surface in an asset, without its spheres. Exact within "
                       "Asset.field_error.")

@@ -142,7 +142,7 @@ std::vector<bool> wanted_columns(const py::object& wanted) {
     asked.push_back(wanted.is_none() && answer.unasked);
   if (wanted.is_none()) return asked;
   if (py::isinstance<py::str>(wanted))
-    throw type_error("wanted: a str; wanted a sequence of names: " + names_of_columns<Answers>());
+    throw type_error("wanted: a str; must be a sequence of names: " + names_of_columns<Answers>());
   for (const py::handle name : wanted) asked[number_of<Answers>(text_of(name), "wanted")] = true;
   return asked;
 }
@@ -160,7 +160,7 @@ Places<Answers> new_columns(const Answers& blank, const std::vector<bool>& wante
                             std::size_t count, int device, cuda::Stream stream) {
   if (cuda::captures(device, stream))
     throw value_error(
-        "out: None; wanted arrays for the answers, as the stream is captured and a graph's own "
+        "out: None; wanted arrays for the answers, because the stream is captured and a graph's "
         "memory does not outlive it");
   const auto columns = columns_of<Answers>();
   constexpr std::size_t kAlign = 256;
@@ -256,7 +256,7 @@ DeviceAnswers<Answers> ask(DeviceAssets& assets, const GivenPairs& given, const 
   pairs.count = arguments.count();
   if (given.fields != nullptr) arguments.lent.push_back(given.fields);
   if (!out.is_none() && !wanted.is_none())
-    throw value_error("wanted: the arrays of `out` say what is wanted already");
+    throw value_error("wanted: excludes `out`, whose arrays already select the answers");
   Places<Answers> places =
       out.is_none() ? new_columns(blank, wanted_columns<Answers>(wanted), pairs.count, device, on)
                     : given_columns(blank, out, pairs.count, device, on, arguments.lent);

@@ -55,8 +55,8 @@ class DeviceAssets {
     if (room.workspace == nullptr || room.workspace->most_pairs() < pairs.count) {
       if (captured)
         throw Error("GPU: a batch of " + std::to_string(pairs.count) +
-                    " pairs is captured, and none so large was asked before: ask once without "
-                    "capturing");
+                    " pairs is captured, but no batch this large ran before: run one without "
+                    "capturing first");
       make_room(room, pairs.count);
     }
     if (!captured && !in_flight_.empty()) in_flight_.back().done->hold(stream);

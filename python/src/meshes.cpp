@@ -56,8 +56,8 @@ py::object declared_up(const Mesh& mesh) {
 
 void add_report(py::module_& module) {
   py::class_<MeshReport>(module, "MeshReport",
-                         "What import and validation found; counts are of the welded mesh as it "
-                         "came, unless they name the closed one.")
+                         "Findings of import and validation. Counts refer to the welded input mesh "
+                         "unless stated otherwise.")
       .def_ro("vertices", &MeshReport::vertices, "Referenced vertices after welding.")
       .def_ro("triangles", &MeshReport::triangles, "As imported.")
       .def_ro("components", &MeshReport::components, "Edge-connected shells.")
@@ -68,15 +68,15 @@ void add_report(py::module_& module) {
       .def_ro("degenerate_triangles", &MeshReport::degenerate_triangles,
               "Zero area or repeated corners.")
       .def_ro("self_intersections", &MeshReport::self_intersections,
-              "Pairs of triangles that meet elsewhere than in shared corners.")
+              "Pairs of triangles that intersect outside shared corners.")
       .def_ro("shells", &MeshReport::shells, "Of the closed mesh.")
       .def_ro("meets_itself", &MeshReport::meets_itself,
-              "Of the closed mesh: its triangles intersect, or may.")
+              "Whether triangles of the closed mesh intersect, or may.")
       .def_ro("filled_holes", &MeshReport::filled_holes, "Closed by repair.")
       .def_ro("repaired", &MeshReport::repaired, "Repair changed the mesh.")
       .def_ro("volume", &MeshReport::volume,
               "[u³] by the divergence theorem; counts self-overlaps twice.")
-      .def_ro("notes", &MeshReport::notes, "One sentence a finding, ready to print.");
+      .def_ro("notes", &MeshReport::notes, "One printable sentence per finding.");
 }
 
 }  // namespace
@@ -86,40 +86,40 @@ void add_meshes(py::module_& module) {
   py::class_<TriangleMesh>(module, "Mesh",
                            "Triangles over shared vertices, in the file's own unit [u] and frame.")
       .def(py::new_(&mesh_of_arrays), py::arg("vertices"), py::arg("triangles"),
-           "Copies arrays.\n\nvertices: (n, 3) [u]. triangles: (m, 3) whole numbers of vertices, "
+           "Copies arrays.\n\nvertices: (n, 3) [u]. triangles: (m, 3) vertex indices, "
            "counter-clockwise seen from outside.")
       .def_prop_ro(
           "vertices",
           [](const py::object& self) {
             return view_of<double>(py::cast<const TriangleMesh&>(self).vertices, self);
           },
-          "(n, 3) float64 [u], read-only: a view that holds the mesh.")
+          "(n, 3) float64 [u], read-only: a view that keeps the mesh alive.")
       .def_prop_ro(
           "triangles",
           [](const py::object& self) {
             return view_of<std::uint32_t>(py::cast<const TriangleMesh&>(self).triangles, self);
           },
-          "(m, 3) uint32, read-only: a view that holds the mesh.")
+          "(m, 3) uint32, read-only: a view that keeps the mesh alive.")
       .def_prop_ro("declared_up_axis", &declared_up<TriangleMesh>,
-                   "'X', 'Y' or 'Z' as the file declares, or None. Nothing is turned.")
+                   "'X', 'Y' or 'Z' as the file declares, or None. The mesh is not rotated.")
       .def_prop_ro(
           "declared_unit", [](const TriangleMesh& mesh) { return mesh.declared.unit; },
-          "[m] length of the file's unit; 0: the file does not say.");
+          "[m] length of the file's unit; 0: not declared.");
   py::class_<ClosedMesh>(
       module, "ClosedMesh",
-      "A mesh that bounds a solid: inside is where its winding number is 1 or more.")
+      "A mesh that bounds a solid. A point is inside if its winding number is 1 or more.")
       .def_prop_ro(
           "vertices",
           [](const py::object& self) {
             return view_of<double>(py::cast<const ClosedMesh&>(self).mesh.vertices, self);
           },
-          "(n, 3) float64 [u], read-only: a view that holds the mesh.")
+          "(n, 3) float64 [u], read-only: a view that keeps the mesh alive.")
       .def_prop_ro(
           "triangles",
           [](const py::object& self) {
             return view_of<std::uint32_t>(py::cast<const ClosedMesh&>(self).mesh.triangles, self);
           },
-          "(m, 3) uint32, read-only: a view that holds the mesh.")
+          "(m, 3) uint32, read-only: a view that keeps the mesh alive.")
       .def_ro("name", &ClosedMesh::name, "For messages.")
       .def_prop_ro(
           "report", [](const ClosedMesh& mesh) { return mesh.report; }, "MeshReport, a copy.");
@@ -131,12 +131,12 @@ void add_meshes(py::module_& module) {
         });
       },
       py::arg("path"), py::kw_only(), py::arg("weld_tolerance") = 0.0,
-      R"(Reads OBJ, STL, PLY, OFF, GLB/glTF, DAE and what assimp knows.
+      R"(Reads OBJ, STL, PLY, OFF, GLB/glTF, DAE and other formats of assimp.
 
 path: str or os.PathLike.
-weld_tolerance: [0, 0.1]; vertices closer than this share of the bounding box's diagonal are one.
+weld_tolerance: [0, 0.1]; vertices closer than this share of the bounding box's diagonal are merged.
 
-Raises Error (file, place, way out).)");
+Raises Error, which names the file, the place and a way out.)");
   module.def(
       "close_mesh",
       [](const std::shared_ptr<TriangleMesh>& mesh, const std::string& name, bool repair) {
@@ -154,8 +154,8 @@ Raises OpenMeshError for an open mesh, Error for one that is flat, empty, not fi
 non-orientable.)");
   module.def(
       "sample_mesh", [](const std::string& name) { return make_sample(name); }, py::arg("name"),
-      "A closed mesh made on the spot: 'bolt', 'nut', 'gear', 'cube', …\n\nAn unknown name raises "
-      "Error, which lists all.");
+      "A generated closed mesh: 'bolt', 'nut', 'gear', 'cube', …\n\nAn unknown name raises Error, "
+      "which lists all names.");
 }
 
 }  // namespace ist::python

@@ -25,9 +25,10 @@ NB_MODULE(_core, module) {
   module.attr("__name__") = "ist";
   py::set_leak_warnings(false);  // what is alive at the end is the system's to free
   const py::exception<ist::Error> error(module, "Error", PyExc_RuntimeError);
-  error.attr("__doc__") = "What the library refuses, in its words: file, place and way out.";
+  error.attr("__doc__") =
+      "An error of the library. The message names the file, the place and a way out.";
   py::exception<ist::OpenMeshError>(module, "OpenMeshError", error.ptr()).attr("__doc__") =
-      "An open mesh that was not asked to be repaired.";
+      "A mesh is not closed, and repair was not requested or failed.";
   module.attr("__version__") = IST_VERSION_STRING;
   python::add_offline(module);
   python::add_meshes(module);

@@ -123,13 +123,13 @@ std::string path_of(const py::object& path) {
 }
 
 void add_offline(py::module_& module) {
-  py::class_<Progress>(module, "Progress", "Where a long stage stands: what `progress` is handed.")
+  py::class_<Progress>(module, "Progress", "Progress of a long stage, passed to `progress`.")
       .def_ro("stage", &Progress::stage,
               "'polygonise', 'resolve', 'pack', 'calibrate', 'cover', 'tree' or 'predict'.")
-      .def_ro("spheres", &Progress::spheres, "Count so far.")
+      .def_ro("spheres", &Progress::spheres, "Number of spheres so far.")
       .def_ro("coverage", &Progress::coverage,
               "[0, 1] of the solid's volume in inner spheres; 'pack' only.")
-      .def_ro("radius", &Progress::radius, "[u] of the spheres being inserted now; 'pack' only.")
+      .def_ro("radius", &Progress::radius, "[u] radius of the spheres being inserted; 'pack' only.")
       .def_ro("fraction", &Progress::fraction, "[0, 1] of this stage's work, an estimate.")
       .def_ro("elapsed", &Progress::elapsed, "[s] since the stage began.");
   py::module_::import_("atexit").attr("register")(py::cpp_function([] {

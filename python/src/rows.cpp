@@ -150,10 +150,10 @@ Rows Rows::of_scene(const py::sequence& solids, const py::object& poses, const p
                         std::to_string(second) + "): " + why);
     };
     if (std::min(first, second) < 0 || std::max(first, second) >= static_cast<std::int64_t>(k))
-      refuse("there are solids 0 to " + std::to_string(k - 1));
-    if (first == second) refuse("a solid does not meet itself");
+      refuse("solids are numbered 0 to " + std::to_string(k - 1));
+    if (first == second) refuse("a solid cannot be paired with itself");
     if (!std::holds_alternative<TreeView>(rows.solids_[static_cast<std::size_t>(second)]))
-      refuse("the second is a field; a field stands first");
+      refuse("the second is a Field; only the first can be");
   }
   const std::size_t scenes = d == 3 ? places.shape(0) : 1;
   rows.pose_b_ = Values(std::move(places), 7, true);
@@ -224,14 +224,13 @@ void refuse_not_held(const Rows& rows, const Column<std::uint32_t>& status, std:
   const Row row = rows.at(0);
   const TreeView* const a = std::get_if<TreeView>(row.a);
   if (exact && a == nullptr)
-    throw Error("a: a Field has no mesh, which measure='exact' asks of both solids");
+    throw Error("a: a Field has no mesh, which measure='exact' needs; pass an Asset");
   if (exact)
     throw Error(std::string(a->has_mesh() ? "b" : "a") +
-                ": holds no mesh, which measure='exact' asks of both solids; bake it with "
-                "surface='all'");
+                ": has no mesh, which measure='exact' needs; bake it with surface='all'");
   throw Error(std::string(row.b.tree.sphere_count() == 0 ? "b" : "a") +
-              ": is a surface alone and holds no spheres; measure='exact' of penetration() needs "
-              "none, and bake() makes them");
+              ": is a surface alone, without spheres; use penetration() with measure='exact', or "
+              "bake it with bake()");
 }
 
 void for_each_row(const Rows& rows, unsigned threads,

@@ -144,35 +144,35 @@ py::object overlaps(const Rows& rows, unsigned threads) {
 constexpr const char* kSeparationDoc =
     R"(Distance of the inner spheres, and a certified interval for the solids.
 
-Arguments as penetration() has them; max_visits, deadline_us [µs]: 0: no limit.
+Arguments as for penetration(). max_visits, deadline_us [µs]: 0: no limit.
 
 Returns a Separation: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
 
 constexpr const char* kPatchesDoc =
     R"(The contact condensed into at most max_patches patches.
 
-Arguments as penetration() has them. Patches sum to the whole.
+Arguments as for penetration(). The patches sum to the whole contact.
 
 Returns ContactPatches: arrays of shape (n, max_patches), or (max_patches,) for one pose.)";
 
 constexpr const char* kOutlineDoc =
-    R"(The patches by measure='exact', and the curves on which the two surfaces cross.
+    R"(The patches of measure='exact', and the curves on which the two surfaces cross.
 
-Arguments as penetration() has them, of one pose; max_visits: 0: no limit.
-Both solids are Assets that hold their mesh; else ist.Error is raised.
+Arguments as for penetration(), of one pose; max_visits: 0: no limit. Both solids are Assets
+with a mesh; otherwise ist.Error is raised.
 
-Returns an OverlapOutline. Where max_visits stopped it there is no segment, and
-contact.penetration.status says so.)";
+Returns an OverlapOutline. It has no segment if max_visits stopped the query;
+contact.penetration.status reports that.)";
 
-constexpr const char* kOverlapDoc = R"(Whether solids share a point: yes and no are certain.
+constexpr const char* kOverlapDoc = R"(Whether solids share a point. Yes and no are certified.
 
-Arguments as penetration() has them. A fraction of what a penetration takes.
+Arguments as for penetration(). Costs a fraction of a penetration query.
 
 Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown; a number for one pose.)";
 
 void add_classes(py::module_& module) {
   py::class_<Separations> separation(module, "Separation",
-                                     "Gaps of placed solids; all zero once inner spheres overlap.");
+                                     "Gaps of placed solids; all zero if inner spheres overlap.");
   add_column(separation, "distance", &Separations::distance, "(n,) [u] between the inner spheres.");
   add_column(separation, "distance_min", &Separations::distance_min,
              "(n,) [u] the true distance of the solids is at least this, certified.");
@@ -188,12 +188,12 @@ void add_classes(py::module_& module) {
   add_column(separation, "sphere_pairs", &Separations::sphere_pairs, "(n,) uint32.");
 
   py::class_<Patches> patch(module, "ContactPatches",
-                            "Contacts as patches; of m there is room for, the first `count` are.");
+                            "Contact patches; the first `count` of m are valid.");
   patch.def_ro("penetration", &Patches::penetration, "The whole: a Penetration.");
   add_column(patch, "count", &Patches::count, "(n,) uint32, patches written; the rest is zero.");
   add_column(patch, "id", &Patches::id,
-             "(n, m) uint64, names a region of the smaller solid: the same in every query of the "
-             "same two assets.");
+             "(n, m) uint64, identifies a region of the smaller solid, in every query of the same "
+             "two assets.");
   add_column(patch, "centroid", &Patches::centroid, "(n, m, 3) [u] of the patch's overlap, world.");
   add_column(patch, "normal", &Patches::normal,
              "(n, m, 3) unit, world: the patch pushes B along it.");
@@ -240,7 +240,7 @@ void add_separation(py::module_& module) {
       py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
       py::arg("threads") = 0,
-      "separation() for pairs of the solids of scenes, as penetration_of_pairs() has them.");
+      "separation() for pairs of solids of scenes, with the arguments of penetration_of_pairs().");
   module.def(
       "contact_patches",
       [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
@@ -290,7 +290,7 @@ void add_separation(py::module_& module) {
       },
       py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("threads") = 0,
-      "overlap() for pairs of the solids of scenes, as penetration_of_pairs() has them.");
+      "overlap() for pairs of solids of scenes, with the arguments of penetration_of_pairs().");
 }
 
 }  // namespace ist::python

@@ -20,12 +20,13 @@ struct Impacts : Gaps {
   Column<std::uint32_t> surface_pairs;
 };
 
-constexpr const char* kDoc = R"(Up to when B, on its way from pose to pose, stays clear of A.
+constexpr const char* kDoc =
+    R"(Time up to which B, moving between two poses, provably stays clear of A.
 
-B goes from `poses` to `poses_to` in the time `duration`: `about` straight on, turning at constant
-speed about one axis, the shorter way. A stands at `poses_a`, or goes to `poses_a_to`.
+B moves from `poses` to `poses_to` in the time `duration`: the point `about` moves straight, and
+B rotates at constant speed about one axis, the shorter way. A rests at `poses_a`, or moves to `poses_a_to`.
 
-poses, poses_to: (7,) or (n, 7), as penetration() has them.
+poses, poses_to: (7,) or (n, 7), as for penetration().
 about, about_a: (3,) [u] in the object's own frame, before its scale: its centre of mass for a free
     body.
 duration: [T] > 0. tolerance: [u]; 0: a thousandth of the smaller solid.
@@ -36,9 +37,10 @@ Returns a TimeOfImpact: arrays of one row a pose, or numbers and (3,) arrays for
 }  // namespace
 
 void add_time_of_impact(py::module_& module) {
-  py::class_<Impacts> type(module, "TimeOfImpact", "Up to when moving solids stay clear.");
-  add_column(type, "time", &Impacts::time,
-             "(n,) [T] in [0, duration]. Certified for every status: they do not touch before.");
+  py::class_<Impacts> type(module, "TimeOfImpact", "Time up to which moving solids stay clear.");
+  add_column(
+      type, "time", &Impacts::time,
+      "(n,) [T] in [0, duration]. The solids do not touch before it, certified for every status.");
   add_column(type, "distance_min", &Impacts::distance_min,
              "(n,) [u] the solids' distance at `time` is at least this, certified.");
   add_column(type, "distance_max", &Impacts::distance_max,
@@ -61,8 +63,8 @@ void add_time_of_impact(py::module_& module) {
         const Rows to = Rows::of_pair(a, b, poses_to, scales,
                                       poses_a_to.is_none() ? poses_a : poses_a_to, scales_a);
         if (from.shape() != to.shape())
-          throw value_error("poses_to: as many rows as poses are wanted: " + text_of(from.shape()) +
-                            ", not " + text_of(to.shape()));
+          throw value_error("poses_to: shape " + text_of(to.shape()) + " of rows; poses have " +
+                            text_of(from.shape()));
         const Eigen::Vector3d centre = take_vector(about, "about"),
                               centre_a = take_vector(about_a, "about_a");
         auto answers = std::make_unique<Impacts>(from.shape());

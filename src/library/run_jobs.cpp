@@ -117,7 +117,7 @@ class Run {
       });
     } catch (const Cancelled&) {
     } catch (const std::bad_alloc&) {
-      fail(job.mesh + ": out of memory. Bake fewer at once (--jobs, --memory)");
+      fail(job.mesh + ": out of memory. Reduce --jobs or --memory");
     } catch (const std::exception& error) {
       fail(error.what());
     }

@@ -112,7 +112,7 @@ def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
     (dict(measure="outer"), ValueError, "measure: 'outer'; one of 'matched', 'inner', 'exact'"),
     (dict(field="maybe"), ValueError, "field: 'maybe'; one of 'automatic', 'never', 'always'"),
     (dict(a=3), TypeError, "a: a int; wanted an Asset or a Field"),
-    (dict(b=ist.BallField(1)), TypeError, "b: a Field; it stands first"),
+    (dict(b=ist.BallField(1)), TypeError, "b: a Field; only `a`"),
 ])
 def test_wrong_arguments_are_named(gear, knot, arguments, error, text):
     with pytest.raises(error, match=text):
@@ -176,10 +176,10 @@ def test_assets_that_no_cache_holds_are_asked_in_order(knot, random_poses):
 
 @pytest.mark.parametrize("arguments, error, text", [
     (dict(poses=np.zeros((3, 7))), ValueError, r"poses: shape \(3, 7\); wanted \(2, 7\) or \(w, 2, 7\)"),
-    (dict(pairs=[(0, 2)]), ValueError, r"pairs\[0\]: \(0, 2\): there are solids 0 to 1"),
+    (dict(pairs=[(0, 2)]), ValueError, r"pairs\[0\]: \(0, 2\): solids are numbered 0 to 1"),
     (dict(pairs=[(0, 1), (-1, 1)]), ValueError, r"pairs\[1\]: \(-1, 1\)"),
-    (dict(pairs=[(1, 1)]), ValueError, "a solid does not meet itself"),
-    (dict(pairs=[(1, 0)]), ValueError, "the second is a field"),
+    (dict(pairs=[(1, 1)]), ValueError, "a solid cannot be paired with itself"),
+    (dict(pairs=[(1, 0)]), ValueError, "the second is a Field"),
     (dict(pairs=[(0.0, 1.0)]), TypeError, "pairs: dtype float64; wanted int64"),
     (dict(pairs=[0, 1]), ValueError, r"pairs: shape \(2,\)"),
     (dict(scales=[1.0]), ValueError, r"scales: shape \(1,\); wanted \(2,\)"),
@@ -334,9 +334,9 @@ def test_what_is_not_held_is_no_zero(thread, cube, random_poses):
     # Of one pose nobody looks at the status.
     pose = poses[0]
     for text, ask in (
-            ("b: holds no mesh, which measure='exact' asks",
+            ("b: has no mesh, which measure='exact' needs",
              lambda: ist.penetration(cube, bare, pose, measure="exact")),
-            ("a: holds no mesh", lambda: ist.penetration(bare, cube, pose, measure="exact")),
+            ("a: has no mesh", lambda: ist.penetration(bare, cube, pose, measure="exact")),
             ("a: a Field has no mesh",
              lambda: ist.penetration(ist.BallField(1), cube, pose, measure="exact")),
             ("b: is a surface alone", lambda: ist.penetration(bolt, nut, pose)),

@@ -61,7 +61,7 @@ class ClusterWork {
         (points_.rounded(t[1]) - a).cross(points_.rounded(t[2]) - a).cwiseAbs();
     normal.maxCoeff(&cluster_.axis);
     for (int tried = 0; points_.turn(cluster_.axis, t[0], t[1], t[2]) == 0; ++tried) {
-      if (tried == 3) throw Unresolvable{"a triangle that meets others lies on a line"};
+      if (tried == 3) throw Unresolvable{"a triangle that intersects others is degenerate"};
       cluster_.axis = (cluster_.axis + 1) % 3;
     }
   }
@@ -89,7 +89,7 @@ class ClusterWork {
         if (x[j].low > x[i].high) break;
         if (y[j].low > y[i].high || y[i].low > y[j].high || !meet(i, j)) continue;
         if (++crossings > kMostCrossings)
-          throw Unresolvable{"too many of its triangles meet in the same places"};
+          throw Unresolvable{"too many triangles intersect at the same places"};
       }
     }
   }

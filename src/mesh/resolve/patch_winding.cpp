@@ -94,7 +94,7 @@ class Rays {
         .maxCoeff(&axis);
     int facing = 0;
     for (int tried = 0; facing == 0; ++tried, axis = (axis + 1) % 3) {
-      if (tried == 3) throw Unresolvable{"a piece of a triangle lies on a line"};
+      if (tried == 3) throw Unresolvable{"a piece of a triangle is degenerate"};
       facing = points_.turn(axis, corners[0], corners[1], corners[2]);
       if (facing != 0) break;
     }
@@ -104,7 +104,7 @@ class Rays {
       const RoundedPoint rounded = points_.round(inside);
       if (const auto winding = count({&rounded, &inside}, piece, axis, facing)) return *winding;
     }
-    throw Unresolvable{"every line through a piece of a triangle meets an edge"};
+    throw Unresolvable{"every ray through a piece of a triangle hits an edge"};
   }
 
  private:
@@ -173,7 +173,7 @@ Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& 
     int balance = 0;
     for (const std::uint32_t side : edges.sides(e))
       balance += (runs_up(pieces, side) ? 1 : -1) * arrangement.winding_step[side / 3];
-    if (balance != 0) throw Unresolvable{"its pieces do not close"};
+    if (balance != 0) throw Unresolvable{"the pieces of the surface do not form a closed surface"};
   }
   DisjointSets sets = manifold_patches(pieces, edges);
   Patches patches;

@@ -36,7 +36,7 @@ Pairs pairs_of(ClosedMesh& closed) {
     if (met) closed.meeting_pairs = std::move(met->pairs);
   }
   if (!closed.meeting_pairs || closed.meeting_pairs->size() > kMostPairs)
-    throw Unresolvable{"too many triangles, or pairs of them that meet"};
+    throw Unresolvable{"too many triangles or intersecting pairs"};
   return *closed.meeting_pairs;
 }
 
@@ -94,7 +94,7 @@ class Resolver {
         pairs_(pairs_of(closed)),
         arrangement_(arrange(closed.mesh.vertices, triangles_, pairs_, work)),
         patches_(find_patches(triangles_, arrangement_, work)) {
-    if (triangles_.empty()) throw Unresolvable{"it has no triangles"};
+    if (triangles_.empty()) throw Unresolvable{"the mesh has no triangles"};
     from_ = closed.mesh.vertices[triangles_[0][0]];
   }
 
@@ -127,7 +127,7 @@ class Resolver {
       for (const std::uint32_t v : arrangement_.pieces[p])
         if (!arrangement_.points.is_given(v)) resolution.moved = 1.7321 * step;  // √3
     }
-    if (made.triangles.empty()) throw Unresolvable{"its winding number is nowhere 1 or more"};
+    if (made.triangles.empty()) throw Unresolvable{"the winding number is nowhere 1 or more"};
     return made;
   }
 
@@ -135,12 +135,12 @@ class Resolver {
   ClosedMesh close(TriangleMesh surface, const Resolution& resolution) const {
     ClosedMesh result = close_oriented(std::move(surface), closed_.name);
     if (find_unbalanced_edge(result.mesh.triangles, EdgeTable(result.mesh.triangles)))
-      throw Unresolvable{"what was made does not close"};
+      throw Unresolvable{"the resolved surface is not closed"};
     const Volume before(closed_.mesh, from_), after(result.mesh, from_);
     const double expected = before.sum - resolution.counted_twice + resolution.counted_against;
     const double off = std::abs(after.sum - expected);
     if (!(off <= 2 * resolution.moved * after.area + 1e-12 * (before.size + after.size)))
-      throw Unresolvable{"the volume of what was made is " + shortest(after.sum) + ", not " +
+      throw Unresolvable{"the volume of the resolved surface is " + shortest(after.sum) + ", not " +
                          shortest(expected)};
     MeshReport& report = result.report;
     report.filled_holes = closed_.report.filled_holes;
@@ -177,16 +177,16 @@ std::string percent(const double part, const double of) {
 }
 
 std::string describe(const Resolution& resolution, const double volume) {
-  std::string text = "parts of it overlap: " + percent(resolution.counted_twice, volume) +
-                     " of the solid's volume were counted twice and count once now";
+  std::string text = "parts of the mesh overlap: " + percent(resolution.counted_twice, volume) +
+                     " of the solid's volume was counted twice and is now counted once";
   if (resolution.counted_against > 0)
     text += "; inside-out regions of " + percent(resolution.counted_against, volume) +
-            " are outside now";
+            " are now outside";
   return text;
 }
 
 ResolvedMesh as_it_is(ClosedMesh closed) {
-  return {std::move(closed), {How::as_it_is, 0, 0, 0, "it counts nothing twice"}};
+  return {std::move(closed), {How::as_it_is, 0, 0, 0, "no volume is counted twice"}};
 }
 
 ResolvedMesh resolve_watched(ClosedMesh closed, WatchedWork& work) {

@@ -127,11 +127,12 @@ std::vector<Meeting> find_meetings(ExactPoints& points, const std::vector<Triang
       const std::uint32_t p = numbers[static_cast<std::size_t>(place)];
       if (meeting.from == kNoIndex) meeting.from = meeting.to = p;
       if (p == meeting.from || p == meeting.to) continue;
-      if (meeting.from != meeting.to) throw Unresolvable{"two triangles meet in more than a line"};
+      if (meeting.from != meeting.to)
+        throw Unresolvable{"two triangles intersect in more than a segment"};
       meeting.to = p;
     }
     if (!meeting.coplanar && meeting.from == kNoIndex)
-      throw Unresolvable{"two triangles that meet have no point in common"};
+      throw Unresolvable{"two intersecting triangles have no common point"};
   }
   return meetings;
 }

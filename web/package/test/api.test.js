@@ -108,7 +108,7 @@ test('what an asset holds', () => {
     assert.match(sentence(() => asset.level(levels, set)), /there is no level/);
   }
   assert.match(
-      sentence(() => asset.spheres({detail: 99})), /bolt\.ist: there is no level 0 of detail 99/);
+      sentence(() => asset.spheres({detail: 99})), /bolt\.ist: has no level 0 of detail 99/);
   assert.match(
       sentence(() => asset.spheres({measure: 'outer'})),
       /measure is outer; there are matched, inner/);
@@ -126,7 +126,7 @@ test('exact is the true volume of two meshes, and refused where there is none', 
   assert.ok(Math.abs(found.force[2] + 71.734) < 1e-3);
   const floor = ist.Field.halfSpace([0, 0, 1]);
   assert.match(
-      sentence(() => ist.penetration(floor, b, pose, exact)), /does not hold what is asked/);
+      sentence(() => ist.penetration(floor, b, pose, exact)), /lacks data that the query needs/);
   const [one, other] =
       ist.penetrationBatch([{a, b, poseB: pose}, {a: floor, b, poseB: pose}], exact);
   assert.deepEqual(one, found);
@@ -276,7 +276,7 @@ test('fields', () => {
       sentence(() => ist.Field.heights(new Float32Array(3), 2, 2, [1, 1])),
       /2 · 2 = 4 numbers, not 3/);
   assert.match(
-      sentence(() => ist.Field.heights(new Float32Array(3), 3, 1, [1, 1])), /two points and more/);
+      sentence(() => ist.Field.heights(new Float32Array(3), 3, 1, [1, 1])), /at least two points/);
   b.free();
 });
 
@@ -301,7 +301,7 @@ test('flat faces: what protrudes is taken out', () => {
       /both solids must be Assets/);
   assert.match(
       sentence(() => ist.patchesWithoutProtrusion({count: 3, patches: []}, a, b, pose)),
-      /what contactPatches\(\) answered/);
+      /the result of contactPatches\(\)/);
   a.free();
 });
 
@@ -410,8 +410,8 @@ test('what is wrong is said', () => {
   assert.match(sentence(() => new ist.Asset()), /static functions/);
   a.free();
   a.free();
-  assert.match(sentence(ask({})), /bolt\.ist is used after its free\(\)/);
-  assert.match(sentence(() => a.info()), /used after its free\(\)/);
+  assert.match(sentence(ask({})), /bolt\.ist was used after free\(\)/);
+  assert.match(sentence(() => a.info()), /used after free\(\)/);
   b.free();
 });
 
