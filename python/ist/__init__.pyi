@@ -17,7 +17,7 @@ from . import gpu as gpu
 __version__: str
 
 _Path = str | os.PathLike[str]
-_Column = Any  # NDArray of one row a pose; a NumPy number for one pose
+_Column = Any  # NDArray of one row a pose; a number for one pose
 _SphereMeasure = Literal["matched", "inner"]
 _Measure = Literal["matched", "inner", "exact"]
 _FieldUse = Literal["automatic", "never", "always"]
