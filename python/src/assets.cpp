@@ -14,6 +14,7 @@
 #include "app/exported_spheres.h"
 #include "app/text.h"
 #include "arrays.h"
+#include "meshes.h"
 #include "module.h"
 #include "offline.h"
 #include "settings/bake_settings.h"
@@ -21,7 +22,6 @@
 namespace ist::python {
 namespace {
 
-using SharedMesh = std::shared_ptr<ClosedMesh>;
 using SharedAsset = std::shared_ptr<Asset>;
 
 constexpr std::pair<const char*, Device> kDevices[] = {
@@ -105,6 +105,8 @@ PackingSettings packing_settings(std::size_t max_spheres, double target_coverage
 }
 
 constexpr const char* kSettingsDoc = R"(
+mesh: a ClosedMesh; or what is closed first: a Mesh, a path, (vertices, triangles), or an object with
+    vertices and faces, such as trimesh's. close_mesh() repairs open ones.
 max_spheres: largest number of spheres; 0: no limit.
 target_coverage: [0, 1] share of the solid's volume at which packing stops.
 min_radius: [u] smallest radius of a sphere.
@@ -166,15 +168,15 @@ struct Targeted {
 void add_bakes(py::module_& module) {
   module.def(
       "bake",
-      [](const SharedMesh& mesh, std::size_t max_spheres, double target_coverage, double min_radius,
-         double time_limit, double epsilon, const std::string& grid, std::uint64_t seed,
-         unsigned threads, const std::string& device, const py::object& surface,
+      [](const py::object& given, std::size_t max_spheres, double target_coverage,
+         double min_radius, double time_limit, double epsilon, const std::string& grid,
+         std::uint64_t seed, unsigned threads, const std::string& device, const py::object& surface,
          const py::object& progress) {
         const PackingSettings settings =
             packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
                              seed, threads, device, surface);
         return offline(
-            [mesh, settings](const ProgressCallback& callback) {
+            [mesh = closed_of(given), settings](const ProgressCallback& callback) {
               return bake(*mesh, settings, callback);
             },
             progress);
@@ -184,7 +186,7 @@ void add_bakes(py::module_& module) {
       py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
       py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
       py::arg("progress") = py::none(),
-      (std::string("Bakes the asset of a closed mesh. The same mesh and settings give the same "
+      (std::string("Bakes the asset of a mesh. The same mesh and settings give the same "
                    "bytes on any machine.\n") +
        kSettingsDoc)
           .c_str());
@@ -200,7 +202,7 @@ void add_bakes(py::module_& module) {
           "Reason for the end of the search.");
   module.def(
       "bake_to_error",
-      [](const SharedMesh& mesh, double relative_error, double at_overlap, std::size_t max_spheres,
+      [](const py::object& given, double relative_error, double at_overlap, std::size_t max_spheres,
          double target_coverage, double min_radius, double time_limit, double epsilon,
          const std::string& grid, std::uint64_t seed, unsigned threads, const std::string& device,
          const py::object& surface, const py::object& progress) {
@@ -208,7 +210,7 @@ void add_bakes(py::module_& module) {
             packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
                              seed, threads, device, surface);
         return offline(
-            [mesh, settings,
+            [mesh = closed_of(given), settings,
              target = ErrorTarget{relative_error, at_overlap}](const ProgressCallback& callback) {
               TargetedAsset made = bake_to_error(*mesh, target, settings, callback);
               return Targeted{std::make_shared<Asset>(std::move(made.asset)),
@@ -234,10 +236,10 @@ void add_bakes(py::module_& module) {
           .c_str());
   module.def(
       "bake_surface",
-      [](const SharedMesh& mesh, const py::object& surface, unsigned threads,
+      [](const py::object& given, const py::object& surface, unsigned threads,
          const py::object& progress) {
         return offline(
-            [mesh, settings = surface_settings(surface),
+            [mesh = closed_of(given), settings = surface_settings(surface),
              threads](const ProgressCallback& callback) {
               return bake_surface(*mesh, settings, threads, callback);
             },
@@ -250,8 +252,8 @@ void add_bakes(py::module_& module) {
       "of bake().\nRaises Error if parts of the mesh overlap.");
   module.def(
       "check",
-      [](const SharedAsset& asset, const SharedMesh& mesh, unsigned threads) {
-        return offline([asset, mesh, threads](const ProgressCallback&) {
+      [](const SharedAsset& asset, const py::object& given, unsigned threads) {
+        return offline([asset, mesh = closed_of(given), threads](const ProgressCallback&) {
           return check(*asset, *mesh, threads);
         });
       },

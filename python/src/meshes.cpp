@@ -10,6 +10,7 @@
 #include <ist/mesh.h>
 
 #include "arrays.h"
+#include "meshes.h"
 #include "module.h"
 #include "offline.h"
 #include "samples/samples.h"
@@ -48,6 +49,15 @@ py::object view_of(const std::vector<Row>& rows, const py::object& owner) {
                                                   {rows.size(), 3}, owner));
 }
 
+/// The solid that a mesh bounds.
+ClosedMesh close(const TriangleMesh& mesh, const std::string& name, bool repair) {
+  return close_mesh(mesh, name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+}
+
+bool is_path(const py::object& value) {
+  return py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__");
+}
+
 template <class Mesh>
 py::object declared_up(const Mesh& mesh) {
   if (mesh.declared.up_axis == 0) return py::none();
@@ -80,6 +90,34 @@ void add_report(py::module_& module) {
 }
 
 }  // namespace
+
+std::shared_ptr<TriangleMesh> mesh_of(const py::object& value) {
+  std::shared_ptr<TriangleMesh> mesh;
+  if (py::try_cast(value, mesh)) return mesh;
+  if (is_path(value))
+    return offline([name = path_of(value)](const ProgressCallback&) {
+      return std::make_shared<TriangleMesh>(load_mesh(name));
+    });
+  if ((py::isinstance<py::tuple>(value) || py::isinstance<py::list>(value)) && py::len(value) == 2)
+    return std::make_shared<TriangleMesh>(mesh_of_arrays(value[0], value[1]));
+  for (const char* const triangles : {"faces", "triangles"})
+    if (py::hasattr(value, "vertices") && py::hasattr(value, triangles))
+      return std::make_shared<TriangleMesh>(
+          mesh_of_arrays(value.attr("vertices"), value.attr(triangles)));
+  throw type_error(
+      "mesh: a " + type_name_of(value) +
+      "; wanted a ClosedMesh, a Mesh, a path, (vertices, triangles), or an object with "
+      "vertices and faces");
+}
+
+std::shared_ptr<ClosedMesh> closed_of(const py::object& value) {
+  std::shared_ptr<ClosedMesh> closed;
+  if (py::try_cast(value, closed)) return closed;
+  return offline([mesh = mesh_of(value),
+                  name = is_path(value) ? path_of(value) : "mesh"](const ProgressCallback&) {
+    return std::make_shared<ClosedMesh>(close(*mesh, name, false));
+  });
+}
 
 void add_meshes(py::module_& module) {
   add_report(module);
@@ -139,19 +177,23 @@ weld_tolerance: [0, 0.1]; vertices closer than this share of the bounding box's 
 Raises Error, which names the file, the place and a way out.)");
   module.def(
       "close_mesh",
-      [](const std::shared_ptr<TriangleMesh>& mesh, const std::string& name, bool repair) {
-        return offline([mesh, name, repair](const ProgressCallback&) {
-          return close_mesh(*mesh, name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+      [](const py::object& mesh, const std::string& name, bool repair) {
+        return offline([mesh = mesh_of(mesh), name, repair](const ProgressCallback&) {
+          return close(*mesh, name, repair);
         });
       },
       py::arg("mesh"), py::kw_only(), py::arg("name") = "mesh", py::arg("repair") = false,
       R"(Validates a mesh and orients its shells.
 
+mesh: a Mesh, or what bake() makes one of.
 name: for messages.
 repair: close an open mesh (weld cracks, fill holes) instead of refusing it; see ClosedMesh.report.
 
 Raises OpenMeshError for an open mesh, Error for one that is flat, empty, not finite or
 non-orientable.)");
+  module.def("from_trimesh", &mesh_of, py::arg("mesh"),
+             "A Mesh of any object with `vertices` and `faces` (or `triangles`), as trimesh's and "
+             "Open3D's; a copy.");
   module.def(
       "sample_mesh", [](const std::string& name) { return make_sample(name); }, py::arg("name"),
       "A generated closed mesh: 'bolt', 'nut', 'gear', 'cube', …\n\nAn unknown name raises Error, "

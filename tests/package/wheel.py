@@ -34,10 +34,10 @@ def main():
     for name in ("bolt", "nut"):
         subprocess.run([PROGRAM, "sample", name, "-o", f"{name}.obj"], check=True)
     subprocess.run([sys.executable, "-c", lines_of_readme(), "bolt.obj", "nut.obj"], check=True)
-    cube = ist.bake(ist.close_mesh(ist.sample_mesh("cube")), max_spheres=100)
-    assert pickle.loads(pickle.dumps(cube)).to_bytes() == cube.to_bytes()
+    bolt = ist.bake("bolt.obj", max_spheres=100)
+    assert pickle.loads(pickle.dumps(bolt)).to_bytes() == bolt.to_bytes()
     with multiprocessing.get_context("spawn").Pool(2) as pool:
-        assert set(pool.map(volume, [cube] * 4)) == {volume(cube)}
+        assert set(pool.map(volume, [bolt] * 4)) == {volume(bolt)}
     assert not ist.gpu.available() and ist.gpu.why_not()
     folder = pathlib.Path(ist.__file__).parent
     assert {"py.typed", "__init__.pyi", "torch.py"} <= set(os.listdir(folder))
