@@ -1,11 +1,11 @@
 // What a batch of poses costs through Python, beside penetration_batch() in C++: the same rows in
 // the same process, a round of one after a round of the other.
 
-#include <pybind11/embed.h>
-#include <pybind11/numpy.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
 
 #include <algorithm>
-#include <cstring>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -18,7 +18,7 @@
 
 namespace {
 
-namespace py = pybind11;
+namespace py = nanobind;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
 
@@ -26,7 +26,16 @@ using ist::benchmark::Report;
 struct Batch {
   std::vector<ist::PlacedPair> pairs;
   py::object a, b;
-  py::array_t<double> poses, scales;
+  std::vector<double> pose_rows, scale_rows;
+
+  py::object poses() const { return array(pose_rows, {scale_rows.size(), 7}); }
+  py::object scales() const { return array(scale_rows, {scale_rows.size()}); }
+
+ private:
+  static py::object array(const std::vector<double>& values,
+                          std::initializer_list<std::size_t> shape) {
+    return py::cast(py::ndarray<py::numpy, const double>(values.data(), shape, py::none()));
+  }
 };
 
 py::object in_python(const py::module_& module, const ist::Asset& asset) {
@@ -50,14 +59,12 @@ Batch make_batch(const py::module_& module, const std::string& pose_class, std::
   }
   batch.a = in_python(module, ist::testing::oracle_asset(mesh_a, spheres));
   batch.b = in_python(module, ist::testing::oracle_asset(mesh_b, spheres));
-  batch.poses = py::array_t<double>({count, std::size_t{7}});
-  batch.scales = py::array_t<double>(static_cast<py::ssize_t>(count));
   for (std::size_t i = 0; i < count; ++i) {
     const ist::PlacedTree& b = rows[i % rows.size()].b;
     batch.pairs.push_back(rows[i % rows.size()]);
-    std::memcpy(batch.poses.mutable_data(i, 0), b.pose.q, sizeof b.pose.q);
-    std::memcpy(batch.poses.mutable_data(i, 4), b.pose.t, sizeof b.pose.t);
-    batch.scales.mutable_at(i) = b.scale;
+    std::copy(std::begin(b.pose.q), std::end(b.pose.q), std::back_inserter(batch.pose_rows));
+    std::copy(std::begin(b.pose.t), std::end(b.pose.t), std::back_inserter(batch.pose_rows));
+    batch.scale_rows.push_back(b.scale);
   }
   return batch;
 }
@@ -75,12 +82,14 @@ int main(int argc, char** argv) {
   const std::size_t count = report.quick() ? 1000 : 10'000;
   const std::size_t spheres = report.quick() ? 1000 : 4000;
   const int rounds = report.quick() ? 5 : 9;
-  const py::scoped_interpreter interpreter;
-  py::module_::import("sys").attr("path").attr("insert")(0, IST_PYTHON_PACKAGE);
-  const py::module_ module = py::module_::import("ist");
+  Py_Initialize();
+  py::detail::nb_module_exec(NB_DOMAIN_STR, PyImport_AddModule("__main__"));
+  py::module_::import_("sys").attr("path").attr("insert")(0, IST_PYTHON_PACKAGE);
+  const py::module_ module = py::module_::import_("ist");
   double worst = 0;
   for (const std::string name : {"sep", "pen", "deep", "contain"}) {
     const Batch batch = make_batch(module, name, count, spheres);
+    const py::object poses = batch.poses(), scales = batch.scales();
     for (const unsigned threads : {1u, 0u}) {
       std::vector<ist::Workspace> workspaces;
       const std::size_t workers = threads == 1 ? 1 : std::thread::hardware_concurrency();
@@ -93,7 +102,7 @@ int main(int argc, char** argv) {
       py::object found;
       const py::object penetration = module.attr("penetration");
       const auto in_python = [&] {
-        found = penetration(batch.a, batch.b, batch.poses, py::arg("scales") = batch.scales,
+        found = penetration(batch.a, batch.b, poses, py::arg("scales") = scales,
                             py::arg("threads") = threads);
       };
       const auto time = [&](const auto& work) {
@@ -112,9 +121,9 @@ int main(int argc, char** argv) {
         }
         cpp.push_back(one), python.push_back(other), ratios.push_back(other / one);
       }
-      const auto volumes = found.attr("volume").cast<py::array_t<double>>();
+      const auto volumes = py::cast<py::ndarray<const double, py::ndim<1>>>(found.attr("volume"));
       for (std::size_t i = 0; i < count; ++i)
-        if (volumes.at(i) != answers[i].volume)
+        if (volumes(i) != answers[i].volume)
           return std::fprintf(stderr, "python_batch: C++ and Python differ\n"), 1;
       report.row("µs a query of a batch of " + std::to_string(count),
                  {{"class", name},
@@ -127,7 +136,7 @@ int main(int argc, char** argv) {
     // A call by itself: what is not the query's.
     const ist::PlacedPair& pair = batch.pairs[0];
     ist::Workspace workspace;
-    const py::object pose = batch.poses[py::int_(0)], scale = batch.scales[py::int_(0)];
+    const py::object pose = poses[0], scale = scales[0];
     const py::object penetration = module.attr("penetration");
     std::vector<double> cpp, python;
     for (int i = 0; i < 300; ++i) {

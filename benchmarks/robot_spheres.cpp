@@ -46,7 +46,7 @@ void measure(Report& report, const std::string& robot, const std::string& urdf, 
   std::set<std::string> seen;
   for (const RobotLink& link : model.links) {
     if (link.collision.empty()) continue;
-    const auto* const file = std::get_if<MeshShape>(&link.collision[0].shape);
+    const auto* const file = std::get_if<LinkMesh>(&link.collision[0].shape);
     if (file == nullptr || !seen.insert(file->file).second) continue;
     const LinkGeometry geometry = geometry_of(link.collision, paths, path);
     ClosedMesh mesh;

@@ -5,6 +5,11 @@ include(GNUInstallDirs)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/ist)
 
 install(DIRECTORY include/ist DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT libist-dev)
+# Debian wants a package's licence in a file of this name.
+foreach(component libist libist-dev ist)
+  install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${component} RENAME copyright
+    COMPONENT ${component})
+endforeach()
 # An export set for each library and kind, so that a project that only asks needs nothing that only
 # baking needs, and one that links the shared library nothing that only the static one needs.
 foreach(as query ist)

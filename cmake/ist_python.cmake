@@ -1,8 +1,8 @@
 # IST_PYTHON AUTO|ON|OFF: the Python module (python/). Sets IST_HAVE_PYTHON. AUTO leaves it out where
-# pybind11, or what CPython's extensions need, is missing; ON ends with an error there.
+# nanobind, or what CPython's extensions need, is missing; ON ends with an error there. nanobind is
+# that of the interpreter, or what ./dev setup brings.
 #
-# Debian's packages are for Debian's interpreter, which need not be the first in PATH; name another
-# one by -DPython_EXECUTABLE.
+# Debian's interpreter need not be the first in PATH; name another one by -DPython_EXECUTABLE.
 set(IST_HAVE_PYTHON FALSE)
 if(IST_PYTHON STREQUAL "OFF" OR IST_SANITIZE STREQUAL "thread" OR IST_FUZZ OR CMAKE_CROSSCOMPILING)
   return()
@@ -16,10 +16,24 @@ if(IST_PYTHON STREQUAL "ON")
 endif()
 find_package(Python 3.9 ${found_how} COMPONENTS Interpreter Development.Module)
 if(Python_FOUND)
-  find_package(pybind11 2.10 ${found_how} CONFIG)
+  # By the stable ABI, which has enough from 3.12 on, one module is for all later versions. CMake
+  # knows that target from 3.26 on; but for Windows it is no other.
+  if(NOT TARGET Python::SABIModule)
+    add_library(Python::SABIModule INTERFACE IMPORTED)
+    target_link_libraries(Python::SABIModule INTERFACE Python::Module)
+  endif()
+  execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir
+    OUTPUT_VARIABLE nanobind_hint OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+  find_package(nanobind 2.10 ${found_how} CONFIG
+    HINTS ${nanobind_hint} ${PROJECT_SOURCE_DIR}/build-python-tools/nanobind/cmake)
 endif()
-if(Python_FOUND AND pybind11_FOUND)
+if(Python_FOUND AND nanobind_FOUND)
   set(IST_HAVE_PYTHON TRUE)
 else()
-  message(STATUS "ist: no Python module: pybind11-dev or python3-dev is missing")
+  message(STATUS "ist: no Python module: nanobind or python3-dev is missing (./dev setup)")
 endif()
+
+# ist_add_python_module(name sources…)
+function(ist_add_python_module name)
+  nanobind_add_module(${name} STABLE_ABI NB_STATIC NOMINSIZE NOSTRIP ${ARGN})
+endfunction()

@@ -13,7 +13,7 @@ const char* way_out(cudaError_t status) {
       return "free device memory, ask for fewer spheres, or bake on the CPU";
     case cudaErrorNoDevice:
     case cudaErrorInvalidDevice:
-      return "there is no such GPU here: bake on the CPU";
+      return "no such GPU: bake on the CPU";
     case cudaErrorInsufficientDriver:
       return "the driver is older than CUDA 13: update it, or bake on the CPU";
     case cudaErrorNoKernelImageForDevice:

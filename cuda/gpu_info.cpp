@@ -34,8 +34,8 @@ std::string obstacle(int device) {
   if (found == cudaErrorInsufficientDriver && cudaDriverGetVersion(&driver) == cudaSuccess &&
       driver != 0)
     return "the GPU driver is older than CUDA 13";
-  if (found != cudaSuccess || count == 0) return "there is no GPU here, or no driver for it";
-  if (device < 0 || device >= count) return "there is no GPU of that index";
+  if (found != cudaSuccess || count == 0) return "no GPU or GPU driver found";
+  if (device < 0 || device >= count) return "no GPU with this index";
   const auto attribute = [device](cudaDeviceAttr which) {
     int value = 0;
     return cudaDeviceGetAttribute(&value, which, device) == cudaSuccess ? value : 0;
@@ -79,16 +79,16 @@ GpuInfo gpu_info(int device) {
   std::string why;
   if (!gpu_available(device, &why)) throw Error("GPU: " + why + ": bake on the CPU");
   cudaDeviceProp properties{};
-  gpu::check(cudaGetDeviceProperties(&properties, device), "asking the GPU for its properties");
+  gpu::check(cudaGetDeviceProperties(&properties, device), "querying the GPU's properties");
   int previous = 0;
-  gpu::check(cudaGetDevice(&previous), "asking for the current GPU");
+  gpu::check(cudaGetDevice(&previous), "querying the current GPU");
   GpuInfo info;
   info.name = properties.name;
   info.compute_capability = 10 * properties.major + properties.minor;
   gpu::check(cudaSetDevice(device), "selecting the GPU");
   const cudaError_t status = cudaMemGetInfo(&info.free_memory, &info.total_memory);
   cudaSetDevice(previous);
-  gpu::check(status, "asking the GPU for its memory");
+  gpu::check(status, "querying the GPU's memory");
   return info;
 }
 

@@ -60,7 +60,7 @@ void ask_all(Queue& queue, const WideTree& tree, const DeviceArray<Question>& qu
   if (warps == 0) warps = static_cast<unsigned>(std::min(questions.size(), kMost));
   answer_all<<<(warps + kWarps - 1) / kWarps, kThreads, 0, queue.stream()>>>(
       tree, questions.data(), questions.size(), answers.data(), warps);
-  check_launch("asking the mesh");
+  check_launch("querying the mesh");
 }
 
 }  // namespace

@@ -50,14 +50,15 @@ DeviceGuard::~DeviceGuard() { cudaSetDevice(previous_); }
 Queue::Queue(const GpuSettings& settings, bool waits)
     : guard_(settings.device), memory_(settings.memory), stream_(settings.stream) {
   check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, settings.device),
-        "asking the GPU for its size");
+        "querying the GPU's size");
   if (memory_ == nullptr) {
     own_memory_ = std::make_unique<DevicePool>(settings.device);
     memory_ = own_memory_.get();
   }
   if (stream_ == nullptr) {
     int least = 0, greatest = 0;
-    check(cudaDeviceGetStreamPriorityRange(&least, &greatest), "asking the GPU for priorities");
+    check(cudaDeviceGetStreamPriorityRange(&least, &greatest),
+          "querying the GPU's stream priorities");
     const int priority = waits ? least : std::max(least - 1, greatest);  // less comes first
     check(cudaStreamCreateWithPriority(&stream_, cudaStreamNonBlocking, priority),
           "making a stream");
@@ -78,7 +79,7 @@ void* Queue::allocate(std::size_t bytes) {
     throw Error(
         "GPU: no device memory left for " + std::to_string(bytes) + " more bytes (" +
         std::to_string(in_use_) +
-        " in use on this stream): free device memory, ask for fewer spheres, or bake on the CPU");
+        " in use on this stream): free device memory, use fewer spheres, or bake on the CPU");
   in_use_ += bytes;
   peak_ = std::max(peak_, in_use_);
   return memory;

@@ -100,8 +100,8 @@ class BandedBuffers {
         const std::size_t most = std::size_t{1} << BandedArrays::kCellBits;
         if (cells_.size() == most)
           throw Error(
-              "packing: more than 16 million cells under work on the GPU: ask for fewer "
-              "spheres or a larger smallest radius");
+              "packing: more than 16 million active cells on the GPU: use fewer spheres or a "
+              "larger smallest radius");
         enlarge_cells(std::min(most, 2 * cells_.size()), cells_.size());
         break;
       }
@@ -186,8 +186,8 @@ class BandedBuffers {
   void enlarge_grid(std::uint64_t words, std::uint64_t blocks, std::uint64_t pairs) {
     if (words > 0x7FFFFFFFu)
       throw Error(
-          "packing: the sphere grid outgrows the GPU backend: ask for fewer spheres, or "
-          "bake on the CPU");
+          "packing: the sphere grid is too large for the GPU: use fewer spheres, or bake on the "
+          "CPU");
     if (words > words_.size()) renew(words_, words);
     if (pairs > pairs_.size()) renew(pairs_, pairs);
     if (blocks * SphereLists::kCellsPerBlock > grid_cells_.size())

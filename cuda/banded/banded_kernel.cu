@@ -28,7 +28,7 @@ __global__ void __launch_bounds__(kThreads, 1)
 unsigned resident_blocks(const Queue& queue) {
   int each = 0;
   check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, banded_kernel, kThreads, kShared),
-        "asking how much of the packing kernel fits the GPU");
+        "querying the occupancy of the packing kernel");
   if (each == 0)
     throw Error("GPU: the packing kernel does not fit this GPU's multiprocessors: bake on the CPU");
   return static_cast<unsigned>(each * queue.multiprocessors());

@@ -35,7 +35,7 @@ packing::GridUse DeviceGridRounds::use() const {
 SpherePacking pack_grids(Queue& queue, const MeshSolid& solid, const PackingSettings& settings,
                          Stage& stage, std::vector<packing::GridRound>* history) {
   std::size_t free_bytes = 0, total_bytes = 0;
-  check(cudaMemGetInfo(&free_bytes, &total_bytes), "asking for the free memory");
+  check(cudaMemGetInfo(&free_bytes, &total_bytes), "querying the free memory");
   // Half of it is for prototypes and what else lives on the device.
   const packing::GridSchedule schedule = packing::grid_schedule(
       settings.grid, settings.grids, packing::grid_figures(solid, free_bytes / 2));

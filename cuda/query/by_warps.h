@@ -45,9 +45,9 @@ int blocks_at_a_time(const Kernel& kernel, unsigned threads) {
   int device = 0, multiprocessors = 0, each = 0;
   check(cudaGetDevice(&device), "looking for a GPU");
   check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device),
-        "asking the GPU for its size");
+        "querying the GPU's size");
   check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&each, kernel, static_cast<int>(threads), 0),
-        "asking how many blocks run at a time");
+        "querying the occupancy of a kernel");
   return each * multiprocessors;
 }
 

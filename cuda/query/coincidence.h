@@ -4,6 +4,7 @@
 
 #include "cuda/query/pair_place.h"
 #include "numerics/host_device.h"
+#include "query/asset/shared_constants.h"
 
 namespace ist::gpu {
 
@@ -21,7 +22,6 @@ struct Coincidence {
   /// `root`, `mean_radius`: of the tree.
   IST_HD Coincidence(const double (&root)[4], double mean_radius, const PairMap& a_from_b)
       : weight(0), slope{} {
-    constexpr double kAlone = 0.4, kApart = 1.6;
     const double(&m)[9] = a_from_b.m;
     const double centre[3] = {root[0], root[1], root[2]};
     double moved[3], way[3], lever[3], way2 = 0;
@@ -34,13 +34,13 @@ struct Coincidence {
     const double spread = root[3] * root[3] / 5, scale = a_from_b.scale;
     const double turned = 3 * (scale * scale + 1) - 2 * ((m[0] + m[4]) + m[8]);
     const double square = way2 + spread * (turned > 0 ? turned : 0);
-    if (!(square < (kApart * kApart) * (mean_radius * mean_radius))) return;
+    if (!(square < (kCopyApart * kCopyApart) * (mean_radius * mean_radius))) return;
     const double distance = std::sqrt(square);
-    const double t = (kApart - distance / mean_radius) / (kApart - kAlone);
+    const double t = (kCopyApart - distance / mean_radius) / (kCopyApart - kCopyAlone);
     weight = 1;
     if (t >= 1) return;
     weight = t * t * (3 - 2 * t);
-    const double per = -6 * t * (1 - t) / ((kApart - kAlone) * mean_radius) / distance;
+    const double per = -6 * t * (1 - t) / ((kCopyApart - kCopyAlone) * mean_radius) / distance;
     const double axis[3] = {m[5] - m[7], m[6] - m[2], m[1] - m[3]};
     for (int k = 0; k < 3; ++k) {
       const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;

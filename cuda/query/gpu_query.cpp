@@ -200,7 +200,8 @@ void gpu::check_batch(const GpuPairs& pairs, const GpuWorkspace::Impl& room, int
 void gpu::check_measure(Measure measure) {
   if (measure != Measure::matched && measure != Measure::inner)
     throw Error(
-        "GPU: batches ask spheres, matched or inner ones: ask the exact measure on the CPU");
+        "GPU: batches support the matched and the inner measure only: use the CPU for the exact "
+        "measure");
 }
 
 namespace {

@@ -94,8 +94,8 @@ inline FieldRef field_ref(const Field& field, const std::byte* at) {
     ref.mesh = SurfaceRef::of(header, at);
   } else {
     throw Error(
-        "GPU: a FunctionField cannot be called there: sample it into a DistanceGridField, or bake "
-        "its solid for a MeshField");
+        "GPU: a FunctionField is not supported: sample it into a DistanceGridField, or bake its "
+        "solid for a MeshField");
   }
   return ref;
 }

@@ -6,6 +6,7 @@
 
 #include "cuda/query/tree_ref.h"
 #include "numerics/host_device.h"
+#include "query/asset/shared_constants.h"
 
 namespace ist::gpu {
 
@@ -84,8 +85,7 @@ struct PairPlace {
             b_from_a.m[3 * i + 2] * a_from_b.t[2]);
     a_from_b.scale = scale;
     b_from_a.scale = per_scale;
-    constexpr double kFarthest = 1e60;  // as relative_pose()
-    return far <= kFarthest && scale <= kFarthest && scale >= 1 / kFarthest;
+    return far <= kFarthestPose && scale <= kFarthestPose && scale >= 1 / kFarthestPose;
   }
 
  private:

@@ -5,6 +5,7 @@
 #include "cuda/query/coincidence.h"
 #include "cuda/query/detail_ref.h"
 #include "numerics/host_device.h"
+#include "query/asset/shared_constants.h"
 
 namespace ist::gpu {
 
@@ -30,7 +31,6 @@ class QuickLooker {
     QuickLook sum = {};
     const double(&root_a)[4] = a_.level[a_.coarser].tree.root;
     const double(&root_b)[4] = b_.level[b_.coarser].tree.root;
-    constexpr double kPokeOut = 3, kSpeck = 1e-9;  // as the CPU has them
     const double reach_a = kPokeOut * root_a[3], reach_b = kPokeOut * (root_b[3] * map_.scale);
     if (!(reach_a > kSpeck * reach_b && reach_b > kSpeck * reach_a)) return sum;
     const double middle_a[3] = {root_a[0], root_a[1], root_a[2]};

@@ -6,14 +6,11 @@
 #include <ist/asset_layout.h>
 
 #include "numerics/host_device.h"
+#include "query/asset/shared_constants.h"
 
 // Trees of an asset where its bytes lie, in device memory or, for tests, in the host's.
 
 namespace ist::gpu {
-
-/// Under the leaves: a node is a single sphere, 16 · block + lane (as in
-/// query/asset/sphere_tree.h).
-constexpr int kSphereLevel = -1;
 
 struct NodeBall {
   double centre[3];

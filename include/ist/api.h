@@ -1,7 +1,7 @@
 #pragma once
 
-/// Stands at the namespace of every public header: what is declared there is seen from outside of a
-/// shared library, and nothing else is.
+/// Marks the namespace of every public header: a shared library exports what is declared there, and
+/// nothing else.
 #if defined(__GNUC__)
 #define IST_API [[gnu::visibility("default")]]
 #else

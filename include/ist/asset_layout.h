@@ -19,8 +19,8 @@
 //
 // An asset of a surface alone has no spheres: n = d = 0, neither trees nor a field, but a mesh.
 //
-// The matched set of all n inner spheres is detail 0 and stands in AssetHeader; the coarser ones
-// are what a query may answer from instead, under PenetrationSettings::pair_budget.
+// The matched set of all n inner spheres is detail 0 and stands in AssetHeader. Under
+// PenetrationSettings::pair_budget a query may answer from the coarser ones instead.
 //
 // A tree, with m(k) = ⌈n / 16^(k+1)⌉ blocks at level k, up to the first level of one block:
 //
@@ -34,8 +34,8 @@
 // but the last of each level is full. Sections follow each other in this order without a gap but
 // the padding to 64 bytes, so that n and d alone give every offset (place_sections).
 //
-// The field, the solid's surface as a query looks at it: triangles, a tree of balls over them, and
-// a grid that tells inside from outside.
+// The field, the solid's surface for queries of spheres: triangles, a tree of balls over them, and
+// a grid that separates inside from outside.
 //
 //   FieldHeader
 //   level 0                           SurfaceBlock[m(0)]
@@ -77,12 +77,12 @@ inline constexpr std::size_t kAssetAlignment = 64;
 inline constexpr std::uint32_t kWidth = 16;       ///< balls in a block
 inline constexpr std::uint32_t kMaxLevels = 7;    ///< 16^7 spheres
 inline constexpr std::uint32_t kMaxDetails = 10;  ///< coarser matched sets of an asset
-/// Classes of overlap by which errors are predicted.
+/// Classes of overlap of predicted errors.
 inline constexpr std::uint32_t kOverlapClasses = 5;
 /// Lowest overlap of a class, part of the smaller solid's volume: contained by itself, then from a
 /// half down.
 inline constexpr double kOverlapClassFloor[kOverlapClasses] = {1, 1e-1, 1e-2, 1e-3, 1e-4};
-/// Radius and cover radius of an unused lane: no distance makes it overlap anything.
+/// Radius and cover radius of an unused lane: it overlaps nothing at any distance.
 inline constexpr float kEmptyRadius = -1e30f;
 /// No coordinate, offset or radius of a checked asset is larger than this, unit frame.
 inline constexpr double kMaxExtent = 16;
@@ -104,11 +104,11 @@ struct Origin {
 };
 static_assert(sizeof(Origin) == 24);
 
-/// What a node knows of the spheres below it; one per BallBlock of level ≥ 1.
+/// Sums of the spheres below a node; one NodeBlock per BallBlock of level ≥ 1.
 struct alignas(64) NodeBlock {
   float volume[kWidth];  ///< Σ of the tree's sphere volumes, unit frame, rounded up; 0 if unused
-  /// Inner tree: radius about the ball's centre that holds every cover ball below; kEmptyRadius if
-  /// unused. Matched tree: 0.
+  /// Inner tree: radius about the ball's centre that contains every cover ball below; kEmptyRadius
+  /// if unused. Matched tree: 0.
   float cover[kWidth];
   /// κ: no point lies inside more than this many of the tree's spheres below; 0 if unused.
   float overlap[kWidth];
@@ -166,8 +166,9 @@ static_assert(sizeof(SurfaceBlock) == 256);
 
 inline constexpr std::uint32_t kBrickWidth = 4;         ///< cells along an edge of a brick
 inline constexpr std::uint32_t kOutsideBrick = ~0u;     ///< brick index: no cell is inside
-inline constexpr std::uint32_t kInsideBrick = ~0u - 1;  ///< all cells are
-/// Where in a cell its reference point is, in edges of the cell: off the planes that meshes like.
+inline constexpr std::uint32_t kInsideBrick = ~0u - 1;  ///< all cells are inside
+/// Place of the reference point in a cell, in edges of the cell: off the planes that meshes often
+/// have.
 inline constexpr double kCellReference[3] = {0.5239, 0.4517, 0.5371};
 
 /// 4 × 4 × 4 cells, bit x + 4 y + 16 z.
@@ -179,8 +180,8 @@ struct CellBrick {
 };
 static_assert(sizeof(CellBrick) == 24);
 
-/// The solid's surface for queries, over floats: the mesh's own triangles or, where an error was
-/// asked for, fewer near them.
+/// The solid's surface for queries, over floats: the mesh's own triangles or, if an error was
+/// requested, fewer near them.
 struct FieldHeader {
   /// Unit frame, proven: this surface and the solid's lie within `error` of each other, and both
   /// solids agree on every point further from them.
@@ -213,8 +214,9 @@ struct alignas(64) MeshBlock {
   std::uint8_t triangles = 0;      ///< 1 … 16
   std::uint8_t vertices = 0;       ///< 3 … 16
   std::uint16_t reserved = 0;
-  std::uint32_t first_neighbour = 0;  ///< place in `neighbours` of the blocks that share a vertex
-  std::uint32_t neighbours = 0;       ///< of them: one entry a block, by number
+  std::uint32_t first_neighbour = 0;  ///< index into `neighbours` of the first block that shares a
+                                      ///< vertex
+  std::uint32_t neighbours = 0;       ///< count: one entry per block, by number
   std::uint32_t shell = 0;
 };
 static_assert(sizeof(MeshBlock) == 128);
@@ -238,21 +240,19 @@ struct alignas(64) BoxSums {
 };
 static_assert(sizeof(BoxSums) == 2048);
 
-/// Triangles that hang together by shared vertices.
+/// Triangles that are connected by shared vertices.
 struct MeshShell {
-  std::uint32_t block = 0;  ///< the first that belongs to it
-  std::uint32_t reserved = 0;
-  float low[3] = {}, high[3] = {};  ///< box, unit frame, rounded outward
+  std::uint32_t block = 0;  ///< its first block
 };
-static_assert(sizeof(MeshShell) == 32);
+static_assert(sizeof(MeshShell) == 4);
 
-/// The solid's surface for Measure::exact: closed, oriented, with winding numbers of 0 and 1 alone
-/// but for touching faces.
+/// The solid's surface for Measure::exact: closed, oriented, with winding numbers of 0 and 1 only,
+/// except for touching faces.
 struct MeshHeader {
   /// Unit frame, proven: this surface and the solid's lie within it of each other. 0: the mesh's
   /// own triangles.
   double error = 0;
-  /// Unit frame: no vertex is further from its place in the mesh, by rounding.
+  /// Unit frame: bound on the displacement of a vertex by rounding.
   double rounding = 0;
   std::uint32_t vertex_count = 0;
   std::uint32_t triangle_count = 0;
@@ -284,9 +284,9 @@ struct alignas(64) AssetHeader {
   double volume = 0;        ///< unit frame, of the solid
   double volume_error = 0;  ///< unit frame, bound on the error of `volume`
   double coverage = 0;      ///< [0, 1] by inner spheres
-  double protrusion = 0;    ///< unit frame: no matched sphere sticks further out of the solid
+  double protrusion = 0;    ///< unit frame: bound on how far matched spheres stick out
 
-  // What was asked for, so that a cache can tell whether to bake again.
+  // Requested settings, so that a cache can decide whether to bake again.
   std::uint64_t asked_spheres = 0;
   double asked_coverage = 0;
   double asked_min_radius = 0;  ///< [u]
@@ -304,11 +304,11 @@ struct alignas(64) AssetHeader {
   std::uint64_t matched_spheres = 0;  ///< offset of Sphere[sphere_count]
   std::uint64_t details = 0;          ///< offset of DetailLevel[detail_count]
   std::uint32_t detail_count = 0;     ///< coarser matched sets, ≤ kMaxDetails
-  std::uint32_t predicted_poses = 0;  ///< behind predicted_error; 0: no prediction
+  std::uint32_t predicted_poses = 0;  ///< of predicted_error; 0: no prediction
   /// Median relative error of the volume in each class of overlap, of two copies of the solid.
   double predicted_error[kOverlapClasses] = {};
-  double asked_error = 0;       ///< relative error asked for; 0: none
-  double asked_at_overlap = 0;  ///< part of the solid's volume where it was asked for
+  double asked_error = 0;       ///< requested relative error; 0: none
+  double asked_at_overlap = 0;  ///< part of the solid's volume for which it was requested
   TreeHeader inner_tree;
   TreeHeader matched_tree;
 
@@ -328,7 +328,7 @@ struct alignas(64) AssetHeader {
   std::uint32_t polygonise_cells = 0;  ///< along the longest side; 0: the solid is a mesh
   std::uint32_t worst_partner = 0;     ///< TrialPartner behind measured_error
 
-  // The solid at density 1, and what holds it (<ist/mass_properties.h>).
+  // The solid at density 1, and its bounds (<ist/mass_properties.h>).
   double centre_of_mass[3] = {};    ///< unit frame
   double centre_of_mass_error = 0;  ///< unit frame, bound on the error of each component
   /// Unit frame, about the centre of mass: entries xx, yy, zz, xy, xz, yz of ∫ (|y|² 1 − y yᵀ).
@@ -342,14 +342,14 @@ struct alignas(64) AssetHeader {
   std::uint64_t mesh = 0;        ///< offset of MeshHeader; 0: baked without one
   std::uint32_t mesh_state = 0;  ///< MeshState
   std::uint32_t reserved_mesh = 0;
-  double counted_twice = 0;  ///< unit frame: ∫ (w − 1)⁺ of the mesh as it came
+  double counted_twice = 0;  ///< unit frame: ∫ (w − 1)⁺ of the input mesh
 };
 static_assert(sizeof(AssetHeader) == 1152);
 
 inline constexpr std::uint32_t kFlagRepaired = 1u << 0;    ///< the mesh was open and repaired
 inline constexpr std::uint32_t kFlagBelowNoise = 1u << 1;  ///< greedy order ends under float noise
-/// The solid is known by its signed distance, and the mesh was made of it: polygonise_cells tells
-/// how. Inner spheres and covers are the solid's, volumes and matched spheres the mesh's.
+/// The solid is known by its signed distance, and the mesh was made from it with polygonise_cells.
+/// Inner spheres and covers are the solid's, volumes and matched spheres the mesh's.
 inline constexpr std::uint32_t kFlagPolygonised = 1u << 2;
 inline constexpr std::uint32_t kFlagWrapped = 1u << 3;  ///< the mesh was made by wrap_mesh()
 
@@ -418,7 +418,7 @@ constexpr void place_mesh(MeshHeader& mesh, std::uint64_t& end) noexcept {
 
 }  // namespace detail
 
-/// Most spheres an asset holds: kMaxLevels levels.
+/// Largest number of spheres of an asset: kMaxLevels levels.
 inline constexpr std::uint64_t kMaxSpheres = std::uint64_t{1} << (4 * kMaxLevels);
 
 /// Spheres of detail i of an asset of n spheres.
@@ -427,9 +427,9 @@ constexpr std::uint64_t detail_spheres(std::uint64_t n, std::uint32_t i) noexcep
 }
 
 /// Sets every offset, count and the file size from `sphere_count` in [0, kMaxSpheres] and
-/// `detail_count`, all of whose sets must have a sphere; `details` are those of the file. `field`,
-/// if there is one, knows list_bytes and its counts: level[0].count, those of bricks, cells and
-/// entries; `mesh` likewise those of vertices, shells, neighbours and level[0].count.
+/// `detail_count`, whose sets must each have a sphere; `details` are those of the file. `field`, if
+/// any, must have list_bytes and its counts: level[0].count, those of bricks, cells and entries.
+/// `mesh`, if any, must have those of vertices, shells, neighbours and level[0].count.
 constexpr void place_sections(AssetHeader& header, DetailLevel* details,
                               FieldHeader* field = nullptr, MeshHeader* mesh = nullptr) noexcept {
   const std::uint64_t n = header.sphere_count;

@@ -17,8 +17,7 @@
 
 namespace IST_API ist {
 
-/// The bytes of an asset in memory that owns them, aligned to 64 bytes. Once moved from it is
-/// empty.
+/// The bytes of an asset in memory, aligned to 64 bytes. Empty once moved from.
 class Asset {
  public:
   /// Copies the bytes. Throws Error, naming `name`, unless TreeView::from_bytes accepts them.
@@ -31,11 +30,11 @@ class Asset {
     return *this;
   }
 
-  /// Reads a file written by save(). Throws Error (file, what is wrong, way out).
+  /// Reads a file written by save(). Throws Error (file, what is wrong, remedy).
   static Asset load(const std::filesystem::path& path);
 
-  /// Writes to a temporary file beside `path` and renames it: the old file or the whole new one
-  /// is there at every moment. Throws Error.
+  /// Writes to a temporary file beside `path` and renames it: at every moment `path` is the old
+  /// file or the whole new one. Throws Error.
   void save(const std::filesystem::path& path) const;
 
   std::span<const std::byte> bytes() const noexcept { return {data_.get(), size_}; }
@@ -60,35 +59,35 @@ class Asset {
 /// Makes the asset of a closed mesh: inner spheres, matched spheres, cover radii, trees, the mesh
 /// and the field.
 ///
-/// Same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number of
-/// threads.
-/// Cancelling during packing keeps what is packed; later it throws Error.
+/// The same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number
+/// of threads. Cancelling during packing keeps what is packed; before and after
+/// it throws Error.
 ///
-/// A mesh that counts volume twice is resolved first: the bake is that of the boundary of where its
-/// winding number is 1 or more (MeshState::resolved). If it cannot be resolved, no mesh is kept
-/// (MeshState::unresolved), and there is no field where it reaches far into itself.
+/// A mesh that counts volume twice is first resolved to the boundary of the set where its winding
+/// number is 1 or more (MeshState::resolved). If that fails, no mesh is kept
+/// (MeshState::unresolved), and no field if the mesh reaches far into itself.
 ///
-/// Throws Error if not one sphere fits, on settings out of range, and where floats cannot be as
-/// exact as the surface's error asked for.
+/// Throws Error if not one sphere fits, on settings out of range, and if floats cannot reach the
+/// requested error of the surface.
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
            const ProgressCallback& progress = {});
 
-/// Makes the asset of a surface alone: the mesh, mass and bounds, without spheres and field. It
-/// takes about as long as the import.
+/// Makes an asset of a surface alone: the mesh, mass properties and bounds, without spheres and
+/// field. Takes about as long as the import.
 ///
-/// Measure::exact and mass_properties() are answered; what asks spheres answers
-/// QueryStatus::not_held.
+/// It serves Measure::exact and mass_properties(); queries of spheres return QueryStatus::not_held.
 ///
-/// `threads`: 0 = all cores. Throws Error where nothing is `wanted`, where the mesh counts volume
-/// twice and cannot be resolved, and as bake() does.
+/// `threads`: 0 = all cores. The only stage of `progress` is "resolve". Throws Error if `wanted` is
+/// false, if the mesh counts volume twice and cannot be resolved, if the callback cancels, and as
+/// bake() does.
 Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings = {},
-                   unsigned threads = 0);
+                   unsigned threads = 0, const ProgressCallback& progress = {});
 
-/// How the mesh in the place of a solid is made, which calibration needs.
+/// Options of the mesh that is made in place of a solid, for calibration.
 struct PolygoniseSettings {
-  /// Cells along the longest side of the bounds, [8, 1024]. Time and memory grow by the square.
-  /// 0: as many as the sphere count needs, 32 to 256, for an error of some 5 % of the mean radius,
-  /// and up to four times that where curved faces meet at an edge.
+  /// Cells along the longest side of the bounds, [8, 1024]. Time and memory grow with the square.
+  /// 0: chosen from the sphere count, 32 to 256, for an error of some 5 % of the mean radius; up to
+  /// four times that where curved faces meet at an edge.
   unsigned cells = 0;
   std::string name = "solid";  ///< for messages; no part of the asset
 };
@@ -96,60 +95,59 @@ struct PolygoniseSettings {
 /// Makes the asset of any solid known by its signed distance: CSG, functions, distance grids.
 ///
 /// Inner spheres and cover radii are certified against the solid itself, on the CPU, by the banded
-/// mode alone. Matched spheres and the volume are those of a mesh in its place, whose surface and
-/// the solid's lie within a proven distance of each other: it is in the asset
-/// (AssetHeader::polygonise_error, kFlagPolygonised), and counts into the protrusion.
-/// The volume's error is what the mesh's differs from solid.volume(), and that one's error.
+/// mode alone. Matched spheres and volume are those of a mesh in its place. The proven distance
+/// between the surfaces of both is in the asset (AssetHeader::polygonise_error, kFlagPolygonised)
+/// and counts into the protrusion. The volume's error is the difference to solid.volume() plus that
+/// one's error. If solid.mesh() is a mesh, this is the bake of that mesh.
 ///
-/// Where solid.mesh() is a mesh, this is the bake of that mesh.
+/// The same solid, settings and cells give the same bytes for any number of threads, and on any
+/// machine if signed_distance() does. The solid is evaluated from many threads at once, and at some
+/// points outside its bounds. Progress reports the stage "polygonise" first; cancelling it throws
+/// Error.
 ///
-/// Same solid, settings and cells give the same bytes for any number of threads; on any machine as
-/// far as signed_distance() does.
-/// The solid is asked from many threads at once, and at some points outside its bounds.
-/// Progress tells of the stage "polygonise" first. Cancelling it throws Error.
-///
-/// Throws Error as the bake of a mesh does, and where the signed distance is found not to be
-/// 1-Lipschitz or not finite, where the solid reaches out of its bounds, where no cell sees it, and
-/// for a grid mode other than banded.
+/// Throws Error as the bake of a mesh does; if the signed distance is found not to be 1-Lipschitz
+/// or not finite; if the solid reaches out of its bounds; if no cell finds it; and for a grid mode
+/// other than banded.
 Asset bake(const Solid& solid, const PackingSettings& settings = {},
            const ProgressCallback& progress = {}, const PolygoniseSettings& meshing = {});
 
-/// How exact an asset's volumes are to be.
+/// Wanted accuracy of an asset's volumes.
 struct ErrorTarget {
   double relative_error = 0.01;  ///< (0, 1) median over random poses, for every TrialPartner
   double at_overlap = 0.001;     ///< [1e-4, 0.5] of the solid's volume, within half a decade
 };
 
-/// How an asset answers where one kind of partner meets it, near the overlap asked about.
+/// Error of an asset against one kind of partner, near the requested overlap.
 struct PartnerError {
   TrialPartner partner = TrialPartner::copy;
   double median = 0;        ///< relative
-  std::uint32_t poses = 0;  ///< behind it; too few to count where the overlap is too much for it
+  std::uint32_t poses = 0;  ///< number of poses; too few to count if the partner hardly reaches the
+                            ///< overlap
 };
 
-/// What bake_to_error() made of its target. TreeView::predicted_errors() tells more.
+/// Result of bake_to_error(). TreeView::predicted_errors() has more.
 struct TargetedAsset {
   Asset asset;
-  double measured_error = 0;  ///< relative, median near the overlap asked about, worst partner's
-  std::uint32_t poses = 0;    ///< of all partners; 0: none was tried, for want of time or of room
-  std::array<PartnerError, kTrialPartners> partners = {};  ///< what each erred
-  bool met = false;  ///< poses > 0 and measured_error ≤ the one asked for
-  /// What ended the search. sphere_count where met: few spheres do; where missed: as many as are
-  /// allowed do not. time_limit: the best asset until then, met or not. Else the limit by which the
-  /// packing could not grow.
+  double measured_error = 0;  ///< relative, median near the requested overlap, of the worst partner
+  std::uint32_t poses = 0;    ///< of all partners; 0: none was tried, for lack of time or room
+  std::array<PartnerError, kTrialPartners> partners = {};  ///< error of each
+  bool met = false;  ///< poses > 0 and measured_error ≤ the requested one
+  /// What ended the search. sphere_count: the target is met with few spheres, or not met with the
+  /// largest allowed count. time_limit: the best asset until then, met or not. Else the limit that
+  /// stopped the packing.
   StopReason stop = StopReason::sphere_count;
 };
 
 /// bake() with about as few spheres as the target needs, at most settings.max_spheres (0 =
-/// 200,000). Where those are not enough: the best asset, and the result says so.
+/// 200,000). If those are not enough, the best asset is returned, and the result says so.
 ///
-/// The asset meets a copy of itself and, as an analytic field, each other TrialPartner: the target
-/// is met if the worst one's median is. The truth is integrated over the meshes at some 300 poses
-/// with independent random rotations, several times as exact as the target; the asset holds the
-/// medians of the copies and which partner is worst.
-/// settings.time_limit bounds all of it, but for its first bake, of a few hundred spheres.
-/// Takes up to about six times a bake of the final count.
-/// Reports the stages of each bake, and "predict".
+/// The asset is tried against a copy of itself and, as an analytic field, each other TrialPartner.
+/// The target is met if the worst one's median is. The truth is integrated over the meshes at some
+/// 300 poses with independent random rotations, several times as accurate as the target. The asset
+/// stores the medians of the copies and the worst partner.
+///
+/// settings.time_limit bounds everything except the first bake, of a few hundred spheres. Takes up
+/// to about six times a bake of the final count. Reports the stages of each bake, and "predict".
 ///
 /// Throws Error as bake() does, and whenever the callback cancels.
 TargetedAsset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
@@ -159,17 +157,16 @@ TargetedAsset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
 /// One proven property of an asset.
 struct Invariant {
   std::string name;  ///< "sphere inside solid", …
-  /// Largest violation measure, unit as in `meaning`; ≤ 0 is sound unless stated.
+  /// Largest measure of a violation, unit as in `meaning`; ≤ 0 is sound unless stated.
   double worst = 0;
   std::string meaning;      ///< what `worst` measures, with its unit
-  std::size_t where = 0;    ///< index of the sphere, node, triangle or place of cells that is worst
-  std::size_t checked = 0;  ///< how many of them, or pairs, were looked at
+  std::size_t where = 0;    ///< index of the worst sphere, node, triangle or place of cells
+  std::size_t checked = 0;  ///< count of them, or of pairs, that were checked
   std::size_t violations = 0;
 };
 
-/// Proves every invariant of an asset again, in double, from its bytes and the mesh alone.
-///
-/// It shares no code with packing but the mesh.
+/// Proves every invariant of an asset again, in double, from its bytes and the mesh alone. It
+/// shares no code with packing except the mesh.
 ///
 /// `threads`: 0 = all cores. Throws Error if the asset is of another mesh.
 std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigned threads = 0);
@@ -178,8 +175,8 @@ std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigne
 ///
 /// What was calibrated by a mesh in the solid's place is proven by that mesh, made again.
 ///
-/// Throws Error if the asset is of another solid, as far as that mesh shows it, or the solid is a
-/// mesh: its ClosedMesh serves then.
+/// Throws Error if the asset is of another solid, as far as that mesh shows it, or if the solid is
+/// a mesh: use its ClosedMesh then.
 std::vector<Invariant> check(const Asset& asset, const Solid& solid, unsigned threads = 0);
 
 }  // namespace ist

@@ -10,8 +10,8 @@
 #include <ist/mesh.h>
 #include <ist/progress.h>
 
-// Few spheres that together hold a whole solid, for planners that must not be told of free space
-// where there is none. Lengths are [u], the mesh's own unit and frame.
+// Few spheres that together cover a whole solid, for motion planners. Lengths are [u], the mesh's
+// own unit and frame.
 
 namespace IST_API ist {
 
@@ -21,50 +21,50 @@ struct CoverSphere {
   double radius = 0;                                 ///< [u]
 };
 
-/// The most spheres that a cover is made of.
+/// The largest number of spheres of a cover.
 inline constexpr std::size_t kMostCoverSpheres = 4096;
 
-/// How many spheres, or how close.
+/// Number of spheres, or their largest protrusion.
 struct SphereCoverSettings {
   std::size_t count =
       64;  ///< [1, kMostCoverSpheres]; with max_protrusion the most that may be used
-  /// [u] ≥ 0. 0: `count` spheres that protrude as little as they can. Else: as few spheres as are
+  /// [u] ≥ 0. 0: `count` spheres that protrude as little as possible. Else: as few spheres as are
   /// found to protrude by no more.
   double max_protrusion = 0;
-  std::uint64_t seed = 0;  ///< of the search; any value serves equally well
+  std::uint64_t seed = 0;  ///< of the search; any value works equally well
   unsigned threads = 0;    ///< 0 = all cores; never changes the result
 };
 
-/// Whether spheres hold a solid.
+/// Whether spheres cover a solid.
 struct SphereCoverProof {
   bool covered = false;  ///< every point of the solid and of its mesh lies in a sphere: proven
-  /// [u] where `covered` is false: the place that is not in any sphere, or could not be proven.
+  /// [u] If `covered` is false: the place that lies in no sphere, or could not be proven.
   Eigen::Vector3d where = Eigen::Vector3d::Zero();
-  double gap = 0;  ///< [u] from there to the nearest sphere; 0 where it is merely not proven
+  double gap = 0;  ///< [u] from there to the nearest sphere; 0 if it is only not proven
 };
 
-/// How far spheres reach out of a solid.
+/// How far spheres protrude from a solid.
 struct SphereProtrusion {
   /// [u] No point of any sphere is further from the solid: proven.
   double largest = 0;
-  /// [u] Some point of a sphere is at least so far: the bound above is no further from the truth.
+  /// [u] Some point of a sphere is at least this far: a lower bound of the true value.
   double largest_seen = 0;
   double mean = 0, p95 = 0;  ///< [u] over the area of the spheres' union, by sampling
   double volume_ratio = 0;   ///< the union's volume over the solid's, by sampling (0.5 %)
 };
 
-/// Spheres that hold a solid, and the proof.
+/// Spheres that cover a solid, with their proven protrusion.
 struct SphereCover {
   std::vector<CoverSphere> spheres;
   SphereProtrusion protrusion;
   bool reached = true;  ///< false: max_protrusion was not reached; these are the best
-  double seconds = 0;   ///< [s] that the search took
+  double seconds = 0;   ///< [s] time of the search
 };
 
-/// Spheres whose union holds the solid of a closed mesh, and protrudes as little as was found.
+/// Spheres whose union covers the solid of a closed mesh and protrudes as little as was found.
 ///
-/// That the union holds the solid is proven as prove_cover() does it.
-/// Same mesh, settings and seed give the same spheres for any number of threads.
+/// The cover is proven as by prove_cover(). The same mesh, settings and seed give the same spheres
+/// for any number of threads.
 ///
 /// Throws Error on settings out of range, and when the callback cancels.
 SphereCover cover_with_spheres(const ClosedMesh& mesh, const SphereCoverSettings& settings = {},
@@ -76,10 +76,10 @@ std::vector<SphereCover> cover_with_spheres(std::span<const ClosedMesh> meshes,
                                             const ProgressCallback& progress = {});
 
 /// Proves, in double, that every point of the solid, and every triangle of its mesh, lies in the
-/// union of the spheres. Spheres of a radius that is not finite or above 0 hold nothing.
+/// union of the spheres. Spheres whose radius is not finite or not above 0 cover nothing.
 SphereCoverProof prove_cover(const ClosedMesh& mesh, std::span<const CoverSphere> spheres);
 
-/// Measures how far spheres reach out of the solid of a closed mesh.
+/// Measures how far spheres protrude from the solid of a closed mesh.
 SphereProtrusion sphere_protrusion(const ClosedMesh& mesh, std::span<const CoverSphere> spheres);
 
 }  // namespace ist

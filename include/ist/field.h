@@ -8,10 +8,11 @@
 #include <ist/api.h>
 #include <ist/query.h>
 
-// Fields: solids that a sphere tree meets without having a tree themselves: grounds, walls,
-// terrains, primitives, and whatever says how far its surface is. Plain views: nothing is copied or
-// allocated, memory they point to must outlive them. Everywhere a distance is positive inside the
-// solid and negative outside, as Solid's is. Lengths are [u] in the field's own frame.
+// Fields: shapes that a sphere tree collides with and that need no tree themselves: half-spaces,
+// primitives, terrains, distance grids, functions, and the surface of an asset. They are plain
+// views: nothing is copied or allocated, and memory they point to must outlive them. Distances are
+// positive inside the solid and negative outside, as those of Solid. Lengths are [u] in the field's
+// own frame.
 
 namespace IST_API ist {
 
@@ -21,7 +22,7 @@ struct HalfSpaceField {
   double offset = 0;                                  ///< [u]
 };
 
-/// A box around the origin. Exact at edges and corners too, and for balls thicker than it.
+/// A box around the origin. Exact, also at edges and corners, and for balls thicker than the box.
 struct BoxField {
   Eigen::Vector3d half_extents = Eigen::Vector3d::Ones();  ///< [u] > 0
 };
@@ -33,57 +34,58 @@ struct BallField {
 
 /// All points within `radius` of the segment from −half_height to +half_height on the z axis.
 ///
-/// A ball meets it as if its surface went on flat from the closest point: relative error about the
-/// ball's radius over the capsule's.
+/// Approximate: a ball is intersected with the tangent plane at the closest point. The relative
+/// error is about the ball's radius over the capsule's.
 struct CapsuleField {
   double radius = 1;       ///< [u] > 0
   double half_height = 1;  ///< [u] ≥ 0, of the segment
 };
 
-/// A cylinder about the z axis. Its mantle is taken for flat as the capsule's is; a ball at the rim
-/// has the share of the mantle times that of the ends.
+/// A cylinder about the z axis. Its lateral surface is taken for flat as the capsule's is; at the
+/// rim a ball has the share of the lateral surface times that of the ends.
 struct CylinderField {
   double radius = 1;       ///< [u] > 0
   double half_height = 1;  ///< [u] > 0
 };
 
-/// Terrain: the solid under a grid of heights along z, two triangles a cell, cut from (i, j) to
-/// (i + 1, j + 1). Exact. Beyond its border it goes on level.
+/// Terrain: the solid under a grid of heights along z, two triangles per cell, cut from (i, j) to
+/// (i
+/// + 1, j + 1). Exact. Beyond its border it continues level.
 struct HeightField {
   const float* heights = nullptr;  ///< [u] [rows · columns], columns (x) run fastest
   std::uint32_t columns = 0;       ///< ≥ 2, along x
   std::uint32_t rows = 0;          ///< ≥ 2, along y
-  double spacing[2] = {1, 1};      ///< [u] > 0, along x and y; heights[0] stands at the origin
-  /// [u] No height is lower or higher: far objects are then told at once. Defaults are always true.
+  double spacing[2] = {1, 1};      ///< [u] > 0, along x and y; heights[0] is at the origin
+  /// [u] Bounds of all heights; tight ones skip far objects at once. The defaults are always valid.
   double lowest = -1e300, highest = 1e300;
 };
 
-/// Distances at the points of a grid, interpolated linearly in each cell: its gradient jumps from
+/// Distances at the points of a grid, interpolated linearly in each cell: the gradient jumps from
 /// cell to cell. Outside of the grid is outside of the solid.
 struct DistanceGridField {
   const float* distances = nullptr;  ///< [u] [size[0] · size[1] · size[2]], x runs fastest
   std::uint32_t size[3] = {};        ///< points along x, y, z, each ≥ 2
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< [u] of the first point
   double spacing = 1;                                ///< [u] > 0
-  double error = 0;  ///< [u] the interpolated distance is off by at most this
+  double error = 0;  ///< [u] bound on the error of the interpolated distance
 };
 
-/// What a look at a field tells.
+/// A sample of a field.
 struct FieldSample {
   double distance = 0;                                 ///< [u] to the surface, positive inside
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< of the distance
 };
 
-/// A field that the caller answers for. Called once for every node and ball that is looked at, on
-/// the thread of the query. A sample that is not finite gives QueryStatus::invalid_input; the
-/// answer is no better than the samples.
+/// A field by a function of the caller's. It is called once for every node and ball that is
+/// visited, on the thread of the query. It must be 1-Lipschitz and never exceed the true distance
+/// by more than `error`. A sample that is not finite gives QueryStatus::invalid_input.
 struct FunctionField {
   FieldSample (*look)(const void* context, const Eigen::Vector3d& x) noexcept = nullptr;
-  const void* context = nullptr;  ///< handed to `look`
-  double error = 0;               ///< [u] distances are off by at most this
+  const void* context = nullptr;  ///< passed to `look`
+  double error = 0;               ///< [u] bound on the error of distances
 };
 
-/// The surface in an asset (TreeView::has_field), without its spheres. Exact within
+/// The stored surface of an asset (TreeView::has_field), without its spheres. Exact within
 /// TreeView::field_error.
 struct MeshField {
   TreeView tree;
@@ -99,12 +101,12 @@ struct PlacedField {
   double scale = 1;  ///< > 0
 };
 
-/// Overlap of a field, held still, and a placed tree: Σ over B's spheres of the part that lies
-/// inside the field. The gradients are those of that sum. volume_min and volume_max make room for
-/// the field's error. Measure::exact is answered not_held: a field has no mesh.
+/// Overlap of a field, held still, and a placed tree: the sum over B's spheres of the part that
+/// lies inside the field. The gradients are those of that sum. volume_min and volume_max include
+/// the field's error. Measure::exact returns not_held: a field has no mesh.
 ///
-/// A limit of the settings stops it as it stops a pair of trees; pair_budget has no effect.
-/// invalid_input also where the field's numbers are out of range.
+/// Limits stop it as they stop a pair of trees; pair_budget has no effect. invalid_input also if
+/// the field's numbers are out of range.
 ///
 /// No allocation, lock or exception. Fields and trees may be shared by threads; the workspace may
 /// not.
@@ -117,11 +119,11 @@ Penetration penetration(const PlacedField& a, const PlacedTree& b,
 Separation separation(const PlacedField& a, const PlacedTree& b, const SeparationSettings& settings,
                       Workspace& workspace) noexcept;
 
-/// Both in one call.
+/// penetration() and separation() in one call.
 PenetrationAndSeparation query(const PlacedField& a, const PlacedTree& b,
                                const QuerySettings& settings, Workspace& workspace) noexcept;
 
-/// The contact condensed into at most patches.size() patches, divided along B's tree.
+/// Condenses the contact into at most patches.size() patches, divided along B's tree.
 ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept;
@@ -132,12 +134,12 @@ struct PlacedFieldPair {
   PlacedTree b;
 };
 
-/// answers[i] = penetration(pairs[i]), as the batch of trees does it.
+/// answers[i] = penetration(pairs[i]), as for the batch of trees.
 void penetration_batch(std::span<const PlacedFieldPair> pairs, const PenetrationSettings& settings,
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel = {}) noexcept;
 
-/// answers[i] = contact_patches(pairs[i]), as the batch of trees does it.
+/// answers[i] = contact_patches(pairs[i]), as for the batch of trees.
 void contact_patches_batch(std::span<const PlacedFieldPair> pairs, const ContactSettings& settings,
                            std::span<Workspace> workspaces, std::span<ContactPatches> answers,
                            std::span<ContactPatch> patches,

@@ -5,14 +5,15 @@
 
 #include <ist/api.h>
 
-// How packing and baking use a GPU. Needs no CUDA header: cudaStream_t is a pointer to CUstream_st.
+// Settings for packing and baking on a GPU. Needs no CUDA header: cudaStream_t is a pointer to
+// CUstream_st.
 
 struct CUstream_st;
 
 namespace IST_API ist {
 
-/// Where device memory comes from, in stream order: what is freed on a stream may be handed out to
-/// later work of that stream without waiting. May be called from any host thread that bakes.
+/// Source of device memory, in stream order: memory freed on a stream may be reused by later work
+/// of that stream without waiting. May be called from any host thread that bakes.
 class DeviceMemoryResource {
  public:
   virtual ~DeviceMemoryResource() = default;
@@ -22,10 +23,11 @@ class DeviceMemoryResource {
   virtual void deallocate(void* memory, std::size_t bytes, CUstream_st* stream) noexcept = 0;
 };
 
-/// Which device, stream and memory a bake uses. Every bake that runs at the same time as another
-/// needs a stream of its own; the result does not depend on it. A bake that is given neither stream
-/// nor memory, and has levels of detail, works on two streams at once, of which the first comes
-/// before a device's work of usual priority: it is done sooner, and needs some more memory.
+/// Device, stream and memory of a bake. Bakes that run at the same time need different streams; the
+/// result does not depend on it.
+///
+/// With neither stream nor memory set, a bake with levels of detail uses two streams. The first has
+/// high priority, so the bake finishes earlier; it needs some more memory.
 struct GpuSettings {
   int device = 0;                          ///< CUDA device index
   CUstream_st* stream = nullptr;           ///< null: made for the call
@@ -40,12 +42,12 @@ struct GpuInfo {
   std::size_t free_memory = 0;   ///< bytes
 };
 
-/// Whether this build can bake on device `device` here; if not, `why` says what is missing (no GPU
-/// backend in this build, no device, no code for it, a driver that is too old, …). Makes the
+/// Whether this build can bake on device `device`. If not, `why` receives what is missing (no GPU
+/// backend in this build, no device, no code for it, a driver that is too old, …). Creates the
 /// device's CUDA context, if there is a device.
 bool gpu_available(int device = 0, std::string* why = nullptr);
 
-/// Throws Error, with the way out, where gpu_available() is false.
+/// Throws Error, with the remedy, if gpu_available() is false.
 GpuInfo gpu_info(int device = 0);
 
 }  // namespace ist

@@ -16,22 +16,22 @@
 
 namespace IST_API ist {
 
-/// Assets in device memory: the bytes of the files as they are.
+/// Assets in device memory: the bytes of the files, unchanged.
 ///
-/// Threads may share it.
+/// May be shared by threads.
 class GpuAssets {
  public:
-  /// Copies the assets to the device of `settings`; they are not needed afterwards. Pairs name them
-  /// by their place in the list.
+  /// Copies the assets to the device of `settings`; they are not needed afterwards. Pairs refer to
+  /// them by index.
   ///
-  /// Throws Error where the device cannot be used or has no memory left, or an asset holds no
+  /// Throws Error if the device cannot be used or has no memory left, or if an asset holds no
   /// spheres.
   explicit GpuAssets(std::span<const TreeView> assets, const GpuSettings& settings = {});
   ~GpuAssets();
   GpuAssets(GpuAssets&&) noexcept;
   GpuAssets& operator=(GpuAssets&&) noexcept;
 
-  std::size_t size() const noexcept;   ///< assets
+  std::size_t size() const noexcept;   ///< number of assets
   std::size_t bytes() const noexcept;  ///< of device memory
   int device() const noexcept;
 
@@ -45,41 +45,41 @@ class GpuAssets {
 /// Placed pairs of assets: arrays of `count` in device memory.
 struct GpuPairs {
   std::size_t count = 0;
-  const std::uint32_t* asset_a = nullptr;  ///< place in GpuAssets
+  const std::uint32_t* asset_a = nullptr;  ///< index into GpuAssets
   const std::uint32_t* asset_b = nullptr;
-  const Pose* pose_a = nullptr;     ///< null: all at the origin, unturned
+  const Pose* pose_a = nullptr;     ///< null: all at the origin, not rotated
   const Pose* pose_b = nullptr;     ///< likewise
   const double* scale_a = nullptr;  ///< null: 1
   const double* scale_b = nullptr;  ///< likewise
 };
 
-/// Answers, each as in Penetration: arrays in device memory; null: not wanted.
+/// Answers, each as in Penetration: arrays in device memory. Null pointers: not wanted.
 struct GpuPenetrations {
   double* volume = nullptr;                ///< [count] [u³]
   double* centroid = nullptr;              ///< [count][3] [u] world
   double* translation_gradient = nullptr;  ///< [count][3] [u²] dV/d(translation of B), world
   /// [count][3] [u³/rad] dV/d(rotation vector of B about B's origin), world
   double* rotation_gradient = nullptr;
-  /// [count] ok, or invalid_input of a pose, a scale or an asset's number; others are not touched
-  /// by that.
+  /// [count] ok, or invalid_input for an invalid pose, scale or asset index; other pairs are not
+  /// affected.
   QueryStatus* status = nullptr;
   std::uint32_t* node_visits = nullptr;   ///< [count]
   std::uint32_t* sphere_pairs = nullptr;  ///< [count]
 };
 
-/// Up to so many pairs a workspace is one for few (GpuWorkspace).
+/// Largest batch size that uses the low-latency partitioning; see GpuWorkspace.
 inline constexpr std::size_t kFewGpuPairs = 16'384;
 
-/// Device memory that a batch works in. One batch at a time may use it.
+/// Working memory of a batch on the device. One batch at a time may use it.
 class GpuWorkspace {
  public:
-  /// For batches of up to `most_pairs`; takes 8 bytes each, 40 where they are few, and
-  /// 100 MB besides.
+  /// For batches of up to `most_pairs`. Takes 100 MB, plus 8 bytes per pair, or 40 bytes up to
+  /// kFewGpuPairs.
   ///
-  /// One for up to kFewGpuPairs cuts them up finer than a larger one: a step of few then ends
-  /// sooner, at the cost of pairs a second. Answers of the two differ by rounding.
+  /// Up to kFewGpuPairs pairs are partitioned more finely: a small batch ends sooner, at the cost
+  /// of throughput. Answers of the two kinds differ by rounding.
   ///
-  /// Throws Error where the device cannot be used or has no memory left.
+  /// Throws Error if the device cannot be used or has no memory left.
   explicit GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings = {});
   ~GpuWorkspace();
   GpuWorkspace(GpuWorkspace&&) noexcept;
@@ -95,42 +95,43 @@ class GpuWorkspace {
   std::unique_ptr<Impl> impl_;
 };
 
-/// What a penetration of a batch may cost, as in PenetrationSettings.
+/// Limits of a penetration of a batch, as in PenetrationSettings.
 struct GpuPenetrationSettings {
   Measure measure = Measure::matched;  ///< matched or inner
   /// Count of sphere pairs to spend on each pair of trees; matched measure only; 0: no limit.
   ///
   /// The answer comes from the finest levels of detail that are expected to need no more, blended
-  /// smoothly with the next coarser ones: PenetrationSettings::pair_budget says how.
+  /// smoothly with the next coarser ones; see PenetrationSettings::pair_budget.
   std::uint32_t pair_budget = 0;
 };
 
 /// answers[i] = penetration(pairs[i]) by lenses (FieldUse::never), finished.
 ///
-/// The volume is within 1e-6 of the sum in double, gradients within 1e-6 of the lenses' single ones
-/// together or of volume^(2/3), if that is more. Under a budget, and of copies of one asset at
-/// nearly the same pose, the sum is the CPU's blend of such sums.
-/// The same bits in every run, whatever else is in the batch, in all workspaces for up to
-/// kFewGpuPairs and in all for more.
-/// Only launches kernels on `stream`: allocates nothing and waits for nothing, so that a CUDA graph
+/// The volume is within 1e-6 of the sum in double. Gradients are within 1e-6 of the sum of the
+/// lenses' magnitudes, or of volume^(2/3) if that is more. Under a budget, and for copies of one
+/// asset at nearly the same pose, the answer is the CPU's blend of such sums. The bits are the same
+/// in every run, whatever else is in the batch, in all workspaces for up to kFewGpuPairs, and in
+/// all larger ones.
+///
+/// Only launches kernels on `stream`: it allocates nothing and waits for nothing, so a CUDA graph
 /// may capture it.
 ///
-/// Throws Error for Measure::exact, where a batch is larger than the workspace, the devices differ
-/// or a launch fails.
+/// Throws Error for Measure::exact, if a batch is larger than the workspace, if the devices differ,
+/// or if a launch fails.
 void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs,
                        const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
                        const GpuPenetrations& answers, CUstream_st* stream);
 
-/// Without a budget.
+/// The same without a budget.
 void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
                        GpuWorkspace& workspace, const GpuPenetrations& answers,
                        CUstream_st* stream);
 
-/// Answers, each as in Separation: arrays in device memory; null: not wanted.
+/// Answers, each as in Separation: arrays in device memory. Null pointers: not wanted.
 struct GpuSeparations {
   double* distance = nullptr;      ///< [count] [u] between the inner spheres
-  double* distance_min = nullptr;  ///< [count] [u] of the solids at least, certified
-  double* distance_max = nullptr;  ///< [count] [u] and at most, certified
+  double* distance_min = nullptr;  ///< [count] [u] lower bound for the solids, certified
+  double* distance_max = nullptr;  ///< [count] [u] upper bound, certified
   double* point_a = nullptr;       ///< [count][3] [u] on A's inner spheres, world
   double* point_b = nullptr;       ///< [count][3] [u] on B's inner spheres, world
   double* normal = nullptr;        ///< [count][3] unit, from A to B, world
@@ -142,52 +143,54 @@ struct GpuSeparations {
 
 /// answers[i] = separation(pairs[i]).
 ///
-/// The distance is the least of all pairs of inner spheres in double. separation() picks that pair
-/// in float, so that its distance may be more by 1e-6 of the objects' size; of several pairs as
-/// near it may have picked another. The interval is certified as there, its lower end never less.
-/// `max_visits` as in SeparationSettings; 0: no limit. Under a limit that binds the interval is
-/// certified too, yet another one than separation()'s.
-/// The same bits in every run, whatever else is in the batch.
+/// The distance is the least over all pairs of inner spheres in double. separation() selects that
+/// pair in float: its distance may be larger by 1e-6 of the objects' size, and among equally near
+/// pairs it may select another. The interval is certified as there, and its lower end is never
+/// lower. `max_visits` as in SeparationSettings; 0: no limit. Under a limit that binds the interval
+/// is certified too, but differs from that of separation(). The bits are the same in every run,
+/// whatever else is in the batch.
+///
 /// Only launches kernels on `stream`, as penetration_batch().
 ///
-/// Throws Error where a batch is larger than the workspace, the devices differ or a launch fails.
+/// Throws Error if a batch is larger than the workspace, if the devices differ, or if a launch
+/// fails.
 void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint32_t max_visits,
                       GpuWorkspace& workspace, const GpuSeparations& answers, CUstream_st* stream);
 
-/// Patches that a pair may be asked for.
+/// Largest number of patches for a pair.
 inline constexpr std::uint32_t kMostGpuPatches = 32;
 
-/// Patches, each as ContactPatch: arrays in device memory; null: not wanted.
+/// Patches, each as ContactPatch: arrays in device memory. Null pointers: not wanted.
 ///
-/// Those of pair i begin at [i · most], in the order of their ids; what lies beyond the last of
-/// them is not written.
+/// Those of pair i begin at [i · most], in the order of their ids; entries beyond the last are not
+/// written.
 struct GpuContactPatches {
   std::uint32_t most = 0;          ///< patches of a pair, up to kMostGpuPatches
   std::uint32_t* count = nullptr;  ///< [count of pairs] patches written
-  std::uint64_t* id = nullptr;     ///< those of contact_patches()
+  std::uint64_t* id = nullptr;     ///< as of contact_patches()
   double* centroid = nullptr;      ///< [3] [u] world
-  double* normal = nullptr;        ///< [3] unit, from A to B, world; zero if the area is
+  double* normal = nullptr;        ///< [3] unit, from A to B, world; zero if the area is 0
   double* area = nullptr;          ///< [u²] |force|
   double* depth = nullptr;         ///< [u] volume/area; 0 if no area
-  double* volume = nullptr;        ///< [u³] share of GpuPenetrations::volume
-  double* force = nullptr;         ///< [3] [u²] share of −translation_gradient
-  double* torque = nullptr;        ///< [3] [u³/rad] share of −rotation_gradient
+  double* volume = nullptr;        ///< [u³] part of GpuPenetrations::volume
+  double* force = nullptr;         ///< [3] [u²] part of −translation_gradient
+  double* torque = nullptr;        ///< [3] [u³/rad] part of −rotation_gradient
 };
 
 /// answers[i] and its patches = contact_patches(pairs[i]) by lenses (FieldUse::never), without
 /// limits: the contact condensed into at most `patches.most`.
 ///
-/// The same regions of the same tree as there, with the same names, unless two divisions are worth
-/// the same to a float's digits.
-/// Answers are those of penetration_batch() to its digits, not its bits; copies of one asset at
-/// nearly the same pose are asked as they are.
-/// Volumes, forces and torques of a pair's patches sum to its answer's to about 1e-15.
-/// The same bits in every run, whatever else is in the batch.
-/// Only launches kernels on `stream`, as penetration_batch(). One warp does a pair: a very large
-/// contact takes it long.
+/// Patches are the same regions of the same tree as there, with the same ids, unless two divisions
+/// are equally good to a float's digits. Answers equal those of penetration_batch() to its
+/// precision, not bit for bit; copies of one asset at nearly the same pose are not treated
+/// specially. Volumes, forces and torques of a pair's patches sum to its answer's to about 1e-15.
+/// The bits are the same in every run, whatever else is in the batch.
 ///
-/// Throws Error for Measure::exact, where a batch is larger than the workspace, more patches than
-/// kMostGpuPatches are asked for, the devices differ or a launch fails.
+/// Only launches kernels on `stream`, as penetration_batch(). One warp processes a pair, so a very
+/// large contact takes long.
+///
+/// Throws Error for Measure::exact, if a batch is larger than the workspace, if patches.most
+/// exceeds kMostGpuPatches, if the devices differ, or if a launch fails.
 void contact_patches_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
                            GpuWorkspace& workspace, const GpuPenetrations& answers,
                            const GpuContactPatches& patches, CUstream_st* stream);

@@ -1,23 +1,23 @@
 #ifndef IST_IST_H
 #define IST_IST_H
 
-/* The queries in C11: what ist::query answers, with the same bits (query.h and field.h say more of
- * each answer). Link as C++ does: the shared library needs nothing else.
+/* The queries of ist::query in C11, with the same bits. query.h and field.h describe the answers in
+ * more detail. The shared library needs nothing else at link time.
  *
- * Errors: every function that can fail returns a status; negative is an error, which
- * ist_describe() puts in words. Nothing is thrown or printed, and an argument that is null, of
- * another size or no handle gives a code.
- * Results: on an error of a call its answers are all zero but for `size` and `status`, where there
- * is room for them.
- * Sizes: a struct that starts with `size` is set up as `ist_penetration_t x = {.size = sizeof x}`;
- * all else may be 0, the default; only ist_impact_settings_t::duration has none. A library serves
- * the sizes of the headers it serves.
- * Handles: ist_tree_t and ist_workspace_t lie in memory of the caller's and are empty where all
- * zero. One that owns memory must be released once, and not be copied. Released ones are known and
- * refused; a copy of one, or memory freed under it, cannot be.
- * Threads: functions may be called from any thread. What is pointed to as const may be shared
- * while nobody changes it; all else, workspaces first, belongs to one call at a time.
- * Hot path: what takes a workspace neither allocates nor locks.
+ * Errors: every function that can fail returns a status. A negative one is an error, which
+ * ist_describe() turns into words. Nothing is thrown or printed. A null pointer, a wrong size or an
+ * invalid handle gives a status.
+ * Results: if a call fails its answers are all zero except for `size` and `status`, where they have
+ * space.
+ * Sizes: set up a struct that starts with `size` as `ist_penetration_t x = {.size = sizeof x}`. All
+ * other members may be 0, the default, except ist_impact_settings_t::duration. A library accepts
+ * the sizes of all headers that it serves.
+ * Handles: ist_tree_t and ist_workspace_t lie in the caller's memory and are empty when all zero. A
+ * handle that owns memory must be released once and must not be copied. Released handles are
+ * detected and refused; a copy of one, or freed memory under it, cannot be detected.
+ * Threads: functions may be called from any thread. Objects passed as const may be shared while
+ * nobody changes them; all others, workspaces in particular, belong to one call at a time.
+ * Hot path: functions that take a workspace neither allocate nor lock.
  * Units: lengths are [u], the unit of the mesh that was baked. */
 
 #include <stddef.h>
@@ -37,23 +37,23 @@ extern "C" {
 typedef int32_t ist_status_t;
 enum {
   IST_OK = 0,
-  /* A limit or the workspace's capacity stopped it: volume_min and volume_max hold what they hold
-   * of a finished answer. */
+  /* A limit or the workspace's capacity stopped the query. volume_min and volume_max are still
+   * bounds, as for a finished answer. */
   IST_BUDGET_EXHAUSTED = 1,
-  /* A pose with NaN or Inf or no unit quaternion, a scale < 0, sizes or distances more than 1e60 :
-   * 1 apart, a field's number or an enum out of range. */
+  /* A pose with NaN or Inf, a quaternion that is not of unit length, a scale < 0, sizes or
+   * distances more than 1e60 : 1 apart, or a field's number or an enum out of range. */
   IST_INVALID_INPUT = -1,
   IST_NULL_POINTER = -2,
-  IST_WRONG_SIZE = -3,    /* a struct's size is none that this library knows */
+  IST_WRONG_SIZE = -3,    /* a struct's size that this library does not know */
   IST_WRONG_VERSION = -4, /* headers that this library does not serve */
   IST_NO_HANDLE = -5,     /* empty, released, or never made */
   IST_NO_MEMORY = -6,
   IST_CANNOT_READ = -7, /* the file; errno may say why */
-  /* A solid does not hold what the measure asks: IST_EXACT asks for the meshes of both (a field has
-   * none), the others for spheres. All numbers of the answer are NaN. */
+  /* A solid lacks what the measure needs: IST_EXACT needs the meshes of both (a field has none),
+   * the others need spheres. All numbers of the answer are NaN. */
   IST_NOT_HELD = -15,
-  IST_NO_DURATION = -14, /* ist_impact_settings_t::duration is 0: no time is asked about */
-  /* Bytes that are no asset. */
+  IST_NO_DURATION = -14, /* ist_impact_settings_t::duration is 0 */
+  /* Bytes that are not an asset. */
   IST_TOO_SHORT = -8,      /* fewer than their header says */
   IST_MISALIGNED = -9,     /* not on a 64-byte boundary */
   IST_NOT_AN_ASSET = -10,  /* wrong magic */
@@ -62,25 +62,25 @@ enum {
   IST_CORRUPT_LAYOUT = -13 /* an offset, count or field out of range */
 };
 
-/* One English sentence, never null; of any number. */
+/* One English sentence for any number; never null. */
 const char* ist_describe(ist_status_t status);
 
 /* IST_VERSION of the library. */
 uint32_t ist_version(void);
 
-/* ist_check_version(IST_VERSION), before anything else: IST_OK or IST_WRONG_VERSION. */
+/* Call ist_check_version(IST_VERSION) first: IST_OK or IST_WRONG_VERSION. */
 ist_status_t ist_check_version(uint32_t headers);
 
 /* --- Memory ----------------------------------------------------------------------------------- */
 
-/* Where memory comes from; a null ist_allocator_t* is the C++ heap. Called by the functions that
- * take one, and by the release of what they made. Neither may throw. */
+/* Memory functions; a null ist_allocator_t* selects the C++ heap. Called by the functions that take
+ * one, and by the release of what these made. Neither may throw. */
 typedef struct ist_allocator {
   uint32_t size;
-  /* At least `bytes` bytes, at a multiple of `alignment` (a power of two), or null. */
+  /* Returns at least `bytes` bytes, at a multiple of `alignment` (a power of two), or null. */
   void* (*allocate)(void* context, size_t bytes, size_t alignment);
   void (*release)(void* context, void* memory, size_t bytes, size_t alignment);
-  void* context; /* handed to both */
+  void* context; /* passed to both */
 } ist_allocator_t;
 
 /* --- Trees ------------------------------------------------------------------------------------ */
@@ -90,19 +90,19 @@ typedef struct ist_tree {
   uint64_t opaque[8];
 } ist_tree_t;
 
-/* Views an asset in memory of the caller's: a mapped file, say. Nothing is copied or allocated.
- * `bytes`: on a 64-byte boundary; they must outlive the view and stay as they are.
- * What `tree` held before is forgotten. It need not be released, and may be copied. */
+/* Views an asset in the caller's memory, such as a mapped file. Nothing is copied or allocated.
+ * `bytes`: on a 64-byte boundary; they must outlive the view and stay unchanged.
+ * The previous content of `tree` is forgotten. A view need not be released, and may be copied. */
 ist_status_t ist_tree_view(const void* bytes, size_t size, ist_tree_t* tree);
 
 /* Reads an asset from a file into memory of `allocator` (null: the heap), which the tree owns. */
 ist_status_t ist_tree_load(const char* path, const ist_allocator_t* allocator, ist_tree_t* tree);
 
-/* Empties the tree; frees its memory if it owns it. No query may be using it. What still points to
- * the ist_tree_t is told IST_NO_HANDLE from then on. */
+/* Empties the tree and frees its memory if it owns it. No query may be using it. Afterwards objects
+ * that point to the ist_tree_t give IST_NO_HANDLE. */
 ist_status_t ist_tree_release(ist_tree_t* tree);
 
-/* What the mesh of an asset is, or why it holds none (tree_view.h). */
+/* The state of an asset's mesh (tree_view.h). */
 typedef int32_t ist_mesh_state_t;
 enum {
   IST_MESH_NONE = 0,
@@ -114,18 +114,19 @@ enum {
 
 typedef struct ist_tree_info {
   uint32_t size;
-  uint32_t has_field; /* 1: the asset holds the solid's surface, so that queries can be exact */
-  uint64_t spheres;   /* count; 0: a surface alone, of which spheres cannot be asked */
+  uint32_t has_field; /* 1: the asset stores the solid's surface, which makes queries of spheres
+                         exact */
+  uint64_t spheres;   /* count; 0: a surface alone, without spheres to query */
   double volume;      /* [u³] of the solid */
-  double coverage;    /* [0, 1] share of it in inner spheres */
-  double protrusion;  /* [u] no matched sphere sticks further out of the solid */
+  double coverage;    /* [0, 1] share of the volume in inner spheres */
+  double protrusion;  /* [u] bound on how far matched spheres stick out of the solid */
   double field_error; /* [u] the stored surface and the solid's lie within this of each other */
   uint32_t field_triangles; /* of that surface */
   uint32_t details;         /* levels of detail of the matched spheres: 0 is the finest */
   uint32_t mesh_triangles;  /* of the mesh kept for exact queries; 0: there is none */
   ist_mesh_state_t mesh_state;
   double mesh_error;    /* [u] the mesh's surface and the solid's lie within this of each other */
-  double counted_twice; /* [u³] volume that the mesh as it came counts more than once */
+  double counted_twice; /* [u³] volume that the input mesh counts more than once */
 } ist_tree_info_t;
 
 ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info);
@@ -141,30 +142,29 @@ enum {
   IST_TRIAL_PLATE = 5
 };
 
-/* Overlaps of a class, and by how much their volumes are wrong. */
+/* A class of overlaps, and the error of their volumes. */
 typedef struct ist_overlap_class {
-  double from, to; /* [0, 1] of the smaller solid's volume; both 1: it lies inside */
-  double median;   /* ≥ 0, 0.01 = 1 %; 0 too where no such pose was found */
+  double from, to; /* [0, 1] of the smaller solid's volume; both 1: it is contained */
+  double median;   /* ≥ 0, 0.01 = 1 %; 0 also if no such pose was found */
 } ist_overlap_class_t;
 
-/* PredictedErrors: of penetration volumes, as the bake measured them. Errors are shares of the
- * overlap's volume. */
+/* PredictedErrors: errors of penetration volumes, as the bake measured them, relative. */
 typedef struct ist_predicted_errors {
   uint32_t size;
-  uint32_t poses;                 /* behind all classes together; 0: nothing is predicted */
+  uint32_t poses;                 /* of all classes together; 0: nothing is predicted */
   ist_overlap_class_t classes[5]; /* of two copies of the solid, deepest first */
-  double target_error;            /* asked for; 0: none was */
-  double target_overlap;          /* where it was asked for */
-  double measured_error;          /* median near target_overlap, of the partner worst there */
+  double target_error;            /* requested; 0: none */
+  double target_overlap;          /* overlap for which it was requested */
+  double measured_error;          /* median near target_overlap, of the worst partner there */
   uint32_t measured_poses;        /* of all partners; 0: nothing was measured there */
   ist_trial_partner_t worst_partner;
-  uint32_t target_met; /* 0 or 1: asked for, measured and reached */
+  uint32_t target_met; /* 0 or 1: requested, measured and reached */
 } ist_predicted_errors_t;
 
-/* No poses for an asset that was baked without asking for an error. */
+/* Without poses for an asset that was baked without an error target. */
 ist_status_t ist_tree_get_predicted_errors(const ist_tree_t* tree, ist_predicted_errors_t* errors);
 
-/* MassProperties: of a solid of density 1. Times a density: mass, and inertia of that mass. */
+/* MassProperties: of a solid of density 1. Multiply by a density for mass and inertia. */
 typedef struct ist_mass_properties {
   uint32_t size;
   ist_status_t status;
@@ -176,7 +176,7 @@ typedef struct ist_mass_properties {
   double inertia_error;        /* [u⁵] of each entry */
 } ist_mass_properties_t;
 
-/* Bounds: what holds a solid. */
+/* Bounds: a box and a ball that contain the solid. */
 typedef struct ist_bounds {
   uint32_t size;
   ist_status_t status;
@@ -192,14 +192,14 @@ ist_status_t ist_tree_get_bounds(const ist_tree_t* tree, ist_bounds_t* bounds);
 /* --- What a tree holds, for pictures (asset_layout.h) ------------------------------------------
  */
 
-/* Measure: what stands for the solid. */
+/* Measure: what represents the solid. */
 typedef int32_t ist_measure_t;
 enum {
   IST_MATCHED = 0, /* spheres whose volumes sum to the solid's: the accurate ones */
   IST_INNER = 1,   /* spheres inside the solid: a certified lower bound of the true volume */
   /* The two meshes: the true volume and its gradients. For penetrations and contact patches of two
-   * trees that hold their mesh (ist_tree_info_t::mesh_triangles); what asks for balls or lenses
-   * answers IST_INVALID_INPUT. */
+   * trees that store their mesh (ist_tree_info_t::mesh_triangles). Functions about balls or lenses
+   * return IST_INVALID_INPUT. */
   IST_EXACT = 2
 };
 
@@ -208,7 +208,7 @@ typedef struct ist_ball {
   double radius;    /* [u] */
 } ist_ball_t;
 
-/* Which balls. */
+/* Selects balls. */
 typedef struct ist_ball_set {
   uint32_t size;
   ist_measure_t measure;
@@ -218,8 +218,8 @@ typedef struct ist_ball_set {
   uint32_t level;
 } ist_ball_set_t;
 
-/* `count`: balls in the set, of which the first `capacity` are written; `balls` may be null if that
- * is 0. IST_INVALID_INPUT, and a count of 0, where there is no such detail or level. */
+/* `count`: balls in the set; the first `capacity` of them are written. `balls` may be null if that
+ * is 0. IST_INVALID_INPUT, and a count of 0, if there is no such detail or level. */
 ist_status_t ist_tree_get_balls(const ist_tree_t* tree, const ist_ball_set_t* set,
                                 ist_ball_t* balls, size_t capacity, size_t* count);
 
@@ -230,10 +230,10 @@ typedef struct ist_surface {
   double (*vertices)[3];    /* [u] [vertex_capacity] in the asset's own frame */
   uint32_t (*triangles)[3]; /* [triangle_capacity] three vertices each */
   size_t vertex_capacity, triangle_capacity;
-  size_t vertex_count, triangle_count; /* answer: those there are; 0 without a surface */
+  size_t vertex_count, triangle_count; /* answer: total counts; 0 without a surface */
 } ist_surface_t;
 
-/* Writes as many as there is room for. An array may be null if its capacity is 0. */
+/* Writes as many as fit. An array may be null if its capacity is 0. */
 ist_status_t ist_tree_get_surface(const ist_tree_t* tree, ist_surface_t* surface);
 
 /* --- Places ----------------------------------------------------------------------------------- */
@@ -276,7 +276,7 @@ enum {
   IST_MESH = 9
 };
 
-/* What a look at a field tells. */
+/* A sample of a field. */
 typedef struct ist_field_sample {
   double distance;    /* [u] to the surface, positive inside */
   double gradient[3]; /* of the distance */
@@ -299,17 +299,17 @@ typedef struct ist_field {
     struct {
       double radius; /* [u] > 0, around the origin */
     } ball;
-    /* about the z axis; of a capsule half_height is the segment's */
+    /* about the z axis; for a capsule half_height is the segment's */
     struct {
       double radius;      /* [u] > 0 */
       double half_height; /* [u] > 0; of a capsule ≥ 0 */
     } capsule, cylinder;
-    /* the solid under a grid of heights along z; beyond its border it goes on level */
+    /* the solid under a grid of heights along z; beyond its border it continues level */
     struct {
       const float* heights;   /* [u] [rows · columns], columns (x) run fastest */
       uint32_t columns, rows; /* ≥ 2 */
-      double spacing[2];      /* [u] > 0, along x and y; heights[0] stands at the origin */
-      double lowest, highest; /* [u] no height is lower or higher; both 0: not told */
+      double spacing[2];      /* [u] > 0, along x and y; heights[0] is at the origin */
+      double lowest, highest; /* [u] bounds of all heights; both 0: unknown */
     } heights;
     /* distances at the points of a grid; outside of it is outside of the solid */
     struct {
@@ -317,15 +317,15 @@ typedef struct ist_field {
       uint32_t points[3];     /* along x, y, z, each ≥ 2 */
       double origin[3];       /* [u] of the first point */
       double spacing;         /* [u] > 0 */
-      double error;           /* [u] the interpolated distance is off by at most this */
+      double error;           /* [u] bound on the error of the interpolated distance */
     } distance_grid;
-    /* whatever answers; called on the thread of the query, and may not throw */
+    /* a function of the caller's, called on the thread of the query; it may not throw */
     struct {
       void (*look)(const void* context, const double x[3], ist_field_sample_t* sample);
-      const void* context; /* handed to `look` */
-      double error;        /* [u] distances are off by at most this */
+      const void* context; /* passed to `look` */
+      double error;        /* [u] bound on the error of distances */
     } function;
-    /* the surface in an asset, without its spheres */
+    /* the stored surface of an asset, without its spheres */
     struct {
       const ist_tree_t* tree;
     } mesh;
@@ -343,14 +343,14 @@ typedef struct ist_placed_field {
 
 /* --- Workspaces ------------------------------------------------------------------------------- */
 
-/* Scratch memory of queries, one a thread. All zero: empty. */
+/* Scratch memory of queries, one per thread. All zero: empty. */
 typedef struct ist_workspace {
   uint64_t opaque[8];
 } ist_workspace_t;
 
-/* `capacity`: count of node pairs that may wait at once; 0 is the default, 1,048,576, which serves
- * two trees of 64,000 spheres at any pose. Takes 40 bytes each, touched as they are needed.
- * `allocator`: null is the heap. What `workspace` held before is forgotten. */
+/* `capacity`: count of node pairs that may wait at once, 40 bytes each, touched as needed. 0 is the
+ * default, 1,048,576, which serves two trees of 64,000 spheres at any pose.
+ * `allocator`: null is the heap. The previous content of `workspace` is forgotten. */
 ist_status_t ist_workspace_make(size_t capacity, const ist_allocator_t* allocator,
                                 ist_workspace_t* workspace);
 ist_status_t ist_workspace_release(ist_workspace_t* workspace);
@@ -360,8 +360,8 @@ ist_status_t ist_workspace_release(ist_workspace_t* workspace);
 typedef int32_t ist_field_use_t;
 enum { IST_FIELD_AUTOMATIC = 0, IST_FIELD_NEVER = 1, IST_FIELD_ALWAYS = 2 };
 
-/* PenetrationSettings. IST_EXACT heeds max_visits alone; where that stops it, the matched spheres
- * answer (NaN where there are none), with bounds that hold the true volume. */
+/* PenetrationSettings. IST_EXACT obeys max_visits only. If that stops it, the answer is that of the
+ * matched spheres (NaN if there are none), with bounds of the true volume. */
 typedef struct ist_penetration_settings {
   uint32_t size;
   ist_measure_t measure;
@@ -398,13 +398,13 @@ typedef struct ist_penetration {
   uint32_t size;
   ist_status_t status;
   double volume; /* [u³] */
-  /* [u³] By IST_EXACT bounds: the true volume lies within. By spheres the finished sum lies within,
-   * with its rounding; how near it is to the true volume they do not say. */
+  /* [u³] With IST_EXACT: bounds of the true volume. By spheres: bounds of the finished sum, with
+   * its rounding; they do not bound the true volume. */
   double volume_min, volume_max;
   double centroid[3];             /* [u] of the overlap, world */
   double translation_gradient[3]; /* [u²] dV/d(translation of B), world */
   double rotation_gradient[3];    /* [u³/rad] dV/d(rotation vector of B about B's origin), world */
-  uint32_t node_visits, sphere_pairs; /* by IST_EXACT: triangles that cross */
+  uint32_t node_visits, sphere_pairs; /* with IST_EXACT: crossing triangles */
 } ist_penetration_t;
 
 /* Separation: all zero once inner spheres overlap. */
@@ -422,15 +422,15 @@ typedef struct ist_separation {
 typedef struct ist_contact_patch {
   uint64_t id;        /* the same region in every query of the same two trees */
   double centroid[3]; /* [u] world */
-  double normal[3];   /* unit, the direction in which the patch pushes B; zero if the area is */
+  double normal[3];   /* unit, the direction in which the patch pushes B; zero if the area is 0 */
   double area;        /* [u²] */
   double depth;       /* [u] volume/area */
   double volume;      /* [u³] */
-  double force[3];    /* [u²] the push on B of a pressure of 1 [force/u²] */
+  double force[3];    /* [u²] force on B of a pressure of 1 [force/u²] */
   double torque[3];   /* [u³/rad] about B's origin */
 } ist_contact_patch_t;
 
-/* Room for patches. */
+/* Space for patches. */
 typedef struct ist_contact_patches {
   uint32_t size;
   uint32_t patch_size;          /* sizeof(ist_contact_patch_t) */
@@ -439,16 +439,31 @@ typedef struct ist_contact_patches {
   size_t count; /* answer: patches written */
 } ist_contact_patches_t;
 
+/* OutlineSegment: a piece of the curve on which two surfaces cross. */
+typedef struct ist_outline_segment {
+  double from[3], to[3]; /* [u] world */
+  uint32_t patch;        /* number of the patch that it bounds; 0 without room for patches */
+} ist_outline_segment_t;
+
+/* Room for an outline. */
+typedef struct ist_outline {
+  uint32_t size;
+  uint32_t segment_size;           /* sizeof(ist_outline_segment_t) */
+  ist_outline_segment_t* segments; /* [capacity] */
+  size_t capacity;
+  size_t total, count; /* answer: segments there are, and segments written */
+} ist_outline_t;
+
 /* --- Queries of two trees. Trees may be shared by threads; the workspace may not. ------------- */
 
-/* Each returns the status that its answer holds, or an error of the call. */
+/* Each returns the status of its answer, or an error of the call. */
 
 ist_status_t ist_penetration(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
                              const ist_penetration_settings_t* settings, ist_workspace_t* workspace,
                              ist_penetration_t* answer);
 
-/* `answer` without what protruding spheres add where flat faces meet; `whole` is what
- * ist_penetration() answered by lenses (IST_FIELD_NEVER) and may be the same struct. */
+/* Removes from an answer what protruding spheres add where flat faces meet. `whole` is the answer
+ * of ist_penetration() by lenses (IST_FIELD_NEVER), and may be the same struct as `answer`. */
 ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_placed_tree_t* a,
                                     const ist_placed_tree_t* b, ist_penetration_t* answer);
 
@@ -460,18 +475,18 @@ ist_status_t ist_separation(const ist_placed_tree_t* a, const ist_placed_tree_t*
 typedef int32_t ist_overlapping_t;
 enum { IST_OVERLAP_NO = 0, IST_OVERLAP_YES = 1, IST_OVERLAP_UNKNOWN = 2 };
 
-/* A fraction of what a penetration takes. On an error, and for invalid input: unknown. */
+/* Takes a fraction of the time of a penetration. On an error, and for invalid input: unknown. */
 ist_status_t ist_overlap(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
                          ist_workspace_t* workspace, ist_overlapping_t* answer);
 
-/* PairFit: how two assets suit each other, whatever their poses. */
+/* PairFit: whether the sizes of two assets suit each other, independent of their poses. */
 typedef struct ist_pair_fit {
   uint32_t size;
   ist_status_t status;
-  double grain_a, grain_b; /* [u] what is finer than that, the spheres do not know */
-  double ratio;            /* ≥ 1, of the coarser grain over the finer */
+  double grain_a, grain_b; /* [u] the spheres do not resolve finer features */
+  double ratio;            /* ≥ 1, coarser grain over the finer */
   uint32_t a_is_coarser;   /* 0 or 1, as are the others */
-  uint32_t has_surface;    /* the coarser asset holds its surface */
+  uint32_t has_surface;    /* the coarser asset stores its surface */
   uint32_t needs_surface;  /* volumes and forces by spheres alone mislead */
   uint32_t fits;           /* has_surface or not needs_surface */
 } ist_pair_fit_t;
@@ -492,9 +507,19 @@ ist_status_t ist_contact_patches(const ist_placed_tree_t* a, const ist_placed_tr
                                  const ist_contact_settings_t* settings, ist_workspace_t* workspace,
                                  ist_contact_patches_t* patches, ist_penetration_t* whole);
 
-/* Takes out of patches, in their place, what protruding spheres add where flat faces meet: each by
- * its own depth. A patch of which nothing is left stays, with zeros.
- * `patches`: as ist_contact_patches() wrote them for these two under these settings. */
+/* The patches of IST_EXACT, whatever the settings say, and their outlines: segments of the closed
+ * curves on which the surfaces cross, A's surface inside B to the left of each seen from outside A.
+ * A patch that lies inside the other solid as a whole has none.
+ * IST_BUDGET_EXHAUSTED: max_visits stopped it. There is no outline, and the matched spheres'
+ * patches are written. `whole`: may be null. */
+ist_status_t ist_overlap_outline(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                 const ist_contact_settings_t* settings, ist_workspace_t* workspace,
+                                 ist_contact_patches_t* patches, ist_outline_t* outline,
+                                 ist_penetration_t* whole);
+
+/* Removes from patches, in place, what protruding spheres add where flat faces meet, each by its
+ * own depth. A patch of which nothing is left stays, with zeros.
+ * `patches`: those that ist_contact_patches() wrote for these two under these settings. */
 ist_status_t ist_patches_without_protrusion(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
                                             const ist_contact_settings_t* settings,
                                             ist_contact_patches_t* patches);
@@ -506,22 +531,22 @@ typedef struct ist_lens_settings {
   uint32_t detail_a, detail_b;
 } ist_lens_settings_t;
 
-/* OverlapLens: what two spheres share. */
+/* OverlapLens: the overlap of two spheres. */
 typedef struct ist_lens {
-  double centre[3];            /* [u] the middle of its thickness, world */
+  double centre[3];            /* [u] middle of its thickness, world */
   double axis[3];              /* unit, from A's sphere to B's, world */
   double radius;               /* [u] where it is widest, across the axis */
   double thickness;            /* [u] along the axis */
   uint32_t sphere_a, sphere_b; /* in insertion order */
 } ist_lens_t;
 
-/* Room for lenses. */
+/* Space for lenses. */
 typedef struct ist_lenses {
   uint32_t size;
   uint32_t lens_size; /* sizeof(ist_lens_t) */
   ist_lens_t* lenses; /* [capacity] */
   size_t capacity;
-  size_t total, count; /* answer: lenses there are, and lenses written */
+  size_t total, count; /* answer: number of lenses, and of lenses written */
 } ist_lenses_t;
 
 /* For pictures (lenses.h). Needs no workspace. IST_INVALID_INPUT also for a level of detail that a
@@ -553,14 +578,14 @@ ist_status_t ist_field_contact_patches(const ist_placed_field_t* a, const ist_pl
                                        ist_workspace_t* workspace, ist_contact_patches_t* patches,
                                        ist_penetration_t* whole);
 
-/* --- Wrenches (wrench.h): what a contact does to both bodies ---------------------------------- */
+/* --- Wrenches (wrench.h): force and torque on both bodies ------------------------------------- */
 
-/* They need no workspace. */
+/* These functions need no workspace. */
 
-/* Of a pressure of 1: −dV by the body's motion. */
+/* For a pressure of 1: −dV by the body's motion. */
 typedef struct ist_wrench {
   double force[3];  /* [u²] out of the other body */
-  double torque[3]; /* [u³] about the point that was named */
+  double torque[3]; /* [u³] about the given point */
 } ist_wrench_t;
 
 typedef struct ist_wrenches {
@@ -570,7 +595,7 @@ typedef struct ist_wrenches {
 
 /* A body's velocity. */
 typedef struct ist_twist {
-  double point[3];            /* [u] a point of the body, now */
+  double point[3];            /* [u] a point of the body at present */
   double velocity[3];         /* [u/s] of that point */
   double angular_velocity[3]; /* [rad/s] */
 } ist_twist_t;
@@ -591,9 +616,9 @@ ist_status_t ist_patch_volume_rate(const ist_contact_patch_t* patch, const ist_p
                                    const ist_twist_t* motion_a, const ist_twist_t* motion_b,
                                    double* rate);
 
-/* --- Time of impact (time_of_impact.h). [T] is a unit of time of the caller's own ------------- */
+/* --- Time of impact (time_of_impact.h). [T] is a unit of time of the caller's ----------------- */
 
-/* Of constant velocity: one point goes straight on, and the object turns about it. */
+/* Constant velocity: one point moves straight, and the object turns about it. */
 typedef struct ist_motion {
   double velocity[3];         /* [u/T] of `about`, world */
   double angular_velocity[3]; /* [rad/T] world */
@@ -605,7 +630,7 @@ typedef struct ist_motion {
 ist_status_t ist_motion_between(const ist_pose_t* from, const ist_pose_t* to, double duration,
                                 const double about[3], double scale, ist_motion_t* motion);
 
-/* Where an object of that scale is at a time of its motion. */
+/* The pose of an object of that scale after `time` of its motion. */
 ist_status_t ist_moved(const ist_pose_t* start, double scale, const ist_motion_t* motion,
                        double time, ist_pose_t* pose);
 
@@ -613,32 +638,33 @@ typedef int32_t ist_impact_kind_t;
 enum {
   IST_NO_IMPACT = 0,         /* clear of each other over the whole interval */
   IST_IMPACT = 1,            /* at `time` no further apart than the tolerance, and approaching */
-  IST_IMPACT_UNRESOLVED = 2, /* clear up to `time`; what comes then cannot be told so finely */
+  IST_IMPACT_UNRESOLVED = 2, /* clear up to `time`; a later contact can be neither shown nor
+                                ruled out */
   IST_IMPACT_OVERLAPPING = 3 /* they meet at the start */
 };
 
 /* ImpactSettings; a null pointer is a duration of 1 and defaults. */
 typedef struct ist_impact_settings {
   uint32_t size;
-  uint32_t max_visits; /* count of pairs of nodes looked at; 0: any */
-  double duration;     /* [T] > 0: what happens in [0, duration] is asked */
-  double tolerance;    /* [u] 0: a thousandth of the smaller solid's bounding radius,
-                          or ten times what fields may err if that is more */
+  uint32_t max_visits; /* count of node pairs visited; 0: no limit */
+  double duration;     /* [T] > 0: the interval is [0, duration] */
+  double tolerance;    /* [u] 0: a thousandth of the smaller solid's bounding radius, or ten
+                          times the error of the fields if that is more */
   double deadline_us;  /* [µs] 0: none */
 } ist_impact_settings_t;
 
 /* TimeOfImpact */
 typedef struct ist_impact {
   uint32_t size;
-  ist_status_t status; /* IST_BUDGET_EXHAUSTED: clear up to `time`, which a limit ended */
+  ist_status_t status; /* IST_BUDGET_EXHAUSTED: a limit; clear up to `time` */
   ist_impact_kind_t kind;
   uint32_t node_visits, surface_pairs;
   double time; /* [T] certified: the solids do not touch before */
-  /* [u] The solids' distance then lies within, certified; distance_min may be next to 0 of an
-   * impact too. That they do not touch before is what `time` says. */
+  /* [u] Certified bounds of the solids' distance at `time`. distance_min may be nearly 0, also for
+   * an impact; `time` is the proof that the solids do not touch before. */
   double distance_min, distance_max;
-  double point_a[3], point_b[3]; /* [u] the nearest points then, world; others may be nearer by a
-                                    part of the tolerance */
+  double point_a[3], point_b[3]; /* [u] points of A and B at `time`, world; others may be nearer
+                                    by a part of the tolerance */
   double normal[3];              /* unit, from A to B, world */
 } ist_impact_t;
 
@@ -663,21 +689,21 @@ typedef struct ist_field_pair {
   const ist_placed_tree_t* b;
 } ist_field_pair_t;
 
-/* The caller's threads. */
+/* Runs a batch on the caller's threads. */
 typedef struct ist_parallel {
   uint32_t size;
-  /* Calls work(batch, i) once for each i in [0, workers), on any threads, at the same time or one
-   * after another, and returns when all calls have. Null: the calling thread does it all. */
+  /* Calls work(batch, i) once for each i in [0, workers), on any threads, concurrently or not, and
+   * returns when all calls have returned. Null: the calling thread does it all. */
   void (*run)(void* pool, size_t workers, void (*work)(void* batch, size_t worker), void* batch);
-  void* pool; /* handed to `run` */
+  void* pool; /* passed to `run` */
 } ist_parallel_t;
 
 /* answers[i] is that of ist_penetration(pairs[i]), with its status, errors included.
  * `answer_size`: sizeof(ist_penetration_t); the answers' own `size` is written, not read.
- * `workspaces`: [workers], one a worker, each made; none: every answer is IST_BUDGET_EXHAUSTED with
- * no upper bound.
- * `parallel`: null is the calling thread. No lock or allocation but its own.
- * Returns an error of the call, in which case no pair was looked at, or IST_OK. */
+ * `workspaces`: [workers], one per worker, each made; without any, every answer is
+ * IST_BUDGET_EXHAUSTED with no upper bound.
+ * `parallel`: null is the calling thread. No lock or allocation except its own.
+ * Returns IST_OK, or an error of the call; then no pair was evaluated. */
 ist_status_t ist_penetration_batch(const ist_pair_t* pairs, size_t count,
                                    const ist_penetration_settings_t* settings,
                                    ist_workspace_t* workspaces, size_t workers,
@@ -692,9 +718,9 @@ ist_status_t ist_field_penetration_batch(const ist_field_pair_t* pairs, size_t c
 
 /* patches[i] and wholes[i] are what ist_contact_patches(pairs[i]) writes; wholes[i] has its status,
  * errors included.
- * `patches`: [count], each set up with room of its own.
+ * `patches`: [count], each set up with its own space.
  * `whole_size`: sizeof(ist_penetration_t); the wholes' own `size` is written, not read.
- * All else as ist_penetration_batch() has it. */
+ * All else as for ist_penetration_batch(). */
 ist_status_t ist_contact_patches_batch(const ist_pair_t* pairs, size_t count,
                                        const ist_contact_settings_t* settings,
                                        ist_workspace_t* workspaces, size_t workers,

@@ -10,16 +10,17 @@
 
 namespace IST_API ist {
 
-/// Which spheres of two trees are put together.
+/// Which spheres of two trees are intersected.
 struct LensSettings {
-  Measure measure = Measure::matched;  ///< not exact, which has no spheres
-  /// Levels of detail of the matched sets, 0 the finest; 0 of inner spheres, which have one.
+  Measure measure = Measure::matched;  ///< matched or inner
+  /// Levels of detail of the matched sets, 0 the finest; 0 for inner spheres, which have one.
   std::uint32_t detail_a = 0, detail_b = 0;
 };
 
-/// What two spheres share, for drawing: an ellipsoid of this size about this centre looks like it.
+/// The overlap of two spheres, for drawing: an ellipsoid of this size about this centre resembles
+/// it.
 struct OverlapLens {
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< [u] the middle of its thickness, world
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< [u] middle of its thickness, world
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();   ///< unit, from A's sphere to B's, world
   double radius = 0;                                 ///< [u] where it is widest, across the axis
   double thickness = 0;                              ///< [u] along the axis
@@ -30,15 +31,15 @@ struct OverlapLens {
 struct OverlapLenses {
   /// invalid_input also for Measure::exact and for a level of detail that a tree does not have.
   QueryStatus status = QueryStatus::ok;
-  std::size_t total = 0;  ///< lenses there are
+  std::size_t total = 0;  ///< number of lenses
   std::size_t count = 0;  ///< lenses written
 };
 
-/// The lenses of two placed trees, in the order of the trees, as many as there is room for: what
-/// penetration() sums where it sums lenses.
+/// The lenses of two placed trees, in the order of the trees, as many as fit: those that
+/// penetration() sums when it sums lenses.
 ///
-/// For pictures: pair by pair, some ten times slower than penetration().
-/// No allocation, lock or exception. Trees may be shared by threads.
+/// For pictures: pair by pair, some ten times slower than penetration(). No allocation, lock or
+/// exception. Trees may be shared by threads.
 OverlapLenses overlap_lenses(const PlacedTree& a, const PlacedTree& b, const LensSettings& settings,
                              std::span<OverlapLens> lenses) noexcept;
 

@@ -14,7 +14,7 @@
 namespace IST_API ist {
 
 /// Signed distances at the points of a lattice, positive inside. A band around the surface
-/// suffices: beyond it any value of the right sign will do.
+/// suffices: beyond it only the sign matters.
 struct DistanceGrid {
   std::array<std::uint32_t, 3> size = {};            ///< points along x, y, z, each ≥ 2
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< [u] of the first point
@@ -29,13 +29,13 @@ struct LevelSetMesh {
 };
 
 /// The solid where the trilinear interpolation of a grid is > 0, as a mesh: a vertex in every cell
-/// of eight points of two signs, edges and corners kept sharp. From there on it is a mesh like any
-/// other: bake() takes it, on a GPU too, and check() proves against it.
+/// whose eight points have both signs, with sharp edges and corners. It is a mesh like any other:
+/// bake() takes it, also on a GPU, and check() proves against it.
 ///
-/// What distances there are inside is found from the mesh, so that a narrow band costs nothing. The
-/// values need not be distances: their zero alone counts. The error is proven from the steepest
-/// slope near the surface, and comes out larger where slopes there differ much.
-/// On the current threads of TBB. Same bytes for any number of them.
+/// Distances inside are computed from the mesh, so a narrow band is enough. Values need not be
+/// distances: only their zero counts. The error is proven from the steepest slope near the surface,
+/// and is larger where slopes differ much there. Runs on the current threads of TBB; the bytes do
+/// not depend on their number.
 ///
 /// Throws Error, naming `name`, for sizes that do not fit, values that are not finite, a grid that
 /// is nowhere inside, a solid that reaches the grid's border, and if progress cancels (stage
@@ -46,16 +46,16 @@ LevelSetMesh mesh_level_set(const DistanceGrid& grid, const std::string& name,
 /// The same as a Solid, by its mesh.
 std::unique_ptr<Solid> make_grid_solid(const DistanceGrid& grid);
 
-/// True where this library was built with OpenVDB.
+/// Whether this library was built with OpenVDB.
 bool vdb_available() noexcept;
 
 /// The level set of an OpenVDB file: its one grid, of floats and marked as a level set (negative
-/// inside, as OpenVDB has it), any linear transform. [u] is the file's world unit.
+/// inside, as in OpenVDB), with any linear transform. [u] is the file's world unit.
 ///
-/// load_mesh() reads a .vdb this way too, so that whatever takes a mesh file takes such a file.
-/// OpenVDB reads the file: not for files that nobody vouches for.
+/// load_mesh() reads a .vdb this way too, so every function that takes a mesh file takes such a
+/// file. OpenVDB reads the file: do not use it for untrusted files.
 ///
-/// Throws Error (file, what is wrong, way out) for a file of several grids or none, a grid of
+/// Throws Error (file, what is wrong, remedy) for a file of several grids or none, a grid of
 /// another kind, a fog volume, as mesh_level_set() does, and without OpenVDB.
 LevelSetMesh load_vdb(const std::string& path, const ProgressCallback& progress = {});
 

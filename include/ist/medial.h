@@ -15,9 +15,9 @@ namespace IST_API ist {
 /// A point of a solid's medial axis, where a ball touches the surface from several sides.
 struct MedialNode {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< [u], the mesh's frame
-  double radius = 0;  ///< [u] its distance from the surface, within 4e-6 of the half-extent
+  double radius = 0;  ///< [u] distance from the surface, within 4e-6 of the half-extent
   int contacts =
-      0;  ///< directions to the surface over 45° apart that were seen there: 2, 3 or 4 (or more)
+      0;  ///< directions to the surface over 45° apart that were found: 2, 3 or 4 (or more)
 };
 
 struct MedialSettings {
@@ -26,15 +26,15 @@ struct MedialSettings {
   std::uint64_t seed = 0;  ///< another seed, other nodes of the same axis
   unsigned threads = 0;    ///< 0 = all cores; never changes the result
   Device device = Device::automatic;
-  GpuSettings gpu = {};  ///< where `device` is a GPU
+  GpuSettings gpu = {};  ///< if `device` is a GPU
 };
 
 /// An approximation of the medial axis: the first round of a grid packing.
 ///
-/// One prototype a grid cell flees from the surface, confined to its cell.
-/// Those that come to rest between surface points over 45° apart are the nodes: Voronoi nodes where
-/// they meet four, else points of the axis' sheets and seams.
-/// Ordered by cell; the same for any device and number of threads.
+/// One prototype a grid cell moves away from the surface, confined to its cell. Those that come to
+/// rest between surface points over 45° apart are the nodes: Voronoi nodes between four, else
+/// points of the axis' sheets and seams. Ordered by cell; the same for any device and number of
+/// threads.
 ///
 /// Throws Error on settings out of range, and for a Solid that is not a mesh.
 std::vector<MedialNode> medial_nodes(const Solid& solid, const MedialSettings& settings = {});

@@ -14,12 +14,12 @@
 
 namespace IST_API ist {
 
-/// How the space is searched for the next spheres. All modes but `banded` are the paper's.
+/// How space is searched for the next spheres. All modes except `banded` are the paper's.
 enum class GridMode : std::uint32_t {
   banded = 0,               ///< ours: a greedy packing with a guarantee
   uniform = 1,              ///< original ProtoSphere: one fixed, fine grid
   explicit_refinement = 2,  ///< one grid, coarse at first, split in 8 every few rounds
-  implicit_refinement = 3,  ///< prototypes on a grid that is refined, distances on a fixed fine one
+  implicit_refinement = 3,  ///< prototypes on a refined grid, distances on a fixed fine one
   hybrid = 4,               ///< both refined together
 };
 
@@ -27,19 +27,21 @@ enum class GridMode : std::uint32_t {
 enum class Device : std::uint32_t {
   automatic,  ///< the GPU if there is one, else the CPU
   cpu,
-  cuda,  ///< an Error where gpu_available() is false
+  cuda,  ///< throws Error if gpu_available() is false
 };
 
-/// The surface that an asset keeps: its mesh, which Measure::exact asks, and its field, by which
-/// the other measures are exact where spheres are too coarse.
+/// What an asset stores of the surface: its mesh, which Measure::exact needs, and its field, which
+/// makes the other measures exact where spheres are too coarse.
 struct SurfaceSettings {
-  bool wanted = true;  ///< false: neither
-  /// [u] How far it may be from the mesh's: as few triangles as that allows. 0: all of the mesh's.
+  bool wanted = true;  ///< false: neither mesh nor field
+  /// [u] Allowed distance from the mesh's surface: as few triangles as that allows. 0: all of the
+  /// mesh's.
   double error = 0;
-  double share = 0;  ///< [0, 1) the same of the longest side of the mesh's bounds, if `error` is 0
+  double share = 0;  ///< [0, 1) the same as a share of the longest side of the mesh's bounds, if
+                     ///< `error` is 0
 };
 
-/// What a packing may cost and how far it goes. The first limit met stops it.
+/// Limits of a packing, and its options. The first limit met stops it.
 struct PackingSettings {
   std::size_t max_spheres =
       10'000;                    ///< count, exactly met unless another limit is first; 0 = no limit
@@ -50,23 +52,23 @@ struct PackingSettings {
   /// round began. 0 = automatic: the library's schedule, fastest at equal coverage.
   double epsilon = 0.0;
   GridMode grid = GridMode::banded;
-  GridSettings grids = {};            ///< of the other modes
+  GridSettings grids = {};            ///< for the other modes
   std::uint64_t seed = 0;             ///< tie-breaks only; any value packs equally well
   unsigned threads = 0;               ///< 0 = all cores; never changes the result
   Device device = Device::automatic;  ///< a Solid that is not a mesh is always packed on the CPU
-  GpuSettings gpu = {};               ///< where `device` is a GPU
-  SurfaceSettings surface = {};       ///< of an asset; packing alone makes none
+  GpuSettings gpu = {};               ///< if `device` is a GPU
+  SurfaceSettings surface = {};       ///< for an asset; pack() ignores it
 };
 
 /// Certified, non-overlapping spheres inside a solid, in insertion order.
 ///
-/// Every prefix is a valid packing, and under the greedy order a good one of its size.
+/// Every prefix is a valid packing and, under the greedy order, a good one of its size.
 struct SpherePacking {
   UnitFrame frame;
   std::vector<Sphere> spheres;
   StopReason stop = StopReason::sphere_count;
   double coverage = 0;  ///< [0, 1] of the solid's volume
-  /// Min over spheres of radius / largest live bound at insertion; 1 for modes that keep no bound.
+  /// Min over spheres of radius / largest live bound at insertion; 1 for modes without a bound.
   double kept_ratio_worst = 1;
   double kept_ratio_median = 1;  ///< median of the same
   bool below_float_noise =
@@ -76,9 +78,8 @@ struct SpherePacking {
 
 /// Fills a solid with certified spheres, large ones first.
 ///
-/// Same solid and settings give the same spheres, bit for bit, for any number of threads (a time
-/// limit or cancel excepted).
-/// A cancelled packing ends with what is packed so far.
+/// The same solid and settings give the same spheres, bit for bit, for any number of threads
+/// (except for a time limit or cancel). A cancelled packing returns what is packed so far.
 ///
 /// Throws Error on settings out of range.
 SpherePacking pack(const Solid& solid, const PackingSettings& settings = {},

@@ -4,7 +4,8 @@
 
 namespace IST_API ist {
 
-/// Rigid motion that takes an object's own frame into the world: x_world = R(q) x + t.
+/// Rigid motion from an object's own frame to the world: x_world = R(q) x + t.
+///
 /// Plain data of 56 bytes under every compiler flag. `pose_eigen.h` converts from and to Eigen.
 struct Pose {
   double q[4] = {1, 0, 0, 0};  ///< quaternion w, x, y, z; within 1e-3 of unit length

@@ -7,7 +7,7 @@
 
 namespace IST_API ist {
 
-/// Pose of a rigid Eigen transform; `x` must hold a rotation (no scale or shear).
+/// Pose of a rigid Eigen transform; `x` must be a rotation and a translation (no scale or shear).
 inline Pose to_pose(const Eigen::Isometry3d& x) {
   const Eigen::Quaterniond q(x.rotation());
   return {{q.w(), q.x(), q.y(), q.z()},

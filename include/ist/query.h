@@ -13,64 +13,64 @@
 
 namespace IST_API ist {
 
-/// What a penetration may cost. Zero, a negative value or NaN means no limit; with none set the
-/// answer is the finished sum.
+/// Limits of a penetration. Zero, a negative value or NaN means no limit; with none set the answer
+/// is the finished sum.
 ///
-/// A penetration that is stopped estimates what is left, by what it summed under a deadline and
-/// else from the densities of the nodes that were not opened, and says budget_exhausted.
+/// A penetration that is stopped estimates the rest and returns budget_exhausted. Under a deadline
+/// it extrapolates from what it summed, else it uses the densities of the unopened nodes.
 ///
-/// Measure::exact heeds max_visits alone. One that is stopped answers what the matched spheres do
-/// (NaN where an asset has none), says budget_exhausted, and bounds the true volume by 0 and the
-/// smaller solid's.
+/// Measure::exact obeys max_visits only. If that stops it, the answer is that of the matched
+/// spheres (NaN where an asset has none) with budget_exhausted, and the true volume is bounded by 0
+/// and the smaller solid's.
 struct PenetrationSettings {
   Measure measure = Measure::matched;
   FieldUse field = FieldUse::automatic;  ///< matched measure only
 
   /// Count of sphere pairs to spend; matched measure only (the inner one has no levels of detail).
   ///
-  /// The answer comes from the finest level of detail that is expected to need no more.
-  /// From 0.7 of the budget on it is blended with the next coarser level: volume and force stay
-  /// continuous, gradients are the blended sum's.
-  /// Shallow contacts keep all spheres.
-  /// Aimed at, not kept; never less than the coarsest level takes.
+  /// The answer comes from the finest level of detail that is expected to need no more. From 0.7 of
+  /// the budget on it is blended with the next coarser level: volume and force stay continuous, and
+  /// gradients are those of the blended sum. Shallow contacts keep all spheres. The count is a
+  /// target, not a bound: the coarsest level is the minimum, whatever it costs.
   std::uint32_t pair_budget = 0;
 
-  /// Count of node pairs opened. Of pairs of trees the largest bounds go first; what meets a
-  /// surface goes in the order of the tree.
+  /// Count of node pairs opened. Pairs of trees are opened largest bounds first, trees against a
+  /// surface in the order of the tree.
   std::uint32_t max_visits = 0;
 
-  /// [µs] wall clock from the call.
-  /// Of pairs of trees as many sixteenths of the leaves are summed as there is time for, the same
-  /// ones at every pose, and stand for all: volume and force then change smoothly with the pose,
-  /// and a loop gains little energy where six or more are. If not even one can be summed, or a
-  /// surface is met, visits end at 0.6 to 0.75 of the time and what is left is estimated. Kept to a
-  /// few µs while the system lets the thread run; what the system takes is not counted.
+  /// [µs] wall clock from the call, kept to a few µs while the system lets the thread run; time
+  /// that the system takes is not counted.
+  ///
+  /// For two trees a fixed 1/16-stratified sample of leaf pairs, the same at every pose, is summed
+  /// until time runs out and extrapolated. Volume and force then change smoothly with the pose, and
+  /// a loop gains little energy where six or more strata are summed. If not even one can be summed,
+  /// or a surface is met, visits end at 0.6 to 0.75 of the time and the rest is estimated.
   double deadline_us = 0;
 
   double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
   double min_radius = 0;      ///< [u] nodes smaller than this are not opened
 };
 
-/// What contact patches may cost; each limit as in PenetrationSettings.
+/// Limits of contact patches, each as in PenetrationSettings.
 struct ContactSettings {
   Measure measure = Measure::matched;
   FieldUse field = FieldUse::automatic;  ///< matched measure only
   std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
-  /// [µs] wall clock from the call, as in PenetrationSettings. Where nothing can stand for all, all
-  /// that is left when visits end is estimated, at 0.1 µs a pair.
+  /// [µs] wall clock from the call, as in PenetrationSettings. Where nothing can be extrapolated,
+  /// the rest is estimated when visits end, at 0.1 µs per pair.
   double deadline_us = 0;
   double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
   double min_radius = 0;      ///< [u] nodes smaller than this are not opened
 };
 
-/// What a separation may cost. Zero, a negative value or NaN means no limit.
+/// Limits of a separation. Zero, a negative value or NaN means no limit.
 struct SeparationSettings {
   std::uint32_t max_visits = 0;  ///< count of node pairs opened, the nearest first
   double deadline_us = 0;        ///< [µs] wall clock from the call; visits end at 0.95 of it
-  bool inner_spheres = false;    ///< asks these, even where both assets keep their meshes
+  bool inner_spheres = false;    ///< uses these even if both assets keep a mesh
 };
 
-/// What each half of query() may cost.
+/// Limits of both halves of query().
 struct QuerySettings {
   PenetrationSettings penetration;
   SeparationSettings separation;
@@ -86,57 +86,56 @@ struct PlacedTree {
 /// Overlap of two placed solids. Gradients are taken with respect to a motion of B, A held still.
 struct Penetration {
   double volume = 0;  ///< [u³] in the chosen measure
-  /// [u³] By Measure::exact these are bounds: the true volume is at least volume_min and at most
-  /// volume_max. By spheres they hold the finished sum, with its rounding, and say nothing of how
-  /// near that sum is to the true volume.
+  /// [u³] With Measure::exact: bounds of the true volume. By spheres: bounds of the finished sum,
+  /// with its rounding; they do not bound the true volume.
   double volume_min = 0;
   double volume_max = 0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the overlap, world; zero if none
-  /// [u²] dV/d(translation of B), world. A pressure [force/u²] pushes B by −pressure times this, A
-  /// by the opposite: <ist/response.h> has pressures that grow with depth.
+  /// [u²] dV/d(translation of B), world. A pressure [force/u²] pushes B by −pressure times this,
+  /// and A by the opposite. <ist/response.h> has pressures that grow with depth.
   Eigen::Vector3d translation_gradient = Eigen::Vector3d::Zero();
   /// [u³/rad] dV/d(rotation vector of B about B's origin), world.
   Eigen::Vector3d rotation_gradient = Eigen::Vector3d::Zero();
   QueryStatus status = QueryStatus::ok;
   std::uint32_t node_visits = 0;  ///< node pairs opened
-  /// Lenses summed that are not empty, spheres put together with triangles of a surface, and
-  /// spheres that lie in the other solid as a whole. By Measure::exact: triangles that cross.
+  /// Non-empty lenses summed, spheres tested against triangles of a surface, and spheres that lie
+  /// wholly in the other solid. With Measure::exact: crossing triangles.
   std::uint32_t sphere_pairs = 0;
 };
 
 /// Gap of two placed solids, between their surfaces if both assets keep a mesh, else between their
-/// inner spheres. All is zero once these overlap, and where the solids touch or one holds the other.
+/// inner spheres. All zero once these overlap.
 struct Separation {
   double distance = 0;      ///< [u] between surfaces or inner spheres
-  double distance_min = 0;  ///< [u] the true distance of the solids is at least this, certified
-  /// [u] and at most this, certified. Where meshes that were simplified overlap, it is what they are
-  /// off by (MeshHeader::error).
+  double distance_min = 0;  ///< [u] lower bound of the true distance of the solids, certified
+  /// [u] upper bound, certified. If simplified meshes overlap, it is their error
+  /// (MeshHeader::error).
   double distance_max = 0;
   Eigen::Vector3d point_a = Eigen::Vector3d::Zero();  ///< [u] on A's surface or spheres, world
-  Eigen::Vector3d point_b = Eigen::Vector3d::Zero();  ///< [u] on B's, world
+  Eigen::Vector3d point_b = Eigen::Vector3d::Zero();  ///< [u] on B's surface or spheres, world
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();   ///< unit, from A to B, world
   QueryStatus status = QueryStatus::ok;
   std::uint32_t node_visits = 0;   ///< node pairs opened
   std::uint32_t sphere_pairs = 0;  ///< pairs of triangles or spheres measured
 };
 
-/// Where a workspace takes its memory: plain functions, called while it is made and when it ends.
+/// Memory functions of a workspace, called while it is made and when it ends.
 struct MemoryHooks {
-  /// At least `bytes` bytes at a multiple of `alignment`, a power of two, or null if there are
-  /// none. Null here: operator new.
+  /// Returns at least `bytes` bytes at a multiple of `alignment`, a power of two, or null if there
+  /// are none. A null pointer here selects operator new.
   void* (*allocate)(void* context, std::size_t bytes, std::size_t alignment) = nullptr;
   void (*release)(void* context, void* memory, std::size_t bytes, std::size_t alignment) = nullptr;
-  void* context = nullptr;  ///< handed to both
+  void* context = nullptr;  ///< passed to both
 };
 
-/// Scratch memory of a query: make one a thread, once.
+/// Scratch memory of a query: make one per thread, once.
 ///
-/// It never changes an answer.
-/// A query that needs more than its capacity stops with budget_exhausted.
+/// It never changes an answer. A query that needs more than its capacity stops with
+/// budget_exhausted.
 class Workspace {
  public:
-  /// `capacity`: count of node pairs that may wait at once. The default serves two trees of 64,000
-  /// spheres at any pose. Takes 40 bytes each, in pages that are touched as they are needed.
+  /// `capacity`: count of node pairs that may wait at once, 40 bytes each, in pages that are
+  /// touched as needed. The default serves two trees of 64,000 spheres at any pose.
   ///
   /// Throws std::bad_alloc.
   explicit Workspace(std::size_t capacity = 1u << 20, const MemoryHooks& memory = {});
@@ -156,39 +155,37 @@ class Workspace {
 
 /// Volume, wrench and centroid of the overlap.
 ///
-/// By spheres the sum is Σ over spheres of the finer tree of their exact part inside the other's
-/// surface, or one of lenses, as PenetrationSettings::field says. The gradients of a finished query
-/// are those of the returned volume. Copies of one asset at nearly the same pose are asked as
-/// unlike levels of detail, since equal spheres on top of each other would count too much.
+/// By spheres it is the sum of the exact parts of the finer tree's spheres inside the other's
+/// surface, or a sum of lenses, as PenetrationSettings::field selects. The gradients of a finished
+/// query are those of the returned volume. Copies of one asset at nearly the same pose are
+/// evaluated as unlike levels of detail, since coincident equal spheres would count too much.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 Penetration penetration(const PlacedTree& a, const PlacedTree& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept;
 
-/// An answer without what protruding spheres add where flat faces meet.
+/// Removes from an answer what protruding spheres add where flat faces meet.
 ///
-/// Nothing is left across a gap of a fifth of a mean sphere radius and more.
-/// Nearer, and in the first fifth of depth, the volume is less.
-/// Round and deeper contacts come back as they are. All is told from volume and force alone, so a
-/// large ball that touches lightly may pass for flat.
-/// Volume and force stay continuous in the pose. The force is the volume's gradient but for 15 %:
-/// use it for contacts, not where energy must be kept.
-/// volume_min is lowered to hold the new volume.
+/// Nothing is left across a gap of a fifth of a mean sphere radius and more. Nearer, and in the
+/// first fifth of depth, the volume is reduced. Round and deeper contacts are unchanged. Only
+/// volume and force are used, so a light touch of a large ball may pass for flat. Volume and force
+/// stay continuous in the pose. The force is the volume's gradient to within 15 %: use it for
+/// contacts, not where energy must be conserved. volume_min is lowered to contain the new volume.
 ///
-/// `whole`: what penetration() answered for these two by lenses (FieldUse::never), in the matched
-/// measure, without a pair budget.
-/// Takes a few nanoseconds.
+/// `whole`: the answer of penetration() for these two by lenses (FieldUse::never), in the matched
+/// measure, without a pair budget. Takes a few nanoseconds.
 Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
                                const PlacedTree& b) noexcept;
 
 /// Distance, witness points, and a certified interval for the solids.
 ///
-/// Where both assets keep a mesh (TreeView::has_mesh) it is that of the surfaces: the interval is as
-/// wide as rounding and what a simplified mesh is off by. Of a solid within the other it is zero.
-/// Else it is that of the inner spheres, exact to about 1e-6 of the objects' size.
-/// Batches on the GPU (<ist/gpu_query.h>) always ask the inner spheres.
-/// One that is stopped holds the nearest points found so far; its interval is certified all the
-/// same.
+/// If both assets keep a mesh (TreeView::has_mesh), this is the distance of the surfaces. The interval
+/// is as wide as rounding and the error of simplified meshes. It is zero if the surfaces cross or one
+/// solid holds the other.
+/// Otherwise it is the distance of the inner spheres, exact to about 1e-6 of the objects' size, and
+/// all zero once these overlap.
+/// A stopped query returns the nearest points that it found; its interval is certified all the same.
+/// Batches on the GPU (<ist/gpu_query.h>) always use the inner spheres.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 Separation separation(const PlacedTree& a, const PlacedTree& b, const SeparationSettings& settings,
@@ -199,52 +196,50 @@ struct PenetrationAndSeparation {
   Separation separation;
 };
 
-/// Both in one call: the unified query of the Inner Sphere Trees papers.
+/// penetration() and separation() in one call: the unified query of the Inner Sphere Trees papers.
 PenetrationAndSeparation query(const PlacedTree& a, const PlacedTree& b,
                                const QuerySettings& settings, Workspace& workspace) noexcept;
 
-/// A part of a contact that a solver may take for one contact point: the lenses near one region of
-/// the smaller solid.
+/// One point of a contact manifold: the part of a contact near one region of the smaller solid.
 struct ContactPatch {
-  /// Names the region: the same in every query of the same two trees in the same measure, so that a
-  /// solver finds what it kept of the patch.
-  /// Other pairs of trees use the same names.
-  /// By Measure::exact it names the lowest pair of triangles that cross on the patch's outline, and
-  /// stays while these do; 0 for a patch that lies inside the other solid as a whole.
+  /// Names the region, for a solver's warm start: the same in every query of the same two trees in
+  /// the same measure. Other pairs of trees use the same names.
+  ///
+  /// With Measure::exact it names the lowest pair of crossing triangles on the patch's outline, and
+  /// is the same while these cross; 0 for a patch that lies wholly inside the other solid.
   std::uint64_t id = 0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the patch's overlap, world
-  /// Unit, world: the direction in which the patch pushes B, from A to B; zero if the area is.
+  /// Unit, world: the direction in which the patch pushes B, from A to B; zero if the area is 0.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  /// [u²] |force|: what the contact surface measures, seen along the normal; 0 where that is
-  /// rounding, as of a patch that lies wholly inside the other solid.
+  /// [u²] |force|: the area of the contact surface seen along the normal; 0 where that is only
+  /// rounding, as for a patch wholly inside the other solid.
   double area = 0;
   /// [u] volume/area, ≤ the smaller solid's bounding diameter; 0 if no area. A mean: patches of one
-  /// level face differ by a factor of two and more, as spheres fall to them.
+  /// level face differ by a factor of two and more, depending on the spheres they contain.
   double depth = 0;
-  double volume = 0;  ///< [u³] share of Penetration::volume
-  /// [u²] share of −translation_gradient: the push on B of a pressure of 1 [force/u²]. A's is
-  /// opposite.
+  double volume = 0;  ///< [u³] part of Penetration::volume
+  /// [u²] part of −translation_gradient: the force on B of a pressure of 1 [force/u²]. The force on
+  /// A is the opposite.
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
-  /// [u³/rad] share of −rotation_gradient, about B's origin: not the moment of `force` at
-  /// `centroid` alone, since a patch resists turning about its normal too.
+  /// [u³/rad] part of −rotation_gradient, about B's origin. It is not only the moment of `force` at
+  /// `centroid`: a patch also resists rotation about its normal.
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();
 };
 
 struct ContactPatches {
-  /// The whole, the bits that penetration() answers without a pair budget, copies of one asset at
-  /// nearly the same pose excepted: those are not asked as unlike levels here.
+  /// The whole contact, bit for bit the answer of penetration() without a pair budget, except for
+  /// copies of one asset at nearly the same pose: here they are not evaluated as unlike levels.
   Penetration penetration;
   std::size_t count = 0;  ///< patches written
 };
 
-/// The contact condensed into at most patches.size() patches.
+/// Condenses the contact into a manifold of at most patches.size() patches.
 ///
-/// Volumes, forces and torques sum to the whole's to about 1e-15.
-/// By Measure::exact they are the connected parts of the overlap, each with its own true volume; if
-/// they are more than there is room for, the least join the nearest ones.
-/// By spheres the contact is divided along the tree of the smaller solid (B's if equal or if A is
-/// too coarse), always at the same places. What a stopped query estimates of unopened nodes is
-/// divided too. Costs 1.7 (one patch) to 2.4 (32) times a penetration.
+/// Volumes, forces and torques sum to the whole's to about 1e-15. With Measure::exact patches are
+/// the connected parts of the overlap, each with its true volume; if there are more than fit, the
+/// smallest join the nearest ones. By spheres the contact is divided along the tree of the smaller
+/// solid (B's if equal or if A is too coarse), always at the same places. The estimate of a stopped
+/// query is divided too. Costs 1.7 (one patch) to 2.4 (32) times a penetration.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
@@ -255,17 +250,18 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
 struct OutlineSegment {
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  ///< [u] world
   Eigen::Vector3d to = Eigen::Vector3d::Zero();    ///< [u] world
-  std::uint32_t patch = 0;                         ///< the patch that it bounds
+  std::uint32_t patch = 0;  ///< number of the patch that it bounds; 0 without room for patches
 };
 
 struct OverlapOutline {
   ContactPatches contact;
-  std::size_t segments = 0;  ///< of the whole outline; as many as there is room for are written
+  /// Of the whole outline; written as far as they fit. 0 if a limit stopped the query.
+  std::size_t segments = 0;
 };
 
-/// contact_patches() by Measure::exact, whatever the settings say, with the outline of each patch:
-/// segments of the closed curves on which the surfaces cross, A's surface inside B to the left of
-/// each seen from outside A. A patch that lies inside the other solid as a whole has none.
+/// contact_patches() with Measure::exact, whatever the settings say, and the outline of each patch:
+/// segments of the closed curves on which the surfaces cross. Seen from outside A, A's surface
+/// inside B is to the left of each. A patch that lies wholly inside the other solid has none.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
@@ -273,16 +269,16 @@ OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
                                std::span<ContactPatch> patches,
                                std::span<OutlineSegment> segments) noexcept;
 
-/// Patches without what protruding spheres add where flat faces meet, as without_protrusion() of a
-/// penetration: each by its own depth, so that faces that lean against each other lose it where
-/// they hardly touch and keep the rest.
+/// Removes from patches what protruding spheres add where flat faces meet, as without_protrusion()
+/// of a penetration does. Each patch is corrected by its own depth, so faces that lean against each
+/// other lose it where they hardly touch and keep the rest.
 ///
-/// Volumes, areas, forces and torques become less; a patch of which nothing is left stays, with
+/// Volumes, areas, forces and torques are reduced. A patch of which nothing is left stays, with
 /// zeros and no normal. Patches whose spheres met a surface, and those of the inner and the exact
-/// measure, are as they should be and stay. So may stay what the Penetration of the same answer
-/// says: it is another sum now.
+/// measure, are unchanged. The accompanying Penetration is not updated; it no longer equals the sum
+/// of the patches.
 ///
-/// `patches`: what contact_patches() wrote for these two under these settings.
+/// `patches`: those that contact_patches() wrote for these two under these settings.
 void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, const PlacedTree& b,
                         const ContactSettings& settings) noexcept;
 
@@ -291,33 +287,31 @@ struct PlacedPair {
   PlacedTree a, b;
 };
 
-/// How penetration_batch reaches the caller's threads: two pointers, nothing that allocates.
+/// Runs penetration_batch on the caller's threads: two pointers, no allocation.
 struct ParallelFor {
-  /// Calls work(batch, i) once for each i in [0, workers), on any threads, at the same time or one
-  /// after another, and returns when all calls have. Null: the calling thread does it all.
+  /// Calls work(batch, i) once for each i in [0, workers), on any threads, concurrently or not, and
+  /// returns when all calls have returned. Null: the calling thread does it all.
   void (*run)(void* pool, std::size_t workers, void (*work)(void* batch, std::size_t worker),
               void* batch) = nullptr;
-  void* pool = nullptr;  ///< handed to `run`
+  void* pool = nullptr;  ///< passed to `run`
 };
 
 /// answers[i] = penetration(pairs[i]), the same bits, for as many as there are answers.
 ///
-/// There are as many workers as workspaces; without any, every answer is budget_exhausted with no
-/// upper bound.
-/// Pairs are handed out by an atomic counter, so that a pool need not balance them.
+/// There is a worker for each workspace; without any, every answer is budget_exhausted with no
+/// upper bound. An atomic counter hands out pairs, so a pool need not balance them.
 ///
-/// No allocation or lock but the pool's own. An exception of `run` ends the program.
+/// No allocation or lock except the pool's own. An exception in `run` ends the program.
 void penetration_batch(std::span<const PlacedPair> pairs, const PenetrationSettings& settings,
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel = {}) noexcept;
 
 /// answers[i] = contact_patches(pairs[i]), the same bits, for as many as there are answers.
 ///
-/// `patches` are shared out evenly: with m = patches.size() / count, where count is the lesser of
-/// pairs and answers, those of pair i begin at patches[i · m], and answers[i].count of them are
-/// written.
+/// `patches` is divided evenly: with m = patches.size() / count, where count is the lesser of pairs
+/// and answers, those of pair i begin at patches[i · m], and answers[i].count of them are written.
 ///
-/// Workspaces, pool and limits as penetration_batch() has them.
+/// Workspaces, pool and limits as for penetration_batch().
 void contact_patches_batch(std::span<const PlacedPair> pairs, const ContactSettings& settings,
                            std::span<Workspace> workspaces, std::span<ContactPatches> answers,
                            std::span<ContactPatch> patches,

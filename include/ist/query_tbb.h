@@ -5,8 +5,8 @@
 
 namespace IST_API ist {
 
-/// Threads of the calling task arena of oneTBB for penetration_batch. Part of ist::ist: ist::query
-/// does not link TBB.
+/// Runs penetration_batch on the calling task arena of oneTBB. Part of ist::ist: ist::query does
+/// not link TBB.
 ParallelFor tbb_parallel_for() noexcept;
 
 }  // namespace ist

@@ -13,33 +13,33 @@
 #include <ist/query.h>
 #include <ist/wrench.h>
 
-// From a volume to a force: the laws that loops and engines without a contact solver of their own
-// need. docs/engines.md says which to choose and why.
+// Contact laws: from a volume to a force, for loops and engines without a contact solver of their
+// own. docs/engines.md explains which to choose.
 //
-// Units: [u] the meshes' length, [s] time, [force], and [mass] = [force·s²/u]. With u = m and
-// force = N mass is kg; with u = mm and force = mN mass is kg too.
+// Units: [u] the meshes' length, [s] time, [force], and [mass] = [force·s²/u]. With u = m and force
+// = N mass is kg; with u = mm and force = mN mass is kg too.
 //
-// Why not a force of k · −translation_gradient: it is k · area whatever the depth, so that a body
-// on a flat face sinks or floats, and falls through once its energy exceeds k · area · thickness.
-// Here the *pressure* grows with depth, as on a bed of springs.
+// A force of k · −translation_gradient is no contact law: it is k · area whatever the depth, so a
+// body on a flat face sinks or floats, and falls through once its energy exceeds k · area ·
+// thickness. Here the *pressure* grows with depth, as on a bed of springs.
 
 namespace IST_API ist {
 
-/// How a contact pushes, patch by patch.
+/// Penalty pressure of each patch:
 ///
-/// Pressure [force/u²] = stiffness · depth · max(0, 1 + damping · d(depth)/dt), where the depth is
-/// the patch's volume over an area of reference.
-/// Never negative: nothing sticks.
+/// pressure [force/u²] = stiffness · depth · max(0, 1 + damping · d(depth)/dt), where the depth is
+/// the patch's volume over a reference area. Never negative: nothing sticks.
 struct ContactLaw {
-  double stiffness = 0;  ///< [force/u³] > 0, of pressure over depth: a Winkler foundation's
-  /// [u²] of reference. 0: each patch's own, the largest that it had (PatchMemory::area), which
+  double stiffness = 0;  ///< [force/u³] > 0, penalty stiffness: pressure over depth (Winkler)
+  /// [u²] Reference area. 0: each patch's own, the largest that it had (PatchMemory::area). This
   /// loses some energy where areas change: a ball that bounces on a plane keeps three quarters. A
-  /// body then rests up to a quarter deeper than stiffness_for_depth() was asked for.
-  /// > 0, for a contact that is one patch (whole_patch): the law is then the gradient of
-  /// ½ stiffness · volume² / area, and keeps energy as the integrator does.
+  /// body then rests up to a quarter deeper than stiffness_for_depth() was given.
+  ///
+  /// > 0: for a contact that is one patch (whole_patch). The law is then the gradient of ½
+  /// stiffness · volume² / area, and conserves energy as the integrator does.
   double area = 0;
-  /// [s/u] ≥ 0, Hunt and Crossley's: see damping_for_restitution(). Acts on the rate of the volume
-  /// alone, so that a thread that slides along itself is not held by it, and vanishes with the
+  /// [s/u] ≥ 0, Hunt and Crossley's: see damping_for_restitution(). It acts on the rate of the
+  /// volume alone, so it does not brake a thread that slides along itself, and vanishes with the
   /// contact.
   double damping = 0;
   double friction = 0;            ///< ≥ 0, Coulomb's coefficient
@@ -47,31 +47,31 @@ struct ContactLaw {
   double friction_damping = 0;    ///< [force·s/u³] ≥ 0, of shear stress over velocity
 };
 
-/// What a patch remembers from step to step.
+/// State of a patch from step to step.
 struct PatchMemory {
   std::uint64_t id = 0;  ///< ContactPatch::id
-  /// [u²] the largest area that the patch has had since it came to be. Depth is measured by it, so
-  /// that the pressure is a function of the volume, and an area that grows can only lose energy.
+  /// [u²] The largest area of the patch since it appeared. Depth is measured with it, so the
+  /// pressure is a function of the volume, and a growing area can only lose energy.
   double area = 0;
-  double stretch[3] = {0, 0, 0};  ///< [u] of the spring of friction, world
+  double stretch[3] = {0, 0, 0};  ///< [u] of the friction spring, world
 };
 
-/// What a contact of two bodies remembers: plain data of the caller, one a pair. Copy it to save a
-/// state; a default one is a contact that was not there.
+/// State of a contact of two bodies: plain data of the caller, one per pair. Copy it to save a
+/// state. A default one is a new contact.
 struct ContactMemory {
   static constexpr std::size_t kPatches = 32;
   PatchMemory patches[kPatches];
-  std::uint32_t count = 0;  ///< of patches that are remembered
+  std::uint32_t count = 0;  ///< of stored patches
 };
 
-/// How B moves as A sees it, without A's frame turning: differences of world velocities.
+/// Motion of B relative to A, in axes that do not turn with A: differences of world velocities.
 struct RelativeMotion {
-  /// [u/s] velocity of B's origin less that of the point of A which is there.
+  /// [u/s] Velocity of B's origin minus that of the point of A at the same place.
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/s] B's less A's
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/s] B's minus A's
 };
 
-/// Of two bodies whose motions are known. `origin_b`: [u] of B's pose, world.
+/// The relative motion of two bodies. `origin_b`: [u] of B's pose, world.
 inline RelativeMotion relative_motion(const Twist& a, const Twist& b,
                                       const Eigen::Vector3d& origin_b) noexcept {
   const auto at_origin = [&](const Twist& t) -> Eigen::Vector3d {
@@ -80,15 +80,15 @@ inline RelativeMotion relative_motion(const Twist& a, const Twist& b,
   return {at_origin(b) - at_origin(a), b.angular_velocity - a.angular_velocity};
 }
 
-/// What a contact does to B; to A the opposite, about the same point.
+/// Force and torque of a contact on B. On A act the opposite ones, about the same point.
 struct ContactForce {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< [force] on B, world
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< [force·u] on B about B's origin, world
   double normal_force = 0;  ///< [force] Σ over patches of pressure times area
-  double energy = 0;        ///< [force·u] held by the springs, normal and friction's
+  double energy = 0;        ///< [force·u] stored in the springs, of normal and friction
 };
 
-/// A penetration as one patch, for contacts that one force stands for. Its id is 0.
+/// A penetration as one patch, for contacts that one force represents. Its id is 0.
 inline ContactPatch whole_patch(const Penetration& contact) noexcept {
   ContactPatch patch;
   patch.centroid = contact.centroid;
@@ -105,11 +105,11 @@ inline ContactPatch whole_patch(const Penetration& contact) noexcept {
 
 namespace detail {
 
-/// A spring that holds the bodies together sideways until Coulomb's limit, then is dragged along.
+/// A spring that holds the bodies together sideways up to Coulomb's limit and then slips.
 ///
-/// With w the way of a step and s the stretch, either |f| is within the limit and f·w plus the
-/// growth of ½ k s² is −½ k w², or s is the nearest point within the limit's ball and it is less:
-/// no step gives energy.
+/// With w the displacement of a step and s the stretch, either |f| is within the limit and f·w plus
+/// the growth of ½ k s² is −½ k w², or s is the nearest point within the limit's ball and the sum
+/// is less: no step gains energy.
 inline Eigen::Vector3d friction_force(const ContactLaw& law, double limit,
                                       const Eigen::Vector3d& normal,
                                       const Eigen::Vector3d& velocity, double step,
@@ -122,8 +122,7 @@ inline Eigen::Vector3d friction_force(const ContactLaw& law, double limit,
   const double held = stiffness * stretch.norm();
   if (held > limit) stretch *= limit / held;
   const Eigen::Vector3d spring = -stiffness * stretch;
-  // As much of the viscous part as the limit leaves room for: the root of |spring + x drag| =
-  // limit.
+  // The viscous part as far as the limit allows: the root of |spring + x drag| = limit.
   const Eigen::Vector3d drag = -law.friction_damping * memory.area * sliding;
   if ((spring + drag).squaredNorm() <= limit * limit) return spring + drag;
   const double a = drag.squaredNorm(), b = spring.dot(drag);
@@ -134,16 +133,15 @@ inline Eigen::Vector3d friction_force(const ContactLaw& law, double limit,
 
 }  // namespace detail
 
-/// What the contact does to B in this step, and what it remembers of it.
+/// Force of the contact on B in this step. Updates `memory`.
 ///
-/// `origin_b`: [u] of B's pose, world. `step`: [s] since the last call, by which friction's springs
-/// are stretched.
-/// `patches`: as contact_patches() wrote them. Of more than ContactMemory::kPatches the rest is
-/// without friction. Patches that are gone are forgotten.
+/// `origin_b`: [u] of B's pose, world. `step`: [s] since the last call, by which the friction
+/// springs are stretched. `patches`: as contact_patches() wrote them. Patches beyond
+/// ContactMemory::kPatches have no friction. Patches that are gone are forgotten.
 ///
-/// The law gives no energy but where the division into patches changes: see docs/engines.md.
+/// The law gains no energy, except where the division into patches changes: see docs/engines.md.
 ///
-/// No allocation, lock or exception. Any thread; the memory is one contact's.
+/// No allocation, lock or exception. Any thread; a memory belongs to one contact.
 inline ContactForce contact_force(const ContactLaw& law, std::span<const ContactPatch> patches,
                                   const RelativeMotion& motion, const Eigen::Vector3d& origin_b,
                                   double step, ContactMemory& memory) noexcept {
@@ -156,7 +154,7 @@ inline ContactForce contact_force(const ContactLaw& law, std::span<const Contact
       if (memory.patches[i].id == patch.id) kept = memory.patches[i];
     }
     if (patch.area > kept.area) {
-      // The springs of friction are as many as the area: their energy stays what it was.
+      // The friction springs grow with the area: their energy stays the same.
       const double share = std::sqrt(kept.area / patch.area);
       for (double& s : kept.stretch) s *= share;
       kept.area = patch.area;
@@ -190,27 +188,27 @@ inline ContactForce contact_force(const ContactLaw& law, std::span<const Contact
   return sum;
 }
 
-/// [force/u³] The stiffness by which a load [force] on an area [u²] rests at a depth [u]. Ask for
-/// no less than what spheres blur a face by, some 0.2 % of the side for 4,000 spheres.
+/// [force/u³] Penalty stiffness by which a load [force] on an area [u²] rests at a depth [u]. Use
+/// at least the depth of the spheres' blur, some 0.2 % of the side for 4,000 spheres.
 inline double stiffness_for_depth(double load, double area, double depth) noexcept {
   return load / (area * depth);
 }
 
-/// [force/u³] The stiffness of an elastic layer on rigid ground that cannot give way sideways.
-/// `young`: [force/u²] > 0. `poisson`: [0, 0.5). `thickness`: [u] > 0.
+/// [force/u³] Stiffness of an elastic layer on rigid ground that cannot expand sideways. `young`:
+/// [force/u²] > 0. `poisson`: [0, 0.5). `thickness`: [u] > 0.
 inline double stiffness_of_layer(double young, double poisson, double thickness) noexcept {
   return (1 - poisson) * young / ((1 + poisson) * (1 - 2 * poisson) * thickness);
 }
 
-/// [force/u³] Of two bodies that both give way.
+/// [force/u³] Stiffness of two compliant bodies in contact.
 inline double stiffness_in_series(double a, double b) noexcept { return a * b / (a + b); }
 
-/// [s/u] ContactLaw::damping by which a body that hits at `speed` [u/s] > 0 comes back at
-/// `restitution` (0, 1] times that; exact for a patch whose area stays. Slower ones lose less.
+/// [s/u] ContactLaw::damping for which a body that hits at `speed` [u/s] > 0 rebounds at
+/// `restitution` (0, 1] times that; exact for a patch of constant area. Slower bodies lose less.
 inline double damping_for_restitution(double restitution, double speed) noexcept {
-  // With x = damping · speed: m v dv/d(depth) = −k depth (1 + damping v) on both ways gives
-  // x − ln(1 + x) = −e x − ln(1 − e x), whatever the power of depth. The left side less the right
-  // one is positive up to the root, then negative, without bound at 1/e.
+  // With x = damping · speed: m v dv/d(depth) = −k depth (1 + damping v) in both directions gives x
+  // − ln(1 + x) = −e x − ln(1 − e x), for any power of depth. The left side minus the right side is
+  // positive up to the root, then negative, without bound at 1/e.
   const auto excess = [e = restitution](double x) {
     return (1 + e) * x - std::log1p(x) + std::log1p(-e * x);
   };
@@ -222,15 +220,15 @@ inline double damping_for_restitution(double restitution, double speed) noexcept
   return restitution < 1 ? low / speed : 0;
 }
 
-/// A body as a contact feels it. The default cannot be moved.
+/// A body for effective_mass(). The default is immovable.
 struct ContactBody {
   double inverse_mass = 0;                                    ///< [1/mass] ≥ 0
   Eigen::Matrix3d inverse_inertia = Eigen::Matrix3d::Zero();  ///< [1/(mass·u²)] world, about
   Eigen::Vector3d centre_of_mass = Eigen::Vector3d::Zero();   ///< [u] world
 };
 
-/// [mass] What a contact at `point` [u] has to move along `direction` (unit), both in the world:
-/// how large a mass would answer a push there as these two bodies do. Infinite if neither moves.
+/// [mass] Effective mass at `point` [u] along `direction` (unit), both world: the mass that would
+/// respond to a force there as these two bodies do. Infinite if both are immovable.
 inline double effective_mass(const ContactBody& a, const ContactBody& b,
                              const Eigen::Vector3d& point,
                              const Eigen::Vector3d& direction) noexcept {
@@ -244,16 +242,17 @@ inline double effective_mass(const ContactBody& a, const ContactBody& b,
 
 /// [s] Above this step semi-implicit Euler (velocities first, then positions) gains energy from a
 /// spring of `stiffness` [force/u] > 0 and a damper of `damping` [force·s/u] ≥ 0 that move `mass`.
-/// A contact's stiffness is ContactLaw::stiffness times its area, its damper ContactLaw::stiffness
-/// · volume · ContactLaw::damping where it is deepest, its mass effective_mass(); stay at a half of
-/// this or less.
+/// For a contact, stiffness is ContactLaw::stiffness times its area, damping is
+/// ContactLaw::stiffness · volume · ContactLaw::damping where it is deepest, and mass is
+/// effective_mass(). Use a half of this or less.
 inline double largest_stable_step(double stiffness, double damping, double mass) noexcept {
   const double frequency = std::sqrt(stiffness / mass);
   const double ratio = damping / (2 * mass * frequency);
   return 2 * (std::sqrt(ratio * ratio + 1) - ratio) / frequency;
 }
 
-/// [force/u] The stiffest undamped spring that semi-implicit Euler bears at this step [s].
+/// [force/u] The stiffest undamped spring that is stable under semi-implicit Euler at this step
+/// [s].
 inline double largest_stable_stiffness(double step, double mass) noexcept {
   return 4 * mass / (step * step);
 }

@@ -12,8 +12,8 @@
 
 namespace IST_API ist {
 
-/// Places a solid in the unit cube by a shift and a power of two, so that nothing downstream
-/// depends on the mesh's unit or offset: x_unit = (x − centre) · 2^−exponent.
+/// Places a solid in the unit cube by a shift and a power of two, so that nothing later depends on
+/// the mesh's unit or offset: x_unit = (x − centre) · 2^−exponent.
 struct UnitFrame {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< [u]
   int exponent = 0;                                  ///< half-extent in (½, 1] after scaling
@@ -23,7 +23,7 @@ struct UnitFrame {
   Eigen::Vector3d from_unit(const Eigen::Vector3d& x) const { return x * scale() + centre; }
 };
 
-/// The frame whose cube of half-extent in (½, 1] holds the box. Throws Error for an empty,
+/// The frame whose cube of half-extent in (½, 1] contains the box. Throws Error for an empty,
 /// infinite or zero-size box.
 UnitFrame unit_frame(const Eigen::AlignedBox3d& bounds);
 
@@ -39,18 +39,16 @@ class Solid {
   /// underestimate the true distance (as CSG by min and max does), never overestimate it.
   virtual double signed_distance(const Eigen::Vector3d& x) const = 0;
 
-  virtual Eigen::AlignedBox3d bounds() const = 0;  ///< [u] holds the whole solid
+  virtual Eigen::AlignedBox3d bounds() const = 0;  ///< [u] contains the whole solid
   virtual double volume() const = 0;               ///< [u³]
-  virtual double volume_error() const {
-    return 0;
-  }  ///< [u³] on volume(); each make_… says how sure
+  virtual double volume_error() const { return 0; }  ///< [u³] on volume(); see each make_… function
 
-  /// The mesh that bounds the solid, where one does (make_solid): it is then packed by its
-  /// triangles, on a GPU too. Null for every other solid.
+  /// The mesh that bounds the solid, if it is one (make_solid): it is then packed by its triangles,
+  /// also on a GPU. Null for every other solid.
   virtual const MeshSolid* mesh() const noexcept { return nullptr; }
 };
 
-/// The solid of a closed mesh: where its winding number is ≥ 1, so that what two shells share
+/// The solid of a closed mesh: where its winding number is ≥ 1, so that volume shared by two shells
 /// counts once. Copies the mesh.
 std::unique_ptr<Solid> make_solid(const ClosedMesh& mesh);
 
@@ -63,20 +61,19 @@ std::unique_ptr<Solid> make_torus(const Eigen::Vector3d& centre, double major, d
 
 /// The solid where a function [u] is > 0.
 ///
-/// The caller vouches that the function is 1-Lipschitz, is 0 or less outside `bounds` [u] and may
-/// be called from many threads at once. A smooth function divided by a bound of its slope will do.
-/// Where it changes by more than the way, spheres may stick out and parts may be missed: bake()
-/// tries some thousand pairs of points and throws Error naming a place; pack() tries nothing.
-/// The volume is as for the boolean combinations below. Throws Error for no function or no box.
+/// The function must be 1-Lipschitz, must be 0 or less outside `bounds` [u], and may be called from
+/// many threads at once. Divide a smooth function by a bound of its slope. If the function is not
+/// 1-Lipschitz, spheres may protrude and parts may be missed: bake() tests some thousand pairs of
+/// points and throws Error with a place; pack() tests nothing. The volume is as for the boolean
+/// combinations below. Throws Error for no function or no box.
 std::unique_ptr<Solid> make_function_solid(
     std::function<double(const Eigen::Vector3d&)> signed_distance,
     const Eigen::AlignedBox3d& bounds);
 
 /// Boolean combinations by min and max of signed distances.
 ///
-/// Their volume is integrated on first use (some 0.1 s).
-/// volume_error() is then an estimate with room (six times the error or more on smooth solids), not
-/// a proof.
+/// Their volume is integrated on first use (some 0.1 s). volume_error() is then an estimate with a
+/// margin (six times the error or more on smooth solids), not a proof.
 ///
 /// Throws Error for an intersection of solids whose bounds do not meet.
 std::unique_ptr<Solid> make_union(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b);

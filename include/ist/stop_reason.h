@@ -13,7 +13,7 @@ enum class StopReason : std::uint32_t {
   min_radius,
   time_limit,
   cancelled,
-  exhausted,  ///< nothing above float resolution fits any more
+  exhausted,  ///< nothing above float resolution fits
 };
 
 }  // namespace ist

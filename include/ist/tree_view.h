@@ -34,49 +34,49 @@ enum class TrialPartner : std::uint32_t {
   copy = 0,    ///< of itself
   plane = 1,   ///< HalfSpaceField
   ball = 2,    ///< 0.1 to 0.3 of the solid's diagonal across
-  edge = 3,    ///< of a box as large, which it meets with an edge first
+  edge = 3,    ///< of a box as large, which meets the solid with an edge first
   corner = 4,  ///< likewise with a corner first
   plate = 5,   ///< as large, and 0.02 of the diagonal thick; any side first
 };
 inline constexpr std::uint32_t kTrialPartners = 6;
 
-/// What the mesh of an asset is, or why it holds none.
+/// The state of an asset's mesh.
 enum class MeshState : std::uint32_t {
-  none = 0,        ///< none was asked for
+  none = 0,        ///< none was requested
   own = 1,         ///< all triangles of the mesh that was baked
-  resolved = 2,    ///< what the mesh counted twice was cut away
-  simplified = 3,  ///< other triangles near the solid: TreeView::mesh_error() tells how near
+  resolved = 2,    ///< volume that the mesh counted twice was cut away
+  simplified = 3,  ///< other triangles near the solid: TreeView::mesh_error() is the bound
   unresolved = 4,  ///< no mesh: it counts volume twice (TreeView::counted_twice)
 };
 
-/// By how much penetration volumes are wrong, measured by bake_to_error() on trial poses: by class
-/// of overlap of two copies of the solid, and near one overlap of other partners too. Overlaps are
-/// shares of the smaller copy's volume, errors are shares of the overlap's.
+/// Errors of penetration volumes, measured by bake_to_error() on trial poses: by class of overlap
+/// of two copies of the solid, and near one overlap of other partners too. Overlaps are shares of
+/// the smaller copy's volume, errors are relative.
 struct PredictedErrors {
   struct OverlapClass {
-    double from = 0, to = 0;  ///< [0, 1] overlaps of the class; both 1: the smaller lies inside
-    double median = 0;        ///< ≥ 0, 0.01 = 1 %; 0 too where no such pose was found
+    double from = 0, to = 0;  ///< [0, 1] overlaps of the class; both 1: the smaller is contained
+    double median = 0;        ///< ≥ 0, 0.01 = 1 %; 0 also if no such pose was found
   };
-  std::uint32_t poses = 0;              ///< behind all classes together; 0: nothing is predicted
+  std::uint32_t poses = 0;              ///< of all classes together; 0: nothing is predicted
   std::array<OverlapClass, 5> classes;  ///< deepest first
-  double target_error = 0;              ///< asked for; 0: none was
-  double target_overlap = 0;            ///< where it was asked for
-  /// Median within half a decade of target_overlap, of the partner that is worst there.
+  double target_error = 0;              ///< requested; 0: none
+  double target_overlap = 0;            ///< overlap for which it was requested
+  /// Median within half a decade of target_overlap, of the worst partner there.
   double measured_error = 0;
   std::uint32_t measured_poses = 0;  ///< of all partners; 0: nothing was measured there
   TrialPartner worst_partner = TrialPartner::copy;
-  /// The target was asked for, measured and reached.
+  /// The target was requested, measured and reached.
   bool target_met() const noexcept { return measured_poses > 0 && measured_error <= target_error; }
 };
 
-/// A checked, read-only view of an asset's bytes: file, mapped memory or buffer. A value of one
-/// pointer; the bytes must outlive it. Copy freely, share between threads.
+/// A checked, read-only view of an asset's bytes: a file, mapped memory or a buffer. One pointer;
+/// the bytes must outlive it. Copy freely, share between threads.
 class TreeView {
  public:
   TreeView() = default;
 
   /// Checks everything before use (hash, offsets, counts, finiteness) without allocating. On any
-  /// status but ok, `out` is left empty.
+  /// status other than ok, `out` is left empty.
   ///
   /// `bytes` must start on a 64-byte boundary, as mapped files do.
   static AssetStatus from_bytes(std::span<const std::byte> bytes, TreeView& out) noexcept;
@@ -84,28 +84,29 @@ class TreeView {
   bool empty() const noexcept { return header_ == nullptr; }
   std::size_t sphere_count() const noexcept;
   double volume() const noexcept;      ///< [u³] of the solid
-  double coverage() const noexcept;    ///< [0, 1] share of it in inner spheres
-  double protrusion() const noexcept;  ///< [u] no matched sphere sticks further out of the solid
-  /// The asset holds the solid's surface, so that queries can be exact.
+  double coverage() const noexcept;    ///< [0, 1] share of the volume in inner spheres
+  double protrusion() const noexcept;  ///< [u] bound on how far matched spheres stick out of the
+                                       ///< solid
+  /// Whether the asset stores the solid's surface, with which spheres are intersected exactly.
   bool has_field() const noexcept;
-  /// [u] that surface and the solid's lie within this of each other; 0 without a field.
+  /// [u] The stored surface and the solid's lie within this of each other; 0 without a field.
   double field_error() const noexcept;
   std::uint32_t field_triangles() const noexcept;  ///< of that surface; 0 without a field
-  /// The asset holds the solid's mesh, which Measure::exact asks. Without spheres it is a surface
-  /// alone: what asks spheres answers QueryStatus::not_held.
+  /// Whether the asset stores the solid's mesh, which Measure::exact needs. An asset with a mesh
+  /// and no spheres is a surface alone: queries of spheres return QueryStatus::not_held.
   bool has_mesh() const noexcept;
   std::uint32_t mesh_triangles() const noexcept;  ///< 0 without a mesh
-  /// [u] the mesh's surface and the solid's lie within this of each other, its rounding included;
-  /// 0 without a mesh.
+  /// [u] The mesh's surface and the solid's lie within this of each other, its rounding included; 0
+  /// without a mesh.
   double mesh_error() const noexcept;
   MeshState mesh_state() const noexcept;  ///< none for an empty view
-  /// [u³] volume that the mesh as it came counts more than once, or below zero; 0 of a mesh that
-  /// winds around every point of its solid once. An estimate for MeshState::unresolved.
+  /// [u³] Volume that the input mesh counts more than once, or below zero; 0 for a mesh that winds
+  /// around every point of its solid once. An estimate for MeshState::unresolved.
   double counted_twice() const noexcept;
-  /// No poses for an asset of bake(), which predicts nothing, and for an empty view.
+  /// Without poses for an asset of bake(), which predicts nothing, and for an empty view.
   PredictedErrors predicted_errors() const noexcept;
 
-  /// The checked bytes behind the view (ist/asset_layout.h); of an empty view a header without
+  /// The checked bytes behind the view (ist/asset_layout.h); for an empty view a header without
   /// spheres.
   const AssetHeader& header() const noexcept {
     return header_ != nullptr ? *header_ : detail::kEmptyAsset;

@@ -1,13 +1,13 @@
 #pragma once
 
-// The version of these headers, for the preprocessor of C and C++, and that of the library which a
-// program meets when it runs. CMake reads the three numbers here.
+// The version of these headers, for the preprocessor of C and C++, and of the library loaded at run
+// time. CMake reads the three numbers here.
 
 #define IST_VERSION_MAJOR 0
 #define IST_VERSION_MINOR 1
 #define IST_VERSION_PATCH 0
 
-/// One number that grows: 10000 · major + 100 · minor + patch.
+/// One increasing number: 10000 · major + 100 · minor + patch.
 #define IST_VERSION (10000 * IST_VERSION_MAJOR + 100 * IST_VERSION_MINOR + IST_VERSION_PATCH)
 
 #define IST_VERSION_TEXT_OF(number) #number
@@ -23,12 +23,12 @@
 
 namespace IST_API ist {
 
-/// IST_VERSION of the library that answers. Another than IST_VERSION here: these headers are not
+/// IST_VERSION of the loaded library. If it differs from IST_VERSION here, these headers are not
 /// those it was built with.
 std::uint32_t version() noexcept;
 
 /// Whether a program compiled with headers of version `headers` may call this library: the same
-/// major number, before 1.0 the same minor one too, and a library that is no older.
+/// major number, before 1.0 also the same minor one, and a library that is no older.
 bool serves(std::uint32_t headers = IST_VERSION) noexcept;
 
 }  // namespace ist

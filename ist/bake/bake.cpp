@@ -139,8 +139,8 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   const std::size_t count = packing.spheres.size();
   if (count == 0)
     throw Error(mesh.name +
-                ": not one sphere fits within the limits; lower the smallest radius or the "
-                "coverage, or allow more time");
+                ": no sphere fits within the limits; lower the smallest radius or the coverage, or "
+                "allow more time");
   arrays.header = describe_bake(mesh, solid, settings, packing);
   arrays.inner_spheres = packing.spheres;
 
@@ -232,7 +232,7 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
            const ProgressCallback& progress) {
   packing::check_settings(settings);
   return thread_arena(settings.threads).execute([&] {
-    const ResolvedMesh resolved = resolve(mesh);
+    const ResolvedMesh resolved = resolve(mesh, progress);
     const MeshSolid solid(resolved.mesh);
     const auto backend = make_backend(solid, {settings.device, settings.gpu});
     SolidField field(solid, resolved.resolution, settings.surface, settings.threads);
@@ -240,11 +240,13 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   });
 }
 
-Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings, unsigned threads) {
+Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings, unsigned threads,
+                   const ProgressCallback& progress) {
   packing::check_settings(settings);
-  if (!settings.wanted) throw Error(mesh.name + ": a surface alone without a surface is nothing");
+  if (!settings.wanted)
+    throw Error(mesh.name + ": a surface alone needs a surface; set surface.wanted");
   return thread_arena(threads).execute([&] {
-    const ResolvedMesh resolved = resolve(mesh);
+    const ResolvedMesh resolved = resolve(mesh, progress);
     const MeshSolid solid(resolved.mesh);
     AssetArrays arrays;
     arrays.header = describe_solid(resolved.mesh, solid);
@@ -252,7 +254,7 @@ Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings, unsi
     keep(keep_surface(solid, resolved.resolution, settings, false), arrays);
     if (!arrays.mesh)
       throw Error(mesh.name +
-                  ": the mesh counts volume twice, so that its surface alone is no solid. " +
+                  ": parts of the mesh overlap, so its surface alone does not bound a solid. " +
                   resolved.resolution.reason + " Bake it with spheres, or wrap it");
     return Asset(asset_bytes(arrays), mesh.name);
   });

@@ -44,7 +44,7 @@ Asset bake_field(const Solid& solid, const PackingSettings& settings,
                  const PolygoniseSettings& meshing, const ProgressCallback& progress) {
   if (settings.grid != GridMode::banded)
     throw Error(meshing.name +
-                ": the grid modes pack meshes; pack other solids with the banded mode");
+                ": only the banded mode packs solids that are not meshes; set grid to banded");
   require_lipschitz(solid);
   const unsigned cells =
       meshing.cells != 0 ? meshing.cells : cells_for(solid, settings.max_spheres);

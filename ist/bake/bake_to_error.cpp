@@ -332,9 +332,9 @@ class TargetBake {
 
 void check_target(const ErrorTarget& target) {
   if (!(target.relative_error > 0 && target.relative_error < 1))
-    throw Error("the error asked for must lie between 0 and 1");
+    throw Error("the requested error must lie between 0 and 1");
   if (!(target.at_overlap >= 1e-4 && target.at_overlap <= 0.5))
-    throw Error("the overlap at which an error is asked for must lie between 0.01 % and 50 %");
+    throw Error("the overlap of the requested error must lie between 0.01 % and 50 %");
 }
 
 }  // namespace
@@ -346,7 +346,7 @@ TargetedAsset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
   if (largest.max_spheres == 0) largest.max_spheres = kMost;
   packing::check_settings(largest);
   return thread_arena(settings.threads).execute([&] {
-    return TargetBake(resolve(mesh), target, settings, progress).run();
+    return TargetBake(resolve(mesh, progress), target, settings, progress).run();
   });
 }
 

@@ -185,19 +185,21 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
   }
   answer.contact.penetration = whole_answer(found, *pose);
   answer.segments = found.crossings;
-  if (patches.empty()) return answer;
-  const std::span<ExactPart> parts(scratch.parts.get(), query.divide());
-  keep_largest(parts, patches.size());
-  answer.contact.count = write_parts(parts, found.origin, *pose, patches);
-  const double smaller = std::cbrt(answer.contact.penetration.volume);
-  finish_patches(patches.first(answer.contact.count), smaller);
+  if (!patches.empty()) {
+    const std::span<ExactPart> parts(scratch.parts.get(), query.divide());
+    keep_largest(parts, patches.size());
+    answer.contact.count = write_parts(parts, found.origin, *pose, patches);
+    const double smaller = std::cbrt(answer.contact.penetration.volume);
+    finish_patches(patches.first(answer.contact.count), smaller);
+  }
   const auto to_world = [&](const exact::Point& p) {
     return pose->to_world(vector(found.origin) + vector(p));
   };
   for (std::uint32_t i = 0; i < std::min<std::size_t>(segments.size(), found.crossings); ++i) {
     exact::Point from, to;
     query.segment(i, from, to);
-    segments[i] = {to_world(from), to_world(to), query.part_of_crossing(i)};
+    const std::uint32_t patch = patches.empty() ? 0 : query.part_of_crossing(i);
+    segments[i] = {to_world(from), to_world(to), patch};
   }
   return answer;
 }

@@ -78,10 +78,10 @@ SphereProtrusion in_mesh_frame(SphereProtrusion p, const UnitFrame& frame) {
 
 void check(const SphereCoverSettings& settings) {
   if (settings.count < 1 || settings.count > kMostCoverSpheres)
-    throw Error("cover: " + std::to_string(settings.count) + " spheres; 1 to " +
-                std::to_string(kMostCoverSpheres) + " can be made");
+    throw Error("cover: " + std::to_string(settings.count) +
+                " spheres requested; the count must be 1 to " + std::to_string(kMostCoverSpheres));
   if (!(settings.max_protrusion >= 0) || !std::isfinite(settings.max_protrusion))
-    throw Error("cover: the largest protrusion must be a length, 0 or more");
+    throw Error("cover: the largest protrusion must be finite and 0 or more");
 }
 
 SphereCover finished(const MeshSolid& solid, const std::vector<CoverSphere>& balls) {

@@ -5,11 +5,16 @@ x_world = R(q) (scale · x) + t. What is refused raises ist.Error with the libra
 wrong shape raise ValueError, of a wrong dtype TypeError.
 """
 
+import copyreg
 import enum
 
 from . import _core
 from ._core import *  # noqa: F403
 from ._core import __version__
+
+
+# Functions go to other processes by their names.
+copyreg.pickle(type(_core.penetration), lambda function: function.__qualname__)
 
 
 class QueryStatus(enum.IntEnum):

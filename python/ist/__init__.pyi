@@ -7,7 +7,7 @@ no leading n: numbers and (3,) arrays.
 import enum
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, final
+from typing import Any, Literal, Protocol, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,7 @@ from . import gpu as gpu
 __version__: str
 
 _Path = str | os.PathLike[str]
-_Column = Any  # NDArray of one row a pose; a NumPy number for one pose
+_Column = Any  # NDArray of one row a pose; a number for one pose
 _SphereMeasure = Literal["matched", "inner"]
 _Measure = Literal["matched", "inner", "exact"]
 _FieldUse = Literal["automatic", "never", "always"]
@@ -105,6 +105,14 @@ class Mesh:
     @property
     def declared_unit(self) -> float: ...  # [m]
 
+class _MeshLike(Protocol):
+    """trimesh.Trimesh, and the like."""
+
+    vertices: Any  # (n, 3) [u]
+    faces: Any  # (m, 3)
+
+_OpenMesh = Mesh | _Path | tuple[ArrayLike, ArrayLike] | _MeshLike
+
 @final
 class ClosedMesh:
     @property
@@ -117,7 +125,8 @@ class ClosedMesh:
     def report(self) -> MeshReport: ...
 
 def load_mesh(path: _Path, *, weld_tolerance: float = 0.0) -> Mesh: ...
-def close_mesh(mesh: Mesh, *, name: str = "mesh", repair: bool = False) -> ClosedMesh: ...
+def from_trimesh(mesh: _MeshLike) -> Mesh: ...
+def close_mesh(mesh: _OpenMesh, *, name: str = "mesh", repair: bool = False) -> ClosedMesh: ...
 def sample_mesh(name: str) -> Mesh: ...
 
 @final
@@ -219,22 +228,23 @@ class Asset:
     def counted_twice(self) -> float: ...  # [u³]
 
 def bake(
-    mesh: ClosedMesh, *, max_spheres: int = 10000, target_coverage: float = 1.0,
+    mesh: ClosedMesh | _OpenMesh, *, max_spheres: int = 10000, target_coverage: float = 1.0,
     min_radius: float = 0.0, time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded",
     seed: int = 0, threads: int = 0, device: _Device = "auto", surface: str | float = "all",
     progress: Callable[[Progress], Any] | None = None,
 ) -> Asset: ...
 def bake_surface(
-    mesh: ClosedMesh, *, surface: str | float = "all", threads: int = 0,
+    mesh: ClosedMesh | _OpenMesh, *, surface: str | float = "all", threads: int = 0,
+    progress: Callable[[Progress], Any] | None = None,
 ) -> Asset: ...
 def bake_to_error(
-    mesh: ClosedMesh, relative_error: float = 0.01, at_overlap: float = 0.001, *,
+    mesh: ClosedMesh | _OpenMesh, relative_error: float = 0.01, at_overlap: float = 0.001, *,
     max_spheres: int = 0, target_coverage: float = 1.0, min_radius: float = 0.0,
     time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded", seed: int = 0,
     threads: int = 0, device: _Device = "auto", surface: str | float = "all",
     progress: Callable[[Progress], Any] | None = None,
 ) -> TargetedAsset: ...
-def check(asset: Asset, mesh: ClosedMesh, *, threads: int = 0) -> list[Invariant]: ...
+def check(asset: Asset, mesh: ClosedMesh | _OpenMesh, *, threads: int = 0) -> list[Invariant]: ...
 
 class Field: ...
 
@@ -349,6 +359,15 @@ class ContactPatches:
     def torque(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u³]
 
 @final
+class OverlapOutline:
+    @property
+    def contact(self) -> ContactPatches: ...  # of one pose
+    @property
+    def segments(self) -> NDArray[np.float64]: ...  # (n, 2, 3) [u] from and to, world
+    @property
+    def patch(self) -> NDArray[np.uint32]: ...  # (n,) the patch that each bounds
+
+@final
 class TimeOfImpact:
     @property
     def time(self) -> _Column: ...  # (n,) [T]
@@ -400,6 +419,11 @@ def contact_patches(
     field: _FieldUse = "automatic", max_visits: int = 0, deadline_us: float = 0.0,
     relative_error: float = 0.0, min_radius: float = 0.0, threads: int = 0,
 ) -> ContactPatches: ...
+def overlap_outline(
+    a: Asset, b: Asset, poses: ArrayLike, *, max_patches: int = 8,
+    scales: ArrayLike | None = None, poses_a: ArrayLike | None = None,
+    scales_a: ArrayLike | None = None, max_visits: int = 0,
+) -> OverlapOutline: ...
 def overlap(
     a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, threads: int = 0,

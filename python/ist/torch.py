@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 import ist
+from ist._scene import all_pairs
 
 __all__ = ["overlap"]
 
@@ -46,14 +47,6 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: torch.Tensor, *, p
         scales = torch.as_tensor(scales)
     return _Overlap.apply(poses, scales, solids, np.asarray(pairs, np.int64).reshape(-1, 2),
                           settings)
-
-
-def all_pairs(solids):
-    """(n, 2): each Asset with each later one, and each Field with each Asset."""
-    assets = [k for k, solid in enumerate(solids) if isinstance(solid, ist.Asset)]
-    fields = [k for k, solid in enumerate(solids) if not isinstance(solid, ist.Asset)]
-    return ([(f, a) for f in fields for a in assets] +
-            [(a, b) for i, a in enumerate(assets) for b in assets[i + 1:]])
 
 
 class _Overlap(torch.autograd.Function):

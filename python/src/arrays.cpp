@@ -5,54 +5,48 @@
 namespace ist::python {
 namespace {
 
-std::string type_name(const py::handle& value) {
-  return py::str(py::type::handle_of(value).attr("__name__"));
-}
-
 /// `kinds`: letters of NumPy's dtype.kind that convert.
-py::array take_array(const py::handle& value, const std::string& name, const std::string& wanted,
-                     const char* kinds, const char* type) {
-  const py::array given = py::array::ensure(value);
-  if (!given) {
-    PyErr_Clear();
-    throw py::type_error(name + ": a " + type_name(value) + " is no array; wanted " + type + " " +
-                         wanted);
+template <class T>
+Array<T> take_array(const py::handle& value, const std::string& name, const std::string& wanted,
+                    const char* kinds, const char* type) {
+  Array<T> array;
+  if (py::try_cast(value, array, false)) return array;
+  const py::module_ numpy = py::module_::import_("numpy");
+  py::object given;
+  try {
+    given = numpy.attr("asarray")(value);
+  } catch (py::python_error&) {
+    throw type_error(name + ": a " + type_name_of(value) + " is not an array; wanted " + type +
+                     " " + wanted);
   }
-  if (std::strchr(kinds, given.dtype().kind()) == nullptr)
-    throw py::type_error(name + ": dtype " + std::string(py::str(given.dtype())) + "; wanted " +
-                         type + " " + wanted);
-  return given;
-}
-
-template <class Array>
-Array converted(const py::array& given, const std::string& name) {
-  Array array = Array::ensure(given);
-  if (!array) {
-    PyErr_Clear();
-    throw py::type_error(name + ": dtype " + std::string(py::str(given.dtype())) +
-                         " does not convert");
-  }
+  const py::object dtype = given.attr("dtype");
+  if (std::strchr(kinds, text_of(dtype.attr("kind"))[0]) == nullptr)
+    throw type_error(name + ": dtype " + text_of(dtype) + "; wanted " + type + " " + wanted);
+  given = numpy.attr("asarray")(given, type, "C");
+  if (!py::try_cast(given, array, false))
+    throw type_error(name + ": dtype " + text_of(dtype) + " does not convert");
   return array;
 }
 
 }  // namespace
 
 Doubles take_doubles(const py::handle& value, const std::string& name, const std::string& wanted) {
-  return converted<Doubles>(take_array(value, name, wanted, "fiu", "float64"), name);
+  return take_array<double>(value, name, wanted, "fiu", "float64");
 }
 
 Floats take_floats(const py::handle& value, const std::string& name, const std::string& wanted) {
-  return converted<py::array_t<float, py::array::c_style | py::array::forcecast>>(
-      take_array(value, name, wanted, "fiu", "float32"), name);
+  return take_array<float>(value, name, wanted, "fiu", "float32");
 }
 
 Integers take_integers(const py::handle& value, const std::string& name,
                        const std::string& wanted) {
-  return converted<Integers>(take_array(value, name, wanted, "iu", "int64"), name);
+  return take_array<std::int64_t>(value, name, wanted, "iu", "int64");
 }
 
-Shape shape_of(const py::array& array) {
-  return Shape(array.shape(), array.shape() + array.ndim());
+Eigen::Vector3d take_vector(const py::handle& value, const char* name) {
+  const Doubles array = take_doubles(value, name, "(3,)");
+  if (array.ndim() != 1 || array.shape(0) != 3) refuse_shape(array, name, "(3,)");
+  return Eigen::Vector3d(array.data());
 }
 
 std::string text_of(const Shape& shape) {
@@ -60,10 +54,6 @@ std::string text_of(const Shape& shape) {
   for (std::size_t i = 0; i < shape.size(); ++i)
     text += (i == 0 ? "" : ", ") + std::to_string(shape[i]);
   return text + (shape.size() == 1 ? ",)" : ")");
-}
-
-void refuse_shape(const py::array& array, const std::string& name, const std::string& wanted) {
-  throw py::value_error(name + ": shape " + text_of(shape_of(array)) + "; wanted " + wanted);
 }
 
 }  // namespace ist::python

@@ -1,27 +1,45 @@
 #pragma once
 
-#include <pybind11/numpy.h>
-#include <pybind11/pybind11.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <Eigen/Core>
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <memory>
 #include <new>
 #include <string>
 #include <vector>
 
-// Arguments and answers as NumPy arrays. What does not fit is a TypeError (dtype) or a ValueError
+// Arguments and answers as arrays. What does not fit is a TypeError (dtype) or a ValueError
 // (shape, value) that names the argument, what it is and what was wanted.
 
 namespace ist::python {
 
-namespace py = pybind11;
+namespace py = nanobind;
 
-using Shape = std::vector<py::ssize_t>;
-using Doubles = py::array_t<double, py::array::c_style>;
-using Integers = py::array_t<std::int64_t, py::array::c_style>;
-using Floats = py::array_t<float, py::array::c_style>;
+inline py::builtin_exception value_error(const std::string& text) {
+  return py::value_error(text.c_str());
+}
+inline py::builtin_exception type_error(const std::string& text) {
+  return py::type_error(text.c_str());
+}
+
+inline std::string text_of(const py::handle& value) { return py::str(value).c_str(); }
+inline std::string type_name_of(const py::handle& value) {
+  return text_of(value.type().attr("__name__"));
+}
+
+using Shape = std::vector<std::size_t>;
+
+/// Memory of an argument, in C order, which stays as long as this.
+template <class T>
+using Array = py::ndarray<const T, py::c_contig, py::device::cpu>;
+using Doubles = Array<double>;
+using Integers = Array<std::int64_t>;
+using Floats = Array<float>;
 
 /// Real numbers. The argument's own memory if that holds them in C order, else a copy.
 /// `wanted`: for the message, "(n, 7)".
@@ -33,45 +51,56 @@ Integers take_integers(const py::handle& value, const std::string& name, const s
 
 /// "(3, 7)"
 std::string text_of(const Shape& shape);
-Shape shape_of(const py::array& array);
 
-[[noreturn]] void refuse_shape(const py::array& array, const std::string& name,
-                               const std::string& wanted);
+template <class T>
+Shape shape_of(const Array<T>& array) {
+  Shape shape;
+  for (std::size_t k = 0; k < array.ndim(); ++k) shape.push_back(array.shape(k));
+  return shape;
+}
+
+template <class T>
+[[noreturn]] void refuse_shape(const Array<T>& array, const std::string& name,
+                               const std::string& wanted) {
+  throw value_error(name + ": shape " + text_of(shape_of(array)) + "; wanted " + wanted);
+}
+
+/// Of three numbers.
+Eigen::Vector3d take_vector(const py::handle& value, const char* name);
 
 /// A new array of shape `rows` + `each`, all zero, and where its data is. What nobody writes to is
 /// not touched: of a long one it takes no memory and no time.
 template <class T>
 struct Column {
   Column() = default;
-  Column(Shape rows, const Shape& each) : width(1) {
-    for (const py::ssize_t n : each) width *= static_cast<std::size_t>(n);
-    rows.insert(rows.end(), each.begin(), each.end());
+  Column(Shape rows, const Shape& each) : shape(std::move(rows)), width(1) {
+    for (const std::size_t n : each) width *= n;
+    shape.insert(shape.end(), each.begin(), each.end());
     std::size_t count = 1;
-    for (const py::ssize_t n : rows) count *= static_cast<std::size_t>(n);
-    if (count * sizeof(T) < kLong) {
-      array = py::array_t<T>(rows);
-      data = static_cast<T*>(array.mutable_data());
-      std::fill_n(data, count, T());
-    } else {
-      data = static_cast<T*>(std::calloc(count, sizeof(T)));
-      if (data == nullptr) throw std::bad_alloc();
-      array = py::array_t<T>(rows, data, py::capsule(data, std::free));
-    }
+    for (const std::size_t n : shape) count *= n;
+    data.reset(static_cast<T*>(std::calloc(count + 1, sizeof(T))), std::free);
+    if (data == nullptr) throw std::bad_alloc();
   }
 
-  T* row(std::size_t i) const { return data + i * width; }
+  T* row(std::size_t i) const { return data.get() + i * width; }
 
-  static constexpr std::size_t kLong = 1 << 16;  // bytes
+  /// An array of NumPy, a number where it has no dimension; None where there is no column.
+  py::object handed_out() const {
+    if (data == nullptr) return py::none();
+    if (shape.empty()) return py::cast(*data);
+    return handed_out(shape, py::dtype<T>());
+  }
 
-  py::array array;
-  T* data = nullptr;
+  py::object handed_out(const Shape& as, const py::dlpack::dtype& type) const {
+    const py::capsule owner(new std::shared_ptr<T>(data), [](void* held) noexcept {
+      delete static_cast<std::shared_ptr<T>*>(held);
+    });
+    return py::cast(py::ndarray<py::numpy>(data.get(), as.size(), as.data(), owner, nullptr, type));
+  }
+
+  Shape shape;
+  std::shared_ptr<T> data;
   std::size_t width = 0;
 };
-
-/// An array as it is handed out: a number where it has no dimension.
-inline py::object handed_out(const py::array& array) {
-  if (array.ndim() == 0) return array[py::tuple()];
-  return array;
-}
 
 }  // namespace ist::python

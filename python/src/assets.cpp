@@ -1,5 +1,6 @@
-#include <pybind11/eigen.h>
-#include <pybind11/stl.h>
+#include <nanobind/eigen/dense.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/vector.h>
 
 #include <cstring>
 #include <memory>
@@ -13,6 +14,7 @@
 #include "app/exported_spheres.h"
 #include "app/text.h"
 #include "arrays.h"
+#include "meshes.h"
 #include "module.h"
 #include "offline.h"
 #include "settings/bake_settings.h"
@@ -20,7 +22,6 @@
 namespace ist::python {
 namespace {
 
-using SharedMesh = std::shared_ptr<ClosedMesh>;
 using SharedAsset = std::shared_ptr<Asset>;
 
 constexpr std::pair<const char*, Device> kDevices[] = {
@@ -32,17 +33,11 @@ constexpr std::pair<const char*, GridMode> kGrids[] = {{"banded", GridMode::band
                                                        {"hybrid", GridMode::hybrid}};
 constexpr std::pair<const char*, bool> kSpheres[] = {{"matched", true}, {"inner", false}};
 
-std::string path_of(const py::object& path) {
-  return py::module_::import("os").attr("fspath")(path).cast<std::string>();
-}
-
-SharedAsset shared(Asset asset) { return std::make_shared<Asset>(std::move(asset)); }
-
-SharedAsset asset_of_bytes(const py::buffer& buffer, const std::string& name) {
+Asset asset_of_bytes(const py::object& buffer, const std::string& name) {
   Py_buffer view;
-  if (PyObject_GetBuffer(buffer.ptr(), &view, PyBUF_SIMPLE) != 0) throw py::error_already_set();
+  if (PyObject_GetBuffer(buffer.ptr(), &view, PyBUF_SIMPLE) != 0) throw py::python_error();
   const std::unique_ptr<Py_buffer, decltype(&PyBuffer_Release)> held(&view, PyBuffer_Release);
-  return std::make_shared<Asset>(
+  return Asset(
       std::span(static_cast<const std::byte*>(view.buf), static_cast<std::size_t>(view.len)), name);
 }
 
@@ -50,17 +45,26 @@ py::bytes bytes_of(const Asset& asset) {
   return py::bytes(reinterpret_cast<const char*>(asset.bytes().data()), asset.bytes().size());
 }
 
+int show_bytes(PyObject* self, Py_buffer* view, int flags) {
+  const auto bytes = py::inst_ptr<Asset>(self)->bytes();
+  return PyBuffer_FillInfo(view, self, const_cast<std::byte*>(bytes.data()),
+                           static_cast<Py_ssize_t>(bytes.size()), 1, flags);
+}
+
+const PyType_Slot kAssetSlots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(show_bytes)},
+                                   {0, nullptr}};
+
 /// (n, 4): centre and radius in the mesh's own unit and frame.
-py::array spheres_of(const Asset& asset, const std::string& which) {
+py::object spheres_of(const Asset& asset, const std::string& which) {
   const bool matched = named(which, "which", kSpheres);
   const auto spheres = app::exported_spheres(asset.view(), 0);
-  Column<double> rows({static_cast<py::ssize_t>(spheres.size())}, {4});
+  const Column<double> rows({spheres.size()}, {4});
   for (std::size_t i = 0; i < spheres.size(); ++i) {
     const app::ExportedSphere& s = spheres[i];
     Eigen::Map<Eigen::Vector4d>(rows.row(i)) << (matched ? s.matched_centre : s.centre),
         (matched ? s.matched_radius : s.radius);
   }
-  return rows.array;
+  return rows.handed_out();
 }
 
 PlacedTree placed(const Asset& asset, const py::object& pose, double scale) {
@@ -76,9 +80,8 @@ PlacedTree placed(const Asset& asset, const py::object& pose, double scale) {
 
 /// What is kept of the mesh, as the command line takes it; a number is as good as its text.
 SurfaceSettings surface_settings(const py::object& given) {
-  const std::optional<SurfaceSettings> surface = parse_surface(py::str(given));
-  if (!surface)
-    throw Error("surface: '" + std::string(py::str(given)) + "' is none of " + kSurfaceMeaning);
+  const std::optional<SurfaceSettings> surface = parse_surface(text_of(given));
+  if (!surface) throw Error("surface: '" + text_of(given) + "' is not one of " + kSurfaceMeaning);
   return *surface;
 }
 
@@ -102,53 +105,55 @@ PackingSettings packing_settings(std::size_t max_spheres, double target_coverage
 }
 
 constexpr const char* kSettingsDoc = R"(
-max_spheres: count; 0: no limit.
-target_coverage: [0, 1] of the solid's volume.
-min_radius: [u] smaller spheres are not inserted.
-time_limit: [s], 0: none; the only setting that costs repeatability.
-epsilon: greedy slack; 0: the library's schedule.
+mesh: a ClosedMesh; or what is closed first: a Mesh, a path, (vertices, triangles), or an object with
+    vertices and faces, such as trimesh's. close_mesh() repairs open ones.
+max_spheres: largest number of spheres; 0: no limit.
+target_coverage: [0, 1] share of the solid's volume at which packing stops.
+min_radius: [u] smallest radius of a sphere.
+time_limit: [s]; 0: no limit. The only setting that makes a bake unrepeatable.
+epsilon: greedy tolerance; 0: automatic schedule.
 grid: 'banded', 'uniform', 'explicit', 'implicit' or 'hybrid'.
 seed: breaks ties.
-threads: 0: all cores; never changes the result.
-device: 'auto', 'cpu' or 'cuda'; never changes the result.
-surface: what is kept of the mesh for exact queries: 'all' of its triangles, 'none', or as few as
+threads: 0: all cores. The result does not depend on it.
+device: 'auto', 'cpu' or 'cuda'. The result does not depend on it.
+surface: surface kept in the asset: 'all' triangles of the mesh, 'none', or as few as
     stay within a length of it: a number [u], or a share of its longest side as '0.1%'.
-progress: called with a Progress on this thread; False cancels: packing then keeps what is packed,
-    later stages raise Error. What it raises is raised.
+progress: called with a Progress on this thread; False cancels: packing then keeps its spheres,
+    other stages raise Error. An exception that it raises is passed on.
 
 Ctrl-C raises KeyboardInterrupt within 0.2 s.
-Raises Error if not one sphere fits, and on settings out of range.)";
+Raises Error if no sphere fits, or if a setting is out of range.)";
 
 void add_bodies(py::module_& module) {
   py::class_<MassProperties>(module, "MassProperties",
                              "A solid of density 1 as a rigid body, with bounds on the errors.")
-      .def_readonly("volume", &MassProperties::volume, "[u³]")
-      .def_readonly("centre_of_mass", &MassProperties::centre_of_mass, "(3,) [u]")
-      .def_readonly("inertia", &MassProperties::inertia,
-                    "(3, 3) [u⁵] about the centre of mass: ∫ (|y|² 1 − y yᵀ).")
-      .def_readonly("volume_error", &MassProperties::volume_error, "[u³]")
-      .def_readonly("centre_of_mass_error", &MassProperties::centre_of_mass_error,
-                    "[u] of each component")
-      .def_readonly("inertia_error", &MassProperties::inertia_error, "[u⁵] of each entry");
-  py::class_<Bounds>(module, "Bounds", "What holds a solid: a box along the axes, and a ball.")
-      .def_readonly("lower", &Bounds::lower, "(3,) [u] corner of the box")
-      .def_readonly("upper", &Bounds::upper, "(3,) [u] the opposite corner")
-      .def_readonly("centre", &Bounds::centre, "(3,) [u] of the ball")
-      .def_readonly("radius", &Bounds::radius, "[u] of the ball");
+      .def_ro("volume", &MassProperties::volume, "[u³]")
+      .def_ro("centre_of_mass", &MassProperties::centre_of_mass, "(3,) [u]")
+      .def_ro("inertia", &MassProperties::inertia,
+              "(3, 3) [u⁵] about the centre of mass: ∫ (|y|² 1 − y yᵀ).")
+      .def_ro("volume_error", &MassProperties::volume_error, "[u³]")
+      .def_ro("centre_of_mass_error", &MassProperties::centre_of_mass_error,
+              "[u] of each component")
+      .def_ro("inertia_error", &MassProperties::inertia_error, "[u⁵] of each entry");
+  py::class_<Bounds>(module, "Bounds", "Bounds of a solid: an axis-aligned box and a ball.")
+      .def_ro("lower", &Bounds::lower, "(3,) [u] corner of the box")
+      .def_ro("upper", &Bounds::upper, "(3,) [u] the opposite corner")
+      .def_ro("centre", &Bounds::centre, "(3,) [u] of the ball")
+      .def_ro("radius", &Bounds::radius, "[u] of the ball");
   py::class_<Invariant>(module, "Invariant", "One proven property of an asset.")
-      .def_readonly("name", &Invariant::name, "'sphere inside solid', …")
-      .def_readonly("worst", &Invariant::worst,
-                    "Largest violation measure, as `meaning` says; ≤ 0 is sound unless stated.")
-      .def_readonly("meaning", &Invariant::meaning, "What `worst` measures, with its unit.")
-      .def_readonly("where", &Invariant::where, "Number of the sphere, node, … that is worst.")
-      .def_readonly("checked", &Invariant::checked, "How many were looked at.")
-      .def_readonly("violations", &Invariant::violations, "How many do not hold.");
-  py::class_<PartnerError>(module, "PartnerError", "How an asset answers one kind of partner.")
-      .def_property_readonly(
+      .def_ro("name", &Invariant::name, "'sphere inside solid', …")
+      .def_ro("worst", &Invariant::worst,
+              "Largest violation, in the measure of `meaning`; ≤ 0 is sound unless stated.")
+      .def_ro("meaning", &Invariant::meaning, "The quantity of `worst`, with its unit.")
+      .def_ro("where", &Invariant::where, "Index of the worst sphere, node, ….")
+      .def_ro("checked", &Invariant::checked, "Number of objects checked.")
+      .def_ro("violations", &Invariant::violations, "Number of violations.");
+  py::class_<PartnerError>(module, "PartnerError", "Error of an asset against one kind of partner.")
+      .def_prop_ro(
           "partner", [](const PartnerError& e) { return app::name_of(e.partner); },
           "'copy', 'plane', 'ball', 'edge', 'corner' or 'plate'.")
-      .def_readonly("median", &PartnerError::median, "Relative.")
-      .def_readonly("poses", &PartnerError::poses, "Behind it.");
+      .def_ro("median", &PartnerError::median, "Median relative error.")
+      .def_ro("poses", &PartnerError::poses, "Number of poses.");
 }
 
 struct Targeted {
@@ -163,16 +168,16 @@ struct Targeted {
 void add_bakes(py::module_& module) {
   module.def(
       "bake",
-      [](const SharedMesh& mesh, std::size_t max_spheres, double target_coverage, double min_radius,
-         double time_limit, double epsilon, const std::string& grid, std::uint64_t seed,
-         unsigned threads, const std::string& device, const py::object& surface,
+      [](const py::object& given, std::size_t max_spheres, double target_coverage,
+         double min_radius, double time_limit, double epsilon, const std::string& grid,
+         std::uint64_t seed, unsigned threads, const std::string& device, const py::object& surface,
          const py::object& progress) {
         const PackingSettings settings =
             packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
                              seed, threads, device, surface);
         return offline(
-            [mesh, settings](const ProgressCallback& callback) {
-              return shared(bake(*mesh, settings, callback));
+            [mesh = closed_of(given), settings](const ProgressCallback& callback) {
+              return bake(*mesh, settings, callback);
             },
             progress);
       },
@@ -181,22 +186,23 @@ void add_bakes(py::module_& module) {
       py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
       py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
       py::arg("progress") = py::none(),
-      (std::string("Makes the asset of a closed mesh. Same mesh and settings, same bytes, on any "
-                   "machine.\n") +
+      (std::string("Bakes the asset of a mesh. The same mesh and settings give the same "
+                   "bytes on any machine.\n") +
        kSettingsDoc)
           .c_str());
-  py::class_<Targeted>(module, "TargetedAsset", "What bake_to_error made of its target.")
-      .def_readonly("asset", &Targeted::asset, "The Asset.")
-      .def_readonly("measured_error", &Targeted::measured_error,
-                    "Relative, median near the overlap asked about, worst partner's.")
-      .def_readonly("poses", &Targeted::poses, "Of all partners; 0: none was tried.")
-      .def_readonly("partners", &Targeted::partners, "A PartnerError for each kind.")
-      .def_readonly("met", &Targeted::met, "poses > 0 and measured_error no larger than asked.")
-      .def_property_readonly(
-          "stop", [](const Targeted& t) { return app::name_of(t.stop); }, "What ended the search.");
+  py::class_<Targeted>(module, "TargetedAsset", "Result of bake_to_error().")
+      .def_ro("asset", &Targeted::asset, "The Asset.")
+      .def_ro("measured_error", &Targeted::measured_error,
+              "Median relative error near the requested overlap, of the worst partner.")
+      .def_ro("poses", &Targeted::poses, "Number of poses of all partners; 0: none was measured.")
+      .def_ro("partners", &Targeted::partners, "A PartnerError for each kind.")
+      .def_ro("met", &Targeted::met, "poses > 0 and measured_error is at most the requested error.")
+      .def_prop_ro(
+          "stop", [](const Targeted& t) { return app::name_of(t.stop); },
+          "Reason for the end of the search.");
   module.def(
       "bake_to_error",
-      [](const SharedMesh& mesh, double relative_error, double at_overlap, std::size_t max_spheres,
+      [](const py::object& given, double relative_error, double at_overlap, std::size_t max_spheres,
          double target_coverage, double min_radius, double time_limit, double epsilon,
          const std::string& grid, std::uint64_t seed, unsigned threads, const std::string& device,
          const py::object& surface, const py::object& progress) {
@@ -204,10 +210,10 @@ void add_bakes(py::module_& module) {
             packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
                              seed, threads, device, surface);
         return offline(
-            [mesh, settings,
+            [mesh = closed_of(given), settings,
              target = ErrorTarget{relative_error, at_overlap}](const ProgressCallback& callback) {
               TargetedAsset made = bake_to_error(*mesh, target, settings, callback);
-              return Targeted{shared(std::move(made.asset)),
+              return Targeted{std::make_shared<Asset>(std::move(made.asset)),
                               made.measured_error,
                               made.poses,
                               {made.partners.begin(), made.partners.end()},
@@ -222,7 +228,7 @@ void add_bakes(py::module_& module) {
       py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
       py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
       py::arg("progress") = py::none(),
-      (std::string("bake() with about as few spheres as an error needs.\n\n"
+      (std::string("bake() with about the fewest spheres that reach an error.\n\n"
                    "relative_error: (0, 1) median over random poses, for every partner.\n"
                    "at_overlap: [1e-4, 0.5] of the solid's volume.\n"
                    "max_spheres: 0: 200,000. The other settings are those of bake():\n") +
@@ -230,48 +236,50 @@ void add_bakes(py::module_& module) {
           .c_str());
   module.def(
       "bake_surface",
-      [](const SharedMesh& mesh, const py::object& surface, unsigned threads) {
+      [](const py::object& given, const py::object& surface, unsigned threads,
+         const py::object& progress) {
         return offline(
-            [mesh, settings = surface_settings(surface), threads](const ProgressCallback&) {
-              return shared(bake_surface(*mesh, settings, threads));
-            });
+            [mesh = closed_of(given), settings = surface_settings(surface),
+             threads](const ProgressCallback& callback) {
+              return bake_surface(*mesh, settings, threads, callback);
+            },
+            progress);
       },
       py::arg("mesh"), py::kw_only(), py::arg("surface") = "all", py::arg("threads") = 0,
-      "Makes the asset of a surface alone: the mesh, mass and bounds, without spheres, for exact "
-      "queries.\n\nWhat asks spheres answers QueryStatus.not_held. The settings are those of "
-      "bake().\nRaises Error where the mesh counts volume twice.");
+      py::arg("progress") = py::none(),
+      "Bakes the asset of a surface alone: the mesh, mass and bounds, without spheres, for exact "
+      "queries.\n\nQueries that need spheres return QueryStatus.not_held. The settings are those "
+      "of bake().\nRaises Error if parts of the mesh overlap.");
   module.def(
       "check",
-      [](const SharedAsset& asset, const SharedMesh& mesh, unsigned threads) {
-        return offline([asset, mesh, threads](const ProgressCallback&) {
+      [](const SharedAsset& asset, const py::object& given, unsigned threads) {
+        return offline([asset, mesh = closed_of(given), threads](const ProgressCallback&) {
           return check(*asset, *mesh, threads);
         });
       },
       py::arg("asset"), py::arg("mesh"), py::kw_only(), py::arg("threads") = 0,
-      "Proves every invariant of an asset again, in double, from its bytes and the mesh alone.\n\n"
-      "Returns a list of Invariant. Raises Error if the asset is of another mesh.");
+      "Verifies every invariant of an asset in double, from its bytes and the mesh alone.\n\n"
+      "Returns a list of Invariant. Raises Error if the asset was baked from another mesh.");
 }
 
 }  // namespace
 
 void add_assets(py::module_& module) {
   add_bodies(module);
-  py::class_<Asset, SharedAsset>(
-      module, "Asset", py::buffer_protocol(),
+  py::class_<Asset>(
+      module, "Asset", py::type_slots(kAssetSlots),
       "A baked solid. Immutable, so threads may share it. "
-      "memoryview(asset) is a read-only view of its bytes that holds it; "
-      "pickle works.")
+      "memoryview(asset) is a read-only view of its bytes that keeps it alive; pickle works.")
       .def_static(
           "load",
           [](const py::object& path) {
-            return offline([name = path_of(path)](const ProgressCallback&) {
-              return shared(Asset::load(name));
-            });
+            return offline(
+                [name = path_of(path)](const ProgressCallback&) { return Asset::load(name); });
           },
           py::arg("path"), "Reads an .ist file. Raises Error (file, what is wrong, way out).")
       .def_static("from_bytes", &asset_of_bytes, py::arg("data"), py::arg("name") = "asset",
                   "Copies the bytes of an .ist file.\n\ndata: bytes, or any contiguous buffer.\n"
-                  "name: for messages. Raises Error unless every check holds.")
+                  "name: used in messages. Raises Error if a check of the bytes fails.")
       .def(
           "save",
           [](const SharedAsset& self, const py::object& path) {
@@ -281,20 +289,21 @@ void add_assets(py::module_& module) {
             });
           },
           py::arg("path"),
-          "Writes an .ist file: the old one or the whole new one is there at every moment.")
+          "Writes an .ist file atomically: readers see the old file or the complete new one.")
       .def("to_bytes", &bytes_of, "The bytes of an .ist file, a copy.")
-      .def_buffer([](const Asset& self) {
-        return py::buffer_info(const_cast<std::byte*>(self.bytes().data()), 1, "B", 1,
-                               {self.bytes().size()}, {1}, true);
-      })
-      .def(py::pickle(&bytes_of,
-                      [](const py::bytes& data) { return asset_of_bytes(data, "pickle"); }))
+      .def("__getstate__", &bytes_of)
+      .def("__setstate__",
+           [](Asset& self, const py::bytes& data) {
+             new (&self) Asset(asset_of_bytes(data, "pickle"));
+           })
+      .def("__copy__", [](const py::object& self) { return self; })
+      .def("__deepcopy__", [](const py::object& self, const py::object&) { return self; })
       .def(
           "info",
           [](const Asset& self) {
-            return py::module_::import("json").attr("loads")(app::asset_json(self.view()).dump());
+            return py::module_::import_("json").attr("loads")(app::asset_json(self.view()).dump());
           },
-          "All that `ist info --json` prints, as a dict: docs/json.md.")
+          "The output of `ist info --json` as a dict: docs/json.md.")
       .def("__str__", [](const Asset& self) { return app::describe_asset(self.view()); })
       .def("spheres", &spheres_of, py::arg("which") = "matched",
            "(n, 4) float64: centre and radius [u], in the mesh's own frame; a copy.\n\n"
@@ -305,8 +314,7 @@ void add_assets(py::module_& module) {
             return mass_properties(placed(self, pose, scale));
           },
           py::arg("pose") = py::none(), py::arg("scale") = 1.0,
-          "MassProperties, in the frame that the pose leads to; all zero for a pose that a query "
-          "calls invalid.")
+          "MassProperties in the frame of the pose; all zero for an invalid pose.")
       .def(
           "bounds",
           [](const Asset& self, const py::object& pose, double scale) {
@@ -314,36 +322,35 @@ void add_assets(py::module_& module) {
                                                 : bounds(placed(self, pose, scale));
           },
           py::arg("pose") = py::none(), py::arg("scale") = 1.0,
-          "Bounds, in the frame that the pose leads to. Matched spheres may reach out by "
-          "`protrusion`.")
-      .def_property_readonly(
+          "Bounds in the frame of the pose. Matched spheres may stick out by `protrusion`.")
+      .def_prop_ro(
           "sphere_count", [](const Asset& self) { return self.view().sphere_count(); }, "Count.")
-      .def_property_readonly(
+      .def_prop_ro(
           "volume", [](const Asset& self) { return self.view().volume(); }, "[u³] of the solid.")
-      .def_property_readonly(
+      .def_prop_ro(
           "coverage", [](const Asset& self) { return self.view().coverage(); },
-          "[0, 1] share of it in inner spheres.")
-      .def_property_readonly(
+          "[0, 1] share of the volume in inner spheres.")
+      .def_prop_ro(
           "protrusion", [](const Asset& self) { return self.view().protrusion(); },
-          "[u] no matched sphere sticks further out of the solid.")
-      .def_property_readonly(
+          "[u] bound on how far matched spheres stick out of the solid.")
+      .def_prop_ro(
           "has_field", [](const Asset& self) { return self.view().has_field(); },
-          "It holds the solid's surface.")
-      .def_property_readonly(
+          "Whether the asset stores the solid's surface.")
+      .def_prop_ro(
           "field_error", [](const Asset& self) { return self.view().field_error(); },
-          "[u] that surface and the solid's lie within this of each other.")
-      .def_property_readonly(
+          "[u] largest distance between that surface and the solid's.")
+      .def_prop_ro(
           "mesh_triangles", [](const Asset& self) { return self.view().mesh_triangles(); },
-          "Of the mesh that exact queries ask; 0: it holds none.")
-      .def_property_readonly(
+          "Number of triangles of the kept mesh, for exact queries; 0: none.")
+      .def_prop_ro(
           "mesh_error", [](const Asset& self) { return self.view().mesh_error(); },
-          "[u] the mesh's surface and the solid's lie within this of each other.")
-      .def_property_readonly(
+          "[u] largest distance between the kept mesh's surface and the solid's.")
+      .def_prop_ro(
           "mesh_state", [](const Asset& self) { return app::name_of(self.view().mesh_state()); },
-          "'own', 'resolved', 'simplified', 'none', or 'unresolved': it counts volume twice.")
-      .def_property_readonly(
+          "'own', 'resolved', 'simplified', 'none', or 'unresolved' (its parts overlap).")
+      .def_prop_ro(
           "counted_twice", [](const Asset& self) { return self.view().counted_twice(); },
-          "[u³] that the mesh as it came counts more than once.");
+          "[u³] volume that the input mesh counts more than once.");
   add_bakes(module);
 }
 

@@ -26,7 +26,7 @@ Function driver_function(const char* name, unsigned version) {
   void* found = nullptr;
   cudaDriverEntryPointQueryResult result = cudaDriverEntryPointSuccess;
   check(cudaGetDriverEntryPointByVersion(name, &found, version, cudaEnableLegacyStream, &result),
-        "asking the driver for a function");
+        "loading a driver function");
   if (result != cudaDriverEntryPointSuccess || found == nullptr)
     throw Error(std::string("GPU: the driver has no ") + name + ": install one for CUDA 13");
   return reinterpret_cast<Function>(found);
@@ -34,7 +34,7 @@ Function driver_function(const char* name, unsigned version) {
 
 void check_driver(CUresult result, const char* doing) {
   if (result != CUDA_SUCCESS)
-    throw Error(std::string("GPU: ") + doing + ": driver's error " + std::to_string(result));
+    throw Error(std::string("GPU: ") + doing + ": driver error " + std::to_string(result));
 }
 
 /// Blocks that nobody owns any more, and the stream that frees them.
@@ -59,7 +59,7 @@ class Dropped {
     static const auto record =
         driver_function<PFN_cuCtxRecordEvent_v12050>("cuCtxRecordEvent", 12050);
     CUcontext context = nullptr;
-    check_driver(current(&context), "looking for the device's context");
+    check_driver(current(&context), "querying the device's context");
     cudaEvent_t all = nullptr;
     check(cudaEventCreateWithFlags(&all, cudaEventDisableTiming), "making an event");
     const CUresult recorded = record(context, all);
@@ -69,7 +69,7 @@ class Dropped {
       data_.clear();
     }
     cudaEventDestroy(all);
-    check_driver(recorded, "freeing answers that are not used any more");
+    check_driver(recorded, "freeing unused answers");
   }
 
   /// Of the process, never destroyed: blocks may outlive the interpreter.
@@ -92,7 +92,7 @@ void* allocated(std::size_t bytes, Stream stream) {
   if (status == cudaErrorMemoryAllocation) {
     cudaGetLastError();
     throw Error("GPU: no device memory left for " + std::to_string(bytes) +
-                " bytes of a batch: free device memory, divide the batch, or want fewer answers");
+                " bytes of a batch: free device memory, split the batch, or request fewer answers");
   }
   check(status, "allocating device memory");
   return data;
@@ -116,7 +116,7 @@ bool Moment::passed() const {
     cudaGetLastError();
     return false;
   }
-  check(status, "asking whether a batch is done");
+  check(status, "querying whether a batch is done");
   return true;
 }
 
@@ -124,7 +124,7 @@ void Moment::wait() const { check(cudaEventSynchronize(event_), "waiting for a b
 
 void Moment::hold(Stream stream) const {
   const DeviceGuard guard(device_);
-  check(cudaStreamWaitEvent(stream, event_, 0), "letting a stream wait for a batch");
+  check(cudaStreamWaitEvent(stream, event_, 0), "making a stream wait for a batch");
 }
 
 Block::~Block() { Dropped::of(device_).add(data_); }
@@ -174,7 +174,7 @@ bool captures(int device, Stream stream) {
   if (stream == legacy_stream()) return false;  // it cannot, and must not be asked while others do
   const DeviceGuard guard(device);
   cudaStreamCaptureStatus status = cudaStreamCaptureStatusNone;
-  check(cudaStreamIsCapturing(stream, &status), "asking a stream for its state");
+  check(cudaStreamIsCapturing(stream, &status), "querying a stream's state");
   return status != cudaStreamCaptureStatusNone;
 }
 

@@ -1,36 +1,26 @@
 #pragma once
 
-#include <pybind11/pybind11.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "arrays.h"
 #include "cuda_calls.h"
-#include "dlpack.h"
 
 // Arrays in device memory: those of any framework as arguments, by DLPack or
 // __cuda_array_interface__, and ours for any framework. Nothing is copied.
 
 namespace ist::python {
 
-namespace py = pybind11;
+using ElementType = py::dlpack::dtype;
 
-struct ElementType {
-  dlpack::TypeCode code;
-  std::uint8_t bits;
-
-  std::size_t bytes() const { return bits / 8u; }
-  bool operator==(const ElementType&) const = default;
-};
-
-inline constexpr ElementType kFloat64 = {dlpack::kFloat, 64};
-inline constexpr ElementType kUInt32 = {dlpack::kUInt, 32};
-inline constexpr ElementType kInt32 = {dlpack::kInt, 32};
-inline constexpr ElementType kUInt64 = {dlpack::kUInt, 64};
-inline constexpr ElementType kInt64 = {dlpack::kInt, 64};
+inline constexpr ElementType kFloat64 = py::dtype<double>();
+inline constexpr ElementType kUInt32 = py::dtype<std::uint32_t>();
+inline constexpr ElementType kInt32 = py::dtype<std::int32_t>();
+inline constexpr ElementType kUInt64 = py::dtype<std::uint64_t>();
+inline constexpr ElementType kInt64 = py::dtype<std::int64_t>();
 
 /// What an argument is to be.
 struct WantedArray {
@@ -59,7 +49,7 @@ struct DeviceArray {
   std::shared_ptr<const cuda::Block> block;
   std::shared_ptr<const cuda::Moment> ready;
   std::byte* data = nullptr;
-  std::vector<std::int64_t> shape;
+  Shape shape;
   ElementType type = kFloat64;
 };
 

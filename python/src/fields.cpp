@@ -1,6 +1,4 @@
-#include <pybind11/eigen.h>
-
-#include <optional>
+#include <memory>
 
 #include <ist/field.h>
 
@@ -11,16 +9,10 @@
 namespace ist::python {
 namespace {
 
-Eigen::Vector3d take_vector(const py::object& value, const char* name) {
-  const Doubles array = take_doubles(value, name, "(3,)");
-  if (array.ndim() != 1 || array.shape(0) != 3) refuse_shape(array, name, "(3,)");
-  return {array.at(0), array.at(1), array.at(2)};
-}
-
 /// A class of Python a kind of field, so that users see which one they hold.
 template <class Kind>
 struct OwnedKind : OwnedField {
-  explicit OwnedKind(Kind kind, py::object owner = py::none())
+  explicit OwnedKind(Kind kind, std::shared_ptr<const void> owner = nullptr)
       : OwnedField{std::move(kind), std::move(owner)} {}
 };
 
@@ -30,87 +22,88 @@ py::class_<OwnedKind<Kind>, OwnedField> add_kind(py::module_& module, const char
   return py::class_<OwnedKind<Kind>, OwnedField>(module, name, doc);
 }
 
-std::uint32_t points(py::ssize_t count) { return static_cast<std::uint32_t>(count); }
+std::uint32_t points(std::size_t count) { return static_cast<std::uint32_t>(count); }
 
 }  // namespace
 
 Solid solid_of(const py::handle& object, const char* name) {
-  if (py::isinstance<Asset>(object)) return object.cast<const Asset&>().view();
-  if (py::isinstance<OwnedField>(object)) return object.cast<const OwnedField&>().field;
-  throw py::type_error(std::string(name) + ": a " +
-                       std::string(py::str(py::type::handle_of(object).attr("__name__"))) +
-                       "; wanted an Asset or a Field");
+  if (py::isinstance<Asset>(object)) return py::cast<const Asset&>(object).view();
+  if (py::isinstance<OwnedField>(object)) return py::cast<const OwnedField&>(object).field;
+  throw type_error(std::string(name) + ": a " + type_name_of(object) +
+                   "; wanted an Asset or a Field");
 }
 
 TreeView tree_of(const py::handle& object, const char* name) {
   const Solid solid = solid_of(object, name);
   if (const TreeView* const tree = std::get_if<TreeView>(&solid)) return *tree;
-  throw py::type_error(std::string(name) + ": a Field; it stands first in a query, as `a`");
+  throw type_error(std::string(name) + ": a Field; only `a`, the first solid, can be one");
 }
 
 Field field_of(const py::handle& object, const char* name) {
   const Solid solid = solid_of(object, name);
   if (const Field* const field = std::get_if<Field>(&solid)) return *field;
-  throw py::type_error(std::string(name) + ": an Asset; MeshField(asset) is its surface");
+  throw type_error(std::string(name) +
+                   ": an Asset; wanted a Field, e.g. MeshField(asset), its surface");
 }
 
 void add_fields(py::module_& module) {
   py::class_<OwnedField>(module, "Field",
-                         "A solid that an asset meets without having a tree itself. Stands first "
-                         "in a query. Lengths are [u] in the field's own frame.");
+                         "A shape that needs no asset. It can only be the first solid of a query. "
+                         "Lengths are [u] in the field's own frame.");
   add_kind<HalfSpaceField>(module, "HalfSpaceField", "The solid normal · x ≤ offset. Exact.")
       .def(
-          py::init([](const py::object& normal, double offset) {
+          py::new_([](const py::object& normal, double offset) {
             return OwnedKind<HalfSpaceField>(HalfSpaceField{take_vector(normal, "normal"), offset});
           }),
           py::arg("normal") = py::make_tuple(0.0, 0.0, 1.0), py::arg("offset") = 0.0,
           "normal: (3,) unit length within 1e-3, outward. offset: [u].");
   add_kind<BoxField>(module, "BoxField", "A box around the origin. Exact.")
-      .def(py::init([](const py::object& half_extents) {
+      .def(py::new_([](const py::object& half_extents) {
              return OwnedKind<BoxField>(BoxField{take_vector(half_extents, "half_extents")});
            }),
            py::arg("half_extents"), "half_extents: (3,) [u] > 0.");
   add_kind<BallField>(module, "BallField", "A ball around the origin. Exact.")
-      .def(py::init([](double radius) { return OwnedKind<BallField>(BallField{radius}); }),
+      .def(py::new_([](double radius) { return OwnedKind<BallField>(BallField{radius}); }),
            py::arg("radius"), "radius: [u] > 0.");
   add_kind<CapsuleField>(module, "CapsuleField",
                          "All points within `radius` of the segment from −half_height to "
                          "+half_height on the z axis.")
-      .def(py::init([](double radius, double half_height) {
+      .def(py::new_([](double radius, double half_height) {
              return OwnedKind<CapsuleField>(CapsuleField{radius, half_height});
            }),
            py::arg("radius"), py::arg("half_height"), "radius: [u] > 0. half_height: [u] ≥ 0.");
   add_kind<CylinderField>(module, "CylinderField", "A cylinder about the z axis.")
-      .def(py::init([](double radius, double half_height) {
+      .def(py::new_([](double radius, double half_height) {
              return OwnedKind<CylinderField>(CylinderField{radius, half_height});
            }),
            py::arg("radius"), py::arg("half_height"), "radius, half_height: [u] > 0.");
   add_kind<HeightField>(module, "HeightField",
-                        "Terrain: the solid under a grid of heights along z. Beyond its border it "
-                        "goes on level.")
-      .def(py::init([](const py::object& heights, const py::object& spacing, double lowest,
-                       double highest) {
-             const Floats grid = take_floats(heights, "heights", "(rows, columns)");
-             if (grid.ndim() != 2) refuse_shape(grid, "heights", "(rows, columns)");
-             const Doubles steps = take_doubles(spacing, "spacing", "(2,)");
-             if (steps.ndim() != 1 || steps.shape(0) != 2) refuse_shape(steps, "spacing", "(2,)");
-             return OwnedKind<HeightField>(HeightField{grid.data(),
-                                                       points(grid.shape(1)),
-                                                       points(grid.shape(0)),
-                                                       {steps.at(0), steps.at(1)},
-                                                       lowest,
-                                                       highest},
-                                           grid);
-           }),
-           py::arg("heights"), py::kw_only(), py::arg("spacing") = py::make_tuple(1.0, 1.0),
-           py::arg("lowest") = -1e300, py::arg("highest") = 1e300,
-           "heights: (rows along y, columns along x) [u]; a float32 array in C order is not "
-           "copied.\nspacing: (2,) [u] > 0 along x and y; heights[0, 0] stands at the origin.\n"
-           "lowest, highest: [u] no height is lower or higher: far objects are then told at once.");
+                        "Terrain: the solid under a grid of heights along z. Beyond the border the "
+                        "nearest height holds.")
+      .def(
+          py::new_([](const py::object& heights, const py::object& spacing, double lowest,
+                      double highest) {
+            const Floats grid = take_floats(heights, "heights", "(rows, columns)");
+            if (grid.ndim() != 2) refuse_shape(grid, "heights", "(rows, columns)");
+            const Doubles steps = take_doubles(spacing, "spacing", "(2,)");
+            if (steps.ndim() != 1 || steps.shape(0) != 2) refuse_shape(steps, "spacing", "(2,)");
+            return OwnedKind<HeightField>(HeightField{grid.data(),
+                                                      points(grid.shape(1)),
+                                                      points(grid.shape(0)),
+                                                      {steps.data()[0], steps.data()[1]},
+                                                      lowest,
+                                                      highest},
+                                          std::make_shared<Floats>(grid));
+          }),
+          py::arg("heights"), py::kw_only(), py::arg("spacing") = py::make_tuple(1.0, 1.0),
+          py::arg("lowest") = -1e300, py::arg("highest") = 1e300,
+          "heights: (rows along y, columns along x) [u]; a float32 array in C order is not "
+          "copied.\nspacing: (2,) [u] > 0 along x and y; heights[0, 0] is at the origin.\n"
+          "lowest, highest: [u] bounds on all heights, by which far objects are rejected quickly.");
   add_kind<DistanceGridField>(module, "DistanceGridField",
                               "Distances at the points of a grid, positive inside, interpolated "
-                              "linearly. Outside of the grid is outside of the solid.")
-      .def(py::init([](const py::object& distances, const py::object& origin, double spacing,
+                              "linearly. Points outside the grid are outside the solid.")
+      .def(py::new_([](const py::object& distances, const py::object& origin, double spacing,
                        double error) {
              const Floats grid = take_floats(distances, "distances", "(z, y, x)");
              if (grid.ndim() != 3) refuse_shape(grid, "distances", "(z, y, x)");
@@ -121,18 +114,19 @@ void add_fields(py::module_& module) {
                      take_vector(origin, "origin"),
                      spacing,
                      error},
-                 grid);
+                 std::make_shared<Floats>(grid));
            }),
            py::arg("distances"), py::kw_only(), py::arg("origin"), py::arg("spacing"),
            py::arg("error") = 0.0,
            "distances: (points along z, y, x) [u]; a float32 array in C order is not copied.\n"
            "origin: (3,) [u] of the first point. spacing: [u] > 0.\n"
-           "error: [u] the interpolated distance is off by at most this.");
+           "error: [u] largest error of the interpolated distance.");
   add_kind<MeshField>(module, "MeshField",
                       "The surface in an asset, without its spheres. Exact within "
                       "Asset.field_error.")
-      .def(py::init([](const py::object& asset) {
-             return OwnedKind<MeshField>(MeshField{tree_of(asset, "asset")}, asset);
+      .def(py::new_([](const py::object& asset) {
+             return OwnedKind<MeshField>(MeshField{tree_of(asset, "asset")},
+                                         std::make_shared<py::object>(asset));
            }),
            py::arg("asset"), "asset: an Asset that has a field.");
 }

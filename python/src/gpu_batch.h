@@ -58,8 +58,8 @@ std::size_t number_of(const std::string& name, const char* argument) {
   const auto columns = columns_of<Answers>();
   for (std::size_t k = 0; k < columns.size(); ++k)
     if (name == columns[k].name) return k;
-  throw py::value_error(std::string(argument) + ": '" + name + "'; there are " +
-                        names_of_columns<Answers>());
+  throw value_error(std::string(argument) + ": '" + name + "'; there are " +
+                    names_of_columns<Answers>());
 }
 
 /// Answers as arrays, ours or those that were given, in the order of columns_of(); null: not
@@ -91,17 +91,17 @@ class PairArguments {
       to = static_cast<const std::uint32_t*>(take(value, {name, {kUInt32, kInt32}, {}, false}));
       return;
     }
-    const auto number = value.cast<std::int64_t>();
+    const auto number = py::cast<std::int64_t>(value);
     if (number < 0 || number >= static_cast<std::int64_t>(size))
-      throw py::value_error(std::string(name) + ": " + std::to_string(number) + "; there are " +
-                            std::to_string(size) + " " + kind);
+      throw value_error(std::string(name) + ": " + std::to_string(number) + "; there are " +
+                        std::to_string(size) + " " + kind);
     same_.push_back({static_cast<std::uint32_t>(number), &to});
   }
 
   /// To be called when all are taken.
   std::size_t count() {
     if (rows_ < 0)
-      throw py::value_error("pose_b: None; one argument must have rows: poses, scales or assets");
+      throw value_error("pose_b: None; one argument must have rows: poses, scales or assets");
     const auto count = static_cast<std::size_t>(rows_);
     for (const auto& [number, to] : same_) {
       repeated_.push_back(std::make_unique<cuda::Repeated>(device_, number, count, stream_));
@@ -116,8 +116,8 @@ class PairArguments {
   void* take(const py::object& value, const WantedArray& wanted) {
     LentArray array = lend(value, wanted, device_, stream_);
     if (rows_ >= 0 && array.rows != rows_)
-      throw py::value_error(wanted.name + ": " + std::to_string(array.rows) +
-                            " rows; the arguments before it have " + std::to_string(rows_));
+      throw value_error(wanted.name + ": " + std::to_string(array.rows) +
+                        " rows; the arguments before it have " + std::to_string(rows_));
     rows_ = array.rows;
     lent.push_back(std::move(array.keep));
     return array.data;
@@ -142,9 +142,8 @@ std::vector<bool> wanted_columns(const py::object& wanted) {
     asked.push_back(wanted.is_none() && answer.unasked);
   if (wanted.is_none()) return asked;
   if (py::isinstance<py::str>(wanted))
-    throw py::type_error("wanted: a str; wanted a sequence of names: " +
-                         names_of_columns<Answers>());
-  for (const py::handle name : wanted) asked[number_of<Answers>(py::str(name), "wanted")] = true;
+    throw type_error("wanted: a str; must be a sequence of names: " + names_of_columns<Answers>());
+  for (const py::handle name : wanted) asked[number_of<Answers>(text_of(name), "wanted")] = true;
   return asked;
 }
 
@@ -160,8 +159,8 @@ template <class Answers>
 Places<Answers> new_columns(const Answers& blank, const std::vector<bool>& wanted,
                             std::size_t count, int device, cuda::Stream stream) {
   if (cuda::captures(device, stream))
-    throw py::value_error(
-        "out: None; wanted arrays for the answers, as the stream is captured and a graph's own "
+    throw value_error(
+        "out: None; wanted arrays for the answers, because the stream is captured and a graph's "
         "memory does not outlive it");
   const auto columns = columns_of<Answers>();
   constexpr std::size_t kAlign = 256;
@@ -169,7 +168,7 @@ Places<Answers> new_columns(const Answers& blank, const std::vector<bool>& wante
   std::vector<std::size_t> begin;
   for (std::size_t k = 0; k < columns.size(); ++k) {
     begin.push_back(bytes);
-    std::size_t each = columns[k].type.bytes();
+    std::size_t each = columns[k].type.bits / 8u;
     for (const std::int64_t n : columns[k].inner_shape(blank)) each *= static_cast<std::size_t>(n);
     if (wanted[k]) bytes += (count * each + kAlign - 1) / kAlign * kAlign;
   }
@@ -183,8 +182,9 @@ Places<Answers> new_columns(const Answers& blank, const std::vector<bool>& wante
     DeviceArray array;
     array.block = block;
     array.data = block->data() + begin[k];
-    array.shape = {static_cast<std::int64_t>(count)};
-    for (const std::int64_t n : columns[k].inner_shape(blank)) array.shape.push_back(n);
+    array.shape = {count};
+    for (const std::int64_t n : columns[k].inner_shape(blank))
+      array.shape.push_back(static_cast<std::size_t>(n));
     array.type = columns[k].type;
     columns[k].set(places.to, array.data);
     places.found.column[k] = py::cast(std::move(array));
@@ -200,17 +200,16 @@ Places<Answers> given_columns(const Answers& blank, const py::object& out, std::
   const auto columns = columns_of<Answers>();
   Places<Answers> places{blank, {}};
   if (py::isinstance<DeviceAnswers<Answers>>(out)) {
-    places.found = out.cast<const DeviceAnswers<Answers>&>();
+    places.found = py::cast<const DeviceAnswers<Answers>&>(out);
   } else if (py::isinstance<py::dict>(out)) {
-    for (const auto& [name, array] : out.cast<py::dict>())
-      places.found.column[number_of<Answers>(py::str(name), "out")] =
-          py::reinterpret_borrow<py::object>(array);
+    for (const auto& [name, array] : py::cast<py::dict>(out))
+      places.found.column[number_of<Answers>(text_of(name), "out")] = py::borrow<py::object>(array);
   } else {
-    throw py::type_error("out: wanted a dict of arrays, or what an earlier call returned");
+    throw type_error("out: wanted a dict of arrays, or what an earlier call returned");
   }
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const py::object& given = places.found.column[k];
-    if (!given) continue;
+    if (!given.is_valid()) continue;
     WantedArray wanted{std::string("out['") + columns[k].name + "']",
                        {columns[k].type},
                        columns[k].inner_shape(blank),
@@ -219,8 +218,8 @@ Places<Answers> given_columns(const Answers& blank, const py::object& out, std::
     if (columns[k].type == kUInt64) wanted.types.push_back(kInt64);
     LentArray array = lend(given, wanted, device, stream);
     if (array.rows != static_cast<std::int64_t>(count))
-      throw py::value_error(wanted.name + ": " + std::to_string(array.rows) +
-                            " rows; the batch has " + std::to_string(count));
+      throw value_error(wanted.name + ": " + std::to_string(array.rows) + " rows; the batch has " +
+                        std::to_string(count));
     columns[k].set(places.to, array.data);
     lent.push_back(std::move(array.keep));
   }
@@ -257,7 +256,7 @@ DeviceAnswers<Answers> ask(DeviceAssets& assets, const GivenPairs& given, const 
   pairs.count = arguments.count();
   if (given.fields != nullptr) arguments.lent.push_back(given.fields);
   if (!out.is_none() && !wanted.is_none())
-    throw py::value_error("wanted: the arrays of `out` say what is wanted already");
+    throw value_error("wanted: excludes `out`, whose arrays already select the answers");
   Places<Answers> places =
       out.is_none() ? new_columns(blank, wanted_columns<Answers>(wanted), pairs.count, device, on)
                     : given_columns(blank, out, pairs.count, device, on, arguments.lent);
@@ -267,7 +266,8 @@ DeviceAnswers<Answers> ask(DeviceAssets& assets, const GivenPairs& given, const 
                                   });
   if (done != nullptr)
     for (const py::object& column : places.found.column)
-      if (column && py::isinstance<DeviceArray>(column)) column.cast<DeviceArray&>().ready = done;
+      if (column.is_valid() && py::isinstance<DeviceArray>(column))
+        py::cast<DeviceArray&>(column).ready = done;
   return std::move(places.found);
 }
 
@@ -277,10 +277,10 @@ void add_answers(py::module_& module, const char* name, const char* doc) {
   py::class_<DeviceAnswers<Answers>> type(module, name, doc);
   const auto columns = columns_of<Answers>();
   for (std::size_t k = 0; k < columns.size(); ++k)
-    type.def_property_readonly(
+    type.def_prop_ro(
         columns[k].name,
         [k](const DeviceAnswers<Answers>& self) -> py::object {
-          return self.column[k] ? self.column[k] : py::none();
+          return self.column[k].is_valid() ? self.column[k] : py::none();
         },
         columns[k].doc);
 }

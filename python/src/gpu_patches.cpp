@@ -26,7 +26,7 @@ std::span<const Answer<PatchAnswers>> columns_of() {
   static constexpr Answer<PatchAnswers> kColumns[] = {
       {"count", kUInt32, 0, set_patches<&To::count>, "(n,) uint32 patches of each pair.", true},
       {"id", kUInt64, 0, set_patches<&To::id>,
-       "(n, m) uint64: the same region of the same solid has the same. Ascending.", true, most_of},
+       "(n, m) uint64: identifies a region of a solid. Ascending.", true, most_of},
       {"centroid", kFloat64, 3, set_patches<&To::centroid>, "(n, m, 3) float64 [u] world.", true,
        most_of},
       {"normal", kFloat64, 3, set_patches<&To::normal>,
@@ -56,8 +56,8 @@ DeviceAnswers<PatchAnswers> patches_of(DeviceAssets& assets, const py::object& a
                                        const py::object& out, const py::object& stream) {
   const Measure which = named(measure, "measure", kGpuMeasures);
   if (max_patches < 1 || max_patches > kMostGpuPatches)
-    throw py::value_error("max_patches: " + std::to_string(max_patches) + "; wanted 1 to " +
-                          std::to_string(kMostGpuPatches));
+    throw value_error("max_patches: " + std::to_string(max_patches) + "; wanted 1 to " +
+                      std::to_string(kMostGpuPatches));
   PatchAnswers blank;
   blank.patches.most = max_patches;
   return ask<PatchAnswers>(assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, nullptr},
@@ -74,12 +74,12 @@ DeviceAnswers<PatchAnswers> patches_of(DeviceAssets& assets, const py::object& a
 constexpr const char* kPatchesDoc =
     R"(Contacts of a batch of pairs, each condensed into a few patches, on the device.
 
-assets … scale_b, measure, out, stream: as penetration() has them.
+assets … scale_b, measure, out, stream: as for penetration().
 max_patches: count for each pair, 1 to 32: m, the second dimension. Beyond count[i] a pair's rows are
     zero, or with `out` as they were.
-wanted: names of answers; None: all.
+wanted: names of the answers to compute; None: all.
 
-As ist.contact_patches(…, field='never'): the same regions with the same names. Their volumes, forces
+As ist.contact_patches(…, field='never'), with the same regions and ids. Their volumes, forces
 and torques sum to the pair's, within 1e-6 of the sum in double.
 
 Returns a ContactPatches.)";
@@ -87,12 +87,11 @@ Returns a ContactPatches.)";
 }  // namespace
 
 void add_gpu_patches(py::module_& module) {
-  add_answers<PatchAnswers>(
-      module, "ContactPatches",
-      "Patches of a batch: arrays on the device, None where not wanted; those that were given as "
-      "`out` are the same objects.");
+  add_answers<PatchAnswers>(module, "ContactPatches",
+                            "Patches of a batch: arrays on the device, None if not requested. "
+                            "Arrays passed as `out` are the same objects.");
   module.def("contact_patches", &patches_of, py::arg("assets"), py::arg("asset_a"),
-             py::arg("asset_b"), py::arg("pose_a"), py::arg("pose_b"),
+             py::arg("asset_b"), py::arg("pose_a").none(), py::arg("pose_b").none(),
              py::arg("scale_a") = py::none(), py::arg("scale_b") = py::none(), py::kw_only(),
              py::arg("max_patches") = 8, py::arg("measure") = "matched",
              py::arg("wanted") = py::none(), py::arg("out") = py::none(),

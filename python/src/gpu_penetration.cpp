@@ -50,42 +50,41 @@ DeviceAnswers<GpuPenetrations> penetrations(DeviceAssets& assets, const py::obje
 
 constexpr const char* kPenetrationDoc = R"(Penetrations of a batch of pairs, on the device.
 
-assets: Assets. asset_a, asset_b: (n,) uint32 or int32 numbers of them, or one number for all.
-pose_a, pose_b: (n, 7) float64: qw, qx, qy, qz, tx [u], ty, tz; None: at the origin, unturned.
+assets: Assets. asset_a, asset_b: (n,) uint32 or int32 indices of them, or one index for all.
+pose_a, pose_b: (n, 7) float64: qw, qx, qy, qz, tx [u], ty, tz; None: the identity.
 scale_a, scale_b: (n,) float64 > 0; None: 1.
-fields: Fields; asset_a are then numbers of those, and their frames are placed by pose_a, scale_a.
+fields: Fields; asset_a are then indices of those, and pose_a and scale_a place their frames.
 measure: 'matched' (the accurate one) or 'inner' (certified lower bound of the true volume). 'exact'
     is for the CPU: ist.penetration.
-pair_budget: count of sphere pairs to spend on each pair of assets, as in ist.penetration; matched
+pair_budget: approximate number of sphere pairs per pair of assets, as in ist.penetration; matched
     measure only; 0: no limit. With fields it has no effect.
-wanted: names of answers; None: all but node_visits and sphere_pairs.
-out: a dict of arrays by the answers' names, or what an earlier call returned: answers go there, and
+wanted: names of the answers to compute; None: all but node_visits and sphere_pairs.
+out: a dict of arrays by name, or the result of an earlier call. Answers are written there, and
     nothing is allocated. uint32 answers fit int32 arrays.
 stream: a handle, or an object with __cuda_stream__, cuda_stream (PyTorch) or ptr (CuPy); None: the
     legacy default stream. Answers are written in its order.
 
-Arrays are those of any framework, in the memory of the assets' device, in C order: they are taken by
-__dlpack__ or __cuda_array_interface__, never copied, and held until the batch is done. One that
-does not fit is a TypeError or a ValueError that names it.
+Arrays can be of any framework, on the assets' device and in C order. They are read through
+__dlpack__ or __cuda_array_interface__, never copied, and kept alive until the batch is done. An
+unsuitable one raises a TypeError or ValueError that names it.
 
 By lenses, as ist.penetration(…, field='never'): volumes are within 1e-6 of the sum in double. With
-fields, volumes and gradients are the CPU's to 1e-9. The same bits in every run, whatever else is in
-the batch. Rows that are invalid are all zero, with the
+fields, volumes and gradients are the CPU's to 1e-9. The bits are the same in every run,
+whatever else is in the batch. Rows that are invalid are all zero, with the
 status invalid_input.
-Nothing waits on the host, but in the first batch that is larger than all before. A stream that is
-captured needs `out`; graphs and other batches of the same Assets must follow one another.
+The host waits only in a batch that is larger than all before. A captured stream
+needs `out`. Graphs and other batches of the same Assets must run one after another.
 
 Returns a Penetration.)";
 
 }  // namespace
 
 void add_gpu_penetration(py::module_& module) {
-  add_answers<GpuPenetrations>(
-      module, "Penetration",
-      "Overlaps of a batch: arrays on the device, None where not wanted; those that were given as "
-      "`out` are the same objects.");
+  add_answers<GpuPenetrations>(module, "Penetration",
+                               "Overlaps of a batch: arrays on the device, None if not requested. "
+                               "Arrays passed as `out` are the same objects.");
   module.def("penetration", &penetrations, py::arg("assets"), py::arg("asset_a"),
-             py::arg("asset_b"), py::arg("pose_a"), py::arg("pose_b"),
+             py::arg("asset_b"), py::arg("pose_a").none(), py::arg("pose_b").none(),
              py::arg("scale_a") = py::none(), py::arg("scale_b") = py::none(), py::kw_only(),
              py::arg("fields") = py::none(), py::arg("measure") = "matched",
              py::arg("pair_budget") = 0, py::arg("wanted") = py::none(),

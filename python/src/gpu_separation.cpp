@@ -46,24 +46,23 @@ DeviceAnswers<GpuSeparations> separations(DeviceAssets& assets, const py::object
 constexpr const char* kSeparationDoc =
     R"(Distances of the inner spheres of a batch of pairs, with certified intervals, on the device.
 
-assets … scale_b, wanted, out, stream: as penetration() has them.
-max_visits: count of node pairs opened for each pair; 0: no limit.
+assets … scale_b, wanted, out, stream: as for penetration().
+max_visits: limit of node pairs for each pair; 0: no limit.
 
-As ist.separation(…): the distance is the least of all pairs of inner spheres in double; the CPU's may
-be more by 1e-6 of the solids' size, and of several pairs as near either may pick another. Under a
-limit that binds, the status is budget_exhausted and the interval another than the CPU's, as certified.
+As ist.separation(…): the distance is the minimum over all pairs of inner spheres in double. The
+CPU's may be larger by 1e-6 of the solids' size, and among equally near pairs the two may differ. If a
+limit stops it, the status is budget_exhausted and the certified interval may differ from the CPU's.
 
 Returns a Separation.)";
 
 }  // namespace
 
 void add_gpu_separation(py::module_& module) {
-  add_answers<GpuSeparations>(
-      module, "Separation",
-      "Gaps of a batch: arrays on the device, None where not wanted; those that were given as "
-      "`out` are the same objects.");
+  add_answers<GpuSeparations>(module, "Separation",
+                              "Gaps of a batch: arrays on the device, None if not requested. "
+                              "Arrays passed as `out` are the same objects.");
   module.def("separation", &separations, py::arg("assets"), py::arg("asset_a"), py::arg("asset_b"),
-             py::arg("pose_a"), py::arg("pose_b"), py::arg("scale_a") = py::none(),
+             py::arg("pose_a").none(), py::arg("pose_b").none(), py::arg("scale_a") = py::none(),
              py::arg("scale_b") = py::none(), py::kw_only(), py::arg("max_visits") = 0,
              py::arg("wanted") = py::none(), py::arg("out") = py::none(),
              py::arg("stream") = py::none(), kSeparationDoc);

@@ -22,9 +22,9 @@ namespace ist::python {
 class DeviceAssets {
  public:
   DeviceAssets(const py::sequence& assets, int device) {
-    const std::vector<py::object> held(assets.begin(), assets.end());
     std::vector<TreeView> views;
-    for (const py::object& asset : held) views.push_back(tree_of(asset, "assets"));
+    const py::list held(assets);
+    for (const py::handle asset : held) views.push_back(tree_of(asset, "assets"));
     const py::gil_scoped_release released;
     GpuSettings settings;
     settings.device = device;
@@ -55,8 +55,8 @@ class DeviceAssets {
     if (room.workspace == nullptr || room.workspace->most_pairs() < pairs.count) {
       if (captured)
         throw Error("GPU: a batch of " + std::to_string(pairs.count) +
-                    " pairs is captured, and none so large was asked before: ask once without "
-                    "capturing");
+                    " pairs is captured, but no batch this large ran before: run one without "
+                    "capturing first");
       make_room(room, pairs.count);
     }
     if (!captured && !in_flight_.empty()) in_flight_.back().done->hold(stream);
@@ -103,9 +103,9 @@ class DeviceAssets {
 class DeviceFields {
  public:
   DeviceFields(const py::sequence& fields, int device) {
-    const std::vector<py::object> held(fields.begin(), fields.end());
     std::vector<Field> all;
-    for (const py::object& field : held) all.push_back(field_of(field, "fields"));
+    const py::list held(fields);
+    for (const py::handle field : held) all.push_back(field_of(field, "fields"));
     const py::gil_scoped_release released;
     GpuSettings settings;
     settings.device = device;

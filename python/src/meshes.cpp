@@ -1,5 +1,5 @@
-#include <pybind11/eigen.h>
-#include <pybind11/stl.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/vector.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -10,6 +10,7 @@
 #include <ist/mesh.h>
 
 #include "arrays.h"
+#include "meshes.h"
 #include "module.h"
 #include "offline.h"
 #include "samples/samples.h"
@@ -21,150 +22,182 @@ namespace {
 static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
 static_assert(sizeof(std::array<std::uint32_t, 3>) == 3 * sizeof(std::uint32_t));
 
-std::shared_ptr<TriangleMesh> mesh_of_arrays(const py::object& vertices,
-                                             const py::object& triangles) {
+TriangleMesh mesh_of_arrays(const py::object& vertices, const py::object& triangles) {
   const Doubles points = take_doubles(vertices, "vertices", "(n, 3)");
   if (points.ndim() != 2 || points.shape(1) != 3) refuse_shape(points, "vertices", "(n, 3)");
   const Integers corners = take_integers(triangles, "triangles", "(m, 3)");
   if (corners.ndim() != 2 || corners.shape(1) != 3) refuse_shape(corners, "triangles", "(m, 3)");
-  const auto mesh = std::make_shared<TriangleMesh>();
-  mesh->vertices.resize(static_cast<std::size_t>(points.shape(0)));
-  std::copy_n(points.data(), points.size(), reinterpret_cast<double*>(mesh->vertices.data()));
-  mesh->triangles.resize(static_cast<std::size_t>(corners.shape(0)));
-  for (py::ssize_t i = 0; i < corners.shape(0); ++i)
-    for (py::ssize_t k = 0; k < 3; ++k) {
-      const std::int64_t corner = corners.at(i, k);
-      if (corner < 0 || corner >= points.shape(0))
-        throw py::value_error("triangles[" + std::to_string(i) + "]: vertex " +
-                              std::to_string(corner) + "; there are vertices 0 to " +
-                              std::to_string(points.shape(0) - 1));
-      mesh->triangles[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)] =
-          static_cast<std::uint32_t>(corner);
-    }
+  TriangleMesh mesh;
+  mesh.vertices.resize(points.shape(0));
+  std::copy_n(points.data(), points.size(), reinterpret_cast<double*>(mesh.vertices.data()));
+  mesh.triangles.resize(corners.shape(0));
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const std::int64_t corner = corners.data()[i];
+    if (corner < 0 || corner >= static_cast<std::int64_t>(points.shape(0)))
+      throw value_error("triangles[" + std::to_string(i / 3) + "]: vertex " +
+                        std::to_string(corner) + "; there are vertices 0 to " +
+                        std::to_string(points.shape(0) - 1));
+    mesh.triangles[i / 3][i % 3] = static_cast<std::uint32_t>(corner);
+  }
   return mesh;
 }
 
 /// (n, 3), read-only, on memory that `owner` holds.
 template <class T, class Row>
-py::array view_of(const std::vector<Row>& rows, const py::object& owner) {
-  py::array_t<T> view({static_cast<py::ssize_t>(rows.size()), py::ssize_t{3}},
-                      reinterpret_cast<const T*>(rows.data()), owner);
-  view.attr("setflags")(py::arg("write") = false);
-  return py::array(view);
+py::object view_of(const std::vector<Row>& rows, const py::object& owner) {
+  return py::cast(py::ndarray<py::numpy, const T>(reinterpret_cast<const T*>(rows.data()),
+                                                  {rows.size(), 3}, owner));
+}
+
+/// The solid that a mesh bounds.
+ClosedMesh close(const TriangleMesh& mesh, const std::string& name, bool repair) {
+  return close_mesh(mesh, name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+}
+
+bool is_path(const py::object& value) {
+  return py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__");
 }
 
 template <class Mesh>
 py::object declared_up(const Mesh& mesh) {
   if (mesh.declared.up_axis == 0) return py::none();
-  return py::str(std::string(1, mesh.declared.up_axis));
+  return py::str(&mesh.declared.up_axis, 1);
 }
 
 void add_report(py::module_& module) {
   py::class_<MeshReport>(module, "MeshReport",
-                         "What import and validation found; counts are of the welded mesh as it "
-                         "came, unless they name the closed one.")
-      .def_readonly("vertices", &MeshReport::vertices, "Referenced vertices after welding.")
-      .def_readonly("triangles", &MeshReport::triangles, "As imported.")
-      .def_readonly("components", &MeshReport::components, "Edge-connected shells.")
-      .def_readonly("boundary_edges", &MeshReport::boundary_edges, "Edges with one triangle.")
-      .def_readonly("nonmanifold_edges", &MeshReport::nonmanifold_edges,
-                    "Edges with three or more triangles.")
-      .def_readonly("flipped_components", &MeshReport::flipped_components, "Shells turned outward.")
-      .def_readonly("degenerate_triangles", &MeshReport::degenerate_triangles,
-                    "Zero area or repeated corners.")
-      .def_readonly("self_intersections", &MeshReport::self_intersections,
-                    "Pairs of triangles that meet elsewhere than in shared corners.")
-      .def_readonly("shells", &MeshReport::shells, "Of the closed mesh.")
-      .def_readonly("meets_itself", &MeshReport::meets_itself,
-                    "Of the closed mesh: its triangles intersect, or may.")
-      .def_readonly("filled_holes", &MeshReport::filled_holes, "Closed by repair.")
-      .def_readonly("repaired", &MeshReport::repaired, "Repair changed the mesh.")
-      .def_readonly("volume", &MeshReport::volume,
-                    "[u³] by the divergence theorem; counts self-overlaps twice.")
-      .def_readonly("notes", &MeshReport::notes, "One sentence a finding, ready to print.");
+                         "Findings of import and validation. Counts refer to the welded input mesh "
+                         "unless stated otherwise.")
+      .def_ro("vertices", &MeshReport::vertices, "Referenced vertices after welding.")
+      .def_ro("triangles", &MeshReport::triangles, "As imported.")
+      .def_ro("components", &MeshReport::components, "Edge-connected shells.")
+      .def_ro("boundary_edges", &MeshReport::boundary_edges, "Edges with one triangle.")
+      .def_ro("nonmanifold_edges", &MeshReport::nonmanifold_edges,
+              "Edges with three or more triangles.")
+      .def_ro("flipped_components", &MeshReport::flipped_components, "Shells turned outward.")
+      .def_ro("degenerate_triangles", &MeshReport::degenerate_triangles,
+              "Zero area or repeated corners.")
+      .def_ro("self_intersections", &MeshReport::self_intersections,
+              "Pairs of triangles that intersect outside shared corners.")
+      .def_ro("shells", &MeshReport::shells, "Of the closed mesh.")
+      .def_ro("meets_itself", &MeshReport::meets_itself,
+              "Whether triangles of the closed mesh intersect, or may.")
+      .def_ro("filled_holes", &MeshReport::filled_holes, "Closed by repair.")
+      .def_ro("repaired", &MeshReport::repaired, "Repair changed the mesh.")
+      .def_ro("volume", &MeshReport::volume,
+              "[u³] by the divergence theorem; counts self-overlaps twice.")
+      .def_ro("notes", &MeshReport::notes, "One printable sentence per finding.");
 }
 
 }  // namespace
 
+std::shared_ptr<TriangleMesh> mesh_of(const py::object& value) {
+  std::shared_ptr<TriangleMesh> mesh;
+  if (py::try_cast(value, mesh)) return mesh;
+  if (is_path(value))
+    return offline([name = path_of(value)](const ProgressCallback&) {
+      return std::make_shared<TriangleMesh>(load_mesh(name));
+    });
+  if ((py::isinstance<py::tuple>(value) || py::isinstance<py::list>(value)) && py::len(value) == 2)
+    return std::make_shared<TriangleMesh>(mesh_of_arrays(value[0], value[1]));
+  for (const char* const triangles : {"faces", "triangles"})
+    if (py::hasattr(value, "vertices") && py::hasattr(value, triangles))
+      return std::make_shared<TriangleMesh>(
+          mesh_of_arrays(value.attr("vertices"), value.attr(triangles)));
+  throw type_error(
+      "mesh: a " + type_name_of(value) +
+      "; wanted a ClosedMesh, a Mesh, a path, (vertices, triangles), or an object with "
+      "vertices and faces");
+}
+
+std::shared_ptr<ClosedMesh> closed_of(const py::object& value) {
+  std::shared_ptr<ClosedMesh> closed;
+  if (py::try_cast(value, closed)) return closed;
+  return offline([mesh = mesh_of(value),
+                  name = is_path(value) ? path_of(value) : "mesh"](const ProgressCallback&) {
+    return std::make_shared<ClosedMesh>(close(*mesh, name, false));
+  });
+}
+
 void add_meshes(py::module_& module) {
   add_report(module);
-  py::class_<TriangleMesh, std::shared_ptr<TriangleMesh>>(
-      module, "Mesh", "Triangles over shared vertices, in the file's own unit [u] and frame.")
-      .def(py::init(&mesh_of_arrays), py::arg("vertices"), py::arg("triangles"),
-           "Copies arrays.\n\nvertices: (n, 3) [u]. triangles: (m, 3) whole numbers of vertices, "
+  py::class_<TriangleMesh>(module, "Mesh",
+                           "Triangles over shared vertices, in the file's own unit [u] and frame.")
+      .def(py::new_(&mesh_of_arrays), py::arg("vertices"), py::arg("triangles"),
+           "Copies arrays.\n\nvertices: (n, 3) [u]. triangles: (m, 3) vertex indices, "
            "counter-clockwise seen from outside.")
-      .def_property_readonly(
+      .def_prop_ro(
           "vertices",
           [](const py::object& self) {
-            return view_of<double>(self.cast<const TriangleMesh&>().vertices, self);
+            return view_of<double>(py::cast<const TriangleMesh&>(self).vertices, self);
           },
-          "(n, 3) float64 [u], read-only: a view that holds the mesh.")
-      .def_property_readonly(
+          "(n, 3) float64 [u], read-only: a view that keeps the mesh alive.")
+      .def_prop_ro(
           "triangles",
           [](const py::object& self) {
-            return view_of<std::uint32_t>(self.cast<const TriangleMesh&>().triangles, self);
+            return view_of<std::uint32_t>(py::cast<const TriangleMesh&>(self).triangles, self);
           },
-          "(m, 3) uint32, read-only: a view that holds the mesh.")
-      .def_property_readonly("declared_up_axis", &declared_up<TriangleMesh>,
-                             "'X', 'Y' or 'Z' as the file declares, or None. Nothing is turned.")
-      .def_property_readonly(
+          "(m, 3) uint32, read-only: a view that keeps the mesh alive.")
+      .def_prop_ro("declared_up_axis", &declared_up<TriangleMesh>,
+                   "'X', 'Y' or 'Z' as the file declares, or None. The mesh is not rotated.")
+      .def_prop_ro(
           "declared_unit", [](const TriangleMesh& mesh) { return mesh.declared.unit; },
-          "[m] length of the file's unit; 0: the file does not say.");
-  py::class_<ClosedMesh, std::shared_ptr<ClosedMesh>>(
+          "[m] length of the file's unit; 0: not declared.");
+  py::class_<ClosedMesh>(
       module, "ClosedMesh",
-      "A mesh that bounds a solid: inside is where its winding number is 1 or more.")
-      .def_property_readonly(
+      "A mesh that bounds a solid. A point is inside if its winding number is 1 or more.")
+      .def_prop_ro(
           "vertices",
           [](const py::object& self) {
-            return view_of<double>(self.cast<const ClosedMesh&>().mesh.vertices, self);
+            return view_of<double>(py::cast<const ClosedMesh&>(self).mesh.vertices, self);
           },
-          "(n, 3) float64 [u], read-only: a view that holds the mesh.")
-      .def_property_readonly(
+          "(n, 3) float64 [u], read-only: a view that keeps the mesh alive.")
+      .def_prop_ro(
           "triangles",
           [](const py::object& self) {
-            return view_of<std::uint32_t>(self.cast<const ClosedMesh&>().mesh.triangles, self);
+            return view_of<std::uint32_t>(py::cast<const ClosedMesh&>(self).mesh.triangles, self);
           },
-          "(m, 3) uint32, read-only: a view that holds the mesh.")
-      .def_readonly("name", &ClosedMesh::name, "For messages.")
-      .def_property_readonly(
+          "(m, 3) uint32, read-only: a view that keeps the mesh alive.")
+      .def_ro("name", &ClosedMesh::name, "For messages.")
+      .def_prop_ro(
           "report", [](const ClosedMesh& mesh) { return mesh.report; }, "MeshReport, a copy.");
   module.def(
       "load_mesh",
       [](const py::object& path, double weld_tolerance) {
-        const auto name = py::module_::import("os").attr("fspath")(path).cast<std::string>();
-        return offline([name, weld_tolerance](const ProgressCallback&) {
-          return std::make_shared<TriangleMesh>(load_mesh(name, {weld_tolerance}));
+        return offline([name = path_of(path), weld_tolerance](const ProgressCallback&) {
+          return load_mesh(name, {weld_tolerance});
         });
       },
       py::arg("path"), py::kw_only(), py::arg("weld_tolerance") = 0.0,
-      R"(Reads OBJ, STL, PLY, OFF, GLB/glTF, DAE and what assimp knows.
+      R"(Reads OBJ, STL, PLY, OFF, GLB/glTF, DAE and other formats of assimp.
 
 path: str or os.PathLike.
-weld_tolerance: [0, 0.1]; vertices closer than this share of the bounding box's diagonal are one.
+weld_tolerance: [0, 0.1]; vertices closer than this share of the bounding box's diagonal are merged.
 
-Raises Error (file, place, way out).)");
+Raises Error, which names the file, the place and a way out.)");
   module.def(
       "close_mesh",
-      [](const std::shared_ptr<TriangleMesh>& mesh, const std::string& name, bool repair) {
-        return offline([mesh, name, repair](const ProgressCallback&) {
-          return std::make_shared<ClosedMesh>(
-              close_mesh(*mesh, name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse));
+      [](const py::object& mesh, const std::string& name, bool repair) {
+        return offline([mesh = mesh_of(mesh), name, repair](const ProgressCallback&) {
+          return close(*mesh, name, repair);
         });
       },
       py::arg("mesh"), py::kw_only(), py::arg("name") = "mesh", py::arg("repair") = false,
       R"(Validates a mesh and orients its shells.
 
+mesh: a Mesh, or what bake() makes one of.
 name: for messages.
 repair: close an open mesh (weld cracks, fill holes) instead of refusing it; see ClosedMesh.report.
 
 Raises OpenMeshError for an open mesh, Error for one that is flat, empty, not finite or
 non-orientable.)");
+  module.def("from_trimesh", &mesh_of, py::arg("mesh"),
+             "A Mesh of any object with `vertices` and `faces` (or `triangles`), as trimesh's and "
+             "Open3D's; a copy.");
   module.def(
-      "sample_mesh",
-      [](const std::string& name) { return std::make_shared<TriangleMesh>(make_sample(name)); },
-      py::arg("name"),
-      "A closed mesh made on the spot: 'bolt', 'nut', 'gear', 'cube', …\n\nAn unknown name raises "
-      "Error, which lists all.");
+      "sample_mesh", [](const std::string& name) { return make_sample(name); }, py::arg("name"),
+      "A generated closed mesh: 'bolt', 'nut', 'gear', 'cube', …\n\nAn unknown name raises Error, "
+      "which lists all names.");
 }
 
 }  // namespace ist::python

@@ -16,17 +16,19 @@ x_world = R(q) (scale · x) + t.)";
 
 }  // namespace
 
-PYBIND11_MODULE(_core, module) {
+NB_MODULE(_core, module) {
   namespace python = ist::python;
   namespace py = python::py;
-  module.doc() = kDoc;
+  module.attr("__doc__") = kDoc;
   // Users know what is here by the package's name.
   const py::object own_name = module.attr("__name__");
   module.attr("__name__") = "ist";
-  const auto error = py::register_exception<ist::Error>(module, "Error", PyExc_RuntimeError);
-  error.doc() = "What the library refuses, in its words: file, place and way out.";
-  py::register_exception<ist::OpenMeshError>(module, "OpenMeshError", error.ptr()).doc() =
-      "An open mesh that was not asked to be repaired.";
+  py::set_leak_warnings(false);  // what is alive at the end is the system's to free
+  const py::exception<ist::Error> error(module, "Error", PyExc_RuntimeError);
+  error.attr("__doc__") =
+      "An error of the library. The message names the file, the place and a way out.";
+  py::exception<ist::OpenMeshError>(module, "OpenMeshError", error.ptr()).attr("__doc__") =
+      "A mesh is not closed, and repair was not requested or failed.";
   module.attr("__version__") = IST_VERSION_STRING;
   python::add_offline(module);
   python::add_meshes(module);

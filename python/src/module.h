@@ -1,10 +1,11 @@
 #pragma once
 
-#include <pybind11/pybind11.h>
+#include <string>
+#include <utility>
+
+#include "arrays.h"
 
 namespace ist::python {
-
-namespace py = pybind11;
 
 // Parts of the module, each in a file of its name.
 void add_meshes(py::module_& module);
@@ -27,7 +28,7 @@ Enum named(const std::string& word, const char* argument,
     if (word == name) return value;
     all += (all.empty() ? "'" : ", '") + std::string(name) + "'";
   }
-  throw py::value_error(std::string(argument) + ": '" + word + "'; one of " + all);
+  throw value_error(std::string(argument) + ": '" + word + "'; one of " + all);
 }
 
 }  // namespace ist::python

@@ -108,7 +108,7 @@ void run_offline(OfflineWork work, const py::object& progress) {
       done = job->done;
     }
     try {
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      if (PyErr_CheckSignals() != 0) throw py::python_error();
       if (news && !progress.is_none() && progress(*news).ptr() == Py_False) job->cancelled = true;
     } catch (...) {
       give_up(*job);
@@ -118,18 +118,21 @@ void run_offline(OfflineWork work, const py::object& progress) {
   if (job->error) std::rethrow_exception(job->error);
 }
 
+std::string path_of(const py::object& path) {
+  return py::cast<std::string>(py::module_::import_("os").attr("fspath")(path));
+}
+
 void add_offline(py::module_& module) {
-  py::class_<Progress>(module, "Progress", "Where a long stage stands: what `progress` is handed.")
-      .def_readonly("stage", &Progress::stage,
-                    "'polygonise', 'pack', 'calibrate', 'cover', 'tree' or 'predict'.")
-      .def_readonly("spheres", &Progress::spheres, "Count so far.")
-      .def_readonly("coverage", &Progress::coverage,
-                    "[0, 1] of the solid's volume in inner spheres; 'pack' only.")
-      .def_readonly("radius", &Progress::radius,
-                    "[u] of the spheres being inserted now; 'pack' only.")
-      .def_readonly("fraction", &Progress::fraction, "[0, 1] of this stage's work, an estimate.")
-      .def_readonly("elapsed", &Progress::elapsed, "[s] since the stage began.");
-  py::module_::import("atexit").attr("register")(py::cpp_function([] {
+  py::class_<Progress>(module, "Progress", "Progress of a long stage, passed to `progress`.")
+      .def_ro("stage", &Progress::stage,
+              "'polygonise', 'resolve', 'pack', 'calibrate', 'cover', 'tree' or 'predict'.")
+      .def_ro("spheres", &Progress::spheres, "Number of spheres so far.")
+      .def_ro("coverage", &Progress::coverage,
+              "[0, 1] of the solid's volume in inner spheres; 'pack' only.")
+      .def_ro("radius", &Progress::radius, "[u] radius of the spheres being inserted; 'pack' only.")
+      .def_ro("fraction", &Progress::fraction, "[0, 1] of this stage's work, an estimate.")
+      .def_ro("elapsed", &Progress::elapsed, "[s] since the stage began.");
+  py::module_::import_("atexit").attr("register")(py::cpp_function([] {
     const py::gil_scoped_release released;
     running().wait();
   }));

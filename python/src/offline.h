@@ -1,16 +1,14 @@
 #pragma once
 
-#include <pybind11/pybind11.h>
-
 #include <functional>
 #include <memory>
 #include <optional>
 
 #include <ist/progress.h>
 
-namespace ist::python {
+#include "arrays.h"
 
-namespace py = pybind11;
+namespace ist::python {
 
 /// What runs on a thread of its own: it must own all that it uses, Python's objects excepted, of
 /// which it may use none.
@@ -34,6 +32,9 @@ auto offline(Work work, const py::object& progress = py::none()) {
               progress);
   return std::move(**answer);
 }
+
+/// Of a str or an os.PathLike.
+std::string path_of(const py::object& path);
 
 void add_offline(py::module_& module);
 

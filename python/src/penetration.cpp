@@ -98,21 +98,21 @@ a: Asset or Field. b: Asset.
 poses: of B, (7,) or (n, 7): qw, qx, qy, qz, tx [u], ty, tz. A C-ordered float64 array is not copied.
 scales: of B, a number or (n,), > 0. poses_a, scales_a: of A; None: at the origin, 1.)";
 
-constexpr const char* kSceneDoc = R"(The same for pairs of the solids of a scene, or of many scenes.
+constexpr const char* kSceneDoc = R"(The same for pairs of solids of one scene or many scenes.
 
 solids: k Assets and Fields.
 poses: (k, 7), or (w, k, 7) for w scenes. scales: (k,) or (w, k), None: 1.
-pairs: (n, 2) numbers of solids; in each the second is an Asset. Answers have shape (n,) or (w, n).)";
+pairs: (n, 2) indices of solids; the second of each pair is an Asset. Answers have shape (n,) or (w, n).)";
 
 constexpr const char* kPenetrationDoc = R"(
 scale_gradients: fill scale_gradient and scale_gradient_a, at three times the cost.
 measure: 'matched' (the accurate spheres), 'inner' (certified lower bound of the true volume) or
     'exact' (the true volume and its gradients: of two Assets that hold their mesh, which bake()
     keeps by default; it heeds max_visits alone).
-field: 'automatic', 'never' or 'always': whether the surface in an asset is used. Not by 'exact'.
-pair_budget, max_visits, deadline_us [µs], relative_error, min_radius [u]: what it may cost; 0: no
+field: 'automatic', 'never' or 'always': whether an asset's surface is used. No effect with 'exact'.
+pair_budget, max_visits, deadline_us [µs], relative_error, min_radius [u]: cost limits; 0: no
     limit. See <ist/query.h>.
-threads: 0: all cores. The answers are the same bits for any number. The GIL is released.
+threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 
 Invalid rows (NaN, a quaternion off unit length by more than 1e-3, a scale ≤ 0) are all zero, with
 the status invalid_input; they spoil no others. Rows of a solid that does not hold what the measure
@@ -122,22 +122,19 @@ Ctrl-C raises KeyboardInterrupt.
 Returns a Penetration: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
 
 void add_class(py::module_& module) {
-  py::class_<Penetrations, std::shared_ptr<Penetrations>> type(
+  py::class_<Penetrations> type(
       module, "Penetration",
       "Overlaps of placed solids: columns of one row a pose, without the (n,) for one pose.");
   add_column(type, "volume", &Penetrations::volume, "(n,) [u³] of the overlap.");
-  add_column(
-      type, "volume_min", &Penetrations::volume_min,
-      "(n,) [u³] By measure='exact' a bound: the true volume is at least this. By spheres "
-      "the finished sum is at least this, with its rounding; how near that sum is to the true "
-      "volume it does not say.");
-  add_column(type, "volume_max", &Penetrations::volume_max,
-             "(n,) [u³] and at most this, likewise.");
+  add_column(type, "volume_min", &Penetrations::volume_min,
+             "(n,) [u³] With measure='exact' a lower bound of the true volume. With spheres a "
+             "lower bound of the finished sum, rounding included; not a bound of the true volume.");
+  add_column(type, "volume_max", &Penetrations::volume_max, "(n,) [u³] the upper bound, likewise.");
   add_column(type, "centroid", &Penetrations::centroid,
              "(n, 3) [u] of the overlap, world; zero if none.");
   add_column(type, "force", &Penetrations::force,
-             "(n, 3) [u²] −dV/d(translation of B), world: the push on B of a pressure of 1. "
-             "A's is opposite.");
+             "(n, 3) [u²] −dV/d(translation of B), world: the force on B of a pressure of 1. The "
+             "force on A is opposite.");
   add_column(type, "torque", &Penetrations::torque,
              "(n, 3) [u³] −dV/d(rotation vector of B) about B's origin, world.");
   add_column(type, "pose_gradient", &Penetrations::pose_gradient,
@@ -145,14 +142,14 @@ void add_class(py::module_& module) {
   add_column(type, "pose_gradient_a", &Penetrations::pose_gradient_a,
              "(n, 7) the same for A's pose.");
   add_column(type, "scale_gradient", &Penetrations::scale_gradient,
-             "(n,) [u³] dV/d(B's scale), by the difference of two queries; None if not asked for.");
+             "(n,) [u³] dV/d(B's scale), by the difference of two queries; None if not requested.");
   add_column(type, "scale_gradient_a", &Penetrations::scale_gradient_a,
              "(n,) [u³] the same for A's scale.");
   add_column(type, "status", &Penetrations::status, "(n,) uint32, a QueryStatus.");
   add_column(type, "node_visits", &Penetrations::node_visits, "(n,) uint32, node pairs opened.");
   add_column(type, "sphere_pairs", &Penetrations::sphere_pairs,
-             "(n,) uint32, lenses summed and spheres put together with a surface; by "
-             "measure='exact' triangles that cross.");
+             "(n,) uint32, lenses summed and spheres overlapped with a surface; with "
+             "measure='exact' intersecting triangles.");
 }
 
 }  // namespace
@@ -203,12 +200,12 @@ void add_penetration(py::module_& module) {
                                            relative_error, min_radius),
                       scale_gradients, threads);
       },
-      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("scales") = py::none(),
-      py::arg("poses_a") = py::none(), py::arg("scales_a") = py::none(),
-      py::arg("scale_gradients") = false, py::arg("measure") = "matched",
-      py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
-      py::arg("deadline_us") = 0.0, py::arg("relative_error") = 0.0, py::arg("min_radius") = 0.0,
-      py::arg("threads") = 0, doc(kPairDoc).c_str());
+      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
+      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("scales_a") = py::none(), py::arg("scale_gradients") = false,
+      py::arg("measure") = "matched", py::arg("field") = "automatic", py::arg("pair_budget") = 0,
+      py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0, py::arg("relative_error") = 0.0,
+      py::arg("min_radius") = 0.0, py::arg("threads") = 0, doc(kPairDoc).c_str());
   module.def(
       "penetration_of_pairs",
       [](const py::sequence& solids, const py::object& poses, const py::object& pairs,

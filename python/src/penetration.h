@@ -1,5 +1,8 @@
 #pragma once
 
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/unique_ptr.h>
+
 #include <ist/query.h>
 
 #include <string>
@@ -37,15 +40,9 @@ struct Penetrations {
 
 /// A property that is a column.
 template <class Class, class Part>
-void add_column(Class& of, const char* name, Part part, const char* doc) {
-  of.def_property_readonly(
-      name,
-      [part](const typename Class::type& self) -> py::object {
-        const py::array& array = (self.*part).array;
-        if (!array || (self.*part).data == nullptr) return py::none();
-        return handed_out(array);
-      },
-      doc);
+void add_column(py::class_<Class>& of, const char* name, Part part, const char* doc) {
+  of.def_prop_ro(
+      name, [part](const Class& self) { return (self.*part).handed_out(); }, doc);
 }
 
 }  // namespace ist::python

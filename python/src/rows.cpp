@@ -7,6 +7,7 @@
 #include <chrono>
 #include <mutex>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <thread>
 
@@ -20,6 +21,8 @@ namespace ist::python {
 namespace {
 
 constexpr const char* kPoses = "(7,) or (n, 7): qw, qx, qy, qz, tx, ty, tz";
+
+constexpr double kOrigin[7] = {1, 0, 0, 0, 0, 0, 0};  // and a scale of 1
 
 Pose pose_from(const double* values) {
   Pose pose;
@@ -89,21 +92,15 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
   Rows rows;
   rows.solids_ = {solid_of(a, "a"), tree_of(b, "b")};
   rows.owners_ = {a, b};
-  py::ssize_t count = -1;  // as many rows as the arguments of many have; -1: none has
-  const auto agree = [&](const py::array& array, const char* name) {
-    if (count >= 0 && array.shape(0) != count)
-      throw py::value_error(std::string(name) + ": " + std::to_string(array.shape(0)) +
-                            " rows; the arguments before it have " + std::to_string(count));
+  std::optional<std::size_t> count;  // as many rows as the arguments of many have
+  const auto agree = [&](const Doubles& array, const char* name) {
+    if (count && array.shape(0) != *count)
+      throw value_error(std::string(name) + ": " + std::to_string(array.shape(0)) +
+                        " rows; the arguments before it have " + std::to_string(*count));
     count = array.shape(0);
   };
   const auto take = [&](const py::object& value, const char* name) -> Values {
-    if (value.is_none()) {
-      Doubles origin(7);
-      const Pose identity;
-      std::memcpy(origin.mutable_data(), identity.q, sizeof identity.q);
-      std::memcpy(origin.mutable_data() + 4, identity.t, sizeof identity.t);
-      return Values(origin, 7, false);
-    }
+    if (value.is_none()) return Values(kOrigin);
     Doubles array = take_doubles(value, name, kPoses);
     if (array.ndim() < 1 || array.ndim() > 2 || array.shape(array.ndim() - 1) != 7)
       refuse_shape(array, name, kPoses);
@@ -112,8 +109,8 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
     return Values(std::move(array), 7, many);
   };
   const auto take_scales = [&](const py::object& value, const char* name) -> Values {
-    Doubles array = take_doubles(value.is_none() ? py::object(py::float_(1.0)) : value, name,
-                                 "a number or (n,)");
+    if (value.is_none()) return Values(kOrigin);
+    Doubles array = take_doubles(value, name, "a number or (n,)");
     if (array.ndim() > 1) refuse_shape(array, name, "a number or (n,)");
     const bool many = array.ndim() == 1;
     if (many) agree(array, name);
@@ -123,8 +120,8 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
   rows.scale_b_ = take_scales(scales, "scales");
   rows.pose_a_ = take(poses_a, "poses_a");
   rows.scale_a_ = take_scales(scales_a, "scales_a");
-  if (count >= 0) rows.shape_ = {count};
-  rows.count_ = count >= 0 ? static_cast<std::size_t>(count) : 1;
+  if (count) rows.shape_ = {*count};
+  rows.count_ = count.value_or(1);
   return rows;
 }
 
@@ -133,35 +130,35 @@ Rows Rows::of_scene(const py::sequence& solids, const py::object& poses, const p
   Rows rows;
   for (const py::handle solid : solids) {
     rows.solids_.push_back(solid_of(solid, "solids"));
-    rows.owners_.push_back(py::reinterpret_borrow<py::object>(solid));
+    rows.owners_.push_back(py::borrow<py::object>(solid));
   }
-  const auto k = static_cast<py::ssize_t>(rows.solids_.size());
+  const auto k = rows.solids_.size();
   const std::string of_solids = std::to_string(k);
   const std::string wanted = "(" + of_solids + ", 7) or (w, " + of_solids + ", 7)";
   Doubles places = take_doubles(poses, "poses", wanted);
-  const py::ssize_t d = places.ndim();
+  const std::size_t d = places.ndim();
   if (d < 2 || d > 3 || places.shape(d - 1) != 7 || places.shape(d - 2) != k)
     refuse_shape(places, "poses", wanted);
   rows.held_pairs_ = take_integers(pairs, "pairs", "(n, 2)");
-  const Integers& named = *rows.held_pairs_;
+  const Integers& named = rows.held_pairs_;
   if (named.ndim() != 2 || named.shape(1) != 2) refuse_shape(named, "pairs", "(n, 2)");
   rows.pairs_ = named.data();
-  for (py::ssize_t i = 0; i < named.shape(0); ++i) {
-    const std::int64_t first = named.at(i, 0), second = named.at(i, 1);
+  for (std::size_t i = 0; i < named.shape(0); ++i) {
+    const std::int64_t first = named.data()[2 * i], second = named.data()[2 * i + 1];
     const auto refuse = [&](const std::string& why) {
-      throw py::value_error("pairs[" + std::to_string(i) + "]: (" + std::to_string(first) + ", " +
-                            std::to_string(second) + "): " + why);
+      throw value_error("pairs[" + std::to_string(i) + "]: (" + std::to_string(first) + ", " +
+                        std::to_string(second) + "): " + why);
     };
-    if (std::min(first, second) < 0 || std::max(first, second) >= k)
-      refuse("there are solids 0 to " + std::to_string(k - 1));
-    if (first == second) refuse("a solid does not meet itself");
+    if (std::min(first, second) < 0 || std::max(first, second) >= static_cast<std::int64_t>(k))
+      refuse("solids are numbered 0 to " + std::to_string(k - 1));
+    if (first == second) refuse("a solid cannot be paired with itself");
     if (!std::holds_alternative<TreeView>(rows.solids_[static_cast<std::size_t>(second)]))
-      refuse("the second is a field; a field stands first");
+      refuse("the second is a Field; only the first can be");
   }
-  const py::ssize_t scenes = d == 3 ? places.shape(0) : 1;
+  const std::size_t scenes = d == 3 ? places.shape(0) : 1;
   rows.pose_b_ = Values(std::move(places), 7, true);
   if (scales.is_none()) {
-    rows.scale_b_ = Values(take_doubles(py::float_(1.0), "scales", ""), 1, false);
+    rows.scale_b_ = Values(kOrigin);
   } else {
     const std::string sizes = d == 3 ? "(w, " + of_solids + ")" : "(" + of_solids + ",)";
     Doubles values = take_doubles(scales, "scales", sizes);
@@ -169,10 +166,10 @@ Rows Rows::of_scene(const py::sequence& solids, const py::object& poses, const p
       refuse_shape(values, "scales", sizes);
     rows.scale_b_ = Values(std::move(values), 1, true);
   }
-  rows.pairs_of_scene_ = static_cast<std::size_t>(named.shape(0));
+  rows.pairs_of_scene_ = named.shape(0);
   rows.shape_ = {named.shape(0)};
   if (d == 3) rows.shape_.insert(rows.shape_.begin(), scenes);
-  rows.count_ = rows.pairs_of_scene_ * static_cast<std::size_t>(scenes);
+  rows.count_ = rows.pairs_of_scene_ * scenes;
   rows.sort_by_asset();
   return rows;
 }
@@ -227,14 +224,13 @@ void refuse_not_held(const Rows& rows, const Column<std::uint32_t>& status, std:
   const Row row = rows.at(0);
   const TreeView* const a = std::get_if<TreeView>(row.a);
   if (exact && a == nullptr)
-    throw Error("a: a Field has no mesh, which measure='exact' asks of both solids");
+    throw Error("a: a Field has no mesh, which measure='exact' needs; pass an Asset");
   if (exact)
     throw Error(std::string(a->has_mesh() ? "b" : "a") +
-                ": holds no mesh, which measure='exact' asks of both solids; bake it with "
-                "surface='all'");
+                ": has no mesh, which measure='exact' needs; bake it with surface='all'");
   throw Error(std::string(row.b.tree.sphere_count() == 0 ? "b" : "a") +
-              ": is a surface alone and holds no spheres; measure='exact' of penetration() needs "
-              "none, and bake() makes them");
+              ": is a surface alone, without spheres; use penetration() with measure='exact', or "
+              "bake it with bake()");
 }
 
 void for_each_row(const Rows& rows, unsigned threads,
@@ -263,7 +259,7 @@ void for_each_row(const Rows& rows, unsigned threads,
     workspaces().give_back(scratch);
     interrupted = interrupt.seen();
   }
-  if (interrupted) throw py::error_already_set();
+  if (interrupted) throw py::python_error();
 }
 
 }  // namespace ist::python

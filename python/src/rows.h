@@ -1,11 +1,8 @@
 #pragma once
 
-#include <pybind11/pybind11.h>
-
 #include <cstring>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include <ist/query.h>
@@ -67,6 +64,7 @@ class Rows {
     Values() = default;
     Values(Doubles values, std::size_t width, bool many)
         : held(std::move(values)), data(held.data()), step(many ? width : 0) {}
+    explicit Values(const double* same) : data(same) {}
     const double* at(std::size_t i) const { return data + i * step; }
 
     Doubles held;
@@ -79,7 +77,7 @@ class Rows {
   std::vector<Solid> solids_;
   std::vector<py::object> owners_;  // of the solids
   Values pose_a_, pose_b_, scale_a_, scale_b_;
-  std::optional<Integers> held_pairs_;
+  Integers held_pairs_;
   const std::int64_t* pairs_ = nullptr;  // null: solid 0 and solid 1
   std::size_t pairs_of_scene_ = 0;
   std::vector<std::size_t> order_;  ///< of the pairs; empty: as they come

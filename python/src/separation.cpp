@@ -24,7 +24,7 @@ struct Separations : Gaps {
 };
 
 struct Patches {
-  Patches(const Shape& rows, py::ssize_t each)
+  Patches(const Shape& rows, std::size_t each)
       : penetration(std::make_shared<Penetrations>(rows)),
         count(rows, {}),
         id(rows, {each}),
@@ -56,6 +56,12 @@ struct Patches {
   Column<double> centroid, normal, area, depth, volume, force, torque;
 };
 
+struct Outline {
+  std::shared_ptr<Patches> contact;
+  Column<double> segments;
+  Column<std::uint32_t> patch;
+};
+
 std::unique_ptr<Separations> separations(const Rows& rows, const SeparationSettings& settings,
                                          unsigned threads) {
   auto answers = std::make_unique<Separations>(rows.shape());
@@ -70,7 +76,7 @@ std::unique_ptr<Separations> separations(const Rows& rows, const SeparationSetti
 
 std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
                                  const ContactSettings& settings, unsigned threads) {
-  auto answers = std::make_unique<Patches>(rows.shape(), static_cast<py::ssize_t>(each));
+  auto answers = std::make_unique<Patches>(rows.shape(), each);
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
     thread_local std::vector<ContactPatch> found;
@@ -86,38 +92,87 @@ std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
   return answers;
 }
 
+std::unique_ptr<Outline> outline(const Rows& rows, std::size_t each,
+                                 const ContactSettings& settings) {
+  if (!rows.shape().empty())
+    throw value_error("poses: " + std::to_string(rows.count()) +
+                      " rows; an outline is that of one pose, (7,)");
+  const auto contact = std::make_shared<Patches>(rows.shape(), each);
+  std::vector<ContactPatch> patches(each);
+  std::vector<OutlineSegment> segments(1024);
+  for_each_row(rows, 1, [&](std::size_t i, Workspace& workspace) {
+    const Row row = rows.at(i);
+    const auto ask = [&] {
+      return row.answer([&](const auto& a, const PlacedTree& b) -> OverlapOutline {
+        if constexpr (std::is_same_v<decltype(a), const PlacedTree&>)
+          return overlap_outline(a, b, settings, workspace, patches, segments);
+        else  // which holds no mesh
+          return {contact_patches(a, b, settings, workspace, patches), 0};
+      });
+    };
+    OverlapOutline found = ask();
+    if (found.segments > segments.size()) {
+      segments.resize(found.segments);
+      found = ask();
+    }
+    segments.resize(found.segments);
+    contact->penetration->write(i, row, found.contact.penetration);
+    *contact->count.row(i) = static_cast<std::uint32_t>(found.contact.count);
+    contact->write(i, std::span(patches).first(found.contact.count));
+  });
+  refuse_not_held(rows, contact->penetration->status, kNotHeld, true);
+  const Shape count = {segments.size()};
+  auto answer = std::make_unique<Outline>(
+      Outline{contact, Column<double>(count, {2, 3}), Column<std::uint32_t>(count, {})});
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    Vector(answer->segments.row(i)) = segments[i].from;
+    Vector(answer->segments.row(i) + 3) = segments[i].to;
+    *answer->patch.row(i) = segments[i].patch;
+  }
+  return answer;
+}
+
 py::object overlaps(const Rows& rows, unsigned threads) {
   const Column<std::uint32_t> answers(rows.shape(), {});
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     *answers.row(i) = static_cast<std::uint32_t>(rows.at(i).answer(
         [&](const auto& a, const PlacedTree& b) { return overlap(a, b, workspace); }));
   });
-  return handed_out(answers.array);
+  return answers.handed_out();
 }
 
 constexpr const char* kSeparationDoc =
     R"(Distance of the inner spheres, and a certified interval for the solids.
 
-Arguments as penetration() has them; max_visits, deadline_us [µs]: 0: no limit.
+Arguments as for penetration(). max_visits, deadline_us [µs]: 0: no limit.
 
 Returns a Separation: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
 
 constexpr const char* kPatchesDoc =
     R"(The contact condensed into at most max_patches patches.
 
-Arguments as penetration() has them. Patches sum to the whole.
+Arguments as for penetration(). The patches sum to the whole contact.
 
 Returns ContactPatches: arrays of shape (n, max_patches), or (max_patches,) for one pose.)";
 
-constexpr const char* kOverlapDoc = R"(Whether solids share a point: yes and no are certain.
+constexpr const char* kOutlineDoc =
+    R"(The patches of measure='exact', and the curves on which the two surfaces cross.
 
-Arguments as penetration() has them. A fraction of what a penetration takes.
+Arguments as for penetration(), of one pose; max_visits: 0: no limit. Both solids are Assets
+with a mesh; otherwise ist.Error is raised.
+
+Returns an OverlapOutline. It has no segment if max_visits stopped the query;
+contact.penetration.status reports that.)";
+
+constexpr const char* kOverlapDoc = R"(Whether solids share a point. Yes and no are certified.
+
+Arguments as for penetration(). Costs a fraction of a penetration query.
 
 Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown; a number for one pose.)";
 
 void add_classes(py::module_& module) {
   py::class_<Separations> separation(module, "Separation",
-                                     "Gaps of placed solids; all zero once inner spheres overlap.");
+                                     "Gaps of placed solids; all zero if inner spheres overlap.");
   add_column(separation, "distance", &Separations::distance, "(n,) [u] between the inner spheres.");
   add_column(separation, "distance_min", &Separations::distance_min,
              "(n,) [u] the true distance of the solids is at least this, certified.");
@@ -133,12 +188,12 @@ void add_classes(py::module_& module) {
   add_column(separation, "sphere_pairs", &Separations::sphere_pairs, "(n,) uint32.");
 
   py::class_<Patches> patch(module, "ContactPatches",
-                            "Contacts as patches; of m there is room for, the first `count` are.");
-  patch.def_readonly("penetration", &Patches::penetration, "The whole: a Penetration.");
+                            "Contact patches; the first `count` of m are valid.");
+  patch.def_ro("penetration", &Patches::penetration, "The whole: a Penetration.");
   add_column(patch, "count", &Patches::count, "(n,) uint32, patches written; the rest is zero.");
   add_column(patch, "id", &Patches::id,
-             "(n, m) uint64, names a region of the smaller solid: the same in every query of the "
-             "same two assets.");
+             "(n, m) uint64, identifies a region of the smaller solid, in every query of the same "
+             "two assets.");
   add_column(patch, "centroid", &Patches::centroid, "(n, m, 3) [u] of the patch's overlap, world.");
   add_column(patch, "normal", &Patches::normal,
              "(n, m, 3) unit, world: the patch pushes B along it.");
@@ -148,6 +203,15 @@ void add_classes(py::module_& module) {
   add_column(patch, "force", &Patches::force, "(n, m, 3) [u²] share of Penetration.force.");
   add_column(patch, "torque", &Patches::torque,
              "(n, m, 3) [u³] share of Penetration.torque, about B's origin.");
+
+  py::class_<Outline> outline(module, "OverlapOutline", "Contact patches and their outlines.");
+  outline.def_ro("contact", &Outline::contact, "The patches: ContactPatches of one pose.");
+  add_column(
+      outline, "segments", &Outline::segments,
+      "(n, 2, 3) [u] from and to of each, world: they form closed curves. A's surface inside "
+      "B lies to the left of each, seen from outside A.");
+  add_column(outline, "patch", &Outline::patch,
+             "(n,) uint32, number of the patch that each bounds; 0 where max_patches is 0.");
 }
 
 }  // namespace
@@ -162,9 +226,10 @@ void add_separation(py::module_& module) {
         return separations(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
                            {max_visits, deadline_us}, threads);
       },
-      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("scales") = py::none(),
-      py::arg("poses_a") = py::none(), py::arg("scales_a") = py::none(), py::arg("max_visits") = 0,
-      py::arg("deadline_us") = 0.0, py::arg("threads") = 0, kSeparationDoc);
+      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
+      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
+      py::arg("threads") = 0, kSeparationDoc);
   module.def(
       "separation_of_pairs",
       [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
@@ -175,7 +240,7 @@ void add_separation(py::module_& module) {
       py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
       py::arg("threads") = 0,
-      "separation() for pairs of the solids of scenes, as penetration_of_pairs() has them.");
+      "separation() for pairs of solids of scenes, with the arguments of penetration_of_pairs().");
   module.def(
       "contact_patches",
       [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
@@ -187,12 +252,26 @@ void add_separation(py::module_& module) {
                         max_visits, deadline_us, relative_error, min_radius},
                        threads);
       },
-      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("max_patches") = 8,
-      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
+      py::arg("max_patches") = 8, py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("measure") = "matched",
       py::arg("field") = "automatic", py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
       py::arg("relative_error") = 0.0, py::arg("min_radius") = 0.0, py::arg("threads") = 0,
       kPatchesDoc);
+  module.def(
+      "overlap_outline",
+      [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
+         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
+         std::uint32_t max_visits) {
+        ContactSettings settings;
+        settings.measure = Measure::exact;
+        settings.max_visits = max_visits;
+        return outline(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), max_patches,
+                       settings);
+      },
+      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("max_patches") = 8,
+      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, kOutlineDoc);
   module.def(
       "overlap",
       [](const py::object& a, const py::object& b, const py::object& poses,
@@ -200,9 +279,9 @@ void add_separation(py::module_& module) {
          unsigned threads) {
         return overlaps(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), threads);
       },
-      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("scales") = py::none(),
-      py::arg("poses_a") = py::none(), py::arg("scales_a") = py::none(), py::arg("threads") = 0,
-      kOverlapDoc);
+      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
+      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("scales_a") = py::none(), py::arg("threads") = 0, kOverlapDoc);
   module.def(
       "overlap_of_pairs",
       [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
@@ -211,7 +290,7 @@ void add_separation(py::module_& module) {
       },
       py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("threads") = 0,
-      "overlap() for pairs of the solids of scenes, as penetration_of_pairs() has them.");
+      "overlap() for pairs of solids of scenes, with the arguments of penetration_of_pairs().");
 }
 
 }  // namespace ist::python

@@ -1,21 +1,19 @@
 #pragma once
 
-#include <pybind11/pybind11.h>
-
 #include <memory>
 #include <variant>
 
 #include <ist/bake.h>
 #include <ist/field.h>
 
-namespace ist::python {
+#include "arrays.h"
 
-namespace py = pybind11;
+namespace ist::python {
 
 /// A field and whoever owns the memory that it points to.
 struct OwnedField {
   Field field;
-  py::object owner;
+  std::shared_ptr<const void> owner;
 };
 
 /// What may stand first in a query: a view. Whoever asks holds the Python object meanwhile.

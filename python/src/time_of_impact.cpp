@@ -20,12 +20,13 @@ struct Impacts : Gaps {
   Column<std::uint32_t> surface_pairs;
 };
 
-constexpr const char* kDoc = R"(Up to when B, on its way from pose to pose, stays clear of A.
+constexpr const char* kDoc =
+    R"(Time up to which B, moving between two poses, provably stays clear of A.
 
-B goes from `poses` to `poses_to` in the time `duration`: `about` straight on, turning at constant
-speed about one axis, the shorter way. A stands at `poses_a`, or goes to `poses_a_to`.
+B moves from `poses` to `poses_to` in the time `duration`: the point `about` moves straight, and
+B rotates at constant speed about one axis, the shorter way. A rests at `poses_a`, or moves to `poses_a_to`.
 
-poses, poses_to: (7,) or (n, 7), as penetration() has them.
+poses, poses_to: (7,) or (n, 7), as for penetration().
 about, about_a: (3,) [u] in the object's own frame, before its scale: its centre of mass for a free
     body.
 duration: [T] > 0. tolerance: [u]; 0: a thousandth of the smaller solid.
@@ -33,18 +34,13 @@ max_visits, deadline_us [µs]: 0: no limit.
 
 Returns a TimeOfImpact: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
 
-Eigen::Vector3d point_of(const py::object& value, const char* name) {
-  const Doubles array = take_doubles(value, name, "(3,)");
-  if (array.ndim() != 1 || array.shape(0) != 3) refuse_shape(array, name, "(3,)");
-  return Eigen::Vector3d(array.data());
-}
-
 }  // namespace
 
 void add_time_of_impact(py::module_& module) {
-  py::class_<Impacts> type(module, "TimeOfImpact", "Up to when moving solids stay clear.");
-  add_column(type, "time", &Impacts::time,
-             "(n,) [T] in [0, duration]. Certified for every status: they do not touch before.");
+  py::class_<Impacts> type(module, "TimeOfImpact", "Time up to which moving solids stay clear.");
+  add_column(
+      type, "time", &Impacts::time,
+      "(n,) [T] in [0, duration]. The solids do not touch before it, certified for every status.");
   add_column(type, "distance_min", &Impacts::distance_min,
              "(n,) [u] the solids' distance at `time` is at least this, certified.");
   add_column(type, "distance_max", &Impacts::distance_max,
@@ -67,10 +63,10 @@ void add_time_of_impact(py::module_& module) {
         const Rows to = Rows::of_pair(a, b, poses_to, scales,
                                       poses_a_to.is_none() ? poses_a : poses_a_to, scales_a);
         if (from.shape() != to.shape())
-          throw py::value_error("poses_to: as many rows as poses are wanted: " +
-                                text_of(from.shape()) + ", not " + text_of(to.shape()));
-        const Eigen::Vector3d centre = point_of(about, "about"),
-                              centre_a = point_of(about_a, "about_a");
+          throw value_error("poses_to: shape " + text_of(to.shape()) + " of rows; poses have " +
+                            text_of(from.shape()));
+        const Eigen::Vector3d centre = take_vector(about, "about"),
+                              centre_a = take_vector(about_a, "about_a");
         auto answers = std::make_unique<Impacts>(from.shape());
         for_each_row(from, threads, [&](std::size_t i, Workspace& workspace) {
           const Row start = from.at(i), end = to.at(i);
@@ -84,12 +80,12 @@ void add_time_of_impact(py::module_& module) {
         refuse_not_held(from, answers->status, static_cast<std::uint32_t>(ImpactStatus::not_held));
         return answers;
       },
-      py::arg("a"), py::arg("b"), py::arg("poses"), py::arg("poses_to"), py::kw_only(),
-      py::arg("about") = py::make_tuple(0.0, 0.0, 0.0), py::arg("scales") = py::none(),
-      py::arg("poses_a") = py::none(), py::arg("poses_a_to") = py::none(),
-      py::arg("about_a") = py::make_tuple(0.0, 0.0, 0.0), py::arg("scales_a") = py::none(),
-      py::arg("duration") = 1.0, py::arg("tolerance") = 0.0, py::arg("max_visits") = 0,
-      py::arg("deadline_us") = 0.0, py::arg("threads") = 0, kDoc);
+      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::arg("poses_to").none(),
+      py::kw_only(), py::arg("about") = py::make_tuple(0.0, 0.0, 0.0),
+      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("poses_a_to") = py::none(), py::arg("about_a") = py::make_tuple(0.0, 0.0, 0.0),
+      py::arg("scales_a") = py::none(), py::arg("duration") = 1.0, py::arg("tolerance") = 0.0,
+      py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0, py::arg("threads") = 0, kDoc);
 }
 
 }  // namespace ist::python

@@ -64,9 +64,9 @@ nlohmann::ordered_json target_json(const TreeView& tree) {
 const char* why_missed(StopReason stop) {
   switch (stop) {
     case StopReason::coverage:
-      return "the coverage asked for ended the packing";
+      return "the requested coverage ended the packing";
     case StopReason::min_radius:
-      return "the smallest radius asked for ended the packing";
+      return "the requested smallest radius ended the packing";
     case StopReason::time_limit:
       return "the time limit ended the search";
     case StopReason::exhausted:
@@ -93,11 +93,12 @@ nlohmann::ordered_json mesh_json(const TreeView& tree) {
 
 std::string describe_mesh(const TreeView& tree) {
   if (!tree.has_mesh())
-    return tree.mesh_state() == MeshState::unresolved ? "none: it counts volume twice" : "none";
-  const char* const whose = tree.mesh_state() == MeshState::own        ? "all of the mesh's"
-                            : tree.mesh_state() == MeshState::resolved ? "of the mesh, resolved"
-                                                                       : "near the solid";
-  return fmt::format("{} triangles, {}, within {:.4g} u of its surface, {} bytes",
+    return tree.mesh_state() == MeshState::unresolved ? "none: parts of the mesh overlap" : "none";
+  const char* const whose = tree.mesh_state() == MeshState::own ? "all of the mesh"
+                            : tree.mesh_state() == MeshState::resolved
+                                ? "of the union of the mesh's parts"
+                                : "simplified";
+  return fmt::format("{} triangles, {}, within {:.4g} u of the surface, {} bytes",
                      grouped(tree.mesh_triangles()), whose, tree.mesh_error(),
                      grouped(mesh_bytes(tree.header())));
 }
@@ -155,7 +156,7 @@ std::string describe_asset(const TreeView& tree) {
   };
   const bool alone = h.sphere_count == 0;
   line("spheres",
-       alone ? "none: a surface alone, which answers exact queries only"
+       alone ? "none: a surface alone, for exact queries only"
              : fmt::format("{}, {:.3f} % of the volume (stopped by: {})", grouped(h.sphere_count),
                            100 * h.coverage, name_of(static_cast<StopReason>(h.stop_reason))));
   if (const std::string coarse = describe_coarseness(tree); !coarse.empty())
@@ -164,13 +165,12 @@ std::string describe_asset(const TreeView& tree) {
     line("warning", twice);
   const auto grid = static_cast<GridMode>(h.asked_grid);
   if (!alone)
-    line("greedy", keeps_bound(grid)
-                       ? fmt::format("radius at least {:.3f} of the largest that would fit, median "
-                                     "{:.3f}",
-                                     h.kept_ratio_worst, h.kept_ratio_median)
-                       : fmt::format("no promise: grid {} keeps no bound on the largest that would "
-                                     "fit",
-                                     name_of(grid)));
+    line("greedy",
+         keeps_bound(grid)
+             ? fmt::format("radius at least {:.3f} of the largest that fits, median {:.3f}",
+                           h.kept_ratio_worst, h.kept_ratio_median)
+             : fmt::format("no bound: grid {} does not track the largest radius that fits",
+                           name_of(grid)));
   const MassProperties mass = mass_properties(tree);
   line("volume", fmt::format("{:.9g} ± {:.1g} u³", mass.volume, mass.volume_error));
   line("mass centre",
@@ -186,8 +186,9 @@ std::string describe_asset(const TreeView& tree) {
   line("frame", fmt::format("centre ({:.9g}, {:.9g}, {:.9g}) u, scale 2^{}", h.centre[0],
                             h.centre[1], h.centre[2], h.exponent));
   if (!alone)
-    line("protrusion", fmt::format("{:.4g} u: no matched sphere sticks further out of the solid",
-                                   h.protrusion * scale));
+    line("protrusion",
+         fmt::format("{:.4g} u: bound on how far matched spheres stick out of the solid",
+                     h.protrusion * scale));
   for (std::uint32_t i = 1; i <= h.detail_count; ++i) {
     const DetailLevel& detail = at<DetailLevel>(h, h.details)[i - 1];
     line("detail",
@@ -202,7 +203,7 @@ std::string describe_asset(const TreeView& tree) {
   line("mesh", describe_mesh(tree));
   if (!alone)
     line(
-        "asked",
+        "requested",
         fmt::format("{} spheres, coverage {:g}, min radius {:g} u, epsilon {:g}, grid {}, "
                     "seed {}",
                     h.asked_spheres == 0 ? "unlimited" : grouped(h.asked_spheres), h.asked_coverage,
@@ -220,11 +221,12 @@ std::string describe_asset(const TreeView& tree) {
   if ((h.flags & kFlagRepaired) != 0) line("note", "the mesh was open and was repaired");
   if ((h.flags & kFlagWrapped) != 0) line("note", "the mesh was not closed and was wrapped");
   if ((h.flags & kFlagPolygonised) != 0)
-    line("solid", fmt::format("by its signed distance; calibrated by a mesh within {:.4g} u of it, "
-                              "of {} cells along the longest side",
+    line("solid", fmt::format("given by its signed distance; calibrated with a mesh within {:.4g} "
+                              "u of it, from {} cells along the longest side",
                               h.polygonise_error * scale, h.polygonise_cells));
   if ((h.flags & kFlagBelowNoise) != 0)
-    line("note", "the smallest spheres lie under float noise: certified, not in greedy order");
+    line("note",
+         "the smallest spheres are below float precision: certified, but not in greedy order");
   line("file", fmt::format("{} bytes, format {}.{}, content {}, mesh {}", grouped(h.file_bytes),
                            h.format_major, h.format_minor, hex(h.content_hash), hex(h.mesh_hash)));
   return text;
@@ -284,10 +286,11 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
 std::string describe_counted_twice(const TreeView& tree) {
   const bool resolved = tree.mesh_state() == MeshState::resolved;
   if (!resolved && tree.mesh_state() != MeshState::unresolved) return "";
-  return fmt::format("the mesh counts {:.3g} u³, {:.2g} % of the volume, more than once: {}",
-                     tree.counted_twice(), 100 * tree.counted_twice() / tree.volume(),
-                     resolved ? "the asset is of its union"
-                              : "it is not kept, and exact queries are not answered");
+  return fmt::format(
+      "parts of the mesh overlap and count {:.3g} u³, {:.2g} % of the volume, more than once: {}",
+      tree.counted_twice(), 100 * tree.counted_twice() / tree.volume(),
+      resolved ? "the asset represents their union"
+               : "the mesh is not kept, and exact queries are not possible");
 }
 
 std::string describe_target(const TreeView& tree) {
@@ -297,11 +300,10 @@ std::string describe_target(const TreeView& tree) {
                                         100 * errors.target_error, 100 * errors.target_overlap);
   const std::string measured =
       errors.measured_poses == 0
-          ? "nothing measured"
-          : fmt::format(
-                "{:.3g} % measured against the worst partner, {}, "
-                "of {} poses in all",
-                100 * errors.measured_error, name_of(errors.worst_partner), errors.measured_poses);
+          ? "not measured"
+          : fmt::format("{:.3g} % measured against the worst partner, {}, with {} poses in all",
+                        100 * errors.measured_error, name_of(errors.worst_partner),
+                        errors.measured_poses);
   if (errors.target_met()) return fmt::format("{}: met, {}", asked, measured);
   return fmt::format("{}: missed, {}; {}", asked, measured,
                      why_missed(static_cast<StopReason>(tree.header().search_stop)));

@@ -47,7 +47,7 @@ struct Baked {
 Baked bake_now(const ClosedMesh& mesh, const BakeSettings& asked,
                const ProgressCallback& progress) {
   const PackingSettings& settings = asked.packing;
-  if (asked.surface_only) return {bake_surface(mesh, settings.surface, settings.threads)};
+  if (asked.surface_only) return {bake_surface(mesh, settings.surface, settings.threads, progress)};
   if (!(asked.target.relative_error > 0)) return {bake(mesh, settings, progress)};
   TargetedAsset found = bake_to_error(mesh, asked.target, settings, progress);
   Baked baked = {std::move(found.asset)};
@@ -132,9 +132,8 @@ void run_bake(const BakeOptions& options) {
     const std::string declares = describe_declared(declared);
     fmt::print("{}\n{}", options.output, describe_asset(asset.view()));
     if (!partners.empty())
-      fmt::print("  {:<12} {}: median error there, poses\n", "partners",
-                 describe_partners(partners));
-    if (!declares.empty()) fmt::print("  {:<12} {}\n", "mesh says", declares);
+      fmt::print("  {:<12} {}: median error (poses)\n", "partners", describe_partners(partners));
+    if (!declares.empty()) fmt::print("  {:<12} {}\n", "declared", declares);
     if (const std::string closing = describe_closing(mesh.report); !closing.empty())
       fmt::print("  {:<12} {}\n", "closed by", closing);
     fmt::print("  {:<12} import {:.2f} s, bake {:.2f} s\n", "time", import_seconds, bake_seconds);
@@ -152,19 +151,20 @@ void add_bake(CLI::App& app) {
                 "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf")
           ->required(false);
   add_output(command, options->output,
-             "The .ist file to write; with --manifest the folder for NAME.ist, of a robot the one "
-             "for LINK.ist and an index, made if need be",
+             "The .ist file to write. With --manifest: the folder for NAME.ist. For a robot: the "
+             "folder for LINK.ist and an index. A missing folder is created",
              Dash::refused);
   add_setting_options(command, options->asked, all_settings());
   add_device_option(command, options->device,
-                    "Where the bake runs; auto: on the GPU if there is one");
-  add_whole(command, "--threads", options->threads, "0 = all cores; never changes the result");
+                    "Device of the bake; auto = the GPU if there is one, else the CPU");
+  add_whole(command, "--threads", options->threads,
+            "Number of threads; 0 = all cores. The result does not depend on it");
   add_robot_options(command, options->robot);
   add_library_options(command, options->library);
-  command->add_flag("--json", options->json, "The result as JSON on stdout");
-  command->add_flag("--quiet", options->quiet, "Only errors");
+  command->add_flag("--json", options->json, "Print the result as JSON");
+  command->add_flag("--quiet", options->quiet, "Print errors only");
   command->footer(
-      "The first limit met stops the packing. Ctrl-C ends the bake without writing a file.\n"
+      "Packing stops at the first limit it reaches. Ctrl-C stops the bake; no file is written.\n"
       "Example: ist bake bolt.obj -o bolt.ist --spheres 4000\n"
       "Example: ist bake ur5.urdf -o ur5 --spheres 1000\n"
       "Example: ist bake --manifest library.toml -o assets --cache ~/.cache/ist");
@@ -172,11 +172,11 @@ void add_bake(CLI::App& app) {
     if (!options->library.manifest.empty()) {
       refuse_idle_options(options->robot, options->library.manifest);
       if (!options->mesh.empty())
-        throw CLI::ValidationError("--manifest", "excludes MESH: write the mesh into the manifest");
+        throw CLI::ValidationError("--manifest", "excludes MESH; list the mesh in the manifest");
       if (!options->asked.given.empty())
         throw CLI::ValidationError("--" + *options->asked.given.begin(),
-                                   "is not combined with --manifest: write it there, without --, "
-                                   "below [defaults] or an [[asset]]");
+                                   "cannot be combined with --manifest; set it in the manifest, "
+                                   "without --, under [defaults] or an [[asset]]");
       return run_library({options->library, options->output, options->device, options->threads,
                           options->json, options->quiet});
     }
@@ -187,7 +187,7 @@ void add_bake(CLI::App& app) {
       for (const Setting& placing : placing_settings())
         if (options->asked.given.contains(placing.name))
           throw CLI::ValidationError("--" + placing.name,
-                                     "is not combined with a robot: its URDF places the meshes");
+                                     "cannot be combined with a robot; its URDF places the meshes");
     run_bake(*options);
   });
 }

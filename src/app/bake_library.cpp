@@ -59,10 +59,10 @@ void make_folder(const std::string& path) {
   std::error_code error;
   fs::create_directories(path, error);
   if (!fs::is_directory(path))
-    throw Error(path + ": cannot be made a folder for the assets" +
+    throw Error(path + ": cannot create this folder for the assets" +
                 (error ? ": " + error.message() : "") + "; name another with -o");
   if (access(path.c_str(), W_OK | X_OK) != 0)
-    throw Error(path + ": this folder cannot be written to; name another with -o");
+    throw Error(path + ": no permission to write to this folder; name another with -o");
 }
 
 /// An empty name counts as none, as in other programs.
@@ -104,16 +104,16 @@ RunSettings settings_for(const LibraryRun& run) {
 void add_library_options(CLI::App* command, LibraryOptions& options) {
   CLI::Option* const manifest =
       add_input(command, "--manifest", options.manifest,
-                "A TOML file that lists meshes (docs/library.md): bake them all")
+                "Bake every mesh that this TOML file lists (docs/library.md)")
           ->required(false);
   add_input(command, "--cache", options.cache,
-            "With --manifest: a folder of assets by what they were baked from, so that what "
-            "did not change is not baked again. Default: $IST_CACHE, else none")
+            "With --manifest: cache folder; an asset whose mesh and settings did not change is "
+            "copied from it instead of baked again. Default: $IST_CACHE, else no cache")
       ->required(false)
       ->needs(manifest);
   add_bytes(command, "--cache-size", options.cache_size,
-            "With --manifest: keep the cache below this, e.g. 10G, by removing what was not used "
-            "for longest. Default: no limit")
+            "With --manifest: size limit of the cache in bytes, e.g. 10G; the least recently used "
+            "assets are removed first. Default: no limit")
       ->needs(manifest);
   add_parsed(
       command, "--shard", "I/N with I from 1 to N, e.g. 2/8",
@@ -121,18 +121,18 @@ void add_library_options(CLI::App* command, LibraryOptions& options) {
         options.shard = text;
         return parse_shard(text).has_value();
       },
-      "With --manifest: bake the I-th of N parts of it; `ist summary` puts their summaries "
-      "together")
+      "With --manifest: bake part I of N; `ist summary` merges the summaries of all parts")
       ->type_name("I/N")
       ->needs(manifest);
   constexpr unsigned kMostJobs = 1024;
   add_whole(command, "--jobs", options.jobs,
-            "With --manifest: assets at once, 0 = as many as threads; never changes the result", 0u,
-            kMostJobs)
+            "With --manifest: number of assets baked at once; 0 = as many as threads. The result "
+            "does not depend on it",
+            0u, kMostJobs)
       ->needs(manifest);
   add_bytes(command, "--memory", options.memory,
-            "With --manifest: let jobs wait for each other above this, e.g. 16G. Default: 80 % of "
-            "what is available")
+            "With --manifest: memory limit in bytes, e.g. 16G; an asset waits until its estimated "
+            "memory is free. Default: 80 % of the available memory")
       ->needs(manifest);
 }
 

@@ -40,12 +40,12 @@ std::string file_name(const std::string& name) {
 
 /// The description of a primitive, as parse_field() takes it.
 std::string field_spec_of(const Shape& shape) {
-  if (const auto* box = std::get_if<BoxShape>(&shape))
+  if (const auto* box = std::get_if<LinkBox>(&shape))
     return fmt::format("box:{:.17g},{:.17g},{:.17g}", box->half_extents.x(), box->half_extents.y(),
                        box->half_extents.z());
-  if (const auto* cylinder = std::get_if<CylinderShape>(&shape))
+  if (const auto* cylinder = std::get_if<LinkCylinder>(&shape))
     return fmt::format("cylinder:{:.17g},{:.17g}", cylinder->radius, cylinder->half_height);
-  return fmt::format("ball:{:.17g}", std::get<BallShape>(shape).radius);
+  return fmt::format("ball:{:.17g}", std::get<LinkBall>(shape).radius);
 }
 
 Json pose_json(const Eigen::Quaterniond& q, const Eigen::Vector3d& t) {
@@ -62,7 +62,8 @@ Asset bake_shape(const ClosedMesh& mesh, const RobotBake& what) {
       return !interrupted();
     };
     const PackingSettings& packing = what.settings.packing;
-    Asset asset = what.settings.surface_only ? bake_surface(mesh, packing.surface, packing.threads)
+    Asset asset = what.settings.surface_only
+                      ? bake_surface(mesh, packing.surface, packing.threads, show)
                   : what.settings.target.relative_error > 0
                       ? bake_to_error(mesh, what.settings.target, packing, show).asset
                       : bake(mesh, packing, show);
@@ -83,9 +84,9 @@ struct Baked {
 void require_folder(const std::string& folder) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_directory(folder, error))
-    throw Error(folder + ": this is a file; a robot is baked into a folder");
+    throw Error(folder + ": is a file; name a folder for the robot's assets");
   fs::create_directories(folder, error);
-  if (error) throw Error(folder + ": the folder cannot be made: " + error.message());
+  if (error) throw Error(folder + ": cannot create the folder: " + error.message());
 }
 
 }  // namespace
@@ -102,7 +103,7 @@ void bake_robot(const RobotBake& what) {
   for (const RobotLink& link : robot.links) {
     Json shapes = Json::array();
     for (const PlacedShape& placed : link.shapes(what.options.shapes())) {
-      if (!std::holds_alternative<MeshShape>(placed.shape)) {
+      if (!std::holds_alternative<LinkMesh>(placed.shape)) {
         shapes.push_back({{"field", field_spec_of(placed.shape)},
                           {"pose", pose_json(placed.rotation, placed.translation)}});
         ++fields;

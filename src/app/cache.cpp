@@ -48,7 +48,7 @@ void run_cache(const CacheOptions& options) {
   if (use.entries > 0)
     fmt::print("  {:<10} {} to {}\n", "last used", days(use.oldest), days(use.newest));
   if (use.left_over > 0)
-    fmt::print("  {:<10} {} files, {} bytes, of programs that write or were killed\n", "unfinished",
+    fmt::print("  {:<10} {} files, {} bytes, of running or killed programs\n", "unfinished",
                grouped(use.left_over), grouped(use.left_over_bytes));
   if (options.prune)
     fmt::print("  {:<10} {} files, {} bytes\n", "removed", grouped(pruned.entries),
@@ -60,24 +60,25 @@ void run_cache(const CacheOptions& options) {
 void add_cache(CLI::App& app) {
   const auto options = std::make_shared<CacheOptions>();
   CLI::App* const command =
-      app.add_subcommand("cache", "Show and prune a cache of `ist bake --manifest`");
+      app.add_subcommand("cache", "Show or prune a cache of `ist bake --manifest`");
   if (const char* const folder = std::getenv("IST_CACHE")) options->folder = folder;
-  command->add_option("DIR", options->folder, "Its folder")
+  command->add_option("DIR", options->folder, "Cache folder")
       ->required(options->folder.empty())
       ->capture_default_str();
   CLI::Option* const prune = command->add_flag(
       "--prune", options->prune,
-      "Remove what killed programs left an hour ago or more, and with --max-size assets");
+      "Remove unfinished files that are at least one hour old; with --max-size also assets");
   add_parsed(
       command, "--max-size", "a number of bytes such as 4096, 512M or 10G",
       [options](const std::string& text) {
         options->most = parse_bytes(text);
         return options->most.has_value();
       },
-      "Keep so much, e.g. 10G, of the assets that were used last; 0 keeps none")
+      "Remove the least recently used assets until the cache is at most this large, in bytes, e.g. "
+      "10G; 0 = remove all")
       ->type_name("BYTES")
       ->needs(prune);
-  command->add_flag("--json", options->json, "As JSON on stdout");
+  command->add_flag("--json", options->json, "Print JSON");
   command->footer("Example: ist cache ~/.cache/ist --prune --max-size 10G");
   command->callback([options] { run_cache(*options); });
 }

@@ -62,7 +62,8 @@ ClosedMesh baked_mesh(std::uint32_t flags, const CheckOptions& options) {
   const double detail = std::exchange(settings.wrap, 0);
   if ((flags & kFlagWrapped) == 0) return read_input_mesh(options.mesh, settings).closed;
   if (detail == 0)
-    throw Error(options.asset + ": its mesh was wrapped: --wrap says with what detail");
+    throw Error(options.asset +
+                ": the asset was baked from a wrapped mesh; pass the same detail with --wrap");
   TriangleMesh mesh = load_mesh(options.mesh);
   place(mesh, settings);
   return wrap_mesh(std::move(mesh), options.mesh, detail);
@@ -83,12 +84,12 @@ void run_check(const CheckOptions& options) {
 void add_check(CLI::App& app) {
   const auto options = std::make_shared<CheckOptions>();
   CLI::App* const command =
-      app.add_subcommand("check", "Prove every invariant again, from asset and mesh alone");
+      app.add_subcommand("check", "Verify every invariant of an asset against its mesh");
   add_input(command, "ASSET", options->asset, "An .ist file");
-  add_input(command, "--mesh", options->mesh, "The MESH it was baked from");
+  add_input(command, "--mesh", options->mesh, "The mesh file that the asset was baked from");
   add_setting_options(command, options->placed, checking_settings());
-  add_whole(command, "--threads", options->threads, "0 = all cores");
-  command->add_flag("--json", options->json, "The invariants as JSON");
+  add_whole(command, "--threads", options->threads, "Number of threads; 0 = all cores");
+  command->add_flag("--json", options->json, "Print the invariants as JSON");
   command->footer(
       "Exits 3 if an invariant is violated.\nExample: ist check bolt.ist --mesh bolt.obj");
   command->callback([options] {

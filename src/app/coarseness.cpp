@@ -48,8 +48,8 @@ std::string describe_coarseness(const TreeView& tree) {
   const std::optional<std::uint64_t> enough = enough_spheres(tree);
   if (!enough) return "";
   return fmt::format(
-      "the spheres are too coarse for thin parts: {:.2g} % of the solid is covered; about {} "
-      "spheres would do",
+      "the spheres are too coarse for thin parts: they fill {:.2g} % of the solid; about {} "
+      "spheres are enough",
       100 * tree.header().coverage, grouped(*enough));
 }
 

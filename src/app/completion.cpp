@@ -13,10 +13,14 @@ std::string words(const std::vector<CommandReference>& commands) {
   return out;
 }
 
-/// The help up to its first stop: what fits beside an option.
+/// The help up to its first stop: what fits beside an option. "e.g. 1%" has none.
 std::string short_help(const std::string& help) {
-  const std::size_t end = help.find_first_of(";\n");
-  return help.substr(0, end);
+  for (std::size_t i = 0; i < help.size(); ++i) {
+    const bool sentence_ends = help[i] == '.' && i + 2 < help.size() && help[i + 1] == ' ' &&
+                               help[i + 2] >= 'A' && help[i + 2] <= 'Z';
+    if (help[i] == ';' || help[i] == '\n' || sentence_ends) return help.substr(0, i);
+  }
+  return help;
 }
 
 std::string replaced(const std::string& text, std::string_view unsafe, const std::string& before) {

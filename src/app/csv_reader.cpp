@@ -40,9 +40,7 @@ std::string CsvReader::field(std::size_t& at) {
   std::string text = line_.substr(at, end - at);
   at = end;
   if (text.find('"') != std::string::npos)
-    fail(
-        "a quote within a field that does not begin with one; put the field in quotes and double "
-        "those within");
+    fail("a quote inside an unquoted field; quote the whole field and double the quotes inside it");
   const std::size_t last = text.find_last_not_of(kBlank);
   text.erase(last == std::string::npos ? 0 : last + 1);
   return text.erase(0, std::min(text.find_first_not_of(kBlank), text.size()));
@@ -52,7 +50,7 @@ std::string CsvReader::quoted_field(std::size_t& at) {
   std::string text;
   while (true) {
     if (at >= line_.size()) {
-      if (!next_line()) fail("a quote is opened and never closed");
+      if (!next_line()) fail("a closing quote is missing");
       text += '\n';
       at = 0;
     } else if (line_[at] != '"') {

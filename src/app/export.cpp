@@ -31,25 +31,26 @@ Format format_of(const std::string& output) {
   if (ending == ".ply") return spheres_ply;
   if (ending == ".json") return spheres_json;
   if (ending == ".glb") return nullptr;
-  throw Error(output + ": nothing is exported as '" + ending + "'; use .csv, .ply, .json or .glb");
+  throw Error(output + ": unknown format '" + ending + "'; use .csv, .ply, .json or .glb");
 }
 
 void run_export(const ExportOptions& options) {
   const Format format = format_of(options.output);
   const Asset asset = Asset::load(options.asset);
   if (asset.view().sphere_count() == 0)
-    throw Error(options.asset +
-                ": a surface alone holds no spheres; bake it without --surface-only");
+    throw Error(options.asset + ": has no spheres; bake it again without --surface-only");
   const std::uint32_t details = asset.view().header().detail_count;
   if (options.detail > details)
-    throw Error(fmt::format("{}: it has {} coarser level(s) of detail, not {}", options.asset,
-                            details, options.detail));
+    throw Error(
+        fmt::format("{}: --detail {} is out of range: the asset has {} coarser level(s) of detail",
+                    options.asset, options.detail, details));
   const bool inner = options.measure == "inner";
   if (inner && format != nullptr)
-    throw Error(options.output + ": holds inner and matched spheres; --measure is for .glb");
+    throw Error(options.output +
+                ": always contains both inner and matched spheres; --measure is for .glb");
   if (inner && options.detail > 0)
     throw Error("--detail " + std::to_string(options.detail) +
-                ": levels of detail are of the matched spheres; leave out --measure inner");
+                ": only matched spheres have levels of detail; omit --measure inner");
   const InterruptGuard guard;
   if (format == nullptr) {
     const std::string name = std::filesystem::path(options.asset).stem().string();
@@ -68,11 +69,11 @@ void add_export(CLI::App& app) {
       app.add_subcommand("export", "Write an asset's spheres for other tools");
   add_input(command, "ASSET", options->asset, "An .ist file");
   add_output(command, options->output,
-             "The .csv, .ply, .json or .glb file to write; - for CSV on standard output",
+             "The .csv, .ply, .json or .glb file to write; - = CSV on standard output",
              Dash::standard_output);
   add_whole(command, "--detail", options->detail,
-            "0: all spheres; i: the i-th coarser level of detail");
-  command->add_option("--measure", options->measure, "Whose tree a .glb shows")
+            "Level of detail; 0 = all spheres, i = the i-th coarser level");
+  command->add_option("--measure", options->measure, "Spheres whose tree a .glb shows")
       ->check(CLI::IsMember({"matched", "inner"}))
       ->capture_default_str();
   command->footer(

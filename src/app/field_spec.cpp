@@ -97,7 +97,7 @@ class Spec {
   static constexpr double kLongest = 1e150;  // [u] what the queries take
 
   [[noreturn]] void fail(const std::string& fault) const {
-    throw Error(fmt::format("'{}' is no {}: {}; write {}:{}, {}", text_, kind_.name, fault,
+    throw Error(fmt::format("'{}' is not a {}: {}; write {}:{}, {}", text_, kind_.name, fault,
                             kind_.name, fmt::join(kind_.numbers, ","), kind_.meaning));
   }
 
@@ -112,7 +112,7 @@ bool is_field_spec(const std::string& text) { return kind_of(text) != nullptr; }
 
 Field parse_field(const std::string& text) {
   const Kind* const kind = kind_of(text);
-  if (kind == nullptr) throw Error("'" + text + "' describes no field");
+  if (kind == nullptr) throw Error("'" + text + "' does not describe a field");
   const Spec spec(text, *kind);
   const std::string_view name = kind->name;
   if (name == "plane") return spec.plane();

@@ -19,9 +19,9 @@ CLI::Option* add_input(CLI::App* command, const std::string& name, std::string& 
   return command->add_option(name, path, help)
       ->required()
       ->check([](const std::string& text) -> std::string {
-        if (text.empty()) return "'' names no file";
-        return text == "-" ? "'-' names no file: it is not read from standard input; ./- would be "
-                             "a file of that name"
+        if (text.empty()) return "'' is not a file name";
+        return text == "-" ? "'-' is not accepted: this is not read from standard input; for a "
+                             "file named - write ./-"
                            : "";
       });
 }
@@ -30,10 +30,10 @@ CLI::Option* add_output(CLI::App* command, std::string& path, const std::string&
   return command->add_option("-o,--output", path, help)
       ->required()
       ->check([dash](const std::string& text) -> std::string {
-        if (text.empty()) return "'' names no file";
+        if (text.empty()) return "'' is not a file name";
         return text == "-" && dash == Dash::refused
-                   ? "'-' names no file: this is not written to standard output; ./- would be a "
-                     "file of that name"
+                   ? "'-' is not accepted: this is not written to standard output; for a file "
+                     "named - write ./-"
                    : "";
       });
 }
@@ -45,15 +45,16 @@ void require_output(const std::string& path, const std::string& input, const std
   if (is_standard_output(path)) return;
   std::error_code none;
   if (fs::equivalent(input, path, none))
-    throw Error(path + ": this is the mesh itself; name another file for " + what);
+    throw Error(path + ": is the input itself; name another file for " + what);
   if (fs::is_directory(path, none))
-    throw Error(path + ": this is a folder; name a file in it for " + what);
+    throw Error(path + ": is a folder; name a file in it for " + what);
   const fs::path parent = fs::path(path).parent_path();
   const std::string folder = parent.empty() ? "." : parent.string();
   if (!fs::is_directory(folder, none))
-    throw Error(path + ": there is no folder " + folder + "; make it, or name another file");
+    throw Error(path + ": the folder " + folder +
+                " does not exist; create it, or name another file");
   if (!fs::exists(path, none) && access(folder.c_str(), W_OK | X_OK) != 0)
-    throw Error(path + ": the folder " + folder + " cannot be written to; name another file");
+    throw Error(path + ": no permission to write to the folder " + folder + "; name another file");
 }
 
 void write_text(const std::string& path, std::string_view text) {

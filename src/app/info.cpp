@@ -28,9 +28,9 @@ void info(const InfoOptions& options) {
 
 void add_info(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App* const command = app.add_subcommand("info", "Show what an asset holds");
+  CLI::App* const command = app.add_subcommand("info", "Show the contents of an asset");
   add_input(command, "ASSET", options->asset, "An .ist file");
-  command->add_flag("--json", options->json, "Every header field, as JSON");
+  command->add_flag("--json", options->json, "Print every header field as JSON");
   command->footer("Example: ist info bolt.ist --json");
   command->callback([options] { info(*options); });
 }

@@ -5,12 +5,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <memory>
 #include <system_error>
 
 #include <ist/error.h>
 #include <ist/version.h>
 
 #include "app/commands.h"
+#include "app/help_format.h"
 #include "app/interrupt.h"
 
 int main(int argc, char** argv) {
@@ -23,13 +25,13 @@ int main(int argc, char** argv) {
                                                                 : spdlog::color_mode::automatic));
   spdlog::set_pattern("ist: %^%l%$: %v");
   CLI::App app(
-      "Sphere packings, inner sphere trees and the volume by which two solids overlap.\n"
-      "Lengths are [u], the mesh's own unit.",
+      "Sphere packings, inner sphere trees and overlap volumes of two solids.\n"
+      "Lengths are in [u], the mesh's own unit.",
       "ist");
+  app.formatter(std::make_shared<HelpFormat>());
   app.set_version_flag("--version", "ist " IST_VERSION_STRING);
   app.footer(
-      "Exit codes: 0 done, 1 error, 2 wrong usage or mistakes in a manifest, 3 check found a "
-      "violation, 130 interrupted.");
+      "Exit codes: 0 success, 1 error, 2 wrong usage, 3 check found a violation, 130 interrupted.");
   add_bake(app);
   add_cache(app);
   add_summary(app);

@@ -68,7 +68,7 @@ std::string man_page(const CLI::App& app) {
   out += fmt::format(".SH DESCRIPTION\n{}\n.SH COMMANDS\n", roff(app.get_description()));
   for (const CommandReference& command : commands_of(app))
     out += fmt::format(".TP\n.BR ist\\-{} (1)\n{}\n", command.name, roff(command.help));
-  out += ".SH ENVIRONMENT\n.TP\n.B NO_COLOR\nIf it is set and not empty, nothing is coloured.\n";
+  out += ".SH ENVIRONMENT\n.TP\n.B NO_COLOR\nIf set and not empty, the output has no colours.\n";
   return out + verbatim("EXIT STATUS", app.get_footer());
 }
 

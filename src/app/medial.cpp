@@ -59,17 +59,19 @@ void add_medial(CLI::App& app) {
       "medial", "Write points of a closed mesh's medial axis with their distance to the surface");
   add_input(command, "MESH", options->mesh, "OBJ, STL, PLY, OFF, GLB/glTF, DAE, …");
   add_output(command, options->output,
-             "The CSV file to write, - for standard output: x,y,z,r in the mesh's own unit and "
-             "frame",
+             "The CSV file to write; - = standard output. Columns x,y,z,r in the mesh's own unit "
+             "and frame",
              Dash::standard_output);
   add_whole(command, "--resolution", options->settings.resolution,
-            "Grid cells on the longest side, a node each at most; 0 = automatic", 0u, kMostCells);
-  add_whole(command, "--seed", options->settings.seed, "Another seed, other points");
-  add_device_option(command, options->device, "Where it runs");
+            "Grid cells along the longest side, each with at most one node; 0 = automatic", 0u,
+            kMostCells);
+  add_whole(command, "--seed", options->settings.seed, "Random seed; each seed gives other points");
+  add_device_option(command, options->device,
+                    "Device; auto = the GPU if there is one, else the CPU");
   add_whole(command, "--threads", options->settings.threads,
-            "0 = all cores; never changes the result");
+            "Number of threads; 0 = all cores. The result does not depend on it");
   add_setting_options(command, options->closing, closing_settings());
-  command->add_flag("--quiet", options->quiet, "Only errors");
+  command->add_flag("--quiet", options->quiet, "Print errors only");
   command->footer("Example: ist medial bolt.obj -o nodes.csv");
   command->callback([options] { run_medial(*options); });
 }

@@ -16,8 +16,8 @@ ClosedMesh close_aloud(TriangleMesh mesh, const std::string& name, const MeshSet
     return closed;
   } catch (const OpenMeshError& error) {
     throw OpenMeshError(std::string(error.what()) +
-                        (settings.repair ? "; --wrap 0.5% makes a closed surface around it"
-                                         : "; --repair closes what can be closed"));
+                        (settings.repair ? "; --wrap 0.5% encloses it in a closed surface"
+                                         : "; --repair tries to close it"));
   }
 }
 
@@ -56,11 +56,10 @@ nlohmann::ordered_json closing_json(const MeshReport& report) {
 
 std::string describe_declared(const DeclaredFrame& declared) {
   std::string text;
-  if (declared.up_axis != 0)
-    text = fmt::format("{} up: the file's axes are kept", declared.up_axis);
+  if (declared.up_axis != 0) text = fmt::format("{} up: axes are not converted", declared.up_axis);
   if (declared.unit != 0)
     text += fmt::format("{}1 unit = {:g} m{}", text.empty() ? "" : "; ", declared.unit,
-                        declared.unit == 1 ? "" : ": lengths come out in metres");
+                        declared.unit == 1 ? "" : ": lengths are converted to metres");
   return text;
 }
 

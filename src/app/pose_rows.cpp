@@ -43,8 +43,9 @@ std::optional<std::size_t> find_column(const std::vector<std::string>& header,
     if (plain(header[i]) != plain(name)) continue;
     if (header[i] != name)
       file.fail(
-          fmt::format("column '{}': it must be spelled '{}', or named otherwise", header[i], name));
-    if (found) file.fail(fmt::format("column '{}' is there twice", name));
+          fmt::format("column '{}' must be spelled '{}'; if it means something else, rename it",
+                      header[i], name));
+    if (found) file.fail(fmt::format("column '{}' appears twice", name));
     found = i;
   }
   return found;
@@ -62,8 +63,8 @@ struct Columns {
     for (std::size_t k = 0; k < kPose.size(); ++k) {
       const std::optional<std::size_t> column = find_column(header, kPose[k], file);
       if (!column)
-        file.fail(
-            fmt::format("no column '{}'; the header row must name qw,qx,qy,qz,tx,ty,tz", kPose[k]));
+        file.fail(fmt::format("no column '{}'; the header row must contain qw,qx,qy,qz,tx,ty,tz",
+                              kPose[k]));
       pose[k] = *column;
     }
   }
@@ -72,7 +73,7 @@ struct Columns {
 PoseTable read(std::istream& text, const std::string& name) {
   CsvReader file(text, name);
   std::vector<std::string> header, fields;
-  if (!file.next(header)) throw Error(name + ": empty; there is no header row");
+  if (!file.next(header)) throw Error(name + ": is empty; the first row must be the header");
   const Columns columns(header, file);
   PoseTable table{{}, columns.label.has_value(), columns.scale.has_value()};
   while (file.next(fields)) {
@@ -93,8 +94,8 @@ PoseTable read(std::istream& text, const std::string& name) {
     if (columns.scale) row.scale_b = number(*columns.scale);
     table.rows.push_back(std::move(row));
   }
-  if (text.bad()) throw Error(name + ": cannot be read to its end");
-  if (table.rows.empty()) throw Error(name + ": no row after the header; there is nothing to ask");
+  if (text.bad()) throw Error(name + ": reading failed before the end");
+  if (table.rows.empty()) throw Error(name + ": no rows after the header");
   return table;
 }
 
@@ -142,8 +143,9 @@ std::string pose_fault(const PoseRow& row) {
   for (std::size_t k = 4; k < kPose.size(); ++k)
     if (const double value = component(pose, k); std::abs(value) > size)
       name = kPose[k], worst = value, size = std::abs(value);
-  return fmt::format("{} is {:g}, too far: sizes and distances may be 1e60 : 1 apart at most", name,
-                     worst);
+  return fmt::format(
+      "{} is {:g}, out of range: sizes and distances may differ by a factor of at most 1e60", name,
+      worst);
 }
 
 }  // namespace ist::app

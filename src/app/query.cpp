@@ -58,20 +58,20 @@ std::string field_fault(const std::string& text) {
 std::string not_an_asset(const std::string& text) {
   if (!is_field_spec(text)) return "";
   return fmt::format(
-      "'{0}' is a field, and only A can be one: name it first and the .ist file second, with that "
-      "one's pose in the field's frame. ./{0} names a file",
+      "'{0}' is a field, and only A can be a field. Pass it first and the .ist file second, with "
+      "the pose of that asset in the field's frame. For a file of this name write ./{0}",
       text);
 }
 
 /// Throws Error if no row is of one of the classes: most likely it is misspelled.
 void keep_classes(PoseTable& table, const QueryOptions& options) {
-  if (!table.has_labels) throw Error(options.poses + ": no column 'class' to select rows by");
+  if (!table.has_labels) throw Error(options.poses + ": no column 'class', which --class needs");
   const auto is_of = [](const std::string& name) {
     return [&name](const PoseRow& row) { return row.label == name; };
   };
   for (const std::string& name : options.classes)
     if (std::none_of(table.rows.begin(), table.rows.end(), is_of(name)))
-      throw Error(fmt::format("{}: none of its {} rows is of class '{}'", options.poses,
+      throw Error(fmt::format("{}: none of the {} rows has the class '{}'", options.poses,
                               table.rows.size(), name));
   std::erase_if(table.rows, [&](const PoseRow& row) {
     return std::find(options.classes.begin(), options.classes.end(), row.label) ==
@@ -83,8 +83,8 @@ std::vector<PoseRow> asked_rows(const QueryOptions& options) {
   if (!options.pose.empty()) return {{"0", "", parse_pose(options.pose), options.scale_b}};
   PoseTable table = read_pose_table(options.poses);
   if (table.has_scales && options.scale_b_given)
-    throw CLI::ValidationError(
-        "--scale-b", "the rows of " + options.poses + " have a scale_b of their own; give one");
+    throw CLI::ValidationError("--scale-b", "conflicts with the column scale_b of " +
+                                                options.poses + "; remove one of them");
   if (!table.has_scales)
     for (PoseRow& row : table.rows) row.scale_b = options.scale_b;
   if (!options.classes.empty()) keep_classes(table, options);
@@ -130,17 +130,16 @@ void check_settings(const QueryOptions& options) {
       no_effect("--field");
   }
   if (exact && settings.deadline_us > 0)
-    throw CLI::ValidationError("--deadline-us", "does not stop --measure exact; --max-visits does");
+    throw CLI::ValidationError("--deadline-us", "does not limit --measure exact; use --max-visits");
   if (!is_field_spec(options.a)) return;
   if (exact)
     throw CLI::ValidationError(
-        "--measure", "exact asks for two meshes, and A is a field: " + options.a +
-                         "; leave the option out, or name an .ist file of the same shape");
+        "--measure", "exact needs the meshes of two assets, and A is a field: " + options.a +
+                         "; omit the option, or pass an .ist file of the same shape");
   if (settings.field == FieldUse::never)
     throw CLI::ValidationError(
-        "--field",
-        "never leaves nothing to ask: " + options.a +
-            " is a field and has no spheres; leave the option out, or name an .ist file");
+        "--field", "never cannot be combined with " + options.a +
+                       ", a field without spheres; omit the option, or pass an .ist file");
   if (settings.pair_budget != 0)
     throw CLI::ValidationError("--pair-budget", "has no effect where A is a field: " + options.a);
 }
@@ -149,8 +148,8 @@ void check_settings(const QueryOptions& options) {
 void require_surface(const std::string& path, const TreeView& tree) {
   if (!tree.has_field())
     throw Error(path +
-                ": holds no field, which --field always needs; bake it again with --surface all, "
-                "or ask with --field auto");
+                ": has no field, which --field always needs; bake it again with --surface all, or "
+                "use --field auto");
 }
 
 /// Throws Error if an asset does not hold what the measure asks.
@@ -158,20 +157,18 @@ void require_held(const std::string& path, const TreeView& tree, Measure measure
   if (measure != Measure::exact) {
     if (tree.sphere_count() > 0) return;
     throw Error(
-        fmt::format("{}: is a surface alone, without the spheres that --measure {} asks; "
-                    "ask with --measure exact, or bake it again without --surface-only",
+        fmt::format("{}: has no spheres, which --measure {} needs; use --measure exact, or bake it "
+                    "again without --surface-only",
                     path, measure == Measure::inner ? "inner" : "matched"));
   }
   if (tree.has_mesh()) return;
   const std::string twice = describe_counted_twice(tree);
   if (!twice.empty())
-    throw Error(
-        fmt::format("{}: {}; ask with --measure matched, or bake a mesh whose parts do not "
-                    "overlap",
-                    path, twice));
+    throw Error(fmt::format(
+        "{}: {}; use --measure matched, or bake a mesh whose parts do not overlap", path, twice));
   throw Error(path +
-              ": holds no mesh, which --measure exact asks; bake it again with --surface all, or "
-              "ask with --measure matched");
+              ": has no mesh, which --measure exact needs; bake it again with --surface all, or "
+              "use --measure matched");
 }
 
 /// Says once on stderr where spheres alone are asked for what they cannot tell.
@@ -183,8 +180,8 @@ void warn_of_misfit(const TreeView& a, const TreeView& b, const std::vector<Pose
     const PairFit fit = pair_fit({a, {}, 1}, {b, {}, row.scale_b});
     if (fit.fits()) continue;
     spdlog::warn(
-        "the spheres of {} are {:.2g} times as coarse as those of {}, and it "
-        "holds no field: volumes and forces may be far off. Bake it again with --surface all",
+        "{}: its spheres are {:.2g} times as coarse as those of {}, and it has no field: volumes "
+        "and forces may be far off. Bake it again with --surface all",
         fit.a_is_coarser ? options.a : options.asset_b, fit.ratio,
         fit.a_is_coarser ? options.asset_b : options.a);
     return;
@@ -230,22 +227,23 @@ void add_query(CLI::App& app) {
   CLI::App* const command =
       app.add_subcommand("query", "Overlap and distance of two solids, B placed in A's frame");
   add_input(command, "A", options->a,
-            "An .ist file or a field: plane:nx,ny,nz,d (the solid n·x ≤ d), box:hx,hy,hz, ball:r, "
-            "capsule:r,h, cylinder:r,h; [u], half extents, h half the height along z")
+            "An .ist file, or a field: plane:nx,ny,nz,d (the solid n·x ≤ d), box:hx,hy,hz (half "
+            "extents), ball:r, capsule:r,h or cylinder:r,h (h = half the height along z). Lengths "
+            "are in [u]")
       ->check(field_fault);
   add_input(command, "B", options->asset_b, "An .ist file")->check(not_an_asset);
-  CLI::Option_group* const poses = command->add_option_group("Poses", "Where B stands");
+  CLI::Option_group* const poses = command->add_option_group("Poses", "Pose of B");
   poses->add_option("--pose", options->pose, "qw,qx,qy,qz,tx,ty,tz: x_A = R (scale · x_B) + t")
       ->check(is_pose);
-  CLI::Option* const file = poses->add_option("--poses", options->poses,
-                                              "CSV with those columns, and id, class, scale_b; "
-                                              "- for standard input");
-  file->check([](const std::string& text) { return text.empty() ? "'' names no file" : ""; });
+  CLI::Option* const file = poses->add_option(
+      "--poses", options->poses,
+      "CSV file with these columns and optionally id, class and scale_b; - = standard input");
+  file->check([](const std::string& text) { return text.empty() ? "'' is not a file name" : ""; });
   poses->require_option(1);
   CLI::Option* const scale =
       add_real(command, "--scale-b", options->scale_b, {.least = 0, .without_least = true},
-               "Uniform scale of B about its own origin");
-  command->add_option("--class", options->classes, "Only rows of this class; may be repeated")
+               "Uniform scale of B about its origin");
+  command->add_option("--class", options->classes, "Only rows of this class. Repeatable")
       ->take_all()
       ->allow_extra_args(false)
       ->needs(file);
@@ -257,8 +255,8 @@ void add_query(CLI::App& app) {
                                                     : name == "inner" ? Measure::inner
                                                                       : Measure::matched;
           },
-          "matched: spheres of the solid's volume, the accurate ones; inner: spheres inside it, a "
-          "lower bound; exact: the meshes that both assets hold, the true volume with its bounds")
+          "matched: spheres with the solid's volume, accurate; inner: spheres inside the solid, a "
+          "lower bound; exact: the kept meshes of both assets, the true volume with bounds")
       ->check(CLI::IsMember({"matched", "inner", "exact"}))
       ->default_str("matched");
   command
@@ -269,27 +267,25 @@ void add_query(CLI::App& app) {
                                                   : name == "always" ? FieldUse::always
                                                                      : FieldUse::automatic;
           },
-          "Whether spheres meet the surface that the other asset holds; auto: where spheres alone "
-          "are too coarse; never: spheres alone; always: the surface alone. Matched measure only")
+          "When to overlap spheres with the other asset's surface instead of its spheres; auto: if "
+          "its spheres are too coarse; never; always. Matched measure only")
       ->check(CLI::IsMember({"auto", "never", "always"}))
       ->default_str("auto");
   add_whole(command, "--pair-budget", options->settings.penetration.pair_budget,
-            "Answer from the level of detail that needs about so many sphere pairs, "
-            "0 = from the finest; matched measure only");
+            "Use the level of detail that needs about this many sphere pairs; 0 = the finest. "
+            "Matched measure only");
   add_whole(command, "--max-visits", options->max_visits,
-            "Stop penetration and separation after so many node pairs each, 0 = no limit");
+            "Limit of node pairs, for penetration and for separation; 0 = no limit");
   add_real(command, "--deadline-us", options->deadline_us, {},
-           "[µs] Stop penetration and separation after this each, 0 = no limit");
+           "[µs] Time limit, for penetration and for separation; 0 = no limit");
   add_whole<std::size_t>(command, "--repeat", options->repeat,
-                         "Rounds over all rows in turn; time_us is a row's least", 1);
-  CLI::Option* const json = command->add_flag("--json", options->json, "Answers as JSON");
-  command->add_flag("--csv", options->csv, "Answers as CSV (the default with --poses)")
-      ->excludes(json);
+                         "Number of rounds over all rows; time_us is the minimum of a row", 1);
+  CLI::Option* const json = command->add_flag("--json", options->json, "Print JSON");
+  command->add_flag("--csv", options->csv, "Print CSV (the default with --poses)")->excludes(json);
   command->footer(
-      "Gradients are taken with respect to a motion of B, all in A's frame; a pressure k "
-      "[force/u²]\n"
-      "pushes B by −k·dVdt and turns it by −k·dVdr about its origin.\n"
-      "A field stands in its own frame; ./box:1,1,1 names a file of that name.\n"
+      "Gradients are with respect to a motion of B, in A's frame. A pressure k [force/u²]\n"
+      "exerts the force −k·dVdt and, about B's origin, the torque −k·dVdr on B.\n"
+      "A field is given in A's frame. For a file named box:1,1,1 write ./box:1,1,1.\n"
       "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9\n"
       "         ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9 --measure exact\n"
       "         ist query plane:0,0,1,0 bolt.ist --pose 1,0,0,0,0,0,-0.5");

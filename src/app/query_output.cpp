@@ -91,13 +91,13 @@ std::string answer_text(const Answer& answer, Measure measure) {
          : known ? "of the overlap, by matched spheres: a limit stopped the exact query"
                  : "a limit stopped the exact query, and an asset has no spheres");
     line("bounds", fmt::format("{} … {} u³", p.volume_min, p.volume_max),
-         "the true volume lies in here");
+         "contain the true volume");
   } else {
     line("volume", fmt::format("{:.6g} u³", p.volume),
          measure == Measure::matched ? "of the overlap, by matched spheres"
                                      : "of the overlap, by inner spheres: a lower bound");
-    line("sum in", fmt::format("{:.6g} … {:.6g} u³", p.volume_min, p.volume_max),
-         "rounding of that sum; it says nothing of the true volume");
+    line("sum range", fmt::format("{:.6g} … {:.6g} u³", p.volume_min, p.volume_max),
+         "contains the finished sum; no bound on the true volume");
   }
   if (known) {
     line("centroid", short_vector(p.centroid) + " u", "of the overlap, in A's frame");
@@ -108,7 +108,7 @@ std::string answer_text(const Answer& answer, Measure measure) {
   if (answer.has_distance()) {
     line("distance", fmt::format("{:.5g} u", s.distance), "between the inner spheres");
     line("interval", fmt::format("{:.5g} … {:.5g} u", s.distance_min, s.distance_max),
-         "the solids' distance lies in here, certified");
+         "contains the distance of the solids, certified");
   }
   line("query", fmt::format("{:.2f} µs", answer.time_us),
        fmt::format("{}, {} node pairs, {} {} pairs", name_of(answer.status()),

@@ -20,25 +20,25 @@ void add_robot_options(CLI::App* command, RobotOptions& options) {
               options.packages[one.substr(0, equals)] = one.substr(equals + 1);
             }
           },
-          "Of a robot: where package://NAME/… lies; may be given more than once. Default: "
-          "ROS_PACKAGE_PATH, then the folders above the URDF")
+          "Robots: the folder of package://NAME/…. Repeatable. Default: ROS_PACKAGE_PATH, then the "
+          "folders above the URDF")
       ->type_name("NAME=DIR")
       ->expected(1)
       ->take_all();
   command->add_flag("--visual", options.visual,
-                    "Of a robot: its visual shapes instead of its collision shapes");
+                    "Robots: use visual shapes instead of collision shapes");
 }
 
 void refuse_idle_options(const RobotOptions& options, const std::string& input) {
   if (is_robot_file(input) || (!options.visual && options.packages.empty())) return;
   throw CLI::ValidationError(options.visual ? "--visual" : "--package",
-                             "has no effect: '" + input + "' is no robot (.urdf)");
+                             "has no effect: '" + input + "' is not a robot (.urdf)");
 }
 
 void refuse_no_shapes(const RobotOptions& options, const std::string& input) {
-  throw Error(input + (options.visual ? ": no link has a visual shape"
-                                      : ": no link has a collision shape; --visual takes the "
-                                        "visual ones"));
+  throw Error(input + (options.visual
+                           ? ": no link has a visual shape"
+                           : ": no link has a collision shape; --visual uses the visual shapes"));
 }
 
 bool is_robot_file(const std::string& path) { return ending_of(path) == ".urdf"; }

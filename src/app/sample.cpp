@@ -27,9 +27,10 @@ std::string list_of_samples() {
 
 void add_sample(CLI::App& app) {
   const auto options = std::make_shared<SampleOptions>();
-  CLI::App* const command = app.add_subcommand("sample", "Write a closed mesh made on the spot");
-  command->add_option("NAME", options->name, "Which one, see below")->required();
-  add_output(command, options->output, "MESH to write: .obj, .ply, .off or .stl", Dash::refused);
+  CLI::App* const command = app.add_subcommand("sample", "Write a generated closed mesh");
+  command->add_option("NAME", options->name, "Name of the mesh, see below")->required();
+  add_output(command, options->output, "The mesh file to write: .obj, .ply, .off or .stl",
+             Dash::refused);
   command->footer(list_of_samples());
   command->callback([options] { write_mesh(make_sample(options->name), options->output); });
 }

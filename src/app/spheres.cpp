@@ -145,16 +145,15 @@ void fill_links(Input& input, const SpheresOptions& options) {
     link.cover.spheres.insert(link.cover.spheres.begin(), link.given.begin(), link.given.end());
     if (options.kind == Kind::cover && !link.proof.covered)
       throw Error(
-          fmt::format("{}: link {}: the spheres could not be proven to hold it near ({:g}, "
-                      "{:g}, {:g})",
+          fmt::format("{}: link {}: cannot prove that the spheres contain it near ({:g}, {:g}, "
+                      "{:g}); change --count",
                       options.input, link.name, link.proof.where.x(), link.proof.where.y(),
                       link.proof.where.z()));
     if (!link.cover.reached)
-      throw Error(fmt::format("{}: link {}: {} spheres still protrude by {:g}; {}", options.input,
-                              link.name, options.cover.count, link.cover.protrusion.largest,
-                              options.cover.count < kMostCoverSpheres
-                                  ? "--count allows more"
-                                  : "--max-protrusion asks for too little"));
+      throw Error(fmt::format(
+          "{}: link {}: {} spheres protrude by {:g}, more than --max-protrusion; {}", options.input,
+          link.name, options.cover.count, link.cover.protrusion.largest,
+          options.cover.count < kMostCoverSpheres ? "increase --count" : "increase it"));
   }
 }
 
@@ -198,8 +197,7 @@ Writer writer_for(const std::string& output) {
       return in.robot.links.empty() ? urdf_of_spheres(spheres_of(in)[0])
                                     : urdf_with_spheres(in.robot, spheres_of(in));
     };
-  throw Error(output + ": spheres are not written as '" + ending +
-              "'; use .urdf, .yml, .xrdf, .srdf or .json");
+  throw Error(output + ": unknown format '" + ending + "'; use .urdf, .yml, .xrdf, .srdf or .json");
 }
 
 void print_report(const Input& input, const SpheresOptions& options, double seconds) {
@@ -251,42 +249,44 @@ void run_spheres(const SpheresOptions& options) {
 void add_spheres(CLI::App& app) {
   const auto options = std::make_shared<SpheresOptions>();
   CLI::App* const command = app.add_subcommand(
-      "spheres", "Write few spheres for each link of a robot, proven to contain it, or of a mesh");
+      "spheres", "Write few spheres that provably contain each link of a robot, or a mesh");
   add_input(command, "INPUT", options->input, "A robot (.urdf) or a mesh (OBJ, STL, PLY, …)");
   add_output(command, options->output,
              "The file to write: .urdf (spheres as collisions), .yml (cuRobo), .xrdf, .srdf "
              "(MoveIt) or .json",
              Dash::refused);
-  add_whole<std::size_t>(command, "--count", options->cover.count,
-                         "Spheres a link; with --max-protrusion the most (default then 1024)", 1,
-                         kMostCoverSpheres);
+  add_whole<std::size_t>(
+      command, "--count", options->cover.count,
+      "Number of spheres per link; with --max-protrusion the largest number (default then 1024)", 1,
+      kMostCoverSpheres);
   CLI::Option* const most =
       add_real(command, "--max-protrusion", options->cover.max_protrusion,
                {.least = 0, .without_least = true},
-               "[u] As few spheres as reach no further out of the link than this");
+               "[u] Use few spheres that stick out of the link by at most this");
   most->default_str("");
   CLI::Option* const cover = command->add_flag_callback(
       "--cover", [options] { options->kind = Kind::cover; },
-      "Spheres that contain the link, proven (the default)");
+      "Spheres that provably contain the link (the default)");
   CLI::Option* const inner = command->add_flag_callback(
       "--inner", [options] { options->kind = Kind::inner; },
-      "Spheres inside the link, certified: the first of a packing");
+      "Spheres inside the link, certified: the first of its packing");
   CLI::Option* const matched = command->add_flag_callback(
       "--matched", [options] { options->kind = Kind::matched; },
-      "Spheres with the link's volume: neither inside nor around it");
+      "Spheres with the link's volume; they neither contain it nor lie inside it");
   inner->excludes(cover)->excludes(most);
   matched->excludes(cover)->excludes(inner)->excludes(most);
   add_robot_options(command, options->robot);
-  add_whole(command, "--seed", options->cover.seed, "Of the search; any value serves equally well");
+  add_whole(command, "--seed", options->cover.seed,
+            "Random seed of the search; any value works equally well");
   add_whole(command, "--threads", options->cover.threads,
-            "0 = all cores; never changes the result");
+            "Number of threads; 0 = all cores. The result does not depend on it");
   add_setting_options(command, options->closing, closing_settings());
-  command->add_flag("--json", options->json, "The report as JSON on stdout");
-  command->add_flag("--quiet", options->quiet, "Only errors");
+  command->add_flag("--json", options->json, "Print the report as JSON");
+  command->add_flag("--quiet", options->quiet, "Print errors only");
   command->footer(
       "Spheres are in the link's frame, lengths in the robot's unit (URDF: metres). The largest\n"
-      "protrusion is proven: no point of a sphere is further from the link. Mean and 95th\n"
-      "percentile are over the area of the spheres' union.\n"
+      "protrusion is proven: no point of a sphere is farther from the link. Mean and 95th\n"
+      "percentile are over the surface of the spheres' union.\n"
       "Example: ist spheres ur5.urdf -o ur5.yml --count 64");
   command->callback([options, command] {
     if (options->cover.max_protrusion > 0 && command->count("--count") == 0)

@@ -29,12 +29,12 @@ void run_summary(const SummaryOptions& options) {
 void add_summary(CLI::App& app) {
   const auto options = std::make_shared<SummaryOptions>();
   CLI::App* const command = app.add_subcommand(
-      "summary", "Show what a bake of a manifest made; of one in shards, all of them together");
-  command->add_option("FILE", options->files, "What `ist bake --manifest … --json` printed")
+      "summary", "Show the results of a manifest bake, or merge those of its shards");
+  command->add_option("FILE", options->files, "Output of `ist bake --manifest … --json`")
       ->required();
-  command->add_flag("--json", options->json, "As JSON on stdout");
+  command->add_flag("--json", options->json, "Print JSON");
   command->footer(
-      "Exits 1 if an asset failed, or a shard is missing, there twice or of another library.\n"
+      "Exits 1 if an asset failed, or if a shard is missing, given twice or of another library.\n"
       "Example: ist summary shard-1.json shard-2.json");
   command->callback([options] { run_summary(*options); });
 }

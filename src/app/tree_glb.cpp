@@ -114,8 +114,8 @@ std::string tree_glb(const TreeView& view, Measure measure, std::uint32_t detail
   const double scale = std::ldexp(1.0, header.exponent);
   constexpr int kMostExponent = 100;  // of what floats can hold, and viewers square
   if (std::abs(header.exponent) > kMostExponent)
-    throw Error(name + ": a size of 2^" + std::to_string(header.exponent) +
-                " is none for the floats of a .glb");
+    throw Error(name + ": its size of about 2^" + std::to_string(header.exponent) +
+                " u is out of range for a .glb (2^-100 to 2^100); export .csv, .ply or .json");
   Json nodes = Json::array(), meshes = Json::array(), materials = Json::array();
   nodes.push_back({{"name", name},
                    {"translation", {header.centre[0], header.centre[1], header.centre[2]}},

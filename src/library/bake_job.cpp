@@ -64,9 +64,9 @@ CacheEntry bake_entry(const Job& job, const BakeMesh& bake) {
   try {
     mesh = read_input_mesh(job.mesh, job.settings.mesh);
   } catch (const OpenMeshError& error) {
-    throw Error(std::string(error.what()) +
-                (job.settings.mesh.repair ? "; wrap = '0.5%' makes a closed surface around it"
-                                          : "; repair = true closes what can be closed"));
+    throw Error(std::string(error.what()) + (job.settings.mesh.repair
+                                                 ? "; wrap = '0.5%' encloses it in a closed surface"
+                                                 : "; repair = true tries to close it"));
   }
   CacheEntry entry = {bake(mesh.closed, job.settings), std::move(mesh.closed.report.notes)};
   if (const auto& judged = mesh.closed.report.judged) entry.confidence = judged->confidence;
@@ -89,17 +89,18 @@ JobResult do_job(const Job& job, const RunSettings& settings, const BakeMesh& ba
     entry = settings.cache->find(*key, damage);
     if (entry) result.status = JobStatus::cached;
     if (!damage.empty())
-      result.warnings.push_back("the cache's entry is damaged and was baked again: " + damage);
+      result.warnings.push_back("the cache entry is damaged, so the asset was baked again: " +
+                                damage);
   }
   if (!entry) {
     entry = bake_entry(job, bake);
     if (key) {
       if (cache_key(job) != *key)
-        throw Error(job.mesh + ": the file changed while it was baked. Bake it again");
+        throw Error(job.mesh + ": the file changed during the bake. Bake it again");
       try {
         if (!was_out_of_time(entry->asset.view())) settings.cache->store(*key, *entry);
       } catch (const Error& error) {
-        result.warnings.push_back(std::string("not kept in the cache: ") + error.what());
+        result.warnings.push_back(std::string("not stored in the cache: ") + error.what());
       }
     }
   }

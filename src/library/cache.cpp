@@ -45,17 +45,17 @@ XXH128_hash_t hash_of(std::span<const std::byte> entry) {
 /// Throws Error that says what is wrong with the bytes.
 CacheEntry parse(const std::vector<std::byte>& bytes, const CacheKey& key) {
   EntryHeader header;
-  if (bytes.size() < sizeof(header)) throw Error("it ends early");
+  if (bytes.size() < sizeof(header)) throw Error("the entry is truncated");
   std::memcpy(&header, bytes.data(), sizeof(header));
   if (std::memcmp(header.magic, kMagic, sizeof(kMagic)) != 0 || header.version != kEntryVersion)
-    throw Error("it is no entry of this version");
+    throw Error("the entry is of another version");
   const XXH128_hash_t hash = hash_of(bytes);
   if (hash.high64 != header.hash_high || hash.low64 != header.hash_low)
-    throw Error("its bytes are not those that were written");
+    throw Error("the entry does not match its checksum");
   const std::uint64_t rest = bytes.size() - sizeof(header);
   if (header.found_bytes > rest || header.asset_bytes != rest - header.found_bytes ||
       CacheKey{header.key_high, header.key_low} != key)
-    throw Error("it belongs to another mesh");
+    throw Error("the entry belongs to another mesh");
   const auto* const text = reinterpret_cast<const char*>(bytes.data() + sizeof(header));
   const nlohmann::json found = nlohmann::json::parse(text, text + header.found_bytes);
   CacheEntry entry = {
@@ -106,8 +106,7 @@ std::vector<CacheFile> files_of(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
     throw Error(folder.string() +
-                ": there is no such folder; `ist bake --manifest … --cache DIR` "
-                "makes one");
+                ": no such folder; `ist bake --manifest … --cache DIR` creates one");
   std::vector<CacheFile> files;
   timespec now = {};
   clock_gettime(CLOCK_REALTIME, &now);
@@ -138,7 +137,7 @@ AssetCache::AssetCache(fs::path folder, std::uint64_t limit)
   std::error_code error;
   fs::create_directories(folder_, error);
   if (!fs::is_directory(folder_))
-    throw Error(folder_.string() + ": cannot be made a folder for the cache: " + error.message());
+    throw Error(folder_.string() + ": cannot create the cache folder: " + error.message());
 }
 
 fs::path AssetCache::file_of(const CacheKey& key) const {

@@ -53,7 +53,7 @@ std::string other_keys(std::string key, std::vector<std::string> known) {
       known.begin(), known.end(),
       [&](const auto& a, const auto& b) { return letters_apart(key, a) < letters_apart(key, b); });
   if (letters_apart(key, *nearest) <= 2) return fmt::format("did you mean '{}'?", *nearest);
-  return fmt::format("there are {}", fmt::join(known, ", "));
+  return fmt::format("known keys are {}", fmt::join(known, ", "));
 }
 
 /// A value as the command line would have it; nothing for a type that it cannot be.
@@ -100,9 +100,8 @@ class Reader {
     try {
       root = toml::parse(text, path_);
     } catch (const toml::parse_error& error) {
-      fault(
-          error.source().begin.line,
-          fmt::format("no TOML: {}. https://toml.io shows how it is written", error.description()));
+      fault(error.source().begin.line,
+            fmt::format("not valid TOML: {}. See https://toml.io", error.description()));
       return finish();
     }
     for (const auto& [key, value] : root) {
@@ -120,7 +119,7 @@ class Reader {
  private:
   std::string content() const {
     std::error_code none;
-    if (fs::is_directory(path_, none)) throw Error(path_ + ": is a folder, no manifest");
+    if (fs::is_directory(path_, none)) throw Error(path_ + ": is a folder, not a manifest");
     std::ifstream file(path_, std::ios::binary);
     if (!file) throw Error(path_ + ": cannot be opened. Check the path and its permissions");
     std::ostringstream text;
@@ -146,7 +145,7 @@ class Reader {
     for (const auto& [key, value] : *table) {
       if (key.str() == "mesh" || key.str() == "name")
         fault(key.source().begin.line,
-              fmt::format("'{}' is no default: write it below an [[asset]]", key.str()));
+              fmt::format("'{}' cannot be a default: set it under an [[asset]]", key.str()));
       else
         read_setting(key, value, defaults_, {});
     }
@@ -169,7 +168,7 @@ class Reader {
 
   void read_assets(const toml::table& root) {
     const toml::node* const node = root.get("asset");
-    if (node == nullptr) return fault(1, "no [[asset]]: there is nothing to bake");
+    if (node == nullptr) return fault(1, "no [[asset]]: add at least one");
     const toml::array* const list = node->as_array();
     if (list == nullptr)
       return fault(node->source().begin.line, "asset: write [[asset]], with two brackets");
@@ -177,7 +176,7 @@ class Reader {
       if (const toml::table* const table = entry.as_table())
         read_asset(*table);
       else
-        fault(entry.source().begin.line, "asset: write [[asset]] and its keys below it");
+        fault(entry.source().begin.line, "asset: write [[asset]] and its keys under it");
     }
   }
 
@@ -188,7 +187,7 @@ class Reader {
     if (const auto* text = node->as_string(); text != nullptr && !text->get().empty())
       return text->get();
     fault(node->source().begin.line,
-          fmt::format("{}: {} is not text in quotes", key, shown(*node)));
+          fmt::format("{}: {} is not a quoted string", key, shown(*node)));
     return std::nullopt;
   }
 
@@ -201,7 +200,7 @@ class Reader {
     Job job;
     complete_settings(job.settings, own, line);
     if (!table.contains("mesh"))
-      return fault(line, "an asset without a mesh: write mesh = \"path or pattern\"");
+      return fault(line, "an asset without a mesh: add mesh = \"path or pattern\"");
     const std::optional<std::string> mesh = text_at(table, "mesh");
     const std::optional<std::string> name = text_at(table, "name");
     if (!mesh) return;
@@ -210,9 +209,10 @@ class Reader {
     const std::vector<std::string> files = files_for(*mesh, mesh_line);
     constexpr std::string_view kStem = "{stem}";
     if (name && name->find(kStem) == std::string::npos && files.size() > 1)
-      return fault(name_line, fmt::format("name: '{}' cannot stand for the {} files of '{}': write "
-                                          "{{stem}} where the file's name without ending is to be",
-                                          *name, files.size(), *mesh));
+      return fault(name_line,
+                   fmt::format("name: '{}' is one name for the {} files of '{}': include {{stem}}, "
+                               "which stands for the file name without its extension",
+                               *name, files.size(), *mesh));
     for (const std::string& file : files) {
       const std::string stem = fs::path(file).stem().string();
       job.name = name.value_or(std::string(kStem));
@@ -254,27 +254,28 @@ class Reader {
       if (!fs::is_directory(path, none)) {
         found = {path};
       } else {
-        fault(line, fmt::format("mesh: '{}' is a folder: write '{}' for the files in it", mesh,
+        fault(line, fmt::format("mesh: '{}' is a folder: use '{}' for the files in it", mesh,
                                 (fs::path(mesh) / "*.obj").string()));
         return {};
       }
     } else if (is_pattern(mesh)) {
       found = matching_files(folder_, mesh);
       if (found.empty())
-        fault(line, fmt::format("mesh: no file matches '{}' in {}: * stands for a name, ** for "
-                                "folders within folders",
-                                mesh, folder));
+        fault(line,
+              fmt::format(
+                  "mesh: no file matches '{}' in {}: * matches any name, ** any nested folders",
+                  mesh, folder));
     } else {
-      fault(line, fmt::format("mesh: there is no file '{}' in {}: paths are relative to the "
-                              "manifest",
-                              mesh, folder));
+      fault(line, fmt::format("mesh: no file '{}' in {}: paths are relative to the manifest", mesh,
+                              folder));
     }
     std::vector<std::string> files;
     for (const fs::path& file : found) {
       if (is_known(file))
         files.push_back(file.string());
       else
-        fault(line, fmt::format("mesh: '{}' has no ending of a mesh format{}", file.string(),
+        fault(line, fmt::format("mesh: '{}' does not have the extension of a mesh format{}",
+                                file.string(),
                                 is_pattern(mesh) ? ": make the pattern narrower, e.g. *.obj" : ""));
     }
     return files;
@@ -293,15 +294,16 @@ class Reader {
     constexpr std::size_t kLongest = 200;  // file systems take 255, less what is appended
     if (job.name.empty() || job.name.starts_with('.') || control || job.name.size() > kLongest ||
         job.name.find('/') != std::string::npos)
-      return fault(line, fmt::format("name: '{}' cannot name a file: write letters, digits and the "
-                                     "like, no '/', no dot first, at most {} bytes",
+      return fault(line, fmt::format("name: '{}' is not a valid file name: use at most {} bytes, "
+                                     "no '/', no control characters and no leading dot",
                                      job.name, kLongest));
     const auto [before, is_new] = taken_.try_emplace(job.name, line, job.mesh);
     if (!is_new)
-      return fault(line,
-                   fmt::format("name: '{}' (of {}) is that of line {} already (of {}): give one of "
-                               "them another name = \"…\", in which {{stem}} stands for the file's",
-                               job.name, job.mesh, before->second.first, before->second.second));
+      return fault(
+          line, fmt::format(
+                    "name: '{}' (of {}) is already used in line {} (of {}): give one of them "
+                    "another name = \"…\"; {{stem}} stands for the file name without its extension",
+                    job.name, job.mesh, before->second.first, before->second.second));
     manifest_.jobs.push_back(job);
   }
 

@@ -117,7 +117,7 @@ class Run {
       });
     } catch (const Cancelled&) {
     } catch (const std::bad_alloc&) {
-      fail(job.mesh + ": out of memory. Bake fewer at once (--jobs, --memory)");
+      fail(job.mesh + ": out of memory. Reduce --jobs or --memory");
     } catch (const std::exception& error) {
       fail(error.what());
     }
@@ -137,9 +137,8 @@ class Run {
     PackingSettings& packing = settings.packing;
     packing.device = Device::cpu;
     packing.threads = threads_of_a_job();
-    if (settings.surface_only) return bake_surface(mesh, packing.surface, packing.threads);
     std::optional<GpuPlaces::Place> place;
-    if (gpus_.places() != 0) {
+    if (gpus_.places() != 0 && !settings.surface_only) {
       place.emplace(gpus_);
       packing.device = Device::cuda;
       packing.gpu.device = place->gpu();
@@ -149,7 +148,9 @@ class Run {
       if (place) place->hold(is_of_gpu(progress));
       return !cancelled_;
     };
-    Asset asset = settings.target.relative_error > 0
+    Asset asset = settings.surface_only
+                      ? bake_surface(mesh, packing.surface, packing.threads, go_on)
+                  : settings.target.relative_error > 0
                       ? bake_to_error(mesh, settings.target, packing, go_on).asset
                       : bake(mesh, packing, go_on);
     // A packing that was cancelled ends with what there is.

@@ -149,12 +149,12 @@ Summary read_summary(const std::string& path) {
     for (const Json& asset : json.at("assets")) summary.results.push_back(result_from(asset));
     if (summary.shard.count < 1 || summary.shard.index < 1 ||
         summary.shard.index > summary.shard.count)
-      throw Error("its shard is none");
+      throw Error("its shard index is not between 1 and the shard count");
     return summary;
   } catch (const std::exception& error) {
     throw Error(fmt::format(
-        "{}: is no summary of `ist bake --manifest … --json`, or one that was cut short: {}", path,
-        error.what()));
+        "{}: is not a complete summary of `ist bake --manifest … --json`: {}. Run that bake again",
+        path, error.what()));
   }
 }
 
@@ -174,10 +174,10 @@ Summary merge(std::vector<Summary> shards) {
         fmt::format("shard {}/{} of {}", shard.shard.index, shard.shard.count, shard.manifest);
     if (shard.library_hash != whole.library_hash || shard.shard.count != count)
       throw Error(
-          fmt::format("{} is not of the same library and split as shard {}/{} of {}: bake "
-                      "all shards with one manifest",
+          fmt::format("{} does not belong to the same library and shard count as shard {}/{} of "
+                      "{}: bake all shards with one manifest",
                       name, shards.front().shard.index, count, whole.manifest));
-    if (shard.shard.index < next) throw Error(name + " is there twice");
+    if (shard.shard.index < next) throw Error(name + " is given twice");
     if (shard.shard.index > next)
       throw Error(fmt::format("shard {}/{} of {} is missing", next, count, whole.manifest));
     ++next;

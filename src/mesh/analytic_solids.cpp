@@ -94,8 +94,10 @@ class Combined final : public IntegratedSolid {
  public:
   Combined(std::unique_ptr<Solid> a, std::unique_ptr<Solid> b, Combination combination)
       : a_(std::move(a)), b_(std::move(b)), combination_(combination) {
-    if (a_ == nullptr || b_ == nullptr) throw Error("a combination of solids needs two of them");
-    if (bounds().isEmpty()) throw Error("the two solids do not meet: their intersection is empty");
+    if (a_ == nullptr || b_ == nullptr)
+      throw Error("a combination of solids needs two solids; one is null");
+    if (bounds().isEmpty())
+      throw Error("the two solids do not overlap: their intersection is empty");
   }
   double signed_distance(const Eigen::Vector3d& x) const override {
     const double a = a_->signed_distance(x), b = b_->signed_distance(x);
@@ -131,7 +133,7 @@ class FunctionSolid final : public IntegratedSolid {
   FunctionSolid(std::function<double(const Eigen::Vector3d&)> signed_distance,
                 const Eigen::AlignedBox3d& bounds)
       : signed_distance_(std::move(signed_distance)), bounds_(bounds) {
-    if (!signed_distance_) throw Error("a solid by a function needs the function");
+    if (!signed_distance_) throw Error("the signed distance function of a solid is null");
     unit_frame(bounds);  // throws where there is no box
   }
   double signed_distance(const Eigen::Vector3d& x) const override { return signed_distance_(x); }

@@ -110,9 +110,10 @@ MeshReport survey(const TriangleMesh& mesh, const EdgeTable& edges) {
     first = e;
   }
   const std::string kind = boundary == odd ? "boundary edge" : "boundary or odd edge";
-  throw OpenMeshError(
-      name + ": " + counted(odd, kind) + ", first at vertex " + std::to_string(edges.low(first)) +
-      " " + position_text(mesh.vertices[edges.low(first)]) + ": not closed. Repair or close it");
+  throw OpenMeshError(name + ": " + counted(odd, kind) + ", first at vertex " +
+                      std::to_string(edges.low(first)) + " " +
+                      position_text(mesh.vertices[edges.low(first)]) +
+                      ": the mesh is not closed. Repair or close it");
 }
 
 /// Coordinates that were rounded until the shape was lost.
@@ -124,27 +125,27 @@ void refuse_unusable_coordinates(const std::string& name, MeshReport& report) {
       (far_off && report.degenerate_triangles > report.triangles / 10))
     throw Error(name + ": " + std::to_string(report.degenerate_triangles) + " of " +
                 counted(report.triangles, "triangle") +
-                " collapse to points or lines: the coordinates have too few digits for a size of " +
+                " are degenerate: the coordinates have too few digits for a size of " +
                 shortest(size) + " at an offset of " + shortest(offset) +
                 ". Export it nearer to the origin, or in a format with more digits");
   if (size < 1e-9 || size > 1e10)
     report.notes.push_back("a size of " + shortest(size) +
-                           " is unusual: is the unit right? (1e-9 to 1e9 is promised to work)");
+                           " is unusual: check the unit (sizes of 1e-9 to 1e9 are supported)");
 }
 
 void note_findings(MeshReport& report) {
   if (report.self_intersections > 0)
-    report.notes.push_back(counted(report.self_intersections, "pair") +
-                           " of triangles intersect: inside is where the winding number is 1 or "
-                           "more");
+    report.notes.push_back(
+        counted(report.self_intersections, "pair") +
+        " of triangles intersect: a point is inside if its winding number is 1 or more");
   if (!report.self_intersections_counted)
     report.notes.push_back(
-        "self-intersections were not looked for: too many triangles, or too close together");
+        "self-intersections were not searched: too many triangles, or too close together");
   if (report.nonmanifold_edges > 0)
-    report.notes.push_back(counted(report.nonmanifold_edges, "edge") + " of three or more faces");
+    report.notes.push_back(counted(report.nonmanifold_edges, "edge") + " with three or more faces");
   if (report.nonmanifold_vertices > 0)
     report.notes.push_back(counted(report.nonmanifold_vertices, "vertex", "vertices") +
-                           " in which sheets only touch");
+                           " where sheets only touch");
 }
 
 using Pairs = std::vector<std::array<std::uint32_t, 2>>;
@@ -181,7 +182,7 @@ void reduce(Surface& surface, MeshReport& report) {
   report.coincident_triangles = reduce_coincident(mesh.triangles, surface.edges);
   if (report.coincident_triangles == 0) return;
   report.notes.push_back(counted(report.coincident_triangles, "coincident triangle") +
-                         " removed as copies or cancelling pairs");
+                         " removed (copies or cancelling pairs)");
   surface.triangles_changed();
 }
 
@@ -193,7 +194,7 @@ void orient_faces(Surface& surface, const std::string& name, MeshReport& report)
     return "vertex " + std::to_string(v) + " " + position_text(mesh.vertices[v]);
   };
   if (!find_unbalanced_edge(mesh.triangles, surface.edges)) return;
-  report.notes.push_back("neighbouring faces disagreed about the outside: turned to agree");
+  report.notes.push_back("neighbouring faces had opposite orientations: made consistent");
   auto conflict = make_consistent(mesh.triangles, manifold_partners(surface.edges));
   if (!conflict) {
     surface.triangles_changed();
@@ -202,7 +203,7 @@ void orient_faces(Surface& surface, const std::string& name, MeshReport& report)
         make_consistent(mesh.triangles, all_partners(mesh.vertices, mesh.triangles, surface.edges));
     if (!conflict) return surface.triangles_changed();
   }
-  throw Error(name + ": not orientable, neither side of it is the outside (seen at " +
+  throw Error(name + ": not orientable: neither side of the surface is the outside (at " +
               corner(*conflict) + "). Remodel it as a closed solid");
 }
 
@@ -212,18 +213,18 @@ void orient_outward(Surface& surface, const std::string& name, MeshReport& repor
   const Nesting nesting = orient_shells(mesh.vertices, mesh.triangles, shells);
   report.shells = shells.count;
   if (nesting.volume.is_flat())
-    throw Error(name + ": flat, it encloses no volume. Give it thickness");
+    throw Error(name + ": flat: it encloses no volume. Give it thickness");
   report.volume = nesting.volume.volume;
   report.flipped_components = nesting.flipped;
   report.cavities = nesting.cavities;
   if (nesting.flipped > 0)
-    report.notes.push_back(counted(nesting.flipped, "shell") + " turned to face outward");
+    report.notes.push_back(counted(nesting.flipped, "shell") + " turned outward");
   if (nesting.cavities > 0) report.notes.push_back(counted(nesting.cavities, "cavity", "cavities"));
   if (nesting.flat > 0) report.notes.push_back(counted(nesting.flat, "shell") + " without volume");
   if (nesting.nested_solids > 0)
-    report.notes.push_back(counted(nesting.nested_solids, "outward shell") +
-                           " within another: solid, not a cavity, because inside is where the "
-                           "winding number is 1 or more");
+    report.notes.push_back(
+        counted(nesting.nested_solids, "outward shell") +
+        " inside another: solid, not a cavity, because the winding number inside it is 1 or more");
 }
 
 /// What orient_outward() finds of shells that face as they should.
@@ -250,7 +251,7 @@ void judge_repair(const TriangleMesh& unrepaired, ClosedMesh& closed) {
   if (judged.confidence < kLeastConfidence)
     throw OpenMeshError(closed.name + ": repaired with a confidence below " +
                         shortest(kLeastConfidence) + " (" + describe(judged) +
-                        "): not to be trusted. Wrap or close it");
+                        "), which is not reliable. Wrap or close it");
   closed.report.judged = judged;
   closed.report.notes.push_back("repair: " + describe(judged));
 }
@@ -273,7 +274,9 @@ ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPoli
   note_findings(report);
   reduce(surface, report);
   if (mesh.triangles.empty())
-    throw Error(name + ": every face is doubled back to back: flat, it encloses no volume");
+    throw Error(name +
+                ": flat: every face has a second one back to back, and they enclose no volume. "
+                "Give it thickness");
   TriangleMesh unrepaired;
   if (count_odd_edges(surface.edges) > 0) {
     if (policy == OpenMeshPolicy::refuse) refuse_open(mesh, surface.edges, name);

@@ -22,9 +22,9 @@ using Quad = std::array<std::uint32_t, 4>;  ///< counter-clockwise seen from out
   for (std::size_t k = 0; k < 3; ++k) border |= at[k] <= 0 || at[k] + 1 >= grid.count[k];
   const std::string place = position_text(grid.point(at[0], at[1], at[2]));
   if (border)
-    throw Error("solid: it reaches out of its bounds near " + place + ". Give larger bounds");
-  throw Error("solid: its signed distance changes by more than the way near " + place +
-              ". Divide it by its largest slope, so that it is 1-Lipschitz");
+    throw Error("solid: it extends beyond its bounds near " + place + ". Enlarge the bounds");
+  throw Error("solid: its signed distance is not 1-Lipschitz near " + place +
+              ". Divide it by its largest slope");
 }
 
 /// The quad across an edge of two signs, by the vertices of the four cells around it.

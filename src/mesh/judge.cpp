@@ -147,8 +147,8 @@ std::string describe(const Judgement& judged) {
   char text[320];
   std::snprintf(text, sizeof text,
                 "confidence %.2f: solid and winding number agree on %.1f %% (± %.1f) of the "
-                "volume, %.1f %% of the surface was kept; the input lies up to %.3g from the "
-                "solid's surface, the solid's surface up to %.3g from the input",
+                "volume, and %.1f %% of the surface was kept; the input is at most %.3g from the "
+                "solid's surface, and that surface at most %.3g from the input",
                 judged.confidence, 100 * judged.agreement, 100 * judged.agreement_error,
                 100 * judged.kept_surface, judged.input_max, judged.made_max);
   return text;

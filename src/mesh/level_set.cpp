@@ -137,8 +137,8 @@ void require_usable(const DistanceGrid& grid, const std::string& name) {
   std::uint64_t count = 1;
   for (const std::uint32_t n : grid.size) {
     if (n < 2 || n > kMostPoints)
-      throw Error(name + ": a grid of " + std::to_string(n) + " points along an axis, not 2 to " +
-                  std::to_string(kMostPoints));
+      throw Error(name + ": a grid of " + std::to_string(n) +
+                  " points along an axis; the number must be 2 to " + std::to_string(kMostPoints));
     count *= n;
     if (count > kMostValues)
       throw Error(name + ": a grid of more than 2^31 points. Resample it with larger cells");
@@ -159,10 +159,10 @@ void require_usable(const DistanceGrid& grid, const std::string& name) {
                                  i / grid.size[0] / grid.size[1]};
     for (std::size_t k = 0; k < 3; ++k)
       if (at[k] == 0 || at[k] + 1 == grid.size[k])
-        throw Error(name + ": the solid reaches the grid's border at " + point_text(i, grid) +
-                    ". Enlarge the grid by a layer of points outside");
+        throw Error(name + ": the solid touches the grid's border at " + point_text(i, grid) +
+                    ". Add a layer of outside points to the grid");
   }
-  if (!any) throw Error(name + ": no point of the grid is inside: there is no solid");
+  if (!any) throw Error(name + ": no point of the grid is inside the solid");
 }
 
 /// The cells of a grid that the surface crosses, and the solid that they are cells of.

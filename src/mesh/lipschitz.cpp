@@ -62,9 +62,9 @@ void require_lipschitz(const Solid& solid) {
     if (one.steepness > worst->steepness) worst = &one;
   }
   if (worst->steepness > 0)
-    throw Error("solid: its signed distance changes by " + shortest(worst->steepness) +
-                " times the way near " + position_text(worst->place) +
-                ". Divide it by its largest slope, so that it is 1-Lipschitz");
+    throw Error("solid: its signed distance is not 1-Lipschitz: its slope is " +
+                shortest(worst->steepness) + " near " + position_text(worst->place) +
+                ". Divide it by its largest slope");
 }
 
 }  // namespace ist

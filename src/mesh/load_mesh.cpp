@@ -85,7 +85,7 @@ Eigen::AlignedBox3d finite_bounds(const SourceFile& file, const PolygonMesh& mes
 
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings) {
   if (!(settings.weld_tolerance >= 0) || settings.weld_tolerance > 0.1)
-    throw Error(path + ": the weld tolerance must lie in 0 … 0.1 of the diagonal");
+    throw Error(path + ": the weld tolerance must be 0 to 0.1 of the diagonal");
   if (ending_of(path) == ".vdb") {
     const ClosedMesh level_set = load_vdb(path).mesh;
     return weld(level_set.mesh,
@@ -98,7 +98,7 @@ TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings) {
   refuse_other_content(file);
   PolygonMesh polygons = reader_of(file.path)(file);
   if (polygons.ends.empty() && polygons.triangles.empty())
-    fail(file, "no faces. There is nothing to bound a solid");
+    fail(file, "contains no faces, so it does not bound a solid");
   const Eigen::AlignedBox3d bounds = finite_bounds(file, polygons);
   std::vector<std::array<std::uint32_t, 3>> triangles = triangulate(polygons);
   TriangleMesh mesh{std::move(polygons.vertices), std::move(triangles)};

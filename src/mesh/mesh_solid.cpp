@@ -105,7 +105,8 @@ std::uint64_t hash_mesh(const UnitFrame& frame, const RawArray<double>& vertices
 
 MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>()) {
   const TriangleMesh& mesh = closed.mesh;
-  if (mesh.triangles.empty()) throw Error(closed.name + ": no triangles: there is no solid");
+  if (mesh.triangles.empty())
+    throw Error(closed.name + ": no triangles, so it does not bound a solid");
   if (mesh.triangles.size() >= kBvhLeaf / 2)
     throw Error(closed.name + ": more than 2^30 triangles: simplify the mesh");
   // Only what a triangle refers to counts; strays may lie anywhere, even at NaN.
@@ -114,7 +115,7 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
   tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
     for (const std::uint32_t v : mesh.triangles[t]) {
       if (v >= mesh.vertices.size())
-        throw Error(closed.name + ": a triangle refers to a vertex that is not there");
+        throw Error(closed.name + ": a triangle refers to a vertex that does not exist");
       std::atomic_ref<std::uint32_t>(place[v]).store(0, std::memory_order_relaxed);
     }
   });
@@ -155,7 +156,7 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
   if (closed.meeting_pairs) {
     for (const auto& pair : *closed.meeting_pairs)
       if (pair[0] >= mesh.triangles.size() || pair[1] >= mesh.triangles.size())
-        throw Error(closed.name + ": meeting pairs name a triangle that is not there");
+        throw Error(closed.name + ": meeting pairs refer to a triangle that does not exist");
     if (impl_->rounding == 0) impl_->meeting_pairs = closed.meeting_pairs;
   }
   impl_->may_overlap = closed.report.meets_itself || closed.report.shells != 1;

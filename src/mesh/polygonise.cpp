@@ -14,7 +14,7 @@ namespace ist {
 
 Polygonised polygonise(const Solid& solid, unsigned cells, const ProgressCallback& progress) {
   if (cells < kFewestCells || cells > kMostCells)
-    throw Error("polygonise: " + std::to_string(cells) + " cells, not " +
+    throw Error("polygonise: " + std::to_string(cells) + " cells requested; the number must be " +
                 std::to_string(kFewestCells) + " to " + std::to_string(kMostCells));
   Stage stage("polygonise", progress);
   stage.step(0, 0);
@@ -24,8 +24,9 @@ Polygonised polygonise(const Solid& solid, unsigned cells, const ProgressCallbac
   const bool seen = std::any_of(listed.begin(), listed.end(),
                                 [](const SurfaceCell& cell) { return cell.loops > 0; });
   if (!seen)
-    throw Error("solid: nothing of it is seen by a grid of " + std::to_string(cells) +
-                " cells. Polygonise it with more, or give bounds that fit");
+    throw Error(
+        "solid: a grid of " + std::to_string(cells) +
+        " cells along the longest side does not resolve it. Use more cells, or tighter bounds");
   return dual_mesh(solid, grid, std::move(listed), stage);
 }
 

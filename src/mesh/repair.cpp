@@ -185,7 +185,7 @@ void cap_holes(TriangleMesh& mesh, MeshReport& report) {
   mesh = weld(mesh, 0);
   if (sheets > 0)
     report.notes.push_back("repair: " + counted(sheets, "open sheet") +
-                           " dropped: they enclose nothing");
+                           " removed: they enclose no volume");
   if (report.filled_holes > 0)
     report.notes.push_back("repair: " + counted(report.filled_holes, "hole") + " capped");
 }
@@ -197,13 +197,13 @@ TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& repo
   close_cracks(mesh, report);
   if (const std::size_t fins = drop_fins(mesh); fins > 0)
     report.notes.push_back("repair: " + counted(fins, "patch", "patches") +
-                           " dropped that hang on edges of three or more faces");
+                           " removed at edges with three or more faces");
   cap_holes(mesh, report);
   tidy(mesh);
   if (mesh.triangles.empty())
-    throw OpenMeshError(name + ": cannot be repaired: nothing in it encloses a volume");
+    throw OpenMeshError(name + ": cannot be repaired: no part of it encloses a volume");
   if (const std::size_t left = odd_edges(mesh); left > 0)
-    throw OpenMeshError(name + ": cannot be repaired: " + counted(left, "edge") + " still open");
+    throw OpenMeshError(name + ": cannot be repaired: " + counted(left, "edge") + " remain open");
   return mesh;
 }
 

@@ -143,7 +143,8 @@ std::vector<SurfaceCell> find_surface_cells(const Solid& solid, const CellGrid& 
       const Eigen::Vector3d corner =
           grid.point(cell.at[0] + (i & 1), cell.at[1] + (i >> 1 & 1), cell.at[2] + (i >> 2));
       const double distance = solid.signed_distance(corner);
-      if (std::isnan(distance)) throw Error("solid: its signed distance is not a number somewhere");
+      if (std::isnan(distance))
+        throw Error("solid: its signed distance is NaN at a point within its bounds");
       if (distance > 0) cell.inside = static_cast<std::uint8_t>(cell.inside | 1 << i);
     }
     find_loops(cell);

@@ -16,8 +16,7 @@ namespace ist {
 namespace {
 
 void check_indices_and_coordinates(const TriangleMesh& mesh, const std::string& name) {
-  if (mesh.triangles.empty())
-    throw Error(name + ": no triangles. There is nothing to bound a solid");
+  if (mesh.triangles.empty()) throw Error(name + ": no triangles, so it does not bound a solid");
   const auto unsound = [&](const std::size_t t) {
     return std::any_of(mesh.triangles[t].begin(), mesh.triangles[t].end(), [&](const auto v) {
       return v >= mesh.vertices.size() || !mesh.vertices[v].allFinite();
@@ -31,7 +30,7 @@ void check_indices_and_coordinates(const TriangleMesh& mesh, const std::string& 
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     for (const std::uint32_t v : mesh.triangles[t]) {
       if (v >= mesh.vertices.size())
-        throw Error(name + ": triangle " + std::to_string(t) + " names vertex " +
+        throw Error(name + ": triangle " + std::to_string(t) + " refers to vertex " +
                     std::to_string(v) + " of " + std::to_string(mesh.vertices.size()));
       if (!mesh.vertices[v].allFinite())
         throw Error(name + ": vertex " + std::to_string(v) +
@@ -47,7 +46,7 @@ void refuse_unusable_size(const TriangleMesh& mesh, const std::string& name) {
   const double size = bounds.sizes().maxCoeff(), offset = largest_coordinate(bounds);
   if (!(size == 0 || size > kSmallest) || !(size < kLargest && offset < kFarthest))
     throw Error(name + ": a size of " + shortest(size) + " at an offset of " + shortest(offset) +
-                " cannot be computed with. Scale it");
+                " is out of range. Scale or move it");
 }
 
 }  // namespace

@@ -189,7 +189,7 @@ DistanceGrid sample(const Wrap& wrap, const Eigen::AlignedBox3d& bounds, double 
 
 ClosedMesh wrap_mesh(TriangleMesh mesh, const std::string& name, double detail) {
   if (!(detail >= kFinest && detail <= kCoarsest))
-    throw Error(name + ": wrapped with a detail of " + shortest(detail) + ", not " +
+    throw Error(name + ": a wrap detail of " + shortest(detail) + " is out of range; use " +
                 shortest(kFinest) + " to " + shortest(kCoarsest) + " of the diagonal");
   weld_usable(mesh, name);
   Eigen::AlignedBox3d bounds;
@@ -198,7 +198,7 @@ ClosedMesh wrap_mesh(TriangleMesh mesh, const std::string& name, double detail) 
   const double offset = largest_coordinate(bounds);
   if (!(step > 1e-12 * offset))
     throw Error(name + ": a size of " + shortest(bounds.diagonal().norm()) + " at an offset of " +
-                shortest(offset) + " cannot be wrapped. Move it nearer to the origin");
+                shortest(offset) + " cannot be wrapped. Move it closer to the origin");
   const Wrap wrap(mesh, step);
   ClosedMesh made = level_set_surface(sample(wrap, bounds, step), name);
   made.report.wrapped = true;

@@ -11,7 +11,7 @@
 namespace ist {
 
 std::vector<MedialNode> medial_nodes(const Solid& solid, const MedialSettings& settings) {
-  if (solid.mesh() == nullptr) throw Error("medial axis: only meshes have one here");
+  if (solid.mesh() == nullptr) throw Error("medial axis: the solid must be a mesh");
   if (settings.resolution > packing::kMostCellsPerSide)
     throw Error("medial axis: resolution is " + std::to_string(settings.resolution) +
                 ", must be at most " + std::to_string(packing::kMostCellsPerSide) +

@@ -25,7 +25,7 @@ TriangleMesh box_mesh(const Vector3d& half) {
   return mesh;
 }
 
-ShapeMesh cylinder_mesh(const CylinderShape& cylinder) {
+ShapeMesh cylinder_mesh(const LinkCylinder& cylinder) {
   const double widened = (1 + 1e-12) / std::cos(std::numbers::pi / kSides);
   const double radius = cylinder.radius * widened;
   ShapeMesh out;
@@ -48,7 +48,7 @@ ShapeMesh cylinder_mesh(const CylinderShape& cylinder) {
   return out;
 }
 
-TriangleMesh scaled_mesh(const MeshShape& shape, const PackagePaths& paths) {
+TriangleMesh scaled_mesh(const LinkMesh& shape, const PackagePaths& paths) {
   TriangleMesh mesh = load_mesh(paths.find(shape.file));
   for (Vector3d& v : mesh.vertices) v = v.cwiseProduct(shape.scale);
   if (shape.scale.prod() < 0)
@@ -61,11 +61,11 @@ TriangleMesh scaled_mesh(const MeshShape& shape, const PackagePaths& paths) {
 ShapeMesh mesh_of(const PlacedShape& placed, const PackagePaths& paths, const std::string& file) {
   ShapeMesh out;
   try {
-    if (const auto* mesh = std::get_if<MeshShape>(&placed.shape)) {
+    if (const auto* mesh = std::get_if<LinkMesh>(&placed.shape)) {
       out.mesh = scaled_mesh(*mesh, paths);
-    } else if (const auto* box = std::get_if<BoxShape>(&placed.shape)) {
+    } else if (const auto* box = std::get_if<LinkBox>(&placed.shape)) {
       out.mesh = box_mesh(box->half_extents);
-    } else if (const auto* cylinder = std::get_if<CylinderShape>(&placed.shape)) {
+    } else if (const auto* cylinder = std::get_if<LinkCylinder>(&placed.shape)) {
       out = cylinder_mesh(*cylinder);
     } else {
       throw Error("a sphere has no mesh");
@@ -83,7 +83,7 @@ LinkGeometry geometry_of(std::span<const PlacedShape> shapes, const PackagePaths
                          const std::string& file) {
   LinkGeometry out;
   for (const PlacedShape& placed : shapes) {
-    if (const auto* ball = std::get_if<BallShape>(&placed.shape)) {
+    if (const auto* ball = std::get_if<LinkBall>(&placed.shape)) {
       out.spheres.push_back({placed.translation, ball->radius});
       continue;
     }

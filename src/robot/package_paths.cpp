@@ -46,7 +46,7 @@ std::string PackagePaths::find(const std::string& name) const {
   const std::size_t slash = rest.find('/');
   const std::string package = rest.substr(0, slash);
   if (package.empty() || slash == std::string::npos)
-    throw Error(in_quotes(name) + ": names no file of a package; write package://NAME/PATH");
+    throw Error(in_quotes(name) + ": is not a file of a package; write package://NAME/PATH");
   const fs::path inside = rest.substr(slash + 1);
   if (const auto given = named_.find(package); given != named_.end()) {
     const fs::path path = fs::path(given->second) / inside;
@@ -72,7 +72,7 @@ std::string PackagePaths::find(const std::string& name) const {
     if (up == up.parent_path()) break;
   }
   throw Error(in_quotes(name) + ": package " + in_quotes(package) +
-              " with that file is not found. Say where it is: --package " + package + "=DIR");
+              " with that file was not found. Pass its folder: --package " + package + "=DIR");
 }
 
 }  // namespace ist

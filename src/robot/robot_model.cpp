@@ -36,23 +36,24 @@ class RobotReader {
   explicit RobotReader(RobotModel& robot) : robot_(robot), xml_(robot.file) {}
 
   void read() {
-    if (xml_[0].name != "robot") xml_.fail(0, "is no robot: a URDF begins with <robot name=\"…\">");
+    if (xml_[0].name != "robot")
+      xml_.fail(0, "is not a robot: a URDF begins with <robot name=\"…\">");
     robot_.name = decoded(xml_.attribute(0, "name"));
     for (std::uint32_t e = xml_[0].first_child; e != kNone; e = xml_[e].next_sibling) {
       if (xml_[e].name == "link") read_link(e);
       if (xml_[e].name == "joint") joints_.push_back(e);
     }
-    if (robot_.links.empty()) xml_.fail(0, "holds no <link>, so there is nothing to do");
+    if (robot_.links.empty()) xml_.fail(0, "contains no <link>. Add at least one");
     require_tree();
   }
 
  private:
   std::string name_of(std::uint32_t element) const {
     const std::string name = decoded(xml_.attribute(element, "name"));
-    if (name.empty()) xml_.fail(element, "has no name. Give it name=\"…\"");
+    if (name.empty()) xml_.fail(element, "has no name. Add name=\"…\"");
     if (std::any_of(name.begin(), name.end(),
                     [](char c) { return static_cast<unsigned char>(c) < ' '; }))
-      xml_.fail(element, "its name holds control characters");
+      xml_.fail(element, "its name contains control characters. Rename it");
     return name;
   }
 
@@ -60,7 +61,7 @@ class RobotReader {
     RobotLink link;
     link.name = name_of(element);
     if (!link_.emplace(link.name, robot_.links.size()).second)
-      xml_.fail(element, "a second link " + in_quotes(link.name) + ". Names must differ");
+      xml_.fail(element, "duplicates the link " + in_quotes(link.name) + ". Rename one of them");
     link.begin = xml_[element].offset;
     link.end = xml_[element].end;
     for (std::uint32_t e = xml_[element].first_child; e != kNone; e = xml_[e].next_sibling) {
@@ -89,7 +90,7 @@ class RobotReader {
     }
     const std::uint32_t geometry = xml_.child(element, "geometry");
     const std::uint32_t shape = geometry == kNone ? kNone : xml_[geometry].first_child;
-    if (shape == kNone) xml_.fail(element, "has no <geometry> with a shape in it");
+    if (shape == kNone) xml_.fail(element, "has no <geometry> with a shape. Add one");
     placed.shape = read_shape(shape);
     return placed;
   }
@@ -97,18 +98,18 @@ class RobotReader {
   Shape read_shape(std::uint32_t e) const {
     const std::string_view kind = xml_[e].name;
     if (kind == "mesh") {
-      MeshShape mesh;
+      LinkMesh mesh;
       mesh.file = decoded(xml_.attribute(e, "filename"));
-      if (mesh.file.empty()) xml_.fail(e, "names no file. Give it filename=\"…\"");
+      if (mesh.file.empty()) xml_.fail(e, "has no file. Add filename=\"…\"");
       mesh.scale = vector(e, "scale", Vector3d::Ones());
       if ((mesh.scale.array() == 0).any())
-        xml_.fail(e, "scale is 0, which makes the mesh flat. Give it scale=\"1 1 1\"");
+        xml_.fail(e, "a scale of 0 makes the mesh flat. Use nonzero factors, e.g. scale=\"1 1 1\"");
       return mesh;
     }
-    if (kind == "box") return BoxShape{0.5 * lengths(e, "size")};
-    if (kind == "cylinder") return CylinderShape{length(e, "radius"), 0.5 * length(e, "length")};
-    if (kind == "sphere") return BallShape{length(e, "radius")};
-    xml_.fail(e, "is a shape that is not known; write mesh, box, cylinder or sphere");
+    if (kind == "box") return LinkBox{0.5 * lengths(e, "size")};
+    if (kind == "cylinder") return LinkCylinder{length(e, "radius"), 0.5 * length(e, "length")};
+    if (kind == "sphere") return LinkBall{length(e, "radius")};
+    xml_.fail(e, "is an unknown shape. Use mesh, box, cylinder or sphere");
   }
 
   /// Finite numbers, as many as there are places.
@@ -124,7 +125,8 @@ class RobotReader {
       const std::string_view word = text.substr(begin, end - begin);
       const std::optional<double> value = parse_real(word);
       if (!value || !std::isfinite(*value) || std::abs(*value) > kLargest)
-        xml_.fail(e, std::string(name) + ": " + in_quotes(word) + " is no finite number");
+        xml_.fail(e, std::string(name) + ": " + in_quotes(word) +
+                         " is not a finite number of at most 1e100");
       if (count < N) values[count] = *value;
       ++count;
       text.remove_prefix(end);
@@ -143,7 +145,7 @@ class RobotReader {
   }
 
   void require_length(std::uint32_t e, std::string_view name, double value) const {
-    if (!(value > 0)) xml_.fail(e, std::string(name) + " is not above 0");
+    if (!(value > 0)) xml_.fail(e, std::string(name) + " must be above 0");
   }
   Vector3d lengths(std::uint32_t e, std::string_view name) const {
     const std::array<double, 3> v = numbers<3>(e, name, xml_.attribute(e, name));
@@ -161,7 +163,7 @@ class RobotReader {
     const std::string name = e == kNone ? "" : decoded(xml_.attribute(e, "link"));
     const auto found = link_.find(name);
     if (found == link_.end())
-      xml_.fail(joint, "its " + std::string(which) + " " + in_quotes(name) + " is no link");
+      xml_.fail(joint, "its " + std::string(which) + " " + in_quotes(name) + " is not a link");
     return found->second;
   }
 
@@ -172,7 +174,8 @@ class RobotReader {
     for (const std::uint32_t joint : joints_) {
       const std::size_t child = end_of(joint, "child");
       if (parent[child] != kRoot)
-        xml_.fail(joint, "link " + in_quotes(robot_.links[child].name) + " has a parent already");
+        xml_.fail(joint, "link " + in_quotes(robot_.links[child].name) +
+                             " already has a parent. A URDF is a tree");
       parent[child] = end_of(joint, "parent");
     }
     std::vector<char> state(parent.size(), 0);  // 1: on the way up, 2: leads to a root
@@ -186,13 +189,13 @@ class RobotReader {
         way.push_back(at);
       }
       if (at != kRoot && state[at] == 1)
-        xml_.fail(0, "its joints go round in a circle through link " +
-                         in_quotes(robot_.links[at].name) + ". A URDF is a tree");
+        xml_.fail(0, "its joints form a cycle through link " + in_quotes(robot_.links[at].name) +
+                         ". A URDF is a tree");
       for (const std::size_t link : way) state[link] = 2;
     }
     if (roots != 1)
       xml_.fail(0, "has " + std::to_string(roots) +
-                       " links without a parent. Join them: a URDF is one tree");
+                       " links without a parent. Connect them by joints: a URDF is one tree");
   }
 
   static constexpr double kLargest = 1e100;

@@ -14,20 +14,20 @@
 
 namespace ist {
 
-struct MeshShape {
+struct LinkMesh {
   std::string file;  ///< as the URDF names it: a path, file://… or package://…
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< not 0; below 0 it mirrors
 };
-struct BoxShape {
+struct LinkBox {
   Eigen::Vector3d half_extents = Eigen::Vector3d::Ones();  ///< [u] > 0
 };
-struct CylinderShape {
+struct LinkCylinder {
   double radius = 1, half_height = 1;  ///< [u] > 0, along z
 };
-struct BallShape {
+struct LinkBall {
   double radius = 1;  ///< [u] > 0
 };
-using Shape = std::variant<MeshShape, BoxShape, CylinderShape, BallShape>;
+using Shape = std::variant<LinkMesh, LinkBox, LinkCylinder, LinkBall>;
 
 /// A shape of a link: x_link = rotation · x + translation.
 struct PlacedShape {

@@ -102,7 +102,7 @@ Setting grid() {
           words,
           "one of " + words,
           "banded",
-          "How space is searched",
+          "Search grid of the packing",
           SettingKind::choice,
           [](BakeSettings& settings, const std::string& text) {
             for (const auto& [word, mode] : kGridModes)
@@ -126,8 +126,8 @@ Setting surface() {
           "all|none|ERROR",
           kSurfaceMeaning,
           "all",
-          "What is kept of the mesh for exact queries: all of its triangles, none, or as few as "
-          "stay within ERROR of it, [u] or, as 0.1%, a share of its longest side",
+          "Surface kept in the asset: all triangles of the mesh, none, or as few as stay within "
+          "ERROR of it. ERROR is in [u] or a share of the longest side, e.g. 0.1%",
           SettingKind::text,
           [](BakeSettings& settings, const std::string& text) {
             const std::optional<SurfaceSettings> surface = parse_surface(text);
@@ -177,61 +177,67 @@ std::vector<Setting> make_settings() {
   return {
       whole("spheres", member_of(&BakeSettings::packing, &PackingSettings::max_spheres), 0,
             kMostSpheres,
-            "Stop at this count, 0 = no limit (with target-error: 200,000, as by default)"),
-      without_default(
-          share("target-error", member_of(&BakeSettings::target, &ErrorTarget::relative_error),
-                {.least = 0, .most = 1, .without_least = true, .without_most = true},
-                "As many spheres as this median error of the volume needs, e.g. 1%; at most "
-                "spheres where given, else 200,000")),
+            "Largest number of spheres; 0 = no limit. With target-error, 0 is the default and "
+            "means 200,000"),
+      without_default(share("target-error",
+                            member_of(&BakeSettings::target, &ErrorTarget::relative_error),
+                            {.least = 0, .most = 1, .without_least = true, .without_most = true},
+                            "Insert spheres until the median error of the overlap volume is at "
+                            "most this, e.g. 1%; the limit is `spheres`, 200,000 by default")),
       without_default(
           share("at-overlap", member_of(&BakeSettings::target, &ErrorTarget::at_overlap),
                 {.least = 1e-4, .most = 0.5},
-                "Overlap, part of the volume, at which target-error is to hold"),
+                "Overlap at which target-error applies, as a share of the solid's volume"),
           "0.1%"),
       share("coverage", member_of(&BakeSettings::packing, &PackingSettings::target_coverage),
-            {.least = 0, .most = 1}, "Stop at this share of the volume"),
+            {.least = 0, .most = 1}, "Stop when the spheres fill this share of the solid's volume"),
       real("min-radius", member_of(&BakeSettings::packing, &PackingSettings::min_radius), from_zero,
-           "[u] Insert nothing smaller"),
+           "[u] Smallest radius of a sphere"),
       real("time", member_of(&BakeSettings::packing, &PackingSettings::time_limit), from_zero,
-           "[s] Stop packing after this, 0 = no limit; with target-error: the whole search"),
+           "[s] Time limit of the packing; 0 = no limit. With target-error it limits the whole "
+           "search"),
       share("epsilon", member_of(&BakeSettings::packing, &PackingSettings::epsilon),
             {.least = 0, .most = 1, .without_most = true},
-            "Every sphere is at least 1 − E times the largest that would fit; 0 = the library's "
-            "own schedule"),
+            "Greedy tolerance: every radius is at least 1 − epsilon times the largest that fits; 0 "
+            "= automatic schedule"),
       surface(),
       flag(
           "surface-only", [](BakeSettings& settings) -> bool& { return settings.surface_only; },
           true,
-          "No spheres: the mesh alone, baked at once, for exact queries; all others need spheres"),
+          "Store the mesh without spheres. Such an asset bakes fast and answers exact queries "
+          "only"),
       grid(),
       whole("grid-resolution", member_of(&PackingSettings::grids, &GridSettings::resolution), 0,
             kMostCells,
-            "Cells on the longest side of the fixed grid (uniform, implicit), or of hybrid's first "
-            "distance grid; 0 = automatic"),
+            "Cells along the longest side of the fixed grid (uniform, implicit) or of the first "
+            "distance grid (hybrid); 0 = automatic"),
       whole("grid-start", member_of(&PackingSettings::grids, &GridSettings::start), 0, kMostCells,
-            "Cells on the longest side of the first grid of prototypes (not banded); 0 = "
+            "Cells along the longest side of the first grid of prototypes (all but banded); 0 = "
             "automatic"),
       whole("grid-refinements", member_of(&PackingSettings::grids, &GridSettings::refinements), -1,
             kMostRefinements,
-            "How often that grid is split in 8 (explicit, implicit, hybrid); -1 = automatic"),
+            "Number of refinements; each splits the cells of that grid into 8 (explicit, implicit, "
+            "hybrid); -1 = automatic"),
       whole("grid-rounds", member_of(&PackingSettings::grids, &GridSettings::rounds_per_level), 0,
             std::numeric_limits<unsigned>::max(),
-            "Rounds before each split (explicit, implicit, hybrid); 0 = automatic"),
+            "Rounds before each refinement (explicit, implicit, hybrid); 0 = automatic"),
       whole("seed", member_of(&BakeSettings::packing, &PackingSettings::seed), 0,
-            std::numeric_limits<std::uint64_t>::max(), "Breaks ties; any value packs equally well"),
+            std::numeric_limits<std::uint64_t>::max(),
+            "Random seed that breaks ties; any value packs equally well"),
       flag("repair", member_of(&BakeSettings::mesh, &MeshSettings::repair), true,
-           "Close an open mesh, say what was done and how sure it is; refused where it is not"),
+           "Close an open mesh and report every change and a confidence in [0, 1]; below 0.6 the "
+           "bake fails"),
       without_default(share(
           "wrap", member_of(&BakeSettings::mesh, &MeshSettings::wrap), {.least = 1e-3, .most = 0.1},
-          "Make a closed surface around a mesh that is not closed, or not by repair; detail "
-          "over the diagonal, e.g. 0.5%")),
+          "Enclose a mesh that is not closed, or that repair cannot close, in a closed surface. "
+          "The value is the detail as a share of the diagonal, e.g. 0.5%")),
       real("scale", member_of(&BakeSettings::mesh, &MeshSettings::scale),
            {.least = 0, .without_least = true},
-           "Every coordinate of the mesh times this: [u] is the unit that comes out"),
+           "Factor for every coordinate of the mesh; [u] is the resulting unit"),
       axis("up-axis", member_of(&BakeSettings::mesh, &MeshSettings::up_axis), "",
-           "Which of the mesh's axes is up; it is turned to world-up. Default: nothing is turned"),
+           "Up axis of the mesh, which is rotated to world-up. Default: no rotation"),
       axis("world-up", member_of(&BakeSettings::mesh, &MeshSettings::world_up), "Z",
-           "Which axis is to be up, with up-axis"),
+           "Up axis of the asset, with up-axis"),
   };
 }
 

@@ -10,6 +10,8 @@
 #include <ist/time_of_impact.h>
 #include <ist/wrench.h>
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -17,6 +19,7 @@
 #include <vector>
 
 #include "c_api/checks.h"
+#include "samples/samples.h"
 #include "support/oracle_assets.h"
 #include "support/random_assets.h"
 #include "support/temp_file.h"
@@ -297,6 +300,72 @@ TEST(CApi, ExactHasTheBitsOfCpp) {
   auto answer = sized<ist_penetration_t>();
   EXPECT_EQ(ist_penetration(&a[0], &b[0], &settings, &scratch, &answer), IST_NOT_HELD);
   EXPECT_TRUE(std::isnan(answer.volume));
+  EXPECT_EQ(ist_workspace_release(&scratch), IST_OK);
+}
+
+/// The segments of each patch form closed curves: where one ends another begins, bit by bit.
+void expect_closed(std::span<const ist_outline_segment_t> segments, std::size_t patches) {
+  std::vector<std::array<double, 4>> from, to;  // the patch first
+  for (const ist_outline_segment_t& segment : segments) {
+    EXPECT_LT(segment.patch, patches);
+    from.push_back({double(segment.patch), segment.from[0], segment.from[1], segment.from[2]});
+    to.push_back({double(segment.patch), segment.to[0], segment.to[1], segment.to[2]});
+  }
+  std::sort(from.begin(), from.end());
+  std::sort(to.begin(), to.end());
+  EXPECT_EQ(from, to);
+}
+
+// The bits of C++, with room for all and for less.
+TEST(CApi, OutlinesHaveTheBitsOfCpp) {
+  const Asset a = bake_surface(close_mesh(make_sample("gear"), "gear"));
+  const Asset b = bake_surface(close_mesh(make_sample("torus_knot"), "knot"));
+  const ist_tree_t tree_a = viewed(a), tree_b = viewed(b);
+  Workspace workspace;
+  ist_workspace_t scratch = {};
+  ASSERT_EQ(ist_workspace_make(0, nullptr, &scratch), IST_OK);
+  std::size_t most = 0;
+  for (int i = 0; i < 12; ++i) {
+    const PlacedTree x{a.view(), {{0.6, 0, 0.8, 0}, {0.1, 0, 0}}, 1};
+    const PlacedTree y{b.view(), {{1, 0, 0, 0}, {0.4 * (i % 4), 0.3 * (i % 3), 0.2}}, 0.7};
+    const ist_placed_tree_t c_x = placed_in_c(tree_a, x), c_y = placed_in_c(tree_b, y);
+    for (const std::size_t room : {0u, 1u, 2u, 32u}) {
+      std::vector<ContactPatch> patches(room);
+      std::vector<OutlineSegment> segments(room == 2 ? 10 : 20000);
+      const OverlapOutline found = overlap_outline(x, y, {}, workspace, patches, segments);
+      std::vector<ist_contact_patch_t> c_room(room);
+      std::vector<ist_outline_segment_t> c_segments(segments.size());
+      ist_contact_patches_t c_patches = {sizeof c_patches, sizeof c_room[0], c_room.data(), room,
+                                         0};
+      ist_outline_t c_outline = {
+          sizeof c_outline, sizeof c_segments[0], c_segments.data(), c_segments.size(), 0, 0};
+      auto whole = sized<ist_penetration_t>();
+      ASSERT_EQ(ist_overlap_outline(&c_x, &c_y, nullptr, &scratch, &c_patches, &c_outline, &whole),
+                IST_OK);
+      expect_same(whole, found.contact.penetration);
+      ASSERT_EQ(c_patches.count, found.contact.count);
+      for (std::size_t k = 0; k < c_patches.count; ++k) expect_same(c_room[k], patches[k]);
+      EXPECT_EQ(c_outline.total, found.segments);
+      ASSERT_EQ(c_outline.count, std::min(found.segments, segments.size()));
+      for (std::size_t k = 0; k < c_outline.count; ++k) {
+        expect_same(c_segments[k].from, segments[k].from);
+        expect_same(c_segments[k].to, segments[k].to);
+        EXPECT_EQ(c_segments[k].patch, segments[k].patch);
+      }
+      if (c_outline.count == c_outline.total)
+        expect_closed(std::span(c_segments).first(c_outline.count), std::max<std::size_t>(room, 1));
+      most = std::max(most, c_patches.count);
+    }
+    // Stopped: no outline.
+    auto settings = sized<ist_contact_settings_t>();
+    settings.max_visits = 1;
+    ist_contact_patches_t none = {sizeof none, sizeof(ist_contact_patch_t), nullptr, 0, 0};
+    ist_outline_t c_outline = {sizeof c_outline, sizeof(ist_outline_segment_t), nullptr, 0, 0, 0};
+    EXPECT_EQ(ist_overlap_outline(&c_x, &c_y, &settings, &scratch, &none, &c_outline, nullptr),
+              IST_BUDGET_EXHAUSTED);
+    EXPECT_EQ(c_outline.total, 0u);
+  }
+  EXPECT_GT(most, 2u);
   EXPECT_EQ(ist_workspace_release(&scratch), IST_OK);
 }
 

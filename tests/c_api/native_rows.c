@@ -151,6 +151,28 @@ static void patches(int i, int print) {
   print_patches(&found);
 }
 
+static void outline(int i, int print) {
+  static ist_outline_segment_t room[1 << 15];
+  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  ist_contact_patch_t patches_room[kMostPatches];
+  ist_contact_patches_t found = {sizeof found, sizeof patches_room[0], patches_room, kMostPatches,
+                                 0};
+  ist_outline_t all = {.size = sizeof all,
+                       .segment_size = sizeof room[0],
+                       .segments = room,
+                       .capacity = sizeof room / sizeof room[0]};
+  ist_penetration_t whole = {.size = sizeof whole};
+  size_t k;
+  ist_overlap_outline(&a, &b, NULL, &workspace, &found, &all, &whole);
+  if (!print) return;
+  print_penetration(&whole);
+  print_patches(&found);
+  for (k = 0; k < all.count; k += 7) {
+    print_doubles(room[k].from, 6);
+    printf(" %u", room[k].patch);
+  }
+}
+
 static void without_protrusion(int i, int print) {
   const ist_placed_tree_t a = placed_a(), b = placed_b(i);
   const ist_penetration_settings_t settings = {.size = sizeof settings, .field = IST_FIELD_NEVER};
@@ -278,6 +300,7 @@ static const struct {
     {"capsule", capsule},
     {"separation", separation},
     {"patches", patches},
+    {"outline", outline},
     {"overlap", overlapping},
     {"lenses", lenses},
     {"without protrusion", without_protrusion},

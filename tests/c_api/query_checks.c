@@ -242,6 +242,67 @@ int patches_answer(scene_t* s) {
   return 0;
 }
 
+int outlines_answer(scene_t* s) {
+  ist_contact_patch_t room[4];
+  ist_outline_segment_t segments[4];
+  ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
+  ist_outline_t outline = {.size = sizeof outline, .segment_size = sizeof segments[0]};
+  ist_penetration_t whole = {.size = sizeof whole};
+  ist_contact_settings_t settings = {.size = sizeof settings};
+  ist_tree_info_t info = {.size = sizeof info};
+  ist_placed_tree_t wrong;
+  ist_status_t wanted = IST_OK;
+  patches.patches = room;
+  patches.capacity = 4;
+  outline.segments = segments;
+  outline.capacity = 4;
+  CHECK(ist_tree_get_info(&s->tree_a, &info) == IST_OK);
+  if (info.mesh_triangles == 0) wanted = IST_NOT_HELD;
+  CHECK(ist_tree_get_info(&s->tree_b, &info) == IST_OK);
+  if (info.mesh_triangles == 0) wanted = IST_NOT_HELD;
+  outline.total = outline.count = patches.count = 9;
+  CHECK(ist_overlap_outline(&s->a, &s->b, NULL, &s->workspace, &patches, &outline, &whole) ==
+        wanted);
+  CHECK(whole.status == wanted);
+  CHECK(wanted == IST_OK || (isnan(whole.volume) && patches.count == 0 && outline.total == 0));
+  CHECK(outline.count == (outline.total < 4 ? outline.total : 4));
+
+  outline.total = outline.count = patches.count = 9;
+  CHECK(ist_overlap_outline(NULL, &s->b, NULL, &s->workspace, &patches, &outline, &whole) ==
+        IST_NULL_POINTER);
+  CHECK(is_empty(&whole, sizeof whole, IST_NULL_POINTER));
+  CHECK(patches.count == 0 && outline.total == 0 && outline.count == 0);
+  CHECK(ist_overlap_outline(&s->a, NULL, NULL, &s->workspace, &patches, &outline, NULL) ==
+        IST_NULL_POINTER);
+  CHECK(ist_overlap_outline(&s->a, &s->b, NULL, NULL, &patches, &outline, NULL) ==
+        IST_NULL_POINTER);
+  CHECK(ist_overlap_outline(&s->a, &s->b, NULL, &s->workspace, NULL, &outline, NULL) ==
+        IST_NULL_POINTER);
+  patches.count = 9;
+  CHECK(ist_overlap_outline(&s->a, &s->b, NULL, &s->workspace, &patches, NULL, &whole) ==
+        IST_NULL_POINTER);
+  CHECK(patches.count == 0 && is_empty(&whole, sizeof whole, IST_NULL_POINTER));
+  wrong = s->b;
+  wrong.pose.t[0] = NAN;
+  CHECK(ist_overlap_outline(&s->a, &wrong, NULL, &s->workspace, &patches, &outline, NULL) ==
+        IST_INVALID_INPUT);
+  settings.measure = 7;
+  CHECK(ist_overlap_outline(&s->a, &s->b, &settings, &s->workspace, &patches, &outline, NULL) ==
+        IST_INVALID_INPUT);
+  outline.segments = NULL;
+  CHECK(ist_overlap_outline(&s->a, &s->b, NULL, &s->workspace, &patches, &outline, NULL) ==
+        IST_NULL_POINTER);
+  outline.capacity = 0;
+  CHECK(ist_overlap_outline(&s->a, &s->b, NULL, &s->workspace, &patches, &outline, NULL) == wanted);
+  outline.segment_size = 8;
+  CHECK(ist_overlap_outline(&s->a, &s->b, NULL, &s->workspace, &patches, &outline, NULL) ==
+        IST_WRONG_SIZE);
+  outline.size = 8;
+  CHECK(ist_overlap_outline(&s->a, &s->b, NULL, &s->workspace, &patches, &outline, NULL) ==
+        IST_WRONG_SIZE);
+  return 0;
+}
+
 /* --- Fields ----------------------------------------------------------------------------------- */
 
 /* The half-space z ≤ offset, as a function. */

@@ -38,6 +38,7 @@ int penetrations_answer(scene_t* s);
 int separations_answer(scene_t* s);
 int overlaps_answer(scene_t* s);
 int patches_answer(scene_t* s);
+int outlines_answer(scene_t* s);
 int fields_answer(scene_t* s);
 int bodies_are_told(scene_t* s);
 int impacts_are_found(scene_t* s);

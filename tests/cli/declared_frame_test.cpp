@@ -36,8 +36,8 @@ TEST_F(DeclaredFrame, TheBakeSaysWhatTheFileDeclares) {
   write("z.dae", collada("<unit meter='0.001'/><up_axis>Z_UP</up_axis>"));
   const Outcome text = bake("z.dae");
   ASSERT_EQ(text.exit_code, 0) << text.err;
-  EXPECT_NE(text.out.find("Z up: the file's axes are kept; 1 unit = 0.001 m: lengths come out in "
-                          "metres"),
+  EXPECT_NE(text.out.find(
+                "Z up: axes are not converted; 1 unit = 0.001 m: lengths are converted to metres"),
             std::string::npos)
       << text.out;
   const nlohmann::json z = nlohmann::json::parse(bake("z.dae", {"--json"}).out);

@@ -141,7 +141,7 @@ TEST_F(FieldQuery, WrongDescriptionsAreUsageErrors) {
 TEST_F(FieldQuery, OnlyTheFirstMayBeAField) {
   for (const char* const a : {"cube.ist", "ball:1"})
     expect_exit(2, {a, "plane:0,0,1,0", "--pose", kAtOrigin},
-                "B: 'plane:0,0,1,0' is a field, and only A can be one: name it first");
+                "B: 'plane:0,0,1,0' is a field, and only A can be a field. Pass it first");
   write("ball:1", read("cube.ist"));
   EXPECT_EQ(asked("cube.ist", "./ball:1", "1,0,0,0,0.5,0,0")["volume"],
             asked("cube.ist", "cube.ist", "1,0,0,0,0.5,0,0")["volume"]);
@@ -153,7 +153,8 @@ TEST_F(FieldQuery, SettingsThatHaveNoEffectAreRefused) {
     more.insert(more.begin(), {a, "cube.ist", "--pose", kAtOrigin});
     expect_exit(2, more, message);
   };
-  refused("ball:1", {"--field", "never"}, "ball:1 is a field and has no spheres");
+  refused("ball:1", {"--field", "never"},
+          "never cannot be combined with ball:1, a field without spheres");
   refused("ball:1", {"--pair-budget", "10"}, "--pair-budget: has no effect where A is a field");
   refused("cube.ist", {"--field", "always", "--measure", "inner"}, "--field: has no effect");
   refused("cube.ist", {"--field", "some"}, "{auto,never,always}");
@@ -161,7 +162,7 @@ TEST_F(FieldQuery, SettingsThatHaveNoEffectAreRefused) {
       ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
       0);
   expect_exit(1, {"cube.ist", "bare.ist", "--pose", kAtOrigin, "--field", "always"},
-              "bare.ist: holds no field");
+              "bare.ist: has no field");
 }
 
 /// Once, and only where the coarser one could have had a surface.
@@ -188,7 +189,7 @@ TEST_F(FieldQuery, WarnsOfSpheresThatDoNotFit) {
   EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--measure", "inner"}), 0u);
   EXPECT_EQ(warnings(asked, {"--scale-b", "5"}), 0u);  // the coarser one has a field
   EXPECT_NE(ist({"query", "bare.ist", "cube.ist", "--pose", kAtOrigin, "--scale-b", "0.1"})
-                .err.find("the spheres of bare.ist are 10 times as coarse"),
+                .err.find("bare.ist: its spheres are 10 times as coarse"),
             std::string::npos);
 }
 

@@ -24,25 +24,28 @@ class FileNames : public CommandLine {
 
 TEST_F(FileNames, NoNameIsRefusedBeforeTheWork) {
   for (const char* command : {"bake", "medial"})
-    expect_usage_error({command, "cube.obj", "-o", ""}, "--output: '' names no file");
-  expect_usage_error({"export", "cube.ist", "-o", ""}, "--output: '' names no file");
-  expect_usage_error({"sample", "cube", "-o", ""}, "--output: '' names no file");
-  expect_usage_error({"bake", "", "-o", "new.ist"}, "MESH: '' names no file");
-  expect_usage_error({"info", ""}, "ASSET: '' names no file");
-  expect_usage_error({"check", "cube.ist", "--mesh", ""}, "--mesh: '' names no file");
-  expect_usage_error({"query", "cube.ist", "", "--pose", "1,0,0,0,0,0,0"}, "B: '' names no file");
-  expect_usage_error({"query", "cube.ist", "cube.ist", "--poses", ""}, "--poses: '' names no file");
+    expect_usage_error({command, "cube.obj", "-o", ""}, "--output: '' is not a file name");
+  expect_usage_error({"export", "cube.ist", "-o", ""}, "--output: '' is not a file name");
+  expect_usage_error({"sample", "cube", "-o", ""}, "--output: '' is not a file name");
+  expect_usage_error({"bake", "", "-o", "new.ist"}, "MESH: '' is not a file name");
+  expect_usage_error({"info", ""}, "ASSET: '' is not a file name");
+  expect_usage_error({"check", "cube.ist", "--mesh", ""}, "--mesh: '' is not a file name");
+  expect_usage_error({"query", "cube.ist", "", "--pose", "1,0,0,0,0,0,0"},
+                     "B: '' is not a file name");
+  expect_usage_error({"query", "cube.ist", "cube.ist", "--poses", ""},
+                     "--poses: '' is not a file name");
 }
 
 TEST_F(FileNames, ADashIsRefusedWhereItStandsForNothing) {
-  expect_usage_error({"bake", "cube.obj", "-o", "-"}, "--output: '-' names no file");
-  expect_usage_error({"sample", "cube", "-o", "-"}, "--output: '-' names no file");
-  expect_usage_error({"bake", "-", "-o", "new.ist"}, "MESH: '-' names no file");
-  expect_usage_error({"medial", "-", "-o", "new.csv"}, "MESH: '-' names no file");
-  expect_usage_error({"info", "-"}, "ASSET: '-' names no file");
-  expect_usage_error({"check", "cube.ist", "--mesh", "-"}, "--mesh: '-' names no file");
-  expect_usage_error({"export", "-", "-o", "new.csv"}, "ASSET: '-' names no file");
-  expect_usage_error({"query", "-", "cube.ist", "--pose", "1,0,0,0,0,0,0"}, "A: '-' names no file");
+  expect_usage_error({"bake", "cube.obj", "-o", "-"}, "--output: '-' is not accepted");
+  expect_usage_error({"sample", "cube", "-o", "-"}, "--output: '-' is not accepted");
+  expect_usage_error({"bake", "-", "-o", "new.ist"}, "MESH: '-' is not accepted");
+  expect_usage_error({"medial", "-", "-o", "new.csv"}, "MESH: '-' is not accepted");
+  expect_usage_error({"info", "-"}, "ASSET: '-' is not accepted");
+  expect_usage_error({"check", "cube.ist", "--mesh", "-"}, "--mesh: '-' is not accepted");
+  expect_usage_error({"export", "-", "-o", "new.csv"}, "ASSET: '-' is not accepted");
+  expect_usage_error({"query", "-", "cube.ist", "--pose", "1,0,0,0,0,0,0"},
+                     "A: '-' is not accepted");
 }
 
 TEST_F(FileNames, ADashIsStandardOutputForTables) {
@@ -68,7 +71,7 @@ TEST_F(FileNames, PosesComeFromStandardInput) {
   EXPECT_EQ(lines_of(outcome.out).size(), 3u);
   const Outcome none = ist({"query", "cube.ist", "cube.ist", "--poses", "-"});
   EXPECT_EQ(none.exit_code, 1);
-  EXPECT_NE(none.err.find("standard input: empty"), std::string::npos) << none.err;
+  EXPECT_NE(none.err.find("standard input: is empty"), std::string::npos) << none.err;
 }
 
 TEST_F(FileNames, EndingsMayBeInCapitals) {

@@ -76,7 +76,7 @@ TEST_F(GridCommands, NoPromiseIsPrintedWhereNoneIsKept) {
     const Outcome bake =
         ist({"bake", "cube.obj", "-o", "g.ist", "--spheres", "10", "--grid", grid});
     EXPECT_EQ(bake.out.find("at least"), std::string::npos) << bake.out;
-    EXPECT_NE(bake.out.find("no promise: grid " + grid), std::string::npos) << bake.out;
+    EXPECT_NE(bake.out.find("no bound: grid " + grid), std::string::npos) << bake.out;
     const auto json = nlohmann::json::parse(ist({"info", "g.ist", "--json"}).out);
     EXPECT_TRUE(json.at("kept_ratio_worst").is_null()) << grid;
     EXPECT_TRUE(json.at("kept_ratio_median").is_null()) << grid;

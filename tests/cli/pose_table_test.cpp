@@ -37,10 +37,10 @@ class PoseTable : public CommandLine {
 };
 
 TEST_F(PoseTable, WithoutRowsItIsAnError) {
-  expect_refused(kPose + "\n", "poses.csv: no row after the header");
-  expect_refused(kPose + "\n\n  \n", "poses.csv: no row after the header");
-  expect_refused("", "poses.csv: empty; there is no header row");
-  expect_refused("\n\n", "poses.csv: empty; there is no header row");
+  expect_refused(kPose + "\n", "poses.csv: no rows after the header");
+  expect_refused(kPose + "\n\n  \n", "poses.csv: no rows after the header");
+  expect_refused("", "poses.csv: is empty; the first row must be the header");
+  expect_refused("\n\n", "poses.csv: is empty; the first row must be the header");
 }
 
 TEST_F(PoseTable, BlankLinesAreNoRows) {
@@ -68,22 +68,22 @@ TEST_F(PoseTable, QuotedFieldsHoldAnything) {
   EXPECT_NE(csv.out.find("\n\"a, b\",0,"), std::string::npos) << csv.out;
   EXPECT_NE(csv.out.find("\n\"say \"\"so\"\"\n\nand so\","), std::string::npos) << csv.out;
 
-  expect_refused(kPose + "\n1,0,0,0,\"3,0,0\n", "poses.csv:2: a quote is opened and never closed");
+  expect_refused(kPose + "\n1,0,0,0,\"3,0,0\n", "poses.csv:2: a closing quote is missing");
   expect_refused(kPose + "\n1,0,0,0,\"3\"4,0,0\n", "poses.csv:2: text after a closing quote");
-  expect_refused(kPose + "\n1,0,0,0,3\"4,0,0\n", "poses.csv:2: a quote within a field");
+  expect_refused(kPose + "\n1,0,0,0,3\"4,0,0\n", "poses.csv:2: a quote inside an unquoted field");
 }
 
 TEST_F(PoseTable, ColumnsThatMayBeMeantAreRefused) {
   const std::string row = "\n2,1,0,0,0,0,0,0\n";
   for (const std::string name : {"Scale_B", "scale_B", "scaleb", "Scale B", "scale-b"})
     expect_refused(name + "," + kPose + row,
-                   "poses.csv:1: column '" + name + "': it must be spelled 'scale_b'");
-  expect_refused("ID," + kPose + row, "column 'ID': it must be spelled 'id'");
-  expect_refused("Class," + kPose + row, "column 'Class': it must be spelled 'class'");
-  expect_refused("TX," + kPose + row, "column 'TX': it must be spelled 'tx'");
-  expect_refused("tx," + kPose + row, "poses.csv:1: column 'tx' is there twice");
+                   "poses.csv:1: column '" + name + "' must be spelled 'scale_b'");
+  expect_refused("ID," + kPose + row, "column 'ID' must be spelled 'id'");
+  expect_refused("Class," + kPose + row, "column 'Class' must be spelled 'class'");
+  expect_refused("TX," + kPose + row, "column 'TX' must be spelled 'tx'");
+  expect_refused("tx," + kPose + row, "poses.csv:1: column 'tx' appears twice");
   expect_refused("scale_b,scale_b," + kPose + "\n1,2,1,0,0,0,0,0,0\n",
-                 "column 'scale_b' is there twice");
+                 "column 'scale_b' appears twice");
   // Others are the user's own affair.
   EXPECT_EQ(answers("mesh,mesh," + kPose + "\n1,2,1,0,0,0,0,0,0\n").size(), 1u);
 }
@@ -91,7 +91,7 @@ TEST_F(PoseTable, ColumnsThatMayBeMeantAreRefused) {
 TEST_F(PoseTable, OneScaleOnly) {
   const std::string table = "scale_b," + kPose + "\n0.5,1,0,0,0,2,0,0\n";
   EXPECT_NEAR(answers(table)[0].at("distance"), 1.25, 0.05);
-  expect_refused(table, "--scale-b: the rows of poses.csv have a scale_b of their own",
+  expect_refused(table, "--scale-b: conflicts with the column scale_b of poses.csv",
                  {"--scale-b", "2"}, 2);
   EXPECT_NEAR(answers(kPose + "\n1,0,0,0,2,0,0\n", {"--scale-b", "0.5"})[0].at("distance"), 1.25,
               0.05);
@@ -100,8 +100,8 @@ TEST_F(PoseTable, OneScaleOnly) {
 TEST_F(PoseTable, ClassesWithoutRowsAreRefused) {
   const std::string table = "class," + kPose + "\npen,1,0,0,0,0.5,0,0\n";
   EXPECT_EQ(answers(table, {"--class", "pen"}).size(), 1u);
-  expect_refused(table, "none of its 1 rows is of class 'pne'", {"--class", "pne"});
-  expect_refused(table, "none of its 1 rows is of class 'pne'",
+  expect_refused(table, "none of the 1 rows has the class 'pne'", {"--class", "pne"});
+  expect_refused(table, "none of the 1 rows has the class 'pne'",
                  {"--class", "pen", "--class", "pne"});
   expect_refused(kPose + "\n1,0,0,0,0,0,0\n", "no column 'class'", {"--class", "pen"});
 }
@@ -117,10 +117,10 @@ TEST_F(PoseTable, WhatIsWrongWithAPoseIsSaid) {
     EXPECT_NE(outcome.out.find("no answer"), std::string::npos) << outcome.out;
     EXPECT_NE(outcome.out.find(message), std::string::npos) << message << "\n" << outcome.out;
   };
-  expect_said("1,0,0,0,0,0,1e70", "tz is 1e+70, too far");
-  expect_said("1,0,0,0,5,-2e61,3", "ty is -2e+61, too far");
-  expect_said("1,0,0,0,0,0,0", "scale_b is 1e+70, too far", {"--scale-b", "1e70"});
-  expect_said("1,0,0,0,0,0,0", "scale_b is 1e-70, too far", {"--scale-b", "1e-70"});
+  expect_said("1,0,0,0,0,0,1e70", "tz is 1e+70, out of range");
+  expect_said("1,0,0,0,5,-2e61,3", "ty is -2e+61, out of range");
+  expect_said("1,0,0,0,0,0,0", "scale_b is 1e+70, out of range", {"--scale-b", "1e70"});
+  expect_said("1,0,0,0,0,0,0", "scale_b is 1e-70, out of range", {"--scale-b", "1e-70"});
   expect_said("1,0,0,0,0,nan,0", "ty is nan");
   expect_said("1,inf,0,0,0,0,0", "qx is inf");
   expect_said("2,0,0,0,0,0,0", "quaternion qw,qx,qy,qz has length 2");

@@ -161,7 +161,7 @@ TEST_F(QueryCommand, JsonHasTheColumnsOfTheCsv) {
 TEST_F(QueryCommand, OnePoseIsAnsweredForAPerson) {
   const Outcome outcome = ist({"query", "cube.ist", "capsule.ist", "--pose", "1,0,0,0,0,0,0"});
   EXPECT_EQ(outcome.exit_code, 0);
-  for (const char* word : {"volume", "sum in", "force/k", "torque/k", "distance", "µs"})
+  for (const char* word : {"volume", "sum range", "force/k", "torque/k", "distance", "µs"})
     EXPECT_NE(outcome.out.find(word), std::string::npos) << word;
   // By spheres nothing is told that could be taken for accuracy.
   EXPECT_EQ(outcome.out.find("bounds"), std::string::npos) << outcome.out;
@@ -214,7 +214,7 @@ TEST_F(ExactQueryCommand, TellsTheTrueVolumeOfSurfacesAlone) {
   const Outcome text = ist(by_text);
   EXPECT_EQ(text.exit_code, 0);
   for (const char* words : {"34.74096031393", "of the true overlap", "bounds",
-                            "the true volume lies in here", "-71.734", "triangle pairs"})
+                            "contain the true volume", "-71.734", "triangle pairs"})
     EXPECT_NE(text.out.find(words), std::string::npos) << words << "\n" << text.out;
   EXPECT_EQ(text.out.find("distance"), std::string::npos) << text.out;
 }
@@ -249,14 +249,14 @@ TEST_F(ExactQueryCommand, SaysWhatIsNotHeld) {
   ASSERT_EQ(
       ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
       0);
-  expect_exit(1, {"cube.ist", "bare.ist", "--pose", "1,0,0,0,0,0,0", "--measure", "exact"},
-              "bare.ist: holds no mesh, which --measure exact asks; bake it again with --surface "
-              "all");
+  expect_exit(
+      1, {"cube.ist", "bare.ist", "--pose", "1,0,0,0,0,0,0", "--measure", "exact"},
+      "bare.ist: has no mesh, which --measure exact needs; bake it again with --surface all");
   for (const char* measure : {"matched", "inner"})
     expect_exit(1, {"cube.ist", "nut.ist", "--pose", "1,0,0,0,0,0,0", "--measure", measure},
-                "nut.ist: is a surface alone, without the spheres that --measure " +
-                    std::string(measure) + " asks; ask with --measure exact");
-  expect_exit(1, {"ball:1", "nut.ist", "--pose", "1,0,0,0,0,0,0"}, "nut.ist: is a surface alone");
+                "nut.ist: has no spheres, which --measure " + std::string(measure) +
+                    " needs; use --measure exact");
+  expect_exit(1, {"ball:1", "nut.ist", "--pose", "1,0,0,0,0,0,0"}, "nut.ist: has no spheres");
 }
 
 TEST_F(ExactQueryCommand, RefusesWhatItDoesNotHeed) {
@@ -269,9 +269,9 @@ TEST_F(ExactQueryCommand, RefusesWhatItDoesNotHeed) {
   refused({"--field", "always"}, "--field: has no effect with --measure exact");
   refused({"--field", "never"}, "--field: has no effect with --measure exact");
   refused({"--pair-budget", "9"}, "--pair-budget: has no effect with --measure exact");
-  refused({"--deadline-us", "9"}, "--deadline-us: does not stop --measure exact");
+  refused({"--deadline-us", "9"}, "--deadline-us: does not limit --measure exact");
   expect_exit(2, {"plane:0,0,1,0", "nut.ist", "--pose", kNutOnBolt, "--measure", "exact"},
-              "exact asks for two meshes, and A is a field: plane:0,0,1,0");
+              "exact needs the meshes of two assets, and A is a field: plane:0,0,1,0");
 }
 
 TEST_F(QueryCommand, WrongInputIsNamed) {

@@ -35,7 +35,7 @@ void walk(const TreeView& view) {
           at<std::uint32_t>(asset, mesh.neighbours)[block.first_neighbour + k] / kWidth;
       sum += at<MeshBlock>(asset, mesh.level[0].blocks)[other].vertices;
     }
-    sum += double{at<MeshShell>(asset, mesh.shells)[block.shell].high[2]};
+    sum += at<MeshShell>(asset, mesh.shells)[block.shell].block;
   }
   for (std::uint32_t k = 1; k < mesh.level_count; ++k)
     for (std::uint32_t i = 0; i < mesh.level[k].count; ++i)

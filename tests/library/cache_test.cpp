@@ -100,7 +100,7 @@ TEST_F(Cache, ADamagedEntryIsFoundAndBakedAgain) {
   const nlohmann::json summary = summary_of("out", {"--cache", "cache"});
   EXPECT_EQ(summary.at("counts").at("baked"), 5);
   for (const nlohmann::json& asset : summary.at("assets"))
-    EXPECT_NE(asset.at("warnings").dump().find("the cache's entry is damaged"), std::string::npos)
+    EXPECT_NE(asset.at("warnings").dump().find("the cache entry is damaged"), std::string::npos)
         << asset;
   EXPECT_TRUE(files_in("out") == files);
   EXPECT_EQ(counts().at("cached"), 5);
@@ -173,7 +173,7 @@ TEST_F(Cache, AFullDiskOfTheCacheIsAWarning) {
   const nlohmann::json summary = summary_of("out", {"--cache", "cache"});
   EXPECT_EQ(summary.at("counts").at("baked"), 5);
   EXPECT_EQ(files_in("out").size(), 5u);
-  EXPECT_NE(summary.dump().find("not kept in the cache: "), std::string::npos) << summary;
+  EXPECT_NE(summary.dump().find("not stored in the cache: "), std::string::npos) << summary;
   EXPECT_NE(summary.dump().find("No space left"), std::string::npos) << summary;
   EXPECT_EQ(cache_of().at("left_over").at("files"), 0);
   const auto files = files_in("out");

@@ -76,13 +76,14 @@ TEST_F(Library, ShardsAreTheWholeAndTheirSummariesToo) {
   };
   expect_error({"shard-1.json", "shard-3.json"}, "shard 2/3 of library.toml is missing");
   expect_error({"shard-1.json", "shard-2.json"}, "shard 3/3 of library.toml is missing");
-  expect_error({"shard-1.json", "shard-2.json", "shard-1.json"}, "is there twice");
+  expect_error({"shard-1.json", "shard-2.json", "shard-1.json"}, "is given twice");
   write("cut.json", read("shard-2.json").substr(0, 100));
-  expect_error({"shard-1.json", "cut.json", "shard-3.json"}, "cut.json: is no summary");
+  expect_error({"shard-1.json", "cut.json", "shard-3.json"}, "cut.json: is not a complete summary");
   nlohmann::json other = nlohmann::json::parse(read("shard-2.json"));
   other["library_hash"] = "0000000000000001";
   write("other.json", other.dump());
-  expect_error({"shard-1.json", "other.json", "shard-3.json"}, "not of the same library");
+  expect_error({"shard-1.json", "other.json", "shard-3.json"},
+               "does not belong to the same library");
 }
 
 TEST_F(Library, AShardIsOneOfSome) {
@@ -111,7 +112,7 @@ TEST_F(Library, OneThatFailsFailsAlone) {
                 "meshes/broken.obj: 3 boundary edges"),
             std::string::npos)
       << summary.at("assets")[0];
-  EXPECT_NE(bake("out").err.find("repair = true closes"), std::string::npos);
+  EXPECT_NE(bake("out").err.find("repair = true tries to close"), std::string::npos);
 }
 
 TEST_F(Library, TargetsAndWarningsAreInTheSummary) {
@@ -174,7 +175,7 @@ TEST_F(Library, OptionsThatBelongElsewhereAreRefused) {
     EXPECT_FALSE(exists("out"));
   };
   expect_usage({"bake", "--manifest", "library.toml", "-o", "out", "--spheres", "5"},
-               "--spheres: is not combined with --manifest");
+               "--spheres: cannot be combined with --manifest");
   expect_usage({"bake", "meshes/cube.obj", "--manifest", "library.toml", "-o", "out"},
                "--manifest: excludes MESH");
   expect_usage({"bake", "-o", "out"}, "MESH");

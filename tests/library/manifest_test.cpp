@@ -29,7 +29,8 @@ class Mistakes : public LibraryFolder {
 };
 
 TEST_F(Mistakes, OfEveryKindAreToldAtOnce) {
-  expect_faults(R"([defaults]
+  expect_faults(
+      R"([defaults]
 sphers = 300
 mesh = "x"
 target_error = "1%"
@@ -70,50 +71,51 @@ up-axis = "W"
 wall-thickness = 3
 min-radius = [1]
 )",
-                {
-                    "2: unknown key 'sphers': did you mean 'spheres'?",
-                    "3: 'mesh' is no default: write it below an [[asset]]",
-                    "4: unknown key 'target_error': did you mean 'target-error'?",
-                    "6: unknown 'thing': a manifest has [defaults] and",
-                    "10: spheres: 'many' is not a whole number from 0 to 2147483647",
-                    "11: coverage: 2 is not a number from 0 to 1, or from 0% to 100%",
-                    "12: repair: 'yes' is not true or false",
-                    "13: name: 'one' cannot stand for the 4 files of 'meshes/*.obj': write {stem}",
-                    "16: mesh: there is no file 'meshes/nix.obj' in .: paths are relative to the",
-                    "19: mesh: no file matches 'meshes/nix*.obj' in .: * stands for",
-                    "21: an asset without a mesh: write mesh = ",
-                    "25: mesh: 'meshes' is a folder: write 'meshes/*.obj' for the files in it",
-                    "26: grid: 'octree' is not one of banded|uniform|explicit|implicit|hybrid",
-                    "30: at-overlap: has no effect without target-error",
-                    "31: name: 'a/b' cannot name a file",
-                    "35: world-up: has no effect without up-axis",
-                    "36: spheres: 2.5 is not a whole number",
-                    "37: scale: 0 is not a finite number above 0",
-                    "38: up-axis: 'W' is not one of X|Y|Z",
-                    "39: unknown key 'wall-thickness': there are mesh, name, spheres, target-error",
-                    "40: min-radius: a list is not a finite number, 0 or more",
-                });
+      {
+          "2: unknown key 'sphers': did you mean 'spheres'?",
+          "3: 'mesh' cannot be a default: set it under an [[asset]]",
+          "4: unknown key 'target_error': did you mean 'target-error'?",
+          "6: unknown 'thing': a manifest has [defaults] and",
+          "10: spheres: 'many' is not a whole number from 0 to 2147483647",
+          "11: coverage: 2 is not a number from 0 to 1, or from 0% to 100%",
+          "12: repair: 'yes' is not true or false",
+          "13: name: 'one' is one name for the 4 files of 'meshes/*.obj': include {stem}",
+          "16: mesh: no file 'meshes/nix.obj' in .: paths are relative to the",
+          "19: mesh: no file matches 'meshes/nix*.obj' in .: * matches any name",
+          "21: an asset without a mesh: add mesh = ",
+          "25: mesh: 'meshes' is a folder: use 'meshes/*.obj' for the files in it",
+          "26: grid: 'octree' is not one of banded|uniform|explicit|implicit|hybrid",
+          "30: at-overlap: has no effect without target-error",
+          "31: name: 'a/b' is not a valid file name",
+          "35: world-up: has no effect without up-axis",
+          "36: spheres: 2.5 is not a whole number",
+          "37: scale: 0 is not a finite number above 0",
+          "38: up-axis: 'W' is not one of X|Y|Z",
+          "39: unknown key 'wall-thickness': known keys are mesh, name, spheres, target-error",
+          "40: min-radius: a list is not a finite number, 0 or more",
+      });
 }
 
 TEST_F(Mistakes, TwoAssetsOfOneNameNameBothLines) {
   expect_faults(
       "[[asset]]\nmesh = \"meshes/*.obj\"\n[[asset]]\nmesh = \"meshes/cube.obj\"\nspheres = 7\n",
-      {"4: name: 'cube' (of meshes/cube.obj) is that of line 2 already (of meshes/cube.obj): give "
+      {"4: name: 'cube' (of meshes/cube.obj) is already used in line 2 (of meshes/cube.obj): give "
        "one of them another name"});
 }
 
 TEST_F(Mistakes, OtherShapesOfAManifest) {
-  expect_faults("", {"1: no [[asset]]: there is nothing to bake"});
+  expect_faults("", {"1: no [[asset]]: add at least one"});
   expect_faults("[asset]\nmesh = \"meshes/cube.obj\"\n",
                 {"1: asset: write [[asset]], with two brackets"});
   expect_faults("defaults = 3\nasset = [ 1 ]\n",
                 {"1: defaults: write [defaults]", "2: asset: write [[asset]]"});
   expect_faults("[[asset]]\nmesh = 3\nname = ''\n",
-                {"2: mesh: 3 is not text in quotes", "3: name: '' is not text in quotes"});
+                {"2: mesh: 3 is not a quoted string", "3: name: '' is not a quoted string"});
   write("meshes/notes.txt", "none");
-  expect_faults("[[asset]]\nmesh = \"meshes/*\"\n",
-                {"2: mesh: 'meshes/notes.txt' has no ending of a mesh format: make the pattern "
-                 "narrower, e.g. *.obj"});
+  expect_faults(
+      "[[asset]]\nmesh = \"meshes/*\"\n",
+      {"2: mesh: 'meshes/notes.txt' does not have the extension of a mesh format: make the pattern "
+       "narrower, e.g. *.obj"});
   // A setting of [defaults] that an asset has no use for.
   expect_faults("[defaults]\ngrid-start = 4\n[[asset]]\nmesh = \"meshes/cube.obj\"\n",
                 {"2: grid-start: has no effect with grid banded, only with uniform, explicit, "
@@ -121,9 +123,9 @@ TEST_F(Mistakes, OtherShapesOfAManifest) {
 }
 
 TEST_F(Mistakes, NoTomlAndNoFile) {
-  expect_faults("[defaults]\nspheres = 3\nspheres = 4\n", {"3: no TOML: "});
-  expect_faults("[defaults]\nspheres 3\n", {"2: no TOML: "});
-  expect_faults("[[asset]]\nmesh = \"\xff\xfe\"\n", {"2: no TOML: "});
+  expect_faults("[defaults]\nspheres = 3\nspheres = 4\n", {"3: not valid TOML: "});
+  expect_faults("[defaults]\nspheres 3\n", {"2: not valid TOML: "});
+  expect_faults("[[asset]]\nmesh = \"\xff\xfe\"\n", {"2: not valid TOML: "});
   const auto expect_error = [&](const std::string& manifest, const std::string& what) {
     const Outcome outcome = bake("out", {}, {}, manifest);
     EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
@@ -169,7 +171,8 @@ TEST_F(Mistakes, AnOutputThatIsNoFolder) {
   write("out.txt", "");
   const Outcome outcome = bake("out.txt");
   EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_NE(outcome.err.find("out.txt: cannot be made a folder for the assets"), std::string::npos)
+  EXPECT_NE(outcome.err.find("out.txt: cannot create this folder for the assets"),
+            std::string::npos)
       << outcome.err;
 }
 

@@ -1,6 +1,9 @@
 """From meshes to assets: arrays in and out, files, errors, progress, Ctrl-C."""
+import copy
 import gc
 import json
+import multiprocessing
+import operator
 import os
 import pickle
 import subprocess
@@ -39,6 +42,40 @@ def test_wrong_arrays_are_named(vertices, triangles, error, text):
         ist.Mesh(vertices, triangles)
 
 
+class Faces:
+    """As trimesh's."""
+
+    def __init__(self, vertices, faces):
+        self.vertices, self.faces = vertices, faces
+
+
+def test_a_bake_takes_a_mesh_in_any_form(tmp_path):
+    mesh = ist.Mesh(*TETRAHEDRON)
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in TETRAHEDRON[0])
+    text += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in TETRAHEDRON[1])
+    (tmp_path / "part.obj").write_text(text)
+    expected = ist.bake(ist.close_mesh(mesh), max_spheres=20).to_bytes()
+    for form in (mesh, TETRAHEDRON, [array.tolist() for array in TETRAHEDRON],
+                 Faces(*TETRAHEDRON), tmp_path / "part.obj", str(tmp_path / "part.obj")):
+        assert ist.bake(form, max_spheres=20).to_bytes() == expected
+    assert np.array_equal(ist.from_trimesh(Faces(*TETRAHEDRON)).triangles, TETRAHEDRON[1])
+    opened = TETRAHEDRON[0], TETRAHEDRON[1][:3]
+    with pytest.raises(ist.OpenMeshError):
+        ist.bake(opened)
+    assert ist.close_mesh(opened, repair=True).report.repaired
+    with pytest.raises(TypeError, match=r"mesh: a dict; wanted a ClosedMesh, .*faces"):
+        ist.bake({})
+    with pytest.raises(ValueError, match=r"vertices: shape \(4, 2\); wanted \(n, 3\)"):
+        ist.bake((np.zeros((4, 2)), TETRAHEDRON[1]))
+
+
+def test_assets_are_copied_and_sent(cube):
+    assert copy.copy(cube) is cube and copy.deepcopy([cube])[0] is cube
+    assert pickle.loads(pickle.dumps(ist.overlap)) is ist.overlap
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply(operator.methodcaller("to_bytes"), [cube]) == cube.to_bytes()
+
+
 def test_views_hold_their_owner_and_are_read_only(cube):
     vertices = ist.close_mesh(ist.Mesh(*TETRAHEDRON)).vertices
     view = memoryview(ist.Asset.from_bytes(cube.to_bytes()))
@@ -61,7 +98,7 @@ def test_a_surface_alone_answers_no_query_of_spheres(cube):
     again = ist.Asset.from_bytes(alone.to_bytes())
     one = [1, 0, 0, 0, 0, 0, 0]
     for query in (ist.penetration, ist.separation):
-        with pytest.raises(ist.Error, match="is a surface alone and holds no spheres"):
+        with pytest.raises(ist.Error, match="is a surface alone, without spheres"):
             query(again, cube, one)
     found = ist.penetration(again, cube, [one])
     assert found.status[0] == ist.QueryStatus.not_held and np.isnan(found.volume[0])
@@ -73,7 +110,7 @@ def test_a_surface_alone_answers_no_query_of_spheres(cube):
 def test_surface_says_what_is_kept(surface, state):
     closed = ist.close_mesh(ist.Mesh(*TETRAHEDRON))
     assert ist.bake(closed, max_spheres=5, surface=surface).mesh_state == state
-    with pytest.raises(ist.Error, match="surface: 'some' is none of"):
+    with pytest.raises(ist.Error, match="surface: 'some' is not one of"):
         ist.bake(closed, max_spheres=5, surface="some")
 
 

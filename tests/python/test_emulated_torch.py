@@ -87,8 +87,8 @@ def test_wrong_scenes_are_named(overlap, solids, random_poses):
     poses = torch.from_numpy(random_poses(6, 0.8))
     for wrong, error, text in [
             (dict(pairs=[(0, 1)]), TypeError, r"pairs\[0\]: \(0, 1\): solids\[1\] is a Field"),
-            (dict(pairs=[(0, 6)]), ValueError, r"pairs\[0\]: \(0, 6\): there are solids 0 to 5"),
-            (dict(pairs=[(2, 2)]), ValueError, "a solid does not meet itself"),
+            (dict(pairs=[(0, 6)]), ValueError, r"pairs\[0\]: \(0, 6\): solids are numbered 0 to 5"),
+            (dict(pairs=[(2, 2)]), ValueError, "a solid cannot be paired with itself"),
             (dict(field="always"), ValueError, "field: on a GPU"),
             (dict(min_radius=1), TypeError, "min_radius: there is no such setting on a GPU"),
             (dict(poses=poses[:5]), ValueError, r"poses: shape \(5, 7\); wanted \(6, 7\)"),

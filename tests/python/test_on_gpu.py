@@ -309,14 +309,14 @@ def test_arguments_that_do_not_fit_are_named(assets, pairs):
         (dict(scale_b=arguments["scale_b"][:5]), ValueError, "scale_b: 5 rows; the arguments before"),
         (dict(asset_a=arguments["asset_a"].long()), TypeError,
          "asset_a: dtype int64; wanted uint32 or int32"),
-        (dict(scale_a=2.0), TypeError, "scale_a: a float is no device array"),
+        (dict(scale_a=2.0), TypeError, "scale_a: a float is not a device array"),
         (dict(pose_b=arguments["pose_b"].clone().requires_grad_()), TypeError, "pose_b: .*grad"),
-        (dict(stream="mine"), TypeError, "stream: a str is no stream"),
+        (dict(stream="mine"), TypeError, "stream: a str is not a stream"),
         (dict(out=[1]), TypeError, "out: wanted a dict of arrays"),
         (dict(out=dict(force=1)), ValueError, "out: 'force'; there are"),
         (dict(out=dict(volume=torch.empty(7).cuda().double())), ValueError, "out.'volume'.: 7 rows"),
         (dict(out=dict(volume=torch.empty(8).cuda())), TypeError, "out.'volume'.: dtype float32"),
-        (dict(out=dict(), wanted=["volume"]), ValueError, "wanted: the arrays of `out`"),
+        (dict(out=dict(), wanted=["volume"]), ValueError, "wanted: excludes `out`"),
     ]
     for wrong, error, text in cases:
         fitting = {n: x.detach() if hasattr(x, "detach") else x for n, x in arguments.items()}
@@ -492,7 +492,7 @@ def test_graphs_capture_batches(assets, pairs):
         for name in COLUMNS:
             assert np.array_equal(out[name].cpu().numpy(), answers[name]), name
     refused = torch.cuda.CUDAGraph()
-    with pytest.raises(ValueError, match="out: None; wanted arrays for the answers, as the stream"):
+    with pytest.raises(ValueError, match="out: None; wanted arrays for the answers, because the stream"):
         with torch.cuda.graph(refused, stream=side):
             ist.gpu.penetration(assets, **arguments, stream=side)
     # What was captured goes on after a larger batch.

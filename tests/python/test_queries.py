@@ -112,7 +112,7 @@ def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
     (dict(measure="outer"), ValueError, "measure: 'outer'; one of 'matched', 'inner', 'exact'"),
     (dict(field="maybe"), ValueError, "field: 'maybe'; one of 'automatic', 'never', 'always'"),
     (dict(a=3), TypeError, "a: a int; wanted an Asset or a Field"),
-    (dict(b=ist.BallField(1)), TypeError, "b: a Field; it stands first"),
+    (dict(b=ist.BallField(1)), TypeError, "b: a Field; only `a`"),
 ])
 def test_wrong_arguments_are_named(gear, knot, arguments, error, text):
     with pytest.raises(error, match=text):
@@ -176,10 +176,10 @@ def test_assets_that_no_cache_holds_are_asked_in_order(knot, random_poses):
 
 @pytest.mark.parametrize("arguments, error, text", [
     (dict(poses=np.zeros((3, 7))), ValueError, r"poses: shape \(3, 7\); wanted \(2, 7\) or \(w, 2, 7\)"),
-    (dict(pairs=[(0, 2)]), ValueError, r"pairs\[0\]: \(0, 2\): there are solids 0 to 1"),
+    (dict(pairs=[(0, 2)]), ValueError, r"pairs\[0\]: \(0, 2\): solids are numbered 0 to 1"),
     (dict(pairs=[(0, 1), (-1, 1)]), ValueError, r"pairs\[1\]: \(-1, 1\)"),
-    (dict(pairs=[(1, 1)]), ValueError, "a solid does not meet itself"),
-    (dict(pairs=[(1, 0)]), ValueError, "the second is a field"),
+    (dict(pairs=[(1, 1)]), ValueError, "a solid cannot be paired with itself"),
+    (dict(pairs=[(1, 0)]), ValueError, "the second is a Field"),
     (dict(pairs=[(0.0, 1.0)]), TypeError, "pairs: dtype float64; wanted int64"),
     (dict(pairs=[0, 1]), ValueError, r"pairs: shape \(2,\)"),
     (dict(scales=[1.0]), ValueError, r"scales: shape \(1,\); wanted \(2,\)"),
@@ -334,9 +334,9 @@ def test_what_is_not_held_is_no_zero(thread, cube, random_poses):
     # Of one pose nobody looks at the status.
     pose = poses[0]
     for text, ask in (
-            ("b: holds no mesh, which measure='exact' asks",
+            ("b: has no mesh, which measure='exact' needs",
              lambda: ist.penetration(cube, bare, pose, measure="exact")),
-            ("a: holds no mesh", lambda: ist.penetration(bare, cube, pose, measure="exact")),
+            ("a: has no mesh", lambda: ist.penetration(bare, cube, pose, measure="exact")),
             ("a: a Field has no mesh",
              lambda: ist.penetration(ist.BallField(1), cube, pose, measure="exact")),
             ("b: is a surface alone", lambda: ist.penetration(bolt, nut, pose)),
@@ -344,6 +344,44 @@ def test_what_is_not_held_is_no_zero(thread, cube, random_poses):
             ("a: is a surface alone", lambda: ist.separation(nut, cube, pose))):
         with pytest.raises(ist.Error, match=text):
             ask()
+
+
+def test_outlines_are_closed_curves(thread, cube):
+    bolt, nut = thread
+    pose = [1, 0, 0, 0, 0, 0, 8.5]
+    found = ist.overlap_outline(bolt, nut, pose, max_patches=16)
+    assert found.segments.shape == (len(found.patch), 2, 3) and len(found.patch) > 1024
+    whole, count = found.contact.penetration, found.contact.count
+    assert whole.volume == ist.penetration(bolt, nut, pose, measure="exact").volume
+    patches = ist.contact_patches(bolt, nut, pose, max_patches=16, measure="exact")
+    assert np.array_equal(found.contact.volume, patches.volume) and count == patches.count > 0
+    for patch in range(count):  # one segment begins where another ends
+        begin, end = np.moveaxis(found.segments[found.patch == patch], 1, 0)
+        assert len(begin) > 2
+        assert np.array_equal(begin[np.lexsort(begin.T)], end[np.lexsort(end.T)])
+        force = 0.5 * np.cross(begin - pose[4:], end - pose[4:]).sum(axis=0)  # Stokes
+        assert force == pytest.approx(found.contact.force[patch], abs=1e-11)
+    assert found.patch.max() == count - 1
+    moved = ist.overlap_outline(bolt, nut, [1, 0, 0, 0, 7, 0, 8.5], poses_a=[1, 0, 0, 0, 7, 0, 0])
+    assert moved.segments - [7, 0, 0] == pytest.approx(found.segments, abs=1e-12)
+    alone = ist.overlap_outline(bolt, nut, pose, max_patches=0)
+    assert np.array_equal(alone.segments, found.segments) and not alone.patch.any()
+    apart = ist.overlap_outline(bolt, nut, AWAY)
+    assert apart.segments.shape == (0, 2, 3) and apart.contact.count == 0
+    stopped = ist.overlap_outline(bolt, nut, pose, max_visits=1)
+    assert stopped.contact.penetration.status == ist.QueryStatus.budget_exhausted
+    assert len(stopped.segments) == 0
+    wrong = ist.overlap_outline(bolt, nut, [np.nan, 0, 0, 0, 0, 0, 0])
+    assert wrong.contact.penetration.status == ist.QueryStatus.invalid_input
+
+    bare = ist.bake(ist.close_mesh(ist.sample_mesh("cube"), name="bare"), max_spheres=50,
+                    surface="none", device="cpu")
+    for text, a, b in (("b: holds no mesh", cube, bare), ("a: holds no mesh", bare, cube),
+                       ("a: a Field has no mesh", ist.BallField(1), cube)):
+        with pytest.raises(ist.Error, match=text):
+            ist.overlap_outline(a, b, IDENTITY)
+    with pytest.raises(ValueError, match="poses: 2 rows; an outline is that of one pose"):
+        ist.overlap_outline(bolt, nut, [pose, pose])
 
 
 def test_impacts_come_in_time(cube):

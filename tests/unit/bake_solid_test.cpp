@@ -145,11 +145,13 @@ TEST(BakeSolid, RefusesFunctionsThatAreNoDistances) {
       EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
     }
   };
-  refused([](const Vector3d& x) { return 2 - 2 * x.norm(); }, box, "times the way near (");
-  refused([](const Vector3d& x) { return x.x() > 0.3 ? 0.1 : -0.1; }, box, "times the way near (");
+  refused([](const Vector3d& x) { return 2 - 2 * x.norm(); }, box,
+          "not 1-Lipschitz: its slope is ");
+  refused([](const Vector3d& x) { return x.x() > 0.3 ? 0.1 : -0.1; }, box,
+          "not 1-Lipschitz: its slope is ");
   refused([](const Vector3d&) { return std::nan(""); }, box, "not finite");
-  refused([](const Vector3d&) { return -0.01; }, box, "nothing of it is seen");
-  refused([](const Vector3d& x) { return 2 - x.norm(); }, box, "out of its bounds");
+  refused([](const Vector3d&) { return -0.01; }, box, "does not resolve it");
+  refused([](const Vector3d& x) { return 2 - x.norm(); }, box, "beyond its bounds");
   refused([](const Vector3d& x) { return 1 - x.norm(); }, {}, "no solid");
   EXPECT_THROW(make_function_solid({}, box), Error);
 }

@@ -178,7 +178,7 @@ TEST(ReadGltf, EveryLieIsCaught) {
        }},
       {"projection",
        [](json& d) { d["nodes"][0]["matrix"] = {1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}; }},
-      {"no whole number of triangles", [](json& d) { d["accessors"][1]["count"] = 11; }},
+      {"not a multiple of three", [](json& d) { d["accessors"][1]["count"] = 11; }},
       {"names vertex 3 of 3", [](json& d) { d["accessors"][0]["count"] = 3; }},
       {"sparse", [](json& d) { d["accessors"][0]["sparse"] = json::object(); }},
       {"mode", [](json& d) { d["meshes"][0]["primitives"][0]["mode"] = 7; }},

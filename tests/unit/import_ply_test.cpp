@@ -133,7 +133,7 @@ TEST(ReadPly, AnyNumberOfNothingIsNothing) {
               .path());
       FAIL();
     } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find("a.ply: no faces"), std::string::npos)
+      EXPECT_NE(std::string(error.what()).find("a.ply: contains no faces"), std::string::npos)
           << error.what();
     }
 }
@@ -143,7 +143,7 @@ TEST(ReadPly, IndicesAreChecked) {
     std::string bytes = binary<float, std::int32_t>(false, "float", "int");
     bytes.replace(bytes.size() - 4, 4,
                   std::string(reinterpret_cast<const char*>(&bad), sizeof bad));
-    EXPECT_NE(error_of(bytes).find("face 3: corner 2 is no vertex"), std::string::npos)
+    EXPECT_NE(error_of(bytes).find("face 3: corner 2 is not a vertex"), std::string::npos)
         << error_of(bytes);
   }
 }

@@ -7,7 +7,11 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <string_view>
+#include <thread>
+#include <vector>
 
+#include <ist/bake.h>
 #include <ist/error.h>
 #include <ist/mesh.h>
 #include <ist/solid.h>
@@ -241,17 +245,22 @@ TEST(Resolve, CrumpledSurfaces) {
   EXPECT_GE(changed, 10u);
 }
 
-TEST(Resolve, SameBytesForAnyNumberOfThreads) {
+/// Balls that overlap.
+ClosedMesh balls(const int count, const int level) {
   std::mt19937_64 random(13);
   std::uniform_real_distribution<double> by(-1, 1);
   TriangleMesh mesh;
-  for (int i = 0; i < 6; ++i) {
-    TriangleMesh ball = testing::icosphere_mesh(2);
+  for (int i = 0; i < count; ++i) {
+    TriangleMesh ball = testing::icosphere_mesh(level);
     const Point shift(by(random), by(random), by(random));
     for (Point& v : ball.vertices) v += shift;
     mesh = joined(mesh, ball);
   }
-  const ClosedMesh closed = close_mesh(mesh, "balls");
+  return close_mesh(mesh, "balls");
+}
+
+TEST(Resolve, SameBytesForAnyNumberOfThreads) {
+  const ClosedMesh closed = balls(6, 2);
   std::optional<ResolvedMesh> first;
   for (const std::size_t threads : {1, 2, 4}) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
@@ -265,6 +274,45 @@ TEST(Resolve, SameBytesForAnyNumberOfThreads) {
     EXPECT_EQ(result.mesh.mesh.triangles, first->mesh.mesh.triangles);
     EXPECT_EQ(result.resolution.counted_twice, first->resolution.counted_twice);
   }
+}
+
+/// A hundred thousand pairs: told of on the caller's thread, and ended where it is told to.
+TEST(Resolve, ReportsAndIsCancelled) {
+  const ClosedMesh closed = balls(40, 3);
+  ASSERT_GT(closed.meeting_pairs->size(), 90'000u);
+  std::vector<double> told;
+  const auto caller = std::this_thread::get_id();
+  const ProgressCallback listen = [&](const Progress& now) {
+    EXPECT_STREQ(now.stage, "resolve");
+    EXPECT_EQ(std::this_thread::get_id(), caller);
+    told.push_back(now.fraction);
+    return true;
+  };
+  const ResolvedMesh result = resolve(closed, listen);
+  EXPECT_EQ(result.resolution.how, How::resolved) << result.resolution.reason;
+  ASSERT_GT(told.size(), 4u);
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+  EXPECT_EQ(told.front(), 0);
+  EXPECT_EQ(told.back(), 1);
+  EXPECT_EQ(result.mesh.mesh.triangles, resolve(closed).mesh.mesh.triangles);
+  std::size_t asked = 0;
+  const ProgressCallback until_third = [&](const Progress&) { return ++asked < 3; };
+  try {
+    resolve(closed, until_third);
+    FAIL() << "not cancelled";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "resolve: cancelled");
+  }
+  EXPECT_EQ(asked, 3u);
+  // So are bakes, however they begin.
+  const ProgressCallback no = [](const Progress& now) {
+    return std::string_view(now.stage) != "resolve";
+  };
+  EXPECT_THROW(bake(closed, {.max_spheres = 100}, no), Error);
+  EXPECT_THROW(bake_surface(closed, {}, 0, no), Error);
+  EXPECT_THROW(bake_to_error(closed, {}, {}, no), Error);
+  // What meets nothing is not looked at.
+  EXPECT_EQ(resolve(close_mesh(testing::cube_mesh(), "cube"), no).resolution.how, How::as_it_is);
 }
 
 TEST(Resolve, WhatItCannotDoItSays) {

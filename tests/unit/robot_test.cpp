@@ -41,41 +41,41 @@ TEST(RobotModel, ReadsShapesAndPoses) {
   EXPECT_EQ(robot.name, "r&s");
   ASSERT_EQ(robot.links.size(), 2u);
   const PlacedShape& box = robot.links[0].collision[0];
-  EXPECT_EQ(std::get<BoxShape>(box.shape).half_extents, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(std::get<LinkBox>(box.shape).half_extents, Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(box.translation, Eigen::Vector3d(1, 2, 3));
   EXPECT_TRUE((box.rotation * Eigen::Vector3d::UnitX()).isApprox(Eigen::Vector3d::UnitY()));
-  EXPECT_EQ(std::get<MeshShape>(robot.links[0].visual[0].shape).scale, Eigen::Vector3d(1, -2, 3));
-  EXPECT_EQ(std::get<CylinderShape>(robot.links[1].collision[0].shape).half_height, 2);
-  EXPECT_EQ(std::get<BallShape>(robot.links[1].collision[1].shape).radius, 0.5);
+  EXPECT_EQ(std::get<LinkMesh>(robot.links[0].visual[0].shape).scale, Eigen::Vector3d(1, -2, 3));
+  EXPECT_EQ(std::get<LinkCylinder>(robot.links[1].collision[0].shape).half_height, 2);
+  EXPECT_EQ(std::get<LinkBall>(robot.links[1].collision[1].shape).radius, 0.5);
 }
 
 TEST(RobotModel, SaysWhatIsWrongAndWhere) {
   const auto expect = [](const std::string& text, const std::string& message) {
     EXPECT_NE(error_of(text).find(message), std::string::npos) << error_of(text);
   };
-  expect("<robot name='r'></robot>", "holds no <link>");
-  expect("<sdf/>", "is no robot");
+  expect("<robot name='r'></robot>", "contains no <link>");
+  expect("<sdf/>", "is not a robot");
   expect("<robot><link name='a'>", "line 1: <link>: the file ends early");
   expect("<!DOCTYPE r [<!ENTITY a 'b'>]><robot/>", "entities are refused");
   expect("<robot><link/></robot>", "has no name");
-  expect("<robot><link name='a'/><link name='a'/></robot>", "a second link");
+  expect("<robot><link name='a'/><link name='a'/></robot>", "duplicates the link");
   expect("<robot><link name='a'/><link name='b'/></robot>", "2 links without a parent");
   expect("<robot><link name='a'/><joint><parent link='a'/><child link='x'/></joint></robot>",
-         "its child \"x\" is no link");
+         "its child \"x\" is not a link");
   expect("<robot><link name='a'/><joint><parent link='a'/><child link='a'/></joint></robot>",
-         "in a circle");
+         "a cycle");
   expect(with_collision(""), "line 3: <collision>: has no <geometry>");
   expect(with_collision("<geometry><blob/></geometry>"), "not known");
   expect(with_collision("<geometry><box size='1 1'/></geometry>"), "has 2 numbers, not 3");
-  expect(with_collision("<geometry><box size='1 1 0'/></geometry>"), "not above 0");
-  expect(with_collision("<geometry><sphere radius='-1'/></geometry>"), "not above 0");
-  expect(with_collision("<geometry><sphere radius='inf'/></geometry>"), "no finite number");
+  expect(with_collision("<geometry><box size='1 1 0'/></geometry>"), "must be above 0");
+  expect(with_collision("<geometry><sphere radius='-1'/></geometry>"), "must be above 0");
+  expect(with_collision("<geometry><sphere radius='inf'/></geometry>"), "not a finite number");
   expect(with_collision("<geometry><sphere/></geometry>"), "has 0 numbers");
   expect(with_collision("<origin xyz='0 nan 0'/><geometry><sphere radius='1'/></geometry>"),
-         "line 4: <origin>: xyz: \"nan\" is no finite number");
-  expect(with_collision("<geometry><mesh/></geometry>"), "names no file");
+         "line 4: <origin>: xyz: \"nan\" is not a finite number");
+  expect(with_collision("<geometry><mesh/></geometry>"), "has no file");
   expect(with_collision("<geometry><mesh filename='m.stl' scale='0 1 1'/></geometry>"),
-         "scale is 0");
+         "a scale of 0");
 }
 
 const char* const kTetrahedron =
@@ -97,7 +97,7 @@ TEST(RobotModel, FindsPackagesAndTurnsMirroredMeshes) {
   EXPECT_THROW(here.find("package://"), Error);
 
   PlacedShape placed;
-  placed.shape = MeshShape{"m.obj", {-2, 1, 3}};
+  placed.shape = LinkMesh{"m.obj", {-2, 1, 3}};
   placed.translation = {5, 0, 0};
   const ClosedMesh closed = close_mesh(mesh_of(placed, here, "r.urdf").mesh, "mirrored");
   EXPECT_EQ(closed.report.flipped_components, 0u);
@@ -107,7 +107,7 @@ TEST(RobotModel, FindsPackagesAndTurnsMirroredMeshes) {
 
 TEST(RobotModel, ACylindersMeshHoldsIt) {
   PlacedShape placed;
-  placed.shape = CylinderShape{2, 3};
+  placed.shape = LinkCylinder{2, 3};
   const ShapeMesh shape = mesh_of(placed, PackagePaths("r.urdf", {}, ""), "r.urdf");
   const auto solid = make_solid(close_mesh(shape.mesh, "cylinder"));
   for (int i = 0; i < 1000; ++i)

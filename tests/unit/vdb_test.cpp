@@ -96,7 +96,7 @@ TEST_F(Vdb, RefusesWhatIsNoLevelSet) {
   inverted->setGridClass(openvdb::GRID_LEVEL_SET);
   inverted->tree().setValue({1, 2, 3}, 0.1f);
   written({inverted});
-  expect_refused("reaches the grid's border");
+  expect_refused("touches the grid's border");
   std::ofstream(path_) << "no vdb at all";
   expect_refused("OpenVDB cannot read it");
   std::remove(path_.c_str());

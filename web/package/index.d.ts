@@ -1,13 +1,13 @@
 // ist in JavaScript: penetration volume, force, torque and distance of solids, from .ist assets.
 //
 // Lengths are [u], the unit of the mesh that was baked. Everything is in double precision.
-// Every function but init() is synchronous, and throws an IstError with one English sentence that
-// says what is wrong and what to do.
+// Every function except init() is synchronous, and throws an IstError with one English sentence:
+// what is wrong, and the remedy.
 // The module keeps its memory in WebAssembly: assets and fields are released by free(), or some time
-// after nothing refers to them any more.
-// A page's workers each have a module of their own and await its init().
+// after the last reference is gone.
+// Each worker of a page has its own module and awaits its init().
 
-/** Where the WebAssembly comes from; the default stands beside the module, or in it (compat). */
+/** Source of the WebAssembly. The default is beside the module, or in it (compat). */
 export interface InitOptions {
   /** Bytes, a compiled module, or an address (or Response) to fetch them from. */
   wasm?:
@@ -20,7 +20,7 @@ export interface InitOptions {
 }
 
 /**
- * Loads the WebAssembly: `await init()` once, before anything else. Called again it waits for the
+ * Loads the WebAssembly: `await init()` once, before anything else. A second call waits for the
  * same module; after a failure it tries again.
  */
 export function init(options?: InitOptions): Promise<void>;
@@ -30,7 +30,7 @@ export function version(): string;
 
 /** Why something could not be done. */
 export class IstError extends Error {
-  /** ist_status_t of <ist/ist.h>, < 0; 0 where the module itself refuses. */
+  /** ist_status_t of <ist/ist.h>, < 0; 0 if the module itself refuses. */
   readonly status: number;
 }
 
@@ -39,7 +39,7 @@ export class IstError extends Error {
 /** Three numbers: an array, a typed array. */
 export type Vector = ArrayLike<number>;
 
-/** x_world = R(rotation) (scale · x) + translation. What is left out is the identity's. */
+/** x_world = R(rotation) (scale · x) + translation. Omitted members are the identity's. */
 export interface Pose {
   /** Quaternion w, x, y, z, within 1e-3 of unit length. (three.js has x, y, z, w.) */
   rotation?: ArrayLike<number>;
@@ -51,12 +51,12 @@ export interface Pose {
 
 // --- Assets -----------------------------------------------------------------------------------------
 
-/** `matched`: spheres whose volumes sum to the solid's. `inner`: spheres inside of it. */
+/** `matched`: spheres whose volumes sum to the solid's. `inner`: spheres inside it. */
 export type SphereMeasure = 'matched' | 'inner';
 
 /**
- * What stands for the solid: a set of spheres, or its mesh. `exact`: the true volume and its
- * gradients, of two assets that both hold their mesh (AssetInfo.meshTriangles > 0).
+ * What represents the solid: a set of spheres, or its mesh. `exact`: the true volume and its
+ * gradients, for two assets that both store their mesh (AssetInfo.meshTriangles > 0).
  */
 export type Measure = SphereMeasure | 'exact';
 
@@ -65,7 +65,7 @@ export interface AssetInfo {
   name: string;
   /** Bytes of the asset. */
   bytes: number;
-  /** Count of spheres; of each of the two sets. 0: a surface alone, of which none can be asked. */
+  /** Count of spheres, of each of the two sets. 0: a surface alone, without spheres to query. */
   spheres: number;
   /** Count of spheres of the matched set at each level of detail, finest first. */
   details: number[];
@@ -73,25 +73,25 @@ export interface AssetInfo {
   volume: number;
   /** [0, 1] share of the solid in inner spheres. */
   coverage: number;
-  /** [u] no matched sphere sticks further out of the solid. */
+  /** [u] bound on how far matched spheres stick out of the solid. */
   protrusion: number;
-  /** The asset holds the solid's surface, so that queries can be exact. */
+  /** The asset stores the solid's surface, which makes queries of spheres exact. */
   hasField: boolean;
   /** [u] the stored surface and the solid's lie within this of each other. */
   fieldError: number;
   /** Count of triangles of the stored surface. */
   fieldTriangles: number;
-  /** What the mesh kept for exact queries is; `unresolved`: none, as it counts volume twice. */
+  /** State of the mesh for exact queries; `unresolved`: none, since it counts volume twice. */
   meshState: 'none' | 'own' | 'resolved' | 'simplified' | 'unresolved';
   /** Count of triangles of that mesh, 0: there is none. */
   meshTriangles: number;
   /** [u] its surface and the solid's lie within this of each other. */
   meshError: number;
-  /** [u³] volume that the mesh as it came counts more than once. */
+  /** [u³] volume that the input mesh counts more than once. */
   countedTwice: number;
 }
 
-/** What holds a solid. */
+/** A box and a ball that contain the solid. */
 export interface Bounds {
   /** [u] corners of the box along the axes. */
   lower: Float64Array;
@@ -101,7 +101,7 @@ export interface Bounds {
   radius: number;
 }
 
-/** Of density 1: times a density, mass and inertia. */
+/** For density 1. Multiply by a density for mass and inertia. */
 export interface MassProperties {
   /** [u³] */
   volume: number;
@@ -111,7 +111,7 @@ export interface MassProperties {
   inertia: Float64Array;
 }
 
-/** Which set of spheres is meant. */
+/** Selects a set of spheres. */
 export interface SphereSet {
   /** Default `matched`. */
   measure?: SphereMeasure;
@@ -123,16 +123,16 @@ export interface SphereSet {
 export interface Surface {
   /** [u] x, y, z of each vertex. */
   positions: Float64Array;
-  /** Three vertices a triangle, counter-clockwise from outside. */
+  /** Three vertices per triangle, counter-clockwise from outside. */
   triangles: Uint32Array;
 }
 
-/** An .ist asset: a solid as spheres, trees over them, and mostly its surface. */
+/** An .ist asset: a solid as spheres, trees over them, and usually its surface and mesh. */
 export class Asset {
   /**
    * Copies and checks an asset's bytes.
-   * `name`: what messages call it, a file's name say.
-   * Throws where the bytes are no asset, an old one or a broken one, and says which.
+   * `name`: for messages, for example the file's name.
+   * Throws if the bytes are not an asset, or one that is old or damaged, and says which.
    */
   static from(bytes: ArrayBufferLike | ArrayBufferView, name?: string): Asset;
 
@@ -148,21 +148,21 @@ export class Asset {
   /** Levels of balls in the tree over a set: level 0 is the spheres, the last has up to sixteen. */
   levelCount(set?: SphereSet): number;
   /**
-   * x, y, z, radius [u] of every ball of a level. Level 0 is the spheres; each ball of level 1 holds
-   * sixteen spheres, and ball i of a higher one those of balls 16 i … 16 i + 15 of the level below.
+   * x, y, z, radius [u] of every ball of a level. Level 0 is the spheres; each ball of level 1 contains
+   * sixteen spheres, and ball i of a higher level those of balls 16 i … 16 i + 15 of the level below.
    */
   level(level: number, set?: SphereSet): Float64Array;
 
   /** The stored surface, within AssetInfo.fieldError of the solid's; null if there is none. */
   surface(): Surface | null;
 
-  /** Gives the memory back. Fields of this asset must not be asked any more. May be called twice. */
+  /** Releases the memory. Fields of this asset must not be used any more. May be called twice. */
   free(): void;
 }
 
 // --- Fields: solids without spheres -----------------------------------------------------------------
 
-/** Stands still as the first solid of a query. Made once, asked often. */
+/** A shape at rest, as the first solid of a query. Make it once and use it often. */
 export class Field {
   /** normal · x ≤ offset. `normal`: unit length within 1e-3, outward. */
   static halfSpace(normal: Vector, offset?: number): Field;
@@ -174,8 +174,8 @@ export class Field {
   /** About the z axis. */
   static cylinder(radius: number, halfHeight: number): Field;
   /**
-   * Terrain under a grid of heights along z, copied: `columns` (x) run fastest, heights[0] stands at
-   * the origin. Beyond its border it goes on level.
+   * Terrain under a grid of heights along z, copied: `columns` (x) run fastest, heights[0] is at
+   * the origin. Beyond its border it continues level.
    */
   static heights(
     heights: Float32Array,
@@ -193,20 +193,20 @@ export class Field {
     spacing: number,
     options?: { origin?: Vector; error?: number },
   ): Field;
-  /** The surface in an asset, without its spheres. */
+  /** The stored surface of an asset, without its spheres. */
   static surface(asset: Asset): Field;
 
-  /** Gives the memory back. May be called twice. */
+  /** Releases the memory. May be called twice. */
   free(): void;
 }
 
 // --- Queries ----------------------------------------------------------------------------------------
 
-// Of a solid A and an asset B at a pose. All that follows is in the world's frame; `poseA` is where A
-// stands. Nothing is left over by a query that writes `into` an answer of an earlier one: a loop that
-// keeps its options and its answer makes no garbage.
+// Queries of a solid A and an asset B at a pose. Answers are in the world frame; `poseA` places A. A
+// query that writes `into` an earlier answer allocates nothing: a loop that keeps its options and its
+// answer makes no garbage.
 
-/** Where a query ends early. A limit that is left out, or 0, is none. */
+/** Limits of a query. Omitted or 0: no limit. */
 export interface Limits {
   /** Count of node pairs opened. */
   maxVisits?: number;
@@ -215,12 +215,12 @@ export interface Limits {
 }
 
 export interface ContactOptions extends Limits {
-  /** Where A stands. Default: the identity. */
+  /** Pose of A. Default: the identity. */
   poseA?: Pose;
-  /** Default `matched`. `exact` heeds maxVisits alone of all limits. */
+  /** Default `matched`. Of the limits `exact` obeys maxVisits only. */
   measure?: Measure;
   /**
-   * Whether the surface that an asset holds is used: where spheres are too coarse for the contact
+   * Whether the stored surface of an asset is used: where spheres are too coarse for the contact
    * (`automatic`, the default), `never`, or `always`.
    */
   field?: 'automatic' | 'never' | 'always';
@@ -231,15 +231,15 @@ export interface ContactOptions extends Limits {
 }
 
 export interface PenetrationOptions extends ContactOptions {
-  /** Count of sphere pairs to spend: a coarser level of detail answers where all are more. */
+  /** Count of sphere pairs to spend: if all are more, a coarser level of detail answers. */
   pairBudget?: number;
-  /** An answer to write over, which is then returned. */
+  /** An answer to overwrite, which is then returned. */
   into?: Penetration;
 }
 
 /**
- * `budget-exhausted`: a limit or the workspace stopped it; volumeMin and volumeMax hold what they
- * hold of a finished answer.
+ * `budget-exhausted`: a limit or the workspace stopped it. volumeMin and volumeMax are still bounds,
+ * as for a finished answer.
  */
 export type Status = 'ok' | 'budget-exhausted';
 
@@ -249,24 +249,24 @@ export interface Penetration {
   /** [u³] */
   volume: number;
   /**
-   * [u³] By `exact` these are bounds: the true volume lies within. By spheres the finished sum lies
-   * within, with its rounding; how near it is to the true volume they do not say.
+   * [u³] With `exact`: bounds of the true volume. By spheres: bounds of the finished sum, with its
+   * rounding; they do not bound the true volume.
    */
   volumeMin: number;
   volumeMax: number;
   /** [u] of the overlap; zero if there is none. */
   centroid: Float64Array;
-  /** [u²] push on B of a pressure of 1: −dV/d(translation of B). A's is the opposite. */
+  /** [u²] force on B of a pressure of 1: −dV/d(translation of B). A's is the opposite. */
   force: Float64Array;
   /** [u³/rad] about B's origin: −dV/d(rotation vector of B). */
   torque: Float64Array;
   /** Node pairs opened. */
   nodeVisits: number;
-  /** Lenses and parts of spheres that were summed; by `exact`: triangles that cross. */
+  /** Lenses and parts of spheres that were summed; with `exact`: crossing triangles. */
   spherePairs: number;
 }
 
-/** Throws for a pose or an option out of range, and for a solid that does not hold what is asked. */
+/** Throws for a pose or an option out of range, and for a solid that lacks what the measure needs. */
 export function penetration(
   a: Asset | Field,
   b: Asset,
@@ -303,13 +303,13 @@ export function separation(
   options?: SeparationOptions,
 ): Separation;
 
-/** A part of a contact that a solver may take for one contact point. */
+/** One point of a contact manifold. */
 export interface ContactPatch {
   /** Names the region: the same in every query of the same two solids. */
   id: number;
   /** [u] */
   centroid: Float64Array;
-  /** Unit, the direction in which the patch pushes B; zero if the area is. */
+  /** Unit, the direction in which the patch pushes B; zero if the area is 0. */
   normal: Float64Array;
   /** [u²] |force|. */
   area: number;
@@ -317,13 +317,13 @@ export interface ContactPatch {
   depth: number;
   /** [u³] */
   volume: number;
-  /** [u²] and [u³/rad] about B's origin: its share of Penetration's. */
+  /** [u²] and [u³/rad] about B's origin: its part of Penetration's. */
   force: Float64Array;
   torque: Float64Array;
 }
 
 export interface ContactPatchesOptions extends ContactOptions {
-  /** Most patches, in [1, 64]. Default 16. */
+  /** Largest number of patches, in [1, 64]. Default 16. */
   maxPatches?: number;
   into?: ContactPatches;
 }
@@ -333,7 +333,7 @@ export interface ContactPatches {
   whole: Penetration;
   /** Patches found. */
   count: number;
-  /** The first `count` are this answer's; room for later ones may follow. */
+  /** The first `count` are this answer's; unused ones may follow. */
   patches: ContactPatch[];
 }
 
@@ -343,6 +343,40 @@ export function contactPatches(
   poseB: Pose,
   options?: ContactPatchesOptions,
 ): ContactPatches;
+
+export interface OverlapOutlineOptions {
+  poseA?: Pose;
+  /** Most patches, in [1, 64]. Default 16. */
+  maxPatches?: number;
+  /** Most node pairs to open. Default 0: no limit. */
+  maxVisits?: number;
+  into?: OverlapOutline;
+}
+
+export interface OverlapOutline {
+  /** The patches by the `exact` measure. */
+  contact: ContactPatches;
+  /** Segments of the outline. 0 where maxVisits stopped it, as contact.whole.status says. */
+  count: number;
+  /**
+   * [u] six numbers a segment: x, y, z of where it begins and of where it ends, in the world. Segments
+   * form closed curves; A's surface inside B lies to the left of each, seen from outside A.
+   */
+  segments: Float64Array;
+  /** Number in contact.patches of the patch that each segment bounds. */
+  patch: Uint32Array;
+}
+
+/**
+ * The curves on which the meshes of two assets cross, by patch. A patch that lies inside the other
+ * solid as a whole has none. Arrays given by `into` may be longer than the answer.
+ */
+export function overlapOutline(
+  a: Asset,
+  b: Asset,
+  poseB: Pose,
+  options?: OverlapOutlineOptions,
+): OverlapOutline;
 
 /** Whether two solids share a point. `yes` and `no` are certain. */
 export function overlap(
@@ -359,35 +393,35 @@ export interface LensesOptions {
   /** Levels of detail of the matched sets. Default 0, the finest. */
   detailA?: number;
   detailB?: number;
-  /** Most lenses to write. Default 4096. */
+  /** Largest number of lenses to write. Default 4096. */
   maxLenses?: number;
   into?: Lenses;
 }
 
 /** The lenses in which spheres of A and B overlap, for drawing. */
 export interface Lenses {
-  /** Lenses there are; those beyond maxLenses are counted only. */
+  /** Number of lenses; those beyond maxLenses are only counted. */
   total: number;
   /** Lenses written. */
   count: number;
   /**
-   * Ten numbers a lens: x, y, z of the middle of its thickness; its axis x, y, z (unit, from A's
+   * Ten numbers per lens: x, y, z of the middle of its thickness; its axis x, y, z (unit, from A's
    * sphere to B's); radius where it is widest [u]; thickness along the axis [u]; index of A's and of
-   * B's sphere in Asset.spheres(). An ellipsoid of that size looks like it.
+   * B's sphere in Asset.spheres(). An ellipsoid of that size resembles it.
    */
   data: Float64Array;
 }
 
 export function lenses(a: Asset, b: Asset, poseB: Pose, options?: LensesOptions): Lenses;
 
-// --- Contacts, looked at once more ------------------------------------------------------------------
+// --- Corrections and wrenches of contacts -----------------------------------------------------------
 
 /**
- * An answer without what protruding spheres add where flat faces meet: nothing is left across a gap
- * of a fifth of a mean sphere radius. Round and deeper contacts come back as they are. For contacts,
- * not where energy must be kept: the force is the volume's gradient but for 15 %.
+ * Removes from an answer what protruding spheres add where flat faces meet: nothing is left across a
+ * gap of a fifth of a mean sphere radius. Round and deeper contacts are unchanged. For contacts, not
+ * where energy must be conserved: the force is the volume's gradient to within 15 %.
  *
- * `whole`: what penetration() answered at these poses by lenses, {field: 'never'}, in the matched
+ * `whole`: the answer of penetration() at these poses by lenses, {field: 'never'}, in the matched
  * measure without a pair budget. `into` may be `whole`.
  */
 export function withoutProtrusion(
@@ -399,8 +433,8 @@ export function withoutProtrusion(
 ): Penetration;
 
 /**
- * The same of patches, in their place: each by its own depth. A patch of which nothing is left stays,
- * with zeros. `found`, `options`: as contactPatches() answered and was asked.
+ * The same for patches, in place: each by its own depth. A patch of which nothing is left stays, with
+ * zeros. `found`, `options`: the answer and the options of contactPatches().
  */
 export function patchesWithoutProtrusion(
   found: ContactPatches,
@@ -410,11 +444,11 @@ export function patchesWithoutProtrusion(
   options?: ContactPatchesOptions,
 ): ContactPatches;
 
-/** Of a pressure of 1. */
+/** For a pressure of 1. */
 export interface Wrench {
   /** [u²] out of the other body. */
   force: Float64Array;
-  /** [u³/rad] about the point that was named. */
+  /** [u³/rad] about the given point. */
   torque: Float64Array;
 }
 
@@ -424,8 +458,8 @@ export interface Wrenches {
 }
 
 /**
- * What a contact, or a patch of it, does to both bodies, about a point of each [u]: their centres of
- * mass, say. Default: the world's origin. `poseB`: of the query.
+ * Force and torque of a contact, or a patch of it, on both bodies, about a point of each [u], usually
+ * its centre of mass. Default: the world's origin. `poseB`: of the query.
  */
 export function wrenches(
   contact: Penetration | ContactPatch,
@@ -434,15 +468,15 @@ export function wrenches(
   into?: Wrenches,
 ): Wrenches;
 
-/** How two assets suit each other, whatever their poses. */
+/** Whether the sizes of two assets suit each other, independent of their poses. */
 export interface PairFit {
-  /** [u] what is finer than that, the spheres do not know. */
+  /** [u] the spheres do not resolve finer features. */
   grainA: number;
   grainB: number;
-  /** ≥ 1, of the coarser grain over the finer. */
+  /** ≥ 1, coarser grain over the finer. */
   ratio: number;
   aIsCoarser: boolean;
-  /** The coarser asset holds its surface. */
+  /** The coarser asset stores its surface. */
   hasSurface: boolean;
   /** Volumes and forces by spheres alone mislead. */
   needsSurface: boolean;
@@ -458,9 +492,9 @@ export function pairFit(
 
 // --- Time of impact ---------------------------------------------------------------------------------
 
-// [T] is a unit of time of the caller's own: a second, a frame.
+// [T] is a unit of time of the caller's: a second, a frame.
 
-/** Of constant velocity: one point goes straight on, and the solid turns about it. */
+/** Constant velocity: one point moves straight, and the solid turns about it. */
 export interface Motion {
   /** [u/T] of `about`, in the world. */
   velocity?: Vector;
@@ -470,7 +504,7 @@ export interface Motion {
   about?: Vector;
 }
 
-/** The motion that leads from one pose to another, the shorter way, in `duration` > 0 [T]. */
+/** The motion from one pose to another, the shorter way, in `duration` > 0 [T]. */
 export function motionBetween(
   from: Pose,
   to: Pose,
@@ -478,47 +512,47 @@ export function motionBetween(
   about?: Vector,
 ): { velocity: Float64Array; angularVelocity: Float64Array; about: Float64Array };
 
-/** A pose that can be written over. */
+/** A pose that can be overwritten. */
 export interface MovedPose {
   rotation: Float64Array;
   translation: Float64Array;
   scale: number;
 }
 
-/** Where a solid is at a time [T] of its motion. */
+/** The pose of a solid after `time` [T] of its motion. */
 export function moved(start: Pose, motion: Motion, time: number, into?: MovedPose): MovedPose;
 
 export interface ImpactOptions extends Limits {
-  /** Where A stands at the start. Default: the identity. */
+  /** Pose of A at the start. Default: the identity. */
   poseA?: Pose;
-  /** Without one it is at rest. */
+  /** Omitted: at rest. */
   motionA?: Motion;
   motionB?: Motion;
-  /** [T] > 0: what happens in [0, duration] is asked. Default 1. */
+  /** [T] > 0: the interval is [0, duration]. Default 1. */
   duration?: number;
   /**
-   * [u] Default 0: a thousandth of the smaller solid's bounding radius, or ten times what fields may
-   * err if that is more.
+   * [u] Default 0: a thousandth of the smaller solid's bounding radius, or ten times the error of
+   * the stored surfaces if that is more.
    */
   tolerance?: number;
   into?: Impact;
 }
 
 export interface Impact {
-  /** `budget-exhausted`: clear up to `time`, which a limit ended. */
+  /** `budget-exhausted`: a limit; clear up to `time`. */
   status: Status;
   /**
    * `none`: clear of each other over the whole interval. `impact`: at `time` no further apart than
-   * the tolerance, and approaching. `unresolved`: clear up to `time`; what comes then cannot be told
-   * so finely. `overlapping`: they meet at the start.
+   * the tolerance, and approaching. `unresolved`: clear up to `time`; a later contact can be neither
+   * shown nor ruled out. `overlapping`: they meet at the start.
    */
   kind: 'none' | 'impact' | 'unresolved' | 'overlapping';
   /** [T] certified: the solids do not touch before. */
   time: number;
-  /** [u] The solids' distance then lies within, certified. */
+  /** [u] Certified bounds of the solids' distance at `time`. */
   distanceMin: number;
   distanceMax: number;
-  /** [u] the nearest points then; others may be nearer by a part of the tolerance. */
+  /** [u] points of A and B at `time`; others may be nearer by a part of the tolerance. */
   pointA: Float64Array;
   pointB: Float64Array;
   /** Unit, from A to B. */
@@ -527,7 +561,7 @@ export interface Impact {
   surfacePairs: number;
 }
 
-/** When two moving solids meet: proven, at any speed. Wants the stored surface of both. */
+/** A proven time up to which two moving solids stay clear. Needs the stored surface of both. */
 export function timeOfImpact(
   a: Asset | Field,
   b: Asset,
@@ -537,7 +571,7 @@ export function timeOfImpact(
 
 // --- Batches ----------------------------------------------------------------------------------------
 
-/** One question among many. */
+/** One pair of a batch. */
 export interface Pair {
   a: Asset | Field;
   b: Asset;
@@ -547,8 +581,8 @@ export interface Pair {
 }
 
 /**
- * `invalid-input`: this pair's pose is out of range; its numbers are 0, and others are answered.
- * `not-held`: a solid of the pair does not hold what the measure asks; its numbers are NaN.
+ * `invalid-input`: this pair's pose is out of range; its numbers are 0. Other pairs are not affected.
+ * `not-held`: a solid of the pair lacks what the measure needs; its numbers are NaN.
  */
 export interface BatchPenetration extends Omit<Penetration, 'status'> {
   status: Status | 'invalid-input' | 'not-held';
@@ -558,15 +592,15 @@ export interface BatchContactPatches extends Omit<ContactPatches, 'whole'> {
 }
 
 /**
- * What penetration() answers for each pair under the same options, in one call. One thread does it:
- * share pairs out among workers to use more.
+ * penetration() of each pair under the same options, in one call, on one thread: divide pairs among
+ * workers to use more.
  */
 export function penetrationBatch(
   pairs: ArrayLike<Pair>,
   options?: Omit<PenetrationOptions, 'poseA' | 'into'> & { into?: BatchPenetration[] },
 ): BatchPenetration[];
 
-/** The same of contactPatches(). */
+/** The same for contactPatches(). */
 export function contactPatchesBatch(
   pairs: ArrayLike<Pair>,
   options?: Omit<ContactPatchesOptions, 'poseA' | 'into'> & { into?: BatchContactPatches[] },

@@ -48,7 +48,8 @@ class HostBackend final : public SolidBackend {
  private:
   const MeshSolid& mesh() const {
     if (solid_.mesh() == nullptr)
-      throw Error("only meshes have grids, cells and covers here, and this solid is none");
+      throw Error(
+          "grids, cells and covers need a mesh, and this solid is not one; use the banded mode");
     return *solid_.mesh();
   }
 

@@ -17,7 +17,8 @@ SpherePacking packed(const Solid& solid, const UnitFrame& frame, const PackingSe
   Stage stage("pack", progress, settings.time_limit);
   if (settings.grid != GridMode::banded) {
     if (mesh == nullptr)
-      throw Error("packing: the grid modes pack meshes; pack other solids with the banded mode");
+      throw Error(
+          "packing: only the banded mode packs solids that are not meshes; set grid to banded");
     return pack_grids(*mesh, settings, stage);
   }
   const PackingLimits limits = packing_limits(solid, frame.scale(), settings);

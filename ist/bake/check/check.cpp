@@ -65,7 +65,7 @@ std::vector<Invariant> check_mesh(const AssetHeader& asset, const ClosedMesh& as
 
 std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid) {
   if ((asset.flags & kFlagPolygonised) == 0)
-    throw Error("solid: the asset was baked from a mesh; check it against that");
+    throw Error("solid: the asset was baked from a mesh; check it against that mesh");
   const Polygonised made = polygonise(solid, asset.polygonise_cells);
   const ClosedMesh closed = close_mesh(made.mesh, "solid");
   const MeshSolid mesh(closed);
@@ -88,7 +88,7 @@ std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigne
 
 std::vector<Invariant> check(const Asset& asset, const Solid& solid, unsigned threads) {
   if (solid.mesh() != nullptr)
-    throw Error("solid: it is a mesh; check the asset against its ClosedMesh");
+    throw Error("solid: this solid is a mesh; check the asset against its ClosedMesh");
   tbb::task_arena arena = thread_arena(threads);
   return arena.execute([&] { return check_solid(asset.view().header(), solid); });
 }

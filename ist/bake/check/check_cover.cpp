@@ -96,7 +96,7 @@ Invariant check_cover(const AssetHeader& asset, const CheckedSolid& surface) {
   }));
   return tally.named("solid covered",
                      "distance of a point of the solid from the nearest cover ball, or the size of "
-                     "a cell that is not proven; −1 where all cells are, unit frame");
+                     "an unproven cell; −1 if all cells are proven, unit frame");
 }
 
 }  // namespace ist

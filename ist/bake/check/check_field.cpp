@@ -30,7 +30,7 @@ Invariant closed(const std::vector<Corners>& triangles) {
   Tally tally;
   std::size_t edge = 0;
   for (const auto& [key, sum] : balance) tally.add(static_cast<double>(std::abs(sum)), edge++);
-  return tally.named("field closed", "runs of an edge one way less those the other way");
+  return tally.named("field closed", "uses of an edge in one direction − uses in the other");
 }
 
 using Polygon = std::vector<Point>;  ///< convex
@@ -211,7 +211,9 @@ Invariant balls(const AssetHeader& asset, const FieldHeader& field,
     }));
     number += count;
   }
-  return sum.named("field balls", "reach of the triangles below a ball − its radius, unit frame");
+  return sum.named(
+      "field balls",
+      "largest distance of the triangles below from a ball's centre − its radius, unit frame");
 }
 
 }  // namespace

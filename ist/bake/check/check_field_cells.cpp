@@ -135,18 +135,20 @@ std::vector<Invariant> check_field_cells(const AssetHeader& asset, const FieldHe
   const FieldTriangles triangles(asset, field);
   const Cells cells(asset, field);
   std::vector<Invariant> out;
-  out.push_back(tally_all(triangles.blocks(), [&](std::size_t b, Tally& tally) {
-                  for (std::uint32_t l = 0; l < triangles.lanes(b); ++l) {
-                    const CheckSurface::Corners t = triangles.corners(b, l);
-                    Listing(field, cells, static_cast<std::uint32_t>(kWidth * b + l), tally)
-                        .look_up({t.begin(), t.end()}, 0);
-                  }
-                }).named("field cells", "1 for a cell that does not list a triangle it meets"));
-  out.push_back(tally_all(cells.places(), [&](std::size_t place, Tally& tally) {
-                  cells.visit(place, [&](const Point& p, bool, bool inside) {
-                    tally.add((of_field.winding(p) % 2 != 0) != inside ? 1 : 0, place);
-                  });
-                }).named("field signs", "1 for a cell whose bit is not its reference point's"));
+  out.push_back(
+      tally_all(triangles.blocks(), [&](std::size_t b, Tally& tally) {
+        for (std::uint32_t l = 0; l < triangles.lanes(b); ++l) {
+          const CheckSurface::Corners t = triangles.corners(b, l);
+          Listing(field, cells, static_cast<std::uint32_t>(kWidth * b + l), tally)
+              .look_up({t.begin(), t.end()}, 0);
+        }
+      }).named("field cells", "1 for a cell that does not list a triangle that intersects it"));
+  out.push_back(
+      tally_all(cells.places(), [&](std::size_t place, Tally& tally) {
+        cells.visit(place, [&](const Point& p, bool, bool inside) {
+          tally.add((of_field.winding(p) % 2 != 0) != inside ? 1 : 0, place);
+        });
+      }).named("field signs", "1 for a cell whose sign is not that of its reference point"));
   out.push_back(
       tally_all(cells.places(),
                 [&](std::size_t place, Tally& tally) {
@@ -157,7 +159,7 @@ std::vector<Invariant> check_field_cells(const AssetHeader& asset, const FieldHe
                   });
                 })
           .named("field inside",
-                 "1 for a cell without surface that lies further than the error from the mesh and "
+                 "1 for a cell without surface that lies farther than the error from the mesh and "
                  "on its other side"));
   return out;
 }

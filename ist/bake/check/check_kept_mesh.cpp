@@ -105,7 +105,8 @@ Invariant same_triangles(const std::vector<Corners>& kept, const std::vector<Cor
   tally.checked = theirs.size();
   tally.violations = missing.size() + added.size();
   tally.worst = static_cast<double>(tally.violations);
-  return tally.named("mesh triangles", "triangles of one, the asset's mesh or the baked, alone");
+  return tally.named("mesh triangles",
+                     "triangles that only the asset's mesh or only the baked mesh has");
 }
 
 /// The baked vertices went no further than `rounding` on their way into the unit frame.
@@ -129,7 +130,8 @@ Invariant rounding(const ClosedMesh& closed, const UnitFrame& frame, double roun
                      }
                      tally.add(off.norm() * (1 - 1e-14) - rounding, v);
                    })
-      .named("mesh rounding", "way of a vertex into the unit frame − the rounding, unit frame");
+      .named("mesh rounding",
+             "displacement of a vertex by the unit frame's rounding − its bound, unit frame");
 }
 
 /// Every edge is run as often one way as the other.
@@ -149,7 +151,7 @@ Invariant closed(const KeptMesh& mesh) {
     for (; i < runs.size() && runs[i].first == runs[first].first; ++i) sum += runs[i].second;
     tally.add(std::abs(sum), first);
   }
-  return tally.named("mesh closed", "runs of an edge one way less those the other way");
+  return tally.named("mesh closed", "uses of an edge in one direction − uses in the other");
 }
 
 /// Triangles of a block hang together.
@@ -162,7 +164,7 @@ Invariant blocks(const KeptMesh& mesh) {
       for (std::size_t k = 1; k < 3; ++k) groups.join(block.corner[0][l], block.corner[k][l]);
     tally.add(static_cast<double>(groups.left()) - 1, b);
   }
-  return tally.named("mesh blocks", "parts of a block that share no vertex, less one");
+  return tally.named("mesh blocks", "parts of a block that share no vertex − 1");
 }
 
 /// A block's list names all blocks that share a vertex with it, and no other.
@@ -188,7 +190,8 @@ Invariant neighbours(const KeptMesh& mesh) {
                                                    named.end(), std::back_inserter(wrong));
                      tally.add(static_cast<double>(wrong.size()), b);
                    })
-      .named("mesh neighbours", "blocks that share a vertex and are not listed, or the reverse");
+      .named("mesh neighbours",
+             "blocks that share a vertex but are not listed, or are listed but share none");
 }
 
 /// How far a block's vertices reach out of a box; ≤ 0: not at all.
@@ -221,30 +224,25 @@ Invariant boxes(const AssetHeader& asset, const KeptMesh& mesh) {
     }));
     number += below;
   }
-  return sum.named("mesh boxes", "how far what is below a box reaches out of it, unit frame");
+  return sum.named("mesh boxes", "protrusion of a box's content out of the box, unit frame");
 }
 
-/// Blocks that hang together are a shell, its box holds them, and there are no others.
-std::vector<Invariant> shells(const KeptMesh& mesh) {
+/// Blocks that hang together are a shell, and there are no others.
+Invariant shells(const KeptMesh& mesh) {
   Groups groups(mesh.header.vertex_count);
   for (std::size_t b = 0; b < mesh.count; ++b)
     for (std::uint32_t i = 1; i < mesh.blocks[b].vertices; ++i)
       groups.join(mesh.blocks[b].vertex[0], mesh.blocks[b].vertex[i]);
-  Tally together, held;
+  Tally together;
   for (std::size_t b = 0; b < mesh.count; ++b) {
-    const MeshShell& shell = mesh.shells[mesh.blocks[b].shell];
+    const MeshBlock& first = mesh.blocks[mesh.shells[mesh.blocks[b].shell].block];
     const bool hang_together =
-        groups.find(mesh.blocks[b].vertex[0]) == groups.find(mesh.blocks[shell.block].vertex[0]);
+        groups.find(mesh.blocks[b].vertex[0]) == groups.find(first.vertex[0]);
     together.add(hang_together ? 0 : 1, b);
-    const Point low(double{shell.low[0]}, double{shell.low[1]}, double{shell.low[2]});
-    const Point high(double{shell.high[0]}, double{shell.high[1]}, double{shell.high[2]});
-    held.add(out_of(mesh, b, low, high), b);
   }
   together.add(std::abs(static_cast<double>(groups.left()) - mesh.header.shell_count), mesh.count);
-  return {together.named("mesh shells",
-                         "1 where a block hangs together with none of its shell; "
-                         "parts that hang together less shells"),
-          held.named("mesh shell boxes", "how far a block reaches out of its shell's, unit frame")};
+  return together.named("mesh shells",
+                        "1 for a block not connected to its shell; connected parts − shells");
 }
 
 }  // namespace
@@ -262,10 +260,9 @@ std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMes
     out = check_near("kept mesh", CheckSurface(mesh.triangles()), boundary_of(surface, bounding),
                      mesh.header.error, bounding);
   }
-  for (Invariant& one :
-       std::vector<Invariant>{closed(mesh), blocks(mesh), neighbours(mesh), boxes(asset, mesh)})
+  for (Invariant& one : std::vector<Invariant>{closed(mesh), blocks(mesh), neighbours(mesh),
+                                               boxes(asset, mesh), shells(mesh)})
     out.push_back(std::move(one));
-  for (Invariant& one : shells(mesh)) out.push_back(std::move(one));
   return out;
 }
 

@@ -146,9 +146,9 @@ std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckSurface
     }
   tight.add((surface.bounds().min() - lower).maxCoeff() - beyond - 1e-12, 0);
   tight.add((upper - surface.bounds().max()).maxCoeff() - beyond - 1e-12, 0);
-  return {box.named("box holds solid", "reach of the surface out of the box, unit frame"),
-          tight.named("box is tight", "room between box and surface, above 1e-12, unit frame"),
-          ball.named("ball holds solid", "reach of the surface out of the ball, unit frame")};
+  return {box.named("box holds solid", "protrusion of the surface out of the box, unit frame"),
+          tight.named("box is tight", "gap between box and surface, above 1e-12, unit frame"),
+          ball.named("ball holds solid", "protrusion of the surface out of the ball, unit frame")};
 }
 
 }  // namespace ist

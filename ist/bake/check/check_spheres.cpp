@@ -113,8 +113,9 @@ std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t det
                   const double depth = surface.winding(c) >= 1 ? d : -d;
                   tally.add(matched[i].r - depth - protrusion - 1e-12, i);
                 })
-          .named(name + "matched protrusion",
-                 "reach of an matched sphere out of the solid − the asset's bound, unit frame"));
+          .named(
+              name + "matched protrusion",
+              "protrusion of a matched sphere out of the solid − the asset's bound, unit frame"));
   return out;
 }
 

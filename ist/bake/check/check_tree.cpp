@@ -184,7 +184,7 @@ std::vector<Invariant> check_tree(const AssetHeader& asset, const TreeHeader& tr
   for (std::size_t lane = 0; lane < n; ++lane) ++seen[check.index(lane)];
   Tally once;
   for (std::size_t i = 0; i < n; ++i) once.add(std::fabs(static_cast<double>(seen[i]) - 1), i);
-  out.push_back(once.named(name + ": each sphere once", "lanes with this insertion index, less 1"));
+  out.push_back(once.named(name + ": each sphere once", "lanes with this insertion index − 1"));
 
   out.push_back(
       tally_all(n, [&](std::size_t lane,
@@ -201,7 +201,8 @@ std::vector<Invariant> check_tree(const AssetHeader& asset, const TreeHeader& tr
                       }
                     })
                     .named(name + ": balls hold spheres",
-                           "reach of a sphere below − radius of the node's ball, unit frame"));
+                           "largest distance of a sphere below from the node's centre − radius of "
+                           "the node's ball, unit frame"));
   if (covers != nullptr)
     out.push_back(check
                       .for_nodes([&](const Node& node, std::size_t, std::size_t number,
@@ -212,7 +213,8 @@ std::vector<Invariant> check_tree(const AssetHeader& asset, const TreeHeader& tr
                                     number);
                       })
                       .named(name + ": cover balls hold covers",
-                             "reach of a cover ball below − the node's cover radius, unit frame"));
+                             "largest distance of a cover ball below from the node's centre − the "
+                             "node's cover radius, unit frame"));
 
   out.push_back(
       check

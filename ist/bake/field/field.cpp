@@ -159,7 +159,7 @@ std::optional<BuiltField> build_field(const MeshSolid& solid, double max_error,
   const bool own = !few;
   Approximation near = own ? own_triangles(surface->arrays()) : *std::move(few);
   if (own && max_error > 0 && !(near.error <= left))
-    throw Error("the surface's error asked for is finer than floats can be; ask for at least " +
+    throw Error("the requested surface error is below float precision; request at least " +
                 std::to_string(near.error / left) + " times as much");
   if (near.mesh.triangles.empty()) return std::nullopt;
   std::optional<FieldHierarchy> hierarchy;

@@ -137,20 +137,17 @@ Box box_of(const MeshArrays& arrays, const MeshBlock& block) {
   return box;
 }
 
-void find_shells(MeshArrays& arrays, const std::vector<Box>& boxes) {
+void find_shells(MeshArrays& arrays) {
   for (MeshBlock& block : arrays.blocks) block.shell = kNone;
   std::vector<std::uint32_t> waiting;
   for (std::uint32_t seed = 0; seed < arrays.blocks.size(); ++seed) {
     if (arrays.blocks[seed].shell != kNone) continue;
     const auto shell = static_cast<std::uint32_t>(arrays.shells.size());
-    Box box;
     waiting = {seed};
     arrays.blocks[seed].shell = shell;
     while (!waiting.empty()) {
-      const std::uint32_t b = waiting.back();
+      const MeshBlock& block = arrays.blocks[waiting.back()];
       waiting.pop_back();
-      box.add(boxes[b]);
-      const MeshBlock& block = arrays.blocks[b];
       for (std::uint32_t k = 0; k < block.neighbours; ++k) {
         const std::uint32_t n = arrays.neighbours[block.first_neighbour + k] / kWidth;
         if (arrays.blocks[n].shell != kNone) continue;
@@ -158,10 +155,7 @@ void find_shells(MeshArrays& arrays, const std::vector<Box>& boxes) {
         waiting.push_back(n);
       }
     }
-    MeshShell& made = arrays.shells.emplace_back();
-    made.block = seed;
-    std::copy_n(box.low, 3, made.low);
-    std::copy_n(box.high, 3, made.high);
+    arrays.shells.push_back({seed});
   }
 }
 
@@ -266,7 +260,7 @@ MeshArrays lay_out_mesh(const MeshView& surface) {
   find_neighbours(arrays);
   std::vector<Box> boxes(arrays.blocks.size());
   for (std::size_t b = 0; b < boxes.size(); ++b) boxes[b] = box_of(arrays, arrays.blocks[b]);
-  find_shells(arrays, boxes);
+  find_shells(arrays);
   lay_out_boxes(std::move(boxes), arrays);
   find_sums(arrays);
   find_slabs(arrays);

@@ -257,8 +257,8 @@ void lay_sign_grid(const MeshView& surface, std::size_t bytes, FieldArrays& arra
     return;
   }
   throw Error(
-      "the surface fills its cells so that no point of them is clear of it; bake without a "
-      "field");
+      "the surface fills its grid cells, so no reference point clear of it exists; bake with "
+      "surface none");
 }
 
 }  // namespace ist

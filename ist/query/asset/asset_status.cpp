@@ -7,7 +7,7 @@ const char* describe(AssetStatus status) noexcept {
     case AssetStatus::ok:
       return "sound";
     case AssetStatus::too_short:
-      return "the file ends early; bake again";
+      return "the file is truncated; bake again";
     case AssetStatus::misaligned:
       return "the bytes do not start on a 64-byte boundary";
     case AssetStatus::not_an_asset:

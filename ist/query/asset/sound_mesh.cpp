@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "query/asset/mesh_parts.h"
 #include "query/asset/sound_values.h"
 
 namespace ist {
@@ -9,24 +10,6 @@ namespace {
 
 constexpr std::uint32_t kMostBlocks = 1u << 4 * (kMaxLevels - 1);
 constexpr float kEmptyLow = static_cast<float>(2 * kMaxExtent);
-
-/// The arrays of a mesh.
-struct MeshParts {
-  MeshParts(const AssetHeader& asset, const MeshHeader& mesh)
-      : header(mesh),
-        count(mesh.level[0].count),
-        blocks(at<MeshBlock>(asset, mesh.level[0].blocks)),
-        neighbours(at<std::uint32_t>(asset, mesh.neighbours)),
-        shells(at<MeshShell>(asset, mesh.shells)),
-        vertices(at<double>(asset, mesh.vertices)) {}
-
-  const MeshHeader& header;
-  std::uint32_t count;
-  const MeshBlock* blocks;
-  const std::uint32_t* neighbours;
-  const MeshShell* shells;
-  const double* vertices;
-};
 
 bool sound_block(const MeshBlock& block, std::uint32_t vertex_count) noexcept {
   if (block.triangles < 1 || block.triangles > kWidth) return false;
@@ -48,17 +31,18 @@ bool sound_blocks(const MeshParts& mesh) noexcept {
   std::uint32_t listed = 0, shells = 0;
   for (std::uint32_t b = 0; b < mesh.count; ++b) {
     const MeshBlock& block = mesh.blocks[b];
-    if (!sound_block(block, mesh.header.vertex_count)) return false;
-    if (block.first_neighbour != listed || block.neighbours > mesh.header.neighbour_count - listed)
+    if (!sound_block(block, mesh.header->vertex_count)) return false;
+    if (block.first_neighbour != listed || block.neighbours > mesh.header->neighbour_count - listed)
       return false;
-    if (block.shell == shells && shells < mesh.header.shell_count && mesh.shells[shells].block == b)
+    if (block.shell == shells && shells < mesh.header->shell_count &&
+        mesh.shells[shells].block == b)
       ++shells;
     if (block.shell >= shells) return false;
     listed += block.neighbours;
     triangles += block.triangles;
   }
-  return triangles == mesh.header.triangle_count && listed == mesh.header.neighbour_count &&
-         shells == mesh.header.shell_count;
+  return triangles == mesh.header->triangle_count && listed == mesh.header->neighbour_count &&
+         shells == mesh.header->shell_count;
 }
 
 bool has_vertex(const MeshBlock& block, std::uint32_t vertex) noexcept {
@@ -102,13 +86,6 @@ bool sound_neighbours(const MeshParts& mesh) noexcept {
 
 bool sound_box(float low, float high) noexcept {
   return is_offset(low) && is_offset(high) && low <= high;
-}
-
-bool sound_shells(const MeshParts& mesh) noexcept {
-  bool sound = true;
-  for (std::uint32_t s = 0; s < mesh.header.shell_count; ++s)
-    for (int k = 0; k < 3; ++k) sound &= sound_box(mesh.shells[s].low[k], mesh.shells[s].high[k]);
-  return sound;
 }
 
 bool sound_boxes(const AssetHeader& asset, const MeshHeader& mesh) noexcept {
@@ -156,7 +133,7 @@ bool sound_sums(const AssetHeader& asset, const MeshHeader& mesh) noexcept {
 
 bool sound_vertices(const MeshParts& mesh) noexcept {
   bool sound = true;
-  for (std::uint64_t i = 0; i < std::uint64_t{3} * mesh.header.vertex_count; ++i)
+  for (std::uint64_t i = 0; i < std::uint64_t{3} * mesh.header->vertex_count; ++i)
     sound &= is_offset(mesh.vertices[i]);
   return sound;
 }
@@ -170,8 +147,8 @@ bool sound_mesh_counts(const MeshHeader& mesh) noexcept {
 bool sound_mesh(const AssetHeader& header, const MeshHeader& mesh) noexcept {
   const MeshParts parts(header, mesh);
   return is_radius(mesh.error) && is_radius(mesh.rounding) && sound_vertices(parts) &&
-         sound_blocks(parts) && sound_neighbours(parts) && sound_shells(parts) &&
-         sound_boxes(header, mesh) && sound_sums(header, mesh);
+         sound_blocks(parts) && sound_neighbours(parts) && sound_boxes(header, mesh) &&
+         sound_sums(header, mesh);
 }
 
 }  // namespace ist

@@ -8,10 +8,9 @@
 
 #include <ist/asset_layout.h>
 
-namespace ist {
+#include "query/asset/shared_constants.h"
 
-/// The level under the leaves: a "node" is a single sphere, block · 16 + lane.
-inline constexpr int kSphereLevel = -1;
+namespace ist {
 
 struct NodeBall {
   double centre[3] = {};

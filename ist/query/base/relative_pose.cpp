@@ -4,11 +4,10 @@
 
 #include <ist/asset_layout.h>
 
+#include "query/asset/shared_constants.h"
+
 namespace ist {
 namespace {
-
-// Beyond this many sizes of A nothing is told apart, and squares of squares stay finite below it.
-constexpr double kFarthest = 1e60;
 
 struct Frame {
   Eigen::Quaterniond rotation;
@@ -57,7 +56,7 @@ std::optional<RelativePose> relative(const std::optional<Frame>& fa,
   const Eigen::Vector3d between = fa->rotation.conjugate() * (fb->translation - fa->translation);
   const Eigen::Vector3d t = (between + (rotation * fb->offset - fa->offset)) / fa->unit;
   const double scale = fb->unit / fa->unit;
-  if (!(t.norm() <= kFarthest) || !(scale <= kFarthest) || !(scale >= 1 / kFarthest))
+  if (!(t.norm() <= kFarthestPose) || !(scale <= kFarthestPose) || !(scale >= 1 / kFarthestPose))
     return std::nullopt;
 
   RelativePose pose;

@@ -83,27 +83,46 @@ std::span<ContactPatch> room_of(const ist_contact_patches_t& given) noexcept {
   return {reinterpret_cast<ContactPatch*>(given.patches), given.capacity};
 }
 
-template <class Solid>
+/// `ask(a, b, settings, workspace, room)` answers ContactPatches. `status`: of other arguments.
+template <class Solid, class Ask>
 ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
                           const ist_contact_settings_t* given, ist_workspace_t* workspace,
-                          ist_contact_patches_t* patches, ist_penetration_t* whole) noexcept {
-  ist_status_t status = whole == nullptr ? IST_OK : check_size(whole);
-  if (status == IST_OK) status = check_size(patches);
-  if (status == IST_OK) {
+                          ist_contact_patches_t* patches, ist_penetration_t* whole,
+                          ist_status_t status, const Ask& ask) noexcept {
+  if (status == IST_OK && whole != nullptr) status = check_size(whole);
+  if (const ist_status_t room = check_size(patches); room == IST_OK)
     patches->count = 0;
-    status = check_room(patches);
-  }
+  else if (status == IST_OK)
+    status = room;
+  if (status == IST_OK) status = check_room(patches);
   ContactSettings settings;
   if (status == IST_OK) status = read(given, settings);
   if (status == IST_OK)
     status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
-      const ContactPatches found = contact_patches(x, y, settings, scratch, room_of(*patches));
+      const ContactPatches found = ask(x, y, settings, scratch, room_of(*patches));
       patches->count = found.count;
       if (whole != nullptr) write(found.penetration, *whole);
       return status_of(found.penetration.status);
     });
   if (whole != nullptr && whole->size == sizeof *whole) noted(status, *whole);
   return status;
+}
+
+template <class Solid>
+ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
+                          const ist_contact_settings_t* given, ist_workspace_t* workspace,
+                          ist_contact_patches_t* patches, ist_penetration_t* whole) noexcept {
+  return find_patches(a, b, given, workspace, patches, whole, IST_OK,
+                      [](auto&&... asked) { return contact_patches(asked...); });
+}
+
+/// Empties the outline.
+ist_status_t check_room(ist_outline_t* given) noexcept {
+  const ist_status_t status = check_size(given);
+  if (status != IST_OK) return status;
+  given->total = given->count = 0;
+  if (given->segment_size != sizeof(ist_outline_segment_t)) return IST_WRONG_SIZE;
+  return given->segments == nullptr && given->capacity > 0 ? IST_NULL_POINTER : IST_OK;
 }
 
 }  // namespace
@@ -188,6 +207,22 @@ ist_status_t ist_field_contact_patches(const ist_placed_field_t* a, const ist_pl
                                        ist_workspace_t* workspace, ist_contact_patches_t* patches,
                                        ist_penetration_t* whole) {
   return find_patches(a, b, settings, workspace, patches, whole);
+}
+
+ist_status_t ist_overlap_outline(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+                                 const ist_contact_settings_t* settings, ist_workspace_t* workspace,
+                                 ist_contact_patches_t* patches, ist_outline_t* outline,
+                                 ist_penetration_t* whole) {
+  const auto ask = [&](const auto& x, const auto& y, const ist::ContactSettings& by,
+                       ist::Workspace& scratch, std::span<ist::ContactPatch> room) {
+    const ist::OverlapOutline found = ist::overlap_outline(
+        x, y, by, scratch, room,
+        {reinterpret_cast<ist::OutlineSegment*>(outline->segments), outline->capacity});
+    outline->total = found.segments;
+    outline->count = std::min(found.segments, outline->capacity);
+    return found.contact;
+  };
+  return find_patches(a, b, settings, workspace, patches, whole, check_room(outline), ask);
 }
 
 ist_status_t ist_patches_without_protrusion(const ist_placed_tree_t* a, const ist_placed_tree_t* b,

@@ -8,24 +8,26 @@ const char* ist_describe(ist_status_t status) {
     case IST_OK:
       return "done";
     case IST_BUDGET_EXHAUSTED:
-      return "a limit or the workspace's capacity stopped the query: what it says of the finished "
-             "answer still holds";
+      return "a limit or the workspace's capacity stopped the query before it finished; its bounds "
+             "still hold";
     case IST_INVALID_INPUT:
-      return "a pose, a scale, a field's number or a setting is out of range";
+      return "a pose, a scale, a number of a field or a setting is out of range";
     case IST_NOT_HELD:
-      return "a solid does not hold what is asked: the exact measure wants the mesh of two assets "
-             "(bake one with all of its surface), all else wants spheres (bake them)";
+      return "an asset lacks data that the query needs: the exact measure needs the kept meshes of "
+             "two assets (bake them with surface all), every other query needs spheres (bake "
+             "without surface-only)";
     case IST_NULL_POINTER:
-      return "a pointer that must not be null is";
+      return "a required pointer is null";
     case IST_WRONG_SIZE:
-      return "the size of a struct is not known to this library: set it to sizeof, and see whether "
-             "headers and library are of one version";
+      return "this library does not know the size of a struct: set it to sizeof, and use headers "
+             "and library of one version";
     case IST_WRONG_VERSION:
-      return "this library does not serve programs compiled with these headers";
+      return "this library does not support programs compiled with these headers; use headers and "
+             "library of one version";
     case IST_NO_HANDLE:
-      return "a tree or workspace is empty, released, or was never made";
+      return "a tree or workspace is empty, released or was never created";
     case IST_NO_MEMORY:
-      return "no memory";
+      return "out of memory";
     case IST_CANNOT_READ:
       return "the file cannot be read";
     case IST_TOO_SHORT:
@@ -41,9 +43,9 @@ const char* ist_describe(ist_status_t status) {
     case IST_CORRUPT_LAYOUT:
       return describe(AssetStatus::corrupt_layout);
     case IST_NO_DURATION:
-      return "ist_impact_settings_t::duration is 0 and asks about no time: set it";
+      return "ist_impact_settings_t::duration is 0; set the duration of the motion";
     default:
-      return "no status of this library";
+      return "unknown status";
   }
 }
 

@@ -110,4 +110,11 @@ static_assert(offsetof(ist_contact_patch_t, volume) == offsetof(ContactPatch, vo
 static_assert(offsetof(ist_contact_patch_t, force) == offsetof(ContactPatch, force));
 static_assert(offsetof(ist_contact_patch_t, torque) == offsetof(ContactPatch, torque));
 
+// So are segments of outlines.
+static_assert(std::is_standard_layout_v<OutlineSegment>);
+static_assert(sizeof(ist_outline_segment_t) == sizeof(OutlineSegment));
+static_assert(offsetof(ist_outline_segment_t, from) == offsetof(OutlineSegment, from));
+static_assert(offsetof(ist_outline_segment_t, to) == offsetof(OutlineSegment, to));
+static_assert(offsetof(ist_outline_segment_t, patch) == offsetof(OutlineSegment, patch));
+
 }  // namespace ist::c_api

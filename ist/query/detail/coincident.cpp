@@ -4,18 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "query/asset/shared_constants.h"
 #include "query/base/smooth_step.h"
 
 namespace ist {
-namespace {
-
-// Mean radii of way within which unlike levels answer alone, and from which on like ones do. Equal
-// spheres forget each other within half a radius; the rest is room to change over gently.
-constexpr double kAlone = 0.4;
-constexpr double kApart = 1.6;
-
-}  // namespace
-
 CoincidenceWeight coincidence_weight(const TreeHeader& tree, const Similarity& a_from_b) noexcept {
   const double(&m)[9] = a_from_b.m;
   const double centre[3] = {tree.root[0], tree.root[1], tree.root[2]};
@@ -31,12 +23,12 @@ CoincidenceWeight coincidence_weight(const TreeHeader& tree, const Similarity& a
   const double square = way.squaredNorm() + spread * std::max(turned, 0.0);
   const double radius = tree.mean_radius;
   CoincidenceWeight result;
-  if (!(square < (kApart * kApart) * (radius * radius))) return result;
+  if (!(square < (kCopyApart * kCopyApart) * (radius * radius))) return result;
   const double distance = std::sqrt(square);
-  const double t = std::min((kApart - distance / radius) / (kApart - kAlone), 1.0);
+  const double t = std::min((kCopyApart - distance / radius) / (kCopyApart - kCopyAlone), 1.0);
   result.weight = smooth_step(t);
   if (t == 1) return result;
-  const double slope = -6 * t * (1 - t) / ((kApart - kAlone) * radius) / distance;
+  const double slope = -6 * t * (1 - t) / ((kCopyApart - kCopyAlone) * radius) / distance;
   result.slope.by_translation = slope * way;
   result.slope.by_rotation =
       slope * (lever.cross(way) - spread * Eigen::Vector3d(m[5] - m[7], m[6] - m[2], m[1] - m[3]));

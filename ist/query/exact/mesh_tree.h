@@ -4,17 +4,15 @@
 #include <cmath>
 #include <cstdint>
 
-#include <ist/asset_layout.h>
-#include <ist/tree_view.h>
-
+#include "query/asset/mesh_parts.h"
 #include "query/exact/orientation.h"
 
 namespace ist {
 
-/// The mesh of an asset with its offsets resolved, unit frame.
+/// The mesh of an asset with its tree of boxes, unit frame.
 ///
 /// Lane l of box block b at level k + 1 is the box around block 16 b + l of level k.
-struct MeshTree {
+struct MeshTree : MeshParts {
   struct Level {
     const BoxBlock* boxes = nullptr;  ///< level 0 has none
     const BoxSums* sums = nullptr;
@@ -23,13 +21,9 @@ struct MeshTree {
   };
 
   MeshTree(const AssetHeader& asset, const MeshHeader& mesh) noexcept
-      : header(&mesh),
+      : MeshParts(asset, mesh),
         hash(asset.content_hash),
-        top(static_cast<int>(mesh.level_count) - 1),
-        blocks(at<MeshBlock>(asset, mesh.level[0].blocks)),
-        vertices(at<double>(asset, mesh.vertices)),
-        shells(at<MeshShell>(asset, mesh.shells)),
-        neighbours(at<std::uint32_t>(asset, mesh.neighbours)) {
+        top(static_cast<int>(mesh.level_count) - 1) {
     level[0].count = mesh.level[0].count;
     for (int k = 1; k <= top; ++k) {
       const LevelHeader& from = mesh.level[k];
@@ -54,13 +48,8 @@ struct MeshTree {
     return extent;
   }
 
-  const MeshHeader* header;
   std::uint64_t hash;  ///< of the asset
   int top;             ///< the level of one box block, ≥ 1
-  const MeshBlock* blocks;
-  const double* vertices;
-  const MeshShell* shells;
-  const std::uint32_t* neighbours;
   Level level[kMaxLevels];
 };
 

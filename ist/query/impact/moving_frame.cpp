@@ -6,14 +6,13 @@
 
 #include <ist/asset_layout.h>
 
+#include "query/asset/shared_constants.h"
+
 namespace ist {
 namespace {
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-
-// As far as poses may be apart, in sizes of A.
-constexpr double kFarthest = 1e60;
 
 // Of a straight way: a product, a sum and the rounded time.
 constexpr double kWayRounding = 6 * 0x1p-53;
@@ -96,7 +95,7 @@ std::optional<MovingFrame> frame_of(const Pose& pose_a, double scale_a, const As
   const double farthest =
       frame.between.norm() + frame.speed * duration + frame.a.reach + frame.b.reach;
   const double angles = (frame.a.spin_speed + frame.b.spin_speed) * duration;
-  if (!(farthest <= kFarthest) || !(angles <= kFarthest)) return std::nullopt;
+  if (!(farthest <= kFarthestPose) || !(angles <= kFarthestPose)) return std::nullopt;
   return frame;
 }
 

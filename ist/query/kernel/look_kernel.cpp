@@ -6,6 +6,7 @@
 #define HWY_TARGET_INCLUDE "query/kernel/look_kernel.cpp"
 #include <hwy/foreach_target.h>
 
+#include "query/asset/shared_constants.h"
 #include "query/kernel/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -13,11 +14,6 @@ namespace ist::HWY_NAMESPACE {
 
 inline constexpr std::size_t kMostBalls = 4 * kWidth;
 inline constexpr double kSphere = 4 * std::numbers::pi / 3;
-
-// The balls of nodes lie within so many root radii of the root's middle: each holds spheres of the
-// root's ball, and is itself no larger than that, or little.
-inline constexpr double kPokeOut = 3;
-inline constexpr double kSpeck = 1e-9;
 
 /// Evenly filled balls, in A's axes about the middle of B's root: so floats tell B's balls apart.
 struct alignas(64) FilledBalls {

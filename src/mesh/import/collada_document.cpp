@@ -24,7 +24,7 @@ ColladaDocument::Index ColladaDocument::target(const Index element,
     xml_.fail(element, "refers to " + in_quotes(url) + ", not to an element of this file");
   const auto found = by_id_.find(url.substr(1));
   if (found == by_id_.end() || xml_[found->second].name != name)
-    xml_.fail(element, "refers to " + in_quotes(url) + ", which is no " + std::string(name) +
+    xml_.fail(element, "refers to " + in_quotes(url) + ", which is not a " + std::string(name) +
                            " of this file");
   return found->second;
 }
@@ -36,7 +36,8 @@ std::uint64_t ColladaDocument::whole(const Index element, const std::string_view
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size())
-    xml_.fail(element, "its " + std::string(attribute) + " is no whole number: " + in_quotes(text));
+    xml_.fail(element,
+              "its " + std::string(attribute) + " is not a whole number: " + in_quotes(text));
   return value;
 }
 
@@ -65,8 +66,8 @@ std::vector<double> ColladaDocument::reals(const Index element) const {
 std::vector<double> ColladaDocument::reals(const Index element, const std::size_t count) const {
   std::vector<double> values = reals(element);
   if (values.size() != count)
-    xml_.fail(element, std::to_string(values.size()) + " numbers, where " + std::to_string(count) +
-                           " belong");
+    xml_.fail(element,
+              std::to_string(values.size()) + " numbers instead of " + std::to_string(count));
   return values;
 }
 

@@ -49,7 +49,7 @@ class GeometryReader {
         document_.reals(document_.target(accessor, "source", "float_array"));
     numbers_read_ += values.size();
     if (numbers_read_ > document_.most())
-      xml_.fail(vertices, "the same array is read again and again. Export each mesh once");
+      xml_.fail(vertices, "the same array is used too often. Export each mesh once");
 
     std::array<std::uint64_t, 3> at{0, 1, 2};
     std::uint64_t place = 0, parameters = 0;
@@ -59,7 +59,7 @@ class GeometryReader {
       for (std::size_t k = 0; k < 3; ++k)
         if (name == std::string_view("XYZ").substr(k, 1)) at[k] = place, ++parameters;
     }
-    if (parameters != 0 && parameters != 3) xml_.fail(accessor, "names not just one X, Y and Z");
+    if (parameters != 0 && parameters != 3) xml_.fail(accessor, "must name X, Y and Z once each");
     const std::uint64_t count = document_.whole(accessor, "count", std::nullopt);
     const std::uint64_t stride = document_.whole(accessor, "stride", 1),
                         offset = document_.whole(accessor, "offset", 0);
@@ -123,7 +123,7 @@ class GeometryReader {
       const std::size_t n = p.size();
       if (name == "triangles") {
         if (n % 3 != 0)
-          xml_.fail(child, std::to_string(n) + " corners are no whole number of triangles");
+          xml_.fail(child, std::to_string(n) + " corners are not a multiple of three");
         for (std::size_t i = 0; i < n; i += 3) mesh_.add_triangle(p[i], p[i + 1], p[i + 2]);
         faces += n / 3;
       } else if (name == "tristrips") {
@@ -168,7 +168,7 @@ class GeometryReader {
     result.reserve(all.size() / corners.width);
     for (std::size_t i = corners.vertex_at; i < all.size(); i += corners.width) {
       if (all[i] >= corners.vertex_count)
-        xml_.fail(p, "names vertex " + std::to_string(all[i]) + " of " +
+        xml_.fail(p, "refers to vertex " + std::to_string(all[i]) + " of " +
                          std::to_string(corners.vertex_count) + ", counted from 0");
       result.push_back(static_cast<Index>(corners.first + all[i]));
     }

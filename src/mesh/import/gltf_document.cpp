@@ -133,7 +133,7 @@ std::string_view GltfDocument::parse_container() {
   constexpr std::size_t kHeader = 12, kChunkHeader = 8;
   constexpr std::uint32_t kJson = 0x4e4f534a, kBinary = 0x004e4942;
   if (bytes.size() < kHeader + kChunkHeader)
-    fail("the file ends early: " + std::to_string(bytes.size()) + " bytes hold no glTF");
+    fail("the file ends early: " + std::to_string(bytes.size()) + " bytes are too few for a glTF");
   if (word_at(bytes, 4) != 2)
     fail("version " + std::to_string(word_at(bytes, 4)) +
          " of the glTF container is not supported. Export it as version 2.0");
@@ -142,7 +142,7 @@ std::string_view GltfDocument::parse_container() {
     fail("the file ends early: it announces " + std::to_string(length) + " bytes, here are " +
          std::to_string(bytes.size()));
   if (length < kHeader + kChunkHeader)
-    fail("its header announces " + std::to_string(length) + " bytes, which hold no glTF");
+    fail("its header announces " + std::to_string(length) + " bytes, which are too few for a glTF");
   bytes = bytes.substr(0, length);
   std::optional<std::string_view> json;
   for (std::size_t at = kHeader; bytes.size() - at >= kChunkHeader;) {
@@ -159,7 +159,7 @@ std::string_view GltfDocument::parse_container() {
       binary_chunk_ = bytes.substr(at, size);
     at += size;
   }
-  if (!json) fail("holds no JSON chunk");
+  if (!json) fail("contains no JSON chunk");
   return *json;
 }
 

@@ -72,9 +72,9 @@ class SceneReader {
     for (Index child = xml_[element].first_child; child != kNone;
          child = xml_[child].next_sibling) {
       if (++steps_ > kMostInstances + xml_.size())
-        xml_.fail(child,
-                  "too many nodes, counted as often as they are instanced. Does one hold "
-                  "itself?");
+        xml_.fail(
+            child,
+            "too many nodes, each counted once per instance. Check that no node contains itself");
       if (xml_[child].name == "node")
         open_.emplace_back(child, parent);
       else if (xml_[child].name == "instance_node")
@@ -88,7 +88,7 @@ class SceneReader {
     if (instance != kNone) return document_.target(instance, "url", "visual_scene");
     const Index library = xml_.child(0, "library_visual_scenes");
     const Index first = library == kNone ? kNone : xml_.child(library, "visual_scene");
-    if (first == kNone) xml_.fail(0, "holds no visual scene. Export it with one");
+    if (first == kNone) xml_.fail(0, "contains no visual scene. Export one");
     return first;
   }
 
@@ -105,7 +105,7 @@ class SceneReader {
     const std::string_view meter = unit == kNone ? "" : xml_.attribute(unit, "meter");
     if (meter.empty()) return frame;
     const std::optional<double> scale = parse_real(meter);
-    if (!scale || !(*scale > 0)) xml_.fail(unit, in_quotes(meter) + " is no length in metres");
+    if (!scale || !(*scale > 0)) xml_.fail(unit, in_quotes(meter) + " is not a length in metres");
     frame.unit = *scale;
     return frame;
   }

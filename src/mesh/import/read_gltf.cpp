@@ -87,7 +87,7 @@ void append_primitive(const GltfDocument& document, const Json& primitive, const
   };
   if (mode == kTriangles && indices.size() % 3 != 0)
     document.fail(name + ": " + std::to_string(indices.size()) +
-                  " corners are no whole number of triangles");
+                  " corners are not a multiple of three");
   if (mode == kTriangles)
     for (std::size_t i = 0; i + 2 < indices.size(); i += 3)
       add(indices[i], indices[i + 1], indices[i + 2]);

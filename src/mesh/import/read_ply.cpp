@@ -321,7 +321,7 @@ void read_faces(Body& body, const Element& element, const std::uint64_t vertex_c
         if (!(value >= 0) || value >= static_cast<double>(vertex_count) ||
             value != std::floor(value))
           body.fail_here("face " + std::to_string(i) + ": corner " + std::to_string(k) +
-                         " is no vertex: the file has " + std::to_string(vertex_count) +
+                         " is not a vertex: the file has " + std::to_string(vertex_count) +
                          ", counted from 0");
         mesh.corners.push_back(static_cast<std::uint32_t>(value));
       }

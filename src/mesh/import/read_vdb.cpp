@@ -21,12 +21,12 @@ openvdb::GridBase::Ptr only_grid(const std::string& path) {
   std::vector<std::string> names;
   for (auto name = file.beginName(); name != file.endName(); ++name)
     names.push_back(name.gridName());
-  if (names.empty()) throw Error(path + ": it holds no grid");
+  if (names.empty()) throw Error(path + ": contains no grid");
   if (names.size() > 1) {
     std::string list;
     for (const std::string& name : names) list += (list.empty() ? "'" : ", '") + name + "'";
-    throw Error(path + ": it holds " + std::to_string(names.size()) + " grids (" + list +
-                "). Write the one that is meant to a file of its own");
+    throw Error(path + ": contains " + std::to_string(names.size()) + " grids (" + list +
+                "). Write the intended one to its own file");
   }
   return file.readGrid(names.front());
 }
@@ -41,7 +41,7 @@ FloatGrid::Ptr level_set_of(const openvdb::GridBase::Ptr& base, const std::strin
     throw Error(path + ": " + name + " is of class '" +
                 openvdb::GridBase::gridClassToString(grid->getGridClass()) +
                 "', not a level set. Convert it (tools::fogToSdf for a fog volume)");
-  if (grid->empty()) throw Error(path + ": " + name + " is empty: there is no solid");
+  if (grid->empty()) throw Error(path + ": " + name + " is empty, so there is no solid");
   if (!grid->transform().isLinear())
     throw Error(path + ": " + name + " has a transform that is not linear. Resample it");
   return grid;
@@ -103,7 +103,7 @@ LevelSetMesh read_level_set(const std::string& path, const ProgressCallback& pro
 bool vdb_available() noexcept { return true; }
 
 LevelSetMesh load_vdb(const std::string& path, const ProgressCallback& progress) {
-  if (!std::filesystem::is_regular_file(path)) throw Error(path + ": there is no such file");
+  if (!std::filesystem::is_regular_file(path)) throw Error(path + ": no such file");
   try {
     return read_level_set(path, progress);
   } catch (const openvdb::Exception& error) {

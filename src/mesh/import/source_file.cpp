@@ -65,7 +65,7 @@ void refuse_other_content(const SourceFile& file) {
     if (bytes.substr(0, foreign.start.size()) == foreign.start)
       fail(file, "is " + std::string(foreign.meaning));
   if (looks_like_web_page(bytes))
-    fail(file, "is a web page, perhaps an error message saved in its place: download it again");
+    fail(file, "is a web page, perhaps a saved error message: download the file again");
 }
 
 void fail(const SourceFile& file, const std::string& what) { throw Error(file.path + ": " + what); }

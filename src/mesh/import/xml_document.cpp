@@ -12,10 +12,10 @@ constexpr std::size_t kDeepest = 1000, kMostAttributes = 256;
 
 XmlDocument::XmlDocument(const SourceFile& file) : file_(file), bytes_(file.bytes) {
   if (bytes_.find('\0') != std::string_view::npos)
-    ist::fail(file_, "holds binary data or another encoding than UTF-8, so it is not read as XML");
+    ist::fail(file_, "contains binary data or is not UTF-8, so it cannot be read as XML");
   parse();
   if (!open_.empty()) fail(open_.back().element, "the file ends early: this element is not closed");
-  if (elements_.empty()) ist::fail(file_, "holds no XML element");
+  if (elements_.empty()) ist::fail(file_, "contains no XML element");
 }
 
 std::string_view XmlDocument::attribute(const std::uint32_t element,

@@ -1,7 +1,5 @@
 #include "mesh/resolve/arrangement.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
@@ -19,6 +17,9 @@ namespace {
 
 /// Each takes some 600 bytes and 10 µs.
 constexpr std::size_t kMostCrossings = 500'000;
+
+/// Shares of the whole work, about.
+constexpr double kMeetings = 0.2, kCuts = 0.2, kPieces = 0.4;
 
 /// A segment in the plane of a cluster: a side of a triangle of it, or what another triangle, in
 /// the plane `other`, has in common with one.
@@ -49,8 +50,9 @@ struct Cluster {
 
 class ClusterWork {
  public:
-  ClusterWork(const ExactPoints& points, const std::vector<Triangle>& triangles, Cluster& cluster)
-      : points_(points), triangles_(triangles), cluster_(cluster) {}
+  ClusterWork(const ExactPoints& points, const std::vector<Triangle>& triangles, Cluster& cluster,
+              const WorkStop& stop)
+      : points_(points), triangles_(triangles), cluster_(cluster), stop_(stop) {}
 
   void choose_axis() {
     const Triangle& t = triangles_[cluster_.triangles[0]];
@@ -59,7 +61,7 @@ class ClusterWork {
         (points_.rounded(t[1]) - a).cross(points_.rounded(t[2]) - a).cwiseAbs();
     normal.maxCoeff(&cluster_.axis);
     for (int tried = 0; points_.turn(cluster_.axis, t[0], t[1], t[2]) == 0; ++tried) {
-      if (tried == 3) throw Unresolvable{"a triangle that meets others lies on a line"};
+      if (tried == 3) throw Unresolvable{"a triangle that intersects others is degenerate"};
       cluster_.axis = (cluster_.axis + 1) % 3;
     }
   }
@@ -79,6 +81,7 @@ class ClusterWork {
     std::stable_sort(order.begin(), order.end(),
                      [&](const std::size_t i, const std::size_t j) { return x[i].low < x[j].low; });
     for (std::size_t place = 0; place < order.size(); ++place) {
+      stop_.look();
       const std::size_t i = order[place];
       for (const std::uint32_t p : cluster_.touched) put(p, segments[i]);
       for (std::size_t next = place + 1; next < order.size(); ++next) {
@@ -86,7 +89,7 @@ class ClusterWork {
         if (x[j].low > x[i].high) break;
         if (y[j].low > y[i].high || y[i].low > y[j].high || !meet(i, j)) continue;
         if (++crossings > kMostCrossings)
-          throw Unresolvable{"too many of its triangles meet in the same places"};
+          throw Unresolvable{"too many triangles intersect at the same places"};
       }
     }
   }
@@ -102,6 +105,7 @@ class ClusterWork {
     inner.erase(std::unique(inner.begin(), inner.end()), inner.end());
     PlanarTriangulation plane(points_, cluster_.axis, frame, inner);
     for (Segment& s : cluster_.segments) {
+      stop_.look();
       const auto along = [&](const std::uint32_t p, const std::uint32_t q) {
         const int by_first = points_.compare(first(), p, q);
         return by_first != 0 ? by_first < 0 : points_.compare(second(), p, q) < 0;
@@ -184,6 +188,7 @@ class ClusterWork {
   const ExactPoints& points_;
   const std::vector<Triangle>& triangles_;
   Cluster& cluster_;
+  const WorkStop& stop_;
 };
 
 using Frames = std::array<std::array<std::uint32_t, 3>, 3>;
@@ -259,9 +264,10 @@ void drop_copies(Cluster& cluster) {
 
 Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
                     const std::vector<Triangle>& triangles,
-                    const std::span<const std::array<std::uint32_t, 2>> pairs) {
+                    const std::span<const std::array<std::uint32_t, 2>> pairs, WatchedWork& work) {
   Arrangement out{ExactPoints(vertices), {}, {}, {}, {}};
-  const std::vector<Meeting> meetings = find_meetings(out.points, triangles, pairs);
+  const std::vector<Meeting> meetings =
+      find_meetings(out.points, triangles, pairs, work, kMeetings);
   const Frames frames = add_frames(out.points);
   DisjointSets planes(triangles.size());
   for (const Meeting& m : meetings)
@@ -270,20 +276,22 @@ Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
   for (std::uint32_t t = 0; t < triangles.size(); ++t) out.plane[t] = planes.find(t);
   std::vector<std::uint32_t> cluster_of;
   std::vector<Cluster> clusters = make_clusters(triangles, meetings, out.plane, cluster_of);
-  const auto work = [&](Cluster& cluster) { return ClusterWork(out.points, triangles, cluster); };
+  const auto on = [&](Cluster& cluster) {
+    return ClusterWork(out.points, triangles, cluster, work);
+  };
   std::atomic<std::size_t> crossings{0};
-  tbb::parallel_for(std::size_t{0}, clusters.size(), [&](const std::size_t c) {
+  work.for_each(clusters.size(), kCuts, [&](const std::size_t c) {
     drop_copies(clusters[c]);
-    work(clusters[c]).choose_axis();
-    work(clusters[c]).meet(crossings);
+    on(clusters[c]).choose_axis();
+    on(clusters[c]).meet(crossings);
   });
   for (Cluster& cluster : clusters)
     for (Crossing& crossing : cluster.crossings) {
       const std::uint32_t p = out.points.add(std::move(crossing.exact), crossing.rounded);
       for (const std::size_t s : crossing.segments) cluster.segments[s].on.push_back(p);
     }
-  tbb::parallel_for(std::size_t{0}, clusters.size(), [&](const std::size_t c) {
-    work(clusters[c]).triangulate(frames[static_cast<std::size_t>(clusters[c].axis)]);
+  work.for_each(clusters.size(), kPieces, [&](const std::size_t c) {
+    on(clusters[c]).triangulate(frames[static_cast<std::size_t>(clusters[c].axis)]);
   });
   const auto add = [&](const Triangle& corners, const std::uint32_t source, const int step) {
     out.pieces.push_back(step > 0 ? corners : Triangle{corners[0], corners[2], corners[1]});

@@ -7,6 +7,7 @@
 
 #include "mesh/edge_table.h"
 #include "mesh/resolve/exact_points.h"
+#include "mesh/resolve/watched_work.h"
 
 namespace ist {
 
@@ -21,9 +22,9 @@ struct Arrangement {
 };
 
 /// Triangles on a line are left out, and pieces that others cancel. `pairs`: those that meet.
-/// The same for any number of threads. Throws Unresolvable.
+/// The same for any number of threads. Throws Unresolvable, and as `work` does.
 Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
                     const std::vector<Triangle>& triangles,
-                    std::span<const std::array<std::uint32_t, 2>> pairs);
+                    std::span<const std::array<std::uint32_t, 2>> pairs, WatchedWork& work);
 
 }  // namespace ist

@@ -1,7 +1,5 @@
 #include "mesh/resolve/patch_winding.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -16,6 +14,8 @@
 
 namespace ist {
 namespace {
+
+constexpr double kPatches = 0.1;  // share of the whole work, about
 
 /// Triangles by the cells of a grid that they may cover, seen along an axis.
 class Columns {
@@ -94,7 +94,7 @@ class Rays {
         .maxCoeff(&axis);
     int facing = 0;
     for (int tried = 0; facing == 0; ++tried, axis = (axis + 1) % 3) {
-      if (tried == 3) throw Unresolvable{"a piece of a triangle lies on a line"};
+      if (tried == 3) throw Unresolvable{"a piece of a triangle is degenerate"};
       facing = points_.turn(axis, corners[0], corners[1], corners[2]);
       if (facing != 0) break;
     }
@@ -104,7 +104,7 @@ class Rays {
       const RoundedPoint rounded = points_.round(inside);
       if (const auto winding = count({&rounded, &inside}, piece, axis, facing)) return *winding;
     }
-    throw Unresolvable{"every line through a piece of a triangle meets an edge"};
+    throw Unresolvable{"every ray through a piece of a triangle hits an edge"};
   }
 
  private:
@@ -165,14 +165,15 @@ class Rays {
 
 }  // namespace
 
-Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& arrangement) {
+Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& arrangement,
+                     WatchedWork& work) {
   const std::vector<Triangle>& pieces = arrangement.pieces;
   const EdgeTable edges(pieces);
   for (std::size_t e = 0; e < edges.size(); ++e) {
     int balance = 0;
     for (const std::uint32_t side : edges.sides(e))
       balance += (runs_up(pieces, side) ? 1 : -1) * arrangement.winding_step[side / 3];
-    if (balance != 0) throw Unresolvable{"its pieces do not close"};
+    if (balance != 0) throw Unresolvable{"the pieces of the surface do not form a closed surface"};
   }
   DisjointSets sets = manifold_patches(pieces, edges);
   Patches patches;
@@ -199,7 +200,7 @@ Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& 
   }
   patches.in_front.resize(largest.size());
   Rays rays(triangles, arrangement);
-  tbb::parallel_for(std::size_t{0}, largest.size(), [&](const std::size_t patch) {
+  work.for_each(largest.size(), kPatches, [&](const std::size_t patch) {
     patches.in_front[patch] = rays.in_front(largest[patch]);
   });
   return patches;

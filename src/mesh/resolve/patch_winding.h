@@ -15,7 +15,8 @@ struct Patches {
 };
 
 /// Exact. On the caller's TBB threads; the answer does not depend on their number.
-/// Throws Unresolvable.
-Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& arrangement);
+/// Throws Unresolvable, and as `work` does.
+Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& arrangement,
+                     WatchedWork& work);
 
 }  // namespace ist

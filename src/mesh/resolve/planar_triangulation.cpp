@@ -69,7 +69,7 @@ void PlanarTriangulation::insert_point(const std::uint32_t p) {
 /// The edge across from a corner, turned: a quadrilateral's other diagonal.
 void PlanarTriangulation::flip(const Place edge) {
   const std::uint32_t t = edge.cell, u = cells_[t].beyond[edge.corner], i = edge.corner;
-  if (u == kNoIndex) throw Unresolvable{"a point lies on the frame of a triangulation"};
+  if (u == kNoIndex) throw Unresolvable{"a point lies on the border of a triangulation"};
   const Cell one = cells_[t], two = cells_[u];
   const std::uint32_t j = two.beyond[0] == t ? 0 : two.beyond[1] == t ? 1 : 2;
   const std::uint32_t p = one.corner[i], a = one.corner[after(i)], b = one.corner[before(i)];

@@ -1,5 +1,7 @@
 #include "mesh/resolve/resolve.h"
 
+#include <tbb/task_arena.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -17,6 +19,8 @@
 #include "mesh/resolve/unresolvable.h"
 #include "mesh/self_intersections.h"
 #include "mesh/shells.h"
+#include "stage/aside.h"
+#include "stage/stage.h"
 
 namespace ist {
 namespace {
@@ -32,7 +36,7 @@ Pairs pairs_of(ClosedMesh& closed) {
     if (met) closed.meeting_pairs = std::move(met->pairs);
   }
   if (!closed.meeting_pairs || closed.meeting_pairs->size() > kMostPairs)
-    throw Unresolvable{"too many triangles, or pairs of them that meet"};
+    throw Unresolvable{"too many triangles or intersecting pairs"};
   return *closed.meeting_pairs;
 }
 
@@ -84,13 +88,13 @@ Eigen::Vector3d snapped(const Eigen::Vector3d& p, const double step) {
 
 class Resolver {
  public:
-  explicit Resolver(ClosedMesh& closed)
+  Resolver(ClosedMesh& closed, WatchedWork& work)
       : closed_(closed),
         triangles_(closed.mesh.triangles),
         pairs_(pairs_of(closed)),
-        arrangement_(arrange(closed.mesh.vertices, triangles_, pairs_)),
-        patches_(find_patches(triangles_, arrangement_)) {
-    if (triangles_.empty()) throw Unresolvable{"it has no triangles"};
+        arrangement_(arrange(closed.mesh.vertices, triangles_, pairs_, work)),
+        patches_(find_patches(triangles_, arrangement_, work)) {
+    if (triangles_.empty()) throw Unresolvable{"the mesh has no triangles"};
     from_ = closed.mesh.vertices[triangles_[0][0]];
   }
 
@@ -123,7 +127,7 @@ class Resolver {
       for (const std::uint32_t v : arrangement_.pieces[p])
         if (!arrangement_.points.is_given(v)) resolution.moved = 1.7321 * step;  // √3
     }
-    if (made.triangles.empty()) throw Unresolvable{"its winding number is nowhere 1 or more"};
+    if (made.triangles.empty()) throw Unresolvable{"the winding number is nowhere 1 or more"};
     return made;
   }
 
@@ -131,12 +135,12 @@ class Resolver {
   ClosedMesh close(TriangleMesh surface, const Resolution& resolution) const {
     ClosedMesh result = close_oriented(std::move(surface), closed_.name);
     if (find_unbalanced_edge(result.mesh.triangles, EdgeTable(result.mesh.triangles)))
-      throw Unresolvable{"what was made does not close"};
+      throw Unresolvable{"the resolved surface is not closed"};
     const Volume before(closed_.mesh, from_), after(result.mesh, from_);
     const double expected = before.sum - resolution.counted_twice + resolution.counted_against;
     const double off = std::abs(after.sum - expected);
     if (!(off <= 2 * resolution.moved * after.area + 1e-12 * (before.size + after.size)))
-      throw Unresolvable{"the volume of what was made is " + shortest(after.sum) + ", not " +
+      throw Unresolvable{"the volume of the resolved surface is " + shortest(after.sum) + ", not " +
                          shortest(expected)};
     MeshReport& report = result.report;
     report.filled_holes = closed_.report.filled_holes;
@@ -173,31 +177,26 @@ std::string percent(const double part, const double of) {
 }
 
 std::string describe(const Resolution& resolution, const double volume) {
-  std::string text = "parts of it overlap: " + percent(resolution.counted_twice, volume) +
-                     " of the solid's volume were counted twice and count once now";
+  std::string text = "parts of the mesh overlap: " + percent(resolution.counted_twice, volume) +
+                     " of the solid's volume was counted twice and is now counted once";
   if (resolution.counted_against > 0)
     text += "; inside-out regions of " + percent(resolution.counted_against, volume) +
-            " are outside now";
+            " are now outside";
   return text;
 }
 
-}  // namespace
+ResolvedMesh as_it_is(ClosedMesh closed) {
+  return {std::move(closed), {How::as_it_is, 0, 0, 0, "no volume is counted twice"}};
+}
 
-ResolvedMesh resolve(ClosedMesh closed) {
+ResolvedMesh resolve_watched(ClosedMesh closed, WatchedWork& work) {
   ResolvedMesh result{std::move(closed), {}};
-  ClosedMesh& mesh = result.mesh;
-  const auto as_it_is = [&] {
-    result.resolution = {How::as_it_is, 0, 0, 0, "it counts nothing twice"};
-    return std::move(result);
-  };
-  if (mesh.meeting_pairs && mesh.meeting_pairs->empty() && mesh.report.shells == 1)
-    return as_it_is();
   try {
     Resolution resolution;
     resolution.how = How::resolved;
-    const Resolver resolver(mesh);
+    const Resolver resolver(result.mesh, work);
     auto surface = resolver.surface(resolution);
-    if (!surface) return as_it_is();
+    if (!surface) return as_it_is(std::move(result.mesh));
     ClosedMesh made = resolver.close(std::move(*surface), resolution);
     resolution.reason = describe(resolution, made.report.volume);
     made.report.notes.push_back(resolution.reason);
@@ -208,6 +207,27 @@ ResolvedMesh resolve(ClosedMesh closed) {
     result.resolution = {How::unresolved, 0, 0, 0, failure.what()};
   }
   return result;
+}
+
+}  // namespace
+
+ResolvedMesh resolve(ClosedMesh closed, const ProgressCallback& progress) {
+  if (closed.meeting_pairs && closed.meeting_pairs->empty() && closed.report.shells == 1)
+    return as_it_is(std::move(closed));
+  WatchedWork work;
+  if (!progress) return resolve_watched(std::move(closed), work);
+  Stage stage("resolve", progress);
+  stage.step(0, 0);
+  const auto threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
+  auto made = do_aside(threads, [&] { return resolve_watched(std::move(closed), work); });
+  try {
+    wait_for(made, [&] { stage.step(0, work.done()); });
+    stage.step(0, 1);
+  } catch (...) {
+    work.stop();
+    throw;
+  }
+  return made.get();
 }
 
 }  // namespace ist

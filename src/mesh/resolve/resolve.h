@@ -3,6 +3,7 @@
 #include <string>
 
 #include <ist/mesh.h>
+#include <ist/progress.h>
 
 namespace ist {
 
@@ -36,6 +37,9 @@ struct ResolvedMesh {
 ///
 /// Same bytes for any number of threads, which are those of the current arena. Takes milliseconds
 /// for thousands of triangles that meet. Never throws for what a mesh looks like.
-ResolvedMesh resolve(ClosedMesh closed);
+///
+/// Reports the stage "resolve" if there is something to be looked at; throws Error if `progress`
+/// cancels.
+ResolvedMesh resolve(ClosedMesh closed, const ProgressCallback& progress = {});
 
 }  // namespace ist

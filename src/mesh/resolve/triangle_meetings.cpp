@@ -1,7 +1,5 @@
 #include "mesh/resolve/triangle_meetings.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -86,10 +84,11 @@ class PairOfTriangles {
 
 /// Gives every name in `names` (sorted, none twice) its number.
 std::vector<std::uint32_t> number(ExactPoints& points, const std::vector<Triangle>& triangles,
-                                  const std::vector<Named>& names) {
+                                  const std::vector<Named>& names, WatchedWork& work,
+                                  const double share) {
   std::vector<ExactPoint> exact(names.size());
   std::vector<RoundedPoint> rounded(names.size());
-  tbb::parallel_for(std::size_t{0}, names.size(), [&](const std::size_t i) {
+  work.for_each(names.size(), share, [&](const std::size_t i) {
     const Named& name = names[i];
     if (name.triangle == kNoIndex) return;
     const ExactPlane plane = points.plane(triangles[name.triangle]);
@@ -107,10 +106,11 @@ std::vector<std::uint32_t> number(ExactPoints& points, const std::vector<Triangl
 }  // namespace
 
 std::vector<Meeting> find_meetings(ExactPoints& points, const std::vector<Triangle>& triangles,
-                                   const std::span<const std::array<std::uint32_t, 2>> pairs) {
+                                   const std::span<const std::array<std::uint32_t, 2>> pairs,
+                                   WatchedWork& work, const double share) {
   std::vector<Meeting> meetings(pairs.size());
   std::vector<std::vector<Named>> ends(pairs.size());
-  tbb::parallel_for(std::size_t{0}, pairs.size(), [&](const std::size_t i) {
+  work.for_each(pairs.size(), share / 2, [&](const std::size_t i) {
     const auto [a, b] = pairs[i];
     meetings[i].triangles = pairs[i];
     meetings[i].coplanar = !PairOfTriangles(points, triangles, ends[i]).add_ends(a, b);
@@ -119,7 +119,7 @@ std::vector<Meeting> find_meetings(ExactPoints& points, const std::vector<Triang
   for (const auto& of_pair : ends) names.insert(names.end(), of_pair.begin(), of_pair.end());
   std::sort(names.begin(), names.end());
   names.erase(std::unique(names.begin(), names.end()), names.end());
-  const std::vector<std::uint32_t> numbers = number(points, triangles, names);
+  const std::vector<std::uint32_t> numbers = number(points, triangles, names, work, share / 2);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     Meeting& meeting = meetings[i];
     for (const Named& name : ends[i]) {
@@ -127,11 +127,12 @@ std::vector<Meeting> find_meetings(ExactPoints& points, const std::vector<Triang
       const std::uint32_t p = numbers[static_cast<std::size_t>(place)];
       if (meeting.from == kNoIndex) meeting.from = meeting.to = p;
       if (p == meeting.from || p == meeting.to) continue;
-      if (meeting.from != meeting.to) throw Unresolvable{"two triangles meet in more than a line"};
+      if (meeting.from != meeting.to)
+        throw Unresolvable{"two triangles intersect in more than a segment"};
       meeting.to = p;
     }
     if (!meeting.coplanar && meeting.from == kNoIndex)
-      throw Unresolvable{"two triangles that meet have no point in common"};
+      throw Unresolvable{"two intersecting triangles have no common point"};
   }
   return meetings;
 }

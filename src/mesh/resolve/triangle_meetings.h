@@ -7,6 +7,7 @@
 
 #include "mesh/edge_table.h"
 #include "mesh/resolve/exact_points.h"
+#include "mesh/resolve/watched_work.h"
 
 namespace ist {
 
@@ -18,8 +19,10 @@ struct Meeting {
 };
 
 /// The meetings of pairs of triangles that meet, in their order; new points are added in an order
-/// that does not depend on threads. Throws Unresolvable where the pairs contradict themselves.
+/// that does not depend on threads. Throws Unresolvable where the pairs contradict themselves, and
+/// as `work` does, of which this is `share`.
 std::vector<Meeting> find_meetings(ExactPoints& points, const std::vector<Triangle>& triangles,
-                                   std::span<const std::array<std::uint32_t, 2>> pairs);
+                                   std::span<const std::array<std::uint32_t, 2>> pairs,
+                                   WatchedWork& work, double share);
 
 }  // namespace ist

@@ -21,9 +21,8 @@ void require(bool in_range, const char* name, double value, const char* range) {
 
 void check_settings(const SurfaceSettings& s) {
   require(s.error >= 0 && std::isfinite(s.error), "surface.error", s.error,
-          "finite and not negative (0 = none is asked for)");
-  require(s.share >= 0 && s.share < 1, "surface.share", s.share,
-          "in [0, 1) (0 = none is asked for)");
+          "finite and not negative (0 = no bound)");
+  require(s.share >= 0 && s.share < 1, "surface.share", s.share, "in [0, 1) (0 = no bound)");
 }
 
 void check_settings(const PackingSettings& s) {
@@ -34,7 +33,7 @@ void check_settings(const PackingSettings& s) {
   require(s.min_radius >= 0 && std::isfinite(s.min_radius), "min_radius", s.min_radius,
           "finite and not negative");
   require(s.time_limit >= 0 && std::isfinite(s.time_limit), "time_limit", s.time_limit,
-          "finite and not negative (0 = none)");
+          "finite and not negative (0 = no limit)");
   require(s.epsilon >= 0 && s.epsilon < 1, "epsilon", s.epsilon, "in [0, 1) (0 = automatic)");
   require(s.grid <= GridMode::hybrid, "grid", static_cast<double>(s.grid), "a GridMode (0 … 4)");
   require(s.grids.start <= 1024, "grids.start", s.grids.start, "at most 1024 (0 = automatic)");
@@ -45,8 +44,8 @@ void check_settings(const PackingSettings& s) {
   check_settings(s.surface);
   if (s.max_spheres == 0 && s.target_coverage >= 1 && s.min_radius <= 0 && s.time_limit <= 0)
     throw Error(
-        "packing: no limit is set; give a sphere count, a coverage below 1, a smallest radius or a "
-        "time");
+        "packing: no limit is set; set max_spheres, a target_coverage below 1, min_radius or "
+        "time_limit");
 }
 
 PackingLimits packing_limits(const Solid& solid, double scale, const PackingSettings& settings) {

@@ -13,7 +13,7 @@ const forgotten = new FinalizationRegistry((places) => places.forEach(give));
 class Owner {
   constructor(places, key) {
     if (key !== kInside)
-      throw new IstError(`ist: ${this.constructor.name}s are made by its static functions`);
+      throw new IstError(`ist: ${this.constructor.name}has no public constructor; use its static functions`);
     this._places = places;
     forgotten.register(this, places, this);
   }
@@ -39,8 +39,8 @@ function bytesOf(given) {
       (typeof SharedArrayBuffer !== 'undefined' && given instanceof SharedArrayBuffer))
     return new Uint8Array(given);
   throw new IstError(
-      'ist: Asset.from() takes an ArrayBuffer or a view of one, as ' +
-      'await (await fetch(address)).arrayBuffer() gives');
+      'ist: Asset.from() takes an ArrayBuffer or a view of one, e.g. ' +
+      'await (await fetch(address)).arrayBuffer()');
 }
 
 const kMeshStates = ['none', 'own', 'resolved', 'simplified', 'unresolved'];
@@ -68,7 +68,7 @@ export class Asset extends Owner {
 
   /** Its handle in WebAssembly. */
   get _at() {
-    if (this._places === null) throw new IstError(`ist: ${this._name} is used after its free()`);
+    if (this._places === null) throw new IstError(`ist: ${this._name} was used after free()`);
     return this._places[0];
   }
 
@@ -128,10 +128,10 @@ export class Asset extends Owner {
     const measure = sphereMeasureOf(set?.measure);
     const status = functions('an asset').balls(this._at, measure, detail, level, room, capacity);
     if (status === kNotHeld)
-      throw new IstError(`ist: ${this._name}: is a surface alone and holds no spheres`, status);
+      throw new IstError(`ist: ${this._name}: is a surface alone, without spheres`, status);
     if (status < 0)
       throw new IstError(
-          `ist: ${this._name}: there is no level ${level} of detail ${detail} in its ` +
+          `ist: ${this._name}: has no level ${level} of detail ${detail} in its ` +
               `${set?.measure ?? 'matched'} spheres`,
           status);
     return u32()[(desk() + kCounts) / 4];
@@ -187,7 +187,7 @@ function made(kind, numbers, data = 0, columns = 0, rows = 0, layers = 0) {
     const absent = numbers.concat(Array(8 - numbers.length).fill(0));
     writeNumbers(f64(), desk() / 8, absent, absent, 8, 'a field');
     const place = wasm.field(kind, data, columns, rows, layers) >>> 0;
-    if (place === 0) throw new IstError('ist: there is no memory for a field');
+    if (place === 0) throw new IstError('ist: out of memory for a field');
     return new Field([place, ...owned], kInside);
   } catch (error) {
     owned.forEach(give);
@@ -204,7 +204,7 @@ function three(given, what) {
 function copied(given, points, what) {
   for (const along of points)
     if (!(Number.isInteger(along) && along >= 2))
-      throw new IstError(`ist: ${what} needs two points and more along each axis, not ${along}`);
+      throw new IstError(`ist: ${what} needs at least two points along each axis, not ${along}`);
   const wanted = points.reduce((a, b) => a * b);
   if (!(given instanceof Float32Array) || given.length !== wanted)
     throw new IstError(
@@ -262,7 +262,7 @@ export class Field extends Owner {
 
   /** Its place in WebAssembly. */
   get _at() {
-    if (this._places === null) throw new IstError('ist: a field is used after its free()');
+    if (this._places === null) throw new IstError('ist: a field was used after free()');
     this._asset?._at;  // which throws if it is free
     return this._places[0];
   }

@@ -32,7 +32,7 @@ export function patchesWithoutProtrusion(found, a, b, poseB, options) {
   writeSettings(options);
   const {patches, count} = found;
   if (!(count <= Math.min(kMostPatches, patches.length)))
-    throw new IstError('ist: patchesWithoutProtrusion() takes what contactPatches() answered');
+    throw new IstError('ist: patchesWithoutProtrusion() takes the result of contactPatches()');
   for (let i = 0; i < count; ++i) writePatch(desk() + kPatches + i * kPatchBytes, patches[i]);
   check(wasm.patches_without_protrusion(a._at, b._at, count), 'patchesWithoutProtrusion()');
   readPatches(desk() + kPatches, count, found);

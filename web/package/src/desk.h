@@ -73,6 +73,7 @@ _Static_assert(sizeof(ist_contact_patch_t) == 128, "patch");
 _Static_assert(sizeof(ist_penetration_t) == 112, "penetration");
 _Static_assert(sizeof(ist_ball_t) == 32, "ball");
 _Static_assert(sizeof(ist_lens_t) == 72, "lens");
+_Static_assert(sizeof(ist_outline_segment_t) == 56, "segment");
 
 static inline ist_placed_tree_t placed(const ist_tree_t* tree, const place_t* place) {
   const ist_placed_tree_t made = {sizeof made, tree, place->pose, place->scale};

@@ -66,7 +66,7 @@ export function writePoseAt(place, pose, what) {
 
 function choice(value, names, what) {
   const i = value === undefined ? 0 : names.indexOf(value);
-  if (i < 0) throw new IstError(`ist: ${what} is ${value}; there are ${names.join(', ')}`);
+  if (i < 0) throw new IstError(`ist: ${what} is ${value}; use one of ${names.join(', ')}`);
   return i;
 }
 

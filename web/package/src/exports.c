@@ -164,6 +164,22 @@ ist_status_t contact_patches(const ist_tree_t* a, const ist_field_t* field, cons
   return status;
 }
 
+/* The numbers of patches and of all segments go to counts. */
+EXPORT(overlap_outline)
+ist_status_t overlap_outline(const ist_tree_t* a, const ist_tree_t* b, uint32_t most,
+                             ist_outline_segment_t* room, size_t capacity) {
+  const ist_placed_tree_t first = placed(a, &desk.a), second = placed(b, &desk.b);
+  const ist_contact_settings_t settings = contact_settings();
+  ist_contact_patches_t found = {sizeof found, sizeof desk.patches[0], desk.patches, most, 0};
+  ist_outline_t outline = {
+      .size = sizeof outline, .segment_size = sizeof *room, .segments = room, .capacity = capacity};
+  const ist_status_t status = ist_overlap_outline(&first, &second, &settings, &desk.workspace,
+                                                  &found, &outline, &desk.penetration);
+  desk.counts[0] = (uint32_t)found.count;
+  desk.counts[1] = (uint32_t)outline.total;
+  return status;
+}
+
 /* 0, 1, 2 as ist_overlapping_t, or an error. */
 EXPORT(overlap)
 int32_t overlap(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b) {

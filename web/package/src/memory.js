@@ -31,7 +31,7 @@ const imports = {
       return 0;
     },
     proc_exit() {
-      throw new IstError('ist: the WebAssembly stopped itself: no memory is left');
+      throw new IstError('ist: the WebAssembly module aborted: out of memory');
     },
   },
 };
@@ -44,7 +44,7 @@ async function instantiated(source) {
     } catch (error) {
       throw new IstError(
           `ist: ${given} cannot be fetched (${error.message}). If a bundler moved it, ` +
-          'name its place, init({wasm: url}), or import "ist-query/compat", which holds it.');
+          'pass its address, init({wasm: url}), or import "ist-query/compat", which contains it.');
     }
   }
   if (given instanceof WebAssembly.Module) return WebAssembly.instantiate(given, imports);
@@ -58,8 +58,8 @@ async function instantiated(source) {
     const magic = new Uint8Array(given, 0, Math.min(4, given.byteLength));
     if (String.fromCharCode(...magic) !== '\0asm')
       throw new IstError(
-          `ist: what lies at ${address} is no WebAssembly. If a bundler moved it, name ` +
-          'its place, init({wasm: url}), or import "ist-query/compat", which holds it.');
+          `ist: ${address} is not a WebAssembly module. If a bundler moved it, pass ` +
+          'its address, init({wasm: url}), or import "ist-query/compat", which contains it.');
   }
   const {instance} = await WebAssembly.instantiate(given, imports);
   return instance;
@@ -67,7 +67,7 @@ async function instantiated(source) {
 
 async function start(source) {
   if (typeof WebAssembly !== 'object')
-    throw new IstError('ist: there is no WebAssembly here. A browser of 2023 or later has it.');
+    throw new IstError('ist: WebAssembly is not available. Use a browser of 2023 or later.');
   let instance;
   try {
     instance = await instantiated(source);
@@ -85,7 +85,7 @@ async function start(source) {
     if (wasm.start() !== 0) throw new IstError('no memory');
   } catch {
     wasm = null;
-    throw new IstError('ist: there is not enough memory for the 42 MB that queries work in');
+    throw new IstError('ist: out of memory: queries need 42 MB');
   }
 }
 
@@ -102,7 +102,7 @@ export function load(source) {
 export function functions(who) {
   if (wasm === null)
     throw new IstError(
-        `ist: ${who} was called before the WebAssembly is there: ` +
+        `ist: ${who} was called before the WebAssembly was loaded: ` +
         (loading === null ? 'call and await init() first' : 'init() was called, but not awaited'));
   return wasm;
 }
@@ -124,7 +124,7 @@ export function u8() {
 /** `size` bytes on a 64-byte boundary. */
 export function take(size) {
   const place = size < 2 ** 32 ? wasm.take(size) >>> 0 : 0;
-  if (place === 0) throw new IstError(`ist: there is no memory for ${size} bytes more`);
+  if (place === 0) throw new IstError(`ist: out of memory for ${size} more bytes`);
   return place;
 }
 export function give(place) {

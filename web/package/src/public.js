@@ -7,7 +7,7 @@ export {contactPatchesBatch, penetrationBatch} from './batch.js';
 export {pairFit, patchesWithoutProtrusion, withoutProtrusion, wrenches} from './bodies.js';
 export {IstError} from './error.js';
 export {motionBetween, moved, timeOfImpact} from './motion.js';
-export {contactPatches, lenses, overlap, penetration, separation} from './query.js';
+export {contactPatches, lenses, overlap, overlapOutline, penetration, separation} from './query.js';
 
 export function version() {
   const number = functions('version()').version();

@@ -85,6 +85,40 @@ export function overlap(a, b, poseB, options) {
 }
 
 const room = new Room();
+const kSegmentBytes = 56;
+
+export function overlapOutline(a, b, poseB, options) {
+  const wasm = functions('overlapOutline()');
+  if (!(a instanceof Asset))
+    throw new IstError('ist: overlapOutline(): solid A must be an Asset: a field has no mesh');
+  const first = a._at, second = solid(b, 'B', 'overlapOutline()');
+  writePose(0, options?.poseA, 'poseA');
+  writePose(1, poseB, 'poseB');
+  writeSettings({maxVisits: options?.maxVisits});
+  const most = maxPatchesOf(options), counts = (desk() + kCounts) / 4;
+  let place, status, capacity, total = 1024;
+  do {
+    capacity = total;
+    place = room.of(kSegmentBytes * capacity);
+    status = wasm.overlap_outline(first, second, most, place, capacity);
+    check(status, 'overlapOutline()');
+    total = u32()[counts + 1];
+  } while (total > capacity);
+  const out = options?.into ??
+      {contact: newPatches(), count: 0, segments: new Float64Array(0), patch: new Uint32Array(0)};
+  readPenetration(desk() + kPenetration, status, out.contact.whole);
+  readPatches(desk() + kPatches, u32()[counts], out.contact);
+  out.count = total;
+  if (out.segments.length < 6 * total) out.segments = new Float64Array(6 * total);
+  if (out.patch.length < total) out.patch = new Uint32Array(total);
+  const numbers = f64(), integers = u32();
+  for (let i = 0; i < total; ++i) {
+    const from = (place + kSegmentBytes * i) / 8;
+    for (let k = 0; k < 6; ++k) out.segments[6 * i + k] = numbers[from + k];
+    out.patch[i] = integers[2 * from + 12];
+  }
+  return out;
+}
 
 export function lenses(a, b, poseB, options) {
   const wasm = functions('lenses()');

@@ -108,7 +108,7 @@ test('what an asset holds', () => {
     assert.match(sentence(() => asset.level(levels, set)), /there is no level/);
   }
   assert.match(
-      sentence(() => asset.spheres({detail: 99})), /bolt\.ist: there is no level 0 of detail 99/);
+      sentence(() => asset.spheres({detail: 99})), /bolt\.ist: has no level 0 of detail 99/);
   assert.match(
       sentence(() => asset.spheres({measure: 'outer'})),
       /measure is outer; there are matched, inner/);
@@ -126,7 +126,7 @@ test('exact is the true volume of two meshes, and refused where there is none', 
   assert.ok(Math.abs(found.force[2] + 71.734) < 1e-3);
   const floor = ist.Field.halfSpace([0, 0, 1]);
   assert.match(
-      sentence(() => ist.penetration(floor, b, pose, exact)), /does not hold what is asked/);
+      sentence(() => ist.penetration(floor, b, pose, exact)), /lacks data that the query needs/);
   const [one, other] =
       ist.penetrationBatch([{a, b, poseB: pose}, {a: floor, b, poseB: pose}], exact);
   assert.deepEqual(one, found);
@@ -194,6 +194,36 @@ test('patches and lenses add up', () => {
   b.free();
 });
 
+test('outlines: closed curves, a patch at a time', () => {
+  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB), pose = {translation: [0, 0, 8.5]};
+  const found = ist.overlapOutline(a, b, pose), {contact, count, segments, patch} = found;
+  assert.ok(count > 1024 && segments.length === 6 * count && patch.length === count);
+  assert.deepEqual(contact, ist.contactPatches(a, b, pose, {measure: 'exact'}));
+  const ends = (first) => Array.from(patch, (p, i) => [p, ...segments.subarray(6 * i + first, 6 * i + first + 3)].join());
+  assert.deepEqual(ends(0).sort(), ends(3).sort());
+  assert.ok(contact.count > 0 && patch.every((p) => p < contact.count));
+  // Stokes: the push is what the outline encloses.
+  const force = [0, 0, 0];
+  for (let i = 0; i < count; ++i) {
+    const [x, y, z, u, v, w] = segments.subarray(6 * i);
+    [y * w - z * v, z * u - x * w, x * v - y * u].forEach((part, k) => force[k] += part / 2);
+  }
+  for (let k = 0; k < 3; ++k) assert.ok(Math.abs(force[k] - contact.whole.force[k]) < 1e-9);
+  const apart = ist.overlapOutline(a, b, {translation: [100, 0, 0]}, {into: found});
+  assert.ok(apart === found && apart.count === 0 && apart.contact.count === 0);
+  const stopped = ist.overlapOutline(a, b, pose, {maxVisits: 1});
+  assert.ok(stopped.contact.whole.status === 'budget-exhausted' && stopped.count === 0);
+
+  const bare = ist.Asset.from(readFileSync(baked('nut', 500, {surface: 'none'})));
+  const without = sentence(() => ist.overlapOutline(a, bare, pose));
+  assert.match(without, /overlapOutline\(\): .*mesh/);
+  assert.match(
+      sentence(() => ist.overlapOutline(ist.Field.ball(1), b, pose)), /a field has no mesh/);
+  a.free();
+  b.free();
+  bare.free();
+});
+
 test('poses and scales: the world may be moved', () => {
   const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB);
   const half = Math.SQRT1_2;
@@ -246,7 +276,7 @@ test('fields', () => {
       sentence(() => ist.Field.heights(new Float32Array(3), 2, 2, [1, 1])),
       /2 · 2 = 4 numbers, not 3/);
   assert.match(
-      sentence(() => ist.Field.heights(new Float32Array(3), 3, 1, [1, 1])), /two points and more/);
+      sentence(() => ist.Field.heights(new Float32Array(3), 3, 1, [1, 1])), /at least two points/);
   b.free();
 });
 
@@ -271,7 +301,7 @@ test('flat faces: what protrudes is taken out', () => {
       /both solids must be Assets/);
   assert.match(
       sentence(() => ist.patchesWithoutProtrusion({count: 3, patches: []}, a, b, pose)),
-      /what contactPatches\(\) answered/);
+      /the result of contactPatches\(\)/);
   a.free();
 });
 
@@ -380,8 +410,8 @@ test('what is wrong is said', () => {
   assert.match(sentence(() => new ist.Asset()), /static functions/);
   a.free();
   a.free();
-  assert.match(sentence(ask({})), /bolt\.ist is used after its free\(\)/);
-  assert.match(sentence(() => a.info()), /used after its free\(\)/);
+  assert.match(sentence(ask({})), /bolt\.ist was used after free\(\)/);
+  assert.match(sentence(() => a.info()), /used after free\(\)/);
   b.free();
 });
 

@@ -128,7 +128,8 @@ export function queries(ist, a, b) {
       bits: penetrationBits,
     };
   };
-  const forSeparation = {into: undefined}, forPatches = {maxPatches: 16, into: undefined};
+  const forSeparation = {into: undefined}, forPatches = {maxPatches: 16, into: undefined},
+        forOutline = {maxPatches: 16, into: undefined};
   return {
     'matched': penetrationOf(a),
     'lenses alone': penetrationOf(a, {field: 'never'}),
@@ -154,6 +155,15 @@ export function queries(ist, a, b) {
       ask: (pose) => forPatches.into = ist.contactPatches(a, b, pose, forPatches),
       bits: (found) =>
           penetrationBits(found.whole).concat(patchBits(found.patches.slice(0, found.count))),
+    },
+    'outline': {
+      ask: (pose) => forOutline.into = ist.overlapOutline(a, b, pose, forOutline),
+      bits: ({contact: {whole, patches, count: some}, count, segments, patch}) => {
+        const bits = penetrationBits(whole).concat(patchBits(patches.slice(0, some)));
+        for (let i = 0; i < count; i += 7)
+          bits.push(...hexes(segments.subarray(6 * i, 6 * i + 6)), patch[i]);
+        return bits;
+      },
     },
     'overlap': {
       ask: (pose) => ist.overlap(a, b, pose),

@@ -1,6 +1,6 @@
 // Compiles only if the types say what docs/web.md does.
 import {
-  Asset, Field, IstError, contactPatches, contactPatchesBatch, init, lenses, motionBetween, moved, overlap, pairFit,
+  Asset, Field, IstError, contactPatches, contactPatchesBatch, init, lenses, motionBetween, moved, overlap, overlapOutline, pairFit,
   patchesWithoutProtrusion, penetration, penetrationBatch, separation, timeOfImpact, version, withoutProtrusion, wrenches,
 } from 'ist-query';
 import * as compat from 'ist-query/compat';
@@ -15,10 +15,11 @@ const pose: Pose = {rotation: new Float64Array([1, 0, 0, 0]), translation: [0, 0
 const options: PenetrationOptions = {measure: 'matched'};
 const answer: Penetration = (options.into = penetration(a, a, pose, options));
 const found: ContactPatches = contactPatches(Field.halfSpace([0, 0, 1]), a, pose, {maxPatches: 4});
+const curves: Float64Array = overlapOutline(a, a, pose, {maxPatches: 4}).segments;
 const surface: Surface | null = a.surface();
 const sum: number = answer.volume + separation(a, a, pose).distance + found.patches[0].area +
     lenses(a, a, pose).data[0] + a.info().details[0] + (surface?.triangles.length ?? 0) + a.spheres({detail: 1})[0];
-const words: string = version() + overlap(a, a, {}) + new IstError('x').status.toFixed(sum);
+const words: string = version() + overlap(a, a, {}) + new IstError('x').status.toFixed(sum + curves[0]);
 const pairs: Pair[] = [{a, b: a, poseB: pose}, {a: Field.ball(1), b: a, poseA: {scale: 2}, poseB: moved(pose, {velocity: [1, 0, 0]}, 2)}];
 const many: {into?: BatchPenetration[]} = {};
 many.into = penetrationBatch(pairs, many);
@@ -34,4 +35,6 @@ penetrationBatch([{a, b: Field.ball(1), poseB: pose}]);
 penetration(a, Field.ball(1), pose);
 // @ts-expect-error
 penetration(a, a, pose, {measure: 'outer'});
+// @ts-expect-error
+overlapOutline(Field.ball(1), a, pose);
 export {thin, words};

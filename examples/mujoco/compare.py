@@ -1,0 +1,296 @@
+"""Scenes of concave parts in MuJoCo, each with the solids of ist and with MuJoCo's own collisions.
+
+    python compare.py [SCENE…] [--ways ist hulls sdf pieces] [--json FILE] [--films FOLDER]
+
+Ways: ist (ist.mujoco), hulls (type="mesh": a mesh is its convex hull), sdf (type="sdf": MuJoCo's own
+mesh SDF), pieces (convex decomposition by CoACD, if it is installed). Times of one run compare with each
+other alone. `depth` is the greatest volume over area of an overlap
+of two meshes, by ist's exact measure.
+"""
+
+import argparse
+import json
+import pathlib
+import sys
+import tempfile
+import time
+
+import ist
+import ist.mujoco
+import mujoco
+import numpy as np
+
+try:
+    import coacd
+except ImportError:
+    coacd = None
+
+STIFF = 'solref="-2e4 -20"'
+
+
+def turned(profile, around=48):
+    """A closed mesh: a closed profile of (radius, height), radii > 0, turned about z."""
+    profile = np.asarray(profile, float)
+    angle = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    vertices = np.stack([np.outer(profile[:, 0], np.cos(angle)), np.outer(profile[:, 0], np.sin(angle)),
+                         np.repeat(profile[:, 1:], around, 1)], -1).reshape(-1, 3)
+    row, column = np.meshgrid(np.arange(len(profile)), np.arange(around), indexing="ij")
+    next_row = (row + 1) % len(profile)
+    a, b = row * around + column, row * around + (column + 1) % around
+    c, d = next_row * around + (column + 1) % around, next_row * around + column
+    return vertices, np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3),
+                                     np.stack([a, c, d], -1).reshape(-1, 3)])
+
+
+def sample(name):
+    mesh = ist.sample_mesh(name)
+    return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+
+
+def vessel(radius, height, wall):
+    """A cup, almost closed at its axis: a hole of a hundredth of its radius stays."""
+    hole = 0.01 * radius
+    return turned([(hole, 0), (radius, 0), (radius, height), (radius - wall, height),
+                   (radius - wall, wall), (hole, wall)])
+
+
+class Scene:
+    """Meshes, bodies and a judgement."""
+
+    seconds, step, options = 1.0, 0.001, ""
+    settings = {"spheres": 4000}  # of ist.mujoco.attach
+
+    def judge(self, model, data, log):
+        """(holds, words)"""
+        raise NotImplementedError
+
+
+class Nut(Scene):
+    """A nut runs down its bolt without friction: 2 mm a turn."""
+
+    seconds = 0.6
+    settings = {"spheres": 10000}
+    meshes = {"bolt": (sample("bolt"), ".001"), "nut": (sample("nut"), ".001")}
+    bodies = f"""<geom name="bolt" mesh="bolt" {STIFF} friction="0"/>
+      <body name="nut" pos="0 0 .010"><freejoint/><geom name="nut" mesh="nut" {STIFF} friction="0"/></body>"""
+
+    def judge(self, model, data, log):
+        log = np.array(log)[len(log) // 5:]
+        turn = np.unwrap(2 * np.arctan2(log[:, 6], log[:, 3]), period=2 * np.pi)
+        turns = abs(turn[-1] - turn[0]) / (2 * np.pi)
+        off = 1e3 * np.abs(log[:, :2]).max()
+        if turns < 0.1 or off > 1:
+            return False, f"does not turn, {off:.2g} mm off its axis"
+        pitch = 1e3 * (log[0, 2] - log[-1, 2]) / turns
+        return abs(pitch - 2) < 0.05, f"{pitch:.3f} mm a turn over {turns:.2f}, {off:.3f} mm off its axis"
+
+
+class Mug(Scene):
+    """Twenty knots fall into a mug and come to rest."""
+
+    seconds, step, count = 3.0, 0.002, 20
+    settings = {"spheres": 1000, "measure": "exact"}
+    meshes = {"mug": (vessel(0.05, 0.12, 0.004), "1"), "knot": (sample("torus_knot"), ".004")}
+    bodies = f'<geom name="mug" mesh="mug" solref="-2e4 -200" friction=".5"/>' + "".join(
+        f'<body name="k{i}" pos="{0.015 * np.cos(2 * i):.4f} {0.015 * np.sin(2 * i):.4f} {0.03 + 0.025 * i:.4f}" '
+        f'euler="{50 * i} {35 * i} 0"><freejoint/><geom name="k{i}" mesh="knot" solref="-2e4 -200" friction=".5"/></body>'
+        for i in range(count))
+
+    def judge(self, model, data, log):
+        places = data.qpos.reshape(-1, 7)[:, :3]
+        inside = int(((np.hypot(places[:, 0], places[:, 1]) < 0.05) & (places[:, 2] > 0)).sum())
+        speed = 1e3 * np.linalg.norm(data.qvel.reshape(-1, 6)[:, :3], axis=1).max()
+        return inside == self.count, f"{inside} of {self.count} inside, fastest {speed:.1f} mm/s at the end"
+
+
+class Pin(Scene):
+    """A pin of 10 mm falls through a hole with 0.05 mm of play a side."""
+
+    seconds = 0.35
+    settings = {"spheres": 1000, "measure": "exact"}  # matched spheres protrude by more than the play
+    meshes = {"plate": (turned([(.00505, 0), (.02, 0), (.02, .01), (.00505, .01)], 64), "1"),
+              "pin": (turned([(1e-5, 0), (.005, 0), (.005, .03), (1e-5, .03)], 64), "1")}
+    bodies = f"""<geom name="plate" mesh="plate" {STIFF} friction=".1"/>
+      <body name="pin" pos=".00003 0 .008" euler="0 .2 0"><freejoint/><geom name="pin" mesh="pin" {STIFF} friction=".1"/></body>"""
+
+    def judge(self, model, data, log):
+        lowest = min(q[2] for q in log)
+        return lowest < -0.03, f"falls {1e3 * (0.008 - lowest):.1f} mm"
+
+
+class Bowl(Scene):
+    """A ball rolls in a bowl, and stays in it."""
+
+    seconds, step = 2.0, 0.002
+    meshes = {"bowl": (turned([(.108 * np.sin(a), .1 - .108 * np.cos(a)) for a in np.linspace(.02, 1.4, 24)]
+                              + [(.1 * np.sin(a), .1 - .1 * np.cos(a)) for a in np.linspace(1.4, .02, 24)]), "1")}
+    bodies = f"""<geom name="bowl" mesh="bowl" solref="-2e4 -200"/>
+      <body name="ball" pos=".06 0 .06"><freejoint/><geom type="sphere" size=".012" solref="-2e4 -200"/></body>"""
+
+    def judge(self, model, data, log):
+        low = 1e3 * min(q[2] for q in log)
+        end = 1e3 * data.qpos[2]
+        return bool(low > 9 and end < 20), f"the ball's centre is {low:.1f} mm high at its lowest (12 on the surface)"
+
+
+class Chain(Scene):
+    """Five rings hang in each other."""
+
+    seconds, step, count = 1.0, 0.001, 5
+    meshes = {"ring": (sample("torus"), ".01")}
+    bodies = "".join(
+        f'<body name="r{i}" pos="0 0 {-0.0125 * i:.4f}" quat="{"1 0 0 0" if i % 2 else ".7071 0 0 .7071"}">'
+        + ("<freejoint/>" if i else "")
+        + f'<geom name="r{i}" mesh="ring" euler="90 0 0" {STIFF} friction=".3"/></body>' for i in range(count))
+
+    def judge(self, model, data, log):
+        places = np.vstack([[[0, 0, 0]], data.qpos.reshape(-1, 7)[:, :3]])
+        gaps = 1e3 * np.linalg.norm(np.diff(places, axis=0), axis=1)
+        return bool(gaps.max() < 17), f"links {gaps.min():.1f} to {gaps.max():.1f} mm apart (linked below 13.5)"
+
+
+SCENES = {scene.__name__.lower(): scene for scene in (Nut, Mug, Pin, Bowl, Chain)}
+
+
+def write_obj(path, mesh):
+    vertices, faces = mesh
+    path.write_text("".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
+                    + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in np.asarray(faces).tolist()))
+
+
+def build(scene, way, folder):
+    """A compiled model, and the meshes of its geoms for the judgement."""
+    assets, pieces = [], {}
+    for name, (mesh, scale) in scene.meshes.items():
+        if way == "pieces":
+            parts = coacd.run_coacd(coacd.Mesh(*mesh), threshold=0.03)
+            pieces[name] = len(parts)
+            for k, part in enumerate(parts):
+                write_obj(folder / f"{name}{k}.obj", part)
+                assets.append(f'<mesh name="{name}{k}" file="{name}{k}.obj" scale="{scale} {scale} {scale}"/>')
+            continue
+        write_obj(folder / f"{name}.obj", mesh)
+        assets.append(f'<mesh name="{name}" file="{name}.obj" scale="{scale} {scale} {scale}" inertia="exact"/>')
+    bodies = scene.bodies
+    if way == "pieces":
+        import re
+
+        def split(found):
+            name = found[2]
+            return "".join(f'<geom{found[1].replace("name=", "class=", 0)} mesh="{name}{k}"{found[3]}/>'
+                           .replace(' name="', f' name="{k}') for k in range(pieces[name]))
+        bodies = re.sub(r'<geom([^>]*?) mesh="(\w+)"([^>]*?)/>', split, bodies)
+    bodies = bodies.replace(' mesh="', f' type="{"sdf" if way == "sdf" else "mesh"}" mesh="')
+    xml = f"""<mujoco><compiler meshdir="{folder}"/><option timestep="{scene.step}"/>
+      <asset>{"".join(assets)}</asset><worldbody>{bodies}</worldbody>{scene.options}</mujoco>"""
+    spec = mujoco.MjSpec.from_string(xml)
+    if way == "ist":
+        ist.mujoco.attach(spec, cache=folder.parent / "cache", **scene.settings)
+    return spec.compile()
+
+
+class Truth:
+    """Exact overlaps of the geoms' own meshes."""
+
+    def __init__(self, scene):
+        self.assets = {name: (ist.bake_surface(ist.close_mesh(ist.Mesh(mesh[0], np.asarray(mesh[1], np.uint32)),
+                                                              name=name)), float(scale))
+                       for name, (mesh, scale) in scene.meshes.items()}
+
+    def depth(self, model, data, scene):
+        solids = []
+        for geom in range(model.ngeom):
+            name = model.geom(geom).name
+            mesh = "knot" if name.startswith("k") else "ring" if name.startswith("r") else name
+            if mesh in self.assets:
+                solids.append((mesh, self.pose(model, data, geom)))
+        deepest = 0.0
+        for i, (first, pose) in enumerate(solids):
+            for second, other in solids[i + 1:]:
+                a, scale_a = self.assets[first]
+                b, scale_b = self.assets[second]
+                p = ist.penetration(a, b, other, poses_a=pose, scales=scale_b, scales_a=scale_a, measure="exact")
+                area = float(np.linalg.norm(p.force))
+                if area > 0:
+                    deepest = max(deepest, min(p.volume / area, float(np.cbrt(p.volume))))
+        return deepest
+
+    @staticmethod
+    def pose(model, data, geom):
+        """Of the mesh's file: MuJoCo moves a mesh to its centre and turns it to its axes."""
+        turn, back, q, t = np.empty(4), np.empty(4), np.empty(4), np.empty(3)
+        mujoco.mju_mat2Quat(turn, data.geom_xmat[geom])
+        mesh = model.geom_dataid[geom]
+        mujoco.mju_negQuat(back, model.mesh_quat[mesh])
+        mujoco.mju_mulQuat(q, turn, back)
+        mujoco.mju_rotVecQuat(t, model.mesh_pos[mesh], q)
+        return np.concatenate([q / np.linalg.norm(q), data.geom_xpos[geom] - t])
+
+
+def run(name, way, folder, films):
+    scene = SCENES[name]()
+    row = {"scene": name, "way": way}
+    try:
+        model = build(scene, way, folder)
+    except ValueError as error:
+        return row | {"holds": False, "words": str(error).splitlines()[0]}
+    data = mujoco.MjData(model)
+    truth = Truth(scene) if way != "pieces" else None
+    film = None
+    if films and way == "ist":
+        from ist.mujoco.film import Film
+        film = Film(model)
+    log, spent, depth, steps = [], 0.0, 0.0, round(scene.seconds / scene.step)
+    for step in range(steps):
+        start = time.perf_counter()
+        mujoco.mj_step(model, data)
+        spent += time.perf_counter() - start
+        if not np.isfinite(data.qpos).all() or np.abs(data.qpos).max() > 10:
+            return row | {"holds": False, "words": f"thrown out after {step + 1} steps",
+                          "steps_per_second": (step + 1) / spent}
+        log.append(data.qpos.copy())
+        if film:
+            film.add(data)
+        if truth and step % max(1, steps // 50) == 0:
+            depth = max(depth, truth.depth(model, data, scene))
+    if film:
+        film.write(films / f"{name}.glb")
+    holds, words = scene.judge(model, data, log)
+    row |= {"holds": bool(holds), "words": words, "steps_per_second": steps / spent}
+    if truth:
+        row["depth_mm"] = 1e3 * depth
+    return row
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"{', '.join(SCENES)}; default all")
+    parser.add_argument("--ways", nargs="+", default=["ist", "hulls", "sdf"] + (["pieces"] if coacd else []),
+                        choices=["ist", "hulls", "sdf", "pieces"])
+    parser.add_argument("--json", type=pathlib.Path, help="write the rows to this file")
+    parser.add_argument("--films", type=pathlib.Path, help="folder for films (.glb) of ist's way")
+    options = parser.parse_args()
+    unknown = set(options.scenes) - set(SCENES)
+    if unknown:
+        parser.error(f"no scene is named {sorted(unknown)[0]}: {', '.join(SCENES)}")
+    if options.films:
+        options.films.mkdir(parents=True, exist_ok=True)
+    rows = []
+    print(f"{'scene':8}{'way':8}{'holds':7}{'steps/s':>9}{'depth mm':>10}  what is seen")
+    with tempfile.TemporaryDirectory() as temporary:
+        for name in options.scenes or SCENES:
+            for way in options.ways:
+                folder = pathlib.Path(temporary) / f"{name}-{way}"
+                folder.mkdir()
+                row = run(name, way, folder, options.films)
+                rows.append(row)
+                depth = f"{row['depth_mm']:10.3f}" if "depth_mm" in row else " " * 10
+                print(f"{name:8}{way:8}{'yes' if row['holds'] else 'no':7}{row.get('steps_per_second', 0):9.0f}"
+                      f"{depth}  {row['words']}", flush=True)
+    if options.json:
+        options.json.write_text(json.dumps({"mujoco": mujoco.__version__, "rows": rows}, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
