@@ -389,6 +389,8 @@ typedef struct ist_separation_settings {
   uint32_t size;
   uint32_t max_visits;
   double deadline_us;
+  uint32_t inner_spheres; /* not 0: uses these even if both assets keep a mesh */
+  uint32_t reserved;      /* 0 */
 } ist_separation_settings_t;
 
 /* --- Answers ---------------------------------------------------------------------------------- */
@@ -407,13 +409,14 @@ typedef struct ist_penetration {
   uint32_t node_visits, sphere_pairs; /* with IST_EXACT: crossing triangles */
 } ist_penetration_t;
 
-/* Separation: all zero once inner spheres overlap. */
+/* Separation: between the surfaces if both assets keep a mesh, else between the inner spheres. All
+ * zero once these overlap. */
 typedef struct ist_separation {
   uint32_t size;
   ist_status_t status;
-  double distance;                   /* [u] between the inner spheres */
+  double distance;                   /* [u] between surfaces or inner spheres */
   double distance_min, distance_max; /* [u] the solids' distance lies within, certified */
-  double point_a[3], point_b[3];     /* [u] on the inner spheres, world */
+  double point_a[3], point_b[3];     /* [u] on the surfaces or spheres, world */
   double normal[3];                  /* unit, from A to B, world */
   uint32_t node_visits, sphere_pairs;
 } ist_separation_t;
@@ -577,6 +580,57 @@ ist_status_t ist_field_contact_patches(const ist_placed_field_t* a, const ist_pl
                                        const ist_contact_settings_t* settings,
                                        ist_workspace_t* workspace, ist_contact_patches_t* patches,
                                        ist_penetration_t* whole);
+
+/* --- Rays and points against one solid (surface.h) -------------------------------------------- */
+
+/* An asset must keep its mesh (IST_NOT_HELD). Of a field, rays meet half-spaces, balls, boxes,
+ * capsules and cylinders; the others answer IST_NOT_HELD. These functions need no workspace.
+ * Each answers `count` rays or points and returns the least of their statuses, or an error of the
+ * call. Without a mesh, or for a ray or point that is no number or too far, numbers are NaN. */
+
+typedef struct ist_ray {
+  double origin[3];    /* [u] world */
+  double direction[3]; /* world, of any length but 0 */
+  double longest;      /* [u] it ends there; 0: nowhere */
+} ist_ray_t;
+
+/* RayHit: where a ray meets the surface first, on its way out if it starts inside. */
+typedef struct ist_ray_hit {
+  ist_status_t status;
+  uint32_t triangle; /* of the kept mesh; UINT32_MAX: no hit, or a field */
+  double distance;   /* [u] infinite: no hit */
+  double point[3];   /* [u] world */
+  double normal[3];  /* unit, outward, world */
+} ist_ray_hit_t;
+
+/* SurfacePoint: the nearest point of the surface. */
+typedef struct ist_surface_point {
+  ist_status_t status;
+  uint32_t triangle;  /* as above */
+  double distance;    /* [u] signed: < 0 inside */
+  double error;       /* [u] the solid's distance is within this of `distance` */
+  double point[3];    /* [u] world */
+  double gradient[3]; /* of the distance: unit, outward, world */
+} ist_surface_point_t;
+
+/* `hit_size`: sizeof(ist_ray_hit_t). */
+ist_status_t ist_raycast(const ist_placed_tree_t* solid, const ist_ray_t* rays, size_t count,
+                         ist_ray_hit_t* hits, size_t hit_size);
+ist_status_t ist_field_raycast(const ist_placed_field_t* solid, const ist_ray_t* rays, size_t count,
+                               ist_ray_hit_t* hits, size_t hit_size);
+
+/* `points`: [3 · count]. `answer_size`: sizeof(ist_surface_point_t). */
+ist_status_t ist_closest_point(const ist_placed_tree_t* solid, const double* points, size_t count,
+                               ist_surface_point_t* answers, size_t answer_size);
+ist_status_t ist_field_closest_point(const ist_placed_field_t* solid, const double* points,
+                                     size_t count, ist_surface_point_t* answers,
+                                     size_t answer_size);
+
+/* IST_OVERLAP_YES: inside; IST_OVERLAP_NO: outside; IST_OVERLAP_UNKNOWN: the status says why. */
+ist_status_t ist_contains(const ist_placed_tree_t* solid, const double* points, size_t count,
+                          ist_overlapping_t* inside);
+ist_status_t ist_field_contains(const ist_placed_field_t* solid, const double* points, size_t count,
+                                ist_overlapping_t* inside);
 
 /* --- Wrenches (wrench.h): force and torque on both bodies ------------------------------------- */
 

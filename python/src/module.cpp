@@ -36,6 +36,7 @@ NB_MODULE(_core, module) {
   python::add_fields(module);
   python::add_penetration(module);
   python::add_separation(module);
+  python::add_surfaces(module);
   python::add_time_of_impact(module);
   python::add_gpu(module);
   module.attr("__name__") = own_name;

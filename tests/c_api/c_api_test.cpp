@@ -245,7 +245,10 @@ TEST(CApi, SurfaceAlone) {
   EXPECT_TRUE(std::isnan(answer.volume) && std::isnan(answer.translation_gradient[2]));
   ist_separation_t gap = {};
   gap.size = sizeof gap;
-  EXPECT_EQ(ist_separation(&placed, &placed, nullptr, &workspace, &gap), IST_NOT_HELD);
+  ist_separation_settings_t spheres = {};
+  spheres.size = sizeof spheres;
+  spheres.inner_spheres = 1;
+  EXPECT_EQ(ist_separation(&placed, &placed, &spheres, &workspace, &gap), IST_NOT_HELD);
   EXPECT_TRUE(std::isnan(gap.distance));
   const ist_ball_set_t set = {sizeof set, IST_INNER, 0, 0};
   std::size_t count = 1;

@@ -24,7 +24,7 @@ TEST(GpuSeparationOracle, IntervalsHoldTheSolidsDistance) {
       const auto [a, b] = placed(rows[i], kSpheres);
       ASSERT_EQ(&a.tree.header(), &first.tree.header());
       ASSERT_EQ(&b.tree.header(), &second.tree.header());
-      const Separation cpu = separation(a, b, {}, workspace);
+      const Separation cpu = separation(a, b, {.inner_spheres = true}, workspace);
       const Separation& gpu = answers[i];
       const double exact = rows[i].solid_distance();
       ASSERT_EQ(gpu.status, QueryStatus::ok);

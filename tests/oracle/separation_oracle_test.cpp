@@ -18,7 +18,7 @@ TEST(SeparationOracle, IntervalsHoldTheSolidsDistance) {
     std::vector<double> widths;
     for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
       const auto [a, b] = testing::placed(row, spheres);
-      const Separation answer = separation(a, b, {}, workspace);
+      const Separation answer = separation(a, b, {.inner_spheres = true}, workspace);
       const double exact = row.solid_distance();
       ASSERT_EQ(answer.status, QueryStatus::ok);
       EXPECT_LE(answer.distance_min, exact) << "row " << row.id << ", " << spheres;
@@ -36,6 +36,21 @@ TEST(SeparationOracle, IntervalsHoldTheSolidsDistance) {
     last_width = median;
   }
   EXPECT_LE(last_width, 0.03);
+}
+
+/// Of the surfaces: the distance itself, to the digits that the oracle has.
+TEST(SeparationOracle, SurfacesAreAtTheSolidsDistance) {
+  IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
+  Workspace workspace;
+  for (const char* const key : {"eledino", "ico1k"})
+    for (const testing::OracleRow& row : testing::read_oracle_rows(key)) {
+      const auto [a, b] = testing::placed(row, 300);
+      const Separation answer = separation(a, b, {}, workspace);
+      ASSERT_EQ(answer.status, QueryStatus::ok);
+      EXPECT_NEAR(answer.distance, row.solid_distance(), 1e-9 * row.solid_distance())
+          << key << " row " << row.id;
+      EXPECT_LE(answer.distance_max - answer.distance_min, 1e-11);
+    }
 }
 
 }  // namespace

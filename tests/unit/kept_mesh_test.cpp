@@ -228,7 +228,8 @@ TEST_F(SurfaceAlone, AnswersNoQueryOfSpheres) {
       EXPECT_EQ(found.count, 0u);
       without_protrusion(std::span(patches).first(0), a, b, contact);
     }
-    expect_not_held(separation(a, b, {}, workspace_));
+    expect_not_held(separation(a, b, {.inner_spheres = true}, workspace_));
+    EXPECT_EQ(separation(a, b, {}, workspace_).status, QueryStatus::ok);
     expect_not_held(time_of_impact(a, b, {}, {}, workspace_));
     EXPECT_EQ(overlap(a, b, workspace_), Overlapping::unknown);
     EXPECT_EQ(overlap_lenses(a, b, {}, {}).status, QueryStatus::not_held);

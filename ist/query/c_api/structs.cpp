@@ -38,6 +38,7 @@ ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& se
   if (given->size != sizeof *given) return IST_WRONG_SIZE;
   settings.max_visits = given->max_visits;
   settings.deadline_us = given->deadline_us;
+  settings.inner_spheres = given->inner_spheres != 0;
   return IST_OK;
 }
 

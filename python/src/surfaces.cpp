@@ -1,0 +1,197 @@
+#include <ist/surface.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+
+#include <ist/error.h>
+
+#include "penetration.h"
+
+namespace ist::python {
+namespace {
+
+struct RayHits {
+  explicit RayHits(const Shape& rows)
+      : distance(rows, {}), point(rows, {3}), normal(rows, {3}), triangle(rows, {}),
+        status(rows, {}) {}
+
+  void write(std::size_t i, const RayHit& hit) const {
+    *distance.row(i) = hit.distance;
+    Vector(point.row(i)) = hit.point;
+    Vector(normal.row(i)) = hit.normal;
+    *triangle.row(i) = hit.triangle;
+    *status.row(i) = static_cast<std::uint32_t>(hit.status);
+  }
+
+  Column<double> distance, point, normal;
+  Column<std::uint32_t> triangle, status;
+};
+
+struct SurfacePoints {
+  explicit SurfacePoints(const Shape& rows)
+      : distance(rows, {}), error(rows, {}), point(rows, {3}), gradient(rows, {3}),
+        triangle(rows, {}), status(rows, {}) {}
+
+  void write(std::size_t i, const SurfacePoint& foot) const {
+    *distance.row(i) = foot.distance;
+    *error.row(i) = foot.error;
+    Vector(point.row(i)) = foot.point;
+    Vector(gradient.row(i)) = foot.gradient;
+    *triangle.row(i) = foot.triangle;
+    *status.row(i) = static_cast<std::uint32_t>(foot.status);
+  }
+
+  Column<double> distance, error, point, gradient;
+  Column<std::uint32_t> triangle, status;
+};
+
+/// A solid at a pose, in the place of a Row's first.
+Row placed_alone(const Solid& solid, const py::object& pose, double scale) {
+  Row row;
+  row.a = &solid;
+  row.scale_a = scale;
+  if (pose.is_none()) return row;
+  const Doubles values = take_doubles(pose, "pose", "(7,): qw, qx, qy, qz, tx, ty, tz");
+  if (values.ndim() != 1 || values.shape(0) != 7)
+    refuse_shape(values, "pose", "(7,): qw, qx, qy, qz, tx, ty, tz");
+  std::copy_n(values.data(), 4, row.pose_a.q);
+  std::copy_n(values.data() + 4, 3, row.pose_a.t);
+  return row;
+}
+
+/// (3,) or (n, 3).
+struct Places {
+  Places(const py::object& value, const char* name)
+      : held(take_doubles(value, name, "(3,) or (n, 3)")) {
+    if (held.ndim() < 1 || held.ndim() > 2 || held.shape(held.ndim() - 1) != 3)
+      refuse_shape(held, name, "(3,) or (n, 3)");
+    if (held.ndim() == 2) rows = {held.shape(0)};
+    count = held.ndim() == 2 ? held.shape(0) : 1;
+  }
+  Eigen::Vector3d at(std::size_t i) const {
+    const double* const x = held.data() + (held.ndim() == 2 ? 3 * i : 0);
+    return {x[0], x[1], x[2]};
+  }
+
+  Doubles held;
+  Shape rows;
+  std::size_t count = 0;
+};
+
+/// ask(placed, i) for each of `count`, the GIL released. Where the solid does not hold what is
+/// asked, nothing is answered.
+template <class Ask>
+void ask_places(const Row& row, std::size_t count, const Ask& ask) {
+  bool held = true;
+  {
+    const py::gil_scoped_release released;
+    row.answer([&](const auto& placed, const PlacedTree&) {
+      for (std::size_t i = 0; i < count && held; ++i)
+        held = ask(placed, i) != QueryStatus::not_held;
+    });
+  }
+  if (!held)
+    throw Error(
+        "solid: has no mesh, or is a Field that no ray can be cast at; bake it with its mesh, or "
+        "use another Field");
+}
+
+constexpr const char* kRaycastDoc = R"(Where rays meet a solid's surface first.
+
+solid: an Asset that keeps its mesh, or a Field (half-space, ball, box, capsule, cylinder).
+pose: (7,), None: at the origin. origins, directions: (3,) or (n, 3) [u], world; directions of any
+length but 0. longest: [u] rays end there. A ray that starts inside meets the surface on its way out.
+
+Returns RayHits: arrays of one row a ray, or numbers and (3,) arrays for one ray.)";
+
+constexpr const char* kClosestPointDoc = R"(Signed distance, nearest point and gradient.
+
+solid, pose: as raycast() has them; any Field. points: (3,) or (n, 3) [u], world.
+
+Returns SurfacePoints: arrays of one row a point, or numbers and (3,) arrays for one point.)";
+
+constexpr const char* kContainsDoc = R"(Whether points are inside a solid.
+
+Arguments as closest_point() has them.
+
+Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown: no usable point or pose; a number for
+one point.)";
+
+}  // namespace
+
+void add_surfaces(py::module_& module) {
+  py::class_<RayHits> hits(module, "RayHits", "Where rays meet a surface first.");
+  add_column(hits, "distance", &RayHits::distance, "(n,) [u] inf: no hit.");
+  add_column(hits, "point", &RayHits::point, "(n, 3) [u] world; zero without a hit.");
+  add_column(hits, "normal", &RayHits::normal, "(n, 3) unit, outward, world.");
+  add_column(hits, "triangle", &RayHits::triangle,
+             "(n,) uint32, of the kept mesh; 2**32 - 1: no hit, or a Field.");
+  add_column(hits, "status", &RayHits::status, "(n,) uint32, a QueryStatus.");
+  py::class_<SurfacePoints> points(module, "SurfacePoints", "Nearest points of a surface.");
+  add_column(points, "distance", &SurfacePoints::distance, "(n,) [u] signed: < 0 inside.");
+  add_column(points, "error", &SurfacePoints::error,
+             "(n,) [u] the solid's distance is within this of `distance`.");
+  add_column(points, "point", &SurfacePoints::point, "(n, 3) [u] on the surface, world.");
+  add_column(points, "gradient", &SurfacePoints::gradient,
+             "(n, 3) of the distance by the point: unit, outward, world.");
+  add_column(points, "triangle", &SurfacePoints::triangle, "(n,) uint32, as RayHits has it.");
+  add_column(points, "status", &SurfacePoints::status, "(n,) uint32, a QueryStatus.");
+
+  module.def(
+      "raycast",
+      [](const py::object& solid, const py::object& pose, const py::object& origins,
+         const py::object& directions, double longest, double scale) {
+        const Solid view = solid_of(solid, "solid");
+        const Row row = placed_alone(view, pose, scale);
+        const Places from(origins, "origins"), along(directions, "directions");
+        if (!from.rows.empty() && !along.rows.empty() && from.count != along.count)
+          throw value_error("directions: " + std::to_string(along.count) + " rows; origins have " +
+                            std::to_string(from.count));
+        const Shape& shape = from.rows.empty() ? along.rows : from.rows;
+        auto answers = std::make_unique<RayHits>(shape);
+        ask_places(row, shape.empty() ? 1 : shape[0], [&](const auto& placed, std::size_t i) {
+          const RayHit hit = raycast(placed, Ray{from.at(i), along.at(i), longest});
+          answers->write(i, hit);
+          return hit.status;
+        });
+        return answers;
+      },
+      py::arg("solid"), py::arg("pose").none(), py::arg("origins"), py::arg("directions"),
+      py::kw_only(), py::arg("longest") = std::numeric_limits<double>::infinity(),
+      py::arg("scale") = 1.0, kRaycastDoc);
+  module.def(
+      "closest_point",
+      [](const py::object& solid, const py::object& pose, const py::object& points, double scale) {
+        const Solid view = solid_of(solid, "solid");
+        const Row row = placed_alone(view, pose, scale);
+        const Places places(points, "points");
+        auto answers = std::make_unique<SurfacePoints>(places.rows);
+        ask_places(row, places.count, [&](const auto& placed, std::size_t i) {
+          const SurfacePoint foot = closest_point(placed, places.at(i));
+          answers->write(i, foot);
+          return foot.status;
+        });
+        return answers;
+      },
+      py::arg("solid"), py::arg("pose").none(), py::arg("points"), py::kw_only(),
+      py::arg("scale") = 1.0, kClosestPointDoc);
+  module.def(
+      "contains",
+      [](const py::object& solid, const py::object& pose, const py::object& points, double scale) {
+        const Solid view = solid_of(solid, "solid");
+        const Row row = placed_alone(view, pose, scale);
+        const Places places(points, "points");
+        const Column<std::uint32_t> answers(places.rows, {});
+        ask_places(row, places.count, [&](const auto& placed, std::size_t i) {
+          const Containment found = contains(placed, places.at(i));
+          *answers.row(i) = found.status != QueryStatus::ok ? 2 : found.inside ? 1 : 0;
+          return found.status;
+        });
+        return answers.handed_out();
+      },
+      py::arg("solid"), py::arg("pose").none(), py::arg("points"), py::kw_only(),
+      py::arg("scale") = 1.0, kContainsDoc);
+}
+
+}  // namespace ist::python
