@@ -179,13 +179,12 @@ Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
 
 /// Distance, witness points, and a certified interval for the solids.
 ///
-/// If both assets keep a mesh (TreeView::has_mesh), this is the distance of the surfaces. The interval
-/// is as wide as rounding and the error of simplified meshes. It is zero if the surfaces cross or one
-/// solid holds the other.
-/// Otherwise it is the distance of the inner spheres, exact to about 1e-6 of the objects' size, and
-/// all zero once these overlap.
-/// A stopped query returns the nearest points that it found; its interval is certified all the same.
-/// Batches on the GPU (<ist/gpu_query.h>) always use the inner spheres.
+/// If both assets keep a mesh (TreeView::has_mesh), this is the distance of the surfaces. The
+/// interval is as wide as rounding and the error of simplified meshes. It is zero if the surfaces
+/// cross or one solid holds the other. Otherwise it is the distance of the inner spheres, exact to
+/// about 1e-6 of the objects' size, and all zero once these overlap. A stopped query returns the
+/// nearest points that it found; its interval is certified all the same. Batches on the GPU
+/// (<ist/gpu_query.h>) always use the inner spheres.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 Separation separation(const PlacedTree& a, const PlacedTree& b, const SeparationSettings& settings,

@@ -26,7 +26,7 @@ namespace IST_API ist {
 
 struct Ray {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  ///< of any length but 0
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();      ///< of any length but 0
   double longest = std::numeric_limits<double>::infinity();  ///< [u] > 0: it ends there
 };
 

@@ -166,8 +166,7 @@ class GapDescent {
 
 /// Between the surfaces that both assets keep.
 Separation surface_separation(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
-                              const SeparationSettings& settings,
-                              ExactScratch& scratch) noexcept {
+                              const SeparationSettings& settings, ExactScratch& scratch) noexcept {
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   Budget budget(limits_of(settings), kForVisits);
   const MeshGap found = mesh_gap(mesh_a, mesh_b, pose.a_from_b, pose.b_from_a, budget, scratch);
@@ -181,10 +180,9 @@ Separation surface_separation(const PlacedTree& a, const PlacedTree& b, const Re
     result.distance_max = unit * simplified;
     return result;
   }
-  const double error = simplified + mesh_a.header->rounding +
-                       pose.a_from_b.scale * mesh_b.header->rounding +
-                       moved_by_poses(a, b, mesh_b, pose) +
-                       1e-15 * pose.unit_origin_a.norm() / unit;
+  const double error =
+      simplified + mesh_a.header->rounding + pose.a_from_b.scale * mesh_b.header->rounding +
+      moved_by_poses(a, b, mesh_b, pose) + 1e-15 * pose.unit_origin_a.norm() / unit;
   const auto world = [&](const exact::Point& p) { return pose.to_world({p.x, p.y, p.z}); };
   const exact::Point between = found.b - found.a;
   result.distance = unit * found.distance;

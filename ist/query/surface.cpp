@@ -75,8 +75,9 @@ struct OwnRay {
       return std::nullopt;
     // Halves: a power of two keeps the digits, and neither it nor a square overflows.
     const int exponent = std::ilogb(largest);
-    const Vector3d scaled = ray.direction.unaryExpr(
-        [&](double x) { return std::ldexp(std::ldexp(x, -exponent / 2), exponent / 2 - exponent); });
+    const Vector3d scaled = ray.direction.unaryExpr([&](double x) {
+      return std::ldexp(std::ldexp(x, -exponent / 2), exponent / 2 - exponent);
+    });
     return OwnRay{*origin, (frame.rotation.transpose() * scaled).normalized(),
                   std::min(ray.longest, kFarthest) / frame.unit};
   }
@@ -113,8 +114,8 @@ class PlacedMesh {
     // Nothing is further.
     const double length = std::min(ray->longest, ray->origin.cwiseAbs().sum() + 4 * extent_);
     const Vector3d end = ray->origin + length * ray->direction;
-    const MeshHit hit = end == ray->origin ? MeshHit()
-                                           : first_hit(*mesh_, point(ray->origin), point(end));
+    const MeshHit hit =
+        end == ray->origin ? MeshHit() : first_hit(*mesh_, point(ray->origin), point(end));
     if (hit.triangle == ~0u) return {};
     return hit_at(*frame_, *ray, hit.t * length, vector(hit.normal).normalized(), hit.triangle);
   }
@@ -127,8 +128,8 @@ class PlacedMesh {
     const double away = std::sqrt(foot.squared);
     const double side = is_inside({*mesh_}, point(*x)) ? -1 : 1;
     // Next to the surface the way to it is rounding.
-    const double rounding = 1e-14 * (extent_ + away) +
-                            1e-15 * (frame_->origin.norm() + given.norm()) / frame_->unit;
+    const double rounding =
+        1e-14 * (extent_ + away) + 1e-15 * (frame_->origin.norm() + given.norm()) / frame_->unit;
     const Vector3d gradient =
         away > rounding ? side / away * (*x - vector(foot.at)) : vector(foot.normal).normalized();
     return {side * away * frame_->unit,
@@ -214,7 +215,9 @@ Chord chord_of(const CapsuleShape& s, const Vector3d& x, const Vector3d& d) noex
 }
 
 template <class Shape>
-concept HasChord = requires(const Shape& s, const Vector3d& x) { chord_of(s, x, x); };
+concept HasChord = requires(const Shape& s, const Vector3d& x) {
+  chord_of(s, x, x);
+};
 
 template <class Shape>
 RayHit shape_hit(Shape& shape, const OwnFrame& frame, const OwnRay& ray) noexcept {

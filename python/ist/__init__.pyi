@@ -315,6 +315,34 @@ class Penetration:
     def sphere_pairs(self) -> _Column: ...  # (n,)
 
 @final
+class RayHits:
+    @property
+    def distance(self) -> _Column: ...  # (n,) [u] inf: no hit
+    @property
+    def point(self) -> NDArray[np.float64]: ...  # (n, 3) [u] world
+    @property
+    def normal(self) -> NDArray[np.float64]: ...  # (n, 3) unit, outward
+    @property
+    def triangle(self) -> _Column: ...  # (n,)
+    @property
+    def status(self) -> _Column: ...  # (n,) QueryStatus
+
+@final
+class SurfacePoints:
+    @property
+    def distance(self) -> _Column: ...  # (n,) [u] < 0 inside
+    @property
+    def error(self) -> _Column: ...  # (n,) [u]
+    @property
+    def point(self) -> NDArray[np.float64]: ...  # (n, 3) [u] world
+    @property
+    def gradient(self) -> NDArray[np.float64]: ...  # (n, 3) unit, outward
+    @property
+    def triangle(self) -> _Column: ...  # (n,)
+    @property
+    def status(self) -> _Column: ...  # (n,) QueryStatus
+
+@final
 class Separation:
     @property
     def distance(self) -> _Column: ...  # (n,) [u]
@@ -405,13 +433,23 @@ def penetration_of_pairs(
 def separation(
     a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, max_visits: int = 0,
-    deadline_us: float = 0.0, threads: int = 0,
+    deadline_us: float = 0.0, inner_spheres: bool = False, threads: int = 0,
 ) -> Separation: ...
 def separation_of_pairs(
     solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *,
     scales: ArrayLike | None = None, max_visits: int = 0, deadline_us: float = 0.0,
-    threads: int = 0,
+    inner_spheres: bool = False, threads: int = 0,
 ) -> Separation: ...
+def raycast(
+    solid: Asset | Field, pose: ArrayLike | None, origins: ArrayLike, directions: ArrayLike, *,
+    longest: float = ..., scale: float = 1.0,
+) -> RayHits: ...
+def closest_point(
+    solid: Asset | Field, pose: ArrayLike | None, points: ArrayLike, *, scale: float = 1.0,
+) -> SurfacePoints: ...
+def contains(
+    solid: Asset | Field, pose: ArrayLike | None, points: ArrayLike, *, scale: float = 1.0,
+) -> Any: ...  # (n,) uint32, Overlapping
 def contact_patches(
     a: Asset | Field, b: Asset, poses: ArrayLike, *, max_patches: int = 8,
     scales: ArrayLike | None = None, poses_a: ArrayLike | None = None,

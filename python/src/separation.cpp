@@ -142,9 +142,11 @@ py::object overlaps(const Rows& rows, unsigned threads) {
 }
 
 constexpr const char* kSeparationDoc =
-    R"(Distance of the inner spheres, and a certified interval for the solids.
+    R"(Distance, nearest points, and a certified interval for the solids.
 
-Arguments as for penetration(). max_visits, deadline_us [µs]: 0: no limit.
+If both assets keep a mesh, the distance of their surfaces. Otherwise, or with inner_spheres=True,
+that of their inner spheres. Arguments as for penetration(). max_visits, deadline_us [µs]: 0: no
+limit.
 
 Returns a Separation: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
 
@@ -172,16 +174,17 @@ Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown; a number for one po
 
 void add_classes(py::module_& module) {
   py::class_<Separations> separation(module, "Separation",
-                                     "Gaps of placed solids; all zero if inner spheres overlap.");
-  add_column(separation, "distance", &Separations::distance, "(n,) [u] between the inner spheres.");
+                                     "Gaps of placed solids; all zero if these overlap.");
+  add_column(separation, "distance", &Separations::distance,
+             "(n,) [u] between surfaces or inner spheres.");
   add_column(separation, "distance_min", &Separations::distance_min,
              "(n,) [u] the true distance of the solids is at least this, certified.");
   add_column(separation, "distance_max", &Separations::distance_max,
              "(n,) [u] and at most this, certified.");
   add_column(separation, "point_a", &Separations::point_a,
-             "(n, 3) [u] on A's inner spheres, world.");
+             "(n, 3) [u] on A's surface or spheres, world.");
   add_column(separation, "point_b", &Separations::point_b,
-             "(n, 3) [u] on B's inner spheres, world.");
+             "(n, 3) [u] on B's surface or spheres, world.");
   add_column(separation, "normal", &Separations::normal, "(n, 3) unit, from A to B, world.");
   add_column(separation, "status", &Separations::status, "(n,) uint32, a QueryStatus.");
   add_column(separation, "node_visits", &Separations::node_visits, "(n,) uint32.");
@@ -222,24 +225,25 @@ void add_separation(py::module_& module) {
       "separation",
       [](const py::object& a, const py::object& b, const py::object& poses,
          const py::object& scales, const py::object& poses_a, const py::object& scales_a,
-         std::uint32_t max_visits, double deadline_us, unsigned threads) {
+         std::uint32_t max_visits, double deadline_us, bool inner_spheres, unsigned threads) {
         return separations(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
-                           {max_visits, deadline_us}, threads);
+                           {max_visits, deadline_us, inner_spheres}, threads);
       },
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
-      py::arg("threads") = 0, kSeparationDoc);
+      py::arg("inner_spheres") = false, py::arg("threads") = 0, kSeparationDoc);
   module.def(
       "separation_of_pairs",
       [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
-         const py::object& scales, std::uint32_t max_visits, double deadline_us, unsigned threads) {
-        return separations(Rows::of_scene(solids, poses, pairs, scales), {max_visits, deadline_us},
-                           threads);
+         const py::object& scales, std::uint32_t max_visits, double deadline_us, bool inner_spheres,
+         unsigned threads) {
+        return separations(Rows::of_scene(solids, poses, pairs, scales),
+                           {max_visits, deadline_us, inner_spheres}, threads);
       },
       py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
-      py::arg("threads") = 0,
+      py::arg("inner_spheres") = false, py::arg("threads") = 0,
       "separation() for pairs of solids of scenes, with the arguments of penetration_of_pairs().");
   module.def(
       "contact_patches",

@@ -13,7 +13,10 @@ namespace {
 
 struct RayHits {
   explicit RayHits(const Shape& rows)
-      : distance(rows, {}), point(rows, {3}), normal(rows, {3}), triangle(rows, {}),
+      : distance(rows, {}),
+        point(rows, {3}),
+        normal(rows, {3}),
+        triangle(rows, {}),
         status(rows, {}) {}
 
   void write(std::size_t i, const RayHit& hit) const {
@@ -30,8 +33,12 @@ struct RayHits {
 
 struct SurfacePoints {
   explicit SurfacePoints(const Shape& rows)
-      : distance(rows, {}), error(rows, {}), point(rows, {3}), gradient(rows, {3}),
-        triangle(rows, {}), status(rows, {}) {}
+      : distance(rows, {}),
+        error(rows, {}),
+        point(rows, {3}),
+        gradient(rows, {3}),
+        triangle(rows, {}),
+        status(rows, {}) {}
 
   void write(std::size_t i, const SurfacePoint& foot) const {
     *distance.row(i) = foot.distance;

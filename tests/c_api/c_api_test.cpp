@@ -7,6 +7,7 @@
 #include <ist/mass_properties.h>
 #include <ist/overlap.h>
 #include <ist/query.h>
+#include <ist/surface.h>
 #include <ist/time_of_impact.h>
 #include <ist/wrench.h>
 
@@ -255,6 +256,57 @@ TEST(CApi, SurfaceAlone) {
   EXPECT_EQ(ist_tree_get_balls(&tree, &set, nullptr, 0, &count), IST_NOT_HELD);
   EXPECT_EQ(count, 0u);
   EXPECT_EQ(ist_workspace_release(&workspace), IST_OK);
+}
+
+TEST(CApi, RaysAndPointsHaveTheBitsOfCpp) {
+  const Asset asset = bake_surface(close_mesh(testing::icosphere_mesh(3), "ball"));
+  const ist_tree_t tree = viewed(asset);
+  const PlacedTree placed{asset.view(), {{0.6, 0, 0.8, 0}, {1, 2, 3}}, 0.7};
+  const ist_placed_tree_t c_placed = {sizeof c_placed, &tree,
+                                      std::bit_cast<ist_pose_t>(placed.pose), placed.scale};
+  const double points[] = {1, 2.1, 3, 4, 5, 6, 1.3, 2, 3.2};
+  ist_ray_t rays[3] = {};
+  ist_ray_hit_t hits[3];
+  ist_surface_point_t feet[3];
+  ist_overlapping_t inside[3];
+  for (int i = 0; i < 3; ++i) {
+    std::copy_n(points + 3 * i, 3, rays[i].origin);
+    for (int k = 0; k < 3; ++k) rays[i].direction[k] = placed.pose.t[k] - points[3 * i + k];
+  }
+  ASSERT_EQ(ist_raycast(&c_placed, rays, 3, hits, sizeof *hits), IST_OK);
+  ASSERT_EQ(ist_closest_point(&c_placed, points, 3, feet, sizeof *feet), IST_OK);
+  ASSERT_EQ(ist_contains(&c_placed, points, 3, inside), IST_OK);
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d x(points + 3 * i);
+    const RayHit hit = raycast(placed, Ray{x, Eigen::Vector3d(rays[i].direction)});
+    const SurfacePoint foot = closest_point(placed, x);
+    EXPECT_SAME(hits[i].distance, hit.distance);
+    EXPECT_EQ(hits[i].triangle, hit.triangle);
+    expect_same(hits[i].point, hit.point);
+    expect_same(hits[i].normal, hit.normal);
+    EXPECT_SAME(feet[i].distance, foot.distance);
+    EXPECT_SAME(feet[i].error, foot.error);
+    expect_same(feet[i].point, foot.point);
+    expect_same(feet[i].gradient, foot.gradient);
+    EXPECT_EQ(inside[i], contains(placed, x).inside ? IST_OVERLAP_YES : IST_OVERLAP_NO);
+  }
+  ist_field_t ball = {};
+  ball.size = sizeof ball;
+  ball.kind = IST_BALL;
+  ball.as.ball.radius = 0.5;
+  const ist_placed_field_t c_ball = {sizeof c_ball, &ball, IST_POSE_IDENTITY, 1};
+  ASSERT_EQ(ist_field_closest_point(&c_ball, points, 3, feet, sizeof *feet), IST_OK);
+  EXPECT_NEAR(feet[0].distance, std::sqrt(14.41) - 0.5, 1e-12);
+  ASSERT_EQ(ist_field_contains(&c_ball, points, 3, inside), IST_OK);
+  ASSERT_EQ(ist_field_raycast(&c_ball, rays, 3, hits, sizeof *hits), IST_OK);
+  rays[1].direction[0] = rays[1].direction[1] = rays[1].direction[2] = 0;
+  EXPECT_EQ(ist_raycast(&c_placed, rays, 3, hits, sizeof *hits), IST_INVALID_INPUT);
+  EXPECT_TRUE(std::isnan(hits[1].distance) && hits[2].status == IST_OK);
+  EXPECT_EQ(ist_raycast(nullptr, rays, 3, hits, sizeof *hits), IST_NULL_POINTER);
+  EXPECT_EQ(ist_raycast(&c_placed, nullptr, 3, hits, sizeof *hits), IST_NULL_POINTER);
+  EXPECT_EQ(ist_raycast(&c_placed, rays, 3, hits, 8), IST_WRONG_SIZE);
+  EXPECT_EQ(ist_contains(&c_placed, points, 3, nullptr), IST_NULL_POINTER);
+  EXPECT_EQ(ist_contains(&c_placed, nullptr, 0, nullptr), IST_OK);
 }
 
 /// The spheres that the asset's layout has, at every level of detail.

@@ -50,11 +50,11 @@ std::vector<Body> bodies() {
   out.emplace_back(testing::icosphere_mesh(3));
   out.emplace_back(testing::torus_mesh(0.35, 0.14, 40, 20));
   // Two shells, and a cavity.
-  out.emplace_back(testing::joined(testing::box_mesh({-1, -1, -1}, {1, 1, 1}),
-                                   testing::inverted(testing::box_mesh({-0.8, -0.8, -0.8},
-                                                                       {0.8, 0.8, 0.8}))));
-  out.emplace_back(testing::joined(testing::box_mesh({-2, -1, -1}, {-1.1, 1, 1}),
-                                   testing::icosphere_mesh(2)));
+  out.emplace_back(
+      testing::joined(testing::box_mesh({-1, -1, -1}, {1, 1, 1}),
+                      testing::inverted(testing::box_mesh({-0.8, -0.8, -0.8}, {0.8, 0.8, 0.8}))));
+  out.emplace_back(
+      testing::joined(testing::box_mesh({-2, -1, -1}, {-1.1, 1, 1}), testing::icosphere_mesh(2)));
   return out;
 }
 
@@ -71,9 +71,8 @@ double winding(const std::vector<exact::FlatTriangle>& triangles, const Vector3d
   for (const exact::FlatTriangle& t : triangles) {
     const Vector3d a = vector(t.corner[0]) - x, b = vector(t.corner[1]) - x,
                    c = vector(t.corner[2]) - x;
-    sum += 2 * std::atan2(a.dot(b.cross(c)), a.norm() * b.norm() * c.norm() +
-                                                 a.dot(b) * c.norm() + b.dot(c) * a.norm() +
-                                                 c.dot(a) * b.norm());
+    sum += 2 * std::atan2(a.dot(b.cross(c)), a.norm() * b.norm() * c.norm() + a.dot(b) * c.norm() +
+                                                 b.dot(c) * a.norm() + c.dot(a) * b.norm());
   }
   return sum / (4 * std::numbers::pi);
 }
@@ -184,8 +183,7 @@ TEST(Surface, PointsOnTheSurface) {
   std::mt19937_64 random(3);
   const PlacedTree placed{body.asset.view(), testing::random_pose(random, 5), 3};
   for (const exact::FlatTriangle& t : body.triangles(placed)) {
-    const Vector3d middle =
-        (vector(t.corner[0]) + vector(t.corner[1]) + vector(t.corner[2])) / 3;
+    const Vector3d middle = (vector(t.corner[0]) + vector(t.corner[1]) + vector(t.corner[2])) / 3;
     for (const Vector3d& x : {middle, vector(t.corner[0])}) {
       const SurfacePoint got = closest_point(placed, x);
       EXPECT_LE(std::abs(got.distance), got.error);
@@ -242,13 +240,14 @@ TEST(Surface, WhatIsNotUsableOrHeldIsNotAnswered) {
   expect(PlacedTree{bare.view(), {}, 1}, {}, QueryStatus::not_held);
   expect_point(PlacedTree{bare.view(), {}, 1}, zero, QueryStatus::not_held);
   expect(PlacedField{MeshField{bare.view()}, {}, 1}, {}, QueryStatus::not_held);
-  for (const Ray& ray : {Ray{zero, zero}, Ray{zero, {nan, 1, 0}}, Ray{{nan, 0, 0}}, Ray{{1e90, 0, 0}},
-                         Ray{zero, {kInfinity, 0, 0}}, Ray{zero, Vector3d::UnitX(), 0},
-                         Ray{zero, Vector3d::UnitX(), nan}}) {
+  for (const Ray& ray : {Ray{zero, zero}, Ray{zero, {nan, 1, 0}}, Ray{{nan, 0, 0}},
+                         Ray{{1e90, 0, 0}}, Ray{zero, {kInfinity, 0, 0}},
+                         Ray{zero, Vector3d::UnitX(), 0}, Ray{zero, Vector3d::UnitX(), nan}}) {
     expect(good, ray, QueryStatus::invalid_input);
     expect(PlacedField{BallField{1}, {}, 1}, ray, QueryStatus::invalid_input);
   }
-  for (const Vector3d& x : {Vector3d(nan, 0, 0), Vector3d(0, kInfinity, 0), Vector3d(0, 0, 1e300)}) {
+  for (const Vector3d& x :
+       {Vector3d(nan, 0, 0), Vector3d(0, kInfinity, 0), Vector3d(0, 0, 1e300)}) {
     expect_point(good, x, QueryStatus::invalid_input);
     expect_point(PlacedField{BallField{1}, {}, 1}, x, QueryStatus::invalid_input);
   }
@@ -265,8 +264,9 @@ TEST(Surface, WhatIsNotUsableOrHeldIsNotAnswered) {
   // Directions of any length, and origins far away.
   for (const double length : {1e-300, 1e-10, 1e200, 1e300}) {
     EXPECT_EQ(raycast(good, Ray{zero, Vector3d(length, 0, 0)}).distance, 0.5) << length;
-    EXPECT_EQ(raycast(PlacedField{BallField{0.5}, {}, 1}, Ray{zero, Vector3d(length, 0, 0)}).distance,
-              0.5)
+    EXPECT_EQ(
+        raycast(PlacedField{BallField{0.5}, {}, 1}, Ray{zero, Vector3d(length, 0, 0)}).distance,
+        0.5)
         << length;
   }
   EXPECT_NEAR(raycast(good, Ray{{-1e9, 0.1, 0.2}}).distance, 1e9 - 0.5, 1e-6);

@@ -114,7 +114,7 @@ def test_separations_are_those_of_the_cpu(solids, arguments):
     apart = 0
     for i, (a, b, pose_a, pose_b, scale_a, scale_b) in enumerate(zip(*arguments.values())):
         one = ist.separation(solids[a], solids[b], pose_b, poses_a=pose_a, scales=scale_b,
-                             scales_a=scale_a)
+                             scales_a=scale_a, inner_spheres=True)
         assert found.status.numpy()[i] == one.status
         assert abs(found.distance.numpy()[i] - one.distance) <= 2e-6 * size
         for name in ("distance_min", "distance_max"):

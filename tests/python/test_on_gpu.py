@@ -161,7 +161,8 @@ def test_separations_are_those_of_the_cpu(solids, assets, pairs):
     for a, b, rows in kinds(arguments):
         answer = ist.separation(
             solids[a], solids[b], arguments["pose_b"][rows], poses_a=arguments["pose_a"][rows],
-            scales=arguments["scale_b"][rows], scales_a=arguments["scale_a"][rows])
+            scales=arguments["scale_b"][rows], scales_a=arguments["scale_a"][rows],
+            inner_spheres=True)
         for name in theirs:
             theirs[name][rows] = getattr(answer, name)
     size = 2 * max(solid.bounds().radius for solid in solids)

@@ -330,7 +330,7 @@ def test_what_is_not_held_is_no_zero(thread, cube, random_poses):
                      "pose_gradient_a", "scale_gradient", "scale_gradient_a"):
             assert np.isnan(getattr(found, name)).all(), name
         assert len(ist.penetration(a, b, poses[:0], measure=measure).volume) == 0
-    assert np.isnan(ist.separation(bolt, nut, poses).distance).all()
+    assert np.isnan(ist.separation(bolt, nut, poses, inner_spheres=True).distance).all()
     # Of one pose nobody looks at the status.
     pose = poses[0]
     for text, ask in (
@@ -341,9 +341,37 @@ def test_what_is_not_held_is_no_zero(thread, cube, random_poses):
              lambda: ist.penetration(ist.BallField(1), cube, pose, measure="exact")),
             ("b: is a surface alone", lambda: ist.penetration(bolt, nut, pose)),
             ("b: is a surface alone", lambda: ist.contact_patches(cube, nut, pose)),
-            ("a: is a surface alone", lambda: ist.separation(nut, cube, pose))):
+            ("a: is a surface alone", lambda: ist.separation(nut, cube, pose, inner_spheres=True))):
         with pytest.raises(ist.Error, match=text):
             ask()
+
+
+def test_rays_and_points(cube):
+    low, high = cube.bounds().lower, cube.bounds().upper
+    middle, half = (low + high) / 2, (high - low) / 2
+    origins = middle + np.array([[-2, 0, 0], [0, 3, 0], [0, 0, 0]]) * half
+    directions = np.array([[5, 0, 0], [0, -1, 0], [0, 0, 1]])
+    hits = ist.raycast(cube, None, origins, directions)
+    assert hits.distance == pytest.approx([half[0], 2 * half[1], half[2]], rel=1e-6)
+    assert hits.normal == pytest.approx(np.array([[-1, 0, 0], [0, 1, 0], [0, 0, 1]]))
+    assert ist.raycast(cube, None, origins[0], [-1, 0, 0]).distance == np.inf
+    assert ist.raycast(cube, None, origins[0], [1, 0, 0], longest=0.5 * half[0]).distance == np.inf
+    feet = ist.closest_point(cube, None, origins)
+    assert feet.distance == pytest.approx([half[0], 2 * half[1], -half.min()], rel=1e-6)
+    assert (ist.contains(cube, None, origins) == [0, 0, 1]).all()
+    pose = [1, 0, 0, 0, 1, 2, 3]
+    moved = ist.closest_point(cube, pose, origins[0] * 2 + [1, 2, 3], scale=2)
+    assert moved.distance == pytest.approx(2 * half[0], rel=1e-6)
+    ball = ist.BallField(2)
+    assert ist.raycast(ball, None, [0, 0, 5], [0, 0, -1]).distance == pytest.approx(3)
+    assert ist.closest_point(ball, None, [0, 0, 5]).distance == pytest.approx(3)
+    assert ist.contains(ball, None, [[0, 0, 1], [np.nan, 0, 0]]).tolist() == [1, 2]
+    assert ist.raycast(cube, None, origins[0], [0, 0, 0]).status == ist.QueryStatus.invalid_input
+    with pytest.raises(ValueError, match="origins: shape"):
+        ist.raycast(cube, None, [1, 2], [1, 0, 0])
+    bare = ist.bake(ist.sample_mesh("cube"), max_spheres=20, surface="none")
+    with pytest.raises(ist.Error, match="has no mesh"):
+        ist.contains(bare, None, middle)
 
 
 def test_outlines_are_closed_curves(thread, cube):

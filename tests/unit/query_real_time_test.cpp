@@ -6,6 +6,7 @@
 #include <ist/ist.h>
 #include <ist/overlap.h>
 #include <ist/query.h>
+#include <ist/surface.h>
 #include <ist/time_of_impact.h>
 
 #include <bit>
@@ -68,6 +69,14 @@ class RealTime : public ::testing::Test {
     volume_[i] += penetration(solid, ball, exact, workspaces_[0]).volume_max;
     penetration(solid, solid, exact, workspaces_[0]);
     penetration(ball, ball, exact, small_);
+    separation(solid, ball, testing::for_separation(settings), workspaces_[0]);
+    separation(ball, ball, testing::for_separation(settings), small_);
+    const Eigen::Vector3d at(b.pose.t[0], b.pose.t[1], b.pose.t[2]);
+    raycast(solid, Ray{at, {1, 2, 3}});
+    closest_point(ball, at);
+    contains(ball, at);
+    raycast(field, Ray{at, {1, 2, 3}});
+    closest_point(field, at);
     time_of_impact(solid, other, motions, until, workspaces_[0]);
     time_of_impact(field, other, motions, until, workspaces_[0]);
     for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {

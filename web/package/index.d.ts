@@ -287,7 +287,7 @@ export interface Separation {
   /** [u] the solids' distance lies within, certified. */
   distanceMin: number;
   distanceMax: number;
-  /** [u] on the inner spheres of A and B. */
+  /** [u] on the surfaces of A and B if both keep a mesh, else on their inner spheres. */
   pointA: Float64Array;
   pointB: Float64Array;
   /** Unit, from A to B. */

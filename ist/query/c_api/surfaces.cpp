@@ -67,8 +67,7 @@ ist_status_t find_inside(const Solid* solid, const double* points, std::size_t c
   return ask_each(solid, count, points != nullptr && inside != nullptr,
                   [&](const auto& placed, std::size_t i) {
                     const double* const x = points + 3 * i;
-                    const Containment found =
-                        contains(placed, Eigen::Vector3d(x[0], x[1], x[2]));
+                    const Containment found = contains(placed, Eigen::Vector3d(x[0], x[1], x[2]));
                     inside[i] = found.status != QueryStatus::ok ? IST_OVERLAP_UNKNOWN
                                 : found.inside                  ? IST_OVERLAP_YES
                                                                 : IST_OVERLAP_NO;

@@ -61,16 +61,15 @@ void gaps_of(const BoxBlock& boxes, const MiddleBox& one, const Similarity& map,
     reach[i] = map.scale * one.half[i];
   }
   for (int i = 0; i < 3; ++i)
-    normal[i] = (axis[0][i] * one.normal[0] + axis[1][i] * one.normal[1]) +
-                axis[2][i] * one.normal[2];
+    normal[i] =
+        (axis[0][i] * one.normal[0] + axis[1][i] * one.normal[1]) + axis[2][i] * one.normal[2];
   // Its slab from its middle; all below is told from there.
   const double before = (one.normal[0] * one.middle[0] + one.normal[1] * one.middle[1]) +
                         one.normal[2] * one.middle[2];
   const double low = map.scale * (one.slab_low - before),
                high = map.scale * (one.slab_high - before);
   // How far it reaches back along `toward`.
-  const double turned =
-      (toward[0] * normal[0] + toward[1] * normal[1]) + toward[2] * normal[2];
+  const double turned = (toward[0] * normal[0] + toward[1] * normal[1]) + toward[2] * normal[2];
   double by_box = 0, by_slab = std::min(turned * low, turned * high);
   for (int k = 0; k < 3; ++k) {
     const double x = toward[0] * axis[k][0] + toward[1] * axis[k][1] + toward[2] * axis[k][2];
@@ -90,8 +89,8 @@ void gaps_of(const BoxBlock& boxes, const MiddleBox& one, const Similarity& map,
     for (std::uint32_t l = 0; l < kWidth; ++l) {
       const double* const u = axis[k];
       const double between = (u[0] * away[0][l] + u[1] * away[1][l]) + u[2] * away[2][l];
-      const double width = (std::abs(u[0]) * half[0][l] + std::abs(u[1]) * half[1][l]) +
-                           std::abs(u[2]) * half[2][l];
+      const double width =
+          (std::abs(u[0]) * half[0][l] + std::abs(u[1]) * half[1][l]) + std::abs(u[2]) * half[2][l];
       const double gap = std::max(0.0, std::abs(between) - (width + reach[k]));
       across[l] += gap * gap;
     }
@@ -113,8 +112,8 @@ void gaps_of(const BoxBlock& boxes, const MiddleBox& one, const Similarity& map,
       to_box += other_rest[i] * away[i][l];
     }
     for (int k = 0; k < 3; ++k)
-      at_box += reach[k] * std::abs((axis[k][0] * rest[0] + axis[k][1] * rest[1]) +
-                                    axis[k][2] * rest[2]);
+      at_box +=
+          reach[k] * std::abs((axis[k][0] * rest[0] + axis[k][1] * rest[1]) + axis[k][2] * rest[2]);
     // Along n, from the one's middle: it, and the lane's slab.
     const double slab_low = boxes.slab_low[l] - at_middle,
                  slab_high = boxes.slab_high[l] - at_middle;
@@ -247,8 +246,8 @@ class GapSearch {
   void open(const GapPair& pair) noexcept {
     const MiddleBox box_a = box_of(a_, pair.level_a, pair.a),
                     box_b = box_of(b_, pair.level_b, pair.b);
-    const bool open_a = pair.level_b == 0 || (pair.level_a > 0 &&
-                                              box_a.size() >= a_from_b_.scale * box_b.size());
+    const bool open_a =
+        pair.level_b == 0 || (pair.level_a > 0 && box_a.size() >= a_from_b_.scale * box_b.size());
     const MeshTree& mesh = open_a ? a_ : b_;
     const int level = open_a ? pair.level_a : pair.level_b;
     const std::uint32_t number = open_a ? pair.a : pair.b;
@@ -291,8 +290,8 @@ class GapSearch {
     const auto& corner_a = placed_a_.block->corner;
     const auto& corner_b = placed_b_.block->corner;
     for (std::uint32_t l = 0; l < kWidth; ++l)
-      ahead_b[l] = std::min(
-          {along_b[corner_b[0][l]], along_b[corner_b[1][l]], along_b[corner_b[2][l]]});
+      ahead_b[l] =
+          std::min({along_b[corner_b[0][l]], along_b[corner_b[1][l]], along_b[corner_b[2][l]]});
     for (std::uint32_t t = 0; t < placed_a_.block->triangles && !out_.overlap; ++t) {
       const double ahead =
           std::max({along_a[corner_a[0][t]], along_a[corner_a[1][t]], along_a[corner_a[2][t]]});
@@ -362,8 +361,8 @@ class GapSearch {
     }
     exact::take_nearest(a, b, over_a, over_b, best_);
     for (const exact::FlatTriangle* t : {&a, &b}) {
-      const double longest = std::max({dot(t->side[0], t->side[0]), dot(t->side[1], t->side[1]),
-                                       dot(t->side[2], t->side[2])});
+      const double longest = std::max(
+          {dot(t->side[0], t->side[0]), dot(t->side[1], t->side[1]), dot(t->side[2], t->side[2])});
       // A foot is off by a rounding over the angle, or by the width.
       if (t->squared_normal < 1e-4 * longest * longest && t->squared_normal > 0) {
         const double width = std::sqrt(t->squared_normal / longest);

@@ -77,8 +77,7 @@ class Way {
         enter[l] = std::max(enter[l], first - kRounding * std::abs(first));
         leave[l] = std::min(leave[l], last + kRounding * std::abs(last));
       }
-    for (std::uint32_t l = 0; l < kWidth; ++l)
-      key[l] = enter[l] <= leave[l] ? enter[l] : HUGE_VAL;
+    for (std::uint32_t l = 0; l < kWidth; ++l) key[l] = enter[l] <= leave[l] ? enter[l] : HUGE_VAL;
   }
 
   void hit(const MeshTree& mesh, std::uint32_t number, MeshHit& best) const noexcept {
@@ -228,8 +227,7 @@ MeshFoot nearest_on(const MeshTree& mesh, const Point& p) noexcept {
     for (int k = 0; k < 3; ++k)
       for (std::uint32_t l = 0; l < kWidth; ++l) {
         const double at = (&p.x)[k];
-        const double gap =
-            std::max(0.0, std::max(boxes.low[k][l] - at, at - boxes.high[k][l]));
+        const double gap = std::max(0.0, std::max(boxes.low[k][l] - at, at - boxes.high[k][l]));
         key[l] += gap * gap;
         along[l] += boxes.normal[k][l] * at;
       }
