@@ -2,9 +2,13 @@
 # nanobind, or what CPython's extensions need, is missing; ON ends with an error there. nanobind is
 # that of the interpreter, or what ./dev setup brings.
 #
+# A cross compiler is asked by ON alone, and takes the headers of the interpreter that runs here: what
+# they say is the same on every 64-bit Linux.
+#
 # Debian's interpreter need not be the first in PATH; name another one by -DPython_EXECUTABLE.
 set(IST_HAVE_PYTHON FALSE)
-if(IST_PYTHON STREQUAL "OFF" OR IST_SANITIZE STREQUAL "thread" OR IST_FUZZ OR CMAKE_CROSSCOMPILING)
+if(IST_PYTHON STREQUAL "OFF" OR IST_SANITIZE STREQUAL "thread" OR IST_FUZZ
+    OR (CMAKE_CROSSCOMPILING AND NOT IST_PYTHON STREQUAL "ON"))
   return()
 endif()
 if(NOT DEFINED Python_EXECUTABLE AND EXISTS /usr/bin/python3)
@@ -35,5 +39,5 @@ endif()
 
 # ist_add_python_module(name sources…)
 function(ist_add_python_module name)
-  nanobind_add_module(${name} STABLE_ABI NB_STATIC NOMINSIZE NOSTRIP ${ARGN})
+  nanobind_add_module(${name} STABLE_ABI NB_STATIC NOMINSIZE NOSTRIP NB_SUPPRESS_WARNINGS ${ARGN})
 endfunction()
