@@ -71,6 +71,9 @@ Batch make_batch(const py::module_& module, const std::string& pose_class, std::
 
 }  // namespace
 
+// nanobind wants a module of this program before it works in it.
+NB_MODULE(python_batch, /*module*/) {}
+
 int main(int argc, char** argv) {
   Report report("python_batch", argc, argv);
   report.page("Batches through Python");
@@ -82,8 +85,9 @@ int main(int argc, char** argv) {
   const std::size_t count = report.quick() ? 1000 : 10'000;
   const std::size_t spheres = report.quick() ? 1000 : 4000;
   const int rounds = report.quick() ? 5 : 9;
+  PyImport_AppendInittab("python_batch", PyInit_python_batch);
   Py_Initialize();
-  py::detail::nb_module_exec(NB_DOMAIN_STR, PyImport_AddModule("__main__"));
+  py::module_::import_("python_batch");
   py::module_::import_("sys").attr("path").attr("insert")(0, IST_PYTHON_PACKAGE);
   const py::module_ module = py::module_::import_("ist");
   double worst = 0;

@@ -8,8 +8,8 @@
 
 namespace ist::python {
 
-/// Of a Mesh, a path, a pair of arrays, or an object with `vertices` and `faces` (or `triangles`), as
-/// trimesh and Open3D have them; else TypeError.
+/// Of a Mesh, a path, a pair of arrays, or an object with `vertices` and `faces` (or `triangles`),
+/// as trimesh and Open3D have them; else TypeError.
 std::shared_ptr<TriangleMesh> mesh_of(const py::object& value);
 
 /// The same, closed; a ClosedMesh as it is. Raises Error as close_mesh() does.

@@ -55,7 +55,7 @@ TEST(AssetBytes, EveryTruncationIsNamed) {
       Asset(std::span(bytes).first(length), "cut.ist");
       FAIL() << length;
     } catch (const Error& error) {
-      ASSERT_STREQ(error.what(), "cut.ist: the file ends early; bake again") << length;
+      ASSERT_STREQ(error.what(), "cut.ist: the file is truncated; bake again") << length;
     }
   }
   for (const std::size_t more : {1u, 64u, 5000u}) {

@@ -88,7 +88,7 @@ TEST_F(HostileAsset, ACutOneIsNamed) {
     write("cut.ist", whole.substr(0, length));
     const Outcome info = ist({"info", "cut.ist"});
     EXPECT_EQ(info.exit_code, 1);
-    EXPECT_EQ(info.err, "ist: error: cut.ist: the file ends early; bake again\n");
+    EXPECT_EQ(info.err, "ist: error: cut.ist: the file is truncated; bake again\n");
   }
 }
 

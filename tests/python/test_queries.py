@@ -404,7 +404,7 @@ def test_outlines_are_closed_curves(thread, cube):
 
     bare = ist.bake(ist.close_mesh(ist.sample_mesh("cube"), name="bare"), max_spheres=50,
                     surface="none", device="cpu")
-    for text, a, b in (("b: holds no mesh", cube, bare), ("a: holds no mesh", bare, cube),
+    for text, a, b in (("b: has no mesh", cube, bare), ("a: has no mesh", bare, cube),
                        ("a: a Field has no mesh", ist.BallField(1), cube)):
         with pytest.raises(ist.Error, match=text):
             ist.overlap_outline(a, b, IDENTITY)

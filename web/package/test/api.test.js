@@ -71,7 +71,7 @@ test('broken assets are refused in the library\'s words', () => {
   assert.match(
       sentence(() => ist.Asset.from(new TextEncoder().encode('solid something'))),
       /not an \.ist asset/);
-  assert.match(sentence(() => ist.Asset.from(bytesA.subarray(0, 1000))), /ends early/);
+  assert.match(sentence(() => ist.Asset.from(bytesA.subarray(0, 1000))), /is truncated/);
   assert.match(sentence(() => ist.Asset.from('nut.ist')), /takes an ArrayBuffer/);
   // A view into a larger buffer, at an odd place.
   const inside = new Uint8Array(bytesA.length + 13);
@@ -270,7 +270,7 @@ test('fields', () => {
   assert.equal(ist.overlap(surface, b, pose), 'yes');
   assert.match(sentence(() => ist.lenses(surface, b, pose)), /a field has no spheres/);
   a.free();
-  assert.match(sentence(() => ist.penetration(surface, b, pose)), /used after its free/);
+  assert.match(sentence(() => ist.penetration(surface, b, pose)), /used after free/);
   assert.match(sentence(() => ist.penetration(ist.Field.ball(-1), b, {})), /out of range/);
   assert.match(
       sentence(() => ist.Field.heights(new Float32Array(3), 2, 2, [1, 1])),
