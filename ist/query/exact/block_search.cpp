@@ -28,6 +28,11 @@ class BlockSearch {
         slack_(2 * pad_b_ + 2 * pad(Similarity::identity(), a_) + search.room * 2) {
     for (int k = 0; k < 9; ++k)
       turn_[k] = static_cast<float>(search.a_from_b.m[k] / search.a_from_b.scale);
+    // Nodes tile a surface.
+    for (int k = 1; k <= a_.top; ++k)
+      size_a_[k] = 1 / std::sqrt(static_cast<float>(a_.level[k].count));
+    for (int k = 1; k <= b_.top; ++k)
+      size_b_[k] = scale_ / std::sqrt(static_cast<float>(b_.level[k].count));
   }
 
   BlockPairs run() {
@@ -38,6 +43,10 @@ class BlockSearch {
         open_b(pair);
       else if (pair.level_b == 0)
         open_a(pair);
+      else if (size_a_[pair.level_a] > kLarger * size_b_[pair.level_b])
+        open_larger_a(pair);
+      else if (size_b_[pair.level_b] > kLarger * size_a_[pair.level_a])
+        open_larger_b(pair);
       else
         open_both(pair);
       if (++found_.visits == search_.max_visits && waiting_ > 0) found_.complete = false;
@@ -46,6 +55,8 @@ class BlockSearch {
   }
 
  private:
+  static constexpr float kLarger = 2;  ///< nodes that are so much larger are opened alone
+
   void push(int level_a, std::uint32_t a, int level_b, std::uint32_t b) {
     if (level_a == 0 && level_b == 0) {
       if (found_.count == scratch_.most_rows())
@@ -132,16 +143,87 @@ class BlockSearch {
     }
   }
 
-  /// A's side is a block.
+  void open_larger_a(const BoxPair& pair) {
+    const BoxBlock& boxes = a_.level[pair.level_a].boxes[pair.a];
+    const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
+    float low[3], high[3];
+    for (int k = 0; k < 3; ++k) {
+      low[k] = b_in_a.all_low[k] - search_.room;
+      high[k] = b_in_a.all_high[k] + search_.room;
+    }
+    std::uint32_t found = meeting(boxes.low, boxes.high, low, high) &
+                          ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
+    for (; found != 0; found &= found - 1)
+      push(pair.level_a - 1, kWidth * pair.a + static_cast<std::uint32_t>(std::countr_zero(found)),
+           pair.level_b, pair.b);
+  }
+
+  void open_larger_b(const BoxPair& pair) {
+    const BoxBlock& boxes = b_.level[pair.level_b].boxes[pair.b];
+    const PlacedBoxes& a_in_b = placed_a(pair.level_a, pair.a);
+    float low[3], high[3];
+    for (int k = 0; k < 3; ++k) {
+      low[k] = a_in_b.all_low[k] - room_b_;
+      high[k] = a_in_b.all_high[k] + room_b_;
+    }
+    std::uint32_t found = meeting(boxes.low, boxes.high, low, high) &
+                          ((1u << used_lanes(b_, pair.level_b, pair.b)) - 1);
+    for (; found != 0; found &= found - 1)
+      push(pair.level_a, pair.a, pair.level_b - 1,
+           kWidth * pair.b + static_cast<std::uint32_t>(std::countr_zero(found)));
+  }
+
+  /// Whether a box meets the box and the plane of one of a block's triangles. `half`: its sides'
+  /// halves, in A's frame.
+  bool meets_triangle(const PlacedTriangles& block, const OneBox& box,
+                      const float (&half)[3][3]) const {
+    const std::uint32_t lanes = meeting(block.low, block.high, box.low, box.high);
+    if (lanes == 0) return false;
+    const F d;
+    float middle[3], reach = 0, size = 0;
+    for (int k = 0; k < 3; ++k) {
+      middle[k] = 0.5f * (box.low[k] + box.high[k]);
+      reach = std::max({reach, std::abs(box.low[k]), std::abs(box.high[k])});
+      size += box.high[k] - box.low[k];
+    }
+    const auto blur = hn::Set(d, 1e-6f * (block.reach + reach) + slack_);
+    std::uint32_t bits = 0;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      hn::Vec<F> n[3];
+      for (int k = 0; k < 3; ++k) n[k] = hn::Load(d, block.normal[k] + l);
+      const auto along = [&](const float(&x)[3]) {
+        return (n[0] * hn::Set(d, x[0]) + n[1] * hn::Set(d, x[1])) + n[2] * hn::Set(d, x[2]);
+      };
+      const auto height = hn::Abs(along(middle) - hn::Load(d, block.offset + l));
+      const auto over = blur * hn::Load(d, block.length + l) +
+                        hn::Load(d, block.slack + l) * hn::Set(d, block.size + size);
+      const auto out =
+          (hn::Abs(along(half[0])) + hn::Abs(along(half[1]))) + (hn::Abs(along(half[2])) + over);
+      bits |= mask_bits(d, height <= out) << l;
+    }
+    return (lanes & bits) != 0;
+  }
+
+  /// A's side is a block: its triangles may be far larger than B's boxes.
   void open_b(const BoxPair& pair) {
     const std::uint32_t lane = pair.a % kWidth, parent = pair.a / kWidth;
     const OneBox here(a_.level[1].boxes[parent].low, a_.level[1].boxes[parent].high, lane,
                       search_.room);
     const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
-    for (std::uint32_t found = meeting(b_in_a.low, b_in_a.high, here.low, here.high); found != 0;
-         found &= found - 1)
-      push(0, pair.a, pair.level_b - 1,
-           kWidth * pair.b + static_cast<std::uint32_t>(std::countr_zero(found)));
+    const BoxBlock& boxes = b_.level[pair.level_b].boxes[pair.b];
+    std::uint32_t found = meeting(b_in_a.low, b_in_a.high, here.low, here.high);
+    if (found == 0) return;
+    const PlacedTriangles& block = placed_triangles(a_, pair.a, nullptr, *scratch_.triangles_a);
+    for (; found != 0; found &= found - 1) {
+      const auto i = static_cast<std::uint32_t>(std::countr_zero(found));
+      float half[3][3];
+      for (int side = 0; side < 3; ++side)
+        for (int k = 0; k < 3; ++k)
+          half[side][k] =
+              turn_[3 * k + side] * scale_ * 0.5f * (boxes.high[side][i] - boxes.low[side][i]);
+      if (meets_triangle(block, OneBox(b_in_a.low, b_in_a.high, i, search_.room), half))
+        push(0, pair.a, pair.level_b - 1, kWidth * pair.b + i);
+    }
   }
 
   void open_a(const BoxPair& pair) {
@@ -150,9 +232,16 @@ class BlockSearch {
     const BoxBlock& boxes = a_.level[pair.level_a].boxes[pair.a];
     std::uint32_t found = meeting(boxes.low, boxes.high, there.low, there.high) &
                           ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
-    for (; found != 0; found &= found - 1)
-      push(pair.level_a - 1, kWidth * pair.a + static_cast<std::uint32_t>(std::countr_zero(found)),
-           0, pair.b);
+    if (found == 0) return;
+    const PlacedTriangles& block =
+        placed_triangles(b_, pair.b, &search_.a_from_b, *scratch_.triangles_b);
+    for (; found != 0; found &= found - 1) {
+      const auto i = static_cast<std::uint32_t>(std::countr_zero(found));
+      float half[3][3] = {};
+      for (int k = 0; k < 3; ++k) half[k][k] = 0.5f * (boxes.high[k][i] - boxes.low[k][i]);
+      if (meets_triangle(block, OneBox(boxes.low, boxes.high, i, search_.room), half))
+        push(pair.level_a - 1, kWidth * pair.a + i, 0, pair.b);
+    }
   }
 
   const CrossingSearch& search_;
@@ -160,6 +249,7 @@ class BlockSearch {
   const MeshTree& b_;
   ExactScratch& scratch_;
   float pad_a_, pad_b_, room_b_, scale_, slack_, turn_[9];
+  float size_a_[kMaxLevels], size_b_[kMaxLevels];  ///< of a level's nodes
   std::uint32_t waiting_ = 0;
   BlockPairs found_;
 };
