@@ -93,10 +93,9 @@ inline PairOfBodies oracle_pair(const std::string& key) {
   return pair;
 }
 
-/// Two development meshes: trial poses, their volumes integrated over both.
+/// Two development meshes: trial poses with their exact volumes.
 inline PairOfBodies development_pair(const std::string& a, const std::string& b,
                                      std::uint32_t per_class) {
-  constexpr double kTruthError = 1e-3;
   const auto path = [](const std::string& file) {
     return testing::shared_path("meshes/dev/" + file).string();
   };
@@ -109,8 +108,7 @@ inline PairOfBodies development_pair(const std::string& a, const std::string& b,
   pair.b = std::make_unique<Body>(stem(b), path(b));
   const Asset asset_a = asset_of(*pair.a, 3'000, true), asset_b = asset_of(*pair.b, 3'000, true);
   for (const TrialPose& trial :
-       trial_poses({pair.a->solid, asset_a.view()}, {pair.b->solid, asset_b.view()}, per_class,
-                   kTruthError, 1))
+       trial_poses({pair.a->solid, asset_a.view()}, {pair.b->solid, asset_b.view()}, per_class, 1))
     pair.rows.push_back({trial.b_in_a, trial.scale_b, trial.volume, trial.overlap_class, false});
   return pair;
 }

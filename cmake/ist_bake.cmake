@@ -34,9 +34,10 @@ foreach(library IN LISTS ist_LIBRARIES)
   endif()
 endforeach()
 if(TARGET ist_shared)
-  # The hash of an asset, which writing it needs too, is nobody's to see: both libraries hold it.
+  # The hash of an asset and the parts of balls inside surfaces, which baking needs too, are nobody's
+  # to see: both libraries hold them.
   target_sources(ist_shared PRIVATE
-    $<FILTER:$<TARGET_OBJECTS:ist_room_query>,INCLUDE,content_hash>)
+    $<FILTER:$<TARGET_OBJECTS:ist_room_query>,INCLUDE,content_hash|patch_sums|surface_patch>)
 endif()
 if(PROJECT_IS_TOP_LEVEL)
   add_subdirectory(src/app)

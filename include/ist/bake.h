@@ -142,14 +142,14 @@ struct TargetedAsset {
 /// 200,000). If those are not enough, the best asset is returned, and the result says so.
 ///
 /// The asset is tried against a copy of itself and, as an analytic field, each other TrialPartner.
-/// The target is met if the worst one's median is. The truth is integrated over the meshes at some
-/// 300 poses with independent random rotations, several times as accurate as the target. The asset
-/// stores the medians of the copies and the worst partner.
+/// The target is met if the worst one's median is. The truth is exact, at some 300 poses with
+/// independent random rotations. The asset stores the medians of the copies and the worst partner.
 ///
 /// settings.time_limit bounds everything except the first bake, of a few hundred spheres. Takes up
 /// to about six times a bake of the final count. Reports the stages of each bake, and "predict".
 ///
-/// Throws Error as bake() does, and whenever the callback cancels.
+/// Throws Error as bake() does, whenever the callback cancels, and for a mesh that counts volume
+/// twice and cannot be resolved: there is no exact volume to measure by.
 TargetedAsset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
                             const PackingSettings& settings = {},
                             const ProgressCallback& progress = {});

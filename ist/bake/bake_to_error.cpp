@@ -29,11 +29,6 @@ constexpr std::uint32_t kNearPoses = 40;      // at the overlap that was asked a
 constexpr std::uint32_t kPartnerPoses = 24;   // likewise, of each partner but the copy
 constexpr std::uint32_t kFewTrials = 8;       // fewer say nothing of a partner
 constexpr std::uint32_t kPosesPerClass = 30;  // besides, for the prediction
-constexpr std::size_t kFewPoses = 10;         // fewer near ones: the spheres did not find them
-constexpr std::size_t kManySpheres = 4'000;   // with so many they would have
-constexpr double kTruthShare = 0.1;           // of the target: what the truth may be off
-constexpr double kPartnerTruthShare = 0.2;    // the same of partners other than the copy
-constexpr double kTruthBest = 1e-4;           // no truth is asked to be better than this
 constexpr std::size_t kMost = 200'000;        // where the caller sets no limit
 
 double median(std::vector<double> values) {
@@ -161,37 +156,40 @@ class TargetBake {
     }
   }
 
-  double truth_error(double share = kTruthShare) const {
-    return std::max(kTruthBest, share * target_.relative_error);
+  /// The solid's own triangles, by which volumes are exact.
+  TreeView own_mesh() {
+    const TreeView baked = best_->asset.view();
+    if (baked.mesh_state() == MeshState::unresolved)
+      throw Error(mesh_.name +
+                  ": the mesh counts volume twice, so that no error can be measured. " +
+                  resolved_.resolution.reason + " Bake it to a number of spheres, or wrap it");
+    if (baked.mesh_state() == MeshState::own || baked.mesh_state() == MeshState::resolved)
+      return baked;
+    if (!own_mesh_) own_mesh_ = bake_surface(mesh_, {}, settings_.threads);
+    return own_mesh_->view();
   }
 
-  /// A first asset, and by its spheres poses at the overlap asked about.
+  /// A first asset, and poses at the overlap asked about.
   void find_near_poses() {
-    for (std::size_t spheres = CountSearch::first(most_);; spheres = std::min(4 * spheres, most_)) {
-      std::optional<Asset> asset = baked(spheres);
-      if (!asset) return;
-      best_ = Candidate{std::move(*asset)};
-      const TrialBody body = {solid_, best_->asset.view()};
-      Stage stage("predict", watch_.strict());
-      poses_ = trial_poses_near(target_.at_overlap, body, body, kNearPoses, truth_error(),
-                                settings_.seed, [&](double part) { return go_on(stage, part); });
-      if (poses_.size() >= kFewPoses || watch_.is_late() || best_->spheres() < spheres ||
-          spheres >= std::min(most_, kManySpheres))
-        return;
-    }
+    std::optional<Asset> asset = baked(CountSearch::first(most_));
+    if (!asset) return;
+    best_ = Candidate{std::move(*asset)};
+    const TrialBody body = {solid_, own_mesh()};
+    Stage stage("predict", watch_.strict());
+    poses_ = trial_poses_near(target_.at_overlap, body, body, kNearPoses, settings_.seed,
+                              [&](double part) { return go_on(stage, part); });
   }
 
   /// Trials of partners other than the copy.
   void find_other_trials() {
     Stage stage("predict", watch_.strict());
-    const PartnerTrials trials(solid_);
+    const PartnerTrials trials(solid_, own_mesh());
     double done = 0;
     for (const TrialPartner partner : kOtherPartners) {
-      for (const PartnerTrial& trial :
-           trials.find(partner, target_.at_overlap, kPartnerPoses, truth_error(kPartnerTruthShare),
-                       settings_.seed, [&](double part) {
-                         return go_on(stage, (done + part) / std::size(kOtherPartners));
-                       }))
+      for (const PartnerTrial& trial : trials.find(
+               partner, target_.at_overlap, kPartnerPoses, settings_.seed, [&](double part) {
+                 return go_on(stage, (done + part) / std::size(kOtherPartners));
+               }))
         others_.push_back({partner, trial});
       if (watch_.is_late()) return;
       ++done;
@@ -200,10 +198,10 @@ class TargetBake {
 
   /// Poses of all classes, other ones than the search has seen; false: the time is over.
   bool add_other_poses() {
-    const TrialBody body = {solid_, best_->asset.view()};
+    const TrialBody body = {solid_, own_mesh()};
     Stage stage("predict", watch_.strict());
     const std::vector<TrialPose> others =
-        trial_poses(body, body, kPosesPerClass, truth_error(), settings_.seed + 1,
+        trial_poses(body, body, kPosesPerClass, settings_.seed + 1,
                     [&](double part) { return go_on(stage, part); });
     if (watch_.is_late()) return false;
     first_of_classes_ = poses_.size();
@@ -327,6 +325,7 @@ class TargetBake {
   std::optional<std::size_t> first_of_classes_;  ///< among them, once they are there
   std::vector<OtherTrial> others_;
   std::optional<Candidate> best_;
+  std::optional<Asset> own_mesh_;  ///< where the candidates hold another or none
   Workspace workspace_;
 };
 

@@ -94,10 +94,10 @@ TEST(BakeToError, AMetTargetHoldsAtOtherPoses) {
   const TrialBody body = {solid, result.asset.view()};
   std::vector<double> errors;
   Workspace workspace;
-  for (const TrialPose& pose : trial_poses_near(kTarget.at_overlap, body, body, 60, 1e-3, 12345)) {
+  for (const TrialPose& pose : trial_poses_near(kTarget.at_overlap, body, body, 60, 12345)) {
     EXPECT_TRUE(is_near(pose, kTarget.at_overlap));
     const double volume =
-        penetration({body.tree, {}, 1}, {body.tree, pose.b_in_a, 1}, {}, workspace).volume;
+        penetration({body.mesh, {}, 1}, {body.mesh, pose.b_in_a, 1}, {}, workspace).volume;
     errors.push_back(std::abs(volume / pose.volume - 1));
   }
   ASSERT_GE(errors.size(), 50u);
@@ -105,7 +105,7 @@ TEST(BakeToError, AMetTargetHoldsAtOtherPoses) {
   EXPECT_LE(errors[30], kTarget.relative_error);
 
   // What the result says stands in the asset.
-  const PredictedErrors errors_in_asset = body.tree.predicted_errors();
+  const PredictedErrors errors_in_asset = body.mesh.predicted_errors();
   EXPECT_TRUE(errors_in_asset.target_met());
   EXPECT_EQ(errors_in_asset.measured_error, result.measured_error);
   EXPECT_EQ(errors_in_asset.measured_poses, result.poses);
@@ -113,7 +113,7 @@ TEST(BakeToError, AMetTargetHoldsAtOtherPoses) {
   EXPECT_EQ(errors_in_asset.target_overlap, kTarget.at_overlap);
 
   // But for what the header says of the target it is a bake of that count.
-  const Asset plain = bake(torus, {.max_spheres = body.tree.sphere_count()});
+  const Asset plain = bake(torus, {.max_spheres = body.mesh.sphere_count()});
   ASSERT_EQ(plain.bytes().size(), result.asset.bytes().size());
   EXPECT_TRUE(std::equal(plain.bytes().begin() + sizeof(AssetHeader), plain.bytes().end(),
                          result.asset.bytes().begin() + sizeof(AssetHeader)));
@@ -150,6 +150,24 @@ TEST(BakeToError, AMissedTargetIsSaidWithItsReason) {
   EXPECT_EQ(thin.stop, StopReason::coverage);
   EXPECT_GT(thin.measured_error, 0.05);
   EXPECT_FALSE(thin.asset.view().predicted_errors().target_met());
+}
+
+// The truth is the solid's, whatever surface the asset keeps.
+TEST(BakeToError, MeasuresByTheMeshThatTheAssetDoesNotKeep) {
+  const ClosedMesh torus = testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
+  PackingSettings settings = {.max_spheres = 200};
+  const TargetedAsset own = bake_to_error(torus, {0.2, 0.01}, settings);
+  settings.surface.wanted = false;
+  const TargetedAsset none = bake_to_error(torus, {0.2, 0.01}, settings);
+  EXPECT_FALSE(none.asset.view().has_mesh());
+  EXPECT_GT(none.poses, 100u);
+  EXPECT_EQ(none.poses, own.poses);
+}
+
+TEST(BakeToError, RefusesWhatHasNoExactVolume) {
+  ClosedMesh wrong = close_mesh(testing::overlapping_cubes_mesh(), "cubes");
+  wrong.meeting_pairs->resize(wrong.meeting_pairs->size() / 2);  // not to be resolved by these
+  EXPECT_THROW(bake_to_error(wrong, {0.1, 0.01}, {.max_spheres = 200}), Error);
 }
 
 TEST(BakeToError, KeepsToItsTime) {

@@ -9,16 +9,14 @@
 #include <cstring>
 #include <numbers>
 
-#include "bake/predict/convex_body.h"
+#include "bake/predict/ball_part.h"
 #include "bake/predict/inner_points.h"
-#include "bake/predict/shared_volume.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 
 namespace ist {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 const ClosedMesh& cube() {
@@ -31,22 +29,20 @@ const MeshSolid& solid_cube() {
   return solid;
 }
 
-TEST(SharedVolume, OfAMeshAndAConvexBodyIsExact) {
+TEST(BallPart, OfACubeIsExact) {
   const Eigen::AlignedBox3d bounds = solid_cube().bounds();
-  const Vector3d face = {bounds.max().x(), bounds.center().y(), bounds.center().z()};
-  const Vector3d along(0.3, 0.5, 1);
   const double r = 0.2 * bounds.sizes().x();
-  const auto volume = [&](const ConvexBody& body) {
-    return shared_volume(solid_cube(), body, along, 1e-4).volume;
-  };
+  const auto part = [&](const Vector3d& centre) { return ball_part(solid_cube(), centre, r); };
   const double ball = 4 * std::numbers::pi / 3 * r * r * r;
-  EXPECT_NEAR(volume(ConvexBody::ball(bounds.center(), r)), ball, 1e-3 * ball);
-  EXPECT_NEAR(volume(ConvexBody::ball(face, r)), ball / 2, 1e-3 * ball);
-  EXPECT_EQ(volume(ConvexBody::ball(face + Vector3d(2 * r, 0, 0), r)), 0);
-  // About the face's normal, so that half of the box is in the cube.
-  const Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3d::UnitX()).toRotationMatrix();
-  const Vector3d half(0.5 * r, r, 1.5 * r);
-  EXPECT_NEAR(volume(ConvexBody::box(face, turn, half)), 4 * half.prod(), 4e-3 * half.prod());
+  const Vector3d out = 0.5 * bounds.sizes();
+  EXPECT_NEAR(part(bounds.center()), ball, 1e-12 * ball);
+  EXPECT_NEAR(part(bounds.center() + Vector3d(out.x(), 0, 0)), ball / 2, 1e-10 * ball);
+  EXPECT_NEAR(part(bounds.center() + Vector3d(out.x(), out.y(), 0)), ball / 4, 1e-10 * ball);
+  EXPECT_NEAR(part(bounds.center() + out), ball / 8, 1e-10 * ball);
+  EXPECT_EQ(part(bounds.center() + Vector3d(out.x() + 2 * r, 0, 0)), 0);
+  // A cap.
+  const double h = 0.3 * r, cap = std::numbers::pi / 3 * h * h * (3 * r - h);
+  EXPECT_NEAR(part(bounds.center() + Vector3d(0, 0.01 * r, out.z() + r - h)), cap, 1e-10 * ball);
 }
 
 TEST(InnerPoints, AreSpreadEvenly) {
@@ -64,10 +60,10 @@ TEST(InnerPoints, AreSpreadEvenly) {
 TEST(PartnerTrials, HoldTheOverlapAskedFor) {
   constexpr double kOverlap = 0.003;
   const Asset asset = bake(cube(), {.max_spheres = 2'000});
-  const PartnerTrials trials(solid_cube());
+  const PartnerTrials trials(solid_cube(), asset.view());
   Workspace workspace;
   for (const TrialPartner partner : kOtherPartners) {
-    const auto found = trials.find(partner, kOverlap, 8, 1e-3, 5);
+    const auto found = trials.find(partner, kOverlap, 8, 5);
     EXPECT_EQ(found.size(), 8u) << static_cast<int>(partner);
     for (const PartnerTrial& trial : found) {
       const double share = trial.volume / solid_cube().volume();
@@ -78,13 +74,14 @@ TEST(PartnerTrials, HoldTheOverlapAskedFor) {
       EXPECT_NEAR(volume, trial.volume, 0.2 * trial.volume) << static_cast<int>(partner);
     }
   }
-  EXPECT_TRUE(trials.find(TrialPartner::ball, 0.5, 4, 1e-2, 5).empty()) << "no room for so much";
+  EXPECT_TRUE(trials.find(TrialPartner::ball, 0.5, 4, 5).empty()) << "no room for so much";
 }
 
 TEST(PartnerTrials, AreTheSameForAnyNumberOfThreads) {
   const auto trials_of = [](int threads) {
     return tbb::task_arena(threads).execute([] {
-      return PartnerTrials(MeshSolid(cube())).find(TrialPartner::corner, 0.001, 4, 1e-2, 3);
+      const Asset surface = bake_surface(cube());
+      return PartnerTrials(solid_cube(), surface.view()).find(TrialPartner::corner, 0.001, 4, 3);
     });
   };
   const auto one = trials_of(1), many = trials_of(4);

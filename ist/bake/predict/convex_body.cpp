@@ -57,11 +57,6 @@ std::optional<LinePart> ConvexBody::part_of(const Vector3d& origin,
   return part;
 }
 
-Eigen::AlignedBox3d ConvexBody::bounds() const {
-  const Vector3d reach = round_ ? half_extents_ : Vector3d(axes_.cwiseAbs() * half_extents_);
-  return {Vector3d(centre_ - reach), Vector3d(centre_ + reach)};
-}
-
 double ConvexBody::volume() const {
   const double box = 8 * half_extents_.prod();
   return round_ ? std::numbers::pi / 6 * box : box;
@@ -70,20 +65,6 @@ double ConvexBody::volume() const {
 ConvexBody ConvexBody::moved(const Vector3d& by) const {
   ConvexBody body = *this;
   body.centre_ += by;
-  return body;
-}
-
-ConvexBody ConvexBody::to_unit(const UnitFrame& frame) const {
-  ConvexBody body = *this;
-  body.centre_ = frame.to_unit(centre_);
-  body.half_extents_ /= frame.scale();
-  return body;
-}
-
-ConvexBody ConvexBody::turned(const Matrix3d& rotation) const {
-  ConvexBody body = *this;
-  body.centre_ = rotation * centre_;
-  body.axes_ = rotation * axes_;
   return body;
 }
 

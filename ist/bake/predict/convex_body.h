@@ -1,10 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <optional>
-
-#include <ist/solid.h>
 
 namespace ist {
 
@@ -25,12 +22,9 @@ class ConvexBody {
   /// The part of the line {origin + t · direction} that lies inside, if any.
   std::optional<LinePart> part_of(const Eigen::Vector3d& origin,
                                   const Eigen::Vector3d& direction) const;
-  Eigen::AlignedBox3d bounds() const;
   double volume() const;
 
   ConvexBody moved(const Eigen::Vector3d& by) const;  ///< [u]
-  ConvexBody to_unit(const UnitFrame& frame) const;
-  ConvexBody turned(const Eigen::Matrix3d& rotation) const;  ///< about the frame's origin
 
  private:
   ConvexBody() = default;

@@ -6,9 +6,12 @@
 #include <optional>
 #include <utility>
 
+#include <ist/bake.h>
+#include <ist/query.h>
+
+#include "bake/predict/ball_part.h"
 #include "bake/predict/convex_body.h"
 #include "bake/predict/inner_points.h"
-#include "bake/predict/shared_volume.h"
 #include "bake/predict/trial_random.h"
 
 namespace ist {
@@ -27,8 +30,9 @@ constexpr double kPlaneReach = 4;  // half extent of the box that the plane's tr
 /// A partner turned as it will come, around the origin.
 struct Shape {
   Field field;
-  Pose pose;        ///< of the field
-  ConvexBody body;  ///< what the truth is integrated over
+  Pose pose;              ///< of the field
+  ConvexBody body;        ///< what the truth is of
+  Vector3d half_extents;  ///< [u] of a ball: its radius
 };
 
 /// Turns `from` to `to`, both of unit length, with a random turn about `to`.
@@ -48,7 +52,19 @@ Quaterniond random_turn(const Vector3d& from, const Vector3d& to, TrialRandom& r
 Shape box_shape(const Vector3d& half_extents, const Quaterniond& turn) {
   return {BoxField{half_extents},
           {{turn.w(), turn.x(), turn.y(), turn.z()}, {0, 0, 0}},
-          ConvexBody::box(Vector3d::Zero(), turn.toRotationMatrix(), half_extents)};
+          ConvexBody::box(Vector3d::Zero(), turn.toRotationMatrix(), half_extents),
+          half_extents};
+}
+
+Asset box_surface(const Vector3d& half) {
+  TriangleMesh mesh;
+  for (int corner = 0; corner < 8; ++corner)
+    mesh.vertices.push_back({(corner & 1) != 0 ? half.x() : -half.x(),
+                             (corner & 2) != 0 ? half.y() : -half.y(),
+                             (corner & 4) != 0 ? half.z() : -half.z()});
+  mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
+                    {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
+  return bake_surface(close_mesh(std::move(mesh), "box"), {}, 1);
 }
 
 Shape shape_of(TrialPartner partner, double diagonal, const Vector3d& direction,
@@ -66,7 +82,10 @@ Shape shape_of(TrialPartner partner, double diagonal, const Vector3d& direction,
       return shape;
     }
     case TrialPartner::ball:
-      return {BallField{size / 2}, {}, ConvexBody::ball(Vector3d::Zero(), size / 2)};
+      return {BallField{size / 2},
+              {},
+              ConvexBody::ball(Vector3d::Zero(), size / 2),
+              Vector3d::Constant(size / 2)};
     case TrialPartner::edge:
       return box_shape(cube, turned({1, 1, 0}));
     case TrialPartner::corner:
@@ -100,17 +119,20 @@ std::optional<double> way_of(const ConvexBody& body, const std::vector<Vector3d>
 
 }  // namespace
 
-PartnerTrials::PartnerTrials(const MeshSolid& solid)
+PartnerTrials::PartnerTrials(const MeshSolid& solid, const TreeView& mesh)
     : solid_(solid),
+      mesh_(mesh),
       points_(inner_points(solid, kPoints)),
       diagonal_(solid.bounds().diagonal().norm()) {}
 
 std::vector<PartnerTrial> PartnerTrials::find(TrialPartner partner, double overlap,
-                                              std::uint32_t count, double relative_error,
-                                              std::uint64_t seed,
+                                              std::uint32_t count, std::uint64_t seed,
                                               const std::function<bool(double)>& go_on) const {
   TrialRandom random(seed + static_cast<std::uint64_t>(partner));
   std::vector<PartnerTrial> trials;
+  Workspace workspace;
+  PenetrationSettings exact;
+  exact.measure = Measure::exact;
   const auto go = [&] {
     return !go_on || go_on(static_cast<double>(trials.size()) / static_cast<double>(count));
   };
@@ -128,15 +150,18 @@ std::vector<PartnerTrial> PartnerTrials::find(TrialPartner partner, double overl
     const auto way = way_of(shape.body, points_, target, direction, wanted);
     if (!way) continue;
     const Vector3d place = target + *way * direction;
-    const SharedVolume truth =
-        shared_volume(solid_, shape.body.moved(place), direction, relative_error, go);
-    const double found = truth.volume / solid_.volume();
-    if (!(truth.volume > 0) || truth.error > relative_error * truth.volume ||
-        found < overlap / kHalfDecade || found > overlap * kHalfDecade)
-      continue;
     Pose pose = shape.pose;
     for (int k = 0; k < 3; ++k) pose.t[k] = place[k];
-    trials.push_back({{shape.field, pose, 1}, truth.volume});
+    double truth = 0;
+    if (partner == TrialPartner::ball) {
+      truth = ball_part(solid_, place, shape.half_extents.x());
+    } else {
+      const Asset box = box_surface(shape.half_extents);
+      truth = penetration({mesh_, {}, 1}, {box.view(), pose, 1}, exact, workspace).volume;
+    }
+    const double found = truth / solid_.volume();
+    if (!(found >= overlap / kHalfDecade && found <= overlap * kHalfDecade)) continue;
+    trials.push_back({{shape.field, pose, 1}, truth});
   }
   return trials;
 }

@@ -27,24 +27,26 @@ inline constexpr TrialPartner kOtherPartners[] = {TrialPartner::plane, TrialPart
 /// Balls and boxes measure 0.1 to 0.3 of the solid's diagonal, plates are 0.02 of it thick. Each
 /// comes from outside along a random direction, towards a random point of the solid, until it
 /// shares a volume within half a decade of the one wanted. Places are found by points of the solid
-/// alone, so that they favour no packing; volumes are integrated over the mesh.
+/// alone, so that they favour no packing; volumes are exact.
 ///
 /// Same trials for the same seed, on any machine and for any number of threads. Runs on the
 /// caller's TBB threads.
 class PartnerTrials {
  public:
-  explicit PartnerTrials(const MeshSolid& solid);
+  /// `mesh`: an asset that holds the solid's own triangles. Both must outlive this.
+  PartnerTrials(const MeshSolid& solid, const TreeView& mesh);
 
-  /// About `count` with overlaps near `overlap` of the solid's volume, true to `relative_error`;
-  /// fewer or none where the partner has no room for so much.
+  /// About `count` with overlaps near `overlap` of the solid's volume; fewer or none where the
+  /// partner has no room for so much.
   /// `go_on(part)`, if any, is told every few milliseconds which part of [0, 1] is done; once it
   /// says no, the trials so far are all.
   std::vector<PartnerTrial> find(TrialPartner partner, double overlap, std::uint32_t count,
-                                 double relative_error, std::uint64_t seed,
+                                 std::uint64_t seed,
                                  const std::function<bool(double)>& go_on = {}) const;
 
  private:
   const MeshSolid& solid_;
+  const TreeView mesh_;
   const std::vector<Eigen::Vector3d> points_;
   double diagonal_ = 0;  ///< [u] of the solid's bounds
 };

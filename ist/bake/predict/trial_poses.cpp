@@ -2,11 +2,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
+#include <limits>
 
 #include <ist/query.h>
 
-#include "bake/predict/shared_volume.h"
 #include "bake/predict/trial_random.h"
 
 namespace ist {
@@ -20,22 +19,7 @@ constexpr std::uint32_t kTriesPerPose = 4;
 constexpr double kContainedSize = 0.15;
 constexpr std::uint32_t kContainedTries = 400;  // for each pose
 constexpr int kApproachSteps = 24;
-constexpr int kBisections = 40;
-
-/// Ball around a solid's spheres in the mesh's frame.
-struct Ball {
-  Vector3d centre;
-  double radius;
-};
-
-Ball root_ball(const TreeView& tree) {
-  const AssetHeader& h = tree.header();
-  const double scale = std::ldexp(1.0, h.exponent);
-  const double* root = h.matched_tree.root;
-  return {
-      scale * Vector3d(root[0], root[1], root[2]) + Vector3d(h.centre[0], h.centre[1], h.centre[2]),
-      scale * root[3]};
-}
+constexpr int kBisections = 12;
 
 Pose pose_of(const Eigen::Quaterniond& q, const Vector3d& t) {
   return {{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}};
@@ -43,14 +27,15 @@ Pose pose_of(const Eigen::Quaterniond& q, const Vector3d& t) {
 
 class Trials {
  public:
-  Trials(const TrialBody& a, const TrialBody& b, double relative_error, std::uint64_t seed,
+  Trials(const TrialBody& a, const TrialBody& b, std::uint64_t seed,
          const std::function<bool(double)>& go_on)
       : a_(a),
         b_(b),
-        ball_a_(root_ball(a.tree)),
-        ball_b_(root_ball(b.tree)),
-        smaller_(std::min(a.solid.volume(), b.solid.volume())),
-        relative_error_(relative_error),
+        centre_a_(a.mesh.header().ball_centre),
+        centre_b_(b.mesh.header().ball_centre),
+        radius_a_(a.mesh.header().ball_radius),
+        radius_b_(b.mesh.header().ball_radius),
+        smaller_(std::min(a.mesh.volume(), b.mesh.volume())),
         random_(seed),
         go_on_([this, go_on] { return !go_on || go_on(done_); }) {}
 
@@ -64,36 +49,31 @@ class Trials {
   bool approach(double fraction, TrialPose& out) {
     const Eigen::Quaterniond q = random_.rotation();
     const Vector3d direction = random_.direction();
-    const auto at = [&](double way) {
-      return pose_of(q, ball_a_.centre + way * direction - q * ball_b_.centre);
-    };
-    const auto ask = [&](const Pose& pose) {
-      return penetration({a_.tree, {}, 1}, {b_.tree, pose, 1}, {}, workspace_);
-    };
     // From outside in, since solids may have holes in the middle.
-    const double start = ball_a_.radius + ball_b_.radius;
+    const double start = radius_a_ + radius_b_;
     double near = start, far = start;
-    for (int i = kApproachSteps; i-- > 0 && near == start;) {
-      const double way = start * i / kApproachSteps;
-      if (ask(at(way)).volume >= fraction * smaller_) {
-        near = way;
-      } else {
+    const auto shares = [&](double way) {
+      const Pose pose = pose_of(q, centre_a_ + way * direction - q * centre_b_);
+      const double volume = shared_volume(pose, 1);
+      if (!(volume >= fraction * smaller_)) {
         far = way;
+        return false;
       }
+      near = way;
+      out.b_in_a = pose;
+      out.volume = volume;
+      return true;
+    };
+    for (int i = kApproachSteps; i-- > 0 && near == start;) {
+      if (!go_on_()) return false;
+      shares(start * i / kApproachSteps);
     }
     if (near == start) return false;
     for (int i = 0; i < kBisections; ++i) {
-      const double middle = (near + far) / 2;
-      (ask(at(middle)).volume < fraction * smaller_ ? far : near) = middle;
+      if (!go_on_()) return false;
+      shares((near + far) / 2);
     }
-    out.b_in_a = at(near);
-    const Vector3d push = ask(out.b_in_a).translation_gradient;
-    const Vector3d along = push.norm() > 0 ? push : direction;
-    const SharedVolume truth =
-        shared_volume(a_.solid, b_.solid, out.b_in_a, 1, along, relative_error_, go_on_);
-    if (!(truth.volume > 0) || truth.error > relative_error_ * truth.volume) return false;
-    out.volume = truth.volume;
-    out.fraction = truth.volume / smaller_;
+    out.fraction = out.volume / smaller_;
     for (std::uint32_t k = 1; k < kOverlapClasses; ++k)
       if (out.fraction >= kOverlapClassFloor[k]) {
         out.overlap_class = k;
@@ -102,65 +82,41 @@ class Trials {
     return false;
   }
 
-  /// A small B somewhere inside A: the truth is its own volume.
+  /// A small B somewhere inside A.
   bool contain(double size, TrialPose& out) {
-    out.scale_b = size * ball_a_.radius / ball_b_.radius;
+    constexpr double kAll = 1 - 1e-9;
+    out.scale_b = size * radius_a_ / radius_b_;
     const Eigen::AlignedBox3d box = a_.solid.bounds();
     Vector3d place;
     for (int k = 0; k < 3; ++k)
       place[k] = box.min()[k] + random_.uniform() * (box.max()[k] - box.min()[k]);
     const Eigen::Quaterniond q = random_.rotation();
     if (a_.solid.signed_distance(place) <= 0) return false;
-    out.b_in_a = pose_of(q, place - q * (out.scale_b * ball_b_.centre));
-    if (!holds_vertices(out)) return false;
-    out.volume = out.scale_b * out.scale_b * out.scale_b * b_.solid.volume();
+    out.b_in_a = pose_of(q, place - q * (out.scale_b * centre_b_));
+    out.volume = out.scale_b * out.scale_b * out.scale_b * b_.mesh.volume();
     out.fraction = 1;
     out.overlap_class = 0;
-    // Vertices inside are not all of it.
-    const SharedVolume shared =
-        shared_volume(a_.solid, b_.solid, out.b_in_a, out.scale_b, Vector3d::UnitX(), 1e-2, go_on_);
-    return std::abs(shared.volume - out.volume) <= 3 * shared.error;
+    return shared_volume(out.b_in_a, out.scale_b) >= kAll * out.volume;
   }
 
   TrialRandom& random() { return random_; }
 
  private:
-  /// Whether all vertices of B lie in A. What is nearer to a place inside than the surface is
-  /// inside too, so that few of them need be asked about.
-  bool holds_vertices(const TrialPose& pose) {
-    constexpr double kSure = 1 - 1e-9;
-    constexpr std::size_t kRemembered = 32;
-    const Eigen::Matrix3d rotation =
-        Eigen::Quaterniond(pose.b_in_a.q[0], pose.b_in_a.q[1], pose.b_in_a.q[2], pose.b_in_a.q[3])
-            .toRotationMatrix();
-    const Vector3d shift(pose.b_in_a.t[0], pose.b_in_a.t[1], pose.b_in_a.t[2]);
-    const MeshView& mesh = b_.solid.arrays();
-    std::vector<Ball> inside;
-    std::size_t asked = 0;
-    for (std::size_t v = 0; v < mesh.vertex_count; ++v) {
-      const Vector3d x = b_.solid.frame().from_unit(Vector3d(mesh.vertices + 3 * v));
-      const Vector3d at = rotation * (pose.scale_b * x) + shift;
-      const auto holds = [&](const Ball& ball) {
-        return (at - ball.centre).squaredNorm() < ball.radius * ball.radius;
-      };
-      if (std::any_of(inside.begin(), inside.end(), holds)) continue;
-      const double depth = a_.solid.signed_distance(at);
-      if (depth <= 0) return false;
-      const Ball ball = {at, kSure * depth};
-      if (inside.size() < kRemembered)
-        inside.push_back(ball);
-      else
-        inside[asked % kRemembered] = ball;
-      constexpr std::size_t kBetweenWords = 1024;
-      if (++asked % kBetweenWords == 0 && !go_on_()) return false;
-    }
-    return true;
+  /// NaN where it is not known.
+  double shared_volume(const Pose& b_in_a, double scale_b) {
+    PenetrationSettings exact;
+    exact.measure = Measure::exact;
+    const Penetration found =
+        penetration({a_.mesh, {}, 1}, {b_.mesh, b_in_a, scale_b}, exact, workspace_);
+    return found.status == QueryStatus::ok ? found.volume
+                                           : std::numeric_limits<double>::quiet_NaN();
   }
 
   const TrialBody& a_;
   const TrialBody& b_;
-  const Ball ball_a_, ball_b_;
-  const double smaller_, relative_error_;
+  const Vector3d centre_a_, centre_b_;  ///< of the balls around them
+  const double radius_a_, radius_b_;
+  const double smaller_;
   TrialRandom random_;
   double done_ = 0;
   const std::function<bool()> go_on_;
@@ -170,9 +126,8 @@ class Trials {
 }  // namespace
 
 std::vector<TrialPose> trial_poses(const TrialBody& a, const TrialBody& b, std::uint32_t per_class,
-                                   double relative_error, std::uint64_t seed,
-                                   const std::function<bool(double)>& go_on) {
-  Trials trials(a, b, relative_error, seed, go_on);
+                                   std::uint64_t seed, const std::function<bool(double)>& go_on) {
+  Trials trials(a, b, seed, go_on);
   std::vector<TrialPose> poses;
   for (std::uint32_t k = 0; k < kOverlapClasses; ++k) {
     std::uint32_t found = 0;
@@ -206,10 +161,9 @@ std::vector<TrialPose> trial_poses(const TrialBody& a, const TrialBody& b, std::
 }
 
 std::vector<TrialPose> trial_poses_near(double overlap, const TrialBody& a, const TrialBody& b,
-                                        std::uint32_t count, double relative_error,
-                                        std::uint64_t seed,
+                                        std::uint32_t count, std::uint64_t seed,
                                         const std::function<bool(double)>& go_on) {
-  Trials trials(a, b, relative_error, seed, go_on);
+  Trials trials(a, b, seed, go_on);
   std::vector<TrialPose> poses;
   for (std::uint32_t i = 0; i < kTriesPerPose * count && poses.size() < count; ++i) {
     if (!trials.next(poses.size(), count)) return poses;
