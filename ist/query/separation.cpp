@@ -2,6 +2,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <ist/query.h>
 
@@ -20,6 +21,9 @@ namespace {
 
 // Part of a deadline for visits. Nothing is estimated afterwards; the rest is for the witness.
 constexpr double kForVisits = 0.95;
+
+// Of a larger B the fourth powers of lengths would overflow: A is moved into its frame instead.
+constexpr double kLargest = 1e30;
 
 /// Depth-first branch and bound, nearest child first, for two minima at once: the gap of the inner
 /// spheres and that of their cover balls. All in A's unit frame.
@@ -204,6 +208,12 @@ Separation separation(const PlacedTree& a, const PlacedTree& b, const Separation
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) {
     result.status = QueryStatus::invalid_input;
+    return result;
+  }
+  if (surfaces && pose->a_from_b.scale > kLargest) {
+    result = separation(b, a, settings, workspace);
+    std::swap(result.point_a, result.point_b);
+    result.normal = -result.normal;
     return result;
   }
   if (surfaces) return surface_separation(a, b, *pose, settings, workspace.impl()->exact);

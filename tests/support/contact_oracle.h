@@ -147,6 +147,7 @@ class ContactJudge {
     const Penetration matched = penetration(place_a, place_b, {}, workspace_);
     const Separation gap = separation(place_a, place_b, {}, workspace_);
     const double d = c.surface_distance;
+    constexpr double kDigits = 1e-11;  // that it has
     ContactVerdict verdict;
     const auto require = [&](bool holds, const std::string& otherwise) {
       if (!holds) verdict.wrong.push_back(otherwise);
@@ -157,8 +158,8 @@ class ContactJudge {
     verdict.interval_width = gap.distance_max - gap.distance_min;
     if (!c.meet()) {
       require(inner.volume == 0, "inner spheres overlap, the solids are apart");
-      require(gap.distance_min <= d, "the solids are closer than distance_min");
-      require(gap.distance_max >= d, "the solids are further apart than distance_max");
+      require(gap.distance_min <= d + kDigits, "the solids are closer than distance_min");
+      require(gap.distance_max >= d - kDigits, "the solids are further apart than distance_max");
       verdict.protrusion = verdict.matched;
       require(!verdict.matched || d <= a.protrusion + b.protrusion,
               "matched overlap beyond both protrusions");
