@@ -128,9 +128,9 @@ class RegionSums {
     sums_.resize(cuts_.bins);
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> to_world(place.rotation_a);
     for (std::uint32_t i = 0; i < kWidth * a.leaf_blocks; ++i) {
-      const gpu::NodeBall x = a.ball(gpu::kSphereLevel, i);
+      const gpu::NodeBall x = a.ball(kSphereLevel, i);
       for (std::uint32_t j = 0; x.r > 0 && j < kWidth * b.leaf_blocks; ++j) {
-        const gpu::NodeBall y = b.ball(gpu::kSphereLevel, j);
+        const gpu::NodeBall y = b.ball(kSphereLevel, j);
         if (!(y.r > 0)) continue;
         double moved[3];
         place.a_from_b.apply(y.centre, moved);
