@@ -25,7 +25,7 @@ try:
 except ImportError:
     coacd = None
 
-STIFF = 'solref="-2e4 -20"'
+STIFF = 'solref="-2e4 -60"'
 
 
 def turned(profile, around=48):
@@ -81,7 +81,7 @@ class Nut(Scene):
         off = 1e3 * np.abs(log[:, :2]).max()
         if turns < 0.1 or off > 1:
             return False, f"does not turn, {off:.2g} mm off its axis"
-        pitch = 1e3 * (log[0, 2] - log[-1, 2]) / turns
+        pitch = 1e3 * abs(np.polyfit(turn / (2 * np.pi), log[:, 2], 1)[0])
         return abs(pitch - 2) < 0.05, f"{pitch:.3f} mm a turn over {turns:.2f}, {off:.3f} mm off its axis"
 
 

@@ -23,7 +23,7 @@ namespace {
 constexpr double kForVisits = 0.95;
 
 // Of a larger B the fourth powers of lengths would overflow: A is moved into its frame instead.
-constexpr double kLargest = 1e30;
+constexpr double kLargestScale = 1e30;
 
 /// Depth-first branch and bound, nearest child first, for two minima at once: the gap of the inner
 /// spheres and that of their cover balls. All in A's unit frame.
@@ -210,7 +210,7 @@ Separation separation(const PlacedTree& a, const PlacedTree& b, const Separation
     result.status = QueryStatus::invalid_input;
     return result;
   }
-  if (surfaces && pose->a_from_b.scale > kLargest) {
+  if (surfaces && pose->a_from_b.scale > kLargestScale) {
     result = separation(b, a, settings, workspace);
     std::swap(result.point_a, result.point_b);
     result.normal = -result.normal;

@@ -140,10 +140,10 @@ class _Scene:
         is_field = np.array([isinstance(solid, ist.Field) for solid in solids], bool)
         for i, (first, second) in enumerate(pairs.tolist()):
             if not (0 <= first < len(solids) and 0 <= second < len(solids)):
-                raise ValueError(f"pairs[{i}]: ({first}, {second}): there are solids 0 to "
+                raise ValueError(f"pairs[{i}]: ({first}, {second}): solids are numbered 0 to "
                                  f"{len(solids) - 1}")
             if first == second:
-                raise ValueError(f"pairs[{i}]: ({first}, {second}): a solid does not meet itself")
+                raise ValueError(f"pairs[{i}]: ({first}, {second}): a solid cannot be paired with itself")
             if is_field[second]:
                 raise TypeError(f"pairs[{i}]: ({first}, {second}): solids[{second}] is a Field; it "
                                 "stands first in a pair")

@@ -1,5 +1,5 @@
-// ist as MuJoCo's narrow phase. mj_loadPluginLibrary() runs the function at the end of this file: it
-// registers the plug-in "ist.solid" and puts collide() into the SDF column of MuJoCo's table of
+// ist as MuJoCo's narrow phase. mj_loadPluginLibrary() runs the function at the end of this file:
+// it registers the plug-in "ist.solid" and puts collide() into the SDF column of MuJoCo's table of
 // collision functions. A geom of type "sdf" with an instance of the plug-in then collides as the
 // solid of its asset; all other geoms collide as before.
 
@@ -174,7 +174,8 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   if (first != nullptr) a = place(m, d, g1, *first);
   if (second == nullptr || (first == nullptr && !shape_of(m, d, g1, field, shape))) {
     complain_once(
-        "ist.solid: a solid meets an ellipsoid, a height field, or a mesh or SDF without an ist.solid: "
+        "ist.solid: a solid meets an ellipsoid, a height field, or a mesh or SDF without an "
+        "ist.solid: "
         "they do not collide. ist.mujoco.attach() makes solids of meshes.");
     return 0;
   }
@@ -203,8 +204,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   }
   int count = 0;
   for (size_t i = 0; i < patches.count; ++i)
-    if (memory.patches[i].area > 0)
-      write_contact(memory.patches[i], b.pose.t, out[count++]);
+    if (memory.patches[i].area > 0) write_contact(memory.patches[i], b.pose.t, out[count++]);
   if (count > 0 || !(margin > 0) || whole.volume > 0 || room < 1) return count;
   // Apart: one contact at the gap, for margins and mj_geomDistance().
   ist_separation_t gap = {};

@@ -117,7 +117,7 @@ TEST_F(Numbers, LeadingZerosAreNotOctal) {
     EXPECT_EQ(outcome.exit_code, 0) << option.name << "\n" << outcome.err;
   }
   const Outcome detail = ist(with(kExport, "--detail", "08"));
-  EXPECT_NE(detail.err.find("not 8"), std::string::npos) << detail.err;
+  EXPECT_NE(detail.err.find("--detail 8 is out of range"), std::string::npos) << detail.err;
 }
 
 TEST_F(Numbers, SharesMayBePercentages) {

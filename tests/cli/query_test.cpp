@@ -199,7 +199,7 @@ TEST_F(ExactQueryCommand, TellsTheTrueVolumeOfSurfacesAlone) {
   EXPECT_GE(r[volume_max], kTruth - 1e-13);
   EXPECT_LT(r[volume_max] - r[volume_min], 1e-9 * kTruth);
   EXPECT_NEAR(r[dVdtx + 2], 71.734, 1e-3);
-  EXPECT_TRUE(std::isnan(r[distance]));
+  EXPECT_EQ(r[distance], 0);
   EXPECT_GT(r[time_us], 0);
 
   by_json.insert(by_json.begin(), "query");
@@ -207,7 +207,7 @@ TEST_F(ExactQueryCommand, TellsTheTrueVolumeOfSurfacesAlone) {
   const nlohmann::ordered_json entry = nlohmann::ordered_json::parse(ist(by_json).out)[0];
   EXPECT_EQ(entry.at("volume").get<double>(), r[volume]);
   EXPECT_EQ(entry.at("status"), "ok");
-  EXPECT_TRUE(entry.at("distance").is_null() && entry.at("distance_max").is_null());
+  EXPECT_EQ(entry.at("distance").get<double>(), 0);
 
   std::vector<std::string> by_text = asked;
   by_text.insert(by_text.begin(), "query");
@@ -216,7 +216,6 @@ TEST_F(ExactQueryCommand, TellsTheTrueVolumeOfSurfacesAlone) {
   for (const char* words : {"34.74096031393", "of the true overlap", "bounds",
                             "contain the true volume", "-71.734", "triangle pairs"})
     EXPECT_NE(text.out.find(words), std::string::npos) << words << "\n" << text.out;
-  EXPECT_EQ(text.out.find("distance"), std::string::npos) << text.out;
 }
 
 TEST_F(ExactQueryCommand, TellsTheSpheresDistanceWhereTheyAre) {

@@ -97,12 +97,14 @@ def test_a_surface_alone_answers_no_query_of_spheres(cube):
     assert len(alone.spheres()) == 0
     again = ist.Asset.from_bytes(alone.to_bytes())
     one = [1, 0, 0, 0, 0, 0, 0]
-    for query in (ist.penetration, ist.separation):
-        with pytest.raises(ist.Error, match="is a surface alone, without spheres"):
-            query(again, cube, one)
+    with pytest.raises(ist.Error, match="is a surface alone, without spheres"):
+        ist.penetration(again, cube, one)
+    with pytest.raises(ist.Error, match="is a surface alone, without spheres"):
+        ist.separation(again, cube, one, inner_spheres=True)
     found = ist.penetration(again, cube, [one])
     assert found.status[0] == ist.QueryStatus.not_held and np.isnan(found.volume[0])
-    assert np.isnan(ist.separation(cube, again, [one]).distance[0])
+    assert np.isnan(ist.separation(cube, again, [one], inner_spheres=True).distance[0])
+    assert ist.separation(cube, again, [1, 0, 0, 0, 3, 0, 0]).distance > 0  # of the meshes
 
 
 @pytest.mark.parametrize("surface, state", [("all", "own"), ("none", "none"), (0.1, "own"),

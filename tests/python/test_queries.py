@@ -425,7 +425,7 @@ def test_impacts_come_in_time(cube):
     assert found.time[0] == pytest.approx((10 * side + lower) / (10 * side), rel=1e-2)
     assert found.normal[0] == pytest.approx([1, 0, 0], abs=1e-6)
     assert ist.time_of_impact(wall, cube, start[0], end[0]).time < 1
-    with pytest.raises(ValueError, match="poses_to: as many rows"):
+    with pytest.raises(ValueError, match="poses_to: shape"):
         ist.time_of_impact(wall, cube, start, end[0])
 
 

@@ -204,7 +204,8 @@ TEST(BakeToError, IsCancelledWithinAFifthOfASecond) {
   };
   bake_to_error(fine_torus(), kTarget, settings, look);
   EXPECT_LE(longest, kLatency) << "before a report of the stage " << where;
-  EXPECT_EQ(stages, (std::set<std::string>{"calibrate", "cover", "pack", "predict", "tree"}));
+  EXPECT_EQ(stages,
+            (std::set<std::string>{"calibrate", "cover", "pack", "predict", "resolve", "tree"}));
 
   for (const std::string& stage : stages) {
     double refused = 0;

@@ -49,7 +49,8 @@ TEST(CloseMesh, OpenCubeIsRefusedWithPlaceAndWayOut) {
   TriangleMesh open = box_mesh(kZero, Eigen::Vector3d::Ones());
   open.triangles.pop_back();  // {1, 7, 5}
   EXPECT_EQ(error_of(open),
-            "part: 3 boundary edges, first at vertex 1 (1 0 0): not closed. Repair or close it");
+            "part: 3 boundary edges, first at vertex 1 (1 0 0): the mesh is not closed. "
+            "Repair or close it");
 }
 
 TEST(CloseMesh, UnweldedSoupIsWelded) {
@@ -77,7 +78,7 @@ TEST(CloseMesh, WhatIsNoMeshIsRefused) {
   EXPECT_NE(error_of({}).find("no triangles"), std::string::npos);
   TriangleMesh mesh = cube_mesh();
   mesh.triangles[3][1] = 8;
-  EXPECT_NE(error_of(mesh).find("triangle 3 names vertex 8 of 8"), std::string::npos);
+  EXPECT_NE(error_of(mesh).find("triangle 3 refers to vertex 8 of 8"), std::string::npos);
   mesh = cube_mesh();
   mesh.vertices[5][2] = std::numeric_limits<double>::infinity();
   EXPECT_NE(error_of(mesh).find("vertex 5"), std::string::npos);

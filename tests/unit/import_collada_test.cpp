@@ -159,7 +159,7 @@ TEST(ImportCollada, WhatIsWrongIsNamed) {
        "line 2: document types and entities are refused"},
       {"<svg></svg>", "is not COLLADA: its root is \"svg\""},
       {replaced(kOne, "<p>0 2", "<p>-1 2"), "line 9: <p>: \"-1\" is not a whole number"},
-      {replaced(kOne, "<p>0 2", "<p>4 2"), "line 9: <p>: names vertex 4 of 4"},
+      {replaced(kOne, "<p>0 2", "<p>4 2"), "line 9: <p>: refers to vertex 4 of 4"},
       {replaced(kOne, "<p>0 2", "<p>2"), "11 corners are not a multiple of three"},
       {replaced(kOne, "triangles count='4'", "triangles count='1000000000'"),
        "announces 1000000000 and holds 4"},
@@ -172,7 +172,7 @@ TEST(ImportCollada, WhatIsWrongIsNamed) {
       {replaced(kOne, ">0 0 0 1", ">nan 0 0 1"), "infinite or not a number"},
       {replaced(kOne, "url='#g'", "url='#h'"), "refers to \"#h\", which is not a geometry"},
       {replaced(kOne, "url='#g'", "url='http://x/#h'"), "not to an element of this file"},
-      {collada("<node><matrix>1 0 0</matrix></node>"), "3 numbers, where 16 belong"},
+      {collada("<node><matrix>1 0 0</matrix></node>"), "3 numbers instead of 16"},
       {collada("<node><skew>1 2 3 4 5 6 7</skew></node>"), "<skew>: is not supported"},
       {collada("<node/>"), "no faces"},
   };

@@ -87,7 +87,7 @@ TEST_F(Vdb, RefusesWhatIsNoLevelSet) {
   first->setName("left");
   second->setName("right");
   written({first, second});
-  expect_refused("it holds 2 grids ('left', 'right')");
+  expect_refused("contains 2 grids ('left', 'right')");
   written({openvdb::Vec3SGrid::create()});
   expect_refused("not float");
   written({});
