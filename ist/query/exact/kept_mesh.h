@@ -36,8 +36,10 @@ inline double moved_by_poses(const PlacedTree& a, const PlacedTree& b, const Mes
     return placed.scale * Eigen::Vector3d(c[0], c[1], c[2]).norm();
   };
   const Eigen::Vector3d shift(pose.a_from_b.t[0], pose.a_from_b.t[1], pose.a_from_b.t[2]);
-  const double between =
-      std::hypot(b.pose.t[0] - a.pose.t[0], b.pose.t[1] - a.pose.t[1], b.pose.t[2] - a.pose.t[2]);
+  // The C library's hypot differs between processors.
+  double between = 0;
+  for (int k = 0; k < 3; ++k) between += (b.pose.t[k] - a.pose.t[k]) * (b.pose.t[k] - a.pose.t[k]);
+  between = std::sqrt(between);
   return 1.1 * kHalfUnit *
          (45 * (1.8 * pose.a_from_b.scale * mesh_b.extent() +
                 (between + offset(a) + offset(b)) / pose.unit_a) +

@@ -56,7 +56,7 @@ test('init() takes bytes, a module and an address, and says what failed', () => 
       process.execPath, ['--input-type=module', '-e', script],
       {cwd: packageFolder, encoding: 'utf8'}));
   assert.match(told[0], /^IstError: .*127\.0\.0\.1:9.* cannot be fetched.*init\(\{wasm: url\}\)/);
-  assert.match(told[1], /^IstError: .* no WebAssembly/);
+  assert.match(told[1], /^IstError: .* not a WebAssembly module/);
   assert.match(told[2], /^IstError: .*404/);
   assert.match(told[3], /^IstError: .*cannot be compiled.*SIMD/);
   assert.match(told[4], /^\d+\.\d+\.\d+$/);
@@ -105,7 +105,7 @@ test('what an asset holds', () => {
     const levels = asset.levelCount(set);
     const top = asset.level(levels - 1, set).length / 4;
     assert.ok(levels >= 3 && top >= 1 && top <= 16);
-    assert.match(sentence(() => asset.level(levels, set)), /there is no level/);
+    assert.match(sentence(() => asset.level(levels, set)), /has no level/);
   }
   assert.match(
       sentence(() => asset.spheres({detail: 99})), /bolt\.ist: has no level 0 of detail 99/);
@@ -132,7 +132,7 @@ test('exact is the true volume of two meshes, and refused where there is none', 
   assert.deepEqual(one, found);
   assert.ok(other.status === 'not-held' && Number.isNaN(other.volume));
   assert.match(
-      sentence(() => ist.lenses(a, b, pose, exact)), /measure is exact; there are matched, inner/);
+      sentence(() => ist.lenses(a, b, pose, exact)), /measure is exact; use one of matched, inner/);
   assert.match(
       sentence(() => ist.penetration(a, b, pose, {measure: 'outer'})),
       /measure is outer; there are matched, inner, exact/);
