@@ -69,10 +69,15 @@ struct GapPair {
   std::uint32_t a, b;
   std::uint8_t level_a, level_b;
 
-  /// In a heap: the nearest on top, of equally near ones what is furthest down the trees.
+  /// In a heap: the nearest on top, of equally near ones what is furthest down the trees. No two
+  /// are equal, so that heaps of all libraries give the same order.
   bool operator<(const GapPair& other) const noexcept {
     if (squared != other.squared) return squared > other.squared;
-    return level_a + level_b > other.level_a + other.level_b;
+    if (const int sum = level_a + level_b, others = other.level_a + other.level_b; sum != others)
+      return sum > others;
+    if (a != other.a) return a > other.a;
+    if (b != other.b) return b > other.b;
+    return level_a > other.level_a;
   }
 };
 

@@ -111,7 +111,7 @@ test('what an asset holds', () => {
       sentence(() => asset.spheres({detail: 99})), /bolt\.ist: has no level 0 of detail 99/);
   assert.match(
       sentence(() => asset.spheres({measure: 'outer'})),
-      /measure is outer; there are matched, inner/);
+      /measure is outer; use one of matched, inner/);
   asset.free();
 });
 
@@ -135,7 +135,7 @@ test('exact is the true volume of two meshes, and refused where there is none', 
       sentence(() => ist.lenses(a, b, pose, exact)), /measure is exact; use one of matched, inner/);
   assert.match(
       sentence(() => ist.penetration(a, b, pose, {measure: 'outer'})),
-      /measure is outer; there are matched, inner, exact/);
+      /measure is outer; use one of matched, inner, exact/);
   for (const each of [a, b, floor]) each.free();
 });
 
