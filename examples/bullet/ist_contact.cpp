@@ -88,7 +88,7 @@ bool find_contact(const btCollisionObject& first, const btCollisionObject& secon
     keep(ist::contact_patches(tree_a, contact.pair.tree_b, settings, workspace, room));
     if (contact.whole.volume_max <= 0) {
       // A bound tells enough: the first few nodes give one.
-      constexpr ist::SeparationSettings kGlance{.max_visits = 8};
+      constexpr ist::SeparationSettings kGlance{.max_visits = 8, .inner_spheres = true};
       const ist::Separation gap = ist::separation(tree_a, contact.pair.tree_b, kGlance, workspace);
       contact.clearance = gap.distance_min - a->tree().protrusion() - b.tree().protrusion();
     }

@@ -60,8 +60,8 @@ class Asset {
 /// and the field.
 ///
 /// The same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number
-/// of threads. Cancelling during packing keeps what is packed; before and after
-/// it throws Error.
+/// of threads. Cancelling during packing keeps what is packed; before and
+/// after it throws Error.
 ///
 /// A mesh that counts volume twice is first resolved to the boundary of the set where its winding
 /// number is 1 or more (MeshState::resolved). If that fails, no mesh is kept

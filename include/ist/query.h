@@ -186,6 +186,9 @@ Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
 /// nearest points that it found; its interval is certified all the same. Batches on the GPU
 /// (<ist/gpu_query.h>) always use the inner spheres.
 ///
+/// Surfaces that run beside each other at one distance, as a nut's and a bolt's threads do, take
+/// milliseconds: in a loop, limit it or use the inner spheres.
+///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 Separation separation(const PlacedTree& a, const PlacedTree& b, const SeparationSettings& settings,
                       Workspace& workspace) noexcept;

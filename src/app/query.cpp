@@ -204,7 +204,9 @@ std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions&
     require_surface(options.asset_b, b.view());
   }
   warn_of_misfit(a.view(), b.view(), rows, options);
-  return answer(PlacedTree{a.view(), {}, 1}, b.view(), rows, options);
+  std::vector<Answer> answers = answer(PlacedTree{a.view(), {}, 1}, b.view(), rows, options);
+  for (Answer& one : answers) one.surfaces = a.view().has_mesh() && b.view().has_mesh();
+  return answers;
 }
 
 void run_query(const QueryOptions& options) {

@@ -106,7 +106,8 @@ std::string answer_text(const Answer& answer, Measure measure) {
          "on B about its origin: −dV/d(rotation of B)");
   }
   if (answer.has_distance()) {
-    line("distance", fmt::format("{:.5g} u", s.distance), "between the inner spheres");
+    line("distance", fmt::format("{:.5g} u", s.distance),
+         answer.surfaces ? "between the surfaces" : "between the inner spheres");
     line("interval", fmt::format("{:.5g} … {:.5g} u", s.distance_min, s.distance_max),
          "contains the distance of the solids, certified");
   }

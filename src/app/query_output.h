@@ -12,7 +12,8 @@ namespace ist::app {
 struct Answer {
   PoseRow row;
   PenetrationAndSeparation result;
-  double time_us = 0;  ///< [µs] wall time of this one query
+  double time_us = 0;     ///< [µs] wall time of this one query
+  bool surfaces = false;  ///< the distance is that of surfaces, else of inner spheres
 
   /// Surfaces alone have no spheres to be apart.
   bool has_distance() const { return result.separation.status != QueryStatus::not_held; }

@@ -218,11 +218,11 @@ TEST_F(ExactQueryCommand, TellsTheTrueVolumeOfSurfacesAlone) {
     EXPECT_NE(text.out.find(words), std::string::npos) << words << "\n" << text.out;
 }
 
-TEST_F(ExactQueryCommand, TellsTheSpheresDistanceWhereTheyAre) {
+TEST_F(ExactQueryCommand, TellsTheDistanceOfSurfaces) {
   const Outcome apart =
       ist({"query", "cube.ist", "capsule.ist", "--pose", "1,0,0,0,0,0,9", "--measure", "exact"});
   EXPECT_EQ(apart.exit_code, 0) << apart.err;
-  EXPECT_NE(apart.out.find("between the inner spheres"), std::string::npos) << apart.out;
+  EXPECT_NE(apart.out.find("between the surfaces"), std::string::npos) << apart.out;
   EXPECT_NE(apart.out.find("volume     0 u³"), std::string::npos) << apart.out;
   const std::vector<double> r = row("1,0,0,0,0.5,0,0", {"--measure", "exact"});
   EXPECT_NEAR(r[volume], 0.5, 1e-12);

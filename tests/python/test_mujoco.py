@@ -75,7 +75,9 @@ def nut(folder, **settings):
 
 
 def test_a_nut_runs_down_its_bolt(folder):
+    as_mesh = mujoco.MjModel.from_xml_path(str(folder / "nut.xml"))
     model, data = nut(folder)
+    assert as_mesh.body_mass[1] / model.body_mass[1] == pytest.approx(1.72, abs=0.01)
     heights, angles, last, angle = [], [], 0.0, 0.0
     for _ in range(600):
         mujoco.mj_step(model, data)
@@ -180,8 +182,11 @@ def test_what_cannot_be_read_is_an_error(config, words):
 
 def test_what_is_not_there_has_a_name(folder):
     spec = mujoco.MjSpec.from_file(str(folder / "nut.xml"))
-    with pytest.raises(ValueError, match="nuts"):
+    with pytest.raises(ValueError, match="no mesh geom named 'nuts'"):
         ist.mujoco.attach(spec, geoms=["nuts"], cache=folder / "cache")
+    spec = mujoco.MjSpec.from_string(CUBE.format(ground=PLANE, height=1))
+    with pytest.raises(ValueError, match="no mesh geom named 'ground'"):
+        ist.mujoco.attach(spec, geoms=["ground"], cache=folder / "cache")
     assert ist.mujoco.load() == ist.mujoco.load() == ist.mujoco.plugin_path()
 
 

@@ -279,10 +279,13 @@ export interface SeparationOptions extends Limits {
   into?: Separation;
 }
 
-/** The gap between two solids; all zero once inner spheres overlap. */
+/**
+ * The gap between two solids: between their surfaces if both keep a mesh, else between their inner
+ * spheres. All zero once these overlap.
+ */
 export interface Separation {
   status: Status;
-  /** [u] between the inner spheres. */
+  /** [u] between surfaces or inner spheres. */
   distance: number;
   /** [u] the solids' distance lies within, certified. */
   distanceMin: number;

@@ -59,7 +59,7 @@ class BlockSearch {
 
   void push(int level_a, std::uint32_t a, int level_b, std::uint32_t b) {
     if (level_a == 0 && level_b == 0) {
-      if (found_.count == scratch_.most_rows())
+      if (found_.count == scratch_.most_pairs())
         found_.complete = false;
       else
         scratch_.keys[found_.count++] = std::uint64_t{a} << 32 | b;
@@ -121,11 +121,7 @@ class BlockSearch {
     const BoxBlock& boxes_b = b_.level[pair.level_b].boxes[pair.b];
     const PlacedBoxes& a_in_b = placed_a(pair.level_a, pair.a);
     const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
-    OneBox all(boxes_a.low, boxes_a.high, 0, 0);
-    for (int k = 0; k < 3; ++k) {
-      all.low[k] = b_in_a.all_low[k] - search_.room;
-      all.high[k] = b_in_a.all_high[k] + search_.room;
-    }
+    const OneBox all(b_in_a.all_low, b_in_a.all_high, search_.room);
     // Unused lanes meet what is large enough.
     std::uint32_t rows = meeting(boxes_a.low, boxes_a.high, all.low, all.high) &
                          ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
@@ -146,12 +142,8 @@ class BlockSearch {
   void open_larger_a(const BoxPair& pair) {
     const BoxBlock& boxes = a_.level[pair.level_a].boxes[pair.a];
     const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
-    float low[3], high[3];
-    for (int k = 0; k < 3; ++k) {
-      low[k] = b_in_a.all_low[k] - search_.room;
-      high[k] = b_in_a.all_high[k] + search_.room;
-    }
-    std::uint32_t found = meeting(boxes.low, boxes.high, low, high) &
+    const OneBox all(b_in_a.all_low, b_in_a.all_high, search_.room);
+    std::uint32_t found = meeting(boxes.low, boxes.high, all.low, all.high) &
                           ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
     for (; found != 0; found &= found - 1)
       push(pair.level_a - 1, kWidth * pair.a + static_cast<std::uint32_t>(std::countr_zero(found)),
@@ -161,12 +153,8 @@ class BlockSearch {
   void open_larger_b(const BoxPair& pair) {
     const BoxBlock& boxes = b_.level[pair.level_b].boxes[pair.b];
     const PlacedBoxes& a_in_b = placed_a(pair.level_a, pair.a);
-    float low[3], high[3];
-    for (int k = 0; k < 3; ++k) {
-      low[k] = a_in_b.all_low[k] - room_b_;
-      high[k] = a_in_b.all_high[k] + room_b_;
-    }
-    std::uint32_t found = meeting(boxes.low, boxes.high, low, high) &
+    const OneBox all(a_in_b.all_low, a_in_b.all_high, room_b_);
+    std::uint32_t found = meeting(boxes.low, boxes.high, all.low, all.high) &
                           ((1u << used_lanes(b_, pair.level_b, pair.b)) - 1);
     for (; found != 0; found &= found - 1)
       push(pair.level_a, pair.a, pair.level_b - 1,

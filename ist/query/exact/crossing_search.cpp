@@ -27,22 +27,10 @@ class TriangleSearch {
     scratch_.pairs->count = 0;
   }
 
-  std::uint32_t find_rows(std::uint32_t count) {
-    for (std::uint32_t n = 0; n < count; ++n)
-      if (!add_rows(static_cast<std::uint32_t>(scratch_.keys[n] >> 32),
-                    static_cast<std::uint32_t>(scratch_.keys[n])))
-        return ~0u;
-    return rows_;
-  }
-
-  CrossingsFound test_rows(std::uint32_t count) {
-    for (std::uint32_t n = 0; n < count && found_.complete; ++n) {
-      const TriangleRow& row = scratch_.rows[n];
-      const PlacedTriangles& a = placed_a(row.a / kWidth);
-      const PlacedTriangles& b = placed_b(row.block_b);
-      for (std::uint32_t lanes = row.lanes; lanes != 0; lanes &= lanes - 1)
-        add_pair(row.a, a, row.block_b, b, static_cast<std::uint32_t>(std::countr_zero(lanes)));
-    }
+  CrossingsFound run(std::uint32_t count) {
+    for (std::uint32_t n = 0; n < count && found_.complete; ++n)
+      meet(static_cast<std::uint32_t>(scratch_.keys[n] >> 32),
+           static_cast<std::uint32_t>(scratch_.keys[n]));
     if (found_.complete) test_pairs();
     clear_behind();
     return found_;
@@ -113,16 +101,12 @@ class TriangleSearch {
     return lanes & bits;
   }
 
-  /// Of a pair of blocks. False where there is no room.
-  bool add_rows(std::uint32_t number_a, std::uint32_t number_b) {
+  /// Tests the triangles of two blocks by boxes and planes.
+  void meet(std::uint32_t number_a, std::uint32_t number_b) {
     const PlacedTriangles& a = placed_a(number_a);
     const PlacedTriangles& b = placed_b(number_b);
-    float low[3], high[3];
-    for (int k = 0; k < 3; ++k) {
-      low[k] = b.all_low[k] - search_.room;
-      high[k] = b.all_high[k] + search_.room;
-    }
-    std::uint32_t rows = meeting(a.low, a.high, low, high);
+    const OneBox all(b.all_low, b.all_high, search_.room);
+    std::uint32_t rows = meeting(a.low, a.high, all.low, all.high);
     const BoxBlock& box_a = a_.level[1].boxes[number_a / kWidth];
     const PlacedBoxes& box_b =
         placed_boxes(b_, 1, number_b / kWidth, search_.a_from_b, pad_b_, *scratch_.boxes_b);
@@ -134,18 +118,16 @@ class TriangleSearch {
     if (rows != 0)
       rows &=
           in_slab(a, normal_b, box_b.slab_low[lane_b] - slack_, box_b.slab_high[lane_b] + slack_);
-    if (rows == 0) return true;
+    if (rows == 0) return;
     const std::uint32_t in_a =
         in_slab(b, normal_a, box_a.slab_low[lane_a] - slack_, box_a.slab_high[lane_a] + slack_);
-    if (in_a == 0) return true;
-    if (rows_ + kWidth > scratch_.most_rows()) return false;
+    if (in_a == 0) return;
     for (; rows != 0; rows &= rows - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
-      const std::uint32_t lanes = crossable(a, i, b, in_a);
-      scratch_.rows[rows_] = {kWidth * number_a + i, number_b, lanes};
-      rows_ += lanes != 0;
+      for (std::uint32_t lanes = crossable(a, i, b, in_a); lanes != 0; lanes &= lanes - 1)
+        add_pair(kWidth * number_a + i, a, number_b, b,
+                 static_cast<std::uint32_t>(std::countr_zero(lanes)));
     }
-    return true;
   }
 
   void add_pair(std::uint32_t triangle_a, const PlacedTriangles& a, std::uint32_t number_b,
@@ -163,7 +145,6 @@ class TriangleSearch {
     take(1, b_.blocks[number_b], b, j);
     pairs.triangle[0][n] = triangle_a;
     pairs.triangle[1][n] = kWidth * number_b + j;
-    ++found_.tests;
     if (++pairs.count == 8) test_pairs();
   }
 
@@ -286,9 +267,9 @@ class TriangleSearch {
     for (std::uint32_t left = all & ~signs.apart & ~signs.sure; left != 0; left &= left - 1) {
       const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
       find_exactly(pairs, n, signs);
-      scratch_.keys[found_.unsure++] =
+      scratch_.other_keys[found_.unsure++] =
           std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n];
-      found_.complete &= found_.unsure + 8 < scratch_.most_rows();
+      found_.complete &= found_.unsure + 8 < scratch_.most_pairs();
     }
     // Two edges pierce where triangles cross, none else.
     std::uint32_t once = 0, twice = 0, more = 0;
@@ -411,18 +392,12 @@ class TriangleSearch {
   const MeshTree& b_;
   ExactScratch& scratch_;
   float pad_b_, slack_;
-  std::uint32_t rows_ = 0;
   CrossingsFound found_;
 };
 
-std::uint32_t search_rows(const CrossingSearch& search, std::uint32_t count,
-                          ExactScratch& scratch) {
-  return TriangleSearch(search, scratch).find_rows(count);
-}
-
-CrossingsFound test_all_rows(const CrossingSearch& search, std::uint32_t count,
-                             ExactScratch& scratch) {
-  return TriangleSearch(search, scratch).test_rows(count);
+CrossingsFound search_triangles(const CrossingSearch& search, std::uint32_t count,
+                                ExactScratch& scratch) {
+  return TriangleSearch(search, scratch).run(count);
 }
 
 const PlacedTriangles& place_one(const CrossingSearch& search, bool of_b, std::uint32_t number,
@@ -437,18 +412,12 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
-HWY_EXPORT(search_rows);
-HWY_EXPORT(test_all_rows);
+HWY_EXPORT(search_triangles);
 HWY_EXPORT(place_one);
 
-std::uint32_t find_rows(const CrossingSearch& search, std::uint32_t count,
-                        ExactScratch& scratch) noexcept {
-  return HWY_DYNAMIC_DISPATCH(search_rows)(search, count, scratch);
-}
-
-CrossingsFound test_rows(const CrossingSearch& search, std::uint32_t count,
-                         ExactScratch& scratch) noexcept {
-  return HWY_DYNAMIC_DISPATCH(test_all_rows)(search, count, scratch);
+CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t count,
+                              ExactScratch& scratch) noexcept {
+  return HWY_DYNAMIC_DISPATCH(search_triangles)(search, count, scratch);
 }
 
 const PlacedTriangles& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,

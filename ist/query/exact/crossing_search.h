@@ -27,9 +27,8 @@ struct BlockPairs {
 
 struct CrossingsFound {
   std::uint32_t crossings = 0;  ///< in ExactScratch::crossings
-  std::uint32_t tests = 0;      ///< pairs of triangles tested by signs
   /// Pairs of triangles whose signs might be others where points move by `room`, and some that are
-  /// far apart: in ExactScratch::keys, A's triangle << 32 | B's.
+  /// far apart: in ExactScratch::other_keys, A's triangle << 32 | B's.
   std::uint32_t unsure = 0;
   bool complete = true;    ///< no limit or room was short
   bool consistent = true;  ///< signs agree with each other
@@ -38,16 +37,10 @@ struct CrossingsFound {
 /// Finds the pairs of blocks.
 BlockPairs find_block_pairs(const CrossingSearch& search, ExactScratch& scratch) noexcept;
 
-/// Of `count` pairs of blocks (ExactScratch::keys, in order) the rows of triangles whose boxes and
-/// planes come within `room`, in order of their blocks, then of A's triangles. Returns how many
-/// there are (ExactScratch::rows), or ~0 where these are too many.
-std::uint32_t find_rows(const CrossingSearch& search, std::uint32_t count,
-                        ExactScratch& scratch) noexcept;
-
-/// Tests rows by signs, exact ones where need be: finds all triangles that cross, in the order of
-/// the rows. The same crossings on every instruction set.
-CrossingsFound test_rows(const CrossingSearch& search, std::uint32_t count,
-                         ExactScratch& scratch) noexcept;
+/// Of `count` pairs of blocks (ExactScratch::keys) all triangles that cross, in the order of the
+/// pairs, by exact signs where need be. The same crossings on every instruction set.
+CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t count,
+                              ExactScratch& scratch) noexcept;
 
 /// The vertices of a block in A's unit frame, B's rounded once after the motion. It stays until
 /// others are placed.

@@ -11,10 +11,8 @@
 namespace ist {
 namespace {
 
+using exact::kHalfUnit;
 using exact::Point;
-
-/// A double's rounding: half a unit in the last place of 1.
-constexpr double kHalfUnit = 0x1p-53;
 
 void set(HookedArray<std::uint64_t>& bits, std::uint32_t i) {
   bits[i / 64] |= std::uint64_t{1} << i % 64;
@@ -28,68 +26,9 @@ Point map_vector(const Similarity& map, const Point& x) {
           (map.m[6] * x.x + map.m[7] * x.y) + map.m[8] * x.z};
 }
 
-void add_to(double (&sums)[8], const double (&from)[8]) {
-  for (int l = 0; l < 8; ++l) sums[l] += from[l];
-}
-
 void add(Point& sum, double factor, const Point& p) { sum = sum + factor * p; }
 
 }  // namespace
-
-void SlotSums::add_volumes(const double (&six_volumes)[8]) noexcept {
-  for (int l = 0; l < 8; ++l) {
-    double rest;
-    exact::two_sum(high_[l], six_volumes[l], high_[l], rest);
-    low_[l] += rest;
-  }
-}
-
-void SlotSums::add_triangles(const ExactTerms& terms) noexcept {
-  add_volumes(terms.six_volumes[0]);
-  for (int k = 0; k < 3; ++k) add_to(moment_[k], terms.moment[k]);
-  add_to(rounding_, terms.rounding);
-}
-
-void SlotSums::add_crossings(const ExactTerms& terms) noexcept {
-  add_triangles(terms);
-  add_volumes(terms.six_volumes[1]);
-  add_volumes(terms.six_volumes[2]);
-  for (int k = 0; k < 3; ++k) {
-    add_to(force_[k], terms.force[k]);
-    add_to(torque_[k], terms.torque[k]);
-  }
-}
-
-ExactSums SlotSums::total() const noexcept {
-  ExactSums out;
-  for (int l = 0; l < 8; ++l) {
-    out.six_volumes.add(high_[l]);
-    out.six_volumes.add(low_[l]);
-    out.moment = out.moment + Point{moment_[0][l], moment_[1][l], moment_[2][l]};
-    out.force = out.force + Point{force_[0][l], force_[1][l], force_[2][l]};
-    out.torque = out.torque + Point{torque_[0][l], torque_[1][l], torque_[2][l]};
-  }
-  return out;
-}
-
-double SlotSums::rounding() const noexcept {
-  double sum = 0;
-  for (const double r : rounding_) sum += r;
-  return sum;
-}
-
-void add_triangle(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept {
-  sums.six_volumes.add(terms.six_volumes[0][l]);
-  sums.moment = sums.moment + Point{terms.moment[0][l], terms.moment[1][l], terms.moment[2][l]};
-}
-
-void add_crossing(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept {
-  add_triangle(terms, l, sums);
-  sums.six_volumes.add(terms.six_volumes[1][l]);
-  sums.six_volumes.add(terms.six_volumes[2][l]);
-  sums.force = sums.force + Point{terms.force[0][l], terms.force[1][l], terms.force[2][l]};
-  sums.torque = sums.torque + Point{terms.torque[0][l], terms.torque[1][l], terms.torque[2][l]};
-}
 
 Point ExactQuery::place(const Side& side, std::uint32_t vertex) const noexcept {
   const Point x = side.mesh.vertex(vertex);
@@ -446,8 +385,8 @@ bool ExactQuery::within_room(std::uint32_t a, std::uint32_t b) const noexcept {
 /// Blocks that cross the other solid, or would if their surface moved by the room.
 void ExactQuery::mark_near(std::uint32_t unsure) noexcept {
   for (std::uint32_t i = 0; i < unsure; ++i) {
-    const auto a = static_cast<std::uint32_t>(scratch_.keys[i] >> 32),
-               b = static_cast<std::uint32_t>(scratch_.keys[i]);
+    const auto a = static_cast<std::uint32_t>(scratch_.other_keys[i] >> 32),
+               b = static_cast<std::uint32_t>(scratch_.other_keys[i]);
     if ((has(sides_[0].marks.crossed, a / kWidth) && has(sides_[1].marks.crossed, b / kWidth)) ||
         !within_room(a, b))
       continue;
@@ -474,7 +413,7 @@ void ExactQuery::bound_near(const Side& own) noexcept {
 }
 
 /// All triangles that cross, in the order of the meshes.
-CrossingsFound ExactQuery::find_crossings(std::uint32_t max_visits) noexcept {
+CrossingsFound ExactQuery::search(std::uint32_t max_visits) noexcept {
   const double room = 2 * (sides_[0].moved + sides_[1].moved);
   search_.room = static_cast<float>(room * (1 + 1e-6));
   search_.max_visits = max_visits;
@@ -483,9 +422,7 @@ CrossingsFound ExactQuery::find_crossings(std::uint32_t max_visits) noexcept {
   out_.visits = pairs.visits;
   if (!pairs.complete) return {.complete = false};
   sort_pairs(pairs.count);
-  const std::uint32_t rows = find_rows(search_, pairs.count, scratch_);
-  if (rows == ~0u) return {.complete = false};
-  return test_rows(search_, rows, scratch_);
+  return find_crossings(search_, pairs.count, scratch_);
 }
 
 ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
@@ -496,7 +433,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
       return out_;
     }
   clear_marks();
-  const CrossingsFound found = find_crossings(max_visits);
+  const CrossingsFound found = search(max_visits);
   out_.crossings = found.crossings;
   out_.consistent = found.consistent;
   out_.complete = found.complete && found.consistent;

@@ -8,7 +8,7 @@
 #include "query/exact/crossing_search.h"
 #include "query/exact/exact_scratch.h"
 #include "query/exact/mesh_tree.h"
-#include "query/exact/overlap_terms.h"
+#include "query/exact/slot_sums.h"
 
 namespace ist {
 
@@ -24,25 +24,6 @@ struct ExactOverlap {
   /// How far the surface of the overlap is from closed, an area vector: rounding, if all is well.
   exact::Point gap = {};
 };
-
-/// Sums of terms in eight slots: a term's slot is its place in the order of its kind.
-class SlotSums {
- public:
-  void add_crossings(const ExactTerms& terms) noexcept;
-  void add_triangles(const ExactTerms& terms) noexcept;
-  ExactSums total() const noexcept;
-  double rounding() const noexcept;
-
- private:
-  void add_volumes(const double (&six_volumes)[8]) noexcept;
-
-  double high_[8] = {}, low_[8] = {};
-  double moment_[3][8] = {}, force_[3][8] = {}, torque_[3][8] = {}, rounding_[8] = {};
-};
-
-/// Adds lane l of terms.
-void add_crossing(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept;
-void add_triangle(const ExactTerms& terms, std::uint32_t l, ExactSums& sums) noexcept;
 
 /// Volume and gradients of the overlap. Allocates, locks and throws nothing. The answer depends on
 /// the meshes and the map alone.
@@ -94,7 +75,7 @@ class ExactQuery {
  private:
   exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
   void clear_marks() noexcept;
-  CrossingsFound find_crossings(std::uint32_t max_visits) noexcept;
+  CrossingsFound search(std::uint32_t max_visits) noexcept;
   void sort_pairs(std::uint32_t count) noexcept;
   CrossedBlock* make_crossed_block(Side& side, std::uint32_t block) noexcept;
   bool add_crossing(std::uint32_t i) noexcept;

@@ -253,7 +253,7 @@ void ExactParts::sum_parts() noexcept {
                               scratch_.crossings.triangle(1, i)) +
                              1;
     part.id = part.id == 0 ? id : std::min(part.id, id);
-    ist::add_crossing(terms, i % 8, part.sums);
+    add_crossing_term(terms, i % 8, part.sums);
   }
   for (Side& own : sides_) {
     for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
@@ -269,7 +269,8 @@ void ExactParts::sum_parts() noexcept {
         const std::uint32_t edge = 3 * t + (crossed.apex[t] + 1u) % 3;
         std::uint32_t element = vertex_element(own, crossed, mesh.corner[edge % 3][t]);
         if (crossed.pierced >> edge & 1) element = scratch_.middles[first + edge];
-        if (element != kNoPart) add_triangle(terms, t % 8, scratch_.parts[part_of(element)].sums);
+        if (element != kNoPart)
+          add_triangle_term(terms, t % 8, scratch_.parts[part_of(element)].sums);
       }
     });
     for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {

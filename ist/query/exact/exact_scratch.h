@@ -44,12 +44,6 @@ struct PlacedCache {
   }
 };
 
-/// Triangles of a block of B that a triangle of A may cross: a bit a lane.
-struct TriangleRow {
-  std::uint32_t a, block_b;  ///< A's triangle: 16 · block + lane
-  std::uint32_t lanes;
-};
-
 /// Eight pairs of triangles that are tested together.
 struct alignas(64) TrianglePairs {
   double corner[2][3][3][8];  ///< [A, B][corner][axis]
@@ -178,7 +172,8 @@ inline bool has(const HookedArray<std::uint64_t>& bits, std::uint32_t i) noexcep
 
 /// What a query knows of the blocks of one solid.
 struct BlockMarks {
-  HookedArray<std::uint64_t> near;     ///< a bit a block: triangles of it may be near the other
+  /// A bit a block: signs of it might differ if the surfaces moved by the room.
+  HookedArray<std::uint64_t> near;
   HookedArray<std::uint64_t> crossed;  ///< triangles of it cross others: it is in `blocks`
   HookedArray<std::uint64_t> pierced;  ///< edges of it are pierced
   HookedArray<std::uint64_t> inside;   ///< no edge is pierced, and it lies inside
@@ -233,10 +228,9 @@ struct ExactScratch {
         pairs(hooked<TrianglePairs>(hooks)),
         waiting(hooked_array<BoxPair>(hooks, kMostWaiting)),
         gaps(hooked_array<GapPair>(hooks, most_blocks + kMostWaiting)),
-        rows(hooked_array<TriangleRow>(hooks, most_rows())),
         crossings(most_crossings, hooks),
-        keys(hooked_array<std::uint64_t>(hooks, most_rows())),
-        other_keys(hooked_array<std::uint64_t>(hooks, most_rows())),
+        keys(hooked_array<std::uint64_t>(hooks, most_pairs())),
+        other_keys(hooked_array<std::uint64_t>(hooks, most_pairs())),
         flood(hooked_array<std::uint32_t>(hooks, most_blocks)),
         ends(hooked_array<PiercedEnd>(hooks, 2 * std::size_t{most_crossings})),
         curves(hooked_array<CurveExtent>(hooks, most_crossings)),
@@ -268,8 +262,8 @@ struct ExactScratch {
     placed_a = mesh_a;
   }
 
-  /// Pairs of blocks, and rows of triangles in them.
-  std::uint32_t most_rows() const noexcept { return 4 * most_crossings; }
+  /// Pairs of blocks, or of triangles, that are kept for later.
+  std::uint32_t most_pairs() const noexcept { return 4 * most_crossings; }
 
   /// Crossings, vertices of crossed blocks and blocks of both solids.
   std::size_t elements() const noexcept {
@@ -285,7 +279,6 @@ struct ExactScratch {
   Hooked<TrianglePairs> pairs;
   HookedArray<BoxPair> waiting;
   HookedArray<GapPair> gaps;
-  HookedArray<TriangleRow> rows;
   Crossings crossings;
   HookedArray<std::uint64_t> keys, other_keys;
   HookedArray<std::uint32_t> flood;

@@ -14,6 +14,9 @@
 
 namespace ist::exact {
 
+/// A double's rounding: half a unit in the last place of 1.
+inline constexpr double kHalfUnit = 0x1p-53;
+
 /// high + low = a + b exactly.
 IST_ANYWHERE void two_sum(double a, double b, double& high, double& low) {
   high = a + b;

@@ -30,7 +30,6 @@ inline double moved_in_mesh(const MeshTree& mesh) noexcept {
 /// with all that follows.
 inline double moved_by_poses(const PlacedTree& a, const PlacedTree& b, const MeshTree& mesh_b,
                              const RelativePose& pose) noexcept {
-  constexpr double kHalfUnit = 0x1p-53;
   const auto offset = [](const PlacedTree& placed) {
     const double* c = placed.tree.header().centre;
     return placed.scale * Eigen::Vector3d(c[0], c[1], c[2]).norm();
@@ -40,7 +39,7 @@ inline double moved_by_poses(const PlacedTree& a, const PlacedTree& b, const Mes
   double between = 0;
   for (int k = 0; k < 3; ++k) between += (b.pose.t[k] - a.pose.t[k]) * (b.pose.t[k] - a.pose.t[k]);
   between = std::sqrt(between);
-  return 1.1 * kHalfUnit *
+  return 1.1 * exact::kHalfUnit *
          (45 * (1.8 * pose.a_from_b.scale * mesh_b.extent() +
                 (between + offset(a) + offset(b)) / pose.unit_a) +
           5 * shift.norm());

@@ -9,8 +9,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// A double's rounding: half a unit in the last place of 1.
-inline constexpr double kHalfUnit = 0x1p-53;
+using exact::kHalfUnit;
 
 HWY_INLINE void store(V v, double* to) { hn::Store(v, D(), to); }
 HWY_INLINE void store(const Vec3& v, double (&to)[3][8], std::size_t l) {
@@ -18,17 +17,6 @@ HWY_INLINE void store(const Vec3& v, double (&to)[3][8], std::size_t l) {
   store(v.y, to[1] + l);
   store(v.z, to[2] + l);
 }
-
-/// The tetrahedron from the origin over a triangle of apex, near and far corner, where
-/// near → far is `along`: six times its volume, and what that may be off by.
-struct Cone {
-  V six, rounding;
-  HWY_INLINE Cone(const Vec3& apex, const Vec3& to, const Vec3& along, V times) {
-    six = times * dot(apex, cross(along, to));
-    rounding = hn::Abs(times) * hn::Set(D(), 20 * kHalfUnit) *
-               (length_bound(apex) + length_bound(to)) * (length_bound(along) * length_bound(to));
-  }
-};
 
 /// A cone from the origin over a part of a triangle is made of tetrahedra with an edge from the
 /// origin to the triangle's apex. Segments that two triangles share bound both of their parts.
@@ -70,10 +58,13 @@ void sum_crossings(const Crossings& crossings, std::uint32_t first, const exact:
           hn::IfThenElse(first_corner, edge - hn::Set(d, 8.0), edge) >= hn::Set(d, 3.0);
       const Vec3 from = {hn::IfThenElse(by_b, of_b.x, of_a.x), hn::IfThenElse(by_b, of_b.y, of_a.y),
                          hn::IfThenElse(by_b, of_b.z, of_a.z)};
-      const Cone cone(from, near[e] - from, offset[e], load(crossings.opposite(e)));
-      store(cone.six, out.six_volumes[1 + e] + l);
-      moment = moment + cone.six * (from + (near[e] + at[e]));
-      rounding = rounding + (cone.rounding +
+      const Vec3 to = near[e] - from;
+      const V times = load(crossings.opposite(e)), six = times * dot(from, cross(offset[e], to));
+      store(six, out.six_volumes[1 + e] + l);
+      moment = moment + six * (from + (near[e] + at[e]));
+      rounding = rounding + (hn::Abs(times) * hn::Set(d, 20 * kHalfUnit) *
+                                 (length_bound(from) + length_bound(to)) *
+                                 (length_bound(offset[e]) * length_bound(to)) +
                              hn::Set(d, 3.0) * load(crossings.end(e, Crossings::kHeightError)));
     }
     store(rounding, out.rounding + l);

@@ -226,6 +226,9 @@ HWY_INLINE std::uint32_t meeting(const float (&low)[3][kWidth], const float (&hi
 
 struct OneBox {
   float low[3], high[3];
+  OneBox(const float (&l)[3], const float (&h)[3], float room) {
+    for (int k = 0; k < 3; ++k) low[k] = l[k] - room, high[k] = h[k] + room;
+  }
   OneBox(const float (&l)[3][kWidth], const float (&h)[3][kWidth], std::uint32_t lane, float room) {
     for (int k = 0; k < 3; ++k) low[k] = l[k][lane] - room, high[k] = h[k][lane] + room;
   }

@@ -1,4 +1,5 @@
-// Points whose coordinates are lanes of doubles: included once a target.
+// Points whose coordinates are lanes of doubles: included once a target. exact::Point is for one
+// double, as functions of a target's instructions are not called from outside of it.
 
 #if defined(IST_QUERY_POINTS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_POINTS_INL_H_

@@ -61,7 +61,7 @@ def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=8, measure="ma
     cache: folder of baked assets; None: $XDG_CACHE_HOME/ist or ~/.cache/ist.
     spheres: of each solid, at most.
     patches: contacts of a pair, at most, 1 to 50. MuJoCo's own limit is sdf_initpoints (40).
-    measure: "matched", "inner" or "exact": see the README of ist.
+    measure: "matched", "inner" or "exact"; exact between two solids that both have it.
 
     Raises ist.OpenMeshError for a mesh that is not closed: repair it first (ist.repair_mesh) or
     leave it out of `geoms`.
@@ -70,9 +70,9 @@ def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=8, measure="ma
     model = spec.compile()
     wanted = None if geoms is None else set(geoms)
     if wanted is not None:
-        unknown = wanted - {g.name for g in spec.geoms}
+        unknown = wanted - {g.name for g in spec.geoms if g.type == mujoco.mjtGeom.mjGEOM_MESH}
         if unknown:
-            raise ValueError(f"geoms: the scene has no geom named {sorted(unknown)[0]!r}")
+            raise ValueError(f"geoms: the scene has no mesh geom named {sorted(unknown)[0]!r}")
     folder = _folder(cache)
     instances = {}
     count = 0
@@ -105,7 +105,7 @@ def _folder(cache):
 def _instance(spec, model, mesh, name, folder, spheres, patches, measure):
     if not any(p.plugin_name == "ist.solid" for p in spec.plugins):
         spec.activate_plugin("ist.solid")
-    plugin = spec.add_plugin(name=f"ist {name}", plugin_name="ist.solid", active=True)
+    plugin = spec.add_plugin(name=f"ist {name} {len(spec.plugins)}", plugin_name="ist.solid", active=True)
     plugin.config = {
         "file": str(_baked(model, mesh, name, folder, spheres)),
         "patches": str(patches),
