@@ -90,7 +90,6 @@ class Mug(Scene):
     """Twenty knots fall into a mug and come to rest."""
 
     seconds, step, count = 3.0, 0.002, 20
-    settings = {"spheres": 1000, "measure": "exact"}
     meshes = {"mug": (vessel(0.05, 0.12, 0.004), "1"), "knot": (sample("torus_knot"), ".004")}
     bodies = f'<geom name="mug" mesh="mug" solref="-2e4 -200" friction=".5"/>' + "".join(
         f'<body name="knot {i}" pos="{0.015 * np.cos(2 * i):.4f} {0.015 * np.sin(2 * i):.4f} {0.03 + 0.025 * i:.4f}" '
