@@ -32,7 +32,8 @@ class TriangleSearch {
       meet(static_cast<std::uint32_t>(scratch_.keys[n] >> 32),
            static_cast<std::uint32_t>(scratch_.keys[n]));
     if (found_.complete) test_pairs();
-    clear_behind();
+    // Sums go over eight at a time.
+    scratch_.crossings.clear(found_.crossings, (found_.crossings + 7) / 8 * 8);
     return found_;
   }
 
@@ -376,15 +377,6 @@ class TriangleSearch {
             (from.error + from.error) / hn::IfThenElse(flat, one, whole) + hn::Set(d, 1e-15)));
     put(Crossings::kHeightError, from.error);
     put(Crossings::kEdge, hn::IfThenElse(turned, from.edge, from.edge + hn::Set(d, 8.0)));
-  }
-
-  /// Sums go over eight at a time.
-  void clear_behind() {
-    const std::uint32_t end = (found_.crossings + 7) / 8 * 8;
-    for (int e = 0; e < 2; ++e)
-      for (int number = 0; number < Crossings::kEndNumbers; ++number)
-        std::fill(scratch_.crossings.end(e, number) + found_.crossings,
-                  scratch_.crossings.end(e, number) + end, 0.0);
   }
 
   const CrossingSearch& search_;

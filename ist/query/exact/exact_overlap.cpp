@@ -468,6 +468,8 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
   out_.sums.torque = out_.sums.torque + crossed.torque;
   out_.error = 1.01 * ((rounding_ + slots_.rounding()) / 6 + layers_) +
                4 * kHalfUnit * std::abs(out_.sums.volume());
+  out_.consistent = std::isfinite(out_.error);  // of what is no number there is no bound
+  out_.complete = out_.consistent;
   return out_;
 }
 

@@ -135,6 +135,12 @@ class Crossings {
     return triangle_[2 * i + side];
   }
 
+  /// Zeros in crossings [from, to): they add nothing to a sum.
+  void clear(std::uint32_t from, std::uint32_t to) noexcept {
+    for (int number = 0; number < kNumbers; ++number)
+      std::fill(at(number) + from, at(number) + to, 0.0);
+  }
+
   /// An end of one.
   struct End {
     std::uint32_t triangle;  ///< whose edge it is
