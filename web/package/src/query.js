@@ -96,7 +96,7 @@ export function overlapOutline(a, b, poseB, options) {
   writePose(1, poseB, 'poseB');
   writeSettings({maxVisits: options?.maxVisits});
   const most = maxPatchesOf(options), counts = (desk() + kCounts) / 4;
-  let place, status, capacity, total = 1024;
+  let place, status, capacity, total = Math.max(1024, options?.into?.patch.length ?? 0);
   do {
     capacity = total;
     place = room.of(kSegmentBytes * capacity);

@@ -10,7 +10,8 @@ import {colour} from './theme.js';
 
 export class World {
   /**
-   * `on`: what to call when a contact was asked (`asked`) and when B was let go or held (`held`).
+   * `on`: what to call when a contact was asked (`asked`), when its times were taken (`timed`) and
+   * when B was let go or held (`held`).
    */
   constructor(view, on) {
     this.view = view;
@@ -37,6 +38,7 @@ export class World {
     this.a = new Solid(assetA, colour('a'), 0);
     this.b = new Solid(assetB, colour('b'), 1);
     this.contact = new Contact(assetA, assetB);
+    this.overlays.hold(this.a, this.b);
     this.view.scene.add(this.a.group, this.b.group);
     this.view.handles.attach(this.b.group);
     this.home = pose;
@@ -45,7 +47,6 @@ export class World {
     this.look = look;
     this.size = Math.min(this.a.bounds.radius, this.b.bounds.radius);
     this.show();
-    this.contact.warm(pose);
     this.reset();
     this.frame();
   }
@@ -168,7 +169,9 @@ export class World {
       force: colour('force'),
       torque: colour('torque'),
       patch: colour('patch'),
-      lens: colour('lens'),
+      overlapA: colour('overlap'),
+      overlapB: colour('overlap-b'),
+      outline: colour('outline'),
       gap: colour('soft'),
     });
     this.view.setColours({ground: colour('ground'), line: colour('line')});
@@ -183,14 +186,17 @@ export class World {
     if (this.free && !this.view.handles.dragging && this.free.advance(group, seconds)) {
       this.stale = this.view.dirty = true;
     }
-    if (!this.stale) return;
+    if (!this.stale) {
+      if (this.contact.time(this.pose)) this.on.timed(this.contact);
+      return;
+    }
     this.stale = false;
     const {x, y, z, w} = group.quaternion, {pose} = this;
     Object.assign(pose.rotation, [w, x, y, z]);
     group.position.toArray(pose.translation);
     const {shown} = this.overlays;
-    this.contact.ask(pose, {patches: shown.patches, lens: shown.lenses});
-    this.overlays.update(this.contact, this.size, group.position);
+    this.contact.ask(pose, shown);
+    this.overlays.update(this.contact, this.size, group);
     this.on.asked(this.contact);
   }
 }

@@ -45,7 +45,7 @@ async function visit(act, options = kDesk) {
   });
   page.on('pageerror', (error) => complaints.push(String(error)));
   await page.goto(`${server.url}/`);
-  await page.waitForFunction('window.playground?.world.contact?.penetration');
+  await page.waitForFunction('window.playground?.world.contact?.best');
   await act(page);
   await context.close();
   assert.deepEqual(complaints, []);
@@ -103,7 +103,7 @@ test(
         const {volume, x, y} = await page.evaluate(() => {
           const {world, view} = playground;
           world.update(0);
-          const {volume, centroid} = world.contact.penetration;
+          const {volume, centroid} = world.contact.best;
           const {x, y} = world.b.group.position.clone().fromArray(centroid).project(view.camera);
           return {volume, x, y};
         });
@@ -135,8 +135,11 @@ test(
         await page.waitForTimeout(200);
         seen.push(await page.evaluate(() => ({
                                         ...structuredClone(playground.world.pose),
-                                        volume: playground.world.contact.penetration.volume,
-                                        told: document.getElementById('read-volume').textContent,
+                                        exact: playground.world.contact.exact.volume,
+                                        spheres: playground.world.contact.spheres.volume,
+                                        told: ['', '-spheres'].map(
+                                            (key) => document.getElementById(`read-volume${key}`)
+                                                         .textContent),
                                       })));
       }
       await page.mouse.up();
@@ -145,18 +148,23 @@ test(
 
       const rows =
           seen.map(({rotation, translation}, i) => [i, ...rotation, ...translation].join());
-      const answers =
-          execFileSync(
-              program, ['query', asset('bolt'), asset('nut'), '--poses', '-'],
-              {input: ['id,qw,qx,qy,qz,tx,ty,tz', ...rows, ''].join('\n'), encoding: 'utf8'})
-              .trim()
-              .split('\n')
-              .map((line) => line.split(','));
-      const column = answers[0].indexOf('volume');
-      seen.forEach(({volume, told}, i) => {
-        const wanted = Number(answers[i + 1][column]);
-        assert.equal(volume, wanted);
-        assert.equal(number(told), Number(wanted.toPrecision(6)));
+      const volumes = (measure) => {
+        const [names, ...answers] =
+            execFileSync(
+                program,
+                ['query', asset('bolt'), asset('nut'), '--poses', '-', '--measure', measure],
+                {input: ['id,qw,qx,qy,qz,tx,ty,tz', ...rows, ''].join('\n'), encoding: 'utf8'})
+                .trim()
+                .split('\n')
+                .map((line) => line.split(','));
+        const column = names.indexOf('volume');
+        return answers.map((answer) => Number(answer[column]));
+      };
+      const wanted = {exact: volumes('exact'), spheres: volumes('matched')};
+      seen.forEach(({exact, spheres, told}, i) => {
+        const both = [wanted.exact[i], wanted.spheres[i]];
+        assert.deepEqual([exact, spheres], both);
+        assert.deepEqual(told.map(number), both.map((volume) => Number(volume.toPrecision(6))));
       });
     }));
 
@@ -191,6 +199,42 @@ test(
           `    ${best.toFixed(2)} to ${worst.toFixed(2)} ms a frame, ` +
           `${(1000 / best).toFixed(0)} to ${(1000 / worst).toFixed(0)} frames a second`);
       assert.ok(best < 20, `${best} ms`);
+    }));
+
+test(
+    'as much of a table is drawn inside a screw as the force on it says',
+    () => visit(async (page) => {
+      await choose(page, 'screw-table');
+      const {drawn, force, segments, apart} = await page.evaluate(() => {
+        const {world, view} = playground, {camera, renderer} = view, {overlays} = world;
+        // From above: a pixel of the table's top is as large as any other.
+        const count = () => {
+          world.update(0);
+          for (const part of overlays.scene.children)
+            part.visible &&= part.isLight || part === overlays.overlap.group;
+          overlays.overlap.outline.visible = false;
+          const centre = world.a.bounds.centre, top = world.a.bounds.upper[2], height = 40;
+          camera.position.set(centre[0], centre[1], top + height);
+          camera.up.set(0, 1, 0);
+          camera.lookAt(centre[0], centre[1], top);
+          renderer.setClearColor('#000000');
+          renderer.clear();
+          renderer.render(overlays.scene, camera);
+          const gl = renderer.getContext(), [, , wide, high] = gl.getParameter(gl.VIEWPORT);
+          const pixels = new Uint8Array(4 * wide * high);
+          gl.readPixels(0, 0, wide, high, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+          let lit = 0;
+          for (let i = 0; i < pixels.length; i += 4) lit += pixels[i] > 40 ? 1 : 0;
+          return lit * (2 * height * Math.tan(camera.fov * Math.PI / 360) / high) ** 2;
+        };
+        const drawn = count(), force = world.contact.exact.force[2];
+        const segments = overlays.overlap.outline.geometry.instanceCount;
+        world.move({...world.b.group.position.clone().set(0, 0, 30)});
+        return {drawn, force, segments, apart: count()};
+      });
+      assert.ok(force > 20 && segments > 10, `${force} ${segments}`);
+      assert.ok(Math.abs(drawn / force - 1) < 0.02, `${drawn} u² of ${force}`);
+      assert.equal(apart, 0);
     }));
 
 test(
@@ -344,7 +388,7 @@ test(
       }
       assert.deepEqual(order, [
         'view', 'theme', 'pair', 'spheres', 'open', 'swap', 'translate', 'letgo', 'home', 'surface',
-        'opacity-a', 'opacity-b', 'cut', 'arrows', 'patches', 'lenses', 'gap', 'Keys'
+        'opacity-a', 'opacity-b', 'cut', 'arrows', 'patches', 'overlap', 'gap', 'Keys'
       ]);
     }));
 
@@ -366,7 +410,7 @@ test(
       }
       await touch('touchEnd');
       await page.waitForFunction(
-          ([, , z]) => playground.world.contact.penetration &&
+          ([, , z]) => playground.world.contact.best &&
               playground.world.pose.translation[2] > z + 0.5,
           before.translation);
       const after = await pose(page);
@@ -433,7 +477,7 @@ test(
           'Home', (start) => playground.world.pose.translation.join() === start.translation.join());
       await page.keyboard.press('r');
       assert.match(
-          await page.locator('#live').textContent(), /^Overlap 33\.\d+ cubic units; force/);
+          await page.locator('#live').textContent(), /^Overlap 34\.\d+ cubic units; force/);
       await page.keyboard.press('t');
       assert.ok(await page.locator('input[value=rotate]').isChecked());
       await page.keyboard.press('Space');
