@@ -2,7 +2,7 @@
 //
 // Lengths are [u], the unit of the mesh that was baked. Everything is in double precision.
 // Every function except init() is synchronous, and throws an IstError with one English sentence:
-// what is wrong, and the remedy.
+// what is wrong, and the remedy. An option that is misspelt throws a TypeError that names it.
 // The module keeps its memory in WebAssembly: assets and fields are released by free(), or some time
 // after the last reference is gone.
 // Each worker of a page has its own module and awaits its init().

@@ -5,6 +5,7 @@ import {Asset} from './asset.js';
 import {writePose} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
+import {checkOptions} from './options.js';
 import {solid} from './query.js';
 
 // Numbers of an answer after its status and triangle, in the order of the header.
@@ -56,6 +57,7 @@ function read(place, count, columns, out) {
 
 export function raycast(given, pose, origins, directions, options) {
   functions('raycast()');
+  checkOptions('raycast()', options);
   const from = rows(origins, 'origins'), along = rows(directions, 'directions');
   if (from !== along && from !== 1 && along !== 1)
     throw new IstError(`ist: directions has ${along} rows; origins has ${from}`);
@@ -73,8 +75,9 @@ export function raycast(given, pose, origins, directions, options) {
 }
 
 /** Writes points, leaves room for an answer of so many bytes each, and asks; where answers lie. */
-function askPoints(question, who, given, pose, points, bytes) {
+function askPoints(question, who, given, pose, points, options, bytes) {
   functions(who);
+  checkOptions(who, options);
   const count = rows(points, 'points');
   const place = room.of(count * (kPointBytes + bytes)), answers = place + count * kPointBytes;
   for (let i = 0; i < count; ++i) writeRow(place + i * kPointBytes, points, i, 'points');
@@ -83,12 +86,12 @@ function askPoints(question, who, given, pose, points, bytes) {
 }
 
 export function closestPoint(given, pose, points, options) {
-  const answers = askPoints('closest_point', 'closestPoint()', given, pose, points, 72);
+  const answers = askPoints('closest_point', 'closestPoint()', given, pose, points, options, 72);
   return read(answers, points.length / 3, kSurfacePoint, options?.into ?? {});
 }
 
 export function contains(given, pose, points, options) {
-  const answers = askPoints('contains', 'contains()', given, pose, points, 4);
+  const answers = askPoints('contains', 'contains()', given, pose, points, options, 4);
   const count = points.length / 3, out = options?.into ?? new Uint8Array(count);
   for (let i = 0; i < count; ++i) out[i] = u32()[answers / 4 + i];
   return out;

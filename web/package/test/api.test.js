@@ -57,7 +57,7 @@ test('init() takes bytes, a module and an address, and says what failed', () => 
       {cwd: packageFolder, encoding: 'utf8'}));
   assert.match(told[0], /^IstError: .*127\.0\.0\.1:9.* cannot be fetched.*init\(\{wasm: url\}\)/);
   assert.match(told[1], /^IstError: .* not a WebAssembly module/);
-  assert.match(told[2], /^IstError: .*404/);
+  assert.match(told[2], /^IstError: .*404.*ist-query\/compat/);
   assert.match(told[3], /^IstError: .*cannot be compiled.*SIMD/);
   assert.match(told[4], /^\d+\.\d+\.\d+$/);
 });
@@ -413,6 +413,40 @@ test('what is wrong is said', () => {
   assert.match(sentence(ask({})), /bolt\.ist was used after free\(\)/);
   assert.match(sentence(() => a.info()), /used after free\(\)/);
   b.free();
+});
+
+test('an option that is misspelt is refused by its name', async () => {
+  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB), floor = ist.Field.halfSpace([0, 0, 1]);
+  const whole = ist.penetration(a, b, {}), found = ist.contactPatches(a, b, {});
+  const calls = {
+    'Asset.spheres': (typo) => a.spheres(typo),
+    'Field.distanceGrid': (typo) =>
+        ist.Field.distanceGrid(new Float32Array(8), [2, 2, 2], 1, typo),
+    penetration: (typo) => ist.penetration(a, b, {}, typo),
+    separation: (typo) => ist.separation(floor, b, {}, typo),
+    contactPatches: (typo) => ist.contactPatches(a, b, {}, typo),
+    overlap: (typo) => ist.overlap(a, b, {}, typo),
+    overlapOutline: (typo) => ist.overlapOutline(a, b, {}, typo),
+    lenses: (typo) => ist.lenses(a, b, {}, typo),
+    raycast: (typo) => ist.raycast(a, {}, [0, 0, 0], [1, 0, 0], typo),
+    closestPoint: (typo) => ist.closestPoint(a, {}, [0, 0, 0], typo),
+    contains: (typo) => ist.contains(a, {}, [0, 0, 0], typo),
+    withoutProtrusion: (typo) => ist.withoutProtrusion(whole, a, b, {}, typo),
+    patchesWithoutProtrusion: (typo) => ist.patchesWithoutProtrusion(found, a, b, {}, typo),
+    wrenches: (typo) => ist.wrenches(whole, {}, typo),
+    pairFit: (typo) => ist.pairFit(a, b, typo),
+    timeOfImpact: (typo) => ist.timeOfImpact(a, b, {}, typo),
+    penetrationBatch: (typo) => ist.penetrationBatch([], typo),
+    contactPatchesBatch: (typo) => ist.contactPatchesBatch([], typo),
+  };
+  for (const [name, call] of Object.entries(calls))
+    assert.throws(() => call({Measure: 1}), {
+      name: 'TypeError',
+      message: new RegExp(`^ist: ${name}\\(\\): no option is called Measure; there are \\w+`),
+    });
+  await assert.rejects(ist.init({Wasm: ''}), {name: 'TypeError', message: /init\(\): .* wasm$/});
+  assert.throws(() => ist.penetrationBatch([], {poseA: {}}), TypeError);  // each pair has its own
+  for (const each of [a, b, floor]) each.free();
 });
 
 test('memory comes back', () => {
