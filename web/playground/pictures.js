@@ -41,7 +41,7 @@ async function shot(how) {
     view.orbit.update();
     view.handles.detach();
     view.floor.visible = false;
-    view.setColours({ground: '#ffffff', line: '#ffffff'});
+    view.setColours({ground: '#ffffff', line: '#ffffff', handle: '#000000', held: '#000000'});
     world.update(0);
     view.dirty = true;
     await new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)));

@@ -24,6 +24,7 @@ async function start() {
   const world = new World(view, {
     asked: (contact) => readouts.note(contact, performance.now()),
     timed: (contact) => readouts.noteTimes(contact),
+    moved: () => document.body.classList.add('moved'),
     held: (free) => $('letgo').setAttribute('aria-pressed', free),
   });
   const settings = new Settings(world, view);

@@ -88,6 +88,51 @@ const handle = (page) => page.evaluate(() => {
   return [left + (at.x + 1) / 2 * width, top + (1 - at.y) / 2 * height];
 });
 
+test('nothing but the ground is drawn while solids load', async (t) => {
+  const page = await chrome.newPage(kDesk);
+  t.after(() => page.close());
+  let arrive;
+  const arrived = new Promise((done) => arrive = done);
+  await page.route('**/demo/*.ist', async (route) => {
+    await arrived;
+    await route.continue();
+  });
+  await page.goto(`${server.url}/`);
+  await page.waitForFunction('window.playground');
+  await page.evaluate(() => document.querySelector('#theme').click());  // draws again
+  const colours = () => page.evaluate(() => {
+    const {view, world} = playground, gl = view.renderer.getContext();
+    view.dirty = true;
+    view.render(world.overlays);
+    const [, , wide, high] = gl.getParameter(gl.VIEWPORT), pixels = new Uint32Array(wide * high);
+    gl.readPixels(0, 0, wide, high, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pixels.buffer));
+    return new Set(pixels).size;
+  });
+  assert.equal(await colours(), 1);
+  assert.ok(await page.locator('#loading').isVisible());
+  arrive();
+  await page.waitForFunction('playground.world.contact?.best');
+  assert.ok(await colours() > 100);
+});
+
+test('any folder of any server of files will do', async (t) => {
+  const below = await serve({'/some/folder/': siteFolder});
+  const page = await chrome.newPage(kDesk), missing = [];
+  t.after(() => page.close().then(below.close));
+  page.on('response', (answer) => answer.ok() || missing.push(answer.url()));
+  for (const address of ['/some/folder/', '/some/folder/index.html']) {
+    await page.goto(below.url + address);
+    // Times are told once they are taken, not those of the first queries.
+    await page.waitForFunction(
+        () => /^[\d,]+$/.test(document.getElementById('read-time').textContent));
+  }
+  for (const link of await page.locator('.about a').all()) {
+    const answer = await page.request.get(await link.evaluate((a) => a.href));
+    assert.ok(answer.ok() && /ist|Apache/.test(await answer.text()));
+  }
+  assert.deepEqual(missing, []);
+});
+
 test(
     'every pair; surface, spheres and tree',
     () => visit(async (page) => {
@@ -127,6 +172,7 @@ test(
     'a dragged nut reads what `ist query` answers',
     () => visit(async (page) => {
       const [x, y] = await handle(page);
+      assert.match(await page.locator('#hint').textContent(), /^Drag an arrow/);
       await page.mouse.move(x, y);
       await page.mouse.down();
       const seen = [];
@@ -143,6 +189,7 @@ test(
                                       })));
       }
       await page.mouse.up();
+      assert.ok(await page.locator('#hint').isHidden());
       assert.ok(
           new Set(seen.map(({translation}) => translation[2])).size > 8, 'the nut was dragged');
 
@@ -249,14 +296,6 @@ test(
                 {name: 'spoiled.ist', bytes: spoiled},
                 {name: 'text.ist', bytes: Buffer.from('no asset')},
                 {name: 'empty.ist', bytes: Buffer.alloc(0)},
-                {name: 'text.obj', bytes: Buffer.from('v 0 0 0\n')},
-                {name: 'nan.obj', bytes: Buffer.from('v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n')},
-                {
-                  name: 'text.stl',
-                  bytes: Buffer.from(
-                      'no mesh, but some words that go on for a little while and then longer still')
-                },
-                {name: 'text.ply', bytes: Buffer.from('no mesh')},
                 {name: 'cut.glb', bytes: triangleGlb().subarray(0, 100)},
                 {name: 'what.zip', bytes: Buffer.from('PK')},
       ]) {
@@ -270,14 +309,14 @@ test(
         await page.locator('#alert-close').click();
         assert.ok(await page.locator('#alert').isHidden());
       }
-      assert.equal(told.size, 10);
+      assert.equal(told.size, 6);
       const before = (await pose(page)).translation[0];
       await page.locator('#view').press('ArrowRight');
       await page.waitForFunction((x) => playground.world.pose.translation[0] > x, before);
     }));
 
 test(
-    'a visitor\'s solids, a mesh over one, and an animated scene',
+    'a visitor\'s solids, a mesh that has to be baked, and an animated scene',
     () => visit(async (page) => {
       const solid = (name) => ({name: `${name}.ist`, bytes: readFileSync(asset(name))});
       await drop(page, [solid('gear'), solid('hollow_sphere')]);
@@ -286,10 +325,22 @@ test(
       await page.waitForFunction(() => playground.world.names?.join() === 'gear,nut');
       assert.equal(await page.locator('#pair').inputValue(), 'own');
       assert.equal(await page.locator('#read-volume').textContent(), '0');
-      await drop(
-          page, [{name: 'gear.obj', bytes: Buffer.from('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n')}]);
-      await page.waitForFunction(
-          () => playground.world.a.looks?.getAttribute('position').count === 3);
+      await page.evaluate(() => playground.before = playground.world.b);
+      const mesh = Buffer.from('v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n');
+      for (const [name, command] of
+               [['My part.obj', '"My part.obj" -o "My part.ist"'],
+                ['part.STL', 'part.STL -o part.ist'],
+      ]) {
+        await drop(page, [solid('bolt'), {name, bytes: mesh}]);
+        await page.locator('#alert').waitFor();
+        assert.equal(
+            await page.locator('#alert-told').textContent(),
+            `${name} is a mesh. The page opens solids: run \`ist bake ${command}\`, then drop ` +
+                `${name.split('.')[0]}.ist. The solids shown have not changed.`);
+        assert.ok(await page.evaluate(() => playground.before === playground.world.b));
+        assert.equal(await page.evaluate(() => playground.world.names.join()), 'gear,nut');
+        await page.locator('#alert-close').click();
+      }
       await page.locator('#swap').click();
       assert.equal(await page.evaluate(() => playground.world.names.join()), 'nut,gear');
 
@@ -387,7 +438,7 @@ test(
         order.push(id);
       }
       assert.deepEqual(order, [
-        'view', 'theme', 'pair', 'spheres', 'open', 'swap', 'translate', 'letgo', 'home', 'surface',
+        'view', 'theme', 'Guide', 'For your own page', 'Licence', 'pair', 'spheres', 'open', 'swap', 'translate', 'letgo', 'home', 'surface',
         'opacity-a', 'opacity-b', 'cut', 'arrows', 'patches', 'overlap', 'gap', 'Keys'
       ]);
     }));
