@@ -263,6 +263,48 @@ static void batches(int i, int print) {
   print_patches(&found);
 }
 
+/* From behind B, past its origin. */
+static void rays(int i, int print) {
+  const ist_placed_tree_t b = placed_b(i);
+  const double* const t = rows[i].pose.t;
+  const double sideways[3] = {0, 0.125, -0.03125};
+  ist_ray_t asked[3];
+  ist_ray_hit_t hits[3];
+  int k;
+  for (k = 0; k < 3; ++k) {
+    const ist_ray_t ray = {
+        {2 * t[0], 2 * t[1], 2 * t[2]}, {sideways[k] - t[0], -t[1], -t[2]}, k == 2 ? 100 : 0};
+    asked[k] = ray;
+  }
+  ist_raycast(&b, asked, 3, hits, sizeof hits[0]);
+  for (k = 0; k < 3 && print; ++k) {
+    printf(" %u", hits[k].triangle);
+    print_doubles(&hits[k].distance, 7);
+  }
+}
+
+/* Points about B's origin, against it and a half-space. */
+static void points(int i, int print) {
+  const ist_placed_tree_t b = placed_b(i);
+  const ist_field_t half_space = {
+      .size = sizeof half_space, .kind = IST_HALF_SPACE, .as.half_space = {{0, 0.6, 0.8}, 0.0625}};
+  const ist_placed_field_t ground = {sizeof ground, &half_space, IST_POSE_IDENTITY, 1};
+  const double* const t = rows[i].pose.t;
+  const double asked[9] = {t[0], t[1], t[2],  t[0] + 0.25, t[1],
+                           t[2], t[0], t[1] + 0.0625, t[2]};
+  ist_surface_point_t feet[6];
+  ist_overlapping_t inside[6];
+  int k;
+  ist_closest_point(&b, asked, 3, feet, sizeof feet[0]);
+  ist_field_closest_point(&ground, asked, 3, feet + 3, sizeof feet[0]);
+  ist_contains(&b, asked, 3, inside);
+  ist_field_contains(&ground, asked, 3, inside + 3);
+  for (k = 0; k < 6 && print; ++k) {
+    printf(" %d %u", inside[k], feet[k].triangle);
+    print_doubles(&feet[k].distance, 8);
+  }
+}
+
 static void overlapping(int i, int print) {
   const ist_placed_tree_t a = placed_a(), b = placed_b(i);
   ist_overlapping_t answer;
@@ -301,6 +343,8 @@ static const struct {
     {"separation", separation},
     {"patches", patches},
     {"outline", outline},
+    {"rays", rays},
+    {"points", points},
     {"overlap", overlapping},
     {"lenses", lenses},
     {"without protrusion", without_protrusion},

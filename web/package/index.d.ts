@@ -2,7 +2,7 @@
 //
 // Lengths are [u], the unit of the mesh that was baked. Everything is in double precision.
 // Every function except init() is synchronous, and throws an IstError with one English sentence:
-// what is wrong, and the remedy.
+// what is wrong, and the remedy. An option that is misspelt throws a TypeError that names it.
 // The module keeps its memory in WebAssembly: assets and fields are released by free(), or some time
 // after the last reference is gone.
 // Each worker of a page has its own module and awaits its init().
@@ -416,6 +416,72 @@ export interface Lenses {
 }
 
 export function lenses(a: Asset, b: Asset, poseB: Pose, options?: LensesOptions): Lenses;
+
+// --- Rays and points against one solid --------------------------------------------------------------
+
+// An asset must keep its mesh (AssetInfo.meshTriangles > 0). Rows of three numbers, flat: one row is
+// one vector. A row that cannot be answered is NaN; alone it throws.
+
+/** Of each ray; arrays given by `into` may be longer than `count`. */
+export interface RayHits {
+  count: number;
+  /** [u] ≥ 0; Infinity: no hit. */
+  distance: Float64Array;
+  /** [u] three numbers a ray, in the world; zero without a hit. */
+  point: Float64Array;
+  /** Unit, outward, three numbers a ray. */
+  normal: Float64Array;
+  /** Of the kept mesh, 2³² − 1: no hit, or a field. */
+  triangle: Uint32Array;
+}
+
+/**
+ * Where rays meet the surface of a solid at `pose` first, on their way out if they start inside. None
+ * slips through between triangles. Directions may have any length but 0. One origin or one direction
+ * serves for all. Of fields: half-spaces, boxes, balls, capsules and cylinders.
+ * `longest` [u]: rays end there; default Infinity.
+ */
+export function raycast(
+  solid: Asset | Field,
+  pose: Pose,
+  origins: ArrayLike<number>,
+  directions: ArrayLike<number>,
+  options?: { longest?: number; into?: RayHits },
+): RayHits;
+
+/** Of each point; arrays given by `into` may be longer than `count`. */
+export interface SurfacePoints {
+  count: number;
+  /** [u] to the surface, < 0 inside. */
+  distance: Float64Array;
+  /** [u] the solid's distance is within this of `distance`. */
+  error: Float64Array;
+  /** [u] on the surface, three numbers a point, in the world. */
+  point: Float64Array;
+  /** Of the distance by the point: unit, outward, three numbers a point. */
+  gradient: Float64Array;
+  /** As RayHits has it. */
+  triangle: Uint32Array;
+}
+
+/** The points of a solid's surface that are nearest to points [u] of the world. */
+export function closestPoint(
+  solid: Asset | Field,
+  pose: Pose,
+  points: ArrayLike<number>,
+  options?: { into?: SurfacePoints },
+): SurfacePoints;
+
+/**
+ * Whether points [u] of the world are inside a solid: 0 no, 1 yes, 2 the point is none. Of a point on
+ * the surface either may be said, the same every time.
+ */
+export function contains(
+  solid: Asset | Field,
+  pose: Pose,
+  points: ArrayLike<number>,
+  options?: { into?: Uint8Array },
+): Uint8Array;
 
 // --- Corrections and wrenches of contacts -----------------------------------------------------------
 

@@ -14,8 +14,7 @@ export const sphereCounts = [4000, 10000];
 const kDragon = sharedMesh('dragon_174k.ply');
 
 /**
- * Poses: quaternion w, x, y, z and translation [u]. `up`: against gravity, an axis of A's. `look`:
- * radii of B to see around it, instead of all.
+ * Poses: quaternion w, x, y, z and translation [u]. `up`: against gravity, an axis of A's.
  */
 const kPairs = [
   {
@@ -46,10 +45,9 @@ const kPairs = [
     id: 'probe-dragon',
     name: 'Probe on a dragon',
     a: {name: 'dragon', mesh: kDragon},
-    b: {name: 'capsule', scale: 0.012},
-    pose: {rotation: [0.70711, 0.70711, 0, 0], translation: [-0.06, 0.1925, 0]},
+    b: {name: 'capsule', scale: 0.02},
+    pose: {rotation: [0.70711, 0.70711, 0, 0], translation: [-0.06, 0.2035, 0]},
     up: 'y',
-    look: 3.2,
   } :
             {
               id: 'probe-knot',
@@ -57,7 +55,6 @@ const kPairs = [
               a: 'torus_knot',
               b: {name: 'capsule', scale: 0.4},
               pose: {rotation: [1, 0, 0, 0], translation: [2.6, 0, 0.7]},
-              look: 4,
             },
   {
     id: 'gears',

@@ -20,7 +20,7 @@ async function shot(how) {
   const [width, height] = how.size ?? [350, 430];
   const page = await chrome.newPage({viewport: {width, height}, colorScheme: 'light'});
   await page.goto(`${server.url}/`);
-  await page.waitForFunction('window.playground?.world.contact?.penetration');
+  await page.waitForFunction('window.playground?.world.contact?.best');
   const count = await page.evaluate(async (how) => {
     const {world, view, setMode, choose} = playground;
     document.body.classList.add('bare');
@@ -29,7 +29,7 @@ async function shot(how) {
     await choose();
     setMode(how.mode ?? 'surface');
     Object.assign(
-        world.overlays.shown, {arrows: false, patches: false, lenses: false, gap: false},
+        world.overlays.shown, {arrows: false, patches: false, overlap: false, gap: false},
         how.overlays);
     world.show(
         {level: how.level ?? 0, opacityA: how.a ?? 1, opacityB: how.b ?? 1, cut: how.cut ?? 0});
@@ -41,7 +41,7 @@ async function shot(how) {
     view.orbit.update();
     view.handles.detach();
     view.floor.visible = false;
-    view.setColours({ground: '#ffffff', line: '#ffffff'});
+    view.setColours({ground: '#ffffff', line: '#ffffff', handle: '#000000', held: '#000000'});
     world.update(0);
     view.dirty = true;
     await new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)));
@@ -77,7 +77,7 @@ async function row(name, views) {
 await row('bolt_and_nut.png', [
   {caption: 'two meshes'},
   {caption: 'filled with spheres', mode: 'spheres', cut: 0.5},
-  {caption: 'their overlap', a: 0.22, b: 0.3, overlays: {lenses: true, arrows: true}},
+  {caption: 'their overlap', a: 0.22, b: 0.3, overlays: {overlap: true, arrows: true}},
 ]);
 await row('packing_levels.png', [0, 1, 2].map((level) => ({
                                                 caption: 'COUNT spheres',

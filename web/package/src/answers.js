@@ -5,7 +5,8 @@ import {f64, u32} from './memory.js';
 
 export const newVector = () => new Float64Array(3);
 
-export const kNotHeld = -15;  // IST_NOT_HELD
+export const kInvalidInput = -1;  // IST_INVALID_INPUT
+export const kNotHeld = -15;      // IST_NOT_HELD
 
 export const statusOf = (status) => status === 0 ? 'ok' :
     status > 0                                   ? 'budget-exhausted' :

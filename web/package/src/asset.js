@@ -4,6 +4,7 @@ import {kNotHeld} from './answers.js';
 import {count, desk, kBounds, kCounts, kInfo, kMass, sphereMeasureOf, writeNumbers} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, give, take, u32, u8, withRoom} from './memory.js';
+import {checkOptions} from './options.js';
 import {welded} from './weld.js';
 
 /** Gives back what nobody refers to any more. */
@@ -124,6 +125,7 @@ export class Asset extends Owner {
 
   /** Writes the first `capacity` balls to `room`, and says how many there are. */
   _balls(set, level, room, capacity) {
+    checkOptions('Asset.spheres()', set);
     const detail = count(set?.detail, 0, 'detail');
     const measure = sphereMeasureOf(set?.measure);
     const status = functions('an asset').balls(this._at, measure, detail, level, room, capacity);
@@ -247,6 +249,7 @@ export class Field extends Owner {
   }
 
   static distanceGrid(distances, points, spacing, options) {
+    checkOptions('Field.distanceGrid()', options);
     const along = three(points, 'points');
     const origin = three(options?.origin ?? [0, 0, 0], 'origin');
     const data = copied(distances, along, 'Field.distanceGrid()');

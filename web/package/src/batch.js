@@ -5,6 +5,7 @@ import {Asset} from './asset.js';
 import {writePoseAt, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {functions, Room, u32} from './memory.js';
+import {checkOptions} from './options.js';
 import {maxPatchesOf, solid} from './query.js';
 
 const kPairBytes = 144;  // asked_pair_t
@@ -36,6 +37,7 @@ const statusAt = (place) => u32()[place / 4 + 1] | 0;
 
 export function penetrationBatch(pairs, options) {
   const wasm = functions('penetrationBatch()'), count = pairs.length;
+  checkOptions('penetrationBatch()', options);
   const place = room.of(count * (kPairBytes + kPenetrationBytes));
   const answers = place + count * kPairBytes;
   writePairs(place, pairs, 'penetrationBatch()');
@@ -52,6 +54,7 @@ export function penetrationBatch(pairs, options) {
 
 export function contactPatchesBatch(pairs, options) {
   const wasm = functions('contactPatchesBatch()'), count = pairs.length;
+  checkOptions('contactPatchesBatch()', options);
   const most = maxPatchesOf(options);
   const wholes = count * kPairBytes, patches = wholes + count * kPenetrationBytes;
   const counts = patches + count * most * kPatchBytes;

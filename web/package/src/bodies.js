@@ -5,6 +5,7 @@ import {Asset} from './asset.js';
 import {copy3, desk, kFit, kMostPatches, kNumbers, kPatches, kPenetration, kWrenches, writeNumbers, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, u32} from './memory.js';
+import {checkOptions} from './options.js';
 
 function two(a, b, who) {
   if (!(a instanceof Asset && b instanceof Asset))
@@ -13,6 +14,7 @@ function two(a, b, who) {
 
 function writePlaces(a, b, poseB, options, who) {
   two(a, b, who);
+  checkOptions(who, options);
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
 }
@@ -42,6 +44,7 @@ export function patchesWithoutProtrusion(found, a, b, poseB, options) {
 export function pairFit(a, b, options) {
   const wasm = functions('pairFit()');
   two(a, b, 'pairFit()');
+  checkOptions('pairFit()', options);
   writePose(0, {scale: options?.scaleA}, 'scaleA');
   writePose(1, {scale: options?.scaleB}, 'scaleB');
   check(wasm.pair_fit(a._at, b._at), 'pairFit()');
@@ -62,6 +65,7 @@ const newWrench = () => ({force: newVector(), torque: newVector()});
 
 export function wrenches(contact, poseB, points, into) {
   const wasm = functions('wrenches()');
+  checkOptions('wrenches()', points);
   writePose(1, poseB, 'poseB');
   const isPatch = contact.normal !== undefined;
   if (isPatch)

@@ -7,5 +7,5 @@ import {load} from './memory.js';
 export * from './public.js';
 
 export function init(options) {
-  return load(() => options?.wasm ?? Uint8Array.from(atob(inlined), (c) => c.charCodeAt(0)));
+  return load(options, () => Uint8Array.from(atob(inlined), (c) => c.charCodeAt(0)));
 }

@@ -1,4 +1,4 @@
-/* Protrusion, fit, wrenches, motions and batches, as a page's JavaScript calls them. */
+/* Protrusion, fit, wrenches, rays, points, motions and batches, as a page's JavaScript calls them. */
 #include "desk.h"
 
 /* --- Of answers that lie on the desk ---------------------------------------------------------- */
@@ -28,6 +28,36 @@ EXPORT(wrenches) ist_status_t wrenches(int32_t is_patch) {
   return is_patch ? ist_patch_wrenches(&desk.patches[0], &desk.b.pose, of_a, of_b, &desk.wrenches)
                   : ist_wrenches(&desk.penetration, &desk.b.pose, of_a, of_b, &desk.wrenches);
 }
+
+/* --- Rays and points: of a tree, or of a field where `tree` is null, at place A ----------------
+ */
+
+EXPORT(raycast)
+ist_status_t raycast(const ist_tree_t* tree, const ist_field_t* field, const ist_ray_t* rays,
+                     size_t count, ist_ray_hit_t* hits) {
+  const ist_placed_tree_t solid = placed(tree, &desk.a);
+  const ist_placed_field_t shape = placed_field(field, &desk.a);
+  return tree == NULL ? ist_field_raycast(&shape, rays, count, hits, sizeof *hits)
+                      : ist_raycast(&solid, rays, count, hits, sizeof *hits);
+}
+EXPORT(closest_point)
+ist_status_t closest_point(const ist_tree_t* tree, const ist_field_t* field, const double* points,
+                           size_t count, ist_surface_point_t* answers) {
+  const ist_placed_tree_t solid = placed(tree, &desk.a);
+  const ist_placed_field_t shape = placed_field(field, &desk.a);
+  return tree == NULL ? ist_field_closest_point(&shape, points, count, answers, sizeof *answers)
+                      : ist_closest_point(&solid, points, count, answers, sizeof *answers);
+}
+EXPORT(contains)
+ist_status_t contains(const ist_tree_t* tree, const ist_field_t* field, const double* points,
+                      size_t count, ist_overlapping_t* inside) {
+  const ist_placed_tree_t solid = placed(tree, &desk.a);
+  const ist_placed_field_t shape = placed_field(field, &desk.a);
+  return tree == NULL ? ist_field_contains(&shape, points, count, inside)
+                      : ist_contains(&solid, points, count, inside);
+}
+_Static_assert(sizeof(ist_ray_t) == 56 && sizeof(ist_ray_hit_t) == 64, "ray");
+_Static_assert(sizeof(ist_surface_point_t) == 72 && sizeof(ist_overlapping_t) == 4, "point");
 
 /* --- Motions: of place B, from there to place A ------------------------------------------------
  */

@@ -5,5 +5,5 @@ import {load} from './memory.js';
 export * from './public.js';
 
 export function init(options) {
-  return load(() => options?.wasm ?? new URL('../dist/ist.wasm', import.meta.url));
+  return load(options, () => new URL('../dist/ist.wasm', import.meta.url));
 }

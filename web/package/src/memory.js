@@ -1,6 +1,7 @@
 // The WebAssembly module: loading it, and its memory.
 
 import {IstError} from './error.js';
+import {checkOptions} from './options.js';
 
 /** The module's exported functions; null before init(). */
 let wasm = null;
@@ -36,6 +37,9 @@ const imports = {
   },
 };
 
+const kRemedy = 'If a bundler moved it, pass its address, init({wasm: url}), or import ' +
+    '"ist-query/compat", which contains it.';
+
 async function instantiated(source) {
   let given = await source;
   if (typeof given === 'string' || given instanceof URL) {
@@ -43,23 +47,21 @@ async function instantiated(source) {
       given = await fetch(given);
     } catch (error) {
       throw new IstError(
-          `ist: ${given} cannot be fetched (${error.message}). If a bundler moved it, ` +
-          'pass its address, init({wasm: url}), or import "ist-query/compat", which contains it.');
+          `ist: ${given} cannot be fetched (${error.message}). ${kRemedy}`);
     }
   }
   if (given instanceof WebAssembly.Module) return WebAssembly.instantiate(given, imports);
   if (typeof Response !== 'undefined' && given instanceof Response) {
     if (!given.ok)
       throw new IstError(
-          `ist: ${given.url} cannot be fetched: ${given.status} ${given.statusText}`);
+          `ist: ${given.url} cannot be fetched: ${given.status} ${given.statusText}. ${kRemedy}`);
     const address = given.url;
     given = await given.arrayBuffer();
     // A page of a server that answers everything.
     const magic = new Uint8Array(given, 0, Math.min(4, given.byteLength));
     if (String.fromCharCode(...magic) !== '\0asm')
       throw new IstError(
-          `ist: ${address} is not a WebAssembly module. If a bundler moved it, pass ` +
-          'its address, init({wasm: url}), or import "ist-query/compat", which contains it.');
+          `ist: ${address} is not a WebAssembly module. ${kRemedy}`);
   }
   const {instance} = await WebAssembly.instantiate(given, imports);
   return instance;
@@ -89,9 +91,10 @@ async function start(source) {
   }
 }
 
-/** Loads the module, once. `source()` says where from. */
-export function load(source) {
-  loading ??= start(source()).catch((error) => {
+/** Loads the module, once: from where the options of init() say, else from what `usual()` says. */
+export async function load(options, usual) {
+  checkOptions('init()', options);
+  loading ??= start(options?.wasm ?? usual()).catch((error) => {
     loading = null;
     throw error;
   });

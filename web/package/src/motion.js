@@ -4,6 +4,7 @@ import {newVector, statusOf} from './answers.js';
 import {copy3, count, desk, kImpact, kImpactSettings, kMotion, kMotionBytes, kNumbers, writeNumbers, writePose} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, u32} from './memory.js';
+import {checkOptions} from './options.js';
 import {ask} from './query.js';
 
 const kOrigin = [0, 0, 0];
@@ -68,6 +69,7 @@ const newImpact = () => ({
 
 export function timeOfImpact(a, b, poseB, options) {
   functions('timeOfImpact()');
+  checkOptions('timeOfImpact()', options);
   writeMotion(0, options?.motionA, 'motionA');
   writeMotion(1, options?.motionB, 'motionB');
   const settings = desk() + kImpactSettings;

@@ -7,5 +7,5 @@ import {load} from './memory.js';
 export * from './public.js';
 
 export function init(options) {
-  return load(() => options?.wasm ?? readFile(new URL('../dist/ist.wasm', import.meta.url)));
+  return load(options, () => readFile(new URL('../dist/ist.wasm', import.meta.url)));
 }

@@ -5,6 +5,7 @@ import {Asset, Field} from './asset.js';
 import {copy3, count, desk, kCounts, kMostPatches, kPatches, kPenetration, kSeparation, sphereMeasureOf, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
+import {checkOptions} from './options.js';
 
 export function solid(given, which, query) {
   if (given instanceof Asset || (which === 'A' && given instanceof Field)) return given._at;
@@ -18,6 +19,7 @@ export function solid(given, which, query) {
  */
 export function ask(question, who, a, b, poseB, options, more) {
   const wasm = functions(who);
+  checkOptions(who, options);
   const first = solid(a, 'A', who), second = solid(b, 'B', who);
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
@@ -89,6 +91,7 @@ const kSegmentBytes = 56;
 
 export function overlapOutline(a, b, poseB, options) {
   const wasm = functions('overlapOutline()');
+  checkOptions('overlapOutline()', options);
   if (!(a instanceof Asset))
     throw new IstError('ist: overlapOutline(): solid A must be an Asset: a field has no mesh');
   const first = a._at, second = solid(b, 'B', 'overlapOutline()');
@@ -96,7 +99,7 @@ export function overlapOutline(a, b, poseB, options) {
   writePose(1, poseB, 'poseB');
   writeSettings({maxVisits: options?.maxVisits});
   const most = maxPatchesOf(options), counts = (desk() + kCounts) / 4;
-  let place, status, capacity, total = 1024;
+  let place, status, capacity, total = Math.max(1024, options?.into?.patch.length ?? 0);
   do {
     capacity = total;
     place = room.of(kSegmentBytes * capacity);
@@ -122,6 +125,7 @@ export function overlapOutline(a, b, poseB, options) {
 
 export function lenses(a, b, poseB, options) {
   const wasm = functions('lenses()');
+  checkOptions('lenses()', options);
   if (!(a instanceof Asset))
     throw new IstError('ist: lenses(): solid A must be an Asset: a field has no spheres');
   const first = a._at, second = solid(b, 'B', 'lenses()');

@@ -57,7 +57,7 @@ test('init() takes bytes, a module and an address, and says what failed', () => 
       {cwd: packageFolder, encoding: 'utf8'}));
   assert.match(told[0], /^IstError: .*127\.0\.0\.1:9.* cannot be fetched.*init\(\{wasm: url\}\)/);
   assert.match(told[1], /^IstError: .* not a WebAssembly module/);
-  assert.match(told[2], /^IstError: .*404/);
+  assert.match(told[2], /^IstError: .*404.*ist-query\/compat/);
   assert.match(told[3], /^IstError: .*cannot be compiled.*SIMD/);
   assert.match(told[4], /^\d+\.\d+\.\d+$/);
 });
@@ -415,6 +415,40 @@ test('what is wrong is said', () => {
   b.free();
 });
 
+test('an option that is misspelt is refused by its name', async () => {
+  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB), floor = ist.Field.halfSpace([0, 0, 1]);
+  const whole = ist.penetration(a, b, {}), found = ist.contactPatches(a, b, {});
+  const calls = {
+    'Asset.spheres': (typo) => a.spheres(typo),
+    'Field.distanceGrid': (typo) =>
+        ist.Field.distanceGrid(new Float32Array(8), [2, 2, 2], 1, typo),
+    penetration: (typo) => ist.penetration(a, b, {}, typo),
+    separation: (typo) => ist.separation(floor, b, {}, typo),
+    contactPatches: (typo) => ist.contactPatches(a, b, {}, typo),
+    overlap: (typo) => ist.overlap(a, b, {}, typo),
+    overlapOutline: (typo) => ist.overlapOutline(a, b, {}, typo),
+    lenses: (typo) => ist.lenses(a, b, {}, typo),
+    raycast: (typo) => ist.raycast(a, {}, [0, 0, 0], [1, 0, 0], typo),
+    closestPoint: (typo) => ist.closestPoint(a, {}, [0, 0, 0], typo),
+    contains: (typo) => ist.contains(a, {}, [0, 0, 0], typo),
+    withoutProtrusion: (typo) => ist.withoutProtrusion(whole, a, b, {}, typo),
+    patchesWithoutProtrusion: (typo) => ist.patchesWithoutProtrusion(found, a, b, {}, typo),
+    wrenches: (typo) => ist.wrenches(whole, {}, typo),
+    pairFit: (typo) => ist.pairFit(a, b, typo),
+    timeOfImpact: (typo) => ist.timeOfImpact(a, b, {}, typo),
+    penetrationBatch: (typo) => ist.penetrationBatch([], typo),
+    contactPatchesBatch: (typo) => ist.contactPatchesBatch([], typo),
+  };
+  for (const [name, call] of Object.entries(calls))
+    assert.throws(() => call({Measure: 1}), {
+      name: 'TypeError',
+      message: new RegExp(`^ist: ${name}\\(\\): no option is called Measure; there are \\w+`),
+    });
+  await assert.rejects(ist.init({Wasm: ''}), {name: 'TypeError', message: /init\(\): .* wasm$/});
+  assert.throws(() => ist.penetrationBatch([], {poseA: {}}), TypeError);  // each pair has its own
+  for (const each of [a, b, floor]) each.free();
+});
+
 test('memory comes back', () => {
   const freed = () => {
     for (let i = 0; i < 50; ++i) {
@@ -476,4 +510,48 @@ test('a loop that keeps its answers makes no garbage', () => {
       ['--expose-gc', '--max-semi-space-size=64', '--input-type=module', '-e', script],
       {cwd: packageFolder, encoding: 'utf8'});
   assert.ok(Number(told) < 100, `${told.trim()} bytes a step`);
+});
+
+test('rays and points against one solid', () => {
+  const bolt = ist.Asset.from(bytesA, 'bolt'), ball = ist.Field.ball(2);
+  const {lower, upper, centre} = bolt.bounds();
+  // Up the bolt's axis, from below and from inside: to its end, and out of its head.
+  const pose = {rotation: [1, 0, 0, 0], translation: [10, 0, 0]};
+  const below = [10, 0, lower[2] - 3], inside = [10, 0, centre[2]], up = [0, 0, 5];
+  const hits = ist.raycast(bolt, pose, [...below, ...inside], up);
+  assert.equal(hits.count, 2);
+  assert.ok(Math.abs(hits.distance[0] - 3) < 1e-9, `${hits.distance}`);
+  assert.ok(Math.abs(hits.point[5] - upper[2]) < 1e-9, `${hits.point}`);
+  assert.deepEqual(Array.from(hits.normal), [0, 0, -1, 0, 0, 1]);
+  const short = ist.raycast(bolt, pose, below, up, {longest: 2, into: hits});
+  assert.equal(short, hits);
+  assert.ok(short.count === 1 && short.distance[0] === Infinity);
+  assert.equal(short.triangle[0], 2 ** 32 - 1);
+
+  assert.deepEqual(Array.from(ist.contains(bolt, pose, [...below, ...inside])), [0, 1]);
+  const feet = ist.closestPoint(bolt, pose, [...below, ...inside]);
+  assert.ok(Math.abs(feet.distance[0] - 3) < 1e-9 && feet.distance[1] < 0);
+  assert.ok(feet.error.every((error) => error >= 0 && error < 1e-6));
+  assert.deepEqual(Array.from(feet.gradient.subarray(0, 3)), [0, 0, -1]);
+
+  // Of a field; NaN among many, a sentence for one alone.
+  const many = ist.closestPoint(ball, {}, [3, 0, 0, NaN, 0, 0]);
+  assert.deepEqual(Array.from(many.distance), [1, NaN]);
+  assert.deepEqual(Array.from(ist.contains(ball, {}, [1, 0, 0, NaN, 0, 0])), [1, 2]);
+  assert.match(sentence(() => ist.closestPoint(ball, {}, [NaN, 0, 0])), /closestPoint\(\): /);
+  assert.match(sentence(() => ist.raycast(ball, {}, [0, 0, 9], [0, 0, 0])), /raycast\(\): /);
+  assert.equal(ist.raycast(ball, {}, [0, 0, 9], [0, 0, -1]).distance[0], 7);
+  assert.match(
+      sentence(() => ist.contains(bolt, {}, [1, 2])), /points has 2 numbers; .* three a row/);
+  assert.match(
+      sentence(() => ist.raycast(bolt, {}, [0, 0, 0, 0, 0, 0], [1, 0, 0, 1, 0, 0, 1, 0, 0])),
+      /directions has 3 rows; origins has 2/);
+  assert.match(sentence(() => ist.contains(bolt, {}, ['1', 2, 3])), /points holds 1, not a number/);
+  assert.match(
+      sentence(() => ist.raycast(bolt, {}, below, up, {longest: 0})), /longest is 0; it must be > 0/);
+  assert.match(sentence(() => ist.contains(pose, {}, below)), /must be an Asset or a Field/);
+  const bare = ist.Asset.from(readFileSync(baked('nut', 500, {surface: 'none'})), 'bare');
+  assert.match(
+      sentence(() => ist.contains(bare, {}, [...below, ...inside])), /lacks data that the query needs/);
+  for (const each of [bolt, ball, bare]) each.free();
 });

@@ -44,7 +44,7 @@ async function volumes(url) {
 test('what npm would publish', () => {
   const files = readdirSync(join(app, 'node_modules/ist-query'), {recursive: true}).map(String);
   for (const file
-           of ['package.json', 'index.d.ts', 'README.md', 'dist/ist.wasm', 'dist/inlined.js',
+           of ['package.json', 'index.d.ts', 'README.md', 'LICENSE', 'dist/ist.wasm', 'dist/inlined.js',
                'src/index.js'])
     assert.ok(files.includes(file), file);
   assert.ok(!files.some((file) => /test|\.c$|\.h$|CMake/.test(file)), files.join());

@@ -8,6 +8,7 @@ function hex(number) {
       buffer.getUint32(4).toString(16).padStart(8, '0');
 }
 const hexes = (numbers) => Array.from(numbers, hex);
+const row = (numbers, i) => numbers.subarray(3 * i, 3 * i + 3);
 const negated = (numbers) => Array.from(numbers, (x) => hex(-x));
 
 /** Rows of a pose table of the oracle. */
@@ -164,6 +165,40 @@ export function queries(ist, a, b) {
           bits.push(...hexes(segments.subarray(6 * i, 6 * i + 6)), patch[i]);
         return bits;
       },
+    },
+    'rays': {
+      ask: (pose) => {
+        const [x, y, z] = pose.translation, origin = [2 * x, 2 * y, 2 * z];
+        return [
+          ist.raycast(b, pose, origin, [-x, -y, -z, 0.125 - x, -y, -z]),
+          ist.raycast(b, pose, origin, [-0.03125 - x, -y, -z], {longest: 100}),
+        ];
+      },
+      bits: (answers) => answers.flatMap(
+          ({count, triangle, distance, point, normal}) => Array.from({length: count}, (_, i) => [
+                                                            triangle[i],
+                                                            hex(distance[i]),
+                                                            ...hexes(row(point, i)),
+                                                            ...hexes(row(normal, i)),
+          ]).flat()),
+    },
+    'points': {
+      ask: (pose) => {
+        const [x, y, z] = pose.translation;
+        const points = [x, y, z, x + 0.25, y, z, x, y + 0.0625, z];
+        return [[b, pose], [halfSpace, {}]].map(
+            ([solid, at]) =>
+                [ist.contains(solid, at, points), ist.closestPoint(solid, at, points)]);
+      },
+      bits: (answers) => answers.flatMap(
+          ([inside, {count, triangle, distance, error, point, gradient}]) =>
+              Array.from({length: count}, (_, i) => [
+                inside[i],
+                triangle[i],
+                ...hexes([distance[i], error[i]]),
+                ...hexes(row(point, i)),
+                ...hexes(row(gradient, i)),
+          ]).flat()),
     },
     'overlap': {
       ask: (pose) => ist.overlap(a, b, pose),

@@ -1,48 +1,75 @@
 // What is known of two solids at a pose: every query that the page shows, into the same answers.
 
-import {contactPatches, lenses, penetration, separation} from 'ist-query';
+import {contactPatches, overlapOutline, penetration, separation} from 'ist-query';
 
 export const kMostPatches = 16;
-export const kMostLenses = 4096;
-const kWarmUp = 40;  // [ms]
-const kTimed = 10;
+const kTimedFor = 5;    // [ms] a browser's clock is coarse
+const kTimedOften = 16;  // times, of which the least is told
 
 export class Contact {
   constructor(a, b) {
     this.a = a;
     this.b = b;
+    this.hasMeshes = [a, b].every((solid) => solid.info().meshTriangles > 0);
     this.options = {
-      penetration: {},
+      spheres: {},
+      exact: {measure: 'exact'},
       separation: {},
       patches: {maxPatches: kMostPatches},
-      lenses: {maxLenses: kMostLenses},
+      outline: {maxPatches: 1},
     };
-    this.time = 0;  // [ms] of penetration and separation, those asked last
+    this.times = {spheres: Infinity, exact: Infinity};  // [ms] of a penetration at this pose
+    this.timed = 0;
   }
 
-  /** What was just compiled is slow at first; times are told from then on. */
-  warm(pose) {
-    let start = performance.now();
-    while (performance.now() - start < kWarmUp) this.ask(pose, {patches: true, lens: true});
-    start = performance.now();
-    for (let i = 0; i < kTimed; ++i) this.askNumbers(pose);
-    this.usual = (performance.now() - start) / kTimed;
-  }
-
-  /** Asks at a pose of B, for patches and lenses only where they are shown. */
-  ask(pose, {patches = false, lens = false} = {}) {
-    const {a, b, options} = this, start = performance.now();
-    this.askNumbers(pose);
-    this.time = performance.now() - start;
-    if (patches) {
-      this.patches = options.patches.into = contactPatches(a, b, pose, options.patches);
-    }
-    if (lens) this.lenses = options.lenses.into = lenses(a, b, pose, options.lenses);
-  }
-
-  askNumbers(pose) {
-    const {a, b, options} = this;
-    this.penetration = options.penetration.into = penetration(a, b, pose, options.penetration);
+  /** Asks at a pose of B, for patches and the overlap's outline only where they are shown. */
+  ask(pose, {patches, overlap}) {
+    const {a, b, options, hasMeshes} = this;
+    this.askSpheres(pose);
     this.separation = options.separation.into = separation(a, b, pose, options.separation);
+    if (patches) this.patches = options.patches.into = contactPatches(a, b, pose, options.patches);
+    if (hasMeshes && overlap) {
+      this.outline = options.outline.into = overlapOutline(a, b, pose, options.outline);
+      this.exact = this.outline.contact.whole;  // the bits of penetration()
+    } else if (hasMeshes) {
+      this.askExact(pose);
+    }
+    this.timed = 0;
   }
+
+  askSpheres(pose) {
+    const {a, b, options} = this;
+    this.spheres = options.spheres.into = penetration(a, b, pose, options.spheres);
+  }
+  askExact(pose) {
+    const {a, b, options} = this;
+    this.exact = options.exact.into = penetration(a, b, pose, options.exact);
+  }
+
+  /** The true overlap; by spheres where a solid keeps no mesh. */
+  get best() {
+    return this.exact ?? this.spheres;
+  }
+
+  /** Takes the times of what was asked last, a little each frame; whether there is something new. */
+  time(pose) {
+    if (this.timed === kTimedOften) return false;
+    const {times} = this;
+    if (this.timed++ === 0) times.spheres = times.exact = Infinity;
+    times.spheres = Math.min(times.spheres, meanTime(() => this.askSpheres(pose)));
+    if (this.hasMeshes) times.exact = Math.min(times.exact, meanTime(() => this.askExact(pose)));
+    return this.timed === kTimedOften;
+  }
+}
+
+/** [ms] */
+function meanTime(act) {
+  const start = performance.now();
+  let count = 0, time;
+  do {
+    act();
+    ++count;
+    time = performance.now() - start;
+  } while (time < kTimedFor);
+  return time / count;
 }

@@ -1,27 +1,21 @@
 // A visitor's files, dropped or chosen: what they hold, or a sentence on why nothing.
 
 import {Asset} from 'ist-query';
-import * as THREE from 'three';
 import {GLTFLoader} from 'three/addons/loaders/GLTFLoader.js';
-import {OBJLoader} from 'three/addons/loaders/OBJLoader.js';
-import {PLYLoader} from 'three/addons/loaders/PLYLoader.js';
-import {STLLoader} from 'three/addons/loaders/STLLoader.js';
-import {mergeGeometries} from 'three/addons/utils/BufferGeometryUtils.js';
 
 const kMost = 512 * 2 ** 20;  // bytes
+/** Endings of meshes, which have to be baked. */
+const kMeshes = ['obj', 'stl', 'ply', 'off', 'glb', 'gltf', 'dae'];
 
 /**
- * What a file is: {kind: 'solid', asset}, {kind: 'looks', geometry} or
- * {kind: 'scene', scene, animations}. Throws an Error with a sentence.
+ * What a file is: {kind: 'solid', asset} or {kind: 'scene', scene, animations}. Throws an Error with
+ * a sentence.
  */
 export async function readFile(file) {
   const ending = file.name.toLowerCase().split('.').pop();
-  const read = {ist: readSolid, obj: readObj, stl: readStl, ply: readPly, glb: readGlb}[ending];
-  if (!read) {
-    throw new Error(
-        `${file.name}: the page opens .ist, .obj, .stl, .ply and .glb files.` +
-        (ending === 'gltf' ? ' Save it as .glb, in one file.' : ''));
-  }
+  const read = {ist: readSolid, glb: readScene}[ending];
+  if (!read && kMeshes.includes(ending)) throw isMesh(file.name);
+  if (!read) throw new Error(`${file.name}: the page opens solids (.ist) and scenes (.glb).`);
   if (file.size === 0) throw new Error(`${file.name} is empty.`);
   if (file.size > kMost)
     throw new Error(`${file.name} is larger than 512 MB, too much for a page.`);
@@ -48,43 +42,19 @@ function readSolid(bytes, name) {
   }
 }
 
-const text = (bytes) => new TextDecoder().decode(bytes);
-
-const readObj = (bytes, name) => looks(new OBJLoader().parse(text(bytes)), name);
-const readStl = (bytes, name) => looks(new THREE.Mesh(new STLLoader().parse(bytes)), name);
-const readPly = (bytes, name) => looks(new THREE.Mesh(new PLYLoader().parse(bytes)), name);
-
-async function readGlb(bytes, name) {
+async function readScene(bytes, name) {
   const {scene, animations} = await new GLTFLoader().parseAsync(bytes, '');
-  if (animations.length > 0) return {kind: 'scene', name, scene, animations};
-  return looks(scene, name);
+  if (animations.length === 0) throw isMesh(name);
+  return {kind: 'scene', name, scene, animations};
 }
 
-/** All triangles of a model as one geometry. */
-function looks(model, name) {
-  const parts = [];
-  model.updateMatrixWorld(true);
-  model.traverse((part) => {
-    if (!part.isMesh) return;
-    let geometry = part.geometry.index ? part.geometry.toNonIndexed() : part.geometry.clone();
-    const position = geometry.getAttribute('position');
-    if (!position || position.count < 3) return;
-    geometry = new THREE.BufferGeometry().setAttribute(
-        'position',
-        new THREE.BufferAttribute(
-            Float32Array.from(
-                {length: 3 * position.count},
-                (_, i) => position.getComponent(Math.floor(i / 3), i % 3)),
-            3));
-    parts.push(geometry.applyMatrix4(part.matrixWorld));
-  });
-  if (parts.length === 0) throw new Told(`${name} holds no triangles.`);
-  const geometry = mergeGeometries(parts);
-  if (!geometry.getAttribute('position').array.every(Number.isFinite)) {
-    throw new Told(`${name} has corners that are no finite numbers.`);
-  }
-  geometry.computeVertexNormals();
-  return {kind: 'looks', name, geometry};
+/** The page cannot bake. */
+function isMesh(name) {
+  const baked = name.replace(/\.[^.]+$/, '.ist');
+  const [from, to] = [name, baked].map((word) => /\s/.test(word) ? `"${word}"` : word);
+  return new Told(
+      `${name} is a mesh. The page opens solids: run \`ist bake ${from} -o ${to}\`, then drop ` +
+      `${baked}. The solids shown have not changed.`);
 }
 
 /** Calls `take(files)` for what is dropped on the page; `hint` shows while it is held over it. */

@@ -79,8 +79,7 @@ export class Library {
     const [a, b] = [world.a.info, world.b.info];
     $('note').textContent =
         `A: ${whole(a.spheres)} spheres, ${(100 * a.coverage).toFixed(1)} % filled. ` +
-        `B: ${whole(b.spheres)} spheres, ${(100 * b.coverage).toFixed(1)} % filled. ` +
-        'u is the unit of the meshes; k is a pressure.';
+        `B: ${whole(b.spheres)} spheres, ${(100 * b.coverage).toFixed(1)} % filled.`;
   }
 
   // --- A visitor's files
@@ -96,14 +95,6 @@ export class Library {
       throw error;
     }
     this.takeSolids(read.filter(({kind}) => kind === 'solid'));
-    for (const {geometry, name} of read.filter(({kind}) => kind === 'looks')) {
-      // By name, else for B.
-      const [ofA, ofB] =
-          this.world.names.map((own) => own.toLowerCase() === stem(name).toLowerCase());
-      this.settings.setMode('surface');
-      this.world[ofA && !ofB ? 'a' : 'b'].wear(geometry);
-      this.view.dirty = true;
-    }
     const scene = read.find(({kind}) => kind === 'scene');
     if (!scene) return;
     this.latest = {};

@@ -23,6 +23,8 @@ async function start() {
   const view = new View($('view'));
   const world = new World(view, {
     asked: (contact) => readouts.note(contact, performance.now()),
+    timed: (contact) => readouts.noteTimes(contact),
+    moved: () => document.body.classList.add('moved'),
     held: (free) => $('letgo').setAttribute('aria-pressed', free),
   });
   const settings = new Settings(world, view);
@@ -103,11 +105,11 @@ async function start() {
     view.render(player.open ? null : world.overlays);
   }
   function plotNow(now) {
-    if (!world.contact?.penetration) return;
-    const {volume, force} = world.contact.penetration;
+    if (!world.contact?.best) return;
+    const {volume, force} = world.contact.best;
     plots.volume.add(now, volume);
     plots.force.add(now, Math.hypot(...force));
-    plots.volume.draw(now, colour('lens'));
+    plots.volume.draw(now, colour('overlap'));
     plots.force.draw(now, colour('force'));
   }
 

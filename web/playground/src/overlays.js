@@ -1,8 +1,9 @@
-// What is known of a contact, drawn over the solids: force and torque, patches, lenses, the gap.
+// What is known of a contact, drawn over the solids: force and torque, patches, the overlap, the gap.
 
 import * as THREE from 'three';
 
-import {kMostLenses, kMostPatches} from './contact.js';
+import {kMostPatches} from './contact.js';
+import {Overlap} from './overlap.js';
 
 const kUp = new THREE.Vector3(0, 1, 0), kForward = new THREE.Vector3(0, 0, 1);
 const kTurn = 1.6 * Math.PI;  // [rad] of the arc that shows a torque
@@ -20,13 +21,14 @@ export class Overlays {
       force: material(),
       torque: material(),
       patch: material(),
-      lens: material(),
+      overlapA: material(),
+      overlapB: material(),
       gap: material(),
     };
-    this.materials.patch.side = THREE.DoubleSide;
-    this.shown = {arrows: true, patches: false, lenses: true, gap: true};
+    const {force, torque, patch, overlapA, overlapB, gap} = this.materials;
+    patch.side = THREE.DoubleSide;
+    this.shown = {arrows: true, patches: false, overlap: true, gap: true};
 
-    const {force, torque, patch, lens, gap} = this.materials;
     this.shaft =
         new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 20).translate(0, 0.5, 0), force);
     this.head = new THREE.Mesh(new THREE.ConeGeometry(1, 1, 28).translate(0, 0.5, 0), force);
@@ -37,12 +39,18 @@ export class Overlays {
     this.turn = new THREE.Group().add(this.arc, this.arcHead);
     this.discs =
         new THREE.InstancedMesh(new THREE.CylinderGeometry(1, 1, 0.12, 40), patch, kMostPatches);
-    this.lenses = new THREE.InstancedMesh(new THREE.SphereGeometry(1, 12, 8), lens, kMostLenses);
+    this.overlap = new Overlap([overlapA, overlapB]);
     this.bridge = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 12).translate(0, 0.5, 0), gap);
     this.ends = [0, 1].map(() => new THREE.Mesh(new THREE.SphereGeometry(1, 20, 14), gap));
-    for (const mesh of [this.discs, this.lenses]) mesh.frustumCulled = false;
+    this.discs.frustumCulled = false;
     this.scene.add(
-        this.shaft, this.head, this.turn, this.discs, this.lenses, this.bridge, ...this.ends);
+        this.shaft, this.head, this.turn, this.discs, this.overlap.group, this.bridge, ...this.ends);
+    this.scene.visible = false;  // until update() gave everything its size
+  }
+
+  /** Takes two solids. */
+  hold(a, b) {
+    this.overlap.hold(a, b);
   }
 
   setColours(colours) {
@@ -50,13 +58,15 @@ export class Overlays {
       material.color.set(colours[name]);
       material.emissive.set(colours[name]).multiplyScalar(0.3);
     }
+    this.overlap.line.color.set(colours.outline);
   }
 
-  /** Of a contact that was asked; `size` [u] is that of the smaller solid, `origin` B's. */
-  update({penetration, separation, patches, lenses}, size, origin) {
-    const touching = penetration.volume > 0;
-    this.drawForce(touching && this.shown.arrows, penetration, size);
-    this.drawTorque(touching && this.shown.arrows, penetration, size, origin);
+  /** Of a contact that was asked; `size` [u] is that of the smaller solid, `b` holds B. */
+  update({best, separation, patches, outline}, size, b) {
+    const touching = best.volume > 0;
+    this.scene.visible = true;
+    this.drawForce(touching && this.shown.arrows, best, size);
+    this.drawTorque(touching && this.shown.arrows, best, size, b.position);
     this.discs.count = touching && this.shown.patches ? patches.count : 0;
     for (let i = 0; i < this.discs.count; ++i) {
       const {centroid, normal, area} = patches.patches[i];
@@ -68,7 +78,11 @@ export class Overlays {
               at.fromArray(centroid), turn, scale.set(r, Math.max(r, 0.02 * size) * 0.4, r)));
     }
     this.discs.instanceMatrix.needsUpdate = true;
-    this.drawLenses(touching && this.shown.lenses, lenses);
+    this.overlap.group.visible = touching && this.shown.overlap;
+    if (this.overlap.group.visible) {
+      b.updateMatrixWorld();
+      this.overlap.update(b.matrixWorld, outline);
+    }
     this.drawGap(!touching && this.shown.gap, separation, size);
   }
 
@@ -95,17 +109,6 @@ export class Overlays {
     this.turn.position.copy(origin);
     this.turn.quaternion.setFromUnitVectors(kForward, at.fromArray(torque).divideScalar(strength));
     this.turn.scale.setScalar(0.15 * size + 0.45 * size * grown(strength / size ** 3));
-  }
-
-  drawLenses(visible, lenses) {
-    const count = this.lenses.count = visible ? lenses.count : 0;
-    for (let i = 0; i < count; ++i) {
-      const [x, y, z, ax, ay, az, radius, thickness] = lenses.data.subarray(10 * i, 10 * i + 8);
-      turn.setFromUnitVectors(kForward, at.set(ax, ay, az));
-      this.lenses.setMatrixAt(
-          i, matrix.compose(at.set(x, y, z), turn, scale.set(radius, radius, thickness / 2)));
-    }
-    this.lenses.instanceMatrix.needsUpdate = true;
   }
 
   drawGap(visible, {distance, pointA, pointB}, size) {

@@ -2,42 +2,36 @@
 
 import {digits, range, vector, whole} from './format.js';
 
+// By name: what is told of the meshes and of the spheres; `wide` of both at once.
 const kRows = [
   ['volume', 'Volume', 'u³', 'main'],
-  ['sum', 'Sum in', 'u³'],  // with its rounding; no bounds of the true volume
-  ['distance', 'Distance', 'u'],
+  ['error', 'Error', '%'],
   ['force', 'Force / k', 'u²'],
-  ['forceVector', '', '', 'detail'],
+  ['forceVector', '', '', 'wide detail'],
   ['torque', 'Torque / k', 'u³'],
-  ['torqueVector', '', '', 'detail'],
-  ['pairs', 'Sphere pairs', ''],
-  ['query', 'Query', 'µs'],
+  ['torqueVector', '', '', 'wide detail'],
+  ['time', 'Time', 'µs'],
+  ['distance', 'Distance', 'u', 'wide'],
 ];
 const kOften = 100;  // [ms] numbers are written at most so often
 const kCalm = 900;   // [ms] words are said once nothing moved for so long
-const kFew = 10;     // queries of which a mean is taken
-const kMean = 1000;  // [ms] over which times of queries are averaged: a browser's clock is coarse
 
 export class Readouts {
-  constructor(list, live) {
+  constructor(table, live) {
     this.live = live;
     this.cells = {};
-    for (const [key, label, unit, style] of kRows) {
-      const row = document.createElement('div');
-      row.className = style ?? '';
-      const cell = (tag, text, className) => {
-        const made = Object.assign(document.createElement(tag), {textContent: text, className});
-        row.append(made);
-        return made;
-      };
-      cell('dt', label, '');
-      this.cells[key] = cell('dd', '–', '');
-      this.cells[key].id = `read-${key}`;
-      cell('dd', unit, 'unit');
-      list.append(row);
+    for (const [key, label, unit, style = ''] of kRows) {
+      const row = table.insertRow();
+      row.className = style;
+      row.append(Object.assign(document.createElement('th'), {textContent: label, scope: 'row'}));
+      const wide = style.includes('wide');
+      for (const name of wide ? [key] : [key, `${key}-spheres`]) {
+        const cell = this.cells[name] = row.insertCell();
+        Object.assign(cell, {id: `read-${name}`, textContent: '–', colSpan: wide ? 2 : 1});
+      }
+      row.insertCell().textContent = unit;
     }
     this.written = -Infinity;
-    this.times = {since: 0, sum: 0, count: 0};
   }
 
   /** After every query; `now` [ms]. */
@@ -45,13 +39,16 @@ export class Readouts {
     this.contact = contact;
     this.changed = now;
     this.said = false;
-    const touching = contact.penetration.volume > 0;
+    const touching = contact.best.volume > 0;
     document.body.classList.toggle('touching', touching);
     document.body.classList.toggle('apart', !touching && contact.separation.distance > 0);
-    const times = this.times;
-    times.sum += contact.time;
-    ++times.count;
     this.stale = true;
+  }
+
+  /** Once times were taken. */
+  noteTimes({times, hasMeshes}) {
+    this.put('time', hasMeshes ? whole(1000 * times.exact) : '–');
+    this.put('time-spheres', whole(1000 * times.spheres));
   }
 
   /** Every frame: writes what is due. */
@@ -63,32 +60,31 @@ export class Readouts {
     }
   }
 
+  put(key, text) {
+    const cell = this.cells[key];
+    if (cell.textContent !== text) cell.textContent = text;
+  }
+
   write(now) {
-    const {penetration: p, separation: s} = this.contact, {cells, times} = this;
+    const {exact, spheres, best, separation: s} = this.contact;
     this.stale = false;
     this.written = now;
-    const put = (key, text) => {
-      if (cells[key].textContent !== text) cells[key].textContent = text;
-    };
-    put('volume', digits(p.volume));
-    put('sum', range(p.volumeMin, p.volumeMax));
-    put('distance', range(s.distanceMin, s.distanceMax, 5));
-    put('force', digits(Math.hypot(...p.force)));
-    put('forceVector', vector(p.force));
-    put('torque', digits(Math.hypot(...p.torque)));
-    put('torqueVector', vector(p.torque));
-    put('pairs', whole(p.spherePairs));
-    if (this.contact !== times.of) {
-      Object.assign(times, {of: this.contact, since: now, sum: 0, count: 0});
-      put('query', whole(1000 * this.contact.usual));
-    } else if (now - times.since > kMean && times.count >= kFew) {
-      put('query', whole(1000 * times.sum / times.count));
-      Object.assign(times, {since: now, sum: 0, count: 0});
+    for (const [p, key] of [[exact, ''], [spheres, '-spheres']]) {
+      this.put(`volume${key}`, p ? digits(p.volume) : '–');
+      this.put(`force${key}`, p ? digits(Math.hypot(...p.force)) : '–');
+      this.put(`torque${key}`, p ? digits(Math.hypot(...p.torque)) : '–');
     }
+    this.put('error', exact ? '0' : '–');
+    this.put('error-spheres', exact?.volume > 0 ? error(spheres.volume, exact.volume) : '–');
+    for (const key of ['force', 'torque']) {
+      this.put(`${key}Vector`, vector(best[key]));
+      this.cells[`${key}Vector`].previousSibling.textContent = exact ? 'exact' : 'spheres';
+    }
+    this.put('distance', range(s.distanceMin, s.distanceMax, 5));
   }
 
   words() {
-    const {penetration: p, separation: s} = this.contact;
+    const {best: p, separation: s} = this.contact;
     if (p.volume > 0) {
       return `Overlap ${digits(p.volume, 4)} cubic units; force ${
                  digits(Math.hypot(...p.force), 4)}, ` +
@@ -105,3 +101,9 @@ export class Readouts {
     this.live.textContent = this.live.textContent === text ? `${text} ` : text;
   }
 }
+
+/** Of a volume, in per cent of the true one, with its sign. */
+const error = (volume, truth) => {
+  const percent = 100 * (volume / truth - 1);
+  return `${percent > 0 ? '+' : ''}${digits(percent, 2)}`;
+};

@@ -1,5 +1,5 @@
-// A solid as it is drawn: the surface that its asset holds (or a mesh put over it), its spheres at
-// a level of detail, or a level of its tree.
+// A solid as it is drawn: the surface that its asset holds, its spheres at a level of detail, or a
+// level of its tree.
 
 import * as THREE from 'three';
 import {toCreasedNormals} from 'three/addons/utils/BufferGeometryUtils.js';
@@ -57,7 +57,6 @@ export class Solid {
     this.depth =
         new THREE.MeshBasicMaterial({colorWrite: false, transparent: true, side: THREE.DoubleSide});
     this.depth.onBeforeCompile = fillCuts;
-    this.looks = null;
     this.show('surface', 0);
   }
 
@@ -72,17 +71,10 @@ export class Solid {
 
   show(mode, level) {
     this.asked = {mode, level};
-    if (mode === 'surface' && !this.info.hasField && !this.looks) mode = 'spheres';
+    if (mode === 'surface' && !this.info.hasField) mode = 'spheres';
     const last = Math.max(0, this.levels(mode).length - 1);
     this.shown = {mode, level: Math.min(level, last)};
     this.draw();
-  }
-
-  /** A mesh instead of the stored surface; null takes it away. */
-  wear(geometry) {
-    this.looks?.dispose();
-    this.looks = geometry;
-    this.show('surface', 0);
   }
 
   setOpacity(opacity) {
@@ -106,7 +98,6 @@ export class Solid {
   dispose() {
     this.clear();
     this.geometry?.dispose();
-    this.looks?.dispose();
     this.material.dispose();
     this.depth.dispose();
     this.group.removeFromParent();
@@ -115,7 +106,6 @@ export class Solid {
   // --- Below: what lies in the group
 
   surface() {
-    if (this.looks) return this.looks;
     if (this.geometry) return this.geometry;
     const {positions, triangles} = this.asset.surface();
     const shared = new THREE.BufferGeometry();

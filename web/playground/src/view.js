@@ -34,7 +34,6 @@ export class View {
     this.orbit.addEventListener('change', () => this.dirty = true);
     this.handles = new TransformControls(this.camera, this.canvas);
     this.handles.setSpace('world');
-    this.handles.setColors(0xd9534f, 0x4caf6d, 0x4a86d8, 0xf2c14e);
     this.handles.addEventListener('change', () => this.dirty = true);
     this.handles.addEventListener('dragging-changed', ({value}) => this.orbit.enabled = !value);
     this.handles.setSize(1.25);
@@ -85,8 +84,10 @@ export class View {
     this.scene.add(this.floor);
   }
 
-  setColours({ground, line}) {
+  /** `handle`: of all three axes, none of which then looks like a force or an overlap. */
+  setColours({ground, line, handle, held}) {
     this.renderer.setClearColor(ground);
+    this.handles.setColors(handle, handle, handle, held);
     this.floor?.material.color.set(line);
     this.dirty = true;
   }

@@ -10,7 +10,8 @@ import {colour} from './theme.js';
 
 export class World {
   /**
-   * `on`: what to call when a contact was asked (`asked`) and when B was let go or held (`held`).
+   * `on`: what to call when a contact was asked (`asked`), when its times were taken (`timed`),
+   * when a visitor moved B (`moved`) and when B was let go or held (`held`).
    */
   constructor(view, on) {
     this.view = view;
@@ -19,15 +20,17 @@ export class World {
     this.pose = {rotation: [1, 0, 0, 0], translation: [0, 0, 0]};
     this.home = {rotation: [1, 0, 0, 0], translation: [0, 0, 0]};
     this.settings = {mode: 'surface', level: 0, opacityA: 1, opacityB: 0.45, cut: 0};
-    view.handles.addEventListener('objectChange', () => this.touched());
+    view.handles.addEventListener('objectChange', () => {
+      this.touched();
+      this.on.moved();
+    });
     view.handles.addEventListener('dragging-changed', () => this.free?.still());
   }
 
   /**
-   * Takes two assets, which it frees when others come. `up`: 'y' or 'z'; `friction` once let go;
-   * `look`: how many radii of B are seen around it, all of both without.
+   * Takes two assets, which it frees when others come. `up`: 'y' or 'z'; `friction` once let go.
    */
-  hold(assetA, assetB, {pose, up = 'z', friction, look}) {
+  hold(assetA, assetB, {pose, up = 'z', friction}) {
     const own = new Set([assetA, assetB]);
     this.letGo(false);
     for (const solid of [this.a, this.b]) {
@@ -37,15 +40,14 @@ export class World {
     this.a = new Solid(assetA, colour('a'), 0);
     this.b = new Solid(assetB, colour('b'), 1);
     this.contact = new Contact(assetA, assetB);
+    this.overlays.hold(this.a, this.b);
     this.view.scene.add(this.a.group, this.b.group);
     this.view.handles.attach(this.b.group);
     this.home = pose;
     this.up = up;
     this.friction = friction;
-    this.look = look;
     this.size = Math.min(this.a.bounds.radius, this.b.bounds.radius);
     this.show();
-    this.contact.warm(pose);
     this.reset();
     this.frame();
   }
@@ -53,19 +55,12 @@ export class World {
   /** Sees both solids whole, on a floor below. */
   frame() {
     const box = new THREE.Box3();
-    const ball = (solid) => new THREE.Sphere(
-        new THREE.Vector3().fromArray(solid.bounds.centre).applyMatrix4(solid.group.matrixWorld),
-        solid.bounds.radius);
     for (const solid of [this.a, this.b]) {
       solid.group.updateMatrixWorld(true);
       box.union(ofBounds(solid.bounds).applyMatrix4(solid.group.matrixWorld));
     }
     const whole = box.getBoundingSphere(new THREE.Sphere());
-    const atB = ball(this.b);
-    if (this.look)
-      this.view.frame(atB.center, this.look * atB.radius, this.up);
-    else
-      this.view.frame(whole.center, Math.max(0.86 * whole.radius, atB.radius), this.up);
+    this.view.frame(whole.center, Math.max(0.86 * whole.radius, this.b.bounds.radius), this.up);
     const axis = this.up === 'y' ? 1 : 2;
     this.floor =
         Math.min(box.min.getComponent(axis), this.a.bounds.lower[axis]) - 0.02 * whole.radius;
@@ -78,13 +73,12 @@ export class World {
     const at = this.b.group.matrixWorld.clone().invert();
     const translation = new THREE.Vector3(), turned = new THREE.Quaternion();
     at.decompose(translation, turned, new THREE.Vector3());
-    const {x, y, z, w} = turned, looks = [this.b.looks, this.a.looks];
+    const {x, y, z, w} = turned;
     this.hold(this.b.asset, this.a.asset, {
       pose: {rotation: [w, x, y, z], translation: translation.toArray()},
       up: this.up,
       friction: this.friction,
     });
-    [this.a, this.b].forEach((solid, k) => looks[k] && solid.wear(looks[k]));
   }
 
   // --- Where B stands
@@ -101,6 +95,7 @@ export class World {
   }
 
   move(by) {
+    this.on.moved();
     this.b.group.position.add(by);
     this.free?.still();
     this.touched();
@@ -108,6 +103,7 @@ export class World {
 
   /** About the middle of B. */
   turn(by) {
+    this.on.moved();
     const middle = new THREE.Vector3().fromArray(this.b.bounds.centre);
     const {position, quaternion} = this.b.group;
     position.add(middle.clone().applyQuaternion(quaternion));
@@ -168,10 +164,17 @@ export class World {
       force: colour('force'),
       torque: colour('torque'),
       patch: colour('patch'),
-      lens: colour('lens'),
+      overlapA: colour('overlap'),
+      overlapB: colour('overlap-b'),
+      outline: colour('outline'),
       gap: colour('soft'),
     });
-    this.view.setColours({ground: colour('ground'), line: colour('line')});
+    this.view.setColours({
+      ground: colour('ground'),
+      line: colour('line'),
+      handle: colour('ink'),
+      held: colour('accent'),
+    });
   }
 
   // --- A frame
@@ -183,14 +186,17 @@ export class World {
     if (this.free && !this.view.handles.dragging && this.free.advance(group, seconds)) {
       this.stale = this.view.dirty = true;
     }
-    if (!this.stale) return;
+    if (!this.stale) {
+      if (this.contact.time(this.pose)) this.on.timed(this.contact);
+      return;
+    }
     this.stale = false;
     const {x, y, z, w} = group.quaternion, {pose} = this;
     Object.assign(pose.rotation, [w, x, y, z]);
     group.position.toArray(pose.translation);
     const {shown} = this.overlays;
-    this.contact.ask(pose, {patches: shown.patches, lens: shown.lenses});
-    this.overlays.update(this.contact, this.size, group.position);
+    this.contact.ask(pose, shown);
+    this.overlays.update(this.contact, this.size, group);
     this.on.asked(this.contact);
   }
 }

@@ -1,11 +1,11 @@
 // Compiles only if the types say what docs/web.md does.
 import {
-  Asset, Field, IstError, contactPatches, contactPatchesBatch, init, lenses, motionBetween, moved, overlap, overlapOutline, pairFit,
-  patchesWithoutProtrusion, penetration, penetrationBatch, separation, timeOfImpact, version, withoutProtrusion, wrenches,
+  Asset, Field, IstError, closestPoint, contains, contactPatches, contactPatchesBatch, init, lenses, motionBetween, moved, overlap, overlapOutline, pairFit,
+  patchesWithoutProtrusion, penetration, penetrationBatch, raycast, separation, timeOfImpact, version, withoutProtrusion, wrenches,
 } from 'ist-query';
 import * as compat from 'ist-query/compat';
 import type {
-  BatchPenetration, ContactPatches, ImpactOptions, Pair, Penetration, PenetrationOptions, Pose, Surface, Wrenches,
+  BatchPenetration, ContactPatches, ImpactOptions, Pair, Penetration, PenetrationOptions, Pose, RayHits, Surface, Wrenches,
 } from 'ist-query';
 
 await init({wasm: fetch('ist.wasm')});
@@ -29,6 +29,8 @@ const push: Wrenches = wrenches(found.patches[0], pose, {b: a.massProperties().c
 const thin: number = withoutProtrusion(answer, a, a, pose, {into: answer}).volume + way.into.time + push.onB.torque[0] +
     patchesWithoutProtrusion(found, a, a, pose).count + contactPatchesBatch(pairs, {maxPatches: 4})[0].whole.volume +
     pairFit(a, a).ratio;
+const hits: RayHits = raycast(a, pose, [0, 0, 9], new Float64Array([0, 0, -1]), {longest: 10});
+const near: number = hits.normal[2] + closestPoint(Field.ball(1), pose, [0, 0, 2]).error[0] + contains(a, {}, [0, 0, 0])[0];
 // @ts-expect-error
 penetrationBatch([{a, b: Field.ball(1), poseB: pose}]);
 // @ts-expect-error
@@ -37,4 +39,4 @@ penetration(a, Field.ball(1), pose);
 penetration(a, a, pose, {measure: 'outer'});
 // @ts-expect-error
 overlapOutline(Field.ball(1), a, pose);
-export {thin, words};
+export {near, thin, words};

@@ -1,0 +1,36 @@
+// Names that options may have: others are misspelt.
+
+const kLimits = ['maxVisits', 'deadlineUs', 'poseA', 'into'];
+const kContact = [...kLimits, 'measure', 'field', 'relativeError', 'minRadius'];
+const kOfBatch = (names) => names.filter((name) => name !== 'poseA');
+const kPenetration = [...kContact, 'pairBudget'], kPatches = [...kContact, 'maxPatches'];
+
+const kNames = {
+  'init()': ['wasm'],
+  'Asset.spheres()': ['measure', 'detail'],
+  'Field.distanceGrid()': ['origin', 'error'],
+  'penetration()': kPenetration,
+  'separation()': kLimits,
+  'contactPatches()': kPatches,
+  'overlap()': ['poseA'],
+  'overlapOutline()': ['poseA', 'maxPatches', 'maxVisits', 'into'],
+  'lenses()': ['poseA', 'measure', 'detailA', 'detailB', 'maxLenses', 'into'],
+  'raycast()': ['longest', 'into'],
+  'closestPoint()': ['into'],
+  'contains()': ['into'],
+  'withoutProtrusion()': ['poseA', 'into'],
+  'patchesWithoutProtrusion()': kPatches,
+  'wrenches()': ['a', 'b'],
+  'pairFit()': ['scaleA', 'scaleB'],
+  'timeOfImpact()': [...kLimits, 'motionA', 'motionB', 'duration', 'tolerance'],
+  'penetrationBatch()': kOfBatch(kPenetration),
+  'contactPatchesBatch()': kOfBatch(kPatches),
+};
+
+/** Throws a TypeError for an option that `who` does not have. */
+export function checkOptions(who, options) {
+  const names = kNames[who];
+  for (const name in options)
+    if (!names.includes(name))
+      throw new TypeError(`ist: ${who}: no option is called ${name}; there are ${names.join(', ')}`);
+}
