@@ -98,32 +98,6 @@ TEST_F(QueryBudget, RelativeErrorIsMet) {
   }
 }
 
-TEST_F(QueryBudget, SmallNodesStayShut) {
-  for (const double radius : {0.4, 0.1, 0.02}) {
-    for (int i = 0; i < 20; ++i) {
-      const PlacedTree a = placed_a(), b = placed_b(0.09 * i);
-      PenetrationSettings settings;
-      settings.min_radius = radius;
-      const Penetration answer = penetration(a, b, settings, workspace_);
-      expect_bounds(answer, penetration(a, b, {}, workspace_));
-    }
-  }
-}
-
-TEST_F(QueryBudget, DeadlineStopsWithBounds) {
-  const PlacedTree a = placed_a(), b = placed_b(0.1);
-  const Penetration finished = penetration(a, b, {}, workspace_);
-  PenetrationSettings settings;
-  settings.deadline_us = 1e-3;  // over before the first look at the clock
-  const Penetration stopped = penetration(a, b, settings, workspace_);
-  EXPECT_EQ(stopped.status, QueryStatus::budget_exhausted);
-  expect_bounds(stopped, finished);
-  settings.deadline_us = 1e9;
-  const Penetration unhurried = penetration(a, b, settings, workspace_);
-  EXPECT_EQ(unhurried.status, QueryStatus::ok);
-  EXPECT_EQ(unhurried.volume, finished.volume);
-}
-
 TEST_F(QueryBudget, AWorkspaceChangesNothingButWhenFull) {
   Workspace small(64), ample(1 << 16);
   int full = 0;

@@ -310,8 +310,6 @@ TEST_F(QueryDetails, OtherLimitsHoldOnTop) {
     const Penetration finished = penetration(a, b, settings, workspace_);
     settings.max_visits = 1u << (i % 11);
     if (i % 4 == 1) settings.relative_error = 0.2;
-    if (i % 4 == 2) settings.min_radius = 0.15;
-    if (i % 4 == 3) settings.deadline_us = 1e-3;
     const Penetration answer = penetration(a, b, settings, workspace_);
     EXPECT_LE(answer.node_visits, settings.max_visits);
     EXPECT_LE(answer.volume_min, finished.volume);
