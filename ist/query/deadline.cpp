@@ -31,7 +31,7 @@ constexpr double kSlowQueries = 32, kSlow = 1.0 / 8;
 }  // namespace
 
 Deadline::Deadline(double microseconds) noexcept {
-  if (!(microseconds > 0) || !std::isfinite(microseconds)) return;
+  if (!std::isfinite(microseconds) || microseconds <= 0) return;
   deadline_ = microseconds;
   budget_ = std::clamp(kFirst * microseconds, kLeast, kMost);
   cost_ = kAim * deadline_ / budget_;
@@ -44,7 +44,7 @@ void Deadline::limit(PenetrationSettings& settings) const noexcept {
 }
 
 void Deadline::record(const Penetration& answer, double microseconds) noexcept {
-  if (deadline_ == 0 || !(microseconds > 0) || !std::isfinite(microseconds)) return;
+  if (deadline_ == 0 || !std::isfinite(microseconds) || microseconds <= 0) return;
   const bool apart = !(answer.volume > 0);
   const double pairs = answer.sphere_pairs;
   if (!apart) {

@@ -1,6 +1,7 @@
-#include <ist/deadline.h>
 #include <gtest/gtest.h>
+#include <ist/deadline.h>
 
+#include <algorithm>
 #include <limits>
 #include <random>
 #include <vector>
@@ -38,12 +39,13 @@ struct LoopRun {
   bool too_slow = false;  ///< at the end
 };
 
-class DeadlineLoop : public ::testing::Test {
- protected:
-  static LoopRun run(std::size_t spheres, bool field, double stiffness, double deadline_us) {
-    const Asset knot = testing::baked(make_sample("torus_knot"), "knot", spheres, field);
-    const Asset ring = testing::baked(testing::ring_mesh(), "ring", spheres, field);
-    Workspace workspace;
+class Loop {
+ public:
+  Loop(std::size_t spheres, bool field)
+      : knot_(testing::baked(make_sample("torus_knot"), "knot", spheres, field)),
+        ring_(testing::baked(testing::ring_mesh(), "ring", spheres, field)) {}
+
+  LoopRun run(double stiffness, double deadline_us) {
     Deadline deadline(deadline_us);
     Times times(7);
     std::vector<double> taken;
@@ -53,7 +55,7 @@ class DeadlineLoop : public ::testing::Test {
       deadline.limit(settings);
       result.budget = settings.pair_budget;
       const Penetration answer =
-          penetration({knot.view(), {}, 1}, {ring.view(), pose, 1}, settings, workspace);
+          penetration({knot_.view(), {}, 1}, {ring_.view(), pose, 1}, settings, workspace_);
       taken.push_back(times.of(answer));
       deadline.record(answer, taken.back());
       return answer;
@@ -65,19 +67,24 @@ class DeadlineLoop : public ::testing::Test {
     result.too_slow = deadline.too_slow();
     return result;
   }
+
+ private:
+  const Asset knot_, ring_;
+  Workspace workspace_;
 };
 
-TEST_F(DeadlineLoop, ARingOnAKnotKeepsItsEnergyAndItsTime) {
+TEST(DeadlineLoop, ARingOnAKnotKeepsItsEnergyAndItsTime) {
   if (testing::kSanitized) GTEST_SKIP() << "takes minutes";
   const struct {
     std::size_t spheres;
     bool field;
     double stiffness;
   } loops[] = {{4000, true, 1e4}, {16000, false, 1e5}};
-  for (const auto& loop : loops) {
+  for (const auto& [spheres, field, stiffness] : loops) {
+    Loop loop(spheres, field);
     for (const double deadline : {160.0, 80.0, 40.0, 20.0}) {
-      SCOPED_TRACE(::testing::Message() << loop.spheres << " spheres, " << deadline << " us");
-      const LoopRun run = this->run(loop.spheres, loop.field, loop.stiffness, deadline);
+      SCOPED_TRACE(::testing::Message() << spheres << " spheres, " << deadline << " us");
+      const LoopRun run = loop.run(stiffness, deadline);
       EXPECT_GT(run.ring.touching, 1000);
       EXPECT_GT(run.ring.apart, 100);
       EXPECT_LT(run.ring.grown, 0.01);
@@ -88,8 +95,9 @@ TEST_F(DeadlineLoop, ARingOnAKnotKeepsItsEnergyAndItsTime) {
   }
 }
 
-TEST_F(DeadlineLoop, SaysWhatNoBudgetKeeps) {
-  const LoopRun run = this->run(4000, false, 1e5, 7);
+TEST(DeadlineLoop, SaysWhatNoBudgetKeeps) {
+  if (testing::kSanitized) GTEST_SKIP() << "takes minutes";
+  const LoopRun run = Loop(4000, false).run(1e5, 7);
   EXPECT_TRUE(run.too_slow);
   EXPECT_LT(run.ring.grown, 0.05);
 }
@@ -130,7 +138,8 @@ TEST(Deadline, ABudgetGlidesInContactAndJumpsApart) {
     before = budget;
   }
   deadline.record(answer_of(0), 1);
-  EXPECT_NEAR(budget_of(deadline), 8000, 1500);
+  EXPECT_GT(budget_of(deadline), 2 * before);
+  EXPECT_LE(budget_of(deadline), 8000u);
   const Deadline copy = deadline;
   EXPECT_EQ(budget_of(copy), budget_of(deadline));
 }

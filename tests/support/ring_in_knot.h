@@ -39,7 +39,8 @@ RingRun run_ring(double stiffness, double rate, double seconds, Ask ask) {
   ring.inertia /= ring.mass;
   ring.mass = 1;
   FreeBody body(ring, start,
-                Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), {0, 2, -1}));
+                Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(),
+                                                   Eigen::Vector3d(0, 2, -1)));
   RingRun run;
   double kinetic = 0, first = 0;
   for (int tick = 0; tick < seconds * rate; ++tick) {
