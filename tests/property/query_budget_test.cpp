@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 #include <ist/query.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
@@ -21,6 +24,16 @@ class QueryBudget : public ::testing::Test {
   PlacedTree placed_a() { return {a_.view(), random_pose(random_, 0.2), 1.0}; }
   PlacedTree placed_b(double distance) { return {b_.view(), random_pose(random_, distance), 0.8}; }
 };
+
+/// [u³] Of the smaller solid's matched spheres.
+double smaller_volume(const PlacedTree& a, const PlacedTree& b) {
+  const auto volume = [](const PlacedTree& placed) {
+    const AssetHeader& header = placed.tree.header();
+    const double unit = std::ldexp(placed.scale, header.exponent);
+    return header.matched_tree.volume_sum * unit * unit * unit;
+  };
+  return std::min(volume(a), volume(b));
+}
 
 /// The stopped answer's bounds hold the finished one, and its volume lies between them.
 void expect_bounds(const Penetration& stopped, const Penetration& finished) {
@@ -49,6 +62,9 @@ TEST_F(QueryBudget, VisitsAreKeptAndBoundsHold) {
       EXPECT_EQ(stopped.status,
                 finished.node_visits > visits ? QueryStatus::budget_exhausted : QueryStatus::ok);
       expect_bounds(stopped, finished);
+      if (stopped.status != QueryStatus::ok) {
+        EXPECT_LE(stopped.volume, smaller_volume(a, b) * (1 + 1e-12));
+      }
       width += stopped.volume_max - stopped.volume_min;
       error += std::abs(stopped.volume - finished.volume);
     }
