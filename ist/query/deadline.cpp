@@ -48,7 +48,7 @@ void Deadline::record(const Penetration& answer, double microseconds) noexcept {
   const bool apart = !(answer.volume > 0);
   const double pairs = answer.sphere_pairs;
   if (!apart) {
-    const bool slow = microseconds > deadline_ && budget_ == kLeast;
+    const bool slow = microseconds > deadline_ && budget_ <= kHigh * kLeast;
     slow_ += ((slow ? 1 : 0) - slow_) / kSlowQueries;
     // A smaller contact's time says little of a full budget's, unless it is late.
     if (2 * pairs >= budget_ || microseconds > deadline_) {

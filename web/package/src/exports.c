@@ -170,7 +170,7 @@ ist_status_t overlap_outline(const ist_tree_t* a, const ist_tree_t* b, uint32_t 
   ist_contact_patches_t found = {sizeof found, sizeof desk.patches[0], desk.patches, most, 0};
   ist_outline_t outline = {
       .size = sizeof outline, .segment_size = sizeof *room, .segments = room, .capacity = capacity};
-  const ist_status_t status = ist_overlap_outline(&first, &second, &settings, &desk.workspace,
+  const ist_status_t status = ist_overlap_outline(&first, &second, &desk.settings, &desk.workspace,
                                                   &found, &outline, &desk.penetration);
   desk.counts[0] = (uint32_t)found.count;
   desk.counts[1] = (uint32_t)outline.total;
