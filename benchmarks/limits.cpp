@@ -1,6 +1,6 @@
 // What limits do in a loop by the real clock: a nut turns down a bolt under gravity at 1 kHz, and a
-// spring draws a ring along a torus knot at 2 kHz, both without friction. What becomes of the energy
-// and of the time per query under deadlines and under fixed pair budgets?
+// spring draws a ring along a torus knot at 2 kHz, both without friction. What becomes of the
+// energy and of the time per query under deadlines and under fixed pair budgets?
 
 #include <string>
 #include <vector>
@@ -141,9 +141,8 @@ int main(int argc, char** argv) {
   for (const double stiffness : {1e4, 1e5}) {
     for (const Limit& limit : kLimits) {
       Loop loop(knot, ring, limit, {{1, 0, 0, 0}, {3, 0, 0}});
-      const ist::testing::RingRun run =
-          ist::testing::run_ring(stiffness, 2000, quick ? 0.5 : 4,
-                                 [&](const ist::Pose& pose) { return loop.ask(pose); });
+      const ist::testing::RingRun run = ist::testing::run_ring(
+          stiffness, 2000, quick ? 0.5 : 4, [&](const ist::Pose& pose) { return loop.ask(pose); });
       loop.report(report, "A ring on a torus knot", stiffness, run.grown, run.fell);
     }
   }

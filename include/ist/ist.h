@@ -463,8 +463,8 @@ ist_status_t ist_separation(const ist_placed_tree_t* a, const ist_placed_tree_t*
                             const ist_separation_settings_t* settings, ist_workspace_t* workspace,
                             ist_separation_t* answer);
 
-/* Deadline (deadline.h): the pair budget that keeps the queries of one pair of bodies within a time.
- * No query reads a clock: the loop measures them. May be copied; all zero: no deadline. */
+/* Deadline (deadline.h): the pair budget that keeps the queries of one pair of bodies within a
+ * time. No query reads a clock: the loop measures them. May be copied; all zero: no deadline. */
 typedef struct ist_deadline {
   double opaque[8];
 } ist_deadline_t;

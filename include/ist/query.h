@@ -227,7 +227,8 @@ struct ContactPatches {
 /// solid (B's if equal or if A is too coarse), always at the same places. The estimate of a stopped
 /// query is divided too. Under a pair budget the patches are those of the level of detail that
 /// answers for most of the volume, and what the blend with other levels adds is spread over them by
-/// volume: their sum stays continuous, while ids change where another level takes over. Costs 1.7 (one patch) to 2.4 (32) times a penetration.
+/// volume: their sum stays continuous, while ids change where another level takes over. Costs 1.7
+/// (one patch) to 2.4 (32) times a penetration.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,

@@ -196,7 +196,8 @@ void add_penetration(py::module_& module) {
       py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("scale_gradients") = false,
       py::arg("measure") = "matched", py::arg("field") = "automatic", py::arg("pair_budget") = 0,
-      py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("threads") = 0, doc(kPairDoc).c_str());
+      py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("threads") = 0,
+      doc(kPairDoc).c_str());
   module.def(
       "penetration_of_pairs",
       [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
@@ -210,7 +211,8 @@ void add_penetration(py::module_& module) {
       py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("scale_gradients") = false,
       py::arg("measure") = "matched", py::arg("field") = "automatic", py::arg("pair_budget") = 0,
-      py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("threads") = 0, doc(kSceneDoc).c_str());
+      py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("threads") = 0,
+      doc(kSceneDoc).c_str());
 }
 
 }  // namespace ist::python

@@ -240,7 +240,8 @@ void add_separation(py::module_& module) {
                            {max_visits, inner_spheres}, threads);
       },
       py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
-      py::arg("scales") = py::none(), py::arg("max_visits") = 0, py::arg("inner_spheres") = false, py::arg("threads") = 0,
+      py::arg("scales") = py::none(), py::arg("max_visits") = 0, py::arg("inner_spheres") = false,
+      py::arg("threads") = 0,
       "separation() for pairs of solids of scenes, with the arguments of penetration_of_pairs().");
   module.def(
       "contact_patches",

@@ -20,8 +20,7 @@ void expect_patches(const PlacedTree& a, const PlacedTree& b, const PenetrationS
                     std::size_t most, Workspace& workspace) {
   const Penetration whole = penetration(a, b, settings, workspace);
   std::vector<ContactPatch> patches(most);
-  const ContactPatches found =
-      contact_patches(a, b, settings, workspace, patches);
+  const ContactPatches found = contact_patches(a, b, settings, workspace, patches);
   EXPECT_EQ(found.penetration.volume, whole.volume);
   EXPECT_EQ(found.penetration.volume_max, whole.volume_max);
   EXPECT_EQ(found.penetration.translation_gradient, whole.translation_gradient);

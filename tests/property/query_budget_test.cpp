@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "query/descent/answer.h"
 #include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
@@ -74,6 +75,24 @@ TEST_F(QueryBudget, VisitsAreKeptAndBoundsHold) {
     last_width = width;
     last_error = error;
   }
+}
+
+TEST(KeptWithin, AStoppedAnswerShrinksAsAWhole) {
+  Penetration answer;
+  answer.volume = 3;
+  answer.volume_min = 2;
+  answer.volume_max = 5;
+  answer.translation_gradient = {0, 0, 6};
+  answer.rotation_gradient = {3, 0, 0};
+  EXPECT_EQ(kept_within(1, answer).volume, 3);  // finished
+  answer.status = QueryStatus::budget_exhausted;
+  const Penetration kept = kept_within(1, answer);
+  EXPECT_EQ(kept.volume, 1);
+  EXPECT_EQ(kept.volume_min, 1);
+  EXPECT_EQ(kept.volume_max, 5);
+  EXPECT_DOUBLE_EQ(kept.translation_gradient.z(), 2);
+  EXPECT_DOUBLE_EQ(kept.rotation_gradient.x(), 1);
+  EXPECT_EQ(kept_within(4, answer).volume, 3);
 }
 
 TEST_F(QueryBudget, TheSmallestPairsAreLeft) {

@@ -147,8 +147,7 @@ class Chunk {
       case 2: {
         ContactPatch patches[8];
         const std::span<ContactPatch> room(patches, 1 + random_() % 8);
-        const ContactPatches answer =
-            contact_patches(a, b, settings, workspace, room);
+        const ContactPatches answer = contact_patches(a, b, settings, workspace, room);
         look_at(answer, room);
         bits_.add(answer.penetration), bits_.add(std::uint64_t{answer.count});
         break;

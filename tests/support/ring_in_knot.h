@@ -11,8 +11,8 @@
 #include "samples/samples.h"
 #include "support/nut_on_bolt.h"
 
-// A ring around the tube of a fixed torus knot, drawn by a spring: it bounces along the tube without
-// friction or damping. What a loop's limits do to energy shows here within seconds.
+// A ring around the tube of a fixed torus knot, drawn by a spring: it bounces along the tube
+// without friction or damping. What a loop's limits do to energy shows here within seconds.
 
 namespace ist::testing {
 
@@ -38,9 +38,9 @@ RingRun run_ring(double stiffness, double rate, double seconds, Ask ask) {
   MassProperties ring = mass_properties(ring_mesh(), 1);
   ring.inertia /= ring.mass;
   ring.mass = 1;
-  FreeBody body(ring, start,
-                Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(),
-                                                   Eigen::Vector3d(0, 2, -1)));
+  FreeBody body(
+      ring, start,
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), Eigen::Vector3d(0, 2, -1)));
   RingRun run;
   double kinetic = 0, first = 0;
   for (int tick = 0; tick < seconds * rate; ++tick) {

@@ -139,8 +139,7 @@ void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& w
   if (asked == "relative_error") settings.relative_error = 0.01;
   if (asked == "contact_patches") {
     ContactPatch patches[6];
-    const ContactPatches answer =
-        contact_patches(a, b, settings, workspace, patches);
+    const ContactPatches answer = contact_patches(a, b, settings, workspace, patches);
     bits.add(answer.penetration);
     for (std::size_t i = 0; i < answer.count; ++i) bits.add(patches[i]);
     return;

@@ -49,8 +49,8 @@ class DetailQueries {
     DetailPair unlike[2] = {pair, pair};
     unlike[0].b = unlike[1].a = pair.a < a_.detail_count ? pair.a + 1 : pair.a - 1;
     const bool mostly_unlike = coincidence.weight >= 0.5;
-    Penetration other = mix(descend(unlike[0], how, mostly_unlike ? most : nullptr),
-                            descend(unlike[1], how), 0.5);
+    Penetration other =
+        mix(descend(unlike[0], how, mostly_unlike ? most : nullptr), descend(unlike[1], how), 0.5);
     if (coincidence.weight == 1) return other;
     const Penetration alike = descend(pair, how, mostly_unlike ? nullptr : most);
     Penetration mixed = mix(alike, other, coincidence.weight);
@@ -154,8 +154,8 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
     const bool rough = coarse.volume_max - coarse.volume_min > kRough * coarse.volume;
     // Where lenses graze, to sum them again in double takes longer than a coarser level saves.
     how.keep_rounding = weights[0].weight < 1;
-    double slope = 0;                               // of the blend by the coarse estimate
-    double sure_slope = 0;                          // and by the quick look
+    double slope = 0;       // of the blend by the coarse estimate
+    double sure_slope = 0;  // and by the quick look
     const auto weight_of = [&](std::size_t i) {
       return sure.weight * (i == 0 ? 1 : 0) + (1 - sure.weight) * weights[i].weight;
     };
@@ -168,9 +168,8 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       if (weight == 0 && weights[i].slope == 0) continue;
       const LevelSum* const by = i == largest ? most : nullptr;
       const bool is_coarse = i + 1 == chain.size() && !rough && by == nullptr;
-      const Penetration part = is_coarse && queries.by_lenses_alone(chain[i])
-                                   ? coarse
-                                   : queries.ask(chain[i], how, by);
+      const Penetration part =
+          is_coarse && queries.by_lenses_alone(chain[i]) ? coarse : queries.ask(chain[i], how, by);
       result.volume += weight * part.volume;
       result.volume_min += weight * part.volume_min;
       result.volume_max += weight * part.volume_max;

@@ -23,7 +23,7 @@ class FieldDescent {
         probes_(probes),
         map_(pose.a_from_b),
         limits_(limits),
-                scratch_(scratch),
+        scratch_(scratch),
         budget_(limits.max_visits),
         tally_(probes, pose, bins) {}
 

@@ -57,7 +57,7 @@ SurfaceDescent::SurfaceDescent(const SurfaceTree& surface, const SphereTree& pro
       balls_(tree_of(surface, ball_header_)),
       precision_(precision_for(balls_, probes, pose)),
       limits_(limits),
-            scratch_(scratch),
+      scratch_(scratch),
       budget_(limits.max_visits),
       surface_level_(balls_.top),
       probe_level_(probes.top),

@@ -46,6 +46,6 @@ struct LeafStage {
 /// Adds the lenses of every sphere of a[i] with every sphere of b[i]. The scratch keeps blocks from
 /// call to call.
 void add_leaf_pairs(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
-                           const std::uint32_t* b, std::size_t n, LeafSums& sums) noexcept;
+                    const std::uint32_t* b, std::size_t n, LeafSums& sums) noexcept;
 
 }  // namespace ist

@@ -155,8 +155,8 @@ ist_status_t contact_patches(const ist_tree_t* a, const ist_field_t* field, cons
                                        &desk.penetration);
   } else {
     const ist_placed_tree_t first = placed(a, &desk.a);
-    status =
-        ist_contact_patches(&first, &second, &desk.settings, &desk.workspace, &found, &desk.penetration);
+    status = ist_contact_patches(&first, &second, &desk.settings, &desk.workspace, &found,
+                                 &desk.penetration);
   }
   desk.counts[0] = (uint32_t)found.count;
   return status;
