@@ -214,7 +214,7 @@ struct ContactPatch {
 struct ContactPatches {
   /// The whole contact, bit for bit the answer of penetration() under the same settings, except for
   /// copies of one asset at nearly the same pose without a pair budget: here they are not evaluated
-  /// as unlike levels.
+  /// as unlike levels. Under a pair budget its counts may be larger.
   Penetration penetration;
   std::size_t count = 0;  ///< patches written
 };
