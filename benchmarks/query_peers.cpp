@@ -329,39 +329,6 @@ void report_answers(Report& report, const std::string& key, const std::vector<Qu
   }
 }
 
-/// How long a penetration under a deadline takes, by the wall's clock, and what its answers keep.
-void report_deadlines(Report& report, const std::string& key, PairOfBodies& pair,
-                      const std::vector<OracleRow>& rows, int rounds) {
-  const auto ask = [&pair](const OracleRow& row, double deadline_us) {
-    return ist::penetration({pair.a.asset.view(), {}}, {pair.b.asset.view(), row.pose, row.scale_b},
-                            {.deadline_us = deadline_us}, pair.workspace);
-  };
-  std::size_t outside = 0;
-  for (const double deadline : {5.0, 10.0, 20.0, 40.0}) {
-    std::vector<double> us(rows.size(), std::numeric_limits<double>::infinity());
-    std::size_t stopped = 0, asked = 0;
-    for (int round = 0; round < rounds; ++round) {
-      for (std::size_t i = 0; i < rows.size(); ++i, ++asked) {
-        const double start = ist::benchmark::wall_seconds();
-        const ist::Penetration answer = ask(rows[i], deadline);
-        us[i] = std::min(us[i], 1e6 * (ist::benchmark::wall_seconds() - start));
-        stopped += answer.status == ist::QueryStatus::budget_exhausted;
-        const double finished = ask(rows[i], 0).volume;
-        // Both are bounds on one sum, whose own rounding is 1e-5 at most.
-        outside +=
-            finished < answer.volume_min * (1 - 1e-5) || finished > answer.volume_max * (1 + 1e-5);
-      }
-    }
-    report.row("Deadlines", {{"pair", key},
-                             {"deadline us", deadline},
-                             {"median us", quantile(us, 0.5)},
-                             {"p99 us", quantile(us, 0.99)},
-                             {"stopped %", 100.0 * double(stopped) / double(asked)}});
-  }
-  report.target(key + ": finished sums outside the bounds of answers that a deadline stopped",
-                double(outside), 0, true);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -391,7 +358,6 @@ int main(int argc, char** argv) {
     measure(queries, rows, report.quick() ? 2 : 9);
     report_times(report, key, queries, rows);
     report_answers(report, key, queries, rows);
-    report_deadlines(report, key, pair, rows, report.quick() ? 3 : 20);
   }
   return report.write();
 }

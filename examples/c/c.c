@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
     ist_placed_tree_t a = {.size = sizeof a, .tree = &tree_a, .pose = here};
     ist_placed_tree_t b = {.size = sizeof b, .tree = &tree_b, .pose = here};
     ist_placed_field_t ground = {.size = sizeof ground, .field = &floor, .pose = here};
-    ist_penetration_settings_t settings = {.size = sizeof settings, .deadline_us = 250};
+    ist_penetration_settings_t settings = {.size = sizeof settings, .pair_budget = 10000};
     ist_penetration_t overlap = {.size = sizeof overlap}, sunk = {.size = sizeof sunk};
     ist_separation_t gap = {.size = sizeof gap};
     b.pose.t[2] = 1.0 - 0.1 * step;

@@ -1,7 +1,7 @@
 // A haptic loop: a thousand times a second and more a hand moves a device, a proxy held to it by a
 // virtual coupling meets the object, and the device feels the coupling. Kept are how late the
 // answers come, force and torque, and whether the loop is passive. Links ist::query alone.
-#include <ist/query.h>
+#include <ist/deadline.h>
 #include <pthread.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -58,8 +58,8 @@ class Session {
         probe_(probe),
         scale_(options.scale),
         period_(1 / options.rate),
+        deadline_(options.deadline_us),
         proxy_({probe, {}, options.scale}, coupling_hz, options.contact_hz) {
-    settings_.penetration.deadline_us = settings_.separation.deadline_us = options.deadline_us;
     // A stroke begins where it touches: the first answers also bring memory and caches up.
     for (int i = 0; i < 100; ++i) {
       proxy_.place(motion_.at(0));
@@ -72,8 +72,13 @@ class Session {
   /// The query alone: what a loop waits for.
   ist::PenetrationAndSeparation ask() {
     const ist::PlacedTree a{object_, {}}, b{probe_, pose_of(proxy_.pose()), scale_};
-    if (motion_.feels()) return ist::query(a, b, settings_, scratch_);
-    return {ist::penetration(a, b, settings_.penetration, scratch_), {}};
+    ist::PenetrationSettings settings;
+    deadline_.limit(settings);
+    const double start = now_us();
+    ist::PenetrationAndSeparation answer{ist::penetration(a, b, settings, scratch_), {}};
+    deadline_.record(answer.penetration, now_us() - start);
+    if (motion_.feels()) answer.separation = ist::separation(a, b, {}, scratch_);
+    return answer;
   }
 
   Felt step(const ist::PenetrationAndSeparation& contact) {
@@ -90,12 +95,13 @@ class Session {
   const HandPose& hand() const { return hand_; }
   const Proxy& proxy() const { return proxy_; }
   const Passivity& passivity() const { return passivity_; }
+  bool too_slow() const { return deadline_.too_slow(); }
 
  private:
   Motion motion_;
   ist::TreeView object_, probe_;
   double scale_, period_, time_ = 0;
-  ist::QuerySettings settings_;
+  ist::Deadline deadline_;
   ist::Workspace scratch_;
   Proxy proxy_;
   HandPose hand_;
@@ -185,7 +191,7 @@ int main(int argc, char** argv) {
   prctl(PR_SET_TIMERSLACK, 1UL);  // else the system wakes what has no priority 50 µs late
 
   Missed missed;
-  std::size_t made = 0, skipped = 0, touching = 0, cut_short = 0;
+  std::size_t made = 0, skipped = 0, touching = 0, too_slow = 0;
   double largest_force = 0, largest_torque = 0;
   double due = now_us() + period;
   for (; made + skipped < ticks; ++made) {
@@ -208,7 +214,7 @@ int main(int argc, char** argv) {
     ticked.push_back(done - woken);
     late.push_back(done - due);
     if (contact.penetration.volume > 0) ++touching;
-    if (contact.penetration.status != ist::QueryStatus::ok) ++cut_short;
+    if (session.too_slow()) ++too_slow;
     largest_force = std::max(largest_force, felt.force.norm());
     largest_torque = std::max(largest_torque, felt.torque.norm());
     if (options.trace != nullptr)
@@ -243,8 +249,8 @@ int main(int argc, char** argv) {
   std::printf(
       "missed deadlines: %zu, of them %zu by the tick's own work, %zu by an overslept timer, %zu "
       "interrupted;\n"
-      "ticks skipped after them: %zu, answers cut short: %zu\n",
-      missed.all(), missed.work, missed.timer, missed.interrupted, skipped, cut_short);
+      "ticks skipped after them: %zu, ticks whose deadline no budget keeps: %zu\n",
+      missed.all(), missed.work, missed.timer, missed.interrupted, skipped, too_slow);
   std::printf("%s: the hand got %.3g more than it had put in, of %.3g stored at most\n",
               passivity.kept() ? "passive" : "not passive", passivity.deficit, passivity.peak);
   if (options.trace != nullptr && !write_trace(options.trace, rows)) return 1;
@@ -255,10 +261,10 @@ int main(int argc, char** argv) {
                "{\"ticks\": %zu, \"rate_hz\": %g, \"load_threads\": %d, \"fifo\": %s,\n"
                " \"object_spheres\": %zu, \"probe_spheres\": %zu, \"in_contact\": %zu,\n"
                " \"missed\": %zu, \"missed_by_work\": %zu, \"missed_by_timer\": %zu,\n"
-               " \"interrupted\": %zu, \"skipped\": %zu, \"cut_short\": %zu",
+               " \"interrupted\": %zu, \"skipped\": %zu, \"too_slow\": %zu",
                made, options.rate, options.load, fifo ? "true" : "false", object.sphere_count(),
                probe.sphere_count(), touching, missed.all(), missed.work, missed.timer,
-               missed.interrupted, skipped, cut_short);
+               missed.interrupted, skipped, too_slow);
   std::fprintf(file,
                ",\n \"coupling_hz\": %g, \"stiffness\": %g, \"turning_stiffness\": %g,\n"
                " \"largest_force\": %g, \"largest_torque\": %g,\n"

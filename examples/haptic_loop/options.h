@@ -8,7 +8,7 @@
 inline constexpr const char* kUsage =
     "usage: haptic_loop OBJECT.ist PROBE.ist [--scale S]   of the probe (1)\n"
     "                   [--seconds T] [--rate HZ]          how long (60), how often (1000)\n"
-    "                   [--deadline-us D]                  cut queries short (0: never)\n"
+    "                   [--deadline-us D]                  time of a query (0: no limit)\n"
     "                   [--load N]                         threads that burden the machine (0)\n"
     "                   [--fifo]                           real-time priority, if permitted\n"
     "                   [--motion stroke|insert|FILE.csv]  the hand's (stroke)\n"

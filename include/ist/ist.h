@@ -368,29 +368,18 @@ typedef struct ist_penetration_settings {
   ist_field_use_t field;
   uint32_t pair_budget;  /* count of sphere pairs to spend; 0: no limit, as in all that follow */
   uint32_t max_visits;   /* count of node pairs opened */
-  double deadline_us;    /* [µs] wall clock from the call */
+  uint32_t reserved;     /* 0 */
   double relative_error; /* stop once (volume_max − volume_min) ≤ this · volume_max */
-  double min_radius;     /* [u] nodes smaller than this are not opened */
 } ist_penetration_settings_t;
 
 /* ContactSettings */
-typedef struct ist_contact_settings {
-  uint32_t size;
-  ist_measure_t measure;
-  ist_field_use_t field;
-  uint32_t max_visits;
-  double deadline_us;
-  double relative_error;
-  double min_radius;
-} ist_contact_settings_t;
+typedef ist_penetration_settings_t ist_contact_settings_t;
 
 /* SeparationSettings */
 typedef struct ist_separation_settings {
   uint32_t size;
   uint32_t max_visits;
-  double deadline_us;
   uint32_t inner_spheres; /* not 0: uses these even if both assets keep a mesh */
-  uint32_t reserved;      /* 0 */
 } ist_separation_settings_t;
 
 /* --- Answers ---------------------------------------------------------------------------------- */
@@ -473,6 +462,26 @@ ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_pl
 ist_status_t ist_separation(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
                             const ist_separation_settings_t* settings, ist_workspace_t* workspace,
                             ist_separation_t* answer);
+
+/* Deadline (deadline.h): the pair budget that keeps the queries of one pair of bodies within a
+ * time. No query reads a clock: the loop measures them. May be copied; all zero: no deadline. */
+typedef struct ist_deadline {
+  double opaque[8];
+} ist_deadline_t;
+
+/* [µs] 0, a negative value or NaN: no deadline, and no pair budget. */
+ist_status_t ist_deadline_make(double microseconds, ist_deadline_t* deadline);
+
+/* Sets the pair budget of the next query; IST_FIELD_AUTOMATIC becomes IST_FIELD_NEVER. */
+ist_status_t ist_deadline_limit(const ist_deadline_t* deadline,
+                                ist_penetration_settings_t* settings);
+
+/* What a query under this budget answered, and how long it took. */
+ist_status_t ist_deadline_record(ist_deadline_t* deadline, const ist_penetration_t* answer,
+                                 double microseconds);
+
+/* Not 0: the coarsest levels of detail take longer than the deadline. */
+int32_t ist_deadline_too_slow(const ist_deadline_t* deadline);
 
 /* Whether two placed solids share a point (overlap.h). Yes and no are certain. */
 typedef int32_t ist_overlapping_t;
@@ -704,7 +713,6 @@ typedef struct ist_impact_settings {
   double duration;     /* [T] > 0: the interval is [0, duration] */
   double tolerance;    /* [u] 0: a thousandth of the smaller solid's bounding radius, or ten
                           times the error of the fields if that is more */
-  double deadline_us;  /* [µs] 0: none */
 } ist_impact_settings_t;
 
 /* TimeOfImpact */

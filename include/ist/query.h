@@ -13,11 +13,14 @@
 
 namespace IST_API ist {
 
-/// Limits of a penetration. Zero, a negative value or NaN means no limit; with none set the answer
-/// is the finished sum.
+/// Limits of a penetration and of contact patches. Zero, a negative value or NaN means no limit;
+/// with none set the answer is the finished sum.
 ///
-/// A penetration that is stopped estimates the rest and returns budget_exhausted. Under a deadline
-/// it extrapolates from what it summed, else it uses the densities of the unopened nodes.
+/// No query reads a clock: poses and settings decide the answer. <ist/deadline.h> chooses a pair
+/// budget from measured times.
+///
+/// A query that is stopped estimates the rest by the densities of the unopened nodes, returns
+/// budget_exhausted and no more than the volume of the smaller solid's spheres.
 ///
 /// Measure::exact obeys max_visits only. If that stops it, the answer is that of the matched
 /// spheres (NaN where an asset has none) with budget_exhausted, and the true volume is bounded by 0
@@ -26,7 +29,8 @@ struct PenetrationSettings {
   Measure measure = Measure::matched;
   FieldUse field = FieldUse::automatic;  ///< matched measure only
 
-  /// Count of sphere pairs to spend; matched measure only (the inner one has no levels of detail).
+  /// Count of sphere pairs to spend; two trees in the matched measure only (the inner one has no
+  /// levels of detail).
   ///
   /// The answer comes from the finest level of detail that is expected to need no more. From 0.7 of
   /// the budget on it is blended with the next coarser level: volume and force stay continuous, and
@@ -34,39 +38,18 @@ struct PenetrationSettings {
   /// target, not a bound: the coarsest level is the minimum, whatever it costs.
   std::uint32_t pair_budget = 0;
 
-  /// Count of node pairs opened. Pairs of trees are opened largest bounds first, trees against a
-  /// surface in the order of the tree.
+  /// Count of node pairs opened: a hard limit, whatever becomes of the answer. Pairs of trees are
+  /// opened largest bounds first, trees against a surface in the order of the tree.
   std::uint32_t max_visits = 0;
 
-  /// [µs] wall clock from the call, kept to a few µs while the system lets the thread run; time
-  /// that the system takes is not counted.
-  ///
-  /// For two trees a fixed 1/16-stratified sample of leaf pairs, the same at every pose, is summed
-  /// until time runs out and extrapolated. Volume and force then change smoothly with the pose, and
-  /// a loop gains little energy where six or more strata are summed. If not even one can be summed,
-  /// or a surface is met, visits end at 0.6 to 0.75 of the time and the rest is estimated.
-  double deadline_us = 0;
-
   double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
-  double min_radius = 0;      ///< [u] nodes smaller than this are not opened
 };
 
-/// Limits of contact patches, each as in PenetrationSettings.
-struct ContactSettings {
-  Measure measure = Measure::matched;
-  FieldUse field = FieldUse::automatic;  ///< matched measure only
-  std::uint32_t max_visits = 0;  ///< count of node pairs opened; the largest bounds go first
-  /// [µs] wall clock from the call, as in PenetrationSettings. Where nothing can be extrapolated,
-  /// the rest is estimated when visits end, at 0.1 µs per pair.
-  double deadline_us = 0;
-  double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
-  double min_radius = 0;      ///< [u] nodes smaller than this are not opened
-};
+using ContactSettings = PenetrationSettings;
 
 /// Limits of a separation. Zero, a negative value or NaN means no limit.
 struct SeparationSettings {
   std::uint32_t max_visits = 0;  ///< count of node pairs opened, the nearest first
-  double deadline_us = 0;        ///< [µs] wall clock from the call; visits end at 0.95 of it
   bool inner_spheres = false;    ///< uses these even if both assets keep a mesh
 };
 
@@ -229,8 +212,9 @@ struct ContactPatch {
 };
 
 struct ContactPatches {
-  /// The whole contact, bit for bit the answer of penetration() without a pair budget, except for
-  /// copies of one asset at nearly the same pose: here they are not evaluated as unlike levels.
+  /// The whole contact, bit for bit the answer of penetration() under the same settings, except for
+  /// copies of one asset at nearly the same pose without a pair budget: here they are not evaluated
+  /// as unlike levels. Under a pair budget its counts may be larger.
   Penetration penetration;
   std::size_t count = 0;  ///< patches written
 };
@@ -241,7 +225,10 @@ struct ContactPatches {
 /// the connected parts of the overlap, each with its true volume; if there are more than fit, the
 /// smallest join the nearest ones. By spheres the contact is divided along the tree of the smaller
 /// solid (B's if equal or if A is too coarse), always at the same places. The estimate of a stopped
-/// query is divided too. Costs 1.7 (one patch) to 2.4 (32) times a penetration.
+/// query is divided too. Under a pair budget the patches are those of the level of detail that
+/// answers for most of the volume, and what the blend with other levels adds is spread over them by
+/// volume: their sum stays continuous, while ids change where another level takes over. Costs 1.7
+/// (one patch) to 2.4 (32) times a penetration.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,

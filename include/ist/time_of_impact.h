@@ -72,7 +72,6 @@ struct ImpactSettings {
   double tolerance = 0;
 
   std::uint32_t max_visits = 0;  ///< count of node pairs visited, the earliest first; 0: no limit
-  double deadline_us = 0;        ///< [µs] wall clock from the call; 0, negative or NaN: none
 };
 
 struct TimeOfImpact {

@@ -10,6 +10,7 @@
 #include "query/contact/write_patches.h"
 #include "query/descent/descent.h"
 #include "query/descent/workspace.h"
+#include "query/detail/detail_blend.h"
 #include "query/exact_penetration.h"
 #include "query/field/pair_overlap.h"
 
@@ -29,54 +30,52 @@ bool divides_b(const SphereTree& a, double radius_a, const SphereTree& b, double
 /// Contact patches of two trees, by the method that penetration() takes.
 class PairPatches {
  public:
-  PairPatches(const PlacedTree& a, const PlacedTree& b, const ContactSettings& settings,
-              const RelativePose& pose, Workspace::Impl& scratch)
+  PairPatches(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
+              const TreeHeader& tree_b, const RelativePose& pose, FieldUse use,
+              Workspace::Impl& scratch)
       : a_(a),
         b_(b),
         pose_(pose),
-        limits_(limits_of(settings)),
         scratch_(scratch),
-        tree_a_(sphere_tree(a.tree, settings.measure)),
-        tree_b_(sphere_tree(b.tree, settings.measure)),
-        both_(a, *tree_a_.header, b, *tree_b_.header, pose, scratch),
-        method_(
-            pair_method(a, *tree_a_.header, b, *tree_b_.header, pose,
-                        settings.measure == Measure::inner ? FieldUse::never : settings.field)) {}
+        tree_a_(a.tree.header(), tree_a),
+        tree_b_(b.tree.header(), tree_b),
+        both_(a, tree_a, b, tree_b, pose, scratch),
+        method_(pair_method(a, tree_a, b, tree_b, pose, use)) {}
 
-  ContactPatches run(std::span<ContactPatch> patches) {
-    ContactPatches result;
+  /// The whole contact, sorted into the workspace's bins.
+  Penetration sum(const DescentLimits& limits) {
     ContactBins& bins = scratch_.contact;
     if (!method_.lenses) {
       start_probed();
-      result.penetration = both_.exact(method_.b_probes, limits_, &bins);
-      result.count = write_probed(result.penetration, patches);
-      return result;
+      return whole_ = both_.exact(method_.b_probes, limits, &bins);
     }
-    const Stopwatch time(limits_);
-    const double radius_a = tree_a_.header->root[3];
-    const double radius_b = tree_b_.header->root[3] * pose_.a_from_b.scale;
-    const bool of_b = divides_b(tree_a_, radius_a, tree_b_, radius_b);
-    bins.start(of_b ? tree_b_ : tree_a_, of_b);
-    Descent descent(tree_a_, tree_b_, pose_, limits_, scratch_, &bins);
+    of_b_ = divides_b(tree_a_, tree_a_.header->root[3], tree_b_,
+                      tree_b_.header->root[3] * pose_.a_from_b.scale);
+    bins.start(of_b_ ? tree_b_ : tree_a_, of_b_);
+    Descent descent(tree_a_, tree_b_, pose_, limits, scratch_, &bins);
     descent.run();
-    const std::uint32_t filled = bins.collect(descent.precision());
+    filled_ = bins.collect(descent.precision());
     const Penetration lenses = descent.penetration();
     const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
     const ExactWeight weight = exact_weight(method_, lenses, unit3);
-    const std::optional<DescentLimits> left = PairOverlap::left_by(lenses, limits_, time);
+    const std::optional<DescentLimits> left = PairOverlap::left_by(lenses, limits);
     // The patches are those of the larger part.
-    if (left && weight.weight >= 0.5) {
-      start_probed();
-      result.penetration = both_.with_exact(method_, lenses, weight, *left, &bins);
-      result.count = write_probed(result.penetration, patches);
-      return result;
-    }
-    result.penetration = weight.most == 0 ? lenses
-                         : left           ? both_.with_exact(method_, lenses, weight, *left)
-                                          : both_.without_exact(method_, lenses);
-    result.count = write_patches({bins, filled, pose_, of_b ? radius_b : radius_a},
-                                 result.penetration, patches);
-    return result;
+    probed_ = left && weight.weight >= 0.5;
+    if (probed_) start_probed();
+    whole_ = weight.most == 0 ? lenses
+             : left ? both_.with_exact(method_, lenses, weight, *left, probed_ ? &bins : nullptr)
+                    : both_.without_exact(method_, lenses);
+    return whole_;
+  }
+
+  const Penetration& whole() const { return whole_; }
+
+  /// The patches of what was summed, which add up to it.
+  std::size_t write(std::span<ContactPatch> patches) {
+    if (!method_.lenses || probed_) return write_probed(patches);
+    const double radius =
+        of_b_ ? tree_b_.header->root[3] * pose_.a_from_b.scale : tree_a_.header->root[3];
+    return write_patches({scratch_.contact, filled_, pose_, radius}, whole_, patches);
   }
 
   double deepest() const {
@@ -89,18 +88,18 @@ class PairPatches {
   void start_probed() { scratch_.contact.start(method_.b_probes ? tree_b_ : tree_a_, true); }
 
   /// The patches of the spheres that probed.
-  std::size_t write_probed(const Penetration& whole, std::span<ContactPatch> patches) {
+  std::size_t write_probed(std::span<ContactPatch> patches) {
     const std::uint32_t filled = scratch_.contact.collect(Precision::float64);
     if (method_.b_probes)
       return write_patches(
-          {scratch_.contact, filled, pose_, tree_b_.header->root[3] * pose_.a_from_b.scale}, whole,
+          {scratch_.contact, filled, pose_, tree_b_.header->root[3] * pose_.a_from_b.scale}, whole_,
           patches);
     // A's spheres probe B: the patches come as pushes on A.
     const std::optional<RelativePose> turned = relative_pose(b_, a_);
     if (!turned) return 0;
     const std::size_t count = write_patches(
         {scratch_.contact, filled, *turned, tree_a_.header->root[3] * turned->a_from_b.scale},
-        turned_over(whole, b_, a_), patches);
+        turned_over(whole_, b_, a_), patches);
     Eigen::Vector3d between;
     for (int k = 0; k < 3; ++k) between[k] = a_.pose.t[k] - b_.pose.t[k];
     for (ContactPatch& patch : patches.first(count)) {
@@ -113,11 +112,38 @@ class PairPatches {
   const PlacedTree& a_;
   const PlacedTree& b_;
   const RelativePose& pose_;
-  const DescentLimits limits_;
   Workspace::Impl& scratch_;
   const SphereTree tree_a_, tree_b_;
   PairOverlap both_;
   const PairMethod method_;
+  Penetration whole_;
+  std::uint32_t filled_ = 0;
+  bool of_b_ = false;
+  bool probed_ = false;  ///< the bins are those of the spheres that probed
+};
+
+/// The patches of the level of detail that blend_details() chooses, or of the finest.
+struct ChosenLevel {
+  const PlacedTree& a;
+  const PlacedTree& b;
+  const RelativePose& pose;
+  bool inner;
+  FieldUse use;
+  Workspace::Impl& scratch;
+  std::optional<PairPatches> patches;
+
+  const TreeHeader& tree_of(const PlacedTree& placed, std::uint32_t detail) const noexcept {
+    const AssetHeader& header = placed.tree.header();
+    return inner ? header.inner_tree : matched_tree(header, detail);
+  }
+
+  static Penetration sum(void* context, const DetailPair& pair,
+                         const DescentLimits& limits) noexcept {
+    ChosenLevel& self = *static_cast<ChosenLevel*>(context);
+    self.patches.emplace(self.a, self.tree_of(self.a, pair.a), self.b, self.tree_of(self.b, pair.b),
+                         self.pose, self.inner ? FieldUse::never : self.use, self.scratch);
+    return self.patches->sum(limits);
+  }
 };
 
 }  // namespace
@@ -134,9 +160,17 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
     refused.penetration.status = QueryStatus::invalid_input;
     return refused;
   }
-  PairPatches both(a, b, settings, *pose, *workspace.impl());
-  const ContactPatches result = both.run(patches);
-  finish_patches(patches.first(result.count), both.deepest());
+  ContactPatches result;
+  const bool inner = settings.measure == Measure::inner;
+  ChosenLevel chosen{a, b, *pose, inner, settings.field, *workspace.impl(), std::nullopt};
+  const LevelSum by{ChosenLevel::sum, &chosen};
+  const bool blends = !inner && settings.pair_budget > 0;
+  result.penetration = blends ? blend_details(a, b, *pose, settings, workspace, &by)
+                              : by.sum(by.context, DetailPair(), limits_of(settings));
+  if (!chosen.patches) return result;
+  result.count = chosen.patches->write(patches);
+  if (blends) spread(chosen.patches->whole(), result.penetration, patches.first(result.count));
+  finish_patches(patches.first(result.count), chosen.patches->deepest());
   return result;
 }
 

@@ -19,9 +19,6 @@
 namespace ist {
 namespace {
 
-// Part of a deadline for visits. Nothing is estimated afterwards; the rest is for the witness.
-constexpr double kForVisits = 0.95;
-
 // Of a larger B the fourth powers of lengths would overflow: A is moved into its frame instead.
 constexpr double kLargestScale = 1e30;
 
@@ -38,7 +35,7 @@ class GapDescent {
         scale_(pose.a_from_b.scale),
         precision_(precision_for_gap(a, b, pose)),
         stack_(scratch.waiting.get()),
-        budget_(limits_of(settings), kForVisits) {}
+        budget_(visit_limit(settings.max_visits)) {}
 
   void run() {
     measure(a_.sphere(0, 0), b_.sphere(0, 0));
@@ -172,7 +169,7 @@ class GapDescent {
 Separation surface_separation(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
                               const SeparationSettings& settings, ExactScratch& scratch) noexcept {
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
-  Budget budget(limits_of(settings), kForVisits);
+  Budget budget(visit_limit(settings.max_visits));
   const MeshGap found = mesh_gap(mesh_a, mesh_b, pose.a_from_b, pose.b_from_a, budget, scratch);
   Separation result;
   result.node_visits = budget.visits();

@@ -420,24 +420,22 @@ def penetration(
     a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None,
     scale_gradients: bool = False, measure: _Measure = "matched", field: _FieldUse = "automatic",
-    pair_budget: int = 0, max_visits: int = 0, deadline_us: float = 0.0,
-    relative_error: float = 0.0, min_radius: float = 0.0, threads: int = 0,
+    pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, threads: int = 0,
 ) -> Penetration: ...
 def penetration_of_pairs(
     solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *,
     scales: ArrayLike | None = None, scale_gradients: bool = False, measure: _Measure = "matched",
     field: _FieldUse = "automatic", pair_budget: int = 0, max_visits: int = 0,
-    deadline_us: float = 0.0, relative_error: float = 0.0, min_radius: float = 0.0,
-    threads: int = 0,
+    relative_error: float = 0.0, threads: int = 0,
 ) -> Penetration: ...
 def separation(
     a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, max_visits: int = 0,
-    deadline_us: float = 0.0, inner_spheres: bool = False, threads: int = 0,
+    inner_spheres: bool = False, threads: int = 0,
 ) -> Separation: ...
 def separation_of_pairs(
     solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *,
-    scales: ArrayLike | None = None, max_visits: int = 0, deadline_us: float = 0.0,
+    scales: ArrayLike | None = None, max_visits: int = 0,
     inner_spheres: bool = False, threads: int = 0,
 ) -> Separation: ...
 def raycast(
@@ -454,8 +452,8 @@ def contact_patches(
     a: Asset | Field, b: Asset, poses: ArrayLike, *, max_patches: int = 8,
     scales: ArrayLike | None = None, poses_a: ArrayLike | None = None,
     scales_a: ArrayLike | None = None, measure: _Measure = "matched",
-    field: _FieldUse = "automatic", max_visits: int = 0, deadline_us: float = 0.0,
-    relative_error: float = 0.0, min_radius: float = 0.0, threads: int = 0,
+    field: _FieldUse = "automatic", pair_budget: int = 0, max_visits: int = 0,
+    relative_error: float = 0.0, threads: int = 0,
 ) -> ContactPatches: ...
 def overlap_outline(
     a: Asset, b: Asset, poses: ArrayLike, *, max_patches: int = 8,
@@ -475,6 +473,5 @@ def time_of_impact(
     about: ArrayLike = (0.0, 0.0, 0.0), scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, poses_a_to: ArrayLike | None = None,
     about_a: ArrayLike = (0.0, 0.0, 0.0), scales_a: ArrayLike | None = None,
-    duration: float = 1.0, tolerance: float = 0.0, max_visits: int = 0, deadline_us: float = 0.0,
-    threads: int = 0,
+    duration: float = 1.0, tolerance: float = 0.0, max_visits: int = 0, threads: int = 0,
 ) -> TimeOfImpact: ...

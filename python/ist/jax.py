@@ -26,7 +26,7 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: jax.Array, *, pair
         Field with each Asset.
     scales: (k,) or (w, k) > 0; None: 1. Their gradient is the difference of two queries, exact to some
         1e-4, and takes three times as long.
-    settings: measure, field, pair_budget, min_radius, threads, … of ist.penetration.
+    settings: measure, field, pair_budget, threads, … of ist.penetration.
 
     Returns an array (n,) or (w, n) of the dtype of `poses`. Pairs of an invalid pose or scale are NaN,
     and so are their gradients; so are pairs of a solid that does not hold what the measure asks.

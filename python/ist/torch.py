@@ -29,7 +29,7 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: torch.Tensor, *, p
     scales: (k,) or (w, k) > 0, where the poses are; None: 1. Their gradient is the difference of two
         queries, 0.05 % of the scale to either side, exact to some 1e-4, and takes three times as
         long.
-    settings: measure, field, pair_budget, min_radius, threads, … of ist.penetration. Limits that
+    settings: measure, field, pair_budget, threads, … of ist.penetration. Limits that
         stop a query leave its gradient without the part that was guessed. By measure="exact" volumes
         and gradients are the true ones. On a GPU there are measure ("matched", "inner") and
         pair_budget, and volumes of two Assets are by lenses: those of field="never" on the CPU.

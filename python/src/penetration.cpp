@@ -80,15 +80,9 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
 
 PenetrationSettings penetration_settings(const std::string& measure, const std::string& field,
                                          std::uint32_t pair_budget, std::uint32_t max_visits,
-                                         double deadline_us, double relative_error,
-                                         double min_radius) {
-  return {named(measure, "measure", kMeasures),
-          named(field, "field", kFieldUses),
-          pair_budget,
-          max_visits,
-          deadline_us,
-          relative_error,
-          min_radius};
+                                         double relative_error) {
+  return {named(measure, "measure", kMeasures), named(field, "field", kFieldUses), pair_budget,
+          max_visits, relative_error};
 }
 
 constexpr const char* kPairDoc =
@@ -110,8 +104,7 @@ measure: 'matched' (the accurate spheres), 'inner' (certified lower bound of the
     'exact' (the true volume and its gradients: of two Assets that hold their mesh, which bake()
     keeps by default; it heeds max_visits alone).
 field: 'automatic', 'never' or 'always': whether an asset's surface is used. No effect with 'exact'.
-pair_budget, max_visits, deadline_us [µs], relative_error, min_radius [u]: cost limits; 0: no
-    limit. See <ist/query.h>.
+pair_budget, max_visits, relative_error: cost limits; 0: no limit. See <ist/query.h>.
 threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 
 Invalid rows (NaN, a quaternion off unit length by more than 1e-3, a scale ≤ 0) are all zero, with
@@ -193,35 +186,33 @@ void add_penetration(py::module_& module) {
       [](const py::object& a, const py::object& b, const py::object& poses,
          const py::object& scales, const py::object& poses_a, const py::object& scales_a,
          bool scale_gradients, const std::string& measure, const std::string& field,
-         std::uint32_t pair_budget, std::uint32_t max_visits, double deadline_us,
-         double relative_error, double min_radius, unsigned threads) {
+         std::uint32_t pair_budget, std::uint32_t max_visits, double relative_error,
+         unsigned threads) {
         return answer(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
-                      penetration_settings(measure, field, pair_budget, max_visits, deadline_us,
-                                           relative_error, min_radius),
+                      penetration_settings(measure, field, pair_budget, max_visits, relative_error),
                       scale_gradients, threads);
       },
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("scale_gradients") = false,
       py::arg("measure") = "matched", py::arg("field") = "automatic", py::arg("pair_budget") = 0,
-      py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0, py::arg("relative_error") = 0.0,
-      py::arg("min_radius") = 0.0, py::arg("threads") = 0, doc(kPairDoc).c_str());
+      py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("threads") = 0,
+      doc(kPairDoc).c_str());
   module.def(
       "penetration_of_pairs",
       [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
          const py::object& scales, bool scale_gradients, const std::string& measure,
          const std::string& field, std::uint32_t pair_budget, std::uint32_t max_visits,
-         double deadline_us, double relative_error, double min_radius, unsigned threads) {
+         double relative_error, unsigned threads) {
         return answer(Rows::of_scene(solids, poses, pairs, scales),
-                      penetration_settings(measure, field, pair_budget, max_visits, deadline_us,
-                                           relative_error, min_radius),
+                      penetration_settings(measure, field, pair_budget, max_visits, relative_error),
                       scale_gradients, threads);
       },
       py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("scale_gradients") = false,
       py::arg("measure") = "matched", py::arg("field") = "automatic", py::arg("pair_budget") = 0,
-      py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0, py::arg("relative_error") = 0.0,
-      py::arg("min_radius") = 0.0, py::arg("threads") = 0, doc(kSceneDoc).c_str());
+      py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("threads") = 0,
+      doc(kSceneDoc).c_str());
 }
 
 }  // namespace ist::python

@@ -145,8 +145,7 @@ constexpr const char* kSeparationDoc =
     R"(Distance, nearest points, and a certified interval for the solids.
 
 If both assets keep a mesh, the distance of their surfaces. Otherwise, or with inner_spheres=True,
-that of their inner spheres. Arguments as for penetration(). max_visits, deadline_us [µs]: 0: no
-limit.
+that of their inner spheres. Arguments as for penetration(). max_visits: 0: no limit.
 
 Returns a Separation: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
 
@@ -225,43 +224,41 @@ void add_separation(py::module_& module) {
       "separation",
       [](const py::object& a, const py::object& b, const py::object& poses,
          const py::object& scales, const py::object& poses_a, const py::object& scales_a,
-         std::uint32_t max_visits, double deadline_us, bool inner_spheres, unsigned threads) {
+         std::uint32_t max_visits, bool inner_spheres, unsigned threads) {
         return separations(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
-                           {max_visits, deadline_us, inner_spheres}, threads);
+                           {max_visits, inner_spheres}, threads);
       },
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
-      py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
-      py::arg("inner_spheres") = false, py::arg("threads") = 0, kSeparationDoc);
+      py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, py::arg("inner_spheres") = false,
+      py::arg("threads") = 0, kSeparationDoc);
   module.def(
       "separation_of_pairs",
       [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
-         const py::object& scales, std::uint32_t max_visits, double deadline_us, bool inner_spheres,
-         unsigned threads) {
+         const py::object& scales, std::uint32_t max_visits, bool inner_spheres, unsigned threads) {
         return separations(Rows::of_scene(solids, poses, pairs, scales),
-                           {max_visits, deadline_us, inner_spheres}, threads);
+                           {max_visits, inner_spheres}, threads);
       },
       py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
-      py::arg("scales") = py::none(), py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
-      py::arg("inner_spheres") = false, py::arg("threads") = 0,
+      py::arg("scales") = py::none(), py::arg("max_visits") = 0, py::arg("inner_spheres") = false,
+      py::arg("threads") = 0,
       "separation() for pairs of solids of scenes, with the arguments of penetration_of_pairs().");
   module.def(
       "contact_patches",
       [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
          const py::object& scales, const py::object& poses_a, const py::object& scales_a,
-         const std::string& measure, const std::string& field, std::uint32_t max_visits,
-         double deadline_us, double relative_error, double min_radius, unsigned threads) {
+         const std::string& measure, const std::string& field, std::uint32_t pair_budget,
+         std::uint32_t max_visits, double relative_error, unsigned threads) {
         return patches(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), max_patches,
                        {named(measure, "measure", kMeasures), named(field, "field", kFieldUses),
-                        max_visits, deadline_us, relative_error, min_radius},
+                        pair_budget, max_visits, relative_error},
                        threads);
       },
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
       py::arg("max_patches") = 8, py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("measure") = "matched",
-      py::arg("field") = "automatic", py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0,
-      py::arg("relative_error") = 0.0, py::arg("min_radius") = 0.0, py::arg("threads") = 0,
-      kPatchesDoc);
+      py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
+      py::arg("relative_error") = 0.0, py::arg("threads") = 0, kPatchesDoc);
   module.def(
       "overlap_outline",
       [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,

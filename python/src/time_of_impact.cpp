@@ -30,7 +30,7 @@ poses, poses_to: (7,) or (n, 7), as for penetration().
 about, about_a: (3,) [u] in the object's own frame, before its scale: its centre of mass for a free
     body.
 duration: [T] > 0. tolerance: [u]; 0: a thousandth of the smaller solid.
-max_visits, deadline_us [µs]: 0: no limit.
+max_visits: 0: no limit.
 
 Returns a TimeOfImpact: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
 
@@ -57,8 +57,8 @@ void add_time_of_impact(py::module_& module) {
          const py::object& poses_to, const py::object& about, const py::object& scales,
          const py::object& poses_a, const py::object& poses_a_to, const py::object& about_a,
          const py::object& scales_a, double duration, double tolerance, std::uint32_t max_visits,
-         double deadline_us, unsigned threads) {
-        const ImpactSettings settings{duration, tolerance, max_visits, deadline_us};
+         unsigned threads) {
+        const ImpactSettings settings{duration, tolerance, max_visits};
         const Rows from = Rows::of_pair(a, b, poses, scales, poses_a, scales_a);
         const Rows to = Rows::of_pair(a, b, poses_to, scales,
                                       poses_a_to.is_none() ? poses_a : poses_a_to, scales_a);
@@ -85,7 +85,7 @@ void add_time_of_impact(py::module_& module) {
       py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("poses_a_to") = py::none(), py::arg("about_a") = py::make_tuple(0.0, 0.0, 0.0),
       py::arg("scales_a") = py::none(), py::arg("duration") = 1.0, py::arg("tolerance") = 0.0,
-      py::arg("max_visits") = 0, py::arg("deadline_us") = 0.0, py::arg("threads") = 0, kDoc);
+      py::arg("max_visits") = 0, py::arg("threads") = 0, kDoc);
 }
 
 }  // namespace ist::python

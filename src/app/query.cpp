@@ -29,7 +29,6 @@ struct QueryOptions {
   bool scale_b_given = false;
   QuerySettings settings;
   std::uint32_t max_visits = 0;
-  double deadline_us = 0;
   std::size_t repeat = 1;
   bool json = false, csv = false;
 };
@@ -129,8 +128,6 @@ void check_settings(const QueryOptions& options) {
     if (exact ? settings.field != FieldUse::automatic : settings.field == FieldUse::always)
       no_effect("--field");
   }
-  if (exact && settings.deadline_us > 0)
-    throw CLI::ValidationError("--deadline-us", "does not limit --measure exact; use --max-visits");
   if (!is_field_spec(options.a)) return;
   if (exact)
     throw CLI::ValidationError(
@@ -278,8 +275,6 @@ void add_query(CLI::App& app) {
             "Matched measure only");
   add_whole(command, "--max-visits", options->max_visits,
             "Limit of node pairs, for penetration and for separation; 0 = no limit");
-  add_real(command, "--deadline-us", options->deadline_us, {},
-           "[µs] Time limit, for penetration and for separation; 0 = no limit");
   add_whole<std::size_t>(command, "--repeat", options->repeat,
                          "Number of rounds over all rows; time_us is the minimum of a row", 1);
   CLI::Option* const json = command->add_flag("--json", options->json, "Print JSON");
@@ -295,7 +290,6 @@ void add_query(CLI::App& app) {
     options->scale_b_given = scale->count() > 0;
     QuerySettings& settings = options->settings;
     settings.penetration.max_visits = settings.separation.max_visits = options->max_visits;
-    settings.penetration.deadline_us = settings.separation.deadline_us = options->deadline_us;
     run_query(*options);
   });
 }

@@ -132,7 +132,6 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
                                                    settings.pair_budget,
                                                    settings.max_visits,
                                                    0,
-                                                   0,
                                                    0};
     auto c_penetration = sized<ist_penetration_t>();
     auto c_separation = sized<ist_separation_t>();

@@ -192,9 +192,9 @@ int c_api_checks(const char* path_a, const char* path_b) {
   if (versions_and_words() != 0 || memory_is_the_callers(path_a) != 0 ||
       trees_are_checked(path_a) != 0 || make_scene(&scene, path_a, path_b) != 0)
     return 1;
-  return penetrations_answer(&scene) != 0 || separations_answer(&scene) != 0 ||
-         overlaps_answer(&scene) != 0 || patches_answer(&scene) != 0 ||
-         outlines_answer(&scene) != 0 ||
+  return penetrations_answer(&scene) != 0 || deadlines_limit(&scene) != 0 ||
+         separations_answer(&scene) != 0 || overlaps_answer(&scene) != 0 ||
+         patches_answer(&scene) != 0 || outlines_answer(&scene) != 0 ||
          fields_answer(&scene) != 0 || bodies_are_told(&scene) != 0 ||
          impacts_are_found(&scene) != 0 || batches_answer(&scene) != 0 ||
          balls_are_told(&scene) != 0 || surfaces_are_told(&scene) != 0 ||

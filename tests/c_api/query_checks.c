@@ -101,6 +101,35 @@ int penetrations_answer(scene_t* s) {
   return 0;
 }
 
+int deadlines_limit(scene_t* s) {
+  ist_penetration_t whole = {.size = sizeof whole}, apart = {.size = sizeof apart};
+  ist_penetration_settings_t settings = {.size = sizeof settings};
+  ist_deadline_t deadline = {0};
+  int i;
+  CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, &whole) == IST_OK);
+  CHECK(ist_deadline_limit(&deadline, &settings) == IST_OK); /* all zero: none */
+  CHECK(settings.pair_budget == 0 && settings.field == IST_FIELD_AUTOMATIC);
+  CHECK(ist_deadline_make(100, &deadline) == IST_OK);
+  CHECK(ist_deadline_limit(&deadline, &settings) == IST_OK);
+  CHECK(settings.pair_budget > 0 && settings.field == IST_FIELD_NEVER);
+  CHECK(ist_deadline_too_slow(&deadline) == 0);
+  for (i = 0; i < 300; ++i)
+    CHECK(ist_deadline_record(&deadline, &whole, 1e6) == IST_OK &&
+          ist_deadline_record(&deadline, &apart, 1) == IST_OK);
+  CHECK(ist_deadline_too_slow(&deadline) != 0);
+  CHECK(ist_deadline_make(100, NULL) == IST_NULL_POINTER);
+  CHECK(ist_deadline_limit(NULL, &settings) == IST_NULL_POINTER);
+  CHECK(ist_deadline_limit(&deadline, NULL) == IST_NULL_POINTER);
+  CHECK(ist_deadline_record(NULL, &whole, 1) == IST_NULL_POINTER);
+  CHECK(ist_deadline_record(&deadline, NULL, 1) == IST_NULL_POINTER);
+  CHECK(ist_deadline_too_slow(NULL) == 0);
+  settings.size = 4;
+  CHECK(ist_deadline_limit(&deadline, &settings) == IST_WRONG_SIZE);
+  whole.size = 4;
+  CHECK(ist_deadline_record(&deadline, &whole, 1) == IST_WRONG_SIZE);
+  return 0;
+}
+
 int separations_answer(scene_t* s) {
   ist_penetration_t penetration = {.size = sizeof penetration}, lone = {.size = sizeof lone};
   ist_separation_t separation = {.size = sizeof separation}, gap = {.size = sizeof gap};

@@ -35,6 +35,7 @@ typedef struct scene {
 
 /* Each: 0, or 1 with the first thing that is not as the header says on stderr. */
 int penetrations_answer(scene_t* s);
+int deadlines_limit(scene_t* s);
 int separations_answer(scene_t* s);
 int overlaps_answer(scene_t* s);
 int patches_answer(scene_t* s);

@@ -52,7 +52,6 @@ const std::vector<Option> kReal = {
     {kCheck, "--scale", "a finite number above 0", {"0", "-1"}},
     {kBake, "--time", "a finite number, 0 or more", {"-1"}},
     {kQuery, "--scale-b", "a finite number above 0", {"0", "-1"}},
-    {kQuery, "--deadline-us", "a finite number, 0 or more", {"-1"}},
 };
 
 /// The command with the option, in place of one that it has already.

@@ -268,7 +268,6 @@ TEST_F(ExactQueryCommand, RefusesWhatItDoesNotHeed) {
   refused({"--field", "always"}, "--field: has no effect with --measure exact");
   refused({"--field", "never"}, "--field: has no effect with --measure exact");
   refused({"--pair-budget", "9"}, "--pair-budget: has no effect with --measure exact");
-  refused({"--deadline-us", "9"}, "--deadline-us: does not limit --measure exact");
   expect_exit(2, {"plane:0,0,1,0", "nut.ist", "--pose", kNutOnBolt, "--measure", "exact"},
               "exact needs the meshes of two assets, and A is a field: plane:0,0,1,0");
 }

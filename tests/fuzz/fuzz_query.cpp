@@ -102,7 +102,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   settings.measure = (flags & 1) != 0 ? Measure::inner : Measure::matched;
   if ((flags & 2) != 0) settings.max_visits = input.next<std::uint8_t>();
   if ((flags & 4) != 0) settings.relative_error = input.next<double>();
-  if ((flags & 8) != 0) settings.min_radius = input.next<double>();
   Workspace& workspace = (flags & 16) != 0 ? small : large;
   PlacedTree placed_a{a.view(), next_pose(input), 1}, placed_b{b.view(), next_pose(input), 1};
   if ((flags & 32) != 0) placed_b.scale = input.next<double>();

@@ -20,20 +20,10 @@ std::vector<std::pair<const char*, PenetrationSettings>> limits() {
     s.max_visits = visits;
     all.emplace_back("max_visits", s);
   }
-  for (const double us : {1e-3, 1.0, 5.0, 20.0}) {
-    PenetrationSettings s;
-    s.deadline_us = us;
-    all.emplace_back("deadline_us", s);
-  }
   for (const double error : {0.5, 0.1, 0.01}) {
     PenetrationSettings s;
     s.relative_error = error;
     all.emplace_back("relative_error", s);
-  }
-  for (const double radius : {0.5, 0.1, 0.02}) {
-    PenetrationSettings s;
-    s.min_radius = radius;
-    all.emplace_back("min_radius", s);
   }
   return all;
 }

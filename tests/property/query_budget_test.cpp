@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 #include <ist/query.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "query/descent/answer.h"
 #include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
@@ -21,6 +25,16 @@ class QueryBudget : public ::testing::Test {
   PlacedTree placed_a() { return {a_.view(), random_pose(random_, 0.2), 1.0}; }
   PlacedTree placed_b(double distance) { return {b_.view(), random_pose(random_, distance), 0.8}; }
 };
+
+/// [u³] Of the smaller solid's matched spheres.
+double smaller_volume(const PlacedTree& a, const PlacedTree& b) {
+  const auto volume = [](const PlacedTree& placed) {
+    const AssetHeader& header = placed.tree.header();
+    const double unit = std::ldexp(placed.scale, header.exponent);
+    return header.matched_tree.volume_sum * unit * unit * unit;
+  };
+  return std::min(volume(a), volume(b));
+}
 
 /// The stopped answer's bounds hold the finished one, and its volume lies between them.
 void expect_bounds(const Penetration& stopped, const Penetration& finished) {
@@ -49,6 +63,9 @@ TEST_F(QueryBudget, VisitsAreKeptAndBoundsHold) {
       EXPECT_EQ(stopped.status,
                 finished.node_visits > visits ? QueryStatus::budget_exhausted : QueryStatus::ok);
       expect_bounds(stopped, finished);
+      if (stopped.status != QueryStatus::ok) {
+        EXPECT_LE(stopped.volume, smaller_volume(a, b) * (1 + 1e-12));
+      }
       width += stopped.volume_max - stopped.volume_min;
       error += std::abs(stopped.volume - finished.volume);
     }
@@ -58,6 +75,24 @@ TEST_F(QueryBudget, VisitsAreKeptAndBoundsHold) {
     last_width = width;
     last_error = error;
   }
+}
+
+TEST(KeptWithin, AStoppedAnswerShrinksAsAWhole) {
+  Penetration answer;
+  answer.volume = 3;
+  answer.volume_min = 2;
+  answer.volume_max = 5;
+  answer.translation_gradient = {0, 0, 6};
+  answer.rotation_gradient = {3, 0, 0};
+  EXPECT_EQ(kept_within(1, answer).volume, 3);  // finished
+  answer.status = QueryStatus::budget_exhausted;
+  const Penetration kept = kept_within(1, answer);
+  EXPECT_EQ(kept.volume, 1);
+  EXPECT_EQ(kept.volume_min, 1);
+  EXPECT_EQ(kept.volume_max, 5);
+  EXPECT_DOUBLE_EQ(kept.translation_gradient.z(), 2);
+  EXPECT_DOUBLE_EQ(kept.rotation_gradient.x(), 1);
+  EXPECT_EQ(kept_within(4, answer).volume, 3);
 }
 
 TEST_F(QueryBudget, TheSmallestPairsAreLeft) {
@@ -96,32 +131,6 @@ TEST_F(QueryBudget, RelativeErrorIsMet) {
       EXPECT_LE(answer.node_visits, finished.node_visits);
     }
   }
-}
-
-TEST_F(QueryBudget, SmallNodesStayShut) {
-  for (const double radius : {0.4, 0.1, 0.02}) {
-    for (int i = 0; i < 20; ++i) {
-      const PlacedTree a = placed_a(), b = placed_b(0.09 * i);
-      PenetrationSettings settings;
-      settings.min_radius = radius;
-      const Penetration answer = penetration(a, b, settings, workspace_);
-      expect_bounds(answer, penetration(a, b, {}, workspace_));
-    }
-  }
-}
-
-TEST_F(QueryBudget, DeadlineStopsWithBounds) {
-  const PlacedTree a = placed_a(), b = placed_b(0.1);
-  const Penetration finished = penetration(a, b, {}, workspace_);
-  PenetrationSettings settings;
-  settings.deadline_us = 1e-3;  // over before the first look at the clock
-  const Penetration stopped = penetration(a, b, settings, workspace_);
-  EXPECT_EQ(stopped.status, QueryStatus::budget_exhausted);
-  expect_bounds(stopped, finished);
-  settings.deadline_us = 1e9;
-  const Penetration unhurried = penetration(a, b, settings, workspace_);
-  EXPECT_EQ(unhurried.status, QueryStatus::ok);
-  EXPECT_EQ(unhurried.volume, finished.volume);
 }
 
 TEST_F(QueryBudget, AWorkspaceChangesNothingButWhenFull) {

@@ -2,6 +2,7 @@
 #include <ist/query.h>
 
 #include <numbers>
+#include <span>
 
 #include "query/asset/sphere_tree.h"
 #include "query/base/relative_pose.h"
@@ -301,6 +302,36 @@ TEST_F(QueryDetails, TheOtherWayRoundIsTheSame) {
   }
 }
 
+TEST_F(QueryDetails, PatchesSumToTheBlend) {
+  ContactPatch patches[6];
+  int blends = 0;
+  for (int i = 0; i < 200; ++i) {
+    const PlacedTree a = placed_a(), b = placed_b(0.05 * (i % 40), i % 2 == 0 ? 1.6 : 0.3);
+    const PenetrationSettings settings{.pair_budget = 100u << (i % 6)};
+    const Penetration whole = penetration(a, b, settings, workspace_);
+    const ContactPatches found = contact_patches(a, b, settings, workspace_, patches);
+    EXPECT_EQ(found.penetration.volume, whole.volume);
+    EXPECT_EQ(found.penetration.volume_max, whole.volume_max);
+    EXPECT_EQ(found.penetration.translation_gradient, whole.translation_gradient);
+    EXPECT_EQ(found.penetration.rotation_gradient, whole.rotation_gradient);
+    EXPECT_EQ(found.count > 0, whole.volume > 0);
+    double volume = 0, pull = 0, turn = 0;
+    Vector3d force = Vector3d::Zero(), torque = force;
+    for (const ContactPatch& patch : std::span(patches).first(found.count)) {
+      volume += patch.volume;
+      force += patch.force;
+      torque += patch.torque;
+      pull += patch.force.norm();
+      turn += patch.torque.norm();
+    }
+    EXPECT_NEAR(volume, whole.volume, 1e-12 * whole.volume);
+    EXPECT_LE((force + whole.translation_gradient).norm(), 1e-12 * (pull + 1e-300));
+    EXPECT_LE((torque + whole.rotation_gradient).norm(), 1e-12 * (turn + 2 * pull + 1e-300));
+    blends += whole.volume != penetration(a, b, {}, workspace_).volume ? 1 : 0;
+  }
+  EXPECT_GT(blends, 50);
+}
+
 TEST_F(QueryDetails, OtherLimitsHoldOnTop) {
   int stopped = 0;
   for (int i = 0; i < 600; ++i) {
@@ -310,8 +341,6 @@ TEST_F(QueryDetails, OtherLimitsHoldOnTop) {
     const Penetration finished = penetration(a, b, settings, workspace_);
     settings.max_visits = 1u << (i % 11);
     if (i % 4 == 1) settings.relative_error = 0.2;
-    if (i % 4 == 2) settings.min_radius = 0.15;
-    if (i % 4 == 3) settings.deadline_us = 1e-3;
     const Penetration answer = penetration(a, b, settings, workspace_);
     EXPECT_LE(answer.node_visits, settings.max_visits);
     EXPECT_LE(answer.volume_min, finished.volume);

@@ -90,7 +90,7 @@ def test_wrong_scenes_are_named(overlap, solids, random_poses):
             (dict(pairs=[(0, 6)]), ValueError, r"pairs\[0\]: \(0, 6\): solids are numbered 0 to 5"),
             (dict(pairs=[(2, 2)]), ValueError, "a solid cannot be paired with itself"),
             (dict(field="always"), ValueError, "field: on a GPU"),
-            (dict(min_radius=1), TypeError, "min_radius: there is no such setting on a GPU"),
+            (dict(max_visits=1), TypeError, "max_visits: there is no such setting on a GPU"),
             (dict(poses=poses[:5]), ValueError, r"poses: shape \(5, 7\); wanted \(6, 7\)"),
             (dict(scales=torch.ones(3)), ValueError, r"scales: shape \(3,\); wanted \(6,\)"),
             (dict(solids=[*solids[:5], 3]), TypeError, r"solids\[5\]: a int; wanted an Asset or a")]:

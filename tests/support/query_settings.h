@@ -4,14 +4,9 @@
 
 namespace ist::testing {
 
-/// The same limits for contact patches.
-inline ContactSettings for_contacts(const PenetrationSettings& s) {
-  return {s.measure, s.field, s.max_visits, s.deadline_us, s.relative_error, s.min_radius};
-}
-
 /// The same limits for a separation.
 inline SeparationSettings for_separation(const PenetrationSettings& s) {
-  return {s.max_visits, s.deadline_us};
+  return {s.max_visits, false};
 }
 
 /// The same limits for both halves of query().

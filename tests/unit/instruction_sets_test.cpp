@@ -20,7 +20,6 @@
 #include <vector>
 
 #include "support/answer_bits.h"
-#include "support/by_shares.h"
 #include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/test_meshes.h"
@@ -140,8 +139,7 @@ void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& w
   if (asked == "relative_error") settings.relative_error = 0.01;
   if (asked == "contact_patches") {
     ContactPatch patches[6];
-    const ContactPatches answer =
-        contact_patches(a, b, testing::for_contacts(settings), workspace, patches);
+    const ContactPatches answer = contact_patches(a, b, settings, workspace, patches);
     bits.add(answer.penetration);
     for (std::size_t i = 0; i < answer.count; ++i) bits.add(patches[i]);
     return;
@@ -159,7 +157,6 @@ void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& w
   bits.add(both.penetration);
   bits.add(both.separation);
   if constexpr (std::is_same_v<A, PlacedTree>) {
-    if (asked == "shares") bits.add(testing::by_shares(a, b, 6.25, workspace));
     if (asked == "matched") bits.add(without_protrusion(both.penetration, a, b));
   }
 }

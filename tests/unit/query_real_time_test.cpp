@@ -33,7 +33,7 @@ class RealTime : public ::testing::Test {
     separation(a, b, testing::for_separation(settings), workspaces_[0]);
     overlap(a, b, workspaces_[0]);
     query(a, b, testing::for_both(settings), workspaces_[0]);
-    contact_patches(a, b, testing::for_contacts(settings), workspaces_[0], patches_);
+    contact_patches(a, b, settings, workspaces_[0], patches_);
     const PlacedPair pairs[] = {{a, b}, {b, a}};
     penetration_batch(pairs, settings, workspaces_, answers_);
 
@@ -51,13 +51,12 @@ class RealTime : public ::testing::Test {
     const PlacedField field{fields_[static_cast<std::size_t>(i) % fields_.size()], poses_a_[i], 1};
     volume_[i] += penetration(field, b, settings, workspaces_[0]).volume;
     query(field, b, testing::for_both(settings), workspaces_[0]);
-    contact_patches(field, b, testing::for_contacts(settings), workspaces_[0], patches_);
+    contact_patches(field, b, settings, workspaces_[0], patches_);
     const PlacedFieldPair field_pairs[] = {{field, b}, {field, a}};
     penetration_batch(field_pairs, settings, workspaces_, answers_);
     const Motions motions{{{0.1, 0.2, 0}, {1, 0, 2}, {}}, {{-1, 0, 1}, {0, 1, 0}, {0.1, 0, 0}}};
     ImpactSettings until;
     until.max_visits = settings.max_visits != 0 ? settings.max_visits : 3000;
-    until.deadline_us = settings.deadline_us;
     time_of_impact(a, b, motions, until, workspaces_[0]);
     time_of_impact(field, b, motions, until, workspaces_[0]);
     const PlacedTree solid{box_.view(), poses_a_[i], 1.0};
@@ -84,7 +83,7 @@ class RealTime : public ::testing::Test {
       with_field.field = use;
       volume_[i] += penetration(solid, b, with_field, workspaces_[0]).volume;
       volume_[i] += penetration(b, solid, with_field, workspaces_[0]).volume;
-      contact_patches(solid, b, testing::for_contacts(with_field), workspaces_[0], patches_);
+      contact_patches(solid, b, with_field, workspaces_[0], patches_);
     }
   }
 
@@ -134,7 +133,7 @@ TEST_F(RealTime, QueriesMakeNoSystemCall) {
   if (!testing::kTrapsWork) GTEST_SKIP() << "the sanitizer owns the traps";
   const auto all = [&] {
     for (int i = 0; i < kPoses; ++i) {
-      PenetrationSettings settings;  // no deadline: what reads the clock may enter the system
+      PenetrationSettings settings;
       if (i % 3 == 1) settings.max_visits = 40;
       if (i % 3 == 2) settings.relative_error = 0.1;
       if (i % 2 == 1) settings.pair_budget = 200;
@@ -159,7 +158,6 @@ TEST_F(RealTime, QueriesTouchNeitherHeapNorLock) {
     PenetrationSettings settings;
     if (i % 4 == 1) settings.max_visits = 40;
     if (i % 4 == 2) settings.relative_error = 0.1;
-    if (i % 4 == 3) settings.deadline_us = 5;
     if (i % 5 >= 3) settings.pair_budget = 200;
     const Trapped trapped = testing::trapped_by([&] { ask(i, settings); });
     EXPECT_EQ(trapped.heap, 0) << "pose " << i;

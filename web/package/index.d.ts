@@ -210,8 +210,6 @@ export class Field {
 export interface Limits {
   /** Count of node pairs opened. */
   maxVisits?: number;
-  /** [µs] wall clock from the call. Browsers coarsen their clock, to 5 or 100 µs and more. */
-  deadlineUs?: number;
 }
 
 export interface ContactOptions extends Limits {
@@ -226,13 +224,14 @@ export interface ContactOptions extends Limits {
   field?: 'automatic' | 'never' | 'always';
   /** Stop once (volumeMax − volumeMin) ≤ this · volumeMax. */
   relativeError?: number;
-  /** [u] nodes smaller than this are not opened. */
-  minRadius?: number;
+  /**
+   * Count of sphere pairs to spend: if all are more, a coarser level of detail answers. Choose it by
+   * the time that queries take; it depends on the pose and on this alone.
+   */
+  pairBudget?: number;
 }
 
 export interface PenetrationOptions extends ContactOptions {
-  /** Count of sphere pairs to spend: if all are more, a coarser level of detail answers. */
-  pairBudget?: number;
   /** An answer to overwrite, which is then returned. */
   into?: Penetration;
 }

@@ -176,6 +176,37 @@ ist_status_t ist_workspace_make(std::size_t capacity, const ist_allocator_t* all
   }
 }
 
+ist_status_t ist_deadline_make(double microseconds, ist_deadline_t* deadline) {
+  if (deadline == nullptr) return IST_NULL_POINTER;
+  *deadline = {};
+  new (deadline) Deadline(microseconds);
+  return IST_OK;
+}
+
+ist_status_t ist_deadline_limit(const ist_deadline_t* deadline,
+                                ist_penetration_settings_t* settings) {
+  if (deadline == nullptr || settings == nullptr) return IST_NULL_POINTER;
+  PenetrationSettings limited;
+  const ist_status_t status = ist::c_api::read(settings, limited);
+  if (status != IST_OK) return status;
+  deadline_in(*deadline).limit(limited);
+  settings->pair_budget = limited.pair_budget;
+  settings->field = static_cast<ist_field_use_t>(limited.field);
+  return IST_OK;
+}
+
+ist_status_t ist_deadline_record(ist_deadline_t* deadline, const ist_penetration_t* answer,
+                                 double microseconds) {
+  if (deadline == nullptr || answer == nullptr) return IST_NULL_POINTER;
+  if (answer->size != sizeof *answer) return IST_WRONG_SIZE;
+  deadline_in(*deadline).record(ist::c_api::read(*answer), microseconds);
+  return IST_OK;
+}
+
+int32_t ist_deadline_too_slow(const ist_deadline_t* deadline) {
+  return deadline != nullptr && deadline_in(*deadline).too_slow() ? 1 : 0;
+}
+
 ist_status_t ist_workspace_release(ist_workspace_t* workspace) {
   if (workspace == nullptr) return IST_NULL_POINTER;
   WorkspaceHandle& handle = WorkspaceHandle::in(*workspace);

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <new>
 
+#include <ist/deadline.h>
 #include <ist/ist.h>
 #include <ist/query.h>
 
@@ -55,6 +56,15 @@ struct WorkspaceHandle {
   bool made() const noexcept { return mark == kMark; }
 };
 static_assert(sizeof(WorkspaceHandle) <= sizeof(ist_workspace_t));
+
+/// A deadline has no handle of its own: all zero is one without a limit.
+static_assert(sizeof(Deadline) <= sizeof(ist_deadline_t));
+inline Deadline& deadline_in(ist_deadline_t& deadline) noexcept {
+  return *reinterpret_cast<Deadline*>(&deadline);
+}
+inline const Deadline& deadline_in(const ist_deadline_t& deadline) noexcept {
+  return *reinterpret_cast<const Deadline*>(&deadline);
+}
 
 /// The checked view behind a handle.
 inline ist_status_t view_of(const ist_tree_t* tree, TreeView& view) noexcept {

@@ -1,43 +1,24 @@
 #include "query/c_api/structs.h"
 
 namespace ist::c_api {
-namespace {
-
-/// Settings that both kinds of penetration have.
-template <class Given, class Settings>
-ist_status_t read_limits(const Given& given, Settings& settings) noexcept {
-  if (given.measure < IST_MATCHED || given.measure > IST_EXACT ||
-      given.field < IST_FIELD_AUTOMATIC || given.field > IST_FIELD_ALWAYS)
-    return IST_INVALID_INPUT;
-  settings.measure = static_cast<Measure>(given.measure);
-  settings.field = static_cast<FieldUse>(given.field);
-  settings.max_visits = given.max_visits;
-  settings.deadline_us = given.deadline_us;
-  settings.relative_error = given.relative_error;
-  settings.min_radius = given.min_radius;
-  return IST_OK;
-}
-
-}  // namespace
-
 ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& settings) noexcept {
   if (given == nullptr) return IST_OK;
   if (given->size != sizeof *given) return IST_WRONG_SIZE;
+  if (given->measure < IST_MATCHED || given->measure > IST_EXACT ||
+      given->field < IST_FIELD_AUTOMATIC || given->field > IST_FIELD_ALWAYS)
+    return IST_INVALID_INPUT;
+  settings.measure = static_cast<Measure>(given->measure);
+  settings.field = static_cast<FieldUse>(given->field);
   settings.pair_budget = given->pair_budget;
-  return read_limits(*given, settings);
-}
-
-ist_status_t read(const ist_contact_settings_t* given, ContactSettings& settings) noexcept {
-  if (given == nullptr) return IST_OK;
-  if (given->size != sizeof *given) return IST_WRONG_SIZE;
-  return read_limits(*given, settings);
+  settings.max_visits = given->max_visits;
+  settings.relative_error = given->relative_error;
+  return IST_OK;
 }
 
 ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& settings) noexcept {
   if (given == nullptr) return IST_OK;
   if (given->size != sizeof *given) return IST_WRONG_SIZE;
   settings.max_visits = given->max_visits;
-  settings.deadline_us = given->deadline_us;
   settings.inner_spheres = given->inner_spheres != 0;
   return IST_OK;
 }
@@ -49,7 +30,6 @@ ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) 
   settings.duration = given->duration;
   settings.tolerance = given->tolerance;
   settings.max_visits = given->max_visits;
-  settings.deadline_us = given->deadline_us;
   return IST_OK;
 }
 

@@ -89,7 +89,6 @@ class FieldArgument {
 };
 
 ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& settings) noexcept;
-ist_status_t read(const ist_contact_settings_t* given, ContactSettings& settings) noexcept;
 ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& settings) noexcept;
 ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) noexcept;
 

@@ -57,10 +57,6 @@ void ContactBins::add_guess(int level_a, std::uint32_t a, int level_b, std::uint
   guesses_[bin].add(guess);
 }
 
-void ContactBins::scale_sums(double factor) noexcept {
-  for_each_bit(marked_, [&](std::uint32_t bin) { sums_[bin].scale(factor); });
-}
-
 void ContactBins::forget_sums() noexcept {
   for_each_bit(marked_, [&](std::uint32_t bin) { sums_[bin] = LeafSums(); });
 }

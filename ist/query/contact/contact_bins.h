@@ -47,9 +47,6 @@ class ContactBins {
   void add_guess(int level_a, std::uint32_t a, int level_b, std::uint32_t b,
                  const Overlap& guess) noexcept;
 
-  /// Multiplies all but the guesses.
-  void scale_sums(double factor) noexcept;
-
   /// Forgets all but the guesses.
   void forget_sums() noexcept;
 

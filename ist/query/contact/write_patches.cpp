@@ -52,13 +52,31 @@ std::size_t write_patches(const Binned& binned, const Penetration& whole,
   }
 
   // The whole is summed in another order, and bounded.
-  for (ContactPatch& patch : out) patch.volume *= volume > 0 ? whole.volume / volume : 0;
+  const double factor = volume > 0 ? whole.volume / volume : 0;
+  for (ContactPatch& patch : out) {
+    patch.volume *= factor;
+    if (whole.status == QueryStatus::ok) continue;
+    patch.force *= factor;
+    patch.torque *= factor;
+  }
   complete(out, largest, whole.volume, [](ContactPatch& p) -> double& { return p.volume; });
   complete<Eigen::Vector3d>(out, largest, -whole.translation_gradient,
                             [](ContactPatch& p) -> Eigen::Vector3d& { return p.force; });
   complete<Eigen::Vector3d>(out, largest, -whole.rotation_gradient,
                             [](ContactPatch& p) -> Eigen::Vector3d& { return p.torque; });
   return out.size();
+}
+
+void spread(const Penetration& part, const Penetration& whole,
+            std::span<ContactPatch> patches) noexcept {
+  if (!(part.volume > 0)) return;
+  const double factor = whole.volume / part.volume;
+  for (ContactPatch& patch : patches) {
+    const double share = patch.volume / part.volume;
+    patch.force -= share * (whole.translation_gradient - part.translation_gradient);
+    patch.torque -= share * (whole.rotation_gradient - part.rotation_gradient);
+    patch.volume *= factor;
+  }
 }
 
 void finish_patches(std::span<ContactPatch> patches, double deepest) noexcept {

@@ -23,4 +23,14 @@ Penetration world_answer(const Overlap& overlap, double lowest, double highest,
   return result;
 }
 
+Penetration kept_within(double most, Penetration answer) noexcept {
+  if (answer.status == QueryStatus::ok || !(answer.volume > most)) return answer;
+  const double factor = most / answer.volume;
+  answer.volume = most;
+  answer.volume_min = std::min(answer.volume_min, most);
+  answer.translation_gradient *= factor;
+  answer.rotation_gradient *= factor;
+  return answer;
+}
+
 }  // namespace ist

@@ -11,4 +11,8 @@ namespace ist {
 Penetration world_answer(const Overlap& overlap, double lowest, double highest,
                          const RelativePose& pose) noexcept;
 
+/// A stopped answer with no more than the volume `most` [u³]: its estimate may be far more. The
+/// push shrinks with the volume.
+Penetration kept_within(double most, Penetration answer) noexcept;
+
 }  // namespace ist

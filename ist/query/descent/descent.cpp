@@ -2,33 +2,18 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <limits>
 #include <numbers>
 #include <utility>
 
 #include "query/base/precision.h"
 #include "query/descent/answer.h"
-#include "query/descent/shares.h"
 #include "query/kernel/node_kernel.h"
 
 namespace ist {
 namespace {
 
-// Leaf pairs between two looks at the error that is left, a few microseconds.
+// Leaf pairs between two looks at the error that is left.
 constexpr std::size_t kLeafChunk = 256;
-
-// Shares of the time that a deadline gives: sums are taken again in double only before the one, and
-// no more guesses are made after the other.
-constexpr double kEarly = 0.3, kLate = 0.85;
-// Nodes are opened up to these. Where there are bins all that is left is guessed, pair by pair.
-constexpr double kVisits = 0.75, kVisitsOfBins = 0.6;
-// Shares are summed up to the one, and none goes on beyond the other.
-constexpr double kPlanned = 0.85, kLatest = 0.95;
-// [µs] no pair of leaves takes longer where time is ample.
-constexpr double kDearest = 0.25;
-// Pairs of leaves that take a few microseconds.
-constexpr std::size_t kFewPairs = 160;
-constexpr std::size_t kGuesses = 32;  ///< between two looks at the clock, evenly over what is left
 
 // Sums whose rounding may exceed this share are taken again in double. The bound is at least fifty
 // times what rounding does, so float keeps 1e-5 (property_query, NoGrazingPairIsLost).
@@ -50,10 +35,9 @@ Descent::Descent(const SphereTree& a, const SphereTree& b, const RelativePose& p
       map_(pose.a_from_b),
       precision_(precision_for(a, b, pose)),
       limits_(limits),
-      min_radius_(limits.min_radius / pose.unit_a),
       scratch_(scratch),
       bins_(bins),
-      budget_(limits, bins == nullptr ? kVisits : kVisitsOfBins) {}
+      budget_(limits.max_visits) {}
 
 void Descent::run() noexcept {
   level_a_ = a_.top;
@@ -86,7 +70,6 @@ bool Descent::open_level() {
   const bool open_a =
       level_b_ == kSphereLevel ||
       (level_a_ != kSphereLevel && a_.typical_cube(level_a_) >= cube * b_.typical_cube(level_b_));
-  if (min_radius_ > 0) drop_small([&](double ra, double rb) { return open_a ? ra : rb; });
   PairList& now = scratch_.now;
   PairList& next = scratch_.next;
   choose();
@@ -148,24 +131,21 @@ Overlap Descent::contained_overlap(bool of_a, const SubtreeSums& contained) cons
 }
 
 void Descent::open_leaves() {
-  if (min_radius_ > 0) drop_small([](double ra, double rb) { return std::max(ra, rb); });
   PairList& now = scratch_.now;
   if (now.size > 0) scratch_.leaves->forget(precision_);
-  if (!by_shares() || !add_by_shares()) {
-    const std::size_t done = limits_.relative_error > 0 ? add_by_bound() : add_in_order();
-    estimate_unopened(now, done);
-    now.size = done;
-  }
+  const std::size_t done = limits_.relative_error > 0 ? add_by_bound() : add_in_order();
+  estimate_unopened(now, done);
+  now.size = done;
 
   // A few grazing lenses are all rounding in float; they are as few as they are shallow.
   const Overlap sum = sure();
   if (precision_ == Precision::float32 && !limits_.keep_rounding &&
-      sum.error > kGrazing * sum.volume && now.size > 0 && !budget_.elapsed_beyond(kEarly)) {
+      sum.error > kGrazing * sum.volume && now.size > 0) {
     precision_ = Precision::float64;
     scratch_.leaves->forget(precision_);
     sums_ = LeafSums();
     if (bins_ != nullptr) bins_->forget_sums();
-    add_leaves(0, now.size, nullptr, sums_);
+    add_leaves(0, now.size);
   }
 }
 
@@ -174,10 +154,9 @@ std::size_t Descent::add_by_bound() {
   double waiting = rank();  // bound on the pairs still to come
   std::size_t done = 0;
   while (done < now.size && !accurate(waiting)) {
-    const std::size_t granted = budget_.grant(std::min(kLeafChunk, now.size - done));
-    const std::size_t n = add_leaves(done, granted, &budget_, sums_);
-    budget_.give_back(granted - n);
+    const std::size_t n = budget_.grant(std::min(kLeafChunk, now.size - done));
     if (n == 0) break;
+    add_leaves(done, n);
     for (std::size_t i = done; i < done + n; ++i) waiting -= scratch_.ranked[i].bound;
     done += n;
   }
@@ -186,90 +165,18 @@ std::size_t Descent::add_by_bound() {
 
 std::size_t Descent::add_in_order() {
   choose();
-  PairList& now = scratch_.now;
-  std::size_t done = 0;
-  while (done < now.size) {
-    const std::size_t granted = budget_.grant(now.size - done);
-    const std::size_t n = add_leaves(done, granted, &budget_, sums_);
-    budget_.give_back(granted - n);
-    if (n == 0) break;
-    done += n;
-  }
+  const std::size_t done = budget_.grant(scratch_.now.size);
+  add_leaves(0, done);
   return done;
 }
 
-bool Descent::by_shares() {
-  const auto pairs = static_cast<double>(scratch_.now.size);
-  if (limits_.relative_error > 0 || pairs > budget_.left()) return false;
-  return limits_.shares > 0 ||
-         (budget_.timed() &&
-          pairs * kDearest > limits_.deadline_us * (kPlanned - budget_.elapsed()));
-}
-
-bool Descent::add_by_shares() {
-  PairList& now = scratch_.now;
-  const bool of_b = b_.header->root[3] * map_.scale <= a_.header->root[3];
-  const ShareBounds bounds =
-      sort_by_shares(now, of_b ? b_ : a_, of_b ? level_b_ : level_a_, of_b, scratch_.next);
-  std::swap(now, scratch_.next);
-  budget_.extend(kLatest);
-  LeafSums shares[kShares];
-  std::size_t done = 0;
-  constexpr double kAll = kShares + 1;
-  double room = limits_.shares > 0 ? limits_.shares : kAll;  // for so many limits do
-  // A few pairs are summed even if the time is over: there would be nothing to go by otherwise.
-  const bool at_least = bounds[1] <= kFewPairs;
-  bool in_time = add_group(0, bounds[0], at_least, sums_);
-  const double start = budget_.timed() ? budget_.elapsed() : 0;
-  while (in_time && done < kShares && room >= static_cast<double>(done + 1)) {
-    in_time = add_group(bounds[done], bounds[done + 1], at_least && done == 0, shares[done]);
-    done += in_time ? 1 : 0;
-    if (budget_.timed() && done > 0)
-      room = static_cast<double>(done) * (kPlanned - start) /
-             std::max(budget_.elapsed() - start, 1e-9);
-  }
-  if (done == 0) {
-    sums_ = LeafSums();
-    std::swap(now, scratch_.next);
-    return false;
-  }
-  for (std::size_t i = 0; i < done; ++i) sums_.add(shares[i]);
-  if (done == kShares && room >= kAll) return true;
-
-  ShareWeights weights = share_weights(
-      std::clamp(room, static_cast<double>(done), static_cast<double>(done + 1)), done);
-  if (bins_ != nullptr) {  // what a bin holds is of all shares alike
-    weights.fill(static_cast<double>(kShares) / static_cast<double>(done));
-    bins_->scale_sums(weights[0]);
-  }
-  for (std::size_t i = 0; i < done; ++i) {
-    Overlap others = finish(shares[i], precision_);
-    others.scale(weights[i] - 1);
-    unopened_.add(others);
-  }
-  stopped_ = true;
-  unopened_bound_ = std::numeric_limits<double>::infinity();  // penetration() caps it
-  now.size = 0;
-  return true;
-}
-
-bool Descent::add_group(std::size_t from, std::size_t to, bool surely, LeafSums& sums) {
-  if (to - from > budget_.left()) return false;
-  // What bins hold of a share that was broken off could not be told from the rest.
-  surely = surely || bins_ != nullptr;
-  const std::size_t granted = surely ? budget_.take(to - from) : budget_.grant(to - from);
-  const std::size_t summed = add_leaves(from, granted, surely ? nullptr : &budget_, sums);
-  budget_.give_back(granted - summed);
-  return summed == to - from;
-}
-
-std::size_t Descent::add_leaves(std::size_t from, std::size_t n, Budget* budget, LeafSums& sums) {
-  if (n == 0) return 0;
+void Descent::add_leaves(std::size_t from, std::size_t n) {
+  if (n == 0) return;
   const std::uint32_t* const a = scratch_.now.a.get() + from;
   const std::uint32_t* const b = scratch_.now.b.get() + from;
-  LeafStage stage{&a_, &b_, level_a_, level_b_, &map_, precision_, budget};
+  LeafStage stage{&a_, &b_, level_a_, level_b_, &map_, precision_};
   if (bins_ != nullptr) stage.bins = bins_->touch(level_a_, a, level_b_, b, n);
-  return add_leaf_pairs(stage, *scratch_.leaves, a, b, n, sums);
+  add_leaf_pairs(stage, *scratch_.leaves, a, b, n, sums_);
 }
 
 bool Descent::accurate(double waiting) const {
@@ -322,40 +229,10 @@ void Descent::choose() {
   std::swap(now, next);
 }
 
-template <class Measured>
-void Descent::drop_small(Measured measured) {
-  PairList& now = scratch_.now;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < now.size; ++i) {
-    const double ra = a_.ball(level_a_, now.a[i]).r;
-    const double rb = b_.ball(level_b_, now.b[i]).r * map_.scale;
-    if (measured(ra, rb) < min_radius_) {
-      unopened_.add(estimate_unopened_pair(now.a[i], now.b[i]));
-    } else {
-      now.a[kept] = now.a[i];
-      now.b[kept++] = now.b[i];
-    }
-  }
-  now.size = kept;
-}
-
 void Descent::estimate_unopened(const PairList& list, std::size_t from) {
-  const std::size_t count = list.size - from;
-  // Bins must add up to the whole, so theirs are all guessed.
-  const std::size_t step =
-      budget_.timed() && bins_ == nullptr ? std::max<std::size_t>(1, count / kGuesses) : 1;
   Overlap guesses;
-  std::size_t guessed = 0;
-  for (std::size_t first = 0; first < step; ++first) {
-    if (first > 0 && budget_.elapsed_beyond(kLate)) {
-      // The others are taken for as large as these on average; penetration() caps the bound.
-      guesses.scale(static_cast<double>(count) / static_cast<double>(guessed));
-      unopened_bound_ = std::numeric_limits<double>::infinity();
-      break;
-    }
-    for (std::size_t i = from + first; i < list.size; i += step, ++guessed)
-      guesses.add(estimate_unopened_pair(list.a[i], list.b[i]));
-  }
+  for (std::size_t i = from; i < list.size; ++i)
+    guesses.add(estimate_unopened_pair(list.a[i], list.b[i]));
   unopened_.add(guesses);
 }
 
@@ -383,15 +260,15 @@ Penetration Descent::penetration() const noexcept {
   const double cap = (1 + 1e-9) * std::min(volume_a * static_cast<double>(b_.header->overlap),
                                            volume_b * static_cast<double>(a_.header->overlap));
   const double sure = overlap.volume - unopened_.volume;
-  // Shares that stand for all may be less than what was summed besides.
-  const double lowest = std::max(0.0, std::min(sure - overlap.error, overlap.volume));
+  const double lowest = std::max(0.0, sure - overlap.error);
   const double highest = std::max(lowest, std::min(cap, sure + overlap.error + unopened_bound_));
 
   Penetration result = world_answer(overlap, lowest, highest, pose_);
   result.node_visits = budget_.visits();
   result.sphere_pairs = sums_.lenses + contained_a_.spheres + contained_b_.spheres;
   if (stopped_) result.status = QueryStatus::budget_exhausted;
-  return result;
+  const double unit = pose_.unit_a;
+  return kept_within(std::min(volume_a, volume_b) * (unit * unit * unit), result);
 }
 
 }  // namespace ist

@@ -57,25 +57,14 @@ class Descent {
 
   void open_leaves();
 
-  /// Sums pairs [from, from + n) of the current list, or as many as a budget has time for.
-  std::size_t add_leaves(std::size_t from, std::size_t n, Budget* budget, LeafSums& sums);
+  /// Sums pairs [from, from + n) of the current list.
+  void add_leaves(std::size_t from, std::size_t n);
 
   /// Sums pairs from those of the largest bound down until the error is accepted; returns how many.
   std::size_t add_by_bound();
 
   /// Sums pairs in the order of the list; returns how many.
   std::size_t add_in_order();
-
-  /// Whether the time may not do for all pairs.
-  bool by_shares();
-
-  /// Sums as many shares of the pairs as there is time for, and takes the others for like them.
-  /// False if not even the first could be finished: then nothing is summed.
-  bool add_by_shares();
-
-  /// Sums pairs [from, to) of the current list; false if limits do not do for all of them.
-  /// `surely`: whatever the time.
-  bool add_group(std::size_t from, std::size_t to, bool surely, LeafSums& sums);
 
   bool accurate(double waiting) const;
 
@@ -89,11 +78,7 @@ class Descent {
   /// What ranks the pairs of the current list, from the largest bound down.
   double bound(std::size_t i) const;
 
-  /// Leaves the pairs unopened of which `measured(radius_a, radius_b)` is under the limit.
-  template <class Measured>
-  void drop_small(Measured measured);
-
-  /// Guesses the pairs from `from` on; if the time is over, from an even choice of them.
+  /// Guesses the pairs from `from` on.
   void estimate_unopened(const PairList& list, std::size_t from);
 
   /// Guesses one pair that stays unopened.
@@ -105,7 +90,6 @@ class Descent {
   const Similarity& map_;
   Precision precision_;
   const DescentLimits limits_;
-  const double min_radius_;  ///< A's unit frame
   Workspace::Impl& scratch_;
   ContactBins* const bins_;
   Budget budget_;

@@ -1,7 +1,6 @@
 #include "query/detail/detail_blend.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "query/detail/coincident.h"
@@ -14,7 +13,7 @@ namespace {
 
 /// How the sum of a pair of levels is asked for.
 struct AskedFor {
-  double relative_error = 0, min_radius = 0;
+  double relative_error = 0;
   bool keep_rounding = false;
 };
 
@@ -30,28 +29,30 @@ class DetailQueries {
         pose_(pose),
         settings_(settings),
         workspace_(workspace),
-        same_asset_(are_one_asset(a_, b_)),
-        start_(settings.deadline_us > 0 ? Clock::now() : Clock::time_point()) {}
+        same_asset_(are_one_asset(a_, b_)) {}
 
   /// The whole sum of a pair of levels, rounded as it may be: where lenses graze they are few, and
   /// the finest level is taken anyway.
   Penetration coarse_estimate(const DetailPair& pair) noexcept {
     DescentLimits limits = limits_left();
-    limits.relative_error = limits.min_radius = 0;
+    limits.relative_error = 0;
     limits.keep_rounding = true;
     return counted(overlap(pair).by_lenses(limits));
   }
 
   /// The sum of a pair of levels; of copies of one asset that all but coincide, that of unlike
   /// levels instead.
-  Penetration ask(const DetailPair& pair, const AskedFor& how) noexcept {
+  Penetration ask(const DetailPair& pair, const AskedFor& how,
+                  const LevelSum* most = nullptr) noexcept {
     const CoincidenceWeight coincidence = coincidence_weight_of(pair);
-    if (coincidence.weight == 0) return descend(pair, how);
+    if (coincidence.weight == 0) return descend(pair, how, most);
     DetailPair unlike[2] = {pair, pair};
     unlike[0].b = unlike[1].a = pair.a < a_.detail_count ? pair.a + 1 : pair.a - 1;
-    Penetration other = mix(descend(unlike[0], how), descend(unlike[1], how), 0.5);
+    const bool mostly_unlike = coincidence.weight >= 0.5;
+    Penetration other =
+        mix(descend(unlike[0], how, mostly_unlike ? most : nullptr), descend(unlike[1], how), 0.5);
     if (coincidence.weight == 1) return other;
-    const Penetration alike = descend(pair, how);
+    const Penetration alike = descend(pair, how, mostly_unlike ? nullptr : most);
     Penetration mixed = mix(alike, other, coincidence.weight);
     add_slope(coincidence.slope, other.volume - alike.volume, pose_, mixed);
     return mixed;
@@ -72,8 +73,6 @@ class DetailQueries {
   std::uint32_t pairs() const noexcept { return pairs_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   PairMethod method_of(const DetailPair& pair) const noexcept {
     return pair_method(placed_a_, matched_tree(a_, pair.a), placed_b_, matched_tree(b_, pair.b),
                        pose_, settings_.field);
@@ -82,14 +81,7 @@ class DetailQueries {
   /// Nothing but the roots is looked at once visits are spent.
   DescentLimits limits_left() const noexcept {
     DescentLimits limits = limits_of(settings_);
-    if (settings_.deadline_us > 0) {
-      const std::chrono::duration<double, std::micro> gone = Clock::now() - start_;
-      limits.deadline_us = std::max(kOver, settings_.deadline_us - gone.count());
-    }
-    if (settings_.max_visits > 0) {
-      limits.max_visits = settings_.max_visits - visits_;
-      if (limits.max_visits == 0) limits.deadline_us = kOver;
-    }
+    limits.spend(visits_);
     return limits;
   }
 
@@ -104,12 +96,13 @@ class DetailQueries {
     return answer;
   }
 
-  Penetration descend(const DetailPair& pair, const AskedFor& how) noexcept {
+  Penetration descend(const DetailPair& pair, const AskedFor& how,
+                      const LevelSum* by = nullptr) noexcept {
     DescentLimits limits = limits_left();
     limits.relative_error = how.relative_error;
-    limits.min_radius = how.min_radius;
     limits.keep_rounding = how.keep_rounding;
-    return counted(overlap(pair).by(method_of(pair), limits));
+    return counted(by != nullptr ? by->sum(by->context, pair, limits)
+                                 : overlap(pair).by(method_of(pair), limits));
   }
 
   const PlacedTree& placed_a_;
@@ -120,7 +113,6 @@ class DetailQueries {
   const PenetrationSettings& settings_;
   Workspace& workspace_;
   const bool same_asset_;
-  const Clock::time_point start_;
   std::uint32_t visits_ = 0, pairs_ = 0;
 };
 
@@ -130,18 +122,19 @@ constexpr double kRough = 5e-4;
 }  // namespace
 
 Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
-                          const PenetrationSettings& settings, Workspace& workspace) noexcept {
+                          const PenetrationSettings& settings, Workspace& workspace,
+                          const LevelSum* most) noexcept {
   DetailQueries queries(a, b, pose, settings, workspace);
-  AskedFor how{settings.relative_error, settings.min_radius, false};
-  if (settings.pair_budget == 0) return queries.ask(DetailPair(), how);
+  AskedFor how{settings.relative_error, false};
+  if (settings.pair_budget == 0) return queries.ask(DetailPair(), how, most);
   const DetailChain chain(a.tree.header(), b.tree.header(), pose.a_from_b.scale);
   // Nothing to choose, or nothing dear.
-  if (chain.size() == 1) return queries.ask(chain[0], how);
+  if (chain.size() == 1) return queries.ask(chain[0], how, most);
   const SphereTree coarse_a(a.tree.header(), matched_tree(a.tree.header(), chain.coarsest().a));
   const SphereTree coarse_b(b.tree.header(), matched_tree(b.tree.header(), chain.coarsest().b));
   const QuickLook look = quick_look(coarse_a, coarse_b, pose.a_from_b, false);
   const DetailWeight sure = chain.quick_weight(look.volume, settings.pair_budget);
-  if (sure.weight == 1) return queries.ask(chain[0], how);
+  if (sure.weight == 1) return queries.ask(chain[0], how, most);
 
   // Whatever else is asked, the coarse estimate is the whole sum: only that is smooth.
   const Penetration coarse = queries.coarse_estimate(chain.coarsest());
@@ -149,6 +142,7 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
   if (coarse.status != QueryStatus::ok) {
     // Stopped here, any level might have been meant.
     result = coarse;
+    if (most != nullptr) queries.ask(chain.coarsest(), {}, most);
     for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
       const Penetration bounds = queries.ask(chain[i], {});
       result.volume_min = std::min(result.volume_min, bounds.volume_min);
@@ -160,15 +154,22 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
     const bool rough = coarse.volume_max - coarse.volume_min > kRough * coarse.volume;
     // Where lenses graze, to sum them again in double takes longer than a coarser level saves.
     how.keep_rounding = weights[0].weight < 1;
-    double slope = 0;                               // of the blend by the coarse estimate
-    double sure_slope = 0;                          // and by the quick look
+    double slope = 0;       // of the blend by the coarse estimate
+    double sure_slope = 0;  // and by the quick look
+    const auto weight_of = [&](std::size_t i) {
+      return sure.weight * (i == 0 ? 1 : 0) + (1 - sure.weight) * weights[i].weight;
+    };
+    std::size_t largest = 0;
+    for (std::size_t i = 1; i < chain.size(); ++i)
+      if (weight_of(i) > weight_of(largest)) largest = i;
     for (std::size_t i = chain.size(); i-- > 0;) {  // the coarse ones first: they are sure to end
       const double alone = i == 0 ? 1 : 0;
-      const double weight = sure.weight * alone + (1 - sure.weight) * weights[i].weight;
+      const double weight = weight_of(i);
       if (weight == 0 && weights[i].slope == 0) continue;
-      const Penetration part = i + 1 == chain.size() && !rough && queries.by_lenses_alone(chain[i])
-                                   ? coarse
-                                   : queries.ask(chain[i], how);
+      const LevelSum* const by = i == largest ? most : nullptr;
+      const bool is_coarse = i + 1 == chain.size() && !rough && by == nullptr;
+      const Penetration part =
+          is_coarse && queries.by_lenses_alone(chain[i]) ? coarse : queries.ask(chain[i], how, by);
       result.volume += weight * part.volume;
       result.volume_min += weight * part.volume_min;
       result.volume_max += weight * part.volume_max;

@@ -23,9 +23,8 @@ class FieldDescent {
         probes_(probes),
         map_(pose.a_from_b),
         limits_(limits),
-        min_radius_(limits.min_radius / pose.unit_a),
         scratch_(scratch),
-        budget_(limits),
+        budget_(limits.max_visits),
         tally_(probes, pose, bins) {}
 
   void run() noexcept {
@@ -62,10 +61,6 @@ class FieldDescent {
     std::uint32_t held[kWidth];
     for (std::size_t i = 0; i < now.size; ++i) {
       const std::uint32_t block = now.a[i];
-      if (min_radius_ > 0 && probes_.ball(level, block).r * map_.scale < min_radius_) {
-        tally_.leave(level, block);
-        continue;
-      }
       if (budget_.grant(1) == 0 || next.size + kWidth > scratch_.capacity) {
         leave(level, i);
         for (std::size_t k = 0; k < next.size; ++k) tally_.leave(level - 1, next.a[k]);
@@ -134,7 +129,6 @@ class FieldDescent {
   const SphereTree& probes_;
   const Similarity& map_;
   const DescentLimits limits_;
-  const double min_radius_;
   Workspace::Impl& scratch_;
   Budget budget_;
   ProbeTally tally_;

@@ -25,7 +25,7 @@ class GapSearch {
         pose_(pose),
         map_(pose.a_from_b),
         stack_(scratch.waiting.get()),
-        budget_(limits_of(settings), 0.95) {}
+        budget_(visit_limit(settings.max_visits)) {}
 
   Separation run() noexcept {
     const double none = -std::numeric_limits<double>::infinity();

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "query/base/smooth_step.h"
+#include "query/descent/answer.h"
 #include "query/descent/descent.h"
 #include "query/field/surface_descent.h"
 
@@ -167,10 +168,13 @@ Penetration PairOverlap::exact(bool b_probes, const DescentLimits& limits,
   const PlacedTree& prober = b_probes ? b_ : a_;
   const SurfaceTree surface = surface_tree(owner.tree);
   const SphereTree probes(prober.tree.header(), b_probes ? tree_b_ : tree_a_);
+  const double unit_b = pose_.unit_a * pose_.a_from_b.scale;
+  const double most = std::min(tree_a_.volume_sum * (pose_.unit_a * pose_.unit_a * pose_.unit_a),
+                               tree_b_.volume_sum * (unit_b * unit_b * unit_b));
   if (b_probes) {
     SurfaceDescent descent(surface, probes, pose_, limits, scratch_, bins);
     descent.run();
-    return descent.penetration();
+    return kept_within(most, descent.penetration());
   }
   const std::optional<RelativePose> turned = relative_pose(owner, prober);
   if (!turned) {
@@ -180,15 +184,13 @@ Penetration PairOverlap::exact(bool b_probes, const DescentLimits& limits,
   }
   SurfaceDescent descent(surface, probes, *turned, limits, scratch_, bins);
   descent.run();
-  return turned_over(descent.penetration(), a_, b_);
+  return turned_over(kept_within(most, descent.penetration()), a_, b_);
 }
 
-std::optional<DescentLimits> PairOverlap::left_by(const Penetration& lenses, DescentLimits limits,
-                                                  const Stopwatch& time) noexcept {
-  limits.deadline_us = time.left_of(limits);
-  if (limits.max_visits == 0) return limits;
-  if (lenses.node_visits >= limits.max_visits) return std::nullopt;
-  limits.max_visits -= lenses.node_visits;
+std::optional<DescentLimits> PairOverlap::left_by(const Penetration& lenses,
+                                                  DescentLimits limits) noexcept {
+  limits.spend(lenses.node_visits);
+  if (limits.max_visits == 0) return std::nullopt;
   return limits;
 }
 
@@ -216,12 +218,11 @@ Penetration PairOverlap::without_exact(const PairMethod& method,
 Penetration PairOverlap::by(const PairMethod& method, const DescentLimits& limits) noexcept {
   if (!method.exact) return by_lenses(limits);
   if (!method.lenses) return exact(method.b_probes, limits);
-  const Stopwatch time(limits);
   const Penetration lenses = by_lenses(limits);
   const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
   const ExactWeight weight = exact_weight(method, lenses, unit3);
   if (weight.most == 0) return lenses;
-  const std::optional<DescentLimits> left = left_by(lenses, limits, time);
+  const std::optional<DescentLimits> left = left_by(lenses, limits);
   if (!left) return without_exact(method, lenses);
   return with_exact(method, lenses, weight, *left);
 }

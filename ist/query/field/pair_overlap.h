@@ -52,10 +52,9 @@ class PairOverlap {
                     ContactBins* bins = nullptr) noexcept;
   Penetration by(const PairMethod& method, const DescentLimits& limits) noexcept;
 
-  /// What the lenses leave of the limits for the exact sum; nothing if no visits are left. `time`:
-  /// since they began.
-  static std::optional<DescentLimits> left_by(const Penetration& lenses, DescentLimits limits,
-                                              const Stopwatch& time) noexcept;
+  /// What the lenses leave of the limits for the exact sum; nothing if no visits are left.
+  static std::optional<DescentLimits> left_by(const Penetration& lenses,
+                                              DescentLimits limits) noexcept;
 
   /// The lenses' sum blended with the exact one, which is summed within what is left. With `bins`,
   /// those of what probes, it is sorted into them too.

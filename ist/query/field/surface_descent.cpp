@@ -57,9 +57,8 @@ SurfaceDescent::SurfaceDescent(const SurfaceTree& surface, const SphereTree& pro
       balls_(tree_of(surface, ball_header_)),
       precision_(precision_for(balls_, probes, pose)),
       limits_(limits),
-      min_radius_(limits.min_radius / pose.unit_a),
       scratch_(scratch),
-      budget_(limits),
+      budget_(limits.max_visits),
       surface_level_(balls_.top),
       probe_level_(probes.top),
       tally_(probes, pose, bins) {}
@@ -75,7 +74,6 @@ void SurfaceDescent::run() noexcept {
         probe_level_ == 0 ||
         (surface_level_ > kSphereLevel &&
          typical_cube(balls_, surface_level_) >= cube * probes_.typical_cube(probe_level_));
-    if (min_radius_ > 0) drop_small();
     if (limits_.relative_error > 0 && tally_.has_held() &&
         tally_.accurate(waiting(), limits_.relative_error)) {
       leave(0);
@@ -142,13 +140,9 @@ bool SurfaceDescent::open_probes() noexcept {
       leave_both(from);
       return false;
     }
-    if (surface_level_ == kSphereLevel) {
-      const std::size_t granted = budget_.grant(end - from);
-      if (granted < end - from) {
-        budget_.give_back(granted);
-        leave_both(from);
-        return false;
-      }
+    if (surface_level_ == kSphereLevel && !budget_.grant_all(end - from)) {
+      leave_both(from);
+      return false;
     }
     const std::uint32_t first = kWidth * now.b[from];
     const std::uint32_t used =
@@ -289,9 +283,7 @@ void SurfaceDescent::sum_leaves() noexcept {
   double left = by_error ? waiting() : 0;
   for (std::size_t from = 0; from < now.size;) {
     const std::size_t end = group_end(from);
-    const std::size_t granted = budget_.grant(end - from);
-    if (granted < end - from) {
-      budget_.give_back(granted);
+    if (!budget_.grant_all(end - from)) {
       leave(from);
       return;
     }
@@ -387,24 +379,6 @@ double SurfaceDescent::waiting() const noexcept {
   for (std::size_t from = 0; from < now.size; from = group_end(from))
     sum += tally_.volume_of(probe_level_, now.b[from]);
   return sum;
-}
-
-void SurfaceDescent::drop_small() noexcept {
-  PairList& now = scratch_.now;
-  std::size_t kept = 0;
-  for (std::size_t from = 0; from < now.size;) {
-    const std::size_t end = group_end(from);
-    if (probes_.ball(probe_level_, now.b[from]).r * map_.scale < min_radius_) {
-      tally_.leave(probe_level_, now.b[from]);
-      from = end;
-      continue;
-    }
-    for (; from < end; ++from, ++kept) {
-      now.a[kept] = now.a[from];
-      now.b[kept] = now.b[from];
-    }
-  }
-  now.size = kept;
 }
 
 void SurfaceDescent::leave(std::size_t from) noexcept {

@@ -85,8 +85,6 @@ class SurfaceDescent {
   /// The same, and all of the next list, which is a level of B further down.
   void leave_both(std::size_t from) noexcept;
 
-  void drop_small() noexcept;
-
   const SurfaceTree& surface_;
   const SphereTree& probes_;
   const RelativePose& pose_;
@@ -95,7 +93,6 @@ class SurfaceDescent {
   SphereTree balls_;  ///< of the surface; its "spheres" are blocks of triangles
   const Precision precision_;
   const DescentLimits limits_;
-  const double min_radius_;  ///< A's unit frame
   Workspace::Impl& scratch_;
   Budget budget_;
   int surface_level_, probe_level_;

@@ -41,7 +41,7 @@ class ImpactLoop {
         frame_(frame),
         waiting_(scratch.ranked.get()),
         capacity_(scratch.capacity),
-        budget_({settings.max_visits, settings.deadline_us, 0, 0}, 0.95),
+        budget_(visit_limit(settings.max_visits)),
         floor_(tolerance / 2) {}
 
   const double end;

@@ -131,8 +131,8 @@ HWY_INLINE void add_both(const PairsOfBlocks<T>& pairs, std::uint32_t met_1, std
 
 /// add_leaf_pairs in T, a few pairs through all stages at a time.
 template <class T>
-std::size_t add_as(const LeafStage& stage, PlacedBlocks<T>& blocks, const std::uint32_t* a,
-                   const std::uint32_t* b, std::size_t n, LeafSums& sums) {
+void add_as(const LeafStage& stage, PlacedBlocks<T>& blocks, const std::uint32_t* a,
+            const std::uint32_t* b, std::size_t n, LeafSums& sums) {
   const TurnedAxes<T> axes(*stage.a_from_b);
   LeafSums* const bins = stage.bins.sums;
   const bool single_a = stage.level_a == kSphereLevel;
@@ -149,7 +149,7 @@ std::size_t add_as(const LeafStage& stage, PlacedBlocks<T>& blocks, const std::u
   PairsOfBlocks<T> pairs;
   LensList<T> list;
   std::size_t done = 0;
-  while (done < n && !(done > 0 && stage.budget != nullptr && stage.budget->visits_end())) {
+  while (done < n) {
     const std::size_t most = std::min(kPairsAtOnce, n - done);
     std::size_t taken = 0;
     for (; taken < most; ++taken) {
@@ -178,17 +178,16 @@ std::size_t add_as(const LeafStage& stage, PlacedBlocks<T>& blocks, const std::u
     }
   }
   sum_last_lenses(list, sums, bins);
-  return done;
 }
 
-std::size_t add_float32(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
-                        const std::uint32_t* b, std::size_t n, LeafSums& sums) {
-  return add_as<float>(stage, scratch.float32, a, b, n, sums);
+void add_float32(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+                 const std::uint32_t* b, std::size_t n, LeafSums& sums) {
+  add_as<float>(stage, scratch.float32, a, b, n, sums);
 }
 
-std::size_t add_float64(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
-                        const std::uint32_t* b, std::size_t n, LeafSums& sums) {
-  return add_as<double>(stage, scratch.float64, a, b, n, sums);
+void add_float64(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+                 const std::uint32_t* b, std::size_t n, LeafSums& sums) {
+  add_as<double>(stage, scratch.float64, a, b, n, sums);
 }
 
 }  // namespace ist::HWY_NAMESPACE
@@ -200,12 +199,13 @@ namespace ist {
 HWY_EXPORT(add_float32);
 HWY_EXPORT(add_float64);
 
-std::size_t add_leaf_pairs(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
-                           const std::uint32_t* b, std::size_t n, LeafSums& sums) noexcept {
+void add_leaf_pairs(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+                    const std::uint32_t* b, std::size_t n, LeafSums& sums) noexcept {
   if (stage.precision == Precision::float32) {
-    return HWY_DYNAMIC_DISPATCH(add_float32)(stage, scratch, a, b, n, sums);
+    HWY_DYNAMIC_DISPATCH(add_float32)(stage, scratch, a, b, n, sums);
+  } else {
+    HWY_DYNAMIC_DISPATCH(add_float64)(stage, scratch, a, b, n, sums);
   }
-  return HWY_DYNAMIC_DISPATCH(add_float64)(stage, scratch, a, b, n, sums);
 }
 
 }  // namespace ist

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "query/base/budget.h"
 #include "query/kernel/node_kernel.h"
 #include "query/kernel/placed_blocks.h"
 
@@ -23,11 +22,6 @@ struct alignas(64) LeafSums {
   double moment[3][kSumLanes] = {};  ///< 3/π · ∫ x dV
   double error[kSumLanes] = {};      ///< 1/2π · bound on what rounded distances change in V
   std::uint32_t lenses = 0;          ///< that are not empty
-
-  void add(const LeafSums& other) noexcept;
-
-  /// All but the count.
-  void scale(double factor) noexcept;
 };
 
 /// Where the sums of single pairs go besides the whole's: pair i to sums[node[i] >> shift].
@@ -46,13 +40,12 @@ struct LeafStage {
   int level_b;
   const Similarity* a_from_b;
   Precision precision;
-  Budget* budget = nullptr;  ///< whose deadline ends the stage, between batches
   LeafBinning bins = {};
 };
 
-/// Adds the lenses of every sphere of a[i] with every sphere of b[i]. Returns how many pairs it
-/// took: all n, or those that came before the deadline. The scratch keeps blocks from call to call.
-std::size_t add_leaf_pairs(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
-                           const std::uint32_t* b, std::size_t n, LeafSums& sums) noexcept;
+/// Adds the lenses of every sphere of a[i] with every sphere of b[i]. The scratch keeps blocks from
+/// call to call.
+void add_leaf_pairs(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+                    const std::uint32_t* b, std::size_t n, LeafSums& sums) noexcept;
 
 }  // namespace ist

@@ -17,31 +17,6 @@ Eigen::Vector3d total(const double (&lanes)[3][kSumLanes]) {
 
 }  // namespace
 
-void LeafSums::add(const LeafSums& other) noexcept {
-  for (std::size_t lane = 0; lane < kSumLanes; ++lane) {
-    caps[lane] += other.caps[lane];
-    error[lane] += other.error[lane];
-    for (int k = 0; k < 3; ++k) {
-      force[k][lane] += other.force[k][lane];
-      torque[k][lane] += other.torque[k][lane];
-      moment[k][lane] += other.moment[k][lane];
-    }
-  }
-  lenses += other.lenses;
-}
-
-void LeafSums::scale(double factor) noexcept {
-  for (std::size_t lane = 0; lane < kSumLanes; ++lane) {
-    caps[lane] *= factor;
-    error[lane] *= factor;
-    for (int k = 0; k < 3; ++k) {
-      force[k][lane] *= factor;
-      torque[k][lane] *= factor;
-      moment[k][lane] *= factor;
-    }
-  }
-}
-
 Overlap finish(const LeafSums& sums, Precision precision) noexcept {
   Overlap overlap;
   overlap.volume = std::numbers::pi / 3 * total(sums.caps);

@@ -24,14 +24,6 @@ struct Overlap {
     torque += other.torque;
     moment += other.moment;
   }
-
-  /// All but `error`.
-  void scale(double factor) noexcept {
-    volume *= factor;
-    force *= factor;
-    torque *= factor;
-    moment *= factor;
-  }
 };
 
 /// Relative rounding of a sum of lenses. A lens is good to a few units in the last place, and at

@@ -15,7 +15,7 @@ typedef struct place {
 
 typedef struct desk {
   place_t a, b;
-  /* For separation and patches too, which have fewer. */
+  /* For separation too, which has fewer. */
   ist_penetration_settings_t settings;
   ist_penetration_t penetration;
   ist_separation_t separation;
@@ -41,34 +41,32 @@ AT(settings.measure, 132);
 AT(settings.field, 136);
 AT(settings.pair_budget, 140);
 AT(settings.max_visits, 144);
-AT(settings.deadline_us, 152);
-AT(settings.relative_error, 160);
-AT(settings.min_radius, 168);
-AT(penetration.status, 180);
-AT(penetration.volume, 184);
-AT(penetration.node_visits, 280);
-AT(separation.status, 292);
-AT(separation.distance, 296);
-AT(separation.node_visits, 392);
-AT(patches, 400);
-AT(info.has_field, 8596);
-AT(info.volume, 8608);
-AT(info.field_triangles, 8640);
-AT(info.mesh_triangles, 8648);
-AT(info.mesh_error, 8656);
-AT(bounds.lower, 8680);
-AT(mass.volume, 8768);
-AT(counts, 8896);
-AT(motion_a, 8904);
-AT(motion_b, 8976);
-AT(impact_settings.max_visits, 9052);
-AT(impact_settings.duration, 9056);
-AT(impact.kind, 9088);
-AT(impact.time, 9104);
-AT(fit.grain_a, 9208);
-AT(fit.a_is_coarser, 9232);
-AT(wrenches.on_a, 9256);
-AT(numbers, 9352);
+AT(settings.relative_error, 152);
+AT(penetration.status, 164);
+AT(penetration.volume, 168);
+AT(penetration.node_visits, 264);
+AT(separation.status, 276);
+AT(separation.distance, 280);
+AT(separation.node_visits, 376);
+AT(patches, 384);
+AT(info.has_field, 8580);
+AT(info.volume, 8592);
+AT(info.field_triangles, 8624);
+AT(info.mesh_triangles, 8632);
+AT(info.mesh_error, 8640);
+AT(bounds.lower, 8664);
+AT(mass.volume, 8752);
+AT(counts, 8880);
+AT(motion_a, 8888);
+AT(motion_b, 8960);
+AT(impact_settings.max_visits, 9036);
+AT(impact_settings.duration, 9040);
+AT(impact.kind, 9064);
+AT(impact.time, 9080);
+AT(fit.grain_a, 9184);
+AT(fit.a_is_coarser, 9208);
+AT(wrenches.on_a, 9232);
+AT(numbers, 9328);
 _Static_assert(sizeof(ist_contact_patch_t) == 128, "patch");
 _Static_assert(sizeof(ist_penetration_t) == 112, "penetration");
 _Static_assert(sizeof(ist_ball_t) == 32, "ball");
@@ -82,14 +80,4 @@ static inline ist_placed_tree_t placed(const ist_tree_t* tree, const place_t* pl
 static inline ist_placed_field_t placed_field(const ist_field_t* field, const place_t* place) {
   const ist_placed_field_t made = {sizeof made, field, place->pose, place->scale};
   return made;
-}
-static inline ist_contact_settings_t contact_settings(void) {
-  const ist_contact_settings_t settings = {.size = sizeof settings,
-                                           .measure = desk.settings.measure,
-                                           .field = desk.settings.field,
-                                           .max_visits = desk.settings.max_visits,
-                                           .deadline_us = desk.settings.deadline_us,
-                                           .relative_error = desk.settings.relative_error,
-                                           .min_radius = desk.settings.min_radius};
-  return settings;
 }

@@ -5,21 +5,21 @@ import {IstError} from './error.js';
 import {f64, functions, u32} from './memory.js';
 
 export const kSettings = 128;
-export const kPenetration = 176;
-export const kSeparation = 288;
-export const kPatches = 400;
+export const kPenetration = 160;
+export const kSeparation = 272;
+export const kPatches = 384;
 export const kMostPatches = 64;
-export const kInfo = 8592;
-export const kBounds = 8672;
-export const kMass = 8760;
-export const kCounts = 8896;
-export const kMotion = 8904;
+export const kInfo = 8576;
+export const kBounds = 8656;
+export const kMass = 8744;
+export const kCounts = 8880;
+export const kMotion = 8888;
 export const kMotionBytes = 72;
-export const kImpactSettings = 9048;
-export const kImpact = 9080;
-export const kFit = 9200;
-export const kWrenches = 9248;
-export const kNumbers = 9352;
+export const kImpactSettings = 9032;
+export const kImpact = 9056;
+export const kFit = 9176;
+export const kWrenches = 9224;
+export const kNumbers = 9328;
 
 let start = 0;
 /** Where the desk stands in memory. */
@@ -95,11 +95,7 @@ export function writeSettings(options) {
   integers[at + 2] = choice(options?.field, kFieldUses, 'field');
   integers[at + 3] = count(options?.pairBudget, 0, 'pairBudget');
   integers[at + 4] = count(options?.maxVisits, 0, 'maxVisits');
-  const numbers = f64();
-  const limits = (desk() + kSettings) / 8 + 3;
-  numbers[limits] = limit(options?.deadlineUs, 'deadlineUs');
-  numbers[limits + 1] = limit(options?.relativeError, 'relativeError');
-  numbers[limits + 2] = limit(options?.minRadius, 'minRadius');
+  f64()[(desk() + kSettings) / 8 + 3] = limit(options?.relativeError, 'relativeError');
 }
 
 /** Copies three numbers, which is shorter than set() and makes no view. */

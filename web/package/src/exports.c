@@ -130,8 +130,7 @@ EXPORT(separation)
 ist_status_t separation(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b) {
   const ist_placed_tree_t second = placed(b, &desk.b);
   const ist_separation_settings_t settings = {.size = sizeof settings,
-                                              .max_visits = desk.settings.max_visits,
-                                              .deadline_us = desk.settings.deadline_us};
+                                              .max_visits = desk.settings.max_visits};
   if (a == NULL) {
     const ist_placed_field_t first = placed_field(field, &desk.a);
     return ist_field_separation(&first, &second, &settings, &desk.workspace, &desk.separation);
@@ -145,7 +144,6 @@ EXPORT(contact_patches)
 ist_status_t contact_patches(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b,
                              uint32_t most) {
   const ist_placed_tree_t second = placed(b, &desk.b);
-  const ist_contact_settings_t settings = contact_settings();
   ist_contact_patches_t found = {.size = sizeof found,
                                  .patch_size = sizeof desk.patches[0],
                                  .patches = desk.patches,
@@ -153,12 +151,12 @@ ist_status_t contact_patches(const ist_tree_t* a, const ist_field_t* field, cons
   ist_status_t status;
   if (a == NULL) {
     const ist_placed_field_t first = placed_field(field, &desk.a);
-    status = ist_field_contact_patches(&first, &second, &settings, &desk.workspace, &found,
+    status = ist_field_contact_patches(&first, &second, &desk.settings, &desk.workspace, &found,
                                        &desk.penetration);
   } else {
     const ist_placed_tree_t first = placed(a, &desk.a);
-    status =
-        ist_contact_patches(&first, &second, &settings, &desk.workspace, &found, &desk.penetration);
+    status = ist_contact_patches(&first, &second, &desk.settings, &desk.workspace, &found,
+                                 &desk.penetration);
   }
   desk.counts[0] = (uint32_t)found.count;
   return status;
@@ -169,11 +167,10 @@ EXPORT(overlap_outline)
 ist_status_t overlap_outline(const ist_tree_t* a, const ist_tree_t* b, uint32_t most,
                              ist_outline_segment_t* room, size_t capacity) {
   const ist_placed_tree_t first = placed(a, &desk.a), second = placed(b, &desk.b);
-  const ist_contact_settings_t settings = contact_settings();
   ist_contact_patches_t found = {sizeof found, sizeof desk.patches[0], desk.patches, most, 0};
   ist_outline_t outline = {
       .size = sizeof outline, .segment_size = sizeof *room, .segments = room, .capacity = capacity};
-  const ist_status_t status = ist_overlap_outline(&first, &second, &settings, &desk.workspace,
+  const ist_status_t status = ist_overlap_outline(&first, &second, &desk.settings, &desk.workspace,
                                                   &found, &outline, &desk.penetration);
   desk.counts[0] = (uint32_t)found.count;
   desk.counts[1] = (uint32_t)outline.total;

@@ -12,9 +12,8 @@ ist_status_t without_protrusion(const ist_tree_t* a, const ist_tree_t* b) {
 EXPORT(patches_without_protrusion)
 ist_status_t patches_without_protrusion(const ist_tree_t* a, const ist_tree_t* b, uint32_t count) {
   const ist_placed_tree_t first = placed(a, &desk.a), second = placed(b, &desk.b);
-  const ist_contact_settings_t settings = contact_settings();
   ist_contact_patches_t found = {sizeof found, sizeof desk.patches[0], desk.patches, count, count};
-  return ist_patches_without_protrusion(&first, &second, &settings, &found);
+  return ist_patches_without_protrusion(&first, &second, &desk.settings, &found);
 }
 
 EXPORT(pair_fit) ist_status_t pair_fit(const ist_tree_t* a, const ist_tree_t* b) {
@@ -120,7 +119,6 @@ void penetration_batch(const asked_pair_t* pairs, size_t count, ist_penetration_
 EXPORT(contact_patches_batch)
 void contact_patches_batch(const asked_pair_t* pairs, size_t count, ist_penetration_t* wholes,
                            ist_contact_patch_t* patches, uint32_t most, uint32_t* counts) {
-  const ist_contact_settings_t settings = contact_settings();
   size_t i;
   for (i = 0; i < count; ++i) {
     const asked_pair_t* const pair = &pairs[i];
@@ -132,10 +130,10 @@ void contact_patches_batch(const asked_pair_t* pairs, size_t count, ist_penetrat
     wholes[i].size = sizeof wholes[i];
     if (pair->a == NULL) {
       const ist_placed_field_t a = placed_field(pair->field, &pair->place_a);
-      ist_field_contact_patches(&a, &b, &settings, &desk.workspace, &found, &wholes[i]);
+      ist_field_contact_patches(&a, &b, &desk.settings, &desk.workspace, &found, &wholes[i]);
     } else {
       const ist_placed_tree_t a = placed(pair->a, &pair->place_a);
-      ist_contact_patches(&a, &b, &settings, &desk.workspace, &found, &wholes[i]);
+      ist_contact_patches(&a, &b, &desk.settings, &desk.workspace, &found, &wholes[i]);
     }
     counts[i] = (uint32_t)found.count;
   }

@@ -77,7 +77,6 @@ export function timeOfImpact(a, b, poseB, options) {
   const given = f64();
   given[settings / 8 + 1] = positive(options?.duration ?? 1, 'duration');
   given[settings / 8 + 2] = options?.tolerance ?? 0;
-  given[settings / 8 + 3] = options?.deadlineUs ?? 0;
   const status = ask('time_of_impact', 'timeOfImpact()', a, b, poseB, options, 0);
   const out = options?.into ?? newImpact();
   const numbers = f64(), integers = u32();

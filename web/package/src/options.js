@@ -1,9 +1,9 @@
 // Names that options may have: others are misspelt.
 
-const kLimits = ['maxVisits', 'deadlineUs', 'poseA', 'into'];
-const kContact = [...kLimits, 'measure', 'field', 'relativeError', 'minRadius'];
+const kLimits = ['maxVisits', 'poseA', 'into'];
+const kContact = [...kLimits, 'measure', 'field', 'relativeError', 'pairBudget'];
 const kOfBatch = (names) => names.filter((name) => name !== 'poseA');
-const kPenetration = [...kContact, 'pairBudget'], kPatches = [...kContact, 'maxPatches'];
+const kPenetration = kContact, kPatches = [...kContact, 'maxPatches'];
 
 const kNames = {
   'init()': ['wasm'],

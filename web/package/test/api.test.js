@@ -238,8 +238,6 @@ test('poses and scales: the world may be moved', () => {
   const limited = ist.penetration(a, b, {translation: [0, 0, 9]}, {maxVisits: 20});
   assert.equal(limited.status, 'budget-exhausted');
   assert.ok(limited.volumeMin <= still.volume && still.volume <= limited.volumeMax);
-  const hurried = ist.penetration(a, b, {translation: [0, 0, 9]}, {deadlineUs: 1e-3});
-  assert.equal(hurried.status, 'budget-exhausted');
   a.free();
   b.free();
 });
