@@ -16,7 +16,6 @@
 #include <ist/bake.h>
 #include <ist/pose_eigen.h>
 #include <ist/query.h>
-#include <manifold/manifold.h>
 
 #include <algorithm>
 #include <array>
@@ -25,6 +24,7 @@
 #include <map>
 #include <numbers>
 
+#include "manifold_mesh.h"
 #include "report.h"
 #include "samples/samples.h"
 #include "support/bullet_mesh.h"
@@ -36,6 +36,7 @@ namespace {
 
 using ist::Pose;
 using ist::TriangleMesh;
+using ist::benchmark::ManifoldMesh;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
 using ist::benchmark::thread_seconds;
@@ -60,31 +61,6 @@ struct Class {
 Eigen::Vector3d placed(const Eigen::Vector3d& x, const Pose& pose) {
   return ist::to_isometry(pose) * x;
 }
-
-class ManifoldMesh {
- public:
-  explicit ManifoldMesh(const TriangleMesh& mesh) : solid_(of(mesh)) {}
-
-  double overlap(const ManifoldMesh& b, const Pose& pose) const {
-    const Eigen::Isometry3d at = ist::to_isometry(pose);
-    manifold::mat3x4 map;
-    for (int column = 0; column < 4; ++column)
-      for (int row = 0; row < 3; ++row) map[column][row] = at.matrix()(row, column);
-    return (solid_ ^ b.solid_.Transform(map)).Volume();
-  }
-
- private:
-  static manifold::Manifold of(const TriangleMesh& mesh) {
-    manifold::MeshGL64 out;
-    out.numProp = 3;
-    for (const Eigen::Vector3d& v : mesh.vertices)
-      out.vertProperties.insert(out.vertProperties.end(), v.data(), v.data() + 3);
-    for (const auto& t : mesh.triangles)
-      out.triVerts.insert(out.triVerts.end(), t.begin(), t.end());
-    return manifold::Manifold(out);
-  }
-  manifold::Manifold solid_;
-};
 
 /// What corefinement cuts: made anew for each call, outside the clock.
 class CgalMesh {

@@ -169,10 +169,12 @@ def trade(report, path):
                 if "error median %" not in mine[0]:
                     axis.axvline(mine[0]["median us"], color=colour, linestyle=":", label=curve)
                     continue
-                style = {"matched": "o-", "inner": "v--", "SDF voxel sum": "s-"}.get(curve, ".-")
-                # An error of 0 has no place on a logarithm.
+                style = {"matched": "o-", "inner": "v--", "SDF voxel sum": "s-", "exact": "*",
+                         "Manifold boolean": "P"}.get(curve, ".-")
+                # Errors below 1e-5 %, those of exact volumes, are at the lower edge.
                 points = [(row["median us"], max(row["error median %"], 1e-5)) for row in mine]
-                axis.loglog(*zip(*points), style, color=colour, label=curve, markersize=5)
+                axis.loglog(*zip(*points), style, color=colour, label=curve,
+                            markersize=11 if style in "*P" else 5)
                 if curve == "matched":
                     for row, point in zip(mine, points):
                         axis.annotate(f" {int(row['setting']):,}", point, fontsize=6)

@@ -74,6 +74,7 @@ std::vector<Method> methods_of(const Sweep& sweep, const std::vector<Baked>& bak
   for (const Baked& assets : baked) add("matched", thousands(assets.spheres), assets, {});
   for (const Baked& assets : baked)
     add("inner", thousands(assets.spheres), assets, {.measure = ist::Measure::inner});
+  add("exact", "", baked.front(), {.measure = ist::Measure::exact});
   for (const Baked& assets : baked) {
     const auto of = [&](const char* what) {
       return std::string(what) + ", " + thousands(assets.spheres) + " spheres";

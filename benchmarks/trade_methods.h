@@ -9,6 +9,9 @@
 #include <tuple>
 #include <vector>
 
+#ifdef IST_HAVE_MANIFOLD
+#include "manifold_mesh.h"
+#endif
 #include "sdf_voxel_sum.h"
 #include "support/bullet_mesh.h"
 #include "support/fcl_mesh.h"
@@ -53,7 +56,13 @@ class Peers {
         fcl_small_(pair.b->closed.mesh, small_scale),
         bullet_a_(pair.a->closed.mesh),
         bullet_b_(pair.b->closed.mesh),
-        bullet_small_(pair.b->closed.mesh, small_scale) {
+        bullet_small_(pair.b->closed.mesh, small_scale)
+#ifdef IST_HAVE_MANIFOLD
+        ,
+        manifold_a_(pair.a->closed.mesh),
+        manifold_b_(pair.b->closed.mesh)
+#endif
+  {
     const double size_a = pair.a->solid.bounds().diagonal().norm();
     for (const double part : voxels) {
       // One spacing for both, a part of A's diagonal.
@@ -73,6 +82,11 @@ class Peers {
                                           row.scale_b == 1 ? bullet_b_ : bullet_small_, row.pose);
                          return std::numeric_limits<double>::quiet_NaN();
                        }});
+#ifdef IST_HAVE_MANIFOLD
+    methods.push_back({"Manifold boolean", "", [this](const Row& row) {
+                         return manifold_a_.overlap(manifold_b_, row.pose, row.scale_b);
+                       }});
+#endif
     for (const auto& [part, a, b] : sdf_) {
       char text[32];
       std::snprintf(text, sizeof text, "h = %g D", part);
@@ -86,6 +100,9 @@ class Peers {
   testing::FclMesh fcl_a_, fcl_b_, fcl_small_;
   testing::BulletMesh bullet_a_, bullet_b_, bullet_small_;
   testing::BulletNarrowPhase narrow_;
+#ifdef IST_HAVE_MANIFOLD
+  ManifoldMesh manifold_a_, manifold_b_;
+#endif
   std::vector<std::tuple<double, SdfVoxels, SdfVoxels>> sdf_;
 };
 

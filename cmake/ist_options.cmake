@@ -1,6 +1,9 @@
 # Language, warnings, floating-point rules and sanitizers of every target of this project. A warning ends the
 # build, but not that of a project that this one is a part of.
 function(ist_compile_options target)
+  if(PROJECT_IS_TOP_LEVEL)
+    ist_precompile(${target})
+  endif()
   set_target_properties(${target} PROPERTIES
     CXX_STANDARD 20 CXX_STANDARD_REQUIRED ON CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON
     # Of a shared library only what the public headers declare is seen (ist/api.h).
@@ -25,4 +28,37 @@ function(ist_compile_options target)
       -fsanitize=${IST_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${IST_SANITIZE})
   endif()
+endfunction()
+
+# Eigen and the standard library take a third of the compiler's time, so they are compiled once for
+# libraries and once for programs, whose flags differ. -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON shows
+# what a source forgot to include. ccache needs CCACHE_SLOPPINESS=pch_defines,time_macros.
+function(ist_precompile target)
+  if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    return()
+  endif()
+  get_target_property(type ${target} TYPE)
+  set(headers "<Eigen/Geometry>" "<algorithm>" "<functional>" "<memory>" "<random>" "<string>")
+  if(type STREQUAL "EXECUTABLE")
+    set(owner ist_headers_of_programs)
+  else()
+    set(owner ist_headers_of_libraries)
+  endif()
+  target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-fpch-preprocess>)
+  if(target STREQUAL owner)
+    list(TRANSFORM headers REPLACE "(.+)" "$<$<COMPILE_LANGUAGE:CXX>:\\1>")
+    target_precompile_headers(${target} PRIVATE ${headers})
+    return()
+  endif()
+  if(NOT TARGET ${owner})
+    file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/headers.cpp CONTENT "int main() {}\n")
+    if(type STREQUAL "EXECUTABLE")
+      add_executable(${owner} EXCLUDE_FROM_ALL ${PROJECT_BINARY_DIR}/headers.cpp)
+    else()
+      add_library(${owner} OBJECT EXCLUDE_FROM_ALL ${PROJECT_BINARY_DIR}/headers.cpp)
+    endif()
+    target_link_libraries(${owner} PRIVATE Eigen3::Eigen)
+    ist_compile_options(${owner})
+  endif()
+  target_precompile_headers(${target} REUSE_FROM ${owner})
 endfunction()

@@ -194,7 +194,7 @@ void orient_faces(Surface& surface, const std::string& name, MeshReport& report)
     return "vertex " + std::to_string(v) + " " + position_text(mesh.vertices[v]);
   };
   if (!find_unbalanced_edge(mesh.triangles, surface.edges)) return;
-  report.notes.push_back("neighbouring faces had opposite orientations: made consistent");
+  report.notes.emplace_back("neighbouring faces had opposite orientations: made consistent");
   auto conflict = make_consistent(mesh.triangles, manifold_partners(surface.edges));
   if (!conflict) {
     surface.triangles_changed();
