@@ -39,11 +39,11 @@ class PairPatches {
         tree_a_(sphere_tree(a.tree, settings.measure)),
         tree_b_(sphere_tree(b.tree, settings.measure)),
         both_(a, *tree_a_.header, b, *tree_b_.header, pose, scratch),
-        method_(
-            pair_method(a, *tree_a_.header, b, *tree_b_.header, pose,
-                        settings.measure == Measure::inner ? FieldUse::never : settings.field)) {}
+        use_(settings.measure == Measure::inner ? FieldUse::never : settings.field),
+        method_(pair_method(a, *tree_a_.header, b, *tree_b_.header, pose, use_)) {}
 
   ContactPatches run(std::span<ContactPatch> patches) {
+    if (lacks_surface(method_, use_)) return not_held<ContactPatches>();
     ContactPatches result;
     ContactBins& bins = scratch_.contact;
     if (!method_.lenses) {
@@ -117,6 +117,7 @@ class PairPatches {
   Workspace::Impl& scratch_;
   const SphereTree tree_a_, tree_b_;
   PairOverlap both_;
+  const FieldUse use_;
   const PairMethod method_;
 };
 
@@ -129,11 +130,7 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
     return exact_patches(a, b, settings, workspace, patches, {}).contact;
   if (lack_spheres(a, b)) return not_held<ContactPatches>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
-  if (!pose || workspace.impl() == nullptr) {
-    ContactPatches refused;
-    refused.penetration.status = QueryStatus::invalid_input;
-    return refused;
-  }
+  if (!pose || workspace.impl() == nullptr) return invalid_input<ContactPatches>();
   PairPatches both(a, b, settings, *pose, *workspace.impl());
   const ContactPatches result = both.run(patches);
   finish_patches(patches.first(result.count), both.deepest());

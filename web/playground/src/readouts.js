@@ -4,7 +4,7 @@ import {digits, range, vector, whole} from './format.js';
 
 const kRows = [
   ['volume', 'Volume', 'u³', 'main'],
-  ['sum', 'Sum in', 'u³'],  // with its rounding; no bounds of the true volume
+  ['sum', 'Interval of the sum', 'u³'],  // it says nothing of the true volume
   ['distance', 'Distance', 'u'],
   ['force', 'Force / k', 'u²'],
   ['forceVector', '', '', 'detail'],
