@@ -232,8 +232,8 @@ std::string fault_of(const Pose& pose, double scale, const char* pose_name,
   return {};
 }
 
-std::string fault_of(const Row& row) {
-  const std::string of_b = fault_of(row.b.pose, row.b.scale, "poses", "scales");
+std::string fault_of(const Row& row, const char* name) {
+  const std::string of_b = fault_of(row.b.pose, row.b.scale, name, "scales");
   if (!of_b.empty()) return of_b;
   const std::string of_a = fault_of(row.pose_a, row.scale_a, "poses_a", "scales_a");
   if (!of_a.empty()) return of_a;
@@ -241,7 +241,8 @@ std::string fault_of(const Row& row) {
   const bool near =
       tree != nullptr ? relative_pose(PlacedTree{*tree, row.pose_a, row.scale_a}, row.b).has_value()
                       : relative_pose(row.pose_a, row.scale_a, row.b).has_value();
-  return near ? std::string() : "poses: sizes or distances are more than 1e60 : 1 apart";
+  return near ? std::string()
+              : std::string(name) + ": sizes or distances are more than 1e60 : 1 apart";
 }
 
 void refuse_unanswered(const Rows& rows, QueryStatus status, Asked asked) {

@@ -104,8 +104,8 @@ inline void refuse_unanswered(const Rows& rows, const Column<std::uint32_t>& sta
 /// What makes a pose or a scale unusable, with the argument's name; nothing if they are usable.
 std::string fault_of(const Pose& pose, double scale, const char* pose_name, const char* scale_name);
 
-/// The same of two placed solids, beside each other too.
-std::string fault_of(const Row& row);
+/// The same of two placed solids, beside each other too. `name`: of B's pose.
+std::string fault_of(const Row& row, const char* name = "poses");
 
 /// Rows of seven numbers, of such or of matrices (4, 4).
 Doubles take_poses(const py::handle& value, const char* name, const std::string& wanted);

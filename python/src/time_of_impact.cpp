@@ -85,10 +85,11 @@ void add_time_of_impact(py::module_& module) {
         if (from.shape().empty()) {
           const auto status = ImpactStatus{*answers->status.row(0)};
           const bool invalid = status == ImpactStatus::invalid_input;
-          if (invalid && fault_of(from.at(0)).empty())
-            throw value_error("poses_to, about: " + (fault_of(to.at(0)).empty()
-                                                         ? "a motion with NaN, or too far"
-                                                         : fault_of(to.at(0))));
+          if (invalid && fault_of(from.at(0)).empty()) {
+            const std::string fault = fault_of(to.at(0), "poses_to");
+            throw value_error(fault.empty() ? "poses_to, about: a motion with NaN, or too far"
+                                            : fault);
+          }
           refuse_unanswered(from, invalid                            ? QueryStatus::invalid_input
                                   : status == ImpactStatus::not_held ? QueryStatus::not_held
                                                                      : QueryStatus::ok);

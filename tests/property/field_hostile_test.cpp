@@ -172,8 +172,9 @@ TEST(FieldHostile, TablesOfNoNumbers) {
               << field.index() << ' ' << value << ' ' << all << ' ' << z;
           const Separation s = separation(a, b, {}, workspace);
           EXPECT_EQ(std::isnan(s.distance), s.status == QueryStatus::invalid_input);
-          if (all && !std::isfinite(value) && z == 0)
+          if (all && !std::isfinite(value) && z == 0) {
             EXPECT_EQ(p.status, QueryStatus::invalid_input) << field.index() << ' ' << value;
+          }
         }
       }
     }

@@ -144,7 +144,7 @@ TEST(TimeOfImpact, RefusesWhatIsNoInput) {
     return time_of_impact(PlacedField{field, {}, 1}, b, {}, {}, workspace()).status;
   };
   EXPECT_EQ(of_field(BallField{-1}), kInvalid);
-  EXPECT_EQ(of_field(HalfSpaceField{{0, 0, 2}, 0}), kInvalid);
+  EXPECT_EQ(of_field(HalfSpaceField{{0, 0, 0}, 0}), kInvalid);
   EXPECT_EQ(of_field(MeshField{ball_of_spheres().view()}), kInvalid);
   EXPECT_EQ(of_field(MeshField{cube().view()}), ImpactStatus::no_impact);
   EXPECT_EQ(of_field(FunctionField{

@@ -478,7 +478,9 @@ TEST(GpuFields, InvalidInputSpoilsOnlyItself) {
     const bool is_bad = std::find(bad.begin(), bad.end(), i) != bad.end();
     EXPECT_EQ(answers[i].status, is_bad ? QueryStatus::invalid_input : QueryStatus::ok) << i;
     EXPECT_EQ(std::isnan(answers[i].volume), is_bad) << i;
-    if (!is_bad) EXPECT_EQ(answers[i].volume, sound[i].volume) << i;
+    if (!is_bad) {
+      EXPECT_EQ(answers[i].volume, sound[i].volume) << i;
+    }
     if (!is_bad || pairs[i].b >= batch_views().size() || pairs[i].a >= fields.size()) continue;
     const Penetration cpu = by_cpu(fields[pairs[i].a], pairs[i], Measure::matched);
     EXPECT_EQ(cpu.status, QueryStatus::invalid_input) << i;

@@ -227,7 +227,9 @@ TEST(GpuQuery, InvalidPosesSpoilOnlyThemselves) {
                   answers[i].translation_gradient.hasNaN() && answers[i].rotation_gradient.hasNaN(),
               is_bad)
         << i;
-    if (!is_bad) EXPECT_EQ(answers[i].volume, sound[i].volume) << i;
+    if (!is_bad) {
+      EXPECT_EQ(answers[i].volume, sound[i].volume) << i;
+    }
   }
   EXPECT_TRUE(HostBatch(batch_views()).run({}, Measure::inner).empty());
 }
