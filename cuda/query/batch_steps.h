@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "cuda/atomics.h"
@@ -22,11 +23,17 @@ IST_HD inline void write3(double* to, std::uint32_t i, double x, double y, doubl
   to[3 * std::uint64_t{i} + 2] = z;
 }
 
+/// Nothing met: zero. Invalid: every number is NaN, as on the CPU (query/base/no_answer.h).
+IST_HD inline double nothing(QueryStatus status) {
+  return status == QueryStatus::ok ? 0 : static_cast<double>(NAN);
+}
+
 IST_HD inline void write_nothing(const GpuPenetrations& to, std::uint32_t i, QueryStatus status) {
-  if (to.volume != nullptr) to.volume[i] = 0;
-  write3(to.centroid, i, 0, 0, 0);
-  write3(to.translation_gradient, i, 0, 0, 0);
-  write3(to.rotation_gradient, i, 0, 0, 0);
+  const double none = nothing(status);
+  if (to.volume != nullptr) to.volume[i] = none;
+  write3(to.centroid, i, none, none, none);
+  write3(to.translation_gradient, i, none, none, none);
+  write3(to.rotation_gradient, i, none, none, none);
   if (to.status != nullptr) to.status[i] = status;
   if (to.node_visits != nullptr) to.node_visits[i] = 0;
   if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = 0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -10,6 +11,7 @@
 #include <ist/field.h>
 
 #include "cuda/query/field_ref.h"
+#include "query/asset/shared_constants.h"
 
 // Host code only: fields in plain numbers. What is out of range is `unusable`, as the shapes of
 // query/field/ are not sound.
@@ -51,8 +53,10 @@ inline FieldRef field_ref(const Field& field, const std::byte* at) {
   const auto* const floats = reinterpret_cast<const float*>(at);
   if (const auto* const f = std::get_if<HalfSpaceField>(&field)) {
     const double length = f->normal.norm();
-    ref.kind = kind(std::abs(length - 1) <= 1e-3 && is_place(f->offset), FieldKind::half_space);
-    ref.half_space.offset = f->offset;
+    ref.kind = kind(
+        length >= kShortestDirection && length <= kLongestDirection && is_place(f->offset / length),
+        FieldKind::half_space);
+    ref.half_space.offset = f->offset / length;
     for (int k = 0; k < 3; ++k) ref.half_space.normal[k] = f->normal[k] / length;
   } else if (const auto* const f = std::get_if<BoxField>(&field)) {
     const Eigen::Vector3d& half = f->half_extents;
@@ -71,7 +75,9 @@ inline FieldRef field_ref(const Field& field, const std::byte* at) {
   } else if (const auto* const f = std::get_if<HeightField>(&field)) {
     ref.kind = kind(f->heights != nullptr && f->columns >= 2 && f->rows >= 2 &&
                         f->columns <= 1u << 20 && f->rows <= 1u << 20 && is_length(f->spacing[0]) &&
-                        is_length(f->spacing[1]) && f->lowest <= f->highest,
+                        is_length(f->spacing[1]) && f->lowest <= f->highest &&
+                        std::all_of(f->heights, f->heights + std::size_t{f->columns} * f->rows,
+                                    [](float height) { return std::isfinite(height); }),
                     FieldKind::height);
     ref.height = {floats,    f->columns, f->rows, {f->spacing[0], f->spacing[1]},
                   f->lowest, f->highest};

@@ -92,9 +92,9 @@ struct PairPlace {
   IST_HD static bool usable(const Pose& pose, double scale, double (&q)[4]) {
     const double norm = std::sqrt((pose.q[0] * pose.q[0] + pose.q[1] * pose.q[1]) +
                                   (pose.q[2] * pose.q[2] + pose.q[3] * pose.q[3]));
-    const double off = norm > 1 ? norm - 1 : 1 - norm;
     constexpr double kLargest = 1.7976931348623157e308;
-    bool good = off <= 1e-3 && scale > 0 && scale <= kLargest;
+    bool good =
+        norm >= kShortestDirection && norm <= kLongestDirection && scale > 0 && scale <= kLargest;
     for (int i = 0; i < 3; ++i) good = good && pose.t[i] >= -kLargest && pose.t[i] <= kLargest;
     const double per_norm = 1 / norm;
     for (int i = 0; i < 4; ++i) q[i] = pose.q[i] * per_norm;

@@ -91,8 +91,10 @@ IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
 IST_HD inline int sift_separation(const SeparationArrays& batch, std::uint32_t i) {
   PairPlace place;
   if (!place_pair(batch.pairs, i, place)) {
-    const double none[3] = {0, 0, 0};
-    write_separation(batch.answers, i, QueryStatus::invalid_input, none, GapWitness{}, 0, 0);
+    const double none = nothing(QueryStatus::invalid_input);
+    const double distance[3] = {none, none, none};
+    const GapWitness witness = {{none, none, none}, {none, none, none}, {none, none, none}};
+    write_separation(batch.answers, i, QueryStatus::invalid_input, distance, witness, 0, 0);
     return -1;
   }
   const AssetRef& a = batch.pairs.assets[batch.pairs.pairs.asset_a[i]];

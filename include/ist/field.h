@@ -18,8 +18,9 @@ namespace IST_API ist {
 
 /// The solid normal · x ≤ offset. Exact.
 struct HalfSpaceField {
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit length within 1e-3, outward
-  double offset = 0;                                  ///< [u]
+  /// Outward, of any length but 0 (1e-150 to 1e150), by which the offset is divided too.
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double offset = 0;  ///< [u] for a unit normal
 };
 
 /// A box around the origin. Exact, also at edges and corners, and for balls thicker than the box.
@@ -50,7 +51,8 @@ struct CylinderField {
 
 /// Terrain: the solid under a grid of heights along z, two triangles per cell, cut from (i, j) to
 /// (i
-/// + 1, j + 1). Exact. Beyond its border it continues level.
+/// + 1, j + 1). Exact. Beyond its border it continues level. A height that is not finite gives
+/// QueryStatus::invalid_input where a query looks at it, on a GPU wherever the terrain is.
 struct HeightField {
   const float* heights = nullptr;  ///< [u] [rows · columns], columns (x) run fastest
   std::uint32_t columns = 0;       ///< ≥ 2, along x
@@ -61,7 +63,8 @@ struct HeightField {
 };
 
 /// Distances at the points of a grid, interpolated linearly in each cell: the gradient jumps from
-/// cell to cell. Outside of the grid is outside of the solid.
+/// cell to cell. Outside of the grid is outside of the solid. A distance that is not finite gives
+/// QueryStatus::invalid_input where a query looks at it.
 struct DistanceGridField {
   const float* distances = nullptr;  ///< [u] [size[0] · size[1] · size[2]], x runs fastest
   std::uint32_t size[3] = {};        ///< points along x, y, z, each ≥ 2

@@ -60,8 +60,8 @@ struct GpuPenetrations {
   double* translation_gradient = nullptr;  ///< [count][3] [u²] dV/d(translation of B), world
   /// [count][3] [u³/rad] dV/d(rotation vector of B about B's origin), world
   double* rotation_gradient = nullptr;
-  /// [count] ok, or invalid_input for an invalid pose, scale or asset index; other pairs are not
-  /// affected.
+  /// [count] ok, or invalid_input for an invalid pose, scale or asset index: all numbers are NaN.
+  /// Other pairs are not affected.
   QueryStatus* status = nullptr;
   std::uint32_t* node_visits = nullptr;   ///< [count]
   std::uint32_t* sphere_pairs = nullptr;  ///< [count]

@@ -7,8 +7,9 @@
  * Errors: every function that can fail returns a status. A negative one is an error, which
  * ist_describe() turns into words. Nothing is thrown or printed. A null pointer, a wrong size or an
  * invalid handle gives a status.
- * Results: if a call fails its answers are all zero except for `size` and `status`, where they have
- * space.
+ * Results: if a query fails all numbers of its answer are NaN and its counts 0, so that no failure
+ * reads as no contact. Other results of a call that fails are all zero except for `size` and
+ * `status`, where they have space.
  * Sizes: set up a struct that starts with `size` as `ist_penetration_t x = {.size = sizeof x}`. All
  * other members may be 0, the default, except ist_impact_settings_t::duration. A library accepts
  * the sizes of all headers that it serves.
@@ -37,11 +38,11 @@ extern "C" {
 typedef int32_t ist_status_t;
 enum {
   IST_OK = 0,
-  /* A limit or the workspace's capacity stopped the query. volume_min and volume_max are still
-   * bounds, as for a finished answer. */
+  /* A limit or the workspace's capacity stopped the query. What volume_min and volume_max contain,
+   * they still contain. */
   IST_BUDGET_EXHAUSTED = 1,
-  /* A pose with NaN or Inf, a quaternion that is not of unit length, a scale < 0, sizes or
-   * distances more than 1e60 : 1 apart, or a field's number or an enum out of range. */
+  /* A pose with NaN or Inf, a quaternion of length 0, a scale < 0, sizes or distances more than
+   * 1e60 : 1 apart, or a field's number or an enum out of range. */
   IST_INVALID_INPUT = -1,
   IST_NULL_POINTER = -2,
   IST_WRONG_SIZE = -3,    /* a struct's size that this library does not know */
@@ -50,7 +51,8 @@ enum {
   IST_NO_MEMORY = -6,
   IST_CANNOT_READ = -7, /* the file; errno may say why */
   /* A solid lacks what the measure needs: IST_EXACT needs the meshes of both (a field has none),
-   * the others need spheres. All numbers of the answer are NaN. */
+   * the others need spheres, IST_FIELD_ALWAYS the surface of the coarser one. All numbers of the
+   * answer are NaN. */
   IST_NOT_HELD = -15,
   IST_NO_DURATION = -14, /* ist_impact_settings_t::duration is 0 */
   /* Bytes that are not an asset. */
@@ -240,7 +242,7 @@ ist_status_t ist_tree_get_surface(const ist_tree_t* tree, ist_surface_t* surface
 
 /* x_world = R(q) x + t */
 typedef struct ist_pose {
-  double q[4]; /* w, x, y, z; within 1e-3 of unit length */
+  double q[4]; /* w, x, y, z; of any length but 0: it is normalised */
   double t[3]; /* [u] */
 } ist_pose_t;
 
@@ -289,7 +291,7 @@ typedef struct ist_field {
   union {
     /* normal · x ≤ offset */
     struct {
-      double normal[3]; /* unit length within 1e-3, outward */
+      double normal[3]; /* outward, of any length but 0, by which the offset is divided too */
       double offset;    /* [u] */
     } half_space;
     /* around the origin */
@@ -389,8 +391,8 @@ typedef struct ist_penetration {
   uint32_t size;
   ist_status_t status;
   double volume; /* [u³] */
-  /* [u³] With IST_EXACT: bounds of the true volume. By spheres: bounds of the finished sum, with
-   * its rounding; they do not bound the true volume. */
+  /* [u³] With IST_EXACT: bounds of the true volume. By spheres: the interval of the finished sum,
+   * as wide as rounding and what a limit left out. It says nothing of the true volume. */
   double volume_min, volume_max;
   double centroid[3];             /* [u] of the overlap, world */
   double translation_gradient[3]; /* [u²] dV/d(translation of B), world */

@@ -44,12 +44,12 @@ MassProperties mass_properties(const TreeView& tree) noexcept;
 Bounds bounds(const TreeView& tree) noexcept;
 
 /// In the world frame, axes included: under a scale s the volume is s³ times as large, the inertia
-/// s⁵ times. All zero for an empty tree, and for an invalid pose or scale. The errors do not
+/// s⁵ times. All NaN for an empty tree, and for an invalid pose or scale. The errors do not
 /// include the rounding of the motion.
 MassProperties mass_properties(const PlacedTree& placed) noexcept;
 
 /// In the world frame: the box along the world's axes around the rotated box, and the ball.
-/// Rounding is not added. All zero as above.
+/// Rounding is not added. All NaN as above.
 Bounds bounds(const PlacedTree& placed) noexcept;
 
 }  // namespace ist

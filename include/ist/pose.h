@@ -6,9 +6,11 @@ namespace IST_API ist {
 
 /// Rigid motion from an object's own frame to the world: x_world = R(q) x + t.
 ///
+/// Lengths from 1e-150 to 1e150 are normalised: q means q/|q|. Others are invalid.
+///
 /// Plain data of 56 bytes under every compiler flag. `pose_eigen.h` converts from and to Eigen.
 struct Pose {
-  double q[4] = {1, 0, 0, 0};  ///< quaternion w, x, y, z; within 1e-3 of unit length
+  double q[4] = {1, 0, 0, 0};  ///< quaternion w, x, y, z; of any length but 0: it is normalised
   double t[3] = {0, 0, 0};     ///< [u] translation
 };
 

@@ -69,8 +69,8 @@ struct PlacedTree {
 /// Overlap of two placed solids. Gradients are taken with respect to a motion of B, A held still.
 struct Penetration {
   double volume = 0;  ///< [u³] in the chosen measure
-  /// [u³] With Measure::exact: bounds of the true volume. By spheres: bounds of the finished sum,
-  /// with its rounding; they do not bound the true volume.
+  /// [u³] With Measure::exact: bounds of the true volume. By spheres: the interval of the finished
+  /// sum, as wide as rounding and what a limit left out. It says nothing of the true volume.
   double volume_min = 0;
   double volume_max = 0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the overlap, world; zero if none

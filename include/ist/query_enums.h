@@ -10,16 +10,16 @@ namespace IST_API ist {
 
 enum class QueryStatus : std::uint32_t {
   ok = 0,  ///< finished: the gradients are exactly those of the returned volume
-  /// A limit of the settings or the workspace's capacity stopped the descent. volume_min and
-  /// volume_max are still bounds, as for a finished answer.
+  /// A limit of the settings or the workspace's capacity stopped the descent. What volume_min and
+  /// volume_max contain, they still contain.
   budget_exhausted = 1,
-  /// The answer is all zero. The cause is a pose with NaN or Inf; a quaternion off unit length by
-  /// more than 1e-3; a scale ≤ 0; an empty tree; sizes or distances more than 1e60 : 1 apart; or a
-  /// workspace that was moved from.
+  /// All numbers of the answer are NaN, its counts 0. The cause is a pose with NaN or Inf; a
+  /// quaternion of length 0; a scale ≤ 0; an empty tree; a field's number out of range; sizes or
+  /// distances more than 1e60 : 1 apart; or a workspace that was moved from.
   invalid_input = 2,
   /// A solid lacks what the measure needs. Measure::exact needs both solids' meshes
-  /// (TreeView::has_mesh; a field has none), the others need spheres. All numbers of the answer are
-  /// NaN.
+  /// (TreeView::has_mesh; a field has none), the others need spheres. FieldUse::always needs the
+  /// surface of the coarser one. All numbers of the answer are NaN.
   not_held = 3,
 };
 
@@ -42,7 +42,7 @@ enum class FieldUse : std::uint32_t {
   /// smooth blend in between. Without a surface in the coarser asset: lenses.
   automatic = 0,
   never = 1,   ///< lenses alone
-  always = 2,  ///< the surface alone, whatever it costs
+  always = 2,  ///< the surface alone, whatever it costs; without one: QueryStatus::not_held
 };
 
 }  // namespace ist

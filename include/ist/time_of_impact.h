@@ -53,8 +53,8 @@ enum class ImpactStatus : std::uint32_t {
   overlapping = 3,       ///< they meet at the start: surfaces cross, or one solid contains the
                          ///< other
   budget_exhausted = 4,  ///< a limit, or the workspace's capacity; they stay clear up to `time`
-  /// The answer is all zero. The cause is that of QueryStatus::invalid_input; a motion with NaN or
-  /// Inf; a duration that is negative, NaN or Inf; or a motion over 1e60 sizes.
+  /// All numbers of the answer are NaN. The cause is that of QueryStatus::invalid_input; a motion
+  /// with NaN or Inf; a duration that is negative, NaN or Inf; or a motion over 1e60 sizes.
   invalid_input = 5,
   /// An asset holds no spheres (QueryStatus::not_held). All numbers of the answer are NaN.
   not_held = 6,

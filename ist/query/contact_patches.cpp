@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include <ist/query.h>
@@ -40,10 +41,12 @@ class PairPatches {
         tree_a_(a.tree.header(), tree_a),
         tree_b_(b.tree.header(), tree_b),
         both_(a, tree_a, b, tree_b, pose, scratch),
+        use_(use),
         method_(pair_method(a, tree_a, b, tree_b, pose, use)) {}
 
   /// The whole contact, sorted into the workspace's bins.
   Penetration sum(const DescentLimits& limits) {
+    if (lacks_surface(method_, use_)) return not_held<Penetration>();
     ContactBins& bins = scratch_.contact;
     if (!method_.lenses) {
       start_probed();
@@ -115,6 +118,7 @@ class PairPatches {
   Workspace::Impl& scratch_;
   const SphereTree tree_a_, tree_b_;
   PairOverlap both_;
+  const FieldUse use_;
   const PairMethod method_;
   Penetration whole_;
   std::uint32_t filled_ = 0;
@@ -155,11 +159,7 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
     return exact_patches(a, b, settings, workspace, patches, {}).contact;
   if (lack_spheres(a, b)) return not_held<ContactPatches>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
-  if (!pose || workspace.impl() == nullptr) {
-    ContactPatches refused;
-    refused.penetration.status = QueryStatus::invalid_input;
-    return refused;
-  }
+  if (!pose || workspace.impl() == nullptr) return invalid_input<ContactPatches>();
   ContactPatches result;
   const bool inner = settings.measure == Measure::inner;
   ChosenLevel chosen{a, b, *pose, inner, settings.field, *workspace.impl(), std::nullopt};
@@ -167,7 +167,7 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
   const bool blends = !inner && settings.pair_budget > 0;
   result.penetration = blends ? blend_details(a, b, *pose, settings, workspace, &by)
                               : by.sum(by.context, DetailPair(), limits_of(settings));
-  if (!chosen.patches) return result;
+  if (!chosen.patches || std::isnan(result.penetration.volume)) return result;
   result.count = chosen.patches->write(patches);
   if (blends) spread(chosen.patches->whole(), result.penetration, patches.first(result.count));
   finish_patches(patches.first(result.count), chosen.patches->deepest());

@@ -168,14 +168,10 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
                              const ContactSettings& settings, Workspace& workspace,
                              std::span<ContactPatch> patches,
                              std::span<OutlineSegment> segments) noexcept {
-  OverlapOutline answer;
   const std::optional<RelativePose> pose = relative_pose(a, b);
-  if (!pose || workspace.impl() == nullptr) {
-    answer.contact.penetration.status = QueryStatus::invalid_input;
-    return answer;
-  }
-  if (a.tree.header().mesh == 0 || b.tree.header().mesh == 0)
-    return {not_held<ContactPatches>(), 0};
+  if (!pose || workspace.impl() == nullptr) return invalid_input<OverlapOutline>();
+  if (a.tree.header().mesh == 0 || b.tree.header().mesh == 0) return not_held<OverlapOutline>();
+  OverlapOutline answer;
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   ExactScratch& scratch = workspace.impl()->exact;
   auto query = query_of<ExactParts>(a, mesh_a, b, mesh_b, *pose, scratch);

@@ -29,19 +29,12 @@ std::optional<RelativePose> pose_of(const PlacedField& a, const PlacedTree& b) n
   return relative_pose(a.pose, a.scale, b);
 }
 
-template <class Answer>
-Answer refused() noexcept {
-  Answer answer;
-  answer.status = QueryStatus::invalid_input;
-  return answer;
-}
-
 /// `tree`: of B, which bins refer to.
 Penetration penetrate(const PlacedField& a, const PlacedTree& b, const SphereTree& tree,
                       const DescentLimits& limits, Workspace& workspace,
                       ContactBins* bins) noexcept {
   const std::optional<RelativePose> pose = pose_of(a, b);
-  if (!pose || workspace.impl() == nullptr) return refused<Penetration>();
+  if (!pose || workspace.impl() == nullptr) return invalid_input<Penetration>();
   if (bins != nullptr) bins->start(tree, true);
   const auto run = [&](auto& descent) {
     descent.run();
@@ -58,7 +51,7 @@ Penetration penetrate(const PlacedField& a, const PlacedTree& b, const SphereTre
         FieldDescent descent(shape, tree, *pose, limits, *workspace.impl(), bins);
         return run(descent);
       },
-      refused<Penetration>);
+      invalid_input<Penetration>);
 }
 
 }  // namespace
@@ -74,7 +67,7 @@ Separation separation(const PlacedField& a, const PlacedTree& b, const Separatio
                       Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return not_held<Separation>();
   const std::optional<RelativePose> pose = pose_of(a, b);
-  if (!pose || workspace.impl() == nullptr) return refused<Separation>();
+  if (!pose || workspace.impl() == nullptr) return invalid_input<Separation>();
   const SphereTree tree = sphere_tree(b.tree, Measure::inner);
   const auto search = [&](auto& shape) {
     return GapSearch(shape, tree, *pose, settings, *workspace.impl()).run();
@@ -83,7 +76,7 @@ Separation separation(const PlacedField& a, const PlacedTree& b, const Separatio
     MeshShape shape(*mesh);
     return search(shape);
   }
-  return with_shape(a.field, search, refused<Separation>);
+  return with_shape(a.field, search, invalid_input<Separation>);
 }
 
 Overlapping overlap(const PlacedField& a, const PlacedTree& b, Workspace& workspace) noexcept {
@@ -111,11 +104,8 @@ ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept {
   if (settings.measure == Measure::exact || lack_spheres(a, b)) return not_held<ContactPatches>();
+  if (workspace.impl() == nullptr) return invalid_input<ContactPatches>();
   ContactPatches result;
-  if (workspace.impl() == nullptr) {
-    result.penetration = refused<Penetration>();
-    return result;
-  }
   ContactBins& bins = workspace.impl()->contact;
   const SphereTree tree = sphere_tree(b.tree, settings.measure);
   result.penetration = penetrate(a, b, tree, limits_of(settings), workspace, &bins);

@@ -1,6 +1,7 @@
 #include <ist/mass_properties.h>
 
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include <ist/asset_layout.h>
@@ -11,6 +12,8 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 Vector3d vector(const double (&v)[3]) noexcept { return {v[0], v[1], v[2]}; }
 
@@ -49,7 +52,8 @@ Bounds bounds(const TreeView& tree) noexcept {
 
 MassProperties mass_properties(const PlacedTree& placed) noexcept {
   const std::optional<Matrix3d> rotation = rotation_of(placed);
-  if (!rotation) return {};
+  if (!rotation)
+    return {kNone, Vector3d::Constant(kNone), Matrix3d::Constant(kNone), kNone, kNone, kNone};
   const double s = placed.scale, cube = s * s * s;
   MassProperties result = mass_properties(placed.tree);
   result.volume *= cube;
@@ -65,7 +69,8 @@ MassProperties mass_properties(const PlacedTree& placed) noexcept {
 
 Bounds bounds(const PlacedTree& placed) noexcept {
   const std::optional<Matrix3d> rotation = rotation_of(placed);
-  if (!rotation) return {};
+  const Vector3d none = Vector3d::Constant(kNone);
+  if (!rotation) return {none, none, none, kNone};
   const Bounds own = bounds(placed.tree);
   const double s = placed.scale;
   const Vector3d origin = vector(placed.pose.t);

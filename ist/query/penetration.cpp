@@ -12,24 +12,22 @@ Penetration penetration(const PlacedTree& a, const PlacedTree& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept {
   if (settings.measure != Measure::exact && lack_spheres(a, b)) return not_held<Penetration>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
-  if (!pose || workspace.impl() == nullptr) {
-    Penetration refused;
-    refused.status = QueryStatus::invalid_input;
-    return refused;
-  }
+  if (!pose || workspace.impl() == nullptr) return invalid_input<Penetration>();
   if (settings.measure == Measure::exact)
     return exact_penetration(a, b, settings, *pose, workspace);
-  if (settings.measure == Measure::matched &&
-      (settings.pair_budget > 0 || are_one_asset(a.tree.header(), b.tree.header())))
-    return blend_details(a, b, *pose, settings, workspace);
   const AssetHeader& header_a = a.tree.header();
   const AssetHeader& header_b = b.tree.header();
   const bool inner = settings.measure == Measure::inner;
   const TreeHeader& tree_a = inner ? header_a.inner_tree : header_a.matched_tree;
   const TreeHeader& tree_b = inner ? header_b.inner_tree : header_b.matched_tree;
-  PairOverlap both(a, tree_a, b, tree_b, *pose, *workspace.impl());
   const FieldUse use = inner ? FieldUse::never : settings.field;
-  return both.by(pair_method(a, tree_a, b, tree_b, *pose, use), limits_of(settings));
+  const PairMethod method = pair_method(a, tree_a, b, tree_b, *pose, use);
+  if (lacks_surface(method, use)) return not_held<Penetration>();
+  if (settings.measure == Measure::matched &&
+      (settings.pair_budget > 0 || are_one_asset(header_a, header_b)))
+    return blend_details(a, b, *pose, settings, workspace);
+  PairOverlap both(a, tree_a, b, tree_b, *pose, *workspace.impl());
+  return both.by(method, limits_of(settings));
 }
 
 }  // namespace ist

@@ -201,12 +201,9 @@ Separation separation(const PlacedTree& a, const PlacedTree& b, const Separation
                       Workspace& workspace) noexcept {
   const bool surfaces = !settings.inner_spheres && keeps_mesh(a) && keeps_mesh(b);
   if (!surfaces && lack_spheres(a, b)) return not_held<Separation>();
-  Separation result;
   const std::optional<RelativePose> pose = relative_pose(a, b);
-  if (!pose || workspace.impl() == nullptr) {
-    result.status = QueryStatus::invalid_input;
-    return result;
-  }
+  if (!pose || workspace.impl() == nullptr) return invalid_input<Separation>();
+  Separation result;
   if (surfaces && pose->a_from_b.scale > kLargestScale) {
     result = separation(b, a, settings, workspace);
     std::swap(result.point_a, result.point_b);

@@ -14,12 +14,6 @@ namespace {
 constexpr double kTolerance = 1e-3;
 constexpr double kErrors = 10;
 
-TimeOfImpact refused() noexcept {
-  TimeOfImpact result;
-  result.status = ImpactStatus::invalid_input;
-  return result;
-}
-
 TimeOfImpact overlap() noexcept {
   TimeOfImpact result;
   result.status = ImpactStatus::overlapping;
@@ -49,7 +43,7 @@ TimeOfImpact time_of_impact(const PlacedTree& a, const PlacedTree& b, const Moti
                             const ImpactSettings& settings, Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return not_held<TimeOfImpact>();
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
-  if (!frame || workspace.impl() == nullptr) return refused();
+  if (!frame || workspace.impl() == nullptr) return invalid_input<TimeOfImpact>();
   const ImpactSide side_a(a.tree), side_b(b.tree);
   if (hold(side_a, side_b, frame->start)) return overlap();
   const double smaller =
@@ -65,11 +59,11 @@ TimeOfImpact time_of_impact(const PlacedField& a, const PlacedTree& b, const Mot
                             const ImpactSettings& settings, Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return not_held<TimeOfImpact>();
   if (const MeshField* const mesh = std::get_if<MeshField>(&a.field)) {
-    if (!mesh->tree.has_field()) return refused();
+    if (!mesh->tree.has_field()) return invalid_input<TimeOfImpact>();
     return time_of_impact(PlacedTree{mesh->tree, a.pose, a.scale}, b, motions, settings, workspace);
   }
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
-  if (!frame || workspace.impl() == nullptr) return refused();
+  if (!frame || workspace.impl() == nullptr) return invalid_input<TimeOfImpact>();
   const ImpactSide side(b.tree);
   const double tolerance = tolerance_of(settings, bounding_radius(b) * frame->b.unit,
                                         side.surface_error() * frame->b.unit, frame->unit);
@@ -86,7 +80,7 @@ TimeOfImpact time_of_impact(const PlacedField& a, const PlacedTree& b, const Mot
         ImpactLoop loop(*frame, tolerance, settings, *workspace.impl());
         return FieldSearch<Shape>(shape, *frame, side, loop).run();
       },
-      refused);
+      invalid_input<TimeOfImpact>);
 }
 
 }  // namespace ist

@@ -5,16 +5,20 @@ x_world = R(q) (scale · x) + t. What is refused raises ist.Error with the libra
 wrong shape raise ValueError, of a wrong dtype TypeError.
 """
 
-import copyreg
 import enum
 
-from . import _core
-from ._core import *  # noqa: F403
-from ._core import __version__
+from . import _calls, _core, _shown
 
+# Before anything is taken from there. One answer's code is an enum's.
+for _owner in (_core, _core.gpu, *(x for x in vars(_core).values() if isinstance(x, type))):
+    _calls.name_faults(_owner, {name: lambda codes: _one(codes, Overlapping)
+                                for name in ("overlap", "contains")})
 
-# Functions go to other processes by their names.
-copyreg.pickle(type(_core.penetration), lambda function: function.__qualname__)
+from ._core import *  # noqa: E402, F403
+from ._core import __version__  # noqa: E402
+from ._poses import poses  # noqa: E402
+
+poses.__module__ = "ist"
 
 
 class QueryStatus(enum.IntEnum):
@@ -22,8 +26,9 @@ class QueryStatus(enum.IntEnum):
 
     ok = 0
     budget_exhausted = 1  # a limit stopped it: volume_min, volume_max hold the finished answer's
-    invalid_input = 2  # the row is all zero
-    not_held = 3  # a solid does not hold what is asked: the row is all NaN; one pose raises Error
+    # The row is all NaN; one pose raises instead:
+    invalid_input = 2  # a pose, a scale or a Field's number is not usable: ValueError
+    not_held = 3  # a solid does not hold what is asked: Error
 
 
 class Overlapping(enum.IntEnum):
@@ -46,7 +51,27 @@ class ImpactStatus(enum.IntEnum):
     not_held = 6
 
 
+def _finish():
+    """Answers and assets show what they are."""
+    for kind in (Penetration, Separation, ContactPatches, TimeOfImpact, RayHits,  # noqa: F405
+                 SurfacePoints):  # noqa: F405
+        kind._statuses = ImpactStatus if kind.__name__ == "TimeOfImpact" else QueryStatus
+        kind.__repr__ = _shown.text_of
+        column = vars(kind).get("status")
+        if column is not None:
+            kind.status = property(
+                lambda self, column=column: _one(column.fget(self), self._statuses), None, None,
+                column.__doc__)
+    Asset._repr_html_ = _shown.html_of  # noqa: F405
+
+
+def _one(codes, kind):
+    return kind(codes) if isinstance(codes, int) else codes
+
+
+_finish()
+
 __all__ = sorted(
     [name for name in vars(_core) if not name.startswith("_")]
-    + ["QueryStatus", "Overlapping", "ImpactStatus", "__version__"]
+    + ["QueryStatus", "Overlapping", "ImpactStatus", "__version__", "poses"]
 )

@@ -203,6 +203,8 @@ class Asset:
     def save(self, path: _Path) -> None: ...
     def to_bytes(self) -> bytes: ...
     def info(self) -> dict[str, Any]: ...
+    # (n, 3) vertices [u], (m, 3) triangles
+    def surface(self) -> tuple[NDArray[np.float64], NDArray[np.uint32]]: ...
     def spheres(self, which: _SphereMeasure = "matched") -> NDArray[np.float64]: ...  # (n, 4) [u]
     def mass_properties(self, pose: ArrayLike | None = None, scale: float = 1.0) -> MassProperties: ...
     def bounds(self, pose: ArrayLike | None = None, scale: float = 1.0) -> Bounds: ...
@@ -223,7 +225,7 @@ class Asset:
     @property
     def mesh_error(self) -> float: ...  # [u]
     @property
-    def mesh_state(self) -> Literal["none", "own", "united", "simplified", "unresolved"]: ...
+    def mesh_state(self) -> Literal["none", "own", "resolved", "simplified", "unresolved"]: ...
     @property
     def counted_twice(self) -> float: ...  # [u³]
 
@@ -290,7 +292,7 @@ class Penetration:
     @property
     def volume(self) -> _Column: ...  # (n,) [u³]
     @property
-    def volume_min(self) -> _Column: ...  # (n,) [u³] exact: the true volume is at least this
+    def volume_min(self) -> _Column: ...  # (n,) [u³] exact: the true volume is at least this; else the sum's interval
     @property
     def volume_max(self) -> _Column: ...  # (n,) [u³] and at most this
     @property
@@ -313,6 +315,52 @@ class Penetration:
     def node_visits(self) -> _Column: ...  # (n,)
     @property
     def sphere_pairs(self) -> _Column: ...  # (n,)
+
+@final
+class Lenses:
+    @property
+    def centre(self) -> NDArray[np.float64]: ...  # (n, 3) [u] world
+    @property
+    def axis(self) -> NDArray[np.float64]: ...  # (n, 3) unit, from A's sphere to B's
+    @property
+    def radius(self) -> NDArray[np.float64]: ...  # (n,) [u]
+    @property
+    def thickness(self) -> NDArray[np.float64]: ...  # (n,) [u]
+    @property
+    def sphere_a(self) -> NDArray[np.uint32]: ...  # (n,)
+    @property
+    def sphere_b(self) -> NDArray[np.uint32]: ...  # (n,)
+
+@final
+class PairFit:
+    @property
+    def grain_a(self) -> float: ...  # [u]
+    @property
+    def grain_b(self) -> float: ...  # [u]
+    @property
+    def ratio(self) -> float: ...  # ≥ 1
+    @property
+    def a_is_coarser(self) -> bool: ...
+    @property
+    def has_surface(self) -> bool: ...
+    @property
+    def needs_surface(self) -> bool: ...
+    @property
+    def fits(self) -> bool: ...
+
+def poses(
+    rotations: ArrayLike, translations: ArrayLike | None = None, *,
+    order: Literal["wxyz", "xyzw"] | None = None,
+) -> NDArray[np.float64]: ...  # (7,) or (n, 7)
+def lenses(
+    a: Asset, b: Asset, pose: ArrayLike, *, pose_a: ArrayLike | None = None, scale: float = 1.0,
+    scale_a: float = 1.0, measure: _SphereMeasure = "matched", detail_a: int = 0, detail_b: int = 0,
+) -> Lenses: ...
+def without_protrusion(
+    whole: Penetration, a: Asset, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
+    poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None,
+) -> Penetration: ...
+def pair_fit(a: Asset, b: Asset, *, scale: float = 1.0, scale_a: float = 1.0) -> PairFit: ...
 
 @final
 class RayHits:

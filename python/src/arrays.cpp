@@ -43,6 +43,21 @@ Integers take_integers(const py::handle& value, const std::string& name,
   return take_array<std::int64_t>(value, name, wanted, "iu", "int64");
 }
 
+double take_limit(double value, const char* name) {
+  if (!(value >= 0))
+    throw value_error(std::string(name) + ": " + text_of(py::float_(value)) +
+                      "; wanted a number ≥ 0");
+  return value;
+}
+
+unsigned take_threads(unsigned threads) {
+  constexpr unsigned kMost = 4096;
+  if (threads > kMost)
+    throw value_error("threads: " + std::to_string(threads) + "; wanted 0, all cores, to " +
+                      std::to_string(kMost));
+  return threads;
+}
+
 Eigen::Vector3d take_vector(const py::handle& value, const char* name) {
   const Doubles array = take_doubles(value, name, "(3,)");
   if (array.ndim() != 1 || array.shape(0) != 3) refuse_shape(array, name, "(3,)");

@@ -65,6 +65,12 @@ template <class T>
   throw value_error(name + ": shape " + text_of(shape_of(array)) + "; wanted " + wanted);
 }
 
+/// Refuses NaN and negative numbers, which no limit can be.
+double take_limit(double value, const char* name);
+
+/// Refuses more threads than a machine has. 0: all cores.
+unsigned take_threads(unsigned threads);
+
 /// Of three numbers.
 Eigen::Vector3d take_vector(const py::handle& value, const char* name);
 

@@ -17,7 +17,9 @@
 #include "meshes.h"
 #include "module.h"
 #include "offline.h"
+#include "rows.h"
 #include "settings/bake_settings.h"
+#include "solids.h"
 
 namespace ist::python {
 namespace {
@@ -68,14 +70,7 @@ py::object spheres_of(const Asset& asset, const std::string& which) {
 }
 
 PlacedTree placed(const Asset& asset, const py::object& pose, double scale) {
-  PlacedTree tree{asset.view(), {}, scale};
-  if (pose.is_none()) return tree;
-  const char* const wanted = "(7,): qw, qx, qy, qz, tx, ty, tz";
-  const Doubles values = take_doubles(pose, "pose", wanted);
-  if (values.ndim() != 1 || values.shape(0) != 7) refuse_shape(values, "pose", wanted);
-  std::memcpy(tree.pose.q, values.data(), sizeof tree.pose.q);
-  std::memcpy(tree.pose.t, values.data() + 4, sizeof tree.pose.t);
-  return tree;
+  return {asset.view(), take_pose(pose, scale), scale};
 }
 
 /// What is kept of the mesh, as the command line takes it; a number is as good as its text.
@@ -304,7 +299,19 @@ void add_assets(py::module_& module) {
             return py::module_::import_("json").attr("loads")(app::asset_json(self.view()).dump());
           },
           "The output of `ist info --json` as a dict: docs/json.md.")
+      .def("__repr__",
+           [](const Asset& self) {
+             const TreeView& view = self.view();
+             return "<ist.Asset: " + std::to_string(view.sphere_count()) + " spheres, volume " +
+                    text_of(py::float_(view.volume())) + " u³, mesh of " +
+                    std::to_string(view.mesh_triangles()) + " triangles" +
+                    (view.has_field() ? "" : ", no surface for queries of spheres") + ">";
+           })
       .def("__str__", [](const Asset& self) { return app::describe_asset(self.view()); })
+      .def("surface", &surface_of,
+           "The surface that queries of spheres use: (n, 3) float64 vertices [u] in the mesh's own "
+           "frame, and (m, 3) uint32 triangles, counter-clockwise from outside. A vertex may stand "
+           "in several rows. Raises Error if the asset holds none.")
       .def("spheres", &spheres_of, py::arg("which") = "matched",
            "(n, 4) float64: centre and radius [u], in the mesh's own frame; a copy.\n\n"
            "which: 'matched' or 'inner'.")
@@ -314,7 +321,7 @@ void add_assets(py::module_& module) {
             return mass_properties(placed(self, pose, scale));
           },
           py::arg("pose") = py::none(), py::arg("scale") = 1.0,
-          "MassProperties in the frame of the pose; all zero for an invalid pose.")
+          "MassProperties in the frame of the pose.")
       .def(
           "bounds",
           [](const Asset& self, const py::object& pose, double scale) {

@@ -1,9 +1,14 @@
+#include <cmath>
+#include <initializer_list>
 #include <memory>
+#include <utility>
 
+#include <ist/error.h>
 #include <ist/field.h>
 
 #include "arrays.h"
 #include "module.h"
+#include "query/field/with_shape.h"
 #include "solids.h"
 
 namespace ist::python {
@@ -12,14 +17,45 @@ namespace {
 /// A class of Python a kind of field, so that users see which one they hold.
 template <class Kind>
 struct OwnedKind : OwnedField {
-  explicit OwnedKind(Kind kind, std::shared_ptr<const void> owner = nullptr)
-      : OwnedField{std::move(kind), std::move(owner)} {}
+  OwnedKind(Kind kind, std::string arguments, std::shared_ptr<const void> owner = nullptr)
+      : OwnedField{std::move(kind), std::move(arguments), std::move(owner)} {}
 };
 
 template <class Kind>
 py::class_<OwnedKind<Kind>, OwnedField> add_kind(py::module_& module, const char* name,
                                                  const char* doc) {
   return py::class_<OwnedKind<Kind>, OwnedField>(module, name, doc);
+}
+
+using Arguments = std::initializer_list<std::pair<const char*, py::object>>;
+
+/// Refuses numbers that no query would take.
+template <class Kind>
+OwnedKind<Kind> sound(Kind kind, const char* wanted, const Arguments& given,
+                      std::shared_ptr<const void> owner = nullptr) {
+  std::string text;
+  for (const auto& [name, value] : given)
+    text += (text.empty() ? "" : ", ") + std::string(name) + "=" + text_of(value);
+  if (!with_shape(
+          kind, [](auto&) { return true; }, [] { return false; }))
+    throw value_error(text + "; wanted " + wanted);
+  return {std::move(kind), std::move(text), std::move(owner)};
+}
+
+/// Refuses values that are not finite or beyond the ends, and grids that are too small.
+void check_grid(const Floats& grid, const char* name, double lowest, double highest) {
+  std::size_t count = 1;
+  for (std::size_t k = 0; k < grid.ndim(); ++k) {
+    if (grid.shape(k) < 2) refuse_shape(grid, name, "two points and more along each axis");
+    count *= grid.shape(k);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const double value = static_cast<double>(grid.data()[i]);
+    if (!std::isfinite(value) || value < lowest || value > highest)
+      throw value_error(std::string(name) + ": number " + std::to_string(i) + " is " +
+                        text_of(py::float_(value)) +
+                        (std::isfinite(value) ? ", not from lowest to highest" : ", not finite"));
+  }
 }
 
 std::uint32_t points(std::size_t count) { return static_cast<std::uint32_t>(count); }
@@ -49,32 +85,45 @@ Field field_of(const py::handle& object, const char* name) {
 void add_fields(py::module_& module) {
   py::class_<OwnedField>(module, "Field",
                          "A shape that needs no asset. It can only be the first solid of a query. "
-                         "Lengths are [u] in the field's own frame.");
+                         "Lengths are [u] in the field's own frame.")
+      .def("__repr__", [](const py::object& self) {
+        return "ist." + type_name_of(self) + "(" + py::cast<const OwnedField&>(self).arguments +
+               ")";
+      });
   add_kind<HalfSpaceField>(module, "HalfSpaceField", "The solid normal · x ≤ offset. Exact.")
-      .def(
-          py::new_([](const py::object& normal, double offset) {
-            return OwnedKind<HalfSpaceField>(HalfSpaceField{take_vector(normal, "normal"), offset});
-          }),
-          py::arg("normal") = py::make_tuple(0.0, 0.0, 1.0), py::arg("offset") = 0.0,
-          "normal: (3,) unit length within 1e-3, outward. offset: [u].");
+      .def(py::new_([](const py::object& normal, double offset) {
+             return sound(HalfSpaceField{take_vector(normal, "normal"), offset},
+                          "finite numbers and a normal of any length but 0",
+                          {{"normal", normal}, {"offset", py::float_(offset)}});
+           }),
+           py::arg("normal") = py::make_tuple(0.0, 0.0, 1.0), py::arg("offset") = 0.0,
+           "normal: (3,) outward, of any length but 0, by which the offset is divided too. "
+           "offset: [u].");
   add_kind<BoxField>(module, "BoxField", "A box around the origin. Exact.")
       .def(py::new_([](const py::object& half_extents) {
-             return OwnedKind<BoxField>(BoxField{take_vector(half_extents, "half_extents")});
+             return sound(BoxField{take_vector(half_extents, "half_extents")}, "(3,) > 0",
+                          {{"half_extents", half_extents}});
            }),
            py::arg("half_extents"), "half_extents: (3,) [u] > 0.");
   add_kind<BallField>(module, "BallField", "A ball around the origin. Exact.")
-      .def(py::new_([](double radius) { return OwnedKind<BallField>(BallField{radius}); }),
+      .def(py::new_([](double radius) {
+             return sound(BallField{radius}, "> 0", {{"radius", py::float_(radius)}});
+           }),
            py::arg("radius"), "radius: [u] > 0.");
   add_kind<CapsuleField>(module, "CapsuleField",
                          "All points within `radius` of the segment from −half_height to "
                          "+half_height on the z axis.")
       .def(py::new_([](double radius, double half_height) {
-             return OwnedKind<CapsuleField>(CapsuleField{radius, half_height});
+             return sound(
+                 CapsuleField{radius, half_height}, "a radius > 0 and a half_height ≥ 0",
+                 {{"radius", py::float_(radius)}, {"half_height", py::float_(half_height)}});
            }),
            py::arg("radius"), py::arg("half_height"), "radius: [u] > 0. half_height: [u] ≥ 0.");
   add_kind<CylinderField>(module, "CylinderField", "A cylinder about the z axis.")
       .def(py::new_([](double radius, double half_height) {
-             return OwnedKind<CylinderField>(CylinderField{radius, half_height});
+             return sound(
+                 CylinderField{radius, half_height}, "both > 0",
+                 {{"radius", py::float_(radius)}, {"half_height", py::float_(half_height)}});
            }),
            py::arg("radius"), py::arg("half_height"), "radius, half_height: [u] > 0.");
   add_kind<HeightField>(module, "HeightField",
@@ -87,13 +136,18 @@ void add_fields(py::module_& module) {
             if (grid.ndim() != 2) refuse_shape(grid, "heights", "(rows, columns)");
             const Doubles steps = take_doubles(spacing, "spacing", "(2,)");
             if (steps.ndim() != 1 || steps.shape(0) != 2) refuse_shape(steps, "spacing", "(2,)");
-            return OwnedKind<HeightField>(HeightField{grid.data(),
-                                                      points(grid.shape(1)),
-                                                      points(grid.shape(0)),
-                                                      {steps.data()[0], steps.data()[1]},
-                                                      lowest,
-                                                      highest},
-                                          std::make_shared<Floats>(grid));
+            check_grid(grid, "heights", lowest, highest);
+            return sound(HeightField{grid.data(),
+                                     points(grid.shape(1)),
+                                     points(grid.shape(0)),
+                                     {steps.data()[0], steps.data()[1]},
+                                     lowest,
+                                     highest},
+                         "spacing > 0, lowest ≤ highest and at most 2**20 points along each axis",
+                         {{"spacing", spacing},
+                          {"lowest", py::float_(lowest)},
+                          {"highest", py::float_(highest)}},
+                         std::make_shared<Floats>(grid));
           }),
           py::arg("heights"), py::kw_only(), py::arg("spacing") = py::make_tuple(1.0, 1.0),
           py::arg("lowest") = -1e300, py::arg("highest") = 1e300,
@@ -107,13 +161,19 @@ void add_fields(py::module_& module) {
                        double error) {
              const Floats grid = take_floats(distances, "distances", "(z, y, x)");
              if (grid.ndim() != 3) refuse_shape(grid, "distances", "(z, y, x)");
-             return OwnedKind<DistanceGridField>(
+             check_grid(grid, "distances", -HUGE_VAL, HUGE_VAL);
+             return sound(
                  DistanceGridField{
                      grid.data(),
                      {points(grid.shape(2)), points(grid.shape(1)), points(grid.shape(0))},
                      take_vector(origin, "origin"),
                      spacing,
                      error},
+                 "a finite origin, a spacing > 0, an error ≥ 0 and at most 2**20 points along "
+                 "each axis",
+                 {{"origin", origin},
+                  {"spacing", py::float_(spacing)},
+                  {"error", py::float_(error)}},
                  std::make_shared<Floats>(grid));
            }),
            py::arg("distances"), py::kw_only(), py::arg("origin"), py::arg("spacing"),
@@ -125,7 +185,10 @@ void add_fields(py::module_& module) {
                       "The surface in an asset, without its spheres. Exact within "
                       "Asset.field_error.")
       .def(py::new_([](const py::object& asset) {
-             return OwnedKind<MeshField>(MeshField{tree_of(asset, "asset")},
+             const TreeView tree = tree_of(asset, "asset");
+             if (!tree.has_field())
+               throw Error("asset: holds no surface; bake it with surface='all'");
+             return OwnedKind<MeshField>(MeshField{tree}, "asset",
                                          std::make_shared<py::object>(asset));
            }),
            py::arg("asset"), "asset: an Asset that has a field.");

@@ -35,6 +35,7 @@ NB_MODULE(_core, module) {
   python::add_assets(module);
   python::add_fields(module);
   python::add_penetration(module);
+  python::add_pictures(module);
   python::add_separation(module);
   python::add_surfaces(module);
   python::add_time_of_impact(module);

@@ -15,6 +15,7 @@ void add_gpu(py::module_& package);
 void add_gpu_patches(py::module_& module);
 void add_gpu_penetration(py::module_& module);
 void add_gpu_separation(py::module_& module);
+void add_pictures(py::module_& module);
 void add_penetration(py::module_& module);
 void add_separation(py::module_& module);
 void add_surfaces(py::module_& module);

@@ -69,12 +69,13 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
         [&](const auto& a, const PlacedTree& b) { return penetration(a, b, settings, workspace); });
     answers->write(i, row, found);
     if (!scale_gradients) return;
-    const ScaleGradient gradient =
-        found.volume != 0 ? scale_gradient(row, found, settings, workspace) : ScaleGradient();
+    const ScaleGradient gradient = found.volume != 0 && !std::isnan(found.volume)
+                                       ? scale_gradient(row, found, settings, workspace)
+                                       : ScaleGradient{found.volume, found.volume};
     *answers->scale_gradient.row(i) = gradient.b;
     *answers->scale_gradient_a.row(i) = gradient.a;
   });
-  refuse_not_held(rows, answers->status, kNotHeld, settings.measure == Measure::exact);
+  refuse_unanswered(rows, answers->status, {settings.measure, settings.field});
   return answers;
 }
 
@@ -82,20 +83,22 @@ PenetrationSettings penetration_settings(const std::string& measure, const std::
                                          std::uint32_t pair_budget, std::uint32_t max_visits,
                                          double relative_error) {
   return {named(measure, "measure", kMeasures), named(field, "field", kFieldUses), pair_budget,
-          max_visits, relative_error};
+          max_visits, take_limit(relative_error, "relative_error")};
 }
 
 constexpr const char* kPairDoc =
     R"(Volume, wrench and centroid of the overlap, for one pose or many.
 
 a: Asset or Field. b: Asset.
-poses: of B, (7,) or (n, 7): qw, qx, qy, qz, tx [u], ty, tz. A C-ordered float64 array is not copied.
+poses: of B, (7,) or (n, 7): qw, qx, qy, qz, tx [u], ty, tz, or matrices (4, 4) or (n, 4, 4).
+    Quaternions of any length but 0 are normalised. A C-ordered float64 array of rows is not copied.
+    ist.poses() makes rows of other conventions.
 scales: of B, a number or (n,), > 0. poses_a, scales_a: of A; None: at the origin, 1.)";
 
 constexpr const char* kSceneDoc = R"(The same for pairs of solids of one scene or many scenes.
 
 solids: k Assets and Fields.
-poses: (k, 7), or (w, k, 7) for w scenes. scales: (k,) or (w, k), None: 1.
+poses: (k, 7), or (w, k, 7) for w scenes; matrices (4, 4) may stand for rows. scales: (k,) or (w, k), None: 1.
 pairs: (n, 2) indices of solids; the second of each pair is an Asset. Answers have shape (n,) or (w, n).)";
 
 constexpr const char* kPenetrationDoc = R"(
@@ -107,9 +110,9 @@ field: 'automatic', 'never' or 'always': whether an asset's surface is used. No 
 pair_budget, max_visits, relative_error: cost limits; 0: no limit. See <ist/query.h>.
 threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 
-Invalid rows (NaN, a quaternion off unit length by more than 1e-3, a scale ≤ 0) are all zero, with
-the status invalid_input; they spoil no others. Rows of a solid that does not hold what the measure
-asks are NaN, with the status not_held; for one pose ist.Error is raised instead.
+Rows that cannot be answered are NaN with a status; they spoil no others. invalid_input: NaN, a
+quaternion of length 0, a scale ≤ 0. not_held: a solid does not hold what the measure or `field`
+asks. For one pose ValueError or ist.Error is raised instead.
 Ctrl-C raises KeyboardInterrupt.
 
 Returns a Penetration: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
@@ -120,9 +123,9 @@ void add_class(py::module_& module) {
       "Overlaps of placed solids: columns of one row a pose, without the (n,) for one pose.");
   add_column(type, "volume", &Penetrations::volume, "(n,) [u³] of the overlap.");
   add_column(type, "volume_min", &Penetrations::volume_min,
-             "(n,) [u³] With measure='exact' a lower bound of the true volume. With spheres a "
-             "lower bound of the finished sum, rounding included; not a bound of the true volume.");
-  add_column(type, "volume_max", &Penetrations::volume_max, "(n,) [u³] the upper bound, likewise.");
+             "(n,) [u³] With measure='exact' a lower bound of the true volume. With spheres the "
+             "lower end of the interval of the finished sum; it says nothing of the true volume.");
+  add_column(type, "volume_max", &Penetrations::volume_max, "(n,) [u³] the upper end, likewise.");
   add_column(type, "centroid", &Penetrations::centroid,
              "(n, 3) [u] of the overlap, world; zero if none.");
   add_column(type, "force", &Penetrations::force,
@@ -164,7 +167,7 @@ void Penetrations::write(std::size_t i, const Row& row, const Penetration& answe
   *status.row(i) = static_cast<std::uint32_t>(answer.status);
   *node_visits.row(i) = answer.node_visits;
   *sphere_pairs.row(i) = answer.sphere_pairs;
-  if (answer.volume_max == 0) return;  // nothing touches, or a row is invalid: all is zero
+  if (answer.volume_max == 0) return;  // nothing touches: all is zero
   *volume.row(i) = answer.volume;
   *volume_min.row(i) = answer.volume_min;
   *volume_max.row(i) = answer.volume_max;

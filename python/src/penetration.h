@@ -21,8 +21,6 @@ inline constexpr std::pair<const char*, Measure> kGpuMeasures[] = {{"matched", M
 inline constexpr std::pair<const char*, FieldUse> kFieldUses[] = {
     {"automatic", FieldUse::automatic}, {"never", FieldUse::never}, {"always", FieldUse::always}};
 
-inline constexpr auto kNotHeld = static_cast<std::uint32_t>(QueryStatus::not_held);
-
 using Vector = Eigen::Map<Eigen::Vector3d>;  ///< a row of a column
 
 /// Penetrations as columns.

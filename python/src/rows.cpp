@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <mutex>
 #include <numeric>
 #include <optional>
@@ -15,12 +16,13 @@
 #include <ist/error.h>
 
 #include "query/base/batch.h"
+#include "query/base/relative_pose.h"
 #include "stage/thread_arena.h"
 
 namespace ist::python {
 namespace {
 
-constexpr const char* kPoses = "(7,) or (n, 7): qw, qx, qy, qz, tx, ty, tz";
+constexpr const char* kPoses = "(7,) or (n, 7): qw, qx, qy, qz, tx, ty, tz; or (n, 4, 4)";
 
 constexpr double kOrigin[7] = {1, 0, 0, 0, 0, 0, 0};  // and a scale of 1
 
@@ -87,8 +89,8 @@ class Interrupt {
 }  // namespace
 
 Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& poses,
-                   const py::object& scales, const py::object& poses_a,
-                   const py::object& scales_a) {
+                   const py::object& scales, const py::object& poses_a, const py::object& scales_a,
+                   const char* name) {
   Rows rows;
   rows.solids_ = {solid_of(a, "a"), tree_of(b, "b")};
   rows.owners_ = {a, b};
@@ -100,8 +102,7 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
     count = array.shape(0);
   };
   const auto take = [&](const py::object& value, const char* name) -> Values {
-    if (value.is_none()) return Values(kOrigin);
-    Doubles array = take_doubles(value, name, kPoses);
+    Doubles array = take_poses(value, name, kPoses);
     if (array.ndim() < 1 || array.ndim() > 2 || array.shape(array.ndim() - 1) != 7)
       refuse_shape(array, name, kPoses);
     const bool many = array.ndim() == 2;
@@ -116,9 +117,9 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
     if (many) agree(array, name);
     return Values(std::move(array), 1, many);
   };
-  rows.pose_b_ = take(poses, "poses");
+  rows.pose_b_ = take(poses, name);
   rows.scale_b_ = take_scales(scales, "scales");
-  rows.pose_a_ = take(poses_a, "poses_a");
+  rows.pose_a_ = poses_a.is_none() ? Values(kOrigin) : take(poses_a, "poses_a");
   rows.scale_a_ = take_scales(scales_a, "scales_a");
   if (count) rows.shape_ = {*count};
   rows.count_ = count.value_or(1);
@@ -135,7 +136,7 @@ Rows Rows::of_scene(const py::sequence& solids, const py::object& poses, const p
   const auto k = rows.solids_.size();
   const std::string of_solids = std::to_string(k);
   const std::string wanted = "(" + of_solids + ", 7) or (w, " + of_solids + ", 7)";
-  Doubles places = take_doubles(poses, "poses", wanted);
+  Doubles places = take_poses(poses, "poses", wanted);
   const std::size_t d = places.ndim();
   if (d < 2 || d > 3 || places.shape(d - 1) != 7 || places.shape(d - 2) != k)
     refuse_shape(places, "poses", wanted);
@@ -218,24 +219,86 @@ Row Rows::at(std::size_t i) const {
   return row;
 }
 
-void refuse_not_held(const Rows& rows, const Column<std::uint32_t>& status, std::uint32_t not_held,
-                     bool exact) {
-  if (!rows.shape().empty() || *status.row(0) != not_held) return;
+std::string fault_of(const Pose& pose, double scale, const char* pose_name,
+                     const char* scale_name) {
+  constexpr const char* kNames[] = {"qw", "qx", "qy", "qz", "tx", "ty", "tz"};
+  for (int k = 0; k < 7; ++k)
+    if (const double x = k < 4 ? pose.q[k] : pose.t[k - 4]; !std::isfinite(x))
+      return std::string(pose_name) + ": " + kNames[k] + " is " + text_of(py::float_(x));
+  if (!(scale > 0) || !std::isfinite(scale))
+    return std::string(scale_name) + ": " + text_of(py::float_(scale)) + "; wanted > 0";
+  if (!usable_rotation(pose, scale))
+    return std::string(pose_name) + ": the quaternion qw, qx, qy, qz has length 0";
+  return {};
+}
+
+std::string fault_of(const Row& row, const char* name) {
+  const std::string of_b = fault_of(row.b.pose, row.b.scale, name, "scales");
+  if (!of_b.empty()) return of_b;
+  const std::string of_a = fault_of(row.pose_a, row.scale_a, "poses_a", "scales_a");
+  if (!of_a.empty()) return of_a;
+  const TreeView* const tree = std::get_if<TreeView>(row.a);
+  const bool near =
+      tree != nullptr ? relative_pose(PlacedTree{*tree, row.pose_a, row.scale_a}, row.b).has_value()
+                      : relative_pose(row.pose_a, row.scale_a, row.b).has_value();
+  return near ? std::string()
+              : std::string(name) + ": sizes or distances are more than 1e60 : 1 apart";
+}
+
+void refuse_unanswered(const Rows& rows, QueryStatus status, Asked asked) {
+  if (!rows.shape().empty()) return;
   const Row row = rows.at(0);
+  if (status == QueryStatus::invalid_input) {
+    const std::string fault = fault_of(row);
+    throw value_error(fault.empty() ? "a: the Field has a number that is not finite" : fault);
+  }
+  if (status != QueryStatus::not_held) return;
   const TreeView* const a = std::get_if<TreeView>(row.a);
+  const bool exact = asked.measure == Measure::exact;
   if (exact && a == nullptr)
     throw Error("a: a Field has no mesh, which measure='exact' needs; pass an Asset");
   if (exact)
     throw Error(std::string(a->has_mesh() ? "b" : "a") +
                 ": has no mesh, which measure='exact' needs; bake it with surface='all'");
-  throw Error(std::string(row.b.tree.sphere_count() == 0 ? "b" : "a") +
-              ": is a surface alone, without spheres; use penetration() with measure='exact', or "
-              "bake it with bake()");
+  for (const bool is_b : {true, false})
+    if (const TreeView* const tree = is_b ? &row.b.tree : a;
+        tree != nullptr && tree->sphere_count() == 0)
+      throw Error(std::string(is_b ? "b" : "a") +
+                  ": is a surface alone, without spheres; use penetration() with measure='exact', "
+                  "or bake it with bake()");
+  throw Error(
+      "field='always': the asset of coarser spheres holds no surface; bake it with surface='all', "
+      "or use field='automatic'");
+}
+
+Doubles take_poses(const py::handle& value, const char* name, const std::string& wanted) {
+  if (value.is_none())
+    throw type_error(std::string(name) + ": None; wanted " + wanted +
+                     "; [1, 0, 0, 0, 0, 0, 0] is the origin");
+  Doubles given = take_doubles(value, name, wanted);
+  const std::size_t d = given.ndim();
+  if (d < 2 || given.shape(d - 1) != 4 || given.shape(d - 2) != 4) return given;
+  const py::object rows = py::module_::import_("ist._poses").attr("rows_of")(value, name);
+  return take_doubles(rows, name, wanted);
+}
+
+Pose take_pose(const py::object& pose, double scale) {
+  Pose taken;
+  if (!pose.is_none()) {
+    const char* const wanted = "(7,): qw, qx, qy, qz, tx, ty, tz; or (4, 4)";
+    const Doubles values = take_poses(pose, "pose", wanted);
+    if (values.ndim() != 1 || values.shape(0) != 7) refuse_shape(values, "pose", wanted);
+    taken = pose_from(values.data());
+  }
+  const std::string fault = fault_of(taken, scale, "pose", "scale");
+  if (!fault.empty()) throw value_error(fault);
+  return taken;
 }
 
 void for_each_row(const Rows& rows, unsigned threads,
                   const std::function<void(std::size_t, Workspace&)>& answer) {
   const std::size_t count = rows.count();
+  take_threads(threads);
   if (count == 0) return;
   Interrupt interrupt;
   bool interrupted = false;

@@ -3,6 +3,7 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <ist/query.h>
@@ -33,16 +34,16 @@ class Rows {
  public:
   /// B at each pose beside A. Arguments of one row serve all rows.
   ///
-  /// `poses`, `poses_a`: (7,) or (n, 7), None: at the origin. `scales`, `scales_a`: a number or
-  /// (n,), None: 1.
+  /// `poses`, `poses_a`: (7,), (n, 7), (4, 4) or (n, 4, 4); poses_a None: at the origin. `scales`,
+  /// `scales_a`: a number or (n,), None: 1. `name`: of `poses`.
   static Rows of_pair(const py::object& a, const py::object& b, const py::object& poses,
                       const py::object& scales, const py::object& poses_a,
-                      const py::object& scales_a);
+                      const py::object& scales_a, const char* name = "poses");
 
   /// Solids of a scene, or of many alike, two at a time.
   ///
-  /// `poses`: (k, 7) or (w, k, 7); `scales`: None, (k,) or (w, k); `pairs`: (n, 2), numbers of
-  /// solids, the second an asset.
+  /// `poses`: (k, 7), (w, k, 7), or matrices (4, 4) for rows; `scales`: None, (k,) or (w, k);
+  /// `pairs`: (n, 2), numbers of solids, the second an asset.
   static Rows of_scene(const py::sequence& solids, const py::object& poses, const py::object& pairs,
                        const py::object& scales);
 
@@ -85,10 +86,32 @@ class Rows {
   void sort_by_asset();
 };
 
-/// Nobody looks at the status of one pose: throws Error, with the way out, where that is all there
-/// is and a solid does not hold what was asked. `exact`: by Measure::exact.
-void refuse_not_held(const Rows& rows, const Column<std::uint32_t>& status, std::uint32_t not_held,
-                     bool exact = false);
+/// What of a solid is asked.
+struct Asked {
+  Measure measure = Measure::matched;
+  FieldUse field = FieldUse::automatic;
+};
+
+/// Nobody looks at the status of one pose. Where that is all there is, throws Error, with the way
+/// out, if a solid does not hold what was asked, and ValueError that names the argument if it is
+/// invalid.
+void refuse_unanswered(const Rows& rows, QueryStatus status, Asked asked = {});
+inline void refuse_unanswered(const Rows& rows, const Column<std::uint32_t>& status,
+                              Asked asked = {}) {
+  if (rows.shape().empty()) refuse_unanswered(rows, QueryStatus{*status.row(0)}, asked);
+}
+
+/// What makes a pose or a scale unusable, with the argument's name; nothing if they are usable.
+std::string fault_of(const Pose& pose, double scale, const char* pose_name, const char* scale_name);
+
+/// The same of two placed solids, beside each other too. `name`: of B's pose.
+std::string fault_of(const Row& row, const char* name = "poses");
+
+/// Rows of seven numbers, of such or of matrices (4, 4).
+Doubles take_poses(const py::handle& value, const char* name, const std::string& wanted);
+
+/// Of (7,) or (4, 4); None: at the origin. Refuses what no query takes, the scale too.
+Pose take_pose(const py::object& pose, double scale);
 
 /// answer(i, workspace) for each row, on `threads` threads (0: all cores), the GIL released.
 /// Ctrl-C ends it: KeyboardInterrupt.

@@ -70,7 +70,7 @@ std::unique_ptr<Separations> separations(const Rows& rows, const SeparationSetti
       return separation(a, b, settings, workspace);
     }));
   });
-  refuse_not_held(rows, answers->status, kNotHeld);
+  refuse_unanswered(rows, answers->status);
   return answers;
 }
 
@@ -88,7 +88,7 @@ std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
     *answers->count.row(i) = static_cast<std::uint32_t>(answer.count);
     answers->write(i, std::span(found).first(answer.count));
   });
-  refuse_not_held(rows, answers->penetration->status, kNotHeld, settings.measure == Measure::exact);
+  refuse_unanswered(rows, answers->penetration->status, {settings.measure, settings.field});
   return answers;
 }
 
@@ -120,7 +120,7 @@ std::unique_ptr<Outline> outline(const Rows& rows, std::size_t each,
     *contact->count.row(i) = static_cast<std::uint32_t>(found.contact.count);
     contact->write(i, std::span(patches).first(found.contact.count));
   });
-  refuse_not_held(rows, contact->penetration->status, kNotHeld, true);
+  refuse_unanswered(rows, contact->penetration->status, {Measure::exact});
   const Shape count = {segments.size()};
   auto answer = std::make_unique<Outline>(
       Outline{contact, Column<double>(count, {2, 3}), Column<std::uint32_t>(count, {})});
@@ -134,6 +134,8 @@ std::unique_ptr<Outline> outline(const Rows& rows, std::size_t each,
 
 py::object overlaps(const Rows& rows, unsigned threads) {
   const Column<std::uint32_t> answers(rows.shape(), {});
+  if (rows.shape().empty() && !fault_of(rows.at(0)).empty())
+    refuse_unanswered(rows, QueryStatus::invalid_input);
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     *answers.row(i) = static_cast<std::uint32_t>(rows.at(i).answer(
         [&](const auto& a, const PlacedTree& b) { return overlap(a, b, workspace); }));
@@ -169,7 +171,8 @@ constexpr const char* kOverlapDoc = R"(Whether solids share a point. Yes and no 
 
 Arguments as for penetration(). Costs a fraction of a penetration query.
 
-Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown; a number for one pose.)";
+Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown, also for invalid rows; a number for one
+pose.)";
 
 void add_classes(py::module_& module) {
   py::class_<Separations> separation(module, "Separation",
@@ -251,7 +254,7 @@ void add_separation(py::module_& module) {
          std::uint32_t max_visits, double relative_error, unsigned threads) {
         return patches(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), max_patches,
                        {named(measure, "measure", kMeasures), named(field, "field", kFieldUses),
-                        pair_budget, max_visits, relative_error},
+                        pair_budget, max_visits, take_limit(relative_error, "relative_error")},
                        threads);
       },
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <variant>
 
 #include <ist/bake.h>
@@ -13,11 +14,15 @@ namespace ist::python {
 /// A field and whoever owns the memory that it points to.
 struct OwnedField {
   Field field;
+  std::string arguments;  ///< that it was made of, for people
   std::shared_ptr<const void> owner;
 };
 
 /// What may stand first in a query: a view. Whoever asks holds the Python object meanwhile.
 using Solid = std::variant<TreeView, Field>;
+
+/// Its surface for queries of spheres, (vertices, triangles); Error where there is none.
+py::tuple surface_of(const Asset& asset);
 
 /// Of an Asset or a Field, else TypeError. `name`: of the argument.
 Solid solid_of(const py::handle& object, const char* name);

@@ -58,12 +58,7 @@ Row placed_alone(const Solid& solid, const py::object& pose, double scale) {
   Row row;
   row.a = &solid;
   row.scale_a = scale;
-  if (pose.is_none()) return row;
-  const Doubles values = take_doubles(pose, "pose", "(7,): qw, qx, qy, qz, tx, ty, tz");
-  if (values.ndim() != 1 || values.shape(0) != 7)
-    refuse_shape(values, "pose", "(7,): qw, qx, qy, qz, tx, ty, tz");
-  std::copy_n(values.data(), 4, row.pose_a.q);
-  std::copy_n(values.data() + 4, 3, row.pose_a.t);
+  row.pose_a = take_pose(pose, scale);
   return row;
 }
 
@@ -86,18 +81,24 @@ struct Places {
   std::size_t count = 0;
 };
 
-/// ask(placed, i) for each of `count`, the GIL released. Where the solid does not hold what is
-/// asked, nothing is answered.
+/// ask(placed, i) for each place of `shape`, the GIL released. Where the solid does not hold what
+/// is asked, nothing is answered. One invalid place is a ValueError.
 template <class Ask>
-void ask_places(const Row& row, std::size_t count, const Ask& ask) {
-  bool held = true;
+void ask_places(const Row& row, const Shape& shape, const char* places, const Ask& ask) {
+  bool held = true, valid = true;
   {
     const py::gil_scoped_release released;
     row.answer([&](const auto& placed, const PlacedTree&) {
-      for (std::size_t i = 0; i < count && held; ++i)
-        held = ask(placed, i) != QueryStatus::not_held;
+      const std::size_t count = shape.empty() ? 1 : shape[0];
+      for (std::size_t i = 0; i < count && held; ++i) {
+        const QueryStatus status = ask(placed, i);
+        held = status != QueryStatus::not_held;
+        valid = status != QueryStatus::invalid_input;
+      }
     });
   }
+  if (!valid && shape.empty())
+    throw value_error(std::string(places) + ": not finite, of length 0, or too far away");
   if (!held)
     throw Error(
         "solid: has no mesh, or is a Field that no ray can be cast at; bake it with its mesh, or "
@@ -122,8 +123,8 @@ constexpr const char* kContainsDoc = R"(Whether points are inside a solid.
 
 Arguments as closest_point() has them.
 
-Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown: no usable point or pose; a number for
-one point.)";
+Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown: no usable point; a number for one
+point.)";
 
 }  // namespace
 
@@ -157,11 +158,12 @@ void add_surfaces(py::module_& module) {
                             std::to_string(from.count));
         const Shape& shape = from.rows.empty() ? along.rows : from.rows;
         auto answers = std::make_unique<RayHits>(shape);
-        ask_places(row, shape.empty() ? 1 : shape[0], [&](const auto& placed, std::size_t i) {
-          const RayHit hit = raycast(placed, Ray{from.at(i), along.at(i), longest});
-          answers->write(i, hit);
-          return hit.status;
-        });
+        ask_places(row, shape, "origins, directions, longest",
+                   [&](const auto& placed, std::size_t i) {
+                     const RayHit hit = raycast(placed, Ray{from.at(i), along.at(i), longest});
+                     answers->write(i, hit);
+                     return hit.status;
+                   });
         return answers;
       },
       py::arg("solid"), py::arg("pose").none(), py::arg("origins"), py::arg("directions"),
@@ -174,7 +176,7 @@ void add_surfaces(py::module_& module) {
         const Row row = placed_alone(view, pose, scale);
         const Places places(points, "points");
         auto answers = std::make_unique<SurfacePoints>(places.rows);
-        ask_places(row, places.count, [&](const auto& placed, std::size_t i) {
+        ask_places(row, places.rows, "points", [&](const auto& placed, std::size_t i) {
           const SurfacePoint foot = closest_point(placed, places.at(i));
           answers->write(i, foot);
           return foot.status;
@@ -190,7 +192,7 @@ void add_surfaces(py::module_& module) {
         const Row row = placed_alone(view, pose, scale);
         const Places places(points, "points");
         const Column<std::uint32_t> answers(places.rows, {});
-        ask_places(row, places.count, [&](const auto& placed, std::size_t i) {
+        ask_places(row, places.rows, "points", [&](const auto& placed, std::size_t i) {
           const Containment found = contains(placed, places.at(i));
           *answers.row(i) = found.status != QueryStatus::ok ? 2 : found.inside ? 1 : 0;
           return found.status;

@@ -1,5 +1,6 @@
 #include <ist/time_of_impact.h>
 
+#include <cmath>
 #include <memory>
 
 #include "gap.h"
@@ -58,10 +59,13 @@ void add_time_of_impact(py::module_& module) {
          const py::object& poses_a, const py::object& poses_a_to, const py::object& about_a,
          const py::object& scales_a, double duration, double tolerance, std::uint32_t max_visits,
          unsigned threads) {
-        const ImpactSettings settings{duration, tolerance, max_visits};
+        if (!(duration > 0) || !std::isfinite(duration))
+          throw value_error("duration: " + text_of(py::float_(duration)) + "; wanted > 0");
+        const ImpactSettings settings{duration, take_limit(tolerance, "tolerance"), max_visits};
         const Rows from = Rows::of_pair(a, b, poses, scales, poses_a, scales_a);
-        const Rows to = Rows::of_pair(a, b, poses_to, scales,
-                                      poses_a_to.is_none() ? poses_a : poses_a_to, scales_a);
+        const Rows to =
+            Rows::of_pair(a, b, poses_to, scales, poses_a_to.is_none() ? poses_a : poses_a_to,
+                          scales_a, "poses_to");
         if (from.shape() != to.shape())
           throw value_error("poses_to: shape " + text_of(to.shape()) + " of rows; poses have " +
                             text_of(from.shape()));
@@ -77,7 +81,18 @@ void add_time_of_impact(py::module_& module) {
             return time_of_impact(one, other, motions, settings, workspace);
           }));
         });
-        refuse_not_held(from, answers->status, static_cast<std::uint32_t>(ImpactStatus::not_held));
+        if (from.shape().empty()) {
+          const auto status = ImpactStatus{*answers->status.row(0)};
+          const bool invalid = status == ImpactStatus::invalid_input;
+          if (invalid && fault_of(from.at(0)).empty()) {
+            const std::string fault = fault_of(to.at(0), "poses_to");
+            throw value_error(fault.empty() ? "poses_to, about: a motion with NaN, or too far"
+                                            : fault);
+          }
+          refuse_unanswered(from, invalid                            ? QueryStatus::invalid_input
+                                  : status == ImpactStatus::not_held ? QueryStatus::not_held
+                                                                     : QueryStatus::ok);
+        }
         return answers;
       },
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::arg("poses_to").none(),

@@ -232,7 +232,9 @@ void add_query(CLI::App& app) {
       ->check(field_fault);
   add_input(command, "B", options->asset_b, "An .ist file")->check(not_an_asset);
   CLI::Option_group* const poses = command->add_option_group("Poses", "Pose of B");
-  poses->add_option("--pose", options->pose, "qw,qx,qy,qz,tx,ty,tz: x_A = R (scale · x_B) + t")
+  poses
+      ->add_option("--pose", options->pose,
+                   "qw,qx,qy,qz,tx,ty,tz: x_A = R (scale · x_B) + t; the quaternion is normalised")
       ->check(is_pose);
   CLI::Option* const file = poses->add_option(
       "--poses", options->poses,

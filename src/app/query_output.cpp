@@ -97,7 +97,7 @@ std::string answer_text(const Answer& answer, Measure measure) {
          measure == Measure::matched ? "of the overlap, by matched spheres"
                                      : "of the overlap, by inner spheres: a lower bound");
     line("sum range", fmt::format("{:.6g} … {:.6g} u³", p.volume_min, p.volume_max),
-         "contains the finished sum; no bound on the true volume");
+         "interval of the finished sum; says nothing of the true volume");
   }
   if (known) {
     line("centroid", short_vector(p.centroid) + " u", "of the overlap, in A's frame");

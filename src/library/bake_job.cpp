@@ -1,5 +1,7 @@
 #include "library/bake_job.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <fstream>
 #include <optional>
@@ -44,6 +46,7 @@ void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& r
   result.bytes = entry.asset.bytes().size();
   result.spheres = tree.sphere_count();
   result.coverage = tree.coverage();
+  result.has_surface = tree.has_field();
   result.mesh_state = name_of(tree.mesh_state());
   result.mesh_triangles = tree.mesh_triangles();
   result.mesh_error = tree.mesh_error();
@@ -71,6 +74,29 @@ CacheEntry bake_entry(const Job& job, const BakeMesh& bake) {
   CacheEntry entry = {bake(mesh.closed, job.settings), std::move(mesh.closed.report.notes)};
   if (const auto& judged = mesh.closed.report.judged) entry.confidence = judged->confidence;
   return entry;
+}
+
+/// Throws Error where an asset is not what its manifest demands.
+void check_demands(const Job& job, const CacheEntry& entry) {
+  const TreeView& tree = entry.asset.view();
+  const Demands& demands = job.demands;
+  const bool lacks_field = !tree.has_field() && tree.sphere_count() > 0;
+  if (demands.surface &&
+      (lacks_field || tree.mesh_triangles() == 0 || tree.mesh_state() == MeshState::unresolved))
+    throw Error(
+        fmt::format("{}: require-surface: the asset holds no surface to query; its mesh is "
+                    "'{}'. Repair the mesh, and keep it with surface = \"all\"",
+                    job.mesh, name_of(tree.mesh_state())));
+  if (!(tree.coverage() >= demands.coverage))
+    throw Error(
+        fmt::format("{}: min-coverage: spheres fill {:.1f} % of the volume, less than "
+                    "{:.1f} %. Allow more spheres",
+                    job.mesh, 100 * tree.coverage(), 100 * demands.coverage));
+  if (entry.confidence && !(*entry.confidence >= demands.confidence))
+    throw Error(
+        fmt::format("{}: min-confidence: the closed mesh has a confidence of {:.2f}, less "
+                    "than {:.2f}. Repair the mesh by hand",
+                    job.mesh, *entry.confidence, demands.confidence));
 }
 
 }  // namespace
@@ -104,6 +130,7 @@ JobResult do_job(const Job& job, const RunSettings& settings, const BakeMesh& ba
       }
     }
   }
+  check_demands(job, *entry);
   const fs::path path = settings.output / (job.name + ".ist");
   write_asset(path, entry->asset);
   result.asset = path.string();

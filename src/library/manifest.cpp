@@ -17,12 +17,16 @@
 
 #include "library/glob.h"
 #include "mesh/mesh_files.h"
+#include "settings/numbers.h"
 
 namespace ist {
 namespace {
 
 namespace fs = std::filesystem;
 using Line = toml::source_index;
+
+/// Keys that no bake has: what the asset must be.
+constexpr std::string_view kDemands[] = {"require-surface", "min-coverage", "min-confidence"};
 
 /// How many letters have to be changed, left out or put in.
 std::size_t letters_apart(std::string_view a, std::string_view b) {
@@ -49,6 +53,7 @@ const Setting* setting_named(std::string_view name) {
 std::string other_keys(std::string key, std::vector<std::string> known) {
   std::replace(key.begin(), key.end(), '_', '-');
   for (const Setting& setting : all_settings()) known.push_back(setting.name);
+  known.insert(known.end(), std::begin(kDemands), std::end(kDemands));
   const auto nearest = std::min_element(
       known.begin(), known.end(),
       [&](const auto& a, const auto& b) { return letters_apart(key, a) < letters_apart(key, b); });
@@ -86,6 +91,7 @@ std::string shown(const toml::node& value) {
 
 /// Settings given somewhere, and in which lines.
 struct Given {
+  Demands demands;
   std::map<std::string, Line> lines;
   std::vector<std::pair<const Setting*, std::string>> values;
 };
@@ -151,10 +157,32 @@ class Reader {
     }
   }
 
+  /// False: the key is no demand.
+  bool read_demand(const toml::key& key, const toml::node& value, Demands& demands) {
+    const std::string name(key.str());
+    if (std::find(std::begin(kDemands), std::end(kDemands), name) == std::end(kDemands))
+      return false;
+    const bool is_flag = name == kDemands[0];
+    const std::optional<std::string> text =
+        text_of(value, is_flag ? SettingKind::flag : SettingKind::share);
+    const std::optional<double> share = text && !is_flag ? parse_share(*text) : std::nullopt;
+    if (is_flag && text) {
+      demands.surface = *text == "true";
+    } else if (share && *share >= 0 && *share <= 1) {
+      (name == kDemands[1] ? demands.coverage : demands.confidence) = *share;
+    } else {
+      fault(key.source().begin.line,
+            fmt::format("{}: {} is not {}", name, shown(value),
+                        is_flag ? "true or false" : "a share from 0 to 1, as 0.5 or 50%"));
+    }
+    return true;
+  }
+
   void read_setting(const toml::key& key, const toml::node& value, Given& given,
                     const std::vector<std::string>& besides) {
     const Line line = key.source().begin.line;
     const std::string name(key.str());
+    if (read_demand(key, value, given.demands)) return;
     const Setting* const setting = setting_named(name);
     if (setting == nullptr)
       return fault(line, fmt::format("unknown key '{}': {}", name, other_keys(name, besides)));
@@ -194,10 +222,12 @@ class Reader {
   void read_asset(const toml::table& table) {
     const Line line = table.source().begin.line;
     Given own;
+    own.demands = defaults_.demands;
     for (const auto& [key, value] : table)
       if (key.str() != "mesh" && key.str() != "name")
         read_setting(key, value, own, {"mesh", "name"});
     Job job;
+    job.demands = own.demands;
     complete_settings(job.settings, own, line);
     if (!table.contains("mesh"))
       return fault(line, "an asset without a mesh: add mesh = \"path or pattern\"");

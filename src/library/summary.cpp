@@ -38,6 +38,7 @@ Json to_json(const JobResult& result) {
           {"bytes", if_done(result.bytes)},
           {"spheres", if_done(result.spheres)},
           {"coverage", if_done(result.coverage)},
+          {"has_surface", if_done(result.has_surface)},
           {"mesh_state", if_done(result.mesh_state)},
           {"mesh_triangles", if_done(result.mesh_triangles)},
           {"mesh_error", if_done(result.mesh_error)},
@@ -76,6 +77,7 @@ JobResult result_from(const Json& json) {
   take(json, "bytes", result.bytes);
   take(json, "spheres", result.spheres);
   take(json, "coverage", result.coverage);
+  if (json.contains("has_surface")) take(json, "has_surface", result.has_surface);
   if (json.contains("mesh_state")) {
     take(json, "mesh_state", result.mesh_state);
     take(json, "mesh_triangles", result.mesh_triangles);

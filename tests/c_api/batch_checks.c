@@ -135,7 +135,7 @@ int batches_answer(scene_t* s) {
   parallel.run = counts_wrongly;
   CHECK(ist_penetration_batch(pairs, PAIRS, NULL, workspaces, 3, answers, size, &parallel) ==
         IST_OK);
-  CHECK(is_empty(&answers[0], size, IST_NULL_POINTER));
+  CHECK(is_refused(&answers[0], size, IST_NULL_POINTER));
   CHECK(ist_penetration_batch(pairs, PAIRS, NULL, NULL, 0, answers, size, NULL) == IST_OK);
   CHECK(answers[0].status == IST_BUDGET_EXHAUSTED && isinf(answers[0].volume_max));
   CHECK(ist_penetration_batch(NULL, 0, NULL, workspaces, 3, NULL, size, NULL) == IST_OK);

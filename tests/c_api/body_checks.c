@@ -34,10 +34,12 @@ int bodies_are_told(scene_t* s) {
   CHECK(ist_placed_mass_properties(&s->b, NULL) == IST_NULL_POINTER);
   CHECK(ist_placed_bounds(NULL, &bounds) == IST_NULL_POINTER);
   CHECK(ist_placed_bounds(&s->b, NULL) == IST_NULL_POINTER);
-  wrong.pose.q[0] = 3;
+  wrong.pose.q[0] = 3; /* a length that is normalised */
+  CHECK(ist_placed_mass_properties(&wrong, &placed_mass) == IST_OK && placed_mass.volume > 0);
+  wrong.pose.q[0] = 0;
   CHECK(ist_placed_mass_properties(&wrong, &mass) == IST_INVALID_INPUT);
   CHECK(ist_placed_bounds(&wrong, &bounds) == IST_INVALID_INPUT);
-  CHECK(is_empty(&bounds, sizeof bounds, IST_INVALID_INPUT));
+  CHECK(is_refused(&bounds, sizeof bounds, IST_INVALID_INPUT));
   mass.size = bounds.size = 0;
   CHECK(ist_tree_get_mass_properties(&s->tree_b, &mass) == IST_WRONG_SIZE);
   CHECK(ist_placed_bounds(&s->b, &bounds) == IST_WRONG_SIZE);
@@ -113,7 +115,7 @@ int impacts_are_found(scene_t* s) {
 
   CHECK(ist_time_of_impact(NULL, &b, NULL, &motion, NULL, &s->workspace, &impact) ==
         IST_NULL_POINTER);
-  CHECK(is_empty(&impact, sizeof impact, IST_NULL_POINTER));
+  CHECK(is_refused(&impact, sizeof impact, IST_NULL_POINTER));
   CHECK(ist_time_of_impact(&s->a, NULL, NULL, &motion, NULL, &s->workspace, &impact) ==
         IST_NULL_POINTER);
   CHECK(ist_time_of_impact(&s->a, &b, NULL, &motion, NULL, NULL, &impact) == IST_NULL_POINTER);
@@ -125,11 +127,11 @@ int impacts_are_found(scene_t* s) {
   settings.duration = 0; /* as a zeroed struct has it */
   CHECK(ist_time_of_impact(&s->a, &b, NULL, &motion, &settings, &s->workspace, &impact) ==
         IST_NO_DURATION);
-  CHECK(is_empty(&impact, sizeof impact, IST_NO_DURATION));
+  CHECK(is_refused(&impact, sizeof impact, IST_NO_DURATION));
   settings.duration = -1;
   CHECK(ist_time_of_impact(&s->a, &b, NULL, &motion, &settings, &s->workspace, &impact) ==
         IST_INVALID_INPUT);
-  CHECK(is_empty(&impact, sizeof impact, IST_INVALID_INPUT));
+  CHECK(is_refused(&impact, sizeof impact, IST_INVALID_INPUT));
   settings.size = 0;
   CHECK(ist_time_of_impact(&s->a, &b, NULL, &motion, &settings, &s->workspace, &impact) ==
         IST_WRONG_SIZE);

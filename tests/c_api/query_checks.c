@@ -29,7 +29,7 @@ int penetrations_answer(scene_t* s) {
 
   /* Each pointer null. */
   CHECK(ist_penetration(NULL, &s->b, NULL, &s->workspace, &other) == IST_NULL_POINTER);
-  CHECK(is_empty(&other, sizeof other, IST_NULL_POINTER));
+  CHECK(is_refused(&other, sizeof other, IST_NULL_POINTER));
   CHECK(ist_penetration(&s->a, NULL, NULL, &s->workspace, &other) == IST_NULL_POINTER);
   CHECK(ist_penetration(&s->a, &s->b, NULL, NULL, &other) == IST_NULL_POINTER);
   CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, NULL) == IST_NULL_POINTER);
@@ -53,7 +53,7 @@ int penetrations_answer(scene_t* s) {
   wrong = s->a;
   wrong.tree = &empty;
   CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_NO_HANDLE);
-  CHECK(is_empty(&other, sizeof other, IST_NO_HANDLE));
+  CHECK(is_refused(&other, sizeof other, IST_NO_HANDLE));
   CHECK(ist_penetration(&s->a, &wrong, NULL, &s->workspace, &other) == IST_NO_HANDLE);
   CHECK(ist_penetration(&s->a, &s->b, NULL, &none, &other) == IST_NO_HANDLE);
 
@@ -82,7 +82,7 @@ int penetrations_answer(scene_t* s) {
   wrong = s->a;
   wrong.pose.t[1] = NAN;
   CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_INVALID_INPUT);
-  CHECK(is_empty(&other, sizeof other, IST_INVALID_INPUT));
+  CHECK(is_refused(&other, sizeof other, IST_INVALID_INPUT));
   wrong = s->a;
   wrong.scale = -1;
   CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_INVALID_INPUT);
@@ -95,7 +95,7 @@ int penetrations_answer(scene_t* s) {
   CHECK(ist_without_protrusion(NULL, &s->a, &s->b, &other) == IST_NULL_POINTER);
   CHECK(ist_without_protrusion(&whole, NULL, &s->b, &other) == IST_NULL_POINTER);
   CHECK(ist_without_protrusion(&whole, &s->a, NULL, &other) == IST_NULL_POINTER);
-  CHECK(is_empty(&other, sizeof other, IST_NULL_POINTER));
+  CHECK(is_refused(&other, sizeof other, IST_NULL_POINTER));
   CHECK(ist_without_protrusion(&whole, &s->a, &s->b, NULL) == IST_NULL_POINTER);
   CHECK(ist_without_protrusion(&whole, &s->a, &s->b, &whole) == IST_OK); /* in its place */
   return 0;
@@ -151,7 +151,7 @@ int separations_answer(scene_t* s) {
   CHECK(penetration.status == IST_OK && separation.status == IST_BUDGET_EXHAUSTED);
 
   CHECK(ist_separation(NULL, &s->b, NULL, &s->workspace, &gap) == IST_NULL_POINTER);
-  CHECK(is_empty(&gap, sizeof gap, IST_NULL_POINTER));
+  CHECK(is_refused(&gap, sizeof gap, IST_NULL_POINTER));
   CHECK(ist_separation(&s->a, NULL, NULL, &s->workspace, &gap) == IST_NULL_POINTER);
   CHECK(ist_separation(&s->a, &s->b, NULL, NULL, &gap) == IST_NULL_POINTER);
   CHECK(ist_separation(&s->a, &s->b, NULL, &s->workspace, NULL) == IST_NULL_POINTER);
@@ -159,16 +159,16 @@ int separations_answer(scene_t* s) {
   CHECK(ist_separation(&s->a, &s->b, &settings, &s->workspace, &gap) == IST_WRONG_SIZE);
   CHECK(ist_query(&s->a, &s->b, NULL, &settings, &s->workspace, &penetration, &separation) ==
         IST_WRONG_SIZE);
-  CHECK(is_empty(&penetration, sizeof penetration, IST_WRONG_SIZE));
+  CHECK(is_refused(&penetration, sizeof penetration, IST_WRONG_SIZE));
   CHECK(ist_query(NULL, &s->b, NULL, NULL, &s->workspace, &penetration, &separation) ==
         IST_NULL_POINTER);
   CHECK(ist_query(&s->a, NULL, NULL, NULL, &s->workspace, &penetration, &separation) ==
         IST_NULL_POINTER);
   CHECK(ist_query(&s->a, &s->b, NULL, NULL, NULL, &penetration, &separation) == IST_NULL_POINTER);
   CHECK(ist_query(&s->a, &s->b, NULL, NULL, &s->workspace, NULL, &separation) == IST_NULL_POINTER);
-  CHECK(is_empty(&separation, sizeof separation, IST_NULL_POINTER));
+  CHECK(is_refused(&separation, sizeof separation, IST_NULL_POINTER));
   CHECK(ist_query(&s->a, &s->b, NULL, NULL, &s->workspace, &penetration, NULL) == IST_NULL_POINTER);
-  CHECK(is_empty(&penetration, sizeof penetration, IST_NULL_POINTER));
+  CHECK(is_refused(&penetration, sizeof penetration, IST_NULL_POINTER));
   s->b.pose.t[0] = x;
   return 0;
 }
@@ -225,7 +225,7 @@ int patches_answer(scene_t* s) {
   CHECK(ist_contact_patches(&s->a, &s->b, &settings, &s->workspace, &patches, NULL) == IST_OK);
   CHECK(ist_contact_patches(NULL, &s->b, NULL, &s->workspace, &patches, &whole) ==
         IST_NULL_POINTER);
-  CHECK(patches.count == 0 && is_empty(&whole, sizeof whole, IST_NULL_POINTER));
+  CHECK(patches.count == 0 && is_refused(&whole, sizeof whole, IST_NULL_POINTER));
   CHECK(ist_contact_patches(&s->a, NULL, NULL, &s->workspace, &patches, NULL) == IST_NULL_POINTER);
   CHECK(ist_contact_patches(&s->a, &s->b, NULL, NULL, &patches, NULL) == IST_NULL_POINTER);
   CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, NULL, &whole) == IST_NULL_POINTER);
@@ -299,7 +299,7 @@ int outlines_answer(scene_t* s) {
   outline.total = outline.count = patches.count = 9;
   CHECK(ist_overlap_outline(NULL, &s->b, NULL, &s->workspace, &patches, &outline, &whole) ==
         IST_NULL_POINTER);
-  CHECK(is_empty(&whole, sizeof whole, IST_NULL_POINTER));
+  CHECK(is_refused(&whole, sizeof whole, IST_NULL_POINTER));
   CHECK(patches.count == 0 && outline.total == 0 && outline.count == 0);
   CHECK(ist_overlap_outline(&s->a, NULL, NULL, &s->workspace, &patches, &outline, NULL) ==
         IST_NULL_POINTER);
@@ -310,7 +310,7 @@ int outlines_answer(scene_t* s) {
   patches.count = 9;
   CHECK(ist_overlap_outline(&s->a, &s->b, NULL, &s->workspace, &patches, NULL, &whole) ==
         IST_NULL_POINTER);
-  CHECK(patches.count == 0 && is_empty(&whole, sizeof whole, IST_NULL_POINTER));
+  CHECK(patches.count == 0 && is_refused(&whole, sizeof whole, IST_NULL_POINTER));
   wrong = s->b;
   wrong.pose.t[0] = NAN;
   CHECK(ist_overlap_outline(&s->a, &wrong, NULL, &s->workspace, &patches, &outline, NULL) ==
@@ -414,7 +414,7 @@ int fields_answer(scene_t* s) {
   for (kind = IST_HEIGHTS; kind <= IST_MESH; ++kind) {
     field.kind = kind;
     CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
-    CHECK(is_empty(&answer, sizeof answer, IST_NULL_POINTER));
+    CHECK(is_refused(&answer, sizeof answer, IST_NULL_POINTER));
   }
   field.as.mesh.tree = &empty;
   CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NO_HANDLE);

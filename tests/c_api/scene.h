@@ -26,6 +26,23 @@ static inline int is_empty(const void* answer, size_t size, ist_status_t status)
   return own_size == size && own_status == status;
 }
 
+/* Whether the numbers of a query's answer are NaN and its counts 0. */
+static inline int is_refused(const void* answer, size_t size, ist_status_t status) {
+  size_t i, unknown = 0;
+  ist_status_t found;
+  memcpy(&found, (const char*)answer + 4, sizeof found);
+  if (found != status) return 0;
+  for (i = 8; i < size; i += 8) {
+    double number;
+    memcpy(&number, (const char*)answer + i, sizeof number);
+    if (number != number)
+      ++unknown;
+    else if (memcmp(&number, &(double){0}, sizeof number) != 0)
+      return 0;
+  }
+  return unknown >= 3;
+}
+
 /* Two trees that overlap. */
 typedef struct scene {
   ist_tree_t tree_a, tree_b;

@@ -123,7 +123,7 @@ TEST_F(PoseTable, WhatIsWrongWithAPoseIsSaid) {
   expect_said("1,0,0,0,0,0,0", "scale_b is 1e-70, out of range", {"--scale-b", "1e-70"});
   expect_said("1,0,0,0,0,nan,0", "ty is nan");
   expect_said("1,inf,0,0,0,0,0", "qx is inf");
-  expect_said("2,0,0,0,0,0,0", "quaternion qw,qx,qy,qz has length 2");
+  expect_said("0,0,0,0,0,0,0", "quaternion qw,qx,qy,qz has length 0");
 }
 
 }  // namespace

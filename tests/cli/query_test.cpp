@@ -305,10 +305,14 @@ TEST_F(QueryCommand, WrongUsageExitsWith2) {
 }
 
 TEST_F(QueryCommand, AnInvalidPoseIsNoZeroForAPerson) {
-  const Outcome outcome = ist({"query", "cube.ist", "cube.ist", "--pose", "2,0,0,0,0,0,0"});
+  const Outcome outcome = ist({"query", "cube.ist", "cube.ist", "--pose", "0,0,0,0,0,0,0"});
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_NE(outcome.out.find("invalid_input"), std::string::npos) << outcome.out;
   EXPECT_EQ(outcome.out.find("volume"), std::string::npos) << outcome.out;
+}
+
+TEST_F(QueryCommand, AQuaternionOfAnyLengthIsNormalised) {
+  EXPECT_EQ(row("2,0,0,0,0.5,0,0")[volume], row("1,0,0,0,0.5,0,0")[volume]);
 }
 
 TEST_F(QueryCommand, AByteOrderMarkAndCarriageReturnsAreNoPartOfACsv) {

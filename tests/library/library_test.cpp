@@ -132,6 +132,27 @@ TEST_F(Library, TargetsAndWarningsAreInTheSummary) {
   EXPECT_NE(assets[1].at("warnings").dump().find("missed"), std::string::npos) << assets[1];
 }
 
+TEST_F(Library, AnAssetThatIsNotWhatIsDemandedFails) {
+  write("demands.toml",
+        "[defaults]\nspheres = 40\nrequire-surface = true\n"
+        "[[asset]]\nmesh = \"meshes/cube.obj\"\n"
+        "[[asset]]\nname = 'bare'\nmesh = \"meshes/cube.obj\"\nsurface = \"none\"\n"
+        "[[asset]]\nname = 'bare_may_be'\nmesh = \"meshes/cube.obj\"\nsurface = \"none\"\n"
+        "require-surface = false\n"
+        "[[asset]]\nname = 'full'\nmesh = \"meshes/cube.obj\"\nmin-coverage = \"99.9%\"\n");
+  const Outcome outcome = bake("out", {"--json"}, {}, "demands.toml");
+  ASSERT_EQ(outcome.exit_code, 1) << outcome.err;
+  const nlohmann::json assets = nlohmann::json::parse(outcome.out).at("assets");
+  ASSERT_EQ(assets.size(), 4u);
+  const auto message = [&](int i) { return assets[i].at("message").dump(); };
+  EXPECT_NE(message(0).find("require-surface: the asset holds no surface"), std::string::npos);
+  EXPECT_EQ(assets[1].at("has_surface"), false);
+  EXPECT_EQ(assets[1].at("status"), "baked");
+  EXPECT_EQ(assets[2].at("has_surface"), true);
+  EXPECT_NE(message(3).find("min-coverage: spheres fill"), std::string::npos) << message(3);
+  EXPECT_EQ(files_in("out").count("bare.ist"), 0u);
+}
+
 TEST_F(Library, InterruptedItKeepsWhatIsFinished) {
   std::string manifest = "[defaults]\nspheres = 1500\n";
   for (int i = 0; i < 30; ++i)

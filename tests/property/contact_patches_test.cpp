@@ -216,6 +216,17 @@ TEST(ContactPatchesTest, RefusesWhatPenetrationRefuses) {
   const ContactPatches answer = contact_patches({a.view(), {}, 1}, bad, {}, workspace, {&patch, 1});
   EXPECT_EQ(answer.count, 0u);
   EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_input);
+  EXPECT_TRUE(std::isnan(answer.penetration.volume));
+  // Neither asset holds a surface that might always be used.
+  const PlacedTree placed{a.view(), {}, 1};
+  const ContactPatches always =
+      contact_patches(placed, placed, {.field = FieldUse::always}, workspace, {&patch, 1});
+  EXPECT_EQ(always.penetration.status, QueryStatus::not_held);
+  EXPECT_EQ(always.count, 0u);
+  const Penetration whole =
+      penetration(placed, placed, {.field = FieldUse::always, .pair_budget = 9}, workspace);
+  EXPECT_EQ(whole.status, QueryStatus::not_held);
+  EXPECT_TRUE(std::isnan(whole.volume));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <ist/query.h>
 
+#include <cmath>
 #include <limits>
 
 #include "support/float_traps.h"
@@ -312,7 +313,7 @@ TEST(Query, RefusesPosesThatAreNone) {
   bad[0].pose.q[2] = nan;
   bad[1].pose.t[0] = nan;
   bad[2].pose.t[1] = inf;
-  bad[3].pose.q[0] = 1.002;
+  bad[3].pose.q[0] = 0;
   bad[4].scale = 0;
   bad[5].scale = -1;
   bad[6].scale = nan;
@@ -322,11 +323,25 @@ TEST(Query, RefusesPosesThatAreNone) {
     for (const auto& answer :
          {query(good, wrong, {}, workspace), query(wrong, good, {}, workspace)}) {
       EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_input);
-      EXPECT_EQ(answer.penetration.volume, 0);
-      EXPECT_EQ(answer.penetration.volume_max, 0);
+      EXPECT_TRUE(std::isnan(answer.penetration.volume));
+      EXPECT_TRUE(std::isnan(answer.penetration.volume_max));
+      EXPECT_TRUE(answer.penetration.translation_gradient.hasNaN());
       EXPECT_EQ(answer.separation.status, QueryStatus::invalid_input);
-      EXPECT_EQ(answer.separation.distance_max, 0);
+      EXPECT_TRUE(std::isnan(answer.separation.distance));
+      EXPECT_TRUE(std::isnan(answer.separation.distance_max));
+      EXPECT_TRUE(answer.separation.normal.hasNaN());
     }
+  }
+  // A quaternion of any other length means its direction.
+  PlacedTree turned = good;
+  turned.pose = {{0.5, 0.5, 0.5, 0.5}, {0.2, 0, 0}};
+  const Penetration expected = penetration(good, turned, {}, workspace);
+  for (const double length : {1e-150, 1e-3, 2.0, 1e150}) {
+    PlacedTree longer = turned;
+    for (double& q : longer.pose.q) q *= length;
+    EXPECT_NEAR(penetration(good, longer, {}, workspace).volume, expected.volume,
+                1e-12 * expected.volume)
+        << length;
   }
   PlacedTree far = good;
   far.pose.t[0] = 1e50;

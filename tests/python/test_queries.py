@@ -1,4 +1,5 @@
 """Queries of one pose and of arrays of poses."""
+import inspect
 import threading
 
 import numpy as np
@@ -84,14 +85,14 @@ def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
     spoiled = poses.copy()
     spoiled[3, 5] = np.nan
     spoiled[7, 0] = np.inf
-    spoiled[20, :4] *= 1.01
+    spoiled[20, 6] = -np.inf
     spoiled[31, :4] = 0
     bad = np.isin(np.arange(40), [3, 7, 20, 31])
     found = ist.penetration(gear, knot, spoiled, scale_gradients=True)
     assert np.array_equal(found.status == ist.QueryStatus.invalid_input, bad)
     assert np.array_equal(found.volume[~bad], expected.volume[~bad])
     for column in (found.volume, found.force, found.pose_gradient, found.scale_gradient):
-        assert (column[bad] == 0).all()
+        assert np.isnan(column[bad]).all()
     scales = np.ones(40)
     scales[11] = -1
     assert np.flatnonzero(ist.separation(gear, knot, poses, scales=scales).status
@@ -262,7 +263,170 @@ def test_fields_meet_assets(cube):
         ist.HeightField(np.zeros(4))
     with pytest.raises(TypeError, match="MeshField|Asset|asset"):
         ist.MeshField(ist.BallField(1))
-    assert ist.penetration(ist.BallField(-1), cube, pose).status == ist.QueryStatus.invalid_input
+    for refused, text in (
+            (lambda: ist.BallField(-1), "radius=-1.0; wanted > 0"),
+            (lambda: ist.BoxField([-1, 1, 1]), "half_extents="),
+            (lambda: ist.HalfSpaceField([0, 0, 0]), "normal="),
+            (lambda: ist.HalfSpaceField(offset=np.nan), "offset=nan"),
+            (lambda: ist.CapsuleField(1, -1), "half_height=-1.0"),
+            (lambda: ist.CylinderField(1, np.inf), "half_height=inf"),
+            (lambda: ist.HeightField(np.zeros((1, 1))), r"heights: shape \(1, 1\)"),
+            (lambda: ist.HeightField([[0, 1], [np.nan, 2]]), "heights: number 2 is nan, not finite"),
+            (lambda: ist.HeightField([[0, 1], [2, 3]], highest=2), "heights: number 3 is 3.0, not from"),
+            (lambda: ist.HeightField(np.zeros((2, 2)), spacing=(0, 1)), "spacing="),
+            (lambda: ist.DistanceGridField(np.full((2, 2, 2), np.inf), origin=(0, 0, 0), spacing=1),
+             "distances: number 0 is inf"),
+            (lambda: ist.DistanceGridField(np.zeros((2, 2, 2)), origin=(0, 0, 0), spacing=-1), "spacing=-1")):
+        with pytest.raises(ValueError, match=text):
+            refused()
+    bare = ist.bake(ist.sample_mesh("cube"), max_spheres=20, surface="none")
+    with pytest.raises(ist.Error, match="asset: holds no surface"):
+        ist.MeshField(bare)
+    with pytest.raises(ist.Error, match="field='always': the asset of coarser spheres holds no surface"):
+        ist.penetration(bare, bare, pose, field="always")
+    assert (ist.penetration(bare, bare, [pose], field="always").status == ist.QueryStatus.not_held).all()
+    assert repr(ist.BoxField([1, 2, 3])) == "ist.BoxField(half_extents=[1, 2, 3])"
+
+
+def test_normals_and_quaternions_of_any_length_are_normalised(cube):
+    pose = np.array([0.5, 0.5, 0.5, 0.5, 0.1, 0.2, 0.3])
+    plane = ist.HalfSpaceField([0, 0, 1], 0.25)
+    expected = ist.penetration(plane, cube, pose).volume
+    assert expected > 0
+    for length in (1e-100, 0.5, 2, 1e100):
+        longer = pose * [length] * 7
+        longer[4:] = pose[4:]
+        assert ist.penetration(plane, cube, longer).volume == pytest.approx(expected, rel=1e-12)
+        other = ist.HalfSpaceField([0, 0, length], 0.25 * length)
+        assert ist.penetration(other, cube, pose).volume == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("pose, text", [
+    ([np.nan, 0, 0, 0, 0, 0, 0], "poses: qw is nan"),
+    ([0, 0, 0, 0, 0, 0, 0], "poses: the quaternion qw, qx, qy, qz has length 0"),
+    ([1, 0, 0, 0, 0, -np.inf, 0], "poses: ty is -inf"),
+    ([1, 0, 0, 0, 0, 1e90, 0], "poses: sizes or distances are more than 1e60 : 1 apart"),
+])
+def test_one_invalid_pose_raises(cube, pose, text):
+    for ask in (ist.penetration, ist.separation, ist.contact_patches, ist.overlap, ist.overlap_outline):
+        with pytest.raises(ValueError, match=text):
+            ask(cube, cube, pose)
+    with pytest.raises(ValueError, match=text):
+        ist.time_of_impact(cube, cube, pose, AWAY)
+    if "apart" not in text:
+        with pytest.raises(ValueError, match=text.replace("poses", "poses_to")):
+            ist.time_of_impact(cube, cube, IDENTITY, pose)
+        for ask in (lambda: cube.mass_properties(pose), lambda: cube.bounds(pose),
+                    lambda: ist.closest_point(cube, pose, [0, 0, 0])):
+            with pytest.raises(ValueError, match=text.replace("poses", "pose")):
+                ask()
+
+
+def test_limits_that_are_none_are_refused(cube):
+    for arguments, text in ((dict(relative_error=np.nan), "relative_error: nan; wanted a number ≥ 0"),
+                            (dict(relative_error=-1.0), "relative_error: -1.0"),
+                            (dict(threads=10**9), "threads: 1000000000; wanted 0, all cores, to 4096"),
+                            (dict(scales=-1), "scales: -1.0; wanted > 0"),
+                            (dict(poses_a=[0] * 7), "poses_a: the quaternion")):
+        with pytest.raises(ValueError, match=text):
+            ist.penetration(cube, cube, IDENTITY, **arguments)
+    with pytest.raises(TypeError, match=r"poses: None; wanted \(7,\)"):
+        ist.penetration(cube, cube, None)
+    with pytest.raises(ValueError, match="tolerance: nan"):
+        ist.time_of_impact(cube, cube, IDENTITY, AWAY, tolerance=np.nan)
+    with pytest.raises(ValueError, match="duration: 0.0; wanted > 0"):
+        ist.time_of_impact(cube, cube, IDENTITY, AWAY, duration=0)
+
+
+def test_mistakes_name_the_argument(cube):
+    for call, text in (
+            (lambda: ist.penetration(cube, cube, IDENTITY, max_visit=3),
+             "penetration\\(\\): there is no argument 'max_visit'; did you mean 'max_visits'?"),
+            (lambda: ist.penetration(cube, cube), "the argument 'poses' is missing"),
+            (lambda: ist.penetration(cube, cube, IDENTITY, 1), "4 arguments without a name; it takes 3"),
+            (lambda: ist.penetration(cube, cube, IDENTITY, a=cube), "'a' is given twice"),
+            (lambda: ist.penetration(cube, cube, IDENTITY, threads="all"), "threads: a str; wanted a whole"),
+            (lambda: ist.penetration(cube, cube, IDENTITY, threads=-1), "threads: -1; wanted a whole number"),
+            (lambda: ist.penetration(cube, cube, IDENTITY, measure=1), "measure: a int; wanted a str"),
+            (lambda: cube.spheres(witch="inner"), "did you mean 'which'?")):
+        with pytest.raises(TypeError, match=text):
+            call()
+    assert "poses_a" in inspect.signature(ist.penetration).parameters
+
+
+def test_matrices_and_quaternions_of_either_order_are_poses(cube, random_poses):
+    rows = random_poses(50, 0.5)
+    w, x, y, z = rows[:, :4].T
+    matrices = np.zeros((50, 4, 4))
+    matrices[:, :3, :3] = np.moveaxis(np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]), -1, 0)
+    matrices[:, :3, 3], matrices[:, 3, 3] = rows[:, 4:], 1
+    same = np.sign((ist.poses(matrices)[:, :4] * rows[:, :4]).sum(axis=1))[:, None]
+    assert ist.poses(matrices)[:, :4] * same == pytest.approx(rows[:, :4], abs=1e-14)
+    expected = ist.penetration(cube, cube, rows).volume
+    assert ist.penetration(cube, cube, matrices).volume == pytest.approx(expected, rel=1e-9)
+    assert ist.penetration(cube, cube, matrices[3]).volume == pytest.approx(expected[3], rel=1e-9)
+    assert ist.penetration(cube, cube, IDENTITY, poses_a=matrices[3]).volume > 0
+    scene = ist.penetration_of_pairs([cube, cube], matrices[:2], [(0, 1)])
+    assert scene.volume == pytest.approx(
+        ist.penetration_of_pairs([cube, cube], rows[:2], [(0, 1)]).volume, rel=1e-9)
+    assert ist.poses(np.roll(3 * rows[:, :4], -1, axis=1), rows[:, 4:], order="xyzw") == pytest.approx(rows)
+    assert ist.poses(rows[0, :4], rows[:, 4:], order="wxyz").shape == (50, 7)
+    assert ist.poses(matrices[:, :3, :3], rows[:, 4:]) == pytest.approx(ist.poses(matrices))
+    spoiled = matrices.copy()
+    spoiled[7, 0, 0] = np.nan
+    assert (ist.penetration(cube, cube, spoiled).status != 0).nonzero()[0].tolist() == [7]
+    mirrored = matrices.copy()
+    mirrored[9, :3, 0] *= -1
+    for wrong, text in ((2 * matrices, "poses: matrix 0 is no rigid motion: its last row"),
+                        (mirrored, "poses: matrix 9 is no rigid motion: it mirrors")):
+        with pytest.raises(ValueError, match=text):
+            ist.penetration(cube, cube, wrong)
+    with pytest.raises(ValueError, match="order: 'qxyz'; one of"):
+        ist.poses(rows[:, :4], order="qxyz")
+    with pytest.raises(ValueError, match="rotations: shape"):
+        ist.poses(rows[:, :4])
+
+
+def test_answers_show_what_they_are(cube):
+    one = ist.penetration(cube, cube, IDENTITY)
+    assert one.status is ist.QueryStatus.ok and repr(one).startswith("ist.Penetration(volume=")
+    assert "status=ok" in repr(one)
+    many = ist.penetration(cube, cube, [IDENTITY, AWAY, [0] * 7])
+    assert repr(many) == "<ist.Penetration of 3 rows: 2 ok, 1 invalid_input>"
+    assert "2 ok" in repr(ist.contact_patches(cube, cube, [IDENTITY, AWAY]))
+    assert ist.overlap(cube, cube, AWAY) is ist.Overlapping.no
+    assert ist.time_of_impact(cube, cube, AWAY, AWAY).status is ist.ImpactStatus.no_impact
+    assert repr(cube).startswith("<ist.Asset: ") and "spheres" in cube._repr_html_()
+
+
+def test_pictures_and_corrections(cube, knot):
+    vertices, triangles = cube.surface()
+    assert triangles.max() < len(vertices) and triangles.shape == (12, 3)
+    corners = vertices[triangles]
+    volume = np.einsum("ij,ij->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) / 6
+    assert volume == pytest.approx(cube.volume, rel=1e-6)
+    with pytest.raises(ist.Error, match="holds no surface"):
+        ist.bake(ist.sample_mesh("cube"), max_spheres=20, surface="none").surface()
+    side = cube.bounds().upper[0] - cube.bounds().lower[0]
+    pose = [1, 0, 0, 0, 1.001 * side, 0, 0]
+    whole = ist.penetration(cube, cube, pose, field="never")
+    found = ist.lenses(cube, cube, pose)
+    assert len(found.centre) == whole.sphere_pairs > 0
+    assert np.linalg.norm(found.axis, axis=1) == pytest.approx(1)
+    fewer = ist.without_protrusion(whole, cube, cube, pose)
+    assert fewer.volume < whole.volume
+    deep = ist.penetration(cube, cube, IDENTITY, field="never")
+    assert ist.without_protrusion(deep, cube, cube, IDENTITY).volume == deep.volume
+    with pytest.raises(ValueError, match="whole: shape"):
+        ist.without_protrusion(whole, cube, cube, [pose])
+    fit = ist.pair_fit(cube, cube)
+    assert fit.fits and fit.ratio == 1 and fit.grain_a == fit.grain_b > 0
+    assert ist.pair_fit(cube, cube, scale=100).needs_surface
+    with pytest.raises(ValueError, match="scale: 0.0"):
+        ist.pair_fit(cube, cube, scale=0)
 
 
 @pytest.fixture(scope="module")
@@ -366,7 +530,9 @@ def test_rays_and_points(cube):
     assert ist.raycast(ball, None, [0, 0, 5], [0, 0, -1]).distance == pytest.approx(3)
     assert ist.closest_point(ball, None, [0, 0, 5]).distance == pytest.approx(3)
     assert ist.contains(ball, None, [[0, 0, 1], [np.nan, 0, 0]]).tolist() == [1, 2]
-    assert ist.raycast(cube, None, origins[0], [0, 0, 0]).status == ist.QueryStatus.invalid_input
+    with pytest.raises(ValueError, match="origins, directions, longest: not finite, of length 0"):
+        ist.raycast(cube, None, origins[0], [0, 0, 0])
+    assert (ist.raycast(cube, None, origins, [0, 0, 0]).status == ist.QueryStatus.invalid_input).all()
     with pytest.raises(ValueError, match="origins: shape"):
         ist.raycast(cube, None, [1, 2], [1, 0, 0])
     bare = ist.bake(ist.sample_mesh("cube"), max_spheres=20, surface="none")
@@ -399,8 +565,8 @@ def test_outlines_are_closed_curves(thread, cube):
     stopped = ist.overlap_outline(bolt, nut, pose, max_visits=1)
     assert stopped.contact.penetration.status == ist.QueryStatus.budget_exhausted
     assert len(stopped.segments) == 0
-    wrong = ist.overlap_outline(bolt, nut, [np.nan, 0, 0, 0, 0, 0, 0])
-    assert wrong.contact.penetration.status == ist.QueryStatus.invalid_input
+    with pytest.raises(ValueError, match="poses: qw is nan"):
+        ist.overlap_outline(bolt, nut, [np.nan, 0, 0, 0, 0, 0, 0])
 
     bare = ist.bake(ist.close_mesh(ist.sample_mesh("cube"), name="bare"), max_spheres=50,
                     surface="none", device="cpu")

@@ -57,6 +57,17 @@ def test_pose_gradients_are_differences(gear, knot, cube, scenes):
     assert along.max() < 1e-9
 
 
+def test_whole_numbers_are_converted(cube):
+    whole = torch.tensor([[1, 0, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0, 0]])
+    found = overlap([cube, cube], whole)
+    assert found.dtype == torch.get_default_dtype()
+    assert found.item() == pytest.approx(overlap([cube, cube], whole.double()).item(), rel=1e-6)
+    assert overlap([cube, cube], whole.double(), scales=torch.tensor([1, 1])).item() == pytest.approx(
+        found.item(), rel=1e-6)
+    with pytest.raises(TypeError, match="poses: dtype torch.complex64; wanted real numbers"):
+        overlap([cube, cube], whole.to(torch.complex64))
+
+
 def test_autograds_own_check(gear, knot):
     pose = torch.tensor([[1.0, 0, 0, 0, 0, 0, 0], [0.9, 0.3, -0.2, 0.4, 0.6, 0.2, 0.1]],
                         dtype=torch.float64, requires_grad=True)

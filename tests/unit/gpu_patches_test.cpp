@@ -377,12 +377,15 @@ TEST(GpuPatches, InvalidPosesSpoilOnlyThemselves) {
   pairs[7].pose_a.q[0] = std::numeric_limits<double>::infinity();
   pairs[11].scale_b = 0;
   pairs[19].b = 99;
+  std::vector<PatchedPair> rest = HostPatches(batch_views()).run(pairs, Measure::matched, 4);
   std::vector<PatchedPair> expected = sound;
   for (const std::size_t i : {3u, 7u, 11u, 19u}) {
-    expected[i] = {};
-    expected[i].whole.status = QueryStatus::invalid_input;
+    EXPECT_EQ(rest[i].whole.status, QueryStatus::invalid_input) << i;
+    EXPECT_TRUE(std::isnan(rest[i].whole.volume)) << i;
+    EXPECT_TRUE(rest[i].patches.empty()) << i;
+    rest[i] = expected[i] = {};
   }
-  expect_same_bits(HostPatches(batch_views()).run(pairs, Measure::matched, 4), expected);
+  expect_same_bits(rest, expected);
   EXPECT_TRUE(HostPatches(batch_views()).run({}, Measure::inner, 4).empty());
 }
 

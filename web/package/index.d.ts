@@ -41,7 +41,7 @@ export type Vector = ArrayLike<number>;
 
 /** x_world = R(rotation) (scale · x) + translation. Omitted members are the identity's. */
 export interface Pose {
-  /** Quaternion w, x, y, z, within 1e-3 of unit length. (three.js has x, y, z, w.) */
+  /** Quaternion w, x, y, z, of any length but 0: it is normalised. (three.js has x, y, z, w.) */
   rotation?: ArrayLike<number>;
   /** [u] */
   translation?: Vector;
@@ -164,7 +164,7 @@ export class Asset {
 
 /** A shape at rest, as the first solid of a query. Make it once and use it often. */
 export class Field {
-  /** normal · x ≤ offset. `normal`: unit length within 1e-3, outward. */
+  /** normal · x ≤ offset. `normal`: outward, of any length but 0, by which offset is divided too. */
   static halfSpace(normal: Vector, offset?: number): Field;
   /** Around the origin. */
   static box(halfExtents: Vector): Field;
@@ -237,8 +237,8 @@ export interface PenetrationOptions extends ContactOptions {
 }
 
 /**
- * `budget-exhausted`: a limit or the workspace stopped it. volumeMin and volumeMax are still bounds,
- * as for a finished answer.
+ * `budget-exhausted`: a limit or the workspace stopped it. What volumeMin and volumeMax contain, they
+ * still contain.
  */
 export type Status = 'ok' | 'budget-exhausted';
 
@@ -248,8 +248,8 @@ export interface Penetration {
   /** [u³] */
   volume: number;
   /**
-   * [u³] With `exact`: bounds of the true volume. By spheres: bounds of the finished sum, with its
-   * rounding; they do not bound the true volume.
+   * [u³] With `exact`: bounds of the true volume. By spheres: the interval of the finished sum, as
+   * wide as rounding and what a limit left out. It says nothing of the true volume.
    */
   volumeMin: number;
   volumeMax: number;
@@ -649,7 +649,7 @@ export interface Pair {
 }
 
 /**
- * `invalid-input`: this pair's pose is out of range; its numbers are 0. Other pairs are not affected.
+ * `invalid-input`: this pair's pose is out of range; its numbers are NaN. Other pairs are not affected.
  * `not-held`: a solid of the pair lacks what the measure needs; its numbers are NaN.
  */
 export interface BatchPenetration extends Omit<Penetration, 'status'> {

@@ -11,6 +11,9 @@ inline constexpr int kSphereLevel = -1;
 /// squares of squares stay finite.
 inline constexpr double kFarthestPose = 1e60;
 
+/// Quaternions and normals of these lengths are normalised: their squares are neither 0 nor Inf.
+inline constexpr double kShortestDirection = 1e-150, kLongestDirection = 1e150;
+
 // Overlapping sphere pairs number kPairShare · n_a n_b · ball(r_a + r_b) · (V + kPairRim (r_a +
 // r_b) √(V L)). Here n is spheres per volume, r a mean radius, V the overlap, and L the size of the
 // smaller solid. The second term counts the contact's rim, whose area grows as √(V L) for round

@@ -1,13 +1,14 @@
 #pragma once
 
 #include <limits>
+#include <type_traits>
 #include <variant>
 
 #include <ist/field.h>
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
 
-// Answers to what an asset cannot be asked: every number is NaN, which nobody takes for no contact.
+// Answers to what cannot be asked: every number is NaN, which nobody takes for no contact.
 
 namespace ist {
 
@@ -25,36 +26,34 @@ bool lack_spheres(const Solid& a, const PlacedTree& b) noexcept {
   return lacks_spheres(a) || lacks_spheres(b);
 }
 
+/// `why`: not_held or invalid_input.
 template <class Answer>
-Answer not_held() noexcept;
-
-template <>
-inline Penetration not_held() noexcept {
+Answer no_answer(QueryStatus why) noexcept {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const Eigen::Vector3d none = Eigen::Vector3d::Constant(kNone);
-  return {kNone, kNone, kNone, none, none, none, QueryStatus::not_held};
+  if constexpr (std::is_same_v<Answer, ContactPatches>) {
+    return {no_answer<Penetration>(why)};
+  } else if constexpr (std::is_same_v<Answer, OverlapOutline>) {
+    return {no_answer<ContactPatches>(why)};
+  } else if constexpr (std::is_same_v<Answer, TimeOfImpact>) {
+    TimeOfImpact result;
+    result.status =
+        why == QueryStatus::not_held ? ImpactStatus::not_held : ImpactStatus::invalid_input;
+    result.time = result.distance_min = result.distance_max = kNone;
+    result.point_a = result.point_b = result.normal = none;
+    return result;
+  } else {
+    return {kNone, kNone, kNone, none, none, none, why};
+  }
 }
 
-template <>
-inline ContactPatches not_held() noexcept {
-  return {not_held<Penetration>()};
+template <class Answer>
+Answer not_held() noexcept {
+  return no_answer<Answer>(QueryStatus::not_held);
 }
-
-template <>
-inline Separation not_held() noexcept {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  const Eigen::Vector3d none = Eigen::Vector3d::Constant(kNone);
-  return {kNone, kNone, kNone, none, none, none, QueryStatus::not_held};
-}
-
-template <>
-inline TimeOfImpact not_held() noexcept {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  TimeOfImpact result;
-  result.status = ImpactStatus::not_held;
-  result.time = result.distance_min = result.distance_max = kNone;
-  result.point_a = result.point_b = result.normal = Eigen::Vector3d::Constant(kNone);
-  return result;
+template <class Answer>
+Answer invalid_input() noexcept {
+  return no_answer<Answer>(QueryStatus::invalid_input);
 }
 
 }  // namespace ist

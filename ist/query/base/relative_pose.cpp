@@ -75,7 +75,7 @@ std::optional<Eigen::Quaterniond> usable_rotation(const Pose& pose, double scale
   const double* q = pose.q;
   const double* t = pose.t;
   const double norm = std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
-  if (!(std::abs(norm - 1) <= 1e-3)) return std::nullopt;
+  if (!(norm >= kShortestDirection) || !(norm <= kLongestDirection)) return std::nullopt;
   if (!std::isfinite(t[0]) || !std::isfinite(t[1]) || !std::isfinite(t[2])) return std::nullopt;
   if (!(scale > 0) || !std::isfinite(scale)) return std::nullopt;
   return Eigen::Quaterniond(q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm);

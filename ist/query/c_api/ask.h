@@ -1,5 +1,6 @@
 #pragma once
 
+#include "query/base/no_answer.h"
 #include "query/c_api/structs.h"
 
 // What all queries of the C functions have in common.
@@ -28,20 +29,15 @@ ist_status_t ask_about(const Solid* a, const ist_placed_tree_t* b, ist_workspace
   return scratch == nullptr ? status : ask(first.placed(), second, *scratch);
 }
 
-/// An answer's status. On an error the answer is all zero else, or NaN as a query wrote it; what is
-/// written anyway is not cleared before, which would cost more than all else here.
-template <class Answer>
-ist_status_t noted(ist_status_t status, Answer& answer) noexcept {
-  if (status < 0 && status != IST_NOT_HELD) {
-    answer = Answer{};
-    answer.size = sizeof(Answer);
-    answer.status = status;
-  }
-  return status;
+/// What was not asked: all numbers are NaN, as those of a query that cannot be answered.
+template <class Found, class Answer>
+ist_status_t refuse(ist_status_t status, Answer& answer) noexcept {
+  write(invalid_input<Found>(), answer);
+  return answer.status = status;
 }
 
-/// A query with settings and one answer: `ask(a, b, settings, workspace)` finds it.
-template <class Settings, class Solid, class Given, class Answer, class Ask>
+/// A query with settings and one answer: `ask(a, b, settings, workspace)` finds it, a `Found`.
+template <class Settings, class Found, class Solid, class Given, class Answer, class Ask>
 ist_status_t answer_with(const Solid* a, const ist_placed_tree_t* b, const Given* given,
                          ist_workspace_t* workspace, Answer* answer, const Ask& ask) noexcept {
   ist_status_t status = check_size(answer);
@@ -51,9 +47,9 @@ ist_status_t answer_with(const Solid* a, const ist_placed_tree_t* b, const Given
   if (status == IST_OK)
     status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
       write(ask(x, y, settings, scratch), *answer);
-      return answer->status;
+      return ist_status_t{IST_OK};
     });
-  return noted(status, *answer);
+  return status == IST_OK ? answer->status : refuse<Found>(status, *answer);
 }
 
 }  // namespace ist::c_api

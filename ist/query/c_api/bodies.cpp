@@ -43,7 +43,7 @@ ist_status_t tell(const Given* given, const Read& read, const Find& find, Answer
   if (status != IST_OK) return status;
   Solid solid;
   status = read(given, solid);
-  if (status == IST_OK) write(find(solid), *answer);
+  if (status == IST_OK || status == IST_INVALID_INPUT) write(find(solid), *answer);
   return answer->status = status;
 }
 

@@ -17,7 +17,7 @@ template <class Solid>
 ist_status_t find_impact(const Solid* a, const ist_placed_tree_t* b, const ist_motion_t* motion_a,
                          const ist_motion_t* motion_b, const ist_impact_settings_t* given,
                          ist_workspace_t* workspace, ist_impact_t* answer) noexcept {
-  return answer_with<ImpactSettings>(
+  return answer_with<ImpactSettings, TimeOfImpact>(
       a, b, given, workspace, answer,
       [&](const auto& x, const auto& y, const ImpactSettings& settings, Workspace& scratch) {
         return time_of_impact(x, y, {read(motion_a), read(motion_b)}, settings, scratch);

@@ -14,7 +14,7 @@ template <class Solid>
 ist_status_t find_penetration(const Solid* a, const ist_placed_tree_t* b,
                               const ist_penetration_settings_t* given, ist_workspace_t* workspace,
                               ist_penetration_t* answer) noexcept {
-  return answer_with<PenetrationSettings>(
+  return answer_with<PenetrationSettings, Penetration>(
       a, b, given, workspace, answer,
       [](const auto& x, const auto& y, const PenetrationSettings& settings, Workspace& scratch) {
         return penetration(x, y, settings, scratch);
@@ -25,7 +25,7 @@ template <class Solid>
 ist_status_t find_separation(const Solid* a, const ist_placed_tree_t* b,
                              const ist_separation_settings_t* given, ist_workspace_t* workspace,
                              ist_separation_t* answer) noexcept {
-  return answer_with<SeparationSettings>(
+  return answer_with<SeparationSettings, Separation>(
       a, b, given, workspace, answer,
       [](const auto& x, const auto& y, const SeparationSettings& settings, Workspace& scratch) {
         return separation(x, y, settings, scratch);
@@ -65,10 +65,11 @@ ist_status_t find_both(const Solid* a, const ist_placed_tree_t* b,
       const PenetrationAndSeparation both = query(x, y, settings, scratch);
       write(both.penetration, *penetration);
       write(both.separation, *separation);
-      return worse(penetration->status, separation->status);
+      return ist_status_t{IST_OK};
     });
-  if (room == IST_OK) noted(status, *penetration);
-  if (other_room == IST_OK) noted(status, *separation);
+  if (status == IST_OK) return worse(penetration->status, separation->status);
+  if (room == IST_OK) refuse<Penetration>(status, *penetration);
+  if (other_room == IST_OK) refuse<Separation>(status, *separation);
   return status;
 }
 
@@ -97,14 +98,17 @@ ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
   if (status == IST_OK) status = check_room(patches);
   ContactSettings settings;
   if (status == IST_OK) status = read(given, settings);
+  ist_status_t answered = IST_OK;
   if (status == IST_OK)
     status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
       const ContactPatches found = ask(x, y, settings, scratch, room_of(*patches));
       patches->count = found.count;
       if (whole != nullptr) write(found.penetration, *whole);
-      return status_of(found.penetration.status);
+      answered = status_of(found.penetration.status);
+      return ist_status_t{IST_OK};
     });
-  if (whole != nullptr && whole->size == sizeof *whole) noted(status, *whole);
+  if (status == IST_OK) return answered;
+  if (whole != nullptr && whole->size == sizeof *whole) refuse<Penetration>(status, *whole);
   return status;
 }
 
@@ -151,7 +155,7 @@ ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_pl
   ist::PlacedTree first, second;
   if (status == IST_OK) status = read(a, first);
   if (status == IST_OK) status = read(b, second);
-  if (status != IST_OK) return noted(status, *answer);
+  if (status != IST_OK) return refuse<ist::Penetration>(status, *answer);
   write(ist::without_protrusion(before, first, second), *answer);
   return answer->status;
 }

@@ -80,7 +80,7 @@ void write(const TimeOfImpact& found, ist_impact_t& answer) noexcept {
   switch (found.status) {
     case ImpactStatus::invalid_input:
       answer.status = IST_INVALID_INPUT;
-      return;  // all zero
+      break;
     case ImpactStatus::budget_exhausted:
       answer.status = IST_BUDGET_EXHAUSTED;
       break;

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <utility>
 
+#include "query/base/no_answer.h"
 #include "query/base/smooth_step.h"
 #include "query/descent/answer.h"
 #include "query/descent/descent.h"
@@ -177,11 +178,7 @@ Penetration PairOverlap::exact(bool b_probes, const DescentLimits& limits,
     return kept_within(most, descent.penetration());
   }
   const std::optional<RelativePose> turned = relative_pose(owner, prober);
-  if (!turned) {
-    Penetration refused;
-    refused.status = QueryStatus::invalid_input;
-    return refused;
-  }
+  if (!turned) return invalid_input<Penetration>();
   SurfaceDescent descent(surface, probes, *turned, limits, scratch_, bins);
   descent.run();
   return turned_over(kept_within(most, descent.penetration()), a_, b_);

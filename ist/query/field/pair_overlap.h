@@ -30,6 +30,11 @@ Penetration turned_over(Penetration answer, const PlacedTree& moving,
 PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
                        const TreeHeader& tree_b, const RelativePose& pose, FieldUse use) noexcept;
 
+/// Whether a surface must be used that the coarser asset does not hold.
+inline bool lacks_surface(const PairMethod& method, FieldUse use) noexcept {
+  return use == FieldUse::always && method.lenses;
+}
+
 /// Weight of the exact sum by what lenses say, A's unit frame, and its slope by that. The finished
 /// sum's weight lies from `least` to `most`.
 struct ExactWeight {

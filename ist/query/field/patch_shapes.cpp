@@ -148,7 +148,11 @@ HeightShape::HeightShape(const HeightField& f) noexcept : field_(f) {
 double HeightShape::height(std::int64_t i, std::int64_t j) const noexcept {
   i = std::clamp<std::int64_t>(i, 0, std::int64_t{field_.columns} - 1);
   j = std::clamp<std::int64_t>(j, 0, std::int64_t{field_.rows} - 1);
-  return field_.heights[static_cast<std::size_t>(j) * field_.columns + static_cast<std::size_t>(i)];
+  const double height =
+      field_.heights[static_cast<std::size_t>(j) * field_.columns + static_cast<std::size_t>(i)];
+  if (std::isfinite(height)) return height;
+  sound = false;
+  return 0;
 }
 
 FieldSample HeightShape::look(const Eigen::Vector3d& x) const noexcept {

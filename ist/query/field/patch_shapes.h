@@ -39,7 +39,7 @@ class HeightShape {
   ProbeTotal block(const ProbeBalls& balls, std::uint32_t used, const double (&origin)[3],
                    std::uint32_t& pairs) noexcept;
 
-  bool sound;
+  mutable bool sound;  ///< no longer once a height that is no number is looked at
 
  private:
   double height(std::int64_t i, std::int64_t j) const noexcept;

@@ -9,6 +9,7 @@
 
 #include <ist/field.h>
 
+#include "query/asset/shared_constants.h"
 #include "query/kernel/lens.h"
 #include "query/probe/cap.h"
 
@@ -36,9 +37,11 @@ inline double squared(double x) noexcept { return x * x; }
 inline bool is_length(double x) noexcept { return x > 0 && x <= 1e150; }
 
 struct HalfSpaceShape {
-  explicit HalfSpaceShape(const HalfSpaceField& f) noexcept : offset(f.offset) {
+  explicit HalfSpaceShape(const HalfSpaceField& f) noexcept {
     const double length = f.normal.norm();
-    sound = std::abs(length - 1) <= 1e-3 && std::abs(offset) <= 1e150;
+    offset = f.offset / length;
+    sound =
+        length >= kShortestDirection && length <= kLongestDirection && std::abs(offset) <= 1e150;
     normal = f.normal / length;
   }
   FieldSample look(const Eigen::Vector3d& x) const noexcept {

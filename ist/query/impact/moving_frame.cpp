@@ -19,12 +19,6 @@ constexpr double kWayRounding = 6 * 0x1p-53;
 // Of what is turned: a polynomial's sine and the angle that it is of, three-term products and sums.
 constexpr double kTurnRounding = 32 * 0x1p-53;
 
-/// As queries take it.
-bool is_rotation(const Pose& pose) noexcept {
-  const double* const q = pose.q;
-  return std::abs(std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3])) - 1) <= 1e-3;
-}
-
 Quaterniond unit_rotation(const Pose& pose) noexcept {
   const double* const q = pose.q;
   const double norm = std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
@@ -164,7 +158,7 @@ Motion motion_between(const Pose& from, const Pose& to, double duration, const V
                       double scale) noexcept {
   Motion motion;
   motion.about = about;
-  if (!(duration > 0) || !is_rotation(from) || !is_rotation(to)) {
+  if (!(duration > 0) || !usable_rotation(from, scale) || !usable_rotation(to, scale)) {
     motion.velocity.setConstant(std::numeric_limits<double>::quiet_NaN());
     return motion;
   }

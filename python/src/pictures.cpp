@@ -1,0 +1,174 @@
+#include <ist/ist.h>
+#include <ist/lenses.h>
+#include <ist/pair_fit.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include <ist/error.h>
+
+#include "penetration.h"
+#include "query/base/relative_pose.h"
+
+// What of assets and contacts is for pictures, and for who chooses how to ask.
+
+namespace ist::python {
+namespace {
+
+struct Lenses {
+  explicit Lenses(std::size_t count)
+      : centre({count}, {3}),
+        axis({count}, {3}),
+        radius({count}, {}),
+        thickness({count}, {}),
+        sphere_a({count}, {}),
+        sphere_b({count}, {}) {}
+
+  Column<double> centre, axis, radius, thickness;
+  Column<std::uint32_t> sphere_a, sphere_b;
+};
+
+std::unique_ptr<Lenses> lenses(const py::object& a, const py::object& b, const py::object& pose,
+                               const py::object& pose_a, double scale, double scale_a,
+                               const std::string& measure, unsigned detail_a, unsigned detail_b) {
+  if (pose.is_none()) take_poses(pose, "pose", "(7,) or (4, 4)");
+  const PlacedTree first{tree_of(a, "a"), take_pose(pose_a, scale_a), scale_a};
+  const PlacedTree second{tree_of(b, "b"), take_pose(pose, scale), scale};
+  const LensSettings settings{named(measure, "measure", kGpuMeasures), detail_a, detail_b};
+  std::vector<OverlapLens> room(4096);
+  OverlapLenses found;
+  {
+    const py::gil_scoped_release released;
+    found = overlap_lenses(first, second, settings, room);
+    if (found.total > room.size()) {
+      room.resize(found.total);
+      found = overlap_lenses(first, second, settings, room);
+    }
+  }
+  if (found.status == QueryStatus::not_held)
+    throw Error("a, b: one is a surface alone, without spheres; bake it with bake()");
+  if (found.status == QueryStatus::invalid_input)
+    throw value_error("pose, detail_a, detail_b: too far away, or an asset has no such detail");
+  auto answers = std::make_unique<Lenses>(found.count);
+  for (std::size_t i = 0; i < found.count; ++i) {
+    Vector(answers->centre.row(i)) = room[i].centre;
+    Vector(answers->axis.row(i)) = room[i].axis;
+    *answers->radius.row(i) = room[i].radius;
+    *answers->thickness.row(i) = room[i].thickness;
+    *answers->sphere_a.row(i) = room[i].sphere_a;
+    *answers->sphere_b.row(i) = room[i].sphere_b;
+  }
+  return answers;
+}
+
+std::shared_ptr<Penetrations> corrected(const Penetrations& whole, const Rows& rows) {
+  if (whole.volume.shape != rows.shape())
+    throw value_error("whole: shape " + text_of(whole.volume.shape) + " of rows; poses have " +
+                      text_of(rows.shape()));
+  auto answers = std::make_shared<Penetrations>(rows.shape());
+  for (std::size_t i = 0; i < rows.count(); ++i) {
+    const Row row = rows.at(i);
+    const TreeView* const a = std::get_if<TreeView>(row.a);
+    if (a == nullptr) throw type_error("a: a Field; wanted an Asset");
+    Penetration before;
+    before.volume = *whole.volume.row(i);
+    before.volume_min = *whole.volume_min.row(i);
+    before.volume_max = *whole.volume_max.row(i);
+    before.centroid = Vector(whole.centroid.row(i));
+    before.translation_gradient = -Vector(whole.force.row(i));
+    before.rotation_gradient = -Vector(whole.torque.row(i));
+    before.status = QueryStatus{*whole.status.row(i)};
+    before.node_visits = *whole.node_visits.row(i);
+    before.sphere_pairs = *whole.sphere_pairs.row(i);
+    answers->write(i, row,
+                   without_protrusion(before, PlacedTree{*a, row.pose_a, row.scale_a}, row.b));
+  }
+  return answers;
+}
+
+PairFit fit_of(const py::object& a, const py::object& b, double scale, double scale_a) {
+  take_pose(py::none(), scale_a);
+  take_pose(py::none(), scale);
+  return pair_fit(PlacedTree{tree_of(a, "a"), {}, scale_a}, PlacedTree{tree_of(b, "b"), {}, scale});
+}
+
+}  // namespace
+
+py::tuple surface_of(const Asset& asset) {
+  const std::span<const std::byte> bytes = asset.bytes();
+  ist_tree_t tree = {};
+  ist_surface_t surface = {};
+  surface.size = sizeof surface;
+  if (ist_tree_view(bytes.data(), bytes.size(), &tree) != IST_OK ||
+      ist_tree_get_surface(&tree, &surface) != IST_OK || surface.triangle_count == 0)
+    throw Error("the asset holds no surface; bake it with surface='all'");
+  const Column<double> vertices({surface.vertex_count}, {3});
+  const Column<std::uint32_t> triangles({surface.triangle_count}, {3});
+  surface.vertices = reinterpret_cast<double(*)[3]>(vertices.row(0));
+  surface.triangles = reinterpret_cast<std::uint32_t(*)[3]>(triangles.row(0));
+  surface.vertex_capacity = surface.vertex_count;
+  surface.triangle_capacity = surface.triangle_count;
+  ist_tree_get_surface(&tree, &surface);
+  return py::make_tuple(vertices.handed_out(), triangles.handed_out());
+}
+
+void add_pictures(py::module_& module) {
+  py::class_<Lenses> type(module, "Lenses", "Lenses in which spheres of two assets overlap.");
+  add_column(type, "centre", &Lenses::centre, "(n, 3) [u] middle of the thickness, world.");
+  add_column(type, "axis", &Lenses::axis, "(n, 3) unit, from A's sphere to B's, world.");
+  add_column(type, "radius", &Lenses::radius, "(n,) [u] where it is widest, across the axis.");
+  add_column(type, "thickness", &Lenses::thickness, "(n,) [u] along the axis.");
+  add_column(type, "sphere_a", &Lenses::sphere_a, "(n,) uint32, row of A's spheres().");
+  add_column(type, "sphere_b", &Lenses::sphere_b, "(n,) uint32, row of B's spheres().");
+  module.def("lenses", &lenses, py::arg("a"), py::arg("b"), py::arg("pose").none(), py::kw_only(),
+             py::arg("pose_a") = py::none(), py::arg("scale") = 1.0, py::arg("scale_a") = 1.0,
+             py::arg("measure") = "matched", py::arg("detail_a") = 0, py::arg("detail_b") = 0,
+             R"(The lenses that penetration() sums when it sums lenses, for pictures.
+
+a, b: Assets. pose, scale: of B. pose_a, scale_a: of A; None: at the origin.
+measure: 'matched' or 'inner'. detail_a, detail_b: levels of detail of the matched spheres, 0 the
+    finest; `sphere_a` and `sphere_b` are then numbers among that level's.
+
+Returns Lenses: an ellipsoid of the radius and the thickness about the centre resembles each.)");
+
+  module.def(
+      "without_protrusion",
+      [](const Penetrations& whole, const py::object& a, const py::object& b,
+         const py::object& poses, const py::object& scales, const py::object& poses_a,
+         const py::object& scales_a) {
+        return corrected(whole, Rows::of_pair(a, b, poses, scales, poses_a, scales_a));
+      },
+      py::arg("whole"), py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
+      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
+      py::arg("scales_a") = py::none(),
+      R"(Removes from an answer what protruding spheres add where flat faces meet.
+
+whole: the answer of penetration() at these poses by lenses, field='never', in the matched measure
+    without a pair budget.
+
+Nothing is left across a gap of a fifth of a mean sphere radius and more; nearer, and in the first
+fifth of depth, volume and force are reduced. Round and deeper contacts are unchanged. The force is
+the volume's gradient to within 15 %: for contacts, not where energy must be conserved.
+
+Returns a Penetration.)");
+
+  py::class_<PairFit>(module, "PairFit", "Whether the sizes of two assets suit each other.")
+      .def_ro("grain_a", &PairFit::grain_a,
+              "[u] mean radius of A's spheres over the share of the solid that they cover: finer "
+              "features are not resolved.")
+      .def_ro("grain_b", &PairFit::grain_b, "[u] likewise.")
+      .def_ro("ratio", &PairFit::ratio, "≥ 1, the coarser grain over the finer.")
+      .def_ro("a_is_coarser", &PairFit::a_is_coarser, "Or both are equal.")
+      .def_ro("has_surface", &PairFit::has_surface, "Whether the coarser asset holds its surface.")
+      .def_ro("needs_surface", &PairFit::needs_surface,
+              "Whether volumes and forces by the spheres of both alone mislead.")
+      .def_prop_ro("fits", &PairFit::fits, "has_surface, or no need of it.");
+  module.def("pair_fit", &fit_of, py::arg("a"), py::arg("b"), py::kw_only(), py::arg("scale") = 1.0,
+             py::arg("scale_a") = 1.0,
+             "Whether the sizes of two Assets suit each other, whatever their poses: a PairFit.\n\n"
+             "scale, scale_a: of B and of A.");
+}
+
+}  // namespace ist::python
