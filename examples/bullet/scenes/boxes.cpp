@@ -28,8 +28,7 @@ WorldSettings settings_of(const SceneOptions& options, double load) {
   settings.gravity = {0, 0, -kGravity};
   settings.margin = 0.002 * kSide;
   settings.hulls = 1;
-  settings.ist.patches = 4;                          // as many as a face has corners
-  settings.ist.query.field = ist::FieldUse::always;  // flat faces of like size
+  settings.ist.patches = 4;  // as many as a face has corners
   // As deep as matched spheres blur a face: there it is in its place.
   set_law(settings, kDensity * cube().volume(), kSide * kSide, 0.002 * kSide, 1, load);
   return settings;

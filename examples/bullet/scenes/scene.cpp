@@ -1,9 +1,9 @@
 #include "scene.h"
 
+#include <ist/bullet/convert.h>
 #include <algorithm>
 #include <cmath>
 
-#include "../to_bullet.h"
 #include "glb_writer.h"
 
 const std::vector<Scene>& scenes() {
