@@ -115,7 +115,7 @@ Spring spring_of(const Meeting& meeting, const btCollisionObject& first,
   if (!std::isfinite(lighter.mass)) return spring;  // nothing moves
   if (!(spring.stiffness > 0)) {
     const double rest = settings.depth * size;
-    spring.linear = 4 * rest;
+    spring.linear = rest;
     const double pull = lighter.gravity > 0 ? lighter.gravity : rest / (step * step);
     spring.stiffness = stiffness_for_depth(lighter.mass * pull, face, rest);
   }

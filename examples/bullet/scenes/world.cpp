@@ -34,6 +34,7 @@ SceneWorld::SceneWorld(const WorldSettings& settings) : settings_(settings) {
   // The patches' springs push by speed; Bullet's own contacts part bodies as it does by default.
   world_.getSolverInfo().m_splitImpulse =
       settings.way == Way::gimpact || settings.way == Way::hulls;
+  world_.getSolverInfo().m_numIterations = 50;
   world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
   if (settings.way == Way::wrench) ist::bullet::push_in_every_tick(world_);
 }

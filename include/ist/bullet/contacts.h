@@ -40,10 +40,12 @@ struct Settings {
   ContactLaw law;
   /// Where no stiffness is given: the lighter body rests by its weight at this depth, as a share of
   /// the smaller asset's size, on a face of that size. The size is the cube root of the volume.
-  /// Four times deeper, pressure begins to grow with the depth's square. A body without gravity is
-  /// held as fast as a step resolves. The depth should be the blur of flat faces: about this of
-  /// 4,000 spheres.
-  double depth = 0.002;
+  /// Deeper, the pressure grows with the depth's square, so that a body bears a hundred times its
+  /// weight ten times as deep. A body without gravity is held as fast as a step resolves.
+  ///
+  /// Flat faces of spheres are blurred. The deeper, the nearer they rest to their place; the less
+  /// deep, the higher a stack stands.
+  double depth = 0.001;
   /// Of a contact, over the critical one; solver only. From 1 on nothing bounces that has no
   /// restitution.
   double damping = 1;
