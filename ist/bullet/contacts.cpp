@@ -36,6 +36,12 @@ btRigidBody* movable(const btCollisionObject& object) {
   return body != nullptr && body->getInvMass() > 0 ? body : nullptr;
 }
 
+btVector3 velocity_of(const btCollisionObject& object, const btVector3& point) {
+  const btRigidBody* const body = btRigidBody::upcast(&object);
+  if (body == nullptr) return {0, 0, 0};
+  return body->getVelocityInLocalPoint(point - body->getCenterOfMassPosition());
+}
+
 }  // namespace
 
 struct PairAlgorithm::State {
@@ -225,18 +231,24 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
     const btVector3 on_first = middle - normal * (depth / 2);
     const btVector3 on_second = middle + normal * (depth / 2);
     btManifoldPoint point(to_first * on_first, to_second * on_second, normal, -depth);
-    const double stiffness = spring.at(patch.depth) * patch.area;
-    point.m_contactPointFlags |= BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING;
-    point.m_combinedContactStiffness1 = static_cast<btScalar>(stiffness);
-    point.m_combinedContactDamping1 = static_cast<btScalar>(spring.relaxation * stiffness);
     point.m_positionWorldOnA = on_first;
     point.m_positionWorldOnB = on_second;
-    point.m_combinedFriction = btManifoldResult::calculateCombinedFriction(&first, &second);
+    point.m_combinedFriction = gCalculateCombinedFrictionCallback(&first, &second);
     point.m_combinedRollingFriction =
-        btManifoldResult::calculateCombinedRollingFriction(&first, &second);
+        gCalculateCombinedRollingFrictionCallback(&first, &second);
     point.m_combinedSpinningFriction =
-        btManifoldResult::calculateCombinedSpinningFriction(&first, &second);
-    point.m_combinedRestitution = btManifoldResult::calculateCombinedRestitution(&first, &second);
+        gCalculateCombinedSpinningFrictionCallback(&first, &second);
+    point.m_combinedRestitution = gCalculateCombinedRestitutionCallback(&first, &second);
+    const double approach = normal.dot(velocity_of(second, on_second) - velocity_of(first, on_first));
+    if (point.m_combinedRestitution > 0 && approach > spring.slow) {
+      // What bounces is hard in this step: a damped spring would swallow the speed.
+      point.m_contactPointFlags |= BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP;
+    } else {
+      const double stiffness = spring.at(patch.depth) * patch.area;
+      point.m_contactPointFlags |= BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING;
+      point.m_combinedContactStiffness1 = static_cast<btScalar>(stiffness);
+      point.m_combinedContactDamping1 = static_cast<btScalar>(spring.relaxation * stiffness);
+    }
     set_name(point, patch.id);
     for (std::size_t k = 0; k < old_count; ++k) {
       if (!same_name(old[k], point)) continue;
@@ -309,7 +321,7 @@ void PairAlgorithm::push(const btCollisionObject& first, const btCollisionObject
   const RelativeMotion motion = relative_motion(twist_of(a), twist_of(b), contact.origin);
   ContactLaw law = settings.law;
   law.stiffness = spring_of(state_->meeting, first, second, settings, step).stiffness;
-  law.friction = btManifoldResult::calculateCombinedFriction(&first, &second);
+  law.friction = gCalculateCombinedFrictionCallback(&first, &second);
   state_->pushed = contact_force(law, std::span(contact.patches).first(contact.count), motion,
                                  contact.origin, step, state_->memory);
   // Impulses, since forces would act again in every further substep of one stepSimulation().

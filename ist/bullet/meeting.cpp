@@ -121,6 +121,7 @@ Spring spring_of(const Meeting& meeting, const btCollisionObject& first,
   }
   const double held = spring.stiffness * face / lighter.mass;  // [1/s²]
   spring.rest = (lighter.gravity > 0 ? lighter.gravity / held : settings.depth * size);
+  spring.slow = std::sqrt(2 * held) * spring.rest;
   spring.relaxation = 2 * settings.damping / std::sqrt(held);
   return spring;
 }
