@@ -33,7 +33,9 @@ foreach(as query ist)
 endforeach()
 # The adapter links ist::query of either kind.
 foreach(library IN LISTS ist_bullet_LIBRARIES)
-  string(REPLACE ist_bullet ist-bullet export ${library})
+  # CMake reads all files that begin with an export's name and a hyphen.
+  string(REPLACE - _ export ${library})
+  string(REPLACE ist_bullet ist-bullet export ${export})
   install(TARGETS ${library} EXPORT ${export} ARCHIVE COMPONENT libist-bullet-dev
     INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
   install(EXPORT ${export} NAMESPACE ist:: DESTINATION ${package_dir} COMPONENT libist-bullet-dev)
