@@ -1,6 +1,7 @@
-# `cpack` in the build folder makes three Debian packages: libist (the shared libraries), libist-dev
-# (headers, static libraries, CMake package, pkg-config files) and ist (the program, which needs
-# neither). What they depend on is read from the binaries (dpkg-shlibdeps).
+# `cpack` in the build folder makes Debian packages: libist (the shared libraries), libist-dev
+# (headers, static libraries, CMake package, pkg-config files), ist (the program, which needs
+# neither) and, where Bullet was found, libist-bullet-dev (ist::bullet). What they depend on is read
+# from the binaries (dpkg-shlibdeps).
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME ist)
 set(CPACK_PACKAGE_VENDOR ist)
@@ -8,7 +9,7 @@ set(CPACK_PACKAGE_CONTACT "the authors of ist <ist@localhost>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
 set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
-set(CPACK_COMPONENTS_ALL libist libist-dev ist)
+set(CPACK_COMPONENTS_ALL ${components})
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
@@ -29,6 +30,12 @@ if(IST_HAVE_OPENVDB)
   string(APPEND CPACK_DEBIAN_LIBIST-DEV_PACKAGE_DEPENDS ", libopenvdb-dev")
 endif()
 set(CPACK_DEBIAN_LIBIST-DEV_DESCRIPTION "${PROJECT_DESCRIPTION}: for development")
+
+set(CPACK_DEBIAN_LIBIST-BULLET-DEV_PACKAGE_NAME libist-bullet-dev)
+set(CPACK_DEBIAN_LIBIST-BULLET-DEV_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_LIBIST-BULLET-DEV_PACKAGE_DEPENDS
+  "libist-dev (= ${PROJECT_VERSION}), libbullet-dev")
+set(CPACK_DEBIAN_LIBIST-BULLET-DEV_DESCRIPTION "${PROJECT_DESCRIPTION}: solids in Bullet")
 
 set(CPACK_DEBIAN_IST_PACKAGE_NAME ist)
 set(CPACK_DEBIAN_IST_PACKAGE_SECTION graphics)

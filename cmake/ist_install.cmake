@@ -1,12 +1,18 @@
 # Installs the headers, the libraries, the command line, the CMake package `ist` and the pkg-config
-# files. Three components, which are Debian packages too (ist_deb.cmake): libist, libist-dev, ist.
+# files. The components are Debian packages too (ist_deb.cmake): libist, libist-dev, ist, and
+# libist-bullet-dev where Bullet was found.
 include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/ist)
 
-install(DIRECTORY include/ist DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT libist-dev)
+install(DIRECTORY include/ist DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT libist-dev
+  PATTERN bullet EXCLUDE)
 # Debian wants a package's licence in a file of this name.
-foreach(component libist libist-dev ist)
+set(components libist libist-dev ist)
+if(ist_bullet_LIBRARIES)
+  list(APPEND components libist-bullet-dev)
+endif()
+foreach(component IN LISTS components)
   install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${component} RENAME copyright
     COMPONENT ${component})
 endforeach()
@@ -25,6 +31,20 @@ foreach(as query ist)
       COMPONENT libist-dev)
   endforeach()
 endforeach()
+# The adapter links ist::query of either kind.
+foreach(library IN LISTS ist_bullet_LIBRARIES)
+  # CMake reads all files that begin with an export's name and a hyphen.
+  string(REPLACE - _ export ${library})
+  string(REPLACE ist_bullet ist-bullet export ${export})
+  install(TARGETS ${library} EXPORT ${export} ARCHIVE COMPONENT libist-bullet-dev
+    INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+  install(EXPORT ${export} NAMESPACE ist:: DESTINATION ${package_dir} COMPONENT libist-bullet-dev)
+endforeach()
+if(ist_bullet_LIBRARIES)
+  install(DIRECTORY include/ist/bullet DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ist
+    COMPONENT libist-bullet-dev)
+  install(FILES cmake/ist_find_bullet.cmake DESTINATION ${package_dir} COMPONENT libist-bullet-dev)
+endif()
 if(TARGET ist_app)
   install(TARGETS ist_app COMPONENT ist)
 endif()

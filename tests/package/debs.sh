@@ -1,6 +1,6 @@
 #!/bin/sh
 # debs.sh SOURCE BUILD WORK A.ist B.ist
-# The three Debian packages: made, installed by dpkg into a root that holds nothing but the files of
+# The Debian packages: made, installed by dpkg into a root that holds nothing but the files of
 # the packages that they depend on (copied from this system, where those are installed), run there by
 # chroot, and removed. What they forget to depend on is not there, and the programs do not start.
 # libist-dev is unpacked beside that root: a C program is built with it and runs inside.
@@ -19,10 +19,13 @@ mkdir -p "$work"
   { cat "$work/cpack.log"; exit 1; }
 arch=$(dpkg --print-architecture)
 deb() { ls "$work"/debs/"$1"_*_"$arch".deb; }
-for package in libist libist-dev ist; do
+for package in libist libist-dev libist-bullet-dev ist; do
   echo "$package depends on $(dpkg-deb -f "$(deb $package)" Depends)"
 done
 dpkg-deb -f "$(deb libist-dev)" Depends | grep -q '^libist (= '
+dpkg-deb -f "$(deb libist-bullet-dev)" Depends | grep -q '^libist-dev (= .*, libbullet-dev$'
+dpkg-deb -c "$(deb libist-bullet-dev)" | grep -q 'include/ist/bullet/contacts.h$'
+if dpkg-deb -c "$(deb libist-dev)" | grep -q bullet; then exit 1; fi
 if dpkg-deb -f "$(deb ist)" Depends | grep -q libist; then exit 1; fi
 
 dpkg-query -W -f '${binary:Package} ,${Provides},\n' | sed 's/ *([^)]*)//g' >"$work/provided"

@@ -1,5 +1,6 @@
 #include "glb_writer.h"
 
+#include <ist/bullet/convert.h>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -11,11 +12,13 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "../to_bullet.h"
 #include "meshes.h"
 #include "world.h"
 
 static_assert(std::endian::native == std::endian::little, "glTF is little-endian");
+
+using ist::bullet::to_bullet;
+using ist::bullet::to_eigen;
 
 namespace {
 

@@ -1,14 +1,12 @@
 #include "part.h"
 
-#include "../ist_shape.h"
-
 Part::Part(const std::string& name, ist::TriangleMesh mesh, std::size_t spheres)
     : name_(name), mesh_(std::move(mesh)) {
   ist::PackingSettings settings;
   settings.max_spheres = spheres;
   settings.device = ist::Device::cpu;
   asset_ = std::make_unique<ist::Asset>(ist::bake(ist::close_mesh(mesh_, name), settings));
-  frame_ = body_frame(tree());
+  frame_ = ist::bullet::body_frame(tree());
 }
 
 std::vector<Eigen::Vector3d> Part::vertices_in_body() const {

@@ -5,11 +5,10 @@
 #include <ist/mesh.h>
 
 #include <Eigen/Geometry>
+#include <ist/bullet/shape.h>
 #include <memory>
 #include <string>
 #include <vector>
-
-#include "../ist_shape.h"
 
 /// A solid as every way of collision wants it.
 class Part {
@@ -21,7 +20,7 @@ class Part {
   const ist::TriangleMesh& mesh() const { return mesh_; }
   const ist::TreeView& tree() const { return asset_->view(); }
   double volume() const { return tree().volume(); }  ///< [u³]
-  const IstBodyFrame& frame() const { return frame_; }
+  const ist::bullet::BodyFrame& frame() const { return frame_; }
 
   /// The mesh's vertices in the body's frame.
   std::vector<Eigen::Vector3d> vertices_in_body() const;
@@ -30,5 +29,5 @@ class Part {
   std::string name_;
   ist::TriangleMesh mesh_;
   std::unique_ptr<ist::Asset> asset_;
-  IstBodyFrame frame_;
+  ist::bullet::BodyFrame frame_;
 };

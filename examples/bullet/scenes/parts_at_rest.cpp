@@ -117,6 +117,8 @@ SceneResult run_peg(const SceneOptions& options) {
   settings.hulls = 24;
   settings.margin = 0.02;
   settings.ist.patches = 16;
+  // The fit leaves less than bodies of this size sink in by default.
+  settings.ist.law.stiffness = ist::stiffness_for_depth(mass * kGravity, 100, 0.02);
   set_law(settings, mass, 100, 0.02, 100);
   SceneWorld world(settings);
   add_ground(world, 0.1);

@@ -6,7 +6,7 @@
 #include <HACD/hacdHACD.h>
 #endif
 
-#include "to_bullet.h"
+#include <ist/bullet/convert.h>
 
 std::unique_ptr<PeerShape> make_gimpact_shape(const Part& part, double margin) {
   auto peer = std::make_unique<PeerShape>();

@@ -1,9 +1,9 @@
 #include "scene.h"
 
+#include <ist/bullet/convert.h>
 #include <algorithm>
 #include <cmath>
 
-#include "../to_bullet.h"
 #include "glb_writer.h"
 
 const std::vector<Scene>& scenes() {
@@ -11,6 +11,7 @@ const std::vector<Scene>& scenes() {
       {"box", "a cube comes to rest on a plane", run_box},
       {"pile", "cubes fall in a heap on a plane", run_pile},
       {"stack", "ten cubes stand on each other", run_stack},
+      {"askew", "ten cubes stand on each other, each a little off and turned", run_askew},
       {"cube", "a cube comes to rest on a cube", run_cube_on_cube},
       {"nut", "a nut turns down a bolt by its weight", run_nut},
       {"screw", "a screw falls on a table a hundred times its size", run_screw},

@@ -66,6 +66,7 @@ class Run {
 SceneResult run_box(const SceneOptions&);
 SceneResult run_pile(const SceneOptions&);
 SceneResult run_stack(const SceneOptions&);
+SceneResult run_askew(const SceneOptions&);
 SceneResult run_cube_on_cube(const SceneOptions&);
 SceneResult run_nut(const SceneOptions&);
 SceneResult run_screw(const SceneOptions&);

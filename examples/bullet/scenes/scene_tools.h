@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <ist/bullet/convert.h>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -8,8 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "../to_bullet.h"
 #include "scene.h"
+
+using ist::bullet::to_bullet;
+using ist::bullet::to_eigen;
 
 // What scenes have in common: places, laws, and what bodies at rest must obey.
 
@@ -24,26 +28,24 @@ inline Eigen::Quaterniond turn(double angle, const Eigen::Vector3d& axis) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis.normalized()));
 }
 
-/// Sets the law so that `load` bodies of `mass` rest on `area` [u²] of the lowest at `depth` [u],
-/// or as near to it as the wrench's step bears, where bodies meet at up to `speed` [u/s].
+/// The solver's springs are the adapter's own. For the wrench sets the law so that `load` bodies of
+/// `mass` rest on `area` [u²] of the lowest at `depth` [u], or as near to it as the step bears, where
+/// bodies meet at up to `speed` [u/s].
 ///
 /// A body that touches on several sides is held by several springs, at arms that make it lighter:
 /// with a quarter of the largest stable frequency some ten of them are still stable.
 inline void set_law(WorldSettings& settings, double mass, double area, double depth, double speed,
                     double load = 1) {
+  if (settings.way != Way::wrench) return;
+  constexpr double kShare = 0.25;
   ist::ContactLaw& law = settings.ist.law;
-  law.stiffness = ist::stiffness_for_depth(load * mass * settings.gravity.norm(), area, depth);
-  if (settings.way == Way::wrench) {
-    constexpr double kShare = 0.25;
-    law.stiffness = std::min(
-        law.stiffness, kShare * kShare * ist::largest_stable_stiffness(settings.step, mass) / area);
-  }
+  law.stiffness = std::min(
+      ist::stiffness_for_depth(load * mass * settings.gravity.norm(), area, depth),
+      kShare * kShare * ist::largest_stable_stiffness(settings.step, mass) / area);
   const double frequency = std::sqrt(law.stiffness * area / mass);
   law.damping = ist::damping_for_restitution(0.3, speed);
   law.friction_stiffness = 0.25 * law.stiffness;
   law.friction_damping = 0.2 * law.friction_stiffness / frequency;
-  settings.ist.relaxation = 1 / frequency;  // half the critical one
-  settings.ist.follow = 0.05 * depth;
 }
 
 /// The plane z = 0, held still.

@@ -1,3 +1,5 @@
+#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -43,18 +45,13 @@ SceneResult run_terrain(const SceneOptions& options) {
     for (std::uint32_t i = 0; i < kPoints; ++i)
       heights.push_back(static_cast<float>(height(i * kSpacing - kHalf, j * kSpacing - kHalf)));
   const auto [lowest, highest] = std::minmax_element(heights.begin(), heights.end());
-  ist::HeightField field;
-  field.heights = heights.data();
-  field.columns = field.rows = kPoints;
-  field.spacing[0] = field.spacing[1] = kSpacing;
-  field.lowest = *lowest;
-  field.highest = *highest;
-
   SceneWorld world(settings);
-  // Bullet's shape is centred.
+  // Bullet's shape is centred. Its cells are cut as ist's are.
+  auto terrain = std::make_unique<btHeightfieldTerrainShape>(
+      kPoints, kPoints, heights.data(), *lowest, *highest, 2, true);
+  terrain->setLocalScaling({kSpacing, kSpacing, 1});
   btRigidBody& ground =
-      world.add_still(std::make_unique<IstTerrain>(field),
-                      place({0, 0, 0.5 * (field.lowest + field.highest)}), kFriction);
+      world.add_still(std::move(terrain), place({0, 0, 0.5 * (*lowest + *highest)}), kFriction);
   btRigidBody& boulder = world.add_still(std::make_unique<btSphereShape>(kBoulder),
                                          place({0, 0, 0.5 * kBoulder}), kFriction);
   const Part* const parts[] = {&torus, &ball, &cube};

@@ -1,12 +1,13 @@
 #include "world.h"
 
 #include <BulletCollision/Gimpact/btGImpactCollisionAlgorithm.h>
+#include <ist/bullet/convert.h>
 
 #include <chrono>
 #include <stdexcept>
 
-#include "../contact_response.h"
-#include "../to_bullet.h"
+using ist::bullet::to_bullet;
+using ist::bullet::to_eigen;
 
 const char* name_of(Way way) {
   switch (way) {
@@ -25,15 +26,17 @@ const char* name_of(Way way) {
 SceneWorld::SceneWorld(const WorldSettings& settings) : settings_(settings) {
   contacts_.settings = settings.ist;
   contacts_.settings.response =
-      settings.way == Way::wrench ? IstSettings::Response::wrench : IstSettings::Response::solver;
-  contacts_.register_with(dispatcher_);
+      settings.way == Way::wrench ? ist::bullet::Settings::Response::wrench
+                                  : ist::bullet::Settings::Response::solver;
   btGImpactCollisionAlgorithm::registerAlgorithm(&dispatcher_);
+  contacts_.register_with(dispatcher_);
   world_.setGravity(to_bullet(settings.gravity));
   // The patches' springs push by speed; Bullet's own contacts part bodies as it does by default.
   world_.getSolverInfo().m_splitImpulse =
       settings.way == Way::gimpact || settings.way == Way::hulls;
+  world_.getSolverInfo().m_numIterations = 50;
   world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
-  if (settings.way == Way::wrench) push_in_every_tick(world_);
+  if (settings.way == Way::wrench) ist::bullet::push_in_every_tick(world_);
 }
 
 SceneWorld::~SceneWorld() {
@@ -42,8 +45,8 @@ SceneWorld::~SceneWorld() {
 
 btCollisionShape* SceneWorld::shape_of(const Part& part) {
   if (settings_.way == Way::solver || settings_.way == Way::wrench) {
-    std::unique_ptr<IstShape>& shape = ist_shapes_[&part];
-    if (shape == nullptr) shape = std::make_unique<IstShape>(part.tree());
+    std::unique_ptr<ist::bullet::Shape>& shape = ist_shapes_[&part];
+    if (shape == nullptr) shape = std::make_unique<ist::bullet::Shape>(part.tree());
     return shape.get();
   }
   std::unique_ptr<PeerShape>& shape = peer_shapes_[&part];
@@ -77,7 +80,7 @@ btRigidBody& SceneWorld::add(const Part& part, double density, const Eigen::Isom
                              double friction) {
   Body body;
   body.part = &part;
-  body.proxy_shape = std::make_unique<IstShape>(part.tree());
+  body.proxy_shape = std::make_unique<ist::bullet::Shape>(part.tree());
   return add(std::move(body), shape_of(part), density * part.volume(),
              to_bullet(Eigen::Isometry3d(at * part.frame().in_mesh)), friction);
 }
@@ -130,14 +133,14 @@ double SceneWorld::potential_energy() const {
 
 double SceneWorld::contact_energy() const {
   double sum = 0;
-  for_each_ist_pair(world_, [&](IstCollisionAlgorithm& pair, const btCollisionObject&,
+  ist::bullet::for_each_pair(world_, [&](ist::bullet::PairAlgorithm& pair, const btCollisionObject&,
                                 const btCollisionObject&) { sum += pair.pushed().energy; });
   return sum;
 }
 
 Eigen::Vector3d SceneWorld::contact_force(const btRigidBody& body) const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for_each_ist_pair(world_, [&](IstCollisionAlgorithm& pair, const btCollisionObject& a,
+  ist::bullet::for_each_pair(world_, [&](ist::bullet::PairAlgorithm& pair, const btCollisionObject& a,
                                 const btCollisionObject& b) {
     if (&a != &body && &b != &body) return;
     sum +=
@@ -160,8 +163,7 @@ Eigen::Vector3d SceneWorld::contact_force(const btRigidBody& body) const {
 }
 
 double SceneWorld::deepest_penetration() {
-  ist::ContactSettings settings;
-  settings.field = ist::FieldUse::always;
+  const ist::bullet::Settings settings;
   double deepest = 0;
   for (Body& body : bodies_) body.proxy->setWorldTransform(body.rigid->getWorldTransform());
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
@@ -174,10 +176,8 @@ double SceneWorld::deepest_penetration() {
       box(bodies_[i], low_i, high_i);
       box(bodies_[j], low_j, high_j);
       if (!TestAabbAgainstAabb2(low_i, high_i, low_j, high_j)) continue;
-      IstContact contact;
-      if (!find_contact(*bodies_[i].proxy, *bodies_[j].proxy, 8, settings, measuring_, contact)) {
-        continue;
-      }
+      ist::bullet::Contact contact;
+      if (!find_contact(*bodies_[i].proxy, *bodies_[j].proxy, settings, contact)) continue;
       for (std::size_t k = 0; k < contact.count; ++k) {
         deepest = std::max(deepest, contact.patches[k].depth);
       }

@@ -3,12 +3,12 @@
 #include <btBulletDynamicsCommon.h>
 
 #include <Eigen/Geometry>
+#include <ist/bullet/contacts.h>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "../ist_collision_algorithm.h"
 #include "part.h"
 #include "peer_shapes.h"
 
@@ -20,7 +20,7 @@ struct WorldSettings {
   Way way = Way::solver;
   double step = 1.0 / 240;  ///< [s]
   Eigen::Vector3d gravity = {0, 0, -9.81};
-  IstSettings ist;         ///< `response` follows `way`
+  ist::bullet::Settings ist;  ///< `response` follows `way`
   double margin = 0;       ///< [u] of GImpact's triangles and of hulls
   std::size_t hulls = 16;  ///< a part's, at least
 };
@@ -33,7 +33,7 @@ class SceneWorld {
 
   /// A part with its mesh frame at `at`. Density 0: held still. The part must outlive the world.
   btRigidBody& add(const Part& part, double density, const Eigen::Isometry3d& at, double friction);
-  /// A shape of Bullet's that is held still: plane, box, ball or IstTerrain.
+  /// A shape of Bullet's that is held still: plane, box, ball or terrain.
   btRigidBody& add_still(std::unique_ptr<btCollisionShape> shape, const Eigen::Isometry3d& at,
                          double friction);
 
@@ -58,7 +58,7 @@ class SceneWorld {
   struct Body {
     std::unique_ptr<btRigidBody> rigid;
     std::unique_ptr<btCollisionShape> own_shape;
-    std::unique_ptr<IstShape> proxy_shape;  ///< null for shapes of Bullet's
+    std::unique_ptr<ist::bullet::Shape> proxy_shape;  ///< null for shapes of Bullet's
     std::unique_ptr<btCollisionObject> proxy;
     const Part* part = nullptr;  ///< null for shapes of Bullet's
   };
@@ -70,16 +70,15 @@ class SceneWorld {
   btCollisionShape* shape_of(const Part& part);
 
   WorldSettings settings_;
-  IstContacts contacts_;
+  ist::bullet::Contacts contacts_;
   btDefaultCollisionConfiguration configuration_;
   btCollisionDispatcher dispatcher_{&configuration_};
   btDbvtBroadphase broadphase_;
   btSequentialImpulseConstraintSolver solver_;
   mutable btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
-  std::map<const Part*, std::unique_ptr<IstShape>> ist_shapes_;
+  std::map<const Part*, std::unique_ptr<ist::bullet::Shape>> ist_shapes_;
   std::map<const Part*, std::unique_ptr<PeerShape>> peer_shapes_;
   std::vector<Body> bodies_;
-  ist::Workspace measuring_;
   long steps_ = 0;
   double seconds_ = 0;
 };

@@ -1,19 +1,23 @@
 #pragma once
 
 #include <LinearMath/btTransform.h>
-#include <ist/pose.h>
 
 #include <Eigen/Geometry>
 
-// Between Bullet's vectors and Eigen's.
+#include <ist/pose.h>
 
-static_assert(sizeof(btScalar) == sizeof(double), "Bullet must be its double-precision build");
+// Between Bullet's vectors, of either precision, and Eigen's.
 
-inline btVector3 to_bullet(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+namespace ist::bullet {
+
+inline btVector3 to_bullet(const Eigen::Vector3d& v) {
+  return {static_cast<btScalar>(v.x()), static_cast<btScalar>(v.y()),
+          static_cast<btScalar>(v.z())};
+}
 inline Eigen::Vector3d to_eigen(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
 
 inline btTransform to_bullet(const Eigen::Isometry3d& x) {
-  const Eigen::Quaterniond q(x.rotation());
+  const Eigen::Quaternion<btScalar> q(Eigen::Quaterniond(x.rotation()).cast<btScalar>());
   return btTransform(btQuaternion(q.x(), q.y(), q.z(), q.w()),
                      to_bullet(Eigen::Vector3d(x.translation())));
 }
@@ -25,8 +29,10 @@ inline Eigen::Isometry3d to_eigen(const btTransform& x) {
   return out;
 }
 
-inline ist::Pose to_pose(const btTransform& x) {
+inline Pose to_pose(const btTransform& x) {
   const btQuaternion q = x.getRotation();
   const btVector3& t = x.getOrigin();
   return {{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}};
 }
+
+}  // namespace ist::bullet

@@ -1,0 +1,340 @@
+#include <ist/bullet/contacts.h>
+
+#include <BulletCollision/CollisionDispatch/btCollisionConfiguration.h>
+#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
+#include <BulletCollision/CollisionDispatch/btConvexConvexAlgorithm.h>
+#include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <typeinfo>
+#include <vector>
+
+#include <ist/bullet/convert.h>
+
+#include "bullet/meeting.h"
+
+namespace ist::bullet {
+
+namespace {
+
+constexpr std::size_t kPointsOfAManifold = MANIFOLD_CACHE_SIZE;
+
+/// A patch's name in the fields in which Bullet keeps the triangles of a point.
+void set_name(btManifoldPoint& point, std::uint64_t id) {
+  point.m_partId0 = static_cast<int>(id >> 32);
+  point.m_index0 = static_cast<int>(id & 0xffffffffu);
+}
+bool same_name(const btManifoldPoint& a, const btManifoldPoint& b) {
+  return a.m_partId0 == b.m_partId0 && a.m_index0 == b.m_index0;
+}
+
+btRigidBody* movable(const btCollisionObject& object) {
+  btRigidBody* const body = btRigidBody::upcast(const_cast<btCollisionObject*>(&object));
+  return body != nullptr && body->getInvMass() > 0 ? body : nullptr;
+}
+
+btVector3 velocity_of(const btCollisionObject& object, const btVector3& point) {
+  const btRigidBody* const body = btRigidBody::upcast(&object);
+  if (body == nullptr) return {0, 0, 0};
+  return body->getVelocityInLocalPoint(point - body->getCenterOfMassPosition());
+}
+
+}  // namespace
+
+struct PairAlgorithm::State {
+  State(const btCollisionShape& first, const btCollisionShape& second) : meeting(first, second) {}
+
+  void move_points(const btCollisionObject& first, const btCollisionObject& second);
+  void fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
+            const Contact& contact, const Spring& spring, btDispatcher& dispatcher);
+  std::size_t points() const;
+
+  Meeting meeting;
+  std::vector<btPersistentManifold*> manifolds;        // the first ones are full
+  std::array<btVector3, Settings::kPatches> normals;   // of all points, in the first's frame
+  btTransform second_in_first;                         // when last asked
+  double still = -1;  // [u] until a point has moved by more than this that answer holds
+  ContactMemory memory;
+  ContactForce pushed;
+  const btCollisionObject* pushed_body = nullptr;
+};
+
+Settings Contacts::settings_of(const btCollisionObject& first,
+                               const btCollisionObject& second) const {
+  Settings of = settings;
+  if (of_pair) of_pair(first, second, of);
+  return of;
+}
+
+void Contacts::register_with(btCollisionDispatcher& dispatcher) {
+  create_.contacts = this;
+  create_.others = dispatcher.getCollisionConfiguration();
+  for (int other = 0; other < MAX_BROADPHASE_COLLISION_TYPES; ++other) {
+    // Bullet takes compounds apart and asks for their children.
+    if (other == COMPOUND_SHAPE_PROXYTYPE || other == EMPTY_SHAPE_PROXYTYPE) continue;
+    for (const auto& [a, b] : {std::pair<int, int>{CUSTOM_CONCAVE_SHAPE_TYPE, other},
+                               std::pair<int, int>{other, CUSTOM_CONCAVE_SHAPE_TYPE}}) {
+      dispatcher.registerCollisionCreateFunc(a, b, &create_);
+      dispatcher.registerClosestPointsCreateFunc(a, b, &create_);
+    }
+  }
+}
+
+btCollisionAlgorithm* Contacts::CreateFunc::CreateCollisionAlgorithm(
+    btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
+    const btCollisionObjectWrapper* b) {
+  static_assert(sizeof(PairAlgorithm) <= sizeof(btConvexConvexAlgorithm));
+  const btCollisionShape &first = *a->getCollisionShape(), &second = *b->getCollisionShape();
+  const Meeting meeting(first, second);
+  if (!meeting.has_shape()) {
+    return others->getCollisionAlgorithmCreateFunc(first.getShapeType(), second.getShapeType())
+        ->CreateCollisionAlgorithm(info, a, b);
+  }
+  if (!meeting.is_met()) {
+    warn((std::string(first.getName()) + " and " + second.getName() +
+          " do not meet: they pass through each other. docs/engines.md lists what an asset meets, "
+          "and what to use in place of the rest.")
+             .c_str());
+  }
+  void* const place = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(PairAlgorithm));
+  return new (place) PairAlgorithm(info, *contacts, first, second);
+}
+
+PairAlgorithm::PairAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
+                             const Contacts& contacts, const btCollisionShape& first,
+                             const btCollisionShape& second)
+    : btActivatingCollisionAlgorithm(info), contacts_(contacts), state_(new State(first, second)) {}
+
+PairAlgorithm::~PairAlgorithm() {
+  for (btPersistentManifold* manifold : state_->manifolds) {
+    // One end of a contact is told, of the first manifold.
+    if (manifold != state_->manifolds.front()) {
+      for (int i = 0; i < manifold->getNumContacts(); ++i) {
+        manifold->clearUserCache(manifold->getContactPoint(i));
+      }
+      manifold->setNumContacts(0);
+    }
+    m_dispatcher->releaseManifold(manifold);
+  }
+}
+
+void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
+                                     const btCollisionObjectWrapper* b,
+                                     const btDispatcherInfo& info, btManifoldResult* result) {
+  if (!state_->meeting.is_met()) return;
+  const btCollisionObject &first = *a->getCollisionObject(), &second = *b->getCollisionObject();
+  const Settings settings = contacts_.settings_of(first, second);
+  const btTransform &at_first = a->getWorldTransform(), &at_second = b->getWorldTransform();
+  Contact contact;
+  if (typeid(*result) != typeid(btManifoldResult)) {
+    // Somebody collects points, by way of a manifold.
+    state_->meeting.find(at_first, at_second, settings, contact);
+    if (state_->manifolds.empty()) {
+      state_->manifolds.push_back(m_dispatcher->getNewManifold(&first, &second));
+    }
+    result->setPersistentManifold(state_->manifolds[0]);
+    for (std::size_t i = 0; i < contact.count; ++i) {
+      const ContactPatch& patch = contact.patches[i];
+      if (!(patch.area > 0)) continue;
+      const Eigen::Vector3d normal = (contact.pushes_second ? -1 : 1) * patch.normal;
+      result->addContactPoint(
+          to_bullet(normal),
+          to_bullet(Eigen::Vector3d(patch.centroid + 0.5 * patch.depth * normal)),
+          static_cast<btScalar>(-patch.depth));
+    }
+    result->setPersistentManifold(nullptr);
+    return;
+  }
+  if (settings.response != Settings::Response::solver) {
+    if (a->m_parent != nullptr || b->m_parent != nullptr) {
+      warn("Settings::Response::wrench pushes no compounds: they pass through each other. Use "
+           "Response::solver for their pairs.");
+    }
+    return;
+  }
+  const btTransform second_in_first = at_first.inverseTimes(at_second);
+  if (state_->still > 0 &&
+      state_->meeting.largest_motion(state_->second_in_first, second_in_first) <= state_->still) {
+    state_->move_points(first, second);
+  } else {
+    const Spring spring = spring_of(state_->meeting, first, second, settings, info.m_timeStep);
+    state_->meeting.find(at_first, at_second, settings, contact);
+    state_->fill(*a, *b, contact, spring, *m_dispatcher);
+    state_->second_in_first = second_in_first;
+    state_->still = std::max(settings.follow * spring.rest, contact.clearance);
+  }
+  if (gContactProcessedCallback == nullptr) return;
+  for (btPersistentManifold* manifold : state_->manifolds) {
+    for (int i = 0; i < manifold->getNumContacts(); ++i) {
+      gContactProcessedCallback(manifold->getContactPoint(i),
+                                const_cast<btCollisionObject*>(&first),
+                                const_cast<btCollisionObject*>(&second));
+    }
+  }
+}
+
+std::size_t PairAlgorithm::State::points() const {
+  std::size_t sum = 0;
+  for (const btPersistentManifold* manifold : manifolds) {
+    sum += static_cast<std::size_t>(manifold->getNumContacts());
+  }
+  return sum;
+}
+
+void PairAlgorithm::State::move_points(const btCollisionObject& first,
+                                       const btCollisionObject& second) {
+  const btTransform& to_world_first = first.getWorldTransform();
+  const btTransform& to_world_second = second.getWorldTransform();
+  std::size_t at = 0;
+  for (btPersistentManifold* manifold : manifolds) {
+    for (int i = 0; i < manifold->getNumContacts(); ++i) {
+      btManifoldPoint& point = manifold->getContactPoint(i);
+      point.m_positionWorldOnA = to_world_first * point.m_localPointA;
+      point.m_positionWorldOnB = to_world_second * point.m_localPointB;
+      point.m_normalWorldOnB = to_world_first.getBasis() * normals[at++];
+      point.m_distance1 =
+          (point.m_positionWorldOnA - point.m_positionWorldOnB).dot(point.m_normalWorldOnB);
+      ++point.m_lifeTime;
+    }
+  }
+}
+
+void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
+                                const btCollisionObjectWrapper& b, const Contact& contact,
+                                const Spring& spring, btDispatcher& dispatcher) {
+  const btCollisionObject &first = *a.getCollisionObject(), &second = *b.getCollisionObject();
+  // Manifolds are filled past Bullet's own functions, which tell of an end whenever they are empty.
+  std::array<btManifoldPoint, Settings::kPatches> old;
+  std::size_t old_count = 0;
+  for (btPersistentManifold* manifold : manifolds) {
+    for (int i = 0; i < manifold->getNumContacts(); ++i) {
+      old[old_count++] = manifold->getContactPoint(i);
+    }
+    manifold->setNumContacts(0);
+  }
+  const bool touched = old_count > 0;
+
+  // Bullet's normal pushes the manifold's first body.
+  const double sign = contact.pushes_second ? -1 : 1;
+  const btTransform to_first = first.getWorldTransform().inverse();
+  const btTransform to_second = second.getWorldTransform().inverse();
+  std::size_t used = 0;
+  for (std::size_t i = 0; i < contact.count; ++i) {
+    const ContactPatch& patch = contact.patches[i];
+    if (!(patch.area > 0)) continue;
+    const btVector3 normal = to_bullet(Eigen::Vector3d(sign * patch.normal));
+    const btVector3 middle = to_bullet(patch.centroid);
+    const btScalar depth = static_cast<btScalar>(patch.depth);
+    const btVector3 on_first = middle - normal * (depth / 2);
+    const btVector3 on_second = middle + normal * (depth / 2);
+    btManifoldPoint point(to_first * on_first, to_second * on_second, normal, -depth);
+    point.m_positionWorldOnA = on_first;
+    point.m_positionWorldOnB = on_second;
+    point.m_combinedFriction = gCalculateCombinedFrictionCallback(&first, &second);
+    point.m_combinedRollingFriction =
+        gCalculateCombinedRollingFrictionCallback(&first, &second);
+    point.m_combinedSpinningFriction =
+        gCalculateCombinedSpinningFrictionCallback(&first, &second);
+    point.m_combinedRestitution = gCalculateCombinedRestitutionCallback(&first, &second);
+    const double approach = normal.dot(velocity_of(second, on_second) - velocity_of(first, on_first));
+    if (point.m_combinedRestitution > 0 && approach > spring.slow) {
+      // What bounces is hard in this step: a damped spring would swallow the speed.
+      point.m_contactPointFlags |= BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP;
+    } else {
+      const double stiffness = spring.at(patch.depth) * patch.area;
+      point.m_contactPointFlags |= BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING;
+      point.m_combinedContactStiffness1 = static_cast<btScalar>(stiffness);
+      point.m_combinedContactDamping1 = static_cast<btScalar>(spring.relaxation * stiffness);
+    }
+    set_name(point, patch.id);
+    for (std::size_t k = 0; k < old_count; ++k) {
+      if (!same_name(old[k], point)) continue;
+      point.m_userPersistentData = old[k].m_userPersistentData;
+      point.m_appliedImpulse = old[k].m_appliedImpulse;
+      point.m_prevRHS = old[k].m_prevRHS;
+      point.m_appliedImpulseLateral1 = old[k].m_appliedImpulseLateral1;
+      point.m_appliedImpulseLateral2 = old[k].m_appliedImpulseLateral2;
+      point.m_lateralFrictionDir1 = old[k].m_lateralFrictionDir1;
+      point.m_lateralFrictionDir2 = old[k].m_lateralFrictionDir2;
+      point.m_lifeTime = old[k].m_lifeTime + 1;
+      old[k] = old[--old_count];
+      break;
+    }
+    if (gContactAddedCallback != nullptr &&
+        ((first.getCollisionFlags() | second.getCollisionFlags()) &
+         btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK)) {
+      gContactAddedCallback(point, &a, point.m_partId0, point.m_index0, &b, point.m_partId1,
+                            point.m_index1);
+    }
+    normals[used] = to_first.getBasis() * normal;
+    const std::size_t at = used++ / kPointsOfAManifold;
+    if (at == manifolds.size()) {
+      manifolds.push_back(dispatcher.getNewManifold(&first, &second));
+      // Bullet forgets no point of ours by itself, as it does of a compound's children.
+      manifolds.back()->setContactBreakingThreshold(BT_LARGE_FLOAT);
+    }
+    btPersistentManifold& manifold = *manifolds[at];
+    manifold.setNumContacts(manifold.getNumContacts() + 1);
+    manifold.getContactPoint(manifold.getNumContacts() - 1) = point;
+  }
+  for (std::size_t k = 0; k < old_count; ++k) manifolds[0]->clearUserCache(old[k]);
+  if (used > 0 && !touched && gContactStartedCallback != nullptr) {
+    gContactStartedCallback(manifolds[0]);
+  }
+  if (used == 0 && touched && gContactEndedCallback != nullptr) gContactEndedCallback(manifolds[0]);
+}
+
+void PairAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {
+  for (btPersistentManifold* manifold : state_->manifolds) manifolds.push_back(manifold);
+}
+
+const ContactForce& PairAlgorithm::pushed() const { return state_->pushed; }
+const btCollisionObject* PairAlgorithm::pushed_body() const { return state_->pushed_body; }
+
+void PairAlgorithm::push(const btCollisionObject& first, const btCollisionObject& second,
+                         double step) {
+  state_->pushed = {};
+  if (!state_->meeting.is_met()) return;
+  Settings settings = contacts_.settings_of(first, second);
+  const bool whole = settings.law.area > 0;
+  if (whole) settings.patches = 1;
+  Contact contact;
+  state_->meeting.find(first.getWorldTransform(), second.getWorldTransform(), settings, contact);
+  const btCollisionObject& body = contact.pushes_second ? second : first;
+  state_->pushed_body = &body;
+  if (contact.whole.volume <= 0) {
+    state_->memory = {};
+    return;
+  }
+  if (whole) contact.patches[0] = whole_patch(contact.whole);  // of one name in every pose
+
+  btRigidBody* const b = movable(body);
+  btRigidBody* const a = movable(contact.pushes_second ? first : second);
+  const auto twist_of = [](const btRigidBody* moved) {
+    if (moved == nullptr) return Twist();
+    return Twist{to_eigen(moved->getCenterOfMassPosition()), to_eigen(moved->getLinearVelocity()),
+                 to_eigen(moved->getAngularVelocity())};
+  };
+  const RelativeMotion motion = relative_motion(twist_of(a), twist_of(b), contact.origin);
+  ContactLaw law = settings.law;
+  law.stiffness = spring_of(state_->meeting, first, second, settings, step).stiffness;
+  law.friction = gCalculateCombinedFrictionCallback(&first, &second);
+  state_->pushed = contact_force(law, std::span(contact.patches).first(contact.count), motion,
+                                 contact.origin, step, state_->memory);
+  // Impulses, since forces would act again in every further substep of one stepSimulation().
+  const auto give = [&](btRigidBody* moved, double sign) {
+    if (moved == nullptr) return;
+    const Eigen::Vector3d arm = contact.origin - to_eigen(moved->getCenterOfMassPosition());
+    const ContactForce& f = state_->pushed;
+    moved->applyCentralImpulse(to_bullet(Eigen::Vector3d(sign * step * f.force)));
+    moved->applyTorqueImpulse(
+        to_bullet(Eigen::Vector3d(sign * step * (f.torque + arm.cross(f.force)))));
+  };
+  give(b, 1);
+  give(a, -1);
+}
+
+}  // namespace ist::bullet

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <optional>
+
+#include <ist/bullet/contacts.h>
+
+#include "bullet/partner.h"
+
+namespace ist::bullet {
+
+/// Two shapes of which one is a Shape, prepared for many queries. Both must outlive it.
+class Meeting {
+ public:
+  Meeting(const btCollisionShape& first, const btCollisionShape& second);
+
+  bool has_shape() const { return b_ != nullptr; }  ///< one of them is a Shape
+  bool is_met() const { return a_ != nullptr || partner_.has_value(); }
+
+  /// The shapes' transforms are given.
+  void find(const btTransform& first, const btTransform& second, const Settings& settings,
+            Contact& contact) const;
+
+  /// [u] No point of one has moved by more than this against the other since the second was at
+  /// `before` in the frame of the first.
+  double largest_motion(const btTransform& before, const btTransform& now) const;
+
+  double volume() const;     ///< [u³] of the smaller asset
+  double stiffness() const;  ///< [force/u³] of the shapes' materials; 0: none has any
+
+ private:
+  const Shape* a_ = nullptr;  // null: partner_
+  const Shape* b_ = nullptr;
+  bool b_is_second_ = true;
+  std::optional<Partner> partner_;
+};
+
+/// What holds two bodies apart.
+struct Spring {
+  double stiffness = 0;   ///< [force/u³] pressure over depth
+  double relaxation = 0;  ///< [s] damper over spring
+  double rest = 0;        ///< [u] depth at which the lighter body rests
+  double slow = 0;        ///< [u/s] a body that fell by `rest` is this fast
+  double linear = 0;      ///< [u] deeper, the pressure grows with the depth's square
+
+  /// [force/u³] at that depth.
+  double at(double depth) const { return stiffness * std::max(1.0, depth / linear); }
+};
+
+/// `step` [s]: the world's.
+Spring spring_of(const Meeting& meeting, const btCollisionObject& first,
+                 const btCollisionObject& second, const Settings& settings, double step);
+
+}  // namespace ist::bullet

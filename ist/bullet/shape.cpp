@@ -1,0 +1,62 @@
+#include <ist/bullet/shape.h>
+
+#include <LinearMath/btAabbUtil2.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include <ist/bullet/convert.h>
+#include <ist/mass_properties.h>
+
+namespace ist::bullet {
+
+BodyFrame body_frame(const TreeView& tree) {
+  const MassProperties mass = mass_properties(tree);
+  BodyFrame frame{Eigen::Isometry3d::Identity(), mass.inertia.diagonal() / mass.volume};
+  const Eigen::Matrix3d diagonal = mass.inertia.diagonal().asDiagonal();
+  if ((mass.inertia - diagonal).norm() > 1e-6 * mass.inertia.norm()) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(mass.inertia);
+    Eigen::Matrix3d axes = solver.eigenvectors();
+    if (axes.determinant() < 0) axes.col(2) *= -1;
+    frame.in_mesh.linear() = axes;
+    frame.unit_inertia = solver.eigenvalues() / mass.volume;
+  }
+  frame.in_mesh.translation() = mass.centre_of_mass;
+  return frame;
+}
+
+Shape::Shape(const TreeView& tree) : tree_(tree), frame_(body_frame(tree)) {
+  m_shapeType = CUSTOM_CONCAVE_SHAPE_TYPE;
+  if (tree.sphere_count() == 0) {
+    warn("An asset without spheres (ist bake --surface-only) collides with nothing: bake spheres.");
+  }
+  mesh_in_body_ = to_bullet(Eigen::Isometry3d(frame_.in_mesh.inverse()));
+  // Matched spheres stick out of the solid by this: what they meet there is a contact.
+  const Bounds box = bounds(tree);
+  btTransformAabb(to_bullet(box.lower), to_bullet(box.upper),
+                  static_cast<btScalar>(tree.protrusion()), mesh_in_body_, lower_, upper_);
+  reach_ = (frame_.in_mesh.inverse() * box.centre).norm() + box.radius + tree.protrusion();
+}
+
+void Shape::getAabb(const btTransform& t, btVector3& lower, btVector3& upper) const {
+  btTransformAabb(scaling_ * lower_, scaling_ * upper_, 0, t, lower, upper);
+}
+
+void Shape::calculateLocalInertia(btScalar mass, btVector3& inertia) const {
+  inertia = to_bullet(Eigen::Vector3d(mass * scale_ * scale_ * frame_.unit_inertia));
+}
+
+void Shape::setLocalScaling(const btVector3& scaling) {
+  const btScalar s = scaling.x();
+  const btScalar off = std::max(std::abs(scaling.y() - s), std::abs(scaling.z() - s));
+  if (!(s > 0) || !(off <= btScalar(1e-6) * s)) {
+    warn("ist::bullet::Shape takes one positive scale for all axes: this scaling is ignored. Bake "
+         "the mesh at its size.");
+    return;
+  }
+  mesh_in_body_.setOrigin(to_bullet(Eigen::Vector3d(s * frame_.in_mesh.inverse().translation())));
+  scale_ = s;
+  scaling_.setValue(s, s, s);
+}
+
+}  // namespace ist::bullet

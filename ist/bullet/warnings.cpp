@@ -1,0 +1,43 @@
+#include <cstdio>
+#include <mutex>
+#include <set>
+#include <string>
+
+#include <ist/bullet/shape.h>
+
+namespace ist::bullet {
+
+namespace {
+
+void print(const char* sentence) { std::fprintf(stderr, "ist::bullet: %s\n", sentence); }
+
+struct Warnings {
+  std::mutex mutex;
+  WarningHandler handler = print;
+  std::set<std::string> given;
+};
+Warnings& warnings() {
+  static Warnings all;
+  return all;
+}
+
+}  // namespace
+
+WarningHandler set_warning_handler(WarningHandler handler) {
+  const std::lock_guard lock(warnings().mutex);
+  const WarningHandler before = warnings().handler;
+  warnings().handler = handler != nullptr ? handler : print;
+  return before;
+}
+
+void warn(const char* sentence) {
+  WarningHandler handler = nullptr;
+  {
+    const std::lock_guard lock(warnings().mutex);
+    if (!warnings().given.insert(sentence).second) return;
+    handler = warnings().handler;
+  }
+  handler(sentence);
+}
+
+}  // namespace ist::bullet
