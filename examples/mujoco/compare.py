@@ -55,6 +55,30 @@ def vessel(radius, height, wall):
                    (radius - wall, wall), (hole, wall)])
 
 
+def bent_rod(radius, thickness, start, end, along=24, around=12):
+    """A rod along an arc of the x-z plane, from one angle to another [rad], with flat ends."""
+    arc = np.linspace(start, end, along)[:, None]
+    turn = np.linspace(0, 2 * np.pi, around, endpoint=False)[None, :]
+    out = radius + thickness * np.cos(turn)
+    rings = np.stack([out * np.cos(arc), thickness * np.sin(turn) + 0 * arc, out * np.sin(arc)], -1).reshape(-1, 3)
+    row, column = np.meshgrid(np.arange(along - 1), np.arange(around), indexing="ij")
+    a, b = row * around + column, row * around + (column + 1) % around
+    c, d = b + around, a + around
+    cap = np.arange(1, around - 1)
+    first, last = np.zeros_like(cap), (along - 1) * around
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3),
+                            np.stack([first, cap + 1, cap], -1),
+                            np.stack([first + last, last + cap, last + cap + 1], -1)])
+    return rings, faces
+
+
+def together(*meshes):
+    """Meshes in one, as they are: where they overlap they meet each other."""
+    counts = np.cumsum([0] + [len(vertices) for vertices, _ in meshes])
+    return (np.concatenate([vertices for vertices, _ in meshes]),
+            np.concatenate([faces + count for (_, faces), count in zip(meshes, counts)]))
+
+
 class Scene:
     """Meshes, bodies and a judgement."""
 
@@ -150,7 +174,36 @@ class Chain(Scene):
         return bool(gaps.max() < 20), f"links {gaps.min():.1f} to {gaps.max():.1f} mm apart (16 where they hang)"
 
 
-SCENES = {scene.__name__.lower(): scene for scene in (Nut, Mug, Pin, Bowl, Chain)}
+class Hook(Scene):
+    """A mug is hung on a hook by its handle: two meshes in one that overlap, as mugs are drawn."""
+
+    seconds, step = 3.0, 0.002
+    handle = bent_rod(.025, .005, -1.8, 1.8)
+    meshes = {"hook": (bent_rod(.04, .004, np.pi, 2 * np.pi), "1"),
+              "mug": (together(vessel(.04, .09, .004), (handle[0] + [.042, 0, .045], handle[1])), "1")}
+    bodies = """<geom name="hook" mesh="hook" euler="0 0 90" pos="0 0 .04" solref="-2e4 -200"/>
+      <body name="mug" pos="-.047 0 -.056"><freejoint/><geom name="mug" mesh="mug" solref="-2e4 -200"/></body>"""
+
+    def judge(self, model, data, log):
+        speed = 1e3 * np.linalg.norm(data.qvel[:3])
+        return bool(data.qpos[2] > -0.15), f"{1e3 * data.qpos[2]:.0f} mm high, {speed:.1f} mm/s at the end"
+
+
+class Pipe(Scene):
+    """Four balls roll through a pipe that is 4 mm wider."""
+
+    seconds, step, count = 1.5, 0.002, 4
+    meshes = {"pipe": (turned([(.014, -.1), (.018, -.1), (.018, .1), (.014, .1)]), "1")}
+    bodies = '<geom name="pipe" mesh="pipe" euler="0 70 0" solref="-2e4 -200"/>' + "".join(
+        f'<body name="ball {i}" pos="{.02 + .021 * i:.3f} 0 {.0073 + .00764 * i:.4f}"><freejoint/>'
+        '<geom type="sphere" size=".010" solref="-2e4 -200"/></body>' for i in range(count))
+
+    def judge(self, model, data, log):
+        out = int((data.qpos.reshape(-1, 7)[:, 2] < -.06).sum())
+        return out == self.count, f"{out} of {self.count} balls are through"
+
+
+SCENES = {scene.__name__.lower(): scene for scene in (Nut, Mug, Pin, Bowl, Chain, Hook, Pipe)}
 
 
 def write_obj(path, mesh):
