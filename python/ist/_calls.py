@@ -90,8 +90,11 @@ def _fault(name, signature, args, kwargs):
                 return f"{parameter.name}: a {type(value).__name__}; wanted {words}"
             if annotation == "int" and value < 0:
                 return f"{parameter.name}: {value}; wanted {words}"
-        elif annotation.startswith("ist.") and type(value).__name__ != annotation[4:]:
-            return f"{parameter.name}: a {type(value).__name__}; wanted an {annotation}"
+        elif annotation.startswith("ist."):
+            wanted = {word.rpartition(".")[2] for word in annotation.split(" | ")}
+            kinds = {"None"} if value is None else {kind.__name__ for kind in type(value).__mro__}
+            if not kinds & wanted:
+                return f"{parameter.name}: a {type(value).__name__}; wanted {annotation}"
     large = [name for name, value in given.items() if parameters[name].annotation == "int"
              and value >= 2**32]
     return f"{large[0]}: {given[large[0]]} is too large" if large else None

@@ -172,7 +172,7 @@ int lenses_are_told(scene_t* s) {
   CHECK(ist_overlap_lenses(&s->a, &s->b, &settings, &lenses) == IST_INVALID_INPUT);
   far_away.pose.t[0] = 100;
   CHECK(ist_overlap_lenses(&s->a, &far_away, NULL, &lenses) == IST_OK && lenses.total == 0);
-  wrong.pose.q[0] = 3;
+  wrong.pose.q[0] = 0;
   CHECK(ist_overlap_lenses(&s->a, &wrong, NULL, &lenses) == IST_INVALID_INPUT);
   CHECK(ist_overlap_lenses(NULL, &s->b, NULL, &lenses) == IST_NULL_POINTER);
   CHECK(ist_overlap_lenses(&s->a, NULL, NULL, &lenses) == IST_NULL_POINTER);

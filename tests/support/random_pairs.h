@@ -84,6 +84,11 @@ inline std::pair<PlacedTree, PlacedTree> placed(const BatchPair& pair) {
 inline void expect_same_bits(const std::vector<Penetration>& x, const std::vector<Penetration>& y) {
   ASSERT_EQ(x.size(), y.size());
   for (std::size_t i = 0; i < x.size(); ++i) {
+    if (x[i].status == QueryStatus::invalid_input) {
+      EXPECT_EQ(y[i].status, QueryStatus::invalid_input) << i;
+      EXPECT_TRUE(std::isnan(x[i].volume) && std::isnan(y[i].volume)) << i;
+      continue;
+    }
     EXPECT_EQ(x[i].volume, y[i].volume) << i;
     EXPECT_EQ(x[i].centroid, y[i].centroid) << i;
     EXPECT_EQ(x[i].translation_gradient, y[i].translation_gradient) << i;
@@ -97,6 +102,11 @@ inline void expect_same_bits(const std::vector<Penetration>& x, const std::vecto
 inline void expect_same_bits(const std::vector<Separation>& x, const std::vector<Separation>& y) {
   ASSERT_EQ(x.size(), y.size());
   for (std::size_t i = 0; i < x.size(); ++i) {
+    if (x[i].status == QueryStatus::invalid_input) {
+      EXPECT_EQ(y[i].status, QueryStatus::invalid_input) << i;
+      EXPECT_TRUE(std::isnan(x[i].distance) && std::isnan(y[i].distance)) << i;
+      continue;
+    }
     EXPECT_EQ(x[i].distance, y[i].distance) << i;
     EXPECT_EQ(x[i].distance_min, y[i].distance_min) << i;
     EXPECT_EQ(x[i].distance_max, y[i].distance_max) << i;

@@ -254,13 +254,14 @@ TEST(MassProperties, InTheWorld) {
   EXPECT_LE((held.lower - box.min()).norm() + (held.upper - box.max()).norm(), 1e-13);
 
   PlacedTree wrong = placed;
-  wrong.pose.q[0] = 3;
-  EXPECT_EQ(mass_properties(wrong).volume, 0);
-  EXPECT_EQ(bounds(wrong).radius, 0);
+  for (double& q : wrong.pose.q) q = 0;
+  EXPECT_TRUE(std::isnan(mass_properties(wrong).volume));
+  EXPECT_TRUE(mass_properties(wrong).inertia.hasNaN());
+  EXPECT_TRUE(std::isnan(bounds(wrong).radius));
   wrong = placed;
   wrong.scale = 0;
-  EXPECT_EQ(mass_properties(wrong).volume, 0);
-  EXPECT_EQ(mass_properties(PlacedTree()).volume, 0);
+  EXPECT_TRUE(std::isnan(mass_properties(wrong).volume));
+  EXPECT_TRUE(std::isnan(mass_properties(PlacedTree()).volume));
   EXPECT_EQ(mass_properties(TreeView()).inertia, Matrix3d(Matrix3d::Zero()));
   EXPECT_EQ(bounds(TreeView()).radius, 0);
 }
