@@ -1,4 +1,4 @@
-// What each way of clustering costs to build and to query: the same spheres, every oracle row of
+// What swaps, and the order of the inner spheres, cost to build and to query: the same spheres, every oracle row of
 // one pair, and copies of other meshes at random poses; counted work. One thread.
 
 #include <ist/bake.h>
@@ -24,17 +24,14 @@ using benchmark::Report;
 
 struct Builder {
   const char* name;
-  Clustering clustering;
   bool swaps;
   bool like_inner = false;  ///< the matched spheres' tree from the inner ones' order, as bakes do
 };
 
 constexpr Builder kBuilders[] = {
-    {"2-means", Clustering::two_means, false},
-    {"2-means, swaps", Clustering::two_means, true},
-    {"neural gas", Clustering::neural_gas, false},
-    {"neural gas, swaps", Clustering::neural_gas, true},
-    {"like the inner spheres'", Clustering::neural_gas, true, true},
+    {"without swaps", false},
+    {"with swaps", true},
+    {"like the inner spheres'", true, true},
 };
 
 /// The asset with its trees built again.
@@ -48,11 +45,10 @@ Asset rebuilt(const Asset& asset, const Builder& builder) {
   arrays.cover_radii = copy(at<float>(header, header.cover_radii));
   arrays.matched_spheres = copy(at<Sphere>(header, header.matched_spheres));
   const std::vector<std::uint32_t> order =
-      sphere_order(arrays.inner_spheres, builder.clustering, builder.swaps);
+      sphere_order(arrays.inner_spheres, builder.swaps);
   arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, order);
   arrays.matched_tree = builder.like_inner ? build_tree_like(arrays.matched_spheres, order)
-                                           : build_tree(arrays.matched_spheres, {},
-                                                        builder.clustering, builder.swaps);
+                                           : build_tree(arrays.matched_spheres, {}, builder.swaps);
   return Asset(asset_bytes(arrays), builder.name);
 }
 
@@ -150,7 +146,7 @@ int main(int argc, char** argv) {
       const Asset asset = bake(mesh, settings);
       double own = 0;
       for (const Builder& builder : kBuilders) {
-        if (builder.clustering != Clustering::neural_gas || !builder.swaps) continue;
+        if (!builder.swaps) continue;
         const Asset tree = rebuilt(asset, builder);
         std::mt19937 bits(7);
         Workspace workspace;

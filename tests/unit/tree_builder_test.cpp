@@ -24,15 +24,15 @@ std::vector<Sphere> random_spheres(std::size_t n, unsigned seed) {
   return spheres;
 }
 
-class TreeOfCount : public ::testing::TestWithParam<std::tuple<std::size_t, Clustering>> {};
+class TreeOfCount : public ::testing::TestWithParam<std::size_t> {};
 
 // Every node's ball holds every sphere and cover ball below it, in double, for any count.
 TEST_P(TreeOfCount, BallsHoldWhatIsBelow) {
-  const auto [n, clustering] = GetParam();
+  const std::size_t n = GetParam();
   const auto spheres = random_spheres(n, static_cast<unsigned>(n));
   std::vector<float> covers(n);
   for (std::size_t i = 0; i < n; ++i) covers[i] = spheres[i].r * 1.5f;
-  const TreeArrays tree = build_tree(spheres, covers, clustering);
+  const TreeArrays tree = build_tree(spheres, covers);
 
   std::set<std::uint32_t> seen;
   for (std::size_t i = 0; i < n; ++i) {
@@ -71,9 +71,7 @@ TEST_P(TreeOfCount, BallsHoldWhatIsBelow) {
 
 INSTANTIATE_TEST_SUITE_P(
     Counts, TreeOfCount,
-    ::testing::Combine(::testing::Values(1, 2, 15, 16, 17, 31, 32, 33, 255, 256, 257, 300, 4095,
-                                         4096, 4097, 5000),
-                       ::testing::Values(Clustering::two_means, Clustering::neural_gas)));
+    ::testing::Values(1, 2, 15, 16, 17, 31, 32, 33, 255, 256, 257, 300, 4095, 4096, 4097, 5000));
 
 /// Σ r³ over the balls of one level.
 double cost(const TreeArrays& tree, std::size_t level) {
@@ -89,21 +87,17 @@ double cost(const TreeArrays& tree, std::size_t level) {
 // A group that is not full, left in the middle, would shift every group behind it across two
 // clusters: still a sound tree, but a bad one.
 TEST(TreeOrder, OneSphereMoreCostsLittle) {
-  for (const Clustering clustering : {Clustering::two_means, Clustering::neural_gas}) {
-    const TreeArrays full = build_tree(random_spheres(4096, 1), {}, clustering);
-    for (const std::size_t n : {4097u, 4111u, 4113u}) {
-      const TreeArrays tree = build_tree(random_spheres(n, 1), {}, clustering);
-      for (const std::size_t level : {1u, 2u})
-        EXPECT_LT(cost(tree, level), 1.15 * cost(full, level)) << n << " level " << level;
-    }
+  const TreeArrays full = build_tree(random_spheres(4096, 1), {});
+  for (const std::size_t n : {4097u, 4111u, 4113u}) {
+    const TreeArrays tree = build_tree(random_spheres(n, 1), {});
+    for (const std::size_t level : {1u, 2u})
+      EXPECT_LT(cost(tree, level), 1.15 * cost(full, level)) << n << " level " << level;
   }
 }
 
 TEST(TreeOrder, SwapsShrinkBalls) {
   const auto spheres = random_spheres(3000, 2);
-  for (const Clustering clustering : {Clustering::two_means, Clustering::neural_gas})
-    EXPECT_LT(cost(build_tree(spheres, {}, clustering, true), 1),
-              0.95 * cost(build_tree(spheres, {}, clustering, false), 1));
+  EXPECT_LT(cost(build_tree(spheres, {}, true), 1), 0.95 * cost(build_tree(spheres, {}, false), 1));
 }
 
 // Spheres that lie as others do but for a third of a radius, and have other radii: from the others'

@@ -13,7 +13,8 @@ namespace ist {
 /// (magnification control) and by a kernel over the prototype's rank as seen from the ball, while
 /// the kernel narrows; then the balls are shared out evenly among the prototypes, near to near.
 /// (Weller, Zachmann: Inner Sphere Trees; Cottrell, Hammer et al.: Batch and median neural gas.)
-/// Groups are as full as in two_means_order, whose `last_stays` this has too.
+/// Only the last group may lack balls. `last_stays`: the last ball lacks spheres, so that it stays
+/// last.
 std::vector<std::uint32_t> neural_gas_order(std::span<const Ball> balls, bool last_stays);
 
 }  // namespace ist

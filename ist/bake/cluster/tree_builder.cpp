@@ -131,14 +131,13 @@ TreeArrays tree_from_order(std::span<const Sphere> spheres, std::span<const floa
   return tree;
 }
 
-std::vector<std::uint32_t> sphere_order(std::span<const Sphere> spheres, Clustering clustering,
-                                        bool swaps) {
-  return tree_order(to_balls(spheres), clustering, swaps);
+std::vector<std::uint32_t> sphere_order(std::span<const Sphere> spheres, bool swaps) {
+  return tree_order(to_balls(spheres), swaps);
 }
 
 TreeArrays build_tree(std::span<const Sphere> spheres, std::span<const float> covers,
-                      Clustering clustering, bool swaps) {
-  return tree_from_order(spheres, covers, sphere_order(spheres, clustering, swaps));
+                      bool swaps) {
+  return tree_from_order(spheres, covers, sphere_order(spheres, swaps));
 }
 
 TreeArrays build_tree_like(std::span<const Sphere> spheres, std::vector<std::uint32_t> order) {

@@ -14,12 +14,10 @@ namespace ist {
 /// and κ is bounded for them. Every ball of the tree holds the spheres below it for certain: radii
 /// are rounded up. Same input, same tree, for any number of threads. The set must not be empty.
 TreeArrays build_tree(std::span<const Sphere> spheres, std::span<const float> covers,
-                      Clustering clustering = Clustering::neural_gas, bool swaps = true);
+                      bool swaps = true);
 
 /// The order in which build_tree() puts the spheres.
-std::vector<std::uint32_t> sphere_order(std::span<const Sphere> spheres,
-                                        Clustering clustering = Clustering::neural_gas,
-                                        bool swaps = true);
+std::vector<std::uint32_t> sphere_order(std::span<const Sphere> spheres, bool swaps = true);
 
 /// The tree of matched spheres that lie much as others do, one for one, from sphere_order() of
 /// those (refined_order(), tree_order.h).

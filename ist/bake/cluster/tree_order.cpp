@@ -8,16 +8,12 @@
 #include <ist/asset_layout.h>
 #include "bake/cluster/neural_gas.h"
 #include "bake/cluster/tree_swaps.h"
-#include "bake/cluster/two_means.h"
 
 namespace ist {
 namespace {
 
-std::vector<std::uint32_t> group_order(std::span<const Ball> balls, bool last_stays,
-                                       Clustering clustering, bool swaps) {
-  std::vector<std::uint32_t> order = clustering == Clustering::neural_gas
-                                         ? neural_gas_order(balls, last_stays)
-                                         : two_means_order(balls, last_stays);
+std::vector<std::uint32_t> group_order(std::span<const Ball> balls, bool last_stays, bool swaps) {
+  std::vector<std::uint32_t> order = neural_gas_order(balls, last_stays);
   if (swaps) improve_groups(balls, last_stays, order);
   return order;
 }
@@ -34,18 +30,17 @@ std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::
   return groups;
 }
 
-std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays,
-                                    Clustering clustering, bool swaps);
+std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays, bool swaps);
 
 /// The order of balls whose groups of 16 follow one another in `order`: groups of their balls, and
 /// so on up.
 std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
                                         std::vector<std::uint32_t> order, bool last_stays,
-                                        Clustering clustering, bool swaps) {
+                                        bool swaps) {
   if (order.size() <= std::size_t{kWidth} * kWidth) return order;
   // A group that is not full comes last, and so does any that holds one that is not.
   const std::vector<std::uint32_t> groups = order_of(
-      group_balls(balls, order), last_stays || order.size() % kWidth != 0, clustering, swaps);
+      group_balls(balls, order), last_stays || order.size() % kWidth != 0, swaps);
   std::vector<std::uint32_t> sorted;
   sorted.reserve(order.size());
   for (const std::uint32_t g : groups)
@@ -55,23 +50,20 @@ std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
   return sorted;
 }
 
-std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays,
-                                    Clustering clustering, bool swaps) {
-  return order_groups(balls, group_order(balls, last_stays, clustering, swaps), last_stays,
-                      clustering, swaps);
+std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays, bool swaps) {
+  return order_groups(balls, group_order(balls, last_stays, swaps), last_stays, swaps);
 }
 
 }  // namespace
 
-std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, Clustering clustering,
-                                      bool swaps) {
-  return order_of(spheres, false, clustering, swaps);
+std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, bool swaps) {
+  return order_of(spheres, false, swaps);
 }
 
 std::vector<std::uint32_t> refined_order(std::span<const Ball> spheres,
                                          std::vector<std::uint32_t> order) {
   improve_groups(spheres, false, order);
-  return order_groups(spheres, std::move(order), false, Clustering::neural_gas, true);
+  return order_groups(spheres, std::move(order), false, true);
 }
 
 }  // namespace ist

@@ -8,18 +8,12 @@
 
 namespace ist {
 
-/// How spheres are grouped (docs/tree_builders.md compares them).
-enum class Clustering {
-  two_means,   ///< recursive weighted 2-means
-  neural_gas,  ///< batch neural gas with magnification control, as in the Inner Sphere Trees papers
-};
-
 /// The order in which spheres lie in a tree: every 16^(k+1) consecutive ones from the start are a
-/// node of level k. Groups of 16 are formed first, then groups of their balls, and so on up.
+/// node of level k. Groups of 16 are formed first, then groups of their balls, and so on up, by
+/// neural gas (neural_gas.h).
 /// With `swaps`, near groups of a level then trade members (tree_swaps.h). Deterministic for any
 /// number of threads.
-std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, Clustering clustering,
-                                      bool swaps);
+std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, bool swaps);
 
 /// An order for spheres that lie much as others do, one for one, from tree_order() of those: its
 /// groups of 16 trade members, and groups of their balls are formed anew. Sooner than an order of
