@@ -161,7 +161,8 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
       state_->meeting.largest_motion(state_->second_in_first, second_in_first) <= state_->still) {
     state_->move_points(first, second);
   } else {
-    const Spring spring = spring_of(state_->meeting, first, second, settings, info.m_timeStep);
+    const Spring spring = spring_of(state_->meeting, first, second, settings,
+                                    info.m_timeStep > 0 ? info.m_timeStep : 1.0 / 60);
     state_->meeting.find(at_first, at_second, settings, contact);
     state_->fill(*a, *b, contact, spring, *m_dispatcher);
     state_->second_in_first = second_in_first;

@@ -385,6 +385,18 @@ TEST(BulletMaterial, OneWorldForAGramAndATon) {
   }
 }
 
+TEST(BulletMaterial, WithoutGravityTheStepSaysHowHard) {
+  World world;
+  world.world.setGravity({0, 0, 0});
+  world.add_ground();
+  btRigidBody& box = world.add(cube_of_side(0.2), 1, btVector3(0, 0, 0.15));
+  box.setLinearVelocity({0, 0, -0.5});
+  double lowest = 1;
+  world.step(240, [&] { lowest = std::min(lowest, box.getWorldTransform().getOrigin().z()); });
+  EXPECT_GT(lowest, 0.098);
+  EXPECT_LT(box.getLinearVelocity().length(), 0.5 * std::exp(-2.0));  // as of a critical spring
+}
+
 /// How high it comes again that falls by 0.1 m, of that height.
 double bounce(double restitution) {
   World world;
