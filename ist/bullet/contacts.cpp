@@ -53,9 +53,9 @@ struct PairAlgorithm::State {
   std::size_t points() const;
 
   Meeting meeting;
-  std::vector<btPersistentManifold*> manifolds;        // the first ones are full
-  std::array<btVector3, Settings::kPatches> normals;   // of all points, in the first's frame
-  btTransform second_in_first;                         // when last asked
+  std::vector<btPersistentManifold*> manifolds;       // the first ones are full
+  std::array<btVector3, Settings::kPatches> normals;  // of all points, in the first's frame
+  btTransform second_in_first;                        // when last asked
   double still = -1;  // [u] until a point has moved by more than this that answer holds
   ContactMemory memory;
   ContactForce pushed;
@@ -150,8 +150,9 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   }
   if (settings.response != Settings::Response::solver) {
     if (a->m_parent != nullptr || b->m_parent != nullptr) {
-      warn("Settings::Response::wrench pushes no compounds: they pass through each other. Use "
-           "Response::solver for their pairs.");
+      warn(
+          "Settings::Response::wrench pushes no compounds: they pass through each other. Use "
+          "Response::solver for their pairs.");
     }
     return;
   }
@@ -160,7 +161,8 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
       state_->meeting.largest_motion(state_->second_in_first, second_in_first) <= state_->still) {
     state_->move_points(first, second);
   } else {
-    const Spring spring = spring_of(state_->meeting, first, second, settings, info.m_timeStep);
+    const Spring spring = spring_of(state_->meeting, first, second, settings,
+                                    info.m_timeStep > 0 ? info.m_timeStep : 1.0 / 60);
     state_->meeting.find(at_first, at_second, settings, contact);
     state_->fill(*a, *b, contact, spring, *m_dispatcher);
     state_->second_in_first = second_in_first;
@@ -234,15 +236,15 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
     point.m_positionWorldOnA = on_first;
     point.m_positionWorldOnB = on_second;
     point.m_combinedFriction = gCalculateCombinedFrictionCallback(&first, &second);
-    point.m_combinedRollingFriction =
-        gCalculateCombinedRollingFrictionCallback(&first, &second);
-    point.m_combinedSpinningFriction =
-        gCalculateCombinedSpinningFrictionCallback(&first, &second);
+    point.m_combinedRollingFriction = gCalculateCombinedRollingFrictionCallback(&first, &second);
+    point.m_combinedSpinningFriction = gCalculateCombinedSpinningFrictionCallback(&first, &second);
     point.m_combinedRestitution = gCalculateCombinedRestitutionCallback(&first, &second);
-    const double approach = normal.dot(velocity_of(second, on_second) - velocity_of(first, on_first));
+    const double approach =
+        normal.dot(velocity_of(second, on_second) - velocity_of(first, on_first));
     if (point.m_combinedRestitution > 0 && approach > spring.slow) {
       // What bounces is hard in this step: a damped spring would swallow the speed.
-      point.m_contactPointFlags |= BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP;
+      point.m_contactPointFlags |=
+          BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP;
     } else {
       const double stiffness = spring.at(patch.depth) * patch.area;
       point.m_contactPointFlags |= BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING;

@@ -108,7 +108,8 @@ HullDistance::HullDistance(const std::vector<btVector3>& points) {
                          .cross(face.corners[(i + 1) % count] - face.corners[0]);
     }
     face.normal.normalize();
-    for (const Eigen::Vector3d& c : face.corners) face.offset += face.normal.dot(c) / static_cast<double>(count);
+    for (const Eigen::Vector3d& c : face.corners)
+      face.offset += face.normal.dot(c) / static_cast<double>(count);
     faces_.push_back(std::move(face));
   }
 }

@@ -4,7 +4,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <cstddef>
 
+#include <ist/asset_layout.h>
 #include <ist/bullet/convert.h>
 #include <ist/mass_properties.h>
 
@@ -50,13 +52,43 @@ void Shape::setLocalScaling(const btVector3& scaling) {
   const btScalar s = scaling.x();
   const btScalar off = std::max(std::abs(scaling.y() - s), std::abs(scaling.z() - s));
   if (!(s > 0) || !(off <= btScalar(1e-6) * s)) {
-    warn("ist::bullet::Shape takes one positive scale for all axes: this scaling is ignored. Bake "
-         "the mesh at its size.");
+    warn(
+        "ist::bullet::Shape takes one positive scale for all axes: this scaling is ignored. Bake "
+        "the mesh at its size.");
     return;
   }
   mesh_in_body_.setOrigin(to_bullet(Eigen::Vector3d(s * frame_.in_mesh.inverse().translation())));
   scale_ = s;
   scaling_.setValue(s, s, s);
+}
+
+void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& lower,
+                                const btVector3& upper) const {
+  if (!tree_.has_mesh()) {
+    warn("Bullet's rays and sweeps pass through an asset without a mesh: bake it with a mesh.");
+    return;
+  }
+  const AssetHeader& asset = tree_.header();
+  const MeshHeader& mesh = *at<MeshHeader>(asset, asset.mesh);
+  const double* const vertices = at<double>(asset, mesh.vertices);
+  const MeshBlock* const blocks = at<MeshBlock>(asset, mesh.level[0].blocks);
+  const Eigen::Vector3d centre(asset.centre);
+  for (std::uint32_t b = 0; b < mesh.level[0].count; ++b) {
+    const MeshBlock& block = blocks[b];
+    btVector3 placed[kWidth];
+    for (int v = 0; v < block.vertices; ++v) {
+      const Eigen::Vector3d unit(vertices + 3 * std::size_t{block.vertex[v]});
+      placed[v] =
+          mesh_in_body_ *
+          to_bullet(Eigen::Vector3d(scale_ * (std::ldexp(1.0, asset.exponent) * unit + centre)));
+    }
+    for (int t = 0; t < block.triangles; ++t) {
+      btVector3 corners[3];
+      for (int k = 0; k < 3; ++k) corners[k] = placed[block.corner[k][t]];
+      if (!TestTriangleAgainstAabb2(corners, lower, upper)) continue;
+      callback->processTriangle(corners, 0, static_cast<int>(b * kWidth) + t);
+    }
+  }
 }
 
 }  // namespace ist::bullet

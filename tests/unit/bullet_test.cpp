@@ -64,7 +64,9 @@ class World {
   btRigidBody& add(std::unique_ptr<btCollisionShape> shape, double mass, const btVector3& at) {
     return add(std::move(shape), mass, at_place(at));
   }
-  void add_ground() { add(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), 0), 0, {0, 0, 0}); }
+  void add_ground() {
+    add(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), 0), 0, {0, 0, 0});
+  }
   void step(int steps, const std::function<void()>& each = {}) {
     for (int i = 0; i < steps; ++i) {
       world.stepSimulation(1.0 / 240, 0);
@@ -76,8 +78,8 @@ class World {
 
  private:
   btDefaultCollisionConfiguration configuration_;
-  btCollisionDispatcherMt dispatcher_{(btSetTaskScheduler(btGetSequentialTaskScheduler()),
-                                       &configuration_)};
+  btCollisionDispatcherMt dispatcher_{
+      (btSetTaskScheduler(btGetSequentialTaskScheduler()), &configuration_)};
   btDbvtBroadphase broadphase_;
   btSequentialImpulseConstraintSolver solver_;
   std::vector<std::unique_ptr<btCollisionShape>> shapes_;
@@ -158,7 +160,7 @@ TEST(BulletPartners, ConesTellTrueDistances) {
 struct Ground {
   const char* name;
   std::function<std::unique_ptr<btCollisionShape>()> make;
-  btVector3 at;  // its flat top is at height 0
+  btVector3 at;     // its flat top is at height 0
   double turn = 0;  // about x
 };
 
@@ -173,18 +175,23 @@ TEST(BulletPartners, ACubeRestsOnEachOfThem) {
   static btBoxShape half_a_floor(btVector3(1, 2, 0.5));
   static bullet::Shape block(cube());
   const std::vector<Ground> grounds = {
-      {"plane", [] { return std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), 0); }, {0, 0, 0}},
+      {"plane",
+       [] { return std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), 0); },
+       {0, 0, 0}},
       {"box", [] { return std::make_unique<btBoxShape>(btVector3(1, 1, 0.5)); }, {0, 0, -0.5}},
-      {"cylinder along y", [] { return std::make_unique<btCylinderShape>(btVector3(1, 0.5, 1)); },
-       {0, 0, -0.5}, SIMD_HALF_PI},
-      {"cylinder along z", [] { return std::make_unique<btCylinderShapeZ>(btVector3(1, 1, 0.5)); },
+      {"cylinder along y",
+       [] { return std::make_unique<btCylinderShape>(btVector3(1, 0.5, 1)); },
+       {0, 0, -0.5},
+       SIMD_HALF_PI},
+      {"cylinder along z",
+       [] { return std::make_unique<btCylinderShapeZ>(btVector3(1, 1, 0.5)); },
        {0, 0, -0.5}},
       {"cone, base up", [] { return std::make_unique<btConeShapeZ>(1, 2); }, {0, 0, -1}, SIMD_PI},
       {"hull", hull_of_box, {0, 0, -1}},
       {"terrain",
        [] {
-         auto terrain = std::make_unique<btHeightfieldTerrainShape>(3, 3, heights.data(), 0.f, 0.5f,
-                                                                    2, true);
+         auto terrain =
+             std::make_unique<btHeightfieldTerrainShape>(3, 3, heights.data(), 0.f, 0.5f, 2, true);
          terrain->setLocalScaling({2, 2, 2});
          return terrain;
        },
@@ -286,6 +293,23 @@ TEST(BulletShape, ScalesAllAxesAlike) {
   EXPECT_EQ(shape.scale(), 2);
 }
 
+TEST(BulletShape, RaysAndSweepsMeetItsSurface) {
+  World world;
+  world.add(cube_of_side(2), 0, btVector3(0.1, 0, 3));
+  world.step(1);
+  const btVector3 from(0.3, 0.2, 9), to(0.3, 0.2, -9);
+  btCollisionWorld::ClosestRayResultCallback ray(from, to);
+  world.world.rayTest(from, to, ray);
+  ASSERT_TRUE(ray.hasHit());
+  EXPECT_NEAR(ray.m_hitPointWorld.z(), 4, 1e-6);
+  EXPECT_NEAR(ray.m_hitNormalWorld.z(), 1, 1e-6);
+  const btSphereShape ball(0.5);
+  btCollisionWorld::ClosestConvexResultCallback sweep(from, to);
+  world.world.convexSweepTest(&ball, at_place(from), at_place(to), sweep);
+  ASSERT_TRUE(sweep.hasHit());
+  EXPECT_NEAR(9 - 18 * sweep.m_closestHitFraction, 4.5, 0.02);
+}
+
 int started = 0, ended = 0, processed = 0;
 
 TEST(BulletEvents, StartedOnceProcessedEachStepEndedOnce) {
@@ -361,6 +385,18 @@ TEST(BulletMaterial, OneWorldForAGramAndATon) {
   }
 }
 
+TEST(BulletMaterial, WithoutGravityTheStepSaysHowHard) {
+  World world;
+  world.world.setGravity({0, 0, 0});
+  world.add_ground();
+  btRigidBody& box = world.add(cube_of_side(0.2), 1, btVector3(0, 0, 0.15));
+  box.setLinearVelocity({0, 0, -0.5});
+  double lowest = 1;
+  world.step(240, [&] { lowest = std::min(lowest, box.getWorldTransform().getOrigin().z()); });
+  EXPECT_GT(lowest, 0.098);
+  EXPECT_LT(box.getLinearVelocity().length(), 0.5 * std::exp(-2.0));  // as of a critical spring
+}
+
 /// How high it comes again that falls by 0.1 m, of that height.
 double bounce(double restitution) {
   World world;
@@ -429,19 +465,19 @@ TEST(BulletThreads, PairsAreAnsweredOnManyAtOnce) {
     }
     btDynamicsWorld& bullet_world = world.world;
     std::vector<std::function<void()>> work;
-    bullet::for_each_pair(bullet_world, [&](bullet::PairAlgorithm& pair, btCollisionObject& a,
-                                            btCollisionObject& b) {
-      work.push_back([&] {
-        const btCollisionObjectWrapper one(nullptr, a.getCollisionShape(), &a,
-                                           a.getWorldTransform(), -1, -1);
-        const btCollisionObjectWrapper other(nullptr, b.getCollisionShape(), &b,
-                                             b.getWorldTransform(), -1, -1);
-        btManifoldResult result(&one, &other);
-        for (int k = 0; k < 50; ++k) {
-          pair.processCollision(&one, &other, bullet_world.getDispatchInfo(), &result);
-        }
-      });
-    });
+    bullet::for_each_pair(
+        bullet_world, [&](bullet::PairAlgorithm& pair, btCollisionObject& a, btCollisionObject& b) {
+          work.push_back([&] {
+            const btCollisionObjectWrapper one(nullptr, a.getCollisionShape(), &a,
+                                               a.getWorldTransform(), -1, -1);
+            const btCollisionObjectWrapper other(nullptr, b.getCollisionShape(), &b,
+                                                 b.getWorldTransform(), -1, -1);
+            btManifoldResult result(&one, &other);
+            for (int k = 0; k < 50; ++k) {
+              pair.processCollision(&one, &other, bullet_world.getDispatchInfo(), &result);
+            }
+          });
+        });
     world.contacts.settings.follow = 0;
     std::vector<std::thread> threads;
     for (const auto& one : work) {

@@ -5,8 +5,8 @@
 #include "meshes.h"
 #include "scene_tools.h"
 
-// Cubes of 600 kg/m³, of 1 m and in stacks of 0.2 m. All that can be asked of them is known: where they rest, how heavy they
-// are, that they stand still.
+// Cubes of 600 kg/m³, of 1 m and in stacks of 0.2 m. All that can be asked of them is known: where
+// they rest, how heavy they are, that they stand still.
 
 namespace {
 

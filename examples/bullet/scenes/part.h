@@ -4,8 +4,8 @@
 #include <ist/bake.h>
 #include <ist/mesh.h>
 
-#include <Eigen/Geometry>
 #include <ist/bullet/shape.h>
+#include <Eigen/Geometry>
 #include <memory>
 #include <string>
 #include <vector>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <Eigen/Geometry>
 #include <ist/bullet/convert.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -29,8 +29,8 @@ inline Eigen::Quaterniond turn(double angle, const Eigen::Vector3d& axis) {
 }
 
 /// The solver's springs are the adapter's own. For the wrench sets the law so that `load` bodies of
-/// `mass` rest on `area` [u²] of the lowest at `depth` [u], or as near to it as the step bears, where
-/// bodies meet at up to `speed` [u/s].
+/// `mass` rest on `area` [u²] of the lowest at `depth` [u], or as near to it as the step bears,
+/// where bodies meet at up to `speed` [u/s].
 ///
 /// A body that touches on several sides is held by several springs, at arms that make it lighter:
 /// with a quarter of the largest stable frequency some ten of them are still stable.
@@ -39,9 +39,9 @@ inline void set_law(WorldSettings& settings, double mass, double area, double de
   if (settings.way != Way::wrench) return;
   constexpr double kShare = 0.25;
   ist::ContactLaw& law = settings.ist.law;
-  law.stiffness = std::min(
-      ist::stiffness_for_depth(load * mass * settings.gravity.norm(), area, depth),
-      kShare * kShare * ist::largest_stable_stiffness(settings.step, mass) / area);
+  law.stiffness =
+      std::min(ist::stiffness_for_depth(load * mass * settings.gravity.norm(), area, depth),
+               kShare * kShare * ist::largest_stable_stiffness(settings.step, mass) / area);
   const double frequency = std::sqrt(law.stiffness * area / mass);
   law.damping = ist::damping_for_restitution(0.3, speed);
   law.friction_stiffness = 0.25 * law.stiffness;

@@ -47,8 +47,8 @@ SceneResult run_terrain(const SceneOptions& options) {
   const auto [lowest, highest] = std::minmax_element(heights.begin(), heights.end());
   SceneWorld world(settings);
   // Bullet's shape is centred. Its cells are cut as ist's are.
-  auto terrain = std::make_unique<btHeightfieldTerrainShape>(
-      kPoints, kPoints, heights.data(), *lowest, *highest, 2, true);
+  auto terrain = std::make_unique<btHeightfieldTerrainShape>(kPoints, kPoints, heights.data(),
+                                                             *lowest, *highest, 2, true);
   terrain->setLocalScaling({kSpacing, kSpacing, 1});
   btRigidBody& ground =
       world.add_still(std::move(terrain), place({0, 0, 0.5 * (*lowest + *highest)}), kFriction);

@@ -25,9 +25,9 @@ const char* name_of(Way way) {
 
 SceneWorld::SceneWorld(const WorldSettings& settings) : settings_(settings) {
   contacts_.settings = settings.ist;
-  contacts_.settings.response =
-      settings.way == Way::wrench ? ist::bullet::Settings::Response::wrench
-                                  : ist::bullet::Settings::Response::solver;
+  contacts_.settings.response = settings.way == Way::wrench
+                                    ? ist::bullet::Settings::Response::wrench
+                                    : ist::bullet::Settings::Response::solver;
   btGImpactCollisionAlgorithm::registerAlgorithm(&dispatcher_);
   contacts_.register_with(dispatcher_);
   world_.setGravity(to_bullet(settings.gravity));
@@ -133,15 +133,16 @@ double SceneWorld::potential_energy() const {
 
 double SceneWorld::contact_energy() const {
   double sum = 0;
-  ist::bullet::for_each_pair(world_, [&](ist::bullet::PairAlgorithm& pair, const btCollisionObject&,
-                                const btCollisionObject&) { sum += pair.pushed().energy; });
+  ist::bullet::for_each_pair(world_,
+                             [&](ist::bullet::PairAlgorithm& pair, const btCollisionObject&,
+                                 const btCollisionObject&) { sum += pair.pushed().energy; });
   return sum;
 }
 
 Eigen::Vector3d SceneWorld::contact_force(const btRigidBody& body) const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  ist::bullet::for_each_pair(world_, [&](ist::bullet::PairAlgorithm& pair, const btCollisionObject& a,
-                                const btCollisionObject& b) {
+  ist::bullet::for_each_pair(world_, [&](ist::bullet::PairAlgorithm& pair,
+                                         const btCollisionObject& a, const btCollisionObject& b) {
     if (&a != &body && &b != &body) return;
     sum +=
         pair.pushed_body() == &body ? pair.pushed().force : Eigen::Vector3d(-pair.pushed().force);

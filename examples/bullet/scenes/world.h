@@ -2,8 +2,8 @@
 
 #include <btBulletDynamicsCommon.h>
 
-#include <Eigen/Geometry>
 #include <ist/bullet/contacts.h>
+#include <Eigen/Geometry>
 #include <map>
 #include <memory>
 #include <string>
@@ -21,8 +21,8 @@ struct WorldSettings {
   double step = 1.0 / 240;  ///< [s]
   Eigen::Vector3d gravity = {0, 0, -9.81};
   ist::bullet::Settings ist;  ///< `response` follows `way`
-  double margin = 0;       ///< [u] of GImpact's triangles and of hulls
-  std::size_t hulls = 16;  ///< a part's, at least
+  double margin = 0;          ///< [u] of GImpact's triangles and of hulls
+  std::size_t hulls = 16;     ///< a part's, at least
 };
 
 /// A btDiscreteDynamicsWorld whose parts collide in one way, and what can be measured of it.

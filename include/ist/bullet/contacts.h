@@ -46,13 +46,13 @@ struct Settings {
   /// Flat faces of spheres are blurred. The deeper, the nearer they rest to their place; the less
   /// deep, the higher a stack stands.
   double depth = 0.001;
-  /// Of a contact, over the critical one; solver only. From 1 on nothing bounces that has no
-  /// restitution.
+  /// Of a contact, over the critical one; solver only. At 1 what has no restitution comes off with
+  /// less than a seventh of its speed, e⁻².
   double damping = 1;
   /// Solver only: two objects are asked about again once a point of one has moved by more than this
-  /// against the other, as a share of the depth at which the lighter rests. Until then their patches
-  /// move along, as much deeper as that motion makes them, of the same areas. A contact that begins
-  /// is seen this late. 0: asked in every step.
+  /// against the other, as a share of the depth at which the lighter rests. Until then their
+  /// patches move along, as much deeper as that motion makes them, of the same areas. A contact
+  /// that begins is seen this late. 0: asked in every step.
   double follow = 0.05;
 };
 
@@ -112,8 +112,9 @@ class PairAlgorithm : public btActivatingCollisionAlgorithm {
                 const btCollisionShape& first, const btCollisionShape& second);
   ~PairAlgorithm() override;
 
-  /// Fills the manifolds where the solver is to answer, or moves what is in them (Settings::follow).
-  /// A result that collects points (contactTest, contactPairTest) gets them instead.
+  /// Fills the manifolds where the solver is to answer, or moves what is in them
+  /// (Settings::follow). A result that collects points (contactTest, contactPairTest) gets them
+  /// instead.
   void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
                         const btDispatcherInfo& info, btManifoldResult* result) override;
 
@@ -158,10 +159,9 @@ void for_each_pair(btDynamicsWorld& world, const Visit& visit) {
 inline void push_in_every_tick(btDynamicsWorld& world) {
   world.setInternalTickCallback(
       [](btDynamicsWorld* stepped, btScalar step) {
-        for_each_pair(*stepped, [step](PairAlgorithm& pair, const btCollisionObject& first,
-                                       const btCollisionObject& second) {
-          pair.push(first, second, step);
-        });
+        for_each_pair(*stepped,
+                      [step](PairAlgorithm& pair, const btCollisionObject& first,
+                             const btCollisionObject& second) { pair.push(first, second, step); });
       },
       world.getWorldUserInfo(), true);
 }

@@ -11,7 +11,7 @@ namespace ist::bullet {
 /// Bullet's body frame of a baked solid: at its centre of mass, along principal axes. Those of the
 /// asset's frame, where they are.
 struct BodyFrame {
-  Eigen::Isometry3d in_mesh = Eigen::Isometry3d::Identity();       ///< body's frame to mesh's
+  Eigen::Isometry3d in_mesh = Eigen::Isometry3d::Identity();  ///< body's frame to mesh's
   Eigen::Vector3d unit_inertia = Eigen::Vector3d::Zero();  ///< [u²] about its axes, of a mass of 1
 };
 BodyFrame body_frame(const TreeView& tree);
@@ -43,9 +43,11 @@ class Shape : public btConcaveShape {
   void setLocalScaling(const btVector3& scaling) override;
   const btVector3& getLocalScaling() const override { return scaling_; }
 
-  /// Bullet's own rays and sweeps see no triangles: ask raycast() of <ist/surface.h>.
-  void processAllTriangles(btTriangleCallback*, const btVector3&, const btVector3&) const override {
-  }
+  /// Gives Bullet's rays, sweeps and debug drawing the triangles of the kept mesh
+  /// (TreeView::has_mesh), all of them in turn: raycast() of <ist/surface.h> is faster. Without a
+  /// mesh there are none, and warn() says so.
+  void processAllTriangles(btTriangleCallback* callback, const btVector3& lower,
+                           const btVector3& upper) const override;
 
  private:
   TreeView tree_;
