@@ -30,7 +30,7 @@ class CacheKeys : public ::testing::Test {
     return (folder_ / name).string();
   }
   static CacheKey key(const std::string& mesh, const BakeSettings& settings = {}) {
-    return cache_key({.name = "any", .mesh = mesh, .settings = settings});
+    return cache_key({.name = "any", .mesh = mesh, .settings = settings, .demands = {}});
   }
 
   fs::path folder_;
