@@ -30,7 +30,7 @@ BodyFrame body_frame(const TreeView& tree) {
 Shape::Shape(const TreeView& tree) : tree_(tree), frame_(body_frame(tree)) {
   m_shapeType = CUSTOM_CONCAVE_SHAPE_TYPE;
   if (tree.sphere_count() == 0) {
-    warn("An asset without spheres (ist bake --surface-only) collides with nothing: bake spheres.");
+    warn("An asset without spheres collides with nothing: bake it with spheres.");
   }
   mesh_in_body_ = to_bullet(Eigen::Isometry3d(frame_.in_mesh.inverse()));
   // Matched spheres stick out of the solid by this: what they meet there is a contact.

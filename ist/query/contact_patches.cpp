@@ -169,7 +169,8 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
                               : by.sum(by.context, DetailPair(), limits_of(settings));
   if (!chosen.patches || std::isnan(result.penetration.volume)) return result;
   result.count = chosen.patches->write(patches);
-  if (blends) spread(chosen.patches->whole(), result.penetration, patches.first(result.count));
+  if (blends || result.count == 0)
+    result.count = spread(chosen.patches->whole(), result.penetration, result.count, patches);
   finish_patches(patches.first(result.count), chosen.patches->deepest());
   return result;
 }

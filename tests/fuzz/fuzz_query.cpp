@@ -55,6 +55,10 @@ void require(bool holds) {
 }
 
 void look_at(const Penetration& answer) {
+  if (answer.status == QueryStatus::invalid_input) {
+    require(std::isnan(answer.volume) && answer.centroid.array().isNaN().all());
+    return;
+  }
   require(answer.volume >= 0);
   require(answer.volume_min <= answer.volume);
   require(answer.volume <= answer.volume_max);
@@ -63,6 +67,7 @@ void look_at(const Penetration& answer) {
 }
 
 bool same_bits(const Penetration& a, const Penetration& b) {
+  if (a.status == QueryStatus::invalid_input) return b.status == a.status;
   return a.volume == b.volume && a.volume_min == b.volume_min && a.volume_max == b.volume_max &&
          a.translation_gradient == b.translation_gradient &&
          a.rotation_gradient == b.rotation_gradient && a.centroid == b.centroid &&
@@ -116,7 +121,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   look_at(penetration);
   if (settings.measure == Measure::matched && settings.pair_budget == 0)
     look_at(without_protrusion(penetration, placed_a, placed_b));
-  require(separation.distance_min >= 0 && separation.distance_min <= separation.distance_max);
+  require(separation.status == QueryStatus::invalid_input
+              ? std::isnan(separation.distance)
+              : separation.distance_min >= 0 && separation.distance_min <= separation.distance_max);
   require(same_bits(
       penetration,
       query(placed_a, placed_b, ist::testing::for_both(settings), workspace).penetration));

@@ -38,6 +38,7 @@ struct Tally {
   std::uint64_t disordered = 0;     ///< a value outside its own bounds, or a negative one
   std::uint64_t not_contained = 0;  ///< stopped answers whose bounds miss the finished one
   std::uint64_t patches_lost = 0;   ///< contact patches that do not sum to the whole
+  std::uint64_t answered = 0;       ///< numbers of an invalid pose
   std::uint64_t finished = 0, stopped = 0, invalid = 0;
 
   void operator+=(const Tally& other) {
@@ -48,6 +49,7 @@ struct Tally {
     finished += other.finished;
     stopped += other.stopped;
     invalid += other.invalid;
+    answered += other.answered;
   }
 };
 
@@ -174,27 +176,33 @@ class Chunk {
 
   void look_at(const Penetration& p) {
     Tally& tally = worker_.tally;
+    if (p.status == QueryStatus::invalid_input) {
+      ++tally.invalid;
+      if (!std::isnan(p.volume) || !std::isnan(p.centroid.sum())) ++tally.answered;
+      return;
+    }
     if (!std::isfinite(p.volume) || !std::isfinite(p.volume_min) || !std::isfinite(p.volume_max) ||
         !p.centroid.allFinite() || !p.translation_gradient.allFinite() ||
         !p.rotation_gradient.allFinite())
       ++tally.not_numbers;
     if (!(0 <= p.volume_min && p.volume_min <= p.volume && p.volume <= p.volume_max))
       ++tally.disordered;
-    ++(p.status == QueryStatus::ok                 ? tally.finished
-       : p.status == QueryStatus::budget_exhausted ? tally.stopped
-                                                   : tally.invalid);
+    ++(p.status == QueryStatus::ok ? tally.finished : tally.stopped);
   }
 
   void look_at(const Separation& s) {
     Tally& tally = worker_.tally;
+    if (s.status == QueryStatus::invalid_input) {
+      ++tally.invalid;
+      if (!std::isnan(s.distance) || !std::isnan(s.normal.sum())) ++tally.answered;
+      return;
+    }
     if (!std::isfinite(s.distance) || !std::isfinite(s.distance_min) ||
         !std::isfinite(s.distance_max) || !s.point_a.allFinite() || !s.point_b.allFinite() ||
         !s.normal.allFinite())
       ++tally.not_numbers;
     if (!(0 <= s.distance_min && s.distance_min <= s.distance_max)) ++tally.disordered;
-    ++(s.status == QueryStatus::ok                 ? tally.finished
-       : s.status == QueryStatus::budget_exhausted ? tally.stopped
-                                                   : tally.invalid);
+    ++(s.status == QueryStatus::ok ? tally.finished : tally.stopped);
   }
 
   void look_at(const ContactPatches& answer, std::span<const ContactPatch> patches) {
@@ -207,7 +215,8 @@ class Chunk {
         ++worker_.tally.not_numbers;
     }
     const double whole = answer.penetration.volume;
-    if (!(std::abs(volume - whole) <= 1e-12 * whole)) ++worker_.tally.patches_lost;
+    if (std::isnan(whole) ? answer.count != 0 : !(std::abs(volume - whole) <= 1e-12 * whole))
+      ++worker_.tally.patches_lost;
   }
 
   void look_at_finished(const Penetration& stopped, const PlacedTree& a, const PlacedTree& b,
@@ -308,6 +317,7 @@ int main(int argc, char** argv) {
   none("chunks of 1,000 queries whose bits differ when asked again",
        static_cast<double>(different));
   none("answers that are not numbers", static_cast<double>(tally.not_numbers));
+  none("numbers for an invalid pose", static_cast<double>(tally.answered));
   none("values outside their own bounds", static_cast<double>(tally.disordered));
   none("stopped answers whose bounds miss the finished one",
        static_cast<double>(tally.not_contained));

@@ -67,16 +67,25 @@ std::size_t write_patches(const Binned& binned, const Penetration& whole,
   return out.size();
 }
 
-void spread(const Penetration& part, const Penetration& whole,
-            std::span<ContactPatch> patches) noexcept {
-  if (!(part.volume > 0)) return;
+std::size_t spread(const Penetration& part, const Penetration& whole, std::size_t count,
+                   std::span<ContactPatch> patches) noexcept {
+  if (patches.empty() || !(whole.volume > 0)) return 0;
+  if (count == 0 || !(part.volume > 0)) {
+    patches[0] = ContactPatch();
+    patches[0].centroid = whole.centroid;
+    patches[0].volume = whole.volume;
+    patches[0].force = -whole.translation_gradient;
+    patches[0].torque = -whole.rotation_gradient;
+    return 1;
+  }
   const double factor = whole.volume / part.volume;
-  for (ContactPatch& patch : patches) {
+  for (ContactPatch& patch : patches.first(count)) {
     const double share = patch.volume / part.volume;
     patch.force -= share * (whole.translation_gradient - part.translation_gradient);
     patch.torque -= share * (whole.rotation_gradient - part.rotation_gradient);
     patch.volume *= factor;
   }
+  return count;
 }
 
 void finish_patches(std::span<ContactPatch> patches, double deepest) noexcept {

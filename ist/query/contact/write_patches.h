@@ -15,10 +15,11 @@ struct Binned {
   double radius;  ///< of the binned tree's root, A's unit frame
 };
 
-/// Makes patches that sum to `part`, a level of detail of a blend, sum to the blend: the difference
-/// is spread by volume.
-void spread(const Penetration& part, const Penetration& whole,
-            std::span<ContactPatch> patches) noexcept;
+/// Makes the first `count` patches, which sum to `part`, a level of detail of a blend, sum to the
+/// blend: the difference is spread by volume. If a limit stopped it before it found anything, one
+/// patch is the whole. Returns how many there are.
+std::size_t spread(const Penetration& part, const Penetration& whole, std::size_t count,
+                   std::span<ContactPatch> patches) noexcept;
 
 /// Divides what is binned; the patches' shares sum to those of the whole.
 std::size_t write_patches(const Binned& binned, const Penetration& whole,
