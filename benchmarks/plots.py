@@ -155,7 +155,7 @@ def trade(report, path):
     pairs = list(dict.fromkeys(row["pair"] for row in rows))[:2]
     classes = list(dict.fromkeys(row["class"] for row in rows))
     curves = list(dict.fromkeys(row["curve"] for row in rows))
-    colours = plt.get_cmap("tab10").colors
+    colours = plt.get_cmap("tab20").colors
     figure, axes = plt.subplots(len(pairs), len(classes), squeeze=False,
                                 figsize=(4 * len(classes), 4.2 * len(pairs)))
     for axis_row, pair in zip(axes, pairs):

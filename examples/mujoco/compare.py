@@ -10,7 +10,9 @@ of two meshes, by ist's exact measure.
 
 import argparse
 import json
+import os
 import pathlib
+import platform
 import re
 import sys
 import tempfile
@@ -212,8 +214,8 @@ def write_obj(path, mesh):
                     + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in np.asarray(faces).tolist()))
 
 
-def build(scene, way, folder):
-    """A compiled model."""
+def spec_of(scene, way, folder):
+    """The scene as an mjSpec; its meshes are files of a folder."""
     assets, pieces = [], {}
     for name, (mesh, scale) in scene.meshes.items():
         if way == "pieces":
@@ -236,7 +238,7 @@ def build(scene, way, folder):
     spec = mujoco.MjSpec.from_string(xml)
     if way == "ist":
         ist.mujoco.attach(spec, cache=folder.parent / "cache", **scene.settings)
-    return spec.compile()
+    return spec
 
 
 class Truth:
@@ -280,7 +282,7 @@ def run(name, way, folder, films):
     scene = SCENES[name]()
     row = {"scene": name, "way": way}
     try:
-        model = build(scene, way, folder)
+        model = spec_of(scene, way, folder).compile()
     except ValueError as error:
         return row | {"holds": False, "words": str(error).splitlines()[0]}
     data = mujoco.MjData(model)
@@ -311,6 +313,16 @@ def run(name, way, folder, films):
     return row
 
 
+def report(rows):
+    """As benchmarks/report.h writes one."""
+    cpu = re.search(r"model name\s*:\s*(.*)", pathlib.Path("/proc/cpuinfo").read_text())
+    return {"benchmark": "mujoco", "commit": os.environ.get("IST_COMMIT", "–"), "date": time.strftime("%Y-%m-%d"),
+            "quick": False, "cpu": cpu[1] if cpu else platform.machine(), "cores": os.cpu_count(),
+            "compiler": f"MuJoCo {mujoco.__version__}",
+            "remarks": ["Made by examples/mujoco/compare.py --json, one core a scene."],
+            "tables": {"Scenes of concave parts": rows}, "targets": []}
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"{', '.join(SCENES)}; default all")
@@ -337,7 +349,7 @@ def main():
                 print(f"{name:8}{way:8}{'yes' if row['holds'] else 'no':7}{row.get('steps_per_second', 0):9.0f}"
                       f"{depth}  {row['words']}", flush=True)
     if options.json:
-        options.json.write_text(json.dumps({"mujoco": mujoco.__version__, "rows": rows}, indent=1) + "\n")
+        options.json.write_text(json.dumps(report(rows), indent=1) + "\n")
     return 0
 
 

@@ -20,8 +20,10 @@ namespace IST_API ist {
 ///     }
 ///
 /// The budget jumps only while the bodies are apart, and changes by at most a thousandth per query
-/// in contact. Each contact thus has one potential, and a loop gains no energy from the clock. No
-/// query is stopped: of the times 95 % are held below 0.8 of the deadline.
+/// in contact. Each contact thus has nearly one potential, and a loop gains little energy from the
+/// clock. No query is stopped: the budget aims at 95 % of the times below 0.8 of the deadline. In a
+/// contact that never opens, as a nut's in its thread, it follows so slowly that times may be twice
+/// the deadline.
 ///
 /// Trivially copyable, without memory of its own. One thread at a time.
 class Deadline {
