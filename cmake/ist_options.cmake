@@ -17,6 +17,11 @@ function(ist_compile_options target)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
     # Eigen's products for NEON are fused by hand where this macro is defined.
     target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-U__ARM_FEATURE_FMA>)
+    if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+      # It inlines Highway's functions for NEON only where the cryptography extension is named, of
+      # which nothing here makes use. All sources have the flag, as they share headers.
+      target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-march=armv8-a+crypto>)
+    endif()
   endif()
   if(PROJECT_IS_TOP_LEVEL)
     target_compile_options(${target} PRIVATE

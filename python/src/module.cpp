@@ -5,6 +5,7 @@
 #include <ist/error.h>
 #include <ist/version.h>
 
+#include "library/bake_revision.h"
 #include "offline.h"
 
 namespace {
@@ -30,6 +31,7 @@ NB_MODULE(_core, module) {
   py::exception<ist::OpenMeshError>(module, "OpenMeshError", error.ptr()).attr("__doc__") =
       "A mesh is not closed, and repair was not requested or failed.";
   module.attr("__version__") = IST_VERSION_STRING;
+  module.attr("_bake_revision") = ist::kBakeRevision;  // for what keeps assets (ist.mujoco)
   python::add_offline(module);
   python::add_meshes(module);
   python::add_assets(module);

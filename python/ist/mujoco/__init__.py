@@ -128,7 +128,7 @@ def _baked(model, mesh, name, folder, spheres):
     vertices = model.mesh_vert[first:first + count].astype(float) @ turn.reshape(3, 3).T + model.mesh_pos[mesh]
     first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
     faces = np.ascontiguousarray(model.mesh_face[first:first + count], dtype=np.uint32)
-    key = hashlib.sha256(f"{ist.__version__} {spheres} ".encode() + vertices.tobytes() + faces.tobytes())
+    key = hashlib.sha256(f"{ist._core._bake_revision} {spheres} ".encode() + vertices.tobytes() + faces.tobytes())
     path = folder / f"{key.hexdigest()[:32]}.ist"
     if path.exists():
         try:

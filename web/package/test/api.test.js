@@ -393,7 +393,8 @@ test('what is wrong is said', () => {
   const ask = (pose, options) => () => ist.penetration(a, b, pose, options);
   assert.match(sentence(ask()), /poseB is missing/);
   assert.match(
-      sentence(ask({rotation: [1, 1, 0, 0]})), /penetration\(\): a pose, .* is out of range/);
+      sentence(ask({rotation: [0, 0, 0, 0]})), /penetration\(\): a pose, .* is out of range/);
+  assert.equal(ask({rotation: [2, 0, 0, 0]})().volume, ask({rotation: [1, 0, 0, 0]})().volume);
   assert.match(sentence(ask({rotation: [1, 0, 0]})), /poseB\.rotation has 3 numbers, not 4/);
   assert.match(sentence(ask({translation: [NaN, 0, 0]})), /out of range/);
   assert.match(sentence(ask({translation: ['1', 0, 0]})), /not a number/);
