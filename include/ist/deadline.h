@@ -7,7 +7,7 @@
 
 namespace IST_API ist {
 
-/// Keeps the queries of one pair of bodies within a time, by their pair budget.
+/// Keeps the queries of one pair of bodies within a time: it chooses their pair budget.
 ///
 /// No query reads a clock, so the loop measures them:
 ///
@@ -21,9 +21,9 @@ namespace IST_API ist {
 ///
 /// The budget jumps only while the bodies are apart, and changes by at most a thousandth per query
 /// in contact. Each contact thus has nearly one potential, and a loop gains little energy from the
-/// clock. No query is stopped: the budget aims at 95 % of the times below 0.8 of the deadline. In a
-/// contact that never opens, as a nut's in its thread, it follows so slowly that times may be twice
-/// the deadline.
+/// clock. No query is stopped: the budget is chosen so that 95 % of the times are below 0.8 of the
+/// deadline. In a contact that never opens, as that of a nut in its thread, the budget follows so
+/// slowly that times may be twice the deadline.
 ///
 /// Trivially copyable, without memory of its own. One thread at a time.
 class Deadline {
@@ -31,18 +31,18 @@ class Deadline {
   /// [µs] Zero, a negative value or NaN: no deadline, and no pair budget.
   explicit Deadline(double microseconds = 0) noexcept;
 
-  /// Sets the pair budget of the next query. FieldUse::automatic becomes never, as the time that a
-  /// surface takes does not follow the budget. Where spheres alone are too coarse
-  /// (PairFit::needs_surface), set FieldUse::always: it stays.
+  /// Sets the pair budget of the next query. FieldUse::automatic becomes never, since the time of a
+  /// query by the surface does not depend on the budget. FieldUse::always is not changed: set it
+  /// where spheres alone are too coarse (PairFit::needs_surface).
   void limit(PenetrationSettings& settings) const noexcept;
 
-  /// What a query of the pair under this budget answered, and how long it took. A time that is not
+  /// Records the answer and the time of a query of the pair under this budget. A time that is not
   /// positive and finite is ignored.
   void record(const Penetration& answer, double microseconds) noexcept;
 
   /// Whether more than an eighth of the last queries in contact were late at the smallest budget.
   /// Then the coarsest levels take longer than the deadline: query less often, or bake fewer
-  /// spheres. It ends when recorded queries are in time again.
+  /// spheres. False again once recorded queries are in time.
   bool too_slow() const noexcept;
 
  private:

@@ -52,7 +52,7 @@ struct CylinderField {
 /// Terrain: the solid under a grid of heights along z, two triangles per cell, cut from (i, j) to
 /// (i
 /// + 1, j + 1). Exact. Beyond its border it continues level. A height that is not finite gives
-/// QueryStatus::invalid_input where a query looks at it, on a GPU wherever the terrain is.
+/// QueryStatus::invalid_input where a query samples it, on a GPU wherever the terrain is.
 struct HeightField {
   const float* heights = nullptr;  ///< [u] [rows · columns], columns (x) run fastest
   std::uint32_t columns = 0;       ///< ≥ 2, along x
@@ -64,7 +64,7 @@ struct HeightField {
 
 /// Distances at the points of a grid, interpolated linearly in each cell: the gradient jumps from
 /// cell to cell. Outside of the grid is outside of the solid. A distance that is not finite gives
-/// QueryStatus::invalid_input where a query looks at it.
+/// QueryStatus::invalid_input where a query samples it.
 struct DistanceGridField {
   const float* distances = nullptr;  ///< [u] [size[0] · size[1] · size[2]], x runs fastest
   std::uint32_t size[3] = {};        ///< points along x, y, z, each ≥ 2

@@ -38,8 +38,8 @@ extern "C" {
 typedef int32_t ist_status_t;
 enum {
   IST_OK = 0,
-  /* A limit or the workspace's capacity stopped the query. What volume_min and volume_max contain,
-   * they still contain. */
+  /* A limit or the workspace's capacity stopped the query. volume_min and volume_max contain the
+   * same value as those of a finished answer. */
   IST_BUDGET_EXHAUSTED = 1,
   /* A pose with NaN or Inf, a quaternion of length 0, a scale < 0, sizes or distances more than
    * 1e60 : 1 apart, or a field's number or an enum out of range. */
@@ -392,7 +392,8 @@ typedef struct ist_penetration {
   ist_status_t status;
   double volume; /* [u³] */
   /* [u³] With IST_EXACT: bounds of the true volume. By spheres: the interval of the finished sum,
-   * as wide as rounding and what a limit left out. It says nothing of the true volume. */
+   * as wide as its rounding and the part that a limit left out. It does not bound the true
+   * volume. */
   double volume_min, volume_max;
   double centroid[3];             /* [u] of the overlap, world */
   double translation_gradient[3]; /* [u²] dV/d(translation of B), world */
@@ -465,8 +466,9 @@ ist_status_t ist_separation(const ist_placed_tree_t* a, const ist_placed_tree_t*
                             const ist_separation_settings_t* settings, ist_workspace_t* workspace,
                             ist_separation_t* answer);
 
-/* Deadline (deadline.h): the pair budget that keeps the queries of one pair of bodies within a
- * time. No query reads a clock: the loop measures them. May be copied; all zero: no deadline. */
+/* Deadline (deadline.h): chooses the pair budget that keeps the queries of one pair of bodies
+ * within a time. No query reads a clock: the loop measures them. May be copied; all zero: no
+ * deadline. */
 typedef struct ist_deadline {
   double opaque[8];
 } ist_deadline_t;
@@ -478,11 +480,11 @@ ist_status_t ist_deadline_make(double microseconds, ist_deadline_t* deadline);
 ist_status_t ist_deadline_limit(const ist_deadline_t* deadline,
                                 ist_penetration_settings_t* settings);
 
-/* What a query under this budget answered, and how long it took. */
+/* Records the answer and the time of a query under this budget. */
 ist_status_t ist_deadline_record(ist_deadline_t* deadline, const ist_penetration_t* answer,
                                  double microseconds);
 
-/* Not 0: the coarsest levels of detail take longer than the deadline. */
+/* Not 0 if the coarsest levels of detail take longer than the deadline. */
 int32_t ist_deadline_too_slow(const ist_deadline_t* deadline);
 
 /* Whether two placed solids share a point (overlap.h). Yes and no are certain. */

@@ -19,8 +19,8 @@ namespace IST_API ist {
 /// No query reads a clock: poses and settings decide the answer. <ist/deadline.h> chooses a pair
 /// budget from measured times.
 ///
-/// A query that is stopped estimates the rest by the densities of the unopened nodes, returns
-/// budget_exhausted and no more than the volume of the smaller solid's spheres.
+/// A query that is stopped estimates the rest by the densities of the unopened nodes. It returns
+/// budget_exhausted, and a volume no larger than that of the smaller solid's spheres.
 ///
 /// Measure::exact obeys max_visits only. If that stops it, the answer is that of the matched
 /// spheres (NaN where an asset has none) with budget_exhausted, and the true volume is bounded by 0
@@ -38,7 +38,7 @@ struct PenetrationSettings {
   /// target, not a bound: the coarsest level is the minimum, whatever it costs.
   std::uint32_t pair_budget = 0;
 
-  /// Count of node pairs opened: a hard limit, whatever becomes of the answer. Pairs of trees are
+  /// Count of node pairs opened: a hard limit, whatever the error of the answer. Pairs of trees are
   /// opened largest bounds first, trees against a surface in the order of the tree.
   std::uint32_t max_visits = 0;
 
@@ -70,7 +70,8 @@ struct PlacedTree {
 struct Penetration {
   double volume = 0;  ///< [u³] in the chosen measure
   /// [u³] With Measure::exact: bounds of the true volume. By spheres: the interval of the finished
-  /// sum, as wide as rounding and what a limit left out. It says nothing of the true volume.
+  /// sum, as wide as its rounding and the part that a limit left out. It does not bound the true
+  /// volume.
   double volume_min = 0;
   double volume_max = 0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the overlap, world; zero if none
@@ -225,9 +226,9 @@ struct ContactPatches {
 /// the connected parts of the overlap, each with its true volume; if there are more than fit, the
 /// smallest join the nearest ones. By spheres the contact is divided along the tree of the smaller
 /// solid (B's if equal or if A is too coarse), always at the same places. The estimate of a stopped
-/// query is divided too. Under a pair budget the patches are those of the level of detail that
-/// answers for most of the volume, and what the blend with other levels adds is spread over them by
-/// volume: their sum stays continuous, while ids change where another level takes over. Costs 1.7
+/// query is divided too. Under a pair budget the patches are those of the level of detail with the
+/// largest weight in the blend. The difference between the blend and that level is spread over them
+/// by volume: their sum stays continuous, and ids change where another level takes over. Costs 1.7
 /// (one patch) to 2.4 (32) times a penetration.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.

@@ -14,12 +14,13 @@
 #include <ist/query.h>
 #include <ist/response.h>
 
-// How assets collide in Bullet: docs/engines.md. Link ist::bullet where Bullet is its
-// single-precision build, ist::bullet-float64 where it is the one with BT_USE_DOUBLE_PRECISION.
+// Narrow phase and contact manifolds of assets in Bullet: docs/engines.md. Link ist::bullet with
+// Bullet in single precision, ist::bullet-float64 with Bullet in double precision
+// (BT_USE_DOUBLE_PRECISION).
 
 namespace ist::bullet {
 
-/// How contacts are found and what they do.
+/// Settings of contact queries and of the contact response.
 struct Settings {
   static constexpr std::size_t kPatches = ContactMemory::kPatches;
 
@@ -32,52 +33,55 @@ struct Settings {
   /// `always` where flat faces meet. Assets without a surface (TreeView::has_field) use lenses.
   ContactSettings query{.field = FieldUse::always};
 
-  /// law.stiffness [force/u³] is the pressure over depth, in both ways. The solver takes it
-  /// implicitly, at any size, and needs no more of the law; the wrench is bound to what the step
-  /// bears. With law.area every wrench is one patch. Friction is Bullet's, of the two bodies.
+  /// law.stiffness [force/u³] is the pressure over depth, for both responses. The solver steps the
+  /// springs implicitly, so any stiffness is stable; it uses nothing else of the law. For the
+  /// wrench the step limits the stiffness. With law.area every wrench is one patch. Friction is
+  /// Bullet's, of the two bodies.
   ///
-  /// 0: that of the two shapes (Shape::stiffness, two in series), or else by `depth`.
+  /// Stiffness 0: that of the two shapes (Shape::stiffness, two in series), or else by `depth`.
   ContactLaw law;
-  /// Where no stiffness is given: the lighter body rests by its weight at this depth, as a share of
-  /// the smaller asset's size, on a face of that size. The size is the cube root of the volume.
-  /// Deeper, the pressure grows with the depth's square, so that a body bears a hundred times its
-  /// weight ten times as deep. A body without gravity is held as fast as a step resolves.
+  /// Used where no stiffness is set: the depth at which the lighter body rests under its weight on
+  /// a face of the smaller asset's size. It is a share of that size, the cube root of the volume.
+  /// Beyond this depth the pressure grows with the square of the depth: at ten times the depth a
+  /// contact bears a hundred times the weight. A body without gravity is held as stiffly as a step
+  /// resolves.
   ///
-  /// Flat faces of spheres are blurred. The deeper, the nearer they rest to their place; the less
-  /// deep, the higher a stack stands.
+  /// Matched spheres blur flat faces. With a larger depth they rest nearer to their place; with a
+  /// smaller depth a higher stack stands.
   double depth = 0.001;
-  /// Of a contact, over the critical one; solver only. At 1 what has no restitution comes off with
-  /// less than a seventh of its speed, e⁻².
+  /// Damping of a contact over critical damping; solver only. At 1 a body without restitution
+  /// rebounds with less than a seventh of its speed, e⁻².
   double damping = 1;
-  /// Solver only: two objects are asked about again once a point of one has moved by more than this
-  /// against the other, as a share of the depth at which the lighter rests. Until then their
-  /// patches move along, as much deeper as that motion makes them, of the same areas. A contact
-  /// that begins is seen this late. 0: asked in every step.
+  /// Solver only: two objects are queried again once a point of one has moved relative to the other
+  /// by more than this share of the depth at which the lighter body rests. Until then their patches
+  /// move along: the motion changes their depths, and their areas stay. A contact that begins may
+  /// be found later by this motion. 0: queried in every step.
   double follow = 0.05;
 };
 
 /// A contact of two objects.
 struct Contact {
   bool pushes_second = true;  ///< the normals push the second object, or else the first
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< [u] about which torques turn it, world
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< [u] reference point of torques, world
   Penetration whole;                                 ///< the contact as one
   std::size_t count = 0;
   std::array<ContactPatch, Settings::kPatches> patches;
-  /// [u] Of objects that do not touch: nor do they while no point has moved by more than this.
+  /// [u] Of objects that do not touch: they stay apart while no point moves by more than this.
   double clearance = 0;
 };
 
-/// The contact of two objects at their transforms of now, by Settings::patches and query. False if
-/// neither is a Shape or one cannot be met; compounds are not taken apart.
+/// Computes the contact of two objects at their current transforms, by Settings::patches and query.
+/// False if neither is a Shape, or if a shape is not supported; compounds are not taken apart.
 bool find_contact(const btCollisionObject& first, const btCollisionObject& second,
                   const Settings& settings, Contact& contact);
 
-/// Answers for a dispatcher's pairs of which one is a Shape. Scratch memory is the thread's, so
-/// that btCollisionDispatcherMt may ask on many.
+/// Narrow phase for the pairs of a dispatcher in which one object is a Shape. Each thread has its
+/// own scratch memory, so btCollisionDispatcherMt may run queries on many threads.
 class Contacts {
  public:
-  /// For all that a Shape meets; warn() tells of what it does not. Comes after other algorithms
-  /// that take all types, as GImpact's does. Must outlive the dispatcher.
+  /// Registers the algorithm for all types that collide with a Shape; warn() reports the others.
+  /// Call it after the registration of other algorithms that take all types, as GImpact's does.
+  /// This object must outlive the dispatcher.
   void register_with(btCollisionDispatcher& dispatcher);
 
   Settings settings;  ///< change between steps
@@ -86,7 +90,7 @@ class Contacts {
                      Settings& settings)>
       of_pair;
 
-  /// Those of a pair.
+  /// The settings of a pair.
   Settings settings_of(const btCollisionObject& first, const btCollisionObject& second) const;
 
  private:
@@ -100,29 +104,29 @@ class Contacts {
   CreateFunc create_;
 };
 
-/// One pair of objects whose boxes overlap, or of a child of a compound. Bullet makes and ends it.
+/// One pair of objects whose boxes overlap, or of a child of a compound. Bullet creates and
+/// destroys it.
 ///
 /// Events are Bullet's: gContactStartedCallback when a pair begins to touch, gContactEndedCallback
 /// when it no longer does, both with its first manifold, and gContactProcessedCallback for every
-/// point in every step. A point is the same as long as its patch has the same name.
-/// gContactAddedCallback may change a point whenever it was computed.
+/// point in every step. A point persists as long as its patch keeps its id. gContactAddedCallback
+/// may change a point whenever it was computed.
 class PairAlgorithm : public btActivatingCollisionAlgorithm {
  public:
   PairAlgorithm(const btCollisionAlgorithmConstructionInfo& info, const Contacts& contacts,
                 const btCollisionShape& first, const btCollisionShape& second);
   ~PairAlgorithm() override;
 
-  /// Fills the manifolds where the solver is to answer, or moves what is in them
-  /// (Settings::follow). A result that collects points (contactTest, contactPairTest) gets them
-  /// instead.
+  /// With Response::solver, fills the manifolds or moves their points (Settings::follow). A result
+  /// that collects points (contactTest, contactPairTest) receives them instead.
   void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
                         const btDispatcherInfo& info, btManifoldResult* result) override;
 
-  /// Pushes both bodies by the law's force for a step of `step` [s], as of where they are now:
-  /// Response::wrench. Compounds are not pushed.
+  /// Response::wrench: applies the law's force at the current transforms to both bodies, for a step
+  /// of `step` [s]. Compounds are not pushed.
   void push(const btCollisionObject& first, const btCollisionObject& second, double step);
 
-  /// What push() did last, and the object on which it did that.
+  /// The last force that push() applied, and the object on which it applied it.
   const ContactForce& pushed() const;
   const btCollisionObject* pushed_body() const;
 
@@ -133,14 +137,14 @@ class PairAlgorithm : public btActivatingCollisionAlgorithm {
   void getAllContactManifolds(btManifoldArray& manifolds) override;
 
  private:
-  // Bullet's pool of algorithms has places of a fixed size, which nobody checks in a release build.
+  // Bullet's pool of algorithms has slots of a fixed size, which a release build does not check.
   struct State;
 
   const Contacts& contacts_;
   std::unique_ptr<State> state_;
 };
 
-/// Every pair of the world that a PairAlgorithm answers for, and its two objects.
+/// Visits every pair of the world that has a PairAlgorithm, with its two objects.
 template <class Visit>
 void for_each_pair(btDynamicsWorld& world, const Visit& visit) {
   btBroadphasePairArray& pairs = world.getPairCache()->getOverlappingPairArray();
@@ -152,10 +156,10 @@ void for_each_pair(btDynamicsWorld& world, const Visit& visit) {
   }
 }
 
-/// Has the law's forces applied before every substep of the world: Settings::Response::wrench.
+/// Applies the law's forces before every substep of the world: Settings::Response::wrench.
 ///
-/// Boxes that begin to overlap in a step are known to it from the next on. Takes the world's tick
-/// callback before the step.
+/// A pair whose boxes begin to overlap in a step is pushed from the next step on. This uses the
+/// world's callback before the tick.
 inline void push_in_every_tick(btDynamicsWorld& world) {
   world.setInternalTickCallback(
       [](btDynamicsWorld* stepped, btScalar step) {

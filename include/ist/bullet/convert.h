@@ -6,7 +6,7 @@
 
 #include <ist/pose.h>
 
-// Between Bullet's vectors, of either precision, and Eigen's.
+// Conversions between Bullet's types, of either precision, and those of Eigen and ist.
 
 namespace ist::bullet {
 

@@ -8,18 +8,18 @@
 
 namespace ist::bullet {
 
-/// Bullet's body frame of a baked solid: at its centre of mass, along principal axes. Those of the
-/// asset's frame, where they are.
+/// Bullet's body frame of a baked solid: at its centre of mass, along principal axes. These are the
+/// axes of the asset's frame, where those are principal.
 struct BodyFrame {
   Eigen::Isometry3d in_mesh = Eigen::Isometry3d::Identity();  ///< body's frame to mesh's
   Eigen::Vector3d unit_inertia = Eigen::Vector3d::Zero();  ///< [u²] about its axes, of a mass of 1
 };
 BodyFrame body_frame(const TreeView& tree);
 
-/// A baked solid as a shape of Bullet's, for Contacts to meet. The asset's bytes must outlive it.
+/// A baked solid as a collision shape of Bullet, for Contacts. The asset's bytes must outlive it.
 ///
-/// Bullet turns bodies about their own origin and wants principal axes there: the body's transform
-/// is that of body_frame(), not the mesh's.
+/// Bullet turns bodies about their own origin and expects principal axes there: the body's
+/// transform is that of body_frame(), not the mesh's.
 class Shape : public btConcaveShape {
  public:
   explicit Shape(const TreeView& tree);
@@ -27,16 +27,16 @@ class Shape : public btConcaveShape {
   const TreeView& tree() const { return tree_; }
   const btTransform& mesh_in_body() const { return mesh_in_body_; }
   double scale() const { return scale_; }
-  double reach() const { return scale_ * reach_; }  ///< [u] all of it is this near to the origin
+  double reach() const { return scale_ * reach_; }  ///< [u] bounding radius about the origin
   double volume() const { return scale_ * scale_ * scale_ * tree_.volume(); }  ///< [u³]
 
-  /// [force/u³] Pressure over depth of its material: see Settings::depth. 0: nothing is known.
+  /// [force/u³] Pressure over depth of its material: see Settings::law. 0: not known.
   double stiffness = 0;
 
   void getAabb(const btTransform& t, btVector3& lower, btVector3& upper) const override;
   void calculateLocalInertia(btScalar mass, btVector3& inertia) const override;
   const char* getName() const override { return "ist::bullet::Shape"; }
-  void setMargin(btScalar) override {}  // a volume needs no skin
+  void setMargin(btScalar) override {}  // a volume needs no margin
   btScalar getMargin() const override { return 0; }
 
   /// One positive factor for all axes; another one is refused by warn() and changes nothing.
@@ -58,14 +58,14 @@ class Shape : public btConcaveShape {
   btVector3 scaling_{1, 1, 1};
 };
 
-/// Called once for each kind of thing that cannot be met, with a sentence that names it. On any
-/// thread that makes pairs. The default writes to stderr.
+/// Called once for each kind of shape or setting that is not supported, with a sentence that names
+/// it. Called on any thread that makes pairs. The default writes to stderr.
 using WarningHandler = void (*)(const char* sentence);
 
 /// Replaces the handler; null: the default. Returns the one before.
 WarningHandler set_warning_handler(WarningHandler handler);
 
-/// Gives the handler a sentence that it has not had yet.
+/// Passes a sentence to the handler, unless the same sentence was passed before.
 void warn(const char* sentence);
 
 }  // namespace ist::bullet
