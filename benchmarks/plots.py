@@ -11,27 +11,6 @@ def save(figure, path):
     plt.close(figure)
 
 
-def packing_openvdb(report, path):
-    rows = report["tables"]["Against OpenVDB fillWithSpheres"]
-    meshes = list(dict.fromkeys(row["mesh"] for row in rows))
-    figure, axes = plt.subplots(1, len(meshes), figsize=(5 * len(meshes), 4), squeeze=False)
-    for axis, mesh in zip(axes[0], meshes):
-        mine = [row for row in rows if row["mesh"] == mesh]
-        for name, seconds, coverage, style in (
-                ("ist", "ist s", "ist coverage %", "o-"),
-                ("OpenVDB", "OpenVDB s", "OpenVDB claimed %", "s--")):
-            axis.semilogx([row[seconds] for row in mine], [row[coverage] for row in mine], style,
-                          label=name)
-            for row in mine:
-                axis.annotate(f" {row['spheres']:,}", (row[seconds], row[coverage]), fontsize=8,
-                              va="top")
-        axis.set(title=mesh, xlabel="seconds, 2 threads", ylabel="coverage, %")
-        axis.grid(True, which="both", alpha=0.3)
-        axis.margins(x=0.2)
-        axis.legend(loc="upper left")
-    save(figure, path)
-
-
 def query_peers(report, path):
     rows = report["tables"]["Time a query"]
     pairs = list(dict.fromkeys(row["pair"] for row in rows))
@@ -52,51 +31,6 @@ def query_peers(report, path):
                  xticks=range(len(classes)), xticklabels=classes)
         axis.grid(True, axis="y", alpha=0.3)
     axes[0, 0].legend(fontsize=7, ncol=3, loc="lower center", bbox_to_anchor=(0.5, 1.12))
-    save(figure, path)
-
-
-def exact_peers(report, path):
-    """Time of an exact query as each triangle is cut in four, and again."""
-    rows = report["tables"]["Growth"]
-    figure, axis = plt.subplots(figsize=(6, 4))
-    for name in dict.fromkeys(row["class"] for row in rows):
-        mine = [row for row in rows if row["class"] == name]
-        axis.loglog([row["triangles"] for row in mine], [row["median us"] for row in mine], "o-",
-                    label=name)
-    ends = [min(row["triangles"] for row in rows), max(row["triangles"] for row in rows)]
-    start = min(row["median us"] for row in rows)
-    axis.loglog(ends, [start, start * (ends[1] / ends[0]) ** 0.5], "k:", label="√n")
-    axis.set(title="Elephant in dino, ever finer", xlabel="triangles of both", ylabel="µs, median")
-    axis.grid(True, which="both", alpha=0.3)
-    axis.legend(fontsize=8)
-    save(figure, path)
-
-
-def volume_error(report, path):
-    """Error of the volume by class of overlap: a panel a pair, a curve a sphere count."""
-    rows = report["tables"]["Volume and force against exact booleans"]
-    pairs = list(dict.fromkeys(row["pair"] for row in rows))
-    classes = list(dict.fromkeys(row["class"] for row in rows))
-    figure, axes = plt.subplots(1, len(pairs), figsize=(4 * len(pairs), 4), squeeze=False,
-                                sharey=True)
-    for axis, pair in zip(axes[0], pairs):
-        for spheres in sorted({row["spheres"] for row in rows if row["pair"] == pair}):
-            mine = [next(row for row in rows if (row["pair"], row["spheres"], row["class"]) ==
-                         (pair, spheres, c)) for c in classes]
-            line, = axis.semilogy(classes, [row["error median %"] for row in mine], "o-",
-                                  label=f"{spheres:,} spheres, median")
-            axis.semilogy(classes, [row["error p95 %"] for row in mine], ":",
-                          color=line.get_color())
-        axis.plot([], [], "k:", label="p95")
-        inner = max(row["spheres"] for row in rows)
-        axis.semilogy(classes, [row["inner median %"] for row in rows
-                                if (row["pair"], row["spheres"]) == (pair, inner)], "k--",
-                      linewidth=0.8, label=f"inner spheres, {inner:,}")
-        axis.set(title=pair, xlabel="overlap, share of the smaller solid")
-        axis.tick_params(axis="x", rotation=30)
-        axis.grid(True, which="major", alpha=0.3)
-    axes[0, 0].set_ylabel("error of the volume, %")
-    axes[0, -1].legend(fontsize=7, loc="center left", bbox_to_anchor=(1, 0.5))
     save(figure, path)
 
 
