@@ -1,5 +1,6 @@
-// What swaps, and the order of the inner spheres, cost to build and to query: the same spheres, every oracle row of
-// one pair, and copies of other meshes at random poses; counted work. One thread.
+// What swaps, and the order of the inner spheres, cost to build and to query: the same spheres,
+// every oracle row of one pair, and copies of other meshes at random poses; counted work. One
+// thread.
 
 #include <ist/bake.h>
 #include <ist/query.h>
@@ -44,8 +45,7 @@ Asset rebuilt(const Asset& asset, const Builder& builder) {
   arrays.inner_spheres = copy(at<Sphere>(header, header.inner_spheres));
   arrays.cover_radii = copy(at<float>(header, header.cover_radii));
   arrays.matched_spheres = copy(at<Sphere>(header, header.matched_spheres));
-  const std::vector<std::uint32_t> order =
-      sphere_order(arrays.inner_spheres, builder.swaps);
+  const std::vector<std::uint32_t> order = sphere_order(arrays.inner_spheres, builder.swaps);
   arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, order);
   arrays.matched_tree = builder.like_inner ? build_tree_like(arrays.matched_spheres, order)
                                            : build_tree(arrays.matched_spheres, {}, builder.swaps);

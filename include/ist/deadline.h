@@ -36,8 +36,8 @@ class Deadline {
   /// where spheres alone are too coarse (PairFit::needs_surface).
   void limit(PenetrationSettings& settings) const noexcept;
 
-  /// Records the answer and the time of a query of the pair under this budget. A time that is not
-  /// positive and finite is ignored.
+  /// Records the answer and the time of a query of the pair under this budget. An answer of NaN,
+  /// and a time that is not positive and finite, are ignored.
   void record(const Penetration& answer, double microseconds) noexcept;
 
   /// Whether more than an eighth of the last queries in contact were late at the smallest budget.

@@ -307,7 +307,7 @@ void PairAlgorithm::push(const btCollisionObject& first, const btCollisionObject
   state_->meeting.find(first.getWorldTransform(), second.getWorldTransform(), settings, contact);
   const btCollisionObject& body = contact.pushes_second ? second : first;
   state_->pushed_body = &body;
-  if (contact.whole.volume <= 0) {
+  if (!(contact.whole.volume > 0)) {
     state_->memory = {};
     return;
   }

@@ -84,13 +84,24 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
     found = contact_patches(partner_->placed(at_a), b, settings.query, workspace(), room);
   } else {
     const PlacedTree a = placed(*a_, at_a);
-    found = contact_patches(a, b, settings.query, workspace(), room);
+    ContactSettings query = settings.query;
+    found = contact_patches(a, b, query, workspace(), room);
+    if (found.penetration.status == QueryStatus::not_held && query.field == FieldUse::always) {
+      query.field = FieldUse::automatic;
+      found = contact_patches(a, b, query, workspace(), room);
+    }
     if (found.penetration.volume_max <= 0) {
       // A bound tells enough: the first few nodes give one.
       constexpr SeparationSettings kGlance{.max_visits = 8, .inner_spheres = true};
       contact.clearance = separation(a, b, kGlance, workspace()).distance_min -
                           a.scale * a.tree.protrusion() - b.scale * b.tree.protrusion();
     }
+  }
+  if (std::isnan(found.penetration.volume)) {
+    warn(
+        "A contact query gave no answer, so two bodies pass through each other: a transform is not "
+        "finite, or Settings::query needs what an asset does not hold.");
+    contact.clearance = 0;
   }
   contact.whole = found.penetration;
   contact.count = found.count;

@@ -44,7 +44,8 @@ void Deadline::limit(PenetrationSettings& settings) const noexcept {
 }
 
 void Deadline::record(const Penetration& answer, double microseconds) noexcept {
-  if (deadline_ == 0 || !std::isfinite(microseconds) || microseconds <= 0) return;
+  if (deadline_ == 0 || std::isnan(answer.volume)) return;
+  if (!std::isfinite(microseconds) || microseconds <= 0) return;
   const bool apart = !(answer.volume > 0);
   const double pairs = answer.sphere_pairs;
   if (!apart) {

@@ -34,17 +34,16 @@ void fill(Held held, std::byte* memory, std::size_t bytes) {
 }
 
 Workspace workspace_holding(Held& held) {
-  return Workspace(
-      1 << 16,
-      {[](void* context, std::size_t bytes, std::size_t alignment) {
-         void* const memory = ::operator new(bytes, std::align_val_t(alignment));
-         fill(*static_cast<Held*>(context), static_cast<std::byte*>(memory), bytes);
-         return memory;
-       },
-       [](void*, void* memory, std::size_t bytes, std::size_t alignment) {
-         ::operator delete(memory, bytes, std::align_val_t(alignment));
-       },
-       &held});
+  return Workspace(1 << 16,
+                   {[](void* context, std::size_t bytes, std::size_t alignment) {
+                      void* const memory = ::operator new(bytes, std::align_val_t(alignment));
+                      fill(*static_cast<Held*>(context), static_cast<std::byte*>(memory), bytes);
+                      return memory;
+                    },
+                    [](void*, void* memory, std::size_t bytes, std::size_t alignment) {
+                      ::operator delete(memory, bytes, std::align_val_t(alignment));
+                    },
+                    &held});
 }
 
 /// Bits of every kind of answer, pose by pose.

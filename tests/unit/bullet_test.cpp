@@ -99,6 +99,39 @@ class Listen {
   ~Listen() { bullet::set_warning_handler(nullptr); }
 };
 
+// The default asks for surfaces: an asset that keeps none still collides, by its spheres.
+TEST(BulletShapes, WithoutASurfaceCollideByLenses) {
+  PackingSettings packing;
+  packing.max_spheres = 500;
+  packing.surface.wanted = false;
+  const Asset asset = bake(close_mesh(cube_mesh(), "cube"), packing);
+  ASSERT_FALSE(asset.view().has_field());
+  bullet::Shape shape(asset.view());
+  btCollisionObject first, second;
+  first.setCollisionShape(&shape);
+  second.setCollisionShape(&shape);
+  second.setWorldTransform(at_place({0.9, 0.1, 0}));
+  bullet::Contact contact;
+  ASSERT_TRUE(bullet::find_contact(first, second, {}, contact));
+  EXPECT_NEAR(contact.whole.volume, 0.09, 0.02);
+  EXPECT_GT(contact.count, 0u);
+}
+
+// A query without an answer is no contact, and that is said.
+TEST(BulletShapes, APlaceThatIsNoNumberIsSaid) {
+  const Listen listen;
+  const auto shape = cube_of_side(1);
+  btCollisionObject first, second;
+  first.setCollisionShape(shape.get());
+  second.setCollisionShape(shape.get());
+  second.setWorldTransform(at_place({NAN, 0, 0}));
+  bullet::Contact contact;
+  bullet::find_contact(first, second, {}, contact);
+  EXPECT_EQ(contact.count, 0u);
+  ASSERT_EQ(warned.size(), 1u);
+  EXPECT_NE(warned[0].find("gave no answer"), std::string::npos) << warned[0];
+}
+
 std::vector<btVector3> corners(double half) {
   std::vector<btVector3> points;
   for (int i = 0; i < 8; ++i) {

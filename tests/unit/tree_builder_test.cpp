@@ -69,9 +69,9 @@ TEST_P(TreeOfCount, BallsHoldWhatIsBelow) {
   EXPECT_EQ(tree.levels.back().blocks.size(), 1u);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Counts, TreeOfCount,
-    ::testing::Values(1, 2, 15, 16, 17, 31, 32, 33, 255, 256, 257, 300, 4095, 4096, 4097, 5000));
+INSTANTIATE_TEST_SUITE_P(Counts, TreeOfCount,
+                         ::testing::Values(1, 2, 15, 16, 17, 31, 32, 33, 255, 256, 257, 300, 4095,
+                                           4096, 4097, 5000));
 
 /// Σ r³ over the balls of one level.
 double cost(const TreeArrays& tree, std::size_t level) {

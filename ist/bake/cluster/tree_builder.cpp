@@ -135,8 +135,7 @@ std::vector<std::uint32_t> sphere_order(std::span<const Sphere> spheres, bool sw
   return tree_order(to_balls(spheres), swaps);
 }
 
-TreeArrays build_tree(std::span<const Sphere> spheres, std::span<const float> covers,
-                      bool swaps) {
+TreeArrays build_tree(std::span<const Sphere> spheres, std::span<const float> covers, bool swaps) {
   return tree_from_order(spheres, covers, sphere_order(spheres, swaps));
 }
 

@@ -39,8 +39,8 @@ std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
                                         bool swaps) {
   if (order.size() <= std::size_t{kWidth} * kWidth) return order;
   // A group that is not full comes last, and so does any that holds one that is not.
-  const std::vector<std::uint32_t> groups = order_of(
-      group_balls(balls, order), last_stays || order.size() % kWidth != 0, swaps);
+  const std::vector<std::uint32_t> groups =
+      order_of(group_balls(balls, order), last_stays || order.size() % kWidth != 0, swaps);
   std::vector<std::uint32_t> sorted;
   sorted.reserve(order.size());
   for (const std::uint32_t g : groups)
