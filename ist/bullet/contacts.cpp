@@ -110,7 +110,7 @@ PairAlgorithm::PairAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
 
 PairAlgorithm::~PairAlgorithm() {
   for (btPersistentManifold* manifold : state_->manifolds) {
-    // One end of a contact is told, of the first manifold.
+    // The end of a contact is reported once, with the first manifold.
     if (manifold != state_->manifolds.front()) {
       for (int i = 0; i < manifold->getNumContacts(); ++i) {
         manifold->clearUserCache(manifold->getContactPoint(i));
@@ -130,7 +130,7 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   const btTransform &at_first = a->getWorldTransform(), &at_second = b->getWorldTransform();
   Contact contact;
   if (typeid(*result) != typeid(btManifoldResult)) {
-    // Somebody collects points, by way of a manifold.
+    // contactTest() and its like collect points through a manifold.
     state_->meeting.find(at_first, at_second, settings, contact);
     if (state_->manifolds.empty()) {
       state_->manifolds.push_back(m_dispatcher->getNewManifold(&first, &second));
@@ -208,7 +208,7 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
                                 const btCollisionObjectWrapper& b, const Contact& contact,
                                 const Spring& spring, btDispatcher& dispatcher) {
   const btCollisionObject &first = *a.getCollisionObject(), &second = *b.getCollisionObject();
-  // Manifolds are filled past Bullet's own functions, which tell of an end whenever they are empty.
+  // Bullet's own functions report an end whenever a manifold is empty, so they are not called.
   std::array<btManifoldPoint, Settings::kPatches> old;
   std::size_t old_count = 0;
   for (btPersistentManifold* manifold : manifolds) {
@@ -242,7 +242,7 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
     const double approach =
         normal.dot(velocity_of(second, on_second) - velocity_of(first, on_first));
     if (point.m_combinedRestitution > 0 && approach > spring.slow) {
-      // What bounces is hard in this step: a damped spring would swallow the speed.
+      // A damped spring would absorb the speed, so a point that bounces is rigid in this step.
       point.m_contactPointFlags |=
           BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP;
     } else {

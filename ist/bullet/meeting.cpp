@@ -91,7 +91,7 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
       found = contact_patches(a, b, query, workspace(), room);
     }
     if (found.penetration.volume_max <= 0) {
-      // A bound tells enough: the first few nodes give one.
+      // A lower bound suffices: the first few nodes give one.
       constexpr SeparationSettings kGlance{.max_visits = 8, .inner_spheres = true};
       contact.clearance = separation(a, b, kGlance, workspace()).distance_min -
                           a.scale * a.tree.protrusion() - b.scale * b.tree.protrusion();

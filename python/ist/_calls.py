@@ -15,7 +15,7 @@ _KINDS = {
 
 
 def signature_of(function):
-    """Of a compiled function with one signature, as its own text has it; annotations are words."""
+    """The signature of a compiled function that has one; annotations are strings."""
     (text, _, defaults), = function.__nb_signature__
     kind, parameters = inspect.Parameter.POSITIONAL_OR_KEYWORD, []
     for part in re.split(r", (?![^\[]*\])", text[text.index("(") + 1:text.rindex(") ->")]):
@@ -33,7 +33,7 @@ def signature_of(function):
 
 
 def named(function, answer=None):
-    """The function, with mistakes in its arguments told by name. `answer`: of what it returns."""
+    """The function; errors in its arguments name them. `answer` converts what it returns."""
 
     @functools.wraps(function)
     def call(*args, **kwargs):

@@ -1,4 +1,4 @@
-// Assets in Bullet: what they meet, what is told of their contacts, how deep they rest.
+// Assets in Bullet: partners, contact events, resting depths.
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcherMt.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <btBulletDynamicsCommon.h>
