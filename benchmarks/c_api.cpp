@@ -24,7 +24,7 @@ using ist::benchmark::Report;
 struct Row {
   ist::PlacedTree a, b;
   ist_tree_t tree_a, tree_b;
-  ist_placed_tree_t c_a, c_b;  ///< point to these
+  ist_placed_t c_a, c_b;  ///< point to these
 };
 
 /// Medians over rounds.
@@ -65,8 +65,8 @@ T sized() {
   return result;
 }
 
-ist_placed_tree_t in_c(const ist_tree_t& tree, const ist::PlacedTree& like) {
-  return {sizeof(ist_placed_tree_t), &tree, std::bit_cast<ist_pose_t>(like.pose), like.scale};
+ist_placed_t in_c(const ist_tree_t& tree, const ist::PlacedTree& like) {
+  return {sizeof(ist_placed_t), &tree, nullptr, std::bit_cast<ist_pose_t>(like.pose), like.scale};
 }
 
 }  // namespace
@@ -155,9 +155,9 @@ int main(int argc, char** argv) {
                auto field = sized<ist_field_t>();
                field.kind = IST_HALF_SPACE;
                field.as.half_space.normal[2] = 1;
-               const ist_placed_field_t plane = {sizeof plane, &field,
-                                                 std::bit_cast<ist_pose_t>(rows[i].a.pose), 1};
-               ist_field_penetration(&plane, &rows[i].c_b, nullptr, &c_workspace, &c_penetration);
+               const ist_placed_t plane = {sizeof plane, nullptr, &field,
+                                           std::bit_cast<ist_pose_t>(rows[i].a.pose), 1};
+               ist_penetration(&plane, &rows[i].c_b, nullptr, &c_workspace, &c_penetration);
                sum -= bits(c_penetration.volume);
              }));
     if (sum != 0) return std::fprintf(stderr, "c_api: C and C++ differ\n"), 1;

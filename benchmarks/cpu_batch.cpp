@@ -47,6 +47,13 @@ class Asker {
   std::vector<ist::Penetration> answers_;
 };
 
+const ist::TreeView& tree_of(const ist::PlacedSolid& solid) {
+  return std::get<ist::PlacedTree>(solid.placed).tree;
+}
+ist::TreeView& tree_of(ist::PlacedSolid& solid) {
+  return std::get<ist::PlacedTree>(solid.placed).tree;
+}
+
 /// How many times as much so many threads do as one where they share nothing: each asks all pairs
 /// by penetration(), of copies of its own. What the machine has for them.
 double ceiling(std::span<const ist::PlacedPair> pairs, std::size_t threads) {
@@ -63,13 +70,13 @@ double ceiling(std::span<const ist::PlacedPair> pairs, std::size_t threads) {
   };
   std::vector<std::unique_ptr<Alone>> all;
   for (std::size_t i = 0; i < threads; ++i) {
-    auto one = std::make_unique<Alone>(pairs[0].a.tree, pairs[0].b.tree);
+    auto one = std::make_unique<Alone>(tree_of(pairs[0].a), tree_of(pairs[0].b));
     one->pairs.assign(pairs.begin(), pairs.end());
     for (ist::PlacedPair& pair : one->pairs) {
       // Rows have both solids either way round.
-      const bool as_first = &pair.a.tree.header() == &pairs[0].a.tree.header();
-      pair.a.tree = as_first ? one->a.view() : one->b.view();
-      pair.b.tree = as_first ? one->b.view() : one->a.view();
+      const bool as_first = &tree_of(pair.a).header() == &tree_of(pairs[0].a).header();
+      tree_of(pair.a) = as_first ? one->a.view() : one->b.view();
+      tree_of(pair.b) = as_first ? one->b.view() : one->a.view();
     }
     all.push_back(std::move(one));
   }
@@ -114,7 +121,7 @@ std::vector<ist::PlacedPair> many_assets(std::vector<ist::Asset>& assets, std::s
 }
 
 std::tuple<const void*, const void*> names(const ist::PlacedPair& pair) {
-  return {&pair.a.tree.header(), &pair.b.tree.header()};
+  return {&tree_of(pair.a).header(), &tree_of(pair.b).header()};
 }
 
 }  // namespace

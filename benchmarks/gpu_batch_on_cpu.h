@@ -18,28 +18,19 @@ namespace ist::benchmark {
 
 inline std::vector<PlacedPair> placed(const Scene& scene, std::size_t count) {
   std::vector<PlacedPair> out;
-  for (const BatchPair& pair : drawn(scene.poses, count))
-    out.push_back({{scene.a->view(), pair.pose_a, pair.scale_a},
-                   {scene.b->view(), pair.pose_b, pair.scale_b}});
-  return out;
-}
-
-inline std::vector<PlacedFieldPair> placed_in_field(const Scene& scene, std::size_t count) {
-  std::vector<PlacedFieldPair> out;
-  for (const BatchPair& pair : drawn(scene.poses, count))
-    out.push_back(
-        {{*scene.field, pair.pose_a, pair.scale_a}, {scene.b->view(), pair.pose_b, pair.scale_b}});
+  for (const BatchPair& pair : drawn(scene.poses, count)) {
+    const PlacedSolid b(scene.b->view(), pair.pose_b, pair.scale_b);
+    if (scene.field != nullptr)
+      out.push_back({{*scene.field, pair.pose_a, pair.scale_a}, b});
+    else
+      out.push_back({{scene.a->view(), pair.pose_a, pair.scale_a}, b});
+  }
   return out;
 }
 
 /// M/s by all cores; `answers` of as many.
 inline double cpu_rate(const Scene& scene, std::size_t count, std::vector<Penetration>& answers) {
-  std::vector<PlacedPair> pairs;
-  std::vector<PlacedFieldPair> in_field;
-  if (scene.field != nullptr)
-    in_field = placed_in_field(scene, count);
-  else
-    pairs = placed(scene, count);
+  const std::vector<PlacedPair> pairs = placed(scene, count);
   PenetrationSettings settings;
   settings.field = FieldUse::never;
   settings.pair_budget = scene.pair_budget;
@@ -48,10 +39,7 @@ inline double cpu_rate(const Scene& scene, std::size_t count, std::vector<Penetr
   double best = 1e30;
   for (int k = 0; k < 3; ++k) {
     const double start = benchmark::wall_seconds();
-    if (scene.field != nullptr)
-      penetration_batch(in_field, settings, workspaces, answers, tbb_parallel_for());
-    else
-      penetration_batch(pairs, settings, workspaces, answers, tbb_parallel_for());
+    penetration_batch(pairs, settings, workspaces, answers, tbb_parallel_for());
     best = std::min(best, benchmark::wall_seconds() - start);
   }
   return static_cast<double>(count) / best * 1e-6;

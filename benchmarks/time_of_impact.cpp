@@ -61,9 +61,7 @@ struct Way {
   double time = 1;  ///< of the first contact, if it hits
 };
 
-ist::Pose pose_at(const Way& way, double time) {
-  return ist::moved(ist::PlacedTree{{}, way.from, 1}, way.motion, time).pose;
-}
+ist::Pose pose_at(const Way& way, double time) { return ist::moved(way.from, way.motion, time); }
 
 /// The first crossing of the surfaces that samples show, then by bisection.
 void find_truth(const Body& a, const Body& b, Way& way) {

@@ -35,22 +35,26 @@ function(ist_compile_options target)
   endif()
 endfunction()
 
-# Eigen and the standard library take a third of the compiler's time, so they are compiled once for
-# libraries and once for programs, whose flags differ. -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON shows
-# what a source forgot to include. ccache needs CCACHE_SLOPPINESS=pch_defines,time_macros.
+# Headers of others take most of the compiler's time, so they are compiled once for libraries and
+# once for programs, whose flags differ. A directory whose sources include more sets IST_MORE_HEADERS
+# (a name, then headers) and IST_MORE_LIBS, which they need.
+# -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON shows what a source forgot to include. ccache needs
+# CCACHE_SLOPPINESS=pch_defines,time_macros.
 function(ist_precompile target)
   if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     return()
   endif()
   get_target_property(type ${target} TYPE)
-  set(headers "<Eigen/Geometry>" "<algorithm>" "<functional>" "<memory>" "<random>" "<string>")
+  set(more ${IST_MORE_HEADERS})
+  list(POP_FRONT more owner)
   if(type STREQUAL "EXECUTABLE")
-    set(owner ist_headers_of_programs)
+    string(PREPEND owner "ist_headers_of_programs")
   else()
-    set(owner ist_headers_of_libraries)
+    string(PREPEND owner "ist_headers_of_libraries")
   endif()
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-fpch-preprocess>)
   if(target STREQUAL owner)
+    set(headers "<Eigen/Geometry>" "<algorithm>" "<functional>" "<memory>" "<random>" "<string>" ${more})
     list(TRANSFORM headers REPLACE "(.+)" "$<$<COMPILE_LANGUAGE:CXX>:\\1>")
     target_precompile_headers(${target} PRIVATE ${headers})
     return()
@@ -62,7 +66,7 @@ function(ist_precompile target)
     else()
       add_library(${owner} OBJECT EXCLUDE_FROM_ALL ${PROJECT_BINARY_DIR}/headers.cpp)
     endif()
-    target_link_libraries(${owner} PRIVATE Eigen3::Eigen)
+    target_link_libraries(${owner} PRIVATE Eigen3::Eigen ${IST_MORE_LIBS})
     ist_compile_options(${owner})
   endif()
   target_precompile_headers(${target} REUSE_FROM ${owner})

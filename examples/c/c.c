@@ -24,15 +24,15 @@ int main(int argc, char** argv) {
 
   floor.as.half_space.normal[2] = 1; /* z <= 0 */
   for (step = bad = 0; step < 10 && !bad; ++step) {
-    ist_placed_tree_t a = {.size = sizeof a, .tree = &tree_a, .pose = here};
-    ist_placed_tree_t b = {.size = sizeof b, .tree = &tree_b, .pose = here};
-    ist_placed_field_t ground = {.size = sizeof ground, .field = &floor, .pose = here};
+    ist_placed_t a = {.size = sizeof a, .tree = &tree_a, .pose = here};
+    ist_placed_t b = {.size = sizeof b, .tree = &tree_b, .pose = here};
+    ist_placed_t ground = {.size = sizeof ground, .field = &floor, .pose = here};
     ist_penetration_settings_t settings = {.size = sizeof settings, .pair_budget = 10000};
     ist_penetration_t overlap = {.size = sizeof overlap}, sunk = {.size = sizeof sunk};
     ist_separation_t gap = {.size = sizeof gap};
     b.pose.t[2] = 1.0 - 0.1 * step;
     bad = failed("query", ist_query(&a, &b, &settings, NULL, &workspace, &overlap, &gap)) ||
-          failed("floor", ist_field_penetration(&ground, &b, NULL, &workspace, &sunk));
+          failed("floor", ist_penetration(&ground, &b, NULL, &workspace, &sunk));
     printf("z %4.1f  volume %-10.4g gap %-8.4g force/k on B along z %-9.4g in the floor %.4g\n",
            b.pose.t[2], overlap.volume, gap.distance, -overlap.translation_gradient[2],
            sunk.volume);

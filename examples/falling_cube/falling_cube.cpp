@@ -90,7 +90,7 @@ int main(int argc, char** argv) try {
                     impact.distance_max);
       }
     }
-    cube = ist::moved(cube, motion, kStep);
+    cube.pose = ist::moved(cube.pose, motion, kStep);
   }
 
   const double falls = std::sqrt(2 * lowest / kGravity);

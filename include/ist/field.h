@@ -2,11 +2,10 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <span>
 #include <variant>
 
 #include <ist/api.h>
-#include <ist/query.h>
+#include <ist/tree_view.h>
 
 // Fields: shapes that a sphere tree collides with and that need no tree themselves: half-spaces,
 // primitives, terrains, distance grids, functions, and the surface of an asset. They are plain
@@ -50,8 +49,7 @@ struct CylinderField {
 };
 
 /// Terrain: the solid under a grid of heights along z, two triangles per cell, cut from (i, j) to
-/// (i
-/// + 1, j + 1). Exact. Beyond its border it continues level. A height that is not finite gives
+/// (i + 1, j + 1). Exact. Beyond its border it continues level. A height that is not finite gives
 /// QueryStatus::invalid_input where a query samples it, on a GPU wherever the terrain is.
 struct HeightField {
   const float* heights = nullptr;  ///< [u] [rows · columns], columns (x) run fastest
@@ -96,56 +94,5 @@ struct MeshField {
 
 using Field = std::variant<HalfSpaceField, BoxField, BallField, CapsuleField, CylinderField,
                            HeightField, DistanceGridField, FunctionField, MeshField>;
-
-/// A field at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
-struct PlacedField {
-  Field field;
-  Pose pose;
-  double scale = 1;  ///< > 0
-};
-
-/// Overlap of a field, held still, and a placed tree: the sum over B's spheres of the part that
-/// lies inside the field. The gradients are those of that sum. volume_min and volume_max include
-/// the field's error. Measure::exact returns not_held: a field has no mesh.
-///
-/// Limits stop it as they stop a pair of trees; pair_budget has no effect. invalid_input also if
-/// the field's numbers are out of range.
-///
-/// No allocation, lock or exception. Fields and trees may be shared by threads; the workspace may
-/// not.
-Penetration penetration(const PlacedField& a, const PlacedTree& b,
-                        const PenetrationSettings& settings, Workspace& workspace) noexcept;
-
-/// Distance between the field and B's inner spheres, and a certified interval for the solids.
-///
-/// Certified as far as the field's distances are: see each field.
-Separation separation(const PlacedField& a, const PlacedTree& b, const SeparationSettings& settings,
-                      Workspace& workspace) noexcept;
-
-/// penetration() and separation() in one call.
-PenetrationAndSeparation query(const PlacedField& a, const PlacedTree& b,
-                               const QuerySettings& settings, Workspace& workspace) noexcept;
-
-/// Condenses the contact into at most patches.size() patches, divided along B's tree.
-ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
-                               const ContactSettings& settings, Workspace& workspace,
-                               std::span<ContactPatch> patches) noexcept;
-
-/// A field and a tree of a batch.
-struct PlacedFieldPair {
-  PlacedField a;
-  PlacedTree b;
-};
-
-/// answers[i] = penetration(pairs[i]), as for the batch of trees.
-void penetration_batch(std::span<const PlacedFieldPair> pairs, const PenetrationSettings& settings,
-                       std::span<Workspace> workspaces, std::span<Penetration> answers,
-                       const ParallelFor& parallel = {}) noexcept;
-
-/// answers[i] = contact_patches(pairs[i]), as for the batch of trees.
-void contact_patches_batch(std::span<const PlacedFieldPair> pairs, const ContactSettings& settings,
-                           std::span<Workspace> workspaces, std::span<ContactPatches> answers,
-                           std::span<ContactPatch> patches,
-                           const ParallelFor& parallel = {}) noexcept;
 
 }  // namespace ist

@@ -250,19 +250,6 @@ typedef struct ist_pose {
 #define IST_POSE_IDENTITY {{1, 0, 0, 0}, {0, 0, 0}}
 /* clang-format on */
 
-/* x_world = R (scale · x) + t */
-typedef struct ist_placed_tree {
-  uint32_t size;
-  const ist_tree_t* tree;
-  ist_pose_t pose;
-  double scale; /* > 0; 0 is taken for 1 */
-} ist_placed_tree_t;
-
-/* In the world, axes and scale included. */
-ist_status_t ist_placed_mass_properties(const ist_placed_tree_t* placed,
-                                        ist_mass_properties_t* properties);
-ist_status_t ist_placed_bounds(const ist_placed_tree_t* placed, ist_bounds_t* bounds);
-
 /* --- Fields: solids without spheres (field.h). Distances are positive inside. ----------------- */
 
 typedef int32_t ist_field_kind_t;
@@ -335,13 +322,19 @@ typedef struct ist_field {
   } as;
 } ist_field_t;
 
-/* x_world = R (scale · x) + t */
-typedef struct ist_placed_field {
+/* A solid at a pose: an asset or a field, the other pointer null. x_world = R (scale · x) + t */
+typedef struct ist_placed {
   uint32_t size;
+  const ist_tree_t* tree;
   const ist_field_t* field;
   ist_pose_t pose;
   double scale; /* > 0; 0 is taken for 1 */
-} ist_placed_field_t;
+} ist_placed_t;
+
+/* In the world, axes and scale included. A field: IST_NOT_HELD. */
+ist_status_t ist_placed_mass_properties(const ist_placed_t* placed,
+                                        ist_mass_properties_t* properties);
+ist_status_t ist_placed_bounds(const ist_placed_t* placed, ist_bounds_t* bounds);
 
 /* --- Workspaces ------------------------------------------------------------------------------- */
 
@@ -449,20 +442,22 @@ typedef struct ist_outline {
   size_t total, count; /* answer: segments there are, and segments written */
 } ist_outline_t;
 
-/* --- Queries of two trees. Trees may be shared by threads; the workspace may not. ------------- */
+/* --- Queries of two solids -------------------------------------------------------------------- */
 
-/* Each returns the status of its answer, or an error of the call. */
+/* Two assets, or an asset and a field in either order; two fields answer IST_NOT_HELD. Functions
+ * that name only assets answer so for any field. Each returns the status of its answer, or an error
+ * of the call. Trees and fields may be shared by threads; the workspace may not. */
 
-ist_status_t ist_penetration(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_penetration(const ist_placed_t* a, const ist_placed_t* b,
                              const ist_penetration_settings_t* settings, ist_workspace_t* workspace,
                              ist_penetration_t* answer);
 
 /* Removes from an answer what protruding spheres add where flat faces meet. `whole` is the answer
  * of ist_penetration() by lenses (IST_FIELD_NEVER), and may be the same struct as `answer`. */
-ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_placed_tree_t* a,
-                                    const ist_placed_tree_t* b, ist_penetration_t* answer);
+ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_placed_t* a,
+                                    const ist_placed_t* b, ist_penetration_t* answer);
 
-ist_status_t ist_separation(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_separation(const ist_placed_t* a, const ist_placed_t* b,
                             const ist_separation_settings_t* settings, ist_workspace_t* workspace,
                             ist_separation_t* answer);
 
@@ -492,8 +487,8 @@ typedef int32_t ist_overlapping_t;
 enum { IST_OVERLAP_NO = 0, IST_OVERLAP_YES = 1, IST_OVERLAP_UNKNOWN = 2 };
 
 /* Takes a fraction of the time of a penetration. On an error, and for invalid input: unknown. */
-ist_status_t ist_overlap(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
-                         ist_workspace_t* workspace, ist_overlapping_t* answer);
+ist_status_t ist_overlap(const ist_placed_t* a, const ist_placed_t* b, ist_workspace_t* workspace,
+                         ist_overlapping_t* answer);
 
 /* PairFit: whether the sizes of two assets suit each other, independent of their poses. */
 typedef struct ist_pair_fit {
@@ -508,18 +503,17 @@ typedef struct ist_pair_fit {
 } ist_pair_fit_t;
 
 /* Needs no workspace: takes nanoseconds. */
-ist_status_t ist_get_pair_fit(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
-                              ist_pair_fit_t* fit);
+ist_status_t ist_get_pair_fit(const ist_placed_t* a, const ist_placed_t* b, ist_pair_fit_t* fit);
 
 /* Both in one call. Returns the worse status: the more negative one, or else the larger. */
-ist_status_t ist_query(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_query(const ist_placed_t* a, const ist_placed_t* b,
                        const ist_penetration_settings_t* penetration_settings,
                        const ist_separation_settings_t* separation_settings,
                        ist_workspace_t* workspace, ist_penetration_t* penetration,
                        ist_separation_t* separation);
 
 /* `whole`: the whole contact; may be null. */
-ist_status_t ist_contact_patches(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_contact_patches(const ist_placed_t* a, const ist_placed_t* b,
                                  const ist_contact_settings_t* settings, ist_workspace_t* workspace,
                                  ist_contact_patches_t* patches, ist_penetration_t* whole);
 
@@ -528,7 +522,7 @@ ist_status_t ist_contact_patches(const ist_placed_tree_t* a, const ist_placed_tr
  * A patch that lies inside the other solid as a whole has none.
  * IST_BUDGET_EXHAUSTED: max_visits stopped it. There is no outline, and the matched spheres'
  * patches are written. `whole`: may be null. */
-ist_status_t ist_overlap_outline(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_overlap_outline(const ist_placed_t* a, const ist_placed_t* b,
                                  const ist_contact_settings_t* settings, ist_workspace_t* workspace,
                                  ist_contact_patches_t* patches, ist_outline_t* outline,
                                  ist_penetration_t* whole);
@@ -536,7 +530,7 @@ ist_status_t ist_overlap_outline(const ist_placed_tree_t* a, const ist_placed_tr
 /* Removes from patches, in place, what protruding spheres add where flat faces meet, each by its
  * own depth. A patch of which nothing is left stays, with zeros.
  * `patches`: those that ist_contact_patches() wrote for these two under these settings. */
-ist_status_t ist_patches_without_protrusion(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_patches_without_protrusion(const ist_placed_t* a, const ist_placed_t* b,
                                             const ist_contact_settings_t* settings,
                                             ist_contact_patches_t* patches);
 
@@ -565,34 +559,10 @@ typedef struct ist_lenses {
   size_t total, count; /* answer: number of lenses, and of lenses written */
 } ist_lenses_t;
 
-/* For pictures (lenses.h). Needs no workspace. IST_INVALID_INPUT also for a level of detail that a
- * tree does not have. */
-ist_status_t ist_overlap_lenses(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+/* For pictures (lenses.h), of two assets. Needs no workspace. IST_INVALID_INPUT also for a level of
+ * detail that a tree does not have. */
+ist_status_t ist_overlap_lenses(const ist_placed_t* a, const ist_placed_t* b,
                                 const ist_lens_settings_t* settings, ist_lenses_t* lenses);
-
-/* --- The same of a field, held still, and a tree ---------------------------------------------- */
-
-ist_status_t ist_field_penetration(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                                   const ist_penetration_settings_t* settings,
-                                   ist_workspace_t* workspace, ist_penetration_t* answer);
-
-ist_status_t ist_field_separation(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                                  const ist_separation_settings_t* settings,
-                                  ist_workspace_t* workspace, ist_separation_t* answer);
-
-ist_status_t ist_field_overlap(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                               ist_workspace_t* workspace, ist_overlapping_t* answer);
-
-ist_status_t ist_field_query(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                             const ist_penetration_settings_t* penetration_settings,
-                             const ist_separation_settings_t* separation_settings,
-                             ist_workspace_t* workspace, ist_penetration_t* penetration,
-                             ist_separation_t* separation);
-
-ist_status_t ist_field_contact_patches(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                                       const ist_contact_settings_t* settings,
-                                       ist_workspace_t* workspace, ist_contact_patches_t* patches,
-                                       ist_penetration_t* whole);
 
 /* --- Rays and points against one solid (surface.h) -------------------------------------------- */
 
@@ -627,24 +597,14 @@ typedef struct ist_surface_point {
 } ist_surface_point_t;
 
 /* `hit_size`: sizeof(ist_ray_hit_t). */
-ist_status_t ist_raycast(const ist_placed_tree_t* solid, const ist_ray_t* rays, size_t count,
+ist_status_t ist_raycast(const ist_placed_t* solid, const ist_ray_t* rays, size_t count,
                          ist_ray_hit_t* hits, size_t hit_size);
-ist_status_t ist_field_raycast(const ist_placed_field_t* solid, const ist_ray_t* rays, size_t count,
-                               ist_ray_hit_t* hits, size_t hit_size);
-
 /* `points`: [3 · count]. `answer_size`: sizeof(ist_surface_point_t). */
-ist_status_t ist_closest_point(const ist_placed_tree_t* solid, const double* points, size_t count,
+ist_status_t ist_closest_point(const ist_placed_t* solid, const double* points, size_t count,
                                ist_surface_point_t* answers, size_t answer_size);
-ist_status_t ist_field_closest_point(const ist_placed_field_t* solid, const double* points,
-                                     size_t count, ist_surface_point_t* answers,
-                                     size_t answer_size);
-
 /* IST_OVERLAP_YES: inside; IST_OVERLAP_NO: outside; IST_OVERLAP_UNKNOWN: the status says why. */
-ist_status_t ist_contains(const ist_placed_tree_t* solid, const double* points, size_t count,
+ist_status_t ist_contains(const ist_placed_t* solid, const double* points, size_t count,
                           ist_overlapping_t* inside);
-ist_status_t ist_field_contains(const ist_placed_field_t* solid, const double* points, size_t count,
-                                ist_overlapping_t* inside);
-
 /* --- Wrenches (wrench.h): force and torque on both bodies ------------------------------------- */
 
 /* These functions need no workspace. */
@@ -716,7 +676,7 @@ typedef struct ist_impact_settings {
   uint32_t max_visits; /* count of node pairs visited; 0: no limit */
   double duration;     /* [T] > 0: the interval is [0, duration] */
   double tolerance;    /* [u] 0: a thousandth of the smaller solid's bounding radius, or ten
-                          times the error of the fields if that is more */
+                          times the error of the surfaces if that is more */
 } ist_impact_settings_t;
 
 /* TimeOfImpact */
@@ -735,25 +695,15 @@ typedef struct ist_impact {
 } ist_impact_t;
 
 /* Null motions are at rest. */
-ist_status_t ist_time_of_impact(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_time_of_impact(const ist_placed_t* a, const ist_placed_t* b,
                                 const ist_motion_t* motion_a, const ist_motion_t* motion_b,
                                 const ist_impact_settings_t* settings, ist_workspace_t* workspace,
                                 ist_impact_t* answer);
-ist_status_t ist_field_time_of_impact(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                                      const ist_motion_t* motion_a, const ist_motion_t* motion_b,
-                                      const ist_impact_settings_t* settings,
-                                      ist_workspace_t* workspace, ist_impact_t* answer);
-
 /* --- Batches ---------------------------------------------------------------------------------- */
 
 typedef struct ist_pair {
-  const ist_placed_tree_t *a, *b;
+  const ist_placed_t *a, *b;
 } ist_pair_t;
-
-typedef struct ist_field_pair {
-  const ist_placed_field_t* a;
-  const ist_placed_tree_t* b;
-} ist_field_pair_t;
 
 /* Runs a batch on the caller's threads. */
 typedef struct ist_parallel {
@@ -776,12 +726,6 @@ ist_status_t ist_penetration_batch(const ist_pair_t* pairs, size_t count,
                                    ist_penetration_t* answers, size_t answer_size,
                                    const ist_parallel_t* parallel);
 
-ist_status_t ist_field_penetration_batch(const ist_field_pair_t* pairs, size_t count,
-                                         const ist_penetration_settings_t* settings,
-                                         ist_workspace_t* workspaces, size_t workers,
-                                         ist_penetration_t* answers, size_t answer_size,
-                                         const ist_parallel_t* parallel);
-
 /* patches[i] and wholes[i] are what ist_contact_patches(pairs[i]) writes; wholes[i] has its status,
  * errors included.
  * `patches`: [count], each set up with its own space.
@@ -792,13 +736,6 @@ ist_status_t ist_contact_patches_batch(const ist_pair_t* pairs, size_t count,
                                        ist_workspace_t* workspaces, size_t workers,
                                        ist_contact_patches_t* patches, ist_penetration_t* wholes,
                                        size_t whole_size, const ist_parallel_t* parallel);
-
-ist_status_t ist_field_contact_patches_batch(const ist_field_pair_t* pairs, size_t count,
-                                             const ist_contact_settings_t* settings,
-                                             ist_workspace_t* workspaces, size_t workers,
-                                             ist_contact_patches_t* patches,
-                                             ist_penetration_t* wholes, size_t whole_size,
-                                             const ist_parallel_t* parallel);
 
 #ifdef __GNUC__
 #pragma GCC visibility pop

@@ -3,7 +3,6 @@
 #include <cstdint>
 
 #include <ist/api.h>
-#include <ist/field.h>
 #include <ist/query.h>
 
 namespace IST_API ist {
@@ -19,11 +18,7 @@ enum class Overlapping : std::uint32_t {
 };
 
 /// Stops at the first meeting pair of inner spheres: a fraction of the time of a penetration.
-///
-/// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
-Overlapping overlap(const PlacedTree& a, const PlacedTree& b, Workspace& workspace) noexcept;
-
-/// The same for a field, certain as far as its distances are: see each field.
-Overlapping overlap(const PlacedField& a, const PlacedTree& b, Workspace& workspace) noexcept;
+/// Certain of a field as far as its distances are: see each field. Two fields: unknown.
+Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace) noexcept;
 
 }  // namespace ist

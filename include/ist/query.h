@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <variant>
 
 #include <ist/api.h>
+#include <ist/field.h>
 #include <ist/pose.h>
 #include <ist/query_enums.h>
 #include <ist/tree_view.h>
@@ -66,6 +68,29 @@ struct PlacedTree {
   double scale = 1;  ///< > 0, about the object's own origin, before the pose
 };
 
+/// A field at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
+struct PlacedField {
+  Field field;
+  Pose pose;
+  double scale = 1;  ///< > 0
+};
+
+/// A solid of a query: an asset or a field at a pose.
+///
+/// A query takes two assets, or an asset and a field in either order. Two fields hold no spheres:
+/// the answer is not_held.
+struct PlacedSolid {
+  PlacedSolid() = default;
+  PlacedSolid(const PlacedTree& tree) : placed(tree) {}
+  PlacedSolid(const PlacedField& field) : placed(field) {}
+  PlacedSolid(const TreeView& tree, const Pose& pose, double scale = 1)
+      : placed(PlacedTree{tree, pose, scale}) {}
+  PlacedSolid(const Field& field, const Pose& pose, double scale = 1)
+      : placed(PlacedField{field, pose, scale}) {}
+
+  std::variant<PlacedTree, PlacedField> placed;
+};
+
 /// Overlap of two placed solids. Gradients are taken with respect to a motion of B, A held still.
 struct Penetration {
   double volume = 0;  ///< [u³] in the chosen measure
@@ -88,7 +113,7 @@ struct Penetration {
 };
 
 /// Gap of two placed solids, between their surfaces if both assets keep a mesh, else between their
-/// inner spheres. All zero once these overlap.
+/// inner spheres, or a field and these. All zero once these overlap.
 struct Separation {
   double distance = 0;      ///< [u] between surfaces or inner spheres
   double distance_min = 0;  ///< [u] lower bound of the true distance of the solids, certified
@@ -144,8 +169,14 @@ class Workspace {
 /// query are those of the returned volume. Copies of one asset at nearly the same pose are
 /// evaluated as unlike levels of detail, since coincident equal spheres would count too much.
 ///
-/// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
-Penetration penetration(const PlacedTree& a, const PlacedTree& b,
+/// Of a field it is the sum over the asset's spheres of the part that lies inside the field.
+/// volume_min and volume_max include the field's error. Limits stop it as they stop a pair of
+/// trees; pair_budget has no effect. Measure::exact returns not_held: a field has no mesh.
+/// invalid_input also if the field's numbers are out of range.
+///
+/// No allocation, lock or exception. Trees and fields may be shared by threads; the workspace may
+/// not. So for all queries.
+Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept;
 
 /// Removes from an answer what protruding spheres add where flat faces meet.
@@ -168,14 +199,13 @@ Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
 /// cross or one solid holds the other. Otherwise it is the distance of the inner spheres, exact to
 /// about 1e-6 of the objects' size, and all zero once these overlap. A stopped query returns the
 /// nearest points that it found; its interval is certified all the same. Batches on the GPU
-/// (<ist/gpu_query.h>) always use the inner spheres.
+/// (<ist/gpu_query.h>) always use the inner spheres. The distance from a field is that of the
+/// asset's inner spheres, certified as far as the field's distances are: see each field.
 ///
 /// Surfaces that run beside each other at one distance, as a nut's and a bolt's threads do, take
 /// milliseconds: in a loop, limit it or use the inner spheres.
-///
-/// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
-Separation separation(const PlacedTree& a, const PlacedTree& b, const SeparationSettings& settings,
-                      Workspace& workspace) noexcept;
+Separation separation(const PlacedSolid& a, const PlacedSolid& b,
+                      const SeparationSettings& settings, Workspace& workspace) noexcept;
 
 struct PenetrationAndSeparation {
   Penetration penetration;
@@ -183,7 +213,7 @@ struct PenetrationAndSeparation {
 };
 
 /// penetration() and separation() in one call: the unified query of the Inner Sphere Trees papers.
-PenetrationAndSeparation query(const PlacedTree& a, const PlacedTree& b,
+PenetrationAndSeparation query(const PlacedSolid& a, const PlacedSolid& b,
                                const QuerySettings& settings, Workspace& workspace) noexcept;
 
 /// One point of a contact manifold: the part of a contact near one region of the smaller solid.
@@ -228,11 +258,10 @@ struct ContactPatches {
 /// solid (B's if equal or if A is too coarse), always at the same places. The estimate of a stopped
 /// query is divided too. Under a pair budget the patches are those of the level of detail with the
 /// largest weight in the blend. The difference between the blend and that level is spread over them
-/// by volume: their sum stays continuous, and ids change where another level takes over. Costs 1.7
-/// (one patch) to 2.4 (32) times a penetration.
-///
-/// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
-ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
+/// by volume: their sum stays continuous, and ids change where another level takes over. The
+/// contact with a field is divided along the asset's tree. Costs 1.7 (one patch) to 2.4 (32) times
+/// a penetration.
+ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept;
 
@@ -252,8 +281,6 @@ struct OverlapOutline {
 /// contact_patches() with Measure::exact, whatever the settings say, and the outline of each patch:
 /// segments of the closed curves on which the surfaces cross. Seen from outside A, A's surface
 /// inside B is to the left of each. A patch that lies wholly inside the other solid has none.
-///
-/// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches,
@@ -274,7 +301,7 @@ void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, co
 
 /// Two placed solids of a batch.
 struct PlacedPair {
-  PlacedTree a, b;
+  PlacedSolid a, b;
 };
 
 /// Runs penetration_batch on the caller's threads: two pointers, no allocation.

@@ -6,7 +6,6 @@
 #include <span>
 
 #include <ist/api.h>
-#include <ist/field.h>
 #include <ist/query.h>
 
 // Rays and points against one solid: an asset that keeps its mesh (TreeView::has_mesh), or a field.
@@ -60,28 +59,19 @@ struct Containment {
 };
 
 /// The first hit of a ray. None slips through between triangles.
-RayHit raycast(const PlacedTree& solid, const Ray& ray) noexcept;
-RayHit raycast(const PlacedField& solid, const Ray& ray) noexcept;
+RayHit raycast(const PlacedSolid& solid, const Ray& ray) noexcept;
 
 /// Signed distance, nearest point and gradient. At equally near points one of them answers.
-SurfacePoint closest_point(const PlacedTree& solid, const Eigen::Vector3d& point) noexcept;
-SurfacePoint closest_point(const PlacedField& solid, const Eigen::Vector3d& point) noexcept;
+SurfacePoint closest_point(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;
 
-Containment contains(const PlacedTree& solid, const Eigen::Vector3d& point) noexcept;
-Containment contains(const PlacedField& solid, const Eigen::Vector3d& point) noexcept;
+Containment contains(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;
 
 /// answers[i] is that of rays[i] or points[i], the same bits, for as many as there are answers.
-void raycast(const PlacedTree& solid, std::span<const Ray> rays,
+void raycast(const PlacedSolid& solid, std::span<const Ray> rays,
              std::span<RayHit> answers) noexcept;
-void raycast(const PlacedField& solid, std::span<const Ray> rays,
-             std::span<RayHit> answers) noexcept;
-void closest_point(const PlacedTree& solid, std::span<const Eigen::Vector3d> points,
+void closest_point(const PlacedSolid& solid, std::span<const Eigen::Vector3d> points,
                    std::span<SurfacePoint> answers) noexcept;
-void closest_point(const PlacedField& solid, std::span<const Eigen::Vector3d> points,
-                   std::span<SurfacePoint> answers) noexcept;
-void contains(const PlacedTree& solid, std::span<const Eigen::Vector3d> points,
-              std::span<Containment> answers) noexcept;
-void contains(const PlacedField& solid, std::span<const Eigen::Vector3d> points,
+void contains(const PlacedSolid& solid, std::span<const Eigen::Vector3d> points,
               std::span<Containment> answers) noexcept;
 
 }  // namespace ist

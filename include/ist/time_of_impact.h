@@ -4,7 +4,6 @@
 #include <cstdint>
 
 #include <ist/api.h>
-#include <ist/field.h>
 #include <ist/pose.h>
 #include <ist/query.h>
 
@@ -32,9 +31,8 @@ Motion motion_between(const Pose& from, const Pose& to, double duration,
                       const Eigen::Vector3d& about = Eigen::Vector3d::Zero(),
                       double scale = 1) noexcept;
 
-/// The object after `time` of a motion that starts at `start`.
-PlacedTree moved(const PlacedTree& start, const Motion& motion, double time) noexcept;
-PlacedField moved(const PlacedField& start, const Motion& motion, double time) noexcept;
+/// The pose after `time` of a motion that starts at `start`. `scale` is the object's.
+Pose moved(const Pose& start, const Motion& motion, double time, double scale = 1) noexcept;
 
 /// The motions of two placed solids.
 struct Motions {
@@ -64,8 +62,8 @@ struct ImpactSettings {
   double duration = 1;  ///< [T] ≥ 0: the interval is [0, duration]
 
   /// [u] An impact is reported when the gap is between a half of this and this. Zero, a negative
-  /// value or NaN: a thousandth of the smaller solid's bounding radius (of B's, if A is a field),
-  /// or ten times the error of the assets' fields if that is more.
+  /// value or NaN: a thousandth of the smaller solid's bounding radius (of the asset's, if the
+  /// other is a field), or ten times the error of the assets' fields if that is more.
   ///
   /// Solids that start nearer have an impact only if they approach. Over several calls they may
   /// come nearer than a half of this, but never to zero.
@@ -101,18 +99,14 @@ struct TimeOfImpact {
 /// A solid is represented by the surface in its asset (TreeView::has_field), or else by the cover
 /// balls of its inner spheres.
 ///
+/// Certified of a field as far as its distances are: see each field. Height fields, distance grids
+/// and functions give no direction: the other solid's faces are divided into pieces as small as the
+/// gap, so large flat faces near them take many visits. Parts of a distance grid or a function that
+/// lie wholly inside the other solid at the start are not found. Two fields: not_held.
+///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not. The
 /// same bits on every x86-64 level.
-TimeOfImpact time_of_impact(const PlacedTree& a, const PlacedTree& b, const Motions& motions,
-                            const ImpactSettings& settings, Workspace& workspace) noexcept;
-
-/// The same for a field and a tree.
-///
-/// Certified as far as the field's distances are: see each field. Height fields, distance grids and
-/// functions give no direction: B's faces are divided into pieces as small as the gap, so large
-/// flat faces near them take many visits. Parts of a distance grid or a function that lie wholly
-/// inside B at the start are not found.
-TimeOfImpact time_of_impact(const PlacedField& a, const PlacedTree& b, const Motions& motions,
+TimeOfImpact time_of_impact(const PlacedSolid& a, const PlacedSolid& b, const Motions& motions,
                             const ImpactSettings& settings, Workspace& workspace) noexcept;
 
 }  // namespace ist

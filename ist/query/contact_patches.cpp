@@ -7,6 +7,7 @@
 
 #include "query/asset/sphere_tree.h"
 #include "query/base/no_answer.h"
+#include "query/base/turned_over.h"
 #include "query/contact/contact_bins.h"
 #include "query/contact/write_patches.h"
 #include "query/descent/descent.h"
@@ -14,6 +15,7 @@
 #include "query/detail/detail_blend.h"
 #include "query/exact_penetration.h"
 #include "query/field/pair_overlap.h"
+#include "query/solid_queries.h"
 
 namespace ist {
 namespace {
@@ -100,15 +102,12 @@ class PairPatches {
     // A's spheres probe B: the patches come as pushes on A.
     const std::optional<RelativePose> turned = relative_pose(b_, a_);
     if (!turned) return 0;
+    Penetration whole = whole_;
+    turn_over(between(a_, b_), whole);
     const std::size_t count = write_patches(
         {scratch_.contact, filled, *turned, tree_a_.header->root[3] * turned->a_from_b.scale},
-        turned_over(whole_, b_, a_), patches);
-    Eigen::Vector3d between;
-    for (int k = 0; k < 3; ++k) between[k] = a_.pose.t[k] - b_.pose.t[k];
-    for (ContactPatch& patch : patches.first(count)) {
-      patch.torque = -(patch.torque + between.cross(patch.force));
-      patch.force = -patch.force;
-    }
+        whole, patches);
+    turn_over(between(b_, a_), patches.first(count));
     return count;
   }
 
@@ -152,9 +151,9 @@ struct ChosenLevel {
 
 }  // namespace
 
-ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
-                               const ContactSettings& settings, Workspace& workspace,
-                               std::span<ContactPatch> patches) noexcept {
+ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
+                            const ContactSettings& settings, Workspace& workspace,
+                            std::span<ContactPatch> patches) noexcept {
   if (settings.measure == Measure::exact)
     return exact_patches(a, b, settings, workspace, patches, {}).contact;
   if (lack_spheres(a, b)) return not_held<ContactPatches>();

@@ -1,9 +1,5 @@
 #include <optional>
 
-#include <ist/field.h>
-#include <ist/overlap.h>
-
-#include "query/base/batch.h"
 #include "query/base/no_answer.h"
 #include "query/contact/write_patches.h"
 #include "query/field/field_descent.h"
@@ -12,6 +8,7 @@
 #include "query/field/mesh_shape.h"
 #include "query/field/surface_descent.h"
 #include "query/field/with_shape.h"
+#include "query/solid_queries.h"
 
 namespace ist {
 namespace {
@@ -56,15 +53,15 @@ Penetration penetrate(const PlacedField& a, const PlacedTree& b, const SphereTre
 
 }  // namespace
 
-Penetration penetration(const PlacedField& a, const PlacedTree& b,
-                        const PenetrationSettings& settings, Workspace& workspace) noexcept {
+Penetration find_penetration(const PlacedField& a, const PlacedTree& b,
+                             const PenetrationSettings& settings, Workspace& workspace) noexcept {
   if (settings.measure == Measure::exact || lack_spheres(a, b)) return not_held<Penetration>();
   const SphereTree tree = sphere_tree(b.tree, settings.measure);
   return penetrate(a, b, tree, limits_of(settings), workspace, nullptr);
 }
 
-Separation separation(const PlacedField& a, const PlacedTree& b, const SeparationSettings& settings,
-                      Workspace& workspace) noexcept {
+Separation find_separation(const PlacedField& a, const PlacedTree& b,
+                           const SeparationSettings& settings, Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return not_held<Separation>();
   const std::optional<RelativePose> pose = pose_of(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Separation>();
@@ -79,7 +76,7 @@ Separation separation(const PlacedField& a, const PlacedTree& b, const Separatio
   return with_shape(a.field, search, invalid_input<Separation>);
 }
 
-Overlapping overlap(const PlacedField& a, const PlacedTree& b, Workspace& workspace) noexcept {
+Overlapping find_overlap(const PlacedField& a, const PlacedTree& b, Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return Overlapping::unknown;
   const std::optional<RelativePose> pose = pose_of(a, b);
   if (!pose || workspace.impl() == nullptr) return Overlapping::unknown;
@@ -94,15 +91,9 @@ Overlapping overlap(const PlacedField& a, const PlacedTree& b, Workspace& worksp
   return with_shape(a.field, search, [] { return Overlapping::unknown; });
 }
 
-PenetrationAndSeparation query(const PlacedField& a, const PlacedTree& b,
-                               const QuerySettings& settings, Workspace& workspace) noexcept {
-  return {penetration(a, b, settings.penetration, workspace),
-          separation(a, b, settings.separation, workspace)};
-}
-
-ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
-                               const ContactSettings& settings, Workspace& workspace,
-                               std::span<ContactPatch> patches) noexcept {
+ContactPatches find_patches(const PlacedField& a, const PlacedTree& b,
+                            const ContactSettings& settings, Workspace& workspace,
+                            std::span<ContactPatch> patches) noexcept {
   if (settings.measure == Measure::exact || lack_spheres(a, b)) return not_held<ContactPatches>();
   if (workspace.impl() == nullptr) return invalid_input<ContactPatches>();
   ContactPatches result;
@@ -117,18 +108,6 @@ ContactPatches contact_patches(const PlacedField& a, const PlacedTree& b,
                                result.penetration, patches);
   finish_patches(patches.first(result.count), 2 * pose->unit_a * radius);
   return result;
-}
-
-void penetration_batch(std::span<const PlacedFieldPair> pairs, const PenetrationSettings& settings,
-                       std::span<Workspace> workspaces, std::span<Penetration> answers,
-                       const ParallelFor& parallel) noexcept {
-  answer_batch(pairs, settings, workspaces, answers, parallel);
-}
-
-void contact_patches_batch(std::span<const PlacedFieldPair> pairs, const ContactSettings& settings,
-                           std::span<Workspace> workspaces, std::span<ContactPatches> answers,
-                           std::span<ContactPatch> patches, const ParallelFor& parallel) noexcept {
-  patch_batch(pairs, settings, workspaces, answers, patches, parallel);
 }
 
 }  // namespace ist

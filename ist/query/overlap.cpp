@@ -12,6 +12,7 @@
 #include "query/base/relative_pose.h"
 #include "query/descent/open_runs.h"
 #include "query/kernel/gap_kernel.h"
+#include "query/solid_queries.h"
 
 namespace ist {
 namespace {
@@ -109,7 +110,7 @@ class MeetingSearch {
 
 }  // namespace
 
-Overlapping overlap(const PlacedTree& a, const PlacedTree& b, Workspace& workspace) noexcept {
+Overlapping find_overlap(const PlacedTree& a, const PlacedTree& b, Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return Overlapping::unknown;
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return Overlapping::unknown;

@@ -5,11 +5,12 @@
 #include "query/detail/detail_blend.h"
 #include "query/exact_penetration.h"
 #include "query/field/pair_overlap.h"
+#include "query/solid_queries.h"
 
 namespace ist {
 
-Penetration penetration(const PlacedTree& a, const PlacedTree& b,
-                        const PenetrationSettings& settings, Workspace& workspace) noexcept {
+Penetration find_penetration(const PlacedTree& a, const PlacedTree& b,
+                             const PenetrationSettings& settings, Workspace& workspace) noexcept {
   if (settings.measure != Measure::exact && lack_spheres(a, b)) return not_held<Penetration>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Penetration>();

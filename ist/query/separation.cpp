@@ -15,6 +15,7 @@
 #include "query/exact/kept_mesh.h"
 #include "query/exact/mesh_distance.h"
 #include "query/kernel/gap_kernel.h"
+#include "query/solid_queries.h"
 
 namespace ist {
 namespace {
@@ -197,8 +198,8 @@ Separation surface_separation(const PlacedTree& a, const PlacedTree& b, const Re
 
 }  // namespace
 
-Separation separation(const PlacedTree& a, const PlacedTree& b, const SeparationSettings& settings,
-                      Workspace& workspace) noexcept {
+Separation find_separation(const PlacedTree& a, const PlacedTree& b,
+                           const SeparationSettings& settings, Workspace& workspace) noexcept {
   const bool surfaces = !settings.inner_spheres && keeps_mesh(a) && keeps_mesh(b);
   if (!surfaces && lack_spheres(a, b)) return not_held<Separation>();
   const std::optional<RelativePose> pose = relative_pose(a, b);

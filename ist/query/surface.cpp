@@ -298,63 +298,44 @@ auto with_solid(const PlacedField& placed, const Use& use) noexcept {
   return use(PlacedShape(placed));
 }
 
-template <class Placed, class Asked, class Answer, class... Kind>
-void answer_all(const Placed& placed, std::span<const Asked> asked, std::span<Answer> answers,
+template <class Asked, class Answer, class... Kind>
+void answer_all(const PlacedSolid& placed, std::span<const Asked> asked, std::span<Answer> answers,
                 Kind... kind) noexcept {
-  with_solid(placed, [&](const auto& solid) {
+  const auto answer = [&](const auto& solid) {
     for (std::size_t i = 0; i < std::min(asked.size(), answers.size()); ++i)
       answers[i] = solid.answer(asked[i], kind...);
-  });
+  };
+  std::visit([&](const auto& given) { with_solid(given, answer); }, placed.placed);
 }
 
-template <class Placed, class Asked, class Answer, class... Kind>
-Answer answer_one(const Placed& placed, const Asked& asked, Answer answer, Kind... kind) noexcept {
+template <class Asked, class Answer, class... Kind>
+Answer answer_one(const PlacedSolid& placed, const Asked& asked, Answer answer,
+                  Kind... kind) noexcept {
   answer_all(placed, std::span(&asked, 1), std::span(&answer, 1), kind...);
   return answer;
 }
 
 }  // namespace
 
-RayHit raycast(const PlacedTree& solid, const Ray& ray) noexcept {
+RayHit raycast(const PlacedSolid& solid, const Ray& ray) noexcept {
   return answer_one(solid, ray, RayHit());
 }
-RayHit raycast(const PlacedField& solid, const Ray& ray) noexcept {
-  return answer_one(solid, ray, RayHit());
-}
-SurfacePoint closest_point(const PlacedTree& solid, const Vector3d& point) noexcept {
+SurfacePoint closest_point(const PlacedSolid& solid, const Vector3d& point) noexcept {
   return answer_one(solid, point, SurfacePoint(), SurfacePoint());
 }
-SurfacePoint closest_point(const PlacedField& solid, const Vector3d& point) noexcept {
-  return answer_one(solid, point, SurfacePoint(), SurfacePoint());
-}
-Containment contains(const PlacedTree& solid, const Vector3d& point) noexcept {
-  return answer_one(solid, point, Containment(), Containment());
-}
-Containment contains(const PlacedField& solid, const Vector3d& point) noexcept {
+Containment contains(const PlacedSolid& solid, const Vector3d& point) noexcept {
   return answer_one(solid, point, Containment(), Containment());
 }
 
-void raycast(const PlacedTree& solid, std::span<const Ray> rays,
+void raycast(const PlacedSolid& solid, std::span<const Ray> rays,
              std::span<RayHit> answers) noexcept {
   answer_all(solid, rays, answers);
 }
-void raycast(const PlacedField& solid, std::span<const Ray> rays,
-             std::span<RayHit> answers) noexcept {
-  answer_all(solid, rays, answers);
-}
-void closest_point(const PlacedTree& solid, std::span<const Vector3d> points,
+void closest_point(const PlacedSolid& solid, std::span<const Vector3d> points,
                    std::span<SurfacePoint> answers) noexcept {
   answer_all(solid, points, answers, SurfacePoint());
 }
-void closest_point(const PlacedField& solid, std::span<const Vector3d> points,
-                   std::span<SurfacePoint> answers) noexcept {
-  answer_all(solid, points, answers, SurfacePoint());
-}
-void contains(const PlacedTree& solid, std::span<const Vector3d> points,
-              std::span<Containment> answers) noexcept {
-  answer_all(solid, points, answers, Containment());
-}
-void contains(const PlacedField& solid, std::span<const Vector3d> points,
+void contains(const PlacedSolid& solid, std::span<const Vector3d> points,
               std::span<Containment> answers) noexcept {
   answer_all(solid, points, answers, Containment());
 }

@@ -5,6 +5,7 @@
 #include "query/impact/field_search.h"
 #include "query/impact/pair_search.h"
 #include "query/probe/membership.h"
+#include "query/solid_queries.h"
 
 namespace ist {
 namespace {
@@ -39,8 +40,8 @@ bool hold(const ImpactSide& a, const ImpactSide& b, const RelativePose& pose) no
 
 }  // namespace
 
-TimeOfImpact time_of_impact(const PlacedTree& a, const PlacedTree& b, const Motions& motions,
-                            const ImpactSettings& settings, Workspace& workspace) noexcept {
+TimeOfImpact find_impact(const PlacedTree& a, const PlacedTree& b, const Motions& motions,
+                         const ImpactSettings& settings, Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return not_held<TimeOfImpact>();
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
   if (!frame || workspace.impl() == nullptr) return invalid_input<TimeOfImpact>();
@@ -55,12 +56,12 @@ TimeOfImpact time_of_impact(const PlacedTree& a, const PlacedTree& b, const Moti
   return PairSearch(*frame, side_a, side_b, loop).run();
 }
 
-TimeOfImpact time_of_impact(const PlacedField& a, const PlacedTree& b, const Motions& motions,
-                            const ImpactSettings& settings, Workspace& workspace) noexcept {
+TimeOfImpact find_impact(const PlacedField& a, const PlacedTree& b, const Motions& motions,
+                         const ImpactSettings& settings, Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return not_held<TimeOfImpact>();
   if (const MeshField* const mesh = std::get_if<MeshField>(&a.field)) {
     if (!mesh->tree.has_field()) return invalid_input<TimeOfImpact>();
-    return time_of_impact(PlacedTree{mesh->tree, a.pose, a.scale}, b, motions, settings, workspace);
+    return find_impact(PlacedTree{mesh->tree, a.pose, a.scale}, b, motions, settings, workspace);
   }
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
   if (!frame || workspace.impl() == nullptr) return invalid_input<TimeOfImpact>();

@@ -22,7 +22,7 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: jax.Array, *, pair
     solids: k Assets and Fields.
     poses: (k, 7), or (w, k, 7) for w scenes: qw, qx, qy, qz, tx [u], ty, tz. Quaternions may have any
         length but 0: what is meant is q/|q|, and the gradient is that of V(q/|q|).
-    pairs: (n, 2) numbers of solids, the second of each an Asset; None: all pairs of Assets, and each
+    pairs: (n, 2) numbers of solids, one of each an Asset; None: all pairs of Assets, and each
         Field with each Asset.
     scales: (k,) or (w, k) > 0; None: 1. Their gradient is the difference of two queries, exact to some
         1e-4, and takes three times as long.

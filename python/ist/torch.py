@@ -25,7 +25,7 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: torch.Tensor, *, p
         Quaternions may have any length but 0: what is meant is q/|q|, and the gradient is that of
         V(q/|q|), so that a step along it changes a rotation and hardly the length.
         On a GPU the volumes and gradients are made there (ist.gpu), and nothing waits on the host.
-    pairs: (n, 2) numbers of solids, the second of each an Asset; None: all pairs of Assets, and each
+    pairs: (n, 2) numbers of solids, one of each an Asset; None: all pairs of Assets, and each
         Field with each Asset.
     scales: (k,) or (w, k) > 0, where the poses are; None: 1. Their gradient is the difference of two
         queries, 0.05 % of the scale to either side, exact to some 1e-4, and takes three times as
@@ -155,9 +155,11 @@ class _Scene:
                                  f"{len(solids) - 1}")
             if first == second:
                 raise ValueError(f"pairs[{i}]: ({first}, {second}): a solid cannot be paired with itself")
-            if is_field[second]:
-                raise TypeError(f"pairs[{i}]: ({first}, {second}): solids[{second}] is a Field; it "
-                                "stands first in a pair")
+            if is_field[first] and is_field[second]:
+                raise ValueError(f"pairs[{i}]: ({first}, {second}): two Fields; one of them must be "
+                                 "an Asset")
+        # A batch takes the Field first; a volume and its gradients by either pose know no order.
+        pairs = np.where(is_field[pairs[:, 1:]], pairs[:, ::-1], pairs)
         assets, asset_place = _each_once(solids, ist.Asset)
         fields, field_place = _each_once(solids, ist.Field)
         self.assets = ist.gpu.Assets(assets, device=device.index)

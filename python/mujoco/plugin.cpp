@@ -78,8 +78,8 @@ void write_pose(Pose& pose, const mjtNum* q, const mjtNum* t) {
 
 /// An asset is in the frame of the mesh's file; MuJoCo moves a mesh to its centre of mass and turns
 /// it to its principal axes.
-ist_placed_tree_t place(const mjModel* m, const mjData* d, int geom, const Instance& solid) {
-  ist_placed_tree_t out = {};
+ist_placed_t place(const mjModel* m, const mjData* d, int geom, const Instance& solid) {
+  ist_placed_t out = {};
   out.size = sizeof out;
   out.tree = &solid.tree->tree;
   mjtNum q[4] = {d->geom_xquat[4 * geom], d->geom_xquat[4 * geom + 1], d->geom_xquat[4 * geom + 2],
@@ -101,7 +101,7 @@ ist_placed_tree_t place(const mjModel* m, const mjData* d, int geom, const Insta
 
 /// A geom without an asset, as a shape. False: there is none for it.
 bool shape_of(const mjModel* m, const mjData* d, int geom, ist_field_t& field,
-              ist_placed_field_t& placed) {
+              ist_placed_t& placed) {
   field = {};
   field.size = sizeof field;
   placed = {};
@@ -168,9 +168,9 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   if (first == nullptr && second == nullptr)
     return before[m->geom_type[g1]][m->geom_type[g2]](m, d, out, g1, g2, margin);
   Scratch& memory = scratch();
-  ist_placed_tree_t a, b;
+  ist_placed_t a, b;
   ist_field_t field;
-  ist_placed_field_t shape;
+  ist_placed_t shape;
   if (first != nullptr) a = place(m, d, g1, *first);
   if (second == nullptr || (first == nullptr && !shape_of(m, d, g1, field, shape))) {
     complain_once(
@@ -197,7 +197,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   whole.size = sizeof whole;
   ist_status_t status =
       two ? ist_contact_patches(&a, &b, &settings, &memory.workspace, &patches, &whole)
-          : ist_field_contact_patches(&shape, &b, &settings, &memory.workspace, &patches, &whole);
+          : ist_contact_patches(&shape, &b, &settings, &memory.workspace, &patches, &whole);
   if (status < 0) {
     complain_once((std::string("ist.solid: ") + ist_describe(status)).c_str());
     return 0;
@@ -210,7 +210,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   ist_separation_t gap = {};
   gap.size = sizeof gap;
   status = two ? ist_separation(&a, &b, nullptr, &memory.workspace, &gap)
-               : ist_field_separation(&shape, &b, nullptr, &memory.workspace, &gap);
+               : ist_separation(&shape, &b, nullptr, &memory.workspace, &gap);
   if (status < 0 || !(gap.distance > 0) || gap.distance >= margin) return 0;
   out->dist = gap.distance;
   for (int k = 0; k < 3; ++k) {

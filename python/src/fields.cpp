@@ -72,7 +72,7 @@ Solid solid_of(const py::handle& object, const char* name) {
 TreeView tree_of(const py::handle& object, const char* name) {
   const Solid solid = solid_of(object, name);
   if (const TreeView* const tree = std::get_if<TreeView>(&solid)) return *tree;
-  throw type_error(std::string(name) + ": a Field; only `a`, the first solid, can be one");
+  throw type_error(std::string(name) + ": a Field; wanted an Asset");
 }
 
 Field field_of(const py::handle& object, const char* name) {
@@ -83,9 +83,10 @@ Field field_of(const py::handle& object, const char* name) {
 }
 
 void add_fields(py::module_& module) {
-  py::class_<OwnedField>(module, "Field",
-                         "A shape that needs no asset. It can only be the first solid of a query. "
-                         "Lengths are [u] in the field's own frame.")
+  py::class_<OwnedField>(
+      module, "Field",
+      "A shape that needs no asset: one of the two solids of a query, the other is an "
+      "Asset. Lengths are [u] in the field's own frame.")
       .def("__repr__", [](const py::object& self) {
         return "ist." + type_name_of(self) + "(" + py::cast<const OwnedField&>(self).arguments +
                ")";

@@ -40,19 +40,17 @@ ScaleGradient scale_gradient(const Row& row, const Penetration& answer,
                              const PenetrationSettings& settings, Workspace& workspace) {
   const double step = row.b.scale / 2048;
   const auto volume = [&](double scale) {
-    Row moved = row;
-    moved.b.scale = scale;
-    return moved.answer([&](const auto& a, const PlacedTree& b) {
-      return penetration(a, b, settings, workspace).volume;
-    });
+    Side moved = row.b;
+    moved.scale = scale;
+    return penetration(row.a.placed(), moved.placed(), settings, workspace).volume;
   };
   ScaleGradient gradient;
   gradient.b = (volume(row.b.scale + step) - volume(row.b.scale - step)) / (2 * step);
   const Eigen::Vector3d way = Eigen::Map<const Eigen::Vector3d>(row.b.pose.t) -
-                              Eigen::Map<const Eigen::Vector3d>(row.pose_a.t);
+                              Eigen::Map<const Eigen::Vector3d>(row.a.pose.t);
   gradient.a =
       (3 * answer.volume - row.b.scale * gradient.b - way.dot(answer.translation_gradient)) /
-      row.scale_a;
+      row.a.scale;
   return gradient;
 }
 
@@ -65,8 +63,7 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
   }
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
-    const Penetration found = row.answer(
-        [&](const auto& a, const PlacedTree& b) { return penetration(a, b, settings, workspace); });
+    const Penetration found = penetration(row.a.placed(), row.b.placed(), settings, workspace);
     answers->write(i, row, found);
     if (!scale_gradients) return;
     const ScaleGradient gradient = found.volume != 0 && !std::isnan(found.volume)
@@ -89,7 +86,7 @@ PenetrationSettings penetration_settings(const std::string& measure, const std::
 constexpr const char* kPairDoc =
     R"(Volume, wrench and centroid of the overlap, for one pose or many.
 
-a: Asset or Field. b: Asset.
+a, b: Assets, or an Asset and a Field.
 poses: of B, (7,) or (n, 7): qw, qx, qy, qz, tx [u], ty, tz, or matrices (4, 4) or (n, 4, 4).
     Quaternions of any length but 0 are normalised. A C-ordered float64 array of rows is not copied.
     ist.poses() makes rows of other conventions.
@@ -99,7 +96,7 @@ constexpr const char* kSceneDoc = R"(The same for pairs of solids of one scene o
 
 solids: k Assets and Fields.
 poses: (k, 7), or (w, k, 7) for w scenes; matrices (4, 4) may stand for rows. scales: (k,) or (w, k), None: 1.
-pairs: (n, 2) indices of solids; the second of each pair is an Asset. Answers have shape (n,) or (w, n).)";
+pairs: (n, 2) indices of solids; one of each pair is an Asset. Answers have shape (n,) or (w, n).)";
 
 constexpr const char* kPenetrationDoc = R"(
 scale_gradients: fill scale_gradient and scale_gradient_a, at three times the cost.
@@ -172,13 +169,13 @@ void Penetrations::write(std::size_t i, const Row& row, const Penetration& answe
   *volume_min.row(i) = answer.volume_min;
   *volume_max.row(i) = answer.volume_max;
   Vector(centroid.row(i)) = answer.centroid;
-  const Eigen::Vector3d origin_a(row.pose_a.t), origin_b(row.b.pose.t);
+  const Eigen::Vector3d origin_a(row.a.pose.t), origin_b(row.b.pose.t);
   const Wrenches push = wrenches(answer, row.b.pose, origin_a, origin_b);
   Vector(force.row(i)) = push.on_b.force;
   Vector(torque.row(i)) = push.on_b.torque;
   write_pose_gradient(row.b.pose, answer.translation_gradient, answer.rotation_gradient,
                       pose_gradient.row(i));
-  write_pose_gradient(row.pose_a, -push.on_a.force, -push.on_a.torque, pose_gradient_a.row(i));
+  write_pose_gradient(row.a.pose, -push.on_a.force, -push.on_a.torque, pose_gradient_a.row(i));
 }
 
 void add_penetration(py::module_& module) {

@@ -70,8 +70,9 @@ std::shared_ptr<Penetrations> corrected(const Penetrations& whole, const Rows& r
   auto answers = std::make_shared<Penetrations>(rows.shape());
   for (std::size_t i = 0; i < rows.count(); ++i) {
     const Row row = rows.at(i);
-    const TreeView* const a = std::get_if<TreeView>(row.a);
-    if (a == nullptr) throw type_error("a: a Field; wanted an Asset");
+    for (const Side* const side : {&row.a, &row.b})
+      if (side->tree() == nullptr)
+        throw type_error(std::string(side == &row.a ? "a" : "b") + ": a Field; wanted an Asset");
     Penetration before;
     before.volume = *whole.volume.row(i);
     before.volume_min = *whole.volume_min.row(i);
@@ -83,7 +84,8 @@ std::shared_ptr<Penetrations> corrected(const Penetrations& whole, const Rows& r
     before.node_visits = *whole.node_visits.row(i);
     before.sphere_pairs = *whole.sphere_pairs.row(i);
     answers->write(i, row,
-                   without_protrusion(before, PlacedTree{*a, row.pose_a, row.scale_a}, row.b));
+                   without_protrusion(before, {*row.a.tree(), row.a.pose, row.a.scale},
+                                      {*row.b.tree(), row.b.pose, row.b.scale}));
   }
   return answers;
 }

@@ -92,7 +92,8 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
                    const py::object& scales, const py::object& poses_a, const py::object& scales_a,
                    const char* name) {
   Rows rows;
-  rows.solids_ = {solid_of(a, "a"), tree_of(b, "b")};
+  rows.solids_ = {solid_of(a, "a"), solid_of(b, "b")};
+  if (rows.are_fields(0, 1)) throw type_error("a, b: two Fields; one of them must be an Asset");
   rows.owners_ = {a, b};
   std::optional<std::size_t> count;  // as many rows as the arguments of many have
   const auto agree = [&](const Doubles& array, const char* name) {
@@ -153,8 +154,8 @@ Rows Rows::of_scene(const py::sequence& solids, const py::object& poses, const p
     if (std::min(first, second) < 0 || std::max(first, second) >= static_cast<std::int64_t>(k))
       refuse("solids are numbered 0 to " + std::to_string(k - 1));
     if (first == second) refuse("a solid cannot be paired with itself");
-    if (!std::holds_alternative<TreeView>(rows.solids_[static_cast<std::size_t>(second)]))
-      refuse("the second is a Field; only the first can be");
+    if (rows.are_fields(static_cast<std::size_t>(first), static_cast<std::size_t>(second)))
+      refuse("two Fields; one of them must be an Asset");
   }
   const std::size_t scenes = d == 3 ? places.shape(0) : 1;
   rows.pose_b_ = Values(std::move(places), 7, true);
@@ -173,6 +174,11 @@ Rows Rows::of_scene(const py::sequence& solids, const py::object& poses, const p
   rows.count_ = rows.pairs_of_scene_ * scenes;
   rows.sort_by_asset();
   return rows;
+}
+
+bool Rows::are_fields(std::size_t first, std::size_t second) const {
+  return std::holds_alternative<Field>(solids_[first]) &&
+         std::holds_alternative<Field>(solids_[second]);
 }
 
 void Rows::sort_by_asset() {
@@ -202,21 +208,17 @@ void Rows::sort_by_asset() {
 Row Rows::at(std::size_t i) const {
   Row row;
   if (pairs_ == nullptr) {
-    row.a = &solids_[0];
-    row.pose_a = pose_from(pose_a_.at(i));
-    row.scale_a = *scale_a_.at(i);
-    row.b = {std::get<TreeView>(solids_[1]), pose_from(pose_b_.at(i)), *scale_b_.at(i)};
+    row.a = {&solids_[0], pose_from(pose_a_.at(i)), *scale_a_.at(i)};
+    row.b = {&solids_[1], pose_from(pose_b_.at(i)), *scale_b_.at(i)};
     return row;
   }
   const std::int64_t* const pair = pairs_ + 2 * (i % pairs_of_scene_);
   const std::size_t scene = i / pairs_of_scene_ * solids_.size();
-  const auto first = static_cast<std::size_t>(pair[0]), second = static_cast<std::size_t>(pair[1]);
-  row.a = &solids_[first];
-  row.pose_a = pose_from(pose_b_.at(scene + first));
-  row.scale_a = *scale_b_.at(scene + first);
-  row.b = {std::get<TreeView>(solids_[second]), pose_from(pose_b_.at(scene + second)),
-           *scale_b_.at(scene + second)};
-  return row;
+  const auto side = [&](std::int64_t number) -> Side {
+    const auto k = static_cast<std::size_t>(number);
+    return {&solids_[k], pose_from(pose_b_.at(scene + k)), *scale_b_.at(scene + k)};
+  };
+  return {side(pair[0]), side(pair[1])};
 }
 
 std::string fault_of(const Pose& pose, double scale, const char* pose_name,
@@ -235,12 +237,16 @@ std::string fault_of(const Pose& pose, double scale, const char* pose_name,
 std::string fault_of(const Row& row, const char* name) {
   const std::string of_b = fault_of(row.b.pose, row.b.scale, name, "scales");
   if (!of_b.empty()) return of_b;
-  const std::string of_a = fault_of(row.pose_a, row.scale_a, "poses_a", "scales_a");
+  const std::string of_a = fault_of(row.a.pose, row.a.scale, "poses_a", "scales_a");
   if (!of_a.empty()) return of_a;
-  const TreeView* const tree = std::get_if<TreeView>(row.a);
+  const Side& asset = row.b.tree() != nullptr ? row.b : row.a;
+  const Side& other = row.b.tree() != nullptr ? row.a : row.b;
+  if (asset.tree() == nullptr) return {};
+  const PlacedTree placed{*asset.tree(), asset.pose, asset.scale};
   const bool near =
-      tree != nullptr ? relative_pose(PlacedTree{*tree, row.pose_a, row.scale_a}, row.b).has_value()
-                      : relative_pose(row.pose_a, row.scale_a, row.b).has_value();
+      other.tree() != nullptr
+          ? relative_pose({*other.tree(), other.pose, other.scale}, placed).has_value()
+          : relative_pose(other.pose, other.scale, placed).has_value();
   return near ? std::string()
               : std::string(name) + ": sizes or distances are more than 1e60 : 1 apart";
 }
@@ -250,22 +256,23 @@ void refuse_unanswered(const Rows& rows, QueryStatus status, Asked asked) {
   const Row row = rows.at(0);
   if (status == QueryStatus::invalid_input) {
     const std::string fault = fault_of(row);
-    throw value_error(fault.empty() ? "a: the Field has a number that is not finite" : fault);
+    throw value_error(fault.empty() ? "a, b: the Field has a number that is not finite" : fault);
   }
   if (status != QueryStatus::not_held) return;
-  const TreeView* const a = std::get_if<TreeView>(row.a);
-  const bool exact = asked.measure == Measure::exact;
-  if (exact && a == nullptr)
-    throw Error("a: a Field has no mesh, which measure='exact' needs; pass an Asset");
-  if (exact)
-    throw Error(std::string(a->has_mesh() ? "b" : "a") +
-                ": has no mesh, which measure='exact' needs; bake it with surface='all'");
-  for (const bool is_b : {true, false})
-    if (const TreeView* const tree = is_b ? &row.b.tree : a;
-        tree != nullptr && tree->sphere_count() == 0)
-      throw Error(std::string(is_b ? "b" : "a") +
-                  ": is a surface alone, without spheres; use penetration() with measure='exact', "
-                  "or bake it with bake()");
+  for (const Side* const side : {&row.a, &row.b}) {
+    const TreeView* const tree = side->tree();
+    const std::string name = side == &row.a ? "a" : "b";
+    if (asked.measure != Measure::exact) {
+      if (tree != nullptr && tree->sphere_count() == 0)
+        throw Error(name +
+                    ": is a surface alone, without spheres; use penetration() with "
+                    "measure='exact', or bake it with bake()");
+    } else if (tree == nullptr) {
+      throw Error(name + ": a Field has no mesh, which measure='exact' needs; pass an Asset");
+    } else if (!tree->has_mesh()) {
+      throw Error(name + ": has no mesh, which measure='exact' needs; bake it with surface='all'");
+    }
+  }
   throw Error(
       "field='always': the asset of coarser spheres holds no surface; bake it with surface='all', "
       "or use field='automatic'");

@@ -13,20 +13,22 @@
 
 namespace ist::python {
 
+/// One of the solids of a row.
+struct Side {
+  const Solid* solid = nullptr;
+  Pose pose;
+  double scale = 1;
+
+  /// Null: a field.
+  const TreeView* tree() const { return std::get_if<TreeView>(solid); }
+  PlacedSolid placed() const {
+    return std::visit([&](const auto& what) { return PlacedSolid(what, pose, scale); }, *solid);
+  }
+};
+
 /// Two placed solids.
 struct Row {
-  const Solid* a = nullptr;
-  Pose pose_a;
-  double scale_a = 1;
-  PlacedTree b;
-
-  /// ask(placed a, b) for a tree or a field.
-  template <class Ask>
-  auto answer(const Ask& ask) const {
-    if (const TreeView* const tree = std::get_if<TreeView>(a))
-      return ask(PlacedTree{*tree, pose_a, scale_a}, b);
-    return ask(PlacedField{std::get<Field>(*a), pose_a, scale_a}, b);
-  }
+  Side a, b;
 };
 
 /// Poses and scales that are asked about: views of the arguments' memory, held here.
@@ -43,7 +45,7 @@ class Rows {
   /// Solids of a scene, or of many alike, two at a time.
   ///
   /// `poses`: (k, 7), (w, k, 7), or matrices (4, 4) for rows; `scales`: None, (k,) or (w, k);
-  /// `pairs`: (n, 2), numbers of solids, the second an asset.
+  /// `pairs`: (n, 2), numbers of solids, one of them an asset.
   static Rows of_scene(const py::sequence& solids, const py::object& poses, const py::object& pairs,
                        const py::object& scales);
 
@@ -83,6 +85,7 @@ class Rows {
   std::size_t pairs_of_scene_ = 0;
   std::vector<std::size_t> order_;  ///< of the pairs; empty: as they come
 
+  bool are_fields(std::size_t first, std::size_t second) const;
   void sort_by_asset();
 };
 

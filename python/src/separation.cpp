@@ -66,9 +66,8 @@ std::unique_ptr<Separations> separations(const Rows& rows, const SeparationSetti
                                          unsigned threads) {
   auto answers = std::make_unique<Separations>(rows.shape());
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
-    answers->write(i, rows.at(i).answer([&](const auto& a, const PlacedTree& b) {
-      return separation(a, b, settings, workspace);
-    }));
+    const Row row = rows.at(i);
+    answers->write(i, separation(row.a.placed(), row.b.placed(), settings, workspace));
   });
   refuse_unanswered(rows, answers->status);
   return answers;
@@ -81,9 +80,8 @@ std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
     const Row row = rows.at(i);
     thread_local std::vector<ContactPatch> found;
     found.resize(each);
-    const ContactPatches answer = row.answer([&](const auto& a, const PlacedTree& b) {
-      return contact_patches(a, b, settings, workspace, found);
-    });
+    const ContactPatches answer =
+        contact_patches(row.a.placed(), row.b.placed(), settings, workspace, found);
     answers->penetration->write(i, row, answer.penetration);
     *answers->count.row(i) = static_cast<std::uint32_t>(answer.count);
     answers->write(i, std::span(found).first(answer.count));
@@ -102,13 +100,12 @@ std::unique_ptr<Outline> outline(const Rows& rows, std::size_t each,
   std::vector<OutlineSegment> segments(1024);
   for_each_row(rows, 1, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
-    const auto ask = [&] {
-      return row.answer([&](const auto& a, const PlacedTree& b) -> OverlapOutline {
-        if constexpr (std::is_same_v<decltype(a), const PlacedTree&>)
-          return overlap_outline(a, b, settings, workspace, patches, segments);
-        else  // which holds no mesh
-          return {contact_patches(a, b, settings, workspace, patches), 0};
-      });
+    const auto ask = [&]() -> OverlapOutline {
+      const TreeView *const a = row.a.tree(), *const b = row.b.tree();
+      if (a == nullptr || b == nullptr)  // a Field holds no mesh
+        return {contact_patches(row.a.placed(), row.b.placed(), settings, workspace, patches), 0};
+      return overlap_outline({*a, row.a.pose, row.a.scale}, {*b, row.b.pose, row.b.scale}, settings,
+                             workspace, patches, segments);
     };
     OverlapOutline found = ask();
     if (found.segments > segments.size()) {
@@ -137,8 +134,9 @@ py::object overlaps(const Rows& rows, unsigned threads) {
   if (rows.shape().empty() && !fault_of(rows.at(0)).empty())
     refuse_unanswered(rows, QueryStatus::invalid_input);
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
-    *answers.row(i) = static_cast<std::uint32_t>(rows.at(i).answer(
-        [&](const auto& a, const PlacedTree& b) { return overlap(a, b, workspace); }));
+    const Row row = rows.at(i);
+    *answers.row(i) =
+        static_cast<std::uint32_t>(overlap(row.a.placed(), row.b.placed(), workspace));
   });
   return answers.handed_out();
 }

@@ -53,13 +53,9 @@ struct SurfacePoints {
   Column<std::uint32_t> triangle, status;
 };
 
-/// A solid at a pose, in the place of a Row's first.
-Row placed_alone(const Solid& solid, const py::object& pose, double scale) {
-  Row row;
-  row.a = &solid;
-  row.scale_a = scale;
-  row.pose_a = take_pose(pose, scale);
-  return row;
+PlacedSolid placed_alone(const py::object& solid, const py::object& pose, double scale) {
+  const Solid view = solid_of(solid, "solid");
+  return Side{&view, take_pose(pose, scale), scale}.placed();
 }
 
 /// (3,) or (n, 3).
@@ -84,18 +80,16 @@ struct Places {
 /// ask(placed, i) for each place of `shape`, the GIL released. Where the solid does not hold what
 /// is asked, nothing is answered. One invalid place is a ValueError.
 template <class Ask>
-void ask_places(const Row& row, const Shape& shape, const char* places, const Ask& ask) {
+void ask_places(const PlacedSolid& placed, const Shape& shape, const char* places, const Ask& ask) {
   bool held = true, valid = true;
   {
     const py::gil_scoped_release released;
-    row.answer([&](const auto& placed, const PlacedTree&) {
-      const std::size_t count = shape.empty() ? 1 : shape[0];
-      for (std::size_t i = 0; i < count && held; ++i) {
-        const QueryStatus status = ask(placed, i);
-        held = status != QueryStatus::not_held;
-        valid = status != QueryStatus::invalid_input;
-      }
-    });
+    const std::size_t count = shape.empty() ? 1 : shape[0];
+    for (std::size_t i = 0; i < count && held; ++i) {
+      const QueryStatus status = ask(placed, i);
+      held = status != QueryStatus::not_held;
+      valid = status != QueryStatus::invalid_input;
+    }
   }
   if (!valid && shape.empty())
     throw value_error(std::string(places) + ": not finite, of length 0, or too far away");
@@ -150,17 +144,16 @@ void add_surfaces(py::module_& module) {
       "raycast",
       [](const py::object& solid, const py::object& pose, const py::object& origins,
          const py::object& directions, double longest, double scale) {
-        const Solid view = solid_of(solid, "solid");
-        const Row row = placed_alone(view, pose, scale);
+        const PlacedSolid placed = placed_alone(solid, pose, scale);
         const Places from(origins, "origins"), along(directions, "directions");
         if (!from.rows.empty() && !along.rows.empty() && from.count != along.count)
           throw value_error("directions: " + std::to_string(along.count) + " rows; origins have " +
                             std::to_string(from.count));
         const Shape& shape = from.rows.empty() ? along.rows : from.rows;
         auto answers = std::make_unique<RayHits>(shape);
-        ask_places(row, shape, "origins, directions, longest",
-                   [&](const auto& placed, std::size_t i) {
-                     const RayHit hit = raycast(placed, Ray{from.at(i), along.at(i), longest});
+        ask_places(placed, shape, "origins, directions, longest",
+                   [&](const PlacedSolid& at, std::size_t i) {
+                     const RayHit hit = raycast(at, Ray{from.at(i), along.at(i), longest});
                      answers->write(i, hit);
                      return hit.status;
                    });
@@ -172,12 +165,11 @@ void add_surfaces(py::module_& module) {
   module.def(
       "closest_point",
       [](const py::object& solid, const py::object& pose, const py::object& points, double scale) {
-        const Solid view = solid_of(solid, "solid");
-        const Row row = placed_alone(view, pose, scale);
+        const PlacedSolid placed = placed_alone(solid, pose, scale);
         const Places places(points, "points");
         auto answers = std::make_unique<SurfacePoints>(places.rows);
-        ask_places(row, places.rows, "points", [&](const auto& placed, std::size_t i) {
-          const SurfacePoint foot = closest_point(placed, places.at(i));
+        ask_places(placed, places.rows, "points", [&](const PlacedSolid& at, std::size_t i) {
+          const SurfacePoint foot = closest_point(at, places.at(i));
           answers->write(i, foot);
           return foot.status;
         });
@@ -188,12 +180,11 @@ void add_surfaces(py::module_& module) {
   module.def(
       "contains",
       [](const py::object& solid, const py::object& pose, const py::object& points, double scale) {
-        const Solid view = solid_of(solid, "solid");
-        const Row row = placed_alone(view, pose, scale);
+        const PlacedSolid placed = placed_alone(solid, pose, scale);
         const Places places(points, "points");
         const Column<std::uint32_t> answers(places.rows, {});
-        ask_places(row, places.rows, "points", [&](const auto& placed, std::size_t i) {
-          const Containment found = contains(placed, places.at(i));
+        ask_places(placed, places.rows, "points", [&](const PlacedSolid& at, std::size_t i) {
+          const Containment found = contains(at, places.at(i));
           *answers.row(i) = found.status != QueryStatus::ok ? 2 : found.inside ? 1 : 0;
           return found.status;
         });

@@ -75,11 +75,10 @@ void add_time_of_impact(py::module_& module) {
         for_each_row(from, threads, [&](std::size_t i, Workspace& workspace) {
           const Row start = from.at(i), end = to.at(i);
           const Motions motions{
-              motion_between(start.pose_a, end.pose_a, settings.duration, centre_a, start.scale_a),
+              motion_between(start.a.pose, end.a.pose, settings.duration, centre_a, start.a.scale),
               motion_between(start.b.pose, end.b.pose, settings.duration, centre, start.b.scale)};
-          answers->write(i, start.answer([&](const auto& one, const PlacedTree& other) {
-            return time_of_impact(one, other, motions, settings, workspace);
-          }));
+          answers->write(
+              i, time_of_impact(start.a.placed(), start.b.placed(), motions, settings, workspace));
         });
         if (from.shape().empty()) {
           const auto status = ImpactStatus{*answers->status.row(0)};

@@ -92,9 +92,8 @@ std::vector<PoseRow> asked_rows(const QueryOptions& options) {
 
 /// Answers every row, `repeat` rounds over all rows in turn, so that no row finds the branch
 /// predictor trained by itself. A row's time is the least of its rounds.
-template <class PlacedA>
-std::vector<Answer> answer(const PlacedA& a, const TreeView& b, const std::vector<PoseRow>& rows,
-                           const QueryOptions& options) {
+std::vector<Answer> answer(const PlacedSolid& a, const TreeView& b,
+                           const std::vector<PoseRow>& rows, const QueryOptions& options) {
   using Clock = std::chrono::steady_clock;
   std::vector<Answer> answers;
   answers.reserve(rows.size());

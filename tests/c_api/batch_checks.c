@@ -32,9 +32,8 @@ static void clear_rooms(ist_contact_patches_t* rooms, ist_contact_patch_t* room)
   }
 }
 
-static int patch_batches_answer(scene_t* s, const ist_pair_t* pairs,
-                                const ist_field_pair_t* field_pairs, ist_workspace_t* workspaces,
-                                ist_parallel_t* parallel) {
+static int patch_batches_answer(scene_t* s, const ist_pair_t* pairs, const ist_pair_t* field_pairs,
+                                ist_workspace_t* workspaces, ist_parallel_t* parallel) {
   static ist_contact_patch_t room[PAIRS * ROOM], lone[ROOM];
   static ist_contact_patches_t rooms[PAIRS];
   static ist_penetration_t wholes[PAIRS];
@@ -59,13 +58,12 @@ static int patch_batches_answer(scene_t* s, const ist_pair_t* pairs,
   CHECK(rooms[0].count > 0);
   clear_rooms(rooms, room);
   rooms[3].patch_size = 1;
-  CHECK(ist_field_contact_patches_batch(field_pairs, PAIRS, NULL, workspaces, 3, rooms, wholes,
-                                        size, NULL) == IST_OK);
+  CHECK(ist_contact_patches_batch(field_pairs, PAIRS, NULL, workspaces, 3, rooms, wholes, size,
+                                  NULL) == IST_OK);
   for (i = 0; i < PAIRS; ++i) {
     memset(lone, 0xcd, sizeof lone);
     one_room.patch_size = i == 3 ? 1 : sizeof lone[0];
-    ist_field_contact_patches(field_pairs[i].a, field_pairs[i].b, NULL, &s->workspace, &one_room,
-                              &one);
+    ist_contact_patches(field_pairs[i].a, field_pairs[i].b, NULL, &s->workspace, &one_room, &one);
     CHECK(memcmp(&one, &wholes[i], size) == 0 && one_room.count == rooms[i].count);
     CHECK(memcmp(lone, room + i * ROOM, sizeof lone) == 0);
     CHECK((one.status == IST_WRONG_SIZE) == (i == 3));
@@ -89,20 +87,20 @@ static int patch_batches_answer(scene_t* s, const ist_pair_t* pairs,
   CHECK(ist_contact_patches_batch(pairs, PAIRS, NULL, workspaces, 3, rooms, wholes, size - 8,
                                   NULL) == IST_WRONG_SIZE);
   rooms[2].size = 8;
-  CHECK(ist_field_contact_patches_batch(field_pairs, PAIRS, NULL, workspaces, 3, rooms, wholes,
-                                        size, NULL) == IST_WRONG_SIZE);
+  CHECK(ist_contact_patches_batch(field_pairs, PAIRS, NULL, workspaces, 3, rooms, wholes, size,
+                                  NULL) == IST_WRONG_SIZE);
   return 0;
 }
 
 int batches_answer(scene_t* s) {
-  ist_placed_tree_t placed[PAIRS];
+  ist_placed_t placed[PAIRS];
   ist_pair_t pairs[PAIRS];
-  ist_field_pair_t field_pairs[PAIRS];
+  ist_pair_t field_pairs[PAIRS];
   ist_penetration_t answers[PAIRS], one = {.size = sizeof one};
   ist_workspace_t workspaces[3] = {0};
   ist_parallel_t parallel = {.size = sizeof parallel, .run = backwards};
   ist_field_t field = {.size = sizeof field, .kind = IST_BALL};
-  ist_placed_field_t ball = {.size = sizeof ball};
+  ist_placed_t ball = {.size = sizeof ball};
   const size_t size = sizeof answers[0];
   size_t ran = 0, i;
   parallel.pool = &ran;
@@ -126,10 +124,10 @@ int batches_answer(scene_t* s) {
     CHECK(memcmp(&one, &answers[i], size) == 0);
     CHECK((one.status == IST_NULL_POINTER) == (i == 7));
   }
-  CHECK(ist_field_penetration_batch(field_pairs, PAIRS, NULL, workspaces, 3, answers, size, NULL) ==
+  CHECK(ist_penetration_batch(field_pairs, PAIRS, NULL, workspaces, 3, answers, size, NULL) ==
         IST_OK);
   for (i = 0; i < PAIRS; ++i) {
-    ist_field_penetration(field_pairs[i].a, field_pairs[i].b, NULL, &s->workspace, &one);
+    ist_penetration(field_pairs[i].a, field_pairs[i].b, NULL, &s->workspace, &one);
     CHECK(memcmp(&one, &answers[i], size) == 0);
   }
   parallel.run = counts_wrongly;

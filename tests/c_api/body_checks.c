@@ -11,7 +11,7 @@ int bodies_are_told(scene_t* s) {
   ist_contact_patch_t room[4];
   ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
   ist_twist_t towards = {.velocity = {1, 0, 0}};
-  ist_placed_tree_t wrong = s->b;
+  ist_placed_t wrong = s->b;
   const ist_tree_t empty = {0};
   const double origin[3] = {0, 0, 0};
   double rate = 1, by_patches = 0, part, sum = 0;
@@ -87,8 +87,8 @@ int impacts_are_found(scene_t* s) {
   ist_impact_t impact = {.size = sizeof impact}, other = {.size = sizeof other};
   ist_impact_settings_t settings = {.size = sizeof settings, .duration = 1};
   ist_field_t field = {.size = sizeof field, .kind = IST_HALF_SPACE};
-  ist_placed_field_t floor = {.size = sizeof floor, .field = &field, .pose = here};
-  ist_placed_tree_t b = s->b;
+  ist_placed_t floor = {.size = sizeof floor, .field = &field, .pose = here};
+  ist_placed_t b = s->b;
   ist_workspace_t none = {0};
   field.as.half_space.normal[2] = 1;
   b.pose.t[2] = 10;
@@ -107,7 +107,7 @@ int impacts_are_found(scene_t* s) {
   CHECK(impact.kind == IST_NO_IMPACT && impact.time == 1);
   CHECK(ist_time_of_impact(&s->a, &s->b, NULL, &motion, NULL, &s->workspace, &impact) == IST_OK);
   CHECK(impact.kind == IST_IMPACT_OVERLAPPING || impact.kind == IST_IMPACT_UNRESOLVED);
-  CHECK(ist_field_time_of_impact(&floor, &b, NULL, &motion, NULL, &s->workspace, &impact) >= 0);
+  CHECK(ist_time_of_impact(&floor, &b, NULL, &motion, NULL, &s->workspace, &impact) >= 0);
   CHECK(impact.time > 0.3 && impact.time < 0.5);
   settings.max_visits = 1;
   CHECK(ist_time_of_impact(&s->a, &b, NULL, &motion, &settings, &s->workspace, &impact) ==
@@ -122,7 +122,7 @@ int impacts_are_found(scene_t* s) {
   CHECK(ist_time_of_impact(&s->a, &b, NULL, &motion, NULL, &s->workspace, NULL) ==
         IST_NULL_POINTER);
   CHECK(ist_time_of_impact(&s->a, &b, NULL, &motion, NULL, &none, &impact) == IST_NO_HANDLE);
-  CHECK(ist_field_time_of_impact(NULL, &b, NULL, &motion, NULL, &s->workspace, &impact) ==
+  CHECK(ist_time_of_impact(NULL, &b, NULL, &motion, NULL, &s->workspace, &impact) ==
         IST_NULL_POINTER);
   settings.duration = 0; /* as a zeroed struct has it */
   CHECK(ist_time_of_impact(&s->a, &b, NULL, &motion, &settings, &s->workspace, &impact) ==

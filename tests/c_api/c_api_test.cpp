@@ -55,8 +55,8 @@ T sized() {
   return result;
 }
 
-ist_placed_tree_t placed_in_c(const ist_tree_t& tree, const PlacedTree& like) {
-  return {sizeof(ist_placed_tree_t), &tree, std::bit_cast<ist_pose_t>(like.pose), like.scale};
+ist_placed_t placed_in_c(const ist_tree_t& tree, const PlacedTree& like) {
+  return {sizeof(ist_placed_t), &tree, nullptr, std::bit_cast<ist_pose_t>(like.pose), like.scale};
 }
 
 #define EXPECT_SAME(a, b) \
@@ -120,7 +120,7 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
     const auto [a, b] = testing::placed(row, 1000);
     const ist_tree_t tree_a = viewed(testing::oracle_asset(row.mesh_a, 1000));
     const ist_tree_t tree_b = viewed(testing::oracle_asset(row.mesh_b, 1000));
-    const ist_placed_tree_t c_a = placed_in_c(tree_a, a), c_b = placed_in_c(tree_b, b);
+    const ist_placed_t c_a = placed_in_c(tree_a, a), c_b = placed_in_c(tree_b, b);
 
     PenetrationSettings settings;
     settings.measure = row.id % 16 == 0 ? Measure::matched : Measure::inner;
@@ -146,10 +146,10 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
     auto c_field = sized<ist_field_t>();
     c_field.kind = IST_MESH;
     c_field.as.mesh.tree = &tree_a;
-    const ist_placed_field_t c_placed = {sizeof c_placed, &c_field, c_a.pose, c_a.scale};
-    ASSERT_GE(ist_field_query(&c_placed, &c_b, nullptr, nullptr, &c_workspace_, &c_penetration,
-                              &c_separation),
-              0);
+    const ist_placed_t c_placed = {sizeof c_placed, nullptr, &c_field, c_a.pose, c_a.scale};
+    ASSERT_GE(
+        ist_query(&c_placed, &c_b, nullptr, nullptr, &c_workspace_, &c_penetration, &c_separation),
+        0);
     const PenetrationAndSeparation both = query(field, b, {}, workspace_);
     expect_same(c_penetration, both.penetration);
     expect_same(c_separation, both.separation);
@@ -178,7 +178,7 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
 
     PlacedTree away = b;
     away.pose.t[0] += 3;
-    ist_placed_tree_t c_away = placed_in_c(tree_b, away);
+    ist_placed_t c_away = placed_in_c(tree_b, away);
     const Motion motion{{-6, 0.1, 0.2}, {0.5, 0.6, 0.7}, {0.01, 0.02, 0.03}};
     const ist_motion_t c_motion = {{-6, 0.1, 0.2}, {0.5, 0.6, 0.7}, {0.01, 0.02, 0.03}};
     const TimeOfImpact impact = time_of_impact(a, away, {{}, motion}, {}, workspace_);
@@ -232,7 +232,7 @@ TEST(CApi, SurfaceAlone) {
   EXPECT_EQ(info.details, 0u);
   EXPECT_EQ(info.mesh_triangles, 12u);
   EXPECT_EQ(info.mesh_state, IST_MESH_OWN);
-  ist_placed_tree_t placed = {};
+  ist_placed_t placed = {};
   placed.size = sizeof placed;
   placed.tree = &tree;
   placed.pose = IST_POSE_IDENTITY;
@@ -261,8 +261,8 @@ TEST(CApi, RaysAndPointsHaveTheBitsOfCpp) {
   const Asset asset = bake_surface(close_mesh(testing::icosphere_mesh(3), "ball"));
   const ist_tree_t tree = viewed(asset);
   const PlacedTree placed{asset.view(), {{0.6, 0, 0.8, 0}, {1, 2, 3}}, 0.7};
-  const ist_placed_tree_t c_placed = {sizeof c_placed, &tree,
-                                      std::bit_cast<ist_pose_t>(placed.pose), placed.scale};
+  const ist_placed_t c_placed = {sizeof c_placed, &tree, nullptr,
+                                 std::bit_cast<ist_pose_t>(placed.pose), placed.scale};
   const double points[] = {1, 2.1, 3, 4, 5, 6, 1.3, 2, 3.2};
   ist_ray_t rays[3] = {};
   ist_ray_hit_t hits[3];
@@ -293,11 +293,11 @@ TEST(CApi, RaysAndPointsHaveTheBitsOfCpp) {
   ball.size = sizeof ball;
   ball.kind = IST_BALL;
   ball.as.ball.radius = 0.5;
-  const ist_placed_field_t c_ball = {sizeof c_ball, &ball, IST_POSE_IDENTITY, 1};
-  ASSERT_EQ(ist_field_closest_point(&c_ball, points, 3, feet, sizeof *feet), IST_OK);
+  const ist_placed_t c_ball = {sizeof c_ball, nullptr, &ball, IST_POSE_IDENTITY, 1};
+  ASSERT_EQ(ist_closest_point(&c_ball, points, 3, feet, sizeof *feet), IST_OK);
   EXPECT_NEAR(feet[0].distance, std::sqrt(14.41) - 0.5, 1e-12);
-  ASSERT_EQ(ist_field_contains(&c_ball, points, 3, inside), IST_OK);
-  ASSERT_EQ(ist_field_raycast(&c_ball, rays, 3, hits, sizeof *hits), IST_OK);
+  ASSERT_EQ(ist_contains(&c_ball, points, 3, inside), IST_OK);
+  ASSERT_EQ(ist_raycast(&c_ball, rays, 3, hits, sizeof *hits), IST_OK);
   rays[1].direction[0] = rays[1].direction[1] = rays[1].direction[2] = 0;
   EXPECT_EQ(ist_raycast(&c_placed, rays, 3, hits, sizeof *hits), IST_INVALID_INPUT);
   EXPECT_TRUE(std::isnan(hits[1].distance) && hits[2].status == IST_OK);
@@ -320,7 +320,7 @@ TEST(CApi, ExactHasTheBitsOfCpp) {
   ASSERT_EQ(ist_workspace_make(0, nullptr, &scratch), IST_OK);
   auto settings = sized<ist_penetration_settings_t>();
   settings.measure = IST_EXACT;
-  std::vector<ist_placed_tree_t> a, b;
+  std::vector<ist_placed_t> a, b;
   std::vector<Penetration> expected;
   for (int i = 0; i < 40; ++i) {
     const PlacedTree x{solids[0].view(), {}, 1};
@@ -382,7 +382,7 @@ TEST(CApi, OutlinesHaveTheBitsOfCpp) {
   for (int i = 0; i < 12; ++i) {
     const PlacedTree x{a.view(), {{0.6, 0, 0.8, 0}, {0.1, 0, 0}}, 1};
     const PlacedTree y{b.view(), {{1, 0, 0, 0}, {0.4 * (i % 4), 0.3 * (i % 3), 0.2}}, 0.7};
-    const ist_placed_tree_t c_x = placed_in_c(tree_a, x), c_y = placed_in_c(tree_b, y);
+    const ist_placed_t c_x = placed_in_c(tree_a, x), c_y = placed_in_c(tree_b, y);
     for (const std::size_t room : {0u, 1u, 2u, 32u}) {
       std::vector<ContactPatch> patches(room);
       std::vector<OutlineSegment> segments(room == 2 ? 10 : 20000);
@@ -508,7 +508,7 @@ TEST(CApi, PatchesWithoutProtrusion) {
   const Asset cube = bake(close_mesh(testing::cube_mesh(), "cube"), {.max_spheres = 500});
   const ist_tree_t tree = viewed(cube);
   const PlacedTree a{cube.view(), {}, 1}, b{cube.view(), {{1, 0, 0, 0}, {0.02, 0.01, 0.999}}, 1};
-  const ist_placed_tree_t c_a = placed_in_c(tree, a), c_b = placed_in_c(tree, b);
+  const ist_placed_t c_a = placed_in_c(tree, a), c_b = placed_in_c(tree, b);
   Workspace workspace;
   ContactPatch patches[16];
   const ContactSettings settings{.field = FieldUse::never};

@@ -66,12 +66,12 @@ static void print_patches(const ist_contact_patches_t* found) {
   }
 }
 
-static ist_placed_tree_t placed_a(void) {
-  const ist_placed_tree_t a = {sizeof a, &tree_a, IST_POSE_IDENTITY, 1};
+static ist_placed_t placed_a(void) {
+  const ist_placed_t a = {sizeof a, &tree_a, NULL, IST_POSE_IDENTITY, 1};
   return a;
 }
-static ist_placed_tree_t placed_b(int i) {
-  const ist_placed_tree_t b = {sizeof b, &tree_b, rows[i].pose, rows[i].scale};
+static ist_placed_t placed_b(int i) {
+  const ist_placed_t b = {sizeof b, &tree_b, NULL, rows[i].pose, rows[i].scale};
   return b;
 }
 
@@ -80,7 +80,7 @@ static ist_placed_tree_t placed_b(int i) {
 
 static void ask_penetration(int i, int print, ist_measure_t measure, ist_field_use_t use,
                             uint32_t pair_budget, uint32_t max_visits) {
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   const ist_penetration_settings_t settings = {.size = sizeof settings,
                                                .measure = measure,
                                                .field = use,
@@ -108,10 +108,10 @@ static void budget(int i, int print) {
 }
 
 static void ask_field(int i, int print, const ist_field_t* field) {
-  const ist_placed_field_t a = {sizeof a, field, IST_POSE_IDENTITY, 1};
-  const ist_placed_tree_t b = placed_b(i);
+  const ist_placed_t a = {sizeof a, NULL, field, IST_POSE_IDENTITY, 1};
+  const ist_placed_t b = placed_b(i);
   ist_penetration_t answer = {.size = sizeof answer};
-  ist_field_penetration(&a, &b, NULL, &workspace, &answer);
+  ist_penetration(&a, &b, NULL, &workspace, &answer);
   if (print) print_penetration(&answer);
 }
 
@@ -131,7 +131,7 @@ static void capsule(int i, int print) {
 }
 
 static void separation(int i, int print) {
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   ist_separation_t answer = {.size = sizeof answer};
   ist_separation(&a, &b, NULL, &workspace, &answer);
   if (!print) return;
@@ -141,7 +141,7 @@ static void separation(int i, int print) {
 }
 
 static void patches(int i, int print) {
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   ist_contact_patch_t room[kMostPatches];
   ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
   ist_penetration_t whole = {.size = sizeof whole};
@@ -153,7 +153,7 @@ static void patches(int i, int print) {
 
 static void outline(int i, int print) {
   static ist_outline_segment_t room[1 << 15];
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   ist_contact_patch_t patches_room[kMostPatches];
   ist_contact_patches_t found = {sizeof found, sizeof patches_room[0], patches_room, kMostPatches,
                                  0};
@@ -174,7 +174,7 @@ static void outline(int i, int print) {
 }
 
 static void without_protrusion(int i, int print) {
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   const ist_penetration_settings_t settings = {.size = sizeof settings, .field = IST_FIELD_NEVER};
   ist_penetration_t answer = {.size = sizeof answer};
   ist_penetration(&a, &b, &settings, &workspace, &answer);
@@ -183,7 +183,7 @@ static void without_protrusion(int i, int print) {
 }
 
 static void patches_without_protrusion(int i, int print) {
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   const ist_contact_settings_t settings = {.size = sizeof settings, .field = IST_FIELD_NEVER};
   ist_contact_patch_t room[kMostPatches];
   ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
@@ -193,7 +193,7 @@ static void patches_without_protrusion(int i, int print) {
 }
 
 static void fit(int i, int print) {
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   ist_pair_fit_t found = {.size = sizeof found};
   ist_get_pair_fit(&a, &b, &found);
   if (!print) return;
@@ -202,7 +202,7 @@ static void fit(int i, int print) {
 }
 
 static void wrenches(int i, int print) {
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   const double of_a[3] = {0.1, 0.2, 0.3}, of_b[3] = {-0.3, 0.2, 0.1};
   ist_penetration_t contact = {.size = sizeof contact};
   ist_wrenches_t found = {.size = sizeof found};
@@ -228,7 +228,7 @@ static void motions(int i, int print) {
 
 /* B on its way across A's origin while A turns. */
 static void impact(int i, int print) {
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   const double* const t = rows[i].pose.t;
   const ist_motion_t of_a = {.angular_velocity = {0, 0.25, 0}};
   const ist_motion_t of_b = {.velocity = {-2 * t[0], -2 * t[1], -2 * t[2]},
@@ -244,18 +244,18 @@ static void impact(int i, int print) {
 }
 
 static void batches(int i, int print) {
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   const ist_field_t half_space = {
       .size = sizeof half_space, .kind = IST_HALF_SPACE, .as.half_space = {{0, 0.6, 0.8}, 0.0625}};
-  const ist_placed_field_t ground = {sizeof ground, &half_space, IST_POSE_IDENTITY, 1};
+  const ist_placed_t ground = {sizeof ground, NULL, &half_space, IST_POSE_IDENTITY, 1};
   const ist_pair_t pairs[2] = {{&a, &b}, {&b, &a}};
-  const ist_field_pair_t field_pair = {&ground, &b};
+  const ist_pair_t field_pair = {&ground, &b};
   ist_contact_patch_t room[kMostPatches];
   ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
   ist_penetration_t answers[3], whole;
   int k;
   ist_penetration_batch(pairs, 2, NULL, &workspace, 1, answers, sizeof whole, NULL);
-  ist_field_penetration_batch(&field_pair, 1, NULL, &workspace, 1, answers + 2, sizeof whole, NULL);
+  ist_penetration_batch(&field_pair, 1, NULL, &workspace, 1, answers + 2, sizeof whole, NULL);
   ist_contact_patches_batch(pairs, 1, NULL, &workspace, 1, &found, &whole, sizeof whole, NULL);
   if (!print) return;
   for (k = 0; k < 3; ++k) print_penetration(&answers[k]);
@@ -265,7 +265,7 @@ static void batches(int i, int print) {
 
 /* From behind B, past its origin. */
 static void rays(int i, int print) {
-  const ist_placed_tree_t b = placed_b(i);
+  const ist_placed_t b = placed_b(i);
   const double* const t = rows[i].pose.t;
   const double sideways[3] = {0, 0.125, -0.03125};
   ist_ray_t asked[3];
@@ -285,20 +285,19 @@ static void rays(int i, int print) {
 
 /* Points about B's origin, against it and a half-space. */
 static void points(int i, int print) {
-  const ist_placed_tree_t b = placed_b(i);
+  const ist_placed_t b = placed_b(i);
   const ist_field_t half_space = {
       .size = sizeof half_space, .kind = IST_HALF_SPACE, .as.half_space = {{0, 0.6, 0.8}, 0.0625}};
-  const ist_placed_field_t ground = {sizeof ground, &half_space, IST_POSE_IDENTITY, 1};
+  const ist_placed_t ground = {sizeof ground, NULL, &half_space, IST_POSE_IDENTITY, 1};
   const double* const t = rows[i].pose.t;
-  const double asked[9] = {t[0], t[1], t[2],  t[0] + 0.25, t[1],
-                           t[2], t[0], t[1] + 0.0625, t[2]};
+  const double asked[9] = {t[0], t[1], t[2], t[0] + 0.25, t[1], t[2], t[0], t[1] + 0.0625, t[2]};
   ist_surface_point_t feet[6];
   ist_overlapping_t inside[6];
   int k;
   ist_closest_point(&b, asked, 3, feet, sizeof feet[0]);
-  ist_field_closest_point(&ground, asked, 3, feet + 3, sizeof feet[0]);
+  ist_closest_point(&ground, asked, 3, feet + 3, sizeof feet[0]);
   ist_contains(&b, asked, 3, inside);
-  ist_field_contains(&ground, asked, 3, inside + 3);
+  ist_contains(&ground, asked, 3, inside + 3);
   for (k = 0; k < 6 && print; ++k) {
     printf(" %d %u", inside[k], feet[k].triangle);
     print_doubles(&feet[k].distance, 8);
@@ -306,7 +305,7 @@ static void points(int i, int print) {
 }
 
 static void overlapping(int i, int print) {
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   ist_overlapping_t answer;
   ist_overlap(&a, &b, &workspace, &answer);
   if (print) printf(" %d", answer);
@@ -315,7 +314,7 @@ static void overlapping(int i, int print) {
 /* In the order of the trees. */
 static void lenses(int i, int print) {
   static ist_lens_t room[8];
-  const ist_placed_tree_t a = placed_a(), b = placed_b(i);
+  const ist_placed_t a = placed_a(), b = placed_b(i);
   ist_lenses_t found = {
       .size = sizeof found, .lens_size = sizeof room[0], .lenses = room, .capacity = 8};
   size_t k;

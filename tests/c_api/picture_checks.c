@@ -144,7 +144,7 @@ int lenses_are_told(scene_t* s) {
   ist_lens_settings_t settings = {.size = sizeof settings};
   ist_lens_t room[3];
   ist_lenses_t lenses = {.size = sizeof lenses, .lens_size = sizeof room[0]};
-  ist_placed_tree_t far_away = s->b, wrong = s->b;
+  ist_placed_t far_away = s->b, wrong = s->b;
   size_t total, i;
   memset(room, 0, sizeof room);
   CHECK(ist_overlap_lenses(&s->a, &s->b, NULL, &lenses) == IST_OK);

@@ -6,12 +6,12 @@
 int penetrations_answer(scene_t* s) {
   ist_penetration_t whole = {.size = sizeof whole}, other = {.size = sizeof other};
   ist_penetration_settings_t settings = {.size = sizeof settings};
-  ist_placed_tree_t wrong;
+  ist_placed_t wrong;
   const ist_tree_t empty = {0};
   ist_workspace_t none = {0};
   ist_tree_info_t info = {.size = sizeof info};
   ist_field_t field = {.size = sizeof field, .kind = IST_BALL};
-  ist_placed_field_t floor = {.size = sizeof floor};
+  ist_placed_t floor = {.size = sizeof floor};
   ist_status_t status;
   int meshes;
 
@@ -70,7 +70,7 @@ int penetrations_answer(scene_t* s) {
   floor.field = &field;
   floor.pose = s->a.pose;
   field.as.ball.radius = 1;
-  CHECK(ist_field_penetration(&floor, &s->b, &settings, &s->workspace, &other) == IST_NOT_HELD);
+  CHECK(ist_penetration(&floor, &s->b, &settings, &s->workspace, &other) == IST_NOT_HELD);
   CHECK(isnan(other.volume) && other.status == IST_NOT_HELD);
 
   /* Numbers that are none. */
@@ -177,17 +177,17 @@ int overlaps_answer(scene_t* s) {
   ist_overlapping_t answer = 77;
   ist_pair_fit_t fit = {.size = sizeof fit};
   ist_field_t field = {.size = sizeof field, .kind = IST_HALF_SPACE};
-  ist_placed_field_t floor = {.size = sizeof floor, .field = &field, .pose = s->a.pose};
-  ist_placed_tree_t far_away = s->b;
+  ist_placed_t floor = {.size = sizeof floor, .field = &field, .pose = s->a.pose};
+  ist_placed_t far_away = s->b;
   ist_workspace_t none = {0};
   field.as.half_space.normal[0] = 1;
   far_away.pose.t[0] = 20;
   CHECK(ist_overlap(&s->a, &s->b, &s->workspace, &answer) == IST_OK && answer == IST_OVERLAP_YES);
   CHECK(ist_overlap(&s->a, &far_away, &s->workspace, &answer) == IST_OK);
   CHECK(answer == IST_OVERLAP_NO);
-  CHECK(ist_field_overlap(&floor, &s->b, &s->workspace, &answer) == IST_OK);
+  CHECK(ist_overlap(&floor, &s->b, &s->workspace, &answer) == IST_OK);
   CHECK(answer == IST_OVERLAP_YES);
-  CHECK(ist_field_overlap(&floor, &far_away, &s->workspace, &answer) == IST_OK);
+  CHECK(ist_overlap(&floor, &far_away, &s->workspace, &answer) == IST_OK);
   CHECK(answer == IST_OVERLAP_NO);
   CHECK(ist_overlap(NULL, &s->b, &s->workspace, &answer) == IST_NULL_POINTER);
   CHECK(answer == IST_OVERLAP_UNKNOWN);
@@ -195,8 +195,8 @@ int overlaps_answer(scene_t* s) {
   CHECK(ist_overlap(&s->a, &s->b, NULL, &answer) == IST_NULL_POINTER);
   CHECK(ist_overlap(&s->a, &s->b, &none, &answer) == IST_NO_HANDLE);
   CHECK(ist_overlap(&s->a, &s->b, &s->workspace, NULL) == IST_NULL_POINTER);
-  CHECK(ist_field_overlap(NULL, &s->b, &s->workspace, &answer) == IST_NULL_POINTER);
-  CHECK(ist_field_overlap(&floor, &s->b, &s->workspace, NULL) == IST_NULL_POINTER);
+  CHECK(ist_overlap(NULL, &s->b, &s->workspace, &answer) == IST_NULL_POINTER);
+  CHECK(ist_overlap(&floor, &s->b, &s->workspace, NULL) == IST_NULL_POINTER);
 
   CHECK(ist_get_pair_fit(&s->a, &s->b, &fit) == IST_OK && fit.ratio >= 1 && fit.grain_a > 0);
   CHECK(ist_get_pair_fit(NULL, &s->b, &fit) == IST_NULL_POINTER);
@@ -213,7 +213,7 @@ int patches_answer(scene_t* s) {
   ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
   ist_penetration_t whole = {.size = sizeof whole};
   ist_contact_settings_t settings = {.size = sizeof settings};
-  ist_placed_tree_t wrong = s->b;
+  ist_placed_t wrong = s->b;
   double volume = 0, left = 0;
   size_t i;
   patches.patches = room;
@@ -279,7 +279,7 @@ int outlines_answer(scene_t* s) {
   ist_penetration_t whole = {.size = sizeof whole};
   ist_contact_settings_t settings = {.size = sizeof settings};
   ist_tree_info_t info = {.size = sizeof info};
-  ist_placed_tree_t wrong;
+  ist_placed_t wrong;
   ist_status_t wanted = IST_OK;
   patches.patches = room;
   patches.capacity = 4;
@@ -346,7 +346,7 @@ int fields_answer(scene_t* s) {
   const ist_pose_t identity = IST_POSE_IDENTITY;
   const ist_tree_t empty = {0};
   ist_field_t field = {.size = sizeof field};
-  ist_placed_field_t a = {.size = sizeof a};
+  ist_placed_t a = {.size = sizeof a};
   ist_penetration_t answer = {.size = sizeof answer}, again = {.size = sizeof again};
   ist_separation_t gap = {.size = sizeof gap};
   ist_contact_patch_t room[4];
@@ -387,15 +387,15 @@ int fields_answer(scene_t* s) {
     } else {
       field.as.mesh.tree = &s->tree_a;
       if (!info.has_field) {
-        CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
+        CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
         break;
       }
     }
-    CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_OK);
+    CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_OK);
     CHECK(answer.volume > 0);
-    CHECK(ist_field_query(&a, &s->b, NULL, NULL, &s->workspace, &again, &gap) == IST_OK);
+    CHECK(ist_query(&a, &s->b, NULL, NULL, &s->workspace, &again, &gap) == IST_OK);
     CHECK(memcmp(&answer, &again, sizeof answer) == 0 && gap.distance == 0);
-    CHECK(ist_field_contact_patches(&a, &s->b, NULL, &s->workspace, &patches, &again) == IST_OK);
+    CHECK(ist_contact_patches(&a, &s->b, NULL, &s->workspace, &patches, &again) == IST_OK);
     CHECK(patches.count > 0 && again.volume == answer.volume);
     if (kind == IST_HALF_SPACE || kind == IST_HEIGHTS) {
       if (kind == IST_HALF_SPACE) by_plane = answer.volume;
@@ -403,7 +403,7 @@ int fields_answer(scene_t* s) {
     }
     s->b.pose.t[2] = 20;
     if (kind != IST_DISTANCE_GRID) {
-      CHECK(ist_field_separation(&a, &s->b, NULL, &s->workspace, &gap) == IST_OK);
+      CHECK(ist_separation(&a, &s->b, NULL, &s->workspace, &gap) == IST_OK);
       CHECK(gap.distance > 10);
     }
     s->b.pose.t[2] = 0;
@@ -413,30 +413,45 @@ int fields_answer(scene_t* s) {
   memset(&field.as, 0, sizeof field.as);
   for (kind = IST_HEIGHTS; kind <= IST_MESH; ++kind) {
     field.kind = kind;
-    CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
+    CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
     CHECK(is_refused(&answer, sizeof answer, IST_NULL_POINTER));
   }
   field.as.mesh.tree = &empty;
-  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NO_HANDLE);
+  CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NO_HANDLE);
   memset(&field.as, 0, sizeof field.as);
   for (kind = IST_HALF_SPACE; kind <= IST_CYLINDER; ++kind) { /* no length may be 0 */
     field.kind = kind;
-    CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
+    CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
   }
   field.kind = 0;
-  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
+  CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
   field.kind = 99;
-  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
+  CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
   field.size = 8;
-  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_WRONG_SIZE);
+  CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_WRONG_SIZE);
   a.field = NULL;
-  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
+  CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
   a.size = 8;
-  CHECK(ist_field_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_WRONG_SIZE);
-  CHECK(ist_field_penetration(NULL, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
-  CHECK(ist_field_separation(NULL, &s->b, NULL, &s->workspace, &gap) == IST_NULL_POINTER);
-  CHECK(ist_field_query(NULL, &s->b, NULL, NULL, &s->workspace, &answer, &gap) == IST_NULL_POINTER);
-  CHECK(ist_field_contact_patches(NULL, &s->b, NULL, &s->workspace, &patches, NULL) ==
-        IST_NULL_POINTER);
+  CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_WRONG_SIZE);
+  CHECK(ist_penetration(NULL, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
+  CHECK(ist_separation(NULL, &s->b, NULL, &s->workspace, &gap) == IST_NULL_POINTER);
+  CHECK(ist_query(NULL, &s->b, NULL, NULL, &s->workspace, &answer, &gap) == IST_NULL_POINTER);
+  CHECK(ist_contact_patches(NULL, &s->b, NULL, &s->workspace, &patches, NULL) == IST_NULL_POINTER);
+
+  /* Either may be the second; not both, nor both in one; and some functions want assets. */
+  field.size = sizeof field;
+  field.kind = IST_BALL;
+  field.as.ball.radius = 0.4;
+  a.field = &field;
+  a.size = sizeof a;
+  CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_OK);
+  CHECK(ist_penetration(&s->b, &a, NULL, &s->workspace, &again) == IST_OK);
+  CHECK(answer.volume == again.volume);
+  for (i = 0; i < 3; ++i) CHECK(answer.translation_gradient[i] == -again.translation_gradient[i]);
+  CHECK(ist_penetration(&a, &a, NULL, &s->workspace, &answer) == IST_NOT_HELD);
+  CHECK(ist_without_protrusion(&again, &s->b, &a, &answer) == IST_NOT_HELD);
+  CHECK(is_refused(&answer, sizeof answer, IST_NOT_HELD));
+  a.tree = &s->tree_a;
+  CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
   return 0;
 }

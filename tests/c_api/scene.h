@@ -46,7 +46,7 @@ static inline int is_refused(const void* answer, size_t size, ist_status_t statu
 /* Two trees that overlap. */
 typedef struct scene {
   ist_tree_t tree_a, tree_b;
-  ist_placed_tree_t a, b;
+  ist_placed_t a, b;
   ist_workspace_t workspace;
 } scene_t;
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include <ist/overlap.h>
+
 #include "query/probe/cap.h"
 #include "support/box_overlap.h"
 #include "support/reference_sum.h"
@@ -53,6 +55,59 @@ TEST(FieldQuery, GradientsAreThoseOfTheVolume) {
       expect_gradients(name, ask, pose, 0.02, 1e-12, random);
     }
   }
+}
+
+/// The gradients of the other order are those by a motion of the field.
+TEST(FieldQuery, EitherMayBeTheSecond) {
+  Workspace workspace;
+  std::mt19937_64 random(24);
+  std::vector<ContactPatch> patches(6), turned(6);
+  for (const auto& [name, field] : fields()) {
+    const PlacedTree body{cube().view(), random_pose(random, 0.3), 0.6};
+    Pose pose = random_pose(random, 0.4);
+    for (int k = 0; k < 3; ++k) pose.t[k] += body.pose.t[k];
+    const Ask ask = [&](const Pose& p) {
+      return penetration(body, PlacedField{field, p, 1.3}, {}, workspace);
+    };
+    expect_gradients(name, ask, pose, 0.02, 1e-12, random);
+
+    const PlacedField still{field, pose, 1.3};
+    const ContactPatches one = contact_patches(still, body, {}, workspace, patches);
+    const ContactPatches other = contact_patches(body, still, {}, workspace, turned);
+    ASSERT_EQ(one.count, other.count) << name;
+    EXPECT_EQ(one.penetration.volume, other.penetration.volume);
+    Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = force;
+    for (std::size_t i = 0; i < one.count; ++i) {
+      EXPECT_EQ(patches[i].id, turned[i].id);
+      EXPECT_EQ(patches[i].normal, -turned[i].normal);
+      force += turned[i].force;
+      torque += turned[i].torque;
+    }
+    const double scale = force.norm() + torque.norm() + 1e-12;
+    EXPECT_LT((force + other.penetration.translation_gradient).norm(), 1e-12 * scale) << name;
+    EXPECT_LT((torque + other.penetration.rotation_gradient).norm(), 1e-12 * scale) << name;
+
+    PlacedTree away = body;
+    away.pose.t[2] += 9;
+    const Separation gap = separation(still, away, {}, workspace);
+    const Separation back = separation(away, still, {}, workspace);
+    EXPECT_EQ(gap.distance, back.distance);
+    EXPECT_EQ(gap.point_a, back.point_b);
+    EXPECT_EQ(gap.normal, -back.normal);
+    EXPECT_EQ(overlap(still, away, workspace), overlap(away, still, workspace));
+  }
+}
+
+TEST(FieldQuery, TwoFieldsHoldNoSpheres) {
+  Workspace workspace;
+  ContactPatch patch;
+  const PlacedSolid box(BoxField{}, Pose{}), ball(BallField{}, Pose{});
+  const Penetration found = penetration(box, ball, {}, workspace);
+  EXPECT_EQ(found.status, QueryStatus::not_held);
+  EXPECT_TRUE(std::isnan(found.volume));
+  EXPECT_EQ(separation(box, ball, {}, workspace).status, QueryStatus::not_held);
+  EXPECT_EQ(contact_patches(box, ball, {}, workspace, {&patch, 1}).count, 0u);
+  EXPECT_EQ(overlap(box, ball, workspace), Overlapping::unknown);
 }
 
 TEST(FieldQuery, CylindersRimIsMetByEveryBall) {

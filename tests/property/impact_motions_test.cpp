@@ -27,11 +27,10 @@ TEST(Motions, LeadFromPoseToPose) {
     const Vector3d about(0.3, -0.2, 0.7);
     const Motion motion = motion_between(from, to, 0.25, about, 2);
     EXPECT_LE(motion.angular_velocity.norm() * 0.25, kPi + 1e-12);
-    const PlacedTree start{cube().view(), from, 2};
-    const Eigen::Isometry3d end = to_isometry(moved(start, motion, 0.25).pose);
+    const Eigen::Isometry3d end = to_isometry(moved(from, motion, 0.25, 2));
     EXPECT_LE((end.matrix() - to_isometry(to).matrix()).norm(), 1e-13);
     // Half-way the point is half-way, and the rotation is the slerp.
-    const Eigen::Isometry3d half = to_isometry(moved(start, motion, 0.125).pose);
+    const Eigen::Isometry3d half = to_isometry(moved(from, motion, 0.125, 2));
     const Vector3d middle = (to_isometry(from) * (2 * about) + to_isometry(to) * (2 * about)) / 2;
     EXPECT_LE((half * Vector3d(2 * about) - middle).norm(), 1e-13);
     const Eigen::Quaterniond slerp = Eigen::Quaterniond(to_isometry(from).linear())

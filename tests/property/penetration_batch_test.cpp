@@ -94,9 +94,10 @@ TEST_F(PenetrationBatch, Patches) {
     }
   };
   expect_same_patches(std::span<const PlacedPair>(pairs_));
-  std::vector<PlacedFieldPair> fields;
-  for (const PlacedPair& pair : pairs_) fields.push_back({{BallField{0.8}, pair.a.pose}, pair.b});
-  expect_same_patches(std::span<const PlacedFieldPair>(fields));
+  std::vector<PlacedPair> fields;
+  for (const PlacedPair& pair : pairs_)
+    fields.push_back({{BallField{0.8}, std::get<PlacedTree>(pair.a.placed).pose}, pair.b});
+  expect_same_patches(std::span<const PlacedPair>(fields));
 
   std::vector<ContactPatches> answers(3);
   contact_patches_batch(pairs_, {}, {}, answers, {});
@@ -148,8 +149,8 @@ TEST_F(PenetrationBatch, Exact) {
   std::size_t met = 0;
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     if (i == 50) continue;  // holds spheres alone
-    pairs_[i].a.tree = (i % 2 == 0 ? cube : ball).view();
-    pairs_[i].b.tree = (i % 3 == 0 ? cube : ball).view();
+    std::get<PlacedTree>(pairs_[i].a.placed).tree = (i % 2 == 0 ? cube : ball).view();
+    std::get<PlacedTree>(pairs_[i].b.placed).tree = (i % 3 == 0 ? cube : ball).view();
   }
   std::vector<Workspace> scratch;
   for (int i = 0; i < 8; ++i) scratch.emplace_back();
@@ -185,8 +186,8 @@ TEST_F(PenetrationBatch, Exact) {
 TEST_F(PenetrationBatch, ExactOfAFieldIsNotHeld) {
   const Asset cube = bake_surface(close_mesh(testing::cube_mesh(), "cube"));
   std::vector<Workspace> scratch(1);
-  const PlacedFieldPair pairs[] = {{{BallField{0.8}, {}}, {cube.view(), {}, 1}},
-                                   {{MeshField{cube.view()}, {}}, pairs_[0].b}};
+  const PlacedPair pairs[] = {{{BallField{0.8}, {}}, {cube.view(), {}, 1}},
+                              {{MeshField{cube.view()}, {}}, pairs_[0].b}};
   Penetration answers[2];
   penetration_batch(pairs, {.measure = Measure::exact}, scratch, answers);
   for (const Penetration& answer : answers) {
@@ -198,7 +199,8 @@ TEST_F(PenetrationBatch, ExactOfAFieldIsNotHeld) {
       contact_patches(pairs[0].a, pairs_[0].b, {.measure = Measure::exact}, scratch[0], patches);
   EXPECT_EQ(found.penetration.status, QueryStatus::not_held);
   EXPECT_EQ(found.count, 0u);
-  EXPECT_EQ(overlap_lenses(pairs_[0].a, pairs_[0].b, {.measure = Measure::exact}, {}).status,
+  const PlacedTree tree{cube.view(), {}, 1};
+  EXPECT_EQ(overlap_lenses(tree, tree, {.measure = Measure::exact}, {}).status,
             QueryStatus::invalid_input);
 }
 

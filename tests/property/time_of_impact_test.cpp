@@ -36,7 +36,15 @@ TEST(TimeOfImpact, OfACubeThatFallsOnAPlane) {
     EXPECT_LE((found.normal - Vector3d::UnitZ()).norm(), 1e-12);
     EXPECT_NEAR(found.point_b.z(), 2 - found.time * speed, 1e-6);
     EXPECT_NEAR(found.point_a.z(), 0, 1e-6);
+    const TimeOfImpact turned =
+        time_of_impact({cube().view(), at({0.3, 0.2, 2.5}), 1}, floor,
+                       {straight({0, 0, -speed}), {}}, settings, workspace());
+    EXPECT_EQ(turned.time, found.time);
+    EXPECT_EQ(turned.point_a, found.point_b);
+    EXPECT_EQ(turned.point_b, found.point_a);
+    EXPECT_EQ(turned.normal, -found.normal);
   }
+  EXPECT_EQ(time_of_impact(floor, floor, {}, {}, workspace()).status, ImpactStatus::not_held);
 }
 
 TEST(TimeOfImpact, OfASpinningRodAndAWall) {
@@ -147,8 +155,11 @@ class Certified : public ::testing::Test {
              const ImpactSettings& settings) {
     const TimeOfImpact found = time_of_impact(a, b, motions, settings, workspace());
     ++count_[static_cast<int>(found.status)];
+    const auto at_time = [](const PlacedTree& start, const Motion& motion, double time) {
+      return PlacedTree{start.tree, moved(start.pose, motion, time, start.scale), start.scale};
+    };
     const auto apart = [&](double time) {
-      return distance(corners(moved(a, motions.a, time)), corners(moved(b, motions.b, time)));
+      return distance(corners(at_time(a, motions.a, time)), corners(at_time(b, motions.b, time)));
     };
     if (found.status == ImpactStatus::overlapping) {
       EXPECT_EQ(found.time, 0);
@@ -160,9 +171,9 @@ class Certified : public ::testing::Test {
     for (int i = 0; i <= 12; ++i) {
       const double time = found.time * i / 12;
       EXPECT_GT(apart(time), 0) << time << " of " << found.time;
-      EXPECT_GT(separation(moved(a, motions.a, time), moved(b, motions.b, time), {}, workspace())
-                    .distance,
-                0);
+      const Separation gap =
+          separation(at_time(a, motions.a, time), at_time(b, motions.b, time), {}, workspace());
+      EXPECT_GT(gap.distance, 0);
     }
     const double gap = apart(found.time);
     EXPECT_GE(gap, found.distance_min * (1 - 1e-9));

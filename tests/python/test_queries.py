@@ -180,7 +180,8 @@ def test_assets_that_no_cache_holds_are_asked_in_order(knot, random_poses):
     (dict(pairs=[(0, 2)]), ValueError, r"pairs\[0\]: \(0, 2\): solids are numbered 0 to 1"),
     (dict(pairs=[(0, 1), (-1, 1)]), ValueError, r"pairs\[1\]: \(-1, 1\)"),
     (dict(pairs=[(1, 1)]), ValueError, "a solid cannot be paired with itself"),
-    (dict(pairs=[(1, 0)]), ValueError, "the second is a Field"),
+    (dict(solids=[ist.BallField(1), ist.BallField(2)]), ValueError,
+     r"pairs\[0\]: \(0, 1\): two Fields; one of them must be an Asset"),
     (dict(pairs=[(0.0, 1.0)]), TypeError, "pairs: dtype float64; wanted int64"),
     (dict(pairs=[0, 1]), ValueError, r"pairs: shape \(2,\)"),
     (dict(scales=[1.0]), ValueError, r"scales: shape \(1,\); wanted \(2,\)"),
@@ -603,3 +604,16 @@ def test_limits_are_taken(gear, knot, random_poses):
     assert (few.volume_min <= whole.volume_max).all() and (few.volume_max >= whole.volume_min).all()
     inner = ist.penetration(gear, knot, poses, measure="inner")
     assert inner.volume.sum() < whole.volume.sum()
+
+
+def test_a_field_may_be_either_solid(gear):
+    ball, pose = ist.BallField(0.8), np.array([0.9, 0.1, 0.2, -0.1, 0.3, 0.2, 0.5])
+    first = ist.penetration(ball, gear, IDENTITY, poses_a=pose)
+    second = ist.penetration(gear, ball, pose, poses_a=IDENTITY)
+    assert first.volume == second.volume > 0
+    assert np.allclose(first.pose_gradient_a, second.pose_gradient, rtol=1e-12, atol=1e-15)
+    assert np.allclose(first.force, -second.force, rtol=0, atol=0)
+    scene = ist.penetration_of_pairs([gear, ball], [IDENTITY, pose], [(0, 1), (1, 0)])
+    assert np.array_equal(scene.volume, [first.volume] * 2)
+    with pytest.raises(TypeError, match="two Fields"):
+        ist.penetration(ball, ball, pose)

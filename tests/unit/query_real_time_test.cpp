@@ -39,8 +39,10 @@ class RealTime : public ::testing::Test {
     penetration_batch(pairs, settings, workspaces_, answers_);
 
     // The C functions.
-    const ist_placed_tree_t c_a = {sizeof c_a, &c_tree_a_, std::bit_cast<ist_pose_t>(a.pose), 1};
-    const ist_placed_tree_t c_b = {sizeof c_b, &c_tree_b_, std::bit_cast<ist_pose_t>(b.pose), 1};
+    const ist_placed_t c_a = {sizeof c_a, &c_tree_a_, nullptr, std::bit_cast<ist_pose_t>(a.pose),
+                              1};
+    const ist_placed_t c_b = {sizeof c_b, &c_tree_b_, nullptr, std::bit_cast<ist_pose_t>(b.pose),
+                              1};
     ist_penetration_t c_penetration = {};
     ist_separation_t c_separation = {};
     c_penetration.size = sizeof c_penetration;
@@ -53,7 +55,7 @@ class RealTime : public ::testing::Test {
     volume_[i] += penetration(field, b, settings, workspaces_[0]).volume;
     query(field, b, testing::for_both(settings), workspaces_[0]);
     contact_patches(field, b, settings, workspaces_[0], patches_);
-    const PlacedFieldPair field_pairs[] = {{field, b}, {field, a}};
+    const PlacedPair field_pairs[] = {{field, b}, {a, field}};
     penetration_batch(field_pairs, settings, workspaces_, answers_);
     const Motions motions{{{0.1, 0.2, 0}, {1, 0, 2}, {}}, {{-1, 0, 1}, {0, 1, 0}, {0.1, 0, 0}}};
     ImpactSettings until;

@@ -162,7 +162,7 @@ export class Asset {
 
 // --- Fields: solids without spheres -----------------------------------------------------------------
 
-/** A shape at rest, as the first solid of a query. Make it once and use it often. */
+/** A shape, as one of the two solids of a query. Make it once and use it often. */
 export class Field {
   /** normal · x ≤ offset. `normal`: outward, of any length but 0, by which offset is divided too. */
   static halfSpace(normal: Vector, offset?: number): Field;
@@ -268,7 +268,7 @@ export interface Penetration {
 /** Throws for a pose or an option out of range, and for a solid that lacks what the measure needs. */
 export function penetration(
   a: Asset | Field,
-  b: Asset,
+  b: Asset | Field,
   poseB: Pose,
   options?: PenetrationOptions,
 ): Penetration;
@@ -300,7 +300,7 @@ export interface Separation {
 
 export function separation(
   a: Asset | Field,
-  b: Asset,
+  b: Asset | Field,
   poseB: Pose,
   options?: SeparationOptions,
 ): Separation;
@@ -341,7 +341,7 @@ export interface ContactPatches {
 
 export function contactPatches(
   a: Asset | Field,
-  b: Asset,
+  b: Asset | Field,
   poseB: Pose,
   options?: ContactPatchesOptions,
 ): ContactPatches;
@@ -383,7 +383,7 @@ export function overlapOutline(
 /** Whether two solids share a point. `yes` and `no` are certain. */
 export function overlap(
   a: Asset | Field,
-  b: Asset,
+  b: Asset | Field,
   poseB: Pose,
   options?: { poseA?: Pose },
 ): 'no' | 'yes' | 'unknown';
@@ -632,7 +632,7 @@ export interface Impact {
 /** A proven time up to which two moving solids stay clear. Needs the stored surface of both. */
 export function timeOfImpact(
   a: Asset | Field,
-  b: Asset,
+  b: Asset | Field,
   poseB: Pose,
   options?: ImpactOptions,
 ): Impact;
@@ -642,7 +642,7 @@ export function timeOfImpact(
 /** One pair of a batch. */
 export interface Pair {
   a: Asset | Field;
-  b: Asset;
+  b: Asset | Field;
   /** Default: the identity. */
   poseA?: Pose;
   poseB: Pose;

@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include <ist/field.h>
+#include <ist/query.h>
 #include <ist/tree_view.h>
 
 #include "mesh/mesh_solid.h"

@@ -55,38 +55,4 @@ inline Penetration unknown_penetration() noexcept {
   return unknown;
 }
 
-/// Pairs of any kind, each with penetration().
-template <class Pair>
-void answer_batch(std::span<const Pair> pairs, const PenetrationSettings& settings,
-                  std::span<Workspace> workspaces, std::span<Penetration> answers,
-                  const ParallelFor& parallel) noexcept {
-  const std::size_t count = std::min(pairs.size(), answers.size());
-  if (workspaces.empty()) {
-    std::fill_n(answers.begin(), count, unknown_penetration());
-    return;
-  }
-  answer_all(count, workspaces.size(), parallel, [&](std::size_t i, std::size_t worker) {
-    answers[i] = penetration(pairs[i].a, pairs[i].b, settings, workspaces[worker]);
-  });
-}
-
-/// Pairs of any kind, each with contact_patches(); each has as many patches as the next, in the
-/// order of pairs.
-template <class Pair>
-void patch_batch(std::span<const Pair> pairs, const ContactSettings& settings,
-                 std::span<Workspace> workspaces, std::span<ContactPatches> answers,
-                 std::span<ContactPatch> patches, const ParallelFor& parallel) noexcept {
-  const std::size_t count = std::min(pairs.size(), answers.size());
-  if (count == 0) return;
-  if (workspaces.empty()) {
-    std::fill_n(answers.begin(), count, ContactPatches{unknown_penetration(), 0});
-    return;
-  }
-  const std::size_t each = patches.size() / count;
-  answer_all(count, workspaces.size(), parallel, [&](std::size_t i, std::size_t worker) {
-    answers[i] = contact_patches(pairs[i].a, pairs[i].b, settings, workspaces[worker],
-                                 patches.subspan(i * each, each));
-  });
-}
-
 }  // namespace ist

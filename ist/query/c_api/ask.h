@@ -7,26 +7,17 @@
 
 namespace ist::c_api {
 
-/// What stands for the first solid of a query: a tree or a field.
-struct TreeArgument {
-  ist_status_t read(const ist_placed_tree_t* given) noexcept { return c_api::read(given, tree); }
-  const PlacedTree& placed() const noexcept { return tree; }
-  PlacedTree tree;
-};
-inline TreeArgument argument_for(const ist_placed_tree_t*) noexcept { return {}; }
-inline FieldArgument argument_for(const ist_placed_field_t*) noexcept { return {}; }
-
-/// Reads what every query has, then runs `ask(a, b, workspace)`, which returns its status.
+/// Reads what every query has, then runs `ask(a, b, workspace)`, which returns its status. `Solid`:
+/// PlacedSolid, or PlacedTree where only assets have an answer.
 template <class Solid, class Ask>
-ist_status_t ask_about(const Solid* a, const ist_placed_tree_t* b, ist_workspace_t* workspace,
+ist_status_t ask_about(const ist_placed_t* a, const ist_placed_t* b, ist_workspace_t* workspace,
                        const Ask& ask) noexcept {
-  auto first = argument_for(a);
-  PlacedTree second;
-  ist_status_t status = first.read(a);
+  Solid first, second;
+  ist_status_t status = read(a, first);
   if (status == IST_OK) status = read(b, second);
   if (status != IST_OK) return status;
   Workspace* const scratch = workspace_of(workspace, status);
-  return scratch == nullptr ? status : ask(first.placed(), second, *scratch);
+  return scratch == nullptr ? status : ask(first, second, *scratch);
 }
 
 /// What was not asked: all numbers are NaN, as those of a query that cannot be answered.
@@ -37,18 +28,19 @@ ist_status_t refuse(ist_status_t status, Answer& answer) noexcept {
 }
 
 /// A query with settings and one answer: `ask(a, b, settings, workspace)` finds it, a `Found`.
-template <class Settings, class Found, class Solid, class Given, class Answer, class Ask>
-ist_status_t answer_with(const Solid* a, const ist_placed_tree_t* b, const Given* given,
+template <class Settings, class Found, class Given, class Answer, class Ask>
+ist_status_t answer_with(const ist_placed_t* a, const ist_placed_t* b, const Given* given,
                          ist_workspace_t* workspace, Answer* answer, const Ask& ask) noexcept {
   ist_status_t status = check_size(answer);
   if (status != IST_OK) return status;
   Settings settings;
   status = read(given, settings);
   if (status == IST_OK)
-    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
-      write(ask(x, y, settings, scratch), *answer);
-      return ist_status_t{IST_OK};
-    });
+    status =
+        ask_about<PlacedSolid>(a, b, workspace, [&](const auto& x, const auto& y, auto& scratch) {
+          write(ask(x, y, settings, scratch), *answer);
+          return ist_status_t{IST_OK};
+        });
   return status == IST_OK ? answer->status : refuse<Found>(status, *answer);
 }
 

@@ -48,48 +48,6 @@ ist_status_t answer_pairs(std::size_t count, const Given* given, const Staff& st
   return IST_OK;
 }
 
-// One name for trees and fields.
-const auto ask_penetration = [](const auto& pair, auto... rest) noexcept {
-  if constexpr (std::is_same_v<decltype(pair), const ist_pair_t&>)
-    return ist_penetration(pair.a, pair.b, rest...);
-  else
-    return ist_field_penetration(pair.a, pair.b, rest...);
-};
-const auto ask_patches = [](const auto& pair, auto... rest) noexcept {
-  if constexpr (std::is_same_v<decltype(pair), const ist_pair_t&>)
-    return ist_contact_patches(pair.a, pair.b, rest...);
-  else
-    return ist_field_contact_patches(pair.a, pair.b, rest...);
-};
-
-template <class Pair>
-ist_status_t find_penetrations(const Pair* pairs, std::size_t count,
-                               const ist_penetration_settings_t* given, const Staff& staff,
-                               ist_penetration_t* answers, std::size_t answer_size) noexcept {
-  if (count > 0 && pairs == nullptr) return IST_NULL_POINTER;
-  return answer_pairs<PenetrationSettings>(count, given, staff, answers, answer_size,
-                                           [&](std::size_t i, ist_workspace_t* scratch) {
-                                             ask_penetration(pairs[i], given, scratch, answers + i);
-                                           });
-}
-
-template <class Pair>
-ist_status_t find_patches(const Pair* pairs, std::size_t count, const ist_contact_settings_t* given,
-                          const Staff& staff, ist_contact_patches_t* patches,
-                          ist_penetration_t* wholes, std::size_t whole_size) noexcept {
-  if (count > 0 && (pairs == nullptr || patches == nullptr)) return IST_NULL_POINTER;
-  // All are of one size, or there is no telling where the next one begins.
-  for (std::size_t i = 0; i < count; ++i) {
-    const ist_status_t status = check_size(patches + i);
-    if (status != IST_OK) return status;
-    patches[i].count = 0;
-  }
-  return answer_pairs<ContactSettings>(
-      count, given, staff, wholes, whole_size, [&](std::size_t i, ist_workspace_t* scratch) {
-        ask_patches(pairs[i], given, scratch, patches + i, wholes + i);
-      });
-}
-
 }  // namespace
 }  // namespace ist::c_api
 
@@ -100,17 +58,12 @@ ist_status_t ist_penetration_batch(const ist_pair_t* pairs, std::size_t count,
                                    ist_workspace_t* workspaces, std::size_t workers,
                                    ist_penetration_t* answers, std::size_t answer_size,
                                    const ist_parallel_t* parallel) {
-  return find_penetrations(pairs, count, settings, {workspaces, workers, parallel}, answers,
-                           answer_size);
-}
-
-ist_status_t ist_field_penetration_batch(const ist_field_pair_t* pairs, std::size_t count,
-                                         const ist_penetration_settings_t* settings,
-                                         ist_workspace_t* workspaces, std::size_t workers,
-                                         ist_penetration_t* answers, std::size_t answer_size,
-                                         const ist_parallel_t* parallel) {
-  return find_penetrations(pairs, count, settings, {workspaces, workers, parallel}, answers,
-                           answer_size);
+  if (count > 0 && pairs == nullptr) return IST_NULL_POINTER;
+  return answer_pairs<ist::PenetrationSettings>(
+      count, settings, {workspaces, workers, parallel}, answers, answer_size,
+      [&](std::size_t i, ist_workspace_t* scratch) {
+        ist_penetration(pairs[i].a, pairs[i].b, settings, scratch, answers + i);
+      });
 }
 
 ist_status_t ist_contact_patches_batch(const ist_pair_t* pairs, std::size_t count,
@@ -118,16 +71,16 @@ ist_status_t ist_contact_patches_batch(const ist_pair_t* pairs, std::size_t coun
                                        ist_workspace_t* workspaces, std::size_t workers,
                                        ist_contact_patches_t* patches, ist_penetration_t* wholes,
                                        std::size_t whole_size, const ist_parallel_t* parallel) {
-  return find_patches(pairs, count, settings, {workspaces, workers, parallel}, patches, wholes,
-                      whole_size);
-}
-
-ist_status_t ist_field_contact_patches_batch(const ist_field_pair_t* pairs, std::size_t count,
-                                             const ist_contact_settings_t* settings,
-                                             ist_workspace_t* workspaces, std::size_t workers,
-                                             ist_contact_patches_t* patches,
-                                             ist_penetration_t* wholes, std::size_t whole_size,
-                                             const ist_parallel_t* parallel) {
-  return find_patches(pairs, count, settings, {workspaces, workers, parallel}, patches, wholes,
-                      whole_size);
+  if (count > 0 && (pairs == nullptr || patches == nullptr)) return IST_NULL_POINTER;
+  // All are of one size, or there is no telling where the next one begins.
+  for (std::size_t i = 0; i < count; ++i) {
+    const ist_status_t status = check_size(patches + i);
+    if (status != IST_OK) return status;
+    patches[i].count = 0;
+  }
+  return answer_pairs<ist::ContactSettings>(
+      count, settings, {workspaces, workers, parallel}, wholes, whole_size,
+      [&](std::size_t i, ist_workspace_t* scratch) {
+        ist_contact_patches(pairs[i].a, pairs[i].b, settings, scratch, patches + i, wholes + i);
+      });
 }

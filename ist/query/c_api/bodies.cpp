@@ -30,7 +30,7 @@ void write(const Bounds& found, ist_bounds_t& out) noexcept {
 }
 
 /// As queries read it, and refused for a pose that they refuse.
-ist_status_t read_usable(const ist_placed_tree_t* given, PlacedTree& placed) noexcept {
+ist_status_t read_usable(const ist_placed_t* given, PlacedTree& placed) noexcept {
   const ist_status_t status = c_api::read(given, placed);
   if (status != IST_OK) return status;
   return usable_rotation(placed.pose, placed.scale) ? IST_OK : IST_INVALID_INPUT;
@@ -118,12 +118,12 @@ ist_status_t ist_tree_get_bounds(const ist_tree_t* tree, ist_bounds_t* bounds) {
   return tell<ist::TreeView>(tree, view_of, kBounds, bounds);
 }
 
-ist_status_t ist_placed_mass_properties(const ist_placed_tree_t* placed,
+ist_status_t ist_placed_mass_properties(const ist_placed_t* placed,
                                         ist_mass_properties_t* properties) {
   return tell<ist::PlacedTree>(placed, read_usable, kMassProperties, properties);
 }
 
-ist_status_t ist_placed_bounds(const ist_placed_tree_t* placed, ist_bounds_t* bounds) {
+ist_status_t ist_placed_bounds(const ist_placed_t* placed, ist_bounds_t* bounds) {
   return tell<ist::PlacedTree>(placed, read_usable, kBounds, bounds);
 }
 
@@ -151,8 +151,7 @@ ist_status_t ist_patch_volume_rate(const ist_contact_patch_t* patch, const ist_p
   return find_rate(patch, b, motion_a, motion_b, rate);
 }
 
-ist_status_t ist_get_pair_fit(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
-                              ist_pair_fit_t* fit) {
+ist_status_t ist_get_pair_fit(const ist_placed_t* a, const ist_placed_t* b, ist_pair_fit_t* fit) {
   ist_status_t status = clear(fit);
   if (status != IST_OK) return status;
   ist::PlacedTree first, second;

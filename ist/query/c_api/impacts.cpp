@@ -13,17 +13,6 @@ Motion read(const ist_motion_t* given) noexcept {
   return {vector(given->velocity), vector(given->angular_velocity), vector(given->about)};
 }
 
-template <class Solid>
-ist_status_t find_impact(const Solid* a, const ist_placed_tree_t* b, const ist_motion_t* motion_a,
-                         const ist_motion_t* motion_b, const ist_impact_settings_t* given,
-                         ist_workspace_t* workspace, ist_impact_t* answer) noexcept {
-  return answer_with<ImpactSettings, TimeOfImpact>(
-      a, b, given, workspace, answer,
-      [&](const auto& x, const auto& y, const ImpactSettings& settings, Workspace& scratch) {
-        return time_of_impact(x, y, {read(motion_a), read(motion_b)}, settings, scratch);
-      });
-}
-
 bool is_finite(const Motion& motion) noexcept {
   return motion.velocity.allFinite() && motion.angular_velocity.allFinite() &&
          motion.about.allFinite();
@@ -53,27 +42,23 @@ ist_status_t ist_motion_between(const ist_pose_t* from, const ist_pose_t* to, do
 ist_status_t ist_moved(const ist_pose_t* start, double scale, const ist_motion_t* motion,
                        double time, ist_pose_t* end) {
   if (end == nullptr) return IST_NULL_POINTER;
-  ist::PlacedTree object;
-  if (start != nullptr) object.pose = pose(*start);
+  const ist::Pose from = start == nullptr ? ist::Pose() : pose(*start);
   *end = {};  // which may be `start`
   if (start == nullptr || motion == nullptr) return IST_NULL_POINTER;
-  object.scale = scale == 0 ? 1 : scale;
-  object = ist::moved(object, read(motion), time);
-  if (!ist::usable_rotation(object.pose, object.scale)) return IST_INVALID_INPUT;
-  write(object.pose, *end);
+  if (scale == 0) scale = 1;
+  const ist::Pose to = ist::moved(from, read(motion), time, scale);
+  if (!ist::usable_rotation(to, scale)) return IST_INVALID_INPUT;
+  write(to, *end);
   return IST_OK;
 }
 
-ist_status_t ist_time_of_impact(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_time_of_impact(const ist_placed_t* a, const ist_placed_t* b,
                                 const ist_motion_t* motion_a, const ist_motion_t* motion_b,
                                 const ist_impact_settings_t* settings, ist_workspace_t* workspace,
                                 ist_impact_t* answer) {
-  return find_impact(a, b, motion_a, motion_b, settings, workspace, answer);
-}
-
-ist_status_t ist_field_time_of_impact(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                                      const ist_motion_t* motion_a, const ist_motion_t* motion_b,
-                                      const ist_impact_settings_t* settings,
-                                      ist_workspace_t* workspace, ist_impact_t* answer) {
-  return find_impact(a, b, motion_a, motion_b, settings, workspace, answer);
+  return answer_with<ist::ImpactSettings, ist::TimeOfImpact>(
+      a, b, settings, workspace, answer,
+      [&](const auto& x, const auto& y, const ist::ImpactSettings& by, ist::Workspace& scratch) {
+        return ist::time_of_impact(x, y, {read(motion_a), read(motion_b)}, by, scratch);
+      });
 }

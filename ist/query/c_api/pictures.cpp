@@ -134,7 +134,7 @@ ist_status_t ist_tree_get_surface(const ist_tree_t* tree, ist_surface_t* surface
   return status;
 }
 
-ist_status_t ist_overlap_lenses(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_overlap_lenses(const ist_placed_t* a, const ist_placed_t* b,
                                 const ist_lens_settings_t* settings, ist_lenses_t* lenses) {
   ist_status_t status = check_size(lenses);
   if (status != IST_OK) return status;

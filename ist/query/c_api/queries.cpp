@@ -10,67 +10,9 @@
 namespace ist::c_api {
 namespace {
 
-template <class Solid>
-ist_status_t find_penetration(const Solid* a, const ist_placed_tree_t* b,
-                              const ist_penetration_settings_t* given, ist_workspace_t* workspace,
-                              ist_penetration_t* answer) noexcept {
-  return answer_with<PenetrationSettings, Penetration>(
-      a, b, given, workspace, answer,
-      [](const auto& x, const auto& y, const PenetrationSettings& settings, Workspace& scratch) {
-        return penetration(x, y, settings, scratch);
-      });
-}
-
-template <class Solid>
-ist_status_t find_separation(const Solid* a, const ist_placed_tree_t* b,
-                             const ist_separation_settings_t* given, ist_workspace_t* workspace,
-                             ist_separation_t* answer) noexcept {
-  return answer_with<SeparationSettings, Separation>(
-      a, b, given, workspace, answer,
-      [](const auto& x, const auto& y, const SeparationSettings& settings, Workspace& scratch) {
-        return separation(x, y, settings, scratch);
-      });
-}
-
 /// The worse of two.
 ist_status_t worse(ist_status_t a, ist_status_t b) noexcept {
   return std::min(a, b) < 0 ? std::min(a, b) : std::max(a, b);
-}
-
-template <class Solid>
-ist_status_t find_overlap(const Solid* a, const ist_placed_tree_t* b, ist_workspace_t* workspace,
-                          ist_overlapping_t* answer) noexcept {
-  static_assert(IST_OVERLAP_UNKNOWN == static_cast<int>(Overlapping::unknown));
-  if (answer == nullptr) return IST_NULL_POINTER;
-  *answer = IST_OVERLAP_UNKNOWN;
-  return ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
-    *answer = static_cast<ist_overlapping_t>(overlap(x, y, scratch));
-    return ist_status_t{IST_OK};
-  });
-}
-
-template <class Solid>
-ist_status_t find_both(const Solid* a, const ist_placed_tree_t* b,
-                       const ist_penetration_settings_t* for_penetration,
-                       const ist_separation_settings_t* for_separation, ist_workspace_t* workspace,
-                       ist_penetration_t* penetration, ist_separation_t* separation) noexcept {
-  const ist_status_t room = check_size(penetration), other_room = check_size(separation);
-  ist_status_t status = worse(room, other_room);
-  QuerySettings settings;
-  if (status == IST_OK)
-    status = worse(read(for_penetration, settings.penetration),
-                   read(for_separation, settings.separation));
-  if (status == IST_OK)
-    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
-      const PenetrationAndSeparation both = query(x, y, settings, scratch);
-      write(both.penetration, *penetration);
-      write(both.separation, *separation);
-      return ist_status_t{IST_OK};
-    });
-  if (status == IST_OK) return worse(penetration->status, separation->status);
-  if (room == IST_OK) refuse<Penetration>(status, *penetration);
-  if (other_room == IST_OK) refuse<Separation>(status, *separation);
-  return status;
 }
 
 ist_status_t check_room(const ist_contact_patches_t* given) noexcept {
@@ -86,7 +28,7 @@ std::span<ContactPatch> room_of(const ist_contact_patches_t& given) noexcept {
 
 /// `ask(a, b, settings, workspace, room)` answers ContactPatches. `status`: of other arguments.
 template <class Solid, class Ask>
-ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
+ist_status_t find_patches(const ist_placed_t* a, const ist_placed_t* b,
                           const ist_contact_settings_t* given, ist_workspace_t* workspace,
                           ist_contact_patches_t* patches, ist_penetration_t* whole,
                           ist_status_t status, const Ask& ask) noexcept {
@@ -100,7 +42,7 @@ ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
   if (status == IST_OK) status = read(given, settings);
   ist_status_t answered = IST_OK;
   if (status == IST_OK)
-    status = ask_about(a, b, workspace, [&](const auto& x, const auto& y, Workspace& scratch) {
+    status = ask_about<Solid>(a, b, workspace, [&](const auto& x, const auto& y, auto& scratch) {
       const ContactPatches found = ask(x, y, settings, scratch, room_of(*patches));
       patches->count = found.count;
       if (whole != nullptr) write(found.penetration, *whole);
@@ -110,14 +52,6 @@ ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
   if (status == IST_OK) return answered;
   if (whole != nullptr && whole->size == sizeof *whole) refuse<Penetration>(status, *whole);
   return status;
-}
-
-template <class Solid>
-ist_status_t find_patches(const Solid* a, const ist_placed_tree_t* b,
-                          const ist_contact_settings_t* given, ist_workspace_t* workspace,
-                          ist_contact_patches_t* patches, ist_penetration_t* whole) noexcept {
-  return find_patches(a, b, given, workspace, patches, whole, IST_OK,
-                      [](auto&&... asked) { return contact_patches(asked...); });
 }
 
 /// Empties the outline.
@@ -134,20 +68,16 @@ ist_status_t check_room(ist_outline_t* given) noexcept {
 
 using namespace ist::c_api;
 
-ist_status_t ist_penetration(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_penetration(const ist_placed_t* a, const ist_placed_t* b,
                              const ist_penetration_settings_t* settings, ist_workspace_t* workspace,
                              ist_penetration_t* answer) {
-  return find_penetration(a, b, settings, workspace, answer);
+  return answer_with<ist::PenetrationSettings, ist::Penetration>(
+      a, b, settings, workspace, answer,
+      [](auto&&... asked) { return ist::penetration(asked...); });
 }
 
-ist_status_t ist_field_penetration(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                                   const ist_penetration_settings_t* settings,
-                                   ist_workspace_t* workspace, ist_penetration_t* answer) {
-  return find_penetration(a, b, settings, workspace, answer);
-}
-
-ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_placed_tree_t* a,
-                                    const ist_placed_tree_t* b, ist_penetration_t* answer) {
+ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_placed_t* a,
+                                    const ist_placed_t* b, ist_penetration_t* answer) {
   ist_status_t status = check_size(whole);
   const ist::Penetration before = status == IST_OK ? read(*whole) : ist::Penetration{};
   const ist_status_t room = clear(answer);  // which may be `whole`
@@ -160,60 +90,59 @@ ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_pl
   return answer->status;
 }
 
-ist_status_t ist_separation(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_separation(const ist_placed_t* a, const ist_placed_t* b,
                             const ist_separation_settings_t* settings, ist_workspace_t* workspace,
                             ist_separation_t* answer) {
-  return find_separation(a, b, settings, workspace, answer);
+  return answer_with<ist::SeparationSettings, ist::Separation>(
+      a, b, settings, workspace, answer, [](auto&&... asked) { return ist::separation(asked...); });
 }
 
-ist_status_t ist_field_separation(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                                  const ist_separation_settings_t* settings,
-                                  ist_workspace_t* workspace, ist_separation_t* answer) {
-  return find_separation(a, b, settings, workspace, answer);
+ist_status_t ist_overlap(const ist_placed_t* a, const ist_placed_t* b, ist_workspace_t* workspace,
+                         ist_overlapping_t* answer) {
+  static_assert(IST_OVERLAP_UNKNOWN == static_cast<int>(ist::Overlapping::unknown));
+  if (answer == nullptr) return IST_NULL_POINTER;
+  *answer = IST_OVERLAP_UNKNOWN;
+  return ask_about<ist::PlacedSolid>(
+      a, b, workspace, [&](const auto& x, const auto& y, auto& scratch) {
+        *answer = static_cast<ist_overlapping_t>(ist::overlap(x, y, scratch));
+        return ist_status_t{IST_OK};
+      });
 }
 
-ist_status_t ist_overlap(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
-                         ist_workspace_t* workspace, ist_overlapping_t* answer) {
-  return find_overlap(a, b, workspace, answer);
-}
-
-ist_status_t ist_field_overlap(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                               ist_workspace_t* workspace, ist_overlapping_t* answer) {
-  return find_overlap(a, b, workspace, answer);
-}
-
-ist_status_t ist_query(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_query(const ist_placed_t* a, const ist_placed_t* b,
                        const ist_penetration_settings_t* penetration_settings,
                        const ist_separation_settings_t* separation_settings,
                        ist_workspace_t* workspace, ist_penetration_t* penetration,
                        ist_separation_t* separation) {
-  return find_both(a, b, penetration_settings, separation_settings, workspace, penetration,
-                   separation);
+  const ist_status_t room = check_size(penetration), other_room = check_size(separation);
+  ist_status_t status = worse(room, other_room);
+  ist::QuerySettings settings;
+  if (status == IST_OK)
+    status = worse(read(penetration_settings, settings.penetration),
+                   read(separation_settings, settings.separation));
+  if (status == IST_OK)
+    status = ask_about<ist::PlacedSolid>(
+        a, b, workspace, [&](const auto& x, const auto& y, auto& scratch) {
+          const ist::PenetrationAndSeparation both = ist::query(x, y, settings, scratch);
+          write(both.penetration, *penetration);
+          write(both.separation, *separation);
+          return ist_status_t{IST_OK};
+        });
+  if (status == IST_OK) return worse(penetration->status, separation->status);
+  if (room == IST_OK) refuse<ist::Penetration>(status, *penetration);
+  if (other_room == IST_OK) refuse<ist::Separation>(status, *separation);
+  return status;
 }
 
-ist_status_t ist_field_query(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                             const ist_penetration_settings_t* penetration_settings,
-                             const ist_separation_settings_t* separation_settings,
-                             ist_workspace_t* workspace, ist_penetration_t* penetration,
-                             ist_separation_t* separation) {
-  return find_both(a, b, penetration_settings, separation_settings, workspace, penetration,
-                   separation);
-}
-
-ist_status_t ist_contact_patches(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_contact_patches(const ist_placed_t* a, const ist_placed_t* b,
                                  const ist_contact_settings_t* settings, ist_workspace_t* workspace,
                                  ist_contact_patches_t* patches, ist_penetration_t* whole) {
-  return find_patches(a, b, settings, workspace, patches, whole);
+  return find_patches<ist::PlacedSolid>(
+      a, b, settings, workspace, patches, whole, IST_OK,
+      [](auto&&... asked) { return ist::contact_patches(asked...); });
 }
 
-ist_status_t ist_field_contact_patches(const ist_placed_field_t* a, const ist_placed_tree_t* b,
-                                       const ist_contact_settings_t* settings,
-                                       ist_workspace_t* workspace, ist_contact_patches_t* patches,
-                                       ist_penetration_t* whole) {
-  return find_patches(a, b, settings, workspace, patches, whole);
-}
-
-ist_status_t ist_overlap_outline(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_overlap_outline(const ist_placed_t* a, const ist_placed_t* b,
                                  const ist_contact_settings_t* settings, ist_workspace_t* workspace,
                                  ist_contact_patches_t* patches, ist_outline_t* outline,
                                  ist_penetration_t* whole) {
@@ -226,10 +155,11 @@ ist_status_t ist_overlap_outline(const ist_placed_tree_t* a, const ist_placed_tr
     outline->count = std::min(found.segments, outline->capacity);
     return found.contact;
   };
-  return find_patches(a, b, settings, workspace, patches, whole, check_room(outline), ask);
+  return find_patches<ist::PlacedTree>(a, b, settings, workspace, patches, whole,
+                                       check_room(outline), ask);
 }
 
-ist_status_t ist_patches_without_protrusion(const ist_placed_tree_t* a, const ist_placed_tree_t* b,
+ist_status_t ist_patches_without_protrusion(const ist_placed_t* a, const ist_placed_t* b,
                                             const ist_contact_settings_t* settings,
                                             ist_contact_patches_t* patches) {
   ist_status_t status = check_room(patches);

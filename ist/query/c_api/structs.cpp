@@ -100,23 +100,16 @@ void write(const TimeOfImpact& found, ist_impact_t& answer) noexcept {
   answer.surface_pairs = found.surface_pairs;
 }
 
-FieldSample FieldArgument::look(const void* context, const Eigen::Vector3d& x) noexcept {
+namespace {
+
+FieldSample look(const void* context, const Eigen::Vector3d& x) noexcept {
   const auto& function = static_cast<const ist_field_t*>(context)->as.function;
   ist_field_sample_t sample = {};
   function.look(function.context, x.data(), &sample);
   return {sample.distance, vector(sample.gradient)};
 }
 
-ist_status_t FieldArgument::read(const ist_placed_field_t* given) noexcept {
-  ist_status_t status = check_size(given);
-  if (status == IST_OK) status = check_size(given->field);
-  if (status == IST_OK) status = read(*given->field);
-  if (status == IST_OK) place(*given, placed_);
-  return status;
-}
-
-ist_status_t FieldArgument::read(const ist_field_t& given) noexcept {
-  Field& field = placed_.field;
+ist_status_t read(const ist_field_t& given, Field& field) noexcept {
   switch (given.kind) {
     case IST_HALF_SPACE:
       field = HalfSpaceField{vector(given.as.half_space.normal), given.as.half_space.offset};
@@ -168,6 +161,30 @@ ist_status_t FieldArgument::read(const ist_field_t& given) noexcept {
     default:
       return IST_INVALID_INPUT;
   }
+}
+
+}  // namespace
+
+ist_status_t read(const ist_placed_t* given, PlacedTree& placed) noexcept {
+  ist_status_t status = check_size(given);
+  if (status != IST_OK) return status;
+  if (given->field != nullptr) status = given->tree == nullptr ? IST_NOT_HELD : IST_INVALID_INPUT;
+  if (status == IST_OK) status = view_of(given->tree, placed.tree);
+  placed.pose = pose(given->pose);
+  placed.scale = given->scale == 0 ? 1 : given->scale;
+  return status;
+}
+
+ist_status_t read(const ist_placed_t* given, PlacedSolid& placed) noexcept {
+  PlacedTree tree;
+  ist_status_t status = read(given, tree);
+  if (status == IST_OK) placed = tree;
+  if (status != IST_NOT_HELD) return status;
+  PlacedField field{{}, tree.pose, tree.scale};
+  status = check_size(given->field);
+  if (status == IST_OK) status = read(*given->field, field.field);
+  if (status == IST_OK) placed = field;
+  return status;
 }
 
 }  // namespace ist::c_api

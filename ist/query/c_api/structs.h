@@ -60,33 +60,10 @@ inline QueryStatus query_status(ist_status_t status) noexcept {
                                           : QueryStatus::invalid_input;
 }
 
-/// The pose and scale of a placed tree or field.
-template <class Given, class Placed>
-void place(const Given& given, Placed& placed) noexcept {
-  placed.pose = pose(given.pose);
-  placed.scale = given.scale == 0 ? 1 : given.scale;
-}
-
-inline ist_status_t read(const ist_placed_tree_t* given, PlacedTree& placed) noexcept {
-  ist_status_t status = check_size(given);
-  if (status == IST_OK) status = view_of(given->tree, placed.tree);
-  if (status == IST_OK) place(*given, placed);
-  return status;
-}
-
-/// A field as C++ has it. Of a function the caller's struct is looked into at every look.
-class FieldArgument {
- public:
-  ist_status_t read(const ist_placed_field_t* given) noexcept;
-  const PlacedField& placed() const noexcept { return placed_; }
-
- private:
-  static FieldSample look(const void* context, const Eigen::Vector3d& x) noexcept;
-
-  ist_status_t read(const ist_field_t& field) noexcept;
-
-  PlacedField placed_;
-};
+/// Of a function the caller's struct is looked into at every look.
+ist_status_t read(const ist_placed_t* given, PlacedSolid& placed) noexcept;
+/// An asset: IST_NOT_HELD for a field.
+ist_status_t read(const ist_placed_t* given, PlacedTree& placed) noexcept;
 
 ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& settings) noexcept;
 ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& settings) noexcept;

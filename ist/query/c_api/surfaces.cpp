@@ -28,51 +28,15 @@ void write(const SurfacePoint& found, ist_surface_point_t& point) noexcept {
 }
 
 /// ask(placed, i) for each of `count`; the least of their statuses.
-template <class Solid, class Ask>
-ist_status_t ask_each(const Solid* given, std::size_t count, bool there, const Ask& ask) noexcept {
-  auto solid = argument_for(given);
-  ist_status_t status = solid.read(given);
+template <class Ask>
+ist_status_t ask_each(const ist_placed_t* given, std::size_t count, bool there,
+                      const Ask& ask) noexcept {
+  PlacedSolid solid;
+  ist_status_t status = c_api::read(given, solid);
   if (status == IST_OK && count > 0 && !there) status = IST_NULL_POINTER;
   if (status != IST_OK) return status;
-  for (std::size_t i = 0; i < count; ++i) status = std::min(status, ask(solid.placed(), i));
+  for (std::size_t i = 0; i < count; ++i) status = std::min(status, ask(solid, i));
   return status;
-}
-
-template <class Solid>
-ist_status_t find_hits(const Solid* solid, const ist_ray_t* rays, std::size_t count,
-                       ist_ray_hit_t* hits, std::size_t hit_size) noexcept {
-  if (hit_size != sizeof(ist_ray_hit_t)) return IST_WRONG_SIZE;
-  return ask_each(solid, count, rays != nullptr && hits != nullptr,
-                  [&](const auto& placed, std::size_t i) {
-                    write(raycast(placed, read(rays[i])), hits[i]);
-                    return hits[i].status;
-                  });
-}
-
-template <class Solid>
-ist_status_t find_points(const Solid* solid, const double* points, std::size_t count,
-                         ist_surface_point_t* answers, std::size_t answer_size) noexcept {
-  if (answer_size != sizeof(ist_surface_point_t)) return IST_WRONG_SIZE;
-  return ask_each(solid, count, points != nullptr && answers != nullptr,
-                  [&](const auto& placed, std::size_t i) {
-                    const double* const x = points + 3 * i;
-                    write(closest_point(placed, Eigen::Vector3d(x[0], x[1], x[2])), answers[i]);
-                    return answers[i].status;
-                  });
-}
-
-template <class Solid>
-ist_status_t find_inside(const Solid* solid, const double* points, std::size_t count,
-                         ist_overlapping_t* inside) noexcept {
-  return ask_each(solid, count, points != nullptr && inside != nullptr,
-                  [&](const auto& placed, std::size_t i) {
-                    const double* const x = points + 3 * i;
-                    const Containment found = contains(placed, Eigen::Vector3d(x[0], x[1], x[2]));
-                    inside[i] = found.status != QueryStatus::ok ? IST_OVERLAP_UNKNOWN
-                                : found.inside                  ? IST_OVERLAP_YES
-                                                                : IST_OVERLAP_NO;
-                    return status_of(found.status);
-                  });
 }
 
 }  // namespace
@@ -80,30 +44,36 @@ ist_status_t find_inside(const Solid* solid, const double* points, std::size_t c
 
 using namespace ist::c_api;
 
-ist_status_t ist_raycast(const ist_placed_tree_t* solid, const ist_ray_t* rays, size_t count,
+ist_status_t ist_raycast(const ist_placed_t* solid, const ist_ray_t* rays, size_t count,
                          ist_ray_hit_t* hits, size_t hit_size) {
-  return find_hits(solid, rays, count, hits, hit_size);
-}
-ist_status_t ist_field_raycast(const ist_placed_field_t* solid, const ist_ray_t* rays, size_t count,
-                               ist_ray_hit_t* hits, size_t hit_size) {
-  return find_hits(solid, rays, count, hits, hit_size);
+  if (hit_size != sizeof(ist_ray_hit_t)) return IST_WRONG_SIZE;
+  return ask_each(solid, count, rays != nullptr && hits != nullptr,
+                  [&](const auto& placed, std::size_t i) {
+                    write(ist::raycast(placed, read(rays[i])), hits[i]);
+                    return hits[i].status;
+                  });
 }
 
-ist_status_t ist_closest_point(const ist_placed_tree_t* solid, const double* points, size_t count,
+ist_status_t ist_closest_point(const ist_placed_t* solid, const double* points, size_t count,
                                ist_surface_point_t* answers, size_t answer_size) {
-  return find_points(solid, points, count, answers, answer_size);
-}
-ist_status_t ist_field_closest_point(const ist_placed_field_t* solid, const double* points,
-                                     size_t count, ist_surface_point_t* answers,
-                                     size_t answer_size) {
-  return find_points(solid, points, count, answers, answer_size);
+  if (answer_size != sizeof(ist_surface_point_t)) return IST_WRONG_SIZE;
+  return ask_each(solid, count, points != nullptr && answers != nullptr,
+                  [&](const auto& placed, std::size_t i) {
+                    const double* const x = points + 3 * i;
+                    write(ist::closest_point(placed, {x[0], x[1], x[2]}), answers[i]);
+                    return answers[i].status;
+                  });
 }
 
-ist_status_t ist_contains(const ist_placed_tree_t* solid, const double* points, size_t count,
+ist_status_t ist_contains(const ist_placed_t* solid, const double* points, size_t count,
                           ist_overlapping_t* inside) {
-  return find_inside(solid, points, count, inside);
-}
-ist_status_t ist_field_contains(const ist_placed_field_t* solid, const double* points, size_t count,
-                                ist_overlapping_t* inside) {
-  return find_inside(solid, points, count, inside);
+  return ask_each(solid, count, points != nullptr && inside != nullptr,
+                  [&](const auto& placed, std::size_t i) {
+                    const double* const x = points + 3 * i;
+                    const ist::Containment found = ist::contains(placed, {x[0], x[1], x[2]});
+                    inside[i] = found.status != ist::QueryStatus::ok ? IST_OVERLAP_UNKNOWN
+                                : found.inside                       ? IST_OVERLAP_YES
+                                                                     : IST_OVERLAP_NO;
+                    return status_of(found.status);
+                  });
 }

@@ -11,6 +11,7 @@
 
 #include "query/base/no_answer.h"
 #include "query/base/smooth_step.h"
+#include "query/base/turned_over.h"
 #include "query/descent/answer.h"
 #include "query/descent/descent.h"
 #include "query/field/surface_descent.h"
@@ -51,14 +52,10 @@ double triangles_met(const AssetHeader& asset, double radius) {
 
 }  // namespace
 
-Penetration turned_over(Penetration answer, const PlacedTree& moving,
-                        const PlacedTree& other) noexcept {
-  Eigen::Vector3d between;
-  for (int k = 0; k < 3; ++k) between[k] = moving.pose.t[k] - other.pose.t[k];
-  answer.rotation_gradient =
-      -(answer.rotation_gradient + between.cross(answer.translation_gradient));
-  answer.translation_gradient = -answer.translation_gradient;
-  return answer;
+Eigen::Vector3d between(const PlacedTree& from, const PlacedTree& to) noexcept {
+  Eigen::Vector3d way;
+  for (int k = 0; k < 3; ++k) way[k] = to.pose.t[k] - from.pose.t[k];
+  return way;
 }
 
 PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
@@ -181,7 +178,9 @@ Penetration PairOverlap::exact(bool b_probes, const DescentLimits& limits,
   if (!turned) return invalid_input<Penetration>();
   SurfaceDescent descent(surface, probes, *turned, limits, scratch_, bins);
   descent.run();
-  return turned_over(kept_within(most, descent.penetration()), a_, b_);
+  Penetration answer = kept_within(most, descent.penetration());
+  turn_over(between(b_, a_), answer);
+  return answer;
 }
 
 std::optional<DescentLimits> PairOverlap::left_by(const Penetration& lenses,

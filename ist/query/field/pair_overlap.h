@@ -22,10 +22,8 @@ struct PairMethod {
   double share = 1;  ///< what "alone" is of trees that are all but alike: the rest is the lenses'
 };
 
-/// An answer whose gradients are by a motion of `moving` about its origin, as one by a motion of
-/// `other` about its own.
-Penetration turned_over(Penetration answer, const PlacedTree& moving,
-                        const PlacedTree& other) noexcept;
+/// [u] From one's origin to the other's, world.
+Eigen::Vector3d between(const PlacedTree& from, const PlacedTree& to) noexcept;
 
 PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
                        const TreeHeader& tree_b, const RelativePose& pose, FieldUse use) noexcept;

@@ -32,14 +32,6 @@ Vector3d lever(const Pose& pose, double scale, const Vector3d& about) noexcept {
   return unit_rotation(pose) * (scale * about);
 }
 
-Pose moved(const Pose& start, double scale, const Motion& motion, double time) noexcept {
-  const Quaterniond rotation = Turning(unit_rotation(start), motion.angular_velocity).at(time);
-  const Vector3d place = translation(start) + lever(start, scale, motion.about) +
-                         motion.velocity * time - rotation * (scale * motion.about);
-  return {{rotation.w(), rotation.x(), rotation.y(), rotation.z()},
-          {place.x(), place.y(), place.z()}};
-}
-
 MovingBody body(const Pose& pose, double scale, const Motion& motion, const AssetHeader* asset,
                 double unit) noexcept {
   MovingBody body;
@@ -179,12 +171,12 @@ Motion motion_between(const Pose& from, const Pose& to, double duration, const V
   return motion;
 }
 
-PlacedTree moved(const PlacedTree& start, const Motion& motion, double time) noexcept {
-  return {start.tree, moved(start.pose, start.scale, motion, time), start.scale};
-}
-
-PlacedField moved(const PlacedField& start, const Motion& motion, double time) noexcept {
-  return {start.field, moved(start.pose, start.scale, motion, time), start.scale};
+Pose moved(const Pose& start, const Motion& motion, double time, double scale) noexcept {
+  const Quaterniond rotation = Turning(unit_rotation(start), motion.angular_velocity).at(time);
+  const Vector3d place = translation(start) + lever(start, scale, motion.about) +
+                         motion.velocity * time - rotation * (scale * motion.about);
+  return {{rotation.w(), rotation.x(), rotation.y(), rotation.z()},
+          {place.x(), place.y(), place.z()}};
 }
 
 }  // namespace ist

@@ -1,14 +1,13 @@
 // Many pairs in one call.
 
 import {kPatchBytes, kPenetrationBytes, newPatches, newPenetration, readPatches, readPenetration} from './answers.js';
-import {Asset} from './asset.js';
 import {writePoseAt, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {functions, Room, u32} from './memory.js';
 import {checkOptions} from './options.js';
 import {maxPatchesOf, solid} from './query.js';
 
-const kPairBytes = 144;  // asked_pair_t
+const kPairBytes = 136;  // asked_pair_t
 const room = new Room();
 
 /** Writes what is asked to `place`. */
@@ -17,14 +16,11 @@ function writePairs(place, pairs, who) {
   try {
     for (; i < pairs.length; ++i) {
       const pair = pairs[i], at = place + i * kPairBytes, words = u32();
-      const first = solid(pair.a, 'A', who), second = solid(pair.b, 'B', who);
-      const isTree = pair.a instanceof Asset;
-      words[at / 4] = isTree ? first : 0;
-      words[at / 4 + 1] = isTree ? 0 : first;
-      words[at / 4 + 2] = second;
-      writePoseAt(at + 16, pair.poseA, 'poseA');
+      words[at / 4] = solid(pair.a, 'A', who);
+      words[at / 4 + 1] = solid(pair.b, 'B', who);
+      writePoseAt(at + 8, pair.poseA, 'poseA');
       if (!pair.poseB) throw new IstError('ist: poseB is missing: {rotation, translation, scale}');
-      writePoseAt(at + 80, pair.poseB, 'poseB');
+      writePoseAt(at + 72, pair.poseB, 'poseB');
     }
   } catch (error) {
     if (error instanceof IstError) error.message = error.message.replace('ist:', `ist: pair ${i}:`);

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <ist/ist.h>
+#include <stddef.h>
+#include <stdint.h>
 
 #define EXPORT(name) __attribute__((export_name(#name)))
 
@@ -73,11 +75,13 @@ _Static_assert(sizeof(ist_ball_t) == 32, "ball");
 _Static_assert(sizeof(ist_lens_t) == 72, "lens");
 _Static_assert(sizeof(ist_outline_segment_t) == 56, "segment");
 
-static inline ist_placed_tree_t placed(const ist_tree_t* tree, const place_t* place) {
-  const ist_placed_tree_t made = {sizeof made, tree, place->pose, place->scale};
-  return made;
-}
-static inline ist_placed_field_t placed_field(const ist_field_t* field, const place_t* place) {
-  const ist_placed_field_t made = {sizeof made, field, place->pose, place->scale};
+/* Where a tree lies, or a field, plus 1. */
+typedef uintptr_t solid_t;
+
+static inline ist_placed_t placed(solid_t solid, const place_t* place) {
+  const int is_field = solid % 2 == 1;
+  const ist_placed_t made = {sizeof made, is_field ? NULL : (const ist_tree_t*)solid,
+                             is_field ? (const ist_field_t*)(solid - 1) : NULL, place->pose,
+                             place->scale};
   return made;
 }

@@ -111,62 +111,38 @@ _Static_assert(offsetof(ist_field_t, as.distance_grid.error) ==
                    offsetof(ist_field_t, as.distance_grid.origin) + 4 * sizeof(double),
                "grid");
 
-/* --- Queries: of two trees, or of a field and a tree where `a` is null -------------------------
- */
+/* --- Queries ---------------------------------------------------------------------------------- */
 
-EXPORT(penetration)
-ist_status_t penetration(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b) {
-  const ist_placed_tree_t second = placed(b, &desk.b);
-  if (a == NULL) {
-    const ist_placed_field_t first = placed_field(field, &desk.a);
-    return ist_field_penetration(&first, &second, &desk.settings, &desk.workspace,
-                                 &desk.penetration);
-  }
-  const ist_placed_tree_t first = placed(a, &desk.a);
+EXPORT(penetration) ist_status_t penetration(solid_t a, solid_t b) {
+  const ist_placed_t first = placed(a, &desk.a), second = placed(b, &desk.b);
   return ist_penetration(&first, &second, &desk.settings, &desk.workspace, &desk.penetration);
 }
 
-EXPORT(separation)
-ist_status_t separation(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b) {
-  const ist_placed_tree_t second = placed(b, &desk.b);
+EXPORT(separation) ist_status_t separation(solid_t a, solid_t b) {
+  const ist_placed_t first = placed(a, &desk.a), second = placed(b, &desk.b);
   const ist_separation_settings_t settings = {.size = sizeof settings,
                                               .max_visits = desk.settings.max_visits};
-  if (a == NULL) {
-    const ist_placed_field_t first = placed_field(field, &desk.a);
-    return ist_field_separation(&first, &second, &settings, &desk.workspace, &desk.separation);
-  }
-  const ist_placed_tree_t first = placed(a, &desk.a);
   return ist_separation(&first, &second, &settings, &desk.workspace, &desk.separation);
 }
 
 /* The number of patches goes to counts[0]. */
-EXPORT(contact_patches)
-ist_status_t contact_patches(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b,
-                             uint32_t most) {
-  const ist_placed_tree_t second = placed(b, &desk.b);
+EXPORT(contact_patches) ist_status_t contact_patches(solid_t a, solid_t b, uint32_t most) {
+  const ist_placed_t first = placed(a, &desk.a), second = placed(b, &desk.b);
   ist_contact_patches_t found = {.size = sizeof found,
                                  .patch_size = sizeof desk.patches[0],
                                  .patches = desk.patches,
                                  .capacity = most < kMostPatches ? most : kMostPatches};
-  ist_status_t status;
-  if (a == NULL) {
-    const ist_placed_field_t first = placed_field(field, &desk.a);
-    status = ist_field_contact_patches(&first, &second, &desk.settings, &desk.workspace, &found,
-                                       &desk.penetration);
-  } else {
-    const ist_placed_tree_t first = placed(a, &desk.a);
-    status = ist_contact_patches(&first, &second, &desk.settings, &desk.workspace, &found,
-                                 &desk.penetration);
-  }
+  const ist_status_t status = ist_contact_patches(&first, &second, &desk.settings, &desk.workspace,
+                                                  &found, &desk.penetration);
   desk.counts[0] = (uint32_t)found.count;
   return status;
 }
 
 /* The numbers of patches and of all segments go to counts. */
 EXPORT(overlap_outline)
-ist_status_t overlap_outline(const ist_tree_t* a, const ist_tree_t* b, uint32_t most,
-                             ist_outline_segment_t* room, size_t capacity) {
-  const ist_placed_tree_t first = placed(a, &desk.a), second = placed(b, &desk.b);
+ist_status_t overlap_outline(solid_t a, solid_t b, uint32_t most, ist_outline_segment_t* room,
+                             size_t capacity) {
+  const ist_placed_t first = placed(a, &desk.a), second = placed(b, &desk.b);
   ist_contact_patches_t found = {sizeof found, sizeof desk.patches[0], desk.patches, most, 0};
   ist_outline_t outline = {
       .size = sizeof outline, .segment_size = sizeof *room, .segments = room, .capacity = capacity};
@@ -178,26 +154,18 @@ ist_status_t overlap_outline(const ist_tree_t* a, const ist_tree_t* b, uint32_t 
 }
 
 /* 0, 1, 2 as ist_overlapping_t, or an error. */
-EXPORT(overlap)
-int32_t overlap(const ist_tree_t* a, const ist_field_t* field, const ist_tree_t* b) {
-  const ist_placed_tree_t second = placed(b, &desk.b);
+EXPORT(overlap) int32_t overlap(solid_t a, solid_t b) {
+  const ist_placed_t first = placed(a, &desk.a), second = placed(b, &desk.b);
   ist_overlapping_t answer;
-  ist_status_t status;
-  if (a == NULL) {
-    const ist_placed_field_t first = placed_field(field, &desk.a);
-    status = ist_field_overlap(&first, &second, &desk.workspace, &answer);
-  } else {
-    const ist_placed_tree_t first = placed(a, &desk.a);
-    status = ist_overlap(&first, &second, &desk.workspace, &answer);
-  }
+  const ist_status_t status = ist_overlap(&first, &second, &desk.workspace, &answer);
   return status < 0 ? status : answer;
 }
 
 /* The numbers of all and of written ones go to counts. */
 EXPORT(lenses)
-ist_status_t lenses(const ist_tree_t* a, const ist_tree_t* b, uint32_t detail_a, uint32_t detail_b,
-                    ist_lens_t* room, size_t capacity) {
-  const ist_placed_tree_t first = placed(a, &desk.a), second = placed(b, &desk.b);
+ist_status_t lenses(solid_t a, solid_t b, uint32_t detail_a, uint32_t detail_b, ist_lens_t* room,
+                    size_t capacity) {
+  const ist_placed_t first = placed(a, &desk.a), second = placed(b, &desk.b);
   const ist_lens_settings_t settings = {sizeof settings, desk.settings.measure, detail_a, detail_b};
   ist_lenses_t found = {
       .size = sizeof found, .lens_size = sizeof *room, .lenses = room, .capacity = capacity};

@@ -7,10 +7,18 @@ import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
 import {checkOptions} from './options.js';
 
+/** As exports.c takes it: a field's place is odd. */
 export function solid(given, which, query) {
-  if (given instanceof Asset || (which === 'A' && given instanceof Field)) return given._at;
-  throw new IstError(
-      `ist: ${query}: solid ${which} must be an ${which === 'A' ? 'Asset or a Field' : 'Asset'}`);
+  if (given instanceof Asset) return given._at;
+  if (given instanceof Field) return given._at + 1;
+  throw new IstError(`ist: ${query}: solid ${which} must be an Asset or a Field`);
+}
+
+function assetsOf(a, b, query, what) {
+  for (const [given, which] of [[a, 'A'], [b, 'B']])
+    if (!(given instanceof Asset))
+      throw new IstError(`ist: ${query}: solid ${which} must be an Asset: a field has no ${what}`);
+  return [a._at, b._at];
 }
 
 /**
@@ -21,11 +29,12 @@ export function ask(question, who, a, b, poseB, options, more) {
   const wasm = functions(who);
   checkOptions(who, options);
   const first = solid(a, 'A', who), second = solid(b, 'B', who);
+  if (a instanceof Field && b instanceof Field)
+    throw new IstError(`ist: ${who}: both solids are Fields; one must be an Asset`);
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
   writeSettings(options);
-  const isTree = a instanceof Asset;
-  const status = wasm[question](isTree ? first : 0, isTree ? 0 : first, second, more);
+  const status = wasm[question](first, second, more);
   check(status, who);
   return status;
 }
@@ -92,9 +101,7 @@ const kSegmentBytes = 56;
 export function overlapOutline(a, b, poseB, options) {
   const wasm = functions('overlapOutline()');
   checkOptions('overlapOutline()', options);
-  if (!(a instanceof Asset))
-    throw new IstError('ist: overlapOutline(): solid A must be an Asset: a field has no mesh');
-  const first = a._at, second = solid(b, 'B', 'overlapOutline()');
+  const [first, second] = assetsOf(a, b, 'overlapOutline()', 'mesh');
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
   writeSettings({maxVisits: options?.maxVisits});
@@ -126,9 +133,7 @@ export function overlapOutline(a, b, poseB, options) {
 export function lenses(a, b, poseB, options) {
   const wasm = functions('lenses()');
   checkOptions('lenses()', options);
-  if (!(a instanceof Asset))
-    throw new IstError('ist: lenses(): solid A must be an Asset: a field has no spheres');
-  const first = a._at, second = solid(b, 'B', 'lenses()');
+  const [first, second] = assetsOf(a, b, 'lenses()', 'spheres');
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
   sphereMeasureOf(options?.measure);

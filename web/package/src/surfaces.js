@@ -1,7 +1,6 @@
 // Rays and points against one solid.
 
 import {kInvalidInput} from './answers.js';
-import {Asset} from './asset.js';
 import {writePose} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
@@ -31,9 +30,9 @@ function writeRow(place, given, row, what) {
 
 /** One alone that cannot be answered is an error; of many it is NaN. */
 function ask(question, who, given, pose, count, place, answers) {
-  const wasm = functions(who), at = solid(given, 'A', who), isTree = given instanceof Asset;
+  const wasm = functions(who), at = solid(given, 'A', who);
   writePose(0, pose, 'pose');
-  const status = wasm[question](isTree ? at : 0, isTree ? 0 : at, place, count, answers);
+  const status = wasm[question](at, place, count, answers);
   if (status !== kInvalidInput || count === 1) check(status, who);
 }
 

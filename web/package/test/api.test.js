@@ -382,8 +382,8 @@ test('a batch: the answers of single calls, a bad pair among them', () => {
   assert.match(
       sentence(() => ist.penetrationBatch([pairs[0], {a, b}])), /pair 1: poseB is missing/);
   assert.match(
-      sentence(() => ist.contactPatchesBatch([{a, b: floor, poseB: {}}])),
-      /pair 0: contactPatchesBatch\(\): solid B must be an Asset/);
+      sentence(() => ist.contactPatchesBatch([{a, b: {}, poseB: {}}])),
+      /pair 0: contactPatchesBatch\(\): solid B must be an Asset or a Field/);
   a.free();
   b.free();
 });
@@ -404,7 +404,11 @@ test('what is wrong is said', () => {
   assert.match(sentence(ask({}, {pairBudget: -1})), /whole number/);
   assert.match(sentence(() => ist.penetration({}, b, {})), /solid A must be an Asset or a Field/);
   assert.match(
-      sentence(() => ist.penetration(a, ist.Field.ball(1), {})), /solid B must be an Asset/);
+      sentence(() => ist.penetration(ist.Field.ball(2), ist.Field.ball(1), {})),
+      /both solids are Fields/);
+  const floor = ist.Field.halfSpace([0, 0, 1], 1);
+  assert.equal(ist.penetration(a, floor, {}).volume, ist.penetration(floor, a, {}).volume);
+  assert.match(sentence(() => ist.lenses(a, floor, {})), /solid B must be an Asset: a field/);
   assert.match(sentence(() => ist.contactPatches(a, b, {}, {maxPatches: 65})), /from 1 to 64/);
   assert.match(sentence(() => new ist.Asset()), /static functions/);
   a.free();
