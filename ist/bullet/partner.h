@@ -9,7 +9,7 @@
 #include <vector>
 
 #include <ist/bullet/shape.h>
-#include <ist/field.h>
+#include <ist/query.h>
 
 namespace ist::bullet {
 
