@@ -15,10 +15,10 @@
 #include <vector>
 
 #include "bake/backend/make_backend.h"
-#include "bake/calibrate/calibration.h"
 #include "bake/cluster/tree_builder.h"
-#include "bake/cover/cover.h"
 #include "bake/field/field.h"
+#include "packing/calibrate/calibration.h"
+#include "packing/cover/cover.h"
 #include "report.h"
 #include "support/shared_data.h"
 

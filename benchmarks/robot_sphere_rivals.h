@@ -10,8 +10,8 @@
 #include <ist/packing.h>
 
 #include "bake/backend/make_backend.h"
-#include "bake/cover/cover.h"
 #include "mesh/mesh_solid.h"
+#include "packing/cover/cover.h"
 #include "spheres/cover_choice.h"
 #include "spheres/cover_proof.h"
 #include "spheres/offset_surface.h"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include <ist/asset_layout.h>
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "bake/cluster/tree_builder.h"
 #include "report.h"
 #include "support/oracle_rows.h"

@@ -1,6 +1,6 @@
 #include "cuda/bake/columns_on_gpu.h"
 
-#include "bake/calibrate/power_relaxation.h"
+#include "packing/calibrate/power_relaxation.h"
 #include "cuda/launch.h"
 #include "cuda/prefix_sum.h"
 #include "mesh/wide_nearest.h"

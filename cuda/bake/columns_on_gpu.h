@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "backend/tasks.h"
-#include "bake/calibrate/power_grid.h"
 #include "cuda/device_array.h"
 #include "mesh/wide_tree.h"
+#include "packing/backend/tasks.h"
+#include "packing/calibrate/power_grid.h"
 
 namespace ist::gpu {
 

@@ -1,6 +1,6 @@
 #include "cuda/bake/cover_on_gpu.h"
 
-#include "bake/cover/cover_cells.h"
+#include "packing/cover/cover_cells.h"
 #include "cuda/device_array.h"
 #include "cuda/warp_team.h"
 #include "mesh/wide_rays.h"

@@ -3,9 +3,9 @@
 #include <functional>
 #include <vector>
 
-#include "backend/tasks.h"
 #include "cuda/queue.h"
 #include "mesh/wide_tree.h"
+#include "packing/backend/tasks.h"
 
 namespace ist::gpu {
 

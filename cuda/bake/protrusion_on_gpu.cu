@@ -1,6 +1,6 @@
 #include "cuda/bake/protrusion_on_gpu.h"
 
-#include "bake/calibrate/protrusion.h"
+#include "packing/calibrate/protrusion.h"
 #include "cuda/device_array.h"
 #include "cuda/warp_team.h"
 #include "mesh/wide_rays.h"

@@ -1,6 +1,6 @@
 #include "cuda/bake/relax_on_gpu.h"
 
-#include "bake/calibrate/power_relaxation.h"
+#include "packing/calibrate/power_relaxation.h"
 #include "cuda/block_team.h"
 #include "cuda/warp_reduce.h"
 #include "cuda/warp_team.h"

@@ -3,8 +3,8 @@
 #include <functional>
 #include <span>
 
-#include "backend/tasks.h"
 #include "cuda/bake/columns_on_gpu.h"
+#include "packing/backend/tasks.h"
 
 namespace ist::gpu {
 

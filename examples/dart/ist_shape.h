@@ -1,6 +1,5 @@
 #pragma once
 
-#include <ist/field.h>
 #include <ist/query.h>
 #include <dart/dynamics/Inertia.hpp>
 #include <dart/dynamics/Shape.hpp>

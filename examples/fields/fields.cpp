@@ -2,7 +2,7 @@
 // is baked. Links ist::ist; a program that loads assets needs ist::query alone.
 #include <ist/bake.h>
 #include <ist/error.h>
-#include <ist/field.h>
+#include <ist/query.h>
 
 #include <cmath>
 #include <cstdio>

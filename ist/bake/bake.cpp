@@ -13,13 +13,13 @@
 
 #include <ist/error.h>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "bake/backend/make_backend.h"
-#include "bake/calibrate/calibration.h"
 #include "bake/cluster/tree_builder.h"
-#include "bake/cover/cover.h"
 #include "bake/mass_and_bounds.h"
 #include "packing/base/packing_settings.h"
+#include "packing/calibrate/calibration.h"
+#include "packing/cover/cover.h"
 #include "stage/aside.h"
 #include "stage/stage.h"
 #include "stage/thread_arena.h"

@@ -2,10 +2,10 @@
 
 #include <ist/bake.h>
 
-#include "asset/asset_writer.h"
-#include "backend/solid_backend.h"
+#include "bake/asset/asset_writer.h"
 #include "bake/kept_surface.h"
 #include "mesh/mesh_solid.h"
+#include "packing/backend/solid_backend.h"
 
 namespace ist {
 

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "bake/backend/make_backend.h"
 #include "bake/bake_solid.h"
 #include "bake/count_search.h"

@@ -7,7 +7,7 @@
 #include <future>
 #include <memory>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/resolve/resolve.h"
 #include "stage/work_stop.h"

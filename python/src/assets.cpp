@@ -10,15 +10,15 @@
 #include <ist/error.h>
 #include <ist/mass_properties.h>
 
-#include "app/asset_summary.h"
-#include "app/exported_spheres.h"
-#include "app/text.h"
 #include "arrays.h"
+#include "library/asset_summary.h"
+#include "library/exported_spheres.h"
+#include "library/settings/bake_settings.h"
+#include "library/text.h"
 #include "meshes.h"
 #include "module.h"
 #include "offline.h"
 #include "rows.h"
-#include "settings/bake_settings.h"
 #include "solids.h"
 
 namespace ist::python {

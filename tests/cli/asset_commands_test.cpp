@@ -3,7 +3,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "cli/program.h"
 
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "bake/calibrate/calibration.h"
-#include "bake/cover/cover.h"
+#include "packing/calibrate/calibration.h"
+#include "packing/cover/cover.h"
 #include "support/gpu_test.h"
 #include "support/on_host.h"
 #include "support/shared_data.h"

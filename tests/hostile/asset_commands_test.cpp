@@ -2,7 +2,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "cli/program.h"
 
 // An asset whose header lies, with a hash that fits, in every command that reads assets.

@@ -1,19 +1,23 @@
 # cmake -DROOT=<the repository> -P arrows.cmake
 # Reads the table of rooms in docs/design.md (| `room` | what it holds | uses |) and the #include "…"
 # lines of every source file. Fails on an include that crosses rooms where no arrow is drawn, on an
-# arrow that nothing uses, on a room whose arrows lead back to it, and on a source file outside all
-# rooms.
+# arrow that nothing uses, on a room whose arrows lead back to it, on a source file outside all rooms,
+# and on a folder of a room that includes one which its row names later.
 cmake_minimum_required(VERSION 3.25)
 
 file(STRINGS ${ROOT}/docs/design.md rows REGEX "^\\| `(src|ist|cuda)[^`]*` \\|" ENCODING UTF-8)
 set(rooms)
 foreach(row IN LISTS rows)
-  if(NOT row MATCHES "^\\| `([^`]+)` \\| .* \\| ([^|]*) \\|$")
+  if(NOT row MATCHES "^\\| `([^`]+)` \\| (.*) \\| ([^|]*) \\|$")
     message(FATAL_ERROR "docs/design.md: not a row of rooms: ${row}")
   endif()
   set(room ${CMAKE_MATCH_1})
-  string(REGEX MATCHALL "`[^`]+`" uses "${CMAKE_MATCH_2}")
+  set(holds "${CMAKE_MATCH_2}")
+  set(uses "${CMAKE_MATCH_3}")
+  string(REGEX MATCHALL "`[a-z_]+`" folders_${room} "${holds}")
+  string(REGEX MATCHALL "`[^`]+`" uses "${uses}")
   string(REPLACE "`" "" uses "${uses}")
+  string(REPLACE "`" "" folders_${room} "${folders_${room}}")
   list(APPEND rooms ${room})
   set(uses_${room} ${uses})
 endforeach()
@@ -34,6 +38,16 @@ function(room_of file out)
     endif()
   endforeach()
   set(${out} "${best}" PARENT_SCOPE)
+endfunction()
+
+# The folder of a room that a file is in; nothing for the room itself.
+function(folder_of file room out)
+  string(REPLACE "${room}/" "" rest "${file}")
+  set(folder "")
+  if(rest MATCHES "^([^/]+)/")
+    set(folder ${CMAKE_MATCH_1})
+  endif()
+  set(${out} "${folder}" PARENT_SCOPE)
 endfunction()
 
 set(errors)
@@ -58,7 +72,16 @@ foreach(file IN LISTS files)
     endforeach()
     if(NOT target)
       list(APPEND errors "${file}: \"${header}\" is in no room")
-    elseif(NOT target STREQUAL room)
+    elseif(target STREQUAL room)
+      # Of the folders of a room: from the file's to the header's.
+      folder_of("${file}" "${room}" from)
+      folder_of("${path}" "${room}" to)
+      list(FIND folders_${room} "${from}" from_place)
+      list(FIND folders_${room} "${to}" to_place)
+      if(from AND to_place GREATER from_place)
+        list(APPEND errors "${file}: \"${header}\": docs/design.md names ${to} after ${from}")
+      endif()
+    else()
       set(used_${room}_${target} TRUE)
       if(NOT target IN_LIST uses_${room})
         list(APPEND errors "${file}: \"${header}\": docs/design.md draws no arrow ${room} -> ${target}")

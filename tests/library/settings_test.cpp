@@ -1,9 +1,9 @@
-#include "settings/bake_settings.h"
+#include "library/settings/bake_settings.h"
 
 #include <gtest/gtest.h>
 
 #include "library/input_mesh.h"
-#include "settings/numbers.h"
+#include "library/settings/numbers.h"
 
 namespace ist {
 namespace {

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "bake/cluster/tree_builder.h"
 #include "query/asset/content_hash.h"
 #include "support/mass_of_spheres.h"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 
 namespace ist::testing {
 

@@ -3,8 +3,8 @@
 #include <ist/packing.h>
 
 #include "bake/backend/make_backend.h"
-#include "bake/calibrate/calibration.h"
-#include "bake/cover/cover.h"
+#include "packing/calibrate/calibration.h"
+#include "packing/cover/cover.h"
 #include "stage/thread_arena.h"
 
 namespace ist::testing {

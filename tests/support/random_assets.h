@@ -8,7 +8,7 @@
 #include <ist/bake.h>
 #include <ist/pose.h>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "bake/cluster/tree_builder.h"
 #include "support/mass_of_spheres.h"
 

@@ -8,7 +8,7 @@
 #include <functional>
 
 #include <ist/asset_layout.h>
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "query/asset/content_hash.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"

@@ -1,4 +1,4 @@
-#include "bake/calibrate/calibration.h"
+#include "packing/calibrate/calibration.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <ist/error.h>
 #include <ist/packing.h>
 
-#include "bake/calibrate/power_cells.h"
 #include "numerics/roots.h"
+#include "packing/calibrate/power_cells.h"
 #include "support/on_host.h"
 #include "support/test_meshes.h"
 

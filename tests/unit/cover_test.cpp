@@ -1,4 +1,4 @@
-#include "bake/cover/cover.h"
+#include "packing/cover/cover.h"
 
 #include <gtest/gtest.h>
 

@@ -3,8 +3,8 @@
 #include <ist/error.h>
 
 #include "bake/backend/pack_on_host.h"
-#include "bake/calibrate/host_calibration.h"
-#include "bake/cover/host_cover.h"
+#include "packing/calibrate/host_calibration.h"
+#include "packing/cover/host_cover.h"
 #include "packing/grids/host_rounds.h"
 #include "packing/grids/medial_grids.h"
 

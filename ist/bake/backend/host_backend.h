@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "backend/solid_backend.h"
+#include "packing/backend/solid_backend.h"
 
 namespace ist {
 

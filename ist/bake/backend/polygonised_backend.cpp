@@ -2,7 +2,7 @@
 
 #include "bake/backend/host_backend.h"
 #include "bake/backend/pack_on_host.h"
-#include "bake/cover/host_cover.h"
+#include "packing/cover/host_cover.h"
 
 namespace ist {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "bake/cluster/tree_order.h"
 
 namespace ist {

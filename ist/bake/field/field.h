@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "bake/field/field_mesh.h"
 #include "mesh/mesh_solid.h"
 #include "stage/work_stop.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "mesh/mesh_view.h"
 
 namespace ist {

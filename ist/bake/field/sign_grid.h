@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "mesh/mesh_view.h"
 
 namespace ist {

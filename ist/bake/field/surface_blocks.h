@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "asset/asset_writer.h"
+#include "bake/asset/asset_writer.h"
 #include "bake/field/field_mesh.h"
 
 namespace ist {

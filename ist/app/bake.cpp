@@ -1,0 +1,195 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <memory>
+
+#include <ist/bake.h>
+#include <ist/error.h>
+
+#include "app/bake_library.h"
+#include "app/bake_robot.h"
+#include "app/commands.h"
+#include "app/device_option.h"
+#include "app/file_options.h"
+#include "app/interrupt.h"
+#include "app/mesh_notes.h"
+#include "app/number_options.h"
+#include "app/progress_line.h"
+#include "app/setting_options.h"
+#include "library/asset_summary.h"
+#include "library/coarseness.h"
+#include "library/text.h"
+
+namespace ist::app {
+namespace {
+
+struct BakeOptions {
+  std::string mesh, output;
+  SettingOptions asked;
+  std::string device = "auto";
+  unsigned threads = 0;
+  bool json = false, quiet = false;
+  LibraryOptions library;
+  RobotOptions robot;
+};
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// An asset, and what its partners erred where an error was asked for.
+struct Baked {
+  Asset asset;
+  std::vector<PartnerError> partners = {};
+};
+
+Baked bake_now(const ClosedMesh& mesh, const BakeSettings& asked,
+               const ProgressCallback& progress) {
+  const PackingSettings& settings = asked.packing;
+  if (asked.surface_only) return {bake_surface(mesh, settings.surface, settings.threads, progress)};
+  if (!(asked.target.relative_error > 0)) return {bake(mesh, settings, progress)};
+  TargetedAsset found = bake_to_error(mesh, asked.target, settings, progress);
+  Baked baked = {std::move(found.asset)};
+  for (const PartnerError& partner : found.partners)
+    if (partner.poses > 0) baked.partners.push_back(partner);
+  return baked;
+}
+
+/// "copy 1.4 % (71), plane 0.3 % (24), …".
+std::string describe_partners(const std::vector<PartnerError>& partners) {
+  std::string text;
+  for (const PartnerError& of : partners)
+    text += fmt::format("{}{} {:.2g} % ({})", text.empty() ? "" : ", ", name_of(of.partner),
+                        100 * of.median, of.poses);
+  return text;
+}
+
+nlohmann::ordered_json partners_json(const std::vector<PartnerError>& partners) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const PartnerError& of : partners)
+    list.push_back({{"partner", name_of(of.partner)}, {"error", of.median}, {"poses", of.poses}});
+  return list;
+}
+
+Baked bake_interruptibly(const ClosedMesh& mesh, const BakeSettings& settings, bool quiet) {
+  constexpr double kPatience = 0.15;  // [s] some steps take seconds, and leave nothing half done
+  const InterruptGuard guard(kPatience);
+  ProgressLine line(quiet);
+  try {
+    const auto show = [&](const Progress& progress) {
+      line.show(progress);
+      return !interrupted();
+    };
+    Baked baked = bake_now(mesh, settings, show);
+    exit_if_interrupted();
+    return baked;
+  } catch (const Error&) {
+    exit_if_interrupted();
+    throw;
+  }
+}
+
+void run_bake(const BakeOptions& options) {
+  if (options.quiet) spdlog::set_level(spdlog::level::err);
+  BakeSettings settings = options.asked.settings;
+  settings.packing.threads = options.threads;
+  const bool robot = is_robot_file(options.mesh);
+  if (!robot) require_output(options.output, options.mesh, "the asset");
+  settings.packing.device = usable_device(options.device);
+  if (!settings.surface_only) announce_device(settings.packing.device);
+  if (robot)
+    return bake_robot(
+        {options.mesh, options.output, settings, options.robot, options.json, options.quiet});
+
+  const auto start = std::chrono::steady_clock::now();
+  const auto [declared, mesh] = read_mesh_aloud(options.mesh, settings.mesh);
+  const double import_seconds = seconds_since(start);
+  const auto [asset, partners] = bake_interruptibly(mesh, settings, options.quiet);
+  const double bake_seconds = seconds_since(start) - import_seconds;
+  {
+    const InterruptGuard guard;  // the file is written whole, or not at all
+    asset.save(options.output);
+  }
+  exit_if_interrupted();
+
+  if (settings.target.relative_error > 0 && !asset.view().predicted_errors().target_met())
+    spdlog::warn("{}: {}", options.output, describe_target(asset.view()));
+  if (const std::string coarse = describe_coarseness(asset.view()); !coarse.empty())
+    spdlog::warn("{}: {}", options.output, coarse);
+  if (const std::string twice = describe_counted_twice(asset.view()); !twice.empty())
+    spdlog::warn("{}: {}", options.output, twice);
+  if (options.json) {
+    nlohmann::ordered_json result = {{"asset", options.output}, {"mesh", options.mesh}};
+    result.update(asset_json(asset.view()));
+    result["declared"] = declared_json(declared);
+    result["notes"] = mesh.report.notes;
+    result["closing"] = closing_json(mesh.report);
+    result["partners"] = partners_json(partners);
+    result["seconds"] = {{"import", import_seconds}, {"bake", bake_seconds}};
+    fmt::print("{}\n", result.dump(2));
+  } else if (!options.quiet) {
+    const std::string declares = describe_declared(declared);
+    fmt::print("{}\n{}", options.output, describe_asset(asset.view()));
+    if (!partners.empty())
+      fmt::print("  {:<12} {}: median error (poses)\n", "partners", describe_partners(partners));
+    if (!declares.empty()) fmt::print("  {:<12} {}\n", "declared", declares);
+    if (const std::string closing = describe_closing(mesh.report); !closing.empty())
+      fmt::print("  {:<12} {}\n", "closed by", closing);
+    fmt::print("  {:<12} import {:.2f} s, bake {:.2f} s\n", "time", import_seconds, bake_seconds);
+  }
+}
+
+}  // namespace
+
+void add_bake(CLI::App& app) {
+  const auto options = std::make_shared<BakeOptions>();
+  CLI::App* const command = app.add_subcommand(
+      "bake", "Pack a closed mesh with spheres and write an .ist asset, or many with --manifest");
+  CLI::Option* const mesh =
+      add_input(command, "MESH", options->mesh,
+                "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf")
+          ->required(false);
+  add_output(command, options->output,
+             "The .ist file to write. With --manifest: the folder for NAME.ist. For a robot: the "
+             "folder for LINK.ist and an index. A missing folder is created",
+             Dash::refused);
+  add_setting_options(command, options->asked, all_settings());
+  add_device_option(command, options->device,
+                    "Device of the bake; auto = the GPU if there is one, else the CPU");
+  add_whole(command, "--threads", options->threads,
+            "Number of threads; 0 = all cores. The result does not depend on it");
+  add_robot_options(command, options->robot);
+  add_library_options(command, options->library);
+  command->add_flag("--json", options->json, "Print the result as JSON");
+  command->add_flag("--quiet", options->quiet, "Print errors only");
+  command->footer(
+      "Packing stops at the first limit it reaches. Ctrl-C stops the bake; no file is written.\n"
+      "Example: ist bake bolt.obj -o bolt.ist --spheres 4000\n"
+      "Example: ist bake ur5.urdf -o ur5 --spheres 1000\n"
+      "Example: ist bake --manifest library.toml -o assets --cache ~/.cache/ist");
+  command->callback([options, mesh] {
+    if (!options->library.manifest.empty()) {
+      refuse_idle_options(options->robot, options->library.manifest);
+      if (!options->mesh.empty())
+        throw CLI::ValidationError("--manifest", "excludes MESH; list the mesh in the manifest");
+      if (!options->asked.given.empty())
+        throw CLI::ValidationError("--" + *options->asked.given.begin(),
+                                   "cannot be combined with --manifest; set it in the manifest, "
+                                   "without --, under [defaults] or an [[asset]]");
+      return run_library({options->library, options->output, options->device, options->threads,
+                          options->json, options->quiet});
+    }
+    if (options->mesh.empty()) throw CLI::RequiredError(mesh->get_name());
+    complete_settings(options->asked);
+    refuse_idle_options(options->robot, options->mesh);
+    if (is_robot_file(options->mesh))
+      for (const Setting& placing : placing_settings())
+        if (options->asked.given.contains(placing.name))
+          throw CLI::ValidationError("--" + placing.name,
+                                     "cannot be combined with a robot; its URDF places the meshes");
+    run_bake(*options);
+  });
+}
+
+}  // namespace ist::app

@@ -1,0 +1,176 @@
+#include "app/bake_library.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <ist/error.h>
+
+#include "app/commands.h"
+#include "app/device_option.h"
+#include "app/file_options.h"
+#include "app/interrupt.h"
+#include "app/library_progress.h"
+#include "app/number_options.h"
+#include "app/summary_table.h"
+#include "library/asset_summary.h"
+#include "library/coarseness.h"
+#include "library/manifest.h"
+#include "library/run_jobs.h"
+#include "library/summary.h"
+
+namespace ist::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<Shard> parse_shard(std::string_view text) {
+  constexpr std::uint32_t kMostShards = 1'000'000;
+  const std::size_t slash = text.find('/');
+  if (slash == std::string_view::npos) return std::nullopt;
+  const auto index = parse_whole<std::uint32_t>(text.substr(0, slash));
+  const auto count = parse_whole<std::uint32_t>(text.substr(slash + 1));
+  if (!index || !count || *index < 1 || *index > *count || *count > kMostShards)
+    return std::nullopt;
+  return Shard{*index, *count};
+}
+
+/// All mistakes at once, before anything is written.
+Manifest read_sound_manifest(const std::string& path) {
+  Manifest manifest = read_manifest(path);
+  if (manifest.faults.empty()) return manifest;
+  for (const std::string& fault : manifest.faults) spdlog::error("{}", fault);
+  spdlog::error("{}: {} mistake{}; nothing was baked", path, manifest.faults.size(),
+                manifest.faults.size() == 1 ? "" : "s");
+  throw ExitCode{kExitError};
+}
+
+void make_folder(const std::string& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (!fs::is_directory(path))
+    throw Error(path + ": cannot create this folder for the assets" +
+                (error ? ": " + error.message() : "") + "; name another with -o");
+  if (access(path.c_str(), W_OK | X_OK) != 0)
+    throw Error(path + ": no permission to write to this folder; name another with -o");
+}
+
+/// An empty name counts as none, as in other programs.
+std::string cache_folder(const LibraryOptions& options) {
+  const char* const from_environment = std::getenv("IST_CACHE");
+  if (!options.cache.empty()) return options.cache;
+  return from_environment != nullptr ? from_environment : "";
+}
+
+std::vector<std::string> warnings_of(const TreeView& tree) {
+  std::vector<std::string> warnings;
+  if (const PredictedErrors errors = tree.predicted_errors();
+      errors.target_error > 0 && !errors.target_met())
+    warnings.push_back(describe_target(tree));
+  if (std::string coarse = describe_coarseness(tree); !coarse.empty())
+    warnings.push_back(std::move(coarse));
+  if (std::string twice = describe_counted_twice(tree); !twice.empty())
+    warnings.push_back(std::move(twice));
+  return warnings;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+RunSettings settings_for(const LibraryRun& run) {
+  RunSettings settings;
+  settings.output = run.output;
+  settings.device = usable_device(run.device);
+  settings.threads = run.threads;
+  settings.jobs = run.library.jobs;
+  settings.memory = run.library.memory;
+  settings.warnings_of = warnings_of;
+  return settings;
+}
+
+}  // namespace
+
+void add_library_options(CLI::App* command, LibraryOptions& options) {
+  CLI::Option* const manifest =
+      add_input(command, "--manifest", options.manifest,
+                "Bake every mesh that this TOML file lists (docs/library.md)")
+          ->required(false);
+  add_input(command, "--cache", options.cache,
+            "With --manifest: cache folder; an asset whose mesh and settings did not change is "
+            "copied from it instead of baked again. Default: $IST_CACHE, else no cache")
+      ->required(false)
+      ->needs(manifest);
+  add_bytes(command, "--cache-size", options.cache_size,
+            "With --manifest: size limit of the cache in bytes, e.g. 10G; the least recently used "
+            "assets are removed first. Default: no limit")
+      ->needs(manifest);
+  add_parsed(
+      command, "--shard", "I/N with I from 1 to N, e.g. 2/8",
+      [&options](const std::string& text) {
+        options.shard = text;
+        return parse_shard(text).has_value();
+      },
+      "With --manifest: bake part I of N; `ist summary` merges the summaries of all parts")
+      ->type_name("I/N")
+      ->needs(manifest);
+  constexpr unsigned kMostJobs = 1024;
+  add_whole(command, "--jobs", options.jobs,
+            "With --manifest: number of assets baked at once; 0 = as many as threads. The result "
+            "does not depend on it",
+            0u, kMostJobs)
+      ->needs(manifest);
+  add_bytes(command, "--memory", options.memory,
+            "With --manifest: memory limit in bytes, e.g. 16G; an asset waits until its estimated "
+            "memory is free. Default: 80 % of the available memory")
+      ->needs(manifest);
+}
+
+void run_library(const LibraryRun& run) {
+  const auto start = std::chrono::steady_clock::now();
+  if (run.quiet) spdlog::set_level(spdlog::level::err);
+  const Manifest manifest = read_sound_manifest(run.library.manifest);
+  RunSettings settings = settings_for(run);
+  const std::string cache = cache_folder(run.library);
+  if (cache.empty() && run.library.cache_size != 0)
+    throw CLI::ValidationError("--cache-size", "has no effect without --cache or IST_CACHE");
+  make_folder(run.output);
+  announce_device(settings.device);
+  if (!cache.empty()) settings.cache = std::make_shared<AssetCache>(cache, run.library.cache_size);
+
+  Summary summary;
+  summary.manifest = run.library.manifest;
+  summary.library_hash = hash_of_library(manifest.jobs);
+  if (!run.library.shard.empty()) summary.shard = *parse_shard(run.library.shard);
+  std::vector<Job> jobs;
+  for (const Job& job : manifest.jobs)
+    if (summary.shard.holds(job.name)) jobs.push_back(job);
+
+  const InterruptGuard guard;
+  LibraryProgress progress(jobs.size(), run.quiet);
+  RunOutcome outcome = run_jobs(jobs, settings, progress);
+  progress.end();
+  if (settings.cache && run.library.cache_size != 0 && !outcome.stopped)
+    prune_cache(cache, run.library.cache_size);
+  summary.results = std::move(outcome.results);
+  summary.seconds = seconds_since(start);
+  print_summary(summary, run.json, run.quiet);
+  if (outcome.abandoned) {
+    std::fflush(stdout);
+    _exit(kExitInterrupted);
+  }
+  exit_if_interrupted();
+  if (!summary.complete()) throw ExitCode{kExitError};
+}
+
+}  // namespace ist::app

@@ -1,0 +1,298 @@
+#include <ist/field.h>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <memory>
+
+#include <ist/bake.h>
+#include <ist/error.h>
+#include <ist/pair_fit.h>
+
+#include "app/commands.h"
+#include "app/field_spec.h"
+#include "app/file_options.h"
+#include "app/number_options.h"
+#include "app/query_output.h"
+#include "library/asset_summary.h"
+
+namespace ist::app {
+namespace {
+
+struct QueryOptions {
+  std::string a, asset_b, pose, poses;
+  std::vector<std::string> classes;
+  double scale_b = 1;
+  bool scale_b_given = false;
+  QuerySettings settings;
+  std::uint32_t max_visits = 0;
+  std::size_t repeat = 1;
+  bool json = false, csv = false;
+};
+
+/// What CLI11 asks of a validator: "" or what is wrong.
+std::string is_pose(const std::string& text) {
+  try {
+    parse_pose(text);
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+/// "", or what is wrong with a description of a field; file names are none.
+std::string field_fault(const std::string& text) {
+  try {
+    if (is_field_spec(text)) parse_field(text);
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+/// "", or the way out where B is described as a field.
+std::string not_an_asset(const std::string& text) {
+  if (!is_field_spec(text)) return "";
+  return fmt::format(
+      "'{0}' is a field, and only A can be a field. Pass it first and the .ist file second, with "
+      "the pose of that asset in the field's frame. For a file of this name write ./{0}",
+      text);
+}
+
+/// Throws Error if no row is of one of the classes: most likely it is misspelled.
+void keep_classes(PoseTable& table, const QueryOptions& options) {
+  if (!table.has_labels) throw Error(options.poses + ": no column 'class', which --class needs");
+  const auto is_of = [](const std::string& name) {
+    return [&name](const PoseRow& row) { return row.label == name; };
+  };
+  for (const std::string& name : options.classes)
+    if (std::none_of(table.rows.begin(), table.rows.end(), is_of(name)))
+      throw Error(fmt::format("{}: none of the {} rows has the class '{}'", options.poses,
+                              table.rows.size(), name));
+  std::erase_if(table.rows, [&](const PoseRow& row) {
+    return std::find(options.classes.begin(), options.classes.end(), row.label) ==
+           options.classes.end();
+  });
+}
+
+std::vector<PoseRow> asked_rows(const QueryOptions& options) {
+  if (!options.pose.empty()) return {{"0", "", parse_pose(options.pose), options.scale_b}};
+  PoseTable table = read_pose_table(options.poses);
+  if (table.has_scales && options.scale_b_given)
+    throw CLI::ValidationError("--scale-b", "conflicts with the column scale_b of " +
+                                                options.poses + "; remove one of them");
+  if (!table.has_scales)
+    for (PoseRow& row : table.rows) row.scale_b = options.scale_b;
+  if (!options.classes.empty()) keep_classes(table, options);
+  return table.rows;
+}
+
+/// Answers every row, `repeat` rounds over all rows in turn, so that no row finds the branch
+/// predictor trained by itself. A row's time is the least of its rounds.
+std::vector<Answer> answer(const PlacedSolid& a, const TreeView& b,
+                           const std::vector<PoseRow>& rows, const QueryOptions& options) {
+  using Clock = std::chrono::steady_clock;
+  std::vector<Answer> answers;
+  answers.reserve(rows.size());
+  for (const PoseRow& row : rows)
+    answers.push_back({row, {}, std::numeric_limits<double>::infinity()});
+  Workspace workspace;
+  for (std::size_t round = 0; round < options.repeat; ++round)
+    for (Answer& answer : answers) {
+      const PlacedTree placed_b{b, answer.row.pose, answer.row.scale_b};
+      const Clock::time_point start = Clock::now();
+      const PenetrationAndSeparation result = query(a, placed_b, options.settings, workspace);
+      const Clock::time_point end = Clock::now();
+      answer.result = result;
+      answer.time_us =
+          std::min(answer.time_us, std::chrono::duration<double, std::micro>(end - start).count());
+    }
+  return answers;
+}
+
+/// Throws CLI::ValidationError where settings exclude each other.
+void check_settings(const QueryOptions& options) {
+  const PenetrationSettings& settings = options.settings.penetration;
+  const bool exact = settings.measure == Measure::exact;
+  const auto no_effect = [&](const char* option) {
+    throw CLI::ValidationError(option, fmt::format("has no effect with --measure {}, only with "
+                                                   "matched",
+                                                   exact ? "exact" : "inner"));
+  };
+  if (settings.measure != Measure::matched) {
+    if (settings.pair_budget != 0) no_effect("--pair-budget");
+    if (exact ? settings.field != FieldUse::automatic : settings.field == FieldUse::always)
+      no_effect("--field");
+  }
+  if (!is_field_spec(options.a)) return;
+  if (exact)
+    throw CLI::ValidationError(
+        "--measure", "exact needs the meshes of two assets, and A is a field: " + options.a +
+                         "; omit the option, or pass an .ist file of the same shape");
+  if (settings.field == FieldUse::never)
+    throw CLI::ValidationError(
+        "--field", "never cannot be combined with " + options.a +
+                       ", a field without spheres; omit the option, or pass an .ist file");
+  if (settings.pair_budget != 0)
+    throw CLI::ValidationError("--pair-budget", "has no effect where A is a field: " + options.a);
+}
+
+/// Throws Error if the surface that --field always asks for is not there.
+void require_surface(const std::string& path, const TreeView& tree) {
+  if (!tree.has_field())
+    throw Error(path +
+                ": has no field, which --field always needs; bake it again with --surface all, or "
+                "use --field auto");
+}
+
+/// Throws Error if an asset does not hold what the measure asks.
+void require_held(const std::string& path, const TreeView& tree, Measure measure) {
+  if (measure != Measure::exact) {
+    if (tree.sphere_count() > 0) return;
+    throw Error(
+        fmt::format("{}: has no spheres, which --measure {} needs; use --measure exact, or bake it "
+                    "again without --surface-only",
+                    path, measure == Measure::inner ? "inner" : "matched"));
+  }
+  if (tree.has_mesh()) return;
+  const std::string twice = describe_counted_twice(tree);
+  if (!twice.empty())
+    throw Error(fmt::format(
+        "{}: {}; use --measure matched, or bake a mesh whose parts do not overlap", path, twice));
+  throw Error(path +
+              ": has no mesh, which --measure exact needs; bake it again with --surface all, or "
+              "use --measure matched");
+}
+
+/// Says once on stderr where spheres alone are asked for what they cannot tell.
+void warn_of_misfit(const TreeView& a, const TreeView& b, const std::vector<PoseRow>& rows,
+                    const QueryOptions& options) {
+  const PenetrationSettings& settings = options.settings.penetration;
+  if (settings.measure != Measure::matched || settings.field != FieldUse::automatic) return;
+  for (const PoseRow& row : rows) {
+    const PairFit fit = pair_fit({a, {}, 1}, {b, {}, row.scale_b});
+    if (fit.fits()) continue;
+    spdlog::warn(
+        "{}: its spheres are {:.2g} times as coarse as those of {}, and it has no field: volumes "
+        "and forces may be far off. Bake it again with --surface all",
+        fit.a_is_coarser ? options.a : options.asset_b, fit.ratio,
+        fit.a_is_coarser ? options.asset_b : options.a);
+    return;
+  }
+}
+
+std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions& options) {
+  const Measure measure = options.settings.penetration.measure;
+  if (is_field_spec(options.a)) {
+    const Asset b = Asset::load(options.asset_b);
+    require_held(options.asset_b, b.view(), measure);
+    return answer(PlacedField{parse_field(options.a), {}, 1}, b.view(), rows, options);
+  }
+  const Asset a = Asset::load(options.a);
+  const Asset b = Asset::load(options.asset_b);
+  require_held(options.a, a.view(), measure);
+  require_held(options.asset_b, b.view(), measure);
+  if (options.settings.penetration.field == FieldUse::always) {
+    require_surface(options.a, a.view());
+    require_surface(options.asset_b, b.view());
+  }
+  warn_of_misfit(a.view(), b.view(), rows, options);
+  std::vector<Answer> answers = answer(PlacedTree{a.view(), {}, 1}, b.view(), rows, options);
+  for (Answer& one : answers) one.surfaces = a.view().has_mesh() && b.view().has_mesh();
+  return answers;
+}
+
+void run_query(const QueryOptions& options) {
+  check_settings(options);
+  const std::vector<Answer> answers = answer(asked_rows(options), options);
+  if (options.json) {
+    fmt::print("{}", answers_json(answers));
+  } else if (options.csv || options.pose.empty()) {
+    fmt::print("{}", answers_csv(answers));
+  } else {
+    fmt::print("A = {}, B = {}\n{}", options.a, options.asset_b,
+               answer_text(answers.front(), options.settings.penetration.measure));
+  }
+}
+
+}  // namespace
+
+void add_query(CLI::App& app) {
+  const auto options = std::make_shared<QueryOptions>();
+  CLI::App* const command =
+      app.add_subcommand("query", "Overlap and distance of two solids, B placed in A's frame");
+  add_input(command, "A", options->a,
+            "An .ist file, or a field: plane:nx,ny,nz,d (the solid n·x ≤ d), box:hx,hy,hz (half "
+            "extents), ball:r, capsule:r,h or cylinder:r,h (h = half the height along z). Lengths "
+            "are in [u]")
+      ->check(field_fault);
+  add_input(command, "B", options->asset_b, "An .ist file")->check(not_an_asset);
+  CLI::Option_group* const poses = command->add_option_group("Poses", "Pose of B");
+  poses
+      ->add_option("--pose", options->pose,
+                   "qw,qx,qy,qz,tx,ty,tz: x_A = R (scale · x_B) + t; the quaternion is normalised")
+      ->check(is_pose);
+  CLI::Option* const file = poses->add_option(
+      "--poses", options->poses,
+      "CSV file with these columns and optionally id, class and scale_b; - = standard input");
+  file->check([](const std::string& text) { return text.empty() ? "'' is not a file name" : ""; });
+  poses->require_option(1);
+  CLI::Option* const scale =
+      add_real(command, "--scale-b", options->scale_b, {.least = 0, .without_least = true},
+               "Uniform scale of B about its origin");
+  command->add_option("--class", options->classes, "Only rows of this class. Repeatable")
+      ->take_all()
+      ->allow_extra_args(false)
+      ->needs(file);
+  command
+      ->add_option_function<std::string>(
+          "--measure",
+          [options](const std::string& name) {
+            options->settings.penetration.measure = name == "exact"   ? Measure::exact
+                                                    : name == "inner" ? Measure::inner
+                                                                      : Measure::matched;
+          },
+          "matched: spheres with the solid's volume, accurate; inner: spheres inside the solid, a "
+          "lower bound; exact: the kept meshes of both assets, the true volume with bounds")
+      ->check(CLI::IsMember({"matched", "inner", "exact"}))
+      ->default_str("matched");
+  command
+      ->add_option_function<std::string>(
+          "--field",
+          [options](const std::string& name) {
+            options->settings.penetration.field = name == "never"    ? FieldUse::never
+                                                  : name == "always" ? FieldUse::always
+                                                                     : FieldUse::automatic;
+          },
+          "When to overlap spheres with the other asset's surface instead of its spheres; auto: if "
+          "its spheres are too coarse; never; always. Matched measure only")
+      ->check(CLI::IsMember({"auto", "never", "always"}))
+      ->default_str("auto");
+  add_whole(command, "--pair-budget", options->settings.penetration.pair_budget,
+            "Use the level of detail that needs about this many sphere pairs; 0 = the finest. "
+            "Matched measure only");
+  add_whole(command, "--max-visits", options->max_visits,
+            "Limit of node pairs, for penetration and for separation; 0 = no limit");
+  add_whole<std::size_t>(command, "--repeat", options->repeat,
+                         "Number of rounds over all rows; time_us is the minimum of a row", 1);
+  CLI::Option* const json = command->add_flag("--json", options->json, "Print JSON");
+  command->add_flag("--csv", options->csv, "Print CSV (the default with --poses)")->excludes(json);
+  command->footer(
+      "Gradients are with respect to a motion of B, in A's frame. A pressure k [force/u²]\n"
+      "exerts the force −k·dVdt and, about B's origin, the torque −k·dVdr on B.\n"
+      "A field is given in A's frame. For a file named box:1,1,1 write ./box:1,1,1.\n"
+      "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9\n"
+      "         ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9 --measure exact\n"
+      "         ist query plane:0,0,1,0 bolt.ist --pose 1,0,0,0,0,0,-0.5");
+  command->callback([options, scale] {
+    options->scale_b_given = scale->count() > 0;
+    QuerySettings& settings = options->settings;
+    settings.penetration.max_visits = settings.separation.max_visits = options->max_visits;
+    run_query(*options);
+  });
+}
+
+}  // namespace ist::app

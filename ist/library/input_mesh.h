@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <ist/mesh.h>
+
+#include "library/settings/bake_settings.h"
+
+namespace ist {
+
+struct InputMesh {
+  DeclaredFrame declared;
+  ClosedMesh closed;
+};
+
+/// Loads, scales, turns and closes a mesh. Throws Error.
+InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings);
+
+/// close_mesh() as `settings` have it; where it throws and a wrap is asked for, wrap_mesh(), with a
+/// note of why. Throws Error.
+ClosedMesh close_as_asked(TriangleMesh mesh, const std::string& name, const MeshSettings& settings);
+
+/// What load_mesh() gives, scaled and turned: the quarter turn about the third axis that takes
+/// up_axis to world_up.
+void place(TriangleMesh& mesh, const MeshSettings& settings);
+
+}  // namespace ist

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+
+#include "library/settings/bake_settings.h"
+
+namespace ist {
+
+/// What an asset must be, or it fails. The bytes of an asset do not depend on it.
+struct Demands {
+  bool surface = false;   ///< it holds its surface, for queries of spheres and exact ones
+  double coverage = 0;    ///< at least; share of the solid's volume
+  double confidence = 0;  ///< at least; of a mesh that had to be closed
+};
+
+/// One asset to bake.
+struct Job {
+  std::string name;  ///< of the asset: NAME.ist
+  std::string mesh;  ///< path
+  BakeSettings settings;
+  Demands demands;
+};
+
+}  // namespace ist

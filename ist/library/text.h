@@ -1,0 +1,24 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+
+#include <ist/packing.h>
+#include <ist/query.h>
+
+#include "library/settings/bake_settings.h"
+
+// How numbers and names are printed for people. Files and JSON never use these but the names.
+
+namespace ist::app {
+
+std::string grouped(std::uint64_t count);  ///< 10,000
+std::string short_vector(const Eigen::Vector3d& v);
+
+using ist::name_of;  // of a GridMode or a MeshState
+const char* name_of(StopReason reason) noexcept;
+const char* name_of(QueryStatus status) noexcept;
+const char* name_of(TrialPartner partner) noexcept;
+
+}  // namespace ist::app

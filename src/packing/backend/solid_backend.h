@@ -1,0 +1,52 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <ist/medial.h>
+#include <ist/packing.h>
+
+#include "packing/backend/tasks.h"
+
+namespace ist {
+
+/// The one seam between what a bake does and where it is done: a solid on the host's threads or in
+/// the memory of a GPU. Both give the same bits. For one thread at a time; host work runs on the
+/// threads of the caller's task arena.
+class SolidBackend {
+ public:
+  virtual ~SolidBackend() = default;
+
+  /// Certified spheres. The settings have been checked; where they run is the backend's affair.
+  virtual SpherePacking pack(const PackingSettings& settings, const ProgressCallback& progress) = 0;
+
+  /// The first round of a grid packing, of a mesh. The settings have been checked.
+  virtual std::vector<MedialNode> medial_nodes(const MedialSettings& settings) = 0;
+
+  /// Relaxes sites; none if the columns cannot measure the solid. `report(part)`: the part of it
+  /// that is done, [0, 1].
+  virtual RelaxedSites relax_sites(const RelaxTask& task,
+                                   const std::function<void(double)>& report) = 0;
+
+  /// How far any of the balls (unit frame) sticks out of the solid at most, at least 0.
+  virtual double largest_protrusion(std::span<const Sphere> balls) = 0;
+
+  /// The cover radii before they are rounded to float. `report(depth)`: before each level.
+  virtual std::vector<double> cover_radii(const CoverTask& task,
+                                          const std::function<void(int)>& report) = 0;
+
+  /// A backend of the same kind for another solid, which must outlive it.
+  virtual std::unique_ptr<SolidBackend> with(const MeshSolid& other) const = 0;
+
+  /// What makes a backend of the same solid for another thread, which calls it and works at the
+  /// same time as this one's does. It uses what this one has and must not outlive it. Empty: there
+  /// is none.
+  virtual std::function<std::unique_ptr<SolidBackend>()> beside() = 0;
+
+  /// Whether the caller's threads have nothing to do while this one works.
+  virtual bool leaves_threads_idle() const = 0;
+};
+
+}  // namespace ist

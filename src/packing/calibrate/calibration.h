@@ -1,0 +1,37 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include <ist/progress.h>
+
+#include "mesh/mesh_solid.h"
+#include "packing/backend/solid_backend.h"
+
+namespace ist {
+
+/// The matched spheres of a solid: one ball for each cell of a partition of the solid, with the
+/// cell's volume and centre of mass (docs/design.md 5).
+struct Calibration {
+  /// Unit frame, one for each inner sphere and in their order. Σ 4/3 π r³ is the solid's volume
+  /// within 1e-6; every radius is > 0.
+  std::vector<Sphere> matched;
+  /// Unit frame, proven: no matched sphere sticks further out of the solid than this.
+  double protrusion = 0;
+};
+
+/// Calibrates a packing: relaxed power cells seeded by the inner spheres, integrated over columns
+/// of the solid. `backend`: the solid's. Same bytes for any backend and number of threads, which
+/// are those of the current arena. Throws Error if there are no spheres or progress cancels.
+Calibration calibrate(const MeshSolid& solid, SolidBackend& backend, std::span<const Sphere> inner,
+                      const ProgressCallback& progress);
+
+/// The same for several prefixes of the spheres, each of `counts` by itself; a call shares what it
+/// makes of the solid. `take(i, calibration)` is given each as soon as it is ready, in their order.
+void calibrate_prefixes(const MeshSolid& solid, SolidBackend& backend,
+                        std::span<const Sphere> inner, std::span<const std::size_t> counts,
+                        const ProgressCallback& progress,
+                        const std::function<void(std::size_t, Calibration)>& take);
+
+}  // namespace ist

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "packing/calibrate/column_lattice.h"
+#include "packing/calibrate/power_relaxation.h"
+
+namespace ist {
+
+/// The octree over a solid's columns in host memory; refers to the lattice.
+class PowerOctree {
+ public:
+  explicit PowerOctree(const ColumnLattice& solid);
+  const PowerGrid& grid() const { return grid_; }
+
+  /// The sums of every site's power cell within the solid. Integers: the same bits for any number
+  /// of threads.
+  std::vector<PowerSums> cell_sums(std::span<const PowerSite> sites) const;
+
+ private:
+  PowerGrid grid_;
+  std::vector<std::vector<std::uint32_t>> flags_;
+};
+
+}  // namespace ist

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "packing/calibrate/power_grid.h"
+
+// What the host does with the sites of a cell, in vectors: the arithmetic of PowerFilter and
+// walk_column, the same bits on every instruction set.
+
+namespace ist {
+
+inline constexpr std::size_t kMostPowerLanes = 8;  ///< of a vector
+
+/// Sites in arrays that may be read, and written, kMostPowerLanes beyond their end.
+struct SiteArrays {
+  double* x;
+  double* y;
+  double* z;
+  double* weight;
+  std::uint32_t* number;  ///< of the site; rising
+
+  SiteArrays from(std::size_t first) const {
+    return {x + first, y + first, z + first, weight + first, number + first};
+  }
+};
+
+/// Copies those of `count` sites that may own a part of the cell to `kept`, which may follow them
+/// without a gap; returns how many. `powers`: room for count + kMostPowerLanes.
+std::size_t keep_sites(const PowerBox& box, const SiteArrays& sites, std::size_t count,
+                       const SiteArrays& kept, double* powers);
+
+/// Cuts the cell's columns at the power cells of 1 to kPowerLeafSites sites; sums[number] grows by
+/// a site's pieces.
+void walk_cell(const PowerGrid& grid, const PowerGridCell& cell, const SiteArrays& sites,
+               std::size_t count, PowerSums* sums);
+
+}  // namespace ist
