@@ -171,7 +171,7 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
   result.count = chosen.patches->write(patches);
   if (blends || result.count == 0)
     result.count = spread(chosen.patches->whole(), result.penetration, result.count, patches);
-  finish_patches(patches.first(result.count), chosen.patches->deepest());
+  finish_patches(patches.first(result.count), b.pose, chosen.patches->deepest());
   return result;
 }
 

@@ -194,7 +194,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
     keep_largest(parts, patches.size());
     answer.contact.count = write_parts(parts, found.origin, *pose, patches);
     const double smaller = cube_root_by_squares(answer.contact.penetration.volume);
-    finish_patches(patches.first(answer.contact.count), smaller);
+    finish_patches(patches.first(answer.contact.count), b.pose, smaller);
   }
   const auto to_world = [&](const exact::Point& p) {
     return pose->to_world(vector(found.origin) + vector(p));
