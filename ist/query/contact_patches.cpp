@@ -156,7 +156,7 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept {
   if (settings.measure == Measure::exact)
-    return exact_patches(a, b, settings, workspace, patches, {}).contact;
+    return exact_patches(a, b, settings, workspace, patches, {}, true).contact;
   if (lack_spheres(a, b)) return not_held<ContactPatches>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<ContactPatches>();
@@ -179,7 +179,7 @@ OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches,
                                std::span<OutlineSegment> segments) noexcept {
-  return exact_patches(a, b, settings, workspace, patches, segments);
+  return exact_patches(a, b, settings, workspace, patches, segments, false);
 }
 
 }  // namespace ist

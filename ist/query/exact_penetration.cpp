@@ -7,7 +7,7 @@
 #include "query/base/no_answer.h"
 #include "query/contact/write_patches.h"
 #include "query/descent/workspace.h"
-#include "query/exact/exact_parts.h"
+#include "query/exact/exact_octants.h"
 #include "query/exact/kept_mesh.h"
 
 namespace ist {
@@ -23,15 +23,17 @@ Query query_of(const PlacedTree& a, const MeshTree& mesh_a, const PlacedTree& b,
 
 Eigen::Vector3d vector(const exact::Point& p) { return {p.x, p.y, p.z}; }
 
+/// At most, of a solid.
+double volume_of(const PlacedTree& placed) {
+  const AssetHeader& asset = placed.tree.header();
+  return std::ldexp(asset.volume + asset.volume_error, 3 * asset.exponent) *
+         (placed.scale * placed.scale * placed.scale);
+}
+
 /// The true volume lies between nothing and the smaller solid's.
 void bound_by_solids(const PlacedTree& a, const PlacedTree& b, Penetration& answer) {
-  const auto most = [](const PlacedTree& placed) {
-    const AssetHeader& asset = placed.tree.header();
-    return std::ldexp(asset.volume + asset.volume_error, 3 * asset.exponent) *
-           (placed.scale * placed.scale * placed.scale);
-  };
   answer.volume_min = 0;
-  answer.volume_max = std::min(most(a), most(b)) * (1 + 1e-12);
+  answer.volume_max = std::min(volume_of(a), volume_of(b)) * (1 + 1e-12);
 }
 
 }  // namespace
@@ -91,12 +93,16 @@ double cube_root_by_squares(double x) {
   return y;
 }
 
-/// As many parts as there is room for, the largest; each other one joins the nearest of these.
+/// As many parts as there is room for, the largest; each other one joins the nearest of those that
+/// push like it, if there are any.
 std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room) {
   std::uint32_t kept = 0;
   for (const ExactPart& part : parts) kept += &parts[part.kept] == &part ? 1 : 0;
   const auto middle = [](const ExactPart& part) -> Eigen::Vector3d {
     return vector(part.sums.moment) / (24 * part.sums.volume());
+  };
+  const auto distance = [&](const ExactPart& x, const ExactPart& y) {
+    return std::pair(dot(x.sums.force, y.sums.force) < 0, (middle(x) - middle(y)).squaredNorm());
   };
   while (kept > room) {
     std::uint32_t least = ~0u, nearest = ~0u;
@@ -106,8 +112,8 @@ std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room) {
         least = p;
     for (std::uint32_t p = 0; p < parts.size(); ++p)
       if (parts[p].kept == p && p != least &&
-          (nearest == ~0u || (middle(parts[p]) - middle(parts[least])).squaredNorm() <
-                                 (middle(parts[nearest]) - middle(parts[least])).squaredNorm()))
+          (nearest == ~0u ||
+           distance(parts[p], parts[least]) < distance(parts[nearest], parts[least])))
         nearest = p;
     parts[least].kept = nearest;
     --kept;
@@ -117,17 +123,17 @@ std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room) {
   return kept;
 }
 
-/// Writes the kept parts in their order, what joined them added; `kept` becomes the patch.
-std::size_t write_parts(std::span<ExactPart> parts, const exact::Point& origin,
-                        const RelativePose& pose, std::span<ContactPatch> patches) {
+/// Adds to the kept parts what joined them.
+void join(std::span<ExactPart> parts) {
   for (const ExactPart& part : parts) {
     ExactPart& into = parts[part.kept];
-    if (&into == &part) continue;
-    into.sums.six_volumes.add(part.sums.six_volumes.value());
-    into.sums.moment = into.sums.moment + part.sums.moment;
-    into.sums.force = into.sums.force + part.sums.force;
-    into.sums.torque = into.sums.torque + part.sums.torque;
+    if (&into != &part) into.sums.add(part.sums);
   }
+}
+
+/// Writes the kept parts in their order; `kept` becomes the patch.
+std::size_t write_parts(std::span<ExactPart> parts, const exact::Point& origin,
+                        const RelativePose& pose, std::span<ContactPatch> patches) {
   std::uint32_t count = 0;
   std::uint32_t place[ExactScratch::kMostParts];
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
@@ -166,15 +172,15 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
 
 OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
                              const ContactSettings& settings, Workspace& workspace,
-                             std::span<ContactPatch> patches,
-                             std::span<OutlineSegment> segments) noexcept {
+                             std::span<ContactPatch> patches, std::span<OutlineSegment> segments,
+                             bool divides) noexcept {
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<OverlapOutline>();
   if (a.tree.header().mesh == 0 || b.tree.header().mesh == 0) return not_held<OverlapOutline>();
   OverlapOutline answer;
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   ExactScratch& scratch = workspace.impl()->exact;
-  auto query = query_of<ExactParts>(a, mesh_a, b, mesh_b, *pose, scratch);
+  auto query = query_of<ExactOctants>(a, mesh_a, b, mesh_b, *pose, scratch);
   const ExactOverlap found = query.run(settings.max_visits);
   if (!found.complete) {
     const auto by_spheres = [&] {
@@ -190,8 +196,14 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
   answer.contact.penetration = whole_answer(found, *pose);
   answer.segments = found.crossings;
   if (!patches.empty()) {
-    const std::span<ExactPart> parts(scratch.parts.get(), query.divide());
-    keep_largest(parts, patches.size());
+    std::span<ExactPart> parts(scratch.parts.get(), query.divide());
+    const std::uint32_t kept = keep_largest(parts, patches.size());
+    if (divides && kept <= ExactScratch::kMostSplit && patches.size() > 1) {
+      join(parts);
+      parts = {scratch.octants.get(), query.split(parts, volume_of(b) <= volume_of(a))};
+      keep_largest(parts, patches.size());
+    }
+    join(parts);
     answer.contact.count = write_parts(parts, found.origin, *pose, patches);
     const double smaller = cube_root_by_squares(answer.contact.penetration.volume);
     finish_patches(patches.first(answer.contact.count), b.pose, smaller);

@@ -1,26 +1,15 @@
 #include "query/exact/exact_parts.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <tuple>
 
 namespace ist {
-namespace {
 
 using exact::Point;
 
-constexpr std::uint32_t kNoPart = ~0u;
-
-template <class Visit>
-void for_each_block(const HookedArray<std::uint64_t>& bits, std::uint32_t blocks,
-                    const Visit& visit) {
-  for (std::uint32_t w = 0; w < (blocks + 63) / 64; ++w)
-    for (std::uint64_t left = bits[w]; left != 0; left &= left - 1)
-      visit(64 * w + static_cast<std::uint32_t>(std::countr_zero(left)));
-}
-
-}  // namespace
+/// ExactScratch has no more blocks, and eight times a pair's name fits into 64 bits.
+constexpr int kTriangleBits = 28;
 
 std::uint32_t ExactParts::root(std::uint32_t element) noexcept {
   std::uint32_t* const parent = scratch_.parent.get();
@@ -44,8 +33,21 @@ std::uint32_t ExactParts::vertex_element(const Side& own, const CrossedBlock& cr
   return (own.is_b ? vertices_of_b_ : out_.crossings) + kWidth * place + vertex;
 }
 
+std::uint32_t ExactParts::first_middle(const Side& own,
+                                       const CrossedBlock& crossed) const noexcept {
+  const auto place = static_cast<std::uint32_t>(&crossed - own.marks.blocks.get());
+  return 3 * kWidth * ((own.is_b ? sides_[0].marks.count : 0) + place);
+}
+
 std::uint32_t ExactParts::block_element(const Side& own, std::uint32_t block) const noexcept {
   return (own.is_b ? blocks_of_b_ : blocks_of_a_) + block;
+}
+
+std::uint32_t ExactParts::triangle_element(const Side& own, const CrossedBlock& crossed,
+                                           std::uint32_t t) const noexcept {
+  const std::uint32_t edge = 3 * t + (crossed.apex[t] + 1u) % 3;
+  if (crossed.pierced >> edge & 1) return scratch_.middles[first_middle(own, crossed) + edge];
+  return vertex_element(own, crossed, own.mesh.blocks[crossed.block].corner[edge % 3][t]);
 }
 
 /// Each element by itself.
@@ -179,10 +181,7 @@ void ExactParts::join_edges() noexcept {
     }
     if (inside != kNoPart && (crossed.inside >> q & 1) != 0)
       unite(inside, vertex_element(own, crossed, q));
-    scratch_.middles[3 * kWidth *
-                         ((own.is_b ? sides_[0].marks.count : 0) +
-                          static_cast<std::uint32_t>(&crossed - own.marks.blocks.get())) +
-                     3 * lane + k] = middle;
+    scratch_.middles[first_middle(own, crossed) + 3 * lane + k] = middle;
   }
 }
 
@@ -249,7 +248,7 @@ void ExactParts::sum_parts() noexcept {
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
     if (i % 8 == 0) crossing_terms(scratch_.crossings, i, out_.origin, terms);
     ExactPart& part = scratch_.parts[part_of(i)];
-    const std::uint64_t id = (std::uint64_t{scratch_.crossings.triangle(0, i)} << 32 |
+    const std::uint64_t id = (std::uint64_t{scratch_.crossings.triangle(0, i)} << kTriangleBits |
                               scratch_.crossings.triangle(1, i)) +
                              1;
     part.id = part.id == 0 ? id : std::min(part.id, id);
@@ -259,16 +258,12 @@ void ExactParts::sum_parts() noexcept {
     for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
       const CrossedBlock& crossed = own.marks.blocks[own.marks.place[b]];
       const MeshBlock& mesh = own.mesh.blocks[b];
-      const std::uint32_t first =
-          3 * kWidth * ((own.is_b ? sides_[0].marks.count : 0) + own.marks.place[b]);
       std::int8_t whole[kWidth];
       count_triangles(mesh, crossed, whole);
       for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
         if (t % 8 == 0) triangle_terms(crossed, whole, static_cast<int>(t / 8), terms);
         if (whole[t] == 0) continue;
-        const std::uint32_t edge = 3 * t + (crossed.apex[t] + 1u) % 3;
-        std::uint32_t element = vertex_element(own, crossed, mesh.corner[edge % 3][t]);
-        if (crossed.pierced >> edge & 1) element = scratch_.middles[first + edge];
+        const std::uint32_t element = triangle_element(own, crossed, t);
         if (element != kNoPart)
           add_triangle_term(terms, t % 8, scratch_.parts[part_of(element)].sums);
       }

@@ -1,0 +1,232 @@
+#include "query/exact/exact_octants.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "query/base/smooth_step.h"
+
+namespace ist {
+namespace {
+
+using exact::Point;
+
+double length(const Point& v) { return std::sqrt(dot(v, v)); }
+
+/// From 1 at `low` to 0 at twice that, or the other way round.
+double falls(double x, double low) { return 1 - smooth_step(x / low - 1); }
+double rises(double x, double low) { return smooth_step(x / low - 1); }
+
+/// Moves a share of what one octant has to another.
+void move(OctantSums& from, double share, OctantSums& to) {
+  const auto give = [&](auto& out, auto& in) {
+    const auto part = share * out;
+    in = in + part;
+    out = share == 1 ? part - part : out - part;
+  };
+  give(from.six_volumes, to.six_volumes);
+  give(from.moment, to.moment);
+  give(from.torque, to.torque);
+  for (int s = 0; s < 2; ++s) give(from.area[s], to.area[s]);
+}
+
+Point unlike(const OctantSums& sums) { return sums.area[0] + sums.area[1]; }
+double both_areas(const OctantSums& sums) { return length(sums.area[0]) + length(sums.area[1]); }
+
+/// How far two octants are one: where one is a sliver of the other, or their two surfaces agree
+/// together only, as those above and below the middle of a thin contact do.
+double oneness(const OctantSums& x, const OctantSums& y) {
+  const double less = std::min(x.six_volumes, y.six_volumes),
+               more = std::max(x.six_volumes, y.six_volumes);
+  const double areas = both_areas(x) + both_areas(y);
+  if (!(less > 0) || !(areas > 0)) return 1;
+  const Point of_x = unlike(x), of_y = unlike(y);
+  const double cured = (length(of_x) + length(of_y)) - length(of_x + of_y);
+  return std::max(falls(less / more, 1.0 / 64), rises(cured / areas, 0.2));
+}
+
+/// A contact that is not thin is one.
+void join_octants(OctantSums (&octants)[8]) {
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < 8; ++i)
+      if ((i >> k & 1) == 0) {
+        OctantSums &x = octants[i], &y = octants[i | 1 << k];
+        move(y, oneness(x, y), x);
+      }
+  double different = 0, areas = 0;
+  for (const OctantSums& sums : octants) {
+    different += length(unlike(sums));
+    areas += both_areas(sums);
+  }
+  const double share = areas > 0 ? rises(different / areas, 0.2) : 1;
+  for (int i = 1; i < 8; ++i) move(octants[i], share, octants[0]);
+}
+
+}  // namespace
+
+void ExactOctants::cut(OctantSums* octants, bool of_b, double times, const Piece& piece, int plane,
+                       int octant) noexcept {
+  if (plane == 3) {
+    OctantSums& sums = octants[octant];
+    const Point &p = piece.at[0], &q = piece.at[1], &r = piece.at[2];
+    const Point area = (0.5 * times) * cross(q - p, r - p), middle = p + (q + r);
+    const double six = 2 * dot(p, area);
+    sums.six_volumes += six;
+    sums.moment = sums.moment + six * middle;
+    sums.area[of_b] = sums.area[of_b] + area;
+    sums.torque = sums.torque + ((of_b ? 0.5 : -0.5) / 3) * cross(middle, area);
+    return;
+  }
+  const bool above[3] = {piece.height[0][plane] >= 0, piece.height[1][plane] >= 0,
+                         piece.height[2][plane] >= 0};
+  if (above[0] == above[1] && above[1] == above[2]) {
+    cut(octants, of_b, times, piece, plane + 1, octant | (above[0] ? 1 << plane : 0));
+    return;
+  }
+  // One corner is alone on its side.
+  const int lone = above[0] == above[1] ? 2 : above[0] == above[2] ? 1 : 0;
+  const int next = (lone + 1) % 3, last = (lone + 2) % 3;
+  Piece tip = piece;
+  for (const int other : {next, last}) {
+    const double *from = piece.height[lone], *to = piece.height[other];
+    const double t = from[plane] / (from[plane] - to[plane]);
+    tip.at[other] = piece.at[lone] + t * (piece.at[other] - piece.at[lone]);
+    for (int k = 0; k < 3; ++k) tip.height[other][k] = from[k] + t * (to[k] - from[k]);
+  }
+  const auto side = [&](bool up) { return octant | (up ? 1 << plane : 0); };
+  cut(octants, of_b, times, tip, plane + 1, side(above[lone]));
+  Piece rest = piece;
+  rest.at[lone] = tip.at[next];
+  std::copy_n(tip.height[next], 3, rest.height[lone]);
+  cut(octants, of_b, times, rest, plane + 1, side(!above[lone]));
+  rest.at[next] = rest.at[lone];
+  std::copy_n(rest.height[lone], 3, rest.height[next]);
+  rest.at[lone] = tip.at[last];
+  std::copy_n(tip.height[last], 3, rest.height[lone]);
+  cut(octants, of_b, times, rest, plane + 1, side(!above[lone]));
+}
+
+void ExactOctants::add_piece(OctantSums* octants, bool of_b, double times, const Point& p,
+                             const Point& q, const Point& r) noexcept {
+  const Point centre = octants->centre;
+  Piece piece = {{p - centre, q - centre, r - centre}, {}};
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < 3; ++k) piece.height[c][k] = dot(axis_[k], piece.at[c]);
+  cut(octants, of_b, times, piece, 0, 0);
+}
+
+OctantSums* ExactOctants::octants_of(std::uint32_t element) noexcept {
+  const ExactPart& part = scratch_.parts[part_of(element)];
+  const std::uint32_t slot = scratch_.parts[part.kept].slot;
+  return slot == kNoPart ? nullptr : &scratch_.octant_sums[8 * slot];
+}
+
+/// The pieces that parts are summed of: see ExactTerms.
+void ExactOctants::sum_octants() noexcept {
+  const Crossings& crossings = scratch_.crossings;
+  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
+    OctantSums* const octants = octants_of(i);
+    if (octants == nullptr) continue;
+    Point ends[2], apex[2];
+    segment(i, ends[0], ends[1]);
+    for (int s = 0; s < 2; ++s) {
+      apex[s] = {crossings.apex(s, 0)[i], crossings.apex(s, 1)[i], crossings.apex(s, 2)[i]};
+      add_piece(octants, s != 0, 1, apex[s], ends[s], ends[1 - s]);
+    }
+    for (int e = 0; e < 2; ++e) {
+      const double times = crossings.opposite(e)[i];
+      if (times == 0) continue;
+      const bool of_b = crossings.end_of(i, e).of_b;
+      const Point near = Point{crossings.end(e, Crossings::kFrom)[i],
+                               crossings.end(e, Crossings::kFrom + 1)[i],
+                               crossings.end(e, Crossings::kFrom + 2)[i]} -
+                         out_.origin;
+      add_piece(octants, of_b, times, apex[of_b], ends[e], near);
+    }
+  }
+  for (Side& own : sides_) {
+    for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
+      const CrossedBlock& crossed = own.marks.blocks[own.marks.place[b]];
+      std::int8_t whole[kWidth];
+      count_triangles(own.mesh.blocks[b], crossed, whole);
+      for (std::uint32_t t = 0; t < kWidth; ++t) {
+        const std::uint32_t element =
+            whole[t] == 0 ? kNoPart : triangle_element(own, crossed, t);
+        if (element == kNoPart) continue;
+        const auto corner = [&](int k) { return crossed.at(crossed.fan[k][t]); };
+        if (OctantSums* const octants = octants_of(element))
+          add_piece(octants, own.is_b, whole[t], corner(0), corner(1), corner(2));
+      }
+    });
+    for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {
+      OctantSums* const octants = octants_of(block_element(own, b));
+      if (octants == nullptr) return;
+      const MeshBlock& mesh = own.mesh.blocks[b];
+      Point vertex[kWidth];
+      for (std::uint32_t v = 0; v < mesh.vertices; ++v)
+        vertex[v] = place(own, mesh.vertex[v]) - out_.origin;
+      for (std::uint32_t t = 0; t < mesh.triangles; ++t)
+        add_piece(octants, own.is_b, 1, vertex[mesh.corner[0][t]], vertex[mesh.corner[1][t]],
+                  vertex[mesh.corner[2][t]]);
+    });
+  }
+}
+
+std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b) noexcept {
+  for (int k = 0; k < 3; ++k)
+    axis_[k] = by_b ? (1 / a_from_b_.scale) *
+                          Point{a_from_b_.m[k], a_from_b_.m[3 + k], a_from_b_.m[6 + k]}
+                    : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
+  std::uint32_t slots = 0, count = 0;
+  for (std::uint32_t p = 0; p < parts.size(); ++p) {
+    ExactPart& part = scratch_.parts[p];
+    part.slot = kNoPart;
+    if (part.kept != p || part.id == 0 || !(part.sums.volume() > 0) ||
+        slots == ExactScratch::kMostSplit)
+      continue;
+    part.slot = slots++;
+    OctantSums* const octants = &scratch_.octant_sums[8 * part.slot];
+    std::fill_n(octants, 8, OctantSums{});
+    octants->centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
+  }
+  sum_octants();
+  for (std::uint32_t p = 0; p < parts.size(); ++p) {
+    const ExactPart& part = parts[p];
+    if (part.kept != p) continue;
+    ExactPart* const out = scratch_.octants.get() + count;
+    const auto write = [&](ExactPart octant, std::uint64_t number) {
+      octant.id = 8 * part.id + number;
+      octant.kept = count;
+      scratch_.octants[count++] = octant;
+    };
+    if (part.slot == kNoPart) {
+      write(part, 0);
+      continue;
+    }
+    OctantSums octants[8];
+    std::copy_n(&scratch_.octant_sums[8 * part.slot], 8, octants);
+    const Point centre = octants[0].centre;
+    join_octants(octants);
+    ExactSums missing = part.sums;  // but for rounding nothing
+    std::uint32_t largest = 0;
+    for (int i = 0; i < 8; ++i) {
+      const OctantSums& octant = octants[i];
+      if (!(octant.six_volumes > 1e-9 * (6 * part.sums.volume()))) continue;
+      ExactPart found = {};
+      found.sums.six_volumes.add(octant.six_volumes);
+      found.sums.moment = octant.moment + (4 * octant.six_volumes) * centre;
+      found.sums.force = 0.5 * (octant.area[1] - octant.area[0]);
+      found.sums.torque = octant.torque + cross(centre, found.sums.force);
+      missing.six_volumes.add(-octant.six_volumes);
+      missing.moment = missing.moment - found.sums.moment;
+      missing.force = missing.force - found.sums.force;
+      missing.torque = missing.torque - found.sums.torque;
+      write(found, static_cast<std::uint64_t>(i));
+      const auto last = static_cast<std::uint32_t>(scratch_.octants.get() + count - out) - 1;
+      if (out[last].sums.volume() > out[largest].sums.volume()) largest = last;
+    }
+    out[largest].sums.add(missing);
+  }
+  return count;
+}
+
+}  // namespace ist

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "query/exact/exact_parts.h"
+
+namespace ist {
+
+/// Connected parts of an overlap, divided into the octants around their centroids.
+///
+/// Every piece of both surfaces is cut by three planes through the centroid, which add nothing to
+/// cones from there: volumes are exact. Pieces change over where they have no area, so the sums are
+/// continuous in the pose. An octant's gradient is half of what each of the two surfaces has in it.
+/// They agree where a contact is thin. Octants join where they do not.
+class ExactOctants : public ExactParts {
+ public:
+  using ExactParts::ExactParts;
+
+  /// Divides parts of divide() that are kept, in the frame of A or B. Returns how many octants are
+  /// in ExactScratch::octants: their names are 8 times the part's, and the octant's number.
+  std::uint32_t split(std::span<const ExactPart> parts, bool by_b) noexcept;
+
+ private:
+  /// A triangle seen from a part's centroid, and on which sides of the planes its corners are.
+  struct Piece {
+    exact::Point at[3];
+    double height[3][3];  ///< [corner][plane]
+  };
+
+  void sum_octants() noexcept;
+  OctantSums* octants_of(std::uint32_t element) noexcept;
+  void add_piece(OctantSums* octants, bool of_b, double times, const exact::Point& p,
+                 const exact::Point& q, const exact::Point& r) noexcept;
+  void cut(OctantSums* octants, bool of_b, double times, const Piece& piece, int plane,
+           int octant) noexcept;
+
+  exact::Point axis_[3];
+};
+
+}  // namespace ist
