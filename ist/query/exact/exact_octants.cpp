@@ -1,6 +1,7 @@
 #include "query/exact/exact_octants.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "query/base/smooth_step.h"
@@ -63,55 +64,55 @@ void join_octants(OctantSums (&octants)[8]) {
 
 }  // namespace
 
-void ExactOctants::cut(OctantSums* octants, bool of_b, double times, const Piece& piece, int plane,
-                       int octant) noexcept {
-  if (plane == 3) {
-    OctantSums& sums = octants[octant];
-    const Point &p = piece.at[0], &q = piece.at[1], &r = piece.at[2];
-    const Point area = (0.5 * times) * cross(q - p, r - p), middle = p + (q + r);
-    const double six = 2 * dot(p, area);
-    sums.six_volumes += six;
-    sums.moment = sums.moment + six * middle;
-    sums.area[of_b] = sums.area[of_b] + area;
-    sums.torque = sums.torque + ((of_b ? 0.5 : -0.5) / 3) * cross(middle, area);
-    return;
+ExactOctants::Corner ExactOctants::corner(const OctantSums* octants,
+                                          const Point& x) const noexcept {
+  Corner out = {x - octants->centre, {}, 0};
+  for (int k = 0; k < 3; ++k) {
+    out.height[k] = dot(axis_[k], out.at);
+    out.octant |= (out.height[k] >= 0 ? 1 : 0) << k;
   }
-  const bool above[3] = {piece.height[0][plane] >= 0, piece.height[1][plane] >= 0,
-                         piece.height[2][plane] >= 0};
-  if (above[0] == above[1] && above[1] == above[2]) {
-    cut(octants, of_b, times, piece, plane + 1, octant | (above[0] ? 1 << plane : 0));
-    return;
-  }
-  // One corner is alone on its side.
-  const int lone = above[0] == above[1] ? 2 : above[0] == above[2] ? 1 : 0;
-  const int next = (lone + 1) % 3, last = (lone + 2) % 3;
-  Piece tip = piece;
-  for (const int other : {next, last}) {
-    const double *from = piece.height[lone], *to = piece.height[other];
-    const double t = from[plane] / (from[plane] - to[plane]);
-    tip.at[other] = piece.at[lone] + t * (piece.at[other] - piece.at[lone]);
-    for (int k = 0; k < 3; ++k) tip.height[other][k] = from[k] + t * (to[k] - from[k]);
-  }
-  const auto side = [&](bool up) { return octant | (up ? 1 << plane : 0); };
-  cut(octants, of_b, times, tip, plane + 1, side(above[lone]));
-  Piece rest = piece;
-  rest.at[lone] = tip.at[next];
-  std::copy_n(tip.height[next], 3, rest.height[lone]);
-  cut(octants, of_b, times, rest, plane + 1, side(!above[lone]));
-  rest.at[next] = rest.at[lone];
-  std::copy_n(rest.height[lone], 3, rest.height[next]);
-  rest.at[lone] = tip.at[last];
-  std::copy_n(tip.height[last], 3, rest.height[lone]);
-  cut(octants, of_b, times, rest, plane + 1, side(!above[lone]));
+  return out;
 }
 
-void ExactOctants::add_piece(OctantSums* octants, bool of_b, double times, const Point& p,
-                             const Point& q, const Point& r) noexcept {
-  const Point centre = octants->centre;
-  Piece piece = {{p - centre, q - centre, r - centre}, {}};
-  for (int c = 0; c < 3; ++c)
-    for (int k = 0; k < 3; ++k) piece.height[c][k] = dot(axis_[k], piece.at[c]);
-  cut(octants, of_b, times, piece, 0, 0);
+/// Where a side goes through a plane, on the side of `from`.
+ExactOctants::Corner ExactOctants::between(const Corner& from, const Corner& to,
+                                           int plane) noexcept {
+  const double t = from.height[plane] / (from.height[plane] - to.height[plane]);
+  Corner out = {from.at + t * (to.at - from.at), {}, from.octant};
+  for (int k = plane + 1; k < 3; ++k) {
+    out.height[k] = from.height[k] + t * (to.height[k] - from.height[k]);
+    // What has both ends on one side stays there, whatever rounding does.
+    if (((from.octant ^ to.octant) >> k & 1) != 0 &&
+        (out.height[k] >= 0) != ((from.octant >> k & 1) != 0))
+      out.octant ^= 1 << k;
+  }
+  return out;
+}
+
+void ExactOctants::add_triangle(OctantSums* octants, bool of_b, double times, const Corner& p,
+                                const Corner& q, const Corner& r) noexcept {
+  const int unlike = (p.octant ^ q.octant) | (p.octant ^ r.octant);
+  if (unlike == 0) {
+    OctantSums& sums = octants[p.octant];
+    const Point area = (0.5 * times) * cross(q.at - p.at, r.at - p.at), three = p.at + (q.at + r.at);
+    const double six = 2 * dot(p.at, area);
+    sums.six_volumes += six;
+    sums.moment = sums.moment + six * three;
+    sums.area[of_b] = sums.area[of_b] + area;
+    sums.torque = sums.torque + ((of_b ? 0.5 : -0.5) / 3) * cross(three, area);
+    return;
+  }
+  const int plane = std::countr_zero(static_cast<unsigned>(unlike)), bit = 1 << plane;
+  // One corner is alone on its side.
+  const bool first = ((q.octant ^ r.octant) & bit) == 0, last = ((p.octant ^ q.octant) & bit) == 0;
+  const Corner &lone = first ? p : last ? r : q, &next = first ? q : last ? p : r,
+               &other = first ? r : last ? q : p;
+  Corner to_next = between(lone, next, plane), to_other = between(lone, other, plane);
+  add_triangle(octants, of_b, times, lone, to_next, to_other);
+  to_next.octant ^= bit;
+  to_other.octant ^= bit;
+  add_triangle(octants, of_b, times, to_next, next, other);
+  add_triangle(octants, of_b, times, to_next, other, to_other);
 }
 
 OctantSums* ExactOctants::octants_of(std::uint32_t element) noexcept {
@@ -126,21 +127,22 @@ void ExactOctants::sum_octants() noexcept {
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
     OctantSums* const octants = octants_of(i);
     if (octants == nullptr) continue;
-    Point ends[2], apex[2];
-    segment(i, ends[0], ends[1]);
+    const Corner ends[2] = {corner(octants, crossings.place_of(i, 0, out_.origin)),
+                            corner(octants, crossings.place_of(i, 1, out_.origin))};
+    Corner apex[2];
     for (int s = 0; s < 2; ++s) {
-      apex[s] = {crossings.apex(s, 0)[i], crossings.apex(s, 1)[i], crossings.apex(s, 2)[i]};
-      add_piece(octants, s != 0, 1, apex[s], ends[s], ends[1 - s]);
+      apex[s] = corner(octants, {crossings.apex(s, 0)[i], crossings.apex(s, 1)[i],
+                                 crossings.apex(s, 2)[i]});
+      add_triangle(octants, s != 0, 1, apex[s], ends[s], ends[1 - s]);
     }
     for (int e = 0; e < 2; ++e) {
       const double times = crossings.opposite(e)[i];
       if (times == 0) continue;
       const bool of_b = crossings.end_of(i, e).of_b;
-      const Point near = Point{crossings.end(e, Crossings::kFrom)[i],
-                               crossings.end(e, Crossings::kFrom + 1)[i],
-                               crossings.end(e, Crossings::kFrom + 2)[i]} -
-                         out_.origin;
-      add_piece(octants, of_b, times, apex[of_b], ends[e], near);
+      const Point near = {crossings.end(e, Crossings::kFrom)[i],
+                          crossings.end(e, Crossings::kFrom + 1)[i],
+                          crossings.end(e, Crossings::kFrom + 2)[i]};
+      add_triangle(octants, of_b, times, apex[of_b], ends[e], corner(octants, near - out_.origin));
     }
   }
   for (Side& own : sides_) {
@@ -152,21 +154,22 @@ void ExactOctants::sum_octants() noexcept {
         const std::uint32_t element =
             whole[t] == 0 ? kNoPart : triangle_element(own, crossed, t);
         if (element == kNoPart) continue;
-        const auto corner = [&](int k) { return crossed.at(crossed.fan[k][t]); };
-        if (OctantSums* const octants = octants_of(element))
-          add_piece(octants, own.is_b, whole[t], corner(0), corner(1), corner(2));
+        OctantSums* const octants = octants_of(element);
+        if (octants == nullptr) continue;
+        const auto at = [&](int k) { return corner(octants, crossed.at(crossed.fan[k][t])); };
+        add_triangle(octants, own.is_b, whole[t], at(0), at(1), at(2));
       }
     });
     for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {
       OctantSums* const octants = octants_of(block_element(own, b));
       if (octants == nullptr) return;
       const MeshBlock& mesh = own.mesh.blocks[b];
-      Point vertex[kWidth];
+      Corner vertex[kWidth];
       for (std::uint32_t v = 0; v < mesh.vertices; ++v)
-        vertex[v] = place(own, mesh.vertex[v]) - out_.origin;
+        vertex[v] = corner(octants, place(own, mesh.vertex[v]) - out_.origin);
       for (std::uint32_t t = 0; t < mesh.triangles; ++t)
-        add_piece(octants, own.is_b, 1, vertex[mesh.corner[0][t]], vertex[mesh.corner[1][t]],
-                  vertex[mesh.corner[2][t]]);
+        add_triangle(octants, own.is_b, 1, vertex[mesh.corner[0][t]], vertex[mesh.corner[1][t]],
+                     vertex[mesh.corner[2][t]]);
     });
   }
 }

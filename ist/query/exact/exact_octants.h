@@ -22,18 +22,19 @@ class ExactOctants : public ExactParts {
   std::uint32_t split(std::span<const ExactPart> parts, bool by_b) noexcept;
 
  private:
-  /// A triangle seen from a part's centroid, and on which sides of the planes its corners are.
-  struct Piece {
-    exact::Point at[3];
-    double height[3][3];  ///< [corner][plane]
+  /// A point seen from a part's centroid.
+  struct Corner {
+    exact::Point at;
+    double height[3];  ///< over the three planes
+    int octant;
   };
 
   void sum_octants() noexcept;
   OctantSums* octants_of(std::uint32_t element) noexcept;
-  void add_piece(OctantSums* octants, bool of_b, double times, const exact::Point& p,
-                 const exact::Point& q, const exact::Point& r) noexcept;
-  void cut(OctantSums* octants, bool of_b, double times, const Piece& piece, int plane,
-           int octant) noexcept;
+  Corner corner(const OctantSums* octants, const exact::Point& x) const noexcept;
+  static Corner between(const Corner& from, const Corner& to, int plane) noexcept;
+  static void add_triangle(OctantSums* octants, bool of_b, double times, const Corner& p,
+                           const Corner& q, const Corner& r) noexcept;
 
   exact::Point axis_[3];
 };

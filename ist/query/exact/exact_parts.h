@@ -51,6 +51,8 @@ class ExactParts : public ExactQuery {
   void join_curves() noexcept;
   void join_holes(Side& side) noexcept;
   void join_edges() noexcept;
+  std::uint32_t join_edge(const Side& side, const CrossedBlock& crossed, std::uint32_t edge,
+                          std::uint32_t first) noexcept;
   void join_vertices(Side& side) noexcept;
   void join_blocks(Side& side) noexcept;
   void sum_parts() noexcept;
