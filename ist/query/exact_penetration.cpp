@@ -96,31 +96,28 @@ double cube_root_by_squares(double x) {
 /// As many parts as there is room for, the largest; each other one joins the nearest of those that
 /// push like it, if there are any.
 std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room) {
-  std::uint32_t kept = 0;
-  for (const ExactPart& part : parts) kept += &parts[part.kept] == &part ? 1 : 0;
-  const auto middle = [](const ExactPart& part) -> Eigen::Vector3d {
-    return vector(part.sums.moment) / (24 * part.sums.volume());
-  };
-  const auto distance = [&](const ExactPart& x, const ExactPart& y) {
-    return std::pair(dot(x.sums.force, y.sums.force) < 0, (middle(x) - middle(y)).squaredNorm());
-  };
-  while (kept > room) {
-    std::uint32_t least = ~0u, nearest = ~0u;
-    for (std::uint32_t p = 0; p < parts.size(); ++p)
-      if (parts[p].kept == p &&
-          (least == ~0u || parts[p].sums.volume() < parts[least].sums.volume()))
-        least = p;
-    for (std::uint32_t p = 0; p < parts.size(); ++p)
-      if (parts[p].kept == p && p != least &&
-          (nearest == ~0u ||
-           distance(parts[p], parts[least]) < distance(parts[nearest], parts[least])))
-        nearest = p;
-    parts[least].kept = nearest;
-    --kept;
+  std::uint32_t kept[ExactScratch::kMostParts], count = 0;
+  for (std::uint32_t p = 0; p < parts.size(); ++p)
+    if (parts[p].kept == p) kept[count++] = p;
+  if (count <= room) return count;
+  for (ExactPart& part : parts) part.centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
+  for (; count > room; --count) {
+    const auto less = [&](std::uint32_t p, std::uint32_t q) {
+      return parts[p].sums.volume() < parts[q].sums.volume();
+    };
+    std::uint32_t* const least = std::min_element(kept, kept + count, less);
+    ExactPart& joins = parts[*least];
+    std::copy(least + 1, kept + count, least);
+    const auto distance = [&](std::uint32_t p) {
+      const exact::Point between = parts[p].centre - joins.centre;
+      return std::pair(dot(parts[p].sums.force, joins.sums.force) < 0, dot(between, between));
+    };
+    const auto nearer = [&](std::uint32_t p, std::uint32_t q) { return distance(p) < distance(q); };
+    joins.kept = *std::min_element(kept, kept + count - 1, nearer);
   }
   for (ExactPart& part : parts)
     while (parts[part.kept].kept != part.kept) part.kept = parts[part.kept].kept;
-  return kept;
+  return count;
 }
 
 /// Adds to the kept parts what joined them.
@@ -200,7 +197,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
     const std::uint32_t kept = keep_largest(parts, patches.size());
     if (divides && kept <= ExactScratch::kMostSplit && patches.size() > 1) {
       join(parts);
-      parts = {scratch.octants.get(), query.split(parts, volume_of(b) <= volume_of(a))};
+      parts = {scratch.octants.get(), query.split(parts, volume_of(b) <= volume_of(a), patches.size())};
       keep_largest(parts, patches.size());
     }
     join(parts);

@@ -45,8 +45,8 @@ double oneness(const OctantSums& x, const OctantSums& y) {
   return std::max(falls(less / more, 1.0 / 64), rises(cured / areas, 0.2));
 }
 
-/// A contact that is not thin is one.
-void join_octants(OctantSums (&octants)[8]) {
+/// A contact that is not thin is one. `small`: how far it is one for lack of room.
+void join_octants(OctantSums (&octants)[8], double small) {
   for (int k = 0; k < 3; ++k)
     for (int i = 0; i < 8; ++i)
       if ((i >> k & 1) == 0) {
@@ -58,7 +58,7 @@ void join_octants(OctantSums (&octants)[8]) {
     different += length(unlike(sums));
     areas += both_areas(sums);
   }
-  const double share = areas > 0 ? rises(different / areas, 0.2) : 1;
+  const double share = areas > 0 ? std::max(small, rises(different / areas, 0.2)) : 1;
   for (int i = 1; i < 8; ++i) move(octants[i], share, octants[0]);
 }
 
@@ -174,16 +174,18 @@ void ExactOctants::sum_octants() noexcept {
   }
 }
 
-std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b) noexcept {
+std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b,
+                                  std::size_t room) noexcept {
   for (int k = 0; k < 3; ++k)
     axis_[k] = by_b ? (1 / a_from_b_.scale) *
                           Point{a_from_b_.m[k], a_from_b_.m[3 + k], a_from_b_.m[6 + k]}
                     : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
   std::uint32_t slots = 0, count = 0;
+  const double least = out_.sums.volume() / static_cast<double>(room);
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     ExactPart& part = scratch_.parts[p];
     part.slot = kNoPart;
-    if (part.kept != p || part.id == 0 || !(part.sums.volume() > 0) ||
+    if (part.kept != p || part.id == 0 || !(part.sums.volume() > least) ||
         slots == ExactScratch::kMostSplit)
       continue;
     part.slot = slots++;
@@ -208,7 +210,7 @@ std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b) n
     OctantSums octants[8];
     std::copy_n(&scratch_.octant_sums[8 * part.slot], 8, octants);
     const Point centre = octants[0].centre;
-    join_octants(octants);
+    join_octants(octants, falls(part.sums.volume(), least));
     ExactSums missing = part.sums;  // but for rounding nothing
     std::uint32_t largest = 0;
     for (int i = 0; i < 8; ++i) {

@@ -212,6 +212,7 @@ struct ExactPart {
   std::uint64_t id = 0;    ///< lowest pair of triangles on its outline, from 1; 0: it has none
   std::uint32_t kept = 0;  ///< the part that it was added to, or itself
   std::uint32_t slot = 0;  ///< of its octants
+  exact::Point centre = {};  ///< centroid from the whole's origin, once there is need of it
 };
 
 /// What is summed of an octant of a part, from the part's centroid.
