@@ -93,6 +93,9 @@ double cube_root_by_squares(double x) {
   return y;
 }
 
+/// Of the smaller solid's radius: octants of a contact this near to each other hold it as one does.
+constexpr double kNearOctants = 0.15;
+
 /// As many parts as there is room for, the largest; each other one joins the nearest of those that
 /// push like it, if there are any.
 std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room) {
@@ -197,13 +200,17 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
     const std::uint32_t kept = keep_largest(parts, patches.size());
     if (divides && kept <= ExactScratch::kMostSplit && patches.size() > 1) {
       join(parts);
-      parts = {scratch.octants.get(), query.split(parts, volume_of(b) <= volume_of(a), patches.size())};
+      const bool by_b = volume_of(b) <= volume_of(a);
+      const PlacedTree& smaller = by_b ? b : a;
+      const double radius = smaller.scale * smaller.tree.header().ball_radius / pose->unit_a;
+      parts = {scratch.octants.get(),
+               query.split(parts, by_b, kNearOctants * radius, patches.size())};
       keep_largest(parts, patches.size());
     }
     join(parts);
     answer.contact.count = write_parts(parts, found.origin, *pose, patches);
-    const double smaller = cube_root_by_squares(answer.contact.penetration.volume);
-    finish_patches(patches.first(answer.contact.count), b.pose, smaller);
+    const double deepest = cube_root_by_squares(answer.contact.penetration.volume);
+    finish_patches(patches.first(answer.contact.count), b.pose, deepest);
   }
   const auto to_world = [&](const exact::Point& p) {
     return pose->to_world(vector(found.origin) + vector(p));

@@ -33,25 +33,28 @@ void move(OctantSums& from, double share, OctantSums& to) {
 Point unlike(const OctantSums& sums) { return sums.area[0] + sums.area[1]; }
 double both_areas(const OctantSums& sums) { return length(sums.area[0]) + length(sums.area[1]); }
 
-/// How far two octants are one: where one is a sliver of the other, or their two surfaces agree
-/// together only, as those above and below the middle of a thin contact do.
-double oneness(const OctantSums& x, const OctantSums& y) {
+/// How far two octants are one: where one is a sliver of the other, where they are near to each
+/// other, or where their two surfaces agree together only, as those above and below the middle of a
+/// thin contact do.
+double oneness(const OctantSums& x, const OctantSums& y, double near) {
   const double less = std::min(x.six_volumes, y.six_volumes),
                more = std::max(x.six_volumes, y.six_volumes);
   const double areas = both_areas(x) + both_areas(y);
   if (!(less > 0) || !(areas > 0)) return 1;
   const Point of_x = unlike(x), of_y = unlike(y);
   const double cured = (length(of_x) + length(of_y)) - length(of_x + of_y);
-  return std::max(falls(less / more, 1.0 / 64), rises(cured / areas, 0.2));
+  const double apart = length((1 / (4 * x.six_volumes)) * x.moment -
+                              (1 / (4 * y.six_volumes)) * y.moment);
+  return std::max({falls(less / more, 1.0 / 64), falls(apart, near), rises(cured / areas, 0.2)});
 }
 
 /// A contact that is not thin is one. `small`: how far it is one for lack of room.
-void join_octants(OctantSums (&octants)[8], double small) {
+void join_octants(OctantSums (&octants)[8], double near, double small) {
   for (int k = 0; k < 3; ++k)
     for (int i = 0; i < 8; ++i)
       if ((i >> k & 1) == 0) {
         OctantSums &x = octants[i], &y = octants[i | 1 << k];
-        move(y, oneness(x, y), x);
+        move(y, oneness(x, y, near), x);
       }
   double different = 0, areas = 0;
   for (const OctantSums& sums : octants) {
@@ -174,7 +177,7 @@ void ExactOctants::sum_octants() noexcept {
   }
 }
 
-std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b,
+std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, double near,
                                   std::size_t room) noexcept {
   for (int k = 0; k < 3; ++k)
     axis_[k] = by_b ? (1 / a_from_b_.scale) *
@@ -210,7 +213,7 @@ std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b,
     OctantSums octants[8];
     std::copy_n(&scratch_.octant_sums[8 * part.slot], 8, octants);
     const Point centre = octants[0].centre;
-    join_octants(octants, falls(part.sums.volume(), least));
+    join_octants(octants, near, falls(part.sums.volume(), least));
     ExactSums missing = part.sums;  // but for rounding nothing
     std::uint32_t largest = 0;
     for (int i = 0; i < 8; ++i) {

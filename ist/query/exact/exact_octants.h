@@ -19,8 +19,10 @@ class ExactOctants : public ExactParts {
 
   /// Divides parts of divide() that are kept, in the frame of A or B: all those for which there is
   /// room if each patch is to have its share of the volume. Returns how many octants are in
-  /// ExactScratch::octants: their names are 8 times the part's, and the octant's number.
-  std::uint32_t split(std::span<const ExactPart> parts, bool by_b, std::size_t room) noexcept;
+  /// ExactScratch::octants: their names are 8 times the part's, and the octant's number. `near`:
+  /// octants that are not further apart are one.
+  std::uint32_t split(std::span<const ExactPart> parts, bool by_b, double near,
+                      std::size_t room) noexcept;
 
  private:
   /// A point seen from a part's centroid.
