@@ -69,25 +69,23 @@ void join_octants(OctantSums (&octants)[8], double near, double small) {
 
 ExactOctants::Corner ExactOctants::corner(const OctantSums* octants,
                                           const Point& x) const noexcept {
-  Corner out = {x - octants->centre, {}, 0};
-  for (int k = 0; k < 3; ++k) {
-    out.height[k] = dot(axis_[k], out.at);
-    out.octant |= (out.height[k] >= 0 ? 1 : 0) << k;
-  }
+  const Point from = x - octants->centre;
+  Corner out = {{dot(axis_[0], from), dot(axis_[1], from), dot(axis_[2], from)}, 0};
+  for (int k = 0; k < 3; ++k) out.octant |= (out.at[k] >= 0 ? 1 : 0) << k;
   return out;
 }
 
 /// Where a side goes through a plane, on the side of `from`.
 ExactOctants::Corner ExactOctants::between(const Corner& from, const Corner& to,
                                            int plane) noexcept {
-  const double t = from.height[plane] / (from.height[plane] - to.height[plane]);
-  Corner out = {from.at + t * (to.at - from.at), {}, from.octant};
-  for (int k = plane + 1; k < 3; ++k) {
-    out.height[k] = from.height[k] + t * (to.height[k] - from.height[k]);
+  const double t = from.at[plane] / (from.at[plane] - to.at[plane]);
+  Corner out = {{0, 0, 0}, from.octant};
+  for (int k = 0; k < 3; ++k) {
+    if (k != plane) out.at[k] = from.at[k] + t * (to.at[k] - from.at[k]);
     // What has both ends on one side stays there, whatever rounding does.
-    if (((from.octant ^ to.octant) >> k & 1) != 0 &&
-        (out.height[k] >= 0) != ((from.octant >> k & 1) != 0))
-      out.octant ^= 1 << k;
+    const int bit = 1 << k;
+    if (k > plane && ((from.octant ^ to.octant) & bit) != 0)
+      out.octant = (out.octant & ~bit) | (out.at[k] >= 0 ? bit : 0);
   }
   return out;
 }
@@ -97,8 +95,10 @@ void ExactOctants::add_triangle(OctantSums* octants, bool of_b, double times, co
   const int unlike = (p.octant ^ q.octant) | (p.octant ^ r.octant);
   if (unlike == 0) {
     OctantSums& sums = octants[p.octant];
-    const Point area = (0.5 * times) * cross(q.at - p.at, r.at - p.at), three = p.at + (q.at + r.at);
-    const double six = 2 * dot(p.at, area);
+    const Point first = p.point(), second = q.point(), third = r.point();
+    const Point area = (0.5 * times) * cross(second - first, third - first);
+    const Point three = first + (second + third);
+    const double six = 2 * dot(first, area);
     sums.six_volumes += six;
     sums.moment = sums.moment + six * three;
     sums.area[of_b] = sums.area[of_b] + area;
@@ -197,6 +197,9 @@ std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, d
     octants->centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
   }
   sum_octants();
+  const auto back = [&](const Point& v) {
+    return v.x * axis_[0] + (v.y * axis_[1] + v.z * axis_[2]);
+  };
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     const ExactPart& part = parts[p];
     if (part.kept != p) continue;
@@ -221,9 +224,9 @@ std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, d
       if (!(octant.six_volumes > 1e-9 * (6 * part.sums.volume()))) continue;
       ExactPart found = {};
       found.sums.six_volumes.add(octant.six_volumes);
-      found.sums.moment = octant.moment + (4 * octant.six_volumes) * centre;
-      found.sums.force = 0.5 * (octant.area[1] - octant.area[0]);
-      found.sums.torque = octant.torque + cross(centre, found.sums.force);
+      found.sums.moment = back(octant.moment) + (4 * octant.six_volumes) * centre;
+      found.sums.force = back(0.5 * (octant.area[1] - octant.area[0]));
+      found.sums.torque = back(octant.torque) + cross(centre, found.sums.force);
       missing.six_volumes.add(-octant.six_volumes);
       missing.moment = missing.moment - found.sums.moment;
       missing.force = missing.force - found.sums.force;

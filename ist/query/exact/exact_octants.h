@@ -25,11 +25,12 @@ class ExactOctants : public ExactParts {
                       std::size_t room) noexcept;
 
  private:
-  /// A point seen from a part's centroid.
+  /// A point seen from a part's centroid, in the axes of the octants.
   struct Corner {
-    exact::Point at;
-    double height[3];  ///< over the three planes
+    double at[3];
     int octant;
+
+    exact::Point point() const noexcept { return {at[0], at[1], at[2]}; }
   };
 
   void sum_octants() noexcept;

@@ -215,13 +215,13 @@ struct ExactPart {
   exact::Point centre = {};  ///< centroid from the whole's origin, once there is need of it
 };
 
-/// What is summed of an octant of a part, from the part's centroid.
+/// What is summed of an octant of a part, from the part's centroid and in the axes of the octants.
 struct OctantSums {
   double six_volumes = 0;
   exact::Point moment = {};   ///< 24 ∫ x
   exact::Point area[2] = {};  ///< ∫ n dA over A's and over B's surface
   exact::Point torque = {};   ///< ½ ∫ x × n dA over B's surface less that over A's
-  exact::Point centre = {};   ///< of the first: the part's centroid from the whole's origin
+  exact::Point centre = {};   ///< of the first: the part's centroid from the whole's origin, A's axes
 };
 
 /// An edge where it is pierced.
