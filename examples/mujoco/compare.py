@@ -4,8 +4,7 @@
 
 Ways: ist (ist.mujoco), hulls (type="mesh": a mesh is its convex hull), sdf (type="sdf": MuJoCo's own
 mesh SDF), pieces (convex decomposition by CoACD, if it is installed). Times of one run compare with each
-other alone. `depth` is the greatest volume over area of an overlap
-of two meshes, by ist's exact measure.
+other alone. `depth` is that of the deepest patch of an overlap of two meshes, by ist's exact measure.
 """
 
 import argparse
@@ -260,10 +259,9 @@ class Truth:
             for second, other in solids[i + 1:]:
                 a, scale_a = self.assets[first]
                 b, scale_b = self.assets[second]
-                p = ist.penetration(a, b, other, poses_a=pose, scales=scale_b, scales_a=scale_a, measure="exact")
-                area = float(np.linalg.norm(p.force))
-                if area > 0:
-                    deepest = max(deepest, min(p.volume / area, float(np.cbrt(p.volume))))
+                patches = ist.contact_patches(a, b, other, poses_a=pose, scales=scale_b, scales_a=scale_a,
+                                              measure="exact", max_patches=64)
+                deepest = max(deepest, float(patches.depth.max()))
         return deepest
 
     @staticmethod

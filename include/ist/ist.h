@@ -416,6 +416,8 @@ typedef struct ist_contact_patch {
   double volume;      /* [u³] */
   double force[3];    /* [u²] force on B of a pressure of 1 [force/u²] */
   double torque[3];   /* [u³/rad] about B's origin */
+  double point[3];    /* [u] world: on the central axis of the wrench, nearest to the centroid */
+  double twist;       /* [u³/rad] moment about the normal that a force at the point lacks */
 } ist_contact_patch_t;
 
 /* Space for patches. */

@@ -221,8 +221,9 @@ struct ContactPatch {
   /// Names the region, for a solver's warm start: the same in every query of the same two trees in
   /// the same measure. Other pairs of trees use the same names.
   ///
-  /// With Measure::exact it names the lowest pair of crossing triangles on the patch's outline, and
-  /// is the same while these cross; 0 for a patch that lies wholly inside the other solid.
+  /// With Measure::exact it names a connected part of the overlap by the lowest pair of crossing
+  /// triangles on its outline, and is the same while these cross; 0 for a part wholly inside the
+  /// other solid. contact_patches() divides parts: 8 times this name, and the octant.
   std::uint64_t id = 0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the patch's overlap, world
   /// Unit, world: the direction in which the patch pushes B, from A to B; zero if the area is 0.
@@ -237,9 +238,14 @@ struct ContactPatch {
   /// [u²] part of −translation_gradient: the force on B of a pressure of 1 [force/u²]. The force on
   /// A is the opposite.
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
-  /// [u³/rad] part of −rotation_gradient, about B's origin. It is not only the moment of `force` at
-  /// `centroid`: a patch also resists rotation about its normal.
+  /// [u³/rad] part of −rotation_gradient, about B's origin: the moment of `force` at `point`, and
+  /// `twist` times `normal`.
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();
+  /// [u] Where a force acts as the patch does: of the central axis of its wrench the point nearest
+  /// to the centroid, world. It lies far away where forces nearly cancel; the centroid if the area
+  /// is 0.
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  double twist = 0;  ///< [u³/rad] moment about the normal that a force at `point` lacks
 };
 
 struct ContactPatches {
@@ -252,9 +258,12 @@ struct ContactPatches {
 
 /// Condenses the contact into a manifold of at most patches.size() patches.
 ///
-/// Volumes, forces and torques sum to the whole's to about 1e-15. With Measure::exact patches are
-/// the connected parts of the overlap, each with its true volume; if there are more than fit, the
-/// smallest join the nearest ones. By spheres the contact is divided along the tree of the smaller
+/// Volumes, forces and torques sum to the whole's to about 1e-15. With Measure::exact the connected
+/// parts of the overlap are divided into the octants around their centroids, in the frame of the
+/// smaller solid, each with its true volume: a level face has four patches, a ring around a shaft
+/// eight. Small or deep contacts are one patch. If there are more patches
+/// than fit, the smallest of a part join their nearest ones, and then so do parts. Patches are
+/// continuous in the pose while the parts are the same and all fit. By spheres the contact is divided along the tree of the smaller
 /// solid (B's if equal or if A is too coarse), always at the same places. The estimate of a stopped
 /// query is divided too. Under a pair budget the patches are those of the level of detail with the
 /// largest weight in the blend. The difference between the blend and that level is spread over them
@@ -278,8 +287,8 @@ struct OverlapOutline {
   std::size_t segments = 0;
 };
 
-/// contact_patches() with Measure::exact, whatever the settings say, and the outline of each patch:
-/// segments of the closed curves on which the surfaces cross. Seen from outside A, A's surface
+/// The connected parts of the overlap, undivided, as patches of Measure::exact, whatever the
+/// settings say, and the outline of each: segments of the closed curves on which the surfaces cross. Seen from outside A, A's surface
 /// inside B is to the left of each. A patch that lies wholly inside the other solid has none.
 OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,

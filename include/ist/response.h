@@ -88,10 +88,11 @@ struct ContactForce {
   double energy = 0;        ///< [force·u] stored in the springs, of normal and friction
 };
 
-/// A penetration as one patch, for contacts that one force represents. Its id is 0.
+/// A penetration as one patch, for contacts that one force represents. Its id is 0, its point the
+/// centroid, since B's origin is not known here.
 inline ContactPatch whole_patch(const Penetration& contact) noexcept {
   ContactPatch patch;
-  patch.centroid = contact.centroid;
+  patch.centroid = patch.point = contact.centroid;
   patch.force = -contact.translation_gradient;
   patch.torque = -contact.rotation_gradient;
   patch.volume = contact.volume;

@@ -155,7 +155,7 @@ ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
                             const ContactSettings& settings, Workspace& workspace,
                             std::span<ContactPatch> patches) noexcept {
   if (settings.measure == Measure::exact)
-    return exact_patches(a, b, settings, workspace, patches, {}).contact;
+    return exact_patches(a, b, settings, workspace, patches, {}, true).contact;
   if (lack_spheres(a, b)) return not_held<ContactPatches>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<ContactPatches>();
@@ -170,7 +170,7 @@ ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
   result.count = chosen.patches->write(patches);
   if (blends || result.count == 0)
     result.count = spread(chosen.patches->whole(), result.penetration, result.count, patches);
-  finish_patches(patches.first(result.count), chosen.patches->deepest());
+  finish_patches(patches.first(result.count), b.pose, chosen.patches->deepest());
   return result;
 }
 
@@ -178,7 +178,7 @@ OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches,
                                std::span<OutlineSegment> segments) noexcept {
-  return exact_patches(a, b, settings, workspace, patches, segments);
+  return exact_patches(a, b, settings, workspace, patches, segments, false);
 }
 
 }  // namespace ist

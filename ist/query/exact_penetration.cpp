@@ -7,7 +7,7 @@
 #include "query/base/no_answer.h"
 #include "query/contact/write_patches.h"
 #include "query/descent/workspace.h"
-#include "query/exact/exact_parts.h"
+#include "query/exact/exact_octants.h"
 #include "query/exact/kept_mesh.h"
 
 namespace ist {
@@ -23,15 +23,17 @@ Query query_of(const PlacedTree& a, const MeshTree& mesh_a, const PlacedTree& b,
 
 Eigen::Vector3d vector(const exact::Point& p) { return {p.x, p.y, p.z}; }
 
+/// At most, of a solid.
+double volume_of(const PlacedTree& placed) {
+  const AssetHeader& asset = placed.tree.header();
+  return std::ldexp(asset.volume + asset.volume_error, 3 * asset.exponent) *
+         (placed.scale * placed.scale * placed.scale);
+}
+
 /// The true volume lies between nothing and the smaller solid's.
 void bound_by_solids(const PlacedTree& a, const PlacedTree& b, Penetration& answer) {
-  const auto most = [](const PlacedTree& placed) {
-    const AssetHeader& asset = placed.tree.header();
-    return std::ldexp(asset.volume + asset.volume_error, 3 * asset.exponent) *
-           (placed.scale * placed.scale * placed.scale);
-  };
   answer.volume_min = 0;
-  answer.volume_max = std::min(most(a), most(b)) * (1 + 1e-12);
+  answer.volume_max = std::min(volume_of(a), volume_of(b)) * (1 + 1e-12);
 }
 
 }  // namespace
@@ -91,43 +93,47 @@ double cube_root_by_squares(double x) {
   return y;
 }
 
-/// As many parts as there is room for, the largest; each other one joins the nearest of these.
+/// Of the smaller solid's radius: octants of a contact this near to each other hold it as one does.
+constexpr double kNearOctants = 0.15;
+
+/// As many parts as there is room for, the largest; each other one joins the nearest of those that
+/// push like it, if there are any.
 std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room) {
-  std::uint32_t kept = 0;
-  for (const ExactPart& part : parts) kept += &parts[part.kept] == &part ? 1 : 0;
-  const auto middle = [](const ExactPart& part) -> Eigen::Vector3d {
-    return vector(part.sums.moment) / (24 * part.sums.volume());
-  };
-  while (kept > room) {
-    std::uint32_t least = ~0u, nearest = ~0u;
-    for (std::uint32_t p = 0; p < parts.size(); ++p)
-      if (parts[p].kept == p &&
-          (least == ~0u || parts[p].sums.volume() < parts[least].sums.volume()))
-        least = p;
-    for (std::uint32_t p = 0; p < parts.size(); ++p)
-      if (parts[p].kept == p && p != least &&
-          (nearest == ~0u || (middle(parts[p]) - middle(parts[least])).squaredNorm() <
-                                 (middle(parts[nearest]) - middle(parts[least])).squaredNorm()))
-        nearest = p;
-    parts[least].kept = nearest;
-    --kept;
+  std::uint32_t kept[ExactScratch::kMostParts], count = 0;
+  for (std::uint32_t p = 0; p < parts.size(); ++p)
+    if (parts[p].kept == p) kept[count++] = p;
+  if (count <= room) return count;
+  for (ExactPart& part : parts) part.centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
+  for (; count > room; --count) {
+    const auto less = [&](std::uint32_t p, std::uint32_t q) {
+      return parts[p].sums.volume() < parts[q].sums.volume();
+    };
+    std::uint32_t* const least = std::min_element(kept, kept + count, less);
+    ExactPart& joins = parts[*least];
+    std::copy(least + 1, kept + count, least);
+    const auto distance = [&](std::uint32_t p) {
+      const exact::Point between = parts[p].centre - joins.centre;
+      return std::pair(dot(parts[p].sums.force, joins.sums.force) < 0, dot(between, between));
+    };
+    const auto nearer = [&](std::uint32_t p, std::uint32_t q) { return distance(p) < distance(q); };
+    joins.kept = *std::min_element(kept, kept + count - 1, nearer);
   }
   for (ExactPart& part : parts)
     while (parts[part.kept].kept != part.kept) part.kept = parts[part.kept].kept;
-  return kept;
+  return count;
 }
 
-/// Writes the kept parts in their order, what joined them added; `kept` becomes the patch.
-std::size_t write_parts(std::span<ExactPart> parts, const exact::Point& origin,
-                        const RelativePose& pose, std::span<ContactPatch> patches) {
+/// Adds to the kept parts what joined them.
+void join(std::span<ExactPart> parts) {
   for (const ExactPart& part : parts) {
     ExactPart& into = parts[part.kept];
-    if (&into == &part) continue;
-    into.sums.six_volumes.add(part.sums.six_volumes.value());
-    into.sums.moment = into.sums.moment + part.sums.moment;
-    into.sums.force = into.sums.force + part.sums.force;
-    into.sums.torque = into.sums.torque + part.sums.torque;
+    if (&into != &part) into.sums.add(part.sums);
   }
+}
+
+/// Writes the kept parts in their order; `kept` becomes the patch.
+std::size_t write_parts(std::span<ExactPart> parts, const exact::Point& origin,
+                        const RelativePose& pose, std::span<ContactPatch> patches) {
   std::uint32_t count = 0;
   std::uint32_t place[ExactScratch::kMostParts];
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
@@ -166,15 +172,15 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
 
 OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
                              const ContactSettings& settings, Workspace& workspace,
-                             std::span<ContactPatch> patches,
-                             std::span<OutlineSegment> segments) noexcept {
+                             std::span<ContactPatch> patches, std::span<OutlineSegment> segments,
+                             bool divides) noexcept {
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<OverlapOutline>();
   if (a.tree.header().mesh == 0 || b.tree.header().mesh == 0) return not_held<OverlapOutline>();
   OverlapOutline answer;
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   ExactScratch& scratch = workspace.impl()->exact;
-  auto query = query_of<ExactParts>(a, mesh_a, b, mesh_b, *pose, scratch);
+  auto query = query_of<ExactOctants>(a, mesh_a, b, mesh_b, *pose, scratch);
   const ExactOverlap found = query.run(settings.max_visits);
   if (!found.complete) {
     const auto by_spheres = [&] {
@@ -190,11 +196,21 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
   answer.contact.penetration = whole_answer(found, *pose);
   answer.segments = found.crossings;
   if (!patches.empty()) {
-    const std::span<ExactPart> parts(scratch.parts.get(), query.divide());
-    keep_largest(parts, patches.size());
+    std::span<ExactPart> parts(scratch.parts.get(), query.divide());
+    const std::uint32_t kept = keep_largest(parts, patches.size());
+    if (divides && kept <= ExactScratch::kMostSplit && patches.size() > 1) {
+      join(parts);
+      const bool by_b = volume_of(b) <= volume_of(a);
+      const PlacedTree& smaller = by_b ? b : a;
+      const double radius = smaller.scale * smaller.tree.header().ball_radius / pose->unit_a;
+      parts = {scratch.octants.get(),
+               query.split(parts, by_b, kNearOctants * radius, patches.size())};
+      keep_largest(parts, patches.size());
+    }
+    join(parts);
     answer.contact.count = write_parts(parts, found.origin, *pose, patches);
-    const double smaller = cube_root_by_squares(answer.contact.penetration.volume);
-    finish_patches(patches.first(answer.contact.count), smaller);
+    const double deepest = cube_root_by_squares(answer.contact.penetration.volume);
+    finish_patches(patches.first(answer.contact.count), b.pose, deepest);
   }
   const auto to_world = [&](const exact::Point& p) {
     return pose->to_world(vector(found.origin) + vector(p));

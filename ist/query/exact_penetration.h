@@ -11,10 +11,11 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
                               const PenetrationSettings& settings, const RelativePose& pose,
                               Workspace& workspace) noexcept;
 
-/// contact_patches() and overlap_outline() by Measure::exact.
+/// contact_patches() and overlap_outline() by Measure::exact. `divides`: parts into octants, as far
+/// as there is room.
 OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
                              const ContactSettings& settings, Workspace& workspace,
-                             std::span<ContactPatch> patches,
-                             std::span<OutlineSegment> segments) noexcept;
+                             std::span<ContactPatch> patches, std::span<OutlineSegment> segments,
+                             bool divides) noexcept;
 
 }  // namespace ist

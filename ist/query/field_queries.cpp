@@ -106,7 +106,7 @@ ContactPatches find_patches(const PlacedField& a, const PlacedTree& b,
   const double radius = tree.header->root[3] * pose->a_from_b.scale;
   result.count = write_patches({bins, bins.collect(Precision::float64), *pose, radius},
                                result.penetration, patches);
-  finish_patches(patches.first(result.count), 2 * pose->unit_a * radius);
+  finish_patches(patches.first(result.count), b.pose, 2 * pose->unit_a * radius);
   return result;
 }
 

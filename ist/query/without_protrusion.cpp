@@ -109,8 +109,11 @@ void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, co
     patch.area *= left.force;
     patch.force *= left.force;
     patch.torque *= left.force;
+    patch.twist *= left.force;
     patch.depth = patch.area > 0 ? patch.volume / patch.area : 0;
-    if (!(patch.area > 0)) patch.normal.setZero();
+    if (patch.area > 0) continue;
+    patch.normal.setZero();
+    patch.point = patch.centroid;
   }
 }
 

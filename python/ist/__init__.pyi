@@ -433,6 +433,10 @@ class ContactPatches:
     def force(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u²]
     @property
     def torque(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u³]
+    @property
+    def point(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u] on the central axis of the wrench
+    @property
+    def twist(self) -> NDArray[np.float64]: ...  # (n, m) [u³] about the normal
 
 @final
 class OverlapOutline:

@@ -133,16 +133,12 @@ bool shape_of(const mjModel* m, const mjData* d, int geom, ist_field_t& field,
   }
 }
 
-/// The wrench of a patch acts on a line. Its point next to the centroid is the place of a contact:
-/// at the centroid itself the force would have another torque.
-void write_contact(const ist_contact_patch_t& patch, const double (&origin)[3], mjPreContact& out) {
-  mjtNum arm[3], moment[3], shift[3];
-  for (int k = 0; k < 3; ++k) arm[k] = patch.centroid[k] - origin[k];
-  mju_cross(moment, arm, patch.force);
-  for (int k = 0; k < 3; ++k) moment[k] = patch.torque[k] - moment[k];
-  mju_cross(shift, patch.force, moment);
-  mju_scl3(shift, shift, 1 / (patch.area * patch.area));
-  // A patch that pushes both ways has a line far away, and little area.
+/// At the patch's point a force acts as the patch does: at its centroid it would have another
+/// torque.
+void write_contact(const ist_contact_patch_t& patch, mjPreContact& out) {
+  mjtNum shift[3];
+  mju_sub3(shift, patch.point, patch.centroid);
+  // A patch that pushes both ways has its point far away, and little area.
   const double length = mju_norm3(shift), most = 2 * std::sqrt(patch.area);
   if (length > most) mju_scl3(shift, shift, most / length);
   for (int k = 0; k < 3; ++k) {
@@ -204,7 +200,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   }
   int count = 0;
   for (size_t i = 0; i < patches.count; ++i)
-    if (memory.patches[i].area > 0) write_contact(memory.patches[i], b.pose.t, out[count++]);
+    if (memory.patches[i].area > 0) write_contact(memory.patches[i], out[count++]);
   if (count > 0 || !(margin > 0) || whole.volume > 0 || room < 1) return count;
   // Apart: one contact at the gap, for margins and mj_geomDistance().
   ist_separation_t gap = {};

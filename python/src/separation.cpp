@@ -34,7 +34,9 @@ struct Patches {
         depth(rows, {each}),
         volume(rows, {each}),
         force(rows, {each, 3}),
-        torque(rows, {each, 3}) {}
+        torque(rows, {each, 3}),
+        point(rows, {each, 3}),
+        twist(rows, {each}) {}
 
   void write(std::size_t i, std::span<const ContactPatch> patches) const {
     for (std::size_t k = 0; k < patches.size(); ++k) {
@@ -47,13 +49,15 @@ struct Patches {
       volume.row(i)[k] = patch.volume;
       Vector(force.row(i) + 3 * k) = patch.force;
       Vector(torque.row(i) + 3 * k) = patch.torque;
+      Vector(point.row(i) + 3 * k) = patch.point;
+      twist.row(i)[k] = patch.twist;
     }
   }
 
   std::shared_ptr<Penetrations> penetration;
   Column<std::uint32_t> count;
   Column<std::uint64_t> id;
-  Column<double> centroid, normal, area, depth, volume, force, torque;
+  Column<double> centroid, normal, area, depth, volume, force, torque, point, twist;
 };
 
 struct Outline {
@@ -206,6 +210,11 @@ void add_classes(py::module_& module) {
   add_column(patch, "force", &Patches::force, "(n, m, 3) [u²] share of Penetration.force.");
   add_column(patch, "torque", &Patches::torque,
              "(n, m, 3) [u³] share of Penetration.torque, about B's origin.");
+  add_column(patch, "point", &Patches::point,
+             "(n, m, 3) [u] world: where a force acts as the patch does. On the central axis of its "
+             "wrench, nearest to the centroid.");
+  add_column(patch, "twist", &Patches::twist,
+             "(n, m) [u³] moment about the normal that a force at the point lacks.");
 
   py::class_<Outline> outline(module, "OverlapOutline", "Contact patches and their outlines.");
   outline.def_ro("contact", &Outline::contact, "The patches: ContactPatches of one pose.");

@@ -75,11 +75,11 @@ class ExactPatches : public ::testing::Test {
     EXPECT_LE((force + whole.translation_gradient).norm(), 1e-14 * area);
     EXPECT_LE((torque + whole.rotation_gradient).norm(), 1e-14 * area * size);
     EXPECT_LE((moment - whole.volume * whole.centroid).norm(), 1e-14 * area * area);
-    // contact_patches() says the same.
+    // contact_patches() divides them.
     std::vector<ContactPatch> same(room);
     ContactSettings settings;
     settings.measure = Measure::exact;
-    EXPECT_EQ(contact_patches(a, b, settings, workspace_, same).count, patches_.size());
+    EXPECT_GE(contact_patches(a, b, settings, workspace_, same).count, patches_.size());
   }
 
   /// Each patch's outline is closed, and its force and torque follow from it alone (Stokes).

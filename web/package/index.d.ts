@@ -322,6 +322,10 @@ export interface ContactPatch {
   /** [u²] and [u³/rad] about B's origin: its part of Penetration's. */
   force: Float64Array;
   torque: Float64Array;
+  /** [u] Where a force acts as the patch does: on the central axis of its wrench, nearest to the centroid. */
+  point: Float64Array;
+  /** [u³/rad] Moment about the normal that a force at the point lacks. */
+  twist: number;
 }
 
 export interface ContactPatchesOptions extends ContactOptions {

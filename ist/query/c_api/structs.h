@@ -85,6 +85,8 @@ static_assert(offsetof(ist_contact_patch_t, depth) == offsetof(ContactPatch, dep
 static_assert(offsetof(ist_contact_patch_t, volume) == offsetof(ContactPatch, volume));
 static_assert(offsetof(ist_contact_patch_t, force) == offsetof(ContactPatch, force));
 static_assert(offsetof(ist_contact_patch_t, torque) == offsetof(ContactPatch, torque));
+static_assert(offsetof(ist_contact_patch_t, point) == offsetof(ContactPatch, point));
+static_assert(offsetof(ist_contact_patch_t, twist) == offsetof(ContactPatch, twist));
 
 // So are segments of outlines.
 static_assert(std::is_standard_layout_v<OutlineSegment>);

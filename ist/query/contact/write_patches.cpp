@@ -88,13 +88,18 @@ std::size_t spread(const Penetration& part, const Penetration& whole, std::size_
   return count;
 }
 
-void finish_patches(std::span<ContactPatch> patches, double deepest) noexcept {
+void finish_patches(std::span<ContactPatch> patches, const Pose& b, double deepest) noexcept {
+  const Eigen::Vector3d origin(b.t);
   for (ContactPatch& patch : patches) {
+    patch.point = patch.centroid;
     const double area = patch.force.norm();
     if (!(area > kPushRounding * std::cbrt(patch.volume * patch.volume))) continue;
     patch.area = area;
     patch.normal = patch.force / patch.area;
     patch.depth = std::min(patch.volume / patch.area, deepest);
+    const Eigen::Vector3d moment = patch.torque - (patch.centroid - origin).cross(patch.force);
+    patch.point += patch.normal.cross(moment) / patch.area;
+    patch.twist = patch.normal.dot(moment);
   }
 }
 

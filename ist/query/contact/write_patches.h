@@ -25,7 +25,7 @@ std::size_t spread(const Penetration& part, const Penetration& whole, std::size_
 std::size_t write_patches(const Binned& binned, const Penetration& whole,
                           std::span<ContactPatch> patches) noexcept;
 
-/// Normals, areas and depths of patches whose forces are known.
-void finish_patches(std::span<ContactPatch> patches, double deepest) noexcept;
+/// What follows from centroids, volumes and wrenches, these about B's origin.
+void finish_patches(std::span<ContactPatch> patches, const Pose& b, double deepest) noexcept;
 
 }  // namespace ist

@@ -461,11 +461,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
     sum_insides(side, side.mesh.top, 0);
     bound_near(side);
   }
-  const ExactSums crossed = slots_.total();
-  out_.sums.six_volumes.add(crossed.six_volumes.value());
-  out_.sums.moment = out_.sums.moment + crossed.moment;
-  out_.sums.force = out_.sums.force + crossed.force;
-  out_.sums.torque = out_.sums.torque + crossed.torque;
+  out_.sums.add(slots_.total());
   out_.error = 1.01 * ((rounding_ + slots_.rounding()) / 6 + layers_) +
                4 * kHalfUnit * std::abs(out_.sums.volume());
   out_.consistent = std::isfinite(out_.error);  // of what is no number there is no bound

@@ -63,6 +63,7 @@ class ExactQuery {
   /// How often the cone over the edge opposite to each lane's apex counts.
   static void count_triangles(const MeshBlock& mesh, const CrossedBlock& crossed,
                               std::int8_t (&whole)[kWidth]) noexcept;
+  exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
   void sum_lane(const Side& side, int level, std::uint32_t i, std::uint32_t lane,
                 ExactSums& sums) noexcept;
 
@@ -73,7 +74,6 @@ class ExactQuery {
   ExactOverlap out_;
 
  private:
-  exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
   void clear_marks() noexcept;
   CrossingsFound search(std::uint32_t max_visits) noexcept;
   void sort_pairs(std::uint32_t count) noexcept;

@@ -1,23 +1,21 @@
 #include "query/exact/exact_parts.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <tuple>
 
 namespace ist {
-namespace {
 
 using exact::Point;
 
-constexpr std::uint32_t kNoPart = ~0u;
+namespace {
+
+/// ExactScratch has no more blocks, and eight times a pair's name fits into 64 bits.
+constexpr int kTriangleBits = 28;
 
 template <class Visit>
-void for_each_block(const HookedArray<std::uint64_t>& bits, std::uint32_t blocks,
-                    const Visit& visit) {
-  for (std::uint32_t w = 0; w < (blocks + 63) / 64; ++w)
-    for (std::uint64_t left = bits[w]; left != 0; left &= left - 1)
-      visit(64 * w + static_cast<std::uint32_t>(std::countr_zero(left)));
+void for_each_bit(std::uint64_t bits, const Visit& visit) {
+  for (; bits != 0; bits &= bits - 1) visit(static_cast<std::uint32_t>(std::countr_zero(bits)));
 }
 
 }  // namespace
@@ -44,8 +42,21 @@ std::uint32_t ExactParts::vertex_element(const Side& own, const CrossedBlock& cr
   return (own.is_b ? vertices_of_b_ : out_.crossings) + kWidth * place + vertex;
 }
 
+std::uint32_t ExactParts::first_middle(const Side& own,
+                                       const CrossedBlock& crossed) const noexcept {
+  const auto place = static_cast<std::uint32_t>(&crossed - own.marks.blocks.get());
+  return 3 * kWidth * ((own.is_b ? sides_[0].marks.count : 0) + place);
+}
+
 std::uint32_t ExactParts::block_element(const Side& own, std::uint32_t block) const noexcept {
   return (own.is_b ? blocks_of_b_ : blocks_of_a_) + block;
+}
+
+std::uint32_t ExactParts::triangle_element(const Side& own, const CrossedBlock& crossed,
+                                           std::uint32_t t) const noexcept {
+  const std::uint32_t edge = 3 * t + (crossed.apex[t] + 1u) % 3;
+  if (crossed.pierced >> edge & 1) return scratch_.middles[first_middle(own, crossed) + edge];
+  return vertex_element(own, crossed, own.mesh.blocks[crossed.block].corner[edge % 3][t]);
 }
 
 /// Each element by itself.
@@ -64,30 +75,33 @@ void ExactParts::begin() noexcept {
 }
 
 /// Segments that end at the same place go on in each other: it is an edge of one triangle and
-/// another that shares the edge, against one of the other solid.
+/// another that shares the edge, against one of the other solid. A table finds it by its name.
 void ExactParts::join_curves() noexcept {
   PiercedEnd* const ends = scratch_.ends.get();
-  std::uint32_t count = 0;
-  for (std::uint32_t i = 0; i < out_.crossings; ++i)
-    for (int e = 0; e < 2; ++e) {
-      const Crossings::End end = scratch_.crossings.end_of(i, e);
-      const MeshBlock& mesh = side(end.of_b).mesh.blocks[end.triangle / kWidth];
-      const std::uint32_t lane = end.triangle % kWidth;
-      const std::uint32_t p = mesh.vertex[mesh.corner[end.edge][lane]],
-                          q = mesh.vertex[mesh.corner[(end.edge + 1) % 3][lane]];
-      ends[count++] = {std::uint64_t{std::min(p, q)} << 32 | std::max(p, q),
-                       scratch_.crossings.end(e, Crossings::kT)[i], i,
-                       scratch_.crossings.triangle(end.of_b ? 0 : 1, i), end.of_b};
+  std::uint64_t* const table = scratch_.keys.get();  // numbers of ends, from 1
+  const std::uint32_t mask = std::bit_ceil(2 * out_.crossings + 1) - 1;
+  std::fill_n(table, mask + 1, 0);
+  for (std::uint32_t i = 0; i < 2 * out_.crossings; ++i) {
+    const Crossings::End end = scratch_.crossings.end_of(i / 2, static_cast<int>(i % 2));
+    const MeshBlock& mesh = side(end.of_b).mesh.blocks[end.triangle / kWidth];
+    const std::uint32_t lane = end.triangle % kWidth;
+    const std::uint32_t p = mesh.vertex[mesh.corner[end.edge][lane]],
+                        q = mesh.vertex[mesh.corner[(end.edge + 1) % 3][lane]];
+    const std::uint64_t edge = std::uint64_t{std::min(p, q)} << 32 | std::max(p, q);
+    const std::uint32_t other = scratch_.crossings.triangle(end.of_b ? 0 : 1, i / 2);
+    ends[i] = {edge, 0, i / 2, other, end.of_b};
+    const std::uint64_t mixed =
+        (edge ^ (std::uint64_t{other} << 20)) * 0x9e3779b97f4a7c15u + (end.of_b ? 1 : 0);
+    std::uint64_t slot = (mixed ^ mixed >> 29) >> 3 & mask;
+    for (; table[slot] != 0; slot = (slot + 1) & mask) {
+      const PiercedEnd& found = ends[table[slot] - 1];
+      if (found.edge == edge && found.other == other && found.of_b == end.of_b) break;
     }
-  const auto place = [](const PiercedEnd& end) {
-    return std::tuple(end.of_b, end.edge, end.other, end.crossing);
-  };
-  std::sort(ends, ends + count,
-            [&](const PiercedEnd& x, const PiercedEnd& y) { return place(x) < place(y); });
-  for (std::uint32_t i = 1; i < count; ++i)
-    if (ends[i].of_b == ends[i - 1].of_b && ends[i].edge == ends[i - 1].edge &&
-        ends[i].other == ends[i - 1].other)
-      unite(ends[i].crossing, ends[i - 1].crossing);
+    if (table[slot] != 0)
+      unite(i / 2, ends[table[slot] - 1].crossing);
+    else
+      table[slot] = i + 1;
+  }
 }
 
 /// A curve that lies in one triangle and goes round what is outside belongs to the narrowest one
@@ -143,47 +157,65 @@ void ExactParts::join_holes(Side& own) noexcept {
 
 /// What an edge has inside joins what bounds it, end by end.
 void ExactParts::join_edges() noexcept {
+  // A list of its ends for each edge that is pierced.
+  std::uint64_t* const next = scratch_.other_keys.get();
+  for (Side& own : sides_)
+    for (std::uint32_t c = 0; c < own.marks.count; ++c) {
+      const CrossedBlock& crossed = own.marks.blocks[c];
+      for_each_bit(crossed.pierced, [&](std::uint32_t edge) {
+        scratch_.middles[first_middle(own, crossed) + edge] = kNoPart;
+      });
+    }
+  for (std::uint32_t i = 0; i < 2 * out_.crossings; ++i) {
+    const Crossings::End end = scratch_.crossings.end_of(i / 2, static_cast<int>(i % 2));
+    Side& own = side(end.of_b);
+    std::uint32_t& first = scratch_.middles[first_middle(own, crossed_block(own, end.triangle)) +
+                                            3 * (end.triangle % kWidth) + end.edge];
+    next[i] = first;
+    first = i;
+  }
+  for (Side& own : sides_)
+    for (std::uint32_t c = 0; c < own.marks.count; ++c) {
+      const CrossedBlock& crossed = own.marks.blocks[c];
+      for_each_bit(crossed.pierced, [&](std::uint32_t edge) {
+        std::uint32_t& middle = scratch_.middles[first_middle(own, crossed) + edge];
+        middle = join_edge(own, crossed, edge, middle);
+      });
+    }
+}
+
+/// Returns what the middle of the edge hangs together with. `first`: of the list of its ends.
+std::uint32_t ExactParts::join_edge(const Side& own, const CrossedBlock& crossed,
+                                    std::uint32_t edge, std::uint32_t first) noexcept {
   PiercedEnd* const ends = scratch_.ends.get();
   std::uint32_t count = 0;
-  for (std::uint32_t i = 0; i < out_.crossings; ++i)
-    for (int e = 0; e < 2; ++e) {
-      const Crossings::End end = scratch_.crossings.end_of(i, e);
-      ends[count++] = {std::uint64_t{3} * end.triangle + end.edge,
-                       scratch_.crossings.end(e, Crossings::kT)[i], i,
-                       (end.enters ? 1u : 0u) | (end.from_first ? 2u : 0u), end.of_b};
-    }
-  std::sort(ends, ends + count, [](const PiercedEnd& x, const PiercedEnd& y) {
-    return std::tuple(x.of_b, x.edge, (x.other & 2) == 0, x.t, x.crossing) <
-           std::tuple(y.of_b, y.edge, (y.other & 2) == 0, y.t, y.crossing);
-  });
-  for (std::uint32_t i = 0; i < count;) {
-    Side& own = side(ends[i].of_b);
-    const auto triangle = static_cast<std::uint32_t>(ends[i].edge / 3);
-    const auto k = static_cast<std::uint32_t>(ends[i].edge % 3);
-    CrossedBlock& crossed = crossed_block(own, triangle);
-    const MeshBlock& mesh = own.mesh.blocks[crossed.block];
-    const std::uint32_t lane = triangle % kWidth;
-    const std::uint32_t p = mesh.corner[k][lane], q = mesh.corner[(k + 1) % 3][lane];
-    std::uint32_t inside = crossed.inside >> p & 1 ? vertex_element(own, crossed, p) : kNoPart;
-    std::uint32_t middle = inside;
-    const std::uint64_t edge = ends[i].edge;
-    const bool of_b = ends[i].of_b;
-    for (; i < count && ends[i].edge == edge && ends[i].of_b == of_b; ++i) {
-      if ((ends[i].other & 1) != 0) {
-        inside = ends[i].crossing;
-      } else {
-        if (inside != kNoPart) unite(inside, ends[i].crossing);
-        inside = kNoPart;
-      }
-      if ((ends[i].other & 2) != 0) middle = inside;
-    }
-    if (inside != kNoPart && (crossed.inside >> q & 1) != 0)
-      unite(inside, vertex_element(own, crossed, q));
-    scratch_.middles[3 * kWidth *
-                         ((own.is_b ? sides_[0].marks.count : 0) +
-                          static_cast<std::uint32_t>(&crossed - own.marks.blocks.get())) +
-                     3 * lane + k] = middle;
+  for (std::uint32_t i = first; i != kNoPart;
+       i = static_cast<std::uint32_t>(scratch_.other_keys[i])) {
+    const Crossings::End end = scratch_.crossings.end_of(i / 2, static_cast<int>(i % 2));
+    ends[count++] = {0, scratch_.crossings.end(static_cast<int>(i % 2), Crossings::kT)[i / 2],
+                     i / 2, (end.enters ? 1u : 0u) | (end.from_first ? 2u : 0u), end.of_b};
   }
+  std::sort(ends, ends + count, [](const PiercedEnd& x, const PiercedEnd& y) {
+    return std::tuple((x.other & 2) == 0, x.t, x.crossing) <
+           std::tuple((y.other & 2) == 0, y.t, y.crossing);
+  });
+  const MeshBlock& mesh = own.mesh.blocks[crossed.block];
+  const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
+                      q = mesh.corner[(edge + 1) % 3][edge / 3];
+  std::uint32_t inside = crossed.inside >> p & 1 ? vertex_element(own, crossed, p) : kNoPart;
+  std::uint32_t middle = inside;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if ((ends[i].other & 1) != 0) {
+      inside = ends[i].crossing;
+    } else {
+      if (inside != kNoPart) unite(inside, ends[i].crossing);
+      inside = kNoPart;
+    }
+    if ((ends[i].other & 2) != 0) middle = inside;
+  }
+  if (inside != kNoPart && (crossed.inside >> q & 1) != 0)
+    unite(inside, vertex_element(own, crossed, q));
+  return middle;
 }
 
 /// Vertices inside, along edges that nothing pierces and from block to block.
@@ -249,7 +281,7 @@ void ExactParts::sum_parts() noexcept {
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
     if (i % 8 == 0) crossing_terms(scratch_.crossings, i, out_.origin, terms);
     ExactPart& part = scratch_.parts[part_of(i)];
-    const std::uint64_t id = (std::uint64_t{scratch_.crossings.triangle(0, i)} << 32 |
+    const std::uint64_t id = (std::uint64_t{scratch_.crossings.triangle(0, i)} << kTriangleBits |
                               scratch_.crossings.triangle(1, i)) +
                              1;
     part.id = part.id == 0 ? id : std::min(part.id, id);
@@ -259,16 +291,12 @@ void ExactParts::sum_parts() noexcept {
     for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
       const CrossedBlock& crossed = own.marks.blocks[own.marks.place[b]];
       const MeshBlock& mesh = own.mesh.blocks[b];
-      const std::uint32_t first =
-          3 * kWidth * ((own.is_b ? sides_[0].marks.count : 0) + own.marks.place[b]);
       std::int8_t whole[kWidth];
       count_triangles(mesh, crossed, whole);
       for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
         if (t % 8 == 0) triangle_terms(crossed, whole, static_cast<int>(t / 8), terms);
         if (whole[t] == 0) continue;
-        const std::uint32_t edge = 3 * t + (crossed.apex[t] + 1u) % 3;
-        std::uint32_t element = vertex_element(own, crossed, mesh.corner[edge % 3][t]);
-        if (crossed.pierced >> edge & 1) element = scratch_.middles[first + edge];
+        const std::uint32_t element = triangle_element(own, crossed, t);
         if (element != kNoPart)
           add_triangle_term(terms, t % 8, scratch_.parts[part_of(element)].sums);
       }

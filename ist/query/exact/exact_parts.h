@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
 #include "query/exact/exact_overlap.h"
@@ -21,21 +22,39 @@ class ExactParts : public ExactQuery {
   /// Its ends, A's unit frame.
   void segment(std::uint32_t i, exact::Point& from, exact::Point& to) const noexcept;
 
+ protected:
+  std::uint32_t part_of(std::uint32_t element) noexcept;
+
+  template <class Visit>
+  static void for_each_block(const HookedArray<std::uint64_t>& bits, std::uint32_t blocks,
+                             const Visit& visit) {
+    for (std::uint32_t w = 0; w < (blocks + 63) / 64; ++w)
+      for (std::uint64_t left = bits[w]; left != 0; left &= left - 1)
+        visit(64 * w + static_cast<std::uint32_t>(std::countr_zero(left)));
+  }
+
+  static constexpr std::uint32_t kNoPart = ~0u;
+  std::uint32_t block_element(const Side& side, std::uint32_t block) const noexcept;
+  /// What a triangle of a crossed block hangs together with, where it counts as a whole.
+  std::uint32_t triangle_element(const Side& side, const CrossedBlock& crossed,
+                                 std::uint32_t triangle) const noexcept;
+
  private:
   std::uint32_t root(std::uint32_t element) noexcept;
   void unite(std::uint32_t x, std::uint32_t y) noexcept;
   // Elements: crossings, vertices of crossed blocks, and blocks inside as a whole.
   std::uint32_t vertex_element(const Side& side, const CrossedBlock& crossed,
                                std::uint32_t vertex) const noexcept;
-  std::uint32_t block_element(const Side& side, std::uint32_t block) const noexcept;
+  std::uint32_t first_middle(const Side& side, const CrossedBlock& crossed) const noexcept;
 
   void begin() noexcept;
   void join_curves() noexcept;
   void join_holes(Side& side) noexcept;
   void join_edges() noexcept;
+  std::uint32_t join_edge(const Side& side, const CrossedBlock& crossed, std::uint32_t edge,
+                          std::uint32_t first) noexcept;
   void join_vertices(Side& side) noexcept;
   void join_blocks(Side& side) noexcept;
-  std::uint32_t part_of(std::uint32_t element) noexcept;
   void sum_parts() noexcept;
   void join_cavities() noexcept;
 

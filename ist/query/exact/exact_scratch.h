@@ -197,13 +197,31 @@ struct ExactSums {
   exact::Point torque = {};  ///< ∫ x × n dA, likewise
 
   double volume() const noexcept { return six_volumes.value() / 6; }
+
+  void add(const ExactSums& other) noexcept {
+    six_volumes.add(other.six_volumes.value());
+    moment = moment + other.moment;
+    force = force + other.force;
+    torque = torque + other.torque;
+  }
 };
 
-/// A connected part of an overlap.
+/// A connected part of an overlap, or an octant of one.
 struct ExactPart {
   ExactSums sums;          ///< from the whole's origin
   std::uint64_t id = 0;    ///< lowest pair of triangles on its outline, from 1; 0: it has none
   std::uint32_t kept = 0;  ///< the part that it was added to, or itself
+  std::uint32_t slot = 0;  ///< of its octants
+  exact::Point centre = {};  ///< centroid from the whole's origin, once there is need of it
+};
+
+/// What is summed of an octant of a part, from the part's centroid and in the axes of the octants.
+struct OctantSums {
+  double six_volumes = 0;
+  exact::Point moment = {};   ///< 24 ∫ x
+  exact::Point area[2] = {};  ///< ∫ n dA over A's and over B's surface
+  exact::Point torque = {};   ///< ½ ∫ x × n dA over B's surface less that over A's
+  exact::Point centre = {};   ///< of the first: the part's centroid from the whole's origin, A's axes
 };
 
 /// An edge where it is pierced.
@@ -243,7 +261,9 @@ struct ExactScratch {
         parent(hooked_array<std::uint32_t>(hooks, elements())),
         part(hooked_array<std::uint32_t>(hooks, elements())),
         middles(hooked_array<std::uint32_t>(hooks, 2 * 3 * kWidth * std::size_t{most_crossed})),
-        parts(hooked_array<ExactPart>(hooks, kMostParts)) {
+        parts(hooked_array<ExactPart>(hooks, kMostParts)),
+        octants(hooked_array<ExactPart>(hooks, kMostParts)),
+        octant_sums(hooked_array<OctantSums>(hooks, 8 * kMostSplit)) {
     triangles_a->forget();
     for (BlockMarks* marks : {&a, &b}) {
       for (HookedArray<std::uint64_t>* bits :
@@ -258,6 +278,7 @@ struct ExactScratch {
   static constexpr std::uint32_t kMostWaiting = 256 * 2 * kMaxLevels;
 
   static constexpr std::uint32_t kMostParts = 1024;
+  static constexpr std::uint32_t kMostSplit = 64;  ///< parts that are divided into octants
 
   /// What is placed is of another pose: all but A's triangles in A's own frame.
   void forget(std::uint64_t mesh_a) noexcept {
@@ -293,7 +314,8 @@ struct ExactScratch {
   HookedArray<CurveExtent> curves;
   HookedArray<std::uint32_t> parent, part;  ///< of an element
   HookedArray<std::uint32_t> middles;       ///< of an edge of a crossed block, A's first
-  HookedArray<ExactPart> parts;
+  HookedArray<ExactPart> parts, octants;
+  HookedArray<OctantSums> octant_sums;
   BlockMarks a, b;
 };
 

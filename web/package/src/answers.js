@@ -72,10 +72,12 @@ export const newPatch = () => ({
   volume: 0,
   force: newVector(),
   torque: newVector(),
+  point: newVector(),
+  twist: 0,
 });
 
 /** Bytes of an ist_contact_patch_t. */
-export const kPatchBytes = 128;
+export const kPatchBytes = 160;
 
 export function readPatch(place, patch) {
   const numbers = f64(), integers = u32(), at = place / 8;
@@ -88,6 +90,8 @@ export function readPatch(place, patch) {
   patch.volume = numbers[at + 9];
   copy3(numbers, at + 10, patch.force);
   copy3(numbers, at + 13, patch.torque);
+  copy3(numbers, at + 16, patch.point);
+  patch.twist = numbers[at + 19];
 }
 
 export function writePatch(place, patch) {
@@ -101,6 +105,8 @@ export function writePatch(place, patch) {
   numbers[at + 9] = patch.volume;
   write3(patch.force, numbers, at + 10);
   write3(patch.torque, numbers, at + 13);
+  write3(patch.point, numbers, at + 16);
+  numbers[at + 19] = patch.twist;
 }
 
 export const newPatches = () => ({whole: newPenetration(), count: 0, patches: []});

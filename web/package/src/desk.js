@@ -9,17 +9,17 @@ export const kPenetration = 160;
 export const kSeparation = 272;
 export const kPatches = 384;
 export const kMostPatches = 64;
-export const kInfo = 8576;
-export const kBounds = 8656;
-export const kMass = 8744;
-export const kCounts = 8880;
-export const kMotion = 8888;
+export const kInfo = 10624;
+export const kBounds = 10704;
+export const kMass = 10792;
+export const kCounts = 10928;
+export const kMotion = 10936;
 export const kMotionBytes = 72;
-export const kImpactSettings = 9032;
-export const kImpact = 9056;
-export const kFit = 9176;
-export const kWrenches = 9224;
-export const kNumbers = 9328;
+export const kImpactSettings = 11080;
+export const kImpact = 11104;
+export const kFit = 11224;
+export const kWrenches = 11272;
+export const kNumbers = 11376;
 
 let start = 0;
 /** Where the desk stands in memory. */

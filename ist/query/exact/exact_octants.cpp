@@ -1,0 +1,243 @@
+#include "query/exact/exact_octants.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "query/base/smooth_step.h"
+
+namespace ist {
+namespace {
+
+using exact::Point;
+
+double length(const Point& v) { return std::sqrt(dot(v, v)); }
+
+/// From 1 at `low` to 0 at twice that, or the other way round.
+double falls(double x, double low) { return 1 - smooth_step(x / low - 1); }
+double rises(double x, double low) { return smooth_step(x / low - 1); }
+
+/// Moves a share of what one octant has to another.
+void move(OctantSums& from, double share, OctantSums& to) {
+  const auto give = [&](auto& out, auto& in) {
+    const auto part = share * out;
+    in = in + part;
+    out = share == 1 ? part - part : out - part;
+  };
+  give(from.six_volumes, to.six_volumes);
+  give(from.moment, to.moment);
+  give(from.torque, to.torque);
+  for (int s = 0; s < 2; ++s) give(from.area[s], to.area[s]);
+}
+
+Point unlike(const OctantSums& sums) { return sums.area[0] + sums.area[1]; }
+double both_areas(const OctantSums& sums) { return length(sums.area[0]) + length(sums.area[1]); }
+
+/// How far two octants are one: where one is a sliver of the other, where they are near to each
+/// other, or where their two surfaces agree together only, as those above and below the middle of a
+/// thin contact do.
+double oneness(const OctantSums& x, const OctantSums& y, double near) {
+  const double less = std::min(x.six_volumes, y.six_volumes),
+               more = std::max(x.six_volumes, y.six_volumes);
+  const double areas = both_areas(x) + both_areas(y);
+  if (!(less > 0) || !(areas > 0)) return 1;
+  const Point of_x = unlike(x), of_y = unlike(y);
+  const double cured = (length(of_x) + length(of_y)) - length(of_x + of_y);
+  const double apart = length((1 / (4 * x.six_volumes)) * x.moment -
+                              (1 / (4 * y.six_volumes)) * y.moment);
+  return std::max({falls(less / more, 1.0 / 64), falls(apart, near), rises(cured / areas, 0.2)});
+}
+
+/// A contact that is not thin is one. `small`: how far it is one for lack of room.
+void join_octants(OctantSums (&octants)[8], double near, double small) {
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < 8; ++i)
+      if ((i >> k & 1) == 0) {
+        OctantSums &x = octants[i], &y = octants[i | 1 << k];
+        move(y, oneness(x, y, near), x);
+      }
+  double different = 0, areas = 0;
+  for (const OctantSums& sums : octants) {
+    different += length(unlike(sums));
+    areas += both_areas(sums);
+  }
+  const double share = areas > 0 ? std::max(small, rises(different / areas, 0.2)) : 1;
+  for (int i = 1; i < 8; ++i) move(octants[i], share, octants[0]);
+}
+
+}  // namespace
+
+ExactOctants::Corner ExactOctants::corner(const OctantSums* octants,
+                                          const Point& x) const noexcept {
+  const Point from = x - octants->centre;
+  Corner out = {{dot(axis_[0], from), dot(axis_[1], from), dot(axis_[2], from)}, 0};
+  for (int k = 0; k < 3; ++k) out.octant |= (out.at[k] >= 0 ? 1 : 0) << k;
+  return out;
+}
+
+/// Where a side goes through a plane, on the side of `from`.
+ExactOctants::Corner ExactOctants::between(const Corner& from, const Corner& to,
+                                           int plane) noexcept {
+  const double t = from.at[plane] / (from.at[plane] - to.at[plane]);
+  Corner out = {{0, 0, 0}, from.octant};
+  for (int k = 0; k < 3; ++k) {
+    if (k != plane) out.at[k] = from.at[k] + t * (to.at[k] - from.at[k]);
+    // What has both ends on one side stays there, whatever rounding does.
+    const int bit = 1 << k;
+    if (k > plane && ((from.octant ^ to.octant) & bit) != 0)
+      out.octant = (out.octant & ~bit) | (out.at[k] >= 0 ? bit : 0);
+  }
+  return out;
+}
+
+void ExactOctants::add_triangle(OctantSums* octants, bool of_b, double times, const Corner& p,
+                                const Corner& q, const Corner& r) noexcept {
+  const int unlike = (p.octant ^ q.octant) | (p.octant ^ r.octant);
+  if (unlike == 0) {
+    OctantSums& sums = octants[p.octant];
+    const Point first = p.point(), second = q.point(), third = r.point();
+    const Point area = (0.5 * times) * cross(second - first, third - first);
+    const Point three = first + (second + third);
+    const double six = 2 * dot(first, area);
+    sums.six_volumes += six;
+    sums.moment = sums.moment + six * three;
+    sums.area[of_b] = sums.area[of_b] + area;
+    sums.torque = sums.torque + ((of_b ? 0.5 : -0.5) / 3) * cross(three, area);
+    return;
+  }
+  const int plane = std::countr_zero(static_cast<unsigned>(unlike)), bit = 1 << plane;
+  // One corner is alone on its side.
+  const bool first = ((q.octant ^ r.octant) & bit) == 0, last = ((p.octant ^ q.octant) & bit) == 0;
+  const Corner &lone = first ? p : last ? r : q, &next = first ? q : last ? p : r,
+               &other = first ? r : last ? q : p;
+  Corner to_next = between(lone, next, plane), to_other = between(lone, other, plane);
+  add_triangle(octants, of_b, times, lone, to_next, to_other);
+  to_next.octant ^= bit;
+  to_other.octant ^= bit;
+  add_triangle(octants, of_b, times, to_next, next, other);
+  add_triangle(octants, of_b, times, to_next, other, to_other);
+}
+
+OctantSums* ExactOctants::octants_of(std::uint32_t element) noexcept {
+  const ExactPart& part = scratch_.parts[part_of(element)];
+  const std::uint32_t slot = scratch_.parts[part.kept].slot;
+  return slot == kNoPart ? nullptr : &scratch_.octant_sums[8 * slot];
+}
+
+/// The pieces that parts are summed of: see ExactTerms.
+void ExactOctants::sum_octants() noexcept {
+  const Crossings& crossings = scratch_.crossings;
+  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
+    OctantSums* const octants = octants_of(i);
+    if (octants == nullptr) continue;
+    const Corner ends[2] = {corner(octants, crossings.place_of(i, 0, out_.origin)),
+                            corner(octants, crossings.place_of(i, 1, out_.origin))};
+    Corner apex[2];
+    for (int s = 0; s < 2; ++s) {
+      apex[s] = corner(octants, {crossings.apex(s, 0)[i], crossings.apex(s, 1)[i],
+                                 crossings.apex(s, 2)[i]});
+      add_triangle(octants, s != 0, 1, apex[s], ends[s], ends[1 - s]);
+    }
+    for (int e = 0; e < 2; ++e) {
+      const double times = crossings.opposite(e)[i];
+      if (times == 0) continue;
+      const bool of_b = crossings.end_of(i, e).of_b;
+      const Point near = {crossings.end(e, Crossings::kFrom)[i],
+                          crossings.end(e, Crossings::kFrom + 1)[i],
+                          crossings.end(e, Crossings::kFrom + 2)[i]};
+      add_triangle(octants, of_b, times, apex[of_b], ends[e], corner(octants, near - out_.origin));
+    }
+  }
+  for (Side& own : sides_) {
+    for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
+      const CrossedBlock& crossed = own.marks.blocks[own.marks.place[b]];
+      std::int8_t whole[kWidth];
+      count_triangles(own.mesh.blocks[b], crossed, whole);
+      for (std::uint32_t t = 0; t < kWidth; ++t) {
+        const std::uint32_t element =
+            whole[t] == 0 ? kNoPart : triangle_element(own, crossed, t);
+        if (element == kNoPart) continue;
+        OctantSums* const octants = octants_of(element);
+        if (octants == nullptr) continue;
+        const auto at = [&](int k) { return corner(octants, crossed.at(crossed.fan[k][t])); };
+        add_triangle(octants, own.is_b, whole[t], at(0), at(1), at(2));
+      }
+    });
+    for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {
+      OctantSums* const octants = octants_of(block_element(own, b));
+      if (octants == nullptr) return;
+      const MeshBlock& mesh = own.mesh.blocks[b];
+      Corner vertex[kWidth];
+      for (std::uint32_t v = 0; v < mesh.vertices; ++v)
+        vertex[v] = corner(octants, place(own, mesh.vertex[v]) - out_.origin);
+      for (std::uint32_t t = 0; t < mesh.triangles; ++t)
+        add_triangle(octants, own.is_b, 1, vertex[mesh.corner[0][t]], vertex[mesh.corner[1][t]],
+                     vertex[mesh.corner[2][t]]);
+    });
+  }
+}
+
+std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, double near,
+                                  std::size_t room) noexcept {
+  for (int k = 0; k < 3; ++k)
+    axis_[k] = by_b ? (1 / a_from_b_.scale) *
+                          Point{a_from_b_.m[k], a_from_b_.m[3 + k], a_from_b_.m[6 + k]}
+                    : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
+  std::uint32_t slots = 0, count = 0;
+  const double least = out_.sums.volume() / static_cast<double>(room);
+  for (std::uint32_t p = 0; p < parts.size(); ++p) {
+    ExactPart& part = scratch_.parts[p];
+    part.slot = kNoPart;
+    if (part.kept != p || part.id == 0 || !(part.sums.volume() > least) ||
+        slots == ExactScratch::kMostSplit)
+      continue;
+    part.slot = slots++;
+    OctantSums* const octants = &scratch_.octant_sums[8 * part.slot];
+    std::fill_n(octants, 8, OctantSums{});
+    octants->centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
+  }
+  sum_octants();
+  const auto back = [&](const Point& v) {
+    return v.x * axis_[0] + (v.y * axis_[1] + v.z * axis_[2]);
+  };
+  for (std::uint32_t p = 0; p < parts.size(); ++p) {
+    const ExactPart& part = parts[p];
+    if (part.kept != p) continue;
+    ExactPart* const out = scratch_.octants.get() + count;
+    const auto write = [&](ExactPart octant, std::uint64_t number) {
+      octant.id = 8 * part.id + number;
+      octant.kept = count;
+      scratch_.octants[count++] = octant;
+    };
+    if (part.slot == kNoPart) {
+      write(part, 0);
+      continue;
+    }
+    OctantSums octants[8];
+    std::copy_n(&scratch_.octant_sums[8 * part.slot], 8, octants);
+    const Point centre = octants[0].centre;
+    join_octants(octants, near, falls(part.sums.volume(), least));
+    ExactSums missing = part.sums;  // but for rounding nothing
+    std::uint32_t largest = 0;
+    for (int i = 0; i < 8; ++i) {
+      const OctantSums& octant = octants[i];
+      if (!(octant.six_volumes > 1e-9 * (6 * part.sums.volume()))) continue;
+      ExactPart found = {};
+      found.sums.six_volumes.add(octant.six_volumes);
+      found.sums.moment = back(octant.moment) + (4 * octant.six_volumes) * centre;
+      found.sums.force = back(0.5 * (octant.area[1] - octant.area[0]));
+      found.sums.torque = back(octant.torque) + cross(centre, found.sums.force);
+      missing.six_volumes.add(-octant.six_volumes);
+      missing.moment = missing.moment - found.sums.moment;
+      missing.force = missing.force - found.sums.force;
+      missing.torque = missing.torque - found.sums.torque;
+      write(found, static_cast<std::uint64_t>(i));
+      const auto last = static_cast<std::uint32_t>(scratch_.octants.get() + count - out) - 1;
+      if (out[last].sums.volume() > out[largest].sums.volume()) largest = last;
+    }
+    out[largest].sums.add(missing);
+  }
+  return count;
+}
+
+}  // namespace ist

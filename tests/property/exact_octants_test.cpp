@@ -1,0 +1,246 @@
+#include <gtest/gtest.h>
+#include <ist/query.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <random>
+#include <set>
+#include <vector>
+
+#include "samples/samples.h"
+#include "support/exact_pair.h"
+#include "support/test_meshes.h"
+
+// Contact patches by Measure::exact: connected parts of an overlap, divided into octants.
+
+namespace ist {
+namespace {
+
+using Point = Eigen::Vector3d;
+using testing::box_mesh;
+using testing::surface;
+
+constexpr double kPi = std::numbers::pi;
+
+/// A pipe about z, from −h to h.
+TriangleMesh pipe(double inner, double outer, double h, std::uint32_t around) {
+  TriangleMesh mesh;
+  const double profile[4][2] = {{inner, -h}, {outer, -h}, {outer, h}, {inner, h}};
+  for (const auto& [r, z] : profile)
+    for (std::uint32_t i = 0; i < around; ++i) {
+      const double turn = 2 * kPi * i / around;
+      mesh.vertices.emplace_back(r * std::cos(turn), r * std::sin(turn), z);
+    }
+  for (std::uint32_t row = 0; row < 4; ++row)
+    for (std::uint32_t i = 0; i < around; ++i) {
+      const std::uint32_t j = (i + 1) % around, a = row * around, b = (row + 1) % 4 * around;
+      mesh.triangles.push_back({a + i, a + j, b + j});
+      mesh.triangles.push_back({a + i, b + j, b + i});
+    }
+  return mesh;
+}
+
+Pose turned(const Point& axis, double angle, const Point& t) {
+  const Eigen::Quaterniond q(Eigen::AngleAxisd(angle, axis.normalized()));
+  return {{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}};
+}
+
+class ExactOctants : public ::testing::Test {
+ protected:
+  const std::vector<ContactPatch>& ask(const PlacedTree& a, const PlacedTree& b,
+                                       std::size_t room = 64) {
+    patches_.assign(room, {});
+    const ContactSettings settings{.measure = Measure::exact};
+    const ContactPatches found = contact_patches(a, b, settings, workspace_, patches_);
+    whole_ = found.penetration;
+    patches_.resize(found.count);
+    expect_whole(a, b);
+    return patches_;
+  }
+
+  const Penetration& whole() const { return whole_; }
+
+ private:
+  /// Patches sum to the whole, each is its own wrench, and no two have one name.
+  void expect_whole(const PlacedTree& a, const PlacedTree& b) {
+    double volume = 0;
+    Point force = Point::Zero(), torque = Point::Zero(), moment = Point::Zero();
+    std::set<std::uint64_t> names;
+    const Point origin(b.pose.t);
+    const double size = testing::size_of(a) + testing::size_of(b), area = size * size;
+    for (const ContactPatch& patch : patches_) {
+      EXPECT_GT(patch.volume, 0);
+      names.insert(patch.id);
+      volume += patch.volume;
+      force += patch.force;
+      torque += patch.torque;
+      moment += patch.volume * patch.centroid;
+      const Point again = (patch.point - origin).cross(patch.force) + patch.twist * patch.normal;
+      if (patch.area > 1e-6 * std::cbrt(patch.volume * patch.volume)) {
+        EXPECT_LE((again - patch.torque).norm(),
+                  1e-13 * (area + (patch.point - origin).norm() * patch.area));
+        EXPECT_LE(std::abs((patch.point - patch.centroid).dot(patch.normal)),
+                  1e-13 * (size + (patch.point - patch.centroid).norm()));
+      }
+    }
+    EXPECT_EQ(names.size(), patches_.size());
+    EXPECT_NEAR(volume, whole_.volume, 1e-15 * area * size);
+    EXPECT_LE((force + whole_.translation_gradient).norm(), 1e-14 * area);
+    EXPECT_LE((torque + whole_.rotation_gradient).norm(), 1e-14 * area * size);
+    EXPECT_LE((moment - whole_.volume * whole_.centroid).norm(), 1e-14 * area * area);
+  }
+
+  Workspace workspace_;
+  std::vector<ContactPatch> patches_;
+  Penetration whole_;
+};
+
+TEST_F(ExactOctants, SumToTheWholeInAnyPose) {
+  const Asset assets[] = {surface(testing::cube_mesh()),
+                          surface(testing::torus_mesh(1, 0.4, 48, 24)),
+                          surface(testing::icosphere_mesh(3)), surface(pipe(0.3, 0.6, 1, 24))};
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> any(-1, 1);
+  std::size_t divided = 0;
+  for (int i = 0; i < 400; ++i) {
+    const PlacedTree a{assets[i % 4].view(), {}, 1};
+    const Point axis(any(random), any(random), any(random)),
+        t(any(random), any(random), any(random));
+    const PlacedTree b{assets[i / 4 % 4].view(), turned(axis, 3 * any(random), 1.6 * t),
+                       std::exp(any(random))};
+    for (const std::size_t room : {1, 3, 64}) divided += ask(a, b, room).size() > 1 ? 1 : 0;
+  }
+  EXPECT_GT(divided, 80u);
+}
+
+TEST_F(ExactOctants, ALevelFaceHasFourPoints) {
+  const Asset table = surface(box_mesh(Point(-3, -3, -1), Point(3, 3, 0)));
+  const Asset box = surface(testing::cube_mesh());
+  for (const double turn : {0.0, 0.3}) {
+    const Pose pose = turned(Point::UnitZ(), turn, Point(0.2, 0.1, 0.499));
+    ask({table.view(), {}, 1}, {box.view(), pose, 1});
+    const std::vector<ContactPatch> patches =
+        ask({table.view(), {}, 1}, {box.view(), pose, 1}, 8);
+    ASSERT_EQ(patches.size(), 4u);
+    for (const ContactPatch& patch : patches) {
+      EXPECT_NEAR(patch.volume, 0.00025, 1e-15);
+      EXPECT_NEAR(patch.depth, 0.001, 2e-6);
+      EXPECT_GT(patch.normal.z(), 0.9999);
+      EXPECT_NEAR((patch.centroid - whole().centroid).norm(), std::sqrt(0.125), 1e-6);
+    }
+  }
+}
+
+/// Pressure that grows with the depth turns a tilted box back by ∫ x · depth dA.
+TEST_F(ExactOctants, ALevelFaceResistsTilt) {
+  const Asset table = surface(box_mesh(Point(-3, -3, -1), Point(3, 3, 0)));
+  const Asset box = surface(box_mesh(Point(-0.5, -0.3, 0), Point(0.5, 0.3, 1)));
+  const Point middle(0.1, 0.2, -0.004);
+  for (const Point& axis : {Point(1, 0, 0), Point(0, 1, 0), Point(1, 1, 0), Point(0.2, -1, 0)}) {
+    Point of_points[2], of_centroids[2], of_whole[2];
+    Point held = Point::Zero();  // by springs that stay where they are
+    for (int k = 0; k < 2; ++k) {
+      const double angle = k == 0 ? -1e-3 : 1e-3;
+      const std::vector<ContactPatch> patches =
+          ask({table.view(), {}, 1}, {box.view(), turned(axis, angle, middle), 1}, 8);
+      EXPECT_GE(patches.size(), 4u);
+      of_points[k] = of_centroids[k] = Point::Zero();
+      for (const ContactPatch& patch : patches) {
+        const Point push = patch.volume * patch.normal;
+        of_points[k] += (patch.point - middle).cross(push);
+        of_centroids[k] += (patch.centroid - middle).cross(push);
+        if (k == 1) continue;
+        const Point turn = axis.normalized().cross(patch.point - middle);
+        held += (patch.point - middle).cross(patch.area * turn.z() * Point::UnitZ());
+      }
+      of_whole[k] = (whole().centroid - middle).cross(whole().volume * Point::UnitZ());
+    }
+    const auto stiffness = [&](const Point(&moment)[2]) {
+      return (moment[0] - moment[1]).dot(axis.normalized()) / 2e-3;
+    };
+    const double whole = stiffness(of_whole);
+    EXPECT_GT(whole, 0.01);
+    EXPECT_NEAR(stiffness(of_centroids), whole, 0.02 * whole);
+    EXPECT_GT(stiffness(of_points), 0.7 * whole);
+    EXPECT_LT(stiffness(of_points), 1.05 * whole);
+    EXPECT_GT(held.dot(axis.normalized()), 0.6 * whole);
+  }
+}
+
+TEST_F(ExactOctants, ARingHoldsItsShaftAllAround) {
+  const Asset shaft = surface(pipe(0.5, 1.002, 3, 60));
+  const Asset ring = surface(pipe(1, 1.5, 0.4, 48));
+  const std::vector<ContactPatch>& patches =
+      ask({shaft.view(), {}, 1}, {ring.view(), turned({0, 0, 1}, 0.1, {0, 0, 0.3}), 1});
+  EXPECT_LE(whole().translation_gradient.norm(), 1e-12);
+  ASSERT_GE(patches.size(), 8u);
+  double highest = 0;
+  for (const double turn : {0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0}) {
+    const Point way(std::cos(turn), std::sin(turn), 0);
+    double with = 0, against = 0;
+    for (const ContactPatch& patch : patches) {
+      with += std::max(0.0, patch.force.dot(way));
+      against += std::max(0.0, -patch.force.dot(way));
+      highest = std::max(highest, std::abs(patch.normal.z()));
+    }
+    EXPECT_GT(with, 1);  // 0.8 · 2 where all of the ring touches: its area over π
+    EXPECT_NEAR(with, against, 1e-12);
+  }
+  EXPECT_LT(highest, 0.05);
+}
+
+TEST_F(ExactOctants, WhatIsDeepIsOne) {
+  const Asset block = surface(box_mesh(Point(-3, -3, -3), Point(3, 3, 0)));
+  const Asset ball = surface(testing::icosphere_mesh(3));
+  EXPECT_EQ(ask({block.view(), {}, 1}, {ball.view(), turned({0, 0, 1}, 0, {0, 0, -0.5}), 1}).size(),
+            1u);
+  EXPECT_EQ(ask({block.view(), {}, 1}, {ball.view(), turned({0, 0, 1}, 0, {0, 0, -1.5}), 1}).size(),
+            1u);
+}
+
+/// The largest change of a patch over a step along a path, patches told by their octants.
+TEST_F(ExactOctants, AreContinuous) {
+  struct Case {
+    Asset a, b;
+    Point axis, from, by;
+    double angle;
+  };
+  Case cases[] = {
+      {surface(box_mesh(Point(-3, -3, -1), Point(3, 3, 0))), surface(testing::cube_mesh()),
+       Point(1, 2, 30), Point(0.3, 0, 0.49), Point(0.5, 0.3, 0.008), 0.4},
+      {surface(box_mesh(Point(-3, -3, -1), Point(3, 3, 0))), surface(testing::cube_mesh()),
+       Point(1, 1, 0), Point(0.3, 0, 0.47), Point(0.05, 0.03, 0.2), 0.6},
+      {surface(pipe(0.5, 1.002, 3, 60)), surface(pipe(1, 1.5, 0.4, 48)), Point(0.01, 0.02, 1),
+       Point(0, 0, 0.3), Point(0.001, 0.0005, 0.2), 0.5},
+      {surface(box_mesh(Point(-3, -3, -1), Point(3, 3, 0))), surface(testing::icosphere_mesh(3)),
+       Point(1, 2, 3), Point(0, 0, 0.97), Point(0.1, 0.2, -0.8), 1.5}};
+  for (const Case& c : cases) {
+    double jumps[2] = {0, 0};
+    for (int fine = 0; fine < 2; ++fine) {
+      const int steps = fine == 0 ? 400 : 3200;
+      std::map<std::uint64_t, ContactPatch> before;
+      for (int i = 0; i <= steps; ++i) {
+        const double t = static_cast<double>(i) / steps;
+        std::map<std::uint64_t, ContactPatch> now;
+        for (const ContactPatch& patch :
+             ask({c.a.view(), {}, 1},
+                 {c.b.view(), turned(c.axis, c.angle * t, c.from + t * c.by), 1}))
+          now[patch.id % 8] = patch;
+        const double size = whole().volume;
+        if (i > 0)
+          for (std::uint64_t octant = 0; octant < 8; ++octant) {
+            const ContactPatch &x = before[octant], &y = now[octant];
+            jumps[fine] = std::max({jumps[fine], std::abs(x.volume - y.volume) / size,
+                                    (x.force - y.force).norm()});
+          }
+        before = now;
+      }
+    }
+    EXPECT_LT(jumps[1], jumps[0] / 4) << jumps[0];
+  }
+}
+
+}  // namespace
+}  // namespace ist
