@@ -1,0 +1,24 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include <ist/query.h>
+
+#include <ist/asset_layout.h>
+
+namespace ist {
+
+/// The true volume lies between nothing and the smaller solid's.
+inline void bound_by_solids(const PlacedTree& a, const PlacedTree& b,
+                            Penetration& answer) noexcept {
+  const auto most = [](const PlacedTree& placed) {
+    const AssetHeader& asset = placed.tree.header();
+    return std::ldexp(asset.volume + asset.volume_error, 3 * asset.exponent) *
+           (placed.scale * placed.scale * placed.scale);
+  };
+  answer.volume_min = 0;
+  answer.volume_max = std::min(most(a), most(b)) * (1 + 1e-12);
+}
+
+}  // namespace ist
