@@ -146,11 +146,11 @@ struct ChosenPart {
     return inner() ? header.inner_tree : matched_tree(header, detail);
   }
 
-  static Penetration sum(void* context, const DetailPair& pair,
+  static Penetration sum(void* context, const DetailPair& pair, FieldUse use,
                          const DescentLimits& limits) noexcept {
     ChosenPart& self = *static_cast<ChosenPart*>(context);
     self.levels.emplace(self.a, self.tree_of(self.a, pair.a), self.b, self.tree_of(self.b, pair.b),
-                        self.pose, self.inner() ? FieldUse::never : self.settings.field,
+                        self.pose, self.inner() ? FieldUse::never : use,
                         *self.workspace.impl());
     return self.levels->sum(limits);
   }
@@ -182,7 +182,7 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
   result.penetration =
       blends ? blend_details(a, b, *pose, settings, workspace,
                              {&chosen, ChosenPart::sum, ChosenPart::sum_exact})
-             : ChosenPart::sum(&chosen, DetailPair(), limits_of(settings));
+             : ChosenPart::sum(&chosen, DetailPair(), settings.field, limits_of(settings));
   if (std::isnan(result.penetration.volume)) return result;
   if (!chosen.exact && !chosen.levels) return result;
   result.count = chosen.exact ? chosen.exact->count : chosen.levels->write(patches);

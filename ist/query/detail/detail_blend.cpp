@@ -27,7 +27,12 @@ class DetailQueries {
         pose_(pose),
         settings_(settings),
         workspace_(workspace),
-        same_asset_(are_one_asset(a_, b_)) {}
+        same_asset_(are_one_asset(a_, b_)),
+        has_exact_(by_error(settings) && settings.pair_budget == 0 && a.tree.has_mesh() &&
+                   b.tree.has_mesh()) {}
+
+  /// The exact measure may answer: nothing limits sphere pairs, which it does not obey.
+  bool has_exact() const noexcept { return has_exact_; }
 
   /// The whole sum of a pair of levels, rounded as it may be: where lenses graze they are few, and
   /// the finest level is taken anyway. By lenses alone if it only chooses levels by their cost.
@@ -82,9 +87,21 @@ class DetailQueries {
   std::uint32_t pairs() const noexcept { return pairs_; }
 
  private:
-  PairMethod method_of(const DetailPair& pair) const noexcept {
+  PairMethod method_of(const DetailPair& pair, FieldUse use) const noexcept {
     return pair_method(placed_a_, matched_tree(a_, pair.a), placed_b_, matched_tree(b_, pair.b),
-                       pose_, settings_.field);
+                       pose_, use);
+  }
+
+  /// The exact measure stands in where surfaces would help out lenses.
+  FieldUse use_of(const DetailPair& pair) const noexcept {
+    return has_exact_ && settings_.field == FieldUse::automatic &&
+                   method_of(pair, FieldUse::automatic).lenses
+               ? FieldUse::never
+               : settings_.field;
+  }
+
+  PairMethod method_of(const DetailPair& pair) const noexcept {
+    return method_of(pair, use_of(pair));
   }
 
   /// Nothing but the roots is looked at once visits are spent.
@@ -109,7 +126,7 @@ class DetailQueries {
                       const BlendSums* by = nullptr) noexcept {
     DescentLimits limits = limits_left();
     limits.keep_rounding = keep_rounding;
-    return counted(by != nullptr ? by->level(by->context, pair, limits)
+    return counted(by != nullptr ? by->level(by->context, pair, use_of(pair), limits)
                                  : overlap(pair).by(method_of(pair), limits));
   }
 
@@ -121,16 +138,12 @@ class DetailQueries {
   const PenetrationSettings& settings_;
   Workspace& workspace_;
   const bool same_asset_;
+  const bool has_exact_;
   std::uint32_t visits_ = 0, pairs_ = 0;
 };
 
 // A coarse estimate whose bounds are further apart than this part of it is too rough for an answer.
 constexpr double kRough = 5e-4;
-
-/// Both solids keep a mesh, and nothing limits sphere pairs, which the exact measure does not obey.
-bool may_be_exact(const PlacedTree& a, const PlacedTree& b, const PenetrationSettings& settings) {
-  return by_error(settings) && settings.pair_budget == 0 && a.tree.has_mesh() && b.tree.has_mesh();
-}
 
 /// Adds a part of a blend.
 void add(double weight, const Penetration& part, Penetration& sum) {
@@ -164,7 +177,7 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
     sure = chain.quick_weight(look.volume, settings.pair_budget);
     if (sure.weight == 1) return queries.ask(chain[0], false, most);
   }
-  const bool has_exact = may_be_exact(a, b, settings);
+  const bool has_exact = queries.has_exact();
   std::optional<WantedError> wanted;
   if (with_error) wanted.emplace(a, b, pose, settings, chain, has_exact);
   if (has_exact && !wanted->by_spheres()) return queries.exact(sums, true);

@@ -13,7 +13,8 @@ struct BlendSums {
   void* context;
   /// Sums the pair of levels of the largest weight, once, in place of PairOverlap::by(): contact
   /// patches sort it into bins. Null: it is summed as the others.
-  Penetration (*level)(void* context, const DetailPair& pair, const DescentLimits& limits) noexcept;
+  Penetration (*level)(void* context, const DetailPair& pair, FieldUse use,
+                       const DescentLimits& limits) noexcept;
   /// The exact measure, if both assets keep a mesh. `most`: its weight is the largest.
   Penetration (*exact)(void* context, std::uint32_t max_visits, bool most) noexcept;
 };
