@@ -34,14 +34,6 @@ double spheres_for(double error_of_one, double error) {
   return times * eighth_root(times);
 }
 
-/// Volume of solid for which a sphere of a level stands, the asset's unit frame. Thin solids need
-/// more spheres: as many times as what inner spheres of that size leave out makes a radius larger.
-double solid_volume(const AssetHeader& asset, const TreeHeader& tree) {
-  const double left_out = 1 / std::max(asset.coverage, 0.01) - 1;
-  const double wider = 1 + left_out * tree.mean_radius / asset.matched_tree.mean_radius;
-  return tree.volume_sum / tree.sphere_count * (wider * wider * wider);
-}
-
 /// How many such spheres an overlap needs. By the errors that the bake measured, if it did: their
 /// inverse is about linear in the number.
 double spheres_needed(const AssetHeader& asset, double error) {
@@ -74,6 +66,12 @@ double crossings(const AssetHeader& asset, double share) {
 }
 
 }  // namespace
+
+double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept {
+  const double left_out = 1 / std::max(asset.coverage, 0.01) - 1;
+  const double wider = 1 + left_out * tree.mean_radius / asset.matched_tree.mean_radius;
+  return tree.volume_sum / tree.sphere_count * (wider * wider * wider);
+}
 
 WantedError::WantedError(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
                          const PenetrationSettings& settings, const DetailChain& chain,

@@ -14,6 +14,10 @@ inline bool by_error(const PenetrationSettings& settings) noexcept {
   return settings.measure == Measure::matched && settings.relative_error > 0;
 }
 
+/// Volume of solid for which a sphere of a level stands, the asset's unit frame. Thin solids need
+/// more spheres: as many times as what inner spheres of that size leave out makes a radius larger.
+double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept;
+
 /// Which pairs of levels are predicted to err by no more than a query accepts, and are cheaper than
 /// the exact measure (docs/design.md 5).
 class WantedError {
