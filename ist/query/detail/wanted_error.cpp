@@ -21,7 +21,7 @@ constexpr double kTooRough = 0.7;
 
 // Surfaces cross in kCrossings (√T_A (V/V_A)^⅜ + √T_B (V/V_B)^⅜) triangles, T being all of them. One
 // costs as much as kPairsOfCrossing pairs of spheres; spheres must save kPairsSaved.
-constexpr double kCrossings = 4.5, kPairsOfCrossing = 28, kPairsSaved = 150;
+constexpr double kCrossings = 4.5, kPairsOfCrossing = 28, kPairsSaved = 250;
 // The overlap at which both are compared, in those from which on a level answers: the next coarser
 // one takes over at four.
 constexpr double kCompared = 2;
