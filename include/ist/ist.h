@@ -41,6 +41,9 @@ enum {
   /* A limit or the workspace's capacity stopped the query. volume_min and volume_max contain the
    * same value as those of a finished answer. */
   IST_BUDGET_EXHAUSTED = 1,
+  /* Finished, but the error is larger than relative_error: an asset has no mesh, or a pair budget or
+   * coincident copies left coarser spheres. */
+  IST_ERROR_EXCEEDED = 2,
   /* A pose with NaN or Inf, a quaternion of length 0, a scale < 0, sizes or distances more than
    * 1e60 : 1 apart, or a field's number or an enum out of range. */
   IST_INVALID_INPUT = -1,
@@ -364,7 +367,10 @@ typedef struct ist_penetration_settings {
   uint32_t pair_budget;  /* count of sphere pairs to spend; 0: no limit, as in all that follow */
   uint32_t max_visits;   /* count of node pairs opened */
   uint32_t reserved;     /* 0 */
-  double relative_error; /* stop once (volume_max − volume_min) ≤ this · volume_max */
+  /* Accepted relative error of the volume, as 0.005 for 0.5 %, of two trees with IST_MATCHED: the
+   * coarsest level of detail that is predicted to err by less, or IST_EXACT, blended smoothly. If an
+   * asset has no mesh, or under a pair budget, the answer may be IST_ERROR_EXCEEDED. */
+  double relative_error;
 } ist_penetration_settings_t;
 
 /* ContactSettings */

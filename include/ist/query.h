@@ -44,7 +44,21 @@ struct PenetrationSettings {
   /// opened largest bounds first, trees against a surface in the order of the tree.
   std::uint32_t max_visits = 0;
 
-  double relative_error = 0;  ///< stop once (volume_max − volume_min) ≤ this · volume_max
+  /// Accepted relative error of the volume, as 0.005 for 0.5 %; two trees in the matched measure
+  /// only. Random poses at such an overlap err by less in 19 of 20 cases, and by less than a third
+  /// of it in the median.
+  ///
+  /// The cheapest measure that is predicted to err by less answers: the coarsest level of detail
+  /// that is exact enough at this overlap, or Measure::exact where none is, or where few triangles
+  /// cross. Neighbours are blended: volume and force stay continuous, and gradients are those of
+  /// the blended sum. A level's error is predicted by the trials of the bake
+  /// (TreeView::predicted_errors), or by a fit if there were none. By spheres, flat faces that rest
+  /// on each other err by more than random poses.
+  ///
+  /// Needs the mesh in both assets (TreeView::has_mesh), and no pair budget. Otherwise the finest
+  /// level, or the finest within the budget, is the best there is. Where it is predicted to err by
+  /// more, the status is error_exceeded. Assets without spheres are answered by Measure::exact.
+  double relative_error = 0;
 };
 
 using ContactSettings = PenetrationSettings;
@@ -250,8 +264,9 @@ struct ContactPatch {
 
 struct ContactPatches {
   /// The whole contact, bit for bit the answer of penetration() under the same settings, except for
-  /// copies of one asset at nearly the same pose without a pair budget: here they are not evaluated
-  /// as unlike levels. Under a pair budget its counts may be larger.
+  /// copies of one asset at nearly the same pose without a pair budget or relative error: here they
+  /// are not evaluated as unlike levels. Under a pair budget or a relative error its counts may be
+  /// larger.
   Penetration penetration;
   std::size_t count = 0;  ///< patches written
 };
@@ -267,9 +282,10 @@ struct ContactPatches {
 /// solid (B's if equal or if A is too coarse), always at the same places. The estimate of a stopped
 /// query is divided too. Under a pair budget the patches are those of the level of detail with the
 /// largest weight in the blend. The difference between the blend and that level is spread over them
-/// by volume: their sum stays continuous, and ids change where another level takes over. The
-/// contact with a field is divided along the asset's tree. Costs 1.7 (one patch) to 2.4 (32) times
-/// a penetration.
+/// by volume: their sum stays continuous, and ids change where another level takes over. Under a
+/// relative error likewise; there the largest weight may be that of Measure::exact. The contact
+/// with a field is divided along the asset's tree. Costs 1.7 (one patch) to 2.4 (32) times a
+/// penetration.
 ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept;

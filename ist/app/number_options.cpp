@@ -16,12 +16,16 @@ CLI::Option* add_parsed(CLI::App* command, const std::string& name, const std::s
       help);
 }
 
-CLI::Option* add_real(CLI::App* command, const std::string& name, double& value, const Range& range,
-                      const std::string& help) {
+namespace {
+
+CLI::Option* add_number(CLI::App* command, const std::string& name, double& value,
+                        const Range& range, const std::string& words,
+                        std::optional<double> (*parse)(std::string_view),
+                        const std::string& help) {
   return add_parsed(
-             command, name, number_in_words(range),
-             [&value, range](const std::string& text) {
-               const std::optional<double> parsed = parse_number(text);
+             command, name, words,
+             [&value, range, parse](const std::string& text) {
+               const std::optional<double> parsed = parse(text);
                if (!parsed || !range.holds(*parsed)) return false;
                value = *parsed;
                return true;
@@ -29,6 +33,18 @@ CLI::Option* add_real(CLI::App* command, const std::string& name, double& value,
              help)
       ->type_name("NUMBER")
       ->default_str(fmt::format("{:g}", value));
+}
+
+}  // namespace
+
+CLI::Option* add_real(CLI::App* command, const std::string& name, double& value, const Range& range,
+                      const std::string& help) {
+  return add_number(command, name, value, range, number_in_words(range), parse_number, help);
+}
+
+CLI::Option* add_share(CLI::App* command, const std::string& name, double& value,
+                       const Range& range, const std::string& help) {
+  return add_number(command, name, value, range, share_in_words(range), parse_share, help);
 }
 
 CLI::Option* add_bytes(CLI::App* command, const std::string& name, std::uint64_t& value,

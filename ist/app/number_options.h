@@ -41,6 +41,10 @@ CLI::Option* add_whole(CLI::App* command, const std::string& name, T& value,
 CLI::Option* add_real(CLI::App* command, const std::string& name, double& value, const Range& range,
                       const std::string& help);
 
+/// A share in a range, 0.005 or 0.5%; `value` holds the default.
+CLI::Option* add_share(CLI::App* command, const std::string& name, double& value,
+                       const Range& range, const std::string& help);
+
 /// Bytes: 4096, 512M, 10G. `value` holds the default; 0 is said to be none.
 CLI::Option* add_bytes(CLI::App* command, const std::string& name, std::uint64_t& value,
                        const std::string& help);

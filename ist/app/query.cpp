@@ -124,6 +124,7 @@ void check_settings(const QueryOptions& options) {
   };
   if (settings.measure != Measure::matched) {
     if (settings.pair_budget != 0) no_effect("--pair-budget");
+    if (settings.relative_error != 0) no_effect("--error");
     if (exact ? settings.field != FieldUse::automatic : settings.field == FieldUse::always)
       no_effect("--field");
   }
@@ -136,8 +137,9 @@ void check_settings(const QueryOptions& options) {
     throw CLI::ValidationError(
         "--field", "never cannot be combined with " + options.a +
                        ", a field without spheres; omit the option, or pass an .ist file");
-  if (settings.pair_budget != 0)
-    throw CLI::ValidationError("--pair-budget", "has no effect where A is a field: " + options.a);
+  for (const auto& [option, given] : {std::pair("--pair-budget", settings.pair_budget != 0),
+                                      std::pair("--error", settings.relative_error != 0)})
+    if (given) throw CLI::ValidationError(option, "has no effect where A is a field: " + options.a);
 }
 
 /// Throws Error if the surface that --field always asks for is not there.
@@ -193,8 +195,13 @@ std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions&
   }
   const Asset a = Asset::load(options.a);
   const Asset b = Asset::load(options.asset_b);
-  require_held(options.a, a.view(), measure);
-  require_held(options.asset_b, b.view(), measure);
+  // Surfaces alone are exact enough.
+  const bool surfaces = options.settings.penetration.relative_error > 0 && a.view().has_mesh() &&
+                        b.view().has_mesh();
+  if (!surfaces) {
+    require_held(options.a, a.view(), measure);
+    require_held(options.asset_b, b.view(), measure);
+  }
   if (options.settings.penetration.field == FieldUse::always) {
     require_surface(options.a, a.view());
     require_surface(options.asset_b, b.view());
@@ -214,7 +221,7 @@ void run_query(const QueryOptions& options) {
     fmt::print("{}", answers_csv(answers));
   } else {
     fmt::print("A = {}, B = {}\n{}", options.a, options.asset_b,
-               answer_text(answers.front(), options.settings.penetration.measure));
+               answer_text(answers.front(), options.settings.penetration));
   }
 }
 
@@ -274,6 +281,11 @@ void add_query(CLI::App& app) {
   add_whole(command, "--pair-budget", options->settings.penetration.pair_budget,
             "Use the level of detail that needs about this many sphere pairs; 0 = the finest. "
             "Matched measure only");
+  add_share(command, "--error", options->settings.penetration.relative_error,
+            {.least = 0, .most = 1, .without_most = true},
+            "Accepted relative error of the volume, e.g. 0.5%, by whichever is cheapest: the "
+            "coarsest level of detail that is predicted to err by less, or the kept meshes; 0 = all "
+            "spheres. Matched measure only");
   add_whole(command, "--max-visits", options->max_visits,
             "Limit of node pairs, for penetration and for separation; 0 = no limit");
   add_whole<std::size_t>(command, "--repeat", options->repeat,
@@ -286,6 +298,7 @@ void add_query(CLI::App& app) {
       "A field is given in A's frame. For a file named box:1,1,1 write ./box:1,1,1.\n"
       "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9\n"
       "         ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9 --measure exact\n"
+      "         ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9 --error 0.5%\n"
       "         ist query plane:0,0,1,0 bolt.ist --pose 1,0,0,0,0,0,-0.5");
   command->callback([options, scale] {
     options->scale_b_given = scale->count() > 0;

@@ -74,12 +74,12 @@ std::string answers_json(std::span<const Answer> answers) {
   return list.dump(2) + "\n";
 }
 
-std::string answer_text(const Answer& answer, Measure measure) {
+std::string answer_text(const Answer& answer, const PenetrationSettings& settings) {
   const Penetration& p = answer.result.penetration;
   const Separation& s = answer.result.separation;
   if (answer.status() == QueryStatus::invalid_input)
     return fmt::format("  no answer: {}: {}\n", name_of(answer.status()), pose_fault(answer.row));
-  const bool exact = measure == Measure::exact;
+  const bool exact = settings.measure == Measure::exact;
   std::string text;
   const auto line = [&](const char* name, const std::string& value, const char* meaning) {
     text += fmt::format("  {:<10} {:<{}} {}\n", name, value, exact ? 44 : 36, meaning);
@@ -94,10 +94,16 @@ std::string answer_text(const Answer& answer, Measure measure) {
          "contain the true volume");
   } else {
     line("volume", fmt::format("{:.6g} u³", p.volume),
-         measure == Measure::matched ? "of the overlap, by matched spheres"
-                                     : "of the overlap, by inner spheres: a lower bound");
+         settings.measure == Measure::inner ? "of the overlap, by inner spheres: a lower bound"
+         : settings.relative_error > 0      ? "of the overlap, by spheres or meshes"
+                                            : "of the overlap, by matched spheres");
     line("sum range", fmt::format("{:.6g} … {:.6g} u³", p.volume_min, p.volume_max),
          "interval of the finished sum; says nothing of the true volume");
+    if (settings.relative_error > 0)
+      line("error", fmt::format("{:g} %", 100 * settings.relative_error),
+           p.status == QueryStatus::error_exceeded ? "accepted, but more is predicted"
+           : p.status == QueryStatus::ok           ? "accepted, and less is predicted"
+                                                   : "accepted, but a limit stopped the query");
   }
   if (known) {
     line("centroid", short_vector(p.centroid) + " u", "of the overlap, in A's frame");

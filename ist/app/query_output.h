@@ -19,8 +19,10 @@ struct Answer {
   bool has_distance() const { return result.separation.status != QueryStatus::not_held; }
   /// Of the halves that there are the one that says most.
   QueryStatus status() const {
-    if (!has_distance()) return result.penetration.status;
-    return std::max(result.penetration.status, result.separation.status);
+    const QueryStatus overlap = result.penetration.status, gap = result.separation.status;
+    if (!has_distance()) return overlap;
+    return overlap == QueryStatus::error_exceeded && gap != QueryStatus::ok ? gap
+                                                                            : std::max(overlap, gap);
   }
   std::uint64_t node_visits() const;
   std::uint64_t sphere_pairs() const;
@@ -31,6 +33,6 @@ std::string answers_csv(std::span<const Answer> answers);
 std::string answers_json(std::span<const Answer> answers);
 
 /// One answer for a person.
-std::string answer_text(const Answer& answer, Measure measure);
+std::string answer_text(const Answer& answer, const PenetrationSettings& settings);
 
 }  // namespace ist::app

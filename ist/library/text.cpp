@@ -43,6 +43,8 @@ const char* name_of(QueryStatus status) noexcept {
       return "invalid_input";
     case QueryStatus::not_held:
       return "not_held";
+    case QueryStatus::error_exceeded:
+      return "error_exceeded";
   }
   return "unknown";
 }

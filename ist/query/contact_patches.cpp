@@ -13,6 +13,7 @@
 #include "query/descent/descent.h"
 #include "query/descent/workspace.h"
 #include "query/detail/detail_blend.h"
+#include "query/detail/wanted_error.h"
 #include "query/exact_penetration.h"
 #include "query/field/pair_overlap.h"
 #include "query/solid_queries.h"
@@ -125,27 +126,42 @@ class PairPatches {
   bool probed_ = false;  ///< the bins are those of the spheres that probed
 };
 
-/// The patches of the level of detail that blend_details() chooses, or of the finest.
-struct ChosenLevel {
+/// The patches of the part of a blend with the largest weight: a pair of levels, or the exact
+/// measure.
+struct ChosenPart {
   const PlacedTree& a;
   const PlacedTree& b;
   const RelativePose& pose;
-  bool inner;
-  FieldUse use;
-  Workspace::Impl& scratch;
-  std::optional<PairPatches> patches;
+  ContactSettings settings;
+  Workspace& workspace;
+  std::span<ContactPatch> patches;
+  std::optional<PairPatches> levels;
+  std::optional<ContactPatches> exact;
+
+  bool inner() const noexcept { return settings.measure == Measure::inner; }
 
   const TreeHeader& tree_of(const PlacedTree& placed, std::uint32_t detail) const noexcept {
     const AssetHeader& header = placed.tree.header();
-    return inner ? header.inner_tree : matched_tree(header, detail);
+    return inner() ? header.inner_tree : matched_tree(header, detail);
   }
 
-  static Penetration sum(void* context, const DetailPair& pair,
+  static Penetration sum(void* context, const DetailPair& pair, FieldUse use,
                          const DescentLimits& limits) noexcept {
-    ChosenLevel& self = *static_cast<ChosenLevel*>(context);
-    self.patches.emplace(self.a, self.tree_of(self.a, pair.a), self.b, self.tree_of(self.b, pair.b),
-                         self.pose, self.inner ? FieldUse::never : self.use, self.scratch);
-    return self.patches->sum(limits);
+    ChosenPart& self = *static_cast<ChosenPart*>(context);
+    self.levels.emplace(self.a, self.tree_of(self.a, pair.a), self.b, self.tree_of(self.b, pair.b),
+                        self.pose, self.inner() ? FieldUse::never : use,
+                        *self.workspace.impl());
+    return self.levels->sum(limits);
+  }
+
+  static Penetration sum_exact(void* context, std::uint32_t max_visits, bool most) noexcept {
+    ChosenPart& self = *static_cast<ChosenPart*>(context);
+    ContactSettings settings = self.settings;
+    settings.max_visits = max_visits;
+    if (!most) return exact_penetration(self.a, self.b, settings, self.pose, self.workspace);
+    self.exact =
+        exact_patches(self.a, self.b, settings, self.workspace, self.patches, {}, true).contact;
+    return self.exact->penetration;
   }
 };
 
@@ -154,23 +170,26 @@ struct ChosenLevel {
 ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
                             const ContactSettings& settings, Workspace& workspace,
                             std::span<ContactPatch> patches) noexcept {
-  if (settings.measure == Measure::exact)
+  if (settings.measure == Measure::exact || (by_error(settings) && lack_spheres(a, b)))
     return exact_patches(a, b, settings, workspace, patches, {}, true).contact;
   if (lack_spheres(a, b)) return not_held<ContactPatches>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<ContactPatches>();
   ContactPatches result;
-  const bool inner = settings.measure == Measure::inner;
-  ChosenLevel chosen{a, b, *pose, inner, settings.field, *workspace.impl(), std::nullopt};
-  const LevelSum by{ChosenLevel::sum, &chosen};
-  const bool blends = !inner && settings.pair_budget > 0;
-  result.penetration = blends ? blend_details(a, b, *pose, settings, workspace, &by)
-                              : by.sum(by.context, DetailPair(), limits_of(settings));
-  if (!chosen.patches || std::isnan(result.penetration.volume)) return result;
-  result.count = chosen.patches->write(patches);
+  ChosenPart chosen{a, b, *pose, settings, workspace, patches, {}, {}};
+  const bool blends = !chosen.inner() && (settings.pair_budget > 0 || by_error(settings));
+  result.penetration =
+      blends ? blend_details(a, b, *pose, settings, workspace,
+                             {&chosen, ChosenPart::sum, ChosenPart::sum_exact})
+             : ChosenPart::sum(&chosen, DetailPair(), settings.field, limits_of(settings));
+  if (std::isnan(result.penetration.volume)) return result;
+  if (!chosen.exact && !chosen.levels) return result;
+  result.count = chosen.exact ? chosen.exact->count : chosen.levels->write(patches);
+  const Penetration& part = chosen.exact ? chosen.exact->penetration : chosen.levels->whole();
   if (blends || result.count == 0)
-    result.count = spread(chosen.patches->whole(), result.penetration, result.count, patches);
-  finish_patches(patches.first(result.count), b.pose, chosen.patches->deepest());
+    result.count = spread(part, result.penetration, result.count, patches);
+  finish_patches(patches.first(result.count), b.pose,
+                 chosen.exact ? exact_deepest(part.volume) : chosen.levels->deepest());
   return result;
 }
 

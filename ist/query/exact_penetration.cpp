@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "query/base/no_answer.h"
+#include "query/base/solid_bounds.h"
 #include "query/contact/write_patches.h"
 #include "query/descent/workspace.h"
 #include "query/exact/exact_octants.h"
@@ -22,19 +23,6 @@ Query query_of(const PlacedTree& a, const MeshTree& mesh_a, const PlacedTree& b,
 }
 
 Eigen::Vector3d vector(const exact::Point& p) { return {p.x, p.y, p.z}; }
-
-/// At most, of a solid.
-double volume_of(const PlacedTree& placed) {
-  const AssetHeader& asset = placed.tree.header();
-  return std::ldexp(asset.volume + asset.volume_error, 3 * asset.exponent) *
-         (placed.scale * placed.scale * placed.scale);
-}
-
-/// The true volume lies between nothing and the smaller solid's.
-void bound_by_solids(const PlacedTree& a, const PlacedTree& b, Penetration& answer) {
-  answer.volume_min = 0;
-  answer.volume_max = std::min(volume_of(a), volume_of(b)) * (1 + 1e-12);
-}
 
 }  // namespace
 
@@ -83,14 +71,6 @@ Answer stopped(const PlacedTree& a, const PlacedTree& b, Answer answer, const Sp
   bound_by_solids(a, b, whole(answer));
   whole(answer).status = QueryStatus::budget_exhausted;
   return answer;
-}
-
-/// Cube root from square roots alone, x ≥ 0: the C library's differs between processors. Each step
-/// leaves a quarter of the error of the logarithm.
-double cube_root_by_squares(double x) {
-  double y = std::sqrt(x);
-  for (int k = 0; k < 30; ++k) y = std::sqrt(std::sqrt(x * y));
-  return y;
 }
 
 /// Of the smaller solid's radius: octants of a contact this near to each other hold it as one does.
@@ -153,6 +133,14 @@ std::size_t write_parts(std::span<ExactPart> parts, const exact::Point& origin,
 
 }  // namespace
 
+double exact_deepest(double volume) noexcept {
+  // The cube root from square roots alone: the C library's differs between processors. Each step
+  // leaves a quarter of the error of the logarithm.
+  double y = std::sqrt(volume);
+  for (int k = 0; k < 30; ++k) y = std::sqrt(std::sqrt(volume * y));
+  return y;
+}
+
 Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
                               const PenetrationSettings& settings, const RelativePose& pose,
                               Workspace& workspace) noexcept {
@@ -164,6 +152,7 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
   const auto by_spheres = [&] {
     PenetrationSettings others = settings;
     others.measure = Measure::matched;
+    others.relative_error = 0;
     return penetration(a, b, others, workspace);
   };
   return stopped<Penetration>(a, b, not_held<Penetration>(), by_spheres,
@@ -186,6 +175,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
     const auto by_spheres = [&] {
       ContactSettings others = settings;
       others.measure = Measure::matched;
+      others.relative_error = 0;
       return contact_patches(a, b, others, workspace, patches);
     };
     answer.contact = stopped<ContactPatches>(
@@ -209,8 +199,8 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
     }
     join(parts);
     answer.contact.count = write_parts(parts, found.origin, *pose, patches);
-    const double deepest = cube_root_by_squares(answer.contact.penetration.volume);
-    finish_patches(patches.first(answer.contact.count), b.pose, deepest);
+    finish_patches(patches.first(answer.contact.count), b.pose,
+                   exact_deepest(answer.contact.penetration.volume));
   }
   const auto to_world = [&](const exact::Point& p) {
     return pose->to_world(vector(found.origin) + vector(p));

@@ -11,6 +11,9 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
                               const PenetrationSettings& settings, const RelativePose& pose,
                               Workspace& workspace) noexcept;
 
+/// [u] Depth that no patch of such a contact [u³] exceeds.
+double exact_deepest(double volume) noexcept;
+
 /// contact_patches() and overlap_outline() by Measure::exact. `divides`: parts into octants, as far
 /// as there is room.
 OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,

@@ -3,19 +3,40 @@
 #include "query/base/no_answer.h"
 #include "query/detail/coincident.h"
 #include "query/detail/detail_blend.h"
+#include "query/detail/wanted_error.h"
 #include "query/exact_penetration.h"
 #include "query/field/pair_overlap.h"
 #include "query/solid_queries.h"
 
 namespace ist {
+namespace {
+
+/// The exact measure as part of a blend.
+struct ExactSum {
+  const PlacedTree& a;
+  const PlacedTree& b;
+  PenetrationSettings settings;
+  const RelativePose& pose;
+  Workspace& workspace;
+
+  static Penetration sum(void* context, std::uint32_t max_visits, bool /*most*/) noexcept {
+    ExactSum& self = *static_cast<ExactSum*>(context);
+    self.settings.max_visits = max_visits;
+    return exact_penetration(self.a, self.b, self.settings, self.pose, self.workspace);
+  }
+};
+
+}  // namespace
 
 Penetration find_penetration(const PlacedTree& a, const PlacedTree& b,
                              const PenetrationSettings& settings, Workspace& workspace) noexcept {
-  if (settings.measure != Measure::exact && lack_spheres(a, b)) return not_held<Penetration>();
+  // Of a surface alone the exact measure errs by no more than is wanted.
+  const bool exact =
+      settings.measure == Measure::exact || (by_error(settings) && lack_spheres(a, b));
+  if (!exact && lack_spheres(a, b)) return not_held<Penetration>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Penetration>();
-  if (settings.measure == Measure::exact)
-    return exact_penetration(a, b, settings, *pose, workspace);
+  if (exact) return exact_penetration(a, b, settings, *pose, workspace);
   const AssetHeader& header_a = a.tree.header();
   const AssetHeader& header_b = b.tree.header();
   const bool inner = settings.measure == Measure::inner;
@@ -24,9 +45,11 @@ Penetration find_penetration(const PlacedTree& a, const PlacedTree& b,
   const FieldUse use = inner ? FieldUse::never : settings.field;
   const PairMethod method = pair_method(a, tree_a, b, tree_b, *pose, use);
   if (lacks_surface(method, use)) return not_held<Penetration>();
-  if (settings.measure == Measure::matched &&
-      (settings.pair_budget > 0 || are_one_asset(header_a, header_b)))
-    return blend_details(a, b, *pose, settings, workspace);
+  if (!inner && (settings.pair_budget > 0 || by_error(settings) ||
+                 are_one_asset(header_a, header_b))) {
+    ExactSum sum{a, b, settings, *pose, workspace};
+    return blend_details(a, b, *pose, settings, workspace, {&sum, nullptr, ExactSum::sum});
+  }
   PairOverlap both(a, tree_a, b, tree_b, *pose, *workspace.impl());
   return both.by(method, limits_of(settings));
 }

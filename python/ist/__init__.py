@@ -29,6 +29,7 @@ class QueryStatus(enum.IntEnum):
     # The row is all NaN; one pose raises instead:
     invalid_input = 2  # a pose, a scale or a Field's number is not usable: ValueError
     not_held = 3  # a solid does not hold what is asked: Error
+    error_exceeded = 4  # finished, but the error is larger than relative_error
 
 
 class Overlapping(enum.IntEnum):

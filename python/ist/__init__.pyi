@@ -32,6 +32,7 @@ class QueryStatus(enum.IntEnum):
     budget_exhausted = 1
     invalid_input = 2
     not_held = 3
+    error_exceeded = 4
 
 class Overlapping(enum.IntEnum):
     no = 0

@@ -118,21 +118,6 @@ TEST_F(QueryBudget, TheSmallestPairsAreLeft) {
   EXPECT_GT(many, 2 * kMany * one);
 }
 
-TEST_F(QueryBudget, RelativeErrorIsMet) {
-  for (const double accepted : {0.5, 0.1, 0.01}) {
-    for (int i = 0; i < 30; ++i) {
-      const PlacedTree a = placed_a(), b = placed_b(0.06 * i);
-      const Penetration finished = penetration(a, b, {}, workspace_);
-      PenetrationSettings settings;
-      settings.relative_error = accepted;
-      const Penetration answer = penetration(a, b, settings, workspace_);
-      expect_bounds(answer, finished);
-      EXPECT_LE(answer.volume_max - answer.volume_min, accepted * answer.volume_max * (1 + 1e-9));
-      EXPECT_LE(answer.node_visits, finished.node_visits);
-    }
-  }
-}
-
 TEST_F(QueryBudget, AWorkspaceChangesNothingButWhenFull) {
   Workspace small(64), ample(1 << 16);
   int full = 0;

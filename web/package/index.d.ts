@@ -222,7 +222,11 @@ export interface ContactOptions extends Limits {
    * (`automatic`, the default), `never`, or `always`.
    */
   field?: 'automatic' | 'never' | 'always';
-  /** Stop once (volumeMax − volumeMin) ≤ this · volumeMax. */
+  /**
+   * Accepted relative error of the volume, such as 0.005 for 0.5 %, by whichever measure is cheapest:
+   * a level of detail where its predicted error is below, else `exact`, blended smoothly. `matched`
+   * only. See <ist/query.h>.
+   */
   relativeError?: number;
   /**
    * Count of sphere pairs to spend: if all are more, a coarser level of detail answers. Choose it by
@@ -238,9 +242,9 @@ export interface PenetrationOptions extends ContactOptions {
 
 /**
  * `budget-exhausted`: a limit or the workspace stopped it. What volumeMin and volumeMax contain, they
- * still contain.
+ * still contain. `error-exceeded`: finished, but the error is larger than relativeError.
  */
-export type Status = 'ok' | 'budget-exhausted';
+export type Status = 'ok' | 'budget-exhausted' | 'error-exceeded';
 
 /** The overlap of two solids. */
 export interface Penetration {

@@ -13,7 +13,6 @@ struct DescentLimits {
   static constexpr std::uint32_t kNoLimit = ~0u;
 
   std::uint32_t max_visits = kNoLimit;  ///< 0: nothing but the roots is tested
-  double relative_error = 0;            ///< 0: no limit
   bool keep_rounding = false;           ///< lenses that graze are not summed again in double
 
   /// Takes visits that were made off.
@@ -29,7 +28,7 @@ inline std::uint32_t visit_limit(std::uint32_t max_visits) noexcept {
 /// The limits that a query's settings set.
 template <class Settings>
 DescentLimits limits_of(const Settings& settings) noexcept {
-  return {visit_limit(settings.max_visits), settings.relative_error, false};
+  return {visit_limit(settings.max_visits), false};
 }
 
 /// Counts visits.

@@ -10,6 +10,9 @@ const char* ist_describe(ist_status_t status) {
     case IST_BUDGET_EXHAUSTED:
       return "a limit or the workspace's capacity stopped the query before it finished; its bounds "
              "still hold";
+    case IST_ERROR_EXCEEDED:
+      return "finished, but the error is larger than relative_error: bake both assets with surface "
+             "all, or with more spheres";
     case IST_INVALID_INPUT:
       return "a pose, a scale, a number of a field or a setting is out of range";
     case IST_NOT_HELD:

@@ -50,12 +50,14 @@ inline void write(const Pose& found, ist_pose_t& out) noexcept {
 inline ist_status_t status_of(QueryStatus status) noexcept {
   return status == QueryStatus::ok                 ? IST_OK
          : status == QueryStatus::budget_exhausted ? IST_BUDGET_EXHAUSTED
+         : status == QueryStatus::error_exceeded   ? IST_ERROR_EXCEEDED
          : status == QueryStatus::not_held         ? IST_NOT_HELD
                                                    : IST_INVALID_INPUT;
 }
 inline QueryStatus query_status(ist_status_t status) noexcept {
   return status == IST_OK                 ? QueryStatus::ok
          : status == IST_BUDGET_EXHAUSTED ? QueryStatus::budget_exhausted
+         : status == IST_ERROR_EXCEEDED   ? QueryStatus::error_exceeded
          : status == IST_NOT_HELD         ? QueryStatus::not_held
                                           : QueryStatus::invalid_input;
 }

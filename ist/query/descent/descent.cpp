@@ -12,9 +12,6 @@
 namespace ist {
 namespace {
 
-// Leaf pairs between two looks at the error that is left.
-constexpr std::size_t kLeafChunk = 256;
-
 // Sums whose rounding may exceed this share are taken again in double. The bound is at least fifty
 // times what rounding does, so float keeps 1e-5 (property_query, NoGrazingPairIsLost).
 constexpr double kGrazing = 5e-4;
@@ -133,7 +130,9 @@ Overlap Descent::contained_overlap(bool of_a, const SubtreeSums& contained) cons
 void Descent::open_leaves() {
   PairList& now = scratch_.now;
   if (now.size > 0) scratch_.leaves->forget(precision_);
-  const std::size_t done = limits_.relative_error > 0 ? add_by_bound() : add_in_order();
+  choose();
+  const std::size_t done = budget_.grant(now.size);
+  add_leaves(0, done);
   estimate_unopened(now, done);
   now.size = done;
 
@@ -149,27 +148,6 @@ void Descent::open_leaves() {
   }
 }
 
-std::size_t Descent::add_by_bound() {
-  PairList& now = scratch_.now;
-  double waiting = rank();  // bound on the pairs still to come
-  std::size_t done = 0;
-  while (done < now.size && !accurate(waiting)) {
-    const std::size_t n = budget_.grant(std::min(kLeafChunk, now.size - done));
-    if (n == 0) break;
-    add_leaves(done, n);
-    for (std::size_t i = done; i < done + n; ++i) waiting -= scratch_.ranked[i].bound;
-    done += n;
-  }
-  return done;
-}
-
-std::size_t Descent::add_in_order() {
-  choose();
-  const std::size_t done = budget_.grant(scratch_.now.size);
-  add_leaves(0, done);
-  return done;
-}
-
 void Descent::add_leaves(std::size_t from, std::size_t n) {
   if (n == 0) return;
   const std::uint32_t* const a = scratch_.now.a.get() + from;
@@ -179,28 +157,8 @@ void Descent::add_leaves(std::size_t from, std::size_t n) {
   add_leaf_pairs(stage, *scratch_.leaves, a, b, n, sums_);
 }
 
-bool Descent::accurate(double waiting) const {
-  const Overlap sum = sure();
-  const double spread = 2 * sum.error + waiting + unopened_bound_;
-  return spread <= limits_.relative_error * (sum.volume + sum.error + waiting + unopened_bound_);
-}
-
 double Descent::bound(std::size_t i) const {
   return bound_pair(a_, level_a_, scratch_.now.a[i], b_, level_b_, scratch_.now.b[i], map_);
-}
-
-double Descent::rank() {
-  PairList& now = scratch_.now;
-  RankedPair* ranked = scratch_.ranked.get();
-  for (std::size_t i = 0; i < now.size; ++i) ranked[i] = {bound(i), now.a[i], now.b[i]};
-  std::sort(ranked, ranked + now.size, before);
-  double sum = 0;
-  for (std::size_t i = 0; i < now.size; ++i) {
-    now.a[i] = ranked[i].a;
-    now.b[i] = ranked[i].b;
-    sum += ranked[i].bound;
-  }
-  return sum;
 }
 
 void Descent::choose() {

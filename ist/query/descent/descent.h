@@ -60,17 +60,6 @@ class Descent {
   /// Sums pairs [from, from + n) of the current list.
   void add_leaves(std::size_t from, std::size_t n);
 
-  /// Sums pairs from those of the largest bound down until the error is accepted; returns how many.
-  std::size_t add_by_bound();
-
-  /// Sums pairs in the order of the list; returns how many.
-  std::size_t add_in_order();
-
-  bool accurate(double waiting) const;
-
-  /// Sorts the current list, largest bound first; returns the sum of the bounds.
-  double rank();
-
   /// Puts the pairs of largest bound that visits are left for first in the current list, if there
   /// are more. Otherwise they stay in order, as neighbours share nodes.
   void choose();

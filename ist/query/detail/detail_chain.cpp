@@ -32,7 +32,7 @@ DetailPair describe(const AssetHeader& a, std::uint32_t detail_a, const AssetHea
 DetailWeight affordable(const DetailPair& pair, double estimate, double budget, double alone,
                         double none) {
   const double root = std::sqrt(estimate);
-  const double expected = pair.density * (estimate + pair.skin * root);
+  const double expected = expected_pairs(pair, estimate);
   // (written so that a damaged asset's NaN takes the coarsest level)
   const double t =
       expected < none * budget ? std::min((none - expected / budget) / (none - alone), 1.0) : 0;
@@ -44,6 +44,10 @@ DetailWeight affordable(const DetailPair& pair, double estimate, double budget, 
 }
 
 }  // namespace
+
+double expected_pairs(const DetailPair& pair, double overlap) noexcept {
+  return pair.density * (overlap + pair.skin * std::sqrt(overlap));
+}
 
 DetailChain::DetailChain(const AssetHeader& a, const AssetHeader& b, double scale) noexcept {
   std::uint32_t at_a = 0, at_b = 0;
@@ -67,16 +71,17 @@ DetailWeight DetailChain::quick_weight(double look, double budget) const noexcep
   return affordable(pairs_[0], look, budget, kLookAlone, kLookNone);
 }
 
-DetailChain::Weights DetailChain::weights(double coarse, double budget) const noexcept {
+DetailChain::Weights DetailChain::weights(double coarse, double budget,
+                                          const Weights& wanted) const noexcept {
   Weights weights;
-  DetailWeight rest{1, 0};
+  DetailWeight rest;
   for (std::size_t i = 0; i + 1 < size_; ++i) {
     const DetailWeight part = affordable(pairs_[i], coarse, budget, kLevelAlone, kLevelNone);
-    weights[i] = {rest.weight * part.weight, rest.slope * part.weight + rest.weight * part.slope};
-    rest = {rest.weight * (1 - part.weight),
-            rest.slope * (1 - part.weight) - rest.weight * part.slope};
+    rest = rest + wanted[i];
+    weights[i] = rest * part;
+    rest = rest * complement(part);
   }
-  weights[size_ - 1] = rest;
+  weights[size_ - 1] = rest + wanted[size_ - 1];
   return weights;
 }
 

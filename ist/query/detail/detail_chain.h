@@ -21,7 +21,18 @@ struct DetailPair {
 struct DetailWeight {
   double weight = 0;  ///< [0, 1]
   double slope = 0;   ///< d weight / d estimate of the overlap
+
+  friend DetailWeight operator*(const DetailWeight& x, const DetailWeight& y) noexcept {
+    return {x.weight * y.weight, x.slope * y.weight + x.weight * y.slope};
+  }
+  friend DetailWeight operator+(const DetailWeight& x, const DetailWeight& y) noexcept {
+    return {x.weight + y.weight, x.slope + y.slope};
+  }
 };
+inline DetailWeight complement(const DetailWeight& x) noexcept { return {1 - x.weight, -x.slope}; }
+
+/// About how many sphere pairs a pair of levels needs for an overlap, A's unit frame.
+double expected_pairs(const DetailPair& pair, double overlap) noexcept;
 
 /// The pairs of levels with which two assets may be asked, from the finest to the coarsest of both
 /// (docs/design.md 5). Each step takes a coarser level on the side of the smaller spheres, which
@@ -50,7 +61,10 @@ class DetailChain {
   /// than 0.7 of `budget` sphere pairs, none where it needs the whole; what is left goes to the
   /// next pair by the same rule, and what none can afford to the coarsest. Continuous in `coarse`,
   /// with the slope. An estimate of 0: the finest.
-  Weights weights(double coarse, double budget) const noexcept;
+  ///
+  /// `wanted`: what each pair would give without a budget, if that is not all the finest.
+  Weights weights(double coarse, double budget,
+                  const Weights& wanted = {DetailWeight{1, 0}}) const noexcept;
 
  private:
   std::array<DetailPair, kMost> pairs_;

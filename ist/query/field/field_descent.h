@@ -22,7 +22,6 @@ class FieldDescent {
       : shape_(shape),
         probes_(probes),
         map_(pose.a_from_b),
-        limits_(limits),
         scratch_(scratch),
         budget_(limits.max_visits),
         tally_(probes, pose, bins) {}
@@ -33,14 +32,11 @@ class FieldDescent {
     now.size = 1;
     int level = probes_.top;
     for (; level > 0 && now.size > 0; --level) {
-      if (accurate(level)) return leave(level, 0);
       if (!open(level)) return;
       std::swap(scratch_.now, scratch_.next);
     }
     for (std::size_t i = 0; i < now.size; ++i) {
-      if ((limits_.relative_error > 0 && i % 16 == 0 && accurate(0)) || budget_.grant(1) == 0)
-        return leave(0, i);
-      waiting_ -= tally_.volume_of(0, now.a[i]);
+      if (budget_.grant(1) == 0) return leave(0, i);
       sum_block(now.a[i]);
     }
   }
@@ -57,7 +53,6 @@ class FieldDescent {
     const PairList& now = scratch_.now;
     PairList& next = scratch_.next;
     next.size = 0;
-    waiting_ = 0;
     std::uint32_t held[kWidth];
     for (std::size_t i = 0; i < now.size; ++i) {
       const std::uint32_t block = now.a[i];
@@ -81,7 +76,6 @@ class FieldDescent {
           held[count++] = child;
         } else {
           next.a[next.size++] = child;
-          waiting_ += tally_.volume_of(level - 1, child);
         }
       }
       tally_.hold(level - 1, held, count);
@@ -115,11 +109,6 @@ class FieldDescent {
     tally_.count(pairs);
   }
 
-  bool accurate(int level) const noexcept {
-    return limits_.relative_error > 0 && level != probes_.top &&
-           tally_.accurate(waiting_, limits_.relative_error);
-  }
-
   void leave(int level, std::size_t from) noexcept {
     const PairList& now = scratch_.now;
     for (std::size_t i = from; i < now.size; ++i) tally_.leave(level, now.a[i]);
@@ -128,11 +117,9 @@ class FieldDescent {
   Shape& shape_;
   const SphereTree& probes_;
   const Similarity& map_;
-  const DescentLimits limits_;
   Workspace::Impl& scratch_;
   Budget budget_;
   ProbeTally tally_;
-  double waiting_ = 0;  ///< volume of the nodes of the current list
 };
 
 }  // namespace ist

@@ -64,15 +64,6 @@ class ProbeTally {
     return probes_.sums(level, block).volume * (map_.scale * map_.scale * map_.scale);
   }
 
-  /// Whether something is inside.
-  bool has_held() const noexcept { return held_.spheres > 0; }
-
-  /// Whether all that is undecided, what waits included, is no more than a part of the answer.
-  bool accurate(double waiting, double relative_error) const noexcept {
-    const double undecided = waiting + left_;
-    return undecided <= relative_error * (sure().volume + undecided);
-  }
-
   /// The answer in world units. `off`: by how much the surface may be elsewhere, its unit frame.
   Penetration answer(double off, std::uint32_t visits) const noexcept {
     Overlap sum = sure();

@@ -56,7 +56,6 @@ SurfaceDescent::SurfaceDescent(const SurfaceTree& surface, const SphereTree& pro
       ball_header_(header_of(surface)),
       balls_(tree_of(surface, ball_header_)),
       precision_(precision_for(balls_, probes, pose)),
-      limits_(limits),
       scratch_(scratch),
       budget_(limits.max_visits),
       surface_level_(balls_.top),
@@ -74,11 +73,6 @@ void SurfaceDescent::run() noexcept {
         probe_level_ == 0 ||
         (surface_level_ > kSphereLevel &&
          typical_cube(balls_, surface_level_) >= cube * probes_.typical_cube(probe_level_));
-    if (limits_.relative_error > 0 && tally_.has_held() &&
-        tally_.accurate(waiting(), limits_.relative_error)) {
-      leave(0);
-      return;
-    }
     if (!(open_surface_now ? open_surface() : open_probes())) return;
   }
   if (now.size > 0) sum_leaves();
@@ -279,20 +273,13 @@ void SurfaceDescent::flush() noexcept {
 
 void SurfaceDescent::sum_leaves() noexcept {
   const PairList& now = scratch_.now;
-  const bool by_error = limits_.relative_error > 0;
-  double left = by_error ? waiting() : 0;
   for (std::size_t from = 0; from < now.size;) {
     const std::size_t end = group_end(from);
     if (!budget_.grant_all(end - from)) {
       leave(from);
       return;
     }
-    if (by_error && tally_.accurate(left, limits_.relative_error)) {
-      leave(from);
-      return;
-    }
     tally_.add(now.b[from], sum_block(now.b[from], from, end));
-    if (by_error) left -= tally_.volume_of(0, now.b[from]);
     from = end;
   }
 }
@@ -371,14 +358,6 @@ std::uint32_t SurfaceDescent::sides(const ProbeBalls& balls, std::uint32_t wante
       result ^= odd_ways(scratch_.patches->find(surface_, scratch_.now.a[i]), scratch_.masks[i], x,
                          balls, wanted);
   return result;
-}
-
-double SurfaceDescent::waiting() const noexcept {
-  const PairList& now = scratch_.now;
-  double sum = 0;
-  for (std::size_t from = 0; from < now.size; from = group_end(from))
-    sum += tally_.volume_of(probe_level_, now.b[from]);
-  return sum;
 }
 
 void SurfaceDescent::leave(std::size_t from) noexcept {

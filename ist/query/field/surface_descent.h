@@ -76,9 +76,6 @@ class SurfaceDescent {
   /// First pair of the next node of B.
   std::size_t group_end(std::size_t from) const noexcept;
 
-  /// Volume of all nodes of B in the current list, A's unit frame.
-  double waiting() const noexcept;
-
   /// Leaves what is in the list from a pair on unopened.
   void leave(std::size_t from) noexcept;
 
@@ -92,7 +89,6 @@ class SurfaceDescent {
   TreeHeader ball_header_;
   SphereTree balls_;  ///< of the surface; its "spheres" are blocks of triangles
   const Precision precision_;
-  const DescentLimits limits_;
   Workspace::Impl& scratch_;
   Budget budget_;
   int surface_level_, probe_level_;

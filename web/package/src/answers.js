@@ -7,9 +7,11 @@ export const newVector = () => new Float64Array(3);
 
 export const kInvalidInput = -1;  // IST_INVALID_INPUT
 export const kNotHeld = -15;      // IST_NOT_HELD
+const kErrorExceeded = 2;         // IST_ERROR_EXCEEDED
 
 export const statusOf = (status) => status === 0 ? 'ok' :
-    status > 0                                   ? 'budget-exhausted' :
+    status === 1                                 ? 'budget-exhausted' :
+    status === kErrorExceeded                    ? 'error-exceeded' :
     status === kNotHeld                          ? 'not-held' :
                                                    'invalid-input';
 
@@ -46,7 +48,9 @@ export function readPenetration(place, status, out) {
 /** Puts an answer back where the library looks for it. */
 export function writePenetration(place, answer) {
   const numbers = f64(), integers = u32(), at = place / 8 + 1;
-  integers[2 * at - 1] = answer.status === 'budget-exhausted' ? 1 : 0;
+  integers[2 * at - 1] = answer.status === 'budget-exhausted' ? 1 :
+      answer.status === 'error-exceeded'                      ? kErrorExceeded :
+                                                                0;
   numbers[at] = answer.volume;
   numbers[at + 1] = answer.volumeMin;
   numbers[at + 2] = answer.volumeMax;

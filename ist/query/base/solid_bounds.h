@@ -1,0 +1,26 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include <ist/query.h>
+
+#include <ist/asset_layout.h>
+
+namespace ist {
+
+/// [u³] At most, of a solid.
+inline double volume_of(const PlacedTree& placed) noexcept {
+  const AssetHeader& asset = placed.tree.header();
+  return std::ldexp(asset.volume + asset.volume_error, 3 * asset.exponent) *
+         (placed.scale * placed.scale * placed.scale);
+}
+
+/// The true volume lies between nothing and the smaller solid's.
+inline void bound_by_solids(const PlacedTree& a, const PlacedTree& b,
+                            Penetration& answer) noexcept {
+  answer.volume_min = 0;
+  answer.volume_max = std::min(volume_of(a), volume_of(b)) * (1 + 1e-12);
+}
+
+}  // namespace ist

@@ -1,0 +1,124 @@
+#include "query/detail/wanted_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "query/base/smooth_step.h"
+#include "query/field/pair_overlap.h"
+
+namespace ist {
+namespace {
+
+// A sum of lenses over n solid spheres (solid_volume()) errs by less than kErrorOfOne · n^(-8/9) in
+// 19 of 20 random poses, and by a third of that in the median. Fitted to spheres of 468 to 30,000
+// in poses of nine pairs of solids (`benchmarks/run.sh wanted_error`).
+constexpr double kErrorOfOne = 0.09;
+constexpr double kMostOverMedian = 3;
+
+// The part of a level's overlap from which on it is blended in.
+constexpr double kTooRough = 0.7;
+
+// Surfaces cross in kCrossings (√T_A (V/V_A)^⅜ + √T_B (V/V_B)^⅜) triangles, T being all of them. One
+// costs as much as kPairsOfCrossing pairs of spheres; spheres must save kPairsSaved.
+constexpr double kCrossings = 4.5, kPairsOfCrossing = 28, kPairsSaved = 250;
+// The overlap at which both are compared, in those from which on a level answers: the next coarser
+// one takes over at four.
+constexpr double kCompared = 2;
+
+double eighth_root(double x) { return std::sqrt(std::sqrt(std::sqrt(x))); }
+
+/// (kErrorOfOne / error)^(9/8), of an error where there is one sphere.
+double spheres_for(double error_of_one, double error) {
+  const double times = error_of_one / error;
+  return times * eighth_root(times);
+}
+
+/// How many such spheres an overlap needs. By the errors that the bake measured, if it did: their
+/// inverse is about linear in the number.
+double spheres_needed(const AssetHeader& asset, double error) {
+  const TreeHeader& tree = asset.matched_tree;
+  const double all = tree.volume_sum / solid_volume(asset, tree);
+  double before = 0, error_before = 0;
+  for (std::uint32_t k = kOverlapClasses; asset.predicted_poses > 0 && k-- > 1;) {
+    const double here = kMostOverMedian * asset.predicted_error[k];
+    if (!(here > 0)) continue;
+    const double middle =
+        std::sqrt(kOverlapClassFloor[k] * (k > 1 ? kOverlapClassFloor[k - 1] : 0.5));
+    const double spheres = middle * all;
+    if (here <= error) {
+      if (before == 0) return spheres * spheres_for(here, error);
+      const double part = (1 / error - 1 / error_before) / (1 / here - 1 / error_before);
+      return before + (spheres - before) * part;
+    }
+    before = spheres;
+    error_before = here;
+  }
+  return before > 0 ? before * spheres_for(error_before, error) : spheres_for(kErrorOfOne, error);
+}
+
+/// About how many triangles of a mesh cross the other's surface.
+double crossings(const AssetHeader& asset, double share) {
+  const double root = std::sqrt(share), quarter = std::sqrt(root);
+  return kCrossings *
+         std::sqrt(static_cast<double>(at<MeshHeader>(asset, asset.mesh)->triangle_count)) *
+         (quarter * std::sqrt(quarter));
+}
+
+}  // namespace
+
+double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept {
+  const double left_out = 1 / std::max(asset.coverage, 0.01) - 1;
+  const double wider = 1 + left_out * tree.mean_radius / asset.matched_tree.mean_radius;
+  return tree.volume_sum / tree.sphere_count * (wider * wider * wider);
+}
+
+WantedError::WantedError(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+                         const PenetrationSettings& settings, const DetailChain& chain,
+                         bool exact) noexcept
+    : size_(chain.size()) {
+  const AssetHeader& asset_a = a.tree.header();
+  const AssetHeader& asset_b = b.tree.header();
+  const double scale3 = pose.a_from_b.scale * pose.a_from_b.scale * pose.a_from_b.scale;
+  const double needed_a = spheres_needed(asset_a, settings.relative_error);
+  const double needed_b = spheres_needed(asset_b, settings.relative_error);
+  for (std::size_t i = 0; i < size_; ++i) {
+    const TreeHeader& tree_a = matched_tree(asset_a, chain[i].a);
+    const TreeHeader& tree_b = matched_tree(asset_b, chain[i].b);
+    const double from_a = needed_a * solid_volume(asset_a, tree_a);
+    const double from_b = needed_b * solid_volume(asset_b, tree_b) * scale3;
+    const PairMethod method = pair_method(a, tree_a, b, tree_b, pose, settings.field);
+    double& from = from_[i];
+    from = method.lenses     ? std::sqrt((from_a * from_a + from_b * from_b) / 2)
+           : method.b_probes ? from_b
+                             : from_a;
+    if (!exact) continue;
+    const double compared = kCompared * from;
+    const double crossing = crossings(asset_a, std::min(1.0, compared / asset_a.volume)) +
+                            crossings(asset_b, std::min(1.0, compared / (asset_b.volume * scale3)));
+    if (!(expected_pairs(chain[i], compared) + kPairsSaved < kPairsOfCrossing * crossing))
+      from = std::numeric_limits<double>::infinity();
+  }
+}
+
+bool WantedError::by_spheres() const noexcept {
+  return std::any_of(from_.begin(), from_.begin() + size_,
+                     [](double from) { return std::isfinite(from); });
+}
+
+WantedError::Shares WantedError::shares(double coarse) const noexcept {
+  Shares shares;
+  DetailWeight& rest = shares.rest;
+  for (std::size_t i = size_; i-- > 0;) {
+    const double from = from_[i];
+    // (so that a damaged asset's NaN is never exact enough)
+    const double t =
+        coarse > kTooRough * from ? std::min((coarse / from - kTooRough) / (1 - kTooRough), 1.0) : 0;
+    const DetailWeight part{smooth_step(t), t < 1 ? 6 * t * (1 - t) / ((1 - kTooRough) * from) : 0};
+    shares.levels[i] = rest * part;
+    rest = rest * complement(part);
+  }
+  return shares;
+}
+
+}  // namespace ist

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <array>
+
+#include <ist/query.h>
+
+#include "query/base/relative_pose.h"
+#include "query/detail/detail_chain.h"
+
+namespace ist {
+
+/// Whether a query is told what error it may have.
+inline bool by_error(const PenetrationSettings& settings) noexcept {
+  return settings.measure == Measure::matched && settings.relative_error > 0;
+}
+
+/// Volume of solid for which a sphere of a level stands, the asset's unit frame. Thin solids need
+/// more spheres: as many times as what inner spheres of that size leave out makes a radius larger.
+double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept;
+
+/// Which pairs of levels are predicted to err by no more than a query accepts, and are cheaper than
+/// the exact measure (docs/design.md 5).
+class WantedError {
+ public:
+  /// `exact`: the exact measure may answer.
+  WantedError(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+              const PenetrationSettings& settings, const DetailChain& chain, bool exact) noexcept;
+
+  /// Some level is exact enough at some overlap.
+  bool by_spheres() const noexcept;
+
+  struct Shares {
+    DetailChain::Weights levels = {};  ///< of the chain
+    DetailWeight rest{1, 0};           ///< at which no level is exact enough
+  };
+  /// Parts of the answer, which sum to 1: all of it is the coarsest pair's from the overlap on at
+  /// which that is exact enough, none up to 0.7 of that; what is left goes to the next finer pair
+  /// by the same rule. Continuous in the coarse estimate, A's unit frame, with the slope.
+  Shares shares(double coarse) const noexcept;
+
+ private:
+  std::size_t size_;
+  std::array<double, DetailChain::kMost> from_;  ///< overlap, A's unit frame; infinity: never
+};
+
+}  // namespace ist
