@@ -2,6 +2,7 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <filesystem>
 #include <memory>
 
 #include <ist/bake.h>
@@ -20,6 +21,7 @@
 #include "app/progress_line.h"
 #include "app/setting_options.h"
 #include "app/text.h"
+#include "mesh/mesh_files.h"
 
 namespace ist::app {
 namespace {
@@ -95,7 +97,12 @@ void run_bake(const BakeOptions& options) {
   BakeSettings settings = options.asked.settings;
   settings.packing.threads = options.threads;
   const bool robot = is_robot_file(options.mesh);
-  if (!robot) require_output(options.output, options.mesh, "the asset");
+  if (!robot) {
+    if (is_mesh_format(options.output))
+      throw Error(options.output + ": has the extension of a mesh; name the asset " +
+                  std::filesystem::path(options.output).replace_extension(".ist").string());
+    require_output(options.output, options.mesh, "the asset");
+  }
   settings.packing.device = usable_device(options.device);
   if (!settings.surface_only) announce_device(settings.packing.device);
   if (robot)
@@ -127,7 +134,7 @@ void run_bake(const BakeOptions& options) {
     result["closing"] = closing_json(mesh.report);
     result["partners"] = partners_json(partners);
     result["seconds"] = {{"import", import_seconds}, {"bake", bake_seconds}};
-    fmt::print("{}\n", result.dump(2));
+    fmt::print("{}\n", json_text(result));
   } else if (!options.quiet) {
     const std::string declares = describe_declared(declared);
     fmt::print("{}\n{}", options.output, describe_asset(asset.view()));

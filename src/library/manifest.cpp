@@ -18,6 +18,7 @@
 #include "library/glob.h"
 #include "mesh/mesh_files.h"
 #include "settings/numbers.h"
+#include "settings/spelling.h"
 
 namespace ist {
 namespace {
@@ -27,21 +28,6 @@ using Line = toml::source_index;
 
 /// Keys that no bake has: what the asset must be.
 constexpr std::string_view kDemands[] = {"require-surface", "min-coverage", "min-confidence"};
-
-/// How many letters have to be changed, left out or put in.
-std::size_t letters_apart(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t corner = std::exchange(row[0], i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t other = corner + (a[i - 1] == b[j - 1] ? 0 : 1);
-      corner = row[j];
-      row[j] = std::min({other, row[j] + 1, row[j - 1] + 1});
-    }
-  }
-  return row[b.size()];
-}
 
 const Setting* setting_named(std::string_view name) {
   for (const Setting& setting : all_settings())
@@ -54,10 +40,8 @@ std::string other_keys(std::string key, std::vector<std::string> known) {
   std::replace(key.begin(), key.end(), '_', '-');
   for (const Setting& setting : all_settings()) known.push_back(setting.name);
   known.insert(known.end(), std::begin(kDemands), std::end(kDemands));
-  const auto nearest = std::min_element(
-      known.begin(), known.end(),
-      [&](const auto& a, const auto& b) { return letters_apart(key, a) < letters_apart(key, b); });
-  if (letters_apart(key, *nearest) <= 2) return fmt::format("did you mean '{}'?", *nearest);
+  if (const std::string nearest = nearest_word(key, known); !nearest.empty())
+    return fmt::format("did you mean '{}'?", nearest);
   return fmt::format("known keys are {}", fmt::join(known, ", "));
 }
 

@@ -153,6 +153,10 @@ Summary read_summary(const std::string& path) {
         summary.shard.index > summary.shard.count)
       throw Error("its shard index is not between 1 and the shard count");
     return summary;
+  } catch (const Json::exception&) {
+    throw Error(path +
+                ": is not a complete summary of `ist bake --manifest … --json`. Run that bake "
+                "again");
   } catch (const std::exception& error) {
     throw Error(fmt::format(
         "{}: is not a complete summary of `ist bake --manifest … --json`: {}. Run that bake again",
