@@ -54,7 +54,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (app.exit(error) == 0) return 0;
     if (const std::string meant = suggestion(app, {argv + 1, argv + argc}); !meant.empty())
-      spdlog::info("did you mean '{}'?", meant);
+      std::fprintf(stderr, "Did you mean '%s'?\n", meant.c_str());
     return kExitUsage;
   } catch (const ExitCode& code) {
     return code.value;

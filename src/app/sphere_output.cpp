@@ -19,7 +19,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json link_json(const SphereLink& link) {
+Json link_json(const SphereLink& link, const SelfCollision& self) {
   const SphereProtrusion& p = link.cover.protrusion;
   Json spheres = Json::array();
   for (const CoverSphere& s : link.cover.spheres)
@@ -29,22 +29,22 @@ Json link_json(const SphereLink& link) {
           {"protrusion_mean", p.mean},
           {"protrusion_p95", p.p95},
           {"volume_ratio", link.has_mesh ? Json(p.volume_ratio) : nullptr},
-          {"covered", link.proof.covered}};
+          {"covered", link.proof.covered},
+          {"self_collision_buffer", self.buffer(link.name)}};
 }
 
 Json robot_json(const SphereRobot& robot) {
   Json links = Json::object();
-  for (const SphereLink& link : robot.links) links[link.name] = link_json(link);
-  Json json = {{"robot", robot.name}, {"links", links}};
-  if (!robot.is_robot()) return json;
+  for (const SphereLink& link : robot.links) links[link.name] = link_json(link, robot.self);
   Json ignored = Json::array();
   for (const IgnoredPair& pair : robot.self.ignored)
     ignored.push_back({{"links", {pair.a, pair.b}}, {"reason", pair.reason}});
-  json["self_collision"] = {{"pairs", robot.self.pairs},
-                            {"ignored", ignored},
-                            {"buffers", Json(robot.self.buffers)},
-                            {"samples", robot.self.samples}};
-  return json;
+  return {{"robot", robot.name},
+          {"links", links},
+          {"self_collision",
+           {{"pairs", robot.self.pairs},
+            {"ignored", ignored},
+            {"samples", robot.self.samples}}}};
 }
 
 /// Links and spheres, each a node, in the default pose. glTF's Y is up, a robot's Z.

@@ -21,7 +21,7 @@ class Limbs {
     for (auto& children : children_) std::sort(children.begin(), children.end());
   }
 
-  /// `before`: free joints from the root to the link.
+  /// `before`: moving joints from the root to the link.
   void add_tools(std::size_t link, std::size_t before, std::vector<std::size_t>& tools) const {
     std::vector<std::size_t> limbs;
     for (const std::size_t child : children_[link])
@@ -37,14 +37,14 @@ class Limbs {
   }
 
  private:
-  /// Free joints from the parent of a link to its leaves.
+  /// Moving joints from the parent of a link to its leaves.
   std::size_t joints_with(std::size_t link) const {
-    return joints_[link] + (robot_.joints[robot_.joint_of[link]].is_free() ? 1 : 0);
+    return joints_[link] + (robot_.joints[robot_.joint_of[link]].motion != Motion::fixed ? 1 : 0);
   }
 
   const RobotModel& robot_;
   std::vector<std::vector<std::size_t>> children_;
-  std::vector<std::size_t> joints_;  ///< free ones below each link
+  std::vector<std::size_t> joints_;  ///< moving ones below each link
 };
 
 }  // namespace

@@ -19,7 +19,7 @@ Positions default_positions(const RobotModel& robot);
 std::vector<Eigen::Isometry3d> link_frames(const RobotModel& robot, const Positions& positions);
 
 /// Links that carry tools, the first one first: the last fixed link behind the joints of each limb.
-/// A limb ends before a hand: where it forks into limbs of fewer free joints than lead there.
+/// A limb ends before a hand: where it forks into limbs of fewer moving joints than lead there.
 std::vector<std::size_t> tool_links(const RobotModel& robot);
 
 }  // namespace ist

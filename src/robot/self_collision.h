@@ -23,6 +23,11 @@ struct SelfCollision {
   /// default pose is free. No more than they protrude by. Links that are not there: 0.
   std::map<std::string, double> buffers;
   std::size_t pairs = 0, samples = 0;  ///< of links, and of positions that were tried
+
+  double buffer(const std::string& link) const {
+    const auto found = buffers.find(link);
+    return found == buffers.end() ? 0 : found->second;
+  }
 };
 
 /// Which links overlap because of how the robot is built.

@@ -118,11 +118,8 @@ void append_ignored(const SelfCollision& self, const std::string& key, const std
 void append_buffers(std::span<const LinkSpheres> links, const SelfCollision& self,
                     const std::string& key, const std::string& indent, std::string& out) {
   out += indent + key + ":\n";
-  for (const LinkSpheres& link : links) {
-    const auto found = self.buffers.find(link.link);
-    out += indent + "  " + yaml_text(link.link) + ": " +
-           real(found == self.buffers.end() ? 0 : found->second) + "\n";
-  }
+  for (const LinkSpheres& link : links)
+    out += indent + "  " + yaml_text(link.link) + ": " + real(self.buffer(link.link)) + "\n";
 }
 
 // What a URDF does not state, as cuRobo's own robots have it.

@@ -235,8 +235,7 @@ TEST(CoverSpheres, ATotalGoesWhereItIsNeeded) {
 
 /// Of all ways to share out, none has a smaller largest estimate.
 TEST(CoverSpheres, SharesAreTheBestOfTheEstimates) {
-  const std::vector<TriedCounts> tried = {
-      {{2, 0.5}, {6, 0.1}}, {{1, 0.3}}, {{3, 0.05}, {4, 0.2}}};
+  const std::vector<TriedCounts> tried = {{{2, 0.5}, {6, 0.1}}, {{1, 0.3}}, {{3, 0.05}, {4, 0.2}}};
   EXPECT_EQ(estimated_protrusion(tried[0], 2), 0.5);
   EXPECT_EQ(estimated_protrusion(tried[0], 1), 1);
   EXPECT_EQ(estimated_protrusion(tried[2], 4), 0.05);  // three of them do better
