@@ -57,7 +57,7 @@ Json pose_json(const Eigen::Quaterniond& q, const Eigen::Vector3d& t) {
 Asset bake_shape(const ClosedMesh& mesh, const RobotBake& what) {
   constexpr double kPatience = 0.15;  // [s]
   const InterruptGuard guard(kPatience);
-  ProgressLine line(what.quiet);
+  ProgressLine line(what.quiet, what.settings.target.relative_error > 0);
   try {
     const auto show = [&](const Progress& progress) {
       line.show(progress);

@@ -42,9 +42,7 @@ Json robot_json(const SphereRobot& robot) {
   return {{"robot", robot.name},
           {"links", links},
           {"self_collision",
-           {{"pairs", robot.self.pairs},
-            {"ignored", ignored},
-            {"samples", robot.self.samples}}}};
+           {{"pairs", robot.self.pairs}, {"ignored", ignored}, {"samples", robot.self.samples}}}};
 }
 
 /// Links and spheres, each a node, in the default pose. glTF's Y is up, a robot's Z.

@@ -15,6 +15,7 @@
 
 #include <ist/error.h>
 
+#include "library/asset_name.h"
 #include "library/glob.h"
 #include "mesh/mesh_files.h"
 #include "settings/numbers.h"
@@ -28,6 +29,11 @@ using Line = toml::source_index;
 
 /// Keys that no bake has: what the asset must be.
 constexpr std::string_view kDemands[] = {"require-surface", "min-coverage", "min-confidence"};
+
+/// Which files, and what assets of them are called.
+bool is_file_key(std::string_view key) {
+  return key == "mesh" || key == "name" || key == "exclude";
+}
 
 const Setting* setting_named(std::string_view name) {
   for (const Setting& setting : all_settings())
@@ -133,7 +139,7 @@ class Reader {
     const toml::table* const table = node->as_table();
     if (table == nullptr) return fault(node->source().begin.line, "defaults: write [defaults]");
     for (const auto& [key, value] : *table) {
-      if (key.str() == "mesh" || key.str() == "name")
+      if (is_file_key(key.str()))
         fault(key.source().begin.line,
               fmt::format("'{}' cannot be a default: set it under an [[asset]]", key.str()));
       else
@@ -208,8 +214,7 @@ class Reader {
     Given own;
     own.demands = defaults_.demands;
     for (const auto& [key, value] : table)
-      if (key.str() != "mesh" && key.str() != "name")
-        read_setting(key, value, own, {"mesh", "name"});
+      if (!is_file_key(key.str())) read_setting(key, value, own, {"mesh", "name", "exclude"});
     Job job;
     job.demands = own.demands;
     complete_settings(job.settings, own, line);
@@ -220,20 +225,42 @@ class Reader {
     if (!mesh) return;
     const Line mesh_line = table.get("mesh")->source().begin.line;
     const Line name_line = name ? table.get("name")->source().begin.line : mesh_line;
-    const std::vector<std::string> files = files_for(*mesh, mesh_line);
-    constexpr std::string_view kStem = "{stem}";
-    if (name && name->find(kStem) == std::string::npos && files.size() > 1)
+    std::vector<std::string> files = files_for(*mesh, mesh_line);
+    if (table.contains("exclude")) exclude(*table.get("exclude"), *mesh, files);
+    if (name && name->find('{') == std::string::npos && files.size() > 1)
       return fault(name_line,
                    fmt::format("name: '{}' is one name for the {} files of '{}': include {{stem}}, "
                                "which stands for the file name without its extension",
                                *name, files.size(), *mesh));
     for (const std::string& file : files) {
-      const std::string stem = fs::path(file).stem().string();
-      job.name = name.value_or(std::string(kStem));
-      if (const std::size_t at = job.name.find(kStem); at != std::string::npos)
-        job.name.replace(at, kStem.size(), stem);
+      try {
+        job.name = name_for(name.value_or("{stem}"), file, folder_);
+      } catch (const Error& error) {
+        return fault(name_line, fmt::format("name: {}", error.what()));
+      }
       job.mesh = file;
       add(job, name_line);
+    }
+  }
+
+  /// Takes out the files that patterns match, of which each must match some.
+  void exclude(const toml::node& node, const std::string& mesh, std::vector<std::string>& files) {
+    toml::array one;
+    if (node.is_string()) one.push_back(node.as_string()->get());
+    const toml::array& patterns = node.is_array() ? *node.as_array() : one;
+    const Line line = node.source().begin.line;
+    if (patterns.empty())
+      return fault(line, "exclude: " + shown(node) + " is not a pattern or a list of patterns");
+    for (const toml::node& entry : patterns) {
+      const auto* const pattern = entry.as_string();
+      if (pattern == nullptr)
+        return fault(line, "exclude: " + shown(entry) + " is not a quoted string");
+      std::size_t gone = 0;
+      for (const fs::path& found : matching_files(folder_, pattern->get()))
+        gone += std::erase(files, found.string());
+      if (gone == 0)
+        fault(line, fmt::format("exclude: '{}' excludes none of the files of '{}'", pattern->get(),
+                                mesh));
     }
   }
 
