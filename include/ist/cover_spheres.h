@@ -26,8 +26,14 @@ inline constexpr std::size_t kMostCoverSpheres = 4096;
 
 /// Number of spheres, or their largest protrusion.
 struct SphereCoverSettings {
-  std::size_t count =
-      64;  ///< [1, kMostCoverSpheres]; with max_protrusion the most that may be used
+  /// [1, kMostCoverSpheres] of each mesh; with max_protrusion the most that may be used.
+  std::size_t count = 64;
+  /// Of several meshes: counts[i], where it is not 0, in place of `count`. Empty, or one a mesh.
+  std::vector<std::size_t> counts = {};
+  /// Not 0: the spheres of all meshes together, at most. Meshes without a count of their own share
+  /// what is left such that the largest protrusion of all is as small as was found. Not with
+  /// max_protrusion.
+  std::size_t total = 0;
   /// [u] ≥ 0. 0: `count` spheres that protrude as little as possible. Else: as few spheres as are
   /// found to protrude by no more.
   double max_protrusion = 0;
@@ -70,7 +76,8 @@ struct SphereCover {
 SphereCover cover_with_spheres(const ClosedMesh& mesh, const SphereCoverSettings& settings = {},
                                const ProgressCallback& progress = {});
 
-/// The same for several meshes, on all threads at once: covers[i] is that of meshes[i].
+/// The same for several meshes, on all threads at once: covers[i] is that of meshes[i]. Equal
+/// meshes are covered once: the others' `seconds` is 0.
 std::vector<SphereCover> cover_with_spheres(std::span<const ClosedMesh> meshes,
                                             const SphereCoverSettings& settings = {},
                                             const ProgressCallback& progress = {});

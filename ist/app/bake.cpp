@@ -2,6 +2,7 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <filesystem>
 #include <memory>
 
 #include <ist/bake.h>
@@ -17,15 +18,17 @@
 #include "app/number_options.h"
 #include "app/progress_line.h"
 #include "app/setting_options.h"
+#include "app/write_mesh.h"
 #include "library/asset_summary.h"
 #include "library/coarseness.h"
 #include "library/text.h"
+#include "mesh/mesh_files.h"
 
 namespace ist::app {
 namespace {
 
 struct BakeOptions {
-  std::string mesh, output;
+  std::string mesh, output, closed_mesh;
   SettingOptions asked;
   std::string device = "auto";
   unsigned threads = 0;
@@ -75,7 +78,7 @@ nlohmann::ordered_json partners_json(const std::vector<PartnerError>& partners) 
 Baked bake_interruptibly(const ClosedMesh& mesh, const BakeSettings& settings, bool quiet) {
   constexpr double kPatience = 0.15;  // [s] some steps take seconds, and leave nothing half done
   const InterruptGuard guard(kPatience);
-  ProgressLine line(quiet);
+  ProgressLine line(quiet, settings.target.relative_error > 0);
   try {
     const auto show = [&](const Progress& progress) {
       line.show(progress);
@@ -95,7 +98,12 @@ void run_bake(const BakeOptions& options) {
   BakeSettings settings = options.asked.settings;
   settings.packing.threads = options.threads;
   const bool robot = is_robot_file(options.mesh);
-  if (!robot) require_output(options.output, options.mesh, "the asset");
+  if (!robot) {
+    if (is_mesh_format(options.output))
+      throw Error(options.output + ": has the extension of a mesh; name the asset " +
+                  std::filesystem::path(options.output).replace_extension(".ist").string());
+    require_output(options.output, options.mesh, "the asset");
+  }
   settings.packing.device = usable_device(options.device);
   if (!settings.surface_only) announce_device(settings.packing.device);
   if (robot)
@@ -109,6 +117,7 @@ void run_bake(const BakeOptions& options) {
   const double bake_seconds = seconds_since(start) - import_seconds;
   {
     const InterruptGuard guard;  // the file is written whole, or not at all
+    if (!options.closed_mesh.empty()) write_mesh(mesh.mesh, options.closed_mesh);
     asset.save(options.output);
   }
   exit_if_interrupted();
@@ -127,7 +136,7 @@ void run_bake(const BakeOptions& options) {
     result["closing"] = closing_json(mesh.report);
     result["partners"] = partners_json(partners);
     result["seconds"] = {{"import", import_seconds}, {"bake", bake_seconds}};
-    fmt::print("{}\n", result.dump(2));
+    fmt::print("{}\n", json_text(result));
   } else if (!options.quiet) {
     const std::string declares = describe_declared(declared);
     fmt::print("{}\n{}", options.output, describe_asset(asset.view()));
@@ -155,6 +164,16 @@ void add_bake(CLI::App& app) {
              "folder for LINK.ist and an index. A missing folder is created",
              Dash::refused);
   add_setting_options(command, options->asked, all_settings());
+  command
+      ->add_option("--write-mesh", options->closed_mesh,
+                   "Also write the mesh that was baked, after --repair or --wrap: .obj, .ply, .off "
+                   "or .stl")
+      ->check([](const std::string& path) -> std::string {
+        const std::string ending = ending_of(path);
+        for (const char* const known : {".obj", ".ply", ".off", ".stl"})
+          if (ending == known) return "";
+        return "'" + path + "' does not end in .obj, .ply, .off or .stl";
+      });
   add_device_option(command, options->device,
                     "Device of the bake; auto = the GPU if there is one, else the CPU");
   add_whole(command, "--threads", options->threads,
@@ -173,6 +192,8 @@ void add_bake(CLI::App& app) {
       refuse_idle_options(options->robot, options->library.manifest);
       if (!options->mesh.empty())
         throw CLI::ValidationError("--manifest", "excludes MESH; list the mesh in the manifest");
+      if (!options->closed_mesh.empty())
+        throw CLI::ValidationError("--write-mesh", "takes one mesh, not a manifest");
       if (!options->asked.given.empty())
         throw CLI::ValidationError("--" + *options->asked.given.begin(),
                                    "cannot be combined with --manifest; set it in the manifest, "
@@ -180,6 +201,8 @@ void add_bake(CLI::App& app) {
       return run_library({options->library, options->output, options->device, options->threads,
                           options->json, options->quiet});
     }
+    if (!options->closed_mesh.empty() && is_robot_file(options->mesh))
+      throw CLI::ValidationError("--write-mesh", "takes one mesh, not a robot");
     if (options->mesh.empty()) throw CLI::RequiredError(mesh->get_name());
     complete_settings(options->asked);
     refuse_idle_options(options->robot, options->mesh);

@@ -4,12 +4,14 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -52,7 +54,42 @@ Manifest read_sound_manifest(const std::string& path) {
   for (const std::string& fault : manifest.faults) spdlog::error("{}", fault);
   spdlog::error("{}: {} mistake{}; nothing was baked", path, manifest.faults.size(),
                 manifest.faults.size() == 1 ? "" : "s");
-  throw ExitCode{kExitError};
+  throw ExitCode{kExitUsage};
+}
+
+/// Assets in the folder that the manifest does not name, and those of jobs that failed.
+std::vector<std::string> stale_assets(const std::string& folder, const Manifest& manifest,
+                                      const std::vector<JobResult>& results) {
+  std::set<std::string> fresh;
+  for (const Job& job : manifest.jobs) fresh.insert(job.name + ".ist");
+  for (const JobResult& result : results)
+    if (result.status == JobStatus::failed) fresh.erase(result.name + ".ist");
+  std::vector<std::string> stale;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".ist" && !fresh.contains(entry.path().filename().string()))
+      stale.push_back(entry.path().string());
+  std::sort(stale.begin(), stale.end());
+  return stale;
+}
+
+/// Those that are left: all, or none.
+std::vector<std::string> settle_stale(std::vector<std::string> stale, bool remove) {
+  if (stale.empty()) return stale;
+  constexpr std::size_t kShown = 3;
+  std::string names;
+  for (std::size_t i = 0; i < std::min(kShown, stale.size()); ++i)
+    names += (i == 0 ? "" : ", ") + stale[i];
+  if (stale.size() > kShown) names += ", …";
+  if (!remove) {
+    spdlog::warn(
+        "stale, since the manifest does not name them or they failed: {} ({}). "
+        "--remove-stale removes them",
+        names, stale.size());
+    return stale;
+  }
+  for (const std::string& path : stale) fs::remove(path);
+  spdlog::info("removed {} stale assets: {}", stale.size(), names);
+  return {};
 }
 
 void make_folder(const std::string& path) {
@@ -124,6 +161,11 @@ void add_library_options(CLI::App* command, LibraryOptions& options) {
       "With --manifest: bake part I of N; `ist summary` merges the summaries of all parts")
       ->type_name("I/N")
       ->needs(manifest);
+  command
+      ->add_flag("--remove-stale", options.remove_stale,
+                 "With --manifest: remove assets from the folder that the manifest does not name, "
+                 "or whose bake failed")
+      ->needs(manifest);
   constexpr unsigned kMostJobs = 1024;
   add_whole(command, "--jobs", options.jobs,
             "With --manifest: number of assets baked at once; 0 = as many as threads. The result "
@@ -146,7 +188,10 @@ void run_library(const LibraryRun& run) {
     throw CLI::ValidationError("--cache-size", "has no effect without --cache or IST_CACHE");
   make_folder(run.output);
   announce_device(settings.device);
-  if (!cache.empty()) settings.cache = std::make_shared<AssetCache>(cache, run.library.cache_size);
+  if (!cache.empty())
+    settings.cache = std::make_shared<AssetCache>(cache, run.library.cache_size);
+  else
+    settings.record = std::make_shared<OutputRecord>(run.output);
 
   Summary summary;
   summary.manifest = run.library.manifest;
@@ -163,6 +208,9 @@ void run_library(const LibraryRun& run) {
   if (settings.cache && run.library.cache_size != 0 && !outcome.stopped)
     prune_cache(cache, run.library.cache_size);
   summary.results = std::move(outcome.results);
+  if (!outcome.stopped)
+    summary.stale =
+        settle_stale(stale_assets(run.output, manifest, summary.results), run.library.remove_stale);
   summary.seconds = seconds_since(start);
   print_summary(summary, run.json, run.quiet);
   if (outcome.abandoned) {

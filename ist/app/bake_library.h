@@ -11,6 +11,7 @@ struct LibraryOptions {
   std::string manifest, cache, shard;
   unsigned jobs = 0;
   std::uint64_t memory = 0, cache_size = 0;
+  bool remove_stale = false;
 };
 
 /// Adds --manifest and the options that need it.

@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <set>
+#include <optional>
 #include <system_error>
 #include <vector>
 
@@ -17,8 +18,9 @@
 #include "app/commands.h"
 #include "app/file_options.h"
 #include "app/interrupt.h"
-#include "app/mesh_notes.h"
+#include "app/link_meshes.h"
 #include "app/progress_line.h"
+#include "library/text.h"
 #include "robot/link_mesh.h"
 
 namespace ist::app {
@@ -55,7 +57,7 @@ Json pose_json(const Eigen::Quaterniond& q, const Eigen::Vector3d& t) {
 Asset bake_shape(const ClosedMesh& mesh, const RobotBake& what) {
   constexpr double kPatience = 0.15;  // [s]
   const InterruptGuard guard(kPatience);
-  ProgressLine line(what.quiet);
+  ProgressLine line(what.quiet, what.settings.target.relative_error > 0);
   try {
     const auto show = [&](const Progress& progress) {
       line.show(progress);
@@ -80,6 +82,44 @@ struct Baked {
   Asset asset;
 };
 
+/// A shape of a link; its mesh, closed, if it is one.
+struct LinkShape {
+  std::string link;
+  const PlacedShape* placed;
+  std::optional<ClosedMesh> mesh = std::nullopt;
+  std::string file = {};  ///< of its asset
+};
+
+bool equal(const LinkShape& a, const LinkShape& b) {
+  return a.mesh && b.mesh && a.mesh->mesh.triangles == b.mesh->mesh.triangles &&
+         a.mesh->mesh.vertices == b.mesh->mesh.vertices;
+}
+
+std::vector<LinkShape> closed_shapes(const RobotModel& robot, const RobotBake& what) {
+  const PackagePaths paths = package_paths(what.robot, what.options);
+  LinkMeshes meshes(what.robot, what.settings.mesh);
+  std::vector<LinkShape> shapes;
+  for (const RobotLink& link : robot.links)
+    for (const PlacedShape& placed : link.shapes(what.options.shapes())) {
+      LinkShape& shape = shapes.emplace_back(LinkShape{link.name, &placed});
+      if (std::holds_alternative<LinkMesh>(placed.shape))
+        shape.mesh =
+            meshes.close(link.name, [&] { return mesh_of(placed, paths, what.robot).mesh; });
+    }
+  meshes.finish();
+  return shapes;
+}
+
+/// LINK.ist, or where that is taken LINK_1.ist, …
+std::string free_name(const std::string& link, const std::vector<Baked>& taken) {
+  std::string file = file_name(link) + ".ist";
+  for (int k = 1; std::any_of(taken.begin(), taken.end(),
+                              [&](const Baked& baked) { return baked.file == file; });
+       ++k)
+    file = fmt::format("{}_{}.ist", file_name(link), k);
+  return file;
+}
+
 /// The folder, made if it is not there. Throws Error.
 void require_folder(const std::string& folder) {
   std::error_code error;
@@ -94,45 +134,40 @@ void require_folder(const std::string& folder) {
 void bake_robot(const RobotBake& what) {
   if (what.quiet) spdlog::set_level(spdlog::level::err);
   const auto start = std::chrono::steady_clock::now();
-  const RobotModel robot = read_robot(what.robot);
-  const PackagePaths paths = package_paths(what.robot, what.options);
+  const RobotModel robot = read_robot_for(what.options, what.robot);
   std::vector<Baked> assets;
-  std::set<std::string> taken;
   Json links = Json::object();
   std::size_t fields = 0;
-  for (const RobotLink& link : robot.links) {
-    Json shapes = Json::array();
-    for (const PlacedShape& placed : link.shapes(what.options.shapes())) {
-      if (!std::holds_alternative<LinkMesh>(placed.shape)) {
-        shapes.push_back({{"field", field_spec_of(placed.shape)},
-                          {"pose", pose_json(placed.rotation, placed.translation)}});
-        ++fields;
-        continue;
-      }
-      std::string file = file_name(link.name);
-      for (int k = 1; !taken.insert(file).second; ++k)
-        file = fmt::format("{}_{}", file_name(link.name), k);
-      file += ".ist";
-      const ClosedMesh mesh =
-          close_aloud(mesh_of(placed, paths, what.robot).mesh,
-                      fmt::format("{}: line {}: link {}", what.robot, placed.line, link.name),
-                      what.settings.mesh);
-      assets.push_back({file, bake_shape(mesh, what)});
-      // The asset is in the link's frame already.
-      shapes.push_back(
-          {{"asset", file},
-           {"pose", pose_json(Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero())}});
+  std::vector<LinkShape> shapes = closed_shapes(robot, what);
+  for (const RobotLink& link : robot.links) links[link.name] = Json::array();
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const LinkShape& shape = shapes[i];
+    if (!shape.mesh) {
+      links[shape.link].push_back(
+          {{"field", field_spec_of(shape.placed->shape)},
+           {"pose", pose_json(shape.placed->rotation, shape.placed->translation)}});
+      ++fields;
+      continue;
     }
-    links[link.name] = shapes;
+    const auto same = std::find_if(shapes.begin(), shapes.begin() + static_cast<std::ptrdiff_t>(i),
+                                   [&](const LinkShape& one) { return equal(one, shape); });
+    shapes[i].file = same->file;
+    if (&*same == &shape) {
+      shapes[i].file = free_name(shape.link, assets);
+      assets.push_back({shape.file, bake_shape(*shape.mesh, what)});
+    }
+    // The asset is in the link's frame already.
+    links[shape.link].push_back(
+        {{"asset", shape.file},
+         {"pose", pose_json(Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero())}});
   }
-  if (assets.empty() && fields == 0) refuse_no_shapes(what.options, what.robot);
   require_folder(what.folder);
   const Json index = {{"robot", robot.name}, {"links", links}};
   const std::string index_file = file_name(robot.name) + ".json";
   {
     const InterruptGuard guard;
     for (const Baked& baked : assets) baked.asset.save(fs::path(what.folder) / baked.file);
-    write_text((fs::path(what.folder) / index_file).string(), index.dump(2) + "\n");
+    write_text((fs::path(what.folder) / index_file).string(), json_text(index) + "\n");
   }
   exit_if_interrupted();
   const double seconds =
@@ -141,7 +176,7 @@ void bake_robot(const RobotBake& what) {
     Json result = {{"index", (fs::path(what.folder) / index_file).string()}};
     result.update(index);
     result["seconds"] = seconds;
-    fmt::print("{}\n", result.dump(2));
+    fmt::print("{}\n", json_text(result));
   } else if (!what.quiet) {
     fmt::print("{}\n", (fs::path(what.folder) / index_file).string());
     for (const Baked& baked : assets)

@@ -40,7 +40,7 @@ void run_cache(const CacheOptions& options) {
         {"newest_use", if_any(use.newest)},
         {"left_over", {{"files", use.left_over}, {"bytes", use.left_over_bytes}}},
         {"pruned", {{"files", pruned.entries}, {"bytes", pruned.bytes}}}};
-    fmt::print("{}\n", result.dump(2));
+    fmt::print("{}\n", json_text(result));
     return;
   }
   fmt::print("{}\n  {:<10} {}, {} bytes\n", options.folder, "assets", grouped(use.entries),

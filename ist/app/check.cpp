@@ -37,7 +37,7 @@ void print_json(const CheckOptions& options, const std::vector<Invariant>& invar
                     {"violations", i.violations}});
   const nlohmann::ordered_json result = {
       {"asset", options.asset}, {"mesh", options.mesh}, {"sound", sound}, {"invariants", list}};
-  fmt::print("{}\n", result.dump(2));
+  fmt::print("{}\n", json_text(result));
 }
 
 void print_table(const CheckOptions& options, const std::vector<Invariant>& invariants,

@@ -7,6 +7,7 @@
 #include "app/commands.h"
 #include "app/file_options.h"
 #include "library/asset_summary.h"
+#include "library/text.h"
 
 namespace ist::app {
 namespace {
@@ -19,7 +20,7 @@ struct InfoOptions {
 void info(const InfoOptions& options) {
   const Asset asset = Asset::load(options.asset);
   if (options.json)
-    fmt::print("{}\n", asset_json(asset.view()).dump(2));
+    fmt::print("{}\n", json_text(asset_json(asset.view())));
   else
     fmt::print("{}\n{}", options.asset, describe_asset(asset.view()));
 }

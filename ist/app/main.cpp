@@ -14,6 +14,7 @@
 #include "app/commands.h"
 #include "app/help_format.h"
 #include "app/interrupt.h"
+#include "app/suggestion.h"
 
 int main(int argc, char** argv) {
   using namespace ist::app;
@@ -51,7 +52,10 @@ int main(int argc, char** argv) {
       throw ist::Error("standard output: cannot write: " + std::generic_category().message(errno));
     return 0;
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitUsage;
+    if (app.exit(error) == 0) return 0;
+    if (const std::string meant = suggestion(app, {argv + 1, argv + argc}); !meant.empty())
+      std::fprintf(stderr, "Did you mean '%s'?\n", meant.c_str());
+    return kExitUsage;
   } catch (const ExitCode& code) {
     return code.value;
   } catch (const std::exception& error) {

@@ -41,7 +41,7 @@ std::string described(const OptionReference& option) {
     names += fmt::format(" \\fI{}\\fR", roff(option.value));
   std::string text = fmt::format(".TP\n{}\n{}", names, roff(option.help));
   if (!text.ends_with('.')) text += '.';
-  if (!option.choices.empty())
+  if (!option.choices.empty() && option.value.find('|') == std::string::npos)
     text += fmt::format(" One of: {}.", roff(fmt::format("{}", fmt::join(option.choices, ", "))));
   if (!option.standard.empty()) text += fmt::format(" Default: {}.", roff(option.standard));
   if (option.required && !option.positional) text += " Required.";

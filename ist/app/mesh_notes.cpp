@@ -9,11 +9,10 @@
 
 namespace ist::app {
 
-ClosedMesh close_aloud(TriangleMesh mesh, const std::string& name, const MeshSettings& settings) {
+ClosedMesh close_or_advise(TriangleMesh mesh, const std::string& name,
+                           const MeshSettings& settings) {
   try {
-    ClosedMesh closed = close_as_asked(std::move(mesh), name, settings);
-    for (const std::string& note : closed.report.notes) spdlog::warn("{}: {}", name, note);
-    return closed;
+    return close_as_asked(std::move(mesh), name, settings);
   } catch (const OpenMeshError& error) {
     throw OpenMeshError(std::string(error.what()) +
                         (settings.repair ? "; --wrap 0.5% encloses it in a closed surface"
@@ -25,7 +24,9 @@ InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings)
   TriangleMesh mesh = load_mesh(path);
   place(mesh, settings);
   const DeclaredFrame declared = mesh.declared;
-  return {declared, close_aloud(std::move(mesh), path, settings)};
+  ClosedMesh closed = close_or_advise(std::move(mesh), path, settings);
+  for (const std::string& note : closed.report.notes) spdlog::warn("{}: {}", path, note);
+  return {declared, std::move(closed)};
 }
 
 std::string describe_closing(const MeshReport& report) {

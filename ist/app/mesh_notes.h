@@ -9,9 +9,9 @@
 
 namespace ist::app {
 
-/// close_as_asked(); what was found about the mesh goes to stderr as warnings, after its name.
-/// Throws Error.
-ClosedMesh close_aloud(TriangleMesh mesh, const std::string& name, const MeshSettings& settings);
+/// close_as_asked(). Throws Error, with the option that may help.
+ClosedMesh close_or_advise(TriangleMesh mesh, const std::string& name,
+                           const MeshSettings& settings);
 
 /// read_input_mesh(); what was found about the mesh goes to stderr as warnings. Throws Error.
 InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings);

@@ -12,7 +12,8 @@ namespace {
 constexpr const char* kWipe = "\r\033[K";
 }
 
-ProgressLine::ProgressLine(bool quiet) : active_(!quiet && isatty(STDERR_FILENO) == 1) {}
+ProgressLine::ProgressLine(bool quiet, bool rounds)
+    : active_(!quiet && isatty(STDERR_FILENO) == 1), whole_(rounds) {}
 
 ProgressLine::~ProgressLine() {
   if (active_) fmt::print(stderr, "{}", kWipe);
@@ -24,8 +25,9 @@ void ProgressLine::show(const Progress& progress) {
   if (std::string_view(progress.stage) == "pack")
     packed =
         fmt::format("coverage {:.2f} %  radius {:.3g}  ", 100 * progress.coverage, progress.radius);
-  fmt::print(stderr, "{}{:<9} {:3.0f} %  {} spheres  {}{:.1f} s", kWipe, progress.stage,
-             100 * progress.fraction, progress.spheres, packed, progress.elapsed);
+  fmt::print(stderr, "{}{:3.0f} %  {:<9} {} spheres  {}{:.1f} s", kWipe,
+             100 * whole_.share(progress), progress.stage, progress.spheres, packed,
+             progress.elapsed);
   std::fflush(stderr);
 }
 

@@ -2,12 +2,15 @@
 
 #include <ist/progress.h>
 
+#include "library/whole_progress.h"
+
 namespace ist::app {
 
 /// One line on stderr that is written over and over, where stderr is a terminal; nothing elsewhere.
 class ProgressLine {
  public:
-  explicit ProgressLine(bool quiet);
+  /// `rounds`: see WholeProgress.
+  explicit ProgressLine(bool quiet, bool rounds = false);
   ~ProgressLine();  ///< wipes the line
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
@@ -16,6 +19,7 @@ class ProgressLine {
 
  private:
   bool active_;
+  WholeProgress whole_;
 };
 
 }  // namespace ist::app

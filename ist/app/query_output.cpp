@@ -71,7 +71,7 @@ std::string answers_json(std::span<const Answer> answers) {
     entry["time_us"] = answer.time_us;
     list.push_back(std::move(entry));
   }
-  return list.dump(2) + "\n";
+  return json_text(list) + "\n";
 }
 
 std::string answer_text(const Answer& answer, const PenetrationSettings& settings) {

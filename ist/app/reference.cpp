@@ -1,18 +1,24 @@
 #include "app/reference.h"
 
 #include <algorithm>
+#include <cctype>
 #include <sstream>
 
 namespace ist::app {
 namespace {
 
-/// "TEXT:{a,b}" says what there is to choose from.
+/// "TEXT:{a,b}" and "a|b|SOMETHING" say what there is to choose from; words in capitals stand for
+/// others, letters for themselves.
 void split_type(const std::string& type, OptionReference& out) {
   const std::size_t open = type.find(":{");
+  const bool listed = open != std::string::npos;
   out.value = type.substr(0, open);
-  if (open == std::string::npos) return;
-  std::istringstream choices(type.substr(open + 2, type.find('}', open) - open - 2));
-  for (std::string choice; std::getline(choices, choice, ',');) out.choices.push_back(choice);
+  if (!listed && type.find('|') == std::string::npos) return;
+  std::istringstream choices(listed ? type.substr(open + 2, type.find('}', open) - open - 2)
+                                    : type);
+  for (std::string choice; std::getline(choices, choice, listed ? ',' : '|');)
+    if (listed || choice.size() == 1 || std::islower(static_cast<unsigned char>(choice[0])) != 0)
+      out.choices.push_back(choice);
 }
 
 OptionReference reference_of(const CLI::Option& option) {

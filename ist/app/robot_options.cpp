@@ -1,10 +1,14 @@
 #include "app/robot_options.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cstdlib>
 
 #include <ist/error.h>
 
 #include "app/file_options.h"
+#include "library/settings/spelling.h"
 
 namespace ist::app {
 
@@ -27,21 +31,54 @@ void add_robot_options(CLI::App* command, RobotOptions& options) {
       ->take_all();
   command->add_flag("--visual", options.visual,
                     "Robots: use visual shapes instead of collision shapes");
+  command->add_option("--skip", options.skipped, "Robots: leave this link out. Repeatable")
+      ->type_name("LINK")
+      ->expected(1)
+      ->take_all();
 }
 
 void refuse_idle_options(const RobotOptions& options, const std::string& input) {
-  if (is_robot_file(input) || (!options.visual && options.packages.empty())) return;
-  throw CLI::ValidationError(options.visual ? "--visual" : "--package",
+  if (is_robot_file(input)) return;
+  if (!options.visual && options.packages.empty() && options.skipped.empty()) return;
+  throw CLI::ValidationError(options.visual             ? "--visual"
+                             : options.packages.empty() ? "--skip"
+                                                        : "--package",
                              "has no effect: '" + input + "' is not a robot (.urdf)");
 }
 
-void refuse_no_shapes(const RobotOptions& options, const std::string& input) {
+RobotModel read_robot_for(const RobotOptions& options, const std::string& input) {
+  RobotModel robot = read_robot(input);
+  for (const std::string& name : options.skipped) require_link(robot, name);
+  bool any = false;
+  for (RobotLink& link : robot.links) {
+    if (std::count(options.skipped.begin(), options.skipped.end(), link.name) != 0) {
+      link.collision.clear();
+      link.visual.clear();
+    }
+    any = any || !link.shapes(options.shapes()).empty();
+  }
+  if (any) return robot;
   throw Error(input + (options.visual
                            ? ": no link has a visual shape"
                            : ": no link has a collision shape; --visual uses the visual shapes"));
 }
 
-bool is_robot_file(const std::string& path) { return ending_of(path) == ".urdf"; }
+void require_link(const RobotModel& robot, const std::string& name) {
+  std::vector<std::string> names;
+  for (const RobotLink& link : robot.links) names.push_back(link.name);
+  if (std::count(names.begin(), names.end(), name) != 0) return;
+  const std::string nearest = nearest_word(name, names);
+  throw Error(fmt::format("{}: no link is called '{}'{}", robot.file.path, name,
+                          nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest)));
+}
+
+bool is_robot_file(const std::string& path) {
+  const std::string ending = ending_of(path);
+  if (ending == ".xacro")
+    throw Error(path + ": is a macro file, not a URDF; expand it: xacro " + path +
+                " -o robot.urdf");
+  return ending == ".urdf";
+}
 
 PackagePaths package_paths(const std::string& urdf, const RobotOptions& options) {
   const char* const ros_path = std::getenv("ROS_PACKAGE_PATH");

@@ -16,6 +16,13 @@ struct SampleOptions {
   std::string name, output;
 };
 
+std::string names_of_samples() {
+  std::string names;
+  for (const Sample& sample : samples())
+    names += (names.empty() ? std::string() : ",") + sample.name;
+  return names;
+}
+
 std::string list_of_samples() {
   std::string list = "NAME is one of\n";
   for (const Sample& sample : samples())
@@ -28,7 +35,9 @@ std::string list_of_samples() {
 void add_sample(CLI::App& app) {
   const auto options = std::make_shared<SampleOptions>();
   CLI::App* const command = app.add_subcommand("sample", "Write a generated closed mesh");
-  command->add_option("NAME", options->name, "Name of the mesh, see below")->required();
+  command->add_option("NAME", options->name, "Name of the mesh, see below")
+      ->required()
+      ->type_name("TEXT:{" + names_of_samples() + "}");
   add_output(command, options->output, "The mesh file to write: .obj, .ply, .off or .stl",
              Dash::refused);
   command->footer(list_of_samples());

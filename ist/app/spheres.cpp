@@ -1,10 +1,11 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include <ist/bake.h>
 #include <ist/cover_spheres.h>
@@ -13,14 +14,15 @@
 #include "app/commands.h"
 #include "app/file_options.h"
 #include "app/interrupt.h"
+#include "app/link_meshes.h"
 #include "app/mesh_notes.h"
 #include "app/number_options.h"
 #include "app/progress_line.h"
 #include "app/robot_options.h"
 #include "app/setting_options.h"
+#include "app/sphere_output.h"
 #include "library/exported_spheres.h"
 #include "robot/link_mesh.h"
-#include "robot/sphere_files.h"
 
 namespace ist::app {
 namespace {
@@ -30,66 +32,67 @@ enum class Kind { cover, inner, matched };
 struct SpheresOptions {
   std::string input, output;
   SphereCoverSettings cover;
+  std::size_t count = 0;                      ///< of each link; 0: not given
+  std::map<std::string, std::size_t> counts;  ///< of links by name
   Kind kind = Kind::cover;
   RobotOptions robot;
   SettingOptions closing;
   bool json = false, quiet = false;
 };
 
-/// A link, or the whole of a mesh, and what became of it.
-struct Link {
-  std::string name;
-  std::vector<CoverSphere> given;  ///< spheres of the description itself
-  bool has_mesh = false;
-  double slack = 0;  ///< [u] by which the mesh may be wider than the shapes
-  SphereCover cover;
-  SphereCoverProof proof;
-};
+SphereRobot read_mesh_input(const SpheresOptions& options) {
+  SphereRobot out;
+  out.input = options.input;
+  out.name = std::filesystem::path(options.input).stem().string();
+  if (!options.counts.empty())
+    throw Error(options.input + ": is a mesh, without links; give --count a number alone");
+  out.links.emplace_back().name = out.name;
+  out.links[0].has_mesh = true;
+  out.robot.name = out.name;
+  out.robot.links.emplace_back().name = out.name;
+  out.robot.joint_of = {kNone};
+  out.robot.order = {0};
+  out.meshes.push_back(read_mesh_aloud(options.input, options.closing.settings.mesh).closed);
+  return out;
+}
 
-/// The input: links, and the meshes of those that have one, in the same order.
-struct Input {
-  std::string name;
-  std::vector<Link> links;
-  std::vector<ClosedMesh> meshes;
-  RobotModel robot;  ///< no links where the input is a mesh
-};
-
-Input read_input(const SpheresOptions& options) {
-  Input input;
-  if (!is_robot_file(options.input)) {
-    input.name = std::filesystem::path(options.input).stem().string();
-    input.links.emplace_back();
-    input.links[0].name = input.name;
-    input.links[0].has_mesh = true;
-    input.meshes.push_back(read_mesh_aloud(options.input, options.closing.settings.mesh).closed);
-    return input;
-  }
-  input.robot = read_robot(options.input);
-  input.name = input.robot.name;
+SphereRobot read_robot_input(const SpheresOptions& options) {
+  SphereRobot out;
+  out.input = options.input;
+  out.robot = read_robot_for(options.robot, options.input);
+  out.name = out.robot.name;
+  for (const auto& [name, count] : options.counts) require_link(out.robot, name);
   const PackagePaths paths = package_paths(options.input, options.robot);
-  for (const RobotLink& link : input.robot.links) {
+  LinkMeshes meshes(options.input, options.closing.settings.mesh);
+  for (const RobotLink& link : out.robot.links) {
     const auto& shapes = link.shapes(options.robot.shapes());
     if (shapes.empty()) continue;
-    LinkGeometry geometry = geometry_of(shapes, paths, options.input);
-    Link& out = input.links.emplace_back();
-    out.name = link.name;
-    out.given = geometry.spheres;
-    out.slack = geometry.slack;
-    out.has_mesh = !geometry.mesh.triangles.empty();
-    if (out.has_mesh)
-      input.meshes.push_back(close_aloud(std::move(geometry.mesh),
-                                         fmt::format("{}: link {}", options.input, link.name),
-                                         options.closing.settings.mesh));
+    SphereLink& one = out.links.emplace_back();
+    one.name = link.name;
+    one.has_mesh = std::any_of(shapes.begin(), shapes.end(), [](const PlacedShape& placed) {
+      return !std::holds_alternative<LinkBall>(placed.shape);
+    });
+    const auto geometry = [&] {
+      LinkGeometry all = geometry_of(shapes, paths, options.input);
+      one.given = std::move(all.spheres);
+      one.slack = all.slack;
+      return std::move(all.mesh);
+    };
+    if (!one.has_mesh)
+      geometry();
+    else if (std::optional<ClosedMesh> closed = meshes.close(link.name, geometry))
+      out.meshes.push_back(std::move(*closed));
   }
-  if (input.links.empty()) refuse_no_shapes(options.robot, options.input);
-  return input;
+  meshes.finish();
+  return out;
 }
 
 /// The first spheres of a packing, or the matched ones of a bake.
-std::vector<CoverSphere> baked_spheres(const ClosedMesh& mesh, const SpheresOptions& options,
+std::vector<CoverSphere> baked_spheres(const ClosedMesh& mesh, std::size_t count,
+                                       const SpheresOptions& options,
                                        const ProgressCallback& progress) {
   PackingSettings settings;
-  settings.max_spheres = options.cover.count;
+  settings.max_spheres = count;
   settings.seed = options.cover.seed;
   settings.threads = options.cover.threads;
   settings.device = Device::cpu;
@@ -103,14 +106,38 @@ std::vector<CoverSphere> baked_spheres(const ClosedMesh& mesh, const SpheresOpti
   return spheres;
 }
 
-std::vector<SphereCover> make_spheres(const Input& input, const SpheresOptions& options,
+/// Counts and total as they were asked for. By default a robot has some 8 spheres a link, as
+/// planners like them, shared by need, and a mesh 64.
+SphereCoverSettings cover_settings(const SphereRobot& input, const SpheresOptions& options) {
+  constexpr std::size_t kOfALink = 8;
+  SphereCoverSettings cover = options.cover;
+  const bool shared = cover.total > 0 || (options.kind == Kind::cover && options.count == 0 &&
+                                          cover.max_protrusion == 0 && input.is_robot());
+  if (options.count > 0) cover.count = options.count;
+  if (cover.max_protrusion > 0 && options.count == 0) cover.count = 1024;
+  for (const SphereLink& link : input.links) {
+    if (!link.has_mesh) continue;
+    const auto own = options.counts.find(link.name);
+    cover.counts.push_back(own == options.counts.end() ? 0 : own->second);
+  }
+  if (!shared || cover.counts.empty()) {
+    cover.total = 0;
+  } else if (cover.total == 0) {
+    for (const std::size_t own : cover.counts) cover.total += own > 0 ? own : kOfALink;
+  }
+  return cover;
+}
+
+std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOptions& options,
                                       const ProgressCallback& progress) {
-  if (options.kind == Kind::cover) return cover_with_spheres(input.meshes, options.cover, progress);
+  const SphereCoverSettings settings = cover_settings(input, options);
+  if (options.kind == Kind::cover) return cover_with_spheres(input.meshes, settings, progress);
   std::vector<SphereCover> covers;
   for (const ClosedMesh& mesh : input.meshes) {
     const auto start = std::chrono::steady_clock::now();
+    const std::size_t own = settings.counts[covers.size()];
     SphereCover cover;
-    cover.spheres = baked_spheres(mesh, options, progress);
+    cover.spheres = baked_spheres(mesh, own > 0 ? own : settings.count, options, progress);
     cover.protrusion = sphere_protrusion(mesh, cover.spheres);
     cover.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     covers.push_back(std::move(cover));
@@ -118,7 +145,7 @@ std::vector<SphereCover> make_spheres(const Input& input, const SpheresOptions& 
   return covers;
 }
 
-void fill_links(Input& input, const SpheresOptions& options) {
+void fill_links(SphereRobot& input, const SpheresOptions& options) {
   constexpr double kPatience = 0.5;  // [s]
   const InterruptGuard guard(kPatience);
   ProgressLine line(options.quiet);
@@ -134,7 +161,7 @@ void fill_links(Input& input, const SpheresOptions& options) {
   }
   exit_if_interrupted();
   std::size_t next = 0;
-  for (Link& link : input.links) {
+  for (SphereLink& link : input.links) {
     link.proof.covered = true;
     if (link.has_mesh) {
       link.cover = std::move(covers[next]);
@@ -152,87 +179,19 @@ void fill_links(Input& input, const SpheresOptions& options) {
     if (!link.cover.reached)
       throw Error(fmt::format(
           "{}: link {}: {} spheres protrude by {:g}, more than --max-protrusion; {}", options.input,
-          link.name, options.cover.count, link.cover.protrusion.largest,
-          options.cover.count < kMostCoverSpheres ? "increase --count" : "increase it"));
+          link.name, link.cover.spheres.size(), link.cover.protrusion.largest,
+          link.cover.spheres.size() < kMostCoverSpheres ? "increase --count" : "increase it"));
   }
-}
-
-nlohmann::ordered_json link_json(const Link& link) {
-  const SphereProtrusion& p = link.cover.protrusion;
-  nlohmann::ordered_json spheres = nlohmann::ordered_json::array();
-  for (const CoverSphere& s : link.cover.spheres)
-    spheres.push_back({s.centre.x(), s.centre.y(), s.centre.z(), s.radius});
-  return {{"spheres", spheres},
-          {"protrusion", p.largest},
-          {"protrusion_mean", p.mean},
-          {"protrusion_p95", p.p95},
-          {"volume_ratio", link.has_mesh ? nlohmann::ordered_json(p.volume_ratio) : nullptr},
-          {"covered", link.proof.covered}};
-}
-
-nlohmann::ordered_json links_json(const Input& input) {
-  nlohmann::ordered_json links = nlohmann::ordered_json::object();
-  for (const Link& link : input.links) links[link.name] = link_json(link);
-  return {{"robot", input.name}, {"links", links}};
-}
-
-/// The file's text, by its ending. Throws Error.
-using Writer = std::string (*)(const Input&);
-
-std::vector<LinkSpheres> spheres_of(const Input& input) {
-  std::vector<LinkSpheres> links;
-  for (const Link& link : input.links) links.push_back({link.name, link.cover.spheres});
-  return links;
-}
-
-Writer writer_for(const std::string& output) {
-  const std::string ending = ending_of(output);
-  if (ending == ".json") return [](const Input& in) { return links_json(in).dump(1) + "\n"; };
-  if (ending == ".yml" || ending == ".yaml")
-    return [](const Input& in) { return curobo_yaml(spheres_of(in)); };
-  if (ending == ".xrdf") return [](const Input& in) { return xrdf(in.name, spheres_of(in)); };
-  if (ending == ".srdf") return [](const Input& in) { return srdf(in.name, spheres_of(in)); };
-  if (ending == ".urdf")
-    return [](const Input& in) {
-      return in.robot.links.empty() ? urdf_of_spheres(spheres_of(in)[0])
-                                    : urdf_with_spheres(in.robot, spheres_of(in));
-    };
-  throw Error(output + ": unknown format '" + ending + "'; use .urdf, .yml, .xrdf, .srdf or .json");
-}
-
-void print_report(const Input& input, const SpheresOptions& options, double seconds) {
-  if (options.json) {
-    nlohmann::ordered_json result = {{"output", options.output}, {"input", options.input}};
-    result.update(links_json(input));
-    for (const Link& link : input.links) {
-      auto& entry = result["links"][link.name];
-      entry["spheres"] = link.cover.spheres.size();
-      entry["seconds"] = link.cover.seconds;
-    }
-    result["seconds"] = seconds;
-    fmt::print("{}\n", result.dump(2));
-    return;
-  }
-  if (options.quiet) return;
-  std::size_t width = 4;
-  for (const Link& link : input.links) width = std::max(width, link.name.size());
-  fmt::print("{}\n  {:<{}} {:>7} {:>8} {:>10} {:>10} {:>10} {:>7} {:>7}\n", options.output, "link",
-             width, "spheres", "covered", "mean [u]", "p95 [u]", "max [u]", "volume", "time");
-  for (const Link& link : input.links) {
-    const SphereProtrusion& p = link.cover.protrusion;
-    fmt::print("  {:<{}} {:>7} {:>8} {:>10.4g} {:>10.4g} {:>10.4g} {:>7.3f} {:>5.2f} s\n",
-               link.name, width, link.cover.spheres.size(), link.proof.covered ? "proven" : "no",
-               p.mean, p.p95, p.largest, link.has_mesh ? p.volume_ratio : 1.0, link.cover.seconds);
-  }
-  fmt::print("  time {:.2f} s\n", seconds);
+  if (input.is_robot()) input.self = self_collision(input.robot, input.spheres());
 }
 
 void run_spheres(const SpheresOptions& options) {
   if (options.quiet) spdlog::set_level(spdlog::level::err);
-  const Writer writer = writer_for(options.output);
+  const SphereWriter writer = sphere_writer(options.output);
   require_output(options.output, options.input, "the spheres");
   const auto start = std::chrono::steady_clock::now();
-  Input input = read_input(options);
+  SphereRobot input =
+      is_robot_file(options.input) ? read_robot_input(options) : read_mesh_input(options);
   fill_links(input, options);
   const std::string text = writer(input);
   {
@@ -240,8 +199,22 @@ void run_spheres(const SpheresOptions& options) {
     write_text(options.output, text);
   }
   exit_if_interrupted();
-  print_report(input, options,
-               std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (options.json)
+    fmt::print("{}", spheres_report_json(input, options.output, seconds));
+  else if (!options.quiet)
+    fmt::print("{}", spheres_table(input, options.output, seconds));
+}
+
+/// "64" or "LINK=64".
+bool take_count(SpheresOptions& options, const std::string& text) {
+  const std::size_t equals = text.rfind('=');
+  const auto count =
+      parse_whole<std::size_t>(text.substr(equals == std::string::npos ? 0 : equals + 1));
+  if (!count || *count < 1 || *count > kMostCoverSpheres || equals == 0) return false;
+  (equals == std::string::npos ? options.count : options.counts[text.substr(0, equals)]) = *count;
+  return true;
 }
 
 }  // namespace
@@ -253,12 +226,29 @@ void add_spheres(CLI::App& app) {
   add_input(command, "INPUT", options->input, "A robot (.urdf) or a mesh (OBJ, STL, PLY, …)");
   add_output(command, options->output,
              "The file to write: .urdf (spheres as collisions), .yml (cuRobo), .xrdf, .srdf "
-             "(MoveIt) or .json",
+             "(MoveIt), .glb (links and spheres to look at) or .json",
              Dash::refused);
-  add_whole<std::size_t>(
-      command, "--count", options->cover.count,
-      "Number of spheres per link; with --max-protrusion the largest number (default then 1024)", 1,
-      kMostCoverSpheres);
+  const std::string meaning =
+      fmt::format("N or LINK=N, with a whole number N from 1 to {}", kMostCoverSpheres);
+  command
+      ->add_option_function<std::vector<std::string>>(
+          "--count",
+          [options, meaning](const std::vector<std::string>& given) {
+            for (const std::string& one : given)
+              if (!take_count(*options, one))
+                throw CLI::ValidationError("--count", fmt::format("'{}' is not {}", one, meaning));
+          },
+          "Number of spheres of each link, or with LINK=N of that link. Repeatable. With "
+          "--max-protrusion the largest number (default then 1024)")
+      ->type_name("[LINK=]N")
+      ->expected(1)
+      ->take_all();
+  CLI::Option* const total =
+      add_whole<std::size_t>(command, "--total", options->cover.total,
+                             "Number of spheres of the whole robot, shared such that the largest "
+                             "protrusion is small. Default: 8 times the links; a mesh gets 64",
+                             1, 1'000'000);
+  total->default_str("");
   CLI::Option* const most =
       add_real(command, "--max-protrusion", options->cover.max_protrusion,
                {.least = 0, .without_least = true},
@@ -273,8 +263,9 @@ void add_spheres(CLI::App& app) {
   CLI::Option* const matched = command->add_flag_callback(
       "--matched", [options] { options->kind = Kind::matched; },
       "Spheres with the link's volume; they neither contain it nor lie inside it");
-  inner->excludes(cover)->excludes(most);
-  matched->excludes(cover)->excludes(inner)->excludes(most);
+  inner->excludes(cover)->excludes(most)->excludes(total);
+  matched->excludes(cover)->excludes(inner)->excludes(most)->excludes(total);
+  most->excludes(total);
   add_robot_options(command, options->robot);
   add_whole(command, "--seed", options->cover.seed,
             "Random seed of the search; any value works equally well");
@@ -287,10 +278,10 @@ void add_spheres(CLI::App& app) {
       "Spheres are in the link's frame, lengths in the robot's unit (URDF: metres). The largest\n"
       "protrusion is proven: no point of a sphere is farther from the link. Mean and 95th\n"
       "percentile are over the surface of the spheres' union.\n"
-      "Example: ist spheres ur5.urdf -o ur5.yml --count 64");
-  command->callback([options, command] {
-    if (options->cover.max_protrusion > 0 && command->count("--count") == 0)
-      options->cover.count = 1024;
+      "Example: ist spheres ur5.urdf -o ur5.yml --total 74");
+  command->callback([options] {
+    if (options->count > 0 && options->cover.total > 0)
+      throw CLI::ValidationError("--count", "a number for every link excludes --total; use LINK=N");
     refuse_idle_options(options->robot, options->input);
     run_spheres(*options);
   });

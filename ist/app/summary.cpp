@@ -13,13 +13,15 @@ namespace {
 
 struct SummaryOptions {
   std::vector<std::string> files;
-  bool json = false;
+  bool json = false, failed = false;
 };
 
 void run_summary(const SummaryOptions& options) {
   std::vector<Summary> shards;
   for (const std::string& file : options.files) shards.push_back(read_summary(file));
-  const Summary whole = merge(std::move(shards));
+  Summary whole = merge(std::move(shards));
+  if (options.failed)
+    std::erase_if(whole.results, [](const JobResult& result) { return result.done(); });
   print_summary(whole, options.json, false);
   if (!whole.complete()) throw ExitCode{kExitError};
 }
@@ -32,6 +34,7 @@ void add_summary(CLI::App& app) {
       "summary", "Show the results of a manifest bake, or merge those of its shards");
   command->add_option("FILE", options->files, "Output of `ist bake --manifest … --json`")
       ->required();
+  command->add_flag("--failed", options->failed, "Show only assets that failed or were not baked");
   command->add_flag("--json", options->json, "Print JSON");
   command->footer(
       "Exits 1 if an asset failed, or if a shard is missing, given twice or of another library.\n"

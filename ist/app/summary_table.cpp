@@ -49,8 +49,7 @@ void print_table(const Summary& summary) {
 
 void print_summary(const Summary& summary, bool json, bool quiet) {
   if (json)
-    fmt::print("{}\n", to_json(summary).dump(2, ' ', false,
-                                             nlohmann::ordered_json::error_handler_t::replace));
+    fmt::print("{}\n", json_text(to_json(summary)));
   else if (!quiet)
     print_table(summary);
 }

@@ -46,6 +46,9 @@ void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& r
   result.bytes = entry.asset.bytes().size();
   result.spheres = tree.sphere_count();
   result.coverage = tree.coverage();
+  result.volume = tree.volume();
+  result.protrusion = tree.protrusion();
+  result.surface_error = tree.field_error();
   result.has_surface = tree.has_field();
   result.mesh_state = name_of(tree.mesh_state());
   result.mesh_triangles = tree.mesh_triangles();
@@ -109,30 +112,32 @@ JobResult do_job(const Job& job, const RunSettings& settings, const BakeMesh& ba
 
   std::optional<CacheEntry> entry;
   std::optional<CacheKey> key;
+  if (settings.cache || settings.record) key = cache_key(job);
+  if (settings.record) entry = settings.record->find(job.name, *key);
   if (settings.cache) {
-    key = cache_key(job);
     std::string damage;
     entry = settings.cache->find(*key, damage);
-    if (entry) result.status = JobStatus::cached;
     if (!damage.empty())
       result.warnings.push_back("the cache entry is damaged, so the asset was baked again: " +
                                 damage);
   }
-  if (!entry) {
+  if (entry) result.status = JobStatus::cached;
+  const bool baked = !entry;
+  if (baked) {
     entry = bake_entry(job, bake);
-    if (key) {
-      if (cache_key(job) != *key)
-        throw Error(job.mesh + ": the file changed during the bake. Bake it again");
-      try {
-        if (!was_out_of_time(entry->asset.view())) settings.cache->store(*key, *entry);
-      } catch (const Error& error) {
-        result.warnings.push_back(std::string("not stored in the cache: ") + error.what());
-      }
-    }
+    if (key && cache_key(job) != *key)
+      throw Error(job.mesh + ": the file changed during the bake. Bake it again");
+  }
+  const bool lasts = baked && !was_out_of_time(entry->asset.view());
+  try {
+    if (settings.cache && lasts) settings.cache->store(*key, *entry);
+  } catch (const Error& error) {
+    result.warnings.push_back(std::string("not stored in the cache: ") + error.what());
   }
   check_demands(job, *entry);
   const fs::path path = settings.output / (job.name + ".ist");
   write_asset(path, entry->asset);
+  if (settings.record && lasts) settings.record->add(job.name, *key, *entry);
   result.asset = path.string();
   describe(*entry, settings, result);
   return result;

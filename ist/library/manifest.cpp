@@ -15,9 +15,12 @@
 
 #include <ist/error.h>
 
+#include "library/asset_name.h"
 #include "library/glob.h"
 #include "library/settings/numbers.h"
 #include "mesh/mesh_files.h"
+#include "library/settings/numbers.h"
+#include "library/settings/spelling.h"
 
 namespace ist {
 namespace {
@@ -28,19 +31,9 @@ using Line = toml::source_index;
 /// Keys that no bake has: what the asset must be.
 constexpr std::string_view kDemands[] = {"require-surface", "min-coverage", "min-confidence"};
 
-/// How many letters have to be changed, left out or put in.
-std::size_t letters_apart(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t corner = std::exchange(row[0], i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t other = corner + (a[i - 1] == b[j - 1] ? 0 : 1);
-      corner = row[j];
-      row[j] = std::min({other, row[j] + 1, row[j - 1] + 1});
-    }
-  }
-  return row[b.size()];
+/// Which files, and what assets of them are called.
+bool is_file_key(std::string_view key) {
+  return key == "mesh" || key == "name" || key == "exclude";
 }
 
 const Setting* setting_named(std::string_view name) {
@@ -54,10 +47,8 @@ std::string other_keys(std::string key, std::vector<std::string> known) {
   std::replace(key.begin(), key.end(), '_', '-');
   for (const Setting& setting : all_settings()) known.push_back(setting.name);
   known.insert(known.end(), std::begin(kDemands), std::end(kDemands));
-  const auto nearest = std::min_element(
-      known.begin(), known.end(),
-      [&](const auto& a, const auto& b) { return letters_apart(key, a) < letters_apart(key, b); });
-  if (letters_apart(key, *nearest) <= 2) return fmt::format("did you mean '{}'?", *nearest);
+  if (const std::string nearest = nearest_word(key, known); !nearest.empty())
+    return fmt::format("did you mean '{}'?", nearest);
   return fmt::format("known keys are {}", fmt::join(known, ", "));
 }
 
@@ -149,7 +140,7 @@ class Reader {
     const toml::table* const table = node->as_table();
     if (table == nullptr) return fault(node->source().begin.line, "defaults: write [defaults]");
     for (const auto& [key, value] : *table) {
-      if (key.str() == "mesh" || key.str() == "name")
+      if (is_file_key(key.str()))
         fault(key.source().begin.line,
               fmt::format("'{}' cannot be a default: set it under an [[asset]]", key.str()));
       else
@@ -224,8 +215,7 @@ class Reader {
     Given own;
     own.demands = defaults_.demands;
     for (const auto& [key, value] : table)
-      if (key.str() != "mesh" && key.str() != "name")
-        read_setting(key, value, own, {"mesh", "name"});
+      if (!is_file_key(key.str())) read_setting(key, value, own, {"mesh", "name", "exclude"});
     Job job;
     job.demands = own.demands;
     complete_settings(job.settings, own, line);
@@ -236,20 +226,42 @@ class Reader {
     if (!mesh) return;
     const Line mesh_line = table.get("mesh")->source().begin.line;
     const Line name_line = name ? table.get("name")->source().begin.line : mesh_line;
-    const std::vector<std::string> files = files_for(*mesh, mesh_line);
-    constexpr std::string_view kStem = "{stem}";
-    if (name && name->find(kStem) == std::string::npos && files.size() > 1)
+    std::vector<std::string> files = files_for(*mesh, mesh_line);
+    if (table.contains("exclude")) exclude(*table.get("exclude"), *mesh, files);
+    if (name && name->find('{') == std::string::npos && files.size() > 1)
       return fault(name_line,
                    fmt::format("name: '{}' is one name for the {} files of '{}': include {{stem}}, "
                                "which stands for the file name without its extension",
                                *name, files.size(), *mesh));
     for (const std::string& file : files) {
-      const std::string stem = fs::path(file).stem().string();
-      job.name = name.value_or(std::string(kStem));
-      if (const std::size_t at = job.name.find(kStem); at != std::string::npos)
-        job.name.replace(at, kStem.size(), stem);
+      try {
+        job.name = name_for(name.value_or("{stem}"), file, folder_);
+      } catch (const Error& error) {
+        return fault(name_line, fmt::format("name: {}", error.what()));
+      }
       job.mesh = file;
       add(job, name_line);
+    }
+  }
+
+  /// Takes out the files that patterns match, of which each must match some.
+  void exclude(const toml::node& node, const std::string& mesh, std::vector<std::string>& files) {
+    toml::array one;
+    if (node.is_string()) one.push_back(node.as_string()->get());
+    const toml::array& patterns = node.is_array() ? *node.as_array() : one;
+    const Line line = node.source().begin.line;
+    if (patterns.empty())
+      return fault(line, "exclude: " + shown(node) + " is not a pattern or a list of patterns");
+    for (const toml::node& entry : patterns) {
+      const auto* const pattern = entry.as_string();
+      if (pattern == nullptr)
+        return fault(line, "exclude: " + shown(entry) + " is not a quoted string");
+      std::size_t gone = 0;
+      for (const fs::path& found : matching_files(folder_, pattern->get()))
+        gone += std::erase(files, found.string());
+      if (gone == 0)
+        fault(line, fmt::format("exclude: '{}' excludes none of the files of '{}'", pattern->get(),
+                                mesh));
     }
   }
 

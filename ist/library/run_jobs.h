@@ -12,6 +12,7 @@
 
 #include "library/cache.h"
 #include "library/job.h"
+#include "library/output_record.h"
 #include "library/result.h"
 
 namespace ist {
@@ -19,6 +20,8 @@ namespace ist {
 struct RunSettings {
   std::filesystem::path output;       ///< folder: an asset is output/NAME.ist
   std::shared_ptr<AssetCache> cache;  ///< null: none
+  /// Null: what is in the output folder is not looked at.
+  std::shared_ptr<OutputRecord> record;
   Device device = Device::automatic;
   unsigned threads = 0;      ///< of all jobs together; 0: all cores
   unsigned jobs = 0;         ///< at once; 0: as many as threads, and besides those that are on GPUs

@@ -38,7 +38,10 @@ Json to_json(const JobResult& result) {
           {"bytes", if_done(result.bytes)},
           {"spheres", if_done(result.spheres)},
           {"coverage", if_done(result.coverage)},
+          {"volume", if_done(result.volume)},
+          {"protrusion", if_done(result.protrusion)},
           {"has_surface", if_done(result.has_surface)},
+          {"surface_error", if_done(result.surface_error)},
           {"mesh_state", if_done(result.mesh_state)},
           {"mesh_triangles", if_done(result.mesh_triangles)},
           {"mesh_error", if_done(result.mesh_error)},
@@ -78,6 +81,11 @@ JobResult result_from(const Json& json) {
   take(json, "spheres", result.spheres);
   take(json, "coverage", result.coverage);
   if (json.contains("has_surface")) take(json, "has_surface", result.has_surface);
+  if (json.contains("volume")) {
+    take(json, "volume", result.volume);
+    take(json, "protrusion", result.protrusion);
+    take(json, "surface_error", result.surface_error);
+  }
   if (json.contains("mesh_state")) {
     take(json, "mesh_state", result.mesh_state);
     take(json, "mesh_triangles", result.mesh_triangles);
@@ -132,6 +140,7 @@ Json to_json(const Summary& summary) {
           {"complete", summary.complete()},
           {"counts", counts},
           {"seconds", summary.seconds},
+          {"stale", summary.stale},
           {"assets", assets}};
 }
 
@@ -148,11 +157,16 @@ Summary read_summary(const std::string& path) {
     take(json.at("shard"), "index", summary.shard.index);
     take(json.at("shard"), "count", summary.shard.count);
     take(json, "seconds", summary.seconds);
+    if (json.contains("stale")) take(json, "stale", summary.stale);
     for (const Json& asset : json.at("assets")) summary.results.push_back(result_from(asset));
     if (summary.shard.count < 1 || summary.shard.index < 1 ||
         summary.shard.index > summary.shard.count)
       throw Error("its shard index is not between 1 and the shard count");
     return summary;
+  } catch (const Json::exception&) {
+    throw Error(path +
+                ": is not a complete summary of `ist bake --manifest … --json`. Run that bake "
+                "again");
   } catch (const std::exception& error) {
     throw Error(fmt::format(
         "{}: is not a complete summary of `ist bake --manifest … --json`: {}. Run that bake again",
@@ -168,6 +182,7 @@ Summary merge(std::vector<Summary> shards) {
                    .library_hash = shards.front().library_hash,
                    .shard = {},
                    .seconds = 0,
+                   .stale = {},
                    .results = {}};
   const std::uint32_t count = shards.front().shard.count;
   std::uint32_t next = 1;
@@ -184,12 +199,15 @@ Summary merge(std::vector<Summary> shards) {
       throw Error(fmt::format("shard {}/{} of {} is missing", next, count, whole.manifest));
     ++next;
     whole.seconds += shard.seconds;
+    whole.stale.insert(whole.stale.end(), shard.stale.begin(), shard.stale.end());
     whole.results.insert(whole.results.end(), shard.results.begin(), shard.results.end());
   }
   if (next <= count)
     throw Error(fmt::format("shard {}/{} of {} is missing", next, count, whole.manifest));
   std::sort(whole.results.begin(), whole.results.end(),
             [](const JobResult& a, const JobResult& b) { return a.name < b.name; });
+  std::sort(whole.stale.begin(), whole.stale.end());
+  whole.stale.erase(std::unique(whole.stale.begin(), whole.stale.end()), whole.stale.end());
   return whole;
 }
 

@@ -24,6 +24,7 @@ struct Summary {
   std::uint64_t library_hash = 0;  ///< of all jobs of the manifest: equal for shards of one library
   Shard shard;
   double seconds = 0;              ///< wall time; of several shards: their sum
+  std::vector<std::string> stale;  ///< assets in the output folder that no job names; left there
   std::vector<JobResult> results;  ///< by name, sorted
 
   std::size_t count(JobStatus status) const;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include <ist/packing.h>
@@ -9,9 +10,12 @@
 
 #include "library/settings/bake_settings.h"
 
-// How numbers and names are printed for people. Files and JSON never use these but the names.
+// How numbers and names are printed: for people, and as JSON.
 
 namespace ist::app {
+
+/// For files and --json. Names that are not UTF-8 are written with replacement characters.
+std::string json_text(const nlohmann::ordered_json& json, int indent = 2);
 
 std::string grouped(std::uint64_t count);  ///< 10,000
 std::string short_vector(const Eigen::Vector3d& v);

@@ -51,6 +51,8 @@ class ImpactStatus(enum.IntEnum):
 @final
 class Progress:
     @property
+    def total(self) -> float: ...  # [0, 1]
+    @property
     def stage(self) -> str: ...
     @property
     def spheres(self) -> int: ...

@@ -215,7 +215,7 @@ void add_bakes(py::module_& module) {
                               made.met,
                               made.stop};
             },
-            progress);
+            progress, true);
       },
       py::arg("mesh"), py::arg("relative_error") = ErrorTarget().relative_error,
       py::arg("at_overlap") = ErrorTarget().at_overlap, py::kw_only(), py::arg("max_spheres") = 0,

@@ -8,6 +8,8 @@
 #include <thread>
 #include <utility>
 
+#include "library/whole_progress.h"
+
 namespace ist::python {
 namespace {
 
@@ -15,6 +17,11 @@ using namespace std::chrono_literals;
 
 constexpr auto kLook = 50ms;       // for signals
 constexpr auto kPatience = 100ms;  // with a stage that was told to end
+
+/// What Python sees.
+struct CallProgress : Progress {
+  double total = 0;
+};
 
 /// What both threads see.
 struct Job {
@@ -86,7 +93,7 @@ void give_up(Job& job) {
 
 }  // namespace
 
-void run_offline(OfflineWork work, const py::object& progress) {
+void run_offline(OfflineWork work, const py::object& progress, bool rounds) {
   const auto job = std::make_shared<Job>();
   running().begin();
   try {
@@ -98,6 +105,8 @@ void run_offline(OfflineWork work, const py::object& progress) {
     running().end();
     throw;
   }
+  app::WholeProgress whole(rounds);
+  CallProgress last;
   for (bool done = false; !done;) {
     std::optional<Progress> news;
     {
@@ -109,13 +118,19 @@ void run_offline(OfflineWork work, const py::object& progress) {
     }
     try {
       if (PyErr_CheckSignals() != 0) throw py::python_error();
-      if (news && !progress.is_none() && progress(*news).ptr() == Py_False) job->cancelled = true;
+      if (news && !progress.is_none()) {
+        last = {*news, whole.share(*news)};
+        if (progress(last).ptr() == Py_False) job->cancelled = true;
+      }
     } catch (...) {
       give_up(*job);
       throw;
     }
   }
   if (job->error) std::rethrow_exception(job->error);
+  if (progress.is_none()) return;
+  last.fraction = last.total = 1;
+  progress(last);
 }
 
 std::string path_of(const py::object& path) {
@@ -123,7 +138,9 @@ std::string path_of(const py::object& path) {
 }
 
 void add_offline(py::module_& module) {
-  py::class_<Progress>(module, "Progress", "Progress of a long stage, passed to `progress`.")
+  py::class_<CallProgress>(module, "Progress", "Progress of a long call, passed to `progress`.")
+      .def_ro("total", &CallProgress::total,
+              "[0, 1] of the whole call, an estimate that never falls; 1 in the last call.")
       .def_ro("stage", &Progress::stage,
               "'polygonise', 'resolve', 'pack', 'calibrate', 'cover', 'tree' or 'predict'.")
       .def_ro("spheres", &Progress::spheres, "Number of spheres so far.")

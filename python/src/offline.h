@@ -18,18 +18,19 @@ using OfflineWork = std::function<void(const ProgressCallback&)>;
 ///
 /// `progress` is called on the calling thread with a Progress; False from it cancels as the stage
 /// says, what it raises is raised.
+/// Its last call, once the work is done, says so. `rounds`: see app::WholeProgress.
 /// Ctrl-C raises KeyboardInterrupt within 0.2 s: the stage is told to end, and where it is in a
 /// step that cannot be cut short it ends unseen, after this call has returned.
-void run_offline(OfflineWork work, const py::object& progress);
+void run_offline(OfflineWork work, const py::object& progress, bool rounds = false);
 
 /// The same for work that answers.
 template <class Work>
-auto offline(Work work, const py::object& progress = py::none()) {
+auto offline(Work work, const py::object& progress = py::none(), bool rounds = false) {
   using Answer = decltype(work(ProgressCallback()));
   const auto answer = std::make_shared<std::optional<Answer>>();
   run_offline([work = std::move(work), answer](
                   const ProgressCallback& callback) mutable { answer->emplace(work(callback)); },
-              progress);
+              progress, rounds);
   return std::move(**answer);
 }
 

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "mesh/import/text_scanner.h"
@@ -14,7 +16,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::uint32_t kNone = XmlDocument::kNone;
+constexpr std::uint32_t kNoElement = XmlDocument::kNone;
 
 /// What the five entities that every XML file may use stand for.
 std::string decoded(std::string_view text) {
@@ -39,11 +41,15 @@ class RobotReader {
     if (xml_[0].name != "robot")
       xml_.fail(0, "is not a robot: a URDF begins with <robot name=\"…\">");
     robot_.name = decoded(xml_.attribute(0, "name"));
-    for (std::uint32_t e = xml_[0].first_child; e != kNone; e = xml_[e].next_sibling) {
+    for (std::uint32_t e = xml_[0].first_child; e != kNoElement; e = xml_[e].next_sibling) {
       if (xml_[e].name == "link") read_link(e);
       if (xml_[e].name == "joint") joints_.push_back(e);
+      if (xml_[e].name.starts_with("xacro:"))
+        xml_.fail(e, "is a macro of xacro, not a URDF. Expand it: xacro IN.xacro -o OUT.urdf");
     }
     if (robot_.links.empty()) xml_.fail(0, "contains no <link>. Add at least one");
+    for (const std::uint32_t joint : joints_) read_joint(joint);
+    for (std::size_t j = 0; j < joints_.size(); ++j) read_mimic(joints_[j], robot_.joints[j]);
     require_tree();
   }
 
@@ -64,7 +70,7 @@ class RobotReader {
       xml_.fail(element, "duplicates the link " + in_quotes(link.name) + ". Rename one of them");
     link.begin = xml_[element].offset;
     link.end = xml_[element].end;
-    for (std::uint32_t e = xml_[element].first_child; e != kNone; e = xml_[e].next_sibling) {
+    for (std::uint32_t e = xml_[element].first_child; e != kNoElement; e = xml_[e].next_sibling) {
       if (xml_[e].name == "collision") {
         link.collision.push_back(read_placed(e));
         link.collision_bytes.emplace_back(xml_[e].offset, xml_[e].end);
@@ -75,22 +81,26 @@ class RobotReader {
     robot_.links.push_back(std::move(link));
   }
 
+  std::pair<Eigen::Quaterniond, Vector3d> read_origin(std::uint32_t element) const {
+    const std::uint32_t origin = xml_.child(element, "origin");
+    if (origin == kNoElement) return {Eigen::Quaterniond::Identity(), Vector3d::Zero()};
+    const Vector3d rpy = vector(origin, "rpy", Vector3d::Zero());
+    return {Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) *
+                Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
+                Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()),
+            vector(origin, "xyz", Vector3d::Zero())};
+  }
+
   PlacedShape read_placed(std::uint32_t element) const {
     PlacedShape placed;
     const auto& bytes = robot_.file.bytes;
     placed.line = 1 + static_cast<std::size_t>(std::count(
                           bytes.begin(),
                           bytes.begin() + static_cast<std::ptrdiff_t>(xml_[element].offset), '\n'));
-    if (const std::uint32_t origin = xml_.child(element, "origin"); origin != kNone) {
-      placed.translation = vector(origin, "xyz", Vector3d::Zero());
-      const Vector3d rpy = vector(origin, "rpy", Vector3d::Zero());
-      placed.rotation = Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) *
-                        Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
-                        Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX());
-    }
+    std::tie(placed.rotation, placed.translation) = read_origin(element);
     const std::uint32_t geometry = xml_.child(element, "geometry");
-    const std::uint32_t shape = geometry == kNone ? kNone : xml_[geometry].first_child;
-    if (shape == kNone) xml_.fail(element, "has no <geometry> with a shape. Add one");
+    const std::uint32_t shape = geometry == kNoElement ? kNoElement : xml_[geometry].first_child;
+    if (shape == kNoElement) xml_.fail(element, "has no <geometry> with a shape. Add one");
     placed.shape = read_shape(shape);
     return placed;
   }
@@ -152,6 +162,10 @@ class RobotReader {
     for (const double x : v) require_length(e, name, x);
     return {v[0], v[1], v[2]};
   }
+  double real(std::uint32_t e, std::string_view name, double otherwise) const {
+    const std::string_view text = xml_.attribute(e, name);
+    return text.empty() ? otherwise : numbers<1>(e, name, text)[0];
+  }
   double length(std::uint32_t e, std::string_view name) const {
     const double value = numbers<1>(e, name, xml_.attribute(e, name))[0];
     require_length(e, name, value);
@@ -160,38 +174,92 @@ class RobotReader {
 
   std::size_t end_of(std::uint32_t joint, std::string_view which) const {
     const std::uint32_t e = xml_.child(joint, which);
-    const std::string name = e == kNone ? "" : decoded(xml_.attribute(e, "link"));
+    const std::string name = e == kNoElement ? "" : decoded(xml_.attribute(e, "link"));
     const auto found = link_.find(name);
     if (found == link_.end())
       xml_.fail(joint, "its " + std::string(which) + " " + in_quotes(name) + " is not a link");
     return found->second;
   }
 
-  /// Every link but one is the child of one joint, and none its own ancestor.
-  void require_tree() const {
-    constexpr std::size_t kRoot = SIZE_MAX;
-    std::vector<std::size_t> parent(robot_.links.size(), kRoot);
-    for (const std::uint32_t joint : joints_) {
-      const std::size_t child = end_of(joint, "child");
-      if (parent[child] != kRoot)
-        xml_.fail(joint, "link " + in_quotes(robot_.links[child].name) +
-                             " already has a parent. A URDF is a tree");
-      parent[child] = end_of(joint, "parent");
+  void read_joint(std::uint32_t e) {
+    RobotJoint joint;
+    joint.name = decoded(xml_.attribute(e, "name"));
+    joint.child = end_of(e, "child");
+    joint.parent = end_of(e, "parent");
+    const auto [rotation, translation] = read_origin(e);
+    joint.origin = Eigen::Translation3d(translation) * rotation;
+    const std::string_view type = xml_.attribute(e, "type");
+    if (type == "revolute" || type == "continuous") {
+      joint.motion = RobotJoint::Motion::turning;
+    } else if (type == "prismatic") {
+      joint.motion = RobotJoint::Motion::sliding;
+    } else if (type != "fixed" && type != "floating" && type != "planar") {
+      xml_.fail(e, "its type " + in_quotes(type) +
+                       " is unknown. Use fixed, revolute, continuous, prismatic, floating or "
+                       "planar");
     }
-    std::vector<char> state(parent.size(), 0);  // 1: on the way up, 2: leads to a root
-    std::size_t roots = 0;
-    for (std::size_t first = 0; first < parent.size(); ++first) {
-      if (parent[first] == kRoot) ++roots;
-      std::vector<std::size_t> way;
-      std::size_t at = first;
-      for (; at != kRoot && state[at] == 0; at = parent[at]) {
-        state[at] = 1;
-        way.push_back(at);
-      }
-      if (at != kRoot && state[at] == 1)
-        xml_.fail(0, "its joints form a cycle through link " + in_quotes(robot_.links[at].name) +
-                         ". A URDF is a tree");
-      for (const std::size_t link : way) state[link] = 2;
+    if (joint.motion != RobotJoint::Motion::fixed) read_motion(e, type == "continuous", joint);
+    if (!joint_.emplace(joint.name, robot_.joints.size()).second)
+      xml_.fail(e, "duplicates the joint " + in_quotes(joint.name) + ". Rename one of them");
+    robot_.joints.push_back(std::move(joint));
+  }
+
+  void read_motion(std::uint32_t e, bool endless, RobotJoint& joint) const {
+    name_of(e);
+    if (const std::uint32_t axis = xml_.child(e, "axis"); axis != kNoElement)
+      joint.axis = vector(axis, "xyz", Vector3d::UnitX());
+    if (joint.axis.norm() == 0) xml_.fail(e, "its axis has the length 0");
+    joint.axis.normalize();
+    joint.lower = -std::numbers::pi;
+    joint.upper = std::numbers::pi;
+    const std::uint32_t limit = xml_.child(e, "limit");
+    if (endless) return;
+    if (limit == kNoElement) xml_.fail(e, "has no <limit>. Add lower=\"…\" and upper=\"…\"");
+    joint.lower = real(limit, "lower", 0);
+    joint.upper = real(limit, "upper", 0);
+    if (joint.lower > joint.upper) xml_.fail(limit, "lower is above upper. Exchange them");
+  }
+
+  void read_mimic(std::uint32_t e, RobotJoint& joint) const {
+    const std::uint32_t mimic = xml_.child(e, "mimic");
+    if (mimic == kNoElement || joint.motion == RobotJoint::Motion::fixed) return;
+    const std::string name = decoded(xml_.attribute(mimic, "joint"));
+    const auto found = joint_.find(name);
+    if (found == joint_.end() || xml_.child(joints_[found->second], "mimic") != kNoElement)
+      xml_.fail(mimic, in_quotes(name) + " is not a joint that moves on its own");
+    joint.mimics = found->second;
+    joint.multiplier = real(mimic, "multiplier", 1);
+    joint.offset = real(mimic, "offset", 0);
+  }
+
+  /// Every link but one is the child of one joint, and none its own ancestor.
+  void require_tree() {
+    const std::size_t count = robot_.links.size();
+    robot_.joint_of.assign(count, kNone);
+    std::vector<std::vector<std::size_t>> children(count);
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      const RobotJoint& joint = robot_.joints[j];
+      if (robot_.joint_of[joint.child] != kNone)
+        xml_.fail(joints_[j], "link " + in_quotes(robot_.links[joint.child].name) +
+                                  " already has a parent. A URDF is a tree");
+      robot_.joint_of[joint.child] = j;
+      children[joint.parent].push_back(joint.child);
+    }
+    std::vector<std::size_t>& order = robot_.order;
+    for (std::size_t i = 0; i < count; ++i)
+      if (robot_.joint_of[i] == kNone) order.push_back(i);
+    const std::size_t roots = order.size();
+    std::vector<bool> reached(count, false);
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      reached[order[k]] = true;
+      order.insert(order.end(), children[order[k]].begin(), children[order[k]].end());
+    }
+    if (order.size() < count) {
+      auto at = static_cast<std::size_t>(std::find(reached.begin(), reached.end(), false) -
+                                         reached.begin());
+      for (std::size_t k = 0; k < count; ++k) at = robot_.joints[robot_.joint_of[at]].parent;
+      xml_.fail(0, "its joints form a cycle through link " + in_quotes(robot_.links[at].name) +
+                       ". A URDF is a tree");
     }
     if (roots != 1)
       xml_.fail(0, "has " + std::to_string(roots) +
@@ -202,7 +270,7 @@ class RobotReader {
 
   RobotModel& robot_;
   const XmlDocument xml_;
-  std::map<std::string, std::size_t> link_;
+  std::map<std::string, std::size_t> link_, joint_;
   std::vector<std::uint32_t> joints_;
 };
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -52,15 +53,39 @@ struct RobotLink {
   }
 };
 
-/// Links in the order of the file; its bytes are kept.
+inline constexpr std::size_t kNone = SIZE_MAX;  ///< no link or joint
+
+/// How a link stands in its parent's frame. Floating and planar joints are taken as fixed.
+struct RobotJoint {
+  enum class Motion { fixed, turning, sliding };
+  std::string name;
+  std::size_t parent = 0, child = 0;                         ///< links
+  Eigen::Isometry3d origin = Eigen::Isometry3d::Identity();  ///< of the child, at position 0
+  Motion motion = Motion::fixed;
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< of length 1, in the child's frame
+  double lower = 0, upper = 0;                      ///< [rad] or [u]
+  /// The joint that moves this one, which stands at multiplier · (its position) + offset; or kNone.
+  std::size_t mimics = kNone;
+  double multiplier = 1, offset = 0;
+
+  /// Whether a planner sets its position.
+  bool is_free() const { return motion != Motion::fixed && mimics == kNone; }
+};
+
+/// Links and joints in the order of the file; its bytes are kept.
 struct RobotModel {
   SourceFile file;
   std::string name;
   std::vector<RobotLink> links;
+  std::vector<RobotJoint> joints;
+  std::vector<std::size_t>
+      joint_of;                    ///< of each link, the joint it is the child of; kNone: the root
+  std::vector<std::size_t> order;  ///< links, parents before children
 };
 
 /// Reads a URDF. Strict where a mistake would move or lose a shape: numbers must be finite, lengths
-/// above 0, joints must make one tree of the links. What describes no shape is not looked at.
+/// above 0, joints must make one tree of the links. What is neither a link's shape nor a joint is
+/// not looked at.
 /// Document types are refused, and with them entities. Throws Error (file, line, what, way out).
 RobotModel read_robot(const std::string& path);
 

@@ -3,7 +3,12 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <filesystem>
+#include <map>
 #include <string_view>
+
+#include "robot/kinematics.h"
+#include "robot/self_collision.h"
 
 namespace ist {
 namespace {
@@ -14,6 +19,12 @@ std::string number(double x) {
   char text[400];
   const auto end = std::to_chars(text, text + sizeof text, x + 0.0, std::chars_format::fixed).ptr;
   return std::string(text, end);
+}
+
+/// The same, for readers that tell whole numbers and others apart.
+std::string real(double x) {
+  const std::string text = number(x);
+  return text.find('.') == std::string::npos ? text + ".0" : text;
 }
 
 std::string vector(const Eigen::Vector3d& v, const char* between) {
@@ -88,6 +99,56 @@ void append_yaml(std::span<const LinkSpheres> links, const std::string& indent, 
   }
 }
 
+std::string yaml_list(const std::vector<std::string>& items) {
+  std::string out;
+  for (const std::string& item : items) out += (out.empty() ? "" : ", ") + item;
+  return "[" + out + "]";
+}
+
+/// "self_collision_ignore:" and what to ignore of each link; all of it once.
+void append_ignored(const SelfCollision& self, const std::string& key, const std::string& indent,
+                    std::string& out) {
+  std::map<std::string, std::vector<std::string>> ignored;
+  for (const IgnoredPair& pair : self.ignored) ignored[pair.a].push_back(yaml_text(pair.b));
+  out += indent + key + (ignored.empty() ? ": {}\n" : ":\n");
+  for (const auto& [link, others] : ignored)
+    out += indent + "  " + yaml_text(link) + ": " + yaml_list(others) + "\n";
+}
+
+void append_buffers(std::span<const LinkSpheres> links, const SelfCollision& self,
+                    const std::string& key, const std::string& indent, std::string& out) {
+  out += indent + key + ":\n";
+  for (const LinkSpheres& link : links)
+    out += indent + "  " + yaml_text(link.link) + ": " + real(self.buffer(link.link)) + "\n";
+}
+
+// What a URDF does not state, as cuRobo's own robots have it.
+constexpr double kAcceleration = 15;  // [rad/s², u/s²]
+constexpr double kJerk = 500;         // [rad/s³, u/s³]
+
+/// Free joints: names, default positions, and a number for each.
+struct Cspace {
+  explicit Cspace(const RobotModel& robot) {
+    const Positions all = default_positions(robot);
+    for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+      if (!robot.joints[j].is_free()) continue;
+      names.push_back(yaml_text(robot.joints[j].name));
+      positions.push_back(real(all[j]));
+    }
+  }
+  std::string each(double value) const {
+    return yaml_list(std::vector<std::string>(names.size(), real(value)));
+  }
+  std::vector<std::string> names, positions;
+};
+
+std::vector<std::string> tool_names(const RobotModel& robot) {
+  std::vector<std::string> names;
+  for (const std::size_t link : tool_links(robot))
+    names.push_back(yaml_text(robot.links[link].name));
+  return names;
+}
+
 }  // namespace
 
 std::string urdf_with_spheres(const RobotModel& robot, std::span<const LinkSpheres> links) {
@@ -130,23 +191,71 @@ std::string urdf_of_spheres(const LinkSpheres& link) {
          xml_text(link.link) + "\">\n    " + collisions(link, "    ") + "\n  </link>\n</robot>\n";
 }
 
-std::string curobo_yaml(std::span<const LinkSpheres> links) {
+std::string curobo_spheres(std::span<const LinkSpheres> links) {
   std::string out = "collision_spheres:\n";
   append_yaml(links, "  ", out);
   return out;
 }
 
-std::string xrdf(const std::string& robot, std::span<const LinkSpheres> links) {
-  const std::string geometry = yaml_text((robot.empty() ? "robot" : robot) + "_spheres");
-  std::string out = "format: xrdf\nformat_version: 1.0\n\ncollision:\n  geometry: " + geometry +
-                    "\n\nself_collision:\n  geometry: " + geometry + "\n\ngeometry:\n  " +
-                    geometry + ":\n    spheres:\n";
+std::string curobo_robot(const RobotModel& robot, const std::string& urdf,
+                         std::span<const LinkSpheres> links, const SelfCollision& self) {
+  const std::vector<std::string> tools = tool_names(robot);
+  const Cspace cspace(robot);
+  std::vector<std::string> names;
+  for (const LinkSpheres& link : links) names.push_back(yaml_text(link.link));
+  const std::string all = yaml_list(names);
+  std::string out = "robot_cfg:\n  kinematics:\n";
+  const auto line = [&](const std::string& text) { out += "    " + text + "\n"; };
+  line("urdf_path: " + yaml_text(urdf));
+  line("asset_root_path: " + yaml_text(std::filesystem::path(urdf).parent_path().string()));
+  line("base_link: " + yaml_text(robot.links[robot.order.front()].name));
+  line("ee_link: " + tools.front());
+  line("link_names: " + (tools.size() > 1 ? yaml_list(tools) : "null"));
+  line("lock_joints: null");
+  line("extra_links: null");
+  line("collision_link_names: " + all);
+  line("mesh_link_names: " + all);
+  line("collision_sphere_buffer: 0.0");
+  line("extra_collision_spheres: {}");
+  append_ignored(self, "self_collision_ignore", "    ", out);
+  append_buffers(links, self, "self_collision_buffer", "    ", out);
+  line("cspace:");
+  line("  joint_names: " + yaml_list(cspace.names));
+  line("  retract_config: " + yaml_list(cspace.positions));
+  line("  null_space_weight: " + cspace.each(1));
+  line("  cspace_distance_weight: " + cspace.each(1));
+  line("  max_acceleration: " + real(kAcceleration) + "  # a URDF has none; set your robot's");
+  line("  max_jerk: " + real(kJerk) + "  # a URDF has none; set your robot's");
+  line("collision_spheres:");
   append_yaml(links, "      ", out);
   return out;
 }
 
-std::string srdf(const std::string& robot, std::span<const LinkSpheres> links) {
-  std::string out = "<?xml version=\"1.0\"?>\n<robot name=\"" + xml_text(robot) + "\">\n";
+std::string xrdf(const RobotModel& robot, std::span<const LinkSpheres> links,
+                 const SelfCollision& self) {
+  const std::string geometry = yaml_text((robot.name.empty() ? "robot" : robot.name) + "_spheres");
+  const Cspace cspace(robot);
+  std::string out = "format: xrdf\nformat_version: 1.0\n\ndefault_joint_positions:";
+  if (cspace.names.empty()) out += " {}";
+  for (std::size_t j = 0; j < cspace.names.size(); ++j)
+    out += "\n  " + cspace.names[j] + ": " + cspace.positions[j];
+  out += "\n\n# A URDF has no limits of acceleration and jerk: set your robot's.\ncspace:";
+  out += "\n  joint_names: " + yaml_list(cspace.names);
+  out += "\n  acceleration_limits: " + cspace.each(kAcceleration);
+  out += "\n  jerk_limits: " + cspace.each(kJerk);
+  out += "\n\ntool_frames: " + yaml_list(tool_names(robot)) + "\n\n";
+  out += "collision:\n  geometry: " + geometry + "\n  buffer_distance: {}\n\n";
+  out += "self_collision:\n  geometry: " + geometry + "\n";
+  append_buffers(links, self, "buffer_distance", "  ", out);
+  append_ignored(self, "ignore", "  ", out);
+  out += "\ngeometry:\n  " + geometry + ":\n    spheres:\n";
+  append_yaml(links, "      ", out);
+  return out;
+}
+
+std::string srdf(const RobotModel& robot, std::span<const LinkSpheres> links,
+                 const SelfCollision& self) {
+  std::string out = "<?xml version=\"1.0\"?>\n<robot name=\"" + xml_text(robot.name) + "\">\n";
   for (const LinkSpheres& link : links) {
     out += "  <link_sphere_approximation link=\"" + xml_text(link.link) + "\">\n";
     for (const CoverSphere& s : link.spheres)
@@ -154,6 +263,9 @@ std::string srdf(const std::string& robot, std::span<const LinkSpheres> links) {
              "\"/>\n";
     out += "  </link_sphere_approximation>\n";
   }
+  for (const IgnoredPair& pair : self.ignored)
+    out += "  <disable_collisions link1=\"" + xml_text(pair.a) + "\" link2=\"" + xml_text(pair.b) +
+           "\" reason=\"" + pair.reason + "\"/>\n";
   return out + "</robot>\n";
 }
 

@@ -17,7 +17,10 @@ namespace ist {
 struct LinkSpheres {
   std::string link;
   std::vector<CoverSphere> spheres;
+  double protrusion = 0;  ///< [u] none reaches further out of the link
 };
+
+struct SelfCollision;
 
 /// The URDF with every collision of these links replaced by spheres; all else is kept, byte for
 /// byte.
@@ -26,14 +29,21 @@ std::string urdf_with_spheres(const RobotModel& robot, std::span<const LinkSpher
 /// A URDF of one link that is spheres, for a mesh that belongs to no robot.
 std::string urdf_of_spheres(const LinkSpheres& link);
 
-/// cuRobo: collision_spheres, a list of center and radius a link.
-std::string curobo_yaml(std::span<const LinkSpheres> links);
+/// cuRobo: collision_spheres alone, a list of center and radius a link, for a mesh that belongs to
+/// no robot.
+std::string curobo_spheres(std::span<const LinkSpheres> links);
 
-/// XRDF 1.0: format, a geometry of spheres, and collision and self_collision that use it. What a
-/// robot needs besides (cspace, tool_frames) is not known here.
-std::string xrdf(const std::string& robot, std::span<const LinkSpheres> links);
+/// cuRobo: a whole robot_cfg. `urdf`: where the robot's file will be found.
+std::string curobo_robot(const RobotModel& robot, const std::string& urdf,
+                         std::span<const LinkSpheres> links, const SelfCollision& self);
 
-/// MoveIt: an SRDF with a link_sphere_approximation a link.
-std::string srdf(const std::string& robot, std::span<const LinkSpheres> links);
+/// XRDF 1.0: cspace, tool frames, a geometry of spheres, and collision and self_collision that use
+/// it.
+std::string xrdf(const RobotModel& robot, std::span<const LinkSpheres> links,
+                 const SelfCollision& self);
+
+/// MoveIt: an SRDF with a link_sphere_approximation a link, and disable_collisions.
+std::string srdf(const RobotModel& robot, std::span<const LinkSpheres> links,
+                 const SelfCollision& self);
 
 }  // namespace ist

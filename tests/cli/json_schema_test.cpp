@@ -87,7 +87,9 @@ TEST_F(JsonSchema, Robots) {
   write("r.urdf",
         "<robot name='r'><link name='NAME'>"
         "<collision><geometry><mesh filename='cube.obj'/></geometry></collision>"
-        "<collision><geometry><sphere radius='1'/></geometry></collision></link></robot>");
+        "<collision><geometry><sphere radius='1'/></geometry></collision></link>"
+        "<link name='b'/><joint name='j' type='fixed'><parent link='NAME'/><child link='b'/></joint>"
+        "</robot>");
   Paths report, file, bake;
   add({"spheres", "r.urdf", "-o", "s.json", "--count", "8", "--json"}, report);
   Paths expected = documented("`ist spheres --json`");

@@ -1,7 +1,9 @@
 #include <urdf_parser/urdf_parser.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "cli/program.h"
@@ -99,12 +101,150 @@ TEST_F(RobotCommands, EveryFormatHoldsTheSameSpheres) {
   EXPECT_EQ(xrdf["format"].as<std::string>(), "xrdf");
   EXPECT_EQ(xrdf["collision"]["geometry"].as<std::string>(), "arm_spheres");
   for (const auto& [name, link] : json["links"].items()) {
-    expect_same(curobo["collision_spheres"][name], link["spheres"]);
+    expect_same(curobo["robot_cfg"]["kinematics"]["collision_spheres"][name], link["spheres"]);
     expect_same(xrdf["geometry"]["arm_spheres"]["spheres"][name], link["spheres"]);
     EXPECT_NE(read("s.srdf").find("<link_sphere_approximation link=\"" + name + "\">"),
               std::string::npos);
   }
   EXPECT_NE(read("s.srdf").find("<sphere center=\"1 0 0\" radius=\"0.5\"/>"), std::string::npos);
+}
+
+/// An arm of four links with a gripper of two fingers that move together.
+constexpr const char* kArm = R"(<robot name="arm">
+  <link name="base"><collision><geometry><box size="0.3 0.3 0.3"/></geometry></collision></link>
+  <link name="upper"><collision><origin xyz="0.5 0 0"/><geometry><box size="0.9 0.2 0.2"/></geometry></collision></link>
+  <link name="lower"><collision><origin xyz="0.5 0 0"/><geometry><box size="0.9 0.2 0.2"/></geometry></collision></link>
+  <link name="hand"><collision><geometry><box size="0.1 0.3 0.1"/></geometry></collision></link>
+  <link name="left"><collision><origin xyz="0.1 0 0"/><geometry><box size="0.1 0.02 0.02"/></geometry></collision></link>
+  <link name="right"><collision><origin xyz="0.1 0 0"/><geometry><box size="0.1 0.02 0.02"/></geometry></collision></link>
+  <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/><limit lower="0.5" upper="2.5" effort="1" velocity="1"/></joint>
+  <joint name="j2" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="1 0 0"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+  <joint name="f" type="fixed"><parent link="lower"/><child link="hand"/><origin xyz="1 0 0"/></joint>
+  <joint name="l" type="prismatic"><parent link="hand"/><child link="left"/><origin xyz="0 0.1 0"/><axis xyz="0 1 0"/><limit lower="0" upper="0.04" effort="1" velocity="1"/></joint>
+  <joint name="r" type="prismatic"><parent link="hand"/><child link="right"/><origin xyz="0 -0.1 0"/><axis xyz="0 -1 0"/><limit lower="0" upper="0.04" effort="1" velocity="1"/><mimic joint="l"/></joint>
+</robot>)";
+
+TEST_F(RobotCommands, PlannersGetAWholeRobot) {
+  write("arm.urdf", kArm);
+  for (const char* file : {"a.yml", "a.xrdf", "a.srdf", "a.json"})
+    ASSERT_EQ(ist({"spheres", "arm.urdf", "-o", file, "--count", "3"}).exit_code, 0) << file;
+  const YAML::Node xrdf = YAML::LoadFile((folder_ / "a.xrdf").string());
+  const YAML::Node curobo = YAML::LoadFile((folder_ / "a.yml").string())["robot_cfg"]["kinematics"];
+  using Words = std::vector<std::string>;
+  const Words joints = {"j1", "j2", "l"};
+  EXPECT_EQ(curobo["urdf_path"].as<std::string>(), (folder_ / "arm.urdf").string());
+  EXPECT_EQ(curobo["base_link"].as<std::string>(), "base");
+  EXPECT_EQ(curobo["ee_link"].as<std::string>(), "hand");
+  EXPECT_EQ(curobo["collision_link_names"].as<Words>(),
+            (Words{"base", "upper", "lower", "hand", "left", "right"}));
+  EXPECT_EQ(curobo["cspace"]["joint_names"].as<Words>(), joints);
+  EXPECT_EQ(curobo["cspace"]["retract_config"].as<std::vector<double>>(),
+            (std::vector<double>{1.5, 0, 0}));
+  // What cuRobo's converter of XRDF asks for.
+  EXPECT_TRUE(xrdf["collision"]["buffer_distance"].IsMap());
+  EXPECT_EQ(xrdf["self_collision"]["geometry"].as<std::string>(),
+            xrdf["collision"]["geometry"].as<std::string>());
+  EXPECT_EQ(xrdf["tool_frames"].as<Words>(), Words{"hand"});
+  EXPECT_EQ(xrdf["cspace"]["joint_names"].as<Words>(), joints);
+  for (const char* limits : {"acceleration_limits", "jerk_limits"})
+    EXPECT_EQ(xrdf["cspace"][limits].size(), 3u);
+  EXPECT_EQ(xrdf["default_joint_positions"]["j1"].as<double>(), 1.5);
+  // All three ignore the same pairs, neighbours among them.
+  const Json json = Json::parse(read("a.json"));
+  std::size_t adjacent = 0;
+  for (const Json& pair : json["self_collision"]["ignored"]) {
+    const std::string a = pair["links"][0], b = pair["links"][1], reason = pair["reason"];
+    adjacent += reason == "Adjacent" ? 1 : 0;
+    for (const YAML::Node& ignore :
+         {curobo["self_collision_ignore"], xrdf["self_collision"]["ignore"]}) {
+      const Words others = ignore[a].as<Words>();
+      EXPECT_NE(std::find(others.begin(), others.end(), b), others.end()) << a << b;
+    }
+    EXPECT_NE(read("a.srdf").find("<disable_collisions link1=\"" + a + "\" link2=\"" + b +
+                                  "\" reason=\"" + reason + "\"/>"),
+              std::string::npos);
+  }
+  EXPECT_EQ(adjacent, 5u);
+  EXPECT_EQ(json["self_collision"]["pairs"], 15);
+  for (const auto& [name, link] : json["links"].items())
+    EXPECT_GE(curobo["self_collision_buffer"][name].as<double>(),
+              -link["protrusion"].get<double>());
+}
+
+TEST_F(RobotCommands, CountsOfTheRobotAndOfLinks) {
+  write("arm.urdf", kArm);
+  const auto links = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"spheres", "arm.urdf", "-o", "a.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = ist(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return Json::parse(read("a.json"))["links"];
+  };
+  const auto total = [](const Json& links) {
+    std::size_t count = 0;
+    for (const Json& link : links) count += link["spheres"].size();
+    return count;
+  };
+  const Json by_default = links({});
+  EXPECT_LE(total(by_default), 48u);
+  EXPECT_GT(by_default["upper"]["spheres"].size(), by_default["left"]["spheres"].size());
+  const Json own = links({"--total", "20", "--count", "upper=3", "--skip", "base"});
+  EXPECT_LE(total(own), 20u);
+  EXPECT_EQ(own["upper"]["spheres"].size(), 3u);
+  EXPECT_FALSE(own.contains("base"));
+  EXPECT_EQ(links({"--count", "4", "--count", "hand=2"})["hand"]["spheres"].size(), 2u);
+  EXPECT_EQ(links({"--count", "2", "--inner"})["upper"]["spheres"].size(), 2u);
+  expect_error({"spheres", "arm.urdf", "-o", "o.json", "--total", "5"}, 1, "Increase it");
+  expect_error({"spheres", "arm.urdf", "-o", "o.json", "--total", "9", "--count", "1"}, 2,
+               "excludes --total");
+  expect_error({"spheres", "arm.urdf", "-o", "o.json", "--count", "uper=2"}, 1,
+               "did you mean 'upper'?");
+  expect_error({"spheres", "arm.urdf", "-o", "o.json", "--skip", "uper"}, 1,
+               "did you mean 'upper'?");
+  expect_error({"spheres", "cube.obj", "-o", "o.json", "--skip", "a"}, 2, "is not a robot");
+}
+
+TEST_F(RobotCommands, AllOpenLinksAreToldAtOnce) {
+  write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const std::string mesh =
+      "<collision><geometry><mesh filename='open.obj'/></geometry></collision></link>";
+  write("two.urdf", "<robot name='r'><link name='first'>" + mesh + "<link name='second'>" + mesh +
+                        "<link name='third'><collision><geometry><box size='1 1 1'/></geometry>"
+                        "</collision></link>"
+                        "<joint name='a' type='fixed'><parent link='first'/><child link='second'/>"
+                        "</joint><joint name='b' type='fixed'><parent link='second'/>"
+                        "<child link='third'/></joint></robot>");
+  for (const char* command : {"spheres", "bake"}) {
+    expect_error({command, "two.urdf", "-o", "o.json"}, 1, "link first");
+    expect_error({command, "two.urdf", "-o", "o.json"}, 1, "link second");
+    expect_error({command, "two.urdf", "-o", "o.json"}, 1, "2 links failed");
+    ASSERT_EQ(ist({command, "two.urdf", "-o", std::string(command) + ".json", "--skip", "first",
+                   "--skip", "second"})
+                  .exit_code,
+              0);
+  }
+  expect_error({"spheres", "r.urdf.xacro", "-o", "o.json"}, 1, "xacro r.urdf.xacro -o");
+}
+
+/// Links and spheres stand where the joints put them, and are read back as meshes.
+TEST_F(RobotCommands, AScene) {
+  write("arm.urdf", kArm);
+  ASSERT_EQ(ist({"spheres", "arm.urdf", "-o", "a.glb", "--count", "3"}).exit_code, 0);
+  const std::string bytes = read("a.glb");
+  std::uint32_t length = 0;
+  std::memcpy(&length, bytes.data() + 12, 4);
+  const Json scene = Json::parse(bytes.substr(20, length));
+  const auto node = [&](const std::string& name) -> const Json& {
+    for (const Json& one : scene["nodes"])
+      if (one.value("name", "") == name) return one;
+    throw std::runtime_error(name);
+  };
+  EXPECT_NEAR(node("upper")["translation"][2].get<double>(), 0.3, 1e-12);
+  EXPECT_NEAR(node("hand")["translation"][0].get<double>(), 2 * std::cos(1.5), 1e-12);
+  EXPECT_NEAR(node("hand")["translation"][2].get<double>(), 0.3 - 2 * std::sin(1.5), 1e-12);
+  EXPECT_TRUE(node("lower mesh").contains("mesh"));
+  EXPECT_GE(node("lower spheres")["children"].size(), 2u);
+  EXPECT_EQ(ist({"bake", "a.glb", "-o", "scene.ist", "--spheres", "10"}).exit_code, 0);
 }
 
 TEST_F(RobotCommands, TheSameBytesAgainAndTheReportAsJson) {

@@ -49,6 +49,11 @@ TEST_F(Usage, WrongUsageExitsWith2AndSaysWhy) {
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--grid", "octree"}, "grid");
   expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--device", "tpu"}, "device");
   expect_usage_error({"sample", "cube"}, "output");
+  // What was probably meant.
+  expect_usage_error({"bke", "cube.obj"}, "Did you mean 'bake'?");
+  expect_usage_error({"bake", "cube.obj", "-o", "new.ist", "--sphere=5"},
+                     "Did you mean '--spheres'?");
+  expect_usage_error({"bake", "cube.obj", "--ouput", "new.ist"}, "Did you mean '--output'?");
 }
 
 /// Formats with doubles bring back the very mesh; STL keeps single precision and no sharing.
@@ -67,6 +72,22 @@ TEST_F(Usage, SamplesAreReadBackAsTheyAre) {
             tolerance)
             << name << " triangle " << t;
   }
+}
+
+TEST_F(Usage, AnAssetHasNotTheNameOfAMesh) {
+  const Outcome outcome = ist({"bake", "cube.obj", "-o", "q.obj"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.err.find("name the asset q.ist"), std::string::npos) << outcome.err;
+  EXPECT_TRUE(new_files().empty());
+}
+
+TEST_F(Usage, JsonOfNamesThatAreNotUtf8) {
+  const std::string name = "c\xff.ist";
+  ASSERT_EQ(ist({"bake", "cube.obj", "-o", name, "--spheres", "5", "--json"}).exit_code, 0);
+  write("bad.json", "{\"schema\": ");
+  const Outcome outcome = ist({"summary", "bad.json"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.err.find("json.exception"), std::string::npos) << outcome.err;
 }
 
 TEST_F(Usage, SampleErrorsSayWhatThereIs) {

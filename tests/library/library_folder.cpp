@@ -51,7 +51,8 @@ std::map<std::string, std::string> LibraryFolder::files_in(const std::string& fo
   std::map<std::string, std::string> files;
   if (!exists(folder)) return files;
   for (const auto& entry : std::filesystem::directory_iterator(folder_ / folder))
-    files[entry.path().filename().string()] = read(folder + "/" + entry.path().filename().string());
+    if (const std::string name = entry.path().filename().string(); !name.starts_with('.'))
+      files[name] = read(folder + "/" + name);
   return files;
 }
 

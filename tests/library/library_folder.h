@@ -23,6 +23,7 @@ class LibraryFolder : public CommandLine {
                             int exit_code = 0) const;
 
   /// Names and bytes of the files in a folder; none if there is no such folder.
+  /// Those that begin with a dot are not among them.
   std::map<std::string, std::string> files_in(const std::string& folder) const;
   /// Entries of a cache.
   std::size_t entries_in(const std::string& cache) const;

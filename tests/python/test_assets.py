@@ -199,10 +199,18 @@ def test_bakes_repeat_and_report_progress(knot, knot_mesh):
     assert again.to_bytes() == knot.to_bytes()
     assert {p.stage for p in seen} <= {"pack", "calibrate", "cover", "tree"} and seen
     assert all(0 <= p.fraction <= 1 for p in seen)
+    rises_to_one([p.total for p in seen])
+
+
+def rises_to_one(totals):
+    assert totals == sorted(totals) and totals[0] >= 0 and totals[-1] == 1
+    assert len(totals) == 1 or totals[-2] < 1
 
 
 def test_a_target_is_met():
-    made = ist.bake_to_error(ist.close_mesh(ist.sample_mesh("cube")), 0.4, 0.4)
+    seen = []
+    made = ist.bake_to_error(ist.close_mesh(ist.sample_mesh("cube")), 0.4, 0.4, progress=seen.append)
+    rises_to_one([p.total for p in seen])
     assert made.met and made.measured_error <= 0.4
     assert {p.partner for p in made.partners} >= {"copy", "plane"}
     assert made.asset.info()["target_met"]

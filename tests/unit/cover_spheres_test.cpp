@@ -8,6 +8,7 @@
 #include <ist/error.h>
 #include <ist/solid.h>
 
+#include "spheres/shared_count.h"
 #include "support/test_meshes.h"
 
 namespace ist::testing {
@@ -185,6 +186,75 @@ TEST(CoverSpheres, SettingsOutOfRangeAndCancelAreErrors) {
   settings.count = 4;
   settings.max_protrusion = NAN;
   EXPECT_THROW(cover_with_spheres(mesh, settings), Error);
+  settings = {};
+  settings.counts = {4, 4};
+  EXPECT_THROW(cover_with_spheres(mesh, settings), Error);
+  settings.counts = {4};
+  settings.total = 3;
+  EXPECT_THROW(cover_with_spheres(mesh, settings), Error);
+  settings.counts = {};
+  settings.max_protrusion = 1;
+  EXPECT_THROW(cover_with_spheres(mesh, settings), Error);
+}
+
+double largest(const std::vector<SphereCover>& covers) {
+  double most = 0;
+  for (const SphereCover& cover : covers) most = std::max(most, cover.protrusion.largest);
+  return most;
+}
+
+std::size_t spheres_in(const std::vector<SphereCover>& covers) {
+  std::size_t count = 0;
+  for (const SphereCover& cover : covers) count += cover.spheres.size();
+  return count;
+}
+
+TEST(CoverSpheres, ATotalGoesWhereItIsNeeded) {
+  // A long bar among small cubes, of which two are the same.
+  const TriangleMesh small = box_mesh({0, 0, 0}, {0.1, 0.1, 0.1});
+  const std::vector<ClosedMesh> meshes = {
+      close_mesh(box_mesh({0, 0, 0}, {4, 0.4, 0.4}), "bar"), close_mesh(small, "small"),
+      close_mesh(small, "same"), close_mesh(box_mesh({0, 0, 0}, {0.2, 0.1, 0.1}), "other")};
+  SphereCoverSettings settings;
+  settings.count = 6;
+  const std::vector<SphereCover> even = cover_with_spheres(meshes, settings);
+  settings.total = 24;
+  const std::vector<SphereCover> shared = cover_with_spheres(meshes, settings);
+  EXPECT_LE(spheres_in(shared), 24u);
+  EXPECT_GT(shared[0].spheres.size(), 12u);
+  EXPECT_LT(largest(shared), 0.6 * largest(even));
+  for (std::size_t i = 0; i < meshes.size(); ++i)
+    EXPECT_TRUE(prove_cover(meshes[i], shared[i].spheres).covered) << i;
+  // Equal meshes are covered once.
+  EXPECT_EQ(shared[2].seconds, 0);
+  EXPECT_EQ(shared[1].spheres.size(), shared[2].spheres.size());
+  // A mesh's own count is not touched.
+  settings.counts = {3, 0, 0, 0};
+  EXPECT_EQ(cover_with_spheres(meshes, settings)[0].spheres.size(), 3u);
+}
+
+/// Of all ways to share out, none has a smaller largest estimate.
+TEST(CoverSpheres, SharesAreTheBestOfTheEstimates) {
+  const std::vector<TriedCounts> tried = {{{2, 0.5}, {6, 0.1}}, {{1, 0.3}}, {{3, 0.05}, {4, 0.2}}};
+  EXPECT_EQ(estimated_protrusion(tried[0], 2), 0.5);
+  EXPECT_EQ(estimated_protrusion(tried[0], 1), 1);
+  EXPECT_EQ(estimated_protrusion(tried[2], 4), 0.05);  // three of them do better
+  EXPECT_NEAR(estimated_protrusion(tried[0], 4), 0.5 * std::pow(0.2, std::log(2) / std::log(3)),
+              1e-12);
+  const std::vector<std::size_t> copies = {1, 2, 1};
+  for (std::size_t total = 4; total < 20; ++total) {
+    const auto worst = [&](const std::vector<std::size_t>& counts) {
+      double most = 0;
+      for (std::size_t i = 0; i < 3; ++i)
+        most = std::max(most, estimated_protrusion(tried[i], counts[i]));
+      return most;
+    };
+    const std::vector<std::size_t> shares = share_out(tried, copies, total);
+    EXPECT_LE(shares[0] + 2 * shares[1] + shares[2], total);
+    for (std::size_t a = 1; a < total; ++a)
+      for (std::size_t b = 1; a + 2 * b < total; ++b)
+        EXPECT_LE(worst(shares), worst({a, b, total - a - 2 * b})) << total;
+  }
 }
 
 }  // namespace

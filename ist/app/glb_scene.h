@@ -1,0 +1,47 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace ist::app {
+
+/// A binary glTF 2.0 scene in the making. Node 0 is its root.
+class GlbScene {
+ public:
+  using Json = nlohmann::ordered_json;
+
+  /// `root`: what stands in node 0.
+  explicit GlbScene(Json root) { nodes_.push_back(std::move(root)); }
+
+  /// A mesh of one material: a ball of radius 1, the same one whatever its material, …
+  std::size_t add_ball(const std::string& name, const std::array<double, 4>& colour);
+  /// … or triangles, with flat faces.
+  std::size_t add_mesh(const std::string& name, const std::array<double, 4>& colour,
+                       std::span<const Eigen::Vector3d> vertices,
+                       std::span<const std::array<std::uint32_t, 3>> triangles);
+
+  /// Adds a node below another, or a ball's instance. Nodes are named by their number.
+  std::size_t add_node(std::size_t parent, Json node);
+  void add_instance(std::size_t parent, std::size_t mesh, const Eigen::Vector3d& at, double scale);
+
+  std::string bytes() const;  ///< of the file
+
+ private:
+  std::size_t add_material(const std::string& name, const std::array<double, 4>& colour);
+  std::size_t add_view(const void* bytes, std::size_t count, int target);
+  std::size_t add_vertices(std::span<const std::array<float, 3>> vertices);
+
+  Json nodes_ = Json::array(), meshes_ = Json::array(), materials_ = Json::array(),
+       accessors_ = Json::array(), views_ = Json::array();
+  std::vector<std::vector<std::size_t>> children_ = {{}};
+  std::string data_;
+  std::size_t ball_ = SIZE_MAX;  ///< its vertices among the accessors; its triangles follow
+};
+
+}  // namespace ist::app

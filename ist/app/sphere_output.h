@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <ist/cover_spheres.h>
+
+#include "robot/self_collision.h"
+
+namespace ist::app {
+
+/// A link, or the whole of a mesh, and its spheres.
+struct SphereLink {
+  std::string name;
+  std::vector<CoverSphere> given;  ///< spheres of the description itself
+  bool has_mesh = false;
+  double slack = 0;  ///< [u] by which the mesh may be wider than the shapes
+  SphereCover cover;
+  SphereCoverProof proof;
+};
+
+/// What `ist spheres` reads and makes.
+struct SphereRobot {
+  std::string name, input;         ///< of the robot or the mesh; path
+  std::vector<SphereLink> links;   ///< those with shapes
+  std::vector<ClosedMesh> meshes;  ///< of the links that have one, in their order
+  RobotModel robot;                ///< of a mesh: one link; its file is empty
+  SelfCollision self;
+
+  bool is_robot() const { return !robot.file.bytes.empty(); }
+  std::vector<LinkSpheres> spheres() const;
+};
+
+/// The file's text, by its ending. Throws Error.
+using SphereWriter = std::string (*)(const SphereRobot&);
+SphereWriter sphere_writer(const std::string& output);
+
+/// The report: a table, or JSON.
+std::string spheres_table(const SphereRobot& robot, const std::string& output, double seconds);
+std::string spheres_report_json(const SphereRobot& robot, const std::string& output,
+                                double seconds);
+
+}  // namespace ist::app

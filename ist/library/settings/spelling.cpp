@@ -1,0 +1,39 @@
+#include "library/settings/spelling.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+namespace ist {
+namespace {
+
+/// How many letters have to be changed, left out or put in.
+std::size_t letters_apart(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t corner = std::exchange(row[0], i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t other = corner + (a[i - 1] == b[j - 1] ? 0 : 1);
+      corner = row[j];
+      row[j] = std::min({other, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+std::string nearest_word(std::string_view word, std::span<const std::string> known) {
+  std::string nearest;
+  std::size_t least = 3;
+  for (const std::string& one : known) {
+    const std::size_t apart = letters_apart(word, one);
+    if (apart >= least || 3 * apart > one.size()) continue;
+    least = apart;
+    nearest = one;
+  }
+  return nearest;
+}
+
+}  // namespace ist
