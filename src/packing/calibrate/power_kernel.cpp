@@ -1,7 +1,7 @@
 #include "packing/calibrate/power_kernel.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "bake/calibrate/power_kernel.cpp"
+#define HWY_TARGET_INCLUDE "packing/calibrate/power_kernel.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
