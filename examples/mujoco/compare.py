@@ -95,7 +95,7 @@ class Nut(Scene):
     """A nut runs down its bolt without friction: 2 mm a turn."""
 
     seconds = 0.6
-    settings = {"spheres": 10000}
+    settings = {"measure": "exact"}  # matched spheres protrude by more than the threads' play
     meshes = {"bolt": (sample("bolt"), ".001"), "nut": (sample("nut"), ".001")}
     bodies = f"""<geom name="bolt" mesh="bolt" {STIFF} friction="0"/>
       <body name="nut" pos="0 0 .010"><freejoint/><geom name="nut" mesh="nut" {STIFF} friction="0"/></body>"""
@@ -132,7 +132,6 @@ class Pin(Scene):
     """A pin of 10 mm falls through a hole with 0.05 mm of play a side."""
 
     seconds = 0.35
-    settings = {"spheres": 1000, "measure": "exact"}  # matched spheres protrude by more than the play
     meshes = {"plate": (turned([(.00505, 0), (.02, 0), (.02, .01), (.00505, .01)], 64), "1"),
               "pin": (turned([(1e-5, 0), (.005, 0), (.005, .03), (1e-5, .03)], 64), "1")}
     bodies = f"""<geom name="plate" mesh="plate" {STIFF} friction=".1"/>
