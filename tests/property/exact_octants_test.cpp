@@ -128,8 +128,7 @@ TEST_F(ExactOctants, ALevelFaceHasFourPoints) {
   for (const double turn : {0.0, 0.3}) {
     const Pose pose = turned(Point::UnitZ(), turn, Point(0.2, 0.1, 0.499));
     ask({table.view(), {}, 1}, {box.view(), pose, 1});
-    const std::vector<ContactPatch> patches =
-        ask({table.view(), {}, 1}, {box.view(), pose, 1}, 8);
+    const std::vector<ContactPatch> patches = ask({table.view(), {}, 1}, {box.view(), pose, 1}, 8);
     ASSERT_EQ(patches.size(), 4u);
     for (const ContactPatch& patch : patches) {
       EXPECT_NEAR(patch.volume, 0.00025, 1e-15);
@@ -316,8 +315,8 @@ TEST_F(ExactOctants, AreContinuous) {
         if (i > 0)
           for (std::uint64_t octant = 0; octant < 8; ++octant) {
             const ContactPatch &x = before[octant], &y = now[octant];
-            jumps[fine] = std::max({jumps[fine], std::abs(x.volume - y.volume) / size,
-                                    (x.force - y.force).norm()});
+            jumps[fine] = std::max(
+                {jumps[fine], std::abs(x.volume - y.volume) / size, (x.force - y.force).norm()});
           }
         before = now;
       }

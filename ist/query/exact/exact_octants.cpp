@@ -41,12 +41,13 @@ double oneness(const OctantSums& x, const OctantSums& y, double near) {
   const double less = std::min(x.six_volumes, y.six_volumes),
                more = std::max(x.six_volumes, y.six_volumes);
   if (!(less > 0)) return 1;
-  const double apart = length((1 / (4 * x.six_volumes)) * x.moment -
-                              (1 / (4 * y.six_volumes)) * y.moment);
+  const double apart =
+      length((1 / (4 * x.six_volumes)) * x.moment - (1 / (4 * y.six_volumes)) * y.moment);
   return std::max(falls(less / more, 1.0 / 64), falls(apart, near));
 }
 
-/// A contact that is not thin is one: there its two surfaces differ. `small`: how far it is one for lack of room.
+/// A contact that is not thin is one: there its two surfaces differ. `small`: how far it is one for
+/// lack of room.
 void join_octants(OctantSums (&octants)[8], double near, double small) {
   for (int k = 0; k < 3; ++k)
     for (int i = 0; i < 8; ++i)
@@ -106,8 +107,15 @@ void ExactOctants::add_triangle(OctantSums* octants, bool of_b, double times, co
   const int plane = std::countr_zero(static_cast<unsigned>(unlike)), bit = 1 << plane;
   // One corner is alone on its side.
   const bool first = ((q.octant ^ r.octant) & bit) == 0, last = ((p.octant ^ q.octant) & bit) == 0;
-  const Corner &lone = first ? p : last ? r : q, &next = first ? q : last ? p : r,
-               &other = first ? r : last ? q : p;
+  const Corner &lone = first  ? p
+                       : last ? r
+                              : q,
+               &next = first  ? q
+                       : last ? p
+                              : r,
+               &other = first  ? r
+                        : last ? q
+                               : p;
   Corner to_next = between(lone, next, plane), to_other = between(lone, other, plane);
   add_triangle(octants, of_b, times, lone, to_next, to_other);
   to_next.octant ^= bit;
@@ -132,8 +140,8 @@ void ExactOctants::sum_octants() noexcept {
                             corner(octants, crossings.place_of(i, 1, out_.origin))};
     Corner apex[2];
     for (int s = 0; s < 2; ++s) {
-      apex[s] = corner(octants, {crossings.apex(s, 0)[i], crossings.apex(s, 1)[i],
-                                 crossings.apex(s, 2)[i]});
+      apex[s] = corner(octants,
+                       {crossings.apex(s, 0)[i], crossings.apex(s, 1)[i], crossings.apex(s, 2)[i]});
       add_triangle(octants, s != 0, 1, apex[s], ends[s], ends[1 - s]);
     }
     for (int e = 0; e < 2; ++e) {
@@ -152,8 +160,7 @@ void ExactOctants::sum_octants() noexcept {
       std::int8_t whole[kWidth];
       count_triangles(own.mesh.blocks[b], crossed, whole);
       for (std::uint32_t t = 0; t < kWidth; ++t) {
-        const std::uint32_t element =
-            whole[t] == 0 ? kNoPart : triangle_element(own, crossed, t);
+        const std::uint32_t element = whole[t] == 0 ? kNoPart : triangle_element(own, crossed, t);
         if (element == kNoPart) continue;
         OctantSums* const octants = octants_of(element);
         if (octants == nullptr) continue;
@@ -162,8 +169,7 @@ void ExactOctants::sum_octants() noexcept {
       }
     });
     for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {
-      if (OctantSums* const octants = octants_of(block_element(own, b)))
-        sum_block(own, b, octants);
+      if (OctantSums* const octants = octants_of(block_element(own, b))) sum_block(own, b, octants);
     });
   }
 }
@@ -179,8 +185,7 @@ void ExactOctants::sum_block(const Side& own, std::uint32_t b, OctantSums* octan
     any |= vertex[v].octant;
   }
   if (all == any) {
-    const LaneSums found =
-        lane_sums(own, 1, b / kWidth, b % kWidth, out_.origin + octants->centre);
+    const LaneSums found = lane_sums(own, 1, b / kWidth, b % kWidth, out_.origin + octants->centre);
     const auto in_axes = [&](const Point& v) -> Point {
       return {dot(axis_[0], v), dot(axis_[1], v), dot(axis_[2], v)};
     };
@@ -199,9 +204,9 @@ void ExactOctants::sum_block(const Side& own, std::uint32_t b, OctantSums* octan
 std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, double near,
                                   std::size_t room) noexcept {
   for (int k = 0; k < 3; ++k)
-    axis_[k] = by_b ? (1 / a_from_b_.scale) *
-                          Point{a_from_b_.m[k], a_from_b_.m[3 + k], a_from_b_.m[6 + k]}
-                    : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
+    axis_[k] =
+        by_b ? (1 / a_from_b_.scale) * Point{a_from_b_.m[k], a_from_b_.m[3 + k], a_from_b_.m[6 + k]}
+             : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
   std::uint32_t slots = 0, count = 0;
   const double least = out_.sums.volume() / static_cast<double>(room);
   for (std::uint32_t p = 0; p < parts.size(); ++p) {

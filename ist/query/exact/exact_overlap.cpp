@@ -317,8 +317,13 @@ ExactQuery::LaneSums ExactQuery::lane_sums(const Side& own, int level, std::uint
     turned = flux(d);
   }
   const double out = dot(d, n);
-  return {2 * (trace + out), 6 * (cone + (trace * d + (turned + out * d))), n, twist + cross(d, n),
-          area, wide, length_bound(d)};
+  return {2 * (trace + out),
+          6 * (cone + (trace * d + (turned + out * d))),
+          n,
+          twist + cross(d, n),
+          area,
+          wide,
+          length_bound(d)};
 }
 
 /// What lies below a lane of a box block, inside as a whole.
