@@ -238,7 +238,8 @@ struct ContactPatches {
 /// same places. The estimate of a stopped query is divided too. Under a pair budget the patches are
 /// those of the level of detail with the largest weight in the blend. The difference between the
 /// blend and that level is spread over them by volume: their sum stays continuous, and ids change
-/// where another level takes over. Costs 1.7 (one patch) to 2.4 (32) times a penetration.
+/// where another level takes over. By spheres it costs 1.7 (one patch) to 2.4 (32) times a
+/// penetration.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not.
 ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
