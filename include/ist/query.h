@@ -278,14 +278,14 @@ struct ContactPatches {
 /// smaller solid, each with its true volume: a level face has four patches, a ring around a shaft
 /// eight. Small or deep contacts are one patch. If there are more patches
 /// than fit, the smallest of a part join their nearest ones, and then so do parts. Patches are
-/// continuous in the pose while the parts are the same and all fit. By spheres the contact is divided along the tree of the smaller
-/// solid (B's if equal or if A is too coarse), always at the same places. The estimate of a stopped
-/// query is divided too. Under a pair budget the patches are those of the level of detail with the
-/// largest weight in the blend. The difference between the blend and that level is spread over them
-/// by volume: their sum stays continuous, and ids change where another level takes over. Under a
-/// relative error likewise; there the largest weight may be that of Measure::exact. The contact
-/// with a field is divided along the asset's tree. Costs 1.7 (one patch) to 2.4 (32) times a
-/// penetration.
+/// continuous in the pose while the parts are the same and all fit. By spheres the contact is
+/// divided along the tree of the smaller solid (B's if equal or if A is too coarse), always at the
+/// same places, and that with a field along the asset's tree. The estimate of a stopped query is
+/// divided too. Under a pair budget the patches are those of the level of detail with the largest
+/// weight in the blend. The difference between the blend and that level is spread over them by
+/// volume: their sum stays continuous, and ids change where another level takes over. Under a
+/// relative error likewise; there the largest weight may be that of Measure::exact. By spheres it
+/// costs 1.7 (one patch) to 2.4 (32) times a penetration.
 ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept;
@@ -304,8 +304,9 @@ struct OverlapOutline {
 };
 
 /// The connected parts of the overlap, undivided, as patches of Measure::exact, whatever the
-/// settings say, and the outline of each: segments of the closed curves on which the surfaces cross. Seen from outside A, A's surface
-/// inside B is to the left of each. A patch that lies wholly inside the other solid has none.
+/// settings say, and the outline of each: segments of the closed curves on which the surfaces
+/// cross. Seen from outside A, A's surface inside B is to the left of each. A patch that lies
+/// wholly inside the other solid has none.
 OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches,

@@ -140,10 +140,9 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
       const ContactPatch& patch = contact.patches[i];
       if (!(patch.area > 0)) continue;
       const Eigen::Vector3d normal = (contact.pushes_second ? -1 : 1) * patch.normal;
-      result->addContactPoint(
-          to_bullet(normal),
-          to_bullet(Eigen::Vector3d(patch.point + 0.5 * patch.depth * normal)),
-          static_cast<btScalar>(-patch.depth));
+      result->addContactPoint(to_bullet(normal),
+                              to_bullet(Eigen::Vector3d(patch.point + 0.5 * patch.depth * normal)),
+                              static_cast<btScalar>(-patch.depth));
     }
     result->setPersistentManifold(nullptr);
     return;

@@ -43,10 +43,13 @@ std::shared_ptr<Tree> load(const std::string& file, ist_status_t& status) {
   return tree;
 }
 
+/// Meshes of more triangles are left to their spheres, which cost the same for any mesh.
+constexpr uint32_t kMostExact = 2000;
+
 /// What an <instance> configures.
 struct Instance {
   std::shared_ptr<Tree> tree;
-  int patches = 8;
+  int patches = 0;  ///< 0: by the pair's measure
   uint32_t measure = IST_MATCHED;
   double scale = 0;  ///< 0: the mesh's
 };
@@ -188,7 +191,9 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   patches.patch_size = sizeof memory.patches[0];
   patches.patches = memory.patches;
   const int room = std::min(mj_maxContact(m, g1, g2, margin > 0), kMostPatches);
-  patches.capacity = static_cast<size_t>(std::max(0, std::min(second->patches, room)));
+  const int usual = settings.measure == IST_EXACT ? 16 : 8;
+  const int most = second->patches > 0 ? second->patches : usual;
+  patches.capacity = static_cast<size_t>(std::max(0, std::min(most, room)));
   ist_penetration_t whole = {};
   whole.size = sizeof whole;
   ist_status_t status =
@@ -232,9 +237,10 @@ int init(const mjModel* m, mjData* d, int i) {
   auto made = std::make_unique<Instance>();
   double patches = made->patches;
   if (!read_number(m, i, "patches", patches) || !read_number(m, i, "scale", made->scale)) return -1;
-  made->patches = static_cast<int>(std::min(std::max(1.0, patches), double{kMostPatches}));
+  made->patches = static_cast<int>(std::min(patches, double{kMostPatches}));
   const char* measure = mj_getPluginConfig(m, i, "measure");
-  if (measure != nullptr && *measure != 0) {
+  const bool chosen = measure != nullptr && *measure != 0;
+  if (chosen) {
     static const std::map<std::string, uint32_t> kMeasures = {
         {"matched", IST_MATCHED}, {"inner", IST_INNER}, {"exact", IST_EXACT}};
     const auto found = kMeasures.find(measure);
@@ -255,6 +261,11 @@ int init(const mjModel* m, mjData* d, int i) {
     mju_warning("ist.solid: %s: %s", file, ist_describe(status));
     return -1;
   }
+  ist_tree_info_t info = {};
+  info.size = sizeof info;
+  if (!chosen && ist_tree_get_info(&made->tree->tree, &info) == IST_OK && info.mesh_triangles > 0 &&
+      info.mesh_triangles <= kMostExact && info.counted_twice == 0)
+    made->measure = IST_EXACT;
   d->plugin_data[i] = reinterpret_cast<uintptr_t>(made.release());
   return 0;
 }

@@ -2,6 +2,7 @@
 #include <ist/query.h>
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -45,6 +46,12 @@ TriangleMesh pipe(double inner, double outer, double h, std::uint32_t around) {
 Pose turned(const Point& axis, double angle, const Point& t) {
   const Eigen::Quaterniond q(Eigen::AngleAxisd(angle, axis.normalized()));
   return {{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}};
+}
+
+TriangleMesh tilted(TriangleMesh mesh) {
+  const Eigen::AngleAxisd turn(0.02, Point::UnitY());
+  for (Point& x : mesh.vertices) x = turn * x;
+  return mesh;
 }
 
 class ExactOctants : public ::testing::Test {
@@ -121,8 +128,7 @@ TEST_F(ExactOctants, ALevelFaceHasFourPoints) {
   for (const double turn : {0.0, 0.3}) {
     const Pose pose = turned(Point::UnitZ(), turn, Point(0.2, 0.1, 0.499));
     ask({table.view(), {}, 1}, {box.view(), pose, 1});
-    const std::vector<ContactPatch> patches =
-        ask({table.view(), {}, 1}, {box.view(), pose, 1}, 8);
+    const std::vector<ContactPatch> patches = ask({table.view(), {}, 1}, {box.view(), pose, 1}, 8);
     ASSERT_EQ(patches.size(), 4u);
     for (const ContactPatch& patch : patches) {
       EXPECT_NEAR(patch.volume, 0.00025, 1e-15);
@@ -130,6 +136,62 @@ TEST_F(ExactOctants, ALevelFaceHasFourPoints) {
       EXPECT_GT(patch.normal.z(), 0.9999);
       EXPECT_NEAR((patch.centroid - whole().centroid).norm(), std::sqrt(0.125), 1e-6);
     }
+  }
+}
+
+/// A box of n × n squares a face.
+TriangleMesh fine_box(std::uint32_t n, const Point& lower, const Point& upper) {
+  TriangleMesh mesh;
+  std::map<std::array<std::uint32_t, 3>, std::uint32_t> numbers;
+  const auto vertex = [&](const std::array<std::uint32_t, 3>& at) {
+    const auto [it, fresh] = numbers.try_emplace(at, mesh.vertices.size());
+    if (fresh)
+      mesh.vertices.push_back(lower + (upper - lower).cwiseProduct(Point(at[0], at[1], at[2])) / n);
+    return it->second;
+  };
+  for (std::size_t k = 0; k < 3; ++k)
+    for (const std::uint32_t end : {0u, n})
+      for (std::uint32_t i = 0; i < n; ++i)
+        for (std::uint32_t j = 0; j < n; ++j) {
+          const auto corner = [&](std::uint32_t u, std::uint32_t v) {
+            std::array<std::uint32_t, 3> at;
+            at[k] = end;
+            at[(k + 1) % 3] = i + (end == 0 ? v : u);
+            at[(k + 2) % 3] = j + (end == 0 ? u : v);
+            return vertex(at);
+          };
+          mesh.triangles.push_back({corner(0, 0), corner(1, 0), corner(1, 1)});
+          mesh.triangles.push_back({corner(0, 0), corner(1, 1), corner(0, 1)});
+        }
+  return mesh;
+}
+
+TEST_F(ExactOctants, AFineFaceIsDividedLikeACoarseOne) {
+  const Point lower(-0.5, -0.4, -0.3), upper(0.5, 0.4, 0.3);
+  const Asset table = surface(box_mesh(Point(-3, -3, -1), Point(3, 3, 0))),
+              coarse = surface(box_mesh(lower, upper)), fine = surface(fine_box(40, lower, upper));
+  const Pose pose = turned(Point(0.003, 0.005, 1), 0.4, Point(0.2, 0.1, 0.295));
+  std::vector<ContactPatch> before;
+  for (const bool a_is_table : {true, false}) {
+    const auto both = [&](const Asset& box) {
+      const PlacedTree t{table.view(), {}, 1}, b{box.view(), pose, 1};
+      return a_is_table ? ask(t, b) : ask(b, t);
+    };
+    const std::vector<ContactPatch> one = both(coarse), other = both(fine);
+    ASSERT_GE(one.size(), 4u);
+    ASSERT_EQ(one.size(), other.size());
+    for (std::size_t i = 0; i < one.size(); ++i) {
+      EXPECT_EQ(one[i].id % 8, other[i].id % 8);
+      EXPECT_NEAR(one[i].volume, other[i].volume, 1e-13);
+      EXPECT_LE((one[i].centroid - other[i].centroid).norm(), 1e-11);
+      EXPECT_LE((one[i].force - other[i].force).norm(), 1e-13);
+      EXPECT_LE((one[i].torque - other[i].torque).norm(), 1e-13);
+      // The same either way round.
+      if (!a_is_table) {
+        EXPECT_LE((one[i].force + before[i].force).norm(), 1e-13);
+      }
+    }
+    before = one;
   }
 }
 
@@ -191,6 +253,23 @@ TEST_F(ExactOctants, ARingHoldsItsShaftAllAround) {
   EXPECT_LT(highest, 0.05);
 }
 
+TEST_F(ExactOctants, AThreadHoldsAllAround) {
+  const Asset bolt = surface(make_sample("bolt")), nut = surface(make_sample("nut"));
+  const std::vector<ContactPatch>& patches =
+      ask({bolt.view(), {}, 1}, {nut.view(), turned({0, 0, 1}, 0, {0, 0, 10.3}), 1}, 16);
+  EXPECT_GE(patches.size(), 8u);
+  const Point axial(0, 0, whole().translation_gradient.z() < 0 ? 1 : -1);
+  for (int quarter = 0; quarter < 4; ++quarter) {
+    const double turn = (quarter + 0.5) * kPi / 2;
+    const Point way(std::cos(turn), std::sin(turn), 0);
+    double most = 0;  // of a patch there that pushes along the axis and away from it
+    for (const ContactPatch& patch : patches)
+      if (patch.point.dot(way) > 2 && patch.normal.dot(axial) > 0.5)
+        most = std::max(most, patch.normal.dot(way));
+    EXPECT_GT(most, 0.1);
+  }
+}
+
 TEST_F(ExactOctants, WhatIsDeepIsOne) {
   const Asset block = surface(box_mesh(Point(-3, -3, -3), Point(3, 3, 0)));
   const Asset ball = surface(testing::icosphere_mesh(3));
@@ -212,6 +291,10 @@ TEST_F(ExactOctants, AreContinuous) {
        Point(1, 2, 30), Point(0.3, 0, 0.49), Point(0.5, 0.3, 0.008), 0.4},
       {surface(box_mesh(Point(-3, -3, -1), Point(3, 3, 0))), surface(testing::cube_mesh()),
        Point(1, 1, 0), Point(0.3, 0, 0.47), Point(0.05, 0.03, 0.2), 0.6},
+      // Octants whose planes lie nearly along the contact.
+      {surface(tilted(box_mesh(Point(-3, -3, -1), Point(3, 3, 0)))),
+       surface(tilted(testing::cube_mesh())), Point(0, 0, 1), Point(0.01, 0, 0.499),
+       Point(0, 0, -0.009), 0},
       {surface(pipe(0.5, 1.002, 3, 60)), surface(pipe(1, 1.5, 0.4, 48)), Point(0.01, 0.02, 1),
        Point(0, 0, 0.3), Point(0.001, 0.0005, 0.2), 0.5},
       {surface(box_mesh(Point(-3, -3, -1), Point(3, 3, 0))), surface(testing::icosphere_mesh(3)),
@@ -232,8 +315,8 @@ TEST_F(ExactOctants, AreContinuous) {
         if (i > 0)
           for (std::uint64_t octant = 0; octant < 8; ++octant) {
             const ContactPatch &x = before[octant], &y = now[octant];
-            jumps[fine] = std::max({jumps[fine], std::abs(x.volume - y.volume) / size,
-                                    (x.force - y.force).norm()});
+            jumps[fine] = std::max(
+                {jumps[fine], std::abs(x.volume - y.volume) / size, (x.force - y.force).norm()});
           }
         before = now;
       }

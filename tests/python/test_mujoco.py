@@ -156,6 +156,20 @@ def test_exact_contacts_hold_no_gap(folder):
     assert data.ncon == 0  # in clearance, where matched spheres protrude and touch
 
 
+def test_small_meshes_are_exact_by_default(folder):
+    tower = "".join(f'<body pos="0 0 {-.03 - .0602 * i}"><freejoint/><geom type="mesh" mesh="cube"/></body>'
+                    for i in range(4)) + '<geom type="mesh" mesh="cube" pos="0 0 -.2708" euler="0 0 20"/>'
+    spec = mujoco.MjSpec.from_string(CUBE.format(ground=tower, height=.0303))
+    assert ist.mujoco.attach(spec, cache=folder / "cache") == 6
+    model = spec.compile()
+    data = run(model, mujoco.MjData(model), 1500)
+    assert data.ncon == 5 * 4  # four a face
+    places = data.qpos.reshape(-1, 7)
+    assert np.abs(data.qvel).max() < 1e-2 and np.abs(places[:, :2]).max() < 1e-6
+    assert np.abs(places[:, 4:6]).max() < 1e-6  # upright
+    assert places[:, 2].min() == pytest.approx(-0.2108, abs=2e-4)  # matched spheres: 2 mm and more higher
+
+
 def test_a_pose_that_is_no_number_is_no_contact(folder):
     model, data = cube(folder, '<geom type="box" size="1 1 .1" pos="0 0 -.1"/>')
     data.qpos[0] = np.nan

@@ -137,11 +137,18 @@ void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& w
   if (asked == "max_visits") settings.max_visits = 50;
   if (asked == "pair_budget") settings.pair_budget = 300;
   if (asked == "relative_error") settings.relative_error = 0.01;
-  if (asked == "contact_patches") {
+  if (asked == "exact_patches") settings.measure = Measure::exact;
+  if (asked == "contact_patches" || asked == "exact_patches") {
     ContactPatch patches[6];
     const ContactPatches answer = contact_patches(a, b, settings, workspace, patches);
     bits.add(answer.penetration);
-    for (std::size_t i = 0; i < answer.count; ++i) bits.add(patches[i]);
+    for (std::size_t i = 0; i < answer.count; ++i) {
+      bits.add(patches[i]);
+      if (asked != "exact_patches") continue;
+      for (const double x : {patches[i].point.x(), patches[i].point.y(), patches[i].point.z()})
+        bits.add(x);
+      bits.add(patches[i].twist);
+    }
     return;
   }
   if (asked == "time_of_impact") {

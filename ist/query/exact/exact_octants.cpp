@@ -11,6 +11,9 @@ namespace {
 
 using exact::Point;
 
+/// Of a part's sums: what is less in an octant is left to the others.
+constexpr double kRounding = 1e-9;
+
 double length(const Point& v) { return std::sqrt(dot(v, v)); }
 
 /// From 1 at `low` to 0 at twice that, or the other way round.
@@ -30,25 +33,21 @@ void move(OctantSums& from, double share, OctantSums& to) {
   for (int s = 0; s < 2; ++s) give(from.area[s], to.area[s]);
 }
 
-Point unlike(const OctantSums& sums) { return sums.area[0] + sums.area[1]; }
 double both_areas(const OctantSums& sums) { return length(sums.area[0]) + length(sums.area[1]); }
 
-/// How far two octants are one: where one is a sliver of the other, where they are near to each
-/// other, or where their two surfaces agree together only, as those above and below the middle of a
-/// thin contact do.
+/// How far two octants are one: where one is a sliver of the other, or where they are near to each
+/// other, as those above and below the middle of a thin contact are.
 double oneness(const OctantSums& x, const OctantSums& y, double near) {
   const double less = std::min(x.six_volumes, y.six_volumes),
                more = std::max(x.six_volumes, y.six_volumes);
-  const double areas = both_areas(x) + both_areas(y);
-  if (!(less > 0) || !(areas > 0)) return 1;
-  const Point of_x = unlike(x), of_y = unlike(y);
-  const double cured = (length(of_x) + length(of_y)) - length(of_x + of_y);
-  const double apart = length((1 / (4 * x.six_volumes)) * x.moment -
-                              (1 / (4 * y.six_volumes)) * y.moment);
-  return std::max({falls(less / more, 1.0 / 64), falls(apart, near), rises(cured / areas, 0.2)});
+  if (!(less > 0)) return 1;
+  const double apart =
+      length((1 / (4 * x.six_volumes)) * x.moment - (1 / (4 * y.six_volumes)) * y.moment);
+  return std::max(falls(less / more, 1.0 / 64), falls(apart, near));
 }
 
-/// A contact that is not thin is one. `small`: how far it is one for lack of room.
+/// A contact that is not thin is one: there its two surfaces differ. `small`: how far it is one for
+/// lack of room.
 void join_octants(OctantSums (&octants)[8], double near, double small) {
   for (int k = 0; k < 3; ++k)
     for (int i = 0; i < 8; ++i)
@@ -58,7 +57,7 @@ void join_octants(OctantSums (&octants)[8], double near, double small) {
       }
   double different = 0, areas = 0;
   for (const OctantSums& sums : octants) {
-    different += length(unlike(sums));
+    different += length(sums.area[0] + sums.area[1]);
     areas += both_areas(sums);
   }
   const double share = areas > 0 ? std::max(small, rises(different / areas, 0.2)) : 1;
@@ -108,8 +107,15 @@ void ExactOctants::add_triangle(OctantSums* octants, bool of_b, double times, co
   const int plane = std::countr_zero(static_cast<unsigned>(unlike)), bit = 1 << plane;
   // One corner is alone on its side.
   const bool first = ((q.octant ^ r.octant) & bit) == 0, last = ((p.octant ^ q.octant) & bit) == 0;
-  const Corner &lone = first ? p : last ? r : q, &next = first ? q : last ? p : r,
-               &other = first ? r : last ? q : p;
+  const Corner &lone = first  ? p
+                       : last ? r
+                              : q,
+               &next = first  ? q
+                       : last ? p
+                              : r,
+               &other = first  ? r
+                        : last ? q
+                               : p;
   Corner to_next = between(lone, next, plane), to_other = between(lone, other, plane);
   add_triangle(octants, of_b, times, lone, to_next, to_other);
   to_next.octant ^= bit;
@@ -134,8 +140,8 @@ void ExactOctants::sum_octants() noexcept {
                             corner(octants, crossings.place_of(i, 1, out_.origin))};
     Corner apex[2];
     for (int s = 0; s < 2; ++s) {
-      apex[s] = corner(octants, {crossings.apex(s, 0)[i], crossings.apex(s, 1)[i],
-                                 crossings.apex(s, 2)[i]});
+      apex[s] = corner(octants,
+                       {crossings.apex(s, 0)[i], crossings.apex(s, 1)[i], crossings.apex(s, 2)[i]});
       add_triangle(octants, s != 0, 1, apex[s], ends[s], ends[1 - s]);
     }
     for (int e = 0; e < 2; ++e) {
@@ -154,8 +160,7 @@ void ExactOctants::sum_octants() noexcept {
       std::int8_t whole[kWidth];
       count_triangles(own.mesh.blocks[b], crossed, whole);
       for (std::uint32_t t = 0; t < kWidth; ++t) {
-        const std::uint32_t element =
-            whole[t] == 0 ? kNoPart : triangle_element(own, crossed, t);
+        const std::uint32_t element = whole[t] == 0 ? kNoPart : triangle_element(own, crossed, t);
         if (element == kNoPart) continue;
         OctantSums* const octants = octants_of(element);
         if (octants == nullptr) continue;
@@ -164,25 +169,44 @@ void ExactOctants::sum_octants() noexcept {
       }
     });
     for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {
-      OctantSums* const octants = octants_of(block_element(own, b));
-      if (octants == nullptr) return;
-      const MeshBlock& mesh = own.mesh.blocks[b];
-      Corner vertex[kWidth];
-      for (std::uint32_t v = 0; v < mesh.vertices; ++v)
-        vertex[v] = corner(octants, place(own, mesh.vertex[v]) - out_.origin);
-      for (std::uint32_t t = 0; t < mesh.triangles; ++t)
-        add_triangle(octants, own.is_b, 1, vertex[mesh.corner[0][t]], vertex[mesh.corner[1][t]],
-                     vertex[mesh.corner[2][t]]);
+      if (OctantSums* const octants = octants_of(block_element(own, b))) sum_block(own, b, octants);
     });
   }
+}
+
+/// A block inside as a whole: by its integrals if it lies in one octant.
+void ExactOctants::sum_block(const Side& own, std::uint32_t b, OctantSums* octants) noexcept {
+  const MeshBlock& mesh = own.mesh.blocks[b];
+  Corner vertex[kWidth];
+  int all = 7, any = 0;
+  for (std::uint32_t v = 0; v < mesh.vertices; ++v) {
+    vertex[v] = corner(octants, place(own, mesh.vertex[v]) - out_.origin);
+    all &= vertex[v].octant;
+    any |= vertex[v].octant;
+  }
+  if (all == any) {
+    const LaneSums found = lane_sums(own, 1, b / kWidth, b % kWidth, out_.origin + octants->centre);
+    const auto in_axes = [&](const Point& v) -> Point {
+      return {dot(axis_[0], v), dot(axis_[1], v), dot(axis_[2], v)};
+    };
+    OctantSums& sums = octants[all];
+    sums.six_volumes += found.six_volumes;
+    sums.moment = sums.moment + in_axes(found.moment);
+    sums.area[own.is_b] = sums.area[own.is_b] + in_axes(found.normal);
+    sums.torque = sums.torque + (own.is_b ? 0.5 : -0.5) * in_axes(found.torque);
+    return;
+  }
+  for (std::uint32_t t = 0; t < mesh.triangles; ++t)
+    add_triangle(octants, own.is_b, 1, vertex[mesh.corner[0][t]], vertex[mesh.corner[1][t]],
+                 vertex[mesh.corner[2][t]]);
 }
 
 std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, double near,
                                   std::size_t room) noexcept {
   for (int k = 0; k < 3; ++k)
-    axis_[k] = by_b ? (1 / a_from_b_.scale) *
-                          Point{a_from_b_.m[k], a_from_b_.m[3 + k], a_from_b_.m[6 + k]}
-                    : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
+    axis_[k] =
+        by_b ? (1 / a_from_b_.scale) * Point{a_from_b_.m[k], a_from_b_.m[3 + k], a_from_b_.m[6 + k]}
+             : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
   std::uint32_t slots = 0, count = 0;
   const double least = out_.sums.volume() / static_cast<double>(room);
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
@@ -197,46 +221,59 @@ std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, d
     octants->centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
   }
   sum_octants();
-  const auto back = [&](const Point& v) {
+  for (std::uint32_t p = 0; p < parts.size(); ++p) {
+    if (parts[p].kept != p) continue;
+    const std::uint32_t first = count;
+    if (parts[p].slot != kNoPart)
+      count = write_octants(parts[p], falls(parts[p].sums.volume(), least), near, count);
+    if (count > first) continue;
+    ExactPart& whole = scratch_.octants[count] = parts[p];
+    whole.id *= 8;
+    whole.kept = count++;
+  }
+  return count;
+}
+
+/// Appends the octants of a part. Returns how many are written then: `first` if they are not those
+/// of the part, as where rounding is more than what it has.
+std::uint32_t ExactOctants::write_octants(const ExactPart& part, double small, double near,
+                                          std::uint32_t first) noexcept {
+  const auto in_frame = [&](const Point& v) {
     return v.x * axis_[0] + (v.y * axis_[1] + v.z * axis_[2]);
   };
-  for (std::uint32_t p = 0; p < parts.size(); ++p) {
-    const ExactPart& part = parts[p];
-    if (part.kept != p) continue;
-    ExactPart* const out = scratch_.octants.get() + count;
-    const auto write = [&](ExactPart octant, std::uint64_t number) {
-      octant.id = 8 * part.id + number;
-      octant.kept = count;
-      scratch_.octants[count++] = octant;
-    };
-    if (part.slot == kNoPart) {
-      write(part, 0);
-      continue;
-    }
-    OctantSums octants[8];
-    std::copy_n(&scratch_.octant_sums[8 * part.slot], 8, octants);
-    const Point centre = octants[0].centre;
-    join_octants(octants, near, falls(part.sums.volume(), least));
-    ExactSums missing = part.sums;  // but for rounding nothing
-    std::uint32_t largest = 0;
-    for (int i = 0; i < 8; ++i) {
-      const OctantSums& octant = octants[i];
-      if (!(octant.six_volumes > 1e-9 * (6 * part.sums.volume()))) continue;
-      ExactPart found = {};
-      found.sums.six_volumes.add(octant.six_volumes);
-      found.sums.moment = back(octant.moment) + (4 * octant.six_volumes) * centre;
-      found.sums.force = back(0.5 * (octant.area[1] - octant.area[0]));
-      found.sums.torque = back(octant.torque) + cross(centre, found.sums.force);
-      missing.six_volumes.add(-octant.six_volumes);
-      missing.moment = missing.moment - found.sums.moment;
-      missing.force = missing.force - found.sums.force;
-      missing.torque = missing.torque - found.sums.torque;
-      write(found, static_cast<std::uint64_t>(i));
-      const auto last = static_cast<std::uint32_t>(scratch_.octants.get() + count - out) - 1;
-      if (out[last].sums.volume() > out[largest].sums.volume()) largest = last;
-    }
-    out[largest].sums.add(missing);
+  OctantSums octants[8];
+  std::copy_n(&scratch_.octant_sums[8 * part.slot], 8, octants);
+  const Point centre = octants[0].centre;
+  join_octants(octants, near, small);
+  ExactSums missing = part.sums;  // but for rounding nothing
+  const double volume = part.sums.volume();
+  double areas = 0;
+  std::uint32_t count = first, largest = first;
+  for (std::uint64_t i = 0; i < 8; ++i) {
+    const OctantSums& octant = octants[i];
+    if (!(octant.six_volumes > kRounding * (6 * volume))) continue;
+    ExactPart& found = scratch_.octants[count] = {};
+    found.id = 8 * part.id + i;
+    found.kept = count;
+    found.sums.six_volumes.add(octant.six_volumes);
+    found.sums.moment = in_frame(octant.moment) + (4 * octant.six_volumes) * centre;
+    found.sums.force = in_frame(0.5 * (octant.area[1] - octant.area[0]));
+    found.sums.torque = in_frame(octant.torque) + cross(centre, found.sums.force);
+    missing.six_volumes.add(-octant.six_volumes);
+    missing.moment = missing.moment - found.sums.moment;
+    missing.force = missing.force - found.sums.force;
+    missing.torque = missing.torque - found.sums.torque;
+    areas += both_areas(octant);
+    if (octant.six_volumes > 6 * scratch_.octants[largest].sums.volume()) largest = count;
+    ++count;
   }
+  const double size = std::sqrt(areas) + length(centre);
+  if (!(std::abs(missing.volume()) <= 100 * kRounding * volume &&
+        length(missing.moment) <= 2400 * kRounding * (volume * size) &&
+        length(missing.force) <= 100 * kRounding * areas &&
+        length(missing.torque) <= 100 * kRounding * (areas * size)))
+    return first;
+  scratch_.octants[largest].sums.add(missing);
   return count;
 }
 

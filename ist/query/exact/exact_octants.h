@@ -34,6 +34,9 @@ class ExactOctants : public ExactParts {
   };
 
   void sum_octants() noexcept;
+  void sum_block(const Side& side, std::uint32_t block, OctantSums* octants) noexcept;
+  std::uint32_t write_octants(const ExactPart& part, double small, double near,
+                              std::uint32_t first) noexcept;
   OctantSums* octants_of(std::uint32_t element) noexcept;
   Corner corner(const OctantSums* octants, const exact::Point& x) const noexcept;
   static Corner between(const Corner& from, const Corner& to, int plane) noexcept;

@@ -276,9 +276,8 @@ void ExactQuery::sum_crossed_block(const Side& own, const CrossedBlock& crossed)
           cross(crossed.at(mesh.corner[k][t]), crossed.at(mesh.corner[(k + 1) % 3][t])));
 }
 
-/// What lies below a lane of a box block, inside as a whole.
-void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i, std::uint32_t lane,
-                          ExactSums& into) noexcept {
+ExactQuery::LaneSums ExactQuery::lane_sums(const Side& own, int level, std::uint32_t i,
+                                           std::uint32_t lane, const Point& origin) const noexcept {
   const BoxBlock& box = own.mesh.level[level].boxes[i];
   const BoxSums& sums = own.mesh.level[level].sums[i];
   const auto middle = [&](int k) {
@@ -296,16 +295,20 @@ void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i, std::uint
         (sums.flux[1][0][lane] * d.x + sums.flux[1][1][lane] * d.y) + sums.flux[1][2][lane] * d.z,
         (sums.flux[2][0][lane] * d.x + sums.flux[2][1][lane] * d.y) + sums.flux[2][2][lane] * d.z};
   };
-  Point d = c - out_.origin, turned;
+  Point twist = {sums.flux[1][2][lane] - sums.flux[2][1][lane],
+                 sums.flux[2][0][lane] - sums.flux[0][2][lane],
+                 sums.flux[0][1][lane] - sums.flux[1][0][lane]};  // ∫ y × n dA
+  Point d = c - origin, turned;
   if (own.is_b) {
     const double s = a_from_b_.scale;
-    d = map_point(a_from_b_, c) - out_.origin;
+    d = map_point(a_from_b_, c) - origin;
     const double* m = a_from_b_.m;
     const Point back = {(m[0] * d.x + m[3] * d.y) + m[6] * d.z,
                         (m[1] * d.x + m[4] * d.y) + m[7] * d.z,
                         (m[2] * d.x + m[5] * d.y) + m[8] * d.z};
     turned = s * map_vector(a_from_b_, flux(back));
     n = s * map_vector(a_from_b_, n);
+    twist = (s * s) * map_vector(a_from_b_, twist);
     cone = (s * s * s) * map_vector(a_from_b_, cone);
     trace *= s * s * s;
     area *= s * s;
@@ -314,11 +317,24 @@ void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i, std::uint
     turned = flux(d);
   }
   const double out = dot(d, n);
-  into.six_volumes.add(2 * (trace + out));
-  add(into.moment, 6, cone + (trace * d + (turned + out * d)));
-  rounding_ += 64 * kHalfUnit * area * (length_bound(d) + wide);
-  add_layer(own, area, wide);
-  if (checked_) add(out_.gap, own.is_b ? -1 : 1, n);
+  return {2 * (trace + out),
+          6 * (cone + (trace * d + (turned + out * d))),
+          n,
+          twist + cross(d, n),
+          area,
+          wide,
+          length_bound(d)};
+}
+
+/// What lies below a lane of a box block, inside as a whole.
+void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i, std::uint32_t lane,
+                          ExactSums& into) noexcept {
+  const LaneSums sums = lane_sums(own, level, i, lane, out_.origin);
+  into.six_volumes.add(sums.six_volumes);
+  into.moment = into.moment + sums.moment;
+  rounding_ += 64 * kHalfUnit * sums.area * (sums.reach + sums.width);
+  add_layer(own, sums.area, sums.width);
+  if (checked_) add(out_.gap, own.is_b ? -1 : 1, sums.normal);
 }
 
 /// Sums the blocks that lie inside as a whole, as few lanes as hold them.

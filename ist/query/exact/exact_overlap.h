@@ -64,6 +64,15 @@ class ExactQuery {
   static void count_triangles(const MeshBlock& mesh, const CrossedBlock& crossed,
                               std::int8_t (&whole)[kWidth]) noexcept;
   exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
+  /// Integrals over all triangles below a lane of a box block, seen from a point.
+  struct LaneSums {
+    double six_volumes;
+    exact::Point moment, normal, torque;  ///< 24 ∫ x, ∫ n dA, ∫ x × n dA
+    double area, width;                   ///< at least, and of the box all sides together
+    double reach;                         ///< of its middle
+  };
+  LaneSums lane_sums(const Side& side, int level, std::uint32_t i, std::uint32_t lane,
+                     const exact::Point& origin) const noexcept;
   void sum_lane(const Side& side, int level, std::uint32_t i, std::uint32_t lane,
                 ExactSums& sums) noexcept;
 

@@ -208,10 +208,10 @@ struct ExactSums {
 
 /// A connected part of an overlap, or an octant of one.
 struct ExactPart {
-  ExactSums sums;          ///< from the whole's origin
-  std::uint64_t id = 0;    ///< lowest pair of triangles on its outline, from 1; 0: it has none
-  std::uint32_t kept = 0;  ///< the part that it was added to, or itself
-  std::uint32_t slot = 0;  ///< of its octants
+  ExactSums sums;            ///< from the whole's origin
+  std::uint64_t id = 0;      ///< lowest pair of triangles on its outline, from 1; 0: it has none
+  std::uint32_t kept = 0;    ///< the part that it was added to, or itself
+  std::uint32_t slot = 0;    ///< of its octants
   exact::Point centre = {};  ///< centroid from the whole's origin, once there is need of it
 };
 
@@ -221,7 +221,8 @@ struct OctantSums {
   exact::Point moment = {};   ///< 24 ∫ x
   exact::Point area[2] = {};  ///< ∫ n dA over A's and over B's surface
   exact::Point torque = {};   ///< ½ ∫ x × n dA over B's surface less that over A's
-  exact::Point centre = {};   ///< of the first: the part's centroid from the whole's origin, A's axes
+  exact::Point centre =
+      {};  ///< of the first: the part's centroid from the whole's origin, A's axes
 };
 
 /// An edge where it is pierced.

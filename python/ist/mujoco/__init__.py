@@ -49,7 +49,7 @@ def load():
     return path
 
 
-def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=8, measure="matched"):
+def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=None, measure=None):
     """Makes solids of the mesh geoms of an MjSpec that collide; returns how many.
 
     Each such geom becomes one of type sdf with an instance of the plug-in `ist.solid`. Its mesh is
@@ -60,8 +60,10 @@ def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=8, measure="ma
         what it was does not collide with a solid.
     cache: folder of baked assets; None: $XDG_CACHE_HOME/ist or ~/.cache/ist.
     spheres: of each solid, at most.
-    patches: contacts of a pair, at most, 1 to 50. MuJoCo's own limit is sdf_initpoints (40).
-    measure: "matched", "inner" or "exact"; exact between two solids that both have it.
+    patches: contacts of a pair, at most, 1 to 50; None: 16 of exact overlaps, 8 of spheres.
+        MuJoCo's own limit is sdf_initpoints (40).
+    measure: "matched", "inner" or "exact"; exact between two solids that both have it. None: exact
+        for meshes of at most 2,000 triangles, matched for others.
 
     Raises ist.OpenMeshError for a mesh that is not closed: repair it first (ist.repair_mesh) or
     leave it out of `geoms`.
@@ -108,10 +110,8 @@ def _instance(spec, model, mesh, name, folder, spheres, patches, measure):
     plugin = spec.add_plugin(name=f"ist {name} {len(spec.plugins)}", plugin_name="ist.solid", active=True)
     plugin.config = {
         "file": str(_baked(model, mesh, name, folder, spheres)),
-        "patches": str(patches),
-        "measure": measure,
         "scale": "1",
-    }
+    } | {key: str(value) for key, value in {"patches": patches, "measure": measure}.items() if value is not None}
     for m in spec.meshes:
         if m.name == name:
             m.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT
