@@ -17,7 +17,7 @@ constexpr double kErrorOfOne = 0.09;
 constexpr double kMostOverMedian = 3;
 // In deep contact forces cancel and err by more than volumes: by 1° at 0.5 % with so many times the
 // overlap more per share of the smaller solid. Only where a finer level is at hand.
-constexpr double kDeep = 4;
+constexpr double kDeep = 4.5;
 
 // The part of a level's overlap from which on it is blended in.
 constexpr double kTooRough = 0.7;
