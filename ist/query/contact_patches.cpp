@@ -150,8 +150,7 @@ struct ChosenPart {
                          const DescentLimits& limits) noexcept {
     ChosenPart& self = *static_cast<ChosenPart*>(context);
     self.levels.emplace(self.a, self.tree_of(self.a, pair.a), self.b, self.tree_of(self.b, pair.b),
-                        self.pose, self.inner() ? FieldUse::never : use,
-                        *self.workspace.impl());
+                        self.pose, self.inner() ? FieldUse::never : use, *self.workspace.impl());
     return self.levels->sum(limits);
   }
 
@@ -160,8 +159,7 @@ struct ChosenPart {
     ContactSettings settings = self.settings;
     settings.max_visits = max_visits;
     if (!most) return exact_penetration(self.a, self.b, settings, self.pose, self.workspace);
-    self.exact =
-        exact_patches(self.a, self.b, settings, self.workspace, self.patches, {}).contact;
+    self.exact = exact_patches(self.a, self.b, settings, self.workspace, self.patches, {}).contact;
     return self.exact->penetration;
   }
 };
@@ -189,8 +187,8 @@ ContactPatches contact_patches(const PlacedTree& a, const PlacedTree& b,
   const Penetration& part = chosen.exact ? chosen.exact->penetration : chosen.levels->whole();
   if (blends || result.count == 0)
     result.count = spread(part, result.penetration, result.count, patches);
-  finish_patches(patches.first(result.count), chosen.exact ? exact_deepest(part.volume)
-                                                           : chosen.levels->deepest());
+  finish_patches(patches.first(result.count),
+                 chosen.exact ? exact_deepest(part.volume) : chosen.levels->deepest());
   return result;
 }
 

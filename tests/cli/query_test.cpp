@@ -159,9 +159,9 @@ TEST_F(QueryCommand, AnErrorIsAcceptedAsAShare) {
   EXPECT_NE(shown.out.find("accepted, and less is predicted"), std::string::npos) << shown.out;
 
   // Without a mesh nothing is exact enough, and that is said.
-  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"})
-                .exit_code,
-            0);
+  ASSERT_EQ(
+      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
+      0);
   const auto all = rows({"bare.ist", "cube.ist", "--csv", "--pose", pose, "--error", "0.5%"});
   ASSERT_EQ(all.size(), 1u);
   EXPECT_NE(all[0].find(",error_exceeded,"), std::string::npos) << all[0];

@@ -135,8 +135,7 @@ TEST_F(WantedErrors, GradientsAreThoseOfTheVolume) {
       return ask(a, moved, error).volume;
     };
     const Vector3d none = Vector3d::Zero();
-    const double pushed =
-        (volume(step * along, none) - volume(-step * along, none)) / (2 * step);
+    const double pushed = (volume(step * along, none) - volume(-step * along, none)) / (2 * step);
     EXPECT_NEAR(pushed, here.translation_gradient.dot(along), 5e-3 * force) << i << ' ' << error;
     const double turned = (volume(none, 1e-3 * along) - volume(none, -1e-3 * along)) / 2e-3;
     EXPECT_NEAR(turned, here.rotation_gradient.dot(along), 5e-3 * force * scale)

@@ -22,8 +22,8 @@ constexpr double kDeep = 4.5;
 // The part of a level's overlap from which on it is blended in.
 constexpr double kTooRough = 0.7;
 
-// Surfaces cross in kCrossings (√T_A (V/V_A)^⅜ + √T_B (V/V_B)^⅜) triangles, T being all of them. One
-// costs as much as kPairsOfCrossing pairs of spheres; spheres must save kPairsSaved.
+// Surfaces cross in kCrossings (√T_A (V/V_A)^⅜ + √T_B (V/V_B)^⅜) triangles, T being all of them.
+// One costs as much as kPairsOfCrossing pairs of spheres; spheres must save kPairsSaved.
 constexpr double kCrossings = 4.5, kPairsOfCrossing = 28, kPairsSaved = 250;
 // The overlap at which both are compared, in those from which on a level answers: the next coarser
 // one takes over at four.
@@ -116,8 +116,9 @@ WantedError::Shares WantedError::shares(double coarse) const noexcept {
   for (std::size_t i = size_; i-- > 0;) {
     const double from = from_[i];
     // (so that a damaged asset's NaN is never exact enough)
-    const double t =
-        coarse > kTooRough * from ? std::min((coarse / from - kTooRough) / (1 - kTooRough), 1.0) : 0;
+    const double t = coarse > kTooRough * from
+                         ? std::min((coarse / from - kTooRough) / (1 - kTooRough), 1.0)
+                         : 0;
     const DetailWeight part{smooth_step(t), t < 1 ? 6 * t * (1 - t) / ((1 - kTooRough) * from) : 0};
     shares.levels[i] = rest * part;
     rest = rest * complement(part);
