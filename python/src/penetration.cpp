@@ -110,7 +110,7 @@ field: 'automatic', 'never' or 'always': whether an asset's surface is used. No 
 pair_budget, max_visits: cost limits; 0: no limit. See <ist/query.h>.
 relative_error: accepted relative error of the volume, such as 0.005 for 0.5 %, of two Assets with
     'matched': the cheapest of the levels of detail and the exact measure that is predicted to err
-    by less, blended smoothly. 19 of 20 random poses err by less, half of them by less than a third.
+    by less, blended smoothly. About 19 of 20 random poses err by less, half by less than a third.
     0: all spheres. status error_exceeded: an Asset has no mesh, or pair_budget is too small.
 threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 

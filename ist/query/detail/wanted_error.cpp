@@ -12,7 +12,7 @@ namespace {
 
 // A sum of lenses over n solid spheres (solid_volume()) errs by less than kErrorOfOne · n^(-8/9) in
 // 19 of 20 random poses, and by a third of that in the median. Fitted to spheres of 468 to 30,000
-// in poses of nine pairs of solids (`benchmarks/run.sh wanted_error`).
+// in poses of seven pairs of solids (`benchmarks/run.sh wanted_error`).
 constexpr double kErrorOfOne = 0.09;
 constexpr double kMostOverMedian = 3;
 // In deep contact forces cancel and err by more than volumes: by 1° at 0.5 % with so many times the
