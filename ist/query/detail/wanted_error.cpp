@@ -83,8 +83,9 @@ WantedError::WantedError(const PlacedTree& a, const PlacedTree& b, const Relativ
   const AssetHeader& asset_a = a.tree.header();
   const AssetHeader& asset_b = b.tree.header();
   const double scale3 = pose.a_from_b.scale * pose.a_from_b.scale * pose.a_from_b.scale;
-  const double needed_a = spheres_needed(asset_a, settings.relative_error);
-  const double needed_b = spheres_needed(asset_b, settings.relative_error);
+  const double error = std::min(settings.relative_error, 1.0);
+  const double needed_a = spheres_needed(asset_a, error);
+  const double needed_b = spheres_needed(asset_b, error);
   for (std::size_t i = 0; i < size_; ++i) {
     const TreeHeader& tree_a = matched_tree(asset_a, chain[i].a);
     const TreeHeader& tree_b = matched_tree(asset_b, chain[i].b);
