@@ -192,7 +192,11 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       result.volume_min = std::min(result.volume_min, bounds.volume_min);
       result.volume_max = std::max(result.volume_max, bounds.volume_max);
     }
-    if (has_exact) bound_by_solids(a, b, result);
+    if (has_exact) {
+      const double by_spheres = result.volume_max;
+      bound_by_solids(a, b, result);
+      result.volume_max = std::max(result.volume_max, by_spheres);
+    }
   } else {
     const double unit3 = pose.unit_a * pose.unit_a * pose.unit_a;
     const double estimate = coarse.volume / unit3;
