@@ -9,7 +9,7 @@
 
 namespace ist {
 
-/// The true volume lies between nothing and the smaller solid's.
+/// The true volume lies between nothing and the smaller solid's; what spheres say may be more.
 inline void bound_by_solids(const PlacedTree& a, const PlacedTree& b,
                             Penetration& answer) noexcept {
   const auto most = [](const PlacedTree& placed) {
@@ -18,7 +18,7 @@ inline void bound_by_solids(const PlacedTree& a, const PlacedTree& b,
            (placed.scale * placed.scale * placed.scale);
   };
   answer.volume_min = 0;
-  answer.volume_max = std::min(most(a), most(b)) * (1 + 1e-12);
+  answer.volume_max = std::max(std::min(most(a), most(b)) * (1 + 1e-12), answer.volume);
 }
 
 }  // namespace ist
