@@ -18,7 +18,8 @@ inline void bound_by_solids(const PlacedTree& a, const PlacedTree& b,
            (placed.scale * placed.scale * placed.scale);
   };
   answer.volume_min = 0;
-  answer.volume_max = std::max(std::min(most(a), most(b)) * (1 + 1e-12), answer.volume);
+  answer.volume_max = std::min(most(a), most(b)) * (1 + 1e-12);
+  if (!std::isnan(answer.volume)) answer.volume_max = std::max(answer.volume_max, answer.volume);
 }
 
 }  // namespace ist
