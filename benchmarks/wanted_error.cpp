@@ -44,9 +44,8 @@ Answers measure(const ist::Asset& a, const ist::Asset& b, const std::vector<Row>
   for (int round = 0; round < rounds; ++round)
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const double start = ist::benchmark::thread_seconds();
-      result.answers[i] = ist::penetration({a.view(), {}, 1},
-                                           {b.view(), rows[i].pose, rows[i].scale_b}, settings,
-                                           workspace);
+      result.answers[i] = ist::penetration(
+          {a.view(), {}, 1}, {b.view(), rows[i].pose, rows[i].scale_b}, settings, workspace);
       const double seconds = ist::benchmark::thread_seconds() - start - clock;
       result.us[i] = std::min(result.us[i], 1e6 * std::max(0.0, seconds));
     }
@@ -114,9 +113,9 @@ void report_levels(Report& report, const PairOfBodies& pair, const std::vector<s
     for (std::size_t i = 0; i < pair.rows.size(); ++i) {
       const auto spheres = [&](const ist::Asset& asset, double scale) {
         const ist::AssetHeader& header = asset.view().header();
-        return pair.rows[i].volume / (std::ldexp(solid_volume(header, header.matched_tree),
-                                                 3 * header.exponent) *
-                                      (scale * scale * scale));
+        return pair.rows[i].volume /
+               (std::ldexp(solid_volume(header, header.matched_tree), 3 * header.exponent) *
+                (scale * scale * scale));
       };
       if (pair.rows[i].overlap_class == 0) continue;
       const double n_a = spheres(a, 1), n_b = spheres(b, pair.rows[i].scale_b);
@@ -162,10 +161,9 @@ int main(int argc, char** argv) {
   pairs.push_back(ist::benchmark::oracle_pair("eledino"));
   if (!report.quick()) {
     for (const char* key : {"big200k", "ico1k"}) pairs.push_back(ist::benchmark::oracle_pair(key));
-    for (const auto& [a, b] : {std::pair("bolt_gen.ply", "nut_gen.ply"),
-                               std::pair("spot.obj", "bunny_60k.ply"),
-                               std::pair("torus.off", "spot.obj"),
-                               std::pair("unit_cube.stl", "adis16480.stl")})
+    for (const auto& [a, b] :
+         {std::pair("bolt_gen.ply", "nut_gen.ply"), std::pair("spot.obj", "bunny_60k.ply"),
+          std::pair("torus.off", "spot.obj"), std::pair("unit_cube.stl", "adis16480.stl")})
       pairs.push_back(ist::benchmark::development_pair(a, b, 30));
   }
   for (const PairOfBodies& pair : pairs) {

@@ -95,7 +95,7 @@ class GpuWorkspace {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Limits of a penetration of a batch, as in PenetrationSettings.
+/// Limits of a batch, as in PenetrationSettings; no relative_error, as exact is not on the GPU.
 struct GpuPenetrationSettings {
   Measure measure = Measure::matched;  ///< matched or inner
   /// Count of sphere pairs to spend on each pair of trees; matched measure only; 0: no limit.

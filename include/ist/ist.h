@@ -41,8 +41,8 @@ enum {
   /* A limit or the workspace's capacity stopped the query. volume_min and volume_max contain the
    * same value as those of a finished answer. */
   IST_BUDGET_EXHAUSTED = 1,
-  /* Finished, but the error is larger than relative_error: an asset has no mesh, or a pair budget or
-   * coincident copies left coarser spheres. */
+  /* Finished, but the error is larger than relative_error: an asset has no mesh, or a pair budget
+   * or coincident copies left coarser spheres. */
   IST_ERROR_EXCEEDED = 2,
   /* A pose with NaN or Inf, a quaternion of length 0, a scale < 0, sizes or distances more than
    * 1e60 : 1 apart, or a field's number or an enum out of range. */
@@ -364,12 +364,12 @@ typedef struct ist_penetration_settings {
   uint32_t size;
   ist_measure_t measure;
   ist_field_use_t field;
-  uint32_t pair_budget;  /* count of sphere pairs to spend; 0: no limit, as in all that follow */
-  uint32_t max_visits;   /* count of node pairs opened */
-  uint32_t reserved;     /* 0 */
+  uint32_t pair_budget; /* count of sphere pairs to spend; 0: no limit, as in all that follow */
+  uint32_t max_visits;  /* count of node pairs opened */
+  uint32_t reserved;    /* 0 */
   /* Accepted relative error of the volume, as 0.005 for 0.5 %, of two trees with IST_MATCHED: the
-   * coarsest level of detail that is predicted to err by less, or IST_EXACT, blended smoothly. If an
-   * asset has no mesh, or under a pair budget, the answer may be IST_ERROR_EXCEEDED. */
+   * coarsest level of detail that is predicted to err by less, or IST_EXACT, blended smoothly. If
+   * an asset has no mesh, or under a pair budget, the answer may be IST_ERROR_EXCEEDED. */
   double relative_error;
 } ist_penetration_settings_t;
 

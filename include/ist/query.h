@@ -45,8 +45,8 @@ struct PenetrationSettings {
   std::uint32_t max_visits = 0;
 
   /// Accepted relative error of the volume, as 0.005 for 0.5 %; two trees in the matched measure
-  /// only. Random poses at such an overlap err by less in 19 of 20 cases, and by less than a third
-  /// of it in the median.
+  /// only. In the median over random poses at such an overlap the error is less than a third of
+  /// this, and it is less than this in about 19 of 20.
   ///
   /// The cheapest measure that is predicted to err by less answers: the coarsest level of detail
   /// that is exact enough at this overlap, or Measure::exact where none is, or where few triangles

@@ -20,8 +20,7 @@ namespace {
 
 CLI::Option* add_number(CLI::App* command, const std::string& name, double& value,
                         const Range& range, const std::string& words,
-                        std::optional<double> (*parse)(std::string_view),
-                        const std::string& help) {
+                        std::optional<double> (*parse)(std::string_view), const std::string& help) {
   return add_parsed(
              command, name, words,
              [&value, range, parse](const std::string& text) {

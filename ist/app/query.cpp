@@ -196,8 +196,8 @@ std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions&
   const Asset a = Asset::load(options.a);
   const Asset b = Asset::load(options.asset_b);
   // Surfaces alone are exact enough.
-  const bool surfaces = options.settings.penetration.relative_error > 0 && a.view().has_mesh() &&
-                        b.view().has_mesh();
+  const bool surfaces =
+      options.settings.penetration.relative_error > 0 && a.view().has_mesh() && b.view().has_mesh();
   if (!surfaces) {
     require_held(options.a, a.view(), measure);
     require_held(options.asset_b, b.view(), measure);
@@ -281,11 +281,12 @@ void add_query(CLI::App& app) {
   add_whole(command, "--pair-budget", options->settings.penetration.pair_budget,
             "Use the level of detail that needs about this many sphere pairs; 0 = the finest. "
             "Matched measure only");
-  add_share(command, "--error", options->settings.penetration.relative_error,
-            {.least = 0, .most = 1, .without_most = true},
-            "Accepted relative error of the volume, e.g. 0.5%, by whichever is cheapest: the "
-            "coarsest level of detail that is predicted to err by less, or the kept meshes; 0 = all "
-            "spheres. Matched measure only");
+  add_share(
+      command, "--error", options->settings.penetration.relative_error,
+      {.least = 0, .most = 1, .without_most = true},
+      "Accepted relative error of the volume, e.g. 0.5%, by whichever is cheapest: the "
+      "coarsest level of detail that is predicted to err by less, or the kept meshes; 0 = all "
+      "spheres. Matched measure only");
   add_whole(command, "--max-visits", options->max_visits,
             "Limit of node pairs, for penetration and for separation; 0 = no limit");
   add_whole<std::size_t>(command, "--repeat", options->repeat,

@@ -21,8 +21,9 @@ struct Answer {
   QueryStatus status() const {
     const QueryStatus overlap = result.penetration.status, gap = result.separation.status;
     if (!has_distance()) return overlap;
-    return overlap == QueryStatus::error_exceeded && gap != QueryStatus::ok ? gap
-                                                                            : std::max(overlap, gap);
+    return overlap == QueryStatus::error_exceeded && gap != QueryStatus::ok
+               ? gap
+               : std::max(overlap, gap);
   }
   std::uint64_t node_visits() const;
   std::uint64_t sphere_pairs() const;

@@ -149,8 +149,7 @@ struct ChosenPart {
                          const DescentLimits& limits) noexcept {
     ChosenPart& self = *static_cast<ChosenPart*>(context);
     self.levels.emplace(self.a, self.tree_of(self.a, pair.a), self.b, self.tree_of(self.b, pair.b),
-                        self.pose, self.inner() ? FieldUse::never : use,
-                        *self.workspace.impl());
+                        self.pose, self.inner() ? FieldUse::never : use, *self.workspace.impl());
     return self.levels->sum(limits);
   }
 

@@ -45,8 +45,8 @@ Penetration find_penetration(const PlacedTree& a, const PlacedTree& b,
   const FieldUse use = inner ? FieldUse::never : settings.field;
   const PairMethod method = pair_method(a, tree_a, b, tree_b, *pose, use);
   if (lacks_surface(method, use)) return not_held<Penetration>();
-  if (!inner && (settings.pair_budget > 0 || by_error(settings) ||
-                 are_one_asset(header_a, header_b))) {
+  if (!inner &&
+      (settings.pair_budget > 0 || by_error(settings) || are_one_asset(header_a, header_b))) {
     ExactSum sum{a, b, settings, *pose, workspace};
     return blend_details(a, b, *pose, settings, workspace, {&sum, nullptr, ExactSum::sum});
   }

@@ -104,7 +104,11 @@ measure: 'matched' (the accurate spheres), 'inner' (certified lower bound of the
     'exact' (the true volume and its gradients: of two Assets that hold their mesh, which bake()
     keeps by default; it heeds max_visits alone).
 field: 'automatic', 'never' or 'always': whether an asset's surface is used. No effect with 'exact'.
-pair_budget, max_visits, relative_error: cost limits; 0: no limit. See <ist/query.h>.
+pair_budget, max_visits: cost limits; 0: no limit. See <ist/query.h>.
+relative_error: accepted relative error of the volume, such as 0.005 for 0.5 %, of two Assets with
+    'matched': the cheapest of the levels of detail and the exact measure that is predicted to err
+    by less, blended smoothly. About 19 of 20 random poses err by less, half by less than a third.
+    0: all spheres. status error_exceeded: an Asset has no mesh, or pair_budget is too small.
 threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 
 Rows that cannot be answered are NaN with a status; they spoil no others. invalid_input: NaN, a

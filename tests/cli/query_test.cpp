@@ -146,6 +146,37 @@ TEST_F(QueryCommand, APairBudgetTakesACoarserLevel) {
   EXPECT_NE(coarse[1], finest[1]);
 }
 
+TEST_F(QueryCommand, AnErrorIsAcceptedAsAShare) {
+  const std::string pose = "0.9,0.1,0.3,0.2,0.9,0.3,0.2";
+  const auto volume = [&](const std::vector<std::string>& more) { return row(pose, more)[1]; };
+  const double exact = volume({"--measure", "exact"});
+  EXPECT_NE(volume({}), exact);
+  // Few triangles cross.
+  EXPECT_EQ(volume({"--error", "0.5%"}), exact);
+  EXPECT_EQ(volume({"--error", "0.005"}), exact);
+  EXPECT_EQ(volume({"--error", "0"}), volume({}));
+  const Outcome shown = ist({"query", "cube.ist", "cube.ist", "--pose", pose, "--error", "0.5%"});
+  EXPECT_NE(shown.out.find("accepted, and less is predicted"), std::string::npos) << shown.out;
+
+  // Without a mesh nothing is exact enough, and that is said.
+  ASSERT_EQ(
+      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
+      0);
+  const auto all = rows({"bare.ist", "cube.ist", "--csv", "--pose", pose, "--error", "0.5%"});
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_NE(all[0].find(",error_exceeded,"), std::string::npos) << all[0];
+  const Outcome more = ist({"query", "bare.ist", "cube.ist", "--pose", pose, "--error", "0.5%"});
+  EXPECT_NE(more.out.find("accepted, but more is predicted"), std::string::npos) << more.out;
+
+  for (const char* const text : {"-1%", "1", "100%", "nan", "half", "5 %"})
+    expect_exit(2, {"cube.ist", "cube.ist", "--pose", pose, "--error", text}, "--error");
+  for (const char* const measure : {"inner", "exact"})
+    expect_exit(2, {"cube.ist", "cube.ist", "--pose", pose, "--error", "1%", "--measure", measure},
+                std::string("--error: has no effect with --measure ") + measure);
+  expect_exit(2, {"ball:1", "cube.ist", "--pose", pose, "--error", "1%"},
+              "--error: has no effect where A is a field: ball:1");
+}
+
 TEST_F(QueryCommand, JsonHasTheColumnsOfTheCsv) {
   const Outcome outcome =
       ist({"query", "cube.ist", "cube.ist", "--pose", "1,0,0,0,0.5,0,0", "--json"});
@@ -256,6 +287,16 @@ TEST_F(ExactQueryCommand, SaysWhatIsNotHeld) {
                 "nut.ist: has no spheres, which --measure " + std::string(measure) +
                     " needs; use --measure exact");
   expect_exit(1, {"ball:1", "nut.ist", "--pose", "1,0,0,0,0,0,0"}, "nut.ist: has no spheres");
+}
+
+TEST_F(ExactQueryCommand, AnAcceptedErrorNeedsNoSpheres) {
+  const auto volume = [&](const std::string& option, const std::string& value) {
+    const Outcome outcome =
+        ist({"query", "bolt.ist", "nut.ist", "--pose", kNutOnBolt, "--csv", option, value});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return numbers_of(lines_of(outcome.out).at(1))[1];
+  };
+  EXPECT_EQ(volume("--error", "1%"), volume("--measure", "exact"));
 }
 
 TEST_F(ExactQueryCommand, RefusesWhatItDoesNotHeed) {

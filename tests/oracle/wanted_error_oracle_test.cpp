@@ -64,9 +64,9 @@ std::map<std::string, Found> ask(const std::vector<OracleRow>& rows, std::size_t
                                                : "0.01–0.1 %";
     by_class[name].error.push_back(std::abs(answer.volume / row.volume - 1) / wanted);
     by_class[name].angle.push_back(
-        name == "contain" ? 0
-                          : testing::degrees_between(answer.translation_gradient,
-                                                     row.translation_gradient));
+        name == "contain"
+            ? 0
+            : testing::degrees_between(answer.translation_gradient, row.translation_gradient));
   }
   return by_class;
 }
@@ -74,9 +74,8 @@ std::map<std::string, Found> ask(const std::vector<OracleRow>& rows, std::size_t
 // The median of every class below the wanted error, 19 of 20 rows below four times that.
 TEST(WantedErrorOracle, EveryClassErrsByLess) {
   IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
-  const std::vector<std::pair<std::string, std::size_t>> pairs = {{"eledino", 10'000},
-                                                                  {"eledino", 1'500},
-                                                                  {"ico1k", 3'000}};
+  const std::vector<std::pair<std::string, std::size_t>> pairs = {
+      {"eledino", 10'000}, {"eledino", 1'500}, {"ico1k", 3'000}};
   for (const auto& [key, spheres] : pairs)
     for (const double wanted : {0.005, 0.02, 0.05}) {
       const auto found = ask(testing::read_oracle_rows(key), spheres, wanted);
@@ -85,7 +84,7 @@ TEST(WantedErrorOracle, EveryClassErrsByLess) {
         SCOPED_TRACE(key + ", " + name + ", " + std::to_string(wanted));
         EXPECT_LE(quantile(of.error, 0.5), 1);
         EXPECT_LE(quantile(of.error, 0.95), 4);
-        EXPECT_LE(quantile(of.angle, 0.5), wanted == 0.005 ? 1 : 2);
+        EXPECT_LE(quantile(of.angle, 0.5), wanted == 0.005 ? 1 : 3);
       }
     }
 }
@@ -98,7 +97,7 @@ TEST(WantedErrorOracle, SmallOnLargeErrsByLess) {
         SCOPED_TRACE(std::string(key) + ", ratio " + name + ", " + std::to_string(wanted));
         EXPECT_LE(quantile(of.error, 0.5), 1);
         EXPECT_LE(quantile(of.error, 0.95), 4);
-        EXPECT_LE(quantile(of.angle, 0.5), wanted == 0.005 ? 1 : 2);
+        EXPECT_LE(quantile(of.angle, 0.5), wanted == 0.005 ? 1 : 3);
       }
 }
 

@@ -323,6 +323,19 @@ def test_one_invalid_pose_raises(cube, pose, text):
                 ask()
 
 
+def test_an_accepted_error_takes_the_meshes_where_these_are_cheap(cube):
+    pose = np.array([0.9, 0.1, 0.3, 0.2, 0.9, 0.3, 0.2])
+    exact = ist.penetration(cube, cube, pose, measure="exact")
+    found = ist.penetration(cube, cube, pose, relative_error=0.005)
+    assert exact.volume > 0 and found.volume == exact.volume and found.status == ist.QueryStatus.ok
+    assert ist.penetration(cube, cube, pose).volume != exact.volume
+    patches = ist.contact_patches(cube, cube, pose, relative_error=0.005)
+    assert patches.penetration.volume == exact.volume
+    # A budget keeps the meshes out.
+    limited = ist.penetration(cube, cube, pose, relative_error=1e-6, pair_budget=1)
+    assert limited.status == ist.QueryStatus.error_exceeded
+
+
 def test_limits_that_are_none_are_refused(cube):
     for arguments, text in ((dict(relative_error=np.nan), "relative_error: nan; wanted a number ≥ 0"),
                             (dict(relative_error=-1.0), "relative_error: -1.0"),

@@ -169,7 +169,7 @@ class Chunk {
         const bool bounded = settings.pair_budget == 0 && (settings.measure == Measure::matched ||
                                                            std::min(which_a, which_b) >= kMadeUp);
         if (compare && bounded && answer.status == QueryStatus::budget_exhausted)
-          look_at_finished(answer, a, b, settings.measure);
+          look_at_finished(answer, a, b, settings);
       }
     }
   }
@@ -220,11 +220,11 @@ class Chunk {
   }
 
   void look_at_finished(const Penetration& stopped, const PlacedTree& a, const PlacedTree& b,
-                        Measure measure) {
-    PenetrationSettings no_limits;
-    no_limits.measure = measure;
-    const Penetration finished = penetration(a, b, no_limits, worker_.large);
-    if (finished.status != QueryStatus::ok) return;
+                        PenetrationSettings settings) {
+    settings.max_visits = 0;
+    const Penetration finished = penetration(a, b, settings, worker_.large);
+    if (finished.status != QueryStatus::ok && finished.status != QueryStatus::error_exceeded)
+      return;
     if (finished.volume_max < stopped.volume_min || finished.volume_min > stopped.volume_max)
       ++worker_.tally.not_contained;
   }

@@ -52,9 +52,8 @@ class DetailQueries {
     DetailPair unlike[2] = {pair, pair};
     unlike[0].b = unlike[1].a = pair.a < a_.detail_count ? pair.a + 1 : pair.a - 1;
     const bool mostly_unlike = coincidence.weight >= 0.5;
-    Penetration other =
-        mix(descend(unlike[0], keep_rounding, mostly_unlike ? most : nullptr),
-            descend(unlike[1], keep_rounding), 0.5);
+    Penetration other = mix(descend(unlike[0], keep_rounding, mostly_unlike ? most : nullptr),
+                            descend(unlike[1], keep_rounding), 0.5);
     if (coincidence.weight == 1) return other;
     const Penetration alike = descend(pair, keep_rounding, mostly_unlike ? nullptr : most);
     Penetration mixed = mix(alike, other, coincidence.weight);
@@ -72,9 +71,8 @@ class DetailQueries {
   Penetration exact(const BlendSums& sums, bool most) noexcept {
     const std::uint32_t left = limits_left().max_visits;
     const std::uint32_t no_limit = 0;
-    return counted(sums.exact(sums.context,
-                              left == DescentLimits::kNoLimit ? no_limit : std::max(left, 1u),
-                              most));
+    return counted(sums.exact(
+        sums.context, left == DescentLimits::kNoLimit ? no_limit : std::max(left, 1u), most));
   }
 
   CoincidenceWeight coincidence_weight_of(const DetailPair& pair) const noexcept {
@@ -194,7 +192,11 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       result.volume_min = std::min(result.volume_min, bounds.volume_min);
       result.volume_max = std::max(result.volume_max, bounds.volume_max);
     }
-    if (has_exact) bound_by_solids(a, b, result);
+    if (has_exact) {
+      const double by_spheres = result.volume_max;
+      bound_by_solids(a, b, result);
+      result.volume_max = std::max(result.volume_max, by_spheres);
+    }
   } else {
     const double unit3 = pose.unit_a * pose.unit_a * pose.unit_a;
     const double estimate = coarse.volume / unit3;

@@ -15,6 +15,11 @@ export const statusOf = (status) => status === 0 ? 'ok' :
     status === kNotHeld                          ? 'not-held' :
                                                    'invalid-input';
 
+/** Of an answer, which is one. */
+export const codeOf = (status) => status === 'budget-exhausted' ? 1 :
+    status === 'error-exceeded'                                 ? kErrorExceeded :
+                                                                  0;
+
 export const newPenetration = () => ({
   status: 'ok',
   volume: 0,
@@ -48,9 +53,7 @@ export function readPenetration(place, status, out) {
 /** Puts an answer back where the library looks for it. */
 export function writePenetration(place, answer) {
   const numbers = f64(), integers = u32(), at = place / 8 + 1;
-  integers[2 * at - 1] = answer.status === 'budget-exhausted' ? 1 :
-      answer.status === 'error-exceeded'                      ? kErrorExceeded :
-                                                                0;
+  integers[2 * at - 1] = codeOf(answer.status);
   numbers[at] = answer.volume;
   numbers[at + 1] = answer.volumeMin;
   numbers[at + 2] = answer.volumeMax;

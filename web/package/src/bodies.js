@@ -1,6 +1,6 @@
 // What is told from answers that are there already, and of two assets at any pose.
 
-import {kPatchBytes, newPenetration, newVector, readPatches, readPenetration, writePatch, writePenetration} from './answers.js';
+import {codeOf, kPatchBytes, newPenetration, newVector, readPatches, readPenetration, writePatch, writePenetration} from './answers.js';
 import {Asset} from './asset.js';
 import {copy3, desk, kFit, kMostPatches, kNumbers, kPatches, kPenetration, kWrenches, writeNumbers, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
@@ -24,8 +24,8 @@ export function withoutProtrusion(whole, a, b, poseB, options) {
   writePlaces(a, b, poseB, options, 'withoutProtrusion()');
   writePenetration(desk() + kPenetration, whole);
   check(wasm.without_protrusion(a._at, b._at), 'withoutProtrusion()');
-  const status = whole.status === 'ok' ? 0 : 1;
-  return readPenetration(desk() + kPenetration, status, options?.into ?? newPenetration());
+  return readPenetration(
+      desk() + kPenetration, codeOf(whole.status), options?.into ?? newPenetration());
 }
 
 export function patchesWithoutProtrusion(found, a, b, poseB, options) {

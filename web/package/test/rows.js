@@ -21,7 +21,8 @@ export function parseRows(csv) {
 
 const kStatus = {
   'ok': 0,
-  'budget-exhausted': 1
+  'budget-exhausted': 1,
+  'error-exceeded': 2
 };
 
 function penetrationBits(p) {
