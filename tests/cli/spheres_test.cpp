@@ -2,6 +2,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -224,6 +225,41 @@ TEST_F(RobotCommands, AllOpenLinksAreToldAtOnce) {
               0);
   }
   expect_error({"spheres", "r.urdf.xacro", "-o", "o.json"}, 1, "xacro r.urdf.xacro -o");
+}
+
+TEST_F(RobotCommands, WarningsOfAKindAreOneLine) {
+  // Two cubes that overlap.
+  const auto box = [](double x, int first) {
+    std::string out;
+    for (int i = 0; i < 8; ++i)
+      out += "v " + std::to_string(x + (i & 1)) + " " + std::to_string((i >> 1) & 1) + " " +
+             std::to_string((i >> 2) & 1) + "\n";
+    for (const auto& [a, b, c] : std::vector<std::array<int, 3>>{{0, 2, 3},
+                                                                 {0, 3, 1},
+                                                                 {4, 5, 7},
+                                                                 {4, 7, 6},
+                                                                 {0, 1, 5},
+                                                                 {0, 5, 4},
+                                                                 {2, 6, 7},
+                                                                 {2, 7, 3},
+                                                                 {0, 4, 6},
+                                                                 {0, 6, 2},
+                                                                 {1, 3, 7},
+                                                                 {1, 7, 5}})
+      out += "f " + std::to_string(a + first) + " " + std::to_string(b + first) + " " +
+             std::to_string(c + first) + "\n";
+    return out;
+  };
+  write("two.obj", box(0, 1) + box(0.5, 9));
+  const std::string mesh =
+      "<collision><geometry><mesh filename='two.obj'/></geometry></collision></link>";
+  write("w.urdf", "<robot name='r'><link name='first'>" + mesh + "<link name='second'>" + mesh +
+                      "<joint name='a' type='fixed'><parent link='first'/><child link='second'/>"
+                      "</joint></robot>");
+  const Outcome outcome = ist({"spheres", "w.urdf", "-o", "w.json", "--count", "2"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.err.find("links first, second: "), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find("link second"), std::string::npos) << outcome.err;
 }
 
 /// Links and spheres stand where the joints put them, and are read back as meshes.
