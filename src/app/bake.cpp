@@ -98,11 +98,13 @@ void run_bake(const BakeOptions& options) {
   settings.packing.threads = options.threads;
   const bool robot = is_robot_file(options.mesh);
   if (!robot) {
+    require_output(options.output, options.mesh, "the asset");
     if (has_mesh_ending(options.output))
       throw Error(options.output + ": has the extension of a mesh; name the asset " +
                   std::filesystem::path(options.output).replace_extension(".ist").string());
-    require_output(options.output, options.mesh, "the asset");
   }
+  if (!options.closed_mesh.empty())
+    require_output(options.closed_mesh, options.mesh, "the closed mesh");
   settings.packing.device = usable_device(options.device);
   if (!settings.surface_only) announce_device(settings.packing.device);
   if (robot)

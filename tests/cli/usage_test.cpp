@@ -93,6 +93,9 @@ TEST_F(Usage, TheClosedMeshIsWrittenWhereItIsAskedFor) {
                 .mesh.triangles.size(),
             12u);
   EXPECT_EQ(ist({"bake", "cube.obj", "-o", "p.ist", "--write-mesh", "p.xyz"}).exit_code, 2);
+  EXPECT_EQ(
+      ist({"bake", "open.obj", "-o", "p.ist", "--repair", "--write-mesh", "open.obj"}).exit_code,
+      1);
   EXPECT_FALSE(exists("p.ist"));
 }
 

@@ -160,6 +160,16 @@ TEST_F(Library, FailuresAloneAndTheQualityOfAssets) {
   EXPECT_EQ(failed.exit_code, 1);
   EXPECT_NE(failed.out.find("broken"), std::string::npos) << failed.out;
   EXPECT_EQ(failed.out.find("gear"), std::string::npos) << failed.out;
+  // A page with a picture of each asset, failures first.
+  EXPECT_EQ(ist({"summary", "summary.json", "--html", "page.html"}).exit_code, 1);
+  const std::string page = read("page.html");
+  std::size_t pictures = 0;
+  for (std::size_t at = 0; (at = page.find("data:image/bmp;base64,Qk", at)) != std::string::npos;
+       ++at)
+    ++pictures;
+  EXPECT_EQ(pictures, names().size());
+  EXPECT_LT(page.find("<td>broken<td>failed"), page.find("<td>capsule<td>baked"));
+  EXPECT_EQ(page.find("http"), std::string::npos);
   for (const nlohmann::json& asset : summary.at("assets")) {
     if (asset.at("status") == "failed") continue;
     const nlohmann::json info =
