@@ -135,11 +135,11 @@ TEST_F(RobotCommands, PlannersGetAWholeRobot) {
   const Words joints = {"j1", "j2", "l"};
   EXPECT_EQ(curobo["urdf_path"].as<std::string>(), (folder_ / "arm.urdf").string());
   EXPECT_EQ(curobo["base_link"].as<std::string>(), "base");
-  EXPECT_EQ(curobo["ee_link"].as<std::string>(), "hand");
+  EXPECT_EQ(curobo["tool_frames"].as<Words>(), Words{"hand"});
   EXPECT_EQ(curobo["collision_link_names"].as<Words>(),
             (Words{"base", "upper", "lower", "hand", "left", "right"}));
   EXPECT_EQ(curobo["cspace"]["joint_names"].as<Words>(), joints);
-  EXPECT_EQ(curobo["cspace"]["retract_config"].as<std::vector<double>>(),
+  EXPECT_EQ(curobo["cspace"]["default_joint_position"].as<std::vector<double>>(),
             (std::vector<double>{1.5, 0, 0}));
   // What cuRobo's converter of XRDF asks for.
   EXPECT_TRUE(xrdf["collision"]["buffer_distance"].IsMap());
