@@ -205,7 +205,7 @@ TEST_F(RobotCommands, CountsOfTheRobotAndOfLinks) {
   expect_error({"spheres", "cube.obj", "-o", "o.json", "--skip", "a"}, 2, "is not a robot");
 }
 
-TEST_F(RobotCommands, AllOpenLinksAreToldAtOnce) {
+TEST_F(RobotCommands, AllOpenLinksAreReportedAtOnce) {
   write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   const std::string mesh =
       "<collision><geometry><mesh filename='open.obj'/></geometry></collision></link>";

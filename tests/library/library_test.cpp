@@ -136,7 +136,7 @@ TEST_F(Library, WhatIsThereAndUnchangedIsNotBakedAgain) {
   EXPECT_EQ(counts().at("cached"), 5);
 }
 
-TEST_F(Library, StaleAssetsAreToldAndRemovedOnRequest) {
+TEST_F(Library, StaleAssetsAreReportedAndRemovedOnRequest) {
   summary_of("out");
   std::filesystem::rename(folder_ / "meshes/cube.obj", folder_ / "meshes/dice.obj");
   write("meshes/nut.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
