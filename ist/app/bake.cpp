@@ -99,11 +99,13 @@ void run_bake(const BakeOptions& options) {
   settings.packing.threads = options.threads;
   const bool robot = is_robot_file(options.mesh);
   if (!robot) {
-    if (is_mesh_format(options.output))
+    require_output(options.output, options.mesh, "the asset");
+    if (has_mesh_ending(options.output))
       throw Error(options.output + ": has the extension of a mesh; name the asset " +
                   std::filesystem::path(options.output).replace_extension(".ist").string());
-    require_output(options.output, options.mesh, "the asset");
   }
+  if (!options.closed_mesh.empty())
+    require_output(options.closed_mesh, options.mesh, "the closed mesh");
   settings.packing.device = usable_device(options.device);
   if (!settings.surface_only) announce_device(settings.packing.device);
   if (robot)
@@ -169,10 +171,8 @@ void add_bake(CLI::App& app) {
                    "Also write the mesh that was baked, after --repair or --wrap: .obj, .ply, .off "
                    "or .stl")
       ->check([](const std::string& path) -> std::string {
-        const std::string ending = ending_of(path);
-        for (const char* const known : {".obj", ".ply", ".off", ".stl"})
-          if (ending == known) return "";
-        return "'" + path + "' does not end in .obj, .ply, .off or .stl";
+        return has_mesh_ending(path) ? ""
+                                     : "'" + path + "' does not end in .obj, .ply, .off or .stl";
       });
   add_device_option(command, options->device,
                     "Device of the bake; auto = the GPU if there is one, else the CPU");

@@ -28,8 +28,12 @@ std::optional<ClosedMesh> LinkMeshes::close(const std::string& link,
     ClosedMesh closed =
         close_or_advise(make(), fmt::format("{}: link {}", robot_, link), settings_);
     for (const std::string& note : closed.report.notes) {
-      Warning& warning =
-          warnings_.try_emplace(without_numbers(note), Warning{note, {}}).first->second;
+      Warning& warning = warnings_[without_numbers(note)];
+      warning.differs |= !warning.links.empty() && note != warning.note;
+      if (warning.links.empty() || note < warning.note) {
+        warning.note = note;
+        warning.link = link;
+      }
       if (warning.links.empty() || warning.links.back() != link) warning.links.push_back(link);
     }
     return closed;
@@ -41,8 +45,10 @@ std::optional<ClosedMesh> LinkMeshes::close(const std::string& link,
 
 void LinkMeshes::finish() const {
   for (const auto& [kind, warning] : warnings_)
-    spdlog::warn("{}: {} {}: {}", robot_, warning.links.size() == 1 ? "link" : "links",
-                 fmt::join(warning.links, ", "), warning.note);
+    spdlog::warn(
+        "{}: {} {}: {}{}", robot_, warning.links.size() == 1 ? "link" : "links",
+        fmt::join(warning.links, ", "), warning.note,
+        warning.differs ? fmt::format(" (the numbers are those of {})", warning.link) : "");
   if (faults_.size() == 1) throw Error(faults_[0]);
   if (faults_.empty()) return;
   for (const std::string& fault : faults_) spdlog::error("{}", fault);

@@ -28,8 +28,10 @@ class LinkMeshes {
 
  private:
   struct Warning {
-    std::string note;  ///< the first of its kind
+    /// The first of its kind by its letters, so that of the lowest confidence, and whose it is.
+    std::string note, link;
     std::vector<std::string> links;
+    bool differs = false;  ///< the others' in its numbers
   };
   const std::string robot_;
   const MeshSettings settings_;

@@ -5,6 +5,8 @@
 
 #include "app/commands.h"
 #include "app/file_options.h"
+#include "app/interrupt.h"
+#include "app/summary_page.h"
 #include "app/summary_table.h"
 #include "library/summary.h"
 
@@ -13,6 +15,7 @@ namespace {
 
 struct SummaryOptions {
   std::vector<std::string> files;
+  std::string page;
   bool json = false, failed = false;
 };
 
@@ -22,7 +25,12 @@ void run_summary(const SummaryOptions& options) {
   Summary whole = merge(std::move(shards));
   if (options.failed)
     std::erase_if(whole.results, [](const JobResult& result) { return result.done(); });
-  print_summary(whole, options.json, false);
+  if (!options.page.empty()) {
+    const InterruptGuard guard;
+    write_text(options.page, summary_page(whole));
+  }
+  exit_if_interrupted();
+  print_summary(whole, options.json, !options.page.empty() && !options.json);
   if (!whole.complete()) throw ExitCode{kExitError};
 }
 
@@ -36,9 +44,12 @@ void add_summary(CLI::App& app) {
       ->required();
   command->add_flag("--failed", options->failed, "Show only assets that failed or were not baked");
   command->add_flag("--json", options->json, "Print JSON");
+  command->add_option("--html", options->page,
+                      "Write a page for browsers instead: a picture and the numbers of each asset");
   command->footer(
       "Exits 1 if an asset failed, or if a shard is missing, given twice or of another library.\n"
-      "Example: ist summary shard-1.json shard-2.json");
+      "Example: ist summary shard-1.json shard-2.json\n"
+      "Example: ist summary summary.json --html library.html");
   command->callback([options] { run_summary(*options); });
 }
 

@@ -72,6 +72,11 @@ std::string stl(const TriangleMesh& mesh) {
 
 }  // namespace
 
+bool has_mesh_ending(const std::string& path) {
+  const std::string ending = ending_of(path);
+  return ending == ".obj" || ending == ".off" || ending == ".ply" || ending == ".stl";
+}
+
 void write_mesh(const TriangleMesh& mesh, const std::string& path) {
   const std::string ending = ending_of(path);
   if (ending == ".obj") return write_atomically(path, obj(mesh));

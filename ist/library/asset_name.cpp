@@ -11,8 +11,8 @@ namespace fs = std::filesystem;
 
 std::string folders_to(const fs::path& file, const fs::path& root) {
   std::string out;
-  for (const fs::path& part :
-       fs::absolute(file).parent_path().lexically_relative(fs::absolute(root).lexically_normal()))
+  for (const fs::path& part : fs::absolute(file).parent_path().lexically_relative(
+           fs::absolute(root / ".").lexically_normal().parent_path()))
     if (part != "." && part != ".." && !part.empty())
       out += fmt::format("{}{}", out.empty() ? "" : "-", part.string());
   return out;

@@ -50,7 +50,9 @@ void OutputRecord::add(const std::string& name, const CacheKey& key, const Cache
                      {"hash", hash_of(entry.asset)},
                      {"notes", entry.notes},
                      {"confidence", entry.confidence ? Json(*entry.confidence) : Json()}};
-  const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  // The end of the line comes first: a line that was cut short does not take this one with it.
+  const std::string text =
+      fmt::format("\n{}", json.dump(-1, ' ', false, Json::error_handler_t::replace));
   const std::lock_guard lock(mutex_);
   std::ofstream file(folder_ / ".ist-bakes", std::ios::app);
   file.write(text.data(), static_cast<std::streamsize>(text.size())).flush();

@@ -6,17 +6,16 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <map>
 #include <string>
 #include <thread>
 
 #include <ist/error.h>
 
 #include "mesh/mesh_solid.h"
+#include "spheres/cover_parts.h"
 #include "spheres/cover_proof.h"
 #include "spheres/cover_search.h"
 #include "spheres/protrusion.h"
-#include "spheres/shared_count.h"
 #include "stage/stage.h"
 #include "stage/thread_arena.h"
 #include "stage/work_stop.h"
@@ -26,7 +25,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kRounds = 6;     ///< of sharing a total out
 constexpr int kMostTries = 8;  ///< counts that are tried for a protrusion; doubling goes on
 
 /// What several searches have done together, told by the thread that started them.
@@ -156,39 +154,8 @@ SphereCover cover_one(const ClosedMesh& mesh, const SphereCoverSettings& setting
   return cover;
 }
 
-/// Equal meshes of which as many spheres are asked for, and their covers by count.
-struct Part {
-  const ClosedMesh* mesh;
-  std::size_t count;   ///< 0: a share of the total
-  std::size_t copies;  ///< meshes
-  std::map<std::size_t, SphereCover> tried = {};
-};
-
-bool equal(const ClosedMesh& a, const ClosedMesh& b) {
-  return a.mesh.triangles == b.mesh.triangles && a.mesh.vertices == b.mesh.vertices;
-}
-
-/// Adds to `parts`, for each mesh, the part that it belongs to; says which.
-std::vector<std::size_t> parts_of(std::span<const ClosedMesh> meshes,
-                                  const SphereCoverSettings& settings, std::vector<Part>& parts) {
-  std::vector<std::size_t> part_of;
-  for (std::size_t i = 0; i < meshes.size(); ++i) {
-    std::size_t count = settings.counts.empty() ? 0 : settings.counts[i];
-    if (count == 0 && settings.total == 0) count = settings.count;
-    const auto found = std::find_if(parts.begin(), parts.end(), [&](const Part& part) {
-      return part.count == count && equal(*part.mesh, meshes[i]);
-    });
-    part_of.push_back(static_cast<std::size_t>(found - parts.begin()));
-    if (found == parts.end())
-      parts.push_back({&meshes[i], count, 1});
-    else
-      ++found->copies;
-  }
-  return part_of;
-}
-
 /// Covers each part with so many spheres, unless that was tried.
-void try_counts(std::vector<Part>& parts, const std::vector<std::size_t>& counts,
+void try_counts(std::vector<CoverPart>& parts, const std::vector<std::size_t>& counts,
                 const SphereCoverSettings& settings, Watch& watch) {
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, parts.size(), 1),
@@ -205,65 +172,23 @@ void try_counts(std::vector<Part>& parts, const std::vector<std::size_t>& counts
       tbb::simple_partitioner());
 }
 
-/// Shares the total among the parts without a count: evenly at first, then by what was measured.
-/// The counts whose largest protrusion was the smallest.
-std::vector<std::size_t> shared_counts(std::vector<Part>& parts,
-                                       const SphereCoverSettings& settings, Watch& watch) {
-  std::vector<std::size_t> counts, copies, open;
-  std::size_t left = settings.total, sharers = 0;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    counts.push_back(parts[i].count);
-    left -= std::min(left, parts[i].count * parts[i].copies);
-    if (parts[i].count != 0) continue;
-    open.push_back(i);
-    copies.push_back(parts[i].copies);
-    sharers += parts[i].copies;
-  }
-  if (left < sharers || (open.empty() && left == 0))
-    throw Error("cover: a total of " + std::to_string(settings.total) +
-                " spheres is less than one for every mesh. Increase it");
-  std::vector<std::size_t> shares(
-      open.size(), std::min(kMostCoverSpheres, left / std::max<std::size_t>(1, sharers)));
-  std::vector<std::size_t> best;
-  std::vector<double> least;  // protrusions, the largest first
-  for (int round = 0; round < kRounds; ++round) {
-    for (std::size_t k = 0; k < open.size(); ++k) counts[open[k]] = shares[k];
-    try_counts(parts, counts, settings, watch);
-    std::vector<TriedCounts> tried;
-    std::vector<double> reached;
-    for (std::size_t k = 0; k < open.size(); ++k) {
-      tried.emplace_back();
-      for (const auto& [count, cover] : parts[open[k]].tried)
-        tried.back()[count] = cover.protrusion.largest;
-      reached.push_back(estimated_protrusion(tried[k], shares[k]));
-    }
-    std::sort(reached.rbegin(), reached.rend());
-    if (best.empty() || reached < least) {
-      least = reached;
-      best = counts;
-    }
-    std::vector<std::size_t> next = share_out(tried, copies, left);
-    if (next == shares) break;
-    shares = std::move(next);
-  }
-  return best;
-}
-
 }  // namespace
 
 std::vector<SphereCover> cover_with_spheres(std::span<const ClosedMesh> meshes,
                                             const SphereCoverSettings& settings,
                                             const ProgressCallback& progress) {
   check(settings, meshes.size());
-  std::vector<Part> parts;
+  std::vector<CoverPart> parts;
   const std::vector<std::size_t> part_of = parts_of(meshes, settings, parts);
-  Watch watch(progress, parts.size() * (settings.total > 0 ? kRounds : 1));
+  Watch watch(progress, parts.size() * (settings.total > 0 ? kSharingRounds : 1));
   std::vector<std::size_t> counts;
-  for (const Part& part : parts) counts.push_back(part.count);
+  for (const CoverPart& part : parts) counts.push_back(part.count);
   try {
     thread_arena(settings.threads).execute([&] {
       if (settings.total > 0)
-        counts = shared_counts(parts, settings, watch);
+        counts = shared_counts(parts, settings.total, [&](const std::vector<std::size_t>& tried) {
+          try_counts(parts, tried, settings, watch);
+        });
       else
         try_counts(parts, counts, settings, watch);
     });

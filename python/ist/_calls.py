@@ -14,9 +14,9 @@ _KINDS = {
 }
 
 
-def signature_of(function):
-    """The signature of a compiled function that has one; annotations are strings."""
-    (text, _, defaults), = function.__nb_signature__
+def signature_of(overload):
+    """The signature of an overload of a compiled function; annotations are strings."""
+    text, _, defaults = overload
     kind, parameters = inspect.Parameter.POSITIONAL_OR_KEYWORD, []
     for part in re.split(r", (?![^\[]*\])", text[text.index("(") + 1:text.rindex(") ->")]):
         name, _, rest = part.partition(": ")
@@ -46,7 +46,7 @@ def named(function, answer=None):
             raise TypeError(text or str(error)) from None
         return found if answer is None else answer(found)
 
-    call.__signature__ = signature_of(function)
+    call.__signature__ = signature_of(*function.__nb_signature__)
     return call
 
 
@@ -60,6 +60,14 @@ def name_faults(owner, answers):
             call = named(value, answers.get(name))
             is_static = kind == "nb_func" and inspect.isclass(owner)
             setattr(owner, name, staticmethod(call) if is_static else call)
+
+
+def refuse(cls, args, kwargs):
+    """Raises TypeError for what the constructor of a compiled class does not take."""
+    signature = signature_of(vars(cls)["__new__"].__nb_signature__[-2])  # the last one calls this
+    parameters = list(signature.parameters.values())[1:]
+    text = _fault(cls.__name__, signature.replace(parameters=parameters), args, kwargs)
+    raise TypeError(text or f"{cls.__name__}(): it does not take these arguments")
 
 
 def _fault(name, signature, args, kwargs):

@@ -10,10 +10,46 @@
 
 namespace {
 
+/// A type, taken only where others may be converted: when no other overload took the arguments.
+struct LateType {
+  ist::python::py::handle type;
+};
+
+}  // namespace
+
+template <>
+struct nanobind::detail::type_caster<LateType> {
+  NB_TYPE_CASTER(LateType, const_name("type"))
+  bool from_python(handle source, std::uint8_t flags, cleanup_list*) noexcept {
+    value.type = source;
+    return (flags & static_cast<std::uint8_t>(cast_flags::convert)) != 0;
+  }
+  static handle from_cpp(LateType late, rv_policy, cleanup_list*) noexcept {
+    return late.type.inc_ref();
+  }
+};
+
+namespace {
+
 constexpr const char* kDoc = R"(Collision of solids by inner sphere trees.
 
 Lengths are [u], whatever unit the meshes have. Poses are rows qw, qx, qy, qz, tx, ty, tz of float64:
 x_world = R(q) (scale · x) + t.)";
+
+/// Adds to each class a constructor that is tried last: it raises TypeError that names the
+/// argument.
+void name_faults_of_constructors(const ist::python::py::module_& module) {
+  namespace py = ist::python::py;
+  for (const auto& [name, value] : py::borrow<py::dict>(module.attr("__dict__"))) {
+    if (!py::isinstance<py::type_object>(value)) continue;
+    if (ist::python::type_name_of(value.attr("__new__")) != "nb_func") continue;
+    py::cpp_function_def(
+        [](LateType cls, const py::args& args, const py::kwargs& kwargs) -> py::object {
+          return py::module_::import_("ist._calls").attr("refuse")(cls.type, args, kwargs);
+        },
+        py::scope(value), py::name("__new__"));
+  }
+}
 
 }  // namespace
 
@@ -42,5 +78,6 @@ NB_MODULE(_core, module) {
   python::add_surfaces(module);
   python::add_time_of_impact(module);
   python::add_gpu(module);
+  name_faults_of_constructors(module);
   module.attr("__name__") = own_name;
 }

@@ -199,29 +199,27 @@ std::string curobo_spheres(std::span<const LinkSpheres> links) {
 
 std::string curobo_robot(const RobotModel& robot, const std::string& urdf,
                          std::span<const LinkSpheres> links, const SelfCollision& self) {
-  const std::vector<std::string> tools = tool_names(robot);
   const Cspace cspace(robot);
   std::vector<std::string> names;
   for (const LinkSpheres& link : links) names.push_back(yaml_text(link.link));
   const std::string all = yaml_list(names);
   std::string out = "robot_cfg:\n  kinematics:\n";
   const auto line = [&](const std::string& text) { out += "    " + text + "\n"; };
+  line("format_version: 2.0");
   line("urdf_path: " + yaml_text(urdf));
   line("asset_root_path: " + yaml_text(std::filesystem::path(urdf).parent_path().string()));
   line("base_link: " + yaml_text(robot.links[robot.order.front()].name));
-  line("ee_link: " + tools.front());
-  line("link_names: " + (tools.size() > 1 ? yaml_list(tools) : "null"));
+  line("tool_frames: " + yaml_list(tool_names(robot)));
   line("lock_joints: null");
   line("extra_links: null");
   line("collision_link_names: " + all);
   line("mesh_link_names: " + all);
   line("collision_sphere_buffer: 0.0");
-  line("extra_collision_spheres: {}");
   append_ignored(self, "self_collision_ignore", "    ", out);
   append_buffers(links, self, "self_collision_buffer", "    ", out);
   line("cspace:");
   line("  joint_names: " + yaml_list(cspace.names));
-  line("  retract_config: " + yaml_list(cspace.positions));
+  line("  default_joint_position: " + yaml_list(cspace.positions));
   line("  null_space_weight: " + cspace.each(1));
   line("  cspace_distance_weight: " + cspace.each(1));
   line("  max_acceleration: " + real(kAcceleration) + "  # a URDF has none; set your robot's");

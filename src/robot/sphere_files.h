@@ -33,7 +33,7 @@ std::string urdf_of_spheres(const LinkSpheres& link);
 /// no robot.
 std::string curobo_spheres(std::span<const LinkSpheres> links);
 
-/// cuRobo: a whole robot_cfg. `urdf`: where the robot's file will be found.
+/// cuRobo 0.8: a whole robot_cfg. `urdf`: where the robot's file will be found.
 std::string curobo_robot(const RobotModel& robot, const std::string& urdf,
                          std::span<const LinkSpheres> links, const SelfCollision& self);
 

@@ -2,6 +2,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -134,11 +135,11 @@ TEST_F(RobotCommands, PlannersGetAWholeRobot) {
   const Words joints = {"j1", "j2", "l"};
   EXPECT_EQ(curobo["urdf_path"].as<std::string>(), (folder_ / "arm.urdf").string());
   EXPECT_EQ(curobo["base_link"].as<std::string>(), "base");
-  EXPECT_EQ(curobo["ee_link"].as<std::string>(), "hand");
+  EXPECT_EQ(curobo["tool_frames"].as<Words>(), Words{"hand"});
   EXPECT_EQ(curobo["collision_link_names"].as<Words>(),
             (Words{"base", "upper", "lower", "hand", "left", "right"}));
   EXPECT_EQ(curobo["cspace"]["joint_names"].as<Words>(), joints);
-  EXPECT_EQ(curobo["cspace"]["retract_config"].as<std::vector<double>>(),
+  EXPECT_EQ(curobo["cspace"]["default_joint_position"].as<std::vector<double>>(),
             (std::vector<double>{1.5, 0, 0}));
   // What cuRobo's converter of XRDF asks for.
   EXPECT_TRUE(xrdf["collision"]["buffer_distance"].IsMap());
@@ -204,7 +205,7 @@ TEST_F(RobotCommands, CountsOfTheRobotAndOfLinks) {
   expect_error({"spheres", "cube.obj", "-o", "o.json", "--skip", "a"}, 2, "is not a robot");
 }
 
-TEST_F(RobotCommands, AllOpenLinksAreToldAtOnce) {
+TEST_F(RobotCommands, AllOpenLinksAreReportedAtOnce) {
   write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   const std::string mesh =
       "<collision><geometry><mesh filename='open.obj'/></geometry></collision></link>";
@@ -224,6 +225,41 @@ TEST_F(RobotCommands, AllOpenLinksAreToldAtOnce) {
               0);
   }
   expect_error({"spheres", "r.urdf.xacro", "-o", "o.json"}, 1, "xacro r.urdf.xacro -o");
+}
+
+TEST_F(RobotCommands, WarningsOfAKindAreOneLine) {
+  // Two cubes that overlap.
+  const auto box = [](double x, int first) {
+    std::string out;
+    for (int i = 0; i < 8; ++i)
+      out += "v " + std::to_string(x + (i & 1)) + " " + std::to_string((i >> 1) & 1) + " " +
+             std::to_string((i >> 2) & 1) + "\n";
+    for (const auto& [a, b, c] : std::vector<std::array<int, 3>>{{0, 2, 3},
+                                                                 {0, 3, 1},
+                                                                 {4, 5, 7},
+                                                                 {4, 7, 6},
+                                                                 {0, 1, 5},
+                                                                 {0, 5, 4},
+                                                                 {2, 6, 7},
+                                                                 {2, 7, 3},
+                                                                 {0, 4, 6},
+                                                                 {0, 6, 2},
+                                                                 {1, 3, 7},
+                                                                 {1, 7, 5}})
+      out += "f " + std::to_string(a + first) + " " + std::to_string(b + first) + " " +
+             std::to_string(c + first) + "\n";
+    return out;
+  };
+  write("two.obj", box(0, 1) + box(0.5, 9));
+  const std::string mesh =
+      "<collision><geometry><mesh filename='two.obj'/></geometry></collision></link>";
+  write("w.urdf", "<robot name='r'><link name='first'>" + mesh + "<link name='second'>" + mesh +
+                      "<joint name='a' type='fixed'><parent link='first'/><child link='second'/>"
+                      "</joint></robot>");
+  const Outcome outcome = ist({"spheres", "w.urdf", "-o", "w.json", "--count", "2"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.err.find("links first, second: "), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find("link second"), std::string::npos) << outcome.err;
 }
 
 /// Links and spheres stand where the joints put them, and are read back as meshes.

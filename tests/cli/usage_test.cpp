@@ -81,6 +81,24 @@ TEST_F(Usage, AnAssetHasNotTheNameOfAMesh) {
   EXPECT_TRUE(new_files().empty());
 }
 
+TEST_F(Usage, TheClosedMeshIsWrittenWhereItIsAskedFor) {
+  // A cube without its last face.
+  const std::string cube = read("cube.obj");
+  write("open.obj", cube.substr(0, cube.rfind("f ")));
+  ASSERT_EQ(ist({"bake", "open.obj", "-o", "o.ist", "--repair", "--write-mesh", "closed.stl",
+                 "--spheres", "10"})
+                .exit_code,
+            0);
+  EXPECT_EQ(ist::close_mesh(ist::load_mesh((folder_ / "closed.stl").string()), "closed")
+                .mesh.triangles.size(),
+            12u);
+  EXPECT_EQ(ist({"bake", "cube.obj", "-o", "p.ist", "--write-mesh", "p.xyz"}).exit_code, 2);
+  EXPECT_EQ(
+      ist({"bake", "open.obj", "-o", "p.ist", "--repair", "--write-mesh", "open.obj"}).exit_code,
+      1);
+  EXPECT_FALSE(exists("p.ist"));
+}
+
 TEST_F(Usage, JsonOfNamesThatAreNotUtf8) {
   const std::string name = "c\xff.ist";
   ASSERT_EQ(ist({"bake", "cube.obj", "-o", name, "--spheres", "5", "--json"}).exit_code, 0);

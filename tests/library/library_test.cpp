@@ -115,6 +115,70 @@ TEST_F(Library, OneThatFailsFailsAlone) {
   EXPECT_NE(bake("out").err.find("repair = true tries to close"), std::string::npos);
 }
 
+/// What is there and follows from the same mesh and settings is not baked again, without a cache.
+TEST_F(Library, WhatIsThereAndUnchangedIsNotBakedAgain) {
+  const auto counts = [&] { return summary_of("out").at("counts"); };
+  EXPECT_EQ(counts().at("baked"), 5);
+  const auto files = files_in("out");
+  EXPECT_EQ(counts().at("cached"), 5);
+  EXPECT_TRUE(files_in("out") == files);
+  write("meshes/cube.obj", read("meshes/cube.obj") + "#");
+  EXPECT_EQ(counts().at("baked"), 1);
+  // Assets that are gone, damaged or another's, and a record that was cut short.
+  std::filesystem::remove(folder_ / "out/cube.ist");
+  write("out/nut.ist", files.at("gear.ist"));
+  write("out/gear.ist", files.at("gear.ist").substr(0, 5000));
+  EXPECT_EQ(counts().at("baked"), 3);
+  EXPECT_TRUE(files_in("out") == files);
+  const std::string record = read("out/.ist-bakes");
+  write("out/.ist-bakes", record.substr(0, record.find('\n', 1) - 20));
+  EXPECT_EQ(counts().at("baked"), 5);
+  EXPECT_EQ(counts().at("cached"), 5);
+}
+
+TEST_F(Library, StaleAssetsAreReportedAndRemovedOnRequest) {
+  summary_of("out");
+  std::filesystem::rename(folder_ / "meshes/cube.obj", folder_ / "meshes/dice.obj");
+  write("meshes/nut.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const Outcome told = bake("out", {"--json"});
+  EXPECT_EQ(told.exit_code, 1);
+  EXPECT_NE(told.err.find("out/cube.ist, out/nut.ist (2). --remove-stale"), std::string::npos)
+      << told.err;
+  EXPECT_EQ(nlohmann::json::parse(told.out).at("stale").size(), 2u);
+  EXPECT_TRUE(exists("out/cube.ist"));
+  bake("out", {"--remove-stale"});
+  EXPECT_FALSE(exists("out/cube.ist"));
+  EXPECT_FALSE(exists("out/nut.ist"));
+  EXPECT_TRUE(exists("out/dice.ist"));
+}
+
+TEST_F(Library, FailuresAloneAndTheQualityOfAssets) {
+  write("meshes/broken.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const nlohmann::json summary = summary_of("out", {}, 1);
+  write("summary.json", summary.dump());
+  const Outcome failed = ist({"summary", "summary.json", "--failed"});
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_NE(failed.out.find("broken"), std::string::npos) << failed.out;
+  EXPECT_EQ(failed.out.find("gear"), std::string::npos) << failed.out;
+  // A page with a picture of each asset, failures first.
+  EXPECT_EQ(ist({"summary", "summary.json", "--html", "page.html"}).exit_code, 1);
+  const std::string page = read("page.html");
+  std::size_t pictures = 0;
+  for (std::size_t at = 0; (at = page.find("data:image/bmp;base64,Qk", at)) != std::string::npos;
+       ++at)
+    ++pictures;
+  EXPECT_EQ(pictures, names().size());
+  EXPECT_LT(page.find("<td>broken<td>failed"), page.find("<td>capsule<td>baked"));
+  EXPECT_EQ(page.find("http"), std::string::npos);
+  for (const nlohmann::json& asset : summary.at("assets")) {
+    if (asset.at("status") == "failed") continue;
+    const nlohmann::json info =
+        nlohmann::json::parse(ist({"info", asset.at("asset"), "--json"}).out);
+    for (const char* field : {"volume", "protrusion"})
+      EXPECT_EQ(asset.at(field), info.at(field)) << field;
+  }
+}
+
 TEST_F(Library, TargetsAndWarningsAreInTheSummary) {
   write("target.toml",
         "[[asset]]\nmesh = \"meshes/cube.obj\"\ntarget-error = \"30%\"\nat-overlap = 0.01\n"

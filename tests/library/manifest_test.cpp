@@ -12,7 +12,7 @@ class Mistakes : public LibraryFolder {
   void expect_faults(const std::string& manifest, const std::vector<std::string>& faults) {
     write("bad.toml", manifest);
     const Outcome outcome = bake("out", {}, {}, "bad.toml");
-    EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
     EXPECT_EQ(outcome.out, "");
     EXPECT_FALSE(exists("out"));
     std::size_t told = 0;
@@ -91,7 +91,7 @@ min-radius = [1]
           "36: spheres: 2.5 is not a whole number",
           "37: scale: 0 is not a finite number above 0",
           "38: up-axis: 'W' is not one of X|Y|Z",
-          "39: unknown key 'wall-thickness': known keys are mesh, name, spheres, target-error",
+          "39: unknown key 'wall-thickness': known keys are mesh, name, exclude, spheres",
           "40: min-radius: a list is not a finite number, 0 or more",
       });
 }
@@ -134,6 +134,34 @@ TEST_F(Mistakes, NoTomlAndNoFile) {
   };
   expect_error("nowhere.toml", "nowhere.toml: cannot be opened");
   expect_error("meshes", "meshes: is a folder");
+}
+
+TEST_F(Mistakes, InNamesAndExclusions) {
+  expect_faults("[[asset]]\nmesh = \"meshes/cube.obj\"\nname = \"{stm}-x\"\n",
+                {"3: name: '{stm}' stands for nothing; use {stem}, {ext}, {parent} or {dir}"});
+  expect_faults("[[asset]]\nmesh = \"meshes/*.obj\"\nexclude = 3\n",
+                {"3: exclude: 3 is not a pattern"});
+  expect_faults("[[asset]]\nmesh = \"meshes/*.obj\"\nexclude = [\"meshes/c*.obj\", \"none*\"]\n",
+                {"3: exclude: 'none*' excludes none of the files"});
+}
+
+TEST_F(Mistakes, NamesAreMadeOfFoldersAndExtensions) {
+  for (const std::string folder : {"meshes/a", "meshes/a/deep", "meshes/b"}) {
+    std::filesystem::create_directories(folder_ / folder);
+    write(folder + "/part.obj", read("meshes/cube.obj"));
+  }
+  write("names.toml",
+        "[defaults]\nspheres = 5\n"
+        "[[asset]]\nmesh = \"meshes/*/*.obj\"\nname = \"{parent}-{stem}\"\n"
+        "[[asset]]\nmesh = \"meshes/**/part.obj\"\nexclude = \"meshes/b/*\"\n"
+        "name = \"x-{dir}_{stem}.{ext}\"\n");
+  const Outcome outcome = bake("out", {}, {}, "names.toml");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  std::vector<std::string> made;
+  for (const auto& [name, bytes] : files_in("out")) made.push_back(name);
+  EXPECT_EQ(made,
+            (std::vector<std::string>{"a-part.ist", "b-part.ist", "x-meshes-a-deep_part.obj.ist",
+                                      "x-meshes-a_part.obj.ist"}));
 }
 
 TEST_F(Mistakes, ButDefaultsMayBeOfNoUseToSome) {

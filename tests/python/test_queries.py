@@ -1,5 +1,6 @@
 """Queries of one pose and of arrays of poses."""
 import inspect
+import re
 import threading
 
 import numpy as np
@@ -632,3 +633,20 @@ def test_a_field_may_be_either_solid(gear):
     assert np.array_equal(scene.volume, [first.volume] * 2)
     with pytest.raises(TypeError, match="two Fields"):
         ist.penetration(ball, ball, pose)
+
+
+def test_constructors_name_the_argument():
+    for make, text in ((lambda: ist.BoxField(half=[1, 1, 1]),
+                        "BoxField(): there is no argument 'half'; it takes half_extents"),
+                       (lambda: ist.BallField("x"), "radius: a str; wanted a number"),
+                       (lambda: ist.BallField(1, 2), "BallField(): 2 arguments without a name"),
+                       (lambda: ist.HeightField([[1, 0], [0, 0]], [1, 1]), "all others by name"),
+                       (lambda: ist.DistanceGridField([[[0, 0], [0, 0]]] * 2, spacing=1),
+                        "the argument 'origin' is missing"),
+                       (lambda: ist.Mesh([]), "Mesh(): the argument 'triangles' is missing")):
+        with pytest.raises(TypeError, match=re.escape(text)):
+            make()
+    for make in (lambda: ist.HalfSpaceField([0, 0, 0]), lambda: ist.BoxField([-1, 1, 1]),
+                 lambda: ist.HeightField([[1.0]]), lambda: ist.HeightField([[1, float("nan")]] * 2)):
+        with pytest.raises(ValueError):
+            make()

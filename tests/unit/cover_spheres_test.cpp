@@ -228,9 +228,14 @@ TEST(CoverSpheres, ATotalGoesWhereItIsNeeded) {
   // Equal meshes are covered once.
   EXPECT_EQ(shared[2].seconds, 0);
   EXPECT_EQ(shared[1].spheres.size(), shared[2].spheres.size());
-  // A mesh's own count is not touched.
+  // A mesh's own count is not touched, and may be all there is.
   settings.counts = {3, 0, 0, 0};
   EXPECT_EQ(cover_with_spheres(meshes, settings)[0].spheres.size(), 3u);
+  settings.counts = {3, 1, 1, 1};
+  settings.total = 6;
+  EXPECT_EQ(spheres_in(cover_with_spheres(meshes, settings)), 6u);
+  settings.total = 5;
+  EXPECT_THROW(cover_with_spheres(meshes, settings), Error);
 }
 
 /// Of all ways to share out, none has a smaller largest estimate.

@@ -62,8 +62,10 @@ TEST(RobotModel, SaysWhatIsWrongAndWhere) {
   expect("<robot><link name='a'/><link name='b'/></robot>", "2 links without a parent");
   expect("<robot><link name='a'/><joint><parent link='a'/><child link='x'/></joint></robot>",
          "its child \"x\" is not a link");
-  expect("<robot><link name='a'/><joint type='fixed'><parent link='a'/><child link='a'/></joint></robot>",
-         "a cycle");
+  expect(
+      "<robot><link name='a'/><joint type='fixed'><parent link='a'/><child "
+      "link='a'/></joint></robot>",
+      "a cycle");
   expect(with_collision(""), "line 3: <collision>: has no <geometry>");
   expect(with_collision("<geometry><blob/></geometry>"), "is an unknown shape");
   expect(with_collision("<geometry><box size='1 1'/></geometry>"), "has 2 numbers, not 3");
