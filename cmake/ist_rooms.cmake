@@ -15,7 +15,7 @@ target_link_libraries(ist_public INTERFACE Eigen3::Eigen)
 add_library(ist_internal INTERFACE)
 
 # ist_add_room(name [APART] FOLDER path AS prefix USES rooms… LIBS targets… SOURCES files…)
-#   AS: what its headers are included by ("bake/cover" for "bake/cover/cover.h").
+#   AS: what its headers are included by ("mesh" for "mesh/weld.h").
 #   LIBS: third parties that its headers or sources need.
 #   APART: no part of the library ist::ist.
 #   SOURCES: relative to FOLDER; none for a room of headers alone.

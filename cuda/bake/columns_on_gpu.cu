@@ -1,9 +1,9 @@
 #include "cuda/bake/columns_on_gpu.h"
 
-#include "packing/calibrate/power_relaxation.h"
 #include "cuda/launch.h"
 #include "cuda/prefix_sum.h"
 #include "mesh/wide_nearest.h"
+#include "packing/calibrate/power_relaxation.h"
 
 namespace ist::gpu {
 namespace {

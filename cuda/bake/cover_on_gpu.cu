@@ -1,9 +1,9 @@
 #include "cuda/bake/cover_on_gpu.h"
 
-#include "packing/cover/cover_cells.h"
 #include "cuda/device_array.h"
 #include "cuda/warp_team.h"
 #include "mesh/wide_rays.h"
+#include "packing/cover/cover_cells.h"
 
 namespace ist::gpu {
 namespace {

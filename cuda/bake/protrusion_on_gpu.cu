@@ -1,9 +1,9 @@
 #include "cuda/bake/protrusion_on_gpu.h"
 
-#include "packing/calibrate/protrusion.h"
 #include "cuda/device_array.h"
 #include "cuda/warp_team.h"
 #include "mesh/wide_rays.h"
+#include "packing/calibrate/protrusion.h"
 
 namespace ist::gpu {
 namespace {

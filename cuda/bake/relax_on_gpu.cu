@@ -1,9 +1,9 @@
 #include "cuda/bake/relax_on_gpu.h"
 
-#include "packing/calibrate/power_relaxation.h"
 #include "cuda/block_team.h"
 #include "cuda/warp_reduce.h"
 #include "cuda/warp_team.h"
+#include "packing/calibrate/power_relaxation.h"
 
 namespace ist::gpu {
 namespace {

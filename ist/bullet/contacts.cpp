@@ -139,7 +139,7 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
     for (std::size_t i = 0; i < contact.count; ++i) {
       const ContactPatch& patch = contact.patches[i];
       if (!(patch.area > 0)) continue;
-      const Eigen::Vector3d normal = (contact.pushes_second ? -1 : 1) * patch.normal;
+      const Eigen::Vector3d normal = -patch.normal;
       result->addContactPoint(to_bullet(normal),
                               to_bullet(Eigen::Vector3d(patch.point + 0.5 * patch.depth * normal)),
                               static_cast<btScalar>(-patch.depth));
@@ -219,14 +219,13 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
   const bool touched = old_count > 0;
 
   // Bullet's normal pushes the manifold's first body.
-  const double sign = contact.pushes_second ? -1 : 1;
   const btTransform to_first = first.getWorldTransform().inverse();
   const btTransform to_second = second.getWorldTransform().inverse();
   std::size_t used = 0;
   for (std::size_t i = 0; i < contact.count; ++i) {
     const ContactPatch& patch = contact.patches[i];
     if (!(patch.area > 0)) continue;
-    const btVector3 normal = to_bullet(Eigen::Vector3d(sign * patch.normal));
+    const btVector3 normal = to_bullet(Eigen::Vector3d(-patch.normal));
     const btVector3 middle = to_bullet(patch.point);
     const btScalar depth = static_cast<btScalar>(patch.depth);
     const btVector3 on_first = middle - normal * (depth / 2);
@@ -304,16 +303,15 @@ void PairAlgorithm::push(const btCollisionObject& first, const btCollisionObject
   if (whole) settings.patches = 1;
   Contact contact;
   state_->meeting.find(first.getWorldTransform(), second.getWorldTransform(), settings, contact);
-  const btCollisionObject& body = contact.pushes_second ? second : first;
-  state_->pushed_body = &body;
+  state_->pushed_body = &second;
   if (!(contact.whole.volume > 0)) {
     state_->memory = {};
     return;
   }
   if (whole) contact.patches[0] = whole_patch(contact.whole);  // of one name in every pose
 
-  btRigidBody* const b = movable(body);
-  btRigidBody* const a = movable(contact.pushes_second ? first : second);
+  btRigidBody* const b = movable(second);
+  btRigidBody* const a = movable(first);
   const auto twist_of = [](const btRigidBody* moved) {
     if (moved == nullptr) return Twist();
     return Twist{to_eigen(moved->getCenterOfMassPosition()), to_eigen(moved->getLinearVelocity()),

@@ -13,10 +13,6 @@ namespace ist::bullet {
 
 namespace {
 
-PlacedTree placed(const Shape& shape, const btTransform& at) {
-  return {shape.tree(), to_pose(at * shape.mesh_in_body()), shape.scale()};
-}
-
 /// Of the thread: a query's scratch memory.
 Workspace& workspace() {
   thread_local Workspace memory;
@@ -41,51 +37,50 @@ Body body_of(const btCollisionObject& object) {
 
 }  // namespace
 
-Meeting::Meeting(const btCollisionShape& first, const btCollisionShape& second) {
-  // SDF shapes of Bullet's have the same type.
-  const auto* const one = dynamic_cast<const Shape*>(&first);
-  const auto* const other = dynamic_cast<const Shape*>(&second);
-  b_is_second_ = other != nullptr;
-  b_ = b_is_second_ ? other : one;
-  if (b_ == nullptr) return;
-  a_ = b_is_second_ ? one : nullptr;
-  if (a_ == nullptr) partner_ = Partner::of(b_is_second_ ? first : second);
+Meeting::Meeting(const btCollisionShape& first, const btCollisionShape& second)
+    // SDF shapes of Bullet's have the same type.
+    : first_(dynamic_cast<const Shape*>(&first)), second_(dynamic_cast<const Shape*>(&second)) {
+  if (has_shape() && first_ == nullptr) partner_ = Partner::of(first);
+  if (has_shape() && second_ == nullptr) partner_ = Partner::of(second);
+}
+
+PlacedSolid Meeting::placed(const Shape* shape, const btTransform& at) const {
+  if (shape == nullptr) return partner_->placed(at);
+  return {shape->tree(), to_pose(at * shape->mesh_in_body()), shape->scale()};
 }
 
 double Meeting::volume() const {
-  return a_ != nullptr ? std::min(a_->volume(), b_->volume()) : b_->volume();
+  if (first_ == nullptr || second_ == nullptr) return (first_ ? first_ : second_)->volume();
+  return std::min(first_->volume(), second_->volume());
 }
 
 double Meeting::stiffness() const {
-  if (a_ == nullptr || a_->stiffness <= 0) return b_->stiffness;
-  return b_->stiffness <= 0 ? a_->stiffness : stiffness_in_series(a_->stiffness, b_->stiffness);
+  const double one = first_ != nullptr ? first_->stiffness : 0;
+  const double other = second_ != nullptr ? second_->stiffness : 0;
+  if (one <= 0 || other <= 0) return std::max(one, other);
+  return stiffness_in_series(one, other);
 }
 
 double Meeting::largest_motion(const btTransform& before, const btTransform& now) const {
   // A turn by θ moves what is R away by 2 R sin(θ/2), and two bases differ by √8 sin(θ/2).
-  const auto motion = [reach = b_->reach()](const btTransform& from, const btTransform& to) {
+  const auto motion = [reach = (second_ ? second_ : first_)->reach()](const btTransform& from,
+                                                                      const btTransform& to) {
     double turned = 0;
     for (int i = 0; i < 3; ++i) turned += (to.getBasis()[i] - from.getBasis()[i]).length2();
     return (to.getOrigin() - from.getOrigin()).length() + reach * std::sqrt(0.5 * turned);
   };
-  return b_is_second_ ? motion(before, now) : motion(before.inverse(), now.inverse());
+  return second_ != nullptr ? motion(before, now) : motion(before.inverse(), now.inverse());
 }
 
 void Meeting::find(const btTransform& first, const btTransform& second, const Settings& settings,
                    Contact& contact) const {
-  const btTransform& at_a = b_is_second_ ? first : second;
-  const PlacedTree b = placed(*b_, b_is_second_ ? second : first);
+  const PlacedSolid a = placed(first_, first), b = placed(second_, second);
   const std::span room(contact.patches.data(), std::min(settings.patches, Settings::kPatches));
-  contact.pushes_second = b_is_second_;
-  contact.origin = Eigen::Vector3d(b.pose.t);
+  contact.origin = std::visit([](const auto& at) { return Eigen::Vector3d(at.pose.t); }, b.placed);
   contact.clearance = 0;
-  ContactPatches found;
-  if (a_ == nullptr) {
-    found = contact_patches(partner_->placed(at_a), b, settings.query, workspace(), room);
-  } else {
-    const PlacedTree a = placed(*a_, at_a);
-    ContactSettings query = settings.query;
-    found = contact_patches(a, b, query, workspace(), room);
+  ContactSettings query = settings.query;
+  ContactPatches found = contact_patches(a, b, query, workspace(), room);
+  if (first_ != nullptr && second_ != nullptr) {
     if (found.penetration.status == QueryStatus::not_held && query.field == FieldUse::always) {
       query.field = FieldUse::automatic;
       found = contact_patches(a, b, query, workspace(), room);
@@ -93,8 +88,9 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
     if (found.penetration.volume_max <= 0) {
       // A lower bound suffices: the first few nodes give one.
       constexpr SeparationSettings kGlance{.max_visits = 8, .inner_spheres = true};
-      contact.clearance = separation(a, b, kGlance, workspace()).distance_min -
-                          a.scale * a.tree.protrusion() - b.scale * b.tree.protrusion();
+      contact.clearance = separation(a, b, kGlance, workspace()).distance_min;
+      for (const Shape* const shape : {first_, second_})
+        contact.clearance -= shape->scale() * shape->tree().protrusion();
     }
   }
   if (std::isnan(found.penetration.volume)) {

@@ -13,10 +13,11 @@ class Meeting {
  public:
   Meeting(const btCollisionShape& first, const btCollisionShape& second);
 
-  bool has_shape() const { return b_ != nullptr; }  ///< one of them is a Shape
-  bool is_met() const { return a_ != nullptr || partner_.has_value(); }
+  /// One of them is a Shape.
+  bool has_shape() const { return first_ != nullptr || second_ != nullptr; }
+  bool is_met() const { return partner_.has_value() || (first_ != nullptr && second_ != nullptr); }
 
-  /// The shapes' transforms are given.
+  /// The shapes' transforms are given. The contact pushes the second.
   void find(const btTransform& first, const btTransform& second, const Settings& settings,
             Contact& contact) const;
 
@@ -28,9 +29,10 @@ class Meeting {
   double stiffness() const;  ///< [force/u³] of the shapes' materials; 0: none has any
 
  private:
-  const Shape* a_ = nullptr;  // null: partner_
-  const Shape* b_ = nullptr;
-  bool b_is_second_ = true;
+  PlacedSolid placed(const Shape* shape, const btTransform& at) const;
+
+  const Shape* first_ = nullptr;  // null: partner_
+  const Shape* second_ = nullptr;
   std::optional<Partner> partner_;
 };
 

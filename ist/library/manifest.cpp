@@ -18,9 +18,8 @@
 #include "library/asset_name.h"
 #include "library/glob.h"
 #include "library/settings/numbers.h"
-#include "mesh/mesh_files.h"
-#include "library/settings/numbers.h"
 #include "library/settings/spelling.h"
+#include "mesh/mesh_files.h"
 
 namespace ist {
 namespace {

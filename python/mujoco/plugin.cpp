@@ -167,24 +167,22 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   if (first == nullptr && second == nullptr)
     return before[m->geom_type[g1]][m->geom_type[g2]](m, d, out, g1, g2, margin);
   Scratch& memory = scratch();
-  ist_placed_t a, b;
+  ist_placed_t a;
   ist_field_t field;
-  ist_placed_t shape;
   if (first != nullptr) a = place(m, d, g1, *first);
-  if (second == nullptr || (first == nullptr && !shape_of(m, d, g1, field, shape))) {
+  if (second == nullptr || (first == nullptr && !shape_of(m, d, g1, field, a))) {
     complain_once(
         "ist.solid: a solid meets an ellipsoid, a height field, or a mesh or SDF without an "
         "ist.solid: "
         "they do not collide. ist.mujoco.attach() makes solids of meshes.");
     return 0;
   }
-  b = place(m, d, g2, *second);
-  const bool two = first != nullptr;
+  const ist_placed_t b = place(m, d, g2, *second);
   ist_contact_settings_t settings = {};
   settings.size = sizeof settings;
   settings.measure = second->measure;
   // A shape has no mesh, so that matched spheres meet it.
-  if (settings.measure == IST_EXACT && (!two || first->measure != IST_EXACT))
+  if (settings.measure == IST_EXACT && (first == nullptr || first->measure != IST_EXACT))
     settings.measure = IST_MATCHED;
   ist_contact_patches_t patches = {};
   patches.size = sizeof patches;
@@ -196,9 +194,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   patches.capacity = static_cast<size_t>(std::max(0, std::min(most, room)));
   ist_penetration_t whole = {};
   whole.size = sizeof whole;
-  ist_status_t status =
-      two ? ist_contact_patches(&a, &b, &settings, &memory.workspace, &patches, &whole)
-          : ist_contact_patches(&shape, &b, &settings, &memory.workspace, &patches, &whole);
+  ist_status_t status = ist_contact_patches(&a, &b, &settings, &memory.workspace, &patches, &whole);
   if (status < 0) {
     complain_once((std::string("ist.solid: ") + ist_describe(status)).c_str());
     return 0;
@@ -210,8 +206,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   // Apart: one contact at the gap, for margins and mj_geomDistance().
   ist_separation_t gap = {};
   gap.size = sizeof gap;
-  status = two ? ist_separation(&a, &b, nullptr, &memory.workspace, &gap)
-               : ist_separation(&shape, &b, nullptr, &memory.workspace, &gap);
+  status = ist_separation(&a, &b, nullptr, &memory.workspace, &gap);
   if (status < 0 || !(gap.distance > 0) || gap.distance >= margin) return 0;
   out->dist = gap.distance;
   for (int k = 0; k < 3; ++k) {

@@ -59,9 +59,8 @@ struct Settings {
   double follow = 0.05;
 };
 
-/// A contact of two objects.
+/// A contact of two objects: forces and normals push the second.
 struct Contact {
-  bool pushes_second = true;  ///< the normals push the second object, or else the first
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< [u] reference point of torques, world
   Penetration whole;                                 ///< the contact as one
   std::size_t count = 0;
