@@ -106,16 +106,12 @@ void ExactOctants::add_triangle(OctantSums* octants, bool of_b, double times, co
   }
   const int plane = std::countr_zero(static_cast<unsigned>(unlike)), bit = 1 << plane;
   // One corner is alone on its side.
-  const bool first = ((q.octant ^ r.octant) & bit) == 0, last = ((p.octant ^ q.octant) & bit) == 0;
-  const Corner &lone = first  ? p
-                       : last ? r
-                              : q,
-               &next = first  ? q
-                       : last ? p
-                              : r,
-               &other = first  ? r
-                        : last ? q
-                               : p;
+  const Corner* const corners[3] = {&p, &q, &r};
+  const int alone = ((q.octant ^ r.octant) & bit) == 0   ? 0
+                    : ((p.octant ^ r.octant) & bit) == 0 ? 1
+                                                         : 2;
+  const Corner &lone = *corners[alone], &next = *corners[(alone + 1) % 3],
+               &other = *corners[(alone + 2) % 3];
   Corner to_next = between(lone, next, plane), to_other = between(lone, other, plane);
   add_triangle(octants, of_b, times, lone, to_next, to_other);
   to_next.octant ^= bit;
@@ -220,7 +216,7 @@ std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, d
     std::fill_n(octants, 8, OctantSums{});
     octants->centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
   }
-  sum_octants();
+  if (slots > 0) sum_octants();
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     if (parts[p].kept != p) continue;
     const std::uint32_t first = count;
