@@ -141,7 +141,7 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
       if (!(patch.area > 0)) continue;
       const Eigen::Vector3d normal = -patch.normal;
       result->addContactPoint(to_bullet(normal),
-                              to_bullet(Eigen::Vector3d(patch.point + 0.5 * patch.depth * normal)),
+                              to_bullet(Eigen::Vector3d(patch.centroid + 0.5 * patch.depth * normal)),
                               static_cast<btScalar>(-patch.depth));
     }
     result->setPersistentManifold(nullptr);
@@ -226,7 +226,8 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
     const ContactPatch& patch = contact.patches[i];
     if (!(patch.area > 0)) continue;
     const btVector3 normal = to_bullet(Eigen::Vector3d(-patch.normal));
-    const btVector3 middle = to_bullet(patch.point);
+    // Not its point, which runs away where a patch pushes both ways.
+    const btVector3 middle = to_bullet(patch.centroid);
     const btScalar depth = static_cast<btScalar>(patch.depth);
     const btVector3 on_first = middle - normal * (depth / 2);
     const btVector3 on_second = middle + normal * (depth / 2);

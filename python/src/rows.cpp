@@ -259,7 +259,7 @@ void refuse_unanswered(const Rows& rows, QueryStatus status, Asked asked) {
     throw value_error(fault.empty() ? "a, b: the Field has a number that is not finite" : fault);
   }
   if (status != QueryStatus::not_held) return;
-  for (const Side* const side : {&row.a, &row.b}) {
+  for (const Side* const side : {&row.b, &row.a}) {
     const TreeView* const tree = side->tree();
     const std::string name = side == &row.a ? "a" : "b";
     if (asked.measure != Measure::exact) {

@@ -199,7 +199,7 @@ TEST_F(PenetrationBatch, ExactOfAFieldIsNotHeld) {
       contact_patches(pairs[0].a, pairs_[0].b, {.measure = Measure::exact}, scratch[0], patches);
   EXPECT_EQ(found.penetration.status, QueryStatus::not_held);
   EXPECT_EQ(found.count, 0u);
-  const PlacedTree tree{cube.view(), {}, 1};
+  const auto& tree = std::get<PlacedTree>(pairs_[0].b.placed);
   EXPECT_EQ(overlap_lenses(tree, tree, {.measure = Measure::exact}, {}).status,
             QueryStatus::invalid_input);
 }

@@ -114,7 +114,7 @@ def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
     (dict(measure="outer"), ValueError, "measure: 'outer'; one of 'matched', 'inner', 'exact'"),
     (dict(field="maybe"), ValueError, "field: 'maybe'; one of 'automatic', 'never', 'always'"),
     (dict(a=3), TypeError, "a: a int; wanted an Asset or a Field"),
-    (dict(b=ist.BallField(1)), TypeError, "b: a Field; only `a`"),
+    (dict(a=ist.BallField(2), b=ist.BallField(1)), TypeError, "a, b: two Fields"),
 ])
 def test_wrong_arguments_are_named(gear, knot, arguments, error, text):
     with pytest.raises(error, match=text):

@@ -46,7 +46,8 @@ struct PlacedCache {
 
 /// Eight pairs of triangles that are tested together.
 struct alignas(64) TrianglePairs {
-  double corner[2][3][3][8];  ///< [A, B][corner][axis]
+  /// [A, B][corner][axis]; finite in lanes without a pair, which are computed too.
+  double corner[2][3][3][8] = {};
   std::uint32_t triangle[2][8];
   std::uint32_t count = 0;
 };
