@@ -623,7 +623,7 @@ def test_limits_are_taken(gear, knot, random_poses):
 
 
 def test_a_field_may_be_either_solid(gear):
-    ball, pose = ist.BallField(0.8), np.array([0.9, 0.1, 0.2, -0.1, 0.3, 0.2, 0.5])
+    ball, pose = ist.BallField(5.0), np.array([0.9, 0.1, 0.2, -0.1, 0.3, 0.2, 0.5])
     first = ist.penetration(ball, gear, IDENTITY, poses_a=pose)
     second = ist.penetration(gear, ball, pose, poses_a=IDENTITY)
     assert first.volume == second.volume > 0
