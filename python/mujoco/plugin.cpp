@@ -44,7 +44,7 @@ std::shared_ptr<Tree> load(const std::string& file, ist_status_t& status) {
 }
 
 /// Meshes of more triangles are left to their spheres, which cost the same for any mesh.
-constexpr uint32_t kMostExact = 2000;
+constexpr uint32_t kMostExact = 5000;
 
 /// What an <instance> configures.
 struct Instance {

@@ -63,7 +63,7 @@ def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=None, measure=
     patches: contacts of a pair, at most, 1 to 50; None: 16 of exact overlaps, 8 of spheres.
         MuJoCo's own limit is sdf_initpoints (40).
     measure: "matched", "inner" or "exact"; exact between two solids that both have it. None: exact
-        for meshes of at most 2,000 triangles, matched for others.
+        for meshes of at most 5,000 triangles, matched for others.
 
     Raises ist.OpenMeshError for a mesh that is not closed: repair it first (ist.repair_mesh) or
     leave it out of `geoms`.
