@@ -21,9 +21,9 @@ enum class QueryStatus : std::uint32_t {
   /// (TreeView::has_mesh; a field has none), the others need spheres. FieldUse::always needs the
   /// surface of the coarser one. All numbers of the answer are NaN.
   not_held = 3,
-  /// Finished, but the error is larger than PenetrationSettings::relative_error: an asset has no
-  /// mesh, or a pair budget or coincident copies left coarser spheres. The gradients are exactly
-  /// those of the returned volume.
+  /// Finished, but the predicted error is larger than PenetrationSettings::relative_error: an asset
+  /// has no mesh, its mesh was simplified too much, or a pair budget or coincident copies left
+  /// coarser spheres. The gradients are exactly those of the returned volume.
   error_exceeded = 4,
 };
 

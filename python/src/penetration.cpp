@@ -108,7 +108,8 @@ pair_budget, max_visits: cost limits; 0: no limit. See <ist/query.h>.
 relative_error: accepted relative error of the volume, such as 0.005 for 0.5 %, of two Assets with
     'matched': the cheapest of the levels of detail and the exact measure that is predicted to err
     by less, blended smoothly. About 19 of 20 random poses err by less, half by less than a third.
-    0: all spheres. status error_exceeded: an Asset has no mesh, or pair_budget is too small.
+    0: all spheres. status error_exceeded: an Asset has no mesh or a
+    simplified one, pair_budget is too small, or copies of an Asset coincide.
 threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 
 Rows that cannot be answered are NaN with a status; they spoil no others. invalid_input: NaN, a

@@ -31,9 +31,7 @@ const thin: number = withoutProtrusion(answer, a, a, pose, {into: answer}).volum
     pairFit(a, a).ratio;
 const hits: RayHits = raycast(a, pose, [0, 0, 9], new Float64Array([0, 0, -1]), {longest: 10});
 const near: number = hits.normal[2] + closestPoint(Field.ball(1), pose, [0, 0, 2]).error[0] + contains(a, {}, [0, 0, 0])[0];
-// @ts-expect-error
 penetrationBatch([{a, b: Field.ball(1), poseB: pose}]);
-// @ts-expect-error
 penetration(a, Field.ball(1), pose);
 // @ts-expect-error
 penetration(a, a, pose, {measure: 'outer'});
