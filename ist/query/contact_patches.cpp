@@ -1,6 +1,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include <ist/query.h>
@@ -169,8 +170,11 @@ struct ChosenPart {
 ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
                             const ContactSettings& settings, Workspace& workspace,
                             std::span<ContactPatch> patches) noexcept {
-  if (settings.measure == Measure::exact || (by_error(settings) && lack_spheres(a, b)))
-    return exact_patches(a, b, settings, workspace, patches, {}, true).contact;
+  if (settings.measure == Measure::exact || (by_error(settings) && lack_spheres(a, b))) {
+    ContactPatches found = exact_patches(a, b, settings, workspace, patches, {}, true).contact;
+    found.penetration = checked(found.penetration, settings);
+    return found;
+  }
   if (lack_spheres(a, b)) return not_held<ContactPatches>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<ContactPatches>();
@@ -187,8 +191,12 @@ ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
   const Penetration& part = chosen.exact ? chosen.exact->penetration : chosen.levels->whole();
   if (blends || result.count == 0)
     result.count = spread(part, result.penetration, result.count, patches);
+  // A stopped exact query has the spheres' patches.
+  const bool by_parts = chosen.exact && part.status == QueryStatus::ok;
   finish_patches(patches.first(result.count), b.pose,
-                 chosen.exact ? exact_deepest(part.volume) : chosen.levels->deepest());
+                 by_parts        ? exact_deepest(part.volume)
+                 : chosen.levels ? chosen.levels->deepest()
+                                 : std::numeric_limits<double>::infinity());
   return result;
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "query/base/no_answer.h"
 #include "query/base/solid_bounds.h"
@@ -77,23 +78,35 @@ Answer stopped(const PlacedTree& a, const PlacedTree& b, Answer answer, const Sp
 constexpr double kNearOctants = 0.15;
 
 /// As many parts as there is room for, the largest; each other one joins the nearest of those that
-/// push like it, if there are any.
-std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room) {
+/// push like it, if there are any. Of octants, the smallest of those that have others of their part
+/// beside them join these first.
+std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room, bool octants) {
   std::uint32_t kept[ExactScratch::kMostParts], count = 0;
   for (std::uint32_t p = 0; p < parts.size(); ++p)
     if (parts[p].kept == p) kept[count++] = p;
   if (count <= room) return count;
+  // Octants of a part follow each other.
+  std::uint16_t group[ExactScratch::kMostParts], left[ExactScratch::kMostParts] = {}, groups = 0;
+  for (std::uint32_t k = 0; k < count; ++k) {
+    if (k > 0 && !(octants && parts[kept[k]].id / 8 == parts[kept[k - 1]].id / 8)) ++groups;
+    group[kept[k]] = groups;
+    ++left[groups];
+  }
   for (ExactPart& part : parts) part.centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
   for (; count > room; --count) {
-    const auto less = [&](std::uint32_t p, std::uint32_t q) {
-      return parts[p].sums.volume() < parts[q].sums.volume();
+    const auto rank = [&](std::uint32_t p) {
+      return std::pair(left[group[p]] == 1, parts[p].sums.volume());
     };
+    const auto less = [&](std::uint32_t p, std::uint32_t q) { return rank(p) < rank(q); };
     std::uint32_t* const least = std::min_element(kept, kept + count, less);
     ExactPart& joins = parts[*least];
+    const std::uint16_t own = group[*least];
+    --left[own];
     std::copy(least + 1, kept + count, least);
     const auto distance = [&](std::uint32_t p) {
       const exact::Point between = parts[p].centre - joins.centre;
-      return std::pair(dot(parts[p].sums.force, joins.sums.force) < 0, dot(between, between));
+      return std::tuple(group[p] != own, dot(parts[p].sums.force, joins.sums.force) < 0,
+                        dot(between, between));
     };
     const auto nearer = [&](std::uint32_t p, std::uint32_t q) { return distance(p) < distance(q); };
     joins.kept = *std::min_element(kept, kept + count - 1, nearer);
@@ -187,7 +200,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
   answer.segments = found.crossings;
   if (!patches.empty()) {
     std::span<ExactPart> parts(scratch.parts.get(), query.divide());
-    const std::uint32_t kept = keep_largest(parts, patches.size());
+    const std::uint32_t kept = keep_largest(parts, patches.size(), false);
     if (divides && kept <= ExactScratch::kMostSplit && patches.size() > 1) {
       join(parts);
       const bool by_b = volume_of(b) <= volume_of(a);
@@ -195,7 +208,9 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
       const double radius = smaller.scale * smaller.tree.header().ball_radius / pose->unit_a;
       parts = {scratch.octants.get(),
                query.split(parts, by_b, kNearOctants * radius, patches.size())};
-      keep_largest(parts, patches.size());
+      keep_largest(parts, patches.size(), true);
+    } else if (divides) {
+      for (ExactPart& part : parts) part.id *= 8;
     }
     join(parts);
     answer.contact.count = write_parts(parts, found.origin, *pose, patches);

@@ -30,13 +30,13 @@ struct ExactSum {
 
 Penetration find_penetration(const PlacedTree& a, const PlacedTree& b,
                              const PenetrationSettings& settings, Workspace& workspace) noexcept {
-  // Of a surface alone the exact measure errs by no more than is wanted.
+  // Surfaces alone have no other measure.
   const bool exact =
       settings.measure == Measure::exact || (by_error(settings) && lack_spheres(a, b));
   if (!exact && lack_spheres(a, b)) return not_held<Penetration>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Penetration>();
-  if (exact) return exact_penetration(a, b, settings, *pose, workspace);
+  if (exact) return checked(exact_penetration(a, b, settings, *pose, workspace), settings);
   const AssetHeader& header_a = a.tree.header();
   const AssetHeader& header_b = b.tree.header();
   const bool inner = settings.measure == Measure::inner;

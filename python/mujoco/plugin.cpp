@@ -232,7 +232,8 @@ int init(const mjModel* m, mjData* d, int i) {
   auto made = std::make_unique<Instance>();
   double patches = made->patches;
   if (!read_number(m, i, "patches", patches) || !read_number(m, i, "scale", made->scale)) return -1;
-  made->patches = static_cast<int>(std::min(patches, double{kMostPatches}));
+  made->patches =
+      patches > 0 ? static_cast<int>(std::clamp(patches, 1.0, double{kMostPatches})) : 0;
   const char* measure = mj_getPluginConfig(m, i, "measure");
   const bool chosen = measure != nullptr && *measure != 0;
   if (chosen) {

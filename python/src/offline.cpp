@@ -128,7 +128,7 @@ void run_offline(OfflineWork work, const py::object& progress, bool rounds) {
     }
   }
   if (job->error) std::rethrow_exception(job->error);
-  if (progress.is_none()) return;
+  if (progress.is_none() || job->cancelled) return;
   last.fraction = last.total = 1;
   progress(last);
 }

@@ -270,6 +270,22 @@ TEST_F(ExactOctants, AThreadHoldsAllAround) {
   }
 }
 
+TEST_F(ExactOctants, ASmallFootKeepsItsPatchWhereRoomIsShort) {
+  const Asset table = surface(box_mesh(Point(-9, -9, -1), Point(9, 9, 0)));
+  const Asset feet = surface(testing::joined(box_mesh(Point(-1, -1, 0), Point(1, 1, 1)),
+                                             box_mesh(Point(4, -0.1, 0), Point(4.2, 0.1, 1))));
+  for (const std::size_t room : {64, 5, 4, 2}) {
+    const auto& patches =
+        ask({table.view(), {}, 1}, {feet.view(), {{1, 0, 0, 0}, {0, 0, -0.01}}, 1}, room);
+    double small = 0;
+    for (const ContactPatch& patch : patches) {
+      EXPECT_GE(patch.id, 8u);
+      if (std::abs(patch.centroid.x() - 4.1) < 0.11) small += patch.volume;
+    }
+    EXPECT_NEAR(small, 0.2 * 0.2 * 0.01, 1e-14) << room;
+  }
+}
+
 TEST_F(ExactOctants, WhatIsDeepIsOne) {
   const Asset block = surface(box_mesh(Point(-3, -3, -3), Point(3, 3, 0)));
   const Asset ball = surface(testing::icosphere_mesh(3));

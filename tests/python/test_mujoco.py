@@ -141,7 +141,7 @@ def test_threads_copies_and_files_change_no_bit(folder, tmp_path):
 
 def test_fifty_contacts_fit(folder):
     spec = mujoco.MjSpec.from_file(str(folder / "nut.xml"))
-    ist.mujoco.attach(spec, cache=folder / "cache", spheres=10000, patches=50)
+    ist.mujoco.attach(spec, cache=folder / "cache", spheres=10000, patches=50, measure="matched")
     spec.option.sdf_initpoints = 50
     model = spec.compile()
     data = mujoco.MjData(model)

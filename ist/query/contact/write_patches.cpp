@@ -92,6 +92,8 @@ void finish_patches(std::span<ContactPatch> patches, const Pose& b, double deepe
   const Eigen::Vector3d origin(b.t);
   for (ContactPatch& patch : patches) {
     patch.point = patch.centroid;
+    patch.normal.setZero();
+    patch.area = patch.depth = patch.twist = 0;
     const double area = patch.force.norm();
     if (!(area > kPushRounding * std::cbrt(patch.volume * patch.volume))) continue;
     patch.area = area;

@@ -14,6 +14,16 @@ inline bool by_error(const PenetrationSettings& settings) noexcept {
   return settings.measure == Measure::matched && settings.relative_error > 0;
 }
 
+/// Says of an answer of the exact measure where its bounds, as of simplified meshes, are wider than
+/// a query accepts.
+inline Penetration checked(Penetration exact, const PenetrationSettings& settings) noexcept {
+  const double most = 2 * settings.relative_error * exact.volume;
+  if (exact.status == QueryStatus::ok && by_error(settings) &&
+      exact.volume_max - exact.volume_min > most && exact.volume > 0)
+    exact.status = QueryStatus::error_exceeded;
+  return exact;
+}
+
 /// Volume of solid for which a sphere of a level stands, the asset's unit frame. Thin solids need
 /// more spheres: as many times as what inner spheres of that size leave out makes a radius larger.
 double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept;

@@ -198,7 +198,9 @@ test('outlines: closed curves, a patch at a time', () => {
   const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB), pose = {translation: [0, 0, 8.5]};
   const found = ist.overlapOutline(a, b, pose), {contact, count, segments, patch} = found;
   assert.ok(count > 1024 && segments.length === 6 * count && patch.length === count);
-  assert.deepEqual(contact, ist.contactPatches(a, b, pose, {measure: 'exact', maxPatches: 1}));
+  const one = ist.contactPatches(a, b, pose, {measure: 'exact', maxPatches: 1});
+  assert.deepEqual(contact.whole, one.whole);
+  assert.deepEqual(contact.patches[0].force, one.patches[0].force);
   assert.equal(ist.contactPatches(a, b, pose, {measure: 'exact'}).count, 8);  // its octants
   const ends = (first) => Array.from(patch, (p, i) => [p, ...segments.subarray(6 * i + first, 6 * i + first + 3)].join());
   assert.deepEqual(ends(0).sort(), ends(3).sort());
