@@ -59,7 +59,6 @@ struct PairAlgorithm::State {
   double still = -1;  // [u] until a point has moved by more than this that answer holds
   ContactMemory memory;
   ContactForce pushed;
-  const btCollisionObject* pushed_body = nullptr;
 };
 
 Settings Contacts::settings_of(const btCollisionObject& first,
@@ -293,7 +292,6 @@ void PairAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {
 }
 
 const ContactForce& PairAlgorithm::pushed() const { return state_->pushed; }
-const btCollisionObject* PairAlgorithm::pushed_body() const { return state_->pushed_body; }
 
 void PairAlgorithm::push(const btCollisionObject& first, const btCollisionObject& second,
                          double step) {
@@ -304,7 +302,6 @@ void PairAlgorithm::push(const btCollisionObject& first, const btCollisionObject
   if (whole) settings.patches = 1;
   Contact contact;
   state_->meeting.find(first.getWorldTransform(), second.getWorldTransform(), settings, contact);
-  state_->pushed_body = &second;
   if (!(contact.whole.volume > 0)) {
     state_->memory = {};
     return;

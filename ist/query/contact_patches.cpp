@@ -105,11 +105,11 @@ class PairPatches {
     const std::optional<RelativePose> turned = relative_pose(b_, a_);
     if (!turned) return 0;
     Penetration whole = whole_;
-    turn_over(between(a_, b_), whole);
+    turn_over(b_.pose, a_.pose, whole);
     const std::size_t count = write_patches(
         {scratch_.contact, filled, *turned, tree_a_.header->root[3] * turned->a_from_b.scale},
         whole, patches);
-    turn_over(between(b_, a_), patches.first(count));
+    turn_over(a_.pose, b_.pose, patches.first(count));
     return count;
   }
 
@@ -172,7 +172,7 @@ ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
                             std::span<ContactPatch> patches) noexcept {
   if (settings.measure == Measure::exact || (by_error(settings) && lack_spheres(a, b))) {
     ContactPatches found = exact_patches(a, b, settings, workspace, patches, {}, true).contact;
-    found.penetration = checked(found.penetration, settings);
+    found.penetration = with_error_status(found.penetration, settings);
     return found;
   }
   if (lack_spheres(a, b)) return not_held<ContactPatches>();

@@ -36,7 +36,8 @@ Penetration find_penetration(const PlacedTree& a, const PlacedTree& b,
   if (!exact && lack_spheres(a, b)) return not_held<Penetration>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Penetration>();
-  if (exact) return checked(exact_penetration(a, b, settings, *pose, workspace), settings);
+  if (exact)
+    return with_error_status(exact_penetration(a, b, settings, *pose, workspace), settings);
   const AssetHeader& header_a = a.tree.header();
   const AssetHeader& header_b = b.tree.header();
   const bool inner = settings.measure == Measure::inner;

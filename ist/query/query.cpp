@@ -30,16 +30,8 @@ Answer ask_pair(const PlacedSolid& a, const PlacedSolid& b, const Answer& none, 
   return answer;
 }
 
-/// The way from B's origin to A's where A is an asset and B a field.
-Eigen::Vector3d from_b_to_a(const PlacedSolid& a, const PlacedSolid& b) noexcept {
-  const auto origin = [](const PlacedSolid& solid) -> Eigen::Vector3d {
-    return std::visit(
-        [](const auto& placed) -> Eigen::Vector3d {
-          return {placed.pose.t[0], placed.pose.t[1], placed.pose.t[2]};
-        },
-        solid.placed);
-  };
-  return origin(a) - origin(b);
+const Pose& pose_of(const PlacedSolid& solid) noexcept {
+  return std::visit([](const auto& placed) -> const Pose& { return placed.pose; }, solid.placed);
 }
 
 /// Witnesses of a separation or an impact.
@@ -58,7 +50,7 @@ Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
       [&](const auto& x, const PlacedTree& y) {
         return find_penetration(x, y, settings, workspace);
       },
-      [&](Penetration& answer) { turn_over(from_b_to_a(a, b), answer); });
+      [&](Penetration& answer) { turn_over(pose_of(a), pose_of(b), answer); });
 }
 
 Separation separation(const PlacedSolid& a, const PlacedSolid& b,
@@ -86,8 +78,8 @@ ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
         return find_patches(x, y, settings, workspace, patches);
       },
       [&](ContactPatches& answer) {
-        turn_over(from_b_to_a(a, b), answer.penetration);
-        turn_over(from_b_to_a(a, b), patches.first(answer.count));
+        turn_over(pose_of(a), pose_of(b), answer.penetration);
+        turn_over(pose_of(a), pose_of(b), patches.first(answer.count));
       });
 }
 

@@ -144,8 +144,7 @@ Eigen::Vector3d SceneWorld::contact_force(const btRigidBody& body) const {
   ist::bullet::for_each_pair(world_, [&](ist::bullet::PairAlgorithm& pair,
                                          const btCollisionObject& a, const btCollisionObject& b) {
     if (&a != &body && &b != &body) return;
-    sum +=
-        pair.pushed_body() == &body ? pair.pushed().force : Eigen::Vector3d(-pair.pushed().force);
+    sum += (&b == &body ? 1 : -1) * pair.pushed().force;
   });
   for (int m = 0; m < dispatcher_.getNumManifolds(); ++m) {
     const btPersistentManifold& manifold =

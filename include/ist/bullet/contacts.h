@@ -125,9 +125,8 @@ class PairAlgorithm : public btActivatingCollisionAlgorithm {
   /// of `step` [s]. Compounds are not pushed.
   void push(const btCollisionObject& first, const btCollisionObject& second, double step);
 
-  /// The last force that push() applied, and the object on which it applied it.
+  /// The force that push() last applied to the second object; the first got the opposite.
   const ContactForce& pushed() const;
-  const btCollisionObject* pushed_body() const;
 
   btScalar calculateTimeOfImpact(btCollisionObject*, btCollisionObject*, const btDispatcherInfo&,
                                  btManifoldResult*) override {

@@ -178,7 +178,8 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
   const bool has_exact = queries.has_exact();
   std::optional<WantedError> wanted;
   if (with_error) wanted.emplace(a, b, pose, settings, chain, has_exact);
-  if (has_exact && !wanted->by_spheres()) return checked(queries.exact(sums, true), settings);
+  if (has_exact && !wanted->by_spheres())
+    return with_error_status(queries.exact(sums, true), settings);
 
   // Whatever else is asked, the coarse estimate is the whole sum: only that is smooth.
   const Penetration coarse = queries.coarse_estimate(chain.coarsest());
@@ -242,7 +243,7 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
       const Penetration part = queries.exact(sums, mostly_exact);
       add(shares.rest.weight, part, result);
       if (shares.rest.slope != 0) slope += shares.rest.slope / unit3 * part.volume;
-      missed |= checked(part, settings).status == QueryStatus::error_exceeded;
+      missed |= with_error_status(part, settings).status == QueryStatus::error_exceeded;
     }
     // The coarse estimate is rounded too, and with it the weights.
     if (slope != 0) {

@@ -52,12 +52,6 @@ double triangles_met(const AssetHeader& asset, double radius) {
 
 }  // namespace
 
-Eigen::Vector3d between(const PlacedTree& from, const PlacedTree& to) noexcept {
-  Eigen::Vector3d way;
-  for (int k = 0; k < 3; ++k) way[k] = to.pose.t[k] - from.pose.t[k];
-  return way;
-}
-
 PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
                        const TreeHeader& tree_b, const RelativePose& pose, FieldUse use) noexcept {
   PairMethod method;
@@ -179,7 +173,7 @@ Penetration PairOverlap::exact(bool b_probes, const DescentLimits& limits,
   SurfaceDescent descent(surface, probes, *turned, limits, scratch_, bins);
   descent.run();
   Penetration answer = kept_within(most, descent.penetration());
-  turn_over(between(b_, a_), answer);
+  turn_over(a_.pose, b_.pose, answer);
   return answer;
 }
 

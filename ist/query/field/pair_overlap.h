@@ -22,9 +22,6 @@ struct PairMethod {
   double share = 1;  ///< what "alone" is of trees that are all but alike: the rest is the lenses'
 };
 
-/// [u] From one's origin to the other's, world.
-Eigen::Vector3d between(const PlacedTree& from, const PlacedTree& to) noexcept;
-
 PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
                        const TreeHeader& tree_b, const RelativePose& pose, FieldUse use) noexcept;
 
