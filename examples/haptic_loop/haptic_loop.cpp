@@ -58,6 +58,7 @@ class Session {
         probe_(probe),
         scale_(options.scale),
         period_(1 / options.rate),
+        exact_(options.exact),
         deadline_(options.deadline_us),
         proxy_({probe, {}, options.scale}, coupling_hz, options.contact_hz) {
     // A stroke begins where it touches: the first answers also bring memory and caches up.
@@ -73,6 +74,8 @@ class Session {
   ist::PenetrationAndSeparation ask() {
     const ist::PlacedTree a{object_, {}}, b{probe_, pose_of(proxy_.pose()), scale_};
     ist::PenetrationSettings settings;
+    if (exact_) settings.measure = ist::Measure::exact;
+    settings.pair_id = 1;  // a loop: triangles that are near are kept from tick to tick
     deadline_.limit(settings);
     const double start = now_us();
     ist::PenetrationAndSeparation answer{ist::penetration(a, b, settings, scratch_), {}};
@@ -101,6 +104,7 @@ class Session {
   Motion motion_;
   ist::TreeView object_, probe_;
   double scale_, period_, time_ = 0;
+  bool exact_;
   ist::Deadline deadline_;
   ist::Workspace scratch_;
   Proxy proxy_;

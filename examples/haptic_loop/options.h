@@ -9,6 +9,7 @@ inline constexpr const char* kUsage =
     "usage: haptic_loop OBJECT.ist PROBE.ist [--scale S]   of the probe (1)\n"
     "                   [--seconds T] [--rate HZ]          how long (60), how often (1000)\n"
     "                   [--deadline-us D]                  time of a query (0: no limit)\n"
+    "                   [--exact]                          the meshes' own volume; no deadline\n"
     "                   [--load N]                         threads that burden the machine (0)\n"
     "                   [--fifo]                           real-time priority, if permitted\n"
     "                   [--motion stroke|insert|FILE.csv]  the hand's (stroke)\n"
@@ -32,7 +33,7 @@ struct Options {
   double turns = 0, wiggle = 0, cycles = 1;
   double coupling_hz = 25, contact_hz = 40;
   int load = 0;
-  bool fifo = false, offline = false, search = false;
+  bool exact = false, fifo = false, offline = false, search = false;
 };
 
 /// Ends the program with code 2 on a wrong usage.
@@ -60,8 +61,10 @@ inline Options parse(int argc, char** argv) {
   const struct {
     const char* name;
     bool* value;
-  } flags[] = {
-      {"--fifo", &options.fifo}, {"--offline", &options.offline}, {"--search", &options.search}};
+  } flags[] = {{"--exact", &options.exact},
+               {"--fifo", &options.fifo},
+               {"--offline", &options.offline},
+               {"--search", &options.search}};
   const char** files[] = {&options.object, &options.probe};
   int file = 0;
   bool wrong = false;

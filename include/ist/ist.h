@@ -366,7 +366,10 @@ typedef struct ist_penetration_settings {
   ist_field_use_t field;
   uint32_t pair_budget; /* count of sphere pairs to spend; 0: no limit, as in all that follow */
   uint32_t max_visits;  /* count of node pairs opened */
-  uint32_t reserved;    /* 0 */
+  /* The caller's number of this pair of solids; 0: none. Calls with one number and one workspace are
+   * steps of one motion: IST_EXACT keeps the triangles that are near each other. Answers have the
+   * same bits as without, but for node_visits. Nothing is kept under max_visits. */
+  uint32_t pair_id;
   /* Accepted relative error of the volume, as 0.005 for 0.5 %, of two trees with IST_MATCHED: the
    * coarsest level of detail that is predicted to err by less, or IST_EXACT, blended smoothly. If
    * an asset has no mesh, or under a pair budget, the answer may be IST_ERROR_EXCEEDED. */

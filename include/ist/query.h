@@ -59,6 +59,13 @@ struct PenetrationSettings {
   /// level, or the finest within the budget, is the best there is. Where it is predicted to err by
   /// more, the status is error_exceeded. Assets without spheres are answered by Measure::exact.
   double relative_error = 0;
+
+  /// The caller's number of this pair of solids; 0: none. Calls with one number and one workspace
+  /// are steps of one motion: exact queries keep the triangles that are near each other, and search
+  /// anew when they have moved too far. Answers have the same bits as without, but for the count of
+  /// nodes. A workspace keeps up to 1,024 pairs of solids and a quarter of a million pairs of
+  /// triangles at its default capacity. Nothing is kept under max_visits.
+  std::uint32_t pair_id = 0;
 };
 
 using ContactSettings = PenetrationSettings;

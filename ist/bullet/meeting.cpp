@@ -38,8 +38,10 @@ Body body_of(const btCollisionObject& object) {
 }  // namespace
 
 Meeting::Meeting(const btCollisionShape& first, const btCollisionShape& second)
-    // SDF shapes of Bullet's have the same type.
-    : first_(dynamic_cast<const Shape*>(&first)), second_(dynamic_cast<const Shape*>(&second)) {
+    : pair_id_(static_cast<std::uint32_t>(reinterpret_cast<std::uintptr_t>(this) >> 3)),
+      // SDF shapes of Bullet's have the same type.
+      first_(dynamic_cast<const Shape*>(&first)),
+      second_(dynamic_cast<const Shape*>(&second)) {
   if (has_shape() && first_ == nullptr) partner_ = Partner::of(first);
   if (has_shape() && second_ == nullptr) partner_ = Partner::of(second);
 }
@@ -79,6 +81,7 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   contact.origin = std::visit([](const auto& at) { return Eigen::Vector3d(at.pose.t); }, b.placed);
   contact.clearance = 0;
   ContactSettings query = settings.query;
+  query.pair_id = pair_id_;
   ContactPatches found = contact_patches(a, b, query, workspace(), room);
   if (first_ != nullptr && second_ != nullptr) {
     if (found.penetration.status == QueryStatus::not_held && query.field == FieldUse::always) {

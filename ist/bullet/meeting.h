@@ -31,6 +31,7 @@ class Meeting {
  private:
   PlacedSolid placed(const Shape* shape, const btTransform& at) const;
 
+  std::uint32_t pair_id_;         // no two at a time have the same
   const Shape* first_ = nullptr;  // null: partner_
   const Shape* second_ = nullptr;
   std::optional<Partner> partner_;

@@ -160,7 +160,7 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
   if (a.tree.header().mesh == 0 || b.tree.header().mesh == 0) return not_held<Penetration>();
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   auto query = query_of<ExactQuery>(a, mesh_a, b, mesh_b, pose, workspace.impl()->exact);
-  const ExactOverlap found = query.run(settings.max_visits);
+  const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
   if (found.complete) return whole_answer(found, pose);
   const auto by_spheres = [&] {
     PenetrationSettings others = settings;
@@ -183,7 +183,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   ExactScratch& scratch = workspace.impl()->exact;
   auto query = query_of<ExactOctants>(a, mesh_a, b, mesh_b, *pose, scratch);
-  const ExactOverlap found = query.run(settings.max_visits);
+  const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
   if (!found.complete) {
     const auto by_spheres = [&] {
       ContactSettings others = settings;

@@ -475,7 +475,8 @@ def penetration(
     a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None,
     scale_gradients: bool = False, measure: _Measure = "matched", field: _FieldUse = "automatic",
-    pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, threads: int = 0,
+    pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, pair_id: int = 0,
+    threads: int = 0,
 ) -> Penetration: ...
 def penetration_of_pairs(
     solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *,
@@ -508,12 +509,12 @@ def contact_patches(
     scales: ArrayLike | None = None, poses_a: ArrayLike | None = None,
     scales_a: ArrayLike | None = None, measure: _Measure = "matched",
     field: _FieldUse = "automatic", pair_budget: int = 0, max_visits: int = 0,
-    relative_error: float = 0.0, threads: int = 0,
+    relative_error: float = 0.0, pair_id: int = 0, threads: int = 0,
 ) -> ContactPatches: ...
 def overlap_outline(
     a: Asset, b: Asset, poses: ArrayLike, *, max_patches: int = 8,
     scales: ArrayLike | None = None, poses_a: ArrayLike | None = None,
-    scales_a: ArrayLike | None = None, max_visits: int = 0,
+    scales_a: ArrayLike | None = None, max_visits: int = 0, pair_id: int = 0,
 ) -> OverlapOutline: ...
 def overlap(
     a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,

@@ -78,9 +78,13 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
 
 PenetrationSettings penetration_settings(const std::string& measure, const std::string& field,
                                          std::uint32_t pair_budget, std::uint32_t max_visits,
-                                         double relative_error) {
-  return {named(measure, "measure", kMeasures), named(field, "field", kFieldUses), pair_budget,
-          max_visits, take_limit(relative_error, "relative_error")};
+                                         double relative_error, std::uint32_t pair_id = 0) {
+  return {named(measure, "measure", kMeasures),
+          named(field, "field", kFieldUses),
+          pair_budget,
+          max_visits,
+          take_limit(relative_error, "relative_error"),
+          pair_id};
 }
 
 constexpr const char* kPairDoc =
@@ -91,6 +95,12 @@ poses: of B, (7,) or (n, 7): qw, qx, qy, qz, tx [u], ty, tz, or matrices (4, 4) 
     Quaternions of any length but 0 are normalised. A C-ordered float64 array of rows is not copied.
     ist.poses() makes rows of other conventions.
 scales: of B, a number or (n,), > 0. poses_a, scales_a: of A; None: at the origin, 1.)";
+
+constexpr const char* kPairIdDoc = R"(
+
+pair_id: a number of yours for this pair of solids, 0: none. Calls with one number, and their rows,
+    are steps of one motion: 'exact' keeps the triangles that are near each other from step to step,
+    and gives the same answers sooner.)";
 
 constexpr const char* kSceneDoc = R"(The same for pairs of solids of one scene or many scenes.
 
@@ -192,17 +202,18 @@ void add_penetration(py::module_& module) {
          const py::object& scales, const py::object& poses_a, const py::object& scales_a,
          bool scale_gradients, const std::string& measure, const std::string& field,
          std::uint32_t pair_budget, std::uint32_t max_visits, double relative_error,
-         unsigned threads) {
-        return answer(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
-                      penetration_settings(measure, field, pair_budget, max_visits, relative_error),
-                      scale_gradients, threads);
+         std::uint32_t pair_id, unsigned threads) {
+        return answer(
+            Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
+            penetration_settings(measure, field, pair_budget, max_visits, relative_error, pair_id),
+            scale_gradients, threads);
       },
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("scale_gradients") = false,
       py::arg("measure") = "matched", py::arg("field") = "automatic", py::arg("pair_budget") = 0,
-      py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("threads") = 0,
-      doc(kPairDoc).c_str());
+      py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("pair_id") = 0,
+      py::arg("threads") = 0, (doc(kPairDoc) + kPairIdDoc).c_str());
   module.def(
       "penetration_of_pairs",
       [](const py::sequence& solids, const py::object& poses, const py::object& pairs,

@@ -259,31 +259,34 @@ void add_separation(py::module_& module) {
       [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
          const py::object& scales, const py::object& poses_a, const py::object& scales_a,
          const std::string& measure, const std::string& field, std::uint32_t pair_budget,
-         std::uint32_t max_visits, double relative_error, unsigned threads) {
-        return patches(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), max_patches,
-                       {named(measure, "measure", kMeasures), named(field, "field", kFieldUses),
-                        pair_budget, max_visits, take_limit(relative_error, "relative_error")},
-                       threads);
+         std::uint32_t max_visits, double relative_error, std::uint32_t pair_id, unsigned threads) {
+        return patches(
+            Rows::of_pair(a, b, poses, scales, poses_a, scales_a), max_patches,
+            {named(measure, "measure", kMeasures), named(field, "field", kFieldUses), pair_budget,
+             max_visits, take_limit(relative_error, "relative_error"), pair_id},
+            threads);
       },
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
       py::arg("max_patches") = 8, py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("measure") = "matched",
       py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
-      py::arg("relative_error") = 0.0, py::arg("threads") = 0, kPatchesDoc);
+      py::arg("relative_error") = 0.0, py::arg("pair_id") = 0, py::arg("threads") = 0, kPatchesDoc);
   module.def(
       "overlap_outline",
       [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
          const py::object& scales, const py::object& poses_a, const py::object& scales_a,
-         std::uint32_t max_visits) {
+         std::uint32_t max_visits, std::uint32_t pair_id) {
         ContactSettings settings;
         settings.measure = Measure::exact;
         settings.max_visits = max_visits;
+        settings.pair_id = pair_id;
         return outline(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), max_patches,
                        settings);
       },
       py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("max_patches") = 8,
       py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
-      py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, kOutlineDoc);
+      py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, py::arg("pair_id") = 0,
+      kOutlineDoc);
   module.def(
       "overlap",
       [](const py::object& a, const py::object& b, const py::object& poses,

@@ -1,6 +1,7 @@
 // A million random and a hundred thousand degenerate poses of exact queries: signs that agree, a
-// surface that closes, bounds in order, A and B exchanged, nothing that is not a number. `./dev
-// soak exact` runs it and writes its report.
+// surface that closes, bounds in order, A and B exchanged, nothing that is not a number; and a
+// million steps of random motions, with and without what is kept from step to step. `./dev soak
+// exact` runs it and writes its report.
 
 #include <ist/query.h>
 
@@ -16,6 +17,7 @@
 
 #include "report.h"
 #include "samples/samples.h"
+#include "support/answer_bits.h"
 #include "support/exact_pair.h"
 #include "support/integer_meshes.h"
 #include "support/test_meshes.h"
@@ -33,11 +35,13 @@ struct Tally {
   std::uint64_t unfinished = 0;    ///< status other than ok
   std::uint64_t inconsistent = 0;  ///< signs that contradict each other
   std::uint64_t not_numbers = 0;
-  std::uint64_t disordered = 0;  ///< a value outside its bounds, or more than the smaller solid
-  std::uint64_t open = 0;        ///< gaps above their bound
-  std::uint64_t unlike = 0;      ///< intervals of A in B and B in A that do not meet
-  std::uint64_t untrue = 0;      ///< intervals that miss a volume which is known
-  std::uint64_t wide = 0;        ///< intervals wider than 1e-9 of the volume
+  std::uint64_t disordered = 0;   ///< a value outside its bounds, or more than the smaller solid
+  std::uint64_t open = 0;         ///< gaps above their bound
+  std::uint64_t unlike = 0;       ///< intervals of A in B and B in A that do not meet
+  std::uint64_t untrue = 0;       ///< intervals that miss a volume which is known
+  std::uint64_t wide = 0;         ///< intervals wider than 1e-9 of the volume
+  std::uint64_t kept = 0;         ///< steps that were answered by what was kept
+  std::uint64_t unlike_kept = 0;  ///< with other bits than from scratch
   double worst_gap = 0;
 
   void operator+=(const Tally& other) {
@@ -54,6 +58,8 @@ struct Tally {
     unlike += other.unlike;
     untrue += other.untrue;
     wide += other.wide;
+    kept += other.kept;
+    unlike_kept += other.unlike_kept;
     worst_gap = std::max(worst_gap, other.worst_gap);
   }
 };
@@ -89,6 +95,45 @@ class Chunk {
         random_(0x9e3779b97f4a7c15u * (index + 1)),
         workspace_(workspace),
         tally_(tally) {}
+
+  /// Three pairs of solids in turn; each moves slowly, fast or by jumps for a while.
+  void move() {
+    struct Moving {
+      const TestSolid *a, *b;
+      PlacedTree at_a, at_b;
+      Point velocity = Point::Zero(), spin = Point::Zero();
+      bool carried = false;
+    };
+    std::vector<Moving> all;
+    for (int i = 0; i < 3; ++i) {
+      const TestSolid &a = pick(), &b = pick();
+      all.push_back({&a, &b, {a.asset.view(), {}, 1}, {b.asset.view(), {}, 1}});
+      scatter(all.back().at_a, all.back().at_b);
+    }
+    for (std::size_t i = 0; i < kChunk; ++i) {
+      Moving& m = all[i % all.size()];
+      const double size = std::min(testing::size_of(m.at_a), testing::size_of(m.at_b));
+      if (i < all.size() || one_in(30)) {
+        const double step = std::pow(10, one_in(8) ? uniform(-1.5, 0) : uniform(-6, -1.5));
+        const auto way = [&] { return Point(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)); };
+        m.velocity = step * size * way();
+        m.spin = one_in(3) ? Point(Point::Zero()) : Point(step * way());
+        m.carried = one_in(4);
+      }
+      if (one_in(60)) one_in(2) ? align(*m.a, *m.b, m.at_a, m.at_b) : scatter(m.at_a, m.at_b);
+      const Eigen::Quaterniond turn(Eigen::AngleAxisd(
+          m.spin.norm(), m.spin.norm() > 0 ? Point(m.spin.normalized()) : Point(Point::UnitX())));
+      const auto step = [&](PlacedTree& placed, const Point& velocity) {
+        const double *q = placed.pose.q, *t = placed.pose.t;
+        set(placed.pose, turn * Eigen::Quaterniond(q[0], q[1], q[2], q[3]),
+            Point(t[0], t[1], t[2]) + velocity);
+      };
+      if (m.carried) step(m.at_a, 2 * m.velocity);
+      step(m.at_b, m.velocity);
+      const auto id = static_cast<std::uint32_t>(1 + random_() % 2 * 1000 + i % all.size());
+      compare(m.at_a, m.at_b, one_in(20) ? id : static_cast<std::uint32_t>(1 + i % all.size()));
+    }
+  }
 
   void run(bool degenerate) {
     for (std::size_t i = 0; i < kChunk; ++i) {
@@ -183,6 +228,39 @@ class Chunk {
       show(a, b, p, q, check);
   }
 
+  void compare(const PlacedTree& a, const PlacedTree& b, std::uint32_t id) {
+    PenetrationSettings settings;
+    settings.measure = Measure::exact;
+    std::uint64_t bits[2];
+    Penetration whole[2];
+    for (const std::uint32_t pair_id : {0u, id}) {
+      testing::AnswerBits sum;
+      settings.pair_id = pair_id;
+      Penetration& p = whole[pair_id == 0 ? 0 : 1];
+      p = penetration(a, b, settings, workspace_);
+      if (pair_id != 0) tally_.kept += p.node_visits == 0 ? 1 : 0;
+      p.node_visits = 0;
+      sum.add(p);
+      if (one_in_eight_ == 0) {
+        ContactPatch patches[8];
+        ContactPatches found = contact_patches(a, b, settings, workspace_, patches);
+        found.penetration.node_visits = 0;
+        sum.add(found.penetration);
+        for (std::size_t k = 0; k < found.count; ++k) sum.add(patches[k]);
+      }
+      bits[pair_id == 0 ? 0 : 1] = sum.value();
+    }
+    one_in_eight_ = (one_in_eight_ + 1) % 8;
+    ++tally_.poses;
+    tally_.pairs += whole[0].sphere_pairs;
+    ++(whole[0].sphere_pairs > 0 ? tally_.crossing
+       : whole[0].volume > 0     ? tally_.contained
+                                 : tally_.apart);
+    if (bits[0] == bits[1]) return;
+    ++tally_.unlike_kept;
+    show(a, b, whole[0], whole[1], {});
+  }
+
   /// A solid on itself, in any place and turn of both: its own volume.
   void look_at_known(const TestSolid& a, PlacedTree at_a) {
     if (!one_in(4)) return;
@@ -219,18 +297,23 @@ class Chunk {
   std::mt19937_64 random_;
   Workspace& workspace_;
   Tally& tally_;
+  int one_in_eight_ = 0;
 };
 
-Tally ask(const std::vector<TestSolid>& solids, std::size_t poses, bool degenerate) {
-  const std::size_t first = degenerate ? 1u << 20 : 0;
+enum class Poses { random, degenerate, motions };
+
+Tally ask(const std::vector<TestSolid>& solids, std::size_t poses, Poses kind) {
+  const std::size_t first = static_cast<std::size_t>(kind) << 20;
   std::atomic<std::size_t> next = 0;
   std::vector<Tally> tallies(std::max(1u, std::thread::hardware_concurrency()));
   std::vector<std::jthread> threads;
   for (Tally& tally : tallies)
     threads.emplace_back([&] {
       Workspace workspace;
-      for (std::size_t i = next++; i < poses / kChunk; i = next++)
-        Chunk(solids, first + i, workspace, tally).run(degenerate);
+      for (std::size_t i = next++; i < poses / kChunk; i = next++) {
+        Chunk chunk(solids, first + i, workspace, tally);
+        kind == Poses::motions ? chunk.move() : chunk.run(kind == Poses::degenerate);
+      }
     });
   threads.clear();
   Tally sum;
@@ -248,7 +331,7 @@ int main(int argc, char** argv) {
     const std::size_t poses =
         (degenerate ? 100'000 : 1'000'000) / (report.quick() ? degenerate ? 20 : 50 : 1);
     const auto start = std::chrono::steady_clock::now();
-    const Tally tally = ask(solids, poses, degenerate);
+    const Tally tally = ask(solids, poses, degenerate ? Poses::degenerate : Poses::random);
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const std::string name = degenerate ? "degenerate" : "random";
@@ -273,6 +356,18 @@ int main(int argc, char** argv) {
     none("intervals that change when A and B are exchanged", tally.unlike);
     if (degenerate) none("intervals that miss a known volume", tally.untrue);
   }
+  const Tally moved = ask(solids, report.quick() ? 20'000 : 1'000'000, Poses::motions);
+  report.row("Motions", {{"steps", moved.poses},
+                         {"surfaces cross", moved.crossing},
+                         {"one in the other", moved.contained},
+                         {"apart", moved.apart},
+                         {"crossing pairs of triangles", moved.pairs},
+                         {"answered by what is kept", moved.kept}});
+  report.target("motions: answers with other bits than from scratch",
+                static_cast<double>(moved.unlike_kept), 0, true);
+  const double share = static_cast<double>(moved.kept) / static_cast<double>(moved.poses);
+  report.target("motions: share that is answered by what is kept", share, 0.3);
+  sound = sound && moved.unlike_kept == 0 && share > 0.3;
   report.remark(
       "25 small meshes: boxes, plates, needles, balls, a torus, a gear, and random ones of integer "
       "coordinates, some of several components and with cavities. Degenerate poses put corners on "

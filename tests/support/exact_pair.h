@@ -52,7 +52,7 @@ inline ExactCheck check_exactly(const PlacedTree& a, const PlacedTree& b, Worksp
   };
   const MeshTree mesh_a = mesh(a), mesh_b = mesh(b);
   ExactQuery query(mesh_a, 0, mesh_b, 0, pose->a_from_b, pose->b_from_a, workspace.impl()->exact);
-  const ExactOverlap found = query.run(0, true);
+  const ExactOverlap found = query.run(0, 0, true);
   const double sizes = size_of(a) / pose->unit_a * (size_of(b) / pose->unit_a);
   const double gap = std::hypot(found.gap.x, found.gap.y, found.gap.z) / sizes;
   const double unit = pose->unit_a * pose->unit_a * pose->unit_a;

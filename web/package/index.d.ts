@@ -233,6 +233,12 @@ export interface ContactOptions extends Limits {
    * the time that queries take; it depends on the pose and on this alone.
    */
   pairBudget?: number;
+  /**
+   * A number of yours for this pair of solids, ≥ 1. Calls with one number are steps of one motion:
+   * `exact` keeps the triangles that are near each other from call to call, and gives the same answer
+   * sooner.
+   */
+  pairId?: number;
 }
 
 export interface PenetrationOptions extends ContactOptions {
@@ -360,6 +366,8 @@ export interface OverlapOutlineOptions {
   maxPatches?: number;
   /** Most node pairs to open. Default 0: no limit. */
   maxVisits?: number;
+  /** As in ContactOptions. */
+  pairId?: number;
   into?: OverlapOutline;
 }
 

@@ -12,6 +12,7 @@ ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& 
   settings.pair_budget = given->pair_budget;
   settings.max_visits = given->max_visits;
   settings.relative_error = given->relative_error;
+  settings.pair_id = given->pair_id;
   return IST_OK;
 }
 

@@ -21,11 +21,12 @@ class BlockSearch {
         a_(*search.a),
         b_(*search.b),
         scratch_(scratch),
+        placed_(search, scratch),
         pad_a_(pad(search.b_from_a, a_)),
         pad_b_(pad(search.a_from_b, b_)),
-        room_b_(static_cast<float>(search.room * search.b_from_a.scale)),
+        room_b_(static_cast<float>(search.reach * search.b_from_a.scale)),
         scale_(static_cast<float>(search.a_from_b.scale) * (1 + kFloatError)),
-        slack_(2 * pad_b_ + 2 * pad(Similarity::identity(), a_) + search.room * 2) {
+        slack_(2 * pad_b_ + 2 * pad(Similarity::identity(), a_) + search.reach * 2) {
     for (int k = 0; k < 9; ++k)
       turn_[k] = static_cast<float>(search.a_from_b.m[k] / search.a_from_b.scale);
     // Nodes tile a surface.
@@ -121,13 +122,13 @@ class BlockSearch {
     const BoxBlock& boxes_b = b_.level[pair.level_b].boxes[pair.b];
     const PlacedBoxes& a_in_b = placed_a(pair.level_a, pair.a);
     const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
-    const OneBox all(b_in_a.all_low, b_in_a.all_high, search_.room);
+    const OneBox all(b_in_a.all_low, b_in_a.all_high, search_.reach);
     // Unused lanes meet what is large enough.
     std::uint32_t rows = meeting(boxes_a.low, boxes_a.high, all.low, all.high) &
                          ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
     for (; rows != 0; rows &= rows - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
-      const OneBox here(boxes_a.low, boxes_a.high, i, search_.room);
+      const OneBox here(boxes_a.low, boxes_a.high, i, search_.reach);
       std::uint32_t columns = meeting(b_in_a.low, b_in_a.high, here.low, here.high);
       if (columns == 0) continue;
       const OneBox there(a_in_b.low, a_in_b.high, i, room_b_);
@@ -142,7 +143,7 @@ class BlockSearch {
   void open_larger_a(const BoxPair& pair) {
     const BoxBlock& boxes = a_.level[pair.level_a].boxes[pair.a];
     const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
-    const OneBox all(b_in_a.all_low, b_in_a.all_high, search_.room);
+    const OneBox all(b_in_a.all_low, b_in_a.all_high, search_.reach);
     std::uint32_t found = meeting(boxes.low, boxes.high, all.low, all.high) &
                           ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
     for (; found != 0; found &= found - 1)
@@ -196,12 +197,12 @@ class BlockSearch {
   void open_b(const BoxPair& pair) {
     const std::uint32_t lane = pair.a % kWidth, parent = pair.a / kWidth;
     const OneBox here(a_.level[1].boxes[parent].low, a_.level[1].boxes[parent].high, lane,
-                      search_.room);
+                      search_.reach);
     const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
     const BoxBlock& boxes = b_.level[pair.level_b].boxes[pair.b];
     std::uint32_t found = meeting(b_in_a.low, b_in_a.high, here.low, here.high);
     if (found == 0) return;
-    const PlacedTriangles& block = placed_triangles(a_, pair.a, nullptr, *scratch_.triangles_a);
+    const PlacedTriangles& block = placed_.triangles(false, pair.a);
     for (; found != 0; found &= found - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(found));
       float half[3][3];
@@ -209,25 +210,24 @@ class BlockSearch {
         for (int k = 0; k < 3; ++k)
           half[side][k] =
               turn_[3 * k + side] * scale_ * 0.5f * (boxes.high[side][i] - boxes.low[side][i]);
-      if (meets_triangle(block, OneBox(b_in_a.low, b_in_a.high, i, search_.room), half))
+      if (meets_triangle(block, OneBox(b_in_a.low, b_in_a.high, i, search_.reach), half))
         push(0, pair.a, pair.level_b - 1, kWidth * pair.b + i);
     }
   }
 
   void open_a(const BoxPair& pair) {
     const PlacedBoxes& b_in_a = placed_b(1, pair.b / kWidth);
-    const OneBox there(b_in_a.low, b_in_a.high, pair.b % kWidth, search_.room);
+    const OneBox there(b_in_a.low, b_in_a.high, pair.b % kWidth, search_.reach);
     const BoxBlock& boxes = a_.level[pair.level_a].boxes[pair.a];
     std::uint32_t found = meeting(boxes.low, boxes.high, there.low, there.high) &
                           ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
     if (found == 0) return;
-    const PlacedTriangles& block =
-        placed_triangles(b_, pair.b, &search_.a_from_b, *scratch_.triangles_b);
+    const PlacedTriangles& block = placed_.triangles(true, pair.b);
     for (; found != 0; found &= found - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(found));
       float half[3][3] = {};
       for (int k = 0; k < 3; ++k) half[k][k] = 0.5f * (boxes.high[k][i] - boxes.low[k][i]);
-      if (meets_triangle(block, OneBox(boxes.low, boxes.high, i, search_.room), half))
+      if (meets_triangle(block, OneBox(boxes.low, boxes.high, i, search_.reach), half))
         push(pair.level_a - 1, kWidth * pair.a + i, 0, pair.b);
     }
   }
@@ -236,6 +236,7 @@ class BlockSearch {
   const MeshTree& a_;
   const MeshTree& b_;
   ExactScratch& scratch_;
+  PlacedPair placed_;
   float pad_a_, pad_b_, room_b_, scale_, slack_, turn_[9];
   float size_a_[kMaxLevels], size_b_[kMaxLevels];  ///< of a level's nodes
   std::uint32_t waiting_ = 0;

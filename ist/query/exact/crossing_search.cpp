@@ -22,27 +22,56 @@ class TriangleSearch {
         a_(*search.a),
         b_(*search.b),
         scratch_(scratch),
-        pad_b_(pad(search.a_from_b, b_)),
-        slack_(2 * pad_b_ + 2 * pad(Similarity::identity(), a_) + search.room * 2) {
+        placed_(search, scratch),
+        pad_b_(pad(search.a_from_b, b_)) {
+    look_ahead(search.reach);
     scratch_.pairs->count = 0;
   }
 
-  CrossingsFound run(std::uint32_t count) {
-    for (std::uint32_t n = 0; n < count && found_.complete; ++n)
+  CrossingsFound run(std::uint32_t count, KeptPairs* keep) {
+    keep_ = keep;
+    for (std::uint32_t n = 0; n < count && found_.complete; ++n) {
+      // Where too many are near, keeping them would not pay.
+      if (keep_ != nullptr && gathered_ > kMostNear * n + 512) {
+        KeptRing::give_up(*keep);
+        look_ahead(search_.near);
+        test_kept(*keep);
+      }
       meet(static_cast<std::uint32_t>(scratch_.keys[n] >> 32),
            static_cast<std::uint32_t>(scratch_.keys[n]));
+    }
+    if (keep_ != nullptr) test_kept(*keep);
+    return finish();
+  }
+
+  CrossingsFound run(const KeptPairs& kept) {
+    test_kept(kept);
+    return finish();
+  }
+
+ private:
+  static constexpr std::uint32_t kMostNear = 8;  ///< pairs of triangles, a pair of blocks
+
+  void look_ahead(float reach) {
+    reach_ = reach;
+    slack_ = 2 * pad_b_ + 2 * pad(Similarity::identity(), a_) + reach * 2;
+  }
+
+  void test_kept(const KeptPairs& kept) {
+    if (keep_ != nullptr) keep_pairs();
+    keep_ = nullptr;
+    for (std::uint32_t n = 0; n < kept.count && found_.complete; ++n) {
+      const std::uint64_t pair = scratch_.kept.pair(kept, n);
+      const auto a = static_cast<std::uint32_t>(pair >> 32), b = static_cast<std::uint32_t>(pair);
+      add_pair(a, placed_.vertices(false, a / kWidth), b, placed_.vertices(true, b / kWidth));
+    }
+  }
+
+  CrossingsFound finish() {
     if (found_.complete) test_pairs();
     // Sums go over eight at a time.
     scratch_.crossings.clear(found_.crossings, (found_.crossings + 7) / 8 * 8);
     return found_;
-  }
-
- private:
-  const PlacedTriangles& placed_a(std::uint32_t number) {
-    return placed_triangles(a_, number, nullptr, *scratch_.triangles_a);
-  }
-  const PlacedTriangles& placed_b(std::uint32_t number) {
-    return placed_triangles(b_, number, &search_.a_from_b, *scratch_.triangles_b);
   }
 
   /// Which triangles of a block reach into a slab.
@@ -74,12 +103,12 @@ class TriangleSearch {
   /// and have it reach through theirs.
   HWY_INLINE std::uint32_t crossable(const PlacedTriangles& a, std::uint32_t i,
                                      const PlacedTriangles& b, std::uint32_t lanes) const {
-    const OneBox box(a.low, a.high, i, search_.room);
+    const OneBox box(a.low, a.high, i, reach_);
     lanes &= meeting(b.low, b.high, box.low, box.high);
     if (lanes == 0) return 0;
     const F d;
     // Coordinates are floats, and points of both blocks that matter are no further apart than this.
-    const float blur = 1e-6f * (a.reach + b.reach) + search_.room, size = a.size + b.size;
+    const float blur = 1e-6f * (a.reach + b.reach) + reach_, size = a.size + b.size;
     const auto over_a = hn::Set(d, blur * a.length[i] + a.slack[i] * size);
     std::uint32_t bits = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
@@ -104,9 +133,9 @@ class TriangleSearch {
 
   /// Tests the triangles of two blocks by boxes and planes.
   void meet(std::uint32_t number_a, std::uint32_t number_b) {
-    const PlacedTriangles& a = placed_a(number_a);
-    const PlacedTriangles& b = placed_b(number_b);
-    const OneBox all(b.all_low, b.all_high, search_.room);
+    const PlacedTriangles& a = placed_.triangles(false, number_a);
+    const PlacedTriangles& b = placed_.triangles(true, number_b);
+    const OneBox all(b.all_low, b.all_high, reach_);
     std::uint32_t rows = meeting(a.low, a.high, all.low, all.high);
     const BoxBlock& box_a = a_.level[1].boxes[number_a / kWidth];
     const PlacedBoxes& box_b =
@@ -123,30 +152,33 @@ class TriangleSearch {
     const std::uint32_t in_a =
         in_slab(b, normal_a, box_a.slab_low[lane_a] - slack_, box_a.slab_high[lane_a] + slack_);
     if (in_a == 0) return;
+    const PlacedVertices& vertices_a = placed_.vertices(false, number_a);
+    const PlacedVertices& vertices_b = placed_.vertices(true, number_b);
     for (; rows != 0; rows &= rows - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
       for (std::uint32_t lanes = crossable(a, i, b, in_a); lanes != 0; lanes &= lanes - 1)
-        add_pair(kWidth * number_a + i, a, number_b, b,
-                 static_cast<std::uint32_t>(std::countr_zero(lanes)));
+        add_pair(kWidth * number_a + i, vertices_a,
+                 kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)),
+                 vertices_b);
     }
   }
 
-  void add_pair(std::uint32_t triangle_a, const PlacedTriangles& a, std::uint32_t number_b,
-                const PlacedTriangles& b, std::uint32_t j) {
+  void add_pair(std::uint32_t triangle_a, const PlacedVertices& vertices_a,
+                std::uint32_t triangle_b, const PlacedVertices& vertices_b) {
     TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t n = pairs.count;
-    const auto take = [&](int side, const MeshBlock& block, const PlacedTriangles& from,
-                          std::uint32_t lane) {
+    const auto take = [&](int side, const MeshTree& mesh, std::uint32_t triangle,
+                          const PlacedVertices& from) {
+      const MeshBlock& block = mesh.blocks[triangle / kWidth];
       for (int c = 0; c < 3; ++c) {
-        const std::uint32_t v = block.corner[c][lane];
-        for (int k = 0; k < 3; ++k) pairs.corner[side][c][k][n] = from.vertex[k][v];
+        const std::uint32_t v = block.corner[c][triangle % kWidth];
+        for (int k = 0; k < 3; ++k) pairs.corner[side][c][k][n] = from.at[k][v];
       }
+      pairs.triangle[side][n] = triangle;
     };
-    take(0, a_.blocks[triangle_a / kWidth], a, triangle_a % kWidth);
-    take(1, b_.blocks[number_b], b, j);
-    pairs.triangle[0][n] = triangle_a;
-    pairs.triangle[1][n] = kWidth * number_b + j;
-    if (++pairs.count == 8) test_pairs();
+    take(0, a_, triangle_a, vertices_a);
+    take(1, b_, triangle_b, vertices_b);
+    if (++pairs.count == 8) keep_ == nullptr ? test_pairs() : keep_pairs();
   }
 
   static HWY_INLINE Vec3 corner_of(const TrianglePairs& pairs, int side, int c, std::size_t l) {
@@ -161,7 +193,7 @@ class TriangleSearch {
     std::uint32_t positive[2][3] = {};       ///< such a height
     std::uint32_t pierced[6] = {};           ///< edge: A's three, B's three
     std::uint32_t apart = 0;                 ///< likewise by a plane
-    std::uint32_t sure = 0;                  ///< no sign is unclear, wherever in the room they lie
+    std::uint32_t sure = 0;                  ///< no sign is unclear
   };
 
   static std::uint32_t each(const std::uint32_t (&bits)[3]) { return bits[0] & bits[1] & bits[2]; }
@@ -169,8 +201,9 @@ class TriangleSearch {
     return (x & y & z) | ~(x | y | z);
   }
 
-  /// In double.
-  HWY_INLINE void find_signs(const TrianglePairs& pairs, std::uint32_t count, Signs& out) const {
+  /// In double. A sign is clear if it stays wherever points move by `move`.
+  HWY_INLINE void find_signs(const TrianglePairs& pairs, std::uint32_t count, double move,
+                             Signs& out) const {
     const D d;
     std::uint32_t certain[2][3] = {};
     std::uint32_t round_positive[3][3] = {}, round_certain[3][3] = {};  // [A's edge][B's edge]
@@ -178,7 +211,7 @@ class TriangleSearch {
       Vec3 corner[2][3];
       for (int s = 0; s < 2; ++s)
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-      const V room = hn::Set(d, double{search_.room});
+      const V room = hn::Set(d, move);
       const V filter = hn::Set(d, exact::kFilter), two = hn::Set(d, 2.0), six = hn::Set(d, 6.0);
       for (int side = 0; side < 2; ++side) {
         const Vec3(&plane)[3] = corner[1 - side];
@@ -264,7 +297,7 @@ class TriangleSearch {
     scratch_.pairs->count = 0;
     if (count == 0) return;
     Signs signs;
-    find_signs(pairs, count, signs);
+    find_signs(pairs, count, search_.room, signs);
     for (std::uint32_t left = all & ~signs.apart & ~signs.sure; left != 0; left &= left - 1) {
       const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
       find_exactly(pairs, n, signs);
@@ -282,6 +315,52 @@ class TriangleSearch {
     }
     found_.consistent &= once == twice && more == 0;
     if (twice != 0) add_crossings(pairs, signs, twice);
+  }
+
+  /// Keeps of what has been gathered what no plane along a triangle or along an edge of each keeps
+  /// as far apart as the search reaches.
+  HWY_NOINLINE void keep_pairs() {
+    const D d;
+    const TrianglePairs& pairs = *scratch_.pairs;
+    const std::uint32_t count = pairs.count;
+    scratch_.pairs->count = 0;
+    gathered_ += count;
+    std::uint32_t apart = 0;
+    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
+      Vec3 corner[2][3], edge[2][3], normal[2];
+      for (int s = 0; s < 2; ++s) {
+        for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
+        for (int c = 0; c < 3; ++c) edge[s][c] = corner[s][(c + 1) % 3] - corner[s][c];
+        normal[s] = cross(edge[s][0], edge[s][1]);
+      }
+      const V zero = hn::Zero(d), reach = hn::Set(d, double{reach_});
+      V beyond = zero;
+      // A axis and what both triangles reach along it, B's seen from a corner of A's.
+      const auto look = [&](const Vec3& axis, V low_a, V high_a, V low_b, V high_b) {
+        const V gap = hn::Max(low_b - high_a, low_a - high_b);
+        beyond = hn::Max(beyond, gap * hn::Abs(gap) - reach * reach * dot(axis, axis));
+      };
+      for (int s = 0; s < 2; ++s) {
+        V at[3];
+        for (int c = 0; c < 3; ++c) at[c] = dot(normal[s], corner[1 - s][c] - corner[s][0]);
+        look(normal[s], zero, zero, min3(at[0], at[1], at[2]), max3(at[0], at[1], at[2]));
+      }
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+          // Both ends of an edge are one along the axis.
+          const Vec3 axis = cross(edge[0][i], edge[1][j]);
+          const V other_a = dot(axis, corner[0][(i + 2) % 3] - corner[0][i]);
+          const V at_b = dot(axis, corner[1][j] - corner[0][i]);
+          const V other_b = at_b + dot(axis, corner[1][(j + 2) % 3] - corner[1][j]);
+          look(axis, hn::Min(zero, other_a), hn::Max(zero, other_a), hn::Min(at_b, other_b),
+               hn::Max(at_b, other_b));
+        }
+      apart |= mask_bits(d, beyond > zero) << l;
+    }
+    for (std::uint32_t left = ((1u << count) - 1) & ~apart; left != 0; left &= left - 1) {
+      const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
+      scratch_.kept.add(*keep_, std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n]);
+    }
   }
 
   /// Where an edge, from p to q, goes through the other triangle.
@@ -383,19 +462,26 @@ class TriangleSearch {
   const MeshTree& a_;
   const MeshTree& b_;
   ExactScratch& scratch_;
-  float pad_b_, slack_;
+  PlacedPair placed_;
+  float pad_b_, reach_, slack_;
+  KeptPairs* keep_ = nullptr;   ///< what is near is kept, and not tested yet
+  std::uint32_t gathered_ = 0;  ///< for it
   CrossingsFound found_;
 };
 
-CrossingsFound search_triangles(const CrossingSearch& search, std::uint32_t count,
+CrossingsFound search_triangles(const CrossingSearch& search, std::uint32_t count, KeptPairs* keep,
                                 ExactScratch& scratch) {
-  return TriangleSearch(search, scratch).run(count);
+  return TriangleSearch(search, scratch).run(count, keep);
 }
 
-const PlacedTriangles& place_one(const CrossingSearch& search, bool of_b, std::uint32_t number,
-                                 ExactScratch& scratch) {
-  return of_b ? placed_triangles(*search.b, number, &search.a_from_b, *scratch.triangles_b)
-              : placed_triangles(*search.a, number, nullptr, *scratch.triangles_a);
+CrossingsFound search_kept(const CrossingSearch& search, const KeptPairs& kept,
+                           ExactScratch& scratch) {
+  return TriangleSearch(search, scratch).run(kept);
+}
+
+const PlacedVertices& place_one(const CrossingSearch& search, bool of_b, std::uint32_t number,
+                                ExactScratch& scratch) {
+  return PlacedPair(search, scratch).vertices(of_b, number);
 }
 
 }  // namespace ist::HWY_NAMESPACE
@@ -405,15 +491,21 @@ HWY_AFTER_NAMESPACE();
 namespace ist {
 
 HWY_EXPORT(search_triangles);
+HWY_EXPORT(search_kept);
 HWY_EXPORT(place_one);
 
-CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t count,
+CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t count, KeptPairs* keep,
                               ExactScratch& scratch) noexcept {
-  return HWY_DYNAMIC_DISPATCH(search_triangles)(search, count, scratch);
+  return HWY_DYNAMIC_DISPATCH(search_triangles)(search, count, keep, scratch);
 }
 
-const PlacedTriangles& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,
+CrossingsFound find_kept_crossings(const CrossingSearch& search, const KeptPairs& kept,
                                    ExactScratch& scratch) noexcept {
+  return HWY_DYNAMIC_DISPATCH(search_kept)(search, kept, scratch);
+}
+
+const PlacedVertices& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,
+                                  ExactScratch& scratch) noexcept {
   return HWY_DYNAMIC_DISPATCH(place_one)(search, of_b, number, scratch);
 }
 

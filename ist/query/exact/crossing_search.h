@@ -14,11 +14,13 @@ struct CrossingSearch {
   const MeshTree* b;
   Similarity a_from_b;  ///< unit frames
   Similarity b_from_a;
-  float room = 0;                ///< A's unit frame: what is this near counts as near
+  float room = 0;                ///< A's unit frame: points may be off by this
+  float near = 0;                ///< pairs that come as near are found, ≥ room
+  float reach = 0;               ///< and those that may, for what is kept: ≥ near
   std::uint32_t max_visits = 0;  ///< pairs of nodes; 0: no limit
 };
 
-/// Pairs of blocks of both meshes whose boxes come within `room`.
+/// Pairs of blocks of both meshes whose boxes come within `reach`.
 struct BlockPairs {
   std::uint32_t count = 0;   ///< in ExactScratch::keys, in any order: A's block << 32 | B's block
   std::uint32_t visits = 0;  ///< pairs of nodes opened
@@ -38,13 +40,18 @@ struct CrossingsFound {
 BlockPairs find_block_pairs(const CrossingSearch& search, ExactScratch& scratch) noexcept;
 
 /// Of `count` pairs of blocks (ExactScratch::keys) all triangles that cross, in the order of the
-/// pairs, by exact signs where need be. The same crossings on every instruction set.
-CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t count,
+/// pairs, by exact signs where need be. The same crossings on every instruction set. `keep`, unless
+/// null, gets the pairs of triangles that may do so before B has moved by its margin.
+CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t count, KeptPairs* keep,
                               ExactScratch& scratch) noexcept;
 
-/// The vertices of a block in A's unit frame, B's rounded once after the motion. It stays until
-/// others are placed.
-const PlacedTriangles& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,
+/// The same crossings, of pairs of triangles that are kept.
+CrossingsFound find_kept_crossings(const CrossingSearch& search, const KeptPairs& kept,
                                    ExactScratch& scratch) noexcept;
+
+/// The vertices of a block in A's unit frame, B's rounded once after the motion. They stay until
+/// others are placed.
+const PlacedVertices& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,
+                                  ExactScratch& scratch) noexcept;
 
 }  // namespace ist

@@ -7,6 +7,7 @@
 
 #include "query/exact/crossing_search.h"
 #include "query/exact/mesh_queries.h"
+#include "query/exact/nearest_points.h"
 
 namespace ist {
 namespace {
@@ -29,6 +30,11 @@ Point map_vector(const Similarity& map, const Point& x) {
 void add(Point& sum, double factor, const Point& p) { sum = sum + factor * p; }
 
 }  // namespace
+
+/// What is nearer than rounding may be told apart is near.
+double ExactQuery::nearness() const noexcept {
+  return 1e-7 * (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent());
+}
 
 Point ExactQuery::place(const Side& side, std::uint32_t vertex) const noexcept {
   const Point x = side.mesh.vertex(vertex);
@@ -83,10 +89,10 @@ CrossedBlock* ExactQuery::make_crossed_block(Side& own, std::uint32_t block) noe
   made.pierced = 0;
   const MeshBlock& mesh = own.mesh.blocks[block];
   double away[kWidth];
-  const PlacedTriangles& placed = place_block(search_, own.is_b, block, scratch_);
+  const PlacedVertices& placed = place_block(search_, own.is_b, block, scratch_);
   const double origin[3] = {out_.origin.x, out_.origin.y, out_.origin.z};
   for (int k = 0; k < 3; ++k)
-    for (std::uint32_t v = 0; v < kWidth; ++v) made.vertex[k][v] = placed.vertex[k][v] - origin[k];
+    for (std::uint32_t v = 0; v < kWidth; ++v) made.vertex[k][v] = placed.at[k][v] - origin[k];
   for (std::uint32_t v = 0; v < kWidth; ++v)
     away[v] =
         (std::abs(made.vertex[0][v]) + std::abs(made.vertex[1][v])) + std::abs(made.vertex[2][v]);
@@ -367,44 +373,36 @@ void ExactQuery::add_layer(const Side& own, double area, double width) noexcept 
   layers_ += own.moved * area + 32 * (own.moved * own.moved) * width;
 }
 
-/// Whether no axis that a search goes by keeps two triangles apart: the same answer whichever
-/// search found them.
-bool ExactQuery::within_room(std::uint32_t a, std::uint32_t b) const noexcept {
-  const std::uint32_t triangles[2] = {a, b};
-  Point corner[2][3], axis[8] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  for (int s = 0; s < 2; ++s) {
-    const Side& own = sides_[s];
-    const std::uint32_t number = triangles[s] / kWidth, lane = triangles[s] % kWidth;
-    const MeshBlock& block = own.mesh.blocks[number];
-    for (int c = 0; c < 3; ++c) corner[s][c] = place(own, block.vertex[block.corner[c][lane]]);
-    const BoxBlock& box = own.mesh.level[1].boxes[number / kWidth];
-    const Point normal = {box.normal[0][number % kWidth], box.normal[1][number % kWidth],
-                          box.normal[2][number % kWidth]};
-    axis[6 + s] = own.is_b ? (1 / a_from_b_.scale) * map_vector(a_from_b_, normal) : normal;
+/// Whether two triangles that do not cross come as near: the same answer whichever search found
+/// them.
+bool ExactQuery::is_near(std::uint32_t a, std::uint32_t b, double distance) const noexcept {
+  const auto flat = [&](const Side& own, std::uint32_t triangle) {
+    const MeshBlock& block = own.mesh.blocks[triangle / kWidth];
+    const auto corner = [&](int k) {
+      return place(own, block.vertex[block.corner[k][triangle % kWidth]]);
+    };
+    return exact::FlatTriangle(corner(0), corner(1), corner(2));
+  };
+  const exact::FlatTriangle of_a = flat(sides_[0], a), of_b = flat(sides_[1], b);
+  exact::Heights over_a, over_b;
+  for (int k = 0; k < 3; ++k) {
+    over_a[k] = dot(of_a.normal, of_b.corner[k] - of_a.corner[0]);
+    over_b[k] = dot(of_b.normal, of_a.corner[k] - of_b.corner[0]);
   }
-  for (int k = 0; k < 3; ++k)
-    axis[3 + k] =
-        (1 / a_from_b_.scale) * Point{a_from_b_.m[k], a_from_b_.m[3 + k], a_from_b_.m[6 + k]};
-  for (const Point& n : axis) {
-    double low[2], high[2];
-    for (int s = 0; s < 2; ++s) {
-      const double at[3] = {dot(n, corner[s][0]), dot(n, corner[s][1]), dot(n, corner[s][2])};
-      low[s] = std::min({at[0], at[1], at[2]});
-      high[s] = std::max({at[0], at[1], at[2]});
-    }
-    const double room = search_.room * length_bound(n);
-    if (low[0] > high[1] + room || low[1] > high[0] + room) return false;
-  }
-  return true;
+  exact::NearestPair best;
+  best.squared = distance * distance;
+  take_nearest(of_a, of_b, over_a, over_b, best);
+  return best.squared < distance * distance;
 }
 
 /// Blocks that cross the other solid, or would if their surface moved by the room.
 void ExactQuery::mark_near(std::uint32_t unsure) noexcept {
+  const double distance = search_.room + nearness();
   for (std::uint32_t i = 0; i < unsure; ++i) {
     const auto a = static_cast<std::uint32_t>(scratch_.other_keys[i] >> 32),
                b = static_cast<std::uint32_t>(scratch_.other_keys[i]);
     if ((has(sides_[0].marks.crossed, a / kWidth) && has(sides_[1].marks.crossed, b / kWidth)) ||
-        !within_room(a, b))
+        !is_near(a, b, distance))
       continue;
     set(sides_[0].marks.near, a / kWidth);
     set(sides_[1].marks.near, b / kWidth);
@@ -429,19 +427,36 @@ void ExactQuery::bound_near(const Side& own) noexcept {
 }
 
 /// All triangles that cross, in the order of the meshes.
-CrossingsFound ExactQuery::search(std::uint32_t max_visits) noexcept {
+CrossingsFound ExactQuery::search(std::uint32_t max_visits, std::uint32_t pair_id) noexcept {
   const double room = 2 * (sides_[0].moved + sides_[1].moved);
+  const MeshTree &a = sides_[0].mesh, &b = sides_[1].mesh;
   search_.room = static_cast<float>(room * (1 + 1e-6));
   search_.max_visits = max_visits;
-  scratch_.forget(sides_[0].mesh.hash);
+  scratch_.forget(a.hash);
+  KeptPairs* kept = nullptr;
+  if (pair_id != 0 && max_visits == 0) {
+    kept = &scratch_.kept.of(pair_id, a, b, a_from_b_);
+    if (scratch_.kept.serves(*kept, b, a_from_b_, room))
+      return find_kept_crossings(search_, *kept, scratch_);
+    scratch_.kept.begin(*kept, a, b, room);
+    if (kept->margin == 0) kept = nullptr;
+  }
+  search_.near = static_cast<float>((room + nearness()) * (1 + 1e-6));
+  search_.reach = search_.near;
+  if (kept != nullptr) search_.reach += static_cast<float>(kept->margin * (1 + 1e-6));
   const BlockPairs pairs = find_block_pairs(search_, scratch_);
   out_.visits = pairs.visits;
-  if (!pairs.complete) return {.complete = false};
-  sort_pairs(pairs.count);
-  return find_crossings(search_, pairs.count, scratch_);
+  CrossingsFound found = {.complete = false};
+  if (pairs.complete) {
+    sort_pairs(pairs.count);
+    found = find_crossings(search_, pairs.count, kept, scratch_);
+  }
+  if (kept != nullptr && !found.complete) kept->margin = 0;
+  return found;
 }
 
-ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
+ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id,
+                             bool checked) noexcept {
   checked_ = checked;
   for (const Side& side : sides_)
     if (side.mesh.level[0].count > scratch_.most_blocks) {
@@ -449,7 +464,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, bool checked) noexcept {
       return out_;
     }
   clear_marks();
-  const CrossingsFound found = search(max_visits);
+  const CrossingsFound found = search(max_visits, pair_id);
   out_.crossings = found.crossings;
   out_.consistent = found.consistent;
   out_.complete = found.complete && found.consistent;

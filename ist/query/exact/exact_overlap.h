@@ -38,8 +38,10 @@ class ExactQuery {
         b_from_a_(b_from_a),
         scratch_(scratch) {}
 
-  /// `max_visits`: 0: no limit. `checked`: finds the gap too.
-  ExactOverlap run(std::uint32_t max_visits = 0, bool checked = false) noexcept;
+  /// `max_visits`: 0: no limit. `pair_id`: of the caller's pair, whose calls are steps of one
+  /// motion; 0: of none. `checked`: finds the gap too.
+  ExactOverlap run(std::uint32_t max_visits = 0, std::uint32_t pair_id = 0,
+                   bool checked = false) noexcept;
 
  protected:
   struct Side {
@@ -84,7 +86,7 @@ class ExactQuery {
 
  private:
   void clear_marks() noexcept;
-  CrossingsFound search(std::uint32_t max_visits) noexcept;
+  CrossingsFound search(std::uint32_t max_visits, std::uint32_t pair_id) noexcept;
   void sort_pairs(std::uint32_t count) noexcept;
   CrossedBlock* make_crossed_block(Side& side, std::uint32_t block) noexcept;
   bool add_crossing(std::uint32_t i) noexcept;
@@ -96,7 +98,8 @@ class ExactQuery {
   void find_insides(Side& side) noexcept;
   void sum_crossed_block(const Side& side, const CrossedBlock& crossed) noexcept;
   void sum_insides(const Side& side, int level, std::uint32_t i) noexcept;
-  bool within_room(std::uint32_t a, std::uint32_t b) const noexcept;
+  double nearness() const noexcept;
+  bool is_near(std::uint32_t a, std::uint32_t b, double distance) const noexcept;
   void mark_near(std::uint32_t unsure) noexcept;
   void bound_near(const Side& side) noexcept;
   void add_layer(const Side& side, double area, double width) noexcept;

@@ -8,6 +8,7 @@
 
 #include "query/base/hooked_memory.h"
 #include "query/exact/crossing.h"
+#include "query/exact/kept_pairs.h"
 
 namespace ist {
 
@@ -19,9 +20,13 @@ struct alignas(64) PlacedBoxes {
   float all_low[3], all_high[3];
 };
 
-/// The triangles of a block in A's unit frame.
+/// The vertices of a block in A's unit frame.
+struct alignas(64) PlacedVertices {
+  double at[3][kWidth];  ///< [axis] B's: rounded once after the motion
+};
+
+/// The triangles of a block in A's unit frame, in floats.
 struct alignas(64) PlacedTriangles {
-  double vertex[3][kWidth];               ///< [axis] B's: rounded once after the motion
   float low[3][kWidth], high[3][kWidth];  ///< boxes, rounded outward; unused lanes empty
   float corner[3][3][kWidth];             ///< [corner][axis]
   float normal[3][kWidth];                ///< product of two sides
@@ -249,12 +254,15 @@ struct ExactScratch {
         most_crossings(most_blocks / 16 + 128),
         boxes_a(hooked<PlacedCache<PlacedBoxes, 256>>(hooks)),
         boxes_b(hooked<PlacedCache<PlacedBoxes, 256>>(hooks)),
+        vertices_a(hooked<PlacedCache<PlacedVertices, 256>>(hooks)),
+        vertices_b(hooked<PlacedCache<PlacedVertices, 256>>(hooks)),
         triangles_a(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
         triangles_b(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
         pairs(hooked<TrianglePairs>(hooks)),
         waiting(hooked_array<BoxPair>(hooks, kMostWaiting)),
         gaps(hooked_array<GapPair>(hooks, most_blocks + kMostWaiting)),
         crossings(most_crossings, hooks),
+        kept(most_pairs(), hooks),
         keys(hooked_array<std::uint64_t>(hooks, most_pairs())),
         other_keys(hooked_array<std::uint64_t>(hooks, most_pairs())),
         flood(hooked_array<std::uint32_t>(hooks, most_blocks)),
@@ -266,6 +274,7 @@ struct ExactScratch {
         parts(hooked_array<ExactPart>(hooks, kMostParts)),
         octants(hooked_array<ExactPart>(hooks, kMostParts)),
         octant_sums(hooked_array<OctantSums>(hooks, 8 * kMostSplit)) {
+    vertices_a->forget();
     triangles_a->forget();
     for (BlockMarks* marks : {&a, &b}) {
       for (HookedArray<std::uint64_t>* bits :
@@ -286,8 +295,11 @@ struct ExactScratch {
   void forget(std::uint64_t mesh_a) noexcept {
     boxes_a->forget();
     boxes_b->forget();
+    vertices_b->forget();
     triangles_b->forget();
-    if (mesh_a != placed_a) triangles_a->forget();
+    if (mesh_a == placed_a) return;
+    vertices_a->forget();
+    triangles_a->forget();
     placed_a = mesh_a;
   }
 
@@ -303,12 +315,14 @@ struct ExactScratch {
   std::uint32_t most_crossed;    ///< blocks of a mesh that cross the other
   std::uint32_t most_crossings;  ///< pairs of triangles
   Hooked<PlacedCache<PlacedBoxes, 256>> boxes_a, boxes_b;
+  Hooked<PlacedCache<PlacedVertices, 256>> vertices_a, vertices_b;
   Hooked<PlacedCache<PlacedTriangles, 256>> triangles_a, triangles_b;
-  std::uint64_t placed_a = 0;  ///< hash of the asset that `triangles_a` are of
+  std::uint64_t placed_a = 0;  ///< hash of the asset that `vertices_a` and `triangles_a` are of
   Hooked<TrianglePairs> pairs;
   HookedArray<BoxPair> waiting;
   HookedArray<GapPair> gaps;
   Crossings crossings;
+  KeptRing kept;
   HookedArray<std::uint64_t> keys, other_keys;
   HookedArray<std::uint32_t> flood;
   // Of parts:

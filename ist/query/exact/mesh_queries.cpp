@@ -133,12 +133,10 @@ bool is_inside(const MeshOfPair& solid, const Point& p) noexcept {
     pad += std::abs(at[k]) + (solid.is_b() ? std::abs(solid.from_a->t[k]) : 0) + 1e-300;
   pad = 1e-12 * pad;
   float low[3], high[3];
-  const BoxBlock& root = mesh.level[mesh.top].boxes[0];
   int axis = 0;
   double shortest = HUGE_VAL, end = 0;
   for (int k = 0; k < 3; ++k) {
-    const double lowest = *std::min_element(root.low[k], root.low[k] + kWidth);
-    const double highest = *std::max_element(root.high[k], root.high[k] + kWidth);
+    const double lowest = mesh.low[k], highest = mesh.high[k];
     if (at[k] < lowest - pad || at[k] > highest + pad) return false;
     const double beyond = 0.25 * (highest - lowest) + 8 * pad;
     for (const double to : {lowest - beyond, highest + beyond})

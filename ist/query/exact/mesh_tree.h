@@ -30,6 +30,11 @@ struct MeshTree : MeshParts {
       level[k] = {at<BoxBlock>(asset, from.blocks), at<BoxSums>(asset, from.nodes), from.count,
                   k > 1 ? level[k - 1].first + level[k - 1].count : 0};
     }
+    const BoxBlock& root = level[top].boxes[0];
+    for (int k = 0; k < 3; ++k) {
+      low[k] = *std::min_element(root.low[k], root.low[k] + kWidth);  // unused ones are empty
+      high[k] = *std::max_element(root.high[k], root.high[k] + kWidth);
+    }
   }
 
   exact::Point vertex(std::uint32_t v) const noexcept {
@@ -40,17 +45,15 @@ struct MeshTree : MeshParts {
   /// No coordinate is larger.
   double extent() const noexcept {
     double extent = 0;
-    const BoxBlock& root = level[top].boxes[0];
     for (int k = 0; k < 3; ++k)
-      for (std::uint32_t l = 0; l < level[top - 1].count; ++l)
-        extent =
-            std::max({extent, std::abs(double{root.low[k][l]}), std::abs(double{root.high[k][l]})});
+      extent = std::max({extent, std::abs(double{low[k]}), std::abs(double{high[k]})});
     return extent;
   }
 
   std::uint64_t hash;  ///< of the asset
   int top;             ///< the level of one box block, ≥ 1
   Level level[kMaxLevels];
+  float low[3], high[3];  ///< a box around it
 };
 
 }  // namespace ist

@@ -26,16 +26,9 @@ using F = LaneTag<float>;
 
 /// What rounding may do to a box that is placed in floats.
 inline float pad(const Similarity& map, const MeshTree& tree) {
-  double extent = 0, shift = 0;
-  const BoxBlock& root = tree.level[tree.top].boxes[0];
-  for (int k = 0; k < 3; ++k) {
-    for (std::uint32_t l = 0; l < kWidth; ++l)
-      if (root.low[k][l] <= root.high[k][l])
-        extent =
-            std::max({extent, std::abs(double{root.low[k][l]}), std::abs(double{root.high[k][l]})});
-    shift = std::max(shift, std::abs(map.t[k]));
-  }
-  return static_cast<float>(1e-6 * (2 * map.scale * extent + shift));
+  double shift = 0;
+  for (const double t : map.t) shift = std::max(shift, std::abs(t));
+  return static_cast<float>(1e-6 * (2 * map.scale * tree.extent() + shift));
 }
 
 inline std::uint32_t used_lanes(const MeshTree& tree, int level, std::uint32_t i) {
@@ -115,36 +108,49 @@ const PlacedBoxes& placed_boxes(const MeshTree& tree, int level, std::uint32_t i
   return out;
 }
 
-/// A block's triangles in A's unit frame; `map` is null for A's own.
+/// A block's vertices in A's unit frame; `map` is null for A's own.
 template <class Cache>
+const PlacedVertices& placed_vertices(const MeshTree& tree, std::uint32_t number,
+                                      const Similarity* map, Cache& cache) {
+  PlacedVertices& out = cache.placed[number % std::size(cache.number)];
+  std::uint32_t& held = cache.number[number % std::size(cache.number)];
+  if (held == number) return out;
+  held = number;
+  const MeshBlock& block = tree.blocks[number];
+  for (std::uint32_t v = 0; v < kWidth; ++v) {
+    const double* x = tree.vertices + std::size_t{3} * block.vertex[v];
+    for (int k = 0; k < 3; ++k) out.at[k][v] = x[k];
+  }
+  if (map == nullptr) return out;
+  const hn::CappedTag<double, 8> d;
+  for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+    const auto x = hn::Load(d, out.at[0] + l), y = hn::Load(d, out.at[1] + l),
+               z = hn::Load(d, out.at[2] + l);
+    for (int k = 0; k < 3; ++k)
+      hn::Store(((hn::Set(d, map->m[3 * k]) * x + hn::Set(d, map->m[3 * k + 1]) * y) +
+                 hn::Set(d, map->m[3 * k + 2]) * z) +
+                    hn::Set(d, map->t[k]),
+                d, out.at[k] + l);
+  }
+  return out;
+}
+
+/// A block's triangles in A's unit frame.
+template <class Vertices, class Cache>
 const PlacedTriangles& placed_triangles(const MeshTree& tree, std::uint32_t number,
-                                        const Similarity* map, Cache& cache) {
+                                        const Similarity* map, Vertices& placed, Cache& cache) {
   PlacedTriangles& out = cache.placed[number % std::size(cache.number)];
   std::uint32_t& held = cache.number[number % std::size(cache.number)];
   if (held == number) return out;
   held = number;
   const MeshBlock& block = tree.blocks[number];
-  alignas(64) double from[3][kWidth];
-  for (std::uint32_t v = 0; v < kWidth; ++v) {
-    const double* x = tree.vertices + std::size_t{3} * block.vertex[v];
-    for (int k = 0; k < 3; ++k) from[k][v] = x[k];
-  }
+  const PlacedVertices& vertices = placed_vertices(tree, number, map, placed);
   const hn::CappedTag<double, 8> dd;
   const hn::Rebind<float, decltype(dd)> df;
   alignas(64) float at[3][kWidth];
-  for (std::size_t l = 0; l < kWidth; l += hn::Lanes(dd)) {
-    const auto x = hn::Load(dd, from[0] + l), y = hn::Load(dd, from[1] + l),
-               z = hn::Load(dd, from[2] + l);
-    for (int k = 0; k < 3; ++k) {
-      auto moved = hn::Load(dd, from[k] + l);
-      if (map != nullptr)
-        moved = ((hn::Set(dd, map->m[3 * k]) * x + hn::Set(dd, map->m[3 * k + 1]) * y) +
-                 hn::Set(dd, map->m[3 * k + 2]) * z) +
-                hn::Set(dd, map->t[k]);
-      hn::Store(moved, dd, out.vertex[k] + l);
-      hn::Store(hn::DemoteTo(df, moved), df, at[k] + l);
-    }
-  }
+  for (int k = 0; k < 3; ++k)
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(dd))
+      hn::Store(hn::DemoteTo(df, hn::Load(dd, vertices.at[k] + l)), df, at[k] + l);
   const F d;
   float reach = 0, size = 0;
   for (int k = 0; k < 3; ++k) {
@@ -223,6 +229,28 @@ HWY_INLINE std::uint32_t meeting(const float (&low)[3][kWidth], const float (&hi
   }
   return bits;
 }
+
+/// Places what a search has come to, once.
+class PlacedPair {
+ public:
+  PlacedPair(const CrossingSearch& search, ExactScratch& scratch)
+      : search_(search), scratch_(scratch) {}
+
+  const PlacedVertices& vertices(bool of_b, std::uint32_t number) {
+    return of_b ? placed_vertices(*search_.b, number, &search_.a_from_b, *scratch_.vertices_b)
+                : placed_vertices(*search_.a, number, nullptr, *scratch_.vertices_a);
+  }
+  const PlacedTriangles& triangles(bool of_b, std::uint32_t number) {
+    return of_b ? placed_triangles(*search_.b, number, &search_.a_from_b, *scratch_.vertices_b,
+                                   *scratch_.triangles_b)
+                : placed_triangles(*search_.a, number, nullptr, *scratch_.vertices_a,
+                                   *scratch_.triangles_a);
+  }
+
+ private:
+  const CrossingSearch& search_;
+  ExactScratch& scratch_;
+};
 
 struct OneBox {
   float low[3], high[3];

@@ -43,6 +43,7 @@ AT(settings.measure, 132);
 AT(settings.field, 136);
 AT(settings.pair_budget, 140);
 AT(settings.max_visits, 144);
+AT(settings.pair_id, 148);
 AT(settings.relative_error, 152);
 AT(penetration.status, 164);
 AT(penetration.volume, 168);

@@ -95,6 +95,7 @@ export function writeSettings(options) {
   integers[at + 2] = choice(options?.field, kFieldUses, 'field');
   integers[at + 3] = count(options?.pairBudget, 0, 'pairBudget');
   integers[at + 4] = count(options?.maxVisits, 0, 'maxVisits');
+  integers[at + 5] = count(options?.pairId, 0, 'pairId');
   f64()[(desk() + kSettings) / 8 + 3] = limit(options?.relativeError, 'relativeError');
 }
 

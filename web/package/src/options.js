@@ -1,7 +1,7 @@
 // Names that options may have: others are misspelt.
 
 const kLimits = ['maxVisits', 'poseA', 'into'];
-const kContact = [...kLimits, 'measure', 'field', 'relativeError', 'pairBudget'];
+const kContact = [...kLimits, 'measure', 'field', 'relativeError', 'pairBudget', 'pairId'];
 const kOfBatch = (names) => names.filter((name) => name !== 'poseA');
 const kPenetration = kContact, kPatches = [...kContact, 'maxPatches'];
 
@@ -13,7 +13,7 @@ const kNames = {
   'separation()': kLimits,
   'contactPatches()': kPatches,
   'overlap()': ['poseA'],
-  'overlapOutline()': ['poseA', 'maxPatches', 'maxVisits', 'into'],
+  'overlapOutline()': ['poseA', 'maxPatches', 'maxVisits', 'pairId', 'into'],
   'lenses()': ['poseA', 'measure', 'detailA', 'detailB', 'maxLenses', 'into'],
   'raycast()': ['longest', 'into'],
   'closestPoint()': ['into'],

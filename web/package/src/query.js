@@ -104,7 +104,7 @@ export function overlapOutline(a, b, poseB, options) {
   const [first, second] = assetsOf(a, b, 'overlapOutline()', 'mesh');
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
-  writeSettings({maxVisits: options?.maxVisits});
+  writeSettings({maxVisits: options?.maxVisits, pairId: options?.pairId});
   const most = maxPatchesOf(options), counts = (desk() + kCounts) / 4;
   let place, status, capacity, total = Math.max(1024, options?.into?.patch.length ?? 0);
   do {

@@ -1,0 +1,79 @@
+#include "query/exact/kept_pairs.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace ist {
+namespace {
+
+/// No point of B moves by more from one placement in A to the other.
+double largest_motion(const MeshTree& b, const Similarity& from, const Similarity& to) {
+  double squared = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double sum = 0;
+    for (int i = 0; i < 3; ++i) {
+      double moved = to.t[i] - from.t[i];
+      for (int k = 0; k < 3; ++k)
+        moved += (to.m[3 * i + k] - from.m[3 * i + k]) *
+                 double{(corner >> k & 1) != 0 ? b.high[k] : b.low[k]};
+      sum += moved * moved;
+    }
+    squared = std::max(squared, sum);
+  }
+  return std::sqrt(squared);
+}
+
+// Steps that a margin is made for. Its pairs grow with it, and searches become rarer.
+constexpr double kMostSteps = 3, kLeastSteps = 1.5;
+
+}  // namespace
+
+KeptRing::KeptRing(std::size_t capacity, const MemoryHooks& hooks)
+    : mask_(std::bit_floor(capacity) - 1),
+      ring_(hooked_array<std::uint64_t>(hooks, mask_ + 1)),
+      ids_(hooked_array<std::uint32_t>(hooks, kSlots)),
+      slots_(hooked_array<KeptPairs>(hooks, kSlots)) {
+  std::fill_n(ids_.get(), kSlots, 0);
+}
+
+KeptPairs& KeptRing::of(std::uint32_t id, const MeshTree& a, const MeshTree& b,
+                        const Similarity& pose) noexcept {
+  const std::uint32_t slot = id * 2654435769u >> (32 - std::countr_zero(kSlots));
+  KeptPairs& kept = slots_[slot];
+  if (ids_[slot] != id || kept.mesh[0] != a.hash || kept.mesh[1] != b.hash ||
+      kept.last.scale != pose.scale)
+    kept = {{a.hash, b.hash}, pose, HUGE_VAL, kMostSteps, pose, 0, 0, 0, 0};
+  else
+    kept.step = largest_motion(b, kept.last, pose);
+  kept.last = pose;
+  ids_[slot] = id;
+  return kept;
+}
+
+bool KeptRing::serves(const KeptPairs& kept, const MeshTree& b, const Similarity& pose,
+                      double room) const noexcept {
+  return kept.margin > 0 && written_ - kept.first <= mask_ &&
+         largest_motion(b, kept.found_at, pose) + std::max(0.0, room - kept.room) < kept.margin;
+}
+
+void KeptRing::begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept {
+  // Sides of triangles, as if they tiled a cube.
+  const double side = 0.5 * std::min(1 / std::sqrt(a.level[0].count),
+                                     kept.last.scale / std::sqrt(b.level[0].count));
+  constexpr double kLeast = 0.02, kMost = 0.3;
+  kept.margin = std::clamp(kept.steps * kept.step, kLeast * side, kMost * side);
+  if (kept.margin < kLeastSteps * kept.step) kept.margin = 0;
+  kept.steps = std::min(1.1 * kept.steps, kMostSteps);
+  kept.found_at = kept.last;
+  kept.room = room;
+  kept.first = written_;
+  kept.count = 0;
+}
+
+void KeptRing::give_up(KeptPairs& kept) noexcept {
+  kept.margin = 0;
+  kept.steps *= 0.5;
+}
+
+}  // namespace ist

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "query/base/hooked_memory.h"
+#include "query/base/relative_pose.h"
+#include "query/exact/mesh_tree.h"
+
+namespace ist {
+
+/// The pairs of triangles of two solids that may cross, or be near, while no point of B has moved
+/// by more than `margin` against A.
+struct KeptPairs {
+  std::uint64_t mesh[2];  ///< hashes of the assets
+  Similarity last;        ///< B in A at the last query
+  double step;            ///< how far it had moved since the one before
+  double steps;           ///< that the next margin is made for
+  Similarity found_at;    ///< B in A when the pairs were found
+  double margin;          ///< A's unit frame; 0: none are kept
+  double room;            ///< of the search that found them
+  std::uint64_t first;    ///< in the ring
+  std::uint32_t count;
+};
+
+/// What exact queries keep from call to call: pairs of triangles of many pairs of solids. The
+/// oldest are overwritten.
+class KeptRing {
+ public:
+  KeptRing(std::size_t capacity, const MemoryHooks& hooks);
+
+  /// What is kept of the caller's pair `id`, for a query at `pose`.
+  KeptPairs& of(std::uint32_t id, const MeshTree& a, const MeshTree& b,
+                const Similarity& pose) noexcept;
+  /// Whether its pairs are all that a search by `room` can find at `pose`.
+  bool serves(const KeptPairs& kept, const MeshTree& b, const Similarity& pose,
+              double room) const noexcept;
+  /// Starts anew, for a search that adds pairs in their order and looks ahead by kept.margin, which
+  /// is 0 where that would not pay.
+  void begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept;
+  /// There are too many: none are kept, and the next margin will be less.
+  static void give_up(KeptPairs& kept) noexcept;
+  void add(KeptPairs& kept, std::uint64_t pair) noexcept {
+    ring_[written_++ & mask_] = pair;
+    ++kept.count;
+  }
+  std::uint64_t pair(const KeptPairs& kept, std::uint32_t i) const noexcept {
+    return ring_[(kept.first + i) & mask_];
+  }
+
+ private:
+  static constexpr std::uint32_t kSlots = 1024;
+
+  std::uint64_t mask_, written_ = 0;
+  HookedArray<std::uint64_t> ring_;
+  HookedArray<std::uint32_t> ids_;  ///< of the slots; 0: free
+  HookedArray<KeptPairs> slots_;
+};
+
+}  // namespace ist
