@@ -185,8 +185,8 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   if (settings.measure == IST_EXACT && (first == nullptr || first->measure != IST_EXACT))
     settings.measure = IST_MATCHED;
   // Steps of this pair in this data are those of one motion.
-  settings.pair_id =
-      static_cast<uint32_t>(reinterpret_cast<uintptr_t>(d) >> 4) * 31 + g1 * m->ngeom + g2 + 1;
+  settings.pair_id = static_cast<uint32_t>((reinterpret_cast<uintptr_t>(d) >> 4) * 31 +
+                                           static_cast<uintptr_t>(g1 * m->ngeom + g2 + 1));
   ist_contact_patches_t patches = {};
   patches.size = sizeof patches;
   patches.patch_size = sizeof memory.patches[0];

@@ -31,8 +31,8 @@ class TriangleSearch {
   CrossingsFound run(std::uint32_t count, KeptPairs* keep) {
     keep_ = keep;
     for (std::uint32_t n = 0; n < count && found_.complete; ++n) {
-      // Where too many are near, keeping them would not pay.
-      if (keep_ != nullptr && gathered_ > kMostNear * n + 512) {
+      // Where many more are near than cross, keeping them would not pay.
+      if (keep_ != nullptr && gathered_ > 2 * n + 3 * keep->crossings + 512) {
         KeptRing::give_up(*keep);
         look_ahead(search_.near);
         test_kept(*keep);
@@ -50,8 +50,6 @@ class TriangleSearch {
   }
 
  private:
-  static constexpr std::uint32_t kMostNear = 8;  ///< pairs of triangles, a pair of blocks
-
   void look_ahead(float reach) {
     reach_ = reach;
     slack_ = 2 * pad_b_ + 2 * pad(Similarity::identity(), a_) + reach * 2;

@@ -434,24 +434,30 @@ CrossingsFound ExactQuery::search(std::uint32_t max_visits, std::uint32_t pair_i
   search_.max_visits = max_visits;
   scratch_.forget(a.hash);
   KeptPairs* kept = nullptr;
+  CrossingsFound found = {.complete = false};
   if (pair_id != 0 && max_visits == 0) {
     kept = &scratch_.kept.of(pair_id, a, b, a_from_b_);
-    if (scratch_.kept.serves(*kept, b, a_from_b_, room))
-      return find_kept_crossings(search_, *kept, scratch_);
+    if (scratch_.kept.serves(*kept, b, a_from_b_, room)) {
+      found = find_kept_crossings(search_, *kept, scratch_);
+      kept->crossings = found.crossings;
+      return found;
+    }
     scratch_.kept.begin(*kept, a, b, room);
-    if (kept->margin == 0) kept = nullptr;
   }
+  const bool keeps = kept != nullptr && kept->margin > 0;
   search_.near = static_cast<float>((room + nearness()) * (1 + 1e-6));
   search_.reach = search_.near;
-  if (kept != nullptr) search_.reach += static_cast<float>(kept->margin * (1 + 1e-6));
+  if (keeps) search_.reach += static_cast<float>(kept->margin * (1 + 1e-6));
   const BlockPairs pairs = find_block_pairs(search_, scratch_);
   out_.visits = pairs.visits;
-  CrossingsFound found = {.complete = false};
   if (pairs.complete) {
     sort_pairs(pairs.count);
-    found = find_crossings(search_, pairs.count, kept, scratch_);
+    found = find_crossings(search_, pairs.count, keeps ? kept : nullptr, scratch_);
   }
-  if (kept != nullptr && !found.complete) kept->margin = 0;
+  if (kept != nullptr) {
+    kept->crossings = found.crossings;
+    if (!found.complete) kept->margin = 0;
+  }
   return found;
 }
 

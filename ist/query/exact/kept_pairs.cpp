@@ -43,7 +43,7 @@ KeptPairs& KeptRing::of(std::uint32_t id, const MeshTree& a, const MeshTree& b,
   KeptPairs& kept = slots_[slot];
   if (ids_[slot] != id || kept.mesh[0] != a.hash || kept.mesh[1] != b.hash ||
       kept.last.scale != pose.scale)
-    kept = {{a.hash, b.hash}, pose, HUGE_VAL, kMostSteps, pose, 0, 0, 0, 0};
+    kept = {{a.hash, b.hash}, pose, HUGE_VAL, 0, kMostSteps, pose, 0, 0, 0, 0};
   else
     kept.step = largest_motion(b, kept.last, pose);
   kept.last = pose;
@@ -61,8 +61,8 @@ void KeptRing::begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, doub
   // Sides of triangles, as if they tiled a cube.
   const double side = 0.5 * std::min(1 / std::sqrt(a.level[0].count),
                                      kept.last.scale / std::sqrt(b.level[0].count));
-  constexpr double kLeast = 0.02, kMost = 0.3;
-  kept.margin = std::clamp(kept.steps * kept.step, kLeast * side, kMost * side);
+  constexpr double kLeast = 0.007, kMost = 0.3;
+  kept.margin = std::clamp(kept.steps * kept.step, kLeast * kept.steps * side, kMost * side);
   if (kept.margin < kLeastSteps * kept.step) kept.margin = 0;
   kept.steps = std::min(1.1 * kept.steps, kMostSteps);
   kept.found_at = kept.last;

@@ -12,14 +12,15 @@ namespace ist {
 /// The pairs of triangles of two solids that may cross, or be near, while no point of B has moved
 /// by more than `margin` against A.
 struct KeptPairs {
-  std::uint64_t mesh[2];  ///< hashes of the assets
-  Similarity last;        ///< B in A at the last query
-  double step;            ///< how far it had moved since the one before
-  double steps;           ///< that the next margin is made for
-  Similarity found_at;    ///< B in A when the pairs were found
-  double margin;          ///< A's unit frame; 0: none are kept
-  double room;            ///< of the search that found them
-  std::uint64_t first;    ///< in the ring
+  std::uint64_t mesh[2];    ///< hashes of the assets
+  Similarity last;          ///< B in A at the last query
+  double step;              ///< how far it had moved since the one before
+  std::uint32_t crossings;  ///< that the last query found
+  double steps;             ///< that the next margin is made for
+  Similarity found_at;      ///< B in A when the pairs were found
+  double margin;            ///< A's unit frame; 0: none are kept
+  double room;              ///< of the search that found them
+  std::uint64_t first;      ///< in the ring
   std::uint32_t count;
 };
 
