@@ -469,6 +469,21 @@ def test_exact_is_the_true_volume(thread):
         assert np.array_equal(getattr(one, name), getattr(many, name)), name
 
 
+def test_exact_queries_of_one_pair_are_steps_of_a_motion(thread):
+    bolt, nut = thread
+    poses = np.tile([1.0, 0, 0, 0, 0, 0, 8.5], (60, 1))
+    poses[:, 6] += np.linspace(0, 0.01, 60)
+    found = ist.penetration(bolt, nut, poses, measure="exact", threads=1)
+    kept = ist.penetration(bolt, nut, poses, measure="exact", threads=1, pair_id=1)
+    for name in ("volume", "volume_min", "volume_max", "force", "torque", "centroid"):
+        assert np.array_equal(getattr(found, name), getattr(kept, name)), name
+    assert (kept.node_visits == 0).sum() > 30 and (found.node_visits > 0).all()
+    patches = ist.contact_patches(bolt, nut, poses[0], measure="exact", pair_id=2)
+    assert patches.penetration.volume == found.volume[0]
+    outline = ist.overlap_outline(bolt, nut, poses[0], pair_id=2)
+    assert outline.contact.penetration.volume == found.volume[0]
+
+
 def test_exact_gradients_are_differences(gear, knot, random_poses):
     poses, poses_a = random_poses(12, 1.2), random_poses(12, 0.4)
     scales, scales_a = np.full(12, 0.8), np.full(12, 1.2)

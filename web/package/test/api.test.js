@@ -124,6 +124,10 @@ test('exact is the true volume of two meshes, and refused where there is none', 
   assert.ok(Math.abs(found.volume / truth - 1) < 1e-11, `${found.volume}`);
   assert.ok(found.volumeMin - 1e-13 <= truth && truth <= found.volumeMax + 1e-13);
   assert.ok(Math.abs(found.force[2] + 71.734) < 1e-3);
+  // Steps of one motion, here of none: the third opens no node.
+  const steps = [1, 2, 3].map(() => ist.penetration(a, b, pose, {...exact, pairId: 5}));
+  assert.deepEqual({...steps[2], nodeVisits: found.nodeVisits}, found);
+  assert.equal(steps[2].nodeVisits, 0);
   const floor = ist.Field.halfSpace([0, 0, 1]);
   assert.match(
       sentence(() => ist.penetration(floor, b, pose, exact)), /lacks data that the query needs/);
