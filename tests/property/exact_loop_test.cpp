@@ -130,6 +130,28 @@ TEST_F(ExactLoop, AnyUseOfNumbersGivesTheSameBits) {
     }
 }
 
+// A list that the workspace has no room for is given up. With less room yet nothing is finished.
+TEST_F(ExactLoop, RoomChangesNoBit) {
+  const Asset ball = testing::surface(testing::icosphere_mesh(4));
+  for (std::size_t capacity = 4000; capacity < 40000; capacity += capacity / 8) {
+    Workspace small(capacity);
+    for (int i = 0; i < 12; ++i) {
+      const PlacedTree a{ball.view(), {}, 1},
+          b{ball.view(), {{1, 0, 0, 0}, {0, 0.002 * i, 0.1}}, 1};
+      PenetrationSettings settings;
+      settings.measure = Measure::exact;
+      testing::AnswerBits bits[2];
+      for (const std::uint32_t id : {0u, 1u}) {
+        settings.pair_id = id;
+        Penetration p = penetration(a, b, settings, small);
+        p.node_visits = 0;
+        bits[id].add(p);
+      }
+      EXPECT_EQ(bits[0].value(), bits[1].value()) << capacity << ' ' << i;
+    }
+  }
+}
+
 TEST_F(ExactLoop, UnderAVisitLimitNothingIsKept) {
   PenetrationSettings settings;
   settings.measure = Measure::exact;

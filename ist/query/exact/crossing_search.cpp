@@ -31,8 +31,10 @@ class TriangleSearch {
   CrossingsFound run(std::uint32_t count, KeptPairs* keep) {
     keep_ = keep;
     for (std::uint32_t n = 0; n < count && found_.complete; ++n) {
-      // Where many more are near than cross, keeping them would not pay.
-      if (keep_ != nullptr && gathered_ > 2 * n + 3 * keep->crossings + 512) {
+      // Where many more are near than cross, keeping them would not pay. Two blocks add at most
+      // 256.
+      if (keep_ != nullptr && (gathered_ > 2 * n + 3 * keep->crossings + 512 ||
+                               gathered_ + 264 > scratch_.kept.most())) {
         KeptRing::give_up(*keep);
         look_ahead(search_.near);
         test_kept(*keep);

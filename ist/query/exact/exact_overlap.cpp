@@ -31,7 +31,7 @@ void add(Point& sum, double factor, const Point& p) { sum = sum + factor * p; }
 
 }  // namespace
 
-/// What is nearer than rounding may be told apart is near.
+/// Triangles that are so near count as near, whichever search found them: far more than rounding.
 double ExactQuery::nearness() const noexcept {
   return 1e-7 * (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent());
 }

@@ -39,6 +39,7 @@ class KeptRing {
   /// Starts anew, for a search that adds pairs in their order and looks ahead by kept.margin, which
   /// is 0 where that would not pay.
   void begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept;
+  std::uint64_t most() const noexcept { return mask_ + 1; }  ///< that one list may have
   /// There are too many: none are kept, and the next margin will be less.
   static void give_up(KeptPairs& kept) noexcept;
   void add(KeptPairs& kept, std::uint64_t pair) noexcept {
