@@ -31,8 +31,8 @@ class DetailSums {
         batch_(batch),
         pair_(pair),
         m_(memory),
-        a_(batch.assets[batch.pairs.asset_a[pair]].details),
-        b_(batch.assets[batch.pairs.asset_b[pair]].details) {}
+        a_(solid_of(batch, batch.pairs.a, pair).details),
+        b_(solid_of(batch, batch.pairs.b, pair).details) {}
 
   /// False if the pair is one for the finest levels' lenses alone.
   IST_HD bool run() {
@@ -153,7 +153,7 @@ class DetailSums {
     if (team_.lane() == 0) {
       totals.spheres = m_.spheres;
       totals.visits = m_.visits;
-      write_answer(batch_.answers, pair_, m_.pair.place, totals);
+      write_answer(batch_.answers, pair_, world_sums(m_.pair.place, totals), totals);
     }
     team_.sync();
   }

@@ -7,10 +7,10 @@
 #include <span>
 #include <variant>
 
-#include <ist/error.h>
 #include <ist/field.h>
 
 #include "cuda/query/field_ref.h"
+#include "cuda/query/pair_place.h"
 #include "query/asset/shared_constants.h"
 
 // Host code only: fields in plain numbers. What is out of range is `unusable`, as the shapes of
@@ -43,12 +43,18 @@ inline std::span<const std::byte> pointed_to(const Field& field) {
   return {};
 }
 
-/// The field, `at` being where who works on it finds what it points to.
-///
-/// Throws Error for a FunctionField.
+inline AssetFrame frame_of(const AssetHeader& header) {
+  return {{header.centre[0], header.centre[1], header.centre[2]}, std::ldexp(1.0, header.exponent)};
+}
+inline AssetFrame frame_of(const Field& field) {
+  const auto* const mesh = std::get_if<MeshField>(&field);
+  return mesh != nullptr && mesh->tree.has_field() ? frame_of(mesh->tree.header())
+                                                   : AssetFrame{{0, 0, 0}, 1};
+}
+
+/// A field that is no FunctionField, `at` being where who works on it finds what it points to.
 inline FieldRef field_ref(const Field& field, const std::byte* at) {
   FieldRef ref = {};
-  ref.frame.unit = 1;
   const auto kind = [](bool sound, FieldKind is) { return sound ? is : FieldKind::unusable; };
   const auto* const floats = reinterpret_cast<const float*>(at);
   if (const auto* const f = std::get_if<HalfSpaceField>(&field)) {
@@ -93,15 +99,7 @@ inline FieldRef field_ref(const Field& field, const std::byte* at) {
                 f->error};
   } else if (const auto* const f = std::get_if<MeshField>(&field)) {
     ref.kind = kind(f->tree.has_field(), FieldKind::mesh);
-    if (ref.kind == FieldKind::unusable) return ref;
-    const AssetHeader& header = f->tree.header();
-    ref.frame = {{header.centre[0], header.centre[1], header.centre[2]},
-                 std::ldexp(1.0, header.exponent)};
-    ref.mesh = SurfaceRef::of(header, at);
-  } else {
-    throw Error(
-        "GPU: a FunctionField is not supported: sample it into a DistanceGridField, or bake its "
-        "solid for a MeshField");
+    if (ref.kind == FieldKind::mesh) ref.mesh = SurfaceRef::of(f->tree.header(), at);
   }
   return ref;
 }

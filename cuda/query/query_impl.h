@@ -14,11 +14,13 @@
 
 namespace ist {
 
-struct GpuAssets::Impl {
+struct GpuSolids::Impl {
   int device = 0;
   gpu::DeviceBytes memory;
-  const gpu::AssetRef* refs = nullptr;
+  const gpu::SolidRef* refs = nullptr;
   std::size_t size = 0;
+  bool has_fields = false;
+  bool has_group[gpu::kFieldGroups] = {};
   bool has_details = false;     ///< some asset has coarser levels
   std::uint32_t most_bins = 0;  ///< of a tree's contacts
 };
@@ -40,13 +42,4 @@ struct GpuWorkspace::Impl {
   gpu::TriangleRoom triangle_room{};
 };
 
-namespace gpu {
-
-/// Throws where a batch does not fit the workspace, or stands on another device than its assets.
-void check_batch(const GpuPairs& pairs, const GpuWorkspace::Impl& room, int device);
-
-/// Throws for Measure::exact, which batches do not know.
-void check_measure(Measure measure);
-
-}  // namespace gpu
 }  // namespace ist

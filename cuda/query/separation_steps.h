@@ -90,15 +90,16 @@ IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
 /// Which list pair i goes to: 0 float, 1 double; −1: it is answered. One thread a pair.
 IST_HD inline int sift_separation(const SeparationArrays& batch, std::uint32_t i) {
   PairPlace place;
-  if (!place_pair(batch.pairs, i, place)) {
-    const double none = nothing(QueryStatus::invalid_input);
+  const QueryStatus placed = place_trees(batch.pairs, i, place);
+  if (placed != QueryStatus::ok) {
+    const double none = nothing(placed);
     const double distance[3] = {none, none, none};
     const GapWitness witness = {{none, none, none}, {none, none, none}, {none, none, none}};
-    write_separation(batch.answers, i, QueryStatus::invalid_input, distance, witness, 0, 0);
+    write_separation(batch.answers, i, placed, distance, witness, 0, 0);
     return -1;
   }
-  const AssetRef& a = batch.pairs.assets[batch.pairs.pairs.asset_a[i]];
-  const AssetRef& b = batch.pairs.assets[batch.pairs.pairs.asset_b[i]];
+  const SolidRef& a = solid_of(batch.pairs, batch.pairs.pairs.a, i);
+  const SolidRef& b = solid_of(batch.pairs, batch.pairs.pairs.b, i);
   const TreeRef& tree_a = a.tree[static_cast<int>(Measure::inner)];
   const TreeRef& tree_b = b.tree[static_cast<int>(Measure::inner)];
   // As precision_for_gap() (query/base/precision.h).
@@ -114,9 +115,10 @@ IST_HD void load_separation(const Team& team, const SeparationArrays& batch, std
                             GapMemory<Real>& memory) {
   if (team.lane() == 0) place_pair(batch.pairs, i, memory.place);
   load_trees(team, batch.pairs, i, memory);
-  const std::uint32_t asset[2] = {batch.pairs.pairs.asset_a[i], batch.pairs.pairs.asset_b[i]};
-  if (team.lane() == 0)
-    for (int side = 0; side < 2; ++side) memory.cover[side] = batch.pairs.assets[asset[side]].cover;
+  if (team.lane() == 0) {
+    memory.cover[0] = solid_of(batch.pairs, batch.pairs.pairs.a, i).cover;
+    memory.cover[1] = solid_of(batch.pairs, batch.pairs.pairs.b, i).cover;
+  }
   team.sync();
 }
 

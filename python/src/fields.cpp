@@ -75,13 +75,6 @@ TreeView tree_of(const py::handle& object, const char* name) {
   throw type_error(std::string(name) + ": a Field; wanted an Asset");
 }
 
-Field field_of(const py::handle& object, const char* name) {
-  const Solid solid = solid_of(object, name);
-  if (const Field* const field = std::get_if<Field>(&solid)) return *field;
-  throw type_error(std::string(name) +
-                   ": an Asset; wanted a Field, e.g. MeshField(asset), its surface");
-}
-
 void add_fields(py::module_& module) {
   py::class_<OwnedField>(
       module, "Field",
