@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "emulated_device.h"
+#include "query/base/members.h"
 #include "support/host_batch.h"
 #include "support/host_patches.h"
 #include "support/host_separations.h"
@@ -57,16 +58,15 @@ void put(Number* column, std::size_t i, const Value& value) {
     std::memcpy(column + i * (sizeof value / sizeof *column), &value, sizeof value);
 }
 
-void write(const std::vector<Penetration>& found, const GpuPenetrations& to) {
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    put(to.volume, i, found[i].volume);
-    put(to.centroid, i, found[i].centroid);
-    put(to.translation_gradient, i, found[i].translation_gradient);
-    put(to.rotation_gradient, i, found[i].rotation_gradient);
-    put(to.status, i, found[i].status);
-    put(to.node_visits, i, found[i].node_visits);
-    put(to.sphere_pairs, i, found[i].sphere_pairs);
-  }
+/// Row i of the columns that an answer has members for.
+template <class Answer, class Columns>
+void write_row(const Answer& answer, const Columns& to, std::size_t i) {
+  for_each_member([i](const auto& value, auto* column) { put(column, i, value); }, answer, to);
+}
+
+template <class Answer, class Columns>
+void write(const std::vector<Answer>& found, const Columns& to) {
+  for (std::size_t i = 0; i < found.size(); ++i) write_row(found[i], to, i);
 }
 
 }  // namespace
@@ -134,19 +134,7 @@ void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint3
       [max_visits](const auto& there, const auto& rows) {
         return testing::HostSeparations(there).run(rows, 0, max_visits);
       },
-      [to](const std::vector<Separation>& found) {
-        for (std::size_t i = 0; i < found.size(); ++i) {
-          put(to.distance, i, found[i].distance);
-          put(to.distance_min, i, found[i].distance_min);
-          put(to.distance_max, i, found[i].distance_max);
-          put(to.point_a, i, found[i].point_a);
-          put(to.point_b, i, found[i].point_b);
-          put(to.normal, i, found[i].normal);
-          put(to.status, i, found[i].status);
-          put(to.node_visits, i, found[i].node_visits);
-          put(to.sphere_pairs, i, found[i].sphere_pairs);
-        }
-      });
+      [to](const auto& found) { write(found, to); });
 }
 
 void contact_patches_batch(const GpuSolids& solids, const GpuPairs& pairs, Measure measure,
@@ -162,18 +150,8 @@ void contact_patches_batch(const GpuSolids& solids, const GpuPairs& pairs, Measu
         for (std::size_t i = 0; i < found.size(); ++i) {
           wholes.push_back(found[i].whole);
           put(to.count, i, static_cast<std::uint32_t>(found[i].patches.size()));
-          for (std::size_t k = 0; k < found[i].patches.size(); ++k) {
-            const ContactPatch& patch = found[i].patches[k];
-            const std::size_t at = i * to.most + k;
-            put(to.id, at, patch.id);
-            put(to.centroid, at, patch.centroid);
-            put(to.normal, at, patch.normal);
-            put(to.area, at, patch.area);
-            put(to.depth, at, patch.depth);
-            put(to.volume, at, patch.volume);
-            put(to.force, at, patch.force);
-            put(to.torque, at, patch.torque);
-          }
+          for (std::size_t k = 0; k < found[i].patches.size(); ++k)
+            write_row(found[i].patches[k], to, i * to.most + k);
         }
         write(wholes, whole);
       });
