@@ -53,10 +53,11 @@ struct MixedScene {
     RandomPairs random(15);
     pairs = random.pairs(count);
     for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t turn = i / (solids.size() + 1);
       pairs[i].a = static_cast<std::uint32_t>(i % (solids.size() + 1));
       pairs[i].scale_b *= random.uniform(0.1, 0.5);
-      if (i % 50 == 7) pairs[i].b = pairs[i].a;
-      if (i % 3 == 0) {
+      if (turn % 10 == 9) pairs[i].b = pairs[i].a;
+      if (turn % 3 == 0) {
         std::swap(pairs[i].a, pairs[i].b);
         std::swap(pairs[i].pose_a, pairs[i].pose_b);
         std::swap(pairs[i].scale_a, pairs[i].scale_b);
