@@ -7,6 +7,7 @@
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/separation_arrays.h"
 #include "numerics/host_device.h"
+#include "query/asset/shared_constants.h"
 
 // A batch of separations, step by step, as batch_steps.h has penetrations.
 
@@ -16,8 +17,6 @@ namespace ist::gpu {
 /// count 1, pairs above them more.
 constexpr std::uint32_t kGapsAlone = 160;
 constexpr std::uint32_t kGapTaskWeight = 16;
-/// From this ratio of sizes on all is in double.
-constexpr double kFloatRatio = 64;
 
 /// [u] The axis between the nearest spheres, world; nothing where spheres overlap.
 struct GapWitness {
@@ -104,9 +103,9 @@ IST_HD inline int sift_separation(const SeparationArrays& batch, std::uint32_t i
   const TreeRef& tree_b = b.tree[static_cast<int>(Measure::inner)];
   // As precision_for_gap() (query/base/precision.h).
   const double ra = tree_a.root[3], rb = tree_b.root[3] * place.a_from_b.scale;
-  const bool alike = rb <= kFloatRatio * ra && ra <= kFloatRatio * rb;
+  const bool alike = rb <= kSingleRatio * ra && ra <= kSingleRatio * rb;
   const double length = span_of(tree_a, a.cover, tree_b, b.cover, place.a_from_b);
-  return alike && length <= kFloatRatio * (ra + rb) ? 0 : 1;
+  return alike && length <= kSingleRatio * (ra + rb) ? 0 : 1;
 }
 
 /// Readies the memory for pair i.
