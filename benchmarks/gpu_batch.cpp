@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <ist/gpu_fields.h>
+#include <ist/gpu_query.h>
 
 #include "cuda/check.h"
 #include "gpu_batch_on_cpu.h"
@@ -67,31 +67,23 @@ class Batches {
 
   /// [ms], the median of ten; keeps the last answers.
   double median_ms(const Scene& scene, std::size_t count) {
-    const bool in_field = scene.field != nullptr;
-    std::vector<TreeView> views = {scene.b->view()};
-    if (!in_field) views.insert(views.begin(), scene.a->view());
-    const GpuAssets assets(views);
-    const GpuFields fields({scene.field, in_field ? 1u : 0u});
+    const GpuSolid a = scene.field != nullptr ? GpuSolid(*scene.field) : scene.a->view();
+    const GpuSolids solids(std::vector<GpuSolid>{a, scene.b->view()});
     const DeviceBatch batch(drawn(scene.poses, count));
     const double ms = median_ms([&] {
-      if (in_field)
-        penetration_batch(assets, fields, batch.pairs(), Measure::matched, workspace(count),
-                          batch.answers(), stream_.get());
-      else
-        penetration_batch(assets, batch.pairs(), {Measure::matched, scene.pair_budget},
-                          workspace(count), batch.answers(), stream_.get());
+      penetration_batch(solids, batch.pairs(), {Measure::matched, scene.pair_budget},
+                        workspace(count), batch.answers(), stream_.get());
     });
     answers_ = batch.get();
     return ms;
   }
   /// Likewise.
   double median_separation_ms(const Scene& scene, std::size_t count) {
-    const TreeView views[2] = {scene.a->view(), scene.b->view()};
-    const GpuAssets assets(views);
+    const GpuSolids solids(std::vector<GpuSolid>{scene.a->view(), scene.b->view()});
     const DeviceBatch batch(drawn(scene.poses, count));
     const DeviceSeparations answers(count);
     const double ms = median_ms([&] {
-      separation_batch(assets, batch.pairs(), 0, workspace(count), answers.answers(),
+      separation_batch(solids, batch.pairs(), 0, workspace(count), answers.answers(),
                        stream_.get());
     });
     separations_ = answers.get();
@@ -100,12 +92,11 @@ class Batches {
 
   /// Likewise.
   double median_patches_ms(const Scene& scene, std::size_t count, std::uint32_t most) {
-    const TreeView views[2] = {scene.a->view(), scene.b->view()};
-    const GpuAssets assets(views);
+    const GpuSolids solids(std::vector<GpuSolid>{scene.a->view(), scene.b->view()});
     const DeviceBatch batch(drawn(scene.poses, count));
     const DevicePatches patches(count, most);
     const double ms = median_ms([&] {
-      contact_patches_batch(assets, batch.pairs(), Measure::matched, workspace(count),
+      contact_patches_batch(solids, batch.pairs(), Measure::matched, workspace(count),
                             batch.answers(), patches.patches(), stream_.get());
     });
     patched_ = patches.get(batch.get());

@@ -51,7 +51,6 @@ inline std::vector<BatchPair> nut_poses(std::size_t count) {
     const double turn = uniform(0, 1);
     const double half = std::numbers::pi * turn;
     BatchPair pair;
-    pair.b = 1;
     pair.pose_b = {
         {std::cos(half), 0, 0, std::sin(half)},
         {uniform(-0.04, 0.04), uniform(-0.04, 0.04), 8 + 2 * turn + uniform(-0.08, 0.08)}};
@@ -97,7 +96,6 @@ inline std::vector<BatchPair> poses_in_ground(const Asset& body, double least, d
     }
     if (!(square > 0.01 && square < 1)) continue;
     for (double& q : pair.pose_b.q) q /= std::sqrt(square);
-    pair.b = 0;
     double bottom = 1e300, top = -1e300;
     for (const testing::WorldSphere& ball :
          testing::world_spheres({body.view(), pair.pose_b, 1}, Measure::matched)) {
@@ -132,7 +130,6 @@ inline std::vector<BatchPair> poses_of_copies(const Asset& body, double most) {
   std::vector<BatchPair> out;
   for (int i = 0; i < 400; ++i) {
     BatchPair pair;
-    pair.b = 1;
     for (double& t : pair.pose_b.t)
       t = most * std::cbrt(body.view().volume()) *
           (static_cast<double>(random() >> 11) * 0x1p-52 - 1);
@@ -146,7 +143,6 @@ inline std::vector<BatchPair> oracle_poses(const std::string& pose_class) {
   for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
     if (row.pose_class != pose_class) continue;
     BatchPair pair;
-    pair.b = 1;
     pair.pose_b = row.pose;
     pair.scale_b = row.scale_b;
     out.push_back(pair);
@@ -159,7 +155,10 @@ inline std::vector<BatchPair> drawn(const std::vector<BatchPair>& poses, std::si
   std::mt19937_64 random(1);
   std::vector<BatchPair> out;
   out.reserve(count);
-  for (std::size_t k = 0; k < count; ++k) out.push_back(poses[random() % poses.size()]);
+  for (std::size_t k = 0; k < count; ++k) {
+    out.push_back(poses[random() % poses.size()]);
+    out.back().b = 1;
+  }
   return out;
 }
 

@@ -24,7 +24,7 @@ def measure(folder):
     elephant, dino = (ist.Asset.load(folder / f"{name}.ist") for name in ("elephant", "dino"))
     with open(folder / "poses_eledino.csv") as file:
         rows = [row for row in csv.DictReader(file)]
-    assets = ist.gpu.Assets([elephant, dino])
+    assets = ist.gpu.Solids([elephant, dino])
     for kind in ("pen", "deep", "contain", "sep"):
         columns = "qw qx qy qz tx ty tz scale_b".split()
         table = np.array([[float(row[c]) for c in columns] for row in rows if row["class"] == kind])

@@ -110,7 +110,6 @@ IST_HD inline void after_grid_pass(const BandedArrays& a, Step next) {
 }
 
 IST_HD inline void after_fill(BandedState& s) {
-  if (s.use.pairs > s.most_pairs) s.most_pairs = s.use.pairs;
   s.use.pairs = 0;
   s.step = s.after_grid;
 }
@@ -127,7 +126,6 @@ IST_HD inline void to_selection(const BandedArrays& a) {
   BandedState& s = *a.state;
   s.winners = s.accepted = 0;
   s.volume = 0;
-  if (s.active > s.most_active) s.most_active = s.active;
   if (s.active == 0) {
     finish_round(a, 0);
     return;

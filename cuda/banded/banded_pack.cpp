@@ -72,11 +72,6 @@ class Watch {
 
 BandedCost cost_of(const BandedState& state, std::uint32_t launches) {
   BandedCost cost{state.worked, state.levels, state.steps, launches};
-  cost.cells = state.slots;
-  cost.candidates = state.most_active;
-  cost.grid_blocks = state.use.cell_blocks;
-  cost.grid_pairs = state.most_pairs;
-  cost.grid_words = state.use.words;
   for (int i = 0; i < static_cast<int>(Step::finished); ++i) {
     const double seconds = static_cast<double>(state.time[i]) * 1e-9;
     switch (static_cast<Step>(i)) {

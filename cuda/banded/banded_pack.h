@@ -15,9 +15,6 @@ struct BandedCost {
   std::uint32_t levels = 0;    ///< dependent steps of work on cells
   std::uint32_t steps = 0;     ///< all dependent steps
   std::uint32_t launches = 0;  ///< 1 + how often an array was too small
-  /// Largest use of the arrays: cells, candidates, words, blocks and pairs of the sphere grid.
-  std::uint32_t cells = 0, candidates = 0, grid_blocks = 0, grid_pairs = 0;
-  std::uint64_t grid_words = 0;
   /// [s] of the device: work on cells, their splitting, selection with certification, the sphere
   /// grid, the rest.
   double work = 0, split = 0, select = 0, grid = 0, rest = 0;

@@ -126,7 +126,6 @@ struct BandedState {
   std::uint32_t stop_asked = 0;
   std::uint64_t worked = 0;  ///< cells, for notes
   std::uint32_t levels = 0, steps = 0;
-  std::uint32_t most_active = 0, most_pairs = 0;
   std::uint64_t since = 0;                              ///< [ns] when this step began
   std::uint64_t time[static_cast<int>(Step::finished)]  ///< [ns] by step
       = {};

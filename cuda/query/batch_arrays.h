@@ -1,46 +1,14 @@
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
-#include <ist/gpu_query.h>
+#include <ist/gpu_arrays.h>
 
-#include "cuda/query/cover_ref.h"
-#include "cuda/query/cuts_ref.h"
-#include "cuda/query/detail_ref.h"
-#include "cuda/query/node_sums.h"
 #include "cuda/query/pair_descent.h"
+#include "cuda/query/solid_ref.h"
 
 namespace ist::gpu {
-
-/// An asset as a batch finds it.
-struct AssetRef {
-  AssetFrame frame;
-  TreeRef tree[2];  ///< by Measure
-  SumsRef sums[2];  ///< set_sums()
-  CutsRef cuts[2];  ///< by Measure
-  CoverRef cover;   ///< of the inner tree
-  AssetDetails details;
-
-  /// `bytes`: where the asset lies for who works on the batch.
-  static AssetRef of(const AssetHeader& header, const std::byte* bytes) {
-    AssetRef ref = {};
-    ref.frame = {{header.centre[0], header.centre[1], header.centre[2]},
-                 std::ldexp(1.0, header.exponent)};
-    ref.tree[static_cast<int>(Measure::matched)] = TreeRef::of(header.matched_tree, bytes);
-    ref.tree[static_cast<int>(Measure::inner)] = TreeRef::of(header.inner_tree, bytes);
-    ref.cover = CoverRef::of(header.inner_tree, bytes);
-    return ref;
-  }
-
-  /// `nodes`: node_sums() of the matched tree and of the inner one, one after the other.
-  void set_sums(const AssetHeader& header, const NodeSum* nodes) {
-    sums[static_cast<int>(Measure::matched)] = SumsRef::of(header.matched_tree, nodes);
-    sums[static_cast<int>(Measure::inner)] =
-        SumsRef::of(header.inner_tree, nodes + node_count(header.matched_tree));
-  }
-};
 
 /// What a descent left waiting, cut into tasks for whoever has time.
 struct SplitPair {
@@ -70,15 +38,20 @@ struct BatchCounters {
   std::uint32_t detailed, details_taken;  ///< pairs that are asked at several levels of detail
 };
 
-/// A batch in the memory of who works on it: kernels, or a test on the host.
-struct BatchArrays {
-  const AssetRef* assets;
-  std::uint32_t asset_count;
+/// A batch of penetrations as it was asked, in the memory of who works on it: kernels, or a test on
+/// the host.
+struct SolidPairs {
+  const SolidRef* solids;
+  std::uint32_t solid_count;
   Measure measure;
-  std::uint32_t pair_budget;  ///< 0: none
-  bool has_details;           ///< some asset has coarser levels
   GpuPairs pairs;
   GpuPenetrations answers;
+};
+
+/// Its pairs of trees, and what these are worked on in.
+struct BatchArrays : SolidPairs {
+  std::uint32_t pair_budget;  ///< 0: none
+  bool has_details;           ///< some asset has coarser levels
 
   BatchCounters* counters;
   std::uint32_t* list;      ///< room for all pairs, and of few for all in every size

@@ -69,6 +69,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchAr
   const WarpTeam team;
   WorkMemory& memory = memories[threadIdx.x / 32];
   const std::uint32_t listed = load_fresh(&batch.counters->listed);
+  if (listed == 0) return;
   const std::uint32_t most = pairs_handed_out(listed, kHandOut * kWarps * gridDim.x);
   if (team.lane() == 0) {
     memory.is_task = false;

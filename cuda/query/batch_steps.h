@@ -39,10 +39,13 @@ IST_HD inline void write_nothing(const GpuPenetrations& to, std::uint32_t i, Que
   if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = 0;
 }
 
-IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, const PairPlace& place,
-                                const LensTotals& totals) {
+IST_HD inline WorldSums world_sums(const PairPlace& place, const LensTotals& totals) {
   // Where nothing met there is nothing to turn.
-  const WorldSums sums = totals.spheres > 0 ? WorldSums::of(place, totals.term) : WorldSums{};
+  return totals.spheres > 0 ? WorldSums::of(place, totals.term) : WorldSums{};
+}
+
+IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, const WorldSums& sums,
+                                const LensTotals& totals) {
   if (to.volume != nullptr) to.volume[i] = sums.volume;
   write3(to.centroid, i, sums.centre[0], sums.centre[1], sums.centre[2]);
   write3(to.translation_gradient, i, sums.push[0], sums.push[1], sums.push[2]);
@@ -52,11 +55,11 @@ IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, cons
   if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = totals.spheres;
 }
 
-IST_HD inline Pose pose_of(const Pose* poses, std::uint32_t i) {
-  return poses != nullptr ? poses[i] : Pose{{1, 0, 0, 0}, {0, 0, 0}};
+IST_HD inline Pose pose_of(const GpuPlacedSolids& side, std::uint32_t i) {
+  return side.pose != nullptr ? side.pose[i] : Pose{{1, 0, 0, 0}, {0, 0, 0}};
 }
-IST_HD inline double scale_of(const double* scales, std::uint32_t i) {
-  return scales != nullptr ? scales[i] : 1;
+IST_HD inline double scale_of(const GpuPlacedSolids& side, std::uint32_t i) {
+  return side.scale != nullptr ? side.scale[i] : 1;
 }
 
 /// Copies what is plain words.
@@ -68,13 +71,39 @@ IST_HD void copy_words(const Team& team, const T& from, T& to) {
     target[k] = source[k];
 }
 
-/// Places pair i; false if it cannot be.
-IST_HD inline bool place_pair(const BatchArrays& batch, std::uint32_t i, PairPlace& place) {
-  const GpuPairs& pairs = batch.pairs;
-  const std::uint32_t a = pairs.asset_a[i], b = pairs.asset_b[i];
-  if (a >= batch.asset_count || b >= batch.asset_count) return false;
-  return place.place(batch.assets[a].frame, pose_of(pairs.pose_a, i), scale_of(pairs.scale_a, i),
-                     batch.assets[b].frame, pose_of(pairs.pose_b, i), scale_of(pairs.scale_b, i));
+/// What a pair is of; `missing`: an index names no solid.
+enum class PairKind { missing, trees, tree_and_field, fields };
+
+IST_HD inline PairKind kind_of(const SolidPairs& batch, std::uint32_t i) {
+  const std::uint32_t a = batch.pairs.a.solid[i], b = batch.pairs.b.solid[i];
+  if (a >= batch.solid_count || b >= batch.solid_count) return PairKind::missing;
+  const bool field_a = batch.solids[a].is_field(), field_b = batch.solids[b].is_field();
+  return field_a && field_b   ? PairKind::fields
+         : field_a || field_b ? PairKind::tree_and_field
+                              : PairKind::trees;
+}
+
+IST_HD inline const SolidRef& solid_of(const SolidPairs& batch, const GpuPlacedSolids& side,
+                                       std::uint32_t i) {
+  return batch.solids[side.solid[i]];
+}
+
+/// Places B of pair i as A sees it; false if it cannot be.
+IST_HD inline bool place_pair(const SolidPairs& batch, const GpuPlacedSolids& a,
+                              const GpuPlacedSolids& b, std::uint32_t i, PairPlace& place) {
+  return place.place(solid_of(batch, a, i).frame, pose_of(a, i), scale_of(a, i),
+                     solid_of(batch, b, i).frame, pose_of(b, i), scale_of(b, i));
+}
+IST_HD inline bool place_pair(const SolidPairs& batch, std::uint32_t i, PairPlace& place) {
+  return place_pair(batch, batch.pairs.a, batch.pairs.b, i, place);
+}
+
+/// Places pair i; why it is none of two trees if not ok.
+IST_HD inline QueryStatus place_trees(const SolidPairs& batch, std::uint32_t i, PairPlace& place) {
+  const PairKind kind = kind_of(batch, i);
+  if (kind == PairKind::tree_and_field || kind == PairKind::fields) return QueryStatus::not_held;
+  return kind == PairKind::trees && place_pair(batch, i, place) ? QueryStatus::ok
+                                                                : QueryStatus::invalid_input;
 }
 
 /// How many pairs of children of two roots meet, to rounding; no more than `most` are counted.
@@ -123,8 +152,8 @@ IST_HD inline double root_distance2(const TreeRef& a, const TreeRef& b, const Pa
 IST_HD inline std::uint32_t sift_finest(const BatchArrays& batch, std::uint32_t i,
                                         const PairPlace& place) {
   const auto measure = static_cast<std::uint32_t>(batch.measure);
-  const TreeRef& a = batch.assets[batch.pairs.asset_a[i]].tree[measure];
-  const TreeRef& b = batch.assets[batch.pairs.asset_b[i]].tree[measure];
+  const TreeRef& a = solid_of(batch, batch.pairs.a, i).tree[measure];
+  const TreeRef& b = solid_of(batch, batch.pairs.b, i).tree[measure];
   const double reach = a.root[3] + b.root[3] * place.a_from_b.scale;
   if (root_distance2(a, b, place) < reach * reach) {
     const std::uint32_t meet =
@@ -159,8 +188,8 @@ IST_HD inline std::uint32_t listed_pair(const BatchArrays& batch, std::uint32_t 
 IST_HD inline bool needs_details(const BatchArrays& batch, std::uint32_t i,
                                  const PairPlace& place) {
   if (batch.measure != Measure::matched) return false;
-  const AssetRef& a = batch.assets[batch.pairs.asset_a[i]];
-  const AssetRef& b = batch.assets[batch.pairs.asset_b[i]];
+  const SolidRef& a = solid_of(batch, batch.pairs.a, i);
+  const SolidRef& b = solid_of(batch, batch.pairs.b, i);
   if (a.details.coarser == 0 && b.details.coarser == 0) return false;
   if (batch.pair_budget > 0) {
     const double reach = a.details.reach + b.details.reach * place.a_from_b.scale;
@@ -175,8 +204,10 @@ enum class PairUse { answered, summed, detailed };
 /// What is to be done of pair i, and how large what is summed is. One thread a pair.
 IST_HD inline PairUse sift_pair(const BatchArrays& batch, std::uint32_t i, std::uint32_t& meet) {
   PairPlace place;
-  if (!place_pair(batch, i, place)) {
-    write_nothing(batch.answers, i, QueryStatus::invalid_input);
+  const QueryStatus status = place_trees(batch, i, place);
+  if (status != QueryStatus::ok) {
+    // A tree and a field are field_steps.h's.
+    if (kind_of(batch, i) != PairKind::tree_and_field) write_nothing(batch.answers, i, status);
     return PairUse::answered;
   }
   if (needs_details(batch, i, place)) return PairUse::detailed;
@@ -189,8 +220,8 @@ template <class Team, class Memory>
 IST_HD void load_trees(const Team& team, const BatchArrays& batch, std::uint32_t i,
                        Memory& memory) {
   const auto measure = static_cast<std::uint32_t>(batch.measure);
-  copy_words(team, batch.assets[batch.pairs.asset_a[i]].tree[measure], memory.tree[0]);
-  copy_words(team, batch.assets[batch.pairs.asset_b[i]].tree[measure], memory.tree[1]);
+  copy_words(team, solid_of(batch, batch.pairs.a, i).tree[measure], memory.tree[0]);
+  copy_words(team, solid_of(batch, batch.pairs.b, i).tree[measure], memory.tree[1]);
   team.sync();
 }
 
@@ -384,7 +415,7 @@ IST_HD void do_work(const Team& team, const BatchArrays& batch, WorkMemory& memo
     floor = task_floor(memory, descent.waiting());
   }
   if (team.lane() == 0 && (!memory.is_task || end_task(batch, memory)))
-    write_answer(batch.answers, memory.pair, memory.place, memory.sum);
+    write_answer(batch.answers, memory.pair, world_sums(memory.place, memory.sum), memory.sum);
   team.sync();
 }
 

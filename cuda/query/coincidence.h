@@ -5,6 +5,7 @@
 #include "cuda/query/pair_place.h"
 #include "numerics/host_device.h"
 #include "query/asset/shared_constants.h"
+#include "query/base/smooth_step.h"
 
 namespace ist::gpu {
 
@@ -39,7 +40,7 @@ struct Coincidence {
     const double t = (kCopyApart - distance / mean_radius) / (kCopyApart - kCopyAlone);
     weight = 1;
     if (t >= 1) return;
-    weight = t * t * (3 - 2 * t);
+    weight = smooth_step(t);
     const double per = -6 * t * (1 - t) / ((kCopyApart - kCopyAlone) * mean_radius) / distance;
     const double axis[3] = {m[5] - m[7], m[6] - m[2], m[1] - m[3]};
     for (int k = 0; k < 3; ++k) {

@@ -31,8 +31,8 @@ class DetailSums {
         batch_(batch),
         pair_(pair),
         m_(memory),
-        a_(batch.assets[batch.pairs.asset_a[pair]].details),
-        b_(batch.assets[batch.pairs.asset_b[pair]].details) {}
+        a_(solid_of(batch, batch.pairs.a, pair).details),
+        b_(solid_of(batch, batch.pairs.b, pair).details) {}
 
   /// False if the pair is one for the finest levels' lenses alone.
   IST_HD bool run() {
@@ -45,7 +45,7 @@ class DetailSums {
     team_.sync();
     const int size = budget > 0 ? m_.chain.size : 1;
     QuickLooker<Team> looker(team_, a_, b_, m_.pair.place.a_from_b, m_.filled);
-    DetailShare sure = {1, 0};
+    DetailWeight sure = {1, 0};
     if (size > 1) sure = m_.chain.sure(looker.look(false).volume, budget);
     if (sure.weight == 1) {
       if (coincidence(m_.chain.pair[0]).weight == 0) return false;
@@ -62,7 +62,7 @@ class DetailSums {
     double slope = 0, sure_slope = 0;  // of the blend by the coarse sum, and by the quick look
     for (int i = size; i-- > 0;) {     // the order of the CPU's additions
       const DetailPair& levels = m_.chain.pair[i];
-      const DetailShare share = m_.chain.share(i, volume_of(m_.coarse), budget);
+      const DetailWeight share = m_.chain.share(i, volume_of(m_.coarse), budget);
       const double alone = i == 0 ? 1 : 0;
       const double weight = sure.weight * alone + (1 - sure.weight) * share.weight;
       if (weight == 0 && share.slope == 0) continue;
@@ -153,7 +153,7 @@ class DetailSums {
     if (team_.lane() == 0) {
       totals.spheres = m_.spheres;
       totals.visits = m_.visits;
-      write_answer(batch_.answers, pair_, m_.pair.place, totals);
+      write_answer(batch_.answers, pair_, world_sums(m_.pair.place, totals), totals);
     }
     team_.sync();
   }

@@ -5,6 +5,7 @@
 
 #include "numerics/angle.h"
 #include "numerics/host_device.h"
+#include "query/asset/shared_constants.h"
 
 // What a triangle does to a ball that meets it: add_patch() (query/probe/patch_sums.h) for one of
 // each, in plain numbers.
@@ -116,7 +117,6 @@ class Disc {
   /// Whether the centre all but lies on an edge: rounding decides from where it sees the triangle,
   /// and cones and angle are worth nothing.
   IST_HD bool on_edge() const {
-    constexpr double kOnEdge2 = 0x1p-28;  // as query/probe/patch_sums.cpp
     const double m2 =
         least(least(edge_[0].m * edge_[0].m, edge_[1].m * edge_[1].m), edge_[2].m * edge_[2].m);
     return m2 + h_ * h_ < kOnEdge2 * (r_ * r_);

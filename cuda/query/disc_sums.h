@@ -8,6 +8,7 @@
 #include "cuda/query/met_balls.h"
 #include "cuda/query/part_sums.h"
 #include "numerics/host_device.h"
+#include "query/asset/shared_constants.h"
 
 // Balls met by triangles, by one team: their parts inside the closed surface, exactly, as
 // add_patch() and total_of() (query/probe/patch_sums.h, query/field/probe_sum.h) have them. What
@@ -55,8 +56,6 @@ class DiscSums {
     }
     if (end) finish(met);
   }
-
-  static constexpr double kLeastAngle = 1e-6;  ///< as query/field/probe_sum.h
 
  private:
   /// Places balls that are held since the last time.

@@ -8,7 +8,8 @@
 #include "cuda/query/lens_sums.h"
 #include "numerics/host_device.h"
 
-// A batch of fields and trees, as batch_arrays.h has it of trees. What is summed is in double.
+// A batch's pairs of a tree and a field, as batch_arrays.h has those of trees. What is summed is in
+// double. Whichever is A, the field stands first here: the tree is placed as the field sees it.
 
 namespace ist::gpu {
 
@@ -57,16 +58,8 @@ struct TriangleRoom {
   std::uint32_t query_room, part_room, word_room;
 };
 
-/// A batch of fields and trees in the memory of who works on it.
-struct FieldBatch {
-  const FieldRef* fields;
-  std::uint32_t field_count;
-  const AssetRef* assets;
-  std::uint32_t asset_count;
-  Measure measure;
-  GpuPairs pairs;  ///< asset_a: places of fields
-  GpuPenetrations answers;
-
+/// A batch's pairs of a tree and a field, and what they are worked on in.
+struct FieldBatch : SolidPairs {
   FieldCounters* counters;
   std::uint32_t* list[2];  ///< room for all pairs each
   TriangleRoom room;
@@ -78,24 +71,44 @@ IST_HD inline std::uint32_t& listed_pair(const FieldBatch& batch, int group, std
   return batch.list[1][group == kMesh ? k : batch.pairs.count - 1 - k];
 }
 
+/// The sides of pair i.
+struct FieldSides {
+  GpuPlacedSolids field, tree;
+  bool turned;  ///< the field is B
+
+  IST_HD FieldSides(const SolidPairs& batch, std::uint32_t i)
+      : turned(solid_of(batch, batch.pairs.b, i).is_field()) {
+    const GpuPlacedSolids &a = batch.pairs.a, &b = batch.pairs.b;
+    field = {turned ? b.solid : a.solid, turned ? b.pose : a.pose, turned ? b.scale : a.scale};
+    tree = {turned ? a.solid : b.solid, turned ? a.pose : b.pose, turned ? a.scale : b.scale};
+  }
+};
+
 IST_HD inline bool place_field_pair(const FieldBatch& batch, std::uint32_t i, PairPlace& place) {
-  const GpuPairs& pairs = batch.pairs;
-  const std::uint32_t a = pairs.asset_a[i], b = pairs.asset_b[i];
-  if (a >= batch.field_count || b >= batch.asset_count) return false;
-  const FieldRef& field = batch.fields[a];
-  return field.kind != FieldKind::unusable &&
-         place.place(field.frame, pose_of(pairs.pose_a, i), scale_of(pairs.scale_a, i),
-                     batch.assets[b].frame, pose_of(pairs.pose_b, i), scale_of(pairs.scale_b, i));
+  const FieldSides sides(batch, i);
+  return place_pair(batch, sides.field, sides.tree, i, place);
+}
+
+IST_HD inline void write_field_answer(const FieldBatch& batch, std::uint32_t i,
+                                      const PairPlace& place, const LensTotals& totals) {
+  WorldSums sums = world_sums(place, totals);
+  const FieldSides sides(batch, i);
+  if (sides.turned) {
+    const Pose tree = pose_of(sides.tree, i), field = pose_of(sides.field, i);
+    sums.turn_over({tree.t[0] - field.t[0], tree.t[1] - field.t[1], tree.t[2] - field.t[2]});
+  }
+  write_answer(batch.answers, i, sums, totals);
 }
 
 /// Readies the memory for pair i, but for its place, which is there or after the team's next sync.
 template <class Team>
 IST_HD void load_solids(const Team& team, const FieldBatch& batch, std::uint32_t i,
                         ProbeMemory& memory) {
-  const AssetRef& asset = batch.assets[batch.pairs.asset_b[i]];
+  const FieldSides sides(batch, i);
+  const SolidRef& asset = solid_of(batch, sides.tree, i);
   copy_words(team, asset.tree[static_cast<int>(batch.measure)], memory.tree);
   copy_words(team, asset.sums[static_cast<int>(batch.measure)], memory.sums);
-  copy_words(team, batch.fields[batch.pairs.asset_a[i]], memory.field);
+  copy_words(team, solid_of(batch, sides.field, i).field, memory.field);
   team.sync();
   if (team.lane() == 0) {
     const double centre[3] = {memory.tree.root[0], memory.tree.root[1], memory.tree.root[2]};

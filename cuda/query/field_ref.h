@@ -5,13 +5,13 @@
 
 #include <ist/asset_layout.h>
 
-#include "cuda/query/pair_place.h"
 #include "cuda/query/surface_ref.h"
 
 namespace ist::gpu {
 
-/// Those of ist::Field that a batch knows, and one whose numbers are out of range.
+/// Those of ist::Field that a batch knows; none, and one whose numbers are out of range.
 enum class FieldKind : std::uint32_t {
+  none,
   unusable,
   half_space,
   ball,
@@ -56,7 +56,6 @@ struct GridRef {
 /// worked on.
 struct FieldRef {
   FieldKind kind;
-  AssetFrame frame;  ///< of a mesh its asset's, of all others their own
   union {
     HalfSpaceRef half_space;
     RoundRef round;

@@ -6,7 +6,7 @@
 #include "numerics/host_device.h"
 #include "numerics/team.h"
 
-// A batch of fields and trees, step by step, as batch_steps.h has it of trees; with
+// A batch's pairs of a tree and a field, step by step, as batch_steps.h has those of trees; with
 // triangles: triangle_steps.h.
 
 namespace ist::gpu {
@@ -22,15 +22,17 @@ IST_HD inline double outside_grid2(const SurfaceRef& s, const double (&x)[3]) {
   return square;
 }
 
-/// Which group pair i is of; −1: it is answered. One thread a pair.
+/// Which group pair i is of; −1: it is answered, or none of a tree and a field. One thread a pair.
 IST_HD inline int sift_field_pair(const FieldBatch& batch, std::uint32_t i) {
+  if (kind_of(batch, i) != PairKind::tree_and_field) return -1;
+  const FieldSides sides(batch, i);
+  const FieldRef& field = solid_of(batch, sides.field, i).field;
+  const SolidRef& asset = solid_of(batch, sides.tree, i);
   PairPlace place;
-  if (!place_field_pair(batch, i, place)) {
+  if (field.kind == FieldKind::unusable || !place_pair(batch, sides.field, sides.tree, i, place)) {
     write_nothing(batch.answers, i, QueryStatus::invalid_input);
     return -1;
   }
-  const FieldRef& field = batch.fields[batch.pairs.asset_a[i]];
-  const AssetRef& asset = batch.assets[batch.pairs.asset_b[i]];
   const TreeRef& tree = asset.tree[static_cast<int>(batch.measure)];
   const double centre[3] = {tree.root[0], tree.root[1], tree.root[2]};
   double x[3];
@@ -52,7 +54,7 @@ IST_HD inline int sift_field_pair(const FieldBatch& batch, std::uint32_t i) {
   const SumsRef& sums = asset.sums[static_cast<int>(batch.measure)];
   PartSums whole;
   whole.add_whole(sums.level[tree.top][0], sums.sphere_count, place.a_from_b);
-  write_answer(batch.answers, i, place, whole.total(SerialTeam()));
+  write_field_answer(batch, i, place, whole.total(SerialTeam()));
   return -1;
 }
 
@@ -69,7 +71,7 @@ IST_HD void sum_field_pair(const Team& team, const FieldBatch& batch, std::uint3
   const LensTotals totals = sums.total(team);
   if (team.lane() == 0) {
     if (sound)
-      write_answer(batch.answers, i, memory.place, totals);
+      write_field_answer(batch, i, memory.place, totals);
     else
       write_nothing(batch.answers, i, QueryStatus::invalid_input);
   }

@@ -9,12 +9,44 @@
 #include <vector>
 
 #include "cuda/check.h"
-#include "cuda/query/asset_parts.h"
+#include "cuda/query/batch_kernels.h"
 #include "cuda/query/device_bytes.h"
-#include "cuda/query/query_impl.h"
+#include "cuda/query/field_kernels.h"
+#include "cuda/query/make_solid_ref.h"
+#include "cuda/query/patch_kernels.h"
+#include "cuda/query/separation_kernels.h"
 #include "cuda/queue.h"
 
 namespace ist {
+
+struct GpuSolids::Impl {
+  int device = 0;
+  gpu::DeviceBytes memory;
+  const gpu::SolidRef* refs = nullptr;
+  std::size_t size = 0;
+  bool has_fields = false;
+  bool has_group[gpu::kFieldGroups] = {};
+  bool has_details = false;     ///< some asset has coarser levels
+  std::uint32_t most_bins = 0;  ///< of a tree's contacts
+};
+
+struct GpuWorkspace::Impl {
+  int device = 0;
+  std::size_t most_pairs = 0;
+  gpu::BatchGrids grids{};
+  gpu::SeparationGrids separation_grids{};
+  gpu::FieldGrids field_grids{};
+  int patch_blocks = 0;
+  gpu::DeviceBytes memory;
+  // What does not change from batch to batch; all kinds lie in the same memory.
+  gpu::BatchArrays arrays{};
+  gpu::SeparationArrays separations{};
+  gpu::PatchArrays patches{};
+  std::size_t patch_room = 0;  ///< [bytes] at patches.rooms
+  gpu::FieldCounters* field_counters = nullptr;
+  gpu::TriangleRoom triangle_room{};
+};
+
 namespace {
 
 /// Room for what is split. A batch that needs more is answered all the same.
@@ -26,60 +58,49 @@ constexpr std::uint32_t kRoomForGapEntries = 1 << 20;  ///< of separations, whos
 
 }  // namespace
 
-GpuAssets::GpuAssets(std::span<const TreeView> assets, const GpuSettings& settings)
+GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settings)
     : impl_(std::make_unique<Impl>()) {
   gpu_info(settings.device);  // throws where there is no such device
   gpu::Queue queue(settings);
-  std::vector<gpu::AssetRef> refs;
+  std::vector<gpu::SolidRef> refs(solids.size());
+  gpu::SolidRef* at = nullptr;
   // Twice: for the sizes, then for what lies there.
   const auto place = [&](std::byte* from) {
     gpu::Parts parts(from);
-    parts.take<gpu::AssetRef>(assets.size());
-    for (std::size_t i = 0; i < assets.size(); ++i) {
-      const AssetHeader& header = assets[i].header();
-      auto* const bytes = parts.take<std::byte>(header.file_bytes);
-      const gpu::AssetParts more = gpu::AssetParts::of(header, bytes);
-      auto* const sums = parts.take<gpu::NodeSum>(more.sums.size());
-      auto* const levels = parts.take<gpu::DetailRef>(more.levels.size());
-      auto* const filled = parts.take<gpu::FilledBall>(more.filled.size());
-      auto* const cuts = parts.take<gpu::CutNode>(more.cuts.size());
-      auto* const ranks = parts.take<std::uint16_t>(more.ranks.size());
-      impl_->most_bins = std::max(impl_->most_bins, more.most_bins());
-      if (from == nullptr) continue;
-      gpu::copy_to_device(bytes, &header, header.file_bytes, queue);
-      gpu::copy_to_device<gpu::NodeSum>(sums, more.sums, queue);
-      gpu::copy_to_device<gpu::DetailRef>(levels, more.levels, queue);
-      gpu::copy_to_device<gpu::FilledBall>(filled, more.filled, queue);
-      gpu::copy_to_device<gpu::CutNode>(cuts, more.cuts, queue);
-      gpu::copy_to_device<std::uint16_t>(ranks, more.ranks, queue);
-      refs.push_back(more.ref(header, bytes, {sums, levels, filled, cuts, ranks},
-                              gpu::first_alike(assets, i)));
-      impl_->has_details = impl_->has_details || header.detail_count > 0;
-    }
+    at = parts.take<gpu::SolidRef>(solids.size());
+    const auto put = [&](const auto& array) {
+      const std::span all(array);
+      using T = typename decltype(all)::value_type;
+      auto* const to = parts.take<T>(all.size());
+      if (from != nullptr) gpu::copy_to_device<T>(to, all, queue);
+      return static_cast<const T*>(to);
+    };
+    for (std::size_t i = 0; i < solids.size(); ++i) refs[i] = gpu::solid_ref(solids, i, put);
     return parts.used();
   };
-  for (const TreeView& asset : assets)
-    if (asset.sphere_count() == 0)
-      throw Error(asset.empty() ? "GPU: an asset of the batch is empty"
-                                : "GPU: an asset of the batch is a surface alone; bake it with "
-                                  "spheres");
   impl_->device = settings.device;
-  impl_->size = assets.size();
+  impl_->size = solids.size();
   impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr));
   place(impl_->memory.data());
-  auto* const at = reinterpret_cast<gpu::AssetRef*>(impl_->memory.data());
-  gpu::copy_to_device<gpu::AssetRef>(at, refs, queue);
+  gpu::copy_to_device<gpu::SolidRef>(at, refs, queue);
   impl_->refs = at;
+  for (const gpu::SolidRef& solid : refs) {
+    if (solid.is_field()) impl_->has_group[gpu::group_of(solid.field.kind)] = true;
+    impl_->has_fields = impl_->has_fields || solid.is_field();
+    impl_->has_details = impl_->has_details || solid.details.coarser > 0;
+    for (const gpu::CutsRef& cuts : solid.cuts)
+      impl_->most_bins = std::max(impl_->most_bins, cuts.bins);
+  }
   queue.wait();
 }
 
-GpuAssets::~GpuAssets() = default;
-GpuAssets::GpuAssets(GpuAssets&&) noexcept = default;
-GpuAssets& GpuAssets::operator=(GpuAssets&&) noexcept = default;
+GpuSolids::~GpuSolids() = default;
+GpuSolids::GpuSolids(GpuSolids&&) noexcept = default;
+GpuSolids& GpuSolids::operator=(GpuSolids&&) noexcept = default;
 
-std::size_t GpuAssets::size() const noexcept { return impl_->size; }
-std::size_t GpuAssets::bytes() const noexcept { return impl_->memory.bytes(); }
-int GpuAssets::device() const noexcept { return impl_->device; }
+std::size_t GpuSolids::size() const noexcept { return impl_->size; }
+std::size_t GpuSolids::bytes() const noexcept { return impl_->memory.bytes(); }
+int GpuSolids::device() const noexcept { return impl_->device; }
 
 namespace {
 
@@ -133,7 +154,6 @@ std::size_t place_separations(std::byte* from, GpuWorkspace::Impl& room) {
                     parts.take<std::uint32_t>(kRoomForGapEntries),
                     parts.take<double>(kRoomForGapEntries), parts.take<double>(kRoomForGapEntries)};
   arrays.pairs.entry_room = kRoomForGapEntries;
-  arrays.pairs.measure = Measure::inner;
   return parts.used();
 }
 
@@ -188,86 +208,74 @@ GpuWorkspace& GpuWorkspace::operator=(GpuWorkspace&&) noexcept = default;
 std::size_t GpuWorkspace::most_pairs() const noexcept { return impl_->most_pairs; }
 std::size_t GpuWorkspace::bytes() const noexcept { return impl_->memory.bytes(); }
 
-void gpu::check_batch(const GpuPairs& pairs, const GpuWorkspace::Impl& room, int device) {
-  if (pairs.count > room.most_pairs)
-    throw Error("GPU: a batch of " + std::to_string(pairs.count) + " pairs; the workspace is for " +
-                std::to_string(room.most_pairs));
-  if (device != room.device)
-    throw Error("GPU: the assets are on device " + std::to_string(device) + ", the workspace on " +
-                std::to_string(room.device));
-}
+namespace {
 
-void gpu::check_measure(Measure measure) {
+/// What all kinds of batches begin with; throws where a batch cannot be launched.
+gpu::SolidPairs asked_of(const GpuSolids& solids, const GpuPairs& pairs,
+                         const GpuWorkspace::Impl& room, Measure measure,
+                         const GpuPenetrations& answers) {
   if (measure != Measure::matched && measure != Measure::inner)
     throw Error(
         "GPU: batches support the matched and the inner measure only: use the CPU for the exact "
         "measure");
-}
-
-namespace {
-
-void set_pairs(const GpuAssets::Impl& assets, const GpuPairs& pairs, gpu::BatchArrays& batch) {
-  batch.assets = assets.refs;
-  batch.asset_count = static_cast<std::uint32_t>(assets.size);
-  batch.pairs = pairs;
+  if (pairs.count > room.most_pairs)
+    throw Error("GPU: a batch of " + std::to_string(pairs.count) + " pairs; the workspace is for " +
+                std::to_string(room.most_pairs));
+  if (solids.device() != room.device)
+    throw Error("GPU: the solids are on device " + std::to_string(solids.device()) +
+                ", the workspace on " + std::to_string(room.device));
+  return {solids.impl().refs, static_cast<std::uint32_t>(solids.size()), measure, pairs, answers};
 }
 
 }  // namespace
 
-void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs,
+void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
                        const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
                        const GpuPenetrations& answers, CUstream_st* stream) {
   const GpuWorkspace::Impl& room = workspace.impl();
-  gpu::check_measure(settings.measure);
-  gpu::check_batch(pairs, room, assets.device());
+  const gpu::SolidPairs asked = asked_of(solids, pairs, room, settings.measure, answers);
   if (pairs.count == 0) return;
   gpu::BatchArrays batch = room.arrays;
-  set_pairs(assets.impl(), pairs, batch);
-  batch.measure = settings.measure;
+  static_cast<gpu::SolidPairs&>(batch) = asked;
   batch.pair_budget = settings.pair_budget;
-  batch.has_details = assets.impl().has_details;
-  batch.answers = answers;
+  batch.has_details = solids.impl().has_details;
   const gpu::DeviceGuard guard(room.device);
   gpu::launch_batch(batch, room.grids, stream);
+  if (!solids.impl().has_fields) return;
+  // In the same memory, once the trees are done with it.
+  const gpu::FieldBatch fields = {
+      asked, room.field_counters, {room.arrays.list, room.arrays.detailed}, room.triangle_room};
+  gpu::launch_field_batch(fields, solids.impl().has_group, room.field_grids, stream);
 }
 
-void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint32_t max_visits,
+void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint32_t max_visits,
                       GpuWorkspace& workspace, const GpuSeparations& answers, CUstream_st* stream) {
   const GpuWorkspace::Impl& room = workspace.impl();
-  gpu::check_batch(pairs, room, assets.device());
+  const gpu::SolidPairs asked = asked_of(solids, pairs, room, Measure::inner, {});
   if (pairs.count == 0) return;
   gpu::SeparationArrays batch = room.separations;
-  set_pairs(assets.impl(), pairs, batch.pairs);
+  static_cast<gpu::SolidPairs&>(batch.pairs) = asked;
   batch.answers = answers;
   batch.max_visits = max_visits == 0 ? ~0u : max_visits;
   const gpu::DeviceGuard guard(room.device);
   gpu::launch_separations(batch, room.separation_grids, stream);
 }
 
-void contact_patches_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
+void contact_patches_batch(const GpuSolids& solids, const GpuPairs& pairs, Measure measure,
                            GpuWorkspace& workspace, const GpuPenetrations& answers,
                            const GpuContactPatches& patches, CUstream_st* stream) {
   const GpuWorkspace::Impl& room = workspace.impl();
-  gpu::check_measure(measure);
-  gpu::check_batch(pairs, room, assets.device());
+  const gpu::SolidPairs asked = asked_of(solids, pairs, room, measure, answers);
   if (patches.most > kMostGpuPatches)
     throw Error("GPU: " + std::to_string(patches.most) + " patches a pair; at most " +
                 std::to_string(kMostGpuPatches));
   if (pairs.count == 0) return;
   gpu::PatchArrays batch = room.patches;
-  set_pairs(assets.impl(), pairs, batch.pairs);
-  batch.pairs.measure = measure;
-  batch.pairs.answers = answers;
+  static_cast<gpu::SolidPairs&>(batch.pairs) = asked;
   batch.patches = patches;
-  batch.most_bins = assets.impl().most_bins;
+  batch.most_bins = solids.impl().most_bins;
   const gpu::DeviceGuard guard(room.device);
   gpu::launch_patches(batch, room.patch_blocks, room.patch_room, stream);
-}
-
-void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
-                       GpuWorkspace& workspace, const GpuPenetrations& answers,
-                       CUstream_st* stream) {
-  penetration_batch(assets, pairs, GpuPenetrationSettings{measure}, workspace, answers, stream);
 }
 
 }  // namespace ist

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <ist/gpu_query.h>
+#include <ist/gpu_arrays.h>
 
 #include "cuda/query/batch_arrays.h"
 #include "cuda/query/patch_memory.h"
@@ -12,7 +12,7 @@ namespace ist::gpu {
 
 /// A batch of contact patches in the memory of who works on it.
 struct PatchArrays {
-  BatchArrays pairs;  ///< assets, pairs, answers, counters and the list
+  BatchArrays pairs;  ///< solids, pairs, answers, counters and the list
   GpuContactPatches patches;
   std::byte* rooms;         ///< of teams, one after another
   std::uint32_t most_bins;  ///< of any asset

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <ist/gpu_query.h>
+#include <ist/gpu_arrays.h>
 
 #include "cuda/query/cuts_ref.h"
 #include "cuda/query/lens_sums.h"

@@ -16,11 +16,9 @@ namespace ist::gpu {
 /// Whether pair i is to be summed; else it is answered. One thread a pair.
 IST_HD inline bool sift_patches(const PatchArrays& batch, std::uint32_t i) {
   PairPlace place;
-  bool sums = false;
-  if (place_pair(batch.pairs, i, place))
-    sums = sift_finest(batch.pairs, i, place);
-  else
-    write_nothing(batch.pairs.answers, i, QueryStatus::invalid_input);
+  const QueryStatus status = place_trees(batch.pairs, i, place);
+  const bool sums = status == QueryStatus::ok && sift_finest(batch.pairs, i, place) > 0;
+  if (status != QueryStatus::ok) write_nothing(batch.pairs.answers, i, status);
   if (!sums && batch.patches.count != nullptr) batch.patches.count[i] = 0;
   return sums;
 }
@@ -128,7 +126,7 @@ IST_HD void patch_pair(const Team& team, const PatchArrays& batch, std::uint32_t
   load_trees(team, pairs, i, pair);
   const double scale = pair.place.a_from_b.scale;
   const bool of_b = divides_b(pair.tree[0], pair.tree[1], scale);
-  const CutsRef cuts = pairs.assets[(of_b ? pairs.pairs.asset_b : pairs.pairs.asset_a)[i]]
+  const CutsRef cuts = pairs.solids[(of_b ? pairs.pairs.b : pairs.pairs.a).solid[i]]
                            .cuts[static_cast<int>(pairs.measure)];
   {
     PairDescent<Team, BinSums<Team>> descent(team, pair,
@@ -143,7 +141,7 @@ IST_HD void patch_pair(const Team& team, const PatchArrays& batch, std::uint32_t
   if (team.lane() == 0) {
     for (int t = 0; t < kTerms; ++t) pair.totals.term[t] = sum[t];
     room.parts->whole = WorldSums::of(pair.place, pair.totals.term);
-    write_answer(pairs.answers, i, pair.place, pair.totals);
+    write_answer(pairs.answers, i, world_sums(pair.place, pair.totals), pair.totals);
   }
   team.sync();
   const int size = division.run(static_cast<int>(batch.patches.most));

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include <ist/gpu_query.h>
+#include <ist/gpu_arrays.h>
 
 #include "cuda/query/batch_arrays.h"
 #include "cuda/query/gap_descent.h"
@@ -11,7 +11,7 @@ namespace ist::gpu {
 
 /// A batch of separations in the memory of who works on it.
 struct SeparationArrays {
-  BatchArrays pairs;  ///< assets, pairs, splits, tasks and room for them
+  BatchArrays pairs;  ///< solids, pairs, splits, tasks and room for them
   // Of what is searched in float, and in double.
   BatchCounters* counters;  ///< [2]
   std::uint32_t* list[2];   ///< room for all pairs each

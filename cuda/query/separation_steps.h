@@ -7,6 +7,7 @@
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/separation_arrays.h"
 #include "numerics/host_device.h"
+#include "query/asset/shared_constants.h"
 
 // A batch of separations, step by step, as batch_steps.h has penetrations.
 
@@ -16,8 +17,6 @@ namespace ist::gpu {
 /// count 1, pairs above them more.
 constexpr std::uint32_t kGapsAlone = 160;
 constexpr std::uint32_t kGapTaskWeight = 16;
-/// From this ratio of sizes on all is in double.
-constexpr double kFloatRatio = 64;
 
 /// [u] The axis between the nearest spheres, world; nothing where spheres overlap.
 struct GapWitness {
@@ -90,22 +89,23 @@ IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
 /// Which list pair i goes to: 0 float, 1 double; −1: it is answered. One thread a pair.
 IST_HD inline int sift_separation(const SeparationArrays& batch, std::uint32_t i) {
   PairPlace place;
-  if (!place_pair(batch.pairs, i, place)) {
-    const double none = nothing(QueryStatus::invalid_input);
+  const QueryStatus placed = place_trees(batch.pairs, i, place);
+  if (placed != QueryStatus::ok) {
+    const double none = nothing(placed);
     const double distance[3] = {none, none, none};
     const GapWitness witness = {{none, none, none}, {none, none, none}, {none, none, none}};
-    write_separation(batch.answers, i, QueryStatus::invalid_input, distance, witness, 0, 0);
+    write_separation(batch.answers, i, placed, distance, witness, 0, 0);
     return -1;
   }
-  const AssetRef& a = batch.pairs.assets[batch.pairs.pairs.asset_a[i]];
-  const AssetRef& b = batch.pairs.assets[batch.pairs.pairs.asset_b[i]];
+  const SolidRef& a = solid_of(batch.pairs, batch.pairs.pairs.a, i);
+  const SolidRef& b = solid_of(batch.pairs, batch.pairs.pairs.b, i);
   const TreeRef& tree_a = a.tree[static_cast<int>(Measure::inner)];
   const TreeRef& tree_b = b.tree[static_cast<int>(Measure::inner)];
   // As precision_for_gap() (query/base/precision.h).
   const double ra = tree_a.root[3], rb = tree_b.root[3] * place.a_from_b.scale;
-  const bool alike = rb <= kFloatRatio * ra && ra <= kFloatRatio * rb;
+  const bool alike = rb <= kSingleRatio * ra && ra <= kSingleRatio * rb;
   const double length = span_of(tree_a, a.cover, tree_b, b.cover, place.a_from_b);
-  return alike && length <= kFloatRatio * (ra + rb) ? 0 : 1;
+  return alike && length <= kSingleRatio * (ra + rb) ? 0 : 1;
 }
 
 /// Readies the memory for pair i.
@@ -114,9 +114,10 @@ IST_HD void load_separation(const Team& team, const SeparationArrays& batch, std
                             GapMemory<Real>& memory) {
   if (team.lane() == 0) place_pair(batch.pairs, i, memory.place);
   load_trees(team, batch.pairs, i, memory);
-  const std::uint32_t asset[2] = {batch.pairs.pairs.asset_a[i], batch.pairs.pairs.asset_b[i]};
-  if (team.lane() == 0)
-    for (int side = 0; side < 2; ++side) memory.cover[side] = batch.pairs.assets[asset[side]].cover;
+  if (team.lane() == 0) {
+    memory.cover[0] = solid_of(batch.pairs, batch.pairs.pairs.a, i).cover;
+    memory.cover[1] = solid_of(batch.pairs, batch.pairs.pairs.b, i).cover;
+  }
   team.sync();
 }
 

@@ -103,9 +103,10 @@ IST_HD void place_query(const FieldBatch& batch, std::uint32_t k, std::uint32_t 
   query.pair = listed_pair(batch, Kind::kGroup, listed);
   place_field_pair(batch, query.pair, query.place);
   query.first_part = kNoPart;
-  const AssetRef& asset = batch.assets[batch.pairs.asset_b[query.pair]];
+  const FieldSides sides(batch, query.pair);
+  const SolidRef& asset = solid_of(batch, sides.tree, query.pair);
   query.inside =
-      Kind::root_inside(SerialTeam(), batch.fields[batch.pairs.asset_a[query.pair]],
+      Kind::root_inside(SerialTeam(), solid_of(batch, sides.field, query.pair).field,
                         asset.tree[static_cast<int>(batch.measure)], query.place.a_from_b);
 }
 
@@ -229,7 +230,7 @@ IST_HD inline void answer_query(const FieldBatch& batch, std::uint32_t k) {
     next = part.next;
   }
   sum.add(query.walked);
-  write_answer(batch.answers, query.pair, query.place, sum);
+  write_field_answer(batch, query.pair, query.place, sum);
 }
 
 /// All steps of pair i.
@@ -255,7 +256,7 @@ IST_HD void sum_whole_query(const Team& team, const FieldBatch& batch, std::uint
     return true;
   });
   total.add(walked.total(team));
-  if (team.lane() == 0) write_answer(batch.answers, i, memory.place, total);
+  if (team.lane() == 0) write_field_answer(batch, i, memory.place, total);
   team.sync();
 }
 

@@ -39,6 +39,15 @@ struct WorldSums {
     sums.turn[2] = turn[2] + (o[0] * push[1] - o[1] * push[0]);
     return sums;
   }
+
+  /// By a motion of A, about its origin. `arm`: [u] from A's origin to B's (turn_over(),
+  /// query/base/turned_over.h).
+  IST_HD void turn_over(const double (&arm)[3]) {
+    turn[0] = -(turn[0] + (arm[1] * push[2] - arm[2] * push[1]));
+    turn[1] = -(turn[1] + (arm[2] * push[0] - arm[0] * push[2]));
+    turn[2] = -(turn[2] + (arm[0] * push[1] - arm[1] * push[0]));
+    for (double& p : push) p = -p;
+  }
 };
 
 }  // namespace ist::gpu

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "library/text.h"
 
@@ -13,18 +15,19 @@ namespace ist::app {
 namespace {
 
 /// The numeric columns between `id` and `status`, in order.
-constexpr std::array kNumbers = {"volume",   "volume_min",   "volume_max",  "cx",
-                                 "cy",       "cz",           "dVdtx",       "dVdty",
-                                 "dVdtz",    "dVdrx",        "dVdry",       "dVdrz",
-                                 "distance", "distance_min", "distance_max"};
-
-std::array<double, kNumbers.size()> numbers(const PenetrationAndSeparation& r) {
+std::vector<std::pair<std::string, double>> numbers(const PenetrationAndSeparation& r) {
   const Penetration& p = r.penetration;
   const Separation& s = r.separation;
-  const Eigen::Vector3d &c = p.centroid, &t = p.translation_gradient, &w = p.rotation_gradient;
-  return {p.volume, p.volume_min, p.volume_max, c.x(),          c.y(),
-          c.z(),    t.x(),        t.y(),        t.z(),          w.x(),
-          w.y(),    w.z(),        s.distance,   s.distance_min, s.distance_max};
+  std::vector<std::pair<std::string, double>> out = {
+      {"volume", p.volume}, {"volume_min", p.volume_min}, {"volume_max", p.volume_max}};
+  for (const auto& [name, v] : {std::pair{"c", p.centroid},
+                                {"dVdt", p.translation_gradient},
+                                {"dVdr", p.rotation_gradient}})
+    for (int k = 0; k < 3; ++k) out.emplace_back(std::string(name) + "xyz"[k], v[k]);
+  out.insert(out.end(), {{"distance", s.distance},
+                         {"distance_min", s.distance_min},
+                         {"distance_max", s.distance_max}});
+  return out;
 }
 
 /// In quotes where it would be more than one field.
@@ -47,11 +50,11 @@ std::uint64_t Answer::sphere_pairs() const {
 
 std::string answers_csv(std::span<const Answer> answers) {
   std::string out = "id";
-  for (const char* name : kNumbers) (out += ',') += name;
+  for (const auto& [name, none] : numbers({})) (out += ',') += name;
   out += ",status,node_visits,sphere_pairs,time_us\n";
   for (const Answer& answer : answers) {
     out += csv_field(answer.row.id);
-    for (const double value : numbers(answer.result))
+    for (const auto& [name, value] : numbers(answer.result))
       fmt::format_to(std::back_inserter(out), ",{:.17g}", value);
     fmt::format_to(std::back_inserter(out), ",{},{},{},{:.17g}\n", name_of(answer.status()),
                    answer.node_visits(), answer.sphere_pairs(), answer.time_us);
@@ -63,8 +66,7 @@ std::string answers_json(std::span<const Answer> answers) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const Answer& answer : answers) {
     nlohmann::ordered_json entry = {{"id", answer.row.id}};
-    const auto values = numbers(answer.result);
-    for (std::size_t k = 0; k < kNumbers.size(); ++k) entry[kNumbers[k]] = values[k];
+    for (const auto& [name, value] : numbers(answer.result)) entry[name] = value;
     entry["status"] = name_of(answer.status());
     entry["node_visits"] = answer.node_visits();
     entry["sphere_pairs"] = answer.sphere_pairs();

@@ -37,17 +37,8 @@ class Array:
     def numpy(self) -> NDArray[Any]: ...  # a copy on the host
 
 @final
-class Assets:
-    def __init__(self, assets: Sequence[Asset], *, device: int = 0) -> None: ...
-    def __len__(self) -> int: ...
-    @property
-    def device(self) -> int: ...
-    @property
-    def bytes(self) -> int: ...
-
-@final
-class Fields:
-    def __init__(self, fields: Sequence[Field], *, device: int = 0) -> None: ...
+class Solids:
+    def __init__(self, solids: Sequence[Asset | Field], *, device: int = 0) -> None: ...
     def __len__(self) -> int: ...
     @property
     def device(self) -> int: ...
@@ -72,9 +63,9 @@ class Penetration:
     def sphere_pairs(self) -> _DeviceArray | None: ...  # (n,)
 
 def penetration(
-    assets: Assets, asset_a: _DeviceArray | int, asset_b: _DeviceArray | int,
+    solids: Solids, solid_a: _DeviceArray | int, solid_b: _DeviceArray | int,
     pose_a: _DeviceArray | None, pose_b: _DeviceArray | None, scale_a: _DeviceArray | None = None,
-    scale_b: _DeviceArray | None = None, *, fields: Fields | None = None,
+    scale_b: _DeviceArray | None = None, *,
     measure: Literal["matched", "inner"] = "matched", pair_budget: int = 0,
     wanted: Sequence[_Answer] | None = None,
     out: Mapping[_Answer, _DeviceArray] | Penetration | None = None, stream: _Stream = None,
@@ -107,7 +98,7 @@ _Gap = Literal[
 ]
 
 def separation(
-    assets: Assets, asset_a: _DeviceArray | int, asset_b: _DeviceArray | int,
+    solids: Solids, solid_a: _DeviceArray | int, solid_b: _DeviceArray | int,
     pose_a: _DeviceArray | None, pose_b: _DeviceArray | None, scale_a: _DeviceArray | None = None,
     scale_b: _DeviceArray | None = None, *, max_visits: int = 0,
     wanted: Sequence[_Gap] | None = None,
@@ -142,7 +133,7 @@ _Patch = Literal[
 ]
 
 def contact_patches(
-    assets: Assets, asset_a: _DeviceArray | int, asset_b: _DeviceArray | int,
+    solids: Solids, solid_a: _DeviceArray | int, solid_b: _DeviceArray | int,
     pose_a: _DeviceArray | None, pose_b: _DeviceArray | None, scale_a: _DeviceArray | None = None,
     scale_b: _DeviceArray | None = None, *, max_patches: int = 8,
     measure: Literal["matched", "inner"] = "matched", wanted: Sequence[_Patch] | None = None,

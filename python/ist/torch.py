@@ -128,19 +128,6 @@ def _ask_cpu(solids, placed, pairs, scales, needs_gradient, settings):
         lambda: tensors(found.scale_gradient_a, found.scale_gradient))
 
 
-class _Group:
-    """Pairs of a scene that one batch answers: those whose first solid is an Asset, or a Field."""
-
-    def __init__(self, chosen, pairs, first, second, fields, device):
-        def on_device(array):
-            return torch.as_tensor(np.ascontiguousarray(array), device=device)
-
-        self.pairs = on_device(pairs[chosen].T)  # two (m,) numbers of solids
-        self.places = [on_device(place[solid].astype(np.int32))  # among what the device holds
-                       for place, solid in zip((first, second), pairs[chosen].T)]
-        self.fields = fields
-
-
 class _Scene:
     """Solids and pairs of them on a device."""
 
@@ -158,33 +145,11 @@ class _Scene:
             if is_field[first] and is_field[second]:
                 raise ValueError(f"pairs[{i}]: ({first}, {second}): two Fields; one of them must be "
                                  "an Asset")
-        # A batch takes the Field first; a volume and its gradients by either pose know no order.
-        pairs = np.where(is_field[pairs[:, 1:]], pairs[:, ::-1], pairs)
-        assets, asset_place = _each_once(solids, ist.Asset)
-        fields, field_place = _each_once(solids, ist.Field)
-        self.assets = ist.gpu.Assets(assets, device=device.index)
-        self.fields = ist.gpu.Fields(fields, device=device.index) if fields else None
-        self.pairs = torch.from_numpy(pairs.T.copy()).to(device)
-        # Rows of one batch after those of the other, and how they come back into the pairs' order.
-        by_field = is_field[pairs[:, 0]] if len(pairs) else np.zeros(0, bool)
-        rows = [np.flatnonzero(~by_field), np.flatnonzero(by_field)]
-        self.groups = []
-        if len(rows[0]) or not len(pairs):
-            self.groups.append(_Group(rows[0], pairs, asset_place, asset_place, None, device))
-        if len(rows[1]):
-            self.groups.append(_Group(rows[1], pairs, field_place, asset_place, self.fields, device))
-        self.order = torch.from_numpy(np.argsort(np.concatenate(rows))).to(device)
-
-    def in_order(self, parts, dim):
-        """What the groups answered, along the pairs' axis."""
-        return parts[0] if len(parts) == 1 else torch.cat(parts, dim).index_select(dim, self.order)
-
-
-def _each_once(solids, kind):
-    """Those of a kind, none twice, and the place of each solid among them."""
-    places = {solid: k for k, solid in enumerate(
-        dict.fromkeys(solid for solid in solids if isinstance(solid, kind)))}
-    return list(places), np.array([places.get(solid, 0) for solid in solids], np.int32)
+        place = {solid: k for k, solid in enumerate(dict.fromkeys(solids))}  # each once
+        self.solids = ist.gpu.Solids(list(place), device=device.index)
+        self.pairs = torch.from_numpy(pairs.T.copy()).to(device)  # two (n,) numbers of solids
+        places = np.array([place[solid] for solid in solids], np.int32)
+        self.places = torch.from_numpy(places[pairs.T]).to(device)  # among what the device holds
 
 
 @functools.lru_cache(maxsize=8)
@@ -206,33 +171,20 @@ def _ask_gpu(solids, placed, pairs, scales, needs_gradient, settings):
         raise ValueError(f"scales: shape {tuple(scales.shape)}; wanted {tuple(placed.shape[:-1])}")
     scene = _scene(tuple(solids), pairs.tobytes(), placed.device)
     wants_pose, wants_scale = needs_gradient[0], scales is not None and needs_gradient[1]
-    parts = [_ask_group(scene.assets, group, placed, scales, wants_pose, wants_scale, asked)
-             for group in scene.groups]
-
-    def joined(which, dim):
-        return [scene.in_order(side, dim) for side in zip(*(which(part) for part in parts))]
-
-    return _Answer(scene.pairs, scene.in_order([part.volume for part in parts], -1),
-                   scene.in_order([part.valid for part in parts], -1),
-                   lambda: joined(lambda part: part.pose_gradients(), -2),
-                   lambda: joined(lambda part: part.scale_gradients(), -1))
-
-
-def _ask_group(assets, group, placed, scales, wants_pose, wants_scale, settings):
-    shape = (*placed.shape[:-2], group.pairs.shape[1])
-    place_a, place_b = (place.expand(shape).reshape(-1).contiguous() for place in group.places)
-    pose_a, pose_b = (placed[..., solid, :].reshape(-1, 7) for solid in group.pairs)
+    shape = (*placed.shape[:-2], scene.pairs.shape[1])
+    place_a, place_b = (place.expand(shape).reshape(-1).contiguous() for place in scene.places)
+    pose_a, pose_b = (placed[..., solid, :].reshape(-1, 7) for solid in scene.pairs)
     scale_a = scale_b = None
     if scales is not None:
-        scale_a, scale_b = (scales[..., solid].reshape(-1) for solid in group.pairs)
+        scale_a, scale_b = (scales[..., solid].reshape(-1) for solid in scene.pairs)
     rows = len(place_a)
 
     def ask(scale_b, *wanted):
         out = {name: placed.new_empty((rows, 3) if name.endswith("gradient") else rows)
                for name in wanted}
         out["status"] = torch.empty(rows, dtype=torch.int32, device=placed.device)
-        ist.gpu.penetration(assets, place_a, place_b, pose_a, pose_b, scale_a, scale_b,
-                            fields=group.fields, out=out, **settings,
+        ist.gpu.penetration(scene.solids, place_a, place_b, pose_a, pose_b, scale_a, scale_b,
+                            out=out, **asked,
                             stream=torch.cuda.current_stream(placed.device).cuda_stream)
         return out
 
@@ -256,7 +208,7 @@ def _ask_group(assets, group, placed, scales, wants_pose, wants_scale, settings)
         by_a = (3 * found["volume"] - scale_b * by_b
                 - (away * found["translation_gradient"]).sum(-1)) / scale_a
         by_scale = [torch.where(found["volume"] > 0, by, 0.0).reshape(shape) for by in (by_a, by_b)]
-    return _Answer(group.pairs, found["volume"].reshape(shape),
+    return _Answer(scene.pairs, found["volume"].reshape(shape),
                    (found["status"] != ist.QueryStatus.invalid_input).reshape(shape),
                    pose_gradients, lambda: by_scale)
 

@@ -11,7 +11,10 @@
 #include <memory>
 #include <new>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "query/base/members.h"
 
 // Arguments and answers as arrays. What does not fit is a TypeError (dtype) or a ValueError
 // (shape, value) that names the argument, what it is and what was wanted.
@@ -74,21 +77,41 @@ unsigned take_threads(unsigned threads);
 /// Of three numbers.
 Eigen::Vector3d take_vector(const py::handle& value, const char* name);
 
-/// A new array of shape `rows` + `each`, all zero, and where its data is. What nobody writes to is
-/// not touched: of a long one it takes no memory and no time.
-template <class T>
+/// A new array of shape `rows` + (`kEach`,), all zero, and where its data is. What nobody writes to
+/// is not touched: of a long one it takes no memory and no time.
+template <class T, std::size_t kEach = 0>
 struct Column {
+  static constexpr std::size_t kWidth = kEach > 0 ? kEach : 1;
+
   Column() = default;
-  Column(Shape rows, const Shape& each) : shape(std::move(rows)), width(1) {
-    for (const std::size_t n : each) width *= n;
-    shape.insert(shape.end(), each.begin(), each.end());
+  explicit Column(Shape rows) : shape(std::move(rows)) {
+    if (kEach > 0) shape.push_back(kEach);
     std::size_t count = 1;
     for (const std::size_t n : shape) count *= n;
     data.reset(static_cast<T*>(std::calloc(count + 1, sizeof(T))), std::free);
     if (data == nullptr) throw std::bad_alloc();
   }
 
-  T* row(std::size_t i) const { return data.get() + i * width; }
+  T* row(std::size_t i) const { return data.get() + i * kWidth; }
+  Eigen::Map<Eigen::Matrix<T, static_cast<int>(kWidth), 1>> vector(std::size_t i) const {
+    return Eigen::Map<Eigen::Matrix<T, static_cast<int>(kWidth), 1>>(row(i));
+  }
+
+  /// `value`: a number or an enumerator, or a vector.
+  template <class Value>
+  void write(std::size_t i, const Value& value) const {
+    if constexpr (kEach > 0)
+      vector(i) = value;
+    else
+      *row(i) = static_cast<T>(value);
+  }
+  template <class Value>
+  void read(std::size_t i, Value& value) const {
+    if constexpr (kEach > 0)
+      value = vector(i);
+    else
+      value = static_cast<Value>(*row(i));
+  }
 
   /// An array of NumPy, a number where it has no dimension; None where there is no column.
   py::object handed_out() const {
@@ -106,7 +129,13 @@ struct Column {
 
   Shape shape;
   std::shared_ptr<T> data;
-  std::size_t width = 0;
 };
+
+/// Row i of columns that are named like an answer's members.
+template <class Columns, class Answer>
+void write_row(const Columns& columns, std::size_t i, const Answer& answer) {
+  for_each_member([i](const auto& column, const auto& value) { column.write(i, value); }, columns,
+                  answer);
+}
 
 }  // namespace ist::python

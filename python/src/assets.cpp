@@ -60,10 +60,10 @@ const PyType_Slot kAssetSlots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(sho
 py::object spheres_of(const Asset& asset, const std::string& which) {
   const bool matched = named(which, "which", kSpheres);
   const auto spheres = app::exported_spheres(asset.view(), 0);
-  const Column<double> rows({spheres.size()}, {4});
+  const Column<double, 4> rows({spheres.size()});
   for (std::size_t i = 0; i < spheres.size(); ++i) {
     const app::ExportedSphere& s = spheres[i];
-    Eigen::Map<Eigen::Vector4d>(rows.row(i)) << (matched ? s.matched_centre : s.centre),
+    rows.vector(i) << (matched ? s.matched_centre : s.centre),
         (matched ? s.matched_radius : s.radius);
   }
   return rows.handed_out();

@@ -262,7 +262,7 @@ py::dict interface_of(const DeviceArray& self) {
 py::object to_numpy(const DeviceArray& self) {
   std::size_t bytes = self.type.bits / 8u;
   for (const std::size_t n : self.shape) bytes *= n;
-  const Column<std::byte> memory({bytes}, {});
+  const Column<std::byte> memory({bytes});
   const DeviceArray held = self;  // another thread may have it written again meanwhile
   {
     const py::gil_scoped_release released;

@@ -8,7 +8,7 @@
 
 #include "arrays.h"
 #include "module.h"
-#include "query/field/with_shape.h"
+#include "query/field/sound_fields.h"
 #include "solids.h"
 
 namespace ist::python {
@@ -36,9 +36,7 @@ OwnedKind<Kind> sound(Kind kind, const char* wanted, const Arguments& given,
   std::string text;
   for (const auto& [name, value] : given)
     text += (text.empty() ? "" : ", ") + std::string(name) + "=" + text_of(value);
-  if (!with_shape(
-          kind, [](auto&) { return true; }, [] { return false; }))
-    throw value_error(text + "; wanted " + wanted);
+  if (!is_sound(kind)) throw value_error(text + "; wanted " + wanted);
   return {std::move(kind), std::move(text), std::move(owner)};
 }
 
@@ -73,13 +71,6 @@ TreeView tree_of(const py::handle& object, const char* name) {
   const Solid solid = solid_of(object, name);
   if (const TreeView* const tree = std::get_if<TreeView>(&solid)) return *tree;
   throw type_error(std::string(name) + ": a Field; wanted an Asset");
-}
-
-Field field_of(const py::handle& object, const char* name) {
-  const Solid solid = solid_of(object, name);
-  if (const Field* const field = std::get_if<Field>(&solid)) return *field;
-  throw type_error(std::string(name) +
-                   ": an Asset; wanted a Field, e.g. MeshField(asset), its surface");
 }
 
 void add_fields(py::module_& module) {

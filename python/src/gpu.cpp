@@ -6,41 +6,24 @@
 namespace ist::python {
 namespace {
 
-void add_assets_class(py::module_& module) {
-  py::class_<DeviceAssets>(
-      module, "Assets",
-      "Assets in the memory of a device, for batches. Pairs refer to them by index.\n\n"
-      "Batches of one Assets run one after another, even on different streams, because they share "
-      "working memory. Keep it alive as long as captured graphs use it.")
-      .def(py::init<const py::sequence&, int>(), py::arg("assets"), py::kw_only(),
+void add_solids_class(py::module_& module) {
+  py::class_<DeviceSolids>(
+      module, "Solids",
+      "Assets and fields in the memory of a device, for batches. Pairs refer to them by index.\n\n"
+      "Their data is copied. Batches of one Solids run one after another, even on different "
+      "streams, "
+      "because they share working memory. Keep it alive as long as captured graphs use it.")
+      .def(py::init<const py::sequence&, int>(), py::arg("solids"), py::kw_only(),
            py::arg("device") = 0,
-           "assets: ist.Asset each. Raises ist.Error if the device cannot be used or is out of "
-           "memory.")
-      .def("__len__", [](const DeviceAssets& self) { return self.assets().size(); })
+           "solids: ist.Asset or ist.Field each; for an asset's surface ist.MeshField(asset). "
+           "Raises ist.Error if the device cannot be used or is out of memory.")
+      .def("__len__", [](const DeviceSolids& self) { return self.solids().size(); })
       .def_prop_ro(
-          "device", [](const DeviceAssets& self) { return self.assets().device(); },
+          "device", [](const DeviceSolids& self) { return self.solids().device(); },
           "CUDA device index.")
       .def_prop_ro(
-          "bytes", [](const DeviceAssets& self) { return self.assets().bytes(); },
-          "Device memory of the assets.");
-}
-
-void add_fields_class(py::module_& module) {
-  py::class_<DeviceFields>(
-      module, "Fields",
-      "Fields in the memory of a device, for batches. Pairs refer to them by index.\n\n"
-      "Their data is copied. Keep it alive as long as captured graphs use it.")
-      .def(py::init<const py::sequence&, int>(), py::arg("fields"), py::kw_only(),
-           py::arg("device") = 0,
-           "fields: ist.Field each; for an asset's surface ist.MeshField(asset). Raises ist.Error "
-           "if the device cannot be used or is out of memory.")
-      .def("__len__", [](const DeviceFields& self) { return self.fields().size(); })
-      .def_prop_ro(
-          "device", [](const DeviceFields& self) { return self.fields().device(); },
-          "CUDA device index.")
-      .def_prop_ro(
-          "bytes", [](const DeviceFields& self) { return self.fields().bytes(); },
-          "Device memory of the fields.");
+          "bytes", [](const DeviceSolids& self) { return self.solids().bytes(); },
+          "Device memory of the solids.");
 }
 
 }  // namespace
@@ -52,8 +35,7 @@ void add_gpu(py::module_& package) {
       "Batches on a GPU: arrays of any framework, in and out, without a copy.\n\n"
       "available() reports whether there is one. docs/batch.md, docs/python.md.");
   add_device_array(module);
-  add_assets_class(module);
-  add_fields_class(module);
+  add_solids_class(module);
   module.def(
       "available", [](int device) { return gpu_available(device); }, py::arg("device") = 0,
       "Whether this build can use the device; why_not() returns the reason if not.");

@@ -83,10 +83,10 @@ class PairArguments {
     if (!value.is_none())
       to = static_cast<const double*>(take(value, {name, {kFloat64}, {}, false}));
   }
-  /// Numbers of solids, of which there are `size`; one for all is kept until the number of rows is
+  /// Indices of solids, of which there are `size`; one for all is kept until the number of rows is
   /// known.
-  void take_numbers(const py::object& value, const char* name, std::size_t size, const char* kind,
-                    const std::uint32_t*& to) {
+  void take_solid(const py::object& value, const char* name, std::size_t size,
+                  const std::uint32_t*& to) {
     if (!py::isinstance<py::int_>(value)) {
       to = static_cast<const std::uint32_t*>(take(value, {name, {kUInt32, kInt32}, {}, false}));
       return;
@@ -94,14 +94,14 @@ class PairArguments {
     const auto number = py::cast<std::int64_t>(value);
     if (number < 0 || number >= static_cast<std::int64_t>(size))
       throw value_error(std::string(name) + ": " + std::to_string(number) + "; there are " +
-                        std::to_string(size) + " " + kind);
+                        std::to_string(size) + " solids");
     same_.push_back({static_cast<std::uint32_t>(number), &to});
   }
 
   /// To be called when all are taken.
   std::size_t count() {
     if (rows_ < 0)
-      throw value_error("pose_b: None; one argument must have rows: poses, scales or assets");
+      throw value_error("pose_b: None; one argument must have rows: poses, scales or solids");
     const auto count = static_cast<std::size_t>(rows_);
     for (const auto& [number, to] : same_) {
       repeated_.push_back(std::make_unique<cuda::Repeated>(device_, number, count, stream_));
@@ -228,40 +228,33 @@ Places<Answers> given_columns(const Answers& blank, const py::object& out, std::
 
 /// The arguments that describe pairs, as they were given.
 struct GivenPairs {
-  const py::object &asset_a, &asset_b, &pose_a, &pose_b, &scale_a, &scale_b;
-  std::shared_ptr<DeviceFields> fields;  ///< those that asset_a names; null: assets
+  const py::object &solid_a, &solid_b, &pose_a, &pose_b, &scale_a, &scale_b;
 };
 
-/// Takes all arguments and launches a batch: launch(assets, pairs, workspace, answers, stream).
+/// Takes all arguments and launches a batch: launch(solids, pairs, workspace, answers, stream).
 /// `blank`: answers without arrays.
 template <class Answers, class Launch>
-DeviceAnswers<Answers> ask(DeviceAssets& assets, const GivenPairs& given, const Answers& blank,
+DeviceAnswers<Answers> ask(DeviceSolids& solids, const GivenPairs& given, const Answers& blank,
                            const py::object& wanted, const py::object& out,
                            const py::object& stream, const Launch& launch) {
   const cuda::Stream on = stream_of(stream);
-  const int device = assets.assets().device();
+  const int device = solids.solids().device();
   PairArguments arguments(device, on);
   GpuPairs pairs;
-  if (given.fields != nullptr)
-    arguments.take_numbers(given.asset_a, "asset_a", given.fields->fields().size(), "fields",
-                           pairs.asset_a);
-  else
-    arguments.take_numbers(given.asset_a, "asset_a", assets.assets().size(), "assets",
-                           pairs.asset_a);
-  arguments.take_numbers(given.asset_b, "asset_b", assets.assets().size(), "assets", pairs.asset_b);
-  arguments.take_pose(given.pose_a, "pose_a", pairs.pose_a);
-  arguments.take_pose(given.pose_b, "pose_b", pairs.pose_b);
-  arguments.take_scale(given.scale_a, "scale_a", pairs.scale_a);
-  arguments.take_scale(given.scale_b, "scale_b", pairs.scale_b);
+  arguments.take_solid(given.solid_a, "solid_a", solids.solids().size(), pairs.a.solid);
+  arguments.take_solid(given.solid_b, "solid_b", solids.solids().size(), pairs.b.solid);
+  arguments.take_pose(given.pose_a, "pose_a", pairs.a.pose);
+  arguments.take_pose(given.pose_b, "pose_b", pairs.b.pose);
+  arguments.take_scale(given.scale_a, "scale_a", pairs.a.scale);
+  arguments.take_scale(given.scale_b, "scale_b", pairs.b.scale);
   pairs.count = arguments.count();
-  if (given.fields != nullptr) arguments.lent.push_back(given.fields);
   if (!out.is_none() && !wanted.is_none())
     throw value_error("wanted: excludes `out`, whose arrays already select the answers");
   Places<Answers> places =
       out.is_none() ? new_columns(blank, wanted_columns<Answers>(wanted), pairs.count, device, on)
                     : given_columns(blank, out, pairs.count, device, on, arguments.lent);
-  const auto done = assets.launch(pairs, on, std::move(arguments.lent),
-                                  [&](const GpuAssets& all, GpuWorkspace& workspace) {
+  const auto done = solids.launch(pairs, on, std::move(arguments.lent),
+                                  [&](const GpuSolids& all, GpuWorkspace& workspace) {
                                     launch(all, pairs, workspace, places.to, on);
                                   });
   if (done != nullptr)

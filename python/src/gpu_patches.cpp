@@ -41,15 +41,15 @@ std::span<const Answer<PatchAnswers>> columns_of() {
       {"torque", kFloat64, 3, set_patches<&To::torque>,
        "(n, m, 3) float64 [u³/rad] about B's origin, summing to the pair's.", true, most_of},
       {"status", kUInt32, 0, set_column<&PatchAnswers::status>,
-       "(n,) uint32, a QueryStatus: ok or invalid_input.", true},
+       "(n,) uint32, a QueryStatus: ok, invalid_input or not_held.", true},
   };
   return kColumns;
 }
 
 namespace {
 
-DeviceAnswers<PatchAnswers> patches_of(DeviceAssets& assets, const py::object& asset_a,
-                                       const py::object& asset_b, const py::object& pose_a,
+DeviceAnswers<PatchAnswers> patches_of(DeviceSolids& solids, const py::object& solid_a,
+                                       const py::object& solid_b, const py::object& pose_a,
                                        const py::object& pose_b, const py::object& scale_a,
                                        const py::object& scale_b, std::uint32_t max_patches,
                                        const std::string& measure, const py::object& wanted,
@@ -60,26 +60,25 @@ DeviceAnswers<PatchAnswers> patches_of(DeviceAssets& assets, const py::object& a
                       std::to_string(kMostGpuPatches));
   PatchAnswers blank;
   blank.patches.most = max_patches;
-  return ask<PatchAnswers>(assets, {asset_a, asset_b, pose_a, pose_b, scale_a, scale_b, nullptr},
-                           blank, wanted, out, stream,
-                           [&](const GpuAssets& all, const GpuPairs& pairs, GpuWorkspace& workspace,
-                               const PatchAnswers& to, cuda::Stream on) {
-                             GpuPenetrations whole;
-                             whole.status = to.status;
-                             contact_patches_batch(all, pairs, which, workspace, whole, to.patches,
-                                                   on);
-                           });
+  return ask<PatchAnswers>(
+      solids, {solid_a, solid_b, pose_a, pose_b, scale_a, scale_b}, blank, wanted, out, stream,
+      [&](const GpuSolids& all, const GpuPairs& pairs, GpuWorkspace& workspace,
+          const PatchAnswers& to, cuda::Stream on) {
+        GpuPenetrations whole;
+        whole.status = to.status;
+        contact_patches_batch(all, pairs, which, workspace, whole, to.patches, on);
+      });
 }
 
 constexpr const char* kPatchesDoc =
     R"(Contacts of a batch of pairs, each condensed into a few patches, on the device.
 
-assets … scale_b, measure, out, stream: as for penetration().
+solids … scale_b, measure, out, stream: as for penetration().
 max_patches: count for each pair, 1 to 32: m, the second dimension. Beyond count[i] a pair's rows are
     zero, or with `out` as they were.
 wanted: names of the answers to compute; None: all.
 
-As ist.contact_patches(…, field='never'), with the same regions and ids. Their volumes, forces
+Of two assets each; a row of a field is not_held. As ist.contact_patches(…, field='never'), with the same regions and ids. Their volumes, forces
 and torques sum to the pair's, within 1e-6 of the sum in double.
 
 Returns a ContactPatches.)";
@@ -90,8 +89,8 @@ void add_gpu_patches(py::module_& module) {
   add_answers<PatchAnswers>(module, "ContactPatches",
                             "Patches of a batch: arrays on the device, None if not requested. "
                             "Arrays passed as `out` are the same objects.");
-  module.def("contact_patches", &patches_of, py::arg("assets"), py::arg("asset_a"),
-             py::arg("asset_b"), py::arg("pose_a").none(), py::arg("pose_b").none(),
+  module.def("contact_patches", &patches_of, py::arg("solids"), py::arg("solid_a"),
+             py::arg("solid_b"), py::arg("pose_a").none(), py::arg("pose_b").none(),
              py::arg("scale_a") = py::none(), py::arg("scale_b") = py::none(), py::kw_only(),
              py::arg("max_patches") = 8, py::arg("measure") = "matched",
              py::arg("wanted") = py::none(), py::arg("out") = py::none(),

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/error.h>
-#include <ist/gpu_fields.h>
 #include <ist/gpu_query.h>
 
 #include <cstddef>
@@ -18,26 +17,29 @@
 
 namespace ist::python {
 
-/// Assets on a device, and what their batches work in.
-class DeviceAssets {
+/// Solids on a device, and what their batches work in.
+class DeviceSolids {
  public:
-  DeviceAssets(const py::sequence& assets, int device) {
-    std::vector<TreeView> views;
-    const py::list held(assets);
-    for (const py::handle asset : held) views.push_back(tree_of(asset, "assets"));
+  DeviceSolids(const py::sequence& solids, int device) {
+    std::vector<GpuSolid> views;
+    const py::list held(solids);
+    for (const py::handle solid : held) {
+      const std::string name = "solids[" + std::to_string(views.size()) + "]";
+      views.push_back(solid_of(solid, name.c_str()));
+    }
     const py::gil_scoped_release released;
     GpuSettings settings;
     settings.device = device;
-    assets_ = std::make_unique<GpuAssets>(views, settings);
+    solids_ = std::make_unique<GpuSolids>(views, settings);
   }
 
-  ~DeviceAssets() {
+  ~DeviceSolids() {
     if (in_flight_.empty()) return;
     const py::gil_scoped_release released;
     in_flight_.back().done->wait();  // what they read is about to go
   }
 
-  const GpuAssets& assets() const { return *assets_; }
+  const GpuSolids& solids() const { return *solids_; }
 
   /// Launches a batch after those before it, on whatever streams they were. Returns when it will
   /// be done, or null where the stream's work goes into a graph.
@@ -47,7 +49,7 @@ class DeviceAssets {
   std::shared_ptr<const cuda::Moment> launch(const GpuPairs& pairs, cuda::Stream stream,
                                              std::vector<std::shared_ptr<void>> lent,
                                              const Launch& batch) {
-    const int device = assets_->device();
+    const int device = solids_->device();
     const bool captured = cuda::captures(device, stream);
     // Few pairs and many are cut up differently, in workspaces of their own: an answer does not
     // depend on what was asked before.
@@ -60,7 +62,7 @@ class DeviceAssets {
       make_room(room, pairs.count);
     }
     if (!captured && !in_flight_.empty()) in_flight_.back().done->hold(stream);
-    batch(*assets_, *room.workspace);
+    batch(*solids_, *room.workspace);
     if (captured) {
       room.captured = true;
       return nullptr;
@@ -83,9 +85,9 @@ class DeviceAssets {
 
   void make_room(Room& room, std::size_t pairs) {
     GpuSettings settings;
-    settings.device = assets_->device();
+    settings.device = solids_->device();
     if (!in_flight_.empty()) in_flight_.back().done->wait();
-    // A graph that was captured uses the old one as long as these assets.
+    // A graph that was captured uses the old one as long as these solids.
     if (room.captured) captured_.push_back(std::move(room.workspace));
     room = {};
     std::size_t most = 4096;
@@ -93,29 +95,10 @@ class DeviceAssets {
     room.workspace = std::make_unique<GpuWorkspace>(most, settings);
   }
 
-  std::unique_ptr<GpuAssets> assets_;
+  std::unique_ptr<GpuSolids> solids_;
   Room rooms_[2];  ///< of few pairs, and of many
   std::vector<std::unique_ptr<GpuWorkspace>> captured_;
   std::deque<Batch> in_flight_;
-};
-
-/// Fields on a device. Batches that read them hold them until they are done.
-class DeviceFields {
- public:
-  DeviceFields(const py::sequence& fields, int device) {
-    std::vector<Field> all;
-    const py::list held(fields);
-    for (const py::handle field : held) all.push_back(field_of(field, "fields"));
-    const py::gil_scoped_release released;
-    GpuSettings settings;
-    settings.device = device;
-    fields_ = std::make_unique<GpuFields>(all, settings);
-  }
-
-  const GpuFields& fields() const { return *fields_; }
-
- private:
-  std::unique_ptr<GpuFields> fields_;
 };
 
 }  // namespace ist::python

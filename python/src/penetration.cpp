@@ -56,10 +56,10 @@ ScaleGradient scale_gradient(const Row& row, const Penetration& answer,
 
 std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings& settings,
                                      bool scale_gradients, unsigned threads) {
-  auto answers = std::make_shared<Penetrations>(rows.shape());
+  auto answers = std::make_shared<Penetrations>(Penetrations{rows.shape()});
   if (scale_gradients) {
-    answers->scale_gradient = {rows.shape(), {}};
-    answers->scale_gradient_a = {rows.shape(), {}};
+    answers->scale_gradient = Column<double>(rows.shape());
+    answers->scale_gradient_a = Column<double>(rows.shape());
   }
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
@@ -69,8 +69,8 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
     const ScaleGradient gradient = found.volume != 0 && !std::isnan(found.volume)
                                        ? scale_gradient(row, found, settings, workspace)
                                        : ScaleGradient{found.volume, found.volume};
-    *answers->scale_gradient.row(i) = gradient.b;
-    *answers->scale_gradient_a.row(i) = gradient.a;
+    answers->scale_gradient.write(i, gradient.b);
+    answers->scale_gradient_a.write(i, gradient.a);
   });
   refuse_unanswered(rows, answers->status, {settings.measure, settings.field});
   return answers;
@@ -162,32 +162,18 @@ void add_class(py::module_& module) {
 
 }  // namespace
 
-Penetrations::Penetrations(const Shape& rows)
-    : volume(rows, {}),
-      volume_min(rows, {}),
-      volume_max(rows, {}),
-      centroid(rows, {3}),
-      force(rows, {3}),
-      torque(rows, {3}),
-      pose_gradient(rows, {7}),
-      pose_gradient_a(rows, {7}),
-      status(rows, {}),
-      node_visits(rows, {}),
-      sphere_pairs(rows, {}) {}
-
 void Penetrations::write(std::size_t i, const Row& row, const Penetration& answer) const {
-  *status.row(i) = static_cast<std::uint32_t>(answer.status);
-  *node_visits.row(i) = answer.node_visits;
-  *sphere_pairs.row(i) = answer.sphere_pairs;
-  if (answer.volume_max == 0) return;  // nothing touches: all is zero
-  *volume.row(i) = answer.volume;
-  *volume_min.row(i) = answer.volume_min;
-  *volume_max.row(i) = answer.volume_max;
-  Vector(centroid.row(i)) = answer.centroid;
+  const bool touches = answer.volume_max != 0;  // else all is zero but the counts
+  for_each_member(
+      [&]<class T, std::size_t kEach>(const Column<T, kEach>& column, const auto& value) {
+        if (touches || std::is_integral_v<T>) column.write(i, value);
+      },
+      *this, answer);
+  if (!touches) return;
   const Eigen::Vector3d origin_a(row.a.pose.t), origin_b(row.b.pose.t);
   const Wrenches push = wrenches(answer, row.b.pose, origin_a, origin_b);
-  Vector(force.row(i)) = push.on_b.force;
-  Vector(torque.row(i)) = push.on_b.torque;
+  force.write(i, push.on_b.force);
+  torque.write(i, push.on_b.torque);
   write_pose_gradient(row.b.pose, answer.translation_gradient, answer.rotation_gradient,
                       pose_gradient.row(i));
   write_pose_gradient(row.a.pose, -push.on_a.force, -push.on_a.torque, pose_gradient_a.row(i));

@@ -21,19 +21,17 @@ inline constexpr std::pair<const char*, Measure> kGpuMeasures[] = {{"matched", M
 inline constexpr std::pair<const char*, FieldUse> kFieldUses[] = {
     {"automatic", FieldUse::automatic}, {"never", FieldUse::never}, {"always", FieldUse::always}};
 
-using Vector = Eigen::Map<Eigen::Vector3d>;  ///< a row of a column
-
 /// Penetrations as columns.
 struct Penetrations {
-  explicit Penetrations(const Shape& rows);
+  Shape rows;
+  Column<double> volume{rows}, volume_min{rows}, volume_max{rows};
+  Column<double, 3> centroid{rows}, force{rows}, torque{rows};
+  Column<double, 7> pose_gradient{rows}, pose_gradient_a{rows};
+  Column<std::uint32_t> status{rows}, node_visits{rows}, sphere_pairs{rows};
+  Column<double> scale_gradient{}, scale_gradient_a{};  ///< without an array where nobody asked
 
   /// What was answered for row i, and how it grows with both poses.
   void write(std::size_t i, const Row& row, const Penetration& answer) const;
-
-  Column<double> volume, volume_min, volume_max, centroid, force, torque, pose_gradient,
-      pose_gradient_a;
-  Column<std::uint32_t> status, node_visits, sphere_pairs;
-  Column<double> scale_gradient, scale_gradient_a;  ///< without an array where nobody asked
 };
 
 /// A property that is a column.

@@ -18,16 +18,10 @@ namespace ist::python {
 namespace {
 
 struct Lenses {
-  explicit Lenses(std::size_t count)
-      : centre({count}, {3}),
-        axis({count}, {3}),
-        radius({count}, {}),
-        thickness({count}, {}),
-        sphere_a({count}, {}),
-        sphere_b({count}, {}) {}
-
-  Column<double> centre, axis, radius, thickness;
-  Column<std::uint32_t> sphere_a, sphere_b;
+  Shape rows;
+  Column<double, 3> centre{rows}, axis{rows};
+  Column<double> radius{rows}, thickness{rows};
+  Column<std::uint32_t> sphere_a{rows}, sphere_b{rows};
 };
 
 std::unique_ptr<Lenses> lenses(const py::object& a, const py::object& b, const py::object& pose,
@@ -51,15 +45,8 @@ std::unique_ptr<Lenses> lenses(const py::object& a, const py::object& b, const p
     throw Error("a, b: one is a surface alone, without spheres; bake it with bake()");
   if (found.status == QueryStatus::invalid_input)
     throw value_error("pose, detail_a, detail_b: too far away, or an asset has no such detail");
-  auto answers = std::make_unique<Lenses>(found.count);
-  for (std::size_t i = 0; i < found.count; ++i) {
-    Vector(answers->centre.row(i)) = room[i].centre;
-    Vector(answers->axis.row(i)) = room[i].axis;
-    *answers->radius.row(i) = room[i].radius;
-    *answers->thickness.row(i) = room[i].thickness;
-    *answers->sphere_a.row(i) = room[i].sphere_a;
-    *answers->sphere_b.row(i) = room[i].sphere_b;
-  }
+  auto answers = std::make_unique<Lenses>(Lenses{{found.count}});
+  for (std::size_t i = 0; i < found.count; ++i) write_row(*answers, i, room[i]);
   return answers;
 }
 
@@ -67,22 +54,16 @@ std::shared_ptr<Penetrations> corrected(const Penetrations& whole, const Rows& r
   if (whole.volume.shape != rows.shape())
     throw value_error("whole: shape " + text_of(whole.volume.shape) + " of rows; poses have " +
                       text_of(rows.shape()));
-  auto answers = std::make_shared<Penetrations>(rows.shape());
+  auto answers = std::make_shared<Penetrations>(Penetrations{rows.shape()});
   for (std::size_t i = 0; i < rows.count(); ++i) {
     const Row row = rows.at(i);
     for (const Side* const side : {&row.a, &row.b})
       if (side->tree() == nullptr)
         throw type_error(std::string(side == &row.a ? "a" : "b") + ": a Field; wanted an Asset");
     Penetration before;
-    before.volume = *whole.volume.row(i);
-    before.volume_min = *whole.volume_min.row(i);
-    before.volume_max = *whole.volume_max.row(i);
-    before.centroid = Vector(whole.centroid.row(i));
-    before.translation_gradient = -Vector(whole.force.row(i));
-    before.rotation_gradient = -Vector(whole.torque.row(i));
-    before.status = QueryStatus{*whole.status.row(i)};
-    before.node_visits = *whole.node_visits.row(i);
-    before.sphere_pairs = *whole.sphere_pairs.row(i);
+    for_each_member([i](auto& value, const auto& column) { column.read(i, value); }, before, whole);
+    before.translation_gradient = -whole.force.vector(i);
+    before.rotation_gradient = -whole.torque.vector(i);
     answers->write(i, row,
                    without_protrusion(before, {*row.a.tree(), row.a.pose, row.a.scale},
                                       {*row.b.tree(), row.b.pose, row.b.scale}));
@@ -106,8 +87,8 @@ py::tuple surface_of(const Asset& asset) {
   if (ist_tree_view(bytes.data(), bytes.size(), &tree) != IST_OK ||
       ist_tree_get_surface(&tree, &surface) != IST_OK || surface.triangle_count == 0)
     throw Error("the asset holds no surface; bake it with surface='all'");
-  const Column<double> vertices({surface.vertex_count}, {3});
-  const Column<std::uint32_t> triangles({surface.triangle_count}, {3});
+  const Column<double, 3> vertices({surface.vertex_count});
+  const Column<std::uint32_t, 3> triangles({surface.triangle_count});
   surface.vertices = reinterpret_cast<double(*)[3]>(vertices.row(0));
   surface.triangles = reinterpret_cast<std::uint32_t(*)[3]>(triangles.row(0));
   surface.vertex_capacity = surface.vertex_count;

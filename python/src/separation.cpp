@@ -4,74 +4,55 @@
 
 #include <memory>
 
-#include "gap.h"
+#include "penetration.h"
 
 namespace ist::python {
 namespace {
 
-struct Separations : Gaps {
-  explicit Separations(const Shape& rows)
-      : Gaps(rows), distance(rows, {}), sphere_pairs(rows, {}) {}
-
-  void write(std::size_t i, const Separation& answer) const {
-    write_gap(i, answer);
-    *distance.row(i) = answer.distance;
-    *sphere_pairs.row(i) = answer.sphere_pairs;
-  }
-
-  Column<double> distance;
-  Column<std::uint32_t> sphere_pairs;
+struct Separations {
+  Shape rows;
+  Column<double> distance{rows}, distance_min{rows}, distance_max{rows};
+  Column<double, 3> point_a{rows}, point_b{rows}, normal{rows};
+  Column<std::uint32_t> status{rows}, node_visits{rows}, sphere_pairs{rows};
 };
 
+Shape with(Shape rows, std::size_t each) {
+  rows.push_back(each);
+  return rows;
+}
+
 struct Patches {
-  Patches(const Shape& rows, std::size_t each)
-      : penetration(std::make_shared<Penetrations>(rows)),
-        count(rows, {}),
-        id(rows, {each}),
-        centroid(rows, {each, 3}),
-        normal(rows, {each, 3}),
-        area(rows, {each}),
-        depth(rows, {each}),
-        volume(rows, {each}),
-        force(rows, {each, 3}),
-        torque(rows, {each, 3}),
-        point(rows, {each, 3}),
-        twist(rows, {each}) {}
+  Shape rows, patches;
+  std::shared_ptr<Penetrations> penetration = std::make_shared<Penetrations>(Penetrations{rows});
+  Column<std::uint32_t> count{rows};
+  Column<std::uint64_t> id{patches};
+  Column<double, 3> centroid{patches}, normal{patches}, force{patches}, torque{patches},
+      point{patches};
+  Column<double> area{patches}, depth{patches}, volume{patches}, twist{patches};
 
-  void write(std::size_t i, std::span<const ContactPatch> patches) const {
-    for (std::size_t k = 0; k < patches.size(); ++k) {
-      const ContactPatch& patch = patches[k];
-      id.row(i)[k] = patch.id;
-      Vector(centroid.row(i) + 3 * k) = patch.centroid;
-      Vector(normal.row(i) + 3 * k) = patch.normal;
-      area.row(i)[k] = patch.area;
-      depth.row(i)[k] = patch.depth;
-      volume.row(i)[k] = patch.volume;
-      Vector(force.row(i) + 3 * k) = patch.force;
-      Vector(torque.row(i) + 3 * k) = patch.torque;
-      Vector(point.row(i) + 3 * k) = patch.point;
-      twist.row(i)[k] = patch.twist;
-    }
+  Patches(const Shape& of, std::size_t each) : rows(of), patches(with(of, each)) {}
+
+  void write(std::size_t i, const Row& row, const ContactPatches& whole,
+             std::span<const ContactPatch> found) const {
+    penetration->write(i, row, whole.penetration);
+    count.write(i, whole.count);
+    for (std::size_t k = 0; k < whole.count; ++k)
+      write_row(*this, i * patches.back() + k, found[k]);
   }
-
-  std::shared_ptr<Penetrations> penetration;
-  Column<std::uint32_t> count;
-  Column<std::uint64_t> id;
-  Column<double> centroid, normal, area, depth, volume, force, torque, point, twist;
 };
 
 struct Outline {
   std::shared_ptr<Patches> contact;
-  Column<double> segments;
+  Column<double, 3> segments;
   Column<std::uint32_t> patch;
 };
 
 std::unique_ptr<Separations> separations(const Rows& rows, const SeparationSettings& settings,
                                          unsigned threads) {
-  auto answers = std::make_unique<Separations>(rows.shape());
+  auto answers = std::make_unique<Separations>(Separations{rows.shape()});
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
-    answers->write(i, separation(row.a.placed(), row.b.placed(), settings, workspace));
+    write_row(*answers, i, separation(row.a.placed(), row.b.placed(), settings, workspace));
   });
   refuse_unanswered(rows, answers->status);
   return answers;
@@ -84,11 +65,8 @@ std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
     const Row row = rows.at(i);
     thread_local std::vector<ContactPatch> found;
     found.resize(each);
-    const ContactPatches answer =
-        contact_patches(row.a.placed(), row.b.placed(), settings, workspace, found);
-    answers->penetration->write(i, row, answer.penetration);
-    *answers->count.row(i) = static_cast<std::uint32_t>(answer.count);
-    answers->write(i, std::span(found).first(answer.count));
+    answers->write(
+        i, row, contact_patches(row.a.placed(), row.b.placed(), settings, workspace, found), found);
   });
   refuse_unanswered(rows, answers->penetration->status, {settings.measure, settings.field});
   return answers;
@@ -117,30 +95,26 @@ std::unique_ptr<Outline> outline(const Rows& rows, std::size_t each,
       found = ask();
     }
     segments.resize(found.segments);
-    contact->penetration->write(i, row, found.contact.penetration);
-    *contact->count.row(i) = static_cast<std::uint32_t>(found.contact.count);
-    contact->write(i, std::span(patches).first(found.contact.count));
+    contact->write(i, row, found.contact, patches);
   });
   refuse_unanswered(rows, contact->penetration->status, {Measure::exact});
-  const Shape count = {segments.size()};
-  auto answer = std::make_unique<Outline>(
-      Outline{contact, Column<double>(count, {2, 3}), Column<std::uint32_t>(count, {})});
+  auto answer = std::make_unique<Outline>(Outline{contact, Column<double, 3>({segments.size(), 2}),
+                                                  Column<std::uint32_t>({segments.size()})});
   for (std::size_t i = 0; i < segments.size(); ++i) {
-    Vector(answer->segments.row(i)) = segments[i].from;
-    Vector(answer->segments.row(i) + 3) = segments[i].to;
-    *answer->patch.row(i) = segments[i].patch;
+    answer->segments.write(2 * i, segments[i].from);
+    answer->segments.write(2 * i + 1, segments[i].to);
+    answer->patch.write(i, segments[i].patch);
   }
   return answer;
 }
 
 py::object overlaps(const Rows& rows, unsigned threads) {
-  const Column<std::uint32_t> answers(rows.shape(), {});
+  const Column<std::uint32_t> answers(rows.shape());
   if (rows.shape().empty() && !fault_of(rows.at(0)).empty())
     refuse_unanswered(rows, QueryStatus::invalid_input);
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
-    *answers.row(i) =
-        static_cast<std::uint32_t>(overlap(row.a.placed(), row.b.placed(), workspace));
+    answers.write(i, overlap(row.a.placed(), row.b.placed(), workspace));
   });
   return answers.handed_out();
 }

@@ -30,7 +30,4 @@ Solid solid_of(const py::handle& object, const char* name);
 /// Of an Asset, else TypeError that says why a field will not do.
 TreeView tree_of(const py::handle& object, const char* name);
 
-/// Of a Field, else TypeError that says how an asset becomes one.
-Field field_of(const py::handle& object, const char* name);
-
 }  // namespace ist::python

@@ -12,45 +12,17 @@ namespace ist::python {
 namespace {
 
 struct RayHits {
-  explicit RayHits(const Shape& rows)
-      : distance(rows, {}),
-        point(rows, {3}),
-        normal(rows, {3}),
-        triangle(rows, {}),
-        status(rows, {}) {}
-
-  void write(std::size_t i, const RayHit& hit) const {
-    *distance.row(i) = hit.distance;
-    Vector(point.row(i)) = hit.point;
-    Vector(normal.row(i)) = hit.normal;
-    *triangle.row(i) = hit.triangle;
-    *status.row(i) = static_cast<std::uint32_t>(hit.status);
-  }
-
-  Column<double> distance, point, normal;
-  Column<std::uint32_t> triangle, status;
+  Shape rows;
+  Column<double> distance{rows};
+  Column<double, 3> point{rows}, normal{rows};
+  Column<std::uint32_t> triangle{rows}, status{rows};
 };
 
 struct SurfacePoints {
-  explicit SurfacePoints(const Shape& rows)
-      : distance(rows, {}),
-        error(rows, {}),
-        point(rows, {3}),
-        gradient(rows, {3}),
-        triangle(rows, {}),
-        status(rows, {}) {}
-
-  void write(std::size_t i, const SurfacePoint& foot) const {
-    *distance.row(i) = foot.distance;
-    *error.row(i) = foot.error;
-    Vector(point.row(i)) = foot.point;
-    Vector(gradient.row(i)) = foot.gradient;
-    *triangle.row(i) = foot.triangle;
-    *status.row(i) = static_cast<std::uint32_t>(foot.status);
-  }
-
-  Column<double> distance, error, point, gradient;
-  Column<std::uint32_t> triangle, status;
+  Shape rows;
+  Column<double> distance{rows}, error{rows};
+  Column<double, 3> point{rows}, gradient{rows};
+  Column<std::uint32_t> triangle{rows}, status{rows};
 };
 
 PlacedSolid placed_alone(const py::object& solid, const py::object& pose, double scale) {
@@ -150,11 +122,11 @@ void add_surfaces(py::module_& module) {
           throw value_error("directions: " + std::to_string(along.count) + " rows; origins have " +
                             std::to_string(from.count));
         const Shape& shape = from.rows.empty() ? along.rows : from.rows;
-        auto answers = std::make_unique<RayHits>(shape);
+        auto answers = std::make_unique<RayHits>(RayHits{shape});
         ask_places(placed, shape, "origins, directions, longest",
                    [&](const PlacedSolid& at, std::size_t i) {
                      const RayHit hit = raycast(at, Ray{from.at(i), along.at(i), longest});
-                     answers->write(i, hit);
+                     write_row(*answers, i, hit);
                      return hit.status;
                    });
         return answers;
@@ -167,10 +139,10 @@ void add_surfaces(py::module_& module) {
       [](const py::object& solid, const py::object& pose, const py::object& points, double scale) {
         const PlacedSolid placed = placed_alone(solid, pose, scale);
         const Places places(points, "points");
-        auto answers = std::make_unique<SurfacePoints>(places.rows);
+        auto answers = std::make_unique<SurfacePoints>(SurfacePoints{places.rows});
         ask_places(placed, places.rows, "points", [&](const PlacedSolid& at, std::size_t i) {
           const SurfacePoint foot = closest_point(at, places.at(i));
-          answers->write(i, foot);
+          write_row(*answers, i, foot);
           return foot.status;
         });
         return answers;
@@ -182,7 +154,7 @@ void add_surfaces(py::module_& module) {
       [](const py::object& solid, const py::object& pose, const py::object& points, double scale) {
         const PlacedSolid placed = placed_alone(solid, pose, scale);
         const Places places(points, "points");
-        const Column<std::uint32_t> answers(places.rows, {});
+        const Column<std::uint32_t> answers(places.rows);
         ask_places(placed, places.rows, "points", [&](const PlacedSolid& at, std::size_t i) {
           const Containment found = contains(at, places.at(i));
           *answers.row(i) = found.status != QueryStatus::ok ? 2 : found.inside ? 1 : 0;

@@ -3,22 +3,16 @@
 #include <cmath>
 #include <memory>
 
-#include "gap.h"
+#include "penetration.h"
 
 namespace ist::python {
 namespace {
 
-struct Impacts : Gaps {
-  explicit Impacts(const Shape& rows) : Gaps(rows), time(rows, {}), surface_pairs(rows, {}) {}
-
-  void write(std::size_t i, const TimeOfImpact& answer) const {
-    write_gap(i, answer);
-    *time.row(i) = answer.time;
-    *surface_pairs.row(i) = answer.surface_pairs;
-  }
-
-  Column<double> time;
-  Column<std::uint32_t> surface_pairs;
+struct Impacts {
+  Shape rows;
+  Column<double> time{rows}, distance_min{rows}, distance_max{rows};
+  Column<double, 3> point_a{rows}, point_b{rows}, normal{rows};
+  Column<std::uint32_t> status{rows}, node_visits{rows}, surface_pairs{rows};
 };
 
 constexpr const char* kDoc =
@@ -71,14 +65,15 @@ void add_time_of_impact(py::module_& module) {
                             text_of(from.shape()));
         const Eigen::Vector3d centre = take_vector(about, "about"),
                               centre_a = take_vector(about_a, "about_a");
-        auto answers = std::make_unique<Impacts>(from.shape());
+        auto answers = std::make_unique<Impacts>(Impacts{from.shape()});
         for_each_row(from, threads, [&](std::size_t i, Workspace& workspace) {
           const Row start = from.at(i), end = to.at(i);
           const Motions motions{
               motion_between(start.a.pose, end.a.pose, settings.duration, centre_a, start.a.scale),
               motion_between(start.b.pose, end.b.pose, settings.duration, centre, start.b.scale)};
-          answers->write(
-              i, time_of_impact(start.a.placed(), start.b.placed(), motions, settings, workspace));
+          write_row(
+              *answers, i,
+              time_of_impact(start.a.placed(), start.b.placed(), motions, settings, workspace));
         });
         if (from.shape().empty()) {
           const auto status = ImpactStatus{*answers->status.row(0)};

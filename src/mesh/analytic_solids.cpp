@@ -5,14 +5,31 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <utility>
 
-#include "mesh/integrated_solid.h"
+#include "mesh/solid_volume.h"
 
 namespace ist {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
+
+/// A solid whose volume has no closed form: integrated when it is first asked for.
+class IntegratedSolid : public Solid {
+ public:
+  double volume() const override { return integrated().value; }
+  double volume_error() const override { return integrated().error; }
+
+ private:
+  const IntegratedVolume& integrated() const {
+    std::call_once(once_, [this] { volume_ = integrate_volume(*this); });
+    return volume_;
+  }
+
+  mutable std::once_flag once_;
+  mutable IntegratedVolume volume_;
+};
 
 void require_length(double value, const char* what) {
   if (!(value > 0) || !std::isfinite(value))

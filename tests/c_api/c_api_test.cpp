@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "c_api/checks.h"
+#include "query/base/members.h"
 #include "samples/samples.h"
 #include "support/oracle_assets.h"
 #include "support/random_assets.h"
@@ -66,39 +67,21 @@ void expect_same(const double (&c)[3], const Eigen::Vector3d& cpp) {
   for (int k = 0; k < 3; ++k) EXPECT_SAME(c[k], cpp[k]);
 }
 
-void expect_same(const ist_penetration_t& c, const Penetration& cpp) {
-  EXPECT_SAME(c.volume, cpp.volume);
-  EXPECT_SAME(c.volume_min, cpp.volume_min);
-  EXPECT_SAME(c.volume_max, cpp.volume_max);
-  expect_same(c.centroid, cpp.centroid);
-  expect_same(c.translation_gradient, cpp.translation_gradient);
-  expect_same(c.rotation_gradient, cpp.rotation_gradient);
-  EXPECT_EQ(c.status, static_cast<int>(cpp.status));
-  EXPECT_EQ(c.node_visits, cpp.node_visits);
-  EXPECT_EQ(c.sphere_pairs, cpp.sphere_pairs);
-}
-
-void expect_same(const ist_separation_t& c, const Separation& cpp) {
-  EXPECT_SAME(c.distance, cpp.distance);
-  EXPECT_SAME(c.distance_min, cpp.distance_min);
-  EXPECT_SAME(c.distance_max, cpp.distance_max);
-  expect_same(c.point_a, cpp.point_a);
-  expect_same(c.point_b, cpp.point_b);
-  expect_same(c.normal, cpp.normal);
-  EXPECT_EQ(c.status, static_cast<int>(cpp.status));
-  EXPECT_EQ(c.node_visits, cpp.node_visits);
-  EXPECT_EQ(c.sphere_pairs, cpp.sphere_pairs);
-}
-
-void expect_same(const ist_contact_patch_t& c, const ContactPatch& cpp) {
-  EXPECT_EQ(c.id, cpp.id);
-  expect_same(c.centroid, cpp.centroid);
-  expect_same(c.normal, cpp.normal);
-  EXPECT_SAME(c.area, cpp.area);
-  EXPECT_SAME(c.depth, cpp.depth);
-  EXPECT_SAME(c.volume, cpp.volume);
-  expect_same(c.force, cpp.force);
-  expect_same(c.torque, cpp.torque);
+/// Of two answers.
+template <class C, class Cpp>
+requires std::is_class_v<C>
+void expect_same(const C& c, const Cpp& cpp) {
+  for_each_member(
+      []<class X, class Y>(const X& x, const Y& y) {
+        if constexpr (std::is_array_v<X>) {
+          expect_same(x, y);
+        } else if constexpr (std::is_same_v<X, double>) {
+          EXPECT_SAME(x, y);
+        } else if constexpr (!std::is_same_v<Y, ImpactStatus>) {
+          EXPECT_EQ(x, static_cast<X>(y));
+        }
+      },
+      c, cpp);
 }
 
 class OracleRows : public ::testing::Test {
@@ -187,14 +170,7 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
         ist_time_of_impact(&c_a, &c_away, nullptr, &c_motion, nullptr, &c_workspace_, &c_impact),
         0);
     EXPECT_EQ(c_impact.kind, static_cast<int>(impact.status));
-    EXPECT_SAME(c_impact.time, impact.time);
-    EXPECT_SAME(c_impact.distance_min, impact.distance_min);
-    EXPECT_SAME(c_impact.distance_max, impact.distance_max);
-    expect_same(c_impact.point_a, impact.point_a);
-    expect_same(c_impact.point_b, impact.point_b);
-    expect_same(c_impact.normal, impact.normal);
-    EXPECT_EQ(c_impact.node_visits, impact.node_visits);
-    EXPECT_EQ(c_impact.surface_pairs, impact.surface_pairs);
+    expect_same(c_impact, impact);
 
     ist_overlapping_t c_overlap;
     ASSERT_EQ(ist_overlap(&c_a, &c_b, &c_workspace_, &c_overlap), IST_OK);
@@ -277,16 +253,8 @@ TEST(CApi, RaysAndPointsHaveTheBitsOfCpp) {
   ASSERT_EQ(ist_contains(&c_placed, points, 3, inside), IST_OK);
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d x(points + 3 * i);
-    const RayHit hit = raycast(placed, Ray{x, Eigen::Vector3d(rays[i].direction)});
-    const SurfacePoint foot = closest_point(placed, x);
-    EXPECT_SAME(hits[i].distance, hit.distance);
-    EXPECT_EQ(hits[i].triangle, hit.triangle);
-    expect_same(hits[i].point, hit.point);
-    expect_same(hits[i].normal, hit.normal);
-    EXPECT_SAME(feet[i].distance, foot.distance);
-    EXPECT_SAME(feet[i].error, foot.error);
-    expect_same(feet[i].point, foot.point);
-    expect_same(feet[i].gradient, foot.gradient);
+    expect_same(hits[i], raycast(placed, Ray{x, Eigen::Vector3d(rays[i].direction)}));
+    expect_same(feet[i], closest_point(placed, x));
     EXPECT_EQ(inside[i], contains(placed, x).inside ? IST_OVERLAP_YES : IST_OVERLAP_NO);
   }
   ist_field_t ball = {};

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "query/base/members.h"
 #include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/test_meshes.h"
@@ -68,10 +69,9 @@ void look_at(const Penetration& answer) {
 
 bool same_bits(const Penetration& a, const Penetration& b) {
   if (a.status == QueryStatus::invalid_input) return b.status == a.status;
-  return a.volume == b.volume && a.volume_min == b.volume_min && a.volume_max == b.volume_max &&
-         a.translation_gradient == b.translation_gradient &&
-         a.rotation_gradient == b.rotation_gradient && a.centroid == b.centroid &&
-         a.status == b.status && a.node_visits == b.node_visits;
+  bool same = true;
+  ist::for_each_member([&](const auto& x, const auto& y) { same = same && x == y; }, a, b);
+  return same;
 }
 
 /// The same poses and scales of two meshes.

@@ -21,13 +21,13 @@ namespace {
 
 class GpuPatchesTest : public GpuTest {
  protected:
-  std::vector<PatchedPair> on_device(const GpuAssets& assets, const std::vector<BatchPair>& pairs,
+  std::vector<PatchedPair> on_device(const GpuSolids& solids, const std::vector<BatchPair>& pairs,
                                      Measure measure, std::uint32_t most) {
     GpuWorkspace workspace(pairs.size());
     const DeviceBatch batch(pairs);
     const DevicePatches patches(pairs.size(), most);
     const Stream stream;
-    contact_patches_batch(assets, batch.pairs(), measure, workspace, batch.answers(),
+    contact_patches_batch(solids, batch.pairs(), measure, workspace, batch.answers(),
                           patches.patches(), stream);
     stream.wait();
     return patches.get(batch.get());
@@ -39,51 +39,52 @@ TEST_F(GpuPatchesTest, HaveTheBitsOfAWarpOnTheHost) {
   pairs[20].pose_b.t[0] = std::nan("");
   pairs[30].scale_b = -1;
   pairs[40].a = 1000;
-  const GpuAssets assets(batch_views());
+  const GpuSolids solids(batch_solids());
   for (const Measure measure : {Measure::matched, Measure::inner})
     for (const std::uint32_t most : {0u, 1u, 6u, kMostGpuPatches})
-      expect_same_bits(on_device(assets, pairs, measure, most),
-                       HostPatches(batch_views()).run(pairs, measure, most, 1));
+      expect_same_bits(on_device(solids, pairs, measure, most),
+                       HostPatches(batch_solids()).run(pairs, measure, most, 1));
 }
 
 /// Of thousands of spheres, and of copies at one pose.
 TEST_F(GpuPatchesTest, LargeContactsHaveTheBitsOfAWarpOnTheHost) {
   std::vector<BatchPair> pairs = detailed_pairs(30, 52);
   for (const BatchPair& copy : copies_in_place(12, 53)) pairs.push_back(copy);
-  const GpuAssets assets(detailed_views());
-  expect_same_bits(on_device(assets, pairs, Measure::matched, 8),
-                   HostPatches(detailed_views()).run(pairs, Measure::matched, 8, 1));
+  const GpuSolids solids(detailed_solids());
+  expect_same_bits(on_device(solids, pairs, Measure::matched, 8),
+                   HostPatches(detailed_solids()).run(pairs, Measure::matched, 8, 1));
 }
 
 TEST_F(GpuPatchesTest, ManyPairsHaveTheSameBitsInEveryRun) {
   const std::vector<BatchPair> some = RandomPairs(54).pairs(3000);
   std::vector<BatchPair> pairs;
   for (std::size_t i = 0; i < 300000; ++i) pairs.push_back(some[(i * 7919) % some.size()]);
-  const GpuAssets assets(batch_views());
-  const std::vector<PatchedPair> expected = on_device(assets, some, Measure::matched, 4);
+  const GpuSolids solids(batch_solids());
+  const std::vector<PatchedPair> expected = on_device(solids, some, Measure::matched, 4);
   std::vector<PatchedPair> repeated;
   for (std::size_t i = 0; i < pairs.size(); ++i)
     repeated.push_back(expected[(i * 7919) % some.size()]);
-  expect_same_bits(on_device(assets, pairs, Measure::matched, 4), repeated);
+  expect_same_bits(on_device(solids, pairs, Measure::matched, 4), repeated);
 }
 
 /// Patches and penetrations may follow each other in one workspace, and a graph may hold them.
 TEST_F(GpuPatchesTest, AGraphMayCaptureThemBesidePenetrations) {
   const std::vector<BatchPair> pairs = RandomPairs(55).pairs(500);
-  const GpuAssets assets(batch_views());
-  const std::vector<PatchedPair> expected = on_device(assets, pairs, Measure::matched, 5);
+  const GpuSolids solids(batch_solids());
+  const std::vector<PatchedPair> expected = on_device(solids, pairs, Measure::matched, 5);
   GpuWorkspace workspace(pairs.size());
   const Stream stream;
   const DeviceBatch direct(pairs), batch(pairs), wholes(pairs);
   const DevicePatches captured(pairs.size(), 5);
-  penetration_batch(assets, direct.pairs(), Measure::matched, workspace, direct.answers(), stream);
+  penetration_batch(solids, direct.pairs(), {Measure::matched}, workspace, direct.answers(),
+                    stream);
   stream.wait();
   cudaGraph_t graph = nullptr;
   cudaGraphExec_t ready = nullptr;
   gpu::check(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal), "capturing");
-  contact_patches_batch(assets, wholes.pairs(), Measure::matched, workspace, wholes.answers(),
+  contact_patches_batch(solids, wholes.pairs(), Measure::matched, workspace, wholes.answers(),
                         captured.patches(), stream);
-  penetration_batch(assets, batch.pairs(), Measure::matched, workspace, batch.answers(), stream);
+  penetration_batch(solids, batch.pairs(), {Measure::matched}, workspace, batch.answers(), stream);
   gpu::check(cudaStreamEndCapture(stream, &graph), "capturing");
   gpu::check(cudaGraphInstantiate(&ready, graph, 0), "making a graph");
   for (int k = 0; k < 3; ++k) gpu::check(cudaGraphLaunch(ready, stream), "launching a graph");
@@ -95,24 +96,24 @@ TEST_F(GpuPatchesTest, AGraphMayCaptureThemBesidePenetrations) {
 }
 
 TEST_F(GpuPatchesTest, WhatDoesNotFitIsAnError) {
-  const GpuAssets assets(batch_views());
+  const GpuSolids solids(batch_solids());
   const std::vector<BatchPair> pairs = RandomPairs(56).pairs(5);
   GpuWorkspace workspace(4);
   const DeviceBatch batch(pairs), four({pairs.begin(), pairs.begin() + 4});
   const DevicePatches patches(pairs.size(), 2);
-  EXPECT_THROW(contact_patches_batch(assets, batch.pairs(), Measure::matched, workspace,
+  EXPECT_THROW(contact_patches_batch(solids, batch.pairs(), Measure::matched, workspace,
                                      batch.answers(), patches.patches(), nullptr),
                Error);
   GpuContactPatches too_many;
   too_many.most = kMostGpuPatches + 1;
-  EXPECT_THROW(contact_patches_batch(assets, four.pairs(), Measure::matched, workspace,
+  EXPECT_THROW(contact_patches_batch(solids, four.pairs(), Measure::matched, workspace,
                                      four.answers(), too_many, nullptr),
                Error);
-  EXPECT_TRUE(on_device(assets, {}, Measure::matched, 3).empty());
+  EXPECT_TRUE(on_device(solids, {}, Measure::matched, 3).empty());
   // Nothing is wanted: nothing is written.
   GpuContactPatches none;
   none.most = 7;
-  contact_patches_batch(assets, four.pairs(), Measure::matched, workspace, {}, none, nullptr);
+  contact_patches_batch(solids, four.pairs(), Measure::matched, workspace, {}, none, nullptr);
   gpu::check(cudaDeviceSynchronize(), "waiting");
 }
 

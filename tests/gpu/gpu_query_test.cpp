@@ -2,14 +2,13 @@
 
 #include <cuda_runtime_api.h>
 #include <ist/error.h>
-#include <ist/gpu_fields.h>
+#include <ist/gpu_query.h>
 
 #include "cuda/check.h"
 #include "support/detailed_pairs.h"
 #include "support/device_batch.h"
 #include "support/gpu_test.h"
 #include "support/host_batch.h"
-#include "support/host_field_batch.h"
 #include "support/random_pairs.h"
 #include "support/surface_queries.h"
 
@@ -26,73 +25,78 @@ TEST_F(GpuQueryTest, HasTheBitsOfAWarpOnTheHost) {
   pairs[20].pose_b.t[0] = std::nan("");
   pairs[30].scale_b = -1;
   pairs[40].a = 1000;
-  const GpuAssets assets(batch_views());
+  const GpuSolids solids(batch_solids());
   const Stream stream;
   for (const std::size_t most_pairs : {pairs.size(), kFewGpuPairs + 1}) {
     GpuWorkspace workspace(most_pairs);
     for (const Measure measure : {Measure::matched, Measure::inner}) {
       const DeviceBatch batch(pairs);
-      penetration_batch(assets, batch.pairs(), measure, workspace, batch.answers(), stream);
+      penetration_batch(solids, batch.pairs(), {measure}, workspace, batch.answers(), stream);
       stream.wait();
-      HostBatch host(batch_views());
+      HostBatch host(batch_solids());
       host.cut_for(most_pairs);
       expect_same_bits(batch.get(), host.run(pairs, measure, 1));
     }
   }
 }
 
-/// All fields that a GPU knows, one that is not sound, and one too many.
-struct FieldScene {
-  std::vector<Field> all;
+/// Trees, all fields that a GPU knows, and one that is not sound: pairs of trees, of a tree and a
+/// field in either order, of two fields, and of one solid too many.
+struct MixedScene {
+  std::vector<GpuSolid> solids = batch_solids();
   std::vector<BatchPair> pairs;
 
-  explicit FieldScene(std::size_t count) {
+  explicit MixedScene(std::size_t count) {
     for (const auto& [name, field] : fields())
-      if (!std::holds_alternative<FunctionField>(field)) all.push_back(field);
-    all.push_back(BallField{-1});
+      if (!std::holds_alternative<FunctionField>(field)) solids.emplace_back(field);
+    solids.emplace_back(Field(BallField{-1}));
     RandomPairs random(15);
     pairs = random.pairs(count);
     for (std::size_t i = 0; i < count; ++i) {
-      pairs[i].a = static_cast<std::uint32_t>(i % (all.size() + 1));
+      const std::size_t turn = i / (solids.size() + 1);
+      pairs[i].a = static_cast<std::uint32_t>(i % (solids.size() + 1));
       pairs[i].scale_b *= random.uniform(0.1, 0.5);
+      if (turn % 10 == 9) pairs[i].b = pairs[i].a;
+      if (turn % 3 == 0) {
+        std::swap(pairs[i].a, pairs[i].b);
+        std::swap(pairs[i].pose_a, pairs[i].pose_b);
+        std::swap(pairs[i].scale_a, pairs[i].scale_b);
+      }
     }
   }
 };
 
 TEST_F(GpuQueryTest, FieldsHaveTheBitsOfAWarpOnTheHost) {
-  FieldScene scene(400);
+  MixedScene scene(400);
   scene.pairs[21].pose_b.t[0] = std::nan("");
   scene.pairs[31].scale_b = -1;
   scene.pairs[41].b = 1000;
-  const GpuAssets assets(batch_views());
-  const GpuFields fields(scene.all);
+  const GpuSolids solids(scene.solids);
   GpuWorkspace workspace(scene.pairs.size());
   const Stream stream;
   for (const Measure measure : {Measure::matched, Measure::inner}) {
     const DeviceBatch batch(scene.pairs);
-    penetration_batch(assets, fields, batch.pairs(), measure, workspace, batch.answers(), stream);
+    penetration_batch(solids, batch.pairs(), {measure}, workspace, batch.answers(), stream);
     stream.wait();
-    HostFieldBatch host(batch_views(), scene.all);
+    HostBatch host(scene.solids);
+    host.cut_for(scene.pairs.size());
     expect_same_bits(batch.get(), host.run(scene.pairs, measure, 1));
   }
 }
 
-/// Asks for some pairs in fields, then for `count` among which they come again and again; both
-/// have the same answers, which it returns.
-std::vector<Penetration> ask_for_few_and_many(const std::vector<Field>& all,
+/// Asks for some pairs, then for `count` among which they come again and again; both have the same
+/// answers, which it returns.
+std::vector<Penetration> ask_for_few_and_many(const std::vector<GpuSolid>& all,
                                               const std::vector<BatchPair>& some,
                                               std::size_t count) {
   std::vector<BatchPair> pairs;
   for (std::size_t i = 0; i < count; ++i) pairs.push_back(some[(i * 7919) % some.size()]);
-  const GpuAssets assets(batch_views());
-  const GpuFields fields(all);
+  const GpuSolids solids(all);
   GpuWorkspace workspace(pairs.size());
   const Stream stream;
   const DeviceBatch few(some), many(pairs);
-  penetration_batch(assets, fields, few.pairs(), Measure::matched, workspace, few.answers(),
-                    stream);
-  penetration_batch(assets, fields, many.pairs(), Measure::matched, workspace, many.answers(),
-                    stream);
+  penetration_batch(solids, few.pairs(), {}, workspace, few.answers(), stream);
+  penetration_batch(solids, many.pairs(), {}, workspace, many.answers(), stream);
   stream.wait();
   std::vector<Penetration> expected = few.get(), repeated;
   for (std::size_t i = 0; i < count; ++i) repeated.push_back(expected[(i * 7919) % some.size()]);
@@ -101,39 +105,42 @@ std::vector<Penetration> ask_for_few_and_many(const std::vector<Field>& all,
 }
 
 TEST_F(GpuQueryTest, ManyPairsInFieldsHaveTheSameBitsInEveryRun) {
-  const FieldScene scene(3000);
-  ask_for_few_and_many(scene.all, scene.pairs, 300000);
+  const MixedScene scene(3000);
+  ask_for_few_and_many(scene.solids, scene.pairs, 300000);
 }
 
 /// More than a round has room for, and some more than any has.
 TEST_F(GpuQueryTest, LargePairsInMeshesHaveTheSameBitsHoweverManyThereAre) {
-  const FieldScene scene(500);
+  const MixedScene scene(500);
   std::vector<BatchPair> some;
   for (BatchPair pair : scene.pairs) {
-    if (pair.a >= scene.all.size() || !std::holds_alternative<MeshField>(scene.all[pair.a]))
+    const auto* const field =
+        pair.a < scene.solids.size() ? std::get_if<Field>(&scene.solids[pair.a]) : nullptr;
+    if (field == nullptr || !std::holds_alternative<MeshField>(*field) ||
+        pair.b >= batch_assets().size())
       continue;
     pair.pose_b = pair.pose_a;
     pair.scale_b = 2 * pair.scale_a;
     some.push_back(pair);
   }
-  ASSERT_GE(some.size(), 30u);
-  HostFieldBatch host(batch_views(), scene.all);
-  expect_same_bits(ask_for_few_and_many(scene.all, some, 60000),
+  ASSERT_GE(some.size(), 15u);
+  HostBatch host(scene.solids);
+  expect_same_bits(ask_for_few_and_many(scene.solids, some, 60000),
                    host.run(some, Measure::matched, 1));
 }
 
 TEST_F(GpuQueryTest, BudgetsAndCopiesHaveTheBitsOfAWarpOnTheHost) {
   std::vector<BatchPair> pairs = detailed_pairs(60, 16);
   for (const BatchPair& copy : copies_in_place(30, 17)) pairs.push_back(copy);
-  const GpuAssets assets(detailed_views());
+  const GpuSolids solids(detailed_solids());
   GpuWorkspace workspace(pairs.size());
   const Stream stream;
   for (const std::uint32_t budget : {0u, 50u, 2000u}) {
     const DeviceBatch batch(pairs);
-    penetration_batch(assets, batch.pairs(), {Measure::matched, budget}, workspace, batch.answers(),
+    penetration_batch(solids, batch.pairs(), {Measure::matched, budget}, workspace, batch.answers(),
                       stream);
     stream.wait();
-    HostBatch host(detailed_views());
+    HostBatch host(detailed_solids());
     expect_same_bits(batch.get(), host.run(pairs, Measure::matched, 1, budget));
   }
 }
@@ -142,12 +149,12 @@ TEST_F(GpuQueryTest, ManyPairsHaveTheSameBitsInEveryRun) {
   const std::vector<BatchPair> some = RandomPairs(12).pairs(3000);
   std::vector<BatchPair> pairs;
   for (std::size_t i = 0; i < 300000; ++i) pairs.push_back(some[(i * 7919) % some.size()]);
-  const GpuAssets assets(batch_views());
+  const GpuSolids solids(batch_solids());
   GpuWorkspace workspace(pairs.size());
   const Stream stream;
   const DeviceBatch few(some), many(pairs);
-  penetration_batch(assets, few.pairs(), Measure::matched, workspace, few.answers(), stream);
-  penetration_batch(assets, many.pairs(), Measure::matched, workspace, many.answers(), stream);
+  penetration_batch(solids, few.pairs(), {Measure::matched}, workspace, few.answers(), stream);
+  penetration_batch(solids, many.pairs(), {Measure::matched}, workspace, many.answers(), stream);
   stream.wait();
   const std::vector<Penetration> expected = few.get();
   std::vector<Penetration> repeated;
@@ -170,8 +177,9 @@ class RepeatedPairs {
         scale_b_(column<double>(some, [](const auto& p) { return p.scale_b; })) {}
 
   GpuPairs pairs() const {
-    return {size_,          a_.data(),       b_.data(),      pose_a_.data(),
-            pose_b_.data(), scale_a_.data(), scale_b_.data()};
+    return {size_,
+            {a_.data(), pose_a_.data(), scale_a_.data()},
+            {b_.data(), pose_b_.data(), scale_b_.data()}};
   }
   /// The pair that the i-th is.
   std::size_t which(std::size_t i) const { return (i * 7919) % of_; }
@@ -193,7 +201,7 @@ class RepeatedPairs {
 
 TEST_F(GpuQueryTest, BatchesOfOneAndOfTenMillionAreAnsweredAsOfFew) {
   const std::vector<BatchPair> some = RandomPairs(18).pairs_at_all_distances(3000);
-  const GpuAssets assets(batch_views());
+  const GpuSolids solids(batch_solids());
   const Stream stream;
   const auto ask = [&](const RepeatedPairs& of, std::size_t most_pairs) {
     const std::size_t n = of.pairs().count;
@@ -210,9 +218,9 @@ TEST_F(GpuQueryTest, BatchesOfOneAndOfTenMillionAreAnsweredAsOfFew) {
     one.most = 1;
     one.count = patches.data();
     one.volume = of_patch.data();
-    penetration_batch(assets, of.pairs(), Measure::matched, workspace, overlaps, stream);
-    separation_batch(assets, of.pairs(), 0, workspace, gaps, stream);
-    contact_patches_batch(assets, of.pairs(), Measure::matched, workspace, {}, one, stream);
+    penetration_batch(solids, of.pairs(), {Measure::matched}, workspace, overlaps, stream);
+    separation_batch(solids, of.pairs(), 0, workspace, gaps, stream);
+    contact_patches_batch(solids, of.pairs(), Measure::matched, workspace, {}, one, stream);
     stream.wait();
     struct Answers {
       std::vector<double> volume, distance, of_patch;
@@ -246,16 +254,17 @@ TEST_F(GpuQueryTest, BatchesOfOneAndOfTenMillionAreAnsweredAsOfFew) {
 
 TEST_F(GpuQueryTest, AGraphMayCaptureIt) {
   const std::vector<BatchPair> pairs = RandomPairs(13).pairs(500);
-  const GpuAssets assets(batch_views());
+  const GpuSolids solids(batch_solids());
   GpuWorkspace workspace(pairs.size());
   const Stream stream;
   const DeviceBatch direct(pairs), captured(pairs);
-  penetration_batch(assets, direct.pairs(), Measure::matched, workspace, direct.answers(), stream);
+  penetration_batch(solids, direct.pairs(), {Measure::matched}, workspace, direct.answers(),
+                    stream);
   stream.wait();
   cudaGraph_t graph = nullptr;
   cudaGraphExec_t ready = nullptr;
   gpu::check(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal), "capturing");
-  penetration_batch(assets, captured.pairs(), Measure::matched, workspace, captured.answers(),
+  penetration_batch(solids, captured.pairs(), {Measure::matched}, workspace, captured.answers(),
                     stream);
   gpu::check(cudaStreamEndCapture(stream, &graph), "capturing");
   gpu::check(cudaGraphInstantiate(&ready, graph, 0), "making a graph");
@@ -268,27 +277,22 @@ TEST_F(GpuQueryTest, AGraphMayCaptureIt) {
 
 TEST_F(GpuQueryTest, WhatDoesNotFitIsAnError) {
   const std::vector<BatchPair> pairs = RandomPairs(14).pairs(5);
-  const GpuAssets assets(batch_views());
+  const GpuSolids solids(batch_solids());
   GpuWorkspace workspace(4);
   const DeviceBatch batch(pairs);
-  EXPECT_THROW(penetration_batch(assets, batch.pairs(), Measure::matched, workspace,
+  EXPECT_THROW(penetration_batch(solids, batch.pairs(), {Measure::matched}, workspace,
                                  batch.answers(), nullptr),
                Error);
-  const TreeView none;
-  EXPECT_THROW(penetration_batch(assets, GpuPairs{}, Measure::exact, workspace, {}, nullptr),
+  const GpuSolid none = TreeView{};
+  EXPECT_THROW(penetration_batch(solids, GpuPairs{}, {Measure::exact}, workspace, {}, nullptr),
                Error);
-  EXPECT_THROW(GpuAssets({&none, 1}), Error);
+  EXPECT_THROW(GpuSolids({&none, 1}), Error);
   EXPECT_THROW(GpuWorkspace(std::size_t{1} << 40), Error);
-  const GpuFields fields(std::vector<Field>{HalfSpaceField{}});
-  EXPECT_THROW(penetration_batch(assets, fields, batch.pairs(), Measure::matched, workspace,
-                                 batch.answers(), nullptr),
-               Error);
-  EXPECT_THROW(GpuFields(std::vector<Field>{FunctionField{}}), Error);
-  EXPECT_EQ(GpuFields(std::vector<Field>{}).size(), 0u);
+  const GpuSolid function = Field(FunctionField{});
+  EXPECT_THROW(GpuSolids({&function, 1}), Error);
+  EXPECT_EQ(GpuSolids({}).size(), 0u);
   const DeviceBatch empty({});
-  penetration_batch(assets, fields, empty.pairs(), Measure::matched, workspace, empty.answers(),
-                    nullptr);
-  penetration_batch(assets, empty.pairs(), Measure::matched, workspace, empty.answers(), nullptr);
+  penetration_batch(solids, empty.pairs(), {Measure::matched}, workspace, empty.answers(), nullptr);
 }
 
 }  // namespace

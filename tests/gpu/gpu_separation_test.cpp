@@ -21,13 +21,13 @@ namespace {
 
 class GpuSeparationTest : public GpuTest {
  protected:
-  std::vector<Separation> on_device(const GpuAssets& assets, const std::vector<BatchPair>& pairs,
+  std::vector<Separation> on_device(const GpuSolids& solids, const std::vector<BatchPair>& pairs,
                                     std::uint32_t max_visits = 0) {
     GpuWorkspace workspace(pairs.size());
     const DeviceBatch batch(pairs);
     const DeviceSeparations answers(pairs.size());
     const Stream stream;
-    separation_batch(assets, batch.pairs(), max_visits, workspace, answers.answers(), stream);
+    separation_batch(solids, batch.pairs(), max_visits, workspace, answers.answers(), stream);
     stream.wait();
     return answers.get();
   }
@@ -41,10 +41,10 @@ TEST_F(GpuSeparationTest, HasTheBitsOfAWarpOnTheHost) {
   pairs[50].scale_b = 1e-6;
   pairs[60].pose_b.t[2] = 1e9;
   pairs[70].pose_b.t[2] = 1e30;
-  const GpuAssets assets(batch_views());
+  const GpuSolids solids(batch_solids());
   for (const std::uint32_t most : {0u, 7u, 250u}) {
-    HostSeparations host(batch_views());
-    expect_same_bits(on_device(assets, pairs, most), host.run(pairs, 0, most));
+    HostSeparations host(batch_solids());
+    expect_same_bits(on_device(solids, pairs, most), host.run(pairs, 0, most));
     EXPECT_EQ(host.counters[0].tasks > 50, most != 7);
   }
 }
@@ -58,8 +58,8 @@ TEST_F(GpuSeparationTest, AgreesWithSeparationOnTheOraclesRows) {
     of_cpu.push_back(placed(row, kSpheres));
     pairs.push_back({0, 1, {}, row.pose, 1, row.scale_b});
   }
-  const GpuAssets assets({{of_cpu[0].first.tree, of_cpu[0].second.tree}});
-  const std::vector<Separation> answers = on_device(assets, pairs);
+  const GpuSolids solids(std::vector<GpuSolid>{of_cpu[0].first.tree, of_cpu[0].second.tree});
+  const std::vector<Separation> answers = on_device(solids, pairs);
   Workspace workspace;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const Separation cpu =
@@ -75,30 +75,31 @@ TEST_F(GpuSeparationTest, ManyPairsHaveTheSameBitsInEveryRun) {
   const std::vector<BatchPair> some = RandomPairs(32).pairs_at_all_distances(3000);
   std::vector<BatchPair> pairs;
   for (std::size_t i = 0; i < 300000; ++i) pairs.push_back(some[(i * 7919) % some.size()]);
-  const GpuAssets assets(batch_views());
-  const std::vector<Separation> expected = on_device(assets, some);
+  const GpuSolids solids(batch_solids());
+  const std::vector<Separation> expected = on_device(solids, some);
   std::vector<Separation> repeated;
   for (std::size_t i = 0; i < pairs.size(); ++i)
     repeated.push_back(expected[(i * 7919) % some.size()]);
-  expect_same_bits(on_device(assets, pairs), repeated);
+  expect_same_bits(on_device(solids, pairs), repeated);
 }
 
 /// Penetrations and separations may follow each other in one workspace, and a graph may hold them.
 TEST_F(GpuSeparationTest, AGraphMayCaptureItBesidePenetrations) {
   const std::vector<BatchPair> pairs = RandomPairs(33).pairs_at_all_distances(500);
-  const GpuAssets assets(batch_views());
-  const std::vector<Separation> expected = on_device(assets, pairs);
+  const GpuSolids solids(batch_solids());
+  const std::vector<Separation> expected = on_device(solids, pairs);
   GpuWorkspace workspace(pairs.size());
   const Stream stream;
   const DeviceBatch batch(pairs), direct(pairs);
   const DeviceSeparations captured(pairs.size());
-  penetration_batch(assets, direct.pairs(), Measure::matched, workspace, direct.answers(), stream);
+  penetration_batch(solids, direct.pairs(), {Measure::matched}, workspace, direct.answers(),
+                    stream);
   stream.wait();
   cudaGraph_t graph = nullptr;
   cudaGraphExec_t ready = nullptr;
   gpu::check(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal), "capturing");
-  separation_batch(assets, batch.pairs(), 0, workspace, captured.answers(), stream);
-  penetration_batch(assets, batch.pairs(), Measure::matched, workspace, batch.answers(), stream);
+  separation_batch(solids, batch.pairs(), 0, workspace, captured.answers(), stream);
+  penetration_batch(solids, batch.pairs(), {Measure::matched}, workspace, batch.answers(), stream);
   gpu::check(cudaStreamEndCapture(stream, &graph), "capturing");
   gpu::check(cudaGraphInstantiate(&ready, graph, 0), "making a graph");
   for (int k = 0; k < 3; ++k) gpu::check(cudaGraphLaunch(ready, stream), "launching a graph");
@@ -110,17 +111,17 @@ TEST_F(GpuSeparationTest, AGraphMayCaptureItBesidePenetrations) {
 }
 
 TEST_F(GpuSeparationTest, WhatDoesNotFitIsAnError) {
-  const GpuAssets assets(batch_views());
+  const GpuSolids solids(batch_solids());
   const std::vector<BatchPair> pairs = RandomPairs(34).pairs_at_all_distances(5);
   GpuWorkspace workspace(4);
   const DeviceBatch batch(pairs);
   const DeviceSeparations answers(pairs.size());
-  EXPECT_THROW(separation_batch(assets, batch.pairs(), 0, workspace, answers.answers(), nullptr),
+  EXPECT_THROW(separation_batch(solids, batch.pairs(), 0, workspace, answers.answers(), nullptr),
                Error);
-  EXPECT_TRUE(on_device(assets, {}).empty());
+  EXPECT_TRUE(on_device(solids, {}).empty());
   // Nothing is wanted: nothing is written.
   const DeviceBatch four({pairs.begin(), pairs.begin() + 4});
-  separation_batch(assets, four.pairs(), 0, workspace, {}, nullptr);
+  separation_batch(solids, four.pairs(), 0, workspace, {}, nullptr);
   gpu::check(cudaDeviceSynchronize(), "waiting");
 }
 

@@ -6,8 +6,7 @@ cmake_minimum_required(VERSION 3.25)
 
 # Constants that may stand in both.
 set(exceptions
-  kLeastAngle kOnEdge2 kPi  # balls in triangles, on the CPU and on the GPU
-  kPairsAtOnce kRounding)   # other numbers with other meanings
+  kPairsAtOnce kRounding)  # other numbers with other meanings
 
 set(errors)
 

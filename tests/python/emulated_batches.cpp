@@ -1,8 +1,6 @@
 // What ist::ist asks of a GPU's batches, on a device that is host memory.
 
-#include <ist/bake.h>
 #include <ist/gpu.h>
-#include <ist/gpu_fields.h>
 #include <ist/gpu_query.h>
 
 #include <cstdlib>
@@ -12,8 +10,8 @@
 #include <vector>
 
 #include "emulated_device.h"
+#include "query/base/members.h"
 #include "support/host_batch.h"
-#include "support/host_field_batch.h"
 #include "support/host_patches.h"
 #include "support/host_separations.h"
 
@@ -43,12 +41,12 @@ std::vector<testing::BatchPair> rows_of(const GpuPairs& pairs) {
   std::vector<testing::BatchPair> rows(pairs.count);
   for (std::size_t i = 0; i < pairs.count; ++i) {
     testing::BatchPair& row = rows[i];
-    row.a = pairs.asset_a[i];
-    row.b = pairs.asset_b[i];
-    if (pairs.pose_a != nullptr) row.pose_a = pairs.pose_a[i];
-    if (pairs.pose_b != nullptr) row.pose_b = pairs.pose_b[i];
-    if (pairs.scale_a != nullptr) row.scale_a = pairs.scale_a[i];
-    if (pairs.scale_b != nullptr) row.scale_b = pairs.scale_b[i];
+    row.a = pairs.a.solid[i];
+    row.b = pairs.b.solid[i];
+    if (pairs.a.pose != nullptr) row.pose_a = pairs.a.pose[i];
+    if (pairs.b.pose != nullptr) row.pose_b = pairs.b.pose[i];
+    if (pairs.a.scale != nullptr) row.scale_a = pairs.a.scale[i];
+    if (pairs.b.scale != nullptr) row.scale_b = pairs.b.scale[i];
   }
   return rows;
 }
@@ -60,16 +58,15 @@ void put(Number* column, std::size_t i, const Value& value) {
     std::memcpy(column + i * (sizeof value / sizeof *column), &value, sizeof value);
 }
 
-void write(const std::vector<Penetration>& found, const GpuPenetrations& to) {
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    put(to.volume, i, found[i].volume);
-    put(to.centroid, i, found[i].centroid);
-    put(to.translation_gradient, i, found[i].translation_gradient);
-    put(to.rotation_gradient, i, found[i].rotation_gradient);
-    put(to.status, i, found[i].status);
-    put(to.node_visits, i, found[i].node_visits);
-    put(to.sphere_pairs, i, found[i].sphere_pairs);
-  }
+/// Row i of the columns that an answer has members for.
+template <class Answer, class Columns>
+void write_row(const Answer& answer, const Columns& to, std::size_t i) {
+  for_each_member([i](const auto& value, auto* column) { put(column, i, value); }, answer, to);
+}
+
+template <class Answer, class Columns>
+void write(const std::vector<Answer>& found, const Columns& to) {
+  for (std::size_t i = 0; i < found.size(); ++i) write_row(found[i], to, i);
 }
 
 }  // namespace
@@ -77,55 +74,18 @@ void write(const std::vector<Penetration>& found, const GpuPenetrations& to) {
 bool gpu_available(int device, std::string*) { return device == 0; }
 GpuInfo gpu_info(int) { return {"emulated", 90, 0, 0}; }
 
-struct GpuAssets::Impl {
-  std::vector<Asset> copies;
-  Alive alive;
-
-  std::vector<TreeView> views() const {
-    std::vector<TreeView> all;
-    for (const Asset& asset : copies) all.push_back(asset.view());
-    return all;
-  }
-};
-
-GpuAssets::GpuAssets(std::span<const TreeView> assets, const GpuSettings&)
-    : impl_(std::make_unique<Impl>()) {
-  for (const TreeView& asset : assets)
-    impl_->copies.emplace_back(
-        std::span(reinterpret_cast<const std::byte*>(&asset.header()), asset.header().file_bytes),
-        "emulated");
-}
-GpuAssets::~GpuAssets() = default;
-std::size_t GpuAssets::size() const noexcept { return impl_->copies.size(); }
-std::size_t GpuAssets::bytes() const noexcept {
-  std::size_t sum = 0;
-  for (const Asset& asset : impl_->copies) sum += asset.bytes().size();
-  return sum;
-}
-int GpuAssets::device() const noexcept { return 0; }
-
-struct GpuFields::Impl {
-  std::vector<std::vector<std::byte>> copies;
-  std::vector<gpu::FieldRef> refs;
+struct GpuSolids::Impl {
+  testing::HostSolids solids;
   Alive alive;
 };
 
-GpuFields::GpuFields(std::span<const Field> fields, const GpuSettings&)
-    : impl_(std::make_unique<Impl>()) {
-  for (const Field& field : fields) {
-    const std::span<const std::byte> data = gpu::pointed_to(field);
-    impl_->copies.emplace_back(data.begin(), data.end());
-    impl_->refs.push_back(gpu::field_ref(field, impl_->copies.back().data()));
-  }
+GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings&)
+    : impl_(std::make_unique<Impl>(Impl{std::vector<GpuSolid>(solids.begin(), solids.end()), {}})) {
 }
-GpuFields::~GpuFields() = default;
-std::size_t GpuFields::size() const noexcept { return impl_->refs.size(); }
-std::size_t GpuFields::bytes() const noexcept {
-  std::size_t sum = impl_->refs.size() * sizeof(gpu::FieldRef);
-  for (const std::vector<std::byte>& copy : impl_->copies) sum += copy.size();
-  return sum;
-}
-int GpuFields::device() const noexcept { return 0; }
+GpuSolids::~GpuSolids() = default;
+std::size_t GpuSolids::size() const noexcept { return impl_->solids.refs().size(); }
+std::size_t GpuSolids::bytes() const noexcept { return impl_->solids.bytes(); }
+int GpuSolids::device() const noexcept { return 0; }
 
 struct GpuWorkspace::Impl {
   std::size_t most_pairs;
@@ -138,95 +98,60 @@ std::size_t GpuWorkspace::most_pairs() const noexcept { return impl_->most_pairs
 
 namespace {
 
-/// answer(assets, rows) → found, and write(found), when the stream comes to it.
+/// answer(solids, rows) → found, and write(found), when the stream comes to it.
 template <class Answer, class Write>
-void launch(const GpuAssets& assets, const GpuPairs& pairs, GpuWorkspace& workspace,
+void launch(const GpuSolids& solids, const GpuPairs& pairs, GpuWorkspace& workspace,
             CUstream_st* stream, const Answer& answer, const Write& write) {
   if (pairs.count > workspace.most_pairs()) std::abort();
   testing::do_later(
-      stream, [&impl = assets.impl(), pairs, answer, write, there = assets.impl().alive.shown(),
+      stream, [&impl = solids.impl(), pairs, answer, write, there = solids.impl().alive.shown(),
                room = workspace.impl().alive.shown()] {
         need(there);
         need(room);
-        write(answer(impl.views(), rows_of(pairs)));
+        write(answer(impl.solids, rows_of(pairs)));
       });
 }
 
 }  // namespace
 
-void penetration_batch(const GpuAssets& assets, const GpuPairs& pairs,
+void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
                        const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
                        const GpuPenetrations& to, CUstream_st* stream) {
   launch(
-      assets, pairs, workspace, stream,
-      [settings, most_pairs = workspace.most_pairs()](const auto& solids, const auto& rows) {
-        testing::HostBatch batch(solids);
+      solids, pairs, workspace, stream,
+      [settings, most_pairs = workspace.most_pairs()](const auto& there, const auto& rows) {
+        testing::HostBatch batch(there);
         batch.cut_for(most_pairs);
         return batch.run(rows, settings.measure, 0, settings.pair_budget);
       },
       [to](const auto& found) { write(found, to); });
 }
 
-void penetration_batch(const GpuAssets& assets, const GpuFields& fields, const GpuPairs& pairs,
-                       Measure measure, GpuWorkspace& workspace, const GpuPenetrations& to,
-                       CUstream_st* stream) {
+void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint32_t max_visits,
+                      GpuWorkspace& workspace, const GpuSeparations& to, CUstream_st* stream) {
   launch(
-      assets, pairs, workspace, stream,
-      [&impl = fields.impl(), there = fields.impl().alive.shown(), measure](const auto& solids,
-                                                                            const auto& rows) {
-        need(there);
-        return testing::HostFieldBatch(solids, impl.refs).run(rows, measure);
+      solids, pairs, workspace, stream,
+      [max_visits](const auto& there, const auto& rows) {
+        return testing::HostSeparations(there).run(rows, 0, max_visits);
       },
       [to](const auto& found) { write(found, to); });
 }
 
-void separation_batch(const GpuAssets& assets, const GpuPairs& pairs, std::uint32_t max_visits,
-                      GpuWorkspace& workspace, const GpuSeparations& to, CUstream_st* stream) {
-  launch(
-      assets, pairs, workspace, stream,
-      [max_visits](const auto& solids, const auto& rows) {
-        return testing::HostSeparations(solids).run(rows, 0, max_visits);
-      },
-      [to](const std::vector<Separation>& found) {
-        for (std::size_t i = 0; i < found.size(); ++i) {
-          put(to.distance, i, found[i].distance);
-          put(to.distance_min, i, found[i].distance_min);
-          put(to.distance_max, i, found[i].distance_max);
-          put(to.point_a, i, found[i].point_a);
-          put(to.point_b, i, found[i].point_b);
-          put(to.normal, i, found[i].normal);
-          put(to.status, i, found[i].status);
-          put(to.node_visits, i, found[i].node_visits);
-          put(to.sphere_pairs, i, found[i].sphere_pairs);
-        }
-      });
-}
-
-void contact_patches_batch(const GpuAssets& assets, const GpuPairs& pairs, Measure measure,
+void contact_patches_batch(const GpuSolids& solids, const GpuPairs& pairs, Measure measure,
                            GpuWorkspace& workspace, const GpuPenetrations& whole,
                            const GpuContactPatches& to, CUstream_st* stream) {
   launch(
-      assets, pairs, workspace, stream,
-      [measure, most = to.most](const auto& solids, const auto& rows) {
-        return testing::HostPatches(solids).run(rows, measure, most);
+      solids, pairs, workspace, stream,
+      [measure, most = to.most](const auto& there, const auto& rows) {
+        return testing::HostPatches(there).run(rows, measure, most);
       },
       [whole, to](const std::vector<testing::PatchedPair>& found) {
         std::vector<Penetration> wholes;
         for (std::size_t i = 0; i < found.size(); ++i) {
           wholes.push_back(found[i].whole);
           put(to.count, i, static_cast<std::uint32_t>(found[i].patches.size()));
-          for (std::size_t k = 0; k < found[i].patches.size(); ++k) {
-            const ContactPatch& patch = found[i].patches[k];
-            const std::size_t at = i * to.most + k;
-            put(to.id, at, patch.id);
-            put(to.centroid, at, patch.centroid);
-            put(to.normal, at, patch.normal);
-            put(to.area, at, patch.area);
-            put(to.depth, at, patch.depth);
-            put(to.volume, at, patch.volume);
-            put(to.force, at, patch.force);
-            put(to.torque, at, patch.torque);
-          }
+          for (std::size_t k = 0; k < found[i].patches.size(); ++k)
+            write_row(found[i].patches[k], to, i * to.most + k);
         }
         write(wholes, whole);
       });

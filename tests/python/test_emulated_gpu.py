@@ -54,8 +54,8 @@ def solids(gear, knot, cube):
 def arguments(random_poses):
     random = np.random.default_rng(3)
     return dict(
-        asset_a=random.integers(0, 3, 40).astype(np.uint32),
-        asset_b=random.integers(0, 3, 40).astype(np.int32),
+        solid_a=random.integers(0, 3, 40).astype(np.uint32),
+        solid_b=random.integers(0, 3, 40).astype(np.int32),
         pose_a=random_poses(40, 0.8), pose_b=random_poses(80, 0.8)[40:].copy(),
         scale_a=random.uniform(0.5, 2, 40), scale_b=random.uniform(0.5, 2, 40))
 
@@ -91,14 +91,14 @@ def test_answers_are_those_of_the_cpu(solids, arguments, measure):
     arguments["pose_b"][3, 5] = np.nan
     expected = expected_of(solids, arguments, measure=measure)
     assert (expected["volume"] > 0).sum() > 10 and expected["status"][3] == 2
-    found = ask(ist.gpu.Assets(solids), arguments, measure=measure)
+    found = ask(ist.gpu.Solids(solids), arguments, measure=measure)
     expect_close(found, expected)
     assert found.node_visits is None and found.volume.dtype == np.float64
     assert found.volume.shape == (40,) and found.centroid.shape == (40, 3) and len(found.status) == 40
 
 
 def test_budgets_are_those_of_the_cpu(solids, arguments):
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
     whole, bound = ask(assets, arguments), ask(assets, arguments, pair_budget=60)
     expect_close(bound, expected_of(solids, arguments, pair_budget=60))
     assert not np.array_equal(bound.volume.numpy(), whole.volume.numpy())
@@ -110,7 +110,7 @@ def test_separations_are_those_of_the_cpu(solids, arguments):
     arguments["pose_b"][:, 4:] *= 8
     arguments["pose_b"][3, 5] = np.nan
     lent_arguments = {n: OnDevice(x.copy()) for n, x in arguments.items()}
-    found = ist.gpu.separation(ist.gpu.Assets(solids), **lent_arguments)
+    found = ist.gpu.separation(ist.gpu.Solids(solids), **lent_arguments)
     size = 2 * max(solid.bounds().radius for solid in solids)
     apart = 0
     for i, (a, b, pose_a, pose_b, scale_a, scale_b) in enumerate(zip(*arguments.values())):
@@ -129,18 +129,18 @@ def test_separations_are_those_of_the_cpu(solids, arguments):
             assert gap == pytest.approx(found.distance.numpy()[i] * found.normal.numpy()[i], abs=1e-9)
     assert apart > 10 and found.status.numpy()[3] == 2
     assert found.node_visits is None and found.normal.shape == (40, 3)
-    few = ist.gpu.separation(ist.gpu.Assets(solids), 0, 1, None, OnDevice(arguments["pose_b"].copy()),
+    few = ist.gpu.separation(ist.gpu.Solids(solids), 0, 1, None, OnDevice(arguments["pose_b"].copy()),
                              max_visits=1, wanted=["status", "distance_min", "distance_max"])
     assert few.distance is None and (few.status.numpy() == 1).any()
     assert np.delete(few.distance_min.numpy() <= few.distance_max.numpy(), 3).all()
     with pytest.raises(ValueError, match="wanted: 'volume'; there are 'distance', 'distance_min'"):
-        ist.gpu.separation(ist.gpu.Assets(solids), 0, 1, None, OnDevice(arguments["pose_b"]),
+        ist.gpu.separation(ist.gpu.Solids(solids), 0, 1, None, OnDevice(arguments["pose_b"]),
                            wanted=["volume"])
 
 
 def test_patches_are_those_of_the_cpu(solids, arguments):
     arguments["pose_b"][3, 5] = np.nan
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
     given = {n: OnDevice(x.copy()) for n, x in arguments.items()}
     found = ist.gpu.contact_patches(assets, **given, max_patches=4)
     ours = {name: getattr(found, name).numpy() for name in (
@@ -188,20 +188,22 @@ def some_fields(knot):
 @pytest.mark.parametrize("measure", ["matched", "inner"])
 def test_fields_are_those_of_the_cpu(solids, some_fields, arguments, measure):
     fields, heights = some_fields
-    arguments["asset_a"] = np.random.default_rng(4).integers(0, 5, 40).astype(np.uint32)
+    arguments["solid_a"] = np.random.default_rng(4).integers(0, 5, 40).astype(np.uint32)
     arguments["pose_b"][3, 5] = np.nan
     expected = [ist.penetration(fields[a], solids[b], [pose_b], poses_a=pose_a, scales=scale_b,
                                 scales_a=scale_a, measure=measure)
                 for a, b, pose_a, pose_b, scale_a, scale_b in zip(*arguments.values())]
-    there = ist.gpu.Fields(fields)
-    assert len(there) == 5 and there.device == 0 and there.bytes > heights.nbytes
+    there = ist.gpu.Solids([*fields, *solids])
+    assert len(there) == 8 and there.device == 0 and there.bytes > heights.nbytes
+    arguments["solid_b"] += 5
+    turned = {name[:-1] + dict(a="b", b="a")[name[-1]]: x for name, x in arguments.items()}
     heights += 1000  # what was uploaded stays
     try:
-        assets = ist.gpu.Assets(solids)
-        found = ask(assets, arguments, fields=there, measure=measure)
-        del there  # the batch holds it
-        gc.collect()
+        found, over = (ask(there, given, measure=measure) for given in (arguments, turned))
         volume = found.volume.numpy()
+        assert np.array_equal(over.volume.numpy(), volume, equal_nan=True)
+        assert np.array_equal(over.translation_gradient.numpy(), -found.translation_gradient.numpy(),
+                              equal_nan=True)
     finally:
         heights -= 1000
     theirs = np.concatenate([one.volume for one in expected])
@@ -211,24 +213,24 @@ def test_fields_are_those_of_the_cpu(solids, some_fields, arguments, measure):
     assert found.translation_gradient.numpy() == pytest.approx(push, rel=1e-6, abs=1e-6, nan_ok=True)
 
 
-def test_wrong_fields_are_named(solids, some_fields, arguments):
-    assets, fields = ist.gpu.Assets(solids), ist.gpu.Fields(some_fields[0])
-    poses = arguments["pose_b"]
-    for wrong, error, text in [
-            (dict(asset_a=5), ValueError, "asset_a: 5; there are 5 fields"),
-            (dict(asset_b=3), ValueError, "asset_b: 3; there are 3 assets"),
-            (dict(fields=some_fields[0]), TypeError, "fields: a list; wanted ist.gpu.Fields")]:
-        given = dict(asset_a=0, asset_b=2, fields=fields, pose_a=None, pose_b=OnDevice(poses.copy()))
-        with pytest.raises(error, match=text):
-            ist.gpu.penetration(assets, **{**given, **wrong})
-    with pytest.raises(TypeError, match=r"fields: an Asset; wanted a Field"):
-        ist.gpu.Fields([solids[0]])
-    with pytest.raises(TypeError, match="fields: a int; wanted an Asset or a Field"):
-        ist.gpu.Fields([3])
+def test_what_cannot_be_answered_is_not_held(solids, some_fields):
+    there = ist.gpu.Solids([*some_fields[0], *solids])
+    for batch, held in ((ist.gpu.penetration, [0, 0, 3]), (ist.gpu.separation, [0, 3, 3]),
+                        (ist.gpu.contact_patches, [0, 3, 3])):
+        numbers = (OnDevice(np.array(rows, np.uint32)) for rows in ([5, 0, 1], [6, 5, 2]))
+        found = batch(there, *numbers, None, OnDevice(np.tile([1.0, 0, 0, 0, 0, 0, 0], (3, 1))))
+        assert found.status.numpy().tolist() == held, batch
+
+
+def test_wrong_solids_are_named(solids):
+    with pytest.raises(ist.Error, match=r"GPU: solid 1 is an asset without spheres: bake it with"):
+        ist.gpu.Solids([solids[0], ist.bake_surface(ist.close_mesh(ist.sample_mesh("cube")))])
+    with pytest.raises(TypeError, match=r"solids\[0\]: a int; wanted an Asset or a Field"):
+        ist.gpu.Solids([3])
 
 
 def test_nothing_is_given_back_before_the_batch_is_done(solids, arguments):
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
     expected = expected_of(solids, arguments)
     first = ask(assets, arguments, stream=5)
     assert len(lent) == 6
@@ -247,14 +249,14 @@ def test_nothing_is_given_back_before_the_batch_is_done(solids, arguments):
 
 
 def test_assets_wait_for_their_batches(solids, arguments):
-    found = ask(ist.gpu.Assets(solids), arguments, stream=5)
+    found = ask(ist.gpu.Solids(solids), arguments, stream=5)
     gc.collect()  # the assets are gone
     assert not lent
     expect_close(found, expected_of(solids, arguments))
 
 
 def test_a_larger_batch_waits_for_its_room(solids, arguments):
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
     few = ask(assets, arguments, stream=5)
     many = {n: np.concatenate([x] * 120) for n, x in arguments.items()}
     for name in many:
@@ -265,7 +267,7 @@ def test_a_larger_batch_waits_for_its_room(solids, arguments):
 
 
 def test_what_was_asked_before_does_not_show(solids, arguments):
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
     few = ask(assets, arguments).volume.numpy()
     many = {n: np.concatenate([x] * 500) for n, x in arguments.items()}
     many["pose_b"][40:, 4:] = 1e6
@@ -276,7 +278,7 @@ def test_what_was_asked_before_does_not_show(solids, arguments):
 
 
 def test_streams_are_passed_on(solids, arguments):
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
 
     class Torch:
         cuda_stream = 12
@@ -298,10 +300,10 @@ def test_streams_are_passed_on(solids, arguments):
 
 
 def test_arguments_may_be_left_out(solids, arguments):
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
     poses = arguments["pose_b"]
     ones = np.ones(40)
-    whole = dict(asset_a=np.zeros(40, np.uint32), asset_b=np.full(40, 2, np.uint32),
+    whole = dict(solid_a=np.zeros(40, np.uint32), solid_b=np.full(40, 2, np.uint32),
                  pose_a=np.tile([1.0, 0, 0, 0, 0, 0, 0], (40, 1)), pose_b=poses, scale_a=ones,
                  scale_b=ones)
     found = ist.gpu.penetration(assets, 0, 2, None, OnDevice(poses.copy()))
@@ -313,19 +315,19 @@ def test_arguments_may_be_left_out(solids, arguments):
     empty = ist.gpu.penetration(assets, 0, 2, None, OnDevice(np.zeros((0, 7))))
     assert empty.volume.shape == (0,) and empty.centroid.numpy().shape == (0, 3)
     for wrong, error, text in [
-            (dict(asset_b=3), ValueError, "asset_b: 3; there are 3 assets"),
-            (dict(asset_a=-1), ValueError, "asset_a: -1; there are 3 assets"),
+            (dict(solid_b=3), ValueError, "solid_b: 3; there are 3 solids"),
+            (dict(solid_a=-1), ValueError, "solid_a: -1; there are 3 solids"),
             (dict(pose_b=None), ValueError, "one argument must have rows"),
             (dict(scale_b=OnDevice(np.ones(3))), ValueError,
              "scale_b: 3 rows; the arguments before it have 40"),
-            (dict(asset_a=OnDevice(np.zeros(40, np.int64))), TypeError,
-             "asset_a: dtype int64; wanted uint32 or int32"),
+            (dict(solid_a=OnDevice(np.zeros(40, np.int64))), TypeError,
+             "solid_a: dtype int64; wanted uint32 or int32"),
             (dict(wanted=["force"]), ValueError, "wanted: 'force'; there are 'volume'"),
             (dict(wanted="volume"), TypeError, "wanted: a str; must be a sequence"),
             (dict(measure="outer"), ValueError, "measure: 'outer'"),
             (dict(measure="exact"), ValueError, "measure: 'exact'; one of 'matched', 'inner'"),
-            (dict(assets=solids), TypeError, "assets: a list; wanted ist.gpu.Assets")]:
-        given = dict(assets=assets, asset_a=0, asset_b=2, pose_a=None, pose_b=OnDevice(poses.copy()))
+            (dict(solids=solids), TypeError, "solids: a list; wanted ist.gpu.Solids")]:
+        given = dict(solids=assets, solid_a=0, solid_b=2, pose_a=None, pose_b=OnDevice(poses.copy()))
         with pytest.raises(error, match=text):
             ist.gpu.penetration(**{**given, **wrong})
     del assets, given
@@ -338,7 +340,7 @@ def kept(array):
 
 
 def test_what_is_given_is_written(solids, arguments):
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
     expected = ask(assets, arguments).volume.numpy()
     out = dict(volume=kept(np.zeros(40)), status=kept(np.full(40, 9, np.int32)))
     found = ask(assets, arguments, out=out)
@@ -363,7 +365,7 @@ def test_what_is_given_is_written(solids, arguments):
 
 
 def test_answers_outlive_what_they_came_from(solids, arguments):
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
     expected = ask(assets, arguments).volume.numpy()
     volume, status = (lambda found: (found.volume, found.status))(ask(assets, arguments))
     gc.collect()
@@ -380,7 +382,7 @@ set_name.argtypes = [ctypes.py_object, ctypes.c_char_p]
 
 
 def test_capsules_hold_what_they_show(solids, arguments):
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
     expected = ask(assets, arguments).centroid.numpy()
     for version, name, layout in ((None, b"dltensor", Managed),
                                   ((1, 1), b"dltensor_versioned", Versioned)):
@@ -420,7 +422,7 @@ def test_capsules_hold_what_they_show(solids, arguments):
 
 def test_a_captured_stream_needs_memory_for_answers(solids, arguments):
     captured = 77  # emulated_device.cpp
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
     out = dict(volume=kept(np.zeros(40)))
     with pytest.raises(ist.Error, match="no batch this large ran before"):
         ask(assets, arguments, out=out, stream=captured)

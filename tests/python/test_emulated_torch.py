@@ -27,20 +27,19 @@ def lent(tensor):
 @pytest.fixture
 def overlap(monkeypatch):
     """ist.torch.overlap that takes tensors of the CPU for a GPU's."""
-    batch, assets, fields = ist.gpu.penetration, ist.gpu.Assets, ist.gpu.Fields
+    batch, there = ist.gpu.penetration, ist.gpu.Solids
 
-    def penetration(assets, *arguments, out, **settings):
-        found = batch(assets, *map(lent, arguments), **settings,
+    def penetration(solids, *arguments, out, **settings):
+        found = batch(solids, *map(lent, arguments), **settings,
                       out={name: lent(tensor) for name, tensor in out.items()})
         # PyTorch would go on behind the batch; here somebody is to wait for it.
-        batch(assets, 0, 0, None, OnDevice(np.zeros((1, 7)))).status.numpy()
+        batch(solids, 0, 0, None, OnDevice(np.zeros((1, 7)))).status.numpy()
         return found
 
     def asked(*arguments, **settings):
         with monkeypatch.context() as patch:
             patch.setattr(ist.gpu, "penetration", penetration)
-            patch.setattr(ist.gpu, "Assets", lambda solids, device: assets(solids))
-            patch.setattr(ist.gpu, "Fields", lambda solids, device: fields(solids))
+            patch.setattr(ist.gpu, "Solids", lambda solids, device: there(solids))
             patch.setattr(torch.cuda, "current_stream", lambda device: Stream())
             patch.setattr(ist.torch, "_ask_cpu", ist.torch._ask_gpu)
             return ist.torch.overlap(*arguments, **settings)
@@ -64,7 +63,7 @@ def solids(gear, knot, cube):
     return [gear, ist.HalfSpaceField(), knot, ist.BoxField([0.5, 0.7, 0.6]), cube, gear]
 
 
-@pytest.mark.parametrize("pairs", [None, [(3, 0), (0, 2), (1, 4), (5, 0), (1, 2), (4, 2)], [(1, 0)],
+@pytest.mark.parametrize("pairs", [None, [(3, 0), (0, 2), (1, 4), (5, 0), (1, 2), (4, 2)], [(1, 0)], [(0, 1), (2, 0), (2, 3)],
                                    [(4, 0)], [(0, 5)], []])
 @pytest.mark.parametrize("scaled", [False, True])
 def test_overlaps_are_those_of_the_cpu(overlap, solids, random_poses, pairs, scaled):
@@ -86,7 +85,7 @@ def test_overlaps_are_those_of_the_cpu(overlap, solids, random_poses, pairs, sca
 def test_wrong_scenes_are_named(overlap, solids, random_poses):
     poses = torch.from_numpy(random_poses(6, 0.8))
     for wrong, error, text in [
-            (dict(pairs=[(0, 1)]), TypeError, r"pairs\[0\]: \(0, 1\): solids\[1\] is a Field"),
+            (dict(pairs=[(1, 3)]), ValueError, r"pairs\[0\]: \(1, 3\): two Fields"),
             (dict(pairs=[(0, 6)]), ValueError, r"pairs\[0\]: \(0, 6\): solids are numbered 0 to 5"),
             (dict(pairs=[(2, 2)]), ValueError, "a solid cannot be paired with itself"),
             (dict(field="always"), ValueError, "field: on a GPU"),

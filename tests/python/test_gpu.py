@@ -210,9 +210,9 @@ def test_without_a_card_it_says_so(cube):
     reason = ist.gpu.why_not()
     assert "GPU" in reason
     with pytest.raises(ist.Error, match=reason):
-        ist.gpu.Assets([cube])
-    with pytest.raises(TypeError, match="assets: a Field"):
-        ist.gpu.Assets([ist.BallField(1)])
+        ist.gpu.Solids([cube])
+    with pytest.raises(TypeError, match=r"solids\[1\]: a int; wanted an Asset or a Field"):
+        ist.gpu.Solids([ist.BallField(1), 3])
     with pytest.raises(TypeError):
         ist.gpu.penetration([cube], 0, 0, None, None)
     for cls in (ist.gpu.Array, ist.gpu.Penetration):

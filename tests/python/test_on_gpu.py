@@ -27,7 +27,7 @@ def solids(gear, knot, cube):
 
 @pytest.fixture(scope="module")
 def assets(solids):
-    return ist.gpu.Assets(solids)
+    return ist.gpu.Solids(solids)
 
 
 @pytest.fixture
@@ -38,8 +38,8 @@ def pairs(random_poses):
     def draw(count, reach):
         random = np.random.default_rng(count)
         return dict(
-            asset_a=random.integers(0, 3, count).astype(np.uint32),
-            asset_b=random.integers(0, 3, count).astype(np.uint32),
+            solid_a=random.integers(0, 3, count).astype(np.uint32),
+            solid_b=random.integers(0, 3, count).astype(np.uint32),
             pose_a=random_poses(count, reach), pose_b=random_poses(count, reach)[::-1].copy(),
             scale_a=random.uniform(0.5, 2, count), scale_b=random.uniform(0.5, 2, count))
 
@@ -57,12 +57,12 @@ def on_card(arguments):
 
 def kinds(arguments):
     """(a, b, rows) of all pairs of the same solids."""
-    for a, b in np.unique(np.stack((arguments["asset_a"], arguments["asset_b"])), axis=1).T:
-        yield a, b, (arguments["asset_a"] == a) & (arguments["asset_b"] == b)
+    for a, b in np.unique(np.stack((arguments["solid_a"], arguments["solid_b"])), axis=1).T:
+        yield a, b, (arguments["solid_a"] == a) & (arguments["solid_b"] == b)
 
 
 def on_cpu(solids, arguments, first=None, **settings):
-    """What ist.penetration says, and force and torque with the signs of gradients; asset_a are
+    """What ist.penetration says, and force and torque with the signs of gradients; solid_a are
     places in `first`."""
     rows = len(arguments["pose_b"])
     answers = dict(volume=np.zeros(rows), centroid=np.zeros((rows, 3)),
@@ -121,8 +121,8 @@ def test_answers_are_those_of_the_cpu(solids, assets, pairs, measure):
     assert (theirs["status"] == ist.QueryStatus.invalid_input).nonzero()[0].tolist() == [10, 20, 30]
     expect_close(ours, theirs)
     assert found.node_visits is None and found.sphere_pairs is None
-    arguments["asset_a"][40] = 3
-    arguments["asset_b"][50] = 2**32 - 1
+    arguments["solid_a"][40] = 3
+    arguments["solid_b"][50] = 2**32 - 1
     again = host(ist.gpu.penetration(assets, **on_card(arguments), measure=measure))
     assert again["status"][[40, 50]].tolist() == [2, 2]
     kept = np.ones(len(ours["volume"]), bool)
@@ -138,18 +138,18 @@ def test_budgets_are_those_of_the_cpu(solids, assets, pairs):
     assert not np.array_equal(ours["volume"], whole["volume"])
 
 
-def test_fields_are_those_of_the_cpu(solids, assets, pairs, knot):
+def test_fields_are_those_of_the_cpu(solids, pairs, knot):
     heights = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 8)).astype(np.float32)
     fields = [ist.HalfSpaceField(), ist.BoxField([1, 2, 0.5]), ist.BallField(1),
               ist.CapsuleField(0.5, 0.3), ist.HeightField(heights, lowest=-0.5, highest=0.5),
               ist.MeshField(knot)]
-    there = ist.gpu.Fields(fields)
+    there = ist.gpu.Solids([*fields, *solids])
     arguments = pairs(3000)
-    arguments["asset_a"] = np.random.default_rng(4).integers(0, 6, 3000).astype(np.uint32)
+    arguments["solid_a"] = np.random.default_rng(4).integers(0, 6, 3000).astype(np.uint32)
     arguments["pose_b"][10, 3] = np.nan
-    found = ist.gpu.penetration(assets, **on_card(arguments), fields=there)
-    del there  # the batch holds it
-    ours, theirs = host(found), on_cpu(solids, arguments, first=fields)
+    numbers = arguments | dict(solid_b=(arguments["solid_b"] + 6).astype(arguments["solid_b"].dtype))
+    ours = host(ist.gpu.penetration(there, **on_card(numbers)))
+    theirs = on_cpu(solids, arguments, first=fields)
     assert (theirs["volume"] > 0).sum() > 1000 and theirs["status"][10] == 2
     assert (ours["status"] == theirs["status"]).all() and np.isnan(ours["volume"][10])
     for name, part in (("volume", 1e-9), ("translation_gradient", 1e-6), ("rotation_gradient", 1e-6)):
@@ -205,7 +205,7 @@ def test_patches_are_those_of_the_cpu(solids, assets, pairs):
 
 def test_arguments_may_be_left_out(assets, pairs):
     arguments = on_card(pairs(500))
-    for name in ("asset_a", "asset_b"):
+    for name in ("solid_a", "solid_b"):
         arguments[name].fill_(1)
     for name in ("scale_a", "scale_b"):
         arguments[name].fill_(1)
@@ -216,7 +216,7 @@ def test_arguments_may_be_left_out(assets, pairs):
                               wanted=["status", "node_visits", "sphere_pairs"])
     assert few.volume is None and few.status.dtype == np.uint32
     assert few.node_visits.numpy().max() > 0 and few.sphere_pairs.numpy().max() > 0
-    with pytest.raises(ValueError, match="asset_b: 3; there are 3 assets"):
+    with pytest.raises(ValueError, match="solid_b: 3; there are 3 solids"):
         ist.gpu.penetration(assets, 0, 3, None, arguments["pose_b"])
     with pytest.raises(ValueError, match="one argument must have rows"):
         ist.gpu.penetration(assets, 0, 1, None, None)
@@ -315,8 +315,8 @@ def test_arguments_that_do_not_fit_are_named(assets, pairs):
         (dict(pose_b=arguments["pose_b"].T.contiguous().T), ValueError, "pose_b: not in C order"),
         (dict(scale_b=arguments["scale_b"][::2]), ValueError, "scale_b: not in C order"),
         (dict(scale_b=arguments["scale_b"][:5]), ValueError, "scale_b: 5 rows; the arguments before"),
-        (dict(asset_a=arguments["asset_a"].long()), TypeError,
-         "asset_a: dtype int64; wanted uint32 or int32"),
+        (dict(solid_a=arguments["solid_a"].long()), TypeError,
+         "solid_a: dtype int64; wanted uint32 or int32"),
         (dict(scale_a=2.0), TypeError, "scale_a: a float is not a device array"),
         (dict(pose_b=arguments["pose_b"].clone().requires_grad_()), TypeError, "pose_b: .*grad"),
         (dict(stream="mine"), TypeError, "stream: a str is not a stream"),
@@ -391,7 +391,7 @@ def test_streams_wait_for_each_other(assets, pairs):
 
 
 def test_what_a_batch_reads_stays_until_it_is_done(solids, pairs):
-    assets = ist.gpu.Assets(solids)
+    assets = ist.gpu.Solids(solids)
     expected = host(ist.gpu.penetration(assets, **on_card(pairs(1000))))
     side = torch.cuda.Stream()
     for _ in range(3):
@@ -412,7 +412,7 @@ def test_what_a_batch_reads_stays_until_it_is_done(solids, pairs):
     found = ist.gpu.penetration(assets, **arguments, stream=side)
     del assets, arguments  # waits for the batch
     gc.collect()
-    others = ist.gpu.Assets(solids[::-1])
+    others = ist.gpu.Solids(solids[::-1])
     expect_same_bits(host(found), expected)
     del others
 
@@ -537,11 +537,11 @@ def test_threads_share_assets(assets, pairs):
 def test_another_device(solids, pairs):
     if torch.cuda.device_count() < 2:
         pytest.skip("one card")
-    second = ist.gpu.Assets(solids, device=1)
+    second = ist.gpu.Solids(solids, device=1)
     assert second.device == 1
     arguments = on_card(pairs(1000))
-    expected = host(ist.gpu.penetration(ist.gpu.Assets(solids), **arguments))
-    with pytest.raises(TypeError, match="asset_a: on CUDA device 0; wanted .* on CUDA device 1"):
+    expected = host(ist.gpu.penetration(ist.gpu.Solids(solids), **arguments))
+    with pytest.raises(TypeError, match="solid_a: on CUDA device 0; wanted .* on CUDA device 1"):
         ist.gpu.penetration(second, **arguments)
     moved = {name: x.to("cuda:1") for name, x in arguments.items()}
     stream = torch.cuda.current_stream(1)
@@ -554,9 +554,9 @@ def test_another_device(solids, pairs):
 def test_assets_say_what_they_take(solids, assets):
     assert len(assets) == 3 and assets.device == 0
     assert assets.bytes >= sum(len(solid.to_bytes()) for solid in solids)
-    assert len(ist.gpu.Assets([])) == 0
+    assert len(ist.gpu.Solids([])) == 0
 
 
 def test_too_large_a_device_is_an_error(solids):
     with pytest.raises(ist.Error, match="GPU"):
-        ist.gpu.Assets(solids, device=torch.cuda.device_count())
+        ist.gpu.Solids(solids, device=torch.cuda.device_count())

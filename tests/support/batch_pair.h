@@ -10,7 +10,7 @@
 
 namespace ist::testing {
 
-/// A pair of a batch on a GPU: assets by their number.
+/// A pair of a batch on a GPU: solids by their number.
 struct BatchPair {
   std::uint32_t a = 0, b = 0;
   Pose pose_a, pose_b;
@@ -35,8 +35,9 @@ struct PairColumns {
   }
 
   GpuPairs pairs() const {
-    return {a.size(),      a.data(),       b.data(),      pose_a.data(),
-            pose_b.data(), scale_a.data(), scale_b.data()};
+    return {a.size(),
+            {a.data(), pose_a.data(), scale_a.data()},
+            {b.data(), pose_b.data(), scale_b.data()}};
   }
 };
 

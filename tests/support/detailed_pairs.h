@@ -24,9 +24,9 @@ inline const std::vector<Asset>& detailed_assets() {
   return made;
 }
 
-inline std::vector<TreeView> detailed_views() {
-  std::vector<TreeView> out;
-  for (const Asset& asset : detailed_assets()) out.push_back(asset.view());
+inline std::vector<GpuSolid> detailed_solids() {
+  std::vector<GpuSolid> out;
+  for (const Asset& asset : detailed_assets()) out.emplace_back(asset.view());
   return out;
 }
 

@@ -75,8 +75,9 @@ class DeviceBatch {
         spheres_(size_) {}
 
   GpuPairs pairs() const {
-    return {size_,          a_.data(),       b_.data(),      pose_a_.data(),
-            pose_b_.data(), scale_a_.data(), scale_b_.data()};
+    return {size_,
+            {a_.data(), pose_a_.data(), scale_a_.data()},
+            {b_.data(), pose_b_.data(), scale_b_.data()}};
   }
   GpuPenetrations answers() const {
     return {volume_.data(), centroid_.data(), push_.data(),   turn_.data(),

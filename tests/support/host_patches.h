@@ -1,13 +1,14 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <ist/query.h>
 
 #include "cuda/query/patch_steps.h"
 #include "support/batch_pair.h"
-#include "support/host_assets.h"
+#include "support/host_solids.h"
 #include "support/host_team.h"
 #include "support/patch_columns.h"
 
@@ -16,7 +17,7 @@ namespace ist::testing {
 /// The GPU's batch of contact patches on the host, as HostBatch runs penetrations.
 class HostPatches {
  public:
-  explicit HostPatches(const std::vector<TreeView>& assets) : assets_(assets) {}
+  explicit HostPatches(HostSolids solids) : solids_(std::move(solids)) {}
 
   /// `seed`: of the order in which lanes go on; 0: a team of one.
   std::vector<PatchedPair> run(const std::vector<BatchPair>& pairs, Measure measure,
@@ -37,18 +38,15 @@ class HostPatches {
                     vectors,
                     vectors};
     // What teams that come before left in their room must not matter.
-    std::vector<std::byte> room(gpu::PatchRoom::bytes(assets_.most_bins()), std::byte{0xA5});
+    std::vector<std::byte> room(gpu::PatchRoom::bytes(solids_.most_bins()), std::byte{0xA5});
     gpu::PatchArrays batch = {};
-    batch.pairs.assets = assets_.refs().data();
-    batch.pairs.asset_count = static_cast<std::uint32_t>(assets_.refs().size());
-    batch.pairs.measure = measure;
-    batch.pairs.pairs = columns.pairs();
-    batch.pairs.answers = wholes.answers();
+    static_cast<gpu::SolidPairs&>(batch.pairs) =
+        solids_.asked(columns.pairs(), measure, wholes.answers());
     batch.patches = {
         most,           to.count.data(), to.id.data(),     to.centroid.data(), to.normal.data(),
         to.area.data(), to.depth.data(), to.volume.data(), to.force.data(),    to.torque.data()};
     batch.rooms = room.data();
-    batch.most_bins = assets_.most_bins();
+    batch.most_bins = solids_.most_bins();
     const auto memory = std::make_unique<gpu::PatchMemory>();
     for (std::uint32_t i = 0; i < n; ++i)
       if (gpu::sift_patches(batch, i))
@@ -58,7 +56,7 @@ class HostPatches {
   }
 
  private:
-  HostAssets assets_;
+  HostSolids solids_;
 };
 
 }  // namespace ist::testing

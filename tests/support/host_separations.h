@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <ist/query.h>
 
 #include "cuda/query/separation_steps.h"
 #include "support/batch_pair.h"
-#include "support/host_assets.h"
+#include "support/host_solids.h"
 #include "support/host_team.h"
 #include "support/separation_columns.h"
 
@@ -18,8 +19,8 @@ namespace ist::testing {
 class HostSeparations {
  public:
   /// Room for what is split: so many of each kind.
-  explicit HostSeparations(const std::vector<TreeView>& assets, std::uint32_t room = 1 << 16)
-      : assets_(assets), room_(room) {}
+  explicit HostSeparations(HostSolids solids, std::uint32_t room = 1 << 16)
+      : solids_(std::move(solids)), room_(room) {}
 
   /// `seed`: of the order in which lanes go on; 0: a team of one. `max_visits`: 0: no limit.
   std::vector<Separation> run(const std::vector<BatchPair>& pairs, unsigned seed = 0,
@@ -46,10 +47,7 @@ class HostSeparations {
     std::vector<double> entries_gap(room_), entries_cover(room_);
     counters[0] = counters[1] = {};
     gpu::SeparationArrays batch = {};
-    batch.pairs.assets = assets_.refs().data();
-    batch.pairs.asset_count = static_cast<std::uint32_t>(assets_.refs().size());
-    batch.pairs.measure = Measure::inner;
-    batch.pairs.pairs = columns.pairs();
+    static_cast<gpu::SolidPairs&>(batch.pairs) = solids_.asked(columns.pairs(), Measure::inner, {});
     batch.counters = counters;
     for (int kind = 0; kind < 2; ++kind) batch.list[kind] = lists[kind].data();
     batch.pairs.splits = splits.data();
@@ -87,7 +85,7 @@ class HostSeparations {
       });
   }
 
-  HostAssets assets_;
+  HostSolids solids_;
   std::uint32_t room_;
 };
 

@@ -5,9 +5,11 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <random>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "query/base/members.h"
 #include "support/baked.h"
 #include "support/host_batch.h"
 #include "support/patch_columns.h"
@@ -28,9 +30,9 @@ inline const std::vector<Asset>& batch_assets() {
   return made;
 }
 
-inline std::vector<TreeView> batch_views() {
-  std::vector<TreeView> out;
-  for (const Asset& asset : batch_assets()) out.push_back(asset.view());
+inline std::vector<GpuSolid> batch_solids() {
+  std::vector<GpuSolid> out;
+  for (const Asset& asset : batch_assets()) out.emplace_back(asset.view());
   return out;
 }
 
@@ -81,64 +83,35 @@ inline std::pair<PlacedTree, PlacedTree> placed(const BatchPair& pair) {
           PlacedTree{batch_assets()[pair.b].view(), pair.pose_b, pair.scale_b}};
 }
 
-inline void expect_same_bits(const std::vector<Penetration>& x, const std::vector<Penetration>& y) {
-  ASSERT_EQ(x.size(), y.size());
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    if (x[i].status == QueryStatus::invalid_input) {
-      EXPECT_EQ(y[i].status, QueryStatus::invalid_input) << i;
-      EXPECT_TRUE(std::isnan(x[i].volume) && std::isnan(y[i].volume)) << i;
-      continue;
-    }
-    EXPECT_EQ(x[i].volume, y[i].volume) << i;
-    EXPECT_EQ(x[i].centroid, y[i].centroid) << i;
-    EXPECT_EQ(x[i].translation_gradient, y[i].translation_gradient) << i;
-    EXPECT_EQ(x[i].rotation_gradient, y[i].rotation_gradient) << i;
-    EXPECT_EQ(x[i].status, y[i].status) << i;
-    EXPECT_EQ(x[i].node_visits, y[i].node_visits) << i;
-    EXPECT_EQ(x[i].sphere_pairs, y[i].sphere_pairs) << i;
-  }
+/// NaN is like NaN.
+template <class Answer>
+void expect_same_answer(const Answer& x, const Answer& y, std::size_t i) {
+  for_each_member(
+      [i]<class Value>(const Value& one, const Value& other) {
+        bool same = one == other;
+        if constexpr (std::is_same_v<Value, double>) same |= std::isnan(one) && std::isnan(other);
+        if constexpr (std::is_same_v<Value, Eigen::Vector3d>)
+          same |= one.array().isNaN().all() && other.array().isNaN().all();
+        EXPECT_TRUE(same) << i << ": " << ::testing::PrintToString(one) << " is not "
+                          << ::testing::PrintToString(other);
+      },
+      x, y);
 }
 
-inline void expect_same_bits(const std::vector<Separation>& x, const std::vector<Separation>& y) {
+template <class Answer>
+void expect_same_bits(const std::vector<Answer>& x, const std::vector<Answer>& y) {
   ASSERT_EQ(x.size(), y.size());
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    if (x[i].status == QueryStatus::invalid_input) {
-      EXPECT_EQ(y[i].status, QueryStatus::invalid_input) << i;
-      EXPECT_TRUE(std::isnan(x[i].distance) && std::isnan(y[i].distance)) << i;
-      continue;
-    }
-    EXPECT_EQ(x[i].distance, y[i].distance) << i;
-    EXPECT_EQ(x[i].distance_min, y[i].distance_min) << i;
-    EXPECT_EQ(x[i].distance_max, y[i].distance_max) << i;
-    EXPECT_EQ(x[i].point_a, y[i].point_a) << i;
-    EXPECT_EQ(x[i].point_b, y[i].point_b) << i;
-    EXPECT_EQ(x[i].normal, y[i].normal) << i;
-    EXPECT_EQ(x[i].status, y[i].status) << i;
-    EXPECT_EQ(x[i].node_visits, y[i].node_visits) << i;
-    EXPECT_EQ(x[i].sphere_pairs, y[i].sphere_pairs) << i;
-  }
+  for (std::size_t i = 0; i < x.size(); ++i) expect_same_answer(x[i], y[i], i);
 }
 
 inline void expect_same_bits(const std::vector<PatchedPair>& x, const std::vector<PatchedPair>& y) {
   ASSERT_EQ(x.size(), y.size());
-  std::vector<Penetration> wholes[2];
   for (std::size_t i = 0; i < x.size(); ++i) {
-    wholes[0].push_back(x[i].whole);
-    wholes[1].push_back(y[i].whole);
+    expect_same_answer(x[i].whole, y[i].whole, i);
     ASSERT_EQ(x[i].patches.size(), y[i].patches.size()) << i;
-    for (std::size_t k = 0; k < x[i].patches.size(); ++k) {
-      const ContactPatch &p = x[i].patches[k], &q = y[i].patches[k];
-      EXPECT_EQ(p.id, q.id) << i;
-      EXPECT_EQ(p.centroid, q.centroid) << i;
-      EXPECT_EQ(p.normal, q.normal) << i;
-      EXPECT_EQ(p.area, q.area) << i;
-      EXPECT_EQ(p.depth, q.depth) << i;
-      EXPECT_EQ(p.volume, q.volume) << i;
-      EXPECT_EQ(p.force, q.force) << i;
-      EXPECT_EQ(p.torque, q.torque) << i;
-    }
+    for (std::size_t k = 0; k < x[i].patches.size(); ++k)
+      expect_same_answer(x[i].patches[k], y[i].patches[k], i);
   }
-  expect_same_bits(wholes[0], wholes[1]);
 }
 
 }  // namespace ist::testing

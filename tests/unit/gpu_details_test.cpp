@@ -52,7 +52,7 @@ struct Off {
 };
 
 TEST(GpuDetails, BudgetsAreTheCpus) {
-  HostBatch batch(detailed_views());
+  HostBatch batch(detailed_solids());
   const std::vector<BatchPair> pairs = detailed_pairs(150, 81);
   std::vector<Penetration> whole = batch.run(pairs, Measure::matched);
   std::size_t changed = 0;
@@ -72,11 +72,11 @@ TEST(GpuDetails, BudgetsAreTheCpus) {
 
 /// By which a budget's shares are told, with the slopes that go into the gradients.
 TEST(GpuDetails, QuickLooksAreTheCpus) {
-  const HostAssets assets(detailed_views());
+  const HostSolids solids(detailed_solids());
   const auto memory = std::make_unique<gpu::FilledMemory>();
   std::size_t met = 0;
   for (const BatchPair& pair : detailed_pairs(200, 84)) {
-    const gpu::AssetRef &a = assets.refs()[pair.a], &b = assets.refs()[pair.b];
+    const gpu::SolidRef &a = solids.refs()[pair.a], &b = solids.refs()[pair.b];
     gpu::PairPlace place;
     ASSERT_TRUE(
         place.place(a.frame, pair.pose_a, pair.scale_a, b.frame, pair.pose_b, pair.scale_b));
@@ -106,7 +106,7 @@ TEST(GpuDetails, QuickLooksAreTheCpus) {
 TEST(GpuDetails, OracleRowsUnderABudgetAreTheCpus) {
   IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
   constexpr std::size_t kSpheres = 1000;
-  std::vector<TreeView> trees;
+  std::vector<GpuSolid> trees;
   std::map<std::string, std::uint32_t> known;
   const auto number_of = [&](const std::string& mesh) {
     const auto [at, fresh] = known.emplace(mesh, static_cast<std::uint32_t>(trees.size()));
@@ -140,7 +140,7 @@ TEST(GpuDetails, OracleRowsUnderABudgetAreTheCpus) {
 }
 
 TEST(GpuDetails, CoincidentCopiesAreTheCpus) {
-  HostBatch batch(detailed_views());
+  HostBatch batch(detailed_solids());
   const std::vector<BatchPair> pairs = copies_in_place(120, 82);
   const std::vector<Penetration> whole = batch.run(pairs, Measure::matched);
   for (const std::uint32_t budget : {0u, 2000u}) {
@@ -158,7 +158,7 @@ TEST(GpuDetails, CoincidentCopiesAreTheCpus) {
 }
 
 TEST(GpuDetails, LanesOfAWarpNeedNoLuck) {
-  HostBatch batch(detailed_views());
+  HostBatch batch(detailed_solids());
   std::vector<BatchPair> pairs = detailed_pairs(12, 83);
   pairs.push_back(pairs.front());
   pairs.back().b = pairs.back().a;

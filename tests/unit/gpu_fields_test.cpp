@@ -8,7 +8,10 @@
 
 #include <ist/error.h>
 
-#include "support/host_field_batch.h"
+#include "query/base/turned_over.h"
+
+#include "support/host_patches.h"
+#include "support/host_separations.h"
 #include "support/oracle_assets.h"
 #include "support/random_pairs.h"
 #include "support/reference_sum.h"
@@ -27,10 +30,19 @@ std::vector<std::pair<const char*, Field>> batch_fields() {
   return out;
 }
 
-std::vector<Field> batch_field_values() {
-  std::vector<Field> out;
-  for (const auto& [name, field] : batch_fields()) out.push_back(field);
-  return out;
+/// Trees and fields as the solids of a batch.
+std::vector<GpuSolid> with_fields(std::vector<GpuSolid> trees, const std::vector<Field>& fields) {
+  for (const Field& field : fields) trees.emplace_back(field);
+  return trees;
+}
+
+/// batch_solids() and batch_fields(): field f is solid kFirstField + f.
+constexpr std::uint32_t kFirstField = 4;
+std::vector<GpuSolid> mixed_solids() {
+  std::vector<Field> all;
+  for (const auto& [name, field] : batch_fields()) all.push_back(field);
+  EXPECT_EQ(batch_solids().size(), kFirstField);
+  return with_fields(batch_solids(), all);
 }
 
 /// Random poses of a field and random trees, near it more often than not.
@@ -38,7 +50,7 @@ std::vector<BatchPair> pairs_with(std::uint32_t field, std::size_t count, unsign
   RandomPairs random(seed);
   std::vector<BatchPair> out = random.pairs(count);
   for (BatchPair& pair : out) {
-    pair.a = field;
+    pair.a = kFirstField + field;
     pair.scale_b *= random.uniform(0.1, 0.5);
     pair.pose_a = random.pose(0.3);
   }
@@ -49,7 +61,8 @@ Penetration by_cpu(const Field& field, const BatchPair& pair, Measure measure) {
   static Workspace workspace;
   PenetrationSettings settings;
   settings.measure = measure;
-  return penetration(PlacedField{field, pair.pose_a, pair.scale_a}, placed(pair).second, settings,
+  return penetration(PlacedField{field, pair.pose_a, pair.scale_a},
+                     PlacedTree{batch_assets()[pair.b].view(), pair.pose_b, pair.scale_b}, settings,
                      workspace);
 }
 
@@ -72,7 +85,7 @@ struct Off {
 
 TEST(GpuFields, AnswersAreTheCpus) {
   const auto named = batch_fields();
-  HostFieldBatch batch(batch_views(), batch_field_values());
+  HostBatch batch(mixed_solids());
   for (std::uint32_t f = 0; f < named.size(); ++f) {
     Off off;
     std::size_t met = 0, crossed = 0;
@@ -103,13 +116,13 @@ TEST(GpuFields, AlignedSolidsToo) {
   const std::vector<Field> fields = {BoxField{Eigen::Vector3d(0.5, 0.5, 0.5)},
                                      MeshField{cube().view()}, terrain_of(flat, 9),
                                      HalfSpaceField{}};
-  HostFieldBatch batch({cube().view(), batch_assets()[3].view()}, fields);
+  HostBatch batch(with_fields({cube().view(), batch_assets()[3].view()}, fields));
   std::vector<BatchPair> pairs;
   for (std::uint32_t f = 0; f < fields.size(); ++f) {
     for (const double scale : {0.25, 0.5, 1.0, 2.0}) {
       for (int i = 0; i < 27; ++i) {
         BatchPair pair;
-        pair.a = f;
+        pair.a = 2 + f;
         pair.b = static_cast<std::uint32_t>(i % 2);
         pair.scale_b = scale;
         for (int k = 0, n = i; k < 3; ++k, n /= 3) pair.pose_b.t[k] = 0.5 * (n % 3) - 0.25 * scale;
@@ -125,7 +138,7 @@ TEST(GpuFields, AlignedSolidsToo) {
     const BatchPair& pair = pairs[i];
     const Asset& body = pair.b == 0 ? cube() : batch_assets()[3];
     const Penetration cpu =
-        penetration(PlacedField{fields[pair.a], pair.pose_a, 1},
+        penetration(PlacedField{fields[pair.a - 2], pair.pose_a, 1},
                     PlacedTree{body.view(), pair.pose_b, pair.scale_b}, {}, workspace);
     off.look(by_one[i], cpu, pair.scale_b);
     off.look(by_warp[i], cpu, pair.scale_b);
@@ -155,21 +168,21 @@ TEST(GpuFields, CentresOnEdges) {
     for (const Eigen::Vector3d& edge : edges[f]) {
       for (const WorldSphere& ball : world_spheres({body.view(), Pose{}, 0.5}, Measure::matched)) {
         BatchPair pair;
-        pair.a = f;
+        pair.a = 1 + f;
         pair.scale_b = 0.5;
         for (int k = 0; k < 3; ++k) pair.pose_b.t[k] = edge[k] - ball.centre[k];
         pairs.push_back(pair);
       }
     }
   }
-  HostFieldBatch batch({body.view()}, fields);
+  HostBatch batch(with_fields({body.view()}, fields));
   const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 7);
   const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched);
   Workspace workspace;
   Off off;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const Penetration cpu =
-        penetration(PlacedField{fields[pairs[i].a], {}, 1},
+        penetration(PlacedField{fields[pairs[i].a - 1], {}, 1},
                     PlacedTree{body.view(), pairs[i].pose_b, pairs[i].scale_b}, {}, workspace);
     off.look(by_one[i], cpu, 0.5);
     off.look(by_warp[i], cpu, 0.5);
@@ -218,11 +231,12 @@ TEST(GpuFields, CentresOnEdgesOfManyTriangles) {
   std::vector<BatchPair> pairs;
   for (std::size_t i = 0; i < balls.size(); i += 100) {
     BatchPair pair;
+    pair.a = 1;
     const double edge[3] = {1.0 / 3, 0.25, 1};
     for (int k = 0; k < 3; ++k) pair.pose_b.t[k] = edge[k] - balls[i].centre[k];
     pairs.push_back(pair);
   }
-  HostFieldBatch batch({body.view()}, fields);
+  HostBatch batch(with_fields({body.view()}, fields));
   const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 7);
   Workspace workspace;
   Off off;
@@ -243,9 +257,8 @@ TEST(GpuFields, CentresOnEdgesOfManyTriangles) {
 TEST(GpuFields, NodesOnATrianglesPlane) {
   const Asset& body = batch_assets()[0];  // a torus of three levels
   const std::vector<Field> fields = {MeshField{torus().view()}};
-  const gpu::FieldRef field = gpu::field_ref(fields[0], gpu::pointed_to(fields[0]).data());
-  const HostAssets assets({body.view()});
-  const gpu::AssetRef& asset = assets.refs()[0];
+  const HostSolids solids(with_fields({body.view()}, fields));
+  const gpu::SolidRef &asset = solids.refs()[0], &field = solids.refs()[1];
   const gpu::TreeRef& tree = asset.tree[static_cast<int>(Measure::matched)];
   RandomPairs random(23);
   std::vector<BatchPair> pairs;
@@ -254,7 +267,7 @@ TEST(GpuFields, NodesOnATrianglesPlane) {
     const gpu::NodeBall ball = tree.ball(0, node);
     double c[3][3], on[3], moved[3] = {0, 0, 0};
     do {
-      field.mesh.corners(static_cast<std::uint32_t>(random.uniform(0, 1600)), c);
+      field.field.mesh.corners(static_cast<std::uint32_t>(random.uniform(0, 1600)), c);
     } while (gpu::TrianglePlane(c).flat);  // a lane without a triangle
     const bool beside = i % 2 == 0;
     const double u = i % 10 == 1 ? 0 : random.uniform(0, 0.5);
@@ -264,13 +277,14 @@ TEST(GpuFields, NodesOnATrianglesPlane) {
       on[k] = field.frame.centre[k] +
               field.frame.unit * ((1 - u - v) * c[0][k] + u * c[1][k] + v * c[2][k]);
     BatchPair pair;
+    pair.a = 1;
     pair.scale_b = 0.1;
     for (int k = 0; k < 3; ++k)
       pair.pose_b.t[k] = on[k] - pair.scale_b * (asset.frame.centre[k] +
                                                  asset.frame.unit * (ball.centre[k] + moved[k]));
     pairs.push_back(pair);
   }
-  HostFieldBatch batch({body.view()}, fields);
+  HostBatch batch(solids);
   const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched);
   Workspace workspace;
   Off off;
@@ -290,13 +304,13 @@ TEST(GpuFields, ProbesOfAnySize) {
   static const Asset many = baked(torus_mesh(1, 0.4, 48, 24), "torus", 4500, false);
   const std::vector<Field> fields = {MeshField{torus().view()},
                                      BoxField{Eigen::Vector3d(0.5, 0.4, 0.3)}};
-  HostFieldBatch batch({many.view()}, fields);
+  HostBatch batch(with_fields({many.view()}, fields));
   for (const double scale : {1e-7, 1e-5, 1e-3, 0.03, 0.1, 0.3, 3.0, 30.0}) {
     RandomPairs random(17);
     std::vector<BatchPair> pairs;
     for (int i = 0; i < 24; ++i) {
       BatchPair pair;
-      pair.a = static_cast<std::uint32_t>(i % 2);
+      pair.a = static_cast<std::uint32_t>(1 + i % 2);
       pair.scale_b = scale;
       pair.pose_b = random.pose(1);
       const double angle = random.uniform(0, 6.3), slope = random.uniform(0, 6.3);
@@ -304,7 +318,7 @@ TEST(GpuFields, ProbesOfAnySize) {
       const double on[3] = {ring * std::cos(angle), ring * std::sin(angle), 0.14 * std::sin(slope)};
       const double on_box[3] = {random.uniform(-0.5, 0.5), 0.4, random.uniform(-0.3, 0.3)};
       for (int k = 0; k < 3; ++k)
-        pair.pose_b.t[k] = (pair.a == 0 ? on : on_box)[k] + 0.7 * scale * random.uniform(-1, 1);
+        pair.pose_b.t[k] = (pair.a == 1 ? on : on_box)[k] + 0.7 * scale * random.uniform(-1, 1);
       pairs.push_back(pair);
     }
     const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 3);
@@ -314,7 +328,7 @@ TEST(GpuFields, ProbesOfAnySize) {
     int met = 0;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       const Penetration cpu =
-          penetration(PlacedField{fields[pairs[i].a], {}, 1},
+          penetration(PlacedField{fields[pairs[i].a - 1], {}, 1},
                       PlacedTree{many.view(), pairs[i].pose_b, scale}, {}, workspace);
       off.look(by_one[i], cpu, scale);
       off.look(by_warp[i], cpu, scale);
@@ -335,7 +349,7 @@ TEST(GpuFields, ProbesOfAnySize) {
 TEST(GpuFields, OracleRowsAreTheCpus) {
   IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
   constexpr std::size_t kSpheres = 1000;
-  std::vector<TreeView> trees;
+  std::vector<GpuSolid> trees;
   std::vector<Field> surfaces;
   std::map<std::string, std::uint32_t> known;
   std::vector<OracleRow> rows = read_oracle_rows("eledino");
@@ -343,8 +357,8 @@ TEST(GpuFields, OracleRowsAreTheCpus) {
   const auto number_of = [&](const std::string& mesh) {
     const auto [at, fresh] = known.emplace(mesh, static_cast<std::uint32_t>(trees.size()));
     if (fresh) {
-      trees.push_back(oracle_asset(mesh, kSpheres).view());
-      surfaces.push_back(MeshField{trees.back()});
+      trees.emplace_back(oracle_asset(mesh, kSpheres).view());
+      surfaces.push_back(MeshField{oracle_asset(mesh, kSpheres).view()});
     }
     return at->second;
   };
@@ -356,7 +370,8 @@ TEST(GpuFields, OracleRowsAreTheCpus) {
     pair.scale_b = row.scale_b;
     pairs.push_back(pair);
   }
-  HostFieldBatch batch(trees, surfaces);
+  for (BatchPair& pair : pairs) pair.a += static_cast<std::uint32_t>(trees.size());
+  HostBatch batch(with_fields(trees, surfaces));
   const std::vector<Penetration> answers = batch.run(pairs, Measure::matched);
   Workspace workspace;
   Off off;
@@ -380,7 +395,7 @@ TEST(GpuFields, OracleRowsAreTheCpus) {
 }
 
 TEST(GpuFields, LanesOfAWarpNeedNoLuck) {
-  HostFieldBatch batch(batch_views(), batch_field_values());
+  HostBatch batch(mixed_solids());
   const auto count = static_cast<std::uint32_t>(batch_fields().size());
   std::vector<BatchPair> pairs;
   for (std::uint32_t f = 0; f < count; ++f)
@@ -406,19 +421,19 @@ TEST(GpuFields, RoomChangesNoBit) {
     BatchPair pair = pairs_with(f, 1, 90)[0];
     pair.pose_b = pair.pose_a;
     pair.scale_b = 2;
-    for (pair.b = 0; pair.b < batch_views().size(); ++pair.b) pairs.push_back(pair);
+    for (pair.b = 0; pair.b < batch_solids().size(); ++pair.b) pairs.push_back(pair);
   }
-  HostFieldBatch roomy(batch_views(), batch_field_values());
+  HostBatch roomy(mixed_solids());
   roomy.query_room = static_cast<std::uint32_t>(pairs.size());
   roomy.part_room = 100 * roomy.query_room;
   roomy.word_room = 10000 * roomy.query_room;
   const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched, 1);
   EXPECT_EQ(roomy.rounds, 2u);  // of facets and of meshes
-  const auto large = [](const HostFieldBatch& batch) {
-    return batch.counters.large[gpu::kFacets] + batch.counters.large[gpu::kMesh];
+  const auto large = [](const HostBatch& batch) {
+    return batch.field_counters.large[gpu::kFacets] + batch.field_counters.large[gpu::kMesh];
   };
-  EXPECT_GT(roomy.counters.listed[gpu::kFacets], 30u);
-  EXPECT_GT(roomy.counters.listed[gpu::kMesh], 30u);
+  EXPECT_GT(roomy.field_counters.listed[gpu::kFacets], 30u);
+  EXPECT_GT(roomy.field_counters.listed[gpu::kMesh], 30u);
   EXPECT_GT(large(roomy), 0u);  // of a leaf more is listed than there is room for
 
   struct Room {
@@ -431,7 +446,7 @@ TEST(GpuFields, RoomChangesNoBit) {
                            Room{"few words", 40, 300, 520, ~0u, true, true},
                            Room{"few rounds", 5, 300, 30000, 2, false, false},
                            Room{"none", 5, 300, 30000, 0, false, false}}) {
-    HostFieldBatch batch(batch_views(), batch_field_values());
+    HostBatch batch(mixed_solids());
     batch.query_room = room.queries;
     batch.part_room = room.parts;
     batch.word_room = room.words;
@@ -444,21 +459,17 @@ TEST(GpuFields, RoomChangesNoBit) {
 }
 
 TEST(GpuFields, InvalidInputSpoilsOnlyItself) {
-  std::vector<Field> fields = batch_field_values();
-  const auto count = static_cast<std::uint32_t>(fields.size());
+  std::vector<GpuSolid> solids = mixed_solids();
+  const auto count = static_cast<std::uint32_t>(batch_fields().size());
   std::vector<BatchPair> pairs;
   for (int i = 0; i < 8; ++i)
     for (std::uint32_t f = 0; f < count; ++f) pairs.push_back(pairs_with(f, 1, 70 + f)[0]);
-  const std::vector<Penetration> sound =
-      HostFieldBatch(batch_views(), fields).run(pairs, Measure::matched);
+  const std::vector<Penetration> sound = HostBatch(solids).run(pairs, Measure::matched);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<float> holes(27, std::numeric_limits<float>::quiet_NaN());
-  fields.push_back(BallField{-1});                        // count
-  fields.push_back(MeshField{batch_assets()[0].view()});  // baked without one
-  fields.push_back(HalfSpaceField{Eigen::Vector3d::Zero(), 0});
-  fields.push_back(HeightField{nullptr, 9, 9});
-  fields.push_back(grid_of(holes, 3));
-  fields.push_back(MeshField{});
+  solids = with_fields(solids, {BallField{-1}, MeshField{batch_assets()[0].view()},  // without one
+                                HalfSpaceField{Eigen::Vector3d::Zero(), 0},
+                                HeightField{nullptr, 9, 9}, grid_of(holes, 3), MeshField{}});
   std::vector<std::size_t> bad = {3, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41};
   pairs[3].pose_b.t[1] = nan;
   pairs[7].pose_a.q[0] = nan;
@@ -467,13 +478,12 @@ TEST(GpuFields, InvalidInputSpoilsOnlyItself) {
   pairs[17].a = 1000;
   pairs[19].b = 99;
   for (std::uint32_t k = 0; k < 5; ++k) {
-    pairs[bad[6 + k]].a = count + k;
+    pairs[bad[6 + k]].a = kFirstField + count + k;
     pairs[bad[6 + k]].pose_b = pairs[bad[6 + k]].pose_a;
   }
   bad.push_back(43);
-  pairs[43].a = count + 5;
-  const std::vector<Penetration> answers =
-      HostFieldBatch(batch_views(), fields).run(pairs, Measure::matched);
+  pairs[43].a = kFirstField + count + 5;
+  const std::vector<Penetration> answers = HostBatch(solids).run(pairs, Measure::matched);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const bool is_bad = std::find(bad.begin(), bad.end(), i) != bad.end();
     EXPECT_EQ(answers[i].status, is_bad ? QueryStatus::invalid_input : QueryStatus::ok) << i;
@@ -481,15 +491,70 @@ TEST(GpuFields, InvalidInputSpoilsOnlyItself) {
     if (!is_bad) {
       EXPECT_EQ(answers[i].volume, sound[i].volume) << i;
     }
-    if (!is_bad || pairs[i].b >= batch_views().size() || pairs[i].a >= fields.size()) continue;
-    const Penetration cpu = by_cpu(fields[pairs[i].a], pairs[i], Measure::matched);
+    if (!is_bad || pairs[i].b >= batch_solids().size() || pairs[i].a >= solids.size()) continue;
+    const Penetration cpu = by_cpu(std::get<Field>(solids[pairs[i].a]), pairs[i], Measure::matched);
     EXPECT_EQ(cpu.status, QueryStatus::invalid_input) << i;
     EXPECT_TRUE(std::isnan(cpu.volume)) << i;
   }
-  EXPECT_TRUE(HostFieldBatch(batch_views(), fields).run({}, Measure::inner).empty());
+  EXPECT_TRUE(HostBatch(solids).run({}, Measure::inner).empty());
+}
+
+/// Pairs of trees, and of a tree and a field in either order, in one batch.
+TEST(GpuFields, ABatchMixesPairsInAnyOrder) {
+  const std::vector<GpuSolid> solids = mixed_solids();
+  const std::vector<BatchPair> of_trees = RandomPairs(19).pairs(40);
+  std::vector<BatchPair> of_fields, pairs;
+  for (std::uint32_t f = 0; kFirstField + f < solids.size(); ++f)
+    for (const BatchPair& pair : pairs_with(f, 12, 190 + f)) of_fields.push_back(pair);
+  std::vector<Penetration> expected = HostBatch(batch_solids()).run(of_trees, Measure::matched, 1);
+  pairs = of_trees;
+  std::size_t crossed = 0;
+  const std::vector<Penetration> first = HostBatch(solids).run(of_fields, Measure::matched, 1);
+  for (std::size_t i = 0; i < of_fields.size(); ++i) {
+    const BatchPair& pair = of_fields[i];
+    pairs.push_back(pair);
+    pairs.push_back({pair.b, pair.a, pair.pose_b, pair.pose_a, pair.scale_b, pair.scale_a});
+    expected.insert(expected.end(), 2, first[i]);
+    turn_over(pair.pose_b, pair.pose_a, expected.back());
+    crossed += first[i].rotation_gradient.norm() > 0 ? 1 : 0;
+  }
+  EXPECT_GT(crossed, 20u);
+  expect_same_bits(HostBatch(solids).run(pairs, Measure::matched, 1), expected);
+}
+
+/// Two fields hold no spheres, and a query of two trees takes no field.
+TEST(GpuFields, WhatHoldsNoSpheresIsNotHeld) {
+  const std::vector<GpuSolid> solids = mixed_solids();
+  std::vector<BatchPair> pairs(4);
+  pairs[1].a = pairs[2].b = pairs[3].a = kFirstField;
+  pairs[1].b = kFirstField + 1;
+  const std::vector<Penetration> volumes = HostBatch(solids).run(pairs, Measure::matched);
+  const std::vector<Separation> gaps = HostSeparations(solids).run(pairs);
+  const std::vector<PatchedPair> patches = HostPatches(solids).run(pairs, Measure::matched, 4);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto held = [](bool yes) { return yes ? QueryStatus::ok : QueryStatus::not_held; };
+    EXPECT_EQ(volumes[i].status, held(i != 1)) << i;
+    EXPECT_EQ(std::isnan(volumes[i].volume), i == 1) << i;
+    EXPECT_EQ(gaps[i].status, held(i == 0)) << i;
+    EXPECT_EQ(std::isnan(gaps[i].distance), i != 0) << i;
+    EXPECT_EQ(patches[i].whole.status, held(i == 0)) << i;
+    EXPECT_EQ(patches[i].patches.empty(), i != 0) << i;
+  }
+}
+
+TEST(GpuFields, WhatABatchCannotHoldIsNamed) {
+  const auto said = [](const GpuSolid& last) -> std::string {
+    try {
+      HostSolids({cube().view(), last});
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "nothing";
+  };
   FunctionField function;
   function.look = [](const void*, const Eigen::Vector3d&) noexcept { return FieldSample{}; };
-  EXPECT_THROW(HostFieldBatch(batch_views(), {function}), Error);
+  EXPECT_EQ(said(Field(function)).find("GPU: solid 1 is a FunctionField"), 0u);
+  EXPECT_EQ(said(TreeView{}), "GPU: solid 1 is an empty asset");
 }
 
 }  // namespace

@@ -58,14 +58,15 @@ struct AgainstCpu {
   std::size_t in_touch = 0, several = 0;
   std::size_t other = 0;  ///< of other regions
 
-  void ask(const std::vector<TreeView>& views, const std::vector<BatchPair>& pairs, Measure measure,
-           std::uint32_t most, Workspace& workspace) {
-    const std::vector<PatchedPair> answers = HostPatches(views).run(pairs, measure, most);
+  void ask(const std::vector<GpuSolid>& solids, const std::vector<BatchPair>& pairs,
+           Measure measure, std::uint32_t most, Workspace& workspace) {
+    const std::vector<PatchedPair> answers = HostPatches(solids).run(pairs, measure, most);
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       const BatchPair& pair = pairs[i];
       const std::vector<ContactPatch> cpu =
-          patches_of_cpu({views[pair.a], pair.pose_a, pair.scale_a},
-                         {views[pair.b], pair.pose_b, pair.scale_b}, measure, most, workspace);
+          patches_of_cpu({std::get<TreeView>(solids[pair.a]), pair.pose_a, pair.scale_a},
+                         {std::get<TreeView>(solids[pair.b]), pair.pose_b, pair.scale_b}, measure,
+                         most, workspace);
       const std::vector<ContactPatch>& gpu = answers[i].patches;
       ASSERT_EQ(gpu.empty(), cpu.empty()) << i;
       in_touch += !cpu.empty();
@@ -98,8 +99,8 @@ TEST(GpuPatches, AreThoseOfTheCpu) {
   for (const Measure measure : {Measure::matched, Measure::inner}) {
     AgainstCpu all;
     for (const std::uint32_t most : {1u, 4u, 11u, kMostGpuPatches}) {
-      all.ask(batch_views(), RandomPairs(41).pairs(300), measure, most, workspace);
-      all.ask(detailed_views(), detailed_pairs(60, 46), measure, most, workspace);
+      all.ask(batch_solids(), RandomPairs(41).pairs(300), measure, most, workspace);
+      all.ask(detailed_solids(), detailed_pairs(60, 46), measure, most, workspace);
     }
     EXPECT_GT(all.several, 300u);
     all.expect_near();
@@ -115,16 +116,16 @@ class RegionSums {
     Vector3d moment = Vector3d::Zero();
   };
 
-  RegionSums(const HostAssets& assets, const BatchPair& pair, Measure measure) {
+  RegionSums(const HostSolids& solids, const BatchPair& pair, Measure measure) {
     const auto tree_of = [&](std::uint32_t asset) -> const gpu::TreeRef& {
-      return assets.refs()[asset].tree[static_cast<int>(measure)];
+      return solids.refs()[asset].tree[static_cast<int>(measure)];
     };
     const gpu::TreeRef &a = tree_of(pair.a), &b = tree_of(pair.b);
     gpu::PairPlace place;
-    EXPECT_TRUE(place.place(assets.refs()[pair.a].frame, pair.pose_a, pair.scale_a,
-                            assets.refs()[pair.b].frame, pair.pose_b, pair.scale_b));
+    EXPECT_TRUE(place.place(solids.refs()[pair.a].frame, pair.pose_a, pair.scale_a,
+                            solids.refs()[pair.b].frame, pair.pose_b, pair.scale_b));
     const bool of_b = gpu::divides_b(a, b, place.a_from_b.scale);
-    cuts_ = assets.refs()[of_b ? pair.b : pair.a].cuts[static_cast<int>(measure)];
+    cuts_ = solids.refs()[of_b ? pair.b : pair.a].cuts[static_cast<int>(measure)];
     sums_.resize(cuts_.bins);
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> to_world(place.rotation_a);
     for (std::uint32_t i = 0; i < kWidth * a.leaf_blocks; ++i) {
@@ -173,15 +174,15 @@ class RegionSums {
 /// have such are left out.
 TEST(GpuPatches, AreTheRegionsSumsInDouble) {
   const std::vector<BatchPair> pairs = RandomPairs(47).pairs(150);
-  const HostAssets assets(batch_views());
+  const HostSolids solids(batch_solids());
   for (const Measure measure : {Measure::matched, Measure::inner}) {
-    const std::vector<PatchedPair> answers = HostPatches(batch_views()).run(pairs, measure, 6);
+    const std::vector<PatchedPair> answers = HostPatches(batch_solids()).run(pairs, measure, 6);
     std::size_t compared = 0;
     double worst = 0, worst_force = 0, worst_place = 0;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       const std::vector<ContactPatch>& patches = answers[i].patches;
       if (patches.empty()) continue;
-      const RegionSums sums(assets, pairs[i], measure);
+      const RegionSums sums(solids, pairs[i], measure);
       double in_regions = 0;
       for (const ContactPatch& patch : patches) in_regions += sums.of(patch.id).volume;
       if (in_regions < (1 - 1e-6) * answers[i].whole.volume) continue;
@@ -243,9 +244,10 @@ void expect_shares(const PatchedPair& of, std::size_t most) {
 TEST(GpuPatches, SumToTheWholeWhichIsThePenetration) {
   const std::vector<BatchPair> pairs = RandomPairs(42).pairs(150);
   for (const Measure measure : {Measure::matched, Measure::inner}) {
-    const std::vector<Penetration> wholes = HostBatch(batch_views()).run(pairs, measure);
+    const std::vector<Penetration> wholes = HostBatch(batch_solids()).run(pairs, measure);
     for (const std::uint32_t most : {0u, 1u, 3u, kMostGpuPatches}) {
-      const std::vector<PatchedPair> answers = HostPatches(batch_views()).run(pairs, measure, most);
+      const std::vector<PatchedPair> answers =
+          HostPatches(batch_solids()).run(pairs, measure, most);
       for (std::size_t i = 0; i < pairs.size(); ++i) {
         SCOPED_TRACE(i);
         expect_shares(answers[i], most);
@@ -262,7 +264,7 @@ TEST(GpuPatches, SumToTheWholeWhichIsThePenetration) {
 
 TEST(GpuPatches, LanesOfAWarpNeedNoLuck) {
   const std::vector<BatchPair> pairs = RandomPairs(43).pairs(60);
-  HostPatches batch(batch_views());
+  HostPatches batch(batch_solids());
   const std::vector<PatchedPair> by_one = batch.run(pairs, Measure::matched, 8);
   const std::vector<PatchedPair> expected = batch.run(pairs, Measure::matched, 8, 1);
   expect_same_bits(batch.run(pairs, Measure::matched, 8, 2), expected);
@@ -335,7 +337,7 @@ TEST(GpuPatches, UnusualContactsAreThoseOfTheCpu) {
   const Asset lattice = made_of(grid, false);
   const Asset one = make_random_asset({1, 1, {}, 0, 0}, 50);
   const Asset few = make_random_asset({100, 0.5, {}, 0, 0}, 51);
-  const std::vector<TreeView> views = {lattice.view(), one.view(), few.view()};
+  const std::vector<GpuSolid> solids = {lattice.view(), one.view(), few.view()};
   RandomPairs random(44);
   std::vector<BatchPair> pairs;
   for (int k = 0; k < 24; ++k) {
@@ -360,24 +362,25 @@ TEST(GpuPatches, UnusualContactsAreThoseOfTheCpu) {
       pairs.push_back(pair);
     }
   pairs.push_back({2, 2, {}, {}, 1, 1});
-  for (const PatchedPair& answer : HostPatches(views).run(pairs, Measure::matched, 12))
+  for (const PatchedPair& answer : HostPatches(solids).run(pairs, Measure::matched, 12))
     expect_shares(answer, 12);
   Workspace workspace;
   AgainstCpu all;
-  all.ask(views, pairs, Measure::matched, 12, workspace);
+  all.ask(solids, pairs, Measure::matched, 12, workspace);
   EXPECT_GT(all.in_touch, 15u);
   all.expect_near();
 }
 
 TEST(GpuPatches, InvalidPosesSpoilOnlyThemselves) {
   std::vector<BatchPair> pairs = RandomPairs(45).pairs(40);
-  const std::vector<PatchedPair> sound = HostPatches(batch_views()).run(pairs, Measure::matched, 4);
+  const std::vector<PatchedPair> sound =
+      HostPatches(batch_solids()).run(pairs, Measure::matched, 4);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   pairs[3].pose_b.t[1] = nan;
   pairs[7].pose_a.q[0] = std::numeric_limits<double>::infinity();
   pairs[11].scale_b = 0;
   pairs[19].b = 99;
-  std::vector<PatchedPair> rest = HostPatches(batch_views()).run(pairs, Measure::matched, 4);
+  std::vector<PatchedPair> rest = HostPatches(batch_solids()).run(pairs, Measure::matched, 4);
   std::vector<PatchedPair> expected = sound;
   for (const std::size_t i : {3u, 7u, 11u, 19u}) {
     EXPECT_EQ(rest[i].whole.status, QueryStatus::invalid_input) << i;
@@ -386,7 +389,7 @@ TEST(GpuPatches, InvalidPosesSpoilOnlyThemselves) {
     rest[i] = expected[i] = {};
   }
   expect_same_bits(rest, expected);
-  EXPECT_TRUE(HostPatches(batch_views()).run({}, Measure::inner, 4).empty());
+  EXPECT_TRUE(HostPatches(batch_solids()).run({}, Measure::inner, 4).empty());
 }
 
 }  // namespace

@@ -84,7 +84,7 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
   // As batches of few pairs are cut up, and of many.
   for (const auto& [measure, most_pairs] :
        {std::pair{Measure::matched, 1}, {Measure::matched, 1'000'000}, {Measure::inner, 1}}) {
-    HostBatch batch(batch_views());
+    HostBatch batch(batch_solids());
     batch.cut_for(static_cast<std::size_t>(most_pairs));
     const std::vector<Penetration> answers = batch.run(pairs, measure);
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -122,7 +122,7 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
 
 /// Splits early, into small tasks.
 HostBatch splitting(std::uint32_t room = 1 << 16) {
-  HostBatch batch(batch_views(), room);
+  HostBatch batch(batch_solids(), room);
   batch.most_alone = 16;
   batch.task_weight = 4;
   return batch;
@@ -169,11 +169,11 @@ TEST(GpuQuery, TheLargestPairsBegin) {
 
 /// All that meet, or whether any does.
 TEST(GpuQuery, CountsChildrenThatMeet) {
-  HostAssets assets(batch_views());
+  HostSolids solids(batch_solids());
   std::size_t some = 0, all = 0;
   for (const BatchPair& pair : RandomPairs(9).pairs(300)) {
-    const gpu::AssetRef& a = assets.refs()[pair.a];
-    const gpu::AssetRef& b = assets.refs()[pair.b];
+    const gpu::SolidRef& a = solids.refs()[pair.a];
+    const gpu::SolidRef& b = solids.refs()[pair.b];
     gpu::PairPlace place;
     ASSERT_TRUE(
         place.place(a.frame, pair.pose_a, pair.scale_a, b.frame, pair.pose_b, pair.scale_b));
@@ -207,7 +207,7 @@ TEST(GpuQuery, LanesOfAWarpNeedNoLuck) {
 TEST(GpuQuery, InvalidPosesSpoilOnlyThemselves) {
   RandomPairs poses(6);
   std::vector<BatchPair> pairs = poses.pairs(40);
-  const std::vector<Penetration> sound = HostBatch(batch_views()).run(pairs, Measure::matched);
+  const std::vector<Penetration> sound = HostBatch(batch_solids()).run(pairs, Measure::matched);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double inf = std::numeric_limits<double>::infinity();
   pairs[3].pose_b.t[1] = nan;
@@ -219,7 +219,7 @@ TEST(GpuQuery, InvalidPosesSpoilOnlyThemselves) {
   pairs[23].scale_b = nan;
   pairs[29].pose_a.t[0] = -inf;
   const std::vector<std::size_t> bad = {3, 7, 11, 13, 17, 19, 23, 29};
-  const std::vector<Penetration> answers = HostBatch(batch_views()).run(pairs, Measure::matched);
+  const std::vector<Penetration> answers = HostBatch(batch_solids()).run(pairs, Measure::matched);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const bool is_bad = std::find(bad.begin(), bad.end(), i) != bad.end();
     EXPECT_EQ(answers[i].status, is_bad ? QueryStatus::invalid_input : QueryStatus::ok) << i;
@@ -231,7 +231,7 @@ TEST(GpuQuery, InvalidPosesSpoilOnlyThemselves) {
       EXPECT_EQ(answers[i].volume, sound[i].volume) << i;
     }
   }
-  EXPECT_TRUE(HostBatch(batch_views()).run({}, Measure::inner).empty());
+  EXPECT_TRUE(HostBatch(batch_solids()).run({}, Measure::inner).empty());
 }
 
 }  // namespace

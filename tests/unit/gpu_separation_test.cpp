@@ -64,7 +64,7 @@ double size_of(const BatchPair& pair) { return 2 * (pair.scale_a + pair.scale_b)
 
 TEST(GpuSeparation, AnswersAreTheLeastGapsInDouble) {
   const std::vector<BatchPair> pairs = RandomPairs(21).pairs_at_all_distances(300);
-  HostSeparations batch(batch_views());
+  HostSeparations batch(batch_solids());
   const std::vector<Separation> answers = batch.run(pairs);
   std::size_t apart = 0, covers_apart = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -99,7 +99,7 @@ TEST(GpuSeparation, AnswersAreTheLeastGapsInDouble) {
 
 TEST(GpuSeparation, AgreesWithSeparation) {
   const std::vector<BatchPair> pairs = RandomPairs(22).pairs_at_all_distances(2000);
-  HostSeparations batch(batch_views());
+  HostSeparations batch(batch_solids());
   const std::vector<Separation> answers = batch.run(pairs);
   Workspace workspace;
   double worst = 0, worst_lower = 0, worst_relative = 0;
@@ -141,7 +141,7 @@ TEST(GpuSeparation, OfTwinsTheNearerOrTheFirstAnswers) {
         0, 0, {}, {{off, 0, 0, 1}, {random.uniform(-5, 5), random.uniform(-5, 5), 0}}};
     pairs.push_back(pair);
   }
-  HostSeparations batch(batch_views());
+  HostSeparations batch(batch_solids());
   const std::vector<Separation> answers = batch.run(pairs);
   std::size_t apart = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -161,18 +161,18 @@ TEST(GpuSeparation, OfTwinsTheNearerOrTheFirstAnswers) {
 /// Splitting, and who does what in which order, must not show.
 TEST(GpuSeparation, SameBitsHoweverItIsSplit) {
   const std::vector<BatchPair> pairs = RandomPairs(23).pairs_at_all_distances(400);
-  HostSeparations roomy(batch_views());
+  HostSeparations roomy(batch_solids());
   const std::vector<Separation> expected = roomy.run(pairs);
   EXPECT_GT(roomy.counters[0].tasks, 50u);
   for (const std::uint32_t room : {0u, 30u, 300u}) {
-    HostSeparations narrow(batch_views(), room);
+    HostSeparations narrow(batch_solids(), room);
     expect_same_bits(narrow.run(pairs), expected);
   }
 }
 
 TEST(GpuSeparation, LanesOfAWarpNeedNoLuck) {
   const std::vector<BatchPair> pairs = RandomPairs(24).pairs_at_all_distances(60);
-  HostSeparations roomy(batch_views()), narrow(batch_views(), 7);
+  HostSeparations roomy(batch_solids()), narrow(batch_solids(), 7);
   const std::vector<Separation> by_one = roomy.run(pairs);
   EXPECT_GT(roomy.counters[0].tasks, 3u);
   expect_same_bits(roomy.run(pairs, 1), by_one);
@@ -183,9 +183,9 @@ TEST(GpuSeparation, LanesOfAWarpNeedNoLuck) {
 /// What a limit leaves out may be as near as the interval says.
 TEST(GpuSeparation, IntervalsOfALimitHoldTheFinishedOnes) {
   const std::vector<BatchPair> pairs = RandomPairs(25).pairs_at_all_distances(300);
-  const std::vector<Separation> finished = HostSeparations(batch_views()).run(pairs);
+  const std::vector<Separation> finished = HostSeparations(batch_solids()).run(pairs);
   for (const std::uint32_t most : {1u, 3u, 20u, 100u, 200u, 400u}) {
-    HostSeparations batch(batch_views()), narrow(batch_views(), 10);
+    HostSeparations batch(batch_solids()), narrow(batch_solids(), 10);
     const std::vector<Separation> answers = batch.run(pairs, 0, most);
     expect_same_bits(narrow.run(pairs, 0, most), answers);
     std::size_t stopped = 0;
@@ -219,7 +219,7 @@ TEST(GpuSeparation, ExtremePlacesAreAnsweredAsWell) {
       pairs.push_back(pair);
     }
   }
-  HostSeparations batch(batch_views());
+  HostSeparations batch(batch_solids());
   const std::vector<Separation> answers = batch.run(pairs);
   EXPECT_GT(batch.counters[1].listed, pairs.size() / 2);
   Workspace workspace;
@@ -238,7 +238,7 @@ TEST(GpuSeparation, ExtremePlacesAreAnsweredAsWell) {
 
 TEST(GpuSeparation, InvalidPosesSpoilOnlyThemselves) {
   std::vector<BatchPair> pairs = RandomPairs(27).pairs_at_all_distances(40);
-  const std::vector<Separation> sound = HostSeparations(batch_views()).run(pairs);
+  const std::vector<Separation> sound = HostSeparations(batch_solids()).run(pairs);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double inf = std::numeric_limits<double>::infinity();
   pairs[3].pose_b.t[1] = nan;
@@ -250,7 +250,7 @@ TEST(GpuSeparation, InvalidPosesSpoilOnlyThemselves) {
   pairs[23].scale_b = nan;
   pairs[29].pose_a.t[0] = -inf;
   const std::vector<std::size_t> bad = {3, 7, 11, 13, 17, 19, 23, 29};
-  const std::vector<Separation> answers = HostSeparations(batch_views()).run(pairs);
+  const std::vector<Separation> answers = HostSeparations(batch_solids()).run(pairs);
   std::vector<Separation> rest = answers, expected = sound;
   for (const std::size_t i : bad) {
     EXPECT_EQ(answers[i].status, QueryStatus::invalid_input) << i;
@@ -261,7 +261,7 @@ TEST(GpuSeparation, InvalidPosesSpoilOnlyThemselves) {
     rest[i] = expected[i] = {};
   }
   expect_same_bits(rest, expected);
-  EXPECT_TRUE(HostSeparations(batch_views()).run({}).empty());
+  EXPECT_TRUE(HostSeparations(batch_solids()).run({}).empty());
 }
 
 }  // namespace

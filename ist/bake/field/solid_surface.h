@@ -19,11 +19,6 @@ class SolidSurface {
   /// they reach further, or that is not known. It refers to the solid.
   static std::optional<SolidSurface> of(const MeshSolid& solid, double enough);
 
-  /// Whether all triangles of the solid are the surface's, if it has one.
-  static bool keeps_all(const MeshSolid& solid) {
-    return solid.meets_itself() || !solid.may_overlap();
-  }
-
   SolidSurface(SolidSurface&&) = default;
   SolidSurface& operator=(SolidSurface&&) = default;
 

@@ -14,6 +14,17 @@ inline constexpr double kFarthestPose = 1e60;
 /// Quaternions and normals of these lengths are normalised: their squares are neither 0 nor Inf.
 inline constexpr double kShortestDirection = 1e-150, kLongestDirection = 1e150;
 
+/// From this ratio of sizes on all is in double. Float keeps a sum of lenses to 1e-5 while both
+/// trees' spheres are of like size: what is rounded are differences to the nearest block's origin,
+/// a few radii long.
+inline constexpr double kSingleRatio = 64;
+
+/// Solid angles smaller than this do not tell on which side a centre is.
+inline constexpr double kLeastAngle = 1e-6;
+/// Part of a ball's radius, squared, within which an edge is too near its centre: the angle under
+/// which the edge is seen is as wrong as the rounding of positions over the way to it.
+inline constexpr double kOnEdge2 = 0x1p-28;
+
 // Overlapping sphere pairs number kPairShare · n_a n_b · ball(r_a + r_b) · (V + kPairRim (r_a +
 // r_b) √(V L)). Here n is spheres per volume, r a mean radius, V the overlap, and L the size of the
 // smaller solid. The second term counts the contact's rim, whose area grows as √(V L) for round

@@ -23,10 +23,6 @@ constexpr double distance_error(double magnitude) {
                         magnitude);
 }
 
-// Float keeps a sum of lenses to 1e-5 while both trees' spheres are of like size: what is rounded
-// are differences to the nearest block's origin, a few radii long.
-inline constexpr double kSingleRatio = 64;
-
 inline Precision precision_for(const SphereTree& a, const SphereTree& b,
                                const RelativePose& pose) noexcept {
   const double ra = a.header->root[3];

@@ -1,12 +1,17 @@
 #pragma once
 
-#include <algorithm>
+// As numerics/host_device.h: the device's code includes this header too.
+#ifdef __CUDACC__
+#define IST_HD __host__ __device__
+#else
+#define IST_HD
+#endif
 
 namespace ist {
 
 /// From 0 at t ≤ 0 to 1 at t ≥ 1, with no slope at either end.
-inline double smooth_step(double t) noexcept {
-  t = std::clamp(t, 0.0, 1.0);
+IST_HD inline double smooth_step(double t) noexcept {
+  t = t < 0 ? 0 : t > 1 ? 1 : t;
   return t * t * (3 - 2 * t);
 }
 

@@ -9,6 +9,7 @@
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
 
+#include "query/base/members.h"
 #include "query/c_api/handles.h"
 
 // C structs to and from those of C++: checked, then copied number by number.
@@ -62,6 +63,37 @@ inline QueryStatus query_status(ist_status_t status) noexcept {
                                           : QueryStatus::invalid_input;
 }
 
+inline ist_status_t status_of(ImpactStatus status) noexcept {
+  return status == ImpactStatus::invalid_input      ? IST_INVALID_INPUT
+         : status == ImpactStatus::budget_exhausted ? IST_BUDGET_EXHAUSTED
+         : status == ImpactStatus::not_held         ? IST_NOT_HELD
+                                                    : IST_OK;
+}
+
+/// Copies an answer from C++ to C or back.
+template <class From, class To>
+requires requires(From from, To to) { from.status, to.status; }
+void write(const From& from, To& to) noexcept {
+  if constexpr (requires { to.size; }) to.size = sizeof to;
+  static_assert(IST_IMPACT_OVERLAPPING == static_cast<int>(ImpactStatus::overlapping));
+  if constexpr (requires { to.kind; })
+    to.kind = status_of(from.status) == IST_OK ? static_cast<ist_impact_kind_t>(from.status) : 0;
+  for_each_member(
+      []<class X, class Y>(const X& x, Y& y) {
+        if constexpr (std::is_same_v<Y, QueryStatus>)
+          y = query_status(x);
+        else if constexpr (std::is_enum_v<X>)
+          y = status_of(x);
+        else if constexpr (std::is_same_v<Y, Eigen::Vector3d>)
+          y = vector(x);
+        else if constexpr (std::is_array_v<Y>)
+          write(x, y);
+        else
+          y = x;
+      },
+      from, to);
+}
+
 /// Of a function the caller's struct is looked into at every look.
 ist_status_t read(const ist_placed_t* given, PlacedSolid& placed) noexcept;
 /// An asset: IST_NOT_HELD for a field.
@@ -71,10 +103,11 @@ ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& 
 ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& settings) noexcept;
 ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) noexcept;
 
-void write(const Penetration& found, ist_penetration_t& answer) noexcept;
-void write(const Separation& found, ist_separation_t& answer) noexcept;
-void write(const TimeOfImpact& found, ist_impact_t& answer) noexcept;
-Penetration read(const ist_penetration_t& given) noexcept;
+inline Penetration read(const ist_penetration_t& given) noexcept {
+  Penetration result;
+  write(given, result);
+  return result;
+}
 
 // Patches are written where the caller has room for them.
 static_assert(std::is_standard_layout_v<ContactPatch>);

@@ -15,18 +15,6 @@ Ray read(const ist_ray_t& given) noexcept {
   return ray;
 }
 
-void write(const RayHit& found, ist_ray_hit_t& hit) noexcept {
-  hit = {status_of(found.status), found.triangle, found.distance, {}, {}};
-  c_api::write(found.point, hit.point);
-  c_api::write(found.normal, hit.normal);
-}
-
-void write(const SurfacePoint& found, ist_surface_point_t& point) noexcept {
-  point = {status_of(found.status), found.triangle, found.distance, found.error, {}, {}};
-  c_api::write(found.point, point.point);
-  c_api::write(found.gradient, point.gradient);
-}
-
 /// ask(placed, i) for each of `count`; the least of their statuses.
 template <class Ask>
 ist_status_t ask_each(const ist_placed_t* given, std::size_t count, bool there,

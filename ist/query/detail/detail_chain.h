@@ -1,38 +1,12 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
-#include <span>
 
 #include <ist/asset_layout.h>
 
+#include "query/detail/detail_pair.h"
+
 namespace ist {
-
-/// Levels of detail of two assets that are asked together.
-struct DetailPair {
-  std::uint32_t a = 0, b = 0;  ///< 0: the finest
-
-  // What the expected number of sphere pairs is made of, A's unit frame.
-  double density = 0;  ///< pairs over volume of overlap
-  double skin = 0;     ///< √volume: makes up for the rim of a shallow contact
-};
-
-/// Part of an answer that one pair of levels gives.
-struct DetailWeight {
-  double weight = 0;  ///< [0, 1]
-  double slope = 0;   ///< d weight / d estimate of the overlap
-
-  friend DetailWeight operator*(const DetailWeight& x, const DetailWeight& y) noexcept {
-    return {x.weight * y.weight, x.slope * y.weight + x.weight * y.slope};
-  }
-  friend DetailWeight operator+(const DetailWeight& x, const DetailWeight& y) noexcept {
-    return {x.weight + y.weight, x.slope + y.slope};
-  }
-};
-inline DetailWeight complement(const DetailWeight& x) noexcept { return {1 - x.weight, -x.slope}; }
-
-/// About how many sphere pairs a pair of levels needs for an overlap, A's unit frame.
-double expected_pairs(const DetailPair& pair, double overlap) noexcept;
 
 /// The pairs of levels with which two assets may be asked, from the finest to the coarsest of both
 /// (docs/design.md 5). Each step takes a coarser level on the side of the smaller spheres, which

@@ -46,9 +46,7 @@ class PatchFiller {
 
 }  // namespace
 
-BoxShape::BoxShape(const BoxField& f) noexcept : half(f.half_extents) {
-  sound = is_length(half.x()) && is_length(half.y()) && is_length(half.z());
-}
+BoxShape::BoxShape(const BoxField& f) noexcept : half(f.half_extents), sound(is_sound(f)) {}
 
 FieldSample BoxShape::look(const Eigen::Vector3d& x) const noexcept {
   const Eigen::Vector3d beyond = x.cwiseAbs() - half;
@@ -139,11 +137,7 @@ ProbeTotal BoxShape::block(const ProbeBalls& balls, std::uint32_t used, const do
   return total_of(balls, sums, settled_sides(sums, inside) & used, origin);
 }
 
-HeightShape::HeightShape(const HeightField& f) noexcept : field_(f) {
-  sound = f.heights != nullptr && f.columns >= 2 && f.rows >= 2 && f.columns <= 1u << 20 &&
-          f.rows <= 1u << 20 && is_length(f.spacing[0]) && is_length(f.spacing[1]) &&
-          f.lowest <= f.highest;
-}
+HeightShape::HeightShape(const HeightField& f) noexcept : sound(is_sound(f)), field_(f) {}
 
 double HeightShape::height(std::int64_t i, std::int64_t j) const noexcept {
   i = std::clamp<std::int64_t>(i, 0, std::int64_t{field_.columns} - 1);

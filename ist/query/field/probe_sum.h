@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <numbers>
 
+#include "query/asset/shared_constants.h"
 #include "query/kernel/overlap.h"
 #include "query/probe/patch_sums.h"
 
@@ -35,9 +36,6 @@ inline void add_part(const Eigen::Vector3d& x, double volume, const Eigen::Vecto
   sum.torque += x.cross(gradient);
   sum.moment += volume * x + moment;
 }
-
-/// Solid angles smaller than this do not tell on which side a centre is.
-inline constexpr double kLeastAngle = 1e-6;
 
 /// The balls whose centre's side the surface inside them tells, a bit each: the share of the sphere
 /// that is inside the solid is [centre inside] + angle / 4π, and within 0 and 1.

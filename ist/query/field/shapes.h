@@ -9,7 +9,7 @@
 
 #include <ist/field.h>
 
-#include "query/asset/shared_constants.h"
+#include "query/field/sound_fields.h"
 #include "query/kernel/lens.h"
 #include "query/probe/cap.h"
 
@@ -34,16 +34,11 @@ inline BallPart flat_part(const FieldSample& at, double r) noexcept {
 
 inline double squared(double x) noexcept { return x * x; }
 
-inline bool is_length(double x) noexcept { return x > 0 && x <= 1e150; }
-
 struct HalfSpaceShape {
-  explicit HalfSpaceShape(const HalfSpaceField& f) noexcept {
-    const double length = f.normal.norm();
-    offset = f.offset / length;
-    sound =
-        length >= kShortestDirection && length <= kLongestDirection && std::abs(offset) <= 1e150;
-    normal = f.normal / length;
-  }
+  explicit HalfSpaceShape(const HalfSpaceField& f) noexcept
+      : normal(f.normal / f.normal.norm()),
+        offset(f.offset / f.normal.norm()),
+        sound(is_sound(f)) {}
   FieldSample look(const Eigen::Vector3d& x) const noexcept {
     return {offset - normal.dot(x), -normal};
   }
@@ -57,7 +52,7 @@ struct HalfSpaceShape {
 };
 
 struct BallShape {
-  explicit BallShape(const BallField& f) noexcept : radius(f.radius), sound(is_length(f.radius)) {}
+  explicit BallShape(const BallField& f) noexcept : radius(f.radius), sound(is_sound(f)) {}
   FieldSample look(const Eigen::Vector3d& x) const noexcept {
     const double d = x.norm();
     return {radius - d, d > 0 ? Eigen::Vector3d(-x / d) : Eigen::Vector3d::Zero().eval()};
@@ -78,9 +73,7 @@ struct BallShape {
 
 struct CapsuleShape {
   explicit CapsuleShape(const CapsuleField& f) noexcept
-      : radius(f.radius),
-        half(f.half_height),
-        sound(is_length(radius) && half >= 0 && half <= 1e150) {}
+      : radius(f.radius), half(f.half_height), sound(is_sound(f)) {}
   FieldSample look(const Eigen::Vector3d& x) const noexcept {
     const Eigen::Vector3d away(x.x(), x.y(), x.z() - std::clamp(x.z(), -half, half));
     const double d = away.norm();
@@ -97,7 +90,7 @@ struct CapsuleShape {
 /// The share of the mantle times that of the slab between the ends.
 struct CylinderShape {
   explicit CylinderShape(const CylinderField& f) noexcept
-      : radius(f.radius), half(f.half_height), sound(is_length(radius) && is_length(half)) {}
+      : radius(f.radius), half(f.half_height), sound(is_sound(f)) {}
   FieldSample nearest(const Eigen::Vector3d& x) const noexcept {
     const double d = std::sqrt(x.x() * x.x() + x.y() * x.y());
     const Eigen::Vector3d mantle =
@@ -144,11 +137,7 @@ struct CylinderShape {
 /// Linear interpolation in the grid's cells; outside, the nearest point of the grid and the way to
 /// it. What is no number there makes the query's input invalid, once it is looked at.
 struct GridShape {
-  explicit GridShape(const DistanceGridField& f) noexcept : grid(f) {
-    sound = f.distances != nullptr && is_length(f.spacing) && f.error >= 0 && f.error <= 1e150 &&
-            f.origin.allFinite();
-    for (const std::uint32_t n : f.size) sound = sound && n >= 2 && n <= 1u << 20;
-  }
+  explicit GridShape(const DistanceGridField& f) noexcept : grid(f), sound(is_sound(f)) {}
   FieldSample look(const Eigen::Vector3d& x) noexcept {
     FieldSample at = interpolated(x);
     if (!(std::abs(at.distance) <= 1e150) || !(at.gradient.squaredNorm() <= 1e300)) {
@@ -207,9 +196,7 @@ struct GridShape {
 
 /// A caller's function. What it says that is no number makes the query's input invalid.
 struct FunctionShape {
-  explicit FunctionShape(const FunctionField& f) noexcept : field(f) {
-    sound = f.look != nullptr && f.error >= 0 && f.error <= 1e150;
-  }
+  explicit FunctionShape(const FunctionField& f) noexcept : field(f), sound(is_sound(f)) {}
   FieldSample look(const Eigen::Vector3d& x) noexcept {
     FieldSample at = field.look(field.context, x);
     if (!(std::abs(at.distance) <= 1e150) || !(at.gradient.squaredNorm() <= 1e6)) {

@@ -33,9 +33,8 @@ HWY_INLINE V angle_of(D d, V x, V y) {
       -0.04348052215716462,
       0.021135373157693246,
   };
-  constexpr double kTanEighth = 0.41421356237309503;  // tan(π/8)
-  constexpr double kQuarter = 0.7853981633974483, kHalf = 1.5707963267948966,
-                   kPi = 3.141592653589793;
+  constexpr double kTanEighth = 0.41421356237309503;                     // tan(π/8)
+  constexpr double kQuarter = 0.7853981633974483, kHalf = 2 * kQuarter;  // of π
   const V zero = hn::Zero(d);
   const V ax = hn::Abs(x), ay = hn::Abs(y);
   const V more = hn::Max(ax, ay), less = hn::Min(ax, ay);
@@ -51,7 +50,7 @@ HWY_INLINE V angle_of(D d, V x, V y) {
   V angle = t * (even + t2 * odd);
   angle = hn::IfThenElse(wide, hn::Set(d, kQuarter) + angle, angle);
   angle = hn::IfThenElse(ay > ax, hn::Set(d, kHalf) - angle, angle);
-  angle = hn::IfThenElse(x < zero, hn::Set(d, kPi) - angle, angle);
+  angle = hn::IfThenElse(x < zero, hn::Set(d, 4 * kQuarter) - angle, angle);
   return hn::CopySignToAbs(angle, y);
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "query/asset/shared_constants.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "query/probe/patch_sums.cpp"
 #include <hwy/foreach_target.h>
@@ -13,10 +15,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
-
-// Part of a ball's radius, squared, within which an edge is too near its centre: the angle under
-// which the edge is seen is as wrong as the rounding of positions over the way to it.
-inline constexpr double kOnEdge2 = 0x1p-28;
 
 using DiscTag = hn::CappedTag<double, 8>;
 using Disc = hn::Vec<DiscTag>;

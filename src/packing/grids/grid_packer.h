@@ -18,7 +18,6 @@ struct GridRound {
   std::size_t spheres = 0;
   double coverage = 0;
   double radius = 0;  ///< largest inserted in the round, unit frame; 0: none
-  int prototype_level = 0, distance_level = 0;
   GridUse use;
 };
 
@@ -113,8 +112,8 @@ class GridPacker {
 
   void record(double radius) {
     if (history_ == nullptr) return;
-    history_->push_back({stage_.elapsed(), result_.spheres.size(), coverage(), radius,
-                         prototypes_.level, distances_, rounds_.use()});
+    history_->push_back(
+        {stage_.elapsed(), result_.spheres.size(), coverage(), radius, rounds_.use()});
   }
 
   double coverage() const {

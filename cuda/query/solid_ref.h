@@ -1,0 +1,26 @@
+#pragma once
+
+#include "cuda/query/cover_ref.h"
+#include "cuda/query/cuts_ref.h"
+#include "cuda/query/detail_ref.h"
+#include "cuda/query/field_ref.h"
+#include "cuda/query/node_sums.h"
+#include "cuda/query/pair_place.h"
+#include "cuda/query/tree_ref.h"
+
+namespace ist::gpu {
+
+/// A solid as a batch finds it: a field, or an asset's trees.
+struct SolidRef {
+  AssetFrame frame;  ///< of an asset and of its surface; of all other fields their own
+  FieldRef field;    ///< FieldKind::none: an asset, which has all that follows
+  TreeRef tree[2];   ///< by Measure
+  SumsRef sums[2];   ///< by Measure
+  CutsRef cuts[2];   ///< by Measure
+  CoverRef cover;    ///< of the inner tree
+  AssetDetails details;
+
+  IST_HD bool is_field() const { return field.kind != FieldKind::none; }
+};
+
+}  // namespace ist::gpu

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include <ist/field.h>
+
+#include "query/asset/shared_constants.h"
+
+// Whether a field's numbers are in range, except for those it points to; the same on CPU and GPU.
+
+namespace ist {
+
+inline bool is_length(double x) noexcept { return x > 0 && x <= 1e150; }
+inline bool is_extent(double x) noexcept { return x >= 0 && x <= 1e150; }
+inline bool is_side(std::uint32_t points) noexcept { return points >= 2 && points <= 1u << 20; }
+
+inline bool is_sound(const HalfSpaceField& f) noexcept {
+  const double length = f.normal.norm();
+  return length >= kShortestDirection && length <= kLongestDirection &&
+         std::abs(f.offset / length) <= 1e150;
+}
+inline bool is_sound(const BoxField& f) noexcept {
+  return is_length(f.half_extents[0]) && is_length(f.half_extents[1]) &&
+         is_length(f.half_extents[2]);
+}
+inline bool is_sound(const BallField& f) noexcept { return is_length(f.radius); }
+inline bool is_sound(const CapsuleField& f) noexcept {
+  return is_length(f.radius) && is_extent(f.half_height);
+}
+inline bool is_sound(const CylinderField& f) noexcept {
+  return is_length(f.radius) && is_length(f.half_height);
+}
+inline bool is_sound(const HeightField& f) noexcept {
+  return f.heights != nullptr && is_side(f.columns) && is_side(f.rows) && is_length(f.spacing[0]) &&
+         is_length(f.spacing[1]) && f.lowest <= f.highest;
+}
+inline bool is_sound(const DistanceGridField& f) noexcept {
+  return f.distances != nullptr && is_length(f.spacing) && is_extent(f.error) &&
+         f.origin.allFinite() && is_side(f.size[0]) && is_side(f.size[1]) && is_side(f.size[2]);
+}
+inline bool is_sound(const FunctionField& f) noexcept {
+  return f.look != nullptr && is_extent(f.error);
+}
+inline bool is_sound(const MeshField& f) noexcept { return f.tree.has_field(); }
+
+}  // namespace ist
