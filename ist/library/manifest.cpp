@@ -53,16 +53,26 @@ std::string other_keys(std::string key, std::vector<std::string> known) {
 
 /// A value as the command line would have it; nothing for a type that it cannot be.
 std::optional<std::string> text_of(const toml::node& value, SettingKind kind) {
-  const bool number =
-      kind == SettingKind::real || kind == SettingKind::share || kind == SettingKind::text;
+  const bool factors = kind == SettingKind::factors;
+  const bool number = kind == SettingKind::real || kind == SettingKind::share ||
+                      kind == SettingKind::text || factors;
   if (const auto* whole = value.as_integer(); whole && (number || kind == SettingKind::whole))
     return fmt::to_string(whole->get());
   if (const auto* real = value.as_floating_point(); real && number)
     return fmt::to_string(real->get());
   if (const auto* text = value.as_string();
-      text &&
-      (kind == SettingKind::share || kind == SettingKind::choice || kind == SettingKind::text))
+      text && (kind == SettingKind::share || kind == SettingKind::choice ||
+               kind == SettingKind::text || factors))
     return text->get();
+  if (const auto* list = value.as_array(); list && factors) {
+    std::string all;
+    for (const toml::node& one : *list) {
+      const std::optional<std::string> text = text_of(one, SettingKind::real);
+      if (!text) return std::nullopt;
+      all += (all.empty() ? "" : ",") + *text;
+    }
+    return all;
+  }
   if (const auto* flag = value.as_boolean(); flag && kind == SettingKind::flag)
     return flag->get() ? "true" : "false";
   return std::nullopt;
