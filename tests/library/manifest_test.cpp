@@ -140,7 +140,7 @@ TEST_F(Mistakes, InNamesAndExclusions) {
   expect_faults("[[asset]]\nmesh = \"meshes/cube.obj\"\nname = \"{stm}-x\"\n",
                 {"3: name: '{stm}' stands for nothing; use {stem}, {ext}, {parent} or {dir}"});
   expect_faults("[[asset]]\nmesh = \"meshes/*.obj\"\nexclude = 3\n",
-                {"3: exclude: 3 is not a pattern"});
+                {"3: exclude: 3 is not a quoted string"});
   expect_faults("[[asset]]\nmesh = \"meshes/*.obj\"\nexclude = [\"meshes/c*.obj\", \"none*\"]\n",
                 {"3: exclude: 'none*' excludes none of the files"});
 }
