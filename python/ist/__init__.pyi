@@ -524,6 +524,11 @@ def contact_patches(
     field: _FieldUse = "automatic", pair_budget: int = 0, max_visits: int = 0,
     relative_error: float = 0.0, threads: int = 0,
 ) -> ContactPatches: ...
+def contact_patches_of_pairs(
+    solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *, max_patches: int = 8,
+    scales: ArrayLike | None = None, measure: _Measure = "matched", field: _FieldUse = "automatic",
+    pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, threads: int = 0,
+) -> ContactPatches: ...
 def overlap_outline(
     a: Asset, b: Asset, poses: ArrayLike, *, max_patches: int = 8,
     scales: ArrayLike | None = None, poses_a: ArrayLike | None = None,
