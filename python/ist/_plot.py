@@ -62,7 +62,7 @@ def plot(solids, poses=None, *, scales=None, path=None):
                     spheres=_text(part["spheres"] / radius, np.float32))
     scene = {"solids": parts, "lines": lines, "outline": _text((outline - middle) / radius, np.float32)}
     page = pathlib.Path(__file__).with_name("viewer.html").read_text(encoding="utf-8")
-    made = Plot(page.replace('id="scene">{}', 'id="scene">' + json.dumps(scene), 1))
+    made = Plot(page.replace('id="scene">{}', 'id="scene">' + json.dumps(scene).replace("<", r"\u003c"), 1))
     if path is not None:
         made.save(path)
     return made
@@ -124,12 +124,16 @@ def _overlaps(solids, poses, scales):
     for i, k in np.asarray(pairs)[touching != ist.Overlapping.no]:
         placed = {"poses_a": poses[i], "scales_a": scales[i], "scales": scales[k]}
         exact = solids[i].mesh_triangles and solids[k].mesh_triangles
-        if exact:
-            found = ist.overlap_outline(solids[i], solids[k], poses[k], **placed)
-            segments.append(found.segments)
-            contact = found.contact.penetration
-        else:
-            contact = ist.penetration(solids[i], solids[k], poses[k], **placed)
+        try:
+            if exact:
+                found = ist.overlap_outline(solids[i], solids[k], poses[k], **placed)
+                segments.append(found.segments)
+                contact = found.contact.penetration
+            else:
+                contact = ist.penetration(solids[i], solids[k], poses[k], **placed)
+        except ist.Error as error:  # one lacks what it takes; both are drawn
+            lines.append(f"overlap of {i} and {k}: {error}")
+            continue
         if contact.volume > 0:
             lines.append(f"overlap of {i} and {k}: {contact.volume:.6g} u³, "
                          + ("exact" if exact else "by spheres"))

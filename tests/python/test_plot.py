@@ -57,6 +57,8 @@ def test_overlaps_have_their_outline_and_volume(cube):
     surface = ist.bake_surface(ist.sample_mesh("cube"))
     solids, outline, lines = scene_of(ist.plot([cube, surface], [apart, half]))
     assert lines == ["overlap of 0 and 1: 0.28125 u³, exact"] and len(solids[1]["vertices"]) > 0
+    solids, outline, lines = scene_of(ist.plot([bare, surface], [apart, half]))
+    assert len(outline) == 0 and "is a surface alone, without spheres" in lines[0]
 
 
 def test_the_page_needs_no_other_file(cube, tmp_path):
