@@ -205,7 +205,43 @@ class Pipe(Scene):
         return out == self.count, f"{out} of {self.count} balls are through"
 
 
-SCENES = {scene.__name__.lower(): scene for scene in (Nut, Mug, Pin, Bowl, Chain, Hook, Pipe)}
+class Gears(Scene):
+    """A spring turns a gear, which turns another with friction in its bearing. Bearings give a little: a body that
+    turns about its own centre of mass alone has rigid contacts in MuJoCo."""
+
+    seconds, step = 2.0, 0.001
+    meshes = {"gear": (sample("gear"), ".01")}
+    bearing = "".join(f'<joint type="slide" axis="{axis}" stiffness="1e4" damping="60"/>' for axis in ("1 0 0", "0 1 0"))
+    bodies = "".join(
+        f'<body name="gear {name}" pos="{x} 0 0" euler="0 0 {turn}">BEARING<joint axis="0 0 1" {joint}/>'
+        f'<geom name="gear {name}" mesh="gear" solref="-2e4 -60" friction=".1"/></body>'
+        for name, x, turn, joint in (("driver", 0, -2.8125, 'stiffness=".02" springref="360"'),
+                                     ("driven", .097, -14.0625, 'damping=".02"'))).replace("BEARING", bearing)
+
+    def judge(self, model, data, log):
+        driver, driven = (np.array(log)[:, k] / (2 * np.pi) for k in (2, 5))
+        off = 16 * np.abs(driver + driven).max()
+        return bool(driver[-1] > 0.5 and off < 0.25), f"{driver[-1]:.2f} turns drive {driven[-1]:.2f}, {off:.2f} of a tooth apart at most"
+
+
+class Torch(Scene):
+    """A torch, a cylinder, drops aslant into a cavity with 1 mm of play, and stands on its flat floor."""
+
+    seconds, step = 2.0, 0.002
+    meshes = {"holder": (vessel(.03, .04, .009), "1"),
+              "torch": (turned([(1e-4, 0), (.02, 0), (.02, .1), (1e-4, .1)]), "1")}
+    bodies = """<geom name="holder" mesh="holder" solref="-2e4 -200"/>
+      <body name="torch" pos="0 0 .014" euler="0 1 0"><freejoint/><geom name="torch" mesh="torch" solref="-2e4 -200"/></body>"""
+
+    def judge(self, model, data, log):
+        tail = np.array(log[len(log) // 2:])
+        height, tilt = 1e3 * tail[:, 2], 2 * np.degrees(np.arcsin(np.clip(np.hypot(tail[:, 4], tail[:, 5]), 0, 1)))
+        speed = 1e3 * np.linalg.norm(data.qvel[:3])
+        return (bool(abs(height[-1] - 9) < 0.5 and tilt.max() < 1 and speed < 5),
+                f"{height[-1]:.2f} mm high (9 on the floor), {tilt.max():.2f}° tilted, {speed:.1f} mm/s at the end")
+
+
+SCENES = {scene.__name__.lower(): scene for scene in (Nut, Mug, Pin, Bowl, Chain, Hook, Pipe, Gears, Torch)}
 
 
 def write_obj(path, mesh):

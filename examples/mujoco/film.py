@@ -1,8 +1,8 @@
 """Draws scenes of compare.py by MuJoCo's renderer, side by side, into an animated picture.
 
-    MUJOCO_GL=egl python film.py FILE.webp
+    MUJOCO_GL=egl python film.py FILE.webp [SCENE…]
 
-Needs Pillow and, for MUJOCO_GL=egl, PyOpenGL and a graphics card.
+Scenes: mug, nut and hook by default; gears, torch. Needs Pillow and, for MUJOCO_GL=egl, PyOpenGL and a graphics card.
 """
 
 import pathlib
@@ -17,7 +17,8 @@ import compare
 SIZE, FRAMES, MS = (360, 400), 60, 50
 # Steps a frame; where the camera looks [m], from how far, azimuth and elevation [degrees].
 VIEWS = {"mug": (10, (0, 0, 0.075), 0.34, 120, -22), "nut": (10, (0, 0, 0.0095), 0.052, 135, -20),
-         "hook": (25, (0, 0, -0.03), 0.30, 150, -14)}
+         "hook": (25, (0, 0, -0.03), 0.30, 150, -14), "gears": (33, (0.0485, 0, 0), 0.30, 90, -50),
+         "torch": (5, (0, 0, 0.04), 0.26, 120, -20)}
 COLOURS = np.array([[.20, .47, .74, 1], [.90, .49, .20, 1], [.25, .62, .35, 1], [.75, .30, .38, 1], [.52, .42, .72, 1]])
 
 
@@ -34,7 +35,7 @@ def film(name, folder):
     moving = 0
     for geom in range(model.ngeom):
         if model.geom_bodyid[geom] == 0:  # a container is seen through
-            model.geom_rgba[geom] = [.62, .66, .70, .4 if model.geom(geom).name == "mug" else 1]
+            model.geom_rgba[geom] = [.62, .66, .70, .4 if model.geom(geom).name in ("mug", "holder") else 1]
         else:
             model.geom_rgba[geom] = COLOURS[moving % len(COLOURS)]
             moving += 1
@@ -53,12 +54,13 @@ def film(name, folder):
 
 
 def main():
-    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
+    scenes = sys.argv[2:] or ["mug", "nut", "hook"]
+    if len(sys.argv) < 2 or sys.argv[1].startswith("-") or set(scenes) - set(VIEWS):
         sys.exit(__doc__.strip())
     from PIL import Image
     with tempfile.TemporaryDirectory() as temporary:
         panels = []
-        for name in VIEWS:
+        for name in scenes:
             folder = pathlib.Path(temporary) / name
             folder.mkdir()
             panels.append(film(name, folder))

@@ -10,8 +10,8 @@
 #include <ist/mesh.h>
 #include <ist/progress.h>
 
-// Few spheres that together cover a whole solid, for motion planners. Lengths are [u], the mesh's
-// own unit and frame.
+// Few spheres, or a capsule, that together cover a whole solid, for motion planners. Lengths are
+// [u], the mesh's own unit and frame.
 
 namespace IST_API ist {
 
@@ -88,5 +88,16 @@ SphereCoverProof prove_cover(const ClosedMesh& mesh, std::span<const CoverSphere
 
 /// Measures how far spheres protrude from the solid of a closed mesh.
 SphereProtrusion sphere_protrusion(const ClosedMesh& mesh, std::span<const CoverSphere> spheres);
+
+/// Every point within `radius` of a segment.
+struct CoverCapsule {
+  Eigen::Vector3d begin = Eigen::Vector3d::Zero(), end = begin;  ///< [u] of the segment
+  double radius = 0;                                             ///< [u]
+};
+
+/// One capsule that contains a mesh and its solid, with about the least volume. Proven: a capsule
+/// is convex and contains every vertex; the radius includes a bound on rounding. Throws Error for a
+/// mesh without triangles.
+CoverCapsule cover_with_capsule(const ClosedMesh& mesh);
 
 }  // namespace ist

@@ -228,8 +228,9 @@ typedef struct ist_ball_set {
 ist_status_t ist_tree_get_balls(const ist_tree_t* tree, const ist_ball_set_t* set,
                                 ist_ball_t* balls, size_t capacity, size_t* count);
 
-/* The surface that an asset holds: closed, oriented, triangles counter-clockwise from outside.
- * A vertex that parts of it share stands in each with the same bits. */
+/* The surface that an asset holds, or the mesh of a surface alone: closed, oriented, triangles
+ * counter-clockwise from outside. A vertex that parts of it share stands in each with the same
+ * bits. */
 typedef struct ist_surface {
   uint32_t size;
   double (*vertices)[3];    /* [u] [vertex_capacity] in the asset's own frame */

@@ -115,6 +115,10 @@ enum class OpenMeshPolicy {
 /// Throws Error (file, place, remedy). Thread-safe.
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings = {});
 
+/// Multiplies the coordinates by a factor for each axis. Negative factors mirror; triangles stay
+/// counter-clockwise. Throws Error if a factor is 0 or not finite.
+void scale_mesh(TriangleMesh& mesh, const Eigen::Vector3d& factors);
+
 /// Validates and orients a mesh: reduces coincident faces to their signed sum, drops degenerate
 /// triangles, orients every shell.
 ///

@@ -30,6 +30,7 @@
 #include "library/manifest.h"
 #include "library/run_jobs.h"
 #include "library/summary.h"
+#include "library/text.h"
 
 namespace ist::app {
 namespace {
@@ -90,6 +91,15 @@ std::vector<std::string> settle_stale(std::vector<std::string> stale, bool remov
   for (const std::string& path : stale) fs::remove(path);
   spdlog::info("removed {} stale assets: {}", stale.size(), names);
   return {};
+}
+
+/// Where none of the robot's assets in this run failed.
+void write_index(const RobotAssets& robot, const std::string& folder,
+                 const std::vector<JobResult>& results) {
+  for (const JobResult& result : results)
+    for (const Job& job : robot.jobs)
+      if (job.name == result.name && !result.done()) return;
+  write_text((fs::path(folder) / (robot.name + ".json")).string(), json_text(robot.index) + "\n");
 }
 
 void make_folder(const std::string& path) {
@@ -211,6 +221,7 @@ void run_library(const LibraryRun& run) {
   if (!outcome.stopped)
     summary.stale =
         settle_stale(stale_assets(run.output, manifest, summary.results), run.library.remove_stale);
+  for (const RobotAssets& robot : manifest.robots) write_index(robot, run.output, summary.results);
   summary.seconds = seconds_since(start);
   print_summary(summary, run.json, run.quiet);
   if (outcome.abandoned) {

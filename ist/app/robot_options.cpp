@@ -1,14 +1,8 @@
 #include "app/robot_options.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cstdlib>
-
 #include <ist/error.h>
 
 #include "app/file_options.h"
-#include "library/settings/spelling.h"
 
 namespace ist::app {
 
@@ -46,43 +40,12 @@ void refuse_idle_options(const RobotOptions& options, const std::string& input) 
                              "has no effect: '" + input + "' is not a robot (.urdf)");
 }
 
-RobotModel read_robot_for(const RobotOptions& options, const std::string& input) {
-  RobotModel robot = read_robot(input);
-  for (const std::string& name : options.skipped) require_link(robot, name);
-  bool any = false;
-  for (RobotLink& link : robot.links) {
-    if (std::count(options.skipped.begin(), options.skipped.end(), link.name) != 0) {
-      link.collision.clear();
-      link.visual.clear();
-    }
-    any = any || !link.shapes(options.shapes()).empty();
-  }
-  if (any) return robot;
-  throw Error(input + (options.visual
-                           ? ": no link has a visual shape"
-                           : ": no link has a collision shape; --visual uses the visual shapes"));
-}
-
-void require_link(const RobotModel& robot, const std::string& name) {
-  std::vector<std::string> names;
-  for (const RobotLink& link : robot.links) names.push_back(link.name);
-  if (std::count(names.begin(), names.end(), name) != 0) return;
-  const std::string nearest = nearest_word(name, names);
-  throw Error(fmt::format("{}: no link is called '{}'{}", robot.file.path, name,
-                          nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest)));
-}
-
 bool is_robot_file(const std::string& path) {
   const std::string ending = ending_of(path);
   if (ending == ".xacro")
     throw Error(path + ": is a macro file, not a URDF; expand it: xacro " + path +
                 " -o robot.urdf");
   return ending == ".urdf";
-}
-
-PackagePaths package_paths(const std::string& urdf, const RobotOptions& options) {
-  const char* const ros_path = std::getenv("ROS_PACKAGE_PATH");
-  return {urdf, options.packages, ros_path == nullptr ? "" : ros_path};
 }
 
 }  // namespace ist::app

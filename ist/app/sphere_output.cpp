@@ -19,12 +19,22 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// Of a link's file: beside a capsule those of the description alone.
+const std::vector<CoverSphere>& spheres_of(const SphereLink& link) {
+  return link.capsule ? link.given : link.cover.spheres;
+}
+
 Json link_json(const SphereLink& link, const SelfCollision& self) {
   const SphereProtrusion& p = link.cover.protrusion;
-  Json spheres = Json::array();
-  for (const CoverSphere& s : link.cover.spheres)
+  Json spheres = Json::array(), capsules = Json::array();
+  for (const CoverSphere& s : spheres_of(link))
     spheres.push_back({s.centre.x(), s.centre.y(), s.centre.z(), s.radius});
+  if (link.capsule) {
+    const auto& [a, b, radius] = *link.capsule;
+    capsules.push_back({a.x(), a.y(), a.z(), b.x(), b.y(), b.z(), radius});
+  }
   return {{"spheres", spheres},
+          {"capsules", capsules},
           {"protrusion", p.largest},
           {"protrusion_mean", p.mean},
           {"protrusion_p95", p.p95},
@@ -86,7 +96,7 @@ std::string robot_yaml(const SphereRobot& robot) {
 std::vector<LinkSpheres> SphereRobot::spheres() const {
   std::vector<LinkSpheres> out;
   for (const SphereLink& link : links)
-    out.push_back({link.name, link.cover.spheres, link.cover.protrusion.largest});
+    out.push_back({link.name, spheres_of(link), link.cover.protrusion.largest, link.capsule});
   return out;
 }
 
@@ -115,7 +125,8 @@ std::string spheres_report_json(const SphereRobot& robot, const std::string& out
   result.update(robot_json(robot));
   for (const SphereLink& link : robot.links) {
     auto& entry = result["links"][link.name];
-    entry["spheres"] = link.cover.spheres.size();
+    entry["spheres"] = spheres_of(link).size();
+    entry["capsules"] = link.capsule ? 1 : 0;
     entry["seconds"] = link.cover.seconds;
   }
   result["seconds"] = seconds;
@@ -123,19 +134,22 @@ std::string spheres_report_json(const SphereRobot& robot, const std::string& out
 }
 
 std::string spheres_table(const SphereRobot& robot, const std::string& output, double seconds) {
+  const auto count_of = [](const SphereLink& link) {
+    return spheres_of(link).size() + (link.capsule ? 1 : 0);
+  };
   std::size_t width = 5, count = 0;
   double largest = 0;
   for (const SphereLink& link : robot.links) width = std::max(width, link.name.size());
-  std::string out =
-      fmt::format("{}\n  {:<{}} {:>7} {:>8} {:>10} {:>10} {:>10} {:>7} {:>7}\n", output, "link",
-                  width, "spheres", "covered", "mean [u]", "p95 [u]", "max [u]", "volume", "time");
+  std::string out = fmt::format("{}\n  {:<{}} {:>7} {:>8} {:>10} {:>10} {:>10} {:>7} {:>7}\n",
+                                output, "link", width, robot.has_capsules() ? "shapes" : "spheres",
+                                "covered", "mean [u]", "p95 [u]", "max [u]", "volume", "time");
   for (const SphereLink& link : robot.links) {
     const SphereProtrusion& p = link.cover.protrusion;
-    out += fmt::format("  {:<{}} {:>7} {:>8} {:>10.4g} {:>10.4g} {:>10.4g} {:>7.3f} {:>5.2f} s\n",
-                       link.name, width, link.cover.spheres.size(),
-                       link.proof.covered ? "proven" : "no", p.mean, p.p95, p.largest,
-                       link.has_mesh ? p.volume_ratio : 1.0, link.cover.seconds);
-    count += link.cover.spheres.size();
+    out +=
+        fmt::format("  {:<{}} {:>7} {:>8} {:>10.4g} {:>10.4g} {:>10.4g} {:>7.3f} {:>5.2f} s\n",
+                    link.name, width, count_of(link), link.proof.covered ? "proven" : "no", p.mean,
+                    p.p95, p.largest, link.has_mesh ? p.volume_ratio : 1.0, link.cover.seconds);
+    count += count_of(link);
     largest = std::max(largest, p.largest);
   }
   if (robot.links.size() > 1)

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +18,7 @@ struct SphereLink {
   bool has_mesh = false;
   double slack = 0;  ///< [u] by which the mesh may be wider than the shapes
   SphereCover cover;
+  std::optional<CoverCapsule> capsule = {};  ///< then `cover` has spheres that contain it
   SphereCoverProof proof;
 };
 
@@ -27,8 +30,11 @@ struct SphereRobot {
   RobotModel robot;                ///< of a mesh: one link; its file is empty
   SelfCollision self;
 
+  bool has_capsules() const {
+    return std::any_of(links.begin(), links.end(), [](const auto& link) { return link.capsule; });
+  }
   bool is_robot() const { return !robot.file.bytes.empty(); }
-  std::vector<LinkSpheres> spheres() const;
+  std::vector<LinkSpheres> spheres() const;  ///< as files hold them
 };
 
 /// The file's text, by its ending. Throws Error.

@@ -27,7 +27,7 @@
 namespace ist::app {
 namespace {
 
-enum class Kind { cover, inner, matched };
+enum class Kind { cover, inner, matched, capsules };
 
 struct SpheresOptions {
   std::string input, output;
@@ -128,6 +128,18 @@ SphereCoverSettings cover_settings(const SphereRobot& input, const SpheresOption
   return cover;
 }
 
+/// Spheres on the capsule's axis that together contain it, and are hardly wider; its ends first.
+std::vector<CoverSphere> spheres_around(const CoverCapsule& capsule) {
+  constexpr int kSpheres = 64;
+  const Eigen::Vector3d step = (capsule.end - capsule.begin) / kSpheres;
+  std::vector<CoverSphere> spheres = {{capsule.begin, capsule.radius},
+                                      {capsule.end, capsule.radius}};
+  for (int i = 0; i < kSpheres; ++i)
+    spheres.push_back({capsule.begin + (i + 0.5) * step,
+                       std::hypot(capsule.radius, step.norm() / 2) * (1 + 1e-12)});
+  return spheres;
+}
+
 std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOptions& options,
                                       const ProgressCallback& progress) {
   const SphereCoverSettings settings = cover_settings(input, options);
@@ -137,7 +149,10 @@ std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOpt
     const auto start = std::chrono::steady_clock::now();
     const std::size_t own = settings.counts[covers.size()];
     SphereCover cover;
-    cover.spheres = baked_spheres(mesh, own > 0 ? own : settings.count, options, progress);
+    if (options.kind == Kind::capsules)
+      cover.spheres = spheres_around(cover_with_capsule(mesh));
+    else
+      cover.spheres = baked_spheres(mesh, own > 0 ? own : settings.count, options, progress);
     cover.protrusion = sphere_protrusion(mesh, cover.spheres);
     cover.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     covers.push_back(std::move(cover));
@@ -165,7 +180,13 @@ void fill_links(SphereRobot& input, const SpheresOptions& options) {
     link.proof.covered = true;
     if (link.has_mesh) {
       link.cover = std::move(covers[next]);
-      link.proof = prove_cover(input.meshes[next], link.cover.spheres);
+      const auto& spheres = link.cover.spheres;
+      if (options.kind == Kind::capsules) {
+        link.capsule = {spheres[0].centre, spheres[1].centre, spheres[0].radius};
+        link.proof.covered = true;  // as cover_with_capsule() proves
+      } else {
+        link.proof = prove_cover(input.meshes[next], spheres);
+      }
       link.cover.protrusion.largest += link.slack;
       ++next;
     }
@@ -182,12 +203,18 @@ void fill_links(SphereRobot& input, const SpheresOptions& options) {
           link.name, link.cover.spheres.size(), link.cover.protrusion.largest,
           link.cover.spheres.size() < kMostCoverSpheres ? "increase --count" : "increase it"));
   }
-  if (input.is_robot()) input.self = self_collision(input.robot, input.spheres());
+  if (!input.is_robot()) return;
+  std::vector<LinkSpheres> links = input.spheres();
+  for (std::size_t i = 0; i < links.size(); ++i) links[i].spheres = input.links[i].cover.spheres;
+  input.self = self_collision(input.robot, links);
 }
 
 void run_spheres(const SpheresOptions& options) {
   if (options.quiet) spdlog::set_level(spdlog::level::err);
   const SphereWriter writer = sphere_writer(options.output);
+  if (const std::string ending = ending_of(options.output);
+      options.kind == Kind::capsules && ending != ".urdf" && ending != ".json")
+    throw Error(options.output + ": this format has no capsules; use .urdf or .json");
   require_output(options.output, options.input, "the spheres");
   const auto start = std::chrono::steady_clock::now();
   SphereRobot input =
@@ -263,6 +290,10 @@ void add_spheres(CLI::App& app) {
   CLI::Option* const matched = command->add_flag_callback(
       "--matched", [options] { options->kind = Kind::matched; },
       "Spheres with the link's volume; they neither contain it nor lie inside it");
+  CLI::Option* const capsules = command->add_flag_callback(
+      "--capsules", [options] { options->kind = Kind::capsules; },
+      "One capsule that provably contains the link, with about the least volume (.urdf, .json)");
+  capsules->excludes(cover)->excludes(inner)->excludes(matched)->excludes(most)->excludes(total);
   inner->excludes(cover)->excludes(most)->excludes(total);
   matched->excludes(cover)->excludes(inner)->excludes(most)->excludes(total);
   most->excludes(total);
@@ -282,6 +313,8 @@ void add_spheres(CLI::App& app) {
   command->callback([options] {
     if (options->count > 0 && options->cover.total > 0)
       throw CLI::ValidationError("--count", "a number for every link excludes --total; use LINK=N");
+    if (options->kind == Kind::capsules && (options->count > 0 || !options->counts.empty()))
+      throw CLI::ValidationError("--count", "has no effect with --capsules: each link gets one");
     refuse_idle_options(options->robot, options->input);
     run_spheres(*options);
   });

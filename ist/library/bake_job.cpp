@@ -13,6 +13,7 @@
 
 #include "bake/asset/atomic_file.h"
 #include "library/input_mesh.h"
+#include "robot/link_mesh.h"
 
 namespace ist {
 namespace {
@@ -68,7 +69,11 @@ void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& r
 CacheEntry bake_entry(const Job& job, const BakeMesh& bake) {
   InputMesh mesh;
   try {
-    mesh = read_input_mesh(job.mesh, job.settings.mesh);
+    if (job.shape)
+      mesh.closed = close_as_asked(mesh_of(*job.shape, {job.urdf, {}, ""}, job.urdf).mesh, job.mesh,
+                                   job.settings.mesh);
+    else
+      mesh = read_input_mesh(job.mesh, job.settings.mesh);
   } catch (const OpenMeshError& error) {
     throw Error(std::string(error.what()) + (job.settings.mesh.repair
                                                  ? "; wrap = '0.5%' encloses it in a closed surface"

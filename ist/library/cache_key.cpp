@@ -82,6 +82,13 @@ CacheKey cache_key(const Job& job) {
   Hash hash;
   hash.add_text(fmt::format("format {}.{} bake {}\n{}", kFormatMajor, kFormatMinor, kBakeRevision,
                             describe_exactly(job.settings)));
+  if (job.shape) {
+    const Eigen::Vector3d &s = std::get<LinkMesh>(job.shape->shape).scale,
+                          &t = job.shape->translation;
+    const Eigen::Vector4d& q = job.shape->rotation.coeffs();
+    hash.add_text(fmt::format("link {} {} {} {} {} {} {} {} {} {}", s.x(), s.y(), s.z(), q.x(),
+                              q.y(), q.z(), q.w(), t.x(), t.y(), t.z()));
+  }
   const auto files = files_of_mesh(job.mesh);
   if (!files) {
     hash.add_text("loaded");

@@ -7,8 +7,7 @@
 namespace ist {
 
 void place(TriangleMesh& mesh, const MeshSettings& settings) {
-  if (settings.scale != 1)
-    for (Eigen::Vector3d& v : mesh.vertices) v *= settings.scale;
+  scale_mesh(mesh, settings.scale);
   if (settings.up_axis == 0 || settings.up_axis == settings.world_up) return;
   // Coordinates change places and signs: no digit is lost.
   const int from = settings.up_axis - 'X', to = settings.world_up - 'X';

@@ -21,8 +21,8 @@ InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings)
 /// note of why. Throws Error.
 ClosedMesh close_as_asked(TriangleMesh mesh, const std::string& name, const MeshSettings& settings);
 
-/// What load_mesh() gives, scaled and turned: the quarter turn about the third axis that takes
-/// up_axis to world_up.
+/// What load_mesh() gives, scaled by scale_mesh() and then turned: the quarter turn about the third
+/// axis that takes up_axis to world_up.
 void place(TriangleMesh& mesh, const MeshSettings& settings);
 
 }  // namespace ist

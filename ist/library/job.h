@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "library/settings/bake_settings.h"
+#include "robot/robot_model.h"
 
 namespace ist {
 
@@ -15,8 +17,10 @@ struct Demands {
 
 /// One asset to bake.
 struct Job {
-  std::string name;  ///< of the asset: NAME.ist
-  std::string mesh;  ///< path
+  std::string name;                       ///< of the asset: NAME.ist
+  std::string mesh;                       ///< path
+  std::optional<PlacedShape> shape = {};  ///< of a robot's link: that mesh in the link's frame
+  std::string urdf = {};                  ///< the robot's, for messages
   BakeSettings settings;
   Demands demands;
 };

@@ -53,16 +53,26 @@ std::string other_keys(std::string key, std::vector<std::string> known) {
 
 /// A value as the command line would have it; nothing for a type that it cannot be.
 std::optional<std::string> text_of(const toml::node& value, SettingKind kind) {
-  const bool number =
-      kind == SettingKind::real || kind == SettingKind::share || kind == SettingKind::text;
+  const bool factors = kind == SettingKind::factors;
+  const bool number = kind == SettingKind::real || kind == SettingKind::share ||
+                      kind == SettingKind::text || factors;
   if (const auto* whole = value.as_integer(); whole && (number || kind == SettingKind::whole))
     return fmt::to_string(whole->get());
   if (const auto* real = value.as_floating_point(); real && number)
     return fmt::to_string(real->get());
   if (const auto* text = value.as_string();
-      text &&
-      (kind == SettingKind::share || kind == SettingKind::choice || kind == SettingKind::text))
+      text && (kind == SettingKind::share || kind == SettingKind::choice ||
+               kind == SettingKind::text || factors))
     return text->get();
+  if (const auto* list = value.as_array(); list && factors) {
+    std::string all;
+    for (const toml::node& one : *list) {
+      const std::optional<std::string> text = text_of(one, SettingKind::real);
+      if (!text) return std::nullopt;
+      all += (all.empty() ? "" : ",") + *text;
+    }
+    return all;
+  }
   if (const auto* flag = value.as_boolean(); flag && kind == SettingKind::flag)
     return flag->get() ? "true" : "false";
   return std::nullopt;
@@ -101,14 +111,17 @@ class Reader {
       return finish();
     }
     for (const auto& [key, value] : root) {
-      if (key.str() != "defaults" && key.str() != "asset")
+      if (key.str() != "defaults" && key.str() != "asset" && key.str() != "robot")
         fault(key.source().begin.line,
               fmt::format("unknown '{}': a manifest has [defaults] and, for each asset or pattern, "
-                          "[[asset]]",
+                          "[[asset]], for each robot [[robot]]",
                           key.str()));
     }
     read_defaults(root);
-    read_assets(root);
+    if (!root.contains("asset") && !root.contains("robot"))
+      fault(1, "no [[asset]]: add at least one");
+    read_entries(root, "asset", &Reader::read_asset);
+    read_entries(root, "robot", &Reader::read_robot_entry);
     return finish();
   }
 
@@ -184,17 +197,94 @@ class Reader {
     given.values.emplace_back(setting, *text);
   }
 
-  void read_assets(const toml::table& root) {
-    const toml::node* const node = root.get("asset");
-    if (node == nullptr) return fault(1, "no [[asset]]: add at least one");
+  void read_entries(const toml::table& root, const std::string& kind,
+                    void (Reader::*read)(const toml::table&)) {
+    const toml::node* const node = root.get(kind);
+    if (node == nullptr) return;
     const toml::array* const list = node->as_array();
     if (list == nullptr)
-      return fault(node->source().begin.line, "asset: write [[asset]], with two brackets");
+      return fault(node->source().begin.line,
+                   fmt::format("{0}: write [[{0}]], with two brackets", kind));
     for (const toml::node& entry : *list) {
       if (const toml::table* const table = entry.as_table())
-        read_asset(*table);
+        (this->*read)(*table);
       else
-        fault(entry.source().begin.line, "asset: write [[asset]] and its keys under it");
+        fault(entry.source().begin.line,
+              fmt::format("{0}: write [[{0}]] and its keys under it", kind));
+    }
+  }
+
+  /// "text" or ["text", …]; a fault, where it is neither.
+  std::vector<std::string> texts_of(std::string_view key, const toml::node& value) {
+    std::vector<std::string> texts;
+    const auto take = [&](const toml::node& one) {
+      if (const auto* text = one.as_string())
+        texts.push_back(text->get());
+      else
+        fault(one.source().begin.line,
+              fmt::format("{}: {} is not a quoted string", key, shown(one)));
+    };
+    if (const toml::array* const list = value.as_array())
+      for (const toml::node& one : *list) take(one);
+    else
+      take(value);
+    return texts;
+  }
+
+  void read_robot_entry(const toml::table& table) {
+    const Line line = table.source().begin.line;
+    const std::size_t faults_before = faults_.size();
+    RobotOptions options;
+    Given own;
+    own.demands = defaults_.demands;
+    for (const auto& [key, value] : table) {
+      if (key == "urdf") continue;
+      if (key == "visual") {
+        if (value.is_boolean())
+          options.visual = value.as_boolean()->get();
+        else
+          fault(key.source().begin.line,
+                fmt::format("visual: {} is not true or false", shown(value)));
+      } else if (key == "skip") {
+        options.skipped = texts_of(key.str(), value);
+      } else if (key == "packages") {
+        if (!value.is_table())
+          fault(key.source().begin.line,
+                fmt::format("packages: {} is not a table: write packages = {{NAME = \"folder\"}}",
+                            shown(value)));
+        else
+          for (const auto& [name, folder] : *value.as_table())
+            for (const std::string& path : texts_of(name.str(), folder))
+              options.packages[std::string(name.str())] = (folder_ / path).string();
+      } else {
+        read_setting(key, value, own, {"urdf", "packages", "visual", "skip"});
+      }
+    }
+    Job like;
+    like.demands = own.demands;
+    complete_settings(like.settings, own, line);
+    for (const Setting& placing : placing_settings())
+      for (const Given* given : {&std::as_const(own), &std::as_const(defaults_)})
+        if (const auto at = given->lines.find(placing.name); at != given->lines.end())
+          fault(at->second,
+                placing.name + ": cannot be combined with a robot; its URDF places the meshes");
+    const std::optional<std::string> urdf = text_at(table, "urdf");
+    if (!urdf) return fault(line, "a robot without a URDF: add urdf = \"path\"");
+    if (faults_.size() != faults_before) return;
+    try {
+      const std::string path = (folder_ / *urdf).lexically_normal().string();
+      const RobotModel robot = read_robot_for(options, path);
+      const PackagePaths paths = package_paths(path, options);
+      RobotAssets made =
+          robot_assets(robot, options.shapes(), file_name_of(robot.name) + "-", like);
+      for (Job& job : made.jobs) {
+        job.mesh = paths.find(job.mesh);
+        std::get<LinkMesh>(job.shape->shape).file = fs::absolute(job.mesh).string();
+        add(job, line);
+      }
+      manifest_.robots.push_back(std::move(made));
+    } catch (const Error& error) {
+      fault(line, error.what());
     }
   }
 
@@ -245,22 +335,13 @@ class Reader {
 
   /// Takes out the files that patterns match, of which each must match some.
   void exclude(const toml::node& node, const std::string& mesh, std::vector<std::string>& files) {
-    toml::array one;
-    if (node.is_string()) one.push_back(node.as_string()->get());
-    const toml::array& patterns = node.is_array() ? *node.as_array() : one;
-    const Line line = node.source().begin.line;
-    if (patterns.empty())
-      return fault(line, "exclude: " + shown(node) + " is not a pattern or a list of patterns");
-    for (const toml::node& entry : patterns) {
-      const auto* const pattern = entry.as_string();
-      if (pattern == nullptr)
-        return fault(line, "exclude: " + shown(entry) + " is not a quoted string");
+    for (const std::string& pattern : texts_of("exclude", node)) {
       std::size_t gone = 0;
-      for (const fs::path& found : matching_files(folder_, pattern->get()))
+      for (const fs::path& found : matching_files(folder_, pattern))
         gone += std::erase(files, found.string());
       if (gone == 0)
-        fault(line, fmt::format("exclude: '{}' excludes none of the files of '{}'", pattern->get(),
-                                mesh));
+        fault(node.source().begin.line,
+              fmt::format("exclude: '{}' excludes none of the files of '{}'", pattern, mesh));
     }
   }
 

@@ -4,12 +4,14 @@
 #include <vector>
 
 #include "library/job.h"
+#include "library/robot_assets.h"
 
 namespace ist {
 
 /// A library of assets as a TOML file describes it (docs/library.md).
 struct Manifest {
   std::vector<Job> jobs;            ///< by name, sorted; complete where there are no faults
+  std::vector<RobotAssets> robots;  ///< whose assets are among the jobs
   std::vector<std::string> faults;  ///< "scene.toml:12: …": all that can be told without baking
 };
 

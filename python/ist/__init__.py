@@ -16,9 +16,11 @@ for _owner in (_core, _core.gpu, *(x for x in vars(_core).values() if isinstance
 
 from ._core import *  # noqa: E402, F403
 from ._core import __version__  # noqa: E402
+from ._plot import Plot, plot  # noqa: E402
 from ._poses import poses  # noqa: E402
 
-poses.__module__ = "ist"
+for _shown_here in (Plot, plot, poses):
+    _shown_here.__module__ = "ist"
 
 
 class QueryStatus(enum.IntEnum):
@@ -74,5 +76,5 @@ _finish()
 
 __all__ = sorted(
     [name for name in vars(_core) if not name.startswith("_")]
-    + ["QueryStatus", "Overlapping", "ImpactStatus", "__version__", "poses"]
+    + ["QueryStatus", "Overlapping", "ImpactStatus", "__version__", "Plot", "plot", "poses"]
 )

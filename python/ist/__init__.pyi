@@ -22,6 +22,7 @@ _SphereMeasure = Literal["matched", "inner"]
 _Measure = Literal["matched", "inner", "exact"]
 _FieldUse = Literal["automatic", "never", "always"]
 _Grid = Literal["banded", "uniform", "explicit", "implicit", "hybrid"]
+_Scale = float | ArrayLike  # a factor, or (3,) of each axis
 _Device = Literal["auto", "cpu", "cuda"]
 
 class Error(RuntimeError): ...
@@ -108,6 +109,8 @@ class Mesh:
     @property
     def declared_unit(self) -> float: ...  # [m]
 
+_Drawn = Asset | Mesh | ClosedMesh
+
 class _MeshLike(Protocol):
     """trimesh.Trimesh, and the like."""
 
@@ -129,7 +132,9 @@ class ClosedMesh:
 
 def load_mesh(path: _Path, *, weld_tolerance: float = 0.0) -> Mesh: ...
 def from_trimesh(mesh: _MeshLike) -> Mesh: ...
-def close_mesh(mesh: _OpenMesh, *, name: str = "mesh", repair: bool = False) -> ClosedMesh: ...
+def close_mesh(
+    mesh: _OpenMesh, *, name: str = "mesh", repair: bool = False, scale: _Scale = 1.0,
+) -> ClosedMesh: ...
 def sample_mesh(name: str) -> Mesh: ...
 
 @final
@@ -236,20 +241,22 @@ def bake(
     mesh: ClosedMesh | _OpenMesh, *, max_spheres: int = 10000, target_coverage: float = 1.0,
     min_radius: float = 0.0, time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded",
     seed: int = 0, threads: int = 0, device: _Device = "auto", surface: str | float = "all",
-    progress: Callable[[Progress], Any] | None = None,
+    scale: _Scale = 1.0, progress: Callable[[Progress], Any] | None = None,
 ) -> Asset: ...
 def bake_surface(
-    mesh: ClosedMesh | _OpenMesh, *, surface: str | float = "all", threads: int = 0,
-    progress: Callable[[Progress], Any] | None = None,
+    mesh: ClosedMesh | _OpenMesh, *, surface: str | float = "all", scale: _Scale = 1.0,
+    threads: int = 0, progress: Callable[[Progress], Any] | None = None,
 ) -> Asset: ...
 def bake_to_error(
     mesh: ClosedMesh | _OpenMesh, relative_error: float = 0.01, at_overlap: float = 0.001, *,
     max_spheres: int = 0, target_coverage: float = 1.0, min_radius: float = 0.0,
     time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded", seed: int = 0,
     threads: int = 0, device: _Device = "auto", surface: str | float = "all",
-    progress: Callable[[Progress], Any] | None = None,
+    scale: _Scale = 1.0, progress: Callable[[Progress], Any] | None = None,
 ) -> TargetedAsset: ...
-def check(asset: Asset, mesh: ClosedMesh | _OpenMesh, *, threads: int = 0) -> list[Invariant]: ...
+def check(
+    asset: Asset, mesh: ClosedMesh | _OpenMesh, *, scale: _Scale = 1.0, threads: int = 0,
+) -> list[Invariant]: ...
 
 class Field: ...
 
@@ -351,6 +358,13 @@ class PairFit:
     @property
     def fits(self) -> bool: ...
 
+class Plot:
+    def save(self, path: _Path) -> None: ...
+
+def plot(
+    solids: _Drawn | Sequence[_Drawn], poses: ArrayLike | None = None, *,
+    scales: ArrayLike | None = None, path: _Path | None = None,
+) -> Plot: ...
 def poses(
     rotations: ArrayLike, translations: ArrayLike | None = None, *,
     order: Literal["wxyz", "xyzw"] | None = None,
@@ -510,6 +524,11 @@ def contact_patches(
     scales_a: ArrayLike | None = None, measure: _Measure = "matched",
     field: _FieldUse = "automatic", pair_budget: int = 0, max_visits: int = 0,
     relative_error: float = 0.0, pair_id: int = 0, threads: int = 0,
+) -> ContactPatches: ...
+def contact_patches_of_pairs(
+    solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *, max_patches: int = 8,
+    scales: ArrayLike | None = None, measure: _Measure = "matched", field: _FieldUse = "automatic",
+    pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, threads: int = 0,
 ) -> ContactPatches: ...
 def overlap_outline(
     a: Asset, b: Asset, poses: ArrayLike, *, max_patches: int = 8,

@@ -1,6 +1,6 @@
-"""Overlap volumes that JAX can differentiate.
+"""Overlap volumes and distances that JAX can differentiate.
 
-`from ist.jax import overlap`: the library's own gradients, in float64 on the host's cores.
+`from ist.jax import overlap, separation`: the library's own gradients, in float64 on the host's cores.
 """
 
 from collections.abc import Sequence
@@ -10,9 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 
 import ist
-from ist._scene import all_pairs
+from ist._scene import Gaps, Volumes, all_pairs
 
-__all__ = ["overlap"]
+__all__ = ["overlap", "separation"]
 
 
 def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: jax.Array, *, pairs=None,
@@ -32,6 +32,22 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: jax.Array, *, pair
     and so are their gradients; so are pairs of a solid that does not hold what the measure asks.
     Works under jit, grad and vmap, where the host is called back. Differentiable once, in reverse.
     """
+    return _differentiable(Volumes, solids, poses, pairs, scales, settings)
+
+
+def separation(solids: Sequence["ist.Asset | ist.Field"], poses: jax.Array, *, pairs=None,
+               scales: "jax.Array | None" = None, **settings) -> jax.Array:
+    """Distances of pairs of placed solids [u], differentiable by their poses and scales.
+
+    Arguments, shapes, NaN and transformations are those of overlap(); settings: inner_spheres,
+    max_visits and threads of ist.separation. Solids that overlap have the distance 0 and no gradient.
+    Elsewhere the gradient is that of the nearest points; where several pairs of points are nearest,
+    that of one of them.
+    """
+    return _differentiable(Gaps, solids, poses, pairs, scales, settings)
+
+
+def _differentiable(kind, solids, poses, pairs, scales, settings):
     solids = list(solids)
     pairs = np.asarray(all_pairs(solids) if pairs is None else pairs, np.int64).reshape(-1, 2)
     poses = jnp.asarray(poses)
@@ -40,12 +56,12 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: jax.Array, *, pair
     if scales is not None:
         scales = jnp.asarray(scales)
 
-    def volumes(poses, scales):
-        return _call(_ask(solids, pairs, settings, False), [()], len(pairs), poses, scales)[0]
+    def values(poses, scales):
+        return _call(_ask(kind, solids, pairs, settings, False), [()], len(pairs), poses, scales)[0]
 
     def forward(poses, scales):
         rows = [(), (7,), (7,)] + ([(), ()] if scales is not None else [])
-        found = _call(_ask(solids, pairs, settings, True), rows, len(pairs), poses, scales)
+        found = _call(_ask(kind, solids, pairs, settings, True), rows, len(pairs), poses, scales)
         return found[0], (found[1:3], found[3:], poses, scales)
 
     def backward(kept, slope):
@@ -60,7 +76,7 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: jax.Array, *, pair
             sizes = sizes.at[..., solid].add(_times(slope, gradient).astype(scales.dtype))
         return total, sizes
 
-    answer = jax.custom_vjp(volumes)
+    answer = jax.custom_vjp(values)
     answer.defvjp(forward, backward)
     return answer(poses, scales)
 
@@ -75,7 +91,7 @@ def _call(ask, rows, pairs, poses, scales):
     return jax.pure_callback(ask, wanted, poses, scales, vmap_method="broadcast_all")
 
 
-def _ask(solids, pairs, settings, with_gradients):
+def _ask(kind, solids, pairs, settings, with_gradients):
     """The callback: of poses (…, k, 7) and scales (…, k) or None."""
 
     def ask(poses, scales):
@@ -85,17 +101,15 @@ def _ask(solids, pairs, settings, with_gradients):
         length = np.linalg.norm(rows[..., :4], axis=-1, keepdims=True)
         with np.errstate(all="ignore"):
             placed = np.concatenate((rows[..., :4] / length, rows[..., 4:]), axis=-1)
-            found = ist.penetration_of_pairs(
-                solids, placed, pairs, scales=sizes,
-                scale_gradients=with_gradients and sizes is not None, **settings)
+            found = kind(solids, placed, pairs, sizes, with_gradients and sizes is not None, settings)
             valid = found.status != ist.QueryStatus.invalid_input
-            answers = [found.volume]
+            answers = [found.value]
             if with_gradients:
-                for solid, gradient in zip(pairs.T, (found.pose_gradient_a, found.pose_gradient)):
+                for solid, gradient in zip(pairs.T, found.pose_gradients()):
                     gradient[..., :4] /= length[:, solid]
                     answers.append(gradient)
                 if sizes is not None:
-                    answers += [found.scale_gradient_a, found.scale_gradient]
+                    answers += found.scale_gradients()
         return [np.where(valid if a.ndim == 2 else valid[..., None], a, np.nan)
                 .reshape(lead + a.shape[1:]).astype(dtype) for a in answers]
 

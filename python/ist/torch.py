@@ -1,6 +1,7 @@
-"""Overlap volumes that PyTorch can differentiate.
+"""Overlap volumes and distances that PyTorch can differentiate.
 
-`from ist.torch import overlap`: the library's own gradients, in float64, on the CPU or a GPU.
+`from ist.torch import overlap, separation`: the library's own gradients, in float64, on the CPU;
+volumes on a GPU too.
 """
 
 import functools
@@ -10,9 +11,9 @@ import numpy as np
 import torch
 
 import ist
-from ist._scene import all_pairs
+from ist._scene import Gaps, Volumes, all_pairs, by_pose
 
-__all__ = ["overlap"]
+__all__ = ["overlap", "separation"]
 
 
 def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: torch.Tensor, *, pairs=None,
@@ -44,13 +45,30 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: torch.Tensor, *, p
     The last eight lists of solids and pairs that were asked about on a GPU stay there, Fields as they
     were when the list came first.
     """
+    return _differentiable(Volumes, solids, poses, pairs, scales, settings)
+
+
+def separation(solids: Sequence["ist.Asset | ist.Field"], poses: torch.Tensor, *, pairs=None,
+               scales: "torch.Tensor | None" = None, **settings) -> torch.Tensor:
+    """Distances of pairs of placed solids [u], differentiable by their poses and scales; on the CPU.
+
+    Arguments, shapes and NaN are those of overlap(); settings: inner_spheres, max_visits and threads of
+    ist.separation. Solids that overlap have the distance 0 and no gradient. Elsewhere the gradient is
+    that of the nearest points; where several pairs of points are nearest, that of one of them.
+
+    Raises TypeError for poses on a GPU: ist.gpu.separation has nearest points and normals there.
+    """
+    return _differentiable(Gaps, solids, poses, pairs, scales, settings)
+
+
+def _differentiable(kind, solids, poses, pairs, scales, settings):
     if pairs is None:
         pairs = all_pairs(solids)
     poses = _real(torch.as_tensor(poses), "poses")
     if scales is not None:
         scales = _real(torch.as_tensor(scales), "scales")
-    return _Overlap.apply(poses, scales, solids, np.asarray(pairs, np.int64).reshape(-1, 2),
-                          settings)
+    return _Answers.apply(poses, scales, solids, np.asarray(pairs, np.int64).reshape(-1, 2),
+                          settings, kind)
 
 
 def _real(tensor, name):
@@ -60,18 +78,18 @@ def _real(tensor, name):
     return tensor if tensor.is_floating_point() else tensor.to(torch.get_default_dtype())
 
 
-class _Overlap(torch.autograd.Function):
+class _Answers(torch.autograd.Function):
     @staticmethod
-    def forward(ctx, poses, scales, solids, pairs, settings):
+    def forward(ctx, poses, scales, solids, pairs, settings, kind):
         given = _doubles(poses, "poses", poses.device)
         length = given[..., :4].norm(dim=-1, keepdim=True)
         placed = torch.cat((given[..., :4] / length, given[..., 4:]), dim=-1)
         sizes = None if scales is None else _doubles(scales, "scales", poses.device)
         ask = _ask_gpu if poses.device.type == "cuda" else _ask_cpu
-        ctx.answer = ask(solids, placed, pairs, sizes, ctx.needs_input_grad[:2], settings)
+        ctx.answer = ask(solids, placed, pairs, sizes, ctx.needs_input_grad[:2], settings, kind)
         ctx.length = length
         ctx.like = [(x.shape, x.dtype) if x is not None else None for x in (poses, scales)]
-        return torch.where(ctx.answer.valid, ctx.answer.volume, torch.nan).to(poses.dtype)
+        return torch.where(ctx.answer.valid, ctx.answer.value, torch.nan).to(poses.dtype)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
@@ -92,7 +110,7 @@ class _Overlap(torch.autograd.Function):
             for solid, gradient in zip(answer.pairs, answer.scale_gradients()):
                 total.index_add_(-1, solid, slope * gradient)
             by_scale = total.to(dtype)
-        return by_pose, by_scale, None, None, None
+        return by_pose, by_scale, None, None, None, None
 
 
 def _doubles(tensor, name, device):
@@ -104,28 +122,23 @@ def _doubles(tensor, name, device):
 
 
 class _Answer:
-    """Of pairs, shape (n,) or (w, n): volume, whether it is `valid`, and both solids' gradients."""
+    """Of pairs, shape (n,) or (w, n): a value, whether it is `valid`, and both solids' gradients."""
 
-    def __init__(self, pairs, volume, valid, pose_gradients, scale_gradients):
+    def __init__(self, pairs, value, valid, pose_gradients, scale_gradients):
         self.pairs = pairs  # two (n,) numbers of solids
-        self.volume, self.valid = volume, valid
+        self.value, self.valid = value, valid
         # Of A and of B; functions, as not everybody wants them.
         self.pose_gradients, self.scale_gradients = pose_gradients, scale_gradients
 
 
-def _ask_cpu(solids, placed, pairs, scales, needs_gradient, settings):
-    found = ist.penetration_of_pairs(
-        solids, placed.numpy(), pairs, scales=None if scales is None else scales.numpy(),
-        scale_gradients=scales is not None and needs_gradient[1], **settings)
-
-    def tensors(*arrays):
-        return [torch.from_numpy(array) for array in arrays]
-
+def _ask_cpu(solids, placed, pairs, scales, needs_gradient, settings, kind):
+    found = kind(solids, placed.numpy(), pairs, None if scales is None else scales.numpy(),
+                 scales is not None and needs_gradient[1], settings)
     return _Answer(
-        torch.from_numpy(pairs.T.copy()), torch.from_numpy(found.volume),
+        torch.from_numpy(pairs.T.copy()), torch.from_numpy(found.value),
         torch.from_numpy(found.status != ist.QueryStatus.invalid_input),
-        lambda: tensors(found.pose_gradient_a, found.pose_gradient),
-        lambda: tensors(found.scale_gradient_a, found.scale_gradient))
+        lambda: [torch.from_numpy(array) for array in found.pose_gradients()],
+        lambda: [torch.from_numpy(array) for array in found.scale_gradients()])
 
 
 class _Scene:
@@ -157,7 +170,9 @@ def _scene(solids, pairs, device):
     return _Scene(solids, np.frombuffer(pairs, np.int64).reshape(-1, 2), device)
 
 
-def _ask_gpu(solids, placed, pairs, scales, needs_gradient, settings):
+def _ask_gpu(solids, placed, pairs, scales, needs_gradient, settings, kind):
+    if kind is Gaps:
+        raise TypeError("poses: on a GPU; separation() takes them on the CPU, ist.gpu.separation on a GPU")
     settings = dict(settings)
     asked = {name: settings.pop(name) for name in ("measure", "pair_budget") if name in settings}
     if settings.pop("field", "never") != "never":
@@ -196,7 +211,7 @@ def _ask_gpu(solids, placed, pairs, scales, needs_gradient, settings):
         push, turn = (found[name] for name in gradients)
         # What turns and moves B is undone by the same about A's origin.
         turn_a = -(turn + torch.linalg.cross(away, push))
-        return [_by_pose(pose, *by).reshape(*shape, 7)
+        return [by_pose(pose, *by, torch.linalg.cross, torch.cat).reshape(*shape, 7)
                 for pose, by in ((pose_a, (-push, turn_a)), (pose_b, (push, turn)))]
 
     by_scale = None
@@ -211,11 +226,3 @@ def _ask_gpu(solids, placed, pairs, scales, needs_gradient, settings):
     return _Answer(scene.pairs, found["volume"].reshape(shape),
                    (found["status"] != ist.QueryStatus.invalid_input).reshape(shape),
                    pose_gradients, lambda: by_scale)
-
-
-def _by_pose(pose, push, turn):
-    """(n, 7): the slope by a pose of unit quaternion, from those by its translation and turning."""
-    w, v = pose[:, :1], pose[:, 1:4]
-    # A rotation vector δ moves the unit quaternion by ½ (0, δ) q.
-    return torch.cat((-2 * (turn * v).sum(-1, keepdim=True),
-                      2 * (w * turn + torch.linalg.cross(turn, v)), push), dim=-1)

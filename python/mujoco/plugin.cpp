@@ -265,6 +265,17 @@ int init(const mjModel* m, mjData* d, int i) {
   if (!chosen && ist_tree_get_info(&made->tree->tree, &info) == IST_OK && info.mesh_triangles > 0 &&
       info.mesh_triangles <= kMostExact && info.counted_twice == 0)
     made->measure = IST_EXACT;
+  for (int geom = 0; geom < m->ngeom && !(made->scale > 0); ++geom) {
+    const int mesh = m->geom_dataid[geom];
+    if (m->geom_plugin[geom] != i || mesh < 0) continue;
+    const mjtNum* const s = m->mesh_scale + 3 * mesh;
+    if (s[0] > 0 && s[0] == s[1] && s[0] == s[2]) continue;
+    mju_warning(
+        "ist.solid: %s: the mesh has the scale \"%g %g %g\"; bake with --scale %g,%g,%g "
+        "and set the config key scale to 1",
+        file, s[0], s[1], s[2], s[0], s[1], s[2]);
+    return -1;
+  }
   d->plugin_data[i] = reinterpret_cast<uintptr_t>(made.release());
   return 0;
 }

@@ -113,6 +113,7 @@ threads: 0: all cores. The result does not depend on it.
 device: 'auto', 'cpu' or 'cuda'. The result does not depend on it.
 surface: surface kept in the asset: 'all' triangles of the mesh, 'none', or as few as
     stay within a length of it: a number [u], or a share of its longest side as '0.1%'.
+scale: as for close_mesh(). [u] is the unit of the scaled mesh.
 progress: called with a Progress on this thread; False cancels: packing then keeps its spheres,
     other stages raise Error. An exception that it raises is passed on.
 
@@ -166,12 +167,12 @@ void add_bakes(py::module_& module) {
       [](const py::object& given, std::size_t max_spheres, double target_coverage,
          double min_radius, double time_limit, double epsilon, const std::string& grid,
          std::uint64_t seed, unsigned threads, const std::string& device, const py::object& surface,
-         const py::object& progress) {
+         const py::object& scale, const py::object& progress) {
         const PackingSettings settings =
             packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
                              seed, threads, device, surface);
         return offline(
-            [mesh = closed_of(given), settings](const ProgressCallback& callback) {
+            [mesh = closed_of(given, scale), settings](const ProgressCallback& callback) {
               return bake(*mesh, settings, callback);
             },
             progress);
@@ -180,7 +181,7 @@ void add_bakes(py::module_& module) {
       py::arg("target_coverage") = 1.0, py::arg("min_radius") = 0.0, py::arg("time_limit") = 0.0,
       py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
       py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
-      py::arg("progress") = py::none(),
+      py::arg("scale") = 1.0, py::arg("progress") = py::none(),
       (std::string("Bakes the asset of a mesh. The same mesh and settings give the same "
                    "bytes on any machine.\n") +
        kSettingsDoc)
@@ -200,12 +201,12 @@ void add_bakes(py::module_& module) {
       [](const py::object& given, double relative_error, double at_overlap, std::size_t max_spheres,
          double target_coverage, double min_radius, double time_limit, double epsilon,
          const std::string& grid, std::uint64_t seed, unsigned threads, const std::string& device,
-         const py::object& surface, const py::object& progress) {
+         const py::object& surface, const py::object& scale, const py::object& progress) {
         const PackingSettings settings =
             packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
                              seed, threads, device, surface);
         return offline(
-            [mesh = closed_of(given), settings,
+            [mesh = closed_of(given, scale), settings,
              target = ErrorTarget{relative_error, at_overlap}](const ProgressCallback& callback) {
               TargetedAsset made = bake_to_error(*mesh, target, settings, callback);
               return Targeted{std::make_shared<Asset>(std::move(made.asset)),
@@ -222,7 +223,7 @@ void add_bakes(py::module_& module) {
       py::arg("target_coverage") = 1.0, py::arg("min_radius") = 0.0, py::arg("time_limit") = 0.0,
       py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
       py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
-      py::arg("progress") = py::none(),
+      py::arg("scale") = 1.0, py::arg("progress") = py::none(),
       (std::string("bake() with about the fewest spheres that reach an error.\n\n"
                    "relative_error: (0, 1) median over random poses, for every partner.\n"
                    "at_overlap: [1e-4, 0.5] of the solid's volume.\n"
@@ -231,30 +232,33 @@ void add_bakes(py::module_& module) {
           .c_str());
   module.def(
       "bake_surface",
-      [](const py::object& given, const py::object& surface, unsigned threads,
-         const py::object& progress) {
+      [](const py::object& given, const py::object& surface, const py::object& scale,
+         unsigned threads, const py::object& progress) {
         return offline(
-            [mesh = closed_of(given), settings = surface_settings(surface),
+            [mesh = closed_of(given, scale), settings = surface_settings(surface),
              threads](const ProgressCallback& callback) {
               return bake_surface(*mesh, settings, threads, callback);
             },
             progress);
       },
-      py::arg("mesh"), py::kw_only(), py::arg("surface") = "all", py::arg("threads") = 0,
-      py::arg("progress") = py::none(),
+      py::arg("mesh"), py::kw_only(), py::arg("surface") = "all", py::arg("scale") = 1.0,
+      py::arg("threads") = 0, py::arg("progress") = py::none(),
       "Bakes the asset of a surface alone: the mesh, mass and bounds, without spheres, for exact "
       "queries.\n\nQueries that need spheres return QueryStatus.not_held. The settings are those "
       "of bake().\nRaises Error if parts of the mesh overlap.");
   module.def(
       "check",
-      [](const SharedAsset& asset, const py::object& given, unsigned threads) {
-        return offline([asset, mesh = closed_of(given), threads](const ProgressCallback&) {
+      [](const SharedAsset& asset, const py::object& given, const py::object& scale,
+         unsigned threads) {
+        return offline([asset, mesh = closed_of(given, scale), threads](const ProgressCallback&) {
           return check(*asset, *mesh, threads);
         });
       },
-      py::arg("asset"), py::arg("mesh"), py::kw_only(), py::arg("threads") = 0,
+      py::arg("asset"), py::arg("mesh"), py::kw_only(), py::arg("scale") = 1.0,
+      py::arg("threads") = 0,
       "Verifies every invariant of an asset in double, from its bytes and the mesh alone.\n\n"
-      "Returns a list of Invariant. Raises Error if the asset was baked from another mesh.");
+      "scale: that of the bake.\n\nReturns a list of Invariant. Raises Error if the asset was "
+      "baked from another mesh.");
 }
 
 }  // namespace
@@ -309,7 +313,8 @@ void add_assets(py::module_& module) {
            })
       .def("__str__", [](const Asset& self) { return app::describe_asset(self.view()); })
       .def("surface", &surface_of,
-           "The surface that queries of spheres use: (n, 3) float64 vertices [u] in the mesh's own "
+           "The surface that queries of spheres use, or the mesh of a surface alone: (n, 3) "
+           "float64 vertices [u] in the mesh's own "
            "frame, and (m, 3) uint32 triangles, counter-clockwise from outside. A vertex may stand "
            "in several rows. Raises Error if the asset holds none.")
       .def("spheres", &spheres_of, py::arg("which") = "matched",

@@ -49,9 +49,18 @@ py::object view_of(const std::vector<Row>& rows, const py::object& owner) {
                                                   {rows.size(), 3}, owner));
 }
 
+Eigen::Vector3d factors_of(const py::object& scale) {
+  double factor = 1;
+  return py::try_cast(scale, factor) ? Eigen::Vector3d::Constant(factor).eval()
+                                     : take_vector(scale, "scale");
+}
+
 /// The solid that a mesh bounds.
-ClosedMesh close(const TriangleMesh& mesh, const std::string& name, bool repair) {
-  return close_mesh(mesh, name, repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
+ClosedMesh close(TriangleMesh mesh, const std::string& name, bool repair,
+                 const Eigen::Vector3d& factors) {
+  scale_mesh(mesh, factors);
+  return close_mesh(std::move(mesh), name,
+                    repair ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
 }
 
 bool is_path(const py::object& value) {
@@ -110,12 +119,17 @@ std::shared_ptr<TriangleMesh> mesh_of(const py::object& value) {
       "vertices and faces");
 }
 
-std::shared_ptr<ClosedMesh> closed_of(const py::object& value) {
+std::shared_ptr<ClosedMesh> closed_of(const py::object& value, const py::object& scale) {
   std::shared_ptr<ClosedMesh> closed;
-  if (py::try_cast(value, closed)) return closed;
-  return offline([mesh = mesh_of(value),
+  const Eigen::Vector3d factors = factors_of(scale);
+  if (py::try_cast(value, closed)) {
+    if (factors != Eigen::Vector3d::Ones())
+      throw value_error("scale: a ClosedMesh is not scaled; close_mesh(mesh, scale=…) makes one");
+    return closed;
+  }
+  return offline([mesh = mesh_of(value), factors,
                   name = is_path(value) ? path_of(value) : "mesh"](const ProgressCallback&) {
-    return std::make_shared<ClosedMesh>(close(*mesh, name, false));
+    return std::make_shared<ClosedMesh>(close(*mesh, name, false, factors));
   });
 }
 
@@ -177,17 +191,20 @@ weld_tolerance: [0, 0.1]; vertices closer than this share of the bounding box's 
 Raises Error, which names the file, the place and a way out.)");
   module.def(
       "close_mesh",
-      [](const py::object& mesh, const std::string& name, bool repair) {
-        return offline([mesh = mesh_of(mesh), name, repair](const ProgressCallback&) {
-          return close(*mesh, name, repair);
+      [](const py::object& mesh, const std::string& name, bool repair, const py::object& scale) {
+        return offline([mesh = mesh_of(mesh), name, repair,
+                        factors = factors_of(scale)](const ProgressCallback&) {
+          return close(*mesh, name, repair, factors);
         });
       },
       py::arg("mesh"), py::kw_only(), py::arg("name") = "mesh", py::arg("repair") = false,
+      py::arg("scale") = 1.0,
       R"(Validates a mesh and orients its shells.
 
 mesh: a Mesh, or what bake() makes one of.
 name: for messages.
 repair: close an open mesh (weld cracks, fill holes) instead of refusing it; see ClosedMesh.report.
+scale: factor of all coordinates, or (3,) of each axis; negative ones mirror. 0 and NaN raise Error.
 
 Raises OpenMeshError for an open mesh, Error for one that is flat, empty, not finite or
 non-orientable.)");

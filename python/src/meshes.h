@@ -13,6 +13,6 @@ namespace ist::python {
 std::shared_ptr<TriangleMesh> mesh_of(const py::object& value);
 
 /// The same, closed; a ClosedMesh as it is. Raises Error as close_mesh() does.
-std::shared_ptr<ClosedMesh> closed_of(const py::object& value);
+std::shared_ptr<ClosedMesh> closed_of(const py::object& value, const py::object& scale);
 
 }  // namespace ist::python

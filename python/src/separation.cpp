@@ -246,6 +246,23 @@ void add_separation(py::module_& module) {
       py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
       py::arg("relative_error") = 0.0, py::arg("pair_id") = 0, py::arg("threads") = 0, kPatchesDoc);
   module.def(
+      "contact_patches_of_pairs",
+      [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
+         std::size_t max_patches, const py::object& scales, const std::string& measure,
+         const std::string& field, std::uint32_t pair_budget, std::uint32_t max_visits,
+         double relative_error, unsigned threads) {
+        return patches(Rows::of_scene(solids, poses, pairs, scales), max_patches,
+                       {named(measure, "measure", kMeasures), named(field, "field", kFieldUses),
+                        pair_budget, max_visits, take_limit(relative_error, "relative_error")},
+                       threads);
+      },
+      py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
+      py::arg("max_patches") = 8, py::arg("scales") = py::none(), py::arg("measure") = "matched",
+      py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
+      py::arg("relative_error") = 0.0, py::arg("threads") = 0,
+      "contact_patches() for pairs of solids of scenes, with the arguments of "
+      "penetration_of_pairs().");
+  module.def(
       "overlap_outline",
       [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
          const py::object& scales, const py::object& poses_a, const py::object& scales_a,

@@ -50,9 +50,7 @@ ShapeMesh cylinder_mesh(const LinkCylinder& cylinder) {
 
 TriangleMesh scaled_mesh(const LinkMesh& shape, const PackagePaths& paths) {
   TriangleMesh mesh = load_mesh(paths.find(shape.file));
-  for (Vector3d& v : mesh.vertices) v = v.cwiseProduct(shape.scale);
-  if (shape.scale.prod() < 0)
-    for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
+  scale_mesh(mesh, shape.scale);
   return mesh;
 }
 

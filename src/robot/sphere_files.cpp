@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <string_view>
@@ -70,16 +71,32 @@ std::string yaml_text(std::string_view text) {
   return out + "\"";
 }
 
+/// A capsule is a cylinder and two spheres: URDF has no capsules.
 std::string collisions(const LinkSpheres& link, const std::string& indent) {
   std::string out;
-  for (std::size_t i = 0; i < link.spheres.size(); ++i) {
-    const CoverSphere& s = link.spheres[i];
-    if (i != 0) out += "\n" + indent;
-    out += "<collision name=\"" + xml_text(link.link) + "_sphere_" + std::to_string(i) +
-           "\"><origin xyz=\"" + vector(s.centre, " ") +
-           "\" rpy=\"0 0 0\"/><geometry><sphere radius=\"" + number(s.radius) +
-           "\"/></geometry></collision>";
+  const auto add = [&](const std::string& name, const Eigen::Vector3d& at, const std::string& rpy,
+                       const std::string& geometry) {
+    if (!out.empty()) out += "\n" + indent;
+    out += "<collision name=\"" + xml_text(link.link) + name + "\"><origin xyz=\"" +
+           vector(at, " ") + "\" rpy=\"" + rpy + "\"/><geometry>" + geometry +
+           "</geometry></collision>";
+  };
+  const auto ball = [&](const std::string& name, const Eigen::Vector3d& at, double radius) {
+    add(name, at, "0 0 0", "<sphere radius=\"" + number(radius) + "\"/>");
+  };
+  if (link.capsule) {
+    const auto& [begin, end, radius] = *link.capsule;
+    const Eigen::Vector3d along = end - begin;
+    ball("_capsule_begin", begin, radius);
+    ball("_capsule_end", end, radius);
+    if (!along.isZero(0))  // which takes z to the capsule's axis
+      add("_capsule", (begin + end) / 2,
+          "0 " + number(std::atan2(along.head<2>().norm(), along.z())) + " " +
+              number(std::atan2(along.y(), along.x())),
+          "<cylinder radius=\"" + number(radius) + "\" length=\"" + number(along.norm()) + "\"/>");
   }
+  for (std::size_t i = 0; i < link.spheres.size(); ++i)
+    ball("_sphere_" + std::to_string(i), link.spheres[i].centre, link.spheres[i].radius);
   return out;
 }
 

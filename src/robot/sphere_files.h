@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,7 +18,8 @@ namespace ist {
 struct LinkSpheres {
   std::string link;
   std::vector<CoverSphere> spheres;
-  double protrusion = 0;  ///< [u] none reaches further out of the link
+  double protrusion = 0;                     ///< [u] none reaches further out of the link
+  std::optional<CoverCapsule> capsule = {};  ///< beside the spheres; URDF alone has it
 };
 
 struct SelfCollision;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "cli/program.h"
 #include "support/shared_data.h"
@@ -302,6 +303,60 @@ TEST_F(RobotCommands, InnerAndMatchedSpheres) {
   for (const auto& s : matched["links"]["base_link"]["spheres"])
     volume += 4.18879020478639 * std::pow(s[3].get<double>(), 3);
   EXPECT_NEAR(volume, 2, 0.01);
+}
+
+/// As other programs read them: every corner of the link lies in one of its three shapes.
+TEST_F(RobotCommands, CapsulesHoldTheLink) {
+  ASSERT_EQ(ist({"sample", "bolt", "-o", "bolt.obj"}).exit_code, 0);
+  write(
+      "b.urdf",
+      "<robot name='b'><link name='bolt'><collision><origin xyz='1 2 3' rpy='0.3 0.8 "
+      "-1'/><geometry>"
+      "<mesh filename='bolt.obj'/></geometry></collision><collision><geometry><sphere radius='2'/>"
+      "</geometry></collision></link></robot>");
+  for (const char* const file : {"c.urdf", "c.json"})
+    ASSERT_EQ(ist({"spheres", "b.urdf", "-o", file, "--capsules"}).exit_code, 0);
+  const auto robot = urdf::parseURDFFile((folder_ / "c.urdf").string());
+  ASSERT_NE(robot, nullptr);
+  const auto& shapes = robot->getLink("bolt")->collision_array;
+  ASSERT_EQ(shapes.size(), 4u);  // the sphere of the description stays
+  const Json link = Json::parse(read("c.json"))["links"]["bolt"];
+  EXPECT_EQ(link["spheres"], Json::parse("[[0.0, 0.0, 0.0, 2.0]]"));
+  ASSERT_EQ(link["capsules"].size(), 1u);
+  EXPECT_TRUE(link["covered"].get<bool>());
+  const double radius = link["capsules"][0][6].get<double>();
+  const Eigen::Matrix3d turn = (Eigen::AngleAxisd(-1, Eigen::Vector3d::UnitZ()) *
+                                Eigen::AngleAxisd(0.8, Eigen::Vector3d::UnitY()) *
+                                Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()))
+                                   .toRotationMatrix();
+  double furthest = 0;
+  std::istringstream words(read("bolt.obj"));
+  for (std::string word; words >> word;) {
+    Eigen::Vector3d v;
+    if (word != "v" || !(words >> v.x() >> v.y() >> v.z())) continue;
+    const Eigen::Vector3d x = turn * v + Eigen::Vector3d(1, 2, 3);
+    double outside = 1e300;
+    for (const auto& shape : shapes) {
+      const auto& p = shape->origin.position;
+      const auto& q = shape->origin.rotation;
+      const Eigen::Vector3d own =
+          Eigen::Quaterniond(q.w, q.x, q.y, q.z).inverse() * (x - Eigen::Vector3d(p.x, p.y, p.z));
+      if (const auto* ball = dynamic_cast<const urdf::Sphere*>(shape->geometry.get())) {
+        outside = std::min(outside, own.norm() - ball->radius);
+      } else {
+        const auto& rod = dynamic_cast<const urdf::Cylinder&>(*shape->geometry);
+        outside = std::min(outside, std::max(own.head<2>().norm() - rod.radius,
+                                             std::abs(own.z()) - rod.length / 2));
+      }
+    }
+    furthest = std::max(furthest, outside);
+  }
+  EXPECT_LT(furthest, 1e-9);
+  EXPECT_GT(furthest, -1e-4 * radius);
+  EXPECT_LT(radius, 9.5);  // the head's corners are 8.66 from the axis
+  expect_error({"spheres", "b.urdf", "-o", "c.yml", "--capsules"}, 1, "use .urdf or .json");
+  expect_error({"spheres", "b.urdf", "-o", "c.json", "--capsules", "--count", "3"}, 2,
+               "no effect with --capsules");
 }
 
 TEST_F(RobotCommands, AMeshAlone) {

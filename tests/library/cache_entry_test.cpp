@@ -55,6 +55,7 @@ TEST_F(CacheKeys, FollowEverySetting) {
                               : setting.name == "world-up"         ? "Y"
                               : setting.kind == SettingKind::whole ? "7"
                               : setting.kind == SettingKind::real  ? "0.25"
+                              : setting.name == "scale"            ? "1,1,-1"
                               : setting.kind == SettingKind::share ? "0.07"
                               : setting.kind == SettingKind::flag  ? "true"
                               : setting.name == "up-axis"          ? "X"

@@ -24,7 +24,7 @@ mesh = "meshes/*.obj"
 name = "upright"
 mesh = "meshes/gear.obj"
 spheres = 30
-scale = 0.001
+scale = [0.001, 0.001, -0.002]
 up-axis = "Y"
 )");
 }

@@ -18,14 +18,14 @@ TEST_F(Library, BakesWhatSingleBakesBake) {
                                        "-o",        "single.ist",
                                        "--spheres", upright ? "30" : "40",
                                        "--device",  "cpu"};
-    if (upright) single.insert(single.end(), {"--scale", "1e-3", "--up-axis", "y"});
+    if (upright) single.insert(single.end(), {"--scale", "1e-3,1e-3,-2e-3", "--up-axis", "y"});
     ASSERT_EQ(ist(single).exit_code, 0);
     EXPECT_TRUE(files.at(name + ".ist") == read("single.ist")) << name;
     EXPECT_NE(outcome.out.find("\n" + name + " "), std::string::npos) << outcome.out;
     EXPECT_NE(outcome.err.find("] " + name + ": baked in "), std::string::npos) << outcome.err;
   }
-  EXPECT_EQ(ist({"check", "out/upright.ist", "--mesh", "meshes/gear.obj", "--scale", "0.001",
-                 "--up-axis", "Y"})
+  EXPECT_EQ(ist({"check", "out/upright.ist", "--mesh", "meshes/gear.obj", "--scale",
+                 "0.001,0.001,-0.002", "--up-axis", "Y"})
                 .exit_code,
             0);
   EXPECT_EQ(ist({"check", "out/upright.ist", "--mesh", "meshes/gear.obj"}).exit_code, 1);

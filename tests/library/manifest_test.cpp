@@ -66,7 +66,7 @@ name = "a/b"
 mesh = "meshes/cube.obj"
 world-up = "Y"
 spheres = 2.5
-scale = 0
+scale = [1, 2]
 up-axis = "W"
 wall-thickness = 3
 min-radius = [1]
@@ -89,7 +89,7 @@ min-radius = [1]
           "31: name: 'a/b' is not a valid file name",
           "35: world-up: has no effect without up-axis",
           "36: spheres: 2.5 is not a whole number",
-          "37: scale: 0 is not a finite number above 0",
+          "37: scale: a list is not a finite number other than 0, or three",
           "38: up-axis: 'W' is not one of X|Y|Z",
           "39: unknown key 'wall-thickness': known keys are mesh, name, exclude, spheres",
           "40: min-radius: a list is not a finite number, 0 or more",
@@ -140,7 +140,7 @@ TEST_F(Mistakes, InNamesAndExclusions) {
   expect_faults("[[asset]]\nmesh = \"meshes/cube.obj\"\nname = \"{stm}-x\"\n",
                 {"3: name: '{stm}' stands for nothing; use {stem}, {ext}, {parent} or {dir}"});
   expect_faults("[[asset]]\nmesh = \"meshes/*.obj\"\nexclude = 3\n",
-                {"3: exclude: 3 is not a pattern"});
+                {"3: exclude: 3 is not a quoted string"});
   expect_faults("[[asset]]\nmesh = \"meshes/*.obj\"\nexclude = [\"meshes/c*.obj\", \"none*\"]\n",
                 {"3: exclude: 'none*' excludes none of the files"});
 }

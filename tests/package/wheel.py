@@ -40,6 +40,7 @@ def main():
         assert set(pool.map(volume, [bolt] * 4)) == {volume(bolt)}
     assert not ist.gpu.available() and ist.gpu.why_not()
     folder = pathlib.Path(ist.__file__).parent
+    assert "WebGL" in str(ist.plot(bolt))
     assert {"py.typed", "__init__.pyi", "torch.py"} <= set(os.listdir(folder))
     print("ok")
 

@@ -255,6 +255,39 @@ TEST_F(WantedErrors, AMissIsSaid) {
   EXPECT_GT(met, 15);
 }
 
+// The bounds of a simplified mesh contain its error: the status reports bounds that are wider than
+// the wanted error.
+TEST_F(WantedErrors, SimplifiedMeshesSayWhereTheyExceedIt) {
+  const Asset alone = bake_surface(closed(icosphere_mesh(5), "ball"), {.error = 1e-3}, 1);
+  PackingSettings with_spheres;
+  with_spheres.surface.error = 3e-5;
+  with_spheres.max_spheres = 100;
+  const Asset packed = bake(closed(torus_mesh(0.35, 0.14, 200, 100), "ring"), with_spheres);
+  for (const Asset* asset : {&alone, &packed})
+    ASSERT_EQ(asset->view().mesh_state(), MeshState::simplified);
+  ContactPatch patches[6];
+  for (const Asset* asset : {&alone, &packed}) {
+    int asked = 0;
+    for (int i = 0; i < 40; ++i) {
+      const PlacedTree a{asset->view(), random_pose(random_, 0), 1}, b = blob_at(i, 0.8);
+      const Penetration truth = exact(a, b);
+      if (!(truth.volume > 0)) continue;
+      const double half_width = (truth.volume_max - truth.volume_min) / 2;
+      for (const double times : {0.5, 2.0}) {
+        const double error = times * half_width / truth.volume;
+        const Penetration answer = ask(a, b, error);
+        if (answer.volume != truth.volume) continue;  // by spheres, which errors were measured of
+        ++asked;
+        const QueryStatus status = times < 1 ? QueryStatus::error_exceeded : QueryStatus::ok;
+        EXPECT_EQ(answer.status, status) << i;
+        const PenetrationSettings settings{.relative_error = error};
+        EXPECT_EQ(contact_patches(a, b, settings, workspace_, patches).penetration.status, status);
+      }
+    }
+    EXPECT_GT(asked, 15) << asset->view().sphere_count();
+  }
+}
+
 TEST_F(WantedErrors, PredictionsOfTheBakeDecide) {
   const auto predicting = [](const Asset& asset, double times) {
     std::vector<std::byte> bytes(asset.bytes().begin(), asset.bytes().end());

@@ -69,6 +69,32 @@ def test_a_bake_takes_a_mesh_in_any_form(tmp_path):
         ist.bake((np.zeros((4, 2)), TETRAHEDRON[1]))
 
 
+@pytest.mark.parametrize("factors", [2, (1, 2, 0.5), (1, 1, -2), (-3, -1, -1)])
+def test_a_bake_scales_each_axis_and_mirrors(factors, knot_mesh):
+    flips = np.prod(np.broadcast_to(factors, 3)) < 0
+    scaled = (knot_mesh.vertices * factors,
+              knot_mesh.triangles[:, [0, 2, 1]] if flips else knot_mesh.triangles)
+    given = (knot_mesh.vertices, knot_mesh.triangles)
+    made = ist.bake(given, max_spheres=50, scale=factors)
+    assert made.to_bytes() == ist.bake(scaled, max_spheres=50).to_bytes()
+    assert all(i.violations == 0 for i in ist.check(made, given, scale=factors))
+    assert ist.bake_surface(given, scale=factors).volume == made.volume
+    assert ist.close_mesh(given, scale=factors).report.volume == pytest.approx(made.volume)
+    with pytest.raises(ist.Error, match="another mesh"):
+        ist.check(made, given)
+
+
+def test_wrong_scales_are_refused(knot_mesh):
+    arrays = (knot_mesh.vertices, knot_mesh.triangles)
+    for wrong in (0, np.nan, (1, 0, 1), (1, np.inf, 1)):
+        with pytest.raises(ist.Error, match="scale: .* finite, not 0"):
+            ist.bake(arrays, scale=wrong)
+    with pytest.raises(ValueError, match=r"scale: shape \(2,\)"):
+        ist.bake(arrays, scale=(1, 2))
+    with pytest.raises(ValueError, match="scale: a ClosedMesh is not scaled"):
+        ist.bake(ist.close_mesh(arrays), scale=2)
+
+
 def test_assets_are_copied_and_sent(cube):
     assert copy.copy(cube) is cube and copy.deepcopy([cube])[0] is cube
     assert pickle.loads(pickle.dumps(ist.overlap)) is ist.overlap
@@ -95,6 +121,10 @@ def test_a_surface_alone_answers_no_query_of_spheres(cube):
     assert alone.volume == pytest.approx(1 / 6, abs=1e-15)
     assert all(one.violations == 0 for one in ist.check(alone, closed))
     assert len(alone.spheres()) == 0
+    vertices, triangles = alone.surface()
+    facets = {tuple(sorted(map(tuple, vertices[t]))) for t in triangles}
+    assert facets == {tuple(sorted(map(tuple, TETRAHEDRON[0][t]))) for t in TETRAHEDRON[1]}
+    assert np.linalg.det(vertices[triangles]).sum() == pytest.approx(1)  # six times the volume
     again = ist.Asset.from_bytes(alone.to_bytes())
     one = [1, 0, 0, 0, 0, 0, 0]
     with pytest.raises(ist.Error, match="is a surface alone, without spheres"):

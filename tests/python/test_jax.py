@@ -8,7 +8,7 @@ jax.config.update("jax_platforms", "cpu")
 import jax.numpy as jnp  # noqa: E402
 
 import ist  # noqa: E402
-from ist.jax import overlap  # noqa: E402
+from ist.jax import overlap, separation  # noqa: E402
 
 
 @pytest.fixture
@@ -62,3 +62,22 @@ def test_invalid_pairs_are_nan_and_spoil_no_others(gear, knot, cube, scenes):
     found = overlap([gear, knot, cube], poses)
     assert jnp.isnan(found).tolist() == [False, True, True]
     assert jnp.isfinite(slope[:2]).all()
+
+
+def test_distances_and_their_gradients(gear, knot, cube, scenes):
+    solids = [gear, knot, cube]
+    poses = scenes.at[..., 4:].multiply(3)
+    sizes = jnp.full((6, 3), 0.5)
+
+    def energy(poses, sizes):
+        return (separation(solids, poses, scales=sizes) * jnp.array([1.0, -0.3, 2.0])).sum(-1)
+
+    by_pose, by_size = jax.jit(jax.grad(lambda x, s: energy(x, s).sum(), (0, 1)))(poses, sizes)
+    step = 1e-6
+    for k in range(3):
+        for place in range(7):
+            by = (energy(poses.at[:, k, place].add(step), sizes)
+                  - energy(poses.at[:, k, place].add(-step), sizes)) / (2 * step)
+            assert np.array(by_pose[:, k, place]) == pytest.approx(np.array(by), abs=2e-3)
+        by = (energy(poses, sizes.at[:, k].add(step)) - energy(poses, sizes.at[:, k].add(-step))) / (2 * step)
+        assert np.array(by_size[:, k]) == pytest.approx(np.array(by), abs=2e-3)

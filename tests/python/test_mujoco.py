@@ -185,13 +185,31 @@ def test_a_pose_that_is_no_number_is_no_contact(folder):
     ({"file": "nowhere.ist", "patches": "many"}, "many"),
 ])
 def test_what_cannot_be_read_is_an_error(config, words):
+    with pytest.raises(ValueError, match=words):
+        with_instance(config)
+
+
+def with_instance(config, height=1):
     ist.mujoco.load()
     text = "".join(f'<config key="{k}" value="{v}"/>' for k, v in config.items())
-    xml = CUBE.format(ground=PLANE, height=1).replace("<asset>", f"""
+    xml = CUBE.format(ground=PLANE, height=height).replace("<asset>", f"""
       <extension><plugin plugin="ist.solid"><instance name="i">{text}</instance></plugin></extension>
       <asset>""").replace('type="mesh" mesh="cube"/>', 'type="sdf" mesh="cube"><plugin instance="i"/></geom>')
-    with pytest.raises(ValueError, match=words):
-        mujoco.MjModel.from_xml_string(xml)
+    return mujoco.MjModel.from_xml_string(xml)
+
+
+def test_a_scale_of_each_axis_is_baked(tmp_path):
+    cube, path = ist.sample_mesh("cube"), str(tmp_path / "cube.ist")
+    corners = 2 * cube.vertices  # CUBE's mesh is 2 u wide
+    ist.bake((corners, cube.triangles), max_spheres=100).save(path)
+    for config in ({"file": path}, {"file": path, "scale": "0"}):
+        with pytest.raises(ValueError, match="bake with --scale 0.05,0.04,0.03"):
+            with_instance(config)
+    ist.bake((corners, cube.triangles), max_spheres=100, scale=(.05, .04, .03)).save(path)
+    model = with_instance({"file": path, "scale": "1"}, height=.09)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert mujoco.mj_geomDistance(model, data, 0, 1, 1.0, np.zeros(6)) == pytest.approx(.06, abs=2e-3)
 
 
 def test_what_is_not_there_has_a_name(folder):

@@ -151,6 +151,8 @@ def test_a_scene_is_its_pairs(gear, knot, cube, random_poses):
     assert found.volume.shape == (5, 4) and found.pose_gradient.shape == (5, 4, 7)
     gaps = ist.separation_of_pairs(solids, scenes, pairs, scales=scales)
     meet = ist.overlap_of_pairs(solids, scenes, pairs, scales=scales)
+    patches = ist.contact_patches_of_pairs(solids, scenes, pairs, scales=scales, max_patches=3)
+    assert patches.volume.shape == (5, 4, 3) and patches.count.max() > 1
     for w in range(5):
         for k, (i, j) in enumerate(pairs):
             how = dict(poses_a=scenes[w, i], scales=scales[w, j], scales_a=scales[w, i])
@@ -159,6 +161,8 @@ def test_a_scene_is_its_pairs(gear, knot, cube, random_poses):
                 assert np.array_equal(getattr(one, name), getattr(found, name)[w, k])
             assert ist.separation(solids[i], solids[j], scenes[w, j], **how).distance == gaps.distance[w, k]
             assert ist.overlap(solids[i], solids[j], scenes[w, j], **how) == meet[w, k]
+            one = ist.contact_patches(solids[i], solids[j], scenes[w, j], max_patches=3, **how)
+            assert np.array_equal(one.force, patches.force[w, k])
     alone = ist.penetration_of_pairs(solids, scenes[0], pairs, scales=scales[0])
     assert np.array_equal(alone.volume, found.volume[0])
 

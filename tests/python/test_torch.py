@@ -5,7 +5,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="no python3-torch: ./dev setup --torch")
 
 import ist  # noqa: E402
-from ist.torch import overlap  # noqa: E402
+from ist.torch import overlap, separation  # noqa: E402
 
 
 @pytest.fixture
@@ -146,3 +146,57 @@ def test_descent_parts_two_solids(gear, knot):
         volume.backward()
         adam.step()
     pytest.fail(f"{volume.item()} is left")
+
+
+def apart(scenes):
+    """Scenes whose solids are mostly clear of each other, and their sizes."""
+    poses = scenes.detach().clone()
+    poses[..., 4:] *= 3
+    sizes = 0.3 + 0.4 * torch.rand(6, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(3))
+    return poses.requires_grad_(), sizes.requires_grad_()
+
+
+def test_distances_are_the_librarys(gear, knot, cube, scenes):
+    solids = [gear, knot, cube]
+    poses, sizes = apart(scenes)
+    unit = poses.detach().numpy().copy()
+    unit[..., :4] /= np.linalg.norm(unit[..., :4], axis=-1, keepdims=True)
+    found = separation(solids, poses, scales=sizes)
+    expected = ist.separation_of_pairs(solids, unit, [(0, 1), (0, 2), (1, 2)], scales=sizes.detach().numpy())
+    assert found.detach().numpy() == pytest.approx(expected.distance, rel=1e-9)
+    assert separation(solids, poses[2], scales=sizes[2]).tolist() == found[2].tolist()
+    inner = separation(solids, poses, scales=sizes, inner_spheres=True)
+    assert (inner >= found).all() and (inner > found).any()
+
+
+def test_gradients_of_distances_are_differences(gear, knot, cube, scenes):
+    solids = [gear, knot, cube]
+    poses, sizes = apart(scenes)
+    weights = torch.tensor([1.0, -0.3, 2.0], dtype=torch.float64)
+
+    def energy(poses, sizes):
+        return (separation(solids, poses, scales=sizes) * weights).sum(-1)
+
+    assert (separation(solids, poses, scales=sizes) > 0).double().mean() > 0.9
+    energy(poses, sizes).sum().backward()
+    for found, expected in (
+            (poses.grad, differences(lambda x: energy(x, sizes), poses.detach(), 1e-6)),
+            (sizes.grad, differences(lambda x: energy(poses, x), sizes.detach(), 1e-6))):
+        for scene in range(6):  # the nearest points move continuously along smooth surfaces only
+            assert (found[scene] - expected[scene]).norm() < 1e-3 * expected[scene].norm()
+
+
+def test_distances_of_what_overlaps_or_is_no_number(cube):
+    poses = torch.zeros(3, 7, dtype=torch.float64)
+    poses[:, 0] = 1
+    poses[2, 4] = torch.nan
+    poses.requires_grad_()
+    found = separation([cube, cube, cube], poses)
+    assert found[0] == 0 and found[1:].isnan().all()
+    assert torch.autograd.grad(separation([cube, cube], poses[:2]).sum(), poses)[0].abs().max() == 0
+    floor = ist.HalfSpaceField([0, 0, 1])
+    high = torch.tensor([[1.0, 0, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0, 2]], requires_grad=True)
+    gap = separation([floor, cube], high)
+    assert gap.item() == pytest.approx(1.5)
+    gap.sum().backward()
+    assert high.grad[1, 4:].tolist() == [0, 0, 1] and high.grad[0, 4:].tolist() == [0, 0, -1]

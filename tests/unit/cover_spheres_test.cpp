@@ -262,5 +262,55 @@ TEST(CoverSpheres, SharesAreTheBestOfTheEstimates) {
   }
 }
 
+double away(const Vector3d& x, const CoverCapsule& capsule) {
+  const Vector3d along = capsule.end - capsule.begin, d = x - capsule.begin;
+  const double t = along.isZero() ? 0 : std::clamp(d.dot(along) / along.squaredNorm(), 0.0, 1.0);
+  return (d - t * along).norm();
+}
+
+double volume_of(const CoverCapsule& c) {
+  return M_PI * c.radius * c.radius * ((c.end - c.begin).norm() + 4 * c.radius / 3);
+}
+
+/// No larger than the capsule around the mesh along each of many lines through its middle.
+TEST(CoverCapsules, HoldTheMeshAndAreSmall) {
+  for (const Case& one : cases()) {
+    SCOPED_TRACE(one.name);
+    const CoverCapsule capsule = cover_with_capsule(close_mesh(one.mesh, one.name));
+    Eigen::AlignedBox3d box;
+    for (const Vector3d& v : one.mesh.vertices) {
+      box.extend(v);
+      EXPECT_LE(away(v, capsule), capsule.radius);
+    }
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> normal;
+    for (int i = 0; i < 300; ++i) {
+      const Vector3d along = Vector3d(normal(random), normal(random), normal(random)).normalized();
+      double radius = 0, low = 0, high = 0;
+      for (const Vector3d& v : one.mesh.vertices) {
+        const Vector3d d = v - box.center();
+        radius = std::max(radius, d.cross(along).norm());
+      }
+      for (const Vector3d& v : one.mesh.vertices) {
+        const Vector3d d = v - box.center();
+        const double cap = std::sqrt(std::max(0.0, radius * radius - d.cross(along).squaredNorm()));
+        low = std::min(low, d.dot(along) + cap);
+        high = std::max(high, d.dot(along) - cap);
+      }
+      EXPECT_LE(volume_of(capsule), (1 + 1e-6) * volume_of({low * along, high * along, radius}));
+    }
+  }
+}
+
+TEST(CoverCapsules, FindACapsule) {
+  TriangleMesh mesh = icosphere_mesh(3);
+  for (Vector3d& v : mesh.vertices) v = 0.3 * v + Vector3d(0, 0, v.z() > 0 ? 1 : -1);
+  mesh = turned(std::move(mesh), 1.2, {5, 6, 7});
+  const CoverCapsule capsule = cover_with_capsule(close_mesh(mesh, "capsule"));
+  EXPECT_NEAR(volume_of(capsule), M_PI * 0.09 * 2.4, 0.01 * M_PI * 0.09 * 2.4);
+  EXPECT_LT((0.5 * (capsule.begin + capsule.end) - Vector3d(5, 6, 7)).norm(), 0.01);
+  EXPECT_THROW(cover_with_capsule(ClosedMesh{}), Error);
+}
+
 }  // namespace
 }  // namespace ist::testing

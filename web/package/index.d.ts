@@ -153,7 +153,10 @@ export class Asset {
    */
   level(level: number, set?: SphereSet): Float64Array;
 
-  /** The stored surface, within AssetInfo.fieldError of the solid's; null if there is none. */
+  /**
+   * The stored surface, within AssetInfo.fieldError of the solid's, or the mesh of a surface alone;
+   * null if there is none.
+   */
   surface(): Surface | null;
 
   /** Releases the memory. Fields of this asset must not be used any more. May be called twice. */

@@ -156,6 +156,24 @@ Setting axis(const char* name, Of of, const char* fallback, const char* help) {
       [of](BakeSettings settings) { return std::string(of(settings) == 0 ? 0 : 1, of(settings)); }};
 }
 
+Setting factors(const char* name, Eigen::Vector3d MeshSettings::*member, const char* help) {
+  return {name,
+          "S|SX,SY,SZ",
+          "a finite number other than 0, or three",
+          "1",
+          help,
+          SettingKind::factors,
+          [member](BakeSettings& settings, const std::string& text) {
+            const std::optional<Eigen::Vector3d> parsed = parse_factors(text);
+            if (parsed) settings.mesh.*member = *parsed;
+            return parsed.has_value();
+          },
+          [member](BakeSettings settings) {
+            const Eigen::Vector3d& s = settings.mesh.*member;
+            return fmt::format("{},{},{}", s.x(), s.y(), s.z());
+          }};
+}
+
 Setting without_default(Setting setting, const char* shown = "") {
   setting.fallback = shown;
   return setting;
@@ -231,9 +249,9 @@ std::vector<Setting> make_settings() {
           "wrap", member_of(&BakeSettings::mesh, &MeshSettings::wrap), {.least = 1e-3, .most = 0.1},
           "Enclose a mesh that is not closed, or that repair cannot close, in a closed surface. "
           "The value is the detail as a share of the diagonal, e.g. 0.5%")),
-      real("scale", member_of(&BakeSettings::mesh, &MeshSettings::scale),
-           {.least = 0, .without_least = true},
-           "Factor for every coordinate of the mesh; [u] is the resulting unit"),
+      factors("scale", &MeshSettings::scale,
+              "Factor for every coordinate of the mesh, or one for each axis of the file; negative "
+              "ones mirror. [u] is the resulting unit"),
       axis("up-axis", member_of(&BakeSettings::mesh, &MeshSettings::up_axis), "",
            "Up axis of the mesh, which is rotated to world-up. Default: no rotation"),
       axis("world-up", member_of(&BakeSettings::mesh, &MeshSettings::world_up), "Z",

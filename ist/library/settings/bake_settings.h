@@ -18,7 +18,7 @@ namespace ist {
 struct MeshSettings {
   bool repair = false;  ///< close an open mesh
   double wrap = 0;      ///< detail of wrap_mesh() for one that is not closed so; 0: none is wrapped
-  double scale = 1;     ///< > 0; every coordinate times this
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< of the file's axes; scale_mesh() takes it
   char up_axis = 0;     ///< 'X', 'Y' or 'Z': which of the file's axes is up; 0: nothing is turned
   char world_up = 'Z';  ///< the mesh is turned so that this axis is up; where up_axis is given
 };
@@ -32,12 +32,13 @@ struct BakeSettings {
 
 /// What is written for a setting.
 enum class SettingKind {
-  whole,   ///< 4000
-  real,    ///< 0.5
-  share,   ///< 0.5 or 50%
-  flag,    ///< on the command line --NAME alone; in a file true or false
-  choice,  ///< one of some words
-  text,    ///< a word, a number or a share
+  whole,    ///< 4000
+  real,     ///< 0.5
+  share,    ///< 0.5 or 50%
+  flag,     ///< on the command line --NAME alone; in a file true or false
+  factors,  ///< 0.5 for all axes or 1,1,0.5; in a file also [1, 1, 0.5]
+  choice,   ///< one of some words
+  text,     ///< a word, a number or a share
 };
 
 struct Setting {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <vector>
 
 namespace ist {
 namespace {
@@ -35,6 +36,21 @@ std::optional<double> parse_share(std::string_view text) {
   if (!text.ends_with('%')) return parse_number(text);
   const std::optional<double> percent = parse_number(text.substr(0, text.size() - 1));
   return percent ? std::optional(*percent / 100) : std::nullopt;
+}
+
+std::optional<Eigen::Vector3d> parse_factors(std::string_view text) {
+  std::vector<double> given;
+  for (;;) {
+    const std::size_t comma = text.find(',');
+    const std::optional<double> factor = parse_number(text.substr(0, comma));
+    if (!factor || !std::isfinite(*factor) || *factor == 0) return std::nullopt;
+    given.push_back(*factor);
+    if (comma == text.npos) break;
+    text.remove_prefix(comma + 1);
+  }
+  if (given.size() == 1) return Eigen::Vector3d::Constant(given[0]);
+  if (given.size() == 3) return Eigen::Vector3d(given[0], given[1], given[2]);
+  return std::nullopt;
 }
 
 std::optional<std::uint64_t> parse_bytes(std::string_view text) {

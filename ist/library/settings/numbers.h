@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <charconv>
 #include <cstdint>
 #include <limits>
@@ -25,6 +26,9 @@ std::optional<double> parse_number(std::string_view text);
 
 /// A number, or a percentage: 0.5 or 50%.
 std::optional<double> parse_share(std::string_view text);
+
+/// One finite number other than 0 for all three axes, or three with commas between.
+std::optional<Eigen::Vector3d> parse_factors(std::string_view text);
 
 /// Bytes as people write them: 4096, 512M, 10G; units K, M, G and T are powers of 1024.
 std::optional<std::uint64_t> parse_bytes(std::string_view text);

@@ -4,6 +4,7 @@
 
 #include <ist/asset_layout.h>
 
+#include "query/asset/mesh_parts.h"
 #include "query/asset/sphere_tree.h"
 #include "query/asset/surface_tree.h"
 #include "query/c_api/structs.h"
@@ -87,6 +88,22 @@ void get_surface(const TreeView& view, ist_surface_t& out) noexcept {
   }
 }
 
+/// The kept mesh of an asset of a surface alone.
+void get_mesh(const TreeView& view, ist_surface_t& out) noexcept {
+  const MeshParts mesh(view.header(), *at<MeshHeader>(view.header(), view.header().mesh));
+  const OwnFrame frame(view.header());
+  out.vertex_count = mesh.header->vertex_count;
+  for (std::size_t v = 0; v < std::min(out.vertex_count, out.vertex_capacity); ++v)
+    frame.place(Eigen::Map<const Eigen::Vector3d>(mesh.vertices + 3 * v), out.vertices[v]);
+  for (std::uint32_t b = 0; b < mesh.count; ++b) {
+    const MeshBlock& block = mesh.blocks[b];
+    for (std::uint32_t t = 0; t < block.triangles; ++t, ++out.triangle_count)
+      if (out.triangle_count < out.triangle_capacity)
+        for (int k = 0; k < 3; ++k)
+          out.triangles[out.triangle_count][k] = block.vertex[block.corner[k][t]];
+  }
+}
+
 ist_status_t read(const ist_lens_settings_t* given, LensSettings& settings) noexcept {
   if (given == nullptr) return IST_OK;
   if (given->size != sizeof *given) return IST_WRONG_SIZE;
@@ -130,7 +147,8 @@ ist_status_t ist_tree_get_surface(const ist_tree_t* tree, ist_surface_t* surface
     return IST_NULL_POINTER;
   ist::TreeView view;
   status = view_of(tree, view);
-  if (status == IST_OK && view.has_field()) get_surface(view, *surface);
+  if (status == IST_OK && (view.has_field() || view.has_mesh()))
+    (view.has_field() ? get_surface : get_mesh)(view, *surface);
   return status;
 }
 

@@ -65,7 +65,7 @@ def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=None, measure=
     measure: "matched", "inner" or "exact"; exact between two solids that both have it. None: exact
         for meshes of at most 5,000 triangles, matched for others.
 
-    Raises ist.OpenMeshError for a mesh that is not closed: repair it first (ist.repair_mesh) or
+    Raises ist.OpenMeshError for a mesh that is not closed: repair it first (ist.close_mesh) or
     leave it out of `geoms`.
     """
     load()
