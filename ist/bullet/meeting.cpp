@@ -44,9 +44,15 @@ Meeting::Meeting(const btCollisionShape& first, const btCollisionShape& second)
   if (has_shape() && second_ == nullptr) partner_ = Partner::of(second);
 }
 
-PlacedSolid Meeting::placed(const Shape* shape, const btTransform& at) const {
-  if (shape == nullptr) return partner_->placed(at);
-  return {shape->tree(), to_pose(at * shape->mesh_in_body()), shape->scale()};
+Meeting::Solids Meeting::placed(const btTransform& first, const btTransform& second,
+                                const Settings& settings, const btVector3& lower,
+                                const btVector3& upper) const {
+  const double thickness = settings.thickness > 0 ? settings.thickness : std::cbrt(volume());
+  const auto one = [&](const Shape* shape, const btTransform& at) -> PlacedSolid {
+    if (shape == nullptr) return partner_->placed(at, lower, upper, thickness);
+    return {shape->tree(), to_pose(at * shape->mesh_in_body()), shape->scale()};
+  };
+  return {one(first_, first), one(second_, second)};
 }
 
 double Meeting::volume() const {
@@ -74,7 +80,10 @@ double Meeting::largest_motion(const btTransform& before, const btTransform& now
 
 void Meeting::find(const btTransform& first, const btTransform& second, const Settings& settings,
                    Contact& contact) const {
-  const PlacedSolid a = placed(first_, first), b = placed(second_, second);
+  btVector3 lower, upper;
+  if (second_ == nullptr) first_->getAabb(second.inverseTimes(first), lower, upper);
+  if (first_ == nullptr) second_->getAabb(first.inverseTimes(second), lower, upper);
+  const auto& [a, b] = placed(first, second, settings, lower, upper);
   const std::span room(contact.patches.data(), std::min(settings.patches, Settings::kPatches));
   contact.origin = std::visit([](const auto& at) { return Eigen::Vector3d(at.pose.t); }, b.placed);
   contact.clearance = 0;

@@ -29,7 +29,10 @@ class Meeting {
   double stiffness() const;  ///< [force/u³] of the shapes' materials; 0: none has any
 
  private:
-  PlacedSolid placed(const Shape* shape, const btTransform& at) const;
+  using Solids = std::array<PlacedSolid, 2>;
+  /// A partner is placed for an asset that is in this box, in the partner's frame.
+  Solids placed(const btTransform& first, const btTransform& second, const Settings& settings,
+                const btVector3& lower, const btVector3& upper) const;
 
   const Shape* first_ = nullptr;  // null: partner_
   const Shape* second_ = nullptr;

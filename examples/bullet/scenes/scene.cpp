@@ -19,6 +19,7 @@ const std::vector<Scene>& scenes() {
       {"peg", "a peg slips into a hole with 0.1 mm of clearance", run_peg},
       {"bunnies", "thirty bunnies in a crate", run_bunnies},
       {"terrain", "tori, balls and cubes in a hollow with a boulder", run_terrain},
+      {"level", "the same on a triangle mesh", run_level},
   };
   return all;
 }

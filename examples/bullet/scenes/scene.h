@@ -74,3 +74,4 @@ SceneResult run_bowl(const SceneOptions&);
 SceneResult run_peg(const SceneOptions&);
 SceneResult run_bunnies(const SceneOptions&);
 SceneResult run_terrain(const SceneOptions&);
+SceneResult run_level(const SceneOptions&);

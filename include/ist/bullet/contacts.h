@@ -49,6 +49,9 @@ struct Settings {
   /// Matched spheres blur flat faces. With a larger depth they rest nearer to their place; with a
   /// smaller depth a higher stack stands.
   double depth = 0.001;
+  /// [u] How far behind the front of its triangles a triangle mesh is solid. 0: the asset's size,
+  /// as above. A body that is deeper is behind the mesh and free.
+  double thickness = 0;
   /// Damping of a contact over critical damping; solver only. At 1 a body without restitution
   /// rebounds with less than a seventh of its speed, e⁻².
   double damping = 1;
