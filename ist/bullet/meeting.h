@@ -1,12 +1,16 @@
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include <ist/bullet/contacts.h>
+#include <ist/time_of_impact.h>
 
 #include "bullet/partner.h"
 
 namespace ist::bullet {
+
+using Places = std::array<btTransform, 2>;
 
 /// Two shapes of which one is a Shape, prepared for many queries. Both must outlive it.
 class Meeting {
@@ -21,6 +25,9 @@ class Meeting {
   void find(const btTransform& first, const btTransform& second, const Settings& settings,
             Contact& contact) const;
 
+  /// The first impact of a motion of both in a time of 1.
+  TimeOfImpact impact(const Places& from, const Places& to, const Settings& settings) const;
+
   /// [u] No point of one has moved by more than this against the other since the second was at
   /// `before` in the frame of the first.
   double largest_motion(const btTransform& before, const btTransform& now) const;
@@ -30,9 +37,8 @@ class Meeting {
 
  private:
   using Solids = std::array<PlacedSolid, 2>;
-  /// A partner is placed for an asset that is in this box, in the partner's frame.
-  Solids placed(const btTransform& first, const btTransform& second, const Settings& settings,
-                const btVector3& lower, const btVector3& upper) const;
+  /// At the beginning of a motion.
+  Solids placed(const Places& from, const Places& to, const Settings& settings) const;
 
   const Shape* first_ = nullptr;  // null: partner_
   const Shape* second_ = nullptr;
@@ -45,6 +51,7 @@ struct Spring {
   double relaxation = 0;  ///< [s] damper over spring
   double rest = 0;        ///< [u] depth at which the lighter body rests
   double slow = 0;        ///< [u/s] a body that fell by `rest` is this fast
+  double fast = 0;        ///< [u/s] above it a contact is rigid
   double linear = 0;      ///< [u] deeper, the pressure grows with the depth's square
 
   /// [force/u³] at that depth.

@@ -210,5 +210,64 @@ TEST(BulletLevel, FallsAt60HzAreStopped) {
   }
 }
 
+// A small cube at 6 m/s moves by five times its side in a step of 60 Hz.
+TEST(BulletImpact, FastBodiesStopAtThinOnes) {
+  static const auto triangles = floor_mesh(20);
+  const std::vector<Level> levels = {
+      {"plane", [] { return std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), 0); }},
+      {"plate",
+       [] { return std::make_unique<btBoxShape>(btVector3(1, 1, 0.0025f)); },
+       {0, 0, -0.0025f}},
+      {"open mesh", [] { return std::make_unique<btBvhTriangleMeshShape>(triangles.get(), true); }},
+      {"asset", [] { return std::make_unique<bullet::Shape>(cube()); }, {0, 0, -0.5}},
+  };
+  constexpr double kSmall = 0.02;
+  for (const Level& level : levels) {
+    SCOPED_TRACE(level.name);
+    for (const bool stopped : {true, false}) {
+      World world;
+      if (stopped) world.world.addAction(&world.contacts);
+      world.add(level.make(), 0, level.at);
+      btRigidBody& box = world.add(cube_of_side(kSmall), 0.1, btVector3(0.03f, 0.02f, 0.25f));
+      box.setCcdMotionThreshold(0.2 * kSmall);
+      box.setLinearVelocity({0, 0, -6});
+      box.setAngularVelocity({1, 2, 3});
+      double lowest = 1;
+      world.step(
+          180, [&] { lowest = std::min<double>(lowest, box.getWorldTransform().getOrigin().z()); },
+          60);
+      if (!stopped) {
+        EXPECT_LT(lowest, 0);
+        continue;
+      }
+      EXPECT_GT(lowest, 0.4 * kSmall);
+      EXPECT_NEAR(box.getWorldTransform().getOrigin().z(), 0.5 * kSmall, 0.01 * kSmall);
+      EXPECT_LT(box.getLinearVelocity().length(), 0.01);
+    }
+  }
+}
+
+TEST(BulletImpact, TheShareOfAMotionIsTold) {
+  World world;
+  world.add_ground();
+  btRigidBody& box = world.add(cube_of_side(kSide), 1, btVector3(0, 0, 0.5));
+  world.step(1);
+  const auto share = [&](double threshold, double fall) {
+    box.setCcdMotionThreshold(btScalar(threshold));
+    box.setWorldTransform(at_place({0, 0, 0.5}));
+    box.setInterpolationWorldTransform(at_place({0, 0, btScalar(0.5 - fall)}));
+    double told = -1;
+    bullet::for_each_pair(
+        world.world, [&](bullet::PairAlgorithm& pair, btCollisionObject& a, btCollisionObject& b) {
+          told = pair.calculateTimeOfImpact(&a, &b, world.world.getDispatchInfo(), nullptr);
+        });
+    return told;
+  };
+  EXPECT_NEAR(share(0.04, 1), 0.4 + 0.01, 1e-3);  // they meet by a quarter of the threshold
+  EXPECT_EQ(share(0.04, 0.3), 1);                 // they do not meet
+  EXPECT_EQ(share(1.1, 1), 1);                    // too little motion
+  EXPECT_EQ(share(0, 1), 1);                      // not asked for
+}
+
 }  // namespace
 }  // namespace ist::testing

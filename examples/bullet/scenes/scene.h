@@ -70,6 +70,7 @@ SceneResult run_askew(const SceneOptions&);
 SceneResult run_cube_on_cube(const SceneOptions&);
 SceneResult run_nut(const SceneOptions&);
 SceneResult run_screw(const SceneOptions&);
+SceneResult run_drop(const SceneOptions&);
 SceneResult run_bowl(const SceneOptions&);
 SceneResult run_peg(const SceneOptions&);
 SceneResult run_bunnies(const SceneOptions&);
