@@ -207,8 +207,7 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
     state_->move_points(first, second);
   } else {
     const double step = info.m_timeStep > 0 ? info.m_timeStep : 1.0 / 60;
-    Spring spring = spring_of(state_->meeting, first, second, settings, step);
-    spring.fast = fast_motion(first, second) / step;
+    const Spring spring = spring_of(state_->meeting, first, second, settings, step);
     state_->meeting.find(at_first, at_second, settings, contact);
     state_->fill(*a, *b, contact, spring, *m_dispatcher);
     state_->second_in_first = second_in_first;
@@ -287,7 +286,7 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
     point.m_combinedRestitution = gCalculateCombinedRestitutionCallback(&first, &second);
     const double approach =
         normal.dot(velocity_of(second, on_second) - velocity_of(first, on_first));
-    if ((point.m_combinedRestitution > 0 && approach > spring.slow) || approach > spring.fast) {
+    if (point.m_combinedRestitution > 0 && approach > spring.slow) {
       // A damped spring would absorb the speed, so a point that bounces is rigid in this step.
       point.m_contactPointFlags |=
           BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP;
@@ -337,7 +336,7 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
 
 double PairAlgorithm::share_until_impact(const btCollisionObject& first,
                                          const btCollisionObject& second, const Places& from,
-                                         const Places& to) {
+                                         const Places& to) const {
   constexpr double kDepth = 0.25;  // of the threshold
   constexpr int kLooks = 24;
   const Meeting& meeting = state_->meeting;
@@ -349,7 +348,6 @@ double PairAlgorithm::share_until_impact(const btCollisionObject& first,
   if (settings.response != Settings::Response::solver) return 1;
   const TimeOfImpact impact = meeting.impact(from, to, settings);
   if (impact.status == ImpactStatus::no_impact) return 1;
-  state_->still = -1;  // their speeds change, also where they are stopped at once
   const double stride = threshold / motion;
   if (impact.status != ImpactStatus::overlapping)
     return std::min(1.0, impact.time + kDepth * stride);

@@ -51,7 +51,6 @@ struct Spring {
   double relaxation = 0;  ///< [s] damper over spring
   double rest = 0;        ///< [u] depth at which the lighter body rests
   double slow = 0;        ///< [u/s] a body that fell by `rest` is this fast
-  double fast = 0;        ///< [u/s] above it a contact is rigid
   double linear = 0;      ///< [u] deeper, the pressure grows with the depth's square
 
   /// [force/u³] at that depth.

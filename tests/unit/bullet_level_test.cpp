@@ -247,6 +247,20 @@ TEST(BulletImpact, FastBodiesStopAtThinOnes) {
   }
 }
 
+// Turning in contact, it would stop for good if no step got on.
+TEST(BulletImpact, ABodyThatSpinsComesToRest) {
+  World world;
+  world.world.addAction(&world.contacts);
+  world.add_ground();
+  btRigidBody& box = world.add(cube_of_side(0.02), 0.1, btVector3(0, 0, 0.25f));
+  box.setCcdMotionThreshold(0.004f);
+  box.setLinearVelocity({0, 0, -10});
+  box.setAngularVelocity({10, 20, 30});
+  world.step(270, {}, 60);
+  EXPECT_NEAR(box.getWorldTransform().getOrigin().z(), 0.01, 2e-4);
+  EXPECT_LT(box.getLinearVelocity().length(), 0.01);
+}
+
 TEST(BulletImpact, TheShareOfAMotionIsTold) {
   World world;
   world.add_ground();

@@ -98,9 +98,8 @@ class Contacts : public btActionInterface {
   /// Called by the world after a step's motion. Pairs in which a body has a
   /// getCcdMotionThreshold(), and in which a point moves by more relative to the other body, are
   /// moved back to where they have met by a quarter of the threshold. Bodies in contact go on as
-  /// long as they get no deeper than that. In the next step a contact that closes faster than the
-  /// threshold a step is rigid. The rest of the motion is lost, as with Bullet's own sweeps, and
-  /// with it the speed that gravity gave.
+  /// long as they get no deeper than that. The rest of the motion is lost, as with Bullet's own
+  /// sweeps, and with it the speed that gravity gave.
   ///
   /// Response::solver only, and not for children of compounds and links of multibodies. A body
   /// that another one hits in this very step is seen along its motion before the hit.
@@ -150,7 +149,7 @@ class PairAlgorithm : public btActivatingCollisionAlgorithm {
   /// see Contacts::updateAction(). 1 for a motion that no getCcdMotionThreshold() asks for.
   double share_until_impact(const btCollisionObject& first, const btCollisionObject& second,
                             const std::array<btTransform, 2>& from,
-                            const std::array<btTransform, 2>& to);
+                            const std::array<btTransform, 2>& to) const;
 
   /// The same for the motion from world transforms to interpolation transforms.
   btScalar calculateTimeOfImpact(btCollisionObject* first, btCollisionObject* second,
