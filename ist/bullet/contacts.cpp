@@ -5,9 +5,11 @@
 #include <BulletCollision/CollisionDispatch/btConvexConvexAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <LinearMath/btTransformUtil.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <typeinfo>
 #include <vector>
@@ -34,6 +36,27 @@ bool same_name(const btManifoldPoint& a, const btManifoldPoint& b) {
 btRigidBody* movable(const btCollisionObject& object) {
   btRigidBody* const body = btRigidBody::upcast(const_cast<btCollisionObject*>(&object));
   return body != nullptr && body->getInvMass() > 0 ? body : nullptr;
+}
+
+/// Where an object was a time ago, by its velocity.
+btTransform moved_back(const btCollisionObject& object, btScalar time) {
+  btTransform before = object.getWorldTransform();
+  const btRigidBody* const body = movable(object);
+  if (body != nullptr && body->isActive()) {
+    btTransformUtil::integrateTransform(object.getWorldTransform(), -body->getLinearVelocity(),
+                                        -body->getAngularVelocity(), time, before);
+  }
+  return before;
+}
+
+/// [u] The motion in a step above which impacts count.
+double fast_motion(const btCollisionObject& first, const btCollisionObject& second) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const btCollisionObject* object : {&first, &second}) {
+    const double squared = object->getCcdSquareMotionThreshold();
+    if (squared > 0) least = std::min(least, std::sqrt(squared));
+  }
+  return least;
 }
 
 btVector3 velocity_of(const btCollisionObject& object, const btVector3& point) {
@@ -80,6 +103,29 @@ void Contacts::register_with(btCollisionDispatcher& dispatcher) {
       dispatcher.registerClosestPointsCreateFunc(a, b, &create_);
     }
   }
+}
+
+void Contacts::updateAction(btCollisionWorld* world, btScalar step) {
+  // All impacts are found before anything is moved, so the order of pairs does not matter.
+  for_each_pair(*world,
+                [&](PairAlgorithm& pair, btCollisionObject& first, btCollisionObject& second) {
+                  const auto share = static_cast<btScalar>(pair.share_until_impact(
+                      first, second, {moved_back(first, step), moved_back(second, step)},
+                      {first.getWorldTransform(), second.getWorldTransform()}));
+                  for (btCollisionObject* object : {&first, &second})
+                    object->setHitFraction(std::min(share, object->getHitFraction()));
+                });
+  for_each_pair(*world,
+                [&](const PairAlgorithm&, btCollisionObject& first, btCollisionObject& second) {
+                  for (btCollisionObject* object : {&first, &second}) {
+                    const btScalar lost = step * (1 - object->getHitFraction());
+                    object->setHitFraction(1);
+                    btRigidBody* const body = movable(*object);
+                    if (body == nullptr || !(lost > 0)) continue;
+                    body->setCenterOfMassTransform(moved_back(*body, lost));
+                    body->setLinearVelocity(body->getLinearVelocity() - lost * body->getGravity());
+                  }
+                });
 }
 
 btCollisionAlgorithm* Contacts::CreateFunc::CreateCollisionAlgorithm(
@@ -139,9 +185,10 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
       const ContactPatch& patch = contact.patches[i];
       if (!(patch.area > 0)) continue;
       const Eigen::Vector3d normal = -patch.normal;
-      result->addContactPoint(to_bullet(normal),
-                              to_bullet(Eigen::Vector3d(patch.centroid + 0.5 * patch.depth * normal)),
-                              static_cast<btScalar>(-patch.depth));
+      result->addContactPoint(
+          to_bullet(normal),
+          to_bullet(Eigen::Vector3d(patch.centroid + 0.5 * patch.depth * normal)),
+          static_cast<btScalar>(-patch.depth));
     }
     result->setPersistentManifold(nullptr);
     return;
@@ -159,8 +206,8 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
       state_->meeting.largest_motion(state_->second_in_first, second_in_first) <= state_->still) {
     state_->move_points(first, second);
   } else {
-    const Spring spring = spring_of(state_->meeting, first, second, settings,
-                                    info.m_timeStep > 0 ? info.m_timeStep : 1.0 / 60);
+    const double step = info.m_timeStep > 0 ? info.m_timeStep : 1.0 / 60;
+    const Spring spring = spring_of(state_->meeting, first, second, settings, step);
     state_->meeting.find(at_first, at_second, settings, contact);
     state_->fill(*a, *b, contact, spring, *m_dispatcher);
     state_->second_in_first = second_in_first;
@@ -285,6 +332,53 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
     gContactStartedCallback(manifolds[0]);
   }
   if (used == 0 && touched && gContactEndedCallback != nullptr) gContactEndedCallback(manifolds[0]);
+}
+
+double PairAlgorithm::share_until_impact(const btCollisionObject& first,
+                                         const btCollisionObject& second, const Places& from,
+                                         const Places& to) const {
+  constexpr double kDepth = 0.25;  // of the threshold
+  constexpr int kLooks = 24;
+  const Meeting& meeting = state_->meeting;
+  const double threshold = fast_motion(first, second);
+  const double motion =
+      meeting.largest_motion(from[0].inverseTimes(from[1]), to[0].inverseTimes(to[1]));
+  if (!meeting.is_met() || !(motion > threshold)) return 1;
+  const Settings settings = contacts_.settings_of(first, second);
+  if (settings.response != Settings::Response::solver) return 1;
+  const TimeOfImpact impact = meeting.impact(from, to, settings);
+  if (impact.status == ImpactStatus::no_impact) return 1;
+  const double stride = threshold / motion;
+  if (impact.status != ImpactStatus::overlapping)
+    return std::min(1.0, impact.time + kDepth * stride);
+
+  // In contact. Their mean depth tells most where they slide or turn, as a nut on its thread.
+  const auto depth_after = [&](double share) {
+    Places at;
+    for (std::size_t i = 0; i < 2; ++i) {
+      btVector3 velocity, turning;
+      btTransformUtil::calculateVelocity(from[i], to[i], 1, velocity, turning);
+      btTransformUtil::integrateTransform(from[i], velocity, turning, static_cast<btScalar>(share),
+                                          at[i]);
+    }
+    Contact contact;
+    meeting.find(at[0], at[1], settings, contact);
+    double area = 0;
+    for (std::size_t i = 0; i < contact.count; ++i) area += contact.patches[i].area;
+    return contact.whole.volume > 0 ? contact.whole.volume / area : 0;
+  };
+  const double most = std::max(depth_after(0), kDepth * threshold);
+  const double least = stride / 8;  // or two bodies that turn into each other would stop for good
+  double share = 0, next = stride;
+  for (int looks = 0; looks < kLooks && share < 1 && next >= least; ++looks) {
+    const double there = std::min(1.0, share + next);
+    if (depth_after(there) > most) {
+      next /= 2;
+    } else {
+      share = there;
+    }
+  }
+  return std::max(share, std::min(1.0, least));
 }
 
 void PairAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {

@@ -46,9 +46,22 @@ Meeting::Meeting(const btCollisionShape& first, const btCollisionShape& second)
   if (has_shape() && second_ == nullptr) partner_ = Partner::of(second);
 }
 
-PlacedSolid Meeting::placed(const Shape* shape, const btTransform& at) const {
-  if (shape == nullptr) return partner_->placed(at);
-  return {shape->tree(), to_pose(at * shape->mesh_in_body()), shape->scale()};
+Meeting::Solids Meeting::placed(const Places& at, const Places& to,
+                                const Settings& settings) const {
+  const auto one = [&](int i) -> PlacedSolid {
+    const Shape* const shape = i == 0 ? first_ : second_;
+    if (shape != nullptr)
+      return {shape->tree(), to_pose(at[i] * shape->mesh_in_body()), shape->scale()};
+    const Shape& other = i == 0 ? *second_ : *first_;
+    btVector3 lower = at[i].inverseTimes(at[1 - i]).getOrigin(), upper = lower;
+    lower.setMin(to[i].inverseTimes(to[1 - i]).getOrigin());
+    upper.setMax(to[i].inverseTimes(to[1 - i]).getOrigin());
+    const auto reach = static_cast<btScalar>(other.reach());
+    return partner_->placed(at[i], lower - btVector3(reach, reach, reach),
+                            upper + btVector3(reach, reach, reach),
+                            settings.thickness > 0 ? settings.thickness : std::cbrt(volume()));
+  };
+  return {one(0), one(1)};
 }
 
 double Meeting::volume() const {
@@ -76,7 +89,7 @@ double Meeting::largest_motion(const btTransform& before, const btTransform& now
 
 void Meeting::find(const btTransform& first, const btTransform& second, const Settings& settings,
                    Contact& contact) const {
-  const PlacedSolid a = placed(first_, first), b = placed(second_, second);
+  const auto& [a, b] = placed({first, second}, {first, second}, settings);
   const std::span room(contact.patches.data(), std::min(settings.patches, Settings::kPatches));
   contact.origin = std::visit([](const auto& at) { return Eigen::Vector3d(at.pose.t); }, b.placed);
   contact.clearance = 0;
@@ -104,6 +117,19 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   }
   contact.whole = found.penetration;
   contact.count = found.count;
+}
+
+TimeOfImpact Meeting::impact(const Places& from, const Places& to, const Settings& settings) const {
+  const auto& [a, b] = placed(from, to, settings);
+  const auto motion = [&](const Shape* shape, int i) {
+    if (shape == nullptr) return motion_between(to_pose(from[i]), to_pose(to[i]), 1);
+    const btTransform& mesh = shape->mesh_in_body();
+    return motion_between(to_pose(from[i] * mesh), to_pose(to[i] * mesh), 1,
+                          to_eigen(mesh.inverse().getOrigin()) / shape->scale(), shape->scale());
+  };
+  // A flat face above a mesh takes any number; what is left is stopped early.
+  const ImpactSettings limit{.max_visits = partner_ ? 1u << 13 : 0u};
+  return time_of_impact(a, b, {motion(first_, 0), motion(second_, 1)}, limit, workspace());
 }
 
 bool find_contact(const btCollisionObject& first, const btCollisionObject& second,

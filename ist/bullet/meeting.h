@@ -1,12 +1,16 @@
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include <ist/bullet/contacts.h>
+#include <ist/time_of_impact.h>
 
 #include "bullet/partner.h"
 
 namespace ist::bullet {
+
+using Places = std::array<btTransform, 2>;
 
 /// Two shapes of which one is a Shape, prepared for many queries. Both must outlive it.
 class Meeting {
@@ -21,6 +25,9 @@ class Meeting {
   void find(const btTransform& first, const btTransform& second, const Settings& settings,
             Contact& contact) const;
 
+  /// The first impact of a motion of both in a time of 1.
+  TimeOfImpact impact(const Places& from, const Places& to, const Settings& settings) const;
+
   /// [u] No point of one has moved by more than this against the other since the second was at
   /// `before` in the frame of the first.
   double largest_motion(const btTransform& before, const btTransform& now) const;
@@ -29,7 +36,9 @@ class Meeting {
   double stiffness() const;  ///< [force/u³] of the shapes' materials; 0: none has any
 
  private:
-  PlacedSolid placed(const Shape* shape, const btTransform& at) const;
+  using Solids = std::array<PlacedSolid, 2>;
+  /// At the beginning of a motion.
+  Solids placed(const Places& from, const Places& to, const Settings& settings) const;
 
   std::uint32_t pair_id_;         // no two at a time have the same
   const Shape* first_ = nullptr;  // null: partner_

@@ -6,6 +6,7 @@
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btPolyhedralConvexShape.h>
+#include <BulletCollision/CollisionShapes/btScaledBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <LinearMath/btConvexHullComputer.h>
@@ -13,6 +14,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <utility>
 
 #include <ist/bullet/convert.h>
 
@@ -60,6 +63,10 @@ FieldSample look_at_cone(const void* context, const Eigen::Vector3d& x) noexcept
       out > 0 ? Eigen::Vector2d(x.head<2>() / out) : Eigen::Vector2d(1, 0);
   sample.gradient << gradient.x() * radial, gradient.y();
   return sample;
+}
+
+FieldSample look_at_mesh(const void* context, const Eigen::Vector3d& x) noexcept {
+  return static_cast<const MeshDistance*>(context)->at(x);
 }
 
 FieldSample look_at_hull(const void* context, const Eigen::Vector3d& x) noexcept {
@@ -138,6 +145,131 @@ FieldSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
   return {-nearest, way};
 }
 
+void MeshDistance::gather(const btConcaveShape& shape, const btVector3& lower,
+                          const btVector3& upper, double thickness) {
+  triangles_.clear();
+  boxes_.clear();
+  thickness_ = thickness;
+  const btVector3* scaling = &shape.getLocalScaling();
+  mirrored_ = scaling->x() * scaling->y() * scaling->z() < 0;
+  up_ = -1;
+  if (shape.getShapeType() == SCALED_TRIANGLE_MESH_SHAPE_PROXYTYPE) {
+    scaling =
+        &static_cast<const btScaledBvhTriangleMeshShape&>(shape).getChildShape()->getLocalScaling();
+    mirrored_ ^= scaling->x() * scaling->y() * scaling->z() < 0;
+  } else if (shape.getShapeType() == TERRAIN_SHAPE_PROXYTYPE) {
+    up_ = static_cast<const btHeightfieldTerrainShape&>(shape).getUpAxis();
+    mirrored_ = (*scaling)[up_] < 0;
+  }
+  const auto grown = static_cast<btScalar>(thickness);
+  shape.processAllTriangles(this, lower - btVector3(grown, grown, grown),
+                            upper + btVector3(grown, grown, grown));
+}
+
+void MeshDistance::processTriangle(btVector3* corners, int, int) {
+  Triangle triangle;
+  for (int k = 0; k < 3; ++k) triangle.corner[k] = to_eigen(corners[k]);
+  const auto& [a, b, c] = triangle.corner;
+  triangle.normal = (b - a).cross(c - a);
+  triangle.area = triangle.normal.norm();
+  if (!(triangle.area > 0)) return;
+  triangle.normal /= triangle.area;
+  if ((up_ >= 0 && triangle.normal[up_] < 0) != mirrored_) {
+    std::swap(triangle.corner[1], triangle.corner[2]);
+    triangle.normal *= -1;
+  }
+  triangle.centre = (a + b + c) / 3;
+  for (const Eigen::Vector3d& corner : triangle.corner)
+    triangle.reach = std::max(triangle.reach, (corner - triangle.centre).norm());
+  if (triangles_.size() % kBlock == 0) boxes_.emplace_back();
+  for (const Eigen::Vector3d& corner : triangle.corner) boxes_.back().extend(corner);
+  triangles_.push_back(triangle);
+}
+
+/// The nearest point of a triangle as shares of its corners.
+Eigen::Vector3d MeshDistance::Triangle::nearest(const Eigen::Vector3d& x) const {
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector3d from = x - corner[k];
+    if (from.dot(corner[(k + 1) % 3] - corner[k]) <= 0 &&
+        from.dot(corner[(k + 2) % 3] - corner[k]) <= 0)
+      return Eigen::Vector3d::Unit(k);
+  }
+  Eigen::Vector3d share;
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector3d& a = corner[(k + 1) % 3];
+    const Eigen::Vector3d along = corner[(k + 2) % 3] - a;
+    share[k] = along.cross(x - a).dot(normal) / area;
+    if (share[k] > 0) continue;
+    const double t = along.dot(x - a) / along.squaredNorm();
+    if (t < 0 || t > 1) continue;
+    share[k] = 0;
+    share[(k + 1) % 3] = 1 - t;
+    share[(k + 2) % 3] = t;
+    break;
+  }
+  return share;
+}
+
+FieldSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
+  // Where several triangles are as near, as at a common side, all of them tell front from back: by
+  // the angles at which they meet there. Sides that two of them share cancel; a border is left.
+  constexpr double kAsNear = 1 + 1e-9, kNone = 1e-6;
+  double nearest = std::numeric_limits<double>::max(), reach = 1e150, size = 0;
+  Eigen::Vector3d foot = x, front = x, border = x;
+  for (std::size_t block = 0; block < boxes_.size(); ++block) {
+    if (boxes_[block].squaredExteriorDistance(x) > kAsNear * nearest) continue;
+    const std::size_t end = std::min(triangles_.size(), kBlock * (block + 1));
+    for (std::size_t i = kBlock * block; i < end; ++i) {
+      const Triangle& triangle = triangles_[i];
+      const double far = reach + triangle.reach;
+      if ((x - triangle.centre).squaredNorm() > far * far) continue;
+      const auto& corner = triangle.corner;
+      const Eigen::Vector3d share = triangle.nearest(x);
+      const Eigen::Vector3d point =
+          share[0] * corner[0] + share[1] * corner[1] + share[2] * corner[2];
+      const double distance = (x - point).squaredNorm();
+      const bool nearer = kAsNear * distance < nearest;
+      if (!nearer && (distance > kAsNear * nearest ||
+                      (point - foot).squaredNorm() > 1e-8 * nearest + 1e-28 * foot.squaredNorm()))
+        continue;
+      if (nearer) {
+        nearest = distance;
+        reach = kAsNear * std::sqrt(nearest);
+        foot = point;
+        front = border = Eigen::Vector3d::Zero();
+        size = triangle.area;
+      }
+      double angle = 2 * std::numbers::pi;
+      for (int k = 0; k < 3; ++k) {
+        const Eigen::Vector3d &a = corner[(k + 1) % 3], &b = corner[(k + 2) % 3];
+        if (share[k] == 1) {
+          const Eigen::Vector3d to_a = a - corner[k], to_b = b - corner[k];
+          angle = std::atan2(to_a.cross(to_b).norm(), to_a.dot(to_b));
+        } else if (share[k] == 0 && share.maxCoeff() < 1) {
+          angle = std::numbers::pi;
+        } else {
+          continue;
+        }
+        border += b - a;
+      }
+      front += angle * triangle.normal;
+    }
+  }
+  if (size == 0) return {-1e100, Eigen::Vector3d::Zero()};
+  front.normalize();
+  const Eigen::Vector3d out = x - foot;
+  const double length = out.norm(), depth = -front.dot(out);
+  const Eigen::Vector3d away = length > kNone * kNone * std::sqrt(size) ? out / length : front;
+  if (depth <= 0) return {-length, -away};
+  if (border.squaredNorm() > kNone * kNone * size) {
+    const Eigen::Vector3d beside = out + std::min(depth, thickness_) * front;
+    const double gap = beside.norm();
+    if (gap > kNone * length) return {-gap, -beside / gap};
+  }
+  if (length < thickness_ - length) return {length, away};
+  return {thickness_ - length, -away};
+}
+
 std::optional<Partner> Partner::of(const btCollisionShape& shape) {
   Partner partner;
   switch (shape.getShapeType()) {
@@ -190,19 +322,31 @@ std::optional<Partner> Partner::of(const btCollisionShape& shape) {
       btVector3 origin;
       if (!Terrain::find(static_cast<const btHeightfieldTerrainShape&>(shape), partner.field_,
                          origin)) {
-        return std::nullopt;
+        partner.mesh_ = &static_cast<const btConcaveShape&>(shape);
+        return partner;
       }
       partner.in_shape_.setOrigin(origin);
       return partner;
     }
+    case TRIANGLE_MESH_SHAPE_PROXYTYPE:
+    case SCALED_TRIANGLE_MESH_SHAPE_PROXYTYPE:
+    case MULTIMATERIAL_TRIANGLE_MESH_PROXYTYPE:
+      partner.mesh_ = &static_cast<const btConcaveShape&>(shape);
+      return partner;
     default:
       return std::nullopt;
   }
 }
 
-PlacedField Partner::placed(const btTransform& shape) const {
+PlacedField Partner::placed(const btTransform& shape, const btVector3& lower,
+                            const btVector3& upper, double thickness) const {
   PlacedField placed = field_;
   placed.pose = to_pose(shape * in_shape_);
+  if (mesh_ != nullptr) {
+    thread_local MeshDistance near;
+    near.gather(*mesh_, lower, upper, thickness);
+    placed.field = FunctionField{look_at_mesh, &near, 0};
+  }
   return placed;
 }
 

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <BulletCollision/CollisionShapes/btCollisionShape.h>
+#include <BulletCollision/CollisionShapes/btConcaveShape.h>
 #include <LinearMath/btTransform.h>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -31,18 +31,50 @@ class HullDistance {
   std::vector<Face> faces_;
 };
 
+/// A triangle mesh near a body, as a solid: what lies behind the front of its nearest triangle, to
+/// a depth. The front is where a triangle's corners run anticlockwise.
+class MeshDistance : public btTriangleCallback {
+ public:
+  /// Takes the triangles of the shape that reach into the box, in the shape's frame, grown by
+  /// `thickness` > 0 [u].
+  void gather(const btConcaveShape& shape, const btVector3& lower, const btVector3& upper,
+              double thickness);
+
+  FieldSample at(const Eigen::Vector3d& x) const noexcept;
+
+ private:
+  struct Triangle {
+    Eigen::Vector3d nearest(const Eigen::Vector3d& x) const;
+
+    Eigen::Vector3d corner[3], normal, centre;
+    double area, reach = 0;  // [u²] twice its own; [u] of a corner from the centre
+  };
+  void processTriangle(btVector3* corners, int part, int index) override;
+
+  static constexpr std::size_t kBlock = 8;  // neighbours, as the shape's tree has them
+  std::vector<Triangle> triangles_;
+  std::vector<Eigen::AlignedBox3d> boxes_;  // of blocks
+  double thickness_ = 0;
+  int up_ = -1;  // of a height field: the axis to which its front faces
+  bool mirrored_ = false;
+};
+
 /// What an asset meets that is none: a shape of Bullet's as a field in the shape's frame. The shape
 /// must outlive it, and must not be changed meanwhile.
 class Partner {
  public:
   static std::optional<Partner> of(const btCollisionShape& shape);
 
-  PlacedField placed(const btTransform& shape) const;
+  /// For an asset in a box in the shape's frame: see MeshDistance::gather(). Triangles last until
+  /// the thread's next call.
+  PlacedField placed(const btTransform& shape, const btVector3& lower, const btVector3& upper,
+                     double thickness) const;
 
  private:
   PlacedField field_;  // its pose is in_shape_, each time
   btTransform in_shape_ = btTransform::getIdentity();
   std::shared_ptr<const HullDistance> hull_;
+  const btConcaveShape* mesh_ = nullptr;
 };
 
 }  // namespace ist::bullet

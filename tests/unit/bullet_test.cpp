@@ -1,103 +1,17 @@
 // Assets in Bullet: partners, contact events, resting depths.
-#include <BulletCollision/CollisionDispatch/btCollisionDispatcherMt.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
-#include <btBulletDynamicsCommon.h>
+#include <BulletCollision/Gimpact/btGImpactShape.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <random>
-#include <string>
 #include <thread>
-#include <vector>
-
-#include <ist/bullet/contacts.h>
-#include <ist/bullet/convert.h>
 
 #include "bullet/partner.h"
-#include "support/baked.h"
-#include "support/test_meshes.h"
+#include "support/bullet_world.h"
 
 namespace ist::testing {
 namespace {
-
-btTransform at_place(const btVector3& place) {
-  return btTransform(btQuaternion::getIdentity(), place);
-}
-
-/// A cube of side 1 about the origin.
-const TreeView& cube() {
-  static const Asset asset = baked(cube_mesh(), "cube", 4000);
-  static const TreeView view = asset.view();
-  return view;
-}
-
-std::unique_ptr<bullet::Shape> cube_of_side(double side) {
-  auto shape = std::make_unique<bullet::Shape>(cube());
-  shape->setLocalScaling(btVector3(side, side, side));
-  return shape;
-}
-
-class World {
- public:
-  World() {
-    contacts.register_with(dispatcher_);
-    world.setGravity({0, 0, -9.81});
-    world.getSolverInfo().m_splitImpulse = false;
-  }
-  ~World() {
-    for (const auto& body : bodies_) world.removeRigidBody(body.get());
-  }
-
-  /// Mass 0: held still. The shape is the world's.
-  btRigidBody& add(std::unique_ptr<btCollisionShape> shape, double mass, const btTransform& at) {
-    btVector3 inertia(0, 0, 0);
-    if (mass > 0) shape->calculateLocalInertia(mass, inertia);
-    btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, shape.get(), inertia);
-    info.m_startWorldTransform = at;
-    bodies_.push_back(std::make_unique<btRigidBody>(info));
-    bodies_.back()->setActivationState(DISABLE_DEACTIVATION);
-    world.addRigidBody(bodies_.back().get());
-    shapes_.push_back(std::move(shape));
-    return *bodies_.back();
-  }
-  btRigidBody& add(std::unique_ptr<btCollisionShape> shape, double mass, const btVector3& at) {
-    return add(std::move(shape), mass, at_place(at));
-  }
-  void add_ground() {
-    add(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), 0), 0, {0, 0, 0});
-  }
-  void step(int steps, const std::function<void()>& each = {}) {
-    for (int i = 0; i < steps; ++i) {
-      world.stepSimulation(1.0 / 240, 0);
-      if (each) each();
-    }
-  }
-
-  bullet::Contacts contacts;
-
- private:
-  btDefaultCollisionConfiguration configuration_;
-  btCollisionDispatcherMt dispatcher_{
-      (btSetTaskScheduler(btGetSequentialTaskScheduler()), &configuration_)};
-  btDbvtBroadphase broadphase_;
-  btSequentialImpulseConstraintSolver solver_;
-  std::vector<std::unique_ptr<btCollisionShape>> shapes_;
-  std::vector<std::unique_ptr<btRigidBody>> bodies_;
-
- public:
-  btDiscreteDynamicsWorld world{&dispatcher_, &broadphase_, &solver_, &configuration_};
-};
-
-std::vector<std::string> warned;
-class Listen {
- public:
-  Listen() {
-    warned.clear();
-    bullet::set_warning_handler([](const char* sentence) { warned.push_back(sentence); });
-  }
-  ~Listen() { bullet::set_warning_handler(nullptr); }
-};
 
 // The default asks for surfaces: an asset that keeps none still collides, by its spheres.
 TEST(BulletShapes, WithoutASurfaceCollideByLenses) {
@@ -167,7 +81,7 @@ TEST(BulletPartners, ConesTellTrueDistances) {
   const btConeShapeZ cone(0.4, 1.0);
   const auto partner = bullet::Partner::of(cone);
   ASSERT_TRUE(partner.has_value());
-  const PlacedField placed = partner->placed(btTransform::getIdentity());
+  const PlacedField placed = partner->placed(btTransform::getIdentity(), {}, {}, 1);
   const auto& field = std::get<FunctionField>(placed.field);
   std::mt19937 random(4);
   std::uniform_real_distribution<double> draw(-1, 1);
@@ -296,7 +210,9 @@ TEST(BulletPartners, WhatCannotBeMetIsToldOnce) {
   world.add(cube_of_side(1), 1, btVector3(5, 0, 0));
   static btTriangleMesh mesh;
   mesh.addTriangle({-9, -9, 0}, {9, -9, 0}, {0, 9, 0});
-  world.add(std::make_unique<btBvhTriangleMeshShape>(&mesh, true), 0, btVector3(0, 0, 0));
+  auto gimpact = std::make_unique<btGImpactMeshShape>(&mesh);
+  gimpact->updateBound();
+  world.add(std::move(gimpact), 0, btVector3(0, 0, 0));
   const btVector3 at(0, 0, 0);
   const btScalar radius = 1;
   world.add(std::make_unique<btMultiSphereShape>(&at, &radius, 1), 0, btVector3(0, 0, 0));
@@ -304,7 +220,7 @@ TEST(BulletPartners, WhatCannotBeMetIsToldOnce) {
   ASSERT_EQ(warned.size(), 2u);
   for (const std::string& sentence : warned) {
     EXPECT_NE(sentence.find("ist::bullet::Shape"), std::string::npos);
-    EXPECT_TRUE(sentence.find("BVHTRIANGLEMESH") != std::string::npos ||
+    EXPECT_TRUE(sentence.find("GImpactMesh") != std::string::npos ||
                 sentence.find("MultiSphere") != std::string::npos)
         << sentence;
   }

@@ -58,6 +58,38 @@ SceneResult run_screw(const SceneOptions& options) {
   return result;
 }
 
+SceneResult run_drop(const SceneOptions& options) {
+  constexpr double kSteel = 7.85e-6, kPlate = 2, kFall = 200;
+  const Part screw("screw", ist::load_mesh((options.meshes / "bolt.obj").string()), 2000);
+  const Part plate("plate", make_box({150, 150, kPlate / 2}), 4000);
+  const double mass = kSteel * screw.volume();
+  WorldSettings settings = settings_of(options);
+  set_law(settings, mass, 10, 0.02, 500);
+  SceneWorld world(settings);
+  btRigidBody& p = world.add(plate, 0, place({0, 0, -kPlate / 2}), 0.4);
+  std::vector<btRigidBody*> screws;
+  for (int i = 0; i < 8; ++i) {
+    screws.push_back(&world.add(
+        screw, kSteel,
+        place({60.0 * (i % 4) - 90, 60.0 * (i / 4) - 30, kFall}, turn(0.8 * i, {1, 0.3 * i, 0.2})),
+        0.4));
+    screws.back()->setDamping(0.05, 0.3);
+    screws.back()->setCcdMotionThreshold(kPlate / 2);
+  }
+  Run run(world, options);
+  const double seconds = options.seconds > 0 ? options.seconds : 3;
+  run.go(0.8 * seconds);
+  WeightOn weight(world, {&p});
+  run.go(0.2 * seconds, [&] { weight.look(); });
+  int above = 0;
+  for (const btRigidBody* s : screws) above += s->getCenterOfMassPosition().z() > 0;
+  SceneResult result = run.finish(21, {{"screws on the plate", static_cast<double>(above), 8, 8},
+                                       {"force over weight", weight.along(), 0.99, 1.01}});
+  result.truths.push_back({"kinetic energy, of weight times length",
+                           result.kinetic_energy / (8 * mass * kGravity * 21), 0, 1e-4});
+  return result;
+}
+
 SceneResult run_bowl(const SceneOptions& options) {
   constexpr double kDensity = 1e-6, kBall = 30, kFoot = 30, kOuter = 100, kWall = 8;
   std::vector<std::pair<double, double>> profile = {{0, 0}, {kFoot, 0}};

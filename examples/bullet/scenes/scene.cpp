@@ -15,10 +15,12 @@ const std::vector<Scene>& scenes() {
       {"cube", "a cube comes to rest on a cube", run_cube_on_cube},
       {"nut", "a nut turns down a bolt by its weight", run_nut},
       {"screw", "a screw falls on a table a hundred times its size", run_screw},
+      {"drop", "eight screws fall on a thin plate", run_drop},
       {"bowl", "a ball in a bowl in a box", run_bowl},
       {"peg", "a peg slips into a hole with 0.1 mm of clearance", run_peg},
       {"bunnies", "thirty bunnies in a crate", run_bunnies},
       {"terrain", "tori, balls and cubes in a hollow with a boulder", run_terrain},
+      {"level", "the same on a triangle mesh", run_level},
   };
   return all;
 }

@@ -20,9 +20,8 @@ double height(double x, double y) {
   return 0.25 * (x * x + y * y) + 0.02 * std::sin(5 * x) * std::cos(4 * y);
 }
 
-}  // namespace
-
-SceneResult run_terrain(const SceneOptions& options) {
+/// Of heights, or of the same triangles as a mesh.
+SceneResult run(const SceneOptions& options, bool mesh) {
   constexpr double kTube = 0.04, kRing = 0.11, kBall = 0.08;
   std::vector<std::pair<double, double>> tube;
   for (int i = 0; i < 24; ++i) {
@@ -45,13 +44,26 @@ SceneResult run_terrain(const SceneOptions& options) {
     for (std::uint32_t i = 0; i < kPoints; ++i)
       heights.push_back(static_cast<float>(height(i * kSpacing - kHalf, j * kSpacing - kHalf)));
   const auto [lowest, highest] = std::minmax_element(heights.begin(), heights.end());
-  SceneWorld world(settings);
   // Bullet's shape is centred. Its cells are cut as ist's are.
   auto terrain = std::make_unique<btHeightfieldTerrainShape>(kPoints, kPoints, heights.data(),
                                                              *lowest, *highest, 2, true);
   terrain->setLocalScaling({kSpacing, kSpacing, 1});
+  btTriangleMesh triangles;
+  if (mesh) {
+    struct : btTriangleCallback {
+      btTriangleMesh* mesh;
+      void processTriangle(btVector3* c, int, int) override {
+        mesh->addTriangle(c[0], c[2], c[1]);  // the heights' are clockwise from above
+      }
+    } copy;
+    copy.mesh = &triangles;
+    terrain->processAllTriangles(&copy, {-kHalf, -kHalf, -kHalf}, {kHalf, kHalf, kHalf});
+  }
+  SceneWorld world(settings);
+  std::unique_ptr<btCollisionShape> shape = std::move(terrain);
+  if (mesh) shape = std::make_unique<btBvhTriangleMeshShape>(&triangles, true);
   btRigidBody& ground =
-      world.add_still(std::move(terrain), place({0, 0, 0.5 * (*lowest + *highest)}), kFriction);
+      world.add_still(std::move(shape), place({0, 0, 0.5 * (*lowest + *highest)}), kFriction);
   btRigidBody& boulder = world.add_still(std::make_unique<btSphereShape>(kBoulder),
                                          place({0, 0, 0.5 * kBoulder}), kFriction);
   const Part* const parts[] = {&torus, &ball, &cube};
@@ -86,3 +98,8 @@ SceneResult run_terrain(const SceneOptions& options) {
                            1e-4});
   return result;
 }
+
+}  // namespace
+
+SceneResult run_terrain(const SceneOptions& options) { return run(options, false); }
+SceneResult run_level(const SceneOptions& options) { return run(options, true); }

@@ -3,6 +3,7 @@
 #include <BulletCollision/CollisionDispatch/btActivatingCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btCollisionCreateFunc.h>
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
+#include <BulletDynamics/Dynamics/btActionInterface.h>
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>
 
 #include <array>
@@ -49,6 +50,9 @@ struct Settings {
   /// Matched spheres blur flat faces. With a larger depth they rest nearer to their place; with a
   /// smaller depth a higher stack stands.
   double depth = 0.001;
+  /// [u] How far behind the front of its triangles a triangle mesh is solid. 0: the asset's size,
+  /// as above. A body that is deeper is behind the mesh and free.
+  double thickness = 0;
   /// Damping of a contact over critical damping; solver only. At 1 a body without restitution
   /// rebounds with less than a seventh of its speed, e⁻².
   double damping = 1;
@@ -76,7 +80,9 @@ bool find_contact(const btCollisionObject& first, const btCollisionObject& secon
 
 /// Narrow phase for the pairs of a dispatcher in which one object is a Shape. Each thread has its
 /// own scratch memory, so btCollisionDispatcherMt may run queries on many threads.
-class Contacts {
+///
+/// As an action of the world (btDynamicsWorld::addAction) it stops fast bodies where they meet.
+class Contacts : public btActionInterface {
  public:
   /// Registers the algorithm for all types that collide with a Shape; warn() reports the others.
   /// Call it after the registration of other algorithms that take all types, as GImpact's does.
@@ -88,6 +94,17 @@ class Contacts {
   std::function<void(const btCollisionObject& first, const btCollisionObject& second,
                      Settings& settings)>
       of_pair;
+
+  /// Called by the world after a step's motion. Pairs in which a body has a
+  /// getCcdMotionThreshold(), and in which a point moves by more relative to the other body, are
+  /// moved back to where they have met by a quarter of the threshold. Bodies in contact go on as
+  /// long as they get no deeper than that. The rest of the motion is lost, as with Bullet's own
+  /// sweeps, and with it the speed that gravity gave.
+  ///
+  /// Response::solver only, and not for children of compounds and links of multibodies. A body
+  /// that another one hits in this very step is seen along its motion before the hit.
+  void updateAction(btCollisionWorld* world, btScalar step) override;
+  void debugDraw(btIDebugDraw*) override {}
 
   /// The settings of a pair.
   Settings settings_of(const btCollisionObject& first, const btCollisionObject& second) const;
@@ -128,9 +145,18 @@ class PairAlgorithm : public btActivatingCollisionAlgorithm {
   /// The force that push() last applied to the second object; the first got the opposite.
   const ContactForce& pushed() const;
 
-  btScalar calculateTimeOfImpact(btCollisionObject*, btCollisionObject*, const btDispatcherInfo&,
-                                 btManifoldResult*) override {
-    return 1;
+  /// The share [0, 1] of a motion after which two bodies have met, or in contact have got too deep:
+  /// see Contacts::updateAction(). 1 for a motion that no getCcdMotionThreshold() asks for.
+  double share_until_impact(const btCollisionObject& first, const btCollisionObject& second,
+                            const std::array<btTransform, 2>& from,
+                            const std::array<btTransform, 2>& to) const;
+
+  /// The same for the motion from world transforms to interpolation transforms.
+  btScalar calculateTimeOfImpact(btCollisionObject* first, btCollisionObject* second,
+                                 const btDispatcherInfo&, btManifoldResult*) override {
+    return static_cast<btScalar>(share_until_impact(
+        *first, *second, {first->getWorldTransform(), second->getWorldTransform()},
+        {first->getInterpolationWorldTransform(), second->getInterpolationWorldTransform()}));
   }
   void getAllContactManifolds(btManifoldArray& manifolds) override;
 
@@ -144,7 +170,7 @@ class PairAlgorithm : public btActivatingCollisionAlgorithm {
 
 /// Visits every pair of the world that has a PairAlgorithm, with its two objects.
 template <class Visit>
-void for_each_pair(btDynamicsWorld& world, const Visit& visit) {
+void for_each_pair(btCollisionWorld& world, const Visit& visit) {
   btBroadphasePairArray& pairs = world.getPairCache()->getOverlappingPairArray();
   for (int i = 0; i < pairs.size(); ++i) {
     auto* const pair = dynamic_cast<PairAlgorithm*>(pairs[i].m_algorithm);
