@@ -37,10 +37,6 @@ struct BakeOptions {
   RobotOptions robot;
 };
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 /// An asset, and what its partners erred where an error was asked for.
 struct Baked {
   Asset asset;

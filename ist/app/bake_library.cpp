@@ -131,10 +131,6 @@ std::vector<std::string> warnings_of(const TreeView& tree) {
   return warnings;
 }
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 RunSettings settings_for(const LibraryRun& run) {
   RunSettings settings;
   settings.output = run.output;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 
 // The subcommands of `ist`. Each function adds one, with its options; the callback that it leaves
 // behind does the work when the command line names it. A callback throws ist::Error for what goes
@@ -16,6 +17,10 @@ inline constexpr int kExitInterrupted = 130;
 struct ExitCode {
   int value;
 };
+
+inline double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
 void add_bake(CLI::App& app);
 void add_cache(CLI::App& app);

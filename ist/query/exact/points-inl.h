@@ -36,6 +36,8 @@ HWY_INLINE V largest(const Vec3& a) {
 }
 /// No less than its length.
 HWY_INLINE V length_bound(const Vec3& a) { return (hn::Abs(a.x) + hn::Abs(a.y)) + hn::Abs(a.z); }
+HWY_INLINE V min3(V x, V y, V z) { return hn::Min(x, hn::Min(y, z)); }
+HWY_INLINE V max3(V x, V y, V z) { return hn::Max(x, hn::Max(y, z)); }
 
 }  // namespace ist::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
