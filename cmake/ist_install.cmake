@@ -5,8 +5,14 @@ include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/ist)
 
-install(DIRECTORY include/ist DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT libist-dev
-  PATTERN bullet EXCLUDE)
+set(others PATTERN bullet EXCLUDE)
+if(IST_QUERY_ONLY)  # headers of functions that ist::query lacks
+  foreach(header IN ITEMS bake cover_spheres gpu gpu_fields gpu_query grid_settings level_set medial
+      mesh packing progress solid stop_reason)
+    list(APPEND others PATTERN ist/${header}.h EXCLUDE)
+  endforeach()
+endif()
+install(DIRECTORY include/ist DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT libist-dev ${others})
 # Debian wants a package's licence in a file of this name.
 set(components libist libist-dev ist)
 if(ist_bullet_LIBRARIES)

@@ -390,7 +390,7 @@ typedef struct ist_separation_settings {
 /* --- Answers ---------------------------------------------------------------------------------- */
 
 /* Penetration: derivatives are with respect to a motion of B, A held still. */
-typedef struct ist_penetration {
+typedef struct ist_penetration_t {
   uint32_t size;
   ist_status_t status;
   double volume; /* [u³] */
@@ -406,7 +406,7 @@ typedef struct ist_penetration {
 
 /* Separation: between the surfaces if both assets keep a mesh, else between the inner spheres. All
  * zero once these overlap. */
-typedef struct ist_separation {
+typedef struct ist_separation_t {
   uint32_t size;
   ist_status_t status;
   double distance;                   /* [u] between surfaces or inner spheres */
@@ -431,7 +431,7 @@ typedef struct ist_contact_patch {
 } ist_contact_patch_t;
 
 /* Space for patches. */
-typedef struct ist_contact_patches {
+typedef struct ist_contact_patches_t {
   uint32_t size;
   uint32_t patch_size;          /* sizeof(ist_contact_patch_t) */
   ist_contact_patch_t* patches; /* [capacity] */
@@ -627,7 +627,7 @@ typedef struct ist_wrench {
   double torque[3]; /* [u³] about the given point */
 } ist_wrench_t;
 
-typedef struct ist_wrenches {
+typedef struct ist_wrenches_t {
   uint32_t size;
   ist_wrench_t on_a, on_b;
 } ist_wrenches_t;

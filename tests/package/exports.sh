@@ -32,8 +32,8 @@ for library; do
   fi
   case $library in
     *ist_query*) wanted='ist::penetration( ist::separation( ist::query( ist::contact_patches(
-      ist::TreeView::from_bytes( ist::Workspace::Workspace( ist::version() ist_penetration' ;;
-    *) wanted='ist::bake( ist::check( ist::load_mesh( ist::pack( ist::Asset::load(' ;;
+      ist::TreeView::from_bytes( ist::Workspace::Workspace( ist::version() ist::Asset::load( ist_penetration' ;;
+    *) wanted='ist::bake( ist::check( ist::load_mesh( ist::pack( ist::Asset::save(' ;;
   esac
   for name in $wanted; do
     printf '%s\n' "$names" | grep -qF "$name" || { echo "$library lacks $name" >&2; exit 1; }

@@ -38,3 +38,20 @@ if readelf -d "$work/bake_and_query" | grep 'libist'; then exit 1; fi
 use "$static_only"
 "$cc" -std=c11 "$source/examples/c/c.c" $(pkg-config --cflags --libs ist-query) -o "$work/c"
 "$work/c" "$a" "$b"
+
+# Its headers need nothing else, and are quiet under warnings; ist::query alone loads a file.
+headers=$(pkg-config --variable=includedir ist-query)/ist
+for header in "$headers"/*.h; do echo "#include <ist/${header##*/}>"; done >"$work/headers.cpp"
+cat >>"$work/headers.cpp" <<'END'
+#include <cstdio>
+int main(int, char** argv) try {
+  return ist::Asset::load(argv[1]).view().sphere_count() > 0 ? 0 : 1;
+} catch (const ist::Error& error) {
+  return std::puts(error.what()), 2;
+}
+END
+for lacking in bake mesh packing gpu_query; do [ ! -e "$headers/$lacking.h" ]; done
+"$cxx" -std=c++20 -Wall -Wextra -Wshadow -Wconversion -Werror "$work/headers.cpp" \
+  $(pkg-config --cflags --libs ist-query | sed 's/-I\([^ ]*eigen3\)/-isystem \1/') -o "$work/headers"
+"$work/headers" "$a"
+"$work/headers" none.ist | grep '^none.ist: cannot open'
