@@ -11,6 +11,8 @@
 namespace ist {
 namespace {
 
+using Json = nlohmann::json;
+
 std::string hash_of(const Asset& asset) {
   return fmt::format("{:016x}", asset.view().header().content_hash);
 }
@@ -21,11 +23,11 @@ OutputRecord::OutputRecord(const std::filesystem::path& folder) : folder_(folder
   std::ifstream file(folder / ".ist-bakes");
   for (std::string text; std::getline(file, text);) {
     try {
-      const nlohmann::json json = nlohmann::json::parse(text);
+      const Json json = Json::parse(text);
       Line line = {json.at("key"), json.at("hash"), json.at("notes"), std::nullopt};
       if (!json.at("confidence").is_null()) line.confidence = json.at("confidence").get<double>();
       lines_[json.at("name")] = std::move(line);
-    } catch (const nlohmann::json::exception&) {
+    } catch (const Json::exception&) {
     }
   }
 }
@@ -43,15 +45,14 @@ std::optional<CacheEntry> OutputRecord::find(const std::string& name, const Cach
 }
 
 void OutputRecord::add(const std::string& name, const CacheKey& key, const CacheEntry& entry) {
-  const nlohmann::json json = {
-      {"name", name},
-      {"key", key.text()},
-      {"hash", hash_of(entry.asset)},
-      {"notes", entry.notes},
-      {"confidence", entry.confidence ? nlohmann::json(*entry.confidence) : nlohmann::json()}};
+  const Json json = {{"name", name},
+                     {"key", key.text()},
+                     {"hash", hash_of(entry.asset)},
+                     {"notes", entry.notes},
+                     {"confidence", entry.confidence ? Json(*entry.confidence) : Json()}};
   // The end of the line comes first: a line that was cut short does not take this one with it.
   const std::string text =
-      fmt::format("\n{}", json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+      fmt::format("\n{}", json.dump(-1, ' ', false, Json::error_handler_t::replace));
   const std::lock_guard lock(mutex_);
   std::ofstream file(folder_ / ".ist-bakes", std::ios::app);
   file.write(text.data(), static_cast<std::streamsize>(text.size())).flush();
