@@ -1,4 +1,4 @@
-#!/ usr / bin / env python3
+#!/usr/bin/env python3
 """Plots what haptic_loop --trace wrote: plot.py TRACE.csv PICTURE.png (needs matplotlib)."""
 
 import csv
@@ -14,8 +14,7 @@ def main():
     from matplotlib import pyplot
 
     with open(sys.argv[1], newline="") as file:
-        rows = [{
-key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
     column = lambda key: [row[key] for row in rows]
     time = column("t")
     figure, axes = pyplot.subplots(3, 1, sharex=True, figsize=(9, 8))
