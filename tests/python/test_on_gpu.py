@@ -191,7 +191,9 @@ def test_patches_are_those_of_the_cpu(solids, assets, pairs):
             solids[a], solids[b], arguments["pose_b"][rows], poses_a=arguments["pose_a"][rows],
             scales=arguments["scale_b"][rows], scales_a=arguments["scale_a"][rows], max_patches=4,
             field="never")
-        alike = (ours["id"][rows] == theirs.id).all(1)  # unless two divisions are worth the same
+        # Unless two divisions are worth the same: then a cell is in another patch.
+        alike = (ours["id"][rows] == theirs.id).all(1)
+        alike &= (np.abs(ours["volume"][rows] - theirs.volume) < 1e-4 * theirs.volume.max(initial=1)).all(1)
         other_regions += (~alike).sum()
         for name in ("volume", "force", "centroid"):
             column = getattr(theirs, name)[alike]
