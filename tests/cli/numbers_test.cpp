@@ -48,8 +48,8 @@ const std::vector<Option> kReal = {
     {kBake, "--target-error", "above 0 and below 1, or above 0% and below 100%", {"0", "1", "0%"}},
     {kTarget, "--at-overlap", "from 0.0001 to 0.5, or from 0.01% to 50%", {"0", "0.6", "51%"}},
     {kBake, "--min-radius", "a finite number, 0 or more", {"-1"}},
-    {kBake, "--scale", "a finite number above 0", {"0", "-1"}},
-    {kCheck, "--scale", "a finite number above 0", {"0", "-1"}},
+    {kBake, "--scale", "a finite number other than 0, or three", {"0", "1,0,1", "1,1"}},
+    {kCheck, "--scale", "a finite number other than 0, or three", {"0", "1,0,1", "1,1"}},
     {kBake, "--time", "a finite number, 0 or more", {"-1"}},
     {kQuery, "--scale-b", "a finite number above 0", {"0", "-1"}},
 };
