@@ -75,7 +75,7 @@ SceneResult run_nut(const SceneOptions& options) {
   while (!arrived && world.time() < longest) run.go(0.05, look);
   const double turns = turned / (2 * std::numbers::pi);
   const double ideal = 0.5 * acceleration * seconds * seconds;
-  std::vector<Truth> truths = {{"turns", std::abs(turns), coarse ? 2 : 3, 4},
+  std::vector<Truth> truths = {{"turns", std::abs(turns), coarse ? 2.0 : 3.0, 4},
                                {"way over pitch times turns", way / (kPitch * turns), 0.97, 1.03},
                                {"farthest off the helix, of the pitch", off / kPitch, 0, 0.25},
                                {"tilt [rad]", tilt, 0, coarse ? 0.1 : 0.05}};

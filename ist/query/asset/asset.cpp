@@ -38,7 +38,7 @@ Asset Asset::load(const std::filesystem::path& path) {
   if (size < 0) throw Error(path.string() + ": cannot read: not a regular file");
   std::vector<std::byte> bytes(static_cast<std::size_t>(size));
   file.seekg(0);
-  if (!file.read(reinterpret_cast<char*>(bytes.data()), size))
+  if (!file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)))
     throw Error(path.string() + ": cannot read: " + reason(errno));
   return Asset(bytes, path.string());
 }

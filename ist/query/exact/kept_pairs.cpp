@@ -31,7 +31,7 @@ constexpr double kMostSteps = 3, kLeastSteps = 1.5;
 
 KeptRing::KeptRing(std::size_t capacity, const MemoryHooks& hooks)
     : mask_(std::bit_floor(capacity) - 1),
-      ring_(hooked_array<std::uint64_t>(hooks, mask_ + 1)),
+      ring_(hooked_array<std::uint64_t>(hooks, static_cast<std::size_t>(most()))),
       ids_(hooked_array<std::uint32_t>(hooks, kSlots)),
       slots_(hooked_array<KeptPairs>(hooks, kSlots)) {
   std::fill_n(ids_.get(), kSlots, 0);

@@ -43,11 +43,11 @@ class KeptRing {
   /// There are too many: none are kept, and the next margin will be less.
   static void give_up(KeptPairs& kept) noexcept;
   void add(KeptPairs& kept, std::uint64_t pair) noexcept {
-    ring_[written_++ & mask_] = pair;
+    ring_[static_cast<std::size_t>(written_++ & mask_)] = pair;
     ++kept.count;
   }
   std::uint64_t pair(const KeptPairs& kept, std::uint32_t i) const noexcept {
-    return ring_[(kept.first + i) & mask_];
+    return ring_[static_cast<std::size_t>((kept.first + i) & mask_)];
   }
 
  private:
