@@ -166,6 +166,11 @@ double stiffest_passive(const Options& options, const ist::TreeView& object,
 int main(int argc, char** argv) {
   const Options options = parse(argc, argv);
   const ist::TreeView object = map_asset(options.object), probe = map_asset(options.probe);
+  if (options.exact && !(object.has_mesh() && probe.has_mesh())) {
+    std::fputs("--exact: both assets need their meshes; bake them without --surface none\n",
+               stderr);
+    return 1;
+  }
   double stiffest = 0;
   if (options.search) {
     stiffest = stiffest_passive(options, object, probe);

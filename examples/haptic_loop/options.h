@@ -9,7 +9,8 @@ inline constexpr const char* kUsage =
     "usage: haptic_loop OBJECT.ist PROBE.ist [--scale S]   of the probe (1)\n"
     "                   [--seconds T] [--rate HZ]          how long (60), how often (1000)\n"
     "                   [--deadline-us D]                  time of a query (0: no limit)\n"
-    "                   [--exact]                          the meshes' own volume; no deadline\n"
+    "                   [--exact]                          the meshes' own volume; not with a "
+    "deadline\n"
     "                   [--load N]                         threads that burden the machine (0)\n"
     "                   [--fifo]                           real-time priority, if permitted\n"
     "                   [--motion stroke|insert|FILE.csv]  the hand's (stroke)\n"
@@ -97,7 +98,8 @@ inline Options parse(int argc, char** argv) {
     ++i;
   }
   if (wrong || file != 2 || !(options.scale > 0) || !(options.seconds > 0) || !(options.rate > 0) ||
-      !(options.cycles > 0) || !(options.coupling_hz > 0) || !(options.contact_hz > 0)) {
+      !(options.cycles > 0) || !(options.coupling_hz > 0) || !(options.contact_hz > 0) ||
+      (options.exact && options.deadline_us > 0)) {
     std::fputs(kUsage, stderr);
     std::exit(2);
   }

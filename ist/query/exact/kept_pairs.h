@@ -36,8 +36,8 @@ class KeptRing {
   /// Whether its pairs are all that a search by `room` can find at `pose`.
   bool serves(const KeptPairs& kept, const MeshTree& b, const Similarity& pose,
               double room) const noexcept;
-  /// Starts anew, for a search that adds pairs in their order and looks ahead by kept.margin, which
-  /// is 0 where that would not pay.
+  /// Empties the list and sets kept.margin, by which a search looks ahead while it adds pairs in
+  /// their order. 0: keeping would not pay.
   void begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept;
   std::uint64_t most() const noexcept { return mask_ + 1; }  ///< that one list may have
   /// There are too many: none are kept, and the next margin will be less.
