@@ -18,8 +18,8 @@ namespace IST_API ist {
 /// and the field.
 ///
 /// The same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number
-/// of threads. Cancelling during packing keeps what is packed; before and
-/// after it throws Error.
+/// of threads. Cancelling during packing keeps what is packed; before and after packing it throws
+/// Error.
 ///
 /// A mesh that counts volume twice is first resolved to the boundary of the set where its winding
 /// number is 1 or more (MeshState::resolved). If that fails, no mesh is kept
@@ -55,8 +55,8 @@ struct PolygoniseSettings {
 /// Inner spheres and cover radii are certified against the solid itself, on the CPU, by the banded
 /// mode alone. Matched spheres and volume are those of a mesh in its place. The proven distance
 /// between the surfaces of both is in the asset (AssetHeader::polygonise_error, kFlagPolygonised)
-/// and counts into the protrusion. The volume's error is the difference to solid.volume() plus that
-/// one's error. If solid.mesh() is a mesh, this is the bake of that mesh.
+/// and counts into the protrusion. The volume's error is its difference from solid.volume() plus
+/// solid.volume_error(). If solid.mesh() is a mesh, this is the bake of that mesh.
 ///
 /// The same solid, settings and cells give the same bytes for any number of threads, and on any
 /// machine if signed_distance() does. The solid is evaluated from many threads at once, and at some
@@ -64,8 +64,8 @@ struct PolygoniseSettings {
 /// Error.
 ///
 /// Throws Error as the bake of a mesh does; if the signed distance is found not to be 1-Lipschitz
-/// or not finite; if the solid reaches out of its bounds; if no cell finds it; and for a grid mode
-/// other than banded.
+/// or not finite; if the solid reaches out of its bounds; if no cell contains a part of it; and for
+/// a grid mode other than banded.
 Asset bake(const Solid& solid, const PackingSettings& settings = {},
            const ProgressCallback& progress = {}, const PolygoniseSettings& meshing = {});
 
@@ -79,8 +79,7 @@ struct ErrorTarget {
 struct PartnerError {
   TrialPartner partner = TrialPartner::copy;
   double median = 0;        ///< relative
-  std::uint32_t poses = 0;  ///< number of poses; too few to count if the partner hardly reaches the
-                            ///< overlap
+  std::uint32_t poses = 0;  ///< too few to count if the partner hardly reaches the overlap
 };
 
 /// Result of bake_to_error(). TreeView::predicted_errors() has more.
@@ -131,10 +130,11 @@ std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigne
 
 /// The same for an asset of any solid, from its bytes and the solid's signed distance alone.
 ///
-/// What was calibrated by a mesh in the solid's place is proven by that mesh, made again.
+/// What the bake calibrated with a mesh in the solid's place is proven against that mesh, which is
+/// made again.
 ///
-/// Throws Error if the asset is of another solid, as far as that mesh shows it, or if the solid is
-/// a mesh: use its ClosedMesh then.
+/// Throws Error if that mesh shows that the asset is of another solid, and if the solid is a mesh:
+/// use its ClosedMesh then.
 std::vector<Invariant> check(const Asset& asset, const Solid& solid, unsigned threads = 0);
 
 }  // namespace ist

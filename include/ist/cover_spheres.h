@@ -28,11 +28,10 @@ inline constexpr std::size_t kMostCoverSpheres = 4096;
 struct SphereCoverSettings {
   /// [1, kMostCoverSpheres] of each mesh; with max_protrusion the most that may be used.
   std::size_t count = 64;
-  /// Of several meshes: counts[i], where it is not 0, in place of `count`. Empty, or one a mesh.
+  /// For several meshes: counts[i] replaces `count` where it is not 0. Empty, or one per mesh.
   std::vector<std::size_t> counts = {};
-  /// Not 0: the spheres of all meshes together, at most. Meshes without a count of their own share
-  /// what is left such that the largest protrusion of all is as small as was found. Not with
-  /// max_protrusion.
+  /// Not 0: largest number of spheres of all meshes together. Meshes without a count of their own
+  /// share the rest, such that the largest protrusion of all is small. Excludes max_protrusion.
   std::size_t total = 0;
   /// [u] ≥ 0. 0: `count` spheres that protrude as little as possible. Else: as few spheres as are
   /// found to protrude by no more.

@@ -41,8 +41,9 @@ struct CapsuleField {
   double half_height = 1;  ///< [u] ≥ 0, of the segment
 };
 
-/// A cylinder about the z axis. Its lateral surface is taken for flat as the capsule's is; at the
-/// rim a ball has the share of the lateral surface times that of the ends.
+/// A cylinder about the z axis. Its lateral surface is approximated as the capsule's. At the rim,
+/// the share of a ball inside is the product of its shares inside the lateral surface and between
+/// the ends.
 struct CylinderField {
   double radius = 1;       ///< [u] > 0
   double half_height = 1;  ///< [u] > 0
@@ -50,7 +51,8 @@ struct CylinderField {
 
 /// Terrain: the solid under a grid of heights along z, two triangles per cell, cut from (i, j) to
 /// (i + 1, j + 1). Exact. Beyond its border it continues level. A height that is not finite gives
-/// QueryStatus::invalid_input where a query samples it, on a GPU wherever the terrain is.
+/// QueryStatus::invalid_input where a query samples it; on a GPU it invalidates every query of the
+/// terrain.
 struct HeightField {
   const float* heights = nullptr;  ///< [u] [rows · columns], columns (x) run fastest
   std::uint32_t columns = 0;       ///< ≥ 2, along x

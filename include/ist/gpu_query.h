@@ -73,7 +73,8 @@ class GpuWorkspace {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Limits of a batch, as in PenetrationSettings; no relative_error, as exact is not on the GPU.
+/// Settings of a batch, as in PenetrationSettings. There is no relative_error, since Measure::exact
+/// does not run on a GPU.
 struct GpuPenetrationSettings {
   Measure measure = Measure::matched;  ///< matched or inner
   /// Count of sphere pairs to spend on each pair of assets; matched measure only; 0: no limit. With

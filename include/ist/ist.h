@@ -194,8 +194,7 @@ ist_status_t ist_tree_get_mass_properties(const ist_tree_t* tree,
                                           ist_mass_properties_t* properties);
 ist_status_t ist_tree_get_bounds(const ist_tree_t* tree, ist_bounds_t* bounds);
 
-/* --- What a tree holds, for pictures (asset_layout.h) ------------------------------------------
- */
+/* --- What a tree holds, for pictures (asset_layout.h) ----------------------------------------- */
 
 /* Measure: what represents the solid. */
 typedef int32_t ist_measure_t;
@@ -203,7 +202,7 @@ enum {
   IST_MATCHED = 0, /* spheres whose volumes sum to the solid's: the accurate ones */
   IST_INNER = 1,   /* spheres inside the solid: a certified lower bound of the true volume */
   /* The two meshes: the true volume and its gradients. For penetrations and contact patches of two
-   * trees that store their mesh (ist_tree_info_t::mesh_triangles). Functions about balls or lenses
+   * trees that store their mesh (ist_tree_info_t::mesh_triangles). Functions about balls and lenses
    * return IST_INVALID_INPUT. */
   IST_EXACT = 2
 };
@@ -229,8 +228,7 @@ ist_status_t ist_tree_get_balls(const ist_tree_t* tree, const ist_ball_set_t* se
                                 ist_ball_t* balls, size_t capacity, size_t* count);
 
 /* The surface that an asset holds, or the mesh of a surface alone: closed, oriented, triangles
- * counter-clockwise from outside. A vertex that parts of it share stands in each with the same
- * bits. */
+ * counter-clockwise from outside. Parts of it repeat shared vertices, with the same bits. */
 typedef struct ist_surface {
   uint32_t size;
   double (*vertices)[3];    /* [u] [vertex_capacity] in the asset's own frame */
@@ -367,13 +365,14 @@ typedef struct ist_penetration_settings {
   ist_field_use_t field;
   uint32_t pair_budget; /* count of sphere pairs to spend; 0: no limit, as in all that follow */
   uint32_t max_visits;  /* count of node pairs opened */
-  /* The caller's number of this pair of solids; 0: none. Calls with one number and one workspace are
+  /* The caller's number of this pair of solids; 0: none. Calls with one number and workspace are
    * steps of one motion: IST_EXACT keeps the triangles that are near each other. Answers have the
-   * same bits as without, but for node_visits. Nothing is kept under max_visits. */
+   * same bits as without, except node_visits. Nothing is kept under max_visits. */
   uint32_t pair_id;
-  /* Accepted relative error of the volume, as 0.005 for 0.5 %, of two trees with IST_MATCHED: the
-   * coarsest level of detail that is predicted to err by less, or IST_EXACT, blended smoothly. If
-   * an asset has no mesh, or under a pair budget, the answer may be IST_ERROR_EXCEEDED. */
+  /* Accepted relative error of the volume, such as 0.005 for 0.5 %, of two trees with IST_MATCHED.
+   * The query uses the coarsest level of detail whose predicted error is smaller, or IST_EXACT,
+   * blended smoothly. If an asset has no mesh, or under a pair budget, the status may be
+   * IST_ERROR_EXCEEDED. */
   double relative_error;
 } ist_penetration_settings_t;
 
@@ -456,8 +455,8 @@ typedef struct ist_outline {
 
 /* --- Queries of two solids -------------------------------------------------------------------- */
 
-/* Two assets, or an asset and a field in either order; two fields answer IST_NOT_HELD. Functions
- * that name only assets answer so for any field. Each returns the status of its answer, or an error
+/* Two assets, or an asset and a field in either order; two fields return IST_NOT_HELD, as does any
+ * field in functions for assets alone. Each function returns the status of its answer, or an error
  * of the call. Trees and fields may be shared by threads; the workspace may not. */
 
 ist_status_t ist_penetration(const ist_placed_t* a, const ist_placed_t* b,
@@ -529,9 +528,9 @@ ist_status_t ist_contact_patches(const ist_placed_t* a, const ist_placed_t* b,
                                  const ist_contact_settings_t* settings, ist_workspace_t* workspace,
                                  ist_contact_patches_t* patches, ist_penetration_t* whole);
 
-/* The patches of IST_EXACT, whatever the settings say, and their outlines: segments of the closed
- * curves on which the surfaces cross, A's surface inside B to the left of each seen from outside A.
- * A patch that lies inside the other solid as a whole has none.
+/* The connected parts of the overlap as patches, by IST_EXACT whatever the settings say, and their
+ * outlines: segments of the closed curves on which the surfaces cross. Seen from outside A, A's
+ * surface inside B is to the left of each. A patch wholly inside the other solid has none.
  * IST_BUDGET_EXHAUSTED: max_visits stopped it. There is no outline, and the matched spheres'
  * patches are written. `whole`: may be null. */
 ist_status_t ist_overlap_outline(const ist_placed_t* a, const ist_placed_t* b,
@@ -578,10 +577,10 @@ ist_status_t ist_overlap_lenses(const ist_placed_t* a, const ist_placed_t* b,
 
 /* --- Rays and points against one solid (surface.h) -------------------------------------------- */
 
-/* An asset must keep its mesh (IST_NOT_HELD). Of a field, rays meet half-spaces, balls, boxes,
- * capsules and cylinders; the others answer IST_NOT_HELD. These functions need no workspace.
- * Each answers `count` rays or points and returns the least of their statuses, or an error of the
- * call. Without a mesh, or for a ray or point that is no number or too far, numbers are NaN. */
+/* An asset must keep its mesh. Rays support half-spaces, balls, boxes, capsules and cylinders. All
+ * else returns IST_NOT_HELD. These functions need no workspace. Each answers `count` rays or points
+ * and returns the least of their statuses, or an error of the call. The numbers of a ray or point
+ * that cannot be answered, or is not finite or too far, are NaN. */
 
 typedef struct ist_ray {
   double origin[3];    /* [u] world */
@@ -617,6 +616,7 @@ ist_status_t ist_closest_point(const ist_placed_t* solid, const double* points, 
 /* IST_OVERLAP_YES: inside; IST_OVERLAP_NO: outside; IST_OVERLAP_UNKNOWN: the status says why. */
 ist_status_t ist_contains(const ist_placed_t* solid, const double* points, size_t count,
                           ist_overlapping_t* inside);
+
 /* --- Wrenches (wrench.h): force and torque on both bodies ------------------------------------- */
 
 /* These functions need no workspace. */
@@ -711,6 +711,7 @@ ist_status_t ist_time_of_impact(const ist_placed_t* a, const ist_placed_t* b,
                                 const ist_motion_t* motion_a, const ist_motion_t* motion_b,
                                 const ist_impact_settings_t* settings, ist_workspace_t* workspace,
                                 ist_impact_t* answer);
+
 /* --- Batches ---------------------------------------------------------------------------------- */
 
 typedef struct ist_pair {

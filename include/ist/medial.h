@@ -16,8 +16,7 @@ namespace IST_API ist {
 struct MedialNode {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< [u], the mesh's frame
   double radius = 0;  ///< [u] distance from the surface, within 4e-6 of the half-extent
-  int contacts =
-      0;  ///< directions to the surface over 45° apart that were found: 2, 3 or 4 (or more)
+  int contacts = 0;   ///< directions found to the surface, over 45° apart: 2, 3, 4 or more
 };
 
 struct MedialSettings {

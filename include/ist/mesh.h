@@ -36,9 +36,9 @@ struct ImportSettings {
 /// Compares a solid made of an open surface with that surface.
 ///
 /// The measure is the surface's generalised winding number w, clamped to [0, 1]: 1 in a closed
-/// solid, less where holes are visible. Before it is evaluated, coincident triangles are reduced
-/// and patches are oriented outward as seen from infinity. Volumes are sampled in the bounding box,
-/// at the same points on any machine.
+/// solid, less where holes are visible. Coincident triangles are reduced first, and patches are
+/// oriented outward as seen from infinity. Volumes are sampled in the bounding box, at the same
+/// points on any machine.
 struct Judgement {
   double confidence = 0;  ///< [0, 1] (agreement − agreement_error) · kept_surface
   /// [0, 1] ∫ w over the solid, divided by the volume of the solid and of the places outside it
@@ -70,9 +70,8 @@ struct MeshReport {
   std::size_t cavities = 0;              ///< inward shells that lie inside an outward one
   std::size_t degenerate_triangles = 0;  ///< zero area or repeated corners
   std::size_t coincident_triangles = 0;  ///< removed as copies or cancelled pairs
-  std::size_t self_intersections =
-      0;  ///< triangle pairs that meet elsewhere than in shared corners
-  bool self_intersections_counted = false;  ///< false: too many triangles, not looked for
+  std::size_t self_intersections = 0;    ///< pairs of triangles that meet outside shared corners
+  bool self_intersections_counted = false;  ///< false: too many triangles, not searched for
   std::size_t shells = 0;        ///< of the closed mesh: pieces that are oriented one by one
   bool meets_itself = true;      ///< the closed mesh: its triangles intersect, or may (not counted)
   std::size_t filled_holes = 0;  ///< boundary loops closed by repair

@@ -17,8 +17,8 @@ enum class Overlapping : std::uint32_t {
   unknown = 2,
 };
 
-/// Stops at the first meeting pair of inner spheres: a fraction of the time of a penetration.
-/// Certain of a field as far as its distances are: see each field. Two fields: unknown.
+/// Stops at the first meeting pair of inner spheres: a fraction of the time of a penetration. With
+/// a field, it is certain as far as the field's distances are: see each field. Two fields: unknown.
 Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace) noexcept;
 
 }  // namespace ist

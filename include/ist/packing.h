@@ -43,8 +43,8 @@ struct SurfaceSettings {
 
 /// Limits of a packing, and its options. The first limit met stops it.
 struct PackingSettings {
-  std::size_t max_spheres =
-      10'000;                    ///< count, exactly met unless another limit is first; 0 = no limit
+  /// Count, met exactly unless another limit is met first; 0 = no limit.
+  std::size_t max_spheres = 10'000;
   double target_coverage = 1.0;  ///< [0, 1] of the solid's volume
   double min_radius = 0.0;       ///< [u] smaller spheres are not inserted
   double time_limit = 0.0;  ///< [s] wall clock, 0 = none; the only setting that costs repeatability
@@ -70,9 +70,8 @@ struct SpherePacking {
   double coverage = 0;  ///< [0, 1] of the solid's volume
   /// Min over spheres of radius / largest live bound at insertion; 1 for modes without a bound.
   double kept_ratio_worst = 1;
-  double kept_ratio_median = 1;  ///< median of the same
-  bool below_float_noise =
-      false;  ///< radii fell under 1e-4 of the half-extent: certified, not greedy
+  double kept_ratio_median = 1;    ///< median of the same
+  bool below_float_noise = false;  ///< radii fell below 1e-4 of the half-extent: not greedy there
   std::size_t rounds = 0;
 };
 

@@ -21,7 +21,7 @@ namespace IST_API ist {
 /// No query reads a clock: poses and settings decide the answer. <ist/deadline.h> chooses a pair
 /// budget from measured times.
 ///
-/// A query that is stopped estimates the rest by the densities of the unopened nodes. It returns
+/// A stopped query estimates the rest from the densities of the unopened nodes. It returns
 /// budget_exhausted, and a volume no larger than that of the smaller solid's spheres.
 ///
 /// Measure::exact obeys max_visits only. If that stops it, the answer is that of the matched
@@ -34,37 +34,37 @@ struct PenetrationSettings {
   /// Count of sphere pairs to spend; two trees in the matched measure only (the inner one has no
   /// levels of detail).
   ///
-  /// The answer comes from the finest level of detail that is expected to need no more. From 0.7 of
-  /// the budget on it is blended with the next coarser level: volume and force stay continuous, and
-  /// gradients are those of the blended sum. Shallow contacts keep all spheres. The count is a
-  /// target, not a bound: the coarsest level is the minimum, whatever it costs.
+  /// The answer comes from the finest level of detail that is expected to need no more pairs. A
+  /// level that needs more than 0.7 of the budget is blended with the next coarser one: volume and
+  /// force stay continuous, and gradients are those of the blended sum. Shallow contacts keep all
+  /// spheres. The count is a target, not a bound: the coarsest level is the minimum, whatever it
+  /// costs.
   std::uint32_t pair_budget = 0;
 
   /// Count of node pairs opened: a hard limit, whatever the error of the answer. Pairs of trees are
   /// opened largest bounds first, trees against a surface in the order of the tree.
   std::uint32_t max_visits = 0;
 
-  /// Accepted relative error of the volume, as 0.005 for 0.5 %; two trees in the matched measure
-  /// only. In the median over random poses at such an overlap the error is less than a third of
-  /// this, and it is less than this in about 19 of 20.
+  /// Accepted relative error of the volume, such as 0.005 for 0.5 %; two trees in the matched
+  /// measure only. Over random poses the median error is less than a third of this, and about 19 of
+  /// 20 errors are below this. Flat faces that rest on each other have larger errors by spheres.
   ///
-  /// The cheapest measure that is predicted to err by less answers: the coarsest level of detail
-  /// that is exact enough at this overlap, or Measure::exact where none is, or where few triangles
-  /// cross. Neighbours are blended: volume and force stay continuous, and gradients are those of
-  /// the blended sum. A level's error is predicted by the trials of the bake
-  /// (TreeView::predicted_errors), or by a fit if there were none. By spheres, flat faces that rest
-  /// on each other err by more than random poses.
+  /// The query uses the cheapest measure whose predicted error is smaller: the coarsest level of
+  /// detail that is accurate enough at this overlap, or Measure::exact where no level is, or where
+  /// few triangles cross. Neighbours are blended: volume and force stay continuous, and gradients
+  /// are those of the blended sum. The prediction comes from the trials of the bake
+  /// (TreeView::predicted_errors), or else from a fit.
   ///
   /// Needs the mesh in both assets (TreeView::has_mesh), and no pair budget. Otherwise the finest
-  /// level, or the finest within the budget, is the best there is. Where it is predicted to err by
-  /// more, the status is error_exceeded. Assets without spheres are answered by Measure::exact.
+  /// level, or the finest within the budget, answers; if its predicted error is larger than this,
+  /// the status is error_exceeded. Assets without spheres are answered by Measure::exact.
   double relative_error = 0;
 
-  /// The caller's number of this pair of solids; 0: none. Calls with one number and one workspace
+  /// The caller's number of this pair of solids; 0: none. Calls with the same number and workspace
   /// are steps of one motion: exact queries keep the triangles that are near each other, and search
-  /// anew when they have moved too far. Answers have the same bits as without, but for the count of
-  /// nodes. A workspace keeps up to 1,024 pairs of solids and a quarter of a million pairs of
-  /// triangles at its default capacity. Nothing is kept under max_visits.
+  /// again only after they have moved too far. Answers have the same bits as without, except
+  /// node_visits. At its default capacity a workspace keeps up to 1,024 pairs of solids and a
+  /// quarter of a million pairs of triangles. Nothing is kept under max_visits.
   std::uint32_t pair_id = 0;
 };
 
@@ -185,28 +185,29 @@ class Workspace {
 
 /// Volume, wrench and centroid of the overlap.
 ///
-/// By spheres it is the sum of the exact parts of the finer tree's spheres inside the other's
-/// surface, or a sum of lenses, as PenetrationSettings::field selects. The gradients of a finished
-/// query are those of the returned volume. Copies of one asset at nearly the same pose are
-/// evaluated as unlike levels of detail, since coincident equal spheres would count too much.
+/// By spheres the volume is a sum of lenses, or the sum of the exact parts of the finer tree's
+/// spheres inside the other's surface, as PenetrationSettings::field selects. The gradients of a
+/// finished query are those of the returned volume. Copies of one asset at nearly the same pose are
+/// evaluated as unlike levels of detail, since the sum over coincident equal spheres is too large.
 ///
-/// Of a field it is the sum over the asset's spheres of the part that lies inside the field.
-/// volume_min and volume_max include the field's error. Limits stop it as they stop a pair of
-/// trees; pair_budget has no effect. Measure::exact returns not_held: a field has no mesh.
-/// invalid_input also if the field's numbers are out of range.
+/// With a field, the volume is the sum over the asset's spheres of the part inside the field.
+/// volume_min and volume_max include the field's error. max_visits applies; pair_budget has no
+/// effect. Measure::exact returns not_held: a field has no mesh. A field whose numbers are out of
+/// range gives invalid_input.
 ///
 /// No allocation, lock or exception. Trees and fields may be shared by threads; the workspace may
-/// not. So for all queries.
+/// not. This holds for all queries.
 Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept;
 
 /// Removes from an answer what protruding spheres add where flat faces meet.
 ///
-/// Nothing is left across a gap of a fifth of a mean sphere radius and more. Nearer, and in the
-/// first fifth of depth, the volume is reduced. Round and deeper contacts are unchanged. Only
-/// volume and force are used, so a light touch of a large ball may pass for flat. Volume and force
-/// stay continuous in the pose. The force is the volume's gradient to within 15 %: use it for
-/// contacts, not where energy must be conserved. volume_min is lowered to contain the new volume.
+/// The result is zero across a gap of a fifth of a mean sphere radius or more. Between this gap and
+/// a depth of a fifth of that radius, the volume is reduced. Round and deeper contacts are
+/// unchanged. Only volume and force are used, so a light touch of a large ball may be treated as
+/// flat. Volume and force stay continuous in the pose. The force is the volume's gradient to within
+/// 15 %: use it for contacts, not where energy must be conserved. volume_min is lowered to contain
+/// the new volume.
 ///
 /// `whole`: the answer of penetration() for these two by lenses (FieldUse::never), in the matched
 /// measure, without a pair budget. Takes a few nanoseconds.
@@ -219,12 +220,12 @@ Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
 /// interval is as wide as rounding and the error of simplified meshes. It is zero if the surfaces
 /// cross or one solid holds the other. Otherwise it is the distance of the inner spheres, exact to
 /// about 1e-6 of the objects' size, and all zero once these overlap. A stopped query returns the
-/// nearest points that it found; its interval is certified all the same. Batches on the GPU
+/// nearest points that it found; its interval is still certified. Batches on the GPU
 /// (<ist/gpu_query.h>) always use the inner spheres. The distance from a field is that of the
 /// asset's inner spheres, certified as far as the field's distances are: see each field.
 ///
-/// Surfaces that run beside each other at one distance, as a nut's and a bolt's threads do, take
-/// milliseconds: in a loop, limit it or use the inner spheres.
+/// If the gap is nearly constant over a large area, as between the threads of a nut and a bolt, a
+/// query takes milliseconds: in a loop, set max_visits or use the inner spheres.
 Separation separation(const PlacedSolid& a, const PlacedSolid& b,
                       const SeparationSettings& settings, Workspace& workspace) noexcept;
 
@@ -262,9 +263,9 @@ struct ContactPatch {
   /// [u³/rad] part of −rotation_gradient, about B's origin: the moment of `force` at `point`, and
   /// `twist` times `normal`.
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();
-  /// [u] Where a force acts as the patch does: of the central axis of its wrench the point nearest
-  /// to the centroid, world. It lies far away where forces nearly cancel; the centroid if the area
-  /// is 0.
+  /// [u] World: the point of the wrench's central axis that is nearest to the centroid. `force`
+  /// applied there has the patch's torque except for `twist`. It lies far away where forces nearly
+  /// cancel; the centroid if the area is 0.
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   double twist = 0;  ///< [u³/rad] moment about the normal that a force at `point` lacks
 };
@@ -280,19 +281,21 @@ struct ContactPatches {
 
 /// Condenses the contact into a manifold of at most patches.size() patches.
 ///
-/// Volumes, forces and torques sum to the whole's to about 1e-15. With Measure::exact the connected
-/// parts of the overlap are divided into the octants around their centroids, in the frame of the
-/// smaller solid, each with its true volume: a level face has four patches, a ring around a shaft
-/// eight. Small or deep contacts are one patch. If there are more patches
-/// than fit, the smallest of a part join their nearest ones, and then so do parts. Patches are
-/// continuous in the pose while the parts are the same and all fit. By spheres the contact is
-/// divided along the tree of the smaller solid (B's if equal or if A is too coarse), always at the
-/// same places, and that with a field along the asset's tree. The estimate of a stopped query is
-/// divided too. Under a pair budget the patches are those of the level of detail with the largest
-/// weight in the blend. The difference between the blend and that level is spread over them by
-/// volume: their sum stays continuous, and ids change where another level takes over. Under a
-/// relative error likewise; there the largest weight may be that of Measure::exact. By spheres it
-/// costs 1.7 (one patch) to 2.4 (32) times a penetration.
+/// Volumes, forces and torques sum to the whole's to about 1e-15.
+///
+/// By spheres the contact is divided along the tree of the smaller solid (B's if equal or if A is
+/// too coarse; the asset's if the other is a field), always at the same places. The estimate of a
+/// stopped query is divided too. It costs 1.7 (one patch) to 2.4 (32) times a penetration. Under a
+/// pair budget or a relative error the patches are those of the level of detail, or of
+/// Measure::exact, with the largest weight in the blend. The difference between the blend and that
+/// part is spread over them by volume: their sum stays continuous, and ids change where another
+/// part takes over.
+///
+/// With Measure::exact the connected parts of the overlap are divided into the octants around their
+/// centroids, in the frame of the smaller solid, each with its true volume: a level face has four
+/// patches, a ring around a shaft eight, a small or deep contact one. If there are more patches
+/// than fit, the smallest of a part are merged with their nearest ones, and then parts likewise.
+/// Patches are continuous in the pose while the parts are the same and all fit.
 ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept;
@@ -310,18 +313,18 @@ struct OverlapOutline {
   std::size_t segments = 0;
 };
 
-/// The connected parts of the overlap, undivided, as patches of Measure::exact, whatever the
-/// settings say, and the outline of each: segments of the closed curves on which the surfaces
-/// cross. Seen from outside A, A's surface inside B is to the left of each. A patch that lies
-/// wholly inside the other solid has none.
+/// The connected parts of the overlap, undivided, as patches, and the outline of each: segments of
+/// the closed curves on which the surfaces cross. The measure is Measure::exact whatever the
+/// settings say. Seen from outside A, A's surface inside B is to the left of each segment. A patch
+/// that lies wholly inside the other solid has no outline.
 OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches,
                                std::span<OutlineSegment> segments) noexcept;
 
 /// Removes from patches what protruding spheres add where flat faces meet, as without_protrusion()
-/// of a penetration does. Each patch is corrected by its own depth, so faces that lean against each
-/// other lose it where they hardly touch and keep the rest.
+/// of a penetration does. Each patch is corrected by its own depth, so inclined faces are corrected
+/// only where they hardly touch.
 ///
 /// Volumes, areas, forces and torques are reduced. A patch of which nothing is left stays, with
 /// zeros and no normal. Patches whose spheres met a surface, and those of the inner and the exact

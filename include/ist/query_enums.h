@@ -39,7 +39,7 @@ enum class Measure : std::uint32_t {
 /// Whether the stored surface of an asset (TreeView::has_field) is used.
 ///
 /// A sphere is intersected exactly with the other solid's surface. A lens of two spheres does not
-/// represent the surface between a sphere and its neighbours.
+/// represent the surface between neighbouring spheres.
 enum class FieldUse : std::uint32_t {
   /// The finer tree's spheres are intersected with the coarser one's surface where its spheres are
   /// too coarse for the contact. Trees of like size in deeper contact are summed by lenses, with a

@@ -33,7 +33,7 @@ struct ContactLaw {
   double stiffness = 0;  ///< [force/u³] > 0, penalty stiffness: pressure over depth (Winkler)
   /// [u²] Reference area. 0: each patch's own, the largest that it had (PatchMemory::area). This
   /// loses some energy where areas change: a ball that bounces on a plane keeps three quarters. A
-  /// body then rests up to a quarter deeper than stiffness_for_depth() was given.
+  /// body then rests up to a quarter deeper than the depth passed to stiffness_for_depth().
   ///
   /// > 0: for a contact that is one patch (whole_patch). The law is then the gradient of ½
   /// stiffness · volume² / area, and conserves energy as the integrator does.

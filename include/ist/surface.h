@@ -10,13 +10,13 @@
 
 // Rays and points against one solid: an asset that keeps its mesh (TreeView::has_mesh), or a field.
 //
-// Of an asset all is told by the triangles that it keeps, by exact signs where signs decide. An
-// asset without a mesh answers not_held. A pose, a scale, a ray or a point that is not usable
-// answers invalid_input. All numbers of these answers are NaN.
+// Of an asset, the kept triangles are queried, with exact signs where signs decide. An asset
+// without a mesh returns not_held; an invalid pose, scale, ray or point returns invalid_input. All
+// numbers of these answers are NaN.
 //
-// Of a field: MeshField is answered as its asset. Half-space, box, ball, capsule and cylinder are
-// exact. Terrain, grids and functions tell points what they tell a query; a ray at one of them
-// answers not_held.
+// Of a field: MeshField is queried as its asset. Half-space, box, ball, capsule and cylinder are
+// exact. Terrains, distance grids and functions support points only, by the distances that queries
+// of solids use; a ray returns not_held.
 //
 // No allocation, lock or exception, and no workspace: threads may share everything. Lengths are
 // [u], all vectors are in the world.
@@ -52,16 +52,17 @@ struct SurfacePoint {
   QueryStatus status = QueryStatus::ok;
 };
 
-/// Whether a point is inside. Of one on the surface either may be said, the same every time.
+/// Whether a point is inside. For a point on the surface either answer is possible, always the same
+/// one.
 struct Containment {
   bool inside = false;  ///< false unless the status is ok
   QueryStatus status = QueryStatus::ok;
 };
 
-/// The first hit of a ray. None slips through between triangles.
+/// The first hit of a ray. No ray passes between two triangles.
 RayHit raycast(const PlacedSolid& solid, const Ray& ray) noexcept;
 
-/// Signed distance, nearest point and gradient. At equally near points one of them answers.
+/// Signed distance, nearest point and gradient. Of several equally near points it returns one.
 SurfacePoint closest_point(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;
 
 Containment contains(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;

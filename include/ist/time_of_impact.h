@@ -99,10 +99,11 @@ struct TimeOfImpact {
 /// A solid is represented by the surface in its asset (TreeView::has_field), or else by the cover
 /// balls of its inner spheres.
 ///
-/// Certified of a field as far as its distances are: see each field. Height fields, distance grids
-/// and functions give no direction: the other solid's faces are divided into pieces as small as the
-/// gap, so large flat faces near them take many visits. Parts of a distance grid or a function that
-/// lie wholly inside the other solid at the start are not found. Two fields: not_held.
+/// With a field, it is certified as far as the field's distances are: see each field. Height
+/// fields, distance grids and functions give no direction: the other solid's faces are divided into
+/// pieces as small as the gap, so large flat faces near them take many visits. Parts of a distance
+/// grid or a function that lie wholly inside the other solid at the start are not found. Two
+/// fields: not_held.
 ///
 /// No allocation, lock or exception. Trees may be shared by threads; the workspace may not. The
 /// same bits on every x86-64 level.

@@ -29,7 +29,7 @@ enum class AssetStatus : std::uint32_t {
 /// One English sentence for a status; never null.
 const char* describe(AssetStatus status) noexcept;
 
-/// What a solid meets in the trials of bake_to_error().
+/// Partner of a solid in the trials of bake_to_error().
 enum class TrialPartner : std::uint32_t {
   copy = 0,    ///< of itself
   plane = 1,   ///< HalfSpaceField

@@ -77,14 +77,10 @@ void add_export(CLI::App& app) {
       ->check(CLI::IsMember({"matched", "inner"}))
       ->capture_default_str();
   command->footer(
-      "A row a sphere, in greedy order, in the mesh's own unit and frame: x,y,z,r the inner "
-      "sphere\n"
-      "(r rounded down: it stays inside), ex,ey,ez,er the matched sphere, c the cover radius "
-      "about\n"
-      "x,y,z (rounded up).\n"
-      "A .glb is a scene: the tree's spheres, and the balls of each level above them, as "
-      "instances\n"
-      "of one ball a level, each level a node and a material of its own, to be hidden or shown.\n"
+      "One row per sphere, in greedy order, in the mesh's own unit and frame: x,y,z,r is the\n"
+      "inner sphere (r rounded down), ex,ey,ez,er the matched sphere, c the cover radius about\n"
+      "x,y,z (rounded up). A .glb is a scene for viewers: the tree's spheres and the balls of\n"
+      "each level above them. Each level is a node with a material, to be shown or hidden.\n"
       "Example: ist export bolt.ist -o bolt.csv");
   command->callback([options] { run_export(*options); });
 }

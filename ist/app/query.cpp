@@ -284,9 +284,9 @@ void add_query(CLI::App& app) {
   add_share(
       command, "--error", options->settings.penetration.relative_error,
       {.least = 0, .most = 1, .without_most = true},
-      "Accepted relative error of the volume, e.g. 0.5%, by whichever is cheapest: the "
-      "coarsest level of detail that is predicted to err by less, or the kept meshes; 0 = all "
-      "spheres. Matched measure only");
+      "Accepted relative error of the volume, e.g. 0.5%; 0 = all spheres. The query uses the "
+      "coarsest level of detail whose predicted error is smaller, or the kept meshes if those are "
+      "cheaper. Matched measure only");
   add_whole(command, "--max-visits", options->max_visits,
             "Limit of node pairs, for penetration and for separation; 0 = no limit");
   add_whole<std::size_t>(command, "--repeat", options->repeat,

@@ -1,7 +1,7 @@
 """Collision of solids by inner sphere trees: docs/python.md, and help() of every name.
 
 Lengths are [u], whatever unit the meshes have. Poses are rows qw, qx, qy, qz, tx, ty, tz of float64:
-x_world = R(q) (scale · x) + t. What is refused raises ist.Error with the library's text; arrays of a
+x_world = R(q) (scale · x) + t. Errors of the library raise ist.Error with its message; arrays of a
 wrong shape raise ValueError, of a wrong dtype TypeError.
 """
 
@@ -27,15 +27,15 @@ class QueryStatus(enum.IntEnum):
     """Codes of `status` of a Penetration or a Separation."""
 
     ok = 0
-    budget_exhausted = 1  # a limit stopped it: volume_min, volume_max hold the finished answer's
+    budget_exhausted = 1  # a limit stopped it: volume_min, volume_max contain the finished answer's
     # The row is all NaN; one pose raises instead:
-    invalid_input = 2  # a pose, a scale or a Field's number is not usable: ValueError
-    not_held = 3  # a solid does not hold what is asked: Error
+    invalid_input = 2  # a pose, a scale or a Field's number is invalid: ValueError
+    not_held = 3  # a solid lacks what the measure needs: Error
     error_exceeded = 4  # finished, but the error is larger than relative_error
 
 
 class Overlapping(enum.IntEnum):
-    """Codes that overlap() answers."""
+    """Codes that overlap() and contains() return."""
 
     no = 0
     yes = 1

@@ -5,7 +5,7 @@ _RIGID = 1e-6  # how far a matrix may be from a rotation, each entry of RᵀR
 
 
 def poses(rotations, translations=None, *, order=None):
-    """Poses as this package takes them, rows qw, qx, qy, qz, tx, ty, tz, of other conventions.
+    """Pose rows qw, qx, qy, qz, tx, ty, tz of this package, from other conventions.
 
     rotations: one of
         (4, 4) or (n, 4, 4): x_world = M (x, 1), without `translations`;

@@ -21,16 +21,16 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: jax.Array, *, pair
 
     solids: k Assets and Fields.
     poses: (k, 7), or (w, k, 7) for w scenes: qw, qx, qy, qz, tx [u], ty, tz. Quaternions may have any
-        length but 0: what is meant is q/|q|, and the gradient is that of V(q/|q|).
+        length but 0: q/|q| is used, and the gradient is that of V(q/|q|).
     pairs: (n, 2) numbers of solids, one of each an Asset; None: all pairs of Assets, and each
         Field with each Asset.
     scales: (k,) or (w, k) > 0; None: 1. Their gradient is the difference of two queries, exact to some
         1e-4, and takes three times as long.
     settings: measure, field, pair_budget, threads, … of ist.penetration.
 
-    Returns an array (n,) or (w, n) of the dtype of `poses`. Pairs of an invalid pose or scale are NaN,
-    and so are their gradients; so are pairs of a solid that does not hold what the measure asks.
-    Works under jit, grad and vmap, where the host is called back. Differentiable once, in reverse.
+    Returns an array (n,) or (w, n) of the dtype of `poses`. Pairs with an invalid pose or scale,
+    or with a solid that lacks what the measure needs, are NaN, and so are their gradients.
+    Works under jit, grad and vmap, by a callback on the host. Differentiable once, in reverse.
     """
     return _differentiable(Volumes, solids, poses, pairs, scales, settings)
 

@@ -23,27 +23,27 @@ def overlap(solids: Sequence["ist.Asset | ist.Field"], poses: torch.Tensor, *, p
     solids: k Assets and Fields.
     poses: (k, 7), or (w, k, 7) for w scenes: qw, qx, qy, qz, tx [u], ty, tz. Any real dtype;
         whole numbers become torch.get_default_dtype().
-        Quaternions may have any length but 0: what is meant is q/|q|, and the gradient is that of
-        V(q/|q|), so that a step along it changes a rotation and hardly the length.
-        On a GPU the volumes and gradients are made there (ist.gpu), and nothing waits on the host.
+        Quaternions may have any length but 0: q/|q| is used, and the gradient is that of V(q/|q|), so
+        that a step along it changes the rotation and hardly the length.
+        On a GPU the volumes and gradients are computed there (ist.gpu), and the host does not wait.
     pairs: (n, 2) numbers of solids, one of each an Asset; None: all pairs of Assets, and each
         Field with each Asset.
     scales: (k,) or (w, k) > 0, where the poses are; None: 1. Their gradient is the difference of two
         queries, 0.05 % of the scale to either side, exact to some 1e-4, and takes three times as
         long.
-    settings: measure, field, pair_budget, threads, … of ist.penetration. Limits that
-        stop a query leave its gradient without the part that was guessed. By measure="exact" volumes
-        and gradients are the true ones. On a GPU there are measure ("matched", "inner") and
-        pair_budget, and volumes of two Assets are by lenses: those of field="never" on the CPU.
+    settings: measure, field, pair_budget, threads, … of ist.penetration. If a limit stops a query, the
+        gradient lacks the estimated part. With measure="exact" volumes and gradients are the true
+        ones. On a GPU only measure ("matched", "inner") and pair_budget apply, and volumes of two
+        Assets are by lenses, as with field="never" on the CPU.
 
-    Returns a tensor (n,) or (w, n) of the dtype and the device of `poses`. Pairs of an invalid pose
-    or scale are NaN, and so are their gradients; they spoil no others. So are pairs of a solid that
-    does not hold what the measure asks. Differentiable once.
+    Returns a tensor (n,) or (w, n) of the dtype and the device of `poses`. Pairs with an invalid pose
+    or scale, or with a solid that lacks what the measure needs, are NaN, and so are their gradients;
+    other pairs are not affected. Differentiable once.
     Sums of spheres have a noise of 5e-9 of the volume: torch.autograd.gradcheck needs eps=1e-4,
     atol=5e-3, rtol=2e-3, and by measure="exact" eps=1e-5, atol=1e-6, rtol=1e-5.
 
-    The last eight lists of solids and pairs that were asked about on a GPU stay there, Fields as they
-    were when the list came first.
+    The last eight lists of solids and pairs stay on the GPU; later changes of a Field's arrays have no
+    effect there.
     """
     return _differentiable(Volumes, solids, poses, pairs, scales, settings)
 

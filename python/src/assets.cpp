@@ -100,8 +100,8 @@ PackingSettings packing_settings(std::size_t max_spheres, double target_coverage
 }
 
 constexpr const char* kSettingsDoc = R"(
-mesh: a ClosedMesh; or what is closed first: a Mesh, a path, (vertices, triangles), or an object with
-    vertices and faces, such as trimesh's. close_mesh() repairs open ones.
+mesh: a ClosedMesh; or a Mesh, a path, (vertices, triangles), or an object with vertices and faces,
+    such as trimesh's, which is closed first. close_mesh() repairs open meshes.
 max_spheres: largest number of spheres; 0: no limit.
 target_coverage: [0, 1] share of the solid's volume at which packing stops.
 min_radius: [u] smallest radius of a sphere.

@@ -74,12 +74,13 @@ constexpr const char* kPatchesDoc =
     R"(Contacts of a batch of pairs, each condensed into a few patches, on the device.
 
 solids … scale_b, measure, out, stream: as for penetration().
-max_patches: count for each pair, 1 to 32: m, the second dimension. Beyond count[i] a pair's rows are
-    zero, or with `out` as they were.
+max_patches: count for each pair, 1 to 32: m, the second dimension. A pair's rows beyond count[i] are
+    zero, or unchanged with `out`.
 wanted: names of the answers to compute; None: all.
 
-Of two assets each; a row of a field is not_held. As ist.contact_patches(…, field='never'), with the same regions and ids. Their volumes, forces
-and torques sum to the pair's, within 1e-6 of the sum in double.
+A row takes two assets; with a field it is not_held. Regions and ids are those of
+ist.contact_patches(…, field='never'). Volumes, forces and torques sum to the pair's, within 1e-6 of
+the sum in double.
 
 Returns a ContactPatches.)";
 

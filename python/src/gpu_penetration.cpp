@@ -61,12 +61,12 @@ Arrays can be of any framework, on the solids' device and in C order. They are r
 __dlpack__ or __cuda_array_interface__, never copied, and kept alive until the batch is done. An
 unsuitable one raises a TypeError or ValueError that names it.
 
-Two assets: by lenses, as ist.penetration(…, field='never'); volumes are within 1e-6 of the sum in
-double. With a field, volumes and gradients are the CPU's to 1e-9. The bits are the same in every run,
-whatever else is in the batch. A row of an invalid pose, scale, field or index is NaN, with the status
-invalid_input; one of two fields is NaN, with not_held.
-The host waits only in a batch that is larger than all before. A captured stream
-needs `out`. Graphs and other batches of the same Solids must run one after another.
+Two assets are summed by lenses, as in ist.penetration(…, field='never'); volumes are within 1e-6 of
+the sum in double. With a field, volumes and gradients agree with the CPU's to 1e-9. The bits are the
+same in every run, whatever else is in the batch. A row with an invalid pose, scale, field or index is
+NaN with the status invalid_input; a row of two fields is NaN with not_held.
+The host waits only in a batch that is larger than all before. A captured stream needs `out`. Graphs
+and other batches of the same Solids must run one after another.
 
 Returns a Penetration.)";
 

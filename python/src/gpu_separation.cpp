@@ -48,9 +48,10 @@ constexpr const char* kSeparationDoc =
 solids … scale_b, wanted, out, stream: as for penetration().
 max_visits: limit of node pairs for each pair; 0: no limit.
 
-Of two assets each; a row of a field is not_held. As ist.separation(…): the distance is the minimum over all pairs of inner spheres in double. The
-CPU's may be larger by 1e-6 of the solids' size, and among equally near pairs the two may differ. If a
-limit stops it, the status is budget_exhausted and the certified interval may differ from the CPU's.
+A row takes two assets; with a field it is not_held. The distance is the minimum over all pairs of
+inner spheres in double. That of ist.separation(…, inner_spheres=True) may be larger by 1e-6 of the
+solids' size, and may select another of several equally near pairs. If a limit stops the query, the
+status is budget_exhausted and the certified interval may differ from the CPU's.
 
 Returns a Separation.)";
 

@@ -98,33 +98,34 @@ scales: of B, a number or (n,), > 0. poses_a, scales_a: of A; None: at the origi
 
 constexpr const char* kPairIdDoc = R"(
 
-pair_id: a number of yours for this pair of solids, 0: none. Calls with one number, and their rows,
-    are steps of one motion: 'exact' keeps the triangles that are near each other from step to step,
+pair_id: a number of yours for this pair of solids, 0: none. Calls with the same number, and their
+    rows, are steps of one motion: 'exact' keeps the triangles that are near each other from step to step,
     and gives the same answers sooner.)";
 
 constexpr const char* kSceneDoc = R"(The same for pairs of solids of one scene or many scenes.
 
 solids: k Assets and Fields.
-poses: (k, 7), or (w, k, 7) for w scenes; matrices (4, 4) may stand for rows. scales: (k,) or (w, k), None: 1.
+poses: (k, 7), or (w, k, 7) for w scenes; matrices (4, 4) are accepted as rows.
+scales: (k,) or (w, k), None: 1.
 pairs: (n, 2) indices of solids; one of each pair is an Asset. Answers have shape (n,) or (w, n).)";
 
 constexpr const char* kPenetrationDoc = R"(
 scale_gradients: fill scale_gradient and scale_gradient_a, at three times the cost.
 measure: 'matched' (the accurate spheres), 'inner' (certified lower bound of the true volume) or
     'exact' (the true volume and its gradients: of two Assets that hold their mesh, which bake()
-    keeps by default; it heeds max_visits alone).
+    keeps by default; max_visits is its only limit).
 field: 'automatic', 'never' or 'always': whether an asset's surface is used. No effect with 'exact'.
 pair_budget, max_visits: cost limits; 0: no limit. See <ist/query.h>.
 relative_error: accepted relative error of the volume, such as 0.005 for 0.5 %, of two Assets with
-    'matched': the cheapest of the levels of detail and the exact measure that is predicted to err
-    by less, blended smoothly. About 19 of 20 random poses err by less, half by less than a third.
-    0: all spheres. status error_exceeded: an Asset has no mesh or a
-    simplified one, pair_budget is too small, or copies of an Asset coincide.
+    'matched'. The query uses the cheapest level of detail, or the exact measure, whose predicted
+    error is smaller, blended smoothly. Over random poses about 19 of 20 errors are smaller, half are
+    below a third. 0: all spheres. Status error_exceeded: the predicted error is larger, since an
+    Asset has no mesh or a simplified one, a pair_budget is set, or copies of an Asset coincide.
 threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 
-Rows that cannot be answered are NaN with a status; they spoil no others. invalid_input: NaN, a
-quaternion of length 0, a scale ≤ 0. not_held: a solid does not hold what the measure or `field`
-asks. For one pose ValueError or ist.Error is raised instead.
+Rows that cannot be answered are NaN with a status and do not affect others. invalid_input: NaN, a
+quaternion of length 0, a scale ≤ 0. not_held: a solid lacks what the measure or `field` needs. For
+one pose ValueError or ist.Error is raised instead.
 Ctrl-C raises KeyboardInterrupt.
 
 Returns a Penetration: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";

@@ -131,9 +131,10 @@ Returns Lenses: an ellipsoid of the radius and the thickness about the centre re
 whole: the answer of penetration() at these poses by lenses, field='never', in the matched measure
     without a pair budget.
 
-Nothing is left across a gap of a fifth of a mean sphere radius and more; nearer, and in the first
-fifth of depth, volume and force are reduced. Round and deeper contacts are unchanged. The force is
-the volume's gradient to within 15 %: for contacts, not where energy must be conserved.
+The result is zero across a gap of a fifth of a mean sphere radius or more. Between this gap and a
+depth of a fifth of that radius, volume and force are reduced. Round and deeper contacts are unchanged.
+The force is the volume's gradient to within 15 %: use it for contacts, not where energy must be
+conserved.
 
 Returns a Penetration.)");
 

@@ -184,10 +184,9 @@ void add_classes(py::module_& module) {
   add_column(patch, "force", &Patches::force, "(n, m, 3) [u²] share of Penetration.force.");
   add_column(patch, "torque", &Patches::torque,
              "(n, m, 3) [u³] share of Penetration.torque, about B's origin.");
-  add_column(
-      patch, "point", &Patches::point,
-      "(n, m, 3) [u] world: where a force acts as the patch does. On the central axis of its "
-      "wrench, nearest to the centroid.");
+  add_column(patch, "point", &Patches::point,
+             "(n, m, 3) [u] world: the point of the wrench's central axis that is nearest to the "
+             "centroid.");
   add_column(patch, "twist", &Patches::twist,
              "(n, m) [u³] moment about the normal that a force at the point lacks.");
 

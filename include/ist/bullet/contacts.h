@@ -47,8 +47,8 @@ struct Settings {
   /// contact bears a hundred times the weight. A body without gravity is held as stiffly as a step
   /// resolves.
   ///
-  /// Matched spheres blur flat faces. With a larger depth they rest nearer to their place; with a
-  /// smaller depth a higher stack stands.
+  /// Matched spheres blur flat faces. With a larger depth bodies rest nearer to their true height;
+  /// with a smaller depth a higher stack stands.
   double depth = 0.001;
   /// [u] How far behind the front of its triangles a triangle mesh is solid. 0: the asset's size,
   /// as above. A body that is deeper is behind the mesh and free.
@@ -97,12 +97,12 @@ class Contacts : public btActionInterface {
 
   /// Called by the world after a step's motion. Pairs in which a body has a
   /// getCcdMotionThreshold(), and in which a point moves by more relative to the other body, are
-  /// moved back to where they have met by a quarter of the threshold. Bodies in contact go on as
-  /// long as they get no deeper than that. The rest of the motion is lost, as with Bullet's own
-  /// sweeps, and with it the speed that gravity gave.
+  /// moved back to where they overlap by a quarter of the threshold. Bodies in contact keep
+  /// moving while they are no deeper than that. The rest of the motion is lost, as with Bullet's
+  /// own sweeps, and with it the speed that gravity gave.
   ///
-  /// Response::solver only, and not for children of compounds and links of multibodies. A body
-  /// that another one hits in this very step is seen along its motion before the hit.
+  /// Response::solver only, and not for children of compounds and links of multibodies. For a
+  /// body that is hit in the same step, its motion before the hit counts.
   void updateAction(btCollisionWorld* world, btScalar step) override;
   void debugDraw(btIDebugDraw*) override {}
 
@@ -145,8 +145,8 @@ class PairAlgorithm : public btActivatingCollisionAlgorithm {
   /// The force that push() last applied to the second object; the first got the opposite.
   const ContactForce& pushed() const;
 
-  /// The share [0, 1] of a motion after which two bodies have met, or in contact have got too deep:
-  /// see Contacts::updateAction(). 1 for a motion that no getCcdMotionThreshold() asks for.
+  /// The share [0, 1] of a motion after which two bodies have met, or in contact are too deep: see
+  /// Contacts::updateAction(). 1 for a motion that exceeds no getCcdMotionThreshold().
   double share_until_impact(const btCollisionObject& first, const btCollisionObject& second,
                             const std::array<btTransform, 2>& from,
                             const std::array<btTransform, 2>& to) const;

@@ -50,14 +50,14 @@ def load():
 
 
 def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=None, measure=None):
-    """Makes solids of the mesh geoms of an MjSpec that collide; returns how many.
+    """Makes solids of the colliding mesh geoms of an MjSpec; returns their number.
 
     Each such geom becomes one of type sdf with an instance of the plug-in `ist.solid`. Its mesh is
-    baked from the vertices that MuJoCo has, so that scales of any kind are right, and weighs what
-    the solid weighs (inertia="exact"). Compile the spec afterwards.
+    baked from the vertices that MuJoCo has, so scales of any kind are right, and has the solid's
+    mass properties (inertia="exact"). Compile the spec afterwards.
 
-    geoms: names of geoms; None: all mesh geoms with a contype or a conaffinity. A mesh that stays
-        what it was does not collide with a solid.
+    geoms: names of geoms; None: all mesh geoms with a contype or a conaffinity. A mesh that
+        is left out does not collide with a solid.
     cache: folder of baked assets; None: $XDG_CACHE_HOME/ist or ~/.cache/ist.
     spheres: of each solid, at most.
     patches: contacts of a pair, at most, 1 to 50; None: 16 of exact overlaps, 8 of spheres.
