@@ -226,18 +226,17 @@ export interface ContactOptions extends Limits {
    */
   field?: 'automatic' | 'never' | 'always';
   /**
-   * Accepted relative error of the volume, such as 0.005 for 0.5 %, by whichever measure is cheapest:
-   * a level of detail where its predicted error is below, else `exact`, blended smoothly. `matched`
-   * only. See <ist/query.h>.
+   * Accepted relative error of the volume, such as 0.005 for 0.5 %. The query uses the cheapest level
+   * of detail, or `exact`, whose predicted error is smaller, blended smoothly. `matched` only.
    */
   relativeError?: number;
   /**
-   * Count of sphere pairs to spend: if all are more, a coarser level of detail answers. Choose it by
-   * the time that queries take; it depends on the pose and on this alone.
+   * Count of sphere pairs to spend: if the finest level of detail needs more, coarser levels answer.
+   * Choose it by measured times.
    */
   pairBudget?: number;
   /**
-   * A number of yours for this pair of solids, ≥ 1. Calls with one number are steps of one motion:
+   * A number of yours for this pair of solids, ≥ 1. Calls with the same number are steps of one motion:
    * `exact` keeps the triangles that are near each other from call to call, and gives the same answer
    * sooner.
    */
@@ -250,8 +249,9 @@ export interface PenetrationOptions extends ContactOptions {
 }
 
 /**
- * `budget-exhausted`: a limit or the workspace stopped it. What volumeMin and volumeMax contain, they
- * still contain. `error-exceeded`: finished, but the error is larger than relativeError.
+ * `budget-exhausted`: a limit or the workspace's capacity stopped it. volumeMin and volumeMax contain
+ * the same value as those of a finished answer. `error-exceeded`: finished, but the predicted error is
+ * larger than relativeError.
  */
 export type Status = 'ok' | 'budget-exhausted' | 'error-exceeded';
 
@@ -335,7 +335,7 @@ export interface ContactPatch {
   /** [u²] and [u³/rad] about B's origin: its part of Penetration's. */
   force: Float64Array;
   torque: Float64Array;
-  /** [u] Where a force acts as the patch does: on the central axis of its wrench, nearest to the centroid. */
+  /** [u] The point of the wrench's central axis that is nearest to the centroid. */
   point: Float64Array;
   /** [u³/rad] Moment about the normal that a force at the point lacks. */
   twist: number;
@@ -454,9 +454,9 @@ export interface RayHits {
 }
 
 /**
- * Where rays meet the surface of a solid at `pose` first, on their way out if they start inside. None
- * slips through between triangles. Directions may have any length but 0. One origin or one direction
- * serves for all. Of fields: half-spaces, boxes, balls, capsules and cylinders.
+ * Where rays first meet the surface of a solid at `pose`, on their way out if they start inside. No
+ * ray passes between two triangles. Directions may have any length but 0. One origin or one direction
+ * applies to all rays. Fields: half-spaces, boxes, balls, capsules and cylinders.
  * `longest` [u]: rays end there; default Infinity.
  */
 export function raycast(
@@ -491,8 +491,8 @@ export function closestPoint(
 ): SurfacePoints;
 
 /**
- * Whether points [u] of the world are inside a solid: 0 no, 1 yes, 2 the point is none. Of a point on
- * the surface either may be said, the same every time.
+ * Whether points [u] of the world are inside a solid: 0 no, 1 yes, 2 invalid point. For a point on
+ * the surface either answer is possible, always the same one.
  */
 export function contains(
   solid: Asset | Field,
@@ -504,9 +504,9 @@ export function contains(
 // --- Corrections and wrenches of contacts -----------------------------------------------------------
 
 /**
- * Removes from an answer what protruding spheres add where flat faces meet: nothing is left across a
- * gap of a fifth of a mean sphere radius. Round and deeper contacts are unchanged. For contacts, not
- * where energy must be conserved: the force is the volume's gradient to within 15 %.
+ * Removes from an answer what protruding spheres add where flat faces meet: the result is zero across
+ * a gap of a fifth of a mean sphere radius. Round and deeper contacts are unchanged. Use it for
+ * contacts, not where energy must be conserved: the force is the volume's gradient to within 15 %.
  *
  * `whole`: the answer of penetration() at these poses by lenses, {field: 'never'}, in the matched
  * measure without a pair budget. `into` may be `whole`.
