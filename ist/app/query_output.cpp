@@ -100,7 +100,9 @@ std::string answer_text(const Answer& answer, const PenetrationSettings& setting
          : settings.relative_error > 0      ? "of the overlap, by spheres or meshes"
                                             : "of the overlap, by matched spheres");
     line("sum range", fmt::format("{:.6g} … {:.6g} u³", p.volume_min, p.volume_max),
-         "interval of the finished sum; says nothing of the true volume");
+         settings.relative_error > 0
+             ? "bounds of the true volume if meshes answered; else the interval of the sum"
+             : "interval of the finished sum; says nothing of the true volume");
     if (settings.relative_error > 0)
       line("error", fmt::format("{:g} %", 100 * settings.relative_error),
            p.status == QueryStatus::error_exceeded ? "accepted, but more is predicted"
@@ -122,7 +124,9 @@ std::string answer_text(const Answer& answer, const PenetrationSettings& setting
   line("query", fmt::format("{:.2f} µs", answer.time_us),
        fmt::format("{}, {} node pairs, {} {} pairs", name_of(answer.status()),
                    grouped(answer.node_visits()), grouped(answer.sphere_pairs()),
-                   exact ? "triangle" : "sphere")
+                   exact                         ? "triangle"
+                   : settings.relative_error > 0 ? "sphere or triangle"
+                                                 : "sphere")
            .c_str());
   return text;
 }

@@ -288,6 +288,8 @@ export function penetration(
 
 export interface SeparationOptions extends Limits {
   poseA?: Pose;
+  /** Uses the inner spheres even if both assets keep a mesh. */
+  innerSpheres?: boolean;
   into?: Separation;
 }
 

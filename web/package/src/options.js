@@ -10,7 +10,7 @@ const kNames = {
   'Asset.spheres()': ['measure', 'detail'],
   'Field.distanceGrid()': ['origin', 'error'],
   'penetration()': kPenetration,
-  'separation()': kLimits,
+  'separation()': [...kLimits, 'innerSpheres'],
   'contactPatches()': kPatches,
   'overlap()': ['poseA'],
   'overlapOutline()': ['poseA', 'maxPatches', 'maxVisits', 'pairId', 'into'],

@@ -57,7 +57,7 @@ const newSeparation = () => ({
 });
 
 export function separation(a, b, poseB, options) {
-  const status = ask('separation', 'separation()', a, b, poseB, options, 0);
+  const status = ask('separation', 'separation()', a, b, poseB, options, options?.innerSpheres ? 1 : 0);
   const out = options?.into ?? newSeparation();
   const numbers = f64(), integers = u32();
   const at = (desk() + kSeparation) / 8 + 1;

@@ -180,6 +180,8 @@ test('patches and lenses add up', () => {
   const apart = ist.separation(a, b, {translation: [100, 0, 0]});
   assert.ok(
       apart.distanceMin > 0 && apart.distanceMin <= apart.distanceMax && apart.normal[0] > 0.9);
+  const spheresApart = ist.separation(a, b, {translation: [100, 0, 0]}, {innerSpheres: true});
+  assert.ok(spheresApart.distance > apart.distance);  // they are inside
   assert.equal(ist.overlap(a, b, {translation: [100, 0, 0]}), 'no');
   assert.equal(ist.overlap(a, b, pose), 'yes');
 
