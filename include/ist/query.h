@@ -283,8 +283,8 @@ struct ContactPatches {
 /// Volumes, forces and torques sum to the whole's to about 1e-15. With Measure::exact the connected
 /// parts of the overlap are divided into the octants around their centroids, in the frame of the
 /// smaller solid, each with its true volume: a level face has four patches, a ring around a shaft
-/// eight. Small or deep contacts are one patch. If there are more patches
-/// than fit, the smallest of a part join their nearest ones, and then so do parts. Patches are
+/// eight. Small or deep contacts are one patch. If there are more patches than fit, the smallest
+/// join their nearest ones; of the octants first those that are small and near. Patches are
 /// continuous in the pose while the parts are the same and all fit. By spheres the contact is
 /// divided along the tree of the smaller solid (B's if equal or if A is too coarse), always at the
 /// same places, and that with a field along the asset's tree. The estimate of a stopped query is
