@@ -294,8 +294,8 @@ struct ContactPatches {
 /// With Measure::exact the connected parts of the overlap are divided into the octants around their
 /// centroids, in the frame of the smaller solid, each with its true volume: a level face has four
 /// patches, a ring around a shaft eight, a small or deep contact one. If there are more patches
-/// than fit, the smallest of a part are merged with their nearest ones, and then parts likewise.
-/// Patches are continuous in the pose while the parts are the same and all fit.
+/// than fit, the smallest are merged with their nearest ones; of the octants first those that are
+/// small and near. Patches are continuous in the pose while the parts are the same and all fit.
 ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept;

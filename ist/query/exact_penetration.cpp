@@ -77,39 +77,42 @@ Answer stopped(const PlacedTree& a, const PlacedTree& b, Answer answer, const Sp
 /// Of the smaller solid's radius: octants of a contact this near to each other hold it as one does.
 constexpr double kNearOctants = 0.15;
 
-/// As many parts as there is room for, the largest; each other one joins the nearest of those that
-/// push like it, if there are any. Of octants, the smallest of those that have others of their part
-/// beside them join these first.
+/// As many parts as there is room for: the least joins the nearest of those that push like it, if
+/// there are any. Least is by volume; of octants by volume times the fourth power of the distance
+/// to the one that it joins: a crumb beside a contact goes, a small foot far from it stays.
 std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room, bool octants) {
   std::uint32_t kept[ExactScratch::kMostParts], count = 0;
   for (std::uint32_t p = 0; p < parts.size(); ++p)
     if (parts[p].kept == p) kept[count++] = p;
   if (count <= room) return count;
-  // Octants of a part follow each other.
-  std::uint16_t group[ExactScratch::kMostParts], left[ExactScratch::kMostParts] = {}, groups = 0;
-  for (std::uint32_t k = 0; k < count; ++k) {
-    if (k > 0 && !(octants && parts[kept[k]].id / 8 == parts[kept[k - 1]].id / 8)) ++groups;
-    group[kept[k]] = groups;
-    ++left[groups];
-  }
   for (ExactPart& part : parts) part.centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
-  for (; count > room; --count) {
-    const auto rank = [&](std::uint32_t p) {
-      return std::pair(left[group[p]] == 1, parts[p].sums.volume());
-    };
-    const auto less = [&](std::uint32_t p, std::uint32_t q) { return rank(p) < rank(q); };
-    std::uint32_t* const least = std::min_element(kept, kept + count, less);
-    ExactPart& joins = parts[*least];
-    const std::uint16_t own = group[*least];
-    --left[own];
-    std::copy(least + 1, kept + count, least);
-    const auto distance = [&](std::uint32_t p) {
-      const exact::Point between = parts[p].centre - joins.centre;
-      return std::tuple(group[p] != own, dot(parts[p].sums.force, joins.sums.force) < 0,
+  std::pair<bool, double> cost[ExactScratch::kMostParts];
+  std::uint32_t nearest[ExactScratch::kMostParts];
+  const auto weigh = [&](std::uint32_t p) {
+    const auto distance = [&](std::uint32_t q) {
+      const exact::Point between = parts[q].centre - parts[p].centre;
+      return std::tuple(q == p, dot(parts[q].sums.force, parts[p].sums.force) < 0,
                         dot(between, between));
     };
-    const auto nearer = [&](std::uint32_t p, std::uint32_t q) { return distance(p) < distance(q); };
-    joins.kept = *std::min_element(kept, kept + count - 1, nearer);
+    const auto nearer = [&](std::uint32_t q, std::uint32_t r) { return distance(q) < distance(r); };
+    nearest[p] = *std::min_element(kept, kept + count, nearer);
+    const auto [self, unlike, square] = distance(nearest[p]);
+    cost[p] = {unlike, parts[p].sums.volume() * (square * square)};
+  };
+  for (std::uint32_t k = 0; k < count; ++k) {
+    nearest[kept[k]] = kept[k];
+    cost[kept[k]] = {false, parts[kept[k]].sums.volume()};
+    if (octants) weigh(kept[k]);
+  }
+  while (count > room) {
+    const auto less = [&](std::uint32_t p, std::uint32_t q) { return cost[p] < cost[q]; };
+    std::uint32_t* const least = std::min_element(kept, kept + count, less);
+    const std::uint32_t joins = *least;
+    std::copy(least + 1, kept + count--, least);
+    weigh(joins);
+    parts[joins].kept = nearest[joins];
+    for (std::uint32_t k = 0; k < count; ++k)
+      if (nearest[kept[k]] == joins) weigh(kept[k]);
   }
   for (ExactPart& part : parts)
     while (parts[part.kept].kept != part.kept) part.kept = parts[part.kept].kept;

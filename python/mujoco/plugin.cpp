@@ -288,6 +288,10 @@ mjPLUGIN_LIB_INIT(ist) {
                 mj_version());
     return;
   }
+  if (mjp_getPlugin(kName, nullptr) != nullptr) {
+    mju_warning("ist.solid is registered already: this copy of the plug-in is not used");
+    return;
+  }
   std::memcpy(before, mjCOLLISIONFUNC, sizeof before);
   // A plane meets a solid where it meets its hull: MuJoCo's own function is exact.
   for (int type = mjGEOM_PLANE + 1; type <= mjGEOM_SDF; ++type)

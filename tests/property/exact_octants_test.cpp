@@ -2,6 +2,7 @@
 #include <ist/query.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -283,6 +284,21 @@ TEST_F(ExactOctants, ASmallFootKeepsItsPatchWhereRoomIsShort) {
       if (std::abs(patch.centroid.x() - 4.1) < 0.11) small += patch.volume;
     }
     EXPECT_NEAR(small, 0.2 * 0.2 * 0.01, 1e-14) << room;
+  }
+}
+
+TEST_F(ExactOctants, CrumbsBesideAContactTakeNoneOfItsRoom) {
+  const Asset table = surface(box_mesh(Point(-9, -9, -1), Point(9, 9, 0)));
+  TriangleMesh feet = box_mesh(Point(-1, -1, 0), Point(1, 1, 1));
+  for (int k = -7; k <= 7; ++k)
+    feet = testing::joined(feet, box_mesh(Point(1.1, 0.1 * k, 0), Point(1.15, 0.1 * k + 0.05, 1)));
+  const Asset foot = surface(feet);
+  for (const std::size_t room : {16, 8, 5}) {
+    const auto& patches =
+        ask({table.view(), {}, 1}, {foot.view(), {{1, 0, 0, 0}, {0, 0, -0.01}}, 1}, room);
+    EXPECT_EQ(patches.size(), room);
+    const auto quarter = [](const ContactPatch& p) { return std::abs(p.volume - 0.01) < 1e-3; };
+    EXPECT_EQ(std::count_if(patches.begin(), patches.end(), quarter), 4) << room;
   }
 }
 
