@@ -105,20 +105,19 @@ TEST(WorkspaceMemory, NoQueryWritesBeyondIt) {
     Guard guard;
     {
       Workspace workspace(
-          capacity,
-          {[](void*, std::size_t bytes, std::size_t alignment) {
-             void* const memory =
-                 ::operator new(bytes + Guard::kBytes, std::align_val_t(alignment));
-             std::memset(static_cast<std::byte*>(memory) + bytes, 0x5a, Guard::kBytes);
-             return memory;
-           },
-           [](void* context, void* memory, std::size_t bytes, std::size_t alignment) {
-             const auto* const end = static_cast<const unsigned char*>(memory) + bytes;
-             static_cast<Guard*>(context)->written_beyond +=
-                 std::any_of(end, end + Guard::kBytes, [](unsigned char c) { return c != 0x5a; });
-             ::operator delete(memory, std::align_val_t(alignment));
-           },
-           &guard});
+          capacity, {[](void*, std::size_t bytes, std::size_t alignment) {
+                       void* const memory =
+                           ::operator new(bytes + Guard::kBytes, std::align_val_t(alignment));
+                       std::memset(static_cast<std::byte*>(memory) + bytes, 0x5a, Guard::kBytes);
+                       return memory;
+                     },
+                     [](void* context, void* memory, std::size_t bytes, std::size_t alignment) {
+                       const auto* const end = static_cast<const unsigned char*>(memory) + bytes;
+                       static_cast<Guard*>(context)->written_beyond += std::any_of(
+                           end, end + Guard::kBytes, [](unsigned char c) { return c != 0x5a; });
+                       ::operator delete(memory, std::align_val_t(alignment));
+                     },
+                     &guard});
       PenetrationSettings settings;
       settings.measure = Measure::exact;
       const PlacedTree placed{knot.view(), {}, 1};
