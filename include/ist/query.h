@@ -164,8 +164,9 @@ struct MemoryHooks {
 /// budget_exhausted.
 class Workspace {
  public:
-  /// `capacity`: count of node pairs that may wait at once, 40 bytes each, in pages that are
-  /// touched as needed. The default serves two trees of 64,000 spheres at any pose.
+  /// `capacity`: count of node pairs that may wait at once; workspace_capacity() tells how many two
+  /// solids need. It takes address space, 7.5 MB and 115 bytes a pair (128 MB by default), whose
+  /// pages are touched as needed. The default serves two trees of 64,000 spheres at any pose.
   ///
   /// Throws std::bad_alloc.
   explicit Workspace(std::size_t capacity = 1u << 20, const MemoryHooks& memory = {});
@@ -182,6 +183,21 @@ class Workspace {
   };
   std::unique_ptr<Impl, Release> impl_;
 };
+
+/// A capacity with which no pose of two solids fills the workspace: penetration() and
+/// contact_patches() by spheres and surfaces, separation() and overlap() then stop at no capacity.
+/// Poses are ignored, scales are not. For several pairs take the largest.
+///
+/// It is proven from the balls of both trees, whichever way they lie: some three times what the
+/// worst poses need, and below the default up to about 64,000 spheres. It allocates, and takes some
+/// 0.1 s for 16,000 spheres.
+///
+/// No such bound serves Measure::exact and time_of_impact(). A capacity c lets the exact measure
+/// find c / 16 + 128 pairs of triangles that cross, and c / 4 + 512 pairs that touch or nearly do:
+/// copies in one place need most. The mesh must have no more than c blocks of 16 triangles.
+///
+/// Throws Error for an empty asset, a scale out of range, or two fields.
+std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);
 
 /// Volume, wrench and centroid of the overlap.
 ///

@@ -4,6 +4,7 @@
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
 #include <BulletCollision/CollisionDispatch/btConvexConvexAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <LinearMath/btTransformUtil.h>
 
@@ -59,6 +60,15 @@ double fast_motion(const btCollisionObject& first, const btCollisionObject& seco
   return least;
 }
 
+/// A shape, or what a compound is made of: `visit(shape, in_body)`.
+template <class Visit>
+void for_each_part(const btCollisionShape& shape, const btTransform& in_body, const Visit& visit) {
+  if (!shape.isCompound()) return visit(shape, in_body);
+  const auto& compound = static_cast<const btCompoundShape&>(shape);
+  for (int i = 0; i < compound.getNumChildShapes(); ++i)
+    for_each_part(*compound.getChildShape(i), in_body * compound.getChildTransform(i), visit);
+}
+
 btVector3 velocity_of(const btCollisionObject& object, const btVector3& point) {
   const btRigidBody* const body = btRigidBody::upcast(&object);
   if (body == nullptr) return {0, 0, 0};
@@ -106,26 +116,62 @@ void Contacts::register_with(btCollisionDispatcher& dispatcher) {
 }
 
 void Contacts::updateAction(btCollisionWorld* world, btScalar step) {
+  btBroadphasePairArray& pairs = world->getPairCache()->getOverlappingPairArray();
+  const auto objects_of = [](const btBroadphasePair& pair) {
+    return std::array{static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject),
+                      static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject)};
+  };
   // All impacts are found before anything is moved, so the order of pairs does not matter.
-  for_each_pair(*world,
-                [&](PairAlgorithm& pair, btCollisionObject& first, btCollisionObject& second) {
-                  const auto share = static_cast<btScalar>(pair.share_until_impact(
-                      first, second, {moved_back(first, step), moved_back(second, step)},
-                      {first.getWorldTransform(), second.getWorldTransform()}));
-                  for (btCollisionObject* object : {&first, &second})
-                    object->setHitFraction(std::min(share, object->getHitFraction()));
+  for (int i = 0; i < pairs.size(); ++i) {
+    const auto& [first, second] = objects_of(pairs[i]);
+    if (!std::isfinite(fast_motion(*first, *second))) continue;
+    for (const btCollisionObject* object : {first, second}) {
+      if (object->getInternalType() == btCollisionObject::CO_FEATHERSTONE_LINK &&
+          object->getCcdSquareMotionThreshold() > 0) {
+        warn(
+            "A link of a multibody has a CCD threshold, but Contacts stops rigid bodies alone: "
+            "take "
+            "smaller steps.");
+      }
+    }
+    const auto share = static_cast<btScalar>(share_of(pairs[i].m_algorithm, *first, *second, step));
+    for (btCollisionObject* object : {first, second})
+      object->setHitFraction(std::min(share, object->getHitFraction()));
+  }
+  for (int i = 0; i < pairs.size(); ++i) {
+    for (btCollisionObject* object : objects_of(pairs[i])) {
+      const btScalar lost = step * (1 - object->getHitFraction());
+      object->setHitFraction(1);
+      btRigidBody* const body = movable(*object);
+      if (body == nullptr || !(lost > 0)) continue;
+      body->setCenterOfMassTransform(moved_back(*body, lost));
+      body->setLinearVelocity(body->getLinearVelocity() - lost * body->getGravity());
+    }
+  }
+}
+
+double Contacts::share_of(const btCollisionAlgorithm* algorithm, const btCollisionObject& first,
+                          const btCollisionObject& second, btScalar step) const {
+  const Places from = {moved_back(first, step), moved_back(second, step)};
+  const Places to = {first.getWorldTransform(), second.getWorldTransform()};
+  if (const auto* const pair = dynamic_cast<const PairAlgorithm*>(algorithm))
+    return pair->share_until_impact(first, second, from, to);
+  // Bullet does not show the algorithms of a compound's children.
+  const btCollisionShape &shape = *first.getCollisionShape(), &other = *second.getCollisionShape();
+  double share = 1;
+  if (!shape.isCompound() && !other.isCompound()) return share;
+  const double threshold = fast_motion(first, second);
+  const Settings settings = settings_of(first, second);
+  for_each_part(shape, btTransform::getIdentity(),
+                [&](const btCollisionShape& part, const btTransform& in_body) {
+                  for_each_part(other, btTransform::getIdentity(),
+                                [&](const btCollisionShape& met, const btTransform& in_other) {
+                                  share = std::min(share, Meeting(part, met).share_until_impact(
+                                                              from, to, {in_body, in_other},
+                                                              threshold, settings));
+                                });
                 });
-  for_each_pair(*world,
-                [&](const PairAlgorithm&, btCollisionObject& first, btCollisionObject& second) {
-                  for (btCollisionObject* object : {&first, &second}) {
-                    const btScalar lost = step * (1 - object->getHitFraction());
-                    object->setHitFraction(1);
-                    btRigidBody* const body = movable(*object);
-                    if (body == nullptr || !(lost > 0)) continue;
-                    body->setCenterOfMassTransform(moved_back(*body, lost));
-                    body->setLinearVelocity(body->getLinearVelocity() - lost * body->getGravity());
-                  }
-                });
+  return share;
 }
 
 btCollisionAlgorithm* Contacts::CreateFunc::CreateCollisionAlgorithm(
@@ -337,48 +383,9 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
 double PairAlgorithm::share_until_impact(const btCollisionObject& first,
                                          const btCollisionObject& second, const Places& from,
                                          const Places& to) const {
-  constexpr double kDepth = 0.25;  // of the threshold
-  constexpr int kLooks = 24;
-  const Meeting& meeting = state_->meeting;
-  const double threshold = fast_motion(first, second);
-  const double motion =
-      meeting.largest_motion(from[0].inverseTimes(from[1]), to[0].inverseTimes(to[1]));
-  if (!meeting.is_met() || !(motion > threshold)) return 1;
-  const Settings settings = contacts_.settings_of(first, second);
-  if (settings.response != Settings::Response::solver) return 1;
-  const TimeOfImpact impact = meeting.impact(from, to, settings);
-  if (impact.status == ImpactStatus::no_impact) return 1;
-  const double stride = threshold / motion;
-  if (impact.status != ImpactStatus::overlapping)
-    return std::min(1.0, impact.time + kDepth * stride);
-
-  // In contact. Their mean depth tells most where they slide or turn, as a nut on its thread.
-  const auto depth_after = [&](double share) {
-    Places at;
-    for (std::size_t i = 0; i < 2; ++i) {
-      btVector3 velocity, turning;
-      btTransformUtil::calculateVelocity(from[i], to[i], 1, velocity, turning);
-      btTransformUtil::integrateTransform(from[i], velocity, turning, static_cast<btScalar>(share),
-                                          at[i]);
-    }
-    Contact contact;
-    meeting.find(at[0], at[1], settings, contact);
-    double area = 0;
-    for (std::size_t i = 0; i < contact.count; ++i) area += contact.patches[i].area;
-    return contact.whole.volume > 0 ? contact.whole.volume / area : 0;
-  };
-  const double most = std::max(depth_after(0), kDepth * threshold);
-  const double least = stride / 8;  // or two bodies that turn into each other would stop for good
-  double share = 0, next = stride;
-  for (int looks = 0; looks < kLooks && share < 1 && next >= least; ++looks) {
-    const double there = std::min(1.0, share + next);
-    if (depth_after(there) > most) {
-      next /= 2;
-    } else {
-      share = there;
-    }
-  }
-  return std::max(share, std::min(1.0, least));
+  return state_->meeting.share_until_impact(
+      from, to, {btTransform::getIdentity(), btTransform::getIdentity()},
+      fast_motion(first, second), contacts_.settings_of(first, second));
 }
 
 void PairAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {

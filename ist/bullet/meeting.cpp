@@ -2,6 +2,7 @@
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
+#include <LinearMath/btTransformUtil.h>
 
 #include <algorithm>
 #include <cmath>
@@ -119,17 +120,65 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   contact.count = found.count;
 }
 
-TimeOfImpact Meeting::impact(const Places& from, const Places& to, const Settings& settings) const {
-  const auto& [a, b] = placed(from, to, settings);
+TimeOfImpact Meeting::impact(const Places& from, const Places& to, const Places& in_body,
+                             const Settings& settings) const {
+  const auto& [a, b] = placed(from * in_body, to * in_body, settings);
   const auto motion = [&](const Shape* shape, int i) {
-    if (shape == nullptr) return motion_between(to_pose(from[i]), to_pose(to[i]), 1);
-    const btTransform& mesh = shape->mesh_in_body();
-    return motion_between(to_pose(from[i] * mesh), to_pose(to[i] * mesh), 1,
-                          to_eigen(mesh.inverse().getOrigin()) / shape->scale(), shape->scale());
+    btTransform solid = in_body[i];
+    if (shape != nullptr) solid *= shape->mesh_in_body();
+    const double scale = shape != nullptr ? shape->scale() : 1;
+    return motion_between(to_pose(from[i] * solid), to_pose(to[i] * solid), 1,
+                          to_eigen(solid.inverse().getOrigin()) / scale, scale);
   };
   // A flat face above a mesh takes any number; what is left is stopped early.
   const ImpactSettings limit{.max_visits = partner_ ? 1u << 13 : 0u};
   return time_of_impact(a, b, {motion(first_, 0), motion(second_, 1)}, limit, workspace());
+}
+
+double Meeting::share_until_impact(const Places& from, const Places& to, const Places& in_body,
+                                   double threshold, const Settings& settings) const {
+  constexpr double kDepth = 0.25;  // of the threshold
+  constexpr int kLooks = 24;
+  if (!is_met() || settings.response != Settings::Response::solver) return 1;
+  const auto between = [&](const Places& at) {
+    const Places shapes = at * in_body;
+    return shapes[0].inverseTimes(shapes[1]);
+  };
+  const double motion = largest_motion(between(from), between(to));
+  if (!(motion > threshold)) return 1;
+  const TimeOfImpact found = impact(from, to, in_body, settings);
+  if (found.status == ImpactStatus::no_impact) return 1;
+  const double stride = threshold / motion;
+  if (found.status != ImpactStatus::overlapping) return std::min(1.0, found.time + kDepth * stride);
+
+  // In contact. Their mean depth tells most where they slide or turn, as a nut on its thread.
+  const auto depth_after = [&](double share) {
+    Places at;
+    for (std::size_t i = 0; i < 2; ++i) {
+      btVector3 velocity, turning;
+      btTransformUtil::calculateVelocity(from[i], to[i], 1, velocity, turning);
+      btTransformUtil::integrateTransform(from[i], velocity, turning, static_cast<btScalar>(share),
+                                          at[i]);
+    }
+    const Places shapes = at * in_body;
+    Contact contact;
+    find(shapes[0], shapes[1], settings, contact);
+    double area = 0;
+    for (std::size_t i = 0; i < contact.count; ++i) area += contact.patches[i].area;
+    return contact.whole.volume > 0 ? contact.whole.volume / area : 0;
+  };
+  const double most = std::max(depth_after(0), kDepth * threshold);
+  const double least = stride / 8;  // or two bodies that turn into each other would stop for good
+  double share = 0, next = stride;
+  for (int looks = 0; looks < kLooks && share < 1 && next >= least; ++looks) {
+    const double there = std::min(1.0, share + next);
+    if (depth_after(there) > most) {
+      next /= 2;
+    } else {
+      share = there;
+    }
+  }
+  return std::max(share, std::min(1.0, least));
 }
 
 bool find_contact(const btCollisionObject& first, const btCollisionObject& second,

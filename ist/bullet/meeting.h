@@ -12,6 +12,8 @@ namespace ist::bullet {
 
 using Places = std::array<btTransform, 2>;
 
+inline Places operator*(const Places& a, const Places& b) { return {a[0] * b[0], a[1] * b[1]}; }
+
 /// Two shapes of which one is a Shape, prepared for many queries. Both must outlive it.
 class Meeting {
  public:
@@ -25,8 +27,11 @@ class Meeting {
   void find(const btTransform& first, const btTransform& second, const Settings& settings,
             Contact& contact) const;
 
-  /// The first impact of a motion of both in a time of 1.
-  TimeOfImpact impact(const Places& from, const Places& to, const Settings& settings) const;
+  /// The share [0, 1] of a motion of two bodies after which their shapes have met, or in contact
+  /// have got too deep: see Contacts::updateAction(). `in_body`: the shapes, as children of these.
+  /// 1 where no point moves by more than `threshold` [u] against the other body.
+  double share_until_impact(const Places& from, const Places& to, const Places& in_body,
+                            double threshold, const Settings& settings) const;
 
   /// [u] No point of one has moved by more than this against the other since the second was at
   /// `before` in the frame of the first.
@@ -39,6 +44,9 @@ class Meeting {
   using Solids = std::array<PlacedSolid, 2>;
   /// At the beginning of a motion.
   Solids placed(const Places& from, const Places& to, const Settings& settings) const;
+  /// The first impact of a motion of both bodies in a time of 1.
+  TimeOfImpact impact(const Places& from, const Places& to, const Places& in_body,
+                      const Settings& settings) const;
 
   std::uint32_t pair_id_;         // no two at a time have the same
   const Shape* first_ = nullptr;  // null: partner_

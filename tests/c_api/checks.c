@@ -157,6 +157,24 @@ static int make_scene(scene_t* scene, const char* path_a, const char* path_b) {
   return 0;
 }
 
+static int capacities_are_told(const scene_t* s) {
+  ist_placed_t inverted, none = {0};
+  ist_workspace_t workspace = {0};
+  ist_penetration_t answer = {.size = sizeof answer};
+  size_t capacity = 7;
+  CHECK(ist_workspace_capacity(&s->a, &s->b, NULL) == IST_NULL_POINTER);
+  CHECK(ist_workspace_capacity(&s->a, NULL, &capacity) == IST_NULL_POINTER && capacity == 0);
+  CHECK(ist_workspace_capacity(&none, &s->b, &capacity) != IST_OK && capacity == 0);
+  inverted = s->a;
+  inverted.scale = -1;
+  CHECK(ist_workspace_capacity(&inverted, &s->b, &capacity) == IST_INVALID_INPUT && capacity == 0);
+  CHECK(ist_workspace_capacity(&s->a, &s->b, &capacity) == IST_OK && capacity > 0);
+  CHECK(ist_workspace_make(capacity, NULL, &workspace) == IST_OK);
+  CHECK(ist_penetration(&s->a, &s->b, NULL, &workspace, &answer) == IST_OK);
+  CHECK(ist_workspace_release(&workspace) == IST_OK);
+  return 0;
+}
+
 static int released_handles_are_known(scene_t* s) {
   ist_penetration_t answer = {.size = sizeof answer};
   CHECK(ist_tree_release(&s->tree_b) == IST_OK);
@@ -198,5 +216,6 @@ int c_api_checks(const char* path_a, const char* path_b) {
          fields_answer(&scene) != 0 || bodies_are_told(&scene) != 0 ||
          impacts_are_found(&scene) != 0 || batches_answer(&scene) != 0 ||
          balls_are_told(&scene) != 0 || surfaces_are_told(&scene) != 0 ||
-         lenses_are_told(&scene) != 0 || released_handles_are_known(&scene) != 0;
+         lenses_are_told(&scene) != 0 || capacities_are_told(&scene) != 0 ||
+         released_handles_are_known(&scene) != 0;
 }

@@ -366,6 +366,23 @@ TEST(Surface, SeparationMatchesAllPairsOfTriangles) {
   EXPECT_GT(meet, 30);
 }
 
+/// A ball in a cavity that is nearly as far away everywhere, so that most pairs of nodes wait.
+TEST(Surface, SeparationNeedsNoCapacity) {
+  const Body ball(testing::icosphere_mesh(6));
+  const Body hollow(testing::joined(testing::box_mesh({-3, -3, -3}, {3, 3, 3}),
+                                    testing::inverted(testing::icosphere_mesh(6))));
+  Workspace least(1), most;
+  std::mt19937_64 random(11);
+  for (const double scale : {0.4, 0.9}) {
+    const PlacedTree a{hollow.asset.view(), {}, 1};
+    const PlacedTree b{ball.asset.view(), testing::random_pose(random, 0), scale};
+    const Separation got = separation(a, b, {}, least);
+    EXPECT_EQ(got.status, QueryStatus::ok);
+    EXPECT_NEAR(got.distance, 1 - scale, 1e-3 * scale);
+    EXPECT_EQ(got.distance, separation(a, b, {}, most).distance);
+  }
+}
+
 /// What is held as a whole is at no distance; what lies in a cavity is.
 TEST(Surface, SeparationOfWhatIsInside) {
   Workspace workspace;

@@ -3,6 +3,7 @@
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
 
+#include <algorithm>
 #include <cstring>
 #include <new>
 #include <random>
@@ -89,6 +90,44 @@ TEST(WorkspaceMemory, WhatItHeldChangesNoBit) {
   const std::vector<std::uint64_t> expected = answers(knot, nut, Held::zeros);
   for (const Held held : {Held::ones, Held::numbers, Held::noise})
     EXPECT_EQ(answers(knot, nut, held), expected) << static_cast<int>(held);
+}
+
+/// Counts writes beyond what a workspace took.
+struct Guard {
+  static constexpr std::size_t kBytes = 4096;
+  int written_beyond = 0;
+};
+
+TEST(WorkspaceMemory, NoQueryWritesBeyondIt) {
+  const Asset knot = bake(close_mesh(make_sample("torus_knot"), "knot"), {.max_spheres = 400});
+  // Copies in one place: every triangle meets its neighbours, and no sign is clear.
+  for (const std::size_t capacity : {64, 3000, 50'000, 1 << 17}) {
+    Guard guard;
+    {
+      Workspace workspace(
+          capacity, {[](void*, std::size_t bytes, std::size_t alignment) {
+                       void* const memory =
+                           ::operator new(bytes + Guard::kBytes, std::align_val_t(alignment));
+                       std::memset(static_cast<std::byte*>(memory) + bytes, 0x5a, Guard::kBytes);
+                       return memory;
+                     },
+                     [](void* context, void* memory, std::size_t bytes, std::size_t alignment) {
+                       const auto* const end = static_cast<const unsigned char*>(memory) + bytes;
+                       static_cast<Guard*>(context)->written_beyond += std::any_of(
+                           end, end + Guard::kBytes, [](unsigned char c) { return c != 0x5a; });
+                       ::operator delete(memory, std::align_val_t(alignment));
+                     },
+                     &guard});
+      PenetrationSettings settings;
+      settings.measure = Measure::exact;
+      const PlacedTree placed{knot.view(), {}, 1};
+      const Penetration answer = penetration(placed, placed, settings, workspace);
+      EXPECT_LE(answer.volume_min, knot.view().volume());
+      EXPECT_GE(answer.volume_max, knot.view().volume());
+      separation(placed, placed, {}, workspace);
+    }
+    EXPECT_EQ(guard.written_beyond, 0) << capacity;
+  }
 }
 
 }  // namespace

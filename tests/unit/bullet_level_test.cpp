@@ -210,6 +210,16 @@ TEST(BulletLevel, FallsAt60HzAreStopped) {
   }
 }
 
+/// A cube of that side, or two side by side in a compound.
+std::unique_ptr<btCollisionShape> fast_shape(double side, bool compound) {
+  if (!compound) return cube_of_side(side);
+  static const auto part = cube_of_side(side);
+  auto both = std::make_unique<btCompoundShape>();
+  for (const double x : {-0.75, 0.75})
+    both->addChildShape(at_place({btScalar(x * side), 0, 0}), part.get());
+  return both;
+}
+
 // A small cube at 6 m/s moves by five times its side in a step of 60 Hz.
 TEST(BulletImpact, FastBodiesStopAtThinOnes) {
   static const auto triangles = floor_mesh(20);
@@ -220,18 +230,29 @@ TEST(BulletImpact, FastBodiesStopAtThinOnes) {
        {0, 0, -0.0025f}},
       {"open mesh", [] { return std::make_unique<btBvhTriangleMeshShape>(triangles.get(), true); }},
       {"asset", [] { return std::make_unique<bullet::Shape>(cube()); }, {0, 0, -0.5}},
+      {"compound",
+       [] {
+         static btBoxShape plate(btVector3(1, 1, 0.0025f));
+         auto compound = std::make_unique<btCompoundShape>();
+         compound->addChildShape(at_place({0, 0, 0.3f}), &plate);
+         return compound;
+       },
+       {0, 0, -0.3025f}},
   };
   constexpr double kSmall = 0.02;
   for (const Level& level : levels) {
     SCOPED_TRACE(level.name);
-    for (const bool stopped : {true, false}) {
+    for (const int kind : {0, 1, 2, 3}) {
+      const bool compound = kind % 2 != 0, stopped = kind < 2;
+      SCOPED_TRACE(compound ? "a compound falls" : "a cube falls");
       World world;
       if (stopped) world.world.addAction(&world.contacts);
       world.add(level.make(), 0, level.at);
-      btRigidBody& box = world.add(cube_of_side(kSmall), 0.1, btVector3(0.03f, 0.02f, 0.25f));
+      btRigidBody& box =
+          world.add(fast_shape(kSmall, compound), 0.1, btVector3(0.03f, 0.02f, 0.25f));
       box.setCcdMotionThreshold(0.2 * kSmall);
       box.setLinearVelocity({0, 0, -6});
-      box.setAngularVelocity({1, 2, 3});
+      box.setAngularVelocity(compound ? btVector3(0, 0, 3) : btVector3(1, 2, 3));
       double lowest = 1;
       world.step(
           180, [&] { lowest = std::min<double>(lowest, box.getWorldTransform().getOrigin().z()); },

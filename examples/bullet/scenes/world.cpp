@@ -35,6 +35,7 @@ SceneWorld::SceneWorld(const WorldSettings& settings) : settings_(settings) {
   world_.getSolverInfo().m_splitImpulse =
       settings.way == Way::gimpact || settings.way == Way::hulls;
   world_.getSolverInfo().m_numIterations = 50;
+  world_.getSolverInfo().m_warmstartingFactor = 1;
   world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
   world_.addAction(&contacts_);  // stops bodies that ask for it
   if (settings.way == Way::wrench) ist::bullet::push_in_every_tick(world_);

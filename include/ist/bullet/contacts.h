@@ -101,8 +101,10 @@ class Contacts : public btActionInterface {
   /// moving while they are no deeper than that. The rest of the motion is lost, as with Bullet's
   /// own sweeps, and with it the speed that gravity gave.
   ///
-  /// Response::solver only, and not for children of compounds and links of multibodies. For a
-  /// body that is hit in the same step, its motion before the hit counts.
+  /// Response::solver only. A compound is stopped by its children, by the table of
+  /// docs/engines.md. Links of multibodies are not stopped, since Bullet's broad phase does not
+  /// look ahead for them; warn() says so. For a body that is hit in the same step, its motion
+  /// before the hit counts.
   void updateAction(btCollisionWorld* world, btScalar step) override;
   void debugDraw(btIDebugDraw*) override {}
 
@@ -117,6 +119,10 @@ class Contacts : public btActionInterface {
                                                    const btCollisionObjectWrapper* a,
                                                    const btCollisionObjectWrapper* b) override;
   };
+  /// Of a pair's motion in the last step: see PairAlgorithm::share_until_impact().
+  double share_of(const btCollisionAlgorithm* algorithm, const btCollisionObject& first,
+                  const btCollisionObject& second, btScalar step) const;
+
   CreateFunc create_;
 };
 

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include <ist/asset_layout.h>
+#include <ist/error.h>
 
 #include "query/base/hooked_memory.h"
 #include "query/c_api/structs.h"
@@ -205,6 +206,24 @@ ist_status_t ist_deadline_record(ist_deadline_t* deadline, const ist_penetration
 
 int32_t ist_deadline_too_slow(const ist_deadline_t* deadline) {
   return deadline != nullptr && deadline_in(*deadline).too_slow() ? 1 : 0;
+}
+
+ist_status_t ist_workspace_capacity(const ist_placed_t* a, const ist_placed_t* b,
+                                    std::size_t* capacity) {
+  if (capacity == nullptr) return IST_NULL_POINTER;
+  *capacity = 0;
+  ist::PlacedSolid first, second;
+  ist_status_t status = read(a, first);
+  if (status == IST_OK) status = read(b, second);
+  if (status != IST_OK) return status;
+  try {
+    *capacity = ist::workspace_capacity(first, second);
+    return IST_OK;
+  } catch (const std::bad_alloc&) {
+    return IST_NO_MEMORY;
+  } catch (const ist::Error&) {
+    return IST_INVALID_INPUT;
+  }
 }
 
 ist_status_t ist_workspace_release(ist_workspace_t* workspace) {

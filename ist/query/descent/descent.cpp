@@ -24,6 +24,13 @@ bool before(const RankedPair& l, const RankedPair& r) {
 
 }  // namespace
 
+bool opens_a(const SphereTree& a, int level_a, const SphereTree& b, int level_b,
+             double scale) noexcept {
+  return level_b == kSphereLevel ||
+         (level_a != kSphereLevel &&
+          a.typical_cube(level_a) >= scale * scale * scale * b.typical_cube(level_b));
+}
+
 Descent::Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
                  const DescentLimits& limits, Workspace::Impl& scratch, ContactBins* bins)
     : a_(a),
@@ -63,10 +70,7 @@ Overlap Descent::sure() const {
 }
 
 bool Descent::open_level() {
-  const double cube = map_.scale * map_.scale * map_.scale;
-  const bool open_a =
-      level_b_ == kSphereLevel ||
-      (level_a_ != kSphereLevel && a_.typical_cube(level_a_) >= cube * b_.typical_cube(level_b_));
+  const bool open_a = opens_a(a_, level_a_, b_, level_b_, map_.scale);
   PairList& now = scratch_.now;
   PairList& next = scratch_.next;
   choose();

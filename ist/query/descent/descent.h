@@ -17,6 +17,10 @@
 
 namespace ist {
 
+/// Whether a stage opens A's nodes: those of the larger typical size. `scale`: of B in A's frame.
+bool opens_a(const SphereTree& a, int level_a, const SphereTree& b, int level_b,
+             double scale) noexcept;
+
 /// The staged descent of docs/design.md 7: node pairs level by level, then pairs of leaf blocks.
 class Descent {
  public:

@@ -295,7 +295,7 @@ class TriangleSearch {
     const TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t count = pairs.count, all = (1u << count) - 1;
     scratch_.pairs->count = 0;
-    if (count == 0) return;
+    if (count == 0 || !found_.complete) return;  // two blocks go on to their end
     Signs signs;
     find_signs(pairs, count, search_.room, signs);
     for (std::uint32_t left = all & ~signs.apart & ~signs.sure; left != 0; left &= left - 1) {

@@ -260,7 +260,7 @@ struct ExactScratch {
         triangles_b(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
         pairs(hooked<TrianglePairs>(hooks)),
         waiting(hooked_array<BoxPair>(hooks, kMostWaiting)),
-        gaps(hooked_array<GapPair>(hooks, most_blocks + kMostWaiting)),
+        gaps(hooked_array<GapPair>(hooks, kMostGaps + kMostWaiting)),
         crossings(most_crossings, hooks),
         kept(most_pairs(), hooks),
         keys(hooked_array<std::uint64_t>(hooks, most_pairs())),
@@ -287,6 +287,9 @@ struct ExactScratch {
 
   /// Node pairs wait depth first: 255 others a level, and both trees are opened together.
   static constexpr std::uint32_t kMostWaiting = 256 * 2 * kMaxLevels;
+
+  /// Of a search for a distance, nearest first; behind them all goes depth first.
+  static constexpr std::uint32_t kMostGaps = 1u << 14;
 
   static constexpr std::uint32_t kMostParts = 1024;
   static constexpr std::uint32_t kMostSplit = 64;  ///< parts that are divided into octants

@@ -189,27 +189,26 @@ class GapSearch {
         a_from_b_(a_from_b),
         b_from_a_(b_from_a),
         budget_(budget),
-        waiting_(scratch.gaps.get()),
-        room_(scratch.most_blocks) {}
+        waiting_(scratch.gaps.get()) {}
 
   MeshGap run() noexcept {
     best_.take(a_.vertex(0), map_point(a_from_b_, b_.vertex(0)));
     out_.overlap = holds({a_}, b_, {&a_from_b_}) || holds({b_, &a_from_b_, &b_from_a_}, a_, {});
     push({0, 0, 0, static_cast<std::uint8_t>(a_.top), static_cast<std::uint8_t>(b_.top)});
+    double least = 0;
     while (size_ > 0 && !out_.overlap && !out_.stopped) {
       const GapPair pair = waiting_[0];
-      if (!(pair.squared < kNearer * best_.squared)) break;
-      if (budget_.grant(1) == 0 || size_ > room_) {
-        out_.stopped = true;
-        break;
-      }
+      least = pair.squared;
+      if (!(least < kNearer * best_.squared)) break;
       std::pop_heap(waiting_, waiting_ + size_--);
-      if (pair.level_a == 0 && pair.level_b == 0)
-        measure(pair.a, pair.b);
-      else
-        open(pair);
+      // Behind a full heap all below the pair waits on a stack, and comes before the rest.
+      const std::uint32_t heap = size_;
+      depth_first_ = heap >= ExactScratch::kMostGaps;
+      visit(pair);
+      while (depth_first_ && size_ > heap && !out_.overlap && !out_.stopped)
+        visit(waiting_[--size_]);
     }
-    const double least = out_.stopped ? waiting_[0].squared : best_.squared;
+    if (!out_.stopped) least = best_.squared;
     if (out_.overlap) return out_;
     out_.distance = std::sqrt(best_.squared);
     out_.a = best_.a, out_.b = best_.b;
@@ -220,7 +219,17 @@ class GapSearch {
  private:
   void push(const GapPair& pair) noexcept {
     waiting_[size_++] = pair;
-    std::push_heap(waiting_, waiting_ + size_);
+    if (!depth_first_) std::push_heap(waiting_, waiting_ + size_);
+  }
+
+  void visit(GapPair pair) noexcept {
+    if (!(pair.squared < kNearer * best_.squared)) return;
+    out_.stopped = budget_.grant(1) == 0;
+    if (out_.stopped) return;
+    if (pair.level_a == 0 && pair.level_b == 0)
+      measure(pair.a, pair.b);
+    else
+      open(pair);
   }
 
   /// Whether a solid holds a shell of the other.
@@ -265,6 +274,7 @@ class GapSearch {
       for (double& gap : squared) gap *= a_from_b_.scale * a_from_b_.scale;
     }
     const std::uint32_t used = std::min(kWidth, mesh.level[level - 1].count - kWidth * number);
+    const std::uint32_t first = size_;
     for (std::uint32_t l = 0; l < used; ++l) {
       if (!(squared[l] < kNearer * best_.squared)) continue;
       GapPair child = pair;
@@ -273,6 +283,7 @@ class GapSearch {
       --(open_a ? child.level_a : child.level_b);
       push(child);
     }
+    if (depth_first_) std::sort(waiting_ + first, waiting_ + size_);
   }
 
   void measure(std::uint32_t a, std::uint32_t b) noexcept {
@@ -381,8 +392,8 @@ class GapSearch {
   double thin_ = 0;
   PlacedBlock placed_a_, placed_b_;
   GapPair* const waiting_;  ///< a heap
-  const std::uint32_t room_;
   std::uint32_t size_ = 0;
+  bool depth_first_ = false;
 };
 
 }  // namespace

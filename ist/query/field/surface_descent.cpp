@@ -13,8 +13,16 @@ namespace {
 // sixteen balls.
 constexpr int kFewTriangles = 4;
 
-/// The balls of a surface as a tree whose spheres are blocks of triangles.
-SphereTree tree_of(const SurfaceTree& surface, const TreeHeader& header) {
+/// Cube of the typical radius of a surface's nodes: they tile an area.
+double typical_cube(const SphereTree& balls, int level) {
+  const double count = balls.count(level);
+  const double r = balls.header->root[3];
+  return r * r * r / (count * std::sqrt(count));
+}
+
+}  // namespace
+
+SphereTree ball_tree(const SurfaceTree& surface, const TreeHeader& header) {
   SphereTree tree(header);
   for (int k = 1; k <= surface.top; ++k)
     tree.level[k - 1] = {surface.level[k].balls, surface.level[k].origins, nullptr,
@@ -22,7 +30,7 @@ SphereTree tree_of(const SurfaceTree& surface, const TreeHeader& header) {
   return tree;
 }
 
-TreeHeader header_of(const SurfaceTree& surface) {
+TreeHeader ball_header(const SurfaceTree& surface) {
   TreeHeader header;
   header.sphere_count = surface.level[0].count;
   header.level_count = static_cast<std::uint32_t>(surface.top);
@@ -37,14 +45,12 @@ TreeHeader header_of(const SurfaceTree& surface) {
   return header;
 }
 
-/// Cube of the typical radius of a surface's nodes: they tile an area.
-double typical_cube(const SphereTree& balls, int level) {
-  const double count = balls.count(level);
-  const double r = balls.header->root[3];
-  return r * r * r / (count * std::sqrt(count));
+bool opens_surface(const SphereTree& balls, int surface_level, const SphereTree& probes,
+                   int probe_level, double scale) noexcept {
+  return probe_level == 0 || (surface_level > kSphereLevel &&
+                              typical_cube(balls, surface_level) >=
+                                  scale * scale * scale * probes.typical_cube(probe_level));
 }
-
-}  // namespace
 
 SurfaceDescent::SurfaceDescent(const SurfaceTree& surface, const SphereTree& probes,
                                const RelativePose& pose, const DescentLimits& limits,
@@ -53,8 +59,8 @@ SurfaceDescent::SurfaceDescent(const SurfaceTree& surface, const SphereTree& pro
       probes_(probes),
       pose_(pose),
       map_(pose.a_from_b),
-      ball_header_(header_of(surface)),
-      balls_(tree_of(surface, ball_header_)),
+      ball_header_(ball_header(surface)),
+      balls_(ball_tree(surface, ball_header_)),
       precision_(precision_for(balls_, probes, pose)),
       scratch_(scratch),
       budget_(limits.max_visits),
@@ -68,11 +74,8 @@ void SurfaceDescent::run() noexcept {
   now.size = 1;
   scratch_.patches->forget();
   while (now.size > 0 && (surface_level_ > kSphereLevel || probe_level_ > 0)) {
-    const double cube = map_.scale * map_.scale * map_.scale;
     const bool open_surface_now =
-        probe_level_ == 0 ||
-        (surface_level_ > kSphereLevel &&
-         typical_cube(balls_, surface_level_) >= cube * probes_.typical_cube(probe_level_));
+        opens_surface(balls_, surface_level_, probes_, probe_level_, map_.scale);
     if (!(open_surface_now ? open_surface() : open_probes())) return;
   }
   if (now.size > 0) sum_leaves();

@@ -19,6 +19,15 @@ namespace ist {
 /// The volume that the spheres of B have inside the surface of A, each sphere's part being exact:
 /// V = Σ_j |b_j ∩ A| (docs/design.md 7).
 ///
+/// The balls of a surface as a tree whose spheres are blocks of triangles.
+TreeHeader ball_header(const SurfaceTree& surface);
+SphereTree ball_tree(const SurfaceTree& surface, const TreeHeader& header);
+
+/// Whether a stage opens the surface's nodes, those of ball_tree(), or the probing tree's. `scale`:
+/// of these in the surface's frame.
+bool opens_surface(const SphereTree& balls, int surface_level, const SphereTree& probes,
+                   int probe_level, double scale) noexcept;
+
 /// Level by level, pairs of a node of B and a node of A's surface; those of one node of B stand
 /// together. A node of B that is left without a partner is all inside or all outside.
 class SurfaceDescent {

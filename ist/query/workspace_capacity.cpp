@@ -1,0 +1,214 @@
+#include <ist/error.h>
+#include <ist/query.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "query/asset/surface_tree.h"
+#include "query/base/precision.h"
+#include "query/base/relative_pose.h"
+#include "query/descent/descent.h"
+#include "query/descent/open_runs.h"
+#include "query/field/surface_descent.h"
+
+namespace ist {
+namespace {
+
+using Balls = std::vector<NodeBall>;
+
+Balls balls_of(const SphereTree& tree, int level, double scale) {
+  Balls balls(tree.count(level));
+  for (std::uint32_t i = 0; i < balls.size(); ++i) {
+    balls[i] = tree.ball(level, i);
+    for (double& x : balls[i].centre) x *= scale;
+    balls[i].r *= scale;
+  }
+  return balls;
+}
+
+double largest(const Balls& balls) {
+  double r = 0;
+  for (const NodeBall& ball : balls) r = std::max(r, ball.r);
+  return r;
+}
+
+/// A ball of `radius` meets no more of the balls than this, wherever it lies: the most that come as
+/// near to a cell of a grid.
+std::size_t most_met(const Balls& balls, double radius) {
+  constexpr double kCells = 4e5, kCellsAReach = 3;
+  double low[3], size[3], sum = 0;
+  for (int k = 0; k < 3; ++k) {
+    double high = -HUGE_VAL;
+    low[k] = HUGE_VAL;
+    for (const NodeBall& ball : balls) {
+      low[k] = std::min(low[k], ball.centre[k] - ball.r - radius);
+      high = std::max(high, ball.centre[k] + ball.r + radius);
+    }
+    size[k] = high - low[k];
+  }
+  for (const NodeBall& ball : balls) sum += ball.r;
+  const double typical = sum / static_cast<double>(balls.size());
+  const double cell =
+      std::max((radius + typical) / kCellsAReach, std::cbrt(size[0] * size[1] * size[2] / kCells));
+  std::size_t count[3];
+  for (int k = 0; k < 3; ++k) count[k] = static_cast<std::size_t>(size[k] / cell) + 1;
+  std::vector<std::uint32_t> met(count[0] * count[1] * count[2]);
+  for (const NodeBall& ball : balls) {
+    const double reach = ball.r + radius;
+    std::size_t first[3], last[3];
+    for (int k = 0; k < 3; ++k) {
+      const double from = (ball.centre[k] - reach - low[k]) / cell;
+      first[k] = static_cast<std::size_t>(std::max(0.0, from - 1e-6));
+      last[k] = std::min(count[k] - 1, static_cast<std::size_t>(from + 2 * reach / cell + 1e-6));
+    }
+    // From the ball's centre to a layer of cells.
+    const auto gap = [&](int k, std::size_t i) {
+      const double to = low[k] + cell * static_cast<double>(i) - ball.centre[k];
+      return std::max({to, -to - cell, 0.0}) * (1 - 1e-9);
+    };
+    for (std::size_t z = first[2]; z <= last[2]; ++z)
+      for (std::size_t y = first[1]; y <= last[1]; ++y)
+        for (std::size_t x = first[0]; x <= last[0]; ++x)
+          if (std::hypot(gap(0, x), gap(1, y), gap(2, z)) <= reach)
+            ++met[(z * count[1] + y) * count[0] + x];
+  }
+  return *std::max_element(met.begin(), met.end());
+}
+
+/// At no pose do more pairs of balls meet: each of A meets the most that one of its size can.
+std::size_t most_pairs(const Balls& a, const Balls& b, double blur) {
+  constexpr double kAlike = 1.25;  // radii that are taken together
+  std::vector<double> radii;
+  for (const NodeBall& ball : a) radii.push_back(ball.r);
+  std::sort(radii.begin(), radii.end());
+  std::size_t pairs = 0;
+  for (auto from = radii.begin(); from != radii.end();) {
+    const auto to = std::upper_bound(from, radii.end(), kAlike * *from);
+    pairs += static_cast<std::size_t>(to - from) * most_met(b, *(to - 1) + blur);
+    from = to;
+  }
+  return pairs;
+}
+
+/// The capacity that every stage of some descents needs, the last stages first: they need most.
+class Capacity {
+ public:
+  void add_count(std::size_t pairs) { capacity_ = std::max(capacity_, pairs + kWidth); }
+
+  /// Of a Descent.
+  void add_trees(const SphereTree& a, const SphereTree& b, const RelativePose& pose) {
+    add_trees({a, b, pose}, a.top, b.top);
+  }
+
+  /// Of a SurfaceDescent.
+  void add_surface(const SurfaceTree& surface, const SphereTree& probes, const RelativePose& pose) {
+    const TreeHeader header = ball_header(surface);
+    const SphereTree balls = ball_tree(surface, header);
+    add_surface({balls, probes, pose}, balls.top, probes.top);
+  }
+
+  std::size_t value() const { return capacity_; }
+
+ private:
+  struct Trees {
+    const SphereTree& a;
+    const SphereTree& b;
+    const RelativePose& pose;
+  };
+
+  void add_trees(const Trees& trees, int level_a, int level_b) {
+    if (level_a <= 0 && level_b <= 0) return;
+    --(opens_a(trees.a, level_a, trees.b, level_b, trees.pose.a_from_b.scale) ? level_a : level_b);
+    add_trees(trees, level_a, level_b);
+    add_stage(trees, level_a, level_b, level_b);
+  }
+
+  void add_surface(const Trees& trees, int level_a, int level_b) {
+    if (level_a <= kSphereLevel && level_b <= 0) return;
+    const int opened_b = level_b;
+    --(opens_surface(trees.a, level_a, trees.b, level_b, trees.pose.a_from_b.scale) ? level_a
+                                                                                    : level_b);
+    add_surface(trees, level_a, level_b);
+    add_stage(trees, level_a, level_b, opened_b);
+  }
+
+  /// `opened_b`: of B's node whose partners are all opened together, if it is not `level_b`.
+  void add_stage(const Trees& trees, int level_a, int level_b, int opened_b) {
+    const std::size_t count_a = trees.a.count(level_a), count_b = trees.b.count(level_b);
+    const bool groups = opened_b != level_b;
+    const std::size_t most = count_a * count_b + kWidth * (groups ? count_a : 1);
+    if (most <= capacity_) return;
+    const double scale = trees.pose.a_from_b.scale;
+    const double roots = trees.a.header->root[3] + scale * trees.b.header->root[3];
+    // What the kernels' rounding may let through.
+    const double blur = distance_error(precision_for(trees.a, trees.b, trees.pose), 32 * roots);
+    const Balls a = balls_of(trees.a, level_a, 1), b = balls_of(trees.b, level_b, scale);
+    std::size_t group = 1;
+    if (groups)
+      group = std::min(count_a, most_met(a, largest(balls_of(trees.b, opened_b, scale)) + blur));
+    const std::size_t pairs = std::min(most_pairs(a, b, blur), most_pairs(b, a, blur));
+    capacity_ = std::max(capacity_, std::min(most, pairs + kWidth * group));
+  }
+
+  std::size_t capacity_ = kWidth * OpenRuns::kMostVisits;
+};
+
+RelativePose scales_of(const std::optional<RelativePose>& pose) {
+  if (!pose)
+    throw Error("workspace_capacity: an asset is empty, or a scale is not positive and finite");
+  return *pose;
+}
+
+std::size_t capacity_of(const PlacedTree& a, const PlacedTree& b) {
+  const PlacedTree still_a{a.tree, {}, a.scale}, still_b{b.tree, {}, b.scale};
+  const RelativePose a_from_b = scales_of(relative_pose(still_a, still_b));
+  const RelativePose b_from_a = scales_of(relative_pose(still_b, still_a));
+  Capacity capacity;
+  if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0) return capacity.value();
+  const auto add = [&](const TreeHeader& tree_a, const TreeHeader& tree_b) {
+    const SphereTree spheres_a(a.tree.header(), tree_a), spheres_b(b.tree.header(), tree_b);
+    capacity.add_trees(spheres_a, spheres_b, a_from_b);
+    if (a.tree.has_field()) capacity.add_surface(surface_tree(a.tree), spheres_b, a_from_b);
+    if (b.tree.has_field()) capacity.add_surface(surface_tree(b.tree), spheres_a, b_from_a);
+  };
+  const AssetHeader &header_a = a.tree.header(), &header_b = b.tree.header();
+  add(header_a.inner_tree, header_b.inner_tree);
+  for (std::uint32_t i = 0; i <= header_a.detail_count; ++i)
+    for (std::uint32_t k = 0; k <= header_b.detail_count; ++k)
+      add(matched_tree(header_a, i), matched_tree(header_b, k));
+  return capacity.value();
+}
+
+std::size_t capacity_of(const PlacedField& a, const PlacedTree& b) {
+  const MeshField* const mesh = std::get_if<MeshField>(&a.field);
+  if (mesh != nullptr && !mesh->tree.has_field())
+    throw Error("workspace_capacity: the asset of a mesh field keeps no surface");
+  const PlacedTree still{b.tree, {}, b.scale};
+  const RelativePose pose =
+      scales_of(mesh != nullptr ? relative_pose(PlacedTree{mesh->tree, {}, a.scale}, still)
+                                : relative_pose(Pose{}, a.scale, still));
+  Capacity capacity;
+  if (b.tree.sphere_count() == 0) return capacity.value();
+  for (const Measure measure : {Measure::matched, Measure::inner}) {
+    const SphereTree tree = sphere_tree(b.tree, measure);
+    if (mesh != nullptr)
+      capacity.add_surface(surface_tree(mesh->tree), tree, pose);
+    else
+      capacity.add_count(tree.count(0));
+  }
+  return capacity.value();
+}
+
+}  // namespace
+
+std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b) {
+  const auto* const tree_a = std::get_if<PlacedTree>(&a.placed);
+  const auto* const tree_b = std::get_if<PlacedTree>(&b.placed);
+  if (tree_a != nullptr && tree_b != nullptr) return capacity_of(*tree_a, *tree_b);
+  if (tree_b != nullptr) return capacity_of(*std::get_if<PlacedField>(&a.placed), *tree_b);
+  if (tree_a != nullptr) return capacity_of(*std::get_if<PlacedField>(&b.placed), *tree_a);
+  throw Error("workspace_capacity: no query takes two fields");
+}
+
+}  // namespace ist
