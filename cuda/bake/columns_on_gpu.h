@@ -11,7 +11,7 @@
 namespace ist::gpu {
 
 /// A mesh cut into columns and the octree over them, in device memory
-/// (packing/calibrate/column_lattice.h, packing/calibrate/power_cells.h).
+/// (packing/calibrate/column_lattice.h, packing/calibrate/host_calibration.h).
 class ColumnsOnGpu {
  public:
   ColumnsOnGpu(Queue& queue, const WideTree& mesh, const ColumnPlan& plan);
