@@ -16,15 +16,10 @@
 
 #include "app/bake_library.h"
 #include "app/commands.h"
-#include "app/device_option.h"
-#include "app/file_options.h"
 #include "app/interrupt.h"
-#include "app/link_meshes.h"
 #include "app/mesh_notes.h"
-#include "app/number_options.h"
+#include "app/options.h"
 #include "app/progress_line.h"
-#include "app/robot_options.h"
-#include "app/setting_options.h"
 #include "app/write_mesh.h"
 #include "library/asset_summary.h"
 #include "library/settings/bake_settings.h"
@@ -84,20 +79,9 @@ Json partners_json(const std::vector<PartnerError>& partners) {
 
 Baked bake_interruptibly(const ClosedMesh& mesh, const BakeSettings& settings, bool quiet) {
   constexpr double kPatience = 0.15;  // [s] some steps take seconds, and leave nothing half done
-  const InterruptGuard guard(kPatience);
-  ProgressLine line(quiet, settings.target.relative_error > 0);
-  try {
-    const auto show = [&](const Progress& progress) {
-      line.show(progress);
-      return !interrupted();
-    };
-    Baked baked = bake_now(mesh, settings, show);
-    exit_if_interrupted();
-    return baked;
-  } catch (const Error&) {
-    exit_if_interrupted();
-    throw;
-  }
+  return interruptibly(
+      kPatience, quiet, settings.target.relative_error > 0,
+      [&](const ProgressCallback& progress) { return bake_now(mesh, settings, progress); });
 }
 
 /// The folder, made if it is not there. Throws Error.

@@ -21,10 +21,8 @@
 #include <utility>
 
 #include "app/commands.h"
-#include "app/device_option.h"
-#include "app/file_options.h"
 #include "app/interrupt.h"
-#include "app/number_options.h"
+#include "app/options.h"
 #include "app/summary_table.h"
 #include "library/asset_summary.h"
 #include "library/coarseness.h"

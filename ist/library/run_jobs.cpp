@@ -21,10 +21,8 @@
 #include <utility>
 
 #include "bake/asset/atomic_file.h"
-#include "library/gpu_places.h"
 #include "library/input_mesh.h"
 #include "library/job_queue.h"
-#include "library/memory.h"
 #include "robot/link_mesh.h"
 
 namespace ist {

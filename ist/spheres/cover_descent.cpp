@@ -8,9 +8,9 @@
 #include <span>
 #include <unordered_set>
 
-#include "spheres/cell_key.h"
 #include "spheres/cover_proof.h"
 #include "spheres/open_corners.h"
+#include "spheres/point_grid.h"
 #include "spheres/protrusion.h"
 
 namespace ist {

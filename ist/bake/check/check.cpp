@@ -9,11 +9,9 @@
 #include <vector>
 
 #include "bake/check/check_field.h"
-#include "bake/check/check_kept_mesh.h"
 #include "bake/check/check_spheres.h"
 #include "bake/check/check_surface.h"
 #include "bake/check/check_tally.h"
-#include "bake/check/check_tree.h"
 #include "bake/check/checked_solid.h"
 #include "mesh/mesh_moments.h"
 #include "mesh/mesh_solid.h"
