@@ -111,8 +111,6 @@ Recentred recentre(const Vector3d& start, std::span<const Vector3d> points,
   return {c, at.excess()};
 }
 
-using Eigen::Vector3d;
-
 constexpr double kFirstStep = 0.08;  ///< by which the level is lowered at a time
 constexpr double kLastStep = 0.003;
 constexpr double kHeld = 0.002;       ///< of the level: a gap so small is none

@@ -72,7 +72,6 @@ bool line_parts(const Side& of, const Side& other, const int x, const int y) {
   return false;
 }
 
-using Point = Eigen::Vector3d;
 using Corners = std::array<Point, 3>;
 
 int side_of(const Corners& t, const Point& p) {
