@@ -6,7 +6,6 @@
 #include <spdlog/spdlog.h>
 
 #include <unistd.h>
-#include <cctype>
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
@@ -159,12 +158,6 @@ void write_text(const std::string& path, std::string_view text) {
   if (!is_standard_output(path)) return write_atomically(path, text);
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size())
     throw Error("standard output: cannot write: " + std::generic_category().message(errno));
-}
-
-std::string ending_of(const std::string& path) {
-  std::string ending = std::filesystem::path(path).extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending;
 }
 
 void add_device_option(CLI::App* command, std::string& name, const std::string& help) {

@@ -14,6 +14,7 @@
 #include "library/robot_assets.h"
 #include "library/settings/bake_settings.h"
 #include "library/settings/numbers.h"
+#include "mesh/import/source_file.h"
 
 // Options that several commands have, and the files that these name. A value that an option does
 // not take ends with exit code 2, the option's name and what it takes.
@@ -60,9 +61,6 @@ void require_output(const std::string& path, const std::string& input, const std
 
 /// The whole file, or not at all; "-" is standard output. Throws Error.
 void write_text(const std::string& path, std::string_view text);
-
-/// What a file name ends in, in small letters: ".csv" of "A.CSV".
-std::string ending_of(const std::string& path);
 
 /// Adds --device: auto, cpu or cuda.
 void add_device_option(CLI::App* command, std::string& name, const std::string& help);

@@ -4,7 +4,6 @@
 
 #include <unistd.h>
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -74,8 +73,7 @@ constexpr std::uint64_t kUnlimited = 200'000;  ///< spheres where no count is se
 
 /// The fewest bytes of a file that a triangle takes.
 std::uint64_t bytes_of_triangle(const std::string& path) {
-  std::string ending = fs::path(path).extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string ending = ending_of(path);
   if (ending == ".stl") return 50;
   if (ending == ".obj" || ending == ".off" || ending == ".dae") return 30;
   return 18;

@@ -291,11 +291,7 @@ class Run {
       if (place) place->hold(is_of_gpu(progress));
       return !cancelled_;
     };
-    Asset asset = settings.surface_only
-                      ? bake_surface(mesh, packing.surface, packing.threads, go_on)
-                  : settings.target.relative_error > 0
-                      ? bake_to_error(mesh, settings.target, packing, go_on).asset
-                      : bake(mesh, packing, go_on);
+    Asset asset = bake_as_asked(mesh, settings, go_on).asset;
     // A packing that was cancelled ends with what there is.
     if (cancelled_) throw Cancelled();
     return asset;

@@ -2,24 +2,15 @@
 
 #include <ist/error.h>
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
 #include <algorithm>
 #include <atomic>
 
 #include "packing/grids/discrete_distance.h"
 #include "packing/grids/local_winding.h"
+#include "stage/thread_arena.h"
 
 namespace ist::packing {
 namespace {
-
-template <class Work>
-void for_each_index(std::size_t count, std::size_t grain, const Work& work) {
-  oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, count, grain),
-                            [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
-                              for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
-                            });
-}
 
 /// Adds, and returns what was there before.
 template <class T>
@@ -59,7 +50,7 @@ HostGrid::HostGrid(const MeshView& mesh) : mesh_(mesh), triangles_(mesh.triangle
   GridScene scene;
   scene.corners = mesh.triangles;
   scene.vertices = mesh.vertices;
-  for_each_index(triangles_.size(), 256, [&](std::size_t t) {
+  for_each_index(0, triangles_.size(), 256, [&](std::size_t t) {
     const Corners c = corners_of(scene, static_cast<std::uint32_t>(t));
     triangles_[t] = make_grid_triangle(c.p[0], c.p[1], c.p[2]);
   });
@@ -124,7 +115,7 @@ void HostGrid::update(const std::vector<Sphere>& spheres, std::size_t first_new)
 void HostGrid::count_triangles(std::vector<std::uint32_t>& counts,
                                std::vector<std::int32_t>& crossings) const {
   const GridScene mesh = scene({});
-  for_each_index(triangles_.size(), 64, [&](std::size_t t) {
+  for_each_index(0, triangles_.size(), 64, [&](std::size_t t) {
     const Corners corners = corners_of(mesh, static_cast<std::uint32_t>(t));
     const TriangleCells cells = cells_of(layout_, corners);
     for_rows(cells.range(), [&](int j, int k) {
@@ -144,7 +135,7 @@ void HostGrid::count_triangles(std::vector<std::uint32_t>& counts,
 void HostGrid::classify(const std::vector<std::uint32_t>& counts,
                         std::vector<std::int32_t>& windings) {
   words_.assign(cells(), 0);
-  for_each_index(static_cast<std::size_t>(layout_.n[1]) * static_cast<std::size_t>(layout_.n[2]),
+  for_each_index(0, static_cast<std::size_t>(layout_.n[1]) * static_cast<std::size_t>(layout_.n[2]),
                  16, [&](std::size_t row) {
                    const std::size_t first = row * static_cast<std::size_t>(layout_.n[0]);
                    std::int32_t winding = 0, last = 0;
@@ -163,7 +154,7 @@ void HostGrid::classify(const std::vector<std::uint32_t>& counts,
 
 /// Cells wholly inside new spheres go inactive.
 void HostGrid::cover(const std::vector<Sphere>& spheres, std::size_t first_new) {
-  for_each_index(spheres.size() - first_new, 4, [&](std::size_t n) {
+  for_each_index(0, spheres.size() - first_new, 4, [&](std::size_t n) {
     const Sphere& s = spheres[first_new + n];
     const CellRange range = sphere_range(layout_, s);
     for_rows(range, [&](int j, int k) {
@@ -188,7 +179,7 @@ std::uint32_t HostGrid::place_of(std::uint32_t cell) const {
 void HostGrid::fill_triangle_lists() {
   const GridScene mesh = scene({});
   std::vector<std::uint32_t> filled(records_.size());
-  for_each_index(triangles_.size(), 64, [&](std::size_t t) {
+  for_each_index(0, triangles_.size(), 64, [&](std::size_t t) {
     const TriangleCells cells = cells_of(layout_, corners_of(mesh, static_cast<std::uint32_t>(t)));
     for_rows(cells.range(), [&](int j, int k) {
       for (int i = cells.range().lo[0]; i <= cells.range().hi[0]; ++i) {
@@ -236,7 +227,7 @@ void HostGrid::hash_words() {
 void HostGrid::list_spheres(const std::vector<Sphere>& spheres) {
   for (CellRecord& r : records_) r.sphere_count = 0;
   const auto for_listed = [&](const auto& visit) {
-    for_each_index(spheres.size(), 16, [&](std::size_t n) {
+    for_each_index(0, spheres.size(), 16, [&](std::size_t n) {
       const CellRange range = sphere_range(layout_, spheres[n]);
       for_rows(range, [&](int j, int k) {
         for_sphere_row(layout_, spheres[n], range, j, k, false, [&](std::uint32_t cell, bool) {
