@@ -31,6 +31,14 @@ struct Groups {
   std::vector<std::uint32_t> representative;  ///< [group] a triangle of largest area
 };
 
+std::array<Eigen::Vector3d, 3> corners_in(const MeshView& mesh, std::uint32_t triangle) {
+  std::array<Point, 3> corners;
+  for (std::size_t k = 0; k < 3; ++k)
+    corners[k] = Eigen::Map<const Point>(
+        mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{triangle} + k]});
+  return corners;
+}
+
 Groups find_groups(const MeshView& mesh, const std::vector<std::uint8_t>& apart) {
   RawArray<Triangle> triangles(mesh.triangle_count);
   tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
@@ -57,14 +65,6 @@ Groups find_groups(const MeshView& mesh, const std::vector<std::uint8_t>& apart)
     if (area[t] >= 0 && (largest == kNoTriangle || area[t] > area[largest])) largest = t;
   }
   return groups;
-}
-
-std::array<Eigen::Vector3d, 3> corners_in(const MeshView& mesh, std::uint32_t triangle) {
-  std::array<Point, 3> corners;
-  for (std::size_t k = 0; k < 3; ++k)
-    corners[k] = Eigen::Map<const Point>(
-        mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{triangle} + k]});
-  return corners;
 }
 
 /// The winding number just outside a part of a triangle, where its normal points to; nothing where
