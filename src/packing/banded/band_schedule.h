@@ -5,7 +5,7 @@
 #include "numerics/hashing.h"
 #include "numerics/roots.h"
 #include "packing/base/certificate.h"
-#include "packing/base/packing_settings.h"
+#include "packing/base/packing_limits.h"
 
 namespace ist::packing {
 
