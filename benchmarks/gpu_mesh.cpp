@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "cuda/device_mesh.h"
-#include "cuda/mesh_queries.h"
 #include "report.h"
+#include "support/gpu_mesh_queries.h"
 #include "support/shared_data.h"
 #include "timing.h"
 

@@ -4,9 +4,7 @@
 
 #include <ist/error.h>
 
-#include "cuda/bake/cover_on_gpu.h"
-#include "cuda/bake/protrusion_on_gpu.h"
-#include "cuda/bake/relax_on_gpu.h"
+#include "cuda/bake/on_gpu.h"
 #include "cuda/banded/banded_pack.h"
 #include "cuda/device_mesh.h"
 #include "cuda/grids/device_grid_rounds.h"

@@ -1,20 +1,42 @@
 #include "cuda/triangle_order.h"
 
-#include <algorithm>
-#include <bit>
-
-#include "cuda/launch.h"
-#include "cuda/radix_sort.h"
-#include "cuda/warp_team.h"
-#include "mesh/wide_build.h"
-
 // Parts of a power of two of triangles begin at multiples of it, so that a place in the order tells
 // its part. The triangles of one last node are cut in halves in shared memory; larger parts, by
 // sorting all of them at once, in 4, 4 and 2 a level of nodes: fewer sorts than halving, and no
 // worse.
+#include <cub/device/device_radix_sort.cuh>
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "cuda/launch.h"
+#include "cuda/warp_team.h"
+#include "mesh/wide_build.h"
 
 namespace ist::gpu {
 namespace {
+
+/// Sorts pairs by the lowest `bits` bits of their keys, ascending; equal keys keep their order. The
+/// arrays are of the same size and come back sorted; in between twice their memory is in use.
+void sort_pairs(Queue& queue, DeviceArray<std::uint32_t>& keys, DeviceArray<std::uint32_t>& values,
+                int bits) {
+  const auto count = static_cast<int>(keys.size());
+  DeviceArray<std::uint32_t> other_keys(queue, keys.size());
+  DeviceArray<std::uint32_t> other_values(queue, values.size());
+  cub::DoubleBuffer<std::uint32_t> key_buffers(keys.data(), other_keys.data());
+  cub::DoubleBuffer<std::uint32_t> value_buffers(values.data(), other_values.data());
+  std::size_t bytes = 0;
+  check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, key_buffers, value_buffers, count, 0, bits,
+                                        queue.stream()),
+        "preparing a sort");
+  DeviceArray<std::byte> scratch(queue, bytes);
+  check(cub::DeviceRadixSort::SortPairs(scratch.data(), bytes, key_buffers, value_buffers, count, 0,
+                                        bits, queue.stream()),
+        "sorting");
+  if (key_buffers.Current() != keys.data()) std::swap(keys, other_keys);
+  if (value_buffers.Current() != values.data()) std::swap(values, other_values);
+}
 
 constexpr unsigned kThreads = 1024;
 constexpr std::uint32_t kNodeTriangles = kWideWidth * kWideWidth;  ///< of a node of the last level

@@ -1,4 +1,4 @@
-#include "cuda/bake/cover_on_gpu.h"
+#include "cuda/bake/on_gpu.h"
 
 #include "cuda/device_array.h"
 #include "cuda/warp_team.h"

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <span>
 
-#include "cuda/grids/grid_cells.h"
 #include "cuda/grids/grid_triangles.h"
 #include "cuda/launch.h"
 #include "cuda/prefix_sum.h"
@@ -14,6 +13,27 @@
 
 namespace ist::gpu {
 namespace {
+
+/// The words of a distance grid, to be changed.
+struct GridWords {
+  std::uint32_t* words = nullptr;
+  const std::uint32_t* keys = nullptr;  ///< nullptr: not hashed
+  std::uint32_t key_mask = 0;
+
+  /// nullptr if the cell is not active.
+  __device__ std::uint32_t* find(std::uint32_t cell) const {
+    using packing::DistanceGrid;
+    std::uint32_t at = cell;
+    if (keys != nullptr) {
+      at = DistanceGrid::hashed(cell) & key_mask;
+      while (keys[at] != cell) {
+        if (keys[at] == DistanceGrid::kEmptyKey) return nullptr;
+        at = (at + 1) & key_mask;
+      }
+    }
+    return words[at] == DistanceGrid::kInactive ? nullptr : words + at;
+  }
+};
 
 using packing::CellRange;
 using packing::CellRecord;

@@ -1,31 +1,36 @@
 #include <fmt/format.h>
+#include <ist/asset_layout.h>
+#include <ist/bake.h>
+#include <ist/error.h>
 #include <spdlog/spdlog.h>
+#include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <memory>
-
-#include <ist/bake.h>
-#include <ist/error.h>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <vector>
 
 #include "app/bake_library.h"
-#include "app/bake_robot.h"
 #include "app/commands.h"
-#include "app/device_option.h"
-#include "app/file_options.h"
 #include "app/interrupt.h"
 #include "app/mesh_notes.h"
-#include "app/number_options.h"
+#include "app/options.h"
 #include "app/progress_line.h"
-#include "app/setting_options.h"
 #include "app/write_mesh.h"
 #include "library/asset_summary.h"
-#include "library/coarseness.h"
+#include "library/settings/bake_settings.h"
 #include "library/text.h"
-#include "mesh/mesh_files.h"
+#include "robot/link_mesh.h"
 
 namespace ist::app {
 namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
 
 struct BakeOptions {
   std::string mesh, output, closed_mesh;
@@ -37,24 +42,6 @@ struct BakeOptions {
   RobotOptions robot;
 };
 
-/// An asset, and what its partners erred where an error was asked for.
-struct Baked {
-  Asset asset;
-  std::vector<PartnerError> partners = {};
-};
-
-Baked bake_now(const ClosedMesh& mesh, const BakeSettings& asked,
-               const ProgressCallback& progress) {
-  const PackingSettings& settings = asked.packing;
-  if (asked.surface_only) return {bake_surface(mesh, settings.surface, settings.threads, progress)};
-  if (!(asked.target.relative_error > 0)) return {bake(mesh, settings, progress)};
-  TargetedAsset found = bake_to_error(mesh, asked.target, settings, progress);
-  Baked baked = {std::move(found.asset)};
-  for (const PartnerError& partner : found.partners)
-    if (partner.poses > 0) baked.partners.push_back(partner);
-  return baked;
-}
-
 /// "copy 1.4 % (71), plane 0.3 % (24), …".
 std::string describe_partners(const std::vector<PartnerError>& partners) {
   std::string text;
@@ -64,8 +51,8 @@ std::string describe_partners(const std::vector<PartnerError>& partners) {
   return text;
 }
 
-nlohmann::ordered_json partners_json(const std::vector<PartnerError>& partners) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+Json partners_json(const std::vector<PartnerError>& partners) {
+  Json list = Json::array();
   for (const PartnerError& of : partners)
     list.push_back({{"partner", name_of(of.partner)}, {"error", of.median}, {"poses", of.poses}});
   return list;
@@ -73,19 +60,64 @@ nlohmann::ordered_json partners_json(const std::vector<PartnerError>& partners) 
 
 Baked bake_interruptibly(const ClosedMesh& mesh, const BakeSettings& settings, bool quiet) {
   constexpr double kPatience = 0.15;  // [s] some steps take seconds, and leave nothing half done
-  const InterruptGuard guard(kPatience);
-  ProgressLine line(quiet, settings.target.relative_error > 0);
-  try {
-    const auto show = [&](const Progress& progress) {
-      line.show(progress);
-      return !interrupted();
-    };
-    Baked baked = bake_now(mesh, settings, show);
-    exit_if_interrupted();
-    return baked;
-  } catch (const Error&) {
-    exit_if_interrupted();
-    throw;
+  return interruptibly(
+      kPatience, quiet, settings.target.relative_error > 0,
+      [&](const ProgressCallback& progress) { return bake_as_asked(mesh, settings, progress); });
+}
+
+/// The folder, made if it is not there. Throws Error.
+void require_folder(const std::string& folder) {
+  std::error_code error;
+  if (fs::exists(folder, error) && !fs::is_directory(folder, error))
+    throw Error(folder + ": is a file; name a folder for the robot's assets");
+  fs::create_directories(folder, error);
+  if (error) throw Error(folder + ": cannot create the folder: " + error.message());
+}
+
+/// Bakes every mesh of every link of the URDF, in the link's frame, and writes assets and the
+/// index, all or nothing: files are written once the last bake is done. Boxes, cylinders and
+/// spheres become field descriptions of the command line with a pose. Throws Error.
+void bake_robot(const BakeOptions& options, const BakeSettings& settings) {
+  const auto start = std::chrono::steady_clock::now();
+  const RobotModel robot = read_robot_for(options.robot, options.mesh);
+  Job like;
+  like.settings = settings;
+  const RobotAssets all = robot_assets(robot, options.robot.shapes(), "", like);
+  const PackagePaths paths = package_paths(options.mesh, options.robot);
+  LinkMeshes meshes(options.mesh, settings.mesh);
+  std::vector<std::optional<ClosedMesh>> closed;
+  for (std::size_t i = 0; i < all.jobs.size(); ++i) {
+    closed.emplace_back();
+    for (const std::string& link : all.links[i])
+      closed[i] =
+          meshes.close(link, [&] { return mesh_of(*all.jobs[i].shape, paths, options.mesh).mesh; });
+  }
+  meshes.finish();
+  std::vector<Asset> assets;
+  for (const auto& mesh : closed)
+    assets.push_back(bake_interruptibly(*mesh, settings, options.quiet).asset);
+  require_folder(options.output);
+  const std::string index_file = (fs::path(options.output) / (all.name + ".json")).string();
+  const auto file_of = [&](std::size_t i) { return all.jobs[i].name + ".ist"; };
+  {
+    const InterruptGuard guard;
+    for (std::size_t i = 0; i < assets.size(); ++i)
+      assets[i].save(fs::path(options.output) / file_of(i));
+    write_text(index_file, json_text(all.index) + "\n");
+  }
+  exit_if_interrupted();
+  const double seconds = seconds_since(start);
+  if (options.json) {
+    Json result = {{"index", index_file}};
+    result.update(all.index);
+    result["seconds"] = seconds;
+    fmt::print("{}\n", json_text(result));
+  } else if (!options.quiet) {
+    fmt::print("{}\n", index_file);
+    for (std::size_t i = 0; i < assets.size(); ++i)
+      fmt::print("  {:<32} {:>6} spheres, coverage {:.1f} %\n", file_of(i),
+                 assets[i].view().header().sphere_count, 100 * assets[i].view().header().coverage);
+    fmt::print("  assets {}, time {:.2f} s\n", assets.size(), seconds);
   }
 }
 
@@ -98,15 +130,13 @@ void run_bake(const BakeOptions& options) {
     require_output(options.output, options.mesh, "the asset");
     if (has_mesh_ending(options.output))
       throw Error(options.output + ": has the extension of a mesh; name the asset " +
-                  std::filesystem::path(options.output).replace_extension(".ist").string());
+                  fs::path(options.output).replace_extension(".ist").string());
   }
   if (!options.closed_mesh.empty())
     require_output(options.closed_mesh, options.mesh, "the closed mesh");
   settings.packing.device = usable_device(options.device);
   if (!settings.surface_only) announce_device(settings.packing.device);
-  if (robot)
-    return bake_robot(
-        {options.mesh, options.output, settings, options.robot, options.json, options.quiet});
+  if (robot) return bake_robot(options, settings);
 
   const auto start = std::chrono::steady_clock::now();
   const auto [declared, mesh] = read_mesh_aloud(options.mesh, settings.mesh);
@@ -120,14 +150,10 @@ void run_bake(const BakeOptions& options) {
   }
   exit_if_interrupted();
 
-  if (settings.target.relative_error > 0 && !asset.view().predicted_errors().target_met())
-    spdlog::warn("{}: {}", options.output, describe_target(asset.view()));
-  if (const std::string coarse = describe_coarseness(asset.view()); !coarse.empty())
-    spdlog::warn("{}: {}", options.output, coarse);
-  if (const std::string twice = describe_counted_twice(asset.view()); !twice.empty())
-    spdlog::warn("{}: {}", options.output, twice);
+  for (const std::string& warning : warnings_of(asset.view()))
+    spdlog::warn("{}: {}", options.output, warning);
   if (options.json) {
-    nlohmann::ordered_json result = {{"asset", options.output}, {"mesh", options.mesh}};
+    Json result = {{"asset", options.output}, {"mesh", options.mesh}};
     result.update(asset_json(asset.view()));
     result["declared"] = declared_json(declared);
     result["notes"] = mesh.report.notes;

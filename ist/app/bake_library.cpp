@@ -1,13 +1,17 @@
 #include "app/bake_library.h"
 
 #include <fmt/format.h>
+#include <ist/error.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
+#include <unistd.h>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
+#include <deque>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -16,14 +20,9 @@
 #include <system_error>
 #include <utility>
 
-#include <ist/error.h>
-
 #include "app/commands.h"
-#include "app/device_option.h"
-#include "app/file_options.h"
 #include "app/interrupt.h"
-#include "app/library_progress.h"
-#include "app/number_options.h"
+#include "app/options.h"
 #include "app/summary_table.h"
 #include "library/asset_summary.h"
 #include "library/coarseness.h"
@@ -34,6 +33,83 @@
 
 namespace ist::app {
 namespace {
+
+constexpr const char* kWipe = "\r\033[K";
+constexpr double kWindow = 30;  // [s] over which the rate is taken
+
+double seconds(std::chrono::steady_clock::duration time) {
+  return std::chrono::duration<double>(time).count();
+}
+
+/// "45 s", "3 min 20 s", "2 h 5 min".
+std::string in_words(double time) {
+  const auto s = static_cast<std::uint64_t>(std::ceil(time));
+  if (s < 60) return fmt::format("{} s", s);
+  if (s < 3600) return fmt::format("{} min {} s", s / 60, s % 60);
+  return fmt::format("{} h {} min", s / 3600, s % 3600 / 60);
+}
+
+/// On a terminal one line on stderr that is written over and over, with rate and time left, and
+/// what failed above it; elsewhere a line an asset.
+class LibraryProgress final : public RunObserver {
+ public:
+  LibraryProgress(std::size_t jobs, bool quiet)
+      : jobs_(jobs), quiet_(quiet), line_(!quiet && isatty(STDERR_FILENO) == 1) {}
+
+  void finished(const JobResult& result) override {
+    ++done_;
+    cached_ += result.status == JobStatus::cached ? 1 : 0;
+    ends_.push_back(Clock::now());
+    if (line_) fmt::print(stderr, "{}", kWipe);
+    std::fflush(stderr);
+    const std::string place = fmt::format("[{}/{}] {}", done_, jobs_, result.name);
+    if (result.status == JobStatus::failed) {
+      ++failed_;
+      spdlog::error("{}: failed: {}", place, result.message);
+    } else {
+      if (!line_)
+        spdlog::info("{}: {} in {:.2f} s, {} spheres, {:.1f} %", place, name_of(result.status),
+                     result.seconds, grouped(result.spheres), 100 * result.coverage);
+      for (const std::string& warning : result.warnings) spdlog::warn("{}: {}", place, warning);
+    }
+  }
+
+  void wait_a_little() override {
+    if (!line_) return;
+    const double now = rate();
+    std::string left;
+    if (now > 0)
+      left = fmt::format("  {:.3g} a second  {} left", now,
+                         in_words(static_cast<double>(jobs_ - done_) / now));
+    fmt::print(stderr, "{}{} of {} assets  {} cached  {} failed{}  {}", kWipe, grouped(done_),
+               grouped(jobs_), grouped(cached_), grouped(failed_), left,
+               interrupted() ? "stopping" : in_words(seconds(Clock::now() - start_)));
+    std::fflush(stderr);
+  }
+
+  bool stop() override { return interrupted(); }
+
+  /// wipes the line
+  void end() {
+    if (line_) fmt::print(stderr, "{}", kWipe);
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  /// [1/s] of the last half minute; 0: nothing ended
+  double rate() {
+    const Clock::time_point now = Clock::now();
+    while (!ends_.empty() && seconds(now - ends_.front()) > kWindow) ends_.pop_front();
+    const double window = std::min(seconds(now - start_), kWindow);
+    return window > 0 ? static_cast<double>(ends_.size()) / window : 0;
+  }
+
+  const std::size_t jobs_;
+  const bool quiet_, line_;
+  const Clock::time_point start_ = Clock::now();
+  std::size_t done_ = 0, cached_ = 0, failed_ = 0;
+  std::deque<Clock::time_point> ends_;  ///< of the last half minute
+};
 
 namespace fs = std::filesystem;
 
@@ -119,18 +195,6 @@ std::string cache_folder(const LibraryOptions& options) {
   return from_environment != nullptr ? from_environment : "";
 }
 
-std::vector<std::string> warnings_of(const TreeView& tree) {
-  std::vector<std::string> warnings;
-  if (const PredictedErrors errors = tree.predicted_errors();
-      errors.target_error > 0 && !errors.target_met())
-    warnings.push_back(describe_target(tree));
-  if (std::string coarse = describe_coarseness(tree); !coarse.empty())
-    warnings.push_back(std::move(coarse));
-  if (std::string twice = describe_counted_twice(tree); !twice.empty())
-    warnings.push_back(std::move(twice));
-  return warnings;
-}
-
 RunSettings settings_for(const LibraryRun& run) {
   RunSettings settings;
   settings.output = run.output;
@@ -143,6 +207,18 @@ RunSettings settings_for(const LibraryRun& run) {
 }
 
 }  // namespace
+
+std::vector<std::string> warnings_of(const TreeView& tree) {
+  std::vector<std::string> warnings;
+  if (const PredictedErrors errors = tree.predicted_errors();
+      errors.target_error > 0 && !errors.target_met())
+    warnings.push_back(describe_target(tree));
+  if (std::string coarse = describe_coarseness(tree); !coarse.empty())
+    warnings.push_back(std::move(coarse));
+  if (std::string twice = describe_counted_twice(tree); !twice.empty())
+    warnings.push_back(std::move(twice));
+  return warnings;
+}
 
 void add_library_options(CLI::App* command, LibraryOptions& options) {
   CLI::Option* const manifest =

@@ -3,6 +3,9 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <string>
+#include <vector>
+
+#include <ist/tree_view.h>
 
 namespace ist::app {
 
@@ -28,5 +31,8 @@ struct LibraryRun {
 /// Bakes the manifest's assets. Throws Error, and ExitCode: 1 where an asset failed, 2 where the
 /// manifest has mistakes, 130 after Ctrl-C.
 void run_library(const LibraryRun& run);
+
+/// What is wrong with an asset that was baked: a missed target, coarse spheres, overlapping parts.
+std::vector<std::string> warnings_of(const TreeView& tree);
 
 }  // namespace ist::app

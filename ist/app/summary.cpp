@@ -1,17 +1,154 @@
+#include "library/summary.h"
+
+#include <fmt/format.h>
+#include <ist/bake.h>
+#include <ist/error.h>
+#include <ist/mass_properties.h>
+#include <ist/surface.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "app/commands.h"
-#include "app/file_options.h"
 #include "app/interrupt.h"
-#include "app/summary_page.h"
+#include "app/options.h"
 #include "app/summary_table.h"
-#include "library/summary.h"
+#include "library/text.h"
 
 namespace ist::app {
 namespace {
+
+using Eigen::Vector3d;
+
+constexpr int kSide = 96;  ///< [pixels] of a picture, a multiple of 4
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '&')
+      out += "&amp;";
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '>')
+      out += "&gt;";
+    else
+      out += c;
+  }
+  return out;
+}
+
+std::string base64(const std::string& bytes) {
+  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t three = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      three = three << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+    for (std::size_t k = 0; k < 4; ++k)
+      out += i + k > bytes.size() ? '=' : kDigits[three >> (18 - 6 * k) & 63];
+  }
+  return out;
+}
+
+/// A bitmap of grey values, the lowest row first.
+std::string bitmap(const std::array<unsigned char, kSide * kSide>& grey) {
+  const auto word = [](std::uint32_t value, std::size_t bytes) {
+    std::string out;
+    for (std::size_t k = 0; k < bytes; ++k) out += static_cast<char>(value >> 8 * k & 255);
+    return out;
+  };
+  constexpr std::uint32_t kData = 14 + 40 + 4 * 256;
+  std::string out = "BM" + word(kData + kSide * kSide, 4) + word(0, 4) + word(kData, 4);
+  out += word(40, 4) + word(kSide, 4) + word(kSide, 4) + word(1, 2) + word(8, 2) + word(0, 4) +
+         word(kSide * kSide, 4) + word(0, 4) + word(0, 4) + word(256, 4) + word(0, 4);
+  for (std::uint32_t i = 0; i < 256; ++i) out += word(i * 0x010101u, 4);
+  return out.append(reinterpret_cast<const char*>(grey.data()), grey.size());
+}
+
+/// The solid from the front, right and above, Z up; empty without a mesh.
+std::string picture(const TreeView& tree) {
+  if (!tree.has_mesh()) return "";
+  const Bounds around = bounds(tree);
+  const Vector3d out = Vector3d(1, -2, 1.2).normalized();
+  const Vector3d right = Vector3d::UnitZ().cross(out).normalized(), up = out.cross(right);
+  const Vector3d light = (out + 0.6 * up - 0.5 * right).normalized();
+  const PlacedTree placed = {tree, {}};
+  std::array<unsigned char, kSide * kSide> grey;
+  for (int row = 0; row < kSide; ++row)
+    for (int column = 0; column < kSide; ++column) {
+      const double x = (2 * column + 1.0) / kSide - 1, y = (2 * row + 1.0) / kSide - 1;
+      const Vector3d from = around.centre + around.radius * (2 * out + x * right + y * up);
+      const RayHit hit = raycast(placed, {from, -out});
+      const double shade = 60 + 170 * std::max(0.0, hit.normal.dot(light));
+      grey[static_cast<std::size_t>(row * kSide + column)] =
+          static_cast<unsigned char>(hit.hit() ? shade : 255);
+    }
+  return bitmap(grey);
+}
+
+std::string image(const JobResult& result) {
+  try {
+    const std::string bytes =
+        result.done() ? picture(Asset::load(result.asset).view()) : std::string();
+    if (bytes.empty()) return "";
+    return fmt::format("<img width={0} height={0} src=\"data:image/bmp;base64,{1}\">", kSide,
+                       base64(bytes));
+  } catch (const Error&) {  // moved since
+    return "";
+  }
+}
+
+std::string row(const JobResult& r) {
+  const bool done = r.done();
+  const auto number = [&](double value, double unit = 1) {
+    return done ? fmt::format("{:.4g}", unit * value) : std::string();
+  };
+  std::string remarks = escaped(r.message);
+  for (const std::string& warning : r.warnings)
+    remarks += (remarks.empty() ? "" : "<br>") + escaped(warning);
+  std::string out = fmt::format("<tr class={}><td>{}<td>{}<td>{}", name_of(r.status), image(r),
+                                escaped(r.name), name_of(r.status));
+  out += fmt::format(
+      "<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}", done ? grouped(r.spheres) : "",
+      number(r.coverage, 100), number(r.volume), number(r.protrusion),
+      done && r.has_surface ? number(r.surface_error) : "", done ? escaped(r.mesh_state) : "",
+      r.error ? fmt::format("{:.2g}", 100 * *r.error) : "",
+      r.confidence ? fmt::format("{:.2f}", *r.confidence) : "", fmt::format("{:.2f}", r.seconds));
+  return out + fmt::format("<td class=t>{}</tr>\n", remarks);
+}
+
+/// A page of a library for a browser, all in one file: a table with a picture of each asset that
+/// keeps its mesh and can be read, failures first.
+std::string summary_page(const Summary& summary) {
+  std::string out = fmt::format(
+      "<!DOCTYPE html>\n<html lang=en><meta charset=utf-8><title>{0}</title>\n<style>"
+      "body{{font:14px sans-serif;margin:2em}}table{{border-collapse:collapse}}"
+      "td,th{{padding:4px 10px;border-bottom:1px solid #ddd;text-align:right}}"
+      "td:nth-child(-n+3),.t{{text-align:left}}th{{position:sticky;top:0;background:#fff}}"
+      ".failed,.not_baked{{background:#fdd}}</style>\n<h1>{0}</h1>\n"
+      "<p>{1} assets: {2} baked, {3} cached, {4} failed, {5} not baked, {6:.1f} s\n",
+      escaped(summary.manifest), grouped(summary.results.size()),
+      grouped(summary.count(JobStatus::baked)), grouped(summary.count(JobStatus::cached)),
+      grouped(summary.count(JobStatus::failed)), grouped(summary.count(JobStatus::not_baked)),
+      summary.seconds);
+  out += "<table><tr><th><th class=t>name<th class=t>status";
+  for (const char* const head :
+       {"spheres", "covered [%]", "volume [u³]", "protrusion [u]", "surface error [u]", "mesh",
+        "error [%]", "confidence", "time [s]"})
+    out += fmt::format("<th>{}", head);
+  out += "<th class=t>remarks</tr>\n";
+  for (const bool done : {false, true})
+    for (const JobResult& result : summary.results)
+      if (result.done() == done) out += row(result);
+  return out + "</table></html>\n";
+}
 
 struct SummaryOptions {
   std::vector<std::string> files;

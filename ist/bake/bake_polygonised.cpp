@@ -1,21 +1,151 @@
+#include <ist/error.h>
+#include <ist/solid.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <memory>
 #include <numbers>
-
-#include <ist/error.h>
+#include <string>
+#include <vector>
 
 #include "bake/backend/make_backend.h"
-#include "bake/backend/polygonised_backend.h"
 #include "bake/bake_solid.h"
 #include "bake/mass_and_bounds.h"
-#include "mesh/lipschitz.h"
+#include "mesh/message_text.h"
 #include "mesh/polygonise.h"
 #include "numerics/roots.h"
+#include "packing/backend/solid_backend.h"
 #include "packing/base/packing_settings.h"
+#include "packing/cover/cover.h"
 #include "stage/thread_arena.h"
 
 namespace ist {
 namespace {
+
+constexpr std::uint64_t kPairs = 20'000;
+constexpr double kRounding = 1e-9;  ///< of the coordinates: no double-precision field is worse
+
+/// A number in [0, 1) for every index: SplitMix64.
+double random_at(std::uint64_t index) {
+  std::uint64_t z = (index + 1) * 0x9e3779b97f4a7c15u;
+  z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+  return static_cast<double>((z ^ z >> 31) >> 11) * 0x1p-53;
+}
+
+/// Throws Error, naming a place, if a signed distance is not finite or, between two of some
+/// thousand points in and around the bounds, changes by more than their distance. What passes may
+/// still do so elsewhere.
+void require_lipschitz(const Solid& solid) {
+  const UnitFrame frame = unit_frame(solid.bounds());
+  const Eigen::Vector3d half = solid.bounds().sizes() / 2;
+  const double far = frame.centre.cwiseAbs().maxCoeff() + half.maxCoeff();
+  struct Finding {
+    double steepness = 0;  ///< change over distance
+    bool not_finite = false;
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
+  };
+  std::vector<Finding> findings(kPairs);
+  tbb::parallel_for(std::uint64_t{0}, kPairs, [&](std::uint64_t i) {
+    // Distances from the whole box down to a 4096th of it.
+    const double reach = std::ldexp(half.maxCoeff(), -static_cast<int>(i % 13));
+    Eigen::Vector3d p, q;
+    for (int k = 0; k < 3; ++k) {
+      const std::uint64_t at = 6 * i + static_cast<std::uint64_t>(k);
+      p[k] = frame.centre[k] + 1.1 * half[k] * (2 * random_at(at) - 1);
+      q[k] = p[k] + reach * (2 * random_at(at + 3) - 1);
+    }
+    const double a = solid.signed_distance(p), b = solid.signed_distance(q);
+    const Eigen::Vector3d way = q - p;
+    const double apart = std::sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2]);
+    Finding& found = findings[i];
+    found.place = p;
+    found.not_finite = !std::isfinite(a) || !std::isfinite(b);
+    if (!found.not_finite && std::abs(a - b) > apart + kRounding * far)
+      found.steepness = std::abs(a - b) / apart;
+  });
+  const Finding* worst = &findings[0];
+  for (const Finding& one : findings) {
+    if (one.not_finite)
+      throw Error("solid: its signed distance is not finite near " + position_text(one.place));
+    if (one.steepness > worst->steepness) worst = &one;
+  }
+  if (worst->steepness > 0)
+    throw Error("solid: its signed distance is not 1-Lipschitz: its slope is " +
+                shortest(worst->steepness) + " near " + position_text(worst->place) +
+                ". Divide it by its largest slope");
+}
+
+/// The solid by its signed distance, in the frame of the mesh and with its volume, so that one
+/// frame and one volume serve all stages.
+class FramedSolid final : public Solid {
+ public:
+  FramedSolid(const Solid& solid, const MeshSolid& mesh) : solid_(solid), mesh_(mesh) {}
+
+  double signed_distance(const Eigen::Vector3d& x) const override {
+    return solid_.signed_distance(x);
+  }
+  Eigen::AlignedBox3d bounds() const override { return mesh_.bounds(); }
+  double volume() const override { return mesh_.volume(); }
+
+ private:
+  const Solid& solid_;
+  const MeshSolid& mesh_;
+};
+
+class PolygonisedBackend final : public SolidBackend {
+ public:
+  PolygonisedBackend(const Solid& solid, const MeshSolid& mesh, double error)
+      : solid_(solid, mesh),
+        frame_(mesh.frame()),
+        error_(error / frame_.scale()),
+        of_mesh_(make_host_backend(mesh)) {}
+
+  SpherePacking pack(const PackingSettings& settings, const ProgressCallback& progress) override {
+    return pack_on_host(solid_, settings, progress);
+  }
+
+  std::vector<MedialNode> medial_nodes(const MedialSettings& settings) override {
+    return of_mesh_->medial_nodes(settings);
+  }
+
+  RelaxedSites relax_sites(const RelaxTask& task,
+                           const std::function<void(double)>& report) override {
+    return of_mesh_->relax_sites(task, report);
+  }
+
+  double largest_protrusion(std::span<const Sphere> balls) override {
+    return of_mesh_->largest_protrusion(balls) + error_;
+  }
+
+  std::vector<double> cover_radii(const CoverTask& task,
+                                  const std::function<void(int)>& report) override {
+    CoverTask whole = task;
+    whole.half += error_;  // the solid may reach out of the mesh's box
+    return cover_on_host(solid_, frame_, whole, report);
+  }
+
+  std::unique_ptr<SolidBackend> with(const MeshSolid& other) const override {
+    return of_mesh_->with(other);
+  }
+
+ private:
+  const FramedSolid solid_;
+  const UnitFrame frame_;
+  const double error_;  ///< unit frame
+  const std::unique_ptr<SolidBackend> of_mesh_;
+};
+
+/// The seam for a solid known by its signed distance, with a mesh in its place, on the host: packed
+/// and covered by the signed distance, calibrated by the mesh. Both lie in the mesh's unit frame.
+/// `error` [u]: the two surfaces lie within it of each other, and it counts into protrusions.
+/// Solid and mesh must outlive the backend.
+std::unique_ptr<SolidBackend> make_polygonised_backend(const Solid& solid, const MeshSolid& mesh,
+                                                       double error) {
+  return std::make_unique<PolygonisedBackend>(solid, mesh, error);
+}
 
 // Edge of a cell over the mean sphere radius: the error is then some 5 % of that radius.
 constexpr double kCellOverRadius = 0.4;

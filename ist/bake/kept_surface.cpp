@@ -2,16 +2,281 @@
 
 #include <tbb/parallel_invoke.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <optional>
 #include <utility>
 
 #include "bake/field/field.h"
-#include "bake/field/mesh_blocks.h"
+#include "bake/field/spatial_order.h"
+#include "bake/field/surface_patches.h"
+#include "mesh/mesh_view.h"
 #include "stage/aside.h"
 
 namespace ist {
 namespace {
+
+constexpr std::uint32_t kNone = ~0u;
+
+float rounded_down(double x) {
+  const auto f = static_cast<float>(x);
+  return double{f} > x ? std::nextafterf(f, -std::numeric_limits<float>::infinity()) : f;
+}
+
+struct Box {
+  float low[3], high[3];
+
+  Box() {
+    std::fill_n(low, 3, static_cast<float>(2 * kMaxExtent));
+    std::fill_n(high, 3, static_cast<float>(-2 * kMaxExtent));
+  }
+  void add(const double* x) {
+    for (int k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], rounded_down(x[k]));
+      high[k] = std::max(high[k], -rounded_down(-x[k]));
+    }
+  }
+  void add(const Box& box) {
+    for (int k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], box.low[k]);
+      high[k] = std::max(high[k], box.high[k]);
+    }
+  }
+};
+
+FieldMesh in_floats(const MeshView& surface) {
+  FieldMesh mesh;
+  mesh.vertices.resize(surface.vertex_count);
+  mesh.triangles.resize(surface.triangle_count);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+    for (std::size_t k = 0; k < 3; ++k)
+      mesh.vertices[v][k] = static_cast<float>(surface.vertices[3 * v + k]);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    std::copy_n(surface.triangles + 3 * t, 3, mesh.triangles[t].begin());
+  return mesh;
+}
+
+/// Patches in an order whose groups of 16, 256, … lie together.
+std::vector<BlockPatch> patches_in_order(const MeshView& surface) {
+  std::vector<BlockPatch> patches = cut_into_patches(in_floats(surface), true);
+  std::vector<std::array<float, 3>> middles(patches.size());
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    Box box;
+    for (const std::uint32_t v : patches[p].vertices)
+      box.add(surface.vertices + 3 * std::size_t{v});
+    for (std::size_t k = 0; k < 3; ++k) middles[p][k] = (box.low[k] + box.high[k]) / 2;
+  }
+  std::vector<BlockPatch> sorted;
+  sorted.reserve(patches.size());
+  for (const std::uint32_t p : spatial_order(middles)) sorted.push_back(std::move(patches[p]));
+  return sorted;
+}
+
+/// Vertices are numbered as blocks first use them.
+void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patches,
+                    MeshArrays& arrays) {
+  std::vector<std::uint32_t> number(surface.vertex_count, kNone);
+  std::uint32_t used = 0;
+  arrays.blocks.resize(patches.size());
+  for (std::size_t b = 0; b < patches.size(); ++b) {
+    const BlockPatch& patch = patches[b];
+    MeshBlock& block = arrays.blocks[b];
+    block.triangles = static_cast<std::uint8_t>(patch.triangles.size());
+    block.vertices = static_cast<std::uint8_t>(patch.vertices.size());
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      const std::uint32_t v = patch.vertices[i < patch.vertices.size() ? i : 0];
+      if (number[v] == kNone) {
+        number[v] = used++;
+        for (std::size_t k = 0; k < 3; ++k)
+          arrays.vertices.push_back(surface.vertices[3 * std::size_t{v} + k] + 0.0);  // −0 is 0
+      }
+      block.vertex[i] = number[v];
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::fill_n(block.corner[k], kWidth, std::uint8_t{0});
+      for (std::size_t i = 0; i < patch.triangles.size(); ++i) {
+        const std::uint32_t v = surface.triangles[3 * std::size_t{patch.triangles[i]} + k];
+        block.corner[k][i] = static_cast<std::uint8_t>(
+            std::find(patch.vertices.begin(), patch.vertices.end(), v) - patch.vertices.begin());
+      }
+    }
+    arrays.header.triangle_count += block.triangles;
+  }
+  arrays.header.vertex_count = used;
+}
+
+void find_neighbours(MeshArrays& arrays) {
+  // The blocks around each vertex.
+  std::vector<std::uint32_t> first(arrays.header.vertex_count + 1);
+  for (const MeshBlock& block : arrays.blocks)
+    for (std::uint32_t i = 0; i < block.vertices; ++i) ++first[block.vertex[i] + 1];
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  std::vector<std::uint32_t> around(first.back());
+  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+  for (std::uint32_t b = 0; b < arrays.blocks.size(); ++b)
+    for (std::uint32_t i = 0; i < arrays.blocks[b].vertices; ++i)
+      around[next[arrays.blocks[b].vertex[i]]++] = b;
+
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> found;  // block, place of the vertex
+  for (std::uint32_t b = 0; b < arrays.blocks.size(); ++b) {
+    MeshBlock& block = arrays.blocks[b];
+    found.clear();
+    for (std::uint32_t i = 0; i < block.vertices; ++i)
+      for (std::uint32_t k = first[block.vertex[i]]; k < first[block.vertex[i] + 1]; ++k)
+        if (around[k] != b) found.emplace_back(around[k], i);
+    std::sort(found.begin(), found.end());
+    block.first_neighbour = static_cast<std::uint32_t>(arrays.neighbours.size());
+    for (std::size_t k = 0; k < found.size(); ++k)
+      if (k == 0 || found[k].first != found[k - 1].first)
+        arrays.neighbours.push_back(found[k].first * kWidth + found[k].second);
+    block.neighbours = static_cast<std::uint32_t>(arrays.neighbours.size()) - block.first_neighbour;
+  }
+}
+
+Box box_of(const MeshArrays& arrays, const MeshBlock& block) {
+  Box box;
+  for (std::uint32_t i = 0; i < block.vertices; ++i)
+    box.add(arrays.vertices.data() + 3 * std::size_t{block.vertex[i]});
+  return box;
+}
+
+void find_shells(MeshArrays& arrays) {
+  for (MeshBlock& block : arrays.blocks) block.shell = kNone;
+  std::vector<std::uint32_t> waiting;
+  for (std::uint32_t seed = 0; seed < arrays.blocks.size(); ++seed) {
+    if (arrays.blocks[seed].shell != kNone) continue;
+    const auto shell = static_cast<std::uint32_t>(arrays.shells.size());
+    waiting = {seed};
+    arrays.blocks[seed].shell = shell;
+    while (!waiting.empty()) {
+      const MeshBlock& block = arrays.blocks[waiting.back()];
+      waiting.pop_back();
+      for (std::uint32_t k = 0; k < block.neighbours; ++k) {
+        const std::uint32_t n = arrays.neighbours[block.first_neighbour + k] / kWidth;
+        if (arrays.blocks[n].shell != kNone) continue;
+        arrays.blocks[n].shell = shell;
+        waiting.push_back(n);
+      }
+    }
+    arrays.shells.push_back({seed});
+  }
+}
+
+void lay_out_boxes(std::vector<Box> below, MeshArrays& arrays) {
+  do {
+    std::vector<BoxBlock>& level = arrays.boxes.emplace_back((below.size() + kWidth - 1) / kWidth);
+    std::vector<Box> around(level.size());
+    for (std::size_t i = 0; i < level.size() * kWidth; ++i) {
+      const Box box = i < below.size() ? below[i] : Box();
+      around[i / kWidth].add(box);
+      for (int k = 0; k < 3; ++k) {
+        level[i / kWidth].low[k][i % kWidth] = box.low[k];
+        level[i / kWidth].high[k][i % kWidth] = box.high[k];
+        level[i / kWidth].normal[k][i % kWidth] = 0;
+      }
+      level[i / kWidth].slab_low[i % kWidth] = box.low[0];
+      level[i / kWidth].slab_high[i % kWidth] = box.high[0];
+    }
+    below = std::move(around);
+  } while (below.size() > 1);
+}
+
+/// Adds the integrals over a triangle, corners from the point that they are taken about.
+void add_integrals(const double (&p)[3][3], BoxSums& sums, std::size_t lane) {
+  double u[3], v[3], middle[3], n[3];
+  for (int k = 0; k < 3; ++k) {
+    u[k] = p[1][k] - p[0][k];
+    v[k] = p[2][k] - p[0][k];
+    middle[k] = ((p[0][k] + p[1][k]) + p[2][k]) / 3;
+  }
+  for (int k = 0; k < 3; ++k) {
+    const int i = (k + 1) % 3, j = (k + 2) % 3;
+    n[k] = (u[i] * v[j] - u[j] * v[i]) / 2;  // ∫ n dA
+  }
+  const double height = (middle[0] * n[0] + middle[1] * n[1]) + middle[2] * n[2];
+  for (int i = 0; i < 3; ++i) {
+    sums.normal[i][lane] += n[i];
+    sums.cone[i][lane] += middle[i] * height;  // y · n is constant on a triangle
+    for (int k = 0; k < 3; ++k) sums.flux[i][k][lane] += middle[i] * n[k];
+  }
+  sums.area[lane] += std::sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]) * (1 + 1e-12) + 1e-300;
+}
+
+/// Of each lane from the triangles themselves: sums of sums would round more.
+void find_sums(MeshArrays& arrays) {
+  std::size_t span = 1;  // blocks below a lane
+  for (const std::vector<BoxBlock>& level : arrays.boxes) {
+    std::vector<BoxSums>& sums = arrays.sums.emplace_back(level.size(), BoxSums{});
+    for (std::size_t b = 0; b < arrays.blocks.size(); ++b) {
+      const std::size_t at = b / span, lane = at % kWidth;
+      const BoxBlock& box = level[at / kWidth];
+      const MeshBlock& block = arrays.blocks[b];
+      for (std::uint32_t t = 0; t < block.triangles; ++t) {
+        double p[3][3];
+        for (int c = 0; c < 3; ++c)
+          for (int k = 0; k < 3; ++k)
+            p[c][k] = arrays.vertices[3 * std::size_t{block.vertex[block.corner[c][t]]} +
+                                      static_cast<std::size_t>(k)] -
+                      (double{box.low[k][lane]} + double{box.high[k][lane]}) / 2;
+        add_integrals(p, sums[at / kWidth], lane);
+      }
+    }
+    span *= kWidth;
+  }
+}
+
+/// Along the mean normal, or z where there is none.
+void find_slabs(MeshArrays& arrays) {
+  std::size_t span = 1;  // blocks below a lane
+  for (std::size_t level = 0; level < arrays.boxes.size(); ++level, span *= kWidth)
+    for (std::size_t at = 0; at * span < arrays.blocks.size(); ++at) {
+      BoxBlock& box = arrays.boxes[level][at / kWidth];
+      const BoxSums& sums = arrays.sums[level][at / kWidth];
+      const std::size_t lane = at % kWidth;
+      double length = 0;
+      for (const auto& n : sums.normal) length += n[lane] * n[lane];
+      length = std::sqrt(length);
+      const bool clear = length > 1e-9 * sums.area[lane];
+      for (int k = 0; k < 3; ++k)
+        box.normal[k][lane] = clear    ? static_cast<float>(sums.normal[k][lane] / length)
+                              : k == 2 ? 1.0f
+                                       : 0.0f;
+      double low = HUGE_VAL, high = -HUGE_VAL;
+      for (std::size_t b = at * span; b < std::min((at + 1) * span, arrays.blocks.size()); ++b)
+        for (std::uint32_t v = 0; v < arrays.blocks[b].vertices; ++v) {
+          const double* x = arrays.vertices.data() + 3 * std::size_t{arrays.blocks[b].vertex[v]};
+          const double along = (box.normal[0][lane] * x[0] + box.normal[1][lane] * x[1]) +
+                               box.normal[2][lane] * x[2];
+          low = std::min(low, along);
+          high = std::max(high, along);
+        }
+      box.slab_low[lane] = rounded_down(low - 1e-14);
+      box.slab_high[lane] = -rounded_down(-high - 1e-14);
+    }
+}
+
+/// Lays out a closed surface as asset_layout.h draws the mesh: blocks of neighbouring triangles in
+/// an order whose groups of 16, 256, … are compact, boxes around them, shells and neighbours.
+/// Blocks that share a vertex are neighbours, and their triangles belong to one shell.
+///
+/// `surface`: unit frame; vertices are taken bit for bit, but −0 becomes 0. `header.error` and
+/// `header.rounding` are the caller's to set. Same bytes for any number of threads and on any
+/// machine.
+MeshArrays lay_out_mesh(const MeshView& surface) {
+  MeshArrays arrays;
+  lay_out_blocks(surface, patches_in_order(surface), arrays);
+  find_neighbours(arrays);
+  std::vector<Box> boxes(arrays.blocks.size());
+  for (std::size_t b = 0; b < boxes.size(); ++b) boxes[b] = box_of(arrays, arrays.blocks[b]);
+  find_shells(arrays);
+  lay_out_boxes(std::move(boxes), arrays);
+  find_sums(arrays);
+  find_slabs(arrays);
+  return arrays;
+}
 
 /// Of a mesh that could not be resolved. Unit frame: ∫ |w − [w ≥ 1]| of the winding number w, as
 /// far as its signs are one. 0: the mesh is the boundary of its solid, but for faces that touch.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <ist/bake.h>
+
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -7,9 +9,7 @@
 #include <string>
 #include <vector>
 
-#include <ist/bake.h>
-
-#include "library/cache_key.h"
+#include "library/job.h"
 
 // A folder of assets by what they were baked from. Any number of processes and hosts may share it,
 // and any of them may die at any moment: an entry is a file that has its name only once it is whole
@@ -19,6 +19,19 @@
 //   asset
 
 namespace ist {
+
+/// What the bytes of an asset follow from, as a hash of 128 bits.
+struct CacheKey {
+  std::uint64_t high = 0, low = 0;
+
+  std::string text() const;  ///< 32 hex digits
+  bool operator==(const CacheKey&) const = default;
+};
+
+/// Of the mesh's bytes, those of the files that it refers to, the settings, the asset's format and
+/// the revision of the bake; name, path, device and threads do not count. Throws Error where a file
+/// cannot be read.
+CacheKey cache_key(const Job& job);
 
 struct CacheEntry {
   Asset asset;

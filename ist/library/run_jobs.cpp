@@ -1,29 +1,172 @@
 #include "library/run_jobs.h"
 
+#include <fmt/format.h>
+#include <ist/asset_layout.h>
+#include <ist/error.h>
+#include <ist/gpu.h>
+#include <nlohmann/json.hpp>
+
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <fstream>
 #include <mutex>
 #include <new>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <thread>
 #include <utility>
 
-#include <ist/error.h>
-#include <ist/gpu.h>
-
-#include "library/bake_job.h"
-#include "library/gpu_places.h"
+#include "bake/asset/atomic_file.h"
+#include "library/input_mesh.h"
 #include "library/job_queue.h"
-#include "library/memory.h"
+#include "robot/link_mesh.h"
 
 namespace ist {
 namespace {
+
+using Json = nlohmann::json;
+
+std::string hash_of(const Asset& asset) {
+  return fmt::format("{:016x}", asset.view().header().content_hash);
+}
+
+/// The asset of an input mesh. Throws Error; `progress` may cancel.
+using BakeMesh = std::function<Asset(const ClosedMesh&, const BakeSettings&)>;
+
+namespace fs = std::filesystem;
+
+/// Nothing is written where the very bytes stand already.
+void write_asset(const fs::path& path, const Asset& asset) {
+  std::error_code none;
+  if (fs::file_size(path, none) == asset.bytes().size() && !none) {
+    std::ifstream file(path, std::ios::binary);
+    std::vector<char> there(asset.bytes().size());
+    const auto* const bytes = reinterpret_cast<const char*>(asset.bytes().data());
+    if (file.read(there.data(), static_cast<std::streamsize>(there.size())) &&
+        std::equal(there.begin(), there.end(), bytes))
+      return;
+  }
+  asset.save(path);
+}
+
+/// Another run, on a machine with more time, would give another asset.
+bool was_out_of_time(const TreeView& tree) {
+  const AssetHeader& h = tree.header();
+  const auto late = static_cast<std::uint32_t>(StopReason::time_limit);
+  return h.stop_reason == late || (h.asked_error > 0 && h.search_stop == late);
+}
+
+void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& result) {
+  const TreeView& tree = entry.asset.view();
+  result.content_hash = tree.header().content_hash;
+  result.bytes = entry.asset.bytes().size();
+  result.spheres = tree.sphere_count();
+  result.coverage = tree.coverage();
+  result.volume = tree.volume();
+  result.protrusion = tree.protrusion();
+  result.surface_error = tree.field_error();
+  result.has_surface = tree.has_field();
+  result.mesh_state = name_of(tree.mesh_state());
+  result.mesh_triangles = tree.mesh_triangles();
+  result.mesh_error = tree.mesh_error();
+  result.counted_twice = tree.counted_twice();
+  if (const PredictedErrors errors = tree.predicted_errors(); errors.target_error > 0) {
+    result.target_error = errors.target_error;
+    result.target_met = errors.target_met();
+    if (errors.measured_poses > 0) result.error = errors.measured_error;
+  }
+  result.confidence = entry.confidence;
+  for (std::string& warning : settings.warnings_of(tree))
+    result.warnings.push_back(std::move(warning));
+  result.warnings.insert(result.warnings.end(), entry.notes.begin(), entry.notes.end());
+}
+
+CacheEntry bake_entry(const Job& job, const BakeMesh& bake) {
+  InputMesh mesh;
+  try {
+    if (job.shape)
+      mesh.closed = close_as_asked(mesh_of(*job.shape, {job.urdf, {}, ""}, job.urdf).mesh, job.mesh,
+                                   job.settings.mesh);
+    else
+      mesh = read_input_mesh(job.mesh, job.settings.mesh);
+  } catch (const OpenMeshError& error) {
+    throw Error(std::string(error.what()) + (job.settings.mesh.repair
+                                                 ? "; wrap = '0.5%' encloses it in a closed surface"
+                                                 : "; repair = true tries to close it"));
+  }
+  CacheEntry entry = {bake(mesh.closed, job.settings), std::move(mesh.closed.report.notes)};
+  if (const auto& judged = mesh.closed.report.judged) entry.confidence = judged->confidence;
+  return entry;
+}
+
+/// Throws Error where an asset is not what its manifest demands.
+void check_demands(const Job& job, const CacheEntry& entry) {
+  const TreeView& tree = entry.asset.view();
+  const Demands& demands = job.demands;
+  const bool lacks_field = !tree.has_field() && tree.sphere_count() > 0;
+  if (demands.surface &&
+      (lacks_field || tree.mesh_triangles() == 0 || tree.mesh_state() == MeshState::unresolved))
+    throw Error(
+        fmt::format("{}: require-surface: the asset holds no surface to query; its mesh is "
+                    "'{}'. Repair the mesh, and keep it with surface = \"all\"",
+                    job.mesh, name_of(tree.mesh_state())));
+  if (!(tree.coverage() >= demands.coverage))
+    throw Error(
+        fmt::format("{}: min-coverage: spheres fill {:.1f} % of the volume, less than "
+                    "{:.1f} %. Allow more spheres",
+                    job.mesh, 100 * tree.coverage(), 100 * demands.coverage));
+  if (entry.confidence && !(*entry.confidence >= demands.confidence))
+    throw Error(
+        fmt::format("{}: min-confidence: the closed mesh has a confidence of {:.2f}, less "
+                    "than {:.2f}. Repair the mesh by hand",
+                    job.mesh, *entry.confidence, demands.confidence));
+}
+
+/// From the mesh's file to the asset's, or from the cache. `bake` is called where it is not in
+/// there. Throws whatever goes wrong; what cannot be kept in the cache is a warning.
+JobResult do_job(const Job& job, const RunSettings& settings, const BakeMesh& bake) {
+  JobResult result;
+  result.name = job.name;
+  result.mesh = job.mesh;
+  result.status = JobStatus::baked;
+
+  std::optional<CacheEntry> entry;
+  std::optional<CacheKey> key;
+  if (settings.cache || settings.record) key = cache_key(job);
+  if (settings.record) entry = settings.record->find(job.name, *key);
+  if (settings.cache) {
+    std::string damage;
+    entry = settings.cache->find(*key, damage);
+    if (!damage.empty())
+      result.warnings.push_back("the cache entry is damaged, so the asset was baked again: " +
+                                damage);
+  }
+  if (entry) result.status = JobStatus::cached;
+  const bool baked = !entry;
+  if (baked) {
+    entry = bake_entry(job, bake);
+    if (key && cache_key(job) != *key)
+      throw Error(job.mesh + ": the file changed during the bake. Bake it again");
+  }
+  const bool lasts = baked && !was_out_of_time(entry->asset.view());
+  try {
+    if (settings.cache && lasts) settings.cache->store(*key, *entry);
+  } catch (const Error& error) {
+    result.warnings.push_back(std::string("not stored in the cache: ") + error.what());
+  }
+  check_demands(job, *entry);
+  const fs::path path = settings.output / (job.name + ".ist");
+  write_asset(path, entry->asset);
+  if (settings.record && lasts) settings.record->add(job.name, *key, *entry);
+  result.asset = path.string();
+  describe(*entry, settings, result);
+  return result;
+}
 
 using Clock = std::chrono::steady_clock;
 
@@ -148,11 +291,7 @@ class Run {
       if (place) place->hold(is_of_gpu(progress));
       return !cancelled_;
     };
-    Asset asset = settings.surface_only
-                      ? bake_surface(mesh, packing.surface, packing.threads, go_on)
-                  : settings.target.relative_error > 0
-                      ? bake_to_error(mesh, settings.target, packing, go_on).asset
-                      : bake(mesh, packing, go_on);
+    Asset asset = bake_as_asked(mesh, settings, go_on).asset;
     // A packing that was cancelled ends with what there is.
     if (cancelled_) throw Cancelled();
     return asset;
@@ -173,6 +312,46 @@ class Run {
 };
 
 }  // namespace
+
+OutputRecord::OutputRecord(const std::filesystem::path& folder) : folder_(folder) {
+  std::ifstream file(folder / ".ist-bakes");
+  for (std::string text; std::getline(file, text);) {
+    try {
+      const Json json = Json::parse(text);
+      Line line = {json.at("key"), json.at("hash"), json.at("notes"), std::nullopt};
+      if (!json.at("confidence").is_null()) line.confidence = json.at("confidence").get<double>();
+      lines_[json.at("name")] = std::move(line);
+    } catch (const Json::exception&) {
+    }
+  }
+}
+
+std::optional<CacheEntry> OutputRecord::find(const std::string& name, const CacheKey& key) const {
+  const auto line = lines_.find(name);
+  if (line == lines_.end() || line->second.key != key.text()) return std::nullopt;
+  try {
+    Asset asset = Asset::load((folder_ / (name + ".ist")).string());
+    if (hash_of(asset) != line->second.hash) return std::nullopt;
+    return CacheEntry{std::move(asset), line->second.notes, line->second.confidence};
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+void OutputRecord::add(const std::string& name, const CacheKey& key, const CacheEntry& entry) {
+  const Json json = {{"name", name},
+                     {"key", key.text()},
+                     {"hash", hash_of(entry.asset)},
+                     {"notes", entry.notes},
+                     {"confidence", entry.confidence ? Json(*entry.confidence) : Json()}};
+  // The end of the line comes first: a line that was cut short does not take this one with it.
+  const std::string text =
+      fmt::format("\n{}", json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  const std::lock_guard lock(mutex_);
+  std::ofstream file(folder_ / ".ist-bakes", std::ios::app);
+  file.write(text.data(), static_cast<std::streamsize>(text.size())).flush();
+  if (!file) throw Error((folder_ / ".ist-bakes").string() + ": cannot write");
+}
 
 const char* name_of(JobStatus status) noexcept {
   switch (status) {

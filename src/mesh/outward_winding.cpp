@@ -1,12 +1,290 @@
 #include "mesh/outward_winding.h"
 
-#include <utility>
+#include <ist/solid.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "mesh/closest_point.h"
+#include "mesh/disjoint_sets.h"
 #include "mesh/edge_table.h"
-#include "mesh/orient_soup.h"
+#include "mesh/exact_triangle.h"
+#include "mesh/line_lattice.h"
+#include "mesh/shells.h"
 #include "mesh/surface_reduction.h"
+#include "numerics/angle.h"
 
 namespace ist {
+namespace {
+
+constexpr double kFullAngle = 12.566370614359172;  ///< 4π
+constexpr double kFar = 3;  ///< distance of what counts together over its radius
+
+/// Signed solid angle of a triangle, positive where p sees its back (van Oosterom & Strackee).
+double solid_angle(const Corners& t, const double p[3]) {
+  double v[3][3], length[3];
+  for (int c = 0; c < 3; ++c) {
+    for (int k = 0; k < 3; ++k) v[c][k] = t.p[c][k] - p[k];
+    length[c] = std::sqrt(v[c][0] * v[c][0] + v[c][1] * v[c][1] + v[c][2] * v[c][2]);
+  }
+  const auto dot = [&](int a, int b) {
+    return v[a][0] * v[b][0] + v[a][1] * v[b][1] + v[a][2] * v[b][2];
+  };
+  const double volume = v[0][0] * (v[1][1] * v[2][2] - v[1][2] * v[2][1]) -
+                        v[0][1] * (v[1][0] * v[2][2] - v[1][2] * v[2][0]) +
+                        v[0][2] * (v[1][0] * v[2][1] - v[1][1] * v[2][0]);
+  return 2 * angle_of(volume, length[0] * length[1] * length[2] + dot(0, 1) * length[2] +
+                                  dot(1, 2) * length[0] + dot(2, 0) * length[1]);
+}
+
+constexpr std::uint32_t kLines = 200;  ///< of sight, along each side of a view
+
+/// What is seen first along a line, from one of its ends.
+struct Seen {
+  double x = std::numeric_limits<double>::infinity();  ///< distance along the line
+  std::uint32_t triangle = kNoIndex;
+  bool front = false;
+
+  void offer(const Seen& other) {
+    if (other.x < x) *this = other;
+  }
+};
+
+/// Lines of sight that end on a patch.
+struct Votes {
+  std::int64_t fronts = 0, backs = 0;
+};
+
+/// Adds what is seen of each patch along one axis; corners are `points`, unit frame, with that axis
+/// first.
+void look_along(const std::vector<std::array<double, 3>>& points,
+                const std::vector<Triangle>& triangles, DisjointSets& patches,
+                std::vector<Votes>& votes) {
+  LineLattice lattice;
+  lattice.y0 = lattice.z0 = -1;
+  lattice.step_y = lattice.step_z = 2.0 / kLines;
+  lattice.offset = kGoldenRatio;
+  lattice.ny = lattice.nz = kLines;
+  std::vector<Seen> low(lattice.lines()), high(lattice.lines());
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    const auto corner = [&](std::size_t k) { return points[triangles[t][k]].data(); };
+    const Corners corners = {{corner(0), corner(1), corner(2)}};
+    const LatticeRange rows = rows_of(lattice, corners);
+    for (std::uint32_t j = rows.first; j < rows.last; ++j) {
+      const LatticeRange lines = lines_of(lattice, corners, j);
+      for (std::uint32_t i = lines.first; i < lines.last; ++i) {
+        const Crossing crossing = crossing_of(lattice, corners, i, j);
+        if (crossing.sign == 0) continue;
+        const std::size_t line = std::size_t{j} * lattice.ny + i;
+        low[line].offer({crossing.x, t, crossing.sign > 0});
+        high[line].offer({-crossing.x, t, crossing.sign < 0});
+      }
+    }
+  }
+  for (const std::vector<Seen>* const end : {&low, &high})
+    for (const Seen& seen : *end)
+      if (seen.triangle != kNoIndex) {
+        Votes& patch = votes[patches.find(seen.triangle)];
+        ++(seen.front ? patch.fronts : patch.backs);
+      }
+}
+
+/// For each patch the volume between it and the middle of its area: > 0 where it bulges to its
+/// front. 0 where only rounding is left, as of a flat one.
+std::vector<double> bulges(const TriangleMesh& soup, DisjointSets& patches,
+                           const UnitFrame& frame) {
+  struct Sum {
+    double area = 0, volume = 0, magnitude = 0;
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  };
+  std::vector<Sum> sums(soup.triangles.size());
+  const auto corner = [&](std::uint32_t t, std::size_t k) {
+    return frame.to_unit(soup.vertices[soup.triangles[t][k]]);
+  };
+  for (std::uint32_t t = 0; t < soup.triangles.size(); ++t) {
+    const Eigen::Vector3d a = corner(t, 0), b = corner(t, 1), c = corner(t, 2);
+    const double area = (b - a).cross(c - a).norm();
+    Sum& sum = sums[patches.find(t)];
+    sum.area += area;
+    sum.middle += area / 3 * (a + b + c);
+  }
+  for (std::uint32_t t = 0; t < soup.triangles.size(); ++t) {
+    Sum& sum = sums[patches.find(t)];
+    if (!(sum.area > 0)) continue;
+    const Eigen::Vector3d middle = sum.middle / sum.area;
+    const Eigen::Vector3d a = corner(t, 0) - middle, b = corner(t, 1) - middle,
+                          c = corner(t, 2) - middle;
+    const double volume = a.dot(b.cross(c));
+    sum.volume += volume;
+    sum.magnitude += a.norm() * b.cross(c).norm();
+  }
+  constexpr double kRounding = 1e-9;
+  std::vector<double> result(sums.size());
+  for (std::size_t p = 0; p < sums.size(); ++p)
+    result[p] = std::abs(sums[p].volume) > kRounding * sums[p].magnitude ? sums[p].volume : 0;
+  return result;
+}
+
+/// Turns the triangles of a soup so that as many as can be show their fronts to the outside.
+///
+/// Neighbours across edges of two triangles are made to agree, as far as the surface is orientable.
+/// Each patch that hangs together so is then turned if of what is seen of it from far away, along
+/// the three axes both ways, twice as much is backs as fronts. Where neither prevails so, as in a
+/// bowl, the side that it bulges to is its front. Patches that nobody sees go with the majority: as
+/// authored, unless most of what is seen had to be turned. The same for any threads.
+void orient_soup(TriangleMesh& soup) {
+  const EdgeTable edges(soup.triangles);
+  make_consistent(soup.triangles, manifold_partners(edges));
+  DisjointSets patches = manifold_patches(soup.triangles, edges);
+  Eigen::AlignedBox3d bounds;
+  for (const Triangle& t : soup.triangles)
+    for (const std::uint32_t v : t) bounds.extend(soup.vertices[v]);
+  const UnitFrame frame = unit_frame(bounds);
+  std::vector<Votes> votes(soup.triangles.size());
+  std::vector<std::array<double, 3>> points(soup.vertices.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t v = 0; v < points.size(); ++v) {
+      const Eigen::Vector3d x = frame.to_unit(soup.vertices[v]);
+      points[v] = {x[axis], x[(axis + 1) % 3], x[(axis + 2) % 3]};
+    }
+    look_along(points, soup.triangles, patches, votes);
+  }
+  const std::vector<double> bulge = bulges(soup, patches, frame);
+  // Lines by which a patch shows its front more than its back, or as it bulges.
+  const auto in_favour = [&](std::uint32_t patch) {
+    const auto [fronts, backs] = votes[patch];
+    if (fronts > 2 * backs || backs > 2 * fronts || bulge[patch] == 0) return fronts - backs;
+    return bulge[patch] > 0 ? fronts + backs : -(fronts + backs);
+  };
+  std::int64_t majority = 0;
+  for (std::uint32_t t = 0; t < soup.triangles.size(); ++t)
+    if (patches.find(t) == t) majority += in_favour(t);
+  for (std::uint32_t t = 0; t < soup.triangles.size(); ++t) {
+    const std::int64_t favour = in_favour(patches.find(t));
+    if (favour < 0 || (favour == 0 && majority < 0))
+      std::swap(soup.triangles[t][1], soup.triangles[t][2]);
+  }
+}
+
+}  // namespace
+
+SoupWinding::SoupWinding(const MeshView& mesh) : mesh_(mesh) {
+  if (mesh.root == kBvhEmpty || (mesh.root & kBvhLeaf) != 0) return;
+  BvhNode around = {};
+  far_of(mesh.root, around, 0);
+}
+
+SoupWinding::Far SoupWinding::far_of_block(std::uint32_t block) const {
+  Far far;
+  double centroid[kBvhWidth][3], normal[kBvhWidth][3];
+  int count = 0;
+  for (const std::uint32_t triangle : mesh_.blocks[block].triangle) {
+    if (triangle == kNoTriangle) continue;
+    const Corners t = corners_of(mesh_, triangle);
+    double a[3], b[3];
+    for (int k = 0; k < 3; ++k) {
+      a[k] = t.p[1][k] - t.p[0][k];
+      b[k] = t.p[2][k] - t.p[0][k];
+      centroid[count][k] = (t.p[0][k] + t.p[1][k] + t.p[2][k]) / 3;
+    }
+    double squares = 0;
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      normal[count][k] = (a[i] * b[j] - a[j] * b[i]) / 2;
+      squares += normal[count][k] * normal[count][k];
+    }
+    const double area = std::sqrt(squares);
+    far.area += area;
+    for (int k = 0; k < 3; ++k) far.centre[k] += area * centroid[count][k];
+    ++count;
+  }
+  for (double& x : far.centre) x = far.area > 0 ? x / far.area : 0;
+  for (int t = 0; t < count; ++t)
+    for (int i = 0; i < 3; ++i) {
+      far.dipole[i] += normal[t][i];
+      for (int j = 0; j < 3; ++j)
+        far.second[3 * i + j] += normal[t][i] * (centroid[t][j] - far.centre[j]);
+    }
+  return far;
+}
+
+/// `place`: which child of `parent` it is; the parent's box bounds it.
+SoupWinding::Far SoupWinding::far_of(std::uint32_t child, const BvhNode& parent, int place) {
+  Far far;
+  if ((child & kBvhLeaf) != 0) {
+    far = far_of_block(child & ~kBvhLeaf);
+  } else {
+    const BvhNode& node = mesh_.nodes[child];
+    std::array<Far, kBvhWidth> below;
+    for (int i = 0; i < kBvhWidth; ++i) {
+      if (node.child[i] == kBvhEmpty) continue;
+      const Far& part = below[static_cast<std::size_t>(i)] = far_of(node.child[i], node, i);
+      far.area += part.area;
+      for (int k = 0; k < 3; ++k) far.centre[k] += part.area * part.centre[k];
+    }
+    for (double& x : far.centre) x = far.area > 0 ? x / far.area : 0;
+    for (const Far& part : below)
+      for (int i = 0; i < 3; ++i) {
+        far.dipole[i] += part.dipole[i];
+        for (int j = 0; j < 3; ++j)
+          far.second[3 * i + j] +=
+              part.second[3 * i + j] + part.dipole[i] * (part.centre[j] - far.centre[j]);
+      }
+    if (of_children_.size() <= child) of_children_.resize(child + 1);
+    of_children_[child] = below;
+  }
+  double squares = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double reach = std::max(far.centre[k] - double{parent.lower[k][place]},
+                                  double{parent.upper[k][place]} - far.centre[k]);
+    squares += reach * reach;
+  }
+  far.reach2 = kFar * kFar * squares;
+  return far;
+}
+
+double SoupWinding::at(const double p[3]) const {
+  double sum = 0;
+  const auto add_block = [&](std::uint32_t block) {
+    for (const std::uint32_t triangle : mesh_.blocks[block].triangle)
+      if (triangle != kNoTriangle) sum += solid_angle(corners_of(mesh_, triangle), p);
+  };
+  if (mesh_.root == kBvhEmpty) return 0;
+  std::uint32_t stack[kBvhStackSize];
+  int top = 0;
+  stack[top++] = mesh_.root;
+  while (top > 0) {
+    const std::uint32_t at = stack[--top];
+    if ((at & kBvhLeaf) != 0) {
+      add_block(at & ~kBvhLeaf);
+      continue;
+    }
+    const BvhNode& node = mesh_.nodes[at];
+    for (int i = 0; i < kBvhWidth; ++i) {
+      if (node.child[i] == kBvhEmpty) continue;
+      const Far& far = of_children_[at][static_cast<std::size_t>(i)];
+      const double r[3] = {far.centre[0] - p[0], far.centre[1] - p[1], far.centre[2] - p[2]};
+      const double r2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
+      if (!(r2 > far.reach2)) {
+        stack[top++] = node.child[i];
+        continue;
+      }
+      double first = 0, second = 0, trace = 0;
+      for (int k = 0; k < 3; ++k) {
+        first += far.dipole[k] * r[k];
+        trace += far.second[4 * k];
+        for (int j = 0; j < 3; ++j) second += r[k] * far.second[3 * k + j] * r[j];
+      }
+      sum += (first + trace - 3 * second / r2) / (r2 * std::sqrt(r2));
+    }
+  }
+  return sum / kFullAngle;
+}
 
 std::unique_ptr<MeshSolid> triangles_as_solid(TriangleMesh mesh) {
   ClosedMesh surface;

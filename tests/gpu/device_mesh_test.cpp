@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "cuda/mesh_queries.h"
 #include "mesh/closest_point.h"
 #include "mesh/mesh_solid.h"
+#include "support/gpu_mesh_queries.h"
 #include "support/gpu_test.h"
 #include "support/host_wide_tree.h"
 #include "support/scarce_memory.h"

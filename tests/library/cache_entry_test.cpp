@@ -9,7 +9,7 @@
 #include <xxhash.h>
 
 #include "library/bake_revision.h"
-#include "library/cache_key.h"
+#include "library/cache.h"
 
 namespace ist {
 namespace {

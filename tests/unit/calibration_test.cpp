@@ -12,7 +12,7 @@
 #include <ist/packing.h>
 
 #include "numerics/roots.h"
-#include "packing/calibrate/power_cells.h"
+#include "packing/calibrate/host_calibration.h"
 #include "support/on_host.h"
 #include "support/test_meshes.h"
 

@@ -15,7 +15,6 @@
 #include "mesh/judge.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"
-#include "mesh/soup_winding.h"
 #include "numerics/angle.h"
 #include "samples/samples.h"
 #include "support/test_meshes.h"

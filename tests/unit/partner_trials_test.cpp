@@ -9,8 +9,6 @@
 #include <cstring>
 #include <numbers>
 
-#include "bake/predict/ball_part.h"
-#include "bake/predict/inner_points.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 

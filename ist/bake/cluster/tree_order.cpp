@@ -1,16 +1,232 @@
 #include "bake/cluster/tree_order.h"
 
+#include <ist/asset_layout.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
+#include <numeric>
 #include <utility>
 
-#include <ist/asset_layout.h>
-#include "bake/cluster/neural_gas.h"
+#include "bake/cluster/gas_kernel.h"
 #include "bake/cluster/tree_swaps.h"
 
 namespace ist {
 namespace {
+
+constexpr int kEpochs = 24;
+constexpr int kSweeps = 20;
+constexpr std::size_t kPart = 256;  // balls that one thread takes
+
+/// Calls work(first, count) for parts of fixed size, whatever the number of threads.
+template <class Work>
+void in_parts(std::size_t size, const Work& work) {
+  const auto part = [&](std::size_t k) { work(k * kPart, std::min(kPart, size - k * kPart)); };
+  const std::size_t parts = (size + kPart - 1) / kPart;
+  if (parts == 1)
+    part(0);
+  else
+    tbb::parallel_for(std::size_t{0}, parts, part);
+}
+
+/// Shares out a range of balls, which come sorted, evenly among prototypes: first along the
+/// prototypes' order, nearest first, as far as there is room; then two groups at a time share out
+/// theirs anew, each ball to the prototype that it prefers, until nothing moves. Σ distance² falls
+/// every time.
+class EvenShares {
+ public:
+  EvenShares(std::span<const Ball> balls, std::span<std::uint32_t> range, const Prototypes& at,
+             std::size_t unit)
+      : range_(range), unit_(unit), groups_(at.count), distances2_(range.size()) {
+    in_parts(range.size(), [&](std::size_t first, std::size_t count) {
+      measure_all(balls, range.subspan(first, count), at, &distances2_[first]);
+    });
+    order_.resize(range.size());
+    std::iota(order_.begin(), order_.end(), 0u);
+  }
+
+  /// Groups of `unit` one after the other, each sorted.
+  void run() {
+    fill_in_turn();
+    for (std::size_t p = 0; p < groups_; ++p)
+      leads_[p] = least_leads(distances2_.data(), group(p), p);
+    std::array<int, kWidth> changed{};  // the sweep that last moved a ball of the group
+    for (int sweep = 1; sweep <= kSweeps; ++sweep) {
+      // Every two groups meet once a sweep, in turns in which each group has one partner: one stays
+      // and the others go round.
+      const std::size_t seats = groups_ + groups_ % 2;
+      for (std::size_t turn = 0; turn + 1 < seats; ++turn)
+        for (std::size_t k = 0; k < seats / 2; ++k) {
+          const std::size_t a = k == 0 ? seats - 1 : (turn + k) % (seats - 1);
+          const std::size_t b = (turn + seats - 1 - k) % (seats - 1);
+          const std::size_t p = std::min(a, b), q = std::max(a, b);
+          if (q < groups_ && share(p, q)) changed[p] = changed[q] = sweep;
+        }
+      if (*std::max_element(changed.begin(), changed.end()) < sweep) break;
+    }
+    // Which balls are where is settled; their order within a group is not until now.
+    std::vector<std::uint8_t> group_of(order_.size());
+    for (std::size_t p = 0; p < groups_; ++p)
+      for (const std::uint32_t i : group(p)) group_of[i] = static_cast<std::uint8_t>(p);
+    std::array<std::size_t, kWidth> next;
+    for (std::size_t p = 0; p < kWidth; ++p) next[p] = p * unit_;
+    const std::vector<std::uint32_t> balls(range_.begin(), range_.end());
+    for (std::size_t i = 0; i < balls.size(); ++i) range_[next[group_of[i]]++] = balls[i];
+  }
+
+ private:
+  /// A ball by its place in the range, and what it is sorted by.
+  struct Entry {
+    double key;
+    std::uint32_t ball;
+    bool operator<(const Entry& other) const {
+      return key != other.key ? key < other.key : ball < other.ball;
+    }
+  };
+
+  std::span<std::uint32_t> group(std::size_t p) {
+    const std::size_t begin = std::min(p * unit_, order_.size());
+    return std::span(order_).subspan(begin, std::min(unit_, order_.size() - begin));
+  }
+
+  void fill_in_turn() {
+    std::vector<Entry> rest;
+    for (std::size_t p = 0; p + 1 < groups_; ++p) {
+      const auto left = std::span(order_).subspan(p * unit_);
+      if (left.size() <= unit_) return;
+      rest.clear();
+      for (const std::uint32_t i : left) rest.push_back({distances2_[i][p], i});
+      std::nth_element(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(unit_), rest.end());
+      for (std::size_t i = 0; i < rest.size(); ++i) left[i] = rest[i].ball;
+    }
+  }
+
+  /// Shares out the balls of groups p and q anew. False: they stay as they are.
+  bool share(std::size_t p, std::size_t q) {
+    if (-leads_[p][q] < leads_[q][p]) return false;
+    const auto first = group(p), second = group(q);
+    if (first.empty() || second.empty()) return false;
+    // Those nearer to p's prototype come first.
+    pool_.clear();
+    for (const auto& part : {first, second})
+      for (const std::uint32_t i : part)
+        pool_.push_back({distances2_[i][p] - distances2_[i][q], i});
+    Entry* const begin = pool_.data();
+    Entry* const middle = begin + first.size();
+    Entry* const end = middle + second.size();
+    const Entry last = *std::max_element(begin, middle);
+    const Entry foremost = *std::min_element(middle, end);
+    if (last < foremost) return false;
+    // What is before all of the second stays there, and what is behind all of the first.
+    Entry* const unsure =
+        std::partition(begin, middle, [&](const Entry& entry) { return entry < foremost; });
+    Entry* const sure =
+        std::partition(middle, end, [&](const Entry& entry) { return !(last < entry); });
+    std::nth_element(unsure, middle, sure);
+    for (std::size_t k = 0; k < first.size(); ++k) first[k] = begin[k].ball;
+    for (std::size_t k = 0; k < second.size(); ++k) second[k] = middle[k].ball;
+    leads_[p] = least_leads(distances2_.data(), first, p);
+    leads_[q] = least_leads(distances2_.data(), second, q);
+    return true;
+  }
+
+  const std::span<std::uint32_t> range_;
+  const std::size_t unit_, groups_;
+  std::vector<PrototypeValues> distances2_;  ///< [place in the range]
+  std::vector<std::uint32_t> order_;         ///< places in the range, by group
+  std::array<PrototypeValues, kWidth> leads_;
+  std::vector<Entry> pool_;
+};
+
+class NeuralGas {
+ public:
+  NeuralGas(std::span<const Ball> balls, bool last_stays) : balls_(balls), last_stays_(last_stays) {
+    order_.resize(balls.size());
+    std::iota(order_.begin(), order_.end(), 0u);
+    split(0, order_.size());
+  }
+
+  std::vector<std::uint32_t> take() { return std::move(order_); }
+
+ private:
+  void split(std::size_t begin, std::size_t end) {
+    const std::size_t count = end - begin;
+    if (count <= kWidth) return;
+    std::size_t unit = kWidth;
+    while (unit * kWidth < count) unit *= kWidth;
+    const auto range = std::span(order_).subspan(begin, count);
+    assign(range, prototypes(range, (count + unit - 1) / unit), unit,
+           last_stays_ && end == order_.size());
+    if (unit == kWidth) return;
+    tbb::parallel_for(std::size_t{0}, (count + unit - 1) / unit, [&](std::size_t p) {
+      split(begin + p * unit, std::min(begin + (p + 1) * unit, end));
+    });
+  }
+
+  Prototypes prototypes(std::span<const std::uint32_t> range, std::size_t count) const {
+    Prototypes at;  // start at balls spread over the range, which is in some order
+    at.count = count;
+    for (std::size_t p = 0; p < count; ++p) {
+      const Ball& ball = balls_[range[(2 * p + 1) * range.size() / (2 * count)]];
+      at.x[p] = ball.x, at.y[p] = ball.y, at.z[p] = ball.z;
+    }
+    // In parts of fixed size, added in their order: the same bits for any number of threads.
+    std::vector<GasPull> pulls((range.size() + kPart - 1) / kPart);
+    // Neighbourhood range λ from half the prototypes towards zero, where this is plain k-means. The
+    // kernel q^rank with q = λ / (1 + λ) stands for exp(−rank / λ): five operations make it.
+    double lambda = static_cast<double>(count) / 2;
+    for (int epoch = 0; epoch < kEpochs; ++epoch, lambda *= 0.75) {
+      PrototypeValues kernel{};
+      kernel[0] = 1;
+      for (std::size_t k = 1; k < count; ++k) kernel[k] = kernel[k - 1] * (lambda / (1 + lambda));
+      in_parts(range.size(), [&](std::size_t first, std::size_t size) {
+        pulls[first / kPart] = pull_of(balls_, range.subspan(first, size), at, kernel);
+      });
+      for (std::size_t p = 0; p < count; ++p) {
+        double x = 0, y = 0, z = 0, total = 0;
+        for (const GasPull& part : pulls) {
+          x += part.x[p];
+          y += part.y[p];
+          z += part.z[p];
+          total += part.total[p];
+        }
+        if (total > 0) at.x[p] = x / total, at.y[p] = y / total, at.z[p] = z / total;
+      }
+    }
+    return at;
+  }
+
+  /// Sorts `range` into groups of `unit`, the last of what remains; the last ball stays last if
+  /// `pinned`.
+  void assign(std::span<std::uint32_t> range, const Prototypes& prototypes, std::size_t unit,
+              bool pinned) const {
+    Prototypes at = prototypes;
+    if (pinned) {
+      PrototypeValues distance2;
+      measure_all(balls_, range.last(1), at, &distance2);
+      const auto nearest = static_cast<std::size_t>(
+          std::min_element(distance2.begin(), distance2.end()) - distance2.begin());
+      for (PrototypeValues* const values : {&at.x, &at.y, &at.z})
+        std::swap((*values)[nearest], (*values)[at.count - 1]);
+    }
+    EvenShares(balls_, range.first(range.size() - pinned), at, unit).run();
+  }
+
+  std::span<const Ball> balls_;
+  bool last_stays_;
+  std::vector<std::uint32_t> order_;
+};
+
+/// Orders balls so that consecutive groups of 16, of 16², … are compact, by hierarchical batch
+/// neural gas: sixteen prototypes a node move to the mean of all balls, weighted by volume
+/// (magnification control) and by a kernel over the prototype's rank as seen from the ball, while
+/// the kernel narrows; then the balls are shared out evenly among the prototypes, near to near.
+/// (Weller, Zachmann: Inner Sphere Trees; Cottrell, Hammer et al.: Batch and median neural gas.)
+/// Only the last group may lack balls. `last_stays`: the last ball lacks spheres, so that it stays
+/// last.
+std::vector<std::uint32_t> neural_gas_order(std::span<const Ball> balls, bool last_stays) {
+  return NeuralGas(balls, last_stays).take();
+}
 
 std::vector<std::uint32_t> group_order(std::span<const Ball> balls, bool last_stays, bool swaps) {
   std::vector<std::uint32_t> order = neural_gas_order(balls, last_stays);

@@ -1,24 +1,98 @@
 #include "bake/predict/partner_trials.h"
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <optional>
-#include <utility>
-
 #include <ist/bake.h>
 #include <ist/query.h>
 
-#include "bake/predict/ball_part.h"
-#include "bake/predict/convex_body.h"
-#include "bake/predict/inner_points.h"
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+
 #include "bake/predict/trial_random.h"
+#include "mesh/line_lattice.h"
+#include "query/probe/patch_sums.h"
 
 namespace ist {
 namespace {
 
-using Eigen::Quaterniond;
+/// A part of a line.
+struct LinePart {
+  double from = 0, to = 0;  ///< in lengths of the line's direction, from < to
+};
+
+using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+/// A ball or a box somewhere, cut by lines exactly.
+class ConvexBody {
+ public:
+  /// `radius` > 0, [u].
+  static ConvexBody ball(const Vector3d& centre, double radius) {
+    ConvexBody body;
+    body.centre_ = centre;
+    body.half_extents_ = Vector3d::Constant(radius);
+    body.round_ = true;
+    return body;
+  }
+
+  /// Half extents > 0, [u], along the columns of `axes`, a rotation.
+  static ConvexBody box(const Vector3d& centre, const Matrix3d& axes,
+                        const Vector3d& half_extents) {
+    ConvexBody body;
+    body.centre_ = centre;
+    body.axes_ = axes;
+    body.half_extents_ = half_extents;
+    return body;
+  }
+
+  /// The part of the line {origin + t · direction} that lies inside, if any.
+  std::optional<LinePart> part_of(const Vector3d& origin, const Vector3d& direction) const {
+    const Vector3d from_centre = origin - centre_;
+    if (round_) {
+      const double length2 = direction.squaredNorm(), along = from_centre.dot(direction);
+      const double radius = half_extents_.x();
+      const double inside = along * along - length2 * (from_centre.squaredNorm() - radius * radius);
+      if (!(inside > 0)) return std::nullopt;
+      const double half = std::sqrt(inside);
+      return LinePart{(-along - half) / length2, (-along + half) / length2};
+    }
+    LinePart part = {-std::numeric_limits<double>::max(), std::numeric_limits<double>::max()};
+    for (int k = 0; k < 3; ++k) {
+      const double at = axes_.col(k).dot(from_centre), step = axes_.col(k).dot(direction);
+      const double half = half_extents_[k];
+      constexpr double kParallel = 1e-12;
+      if (std::abs(step) < kParallel) {
+        if (std::abs(at) >= half) return std::nullopt;
+        continue;
+      }
+      double enters = (-half - at) / step, leaves = (half - at) / step;
+      if (step < 0) std::swap(enters, leaves);
+      part.from = std::max(part.from, enters);
+      part.to = std::min(part.to, leaves);
+    }
+    if (!(part.from < part.to)) return std::nullopt;
+    return part;
+  }
+
+  double volume() const {
+    const double box = 8 * half_extents_.prod();
+    return round_ ? std::numbers::pi / 6 * box : box;
+  }
+
+ private:
+  ConvexBody() = default;
+
+  Eigen::Vector3d centre_;
+  Eigen::Matrix3d axes_ = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d half_extents_;  ///< of a ball: its radius, three times
+  bool round_ = false;
+};
+
+using Eigen::Quaterniond;
 
 constexpr std::size_t kPoints = 100'000;
 constexpr std::uint32_t kTriesPerTrial = 6;
@@ -118,6 +192,85 @@ std::optional<double> way_of(const ConvexBody& body, const std::vector<Vector3d>
 }
 
 }  // namespace
+
+std::vector<Vector3d> inner_points(const MeshSolid& solid, std::size_t count) {
+  constexpr double kMostLines = 1024;  // on a side
+  const Eigen::AlignedBox3d bounds = solid.bounds();
+  const Vector3d low = solid.frame().to_unit(bounds.min());
+  const Vector3d sizes = solid.frame().to_unit(bounds.max()) - low;
+  const double step = std::cbrt(solid.unit_volume() / static_cast<double>(count));
+  const auto lines = [&](double size) {
+    return static_cast<std::uint32_t>(std::clamp(std::ceil(size / step), 1.0, kMostLines));
+  };
+  LineLattice lattice;
+  lattice.y0 = low.y();
+  lattice.z0 = low.z();
+  lattice.ny = lines(sizes.y());
+  lattice.nz = lines(sizes.z());
+  lattice.step_y = sizes.y() / lattice.ny;
+  lattice.step_z = sizes.z() / lattice.nz;
+  lattice.offset = kGoldenRatio / 2;
+  lattice.shift = kGoldenRatio;
+  const LatticeCrossings all = cross_lattice(solid.arrays(), lattice);
+
+  // Along the lines, so that each stands for as much as a cell of the wanted step.
+  const double along = step * step * step / (lattice.step_y * lattice.step_z);
+  std::vector<Vector3d> points;
+  double turned = 0;  // of the first point of a line, over the step
+  for (std::uint32_t j = 0; j < lattice.nz; ++j)
+    for (std::uint32_t i = 0; i < lattice.ny; ++i) {
+      turned += kGoldenRatio;
+      turned -= std::floor(turned);
+      int winding = 0;
+      double since = 0;
+      const std::size_t line = std::size_t{j} * lattice.ny + i;
+      for (std::uint32_t c = all.first[line]; c < all.first[line + 1]; ++c) {
+        const Crossing& crossing = all.crossings[c];
+        if (winding >= 1)
+          for (double k = std::ceil((since - low.x()) / along - turned);
+               low.x() + (k + turned) * along < crossing.x; ++k)
+            points.push_back(solid.frame().from_unit(
+                {low.x() + (k + turned) * along, lattice.y(i, j), lattice.z(j)}));
+        winding += crossing.sign;
+        since = crossing.x;
+      }
+    }
+  return points;
+}
+
+double ball_part(const MeshSolid& solid, const Vector3d& centre, double radius) {
+  const MeshView& mesh = solid.arrays();
+  const Vector3d at = solid.frame().to_unit(centre);
+  ProbeBalls one = {};
+  one.r[0] = one.reach = radius / solid.frame().scale();
+  for (int k = 0; k < 3; ++k) one.origin[k] = at[k];
+  const auto add = [&](const ProbeBalls& balls, ProbeSums& sums) {
+    for (std::uint32_t first = 0; first < mesh.triangle_count; first += kWidth) {
+      TriangleCorners corners = {};
+      const std::uint32_t count = std::min(kWidth, mesh.triangle_count - first);
+      for (std::uint32_t i = 0; i < count; ++i)
+        for (std::uint32_t c = 0; c < 3; ++c) {
+          const double* const x =
+              mesh.vertices + std::size_t{3} * mesh.triangles[std::size_t{3} * (first + i) + c];
+          corners.x[c][i] = x[0];
+          corners.y[c][i] = x[1];
+          corners.z[c][i] = x[2];
+        }
+      SurfacePatch patch;
+      make_patch(corners, patch);
+      const std::uint32_t near = triangles_near(patch, balls.origin, balls.reach);
+      if (near != 0) add_patch(patch, near, balls, 1, sums);
+    }
+  };
+  ProbeSums sums;
+  add(one, sums);
+  off_edges(one, sums, add);
+  const double r = one.r[0], whole = 4 * std::numbers::pi / 3 * (r * r * r);
+  const double held = solid.inside(at) ? whole : 0;
+  const double volume = std::clamp(held + ((sums.met & 1) != 0 ? sums.cones[0] : 0), 0.0, whole);
+  const double unit = solid.frame().scale();
+  return volume * (unit * unit * unit);
+}
 
 PartnerTrials::PartnerTrials(const MeshSolid& solid, const TreeView& mesh)
     : solid_(solid),

@@ -1,15 +1,26 @@
 #pragma once
 
+#include <ist/query.h>
+#include <ist/tree_view.h>
+
+#include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <vector>
 
-#include <ist/query.h>
-#include <ist/tree_view.h>
-
 #include "mesh/mesh_solid.h"
 
 namespace ist {
+
+/// About `count` points [u] spread evenly over the solid: a share of them inside a body is about
+/// the share of the solid's volume that lies in it. Same points on any machine and for any number
+/// of threads; runs on the caller's TBB threads.
+std::vector<Eigen::Vector3d> inner_points(const MeshSolid& solid, std::size_t count);
+
+/// [u³] What a ball has inside the solid, to rounding; the mesh must wind around every point once
+/// or not at all. Looks at every triangle.
+double ball_part(const MeshSolid& solid, const Eigen::Vector3d& centre, double radius);
 
 /// A solid, at rest, and a partner of another shape and size that meets it.
 struct PartnerTrial {

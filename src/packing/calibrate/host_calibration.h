@@ -1,16 +1,34 @@
 #pragma once
 
+#include <ist/sphere.h>
+
 #include <functional>
 #include <span>
-
-#include <ist/sphere.h>
+#include <vector>
 
 #include "mesh/mesh_solid.h"
 #include "packing/backend/tasks.h"
+#include "packing/calibrate/column_lattice.h"
+#include "packing/calibrate/power_relaxation.h"
 
 // Calibration's heavy parts on the threads of the current arena; SolidBackend says what they do.
 
 namespace ist {
+
+/// The octree over a solid's columns in host memory; refers to the lattice.
+class PowerOctree {
+ public:
+  explicit PowerOctree(const ColumnLattice& solid);
+  const PowerGrid& grid() const { return grid_; }
+
+  /// The sums of every site's power cell within the solid. Integers: the same bits for any number
+  /// of threads.
+  std::vector<PowerSums> cell_sums(std::span<const PowerSite> sites) const;
+
+ private:
+  PowerGrid grid_;
+  std::vector<std::vector<std::uint32_t>> flags_;
+};
 
 RelaxedSites relax_on_host(const MeshSolid& solid, const RelaxTask& task,
                            const std::function<void(double)>& report);

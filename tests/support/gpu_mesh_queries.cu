@@ -1,4 +1,4 @@
-#include "cuda/mesh_queries.h"
+#include "support/gpu_mesh_queries.h"
 
 #include <algorithm>
 
