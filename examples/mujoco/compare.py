@@ -1,6 +1,7 @@
 """Scenes of concave parts in MuJoCo, each with the solids of ist and with MuJoCo's own collisions.
 
-    python compare.py [SCENE…] [--ways ist hulls sdf pieces] [--measure exact] [--json FILE] [--films FOLDER]
+    python compare.py [SCENE…] [--ways ist hulls sdf pieces] [--measure inner --spheres 20000] [--json FILE]
+                      [--films FOLDER]
 
 Ways: ist (ist.mujoco), hulls (type="mesh": a mesh is its convex hull), sdf (type="sdf": MuJoCo's own
 mesh SDF), pieces (convex decomposition by CoACD, if it is installed). Times of one run compare with each
@@ -116,10 +117,11 @@ class Mug(Scene):
     """Twenty knots fall into a mug and come to rest."""
 
     seconds, step, count = 3.0, 0.002, 20
+    settings = {"spheres": 2000}
     meshes = {"mug": (vessel(0.05, 0.12, 0.004), "1"), "knot": (sample("torus_knot"), ".004")}
-    bodies = f'<geom name="mug" mesh="mug" solref="-2e4 -200" friction=".5"/>' + "".join(
+    bodies = f'<geom name="mug" mesh="mug" solref="-5e4 -310" friction=".5"/>' + "".join(
         f'<body name="knot {i}" pos="{0.015 * np.cos(2 * i):.4f} {0.015 * np.sin(2 * i):.4f} {0.03 + 0.025 * i:.4f}" '
-        f'euler="{50 * i} {35 * i} 0"><freejoint/><geom name="knot {i}" mesh="knot" solref="-2e4 -200" friction=".5"/></body>'
+        f'euler="{50 * i} {35 * i} 0"><freejoint/><geom name="knot {i}" mesh="knot" solref="-5e4 -310" friction=".5"/></body>'
         for i in range(count))
 
     def judge(self, model, data, log):
@@ -364,10 +366,15 @@ def main():
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"{', '.join(SCENES)}; default all")
     parser.add_argument("--ways", nargs="+", default=["ist", "hulls", "sdf"] + (["pieces"] if coacd else []),
                         choices=["ist", "hulls", "sdf", "pieces"])
-    parser.add_argument("--measure", choices=["matched", "exact"], help="of ist's way, for all meshes; default by mesh")
+    parser.add_argument("--measure", choices=["matched", "inner", "exact"],
+                        help="of ist's way, for all meshes; default by mesh")
+    parser.add_argument("--spheres", type=int, help="of ist's way, for each mesh; default by scene")
     parser.add_argument("--json", type=pathlib.Path, help="write the rows to this file")
     parser.add_argument("--films", type=pathlib.Path, help="folder for films (.glb) of ist's way")
     options = parser.parse_args()
+    if options.spheres:
+        for scene in SCENES.values():
+            scene.settings = {"spheres": options.spheres}
     unknown = set(options.scenes) - set(SCENES)
     if unknown:
         parser.error(f"no scene is named {sorted(unknown)[0]}: {', '.join(SCENES)}")
