@@ -1,4 +1,4 @@
-#include "cuda/bake/columns_on_gpu.h"
+#include "cuda/bake/on_gpu.h"
 
 #include "cuda/launch.h"
 #include "cuda/prefix_sum.h"

@@ -16,20 +16,14 @@
 
 #include "app/bake_library.h"
 #include "app/commands.h"
-#include "app/device_option.h"
-#include "app/file_options.h"
 #include "app/interrupt.h"
-#include "app/link_meshes.h"
 #include "app/mesh_notes.h"
-#include "app/number_options.h"
+#include "app/options.h"
 #include "app/progress_line.h"
-#include "app/robot_options.h"
-#include "app/setting_options.h"
 #include "app/write_mesh.h"
 #include "library/asset_summary.h"
 #include "library/settings/bake_settings.h"
 #include "library/text.h"
-#include "mesh/mesh_files.h"
 #include "robot/link_mesh.h"
 
 namespace ist::app {
@@ -47,24 +41,6 @@ struct BakeOptions {
   LibraryOptions library;
   RobotOptions robot;
 };
-
-/// An asset, and what its partners erred where an error was asked for.
-struct Baked {
-  Asset asset;
-  std::vector<PartnerError> partners = {};
-};
-
-Baked bake_now(const ClosedMesh& mesh, const BakeSettings& asked,
-               const ProgressCallback& progress) {
-  const PackingSettings& settings = asked.packing;
-  if (asked.surface_only) return {bake_surface(mesh, settings.surface, settings.threads, progress)};
-  if (!(asked.target.relative_error > 0)) return {bake(mesh, settings, progress)};
-  TargetedAsset found = bake_to_error(mesh, asked.target, settings, progress);
-  Baked baked = {std::move(found.asset)};
-  for (const PartnerError& partner : found.partners)
-    if (partner.poses > 0) baked.partners.push_back(partner);
-  return baked;
-}
 
 /// "copy 1.4 % (71), plane 0.3 % (24), …".
 std::string describe_partners(const std::vector<PartnerError>& partners) {
@@ -84,20 +60,9 @@ Json partners_json(const std::vector<PartnerError>& partners) {
 
 Baked bake_interruptibly(const ClosedMesh& mesh, const BakeSettings& settings, bool quiet) {
   constexpr double kPatience = 0.15;  // [s] some steps take seconds, and leave nothing half done
-  const InterruptGuard guard(kPatience);
-  ProgressLine line(quiet, settings.target.relative_error > 0);
-  try {
-    const auto show = [&](const Progress& progress) {
-      line.show(progress);
-      return !interrupted();
-    };
-    Baked baked = bake_now(mesh, settings, show);
-    exit_if_interrupted();
-    return baked;
-  } catch (const Error&) {
-    exit_if_interrupted();
-    throw;
-  }
+  return interruptibly(
+      kPatience, quiet, settings.target.relative_error > 0,
+      [&](const ProgressCallback& progress) { return bake_as_asked(mesh, settings, progress); });
 }
 
 /// The folder, made if it is not there. Throws Error.

@@ -21,10 +21,8 @@
 #include <utility>
 
 #include "app/commands.h"
-#include "app/device_option.h"
-#include "app/file_options.h"
 #include "app/interrupt.h"
-#include "app/number_options.h"
+#include "app/options.h"
 #include "app/summary_table.h"
 #include "library/asset_summary.h"
 #include "library/coarseness.h"
@@ -35,28 +33,6 @@
 
 namespace ist::app {
 namespace {
-
-/// On a terminal one line on stderr that is written over and over, with rate and time left, and
-/// what failed above it; elsewhere a line an asset.
-class LibraryProgress final : public RunObserver {
- public:
-  LibraryProgress(std::size_t jobs, bool quiet);
-
-  void finished(const JobResult& result) override;
-  void wait_a_little() override;
-  bool stop() override;
-  void end();  ///< wipes the line
-
- private:
-  using Clock = std::chrono::steady_clock;
-  double rate();  ///< [1/s] of the last half minute; 0: nothing ended
-
-  const std::size_t jobs_;
-  const bool quiet_, line_;
-  const Clock::time_point start_ = Clock::now();
-  std::size_t done_ = 0, cached_ = 0, failed_ = 0;
-  std::deque<Clock::time_point> ends_;  ///< of the last half minute
-};
 
 constexpr const char* kWipe = "\r\033[K";
 constexpr double kWindow = 30;  // [s] over which the rate is taken
@@ -73,52 +49,67 @@ std::string in_words(double time) {
   return fmt::format("{} h {} min", s / 3600, s % 3600 / 60);
 }
 
-LibraryProgress::LibraryProgress(std::size_t jobs, bool quiet)
-    : jobs_(jobs), quiet_(quiet), line_(!quiet && isatty(STDERR_FILENO) == 1) {}
+/// On a terminal one line on stderr that is written over and over, with rate and time left, and
+/// what failed above it; elsewhere a line an asset.
+class LibraryProgress final : public RunObserver {
+ public:
+  LibraryProgress(std::size_t jobs, bool quiet)
+      : jobs_(jobs), quiet_(quiet), line_(!quiet && isatty(STDERR_FILENO) == 1) {}
 
-void LibraryProgress::finished(const JobResult& result) {
-  ++done_;
-  cached_ += result.status == JobStatus::cached ? 1 : 0;
-  ends_.push_back(Clock::now());
-  if (line_) fmt::print(stderr, "{}", kWipe);
-  std::fflush(stderr);
-  const std::string place = fmt::format("[{}/{}] {}", done_, jobs_, result.name);
-  if (result.status == JobStatus::failed) {
-    ++failed_;
-    spdlog::error("{}: failed: {}", place, result.message);
-  } else {
-    if (!line_)
-      spdlog::info("{}: {} in {:.2f} s, {} spheres, {:.1f} %", place, name_of(result.status),
-                   result.seconds, grouped(result.spheres), 100 * result.coverage);
-    for (const std::string& warning : result.warnings) spdlog::warn("{}: {}", place, warning);
+  void finished(const JobResult& result) override {
+    ++done_;
+    cached_ += result.status == JobStatus::cached ? 1 : 0;
+    ends_.push_back(Clock::now());
+    if (line_) fmt::print(stderr, "{}", kWipe);
+    std::fflush(stderr);
+    const std::string place = fmt::format("[{}/{}] {}", done_, jobs_, result.name);
+    if (result.status == JobStatus::failed) {
+      ++failed_;
+      spdlog::error("{}: failed: {}", place, result.message);
+    } else {
+      if (!line_)
+        spdlog::info("{}: {} in {:.2f} s, {} spheres, {:.1f} %", place, name_of(result.status),
+                     result.seconds, grouped(result.spheres), 100 * result.coverage);
+      for (const std::string& warning : result.warnings) spdlog::warn("{}: {}", place, warning);
+    }
   }
-}
 
-double LibraryProgress::rate() {
-  const Clock::time_point now = Clock::now();
-  while (!ends_.empty() && seconds(now - ends_.front()) > kWindow) ends_.pop_front();
-  const double window = std::min(seconds(now - start_), kWindow);
-  return window > 0 ? static_cast<double>(ends_.size()) / window : 0;
-}
+  void wait_a_little() override {
+    if (!line_) return;
+    const double now = rate();
+    std::string left;
+    if (now > 0)
+      left = fmt::format("  {:.3g} a second  {} left", now,
+                         in_words(static_cast<double>(jobs_ - done_) / now));
+    fmt::print(stderr, "{}{} of {} assets  {} cached  {} failed{}  {}", kWipe, grouped(done_),
+               grouped(jobs_), grouped(cached_), grouped(failed_), left,
+               interrupted() ? "stopping" : in_words(seconds(Clock::now() - start_)));
+    std::fflush(stderr);
+  }
 
-void LibraryProgress::wait_a_little() {
-  if (!line_) return;
-  const double now = rate();
-  std::string left;
-  if (now > 0)
-    left = fmt::format("  {:.3g} a second  {} left", now,
-                       in_words(static_cast<double>(jobs_ - done_) / now));
-  fmt::print(stderr, "{}{} of {} assets  {} cached  {} failed{}  {}", kWipe, grouped(done_),
-             grouped(jobs_), grouped(cached_), grouped(failed_), left,
-             interrupted() ? "stopping" : in_words(seconds(Clock::now() - start_)));
-  std::fflush(stderr);
-}
+  bool stop() override { return interrupted(); }
 
-bool LibraryProgress::stop() { return interrupted(); }
+  /// wipes the line
+  void end() {
+    if (line_) fmt::print(stderr, "{}", kWipe);
+  }
 
-void LibraryProgress::end() {
-  if (line_) fmt::print(stderr, "{}", kWipe);
-}
+ private:
+  using Clock = std::chrono::steady_clock;
+  /// [1/s] of the last half minute; 0: nothing ended
+  double rate() {
+    const Clock::time_point now = Clock::now();
+    while (!ends_.empty() && seconds(now - ends_.front()) > kWindow) ends_.pop_front();
+    const double window = std::min(seconds(now - start_), kWindow);
+    return window > 0 ? static_cast<double>(ends_.size()) / window : 0;
+  }
+
+  const std::size_t jobs_;
+  const bool quiet_, line_;
+  const Clock::time_point start_ = Clock::now();
+  std::size_t done_ = 0, cached_ = 0, failed_ = 0;
+  std::deque<Clock::time_point> ends_;  ///< of the last half minute
+};
 
 namespace fs = std::filesystem;
 

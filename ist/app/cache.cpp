@@ -9,7 +9,7 @@
 #include <string>
 
 #include "app/commands.h"
-#include "app/number_options.h"
+#include "app/options.h"
 #include "library/text.h"
 
 namespace ist::app {

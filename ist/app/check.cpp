@@ -10,9 +10,7 @@
 
 #include <ist/asset_layout.h>
 #include "app/commands.h"
-#include "app/file_options.h"
-#include "app/number_options.h"
-#include "app/setting_options.h"
+#include "app/options.h"
 #include "library/input_mesh.h"
 #include "library/text.h"
 

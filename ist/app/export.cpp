@@ -13,10 +13,9 @@
 #include <string>
 
 #include "app/commands.h"
-#include "app/file_options.h"
 #include "app/glb_scene.h"
 #include "app/interrupt.h"
-#include "app/number_options.h"
+#include "app/options.h"
 #include "library/exported_spheres.h"
 
 namespace ist::app {

@@ -5,7 +5,7 @@
 #include <ist/bake.h>
 
 #include "app/commands.h"
-#include "app/file_options.h"
+#include "app/options.h"
 #include "library/asset_summary.h"
 #include "library/text.h"
 

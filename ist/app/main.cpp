@@ -25,21 +25,6 @@
 namespace ist::app {
 namespace {
 
-/// CLI11's help, with lines that end at the terminal's right edge (at column 80 without a terminal,
-/// at 100 at most).
-class HelpFormat : public CLI::Formatter {
- public:
-  HelpFormat();
-
-  std::string make_option(const CLI::Option* option, bool is_positional) const override;
-  std::string make_subcommand(const CLI::App* command) const override;
-  std::string make_description(const CLI::App* app) const override;
-  std::string make_footer(const CLI::App* app) const override;
-
- private:
-  std::size_t width_;
-};
-
 constexpr std::size_t kNoTerminal = 80, kNarrowest = 60, kWidest = 100;
 constexpr std::size_t kGroupIndent = 2;  ///< what CLI11 adds to groups of options
 
@@ -86,30 +71,39 @@ std::string wrapped(const std::string& text, std::size_t indent, std::size_t wid
   return out;
 }
 
-HelpFormat::HelpFormat() : width_(terminal_width() - kGroupIndent) {}
+/// CLI11's help, with lines that end at the terminal's right edge (at column 80 without a terminal,
+/// at 100 at most).
+class HelpFormat : public CLI::Formatter {
+ public:
+  HelpFormat() : width_(terminal_width() - kGroupIndent) {}
 
-std::string HelpFormat::make_option(const CLI::Option* option, bool is_positional) const {
-  return wrapped(Formatter::make_option(option, is_positional), get_column_width(), width_);
-}
+  std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    return wrapped(Formatter::make_option(option, is_positional), get_column_width(), width_);
+  }
 
-std::string HelpFormat::make_subcommand(const CLI::App* command) const {
-  return wrapped(Formatter::make_subcommand(command), get_column_width(), width_);
-}
+  std::string make_subcommand(const CLI::App* command) const override {
+    return wrapped(Formatter::make_subcommand(command), get_column_width(), width_);
+  }
 
-std::string HelpFormat::make_description(const CLI::App* app) const {
-  return wrapped(Formatter::make_description(app), 0, width_);
-}
+  std::string make_description(const CLI::App* app) const override {
+    return wrapped(Formatter::make_description(app), 0, width_);
+  }
 
-/// Examples and lists stay as they are.
-std::string HelpFormat::make_footer(const CLI::App* app) const {
-  std::istringstream lines(Formatter::make_footer(app));
-  std::string out;
-  for (std::string line; std::getline(lines, line);)
-    out += (line.starts_with("Example") || line.starts_with(' ') ? line
-                                                                 : wrapped_line(line, 0, width_)) +
-           "\n";
-  return out;
-}
+  /// Examples and lists stay as they are.
+  std::string make_footer(const CLI::App* app) const override {
+    std::istringstream lines(Formatter::make_footer(app));
+    std::string out;
+    for (std::string line; std::getline(lines, line);)
+      out +=
+          (line.starts_with("Example") || line.starts_with(' ') ? line
+                                                                : wrapped_line(line, 0, width_)) +
+          "\n";
+    return out;
+  }
+
+ private:
+  std::size_t width_;
+};
 
 /// For a command line that was refused: the command or the option that its first unknown word was
 /// probably meant to be. Empty if there is none.

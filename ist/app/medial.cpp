@@ -9,11 +9,8 @@
 #include <ist/error.h>
 
 #include "app/commands.h"
-#include "app/device_option.h"
-#include "app/file_options.h"
 #include "app/mesh_notes.h"
-#include "app/number_options.h"
-#include "app/setting_options.h"
+#include "app/options.h"
 
 namespace ist::app {
 namespace {

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <ist/error.h>
 #include <ist/progress.h>
 
+#include "app/interrupt.h"
 #include "library/whole_progress.h"
 
 namespace ist::app {
@@ -21,5 +23,25 @@ class ProgressLine {
   bool active_;
   WholeProgress whole_;
 };
+
+/// What `work` makes of a ProgressCallback that shows the line and ends the work at Ctrl-C.
+/// `patience` [s]: see InterruptGuard; `quiet`, `rounds`: see ProgressLine. Throws ExitCode 130
+/// after Ctrl-C, whatever came of the work.
+template <class Work>
+auto interruptibly(double patience, bool quiet, bool rounds, const Work& work) {
+  const InterruptGuard guard(patience);
+  ProgressLine line(quiet, rounds);
+  try {
+    auto made = work([&line](const Progress& progress) {
+      line.show(progress);
+      return !interrupted();
+    });
+    exit_if_interrupted();
+    return made;
+  } catch (const Error&) {
+    exit_if_interrupted();
+    throw;
+  }
+}
 
 }  // namespace ist::app

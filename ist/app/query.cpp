@@ -14,8 +14,7 @@
 
 #include "app/commands.h"
 #include "app/field_spec.h"
-#include "app/file_options.h"
-#include "app/number_options.h"
+#include "app/options.h"
 #include "app/query_output.h"
 #include "library/asset_summary.h"
 

@@ -1,11 +1,75 @@
 #include "app/reference.h"
 
+#include <fmt/format.h>
+#include <ist/error.h>
+#include <ist/version.h>
+
 #include <algorithm>
 #include <cctype>
+#include <filesystem>
+#include <memory>
 #include <sstream>
+#include <system_error>
+
+#include "app/commands.h"
+#include "app/interrupt.h"
+#include "app/options.h"
 
 namespace ist::app {
 namespace {
+
+/// Text that roff takes as it is: hyphens that can be copied, no escapes, no requests.
+std::string roff(const std::string& text) {
+  std::string out;
+  bool line_begins = true;
+  for (const char c : text) {
+    if (line_begins && (c == '.' || c == '\'')) out += "\\&";
+    line_begins = c == '\n';
+    if (c == '\\')
+      out += "\\e";
+    else if (c == '-')
+      out += "\\-";
+    else
+      out += c;
+  }
+  return out;
+}
+
+std::string title(const std::string& name) {
+  return fmt::format(".TH \"{}\" 1 \"\" \"ist {}\" \"User Commands\"\n", name, IST_VERSION_STRING);
+}
+
+/// Lines as they stand.
+std::string verbatim(const std::string& heading, const std::string& text) {
+  if (text.empty()) return "";
+  return fmt::format(".SH {}\n.nf\n{}\n.fi\n", heading, roff(text));
+}
+
+std::string described(const OptionReference& option) {
+  std::string names;
+  for (const std::string& name : option.names)
+    names += (names.empty() ? "" : ", ") + fmt::format("\\fB{}\\fR", roff(name));
+  if (!option.positional && option.takes_value)
+    names += fmt::format(" \\fI{}\\fR", roff(option.value));
+  std::string text = fmt::format(".TP\n{}\n{}", names, roff(option.help));
+  if (!text.ends_with('.')) text += '.';
+  if (!option.choices.empty() && option.value.find('|') == std::string::npos)
+    text += fmt::format(" One of: {}.", roff(fmt::format("{}", fmt::join(option.choices, ", "))));
+  if (!option.standard.empty()) text += fmt::format(" Default: {}.", roff(option.standard));
+  if (option.required && !option.positional) text += " Required.";
+  return text + "\n";
+}
+
+void write_manual(const CLI::App& app, const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw Error(folder + ": cannot create the folder: " + error.message());
+  const InterruptGuard guard;
+  const std::filesystem::path in = folder;
+  write_text((in / "ist.1").string(), man_page(app));
+  for (const CommandReference& command : commands_of(app))
+    write_text((in / ("ist-" + command.name + ".1")).string(), man_page(command));
+}
 
 /// "TEXT:{a,b}" and "a|b|SOMETHING" say what there is to choose from; words in capitals stand for
 /// others, letters for themselves.
@@ -47,6 +111,52 @@ void collect(const CLI::App& app, std::vector<OptionReference>& out) {
 }
 
 }  // namespace
+
+std::string man_page(const CommandReference& command) {
+  std::string out = title("IST-" + command.name);
+  out += fmt::format(".SH NAME\nist\\-{} \\- {}\n", command.name, roff(command.help));
+  out += fmt::format(".SH SYNOPSIS\n.B ist {}\n[\\fIOPTIONS\\fR]", command.name);
+  for (const OptionReference& option : command.options)
+    if (option.positional) out += fmt::format(" \\fI{}\\fR", roff(option.names.front()));
+  out += "\n.SH OPTIONS\n";
+  for (const OptionReference& option : command.options) out += described(option);
+  return out + verbatim("NOTES", command.footer) + ".SH SEE ALSO\n.BR ist (1)\n";
+}
+
+std::string man_page(const CLI::App& app) {
+  std::string out = title("IST");
+  out += ".SH NAME\nist \\- sphere packings, inner sphere trees and penetration volumes\n";
+  out += ".SH SYNOPSIS\n.B ist\n\\fICOMMAND\\fR [\\fIOPTIONS\\fR]\n";
+  out += fmt::format(".SH DESCRIPTION\n{}\n.SH COMMANDS\n", roff(app.get_description()));
+  for (const CommandReference& command : commands_of(app))
+    out += fmt::format(".TP\n.BR ist\\-{} (1)\n{}\n", command.name, roff(command.help));
+  out += ".SH ENVIRONMENT\n.TP\n.B NO_COLOR\nIf set and not empty, the output has no colours.\n";
+  return out + verbatim("EXIT STATUS", app.get_footer());
+}
+
+void add_reference(CLI::App& app) {
+  const auto shell = std::make_shared<std::string>();
+  CLI::App* const completion =
+      app.add_subcommand("completion", "Print a completion script for a shell");
+  completion->add_option("SHELL", *shell, "Name of the shell")
+      ->required()
+      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+  completion->footer(
+      "Installing ist installs these scripts. Without an installation:\n"
+      "Example: ist completion bash > ~/.local/share/bash-completion/completions/ist");
+  completion->callback([&app, shell] {
+    const auto commands = commands_of(app);
+    fmt::print("{}", *shell == "bash"  ? bash_completion(commands)
+                     : *shell == "zsh" ? zsh_completion(commands)
+                                       : fish_completion(commands));
+  });
+
+  const auto folder = std::make_shared<std::string>();
+  CLI::App* const manual = app.add_subcommand("manual", "Write the man pages of all commands");
+  add_output(manual, *folder, "The folder for ist.1, ist-bake.1, …", Dash::refused);
+  manual->footer("Example: ist manual -o man && man man/ist-bake.1");
+  manual->callback([&app, folder] { write_manual(app, *folder); });
+}
 
 std::vector<CommandReference> commands_of(const CLI::App& app) {
   std::vector<CommandReference> commands;

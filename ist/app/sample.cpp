@@ -6,7 +6,7 @@
 #include <string>
 
 #include "app/commands.h"
-#include "app/file_options.h"
+#include "app/options.h"
 #include "app/write_mesh.h"
 
 namespace ist::app {

@@ -9,8 +9,8 @@
 
 #include <ist/error.h>
 
-#include "app/file_options.h"
 #include "app/glb_scene.h"
+#include "app/options.h"
 #include "library/text.h"
 #include "robot/kinematics.h"
 

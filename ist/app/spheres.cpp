@@ -12,14 +12,10 @@
 #include <ist/error.h>
 
 #include "app/commands.h"
-#include "app/file_options.h"
 #include "app/interrupt.h"
-#include "app/link_meshes.h"
 #include "app/mesh_notes.h"
-#include "app/number_options.h"
+#include "app/options.h"
 #include "app/progress_line.h"
-#include "app/robot_options.h"
-#include "app/setting_options.h"
 #include "app/sphere_output.h"
 #include "library/exported_spheres.h"
 #include "robot/link_mesh.h"
@@ -154,7 +150,7 @@ std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOpt
     else
       cover.spheres = baked_spheres(mesh, own > 0 ? own : settings.count, options, progress);
     cover.protrusion = sphere_protrusion(mesh, cover.spheres);
-    cover.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    cover.seconds = seconds_since(start);
     covers.push_back(std::move(cover));
   }
   return covers;
@@ -162,19 +158,9 @@ std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOpt
 
 void fill_links(SphereRobot& input, const SpheresOptions& options) {
   constexpr double kPatience = 0.5;  // [s]
-  const InterruptGuard guard(kPatience);
-  ProgressLine line(options.quiet);
-  std::vector<SphereCover> covers;
-  try {
-    covers = make_spheres(input, options, [&](const Progress& progress) {
-      line.show(progress);
-      return !interrupted();
-    });
-  } catch (const Error&) {
-    exit_if_interrupted();
-    throw;
-  }
-  exit_if_interrupted();
+  std::vector<SphereCover> covers = interruptibly(
+      kPatience, options.quiet, false,
+      [&](const ProgressCallback& progress) { return make_spheres(input, options, progress); });
   std::size_t next = 0;
   for (SphereLink& link : input.links) {
     link.proof.covered = true;
@@ -226,8 +212,7 @@ void run_spheres(const SpheresOptions& options) {
     write_text(options.output, text);
   }
   exit_if_interrupted();
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = seconds_since(start);
   if (options.json)
     fmt::print("{}", spheres_report_json(input, options.output, seconds));
   else if (!options.quiet)

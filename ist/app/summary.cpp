@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "app/commands.h"
-#include "app/file_options.h"
 #include "app/interrupt.h"
+#include "app/options.h"
 #include "app/summary_table.h"
 #include "library/text.h"
 

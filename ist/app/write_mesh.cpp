@@ -8,7 +8,7 @@
 
 #include <ist/error.h>
 
-#include "app/file_options.h"
+#include "app/options.h"
 #include "bake/asset/atomic_file.h"
 
 namespace ist::app {

@@ -10,9 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "bake/backend/host_backend.h"
 #include "bake/backend/make_backend.h"
-#include "bake/backend/pack_on_host.h"
 #include "bake/bake_solid.h"
 #include "bake/mass_and_bounds.h"
 #include "mesh/message_text.h"
@@ -20,7 +18,7 @@
 #include "numerics/roots.h"
 #include "packing/backend/solid_backend.h"
 #include "packing/base/packing_settings.h"
-#include "packing/cover/host_cover.h"
+#include "packing/cover/cover.h"
 #include "stage/thread_arena.h"
 
 namespace ist {
@@ -106,7 +104,7 @@ class PolygonisedBackend final : public SolidBackend {
         of_mesh_(make_host_backend(mesh)) {}
 
   SpherePacking pack(const PackingSettings& settings, const ProgressCallback& progress) override {
-    return packing::pack_on_host(solid_, settings, progress);
+    return pack_on_host(solid_, settings, progress);
   }
 
   std::vector<MedialNode> medial_nodes(const MedialSettings& settings) override {
@@ -132,10 +130,6 @@ class PolygonisedBackend final : public SolidBackend {
   std::unique_ptr<SolidBackend> with(const MeshSolid& other) const override {
     return of_mesh_->with(other);
   }
-
-  std::function<std::unique_ptr<SolidBackend>()> beside() override { return {}; }
-
-  bool leaves_threads_idle() const override { return false; }
 
  private:
   const FramedSolid solid_;

@@ -11,7 +11,6 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -210,9 +209,7 @@ CacheKey cache_key(const Job& job) {
     return hash.key();
   }
   // Its ending says how a file is read.
-  std::string ending = std::filesystem::path(job.mesh).extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  hash.add_text(ending);
+  hash.add_text(ending_of(job.mesh));
   for (const std::string& file : *files) hash.add_file(file);
   return hash.key();
 }

@@ -42,4 +42,16 @@ InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings)
   return result;
 }
 
+Baked bake_as_asked(const ClosedMesh& mesh, const BakeSettings& asked,
+                    const ProgressCallback& progress) {
+  const PackingSettings& settings = asked.packing;
+  if (asked.surface_only) return {bake_surface(mesh, settings.surface, settings.threads, progress)};
+  if (!(asked.target.relative_error > 0)) return {bake(mesh, settings, progress)};
+  TargetedAsset found = bake_to_error(mesh, asked.target, settings, progress);
+  Baked baked = {std::move(found.asset)};
+  for (const PartnerError& partner : found.partners)
+    if (partner.poses > 0) baked.partners.push_back(partner);
+  return baked;
+}
+
 }  // namespace ist

@@ -25,4 +25,14 @@ ClosedMesh close_as_asked(TriangleMesh mesh, const std::string& name, const Mesh
 /// axis that takes up_axis to world_up.
 void place(TriangleMesh& mesh, const MeshSettings& settings);
 
+/// An asset, and what its partners erred where an error was asked for.
+struct Baked {
+  Asset asset;
+  std::vector<PartnerError> partners = {};
+};
+
+/// bake_surface(), bake_to_error() or bake(), as the settings ask. Throws Error.
+Baked bake_as_asked(const ClosedMesh& mesh, const BakeSettings& asked,
+                    const ProgressCallback& progress);
+
 }  // namespace ist

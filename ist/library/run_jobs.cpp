@@ -4,6 +4,7 @@
 #include <ist/asset_layout.h>
 #include <ist/error.h>
 #include <ist/gpu.h>
+#include <nlohmann/json.hpp>
 
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
@@ -21,14 +22,18 @@
 #include <utility>
 
 #include "bake/asset/atomic_file.h"
-#include "library/gpu_places.h"
 #include "library/input_mesh.h"
 #include "library/job_queue.h"
-#include "library/memory.h"
 #include "robot/link_mesh.h"
 
 namespace ist {
 namespace {
+
+using Json = nlohmann::json;
+
+std::string hash_of(const Asset& asset) {
+  return fmt::format("{:016x}", asset.view().header().content_hash);
+}
 
 /// The asset of an input mesh. Throws Error; `progress` may cancel.
 using BakeMesh = std::function<Asset(const ClosedMesh&, const BakeSettings&)>;
@@ -286,11 +291,7 @@ class Run {
       if (place) place->hold(is_of_gpu(progress));
       return !cancelled_;
     };
-    Asset asset = settings.surface_only
-                      ? bake_surface(mesh, packing.surface, packing.threads, go_on)
-                  : settings.target.relative_error > 0
-                      ? bake_to_error(mesh, settings.target, packing, go_on).asset
-                      : bake(mesh, packing, go_on);
+    Asset asset = bake_as_asked(mesh, settings, go_on).asset;
     // A packing that was cancelled ends with what there is.
     if (cancelled_) throw Cancelled();
     return asset;
@@ -311,6 +312,46 @@ class Run {
 };
 
 }  // namespace
+
+OutputRecord::OutputRecord(const std::filesystem::path& folder) : folder_(folder) {
+  std::ifstream file(folder / ".ist-bakes");
+  for (std::string text; std::getline(file, text);) {
+    try {
+      const Json json = Json::parse(text);
+      Line line = {json.at("key"), json.at("hash"), json.at("notes"), std::nullopt};
+      if (!json.at("confidence").is_null()) line.confidence = json.at("confidence").get<double>();
+      lines_[json.at("name")] = std::move(line);
+    } catch (const Json::exception&) {
+    }
+  }
+}
+
+std::optional<CacheEntry> OutputRecord::find(const std::string& name, const CacheKey& key) const {
+  const auto line = lines_.find(name);
+  if (line == lines_.end() || line->second.key != key.text()) return std::nullopt;
+  try {
+    Asset asset = Asset::load((folder_ / (name + ".ist")).string());
+    if (hash_of(asset) != line->second.hash) return std::nullopt;
+    return CacheEntry{std::move(asset), line->second.notes, line->second.confidence};
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+void OutputRecord::add(const std::string& name, const CacheKey& key, const CacheEntry& entry) {
+  const Json json = {{"name", name},
+                     {"key", key.text()},
+                     {"hash", hash_of(entry.asset)},
+                     {"notes", entry.notes},
+                     {"confidence", entry.confidence ? Json(*entry.confidence) : Json()}};
+  // The end of the line comes first: a line that was cut short does not take this one with it.
+  const std::string text =
+      fmt::format("\n{}", json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  const std::lock_guard lock(mutex_);
+  std::ofstream file(folder_ / ".ist-bakes", std::ios::app);
+  file.write(text.data(), static_cast<std::streamsize>(text.size())).flush();
+  if (!file) throw Error((folder_ / ".ist-bakes").string() + ": cannot write");
+}
 
 const char* name_of(JobStatus status) noexcept {
   switch (status) {

@@ -1,21 +1,47 @@
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <functional>
-#include <memory>
-#include <string>
-#include <vector>
-
 #include <ist/packing.h>
 #include <ist/tree_view.h>
 
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "library/cache.h"
 #include "library/job.h"
-#include "library/output_record.h"
 #include "library/result.h"
 
 namespace ist {
+
+/// What the assets of a folder were baked from, in its file .ist-bakes: a line an asset, appended
+/// when it is written. A line that is not whole is passed over.
+class OutputRecord {
+ public:
+  explicit OutputRecord(const std::filesystem::path& folder);
+
+  /// The asset NAME.ist, if it is the one that was written from what the key stands for. From any
+  /// thread.
+  std::optional<CacheEntry> find(const std::string& name, const CacheKey& key) const;
+
+  /// From any thread. Throws Error.
+  void add(const std::string& name, const CacheKey& key, const CacheEntry& entry);
+
+ private:
+  struct Line {
+    std::string key, hash;
+    std::vector<std::string> notes;
+    std::optional<double> confidence;
+  };
+  const std::filesystem::path folder_;
+  std::map<std::string, Line> lines_;  ///< as they were before this run
+  std::mutex mutex_;
+};
 
 struct RunSettings {
   std::filesystem::path output;       ///< folder: an asset is output/NAME.ist

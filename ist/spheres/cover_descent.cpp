@@ -8,9 +8,9 @@
 #include <span>
 #include <unordered_set>
 
-#include "spheres/cell_key.h"
 #include "spheres/cover_proof.h"
 #include "spheres/open_corners.h"
+#include "spheres/point_grid.h"
 #include "spheres/protrusion.h"
 
 namespace ist {
@@ -110,8 +110,6 @@ Recentred recentre(const Vector3d& start, std::span<const Vector3d> points,
   }
   return {c, at.excess()};
 }
-
-using Eigen::Vector3d;
 
 constexpr double kFirstStep = 0.08;  ///< by which the level is lowered at a time
 constexpr double kLastStep = 0.003;

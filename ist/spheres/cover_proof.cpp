@@ -7,8 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "spheres/halves.h"
-#include "spheres/triangle_corners.h"
+#include "spheres/triangles.h"
 
 namespace ist {
 namespace {

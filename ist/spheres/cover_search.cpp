@@ -9,11 +9,11 @@
 #include <utility>
 
 #include "numerics/hashing.h"
-#include "spheres/cell_key.h"
 #include "spheres/cover_choice.h"
 #include "spheres/cover_descent.h"
 #include "spheres/cover_proof.h"
 #include "spheres/offset_surface.h"
+#include "spheres/point_grid.h"
 #include "spheres/protrusion.h"
 
 namespace ist {

@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "spheres/triangle_corners.h"
+#include "spheres/triangles.h"
 
 namespace ist {
 namespace {

@@ -11,8 +11,8 @@
 #include <unordered_set>
 
 #include "mesh/edge_table.h"
-#include "spheres/cell_key.h"
-#include "spheres/halves.h"
+#include "spheres/point_grid.h"
+#include "spheres/triangles.h"
 
 namespace ist {
 namespace {

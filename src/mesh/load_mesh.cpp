@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <assimp/Importer.hpp>
 #include <cmath>
-#include <filesystem>
+#include <exception>
 #include <span>
 #include <string>
 #include <utility>
@@ -14,8 +14,9 @@
 #include <ist/level_set.h>
 #include <ist/mesh.h>
 
+#include "mesh/import/gltf_document.h"
 #include "mesh/import/polygon_mesh.h"
-#include "mesh/import/read_mesh.h"
+#include "mesh/mesh_files.h"
 #include "mesh/weld.h"
 
 namespace ist {
@@ -32,12 +33,6 @@ constexpr std::array<std::pair<std::string_view, Reader>, 7> kReaders{{
     {".gltf", read_gltf},
     {".dae", read_collada},
 }};
-
-std::string ending_of(const std::string& path) {
-  std::string ending = std::filesystem::path(path).extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending;
-}
 
 Reader reader_of(const std::string& path) {
   const std::string ending = ending_of(path);
@@ -81,7 +76,32 @@ Eigen::AlignedBox3d finite_bounds(const SourceFile& file, const PolygonMesh& mes
   return bounds.box;
 }
 
+/// Not read by a third party.
+bool is_ours(const std::string& ending) {
+  return ending == ".vdb" || std::any_of(kReaders.begin(), kReaders.end(),
+                                         [&](const auto& one) { return ending == one.first; });
+}
+
 }  // namespace
+
+bool is_mesh_format(const std::string& path) {
+  const std::string ending = ending_of(path);
+  if (ending.empty()) return false;
+  return is_ours(ending) || Assimp::Importer().IsExtensionSupported(ending);
+}
+
+std::optional<std::vector<std::string>> files_of_mesh(const std::string& path) {
+  const std::string ending = ending_of(path);
+  if (!is_ours(ending)) return std::nullopt;
+  std::vector<std::string> files = {path};
+  if (ending != ".gltf" && ending != ".glb") return files;
+  const SourceFile source = read_source_file(path);
+  try {
+    for (std::string& beside : GltfDocument(source).files()) files.push_back(std::move(beside));
+  } catch (const std::exception&) {  // loading it will say why
+  }
+  return files;
+}
 
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings) {
   if (!(settings.weld_tolerance >= 0) || settings.weld_tolerance > 0.1)

@@ -1,10 +1,17 @@
 #pragma once
 
+#include <ist/mesh.h>
+
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "mesh/import/source_file.h"
+
 namespace ist {
+
+/// What load_mesh() does with a file once its bytes are in memory.
+TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings);
 
 /// Whether load_mesh() has a reader for files that end like this one.
 bool is_mesh_format(const std::string& path);

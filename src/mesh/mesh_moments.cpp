@@ -1,16 +1,204 @@
 #include "mesh/mesh_moments.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <span>
 #include <vector>
+
+#include "mesh/line_lattice.h"
+#include "mesh/winding.h"
 
 namespace ist {
 namespace {
+
+constexpr std::size_t kIntervals = 200;  ///< along y and along z before any is halved
+constexpr int kMaxHalvings = 30;
+constexpr double kTolerance = 1e-7;  ///< of an interval, relative to the bounding box
+
+template <int N>
+using Values = Eigen::Array<double, N, 1>;
+
+/// Integrals, the volume's first.
+template <int N>
+struct Measured {
+  Values<N> value = Values<N>::Zero(), error = Values<N>::Zero();
+
+  void add(const Measured& part) {
+    value += part.value;
+    error += part.error;
+  }
+};
+
+/// Adaptive integral of f over [a, b], whose values at both ends and in the middle are known:
+/// halves where the volume's is not linear, so that a step is found like a root.
+template <int N, class Function>
+Measured<N> integrate(const Function& f, double a, double b, const Values<N>& at_a,
+                      const Values<N>& at_middle, const Values<N>& at_b, double tolerance,
+                      int halvings) {
+  const Values<N> bend = (at_middle - (at_a + at_b) / 2).abs() * (b - a);
+  if (bend[0] <= tolerance || halvings == 0)
+    return {(at_a + at_b + 4 * at_middle) / 6 * (b - a), bend};
+  const double middle = (a + b) / 2;
+  Measured<N> sum =
+      integrate<N>(f, a, middle, at_a, f((a + middle) / 2), at_middle, tolerance, halvings - 1);
+  sum.add(
+      integrate<N>(f, middle, b, at_middle, f((middle + b) / 2), at_b, tolerance, halvings - 1));
+  return sum;
+}
+
+/// ∫ (winding − [winding ≥ 1]) · (1, x, x²) dx along the line (·, y, z).
+Values<3> line_excess(std::span<const Crossing> crossings) {
+  Values<3> excess = Values<3>::Zero();
+  int winding = 0;
+  for (std::size_t i = 0; i + 1 < crossings.size(); ++i) {
+    winding += crossings[i].sign;
+    const int counted_twice = winding - (winding >= 1 ? 1 : 0);
+    if (counted_twice == 0) continue;
+    const double a = crossings[i].x, b = crossings[i + 1].x;
+    const double length = counted_twice * (b - a);
+    excess += Values<3>(length, length * (a + b) / 2, length * (a * a + a * b + b * b) / 3);
+  }
+  return excess;
+}
+
+/// Of a line, the integrands of 1, x, x², y, y², xy.
+Values<6> along_y(const Values<3>& line, double y) {
+  Values<6> values;
+  values << line[0], line[1], line[2], y * line[0], y * y * line[0], y * line[1];
+  return values;
+}
+
+/// Of a plane, the integrands of the ten moments.
+Moments along_z(const Values<6>& plane, double z) {
+  Moments values;
+  values << plane[0], plane[1], plane[3], z * plane[0], plane[2], plane[4], z * z * plane[0],
+      plane[5], z * plane[1], z * plane[3];
+  return values;
+}
+
+struct MeshBox {
+  double lower[3], upper[3];
+};
+
+MeshBox box_of(const MeshView& mesh) {
+  const double* p = mesh.vertices;
+  MeshBox box = {{p[0], p[1], p[2]}, {p[0], p[1], p[2]}};
+  for (const double* end = p + 3 * std::size_t{mesh.vertex_count}; p != end; p += 3)
+    for (int k = 0; k < 3; ++k) {
+      box.lower[k] = std::min(box.lower[k], p[k]);
+      box.upper[k] = std::max(box.upper[k], p[k]);
+    }
+  return box;
+}
+
+/// Integrals of the excess: along x exactly, along y and z adaptively. The lines that are looked at
+/// in any case are drawn in one go; only where they find an excess is the hierarchy asked for more.
+class ExcessIntegral {
+ public:
+  ExcessIntegral(const MeshView& arrays, const HierarchyMaker& hierarchy)
+      : hierarchy_(hierarchy), box_(box_of(arrays)) {
+    lattice_.y0 = box_.lower[1];
+    lattice_.z0 = box_.lower[2];
+    lattice_.step_y = size(1) / double(2 * kIntervals);
+    lattice_.step_z = size(2) / double(2 * kIntervals);
+    lattice_.ny = lattice_.nz = 2 * kIntervals + 1;
+    const bool flat = !(lattice_.step_y > 0 && lattice_.step_z > 0);
+    if (flat) return;
+    const LatticeCrossings lines = cross_lattice(arrays, lattice_);
+    at_line_.resize(lattice_.lines());
+    tbb::parallel_for(std::size_t{0}, at_line_.size(), [&](std::size_t line) {
+      at_line_[line] =
+          line_excess(std::span(lines.crossings)
+                          .subspan(lines.first[line], lines.first[line + 1] - lines.first[line]));
+    });
+  }
+
+  double plane() const { return size(1) * size(2); }
+
+  Measured<10> value() const {
+    if (at_line_.empty()) return {};
+    std::vector<Measured<10>> slices(lattice_.nz);
+    tbb::parallel_for(std::uint32_t{0}, lattice_.nz,
+                      [&](std::uint32_t j) { slices[j] = lattice_slice(j); });
+    std::vector<Measured<10>> parts(kIntervals);
+    tbb::parallel_for(std::size_t{0}, kIntervals, [&](std::size_t i) {
+      const Measured<10>&lower = slices[2 * i], &middle = slices[2 * i + 1],
+            &upper = slices[2 * i + 2];
+      Moments slice_error = lower.error.max(middle.error).max(upper.error);
+      const auto area = [&](double z) {
+        const Measured<10> s = free_slice(z);
+        slice_error = slice_error.max(s.error);
+        return s.value;
+      };
+      const auto j = static_cast<std::uint32_t>(2 * i);
+      parts[i] = integrate<10>(area, lattice_.z(j), lattice_.z(j + 2), lower.value, middle.value,
+                               upper.value, kTolerance * size(0) * plane(), kMaxHalvings);
+      parts[i].error += slice_error * 2 * lattice_.step_z;
+    });
+    Measured<10> sum;
+    for (const Measured<10>& part : parts) sum.add(part);
+    return sum;
+  }
+
+ private:
+  double size(int axis) const { return box_.upper[axis] - box_.lower[axis]; }
+
+  Values<3> excess_at(double y, double z, std::vector<Crossing>& scratch) const {
+    line_crossings(hierarchy_(), y, z, scratch);
+    return line_excess(scratch);
+  }
+
+  /// The excess of the plane (·, ·, z), areas, from its values at the lattice's lines.
+  template <class Known>
+  Measured<10> slice(double z, const Known& known) const {
+    std::vector<Crossing> scratch;
+    const auto excess = [&](double y) { return along_y(excess_at(y, z, scratch), y); };
+    const auto at = [&](std::uint32_t i) { return along_y(known(i), lattice_.y(i, 0)); };
+    Measured<6> sum;
+    for (std::uint32_t i = 0; i + 2 < lattice_.ny; i += 2)
+      sum.add(integrate<6>(excess, lattice_.y(i, 0), lattice_.y(i + 2, 0), at(i), at(i + 1),
+                           at(i + 2), kTolerance * size(0) * size(1), kMaxHalvings));
+    return {along_z(sum.value, z), along_z(sum.error, std::abs(z))};
+  }
+
+  Measured<10> lattice_slice(std::uint32_t j) const {
+    return slice(lattice_.z(j),
+                 [&](std::uint32_t i) { return at_line_[std::size_t{j} * lattice_.ny + i]; });
+  }
+
+  Measured<10> free_slice(double z) const {
+    std::vector<Crossing> scratch;
+    std::vector<Values<3>> at(lattice_.ny);
+    for (std::uint32_t i = 0; i < lattice_.ny; ++i) at[i] = excess_at(lattice_.y(i, 0), z, scratch);
+    return slice(z, [&](std::uint32_t i) { return at[i]; });
+  }
+
+  const HierarchyMaker& hierarchy_;
+  MeshBox box_;
+  LineLattice lattice_;
+  std::vector<Values<3>> at_line_;  // the excess of every line
+};
+
+/// The largest extent of a triangle along x.
+double longest_triangle(const MeshView& mesh) {
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::uint32_t>(0, mesh.triangle_count), 0.0,
+      [&](const tbb::blocked_range<std::uint32_t>& range, double longest) {
+        for (std::uint32_t t = range.begin(); t < range.end(); ++t) {
+          const Extent x(corners_of(mesh, t));
+          longest = std::max(longest, x.high - x.low);
+        }
+        return longest;
+      },
+      [](const double a, const double b) { return std::max(a, b); });
+}
 
 using Eigen::Vector3d;
 
@@ -174,6 +362,15 @@ MeshMoments less(const MeshView& mesh, const WindingExcess& excess) {
 }
 
 }  // namespace
+
+WindingExcess winding_excess(const MeshView& mesh, const HierarchyMaker& hierarchy) {
+  const ExcessIntegral integral(mesh, hierarchy);
+  const Measured<10> sum = integral.value();
+  // What n columns did not meet covers less than 3 / n of the plane, 95 times in 100. A fold is
+  // taken to be no deeper than the longest triangle.
+  constexpr double kColumns = 4.0 * kIntervals * kIntervals;
+  return {sum.value, sum.error, 3 / kColumns * integral.plane() * longest_triangle(mesh)};
+}
 
 MeshMoments enclosed_moments(const MeshView& mesh) { return less(mesh, {}); }
 

@@ -65,15 +65,19 @@ IST_HD inline double crossing_x(const Corners& t, const double yz[2]) {
 /// line are the same, negated.
 IST_HD inline bool ray_towards_plus(const double p[3]) { return p[0] >= 0; }
 
+/// Whether the line through p parallel to x meets a triangle that it pierces, which faces
+/// `facing`, further along +x than p.
+IST_HD inline bool lies_beyond(const Corners& t, int facing, const double p[3]) {
+  const Extent x(t);
+  if (!(x.low <= p[0] && p[0] <= x.high)) return p[0] < x.low;
+  return orient3d_sign(t.p[0], t.p[1], t.p[2], p) * facing > 0;
+}
+
 /// What a triangle adds to the winding number of p.
 IST_HD inline int ray_winding(const Corners& t, const double p[3]) {
   const int facing = pierced(t, p + 1);
   if (facing == 0) return 0;
-  const Extent x(t);
-  // Behind an outward triangle that faces +x the surface lies further along +x.
-  bool beyond = p[0] < x.low;
-  if (x.low <= p[0] && p[0] <= x.high)
-    beyond = orient3d_sign(t.p[0], t.p[1], t.p[2], p) * facing > 0;
+  const bool beyond = lies_beyond(t, facing, p);
   if (beyond != ray_towards_plus(p)) return 0;
   return beyond ? facing : -facing;
 }

@@ -14,7 +14,6 @@
 
 #include "mesh/fans.h"
 #include "mesh/surface_reduction.h"
-#include "mesh/triangle_separation.h"
 #include "mesh/usable_mesh.h"
 #include "stage/raw_array.h"
 

@@ -128,19 +128,14 @@ class RobotReader {
                                 std::string_view text) const {
     std::array<double, N> values{};
     std::size_t count = 0;
-    while (true) {
-      const std::size_t begin = text.find_first_not_of(" \t\r\n");
-      if (begin == std::string_view::npos) break;
-      const std::size_t end = std::min(text.find_first_of(" \t\r\n", begin), text.size());
-      const std::string_view word = text.substr(begin, end - begin);
+    for_words(text, [&](std::string_view word) {
       const std::optional<double> value = parse_real(word);
       if (!value || !std::isfinite(*value) || std::abs(*value) > kLargest)
         xml_.fail(e, std::string(name) + ": " + in_quotes(word) +
                          " is not a finite number of at most 1e100");
       if (count < N) values[count] = *value;
       ++count;
-      text.remove_prefix(end);
-    }
+    });
     if (count != N)
       xml_.fail(e, std::string(name) + " has " + std::to_string(count) + " numbers, not " +
                        std::to_string(N));

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "mesh/import/read_mesh.h"
+#include "mesh/mesh_files.h"
 
 // A file of one format ends in a mesh or in an Error that begins with its name; what becomes a
 // small mesh is closed, or refused, likewise. One in sixteen may be repaired: judging what a repair

@@ -8,9 +8,6 @@
 #include <random>
 #include <thread>
 
-#include "library/gpu_places.h"
-#include "library/memory.h"
-
 namespace ist {
 namespace {
 

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <random>
 
-#include "mesh/import/read_mesh.h"
+#include "mesh/mesh_files.h"
 #include "support/box_overlap.h"
 #include "support/extremes.h"
 #include "support/reference_sum.h"

@@ -13,7 +13,6 @@
 #include "mesh/fans.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/surface_reduction.h"
-#include "mesh/triangle_separation.h"
 #include "mesh/weld.h"
 #include "support/test_meshes.h"
 

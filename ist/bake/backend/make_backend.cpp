@@ -1,9 +1,95 @@
 #include "bake/backend/make_backend.h"
 
-#include "bake/backend/host_backend.h"
+#include <ist/error.h>
+
 #include "cuda/cuda_backend.h"
+#include "packing/banded/banded_packer.h"
+#include "packing/banded/field_surface.h"
+#include "packing/banded/mesh_surface.h"
+#include "packing/base/packing_settings.h"
+#include "packing/calibrate/host_calibration.h"
+#include "packing/cover/cover.h"
+#include "packing/grids/host_rounds.h"
+#include "packing/grids/medial_grids.h"
+#include "packing/grids/pack_grids.h"
 
 namespace ist {
+namespace {
+
+SpherePacking packed(const Solid& solid, const UnitFrame& frame, const PackingSettings& settings,
+                     const ProgressCallback& progress) {
+  const MeshSolid* const mesh = solid.mesh();
+  Stage stage("pack", progress, settings.time_limit);
+  if (settings.grid != GridMode::banded) {
+    if (mesh == nullptr)
+      throw Error(
+          "packing: only the banded mode packs solids that are not meshes; set grid to banded");
+    return packing::pack_grids(*mesh, settings, stage);
+  }
+  const packing::PackingLimits limits = packing::packing_limits(solid, frame.scale(), settings);
+  if (mesh != nullptr) {
+    const packing::MeshSurface surface(*mesh);
+    return packing::BandedPacker(surface, limits, stage).run();
+  }
+  const packing::FieldSurface surface(solid, frame);
+  return packing::BandedPacker(surface, limits, stage).run();
+}
+
+class HostBackend final : public SolidBackend {
+ public:
+  explicit HostBackend(const Solid& solid) : solid_(solid) {}
+
+  SpherePacking pack(const PackingSettings& settings, const ProgressCallback& progress) override {
+    return pack_on_host(solid_, settings, progress);
+  }
+
+  std::vector<MedialNode> medial_nodes(const MedialSettings& settings) override {
+    return packing::medial_nodes_by(packing::HostRounds(mesh().arrays()), mesh(), settings);
+  }
+
+  RelaxedSites relax_sites(const RelaxTask& task,
+                           const std::function<void(double)>& report) override {
+    return relax_on_host(mesh(), task, report);
+  }
+
+  double largest_protrusion(std::span<const Sphere> balls) override {
+    return protrusion_on_host(mesh(), balls);
+  }
+
+  std::vector<double> cover_radii(const CoverTask& task,
+                                  const std::function<void(int)>& report) override {
+    return cover_on_host(mesh(), task, report);
+  }
+
+  std::unique_ptr<SolidBackend> with(const MeshSolid& other) const override {
+    return make_host_backend(other);
+  }
+
+ private:
+  const MeshSolid& mesh() const {
+    if (solid_.mesh() == nullptr)
+      throw Error(
+          "grids, cells and covers need a mesh, and this solid is not one; use the banded mode");
+    return *solid_.mesh();
+  }
+
+  const Solid& solid_;
+};
+
+}  // namespace
+
+SpherePacking pack_on_host(const Solid& solid, const PackingSettings& settings,
+                           const ProgressCallback& progress) {
+  const MeshSolid* const mesh = solid.mesh();
+  const UnitFrame frame = mesh != nullptr ? mesh->frame() : unit_frame(solid.bounds());
+  SpherePacking result = packed(solid, frame, settings, progress);
+  result.frame = frame;
+  return result;
+}
+
+std::unique_ptr<SolidBackend> make_host_backend(const Solid& solid) {
+  return std::make_unique<HostBackend>(solid);
+}
 
 // The one place that knows which backends there are.
 std::unique_ptr<SolidBackend> make_backend(const Solid& solid, const BackendChoice& choice) {

@@ -1,10 +1,19 @@
 #pragma once
 
+#include <ist/packing.h>
+
 #include <memory>
 
 #include "packing/backend/solid_backend.h"
 
 namespace ist {
+
+/// pack() on the threads of the current arena. The settings have been checked.
+SpherePacking pack_on_host(const Solid& solid, const PackingSettings& settings,
+                           const ProgressCallback& progress);
+
+/// The seam's host implementation. What only meshes can be asked throws Error for other solids.
+std::unique_ptr<SolidBackend> make_host_backend(const Solid& solid);
 
 /// Where a solid's work is to be done.
 struct BackendChoice {

@@ -9,11 +9,9 @@
 #include <vector>
 
 #include "bake/check/check_field.h"
-#include "bake/check/check_kept_mesh.h"
 #include "bake/check/check_spheres.h"
 #include "bake/check/check_surface.h"
 #include "bake/check/check_tally.h"
-#include "bake/check/check_tree.h"
 #include "bake/check/checked_solid.h"
 #include "mesh/mesh_moments.h"
 #include "mesh/mesh_solid.h"
@@ -170,34 +168,26 @@ std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckSurface
 /// A solid known by its signed distance, as `check` sees it. Refers to the solid.
 class DistanceSolid final : public CheckedSolid {
  public:
-  DistanceSolid(const Solid& solid, const UnitFrame& frame);
+  DistanceSolid(const Solid& solid, const UnitFrame& frame)
+      : solid_(solid),
+        frame_(frame),
+        bounds_(frame.to_unit(solid.bounds().min()), frame.to_unit(solid.bounds().max())) {}
 
-  double distance(const Eigen::Vector3d& p, double limit) const override;
-  int winding(const Eigen::Vector3d& p) const override;
+  double distance(const Eigen::Vector3d& p, double) const override { return std::abs(value(p)); }
+
+  int winding(const Eigen::Vector3d& p) const override { return value(p) > 0 ? 1 : 0; }
+
   const Eigen::AlignedBox3d& bounds() const override { return bounds_; }
 
  private:
-  double value(const Eigen::Vector3d& p) const;
+  double value(const Eigen::Vector3d& p) const {
+    return solid_.signed_distance(frame_.from_unit(p)) / frame_.scale();
+  }
 
   const Solid& solid_;
   UnitFrame frame_;
   Eigen::AlignedBox3d bounds_;
 };
-
-DistanceSolid::DistanceSolid(const Solid& solid, const UnitFrame& frame)
-    : solid_(solid),
-      frame_(frame),
-      bounds_(frame.to_unit(solid.bounds().min()), frame.to_unit(solid.bounds().max())) {}
-
-double DistanceSolid::distance(const Eigen::Vector3d& p, double) const {
-  return std::abs(value(p));
-}
-
-int DistanceSolid::winding(const Eigen::Vector3d& p) const { return value(p) > 0 ? 1 : 0; }
-
-double DistanceSolid::value(const Eigen::Vector3d& p) const {
-  return solid_.signed_distance(frame_.from_unit(p)) / frame_.scale();
-}
 
 void append(std::vector<Invariant>& all, std::vector<Invariant> more) {
   for (Invariant& one : more) all.push_back(std::move(one));

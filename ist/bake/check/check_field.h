@@ -1,11 +1,12 @@
 #pragma once
 
+#include <ist/asset_layout.h>
+#include <ist/bake.h>
+
 #include <string>
 #include <vector>
 
-#include <ist/bake.h>
-
-#include <ist/asset_layout.h>
+#include "bake/check/check_field.h"
 #include "bake/check/check_surface.h"
 
 namespace ist {
@@ -60,5 +61,13 @@ class FieldTriangles {
 /// Cells hold what meets them, and their bits are true. `surface`: the boundary of the solid.
 std::vector<Invariant> check_field_cells(const AssetHeader& asset, const FieldHeader& field,
                                          const CheckSurface& of_field, const CheckSurface& surface);
+
+/// The mesh of an asset that has one, against the mesh that was baked and by itself: its triangles
+/// or its error, closed, its blocks, neighbours, shells and boxes.
+///
+/// `closed`: what was baked; `surface`: the same in the unit frame, `frame`.
+std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMesh& closed,
+                                       const UnitFrame& frame, const CheckSurface& surface,
+                                       Bounding bounding);
 
 }  // namespace ist

@@ -1,4 +1,4 @@
-#include "bake/check/check_kept_mesh.h"
+#include "bake/check/check_field.h"
 
 #include <algorithm>
 #include <array>

@@ -1,15 +1,21 @@
 #pragma once
 
+#include <ist/asset_layout.h>
+#include <ist/bake.h>
+
 #include <string>
 #include <utility>
 #include <vector>
 
-#include <ist/bake.h>
-
-#include <ist/asset_layout.h>
 #include "bake/check/check_surface.h"
 
 namespace ist {
+
+/// One tree against the table of its spheres: leaves, balls, cover balls, volumes and κ. `covers`
+/// is null for the matched tree.
+std::vector<Invariant> check_tree(const AssetHeader& asset, const TreeHeader& tree,
+                                  const Sphere* spheres, const float* covers,
+                                  const std::string& name);
 
 /// Inner spheres lie in the solid and apart; covers hold spheres.
 std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSolid& surface);

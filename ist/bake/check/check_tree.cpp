@@ -1,4 +1,3 @@
-#include "bake/check/check_tree.h"
 
 #include <algorithm>
 #include <array>

@@ -24,15 +24,6 @@ constexpr double kPartSlack = 1.02;  // likewise, of one part
 
 using Point = std::array<double, 3>;
 
-double between(const Point& a, const Point& b) {
-  const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-  return std::sqrt(dot3(d, d));
-}
-
-Point half_way(const Point& a, const Point& b) {
-  return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
-}
-
 /// A part of a field's triangle.
 struct Part {
   Point corner[3];

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <span>
+
+#include "mesh/triangle_frame.h"
 
 namespace ist {
 
@@ -35,5 +38,14 @@ class Hull {
   std::array<Point, kMost> corner_;
   std::size_t count_ = 0;
 };
+
+/// The distance of two points, and the point in their middle.
+inline double between(const Hull::Point& a, const Hull::Point& b) {
+  const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  return std::sqrt(dot3(d, d));
+}
+inline Hull::Point half_way(const Hull::Point& a, const Hull::Point& b) {
+  return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
+}
 
 }  // namespace ist

@@ -112,11 +112,6 @@ using Point = Hull::Point;
 
 constexpr int kMostParts = 32;  ///< that are looked at
 
-double between(const Point& a, const Point& b) {
-  const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-  return std::sqrt(dot3(d, d));
-}
-
 Point middle_of(const Hull& hull) {
   Point c = {};
   for (const Point& p : hull.corners())

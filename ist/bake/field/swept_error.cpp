@@ -19,11 +19,6 @@ constexpr double kRounding = 1e-15;    // of a squared distance, with room
 constexpr double kFar = 1e3;           // further than anything in the unit frame
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-double between(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-  const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-  return std::sqrt(dot3(d, d));
-}
-
 std::vector<TriangleFrame<double>> frames_of(const MeshView& surface) {
   std::vector<TriangleFrame<double>> frames(surface.triangle_count);
   tbb::parallel_for(std::size_t{0}, frames.size(), [&](std::size_t t) {
@@ -33,10 +28,6 @@ std::vector<TriangleFrame<double>> frames_of(const MeshView& surface) {
     frames[t] = make_triangle_frame(vertex(0), vertex(1), vertex(2));
   });
   return frames;
-}
-
-std::array<double, 3> half_way(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-  return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
 }
 
 }  // namespace

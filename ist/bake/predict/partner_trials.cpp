@@ -24,20 +24,64 @@ struct LinePart {
   double from = 0, to = 0;  ///< in lengths of the line's direction, from < to
 };
 
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
 /// A ball or a box somewhere, cut by lines exactly.
 class ConvexBody {
  public:
   /// `radius` > 0, [u].
-  static ConvexBody ball(const Eigen::Vector3d& centre, double radius);
+  static ConvexBody ball(const Vector3d& centre, double radius) {
+    ConvexBody body;
+    body.centre_ = centre;
+    body.half_extents_ = Vector3d::Constant(radius);
+    body.round_ = true;
+    return body;
+  }
+
   /// Half extents > 0, [u], along the columns of `axes`, a rotation.
-  static ConvexBody box(const Eigen::Vector3d& centre, const Eigen::Matrix3d& axes,
-                        const Eigen::Vector3d& half_extents);
+  static ConvexBody box(const Vector3d& centre, const Matrix3d& axes,
+                        const Vector3d& half_extents) {
+    ConvexBody body;
+    body.centre_ = centre;
+    body.axes_ = axes;
+    body.half_extents_ = half_extents;
+    return body;
+  }
 
   /// The part of the line {origin + t · direction} that lies inside, if any.
-  std::optional<LinePart> part_of(const Eigen::Vector3d& origin,
-                                  const Eigen::Vector3d& direction) const;
-  double volume() const;
+  std::optional<LinePart> part_of(const Vector3d& origin, const Vector3d& direction) const {
+    const Vector3d from_centre = origin - centre_;
+    if (round_) {
+      const double length2 = direction.squaredNorm(), along = from_centre.dot(direction);
+      const double radius = half_extents_.x();
+      const double inside = along * along - length2 * (from_centre.squaredNorm() - radius * radius);
+      if (!(inside > 0)) return std::nullopt;
+      const double half = std::sqrt(inside);
+      return LinePart{(-along - half) / length2, (-along + half) / length2};
+    }
+    LinePart part = {-std::numeric_limits<double>::max(), std::numeric_limits<double>::max()};
+    for (int k = 0; k < 3; ++k) {
+      const double at = axes_.col(k).dot(from_centre), step = axes_.col(k).dot(direction);
+      const double half = half_extents_[k];
+      constexpr double kParallel = 1e-12;
+      if (std::abs(step) < kParallel) {
+        if (std::abs(at) >= half) return std::nullopt;
+        continue;
+      }
+      double enters = (-half - at) / step, leaves = (half - at) / step;
+      if (step < 0) std::swap(enters, leaves);
+      part.from = std::max(part.from, enters);
+      part.to = std::min(part.to, leaves);
+    }
+    if (!(part.from < part.to)) return std::nullopt;
+    return part;
+  }
 
+  double volume() const {
+    const double box = 8 * half_extents_.prod();
+    return round_ ? std::numbers::pi / 6 * box : box;
+  }
 
  private:
   ConvexBody() = default;
@@ -48,62 +92,7 @@ class ConvexBody {
   bool round_ = false;
 };
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-
-ConvexBody ConvexBody::ball(const Vector3d& centre, double radius) {
-  ConvexBody body;
-  body.centre_ = centre;
-  body.half_extents_ = Vector3d::Constant(radius);
-  body.round_ = true;
-  return body;
-}
-
-ConvexBody ConvexBody::box(const Vector3d& centre, const Matrix3d& axes,
-                           const Vector3d& half_extents) {
-  ConvexBody body;
-  body.centre_ = centre;
-  body.axes_ = axes;
-  body.half_extents_ = half_extents;
-  return body;
-}
-
-std::optional<LinePart> ConvexBody::part_of(const Vector3d& origin,
-                                            const Vector3d& direction) const {
-  const Vector3d from_centre = origin - centre_;
-  if (round_) {
-    const double length2 = direction.squaredNorm(), along = from_centre.dot(direction);
-    const double radius = half_extents_.x();
-    const double inside = along * along - length2 * (from_centre.squaredNorm() - radius * radius);
-    if (!(inside > 0)) return std::nullopt;
-    const double half = std::sqrt(inside);
-    return LinePart{(-along - half) / length2, (-along + half) / length2};
-  }
-  LinePart part = {-std::numeric_limits<double>::max(), std::numeric_limits<double>::max()};
-  for (int k = 0; k < 3; ++k) {
-    const double at = axes_.col(k).dot(from_centre), step = axes_.col(k).dot(direction);
-    const double half = half_extents_[k];
-    constexpr double kParallel = 1e-12;
-    if (std::abs(step) < kParallel) {
-      if (std::abs(at) >= half) return std::nullopt;
-      continue;
-    }
-    double enters = (-half - at) / step, leaves = (half - at) / step;
-    if (step < 0) std::swap(enters, leaves);
-    part.from = std::max(part.from, enters);
-    part.to = std::min(part.to, leaves);
-  }
-  if (!(part.from < part.to)) return std::nullopt;
-  return part;
-}
-
-double ConvexBody::volume() const {
-  const double box = 8 * half_extents_.prod();
-  return round_ ? std::numbers::pi / 6 * box : box;
-}
-
 using Eigen::Quaterniond;
-using Eigen::Vector3d;
 
 constexpr std::size_t kPoints = 100'000;
 constexpr std::uint32_t kTriesPerTrial = 6;
@@ -204,8 +193,6 @@ std::optional<double> way_of(const ConvexBody& body, const std::vector<Vector3d>
 
 }  // namespace
 
-using Eigen::Vector3d;
-
 std::vector<Vector3d> inner_points(const MeshSolid& solid, std::size_t count) {
   constexpr double kMostLines = 1024;  // on a side
   const Eigen::AlignedBox3d bounds = solid.bounds();
@@ -250,8 +237,6 @@ std::vector<Vector3d> inner_points(const MeshSolid& solid, std::size_t count) {
     }
   return points;
 }
-
-using Eigen::Vector3d;
 
 double ball_part(const MeshSolid& solid, const Vector3d& centre, double radius) {
   const MeshView& mesh = solid.arrays();

@@ -7,6 +7,16 @@
 #include "mesh/import/text_scanner.h"
 
 namespace ist {
+namespace {
+
+std::optional<std::uint64_t> parse_whole(const std::string_view text) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace
 
 ColladaDocument::ColladaDocument(const SourceFile& file)
     : xml_(file), most_(12'000'000 + file.bytes.size()) {
@@ -33,29 +43,16 @@ std::uint64_t ColladaDocument::whole(const Index element, const std::string_view
                                      const std::optional<std::uint64_t> fallback) const {
   const std::string_view text = xml_.attribute(element, attribute);
   if (text.empty() && fallback) return *fallback;
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size())
+  const std::optional<std::uint64_t> value = parse_whole(text);
+  if (!value)
     xml_.fail(element,
               "its " + std::string(attribute) + " is not a whole number: " + in_quotes(text));
-  return value;
-}
-
-/// The words of an element's text, one after the other.
-template <class Visit>
-void ColladaDocument::for_words(const Index element, const Visit& visit) const {
-  constexpr std::string_view kSpace = " \t\r\n";
-  const std::string_view text = xml_[element].text;
-  for (std::size_t at = text.find_first_not_of(kSpace); at != std::string_view::npos;) {
-    const std::size_t end = std::min(text.find_first_of(kSpace, at), text.size());
-    visit(text.substr(at, end - at));
-    at = text.find_first_not_of(kSpace, end);
-  }
+  return *value;
 }
 
 std::vector<double> ColladaDocument::reals(const Index element) const {
   std::vector<double> values;
-  for_words(element, [&](const std::string_view word) {
+  for_words(xml_[element].text, [&](const std::string_view word) {
     const std::optional<double> value = parse_real(word);
     if (!value) xml_.fail(element, in_quotes(word) + " is not a number");
     values.push_back(*value);
@@ -73,12 +70,10 @@ std::vector<double> ColladaDocument::reals(const Index element, const std::size_
 
 std::vector<std::uint64_t> ColladaDocument::wholes(const Index element) const {
   std::vector<std::uint64_t> values;
-  for_words(element, [&](const std::string_view word) {
-    std::uint64_t value = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size())
-      xml_.fail(element, in_quotes(word) + " is not a whole number ≥ 0");
-    values.push_back(value);
+  for_words(xml_[element].text, [&](const std::string_view word) {
+    const std::optional<std::uint64_t> value = parse_whole(word);
+    if (!value) xml_.fail(element, in_quotes(word) + " is not a whole number ≥ 0");
+    values.push_back(*value);
   });
   return values;
 }

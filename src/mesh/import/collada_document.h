@@ -38,9 +38,6 @@ class ColladaDocument {
   std::size_t most() const { return most_; }
 
  private:
-  template <class Visit>
-  void for_words(Index element, const Visit& visit) const;
-
   const XmlDocument xml_;
   const std::size_t most_;
   std::unordered_map<std::string_view, Index> by_id_;

@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <assimp/Importer.hpp>
-#include <cctype>
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -70,8 +68,7 @@ DeclaredFrame declared_frame(const aiScene& scene) {
 
 PolygonMesh read_with_assimp(const SourceFile& file) {
   Assimp::Importer importer;
-  std::string ending = std::filesystem::path(file.path).extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string ending = ending_of(file.path);
   if (ending.empty() || !importer.IsExtensionSupported(ending))
     fail(file, "no mesh format ends in " + in_quotes(ending) +
                    ". Known are obj, stl, ply, off, glb, gltf, dae and what assimp reads");

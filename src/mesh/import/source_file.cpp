@@ -29,10 +29,13 @@ constexpr std::array kForeign{
               "a Git LFS pointer, not the mesh itself: fetch it with `git lfs pull`"},
 };
 
+std::string lower_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
 bool looks_like_web_page(std::string_view bytes) {
-  std::string start;
-  for (const char c : bytes.substr(0, 512))
-    start += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string start = lower_case(std::string(bytes.substr(0, 512)));
   const auto first = start.find_first_not_of(" \t\r\n\xef\xbb\xbf");
   if (first == std::string::npos || start[first] != '<') return false;
   return start.find("<html") != std::string::npos || start.find("<!doctype html") == first;
@@ -72,6 +75,10 @@ void fail(const SourceFile& file, const std::string& what) { throw Error(file.pa
 
 void fail_at_line(const SourceFile& file, const std::size_t line, const std::string& what) {
   fail(file, "line " + std::to_string(line) + ": " + what);
+}
+
+std::string ending_of(const std::string& path) {
+  return lower_case(std::filesystem::path(path).extension().string());
 }
 
 std::string in_quotes(const std::string_view word) {

@@ -23,6 +23,9 @@ void refuse_other_content(const SourceFile& file);
 [[noreturn]] void fail(const SourceFile& file, const std::string& what);
 [[noreturn]] void fail_at_line(const SourceFile& file, std::size_t line, const std::string& what);
 
+/// What a file name ends in, in small letters: ".csv" of "A.CSV".
+std::string ending_of(const std::string& path);
+
 /// Words of a file as they may appear in a message: printable, short, in quotes.
 std::string in_quotes(std::string_view word);
 

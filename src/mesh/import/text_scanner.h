@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -38,6 +39,17 @@ class TextScanner {
   std::size_t line_number_ = 0;
   char comment_;
 };
+
+/// Calls visit(word) for every word of a text, which blanks and ends of lines keep apart.
+template <class Visit>
+void for_words(std::string_view text, const Visit& visit) {
+  constexpr std::string_view kSpace = " \t\r\n";
+  for (std::size_t at = text.find_first_not_of(kSpace); at != std::string_view::npos;) {
+    const std::size_t end = std::min(text.find_first_of(kSpace, at), text.size());
+    visit(text.substr(at, end - at));
+    at = text.find_first_not_of(kSpace, end);
+  }
+}
 
 /// The whole word as a number, or nothing. What is too large for double is infinite, too small 0.
 std::optional<double> parse_real(std::string_view word);

@@ -43,10 +43,10 @@ class SolidBackend {
   /// What makes a backend of the same solid for another thread, which calls it and works at the
   /// same time as this one's does. It uses what this one has and must not outlive it. Empty: there
   /// is none.
-  virtual std::function<std::unique_ptr<SolidBackend>()> beside() = 0;
+  virtual std::function<std::unique_ptr<SolidBackend>()> beside() { return {}; }
 
   /// Whether the caller's threads have nothing to do while this one works.
-  virtual bool leaves_threads_idle() const = 0;
+  virtual bool leaves_threads_idle() const { return false; }
 };
 
 }  // namespace ist

@@ -4,8 +4,6 @@
 #include <vector>
 
 #include <ist/packing.h>
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include "packing/banded/band_schedule.h"
 #include "packing/banded/prototype.h"
@@ -13,6 +11,7 @@
 #include "packing/base/packing_settings.h"
 #include "packing/base/sphere_grid.h"
 #include "stage/stage.h"
+#include "stage/thread_arena.h"
 
 namespace ist::packing {
 
@@ -117,7 +116,7 @@ class BandedPacker {
         for (std::size_t from = 0; from < now.size(); from += kChunk) {
           const std::size_t to = std::min(now.size(), from + kChunk);
           state.resize(kChunk);
-          for_each_index(from, to, [&](std::size_t i) {
+          for_each_index(from, to, 16, [&](std::size_t i) {
             typename Field::Scratch scratch;
             StoredCell<Feature>& stored = cells_[now[i]];
             Cell cell = load_cell(SerialTeam{}, stored, scratch);
@@ -145,7 +144,7 @@ class BandedPacker {
     std::vector<Cell> children(8 * std::min(parents.size(), kChunk));
     for (std::size_t from = 0; from < parents.size(); from += kChunk) {
       const std::size_t to = std::min(parents.size(), from + kChunk);
-      for_each_index(from, to, [&](std::size_t i) {
+      for_each_index(from, to, 16, [&](std::size_t i) {
         typename Field::Scratch scratch;
         const Cell parent = load_cell(SerialTeam{}, cells_[parents[i]], scratch);
         for (int k = 0; k < 8; ++k)
@@ -194,7 +193,7 @@ class BandedPacker {
     const std::vector<Winner> winners = select_independent(candidates);
     const Spheres spheres(result_.spheres, grid_);
     std::vector<float> radius(winners.size());
-    for_each_index(0, winners.size(), [&](std::size_t i) {
+    for_each_index(0, winners.size(), 16, [&](std::size_t i) {
       const Candidate& c = candidates[winners[i].index];
       const double to_surface =
           gap_to_surface(surface_.clearance(SerialTeam{}, c.centre, clearance_limit(c.radius)));
@@ -220,14 +219,6 @@ class BandedPacker {
       ++inserted;
     }
     return inserted;
-  }
-
-  template <class Work>
-  static void for_each_index(std::size_t from, std::size_t to, const Work& work) {
-    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(from, to, 16),
-                              [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
-                                for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
-                              });
   }
 
   bool out_of_time_or_cancelled() {

@@ -1,11 +1,9 @@
 #include "packing/banded/selection.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 
 #include "packing/base/certificate.h"
+#include "stage/thread_arena.h"
 
 namespace ist::packing {
 namespace {
@@ -57,27 +55,19 @@ class Buckets {
   std::vector<std::uint32_t> start_, members_;
 };
 
-template <class Work>
-void for_each_index(std::size_t count, const Work& work) {
-  oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, count, 64),
-                            [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
-                              for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
-                            });
-}
-
 }  // namespace
 
 std::vector<Winner> select_independent(const std::vector<Candidate>& candidates) {
   const Buckets buckets(candidates);
   std::vector<std::uint8_t> wins(candidates.size());
-  for_each_index(candidates.size(), [&](std::size_t i) { wins[i] = !buckets.dominated(i); });
+  for_each_index(0, candidates.size(), 64, [&](std::size_t i) { wins[i] = !buckets.dominated(i); });
   std::vector<Winner> winners;
   for (std::size_t i = 0; i < candidates.size(); ++i)
     if (wins[i]) winners.push_back({static_cast<std::uint32_t>(i)});
   std::sort(winners.begin(), winners.end(), [&](const Winner& a, const Winner& b) {
     return goes_before(candidates[a.index], candidates[b.index]);
   });
-  for_each_index(winners.size(), [&](std::size_t i) {
+  for_each_index(0, winners.size(), 64, [&](std::size_t i) {
     const Candidate& a = candidates[winners[i].index];
     winners[i].gap = a.radius;
     buckets.any_near(winners[i].index, [&](std::uint32_t m) {

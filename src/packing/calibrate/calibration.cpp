@@ -18,27 +18,6 @@
 namespace ist {
 namespace {
 
-/// A solid seen so that lines along x meet it well. A thin plate is measured exactly by the lines
-/// that pierce it and badly by those that run along it, a needle by none if it lies at a slant in
-/// its box. So where few lines of the box along x meet the solid, it is turned: x is then the
-/// principal axis along which its surface extends least, z the one along which it extends most.
-class TurnedSolid {
- public:
-  explicit TurnedSolid(const MeshSolid& solid);
-
-  const MeshSolid& solid() const { return turned_ ? *turned_ : original_; }
-  /// Length of solid()'s unit in the original's unit frame.
-  double scale() const { return turned_ ? turned_->frame().scale() : 1; }
-  /// From the unit frame of the original to that of solid(), and back.
-  Eigen::Vector3d turn(const Eigen::Vector3d& x) const;
-  Eigen::Vector3d turn_back(const Eigen::Vector3d& x) const;
-
- private:
-  const MeshSolid& original_;
-  std::unique_ptr<MeshSolid> turned_;                   // null: the original serves
-  Eigen::Matrix3d axes_ = Eigen::Matrix3d::Identity();  // rows
-};
-
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
@@ -128,33 +107,49 @@ Matrix3d principal_axes(Matrix3d m) {
   return sorted;
 }
 
-TurnedSolid::TurnedSolid(const MeshSolid& solid) : original_(solid) {
-  const MeshView& view = solid.arrays();
-  const SurfaceMoments moments = surface_moments(view);
-  const Vector3d size = solid.bounds().sizes() / solid.frame().scale();
-  if (moments.shadow.x() >= kSmallShadow * moments.shadow.maxCoeff() &&
-      moments.shadow.x() >= kEmptyBox * size.y() * size.z())
-    return;
-  axes_ = principal_axes(moments.covariance);
-  ClosedMesh mesh;
-  mesh.name = "turned mesh";
-  mesh.report.closed = true;
-  for (std::size_t v = 0; v < view.vertex_count; ++v)
-    mesh.mesh.vertices.push_back(axes_ * Vector3d(view.vertices + 3 * v));
-  for (std::size_t t = 0; t < view.triangle_count; ++t) {
-    const std::uint32_t* corner = view.triangles + 3 * t;
-    mesh.mesh.triangles.push_back({corner[0], corner[1], corner[2]});
+/// A solid seen so that lines along x meet it well. A thin plate is measured exactly by the lines
+/// that pierce it and badly by those that run along it, a needle by none if it lies at a slant in
+/// its box. So where few lines of the box along x meet the solid, it is turned: x is then the
+/// principal axis along which its surface extends least, z the one along which it extends most.
+class TurnedSolid {
+ public:
+  explicit TurnedSolid(const MeshSolid& solid) : original_(solid) {
+    const MeshView& view = solid.arrays();
+    const SurfaceMoments moments = surface_moments(view);
+    const Vector3d size = solid.bounds().sizes() / solid.frame().scale();
+    if (moments.shadow.x() >= kSmallShadow * moments.shadow.maxCoeff() &&
+        moments.shadow.x() >= kEmptyBox * size.y() * size.z())
+      return;
+    axes_ = principal_axes(moments.covariance);
+    ClosedMesh mesh;
+    mesh.name = "turned mesh";
+    mesh.report.closed = true;
+    for (std::size_t v = 0; v < view.vertex_count; ++v)
+      mesh.mesh.vertices.push_back(axes_ * Vector3d(view.vertices + 3 * v));
+    for (std::size_t t = 0; t < view.triangle_count; ++t) {
+      const std::uint32_t* corner = view.triangles + 3 * t;
+      mesh.mesh.triangles.push_back({corner[0], corner[1], corner[2]});
+    }
+    turned_ = std::make_unique<MeshSolid>(mesh);
   }
-  turned_ = std::make_unique<MeshSolid>(mesh);
-}
 
-Vector3d TurnedSolid::turn(const Vector3d& x) const {
-  return turned_ ? turned_->frame().to_unit(axes_ * x) : x;
-}
+  const MeshSolid& solid() const { return turned_ ? *turned_ : original_; }
+  /// Length of solid()'s unit in the original's unit frame.
+  double scale() const { return turned_ ? turned_->frame().scale() : 1; }
+  /// From the unit frame of the original to that of solid(), and back.
+  Vector3d turn(const Vector3d& x) const {
+    return turned_ ? turned_->frame().to_unit(axes_ * x) : x;
+  }
 
-Vector3d TurnedSolid::turn_back(const Vector3d& x) const {
-  return turned_ ? Vector3d(axes_.transpose() * turned_->frame().from_unit(x)) : x;
-}
+  Vector3d turn_back(const Vector3d& x) const {
+    return turned_ ? Vector3d(axes_.transpose() * turned_->frame().from_unit(x)) : x;
+  }
+
+ private:
+  const MeshSolid& original_;
+  std::unique_ptr<MeshSolid> turned_;                   // null: the original serves
+  Eigen::Matrix3d axes_ = Eigen::Matrix3d::Identity();  // rows
+};
 
 constexpr double kStep = 0.15;  // distance of columns over the mean leaf radius
 // Enough columns to measure the solid where spheres are few, and a bound where it is thin.

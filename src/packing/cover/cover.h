@@ -1,12 +1,14 @@
 #pragma once
 
+#include <ist/progress.h>
+
+#include <functional>
 #include <span>
 #include <vector>
 
-#include <ist/progress.h>
-
 #include "mesh/mesh_solid.h"
 #include "packing/backend/solid_backend.h"
+#include "packing/backend/tasks.h"
 
 namespace ist {
 
@@ -19,5 +21,13 @@ namespace ist {
 /// no spheres or progress cancels.
 std::vector<float> cover_radii(const MeshSolid& solid, SolidBackend& backend,
                                std::span<const Sphere> inner, const ProgressCallback& progress);
+
+/// SolidBackend::cover_radii() on the threads of the current arena.
+std::vector<double> cover_on_host(const MeshSolid& solid, const CoverTask& task,
+                                  const std::function<void(int)>& report);
+
+/// The same for a solid known by its signed distance alone, in the unit frame `frame`.
+std::vector<double> cover_on_host(const Solid& solid, const UnitFrame& frame, const CoverTask& task,
+                                  const std::function<void(int)>& report);
 
 }  // namespace ist

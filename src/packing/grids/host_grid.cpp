@@ -1,25 +1,16 @@
 #include "packing/grids/host_grid.h"
 
 #include <ist/error.h>
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
 
 #include "packing/grids/discrete_distance.h"
 #include "packing/grids/local_winding.h"
+#include "stage/thread_arena.h"
 
 namespace ist::packing {
 namespace {
-
-template <class Work>
-void for_each_index(std::size_t count, std::size_t grain, const Work& work) {
-  oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, count, grain),
-                            [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
-                              for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
-                            });
-}
 
 /// Adds, and returns what was there before.
 template <class T>
@@ -35,11 +26,31 @@ void for_rows(const CellRange& range, const Visit& visit) {
 
 }  // namespace
 
+void HostGrid::measure_distances() {
+  std::vector<std::uint8_t> field(cells(), kInactiveCell);
+  const auto for_active = [this](const auto& visit) {
+    for (const CellRecord& r : records_) {
+      std::uint32_t& word = words_[place_of(r.cell)];
+      if (word != DistanceGrid::kInactive) visit(r, word);
+    }
+  };
+  for_active([&](const CellRecord& r, std::uint32_t) { field[r.cell] = start_distance(r); });
+  for (int axis = 0; axis < 3; ++axis)
+    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<int>(0, grid_lines(layout_, axis), 64),
+                              [&](const oneapi::tbb::blocked_range<int>& lines) {
+                                for (int n = lines.begin(); n != lines.end(); ++n)
+                                  sweep_line(field.data(), grid_line(layout_, axis, n));
+                              });
+  for_active([&](const CellRecord& r, std::uint32_t& word) {
+    word = DistanceGrid::slot(word) | std::uint32_t{field[r.cell]} << 24;
+  });
+}
+
 HostGrid::HostGrid(const MeshView& mesh) : mesh_(mesh), triangles_(mesh.triangle_count) {
   GridScene scene;
   scene.corners = mesh.triangles;
   scene.vertices = mesh.vertices;
-  for_each_index(triangles_.size(), 256, [&](std::size_t t) {
+  for_each_index(0, triangles_.size(), 256, [&](std::size_t t) {
     const Corners c = corners_of(scene, static_cast<std::uint32_t>(t));
     triangles_[t] = make_grid_triangle(c.p[0], c.p[1], c.p[2]);
   });
@@ -104,7 +115,7 @@ void HostGrid::update(const std::vector<Sphere>& spheres, std::size_t first_new)
 void HostGrid::count_triangles(std::vector<std::uint32_t>& counts,
                                std::vector<std::int32_t>& crossings) const {
   const GridScene mesh = scene({});
-  for_each_index(triangles_.size(), 64, [&](std::size_t t) {
+  for_each_index(0, triangles_.size(), 64, [&](std::size_t t) {
     const Corners corners = corners_of(mesh, static_cast<std::uint32_t>(t));
     const TriangleCells cells = cells_of(layout_, corners);
     for_rows(cells.range(), [&](int j, int k) {
@@ -124,7 +135,7 @@ void HostGrid::count_triangles(std::vector<std::uint32_t>& counts,
 void HostGrid::classify(const std::vector<std::uint32_t>& counts,
                         std::vector<std::int32_t>& windings) {
   words_.assign(cells(), 0);
-  for_each_index(static_cast<std::size_t>(layout_.n[1]) * static_cast<std::size_t>(layout_.n[2]),
+  for_each_index(0, static_cast<std::size_t>(layout_.n[1]) * static_cast<std::size_t>(layout_.n[2]),
                  16, [&](std::size_t row) {
                    const std::size_t first = row * static_cast<std::size_t>(layout_.n[0]);
                    std::int32_t winding = 0, last = 0;
@@ -143,7 +154,7 @@ void HostGrid::classify(const std::vector<std::uint32_t>& counts,
 
 /// Cells wholly inside new spheres go inactive.
 void HostGrid::cover(const std::vector<Sphere>& spheres, std::size_t first_new) {
-  for_each_index(spheres.size() - first_new, 4, [&](std::size_t n) {
+  for_each_index(0, spheres.size() - first_new, 4, [&](std::size_t n) {
     const Sphere& s = spheres[first_new + n];
     const CellRange range = sphere_range(layout_, s);
     for_rows(range, [&](int j, int k) {
@@ -168,7 +179,7 @@ std::uint32_t HostGrid::place_of(std::uint32_t cell) const {
 void HostGrid::fill_triangle_lists() {
   const GridScene mesh = scene({});
   std::vector<std::uint32_t> filled(records_.size());
-  for_each_index(triangles_.size(), 64, [&](std::size_t t) {
+  for_each_index(0, triangles_.size(), 64, [&](std::size_t t) {
     const TriangleCells cells = cells_of(layout_, corners_of(mesh, static_cast<std::uint32_t>(t)));
     for_rows(cells.range(), [&](int j, int k) {
       for (int i = cells.range().lo[0]; i <= cells.range().hi[0]; ++i) {
@@ -216,7 +227,7 @@ void HostGrid::hash_words() {
 void HostGrid::list_spheres(const std::vector<Sphere>& spheres) {
   for (CellRecord& r : records_) r.sphere_count = 0;
   const auto for_listed = [&](const auto& visit) {
-    for_each_index(spheres.size(), 16, [&](std::size_t n) {
+    for_each_index(0, spheres.size(), 16, [&](std::size_t n) {
       const CellRange range = sphere_range(layout_, spheres[n]);
       for_rows(range, [&](int j, int k) {
         for_sphere_row(layout_, spheres[n], range, j, k, false, [&](std::uint32_t cell, bool) {

@@ -1,7 +1,5 @@
 #include "packing/grids/host_rounds.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,24 +9,17 @@
 #include "packing/grids/discrete_distance.h"
 #include "packing/grids/grid_certificate.h"
 #include "packing/grids/prototype_cells.h"
+#include "stage/thread_arena.h"
 
 namespace ist::packing {
 namespace {
-
-template <class Work>
-void for_each_index(std::size_t count, const Work& work) {
-  oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(0, count, 64),
-                            [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
-                              for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
-                            });
-}
 
 /// Those of `candidates` that `keep(index)` is true for.
 template <class Keep>
 std::vector<GridCandidate> filtered(const std::vector<GridCandidate>& candidates,
                                     const Keep& keep) {
   std::vector<std::uint8_t> kept(candidates.size());
-  for_each_index(candidates.size(), [&](std::size_t i) { kept[i] = keep(i) ? 1 : 0; });
+  for_each_index(0, candidates.size(), 64, [&](std::size_t i) { kept[i] = keep(i) ? 1 : 0; });
   std::vector<GridCandidate> out;
   for (std::size_t i = 0; i < candidates.size(); ++i)
     if (kept[i] != 0) out.push_back(candidates[i]);
@@ -108,14 +99,6 @@ std::vector<GridCandidate> selected(const GridLayout& layout,
   return filtered(ahead, [&](std::size_t i) { return !classes.outdone(i); });
 }
 
-template <class Work>
-void for_each_index(std::size_t from, std::size_t to, const Work& work) {
-  oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(from, to, 8),
-                            [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
-                              for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
-                            });
-}
-
 }  // namespace
 
 void HostRounds::build(const GridLayout& layout) {
@@ -147,7 +130,7 @@ std::vector<GridCandidate> HostRounds::converged(const AscentSettings& settings,
                                                  const GoOn& go_on) {
   const GridScene scene = grid_.scene(spheres_);
   std::vector<std::uint8_t> active(cells_.size());
-  for_each_index(0, cells_.size(), [&](std::size_t i) {
+  for_each_index(0, cells_.size(), 8, [&](std::size_t i) {
     active[i] = prototype_cell_active(SerialTeam{}, scene, prototypes_, cells_[i]) ? 1 : 0;
   });
   std::size_t kept = 0;
@@ -158,7 +141,7 @@ std::vector<GridCandidate> HostRounds::converged(const AscentSettings& settings,
   std::vector<GridCandidate> candidates(kept);
   constexpr std::size_t kChunk = 4096;  // prototypes between two looks at clock and progress
   for (std::size_t from = 0; from < kept; from += kChunk) {
-    for_each_index(from, std::min(kept, from + kChunk), [&](std::size_t i) {
+    for_each_index(from, std::min(kept, from + kChunk), 8, [&](std::size_t i) {
       candidates[i] = converged_prototype(SerialTeam{}, scene, settings, cells_[i]);
     });
     if (!go_on()) return {};
@@ -170,7 +153,7 @@ std::vector<GridWinner> HostRounds::round(const AscentSettings& settings, const 
   const std::vector<GridCandidate> winners = selected(prototypes_, converged(settings, go_on));
   const GridScene scene = grid_.scene(spheres_);
   std::vector<GridWinner> certified(winners.size());
-  for_each_index(0, winners.size(), [&](std::size_t i) {
+  for_each_index(0, winners.size(), 8, [&](std::size_t i) {
     certified[i] = {winners[i], certified_room(SerialTeam{}, scene, winners[i])};
   });
   return certified;

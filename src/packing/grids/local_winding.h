@@ -39,12 +39,7 @@ IST_HD inline int row_crossing(const GridLayout& g, const Corners& t, int j, int
 /// winding number.
 IST_HD inline int winding_before(const Corners& t, const double p[3]) {
   const int facing = pierced(t, p + 1);
-  if (facing == 0) return 0;
-  const Extent x(t);
-  bool beyond = p[0] < x.low;
-  if (x.low <= p[0] && p[0] <= x.high)
-    beyond = orient3d_sign(t.p[0], t.p[1], t.p[2], p) * facing > 0;
-  return beyond ? 0 : -facing;
+  return facing == 0 || lies_beyond(t, facing, p) ? 0 : -facing;
 }
 
 /// Is p in the solid (winding number ≥ 1)? p in the grid.

@@ -1,9 +1,155 @@
 #pragma once
 
+#include <ist/packing.h>
+
+#include <algorithm>
+
 #include "mesh/mesh_solid.h"
-#include "packing/grids/grid_packer.h"
+#include "packing/base/certificate.h"
+#include "packing/base/packing_settings.h"
+#include "packing/grids/grid_rounds.h"
+#include "packing/grids/grid_schedule.h"
+#include "stage/stage.h"
 
 namespace ist::packing {
+
+/// A round, for whoever wants the history.
+struct GridRound {
+  double seconds = 0;  ///< since the start, at the end of the round
+  std::size_t spheres = 0;
+  double coverage = 0;
+  double radius = 0;  ///< largest inserted in the round, unit frame; 0: none
+  GridUse use;
+};
+
+// Float distances to a grid's lists are good to a few 2^-23: nothing below this is told apart. The
+// banded mode certifies as it goes, and goes down to a quarter of it.
+constexpr float kSmallestGridRadius = 0x1p-21f;
+constexpr int kIdleRounds = 3;  ///< without a sphere at the finest grids: nothing fits any more
+
+/// The paper's algorithm (§3, §4; docs/design.md 4.1), the same for all four schedules, on the host
+/// or a device: `Rounds` as grid_rounds.h says.
+template <class Rounds>
+class GridPacker {
+ public:
+  GridPacker(Rounds& rounds, const GridSchedule& schedule, const PackingLimits& limits,
+             Stage& stage, std::vector<GridRound>* history)
+      : rounds_(rounds),
+        schedule_(schedule),
+        limits_(limits),
+        stage_(stage),
+        history_(history),
+        prototypes_(schedule.level(schedule.prototypes)),
+        distances_(schedule.distances) {}
+
+  SpherePacking run() {
+    rounds_.build(schedule_.level(distances_));
+    rounds_.place_prototypes(prototypes_);
+    int rounds_at_level = 0, idle = 0;
+    while (goes_on()) {
+      const bool any = round();
+      if (stopped_) break;
+      idle = any ? 0 : idle + 1;
+      ++rounds_at_level;
+      if (prototypes_.level < schedule_.finest_prototypes &&
+          (rounds_at_level >= schedule_.rounds_per_level || !any)) {
+        refine();
+        rounds_at_level = idle = 0;
+      } else if (any) {
+        rounds_.update();
+      } else if (idle == kIdleRounds) {
+        stop(rounded_up(limits_.min_radius) > kSmallestGridRadius ? StopReason::min_radius
+                                                                  : StopReason::exhausted);
+      }
+    }
+    result_.stop = reason_;
+    result_.coverage = coverage();
+    return std::move(result_);
+  }
+
+ private:
+  /// Inserts what one set of prototypes finds; false if that is nothing.
+  bool round() {
+    const float smallest = std::max(kSmallestGridRadius, rounded_up(limits_.min_radius));
+    std::vector<GridWinner> winners = rounds_.round(
+        {prototypes_, limits_.seed, static_cast<std::uint32_t>(result_.rounds), smallest},
+        [this] { return goes_on(); });
+    if (stopped_) return false;
+    std::sort(winners.begin(), winners.end(), [](const GridWinner& a, const GridWinner& b) {
+      return goes_before(a.candidate, b.candidate);
+    });
+    std::vector<Sphere> inserted;
+    for (const GridWinner& w : winners) {
+      const float r = rounded_down(w.room);
+      if (!(r >= smallest)) continue;
+      if (r < kFloatNoise) result_.below_float_noise = true;
+      inserted.push_back({w.candidate.centre.x, w.candidate.centre.y, w.candidate.centre.z, r});
+      radius_ = inserted.front().r;
+      result_.spheres.push_back(inserted.back());
+      covered_ += fixed_ball_volume(r, volume_unit_);
+      if (result_.spheres.size() == limits_.max_spheres)
+        stop(StopReason::sphere_count);
+      else if (coverage() >= limits_.target_coverage)
+        stop(StopReason::coverage);
+      if (stopped_) break;
+    }
+    ++result_.rounds;
+    if (!stopped_) rounds_.append(inserted);
+    record(inserted.empty() ? 0 : double{inserted.front().r});
+    return !inserted.empty();
+  }
+
+  /// Splits the prototype grid; the distance grid follows where it would be the coarser one.
+  void refine() {
+    prototypes_ = refined(prototypes_);
+    if (distances_ < std::min(schedule_.finest_distances, prototypes_.level)) {
+      ++distances_;
+      rounds_.build(schedule_.level(distances_));
+    } else {
+      rounds_.update();
+    }
+    rounds_.split_prototypes();
+  }
+
+  void record(double radius) {
+    if (history_ == nullptr) return;
+    history_->push_back(
+        {stage_.elapsed(), result_.spheres.size(), coverage(), radius, rounds_.use()});
+  }
+
+  double coverage() const {
+    return std::min(1.0, static_cast<double>(covered_) * volume_unit_ / limits_.volume);
+  }
+
+  void stop(StopReason reason) {
+    stopped_ = true;
+    reason_ = reason;
+  }
+
+  /// Looks at the clock, and asks the user's callback ten times a second.
+  bool goes_on() {
+    if (stopped_) return false;
+    const auto why = stage_.stop([this](Progress& now) {
+      set_progress(now, limits_, result_.spheres.size(), coverage(), double{radius_});
+    });
+    if (why) stop(*why);
+    return !stopped_;
+  }
+
+  Rounds& rounds_;
+  const GridSchedule& schedule_;
+  const PackingLimits& limits_;
+  Stage& stage_;
+  std::vector<GridRound>* const history_;
+  GridLayout prototypes_;
+  int distances_;
+  SpherePacking result_;
+  double volume_unit_ = volume_unit_of(limits_.volume);
+  std::uint64_t covered_ = 0;  ///< in volume_unit_
+  float radius_ = 0;
+  bool stopped_ = false;
+  StopReason reason_ = StopReason::exhausted;
+};
 
 /// What grid sizes are picked from; `memory` [bytes] for the grids.
 GridFigures grid_figures(const MeshSolid& solid, std::size_t memory);
