@@ -355,7 +355,7 @@ ist_status_t ist_workspace_release(ist_workspace_t* workspace);
 
 /* A capacity with which no pose of two solids fills the workspace, but for the exact measure and
  * ist_time_of_impact(): workspace_capacity() in ist/query.h. Scales count, poses do not. It
- * allocates and takes some 0.1 s for 16,000 spheres. IST_INVALID_INPUT for two fields. */
+ * allocates and takes some 0.3 s for 16,000 spheres. IST_INVALID_INPUT for two fields. */
 ist_status_t ist_workspace_capacity(const ist_placed_t* a, const ist_placed_t* b, size_t* capacity);
 
 /* --- Settings: a null pointer means the defaults, all 0 but for `size` ------------------------ */

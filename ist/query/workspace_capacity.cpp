@@ -10,6 +10,8 @@
 #include "query/base/relative_pose.h"
 #include "query/descent/descent.h"
 #include "query/descent/open_runs.h"
+#include "query/detail/coincident.h"
+#include "query/detail/detail_chain.h"
 #include "query/field/surface_descent.h"
 
 namespace ist {
@@ -62,16 +64,18 @@ std::size_t most_met(const Balls& balls, double radius) {
       first[k] = static_cast<std::size_t>(std::max(0.0, from - 1e-6));
       last[k] = std::min(count[k] - 1, static_cast<std::size_t>(from + 2 * reach / cell + 1e-6));
     }
-    // From the ball's centre to a layer of cells.
+    // Squared, from the ball's centre to a layer of cells.
     const auto gap = [&](int k, std::size_t i) {
       const double to = low[k] + cell * static_cast<double>(i) - ball.centre[k];
-      return std::max({to, -to - cell, 0.0}) * (1 - 1e-9);
+      const double away = std::max({to, -to - cell, 0.0}) * (1 - 1e-9);
+      return away * away;
     };
     for (std::size_t z = first[2]; z <= last[2]; ++z)
-      for (std::size_t y = first[1]; y <= last[1]; ++y)
-        for (std::size_t x = first[0]; x <= last[0]; ++x)
-          if (std::hypot(gap(0, x), gap(1, y), gap(2, z)) <= reach)
-            ++met[(z * count[1] + y) * count[0] + x];
+      for (std::size_t y = first[1]; y <= last[1]; ++y) {
+        const double left = reach * reach - (gap(2, z) + gap(1, y));
+        std::uint32_t* const row = met.data() + (z * count[1] + y) * count[0];
+        for (std::size_t x = first[0]; x <= last[0]; ++x) row[x] += gap(0, x) <= left;
+      }
   }
   return *std::max_element(met.begin(), met.end());
 }
@@ -166,17 +170,31 @@ std::size_t capacity_of(const PlacedTree& a, const PlacedTree& b) {
   const RelativePose b_from_a = scales_of(relative_pose(still_b, still_a));
   Capacity capacity;
   if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0) return capacity.value();
-  const auto add = [&](const TreeHeader& tree_a, const TreeHeader& tree_b) {
-    const SphereTree spheres_a(a.tree.header(), tree_a), spheres_b(b.tree.header(), tree_b);
-    capacity.add_trees(spheres_a, spheres_b, a_from_b);
-    if (a.tree.has_field()) capacity.add_surface(surface_tree(a.tree), spheres_b, a_from_b);
-    if (b.tree.has_field()) capacity.add_surface(surface_tree(b.tree), spheres_a, b_from_a);
-  };
   const AssetHeader &header_a = a.tree.header(), &header_b = b.tree.header();
+  const auto add = [&](const TreeHeader& tree_a, const TreeHeader& tree_b) {
+    capacity.add_trees({header_a, tree_a}, {header_b, tree_b}, a_from_b);
+  };
   add(header_a.inner_tree, header_b.inner_tree);
-  for (std::uint32_t i = 0; i <= header_a.detail_count; ++i)
-    for (std::uint32_t k = 0; k <= header_b.detail_count; ++k)
-      add(matched_tree(header_a, i), matched_tree(header_b, k));
+  const DetailChain chain(header_a, header_b, a_from_b.a_from_b.scale);
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const DetailPair& pair = chain[i];
+    add(matched_tree(header_a, pair.a), matched_tree(header_b, pair.b));
+    if (pair.a != pair.b || !are_one_asset(header_a, header_b)) continue;
+    // Copies that coincide are asked as unlike levels.
+    const std::uint32_t other = pair.a < header_a.detail_count ? pair.a + 1 : pair.a - 1;
+    add(matched_tree(header_a, pair.a), matched_tree(header_b, other));
+    add(matched_tree(header_a, other), matched_tree(header_b, pair.a));
+  }
+  const auto add_surface = [&](const PlacedTree& owner, const AssetHeader& prober,
+                               const RelativePose& pose) {
+    if (!owner.tree.has_field()) return;
+    const SurfaceTree surface = surface_tree(owner.tree);
+    capacity.add_surface(surface, {prober, prober.inner_tree}, pose);
+    for (std::uint32_t i = 0; i <= prober.detail_count; ++i)
+      capacity.add_surface(surface, {prober, matched_tree(prober, i)}, pose);
+  };
+  add_surface(a, header_b, a_from_b);
+  add_surface(b, header_a, b_from_a);
   return capacity.value();
 }
 
