@@ -164,6 +164,7 @@ void add_class(py::module_& module) {
   add_column(type, "sphere_pairs", &Penetrations::sphere_pairs,
              "(n,) uint32, lenses summed and spheres overlapped with a surface; with "
              "measure='exact' intersecting triangles.");
+  add_pickling(type);
 }
 
 }  // namespace

@@ -31,7 +31,8 @@ struct Patches {
       point{patches};
   Column<double> area{patches}, depth{patches}, volume{patches}, twist{patches};
 
-  Patches(const Shape& of, std::size_t each) : rows(of), patches(with(of, each)) {}
+  explicit Patches(const Shape& of = {}, std::size_t each = 0)
+      : rows(of), patches(with(of, each)) {}
 
   void write(std::size_t i, const Row& row, const ContactPatches& whole,
              std::span<const ContactPatch> found) const {
@@ -175,10 +176,11 @@ void add_classes(py::module_& module) {
   add_column(separation, "status", &Separations::status, "(n,) uint32, a QueryStatus.");
   add_column(separation, "node_visits", &Separations::node_visits, "(n,) uint32.");
   add_column(separation, "sphere_pairs", &Separations::sphere_pairs, "(n,) uint32.");
+  add_pickling(separation);
 
   py::class_<Patches> patch(module, "ContactPatches",
                             "Contact patches; the first `count` of m are valid.");
-  patch.def_ro("penetration", &Patches::penetration, "The whole: a Penetration.");
+  add_inner(patch, "penetration", &Patches::penetration, "The whole: a Penetration.");
   patch.def_prop_ro(
       "status", [](const Patches& self) { return self.penetration->status.handed_out(); },
       "(n,) uint32, a QueryStatus: the whole's.");
@@ -201,15 +203,17 @@ void add_classes(py::module_& module) {
       "wrench, nearest to the centroid.");
   add_column(patch, "twist", &Patches::twist,
              "(n, m) [u³] moment about the normal that a force at the point lacks.");
+  add_pickling(patch);
 
   py::class_<Outline> outline(module, "OverlapOutline", "Contact patches and their outlines.");
-  outline.def_ro("contact", &Outline::contact, "The patches: ContactPatches of one pose.");
+  add_inner(outline, "contact", &Outline::contact, "The patches: ContactPatches of one pose.");
   add_column(
       outline, "segments", &Outline::segments,
       "(n, 2, 3) [u] from and to of each, world: they form closed curves. A's surface inside "
       "B lies to the left of each, seen from outside A.");
   add_column(outline, "patch", &Outline::patch,
              "(n,) uint32, number of the patch that each bounds; 0 where max_patches is 0.");
+  add_pickling(outline);
 }
 
 }  // namespace
