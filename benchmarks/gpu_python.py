@@ -1,4 +1,4 @@
-"""ist.gpu.penetration beside what the device itself does of it, and ist.torch.overlap.
+"""ist.penetration of solids on a GPU beside what the device itself does of it, and ist.torch.overlap.
 
     PYTHONPATH=build/python python3 benchmarks/gpu_python.py FOLDER
 
@@ -24,7 +24,7 @@ def measure(folder):
     elephant, dino = (ist.Asset.load(folder / f"{name}.ist") for name in ("elephant", "dino"))
     with open(folder / "poses_eledino.csv") as file:
         rows = [row for row in csv.DictReader(file)]
-    assets = ist.gpu.Solids([elephant, dino])
+    assets = ist.Solids([elephant, dino], device="cuda")
     for kind in ("pen", "deep", "contain", "sep"):
         columns = "qw qx qy qz tx ty tz scale_b".split()
         table = np.array([[float(row[c]) for c in columns] for row in rows if row["class"] == kind])
@@ -32,7 +32,8 @@ def measure(folder):
             drawn = torch.from_numpy(table[np.random.default_rng(1).integers(0, len(table), count)]).cuda()
             poses, scales = drawn[:, :7].contiguous(), drawn[:, 7].contiguous()
             numbers = [torch.full((count,), k, dtype=torch.int32, device="cuda") for k in (0, 1)]
-            kept = ist.gpu.penetration(assets, *numbers, None, poses, None, scales)
+            sides = [assets[number] for number in numbers]
+            kept = ist.penetration(*sides, poses, scales=scales, field="never")
             torch.cuda.synchronize()
             row = dict(poses=kind, pairs=count)
             for name, out in (("into the same arrays", kept), ("into new arrays", None)):
@@ -43,8 +44,7 @@ def measure(folder):
                     events[0].record()
                     for _ in range(10):
                         before = time.perf_counter()
-                        found = ist.gpu.penetration(assets, *numbers, None, poses, None, scales,
-                                                    out=out)
+                        found = ist.penetration(*sides, poses, scales=scales, field="never", out=out)
                         call.append(time.perf_counter() - before)
                     events[1].record()
                     torch.cuda.synchronize()
@@ -63,7 +63,7 @@ def measure(folder):
                 for _ in range(20):
                     torch.cuda.synchronize()
                     start = time.perf_counter()
-                    overlap([elephant, dino], scene, scales=sizes).sum().backward()
+                    overlap(assets, scene, scales=sizes, field="never").sum().backward()
                     torch.cuda.synchronize()
                     times.append(time.perf_counter() - start)
                 row["ist.torch.overlap and backward, ms"] = 1e3 * np.median(times)

@@ -34,6 +34,8 @@ IST_HD inline void write_nothing(const GpuPenetrations& to, std::uint32_t i, Que
   write3(to.centroid, i, none, none, none);
   write3(to.translation_gradient, i, none, none, none);
   write3(to.rotation_gradient, i, none, none, none);
+  write3(to.force, i, none, none, none);
+  write3(to.torque, i, none, none, none);
   if (to.status != nullptr) to.status[i] = status;
   if (to.node_visits != nullptr) to.node_visits[i] = 0;
   if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = 0;
@@ -50,6 +52,8 @@ IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, cons
   write3(to.centroid, i, sums.centre[0], sums.centre[1], sums.centre[2]);
   write3(to.translation_gradient, i, sums.push[0], sums.push[1], sums.push[2]);
   write3(to.rotation_gradient, i, sums.turn[0], sums.turn[1], sums.turn[2]);
+  write3(to.force, i, -sums.push[0], -sums.push[1], -sums.push[2]);
+  write3(to.torque, i, -sums.turn[0], -sums.turn[1], -sums.turn[2]);
   if (to.status != nullptr) to.status[i] = QueryStatus::ok;
   if (to.node_visits != nullptr) to.node_visits[i] = totals.visits;
   if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = totals.spheres;

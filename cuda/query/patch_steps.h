@@ -42,6 +42,12 @@ class PatchWriter {
     const double a = memory.pair.tree[0].root[3];
     const double b = memory.pair.tree[1].root[3] * place_.a_from_b.scale;
     deepest_ = 2 * place_.unit_a * (a < b ? a : b);
+    for (int k = 0; k < 3; ++k) {
+      const double* const r = place_.rotation_a + 3 * k;
+      const double(&t)[3] = place_.a_from_b.t;
+      origin_b_[k] = place_.origin_a[k] +
+                     place_.unit_a * (r[0] * t[0] + r[1] * t[1] + r[2] * t[2]) - place_.offset_b[k];
+    }
   }
 
   IST_HD void write(const GpuContactPatches& to, std::uint32_t pair) {
@@ -106,6 +112,28 @@ class PatchWriter {
     put(to.volume, at, sums.volume);
     put3(to.force, at, push, -1);
     put3(to.torque, at, sums.turn, -1);
+    write_axis(to, at, sums, area);
+  }
+
+  /// The central axis of the patch's wrench (finish_patches(), query/contact/write_patches.cpp).
+  IST_HD void write_axis(const GpuContactPatches& to, std::uint64_t at, const WorldSums& sums,
+                         double area) const {
+    double arm[3], moment[3], point[3], twist = 0;
+    for (int k = 0; k < 3; ++k) arm[k] = sums.centre[k] - origin_b_[k];
+    const double(&push)[3] = sums.push;
+    for (int k = 0; k < 3; ++k) {
+      const int l = (k + 1) % 3, m = (k + 2) % 3;
+      moment[k] = (arm[l] * push[m] - arm[m] * push[l]) - sums.turn[k];
+    }
+    for (int k = 0; k < 3; ++k) {
+      const int l = (k + 1) % 3, m = (k + 2) % 3;
+      point[k] = sums.centre[k];
+      if (!(area > 0)) continue;
+      point[k] -= (push[l] * moment[m] - push[m] * moment[l]) / (area * area);
+      twist -= push[k] * moment[k] / area;
+    }
+    put3(to.point, at, point, 1);
+    put(to.twist, at, twist);
   }
 
   const Team& team_;
@@ -113,7 +141,8 @@ class PatchWriter {
   PatchParts& parts_;
   const CutsRef& cuts_;
   const int size_;
-  double deepest_;  ///< [u] of any patch
+  double deepest_;      ///< [u] of any patch
+  double origin_b_[3];  ///< [u] world
 };
 
 /// Sums pair i and divides it.

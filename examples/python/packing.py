@@ -86,15 +86,16 @@ def main():
     seconds = time.perf_counter() - start
 
     n = len(kinds)
-    solids = WALLS + crate.parts
+    solids = ist.Solids(WALLS + crate.parts)
     poses = np.concatenate((np.tile([1.0, 0, 0, 0, 0, 0, 0], (len(WALLS), 1)), crate.poses))
     sizes = np.concatenate((np.ones(len(WALLS)), crate.scales))
-    pairs = [(i, j) for j in range(len(WALLS), len(solids)) for i in range(j)]
-    gaps = ist.separation_of_pairs(solids, poses, pairs, scales=sizes)
+    a, b = np.array([(i, j) for j in range(len(WALLS), len(solids)) for i in range(j)]).T
+    gaps = ist.separation(solids[a], solids[b], poses[b], poses_a=poses[a], scales=sizes[b],
+                          scales_a=sizes[a])
     filled = sum(part.volume * scale**3 for part, scale in zip(crate.parts, crate.scales))
     print(f"{n} of {options.parts} parts found room in {seconds:.2f} s; they fill "
           f"{filled / BOX.prod():.0%} of the box")
-    print(f"{np.count_nonzero(gaps.distance_min > 0)} of {len(pairs)} pairs of parts and walls are "
+    print(f"{np.count_nonzero(gaps.distance_min > 0)} of {len(a)} pairs of parts and walls are "
           f"proven apart, the nearest spheres are {gaps.distance.min():.3g} u apart")
     if options.picture:
         picture(options.picture, meshes, kinds, crate)

@@ -43,7 +43,7 @@ def push_apart(solids, poses, pairs, scales, device="cpu", most_steps=2000):
     for step in range(most_steps):
         swollen = min(1, 0.3 + 0.7 * step / SWELLING)
         descent.zero_grad()
-        energy = overlap(solids, moved, pairs=pairs, scales=swollen * grown).sum()
+        energy = overlap(solids, moved, pairs=pairs, scales=swollen * grown, field="never").sum()
         energies.append(energy.item())
         if energies[-1] == 0 and swollen == 1:
             break
@@ -75,8 +75,10 @@ def main():
     apart, energies = push_apart(solids, poses, pairs, scales, options.device)
     seconds = time.perf_counter() - start
 
-    before = ist.penetration_of_pairs(solids, poses, pairs, scales=scales)
-    after = ist.separation_of_pairs(solids, apart, pairs, scales=scales)
+    held, (a, b) = ist.Solids(solids), pairs.T
+    sizes = dict(scales=scales[b], scales_a=scales[a])
+    before = ist.penetration(held[a], held[b], poses[b], poses_a=poses[a], **sizes)
+    after = ist.separation(held[a], held[b], apart[b], poses_a=apart[a], **sizes)
     volume = sum(asset.volume * scale**3 for asset, scale in zip(solids, scales))
     print(f"{options.objects} solids of {volume:.3g} u³, {np.count_nonzero(before.volume)} pairs "
           f"overlap by {before.volume.sum():.3g} u³")

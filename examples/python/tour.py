@@ -71,8 +71,10 @@ print(f"it lands at {fall.time:.3f} (exact: 0.75)")
 assert fall.status == ist.ImpactStatus.impact and abs(fall.time - 0.75) < 0.01
 
 # %% A scene: solids, a pose each, and which pairs are asked. Slopes by every pose come with it.
-scene = ist.penetration_of_pairs([floor, wheel, box], np.array([[1, 0, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0, 0], pose]),
-                                 pairs=[(0, 1), (0, 2), (1, 2)])
+solids = ist.Solids([floor, wheel, box])
+poses = np.array([[1, 0, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0, 0], pose])
+a, b = np.array([(0, 1), (0, 2), (1, 2)]).T
+scene = ist.penetration(solids[a], solids[b], poses[b], poses_a=poses[a])
 step = -1e-3 * scene.pose_gradient[2] / np.linalg.norm(scene.pose_gradient[2])
 moved = pose + step
 moved[:4] /= np.linalg.norm(moved[:4])

@@ -10,7 +10,7 @@
 #include <ist/mesh.h>
 #include <ist/progress.h>
 
-// Few spheres, or a capsule, that together cover a whole solid, for motion planners. Lengths are
+// Few spheres, or capsules, that together cover a whole solid, for motion planners. Lengths are
 // [u], the mesh's own unit and frame.
 
 namespace IST_API ist {
@@ -94,9 +94,16 @@ struct CoverCapsule {
   double radius = 0;                                             ///< [u]
 };
 
-/// One capsule that contains a mesh and its solid, with about the least volume. Proven: a capsule
-/// is convex and contains every vertex; the radius includes a bound on rounding. Throws Error for a
-/// mesh without triangles.
-CoverCapsule cover_with_capsule(const ClosedMesh& mesh);
+/// The largest number of capsules of a cover.
+inline constexpr std::size_t kMostCoverCapsules = 12;
+
+/// Capsules that together contain a mesh and its solid, with about the least sum of volumes: at
+/// most `count`, and fewer where more do not reduce it.
+///
+/// Proven: parallel planes divide the solid, and each capsule is convex and contains the corners of
+/// its part; radii include a bound on rounding. `threads`: 0: all cores; never changes the result.
+/// Throws Error for a mesh without triangles, and for a count of 0 or above kMostCoverCapsules.
+std::vector<CoverCapsule> cover_with_capsules(const ClosedMesh& mesh, std::size_t count = 1,
+                                              unsigned threads = 0);
 
 }  // namespace ist

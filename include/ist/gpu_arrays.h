@@ -41,6 +41,8 @@ struct GpuPenetrations {
   QueryStatus* status = nullptr;
   std::uint32_t* node_visits = nullptr;   ///< [count]
   std::uint32_t* sphere_pairs = nullptr;  ///< [count]
+  double* force = nullptr;                ///< [count][3] [u²] −translation_gradient: on B
+  double* torque = nullptr;  ///< [count][3] [u³] −rotation_gradient: about B's origin
 };
 
 /// Answers, each as in Separation: arrays in device memory. Null pointers: not wanted.
@@ -75,6 +77,8 @@ struct GpuContactPatches {
   double* volume = nullptr;        ///< [u³] part of GpuPenetrations::volume
   double* force = nullptr;         ///< [3] [u²] part of −translation_gradient
   double* torque = nullptr;        ///< [3] [u³/rad] part of −rotation_gradient
+  double* point = nullptr;         ///< [3] [u] world, as ContactPatch::point
+  double* twist = nullptr;         ///< [u³] as ContactPatch::twist
 };
 
 }  // namespace ist

@@ -19,9 +19,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Of a link's file: beside a capsule those of the description alone.
+/// Of a link's file: beside capsules those of the description alone.
 const std::vector<CoverSphere>& spheres_of(const SphereLink& link) {
-  return link.capsule ? link.given : link.cover.spheres;
+  return link.capsules.empty() ? link.cover.spheres : link.given;
 }
 
 Json link_json(const SphereLink& link, const SelfCollision& self) {
@@ -29,10 +29,8 @@ Json link_json(const SphereLink& link, const SelfCollision& self) {
   Json spheres = Json::array(), capsules = Json::array();
   for (const CoverSphere& s : spheres_of(link))
     spheres.push_back({s.centre.x(), s.centre.y(), s.centre.z(), s.radius});
-  if (link.capsule) {
-    const auto& [a, b, radius] = *link.capsule;
+  for (const auto& [a, b, radius] : link.capsules)
     capsules.push_back({a.x(), a.y(), a.z(), b.x(), b.y(), b.z(), radius});
-  }
   return {{"spheres", spheres},
           {"capsules", capsules},
           {"protrusion", p.largest},
@@ -96,7 +94,7 @@ std::string robot_yaml(const SphereRobot& robot) {
 std::vector<LinkSpheres> SphereRobot::spheres() const {
   std::vector<LinkSpheres> out;
   for (const SphereLink& link : links)
-    out.push_back({link.name, spheres_of(link), link.cover.protrusion.largest, link.capsule});
+    out.push_back({link.name, spheres_of(link), link.cover.protrusion.largest, link.capsules});
   return out;
 }
 
@@ -126,7 +124,7 @@ std::string spheres_report_json(const SphereRobot& robot, const std::string& out
   for (const SphereLink& link : robot.links) {
     auto& entry = result["links"][link.name];
     entry["spheres"] = spheres_of(link).size();
-    entry["capsules"] = link.capsule ? 1 : 0;
+    entry["capsules"] = link.capsules.size();
     entry["seconds"] = link.cover.seconds;
   }
   result["seconds"] = seconds;
@@ -135,7 +133,7 @@ std::string spheres_report_json(const SphereRobot& robot, const std::string& out
 
 std::string spheres_table(const SphereRobot& robot, const std::string& output, double seconds) {
   const auto count_of = [](const SphereLink& link) {
-    return spheres_of(link).size() + (link.capsule ? 1 : 0);
+    return spheres_of(link).size() + link.capsules.size();
   };
   std::size_t width = 5, count = 0;
   double largest = 0;

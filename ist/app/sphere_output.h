@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,7 +17,7 @@ struct SphereLink {
   bool has_mesh = false;
   double slack = 0;  ///< [u] by which the mesh may be wider than the shapes
   SphereCover cover;
-  std::optional<CoverCapsule> capsule = {};  ///< then `cover` has spheres that contain it
+  std::vector<CoverCapsule> capsules = {};  ///< if any, `cover` has spheres that contain them
   SphereCoverProof proof;
 };
 
@@ -31,7 +30,8 @@ struct SphereRobot {
   SelfCollision self;
 
   bool has_capsules() const {
-    return std::any_of(links.begin(), links.end(), [](const auto& link) { return link.capsule; });
+    return std::any_of(links.begin(), links.end(),
+                       [](const auto& link) { return !link.capsules.empty(); });
   }
   bool is_robot() const { return !robot.file.bytes.empty(); }
   std::vector<LinkSpheres> spheres() const;  ///< as files hold them

@@ -124,20 +124,25 @@ SphereCoverSettings cover_settings(const SphereRobot& input, const SpheresOption
   return cover;
 }
 
-/// Spheres on the capsule's axis that together contain it, and are hardly wider; its ends first.
-std::vector<CoverSphere> spheres_around(const CoverCapsule& capsule) {
+/// Spheres on the capsules' axes that together contain them, and are hardly wider.
+std::vector<CoverSphere> spheres_around(const std::vector<CoverCapsule>& capsules) {
   constexpr int kSpheres = 64;
-  const Eigen::Vector3d step = (capsule.end - capsule.begin) / kSpheres;
-  std::vector<CoverSphere> spheres = {{capsule.begin, capsule.radius},
-                                      {capsule.end, capsule.radius}};
-  for (int i = 0; i < kSpheres; ++i)
-    spheres.push_back({capsule.begin + (i + 0.5) * step,
-                       std::hypot(capsule.radius, step.norm() / 2) * (1 + 1e-12)});
+  std::vector<CoverSphere> spheres;
+  for (const CoverCapsule& capsule : capsules) {
+    const Eigen::Vector3d step = (capsule.end - capsule.begin) / kSpheres;
+    spheres.push_back({capsule.begin, capsule.radius});
+    spheres.push_back({capsule.end, capsule.radius});
+    for (int i = 0; i < kSpheres; ++i)
+      spheres.push_back({capsule.begin + (i + 0.5) * step,
+                         std::hypot(capsule.radius, step.norm() / 2) * (1 + 1e-12)});
+  }
   return spheres;
 }
 
+/// `capsules`: of each mesh, if that is what is wanted.
 std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOptions& options,
-                                      const ProgressCallback& progress) {
+                                      const ProgressCallback& progress,
+                                      std::vector<std::vector<CoverCapsule>>& capsules) {
   const SphereCoverSettings settings = cover_settings(input, options);
   if (options.kind == Kind::cover) return cover_with_spheres(input.meshes, settings, progress);
   std::vector<SphereCover> covers;
@@ -146,7 +151,8 @@ std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOpt
     const std::size_t own = settings.counts[covers.size()];
     SphereCover cover;
     if (options.kind == Kind::capsules)
-      cover.spheres = spheres_around(cover_with_capsule(mesh));
+      cover.spheres = spheres_around(capsules.emplace_back(cover_with_capsules(
+          mesh, own > 0 ? own : std::max<std::size_t>(options.count, 1), settings.threads)));
     else
       cover.spheres = baked_spheres(mesh, own > 0 ? own : settings.count, options, progress);
     cover.protrusion = sphere_protrusion(mesh, cover.spheres);
@@ -158,9 +164,11 @@ std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOpt
 
 void fill_links(SphereRobot& input, const SpheresOptions& options) {
   constexpr double kPatience = 0.5;  // [s]
+  std::vector<std::vector<CoverCapsule>> capsules;
   std::vector<SphereCover> covers = interruptibly(
-      kPatience, options.quiet, false,
-      [&](const ProgressCallback& progress) { return make_spheres(input, options, progress); });
+      kPatience, options.quiet, false, [&](const ProgressCallback& progress) {
+        return make_spheres(input, options, progress, capsules);
+      });
   std::size_t next = 0;
   for (SphereLink& link : input.links) {
     link.proof.covered = true;
@@ -168,8 +176,8 @@ void fill_links(SphereRobot& input, const SpheresOptions& options) {
       link.cover = std::move(covers[next]);
       const auto& spheres = link.cover.spheres;
       if (options.kind == Kind::capsules) {
-        link.capsule = {spheres[0].centre, spheres[1].centre, spheres[0].radius};
-        link.proof.covered = true;  // as cover_with_capsule() proves
+        link.capsules = std::move(capsules[next]);
+        link.proof.covered = true;  // as cover_with_capsules() proves
       } else {
         link.proof = prove_cover(input.meshes[next], spheres);
       }
@@ -277,7 +285,9 @@ void add_spheres(CLI::App& app) {
       "Spheres with the link's volume; they neither contain it nor lie inside it");
   CLI::Option* const capsules = command->add_flag_callback(
       "--capsules", [options] { options->kind = Kind::capsules; },
-      "One capsule that provably contains the link, with about the least volume (.urdf, .json)");
+      fmt::format("Capsules that together provably contain the link, with about the least volume: "
+                  "one, or at most --count, up to {} (.urdf, .json)",
+                  kMostCoverCapsules));
   capsules->excludes(cover)->excludes(inner)->excludes(matched)->excludes(most)->excludes(total);
   inner->excludes(cover)->excludes(most)->excludes(total);
   matched->excludes(cover)->excludes(inner)->excludes(most)->excludes(total);
@@ -298,8 +308,11 @@ void add_spheres(CLI::App& app) {
   command->callback([options] {
     if (options->count > 0 && options->cover.total > 0)
       throw CLI::ValidationError("--count", "a number for every link excludes --total; use LINK=N");
-    if (options->kind == Kind::capsules && (options->count > 0 || !options->counts.empty()))
-      throw CLI::ValidationError("--count", "has no effect with --capsules: each link gets one");
+    std::size_t most = options->count;
+    for (const auto& [link, count] : options->counts) most = std::max(most, count);
+    if (options->kind == Kind::capsules && most > kMostCoverCapsules)
+      throw CLI::ValidationError(
+          "--count", fmt::format("{} with --capsules; at most {}", most, kMostCoverCapsules));
     refuse_idle_options(options->robot, options->input);
     run_spheres(*options);
   });

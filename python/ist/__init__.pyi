@@ -298,6 +298,26 @@ class MeshField(Field):
     def __init__(self, asset: Asset) -> None: ...
 
 @final
+class SolidRows: ...
+
+@final
+class Solids:
+    def __init__(
+        self, solids: Sequence[Asset | Field], *, device: Any = "cpu",
+    ) -> None: ...  # "cpu", "cuda", "cuda:1", a torch.device
+    def __len__(self) -> int: ...
+    def __getitem__(self, index: int | _Rows) -> SolidRows: ...  # or (n,) indices
+    @property
+    def device(self) -> str: ...
+    @property
+    def fields(self) -> list[int]: ...
+    @property
+    def bytes(self) -> int: ...  # of device memory
+
+_Solid = Asset | Field | SolidRows
+_Rows = Any  # ArrayLike; of solids on a GPU an array of any framework in its memory
+
+@final
 class Penetration:
     @property
     def volume(self) -> _Column: ...  # (n,) [u³]
@@ -433,6 +453,8 @@ class ContactPatches:
     @property
     def penetration(self) -> Penetration: ...
     @property
+    def status(self) -> _Column: ...  # (n,) QueryStatus
+    @property
     def count(self) -> _Column: ...  # (n,)
     @property
     def id(self) -> NDArray[np.uint64]: ...  # (n, m)
@@ -486,28 +508,18 @@ class TimeOfImpact:
     def surface_pairs(self) -> _Column: ...  # (n,)
 
 def penetration(
-    a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
-    poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None,
+    a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
+    poses_a: _Rows | None = None, scales_a: _Rows | None = None,
     scale_gradients: bool = False, measure: _Measure = "matched", field: _FieldUse = "automatic",
     pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, pair_id: int = 0,
-    threads: int = 0,
-) -> Penetration: ...
-def penetration_of_pairs(
-    solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *,
-    scales: ArrayLike | None = None, scale_gradients: bool = False, measure: _Measure = "matched",
-    field: _FieldUse = "automatic", pair_budget: int = 0, max_visits: int = 0,
-    relative_error: float = 0.0, threads: int = 0,
-) -> Penetration: ...
+    threads: int = 0, wanted: Sequence[str] | None = None, out: Any = None, stream: Any = None,
+) -> Penetration: ...  # of solids on a GPU gpu.Penetration
 def separation(
-    a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
-    poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, max_visits: int = 0,
-    inner_spheres: bool = False, threads: int = 0,
-) -> Separation: ...
-def separation_of_pairs(
-    solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *,
-    scales: ArrayLike | None = None, max_visits: int = 0,
-    inner_spheres: bool = False, threads: int = 0,
-) -> Separation: ...
+    a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
+    poses_a: _Rows | None = None, scales_a: _Rows | None = None, max_visits: int = 0,
+    inner_spheres: bool = False, threads: int = 0, wanted: Sequence[str] | None = None,
+    out: Any = None, stream: Any = None,
+) -> Separation: ...  # of solids on a GPU gpu.Separation
 def raycast(
     solid: Asset | Field, pose: ArrayLike | None, origins: ArrayLike, directions: ArrayLike, *,
     longest: float = ..., scale: float = 1.0,
@@ -519,32 +531,24 @@ def contains(
     solid: Asset | Field, pose: ArrayLike | None, points: ArrayLike, *, scale: float = 1.0,
 ) -> Any: ...  # (n,) uint32, Overlapping
 def contact_patches(
-    a: Asset | Field, b: Asset, poses: ArrayLike, *, max_patches: int = 8,
-    scales: ArrayLike | None = None, poses_a: ArrayLike | None = None,
-    scales_a: ArrayLike | None = None, measure: _Measure = "matched",
+    a: _Solid, b: _Solid, poses: _Rows, *, max_patches: int = 8,
+    scales: _Rows | None = None, poses_a: _Rows | None = None,
+    scales_a: _Rows | None = None, measure: _Measure = "matched",
     field: _FieldUse = "automatic", pair_budget: int = 0, max_visits: int = 0,
-    relative_error: float = 0.0, pair_id: int = 0, threads: int = 0,
-) -> ContactPatches: ...
-def contact_patches_of_pairs(
-    solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *, max_patches: int = 8,
-    scales: ArrayLike | None = None, measure: _Measure = "matched", field: _FieldUse = "automatic",
-    pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, threads: int = 0,
-) -> ContactPatches: ...
+    relative_error: float = 0.0, pair_id: int = 0, threads: int = 0, wanted: Sequence[str] | None = None,
+    out: Any = None, stream: Any = None,
+) -> ContactPatches: ...  # of solids on a GPU gpu.ContactPatches
 def overlap_outline(
     a: Asset, b: Asset, poses: ArrayLike, *, max_patches: int = 8,
     scales: ArrayLike | None = None, poses_a: ArrayLike | None = None,
     scales_a: ArrayLike | None = None, max_visits: int = 0, pair_id: int = 0,
 ) -> OverlapOutline: ...
 def overlap(
-    a: Asset | Field, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
+    a: _Solid, b: _Solid, poses: _Rows, *, scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, threads: int = 0,
 ) -> Any: ...  # (n,) uint32, Overlapping
-def overlap_of_pairs(
-    solids: Sequence[Asset | Field], poses: ArrayLike, pairs: ArrayLike, *,
-    scales: ArrayLike | None = None, threads: int = 0,
-) -> Any: ...  # (n,) uint32, Overlapping
 def time_of_impact(
-    a: Asset | Field, b: Asset, poses: ArrayLike, poses_to: ArrayLike, *,
+    a: _Solid, b: _Solid, poses: ArrayLike, poses_to: ArrayLike, *,
     about: ArrayLike = (0.0, 0.0, 0.0), scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, poses_a_to: ArrayLike | None = None,
     about_a: ArrayLike = (0.0, 0.0, 0.0), scales_a: ArrayLike | None = None,

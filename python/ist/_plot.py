@@ -116,12 +116,13 @@ def _part(solid, pose, scale):
 def _overlaps(solids, poses, scales):
     """(n, 2, 3) segments of all outlines in the world, and a line of text for each overlap."""
     segments, lines = [np.zeros((0, 2, 3))], []
-    assets = [k for k, solid in enumerate(solids) if isinstance(solid, ist.Asset)]
-    pairs = [(i, k) for n, i in enumerate(assets) for k in assets[n + 1:]]
-    if not pairs:
-        return segments[0], lines
-    touching = ist.overlap_of_pairs(solids, poses, pairs, scales=scales)
-    for i, k in np.asarray(pairs)[touching != ist.Overlapping.no]:
+    assets = np.flatnonzero([isinstance(solid, ist.Asset) for solid in solids])
+    held = ist.Solids([solids[k] for k in assets])
+    first, second = np.triu_indices(len(assets), 1)
+    a, b = assets[first], assets[second]
+    touching = ist.overlap(held[first], held[second], poses[b], poses_a=poses[a], scales=scales[b],
+                           scales_a=scales[a]) != ist.Overlapping.no
+    for i, k in zip(a[touching], b[touching]):
         placed = {"poses_a": poses[i], "scales_a": scales[i], "scales": scales[k]}
         exact = solids[i].mesh_triangles and solids[k].mesh_triangles
         try:

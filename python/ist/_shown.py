@@ -9,9 +9,8 @@ def text_of(answer):
     """All numbers of one answer; of many rows how many have which status."""
     name = type(answer).__name__
     columns = {key: getattr(answer, key) for key in vars(type(answer)) if not key.startswith("_")}
-    rows = np.shape(columns.get("status", getattr(columns.get("penetration"), "status", 0)))
-    if rows:
-        status = np.asarray(answer.status if "status" in columns else answer.penetration.status)
+    status = np.asarray(answer.status)
+    if rows := status.shape:
         kinds = type(answer)._statuses
         counts = ", ".join(f"{count:,} {kinds(code).name}"
                            for code, count in zip(*np.unique(status, return_counts=True)))

@@ -1,19 +1,11 @@
 """Types of ist.gpu. Shapes and units: docs/python.md, and help() of every name."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal, final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import Asset, Field
-
 _DeviceArray = Any  # has __dlpack__ and __dlpack_device__, or __cuda_array_interface__
-_Stream = Any  # a handle, or has __cuda_stream__, cuda_stream or ptr
-_Answer = Literal[
-    "volume", "centroid", "translation_gradient", "rotation_gradient", "status", "node_visits",
-    "sphere_pairs",
-]
 
 def available(device: int = 0) -> bool: ...
 def why_not(device: int = 0) -> str | None: ...
@@ -37,39 +29,21 @@ class Array:
     def numpy(self) -> NDArray[Any]: ...  # a copy on the host
 
 @final
-class Solids:
-    def __init__(self, solids: Sequence[Asset | Field], *, device: int = 0) -> None: ...
-    def __len__(self) -> int: ...
-    @property
-    def device(self) -> int: ...
-    @property
-    def bytes(self) -> int: ...
-
-@final
 class Penetration:
     @property
     def volume(self) -> _DeviceArray | None: ...  # (n,) [u³]
     @property
     def centroid(self) -> _DeviceArray | None: ...  # (n, 3) [u]
     @property
-    def translation_gradient(self) -> _DeviceArray | None: ...  # (n, 3) [u²] of B
+    def force(self) -> _DeviceArray | None: ...  # (n, 3) [u²] on B
     @property
-    def rotation_gradient(self) -> _DeviceArray | None: ...  # (n, 3) [u³/rad] of B
+    def torque(self) -> _DeviceArray | None: ...  # (n, 3) [u³] on B, about its origin
     @property
     def status(self) -> _DeviceArray | None: ...  # (n,) QueryStatus
     @property
     def node_visits(self) -> _DeviceArray | None: ...  # (n,)
     @property
     def sphere_pairs(self) -> _DeviceArray | None: ...  # (n,)
-
-def penetration(
-    solids: Solids, solid_a: _DeviceArray | int, solid_b: _DeviceArray | int,
-    pose_a: _DeviceArray | None, pose_b: _DeviceArray | None, scale_a: _DeviceArray | None = None,
-    scale_b: _DeviceArray | None = None, *,
-    measure: Literal["matched", "inner"] = "matched", pair_budget: int = 0,
-    wanted: Sequence[_Answer] | None = None,
-    out: Mapping[_Answer, _DeviceArray] | Penetration | None = None, stream: _Stream = None,
-) -> Penetration: ...
 
 @final
 class Separation:
@@ -92,19 +66,6 @@ class Separation:
     @property
     def sphere_pairs(self) -> _DeviceArray | None: ...  # (n,)
 
-_Gap = Literal[
-    "distance", "distance_min", "distance_max", "point_a", "point_b", "normal", "status",
-    "node_visits", "sphere_pairs",
-]
-
-def separation(
-    solids: Solids, solid_a: _DeviceArray | int, solid_b: _DeviceArray | int,
-    pose_a: _DeviceArray | None, pose_b: _DeviceArray | None, scale_a: _DeviceArray | None = None,
-    scale_b: _DeviceArray | None = None, *, max_visits: int = 0,
-    wanted: Sequence[_Gap] | None = None,
-    out: Mapping[_Gap, _DeviceArray] | Separation | None = None, stream: _Stream = None,
-) -> Separation: ...
-
 @final
 class ContactPatches:
     @property
@@ -126,16 +87,8 @@ class ContactPatches:
     @property
     def torque(self) -> _DeviceArray | None: ...  # (n, m, 3) [u³/rad]
     @property
+    def point(self) -> _DeviceArray | None: ...  # (n, m, 3) [u] on the central axis of the wrench
+    @property
+    def twist(self) -> _DeviceArray | None: ...  # (n, m) [u³] about the normal
+    @property
     def status(self) -> _DeviceArray | None: ...  # (n,) QueryStatus
-
-_Patch = Literal[
-    "count", "id", "centroid", "normal", "area", "depth", "volume", "force", "torque", "status",
-]
-
-def contact_patches(
-    solids: Solids, solid_a: _DeviceArray | int, solid_b: _DeviceArray | int,
-    pose_a: _DeviceArray | None, pose_b: _DeviceArray | None, scale_a: _DeviceArray | None = None,
-    scale_b: _DeviceArray | None = None, *, max_patches: int = 8,
-    measure: Literal["matched", "inner"] = "matched", wanted: Sequence[_Patch] | None = None,
-    out: Mapping[_Patch, _DeviceArray] | ContactPatches | None = None, stream: _Stream = None,
-) -> ContactPatches: ...

@@ -5,12 +5,14 @@
 #include <nanobind/stl/string.h>
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
 #include <new>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -95,6 +97,20 @@ struct Column {
   T* row(std::size_t i) const { return data.get() + i * kWidth; }
   Eigen::Map<Eigen::Matrix<T, static_cast<int>(kWidth), 1>> vector(std::size_t i) const {
     return Eigen::Map<Eigen::Matrix<T, static_cast<int>(kWidth), 1>>(row(i));
+  }
+
+  /// What handed_out() gave, of another process too.
+  static Column taken(const py::handle& given) {
+    Column column;
+    if (given.is_none()) return column;
+    constexpr char type[] = {std::is_integral_v<T> ? 'u' : 'f', '0' + sizeof(T), '\0'};
+    const auto array = py::cast<Array<T>>(
+        py::module_::import_("numpy").attr("asarray")(given, type, py::arg("order") = "C"));
+    Shape rows = shape_of(array);
+    if (kEach > 0) rows.pop_back();
+    column = Column(std::move(rows));
+    std::copy_n(array.data(), array.size(), column.data.get());
+    return column;
   }
 
   /// `value`: a number or an enumerator, or a vector.

@@ -17,7 +17,7 @@ namespace {
 /// A class of Python a kind of field, so that users see which one they hold.
 template <class Kind>
 struct OwnedKind : OwnedField {
-  OwnedKind(Kind kind, std::string arguments, std::shared_ptr<const void> owner = nullptr)
+  OwnedKind(Kind kind, py::dict arguments, std::shared_ptr<const void> owner = nullptr)
       : OwnedField{std::move(kind), std::move(arguments), std::move(owner)} {}
 };
 
@@ -27,17 +27,29 @@ py::class_<OwnedKind<Kind>, OwnedField> add_kind(py::module_& module, const char
   return py::class_<OwnedKind<Kind>, OwnedField>(module, name, doc);
 }
 
+/// Of all but grids and assets, which are large.
+std::string text_of_arguments(const py::dict& arguments) {
+  std::string text;
+  for (const auto& [key, value] : arguments) {
+    const std::string name = text_of(key);
+    if (name == "heights" || name == "distances") continue;
+    if (!text.empty()) text += ", ";
+    text += name;
+    if (name != "asset") text.append("=").append(text_of(value));
+  }
+  return text;
+}
+
 using Arguments = std::initializer_list<std::pair<const char*, py::object>>;
 
 /// Refuses numbers that no query would take.
 template <class Kind>
 OwnedKind<Kind> sound(Kind kind, const char* wanted, const Arguments& given,
                       std::shared_ptr<const void> owner = nullptr) {
-  std::string text;
-  for (const auto& [name, value] : given)
-    text += (text.empty() ? "" : ", ") + std::string(name) + "=" + text_of(value);
-  if (!is_sound(kind)) throw value_error(text + "; wanted " + wanted);
-  return {std::move(kind), std::move(text), std::move(owner)};
+  py::dict arguments;
+  for (const auto& [name, value] : given) arguments[name] = value;
+  if (!is_sound(kind)) throw value_error(text_of_arguments(arguments) + "; wanted " + wanted);
+  return {std::move(kind), std::move(arguments), std::move(owner)};
 }
 
 /// Refuses values that are not finite or beyond the ends, and grids that are too small.
@@ -78,9 +90,15 @@ void add_fields(py::module_& module) {
       module, "Field",
       "A shape that needs no asset: one of the two solids of a query, the other is an "
       "Asset. Lengths are [u] in the field's own frame.")
-      .def("__repr__", [](const py::object& self) {
-        return "ist." + type_name_of(self) + "(" + py::cast<const OwnedField&>(self).arguments +
-               ")";
+      .def("__repr__",
+           [](const py::object& self) {
+             return "ist." + type_name_of(self) + "(" +
+                    text_of_arguments(py::cast<const OwnedField&>(self).arguments) + ")";
+           })
+      .def("__reduce__", [](const py::object& self) {
+        const py::dict& arguments = py::cast<const OwnedField&>(self).arguments;
+        const py::object partial = py::module_::import_("functools").attr("partial");
+        return py::make_tuple(partial(self.type(), **arguments), py::make_tuple());
       });
   add_kind<HalfSpaceField>(module, "HalfSpaceField", "The solid normal · x ≤ offset. Exact.")
       .def(py::new_([](const py::object& normal, double offset) {
@@ -136,7 +154,8 @@ void add_fields(py::module_& module) {
                                      lowest,
                                      highest},
                          "spacing > 0, lowest ≤ highest and at most 2**20 points along each axis",
-                         {{"spacing", spacing},
+                         {{"heights", heights},
+                          {"spacing", spacing},
                           {"lowest", py::float_(lowest)},
                           {"highest", py::float_(highest)}},
                          std::make_shared<Floats>(grid));
@@ -163,7 +182,8 @@ void add_fields(py::module_& module) {
                      error},
                  "a finite origin, a spacing > 0, an error ≥ 0 and at most 2**20 points along "
                  "each axis",
-                 {{"origin", origin},
+                 {{"distances", distances},
+                  {"origin", origin},
                   {"spacing", py::float_(spacing)},
                   {"error", py::float_(error)}},
                  std::make_shared<Floats>(grid));
@@ -180,8 +200,9 @@ void add_fields(py::module_& module) {
              const TreeView tree = tree_of(asset, "asset");
              if (!tree.has_field())
                throw Error("asset: holds no surface; bake it with surface='all'");
-             return OwnedKind<MeshField>(MeshField{tree}, "asset",
-                                         std::make_shared<py::object>(asset));
+             py::dict arguments;
+             arguments["asset"] = asset;
+             return OwnedKind<MeshField>(MeshField{tree}, std::move(arguments));
            }),
            py::arg("asset"), "asset: an Asset that has a field.");
 }

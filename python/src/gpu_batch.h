@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "device_arrays.h"
-#include "gpu_solids.h"
+#include "gpu_queries.h"
 
 // What all batches on a device share: arguments that describe pairs, columns of answers.
 
@@ -69,68 +69,46 @@ struct DeviceAnswers {
   std::vector<py::object> column = std::vector<py::object>(columns_of<Answers>().size());
 };
 
-/// The arguments that describe pairs, as many rows as they have.
+/// The arguments that describe pairs, as many rows as `poses` has.
 class PairArguments {
  public:
-  PairArguments(int device, cuda::Stream stream) : device_(device), stream_(stream) {}
-
-  void take_pose(const py::object& value, const char* name, const Pose*& to) {
-    if (value.is_none()) return;
+  PairArguments(const DeviceSides& sides, const GivenRows& given, cuda::Stream stream)
+      : device_(sides.solids->solids().device()), stream_(stream) {
     static_assert(sizeof(Pose) == 7 * sizeof(double));
-    to = static_cast<const Pose*>(take(value, {name, {kFloat64}, {7}, false}));
-  }
-  void take_scale(const py::object& value, const char* name, const double*& to) {
-    if (!value.is_none())
-      to = static_cast<const double*>(take(value, {name, {kFloat64}, {}, false}));
-  }
-  /// Indices of solids, of which there are `size`; one for all is kept until the number of rows is
-  /// known.
-  void take_solid(const py::object& value, const char* name, std::size_t size,
-                  const std::uint32_t*& to) {
-    if (!py::isinstance<py::int_>(value)) {
-      to = static_cast<const std::uint32_t*>(take(value, {name, {kUInt32, kInt32}, {}, false}));
-      return;
-    }
-    const auto number = py::cast<std::int64_t>(value);
-    if (number < 0 || number >= static_cast<std::int64_t>(size))
-      throw value_error(std::string(name) + ": " + std::to_string(number) + "; there are " +
-                        std::to_string(size) + " solids");
-    same_.push_back({static_cast<std::uint32_t>(number), &to});
+    take(given.poses, {"poses", {kFloat64}, {7}}, pairs.b.pose);
+    if (!given.poses_a.is_none()) take(given.poses_a, {"poses_a", {kFloat64}, {7}}, pairs.a.pose);
+    if (!given.scales.is_none()) take(given.scales, {"scales", {kFloat64}, {}}, pairs.b.scale);
+    if (!given.scales_a.is_none())
+      take(given.scales_a, {"scales_a", {kFloat64}, {}}, pairs.a.scale);
+    take_solid(sides.a, "a", pairs.a.solid);
+    take_solid(sides.b, "b", pairs.b.solid);
   }
 
-  /// To be called when all are taken.
-  std::size_t count() {
-    if (rows_ < 0)
-      throw value_error("pose_b: None; one argument must have rows: poses, scales or solids");
-    const auto count = static_cast<std::size_t>(rows_);
-    for (const auto& [number, to] : same_) {
-      repeated_.push_back(std::make_unique<cuda::Repeated>(device_, number, count, stream_));
-      *to = repeated_.back()->data();
-    }
-    return count;
-  }
-
+  GpuPairs pairs;
   std::vector<std::shared_ptr<void>> lent;
 
  private:
-  void* take(const py::object& value, const WantedArray& wanted) {
+  template <class T>
+  void take(const py::object& value, const WantedArray& wanted, const T*& to) {
     LentArray array = lend(value, wanted, device_, stream_);
-    if (rows_ >= 0 && array.rows != rows_)
-      throw value_error(wanted.name + ": " + std::to_string(array.rows) +
-                        " rows; the arguments before it have " + std::to_string(rows_));
-    rows_ = array.rows;
+    const auto rows = static_cast<std::size_t>(array.rows);
+    if (!lent.empty() && rows != pairs.count)
+      throw value_error(wanted.name + ": " + std::to_string(rows) +
+                        " rows; the arguments before it have " + std::to_string(pairs.count));
+    pairs.count = rows;
+    to = static_cast<const T*>(array.data);
     lent.push_back(std::move(array.keep));
-    return array.data;
   }
 
-  struct Same {
-    std::uint32_t number;
-    const std::uint32_t** to;
-  };
+  void take_solid(const py::object& index, const char* name, const std::uint32_t*& to) {
+    if (!py::isinstance<py::int_>(index)) return take(index, {name, {kUInt32, kInt32}, {}}, to);
+    repeated_.push_back(std::make_unique<cuda::Repeated>(device_, py::cast<std::uint32_t>(index),
+                                                         pairs.count, stream_));
+    to = repeated_.back()->data();
+  }
+
   int device_;
   cuda::Stream stream_;
-  std::int64_t rows_ = -1;
-  std::vector<Same> same_;
   std::vector<std::unique_ptr<cuda::Repeated>> repeated_;  // until the batch is launched
 };
 
@@ -226,33 +204,22 @@ Places<Answers> given_columns(const Answers& blank, const py::object& out, std::
   return places;
 }
 
-/// The arguments that describe pairs, as they were given.
-struct GivenPairs {
-  const py::object &solid_a, &solid_b, &pose_a, &pose_b, &scale_a, &scale_b;
-};
-
 /// Takes all arguments and launches a batch: launch(solids, pairs, workspace, answers, stream).
 /// `blank`: answers without arrays.
 template <class Answers, class Launch>
-DeviceAnswers<Answers> ask(DeviceSolids& solids, const GivenPairs& given, const Answers& blank,
-                           const py::object& wanted, const py::object& out,
-                           const py::object& stream, const Launch& launch) {
-  const cuda::Stream on = stream_of(stream);
+py::object ask(const DeviceSides& sides, const GivenRows& given, const Answers& blank,
+               const Launch& launch) {
+  const cuda::Stream on = stream_of(given.stream);
+  DeviceSolids& solids = *sides.solids;
   const int device = solids.solids().device();
-  PairArguments arguments(device, on);
-  GpuPairs pairs;
-  arguments.take_solid(given.solid_a, "solid_a", solids.solids().size(), pairs.a.solid);
-  arguments.take_solid(given.solid_b, "solid_b", solids.solids().size(), pairs.b.solid);
-  arguments.take_pose(given.pose_a, "pose_a", pairs.a.pose);
-  arguments.take_pose(given.pose_b, "pose_b", pairs.b.pose);
-  arguments.take_scale(given.scale_a, "scale_a", pairs.a.scale);
-  arguments.take_scale(given.scale_b, "scale_b", pairs.b.scale);
-  pairs.count = arguments.count();
-  if (!out.is_none() && !wanted.is_none())
+  PairArguments arguments(sides, given, on);
+  const GpuPairs& pairs = arguments.pairs;
+  if (!given.out.is_none() && !given.wanted.is_none())
     throw value_error("wanted: excludes `out`, whose arrays already select the answers");
   Places<Answers> places =
-      out.is_none() ? new_columns(blank, wanted_columns<Answers>(wanted), pairs.count, device, on)
-                    : given_columns(blank, out, pairs.count, device, on, arguments.lent);
+      given.out.is_none()
+          ? new_columns(blank, wanted_columns<Answers>(given.wanted), pairs.count, device, on)
+          : given_columns(blank, given.out, pairs.count, device, on, arguments.lent);
   const auto done = solids.launch(pairs, on, std::move(arguments.lent),
                                   [&](const GpuSolids& all, GpuWorkspace& workspace) {
                                     launch(all, pairs, workspace, places.to, on);
@@ -261,7 +228,7 @@ DeviceAnswers<Answers> ask(DeviceSolids& solids, const GivenPairs& given, const 
     for (const py::object& column : places.found.column)
       if (column.is_valid() && py::isinstance<DeviceArray>(column))
         py::cast<DeviceArray&>(column).ready = done;
-  return std::move(places.found);
+  return py::cast(std::move(places.found));
 }
 
 /// The class of a kind of answers.

@@ -40,62 +40,39 @@ std::span<const Answer<PatchAnswers>> columns_of() {
        "(n, m, 3) float64 [u²] on B, summing to the pair's.", true, most_of},
       {"torque", kFloat64, 3, set_patches<&To::torque>,
        "(n, m, 3) float64 [u³/rad] about B's origin, summing to the pair's.", true, most_of},
+      {"point", kFloat64, 3, set_patches<&To::point>,
+       "(n, m, 3) float64 [u] world: on the central axis of the patch's wrench.", true, most_of},
+      {"twist", kFloat64, 0, set_patches<&To::twist>,
+       "(n, m) float64 [u³] moment about the normal that a force at the point lacks.", true,
+       most_of},
       {"status", kUInt32, 0, set_column<&PatchAnswers::status>,
        "(n,) uint32, a QueryStatus: ok, invalid_input or not_held.", true},
   };
   return kColumns;
 }
 
-namespace {
-
-DeviceAnswers<PatchAnswers> patches_of(DeviceSolids& solids, const py::object& solid_a,
-                                       const py::object& solid_b, const py::object& pose_a,
-                                       const py::object& pose_b, const py::object& scale_a,
-                                       const py::object& scale_b, std::uint32_t max_patches,
-                                       const std::string& measure, const py::object& wanted,
-                                       const py::object& out, const py::object& stream) {
+py::object device_patches(const DeviceSides& sides, const GivenRows& given, std::size_t max_patches,
+                          const std::string& measure) {
   const Measure which = named(measure, "measure", kGpuMeasures);
   if (max_patches < 1 || max_patches > kMostGpuPatches)
     throw value_error("max_patches: " + std::to_string(max_patches) + "; wanted 1 to " +
-                      std::to_string(kMostGpuPatches));
+                      std::to_string(kMostGpuPatches) + " on a GPU");
   PatchAnswers blank;
-  blank.patches.most = max_patches;
-  return ask<PatchAnswers>(
-      solids, {solid_a, solid_b, pose_a, pose_b, scale_a, scale_b}, blank, wanted, out, stream,
-      [&](const GpuSolids& all, const GpuPairs& pairs, GpuWorkspace& workspace,
-          const PatchAnswers& to, cuda::Stream on) {
-        GpuPenetrations whole;
-        whole.status = to.status;
-        contact_patches_batch(all, pairs, which, workspace, whole, to.patches, on);
-      });
+  blank.patches.most = static_cast<std::uint32_t>(max_patches);
+  return ask<PatchAnswers>(sides, given, blank,
+                           [&](const GpuSolids& all, const GpuPairs& pairs, GpuWorkspace& workspace,
+                               const PatchAnswers& to, cuda::Stream on) {
+                             GpuPenetrations whole;
+                             whole.status = to.status;
+                             contact_patches_batch(all, pairs, which, workspace, whole, to.patches,
+                                                   on);
+                           });
 }
-
-constexpr const char* kPatchesDoc =
-    R"(Contacts of a batch of pairs, each condensed into a few patches, on the device.
-
-solids … scale_b, measure, out, stream: as for penetration().
-max_patches: count for each pair, 1 to 32: m, the second dimension. A pair's rows beyond count[i] are
-    zero, or unchanged with `out`.
-wanted: names of the answers to compute; None: all.
-
-A row takes two assets; with a field it is not_held. Regions and ids are those of
-ist.contact_patches(…, field='never'). Volumes, forces and torques sum to the pair's, within 1e-6 of
-the sum in double.
-
-Returns a ContactPatches.)";
-
-}  // namespace
 
 void add_gpu_patches(py::module_& module) {
   add_answers<PatchAnswers>(module, "ContactPatches",
                             "Patches of a batch: arrays on the device, None if not requested. "
                             "Arrays passed as `out` are the same objects.");
-  module.def("contact_patches", &patches_of, py::arg("solids"), py::arg("solid_a"),
-             py::arg("solid_b"), py::arg("pose_a").none(), py::arg("pose_b").none(),
-             py::arg("scale_a") = py::none(), py::arg("scale_b") = py::none(), py::kw_only(),
-             py::arg("max_patches") = 8, py::arg("measure") = "matched",
-             py::arg("wanted") = py::none(), py::arg("out") = py::none(),
-             py::arg("stream") = py::none(), kPatchesDoc);
 }
 
 }  // namespace ist::python

@@ -20,17 +20,11 @@ namespace ist::python {
 /// Solids on a device, and what their batches work in.
 class DeviceSolids {
  public:
-  DeviceSolids(const py::sequence& solids, int device) {
-    std::vector<GpuSolid> views;
-    const py::list held(solids);
-    for (const py::handle solid : held) {
-      const std::string name = "solids[" + std::to_string(views.size()) + "]";
-      views.push_back(solid_of(solid, name.c_str()));
-    }
+  DeviceSolids(const std::vector<GpuSolid>& solids, int device) {
     const py::gil_scoped_release released;
     GpuSettings settings;
     settings.device = device;
-    solids_ = std::make_unique<GpuSolids>(views, settings);
+    solids_ = std::make_unique<GpuSolids>(solids, settings);
   }
 
   ~DeviceSolids() {

@@ -133,6 +133,12 @@ std::shared_ptr<ClosedMesh> closed_of(const py::object& value, const py::object&
   });
 }
 
+/// (Mesh, (vertices, triangles)), for pickles; what a file declared is not in them.
+static py::tuple remade(const py::object& mesh) {
+  return py::make_tuple(py::module_::import_("ist").attr("Mesh"),
+                        py::make_tuple(mesh.attr("vertices"), mesh.attr("triangles")));
+}
+
 void add_meshes(py::module_& module) {
   add_report(module);
   py::class_<TriangleMesh>(module, "Mesh",
@@ -156,7 +162,8 @@ void add_meshes(py::module_& module) {
                    "'X', 'Y' or 'Z' as the file declares, or None. The mesh is not rotated.")
       .def_prop_ro(
           "declared_unit", [](const TriangleMesh& mesh) { return mesh.declared.unit; },
-          "[m] length of the file's unit; 0: not declared.");
+          "[m] length of the file's unit; 0: not declared.")
+      .def("__reduce__", &remade);
   py::class_<ClosedMesh>(
       module, "ClosedMesh",
       "A mesh that bounds a solid. A point is inside if its winding number is 1 or more.")
@@ -174,7 +181,16 @@ void add_meshes(py::module_& module) {
           "(m, 3) uint32, read-only: a view that keeps the mesh alive.")
       .def_ro("name", &ClosedMesh::name, "For messages.")
       .def_prop_ro(
-          "report", [](const ClosedMesh& mesh) { return mesh.report; }, "MeshReport, a copy.");
+          "report", [](const ClosedMesh& mesh) { return mesh.report; }, "MeshReport, a copy.")
+      .def("__reduce__", [](const py::object& self) {
+        // Closed again, by its arrays: the report is that of the mesh as it is.
+        const py::tuple mesh = remade(self);
+        const py::module_ package = py::module_::import_("ist");
+        const py::object again =
+            py::module_::import_("functools")
+                .attr("partial")(package.attr("close_mesh"), py::arg("name") = self.attr("name"));
+        return py::make_tuple(again, py::make_tuple(mesh[1]));
+      });
   module.def(
       "load_mesh",
       [](const py::object& path, double weld_tolerance) {

@@ -7,6 +7,7 @@
 
 #include "library/bake_revision.h"
 #include "offline.h"
+#include "solid_rows.h"
 
 namespace {
 
@@ -72,6 +73,7 @@ NB_MODULE(_core, module) {
   python::add_meshes(module);
   python::add_assets(module);
   python::add_fields(module);
+  python::add_solid_rows(module);
   python::add_penetration(module);
   python::add_pictures(module);
   python::add_separation(module);

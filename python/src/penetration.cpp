@@ -7,6 +7,8 @@
 #include <ist/field.h>
 #include <ist/wrench.h>
 
+#include "gpu_queries.h"
+
 namespace ist::python {
 namespace {
 
@@ -78,7 +80,7 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
 
 PenetrationSettings penetration_settings(const std::string& measure, const std::string& field,
                                          std::uint32_t pair_budget, std::uint32_t max_visits,
-                                         double relative_error, std::uint32_t pair_id = 0) {
+                                         double relative_error, std::uint32_t pair_id) {
   return {named(measure, "measure", kMeasures),
           named(field, "field", kFieldUses),
           pair_budget,
@@ -87,29 +89,14 @@ PenetrationSettings penetration_settings(const std::string& measure, const std::
           pair_id};
 }
 
-constexpr const char* kPairDoc =
+constexpr const char* kDoc =
     R"(Volume, wrench and centroid of the overlap, for one pose or many.
 
-a, b: Assets, or an Asset and a Field.
+a, b: Assets, or an Asset and a Field; of unlike rows solids[indices] of an ist.Solids.
 poses: of B, (7,) or (n, 7): qw, qx, qy, qz, tx [u], ty, tz, or matrices (4, 4) or (n, 4, 4).
     Quaternions of any length but 0 are normalised. A C-ordered float64 array of rows is not copied.
     ist.poses() makes rows of other conventions.
-scales: of B, a number or (n,), > 0. poses_a, scales_a: of A; None: at the origin, 1.)";
-
-constexpr const char* kPairIdDoc = R"(
-
-pair_id: a number of yours for this pair of solids, 0: none. Calls with the same number, and their
-    rows, are steps of one motion: 'exact' keeps the triangles that are near each other from step to step,
-    and gives the same answers sooner.)";
-
-constexpr const char* kSceneDoc = R"(The same for pairs of solids of one scene or many scenes.
-
-solids: k Assets and Fields.
-poses: (k, 7), or (w, k, 7) for w scenes; matrices (4, 4) are accepted as rows.
-scales: (k,) or (w, k), None: 1.
-pairs: (n, 2) indices of solids; one of each pair is an Asset. Answers have shape (n,) or (w, n).)";
-
-constexpr const char* kPenetrationDoc = R"(
+scales: of B, a number or (n,), > 0. poses_a, scales_a: of A; None: at the origin, 1.
 scale_gradients: fill scale_gradient and scale_gradient_a, at three times the cost.
 measure: 'matched' (the accurate spheres), 'inner' (certified lower bound of the true volume) or
     'exact' (the true volume and its gradients: of two Assets that hold their mesh, which bake()
@@ -121,14 +108,32 @@ relative_error: accepted relative error of the volume, such as 0.005 for 0.5 %, 
     error is smaller, blended smoothly. Over random poses about 19 of 20 errors are smaller, half are
     below a third. 0: all spheres. Status error_exceeded: the predicted error is larger, since an
     Asset has no mesh or a simplified one, a pair_budget is set, or copies of an Asset coincide.
+pair_id: a number of yours for this pair of solids, 0: none. Calls with the same number, and their
+    rows, are steps of one motion: 'exact' keeps the triangles that are near each other from step to
+    step, and gives the same answers sooner.
 threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 
 Rows that cannot be answered are NaN with a status and do not affect others. invalid_input: NaN, a
-quaternion of length 0, a scale ≤ 0. not_held: a solid lacks what the measure or `field` needs. For
-one pose ValueError or ist.Error is raised instead.
+quaternion of length 0, a scale ≤ 0. not_held: a solid lacks what the measure or `field` needs, or
+both are Fields. For one pose ValueError or ist.Error is raised instead.
 Ctrl-C raises KeyboardInterrupt.
 
-Returns a Penetration: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
+Solids on a GPU, ist.Solids(…, device='cuda'): the same call gives the same answers there, and what a
+GPU cannot answer raises. It takes field='never', the measures 'matched' and 'inner', and of the limits
+pair_budget. Volumes are within 1e-6 of the sum in double, and of an Asset and a Field within 1e-9 of
+the CPU's. The bits are the same in every run, whatever else is in the batch.
+Arrays are of any framework, in that device's memory and in C order: poses (n, 7) and scales (n,)
+float64, indices uint32 or int32. They are read by __dlpack__ or __cuda_array_interface__, never
+copied, and kept alive until the batch is done. An index without a solid makes its row invalid_input.
+wanted: names of the columns to compute; None: all but node_visits and sphere_pairs.
+out: a dict of arrays by name, or the answer of an earlier call. Answers are written there, and
+    nothing is allocated. uint32 answers fit int32 arrays.
+stream: a handle, or an object with __cuda_stream__, cuda_stream (PyTorch) or ptr (CuPy); None: the
+    legacy default stream. Answers are written in its order. The host waits only in a batch that is
+    larger than all before. A captured stream needs `out`.
+
+Returns a Penetration: arrays of one row a pose, or numbers and (3,) arrays for one pose. Of solids on a
+GPU an ist.gpu.Penetration, whose columns are arrays there.)";
 
 void add_class(py::module_& module) {
   py::class_<Penetrations> type(
@@ -159,6 +164,7 @@ void add_class(py::module_& module) {
   add_column(type, "sphere_pairs", &Penetrations::sphere_pairs,
              "(n,) uint32, lenses summed and spheres overlapped with a surface; with "
              "measure='exact' intersecting triangles.");
+  add_pickling(type);
 }
 
 }  // namespace
@@ -182,40 +188,35 @@ void Penetrations::write(std::size_t i, const Row& row, const Penetration& answe
 
 void add_penetration(py::module_& module) {
   add_class(module);
-  const auto doc = [](const char* what) { return std::string(what) + kPenetrationDoc; };
   module.def(
       "penetration",
       [](const py::object& a, const py::object& b, const py::object& poses,
          const py::object& scales, const py::object& poses_a, const py::object& scales_a,
          bool scale_gradients, const std::string& measure, const std::string& field,
          std::uint32_t pair_budget, std::uint32_t max_visits, double relative_error,
-         std::uint32_t pair_id, unsigned threads) {
-        return answer(
+         std::uint32_t pair_id, unsigned threads, const py::object& wanted, const py::object& out,
+         const py::object& stream) -> py::object {
+        const GivenRows given{poses, scales, poses_a, scales_a, wanted, out, stream};
+        if (const DeviceSides sides = device_sides(a, b); sides.solids != nullptr) {
+          refuse_given("not on a GPU", {{"scale_gradients", scale_gradients},
+                                        {"max_visits", max_visits != 0},
+                                        {"relative_error", relative_error != 0}});
+          refuse_surfaces(field);
+          return device_penetrations(sides, given, measure, pair_budget);
+        }
+        refuse_device_arguments(given);
+        return py::cast(answer(
             Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
             penetration_settings(measure, field, pair_budget, max_visits, relative_error, pair_id),
-            scale_gradients, threads);
+            scale_gradients, threads));
       },
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("scale_gradients") = false,
       py::arg("measure") = "matched", py::arg("field") = "automatic", py::arg("pair_budget") = 0,
       py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("pair_id") = 0,
-      py::arg("threads") = 0, (doc(kPairDoc) + kPairIdDoc).c_str());
-  module.def(
-      "penetration_of_pairs",
-      [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
-         const py::object& scales, bool scale_gradients, const std::string& measure,
-         const std::string& field, std::uint32_t pair_budget, std::uint32_t max_visits,
-         double relative_error, unsigned threads) {
-        return answer(Rows::of_scene(solids, poses, pairs, scales),
-                      penetration_settings(measure, field, pair_budget, max_visits, relative_error),
-                      scale_gradients, threads);
-      },
-      py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
-      py::arg("scales") = py::none(), py::arg("scale_gradients") = false,
-      py::arg("measure") = "matched", py::arg("field") = "automatic", py::arg("pair_budget") = 0,
-      py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("threads") = 0,
-      doc(kSceneDoc).c_str());
+      py::arg("threads") = 0, py::arg("wanted") = py::none(), py::arg("out") = py::none(),
+      py::arg("stream") = py::none(), kDoc);
 }
 
 }  // namespace ist::python

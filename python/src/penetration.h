@@ -5,7 +5,11 @@
 
 #include <ist/query.h>
 
+#include <functional>
+#include <memory>
 #include <string>
+#include <type_traits>
+#include <vector>
 
 #include "arrays.h"
 #include "module.h"
@@ -34,11 +38,52 @@ struct Penetrations {
   void write(std::size_t i, const Row& row, const Penetration& answer) const;
 };
 
+/// The parts of answers of a class that a pickle holds.
+template <class Class>
+struct Pickled {
+  struct Part {
+    std::function<py::object(const Class&)> get;
+    std::function<void(Class&, const py::handle&)> set;
+  };
+  static inline std::vector<Part> parts;
+};
+
 /// A property that is a column.
 template <class Class, class Part>
 void add_column(py::class_<Class>& of, const char* name, Part part, const char* doc) {
-  of.def_prop_ro(
-      name, [part](const Class& self) { return (self.*part).handed_out(); }, doc);
+  const auto get = [part](const Class& self) { return (self.*part).handed_out(); };
+  of.def_prop_ro(name, get, doc);
+  Pickled<Class>::parts.push_back({get, [part](Class& self, const py::handle& given) {
+                                     using Taken = std::remove_reference_t<decltype(self.*part)>;
+                                     self.*part = Taken::taken(given);
+                                   }});
+}
+
+/// A property that is an answer of another class.
+template <class Class, class Inner>
+void add_inner(py::class_<Class>& of, const char* name, std::shared_ptr<Inner> Class::*part,
+               const char* doc) {
+  of.def_ro(name, part, doc);
+  Pickled<Class>::parts.push_back({[part](const Class& self) { return py::cast(self.*part); },
+                                   [part](Class& self, const py::handle& given) {
+                                     self.*part = py::cast<std::shared_ptr<Inner>>(given);
+                                   }});
+}
+
+/// Answers go to other processes, when all their columns are there.
+template <class Class>
+void add_pickling(py::class_<Class>& of) {
+  of.def("__getstate__", [](const Class& self) {
+    py::list state;
+    for (const auto& part : Pickled<Class>::parts) state.append(part.get(self));
+    return py::make_tuple(py::tuple(state));  // never empty
+  });
+  of.def("__setstate__", [](Class& self, const py::tuple& state) {
+    new (&self) Class{};
+    const py::object columns = state[0];
+    for (std::size_t i = 0; i < Pickled<Class>::parts.size(); ++i)
+      Pickled<Class>::parts[i].set(self, columns[i]);
+  });
 }
 
 }  // namespace ist::python

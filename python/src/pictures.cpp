@@ -105,6 +105,7 @@ void add_pictures(py::module_& module) {
   add_column(type, "thickness", &Lenses::thickness, "(n,) [u] along the axis.");
   add_column(type, "sphere_a", &Lenses::sphere_a, "(n,) uint32, row of A's spheres().");
   add_column(type, "sphere_b", &Lenses::sphere_b, "(n,) uint32, row of B's spheres().");
+  add_pickling(type);
   module.def("lenses", &lenses, py::arg("a"), py::arg("b"), py::arg("pose").none(), py::kw_only(),
              py::arg("pose_a") = py::none(), py::arg("scale") = 1.0, py::arg("scale_a") = 1.0,
              py::arg("measure") = "matched", py::arg("detail_a") = 0, py::arg("detail_b") = 0,

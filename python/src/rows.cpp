@@ -92,16 +92,22 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
                    const py::object& scales, const py::object& poses_a, const py::object& scales_a,
                    const char* name) {
   Rows rows;
-  rows.solids_ = {solid_of(a, "a"), solid_of(b, "b")};
-  if (rows.are_fields(0, 1)) throw type_error("a, b: two Fields; one of them must be an Asset");
-  rows.owners_ = {a, b};
+  rows.a_ = Choice(a, "a");
+  rows.b_ = Choice(b, "b");
+  const auto is_field = [](const Choice& side) {
+    return side.step == 0 && std::holds_alternative<Field>(side.among[0]);
+  };
+  if (is_field(rows.a_) && is_field(rows.b_))
+    throw type_error("a, b: two Fields; one of them must be an Asset");
   std::optional<std::size_t> count;  // as many rows as the arguments of many have
-  const auto agree = [&](const Doubles& array, const char* name) {
+  const auto agree = [&](const auto& array, const char* name) {
     if (count && array.shape(0) != *count)
       throw value_error(std::string(name) + ": " + std::to_string(array.shape(0)) +
                         " rows; the arguments before it have " + std::to_string(*count));
     count = array.shape(0);
   };
+  if (rows.a_.step != 0) agree(rows.a_.indices, "a");
+  if (rows.b_.step != 0) agree(rows.b_.indices, "b");
   const auto take = [&](const py::object& value, const char* name) -> Values {
     Doubles array = take_poses(value, name, kPoses);
     if (array.ndim() < 1 || array.ndim() > 2 || array.shape(array.ndim() - 1) != 7)
@@ -124,101 +130,65 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
   rows.scale_a_ = take_scales(scales_a, "scales_a");
   if (count) rows.shape_ = {*count};
   rows.count_ = count.value_or(1);
-  return rows;
-}
-
-Rows Rows::of_scene(const py::sequence& solids, const py::object& poses, const py::object& pairs,
-                    const py::object& scales) {
-  Rows rows;
-  for (const py::handle solid : solids) {
-    rows.solids_.push_back(solid_of(solid, "solids"));
-    rows.owners_.push_back(py::borrow<py::object>(solid));
-  }
-  const auto k = rows.solids_.size();
-  const std::string of_solids = std::to_string(k);
-  const std::string wanted = "(" + of_solids + ", 7) or (w, " + of_solids + ", 7)";
-  Doubles places = take_poses(poses, "poses", wanted);
-  const std::size_t d = places.ndim();
-  if (d < 2 || d > 3 || places.shape(d - 1) != 7 || places.shape(d - 2) != k)
-    refuse_shape(places, "poses", wanted);
-  rows.held_pairs_ = take_integers(pairs, "pairs", "(n, 2)");
-  const Integers& named = rows.held_pairs_;
-  if (named.ndim() != 2 || named.shape(1) != 2) refuse_shape(named, "pairs", "(n, 2)");
-  rows.pairs_ = named.data();
-  for (std::size_t i = 0; i < named.shape(0); ++i) {
-    const std::int64_t first = named.data()[2 * i], second = named.data()[2 * i + 1];
-    const auto refuse = [&](const std::string& why) {
-      throw value_error("pairs[" + std::to_string(i) + "]: (" + std::to_string(first) + ", " +
-                        std::to_string(second) + "): " + why);
-    };
-    if (std::min(first, second) < 0 || std::max(first, second) >= static_cast<std::int64_t>(k))
-      refuse("solids are numbered 0 to " + std::to_string(k - 1));
-    if (first == second) refuse("a solid cannot be paired with itself");
-    if (rows.are_fields(static_cast<std::size_t>(first), static_cast<std::size_t>(second)))
-      refuse("two Fields; one of them must be an Asset");
-  }
-  const std::size_t scenes = d == 3 ? places.shape(0) : 1;
-  rows.pose_b_ = Values(std::move(places), 7, true);
-  if (scales.is_none()) {
-    rows.scale_b_ = Values(kOrigin);
-  } else {
-    const std::string sizes = d == 3 ? "(w, " + of_solids + ")" : "(" + of_solids + ",)";
-    Doubles values = take_doubles(scales, "scales", sizes);
-    if (values.ndim() != d - 1 || values.shape(d - 2) != k || (d == 3 && values.shape(0) != scenes))
-      refuse_shape(values, "scales", sizes);
-    rows.scale_b_ = Values(std::move(values), 1, true);
-  }
-  rows.pairs_of_scene_ = named.shape(0);
-  rows.shape_ = {named.shape(0)};
-  if (d == 3) rows.shape_.insert(rows.shape_.begin(), scenes);
-  rows.count_ = rows.pairs_of_scene_ * scenes;
   rows.sort_by_asset();
   return rows;
 }
 
-bool Rows::are_fields(std::size_t first, std::size_t second) const {
-  return std::holds_alternative<Field>(solids_[first]) &&
-         std::holds_alternative<Field>(solids_[second]);
+Rows::Choice::Choice(const py::object& given, const char* name) : owner(given) {
+  if (py::isinstance<Solids>(given))
+    throw type_error(std::string(name) + ": an ist.Solids; wanted solids[index] of it");
+  if (!py::isinstance<SolidRows>(given)) {
+    own = {solid_of(given, name)};
+    among = own;
+    return;
+  }
+  const auto& rows = py::cast<const SolidRows&>(given);
+  const Solids& solids = rows.among();
+  if (solids.on_device != nullptr)
+    throw type_error(std::string(name) + ": on " + solids.device() +
+                     "; this query is for the CPU alone");
+  among = solids.views;
+  if (py::isinstance<py::int_>(rows.index)) {
+    among = among.subspan(py::cast<std::size_t>(rows.index), 1);
+    return;
+  }
+  indices = take_integers(rows.index, name, "(n,) indices of solids");
+  if (indices.ndim() != 1) refuse_shape(indices, name, "(n,) indices of solids");
+  step = 1;
+  for (std::size_t i = 0; i < indices.shape(0); ++i)
+    if (const std::int64_t k = indices.data()[i]; k < 0 || k >= std::ssize(among))
+      throw value_error(std::string(name) + ": row " + std::to_string(i) + " is solid " +
+                        std::to_string(k) + "; there are " + std::to_string(among.size()) +
+                        " solids");
 }
 
 void Rows::sort_by_asset() {
   // Below, sorting takes longer than what it saves: 2 % of a batch over four assets, 6 to 9 % over
   // 80 MB and more (benchmarks/run.sh cpu_batch).
   constexpr std::uint64_t kCache = 32u << 20;
-  const auto header = [&](std::int64_t solid) -> const AssetHeader* {
-    const TreeView* const tree = std::get_if<TreeView>(&solids_[static_cast<std::size_t>(solid)]);
+  if (a_.step + b_.step == 0) return;
+  const auto header = [](const Solid& solid) -> const AssetHeader* {
+    const TreeView* const tree = std::get_if<TreeView>(&solid);
     return tree != nullptr ? &tree->header() : nullptr;
   };
   std::set<const AssetHeader*> assets;
   std::uint64_t bytes = 0;
-  for (std::size_t k = 0; k < solids_.size(); ++k) {
-    const AssetHeader* const asset = header(static_cast<std::int64_t>(k));
-    if (asset != nullptr && assets.insert(asset).second) bytes += asset->file_bytes;
-  }
-  if (bytes < kCache || count_ == 0) return;
-  order_.resize(pairs_of_scene_);
+  for (const Choice* const side : {&a_, &b_})
+    for (const Solid& solid : side->among)
+      if (const AssetHeader* const asset = header(solid);
+          asset != nullptr && assets.insert(asset).second)
+        bytes += asset->file_bytes;
+  if (bytes < kCache) return;
+  order_.resize(count_);
   std::iota(order_.begin(), order_.end(), std::size_t{0});
-  const auto key = [&](std::size_t pair) {
-    return std::pair(header(pairs_[2 * pair]), header(pairs_[2 * pair + 1]));
-  };
+  const auto key = [&](std::size_t i) { return std::pair(header(a_.at(i)), header(b_.at(i))); };
   std::stable_sort(order_.begin(), order_.end(),
                    [&](std::size_t one, std::size_t other) { return key(one) < key(other); });
 }
 
 Row Rows::at(std::size_t i) const {
-  Row row;
-  if (pairs_ == nullptr) {
-    row.a = {&solids_[0], pose_from(pose_a_.at(i)), *scale_a_.at(i)};
-    row.b = {&solids_[1], pose_from(pose_b_.at(i)), *scale_b_.at(i)};
-    return row;
-  }
-  const std::int64_t* const pair = pairs_ + 2 * (i % pairs_of_scene_);
-  const std::size_t scene = i / pairs_of_scene_ * solids_.size();
-  const auto side = [&](std::int64_t number) -> Side {
-    const auto k = static_cast<std::size_t>(number);
-    return {&solids_[k], pose_from(pose_b_.at(scene + k)), *scale_b_.at(scene + k)};
-  };
-  return {side(pair[0]), side(pair[1])};
+  return {{&a_.at(i), pose_from(pose_a_.at(i)), *scale_a_.at(i)},
+          {&b_.at(i), pose_from(pose_b_.at(i)), *scale_b_.at(i)}};
 }
 
 std::string fault_of(const Pose& pose, double scale, const char* pose_name,

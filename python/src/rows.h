@@ -3,13 +3,14 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <ist/query.h>
 
 #include "arrays.h"
-#include "solids.h"
+#include "solid_rows.h"
 
 namespace ist::python {
 
@@ -36,18 +37,12 @@ class Rows {
  public:
   /// B at each pose beside A. Arguments of one row serve all rows.
   ///
-  /// `poses`, `poses_a`: (7,), (n, 7), (4, 4) or (n, 4, 4); poses_a None: at the origin. `scales`,
-  /// `scales_a`: a number or (n,), None: 1. `name`: of `poses`.
+  /// `a`, `b`: an Asset, a Field, or SolidRows on the CPU. `poses`, `poses_a`: (7,), (n, 7), (4, 4)
+  /// or (n, 4, 4); poses_a None: at the origin. `scales`, `scales_a`: a number or (n,), None: 1.
+  /// `name`: of `poses`.
   static Rows of_pair(const py::object& a, const py::object& b, const py::object& poses,
                       const py::object& scales, const py::object& poses_a,
                       const py::object& scales_a, const char* name = "poses");
-
-  /// Solids of a scene, or of many alike, two at a time.
-  ///
-  /// `poses`: (k, 7), (w, k, 7), or matrices (4, 4) for rows; `scales`: None, (k,) or (w, k);
-  /// `pairs`: (n, 2), numbers of solids, one of them an asset.
-  static Rows of_scene(const py::sequence& solids, const py::object& poses, const py::object& pairs,
-                       const py::object& scales);
 
   const Shape& shape() const { return shape_; }  ///< of what is answered once a row
   std::size_t count() const { return count_; }
@@ -55,11 +50,7 @@ class Rows {
 
   /// The row that is asked i-th: pairs of the same assets one after another, where all of them
   /// together are more than a cache holds.
-  std::size_t asked(std::size_t i) const {
-    if (order_.empty()) return i;
-    const std::size_t scenes = count_ / pairs_of_scene_;
-    return i % scenes * pairs_of_scene_ + order_[i / scenes];
-  }
+  std::size_t asked(std::size_t i) const { return order_.empty() ? i : order_[i]; }
 
  private:
   /// One or many values of `width` doubles.
@@ -75,17 +66,27 @@ class Rows {
     std::size_t step = 0;
   };
 
+  /// The solids of one side: one, or each row's.
+  struct Choice {
+    Choice() = default;
+    Choice(const py::object& given, const char* name);
+    const Solid& at(std::size_t i) const {
+      return among[step == 0 ? 0 : static_cast<std::size_t>(indices.data()[i])];
+    }
+
+    std::vector<Solid> own;  // of an Asset or a Field
+    py::object owner;
+    std::span<const Solid> among;  // these, or those of ist.Solids
+    Integers indices;
+    std::size_t step = 0;  // 0: the same for all rows
+  };
+
   Shape shape_;
   std::size_t count_ = 0;
-  std::vector<Solid> solids_;
-  std::vector<py::object> owners_;  // of the solids
+  Choice a_, b_;
   Values pose_a_, pose_b_, scale_a_, scale_b_;
-  Integers held_pairs_;
-  const std::int64_t* pairs_ = nullptr;  // null: solid 0 and solid 1
-  std::size_t pairs_of_scene_ = 0;
-  std::vector<std::size_t> order_;  ///< of the pairs; empty: as they come
+  std::vector<std::size_t> order_;  ///< of the rows; empty: as they come
 
-  bool are_fields(std::size_t first, std::size_t second) const;
   void sort_by_asset();
 };
 

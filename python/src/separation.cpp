@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "gpu_queries.h"
 #include "penetration.h"
 
 namespace ist::python {
@@ -30,7 +31,8 @@ struct Patches {
       point{patches};
   Column<double> area{patches}, depth{patches}, volume{patches}, twist{patches};
 
-  Patches(const Shape& of, std::size_t each) : rows(of), patches(with(of, each)) {}
+  explicit Patches(const Shape& of = {}, std::size_t each = 0)
+      : rows(of), patches(with(of, each)) {}
 
   void write(std::size_t i, const Row& row, const ContactPatches& whole,
              std::span<const ContactPatch> found) const {
@@ -125,12 +127,19 @@ constexpr const char* kSeparationDoc =
 If both assets keep a mesh, the distance of their surfaces. Otherwise, or with inner_spheres=True,
 that of their inner spheres. Arguments as for penetration(). max_visits: 0: no limit.
 
+Solids on a GPU: of two Assets, inner_spheres=True; a row of a Field is not_held. The distance is the
+minimum over all pairs of inner spheres in double. The CPU's may be larger by 1e-6 of the solids' size,
+and among equally near pairs the two may differ. A stopped row's interval may differ from the CPU's.
+
 Returns a Separation: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
 
 constexpr const char* kPatchesDoc =
     R"(The contact condensed into at most max_patches patches.
 
 Arguments as for penetration(). The patches sum to the whole contact.
+
+Solids on a GPU: of two Assets, 1 to 32 patches, without limits; a row of a Field is not_held. Beyond
+count[i] a pair's patches are zero, or with `out` as they were.
 
 Returns ContactPatches: arrays of shape (n, max_patches), or (max_patches,) for one pose.)";
 
@@ -167,10 +176,14 @@ void add_classes(py::module_& module) {
   add_column(separation, "status", &Separations::status, "(n,) uint32, a QueryStatus.");
   add_column(separation, "node_visits", &Separations::node_visits, "(n,) uint32.");
   add_column(separation, "sphere_pairs", &Separations::sphere_pairs, "(n,) uint32.");
+  add_pickling(separation);
 
   py::class_<Patches> patch(module, "ContactPatches",
                             "Contact patches; the first `count` of m are valid.");
-  patch.def_ro("penetration", &Patches::penetration, "The whole: a Penetration.");
+  add_inner(patch, "penetration", &Patches::penetration, "The whole: a Penetration.");
+  patch.def_prop_ro(
+      "status", [](const Patches& self) { return self.penetration->status.handed_out(); },
+      "(n,) uint32, a QueryStatus: the whole's.");
   add_column(patch, "count", &Patches::count, "(n,) uint32, patches written; the rest is zero.");
   add_column(patch, "id", &Patches::id,
              "(n, m) uint64, identifies a region of the smaller solid, in every query of the same "
@@ -189,15 +202,17 @@ void add_classes(py::module_& module) {
              "centroid.");
   add_column(patch, "twist", &Patches::twist,
              "(n, m) [u³] moment about the normal that a force at the point lacks.");
+  add_pickling(patch);
 
   py::class_<Outline> outline(module, "OverlapOutline", "Contact patches and their outlines.");
-  outline.def_ro("contact", &Outline::contact, "The patches: ContactPatches of one pose.");
+  add_inner(outline, "contact", &Outline::contact, "The patches: ContactPatches of one pose.");
   add_column(
       outline, "segments", &Outline::segments,
       "(n, 2, 3) [u] from and to of each, world: they form closed curves. A's surface inside "
       "B lies to the left of each, seen from outside A.");
   add_column(outline, "patch", &Outline::patch,
              "(n,) uint32, number of the patch that each bounds; 0 where max_patches is 0.");
+  add_pickling(outline);
 }
 
 }  // namespace
@@ -208,59 +223,52 @@ void add_separation(py::module_& module) {
       "separation",
       [](const py::object& a, const py::object& b, const py::object& poses,
          const py::object& scales, const py::object& poses_a, const py::object& scales_a,
-         std::uint32_t max_visits, bool inner_spheres, unsigned threads) {
-        return separations(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
-                           {max_visits, inner_spheres}, threads);
+         std::uint32_t max_visits, bool inner_spheres, unsigned threads, const py::object& wanted,
+         const py::object& out, const py::object& stream) -> py::object {
+        const GivenRows given{poses, scales, poses_a, scales_a, wanted, out, stream};
+        if (const DeviceSides sides = device_sides(a, b); sides.solids != nullptr) {
+          refuse_given("False; on a GPU distances are those of inner spheres: wanted True",
+                       {{"inner_spheres", !inner_spheres}});
+          return device_separations(sides, given, max_visits);
+        }
+        refuse_device_arguments(given);
+        return py::cast(separations(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
+                                    {max_visits, inner_spheres}, threads));
       },
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, py::arg("inner_spheres") = false,
-      py::arg("threads") = 0, kSeparationDoc);
-  module.def(
-      "separation_of_pairs",
-      [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
-         const py::object& scales, std::uint32_t max_visits, bool inner_spheres, unsigned threads) {
-        return separations(Rows::of_scene(solids, poses, pairs, scales),
-                           {max_visits, inner_spheres}, threads);
-      },
-      py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
-      py::arg("scales") = py::none(), py::arg("max_visits") = 0, py::arg("inner_spheres") = false,
-      py::arg("threads") = 0,
-      "separation() for pairs of solids of scenes, with the arguments of penetration_of_pairs().");
+      py::arg("threads") = 0, py::arg("wanted") = py::none(), py::arg("out") = py::none(),
+      py::arg("stream") = py::none(), kSeparationDoc);
   module.def(
       "contact_patches",
       [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
          const py::object& scales, const py::object& poses_a, const py::object& scales_a,
          const std::string& measure, const std::string& field, std::uint32_t pair_budget,
-         std::uint32_t max_visits, double relative_error, std::uint32_t pair_id, unsigned threads) {
-        return patches(
+         std::uint32_t max_visits, double relative_error, std::uint32_t pair_id, unsigned threads,
+         const py::object& wanted, const py::object& out, const py::object& stream) -> py::object {
+        const GivenRows given{poses, scales, poses_a, scales_a, wanted, out, stream};
+        if (const DeviceSides sides = device_sides(a, b); sides.solids != nullptr) {
+          refuse_given("not on a GPU", {{"pair_budget", pair_budget != 0},
+                                        {"max_visits", max_visits != 0},
+                                        {"relative_error", relative_error != 0}});
+          refuse_surfaces(field);
+          return device_patches(sides, given, max_patches, measure);
+        }
+        refuse_device_arguments(given);
+        return py::cast(patches(
             Rows::of_pair(a, b, poses, scales, poses_a, scales_a), max_patches,
             {named(measure, "measure", kMeasures), named(field, "field", kFieldUses), pair_budget,
              max_visits, take_limit(relative_error, "relative_error"), pair_id},
-            threads);
+            threads));
       },
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
       py::arg("max_patches") = 8, py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("measure") = "matched",
       py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
-      py::arg("relative_error") = 0.0, py::arg("pair_id") = 0, py::arg("threads") = 0, kPatchesDoc);
-  module.def(
-      "contact_patches_of_pairs",
-      [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
-         std::size_t max_patches, const py::object& scales, const std::string& measure,
-         const std::string& field, std::uint32_t pair_budget, std::uint32_t max_visits,
-         double relative_error, unsigned threads) {
-        return patches(Rows::of_scene(solids, poses, pairs, scales), max_patches,
-                       {named(measure, "measure", kMeasures), named(field, "field", kFieldUses),
-                        pair_budget, max_visits, take_limit(relative_error, "relative_error")},
-                       threads);
-      },
-      py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
-      py::arg("max_patches") = 8, py::arg("scales") = py::none(), py::arg("measure") = "matched",
-      py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
-      py::arg("relative_error") = 0.0, py::arg("threads") = 0,
-      "contact_patches() for pairs of solids of scenes, with the arguments of "
-      "penetration_of_pairs().");
+      py::arg("relative_error") = 0.0, py::arg("pair_id") = 0, py::arg("threads") = 0,
+      py::arg("wanted") = py::none(), py::arg("out") = py::none(), py::arg("stream") = py::none(),
+      kPatchesDoc);
   module.def(
       "overlap_outline",
       [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
@@ -287,15 +295,6 @@ void add_separation(py::module_& module) {
       py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(), py::arg("threads") = 0, kOverlapDoc);
-  module.def(
-      "overlap_of_pairs",
-      [](const py::sequence& solids, const py::object& poses, const py::object& pairs,
-         const py::object& scales, unsigned threads) {
-        return overlaps(Rows::of_scene(solids, poses, pairs, scales), threads);
-      },
-      py::arg("solids"), py::arg("poses"), py::arg("pairs"), py::kw_only(),
-      py::arg("scales") = py::none(), py::arg("threads") = 0,
-      "overlap() for pairs of solids of scenes, with the arguments of penetration_of_pairs().");
 }
 
 }  // namespace ist::python

@@ -14,7 +14,7 @@ namespace ist::python {
 /// A field and whoever owns the memory that it points to.
 struct OwnedField {
   Field field;
-  std::string arguments;  ///< that it was made of, for people
+  py::dict arguments;  ///< that it was made of
   std::shared_ptr<const void> owner;
 };
 

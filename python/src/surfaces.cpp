@@ -102,6 +102,7 @@ void add_surfaces(py::module_& module) {
   add_column(hits, "triangle", &RayHits::triangle,
              "(n,) uint32, of the kept mesh; 2**32 - 1: no hit, or a Field.");
   add_column(hits, "status", &RayHits::status, "(n,) uint32, a QueryStatus.");
+  add_pickling(hits);
   py::class_<SurfacePoints> points(module, "SurfacePoints", "Nearest points of a surface.");
   add_column(points, "distance", &SurfacePoints::distance, "(n,) [u] signed: < 0 inside.");
   add_column(points, "error", &SurfacePoints::error,
@@ -111,6 +112,7 @@ void add_surfaces(py::module_& module) {
              "(n, 3) of the distance by the point: unit, outward, world.");
   add_column(points, "triangle", &SurfacePoints::triangle, "(n,) uint32, as RayHits has it.");
   add_column(points, "status", &SurfacePoints::status, "(n,) uint32, a QueryStatus.");
+  add_pickling(points);
 
   module.def(
       "raycast",

@@ -46,6 +46,7 @@ void add_time_of_impact(py::module_& module) {
   add_column(type, "status", &Impacts::status, "(n,) uint32, an ImpactStatus.");
   add_column(type, "node_visits", &Impacts::node_visits, "(n,) uint32.");
   add_column(type, "surface_pairs", &Impacts::surface_pairs, "(n,) uint32.");
+  add_pickling(type);
   module.def(
       "time_of_impact",
       [](const py::object& a, const py::object& b, const py::object& poses,

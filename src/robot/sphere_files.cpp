@@ -84,13 +84,14 @@ std::string collisions(const LinkSpheres& link, const std::string& indent) {
   const auto ball = [&](const std::string& name, const Eigen::Vector3d& at, double radius) {
     add(name, at, "0 0 0", "<sphere radius=\"" + number(radius) + "\"/>");
   };
-  if (link.capsule) {
-    const auto& [begin, end, radius] = *link.capsule;
+  for (std::size_t i = 0; i < link.capsules.size(); ++i) {
+    const auto& [begin, end, radius] = link.capsules[i];
     const Eigen::Vector3d along = end - begin;
-    ball("_capsule_begin", begin, radius);
-    ball("_capsule_end", end, radius);
+    const std::string name = "_capsule_" + std::to_string(i);
+    ball(name + "_begin", begin, radius);
+    ball(name + "_end", end, radius);
     if (!along.isZero(0))  // which takes z to the capsule's axis
-      add("_capsule", (begin + end) / 2,
+      add(name, (begin + end) / 2,
           "0 " + number(std::atan2(along.head<2>().norm(), along.z())) + " " +
               number(std::atan2(along.y(), along.x())),
           "<cylinder radius=\"" + number(radius) + "\" length=\"" + number(along.norm()) + "\"/>");

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,8 +17,8 @@ namespace ist {
 struct LinkSpheres {
   std::string link;
   std::vector<CoverSphere> spheres;
-  double protrusion = 0;                     ///< [u] none reaches further out of the link
-  std::optional<CoverCapsule> capsule = {};  ///< beside the spheres; URDF alone has it
+  double protrusion = 0;                    ///< [u] none reaches further out of the link
+  std::vector<CoverCapsule> capsules = {};  ///< beside the spheres; URDF alone has them
 };
 
 struct SelfCollision;

@@ -355,8 +355,13 @@ TEST_F(RobotCommands, CapsulesHoldTheLink) {
   EXPECT_GT(furthest, -1e-4 * radius);
   EXPECT_LT(radius, 9.5);  // the head's corners are 8.66 from the axis
   expect_error({"spheres", "b.urdf", "-o", "c.yml", "--capsules"}, 1, "use .urdf or .json");
-  expect_error({"spheres", "b.urdf", "-o", "c.json", "--capsules", "--count", "3"}, 2,
-               "no effect with --capsules");
+  expect_error({"spheres", "b.urdf", "-o", "c.json", "--capsules", "--count", "bolt=13"}, 2,
+               "13 with --capsules; at most 12");
+  ASSERT_EQ(ist({"spheres", "b.urdf", "-o", "d.json", "--capsules", "--count", "3"}).exit_code, 0);
+  const Json two = Json::parse(read("d.json"))["links"]["bolt"];
+  EXPECT_EQ(two["capsules"].size(), 2u);  // head and shaft: a third does not help
+  EXPECT_LT(two["volume_ratio"].get<double>(), 0.7 * link["volume_ratio"].get<double>());
+  EXPECT_LT(two["protrusion"].get<double>(), link["protrusion"].get<double>());
 }
 
 TEST_F(RobotCommands, AMeshAlone) {

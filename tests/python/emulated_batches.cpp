@@ -124,7 +124,13 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
         batch.cut_for(most_pairs);
         return batch.run(rows, settings.measure, 0, settings.pair_budget);
       },
-      [to](const auto& found) { write(found, to); });
+      [to](const auto& found) {
+        write(found, to);
+        for (std::size_t i = 0; i < found.size(); ++i) {
+          put(to.force, i, Eigen::Vector3d(-found[i].translation_gradient));
+          put(to.torque, i, Eigen::Vector3d(-found[i].rotation_gradient));
+        }
+      });
 }
 
 void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint32_t max_visits,

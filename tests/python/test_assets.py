@@ -317,3 +317,50 @@ def test_other_threads_run_meanwhile(knot_mesh):
         count += 1
         time.sleep(0.001)
     assert count > 10
+
+
+@pytest.mark.parametrize("make", [
+    lambda a, b: ist.penetration(a, b, AT, scale_gradients=True), lambda a, b: ist.penetration(a, b, [AT] * 3),
+    lambda a, b: ist.separation(a, b, AT), lambda a, b: ist.contact_patches(a, b, [AT] * 2, max_patches=3),
+    lambda a, b: ist.time_of_impact(a, b, AT, AT), lambda a, b: ist.raycast(a, None, [0, 0, 9], [0, 0, -1]),
+    lambda a, b: ist.closest_point(a, None, np.zeros((4, 3))), lambda a, b: ist.lenses(a, b, AT),
+    lambda a, b: ist.overlap_outline(a, b, AT), lambda a, b: ist.penetration(a, b, np.zeros((0, 7)))])
+def test_answers_pickle(gear, cube, make):
+    answer = make(gear, cube)
+    again = pickle.loads(pickle.dumps(answer))
+    expect_same_columns(again, answer)
+
+
+AT = [0.9, 0.1, 0.2, 0.3, 2.5, 0.3, 0.2]
+
+
+def expect_same_columns(one, other):
+    assert type(one) is type(other)
+    for name in vars(type(one)):
+        if name.startswith("_"):
+            continue
+        x, y = getattr(one, name), getattr(other, name)
+        if type(x).__module__ == "ist" and not isinstance(x, int):
+            expect_same_columns(x, y)
+        else:
+            assert type(x) is type(y) and np.array_equal(x, y), name
+            assert getattr(x, "dtype", None) == getattr(y, "dtype", None), name
+
+
+def test_shapes_and_meshes_pickle(knot, cube):
+    heights = np.random.default_rng(1).uniform(0, 1, (4, 5)).astype(np.float32)
+    inside = np.ones((3, 3, 3), np.float32)
+    for shape in (ist.HalfSpaceField([0, 0, 2], 0.5), ist.BoxField([1, 2, 3]), ist.BallField(2),
+                  ist.CapsuleField(1, 2), ist.CylinderField(1, 2), ist.MeshField(knot),
+                  ist.HeightField(heights, spacing=(0.5, 0.5), lowest=0),
+                  ist.DistanceGridField(inside, origin=[-1, -1, -1], spacing=1.0)):
+        again = pickle.loads(pickle.dumps(shape))
+        assert repr(again) == repr(shape)
+        assert ist.penetration(again, cube, [1, 0, 0, 0, 0.2, 0.1, 0]).volume == ist.penetration(
+            shape, cube, [1, 0, 0, 0, 0.2, 0.1, 0]).volume > 0
+    mesh = ist.sample_mesh("gear")
+    for one in (mesh, ist.close_mesh(mesh, name="wheel")):
+        again = pickle.loads(pickle.dumps(one))
+        assert type(again) is type(one) and np.array_equal(again.vertices, one.vertices)
+        assert np.array_equal(again.triangles, one.triangles)
+    assert again.name == "wheel" and again.report.volume == one.report.volume

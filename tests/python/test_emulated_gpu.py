@@ -1,4 +1,4 @@
-"""ist.gpu over a device that is host memory (emulated_device.cpp): who waits, holds and frees.
+"""Solids on a device that is host memory (emulated_device.cpp): who waits, holds and frees.
 
 What a batch was lent is spoiled as soon as it is given back, and work of a stream is done when
 somebody waits for it. On a card: test_on_gpu.py.
@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import ist
+from test_rows import ask as batch
 from test_gpu import CUDA, DELETER, Interface, Managed, Tensor, Versioned, new_capsule
 
 FLOATS, UINTS = 2, 1
@@ -54,15 +55,14 @@ def solids(gear, knot, cube):
 def arguments(random_poses):
     random = np.random.default_rng(3)
     return dict(
-        solid_a=random.integers(0, 3, 40).astype(np.uint32),
-        solid_b=random.integers(0, 3, 40).astype(np.int32),
-        pose_a=random_poses(40, 0.8), pose_b=random_poses(80, 0.8)[40:].copy(),
-        scale_a=random.uniform(0.5, 2, 40), scale_b=random.uniform(0.5, 2, 40))
+        a=random.integers(0, 3, 40).astype(np.uint32),
+        b=random.integers(0, 3, 40).astype(np.int32),
+        poses_a=random_poses(40, 0.8), poses=random_poses(80, 0.8)[40:].copy(),
+        scales_a=random.uniform(0.5, 2, 40), scales=random.uniform(0.5, 2, 40))
 
 
 def ask(assets, arguments, **settings):
-    return ist.gpu.penetration(assets, **{n: OnDevice(x.copy()) for n, x in arguments.items()},
-                               **settings)
+    return batch(assets, **{n: OnDevice(x.copy()) for n, x in arguments.items()}, **settings)
 
 
 def expected_of(solids, arguments, **settings):
@@ -71,8 +71,8 @@ def expected_of(solids, arguments, **settings):
              for a, b, pose_a, pose_b, scale_a, scale_b in zip(*arguments.values())]
     return dict(volume=np.concatenate([f.volume for f in found]),
                 centroid=np.concatenate([f.centroid for f in found]),
-                translation_gradient=-np.concatenate([f.force for f in found]),
-                rotation_gradient=-np.concatenate([f.torque for f in found]),
+                force=np.concatenate([f.force for f in found]),
+                torque=np.concatenate([f.torque for f in found]),
                 status=np.concatenate([f.status for f in found]))
 
 
@@ -81,101 +81,58 @@ def expect_close(found, expected):
     for name, column in expected.items():
         ours = getattr(found, name).numpy()
         assert ours.shape == column.shape
-        power = dict(volume=3, centroid=1, translation_gradient=2, rotation_gradient=3, status=0)[name]
+        power = dict(volume=3, centroid=1, force=2, torque=3, status=0)[name]
         assert (np.isnan(ours.astype(float)) == np.isnan(column.astype(float))).all(), name
         assert np.nanmax(np.abs(ours.astype(float) - column)) <= 1e-5 * size**power, name
 
 
 @pytest.mark.parametrize("measure", ["matched", "inner"])
 def test_answers_are_those_of_the_cpu(solids, arguments, measure):
-    arguments["pose_b"][3, 5] = np.nan
+    arguments["poses"][3, 5] = np.nan
     expected = expected_of(solids, arguments, measure=measure)
     assert (expected["volume"] > 0).sum() > 10 and expected["status"][3] == 2
-    found = ask(ist.gpu.Solids(solids), arguments, measure=measure)
+    found = ask(ist.Solids(solids, device="cuda"), arguments, measure=measure)
     expect_close(found, expected)
     assert found.node_visits is None and found.volume.dtype == np.float64
     assert found.volume.shape == (40,) and found.centroid.shape == (40, 3) and len(found.status) == 40
 
 
-def test_budgets_are_those_of_the_cpu(solids, arguments):
-    assets = ist.gpu.Solids(solids)
-    whole, bound = ask(assets, arguments), ask(assets, arguments, pair_budget=60)
-    expect_close(bound, expected_of(solids, arguments, pair_budget=60))
-    assert not np.array_equal(bound.volume.numpy(), whole.volume.numpy())
-    with pytest.raises(TypeError):
-        ask(assets, arguments, pair_budget=-1)
-
-
-def test_separations_are_those_of_the_cpu(solids, arguments):
-    arguments["pose_b"][:, 4:] *= 8
-    arguments["pose_b"][3, 5] = np.nan
-    lent_arguments = {n: OnDevice(x.copy()) for n, x in arguments.items()}
-    found = ist.gpu.separation(ist.gpu.Solids(solids), **lent_arguments)
-    size = 2 * max(solid.bounds().radius for solid in solids)
-    apart = 0
-    for i, (a, b, pose_a, pose_b, scale_a, scale_b) in enumerate(zip(*arguments.values())):
-        one = ist.separation(solids[a], solids[b], [pose_b], poses_a=pose_a, scales=scale_b,
-                             scales_a=scale_a, inner_spheres=True)
-        assert found.status.numpy()[i] == one.status[0]
-        if i == 3:
-            assert np.isnan(found.distance.numpy()[3]) and np.isnan(found.normal.numpy()[3]).all()
-            continue
-        assert abs(found.distance.numpy()[i] - one.distance[0]) <= 2e-6 * size
-        for name in ("distance_min", "distance_max"):
-            assert getattr(found, name).numpy()[i] == pytest.approx(getattr(one, name)[0], abs=1e-5 * size)
-        apart += one.distance[0] > 0
-        if one.distance[0] > 0:
-            gap = found.point_b.numpy()[i] - found.point_a.numpy()[i]
-            assert gap == pytest.approx(found.distance.numpy()[i] * found.normal.numpy()[i], abs=1e-9)
-    assert apart > 10 and found.status.numpy()[3] == 2
-    assert found.node_visits is None and found.normal.shape == (40, 3)
-    few = ist.gpu.separation(ist.gpu.Solids(solids), 0, 1, None, OnDevice(arguments["pose_b"].copy()),
-                             max_visits=1, wanted=["status", "distance_min", "distance_max"])
+def test_stopped_separations_keep_their_interval(solids, arguments):
+    arguments["poses"][:, 4:] *= 8
+    arguments["poses"][3, 5] = np.nan
+    assets = ist.Solids(solids, device="cuda")
+    few = batch(assets, a=0, b=1, poses=OnDevice(arguments["poses"].copy()), query=ist.separation,
+                max_visits=1, wanted=["status", "distance_min", "distance_max"])
     assert few.distance is None and (few.status.numpy() == 1).any()
     assert np.delete(few.distance_min.numpy() <= few.distance_max.numpy(), 3).all()
     with pytest.raises(ValueError, match="wanted: 'volume'; there are 'distance', 'distance_min'"):
-        ist.gpu.separation(ist.gpu.Solids(solids), 0, 1, None, OnDevice(arguments["pose_b"]),
-                           wanted=["volume"])
+        batch(assets, a=0, b=1, poses=OnDevice(arguments["poses"]), query=ist.separation,
+              wanted=["volume"])
 
 
-def test_patches_are_those_of_the_cpu(solids, arguments):
-    arguments["pose_b"][3, 5] = np.nan
-    assets = ist.gpu.Solids(solids)
-    given = {n: OnDevice(x.copy()) for n, x in arguments.items()}
-    found = ist.gpu.contact_patches(assets, **given, max_patches=4)
-    ours = {name: getattr(found, name).numpy() for name in (
-        "count", "id", "centroid", "normal", "area", "depth", "volume", "force", "torque", "status")}
+def test_patches_are_written_where_they_are_wanted(solids, arguments):
+    arguments["poses"][3, 5] = np.nan
+    assets = ist.Solids(solids, device="cuda")
+    found = ask(assets, arguments, query=ist.contact_patches, max_patches=4)
+    ours = {name: getattr(found, name).numpy() for name in ("count", "id", "volume", "force", "status")}
     assert ours["id"].shape == (40, 4) and ours["id"].dtype == np.uint64
-    assert ours["force"].shape == (40, 4, 3) and ours["count"].max() == 4 and ours["status"][3] == 2
-    whole = ask(assets, arguments)
-    valid = np.arange(40) != 3
-    assert ours["volume"].sum(1)[valid] == pytest.approx(whole.volume.numpy()[valid], rel=1e-5)
-    for i, (a, b, pose_a, pose_b, scale_a, scale_b) in enumerate(zip(*arguments.values())):
-        if i == 3:
-            assert ours["count"][3] == 0 and np.isnan(whole.volume.numpy()[3])
-            continue
-        one = ist.contact_patches(solids[a], solids[b], pose_b, poses_a=pose_a, scales=scale_b,
-                                  scales_a=scale_a, max_patches=4, field="never")
-        n = int(one.count)
-        assert ours["count"][i] == n
-        assert (ours["id"][i, :n] == one.id[:n]).all() and not ours["volume"][i, n:].any()
-        for name, power in dict(centroid=1, area=2, volume=3, force=2, torque=3).items():
-            size = max(1, np.abs(getattr(one, name)).max())
-            assert np.abs(ours[name][i, :n] - getattr(one, name)[:n]).max(initial=0) <= 1e-4 * size, name
+    assert ours["force"].shape == (40, 4, 3) and ours["count"].max() == 4
+    assert ours["status"][3] == 2 and ours["count"][3] == 0
+    assert not ours["volume"][np.arange(4) >= ours["count"][:, None]].any()
+    whole = ask(assets, arguments).volume.numpy()
+    assert np.delete(ours["volume"].sum(1), 3) == pytest.approx(np.delete(whole, 3), rel=1e-5)
     out = dict(volume=kept(np.full((40, 2), 7.0)), id=kept(np.zeros((40, 2), np.int64)))
-    again = ist.gpu.contact_patches(assets, **given, max_patches=2, out=out)
+    again = ask(assets, arguments, query=ist.contact_patches, max_patches=2, out=out)
     assert again.volume is out["volume"] and again.count is None
     del found
     ask(assets, arguments).volume.numpy()
     assert out["volume"].array[3, 0] == 7 and (out["volume"].array[:, 0] > 0).all()
-    for wrong, error, text in [
-            (dict(max_patches=0), ValueError, "max_patches: 0; wanted 1 to 32"),
-            (dict(max_patches=33), ValueError, "max_patches: 33; wanted 1 to 32"),
-            (dict(max_patches=3, out=out), ValueError,
-             r"out\['.*'\]: shape \(40, 2\); wanted .* \(n, 3\) on CUDA"),
-            (dict(wanted=["distance"]), ValueError, "wanted: 'distance'; there are 'count', 'id'")]:
-        with pytest.raises(error, match=text):
-            ist.gpu.contact_patches(assets, **given, **wrong)
+    for wrong, text in [
+            (dict(max_patches=33), "max_patches: 33; wanted 1 to 32"),
+            (dict(max_patches=3, out=out), r"out\['.*'\]: shape \(40, 2\); wanted .* \(n, 3\) on CUDA"),
+            (dict(wanted=["distance"]), "wanted: 'distance'; there are 'count', 'id'")]:
+        with pytest.raises(ValueError, match=text):
+            ask(assets, arguments, query=ist.contact_patches, **wrong)
 
 
 @pytest.fixture(scope="module")
@@ -188,53 +145,53 @@ def some_fields(knot):
 @pytest.mark.parametrize("measure", ["matched", "inner"])
 def test_fields_are_those_of_the_cpu(solids, some_fields, arguments, measure):
     fields, heights = some_fields
-    arguments["solid_a"] = np.random.default_rng(4).integers(0, 5, 40).astype(np.uint32)
-    arguments["pose_b"][3, 5] = np.nan
+    arguments["a"] = np.random.default_rng(4).integers(0, 5, 40).astype(np.uint32)
+    arguments["poses"][3, 5] = np.nan
     expected = [ist.penetration(fields[a], solids[b], [pose_b], poses_a=pose_a, scales=scale_b,
                                 scales_a=scale_a, measure=measure)
                 for a, b, pose_a, pose_b, scale_a, scale_b in zip(*arguments.values())]
-    there = ist.gpu.Solids([*fields, *solids])
-    assert len(there) == 8 and there.device == 0 and there.bytes > heights.nbytes
-    arguments["solid_b"] += 5
-    turned = {name[:-1] + dict(a="b", b="a")[name[-1]]: x for name, x in arguments.items()}
+    there = ist.Solids([*fields, *solids], device="cuda")
+    assert len(there) == 8 and there.device == "cuda:0" and there.bytes > heights.nbytes
+    arguments["b"] += 5
+    names = dict(a="b", poses_a="poses", scales_a="scales")
+    names |= {b: a for a, b in names.items()}
+    turned = {names[name]: x for name, x in arguments.items()}
     heights += 1000  # what was uploaded stays
     try:
         found, over = (ask(there, given, measure=measure) for given in (arguments, turned))
         volume = found.volume.numpy()
         assert np.array_equal(over.volume.numpy(), volume, equal_nan=True)
-        assert np.array_equal(over.translation_gradient.numpy(), -found.translation_gradient.numpy(),
-                              equal_nan=True)
+        assert np.array_equal(over.force.numpy(), -found.force.numpy(), equal_nan=True)
     finally:
         heights -= 1000
     theirs = np.concatenate([one.volume for one in expected])
     assert (theirs > 0).sum() > 15 and found.status.numpy()[3] == 2
     assert volume == pytest.approx(theirs, rel=1e-9, abs=1e-9, nan_ok=True)
-    push = np.concatenate([-one.force for one in expected])
-    assert found.translation_gradient.numpy() == pytest.approx(push, rel=1e-6, abs=1e-6, nan_ok=True)
+    push = np.concatenate([one.force for one in expected])
+    assert found.force.numpy() == pytest.approx(push, rel=1e-6, abs=1e-6, nan_ok=True)
 
 
 def test_what_cannot_be_answered_is_not_held(solids, some_fields):
-    there = ist.gpu.Solids([*some_fields[0], *solids])
-    for batch, held in ((ist.gpu.penetration, [0, 0, 3]), (ist.gpu.separation, [0, 3, 3]),
-                        (ist.gpu.contact_patches, [0, 3, 3])):
-        numbers = (OnDevice(np.array(rows, np.uint32)) for rows in ([5, 0, 1], [6, 5, 2]))
-        found = batch(there, *numbers, None, OnDevice(np.tile([1.0, 0, 0, 0, 0, 0, 0], (3, 1))))
-        assert found.status.numpy().tolist() == held, batch
+    there = ist.Solids([*some_fields[0], *solids], device="cuda")
+    poses = np.tile([1.0, 0, 0, 0, 0, 0, 0], (3, 1))
+    for query, held in ((ist.penetration, [0, 0, 3]), (ist.separation, [0, 3, 3]),
+                        (ist.contact_patches, [0, 3, 3])):
+        found = batch(there, a=OnDevice(np.array([5, 0, 1], np.uint32)),
+                      b=OnDevice(np.array([6, 5, 2], np.uint32)), poses=OnDevice(poses.copy()), query=query)
+        assert found.status.numpy().tolist() == held, query
 
 
 def test_wrong_solids_are_named(solids):
     with pytest.raises(ist.Error, match=r"GPU: solid 1 is an asset without spheres: bake it with"):
-        ist.gpu.Solids([solids[0], ist.bake_surface(ist.close_mesh(ist.sample_mesh("cube")))])
-    with pytest.raises(TypeError, match=r"solids\[0\]: a int; wanted an Asset or a Field"):
-        ist.gpu.Solids([3])
+        ist.Solids([solids[0], ist.bake_surface(ist.sample_mesh("cube"))], device="cuda")
 
 
 def test_nothing_is_given_back_before_the_batch_is_done(solids, arguments):
-    assets = ist.gpu.Solids(solids)
+    assets = ist.Solids(solids, device="cuda")
     expected = expected_of(solids, arguments)
     first = ask(assets, arguments, stream=5)
     assert len(lent) == 6
-    second = ask(assets, {**arguments, "pose_b": arguments["pose_b"][::-1]}, stream=6)
+    second = ask(assets, {**arguments, "poses": arguments["poses"][::-1]}, stream=6)
     assert len(lent) == 12
     third = ask(assets, arguments)
     gc.collect()
@@ -249,28 +206,28 @@ def test_nothing_is_given_back_before_the_batch_is_done(solids, arguments):
 
 
 def test_assets_wait_for_their_batches(solids, arguments):
-    found = ask(ist.gpu.Solids(solids), arguments, stream=5)
+    found = ask(ist.Solids(solids, device="cuda"), arguments, stream=5)
     gc.collect()  # the assets are gone
     assert not lent
     expect_close(found, expected_of(solids, arguments))
 
 
 def test_a_larger_batch_waits_for_its_room(solids, arguments):
-    assets = ist.gpu.Solids(solids)
+    assets = ist.Solids(solids, device="cuda")
     few = ask(assets, arguments, stream=5)
     many = {n: np.concatenate([x] * 120) for n, x in arguments.items()}
     for name in many:
         many[name][40:] = arguments[name][0]
-    many["pose_b"][40:, 4:] = 1e6
+    many["poses"][40:, 4:] = 1e6
     found = ask(assets, many, stream=6)
     assert np.array_equal(found.volume.numpy()[:40], few.volume.numpy())
 
 
 def test_what_was_asked_before_does_not_show(solids, arguments):
-    assets = ist.gpu.Solids(solids)
+    assets = ist.Solids(solids, device="cuda")
     few = ask(assets, arguments).volume.numpy()
     many = {n: np.concatenate([x] * 500) for n, x in arguments.items()}
-    many["pose_b"][40:, 4:] = 1e6
+    many["poses"][40:, 4:] = 1e6
     of_many = ask(assets, many).volume.numpy()[:40]
     assert np.allclose(of_many, few, rtol=1e-6, atol=0)
     assert (of_many != few).any()  # as many are cut up otherwise
@@ -278,7 +235,7 @@ def test_what_was_asked_before_does_not_show(solids, arguments):
 
 
 def test_streams_are_passed_on(solids, arguments):
-    assets = ist.gpu.Solids(solids)
+    assets = ist.Solids(solids, device="cuda")
 
     class Torch:
         cuda_stream = 12
@@ -291,45 +248,41 @@ def test_streams_are_passed_on(solids, arguments):
             return 0, 14
 
     for given, handle in ((None, 1), (0, 1), (2, 2), (Torch(), 12), (CuPy(), 13), (Core(), 14)):
-        poses = OnDevice(arguments["pose_b"].copy())
-        found = ist.gpu.penetration(assets, 0, 1, None, poses, stream=given)
+        poses = OnDevice(arguments["poses"].copy())
+        found = batch(assets, a=0, b=1, poses=poses, stream=given)
         assert poses.streams == [handle]
         assert found.volume.numpy().shape == (40,)
     with pytest.raises(TypeError, match="stream: a str is not a stream"):
-        ist.gpu.penetration(assets, 0, 1, None, OnDevice(arguments["pose_b"]), stream="mine")
+        batch(assets, a=0, b=1, poses=OnDevice(arguments["poses"]), stream="mine")
 
 
 def test_arguments_may_be_left_out(solids, arguments):
-    assets = ist.gpu.Solids(solids)
-    poses = arguments["pose_b"]
+    assets = ist.Solids(solids, device="cuda")
+    poses = arguments["poses"]
     ones = np.ones(40)
-    whole = dict(solid_a=np.zeros(40, np.uint32), solid_b=np.full(40, 2, np.uint32),
-                 pose_a=np.tile([1.0, 0, 0, 0, 0, 0, 0], (40, 1)), pose_b=poses, scale_a=ones,
-                 scale_b=ones)
-    found = ist.gpu.penetration(assets, 0, 2, None, OnDevice(poses.copy()))
+    whole = dict(a=np.zeros(40, np.uint32), b=np.full(40, 2, np.uint32),
+                 poses_a=np.tile([1.0, 0, 0, 0, 0, 0, 0], (40, 1)), poses=poses, scales_a=ones,
+                 scales=ones)
+    found = batch(assets, a=0, b=2, poses=OnDevice(poses.copy()))
     expected = ask(assets, whole)
     assert expected.volume.numpy().max() > 0
     assert np.array_equal(found.volume.numpy(), expected.volume.numpy())
-    few = ist.gpu.penetration(assets, 0, 2, None, OnDevice(poses.copy()), wanted=["node_visits"])
+    few = batch(assets, a=0, b=2, poses=OnDevice(poses.copy()), wanted=["node_visits"])
     assert few.volume is None and few.node_visits.numpy().max() > 0
-    empty = ist.gpu.penetration(assets, 0, 2, None, OnDevice(np.zeros((0, 7))))
+    empty = batch(assets, a=0, b=2, poses=OnDevice(np.zeros((0, 7))))
     assert empty.volume.shape == (0,) and empty.centroid.numpy().shape == (0, 3)
     for wrong, error, text in [
-            (dict(solid_b=3), ValueError, "solid_b: 3; there are 3 solids"),
-            (dict(solid_a=-1), ValueError, "solid_a: -1; there are 3 solids"),
-            (dict(pose_b=None), ValueError, "one argument must have rows"),
-            (dict(scale_b=OnDevice(np.ones(3))), ValueError,
-             "scale_b: 3 rows; the arguments before it have 40"),
-            (dict(solid_a=OnDevice(np.zeros(40, np.int64))), TypeError,
-             "solid_a: dtype int64; wanted uint32 or int32"),
-            (dict(wanted=["force"]), ValueError, "wanted: 'force'; there are 'volume'"),
+            (dict(poses=None), TypeError, "poses: a NoneType is not a device array"),
+            (dict(scales=OnDevice(np.ones(3))), ValueError,
+             "scales: 3 rows; the arguments before it have 40"),
+            (dict(a=OnDevice(np.zeros(40, np.int64))), TypeError,
+             "a: dtype int64; wanted uint32 or int32"),
+            (dict(wanted=["pose_gradient"]), ValueError, "wanted: 'pose_gradient'; there are 'volume'"),
             (dict(wanted="volume"), TypeError, "wanted: a str; must be a sequence"),
-            (dict(measure="outer"), ValueError, "measure: 'outer'"),
-            (dict(measure="exact"), ValueError, "measure: 'exact'; one of 'matched', 'inner'"),
-            (dict(solids=solids), TypeError, "solids: a list; wanted ist.gpu.Solids")]:
-        given = dict(solids=assets, solid_a=0, solid_b=2, pose_a=None, pose_b=OnDevice(poses.copy()))
+            (dict(measure="outer"), ValueError, "measure: 'outer'")]:
+        given = dict(a=0, b=2, poses=OnDevice(poses.copy()))
         with pytest.raises(error, match=text):
-            ist.gpu.penetration(**{**given, **wrong})
+            batch(assets, **{**given, **wrong})
     del assets, given
     assert not lent  # what was refused is given back too
 
@@ -340,20 +293,20 @@ def kept(array):
 
 
 def test_what_is_given_is_written(solids, arguments):
-    assets = ist.gpu.Solids(solids)
+    assets = ist.Solids(solids, device="cuda")
     expected = ask(assets, arguments).volume.numpy()
     out = dict(volume=kept(np.zeros(40)), status=kept(np.full(40, 9, np.int32)))
     found = ask(assets, arguments, out=out)
     assert found.volume is out["volume"] and found.status is out["status"] and found.centroid is None
     ours = ask(assets, arguments)  # behind it
-    again = ask(assets, {**arguments, "pose_b": arguments["pose_b"][::-1]}, out=ours)
+    again = ask(assets, {**arguments, "poses": arguments["poses"][::-1]}, out=ours)
     assert again.volume is ours.volume and again.status is ours.status
     assert np.array_equal(ours.volume.numpy(), again.volume.numpy())
     assert np.array_equal(out["volume"].array, expected) and (out["status"].array == 0).all()
     assert not np.array_equal(ours.volume.numpy(), expected)
     for wrong, error, text in [
             ([1], TypeError, "out: wanted a dict of arrays"),
-            (dict(force=1), ValueError, "out: 'force'; there are"),
+            (dict(volumes=1), ValueError, "out: 'volumes'; there are"),
             (dict(volume=kept(np.zeros(3))), ValueError, r"out\['volume'\]: 3 rows; the batch has 40"),
             (dict(volume=kept(np.zeros(40, np.float32))), TypeError, r"out\['volume'\]: dtype float32"),
             (dict(status=kept(np.zeros(40))), TypeError, r"out\['status'\]: dtype float64; wanted uint32"),
@@ -365,7 +318,7 @@ def test_what_is_given_is_written(solids, arguments):
 
 
 def test_answers_outlive_what_they_came_from(solids, arguments):
-    assets = ist.gpu.Solids(solids)
+    assets = ist.Solids(solids, device="cuda")
     expected = ask(assets, arguments).volume.numpy()
     volume, status = (lambda found: (found.volume, found.status))(ask(assets, arguments))
     gc.collect()
@@ -382,7 +335,7 @@ set_name.argtypes = [ctypes.py_object, ctypes.c_char_p]
 
 
 def test_capsules_hold_what_they_show(solids, arguments):
-    assets = ist.gpu.Solids(solids)
+    assets = ist.Solids(solids, device="cuda")
     expected = ask(assets, arguments).centroid.numpy()
     for version, name, layout in ((None, b"dltensor", Managed),
                                   ((1, 1), b"dltensor_versioned", Versioned)):
@@ -422,7 +375,7 @@ def test_capsules_hold_what_they_show(solids, arguments):
 
 def test_a_captured_stream_needs_memory_for_answers(solids, arguments):
     captured = 77  # emulated_device.cpp
-    assets = ist.gpu.Solids(solids)
+    assets = ist.Solids(solids, device="cuda")
     out = dict(volume=kept(np.zeros(40)))
     with pytest.raises(ist.Error, match="no batch this large ran before"):
         ask(assets, arguments, out=out, stream=captured)
@@ -430,13 +383,13 @@ def test_a_captured_stream_needs_memory_for_answers(solids, arguments):
     with pytest.raises(ValueError, match="out: None; wanted arrays for the answers, because the stream"):
         ask(assets, arguments, stream=captured)
     inputs = {n: kept(x) for n, x in arguments.items()}
-    ist.gpu.penetration(assets, **inputs, out=out, stream=captured)
+    batch(assets, **inputs, out=out, stream=captured)
     assert len(lent) <= 6  # a graph's memory is its maker's to keep
     many = {n: np.concatenate([x] * 120) for n, x in arguments.items()}
-    many["pose_b"][:, 4:] = 1e6
+    many["poses"][:, 4:] = 1e6
     ask(assets, many, out=dict(volume=kept(np.ones(4800))))
     # The graph goes on in its own room, which is not freed: who waits for its stream does its work.
-    poses = arguments["pose_b"].copy()
+    poses = arguments["poses"].copy()
     waits = Interface(shape=(40, 7), data=(poses.ctypes.data, False), stream=captured)
-    ist.gpu.penetration(assets, 0, 1, None, waits).volume.numpy()
+    batch(assets, a=0, b=1, poses=waits).volume.numpy()
     assert np.array_equal(out["volume"].array, expected)

@@ -24,29 +24,52 @@ def lent(tensor):
     return array
 
 
+class Index:
+    """Of rows, where it is a device's."""
+
+    def __init__(self, tensor):
+        self.tensor = tensor
+
+    def reshape(self, count):
+        return lent(self.tensor.reshape(count))
+
+
 @pytest.fixture
-def overlap(monkeypatch):
-    """ist.torch.overlap that takes tensors of the CPU for a GPU's."""
-    batch, there = ist.gpu.penetration, ist.gpu.Solids
+def there(monkeypatch):
+    """there(ist.torch.overlap) → the same, which takes tensors of the CPU for a GPU's."""
+    scene, ask, spread = ist.torch.Scene, ist.torch._ask_gpu, ist.torch._ARRAY.spread
 
-    def penetration(solids, *arguments, out, **settings):
-        found = batch(solids, *map(lent, arguments), **settings,
-                      out={name: lent(tensor) for name, tensor in out.items()})
-        # PyTorch would go on behind the batch; here somebody is to wait for it.
-        batch(solids, 0, 0, None, OnDevice(np.zeros((1, 7)))).status.numpy()
-        return found
+    def of(function):
+        def asked(*arguments, **settings):
+            held = []
 
-    def asked(*arguments, **settings):
-        with monkeypatch.context() as patch:
-            patch.setattr(ist.gpu, "penetration", penetration)
-            patch.setattr(ist.gpu, "Solids", lambda solids, device: there(solids))
-            patch.setattr(torch.cuda, "current_stream", lambda device: Stream())
-            patch.setattr(ist.torch, "_ask_cpu", ist.torch._ask_gpu)
-            return ist.torch.overlap(*arguments, **settings)
+            def on_device(solids, pairs, _):
+                held.append(scene(solids, pairs, solids.device if isinstance(solids, ist.Solids) else "cuda"))
+                return held[-1]
 
-    ist.torch._scene.cache_clear()
-    yield asked
-    ist.torch._scene.cache_clear()
+            def ask_device(query, names, a, b, poses, **arguments):
+                def batch(a, b, poses, *, out, poses_a, scales, scales_a, stream, **settings):
+                    query(a, b, lent(poses), poses_a=lent(poses_a), scales=lent(scales),
+                          scales_a=lent(scales_a), stream=stream, **settings,
+                          out={name: lent(tensor) for name, tensor in out.items()})
+                    # PyTorch would go on behind the batch; here somebody is to wait for it.
+                    solids = held[-1].solids
+                    query(solids[0], solids[0], OnDevice(np.zeros((1, 7))), **settings).status.numpy()
+                return ask(batch, names, a, b, poses, **arguments)
+
+            with monkeypatch.context() as patch:
+                patch.setattr(ist.torch, "Scene", on_device)
+                patch.setattr(ist.torch._ARRAY, "ask", ask_device)
+                patch.setattr(ist.torch._ARRAY, "spread", lambda *rows: Index(spread(*rows)))
+                patch.setattr(torch.cuda, "current_stream", lambda device: Stream())
+                return function(*arguments, **settings)
+        return asked
+    return of
+
+
+@pytest.fixture
+def overlap(there):
+    return there(ist.torch.overlap)
 
 
 def gradients(overlap, solids, poses, scales, **settings):
@@ -72,7 +95,7 @@ def test_overlaps_are_those_of_the_cpu(overlap, solids, random_poses, pairs, sca
     scales = torch.linspace(0.7, 1.3, 24, dtype=torch.float64).reshape(4, 6) if scaled else None
     for p, s in ((poses, scales), (poses[0], scales[0] if scaled else None)):
         theirs = gradients(ist.torch.overlap, solids, p, s, pairs=pairs, field="never")
-        ours = gradients(overlap, solids, p, s, pairs=pairs)
+        ours = gradients(overlap, solids, p, s, pairs=pairs, field="never")
         assert pairs == [] or p.ndim == 2 or theirs[0].nan_to_num().abs().max() > 0.01
         for k, (one, other) in enumerate(zip(ours, theirs)):
             assert one.shape == other.shape and (one.isnan() == other.isnan()).all()
@@ -88,15 +111,40 @@ def test_wrong_scenes_are_named(overlap, solids, random_poses):
             (dict(pairs=[(1, 3)]), ValueError, r"pairs\[0\]: \(1, 3\): two Fields; one of them must"),
             (dict(pairs=[(0, 6)]), ValueError, r"pairs\[0\]: \(0, 6\): solids are numbered 0 to 5"),
             (dict(pairs=[(2, 2)]), ValueError, "a solid cannot be paired with itself"),
-            (dict(field="always"), ValueError, "field: on a GPU"),
-            (dict(max_visits=1), TypeError, "max_visits: there is no such setting on a GPU"),
+            (dict(field="always"), ValueError, "field: 'always'; on a GPU"),
+            (dict(max_visits=1), ValueError, "max_visits: not on a GPU"),
             (dict(poses=poses[:5]), ValueError, r"poses: shape \(5, 7\); wanted \(6, 7\)"),
             (dict(scales=torch.ones(3)), ValueError, r"scales: shape \(3,\); wanted \(6,\)"),
             (dict(solids=[*solids[:5], 3]), TypeError, r"solids\[5\]: a int; wanted an Asset or a")]:
         with pytest.raises(error, match=text):
-            overlap(**{**dict(solids=solids, poses=poses, pairs=[(0, 2)]), **wrong})
+            overlap(**{**dict(solids=solids, poses=poses, pairs=[(0, 2)], field="never"), **wrong})
 
 
 def test_a_budget_is_passed_on(overlap, solids, random_poses):
     poses = torch.from_numpy(random_poses(6, 0.8))
-    assert not torch.equal(overlap(solids, poses, pair_budget=60), overlap(solids, poses))
+    assert not torch.equal(overlap(solids, poses, pair_budget=60, field="never"),
+                           overlap(solids, poses, field="never"))
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_distances_are_those_of_the_cpu(there, gear, knot, cube, random_poses, held):
+    solids = [gear, knot, cube, gear]
+    poses = torch.from_numpy(random_poses(16, 6.0).reshape(4, 4, 7))
+    poses[1, 2, 5] = torch.nan
+    scales = torch.linspace(0.7, 1.3, 16, dtype=torch.float64).reshape(4, 4)
+    for s in (None, scales):
+        theirs = gradients(ist.torch.separation, solids, poses, s, inner_spheres=True)
+        ours = gradients(there(ist.torch.separation),
+                         ist.Solids(solids, device="cuda") if held else solids, poses, s, inner_spheres=True)
+        assert (theirs[0] > 0).sum() > 12
+        for one, other in zip(ours, theirs):
+            assert (one.isnan() == other.isnan()).all()
+            assert (one - other).nan_to_num().abs().max() <= 1e-4 * other.nan_to_num().abs().max()
+
+
+def test_solids_are_where_the_poses_are(gear, knot, random_poses):
+    poses = torch.from_numpy(random_poses(2, 1.0))
+    with pytest.raises(TypeError, match="solids: on cuda:0; wanted them on cpu, as poses are"):
+        ist.torch.overlap(ist.Solids([gear, knot], device="cuda"), poses)
+    held = ist.Solids([gear, knot])
+    assert ist.torch.overlap(held, poses).item() == ist.torch.overlap([gear, knot], poses).item()

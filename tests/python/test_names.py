@@ -65,7 +65,7 @@ def test_everything_is_documented():
         if inspect.isclass(value) or inspect.ismodule(value) or callable(value):
             assert value.__doc__ and len(value.__doc__) > 10, value
     for cls in (ist.Penetration, ist.Separation, ist.ContactPatches, ist.TimeOfImpact, ist.gpu.Array,
-                ist.gpu.Solids, ist.gpu.ContactPatches, ist.gpu.Penetration, ist.gpu.Separation):
+                ist.Solids, ist.gpu.ContactPatches, ist.gpu.Penetration, ist.gpu.Separation):
         for member, value in vars(cls).items():
             if not member.startswith("_"):
                 assert value.__doc__, (cls, member)

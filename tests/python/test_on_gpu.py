@@ -1,4 +1,4 @@
-"""ist.gpu on a card, with the arrays of PyTorch, CuPy and JAX."""
+"""Queries of solids on a card, with the arrays of PyTorch, CuPy and JAX."""
 import functools
 import gc
 import os
@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 import ist
+from test_rows import ask
 
 pytestmark = pytest.mark.skipif(not ist.gpu.available(), reason=f"{ist.gpu.why_not()}")
 
 if ist.gpu.available():
     torch = pytest.importorskip("torch", reason="no PyTorch")
 
-COLUMNS = ["volume", "centroid", "translation_gradient", "rotation_gradient"]
+COLUMNS = ["volume", "centroid", "force", "torque"]
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,7 @@ def solids(gear, knot, cube):
 
 @pytest.fixture(scope="module")
 def assets(solids):
-    return ist.gpu.Solids(solids)
+    return ist.Solids(solids, device="cuda")
 
 
 @pytest.fixture
@@ -38,10 +39,10 @@ def pairs(random_poses):
     def draw(count, reach):
         random = np.random.default_rng(count)
         return dict(
-            solid_a=random.integers(0, 3, count).astype(np.uint32),
-            solid_b=random.integers(0, 3, count).astype(np.uint32),
-            pose_a=random_poses(count, reach), pose_b=random_poses(count, reach)[::-1].copy(),
-            scale_a=random.uniform(0.5, 2, count), scale_b=random.uniform(0.5, 2, count))
+            a=random.integers(0, 3, count).astype(np.uint32),
+            b=random.integers(0, 3, count).astype(np.uint32),
+            poses_a=random_poses(count, reach), poses=random_poses(count, reach)[::-1].copy(),
+            scales_a=random.uniform(0.5, 2, count), scales=random.uniform(0.5, 2, count))
 
     def make(count, reach=1.5):
         return {name: column.copy() for name, column in draw(count, reach).items()}
@@ -57,24 +58,23 @@ def on_card(arguments):
 
 def kinds(arguments):
     """(a, b, rows) of all pairs of the same solids."""
-    for a, b in np.unique(np.stack((arguments["solid_a"], arguments["solid_b"])), axis=1).T:
-        yield a, b, (arguments["solid_a"] == a) & (arguments["solid_b"] == b)
+    for a, b in np.unique(np.stack((arguments["a"], arguments["b"])), axis=1).T:
+        yield a, b, (arguments["a"] == a) & (arguments["b"] == b)
 
 
 def on_cpu(solids, arguments, first=None, **settings):
-    """What ist.penetration says, and force and torque with the signs of gradients; solid_a are
-    places in `first`."""
-    rows = len(arguments["pose_b"])
+    """What ist.penetration says of each kind of pair; `a` are places in `first`."""
+    rows = len(arguments["poses"])
     answers = dict(volume=np.zeros(rows), centroid=np.zeros((rows, 3)),
-                   translation_gradient=np.zeros((rows, 3)), rotation_gradient=np.zeros((rows, 3)),
+                   force=np.zeros((rows, 3)), torque=np.zeros((rows, 3)),
                    status=np.zeros(rows, np.uint32))
     for a, b, rows in kinds(arguments):
         found = ist.penetration(
-            (first or solids)[a], solids[b], arguments["pose_b"][rows],
-            poses_a=arguments["pose_a"][rows], scales=arguments["scale_b"][rows],
-            scales_a=arguments["scale_a"][rows], field="never", **settings)
+            (first or solids)[a], solids[b], arguments["poses"][rows],
+            poses_a=arguments["poses_a"][rows], scales=arguments["scales"][rows],
+            scales_a=arguments["scales_a"][rows], field="never", **settings)
         for name, column in zip([*COLUMNS, "status"], [
-                found.volume, found.centroid, -found.force, -found.torque, found.status]):
+                found.volume, found.centroid, found.force, found.torque, found.status]):
             answers[name][rows] = column
     return answers
 
@@ -92,7 +92,7 @@ def expect_close(ours, theirs):
     assert ((ours["volume"] > 0) == (volume > 0)).all()
     assert (np.abs(ours["volume"] - volume) <= 1e-5 * volume).all()
     size = volume ** (1 / 3)
-    for name, power in (("translation_gradient", 2), ("rotation_gradient", 3)):
+    for name, power in (("force", 2), ("torque", 3)):
         largest = np.abs(theirs[name]).max(axis=1)
         error = np.abs(ours[name] - theirs[name]).max(axis=1)
         assert (error <= 1e-4 * (largest + size**power)).all(), name
@@ -112,18 +112,18 @@ def expect_same_bits(one, other):
 @pytest.mark.parametrize("measure", ["matched", "inner"])
 def test_answers_are_those_of_the_cpu(solids, assets, pairs, measure):
     arguments = pairs(20_000)
-    arguments["pose_b"][10, 3] = np.nan
-    arguments["scale_a"][20] = -1
-    arguments["pose_a"][30, :4] = 0
-    found = ist.gpu.penetration(assets, **on_card(arguments), measure=measure)
+    arguments["poses"][10, 3] = np.nan
+    arguments["scales_a"][20] = -1
+    arguments["poses_a"][30, :4] = 0
+    found = ask(assets, **on_card(arguments), measure=measure)
     ours, theirs = host(found), on_cpu(solids, arguments, measure=measure)
     assert (theirs["volume"] > 0).sum() > 5000
     assert (theirs["status"] == ist.QueryStatus.invalid_input).nonzero()[0].tolist() == [10, 20, 30]
     expect_close(ours, theirs)
     assert found.node_visits is None and found.sphere_pairs is None
-    arguments["solid_a"][40] = 3
-    arguments["solid_b"][50] = 2**32 - 1
-    again = host(ist.gpu.penetration(assets, **on_card(arguments), measure=measure))
+    arguments["a"][40] = 3
+    arguments["b"][50] = 2**32 - 1
+    again = host(ask(assets, **on_card(arguments), measure=measure))
     assert again["status"][[40, 50]].tolist() == [2, 2]
     kept = np.ones(len(ours["volume"]), bool)
     kept[[40, 50]] = False
@@ -132,8 +132,8 @@ def test_answers_are_those_of_the_cpu(solids, assets, pairs, measure):
 
 def test_budgets_are_those_of_the_cpu(solids, assets, pairs):
     arguments = pairs(2000)
-    whole = host(ist.gpu.penetration(assets, **on_card(arguments)))
-    ours = host(ist.gpu.penetration(assets, **on_card(arguments), pair_budget=100))
+    whole = host(ask(assets, **on_card(arguments)))
+    ours = host(ask(assets, **on_card(arguments), pair_budget=100))
     expect_close(ours, on_cpu(solids, arguments, pair_budget=100))
     assert not np.array_equal(ours["volume"], whole["volume"])
 
@@ -143,30 +143,30 @@ def test_fields_are_those_of_the_cpu(solids, pairs, knot):
     fields = [ist.HalfSpaceField(), ist.BoxField([1, 2, 0.5]), ist.BallField(1),
               ist.CapsuleField(0.5, 0.3), ist.HeightField(heights, lowest=-0.5, highest=0.5),
               ist.MeshField(knot)]
-    there = ist.gpu.Solids([*fields, *solids])
+    there = ist.Solids([*fields, *solids], device="cuda")
     arguments = pairs(3000)
-    arguments["solid_a"] = np.random.default_rng(4).integers(0, 6, 3000).astype(np.uint32)
-    arguments["pose_b"][10, 3] = np.nan
-    numbers = arguments | dict(solid_b=(arguments["solid_b"] + 6).astype(arguments["solid_b"].dtype))
-    ours = host(ist.gpu.penetration(there, **on_card(numbers)))
+    arguments["a"] = np.random.default_rng(4).integers(0, 6, 3000).astype(np.uint32)
+    arguments["poses"][10, 3] = np.nan
+    numbers = arguments | dict(b=(arguments["b"] + 6).astype(arguments["b"].dtype))
+    ours = host(ask(there, **on_card(numbers)))
     theirs = on_cpu(solids, arguments, first=fields)
     assert (theirs["volume"] > 0).sum() > 1000 and theirs["status"][10] == 2
     assert (ours["status"] == theirs["status"]).all() and np.isnan(ours["volume"][10])
-    for name, part in (("volume", 1e-9), ("translation_gradient", 1e-6), ("rotation_gradient", 1e-6)):
+    for name, part in (("volume", 1e-9), ("force", 1e-6), ("torque", 1e-6)):
         error, size = np.abs(ours[name] - theirs[name]), np.abs(theirs[name])
         assert np.nanmax(error) <= part * np.nanmax(size), name
 
 
 def test_separations_are_those_of_the_cpu(solids, assets, pairs):
     arguments = pairs(3000, reach=4)
-    arguments["pose_b"][10, 3] = np.nan
-    found = ist.gpu.separation(assets, **on_card(arguments))
+    arguments["poses"][10, 3] = np.nan
+    found = ask(assets, query=ist.separation, **on_card(arguments))
     names = ("distance", "distance_min", "distance_max")
     ours, theirs = host(found, (*names, "status")), {n: np.zeros(3000) for n in (*names, "status")}
     for a, b, rows in kinds(arguments):
         answer = ist.separation(
-            solids[a], solids[b], arguments["pose_b"][rows], poses_a=arguments["pose_a"][rows],
-            scales=arguments["scale_b"][rows], scales_a=arguments["scale_a"][rows],
+            solids[a], solids[b], arguments["poses"][rows], poses_a=arguments["poses_a"][rows],
+            scales=arguments["scales"][rows], scales_a=arguments["scales_a"][rows],
             inner_spheres=True)
         for name in theirs:
             theirs[name][rows] = getattr(answer, name)
@@ -181,15 +181,15 @@ def test_separations_are_those_of_the_cpu(solids, assets, pairs):
 
 def test_patches_are_those_of_the_cpu(solids, assets, pairs):
     arguments = pairs(2000)
-    arguments["pose_b"][10, 3] = np.nan
+    arguments["poses"][10, 3] = np.nan
     names = ("count", "id", "volume", "force", "centroid", "status")
-    ours = host(ist.gpu.contact_patches(assets, **on_card(arguments), max_patches=4), names)
+    ours = host(ask(assets, query=ist.contact_patches, **on_card(arguments), max_patches=4), names)
     assert ours["status"][10] == 2 and ours["count"][10] == 0
     other_regions = 0
     for a, b, rows in kinds(arguments):
         theirs = ist.contact_patches(
-            solids[a], solids[b], arguments["pose_b"][rows], poses_a=arguments["pose_a"][rows],
-            scales=arguments["scale_b"][rows], scales_a=arguments["scale_a"][rows], max_patches=4,
+            solids[a], solids[b], arguments["poses"][rows], poses_a=arguments["poses_a"][rows],
+            scales=arguments["scales"][rows], scales_a=arguments["scales_a"][rows], max_patches=4,
             field="never")
         # Unless two divisions are worth the same: then a cell is in another patch.
         alike = (ours["id"][rows] == theirs.id).all(1)
@@ -200,41 +200,41 @@ def test_patches_are_those_of_the_cpu(solids, assets, pairs):
             error = np.abs(ours[name][rows][alike] - column).max(initial=0)
             assert error <= 1e-4 * np.abs(column).max(initial=1), name
     assert other_regions <= 4
-    whole = host(ist.gpu.penetration(assets, **on_card(arguments)))
+    whole = host(ask(assets, **on_card(arguments)))
     error = np.abs(ours["volume"].sum(1) - whole["volume"])
     assert np.nanmax(error) <= 1e-5 * np.nanmax(whole["volume"])
 
 
 def test_arguments_may_be_left_out(assets, pairs):
     arguments = on_card(pairs(500))
-    for name in ("solid_a", "solid_b"):
+    for name in ("a", "b"):
         arguments[name].fill_(1)
-    for name in ("scale_a", "scale_b"):
+    for name in ("scales_a", "scales"):
         arguments[name].fill_(1)
-    arguments["pose_a"].copy_(torch.tensor([1.0, 0, 0, 0, 0, 0, 0]))
-    whole = host(ist.gpu.penetration(assets, **arguments))
-    expect_same_bits(host(ist.gpu.penetration(assets, 1, 1, None, arguments["pose_b"])), whole)
-    few = ist.gpu.penetration(assets, 1, 1, None, arguments["pose_b"],
+    arguments["poses_a"].copy_(torch.tensor([1.0, 0, 0, 0, 0, 0, 0]))
+    whole = host(ask(assets, **arguments))
+    expect_same_bits(host(ask(assets, a=1, b=1, poses=arguments["poses"])), whole)
+    few = ask(assets, a=1, b=1, poses=arguments["poses"],
                               wanted=["status", "node_visits", "sphere_pairs"])
     assert few.volume is None and few.status.dtype == np.uint32
     assert few.node_visits.numpy().max() > 0 and few.sphere_pairs.numpy().max() > 0
-    with pytest.raises(ValueError, match="solid_b: 3; there are 3 solids"):
-        ist.gpu.penetration(assets, 0, 3, None, arguments["pose_b"])
-    with pytest.raises(ValueError, match="one argument must have rows"):
-        ist.gpu.penetration(assets, 0, 1, None, None)
-    with pytest.raises(ValueError, match="wanted: 'force'; there are 'volume'"):
-        ist.gpu.penetration(assets, 0, 1, None, arguments["pose_b"], wanted=["force"])
+    with pytest.raises(IndexError, match="there are 3 solids"):
+        ask(assets, a=0, b=3, poses=arguments["poses"])
+    with pytest.raises(TypeError, match="poses: a NoneType is not a device array"):
+        ask(assets, a=0, b=1, poses=None)
+    with pytest.raises(ValueError, match="wanted: 'pose_gradient'; there are 'volume'"):
+        ask(assets, a=0, b=1, poses=arguments["poses"], wanted=["pose_gradient"])
     with pytest.raises(ValueError, match="measure: 'outer'"):
-        ist.gpu.penetration(assets, 0, 1, None, arguments["pose_b"], measure="outer")
+        ask(assets, a=0, b=1, poses=arguments["poses"], measure="outer")
 
 
 @pytest.mark.parametrize("count", [0, 1, 10_000_000])
 def test_batches_of_any_size(assets, pairs, count):
     few = on_card(pairs(min(count, 1000)))
-    found = ist.gpu.penetration(assets, **few)
+    found = ask(assets, **few)
     if count > 1000:
         # Up to 16,384 pairs are cut up otherwise than more: their answers differ by rounding.
-        some, all_of_them = (host(ist.gpu.penetration(assets, **{
+        some, all_of_them = (host(ask(assets, **{
             n: x.repeat(size // 1000, *[1] * (x.ndim - 1)) for n, x in few.items()}))
             for size in (20_000, count))
         expect_same_bits({n: x[-1000:] for n, x in all_of_them.items()},
@@ -246,8 +246,8 @@ def test_batches_of_any_size(assets, pairs, count):
 
 def test_frameworks_take_and_give_the_same_memory(assets, pairs):
     arguments = pairs(2000)
-    expected = host(ist.gpu.penetration(assets, **on_card(arguments)))
-    found = ist.gpu.penetration(assets, **on_card(arguments))
+    expected = host(ask(assets, **on_card(arguments)))
+    found = ask(assets, **on_card(arguments))
     address = found.volume.__cuda_array_interface__["data"][0]
     assert found.volume.__dlpack_device__() == (2, 0) and found.volume.device == 0
     tensor = torch.from_dlpack(found.volume)
@@ -267,12 +267,12 @@ def test_frameworks_take_and_give_the_same_memory(assets, pairs):
 def test_cupy_takes_and_gives(assets, pairs):
     cupy = pytest.importorskip("cupy", reason="no CuPy")
     arguments = pairs(2000)
-    expected = host(ist.gpu.penetration(assets, **on_card(arguments)))
+    expected = host(ask(assets, **on_card(arguments)))
     arrays = {name: cupy.asarray(x) for name, x in arguments.items()}
     stream = cupy.cuda.Stream(non_blocking=True)
     cupy.cuda.get_current_stream().synchronize()
     for how in (None, stream, stream.ptr):
-        found = ist.gpu.penetration(assets, **arrays, stream=how)
+        found = ask(assets, **arrays, stream=how)
         by_dlpack, by_interface = cupy.from_dlpack(found.volume), cupy.asarray(found.volume)
         assert by_dlpack.data.ptr == by_interface.data.ptr
         assert np.array_equal(cupy.asnumpy(by_dlpack), expected["volume"])
@@ -283,10 +283,10 @@ def test_cupy_takes_and_gives(assets, pairs):
             self.array = array
             self.__cuda_array_interface__ = array.__cuda_array_interface__
 
-    found = ist.gpu.penetration(assets, **{n: Interface(x) for n, x in arrays.items()})
+    found = ask(assets, **{n: Interface(x) for n, x in arrays.items()})
     expect_same_bits(host(found), expected)
     out = dict(volume=cupy.empty(2000), status=cupy.empty(2000, cupy.uint32))
-    given = ist.gpu.penetration(assets, **arrays, out=out)
+    given = ask(assets, **arrays, out=out)
     assert given.volume is out["volume"] and np.array_equal(out["volume"].get(), expected["volume"])
 
 
@@ -296,9 +296,9 @@ def test_jax_takes_and_gives(assets, pairs):
     if jax.default_backend() != "gpu":
         pytest.skip("JAX without a GPU")
     arguments = pairs(2000)
-    expected = host(ist.gpu.penetration(assets, **on_card(arguments)))
+    expected = host(ask(assets, **on_card(arguments)))
     arrays = {name: jax.numpy.asarray(x) for name, x in arguments.items()}
-    found = ist.gpu.penetration(assets, **arrays)
+    found = ask(assets, **arrays)
     del arrays
     volume = jax.dlpack.from_dlpack(found.volume)
     del found
@@ -310,20 +310,19 @@ def test_jax_takes_and_gives(assets, pairs):
 def test_arguments_that_do_not_fit_are_named(assets, pairs):
     arguments = on_card(pairs(8))
     cases = [
-        (dict(pose_b=arguments["pose_b"].float()), TypeError, "pose_b: dtype float32; wanted float64"),
-        (dict(pose_a=arguments["pose_a"].cpu()), TypeError, "pose_a: on the CPU; wanted float64"),
-        (dict(pose_a=arguments["pose_a"].cpu().pin_memory()), TypeError, "pose_a: on the CPU"),
-        (dict(pose_b=arguments["pose_b"][:, :6]), ValueError, r"pose_b: shape \(8, 6\); wanted"),
-        (dict(pose_b=arguments["pose_b"].T.contiguous().T), ValueError, "pose_b: not in C order"),
-        (dict(scale_b=arguments["scale_b"][::2]), ValueError, "scale_b: not in C order"),
-        (dict(scale_b=arguments["scale_b"][:5]), ValueError, "scale_b: 5 rows; the arguments before"),
-        (dict(solid_a=arguments["solid_a"].long()), TypeError,
-         "solid_a: dtype int64; wanted uint32 or int32"),
-        (dict(scale_a=2.0), TypeError, "scale_a: a float is not a device array"),
-        (dict(pose_b=arguments["pose_b"].clone().requires_grad_()), TypeError, "pose_b: .*grad"),
+        (dict(poses=arguments["poses"].float()), TypeError, "poses: dtype float32; wanted float64"),
+        (dict(poses_a=arguments["poses_a"].cpu()), TypeError, "poses_a: on the CPU; wanted float64"),
+        (dict(poses_a=arguments["poses_a"].cpu().pin_memory()), TypeError, "poses_a: on the CPU"),
+        (dict(poses=arguments["poses"][:, :6]), ValueError, r"poses: shape \(8, 6\); wanted"),
+        (dict(poses=arguments["poses"].T.contiguous().T), ValueError, "poses: not in C order"),
+        (dict(scales=arguments["scales"][::2]), ValueError, "scales: not in C order"),
+        (dict(scales=arguments["scales"][:5]), ValueError, "scales: 5 rows; the arguments before"),
+        (dict(a=arguments["a"].long()), TypeError, "a: dtype int64; wanted uint32 or int32"),
+        (dict(scales_a=2.0), TypeError, "scales_a: a float is not a device array"),
+        (dict(poses=arguments["poses"].clone().requires_grad_()), TypeError, "poses: .*grad"),
         (dict(stream="mine"), TypeError, "stream: a str is not a stream"),
         (dict(out=[1]), TypeError, "out: wanted a dict of arrays"),
-        (dict(out=dict(force=1)), ValueError, "out: 'force'; there are"),
+        (dict(out=dict(volumes=1)), ValueError, "out: 'volumes'; there are"),
         (dict(out=dict(volume=torch.empty(7).cuda().double())), ValueError, "out.'volume'.: 7 rows"),
         (dict(out=dict(volume=torch.empty(8).cuda())), TypeError, "out.'volume'.: dtype float32"),
         (dict(out=dict(), wanted=["volume"]), ValueError, "wanted: excludes `out`"),
@@ -331,21 +330,21 @@ def test_arguments_that_do_not_fit_are_named(assets, pairs):
     for wrong, error, text in cases:
         fitting = {n: x.detach() if hasattr(x, "detach") else x for n, x in arguments.items()}
         with pytest.raises(error, match=text):
-            ist.gpu.penetration(assets, **{**fitting, **wrong})
+            ask(assets, **{**fitting, **wrong})
 
 
 def test_what_is_given_is_written(assets, pairs):
     arguments = on_card(pairs(1000))
-    expected = host(ist.gpu.penetration(assets, **arguments))
+    expected = host(ask(assets, **arguments))
     out = dict(volume=torch.empty(1000, dtype=torch.float64, device="cuda"),
                status=torch.empty(1000, dtype=torch.int32, device="cuda"))
-    found = ist.gpu.penetration(assets, **arguments, out=out)
+    found = ask(assets, **arguments, out=out)
     assert found.volume is out["volume"] and found.status is out["status"] and found.centroid is None
     assert np.array_equal(found.volume.cpu().numpy(), expected["volume"])
-    ours = ist.gpu.penetration(assets, **arguments)
-    arguments["pose_b"] = arguments["pose_b"].flip(0)
-    other = host(ist.gpu.penetration(assets, **arguments))
-    again = ist.gpu.penetration(assets, **arguments, out=ours)
+    ours = ask(assets, **arguments)
+    arguments["poses"] = arguments["poses"].flip(0)
+    other = host(ask(assets, **arguments))
+    again = ask(assets, **arguments, out=ours)
     assert again.volume is ours.volume
     expect_same_bits(host(again), other)
     torch.cuda.synchronize()
@@ -356,14 +355,14 @@ CYCLES = 1_000_000_000  # a good part of a second
 
 def test_nothing_waits_on_the_host(assets, pairs):
     arguments = on_card(pairs(1000))
-    host(ist.gpu.penetration(assets, **arguments))
+    host(ask(assets, **arguments))
     for stream in (torch.cuda.current_stream(), torch.cuda.Stream()):
         torch.cuda.synchronize()
         with torch.cuda.stream(stream):
             torch.cuda._sleep(CYCLES)
             start = time.perf_counter()
             for _ in range(5):
-                found = ist.gpu.penetration(assets, **arguments, stream=stream)
+                found = ask(assets, **arguments, stream=stream)
                 tensor = torch.from_dlpack(found.volume)
                 del found
             took = time.perf_counter() - start
@@ -374,27 +373,27 @@ def test_nothing_waits_on_the_host(assets, pairs):
 
 def test_streams_wait_for_each_other(assets, pairs):
     arguments = on_card(pairs(1000))
-    expected = host(ist.gpu.penetration(assets, **arguments))
+    expected = host(ask(assets, **arguments))
     torch.cuda.synchronize()
     late = torch.cuda.Stream()
     other = torch.cuda.Stream()
     for made_on, asked_on, read_on in (
             (late, None, None), (late, late, None), (late, other, late), (None, late, other)):
-        poses = torch.zeros_like(arguments["pose_b"])
+        poses = torch.zeros_like(arguments["poses"])
         torch.cuda.synchronize()
         with torch.cuda.stream(made_on):
             torch.cuda._sleep(CYCLES // 4)
-            poses.copy_(arguments["pose_b"])
+            poses.copy_(arguments["poses"])
             # PyTorch says on which stream it is written: the current one.
-            found = ist.gpu.penetration(assets, **{**arguments, "pose_b": poses}, stream=asked_on)
+            found = ask(assets, **{**arguments, "poses": poses}, stream=asked_on)
         with torch.cuda.stream(read_on):
             volume = torch.from_dlpack(found.volume) * 1
             assert np.array_equal(volume.cpu().numpy(), expected["volume"])
 
 
 def test_what_a_batch_reads_stays_until_it_is_done(solids, pairs):
-    assets = ist.gpu.Solids(solids)
-    expected = host(ist.gpu.penetration(assets, **on_card(pairs(1000))))
+    assets = ist.Solids(solids, device="cuda")
+    expected = host(ask(assets, **on_card(pairs(1000))))
     side = torch.cuda.Stream()
     for _ in range(3):
         arguments = on_card(pairs(1000))
@@ -402,7 +401,7 @@ def test_what_a_batch_reads_stays_until_it_is_done(solids, pairs):
         side.wait_stream(torch.cuda.current_stream())
         with torch.cuda.stream(side):
             torch.cuda._sleep(CYCLES // 4)
-        found = ist.gpu.penetration(assets, **arguments, stream=side)
+        found = ask(assets, **arguments, stream=side)
         del arguments  # PyTorch may give the memory to others now
         spoiled = [torch.full((1000, 7), 3.0, dtype=torch.float64, device="cuda") for _ in range(20)]
         expect_same_bits(host(found), expected)
@@ -411,24 +410,24 @@ def test_what_a_batch_reads_stays_until_it_is_done(solids, pairs):
     torch.cuda.synchronize()
     with torch.cuda.stream(side):
         torch.cuda._sleep(CYCLES // 4)
-    found = ist.gpu.penetration(assets, **arguments, stream=side)
+    found = ask(assets, **arguments, stream=side)
     del assets, arguments  # waits for the batch
     gc.collect()
-    others = ist.gpu.Solids(solids[::-1])
+    others = ist.Solids(solids[::-1], device="cuda")
     expect_same_bits(host(found), expected)
     del others
 
 
 def test_answers_outlive_what_they_came_from(assets, pairs):
     arguments = on_card(pairs(5000))
-    expected = host(ist.gpu.penetration(assets, **arguments))
-    found = ist.gpu.penetration(assets, **arguments)
+    expected = host(ask(assets, **arguments))
+    found = ask(assets, **arguments)
     volume, interface = torch.from_dlpack(found.volume), torch.as_tensor(found.centroid, device="cuda")
     status = found.status
     del found
     gc.collect()
     for _ in range(20):  # would take the memory if it were free
-        ist.gpu.penetration(assets, 0, 1, None, arguments["pose_b"])
+        ask(assets, a=0, b=1, poses=arguments["poses"])
     assert np.array_equal(volume.cpu().numpy(), expected["volume"])
     assert np.array_equal(interface.cpu().numpy(), expected["centroid"])
     assert np.array_equal(status.numpy(), expected["status"])
@@ -436,11 +435,11 @@ def test_answers_outlive_what_they_came_from(assets, pairs):
 
 def test_a_reader_that_drops_answers_early_is_not_disturbed(assets, pairs):
     arguments = on_card(pairs(5000))
-    expected = host(ist.gpu.penetration(assets, **arguments))["volume"]
+    expected = host(ask(assets, **arguments))["volume"]
     reader = torch.cuda.Stream()
     copies = []
     for _ in range(10):
-        volume = torch.from_dlpack(ist.gpu.penetration(assets, **arguments).volume)
+        volume = torch.from_dlpack(ask(assets, **arguments).volume)
         reader.wait_stream(torch.cuda.current_stream())
         with torch.cuda.stream(reader):
             torch.cuda._sleep(CYCLES // 40)
@@ -454,11 +453,11 @@ def test_a_reader_that_drops_answers_early_is_not_disturbed(assets, pairs):
 def test_memory_is_used_again(assets, pairs):
     arguments = on_card(pairs(100_000))
     for _ in range(5):
-        ist.gpu.penetration(assets, **arguments)
+        ask(assets, **arguments)
     torch.cuda.synchronize()
     before = torch.cuda.mem_get_info()[0]
     for batch in range(300):
-        ist.gpu.penetration(assets, **arguments)
+        ask(assets, **arguments)
         if batch % 20 == 0:
             torch.cuda.synchronize()  # what is not done yet holds memory
     assert before - torch.cuda.mem_get_info()[0] < 600e6  # 300 of them are 2.8 GB
@@ -467,36 +466,36 @@ def test_memory_is_used_again(assets, pairs):
 def test_no_memory_left_is_an_error_with_a_way_out(assets, pairs):
     arguments = on_card(pairs(1000))
     many = {n: x.repeat(4000, *[1] * (x.ndim - 1)) for n, x in arguments.items()}
-    host(ist.gpu.penetration(assets, **arguments))
+    host(ask(assets, **arguments))
     torch.cuda.synchronize()
     free = torch.cuda.mem_get_info()[0]
     filled = torch.empty(free - 150_000_000, dtype=torch.uint8, device="cuda")
     with pytest.raises(ist.Error, match="no device memory left"):
-        held = [ist.gpu.penetration(assets, **many) for _ in range(100)]  # 37 GB
+        held = [ask(assets, **many) for _ in range(100)]  # 37 GB
         pytest.fail(f"{len(held)} batches had room")
     del filled
     torch.cuda.empty_cache()
-    host(ist.gpu.penetration(assets, **arguments))
+    host(ask(assets, **arguments))
 
 
 def test_graphs_capture_batches(assets, pairs):
     arguments = on_card(pairs(3000))
     out = {name: torch.empty((3000, 3) if name != "volume" else 3000, dtype=torch.float64,
                              device="cuda") for name in COLUMNS}
-    expected = host(ist.gpu.penetration(assets, **arguments))
-    flipped = {**arguments, "pose_b": arguments["pose_b"].flip(0)}
-    expected_flipped = host(ist.gpu.penetration(assets, **flipped))
+    expected = host(ask(assets, **arguments))
+    flipped = {**arguments, "poses": arguments["poses"].flip(0)}
+    expected_flipped = host(ask(assets, **flipped))
     torch.cuda.synchronize()
     graph = torch.cuda.CUDAGraph()
     side = torch.cuda.Stream()
     with torch.cuda.graph(graph, stream=side):
-        ist.gpu.penetration(assets, **arguments, out=out, stream=side)
-        ist.gpu.penetration(assets, 0, 1, None, arguments["pose_b"], out=dict(volume=out["volume"]),
+        ask(assets, **arguments, out=out, stream=side)
+        ask(assets, a=0, b=1, poses=arguments["poses"], out=dict(volume=out["volume"]),
                             stream=side)
-        ist.gpu.penetration(assets, **arguments, out=out, stream=side)
-    for rows, answers in ((arguments["pose_b"].clone(), expected),
-                          (flipped["pose_b"], expected_flipped)):
-        arguments["pose_b"].copy_(rows)
+        ask(assets, **arguments, out=out, stream=side)
+    for rows, answers in ((arguments["poses"].clone(), expected),
+                          (flipped["poses"], expected_flipped)):
+        arguments["poses"].copy_(rows)
         graph.replay()
         torch.cuda.synchronize()
         for name in COLUMNS:
@@ -504,9 +503,9 @@ def test_graphs_capture_batches(assets, pairs):
     refused = torch.cuda.CUDAGraph()
     with pytest.raises(ValueError, match="out: None; wanted arrays for the answers, because the stream"):
         with torch.cuda.graph(refused, stream=side):
-            ist.gpu.penetration(assets, **arguments, stream=side)
+            ask(assets, **arguments, stream=side)
     # What was captured goes on after a larger batch.
-    host(ist.gpu.penetration(assets, **{n: x.repeat(2000, *[1] * (x.ndim - 1))
+    host(ask(assets, **{n: x.repeat(2000, *[1] * (x.ndim - 1))
                                         for n, x in arguments.items()}))
     graph.replay()
     torch.cuda.synchronize()
@@ -515,7 +514,7 @@ def test_graphs_capture_batches(assets, pairs):
 
 def test_threads_share_assets(assets, pairs):
     arguments = on_card(pairs(2000))
-    expected = host(ist.gpu.penetration(assets, **arguments))
+    expected = host(ask(assets, **arguments))
     torch.cuda.synchronize()
     failed = []
 
@@ -523,7 +522,7 @@ def test_threads_share_assets(assets, pairs):
         stream = torch.cuda.Stream()
         try:
             for _ in range(20):
-                expect_same_bits(host(ist.gpu.penetration(assets, **arguments, stream=stream)),
+                expect_same_bits(host(ask(assets, **arguments, stream=stream)),
                                  expected)
         except BaseException as error:
             failed.append(error)
@@ -539,26 +538,26 @@ def test_threads_share_assets(assets, pairs):
 def test_another_device(solids, pairs):
     if torch.cuda.device_count() < 2:
         pytest.skip("one card")
-    second = ist.gpu.Solids(solids, device=1)
-    assert second.device == 1
+    second = ist.Solids(solids, device="cuda:1")
+    assert second.device == "cuda:1"
     arguments = on_card(pairs(1000))
-    expected = host(ist.gpu.penetration(ist.gpu.Solids(solids), **arguments))
-    with pytest.raises(TypeError, match="solid_a: on CUDA device 0; wanted .* on CUDA device 1"):
-        ist.gpu.penetration(second, **arguments)
+    expected = host(ask(ist.Solids(solids, device="cuda"), **arguments))
+    with pytest.raises(TypeError, match="poses: on CUDA device 0; wanted .* on CUDA device 1"):
+        ask(second, **arguments)
     moved = {name: x.to("cuda:1") for name, x in arguments.items()}
     stream = torch.cuda.current_stream(1)
-    found = ist.gpu.penetration(second, **moved, stream=stream)
+    found = ask(second, **moved, stream=stream)
     assert torch.from_dlpack(found.volume).device.index == 1
     expect_same_bits(host(found), expected)
     assert torch.cuda.current_device() == 0
 
 
 def test_assets_say_what_they_take(solids, assets):
-    assert len(assets) == 3 and assets.device == 0
+    assert len(assets) == 3 and assets.device == "cuda:0"
     assert assets.bytes >= sum(len(solid.to_bytes()) for solid in solids)
-    assert len(ist.gpu.Solids([])) == 0
+    assert len(ist.Solids([], device="cuda")) == 0
 
 
 def test_too_large_a_device_is_an_error(solids):
     with pytest.raises(ist.Error, match="GPU"):
-        ist.gpu.Solids(solids, device=torch.cuda.device_count())
+        ist.Solids(solids, device=f"cuda:{torch.cuda.device_count()}")

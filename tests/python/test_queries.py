@@ -77,7 +77,6 @@ def test_batches_of_none_and_of_one(gear, knot):
     assert ist.contact_patches(gear, knot, np.empty((0, 7))).id.shape == (0, 8)
     assert ist.penetration(gear, knot, [IDENTITY]).volume.shape == (1,)
     assert ist.contact_patches(gear, knot, IDENTITY, max_patches=0).count == 0
-    assert ist.penetration_of_pairs([gear, knot], [IDENTITY, AWAY], np.empty((0, 2), int)).volume.shape == (0,)
 
 
 def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
@@ -140,61 +139,6 @@ def test_only_the_relative_pose_counts(gear, knot, random_poses):
     assert there.volume == pytest.approx(here.volume, rel=1e-6, abs=1e-9)
     turned = here.force @ rotation(moved_a).T
     assert there.force == pytest.approx(turned, rel=1e-5, abs=1e-5)
-
-
-def test_a_scene_is_its_pairs(gear, knot, cube, random_poses):
-    solids = [ist.HalfSpaceField(), gear, knot, cube]
-    scenes = random_poses(20, 2).reshape(5, 4, 7)
-    scales = np.random.default_rng(3).uniform(0.5, 1.5, (5, 4))
-    pairs = np.array([(0, 1), (1, 2), (3, 2), (2, 1)])
-    found = ist.penetration_of_pairs(solids, scenes, pairs, scales=scales, scale_gradients=True)
-    assert found.volume.shape == (5, 4) and found.pose_gradient.shape == (5, 4, 7)
-    gaps = ist.separation_of_pairs(solids, scenes, pairs, scales=scales)
-    meet = ist.overlap_of_pairs(solids, scenes, pairs, scales=scales)
-    patches = ist.contact_patches_of_pairs(solids, scenes, pairs, scales=scales, max_patches=3)
-    assert patches.volume.shape == (5, 4, 3) and patches.count.max() > 1
-    for w in range(5):
-        for k, (i, j) in enumerate(pairs):
-            how = dict(poses_a=scenes[w, i], scales=scales[w, j], scales_a=scales[w, i])
-            one = ist.penetration(solids[i], solids[j], scenes[w, j], scale_gradients=True, **how)
-            for name in ("volume", "torque", "pose_gradient", "pose_gradient_a", "scale_gradient_a"):
-                assert np.array_equal(getattr(one, name), getattr(found, name)[w, k])
-            assert ist.separation(solids[i], solids[j], scenes[w, j], **how).distance == gaps.distance[w, k]
-            assert ist.overlap(solids[i], solids[j], scenes[w, j], **how) == meet[w, k]
-            one = ist.contact_patches(solids[i], solids[j], scenes[w, j], max_patches=3, **how)
-            assert np.array_equal(one.force, patches.force[w, k])
-    alone = ist.penetration_of_pairs(solids, scenes[0], pairs, scales=scales[0])
-    assert np.array_equal(alone.volume, found.volume[0])
-
-
-def test_assets_that_no_cache_holds_are_asked_in_order(knot, random_poses):
-    """They are sorted; the answers are not."""
-    copies = [ist.Asset.from_bytes(knot.to_bytes())
-              for _ in range(1 + (32 << 20) // len(knot.to_bytes()))]
-    scenes = random_poses(3 * len(copies), 1).reshape(3, len(copies), 7)
-    pairs = np.random.default_rng(1).permutation(len(copies))[:20].reshape(10, 2)
-    found = ist.penetration_of_pairs(copies, scenes, pairs).volume
-    for k, (i, j) in enumerate(pairs):
-        expected = ist.penetration(knot, knot, scenes[:, j], poses_a=scenes[:, i]).volume
-        assert np.array_equal(found[:, k], expected)
-    assert (found > 0).any()
-
-
-@pytest.mark.parametrize("arguments, error, text", [
-    (dict(poses=np.zeros((3, 7))), ValueError, r"poses: shape \(3, 7\); wanted \(2, 7\) or \(w, 2, 7\)"),
-    (dict(pairs=[(0, 2)]), ValueError, r"pairs\[0\]: \(0, 2\): solids are numbered 0 to 1"),
-    (dict(pairs=[(0, 1), (-1, 1)]), ValueError, r"pairs\[1\]: \(-1, 1\)"),
-    (dict(pairs=[(1, 1)]), ValueError, "a solid cannot be paired with itself"),
-    (dict(solids=[ist.BallField(1), ist.BallField(2)]), ValueError,
-     r"pairs\[0\]: \(0, 1\): two Fields; one of them must be an Asset"),
-    (dict(pairs=[(0.0, 1.0)]), TypeError, "pairs: dtype float64; wanted int64"),
-    (dict(pairs=[0, 1]), ValueError, r"pairs: shape \(2,\)"),
-    (dict(scales=[1.0]), ValueError, r"scales: shape \(1,\); wanted \(2,\)"),
-])
-def test_wrong_scenes_are_named(gear, arguments, error, text):
-    scene = dict(solids=[ist.BallField(1), gear], poses=[IDENTITY, IDENTITY], pairs=[(0, 1)])
-    with pytest.raises(error, match=text):
-        ist.penetration_of_pairs(**{**scene, **arguments})
 
 
 def rotation(pose):
@@ -388,9 +332,6 @@ def test_matrices_and_quaternions_of_either_order_are_poses(cube, random_poses):
     assert ist.penetration(cube, cube, matrices).volume == pytest.approx(expected, rel=1e-9)
     assert ist.penetration(cube, cube, matrices[3]).volume == pytest.approx(expected[3], rel=1e-9)
     assert ist.penetration(cube, cube, IDENTITY, poses_a=matrices[3]).volume > 0
-    scene = ist.penetration_of_pairs([cube, cube], matrices[:2], [(0, 1)])
-    assert scene.volume == pytest.approx(
-        ist.penetration_of_pairs([cube, cube], rows[:2], [(0, 1)]).volume, rel=1e-9)
     assert ist.poses(np.roll(3 * rows[:, :4], -1, axis=1), rows[:, 4:], order="xyzw") == pytest.approx(rows)
     assert ist.poses(rows[0, :4], rows[:, 4:], order="wxyz").shape == (50, 7)
     assert ist.poses(matrices[:, :3, :3], rows[:, 4:]) == pytest.approx(ist.poses(matrices))
@@ -648,8 +589,6 @@ def test_a_field_may_be_either_solid(gear):
     assert first.volume == second.volume > 0
     assert np.allclose(first.pose_gradient_a, second.pose_gradient, rtol=1e-12, atol=1e-15)
     assert np.allclose(first.force, -second.force, rtol=0, atol=0)
-    scene = ist.penetration_of_pairs([gear, ball], [IDENTITY, pose], [(0, 1), (1, 0)])
-    assert np.array_equal(scene.volume, [first.volume] * 2)
     with pytest.raises(TypeError, match="two Fields"):
         ist.penetration(ball, ball, pose)
 

@@ -32,7 +32,8 @@ def test_volumes_are_the_librarys(gear, knot, cube, scenes):
     volumes = overlap(solids, scenes)
     unit = scenes.detach().numpy().copy()
     unit[..., :4] /= np.linalg.norm(unit[..., :4], axis=-1, keepdims=True)
-    expected = ist.penetration_of_pairs(solids, unit, [(0, 1), (0, 2), (1, 2)]).volume
+    expected = np.stack([ist.penetration(solids[a], solids[b], unit[:, b], poses_a=unit[:, a]).volume
+                         for a, b in ((0, 1), (0, 2), (1, 2))], axis=-1)
     assert volumes.shape == (6, 3) and volumes.dtype == torch.float64
     assert volumes.detach().numpy() == pytest.approx(expected, rel=1e-9)
     assert overlap(solids, scenes[2]).tolist() == volumes[2].tolist()
@@ -162,8 +163,11 @@ def test_distances_are_the_librarys(gear, knot, cube, scenes):
     unit = poses.detach().numpy().copy()
     unit[..., :4] /= np.linalg.norm(unit[..., :4], axis=-1, keepdims=True)
     found = separation(solids, poses, scales=sizes)
-    expected = ist.separation_of_pairs(solids, unit, [(0, 1), (0, 2), (1, 2)], scales=sizes.detach().numpy())
-    assert found.detach().numpy() == pytest.approx(expected.distance, rel=1e-9)
+    size = sizes.detach().numpy()
+    expected = np.stack([ist.separation(solids[a], solids[b], unit[:, b], poses_a=unit[:, a],
+                                        scales=size[:, b], scales_a=size[:, a]).distance
+                         for a, b in ((0, 1), (0, 2), (1, 2))], axis=-1)
+    assert found.detach().numpy() == pytest.approx(expected, rel=1e-9)
     assert separation(solids, poses[2], scales=sizes[2]).tolist() == found[2].tolist()
     inner = separation(solids, poses, scales=sizes, inner_spheres=True)
     assert (inner >= found).all() and (inner > found).any()

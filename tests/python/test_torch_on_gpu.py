@@ -1,4 +1,5 @@
-"""ist.torch.overlap on a card."""
+"""ist.torch on a card."""
+import functools
 import time
 
 import numpy as np
@@ -10,7 +11,8 @@ pytestmark = pytest.mark.skipif(not ist.gpu.available(), reason=f"{ist.gpu.why_n
 
 if ist.gpu.available():
     torch = pytest.importorskip("torch", reason="no PyTorch")
-    from ist.torch import overlap
+    import ist.torch
+    overlap = functools.partial(ist.torch.overlap, field="never")
 
 CYCLES = 1_000_000_000  # a good part of a second
 
@@ -20,10 +22,10 @@ def solids(gear, knot, cube):
     return [gear, knot, cube]
 
 
-def gradients(solids, poses, scales, device, **settings):
+def gradients(solids, poses, scales, device, query=None, **settings):
     poses = poses.to(device).requires_grad_()
     scales = scales.to(device).requires_grad_() if scales is not None else None
-    volumes = overlap(solids, poses, scales=scales, **settings)
+    volumes = (query or overlap)(solids, poses, scales=scales, **settings)
     weights = torch.linspace(-1, 2, volumes.numel(), dtype=torch.float64).reshape(volumes.shape)
     (volumes * weights.to(device)).sum().backward()
     return [x.detach().cpu() for x in (volumes, poses.grad)] + (
@@ -37,7 +39,7 @@ def test_overlaps_are_those_of_the_cpu(solids, random_poses):
     scales = torch.linspace(0.7, 1.3, 400, dtype=torch.float64).reshape(100, 4)
     for p, s in ((poses, None), (poses, scales), (poses[0], scales[0])):
         ours = gradients(solids, p.clone(), s, "cuda")
-        theirs = gradients(solids, p.clone(), s, "cpu", field="never")
+        theirs = gradients(solids, p.clone(), s, "cpu")
         assert theirs[0].abs().max() > 0.1
         for k, (one, other) in enumerate(zip(ours, theirs)):
             bound = (1e-5, 1e-5, 2e-3)[k]  # scales' are differences
@@ -52,7 +54,7 @@ def test_fields_stand_first(solids, random_poses):
     scales = torch.linspace(0.7, 1.3, 600, dtype=torch.float64).reshape(100, 6)
     for s in (None, scales):
         ours = gradients(solids, poses.clone(), s, "cuda")
-        theirs = gradients(solids, poses.clone(), s, "cpu", field="never")
+        theirs = gradients(solids, poses.clone(), s, "cpu")
         for k, (one, other) in enumerate(zip(ours, theirs)):
             assert (one - other).abs().max() <= (1e-5, 1e-5, 2e-3)[k] * other.abs().max(), k
 
@@ -70,6 +72,22 @@ def test_overlaps_gradients_are_differences(solids, random_poses):
             (overlap(solids, poses + step) - overlap(solids, poses - step)) * weights).sum(-1) / (2 * h)
     assert expected.abs().max() > 0.1
     assert (found.cuda() - expected).norm() < 5e-3 * expected.norm()
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_distances_are_those_of_the_cpu(solids, random_poses, held):
+    distance = functools.partial(ist.torch.separation, inner_spheres=True)
+    poses = torch.from_numpy(random_poses(300, 6.0).reshape(100, 3, 7))
+    scales = torch.linspace(0.7, 1.3, 300, dtype=torch.float64).reshape(100, 3)
+    there = ist.Solids(solids, device="cuda") if held else solids
+    for s in (None, scales):
+        ours = gradients(there, poses.clone(), s, "cuda", distance)
+        theirs = gradients(solids, poses.clone(), s, "cpu", distance)
+        assert (theirs[0] > 0).double().mean() > 0.8
+        assert (ours[0] - theirs[0]).abs().max() < 1e-5 * theirs[0].abs().max()
+        for one, other in zip(ours[1:], theirs[1:]):  # among equally near spheres the two may differ
+            error = (one - other).abs().reshape(100, -1).max(dim=1).values
+            assert (error < 1e-3 * other.abs().max()).double().mean() > 0.97
 
 
 def test_overlap_never_waits(solids, random_poses):

@@ -24,15 +24,19 @@ class DevicePatches {
         depth_(pairs * most),
         volume_(pairs * most),
         force_(3 * pairs * most),
-        torque_(3 * pairs * most) {}
+        torque_(3 * pairs * most),
+        point_(3 * pairs * most),
+        twist_(pairs * most) {}
 
   GpuContactPatches patches() const {
-    return {most_,        count_.data(), id_.data(),     centroid_.data(), normal_.data(),
-            area_.data(), depth_.data(), volume_.data(), force_.data(),    torque_.data()};
+    return {most_,          count_.data(),  id_.data(),    centroid_.data(),
+            normal_.data(), area_.data(),   depth_.data(), volume_.data(),
+            force_.data(),  torque_.data(), point_.data(), twist_.data()};
   }
   std::vector<PatchedPair> get(const std::vector<Penetration>& wholes) const {
-    return PatchColumns{most_,       count_.get(), id_.get(),     centroid_.get(), normal_.get(),
-                        area_.get(), depth_.get(), volume_.get(), force_.get(),    torque_.get()}
+    return PatchColumns{most_,         count_.get(),  id_.get(),    centroid_.get(),
+                        normal_.get(), area_.get(),   depth_.get(), volume_.get(),
+                        force_.get(),  torque_.get(), point_.get(), twist_.get()}
         .rows(wholes);
   }
 
@@ -40,7 +44,7 @@ class DevicePatches {
   std::uint32_t most_;
   OnDevice<std::uint32_t> count_;
   OnDevice<std::uint64_t> id_;
-  OnDevice<double> centroid_, normal_, area_, depth_, volume_, force_, torque_;
+  OnDevice<double> centroid_, normal_, area_, depth_, volume_, force_, torque_, point_, twist_;
 };
 
 }  // namespace ist::testing

@@ -36,15 +36,26 @@ class HostPatches {
                     numbers,
                     numbers,
                     vectors,
-                    vectors};
+                    vectors,
+                    vectors,
+                    numbers};
     // What teams that come before left in their room must not matter.
     std::vector<std::byte> room(gpu::PatchRoom::bytes(solids_.most_bins()), std::byte{0xA5});
     gpu::PatchArrays batch = {};
     static_cast<gpu::SolidPairs&>(batch.pairs) =
         solids_.asked(columns.pairs(), measure, wholes.answers());
-    batch.patches = {
-        most,           to.count.data(), to.id.data(),     to.centroid.data(), to.normal.data(),
-        to.area.data(), to.depth.data(), to.volume.data(), to.force.data(),    to.torque.data()};
+    batch.patches = {most,
+                     to.count.data(),
+                     to.id.data(),
+                     to.centroid.data(),
+                     to.normal.data(),
+                     to.area.data(),
+                     to.depth.data(),
+                     to.volume.data(),
+                     to.force.data(),
+                     to.torque.data(),
+                     to.point.data(),
+                     to.twist.data()};
     batch.rooms = room.data();
     batch.most_bins = solids_.most_bins();
     const auto memory = std::make_unique<gpu::PatchMemory>();

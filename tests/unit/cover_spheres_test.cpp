@@ -276,7 +276,7 @@ double volume_of(const CoverCapsule& c) {
 TEST(CoverCapsules, HoldTheMeshAndAreSmall) {
   for (const Case& one : cases()) {
     SCOPED_TRACE(one.name);
-    const CoverCapsule capsule = cover_with_capsule(close_mesh(one.mesh, one.name));
+    const CoverCapsule capsule = cover_with_capsules(close_mesh(one.mesh, one.name))[0];
     Eigen::AlignedBox3d box;
     for (const Vector3d& v : one.mesh.vertices) {
       box.extend(v);
@@ -306,10 +306,59 @@ TEST(CoverCapsules, FindACapsule) {
   TriangleMesh mesh = icosphere_mesh(3);
   for (Vector3d& v : mesh.vertices) v = 0.3 * v + Vector3d(0, 0, v.z() > 0 ? 1 : -1);
   mesh = turned(std::move(mesh), 1.2, {5, 6, 7});
-  const CoverCapsule capsule = cover_with_capsule(close_mesh(mesh, "capsule"));
+  const CoverCapsule capsule = cover_with_capsules(close_mesh(mesh, "capsule"))[0];
   EXPECT_NEAR(volume_of(capsule), M_PI * 0.09 * 2.4, 0.01 * M_PI * 0.09 * 2.4);
   EXPECT_LT((0.5 * (capsule.begin + capsule.end) - Vector3d(5, 6, 7)).norm(), 0.01);
-  EXPECT_THROW(cover_with_capsule(ClosedMesh{}), Error);
+  EXPECT_THROW(cover_with_capsules(ClosedMesh{}), Error);
+}
+
+TEST(CoverCapsules, SeveralHoldEveryPointOfTheSolid) {
+  std::vector<Case> all = cases();
+  // Between its ends there are cuts alone.
+  TriangleMesh spike;
+  spike.vertices = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {0, 0, 10}};
+  spike.triangles = {{0, 2, 1}, {0, 3, 2}, {0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}};
+  all.push_back({"spike", turned(spike, 0.3, {0, 0, 0})});
+  for (const Case& one : all) {
+    SCOPED_TRACE(one.name);
+    const ClosedMesh mesh = close_mesh(one.mesh, one.name);
+    const auto solid = make_solid(mesh);
+    const Eigen::AlignedBox3d box = solid->bounds();
+    double before = std::numeric_limits<double>::infinity();
+    for (const std::size_t count : {1u, 3u, 12u}) {
+      const std::vector<CoverCapsule> capsules = cover_with_capsules(mesh, count, 2);
+      EXPECT_LE(capsules.size(), count);
+      double sum = 0;
+      for (const CoverCapsule& c : capsules) sum += volume_of(c);
+      EXPECT_LE(sum, before * 1.05);  // searched with fewer points
+      before = std::min(before, sum);
+      std::mt19937_64 random(9);
+      std::uniform_real_distribution<double> share(0, 1);
+      for (int i = 0; i < 5'000; ++i) {
+        const Vector3d x =
+            box.min() +
+            Vector3d(share(random), share(random), share(random)).cwiseProduct(box.sizes());
+        if (solid->signed_distance(x) <= 0) continue;
+        EXPECT_TRUE(std::any_of(capsules.begin(), capsules.end(),
+                                [&](const CoverCapsule& c) { return away(x, c) <= c.radius; }));
+      }
+    }
+  }
+  EXPECT_THROW(cover_with_capsules(close_mesh(box_mesh({0, 0, 0}, {1, 1, 1}), "box"), 13), Error);
+}
+
+/// An elbow of two rods needs one for each.
+TEST(CoverCapsules, DivideAnElbow) {
+  TriangleMesh mesh = box_mesh({0, 0, 0}, {4, 0.5, 0.5});
+  const auto more = static_cast<std::uint32_t>(mesh.vertices.size());
+  const TriangleMesh other = box_mesh({3.6, 0.1, 0.1}, {4.1, 4, 0.4});
+  mesh.vertices.insert(mesh.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (const auto& t : other.triangles)
+    mesh.triangles.push_back({t[0] + more, t[1] + more, t[2] + more});
+  const ClosedMesh elbow = close_mesh(mesh, "elbow");
+  const std::vector<CoverCapsule> two = cover_with_capsules(elbow, 2);
+  ASSERT_EQ(two.size(), 2u);
+  EXPECT_LT(volume_of(two[0]) + volume_of(two[1]), 0.3 * volume_of(cover_with_capsules(elbow)[0]));
 }
 
 }  // namespace

@@ -41,6 +41,7 @@ struct PatchDifference {
   double force = 0;     ///< of area, or of volume^(2/3) if more
   double torque = 0;    ///< of that times B's size
   double centroid = 0;  ///< of both sizes
+  double axis = 0;      ///< of the wrench's: torque and place, likewise
 
   void add(const ContactPatch& x, const ContactPatch& y, const BatchPair& pair) {
     const double size = 2 * pair.scale_b;
@@ -49,6 +50,13 @@ struct PatchDifference {
     force = std::max(force, (x.force - y.force).norm() / reach);
     torque = std::max(torque, (x.torque - y.torque).norm() / (reach * size));
     centroid = std::max(centroid, (x.centroid - y.centroid).norm() / (size + 2 * pair.scale_a));
+    // What is left of the torque once the force acts at the point is the twist about the normal.
+    const Eigen::Vector3d left =
+        x.torque - (x.point - Eigen::Vector3d(pair.pose_b.t)).cross(x.force) - x.twist * x.normal;
+    const Eigen::Vector3d arm = x.point - x.centroid;
+    const double room = size + arm.norm() + 1e-6 * x.point.norm();  // world coordinates round
+    axis = std::max(axis, x.area > 0 ? left.norm() / (reach * room) : std::abs(x.twist));
+    axis = std::max(axis, std::abs(arm.dot(x.normal)) / room);
   }
 };
 
@@ -91,6 +99,7 @@ struct AgainstCpu {
     EXPECT_LE(difference.force, 1e-4);
     EXPECT_LE(difference.torque, 1e-4);
     EXPECT_LE(difference.centroid, 1e-5);
+    EXPECT_LE(difference.axis, 1e-9);
   }
 };
 

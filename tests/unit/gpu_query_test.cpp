@@ -204,6 +204,23 @@ TEST(GpuQuery, LanesOfAWarpNeedNoLuck) {
   }
 }
 
+TEST(GpuQuery, ForceAndTorqueAreTheGradientsTurned) {
+  double push[3], turn[3], force[3], torque[3];
+  GpuPenetrations to;
+  to.translation_gradient = push;
+  to.rotation_gradient = turn;
+  to.force = force;
+  to.torque = torque;
+  gpu::write_answer(to, 0, {.volume = 1, .centre = {}, .push = {2, -3, 5}, .turn = {-7, 11, 13}},
+                    {});
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_EQ(force[k], -push[k]);
+    EXPECT_EQ(torque[k], -turn[k]);
+  }
+  gpu::write_nothing(to, 0, QueryStatus::invalid_input);
+  EXPECT_TRUE(std::isnan(force[0]) && std::isnan(force[2]) && std::isnan(torque[2]));
+}
+
 TEST(GpuQuery, InvalidPosesSpoilOnlyThemselves) {
   RandomPairs poses(6);
   std::vector<BatchPair> pairs = poses.pairs(40);
