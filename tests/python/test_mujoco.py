@@ -1,5 +1,6 @@
 """ist.mujoco: meshes of a scene collide as solids."""
 
+import concurrent.futures
 import json
 import os
 import subprocess
@@ -137,6 +138,9 @@ def test_threads_copies_and_files_change_no_bit(folder, tmp_path):
     mujoco.mj_saveModel(model, str(tmp_path / "nut.mjb"))
     stored = mujoco.MjModel.from_binary_path(str(tmp_path / "nut.mjb"))
     assert np.array_equal(run(stored, mujoco.MjData(stored), 100).qpos, first)
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        for each in pool.map(lambda one: run(model, one, 100), [mujoco.MjData(model) for _ in range(4)]):
+            assert np.array_equal(each.qpos, first)
 
 
 def test_fifty_contacts_fit(folder):
