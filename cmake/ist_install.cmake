@@ -7,7 +7,7 @@ set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/ist)
 
 set(others PATTERN bullet EXCLUDE)
 if(IST_QUERY_ONLY)  # headers of functions that ist::query lacks
-  foreach(header IN ITEMS bake cover_spheres gpu gpu_fields gpu_query grid_settings level_set medial
+  foreach(header IN ITEMS bake cover_spheres gpu gpu_query grid_settings ist_bake level_set medial
       mesh packing progress solid stop_reason)
     list(APPEND others PATTERN ist/${header}.h EXCLUDE)
   endforeach()

@@ -162,20 +162,21 @@ class Bowl(Scene):
 
 
 class Chain(Scene):
-    """Five rings hang in each other."""
+    """Five rings hang in each other, and a spring lifts the first by 20 mm."""
 
     seconds, step, count = 1.0, 0.001, 5
     meshes = {"ring": (turned([(.01 + .002 * np.cos(a), .002 * np.sin(a))
                                for a in np.linspace(0, 2 * np.pi, 16, endpoint=False)]), "1")}
     bodies = "".join(
         f'<body name="ring {i}" pos="0 0 {-0.0155 * i:.4f}" quat="{"1 0 0 0" if i % 2 else ".7071 0 0 .7071"}">'
-        + ("<freejoint/>" if i else "")
+        + ("<freejoint/>" if i else '<joint type="slide" axis="0 0 1" stiffness="50" damping="2" springref=".02"/>')
         + f'<geom name="ring {i}" mesh="ring" euler="90 0 0" {STIFF} friction=".3"/></body>' for i in range(count))
 
     def judge(self, model, data, log):
-        places = np.vstack([[[0, 0, 0]], data.qpos.reshape(-1, 7)[:, :3]])
+        places = np.vstack([[[0, 0, data.qpos[0]]], data.qpos[1:].reshape(-1, 7)[:, :3]])
         gaps = 1e3 * np.linalg.norm(np.diff(places, axis=0), axis=1)
-        return bool(gaps.max() < 20), f"links {gaps.min():.1f} to {gaps.max():.1f} mm apart (16 where they hang)"
+        return (bool(gaps.max() < 20 and data.qpos[0] > .015),
+                f"lifted by {1e3 * data.qpos[0]:.1f} mm, links {gaps.min():.1f} to {gaps.max():.1f} mm apart (16 where they hang)")
 
 
 class Hook(Scene):

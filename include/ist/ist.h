@@ -58,6 +58,7 @@ enum {
    * answer are NaN. */
   IST_NOT_HELD = -15,
   IST_NO_DURATION = -14, /* ist_impact_settings_t::duration is 0 */
+  IST_NOT_BAKED = -16,   /* ist_bake() (ist_bake.h): its message says why */
   /* Bytes that are not an asset. */
   IST_TOO_SHORT = -8,      /* fewer than their header says */
   IST_MISALIGNED = -9,     /* not on a 64-byte boundary */
@@ -660,6 +661,46 @@ ist_status_t ist_volume_rate(const ist_penetration_t* contact, const ist_pose_t*
 ist_status_t ist_patch_volume_rate(const ist_contact_patch_t* patch, const ist_pose_t* b,
                                    const ist_twist_t* motion_a, const ist_twist_t* motion_b,
                                    double* rate);
+
+/* --- Contact laws (response.h): from patches to a force --------------------------------------- */
+
+/* ContactLaw: the pressure grows with depth. `stiffness` must be set. */
+typedef struct ist_contact_law {
+  uint32_t size;
+  double stiffness; /* [force/u³] > 0 */
+  double area;      /* [u²] reference area; 0: each patch's own, the largest that it had */
+  double damping;   /* [s/u] ≥ 0 */
+  double friction;  /* ≥ 0, Coulomb's coefficient */
+  double friction_stiffness; /* [force/u³] ≥ 0, of shear stress over stretch */
+  double friction_damping;   /* [force·s/u³] ≥ 0, of shear stress over velocity */
+} ist_contact_law_t;
+
+/* ContactMemory: one per contact of two bodies, plain data. All zero is a new contact. */
+typedef struct ist_patch_memory {
+  uint64_t id;
+  double area;       /* [u²] */
+  double stretch[3]; /* [u] */
+} ist_patch_memory_t;
+typedef struct ist_contact_memory {
+  ist_patch_memory_t patches[32];
+  uint32_t count;
+} ist_contact_memory_t;
+
+/* On A acts the opposite, about the same point. */
+typedef struct ist_contact_force_t {
+  uint32_t size;
+  double force[3];     /* [force] on B, world */
+  double torque[3];    /* [force·u] on B about B's origin, world */
+  double normal_force; /* [force] Σ of pressure times area */
+  double energy;       /* [force·u] stored in the springs */
+} ist_contact_force_t;
+
+/* `patches`: as ist_contact_patches() wrote them. `step`: [s] since the last call. A null twist is
+ * at rest. IST_INVALID_INPUT for a law or step out of range; then `memory` does not change. */
+ist_status_t ist_contact_force(const ist_contact_law_t* law, const ist_contact_patch_t* patches,
+                               size_t count, const ist_pose_t* b, const ist_twist_t* motion_a,
+                               const ist_twist_t* motion_b, double step,
+                               ist_contact_memory_t* memory, ist_contact_force_t* force);
 
 /* --- Time of impact (time_of_impact.h). [T] is a unit of time of the caller's ----------------- */
 

@@ -497,6 +497,8 @@ TEST(CApi, PatchesWithoutProtrusion) {
   for (std::size_t i = 0; i < count; ++i) expect_same(c_room[i], patches[i]);
 }
 
+TEST(CApi, BakesAndPushesFromC) { EXPECT_EQ(c_bake_checks(), 0); }
+
 TEST(CApi, PredictedErrors) {
   const TargetedAsset baked = bake_to_error(close_mesh(testing::cube_mesh(), "cube"), {0.2, 0.01});
   const PredictedErrors cpp = baked.asset.view().predicted_errors();

@@ -1,5 +1,9 @@
+#include <cmath>
+#include <cstring>
+
 #include <ist/mass_properties.h>
 #include <ist/pair_fit.h>
+#include <ist/response.h>
 #include <ist/wrench.h>
 
 #include "query/base/relative_pose.h"
@@ -167,5 +171,42 @@ ist_status_t ist_get_pair_fit(const ist_placed_t* a, const ist_placed_t* b, ist_
   fit->has_surface = found.has_surface ? 1 : 0;
   fit->needs_surface = found.needs_surface ? 1 : 0;
   fit->fits = found.fits() ? 1 : 0;
+  return IST_OK;
+}
+
+ist_status_t ist_contact_force(const ist_contact_law_t* law, const ist_contact_patch_t* patches,
+                               std::size_t count, const ist_pose_t* b, const ist_twist_t* motion_a,
+                               const ist_twist_t* motion_b, double step,
+                               ist_contact_memory_t* memory, ist_contact_force_t* force) {
+  static_assert(sizeof(ist_contact_memory_t) == sizeof(ist::ContactMemory) &&
+                offsetof(ist_contact_memory_t, count) == offsetof(ist::ContactMemory, count) &&
+                sizeof(ist_patch_memory_t) == sizeof(ist::PatchMemory) &&
+                offsetof(ist_patch_memory_t, stretch) == offsetof(ist::PatchMemory, stretch));
+  ist_status_t status = clear(force);
+  if (status == IST_OK) status = check_size(law);
+  if (status != IST_OK) return status;
+  if ((patches == nullptr && count > 0) || b == nullptr || memory == nullptr)
+    return IST_NULL_POINTER;
+  const ist::ContactLaw given = {
+      law->stiffness,       law->area, law->damping, law->friction, law->friction_stiffness,
+      law->friction_damping};
+  for (const double number : {given.area, given.damping, given.friction, given.friction_stiffness,
+                              given.friction_damping, step})
+    if (!(number >= 0 && std::isfinite(number))) return IST_INVALID_INPUT;
+  if (!(given.stiffness > 0 && std::isfinite(given.stiffness)) ||
+      memory->count > ist::ContactMemory::kPatches)
+    return IST_INVALID_INPUT;
+  // Both memories are plain numbers at the same places.
+  ist::ContactMemory kept;
+  std::memcpy(&kept, memory, sizeof kept);
+  const Eigen::Vector3d origin = vector(b->t);
+  const ist::ContactForce found = ist::contact_force(
+      given, {reinterpret_cast<const ist::ContactPatch*>(patches), count},
+      ist::relative_motion(twist(motion_a), twist(motion_b), origin), origin, step, kept);
+  std::memcpy(memory, &kept, sizeof kept);
+  write(found.force, force->force);
+  write(found.torque, force->torque);
+  force->normal_force = found.normal_force;
+  force->energy = found.energy;
   return IST_OK;
 }

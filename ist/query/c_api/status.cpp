@@ -47,6 +47,8 @@ const char* ist_describe(ist_status_t status) {
       return describe(AssetStatus::corrupt_layout);
     case IST_NO_DURATION:
       return "ist_impact_settings_t::duration is 0; set the duration of the motion";
+    case IST_NOT_BAKED:
+      return "the mesh or a setting cannot be baked; the message of ist_bake() says why";
     default:
       return "unknown status";
   }

@@ -1,0 +1,40 @@
+#ifndef IST_IST_BAKE_H
+#define IST_IST_BAKE_H
+
+/* Bakes in C11: bake.h. Links ist::ist; the rules are those of ist.h. */
+
+#include <ist/ist.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+#ifdef __GNUC__
+#pragma GCC visibility push(default)
+#endif
+
+/* A null pointer means the defaults, all 0 but for `size`. */
+typedef struct ist_bake_settings {
+  uint32_t size;
+  uint32_t threads;      /* 0: all cores; never changes the asset */
+  uint64_t spheres;      /* count; 0: 10,000 */
+  uint32_t surface_only; /* not 0: no spheres; the asset serves the exact measure alone */
+} ist_bake_settings_t;
+
+/* Makes the asset of a closed mesh. `tree` owns it: release it with ist_tree_release().
+ * `vertices`: [3 · vertex_count] [u]; `triangles`: [3 · triangle_count] vertices, counter-clockwise
+ * seen from outside.
+ * `message`: [message_size] receives a sentence, cut to fit, where the status is IST_NOT_BAKED: an
+ * open mesh, a vertex that is not there, a setting out of range. May be null.
+ * Allocates, takes seconds, and uses many threads. */
+ist_status_t ist_bake(const double* vertices, size_t vertex_count, const uint32_t* triangles,
+                      size_t triangle_count, const ist_bake_settings_t* settings, ist_tree_t* tree,
+                      char* message, size_t message_size);
+
+#ifdef __GNUC__
+#pragma GCC visibility pop
+#endif
+#ifdef __cplusplus
+}
+#endif
+
+#endif
