@@ -165,8 +165,8 @@ std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOpt
 void fill_links(SphereRobot& input, const SpheresOptions& options) {
   constexpr double kPatience = 0.5;  // [s]
   std::vector<std::vector<CoverCapsule>> capsules;
-  std::vector<SphereCover> covers = interruptibly(
-      kPatience, options.quiet, false, [&](const ProgressCallback& progress) {
+  std::vector<SphereCover> covers =
+      interruptibly(kPatience, options.quiet, false, [&](const ProgressCallback& progress) {
         return make_spheres(input, options, progress, capsules);
       });
   std::size_t next = 0;
