@@ -197,8 +197,8 @@ static int versions_and_words(void) {
   CHECK(ist_check_version(IST_VERSION + 100) == IST_WRONG_VERSION);
   CHECK(ist_check_version(IST_VERSION + 10000) == IST_WRONG_VERSION);
   CHECK(ist_check_version(0) == IST_WRONG_VERSION);
-  for (status = IST_NOT_HELD - 1; status <= IST_ERROR_EXCEEDED + 1; ++status) {
-    const int known = status >= IST_NOT_HELD && status <= IST_ERROR_EXCEEDED;
+  for (status = IST_NOT_BAKED - 1; status <= IST_ERROR_EXCEEDED + 1; ++status) {
+    const int known = status >= IST_NOT_BAKED && status <= IST_ERROR_EXCEEDED;
     const int unknown = strcmp(ist_describe(status), ist_describe(12345)) == 0;
     CHECK(known != unknown);
   }

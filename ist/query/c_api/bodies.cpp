@@ -198,7 +198,7 @@ ist_status_t ist_contact_force(const ist_contact_law_t* law, const ist_contact_p
     return IST_INVALID_INPUT;
   // Both memories are plain numbers at the same places.
   ist::ContactMemory kept;
-  std::memcpy(&kept, memory, sizeof kept);
+  std::memcpy(static_cast<void*>(&kept), memory, sizeof kept);
   const Eigen::Vector3d origin = vector(b->t);
   const ist::ContactForce found = ist::contact_force(
       given, {reinterpret_cast<const ist::ContactPatch*>(patches), count},
