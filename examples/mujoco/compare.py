@@ -169,7 +169,7 @@ class Chain(Scene):
                                for a in np.linspace(0, 2 * np.pi, 16, endpoint=False)]), "1")}
     bodies = "".join(
         f'<body name="ring {i}" pos="0 0 {-0.0155 * i:.4f}" quat="{"1 0 0 0" if i % 2 else ".7071 0 0 .7071"}">'
-        + ("<freejoint/>" if i else '<joint type="slide" axis="0 0 1" stiffness="50" damping="2" springref=".02"/>')
+        + ("<freejoint/>" if i else '<joint type="slide" axis="0 0 1" stiffness="50" damping="20" springref=".02"/>')
         + f'<geom name="ring {i}" mesh="ring" euler="90 0 0" {STIFF} friction=".3"/></body>' for i in range(count))
 
     def judge(self, model, data, log):
