@@ -373,7 +373,7 @@ def main():
     parser.add_argument("--json", type=pathlib.Path, help="write the rows to this file")
     parser.add_argument("--films", type=pathlib.Path, help="folder for films (.glb) of ist's way")
     options = parser.parse_args()
-    if options.spheres:
+    if options.spheres is not None:
         for scene in SCENES.values():
             scene.settings = {"spheres": options.spheres}
     unknown = set(options.scenes) - set(SCENES)

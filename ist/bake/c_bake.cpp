@@ -7,6 +7,7 @@
 #include <cstring>
 #include <exception>
 #include <new>
+#include <utility>
 
 #include "query/base/hooked_memory.h"
 #include "query/c_api/handles.h"

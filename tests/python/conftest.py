@@ -29,6 +29,11 @@ def gear():
     return baked("gear", 1000)
 
 
+@pytest.fixture(scope="session")
+def solids(gear, knot, cube):
+    return [gear, knot, cube]
+
+
 @pytest.fixture
 def random_poses():
     """random_poses(count, reach) → (count, 7): any rotation, translations up to reach an axis."""

@@ -46,11 +46,6 @@ class OnDevice:
         return new_capsule(ctypes.addressof(managed), b"dltensor_versioned", None)
 
 
-@pytest.fixture(scope="module")
-def solids(gear, knot, cube):
-    return [gear, knot, cube]
-
-
 @pytest.fixture
 def arguments(random_poses):
     random = np.random.default_rng(3)

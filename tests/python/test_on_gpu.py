@@ -22,11 +22,6 @@ COLUMNS = ["volume", "centroid", "force", "torque"]
 
 
 @pytest.fixture(scope="module")
-def solids(gear, knot, cube):
-    return [gear, knot, cube]
-
-
-@pytest.fixture(scope="module")
 def assets(solids):
     return ist.Solids(solids, device="cuda")
 

@@ -42,11 +42,6 @@ def back(column):
     return column if isinstance(column, np.ndarray) else column.numpy()
 
 
-@pytest.fixture(scope="module")
-def solids(gear, knot, cube):
-    return [gear, knot, cube]
-
-
 @pytest.fixture
 def arguments(random_poses):
     random = np.random.default_rng(3)
