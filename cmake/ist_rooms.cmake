@@ -14,6 +14,19 @@ target_link_libraries(ist_public INTERFACE Eigen3::Eigen)
 # What tests, benchmarks and the command line see: the headers of all rooms.
 add_library(ist_internal INTERFACE)
 
+# ist_compile_together(target sources…): several sources are one for the compiler, since half of its time
+# goes to headers and templates that all of them use. Sources that are compiled once an instruction set
+# stay alone.
+function(ist_compile_together target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 9)
+  foreach(source IN LISTS ARGN)
+    file(STRINGS ${source} each_target REGEX "hwy/foreach_target" LIMIT_COUNT 1)
+    if(each_target)
+      set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
+  endforeach()
+endfunction()
+
 # ist_add_room(name [APART] FOLDER path AS prefix USES rooms… LIBS targets… SOURCES files…)
 #   AS: what its headers are included by ("mesh" for "mesh/weld.h").
 #   LIBS: third parties that its headers or sources need.
@@ -36,6 +49,7 @@ function(ist_add_room name)
     target_include_directories(${target} PUBLIC ${root})
     target_link_libraries(${target} PUBLIC ist_public ${arg_USES} PRIVATE ${arg_LIBS})
     ist_compile_options(${target})
+    ist_compile_together(${target} ${arg_SOURCES})
     if(NOT arg_APART)
       set_property(GLOBAL APPEND PROPERTY IST_ROOM_OBJECTS $<TARGET_OBJECTS:${target}>)
     endif()

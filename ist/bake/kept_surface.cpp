@@ -19,7 +19,7 @@
 namespace ist {
 namespace {
 
-constexpr std::uint32_t kNone = ~0u;
+constexpr std::uint32_t kNoVertex = ~0u;
 
 float rounded_down(double x) {
   const auto f = static_cast<float>(x);
@@ -78,7 +78,7 @@ std::vector<BlockPatch> patches_in_order(const MeshView& surface) {
 /// Vertices are numbered as blocks first use them.
 void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patches,
                     MeshArrays& arrays) {
-  std::vector<std::uint32_t> number(surface.vertex_count, kNone);
+  std::vector<std::uint32_t> number(surface.vertex_count, kNoVertex);
   std::uint32_t used = 0;
   arrays.blocks.resize(patches.size());
   for (std::size_t b = 0; b < patches.size(); ++b) {
@@ -88,7 +88,7 @@ void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patc
     block.vertices = static_cast<std::uint8_t>(patch.vertices.size());
     for (std::size_t i = 0; i < kWidth; ++i) {
       const std::uint32_t v = patch.vertices[i < patch.vertices.size() ? i : 0];
-      if (number[v] == kNone) {
+      if (number[v] == kNoVertex) {
         number[v] = used++;
         for (std::size_t k = 0; k < 3; ++k)
           arrays.vertices.push_back(surface.vertices[3 * std::size_t{v} + k] + 0.0);  // −0 is 0
@@ -144,10 +144,10 @@ Box box_of(const MeshArrays& arrays, const MeshBlock& block) {
 }
 
 void find_shells(MeshArrays& arrays) {
-  for (MeshBlock& block : arrays.blocks) block.shell = kNone;
+  for (MeshBlock& block : arrays.blocks) block.shell = kNoVertex;
   std::vector<std::uint32_t> waiting;
   for (std::uint32_t seed = 0; seed < arrays.blocks.size(); ++seed) {
-    if (arrays.blocks[seed].shell != kNone) continue;
+    if (arrays.blocks[seed].shell != kNoVertex) continue;
     const auto shell = static_cast<std::uint32_t>(arrays.shells.size());
     waiting = {seed};
     arrays.blocks[seed].shell = shell;
@@ -156,7 +156,7 @@ void find_shells(MeshArrays& arrays) {
       waiting.pop_back();
       for (std::uint32_t k = 0; k < block.neighbours; ++k) {
         const std::uint32_t n = arrays.neighbours[block.first_neighbour + k] / kWidth;
-        if (arrays.blocks[n].shell != kNone) continue;
+        if (arrays.blocks[n].shell != kNoVertex) continue;
         arrays.blocks[n].shell = shell;
         waiting.push_back(n);
       }

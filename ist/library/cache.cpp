@@ -22,6 +22,7 @@
 
 #include "bake/asset/atomic_file.h"
 #include "library/bake_revision.h"
+#include "library/text.h"
 #include "mesh/mesh_files.h"
 
 namespace ist {
@@ -114,7 +115,8 @@ CacheEntry parse(const std::vector<std::byte>& bytes, const CacheKey& key) {
       CacheKey{header.key_high, header.key_low} != key)
     throw Error("the entry belongs to another mesh");
   const auto* const text = reinterpret_cast<const char*>(bytes.data() + sizeof(header));
-  const nlohmann::json found = nlohmann::json::parse(text, text + header.found_bytes);
+  const nlohmann::ordered_json found =
+      nlohmann::ordered_json::parse(text, text + header.found_bytes);
   CacheEntry entry = {
       Asset(std::span(bytes).subspan(sizeof(header) + header.found_bytes), "the asset"),
       found.at("notes").get<std::vector<std::string>>()};
@@ -242,9 +244,9 @@ std::optional<CacheEntry> AssetCache::find(const CacheKey& key, std::string& dam
 }
 
 void AssetCache::store(const CacheKey& key, const CacheEntry& entry) {
-  nlohmann::json about = {{"notes", entry.notes}, {"confidence", nullptr}};
+  nlohmann::ordered_json about = {{"notes", entry.notes}, {"confidence", nullptr}};
   if (entry.confidence) about["confidence"] = *entry.confidence;
-  const std::string found = about.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string found = app::json_text(about, -1);
   const std::span<const std::byte> asset = entry.asset.bytes();
   EntryHeader header = {};
   std::memcpy(header.magic, kMagic, sizeof(kMagic));

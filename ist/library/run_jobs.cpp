@@ -24,12 +24,13 @@
 #include "bake/asset/atomic_file.h"
 #include "library/input_mesh.h"
 #include "library/job_queue.h"
+#include "library/text.h"
 #include "robot/link_mesh.h"
 
 namespace ist {
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 std::string hash_of(const Asset& asset) {
   return fmt::format("{:016x}", asset.view().header().content_hash);
@@ -345,8 +346,7 @@ void OutputRecord::add(const std::string& name, const CacheKey& key, const Cache
                      {"notes", entry.notes},
                      {"confidence", entry.confidence ? Json(*entry.confidence) : Json()}};
   // The end of the line comes first: a line that was cut short does not take this one with it.
-  const std::string text =
-      fmt::format("\n{}", json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  const std::string text = fmt::format("\n{}", app::json_text(json, -1));
   const std::lock_guard lock(mutex_);
   std::ofstream file(folder_ / ".ist-bakes", std::ios::app);
   file.write(text.data(), static_cast<std::streamsize>(text.size())).flush();

@@ -23,8 +23,6 @@ Query query_of(const PlacedTree& a, const MeshTree& mesh_a, const PlacedTree& b,
   return {mesh_a, moved_in_mesh(mesh_a), mesh_b, moved_b, pose.a_from_b, pose.b_from_a, scratch};
 }
 
-Eigen::Vector3d vector(const exact::Point& p) { return {p.x, p.y, p.z}; }
-
 }  // namespace
 
 namespace {

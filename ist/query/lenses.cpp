@@ -14,8 +14,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-Vector3d vector(const double (&v)[3]) noexcept { return {v[0], v[1], v[2]}; }
-
 /// The tree that settings name; none if there is no such level of detail or measure.
 std::optional<SphereTree> tree_of(const TreeView& view, Measure measure,
                                   std::uint32_t detail) noexcept {

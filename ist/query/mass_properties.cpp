@@ -5,6 +5,7 @@
 #include <optional>
 
 #include <ist/asset_layout.h>
+#include "query/base/no_answer.h"
 #include "query/base/relative_pose.h"
 
 namespace ist {
@@ -12,10 +13,6 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-
-Vector3d vector(const double (&v)[3]) noexcept { return {v[0], v[1], v[2]}; }
 
 /// x_world = rotation (scale · x) + translation; nothing for what a query would call invalid.
 std::optional<Matrix3d> rotation_of(const PlacedTree& placed) noexcept {

@@ -15,7 +15,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 /// Further from a solid, in its own lengths, nothing is told. Squares of squares stay finite.
 constexpr double kFarthest = 1e60;
 
@@ -35,19 +34,19 @@ Containment refused(QueryStatus status) noexcept {
 }
 
 /// A solid's own frame: an asset's unit frame, a field's own.
-struct OwnFrame {
+struct SolidFrame {
   Eigen::Matrix3d rotation;
   Vector3d origin;  ///< [u] world
   double unit;      ///< [u]
 
-  static std::optional<OwnFrame> of(const Pose& pose, double scale, const Vector3d& offset,
-                                    int exponent) noexcept {
+  static std::optional<SolidFrame> of(const Pose& pose, double scale, const Vector3d& offset,
+                                      int exponent) noexcept {
     const std::optional<Eigen::Quaterniond> turn = usable_rotation(pose, scale);
     if (!turn || !(scale <= kFarthest) || !(scale >= 1 / kFarthest)) return std::nullopt;
     const Eigen::Matrix3d rotation = turn->toRotationMatrix();
-    return OwnFrame{rotation,
-                    Vector3d(pose.t[0], pose.t[1], pose.t[2]) + rotation * (scale * offset),
-                    std::ldexp(scale, exponent)};
+    return SolidFrame{rotation,
+                      Vector3d(pose.t[0], pose.t[1], pose.t[2]) + rotation * (scale * offset),
+                      std::ldexp(scale, exponent)};
   }
   Vector3d world(const Vector3d& x) const noexcept { return rotation * (unit * x) + origin; }
   /// Empty where it is too far or no place at all.
@@ -60,15 +59,13 @@ struct OwnFrame {
 };
 
 exact::Point point(const Vector3d& x) noexcept { return {x.x(), x.y(), x.z()}; }
-Vector3d vector(const exact::Point& p) noexcept { return {p.x, p.y, p.z}; }
-
 /// A ray in a solid's own frame.
 struct OwnRay {
   Vector3d origin;
   Vector3d direction;  ///< unit
   double longest;
 
-  static std::optional<OwnRay> of(const Ray& ray, const OwnFrame& frame) noexcept {
+  static std::optional<OwnRay> of(const Ray& ray, const SolidFrame& frame) noexcept {
     const double largest = ray.direction.cwiseAbs().maxCoeff();
     const std::optional<Vector3d> origin = frame.own(ray.origin);
     if (!origin || !(largest > 0) || !ray.direction.allFinite() || !(ray.longest > 0))
@@ -83,7 +80,7 @@ struct OwnRay {
   }
 };
 
-RayHit hit_at(const OwnFrame& frame, const OwnRay& ray, double distance, const Vector3d& normal,
+RayHit hit_at(const SolidFrame& frame, const OwnRay& ray, double distance, const Vector3d& normal,
               std::uint32_t triangle) noexcept {
   return {frame.unit * distance, frame.world(ray.origin + distance * ray.direction),
           (frame.rotation * normal).normalized(), triangle, QueryStatus::ok};
@@ -99,8 +96,8 @@ class PlacedMesh {
       return;
     }
     const AssetHeader& asset = placed.tree.header();
-    frame_ = OwnFrame::of(placed.pose, placed.scale,
-                          {asset.centre[0], asset.centre[1], asset.centre[2]}, asset.exponent);
+    frame_ = SolidFrame::of(placed.pose, placed.scale,
+                            {asset.centre[0], asset.centre[1], asset.centre[2]}, asset.exponent);
     if (!frame_) return;
     mesh_.emplace(mesh_of(placed));
     extent_ = mesh_->extent();
@@ -149,7 +146,7 @@ class PlacedMesh {
 
  private:
   QueryStatus status_ = QueryStatus::invalid_input;
-  std::optional<OwnFrame> frame_;
+  std::optional<SolidFrame> frame_;
   std::optional<MeshTree> mesh_;
   double extent_ = 0;
 };
@@ -220,7 +217,7 @@ concept HasChord = requires(const Shape& s, const Vector3d& x) {
 };
 
 template <class Shape>
-RayHit shape_hit(Shape& shape, const OwnFrame& frame, const OwnRay& ray) noexcept {
+RayHit shape_hit(Shape& shape, const SolidFrame& frame, const OwnRay& ray) noexcept {
   if constexpr (HasChord<Shape>) {
     const Chord chord = chord_of(shape, ray.origin, ray.direction);
     const double distance = chord.first >= 0 ? chord.first : chord.last;
@@ -237,7 +234,7 @@ class PlacedShape {
  public:
   explicit PlacedShape(const PlacedField& placed) noexcept
       : field_(placed.field),
-        frame_(OwnFrame::of(placed.pose, placed.scale, Vector3d::Zero(), 0)) {}
+        frame_(SolidFrame::of(placed.pose, placed.scale, Vector3d::Zero(), 0)) {}
 
   RayHit answer(const Ray& given) const noexcept {
     const auto refuse = [] { return refused<RayHit>(QueryStatus::invalid_input); };
@@ -283,7 +280,7 @@ class PlacedShape {
   }
 
   const Field& field_;
-  std::optional<OwnFrame> frame_;
+  std::optional<SolidFrame> frame_;
 };
 
 /// Runs `use(solid)` with what answers.

@@ -17,7 +17,7 @@ namespace {
 // solids tried (benchmarks/aligned): u is 0.13 … 0.19 as they touch, 0.22 … 0.28 when a fifth of
 // the skin deep, and from there on the volume is right to 10 %.
 constexpr double kTouching = 0.135;
-constexpr double kDeep = 0.225;
+constexpr double kDeepOverlap = 0.225;
 // d(log u) / d(log volume) on the way, by which the force changes with the volume.
 constexpr double kStiffening = 0.42;
 // |force|³ / volume² over the depth: hundreds for round contacts of the oracle's solids, and from
@@ -45,15 +45,15 @@ double flatness(double volume, double area, double depth) {
   return smooth_step((ratio * ratio * area / depth - kRound) / (kFlat - kRound));
 }
 
-/// What of volume and force is left at a depth < kDeep, over the skin.
+/// What of volume and force is left at a depth < kDeepOverlap, over the skin.
 struct Left {
   double volume, force;
 };
 Left left_at(double depth, double flat) {
-  const double t = std::max((depth - kTouching) / (kDeep - kTouching), 0.0);
+  const double t = std::max((depth - kTouching) / (kDeepOverlap - kTouching), 0.0);
   const double volume = smooth_step(t);
   const double force =
-      volume + kStiffening * depth * (6 * t * (1 - t) / (kDeep - kTouching));  // t < 1
+      volume + kStiffening * depth * (6 * t * (1 - t) / (kDeepOverlap - kTouching));  // t < 1
   return {1 - flat * (1 - volume), 1 - flat * (1 - force)};
 }
 
@@ -64,7 +64,7 @@ Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
   if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0 || !(whole.volume > 0)) return whole;
   const double area = whole.translation_gradient.norm();
   const double skin = skin_of(a, b);
-  if (!(whole.volume < kDeep * (skin * area))) return whole;
+  if (!(whole.volume < kDeepOverlap * (skin * area))) return whole;
   const double depth = whole.volume / (skin * area);
   const Left left = left_at(depth, flatness(whole.volume, area, depth));
   Penetration result = whole;
@@ -89,7 +89,7 @@ void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, co
     return;
   const double skin = skin_of(a, b);
   const auto is_light = [&](const ContactPatch& patch) {
-    return patch.volume < kDeep * (skin * patch.area);
+    return patch.volume < kDeepOverlap * (skin * patch.area);
   };
   // The light patches are one contact, flat or not, and each has its depth.
   double volume = 0;

@@ -14,7 +14,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kMargin = 1e-12;       ///< unit frame, above the rounding of any distance here
 constexpr double kSmallCube = 1e-3;     ///< unit frame
 constexpr double kSmallestCube = 1e-9;  ///< unit frame: smaller ones stay unproven
 constexpr double kSmallBesideGap = 0.25;

@@ -10,13 +10,13 @@
 #include "mesh/closest_point.h"
 #include "mesh/mesh_view.h"
 #include "spheres/offset_surface.h"
+#include "spheres/triangles.h"
 
 namespace ist {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kMargin = 1e-12;  ///< unit frame, above the rounding of any distance here
 constexpr double kRounded = 1e-5;  ///< unit frame, by which the proof may end above what was seen
 constexpr double kTolerance = 0.01;
 

@@ -9,6 +9,8 @@
 
 namespace ist {
 
+inline constexpr double kMargin = 1e-12;  ///< unit frame, above the rounding of any distance here
+
 /// Unit frame.
 inline std::array<Eigen::Vector3d, 3> triangle_corners(const MeshView& mesh,
                                                        std::uint32_t triangle) {

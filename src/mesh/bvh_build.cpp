@@ -45,10 +45,10 @@ Lanes lowest(Lanes a, Lanes b) { return a < b ? a : b; }
 Lanes highest(Lanes a, Lanes b) { return a > b ? a : b; }
 Lanes all(float value) { return Lanes{value, value, value, value}; }
 
-struct Box {
+struct GrowingBox {
   Lanes lower = all(kInfinity), upper = all(-kInfinity);
 
-  void extend(const Box& other) {
+  void extend(const GrowingBox& other) {
     lower = lowest(lower, other.lower);
     upper = highest(upper, other.upper);
   }
@@ -65,12 +65,12 @@ struct Item {
   Lanes lower, upper;
 
   Item() {}  // left as it is, for threads to fill
-  Item(const Box& around, std::uint32_t name, std::uint32_t count)
+  Item(const GrowingBox& around, std::uint32_t name, std::uint32_t count)
       : lower(around.lower), upper(around.upper) {
     lower[3] = std::bit_cast<float>(name + kLeastNormal);
     upper[3] = std::bit_cast<float>(count + kLeastNormal);
   }
-  Box box() const { return {lower, upper}; }
+  GrowingBox box() const { return {lower, upper}; }
   std::uint32_t name() const { return number(lower[3]); }
   std::uint32_t count() const { return number(upper[3]); }
   Lanes centre2() const { return lower + upper; }  // twice the centre
@@ -82,14 +82,14 @@ struct Item {
   }
 };
 
-float longest_side(const Box& box) {
+float longest_side(const GrowingBox& box) {
   const Lanes size = box.upper - box.lower;
   return std::max({size[0], size[1], size[2]});
 }
 
 /// What is known of items: their box, and that of their centres.
-struct Extent {
-  Box box, centres;
+struct SortExtent {
+  GrowingBox box, centres;
   std::uint32_t count = 0;  ///< triangles
 
   void add(const Item& item) {
@@ -98,7 +98,7 @@ struct Extent {
     centres.extend({centre2, centre2});
     count += item.count();
   }
-  void add(const Extent& other) {
+  void add(const SortExtent& other) {
     box.extend(other.box);
     centres.extend(other.centres);
     count += other.count;
@@ -108,7 +108,7 @@ struct Extent {
 /// Items that hang below one node.
 struct Range {
   std::span<Item> items;
-  Extent extent;
+  SortExtent extent;
   int depth;
 };
 
@@ -117,7 +117,8 @@ struct Slices {
   Lanes low, scale;
   int last;
 
-  Slices(const Box& centres, int count) : low(centres.lower), scale(all(0)), last(count - 1) {
+  Slices(const GrowingBox& centres, int count)
+      : low(centres.lower), scale(all(0)), last(count - 1) {
     low[3] = 0;
     for (int k = 0; k < 3; ++k) {
       const float size = centres.upper[k] - centres.lower[k];
@@ -144,7 +145,7 @@ struct Cut {
 /// The binned surface area heuristic's least.
 template <int kBins>
 Cut cheapest_cut(const Range& range, const Slices& slices) {
-  Box boxes[3][kBins];
+  GrowingBox boxes[3][kBins];
   std::uint32_t counts[3][kBins] = {};
   for (const Item& item : range.items) {
     const Places place = slices.of(item);
@@ -158,14 +159,14 @@ Cut cheapest_cut(const Range& range, const Slices& slices) {
   for (int axis = 0; axis < 3; ++axis) {
     if (!(slices.scale[axis] > 0)) continue;
     float right[kBins];
-    Box box;
+    GrowingBox box;
     std::uint32_t n = 0;
     for (int b = kBins - 1; b > 0; --b) {
       box.extend(boxes[axis][b]);
       n += counts[axis][b];
       right[b] = n == 0 ? kInfinity : box.half_area() * blocks_of(n);
     }
-    box = Box();
+    box = GrowingBox();
     n = 0;
     for (int b = 1; b < kBins; ++b) {
       box.extend(boxes[axis][b - 1]);
@@ -181,8 +182,8 @@ Cut cheapest_cut(const Range& range, const Slices& slices) {
   return best;
 }
 
-Extent extent_of(std::span<const Item> items) {
-  Extent extent;
+SortExtent extent_of(std::span<const Item> items) {
+  SortExtent extent;
   for (const Item& item : items) extent.add(item);
   return extent;
 }
@@ -213,7 +214,7 @@ std::array<Range, 2> halves(const Range& range) {
   const Cut cut = count < kMany ? cheapest_cut<8>(range, slices) : cheapest_cut<16>(range, slices);
   if (cut.axis < 0) return parted(range,
                                   count / 2);  // all centres coincide: any half is as good
-  Extent extent[2];
+  SortExtent extent[2];
   std::size_t left = 0, right = count;
   const auto is_left = [&](const Item& item) {
     const bool is = slices.of(item)[cut.axis] < cut.bin;
@@ -263,7 +264,7 @@ std::uint32_t add_node(const Range& range, std::vector<BvhNode>& nodes, const Is
   const auto index = static_cast<std::uint32_t>(nodes.size());
   nodes.emplace_back();
   for (int i = 0; i < kBvhWidth; ++i) {
-    const Box box = i < count ? children[std::size_t(i)].extent.box : Box();
+    const GrowingBox box = i < count ? children[std::size_t(i)].extent.box : GrowingBox();
     for (int k = 0; k < 3; ++k) {
       nodes[index].lower[k][i] = box.lower[k];
       nodes[index].upper[k][i] = box.upper[k];
@@ -291,15 +292,15 @@ std::span<Item> chunk_of(std::span<Item> items, std::size_t chunk) {
   return items.subspan(chunk * kChunk, std::min(kChunk, items.size() - chunk * kChunk));
 }
 
-Extent extent_of_many(std::span<Item> items) {
+SortExtent extent_of_many(std::span<Item> items) {
   return tbb::parallel_deterministic_reduce(
-      tbb::blocked_range<std::size_t>(0, chunks_of(items.size()), 1), Extent(),
-      [&](const tbb::blocked_range<std::size_t>& range, Extent extent) {
+      tbb::blocked_range<std::size_t>(0, chunks_of(items.size()), 1), SortExtent(),
+      [&](const tbb::blocked_range<std::size_t>& range, SortExtent extent) {
         for (std::size_t c = range.begin(); c < range.end(); ++c)
           extent.add(extent_of(chunk_of(items, c)));
         return extent;
       },
-      [](Extent a, const Extent& b) {
+      [](SortExtent a, const SortExtent& b) {
         a.add(b);
         return a;
       });
@@ -313,12 +314,12 @@ class CellTree {
  public:
   explicit CellTree(const Range& range)
       : range_(range), edge_(range.items.size() < kManyItems ? 8 : 16) {
-    const Box& centres = range.extent.centres;
+    const GrowingBox& centres = range.extent.centres;
     low_ = centres.lower;
     scale_ = all(static_cast<float>(edge_) / longest_side(centres));
     low_[3] = scale_[3] = 0;
     count_cells();
-    const Extent whole = extent_of(cells_);
+    const SortExtent whole = extent_of(cells_);
     add_top({cells_, whole, range.depth});
   }
 
@@ -352,10 +353,10 @@ class CellTree {
   void count_cells() {
     const std::size_t chunks = chunks_of(range_.items.size());
     of_chunk_.resize(chunks * cells_of_grid_);
-    tbb::enumerable_thread_specific<std::vector<Box>> boxes(
-        [this] { return std::vector<Box>(cells_of_grid_); });
+    tbb::enumerable_thread_specific<std::vector<GrowingBox>> boxes(
+        [this] { return std::vector<GrowingBox>(cells_of_grid_); });
     tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
-      std::vector<Box>& of_thread = boxes.local();
+      std::vector<GrowingBox>& of_thread = boxes.local();
       for (const Item& item : chunk_of(range_.items, c)) {
         const std::size_t cell = cell_of(item);
         ++of_chunk_[c * cells_of_grid_ + cell];
@@ -366,8 +367,8 @@ class CellTree {
       std::uint32_t count = 0;
       for (std::size_t c = 0; c < chunks; ++c) count += of_chunk_[c * cells_of_grid_ + cell];
       if (count == 0) continue;
-      Box box;
-      for (const std::vector<Box>& of_thread : boxes) box.extend(of_thread[cell]);
+      GrowingBox box;
+      for (const std::vector<GrowingBox>& of_thread : boxes) box.extend(of_thread[cell]);
       cells_.emplace_back(box, static_cast<std::uint32_t>(cell), count);
     }
   }
@@ -455,14 +456,14 @@ Tree tree_of(const Range& range) {
   return tree;
 }
 
-class Triangles {
+class TrianglesToSort {
  public:
-  Triangles(std::span<const double> vertices, std::span<const std::uint32_t> corners)
+  TrianglesToSort(std::span<const double> vertices, std::span<const std::uint32_t> corners)
       : vertices_(vertices), corners_(corners) {}
 
   Item item(std::uint32_t triangle) const {
     const double *a = corner(triangle, 0), *b = corner(triangle, 1), *c = corner(triangle, 2);
-    Box box;
+    GrowingBox box;
     for (int k = 0; k < 3; ++k) {
       box.lower[k] = rounded_down(std::min({a[k], b[k], c[k]}));
       box.upper[k] = rounded_up(std::max({a[k], b[k], c[k]}));
@@ -505,7 +506,7 @@ Bvh build_bvh(std::span<const double> vertices, std::span<const std::uint32_t> c
   const auto count = static_cast<std::uint32_t>(corners.size() / 3);
   Bvh bvh;
   if (count == 0) return bvh;
-  const Triangles triangles(vertices, corners);
+  const TrianglesToSort triangles(vertices, corners);
   auto items = std::make_unique_for_overwrite<Item[]>(count);
   tbb::parallel_for(std::uint32_t{0}, count,
                     [&](std::uint32_t t) { items[t] = triangles.item(t); });

@@ -40,10 +40,6 @@ class PlaneFit {
   }
 
  private:
-  static double dot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  }
-
   /// Minimum of Σ (n·x − n·p)² + weight |x − from|², by Cholesky's factors.
   Eigen::Vector3d solved(double weight, const Eigen::Vector3d& from) const {
     double l[3][3] = {};
@@ -141,8 +137,6 @@ Vector3d kept_inside(Vector3d x) {
   for (int k = 0; k < 3; ++k) x[k] = std::clamp(x[k], -kReach, kReach);
   return x;
 }
-
-double dot(const Vector3d& a, const Vector3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 Vector3d vertex_of(const CellField& field, const SurfaceCell& cell, int loop) {
   PlaneFit planes;

@@ -27,7 +27,6 @@ constexpr double kMargin = 1 + 1e-12;  // above relative roundings
 constexpr int kTriangleDepth = 5, kCellDepth = 5;
 constexpr std::size_t kMostPieces = 256, kMostParts = 4096;
 
-double dot(const Vector3d& a, const Vector3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 double length(const Vector3d& a) { return std::sqrt(dot(a, a)); }
 
 double largest(const std::vector<double>& values) {

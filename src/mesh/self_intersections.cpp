@@ -116,7 +116,7 @@ class TriangleBoxes {
   std::vector<std::vector<EightBoxes>> levels_;  ///< [0]: boxes of triangles; the last has one node
 };
 
-using Point = std::array<float, 3>;
+using FloatPoint = std::array<float, 3>;
 
 constexpr std::uint64_t kLeftOut = UINT64_MAX;
 constexpr int kIndexBits = 21;
@@ -133,11 +133,11 @@ std::uint64_t spread(std::uint64_t x) {
 }
 
 /// In [0, 1], with the order along each axis kept.
-RawArray<Point> placed(const std::vector<Eigen::Vector3d>& vertices) {
+RawArray<FloatPoint> placed(const std::vector<Eigen::Vector3d>& vertices) {
   const Eigen::AlignedBox3d bounds = bounds_of(vertices);
   const Eigen::Vector3d corner = bounds.min();
   const double width = bounds.sizes().maxCoeff();
-  RawArray<Point> points(vertices.size());
+  RawArray<FloatPoint> points(vertices.size());
   tbb::parallel_for(std::size_t{0}, vertices.size(), [&](const std::size_t v) {
     for (int k = 0; k < 3; ++k)
       points[v][static_cast<std::size_t>(k)] =
@@ -147,7 +147,7 @@ RawArray<Point> placed(const std::vector<Eigen::Vector3d>& vertices) {
 }
 
 /// Where a triangle's middle lies along the curve.
-std::uint64_t key_of(const RawArray<Point>& points, const Triangle& t) {
+std::uint64_t key_of(const RawArray<FloatPoint>& points, const Triangle& t) {
   std::uint64_t key = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const float middle = (points[t[0]][k] + points[t[1]][k] + points[t[2]][k]) / 3;
@@ -215,7 +215,7 @@ std::vector<EightBoxes> in_eights(const std::size_t count, const BoxOf& box_of) 
 
 TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
                              const std::vector<Triangle>& triangles) {
-  const RawArray<Point> points = placed(vertices);
+  const RawArray<FloatPoint> points = placed(vertices);
   RawArray<std::uint64_t> keys(triangles.size());
   tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
     keys[t] = is_degenerate(vertices, triangles[t])

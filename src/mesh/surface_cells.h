@@ -10,6 +10,11 @@
 
 namespace ist {
 
+/// Summed in this order.
+inline double dot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
 /// A grid of cubic cells around a solid.
 struct CellGrid {
   Eigen::Vector3d low = Eigen::Vector3d::Zero();  ///< [u]

@@ -19,9 +19,9 @@ namespace ist {
 namespace {
 
 constexpr std::size_t kDrawers = 256;  ///< by the hash's highest bits
-constexpr std::size_t kChunk = 16'384;
+constexpr std::size_t kWeldChunk = 16'384;
 
-struct Entry {
+struct WeldEntry {
   std::uint32_t hash, point;
 };
 
@@ -33,13 +33,13 @@ std::uint64_t hash_of_bits(const Eigen::Vector3d& p) {
 }
 
 /// The entries of a drawer come in the order of their points: the first of equal ones is kept.
-void find_first(const std::vector<Eigen::Vector3d>& points, const Entry* const entries,
+void find_first(const std::vector<Eigen::Vector3d>& points, const WeldEntry* const entries,
                 const std::size_t count, std::vector<std::uint32_t>& first) {
   constexpr std::uint32_t kFree = UINT32_MAX;
   const std::size_t mask = std::bit_ceil(2 * count + 1) - 1;
-  std::vector<Entry> table(mask + 1, Entry{0, kFree});
+  std::vector<WeldEntry> table(mask + 1, WeldEntry{0, kFree});
   for (std::size_t i = 0; i < count; ++i) {
-    const Entry& entry = entries[i];
+    const WeldEntry& entry = entries[i];
     std::size_t at = entry.hash & mask;
     while (table[at].point != kFree &&
            !(table[at].hash == entry.hash && points[table[at].point] == points[entry.point]))
@@ -55,12 +55,12 @@ void find_first(const std::vector<Eigen::Vector3d>& points, const Entry* const e
 std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& points,
                                        const std::vector<std::uint8_t>& used) {
   // Chunks of points count what they have for each drawer, then put it there in order.
-  const std::size_t chunks = (points.size() + kChunk - 1) / kChunk;
+  const std::size_t chunks = (points.size() + kWeldChunk - 1) / kWeldChunk;
   std::vector<std::uint64_t> hashes(points.size());
   std::vector<std::array<std::uint32_t, kDrawers>> place(chunks);
   const auto for_each_used = [&](const auto& visit) {
     tbb::parallel_for(std::size_t{0}, chunks, [&](const std::size_t c) {
-      for (std::size_t p = c * kChunk; p < std::min((c + 1) * kChunk, points.size()); ++p)
+      for (std::size_t p = c * kWeldChunk; p < std::min((c + 1) * kWeldChunk, points.size()); ++p)
         if (used[p] != 0) visit(c, p);
     });
   };
@@ -80,7 +80,7 @@ std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& point
     }
   }
   begin[kDrawers] = sum;
-  std::vector<Entry> entries(sum);
+  std::vector<WeldEntry> entries(sum);
   for_each_used([&](const std::size_t c, const std::size_t p) {
     entries[place[c][hashes[p] >> 56]++] = {static_cast<std::uint32_t>(hashes[p]),
                                             static_cast<std::uint32_t>(p)};
@@ -92,7 +92,7 @@ std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& point
   return first;
 }
 
-constexpr std::uint32_t kNone = UINT32_MAX;
+constexpr std::uint32_t kNoEntry = UINT32_MAX;
 
 std::uint64_t mix(std::uint64_t h, const std::uint64_t value) {
   h = (h ^ value) * 0x9e3779b97f4a7c15u;
@@ -103,17 +103,18 @@ std::uint64_t mix(std::uint64_t h, const std::uint64_t value) {
 class CellTable {
  public:
   explicit CellTable(const std::size_t vertices)
-      : mask_(std::bit_ceil(std::max<std::size_t>(vertices, 16)) - 1), heads_(mask_ + 1, kNone) {}
+      : mask_(std::bit_ceil(std::max<std::size_t>(vertices, 16)) - 1),
+        heads_(mask_ + 1, kNoEntry) {}
 
   void add(const std::uint64_t hash, const std::uint32_t vertex) {
-    if (vertex >= next_.size()) next_.resize(vertex + 1, kNone);
+    if (vertex >= next_.size()) next_.resize(vertex + 1, kNoEntry);
     next_[vertex] = heads_[hash & mask_];
     heads_[hash & mask_] = vertex;
   }
 
   template <class Visit>
   void visit(const std::uint64_t hash, const Visit& visit) const {
-    for (std::uint32_t v = heads_[hash & mask_]; v != kNone; v = next_[v]) visit(v);
+    for (std::uint32_t v = heads_[hash & mask_]; v != kNoEntry; v = next_[v]) visit(v);
   }
 
  private:
@@ -195,7 +196,7 @@ TriangleMesh weld_among(const TriangleMesh& mesh, const double tolerance,
                         const std::vector<bool>& among) {
   const std::vector<std::uint8_t> used = referenced(mesh);
   TriangleMesh result;
-  std::vector<std::uint32_t> kept_as(mesh.vertices.size(), kNone);
+  std::vector<std::uint32_t> kept_as(mesh.vertices.size(), kNoEntry);
   CellTable table(mesh.vertices.size());
   // Cells as wide as the tolerance: what is near enough lies in one of 27.
   const auto cell_of = [&](const Eigen::Vector3d& p) {
@@ -207,7 +208,7 @@ TriangleMesh weld_among(const TriangleMesh& mesh, const double tolerance,
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     if (used[i] == 0) continue;
     const Eigen::Vector3d& p = mesh.vertices[i];
-    std::uint32_t first = kNone;
+    std::uint32_t first = kNoEntry;
     if (among[i]) {
       const Cell cell = cell_of(p);
       for (int dx = -reach; dx <= reach; ++dx)
@@ -220,7 +221,7 @@ TriangleMesh weld_among(const TriangleMesh& mesh, const double tolerance,
                           if (near && v < first) first = v;
                         });
     }
-    if (first == kNone) {
+    if (first == kNoEntry) {
       first = static_cast<std::uint32_t>(result.vertices.size());
       result.vertices.emplace_back(p + Eigen::Vector3d::Zero());
       if (among[i]) table.add(hash_of(cell_of(p)), first);

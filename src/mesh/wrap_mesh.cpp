@@ -28,7 +28,7 @@ constexpr double kBeyond = 3.37;   ///< steps of lattice around the bounds; no p
 constexpr double kFarthest = 2;    ///< steps: values beyond are cut
 constexpr double kKeptByWrap = 2;  ///< steps: thickened walls end about one from their middle
 constexpr double kClearly = 0.75;  ///< winding number of what is no hole's other side
-constexpr std::uint32_t kBlock = 16;  ///< points along a side of what is decided at once
+constexpr std::uint32_t kBlockSide = 16;  ///< points along a side of what is decided at once
 
 /// Whether nothing a step behind either side of a triangle is clearly inside: it is a sheet, or a
 /// wall that the lattice may miss. Of a large one, whether that is so at two of four points.
@@ -170,17 +170,17 @@ DistanceGrid sample(const Wrap& wrap, const Eigen::AlignedBox3d& bounds, double 
   for (std::size_t k = 0; k < 3; ++k) {
     const double extent = bounds.sizes()[static_cast<int>(k)] / step + 2 * kBeyond;
     grid.size[k] = static_cast<std::uint32_t>(std::ceil(extent)) + 1;
-    blocks[k] = (grid.size[k] + kBlock - 1) / kBlock;
+    blocks[k] = (grid.size[k] + kBlockSide - 1) / kBlockSide;
     count *= grid.size[k];
   }
   grid.values.resize(count);
   const Sampler sampler(wrap, grid);
   tbb::parallel_for(
       std::size_t{0}, std::size_t{blocks[0]} * blocks[1] * blocks[2], [&](std::size_t b) {
-        const auto at = [&](std::size_t of) { return static_cast<std::uint32_t>(of) * kBlock; };
+        const auto at = [&](std::size_t of) { return static_cast<std::uint32_t>(of) * kBlockSide; };
         sampler.fill(
             {at(b % blocks[0]), at(b / blocks[0] % blocks[1]), at(b / blocks[0] / blocks[1])},
-            kBlock);
+            kBlockSide);
       });
   return grid;
 }

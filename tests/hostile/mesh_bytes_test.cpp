@@ -18,7 +18,7 @@ using testing::AlignedBytes;
 Asset alone(TriangleMesh mesh) { return bake_surface(close_mesh(std::move(mesh), "mesh")); }
 
 /// Reads all that a query may: the address sanitizer sees what lies outside.
-void walk(const AlignedBytes& bytes) {
+void walk_mesh(const AlignedBytes& bytes) {
   TreeView view;
   ASSERT_EQ(TreeView::from_bytes(bytes.span(), view), AssetStatus::ok);
   ASSERT_TRUE(view.has_mesh());
@@ -71,7 +71,7 @@ TEST(MeshBytes, EveryHostileWordIsRefusedOrHarmless) {
         }
         ++accepted;
         SCOPED_TRACE("byte " + std::to_string(at) + " = " + std::to_string(value));
-        walk(changed);
+        walk_mesh(changed);
         if (HasFailure()) return;
       }
     EXPECT_GT(refused, 1000u);

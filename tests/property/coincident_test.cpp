@@ -29,7 +29,7 @@ Pose small_pose(const Vector3d& shift, const Vector3d& turn) {
 }
 
 /// `turn` after the pose's own, about the origin of B.
-Pose moved(const Pose& pose, const Vector3d& shift, const Vector3d& turn) {
+Pose moved_by(const Pose& pose, const Vector3d& shift, const Vector3d& turn) {
   Pose result = small_pose(shift, turn);
   const Eigen::Quaterniond both =
       Eigen::Quaterniond(result.q[0], result.q[1], result.q[2], result.q[3]) *
@@ -116,7 +116,7 @@ TEST_F(CoincidentInstances, AnswerTheBlendedSumAndItsGradient) {
     for (int k = 0; k < 3; ++k) {
       const Vector3d step = h * Vector3d::Unit(k), none = Vector3d::Zero();
       const auto at = [&](const Vector3d& shift, const Vector3d& turn) {
-        return reference(placed(moved(b.pose, shift, turn), b.scale));
+        return reference(placed(moved_by(b.pose, shift, turn), b.scale));
       };
       force[k] = (at(step, none) - at(-step, none)) / (2 * h);
       torque[k] = (at(none, step) - at(none, -step)) / (2 * h);

@@ -17,7 +17,7 @@ namespace {
 
 using namespace testing;
 
-constexpr double kPi = std::numbers::pi;
+constexpr double kHalfTurn = std::numbers::pi;
 
 TEST(TimeOfImpact, OfACubeThatFallsOnAPlane) {
   const PlacedField floor{HalfSpaceField{}, {}, 1};
@@ -51,7 +51,7 @@ TEST(TimeOfImpact, OfASpinningRodAndAWall) {
   // The rod turns about its middle, d before the wall: cos θ + 0.05 sin θ = d, with x and z
   // swapped.
   for (const double d : {0.3, 0.7, 0.95}) {
-    double low = 0, high = kPi / 2;
+    double low = 0, high = kHalfTurn / 2;
     for (int i = 0; i < 100; ++i) {
       const double middle = (low + high) / 2;
       (std::sin(middle) + 0.05 * std::cos(middle) < d ? low : high) = middle;
@@ -84,7 +84,7 @@ TEST(TimeOfImpact, OfASpinningRodAndAWall) {
   }
   // Just out of reach, for a hundred thousand turns.
   ImpactSettings settings;
-  settings.duration = 1e5 * 2 * kPi;
+  settings.duration = 1e5 * 2 * kHalfTurn;
   settings.tolerance = 1e-4;
   const TimeOfImpact clear =
       time_of_impact(PlacedField{HalfSpaceField{}, {}, 1}, {rod().view(), at({0, 0, 1.01}), 1},

@@ -33,8 +33,8 @@ const ClosedMesh& fine_torus() {  // 50,000 triangles
   return mesh;
 }
 
-const ClosedMesh& cube() {
-  static const ClosedMesh mesh = testing::closed(testing::cube_mesh(), "cube");
+const ClosedMesh& closed_cube() {
+  static const ClosedMesh mesh = testing::closed(testing::cube_mesh(), "closed_cube");
   return mesh;
 }
 
@@ -123,7 +123,7 @@ TEST(BakeToError, AMetTargetHoldsAtOtherPoses) {
 }
 
 TEST(BakeToError, PredictsByClassOfOverlap) {
-  const TargetedAsset result = bake_to_error(cube(), {0.2, 0.01});
+  const TargetedAsset result = bake_to_error(closed_cube(), {0.2, 0.01});
   const PredictedErrors errors = result.asset.view().predicted_errors();
   EXPECT_GE(errors.poses, 100u);
   double to = 1;
@@ -139,13 +139,13 @@ TEST(BakeToError, PredictsByClassOfOverlap) {
 }
 
 TEST(BakeToError, AMissedTargetIsSaidWithItsReason) {
-  const TargetedAsset few = bake_to_error(cube(), {0.01, 0.001}, {.max_spheres = 80});
+  const TargetedAsset few = bake_to_error(closed_cube(), {0.01, 0.001}, {.max_spheres = 80});
   EXPECT_FALSE(few.met);
   EXPECT_EQ(few.stop, StopReason::sphere_count);
   EXPECT_GT(few.measured_error, 0.01);
   EXPECT_GE(few.poses, 40u);
   const TargetedAsset thin =
-      bake_to_error(cube(), {0.05, 0.001}, {.max_spheres = 0, .target_coverage = 0.5});
+      bake_to_error(closed_cube(), {0.05, 0.001}, {.max_spheres = 0, .target_coverage = 0.5});
   EXPECT_FALSE(thin.met);
   EXPECT_EQ(thin.stop, StopReason::coverage);
   EXPECT_GT(thin.measured_error, 0.05);

@@ -14,7 +14,7 @@ namespace {
 
 using namespace testing;
 
-TriangleMesh moved(TriangleMesh mesh, const double scale, const Eigen::Vector3d& by) {
+TriangleMesh scaled_and_moved(TriangleMesh mesh, const double scale, const Eigen::Vector3d& by) {
   for (auto& v : mesh.vertices) v = v * scale + by;
   return mesh;
 }
@@ -92,12 +92,12 @@ TEST(CloseMesh, FlatAndCollapsedAreRefused) {
   for (auto& v : lens.vertices) v[1] = 0;
   EXPECT_NE(error_of(lens, OpenMeshPolicy::repair).find("flat"), std::string::npos);
   // A sphere of size 1e-3 at 1e6, in float.
-  TriangleMesh sphere = moved(icosphere_mesh(2), 1e-3, Eigen::Vector3d::Constant(1e6));
+  TriangleMesh sphere = scaled_and_moved(icosphere_mesh(2), 1e-3, Eigen::Vector3d::Constant(1e6));
   EXPECT_EQ(error_of(sphere), "accepted");
   for (auto& v : sphere.vertices) v = v.cast<float>().cast<double>();
   EXPECT_NE(error_of(sphere).find("too few digits"), std::string::npos);
   // Not all of it gone, but most.
-  TriangleMesh coarse = moved(icosphere_mesh(4), 0.2, Eigen::Vector3d::Constant(1e6));
+  TriangleMesh coarse = scaled_and_moved(icosphere_mesh(4), 0.2, Eigen::Vector3d::Constant(1e6));
   for (auto& v : coarse.vertices) v = v.cast<float>().cast<double>();
   EXPECT_NE(error_of(coarse).find("too few digits"), std::string::npos);
 }
@@ -107,10 +107,11 @@ TEST(CloseMesh, WhatDoubleCannotCubeIsRefused) {
   const TriangleMesh mesh = joined(cube_mesh(), box_mesh(Eigen::Vector3d(0.5, 0, 0), {1, 1, 1}));
   EXPECT_EQ(error_of(mesh), "accepted");
   for (const double scale : {1e124, 1e300, 1e-100, 1e-300})
-    EXPECT_NE(error_of(moved(mesh, scale, kZero)).find("is out of range. Scale or move it"),
-              std::string::npos)
+    EXPECT_NE(
+        error_of(scaled_and_moved(mesh, scale, kZero)).find("is out of range. Scale or move it"),
+        std::string::npos)
         << scale;
-  EXPECT_NE(error_of(moved(mesh, 1e86, Eigen::Vector3d::Constant(1e101)))
+  EXPECT_NE(error_of(scaled_and_moved(mesh, 1e86, Eigen::Vector3d::Constant(1e101)))
                 .find("is out of range. Scale or move it"),
             std::string::npos);
 }
@@ -129,7 +130,8 @@ TEST(CloseMesh, InsideOutIsTurned) {
 }
 
 TEST(CloseMesh, CavitiesStay) {
-  const TriangleMesh outer = moved(cube_mesh(), 4, kZero), inner = moved(cube_mesh(), 2, kZero);
+  const TriangleMesh outer = scaled_and_moved(cube_mesh(), 4, kZero),
+                     inner = scaled_and_moved(cube_mesh(), 2, kZero);
   const TriangleMesh core = cube_mesh();
   const ClosedMesh hollow = close_mesh(joined(outer, inverted(inner)), "hollow");
   EXPECT_EQ(hollow.report.cavities, 1u);
@@ -150,7 +152,8 @@ TEST(CloseMesh, CavitiesStay) {
 }
 
 TEST(CloseMesh, NestedSolidsAndOverlapsKeepTheirWindingNumber) {
-  const ClosedMesh nested = close_mesh(joined(moved(cube_mesh(), 4, kZero), cube_mesh()), "nested");
+  const ClosedMesh nested =
+      close_mesh(joined(scaled_and_moved(cube_mesh(), 4, kZero), cube_mesh()), "nested");
   EXPECT_DOUBLE_EQ(nested.report.volume, 65);  // counted twice, as stated
   EXPECT_TRUE(has_note(nested.report, "winding number"));
   const ClosedMesh overlapping = close_mesh(overlapping_cubes_mesh(), "overlap");
@@ -171,8 +174,8 @@ TEST(CloseMesh, CoincidentFacesAreTheirSignedSum) {
   EXPECT_EQ(twice.report.coincident_triangles, 12u);
   EXPECT_DOUBLE_EQ(twice.report.volume, 1);
   // Face to face: the double wall goes.
-  const TriangleMesh block =
-      joined(box_mesh(kZero, {1, 1, 1}), moved(box_mesh(kZero, {1, 1, 1}), 1, {1, 0, 0}));
+  const TriangleMesh block = joined(box_mesh(kZero, {1, 1, 1}),
+                                    scaled_and_moved(box_mesh(kZero, {1, 1, 1}), 1, {1, 0, 0}));
   const ClosedMesh joined_block = close_mesh(block, "block");
   EXPECT_EQ(joined_block.report.coincident_triangles, 4u);
   EXPECT_EQ(joined_block.mesh.triangles.size(), 20u);

@@ -21,7 +21,7 @@ using testing::closed;
 using testing::cover_on_host;
 
 /// A packing; in a sliver, where packing has no end of equal places, equal spheres at random.
-std::vector<Sphere> packed(const MeshSolid& solid, std::size_t count) {
+std::vector<Sphere> packed_for_cover(const MeshSolid& solid, std::size_t count) {
   const Vector3d size = solid.bounds().sizes() / solid.frame().scale();
   if (size.minCoeff() < 1e-3) {
     std::mt19937_64 random(5);
@@ -93,7 +93,7 @@ TEST(Cover, HoldsEveryPointOfTheSolid) {
   for (const Case& c : cases()) {
     const MeshSolid solid(closed(c.mesh, c.name));
     for (const std::size_t count : {1u, 30u, 300u}) {
-      const std::vector<Sphere> inner = packed(solid, count);
+      const std::vector<Sphere> inner = packed_for_cover(solid, count);
       const std::vector<float> covers = cover_on_host(solid, inner);
       ASSERT_EQ(covers.size(), inner.size());
       for (std::size_t k = 0; k < inner.size(); ++k) EXPECT_GE(covers[k], inner[k].r);
@@ -106,7 +106,7 @@ TEST(Cover, HoldsEveryPointOfTheSolid) {
 TEST(Cover, ShrunkRadiiLeaveGaps) {
   for (const Case& c : cases()) {
     const MeshSolid solid(closed(c.mesh, c.name));
-    const std::vector<Sphere> inner = packed(solid, 30);
+    const std::vector<Sphere> inner = packed_for_cover(solid, 30);
     std::vector<float> covers = cover_on_host(solid, inner);
     for (float& r : covers) r *= 0.7f;
     EXPECT_GT(worst_gap(solid, inner, covers), 0) << c.name;
@@ -117,7 +117,7 @@ TEST(Cover, IsTight) {
   const MeshSolid solid(closed(testing::torus_mesh(1, 0.3, 64, 32), "torus"));
   double before = 1;
   for (const std::size_t count : {100u, 1'000u}) {
-    const std::vector<Sphere> inner = packed(solid, count);
+    const std::vector<Sphere> inner = packed_for_cover(solid, count);
     const std::vector<float> covers = cover_on_host(solid, inner);
     double sum = 0;  // how far cover balls stick out of the solid
     for (std::size_t k = 0; k < inner.size(); ++k) {
@@ -133,7 +133,7 @@ TEST(Cover, IsTight) {
 
 TEST(Cover, SameBytesForAnyThreadCount) {
   const MeshSolid solid(closed(testing::torus_mesh(1, 0.3, 64, 32), "torus"));
-  const std::vector<Sphere> inner = packed(solid, 300);
+  const std::vector<Sphere> inner = packed_for_cover(solid, 300);
   const std::vector<float> one = cover_on_host(solid, inner, 1);
   for (const unsigned threads : {2u, 7u}) EXPECT_EQ(one, cover_on_host(solid, inner, threads));
 }

@@ -68,7 +68,7 @@ Penetration by_cpu(const Field& field, const BatchPair& pair, Measure measure) {
 
 /// By how much an answer is off: parts of the volume, and of the surface or lever that go with the
 /// larger of it and of a thousandth of what the tree has.
-struct Off {
+struct FieldOff {
   double volume = 0, push = 0, turn = 0, centre = 0;
 
   void look(const Penetration& gpu, const Penetration& cpu, double size) {
@@ -87,7 +87,7 @@ TEST(GpuFields, AnswersAreTheCpus) {
   const auto named = batch_fields();
   HostBatch batch(mixed_solids());
   for (std::uint32_t f = 0; f < named.size(); ++f) {
-    Off off;
+    FieldOff off;
     std::size_t met = 0, crossed = 0;
     for (const Measure measure : {Measure::matched, Measure::inner}) {
       const std::vector<BatchPair> pairs = pairs_with(f, 300, 30 + f);
@@ -133,7 +133,7 @@ TEST(GpuFields, AlignedSolidsToo) {
   const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 7);
   const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched);
   Workspace workspace;
-  Off off;
+  FieldOff off;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const BatchPair& pair = pairs[i];
     const Asset& body = pair.b == 0 ? cube() : batch_assets()[3];
@@ -179,7 +179,7 @@ TEST(GpuFields, CentresOnEdges) {
   const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 7);
   const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched);
   Workspace workspace;
-  Off off;
+  FieldOff off;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const Penetration cpu =
         penetration(PlacedField{fields[pairs[i].a - 1], {}, 1},
@@ -239,7 +239,7 @@ TEST(GpuFields, CentresOnEdgesOfManyTriangles) {
   HostBatch batch(with_fields({body.view()}, fields));
   const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 7);
   Workspace workspace;
-  Off off;
+  FieldOff off;
   for (std::size_t i = 0; i < pairs.size(); ++i)
     off.look(by_warp[i],
              penetration(PlacedField{fields[0], {}, 1}, PlacedTree{body.view(), pairs[i].pose_b, 1},
@@ -287,7 +287,7 @@ TEST(GpuFields, NodesOnATrianglesPlane) {
   HostBatch batch(solids);
   const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched);
   Workspace workspace;
-  Off off;
+  FieldOff off;
   for (std::size_t i = 0; i < pairs.size(); ++i)
     off.look(by_one[i],
              penetration(PlacedField{fields[0], {}, 1},
@@ -324,7 +324,7 @@ TEST(GpuFields, ProbesOfAnySize) {
     const std::vector<Penetration> by_warp = batch.run(pairs, Measure::matched, 3);
     const std::vector<Penetration> by_one = batch.run(pairs, Measure::matched);
     Workspace workspace;
-    Off off;
+    FieldOff off;
     int met = 0;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       const Penetration cpu =
@@ -374,7 +374,7 @@ TEST(GpuFields, OracleRowsAreTheCpus) {
   HostBatch batch(with_fields(trees, surfaces));
   const std::vector<Penetration> answers = batch.run(pairs, Measure::matched);
   Workspace workspace;
-  Off off;
+  FieldOff off;
   std::size_t met = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const auto [a, b] = placed(rows[i], kSpheres);

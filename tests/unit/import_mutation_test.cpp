@@ -29,16 +29,16 @@ void survive_damage(const std::string& name, const std::string& bytes) {
   }
 }
 
-const std::string kCorners = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
+const std::string kCornerText = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
 const std::string kFaces = "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
 
 TEST(DamagedFiles, Text) {
-  survive_damage("a.off", "OFF\n4 4 6\n" + kCorners + kFaces);
+  survive_damage("a.off", "OFF\n4 4 6\n" + kCornerText + kFaces);
   survive_damage("a.ply",
                  "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
                  "property float z\nelement face 4\nproperty list uchar int vertex_indices\n"
                  "end_header\n" +
-                     kCorners + kFaces);
+                     kCornerText + kFaces);
   survive_damage(
       "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1/1 2/2 4/3\nf -3 -2 -1\nf 1 4 3\n");
   survive_damage("a.stl",

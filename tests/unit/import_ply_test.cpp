@@ -30,8 +30,8 @@ class Bytes {
   bool big_endian_;
 };
 
-constexpr double kCorners[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-constexpr int kFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
+constexpr double kPlyCorners[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+constexpr int kPlyFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
 
 std::string header(const std::string& format, const std::string& vertex_type,
                    const std::string& index_type) {
@@ -45,10 +45,10 @@ template <class Vertex, class Index>
 std::string binary(const bool big_endian, const std::string& vertex_type,
                    const std::string& index_type) {
   Bytes body(big_endian);
-  for (const auto& c : kCorners)
+  for (const auto& c : kPlyCorners)
     body << static_cast<Vertex>(c[0]) << std::uint8_t{7} << static_cast<Vertex>(c[1])
          << static_cast<Vertex>(c[2]);
-  for (const auto& f : kFaces) {
+  for (const auto& f : kPlyFaces) {
     body << std::uint8_t{3};
     for (const int v : f) body << static_cast<Index>(v);
   }
@@ -65,7 +65,7 @@ void expect_tetrahedron(const std::string& bytes) {
   EXPECT_NEAR(close_mesh(mesh, "tetrahedron").report.volume, 1.0 / 6, 1e-15);
 }
 
-std::string error_of(const std::string& bytes) {
+std::string ply_error_of(const std::string& bytes) {
   try {
     load(bytes);
   } catch (const Error& error) {
@@ -105,8 +105,8 @@ TEST(ReadPly, TextKeepsAllDigitsOfADouble) {
 TEST(ReadPly, EveryCutIsAnError) {
   const std::string whole = binary<float, std::int32_t>(false, "float", "int");
   for (std::size_t length = 1; length < whole.size(); ++length)
-    EXPECT_NE(error_of(whole.substr(0, length)), "accepted") << length;
-  EXPECT_NE(error_of(whole.substr(0, whole.size() - 1)).find("ends early"), std::string::npos);
+    EXPECT_NE(ply_error_of(whole.substr(0, length)), "accepted") << length;
+  EXPECT_NE(ply_error_of(whole.substr(0, whole.size() - 1)).find("ends early"), std::string::npos);
 }
 
 TEST(ReadPly, CountsAreCheckedBeforeMemoryIsTaken) {
@@ -114,10 +114,10 @@ TEST(ReadPly, CountsAreCheckedBeforeMemoryIsTaken) {
        {"2147483647", "18446744073709551615", "-1", "9223372036854775807"}) {
     std::string bytes = binary<float, std::int32_t>(false, "float", "int");
     bytes.replace(bytes.find("vertex 4"), 8, "vertex " + lie);
-    EXPECT_NE(error_of(bytes), "accepted") << lie;
+    EXPECT_NE(ply_error_of(bytes), "accepted") << lie;
   }
-  EXPECT_NE(error_of("ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\n"
-                     "property float y\nproperty float z\nend_header\n0 0 0\n")
+  EXPECT_NE(ply_error_of("ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\n"
+                         "property float y\nproperty float z\nend_header\n0 0 0\n")
                 .find("too short"),
             std::string::npos);
 }
@@ -143,8 +143,8 @@ TEST(ReadPly, IndicesAreChecked) {
     std::string bytes = binary<float, std::int32_t>(false, "float", "int");
     bytes.replace(bytes.size() - 4, 4,
                   std::string(reinterpret_cast<const char*>(&bad), sizeof bad));
-    EXPECT_NE(error_of(bytes).find("face 3: corner 2 is not a vertex"), std::string::npos)
-        << error_of(bytes);
+    EXPECT_NE(ply_error_of(bytes).find("face 3: corner 2 is not a vertex"), std::string::npos)
+        << ply_error_of(bytes);
   }
 }
 
@@ -153,8 +153,9 @@ TEST(ReadPly, NonFiniteVertexIsNamedOnlyIfUsed) {
       "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
       "property float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n";
   EXPECT_EQ(load(start + "0 0 0\nnan 0 0\n1 0 0\n0 1 0\n3 0 2 3\n").vertices.size(), 3u);
-  EXPECT_NE(error_of(start + "0 0 0\nnan 0 0\n1 0 0\n0 1 0\n3 0 1 3\n").find("line 11: vertex 1"),
-            std::string::npos);
+  EXPECT_NE(
+      ply_error_of(start + "0 0 0\nnan 0 0\n1 0 0\n0 1 0\n3 0 1 3\n").find("line 11: vertex 1"),
+      std::string::npos);
 }
 
 }  // namespace

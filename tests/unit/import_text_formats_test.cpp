@@ -16,13 +16,13 @@ namespace {
 
 using testing::TempFile;
 
-TriangleMesh load(const std::string& name, const std::string& bytes) {
+TriangleMesh load_text(const std::string& name, const std::string& bytes) {
   return load_mesh(TempFile(name, bytes).path());
 }
 
 std::string error_of(const std::string& name, const std::string& bytes) {
   try {
-    load(name, bytes);
+    load_text(name, bytes);
   } catch (const Error& error) {
     return error.what();
   }
@@ -43,26 +43,27 @@ void expect_tetrahedron(const TriangleMesh& mesh) {
 }
 
 TEST(ReadObj, Grammar) {
-  expect_tetrahedron(load("a.obj", kObj + kObjFaces));
-  expect_tetrahedron(load("a.OBJ", kObjFaces + kObj));  // faces first
-  expect_tetrahedron(load("a.obj", "\xef\xbb\xbf# c\r\nmtllib x\r\n" + kObj +
-                                       "vn 0 0 1\nvt 0 0\no a\ng b\nusemtl m\ns off\n"
-                                       "f 1/1 3/1 2/1\nf 1//1 2//1 4//1\nf -3/1/1 -2/1/1 -1/1/1\n"
-                                       "f 1 4 \\\n 3"));
+  expect_tetrahedron(load_text("a.obj", kObj + kObjFaces));
+  expect_tetrahedron(load_text("a.OBJ", kObjFaces + kObj));  // faces first
   expect_tetrahedron(
-      load("a.obj", "v 0 0 0 1 0 0\nv +1 0 0\nv 0 1e0 0 # one\nv 0 0 .1e1\n" + kObjFaces));
+      load_text("a.obj", "\xef\xbb\xbf# c\r\nmtllib x\r\n" + kObj +
+                             "vn 0 0 1\nvt 0 0\no a\ng b\nusemtl m\ns off\n"
+                             "f 1/1 3/1 2/1\nf 1//1 2//1 4//1\nf -3/1/1 -2/1/1 -1/1/1\n"
+                             "f 1 4 \\\n 3"));
+  expect_tetrahedron(
+      load_text("a.obj", "v 0 0 0 1 0 0\nv +1 0 0\nv 0 1e0 0 # one\nv 0 0 .1e1\n" + kObjFaces));
 }
 
 TEST(ReadObj, KeepsAllDigitsOfADouble) {
   const TriangleMesh mesh =
-      load("a.obj", "v 1000000.0000001234 0.1 1e-300\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+      load_text("a.obj", "v 1000000.0000001234 0.1 1e-300\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   EXPECT_EQ(mesh.vertices[0], Eigen::Vector3d(1000000.0000001234, 0.1, 1e-300));
 }
 
 TEST(ReadObj, ReadsPointsWhateverTheLocale) {
   const std::string before = std::setlocale(LC_ALL, nullptr);
   for (const char* name : {"de_DE.UTF-8", "fr_FR.UTF-8"}) std::setlocale(LC_ALL, name);
-  EXPECT_EQ(load("a.obj", "v 1.5 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n").vertices[0][0], 1.5);
+  EXPECT_EQ(load_text("a.obj", "v 1.5 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n").vertices[0][0], 1.5);
   std::setlocale(LC_ALL, before.c_str());
 }
 
@@ -80,7 +81,7 @@ TEST(ReadObj, ErrorsNameTheLine) {
 }
 
 TEST(ReadObj, IgnoresWhatNoFaceUses) {
-  const TriangleMesh mesh = load("a.obj", kObj + "v nan 1e400 0\nv 1e20 0 0\n" + kObjFaces);
+  const TriangleMesh mesh = load_text("a.obj", kObj + "v nan 1e400 0\nv 1e20 0 0\n" + kObjFaces);
   expect_tetrahedron(mesh);
 }
 
@@ -88,7 +89,7 @@ TEST(ReadObj, ConcavePolygonKeepsItsShape) {
   // An L, and an arrow head whose first corner sees not all of it.
   const std::string l = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\n";
   for (const std::string face : {"f 1 2 3 4 5 6\n", "f 3 4 5 6 1 2\n", "f 5 6 1 2 3 4\n"}) {
-    const TriangleMesh mesh = load("a.obj", l + face);
+    const TriangleMesh mesh = load_text("a.obj", l + face);
     double area = 0;
     for (const auto& t : mesh.triangles) {
       const auto& v = mesh.vertices;
@@ -112,7 +113,7 @@ TEST(ReadObj, ManyLargeConcavePolygonsAreReadSoon) {
     for (int i = 2 * kTeeth + 2; i > 0; --i) text << ' ' << i;
     text << '\n';
   }
-  const TriangleMesh mesh = load("a.obj", text.str());
+  const TriangleMesh mesh = load_text("a.obj", text.str());
   ASSERT_EQ(mesh.triangles.size(), std::size_t{kCopies} * 2 * kTeeth);
   double area = 0;
   for (const auto& [a, b, c] : mesh.triangles) {
@@ -140,16 +141,16 @@ TEST(ReadObj, ManyLargeConcavePolygonsAreReadSoon) {
 TEST(ReadOff, Grammar) {
   const std::string body =
       "4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
-  expect_tetrahedron(load("a.off", "OFF\n" + body));
-  expect_tetrahedron(load("a.off", "# c\nOFF " + body));
+  expect_tetrahedron(load_text("a.off", "OFF\n" + body));
+  expect_tetrahedron(load_text("a.off", "# c\nOFF " + body));
   expect_tetrahedron(
-      load("a.off", "OFF 4 4 6 0 0 0 1 0 0 0 1 0 0 0 1 3 0 2 1 3 0 1 3 3 1 2 3 3 0 3 2"));
-  expect_tetrahedron(load("a.off",
-                          "COFF\n4 4 6\n0 0 0 255 0 0 1\n1 0 0 9 9 9 1\n0 1 0 1 1 1 1\n"
-                          "0 0 1 1 1 1 1\n3 0 2 1 255 0 0\n3 0 1 3\n3 1 2 3 7\n3 0 3 2\n"));
-  expect_tetrahedron(load("a.off",
-                          "NOFF\n4 4 6\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n"
-                          "0 0 1 0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"));
+      load_text("a.off", "OFF 4 4 6 0 0 0 1 0 0 0 1 0 0 0 1 3 0 2 1 3 0 1 3 3 1 2 3 3 0 3 2"));
+  expect_tetrahedron(load_text("a.off",
+                               "COFF\n4 4 6\n0 0 0 255 0 0 1\n1 0 0 9 9 9 1\n0 1 0 1 1 1 1\n"
+                               "0 0 1 1 1 1 1\n3 0 2 1 255 0 0\n3 0 1 3\n3 1 2 3 7\n3 0 3 2\n"));
+  expect_tetrahedron(load_text("a.off",
+                               "NOFF\n4 4 6\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n"
+                               "0 0 1 0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"));
 }
 
 TEST(ReadOff, Errors) {
@@ -197,13 +198,13 @@ std::string stl_binary(const std::string& header = "") {
 }
 
 TEST(ReadStl, TextAndBinary) {
-  expect_tetrahedron(load("a.stl", stl_text()));
+  expect_tetrahedron(load_text("a.stl", stl_text()));
   std::string upper = stl_text();
   for (char& c : upper) c = static_cast<char>(std::toupper(c));
-  expect_tetrahedron(load("a.STL", upper));
-  expect_tetrahedron(load("a.stl", stl_binary()));
-  expect_tetrahedron(load("a.stl", stl_binary("solid exported by something")));
-  expect_tetrahedron(load("a.stl", stl_binary("solid") + "trailing"));
+  expect_tetrahedron(load_text("a.STL", upper));
+  expect_tetrahedron(load_text("a.stl", stl_binary()));
+  expect_tetrahedron(load_text("a.stl", stl_binary("solid exported by something")));
+  expect_tetrahedron(load_text("a.stl", stl_binary("solid") + "trailing"));
 }
 
 TEST(ReadStl, Errors) {

@@ -18,9 +18,9 @@ namespace {
 using Eigen::Vector3d;
 using ist::Solid;
 
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kHalfTurn = 3.14159265358979323846;
 
-std::unique_ptr<Solid> bored_box() {
+std::unique_ptr<Solid> box_with_bore() {
   return ist::make_difference(ist::make_box({0.1, 0, 0}, {1, 0.7, 0.4}),
                               ist::make_ball({1, 0.7, 0.4}, 0.5));
 }
@@ -41,7 +41,7 @@ std::vector<Case> cases() {
   all.push_back({"box", ist::make_box({0.1, -0.2, 0}, {0.5, 1, 0.25}), 1e-3});
   all.push_back({"torus", ist::make_torus({0, 0.3, 0}, 0.8, 0.3), 0.1});
   all.push_back({"snowman", snowman(), 0.3});
-  all.push_back({"bored box", bored_box(), 0.3});
+  all.push_back({"bored box", box_with_bore(), 0.3});
   return all;
 }
 
@@ -140,7 +140,7 @@ TEST(Polygonise, BoxesAreExact) {
 }
 
 TEST(Polygonise, SameBytesForAnyNumberOfThreads) {
-  const auto solid = bored_box();
+  const auto solid = box_with_bore();
   const ist::Polygonised all = ist::polygonise(*solid, 40);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   const ist::Polygonised alone = ist::polygonise(*solid, 40);
@@ -182,7 +182,7 @@ class Faulty final : public Solid {
   Eigen::AlignedBox3d bounds() const override {
     return {Vector3d::Constant(-bound_), Vector3d::Constant(bound_)};
   }
-  double volume() const override { return 4 * kPi / 3; }
+  double volume() const override { return 4 * kHalfTurn / 3; }
 
  private:
   double slope_, bound_;

@@ -13,11 +13,11 @@
 namespace ist::testing {
 namespace {
 
-RobotModel robot_of(const std::string& text) { return read_robot(SourceFile{"r.urdf", text}); }
+RobotModel model_of(const std::string& text) { return read_robot(SourceFile{"r.urdf", text}); }
 
-std::string error_of(const std::string& text) {
+std::string model_error_of(const std::string& text) {
   try {
-    robot_of(text);
+    model_of(text);
   } catch (const Error& error) {
     return error.what();
   }
@@ -30,7 +30,7 @@ std::string with_collision(const std::string& inside) {
 }
 
 TEST(RobotModel, ReadsShapesAndPoses) {
-  const RobotModel robot = robot_of(
+  const RobotModel robot = model_of(
       "<?xml version='1.0'?><!-- a --><robot name='r&amp;s'><link name='base'>"
       "<collision><origin xyz='1 2 3' rpy='0 0 1.5707963267948966'/>"
       "<geometry><box size='2 4 6'/></geometry></collision>"
@@ -51,7 +51,7 @@ TEST(RobotModel, ReadsShapesAndPoses) {
 
 TEST(RobotModel, SaysWhatIsWrongAndWhere) {
   const auto expect = [](const std::string& text, const std::string& message) {
-    EXPECT_NE(error_of(text).find(message), std::string::npos) << error_of(text);
+    EXPECT_NE(model_error_of(text).find(message), std::string::npos) << model_error_of(text);
   };
   expect("<robot name='r'></robot>", "contains no <link>");
   expect("<sdf/>", "is not a robot");
@@ -123,7 +123,7 @@ TEST(SphereFiles, UrdfKeepsAllButItsCollisions) {
       "<box size='1 1 1'/></geometry>\n    </collision>\n    <collision><geometry><sphere "
       "radius='1'/></geometry></collision>\n  </link>\n  <!-- kept -->\n</robot>\n";
   const std::string out =
-      urdf_with_spheres(robot_of(text), std::vector<LinkSpheres>{{"a", {{{1, 2, 3}, 0.25}}}});
+      urdf_with_spheres(model_of(text), std::vector<LinkSpheres>{{"a", {{{1, 2, 3}, 0.25}}}});
   EXPECT_EQ(out,
             "<robot name='r'>\n  <link name='a'>\n    <inertial/>\n    <collision "
             "name=\"a_sphere_0\"><origin xyz=\"1 2 3\" rpy=\"0 0 0\"/><geometry><sphere "

@@ -26,20 +26,21 @@ const Baked& torus() {
   static const Baked solid(testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus"));
   return solid;
 }
-const Baked& cube() {
-  static const Baked solid(testing::closed(testing::cube_mesh(), "cube"));
+const Baked& baked_cube() {
+  static const Baked solid(testing::closed(testing::cube_mesh(), "baked_cube"));
   return solid;
 }
 
 TEST(TrialPoses, EveryClassHasItsPosesAndTheirTruth) {
-  const auto poses = trial_poses(torus().body(), cube().body(), 6, 7);
+  const auto poses = trial_poses(torus().body(), baked_cube().body(), 6, 7);
   std::array<int, kOverlapClasses> found = {};
   Workspace workspace;
   for (const TrialPose& pose : poses) {
     const std::uint32_t k = pose.overlap_class;
     ++found[k];
-    const double smaller = std::min(
-        torus().solid.volume(), pose.scale_b * pose.scale_b * pose.scale_b * cube().solid.volume());
+    const double smaller =
+        std::min(torus().solid.volume(),
+                 pose.scale_b * pose.scale_b * pose.scale_b * baked_cube().solid.volume());
     EXPECT_NEAR(pose.fraction, pose.volume / smaller, 1e-9);
     EXPECT_GE(pose.fraction, kOverlapClassFloor[k] * (k == 0 ? 1 - 1e-9 : 1));
     if (k > 1) {
@@ -47,8 +48,8 @@ TEST(TrialPoses, EveryClassHasItsPosesAndTheirTruth) {
     }
     // The spheres alone know the volume to some per cent, of shallow overlaps the order.
     const double matched =
-        penetration({torus().asset.view(), {}, 1}, {cube().asset.view(), pose.b_in_a, pose.scale_b},
-                    {}, workspace)
+        penetration({torus().asset.view(), {}, 1},
+                    {baked_cube().asset.view(), pose.b_in_a, pose.scale_b}, {}, workspace)
             .volume;
     const double factor = k <= 1 ? 1.05 : k == 2 ? 1.3 : 4;
     EXPECT_LE(matched, factor * pose.volume) << k;
@@ -60,7 +61,7 @@ TEST(TrialPoses, EveryClassHasItsPosesAndTheirTruth) {
 TEST(TrialPoses, AreTheSameForAnyNumberOfThreads) {
   const auto poses_of = [&](int threads) {
     return tbb::task_arena(threads).execute(
-        [&] { return trial_poses(cube().body(), cube().body(), 3, 3); });
+        [&] { return trial_poses(baked_cube().body(), baked_cube().body(), 3, 3); });
   };
   const auto one = poses_of(1), many = poses_of(4);
   ASSERT_EQ(one.size(), many.size());
@@ -68,10 +69,11 @@ TEST(TrialPoses, AreTheSameForAnyNumberOfThreads) {
     EXPECT_EQ(one[i].volume, many[i].volume);
     EXPECT_EQ(std::memcmp(&one[i].b_in_a, &many[i].b_in_a, sizeof(Pose)), 0);
   }
-  EXPECT_NE(trial_poses(cube().body(), cube().body(), 3, 4)[0].b_in_a.t[0], one[0].b_in_a.t[0]);
+  EXPECT_NE(trial_poses(baked_cube().body(), baked_cube().body(), 3, 4)[0].b_in_a.t[0],
+            one[0].b_in_a.t[0]);
 }
 
-// A ball takes few spheres, a cube many, and a harder target more.
+// A ball takes few spheres, a baked_cube many, and a harder target more.
 TEST(BakeToError, TakesAsManySpheresAsItNeeds) {
   const ClosedMesh ball = testing::closed(testing::icosphere_mesh(4), "ball");
   const Asset easy = bake_to_error(ball, {0.03, 0.01}).asset;
@@ -83,27 +85,27 @@ TEST(BakeToError, TakesAsManySpheresAsItNeeds) {
   EXPECT_EQ(header.asked_at_overlap, 0.01);
 
   const Asset coarse =
-      bake_to_error(cube().mesh, {0.1, 0.01}, {.max_spheres = 0, .threads = 1}).asset;
-  const Asset fine = bake_to_error(cube().mesh, {0.04, 0.01}, {.max_spheres = 0}).asset;
+      bake_to_error(baked_cube().mesh, {0.1, 0.01}, {.max_spheres = 0, .threads = 1}).asset;
+  const Asset fine = bake_to_error(baked_cube().mesh, {0.04, 0.01}, {.max_spheres = 0}).asset;
   EXPECT_GT(coarse.view().sphere_count(), header.sphere_count);
   EXPECT_GT(fine.view().sphere_count(), coarse.view().sphere_count());
   EXPECT_LT(fine.view().header().predicted_error[2], coarse.view().header().predicted_error[2]);
 
   // Any number of threads finds the same.
   const Asset again =
-      bake_to_error(cube().mesh, {0.1, 0.01}, {.max_spheres = 0, .threads = 3}).asset;
+      bake_to_error(baked_cube().mesh, {0.1, 0.01}, {.max_spheres = 0, .threads = 3}).asset;
   EXPECT_TRUE(std::equal(again.bytes().begin(), again.bytes().end(), coarse.bytes().begin(),
                          coarse.bytes().end()));
 }
 
 TEST(BakeToError, RefusesSenseless) {
-  EXPECT_THROW(bake_to_error(cube().mesh, {0.0, 0.01}), Error);
-  EXPECT_THROW(bake_to_error(cube().mesh, {0.01, 0.9}), Error);
+  EXPECT_THROW(bake_to_error(baked_cube().mesh, {0.0, 0.01}), Error);
+  EXPECT_THROW(bake_to_error(baked_cube().mesh, {0.01, 0.9}), Error);
 }
 
 // Where the most is not enough, all of it is taken.
 TEST(BakeToError, StopsAtTheMostThatIsAllowed) {
-  const Asset asset = bake_to_error(cube().mesh, {0.01, 0.001}, {.max_spheres = 80}).asset;
+  const Asset asset = bake_to_error(baked_cube().mesh, {0.01, 0.001}, {.max_spheres = 80}).asset;
   EXPECT_EQ(asset.view().sphere_count(), 80u);
   EXPECT_GT(asset.view().header().predicted_error[3], 0.01);
 }

@@ -53,12 +53,12 @@ ist::TriangleMesh potato(std::uint64_t seed, int subdivisions) {
   return mesh;
 }
 
-struct Case {
+struct TreeCase {
   std::string name;
   ist::TriangleMesh mesh;
 };
 
-std::vector<Case> cases() {
+std::vector<TreeCase> tree_cases() {
   ist::TriangleMesh far = potato(3, 3);
   for (auto& v : far.vertices) v = 1e-3 * v + Vector3d(7e3, -2e3, 1e4);
   return {{"cube", cube_mesh()},
@@ -98,7 +98,7 @@ std::vector<Vector3d> points_about(const ist::MeshView& mesh, std::uint64_t seed
 
 class WideTree : public ::testing::TestWithParam<std::size_t> {
  protected:
-  const Case case_ = cases()[GetParam()];
+  const TreeCase case_ = tree_cases()[GetParam()];
   const MeshSolid solid_{closed(case_.mesh, case_.name)};
   const HostWideTree host_{solid_.view()};
   const ist::WideTree& tree_ = host_.tree();
@@ -243,9 +243,9 @@ TEST_P(WideTree, LineCrossingsAreTheCpus) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Meshes, WideTree, ::testing::Range(std::size_t{0}, cases().size()),
+INSTANTIATE_TEST_SUITE_P(Meshes, WideTree, ::testing::Range(std::size_t{0}, tree_cases().size()),
                          [](const auto& info) {
-                           std::string name = cases()[info.param].name;
+                           std::string name = tree_cases()[info.param].name;
                            std::replace(name.begin(), name.end(), ' ', '_');
                            return name;
                          });

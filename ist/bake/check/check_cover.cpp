@@ -10,7 +10,7 @@ namespace ist {
 namespace {
 
 constexpr int kTaskDepth = 3;
-constexpr double kSmallest = 1e-7;          // half edge, unit frame: smaller cells stay unproven
+constexpr double kSmallestCell = 1e-7;      // half edge, unit frame: smaller cells stay unproven
 constexpr std::size_t kEnoughFailures = 8;  // a task stops looking once it has found so many
 
 struct Cell {
@@ -63,7 +63,7 @@ class CoverProof {
     } else if (gap > 0) {
       return tally.add(gap, nearest);
     }
-    if (cell.half < kSmallest) return tally.add(cell.half, nearest);
+    if (cell.half < kSmallestCell) return tally.add(cell.half, nearest);
     if (later != nullptr && cell.depth == kTaskDepth)
       return later->emplace_back(cell, list), void();
     for (int k = 0; k < 8; ++k) {

@@ -51,9 +51,9 @@ class KeptMesh {
 };
 
 /// Sets that grow together.
-class Groups {
+class LaneGroups {
  public:
-  explicit Groups(std::size_t count) : of_(count), left_(count) {
+  explicit LaneGroups(std::size_t count) : of_(count), left_(count) {
     std::iota(of_.begin(), of_.end(), std::size_t{0});
   }
   std::size_t find(std::size_t i) {
@@ -159,7 +159,7 @@ Invariant blocks(const KeptMesh& mesh) {
   Tally tally;
   for (std::size_t b = 0; b < mesh.count; ++b) {
     const MeshBlock& block = mesh.blocks[b];
-    Groups groups(block.vertices);
+    LaneGroups groups(block.vertices);
     for (std::uint32_t l = 0; l < block.triangles; ++l)
       for (std::size_t k = 1; k < 3; ++k) groups.join(block.corner[0][l], block.corner[k][l]);
     tally.add(static_cast<double>(groups.left()) - 1, b);
@@ -229,7 +229,7 @@ Invariant boxes(const AssetHeader& asset, const KeptMesh& mesh) {
 
 /// Blocks that hang together are a shell, and there are no others.
 Invariant shells(const KeptMesh& mesh) {
-  Groups groups(mesh.header.vertex_count);
+  LaneGroups groups(mesh.header.vertex_count);
   for (std::size_t b = 0; b < mesh.count; ++b)
     for (std::uint32_t i = 1; i < mesh.blocks[b].vertices; ++i)
       groups.join(mesh.blocks[b].vertex[0], mesh.blocks[b].vertex[i]);

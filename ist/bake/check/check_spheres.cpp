@@ -10,8 +10,6 @@
 namespace ist {
 namespace {
 
-Eigen::Vector3d centre(const Sphere& s) { return {s.x, s.y, s.z}; }
-
 double volume_of(const Sphere* spheres, std::size_t count) {
   double sum = 0;
   for (std::size_t i = 0; i < count; ++i) {

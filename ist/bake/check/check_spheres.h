@@ -11,6 +11,8 @@
 
 namespace ist {
 
+inline Eigen::Vector3d centre(const Sphere& s) { return {s.x, s.y, s.z}; }
+
 /// One tree against the table of its spheres: leaves, balls, cover balls, volumes and κ. `covers`
 /// is null for the matched tree.
 std::vector<Invariant> check_tree(const AssetHeader& asset, const TreeHeader& tree,

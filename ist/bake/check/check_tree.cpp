@@ -105,8 +105,6 @@ class TreeCheck {
   const float* covers_;
 };
 
-Eigen::Vector3d centre(const Sphere& s) { return {s.x, s.y, s.z}; }
-
 void TreeCheck::count_cover(const Eigen::Vector3d& p, std::span<const std::size_t> generators,
                             std::span<const std::size_t> candidates, Tally& tally) const {
   std::vector<std::size_t> holds(generators.begin(), generators.end());

@@ -17,23 +17,22 @@
 namespace ist {
 namespace {
 
-constexpr double kRounding = 1e-12;  // of a distance in the unit frame, with room
-constexpr double kFar = 1e3;         // further than anything in the unit frame
-constexpr double kSlack = 1.25;      // of the bound that is tried over what is seen at samples
-constexpr double kPartSlack = 1.02;  // likewise, of one part
+constexpr double kDistanceRounding = 1e-12;  // of a distance in the unit frame, with room
+constexpr double kTrialSlack = 1.25;  // of the bound that is tried over what is seen at samples
+constexpr double kPartSlack = 1.02;   // likewise, of one part
 
-using Point = std::array<double, 3>;
+using HullPoint = std::array<double, 3>;
 
 /// A part of a field's triangle.
-struct Part {
-  Point corner[3];
+struct HullPart {
+  HullPoint corner[3];
 
-  Point centre() const {
-    Point c;
+  HullPoint centre() const {
+    HullPoint c;
     for (std::size_t k = 0; k < 3; ++k) c[k] = (corner[0][k] + corner[1][k] + corner[2][k]) / 3;
     return c;
   }
-  double radius(const Point& centre) const {
+  double radius(const HullPoint& centre) const {
     return std::max(
         {between(centre, corner[0]), between(centre, corner[1]), between(centre, corner[2])});
   }
@@ -46,10 +45,10 @@ class FieldNearMesh {
 
   /// A bound on the distance of all points of the part, at most `target` where that can be shown.
   /// `reach`: no point of the mesh nearest to the centre is further than this.
-  double bound(const Part& part, double target, double reach) const {
-    const Point c = part.centre();
+  double bound(const HullPart& part, double target, double reach) const {
+    const HullPoint c = part.centre();
     const ClosestPoint closest =
-        exact_closest_point(mesh_, {c[0], c[1], c[2]}, reach * (1 + 1e-9) + kRounding);
+        exact_closest_point(mesh_, {c[0], c[1], c[2]}, reach * (1 + 1e-9) + kDistanceRounding);
     const double radius = part.radius(c);
     if (closest.distance + radius <= target) return closest.distance + radius;
     if (closest.triangle != kNoTriangle) {
@@ -61,38 +60,38 @@ class FieldNearMesh {
       return target;
     // No bound is less than what is seen, and showing a little more takes far fewer parts.
     target = std::max(target, kPartSlack * closest.distance);
-    for (const Point& p : part.corner)
+    for (const HullPoint& p : part.corner)
       target = std::max(
-          target, kPartSlack * exact_closest_point(
-                                   mesh_, {p[0], p[1], p[2]},
-                                   (closest.distance + between(c, p)) * (1 + 1e-9) + kRounding)
+          target, kPartSlack * exact_closest_point(mesh_, {p[0], p[1], p[2]},
+                                                   (closest.distance + between(c, p)) * (1 + 1e-9) +
+                                                       kDistanceRounding)
                                    .distance);
     // Halved across the longest side.
     int from = 0;
     for (int k = 1; k < 3; ++k)
       if (side(part, k) > side(part, from)) from = k;
-    const Point middle = half_way(part.corner[from], part.corner[(from + 1) % 3]);
-    Part first = part, second = part;
+    const HullPoint middle = half_way(part.corner[from], part.corner[(from + 1) % 3]);
+    HullPart first = part, second = part;
     first.corner[(from + 1) % 3] = middle;
     second.corner[from] = middle;
     double most = 0;
-    for (const Part& half : {first, second})
+    for (const HullPart& half : {first, second})
       most = std::max(most, bound(half, target, closest.distance + between(c, half.centre())));
     return most;
   }
 
  private:
-  static double side(const Part& part, int from) {
+  static double side(const HullPart& part, int from) {
     return between(part.corner[from], part.corner[(from + 1) % 3]);
   }
 
   /// The distance to a triangle is convex: it is largest at a corner.
-  double from_triangle(const Part& part, std::uint32_t triangle) const {
+  double from_triangle(const HullPart& part, std::uint32_t triangle) const {
     const std::uint32_t* t = mesh_.triangles + 3 * std::size_t{triangle};
     const auto vertex = [&](int i) { return mesh_.vertices + 3 * std::size_t{t[i]}; };
     const TriangleFrame<double> frame = make_triangle_frame(vertex(0), vertex(1), vertex(2));
     double most2 = 0;
-    for (const Point& p : part.corner)
+    for (const HullPoint& p : part.corner)
       most2 = std::max(most2, closest_in_frame(frame, p.data()).distance2);
     return std::sqrt(most2);
   }
@@ -101,8 +100,8 @@ class FieldNearMesh {
   const HullCuts cuts_;
 };
 
-Part part_of(const FieldMesh& field, std::size_t triangle) {
-  Part part;
+HullPart part_of(const FieldMesh& field, std::size_t triangle) {
+  HullPart part;
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t k = 0; k < 3; ++k)
       part.corner[i][k] = field.vertices[field.triangles[triangle][i]][k];
@@ -117,7 +116,7 @@ void raise(const std::atomic_ref<double>& value, double to) {
 
 }  // namespace
 
-std::size_t KnownDistances::Hash::operator()(const Point& p) const {
+std::size_t KnownDistances::Hash::operator()(const HullPoint& p) const {
   std::uint64_t hash = 0;
   for (const double x : p) {
     hash = (hash ^ std::bit_cast<std::uint64_t>(x)) * 0x9E3779B97F4A7C15u;
@@ -126,7 +125,7 @@ std::size_t KnownDistances::Hash::operator()(const Point& p) const {
   return hash;
 }
 
-double KnownDistances::of(const Point& p) {
+double KnownDistances::of(const HullPoint& p) {
   if (const auto known = known_.find(p); known != known_.end()) return known->second;
   const double distance = exact_closest_point(mesh_, {p[0], p[1], p[2]}, kFar).distance;
   known_.emplace(p, distance);
@@ -168,7 +167,7 @@ std::vector<double> FieldError::seen(double enough) {
 
 FieldError::Proven FieldError::proven(double seen, double enough) const {
   const FieldNearMesh near_mesh(mesh_);
-  const double target = kSlack * seen + kRounding;
+  const double target = kTrialSlack * seen + kDistanceRounding;
   // What lies within the target at first sight is passed over where something else does not.
   std::vector<std::uint8_t> passed_over(mesh_.triangle_count);
   std::vector<double> of_field(middle_.size());
@@ -196,7 +195,7 @@ FieldError::Proven FieldError::proven(double seen, double enough) const {
       stop_.look();
       if (passed_over[t] != 0) bound_swept(t, true);
     });
-  out.most = most() + kRounding;
+  out.most = most() + kDistanceRounding;
   return out;
 }
 

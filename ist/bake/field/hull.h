@@ -9,6 +9,8 @@
 
 namespace ist {
 
+inline constexpr double kFar = 1e3;  ///< further than anything in the unit frame
+
 /// All points between a few corners: a convex body, or a flat one. Unit frame.
 class Hull {
  public:

@@ -14,18 +14,18 @@
 namespace ist {
 namespace {
 
-using Point = std::array<double, 3>;
+using HullPoint = std::array<double, 3>;
 
-constexpr double kRounding = 1e-14;  // of a height in the unit frame, with room
+constexpr double kHeightRounding = 1e-14;  // of a height in the unit frame, with room
 
 /// A hull moved along a direction.
 struct MovedHull {
-  std::array<Point, Hull::kMost> corner;
+  std::array<HullPoint, Hull::kMost> corner;
   std::size_t count;
   float low[3], high[3];
   double least, most;  ///< along the direction
 
-  MovedHull(std::span<const Point> hull, const double direction[3], double by)
+  MovedHull(std::span<const HullPoint> hull, const double direction[3], double by)
       : count(hull.size()), least(HUGE_VAL), most(-HUGE_VAL) {
     std::fill(low, low + 3, HUGE_VALF);
     std::fill(high, high + 3, -HUGE_VALF);
@@ -44,15 +44,15 @@ struct MovedHull {
   /// A plane across the direction, or along the triangle, has all of it on one side.
   bool is_apart_from(const double* const p[3], const double direction[3]) const {
     const double height[3] = {dot3(p[0], direction), dot3(p[1], direction), dot3(p[2], direction)};
-    if (std::max({height[0], height[1], height[2]}) < least - kRounding) return true;
-    if (std::min({height[0], height[1], height[2]}) > most + kRounding) return true;
+    if (std::max({height[0], height[1], height[2]}) < least - kHeightRounding) return true;
+    if (std::min({height[0], height[1], height[2]}) > most + kHeightRounding) return true;
     double u[3], v[3], n[3];
     for (int k = 0; k < 3; ++k) {
       u[k] = p[1][k] - p[0][k];
       v[k] = p[2][k] - p[0][k];
     }
     cross3(u, v, n);
-    const double room = kRounding * (std::fabs(n[0]) + std::fabs(n[1]) + std::fabs(n[2]));
+    const double room = kHeightRounding * (std::fabs(n[0]) + std::fabs(n[1]) + std::fabs(n[2]));
     bool above = room > 0, below = room > 0;
     for (std::size_t i = 0; i < count; ++i) {
       const double w[3] = {corner[i][0] - p[0][0], corner[i][1] - p[0][1], corner[i][2] - p[0][2]};
@@ -99,8 +99,8 @@ bool windings_differ(const MeshView& surface, const double p[3], const double q[
 /// the same; so the surface passes between. False: it may be so or not. Unit frame.
 ///
 /// `surface` has a hierarchy; `direction` is of unit length, but for rounding.
-bool within_slab(const MeshView& surface, std::span<const Point> hull, const double direction[3],
-                 double distance) {
+bool within_slab(const MeshView& surface, std::span<const HullPoint> hull,
+                 const double direction[3], double distance) {
   const MovedHull there(hull, direction, distance);
   if (!meets_none(surface, there, direction)) return false;
   const MovedHull back(hull, direction, -distance);
@@ -108,25 +108,23 @@ bool within_slab(const MeshView& surface, std::span<const Point> hull, const dou
   return windings_differ(surface, there.corner[0].data(), back.corner[0].data());
 }
 
-using Point = Hull::Point;
-
 constexpr int kMostParts = 32;  ///< that are looked at
 
-Point middle_of(const Hull& hull) {
-  Point c = {};
-  for (const Point& p : hull.corners())
+HullPoint middle_of(const Hull& hull) {
+  HullPoint c = {};
+  for (const HullPoint& p : hull.corners())
     for (std::size_t k = 0; k < 3; ++k) c[k] += p[k];
   for (double& x : c) x /= static_cast<double>(hull.corners().size());
   return c;
 }
 
-double distance2(const HullCuts::Frame& triangle, const Point& p) {
+double distance2(const HullCuts::Frame& triangle, const HullPoint& p) {
   return closest_in_frame(triangle, p.data()).distance2;
 }
 
 bool holds_all(const HullCuts::Frame& triangle, const Hull& hull, double limit2) {
   return std::all_of(hull.corners().begin(), hull.corners().end(),
-                     [&](const Point& p) { return distance2(triangle, p) <= limit2; });
+                     [&](const HullPoint& p) { return distance2(triangle, p) <= limit2; });
 }
 
 /// Through a side of a triangle, across it; the triangle is below.
@@ -171,7 +169,7 @@ bool HullCuts::is_within(const Hull& hull, const Frame& triangle, const Known& k
     const Hull::Plane plane = plane_of_side(triangle, side);
     // Only where something beyond the side is too far away.
     const bool is_needed =
-        std::any_of(over.corners().begin(), over.corners().end(), [&](const Point& p) {
+        std::any_of(over.corners().begin(), over.corners().end(), [&](const HullPoint& p) {
           return dot3(plane.normal, p.data()) > plane.offset && distance2(triangle, p) > limit2;
         });
     if (is_needed && (!over.cut(plane, beyond[side]) || over.is_empty())) return false;
@@ -184,7 +182,7 @@ bool HullCuts::is_within(const Hull& hull, const Frame& triangle, const Known& k
 
 bool HullCuts::is_within(const Hull& hull, const Known& known, Task& task) const {
   if (++task.parts > kMostParts) return false;
-  const Point c = middle_of(hull);
+  const HullPoint c = middle_of(hull);
   const double limit2 = task.distance * task.distance;
   double reach = (known.distance + between(known.at, c)) * (1 + 1e-9) + 1e-12;
   double least2 = reach * reach;

@@ -11,10 +11,10 @@
 namespace ist {
 namespace {
 
-using Point = std::array<float, 3>;
+using FloatPoint = std::array<float, 3>;
 
-std::size_t longest_axis(std::span<const Point> points, std::span<const std::uint32_t> order) {
-  Point low = points[order.front()], high = low;
+std::size_t longest_axis(std::span<const FloatPoint> points, std::span<const std::uint32_t> order) {
+  FloatPoint low = points[order.front()], high = low;
   for (const std::uint32_t i : order)
     for (std::size_t k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], points[i][k]);
@@ -33,7 +33,7 @@ std::size_t first_half(std::size_t n) {
   return std::max<std::size_t>(1, (n + group) / (2 * group)) * group;
 }
 
-void halve(std::span<const Point> points, std::span<std::uint32_t> order) {
+void halve(std::span<const FloatPoint> points, std::span<std::uint32_t> order) {
   if (order.size() <= kWidth) return;
   const std::size_t axis = longest_axis(points, order);
   const std::size_t half = first_half(order.size());
@@ -60,7 +60,7 @@ void settle(std::span<std::uint32_t> order) {
 
 }  // namespace
 
-std::vector<std::uint32_t> spatial_order(std::span<const Point> points) {
+std::vector<std::uint32_t> spatial_order(std::span<const FloatPoint> points) {
   std::vector<std::uint32_t> order(points.size());
   std::iota(order.begin(), order.end(), 0u);
   halve(points, order);

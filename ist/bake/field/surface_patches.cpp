@@ -15,13 +15,13 @@
 namespace ist {
 namespace {
 
-using Point = std::array<float, 3>;
+using FloatPoint = std::array<float, 3>;
 
 constexpr std::uint32_t kNone = ~0u;
 /// Patches are joined where the result is not larger than this, in radii of the larger.
 constexpr double kJoinedRadius = 1.5;
 
-double distance2(const Point& a, const Point& b) {
+double distance2(const FloatPoint& a, const FloatPoint& b) {
   double sum = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const double d = double{a[k]} - double{b[k]};
@@ -106,7 +106,7 @@ class Growth {
   /// would be left alone counted less; then the one nearest to the patch's middle.
   std::uint32_t best_neighbour(const BlockPatch& patch) const {
     if (patch.triangles.size() == kWidth) return kNone;
-    Point middle = {};
+    FloatPoint middle = {};
     for (const std::uint32_t t : patch.triangles)
       for (std::size_t k = 0; k < 3; ++k)
         middle[k] += middle_[t][k] / static_cast<float>(patch.triangles.size());
@@ -149,23 +149,23 @@ class Growth {
   std::vector<std::uint8_t> taken_;
   std::vector<std::uint32_t> last_patch_;  ///< [vertex] the last that took it, from 1
   std::uint32_t patches_ = 0;
-  std::vector<Point> middle_;
+  std::vector<FloatPoint> middle_;
 };
 
 /// A ball around a patch: the middle of its box and the farthest vertex.
-struct Extent {
-  Point middle;
+struct SurfaceExtent {
+  FloatPoint middle;
   double radius;
 };
 
-Extent extent_of(const FieldMesh& mesh, const std::vector<std::uint32_t>& vertices) {
-  Point low = mesh.vertices[vertices[0]], high = low;
+SurfaceExtent extent_of(const FieldMesh& mesh, const std::vector<std::uint32_t>& vertices) {
+  FloatPoint low = mesh.vertices[vertices[0]], high = low;
   for (const std::uint32_t v : vertices)
     for (std::size_t k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], mesh.vertices[v][k]);
       high[k] = std::max(high[k], mesh.vertices[v][k]);
     }
-  Extent out{{}, 0};
+  SurfaceExtent out{{}, 0};
   for (std::size_t k = 0; k < 3; ++k) out.middle[k] = (low[k] + high[k]) / 2;
   for (const std::uint32_t v : vertices)
     out.radius = std::max(out.radius, distance2(mesh.vertices[v], out.middle));
@@ -183,10 +183,10 @@ std::vector<std::uint32_t> united(const BlockPatch& a, const BlockPatch& b) {
 /// Joins patches that are not full to others near them in space, `connected`: by a vertex.
 std::vector<BlockPatch> joined(const FieldMesh& mesh, std::vector<BlockPatch> patches,
                                bool connected) {
-  std::vector<Point> middles(patches.size());
+  std::vector<FloatPoint> middles(patches.size());
   std::vector<double> radii(patches.size());
   for (std::size_t p = 0; p < patches.size(); ++p) {
-    const Extent extent = extent_of(mesh, patches[p].vertices);
+    const SurfaceExtent extent = extent_of(mesh, patches[p].vertices);
     middles[p] = extent.middle;
     radii[p] = extent.radius;
   }

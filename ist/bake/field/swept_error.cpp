@@ -15,8 +15,7 @@ namespace {
 
 constexpr double kSmallestPart = 0.2;  // of the target: smaller prisms are taken for their centres
 constexpr double kSlack = 1.02;        // of a target over what is seen of its part
-constexpr double kRounding = 1e-15;    // of a squared distance, with room
-constexpr double kFar = 1e3;           // further than anything in the unit frame
+constexpr double kSquareRounding = 1e-15;  // of a squared distance, with room
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 std::vector<TriangleFrame<double>> frames_of(const MeshView& surface) {
@@ -95,7 +94,7 @@ std::span<const std::uint32_t> SweptError::star(std::uint32_t field_vertex) cons
 
 double SweptError::at_vertex(std::uint32_t vertex, double known, double enough) {
   const double* x = mesh_.vertices + 3 * std::size_t{vertex};
-  const double known2 = known * known * (1 - kRounding);
+  const double known2 = known * known * (1 - kSquareRounding);
   double least2 = kFar * kFar;
   const auto is_near = [&](std::uint32_t t) {
     const double d2 = distance2(t, {x[0], x[1], x[2]});

@@ -8,7 +8,6 @@
 namespace ist {
 namespace {
 
-constexpr std::uint32_t kMostBlocks = 1u << 4 * (kMaxLevels - 1);
 constexpr std::uint32_t kMostBricks = 1u << 20;  // along an axis
 
 bool sound_surface_block(const SurfaceBlock& block) noexcept {

@@ -10,7 +10,7 @@
 namespace ist {
 namespace {
 
-constexpr double kRounding = 1e-12;
+constexpr double kMassRounding = 1e-12;
 /// No entry of an inertia is larger: a mass of 1e18 within kMaxExtent.
 constexpr double kMaxInertia = 1e21;
 
@@ -27,14 +27,14 @@ bool sound_inertia(const AssetHeader& header) noexcept {
       -m[3], half_trace - m[1], -m[5],        //
       -m[4], -m[5], half_trace - m[2];
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(second, Eigen::EigenvaluesOnly);
-  return principal.eigenvalues()[0] >= -(kRounding * half_trace + 3 * header.inertia_error);
+  return principal.eigenvalues()[0] >= -(kMassRounding * half_trace + 3 * header.inertia_error);
 }
 
 /// The box lies near the unit frame and holds the centres of ball and mass; the ball is as large as
 /// its longest side at least, and as its diagonal at most.
 bool sound_bounds(const AssetHeader& header) noexcept {
   const double unit = std::ldexp(1.0, header.exponent);
-  const double room = kRounding * unit;
+  const double room = kMassRounding * unit;
   double half_side = 0, squares = 0;
   for (int k = 0; k < 3; ++k) {
     if (!std::isfinite(header.box_lower[k]) || !std::isfinite(header.box_upper[k])) return false;
@@ -42,7 +42,7 @@ bool sound_bounds(const AssetHeader& header) noexcept {
     const double high = (header.box_upper[k] - header.centre[k]) / unit;
     if (!is_offset(low) || !is_offset(high)) return false;
     if (!in_range(header.ball_centre[k], header.box_lower[k], header.box_upper[k])) return false;
-    const double slack = header.centre_of_mass_error + kRounding;
+    const double slack = header.centre_of_mass_error + kMassRounding;
     if (!in_range(header.centre_of_mass[k], low - slack, high + slack)) return false;
     half_side = std::max(half_side, (high - low) / 2);
     squares += (high - low) * (high - low) / 4;

@@ -8,7 +8,6 @@
 namespace ist {
 namespace {
 
-constexpr std::uint32_t kMostBlocks = 1u << 4 * (kMaxLevels - 1);
 constexpr float kEmptyLow = static_cast<float>(2 * kMaxExtent);
 
 bool sound_block(const MeshBlock& block, std::uint32_t vertex_count) noexcept {

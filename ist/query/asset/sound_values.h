@@ -8,6 +8,8 @@
 
 namespace ist {
 
+inline constexpr std::uint32_t kMostBlocks = 1u << 4 * (kMaxLevels - 1);  ///< of a level
+
 // Comparisons are written so that NaN fails them.
 inline bool in_range(double value, double low, double high) noexcept {
   return value >= low && value <= high;

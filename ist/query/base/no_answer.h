@@ -12,6 +12,8 @@
 
 namespace ist {
 
+inline constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
 /// It is a surface alone.
 inline bool lacks_spheres(const TreeView& tree) noexcept {
   return !tree.empty() && tree.sphere_count() == 0;
@@ -29,7 +31,6 @@ bool lack_spheres(const Solid& a, const PlacedTree& b) noexcept {
 /// `why`: not_held or invalid_input.
 template <class Answer>
 Answer no_answer(QueryStatus why) noexcept {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const Eigen::Vector3d none = Eigen::Vector3d::Constant(kNone);
   if constexpr (std::is_same_v<Answer, ContactPatches>) {
     return {no_answer<Penetration>(why)};

@@ -8,6 +8,12 @@
 
 namespace ist {
 
+inline Eigen::Vector3d vector(const double (&v)[3]) noexcept { return {v[0], v[1], v[2]}; }
+template <class Point>
+Eigen::Vector3d vector(const Point& p) noexcept {
+  return {p.x, p.y, p.z};
+}
+
 /// x ↦ scale · R x + t with the matrix stored scaled: plain numbers, because SIMD code reads them.
 struct Similarity {
   double m[9] = {};  ///< scale · R, row by row

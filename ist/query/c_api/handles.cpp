@@ -13,7 +13,7 @@
 namespace ist::c_api {
 namespace {
 
-ist_status_t status_of(AssetStatus status) noexcept {
+ist_status_t asset_status_of(AssetStatus status) noexcept {
   switch (status) {
     case AssetStatus::ok:
       return IST_OK;
@@ -38,7 +38,7 @@ ist_status_t make_tree(const void* bytes, std::size_t size, ist_tree_t& tree) no
   const AssetStatus status =
       TreeView::from_bytes({static_cast<const std::byte*>(bytes), size}, handle.view);
   if (status == AssetStatus::ok) handle.mark = handle.expected_mark();
-  return status_of(status);
+  return asset_status_of(status);
 }
 
 struct CloseFile {

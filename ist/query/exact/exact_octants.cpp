@@ -12,7 +12,7 @@ namespace {
 using exact::Point;
 
 /// Of a part's sums: what is less in an octant is left to the others.
-constexpr double kRounding = 1e-9;
+constexpr double kOctantRounding = 1e-9;
 
 double length(const Point& v) { return std::sqrt(dot(v, v)); }
 
@@ -247,7 +247,7 @@ std::uint32_t ExactOctants::write_octants(const ExactPart& part, double small, d
   std::uint32_t count = first, largest = first;
   for (std::uint64_t i = 0; i < 8; ++i) {
     const OctantSums& octant = octants[i];
-    if (!(octant.six_volumes > kRounding * (6 * volume))) continue;
+    if (!(octant.six_volumes > kOctantRounding * (6 * volume))) continue;
     ExactPart& found = scratch_.octants[count] = {};
     found.id = 8 * part.id + i;
     found.kept = count;
@@ -264,10 +264,10 @@ std::uint32_t ExactOctants::write_octants(const ExactPart& part, double small, d
     ++count;
   }
   const double size = std::sqrt(areas) + length(centre);
-  if (!(std::abs(missing.volume()) <= 100 * kRounding * volume &&
-        length(missing.moment) <= 2400 * kRounding * (volume * size) &&
-        length(missing.force) <= 100 * kRounding * areas &&
-        length(missing.torque) <= 100 * kRounding * (areas * size)))
+  if (!(std::abs(missing.volume()) <= 100 * kOctantRounding * volume &&
+        length(missing.moment) <= 2400 * kOctantRounding * (volume * size) &&
+        length(missing.force) <= 100 * kOctantRounding * areas &&
+        length(missing.torque) <= 100 * kOctantRounding * (areas * size)))
     return first;
   scratch_.octants[largest].sums.add(missing);
   return count;

@@ -11,7 +11,7 @@ namespace {
 
 // Triangles of a block, or a ball that is to be placed, up to which each is looked at with all of
 // sixteen balls.
-constexpr int kFewTriangles = 4;
+constexpr int kFewInBlock = 4;
 
 /// Cube of the typical radius of a surface's nodes: they tile an area.
 double typical_cube(const SphereTree& balls, int level) {
@@ -199,7 +199,7 @@ std::uint32_t SurfaceDescent::sort_children(std::size_t from, std::size_t to,
     masks[i] = 0;
     if (near == 0) continue;
     count += std::popcount(near);
-    masks[i] = static_cast<std::uint16_t>(used & (std::popcount(near) <= kFewTriangles
+    masks[i] = static_cast<std::uint16_t>(used & (std::popcount(near) <= kFewInBlock
                                                       ? balls_near(patch, near, balls)
                                                       : near_block(balls, now.a[i])));
     met |= masks[i];
@@ -210,7 +210,7 @@ std::uint32_t SurfaceDescent::sort_children(std::size_t from, std::size_t to,
   }
   const std::uint32_t alone = used & ~met;
   if (alone == 0) return met;
-  if (count > kFewTriangles * std::popcount(alone)) {
+  if (count > kFewInBlock * std::popcount(alone)) {
     for (std::uint32_t left = alone; left != 0; left &= left - 1)
       settle(probe_level_ - 1, kWidth * block + static_cast<std::uint32_t>(std::countr_zero(left)));
   } else {
@@ -303,7 +303,7 @@ ProbeTotal SurfaceDescent::sum_block(std::uint32_t block, std::size_t from,
     if (near[i] == 0) continue;
     count += std::popcount(near[i]);
     const std::uint32_t chosen =
-        std::popcount(near[i]) <= kFewTriangles ? used : used & near_block(balls, a);
+        std::popcount(near[i]) <= kFewInBlock ? used : used & near_block(balls, a);
     if (chosen != 0) add_patch(patch, near[i], balls, chosen, sums);
   }
   tally_.count(sums.pairs);
@@ -342,7 +342,7 @@ std::uint32_t SurfaceDescent::sides(const ProbeBalls& balls, std::uint32_t wante
   };
   double x[3];
   std::uint32_t result = 0;
-  if (triangles > kFewTriangles * std::popcount(wanted)) {
+  if (triangles > kFewInBlock * std::popcount(wanted)) {
     for (std::uint32_t left = wanted; left != 0; left &= left - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(left));
       centre_of(i, x);

@@ -11,8 +11,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-Vector3d vector(const double (&x)[3]) noexcept { return {x[0], x[1], x[2]}; }
-
 // A little further, for the rounding of what is compared.
 constexpr double kMore = 1 + 1e-12;
 

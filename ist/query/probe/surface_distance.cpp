@@ -7,7 +7,7 @@
 namespace ist {
 namespace {
 
-using Vec = Eigen::Vector3d;
+using Eigen::Vector3d;
 
 /// Depth first, nearest ball first.
 class NearestSearch {
@@ -35,9 +35,9 @@ class NearestSearch {
     } children[kWidth];
     std::uint32_t count = 0;
     for (std::uint32_t lane = 0; lane < kWidth && kWidth * block + lane < below; ++lane) {
-      const Vec centre(origin.x + static_cast<double>(balls.x[lane]),
-                       origin.y + static_cast<double>(balls.y[lane]),
-                       origin.z + static_cast<double>(balls.z[lane]));
+      const Vector3d centre(origin.x + static_cast<double>(balls.x[lane]),
+                            origin.y + static_cast<double>(balls.y[lane]),
+                            origin.z + static_cast<double>(balls.z[lane]));
       Child child{(centre - at_).norm() - static_cast<double>(balls.r[lane]),
                   kWidth * block + lane};
       if (child.gap >= best_.distance) continue;
@@ -73,7 +73,7 @@ class NearestSearch {
 
   const SurfaceTree& surface_;
   const double (&x_)[3];
-  const Vec at_;
+  const Vector3d at_;
   NearestSurface best_;
 };
 
@@ -83,13 +83,13 @@ double nearest_in_triangle(const double (&x)[3], const double (&a)[3], const dou
                            const double (&c)[3], double (&point)[3]) noexcept {
   // By the regions of Voronoi of corners, edges and inside (Ericson, Real-Time Collision
   // Detection).
-  const Vec p(x[0], x[1], x[2]), A(a[0], a[1], a[2]), B(b[0], b[1], b[2]), C(c[0], c[1], c[2]);
-  const Vec ab = B - A, ac = C - A, ap = p - A;
-  Vec nearest;
+  const Vector3d p(x[0], x[1], x[2]), A(a[0], a[1], a[2]), B(b[0], b[1], b[2]), C(c[0], c[1], c[2]);
+  const Vector3d ab = B - A, ac = C - A, ap = p - A;
+  Vector3d nearest;
   const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  const Vec bp = p - B;
+  const Vector3d bp = p - B;
   const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  const Vec cp = p - C;
+  const Vector3d cp = p - C;
   const double d5 = ab.dot(cp), d6 = ac.dot(cp);
   const double va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
   if (d1 <= 0 && d2 <= 0) {
@@ -106,7 +106,7 @@ double nearest_in_triangle(const double (&x)[3], const double (&a)[3], const dou
     nearest = B + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (C - B);
   } else {
     const double sum = va + vb + vc;
-    nearest = sum > 0 ? Vec(A + vb / sum * ab + vc / sum * ac) : A;
+    nearest = sum > 0 ? Vector3d(A + vb / sum * ab + vc / sum * ac) : A;
   }
   for (int k = 0; k < 3; ++k) point[k] = nearest[k];
   return (nearest - p).squaredNorm();

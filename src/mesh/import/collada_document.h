@@ -57,4 +57,6 @@ class ColladaGeometries {
   std::size_t numbers_read_ = 0;
 };
 
+inline constexpr ColladaDocument::Index kNoElement = ColladaDocument::kNone;
+
 }  // namespace ist

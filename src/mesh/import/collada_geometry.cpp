@@ -13,7 +13,6 @@ namespace ist {
 namespace {
 
 using Index = ColladaDocument::Index;
-constexpr Index kNone = ColladaDocument::kNone;
 constexpr std::uint64_t kWidest = 255;  // inputs of a corner
 
 /// Reads one <geometry>.
@@ -24,8 +23,9 @@ class GeometryReader {
 
   PolygonMesh read(const Index geometry) {
     const Index source = xml_.child(geometry, "mesh");
-    if (source == kNone) return {};  // a spline has no faces
-    for (Index child = xml_[source].first_child; child != kNone; child = xml_[child].next_sibling) {
+    if (source == kNoElement) return {};  // a spline has no faces
+    for (Index child = xml_[source].first_child; child != kNoElement;
+         child = xml_[child].next_sibling) {
       const std::string_view name = xml_[child].name;
       if (name == "triangles" || name == "polylist" || name == "polygons" || name == "tristrips" ||
           name == "trifans")
@@ -38,13 +38,13 @@ class GeometryReader {
   /// Positions of a <vertices>.
   std::vector<Eigen::Vector3d> positions(const Index vertices) {
     Index input = xml_[vertices].first_child;
-    while (input != kNone && xml_.attribute(input, "semantic") != "POSITION")
+    while (input != kNoElement && xml_.attribute(input, "semantic") != "POSITION")
       input = xml_[input].next_sibling;
-    if (input == kNone) xml_.fail(vertices, "has no positions");
+    if (input == kNoElement) xml_.fail(vertices, "has no positions");
     const Index source = document_.target(input, "source", "source");
     const Index common = xml_.child(source, "technique_common");
-    const Index accessor = common == kNone ? kNone : xml_.child(common, "accessor");
-    if (accessor == kNone) xml_.fail(source, "has no accessor");
+    const Index accessor = common == kNoElement ? kNoElement : xml_.child(common, "accessor");
+    if (accessor == kNoElement) xml_.fail(source, "has no accessor");
     const std::vector<double> values =
         document_.reals(document_.target(accessor, "source", "float_array"));
     numbers_read_ += values.size();
@@ -53,7 +53,7 @@ class GeometryReader {
 
     std::array<std::uint64_t, 3> at{0, 1, 2};
     std::uint64_t place = 0, parameters = 0;
-    for (Index param = xml_[accessor].first_child; param != kNone;
+    for (Index param = xml_[accessor].first_child; param != kNoElement;
          param = xml_[param].next_sibling, ++place) {
       const std::string_view name = xml_.attribute(param, "name");
       for (std::size_t k = 0; k < 3; ++k)
@@ -82,8 +82,8 @@ class GeometryReader {
   void append_primitive(const Index element) {
     std::uint64_t width = 1;
     std::optional<std::uint64_t> vertex_at;
-    Index vertices = kNone;
-    for (Index input = xml_[element].first_child; input != kNone;
+    Index vertices = kNoElement;
+    for (Index input = xml_[element].first_child; input != kNoElement;
          input = xml_[input].next_sibling) {
       if (xml_[input].name != "input") continue;
       const std::uint64_t offset = document_.whole(input, "offset", 0);
@@ -108,12 +108,12 @@ class GeometryReader {
     std::vector<std::uint64_t> sizes;  // of a polylist's polygons
     if (name == "polylist") {
       const Index counts = xml_.child(element, "vcount");
-      if (counts == kNone) xml_.fail(element, "has no vcount");
+      if (counts == kNoElement) xml_.fail(element, "has no vcount");
       sizes = document_.wholes(counts);
     }
     std::uint64_t faces = 0;
     bool has_corners = false;
-    for (Index child = xml_[element].first_child; child != kNone;
+    for (Index child = xml_[element].first_child; child != kNoElement;
          child = xml_[child].next_sibling) {
       if (xml_[child].name == "ph") xml_.fail(child, "polygons with holes are not supported");
       if (xml_[child].name != "p") continue;

@@ -17,7 +17,6 @@ namespace {
 
 using Transform = Eigen::Affine3d;
 using Index = ColladaDocument::Index;
-constexpr Index kNone = ColladaDocument::kNone;
 
 /// Sine and cosine of an angle in degrees from + − × ÷ alone, the same on every machine; exact at
 /// multiples of 90°.
@@ -56,7 +55,8 @@ class SceneReader {
       const auto [node, parent] = open_.back();
       open_.pop_back();
       const Transform world = parent * local_transform(node);
-      for (Index child = xml_[node].first_child; child != kNone; child = xml_[child].next_sibling) {
+      for (Index child = xml_[node].first_child; child != kNoElement;
+           child = xml_[child].next_sibling) {
         if (xml_[child].name == "instance_geometry")
           append(document_.target(child, "url", "geometry"), world, child);
         else if (xml_[child].name == "instance_controller")
@@ -69,7 +69,7 @@ class SceneReader {
 
  private:
   void open_nodes_below(const Index element, const Transform& parent) {
-    for (Index child = xml_[element].first_child; child != kNone;
+    for (Index child = xml_[element].first_child; child != kNoElement;
          child = xml_[child].next_sibling) {
       if (++steps_ > kMostInstances + xml_.size())
         xml_.fail(
@@ -84,11 +84,12 @@ class SceneReader {
 
   Index visual_scene() const {
     const Index scene = xml_.child(0, "scene");
-    const Index instance = scene == kNone ? kNone : xml_.child(scene, "instance_visual_scene");
-    if (instance != kNone) return document_.target(instance, "url", "visual_scene");
+    const Index instance =
+        scene == kNoElement ? kNoElement : xml_.child(scene, "instance_visual_scene");
+    if (instance != kNoElement) return document_.target(instance, "url", "visual_scene");
     const Index library = xml_.child(0, "library_visual_scenes");
-    const Index first = library == kNone ? kNone : xml_.child(library, "visual_scene");
-    if (first == kNone) xml_.fail(0, "contains no visual scene. Export one");
+    const Index first = library == kNoElement ? kNoElement : xml_.child(library, "visual_scene");
+    if (first == kNoElement) xml_.fail(0, "contains no visual scene. Export one");
     return first;
   }
 
@@ -97,12 +98,12 @@ class SceneReader {
   DeclaredFrame declared_frame() const {
     DeclaredFrame frame;
     const Index asset = xml_.child(0, "asset");
-    if (asset == kNone) return frame;
+    if (asset == kNoElement) return frame;
     const Index axis = xml_.child(asset, "up_axis"), unit = xml_.child(asset, "unit");
-    const std::string_view up = axis == kNone ? "" : xml_[axis].text;
+    const std::string_view up = axis == kNoElement ? "" : xml_[axis].text;
     for (const char letter : {'X', 'Y', 'Z'})
       if (up.find(std::string{letter} + "_UP") != std::string_view::npos) frame.up_axis = letter;
-    const std::string_view meter = unit == kNone ? "" : xml_.attribute(unit, "meter");
+    const std::string_view meter = unit == kNoElement ? "" : xml_.attribute(unit, "meter");
     if (meter.empty()) return frame;
     const std::optional<double> scale = parse_real(meter);
     if (!scale || !(*scale > 0)) xml_.fail(unit, in_quotes(meter) + " is not a length in metres");
@@ -122,7 +123,8 @@ class SceneReader {
     const auto [found, is_new] = transforms_.try_emplace(node, Transform::Identity());
     if (!is_new) return found->second;
     Transform& transform = found->second;
-    for (Index child = xml_[node].first_child; child != kNone; child = xml_[child].next_sibling) {
+    for (Index child = xml_[node].first_child; child != kNoElement;
+         child = xml_[child].next_sibling) {
       const std::string_view name = xml_[child].name;
       if (name == "matrix") {
         transform = transform * matrix(child);
@@ -133,8 +135,9 @@ class SceneReader {
       } else if (name == "rotate") {
         transform.rotate(rotation(child));
       } else if (name == "skew" || name == "lookat") {
-        if (xml_.child(node, "camera") == kNone && xml_.child(node, "instance_camera") == kNone &&
-            xml_.child(node, "instance_light") == kNone)
+        if (xml_.child(node, "camera") == kNoElement &&
+            xml_.child(node, "instance_camera") == kNoElement &&
+            xml_.child(node, "instance_light") == kNoElement)
           xml_.fail(child, "is not supported. Export it with matrices");
       }
     }
@@ -169,12 +172,14 @@ class SceneReader {
     Controlled& controlled = found->second;
     if (is_new) {
       const Index skin = xml_.child(controller, "skin"), morph = xml_.child(controller, "morph");
-      if (skin == kNone && morph == kNone) xml_.fail(controller, "is neither skin nor morph");
-      controlled.geometry = document_.target(skin == kNone ? morph : skin, "source", "geometry");
-      if (skin != kNone) {
+      if (skin == kNoElement && morph == kNoElement)
+        xml_.fail(controller, "is neither skin nor morph");
+      controlled.geometry =
+          document_.target(skin == kNoElement ? morph : skin, "source", "geometry");
+      if (skin != kNoElement) {
         const Index bind = xml_.child(skin, "bind_shape_matrix");
         controlled.pose =
-            bind == kNone ? root_transform() : Transform(root_transform() * matrix(bind));
+            bind == kNoElement ? root_transform() : Transform(root_transform() * matrix(bind));
       }
     }
     append(controlled.geometry, controlled.pose.value_or(world), instance);
@@ -205,7 +210,7 @@ class SceneReader {
   static constexpr std::size_t kMostInstances = 1'000'000;
 
   struct Controlled {
-    Index geometry = kNone;
+    Index geometry = kNoElement;
     std::optional<Transform> pose;  ///< a skin's
   };
 

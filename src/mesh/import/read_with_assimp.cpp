@@ -15,10 +15,10 @@
 namespace ist {
 namespace {
 
-using Transform = Eigen::Matrix4d;
+using AssimpTransform = Eigen::Matrix4d;
 
-Transform to_double(const aiMatrix4x4& m) {
-  Transform result;
+AssimpTransform to_double(const aiMatrix4x4& m) {
+  AssimpTransform result;
   result << double(m.a1), double(m.a2), double(m.a3), double(m.a4),  //
       double(m.b1), double(m.b2), double(m.b3), double(m.b4),        //
       double(m.c1), double(m.c2), double(m.c3), double(m.c4),        //
@@ -26,7 +26,7 @@ Transform to_double(const aiMatrix4x4& m) {
   return result;
 }
 
-void append(const aiMesh& mesh, const Transform& world, PolygonMesh& out) {
+void append(const aiMesh& mesh, const AssimpTransform& world, PolygonMesh& out) {
   const auto first = out.vertices.size();
   if (first + mesh.mNumVertices > UINT32_MAX) return;
   for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
@@ -47,10 +47,10 @@ void append(const aiMesh& mesh, const Transform& world, PolygonMesh& out) {
 }
 
 /// assimp turns the z axis of these formats to y in front of the scene; this turns it back.
-Transform own_axes(const std::string& ending) {
+AssimpTransform own_axes(const std::string& ending) {
   constexpr std::array<std::string_view, 10> kTurned = {".3ds", ".prj", ".ase", ".ask",     ".dxf",
                                                         ".iqm", ".md2", ".md3", ".md5mesh", ".mdc"};
-  Transform back = Transform::Identity();
+  AssimpTransform back = AssimpTransform::Identity();
   if (std::find(kTurned.begin(), kTurned.end(), ending) != kTurned.end())
     back << 1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1;
   return back;
@@ -78,7 +78,7 @@ PolygonMesh read_with_assimp(const SourceFile& file) {
     fail(file, "cannot be read as a mesh: " + std::string(importer.GetErrorString()));
   PolygonMesh mesh;
   mesh.declared = declared_frame(*scene);
-  std::vector<std::pair<const aiNode*, Transform>> open{
+  std::vector<std::pair<const aiNode*, AssimpTransform>> open{
       {scene->mRootNode, own_axes(ending) * to_double(scene->mRootNode->mTransformation)}};
   while (!open.empty()) {
     const auto [node, world] = open.back();

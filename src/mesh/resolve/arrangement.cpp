@@ -167,7 +167,7 @@ struct Segment {
 };
 
 /// Where two segments cross that do so between their ends.
-struct Crossing {
+struct CutCrossing {
   std::array<std::size_t, 2> segments;
   ExactPoint exact;
   RoundedPoint rounded;
@@ -178,7 +178,7 @@ struct Cluster {
   std::vector<std::uint32_t> triangles;
   std::vector<Segment> segments = {};
   std::vector<std::uint32_t> touched = {};  ///< points where other triangles only touch
-  std::vector<Crossing> crossings = {};
+  std::vector<CutCrossing> crossings = {};
   std::vector<PlanarTriangulation::Covered> pieces = {};
   int axis = 0;  ///< seen along it, the plane is no line
 };
@@ -421,7 +421,7 @@ Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
     on(clusters[c]).meet(crossings);
   });
   for (Cluster& cluster : clusters)
-    for (Crossing& crossing : cluster.crossings) {
+    for (CutCrossing& crossing : cluster.crossings) {
       const std::uint32_t p = out.points.add(std::move(crossing.exact), crossing.rounded);
       for (const std::size_t s : crossing.segments) cluster.segments[s].on.push_back(p);
     }

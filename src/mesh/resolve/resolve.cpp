@@ -28,14 +28,14 @@ namespace {
 using Pairs = std::vector<std::array<std::uint32_t, 2>>;
 using How = Resolution::How;
 
-constexpr std::size_t kMostPairs = 2'000'000;
+constexpr std::size_t kMostResolvedPairs = 2'000'000;
 
 Pairs pairs_of(ClosedMesh& closed) {
   if (!closed.meeting_pairs) {
     auto met = find_self_intersections(closed.mesh.vertices, closed.mesh.triangles);
     if (met) closed.meeting_pairs = std::move(met->pairs);
   }
-  if (!closed.meeting_pairs || closed.meeting_pairs->size() > kMostPairs)
+  if (!closed.meeting_pairs || closed.meeting_pairs->size() > kMostResolvedPairs)
     throw Unresolvable{"too many triangles or intersecting pairs"};
   return *closed.meeting_pairs;
 }
