@@ -14,10 +14,13 @@ target_link_libraries(ist_public INTERFACE Eigen3::Eigen)
 # What tests, benchmarks and the command line see: the headers of all rooms.
 add_library(ist_internal INTERFACE)
 
-# ist_compile_together(target sources…): several sources are one for the compiler, since half of its time
+# ist_compile_together(target sources…): nine sources are one for the compiler, since half of its time
 # goes to headers and templates that all of them use. Sources that are compiled once an instruction set
-# stay alone.
+# stay alone; so do all where tools read how each is compiled, or a missing include is looked for.
 function(ist_compile_together target)
+  if(CMAKE_DISABLE_PRECOMPILE_HEADERS OR CMAKE_EXPORT_COMPILE_COMMANDS)
+    return()
+  endif()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 9)
   foreach(source IN LISTS ARGN)
     file(STRINGS ${source} each_target REGEX "hwy/foreach_target" LIMIT_COUNT 1)
