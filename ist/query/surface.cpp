@@ -5,6 +5,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "query/base/no_answer.h"
 #include "query/base/relative_pose.h"
 #include "query/exact/kept_mesh.h"
 #include "query/exact/mesh_queries.h"
