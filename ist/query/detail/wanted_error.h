@@ -16,7 +16,8 @@ inline bool by_error(const PenetrationSettings& settings) noexcept {
 
 /// Says of an answer of the exact measure where its bounds, as of simplified meshes, are wider than
 /// a query accepts.
-inline Penetration with_error_status(Penetration exact, const PenetrationSettings& settings) noexcept {
+inline Penetration with_error_status(Penetration exact,
+                                     const PenetrationSettings& settings) noexcept {
   const double most = 2 * settings.relative_error * exact.volume;
   if (exact.status == QueryStatus::ok && by_error(settings) &&
       exact.volume_max - exact.volume_min > most && exact.volume > 0)
