@@ -12,6 +12,7 @@
 
 namespace ist {
 
+/// The numbers of an answer that cannot be given.
 inline constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// It is a surface alone.
