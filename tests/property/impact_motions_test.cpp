@@ -18,15 +18,13 @@ namespace {
 
 using namespace testing;
 
-constexpr double kPi = std::numbers::pi;
-
 TEST(Motions, LeadFromPoseToPose) {
   std::mt19937_64 random(1);
   for (int i = 0; i < 200; ++i) {
     const Pose from = random_pose(random, 2), to = random_pose(random, 3);
     const Vector3d about(0.3, -0.2, 0.7);
     const Motion motion = motion_between(from, to, 0.25, about, 2);
-    EXPECT_LE(motion.angular_velocity.norm() * 0.25, kPi + 1e-12);
+    EXPECT_LE(motion.angular_velocity.norm() * 0.25, std::numbers::pi + 1e-12);
     const Eigen::Isometry3d end = to_isometry(moved(from, motion, 0.25, 2));
     EXPECT_LE((end.matrix() - to_isometry(to).matrix()).norm(), 1e-13);
     // Half-way the point is half-way, and the rotation is the slerp.
@@ -42,7 +40,8 @@ TEST(Motions, LeadFromPoseToPose) {
 }
 
 TEST(Motions, TurnAsTheExponential) {
-  for (const double h : {-kPi / 2, -1.0, -1e-9, 0.0, 1e-5, 0.5, 1.2, kPi / 2}) {
+  for (const double h :
+       {-std::numbers::pi / 2, -1.0, -1e-9, 0.0, 1e-5, 0.5, 1.2, std::numbers::pi / 2}) {
     EXPECT_NEAR(sine_cosine(h).sine, std::sin(h), 2e-16);
     EXPECT_NEAR(sine_cosine(h).cosine, std::cos(h), 3e-16);
   }

@@ -17,8 +17,6 @@ namespace {
 
 using namespace testing;
 
-constexpr double kHalfTurn = std::numbers::pi;
-
 TEST(TimeOfImpact, OfACubeThatFallsOnAPlane) {
   const PlacedField floor{HalfSpaceField{}, {}, 1};
   for (const double speed : {1e-3, 1.0, 1e3}) {
@@ -51,7 +49,7 @@ TEST(TimeOfImpact, OfASpinningRodAndAWall) {
   // The rod turns about its middle, d before the wall: cos θ + 0.05 sin θ = d, with x and z
   // swapped.
   for (const double d : {0.3, 0.7, 0.95}) {
-    double low = 0, high = kHalfTurn / 2;
+    double low = 0, high = std::numbers::pi / 2;
     for (int i = 0; i < 100; ++i) {
       const double middle = (low + high) / 2;
       (std::sin(middle) + 0.05 * std::cos(middle) < d ? low : high) = middle;
@@ -84,7 +82,7 @@ TEST(TimeOfImpact, OfASpinningRodAndAWall) {
   }
   // Just out of reach, for a hundred thousand turns.
   ImpactSettings settings;
-  settings.duration = 1e5 * 2 * kHalfTurn;
+  settings.duration = 1e5 * 2 * std::numbers::pi;
   settings.tolerance = 1e-4;
   const TimeOfImpact clear =
       time_of_impact(PlacedField{HalfSpaceField{}, {}, 1}, {rod().view(), at({0, 0, 1.01}), 1},

@@ -6,10 +6,17 @@
 
 namespace ist::testing {
 
-/// `field`: whether the asset holds its surface.
-inline Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres, bool field = true) {
+/// `threads`: 0: all.
+inline PackingSettings of_size(std::size_t spheres, unsigned threads = 0) {
   PackingSettings settings;
   settings.max_spheres = spheres;
+  settings.threads = threads;
+  return settings;
+}
+
+/// `field`: whether the asset holds its surface.
+inline Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres, bool field = true) {
+  PackingSettings settings = of_size(spheres);
   settings.surface.wanted = field;
   return bake(close_mesh(std::move(mesh), name), settings);
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -14,8 +15,6 @@ namespace {
 
 using Eigen::Vector3d;
 using ist::Solid;
-
-constexpr double kPi = 3.14159265358979323846;
 
 std::unique_ptr<Solid> bored_box() {  // a box with a ball cut out of one corner, a torus added
   return ist::make_union(ist::make_difference(ist::make_box({0, 0, 0}, {1, 0.7, 0.4}),
@@ -71,33 +70,34 @@ TEST(AnalyticSolid, DistancesAreLipschitzAndNeverBeyondTheSurface) {
 }
 
 TEST(AnalyticSolid, VolumesInClosedForm) {
-  EXPECT_DOUBLE_EQ(ist::make_ball({5, 5, 5}, 2)->volume(), 32 * kPi / 3);
+  EXPECT_DOUBLE_EQ(ist::make_ball({5, 5, 5}, 2)->volume(), 32 * std::numbers::pi / 3);
   EXPECT_DOUBLE_EQ(ist::make_box({5, 5, 5}, {1, 2, 3})->volume(), 48);
-  EXPECT_DOUBLE_EQ(ist::make_torus({5, 5, 5}, 2, 1)->volume(), 4 * kPi * kPi);
+  EXPECT_DOUBLE_EQ(ist::make_torus({5, 5, 5}, 2, 1)->volume(),
+                   4 * std::numbers::pi * std::numbers::pi);
 }
 
 /// Integrated volumes against closed forms: within the stated error, and that small.
 TEST(AnalyticSolid, IntegratedVolumesKeepTheirStatedError) {
   const auto ball = [](double x, double r) { return ist::make_ball({x, 0.01, -0.02}, r); };
-  const double lens = kPi * 5 / 12;  // of two unit balls at distance 1
+  const double lens = std::numbers::pi * 5 / 12;  // of two unit balls at distance 1
   struct Case {
     std::unique_ptr<Solid> solid;
     double volume;
   };
   std::vector<Case> cases;
   cases.push_back({ist::make_intersection(ball(0, 1), ball(1, 1)), lens});
-  cases.push_back({ist::make_union(ball(0, 1), ball(1, 1)), 8 * kPi / 3 - lens});
-  cases.push_back({ist::make_difference(ball(0, 1), ball(1, 1)), 4 * kPi / 3 - lens});
-  cases.push_back({ist::make_union(ball(0, 1), ball(10, 1)), 8 * kPi / 3});
+  cases.push_back({ist::make_union(ball(0, 1), ball(1, 1)), 8 * std::numbers::pi / 3 - lens});
+  cases.push_back({ist::make_difference(ball(0, 1), ball(1, 1)), 4 * std::numbers::pi / 3 - lens});
+  cases.push_back({ist::make_union(ball(0, 1), ball(10, 1)), 8 * std::numbers::pi / 3});
   cases.push_back({ist::make_difference(ist::make_box({0, 0, 0}, {1, 1, 1}),
                                         ist::make_box({0.3, 0.1, 0.2}, {0.5, 0.4, 0.3})),
                    8 - 0.48});
   cases.push_back({ist::make_difference(ist::make_box({0, 0, 0}, {1, 1, 1}),
                                         ist::make_torus({0, 0, 0}, 0.6, 0.3)),
-                   8 - 2 * kPi * kPi * 0.6 * 0.09});
+                   8 - 2 * std::numbers::pi * std::numbers::pi * 0.6 * 0.09});
   cases.push_back({ist::make_intersection(ist::make_box({1e6, 0, 0}, {1e-3, 1e-3, 1e-3}),
                                           ist::make_ball({1e6 + 1e-3, 0, 0}, 1e-3)),
-                   2 * kPi / 3 * 1e-9});
+                   2 * std::numbers::pi / 3 * 1e-9});
   for (const Case& c : cases) {
     EXPECT_LE(std::abs(c.solid->volume() - c.volume), c.solid->volume_error());
     EXPECT_LT(c.solid->volume_error(), 0.001 * c.volume);

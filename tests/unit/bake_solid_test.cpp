@@ -9,6 +9,7 @@
 #include <ist/error.h>
 #include <ist/query.h>
 
+#include "support/baked.h"
 #include "support/test_meshes.h"
 
 namespace ist {
@@ -22,15 +23,8 @@ std::unique_ptr<Solid> bored_box() {
       make_ball({1, 0.7, 0.4}, 0.5));
 }
 
-PackingSettings solid_of_size(std::size_t spheres, unsigned threads = 0) {
-  PackingSettings settings;
-  settings.max_spheres = spheres;
-  settings.threads = threads;
-  return settings;
-}
-
 const Asset& ball_asset() {
-  static const Asset asset = bake(*make_ball({0.2, 0.1, 0}, 1), solid_of_size(2000));
+  static const Asset asset = bake(*make_ball({0.2, 0.1, 0}, 1), testing::of_size(2000));
   return asset;
 }
 
@@ -44,7 +38,7 @@ void expect_sound(const std::vector<Invariant>& invariants) {
 
 TEST(BakeSolid, BakesCsgSound) {
   const auto solid = bored_box();
-  const Asset asset = bake(*solid, solid_of_size(800));
+  const Asset asset = bake(*solid, testing::of_size(800));
   const AssetHeader& h = asset.view().header();
   EXPECT_EQ(h.sphere_count, 800u);
   EXPECT_NE(h.flags & kFlagPolygonised, 0u);
@@ -63,15 +57,16 @@ TEST(BakeSolid, BakesABallSound) {
 
 TEST(BakeSolid, SameBytesForAnyNumberOfThreads) {
   const auto solid = bored_box();
-  const Asset one = bake(*solid, solid_of_size(150, 1)), two = bake(*solid, solid_of_size(150, 2));
+  const Asset one = bake(*solid, testing::of_size(150, 1)),
+              two = bake(*solid, testing::of_size(150, 2));
   EXPECT_TRUE(
       std::equal(one.bytes().begin(), one.bytes().end(), two.bytes().begin(), two.bytes().end()));
 }
 
 TEST(BakeSolid, CellsAndSpheresTellAssetsApart) {
   const auto ball = make_ball({0, 0, 0}, 1);
-  const Asset fine = bake(*ball, solid_of_size(50), {}, {.cells = 64});
-  const Asset coarse = bake(*ball, solid_of_size(50), {}, {.cells = 16});
+  const Asset fine = bake(*ball, testing::of_size(50), {}, {.cells = 64});
+  const Asset coarse = bake(*ball, testing::of_size(50), {}, {.cells = 16});
   EXPECT_EQ(fine.view().header().polygonise_cells, 64u);
   EXPECT_LT(fine.view().header().polygonise_error, 0.3 * coarse.view().header().polygonise_error);
   expect_sound(check(coarse, *ball));
@@ -109,8 +104,8 @@ TEST(BakeSolid, PenetrationIsTheLens) {
 
 TEST(BakeSolid, AMeshesSolidIsBakedAsTheMesh) {
   const ClosedMesh mesh = testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
-  const Asset by_mesh = bake(mesh, solid_of_size(100)),
-              by_solid = bake(*make_solid(mesh), solid_of_size(100));
+  const Asset by_mesh = bake(mesh, testing::of_size(100)),
+              by_solid = bake(*make_solid(mesh), testing::of_size(100));
   EXPECT_TRUE(std::equal(by_mesh.bytes().begin(), by_mesh.bytes().end(), by_solid.bytes().begin(),
                          by_solid.bytes().end()));
   EXPECT_THROW(check(by_mesh, *make_solid(mesh)), Error);
@@ -129,18 +124,18 @@ TEST(BakeSolid, BakesFunctions) {
         return std::min((0.8 - std::abs(wave)) / (5 * std::sqrt(3.0)), 1 - x.norm());
       },
       box);
-  const Asset asset = bake(*gyroid, solid_of_size(400));
+  const Asset asset = bake(*gyroid, testing::of_size(400));
   EXPECT_GT(asset.view().header().coverage, 0.3);
   expect_sound(check(asset, *gyroid));
   const auto ball = make_function_solid([](const Vector3d& x) { return 1 - x.norm(); }, box);
-  EXPECT_EQ(bake(*ball, solid_of_size(20)).view().header().volume_error > 0, true);
+  EXPECT_EQ(bake(*ball, testing::of_size(20)).view().header().volume_error > 0, true);
 }
 
 TEST(BakeSolid, RefusesFunctionsThatAreNoDistances) {
   const Eigen::AlignedBox3d box(Vector3d::Constant(-1.2), Vector3d::Constant(1.2));
   const auto refused = [&](auto function, const Eigen::AlignedBox3d& bounds, const char* why) {
     try {
-      bake(*make_function_solid(function, bounds), solid_of_size(20));
+      bake(*make_function_solid(function, bounds), testing::of_size(20));
       ADD_FAILURE() << "accepted: " << why;
     } catch (const Error& error) {
       EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
@@ -159,11 +154,11 @@ TEST(BakeSolid, RefusesFunctionsThatAreNoDistances) {
 
 TEST(BakeSolid, RefusesWhatCannotBeDone) {
   const auto ball = make_ball({0, 0, 0}, 1);
-  PackingSettings grids = solid_of_size(50);
+  PackingSettings grids = testing::of_size(50);
   grids.grid = GridMode::uniform;
   EXPECT_THROW(bake(*ball, grids), Error);
-  EXPECT_THROW(bake(*ball, solid_of_size(50), [](const Progress&) { return false; }), Error);
-  EXPECT_THROW(bake(*ball, solid_of_size(50), {}, {.cells = 4}), Error);
+  EXPECT_THROW(bake(*ball, testing::of_size(50), [](const Progress&) { return false; }), Error);
+  EXPECT_THROW(bake(*ball, testing::of_size(50), {}, {.cells = 4}), Error);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <ist/asset_layout.h>
 #include "bake/asset/asset_writer.h"
 #include "query/asset/content_hash.h"
+#include "support/baked.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 
@@ -18,19 +19,12 @@ namespace {
 
 ClosedMesh cube() { return testing::closed(testing::cube_mesh(), "cube"); }
 
-PackingSettings spheres_of_size(std::size_t spheres, unsigned threads = 0) {
-  PackingSettings settings;
-  settings.max_spheres = spheres;
-  settings.threads = threads;
-  return settings;
-}
-
 std::vector<std::byte> bytes_of(const Asset& asset) {
   return {asset.bytes().begin(), asset.bytes().end()};
 }
 
 const Asset& cube_asset() {
-  static const Asset asset = bake(cube(), spheres_of_size(60));
+  static const Asset asset = bake(cube(), testing::of_size(60));
   return asset;
 }
 
@@ -48,10 +42,10 @@ TEST(Check, FindsBakesSound) {
   expect_all_sound(check(cube_asset(), cube()));
   for (const std::size_t n : {1u, 16u, 17u, 400u, 1000u}) {
     const ClosedMesh torus = testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
-    expect_all_sound(check(bake(torus, spheres_of_size(n)), torus));
+    expect_all_sound(check(bake(torus, testing::of_size(n)), torus));
   }
   const ClosedMesh two = testing::closed(testing::overlapping_cubes_mesh(), "two cubes");
-  expect_all_sound(check(bake(two, spheres_of_size(300)), two));
+  expect_all_sound(check(bake(two, testing::of_size(300)), two));
 }
 
 TEST(Check, RefusesAnotherMesh) {
@@ -175,7 +169,7 @@ TEST(Check, TurnsRedForEveryInvariant) {
 
 // A level of detail is checked like the finest.
 TEST(Check, TurnsRedForEveryInvariantOfADetail) {
-  const Asset asset = bake(cube(), spheres_of_size(1000));
+  const Asset asset = bake(cube(), testing::of_size(1000));
   ASSERT_EQ(asset.view().header().detail_count, 1u);
   const auto detail = [](AssetHeader& h) -> DetailLevel& {
     return *writable<DetailLevel>(h, h.details);
@@ -208,7 +202,7 @@ CellBrick* bricks(AssetHeader& h) { return writable<CellBrick>(h, field(h).brick
 // So is the field.
 TEST(Check, TurnsRedForEveryInvariantOfTheField) {
   const ClosedMesh torus = close_mesh(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
-  const Asset asset = bake(torus, spheres_of_size(60));
+  const Asset asset = bake(torus, testing::of_size(60));
   ASSERT_TRUE(asset.view().has_field());
   expect_all_sound(check(asset, torus));
   const std::vector<Tampering> cases = {
@@ -245,7 +239,7 @@ TEST(Check, TurnsRedForEveryInvariantOfTheMesh) {
   TriangleMesh moved = testing::torus_mesh(1.0, 0.4, 40, 20);
   for (Eigen::Vector3d& v : moved.vertices) v += Eigen::Vector3d(0.1, 0.2, 0.3);
   const ClosedMesh torus = close_mesh(std::move(moved), "torus");
-  const Asset asset = bake(torus, spheres_of_size(60));
+  const Asset asset = bake(torus, testing::of_size(60));
   ASSERT_EQ(asset.view().mesh_state(), MeshState::own);
   ASSERT_EQ(asset.view().mesh_triangles(), torus.mesh.triangles.size());
   expect_all_sound(check(asset, torus));
@@ -299,9 +293,9 @@ TEST(Bake, SameBytesForAnyThreadCount) {
   const ClosedMesh meshes[] = {cube(),
                                testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus")};
   for (const ClosedMesh& mesh : meshes) {
-    const auto one = bytes_of(bake(mesh, spheres_of_size(1000, 1)));
+    const auto one = bytes_of(bake(mesh, testing::of_size(1000, 1)));
     for (const unsigned threads : {1u, 2u, 5u})
-      EXPECT_EQ(one, bytes_of(bake(mesh, spheres_of_size(1000, threads)))) << mesh.name << threads;
+      EXPECT_EQ(one, bytes_of(bake(mesh, testing::of_size(1000, threads)))) << mesh.name << threads;
   }
 }
 
@@ -309,9 +303,9 @@ TEST(Bake, SameBytesForAnyThreadCountOfAScan) {
   IST_NEEDS_SHARED("oracle/meshes/dino.off");
   const std::string path = testing::shared_path("oracle/meshes/dino.off").string();
   const ClosedMesh dino = close_mesh(load_mesh(path), path);
-  const auto one = bytes_of(bake(dino, spheres_of_size(200, 1)));
+  const auto one = bytes_of(bake(dino, testing::of_size(200, 1)));
   for (const unsigned threads : {2u, 5u})
-    EXPECT_EQ(one, bytes_of(bake(dino, spheres_of_size(200, threads))));
+    EXPECT_EQ(one, bytes_of(bake(dino, testing::of_size(200, threads))));
 }
 
 /// The asset without what says where and how large the mesh is.
@@ -334,14 +328,14 @@ TEST(Bake, SameBytesAtAnyScaleAndOffset) {
   const TriangleMesh torus = testing::torus_mesh(1.0, 0.375, 24, 12);
   TriangleMesh snapped = torus;  // on a grid that the shifts below keep
   for (auto& v : snapped.vertices) v = (v.array() * 1048576).round() / 1048576;
-  const Asset first = bake(testing::closed(snapped, "torus"), spheres_of_size(100));
+  const Asset first = bake(testing::closed(snapped, "torus"), testing::of_size(100));
   const auto bytes = frameless(first);
   const double radius = bounds(first.view()).radius;
   for (const double scale : {std::ldexp(1.0, -30), 1.0, 4.0, std::ldexp(1.0, 30)})
     for (const double shift : {0.0, 1e6}) {
       TriangleMesh moved = snapped;
       for (auto& v : moved.vertices) v = scale * (v + Eigen::Vector3d(shift, -shift, 2 * shift));
-      const Asset asset = bake(testing::closed(moved, "torus"), spheres_of_size(100));
+      const Asset asset = bake(testing::closed(moved, "torus"), testing::of_size(100));
       EXPECT_EQ(bytes, frameless(asset)) << scale << " " << shift;
       EXPECT_NEAR(bounds(asset.view()).radius / scale, radius, 1e-12 * radius);
     }
@@ -349,9 +343,9 @@ TEST(Bake, SameBytesAtAnyScaleAndOffset) {
 
 TEST(Bake, AViewSpeaksInTheMeshsUnit) {
   TriangleMesh torus = testing::torus_mesh(1.0, 0.375, 24, 12);
-  const Asset small = bake(testing::closed(torus, "torus"), spheres_of_size(100));
+  const Asset small = bake(testing::closed(torus, "torus"), testing::of_size(100));
   for (auto& v : torus.vertices) v *= 8;
-  const Asset large = bake(testing::closed(torus, "torus"), spheres_of_size(100));
+  const Asset large = bake(testing::closed(torus, "torus"), testing::of_size(100));
   EXPECT_EQ(large.view().volume(), 512 * small.view().volume());
   EXPECT_EQ(large.view().protrusion(), 8 * small.view().protrusion());
   EXPECT_EQ(large.view().coverage(), small.view().coverage());
@@ -363,7 +357,7 @@ TEST(Bake, AViewSpeaksInTheMeshsUnit) {
 
 TEST(Bake, CancelKeepsWhatIsPacked) {
   bool cancelled = false;
-  const Asset asset = bake(cube(), spheres_of_size(100'000), [&](const Progress& now) {
+  const Asset asset = bake(cube(), testing::of_size(100'000), [&](const Progress& now) {
     if (std::strcmp(now.stage, "pack") != 0 || now.spheres < 100) return true;
     cancelled = true;
     return false;
@@ -371,7 +365,7 @@ TEST(Bake, CancelKeepsWhatIsPacked) {
   ASSERT_TRUE(cancelled);
   EXPECT_LT(asset.view().sphere_count(), 100'000u);
   EXPECT_EQ(asset.view().header().stop_reason, static_cast<std::uint32_t>(StopReason::cancelled));
-  EXPECT_THROW(bake(cube(), spheres_of_size(50),
+  EXPECT_THROW(bake(cube(), testing::of_size(50),
                     [](const Progress& now) { return std::strcmp(now.stage, "tree") != 0; }),
                Error);
 }

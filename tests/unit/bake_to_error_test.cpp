@@ -34,7 +34,7 @@ const ClosedMesh& fine_torus() {  // 50,000 triangles
 }
 
 const ClosedMesh& closed_cube() {
-  static const ClosedMesh mesh = testing::closed(testing::cube_mesh(), "closed_cube");
+  static const ClosedMesh mesh = testing::closed(testing::cube_mesh(), "cube");
   return mesh;
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <numbers>
 #include <random>
 
 #include <ist/error.h>
@@ -17,8 +18,6 @@ namespace {
 
 using Eigen::Vector3d;
 using ist::Solid;
-
-constexpr double kHalfTurn = 3.14159265358979323846;
 
 std::unique_ptr<Solid> box_with_bore() {
   return ist::make_difference(ist::make_box({0.1, 0, 0}, {1, 0.7, 0.4}),
@@ -182,7 +181,7 @@ class Faulty final : public Solid {
   Eigen::AlignedBox3d bounds() const override {
     return {Vector3d::Constant(-bound_), Vector3d::Constant(bound_)};
   }
-  double volume() const override { return 4 * kHalfTurn / 3; }
+  double volume() const override { return 4 * std::numbers::pi / 3; }
 
  private:
   double slope_, bound_;

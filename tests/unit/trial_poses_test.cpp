@@ -27,7 +27,7 @@ const Baked& torus() {
   return solid;
 }
 const Baked& baked_cube() {
-  static const Baked solid(testing::closed(testing::cube_mesh(), "baked_cube"));
+  static const Baked solid(testing::closed(testing::cube_mesh(), "cube"));
   return solid;
 }
 
@@ -73,7 +73,7 @@ TEST(TrialPoses, AreTheSameForAnyNumberOfThreads) {
             one[0].b_in_a.t[0]);
 }
 
-// A ball takes few spheres, a baked_cube many, and a harder target more.
+// A ball takes few spheres, a cube many, and a harder target more.
 TEST(BakeToError, TakesAsManySpheresAsItNeeds) {
   const ClosedMesh ball = testing::closed(testing::icosphere_mesh(4), "ball");
   const Asset easy = bake_to_error(ball, {0.03, 0.01}).asset;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <list>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -16,8 +17,6 @@ using Eigen::Vector3d;
 using ist::Crossing;
 using ist::MeshSolid;
 
-constexpr double kWindingPi = 3.14159265358979323846;
-
 /// Winding number by the sum of solid angles (Van Oosterom and Strackee): no rays, no predicates.
 double solid_angle_winding(const ist::MeshView& mesh, const Vector3d& p) {
   double sum = 0;
@@ -29,7 +28,7 @@ double solid_angle_winding(const ist::MeshView& mesh, const Vector3d& p) {
     sum += std::atan2(c[0].dot(c[1].cross(c[2])),
                       a * b * d + c[0].dot(c[1]) * d + c[1].dot(c[2]) * a + c[2].dot(c[0]) * b);
   }
-  return sum / (2 * kWindingPi);
+  return sum / (2 * std::numbers::pi);
 }
 
 /// An icosphere dented and blown at random: star-shaped, closed.
