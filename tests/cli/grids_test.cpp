@@ -73,8 +73,10 @@ TEST_F(GridCommands, OptionsThatTheGridHasNoUseForAreRefused) {
 /// Only the banded packing is greedy and knows by how much.
 TEST_F(GridCommands, NoPromiseIsPrintedWhereNoneIsKept) {
   for (const std::string grid : {"uniform", "explicit", "implicit", "hybrid"}) {
-    const Outcome bake =
-        ist({"bake", "cube.obj", "-o", "g.ist", "--spheres", "10", "--grid", grid});
+    std::vector<std::string> arguments = {"bake",      "cube.obj", "-o",     "g.ist",
+                                          "--spheres", "10",       "--grid", grid};
+    if (grid != "explicit") arguments.insert(arguments.end(), {"--grid-resolution", "16"});
+    const Outcome bake = ist(arguments);
     EXPECT_EQ(bake.out.find("at least"), std::string::npos) << bake.out;
     EXPECT_NE(bake.out.find("no bound: grid " + grid), std::string::npos) << bake.out;
     const auto json = nlohmann::json::parse(ist({"info", "g.ist", "--json"}).out);

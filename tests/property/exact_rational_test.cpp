@@ -92,7 +92,7 @@ class ExactRational : public ::testing::Test {
 TEST_F(ExactRational, RandomMeshesInCubeTurns) {
   IntegerMeshes random(1);
   const std::vector<CubeTurn> turns = cube_turns();
-  for (int i = 0; i < 6 * IntegerMeshes::kKinds; ++i) {
+  for (int i = 0; i < 3 * IntegerMeshes::kKinds; ++i) {
     const TriangleMesh a = random.make(i % IntegerMeshes::kKinds);
     TriangleMesh b = random.make(random.whole(0, IntegerMeshes::kKinds - 1));
     const Asset asset_a = testing::surface(a);
@@ -108,8 +108,8 @@ TEST_F(ExactRational, RandomMeshesInCubeTurns) {
               "meshes " + std::to_string(i) + ", pose " + std::to_string(k));
     }
   }
-  EXPECT_EQ(poses_, 216);
-  EXPECT_GE(poses_ - empty_, 100);
+  EXPECT_EQ(poses_, 108);
+  EXPECT_GE(poses_ - empty_, 50);
 }
 
 // On copies of themselves, and on what shares faces, edges or corners with them.

@@ -325,7 +325,7 @@ TEST(CoverCapsules, SeveralHoldEveryPointOfTheSolid) {
     const auto solid = make_solid(mesh);
     const Eigen::AlignedBox3d box = solid->bounds();
     double before = std::numeric_limits<double>::infinity();
-    for (const std::size_t count : {1u, 3u, 12u}) {
+    for (const std::size_t count : {1u, 4u}) {
       const std::vector<CoverCapsule> capsules = cover_with_capsules(mesh, count, 2);
       EXPECT_LE(capsules.size(), count);
       double sum = 0;

@@ -10,7 +10,7 @@
 
 namespace {
 
-constexpr double kSide = 1, kDensity = 600, kGravity = 9.81, kFriction = 0.5;
+constexpr double kSide = 1;
 
 Part make_cube(std::size_t spheres) {
   return Part("cube", make_box(Eigen::Vector3d::Constant(kSide / 2)), spheres);
@@ -22,15 +22,12 @@ const Part& cube() {
 
 /// `load`: what the lowest cube bears, in cubes.
 WorldSettings settings_of(const SceneOptions& options, double load) {
-  WorldSettings settings;
-  settings.way = options.way;
-  settings.step = 1 / options.hz;
-  settings.gravity = {0, 0, -kGravity};
+  WorldSettings settings = world_settings(options);
   settings.margin = 0.002 * kSide;
   settings.hulls = 1;
   settings.ist.patches = 4;  // as many as a face has corners
   // As deep as matched spheres blur a face: there it is in its place.
-  set_law(settings, kDensity * cube().volume(), kSide * kSide, 0.002 * kSide, 1, load);
+  set_law(settings, kWood * cube().volume(), kSide * kSide, 0.002 * kSide, 1, load);
   return settings;
 }
 
@@ -64,15 +61,15 @@ SceneResult run_box(const SceneOptions& options) {
   SceneWorld world(settings_of(options, 1));
   btRigidBody& ground = add_ground(world, kFriction);
   btRigidBody& box = world.add(
-      cube(), kDensity, place({0.1, 0.07, kSide / 2 + 0.01}, turn(0.3, {0, 0, 1})), kFriction);
+      cube(), kWood, place({0.1, 0.07, kSide / 2 + 0.01}, turn(0.3, {0, 0, 1})), kFriction);
   return come_to_rest(world, ground, box, kSide / 2, options);
 }
 
 SceneResult run_cube_on_cube(const SceneOptions& options) {
   SceneWorld world(settings_of(options, 1));
   btRigidBody& below = world.add(cube(), 0, place({0, 0, kSide / 2}), kFriction);
-  btRigidBody& above = world.add(
-      cube(), kDensity, place({0, 0, 1.5 * kSide + 0.01}, turn(0.2, {0, 0, 1})), kFriction);
+  btRigidBody& above =
+      world.add(cube(), kWood, place({0, 0, 1.5 * kSide + 0.01}, turn(0.2, {0, 0, 1})), kFriction);
   return come_to_rest(world, below, above, 1.5 * kSide, options);
 }
 
@@ -87,7 +84,7 @@ SceneResult stand(const SceneOptions& options, double aside, double turned) {
   settings.margin = 0.002 * kSmall;
   settings.ist.patches = 8;
   if (options.way == Way::wrench) {
-    set_law(settings, kDensity * box.volume(), kSmall * kSmall, 0.002 * kSmall, 1, kCubes);
+    set_law(settings, kWood * box.volume(), kSmall * kSmall, 0.002 * kSmall, 1, kCubes);
   }
   SceneWorld world(settings);
   btRigidBody& ground = add_ground(world, kFriction);
@@ -98,8 +95,7 @@ SceneResult stand(const SceneOptions& options, double aside, double turned) {
   for (int i = 0; i < kCubes; ++i) {
     const double x = aside * draw(), y = aside * draw(), angle = turned * draw();
     begin.push_back({x, y, kSmall * (i + 0.5)});
-    boxes.push_back(
-        &world.add(box, kDensity, place(begin.back(), turn(angle, {0, 0, 1})), kFriction));
+    boxes.push_back(&world.add(box, kWood, place(begin.back(), turn(angle, {0, 0, 1})), kFriction));
   }
   Run run(world, options);
   const double seconds = seconds_of(options, options.full ? 60 : 8);
@@ -136,7 +132,7 @@ SceneResult run_pile(const SceneOptions& options) {
     const double angle = 6 * draw(), x = draw() - 0.5, y = draw() - 0.5, z = draw() - 0.5;
     const Eigen::Vector3d at(1.8 * (i % 2) + 0.3 * x, 1.8 * (i / 2 % 2) + 0.3 * y,
                              1 + 1.8 * (i / 4));
-    world.add(part, kDensity, place(at, turn(angle, {x, y, z + 0.01})), kFriction);
+    world.add(part, kWood, place(at, turn(angle, {x, y, z + 0.01})), kFriction);
   }
   Run run(world, options);
   const double seconds = seconds_of(options, 8);

@@ -7,7 +7,7 @@
 
 namespace {
 
-constexpr double kPitch = 2, kLead = kPitch / (2 * std::numbers::pi), kGravity = 9810;
+constexpr double kPitch = 2, kLead = kPitch / (2 * std::numbers::pi);
 constexpr double kSteel = 7.85e-6;
 constexpr double kFit = 8;                 // [mm] of the bolt at which the nut fits unturned
 constexpr double kBolt = 21;               // [mm] its length
@@ -21,10 +21,7 @@ SceneResult run_nut(const SceneOptions& options) {
   const Part nut("nut", ist::load_mesh((options.meshes / "nut.obj").string()), 4000);
   const double mass = kSteel * nut.volume();
 
-  WorldSettings settings;
-  settings.way = options.way;
-  settings.step = 1 / options.hz;
-  settings.gravity = {0, 0, -kGravity};
+  WorldSettings settings = world_settings(options, kGravityOfMillimetres);
   settings.margin = 0.01;
   settings.hulls = 64;
   set_law(settings, mass, kFlanks, 0.03, 100);
@@ -46,7 +43,7 @@ SceneResult run_nut(const SceneOptions& options) {
 
   // Without friction the nut goes down the helix as a bead on a wire.
   const double inertia = nut.frame().unit_inertia.maxCoeff();
-  const double acceleration = kGravity / (1 + inertia / (kLead * kLead));
+  const double acceleration = kGravityOfMillimetres / (1 + inertia / (kLead * kLead));
 
   Run run(world, options);
   double turned = 0, last = 0, off = 0, tilt = 0, way = 0;
@@ -81,8 +78,8 @@ SceneResult run_nut(const SceneOptions& options) {
                                {"tilt [rad]", tilt, 0, coarse ? 0.1 : 0.05}};
   if (!coarse) {
     truths.push_back({"way over that of a bead on the helix", way / ideal, 0.75, 1.1});
-    truths.push_back(
-        {"energy gained, of what the way releases", most / (mass * kGravity * way), -kNone, 0.05});
+    truths.push_back({"energy gained, of what the way releases",
+                      most / (mass * kGravityOfMillimetres * way), -kNone, 0.05});
   }
   return run.finish(kPitch, std::move(truths));
 }

@@ -10,13 +10,8 @@
 
 namespace {
 
-constexpr double kGravity = 9810;  // [mm/s²]
-
-WorldSettings settings_of(const SceneOptions& options) {
-  WorldSettings settings;
-  settings.way = options.way;
-  settings.step = 1 / options.hz;
-  settings.gravity = {0, 0, -kGravity};
+WorldSettings settings_of_parts(const SceneOptions& options) {
+  WorldSettings settings = world_settings(options, kGravityOfMillimetres);
   settings.margin = 0.05;
   return settings;
 }
@@ -35,7 +30,7 @@ SceneResult run_screw(const SceneOptions& options) {
                               }),
                    4000);
   const double mass = kSteel * screw.volume();
-  WorldSettings settings = settings_of(options);
+  WorldSettings settings = settings_of_parts(options);
   set_law(settings, mass, 10, 0.02, 500);
   SceneWorld world(settings);
   btRigidBody& t = world.add(table, 0, place({0, 0, 0}), 0.4);
@@ -54,7 +49,7 @@ SceneResult run_screw(const SceneOptions& options) {
                                {"height of its centre over the table [mm]", height, 4, 11}};
   SceneResult result = run.finish(21, std::move(truths));
   result.truths.push_back({"kinetic energy, of weight times length",
-                           result.kinetic_energy / (mass * kGravity * 21), 0, 1e-4});
+                           result.kinetic_energy / (mass * kGravityOfMillimetres * 21), 0, 1e-4});
   return result;
 }
 
@@ -63,7 +58,7 @@ SceneResult run_drop(const SceneOptions& options) {
   const Part screw("screw", ist::load_mesh((options.meshes / "bolt.obj").string()), 2000);
   const Part plate("plate", make_box({150, 150, kPlate / 2}), 4000);
   const double mass = kSteel * screw.volume();
-  WorldSettings settings = settings_of(options);
+  WorldSettings settings = settings_of_parts(options);
   set_law(settings, mass, 10, 0.02, 500);
   SceneWorld world(settings);
   btRigidBody& p = world.add(plate, 0, place({0, 0, -kPlate / 2}), 0.4);
@@ -86,7 +81,8 @@ SceneResult run_drop(const SceneOptions& options) {
   SceneResult result = run.finish(21, {{"screws on the plate", static_cast<double>(above), 8, 8},
                                        {"force over weight", weight.along(), 0.99, 1.01}});
   result.truths.push_back({"kinetic energy, of weight times length",
-                           result.kinetic_energy / (8 * mass * kGravity * 21), 0, 1e-4});
+                           result.kinetic_energy / (8 * mass * kGravityOfMillimetres * 21), 0,
+                           1e-4});
   return result;
 }
 
@@ -109,7 +105,7 @@ SceneResult run_bowl(const SceneOptions& options) {
                  make_cells({-130, -120, 120, 130}, {-130, -120, 120, 130}, {0, 10, 90},
                             [](int i, int j, int k) { return k == 0 || i != 1 || j != 1; }),
                  4000);
-  WorldSettings settings = settings_of(options);
+  WorldSettings settings = settings_of_parts(options);
   set_law(settings, kDensity * ball.volume(), 200, 0.1, 500);
   SceneWorld world(settings);
   btRigidBody& ground = add_ground(world, 0.5);
@@ -130,9 +126,9 @@ SceneResult run_bowl(const SceneOptions& options) {
                              {"ball off the bowl's axis [mm]", centre.head<2>().norm(), 0, 3},
                              {"ball's height off, of its diameter",
                               (centre.z() - (kWall - low) - kBall) / (2 * kBall), -0.01, 0.01}});
-  result.truths.push_back({"kinetic energy, of weight times ball",
-                           result.kinetic_energy / (total_mass(world) * kGravity * 2 * kBall), 0,
-                           1e-4});
+  result.truths.push_back(
+      {"kinetic energy, of weight times ball",
+       result.kinetic_energy / (total_mass(world) * kGravityOfMillimetres * 2 * kBall), 0, 1e-4});
   return result;
 }
 
@@ -145,12 +141,12 @@ SceneResult run_peg(const SceneOptions& options) {
       make_turned({{kHole, 0}, {30, 0}, {30, kDeep}, {kHole + 2, kDeep}, {kHole, kDeep - 2}}, 96),
       4000);
   const double mass = kSteel * peg.volume();
-  WorldSettings settings = settings_of(options);
+  WorldSettings settings = settings_of_parts(options);
   settings.hulls = 24;
   settings.margin = 0.02;
   settings.ist.patches = 16;
   // The fit leaves less than bodies of this size sink in by default.
-  settings.ist.law.stiffness = ist::stiffness_for_depth(mass * kGravity, 100, 0.02);
+  settings.ist.law.stiffness = ist::stiffness_for_depth(mass * kGravityOfMillimetres, 100, 0.02);
   set_law(settings, mass, 100, 0.02, 100);
   SceneWorld world(settings);
   add_ground(world, 0.1);
@@ -184,7 +180,7 @@ SceneResult run_bunnies(const SceneOptions& options) {
   const Part bunny("bunny", std::move(mesh), 1000);
   const double mass = kDensity * bunny.volume();
 
-  WorldSettings settings = settings_of(options);
+  WorldSettings settings = settings_of_parts(options);
   settings.gravity = {0, 0, -kMetres};
   settings.margin = 0.001;
   set_law(settings, mass, 0.0005, 0.0005, 1);

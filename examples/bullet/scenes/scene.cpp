@@ -25,6 +25,14 @@ const std::vector<Scene>& scenes() {
   return all;
 }
 
+WorldSettings world_settings(const SceneOptions& options, double gravity) {
+  WorldSettings settings;
+  settings.way = options.way;
+  settings.step = 1 / options.hz;
+  settings.gravity = {0, 0, -gravity};
+  return settings;
+}
+
 bool SceneResult::works() const {
   return std::all_of(truths.begin(), truths.end(), [](const Truth& t) { return t.holds(); });
 }

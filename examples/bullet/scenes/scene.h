@@ -21,6 +21,9 @@ struct SceneOptions {
   bool quiet = false;
 };
 
+/// The options' way and step, and weight.
+WorldSettings world_settings(const SceneOptions& options, double gravity = kGravity);
+
 /// One number of a scene, and what it has to be.
 struct Truth {
   std::string what;

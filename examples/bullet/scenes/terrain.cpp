@@ -12,7 +12,6 @@
 
 namespace {
 
-constexpr double kGravity = 9.81, kWood = 600, kFriction = 0.5;
 constexpr std::uint32_t kPoints = 41;
 constexpr double kSpacing = 0.1, kHalf = 0.5 * kSpacing * (kPoints - 1), kBoulder = 0.25;
 
@@ -32,10 +31,7 @@ SceneResult run(const SceneOptions& options, bool mesh) {
   const Part ball("ball", make_ball(kBall, 48), 1000);
   const Part cube("cube", make_box(Eigen::Vector3d::Constant(0.07)), 1000);
 
-  WorldSettings settings;
-  settings.way = options.way;
-  settings.step = 1 / options.hz;
-  settings.gravity = {0, 0, -kGravity};
+  WorldSettings settings = world_settings(options);
   settings.margin = 0.001;
   set_law(settings, kWood * torus.volume(), 0.0005, 0.0005, 1);
 

@@ -16,10 +16,16 @@
 enum class Way { solver, wrench, gimpact, hulls };
 const char* name_of(Way way);
 
+constexpr double kGravity = 9.81;               ///< [m/s²]
+constexpr double kGravityOfMillimetres = 9810;  ///< [mm/s²]
+
+constexpr double kWood = 600;      ///< [kg/m³]
+constexpr double kFriction = 0.5;  ///< of most bodies
+
 struct WorldSettings {
   Way way = Way::solver;
   double step = 1.0 / 240;  ///< [s]
-  Eigen::Vector3d gravity = {0, 0, -9.81};
+  Eigen::Vector3d gravity = {0, 0, -kGravity};
   ist::bullet::Settings ist;  ///< `response` follows `way`
   double margin = 0;          ///< [u] of GImpact's triangles and of hulls
   std::size_t hulls = 16;     ///< a part's, at least
