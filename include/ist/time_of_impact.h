@@ -52,14 +52,14 @@ enum class ImpactStatus : std::uint32_t {
                          ///< other
   budget_exhausted = 4,  ///< a limit, or the workspace's capacity; they stay clear up to `time`
   /// All numbers of the answer are NaN. The cause is that of QueryStatus::invalid_input; a motion
-  /// with NaN or Inf; a duration that is negative, NaN or Inf; or a motion over 1e60 sizes.
+  /// with NaN or Inf; a duration that is not > 0, or Inf; or a motion over 1e60 sizes.
   invalid_input = 5,
   /// An asset holds no spheres (QueryStatus::not_held). All numbers of the answer are NaN.
   not_held = 6,
 };
 
 struct ImpactSettings {
-  double duration = 1;  ///< [T] ≥ 0: the interval is [0, duration]
+  double duration = 1;  ///< [T] > 0: the interval is [0, duration]
 
   /// [u] An impact is reported when the gap is between a half of this and this. Zero, a negative
   /// value or NaN: a thousandth of the smaller solid's bounding radius (of the asset's, if the

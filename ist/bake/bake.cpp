@@ -9,7 +9,9 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include <ist/error.h>
 
@@ -58,20 +60,31 @@ std::vector<std::size_t> detail_counts(std::size_t spheres) {
   return counts;
 }
 
-/// Work on trees, done while a backend leaves the caller's threads idle, or when they are free.
-class HostWork {
+/// Stages of a bake on the host's threads. Each starts when all that it waits for is done: while a
+/// backend leaves the caller's threads idle, or when they are free.
+class HostStages {
  public:
-  explicit HostWork(bool threads_are_idle) : at_once_(threads_are_idle) {}
+  struct Stage {
+    std::string_view name;
+    std::vector<std::string_view> waits_for;  ///< stages, or steps of the caller's
+    std::function<void()> work;
+  };
+
+  HostStages(bool threads_are_idle, std::vector<Stage> table)
+      : at_once_(threads_are_idle), table_(std::move(table)), left_(table_.size()) {
+    for (std::size_t i = 0; i < table_.size(); ++i)
+      left_[i] = static_cast<int>(table_[i].waits_for.size());
+  }
   /// Waits, whichever way the scope is left: a group that is left alone would be cancelled, and
   /// with it, unseen, the loops inside its tasks.
-  ~HostWork() {
+  ~HostStages() {
     try {
       group_.wait();
     } catch (...) {  // the scope is left by an exception already
     }
   }
-  HostWork(const HostWork&) = delete;
-  HostWork& operator=(const HostWork&) = delete;
+  HostStages(const HostStages&) = delete;
+  HostStages& operator=(const HostStages&) = delete;
 
   void add(std::function<void()> work) {
     if (at_once_)
@@ -80,11 +93,13 @@ class HostWork {
       waiting_.push_back(std::move(work));
   }
 
-  /// To be called by both of two that a work has to wait for: the later adds it.
-  std::function<void()> add_after_both(std::function<void()> work) {
-    return [this, left = std::make_shared<std::atomic<int>>(2), work = std::move(work)] {
-      if (--*left == 0) add(work);
-    };
+  void done(std::string_view name) {
+    for (std::size_t i = 0; i < table_.size(); ++i)
+      if (std::ranges::count(table_[i].waits_for, name) != 0 && --left_[i] == 0)
+        add([this, i] {
+          table_[i].work();
+          done(table_[i].name);
+        });
   }
 
   void finish() {
@@ -95,6 +110,8 @@ class HostWork {
 
  private:
   bool at_once_;
+  std::vector<Stage> table_;
+  std::vector<std::atomic<int>> left_;
   std::vector<std::function<void()>> waiting_;
   tbb::task_group group_;
 };
@@ -129,10 +146,23 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
                         const ProgressCallback& progress) {
   AssetArrays arrays;
   std::vector<std::uint32_t> inner_order;
-  HostWork host(backend.leaves_threads_idle());
+  // The finest matched spheres lie much as the inner ones do, whose order is found meanwhile. Trees
+  // of coarser levels follow their calibration.
+  HostStages host(
+      backend.leaves_threads_idle(),
+      {{"moments", {"start"}, [&] { solid.unit_moments(); }},
+       {"order", {"pack"}, [&] { inner_order = sphere_order(arrays.inner_spheres); }},
+       {"bounds", {"pack"}, [&] { describe_bounds(solid, 0, arrays.header); }},
+       {"finest tree",
+        {"order", "calibrate"},
+        [&] { arrays.matched_tree = build_tree_like(arrays.matched_spheres, inner_order); }},
+       {"inner tree", {"order", "cover"}, [&] {
+          arrays.inner_tree =
+              tree_from_order(arrays.inner_spheres, arrays.cover_radii, inner_order);
+        }}});
   if (backend.leaves_threads_idle()) {
     field.start();
-    host.add([&] { solid.unit_moments(); });
+    host.done("start");
   }
 
   const SpherePacking packing = backend.pack(settings, progress);
@@ -143,29 +173,17 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
                 "allow more time");
   arrays.header = describe_bake(mesh, solid, settings, packing);
   arrays.inner_spheres = packing.spheres;
-
-  // The finest matched spheres lie much as the inner ones do, whose order is found meanwhile.
-  const auto grow_finest = host.add_after_both(
-      [&] { arrays.matched_tree = build_tree_like(arrays.matched_spheres, inner_order); });
-  const auto grow_inner = host.add_after_both([&] {
-    arrays.inner_tree = tree_from_order(arrays.inner_spheres, arrays.cover_radii, inner_order);
-  });
-  host.add([&, grow_finest, grow_inner] {
-    inner_order = sphere_order(arrays.inner_spheres);
-    grow_finest();
-    grow_inner();
-  });
-  host.add([&] { describe_bounds(solid, 0, arrays.header); });
+  host.done("pack");
 
   const std::vector<std::size_t> counts = detail_counts(count);
   arrays.details.resize(counts.size() - 1);
   const auto calibrate_levels = [&](std::size_t first, std::size_t end, SolidBackend& on,
-                                    HostWork& trees, const ProgressCallback& report) {
+                                    HostStages& trees, const ProgressCallback& report) {
     const auto take = [&](std::size_t i, Calibration made) {
       if (first + i == 0) {
         arrays.matched_spheres = std::move(made.matched);
         arrays.header.protrusion = made.protrusion;
-        grow_finest();
+        host.done("calibrate");
         return;
       }
       DetailArrays& detail = arrays.details[first + i - 1];
@@ -180,7 +198,7 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   if (const auto beside = backend.beside(); beside && counts.size() > 1) {
     levels.emplace(settings.threads, [&, beside](const ProgressCallback& report) {
       const std::unique_ptr<SolidBackend> other = beside();
-      HostWork trees(true);  // a task group belongs to the threads of one arena
+      HostStages trees(true, {});  // a task group belongs to the threads of one arena
       calibrate_levels(1, counts.size(), *other, trees, report);
       trees.finish();
     });
@@ -190,7 +208,7 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
     calibrate_levels(0, counts.size(), backend, host, progress);
   }
   arrays.cover_radii = cover_radii(solid, backend, packing.spheres, progress);
-  grow_inner();
+  host.done("cover");
 
   Stage stage("tree", progress);
   stage.step(count, 0);

@@ -7,7 +7,7 @@ no leading n: numbers and (3,) arrays.
 import enum
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, Protocol, final
+from typing import Any, Final, Literal, Protocol, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,63 +51,38 @@ class ImpactStatus(enum.IntEnum):
 
 @final
 class Progress:
-    @property
-    def total(self) -> float: ...  # [0, 1]
-    @property
-    def stage(self) -> str: ...
-    @property
-    def spheres(self) -> int: ...
-    @property
-    def coverage(self) -> float: ...  # [0, 1]
-    @property
-    def radius(self) -> float: ...  # [u]
-    @property
-    def fraction(self) -> float: ...  # [0, 1]
-    @property
-    def elapsed(self) -> float: ...  # [s]
+    total: Final[float]  # [0, 1]
+    stage: Final[str]
+    spheres: Final[int]
+    coverage: Final[float]  # [0, 1]
+    radius: Final[float]  # [u]
+    fraction: Final[float]  # [0, 1]
+    elapsed: Final[float]  # [s]
 
 @final
 class MeshReport:
-    @property
-    def vertices(self) -> int: ...
-    @property
-    def triangles(self) -> int: ...
-    @property
-    def components(self) -> int: ...
-    @property
-    def boundary_edges(self) -> int: ...
-    @property
-    def nonmanifold_edges(self) -> int: ...
-    @property
-    def flipped_components(self) -> int: ...
-    @property
-    def degenerate_triangles(self) -> int: ...
-    @property
-    def self_intersections(self) -> int: ...
-    @property
-    def shells(self) -> int: ...
-    @property
-    def meets_itself(self) -> bool: ...
-    @property
-    def filled_holes(self) -> int: ...
-    @property
-    def repaired(self) -> bool: ...
-    @property
-    def volume(self) -> float: ...  # [u³]
-    @property
-    def notes(self) -> list[str]: ...
+    vertices: Final[int]
+    triangles: Final[int]
+    components: Final[int]
+    boundary_edges: Final[int]
+    nonmanifold_edges: Final[int]
+    flipped_components: Final[int]
+    degenerate_triangles: Final[int]
+    self_intersections: Final[int]
+    shells: Final[int]
+    meets_itself: Final[bool]
+    filled_holes: Final[int]
+    repaired: Final[bool]
+    volume: Final[float]  # [u³]
+    notes: Final[list[str]]
 
 @final
 class Mesh:
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike) -> None: ...
-    @property
-    def vertices(self) -> NDArray[np.float64]: ...  # (n, 3) [u], read-only view
-    @property
-    def triangles(self) -> NDArray[np.uint32]: ...  # (m, 3), read-only view
-    @property
-    def declared_up_axis(self) -> Literal["X", "Y", "Z"] | None: ...
-    @property
-    def declared_unit(self) -> float: ...  # [m]
+    vertices: Final[NDArray[np.float64]]  # (n, 3) [u], read-only view
+    triangles: Final[NDArray[np.uint32]]  # (m, 3), read-only view
+    declared_up_axis: Final[Literal["X", "Y", "Z"] | None]
+    declared_unit: Final[float]  # [m]
 
 _Drawn = Asset | Mesh | ClosedMesh
 
@@ -121,14 +96,10 @@ _OpenMesh = Mesh | _Path | tuple[ArrayLike, ArrayLike] | _MeshLike
 
 @final
 class ClosedMesh:
-    @property
-    def vertices(self) -> NDArray[np.float64]: ...  # (n, 3) [u], read-only view
-    @property
-    def triangles(self) -> NDArray[np.uint32]: ...  # (m, 3), read-only view
-    @property
-    def name(self) -> str: ...
-    @property
-    def report(self) -> MeshReport: ...
+    vertices: Final[NDArray[np.float64]]  # (n, 3) [u], read-only view
+    triangles: Final[NDArray[np.uint32]]  # (m, 3), read-only view
+    name: Final[str]
+    report: Final[MeshReport]
 
 def load_mesh(path: _Path, *, weld_tolerance: float = 0.0) -> Mesh: ...
 def from_trimesh(mesh: _MeshLike) -> Mesh: ...
@@ -139,68 +110,43 @@ def sample_mesh(name: str) -> Mesh: ...
 
 @final
 class MassProperties:
-    @property
-    def volume(self) -> float: ...  # [u³]
-    @property
-    def centre_of_mass(self) -> NDArray[np.float64]: ...  # (3,) [u]
-    @property
-    def inertia(self) -> NDArray[np.float64]: ...  # (3, 3) [u⁵]
-    @property
-    def volume_error(self) -> float: ...  # [u³]
-    @property
-    def centre_of_mass_error(self) -> float: ...  # [u]
-    @property
-    def inertia_error(self) -> float: ...  # [u⁵]
+    volume: Final[float]  # [u³]
+    centre_of_mass: Final[NDArray[np.float64]]  # (3,) [u]
+    inertia: Final[NDArray[np.float64]]  # (3, 3) [u⁵]
+    volume_error: Final[float]  # [u³]
+    centre_of_mass_error: Final[float]  # [u]
+    inertia_error: Final[float]  # [u⁵]
 
 @final
 class Bounds:
-    @property
-    def lower(self) -> NDArray[np.float64]: ...  # (3,) [u]
-    @property
-    def upper(self) -> NDArray[np.float64]: ...  # (3,) [u]
-    @property
-    def centre(self) -> NDArray[np.float64]: ...  # (3,) [u]
-    @property
-    def radius(self) -> float: ...  # [u]
+    lower: Final[NDArray[np.float64]]  # (3,) [u]
+    upper: Final[NDArray[np.float64]]  # (3,) [u]
+    centre: Final[NDArray[np.float64]]  # (3,) [u]
+    radius: Final[float]  # [u]
 
 @final
 class Invariant:
-    @property
-    def name(self) -> str: ...
-    @property
-    def worst(self) -> float: ...
-    @property
-    def meaning(self) -> str: ...
-    @property
-    def where(self) -> int: ...
-    @property
-    def checked(self) -> int: ...
-    @property
-    def violations(self) -> int: ...
+    name: Final[str]
+    worst: Final[float]
+    meaning: Final[str]
+    where: Final[int]
+    checked: Final[int]
+    violations: Final[int]
 
 @final
 class PartnerError:
-    @property
-    def partner(self) -> str: ...
-    @property
-    def median(self) -> float: ...
-    @property
-    def poses(self) -> int: ...
+    partner: Final[str]
+    median: Final[float]
+    poses: Final[int]
 
 @final
 class TargetedAsset:
-    @property
-    def asset(self) -> Asset: ...
-    @property
-    def measured_error(self) -> float: ...
-    @property
-    def poses(self) -> int: ...
-    @property
-    def partners(self) -> list[PartnerError]: ...
-    @property
-    def met(self) -> bool: ...
-    @property
-    def stop(self) -> str: ...
+    asset: Final[Asset]
+    measured_error: Final[float]
+    poses: Final[int]
+    partners: Final[list[PartnerError]]
+    met: Final[bool]
+    stop: Final[str]
 
 @final
 class Asset:
@@ -216,26 +162,16 @@ class Asset:
     def spheres(self, which: _SphereMeasure = "matched") -> NDArray[np.float64]: ...  # (n, 4) [u]
     def mass_properties(self, pose: ArrayLike | None = None, scale: float = 1.0) -> MassProperties: ...
     def bounds(self, pose: ArrayLike | None = None, scale: float = 1.0) -> Bounds: ...
-    @property
-    def sphere_count(self) -> int: ...
-    @property
-    def volume(self) -> float: ...  # [u³]
-    @property
-    def coverage(self) -> float: ...  # [0, 1]
-    @property
-    def protrusion(self) -> float: ...  # [u]
-    @property
-    def has_field(self) -> bool: ...
-    @property
-    def field_error(self) -> float: ...  # [u]
-    @property
-    def mesh_triangles(self) -> int: ...  # 0: it holds no mesh
-    @property
-    def mesh_error(self) -> float: ...  # [u]
-    @property
-    def mesh_state(self) -> Literal["none", "own", "resolved", "simplified", "unresolved"]: ...
-    @property
-    def counted_twice(self) -> float: ...  # [u³]
+    sphere_count: Final[int]
+    volume: Final[float]  # [u³]
+    coverage: Final[float]  # [0, 1]
+    protrusion: Final[float]  # [u]
+    has_field: Final[bool]
+    field_error: Final[float]  # [u]
+    mesh_triangles: Final[int]  # 0: it holds no mesh
+    mesh_error: Final[float]  # [u]
+    mesh_state: Final[Literal["none", "own", "resolved", "simplified", "unresolved"]]
+    counted_twice: Final[float]  # [u³]
 
 def bake(
     mesh: ClosedMesh | _OpenMesh, *, max_spheres: int = 10000, target_coverage: float = 1.0,
@@ -307,76 +243,47 @@ class Solids:
     ) -> None: ...  # "cpu", "cuda", "cuda:1", a torch.device
     def __len__(self) -> int: ...
     def __getitem__(self, index: int | _Rows) -> SolidRows: ...  # or (n,) indices
-    @property
-    def device(self) -> str: ...
-    @property
-    def fields(self) -> list[int]: ...
-    @property
-    def bytes(self) -> int: ...  # of device memory
+    device: Final[str]
+    fields: Final[list[int]]
+    bytes: Final[int]  # of device memory
 
 _Solid = Asset | Field | SolidRows
 _Rows = Any  # ArrayLike; of solids on a GPU an array of any framework in its memory
 
 @final
 class Penetration:
-    @property
-    def volume(self) -> _Column: ...  # (n,) [u³]
-    @property
-    def volume_min(self) -> _Column: ...  # (n,) [u³] exact: the true volume is at least this; else the sum's interval
-    @property
-    def volume_max(self) -> _Column: ...  # (n,) [u³] and at most this
-    @property
-    def centroid(self) -> NDArray[np.float64]: ...  # (n, 3) [u]
-    @property
-    def force(self) -> NDArray[np.float64]: ...  # (n, 3) [u²] on B
-    @property
-    def torque(self) -> NDArray[np.float64]: ...  # (n, 3) [u³] on B, about its origin
-    @property
-    def pose_gradient(self) -> NDArray[np.float64]: ...  # (n, 7) dV/d(pose of B)
-    @property
-    def pose_gradient_a(self) -> NDArray[np.float64]: ...  # (n, 7) dV/d(pose of A)
-    @property
-    def scale_gradient(self) -> _Column | None: ...  # (n,) [u³] dV/d(scale of B)
-    @property
-    def scale_gradient_a(self) -> _Column | None: ...  # (n,) [u³] dV/d(scale of A)
-    @property
-    def status(self) -> _Column: ...  # (n,) QueryStatus
-    @property
-    def node_visits(self) -> _Column: ...  # (n,)
-    @property
-    def sphere_pairs(self) -> _Column: ...  # (n,)
+    volume: Final[_Column]  # (n,) [u³]
+    volume_min: Final[_Column]  # (n,) [u³] exact: the true volume is at least this; else the sum's interval
+    volume_max: Final[_Column]  # (n,) [u³] and at most this
+    centroid: Final[NDArray[np.float64]]  # (n, 3) [u]
+    force: Final[NDArray[np.float64]]  # (n, 3) [u²] on B
+    torque: Final[NDArray[np.float64]]  # (n, 3) [u³] on B, about its origin
+    pose_gradient: Final[NDArray[np.float64]]  # (n, 7) dV/d(pose of B)
+    pose_gradient_a: Final[NDArray[np.float64]]  # (n, 7) dV/d(pose of A)
+    scale_gradient: Final[_Column | None]  # (n,) [u³] dV/d(scale of B)
+    scale_gradient_a: Final[_Column | None]  # (n,) [u³] dV/d(scale of A)
+    status: Final[_Column]  # (n,) QueryStatus
+    node_visits: Final[_Column]  # (n,)
+    sphere_pairs: Final[_Column]  # (n,)
 
 @final
 class Lenses:
-    @property
-    def centre(self) -> NDArray[np.float64]: ...  # (n, 3) [u] world
-    @property
-    def axis(self) -> NDArray[np.float64]: ...  # (n, 3) unit, from A's sphere to B's
-    @property
-    def radius(self) -> NDArray[np.float64]: ...  # (n,) [u]
-    @property
-    def thickness(self) -> NDArray[np.float64]: ...  # (n,) [u]
-    @property
-    def sphere_a(self) -> NDArray[np.uint32]: ...  # (n,)
-    @property
-    def sphere_b(self) -> NDArray[np.uint32]: ...  # (n,)
+    centre: Final[NDArray[np.float64]]  # (n, 3) [u] world
+    axis: Final[NDArray[np.float64]]  # (n, 3) unit, from A's sphere to B's
+    radius: Final[NDArray[np.float64]]  # (n,) [u]
+    thickness: Final[NDArray[np.float64]]  # (n,) [u]
+    sphere_a: Final[NDArray[np.uint32]]  # (n,)
+    sphere_b: Final[NDArray[np.uint32]]  # (n,)
 
 @final
 class PairFit:
-    @property
-    def grain_a(self) -> float: ...  # [u]
-    @property
-    def grain_b(self) -> float: ...  # [u]
-    @property
-    def ratio(self) -> float: ...  # ≥ 1
-    @property
-    def a_is_coarser(self) -> bool: ...
-    @property
-    def has_surface(self) -> bool: ...
-    @property
-    def needs_surface(self) -> bool: ...
-    @property
-    def fits(self) -> bool: ...
+    grain_a: Final[float]  # [u]
+    grain_b: Final[float]  # [u]
+    ratio: Final[float]  # ≥ 1
+    a_is_coarser: Final[bool]
+    has_surface: Final[bool]
+    needs_surface: Final[bool]
+    fits: Final[bool]
 
 class Plot:
     def save(self, path: _Path) -> None: ...
@@ -401,111 +308,66 @@ def pair_fit(a: Asset, b: Asset, *, scale: float = 1.0, scale_a: float = 1.0) ->
 
 @final
 class RayHits:
-    @property
-    def distance(self) -> _Column: ...  # (n,) [u] inf: no hit
-    @property
-    def point(self) -> NDArray[np.float64]: ...  # (n, 3) [u] world
-    @property
-    def normal(self) -> NDArray[np.float64]: ...  # (n, 3) unit, outward
-    @property
-    def triangle(self) -> _Column: ...  # (n,)
-    @property
-    def status(self) -> _Column: ...  # (n,) QueryStatus
+    distance: Final[_Column]  # (n,) [u] inf: no hit
+    point: Final[NDArray[np.float64]]  # (n, 3) [u] world
+    normal: Final[NDArray[np.float64]]  # (n, 3) unit, outward
+    triangle: Final[_Column]  # (n,)
+    status: Final[_Column]  # (n,) QueryStatus
 
 @final
 class SurfacePoints:
-    @property
-    def distance(self) -> _Column: ...  # (n,) [u] < 0 inside
-    @property
-    def error(self) -> _Column: ...  # (n,) [u]
-    @property
-    def point(self) -> NDArray[np.float64]: ...  # (n, 3) [u] world
-    @property
-    def gradient(self) -> NDArray[np.float64]: ...  # (n, 3) unit, outward
-    @property
-    def triangle(self) -> _Column: ...  # (n,)
-    @property
-    def status(self) -> _Column: ...  # (n,) QueryStatus
+    distance: Final[_Column]  # (n,) [u] < 0 inside
+    error: Final[_Column]  # (n,) [u]
+    point: Final[NDArray[np.float64]]  # (n, 3) [u] world
+    gradient: Final[NDArray[np.float64]]  # (n, 3) unit, outward
+    triangle: Final[_Column]  # (n,)
+    status: Final[_Column]  # (n,) QueryStatus
 
 @final
 class Separation:
-    @property
-    def distance(self) -> _Column: ...  # (n,) [u]
-    @property
-    def distance_min(self) -> _Column: ...  # (n,) [u] certified
-    @property
-    def distance_max(self) -> _Column: ...  # (n,) [u] certified
-    @property
-    def point_a(self) -> NDArray[np.float64]: ...  # (n, 3) [u] world
-    @property
-    def point_b(self) -> NDArray[np.float64]: ...  # (n, 3) [u] world
-    @property
-    def normal(self) -> NDArray[np.float64]: ...  # (n, 3) unit, from A to B
-    @property
-    def status(self) -> _Column: ...  # (n,) QueryStatus
-    @property
-    def node_visits(self) -> _Column: ...  # (n,)
-    @property
-    def sphere_pairs(self) -> _Column: ...  # (n,)
+    distance: Final[_Column]  # (n,) [u]
+    distance_min: Final[_Column]  # (n,) [u] certified
+    distance_max: Final[_Column]  # (n,) [u] certified
+    point_a: Final[NDArray[np.float64]]  # (n, 3) [u] world
+    point_b: Final[NDArray[np.float64]]  # (n, 3) [u] world
+    normal: Final[NDArray[np.float64]]  # (n, 3) unit, from A to B
+    status: Final[_Column]  # (n,) QueryStatus
+    node_visits: Final[_Column]  # (n,)
+    sphere_pairs: Final[_Column]  # (n,)
 
 @final
 class ContactPatches:
-    @property
-    def penetration(self) -> Penetration: ...
-    @property
-    def status(self) -> _Column: ...  # (n,) QueryStatus
-    @property
-    def count(self) -> _Column: ...  # (n,)
-    @property
-    def id(self) -> NDArray[np.uint64]: ...  # (n, m)
-    @property
-    def centroid(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u]
-    @property
-    def normal(self) -> NDArray[np.float64]: ...  # (n, m, 3) unit, from A to B
-    @property
-    def area(self) -> NDArray[np.float64]: ...  # (n, m) [u²]
-    @property
-    def depth(self) -> NDArray[np.float64]: ...  # (n, m) [u]
-    @property
-    def volume(self) -> NDArray[np.float64]: ...  # (n, m) [u³]
-    @property
-    def force(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u²]
-    @property
-    def torque(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u³]
-    @property
-    def point(self) -> NDArray[np.float64]: ...  # (n, m, 3) [u] on the central axis of the wrench
-    @property
-    def twist(self) -> NDArray[np.float64]: ...  # (n, m) [u³] about the normal
+    penetration: Final[Penetration]
+    status: Final[_Column]  # (n,) QueryStatus
+    count: Final[_Column]  # (n,)
+    id: Final[NDArray[np.uint64]]  # (n, m)
+    centroid: Final[NDArray[np.float64]]  # (n, m, 3) [u]
+    normal: Final[NDArray[np.float64]]  # (n, m, 3) unit, from A to B
+    area: Final[NDArray[np.float64]]  # (n, m) [u²]
+    depth: Final[NDArray[np.float64]]  # (n, m) [u]
+    volume: Final[NDArray[np.float64]]  # (n, m) [u³]
+    force: Final[NDArray[np.float64]]  # (n, m, 3) [u²]
+    torque: Final[NDArray[np.float64]]  # (n, m, 3) [u³]
+    point: Final[NDArray[np.float64]]  # (n, m, 3) [u] on the central axis of the wrench
+    twist: Final[NDArray[np.float64]]  # (n, m) [u³] about the normal
 
 @final
 class OverlapOutline:
-    @property
-    def contact(self) -> ContactPatches: ...  # of one pose
-    @property
-    def segments(self) -> NDArray[np.float64]: ...  # (n, 2, 3) [u] from and to, world
-    @property
-    def patch(self) -> NDArray[np.uint32]: ...  # (n,) the patch that each bounds
+    contact: Final[ContactPatches]  # of one pose
+    segments: Final[NDArray[np.float64]]  # (n, 2, 3) [u] from and to, world
+    patch: Final[NDArray[np.uint32]]  # (n,) the patch that each bounds
 
 @final
 class TimeOfImpact:
-    @property
-    def time(self) -> _Column: ...  # (n,) [T]
-    @property
-    def distance_min(self) -> _Column: ...  # (n,) [u]
-    @property
-    def distance_max(self) -> _Column: ...  # (n,) [u]
-    @property
-    def point_a(self) -> NDArray[np.float64]: ...  # (n, 3) [u]
-    @property
-    def point_b(self) -> NDArray[np.float64]: ...  # (n, 3) [u]
-    @property
-    def normal(self) -> NDArray[np.float64]: ...  # (n, 3) unit, from A to B
-    @property
-    def status(self) -> _Column: ...  # (n,) ImpactStatus
-    @property
-    def node_visits(self) -> _Column: ...  # (n,)
-    @property
-    def surface_pairs(self) -> _Column: ...  # (n,)
+    time: Final[_Column]  # (n,) [T]
+    distance_min: Final[_Column]  # (n,) [u]
+    distance_max: Final[_Column]  # (n,) [u]
+    point_a: Final[NDArray[np.float64]]  # (n, 3) [u]
+    point_b: Final[NDArray[np.float64]]  # (n, 3) [u]
+    normal: Final[NDArray[np.float64]]  # (n, 3) unit, from A to B
+    status: Final[_Column]  # (n,) ImpactStatus
+    node_visits: Final[_Column]  # (n,)
+    surface_pairs: Final[_Column]  # (n,)
 
 def penetration(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
@@ -517,7 +379,7 @@ def penetration(
 def separation(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
     poses_a: _Rows | None = None, scales_a: _Rows | None = None, max_visits: int = 0,
-    inner_spheres: bool = False, threads: int = 0, wanted: Sequence[str] | None = None,
+    inner_spheres: bool | None = None, threads: int = 0, wanted: Sequence[str] | None = None,
     out: Any = None, stream: Any = None,
 ) -> Separation: ...  # of solids on a GPU gpu.Separation
 def raycast(
@@ -531,17 +393,16 @@ def contains(
     solid: Asset | Field, pose: ArrayLike | None, points: ArrayLike, *, scale: float = 1.0,
 ) -> Any: ...  # (n,) uint32, Overlapping
 def contact_patches(
-    a: _Solid, b: _Solid, poses: _Rows, *, max_patches: int = 8,
-    scales: _Rows | None = None, poses_a: _Rows | None = None,
-    scales_a: _Rows | None = None, measure: _Measure = "matched",
-    field: _FieldUse = "automatic", pair_budget: int = 0, max_visits: int = 0,
-    relative_error: float = 0.0, pair_id: int = 0, threads: int = 0, wanted: Sequence[str] | None = None,
-    out: Any = None, stream: Any = None,
+    a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
+    poses_a: _Rows | None = None, scales_a: _Rows | None = None,
+    max_patches: int = 8, measure: _Measure = "matched", field: _FieldUse = "automatic",
+    pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, pair_id: int = 0,
+    threads: int = 0, wanted: Sequence[str] | None = None, out: Any = None, stream: Any = None,
 ) -> ContactPatches: ...  # of solids on a GPU gpu.ContactPatches
 def overlap_outline(
-    a: Asset, b: Asset, poses: ArrayLike, *, max_patches: int = 8,
-    scales: ArrayLike | None = None, poses_a: ArrayLike | None = None,
-    scales_a: ArrayLike | None = None, max_visits: int = 0, pair_id: int = 0,
+    a: Asset, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
+    poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None,
+    max_patches: int = 8, max_visits: int = 0, pair_id: int = 0,
 ) -> OverlapOutline: ...
 def overlap(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: ArrayLike | None = None,

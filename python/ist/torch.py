@@ -33,8 +33,8 @@ def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: torch
         long.
     settings: measure, field, pair_budget, threads, … of ist.penetration. If a limit stops a query, the
         gradient lacks the estimated part. With measure="exact" volumes and gradients are the true
-        ones. A GPU takes field="never", measure ("matched", "inner") and pair_budget, and gives the
-        CPU's answers.
+        ones. A GPU takes measure ("matched", "inner") and pair_budget. It gives the CPU's answers for
+        field="never", of two Assets also by default.
 
     Returns a tensor (n,) or (w, n) of the dtype and the device of `poses`. Pairs with an invalid pose
     or scale, or with a solid that lacks what the measure needs, are NaN, and so are their gradients;
@@ -55,7 +55,8 @@ def separation(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: to
     Arguments, shapes and NaN are those of overlap(); settings: inner_spheres, max_visits and threads of
     ist.separation. Solids that overlap have the distance 0 and no gradient. Elsewhere the gradient is
     that of the nearest points; where several pairs of points are nearest, that of one of them.
-    A GPU takes inner_spheres=True and max_visits, and pairs of two Assets; others are NaN.
+    A GPU takes max_visits and pairs of two Assets; others are NaN. Its distances are always those of
+    inner spheres.
     """
     return _differentiable(Gaps, solids, poses, pairs, scales, settings)
 

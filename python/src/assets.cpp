@@ -28,11 +28,6 @@ using SharedAsset = std::shared_ptr<Asset>;
 
 constexpr std::pair<const char*, Device> kDevices[] = {
     {"auto", Device::automatic}, {"cpu", Device::cpu}, {"cuda", Device::cuda}};
-constexpr std::pair<const char*, GridMode> kGrids[] = {{"banded", GridMode::banded},
-                                                       {"uniform", GridMode::uniform},
-                                                       {"explicit", GridMode::explicit_refinement},
-                                                       {"implicit", GridMode::implicit_refinement},
-                                                       {"hybrid", GridMode::hybrid}};
 constexpr std::pair<const char*, bool> kSpheres[] = {{"matched", true}, {"inner", false}};
 
 Asset asset_of_bytes(const py::object& buffer, const std::string& name) {
@@ -78,25 +73,6 @@ SurfaceSettings surface_settings(const py::object& given) {
   const std::optional<SurfaceSettings> surface = parse_surface(text_of(given));
   if (!surface) throw Error("surface: '" + text_of(given) + "' is not one of " + kSurfaceMeaning);
   return *surface;
-}
-
-/// Keywords that all bakes share.
-PackingSettings packing_settings(std::size_t max_spheres, double target_coverage, double min_radius,
-                                 double time_limit, double epsilon, const std::string& grid,
-                                 std::uint64_t seed, unsigned threads, const std::string& device,
-                                 const py::object& surface) {
-  PackingSettings settings;
-  settings.max_spheres = max_spheres;
-  settings.target_coverage = target_coverage;
-  settings.min_radius = min_radius;
-  settings.time_limit = time_limit;
-  settings.epsilon = epsilon;
-  settings.grid = named(grid, "grid", kGrids);
-  settings.seed = seed;
-  settings.threads = threads;
-  settings.device = named(device, "device", kDevices);
-  settings.surface = surface_settings(surface);
-  return settings;
 }
 
 constexpr const char* kSettingsDoc = R"(
@@ -161,31 +137,53 @@ struct Targeted {
   StopReason stop = StopReason::sphere_count;
 };
 
-void add_bakes(py::module_& module) {
+/// Adds what bakes: bake(mesh, settings, callback, more…). `more`: py::arg of each; they come
+/// before the keywords that all have.
+template <class Made, class... Given, class... More>
+void add_bake(py::module_& module, const char* name, const char* doc, std::size_t usual_spheres,
+              bool rounds,
+              Made (*bake)(const ClosedMesh&, const PackingSettings&, const ProgressCallback&,
+                           Given...),
+              const More&... more) {
   module.def(
-      "bake",
-      [](const py::object& given, std::size_t max_spheres, double target_coverage,
-         double min_radius, double time_limit, double epsilon, const std::string& grid,
-         std::uint64_t seed, unsigned threads, const std::string& device, const py::object& surface,
-         const py::object& scale, const py::object& progress) {
-        const PackingSettings settings =
-            packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
-                             seed, threads, device, surface);
+      name,
+      [bake, rounds](const py::object& mesh, Given... given, std::size_t max_spheres,
+                     double target_coverage, double min_radius, double time_limit, double epsilon,
+                     const std::string& grid, std::uint64_t seed, unsigned threads,
+                     const std::string& device, const py::object& surface, const py::object& scale,
+                     const py::object& progress) {
+        PackingSettings settings;
+        settings.max_spheres = max_spheres;
+        settings.target_coverage = target_coverage;
+        settings.min_radius = min_radius;
+        settings.time_limit = time_limit;
+        settings.epsilon = epsilon;
+        settings.grid = named(grid, "grid", kGridModes);
+        settings.seed = seed;
+        settings.threads = threads;
+        settings.device = named(device, "device", kDevices);
+        settings.surface = surface_settings(surface);
         return offline(
-            [mesh = closed_of(given, scale), settings](const ProgressCallback& callback) {
-              return bake(*mesh, settings, callback);
+            [=, closed = closed_of(mesh, scale)](const ProgressCallback& callback) {
+              return bake(*closed, settings, callback, given...);
             },
-            progress);
+            progress, rounds);
       },
-      py::arg("mesh"), py::kw_only(), py::arg("max_spheres") = PackingSettings().max_spheres,
+      py::arg("mesh"), more..., py::kw_only(), py::arg("max_spheres") = usual_spheres,
       py::arg("target_coverage") = 1.0, py::arg("min_radius") = 0.0, py::arg("time_limit") = 0.0,
       py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
       py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
       py::arg("scale") = 1.0, py::arg("progress") = py::none(),
-      (std::string("Bakes the asset of a mesh. The same mesh and settings give the same "
-                   "bytes on any machine.\n") +
-       kSettingsDoc)
-          .c_str());
+      (std::string(doc) + kSettingsDoc).c_str());
+}
+
+void add_bakes(py::module_& module) {
+  add_bake(
+      module, "bake",
+      "Bakes the asset of a mesh. The same mesh and settings give the same bytes on any machine.\n",
+      PackingSettings().max_spheres, false,
+      +[](const ClosedMesh& mesh, const PackingSettings& settings,
+          const ProgressCallback& callback) { return bake(mesh, settings, callback); });
   py::class_<Targeted>(module, "TargetedAsset", "Result of bake_to_error().")
       .def_ro("asset", &Targeted::asset, "The Asset.")
       .def_ro("measured_error", &Targeted::measured_error,
@@ -196,40 +194,25 @@ void add_bakes(py::module_& module) {
       .def_prop_ro(
           "stop", [](const Targeted& t) { return app::name_of(t.stop); },
           "Reason for the end of the search.");
-  module.def(
-      "bake_to_error",
-      [](const py::object& given, double relative_error, double at_overlap, std::size_t max_spheres,
-         double target_coverage, double min_radius, double time_limit, double epsilon,
-         const std::string& grid, std::uint64_t seed, unsigned threads, const std::string& device,
-         const py::object& surface, const py::object& scale, const py::object& progress) {
-        const PackingSettings settings =
-            packing_settings(max_spheres, target_coverage, min_radius, time_limit, epsilon, grid,
-                             seed, threads, device, surface);
-        return offline(
-            [mesh = closed_of(given, scale), settings,
-             target = ErrorTarget{relative_error, at_overlap}](const ProgressCallback& callback) {
-              TargetedAsset made = bake_to_error(*mesh, target, settings, callback);
-              return Targeted{std::make_shared<Asset>(std::move(made.asset)),
-                              made.measured_error,
-                              made.poses,
-                              {made.partners.begin(), made.partners.end()},
-                              made.met,
-                              made.stop};
-            },
-            progress, true);
+  add_bake(
+      module, "bake_to_error",
+      "bake() with about the fewest spheres that reach an error.\n\n"
+      "relative_error: (0, 1) median over random poses, for every partner.\n"
+      "at_overlap: [1e-4, 0.5] of the solid's volume.\n"
+      "max_spheres: 0: 200,000. The other settings are those of bake():\n",
+      0, true,
+      +[](const ClosedMesh& mesh, const PackingSettings& settings, const ProgressCallback& callback,
+          double relative_error, double at_overlap) {
+        TargetedAsset made = bake_to_error(mesh, {relative_error, at_overlap}, settings, callback);
+        return Targeted{std::make_shared<Asset>(std::move(made.asset)),
+                        made.measured_error,
+                        made.poses,
+                        {made.partners.begin(), made.partners.end()},
+                        made.met,
+                        made.stop};
       },
-      py::arg("mesh"), py::arg("relative_error") = ErrorTarget().relative_error,
-      py::arg("at_overlap") = ErrorTarget().at_overlap, py::kw_only(), py::arg("max_spheres") = 0,
-      py::arg("target_coverage") = 1.0, py::arg("min_radius") = 0.0, py::arg("time_limit") = 0.0,
-      py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
-      py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
-      py::arg("scale") = 1.0, py::arg("progress") = py::none(),
-      (std::string("bake() with about the fewest spheres that reach an error.\n\n"
-                   "relative_error: (0, 1) median over random poses, for every partner.\n"
-                   "at_overlap: [1e-4, 0.5] of the solid's volume.\n"
-                   "max_spheres: 0: 200,000. The other settings are those of bake():\n") +
-       kSettingsDoc)
-          .c_str());
+      py::arg("relative_error") = ErrorTarget().relative_error,
+      py::arg("at_overlap") = ErrorTarget().at_overlap);
   module.def(
       "bake_surface",
       [](const py::object& given, const py::object& surface, const py::object& scale,

@@ -10,12 +10,6 @@ void refuse_given(const char* where, std::initializer_list<std::pair<const char*
     if (is_given) throw value_error(std::string(name) + ": " + where);
 }
 
-void refuse_surfaces(const std::string& field) {
-  if (field != "never")
-    throw value_error("field: '" + field +
-                      "'; on a GPU volumes of two Assets are by lenses: wanted 'never'");
-}
-
 void add_gpu(py::module_& package) {
   // ist.gpu, since the package has its users' name meanwhile.
   py::module_ module = package.def_submodule(
@@ -36,7 +30,6 @@ void add_gpu(py::module_& package) {
       py::arg("device") = 0, "What is missing where available() is False; None where it is True.");
   add_gpu_penetration(module);
   add_gpu_separation(module);
-  add_gpu_patches(module);
   // So that arguments can be tried where there is no device.
   module.def(
       "_lend",

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
+#include <cstring>
 #include <memory>
 #include <span>
 #include <string>
@@ -9,53 +11,86 @@
 #include <vector>
 
 #include "device_arrays.h"
-#include "gpu_queries.h"
+#include "pair_queries.h"
+#include "penetration.h"
 
 // What all batches on a device share: arguments that describe pairs, columns of answers.
 
 namespace ist::python {
 
 /// A column that a batch can write.
-template <class Answers>
-struct Answer {
-  const char* name;
-  ElementType type;
-  int width;
-  void (*set)(Answers& to, void* data);
+struct DeviceColumn {
+  std::string name;
   const char* doc;
-  bool unasked;  ///< written where nobody says what is wanted
-  /// Rows for each pair; null: one, without a dimension of its own.
-  std::uint32_t (*each)(const Answers&) = nullptr;
+  ElementType type;
+  std::size_t width;  ///< 0: a number
+  std::size_t place;  ///< of its pointer among the answers
+  bool of_patches;    ///< answers.most rows for each pair
 
   /// Of a pair's part of the column. `to`: how it is asked.
+  template <class Answers>
   std::vector<std::int64_t> inner_shape(const Answers& to) const {
     std::vector<std::int64_t> shape;
-    if (each != nullptr) shape.push_back(each(to));
-    if (width != 0) shape.push_back(width);
+    if constexpr (requires { to.most; })
+      if (of_patches) shape.push_back(to.most);
+    if (width != 0) shape.push_back(static_cast<std::int64_t>(width));
     return shape;
   }
-};
 
-template <auto kColumn, class Answers>
-void set_column(Answers& to, void* data) {
-  to.*kColumn = static_cast<std::remove_reference_t<decltype(to.*kColumn)>>(data);
-}
+  template <class Answers>
+  void set(Answers& to, void* data) const {
+    std::memcpy(reinterpret_cast<std::byte*>(&to) + place, &data, sizeof data);
+  }
+
+  /// Written where nobody says what is wanted.
+  bool unasked() const { return name != "node_visits" && name != "sphere_pairs"; }
+};
 
 /// The columns of a kind of answers.
 template <class Answers>
-std::span<const Answer<Answers>> columns_of();
+std::vector<DeviceColumn>& columns_of() {
+  static std::vector<DeviceColumn> all;
+  return all;
+}
+
+/// Makes columns on a device like those of `Columns` on the CPU.
+template <class Answers, class Columns>
+struct LikeColumns {
+  Answers answers;
+  Columns columns;
+
+  template <class T, std::size_t kEach>
+  void add(const auto& pointer, const Column<T, kEach>& like, bool of_patches) {
+    static_assert(sizeof(*pointer) == sizeof(T));
+    for (const auto& part : Pickled<Columns>::parts)
+      if (part.where(columns) == &like)
+        add(pointer, part.name, part.doc, py::dtype<T>(), kEach, of_patches);
+  }
+  void add(const auto& pointer, const char* name, const char* doc, ElementType type,
+           std::size_t width = 0, bool of_patches = false) {
+    const auto place =
+        reinterpret_cast<const std::byte*>(&pointer) - reinterpret_cast<const std::byte*>(&answers);
+    columns_of<Answers>().push_back(
+        {name, doc, type, width, static_cast<std::size_t>(place), of_patches});
+  }
+  void add_members() {
+    constexpr bool kOfPatches = requires(Answers of) { of.most; };
+    for_each_member([&](const auto& pointer, const auto& like) { add(pointer, like, kOfPatches); },
+                    answers, columns);
+  }
+};
 
 template <class Answers>
 std::string names_of_columns() {
   std::string all;
-  for (const Answer<Answers>& answer : columns_of<Answers>())
-    all += (all.empty() ? "'" : ", '") + std::string(answer.name) + "'";
+  for (const DeviceColumn& column : columns_of<Answers>())
+    all += (all.empty() ? "'" : ", '") + column.name + "'";
   return all;
 }
 
 template <class Answers>
 std::size_t number_of(const std::string& name, const char* argument) {
-  const auto columns = columns_of<Answers>();
+  const auto& columns = columns_of<Answers>();
   for (std::size_t k = 0; k < columns.size(); ++k)
     if (name == columns[k].name) return k;
   throw value_error(std::string(argument) + ": '" + name + "'; there are " +
@@ -72,7 +107,7 @@ struct DeviceAnswers {
 /// The arguments that describe pairs, as many rows as `poses` has.
 class PairArguments {
  public:
-  PairArguments(const DeviceSides& sides, const GivenRows& given, cuda::Stream stream)
+  PairArguments(const DeviceSides& sides, const GivenPair& given, cuda::Stream stream)
       : device_(sides.solids->solids().device()), stream_(stream) {
     static_assert(sizeof(Pose) == 7 * sizeof(double));
     take(given.poses, {"poses", {kFloat64}, {7}}, pairs.b.pose);
@@ -116,8 +151,8 @@ class PairArguments {
 template <class Answers>
 std::vector<bool> wanted_columns(const py::object& wanted) {
   std::vector<bool> asked;
-  for (const Answer<Answers>& answer : columns_of<Answers>())
-    asked.push_back(wanted.is_none() && answer.unasked);
+  for (const DeviceColumn& column : columns_of<Answers>())
+    asked.push_back(wanted.is_none() && column.unasked());
   if (wanted.is_none()) return asked;
   if (py::isinstance<py::str>(wanted))
     throw type_error("wanted: a str; must be a sequence of names: " + names_of_columns<Answers>());
@@ -127,20 +162,20 @@ std::vector<bool> wanted_columns(const py::object& wanted) {
 
 /// Where the answers of a batch go.
 template <class Answers>
-struct Places {
+struct DevicePlaces {
   Answers to;
   DeviceAnswers<Answers> found;
 };
 
 /// Arrays of ours, all in one block. `blank`: how it is asked, without arrays.
 template <class Answers>
-Places<Answers> new_columns(const Answers& blank, const std::vector<bool>& wanted,
-                            std::size_t count, int device, cuda::Stream stream) {
+DevicePlaces<Answers> new_columns(const Answers& blank, const std::vector<bool>& wanted,
+                                  std::size_t count, int device, cuda::Stream stream) {
   if (cuda::captures(device, stream))
     throw value_error(
         "out: None; wanted arrays for the answers, because the stream is captured and a graph's "
         "memory does not outlive it");
-  const auto columns = columns_of<Answers>();
+  const auto& columns = columns_of<Answers>();
   constexpr std::size_t kAlign = 256;
   std::size_t bytes = 0;
   std::vector<std::size_t> begin;
@@ -152,9 +187,9 @@ Places<Answers> new_columns(const Answers& blank, const std::vector<bool>& wante
   }
   const auto block = cuda::allocate(device, std::max(bytes, kAlign), stream);
   const bool all_written = std::all_of(columns.begin(), columns.end(),
-                                       [](const auto& column) { return column.each == nullptr; });
+                                       [](const auto& column) { return !column.of_patches; });
   if (!all_written) cuda::clear(*block, bytes, stream);
-  Places<Answers> places{blank, {}};
+  DevicePlaces<Answers> places{blank, {}};
   for (std::size_t k = 0; k < columns.size(); ++k) {
     if (!wanted[k]) continue;
     DeviceArray array;
@@ -172,11 +207,11 @@ Places<Answers> new_columns(const Answers& blank, const std::vector<bool>& wante
 
 /// The arrays that were given.
 template <class Answers>
-Places<Answers> given_columns(const Answers& blank, const py::object& out, std::size_t count,
-                              int device, cuda::Stream stream,
-                              std::vector<std::shared_ptr<void>>& lent) {
-  const auto columns = columns_of<Answers>();
-  Places<Answers> places{blank, {}};
+DevicePlaces<Answers> given_columns(const Answers& blank, const py::object& out, std::size_t count,
+                                    int device, cuda::Stream stream,
+                                    std::vector<std::shared_ptr<void>>& lent) {
+  const auto& columns = columns_of<Answers>();
+  DevicePlaces<Answers> places{blank, {}};
   if (py::isinstance<DeviceAnswers<Answers>>(out)) {
     places.found = py::cast<const DeviceAnswers<Answers>&>(out);
   } else if (py::isinstance<py::dict>(out)) {
@@ -188,10 +223,8 @@ Places<Answers> given_columns(const Answers& blank, const py::object& out, std::
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const py::object& given = places.found.column[k];
     if (!given.is_valid()) continue;
-    WantedArray wanted{std::string("out['") + columns[k].name + "']",
-                       {columns[k].type},
-                       columns[k].inner_shape(blank),
-                       true};
+    WantedArray wanted{
+        "out['" + columns[k].name + "']", {columns[k].type}, columns[k].inner_shape(blank), true};
     if (columns[k].type == kUInt32) wanted.types.push_back(kInt32);
     if (columns[k].type == kUInt64) wanted.types.push_back(kInt64);
     LentArray array = lend(given, wanted, device, stream);
@@ -207,16 +240,16 @@ Places<Answers> given_columns(const Answers& blank, const py::object& out, std::
 /// Takes all arguments and launches a batch: launch(solids, pairs, workspace, answers, stream).
 /// `blank`: answers without arrays.
 template <class Answers, class Launch>
-py::object ask(const DeviceSides& sides, const GivenRows& given, const Answers& blank,
-               const Launch& launch) {
+py::object ask(const DeviceSides& sides, const GivenPair& pair, const GivenOutput& given,
+               const Answers& blank, const Launch& launch) {
   const cuda::Stream on = stream_of(given.stream);
   DeviceSolids& solids = *sides.solids;
   const int device = solids.solids().device();
-  PairArguments arguments(sides, given, on);
+  PairArguments arguments(sides, pair, on);
   const GpuPairs& pairs = arguments.pairs;
   if (!given.out.is_none() && !given.wanted.is_none())
     throw value_error("wanted: excludes `out`, whose arrays already select the answers");
-  Places<Answers> places =
+  DevicePlaces<Answers> places =
       given.out.is_none()
           ? new_columns(blank, wanted_columns<Answers>(given.wanted), pairs.count, device, on)
           : given_columns(blank, given.out, pairs.count, device, on, arguments.lent);
@@ -231,14 +264,18 @@ py::object ask(const DeviceSides& sides, const GivenRows& given, const Answers& 
   return py::cast(std::move(places.found));
 }
 
-/// The class of a kind of answers.
+/// The class of a kind of answers, all of whose columns are added. `doc`: of what they are.
 template <class Answers>
 void add_answers(py::module_& module, const char* name, const char* doc) {
-  py::class_<DeviceAnswers<Answers>> type(module, name, doc);
-  const auto columns = columns_of<Answers>();
+  py::class_<DeviceAnswers<Answers>> type(
+      module, name,
+      (std::string(doc) + " of a batch: arrays on the device, None if not requested. Arrays passed "
+                          "as `out` are the same objects.")
+          .c_str());
+  const auto& columns = columns_of<Answers>();
   for (std::size_t k = 0; k < columns.size(); ++k)
     type.def_prop_ro(
-        columns[k].name,
+        columns[k].name.c_str(),
         [k](const DeviceAnswers<Answers>& self) -> py::object {
           return self.column[k].is_valid() ? self.column[k] : py::none();
         },

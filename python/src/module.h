@@ -12,7 +12,6 @@ void add_meshes(py::module_& module);
 void add_assets(py::module_& module);
 void add_fields(py::module_& module);
 void add_gpu(py::module_& package);
-void add_gpu_patches(py::module_& module);
 void add_gpu_penetration(py::module_& module);
 void add_gpu_separation(py::module_& module);
 void add_pictures(py::module_& module);

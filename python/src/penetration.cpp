@@ -7,7 +7,7 @@
 #include <ist/field.h>
 #include <ist/wrench.h>
 
-#include "gpu_queries.h"
+#include "gpu_batch.h"
 
 namespace ist::python {
 namespace {
@@ -78,17 +78,6 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
   return answers;
 }
 
-PenetrationSettings penetration_settings(const std::string& measure, const std::string& field,
-                                         std::uint32_t pair_budget, std::uint32_t max_visits,
-                                         double relative_error, std::uint32_t pair_id) {
-  return {named(measure, "measure", kMeasures),
-          named(field, "field", kFieldUses),
-          pair_budget,
-          max_visits,
-          take_limit(relative_error, "relative_error"),
-          pair_id};
-}
-
 constexpr const char* kDoc =
     R"(Volume, wrench and centroid of the overlap, for one pose or many.
 
@@ -102,6 +91,7 @@ measure: 'matched' (the accurate spheres), 'inner' (certified lower bound of the
     'exact' (the true volume and its gradients: of two Assets that hold their mesh, which bake()
     keeps by default; max_visits is its only limit).
 field: 'automatic', 'never' or 'always': whether an asset's surface is used. No effect with 'exact'.
+    On a GPU 'automatic' is 'never' for two Assets.
 pair_budget, max_visits: cost limits; 0: no limit. See <ist/query.h>.
 relative_error: accepted relative error of the volume, such as 0.005 for 0.5 %, of two Assets with
     'matched'. The query uses the cheapest level of detail, or the exact measure, whose predicted
@@ -119,9 +109,10 @@ both are Fields. For one pose ValueError or ist.Error is raised instead.
 Ctrl-C raises KeyboardInterrupt.
 
 Solids on a GPU, ist.Solids(…, device='cuda'): the same call gives the same answers there, and what a
-GPU cannot answer raises. It takes field='never', the measures 'matched' and 'inner', and of the limits
-pair_budget. Volumes are within 1e-6 of the sum in double, and of an Asset and a Field within 1e-9 of
-the CPU's. The bits are the same in every run, whatever else is in the batch.
+GPU cannot answer raises. It takes the measures 'matched' and 'inner', and of the limits pair_budget.
+Two Assets are summed as with field='never': where spheres are too coarse for a contact, the CPU's
+'automatic' differs. Volumes are within 1e-6 of the sum in double, and of an Asset and a Field within
+1e-9 of the CPU's. The bits are the same in every run, whatever else is in the batch.
 Arrays are of any framework, in that device's memory and in C order: poses (n, 7) and scales (n,)
 float64, indices uint32 or int32. They are read by __dlpack__ or __cuda_array_interface__, never
 copied, and kept alive until the batch is done. An index without a solid makes its row invalid_input.
@@ -186,37 +177,55 @@ void Penetrations::write(std::size_t i, const Row& row, const Penetration& answe
   write_pose_gradient(row.a.pose, -push.on_a.force, -push.on_a.torque, pose_gradient_a.row(i));
 }
 
+ContactSettings contact_settings(const std::string& measure, const std::string& field,
+                                 std::uint32_t pair_budget, std::uint32_t max_visits,
+                                 double relative_error, std::uint32_t pair_id) {
+  return {named(measure, "measure", kMeasures),
+          named(field, "field", kFieldUses),
+          pair_budget,
+          max_visits,
+          take_limit(relative_error, "relative_error"),
+          pair_id};
+}
+
 void add_penetration(py::module_& module) {
   add_class(module);
-  module.def(
-      "penetration",
-      [](const py::object& a, const py::object& b, const py::object& poses,
-         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
-         bool scale_gradients, const std::string& measure, const std::string& field,
-         std::uint32_t pair_budget, std::uint32_t max_visits, double relative_error,
-         std::uint32_t pair_id, unsigned threads, const py::object& wanted, const py::object& out,
-         const py::object& stream) -> py::object {
-        const GivenRows given{poses, scales, poses_a, scales_a, wanted, out, stream};
-        if (const DeviceSides sides = device_sides(a, b); sides.solids != nullptr) {
+  add_pair_query(
+      module, "penetration",
+      +[](const GivenPair& pair, bool scale_gradients, const std::string& measure,
+          const std::string& field, std::uint32_t pair_budget, std::uint32_t max_visits,
+          double relative_error, std::uint32_t pair_id, unsigned threads, const py::object& wanted,
+          const py::object& out, const py::object& stream) -> py::object {
+        const GivenOutput given{wanted, out, stream};
+        if (const DeviceSides sides = device_sides(pair.a, pair.b); sides.solids != nullptr) {
           refuse_given("not on a GPU", {{"scale_gradients", scale_gradients},
                                         {"max_visits", max_visits != 0},
                                         {"relative_error", relative_error != 0}});
-          refuse_surfaces(field);
-          return device_penetrations(sides, given, measure, pair_budget);
+          named(field, "field", kGpuFieldUses);
+          const GpuPenetrationSettings settings{named(measure, "measure", kGpuMeasures),
+                                                pair_budget};
+          return ask<GpuPenetrations>(
+              sides, pair, given, {},
+              [&](const GpuSolids& all, const GpuPairs& pairs, GpuWorkspace& workspace,
+                  const GpuPenetrations& to,
+                  cuda::Stream on) { penetration_batch(all, pairs, settings, workspace, to, on); });
         }
-        refuse_device_arguments(given);
+        refuse_output(given);
         return py::cast(answer(
-            Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
-            penetration_settings(measure, field, pair_budget, max_visits, relative_error, pair_id),
+            pair.rows(),
+            contact_settings(measure, field, pair_budget, max_visits, relative_error, pair_id),
             scale_gradients, threads));
       },
-      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
-      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
-      py::arg("scales_a") = py::none(), py::arg("scale_gradients") = false,
-      py::arg("measure") = "matched", py::arg("field") = "automatic", py::arg("pair_budget") = 0,
-      py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("pair_id") = 0,
-      py::arg("threads") = 0, py::arg("wanted") = py::none(), py::arg("out") = py::none(),
-      py::arg("stream") = py::none(), kDoc);
+      py::arg("scale_gradients") = false, py::arg("measure") = "matched",
+      py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
+      py::arg("relative_error") = 0.0, py::arg("pair_id") = 0, py::arg("threads") = 0,
+      py::arg("wanted") = py::none(), py::arg("out") = py::none(), py::arg("stream") = py::none(),
+      kDoc);
+}
+
+void add_gpu_penetration(py::module_& module) {
+  LikeColumns<GpuPenetrations, Penetrations>().add_members();
+  add_answers<GpuPenetrations>(module, "Penetration", "Overlaps");
 }
 
 }  // namespace ist::python

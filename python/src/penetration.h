@@ -24,6 +24,14 @@ inline constexpr std::pair<const char*, Measure> kGpuMeasures[] = {{"matched", M
                                                                    {"inner", Measure::inner}};
 inline constexpr std::pair<const char*, FieldUse> kFieldUses[] = {
     {"automatic", FieldUse::automatic}, {"never", FieldUse::never}, {"always", FieldUse::always}};
+/// Of two Assets a GPU sums lenses alone.
+inline constexpr std::pair<const char*, FieldUse> kGpuFieldUses[] = {{"automatic", FieldUse::never},
+                                                                     {"never", FieldUse::never}};
+
+/// Keywords that penetrations and contact patches share.
+ContactSettings contact_settings(const std::string& measure, const std::string& field,
+                                 std::uint32_t pair_budget, std::uint32_t max_visits,
+                                 double relative_error, std::uint32_t pair_id);
 
 /// Penetrations as columns.
 struct Penetrations {
@@ -42,6 +50,8 @@ struct Penetrations {
 template <class Class>
 struct Pickled {
   struct Part {
+    const char *name, *doc;
+    std::function<const void*(const Class&)> where;  ///< the column
     std::function<py::object(const Class&)> get;
     std::function<void(Class&, const py::handle&)> set;
   };
@@ -53,10 +63,13 @@ template <class Class, class Part>
 void add_column(py::class_<Class>& of, const char* name, Part part, const char* doc) {
   const auto get = [part](const Class& self) { return (self.*part).handed_out(); };
   of.def_prop_ro(name, get, doc);
-  Pickled<Class>::parts.push_back({get, [part](Class& self, const py::handle& given) {
-                                     using Taken = std::remove_reference_t<decltype(self.*part)>;
-                                     self.*part = Taken::taken(given);
-                                   }});
+  Pickled<Class>::parts.push_back(
+      {name, doc, [part](const Class& self) { return static_cast<const void*>(&(self.*part)); },
+       get,
+       [part](Class& self, const py::handle& given) {
+         using Taken = std::remove_reference_t<decltype(self.*part)>;
+         self.*part = Taken::taken(given);
+       }});
 }
 
 /// A property that is an answer of another class.
@@ -64,7 +77,8 @@ template <class Class, class Inner>
 void add_inner(py::class_<Class>& of, const char* name, std::shared_ptr<Inner> Class::*part,
                const char* doc) {
   of.def_ro(name, part, doc);
-  Pickled<Class>::parts.push_back({[part](const Class& self) { return py::cast(self.*part); },
+  Pickled<Class>::parts.push_back({name, doc, [](const Class&) { return nullptr; },
+                                   [part](const Class& self) { return py::cast(self.*part); },
                                    [part](Class& self, const py::handle& given) {
                                      self.*part = py::cast<std::shared_ptr<Inner>>(given);
                                    }});

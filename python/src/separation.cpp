@@ -3,9 +3,12 @@
 #include <ist/query.h>
 
 #include <memory>
+#include <optional>
+#include <string>
 
-#include "gpu_queries.h"
-#include "penetration.h"
+#include <nanobind/stl/optional.h>
+
+#include "gpu_batch.h"
 
 namespace ist::python {
 namespace {
@@ -16,6 +19,13 @@ struct Separations {
   Column<double, 3> point_a{rows}, point_b{rows}, normal{rows};
   Column<std::uint32_t> status{rows}, node_visits{rows}, sphere_pairs{rows};
 };
+
+/// Patches of a batch on a device, and whether it was well asked.
+struct GpuPatches : GpuContactPatches {
+  QueryStatus* status = nullptr;
+};
+
+constexpr std::size_t kUsualPatches = 8;
 
 Shape with(Shape rows, std::size_t each) {
   rows.push_back(each);
@@ -127,16 +137,18 @@ constexpr const char* kSeparationDoc =
 If both assets keep a mesh, the distance of their surfaces. Otherwise, or with inner_spheres=True,
 that of their inner spheres. Arguments as for penetration(). max_visits: 0: no limit.
 
-Solids on a GPU: of two Assets, inner_spheres=True; a row of a Field is not_held. The distance is the
-minimum over all pairs of inner spheres in double. The CPU's may be larger by 1e-6 of the solids' size,
-and among equally near pairs the two may differ. A stopped row's interval may differ from the CPU's.
+Solids on a GPU: of two Assets; a row of a Field is not_held. The distance is always that of the inner
+spheres, so inner_spheres=False raises: the minimum over all pairs in double. The CPU's may be larger by
+1e-6 of the solids' size, and among equally near pairs the two may differ. A stopped row's interval may
+differ from the CPU's.
 
 Returns a Separation: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
 
 constexpr const char* kPatchesDoc =
     R"(The contact condensed into at most max_patches patches.
 
-Arguments as for penetration(). The patches sum to the whole contact.
+Arguments as for penetration(). The patches sum to the whole contact. max_patches:
+on the CPU any number.
 
 Solids on a GPU: of two Assets, 1 to 32 patches, without limits; a row of a Field is not_held. Beyond
 count[i] a pair's patches are zero, or with `out` as they were.
@@ -219,82 +231,93 @@ void add_classes(py::module_& module) {
 
 void add_separation(py::module_& module) {
   add_classes(module);
-  module.def(
-      "separation",
-      [](const py::object& a, const py::object& b, const py::object& poses,
-         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
-         std::uint32_t max_visits, bool inner_spheres, unsigned threads, const py::object& wanted,
-         const py::object& out, const py::object& stream) -> py::object {
-        const GivenRows given{poses, scales, poses_a, scales_a, wanted, out, stream};
-        if (const DeviceSides sides = device_sides(a, b); sides.solids != nullptr) {
-          refuse_given("False; on a GPU distances are those of inner spheres: wanted True",
-                       {{"inner_spheres", !inner_spheres}});
-          return device_separations(sides, given, max_visits);
+  add_pair_query(
+      module, "separation",
+      +[](const GivenPair& pair, std::uint32_t max_visits, std::optional<bool> inner_spheres,
+          unsigned threads, const py::object& wanted, const py::object& out,
+          const py::object& stream) -> py::object {
+        const GivenOutput given{wanted, out, stream};
+        if (const DeviceSides sides = device_sides(pair.a, pair.b); sides.solids != nullptr) {
+          refuse_given("False; on a GPU distances are those of inner spheres",
+                       {{"inner_spheres", !inner_spheres.value_or(true)}});
+          return ask<GpuSeparations>(
+              sides, pair, given, {},
+              [&](const GpuSolids& all, const GpuPairs& pairs, GpuWorkspace& workspace,
+                  const GpuSeparations& to, cuda::Stream on) {
+                separation_batch(all, pairs, max_visits, workspace, to, on);
+              });
         }
-        refuse_device_arguments(given);
-        return py::cast(separations(Rows::of_pair(a, b, poses, scales, poses_a, scales_a),
-                                    {max_visits, inner_spheres}, threads));
+        refuse_output(given);
+        return py::cast(
+            separations(pair.rows(), {max_visits, inner_spheres.value_or(false)}, threads));
       },
-      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
-      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
-      py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, py::arg("inner_spheres") = false,
-      py::arg("threads") = 0, py::arg("wanted") = py::none(), py::arg("out") = py::none(),
-      py::arg("stream") = py::none(), kSeparationDoc);
-  module.def(
-      "contact_patches",
-      [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
-         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
-         const std::string& measure, const std::string& field, std::uint32_t pair_budget,
-         std::uint32_t max_visits, double relative_error, std::uint32_t pair_id, unsigned threads,
-         const py::object& wanted, const py::object& out, const py::object& stream) -> py::object {
-        const GivenRows given{poses, scales, poses_a, scales_a, wanted, out, stream};
-        if (const DeviceSides sides = device_sides(a, b); sides.solids != nullptr) {
+      py::arg("max_visits") = 0, py::arg("inner_spheres") = py::none(), py::arg("threads") = 0,
+      py::arg("wanted") = py::none(), py::arg("out") = py::none(), py::arg("stream") = py::none(),
+      kSeparationDoc);
+  add_pair_query(
+      module, "contact_patches",
+      +[](const GivenPair& pair, std::size_t max_patches, const std::string& measure,
+          const std::string& field, std::uint32_t pair_budget, std::uint32_t max_visits,
+          double relative_error, std::uint32_t pair_id, unsigned threads, const py::object& wanted,
+          const py::object& out, const py::object& stream) -> py::object {
+        const GivenOutput given{wanted, out, stream};
+        if (const DeviceSides sides = device_sides(pair.a, pair.b); sides.solids != nullptr) {
           refuse_given("not on a GPU", {{"pair_budget", pair_budget != 0},
                                         {"max_visits", max_visits != 0},
                                         {"relative_error", relative_error != 0}});
-          refuse_surfaces(field);
-          return device_patches(sides, given, max_patches, measure);
+          named(field, "field", kGpuFieldUses);
+          const Measure which = named(measure, "measure", kGpuMeasures);
+          if (max_patches < 1 || max_patches > kMostGpuPatches)
+            throw value_error("max_patches: " + std::to_string(max_patches) + "; wanted 1 to " +
+                              std::to_string(kMostGpuPatches) + " on a GPU");
+          GpuPatches blank;
+          blank.most = static_cast<std::uint32_t>(max_patches);
+          return ask<GpuPatches>(
+              sides, pair, given, blank,
+              [&](const GpuSolids& all, const GpuPairs& pairs, GpuWorkspace& workspace,
+                  const GpuPatches& to, cuda::Stream on) {
+                GpuPenetrations whole;
+                whole.status = to.status;
+                contact_patches_batch(all, pairs, which, workspace, whole, to, on);
+              });
         }
-        refuse_device_arguments(given);
+        refuse_output(given);
         return py::cast(patches(
-            Rows::of_pair(a, b, poses, scales, poses_a, scales_a), max_patches,
-            {named(measure, "measure", kMeasures), named(field, "field", kFieldUses), pair_budget,
-             max_visits, take_limit(relative_error, "relative_error"), pair_id},
+            pair.rows(), max_patches,
+            contact_settings(measure, field, pair_budget, max_visits, relative_error, pair_id),
             threads));
       },
-      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
-      py::arg("max_patches") = 8, py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
-      py::arg("scales_a") = py::none(), py::arg("measure") = "matched",
+      py::arg("max_patches") = kUsualPatches, py::arg("measure") = "matched",
       py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
       py::arg("relative_error") = 0.0, py::arg("pair_id") = 0, py::arg("threads") = 0,
       py::arg("wanted") = py::none(), py::arg("out") = py::none(), py::arg("stream") = py::none(),
       kPatchesDoc);
-  module.def(
-      "overlap_outline",
-      [](const py::object& a, const py::object& b, const py::object& poses, std::size_t max_patches,
-         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
-         std::uint32_t max_visits, std::uint32_t pair_id) {
+  add_pair_query(
+      module, "overlap_outline",
+      +[](const GivenPair& pair, std::size_t max_patches, std::uint32_t max_visits,
+          std::uint32_t pair_id) {
         ContactSettings settings;
         settings.measure = Measure::exact;
         settings.max_visits = max_visits;
         settings.pair_id = pair_id;
-        return outline(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), max_patches,
-                       settings);
+        return outline(pair.rows(), max_patches, settings);
       },
-      py::arg("a"), py::arg("b"), py::arg("poses"), py::kw_only(), py::arg("max_patches") = 8,
-      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
-      py::arg("scales_a") = py::none(), py::arg("max_visits") = 0, py::arg("pair_id") = 0,
+      py::arg("max_patches") = kUsualPatches, py::arg("max_visits") = 0, py::arg("pair_id") = 0,
       kOutlineDoc);
-  module.def(
-      "overlap",
-      [](const py::object& a, const py::object& b, const py::object& poses,
-         const py::object& scales, const py::object& poses_a, const py::object& scales_a,
-         unsigned threads) {
-        return overlaps(Rows::of_pair(a, b, poses, scales, poses_a, scales_a), threads);
-      },
-      py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
-      py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
-      py::arg("scales_a") = py::none(), py::arg("threads") = 0, kOverlapDoc);
+  add_pair_query(
+      module, "overlap",
+      +[](const GivenPair& pair, unsigned threads) { return overlaps(pair.rows(), threads); },
+      py::arg("threads") = 0, kOverlapDoc);
+}
+
+void add_gpu_separation(py::module_& module) {
+  LikeColumns<GpuSeparations, Separations>().add_members();
+  add_answers<GpuSeparations>(module, "Separation", "Gaps");
+  LikeColumns<GpuPatches, Patches> like;
+  like.add(like.answers.count, like.columns.count, false);
+  like.add_members();
+  like.add(like.answers.status, "status", "(n,) uint32, a QueryStatus.", kUInt32);
+  add_answers<GpuPatches>(module, "ContactPatches", "Patches");
 }
 
 }  // namespace ist::python

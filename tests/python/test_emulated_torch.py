@@ -111,7 +111,7 @@ def test_wrong_scenes_are_named(overlap, solids, random_poses):
             (dict(pairs=[(1, 3)]), ValueError, r"pairs\[0\]: \(1, 3\): two Fields; one of them must"),
             (dict(pairs=[(0, 6)]), ValueError, r"pairs\[0\]: \(0, 6\): solids are numbered 0 to 5"),
             (dict(pairs=[(2, 2)]), ValueError, "a solid cannot be paired with itself"),
-            (dict(field="always"), ValueError, "field: 'always'; on a GPU"),
+            (dict(field="always"), ValueError, "field: 'always'; one of 'automatic', 'never'"),
             (dict(max_visits=1), ValueError, "max_visits: not on a GPU"),
             (dict(poses=poses[:5]), ValueError, r"poses: shape \(5, 7\); wanted \(6, 7\)"),
             (dict(scales=torch.ones(3)), ValueError, r"scales: shape \(3,\); wanted \(6,\)"),

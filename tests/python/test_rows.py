@@ -135,8 +135,8 @@ def test_what_a_device_does_not_take_is_named(device, there, solids, arguments):
                  (ist.separation, dict(wanted=["distance"]), "wanted: for solids on a GPU only"),
                  (ist.contact_patches, dict(stream=1), "stream: for solids on a GPU only")]
     else:
-        wrong = [(ist.penetration, dict(field="automatic"), "field: 'automatic'; on a GPU volumes of two"),
-                 (ist.contact_patches, dict(field="always"), "field: 'always'; on a GPU volumes of two"),
+        wrong = [(ist.penetration, dict(field="always"), "field: 'always'; one of 'automatic', 'never'"),
+                 (ist.contact_patches, dict(field="always"), "field: 'always'; one of 'automatic', 'never'"),
                  (ist.penetration, dict(measure="exact"), "measure: 'exact'; one of 'matched', 'inner'"),
                  (ist.penetration, dict(max_visits=9), "max_visits: not on a GPU"),
                  (ist.penetration, dict(relative_error=0.1), "relative_error: not on a GPU"),
@@ -147,6 +147,18 @@ def test_what_a_device_does_not_take_is_named(device, there, solids, arguments):
     for query, settings, text in wrong:
         with pytest.raises(ValueError, match=text):
             ask(held, a=0, b=1, poses=poses, query=query, **settings)
+
+
+def test_the_defaults_work_on_both(device, there, solids, arguments):
+    """On a GPU they mean lenses and inner spheres."""
+    held = ist.Solids(solids, device=device)
+    for query, meant, name in [(ist.penetration, dict(field="never"), "volume"),
+                               (ist.contact_patches, dict(field="never"), "volume"),
+                               (ist.separation, dict(inner_spheres=True), "distance")]:
+        found, same = (back(getattr(query(held[0], held[1], there(arguments["poses"]), **settings), name))
+                       for settings in ({}, meant))
+        assert found.shape == ((60, 8) if query is ist.contact_patches else (60,))
+        assert device == "cpu" or np.array_equal(found, same)
 
 
 def test_both_solids_are_on_one_device(solids, arguments):

@@ -344,7 +344,7 @@ export interface ContactPatch {
 }
 
 export interface ContactPatchesOptions extends ContactOptions {
-  /** Largest number of patches, in [1, 64]. Default 16. */
+  /** Largest number of patches, in [1, 32]. Default 8. */
   maxPatches?: number;
   into?: ContactPatches;
 }
@@ -367,7 +367,7 @@ export function contactPatches(
 
 export interface OverlapOutlineOptions {
   poseA?: Pose;
-  /** Most patches, in [1, 64]. Default 16. */
+  /** Largest number of patches, in [1, 32]. Default 8. */
   maxPatches?: number;
   /** Most node pairs to open. Default 0: no limit. */
   maxVisits?: number;

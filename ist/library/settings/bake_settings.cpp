@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <type_traits>
 #include <utility>
@@ -16,14 +15,6 @@ namespace {
 constexpr std::size_t kMostSpheres = 0x7fffffff;  // these three: what the library takes
 constexpr unsigned kMostCells = 1024;             // on a side
 constexpr int kMostRefinements = 10;
-
-constexpr std::array<std::pair<const char*, GridMode>, 5> kGridModes = {{
-    {"banded", GridMode::banded},
-    {"uniform", GridMode::uniform},
-    {"explicit", GridMode::explicit_refinement},
-    {"implicit", GridMode::implicit_refinement},
-    {"hybrid", GridMode::hybrid},
-}};
 
 // What follows makes a setting from the member that it sets: `of(settings)` is that member.
 

@@ -5,6 +5,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <ist/bake.h>
@@ -77,6 +78,12 @@ std::optional<SettingFault> complete(BakeSettings& settings, const std::set<std:
 /// Every setting that the bytes of an asset may depend on, as text; equal text, equal settings.
 std::string describe_exactly(const BakeSettings& settings);
 
+inline constexpr std::pair<const char*, GridMode> kGridModes[] = {
+    {"banded", GridMode::banded},
+    {"uniform", GridMode::uniform},
+    {"explicit", GridMode::explicit_refinement},
+    {"implicit", GridMode::implicit_refinement},
+    {"hybrid", GridMode::hybrid}};
 const char* name_of(GridMode mode) noexcept;
 const char* name_of(MeshState state) noexcept;
 

@@ -64,7 +64,7 @@ bool usable(const Motion& motion) noexcept {
 std::optional<MovingFrame> frame_of(const Pose& pose_a, double scale_a, const AssetHeader* asset_a,
                                     const PlacedTree& b, const std::optional<RelativePose>& start,
                                     const Motions& motions, double duration) noexcept {
-  if (!start || !usable(motions.a) || !usable(motions.b) || !(duration >= 0)) return std::nullopt;
+  if (!start || !usable(motions.a) || !usable(motions.b) || !(duration > 0)) return std::nullopt;
   MovingFrame frame;
   frame.start = *start;
   frame.unit = start->unit_a;

@@ -3,8 +3,6 @@
 import {copy3} from './desk.js';
 import {f64, u32} from './memory.js';
 
-export const newVector = () => new Float64Array(3);
-
 export const kInvalidInput = -1;  // IST_INVALID_INPUT
 export const kNotHeld = -15;      // IST_NOT_HELD
 const kErrorExceeded = 2;         // IST_ERROR_EXCEEDED
@@ -20,14 +18,39 @@ export const codeOf = (status) => status === 'budget-exhausted' ? 1 :
     status === 'error-exceeded'                                 ? kErrorExceeded :
                                                                   0;
 
+// Vectors of answers: after how many numbers each begins; < 0: it lies there with the other sign.
+// Other numbers are named one by one: through such a table each would make garbage.
+const kPenetration = {centroid: 3, force: -6, torque: -9};
+const kPatch = {centroid: 1, normal: 4, force: 10, torque: 13, point: 16};
+const kGap = {pointA: 3, pointB: 6, normal: 9};
+export const kMotion = {velocity: 0, angularVelocity: 3, about: 6};
+export const kWrench = {force: 0, torque: 3};
+
+export function newVectors(table) {
+  const made = {};
+  for (const name in table) made[name] = new Float64Array(3);
+  return made;
+}
+
+export function readVectors(table, at, out) {
+  const numbers = f64();
+  for (const name in table)
+    copy3(numbers, at + Math.abs(table[name]), out[name], table[name] < 0 ? -1 : 1);
+  return out;
+}
+
+function writeVectors(table, at, answer) {
+  const numbers = f64();
+  for (const name in table)
+    copy3(answer[name], 0, numbers, table[name] < 0 ? -1 : 1, at + Math.abs(table[name]));
+}
+
 export const newPenetration = () => ({
   status: 'ok',
   volume: 0,
   volumeMin: 0,
   volumeMax: 0,
-  centroid: newVector(),
-  force: newVector(),
-  torque: newVector(),
+  ...newVectors(kPenetration),
   nodeVisits: 0,
   spherePairs: 0,
 });
@@ -42,12 +65,9 @@ export function readPenetration(place, status, out) {
   out.volume = numbers[at];
   out.volumeMin = numbers[at + 1];
   out.volumeMax = numbers[at + 2];
-  copy3(numbers, at + 3, out.centroid);
-  copy3(numbers, at + 6, out.force, -1);
-  copy3(numbers, at + 9, out.torque, -1);
   out.nodeVisits = integers[2 * at + 24];
   out.spherePairs = integers[2 * at + 25];
-  return out;
+  return readVectors(kPenetration, at, out);
 }
 
 /** Puts an answer back where the library looks for it. */
@@ -57,31 +77,23 @@ export function writePenetration(place, answer) {
   numbers[at] = answer.volume;
   numbers[at + 1] = answer.volumeMin;
   numbers[at + 2] = answer.volumeMax;
-  write3(answer.centroid, numbers, at + 3);
-  write3(answer.force, numbers, at + 6, -1);
-  write3(answer.torque, numbers, at + 9, -1);
   integers[2 * at + 24] = answer.nodeVisits;
   integers[2 * at + 25] = answer.spherePairs;
+  writeVectors(kPenetration, at, answer);
 }
 
-function write3(from, to, at, sign = 1) {
-  to[at] = sign * from[0];
-  to[at + 1] = sign * from[1];
-  to[at + 2] = sign * from[2];
+/** Of a separation and of an impact: the gap, and where it is. */
+export const newGap = () => ({distanceMin: 0, distanceMax: 0, ...newVectors(kGap), nodeVisits: 0});
+
+/** `at`: doubles from the start of memory to the number before the gap. */
+export function readGap(at, out) {
+  out.distanceMin = f64()[at + 1];
+  out.distanceMax = f64()[at + 2];
+  return readVectors(kGap, at, out);
 }
 
-export const newPatch = () => ({
-  id: 0,
-  centroid: newVector(),
-  normal: newVector(),
-  area: 0,
-  depth: 0,
-  volume: 0,
-  force: newVector(),
-  torque: newVector(),
-  point: newVector(),
-  twist: 0,
-});
+export const newPatch =
+    () => ({id: 0, ...newVectors(kPatch), area: 0, depth: 0, volume: 0, twist: 0});
 
 /** Bytes of an ist_contact_patch_t. */
 export const kPatchBytes = 160;
@@ -90,30 +102,22 @@ export function readPatch(place, patch) {
   const numbers = f64(), integers = u32(), at = place / 8;
   // Exact below 2⁵³, which is what assets that fit into 32 bits of addresses stay under.
   patch.id = integers[2 * at] + 2 ** 32 * integers[2 * at + 1];
-  copy3(numbers, at + 1, patch.centroid);
-  copy3(numbers, at + 4, patch.normal);
   patch.area = numbers[at + 7];
   patch.depth = numbers[at + 8];
   patch.volume = numbers[at + 9];
-  copy3(numbers, at + 10, patch.force);
-  copy3(numbers, at + 13, patch.torque);
-  copy3(numbers, at + 16, patch.point);
   patch.twist = numbers[at + 19];
+  readVectors(kPatch, at, patch);
 }
 
 export function writePatch(place, patch) {
   const numbers = f64(), integers = u32(), at = place / 8;
   integers[2 * at] = patch.id % 2 ** 32;
   integers[2 * at + 1] = Math.floor(patch.id / 2 ** 32);
-  write3(patch.centroid, numbers, at + 1);
-  write3(patch.normal, numbers, at + 4);
   numbers[at + 7] = patch.area;
   numbers[at + 8] = patch.depth;
   numbers[at + 9] = patch.volume;
-  write3(patch.force, numbers, at + 10);
-  write3(patch.torque, numbers, at + 13);
-  write3(patch.point, numbers, at + 16);
   numbers[at + 19] = patch.twist;
+  writeVectors(kPatch, at, patch);
 }
 
 export const newPatches = () => ({whole: newPenetration(), count: 0, patches: []});

@@ -1,7 +1,7 @@
 // Assets and fields: what lies in WebAssembly's memory and is given back.
 
 import {kNotHeld} from './answers.js';
-import {count, desk, kBounds, kCounts, kInfo, kMass, sphereMeasureOf, writeNumbers} from './desk.js';
+import {count, desk, sphereMeasureOf, writeNumbers} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, give, take, u32, u8, withRoom} from './memory.js';
 import {checkOptions} from './options.js';
@@ -80,7 +80,7 @@ export class Asset extends Owner {
 
   info() {
     const numbers = this._told();
-    const integers = u32(), at = (desk() + kInfo) / 4, values = (desk() + kInfo) / 8 + 2;
+    const integers = u32(), at = desk().info / 4, values = at / 2 + 2;
     const details = [];
     const spheres = integers[at + 2] + 2 ** 32 * integers[at + 3];
     // A surface alone has no levels of spheres.
@@ -105,7 +105,7 @@ export class Asset extends Owner {
   }
 
   bounds() {
-    const numbers = this._told(), at = (desk() + kBounds) / 8 + 1;
+    const numbers = this._told(), at = desk().bounds / 8 + 1;
     return {
       lower: vector(at),
       upper: vector(at + 3),
@@ -115,7 +115,7 @@ export class Asset extends Owner {
   }
 
   massProperties() {
-    const numbers = this._told(), at = (desk() + kMass) / 8 + 1;
+    const numbers = this._told(), at = desk().mass / 8 + 1;
     return {
       volume: numbers[at],
       centreOfMass: vector(at + 1),
@@ -136,7 +136,7 @@ export class Asset extends Owner {
           `ist: ${this._name}: has no level ${level} of detail ${detail} in its ` +
               `${set?.measure ?? 'matched'} spheres`,
           status);
-    return u32()[(desk() + kCounts) / 4];
+    return u32()[desk().counts / 4];
   }
 
   _count(set, level) {
@@ -164,7 +164,7 @@ export class Asset extends Owner {
   surface() {
     const wasm = functions('an asset');
     check(wasm.surface(this._at, 0, 0, 0, 0), this._name);
-    const counts = (desk() + kCounts) / 4;
+    const counts = desk().counts / 4;
     const vertices = u32()[counts], triangles = u32()[counts + 1];
     if (triangles === 0) return null;
     return withRoom(24 * vertices + 12 * triangles, (room) => {
@@ -187,7 +187,7 @@ function made(kind, numbers, data = 0, columns = 0, rows = 0, layers = 0) {
   try {
     const wasm = functions('a field');
     const absent = numbers.concat(Array(8 - numbers.length).fill(0));
-    writeNumbers(f64(), desk() / 8, absent, absent, 8, 'a field');
+    writeNumbers(f64(), desk().a / 8, absent, absent, 8, 'a field');
     const place = wasm.field(kind, data, columns, rows, layers) >>> 0;
     if (place === 0) throw new IstError('ist: out of memory for a field');
     return new Field([place, ...owned], kInside);

@@ -1,8 +1,8 @@
 // What is told from answers that are there already, and of two assets at any pose.
 
-import {codeOf, kPatchBytes, newPenetration, newVector, readPatches, readPenetration, writePatch, writePenetration} from './answers.js';
+import {codeOf, kPatchBytes, kWrench, newPenetration, newVectors, readPatches, readPenetration, readVectors, writePatch, writePenetration} from './answers.js';
 import {Asset} from './asset.js';
-import {copy3, desk, kFit, kMostPatches, kNumbers, kPatches, kPenetration, kWrenches, writeNumbers, writePose, writeSettings} from './desk.js';
+import {desk, kMostPatches, writeNumbers, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, u32} from './memory.js';
 import {checkOptions} from './options.js';
@@ -22,10 +22,10 @@ function writePlaces(a, b, poseB, options, who) {
 export function withoutProtrusion(whole, a, b, poseB, options) {
   const wasm = functions('withoutProtrusion()');
   writePlaces(a, b, poseB, options, 'withoutProtrusion()');
-  writePenetration(desk() + kPenetration, whole);
+  writePenetration(desk().penetration, whole);
   check(wasm.without_protrusion(a._at, b._at), 'withoutProtrusion()');
   return readPenetration(
-      desk() + kPenetration, codeOf(whole.status), options?.into ?? newPenetration());
+      desk().penetration, codeOf(whole.status), options?.into ?? newPenetration());
 }
 
 export function patchesWithoutProtrusion(found, a, b, poseB, options) {
@@ -35,9 +35,9 @@ export function patchesWithoutProtrusion(found, a, b, poseB, options) {
   const {patches, count} = found;
   if (!(count <= Math.min(kMostPatches, patches.length)))
     throw new IstError('ist: patchesWithoutProtrusion() takes the result of contactPatches()');
-  for (let i = 0; i < count; ++i) writePatch(desk() + kPatches + i * kPatchBytes, patches[i]);
+  for (let i = 0; i < count; ++i) writePatch(desk().patches + i * kPatchBytes, patches[i]);
   check(wasm.patches_without_protrusion(a._at, b._at, count), 'patchesWithoutProtrusion()');
-  readPatches(desk() + kPatches, count, found);
+  readPatches(desk().patches, count, found);
   return found;
 }
 
@@ -48,7 +48,7 @@ export function pairFit(a, b, options) {
   writePose(0, {scale: options?.scaleA}, 'scaleA');
   writePose(1, {scale: options?.scaleB}, 'scaleB');
   check(wasm.pair_fit(a._at, b._at), 'pairFit()');
-  const numbers = f64(), integers = u32(), at = (desk() + kFit) / 8 + 1;
+  const numbers = f64(), integers = u32(), at = desk().fit / 8 + 1;
   return {
     grainA: numbers[at],
     grainB: numbers[at + 1],
@@ -61,7 +61,6 @@ export function pairFit(a, b, options) {
 }
 
 const kOrigin = [0, 0, 0];
-const newWrench = () => ({force: newVector(), torque: newVector()});
 
 export function wrenches(contact, poseB, points, into) {
   const wasm = functions('wrenches()');
@@ -69,18 +68,16 @@ export function wrenches(contact, poseB, points, into) {
   writePose(1, poseB, 'poseB');
   const isPatch = contact.normal !== undefined;
   if (isPatch)
-    writePatch(desk() + kPatches, contact);
+    writePatch(desk().patches, contact);
   else
-    writePenetration(desk() + kPenetration, contact);
-  const numbers = f64(), at = (desk() + kNumbers) / 8;
+    writePenetration(desk().penetration, contact);
+  const numbers = f64(), at = desk().numbers / 8;
   writeNumbers(numbers, at, points?.a, kOrigin, 3, 'points.a');
   writeNumbers(numbers, at + 3, points?.b, kOrigin, 3, 'points.b');
   check(wasm.wrenches(isPatch ? 1 : 0), 'wrenches()');
-  const out = into ?? {onA: newWrench(), onB: newWrench()};
-  const first = (desk() + kWrenches) / 8 + 1;
-  copy3(numbers, first, out.onA.force);
-  copy3(numbers, first + 3, out.onA.torque);
-  copy3(numbers, first + 6, out.onB.force);
-  copy3(numbers, first + 9, out.onB.torque);
+  const out = into ?? {onA: newVectors(kWrench), onB: newVectors(kWrench)};
+  const first = desk().wrenches / 8 + 1;
+  readVectors(kWrench, first, out.onA);
+  readVectors(kWrench, first + 6, out.onB);
   return out;
 }

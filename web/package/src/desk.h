@@ -1,4 +1,4 @@
-/* The desk: numbers of questions and answers lie at fixed places of it, which src/desk.js knows. */
+/* The desk: numbers of questions and answers lie on it, where places() says. */
 #pragma once
 
 #include <ist/ist.h>
@@ -7,7 +7,8 @@
 
 #define EXPORT(name) __attribute__((export_name(#name)))
 
-enum { kMostPatches = 64 };
+/* As many as a contact law remembers, and a GPU finds. */
+enum { kMostPatches = sizeof((ist_contact_memory_t*)0)->patches / sizeof(ist_patch_memory_t) };
 
 /* w, x, y, z; x, y, z; scale, where 0 is taken for 1 */
 typedef struct place {
@@ -36,40 +37,7 @@ typedef struct desk {
 } desk_t;
 extern desk_t desk;
 
-#define AT(member, place) _Static_assert(offsetof(desk_t, member) == (place), #member)
-AT(a, 0);
-AT(b, 64);
-AT(settings.measure, 132);
-AT(settings.field, 136);
-AT(settings.pair_budget, 140);
-AT(settings.max_visits, 144);
-AT(settings.pair_id, 148);
-AT(settings.relative_error, 152);
-AT(penetration.status, 164);
-AT(penetration.volume, 168);
-AT(penetration.node_visits, 264);
-AT(separation.status, 276);
-AT(separation.distance, 280);
-AT(separation.node_visits, 376);
-AT(patches, 384);
-AT(info.has_field, 10628);
-AT(info.volume, 10640);
-AT(info.field_triangles, 10672);
-AT(info.mesh_triangles, 10680);
-AT(info.mesh_error, 10688);
-AT(bounds.lower, 10712);
-AT(mass.volume, 10800);
-AT(counts, 10928);
-AT(motion_a, 10936);
-AT(motion_b, 11008);
-AT(impact_settings.max_visits, 11084);
-AT(impact_settings.duration, 11088);
-AT(impact.kind, 11112);
-AT(impact.time, 11128);
-AT(fit.grain_a, 11232);
-AT(fit.a_is_coarser, 11256);
-AT(wrenches.on_a, 11280);
-AT(numbers, 11376);
+_Static_assert(kMostPatches == 32, "patches");
 _Static_assert(sizeof(ist_contact_patch_t) == 160, "patch");
 _Static_assert(sizeof(ist_penetration_t) == 112, "penetration");
 _Static_assert(sizeof(ist_ball_t) == 32, "ball");

@@ -1,46 +1,40 @@
-// The desk of src/exports.c: where questions are put and answers lie. Every place is held there by
-// a static assert. Numbers below are bytes from its start.
+// The desk of src/exports.c: where questions are put and answers lie.
 
 import {IstError} from './error.js';
 import {f64, functions, u32} from './memory.js';
 
-export const kSettings = 128;
-export const kPenetration = 160;
-export const kSeparation = 272;
-export const kPatches = 384;
-export const kMostPatches = 64;
-export const kInfo = 10624;
-export const kBounds = 10704;
-export const kMass = 10792;
-export const kCounts = 10928;
-export const kMotion = 10936;
-export const kMotionBytes = 72;
-export const kImpactSettings = 11080;
-export const kImpact = 11104;
-export const kFit = 11224;
-export const kWrenches = 11272;
-export const kNumbers = 11376;
+export const kMostPatches = 32;
 
-let start = 0;
-/** Where the desk stands in memory. */
+// In the order of places().
+const kParts = [
+  'a', 'b', 'settings', 'penetration', 'separation', 'info', 'bounds', 'mass', 'impactSettings',
+  'impact', 'fit', 'wrenches', 'motionA', 'motionB', 'patches', 'counts', 'numbers'
+];
+let parts = null;
+/** Where each part of the desk lies: bytes from the start of memory. */
 export function desk() {
-  if (start === 0) start = functions('a query').desk() >>> 0;
-  return start;
+  if (parts === null) {
+    const at = (functions('a query').places() >>> 0) / 4;
+    parts = Object.fromEntries(kParts.map((name, i) => [name, u32()[at + i]]));
+  }
+  return parts;
 }
 
 // Words are put together only where something is wrong: a loop shall make no garbage.
 
-function number(value, what, part = '') {
+const named = (what, part) => part === undefined ? what : `${what}.${part}`;
+
+function number(value, what, part) {
   if (typeof value !== 'number')
-    throw new IstError(`ist: ${what}${part} is ${value}, not a number`);
+    throw new IstError(`ist: ${named(what, part)} is ${value}, not a number`);
   return value;
 }
 
 /** Writes `count` numbers, or those of `absent` where none are given. */
-export function writeNumbers(out, at, given, absent, count, what, part = '') {
+export function writeNumbers(out, at, given, absent, count, what, part) {
   if (given === undefined || given === null) given = absent;
   if (given.length !== count)
-    throw new IstError(`ist: ${what}${part} has ${given.length ?? 'no'} numbers, not ${count}`);
+    throw new IstError(`ist: ${named(what, part)} has ${given.length ?? 'no'} numbers, not ${count}`);
   for (let i = 0; i < count; ++i) out[at + i] = number(given[i], what, part);
 }
 
@@ -51,15 +45,15 @@ const kOrigin = [0, 0, 0];
 export function writePose(which, pose, what) {
   if (which === 1 && (pose === undefined || pose === null))
     throw new IstError(`ist: ${what} is missing: {rotation, translation, scale}`);
-  writePoseAt(desk() + 64 * which, pose, what);
+  writePoseAt(which === 0 ? desk().a : desk().b, pose, what);
 }
 
 /** The same anywhere in memory. */
 export function writePoseAt(place, pose, what) {
   const out = f64(), at = place / 8;
-  writeNumbers(out, at, pose?.rotation, kIdentity, 4, what, '.rotation');
-  writeNumbers(out, at + 4, pose?.translation, kOrigin, 3, what, '.translation');
-  const scale = number(pose?.scale ?? 1, what, '.scale');
+  writeNumbers(out, at, pose?.rotation, kIdentity, 4, what, 'rotation');
+  writeNumbers(out, at + 4, pose?.translation, kOrigin, 3, what, 'translation');
+  const scale = number(pose?.scale ?? 1, what, 'scale');
   if (!(scale > 0)) throw new IstError(`ist: ${what}.scale is ${scale}; it must be > 0`);
   out[at + 7] = scale;
 }
@@ -90,18 +84,16 @@ export function sphereMeasureOf(value) {
 /** Writes every setting that options have. */
 export function writeSettings(options) {
   const integers = u32();
-  const at = (desk() + kSettings) / 4;
+  const at = desk().settings / 4;
   integers[at + 1] = choice(options?.measure, kMeasures, 'measure');
   integers[at + 2] = choice(options?.field, kFieldUses, 'field');
   integers[at + 3] = count(options?.pairBudget, 0, 'pairBudget');
   integers[at + 4] = count(options?.maxVisits, 0, 'maxVisits');
   integers[at + 5] = count(options?.pairId, 0, 'pairId');
-  f64()[(desk() + kSettings) / 8 + 3] = limit(options?.relativeError, 'relativeError');
+  f64()[at / 2 + 3] = limit(options?.relativeError, 'relativeError');
 }
 
 /** Copies three numbers, which is shorter than set() and makes no view. */
-export function copy3(from, at, to, sign = 1) {
-  to[0] = sign * from[at];
-  to[1] = sign * from[at + 1];
-  to[2] = sign * from[at + 2];
+export function copy3(from, at, to, sign = 1, place = 0) {
+  for (let k = 0; k < 3; ++k) to[place + k] = sign * from[at + k];
 }

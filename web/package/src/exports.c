@@ -17,7 +17,15 @@ desk_t desk = {
     .wrenches = {.size = sizeof desk.wrenches},
 };
 
-EXPORT(desk) desk_t* desk_at(void) { return &desk; }
+/* Where the parts of the desk lie, in the order of src/desk.js. */
+EXPORT(places) const void* const* places(void) {
+  static const void* const all[] = {
+      &desk.a,     &desk.b,        &desk.settings, &desk.penetration,     &desk.separation,
+      &desk.info,  &desk.bounds,   &desk.mass,     &desk.impact_settings, &desk.impact,
+      &desk.fit,   &desk.wrenches, &desk.motion_a, &desk.motion_b,        desk.patches,
+      desk.counts, desk.numbers};
+  return all;
+}
 
 EXPORT(start) ist_status_t start(void) { return ist_workspace_make(0, NULL, &desk.workspace); }
 

@@ -1,8 +1,8 @@
 // The queries.
 
-import {newPatches, newPenetration, newVector, readPatches, readPenetration, statusOf} from './answers.js';
+import {newGap, newPatches, newPenetration, readGap, readPatches, readPenetration, statusOf} from './answers.js';
 import {Asset, Field} from './asset.js';
-import {copy3, count, desk, kCounts, kMostPatches, kPatches, kPenetration, kSeparation, sphereMeasureOf, writePose, writeSettings} from './desk.js';
+import {count, desk, kMostPatches, sphereMeasureOf, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
 import {checkOptions} from './options.js';
@@ -41,40 +41,24 @@ export function ask(question, who, a, b, poseB, options, more) {
 
 export function penetration(a, b, poseB, options) {
   const status = ask('penetration', 'penetration()', a, b, poseB, options, 0);
-  return readPenetration(desk() + kPenetration, status, options?.into ?? newPenetration());
+  return readPenetration(desk().penetration, status, options?.into ?? newPenetration());
 }
 
-const newSeparation = () => ({
-  status: 'ok',
-  distance: 0,
-  distanceMin: 0,
-  distanceMax: 0,
-  pointA: newVector(),
-  pointB: newVector(),
-  normal: newVector(),
-  nodeVisits: 0,
-  spherePairs: 0,
-});
+const newSeparation = () => ({status: 'ok', distance: 0, ...newGap(), spherePairs: 0});
 
 export function separation(a, b, poseB, options) {
   const status = ask('separation', 'separation()', a, b, poseB, options, options?.innerSpheres ? 1 : 0);
   const out = options?.into ?? newSeparation();
-  const numbers = f64(), integers = u32();
-  const at = (desk() + kSeparation) / 8 + 1;
+  const integers = u32(), at = desk().separation / 8 + 1;
   out.status = statusOf(status);
-  out.distance = numbers[at];
-  out.distanceMin = numbers[at + 1];
-  out.distanceMax = numbers[at + 2];
-  copy3(numbers, at + 3, out.pointA);
-  copy3(numbers, at + 6, out.pointB);
-  copy3(numbers, at + 9, out.normal);
+  out.distance = f64()[at];
   out.nodeVisits = integers[2 * at + 24];
   out.spherePairs = integers[2 * at + 25];
-  return out;
+  return readGap(at, out);
 }
 
 export function maxPatchesOf(options) {
-  const most = options?.maxPatches ?? 16;
+  const most = options?.maxPatches ?? 8;
   if (!(Number.isInteger(most) && most >= 1 && most <= kMostPatches))
     throw new IstError(
         `ist: maxPatches is ${most}; it must be a whole number from 1 to ${kMostPatches}`);
@@ -85,8 +69,8 @@ export function contactPatches(a, b, poseB, options) {
   const most = maxPatchesOf(options);
   const status = ask('contact_patches', 'contactPatches()', a, b, poseB, options, most);
   const out = options?.into ?? newPatches();
-  readPenetration(desk() + kPenetration, status, out.whole);
-  readPatches(desk() + kPatches, u32()[(desk() + kCounts) / 4], out);
+  readPenetration(desk().penetration, status, out.whole);
+  readPatches(desk().patches, u32()[desk().counts / 4], out);
   return out;
 }
 
@@ -105,7 +89,7 @@ export function overlapOutline(a, b, poseB, options) {
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
   writeSettings({maxVisits: options?.maxVisits, pairId: options?.pairId});
-  const most = maxPatchesOf(options), counts = (desk() + kCounts) / 4;
+  const most = maxPatchesOf(options), counts = desk().counts / 4;
   let place, status, capacity, total = Math.max(1024, options?.into?.patch.length ?? 0);
   do {
     capacity = total;
@@ -116,8 +100,8 @@ export function overlapOutline(a, b, poseB, options) {
   } while (total > capacity);
   const out = options?.into ??
       {contact: newPatches(), count: 0, segments: new Float64Array(0), patch: new Uint32Array(0)};
-  readPenetration(desk() + kPenetration, status, out.contact.whole);
-  readPatches(desk() + kPatches, u32()[counts], out.contact);
+  readPenetration(desk().penetration, status, out.contact.whole);
+  readPatches(desk().patches, u32()[counts], out.contact);
   out.count = total;
   if (out.segments.length < 6 * total) out.segments = new Float64Array(6 * total);
   if (out.patch.length < total) out.patch = new Uint32Array(total);
@@ -145,7 +129,7 @@ export function lenses(a, b, poseB, options) {
       place, most);
   check(status, 'lenses()');
   const out = options?.into ?? {total: 0, count: 0, data: new Float64Array(0)};
-  const integers = u32(), numbers = f64(), counts = (desk() + kCounts) / 4;
+  const integers = u32(), numbers = f64(), counts = desk().counts / 4;
   out.total = integers[counts];
   out.count = integers[counts + 1];
   if (out.data.length < 10 * out.count)

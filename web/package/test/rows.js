@@ -57,7 +57,7 @@ function moreQueries(ist, a, b, halfSpace) {
     },
     'patches without protrusion': {
       ask: (pose) => {
-        const options = {field: 'never'};
+        const options = {field: 'never', maxPatches: 16};
         const found = ist.contactPatches(a, b, pose, options);
         return ist.patchesWithoutProtrusion(found, a, b, pose, options);
       },
@@ -108,7 +108,7 @@ function moreQueries(ist, a, b, halfSpace) {
         const turned = {a: b, b: a, poseA: pose, poseB: identity};
         return [
           ist.penetrationBatch([pair, turned, {a: halfSpace, b, poseB: pose}]),
-          ist.contactPatchesBatch([pair])[0]
+          ist.contactPatchesBatch([pair], {maxPatches: 16})[0]
         ];
       },
       bits: ([
