@@ -16,6 +16,6 @@ int main(int argc, char** argv) try {
   const Eigen::Vector3d push_on_b = -p.translation_gradient;  // times a pressure [force/u²]
   std::printf("overlap %g, push B along (%g, %g, %g)\n", p.volume, push_on_b.x(), push_on_b.y(),
               push_on_b.z());
-} catch (const ist::Error& error) {  // names the file and the way out; queries never throw
+} catch (const ist::Error& error) {  // names the file and the remedy; queries never throw
   return std::fprintf(stderr, "%s\n", error.what()), 1;
 }

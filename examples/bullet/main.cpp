@@ -1,5 +1,5 @@
-// Scenes in which ist finds the contacts of Bullet's bodies, beside Bullet's own ways. Headless:
-// every scene prints what is known of it and whether it holds.
+// Scenes in which ist finds the contacts of Bullet's bodies, compared with Bullet's own. Headless:
+// every scene prints its known values and whether they hold.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

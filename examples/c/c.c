@@ -1,4 +1,4 @@
-/* Two assets and a floor, asked from C. By CMake, or without it:
+/* Queries of two assets and a floor from C. By CMake, or without it:
  *   cc -std=c11 c.c $(pkg-config --cflags --libs ist-query) -o c */
 #include <ist/ist.h>
 #include <stdio.h>

@@ -1,5 +1,5 @@
-// What an engine does: assets are mapped once, contacts are asked for in every step, without an
-// allocation or a lock. Links ist::query alone.
+// An engine's run-time part: maps assets once and queries contacts in every step, without
+// allocation or lock. Links ist::query alone.
 #include <fcntl.h>
 #include <ist/deadline.h>
 #include <sys/mman.h>

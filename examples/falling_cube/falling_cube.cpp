@@ -1,6 +1,6 @@
 // A rigid body without an engine: a cube of side 1 falls on the floor, tilted, and comes to rest.
-// Its mass is the asset's, its contact a law of <ist/response.h>, its way a Motion. Ends with 1
-// where physics says otherwise: ist bake cube.obj -o cube.ist --spheres 1000; falling_cube cube.ist
+// Mass from the asset, contact law from <ist/response.h>, path as a Motion. Exits with 1 if the
+// result is unphysical: ist bake cube.obj -o cube.ist --spheres 1000; falling_cube cube.ist
 #include <ist/bake.h>
 #include <ist/error.h>
 #include <ist/field.h>
@@ -56,7 +56,7 @@ int main(int argc, char** argv) try {
     const Eigen::Matrix3d inverse_inertia = now.inertia.inverse();
     Vector3d force(0, 0, -weight), torque = Vector3d::Zero();
 
-    // A certain no is had for a fraction of what patches take.
+    // A certain no costs a fraction of the patches.
     if (ist::overlap(floor, cube, scratch) == ist::Overlapping::no) {
       memory = {};
     } else {
@@ -67,7 +67,7 @@ int main(int argc, char** argv) try {
       const ist::ContactForce push =
           ist::contact_force(law, std::span(patches).first(found.count),
                              ist::relative_motion({}, twist, origin), origin, kStep, memory);
-      // The law speaks of the cube's origin, a free body turns about its centre of mass.
+      // The law's torque is about the cube's origin; a free body turns about its centre of mass.
       const ist::Wrench on_cube = ist::about({push.force, push.torque}, origin, now.centre_of_mass);
       force += on_cube.force;
       torque += on_cube.torque;

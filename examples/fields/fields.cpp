@@ -1,5 +1,5 @@
-// A baked solid on a floor, on a terrain, at a wall and in a function of one's own, none of which
-// is baked. Links ist::ist; a program that loads assets needs ist::query alone.
+// A baked solid on a floor, on a terrain, at a wall and in a user function, none of them baked.
+// Links ist::ist; a program that loads assets needs ist::query alone.
 #include <ist/bake.h>
 #include <ist/error.h>
 #include <ist/query.h>

@@ -67,8 +67,8 @@ class Stroke {
   Eigen::Vector3d out_ = Eigen::Vector3d::UnitX();
 };
 
-/// A hand that puts a part in and takes it out again, by a way that closes: smooth, with a tremor
-/// of 1 to 9 Hz that closes too.
+/// A hand that inserts a part and withdraws it along a closed, smooth path, with a periodic tremor
+/// of 1 to 9 Hz.
 class Insert {
  public:
   explicit Insert(const Options& options) : options_(options) {}

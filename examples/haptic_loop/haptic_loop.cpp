@@ -1,6 +1,6 @@
-// A haptic loop: a thousand times a second and more a hand moves a device, a proxy held to it by a
-// virtual coupling meets the object, and the device feels the coupling. Kept are how late the
-// answers come, force and torque, and whether the loop is passive. Links ist::query alone.
+// A haptic loop at 1 kHz or more: a hand moves a device, a proxy on a virtual coupling touches the
+// object, and the device renders the coupling. Records latency, force and torque, and whether the
+// loop is passive. Links ist::query alone.
 #include <ist/deadline.h>
 #include <pthread.h>
 #include <sys/mman.h>

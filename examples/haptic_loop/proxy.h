@@ -122,8 +122,7 @@ class Proxy {
   double work_ = 0;
 };
 
-/// Whether the loop gives the hand more than it got: energy that the hand put in, less what is
-/// stored, must not fall below nought.
+/// Passivity: the energy that the hand put in minus the stored energy must not be negative.
 struct Passivity {
   double deficit = 0;  ///< the most that it fell below
   double peak = 0;     ///< the most that was stored

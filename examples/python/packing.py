@@ -19,7 +19,7 @@ SIZE = 1.0  # [u] radius of the ball around each part
 SPHERES = 1000
 BOX = np.array([4.0, 4.0, 3.5])  # [u] inner size; it stands on z = 0, its corner at the origin
 TRIED = 2000  # poses a part
-MARGIN = 1.02  # parts are asked this much larger
+MARGIN = 1.02  # parts are queried this much larger
 
 WALLS = [ist.HalfSpaceField(normal=(1, 0, 0)), ist.HalfSpaceField(normal=(-1, 0, 0), offset=-BOX[0]),
          ist.HalfSpaceField(normal=(0, 1, 0)), ist.HalfSpaceField(normal=(0, -1, 0), offset=-BOX[1]),

@@ -20,7 +20,7 @@ from scene import Scaled, draw, palette, random_rotations
 SHAPES = ["gear", "torus_knot", "nut", "torus", "capsule"]
 SIZE = 1.0  # [u] radius of the ball around each solid
 SPHERES = 1000
-MARGIN = 1.03  # solids are asked this much larger in the end
+MARGIN = 1.03  # solids are queried this much larger in the end
 SWELLING = 100  # steps until they are
 
 

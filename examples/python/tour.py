@@ -70,7 +70,7 @@ fall = ist.time_of_impact(floor, box, [1, 0, 0, 0, 0, 0, 3], [1, 0, 0, 0, 0, 0, 
 print(f"it lands at {fall.time:.3f} (exact: 0.75)")
 assert fall.status == ist.ImpactStatus.impact and abs(fall.time - 0.75) < 0.01
 
-# %% A scene: solids, a pose each, and which pairs are asked. Slopes by every pose come with it.
+# %% A scene: solids, a pose each, and the pairs to query. Returns gradients by every pose.
 solids = ist.Solids([floor, wheel, box])
 poses = np.array([[1, 0, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0, 0], pose])
 a, b = np.array([(0, 1), (0, 2), (1, 2)]).T

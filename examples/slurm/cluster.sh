@@ -1,5 +1,5 @@
 # To be sourced: a Slurm of two nodes on this machine, to try things on. Needs root, and Debian's
-# slurm-wlm and munge. Each node is a slurmd in a PID namespace of its own: killed, all that runs on
+# slurm-wlm and munge. Each node is a slurmd in its own PID namespace: when killed, all that runs on
 # the node is gone, as when a machine dies.
 #   start_cluster DIR    DIR holds all that it writes; sets SLURM_CONF
 #   kill_node NAME       n1 or n2

@@ -45,8 +45,8 @@
 //   cell ends                         uint16 or uint32[cell_count], as list_bytes says
 //   cell triangles                    uint16 or uint32[entry_count]   16 · block + lane
 //
-// The list of a cell starts where that of the cell before ends, its brick's first where the brick's
-// lists do.
+// A cell's list starts where the previous cell's ends; a brick's first cell starts at
+// CellBrick::list.
 //
 // The mesh, the solid's surface with all its digits, for Measure::exact:
 //
@@ -79,8 +79,8 @@ inline constexpr std::uint32_t kMaxLevels = 7;    ///< 16^7 spheres
 inline constexpr std::uint32_t kMaxDetails = 10;  ///< coarser matched sets of an asset
 /// Classes of overlap of predicted errors.
 inline constexpr std::uint32_t kOverlapClasses = 5;
-/// Lowest overlap of a class, part of the smaller solid's volume: contained by itself, then from a
-/// half down.
+/// Lowest overlap of a class, as a share of the smaller solid's volume: 1 = contained, then from ½
+/// down.
 inline constexpr double kOverlapClassFloor[kOverlapClasses] = {1, 1e-1, 1e-2, 1e-3, 1e-4};
 /// Radius and cover radius of an unused lane: it overlaps nothing at any distance.
 inline constexpr float kEmptyRadius = -1e30f;
@@ -167,8 +167,7 @@ static_assert(sizeof(SurfaceBlock) == 256);
 inline constexpr std::uint32_t kBrickWidth = 4;         ///< cells along an edge of a brick
 inline constexpr std::uint32_t kOutsideBrick = ~0u;     ///< brick index: no cell is inside
 inline constexpr std::uint32_t kInsideBrick = ~0u - 1;  ///< all cells are inside
-/// Place of the reference point in a cell, in edges of the cell: off the planes that meshes often
-/// have.
+/// Position of a cell's reference point, in cell edges: off planes common in meshes.
 inline constexpr double kCellReference[3] = {0.5239, 0.4517, 0.5371};
 
 /// 4 × 4 × 4 cells, bit x + 4 y + 16 z.
@@ -206,7 +205,7 @@ static_assert(sizeof(FieldHeader) == 336);
 
 /// Up to sixteen triangles of the mesh over up to sixteen of its vertices.
 ///
-/// Every two triangles of a block are joined by triangles of it that share vertices.
+/// A block's triangles are connected by shared vertices.
 struct alignas(64) MeshBlock {
   std::uint32_t vertex[kWidth];    ///< index into the mesh's vertices; unused ones repeat the first
   std::uint8_t corner[3][kWidth];  ///< place in `vertex` of a triangle's corners, counter-clockwise

@@ -18,20 +18,20 @@ namespace IST_API ist {
 /// and the field.
 ///
 /// The same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number
-/// of threads. Cancelling during packing keeps what is packed; before and after packing it throws
-/// Error.
+/// of threads. Cancelling during packing keeps the spheres so far; before and after packing it
+/// throws Error.
 ///
 /// A mesh that counts volume twice is first resolved to the boundary of the set where its winding
 /// number is 1 or more (MeshState::resolved). If that fails, no mesh is kept
 /// (MeshState::unresolved), and no field if the mesh reaches far into itself.
 ///
-/// Throws Error if not one sphere fits, on settings out of range, and if floats cannot reach the
-/// requested error of the surface.
+/// Throws Error if no sphere fits, on settings out of range, and if the requested surface error is
+/// below float precision.
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
            const ProgressCallback& progress = {});
 
-/// Makes an asset of a surface alone: the mesh, mass properties and bounds, without spheres and
-/// field. Takes about as long as the import.
+/// Makes a surface-only asset: the mesh, mass properties and bounds, without spheres or field.
+/// Takes about as long as the import.
 ///
 /// It serves Measure::exact and mass_properties(); queries of spheres return QueryStatus::not_held.
 ///
@@ -99,8 +99,9 @@ struct TargetedAsset {
 /// 200,000). If those are not enough, the best asset is returned, and the result says so.
 ///
 /// The asset is tried against a copy of itself and, as an analytic field, each other TrialPartner.
-/// The target is met if the worst one's median is. The truth is exact, at some 300 poses with
-/// independent random rotations. The asset stores the medians of the copies and the worst partner.
+/// The target is met if the worst partner's median meets it. The truth is exact, at some 300 poses
+/// with independent random rotations. The asset stores the medians of the copies and the worst
+/// partner.
 ///
 /// settings.time_limit bounds everything except the first bake, of a few hundred spheres. Takes up
 /// to about six times a bake of the final count. Reports the stages of each bake, and "predict".
@@ -117,7 +118,7 @@ struct Invariant {
   /// Largest measure of a violation, unit as in `meaning`; ≤ 0 is sound unless stated.
   double worst = 0;
   std::string meaning;      ///< what `worst` measures, with its unit
-  std::size_t where = 0;    ///< index of the worst sphere, node, triangle or place of cells
+  std::size_t where = 0;    ///< index of the worst sphere, node, triangle or cell
   std::size_t checked = 0;  ///< count of them, or of pairs, that were checked
   std::size_t violations = 0;
 };
@@ -130,8 +131,8 @@ std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigne
 
 /// The same for an asset of any solid, from its bytes and the solid's signed distance alone.
 ///
-/// What the bake calibrated with a mesh in the solid's place is proven against that mesh, which is
-/// made again.
+/// Data calibrated with a mesh in the solid's place is proven against that mesh, which is made
+/// again.
 ///
 /// Throws Error if that mesh shows that the asset is of another solid, and if the solid is a mesh:
 /// use its ClosedMesh then.

@@ -33,8 +33,8 @@ struct SphereCoverSettings {
   /// Not 0: largest number of spheres of all meshes together. Meshes without a count of their own
   /// share the rest, such that the largest protrusion of all is small. Excludes max_protrusion.
   std::size_t total = 0;
-  /// [u] ≥ 0. 0: `count` spheres that protrude as little as possible. Else: as few spheres as are
-  /// found to protrude by no more.
+  /// [u] ≥ 0. 0: `count` spheres that protrude as little as possible. Else: the fewest spheres
+  /// found that protrude by no more.
   double max_protrusion = 0;
   std::uint64_t seed = 0;  ///< of the search; any value works equally well
   unsigned threads = 0;    ///< 0 = all cores; never changes the result
@@ -45,7 +45,7 @@ struct SphereCoverProof {
   bool covered = false;  ///< every point of the solid and of its mesh lies in a sphere: proven
   /// [u] If `covered` is false: the place that lies in no sphere, or could not be proven.
   Eigen::Vector3d where = Eigen::Vector3d::Zero();
-  double gap = 0;  ///< [u] from there to the nearest sphere; 0 if it is only not proven
+  double gap = 0;  ///< [u] from there to the nearest sphere; 0 if merely unproven
 };
 
 /// How far spheres protrude from a solid.

@@ -9,8 +9,8 @@ namespace IST_API ist {
 
 /// The one exception type of the offline stages (import … bake) and of Asset::load().
 ///
-/// Its message names the file, the place and the remedy. Apart from it only std::bad_alloc, and
-/// what the caller's own callback throws, leave a stage. Queries never throw; they return a
+/// Its message names the file, the place and the remedy. A stage also lets std::bad_alloc and
+/// exceptions of the caller's callback pass. Queries never throw; they return a
 /// QueryStatus.
 class Error : public std::runtime_error {
  public:

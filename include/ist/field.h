@@ -17,7 +17,7 @@ namespace IST_API ist {
 
 /// The solid normal · x ≤ offset. Exact.
 struct HalfSpaceField {
-  /// Outward, of any length but 0 (1e-150 to 1e150), by which the offset is divided too.
+  /// Outward; its length (1e-150 to 1e150) divides the offset too.
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
   double offset = 0;  ///< [u] for a unit normal
 };
@@ -63,7 +63,7 @@ struct HeightField {
 };
 
 /// Distances at the points of a grid, interpolated linearly in each cell: the gradient jumps from
-/// cell to cell. Outside of the grid is outside of the solid. A distance that is not finite gives
+/// cell to cell. Points outside the grid are outside the solid. A distance that is not finite gives
 /// QueryStatus::invalid_input where a query samples it.
 struct DistanceGridField {
   const float* distances = nullptr;  ///< [u] [size[0] · size[1] · size[2]], x runs fastest

@@ -28,7 +28,7 @@ struct GpuPairs {
 /// Largest batch size that uses the low-latency partitioning; see GpuWorkspace.
 inline constexpr std::size_t kFewGpuPairs = 16'384;
 
-/// Answers, each as in Penetration: arrays in device memory. Null pointers: not wanted.
+/// Answers, each as in Penetration: arrays in device memory. Null: not computed.
 struct GpuPenetrations {
   double* volume = nullptr;                ///< [count] [u³]
   double* centroid = nullptr;              ///< [count][3] [u] world

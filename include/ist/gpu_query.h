@@ -85,18 +85,18 @@ struct GpuPenetrationSettings {
   std::uint32_t pair_budget = 0;
 };
 
-/// answers[i] = penetration(pairs[i]), of two assets by lenses (FieldUse::never), finished.
+/// answers[i] = penetration(pairs[i]) as a finished sum, of two assets by lenses (FieldUse::never).
 ///
 /// Two assets: the volume is within 1e-6 of the sum in double. Gradients are within 1e-6 of the sum
 /// of the lenses' magnitudes, or of volume^(2/3) if that is more. Under a budget, and for copies of
 /// one asset at nearly the same pose, the answer is the CPU's blend of such sums.
 ///
 /// An asset and a field, in either order: sums are in double. The volume is within 1e-9 of the
-/// CPU's, or within a millionth of that of the asset's size³ if that is more, and gradients
-/// likewise. node_visits counts opened nodes of the asset and of a mesh's surface.
+/// CPU's, or 1e-15 of the asset's size³ if that is more; gradients likewise. node_visits counts
+/// opened nodes of the asset and of a mesh's surface.
 ///
-/// The bits are the same in every run, whatever else is in the batch, in all workspaces for up to
-/// kFewGpuPairs, and in all larger ones.
+/// The bits are the same in every run and in any batch; they depend only on whether the workspace
+/// is for up to kFewGpuPairs or more.
 ///
 /// Only launches kernels on `stream`: it allocates nothing and waits for nothing, so a CUDA graph
 /// may capture it.
@@ -111,10 +111,10 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
 ///
 /// The distance is the least over all pairs of inner spheres in double. separation() selects that
 /// pair in float: its distance may be larger by 1e-6 of the objects' size, and among equally near
-/// pairs it may select another. The interval is certified as there, and its lower end is never
-/// lower. `max_visits` as in SeparationSettings; 0: no limit. Under a limit that binds the interval
-/// is certified too, but differs from that of separation(). The bits are the same in every run,
-/// whatever else is in the batch.
+/// pairs it may select another. The interval is certified too, and its lower end is at least
+/// separation()'s. `max_visits` as in SeparationSettings; 0: no limit. Under a limit that binds the
+/// interval is certified too, but differs from that of separation(). The bits are the same in every
+/// run, whatever else is in the batch.
 ///
 /// Only launches kernels on `stream`, as penetration_batch().
 ///

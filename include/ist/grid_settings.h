@@ -7,7 +7,7 @@ namespace IST_API ist {
 /// Grids of the modes after Weller and Zachmann (GridMode other than banded).
 ///
 /// 0, or a negative count of refinements, is automatic: sizes are chosen from how much of its box
-/// the solid fills, and that of the distance grid also from the free memory. What is packed depends
+/// the solid fills, and that of the distance grid also from the free memory. The packing depends
 /// on `start`, `refinements`, `rounds_per_level` and, for uniform, `resolution`; the rest affects
 /// speed and memory.
 struct GridSettings {

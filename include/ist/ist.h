@@ -11,7 +11,8 @@
  * reads as no contact. Other results of a call that fails are all zero except for `size` and
  * `status`, where they have space.
  * Sizes: set up a struct that starts with `size` as `ist_penetration_t x = {.size = sizeof x}`. All
- * other members may be 0, the default, except ist_impact_settings_t::duration. A library accepts
+ * other members may be 0, the default, except ist_impact_settings_t::duration and
+ * ist_contact_law_t::stiffness. A library accepts
  * the sizes of all headers that it serves.
  * Handles: ist_tree_t and ist_workspace_t lie in the caller's memory and are empty when all zero. A
  * handle that owns memory must be released once and must not be copied. Released handles are
@@ -38,11 +39,11 @@ extern "C" {
 typedef int32_t ist_status_t;
 enum {
   IST_OK = 0,
-  /* A limit or the workspace's capacity stopped the query. volume_min and volume_max contain the
-   * same value as those of a finished answer. */
+  /* A limit or the workspace's capacity stopped the query. volume_min and volume_max still contain
+   * the finished sum (IST_EXACT: the true volume). */
   IST_BUDGET_EXHAUSTED = 1,
-  /* Finished, but the error is larger than relative_error: an asset has no mesh, or a pair budget
-   * or coincident copies left coarser spheres. */
+  /* Finished, but the predicted error exceeds relative_error: an asset has no mesh or a simplified
+   * one, or a pair budget or coincident copies left coarser spheres. */
   IST_ERROR_EXCEEDED = 2,
   /* A pose with NaN or Inf, a quaternion of length 0, a scale < 0, sizes or distances more than
    * 1e60 : 1 apart, or a field's number or an enum out of range. */
@@ -137,7 +138,7 @@ typedef struct ist_tree_info {
 
 ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info);
 
-/* What a solid meets in the trials of a bake to an error (tree_view.h). */
+/* Partner of a solid in the trials of a bake to an error (tree_view.h). */
 typedef int32_t ist_trial_partner_t;
 enum {
   IST_TRIAL_COPY = 0,
@@ -167,7 +168,7 @@ typedef struct ist_predicted_errors {
   uint32_t target_met; /* 0 or 1: requested, measured and reached */
 } ist_predicted_errors_t;
 
-/* Without poses for an asset that was baked without an error target. */
+/* `poses` is 0 for an asset baked without an error target. */
 ist_status_t ist_tree_get_predicted_errors(const ist_tree_t* tree, ist_predicted_errors_t* errors);
 
 /* MassProperties: of a solid of density 1. Multiply by a density for mass and inertia. */
@@ -195,7 +196,7 @@ ist_status_t ist_tree_get_mass_properties(const ist_tree_t* tree,
                                           ist_mass_properties_t* properties);
 ist_status_t ist_tree_get_bounds(const ist_tree_t* tree, ist_bounds_t* bounds);
 
-/* --- What a tree holds, for pictures (asset_layout.h) ----------------------------------------- */
+/* --- Contents of a tree, for drawing (asset_layout.h) ----------------------------------------- */
 
 /* Measure: what represents the solid. */
 typedef int32_t ist_measure_t;
@@ -218,8 +219,8 @@ typedef struct ist_ball_set {
   uint32_t size;
   ist_measure_t measure;
   uint32_t detail; /* of matched spheres: < ist_tree_info_t::details; of inner ones 0 */
-  /* 0: the spheres, in insertion order. 1: balls around sixteen spheres each. Above, balls around
-   * the spheres of sixteen balls of the level below each, up to the level of sixteen or fewer. */
+  /* 0: the spheres, in insertion order. 1: balls around sixteen spheres each. Above: balls around
+   * the spheres of sixteen balls of the level below, up to a level of at most sixteen. */
   uint32_t level;
 } ist_ball_set_t;
 
@@ -281,7 +282,7 @@ typedef struct ist_field {
   union {
     /* normal · x ≤ offset */
     struct {
-      double normal[3]; /* outward, of any length but 0, by which the offset is divided too */
+      double normal[3]; /* outward, not 0; its length divides `offset` */
       double offset;    /* [u] */
     } half_space;
     /* around the origin */
@@ -346,20 +347,20 @@ typedef struct ist_workspace {
   uint64_t opaque[8];
 } ist_workspace_t;
 
-/* `capacity`: count of node pairs that may wait at once. It takes address space, 7.5 MB and 115
- * bytes a pair, touched as needed. 0 is the default, 1,048,576, which serves two trees of 64,000
- * spheres at any pose.
- * `allocator`: null is the heap. The previous content of `workspace` is forgotten. */
+/* `capacity`: count of node pairs that may wait at once. It reserves 7.5 MB and 115 bytes per pair
+ * of address space, touched as needed. 0 is the default, 1,048,576, which serves two trees of
+ * 64,000 spheres at any pose. `allocator`: null is the heap. The previous content of `workspace` is
+ * forgotten. */
 ist_status_t ist_workspace_make(size_t capacity, const ist_allocator_t* allocator,
                                 ist_workspace_t* workspace);
 ist_status_t ist_workspace_release(ist_workspace_t* workspace);
 
-/* A capacity with which no pose of two solids fills the workspace, but for the exact measure and
- * ist_time_of_impact(): workspace_capacity() in ist/query.h. Scales count, poses do not. It
+/* A capacity that suffices for two solids at any pose, except for the exact measure and
+ * ist_time_of_impact(): workspace_capacity() in ist/query.h. Poses are ignored, scales are not. It
  * allocates and takes some 0.3 s for 16,000 spheres. IST_INVALID_INPUT for two fields. */
 ist_status_t ist_workspace_capacity(const ist_placed_t* a, const ist_placed_t* b, size_t* capacity);
 
-/* --- Settings: a null pointer means the defaults, all 0 but for `size` ------------------------ */
+/* --- Settings: a null pointer means the defaults, all 0 except `size` ------------------------ */
 
 typedef int32_t ist_field_use_t;
 enum { IST_FIELD_AUTOMATIC = 0, IST_FIELD_NEVER = 1, IST_FIELD_ALWAYS = 2 };
@@ -373,8 +374,8 @@ typedef struct ist_penetration_settings {
   uint32_t pair_budget; /* count of sphere pairs to spend; 0: no limit, as in all that follow */
   uint32_t max_visits;  /* count of node pairs opened */
   /* The caller's number of this pair of solids; 0: none. Calls with one number and workspace are
-   * steps of one motion: IST_EXACT keeps the triangles that are near each other. Answers have the
-   * same bits as without, except node_visits. Nothing is kept under max_visits. */
+   * steps of one motion: IST_EXACT keeps nearby triangles. It changes no bit of an answer except
+   * node_visits. Nothing is kept under max_visits. */
   uint32_t pair_id;
   /* Accepted relative error of the volume, such as 0.005 for 0.5 %, of two trees with IST_MATCHED.
    * The query uses the coarsest level of detail whose predicted error is smaller, or IST_EXACT,
@@ -390,7 +391,7 @@ typedef ist_penetration_settings_t ist_contact_settings_t;
 typedef struct ist_separation_settings {
   uint32_t size;
   uint32_t max_visits;
-  uint32_t inner_spheres; /* not 0: uses these even if both assets keep a mesh */
+  uint32_t inner_spheres; /* not 0: use them even if both assets keep a mesh */
 } ist_separation_settings_t;
 
 /* --- Answers ---------------------------------------------------------------------------------- */
@@ -433,7 +434,7 @@ typedef struct ist_contact_patch {
   double force[3];    /* [u²] force on B of a pressure of 1 [force/u²] */
   double torque[3];   /* [u³/rad] about B's origin */
   double point[3];    /* [u] world: on the central axis of the wrench, nearest to the centroid */
-  double twist;       /* [u³/rad] moment about the normal that a force at the point lacks */
+  double twist;       /* [u³/rad] residual moment about the normal of a force at `point` */
 } ist_contact_patch_t;
 
 /* Space for patches. */
@@ -470,7 +471,7 @@ ist_status_t ist_penetration(const ist_placed_t* a, const ist_placed_t* b,
                              const ist_penetration_settings_t* settings, ist_workspace_t* workspace,
                              ist_penetration_t* answer);
 
-/* Removes from an answer what protruding spheres add where flat faces meet. `whole` is the answer
+/* Removes the volume that protruding spheres add where flat faces meet. `whole` is the answer
  * of ist_penetration() by lenses (IST_FIELD_NEVER), and may be the same struct as `answer`. */
 ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_placed_t* a,
                                     const ist_placed_t* b, ist_penetration_t* answer);
@@ -516,7 +517,7 @@ typedef struct ist_pair_fit {
   double ratio;            /* ≥ 1, coarser grain over the finer */
   uint32_t a_is_coarser;   /* 0 or 1, as are the others */
   uint32_t has_surface;    /* the coarser asset stores its surface */
-  uint32_t needs_surface;  /* volumes and forces by spheres alone mislead */
+  uint32_t needs_surface;  /* volumes and forces by spheres alone are misleading */
   uint32_t fits;           /* has_surface or not needs_surface */
 } ist_pair_fit_t;
 
@@ -545,8 +546,8 @@ ist_status_t ist_overlap_outline(const ist_placed_t* a, const ist_placed_t* b,
                                  ist_contact_patches_t* patches, ist_outline_t* outline,
                                  ist_penetration_t* whole);
 
-/* Removes from patches, in place, what protruding spheres add where flat faces meet, each by its
- * own depth. A patch of which nothing is left stays, with zeros.
+/* Removes from patches, in place, the volume that protruding spheres add where flat faces meet,
+ * each by its own depth. A patch reduced to nothing is kept, with zeros.
  * `patches`: those that ist_contact_patches() wrote for these two under these settings. */
 ist_status_t ist_patches_without_protrusion(const ist_placed_t* a, const ist_placed_t* b,
                                             const ist_contact_settings_t* settings,
@@ -584,15 +585,15 @@ ist_status_t ist_overlap_lenses(const ist_placed_t* a, const ist_placed_t* b,
 
 /* --- Rays and points against one solid (surface.h) -------------------------------------------- */
 
-/* An asset must keep its mesh. Rays support half-spaces, balls, boxes, capsules and cylinders. All
- * else returns IST_NOT_HELD. These functions need no workspace. Each answers `count` rays or points
- * and returns the least of their statuses, or an error of the call. The numbers of a ray or point
- * that cannot be answered, or is not finite or too far, are NaN. */
+/* An asset must keep its mesh. Rays support half-spaces, balls, boxes, capsules and cylinders;
+ * points support all fields. Others return IST_NOT_HELD. These functions need no workspace. Each
+ * answers `count` rays or points and returns the least of their statuses, or an error of the call.
+ * The numbers of a ray or point that cannot be answered, or is not finite or too far, are NaN. */
 
 typedef struct ist_ray {
   double origin[3];    /* [u] world */
   double direction[3]; /* world, of any length but 0 */
-  double longest;      /* [u] it ends there; 0: nowhere */
+  double longest;      /* [u] its length; 0: infinite */
 } ist_ray_t;
 
 /* RayHit: where a ray meets the surface first, on its way out if it starts inside. */
@@ -628,7 +629,7 @@ ist_status_t ist_contains(const ist_placed_t* solid, const double* points, size_
 
 /* These functions need no workspace. */
 
-/* For a pressure of 1: −dV by the body's motion. */
+/* For a pressure of 1: −dV/d(the body's motion). */
 typedef struct ist_wrench {
   double force[3];  /* [u²] out of the other body */
   double torque[3]; /* [u³] about the given point */
@@ -654,7 +655,7 @@ ist_status_t ist_patch_wrenches(const ist_contact_patch_t* patch, const ist_pose
                                 const double point_a[3], const double point_b[3],
                                 ist_wrenches_t* wrenches);
 
-/* [u³/s] dV/dt while both move; a null twist is at rest. */
+/* [u³/s] dV/dt while both move; a null twist: at rest. */
 ist_status_t ist_volume_rate(const ist_penetration_t* contact, const ist_pose_t* b,
                              const ist_twist_t* motion_a, const ist_twist_t* motion_b,
                              double* rate);
@@ -667,10 +668,10 @@ ist_status_t ist_patch_volume_rate(const ist_contact_patch_t* patch, const ist_p
 /* ContactLaw: the pressure grows with depth. `stiffness` must be set. */
 typedef struct ist_contact_law {
   uint32_t size;
-  double stiffness; /* [force/u³] > 0 */
-  double area;      /* [u²] reference area; 0: each patch's own, the largest that it had */
-  double damping;   /* [s/u] ≥ 0 */
-  double friction;  /* ≥ 0, Coulomb's coefficient */
+  double stiffness;          /* [force/u³] > 0 */
+  double area;               /* [u²] reference area; 0: the largest that each patch had */
+  double damping;            /* [s/u] ≥ 0 */
+  double friction;           /* ≥ 0, Coulomb's coefficient */
   double friction_stiffness; /* [force/u³] ≥ 0, of shear stress over stretch */
   double friction_damping;   /* [force·s/u³] ≥ 0, of shear stress over velocity */
 } ist_contact_law_t;
@@ -686,7 +687,7 @@ typedef struct ist_contact_memory {
   uint32_t count;
 } ist_contact_memory_t;
 
-/* On A acts the opposite, about the same point. */
+/* A receives the opposite, about the same point. */
 typedef struct ist_contact_force_t {
   uint32_t size;
   double force[3];     /* [force] on B, world */

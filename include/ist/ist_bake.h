@@ -12,7 +12,7 @@ extern "C" {
 #pragma GCC visibility push(default)
 #endif
 
-/* A null pointer means the defaults, all 0 but for `size`. */
+/* A null pointer means the defaults, all 0 except `size`. */
 typedef struct ist_bake_settings {
   uint32_t size;
   uint32_t threads;      /* 0: all cores; never changes the asset */
@@ -24,7 +24,7 @@ typedef struct ist_bake_settings {
  * `vertices`: [3 · vertex_count] [u]; `triangles`: [3 · triangle_count] vertices, counter-clockwise
  * seen from outside.
  * `message`: [message_size] receives a sentence, cut to fit, where the status is IST_NOT_BAKED: an
- * open mesh, a vertex that is not there, a setting out of range. May be null.
+ * open mesh, a vertex index or a setting out of range. May be null.
  * Allocates, takes seconds, and uses many threads. */
 ist_status_t ist_bake(const double* vertices, size_t vertex_count, const uint32_t* triangles,
                       size_t triangle_count, const ist_bake_settings_t* settings, ist_tree_t* tree,

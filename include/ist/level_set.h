@@ -37,8 +37,8 @@ struct LevelSetMesh {
 /// and is larger where slopes differ much there. Runs on the current threads of TBB; the bytes do
 /// not depend on their number.
 ///
-/// Throws Error, naming `name`, for sizes that do not fit, values that are not finite, a grid that
-/// is nowhere inside, a solid that reaches the grid's border, and if progress cancels (stage
+/// Throws Error, naming `name`, for mismatched sizes, values that are not finite, a grid without
+/// inside points, a solid that reaches the grid's border, and if progress cancels (stage
 /// "polygonise").
 LevelSetMesh mesh_level_set(const DistanceGrid& grid, const std::string& name,
                             const ProgressCallback& progress = {});

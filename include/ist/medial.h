@@ -22,7 +22,7 @@ struct MedialNode {
 struct MedialSettings {
   unsigned resolution = 0;  ///< cells on the solid's longest side, one node each at most; 1 … 1024
                             ///< or 0 = automatic (32–72)
-  std::uint64_t seed = 0;  ///< another seed, other nodes of the same axis
+  std::uint64_t seed = 0;  ///< other seeds give other nodes of the same axis
   unsigned threads = 0;    ///< 0 = all cores; never changes the result
   Device device = Device::automatic;
   GpuSettings gpu = {};  ///< if `device` is a GPU
@@ -30,8 +30,8 @@ struct MedialSettings {
 
 /// An approximation of the medial axis: the first round of a grid packing.
 ///
-/// One prototype a grid cell moves away from the surface, confined to its cell. Those that come to
-/// rest between surface points over 45° apart are the nodes: Voronoi nodes between four, else
+/// One prototype per grid cell moves away from the surface, confined to its cell. Those that come
+/// to rest between surface points over 45° apart are the nodes: Voronoi nodes between four, else
 /// points of the axis' sheets and seams. Ordered by cell; the same for any device and number of
 /// threads.
 ///

@@ -81,7 +81,7 @@ struct MeshReport {
   std::optional<Judgement> judged;  ///< of a repaired or wrapped mesh
   double volume = 0;                ///< [u³] divergence theorem; counts self-overlaps twice
   Eigen::AlignedBox3d bounds;       ///< [u] of the referenced vertices
-  std::vector<std::string> notes;   ///< one sentence a finding, ready to print
+  std::vector<std::string> notes;   ///< one printable sentence per finding
 };
 
 /// A mesh that bounds a solid: every edge balanced, every shell oriented. A point is inside where
@@ -100,7 +100,7 @@ struct ClosedMesh {
 /// What to do with a mesh that does not bound a solid.
 enum class OpenMeshPolicy {
   refuse,  ///< throw OpenMeshError with the place of the first open edge
-  /// Weld cracks, fill holes, drop what cannot bound a solid; report and judge it. Throw
+  /// Weld cracks, fill holes, drop open sheets and fins; report and judge the result. Throw
   /// OpenMeshError if the confidence is too low.
   repair,
 };

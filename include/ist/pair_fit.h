@@ -13,7 +13,7 @@ struct PairFit {
   double ratio = 1;          ///< ≥ 1, coarser grain over the finer
   bool a_is_coarser = true;  ///< or both are equal
   bool has_surface = true;   ///< the coarser asset stores its surface (TreeView::has_field)
-  /// The ratio is 4 or more: volumes and forces by the spheres of both alone mislead. The coarser
+  /// The ratio is 4 or more: volumes and forces by spheres alone are misleading. The coarser
   /// one's surface helps, if it is stored and FieldUse allows it.
   bool needs_surface = false;
 

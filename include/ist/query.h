@@ -15,8 +15,8 @@
 
 namespace IST_API ist {
 
-/// Limits of a penetration and of contact patches. Zero, a negative value or NaN means no limit;
-/// with none set the answer is the finished sum.
+/// Limits of a penetration and of contact patches. Zero, a negative value or NaN means no limit.
+/// Without limits the answer is the finished sum.
 ///
 /// No query reads a clock: poses and settings decide the answer. <ist/deadline.h> chooses a pair
 /// budget from measured times.
@@ -60,11 +60,11 @@ struct PenetrationSettings {
   /// the status is error_exceeded. Assets without spheres are answered by Measure::exact.
   double relative_error = 0;
 
-  /// The caller's number of this pair of solids; 0: none. Calls with the same number and workspace
-  /// are steps of one motion: exact queries keep the triangles that are near each other, and search
-  /// again only after they have moved too far. Answers have the same bits as without, except
-  /// node_visits. At its default capacity a workspace keeps up to 1,024 pairs of solids and a
-  /// quarter of a million pairs of triangles. Nothing is kept under max_visits.
+  /// The caller's id of this pair of solids; 0: none. Calls with the same id and workspace are
+  /// steps of one motion: exact queries keep the nearby triangles and search again only after too
+  /// much motion. It changes no bit of an answer except node_visits. At its default capacity a
+  /// workspace keeps up to 1,024 pairs of solids and a quarter of a million pairs of triangles.
+  /// Nothing is kept under max_visits.
   std::uint32_t pair_id = 0;
 };
 
@@ -73,7 +73,7 @@ using ContactSettings = PenetrationSettings;
 /// Limits of a separation. Zero, a negative value or NaN means no limit.
 struct SeparationSettings {
   std::uint32_t max_visits = 0;  ///< count of node pairs opened, the nearest first
-  bool inner_spheres = false;    ///< uses these even if both assets keep a mesh
+  bool inner_spheres = false;    ///< use the inner spheres even if both assets keep a mesh
 };
 
 /// Limits of both halves of query().
@@ -133,8 +133,8 @@ struct Penetration {
   std::uint32_t sphere_pairs = 0;
 };
 
-/// Gap of two placed solids, between their surfaces if both assets keep a mesh, else between their
-/// inner spheres, or a field and these. All zero once these overlap.
+/// Gap of two placed solids: between their surfaces if both assets keep a mesh, else between inner
+/// spheres, or inner spheres and a field. All zero once these overlap.
 struct Separation {
   double distance = 0;      ///< [u] between surfaces or inner spheres
   double distance_min = 0;  ///< [u] lower bound of the true distance of the solids, certified
@@ -149,10 +149,10 @@ struct Separation {
   std::uint32_t sphere_pairs = 0;  ///< pairs of triangles or spheres measured
 };
 
-/// Memory functions of a workspace, called while it is made and when it ends.
+/// Memory functions of a workspace, called on construction and destruction.
 struct MemoryHooks {
-  /// Returns at least `bytes` bytes at a multiple of `alignment`, a power of two, or null if there
-  /// are none. A null pointer here selects operator new.
+  /// Returns at least `bytes` bytes at a multiple of `alignment`, a power of two; null if out of
+  /// memory. A null pointer here selects operator new.
   void* (*allocate)(void* context, std::size_t bytes, std::size_t alignment) = nullptr;
   void (*release)(void* context, void* memory, std::size_t bytes, std::size_t alignment) = nullptr;
   void* context = nullptr;  ///< passed to both
@@ -164,8 +164,8 @@ struct MemoryHooks {
 /// budget_exhausted.
 class Workspace {
  public:
-  /// `capacity`: count of node pairs that may wait at once; workspace_capacity() tells how many two
-  /// solids need. It takes address space, 7.5 MB and 115 bytes a pair (128 MB by default), whose
+  /// `capacity`: count of node pairs that may wait at once; workspace_capacity() returns what two
+  /// solids need. It reserves 7.5 MB and 115 bytes per pair of address space (128 MB by default);
   /// pages are touched as needed. The default serves two trees of 64,000 spheres at any pose.
   ///
   /// Throws std::bad_alloc.
@@ -184,17 +184,17 @@ class Workspace {
   std::unique_ptr<Impl, Release> impl_;
 };
 
-/// A capacity with which no pose of two solids fills the workspace: penetration() and
-/// contact_patches() by spheres and surfaces, separation() and overlap() then stop at no capacity.
-/// Poses are ignored, scales are not. For several pairs take the largest.
+/// A capacity that suffices for two solids at any pose: penetration() and contact_patches() by
+/// spheres and surfaces, separation() and overlap() never exhaust it. Poses are ignored, scales
+/// are not. For several pairs take the largest.
 ///
-/// It is proven from the balls of both trees, whichever way they lie: three to five times what the
-/// worst poses need. 4,096 is the least, two cubes of 64,000 spheres get 169,140. It allocates, and
-/// takes some 0.3 s for 16,000 spheres.
+/// The bound is proven from the balls of both trees and is three to five times the need of the
+/// worst poses: at least 4,096, and 169,140 for two cubes of 64,000 spheres. The call allocates,
+/// and takes some 0.3 s for 16,000 spheres.
 ///
-/// No such bound serves Measure::exact and time_of_impact(). A capacity c lets the exact measure
-/// find c / 16 + 128 pairs of triangles that cross, and c / 4 + 512 pairs that touch or nearly do:
-/// copies in one place need most. The mesh must have no more than c blocks of 16 triangles.
+/// It does not cover Measure::exact and time_of_impact(). A capacity c lets the exact measure find
+/// c / 16 + 128 crossing pairs of triangles, and c / 4 + 512 pairs that touch or nearly do:
+/// coincident copies need most. The mesh must have no more than c blocks of 16 triangles.
 ///
 /// Throws Error for an empty asset, a scale out of range, or two fields.
 std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);
@@ -216,16 +216,16 @@ std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);
 Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept;
 
-/// Removes from an answer what protruding spheres add where flat faces meet.
+/// Removes from an answer the volume that protruding spheres add where flat faces meet.
 ///
-/// The result is zero across a gap of a fifth of a mean sphere radius or more. Between this gap and
-/// a depth of a fifth of that radius, the volume is reduced. Round and deeper contacts are
-/// unchanged. Only volume and force are used, so a light touch of a large ball may be treated as
-/// flat. Volume and force stay continuous in the pose. The force is the volume's gradient to within
-/// 15 %: use it for contacts, not where energy must be conserved. volume_min is lowered to contain
-/// the new volume.
+/// The result is zero across a gap of a fifth of a mean sphere radius or more. Between this gap
+/// and a depth of a fifth of that radius, the volume is reduced; the force may grow. Round and
+/// deeper contacts are unchanged. Only volume and force are used, so a light touch of a large ball
+/// may be treated as flat. Volume and force stay continuous in the pose. The force is the volume's
+/// gradient to within 15 %: use it for contacts, not where energy must be conserved. volume_min is
+/// lowered to contain the new volume.
 ///
-/// `whole`: the answer of penetration() for these two by lenses (FieldUse::never), in the matched
+/// `whole`: the answer of penetration() for this pair by lenses (FieldUse::never), in the matched
 /// measure, without a pair budget. Takes a few nanoseconds.
 Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
                                const PlacedTree& b) noexcept;
@@ -234,8 +234,8 @@ Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
 ///
 /// If both assets keep a mesh (TreeView::has_mesh), this is the distance of the surfaces. The
 /// interval is as wide as rounding and the error of simplified meshes. It is zero if the surfaces
-/// cross or one solid holds the other. Otherwise it is the distance of the inner spheres, exact to
-/// about 1e-6 of the objects' size, and all zero once these overlap. A stopped query returns the
+/// cross or one solid contains the other. Otherwise it is the distance of the inner spheres, exact
+/// to about 1e-6 of the objects' size, and all zero once these overlap. A stopped query returns the
 /// nearest points that it found; its interval is still certified. Batches on the GPU
 /// (<ist/gpu_query.h>) always use the inner spheres. The distance from a field is that of the
 /// asset's inner spheres, certified as far as the field's distances are: see each field.
@@ -256,8 +256,8 @@ PenetrationAndSeparation query(const PlacedSolid& a, const PlacedSolid& b,
 
 /// One point of a contact manifold: the part of a contact near one region of the smaller solid.
 struct ContactPatch {
-  /// Names the region, for a solver's warm start: the same in every query of the same two trees in
-  /// the same measure. Other pairs of trees use the same names.
+  /// Identifies the region for warm starting: the same in every query of the same two trees in the
+  /// same measure. Ids repeat across pairs of trees.
   ///
   /// With Measure::exact it names a connected part of the overlap by the lowest pair of crossing
   /// triangles on its outline, and is the same while these cross; 0 for a part wholly inside the
@@ -266,7 +266,7 @@ struct ContactPatch {
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the patch's overlap, world
   /// Unit, world: the direction in which the patch pushes B, from A to B; zero if the area is 0.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  /// [u²] |force|: the area of the contact surface seen along the normal; 0 where that is only
+  /// [u²] |force|: the area of the contact surface seen along the normal; 0 if it is only
   /// rounding, as for a patch wholly inside the other solid.
   double area = 0;
   /// [u] volume/area, ≤ the smaller solid's bounding diameter; 0 if no area. A mean: patches of one
@@ -280,10 +280,10 @@ struct ContactPatch {
   /// `twist` times `normal`.
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();
   /// [u] World: the point of the wrench's central axis that is nearest to the centroid. `force`
-  /// applied there has the patch's torque except for `twist`. It lies far away where forces nearly
-  /// cancel; the centroid if the area is 0.
+  /// applied there has the patch's torque except for `twist`. It is far away where forces nearly
+  /// cancel, and the centroid if the area is 0.
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  double twist = 0;  ///< [u³/rad] moment about the normal that a force at `point` lacks
+  double twist = 0;  ///< [u³/rad] residual moment about the normal of a force at `point`
 };
 
 struct ContactPatches {
@@ -320,12 +320,12 @@ ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
 struct OutlineSegment {
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  ///< [u] world
   Eigen::Vector3d to = Eigen::Vector3d::Zero();    ///< [u] world
-  std::uint32_t patch = 0;  ///< number of the patch that it bounds; 0 without room for patches
+  std::uint32_t patch = 0;  ///< index of the patch that it bounds; 0 if `patches` is empty
 };
 
 struct OverlapOutline {
   ContactPatches contact;
-  /// Of the whole outline; written as far as they fit. 0 if a limit stopped the query.
+  /// Total count; as many as fit are written. 0 if a limit stopped the query.
   std::size_t segments = 0;
 };
 
@@ -342,10 +342,10 @@ OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
 /// of a penetration does. Each patch is corrected by its own depth, so inclined faces are corrected
 /// only where they hardly touch.
 ///
-/// Volumes, areas, forces and torques are reduced. A patch of which nothing is left stays, with
-/// zeros and no normal. Patches whose spheres met a surface, and those of the inner and the exact
-/// measure, are unchanged. The accompanying Penetration is not updated; it no longer equals the sum
-/// of the patches.
+/// Volumes are reduced; areas, forces and torques are scaled with them. A patch reduced to nothing
+/// is kept, with zeros and no normal. Patches whose spheres met a surface, and those of the inner
+/// and the exact measure, are unchanged. The accompanying Penetration is not updated; it no longer
+/// equals the sum of the patches.
 ///
 /// `patches`: those that contact_patches() wrote for these two under these settings.
 void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, const PlacedTree& b,
@@ -356,7 +356,7 @@ struct PlacedPair {
   PlacedSolid a, b;
 };
 
-/// Runs penetration_batch on the caller's threads: two pointers, no allocation.
+/// Runs a batch on the caller's threads: two pointers, no allocation.
 struct ParallelFor {
   /// Calls work(batch, i) once for each i in [0, workers), on any threads, concurrently or not, and
   /// returns when all calls have returned. Null: the calling thread does it all.
@@ -365,7 +365,7 @@ struct ParallelFor {
   void* pool = nullptr;  ///< passed to `run`
 };
 
-/// answers[i] = penetration(pairs[i]), the same bits, for as many as there are answers.
+/// answers[i] = penetration(pairs[i]), bit for bit, for i < answers.size().
 ///
 /// There is a worker for each workspace; without any, every answer is budget_exhausted with no
 /// upper bound. An atomic counter hands out pairs, so a pool need not balance them.
@@ -375,7 +375,7 @@ void penetration_batch(std::span<const PlacedPair> pairs, const PenetrationSetti
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel = {}) noexcept;
 
-/// answers[i] = contact_patches(pairs[i]), the same bits, for as many as there are answers.
+/// answers[i] = contact_patches(pairs[i]), bit for bit, for i < answers.size().
 ///
 /// `patches` is divided evenly: with m = patches.size() / count, where count is the lesser of pairs
 /// and answers, those of pair i begin at patches[i · m], and answers[i].count of them are written.

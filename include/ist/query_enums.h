@@ -11,7 +11,7 @@ namespace IST_API ist {
 enum class QueryStatus : std::uint32_t {
   ok = 0,  ///< finished: the gradients are exactly those of the returned volume
   /// A limit of the settings or the workspace's capacity stopped the descent. volume_min and
-  /// volume_max contain the same value as those of a finished answer.
+  /// volume_max still contain the finished sum (exact: the true volume).
   budget_exhausted = 1,
   /// All numbers of the answer are NaN, its counts 0. The cause is a pose with NaN or Inf; a
   /// quaternion of length 0; a scale ≤ 0; an empty tree; a field's number out of range; sizes or

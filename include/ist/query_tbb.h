@@ -5,7 +5,7 @@
 
 namespace IST_API ist {
 
-/// Runs penetration_batch on the calling task arena of oneTBB. Part of ist::ist: ist::query does
+/// Runs batches on the calling task arena of oneTBB. Part of ist::ist: ist::query does
 /// not link TBB.
 ParallelFor tbb_parallel_for() noexcept;
 

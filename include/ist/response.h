@@ -19,9 +19,9 @@
 // Units: [u] the meshes' length, [s] time, [force], and [mass] = [force·s²/u]. With u = m and force
 // = N mass is kg; with u = mm and force = mN mass is kg too.
 //
-// A force of k · −translation_gradient is no contact law: it is k · area whatever the depth, so a
-// body on a flat face sinks or floats, and falls through once its energy exceeds k · area ·
-// thickness. Here the *pressure* grows with depth, as on a bed of springs.
+// A force of k · −translation_gradient is not a contact law: it is k · area at any depth
+// (docs/engines.md, *What a volume provides*). Here the *pressure* grows with depth, as on a bed of
+// springs.
 
 namespace IST_API ist {
 
@@ -31,7 +31,7 @@ namespace IST_API ist {
 /// the patch's volume over a reference area. Never negative: nothing sticks.
 struct ContactLaw {
   double stiffness = 0;  ///< [force/u³] > 0, penalty stiffness: pressure over depth (Winkler)
-  /// [u²] Reference area. 0: each patch's own, the largest that it had (PatchMemory::area). This
+  /// [u²] Reference area. 0: the largest that each patch had (PatchMemory::area). This
   /// loses some energy where areas change: a ball that bounces on a plane keeps three quarters. A
   /// body then rests up to a quarter deeper than the depth passed to stiffness_for_depth().
   ///
@@ -80,7 +80,7 @@ inline RelativeMotion relative_motion(const Twist& a, const Twist& b,
   return {at_origin(b) - at_origin(a), b.angular_velocity - a.angular_velocity};
 }
 
-/// Force and torque of a contact on B. On A act the opposite ones, about the same point.
+/// Force and torque of a contact on B. A receives the opposite, about the same point.
 struct ContactForce {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< [force] on B, world
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< [force·u] on B about B's origin, world
@@ -189,7 +189,7 @@ inline ContactForce contact_force(const ContactLaw& law, std::span<const Contact
   return sum;
 }
 
-/// [force/u³] Penalty stiffness by which a load [force] on an area [u²] rests at a depth [u]. Use
+/// [force/u³] Penalty stiffness at which a load [force] on an area [u²] rests at a depth [u]. Use
 /// at least the depth of the spheres' blur, some 0.2 % of the side for 4,000 spheres.
 inline double stiffness_for_depth(double load, double area, double depth) noexcept {
   return load / (area * depth);

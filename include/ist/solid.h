@@ -41,7 +41,9 @@ class Solid {
 
   virtual Eigen::AlignedBox3d bounds() const = 0;  ///< [u] contains the whole solid
   virtual double volume() const = 0;               ///< [u³]
-  virtual double volume_error() const { return 0; }  ///< [u³] on volume(); see each make_… function
+  virtual double volume_error() const {
+    return 0;
+  }  ///< [u³] bound on volume(); see each make_… function
 
   /// The mesh that bounds the solid, if it is one (make_solid): it is then packed by its triangles,
   /// also on a GPU. Null for every other solid.
@@ -65,7 +67,7 @@ std::unique_ptr<Solid> make_torus(const Eigen::Vector3d& centre, double major, d
 /// many threads at once. Divide a smooth function by a bound of its slope. If the function is not
 /// 1-Lipschitz, spheres may protrude and parts may be missed: bake() tests some thousand pairs of
 /// points and throws Error with a place; pack() tests nothing. The volume is as for the boolean
-/// combinations below. Throws Error for no function or no box.
+/// combinations below. Throws Error for a null function or an empty box.
 std::unique_ptr<Solid> make_function_solid(
     std::function<double(const Eigen::Vector3d&)> signed_distance,
     const Eigen::AlignedBox3d& bounds);

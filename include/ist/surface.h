@@ -10,23 +10,23 @@
 
 // Rays and points against one solid: an asset that keeps its mesh (TreeView::has_mesh), or a field.
 //
-// Of an asset, the kept triangles are queried, with exact signs where signs decide. An asset
+// For an asset, the kept triangles are queried; exact signs decide. An asset
 // without a mesh returns not_held; an invalid pose, scale, ray or point returns invalid_input. All
 // numbers of these answers are NaN.
 //
-// Of a field: MeshField is queried as its asset. Half-space, box, ball, capsule and cylinder are
+// For a field: MeshField is queried as its asset. Half-space, box, ball, capsule and cylinder are
 // exact. Terrains, distance grids and functions support points only, by the distances that queries
 // of solids use; a ray returns not_held.
 //
 // No allocation, lock or exception, and no workspace: threads may share everything. Lengths are
-// [u], all vectors are in the world.
+// [u], vectors in world coordinates.
 
 namespace IST_API ist {
 
 struct Ray {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::UnitX();      ///< of any length but 0
-  double longest = std::numeric_limits<double>::infinity();  ///< [u] > 0: it ends there
+  double longest = std::numeric_limits<double>::infinity();  ///< [u] > 0, its length
 };
 
 /// Where a ray meets a solid's surface first. One that starts inside meets it on its way out:
@@ -48,7 +48,7 @@ struct SurfacePoint {
   double error = 0;     ///< [u] the solid's distance is within this of `distance`
   Eigen::Vector3d point = Eigen::Vector3d::Zero();     ///< on the surface
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< of the distance: unit, outward
-  std::uint32_t triangle = ~0u;                        ///< as RayHit has it
+  std::uint32_t triangle = ~0u;                        ///< as in RayHit
   QueryStatus status = QueryStatus::ok;
 };
 
@@ -62,12 +62,12 @@ struct Containment {
 /// The first hit of a ray. No ray passes between two triangles.
 RayHit raycast(const PlacedSolid& solid, const Ray& ray) noexcept;
 
-/// Signed distance, nearest point and gradient. Of several equally near points it returns one.
+/// Signed distance, nearest point and gradient. Returns one of several equally near points.
 SurfacePoint closest_point(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;
 
 Containment contains(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;
 
-/// answers[i] is that of rays[i] or points[i], the same bits, for as many as there are answers.
+/// answers[i] is that of rays[i] or points[i], bit for bit, for i < answers.size().
 void raycast(const PlacedSolid& solid, std::span<const Ray> rays,
              std::span<RayHit> answers) noexcept;
 void closest_point(const PlacedSolid& solid, std::span<const Eigen::Vector3d> points,

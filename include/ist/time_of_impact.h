@@ -25,7 +25,7 @@ struct Motion {
 /// The motion that takes an object from one pose to another in the time `duration` > 0: `about`
 /// moves straight, and the object turns at constant speed about one axis, the shorter way (slerp).
 ///
-/// It ends at `to` except for rounding. `scale` is the object's (PlacedTree::scale). An invalid
+/// It ends at `to` up to rounding. `scale` is the object's (PlacedTree::scale). An invalid
 /// pose or duration yields a Motion that queries reject.
 Motion motion_between(const Pose& from, const Pose& to, double duration,
                       const Eigen::Vector3d& about = Eigen::Vector3d::Zero(),
@@ -74,8 +74,8 @@ struct ImpactSettings {
 
 struct TimeOfImpact {
   ImpactStatus status = ImpactStatus::no_impact;
-  /// [T] in [0, duration]. Certified for every status: the solids do not touch in [0, time]. If it
-  /// is 0 they do not touch at 0, except for overlapping and unresolved.
+  /// [T] in [0, duration]. Certified for every status: the solids do not touch in [0, time]. 0
+  /// proves no contact at 0, except for overlapping and unresolved.
   double time = 0;
   /// [u] Certified bounds of the solids' distance at `time`. The lower end is a bound proven for
   /// all parts over the whole motion, not a measurement: it is nearly 0 where parts slide past each
@@ -89,7 +89,7 @@ struct TimeOfImpact {
   Eigen::Vector3d point_b = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< likewise: unit, from A to B, world
   std::uint32_t node_visits = 0;                     ///< node pairs visited
-  /// Of these, pairs of triangles, of spheres, or of a field with one of these.
+  /// Of which pairs of triangles or spheres, or of one of these and a field.
   std::uint32_t surface_pairs = 0;
 };
 

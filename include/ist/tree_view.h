@@ -34,9 +34,9 @@ enum class TrialPartner : std::uint32_t {
   copy = 0,    ///< of itself
   plane = 1,   ///< HalfSpaceField
   ball = 2,    ///< 0.1 to 0.3 of the solid's diagonal across
-  edge = 3,    ///< of a box as large, which meets the solid with an edge first
+  edge = 3,    ///< of a box of that size, edge first
   corner = 4,  ///< likewise with a corner first
-  plate = 5,   ///< as large, and 0.02 of the diagonal thick; any side first
+  plate = 5,   ///< of that size, 0.02 of the diagonal thick; any side first
 };
 inline constexpr std::uint32_t kTrialPartners = 6;
 
@@ -103,7 +103,7 @@ class TreeView {
   /// [u³] Volume that the input mesh counts more than once, or below zero; 0 for a mesh that winds
   /// around every point of its solid once. An estimate for MeshState::unresolved.
   double counted_twice() const noexcept;
-  /// Without poses for an asset of bake(), which predicts nothing, and for an empty view.
+  /// `poses` is 0 for an asset of bake() and for an empty view.
   PredictedErrors predicted_errors() const noexcept;
 
   /// The checked bytes behind the view (ist/asset_layout.h); for an empty view a header without

@@ -11,8 +11,8 @@
 
 namespace IST_API ist {
 
-/// Force and moment on one body for a pressure of 1: −dV by its motion. Times a pressure
-/// [force/u²], they are the force and the moment of a penalty potential pressure · V.
+/// Force and moment on one body for a pressure of 1: −dV/d(its motion). Multiplied by a pressure
+/// [force/u²] they are those of a penalty potential pressure · V.
 struct Wrench {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< [u²] points out of the other body
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< [u³] about the given point
@@ -25,8 +25,8 @@ struct Wrenches {
 
 /// A body's velocity.
 struct Twist {
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();             ///< [u] a point of the body at
-                                                               ///< present
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();             ///< [u] present position of a body
+                                                               /// point
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< [u/s] of that point
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/s]
 };
@@ -37,15 +37,15 @@ inline Wrench about(const Wrench& wrench, const Eigen::Vector3d& from,
   return {wrench.force, wrench.torque + (from - to).cross(wrench.force)};
 }
 
-/// Both wrenches from the one on B about B's origin, as in answers.
+/// Both wrenches from the one on B about B's origin, as queries return it.
 inline Wrenches both_wrenches(const Wrench& on_b, const Eigen::Vector3d& origin_b,
                               const Eigen::Vector3d& point_a,
                               const Eigen::Vector3d& point_b) noexcept {
   return {about({-on_b.force, -on_b.torque}, origin_b, point_a), about(on_b, origin_b, point_b)};
 }
 
-/// Of a whole contact, on A about `point_a` and on B about `point_b` [u], usually the centres of
-/// mass.
+/// Wrenches of a whole contact, on A about `point_a`, on B about `point_b` [u], usually the
+/// centres of mass.
 ///
 /// `b`: B's pose in the query.
 inline Wrenches wrenches(const Penetration& contact, const Pose& b, const Eigen::Vector3d& point_a,
@@ -62,7 +62,7 @@ inline Wrenches wrenches(const ContactPatch& patch, const Pose& b, const Eigen::
 
 /// [u³/s] dV/dt while both bodies move: > 0 while the overlap grows.
 ///
-/// For a patch, its part of that. A body at rest is a Twist().
+/// For a patch, its share. A body at rest is a Twist().
 template <class Contact>
 double volume_rate(const Contact& contact, const Pose& b, const Twist& motion_a,
                    const Twist& motion_b) noexcept {

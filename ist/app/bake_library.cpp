@@ -159,7 +159,7 @@ std::vector<std::string> settle_stale(std::vector<std::string> stale, bool remov
   if (stale.size() > kShown) names += ", …";
   if (!remove) {
     spdlog::warn(
-        "stale, since the manifest does not name them or they failed: {} ({}). "
+        "stale (not in the manifest, or failed): {} ({}). "
         "--remove-stale removes them",
         names, stale.size());
     return stale;

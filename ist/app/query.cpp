@@ -295,7 +295,7 @@ void add_query(CLI::App& app) {
   command->footer(
       "Gradients are with respect to a motion of B, in A's frame. A pressure k [force/u²]\n"
       "exerts the force −k·dVdt and, about B's origin, the torque −k·dVdr on B.\n"
-      "A field is given in A's frame. For a file named box:1,1,1 write ./box:1,1,1.\n"
+      "A field defines A's frame. For a file named box:1,1,1 write ./box:1,1,1.\n"
       "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9\n"
       "         ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9 --measure exact\n"
       "         ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9 --error 0.5%\n"

@@ -102,11 +102,11 @@ std::string answer_text(const Answer& answer, const PenetrationSettings& setting
     line("sum range", fmt::format("{:.6g} … {:.6g} u³", p.volume_min, p.volume_max),
          settings.relative_error > 0
              ? "bounds of the true volume if meshes answered; else the interval of the sum"
-             : "interval of the finished sum; says nothing of the true volume");
+             : "interval of the finished sum, not of the true volume");
     if (settings.relative_error > 0)
       line("error", fmt::format("{:g} %", 100 * settings.relative_error),
-           p.status == QueryStatus::error_exceeded ? "accepted, but more is predicted"
-           : p.status == QueryStatus::ok           ? "accepted, and less is predicted"
+           p.status == QueryStatus::error_exceeded ? "accepted; predicted error is larger"
+           : p.status == QueryStatus::ok           ? "accepted; predicted error is smaller"
                                                    : "accepted, but a limit stopped the query");
   }
   if (known) {

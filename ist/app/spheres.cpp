@@ -246,7 +246,7 @@ void add_spheres(CLI::App& app) {
   add_input(command, "INPUT", options->input, "A robot (.urdf) or a mesh (OBJ, STL, PLY, …)");
   add_output(command, options->output,
              "The file to write: .urdf (spheres as collisions), .yml (cuRobo), .xrdf, .srdf "
-             "(MoveIt), .glb (links and spheres to look at) or .json",
+             "(MoveIt), .glb (links and spheres, for viewers) or .json",
              Dash::refused);
   const std::string meaning =
       fmt::format("N or LINK=N, with a whole number N from 1 to {}", kMostCoverSpheres);
@@ -259,14 +259,14 @@ void add_spheres(CLI::App& app) {
                 throw CLI::ValidationError("--count", fmt::format("'{}' is not {}", one, meaning));
           },
           "Number of spheres of each link, or with LINK=N of that link. Repeatable. With "
-          "--max-protrusion the largest number (default then 1024)")
+          "--max-protrusion the maximum (default 1024)")
       ->type_name("[LINK=]N")
       ->expected(1)
       ->take_all();
   CLI::Option* const total =
       add_whole<std::size_t>(command, "--total", options->cover.total,
-                             "Number of spheres of the whole robot, shared such that the largest "
-                             "protrusion is small. Default: 8 times the links; a mesh gets 64",
+                             "Number of spheres of the whole robot, shared to keep the largest "
+                             "protrusion small. Default: 8 per link; 64 for a mesh",
                              1, 1'000'000);
   total->default_str("");
   CLI::Option* const most =

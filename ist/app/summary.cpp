@@ -182,7 +182,7 @@ void add_summary(CLI::App& app) {
   command->add_flag("--failed", options->failed, "Show only assets that failed or were not baked");
   command->add_flag("--json", options->json, "Print JSON");
   command->add_option("--html", options->page,
-                      "Write a page for browsers instead: a picture and the numbers of each asset");
+                      "Write an HTML page instead, with a picture and the numbers of each asset");
   command->footer(
       "Exits 1 if an asset failed, or if a shard is missing, given twice or of another library.\n"
       "Example: ist summary shard-1.json shard-2.json\n"

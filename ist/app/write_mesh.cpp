@@ -83,7 +83,7 @@ void write_mesh(const TriangleMesh& mesh, const std::string& path) {
   if (ending == ".off") return write_atomically(path, off(mesh));
   if (ending == ".ply") return write_atomically(path, ply(mesh));
   if (ending == ".stl") return write_atomically(path, stl(mesh));
-  throw Error(path + ": no mesh format is called '" + ending + "'; use .obj, .ply, .off or .stl");
+  throw Error(path + ": unknown mesh format '" + ending + "'; use .obj, .ply, .off or .stl");
 }
 
 }  // namespace ist::app

@@ -1,7 +1,7 @@
 """Types of package ist. Shapes, units and frames: docs/python.md, and help() of every name.
 
-[u] is the meshes' own unit; poses are rows qw, qx, qy, qz, tx, ty, tz. Of a single pose, columns have
-no leading n: numbers and (3,) arrays.
+[u] is the meshes' own unit; poses are rows qw, qx, qy, qz, tx, ty, tz. For a single pose, columns
+have no leading n: numbers and (3,) arrays.
 """
 
 import enum

@@ -10,8 +10,8 @@ def poses(rotations, translations=None, *, order=None):
     rotations: one of
         (4, 4) or (n, 4, 4): x_world = M (x, 1), without `translations`;
         (3, 3) or (n, 3, 3): rotation matrices;
-        (4,) or (n, 4): quaternions, with `order`: "wxyz", or "xyzw" as SciPy, ROS and three.js have
-        them. Of any length but 0: they are normalised.
+        (4,) or (n, 4): quaternions, with `order`: "wxyz", or "xyzw" as in SciPy, ROS and three.js.
+        Any non-zero length: they are normalised.
     translations: (3,) or (n, 3) [u]; None: zero.
 
     Returns (7,) or (n, 7) float64. NaN stays NaN: a query answers such a row with a status. Raises

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def text_of(answer):
-    """All numbers of one answer; of many rows how many have which status."""
+    """All numbers of one answer; for many rows the count of each status."""
     name = type(answer).__name__
     columns = {key: getattr(answer, key) for key in vars(type(answer)) if not key.startswith("_")}
     status = np.asarray(answer.status)

@@ -25,8 +25,8 @@ def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: jax.A
         length but 0: q/|q| is used, and the gradient is that of V(q/|q|).
     pairs: (n, 2) numbers of solids, one of each an Asset; None: all pairs of Assets, and each
         Field with each Asset.
-    scales: (k,) or (w, k) > 0; None: 1. Their gradient is the difference of two queries, exact to some
-        1e-4, and takes three times as long.
+    scales: (k,) or (w, k) > 0; None: 1. Their gradient is a difference of two queries: accurate to
+        2e-4, at three times the cost.
     settings: measure, field, pair_budget, threads, … of ist.penetration.
 
     Returns an array (n,) or (w, n) of the dtype of `poses`. Pairs with an invalid pose or scale,

@@ -28,9 +28,8 @@ def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: torch
         On a GPU the volumes and gradients are computed there, and the host does not wait.
     pairs: (n, 2) numbers of solids, one of each an Asset; None: all pairs of Assets, and each
         Field with each Asset.
-    scales: (k,) or (w, k) > 0, where the poses are; None: 1. Their gradient is the difference of two
-        queries, 0.05 % of the scale to either side, exact to some 1e-4, and takes three times as
-        long.
+    scales: (k,) or (w, k) > 0, where the poses are; None: 1. Their gradient is a difference of two
+        queries, 0.05 % of the scale to either side: accurate to 2e-4, at three times the cost.
     settings: measure, field, pair_budget, threads, … of ist.penetration. If a limit stops a query, the
         gradient lacks the estimated part. With measure="exact" volumes and gradients are the true
         ones. A GPU takes measure ("matched", "inner") and pair_budget. It gives the CPU's answers for
@@ -39,8 +38,8 @@ def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: torch
     Returns a tensor (n,) or (w, n) of the dtype and the device of `poses`. Pairs with an invalid pose
     or scale, or with a solid that lacks what the measure needs, are NaN, and so are their gradients;
     other pairs are not affected. Differentiable once.
-    Sums of spheres have a noise of 5e-9 of the volume: torch.autograd.gradcheck needs eps=1e-4,
-    atol=5e-3, rtol=2e-3, and by measure="exact" eps=1e-5, atol=1e-6, rtol=1e-5.
+    Sphere sums have a noise of 5e-9 of the volume: torch.autograd.gradcheck needs eps=1e-4,
+    atol=5e-3, rtol=2e-3; with measure="exact" eps=1e-5, atol=1e-6, rtol=1e-5.
 
     The last eight lists of solids and pairs stay on the GPU; later changes of a Field's arrays have no
     effect there. An ist.Solids is uploaded once.

@@ -227,7 +227,7 @@ bool read_number(const mjModel* m, int i, const char* key, double& value) {
   char* end = nullptr;
   value = std::strtod(text, &end);
   if (end != text && *end == 0 && std::isfinite(value) && value >= 0) return true;
-  mju_warning("ist.solid: %s=\"%s\" is no number ≥ 0", key, text);
+  mju_warning("ist.solid: %s=\"%s\" is not a number ≥ 0", key, text);
   return false;
 }
 

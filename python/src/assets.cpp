@@ -226,9 +226,9 @@ void add_bakes(py::module_& module) {
       },
       py::arg("mesh"), py::kw_only(), py::arg("surface") = "all", py::arg("scale") = 1.0,
       py::arg("threads") = 0, py::arg("progress") = py::none(),
-      "Bakes the asset of a surface alone: the mesh, mass and bounds, without spheres, for exact "
+      "Bakes a surface-only asset: the mesh, mass and bounds, without spheres, for exact "
       "queries.\n\nQueries that need spheres return QueryStatus.not_held. The settings are those "
-      "of bake().\nRaises Error if parts of the mesh overlap.");
+      "of bake().\nRaises Error if parts of the mesh overlap and cannot be resolved.");
   module.def(
       "check",
       [](const SharedAsset& asset, const py::object& given, const py::object& scale,
@@ -258,7 +258,7 @@ void add_assets(py::module_& module) {
             return offline(
                 [name = path_of(path)](const ProgressCallback&) { return Asset::load(name); });
           },
-          py::arg("path"), "Reads an .ist file. Raises Error (file, what is wrong, way out).")
+          py::arg("path"), "Reads an .ist file. Raises Error (file, what is wrong, remedy).")
       .def_static("from_bytes", &asset_of_bytes, py::arg("data"), py::arg("name") = "asset",
                   "Copies the bytes of an .ist file.\n\ndata: bytes, or any contiguous buffer.\n"
                   "name: used in messages. Raises Error if a check of the bytes fails.")
@@ -298,8 +298,8 @@ void add_assets(py::module_& module) {
       .def("surface", &surface_of,
            "The surface that queries of spheres use, or the mesh of a surface alone: (n, 3) "
            "float64 vertices [u] in the mesh's own "
-           "frame, and (m, 3) uint32 triangles, counter-clockwise from outside. A vertex may stand "
-           "in several rows. Raises Error if the asset holds none.")
+           "frame, and (m, 3) uint32 triangles, counter-clockwise from outside. A vertex may "
+           "appear in several rows. Raises Error without a surface.")
       .def("spheres", &spheres_of, py::arg("which") = "matched",
            "(n, 4) float64: centre and radius [u], in the mesh's own frame; a copy.\n\n"
            "which: 'matched' or 'inner'.")

@@ -278,8 +278,8 @@ void add_device_array(py::module_& module) {
       module, "Array",
       "An array in device memory that any framework takes without a copy: torch.from_dlpack(x), "
       "cupy.from_dlpack(x), jax.dlpack.from_dlpack(x), or by __cuda_array_interface__.\n\n"
-      "The memory stays as long as anybody holds it. Whoever takes it waits, on its stream and not "
-      "on the host, until it is written.")
+      "The memory lives as long as a reference to it. A consumer's stream, not the host, waits "
+      "until it is written.")
       .def_prop_ro(
           "shape", [](const DeviceArray& self) { return py::tuple(py::cast(self.shape)); },
           "(n,) or (n, 3)")
@@ -295,8 +295,8 @@ void add_device_array(py::module_& module) {
       .def("__dlpack__", &to_dlpack, py::kw_only(), py::arg("stream") = py::none(),
            py::arg("max_version") = py::none(), py::arg("dl_device") = py::none(),
            py::arg("copy") = py::none(),
-           "A capsule of DLPack 1.0, or 0.x without `max_version`. stream: that will read it; "
-           "-1: reads wait otherwise.")
+           "A capsule of DLPack 1.0, or 0.x without `max_version`. stream: the reading stream; "
+           "-1: no synchronisation here.")
       .def("__dlpack_device__",
            [](const DeviceArray& self) {
              return py::make_tuple(py::device::cuda::value, self.block->device());

@@ -86,10 +86,9 @@ TreeView tree_of(const py::handle& object, const char* name) {
 }
 
 void add_fields(py::module_& module) {
-  py::class_<OwnedField>(
-      module, "Field",
-      "A shape that needs no asset: one of the two solids of a query, the other is an "
-      "Asset. Lengths are [u] in the field's own frame.")
+  py::class_<OwnedField>(module, "Field",
+                         "A shape that needs no asset: one of the two solids of a query; the other "
+                         "is an Asset. Lengths are [u] in the field's own frame.")
       .def("__repr__",
            [](const py::object& self) {
              return "ist." + type_name_of(self) + "(" +
@@ -137,8 +136,8 @@ void add_fields(py::module_& module) {
            }),
            py::arg("radius"), py::arg("half_height"), "radius, half_height: [u] > 0.");
   add_kind<HeightField>(module, "HeightField",
-                        "Terrain: the solid under a grid of heights along z. Beyond the border the "
-                        "nearest height holds.")
+                        "Terrain: the solid under a grid of heights along z. It continues level "
+                        "beyond its border.")
       .def(
           py::new_([](const py::object& heights, const py::object& spacing, double lowest,
                       double highest) {

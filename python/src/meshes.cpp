@@ -204,7 +204,7 @@ void add_meshes(py::module_& module) {
 path: str or os.PathLike.
 weld_tolerance: [0, 0.1]; vertices closer than this share of the bounding box's diagonal are merged.
 
-Raises Error, which names the file, the place and a way out.)");
+Raises Error, which names the file, the place and the remedy.)");
   module.def(
       "close_mesh",
       [](const py::object& mesh, const std::string& name, bool repair, const py::object& scale) {
@@ -217,7 +217,7 @@ Raises Error, which names the file, the place and a way out.)");
       py::arg("scale") = 1.0,
       R"(Validates a mesh and orients its shells.
 
-mesh: a Mesh, or what bake() makes one of.
+mesh: a Mesh, or anything that bake() accepts.
 name: for messages.
 repair: close an open mesh (weld cracks, fill holes) instead of refusing it; see ClosedMesh.report.
 scale: factor of all coordinates, or (3,) of each axis; negative ones mirror. 0 and NaN raise Error.
@@ -225,8 +225,8 @@ scale: factor of all coordinates, or (3,) of each axis; negative ones mirror. 0 
 Raises OpenMeshError for an open mesh, Error for one that is flat, empty, not finite or
 non-orientable.)");
   module.def("from_trimesh", &mesh_of, py::arg("mesh"),
-             "A Mesh of any object with `vertices` and `faces` (or `triangles`), as trimesh's and "
-             "Open3D's; a copy.");
+             "A Mesh of any object with `vertices` and `faces` (or `triangles`), such as "
+             "trimesh's; a copy.");
   module.def(
       "sample_mesh", [](const std::string& name) { return make_sample(name); }, py::arg("name"),
       "A generated closed mesh: 'bolt', 'nut', 'gear', 'cube', …\n\nAn unknown name raises Error, "

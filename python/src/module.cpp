@@ -64,7 +64,7 @@ NB_MODULE(_core, module) {
   py::set_leak_warnings(false);  // what is alive at the end is the system's to free
   const py::exception<ist::Error> error(module, "Error", PyExc_RuntimeError);
   error.attr("__doc__") =
-      "An error of the library. The message names the file, the place and a way out.";
+      "An error of the library. The message names the file, the place and the remedy.";
   py::exception<ist::OpenMeshError>(module, "OpenMeshError", error.ptr()).attr("__doc__") =
       "A mesh is not closed, and repair was not requested or failed.";
   module.attr("__version__") = IST_VERSION_STRING;

@@ -81,7 +81,7 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
 constexpr const char* kDoc =
     R"(Volume, wrench and centroid of the overlap, for one pose or many.
 
-a, b: Assets, or an Asset and a Field; of unlike rows solids[indices] of an ist.Solids.
+a, b: Assets, or an Asset and a Field; for rows of different solids, solids[indices].
 poses: of B, (7,) or (n, 7): qw, qx, qy, qz, tx [u], ty, tz, or matrices (4, 4) or (n, 4, 4).
     Quaternions of any length but 0 are normalised. A C-ordered float64 array of rows is not copied.
     ist.poses() makes rows of other conventions.
@@ -98,9 +98,9 @@ relative_error: accepted relative error of the volume, such as 0.005 for 0.5 %, 
     error is smaller, blended smoothly. Over random poses about 19 of 20 errors are smaller, half are
     below a third. 0: all spheres. Status error_exceeded: the predicted error is larger, since an
     Asset has no mesh or a simplified one, a pair_budget is set, or copies of an Asset coincide.
-pair_id: a number of yours for this pair of solids, 0: none. Calls with the same number, and their
-    rows, are steps of one motion: 'exact' keeps the triangles that are near each other from step to
-    step, and gives the same answers sooner.
+pair_id: your id of this pair of solids, 0: none. Calls with the same id, and their rows, are steps
+    of one motion: 'exact' keeps nearby triangles from step to step and returns the same answers
+    faster.
 threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 
 Rows that cannot be answered are NaN with a status and do not affect others. invalid_input: NaN, a
@@ -108,8 +108,8 @@ quaternion of length 0, a scale ≤ 0. not_held: a solid lacks what the measure 
 both are Fields. For one pose ValueError or ist.Error is raised instead.
 Ctrl-C raises KeyboardInterrupt.
 
-Solids on a GPU, ist.Solids(…, device='cuda'): the same call gives the same answers there, and what a
-GPU cannot answer raises. It takes the measures 'matched' and 'inner', and of the limits pair_budget.
+Solids on a GPU, ist.Solids(…, device='cuda'): the same call gives the same answers there;
+unsupported arguments raise. A GPU takes the measures 'matched' and 'inner', and pair_budget.
 Two Assets are summed as with field='never': where spheres are too coarse for a contact, the CPU's
 'automatic' differs. Volumes are within 1e-6 of the sum in double, and of an Asset and a Field within
 1e-9 of the CPU's. The bits are the same in every run, whatever else is in the batch.
@@ -133,7 +133,7 @@ void add_class(py::module_& module) {
   add_column(type, "volume", &Penetrations::volume, "(n,) [u³] of the overlap.");
   add_column(type, "volume_min", &Penetrations::volume_min,
              "(n,) [u³] With measure='exact' a lower bound of the true volume. With spheres the "
-             "lower end of the interval of the finished sum; it says nothing of the true volume.");
+             "lower end of the interval of the finished sum; no bound of the true volume.");
   add_column(type, "volume_max", &Penetrations::volume_max, "(n,) [u³] the upper end, likewise.");
   add_column(type, "centroid", &Penetrations::centroid,
              "(n, 3) [u] of the overlap, world; zero if none.");

@@ -113,7 +113,7 @@ void add_pictures(py::module_& module) {
 
 a, b: Assets. pose, scale: of B. pose_a, scale_a: of A; None: at the origin.
 measure: 'matched' or 'inner'. detail_a, detail_b: levels of detail of the matched spheres, 0 the
-    finest; `sphere_a` and `sphere_b` are then numbers among that level's.
+    finest; `sphere_a` and `sphere_b` then index that level's spheres.
 
 Returns Lenses: an ellipsoid of the radius and the thickness about the centre resembles each.)");
 
@@ -127,14 +127,14 @@ Returns Lenses: an ellipsoid of the radius and the thickness about the centre re
       py::arg("whole"), py::arg("a"), py::arg("b"), py::arg("poses").none(), py::kw_only(),
       py::arg("scales") = py::none(), py::arg("poses_a") = py::none(),
       py::arg("scales_a") = py::none(),
-      R"(Removes from an answer what protruding spheres add where flat faces meet.
+      R"(Removes the volume that protruding spheres add where flat faces meet.
 
 whole: the answer of penetration() at these poses by lenses, field='never', in the matched measure
     without a pair budget.
 
 The result is zero across a gap of a fifth of a mean sphere radius or more. Between this gap and a
-depth of a fifth of that radius, volume and force are reduced. Round and deeper contacts are unchanged.
-The force is the volume's gradient to within 15 %: use it for contacts, not where energy must be
+depth of a fifth of that radius, the volume is reduced and the force scaled with it. Round and
+deeper contacts are unchanged. The force is the volume's gradient to within 15 %: use it for contacts, not where energy must be
 conserved.
 
 Returns a Penetration.)");
@@ -148,8 +148,8 @@ Returns a Penetration.)");
       .def_ro("a_is_coarser", &PairFit::a_is_coarser, "Or both are equal.")
       .def_ro("has_surface", &PairFit::has_surface, "Whether the coarser asset holds its surface.")
       .def_ro("needs_surface", &PairFit::needs_surface,
-              "Whether volumes and forces by the spheres of both alone mislead.")
-      .def_prop_ro("fits", &PairFit::fits, "has_surface, or no need of it.");
+              "Whether volumes and forces by spheres alone are misleading.")
+      .def_prop_ro("fits", &PairFit::fits, "has_surface, or not needs_surface.");
   module.def("pair_fit", &fit_of, py::arg("a"), py::arg("b"), py::kw_only(), py::arg("scale") = 1.0,
              py::arg("scale_a") = 1.0,
              "Whether the sizes of two Assets suit each other, whatever their poses: a PairFit.\n\n"

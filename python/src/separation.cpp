@@ -151,7 +151,7 @@ Arguments as for penetration(). The patches sum to the whole contact. max_patche
 on the CPU any number.
 
 Solids on a GPU: of two Assets, 1 to 32 patches, without limits; a row of a Field is not_held. Beyond
-count[i] a pair's patches are zero, or with `out` as they were.
+count[i] a pair's patches are zero, or unchanged with `out`.
 
 Returns ContactPatches: arrays of shape (n, max_patches), or (max_patches,) for one pose.)";
 
@@ -213,7 +213,7 @@ void add_classes(py::module_& module) {
              "(n, m, 3) [u] world: the point of the wrench's central axis that is nearest to the "
              "centroid.");
   add_column(patch, "twist", &Patches::twist,
-             "(n, m) [u³] moment about the normal that a force at the point lacks.");
+             "(n, m) [u³] residual moment about the normal of a force at `point`.");
   add_pickling(patch);
 
   py::class_<Outline> outline(module, "OverlapOutline", "Contact patches and their outlines.");

@@ -81,16 +81,15 @@ Returns RayHits: arrays of one row a ray, or numbers and (3,) arrays for one ray
 
 constexpr const char* kClosestPointDoc = R"(Signed distance, nearest point and gradient.
 
-solid, pose: as raycast() has them; any Field. points: (3,) or (n, 3) [u], world.
+solid, pose: as for raycast(); any Field. points: (3,) or (n, 3) [u], world.
 
 Returns SurfacePoints: arrays of one row a point, or numbers and (3,) arrays for one point.)";
 
 constexpr const char* kContainsDoc = R"(Whether points are inside a solid.
 
-Arguments as closest_point() has them.
+Arguments as for closest_point().
 
-Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown: no usable point; a number for one
-point.)";
+Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown: invalid point; a number for one point.)";
 
 }  // namespace
 
@@ -110,7 +109,7 @@ void add_surfaces(py::module_& module) {
   add_column(points, "point", &SurfacePoints::point, "(n, 3) [u] on the surface, world.");
   add_column(points, "gradient", &SurfacePoints::gradient,
              "(n, 3) of the distance by the point: unit, outward, world.");
-  add_column(points, "triangle", &SurfacePoints::triangle, "(n,) uint32, as RayHits has it.");
+  add_column(points, "triangle", &SurfacePoints::triangle, "(n,) uint32, as in RayHits.");
   add_column(points, "status", &SurfacePoints::status, "(n,) uint32, a QueryStatus.");
   add_pickling(points);
 

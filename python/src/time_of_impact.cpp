@@ -24,7 +24,7 @@ B rotates at constant speed about one axis, the shorter way. A rests at `poses_a
 poses, poses_to: (7,) or (n, 7), as for penetration().
 about, about_a: (3,) [u] in the object's own frame, before its scale: its centre of mass for a free
     body.
-duration: [T] > 0. tolerance: [u]; 0: a thousandth of the smaller solid.
+duration: [T] > 0. tolerance: [u]; 0: a thousandth of the smaller bounding radius.
 max_visits: 0: no limit.
 
 Returns a TimeOfImpact: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";

@@ -156,7 +156,7 @@ TEST_F(QueryCommand, AnErrorIsAcceptedAsAShare) {
   EXPECT_EQ(volume({"--error", "0.005"}), exact);
   EXPECT_EQ(volume({"--error", "0"}), volume({}));
   const Outcome shown = ist({"query", "cube.ist", "cube.ist", "--pose", pose, "--error", "0.5%"});
-  EXPECT_NE(shown.out.find("accepted, and less is predicted"), std::string::npos) << shown.out;
+  EXPECT_NE(shown.out.find("accepted; predicted error is smaller"), std::string::npos) << shown.out;
 
   // Without a mesh nothing is exact enough, and that is said.
   ASSERT_EQ(
@@ -166,7 +166,7 @@ TEST_F(QueryCommand, AnErrorIsAcceptedAsAShare) {
   ASSERT_EQ(all.size(), 1u);
   EXPECT_NE(all[0].find(",error_exceeded,"), std::string::npos) << all[0];
   const Outcome more = ist({"query", "bare.ist", "cube.ist", "--pose", pose, "--error", "0.5%"});
-  EXPECT_NE(more.out.find("accepted, but more is predicted"), std::string::npos) << more.out;
+  EXPECT_NE(more.out.find("accepted; predicted error is larger"), std::string::npos) << more.out;
 
   for (const char* const text : {"-1%", "1", "100%", "nan", "half", "5 %"})
     expect_exit(2, {"cube.ist", "cube.ist", "--pose", pose, "--error", text}, "--error");

@@ -28,7 +28,7 @@ export function init(options?: InitOptions): Promise<void>;
 /** Version of the library, `0.1.0`. */
 export function version(): string;
 
-/** Why something could not be done. */
+/** An error of this package. */
 export class IstError extends Error {
   /** ist_status_t of <ist/ist.h>, < 0; 0 if the module itself refuses. */
   readonly status: number;
@@ -41,7 +41,7 @@ export type Vector = ArrayLike<number>;
 
 /** x_world = R(rotation) (scale · x) + translation. Omitted members are the identity's. */
 export interface Pose {
-  /** Quaternion w, x, y, z, of any length but 0: it is normalised. (three.js has x, y, z, w.) */
+  /** Quaternion w, x, y, z, not 0; it is normalised. (three.js has x, y, z, w.) */
   rotation?: ArrayLike<number>;
   /** [u] */
   translation?: Vector;
@@ -167,7 +167,7 @@ export class Asset {
 
 /** A shape, as one of the two solids of a query. Make it once and use it often. */
 export class Field {
-  /** normal · x ≤ offset. `normal`: outward, of any length but 0, by which offset is divided too. */
+  /** normal · x ≤ offset. `normal`: outward, not 0; its length divides `offset` too. */
   static halfSpace(normal: Vector, offset?: number): Field;
   /** Around the origin. */
   static box(halfExtents: Vector): Field;
@@ -187,8 +187,8 @@ export class Field {
     spacing: ArrayLike<number>,
   ): Field;
   /**
-   * Distances, positive inside, at the points of a grid, copied: x runs fastest. Outside of the grid
-   * is outside of the solid.
+   * Distances, positive inside, at the points of a grid, copied: x runs fastest. Points outside
+   * the grid are outside the solid.
    */
   static distanceGrid(
     distances: Float32Array,
@@ -218,7 +218,7 @@ export interface Limits {
 export interface ContactOptions extends Limits {
   /** Pose of A. Default: the identity. */
   poseA?: Pose;
-  /** Default `matched`. Of the limits `exact` obeys maxVisits only. */
+  /** Default `matched`. `exact` obeys only the limit maxVisits. */
   measure?: Measure;
   /**
    * Whether the stored surface of an asset is used: where spheres are too coarse for the contact
@@ -236,9 +236,8 @@ export interface ContactOptions extends Limits {
    */
   pairBudget?: number;
   /**
-   * A number of yours for this pair of solids, ≥ 1. Calls with the same number are steps of one motion:
-   * `exact` keeps the triangles that are near each other from call to call, and gives the same answer
-   * sooner.
+   * Your id of this pair of solids, ≥ 1. Calls with the same id are steps of one motion: `exact`
+   * keeps nearby triangles from call to call and returns the same answer faster.
    */
   pairId?: number;
 }
@@ -249,9 +248,9 @@ export interface PenetrationOptions extends ContactOptions {
 }
 
 /**
- * `budget-exhausted`: a limit or the workspace's capacity stopped it. volumeMin and volumeMax contain
- * the same value as those of a finished answer. `error-exceeded`: finished, but the predicted error is
- * larger than relativeError.
+ * `budget-exhausted`: a limit or the workspace's capacity stopped it. volumeMin and volumeMax
+ * still contain the finished sum (`exact`: the true volume). `error-exceeded`: finished, but the
+ * predicted error is larger than relativeError.
  */
 export type Status = 'ok' | 'budget-exhausted' | 'error-exceeded';
 
@@ -262,7 +261,7 @@ export interface Penetration {
   volume: number;
   /**
    * [u³] With `exact`: bounds of the true volume. By spheres: the interval of the finished sum, as
-   * wide as rounding and what a limit left out. It says nothing of the true volume.
+   * wide as rounding and the part that a limit left out. It does not bound the true volume.
    */
   volumeMin: number;
   volumeMax: number;
@@ -339,7 +338,7 @@ export interface ContactPatch {
   torque: Float64Array;
   /** [u] The point of the wrench's central axis that is nearest to the centroid. */
   point: Float64Array;
-  /** [u³/rad] Moment about the normal that a force at the point lacks. */
+  /** [u³/rad] Residual moment about the normal of a force at `point`. */
   twist: number;
 }
 
@@ -382,8 +381,8 @@ export interface OverlapOutline {
   /** Segments of the outline. 0 where maxVisits stopped it, as contact.whole.status says. */
   count: number;
   /**
-   * [u] six numbers a segment: x, y, z of where it begins and of where it ends, in the world. Segments
-   * form closed curves; A's surface inside B lies to the left of each, seen from outside A.
+   * [u] six numbers per segment: x, y, z of its start and of its end, in the world. Segments form
+   * closed curves; A's surface inside B lies to the left of each, seen from outside A.
    */
   segments: Float64Array;
   /** Number in contact.patches of the patch that each segment bounds. */
@@ -391,8 +390,8 @@ export interface OverlapOutline {
 }
 
 /**
- * The curves on which the meshes of two assets cross, by patch. A patch that lies inside the other
- * solid as a whole has none. Arrays given by `into` may be longer than the answer.
+ * The curves on which the meshes of two assets cross, by patch. A patch wholly inside the other
+ * solid has none. Arrays given by `into` may be longer than the answer.
  */
 export function overlapOutline(
   a: Asset,
@@ -439,17 +438,17 @@ export function lenses(a: Asset, b: Asset, poseB: Pose, options?: LensesOptions)
 
 // --- Rays and points against one solid --------------------------------------------------------------
 
-// An asset must keep its mesh (AssetInfo.meshTriangles > 0). Rows of three numbers, flat: one row is
-// one vector. A row that cannot be answered is NaN; alone it throws.
+// An asset must keep its mesh (AssetInfo.meshTriangles > 0). Flat arrays of three numbers per row.
+// A row that cannot be answered is NaN; a single row throws.
 
 /** Of each ray; arrays given by `into` may be longer than `count`. */
 export interface RayHits {
   count: number;
   /** [u] ≥ 0; Infinity: no hit. */
   distance: Float64Array;
-  /** [u] three numbers a ray, in the world; zero without a hit. */
+  /** [u] three numbers per ray, in the world; zero without a hit. */
   point: Float64Array;
-  /** Unit, outward, three numbers a ray. */
+  /** Unit, outward, three numbers per ray. */
   normal: Float64Array;
   /** Of the kept mesh, 2³² − 1: no hit, or a field. */
   triangle: Uint32Array;
@@ -476,11 +475,11 @@ export interface SurfacePoints {
   distance: Float64Array;
   /** [u] the solid's distance is within this of `distance`. */
   error: Float64Array;
-  /** [u] on the surface, three numbers a point, in the world. */
+  /** [u] on the surface, three numbers per point, in the world. */
   point: Float64Array;
-  /** Of the distance by the point: unit, outward, three numbers a point. */
+  /** Of the distance: unit, outward, three numbers per point. */
   gradient: Float64Array;
-  /** As RayHits has it. */
+  /** As in RayHits. */
   triangle: Uint32Array;
 }
 
@@ -506,7 +505,7 @@ export function contains(
 // --- Corrections and wrenches of contacts -----------------------------------------------------------
 
 /**
- * Removes from an answer what protruding spheres add where flat faces meet: the result is zero across
+ * Removes the volume that protruding spheres add where flat faces meet: the result is zero across
  * a gap of a fifth of a mean sphere radius. Round and deeper contacts are unchanged. Use it for
  * contacts, not where energy must be conserved: the force is the volume's gradient to within 15 %.
  *
@@ -522,7 +521,7 @@ export function withoutProtrusion(
 ): Penetration;
 
 /**
- * The same for patches, in place: each by its own depth. A patch of which nothing is left stays, with
+ * The same for patches, in place: each by its own depth. A patch reduced to nothing is kept, with
  * zeros. `found`, `options`: the answer and the options of contactPatches().
  */
 export function patchesWithoutProtrusion(
@@ -567,7 +566,7 @@ export interface PairFit {
   aIsCoarser: boolean;
   /** The coarser asset stores its surface. */
   hasSurface: boolean;
-  /** Volumes and forces by spheres alone mislead. */
+  /** Volumes and forces by spheres alone are misleading. */
   needsSurface: boolean;
   /** hasSurface, or not needsSurface. */
   fits: boolean;

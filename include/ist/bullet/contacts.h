@@ -30,14 +30,14 @@ struct Settings {
     wrench,  ///< push_in_every_tick() applies the force of `law`, Bullet sees no contact
   };
   Response response = Response::solver;
-  std::size_t patches = 8;  ///< [1, kPatches] a contact
+  std::size_t patches = 8;  ///< [1, kPatches] per contact
   /// `always` where flat faces meet. Assets without a surface (TreeView::has_field) use lenses.
   ContactSettings query{.field = FieldUse::always};
 
   /// law.stiffness [force/u³] is the pressure over depth, for both responses. The solver steps the
   /// springs implicitly, so any stiffness is stable; it uses nothing else of the law. For the
-  /// wrench the step limits the stiffness. With law.area every wrench is one patch. Friction is
-  /// Bullet's, of the two bodies.
+  /// wrench the step limits the stiffness. With law.area every wrench is one patch. Friction uses
+  /// Bullet's coefficients.
   ///
   /// Stiffness 0: that of the two shapes (Shape::stiffness, two in series), or else by `depth`.
   ContactLaw law;
@@ -45,10 +45,10 @@ struct Settings {
   /// a face of the smaller asset's size. It is a share of that size, the cube root of the volume.
   /// Beyond this depth the pressure grows with the square of the depth: at ten times the depth a
   /// contact bears a hundred times the weight. A body without gravity is held as stiffly as a step
-  /// resolves.
+  /// allows.
   ///
   /// Matched spheres blur flat faces. With a larger depth bodies rest nearer to their true height;
-  /// with a smaller depth a higher stack stands.
+  /// a smaller depth lets higher stacks stand.
   double depth = 0.001;
   /// [u] How far behind the front of its triangles a triangle mesh is solid. 0: the asset's size,
   /// as above. A body that is deeper is behind the mesh and free.
@@ -58,8 +58,8 @@ struct Settings {
   double damping = 1;
   /// Solver only: two objects are queried again once a point of one has moved relative to the other
   /// by more than this share of the depth at which the lighter body rests. Until then their patches
-  /// move along: the motion changes their depths, and their areas stay. A contact that begins may
-  /// be found later by this motion. 0: queried in every step.
+  /// move along: the motion changes their depths, and their areas stay. A new contact may be found
+  /// late by this motion. 0: queried in every step.
   double follow = 0.05;
 };
 
@@ -69,7 +69,7 @@ struct Contact {
   Penetration whole;                                 ///< the contact as one
   std::size_t count = 0;
   std::array<ContactPatch, Settings::kPatches> patches;
-  /// [u] Of objects that do not touch: they stay apart while no point moves by more than this.
+  /// [u] Of separate objects: they stay apart while no point moves by more than this.
   double clearance = 0;
 };
 

@@ -8,8 +8,8 @@
 
 namespace ist::bullet {
 
-/// Bullet's body frame of a baked solid: at its centre of mass, along principal axes. These are the
-/// axes of the asset's frame, where those are principal.
+/// Bullet's body frame of a baked solid: at its centre of mass, along principal axes: the asset's
+/// own axes if those are principal.
 struct BodyFrame {
   Eigen::Isometry3d in_mesh = Eigen::Isometry3d::Identity();  ///< body's frame to mesh's
   Eigen::Vector3d unit_inertia = Eigen::Vector3d::Zero();  ///< [u²] about its axes, of a mass of 1
@@ -62,7 +62,7 @@ class Shape : public btConcaveShape {
 /// it. Called on any thread that makes pairs. The default writes to stderr.
 using WarningHandler = void (*)(const char* sentence);
 
-/// Replaces the handler; null: the default. Returns the one before.
+/// Replaces the handler; null: the default. Returns the previous one.
 WarningHandler set_warning_handler(WarningHandler handler);
 
 /// Passes a sentence to the handler, unless the same sentence was passed before.

@@ -23,7 +23,7 @@ def main(arguments=None):
     parser.add_argument("--patches", type=int, help="contacts of a pair, at most, 1 to 50")
     parser.add_argument("--measure", choices=("matched", "inner", "exact"))
     parser.add_argument("--cache", help="folder of baked assets (default: ~/.cache/ist)")
-    parser.add_argument("--film", metavar="OUT.glb", help="write the motion, 30 pictures a second")
+    parser.add_argument("--film", metavar="OUT.glb", help="write the motion, 30 frames a second")
     parser.add_argument("--json", action="store_true", help="report as JSON on stdout")
     options = parser.parse_args(arguments)
     try:
