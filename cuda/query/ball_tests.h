@@ -2,11 +2,11 @@
 
 #include <cstdint>
 
-#include "cuda/query/bits.h"
 #include "cuda/query/field_walk.h"
 #include "cuda/query/met_balls.h"
 #include "cuda/query/part_sums.h"
 #include "cuda/query/seen_triangles.h"
+#include "numerics/bits.h"
 #include "numerics/host_device.h"
 
 // Balls of leaf blocks tested against triangles, by one team. Those that no triangle meets are
@@ -137,7 +137,7 @@ class BallTests {
   IST_HD void test() {
     tests_ = false;
     double x[kItemsALane][3], r[kItemsALane];
-    PartInside part[kItemsALane] = {};
+    BallPart part[kItemsALane] = {};
     bool settled[kItemsALane];
     std::uint32_t touched = 0, odd = 0;
     for (int i = 0; i < kItemsALane; ++i) {
@@ -227,7 +227,7 @@ class BallTests {
     m_.held_as[of_item] = static_cast<std::uint8_t>(place);
   }
 
-  IST_HD void add_settled(const double (&x)[3], const PartInside& part) {
+  IST_HD void add_settled(const double (&x)[3], const BallPart& part) {
     if (!(part.volume > 0)) return;
     const double* const t = probe_.place.a_from_b.t;
     const double at[3] = {x[0] - t[0], x[1] - t[1], x[2] - t[2]};

@@ -1,9 +1,9 @@
 #include "cuda/check.h"
 #include "cuda/launch.h"
-#include "cuda/query/batch_kernels.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/by_warps.h"
 #include "cuda/query/detail_sums.h"
+#include "cuda/query/kernels.h"
 #include "cuda/warp_team.h"
 
 namespace ist::gpu {
@@ -110,12 +110,12 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchAr
 
 }  // namespace
 
-BatchGrids batch_grids() {
-  return {blocks_at_a_time(sum_pairs, kThreads),
-          blocks_at_a_time(sum_detailed_pairs, 32 * kDetailWarps)};
+void find_batch_grids(Grids& grids) {
+  grids.sum = blocks_at_a_time(sum_pairs, kThreads);
+  grids.details = blocks_at_a_time(sum_detailed_pairs, 32 * kDetailWarps);
 }
 
-void launch_batch(const BatchArrays& batch, const BatchGrids& grids, cudaStream_t stream) {
+void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, sizeof(BatchCounters), stream), "starting a batch");
   sift_pairs<<<blocks_for(batch.pairs.count, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
   check_launch("placing pairs of trees");

@@ -4,60 +4,16 @@
 #include <cstdint>
 
 #include "cuda/atomics.h"
+#include "cuda/query/answers.h"
 #include "cuda/query/batch_arrays.h"
-#include "cuda/query/coincidence.h"
-#include "cuda/query/split_room.h"
-#include "cuda/query/world_sums.h"
 #include "numerics/host_device.h"
+#include "query/detail/coincidence.h"
 
 // A batch of pairs of trees, step by step: what a kernel's threads and warps do, and a test's
 // threads on the host. An answer depends on its pair and on how finely the batch is cut up
 // (BatchArrays::cut_for()) alone: neither on the others nor on who sums what.
 
 namespace ist::gpu {
-
-IST_HD inline void write3(double* to, std::uint32_t i, double x, double y, double z) {
-  if (to == nullptr) return;
-  to[3 * std::uint64_t{i}] = x;
-  to[3 * std::uint64_t{i} + 1] = y;
-  to[3 * std::uint64_t{i} + 2] = z;
-}
-
-/// Nothing met: zero. Invalid: every number is NaN, as on the CPU (query/base/no_answer.h).
-IST_HD inline double nothing(QueryStatus status) {
-  return status == QueryStatus::ok ? 0 : static_cast<double>(NAN);
-}
-
-IST_HD inline void write_nothing(const GpuPenetrations& to, std::uint32_t i, QueryStatus status) {
-  const double none = nothing(status);
-  if (to.volume != nullptr) to.volume[i] = none;
-  write3(to.centroid, i, none, none, none);
-  write3(to.translation_gradient, i, none, none, none);
-  write3(to.rotation_gradient, i, none, none, none);
-  write3(to.force, i, none, none, none);
-  write3(to.torque, i, none, none, none);
-  if (to.status != nullptr) to.status[i] = status;
-  if (to.node_visits != nullptr) to.node_visits[i] = 0;
-  if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = 0;
-}
-
-IST_HD inline WorldSums world_sums(const PairPlace& place, const LensTotals& totals) {
-  // Where nothing met there is nothing to turn.
-  return totals.spheres > 0 ? WorldSums::of(place, totals.term) : WorldSums{};
-}
-
-IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, const WorldSums& sums,
-                                const LensTotals& totals) {
-  if (to.volume != nullptr) to.volume[i] = sums.volume;
-  write3(to.centroid, i, sums.centre[0], sums.centre[1], sums.centre[2]);
-  write3(to.translation_gradient, i, sums.push[0], sums.push[1], sums.push[2]);
-  write3(to.rotation_gradient, i, sums.turn[0], sums.turn[1], sums.turn[2]);
-  write3(to.force, i, -sums.push[0], -sums.push[1], -sums.push[2]);
-  write3(to.torque, i, -sums.turn[0], -sums.turn[1], -sums.turn[2]);
-  if (to.status != nullptr) to.status[i] = QueryStatus::ok;
-  if (to.node_visits != nullptr) to.node_visits[i] = totals.visits;
-  if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = totals.spheres;
-}
 
 IST_HD inline Pose pose_of(const GpuPlacedSolids& side, std::uint32_t i) {
   return side.pose != nullptr ? side.pose[i] : Pose{{1, 0, 0, 0}, {0, 0, 0}};
@@ -112,7 +68,7 @@ IST_HD inline QueryStatus place_trees(const SolidPairs& batch, std::uint32_t i, 
 
 /// How many pairs of children of two roots meet, to rounding; no more than `most` are counted.
 IST_HD inline std::uint32_t children_that_meet(const TreeRef& a, const TreeRef& b,
-                                               const PairMap& map, std::uint32_t most) {
+                                               const Similarity& map, std::uint32_t most) {
   const BallBlock& of_a = in_global_memory(a.blocks[a.top])[0];
   const BallBlock& of_b = in_global_memory(b.blocks[b.top])[0];
   const Origin& from_a = a.origins[a.top][0];
@@ -122,11 +78,8 @@ IST_HD inline std::uint32_t children_that_meet(const TreeRef& a, const TreeRef& 
   IST_ROLLED
   for (std::uint32_t j = 0; j < kWidth && meet < most; ++j) {
     if (!(of_b.r[j] > 0)) continue;
-    const double centre[3] = {from_b.x + static_cast<double>(of_b.x[j]),
-                              from_b.y + static_cast<double>(of_b.y[j]),
-                              from_b.z + static_cast<double>(of_b.z[j])};
     double moved[3];
-    map.apply(centre, moved);
+    map.apply_fused(lane_ball(of_b, from_b, j).centre, moved);
     const auto x = static_cast<float>(moved[0] - from_a.x);
     const auto y = static_cast<float>(moved[1] - from_a.y);
     const auto z = static_cast<float>(moved[2] - from_a.z);
@@ -146,7 +99,7 @@ IST_HD inline std::uint32_t children_that_meet(const TreeRef& a, const TreeRef& 
 IST_HD inline double root_distance2(const TreeRef& a, const TreeRef& b, const PairPlace& place) {
   const double centre[3] = {b.root[0], b.root[1], b.root[2]};
   double moved[3], d2 = 0;
-  place.a_from_b.apply(centre, moved);
+  place.a_from_b.apply_fused(centre, moved);
   for (int k = 0; k < 3; ++k) d2 += (moved[k] - a.root[k]) * (moved[k] - a.root[k]);
   return d2;
 }
@@ -200,7 +153,7 @@ IST_HD inline bool needs_details(const BatchArrays& batch, std::uint32_t i,
     return root_distance2(a.tree[0], b.tree[0], place) < reach * reach;
   }
   return a.details.first_alike == b.details.first_alike &&
-         Coincidence(a.tree[0].root, a.details.mean_radius, place.a_from_b).weight > 0;
+         coincidence_weight(a.tree[0].root, a.details.mean_radius, place.a_from_b).weight > 0;
 }
 
 enum class PairUse { answered, summed, detailed };
@@ -259,6 +212,50 @@ IST_HD inline int task_floor(const PairMemory& memory, int waiting) {
   while (waiting > 0 && weight < memory.task_weight && top - waiting < kTaskRoom)
     weight += weight_of(memory, --waiting);
   return waiting;
+}
+
+/// Where a descent leaves what waits, if it fits.
+struct SplitRoom {
+  bool fits;
+  std::uint32_t split;
+  std::uint32_t first_entry;
+  std::uint32_t first_task, tasks;  ///< taken, whether it fits or not
+};
+
+/// Takes room for the `waiting` entries of pair i and lists their tasks. All of the team together.
+///
+/// `floor_of(top)`: the lowest entry of the task that begins below entry `top`.
+template <class Team, class FloorOf>
+IST_HD SplitRoom take_room(const Team& team, const BatchArrays& batch, BatchCounters& counters,
+                           std::uint32_t i, int waiting, const FloorOf& floor_of) {
+  std::uint32_t tasks = 0;
+  for (int top = waiting; top > 0; ++tasks) top = floor_of(top);
+  const auto entries = static_cast<std::uint32_t>(waiting);
+  std::uint32_t split = 0, task = 0, entry = 0, fits = 0, taken = 0;
+  // Counters stop soon after the room ends, so that no batch is large enough to turn them over.
+  if (team.lane() == 0 && atomic_load(&counters.splits) < batch.split_room &&
+      atomic_load(&counters.tasks) < batch.task_room &&
+      atomic_load(&counters.entries) < batch.entry_room) {
+    taken = tasks;
+    split = atomic_add(&counters.splits, 1);
+    task = atomic_add(&counters.tasks, tasks);
+    entry = atomic_add(&counters.entries, entries);
+    const bool all = split < batch.split_room && task + tasks <= batch.task_room &&
+                     entry + entries <= batch.entry_room;
+    fits = all ? 1 : 0;
+    // Room that was taken and does not do stays unused: its tasks hold nothing.
+    int top = waiting;
+    for (std::uint32_t k = 0; k < tasks; ++k) {
+      const int floor = floor_of(top);
+      if (task + k < batch.task_room)
+        batch.tasks[task + k] = {split, entry + static_cast<std::uint32_t>(floor),
+                                 all ? static_cast<std::uint32_t>(top - floor) : 0};
+      top = floor;
+    }
+    if (all) batch.splits[split] = {i, task, tasks, tasks};
+  }
+  return {team.broadcast(fits, 0) != 0, team.broadcast(split, 0), team.broadcast(entry, 0),
+          team.broadcast(task, 0), team.broadcast(taken, 0)};
 }
 
 /// Leaves what waits to others; false if there is no room. All of the team together.

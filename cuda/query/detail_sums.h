@@ -1,18 +1,118 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "cuda/query/batch_steps.h"
-#include "cuda/query/coincidence.h"
-#include "cuda/query/detail_chain.h"
-#include "cuda/query/quick_look.h"
+#include "cuda/query/detail_ref.h"
 #include "numerics/host_device.h"
+#include "query/base/pair_place.h"
+#include "query/detail/coincidence.h"
+#include "query/detail/detail_chain.h"
 
 // Pairs of trees that are asked at several levels of detail: under a pair budget, and copies of one
 // asset that all but coincide. blend_details() (query/detail/detail_blend.h) by one team, in
 // double, of sums in A's unit frame.
 
 namespace ist::gpu {
+
+struct FilledMemory {
+  FilledBall ball[2][kMostFilled];
+};
+
+/// What two assets overlap by as a quick look at their coarsest levels sees them, A's unit frame.
+struct QuickLook {
+  double volume;
+  PoseSlope slope;
+};
+
+/// quick_look() (query/kernel/look_kernel.h) by a team, in double.
+template <class Team>
+class QuickLooker {
+ public:
+  IST_HD QuickLooker(const Team& team, const AssetDetails& a, const AssetDetails& b,
+                     const Similarity& map, FilledMemory& memory)
+      : team_(team), a_(a), b_(b), map_(map), m_(memory) {}
+
+  IST_HD QuickLook look(bool slopes) {
+    QuickLook sum = {};
+    const double(&root_a)[4] = a_.level[a_.coarser].tree.root;
+    const double(&root_b)[4] = b_.level[b_.coarser].tree.root;
+    const double reach_a = kPokeOut * root_a[3], reach_b = kPokeOut * (root_b[3] * map_.scale);
+    if (!(reach_a > kSpeck * reach_b && reach_b > kSpeck * reach_a)) return sum;
+    const double middle_a[3] = {root_a[0], root_a[1], root_a[2]};
+    const double centre_b[3] = {root_b[0], root_b[1], root_b[2]};
+    double middle_b[3];
+    map_.apply_fused(centre_b, middle_b);
+    const int count_a = place(0, middle_b, b_.filled_reach * map_.scale);
+    const int count_b = place(1, middle_a, a_.filled_reach);
+    double volume = 0, force[3] = {0, 0, 0}, torque[3] = {0, 0, 0};
+    for (int k = team_.lane(); k < count_a * count_b; k += Team::kWidth) {
+      const FilledBall &a = m_.ball[0][k % count_a], &b = m_.ball[1][k / count_a];
+      const double d[3] = {b.x[0] - a.x[0], b.x[1] - a.x[1], b.x[2] - a.x[2]};
+      const double reach = a.r + b.r, step = a.r > b.r ? a.r - b.r : b.r - a.r;
+      double distance = sqrt((d[0] * d[0] + d[1] * d[1]) + d[2] * d[2]);
+      // A ball that the other holds overlaps as one that touches it from inside.
+      distance = distance > step ? distance : step;
+      if (!(distance < reach)) continue;
+      distance = distance > kLeastDistance ? distance : kLeastDistance;
+      const double inverse = 1 / distance, depth = reach - distance;
+      const double filled = b.fill * a.fill * depth;
+      volume += filled * depth * ((distance + 2 * reach) - 3 * step * (step * inverse));
+      if (!slopes) continue;
+      const double pull =
+          filled * (reach + distance) *
+          (((distance - step) * inverse) * (((distance + step) * inverse) * inverse));
+      const double arm[3] = {b.x[0] - map_.t[0], b.x[1] - map_.t[1], b.x[2] - map_.t[2]};
+      for (int axis = 0; axis < 3; ++axis) {
+        const int l = (axis + 1) % 3, m = (axis + 2) % 3;
+        force[axis] += pull * d[axis];
+        torque[axis] += arm[l] * (pull * d[m]) - arm[m] * (pull * d[l]);
+      }
+    }
+    sum.volume = kPi / 12 * team_.sum(volume);
+    for (int axis = 0; slopes && axis < 3; ++axis) {
+      sum.slope.by_translation[axis] = -kPi / 4 * team_.sum(force[axis]);
+      sum.slope.by_rotation[axis] = -kPi / 4 * team_.sum(torque[axis]);
+    }
+    team_.sync();
+    return sum;
+  }
+
+ private:
+  /// Lists the balls of a side that come within a reach of a point; returns how many.
+  IST_HD int place(int side, const double (&middle)[3], double reach) {
+    const AssetDetails& asset = side == 0 ? a_ : b_;
+    int count = 0;
+    for (int base = 0; base < static_cast<int>(asset.filled_count); base += Team::kWidth) {
+      FilledBall ball = {};
+      bool near = false;
+      if (base + team_.lane() < static_cast<int>(asset.filled_count)) {
+        ball = asset.filled[base + team_.lane()];
+        if (side == 1) {
+          const double from[3] = {ball.x[0], ball.x[1], ball.x[2]};
+          map_.apply_fused(from, ball.x);
+          ball.r *= map_.scale;
+        }
+        const double d[3] = {ball.x[0] - middle[0], ball.x[1] - middle[1], ball.x[2] - middle[2]};
+        const double sum = ball.r + reach;
+        near = (d[0] * d[0] + d[1] * d[1]) + d[2] * d[2] <= sum * sum;
+      }
+      int total = 0;
+      const int at = count + team_.exclusive_count(near, total);
+      if (near) m_.ball[side][at] = ball;
+      count += total;
+    }
+    team_.sync();
+    return count;
+  }
+
+  const Team& team_;
+  const AssetDetails& a_;
+  const AssetDetails& b_;
+  const Similarity& map_;
+  FilledMemory& m_;
+};
 
 struct DetailMemory {
   PairMemory pair;
@@ -21,6 +121,20 @@ struct DetailMemory {
   LensTotals coarse, part, result;
   std::uint32_t spheres, visits;  ///< of all that was asked
 };
+
+/// Sums a pair of levels to memory.totals.
+template <class Team>
+IST_HD_ONCE void sum_levels(const Team team, const TreeRef& a, const TreeRef& b,
+                            PairMemory& of_pair) {
+  PairMemory& memory = *team.memory(&of_pair);
+  team.sync();
+  copy_words(team, a, memory.tree[0]);
+  copy_words(team, b, memory.tree[1]);
+  team.sync();
+  PairDescent<Team> descent(team, memory);
+  descent.start();
+  descent.run(0, ~0u);
+}
 
 template <class Team>
 class DetailSums {
@@ -39,30 +153,32 @@ class DetailSums {
     const double budget = batch_.pair_budget;
     if (team_.lane() == 0) {
       place_pair(batch_, pair_, m_.pair.place);
-      m_.chain.plan(a_, b_, m_.pair.place.a_from_b.scale);
+      m_.chain.plan(
+          a_.coarser, [&](std::uint32_t i) { return a_.level[i].level; }, b_.coarser,
+          [&](std::uint32_t i) { return b_.level[i].level; }, m_.pair.place.a_from_b.scale);
       m_.spheres = m_.visits = 0;
     }
     team_.sync();
-    const int size = budget > 0 ? m_.chain.size : 1;
+    const std::size_t size = budget > 0 ? m_.chain.size() : 1;
     QuickLooker<Team> looker(team_, a_, b_, m_.pair.place.a_from_b, m_.filled);
     DetailWeight sure = {1, 0};
-    if (size > 1) sure = m_.chain.sure(looker.look(false).volume, budget);
+    if (size > 1) sure = m_.chain.quick_weight(looker.look(false).volume, budget);
     if (sure.weight == 1) {
-      if (coincidence(m_.chain.pair[0]).weight == 0) return false;
-      ask(m_.chain.pair[0]);
+      if (coincidence(m_.chain[0]).weight == 0) return false;
+      ask(m_.chain[0]);
       finish(m_.part);
       return true;
     }
-    descend(m_.chain.pair[size - 1].a, m_.chain.pair[size - 1].b);
+    descend(m_.chain.coarsest().a, m_.chain.coarsest().b);
     if (team_.lane() == 0) {
       m_.coarse = m_.pair.totals;
       m_.result.clear();
     }
     team_.sync();
-    double slope = 0, sure_slope = 0;  // of the blend by the coarse sum, and by the quick look
-    for (int i = size; i-- > 0;) {     // the order of the CPU's additions
-      const DetailPair& levels = m_.chain.pair[i];
-      const DetailWeight share = m_.chain.share(i, volume_of(m_.coarse), budget);
+    double slope = 0, sure_slope = 0;       // of the blend by the coarse sum, and by the quick look
+    for (std::size_t i = size; i-- > 0;) {  // the order of the CPU's additions
+      const DetailPair& levels = m_.chain[i];
+      const DetailWeight share = share_of(i, budget);
       const double alone = i == 0 ? 1 : 0;
       const double weight = sure.weight * alone + (1 - sure.weight) * share.weight;
       if (weight == 0 && share.slope == 0) continue;
@@ -86,6 +202,20 @@ class DetailSums {
   }
 
  private:
+  /// Of pair i of levels by the coarse sum.
+  IST_HD DetailWeight share_of(std::size_t i, double budget) const {
+    DetailWeight found;
+    m_.chain.share(
+        volume_of(m_.coarse), budget,
+        [](std::size_t k) {
+          return DetailWeight{k == 0 ? 1.0 : 0.0, 0};
+        },
+        [&](std::size_t k, const DetailWeight& weight) {
+          if (k == i) found = weight;
+        });
+    return found;
+  }
+
   IST_HD static double volume_of(const LensTotals& totals) { return kPi / 3 * totals.term[kCaps]; }
 
   IST_HD static void add_part(const LensTotals& part, double weight, LensTotals& sum) {
@@ -93,22 +223,23 @@ class DetailSums {
   }
 
   /// `step`: what the sum grows by as what has the slope goes from 0 to 1.
-  IST_HD static void add_slope(const PairSlope& slope, double step, LensTotals& sum) {
+  IST_HD static void add_slope(const PoseSlope& slope, double step, LensTotals& sum) {
     for (int k = 0; k < 3; ++k) {
       sum.term[kForce + k] += -1 / (2 * kPi) * step * slope.by_translation[k];
       sum.term[kTorque + k] += -1 / (2 * kPi) * step * slope.by_rotation[k];
     }
   }
 
-  IST_HD Coincidence coincidence(const DetailPair& levels) const {
+  IST_HD CoincidenceWeight coincidence(const DetailPair& levels) const {
     const DetailRef& tree = a_.level[levels.a];
     const bool alike = a_.first_alike == b_.first_alike && a_.coarser > 0 && levels.a == levels.b;
-    return Coincidence(tree.tree.root, alike ? tree.mean_radius : 0, m_.pair.place.a_from_b);
+    return coincidence_weight(tree.tree.root, alike ? tree.level.mean_radius : 0,
+                              m_.pair.place.a_from_b);
   }
 
   /// The sum of two levels, or of unlike ones where copies all but coincide: to m_.part.
   IST_HD void ask(const DetailPair& levels) {
-    const Coincidence same = coincidence(levels);
+    const CoincidenceWeight same = coincidence(levels);
     const std::uint32_t a = levels.a, b = levels.b, other = a < a_.coarser ? a + 1 : a - 1;
     if (team_.lane() == 0) m_.part.clear();
     double unlike = 0;
@@ -135,13 +266,7 @@ class DetailSums {
 
   /// The whole sum of two levels: to m_.pair.totals.
   IST_HD void descend(std::uint32_t a, std::uint32_t b) {
-    team_.sync();
-    copy_words(team_, a_.level[a].tree, m_.pair.tree[0]);
-    copy_words(team_, b_.level[b].tree, m_.pair.tree[1]);
-    team_.sync();
-    PairDescent<Team> descent(team_, m_.pair);
-    descent.start();
-    descent.run(0, ~0u);
+    sum_levels(team_, a_.level[a].tree, b_.level[b].tree, *team_.memory(&m_.pair));
     if (team_.lane() == 0) {
       m_.spheres += m_.pair.totals.spheres;
       m_.visits += m_.pair.totals.visits;

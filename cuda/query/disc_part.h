@@ -5,6 +5,7 @@
 
 #include "numerics/angle.h"
 #include "numerics/host_device.h"
+#include "numerics/plain.h"
 #include "query/asset/shared_constants.h"
 
 // What a triangle does to a ball that meets it: add_patch() (query/probe/patch_sums.h) for one of
@@ -12,18 +13,10 @@
 
 namespace ist::gpu {
 
-IST_HD inline double least(double x, double y) { return x < y ? x : y; }
-IST_HD inline double most(double x, double y) { return x > y ? x : y; }
-IST_HD inline double size_of(double x) { return x < 0 ? -x : x; }
-
 /// By less than this part of its radius a ball is moved, to be told from beside an edge on which
 /// its centre lies.
 constexpr double kMoved = 0x1p-10;
 
-/// In a direction in which no edge of a made thing lies (kAway, query/probe/patch_sums.cpp).
-IST_HD inline double moved_along(int axis) {
-  return 0x1p-12 * (axis == 0 ? 0.43877 : axis == 1 ? 0.61803 : 0.65236);
-}
 IST_HD inline void move_away(double r, double (&at)[3]) {
   at[0] += moved_along(0) * r;
   at[1] += moved_along(1) * r;
@@ -40,26 +33,22 @@ struct TrianglePlane {
   bool flat;            ///< it has no plane: no ball is to meet it
 
   IST_HD explicit TrianglePlane(const double (&c)[3][3]) {
-    double e[3], f[3], cross[3];
+    double e[3], f[3], normal[3];
     for (int k = 0; k < 3; ++k) {
       corner[k] = c[0][k];
       e[k] = c[1][k] - c[0][k];
       f[k] = c[2][k] - c[0][k];
     }
-    cross[0] = e[1] * f[2] - e[2] * f[1];
-    cross[1] = e[2] * f[0] - e[0] * f[2];
-    cross[2] = e[0] * f[1] - e[1] * f[0];
-    const double area = norm(cross), base = norm(e);
+    cross(e, f, normal);
+    const double area = norm(normal), base = norm(e);
     flat = !(area > 0);
     const double per_area = 1 / (flat ? 1 : area), per_base = 1 / (flat ? 1 : base);
     for (int k = 0; k < 3; ++k) {
       u[k] = e[k] * per_base;
-      n[k] = cross[k] * per_area;
+      n[k] = normal[k] * per_area;
     }
-    v[0] = n[1] * u[2] - n[2] * u[1];
-    v[1] = n[2] * u[0] - n[0] * u[2];
-    v[2] = n[0] * u[1] - n[1] * u[0];
-    const double apex_x = (f[0] * u[0] + f[1] * u[1]) + f[2] * u[2], apex_y = area * per_base;
+    cross(n, u, v);
+    const double apex_x = dot(f, u), apex_y = area * per_base;
     length[0] = base;
     ex[0] = 1;
     ey[0] = 0;
@@ -70,15 +59,12 @@ struct TrianglePlane {
   /// Height over the plane, and the foot in it.
   IST_HD void feet(const double (&x)[3], double& height, double& fx, double& fy) const {
     const double p[3] = {x[0] - corner[0], x[1] - corner[1], x[2] - corner[2]};
-    height = (p[0] * n[0] + p[1] * n[1]) + p[2] * n[2];
-    fx = (p[0] * u[0] + p[1] * u[1]) + p[2] * u[2];
-    fy = (p[0] * v[0] + p[1] * v[1]) + p[2] * v[2];
+    height = dot(p, n);
+    fx = dot(p, u);
+    fy = dot(p, v);
   }
 
  private:
-  IST_HD static double norm(const double (&a)[3]) {
-    return sqrt((a[0] * a[0] + a[1] * a[1]) + a[2] * a[2]);
-  }
   IST_HD void set_edge(int k, double x, double y, bool flat) {
     length[k] = sqrt(x * x + y * y);
     const double per_length = 1 / (flat ? 1 : length[k]);
@@ -105,7 +91,7 @@ class Disc {
  public:
   IST_HD Disc(const TrianglePlane& t, const double (&x)[3], double r) : r_(r) {
     t.feet(x, height_, x_, y_);
-    h_ = size_of(height_);
+    h_ = std::fabs(height_);
     rho2_ = (r - h_) * (r + h_);
     const double px = t.length[0] - x_;
     const double t1 = px * t.ex[1] - y_ * t.ey[1], t2 = -(x_ * t.ex[2] + y_ * t.ey[2]);

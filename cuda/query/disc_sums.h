@@ -2,11 +2,11 @@
 
 #include <cstdint>
 
-#include "cuda/query/bits.h"
 #include "cuda/query/disc_part.h"
 #include "cuda/query/field_walk.h"
 #include "cuda/query/met_balls.h"
 #include "cuda/query/part_sums.h"
+#include "numerics/bits.h"
 #include "numerics/host_device.h"
 #include "query/asset/shared_constants.h"
 
@@ -127,7 +127,7 @@ class DiscSums {
       }
       if (ball >= held_) continue;
       const double x[3] = {m_.x[0][ball], m_.x[1][ball], m_.x[2][ball]}, angle = m_.angle[ball];
-      const bool told = size_of(angle) > kLeastAngle;
+      const bool told = std::fabs(angle) > kLeastAngle;
       add_ball(probe_.place.a_from_b, x, m_.r[ball], told ? angle < 0 : m_.inside[ball] != 0,
                m_.cones[ball], sums_);
     }

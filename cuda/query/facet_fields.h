@@ -32,14 +32,7 @@ class FacetSource {
 
   IST_HD void corners(const FacetId& id, double (&c)[3][3]) const {
     if (field_.kind == FieldKind::box) {
-      // Corners of the faces, counter-clockwise from outside, four bits each.
-      constexpr std::uint32_t kFaces[6] = {0x2640, 0x5731, 0x4510, 0x3762, 0x1320, 0x6754};
-      const std::uint32_t face = kFaces[id.a / 2], first = 1 + id.a % 2;
-      for (std::uint32_t k = 0; k < 3; ++k) {
-        const std::uint32_t corner = face >> 4 * (k == 0 ? 0 : first + k - 1);
-        for (int axis = 0; axis < 3; ++axis)
-          c[k][axis] = (corner >> axis & 1) != 0 ? field_.box.half[axis] : -field_.box.half[axis];
-      }
+      field_.box.corners(id.a, c);
       return;
     }
     const std::int64_t i = std::int64_t{id.a} - 1, j = std::int64_t{id.b / 2} - 1;
@@ -56,12 +49,9 @@ class FacetSource {
     IST_HD Near(const FieldRef& field, const double (&x)[3], double reach) {
       if (field.kind == FieldKind::box) return;
       for (int k = 0; k < 2; ++k) {
-        const double low = (x[k] - reach) / field.height.spacing[k];
-        const double high = (x[k] + reach) / field.height.spacing[k];
-        const double last = (k == 0 ? field.height.columns : field.height.rows) - 1.0;
-        // Beyond the border one cell is as good as any number: it is level across it.
-        from_[k] = static_cast<std::int64_t>(floor(clamped(low, -1, last)));
-        count_[k] = static_cast<std::int64_t>(floor(clamped(high, -1, last))) - from_[k] + 1;
+        std::int64_t to;
+        field.height.cells_near(k, x[k], reach, from_[k], to);
+        count_[k] = to - from_[k] + 1;
       }
     }
 
@@ -96,72 +86,32 @@ class FacetSource {
   template <class Team>
   IST_HD bool inside(const Team&, bool wanted, const double (&x)[3]) const {
     if (!wanted) return false;
-    if (field_.kind == FieldKind::height) return x[2] < surface(x[0], x[1]);
-    return size_of(x[0]) < field_.box.half[0] && size_of(x[1]) < field_.box.half[1] &&
-           size_of(x[2]) < field_.box.half[2];
+    if (field_.kind == FieldKind::box) return field_.box.holds(x);
+    const PlainTerrain& f = field_.height;
+    return x[2] < f.surface(
+                      x[0], x[1], [&](std::int64_t i, std::int64_t j) { return f.height(i, j); });
   }
 
   /// A ball that comes near one face of a box, or none, needs no triangles.
-  IST_HD bool settles(const double (&x)[3], double r, PartInside& part) const {
+  IST_HD bool settles(const double (&x)[3], double r, BallPart& part) const {
     if (field_.kind != FieldKind::box) return false;
-    const double(&half)[3] = field_.box.half;
-    int faces = 0, axis = 0;
-    double side = 1;
+    int axis;
+    double side;
+    if (field_.box.faces_near(x, r, axis, side) > 1) return false;
+    DistanceLook at = {r, {}};
     for (int k = 0; k < 3; ++k) {
-      for (int s = 1; s >= -1; s -= 2) {
-        if (half[k] - s * x[k] >= r) continue;
-        ++faces;
-        axis = k;
-        side = s;
-      }
-    }
-    if (faces > 1) return false;
-    DistanceLook at = {r, {0, 0, 0}};
-    for (int k = 0; k < 3; ++k) {
-      if (faces == 0 || k != axis) continue;
-      at.distance = half[k] - side * x[k];
-      at.gradient[k] = -side;
+      at.distance = k == axis ? field_.box.below_face(k, side, x[k]) : at.distance;
+      at.gradient[k] = k == axis ? -side : 0;
     }
     part = flat_part(at, r);
     return true;
   }
 
  private:
-  IST_HD double height(std::int64_t i, std::int64_t j) const {
-    const HeightRef& f = field_.height;
-    const std::int64_t last[2] = {std::int64_t{f.columns} - 1, std::int64_t{f.rows} - 1};
-    i = i < 0 ? 0 : i > last[0] ? last[0] : i;
-    j = j < 0 ? 0 : j > last[1] ? last[1] : j;
-    return static_cast<double>(
-        f.heights[static_cast<std::uint64_t>(j) * f.columns + static_cast<std::uint64_t>(i)]);
-  }
-
-  /// The cells at the border reach as far as the balls do.
   IST_HD void grid_point(std::int64_t i, std::int64_t j, double (&p)[3]) const {
-    const HeightRef& f = field_.height;
-    const std::int64_t n[2] = {i, j};
-    const double reach = 2 * whole_[3];
-    for (int k = 0; k < 2; ++k) {
-      const std::int64_t last = std::int64_t{k == 0 ? f.columns : f.rows} - 1;
-      const double at = static_cast<double>(n[k]) * f.spacing[k];
-      p[k] = n[k] < 0      ? least(at, whole_[k] - reach)
-             : n[k] > last ? most(at, whole_[k] + reach)
-                           : at;
-    }
-    p[2] = height(i, j);
-  }
-
-  /// Height of the terrain over a point.
-  IST_HD double surface(double x, double y) const {
-    const HeightRef& f = field_.height;
-    const double u = clamped(x / f.spacing[0], -1, f.columns);
-    const double v = clamped(y / f.spacing[1], -1, f.rows);
-    const double i = floor(u), j = floor(v), s = u - i, t = v - j;
-    const auto a = static_cast<std::int64_t>(i), b = static_cast<std::int64_t>(j);
-    const double low = height(a, b), high = height(a + 1, b + 1);
-    const double side = s >= t ? height(a + 1, b) : height(a, b + 1);
-    return s >= t ? low + s * (side - low) + t * (high - side)
-                  : low + t * (side - low) + s * (high - side);
+    p[0] = field_.height.point(0, i, whole_[0], whole_[3]);
+    p[1] = field_.height.point(1, j, whole_[1], whole_[3]);
+    p[2] = field_.height.height(i, j);
   }
 
   const FieldRef& field_;
@@ -224,7 +174,7 @@ class FacetWalk {
     staged_ = 0;
     const NodeBall ball = m_.tree.ball(0, block);
     double centre[3];
-    m_.place.a_from_b.apply(ball.centre, centre);
+    m_.place.a_from_b.apply_fused(ball.centre, centre);
     const double reach = ball.r * m_.place.a_from_b.scale * (1 + 1e-12);
     near_ = FacetSource::Near(m_.field, centre, reach);
     near_size_ = near_.size();

@@ -95,7 +95,9 @@ IST_HD inline void write_field_answer(const FieldBatch& batch, std::uint32_t i,
   const FieldSides sides(batch, i);
   if (sides.turned) {
     const Pose tree = pose_of(sides.tree, i), field = pose_of(sides.field, i);
-    sums.turn_over({tree.t[0] - field.t[0], tree.t[1] - field.t[1], tree.t[2] - field.t[2]});
+    sums.rotation_gradient = turned_over(vec3(tree.t) - vec3(field.t), sums.translation_gradient,
+                                         sums.rotation_gradient);
+    sums.translation_gradient = -sums.translation_gradient;
   }
   write_answer(batch.answers, i, sums, totals);
 }
@@ -113,7 +115,7 @@ IST_HD void load_solids(const Team& team, const FieldBatch& batch, std::uint32_t
   if (team.lane() == 0) {
     const double centre[3] = {memory.tree.root[0], memory.tree.root[1], memory.tree.root[2]};
     double x[3];
-    memory.place.a_from_b.apply(centre, x);
+    memory.place.a_from_b.apply_fused(centre, x);
     for (int k = 0; k < 3; ++k) memory.whole[k] = x[k];
     memory.whole[3] = memory.tree.root[3] * memory.place.a_from_b.scale;
   }

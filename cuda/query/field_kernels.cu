@@ -1,8 +1,8 @@
-#include "cuda/query/field_kernels.h"
-
 #include "cuda/check.h"
 #include "cuda/launch.h"
 #include "cuda/query/by_warps.h"
+#include "cuda/query/field_steps.h"
+#include "cuda/query/kernels.h"
 
 namespace ist::gpu {
 namespace {
@@ -35,13 +35,14 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_smooth_pairs(const 
 
 }  // namespace
 
-FieldGrids field_grids() {
-  return {blocks_at_a_time(sum_smooth_pairs, kThreads), triangle_grids<FacetKind>(),
-          triangle_grids<MeshKind>()};
+void find_field_grids(Grids& grids) {
+  grids.smooth = blocks_at_a_time(sum_smooth_pairs, kThreads);
+  grids.of[kFacets] = triangle_grids<FacetKind>();
+  grids.of[kMesh] = triangle_grids<MeshKind>();
 }
 
 void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups],
-                        const FieldGrids& grids, cudaStream_t stream) {
+                        const Grids& grids, cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, sizeof(FieldCounters), stream), "starting a batch");
   sift_field_pairs<<<blocks_for(batch.pairs.count, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
   check_launch("placing trees in fields");
@@ -49,8 +50,8 @@ void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups]
     sum_smooth_pairs<<<static_cast<unsigned>(grids.smooth), kThreads, 0, stream>>>(batch);
     check_launch("summing trees in fields");
   }
-  if (has[kFacets]) launch_triangle_pairs<FacetKind>(batch, grids.facets, stream);
-  if (has[kMesh]) launch_triangle_pairs<MeshKind>(batch, grids.mesh, stream);
+  if (has[kFacets]) launch_triangle_pairs<FacetKind>(batch, grids, stream);
+  if (has[kMesh]) launch_triangle_pairs<MeshKind>(batch, grids, stream);
 }
 
 }  // namespace ist::gpu

@@ -1,11 +1,9 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
-#include <ist/asset_layout.h>
-
 #include "cuda/query/surface_ref.h"
+#include "query/field/plain_shapes.h"
 
 namespace ist::gpu {
 
@@ -23,45 +21,18 @@ enum class FieldKind : std::uint32_t {
   mesh
 };
 
-struct HalfSpaceRef {
-  double normal[3];  ///< unit
-  double offset;
-};
-
-/// A ball, a capsule or a cylinder.
-struct RoundRef {
-  double radius, half;
-};
-
-struct BoxRef {
-  double half[3];
-};
-
-struct HeightRef {
-  const float* heights;
-  std::uint32_t columns, rows;
-  double spacing[2];
-  double lowest, highest;
-};
-
-struct GridRef {
-  const float* distances;
-  std::uint32_t size[3];
-  double origin[3];
-  double spacing;
-  double error;
-};
-
 /// A field of a batch in plain numbers (ist/field.h), what it points to being where the batch is
 /// worked on.
 struct FieldRef {
   FieldKind kind;
   union {
-    HalfSpaceRef half_space;
-    RoundRef round;
-    BoxRef box;
-    HeightRef height;
-    GridRef grid;
+    PlainHalfSpace half_space;
+    PlainBall ball;
+    PlainCapsule capsule;
+    PlainCylinder cylinder;
+    PlainGrid grid;
+    PlainBox box;
+    PlainTerrain height;
     SurfaceRef mesh;
   };
 };

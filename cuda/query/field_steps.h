@@ -36,16 +36,16 @@ IST_HD inline int sift_field_pair(const FieldBatch& batch, std::uint32_t i) {
   const TreeRef& tree = asset.tree[static_cast<int>(batch.measure)];
   const double centre[3] = {tree.root[0], tree.root[1], tree.root[2]};
   double x[3];
-  place.a_from_b.apply(centre, x);
+  place.a_from_b.apply_fused(centre, x);
   const double r = tree.root[3] * place.a_from_b.scale;
   if (field.kind == FieldKind::mesh) {
-    const double reach = r * (1 + 1e-6);
+    const double reach = sure_reach(r, 0);
     if (outside_grid2(field.mesh, x) < reach * reach) return kMesh;
     write_nothing(batch.answers, i, QueryStatus::ok);
     return -1;
   }
   bool sound = true;
-  const double d = distance_in(field, x, sound), reach = sure_reach(field, r);
+  const double d = distance_in(field, x, sound), reach = sure_reach(r, distance_error(field));
   if (sound && d > -reach && d < reach) return group_of(field.kind);
   if (!sound || d <= -reach) {
     write_nothing(batch.answers, i, sound ? QueryStatus::ok : QueryStatus::invalid_input);

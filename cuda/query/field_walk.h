@@ -25,18 +25,12 @@ struct ProbeMemory {
 /// A ball of a block of the tree, the field's frame; false if the lane holds none.
 IST_HD inline bool place_ball(const ProbeMemory& m, int level, std::uint32_t block, int lane,
                               double (&x)[3], double& r) {
-  const BallBlock& b = in_global_memory(m.tree.blocks[level])[block];
-  const Origin& o = in_global_memory(m.tree.origins[level])[block];
-  const double at[3] = {o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
-                        o.z + static_cast<double>(b.z[lane])};
-  m.place.a_from_b.apply(at, x);
-  r = static_cast<double>(b.r[lane]) * m.place.a_from_b.scale;
+  const NodeBall ball =
+      lane_ball(in_global_memory(m.tree.blocks[level])[block],
+                in_global_memory(m.tree.origins[level])[block], static_cast<std::uint32_t>(lane));
+  m.place.a_from_b.apply_fused(ball.centre, x);
+  r = ball.r * m.place.a_from_b.scale;
   return r > 0;
-}
-
-/// A look's distance beyond which a ball is in or out as a whole.
-IST_HD inline double sure_reach(const FieldRef& field, double r) {
-  return r * (1 + 1e-6) + distance_error(field);
 }
 
 struct WalkMemory : ProbeMemory {
@@ -80,7 +74,7 @@ class FieldWalk {
       double x[3], r;
       if (half >= have || !place_ball(m_, 0, blocks[half], item % static_cast<int>(kWidth), x, r))
         continue;
-      const PartInside part = part_in(m_.field, x, r, sound_);
+      const BallPart part = part_in(m_.field, x, r, sound_);
       if (!(part.volume > 0)) continue;
       const double* const t = m_.place.a_from_b.t;
       const double at[3] = {x[0] - t[0], x[1] - t[1], x[2] - t[2]};
@@ -114,7 +108,8 @@ class FieldWalk {
       bool waits = false;
       double x[3], r;
       if (half < have && place_ball(m_, level, block, lane, x, r)) {
-        const double d = distance_in(m_.field, x, sound_), reach = sure_reach(m_.field, r);
+        const double d = distance_in(m_.field, x, sound_),
+                     reach = sure_reach(r, distance_error(m_.field));
         waits = d > -reach && d < reach;
         if (d >= reach)
           sums_.add_whole(m_.sums.level[level - 1][child], m_.sums.spheres_below(level - 1, child),

@@ -5,9 +5,10 @@
 
 #include "cuda/query/cover_ref.h"
 #include "cuda/query/gap_totals.h"
-#include "cuda/query/pair_place.h"
 #include "cuda/query/tree_ref.h"
 #include "numerics/host_device.h"
+#include "query/base/pair_place.h"
+#include "query/base/precision.h"
 
 // Two trees searched by one team for two minima at once, the gap of the inner spheres and that of
 // their cover balls: depth first, the nearest child first, as GapDescent of query/separation.cpp.
@@ -42,6 +43,8 @@ struct GapMemory {
   PairPlace place;
   TreeRef tree[2];
   CoverRef cover[2];
+  IST_HD RootBall root(int side) const { return RootBall::of(tree[side].root, cover[side].root); }
+
   Real turn[9];           ///< place.a_from_b.m
   GapTotals best;         ///< so far
   GapTotals before, sum;  ///< of who divides the search: of its first part, of all
@@ -69,10 +72,9 @@ class GapDescent {
   IST_HD GapDescent(const Team& team, GapMemory<Real>& memory) : team_(team), m_(memory) {
     if (team_.lane() == 0)
       for (int i = 0; i < 9; ++i) m_.turn[i] = static_cast<Real>(m_.place.a_from_b.m[i]);
-    const double length =
-        span_of(m_.tree[0], m_.cover[0], m_.tree[1], m_.cover[1], m_.place.a_from_b);
+    const double length = span(m_.root(0), m_.root(1), m_.place.a_from_b);
     // A third more, for limits and gaps are rounded too.
-    double margin = gap_error<Real>(length) * (4.0 / 3);
+    double margin = ist::distance_error<Real>(length) * (4.0 / 3);
     if (sizeof(Real) == 8) {
       // Of what is too far apart for double all would be in play: GapTotals::cover is off then.
       const double most =
@@ -270,11 +272,11 @@ class GapDescent {
     const std::uint32_t other = node_of(of_a ? word_b : word_a);
     const int side_x = of_a ? 0 : 1, side_y = 1 - side_x;
     const TreeRef &x = m_.tree[side_x], &y = m_.tree[side_y];
-    const PairMap& map = of_a ? m_.place.a_from_b : m_.place.b_from_a;
+    const Similarity& map = of_a ? m_.place.a_from_b : m_.place.b_from_a;
     const NodeBall ball = y.ball(level_y, other);
     const double cover_y = m_.cover[side_y].of_node(level_y, other, y.top);
     double moved[3];
-    map.apply(ball.centre, moved);
+    map.apply_fused(ball.centre, moved);
     const BallBlock& block = x.blocks[level_x][opened];
     const Origin& origin = x.origins[level_x][opened];
     const Real dx = static_cast<Real>(block.x[lane]) - static_cast<Real>(moved[0] - origin.x);
@@ -373,17 +375,17 @@ class GapDescent {
     const BallBlock& b = m_.tree[1].blocks[0][leaf_b];
     const Origin& origin_a = m_.tree[0].origins[0][leaf_a];
     const Origin& origin_b = m_.tree[1].origins[0][leaf_b];
-    const PairMap& map = m_.place.a_from_b;
+    const Similarity& map = m_.place.a_from_b;
     const Real scale = static_cast<Real>(map.scale);
     const double from[3] = {origin_b.x, origin_b.y, origin_b.z};
     double moved[3];
-    map.apply(from, moved);
+    map.apply_fused(from, moved);
     const Real off[3] = {static_cast<Real>(moved[0] - origin_a.x),
                          static_cast<Real>(moved[1] - origin_a.y),
                          static_cast<Real>(moved[2] - origin_a.z)};
     const NodeBall ball_a = m_.tree[0].ball(0, leaf_a);
     const NodeBall ball_b = m_.tree[1].ball(0, leaf_b);
-    map.apply(ball_b.centre, moved);
+    map.apply_fused(ball_b.centre, moved);
     const LensSide<Real> near_a = {static_cast<Real>(ball_a.centre[0] - origin_a.x),
                                    static_cast<Real>(ball_a.centre[1] - origin_a.y),
                                    static_cast<Real>(ball_a.centre[2] - origin_a.z),
@@ -420,9 +422,9 @@ class GapDescent {
   IST_HD void measure(std::uint32_t a, std::uint32_t b, GapTotals& best) {
     const NodeBall ball_a = m_.tree[0].ball(kSphereLevel, a);
     const NodeBall ball_b = m_.tree[1].ball(kSphereLevel, b);
-    const PairMap& map = m_.place.a_from_b;
+    const Similarity& map = m_.place.a_from_b;
     double moved[3];
-    map.apply(ball_b.centre, moved);
+    map.apply_fused(ball_b.centre, moved);
     const double dx = moved[0] - ball_a.centre[0], dy = moved[1] - ball_a.centre[1],
                  dz = moved[2] - ball_a.centre[2];
     const double d = root((dx * dx + dy * dy) + dz * dz);

@@ -2,9 +2,6 @@
 
 #include <cstdint>
 
-#include "cuda/query/cover_ref.h"
-#include "cuda/query/pair_place.h"
-#include "cuda/query/tree_ref.h"
 #include "numerics/host_device.h"
 
 namespace ist::gpu {
@@ -42,28 +39,5 @@ struct GapTotals {
   }
   IST_HD bool overlap() const { return gap <= 0; }
 };
-
-/// Length within which all of both trees and the way between them lie, A's unit frame (span() of
-/// query/base/precision.h).
-IST_HD inline double span_of(const TreeRef& a, const CoverRef& cover_a, const TreeRef& b,
-                             const CoverRef& cover_b, const PairMap& a_from_b) {
-  const double centre[3] = {b.root[0], b.root[1], b.root[2]};
-  double moved[3], sum = 0;
-  a_from_b.apply(centre, moved);
-  for (int k = 0; k < 3; ++k) {
-    const double apart = moved[k] - a.root[k];
-    sum += apart < 0 ? -apart : apart;
-  }
-  const double reach_a = a.root[3] > cover_a.root ? a.root[3] : cover_a.root;
-  const double reach_b = b.root[3] > cover_b.root ? b.root[3] : cover_b.root;
-  return sum + 2 * (reach_a + a_from_b.scale * reach_b);
-}
-
-/// How far rounding may move a distance within `length` (distance_error() of
-/// query/base/precision.h).
-template <class Real>
-IST_HD double gap_error(double length) {
-  return 12 * (sizeof(Real) == 4 ? 0x1p-24 : 0x1p-53) * length;
-}
 
 }  // namespace ist::gpu

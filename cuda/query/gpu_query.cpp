@@ -6,18 +6,74 @@
 #include <cmath>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cuda/check.h"
-#include "cuda/query/batch_kernels.h"
-#include "cuda/query/device_bytes.h"
-#include "cuda/query/field_kernels.h"
+#include "cuda/query/kernels.h"
 #include "cuda/query/make_solid_ref.h"
-#include "cuda/query/patch_kernels.h"
-#include "cuda/query/separation_kernels.h"
 #include "cuda/queue.h"
 
 namespace ist {
+
+namespace gpu {
+
+/// Device memory that outlives the queue it comes from.
+class DeviceBytes {
+ public:
+  DeviceBytes() = default;
+  DeviceBytes(Queue& queue, const GpuSettings& settings, std::size_t bytes)
+      : settings_(settings), data_(queue.allocate(bytes)), bytes_(bytes) {}
+  ~DeviceBytes() {
+    if (data_ == nullptr) return;
+    try {
+      Queue(settings_).deallocate(data_, bytes_);
+    } catch (const Error&) {  // a device that is gone has no memory to give back
+    }
+  }
+  DeviceBytes(DeviceBytes&& other) noexcept { *this = std::move(other); }
+  DeviceBytes& operator=(DeviceBytes&& other) noexcept {
+    std::swap(settings_, other.settings_);
+    std::swap(data_, other.data_);
+    std::swap(bytes_, other.bytes_);
+    return *this;
+  }
+
+  std::byte* data() const { return static_cast<std::byte*>(data_); }
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  GpuSettings settings_;
+  void* data_ = nullptr;
+  std::size_t bytes_ = 0;
+};
+
+/// Parts of a block of memory, one after another.
+class Parts {
+ public:
+  explicit Parts(std::byte* from) : from_(from) {}
+
+  template <class T>
+  T* take(std::size_t count) {
+    T* const part = reinterpret_cast<T*>(from_ + used_);
+    used_ += (count * sizeof(T) + 255) / 256 * 256;
+    return part;
+  }
+  std::size_t used() const { return used_; }
+
+ private:
+  std::byte* from_;
+  std::size_t used_ = 0;
+};
+
+template <class T>
+void copy_to_device(T* to, std::span<const T> from, Queue& queue) {
+  if (from.empty()) return;
+  check(cudaMemcpyAsync(to, from.data(), from.size_bytes(), cudaMemcpyHostToDevice, queue.stream()),
+        "copying to the GPU");
+}
+
+}  // namespace gpu
 
 struct GpuSolids::Impl {
   int device = 0;
@@ -33,10 +89,7 @@ struct GpuSolids::Impl {
 struct GpuWorkspace::Impl {
   int device = 0;
   std::size_t most_pairs = 0;
-  gpu::BatchGrids grids{};
-  gpu::SeparationGrids separation_grids{};
-  gpu::FieldGrids field_grids{};
-  int patch_blocks = 0;
+  gpu::Grids grids{};
   gpu::DeviceBytes memory;
   // What does not change from batch to batch; all kinds lie in the same memory.
   gpu::BatchArrays arrays{};
@@ -135,7 +188,7 @@ std::size_t place_penetrations(std::byte* from, GpuWorkspace::Impl& room) {
   const std::size_t lists = parts.used();
   const std::size_t triangles = place_triangle_room(from + lists, room.triangle_room);
   place_splits(parts, arrays);
-  arrays.places = parts.take<gpu::PairPlace>(kRoomForSplits);
+  arrays.places = parts.take<PairPlace>(kRoomForSplits);
   arrays.totals = parts.take<gpu::LensTotals>(kRoomForSplits + kRoomForTasks);
   arrays.entries_a = parts.take<std::uint32_t>(kRoomForEntries);
   arrays.entries_b = parts.take<std::uint32_t>(kRoomForEntries);
@@ -189,10 +242,10 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   gpu::Queue queue(settings);
   impl_->device = settings.device;
   impl_->most_pairs = most_pairs;
-  impl_->grids = gpu::batch_grids();
-  impl_->separation_grids = gpu::separation_grids();
-  impl_->field_grids = gpu::field_grids();
-  impl_->patch_blocks = gpu::patch_blocks();
+  gpu::find_batch_grids(impl_->grids);
+  gpu::find_separation_grids(impl_->grids);
+  gpu::find_patch_grids(impl_->grids);
+  gpu::find_field_grids(impl_->grids);
   impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr, *impl_));
   place(impl_->memory.data(), *impl_);
   gpu::check(cudaMemsetAsync(impl_->arrays.posted, 0, kRoomForTasks * sizeof(std::uint32_t),
@@ -245,7 +298,7 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
   // In the same memory, once the trees are done with it.
   const gpu::FieldBatch fields = {
       asked, room.field_counters, {room.arrays.list, room.arrays.detailed}, room.triangle_room};
-  gpu::launch_field_batch(fields, solids.impl().has_group, room.field_grids, stream);
+  gpu::launch_field_batch(fields, solids.impl().has_group, room.grids, stream);
 }
 
 void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint32_t max_visits,
@@ -258,7 +311,7 @@ void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint3
   batch.answers = answers;
   batch.max_visits = max_visits == 0 ? ~0u : max_visits;
   const gpu::DeviceGuard guard(room.device);
-  gpu::launch_separations(batch, room.separation_grids, stream);
+  gpu::launch_separations(batch, room.grids, stream);
 }
 
 void contact_patches_batch(const GpuSolids& solids, const GpuPairs& pairs, Measure measure,
@@ -275,7 +328,7 @@ void contact_patches_batch(const GpuSolids& solids, const GpuPairs& pairs, Measu
   batch.patches = patches;
   batch.most_bins = solids.impl().most_bins;
   const gpu::DeviceGuard guard(room.device);
-  gpu::launch_patches(batch, room.patch_blocks, room.patch_room, stream);
+  gpu::launch_patches(batch, room.grids, room.patch_room, stream);
 }
 
 }  // namespace ist

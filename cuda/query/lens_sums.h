@@ -2,10 +2,13 @@
 
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 
 #include "numerics/host_device.h"
 
 namespace ist::gpu {
+
+constexpr double kPi = std::numbers::pi;
 
 /// What is summed over lenses, A's unit frame; positions from B's unit-frame origin.
 enum Term {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -10,15 +12,170 @@
 
 #include <ist/asset_layout.h>
 #include <ist/error.h>
+#include <ist/field.h>
 #include <ist/gpu_query.h>
 
-#include "cuda/query/make_cuts.h"
-#include "cuda/query/make_field_ref.h"
+#include "cuda/query/cuts_ref.h"
+#include "cuda/query/field_ref.h"
 #include "cuda/query/solid_ref.h"
+#include "query/asset/sphere_tree.h"
+#include "query/base/pair_place.h"
+#include "query/contact/tree_cuts.h"
+#include "query/field/shapes.h"
 
-// Host code only.
+// Solids of a batch in plain numbers. Host code only.
 
 namespace ist::gpu {
+
+/// All regions of a tree, and the ranks of its bins.
+class TreeRegions {
+ public:
+  TreeRegions(const AssetHeader& asset, const TreeHeader& header)
+      : tree_(asset, header), cuts_(tree_), ranks_(tree_.level[cuts_.bin_level()].count) {
+    nodes_.reserve(2 * ranks_.size() - 1);
+    add(cuts_.root());
+  }
+
+  const std::vector<CutNode>& nodes() const { return nodes_; }
+  const std::vector<std::uint16_t>& ranks() const { return ranks_; }
+  std::uint32_t bins() const { return static_cast<std::uint32_t>(ranks_.size()); }
+  int shift() const { return 4 * (1 + cuts_.bin_level()); }
+
+ private:
+  void add(TreeRegion region) {
+    const std::size_t at = nodes_.size();
+    nodes_.push_back({cuts_.id(region), ranked_, ranked_ + 1, 0});
+    if (!cuts_.open(region)) {
+      const int bit = std::countr_zero(region.members);
+      ranks_[region.first + static_cast<std::uint32_t>(bit)] =
+          static_cast<std::uint16_t>(ranked_++);
+      return;
+    }
+    const std::uint64_t side = cuts_.cut(region);
+    add({side, region.first, region.level});
+    nodes_[at].rest = static_cast<std::uint32_t>(nodes_.size());
+    add({region.members & ~side, region.first, region.level});
+    nodes_[at].end = ranked_;
+  }
+
+  const SphereTree tree_;
+  const TreeCuts cuts_;
+  std::vector<CutNode> nodes_;
+  std::vector<std::uint16_t> ranks_;
+  std::uint32_t ranked_ = 0;
+};
+
+/// The memory that a field points to: heights, distances, an asset's bytes; none of what is out of
+/// range.
+inline std::span<const std::byte> pointed_to(const Field& field) {
+  const auto bytes = [](const auto* from, std::size_t count) {
+    return std::as_bytes(std::span(from, count));
+  };
+  if (const auto* const f = std::get_if<HeightField>(&field); f != nullptr && is_sound(*f))
+    return bytes(f->heights, std::size_t{f->columns} * f->rows);
+  if (const auto* const g = std::get_if<DistanceGridField>(&field); g != nullptr && is_sound(*g))
+    return bytes(g->distances, std::size_t{g->size[0]} * g->size[1] * g->size[2]);
+  if (const auto* const m = std::get_if<MeshField>(&field); m != nullptr && is_sound(*m))
+    return bytes(reinterpret_cast<const std::byte*>(&m->tree.header()),
+                 m->tree.header().file_bytes);
+  return {};
+}
+
+inline AssetFrame frame_of(const Field& field) {
+  const auto* const mesh = std::get_if<MeshField>(&field);
+  return mesh != nullptr && mesh->tree.has_field() ? frame_of(mesh->tree.header())
+                                                   : AssetFrame{{0, 0, 0}, 1};
+}
+
+/// `at`: where who works on the field finds what it points to. `unusable` if out of range.
+inline FieldRef field_ref(const Field& field, const std::byte* at) {
+  FieldRef ref = {};
+  ref.kind = FieldKind::unusable;
+  if (!std::visit([](const auto& f) { return is_sound(f); }, field)) return ref;
+  const auto* const floats = reinterpret_cast<const float*>(at);
+  if (const auto* const f = std::get_if<HalfSpaceField>(&field)) {
+    ref.kind = FieldKind::half_space;
+    ref.half_space = plain(*f);
+  } else if (const auto* const f = std::get_if<BoxField>(&field)) {
+    ref.kind = FieldKind::box;
+    ref.box = plain(*f);
+  } else if (const auto* const f = std::get_if<BallField>(&field)) {
+    ref.kind = FieldKind::ball;
+    ref.ball = plain(*f);
+  } else if (const auto* const f = std::get_if<CapsuleField>(&field)) {
+    ref.kind = FieldKind::capsule;
+    ref.capsule = plain(*f);
+  } else if (const auto* const f = std::get_if<CylinderField>(&field)) {
+    ref.kind = FieldKind::cylinder;
+    ref.cylinder = plain(*f);
+  } else if (const auto* const f = std::get_if<HeightField>(&field)) {
+    if (std::all_of(f->heights, f->heights + std::size_t{f->columns} * f->rows,
+                    [](float height) { return std::isfinite(height); }))
+      ref.kind = FieldKind::height;
+    ref.height = plain(*f);
+    ref.height.heights = floats;
+  } else if (const auto* const f = std::get_if<DistanceGridField>(&field)) {
+    ref.kind = FieldKind::grid;
+    ref.grid = plain(*f);
+    ref.grid.distances = floats;
+  } else if (const auto* const f = std::get_if<MeshField>(&field)) {
+    ref.kind = FieldKind::mesh;
+    ref.mesh = SurfaceRef::of(f->tree.header(), at);
+  }
+  return ref;
+}
+
+/// Of all nodes, level by level.
+inline std::vector<NodeSum> node_sums(const SphereTree& tree) {
+  std::vector<NodeSum> sums;
+  std::size_t below = 0;
+  for (int level = 0; level <= tree.top; ++level) {
+    const std::uint32_t children = level == 0 ? kWidth * tree.count(0) : tree.count(level - 1);
+    const std::size_t first = sums.size();
+    for (std::uint32_t c = 0; c < children; ++c) {
+      if (c % kWidth == 0) sums.push_back({});
+      NodeSum& sum = sums.back();
+      if (level > 0) {
+        const NodeSum child = sums[below + c];
+        sum.cubes += child.cubes;
+        for (int k = 0; k < 3; ++k) sum.moment[k] += child.moment[k];
+        continue;
+      }
+      const NodeBall ball = tree.sphere(c / kWidth, c % kWidth);
+      if (!(ball.r > 0)) continue;
+      const double cube = ball.r * ball.r * ball.r;
+      sum.cubes += cube;
+      for (int k = 0; k < 3; ++k) sum.moment[k] += cube * ball.centre[k];
+    }
+    below = first;
+  }
+  return sums;
+}
+
+/// The nodes of the lowest level of a tree that has no more than kMostFilled.
+inline std::vector<FilledBall> filled_balls(const SphereTree& tree) {
+  int level = 0;
+  while (level < tree.top && tree.count(level) > kMostFilled) ++level;
+  std::vector<FilledBall> balls;
+  for (std::uint32_t i = 0; i < tree.count(level); ++i) {
+    const NodeBall ball = tree.ball(level, i);
+    const double sphere = 4 * kPi / 3 * ((ball.r * ball.r) * ball.r);
+    balls.push_back({{ball.centre[0], ball.centre[1], ball.centre[2]},
+                     ball.r,
+                     tree.sums(level, i).volume / sphere});
+  }
+  return balls;
+}
+
+/// How far balls reach from a centre.
+inline double reach_of(const std::vector<FilledBall>& balls, const double* centre) {
+  double reach = 0;
+  for (const FilledBall& ball : balls)
+    reach = std::max(
+        reach,
+        std::hypot(ball.x[0] - centre[0], ball.x[1] - centre[1], ball.x[2] - centre[2]) + ball.r);
+  return reach * (1 + 1e-9);
+}
 
 /// The first of the solids that is an asset with these bytes (are_one_asset(),
 /// query/detail/coincident.h).
@@ -61,15 +218,27 @@ SolidRef solid_ref(std::span<const GpuSolid> solids, std::size_t i, const Put& p
     const TreeHeader& tree = measure == Measure::inner ? header.inner_tree : header.matched_tree;
     const auto k = static_cast<int>(measure);
     ref.tree[k] = TreeRef::of(tree, bytes);
-    ref.sums[k] = SumsRef::of(tree, put(node_sums(tree, here)));
+    ref.sums[k] = SumsRef::of(tree, put(node_sums({header, tree})));
     const TreeRegions regions(header, tree);
     ref.cuts[k] = {put(regions.nodes()), put(regions.ranks()), regions.bins(), regions.shift()};
   }
   ref.cover = CoverRef::of(header.inner_tree, bytes);
-  const std::vector<FilledBall> filled = filled_balls(header);
-  ref.details = asset_details(header, filled);
-  ref.details.level = put(detail_refs(header, bytes));
+  std::vector<DetailRef> levels;
+  std::vector<FilledBall> roots;
+  for (std::uint32_t i = 0; i <= header.detail_count; ++i) {
+    const TreeHeader& tree = matched_tree(header, i);
+    levels.push_back({TreeRef::of(tree, bytes), LevelCost::of(tree)});
+    roots.push_back({{tree.root[0], tree.root[1], tree.root[2]}, tree.root[3], 1});
+  }
+  const std::vector<FilledBall> filled =
+      filled_balls({header, matched_tree(header, header.detail_count)});
+  ref.details.coarser = header.detail_count;
+  ref.details.mean_radius = header.matched_tree.mean_radius;
+  ref.details.reach = reach_of(roots, roots.front().x);
+  ref.details.filled_reach = reach_of(filled, roots.back().x);
+  ref.details.filled_count = static_cast<std::uint32_t>(filled.size());
   ref.details.filled = put(filled);
+  ref.details.level = put(levels);
   ref.details.first_alike = first_alike(solids, header);
   return ref;
 }

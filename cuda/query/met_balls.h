@@ -39,7 +39,7 @@ struct MetBalls {
 
 /// A ball that lies inside or outside but for cones over what meets it; its centre is at x, the
 /// field's frame.
-IST_HD inline void add_ball(const PairMap& a_from_b, const double (&x)[3], double r, bool inside,
+IST_HD inline void add_ball(const Similarity& a_from_b, const double (&x)[3], double r, bool inside,
                             double cones, PartSums& sums) {
   const double whole = 4 * kPi / 3 * (r * r * r);
   const double part = (inside ? whole : 0) + cones;

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstdint>
 
-#include "cuda/query/bits.h"
 #include "cuda/query/pair_memory.h"
 #include "cuda/query/pair_sums.h"
+#include "numerics/bits.h"
 #include "numerics/host_device.h"
 
 // Two trees met by one team: the sum that Descent (query/descent/descent.h) makes level by level,
@@ -25,7 +25,7 @@ class PairDescent {
     if (team_.lane() == 0) {
       m_.steps.plan(m_.tree[0], m_.tree[1], m_.place.a_from_b.scale);
       m_.totals.clear();
-      const PairMap& map = m_.place.a_from_b;
+      const Similarity& map = m_.place.a_from_b;
       for (int i = 0; i < 3; ++i)
         m_.turn[i] = {static_cast<float>(map.m[3 * i]), static_cast<float>(map.m[3 * i + 1]),
                       static_cast<float>(map.m[3 * i + 2]), static_cast<float>(map.scale)};
@@ -132,11 +132,11 @@ class PairDescent {
     const TreeRef& x = m_.tree[of_a ? 0 : 1];
     const int level_x = of_a ? level_a : level_b;
     const std::uint32_t opened = of_a ? pair.a : pair.b;
-    const PairMap& map = of_a ? m_.place.a_from_b : m_.place.b_from_a;
+    const Similarity& map = of_a ? m_.place.a_from_b : m_.place.b_from_a;
     const NodeBall ball =
         m_.tree[of_a ? 1 : 0].ball(of_a ? level_b : level_a, of_a ? pair.b : pair.a);
     double moved[3];
-    map.apply(ball.centre, moved);
+    map.apply_fused(ball.centre, moved);
     const Origin& origin = x.origins[level_x][opened];
     m_.opening.other[k] = {
         static_cast<float>(moved[0] - origin.x), static_cast<float>(moved[1] - origin.y),
@@ -230,13 +230,13 @@ class PairDescent {
 
   /// A sphere in A's unit frame's axes, from B's unit-frame origin.
   IST_HD LensBall seen(bool of_a, std::uint32_t number) const {
-    const PairMap& map = m_.place.a_from_b;
+    const Similarity& map = m_.place.a_from_b;
     const NodeBall ball = m_.tree[of_a ? 0 : 1].ball(kSphereLevel, number);
     if (of_a)
       return {{ball.centre[0] - map.t[0], ball.centre[1] - map.t[1], ball.centre[2] - map.t[2]},
               ball.r};
     LensBall out;
-    map.turn(ball.centre, out.at);
+    map.turn_fused(ball.centre, out.at);
     out.r = ball.r * map.scale;
     return out;
   }
@@ -262,16 +262,16 @@ class PairDescent {
     const std::uint32_t block_b = one_b ? leaf_b / kWidth : leaf_b;
     const Origin& origin_a = m_.tree[0].origins[0][block_a];
     const Origin& origin_b = m_.tree[1].origins[0][block_b];
-    const PairMap& map = m_.place.a_from_b;
+    const Similarity& map = m_.place.a_from_b;
     const double from[3] = {origin_b.x, origin_b.y, origin_b.z};
     double moved[3];
-    map.apply(from, moved);
+    map.apply_fused(from, moved);
     Ball off = {static_cast<float>(moved[0] - origin_a.x),
                 static_cast<float>(moved[1] - origin_a.y),
                 static_cast<float>(moved[2] - origin_a.z), 0};
     const NodeBall ball_a = m_.tree[0].ball(level_a, leaf_a);
     const NodeBall ball_b = m_.tree[1].ball(level_b, leaf_b);
-    map.apply(ball_b.centre, moved);
+    map.apply_fused(ball_b.centre, moved);
     const Ball near_a = {static_cast<float>(ball_a.centre[0] - origin_a.x),
                          static_cast<float>(ball_a.centre[1] - origin_a.y),
                          static_cast<float>(ball_a.centre[2] - origin_a.z),

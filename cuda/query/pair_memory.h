@@ -3,8 +3,8 @@
 #include <cstdint>
 
 #include "cuda/query/lens_sums.h"
-#include "cuda/query/pair_place.h"
 #include "cuda/query/tree_ref.h"
+#include "query/base/pair_place.h"
 
 namespace ist::gpu {
 

@@ -4,12 +4,10 @@
 
 #include "cuda/query/lens_sums.h"
 #include "cuda/query/node_sums.h"
-#include "cuda/query/pair_place.h"
 #include "numerics/host_device.h"
+#include "query/base/pair_place.h"
 
 namespace ist::gpu {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// What one lane sums of the parts of balls inside a field, the field's frame; positions from the
 /// probing tree's unit-frame origin.
@@ -36,7 +34,7 @@ struct PartSums {
   }
 
   /// A node that is inside as a whole.
-  IST_HD void add_whole(const NodeSum& sum, std::uint32_t count, const PairMap& a_from_b) {
+  IST_HD void add_whole(const NodeSum& sum, std::uint32_t count, const Similarity& a_from_b) {
     const double factor = 4 * kPi / 3 * (a_from_b.scale * a_from_b.scale * a_from_b.scale);
     volume += factor * sum.cubes;
     for (int k = 0; k < 3; ++k)

@@ -1,10 +1,9 @@
-#include "cuda/query/patch_kernels.h"
-
 #include <algorithm>
 
 #include "cuda/check.h"
 #include "cuda/launch.h"
 #include "cuda/query/by_warps.h"
+#include "cuda/query/kernels.h"
 #include "cuda/query/patch_steps.h"
 #include "cuda/warp_team.h"
 
@@ -39,9 +38,9 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) divide_contacts(const P
 
 }  // namespace
 
-int patch_blocks() { return blocks_at_a_time(divide_contacts, kThreads); }
+void find_patch_grids(Grids& grids) { grids.divide = blocks_at_a_time(divide_contacts, kThreads); }
 
-void launch_patches(const PatchArrays& batch, int blocks, std::size_t room_bytes,
+void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t room_bytes,
                     cudaStream_t stream) {
   check(cudaMemsetAsync(batch.pairs.counters, 0, sizeof(BatchCounters), stream),
         "starting a batch");
@@ -49,7 +48,8 @@ void launch_patches(const PatchArrays& batch, int blocks, std::size_t room_bytes
   sift_contacts<<<blocks_for(pairs, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
   check_launch("placing pairs of trees");
   const std::size_t fit = room_bytes / (kWarps * PatchRoom::bytes(batch.most_bins));
-  const auto at_a_time = static_cast<unsigned>(std::min(fit, static_cast<std::size_t>(blocks)));
+  const auto at_a_time =
+      static_cast<unsigned>(std::min(fit, static_cast<std::size_t>(grids.divide)));
   divide_contacts<<<at_a_time, kThreads, 0, stream>>>(batch);
   check_launch("dividing contacts into patches");
 }

@@ -5,10 +5,10 @@
 
 #include <ist/gpu_arrays.h>
 
+#include "cuda/query/answers.h"
 #include "cuda/query/cuts_ref.h"
 #include "cuda/query/lens_sums.h"
 #include "cuda/query/pair_memory.h"
-#include "cuda/query/world_sums.h"
 #include "numerics/host_device.h"
 #include "query/contact/contact_numbers.h"
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "cuda/query/disc_part.h"
 #include "numerics/host_device.h"
+#include "numerics/plain.h"
 
 namespace ist::gpu {
 
@@ -117,14 +117,6 @@ struct SeenTriangles {
   IST_HD static Plane plane_through(const double (&x)[3], const double (&n)[3]) {
     return {{static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])},
             static_cast<float>(-dot(n, x))};
-  }
-  IST_HD static double dot(const double (&a)[3], const double (&b)[3]) {
-    return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
-  }
-  IST_HD static void cross(const double (&a)[3], const double (&b)[3], double (&c)[3]) {
-    c[0] = a[1] * b[2] - a[2] * b[1];
-    c[1] = a[2] * b[0] - a[0] * b[2];
-    c[2] = a[0] * b[1] - a[1] * b[0];
   }
   /// Good to a float's digits: of a length, which scales a plane's numbers alike.
   IST_HD static double inverse_root(double square) {

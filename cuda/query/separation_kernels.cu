@@ -1,8 +1,7 @@
-#include "cuda/query/separation_kernels.h"
-
 #include "cuda/check.h"
 #include "cuda/launch.h"
 #include "cuda/query/by_warps.h"
+#include "cuda/query/kernels.h"
 #include "cuda/query/separation_steps.h"
 #include "cuda/warp_team.h"
 
@@ -67,13 +66,12 @@ void launch_searches(const SeparationArrays& batch, int blocks, cudaStream_t str
 
 }  // namespace
 
-SeparationGrids separation_grids() {
-  return {{blocks_at_a_time(separate_pairs<float>, kThreads<float>),
-           blocks_at_a_time(separate_pairs<double>, kThreads<double>)}};
+void find_separation_grids(Grids& grids) {
+  grids.search[0] = blocks_at_a_time(separate_pairs<float>, kThreads<float>);
+  grids.search[1] = blocks_at_a_time(separate_pairs<double>, kThreads<double>);
 }
 
-void launch_separations(const SeparationArrays& batch, const SeparationGrids& grids,
-                        cudaStream_t stream) {
+void launch_separations(const SeparationArrays& batch, const Grids& grids, cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, 2 * sizeof(BatchCounters), stream), "starting a batch");
   sift_separations<<<blocks_for(batch.pairs.pairs.count, kSiftThreads), kSiftThreads, 0, stream>>>(
       batch);

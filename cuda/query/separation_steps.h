@@ -1,13 +1,12 @@
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
 #include "cuda/atomics.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/separation_arrays.h"
 #include "numerics/host_device.h"
-#include "query/asset/shared_constants.h"
+#include "query/base/precision.h"
 
 // A batch of separations, step by step, as batch_steps.h has penetrations.
 
@@ -18,72 +17,37 @@ namespace ist::gpu {
 constexpr std::uint32_t kGapsAlone = 160;
 constexpr std::uint32_t kGapTaskWeight = 16;
 
-/// [u] The axis between the nearest spheres, world; nothing where spheres overlap.
-struct GapWitness {
-  double point_a[3], point_b[3], normal[3];
-};
-
-IST_HD inline void write_separation(const GpuSeparations& to, std::uint32_t i, QueryStatus status,
-                                    const double (&distance)[3], const GapWitness& witness,
-                                    std::uint32_t visits, std::uint32_t spheres) {
-  if (to.distance != nullptr) to.distance[i] = distance[0];
-  if (to.distance_min != nullptr) to.distance_min[i] = distance[1];
-  if (to.distance_max != nullptr) to.distance_max[i] = distance[2];
-  write3(to.point_a, i, witness.point_a[0], witness.point_a[1], witness.point_a[2]);
-  write3(to.point_b, i, witness.point_b[0], witness.point_b[1], witness.point_b[2]);
-  write3(to.normal, i, witness.normal[0], witness.normal[1], witness.normal[2]);
-  if (to.status != nullptr) to.status[i] = status;
-  if (to.node_visits != nullptr) to.node_visits[i] = visits;
-  if (to.sphere_pairs != nullptr) to.sphere_pairs[i] = spheres;
-}
-
 /// World units, as separation(). By one lane.
 template <class Real>
 IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
                               const GapMemory<Real>& memory, const GapTotals& totals) {
-  const QueryStatus status = totals.out_of_time != 0 && !totals.overlap()
-                                 ? QueryStatus::budget_exhausted
-                                 : QueryStatus::ok;
-  double distance[3] = {0, 0, 0};
-  GapWitness witness = {};
+  SeparationRow row = {};
+  row.node_visits = totals.visits;
+  row.sphere_pairs = totals.spheres;
   if (!totals.overlap()) {
+    if (totals.out_of_time != 0) row.status = QueryStatus::budget_exhausted;
     const PairPlace& place = memory.place;
-    const double* const origin = place.origin_a;
     const double unit = place.unit_a;
-    const double length =
-        span_of(memory.tree[0], memory.cover[0], memory.tree[1], memory.cover[1], place.a_from_b);
-    const double off =
-        root((origin[0] * origin[0] + origin[1] * origin[1]) + origin[2] * origin[2]);
-    const double error = gap_error<double>(length) + 1e-15 * off / unit;
+    const double rounding =
+        ist::distance_error<double>(span(memory.root(0), memory.root(1), place.a_from_b));
+    const double error = rounding + place.rounding_of_world();
     // What far apart was not told apart (GapDescent), covers have not yet.
-    const double least = totals.cover - gap_error<double>(length) - error;
-    distance[0] = unit * totals.gap;
-    distance[1] = least > 0 ? unit * least : 0;
-    distance[2] = unit * (totals.gap + error);
+    const double least = totals.cover - rounding - error;
+    row.distance = unit * totals.gap;
+    row.distance_min = unit * (least > 0 ? least : 0);
+    row.distance_max = unit * (totals.gap + error);
 
     const NodeBall a = memory.tree[0].ball(kSphereLevel, totals.a);
     const NodeBall b = memory.tree[1].ball(kSphereLevel, totals.b);
-    double moved[3], axis[3], length2 = 0;
-    place.a_from_b.apply(b.centre, moved);
-    for (int k = 0; k < 3; ++k) {
-      axis[k] = moved[k] - a.centre[k];
-      length2 += axis[k] * axis[k];
-    }
-    const double norm = root(length2), radius_b = place.a_from_b.scale * b.r;
-    for (int k = 0; k < 3; ++k) axis[k] /= norm;
-    for (int row = 0; row < 3; ++row) {
-      const double* const r = place.rotation_a + 3 * row;
-      double on_a = 0, on_b = 0;
-      for (int k = 0; k < 3; ++k) {
-        on_a += r[k] * (unit * (a.centre[k] + a.r * axis[k]));
-        on_b += r[k] * (unit * (moved[k] - radius_b * axis[k]));
-        witness.normal[row] += r[k] * axis[k];
-      }
-      witness.point_a[row] = on_a + origin[row];
-      witness.point_b[row] = on_b + origin[row];
-    }
+    double moved[3];
+    place.a_from_b.apply_fused(b.centre, moved);
+    const Vec3 at_a = vec3(a.centre), at_b = vec3(moved), way = at_b - at_a;
+    const Vec3 axis = way / norm(way);
+    row.point_a = place.to_world(at_a + a.r * axis);
+    row.point_b = place.to_world(at_b - place.a_from_b.scale * b.r * axis);
+    row.normal = turned(place.rotation_a, axis);
   }
-  write_separation(batch.answers, i, status, distance, witness, totals.visits, totals.spheres);
+  write_row(batch.answers, i, row);
 }
 
 /// Which list pair i goes to: 0 float, 1 double; −1: it is answered. One thread a pair.
@@ -91,21 +55,17 @@ IST_HD inline int sift_separation(const SeparationArrays& batch, std::uint32_t i
   PairPlace place;
   const QueryStatus placed = place_trees(batch.pairs, i, place);
   if (placed != QueryStatus::ok) {
-    const double none = nothing(placed);
-    const double distance[3] = {none, none, none};
-    const GapWitness witness = {{none, none, none}, {none, none, none}, {none, none, none}};
-    write_separation(batch.answers, i, placed, distance, witness, 0, 0);
+    write_row(batch.answers, i, no_row<SeparationRow>(placed));
     return -1;
   }
   const SolidRef& a = solid_of(batch.pairs, batch.pairs.pairs.a, i);
   const SolidRef& b = solid_of(batch.pairs, batch.pairs.pairs.b, i);
   const TreeRef& tree_a = a.tree[static_cast<int>(Measure::inner)];
   const TreeRef& tree_b = b.tree[static_cast<int>(Measure::inner)];
-  // As precision_for_gap() (query/base/precision.h).
-  const double ra = tree_a.root[3], rb = tree_b.root[3] * place.a_from_b.scale;
-  const bool alike = rb <= kSingleRatio * ra && ra <= kSingleRatio * rb;
-  const double length = span_of(tree_a, a.cover, tree_b, b.cover, place.a_from_b);
-  return alike && length <= kSingleRatio * (ra + rb) ? 0 : 1;
+  const Precision precision =
+      precision_for_gap(RootBall::of(tree_a.root, a.cover.root),
+                        RootBall::of(tree_b.root, b.cover.root), place.a_from_b);
+  return precision == Precision::float32 ? 0 : 1;
 }
 
 /// Readies the memory for pair i.

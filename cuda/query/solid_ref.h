@@ -5,8 +5,8 @@
 #include "cuda/query/detail_ref.h"
 #include "cuda/query/field_ref.h"
 #include "cuda/query/node_sums.h"
-#include "cuda/query/pair_place.h"
 #include "cuda/query/tree_ref.h"
+#include "query/base/pair_place.h"
 
 namespace ist::gpu {
 

@@ -87,11 +87,8 @@ struct SurfaceRef {
 
   /// The ball in a lane of a block of a level above 0; a negative radius if there is none.
   IST_HD NodeBall lane_ball(int level, std::uint32_t block, std::uint32_t lane) const {
-    const BallBlock& b = in_global_memory(balls[level])[block];
-    const Origin& o = in_global_memory(origins[level])[block];
-    return {{o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
-             o.z + static_cast<double>(b.z[lane])},
-            static_cast<double>(b.r[lane])};
+    return ist::lane_ball(in_global_memory(balls[level])[block],
+                          in_global_memory(origins[level])[block], lane);
   }
 
   /// Corners of triangle 16 · block + lane.

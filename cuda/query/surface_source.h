@@ -26,7 +26,7 @@ class SurfaceSource {
     return steps_through(from, way, surface_, id);
   }
 
-  IST_HD static bool settles(const double (&)[3], double, PartInside&) { return false; }
+  IST_HD static bool settles(const double (&)[3], double, BallPart&) { return false; }
 
   template <class Team>
   IST_HD bool inside(const Team& team, bool wanted, const double (&x)[3]) const {
@@ -72,7 +72,7 @@ class SurfaceSource {
     double far = reach;
     for (int k = 0; k < 3; ++k) {
       p[k] = static_cast<float>(x[k]);
-      far = most(far, size_of(x[k]));
+      far = most(far, std::fabs(x[k]));
     }
     return triangle_comes_near(c, p, static_cast<float>(reach + kRounding * far));
   }

@@ -55,9 +55,9 @@ IST_HD inline void moved_ball(double (&x)[3], double& r) {
 
 /// Of a node of a tree, the field's frame: moved_ball().
 IST_HD inline void node_ball(const TreeRef& tree, int level, std::uint32_t number,
-                             const PairMap& a_from_b, double (&x)[3], double& r) {
+                             const Similarity& a_from_b, double (&x)[3], double& r) {
   const NodeBall ball = tree.ball(level, number);
-  a_from_b.apply(ball.centre, x);
+  a_from_b.apply_fused(ball.centre, x);
   r = ball.r * a_from_b.scale;
   moved_ball(x, r);
 }

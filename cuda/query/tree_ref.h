@@ -5,17 +5,11 @@
 
 #include <ist/asset_layout.h>
 
-#include "numerics/host_device.h"
-#include "query/asset/shared_constants.h"
+#include "query/asset/node_ball.h"
 
 // Trees of an asset where its bytes lie, in device memory or, for tests, in the host's.
 
 namespace ist::gpu {
-
-struct NodeBall {
-  double centre[3];
-  double r;
-};
 
 /// One tree with its offsets resolved. A node is named by a level and a block of it.
 struct TreeRef {
@@ -35,9 +29,9 @@ struct TreeRef {
       const LevelHeader& level = tree.level[i];
       ref.blocks[i] = reinterpret_cast<const BallBlock*>(bytes + level.blocks);
       ref.origins[i] = reinterpret_cast<const Origin*>(bytes + level.origins);
-      ref.cube[i + 1] = tree.root[3] * tree.root[3] * tree.root[3] / level.count;
+      ref.cube[i + 1] = typical_cube(tree.root[3], level.count);
     }
-    ref.cube[0] = tree.root[3] * tree.root[3] * tree.root[3] / tree.sphere_count;
+    ref.cube[0] = typical_cube(tree.root[3], tree.sphere_count);
     for (int k = 0; k < 4; ++k) ref.root[k] = tree.root[k];
     ref.leaf_blocks = tree.level[0].count;
     return ref;
@@ -46,12 +40,8 @@ struct TreeRef {
   /// Unit frame.
   IST_HD NodeBall ball(int level, std::uint32_t node) const {
     if (level == top) return {{root[0], root[1], root[2]}, root[3]};
-    const BallBlock& b = blocks[level + 1][node / kWidth];
-    const Origin& o = origins[level + 1][node / kWidth];
-    const std::uint32_t lane = node % kWidth;
-    return {{o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
-             o.z + static_cast<double>(b.z[lane])},
-            static_cast<double>(b.r[lane])};
+    return lane_ball(blocks[level + 1][node / kWidth], origins[level + 1][node / kWidth],
+                     node % kWidth);
   }
 };
 
@@ -65,7 +55,6 @@ struct OpeningSteps {
 
   /// `scale`: of B in A's unit frame.
   IST_HD void plan(const TreeRef& a, const TreeRef& b, double scale) {
-    const double cube = scale * scale * scale;
     int at_a = a.top, at_b = b.top;
     const auto note = [&] {
       level_a[count] = static_cast<signed char>(at_a);
@@ -73,8 +62,7 @@ struct OpeningSteps {
     };
     for (count = 0; count < kMost && (at_a > 0 || at_b > 0); ++count) {
       note();
-      const bool open_a = at_b == kSphereLevel ||
-                          (at_a != kSphereLevel && a.cube[at_a + 1] >= cube * b.cube[at_b + 1]);
+      const bool open_a = ist::opens_a(at_a, a.cube[at_a + 1], at_b, b.cube[at_b + 1], scale);
       opens_a[count] = open_a;
       --(open_a ? at_a : at_b);
     }

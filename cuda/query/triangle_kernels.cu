@@ -1,8 +1,7 @@
-#include "cuda/query/triangle_kernels.h"
-
 #include "cuda/check.h"
 #include "cuda/launch.h"
 #include "cuda/query/by_warps.h"
+#include "cuda/query/kernels.h"
 
 namespace ist::gpu {
 namespace {
@@ -83,8 +82,8 @@ TriangleGrids triangle_grids() {
 }
 
 template <class Kind>
-void launch_triangle_pairs(const FieldBatch& batch, const TriangleGrids& grids,
-                           cudaStream_t stream) {
+void launch_triangle_pairs(const FieldBatch& batch, const Grids& all, cudaStream_t stream) {
+  const TriangleGrids& grids = all.of[Kind::kGroup];
   constexpr std::uint64_t kLeastOfRound = 1 << 14;  // of pairs that keep some 700 words each
   const auto rounds =
       static_cast<std::uint32_t>((batch.pairs.count + kLeastOfRound - 1) / kLeastOfRound);
@@ -108,9 +107,7 @@ void launch_triangle_pairs(const FieldBatch& batch, const TriangleGrids& grids,
 
 template TriangleGrids triangle_grids<MeshKind>();
 template TriangleGrids triangle_grids<FacetKind>();
-template void launch_triangle_pairs<MeshKind>(const FieldBatch&, const TriangleGrids&,
-                                              cudaStream_t);
-template void launch_triangle_pairs<FacetKind>(const FieldBatch&, const TriangleGrids&,
-                                               cudaStream_t);
+template void launch_triangle_pairs<MeshKind>(const FieldBatch&, const Grids&, cudaStream_t);
+template void launch_triangle_pairs<FacetKind>(const FieldBatch&, const Grids&, cudaStream_t);
 
 }  // namespace ist::gpu

@@ -41,7 +41,7 @@ struct MeshKind {
   }
   template <class Team>
   IST_HD static bool root_inside(const Team& team, const FieldRef& field, const TreeRef& tree,
-                                 const PairMap& a_from_b) {
+                                 const Similarity& a_from_b) {
     double centre[3], reach;
     node_ball(tree, tree.top, 0, a_from_b, centre, reach);
     return inside_surface(team, field.mesh, team.lane() == 0, centre);
@@ -60,7 +60,7 @@ struct FacetKind {
   IST_HD static Source source(const ProbeMemory& memory) { return {memory.field, memory.whole}; }
   /// Its sides are told ball by ball.
   template <class Team>
-  IST_HD static bool root_inside(const Team&, const FieldRef&, const TreeRef&, const PairMap&) {
+  IST_HD static bool root_inside(const Team&, const FieldRef&, const TreeRef&, const Similarity&) {
     return false;
   }
 };

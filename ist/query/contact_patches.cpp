@@ -22,16 +22,6 @@
 namespace ist {
 namespace {
 
-/// Whether contacts are divided along B's tree: the smaller solid's, whose contacts stay with its
-/// own corners while it slides, or the only one fine enough. The pose has no say.
-bool divides_b(const SphereTree& a, double radius_a, const SphereTree& b, double radius_b) {
-  const std::uint32_t blocks_a = a.level[0].count;
-  const std::uint32_t blocks_b = b.level[0].count;
-  const std::uint32_t fewer = std::min(blocks_a, blocks_b);
-  if (fewer < kFewContactBlocks && blocks_a != blocks_b) return blocks_b > blocks_a;
-  return radius_b <= radius_a;
-}
-
 /// Contact patches of two trees, by the method that penetration() takes.
 class PairPatches {
  public:
@@ -56,7 +46,7 @@ class PairPatches {
       start_probed();
       return whole_ = both_.exact(method_.b_probes, limits, &bins);
     }
-    of_b_ = divides_b(tree_a_, tree_a_.header->root[3], tree_b_,
+    of_b_ = divides_b(tree_a_.level[0].count, tree_a_.header->root[3], tree_b_.level[0].count,
                       tree_b_.header->root[3] * pose_.a_from_b.scale);
     bins.start(of_b_ ? tree_b_ : tree_a_, of_b_);
     Descent descent(tree_a_, tree_b_, pose_, limits, scratch_, &bins);

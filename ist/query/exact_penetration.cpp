@@ -23,32 +23,28 @@ Query query_of(const PlacedTree& a, const MeshTree& mesh_a, const PlacedTree& b,
   return {mesh_a, moved_in_mesh(mesh_a), mesh_b, moved_b, pose.a_from_b, pose.b_from_a, scratch};
 }
 
-}  // namespace
-
-namespace {
-
 /// Sums of an overlap or a part of it in world units, all but the volume's bounds.
-struct WorldSums {
+struct ExactInWorld {
   double volume;
   Eigen::Vector3d centroid, force, torque;
 
-  WorldSums(const ExactSums& sums, const exact::Point& origin, const RelativePose& pose) {
+  ExactInWorld(const ExactSums& sums, const exact::Point& origin, const RelativePose& pose) {
     const double u = pose.unit_a, found = sums.volume();
     volume = found * (u * u * u);
-    force = pose.rotation_a * vector(sums.force) * (u * u);
+    force = pose.rotation() * vector(sums.force) * (u * u);
     centroid.setZero();
     if (found != 0) centroid = pose.to_world(vector(origin) + vector(sums.moment) / (24 * found));
     // The sums' origin from B's.
     const Eigen::Vector3d shift(pose.a_from_b.t[0], pose.a_from_b.t[1], pose.a_from_b.t[2]);
     const Eigen::Vector3d arm =
-        pose.rotation_a * ((vector(origin) - shift) * u) + pose.unit_offset_b;
-    torque = pose.rotation_a * vector(sums.torque) * (u * u * u) + arm.cross(force);
+        pose.rotation() * ((vector(origin) - shift) * u) + vector(pose.offset_b);
+    torque = pose.rotation() * vector(sums.torque) * (u * u * u) + arm.cross(force);
   }
 };
 
 Penetration whole_answer(const ExactOverlap& found, const RelativePose& pose) {
   const double u = pose.unit_a;
-  const WorldSums sums(found.sums, found.origin, pose);
+  const ExactInWorld sums(found.sums, found.origin, pose);
   Penetration answer;
   answer.volume = std::max(0.0, sums.volume);
   const double error = found.error * (u * u * u) + (answer.volume - sums.volume);
@@ -132,7 +128,7 @@ std::size_t write_parts(std::span<ExactPart> parts, const exact::Point& origin,
   std::uint32_t place[ExactScratch::kMostParts];
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     if (parts[p].kept != p) continue;
-    const WorldSums sums(parts[p].sums, origin, pose);
+    const ExactInWorld sums(parts[p].sums, origin, pose);
     ContactPatch& patch = patches[place[p] = count++];
     patch = {};
     patch.id = parts[p].id;

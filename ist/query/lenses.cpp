@@ -96,7 +96,7 @@ class LensSearch {
     lens.radius *= pose_.unit_a;
     lens.thickness = (end - begin) * pose_.unit_a;
     const Vector3d axis = d > 0 ? Vector3d(way / d) : Vector3d::UnitZ();
-    lens.axis = pose_.rotation_a * axis;
+    lens.axis = pose_.rotation() * axis;
     lens.centre = pose_.to_world(a.centre + 0.5 * (begin + end) * axis);
     lens.sphere_a = index_a_[a.index];
     lens.sphere_b = index_b_[b.index];

@@ -28,11 +28,11 @@ class MeetingSearch {
         a_side_(a, b, pose.a_from_b),
         b_side_(b, a, pose.b_from_a),
         scale_(pose.a_from_b.scale),
-        precision_(precision_for_gap(a, b, pose)),
+        precision_(precision_for_gap(a.root(), b.root(), pose.a_from_b)),
         waiting_(scratch) {
-    const double length = span(a, b, pose);
+    const double length = span(a.root(), b.root(), pose.a_from_b);
     error_ = distance_error(precision_, length) + distance_error(Precision::float64, length) +
-             1e-15 * pose.unit_origin_a.norm() / pose.unit_a;
+             pose.rounding_of_world();
   }
 
   Overlapping run() {

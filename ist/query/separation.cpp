@@ -34,7 +34,7 @@ class GapDescent {
         a_side_(a, b, pose.a_from_b),
         b_side_(b, a, pose.b_from_a),
         scale_(pose.a_from_b.scale),
-        precision_(precision_for_gap(a, b, pose)),
+        precision_(precision_for_gap(a.root(), b.root(), pose.a_from_b)),
         stack_(scratch.waiting.get()),
         budget_(visit_limit(settings.max_visits)) {}
 
@@ -182,9 +182,9 @@ Separation surface_separation(const PlacedTree& a, const PlacedTree& b, const Re
     result.distance_max = unit * simplified;
     return result;
   }
-  const double error =
-      simplified + mesh_a.header->rounding + pose.a_from_b.scale * mesh_b.header->rounding +
-      moved_by_poses(a, b, mesh_b, pose) + 1e-15 * pose.unit_origin_a.norm() / unit;
+  const double error = simplified + mesh_a.header->rounding +
+                       pose.a_from_b.scale * mesh_b.header->rounding +
+                       moved_by_poses(a, b, mesh_b, pose) + pose.rounding_of_world();
   const auto world = [&](const exact::Point& p) { return pose.to_world({p.x, p.y, p.z}); };
   const exact::Point between = found.b - found.a;
   result.distance = unit * found.distance;
@@ -192,7 +192,7 @@ Separation surface_separation(const PlacedTree& a, const PlacedTree& b, const Re
   result.distance_max = unit * (found.distance * (1 + 1e-15) + error);
   result.point_a = world(found.a);
   result.point_b = world(found.b);
-  result.normal = pose.rotation_a * Eigen::Vector3d(between.x, between.y, between.z).normalized();
+  result.normal = pose.rotation() * Eigen::Vector3d(between.x, between.y, between.z).normalized();
   return result;
 }
 
@@ -222,10 +222,9 @@ Separation find_separation(const PlacedTree& a, const PlacedTree& b,
   if (descent.overlap()) return result;
 
   const double unit = pose->unit_a;
-  const double length = span(tree_a, tree_b, *pose);
+  const double length = span(tree_a.root(), tree_b.root(), pose->a_from_b);
   const double kernel_error = distance_error(descent.precision(), length);
-  const double world_error =
-      distance_error(Precision::float64, length) + 1e-15 * pose->unit_origin_a.norm() / unit;
+  const double world_error = distance_error(Precision::float64, length) + pose->rounding_of_world();
   const double gap = descent.gap();
   result.distance = unit * gap;
   result.distance_min = unit * std::max(0.0, descent.cover() - kernel_error - world_error);
@@ -233,7 +232,7 @@ Separation find_separation(const PlacedTree& a, const PlacedTree& b,
   const Eigen::Vector3d axis = (descent.centre_b() - descent.centre_a()).normalized();
   result.point_a = pose->to_world(descent.centre_a() + descent.radius_a() * axis);
   result.point_b = pose->to_world(descent.centre_b() - descent.radius_b() * axis);
-  result.normal = pose->rotation_a * axis;
+  result.normal = pose->rotation() * axis;
   return result;
 }
 

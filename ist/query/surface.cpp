@@ -16,9 +16,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Further from a solid, in its own lengths, nothing is told. Squares of squares stay finite.
-constexpr double kFarthest = 1e60;
-
 template <class Answer>
 Answer refused(QueryStatus status) noexcept;
 template <>
@@ -43,7 +40,7 @@ struct SolidFrame {
   static std::optional<SolidFrame> of(const Pose& pose, double scale, const Vector3d& offset,
                                       int exponent) noexcept {
     const std::optional<Eigen::Quaterniond> turn = usable_rotation(pose, scale);
-    if (!turn || !(scale <= kFarthest) || !(scale >= 1 / kFarthest)) return std::nullopt;
+    if (!turn || !ratio_in_range(scale)) return std::nullopt;
     const Eigen::Matrix3d rotation = turn->toRotationMatrix();
     return SolidFrame{rotation,
                       Vector3d(pose.t[0], pose.t[1], pose.t[2]) + rotation * (scale * offset),
@@ -52,10 +49,8 @@ struct SolidFrame {
   Vector3d world(const Vector3d& x) const noexcept { return rotation * (unit * x) + origin; }
   /// Empty where it is too far or no place at all.
   std::optional<Vector3d> own(const Vector3d& world) const noexcept {
-    if (!(world.cwiseAbs().maxCoeff() <= kFarthest) || !world.allFinite()) return std::nullopt;
     const Vector3d x = rotation.transpose() * (world - origin) / unit;
-    if (!(x.cwiseAbs().maxCoeff() <= kFarthest)) return std::nullopt;
-    return x;
+    return in_pose_range(plain(x)) ? std::optional(x) : std::nullopt;
   }
 };
 
@@ -77,7 +72,7 @@ struct OwnRay {
       return std::ldexp(std::ldexp(x, -exponent / 2), exponent / 2 - exponent);
     });
     return OwnRay{*origin, (frame.rotation.transpose() * scaled).normalized(),
-                  std::min(ray.longest, kFarthest) / frame.unit};
+                  std::min(ray.longest, kFarthestPose) / frame.unit};
   }
 };
 
@@ -190,7 +185,8 @@ Chord within_radius(const Vector3d& x, const Vector3d& d, double radius) noexcep
 }
 
 Chord chord_of(const HalfSpaceShape& s, const Vector3d& x, const Vector3d& d) noexcept {
-  return below(s.normal.dot(x), s.normal.dot(d), s.offset);
+  const Vector3d normal(s.normal);
+  return below(normal.dot(x), normal.dot(d), s.offset);
 }
 Chord chord_of(const BoxShape& s, const Vector3d& x, const Vector3d& d) noexcept {
   Chord chord;

@@ -146,7 +146,8 @@ class Capacity {
     const double scale = trees.pose.a_from_b.scale;
     const double roots = trees.a.header->root[3] + scale * trees.b.header->root[3];
     // What the kernels' rounding may let through.
-    const double blur = distance_error(precision_for(trees.a, trees.b, trees.pose), 32 * roots);
+    const double blur = distance_error(
+        precision_for(trees.a.root(), trees.b.root(), trees.pose.a_from_b.scale), 32 * roots);
     const Balls a = balls_of(trees.a, level_a, 1), b = balls_of(trees.b, level_b, scale);
     std::size_t group = 1;
     if (groups)

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "query/asset/surface_tree.h"
+#include "query/probe/sides.h"
 #include "support/asset_bytes.h"
 #include "support/test_meshes.h"
 
@@ -47,8 +48,8 @@ void walk(const AlignedBytes& bytes) {
     const CellBrick& brick = tree.bricks[code];
     for (std::uint64_t left = brick.surface; left != 0; left &= left - 1) {
       ++cells;
-      const SurfaceTree::CellList list =
-          tree.cell_list(brick, static_cast<std::uint32_t>(std::countr_zero(left)));
+      const CellList list = cell_list(brick, static_cast<std::uint32_t>(std::countr_zero(left)),
+                                      [&](std::uint32_t i) { return tree.cell_ends[i]; });
       for (std::uint32_t e = list.begin; e < list.end; ++e)
         for (int k = 0; k < 3; ++k) {
           float corner[3];

@@ -23,15 +23,15 @@ rpath="-Wl,-rpath,$(pkg-config --variable=libdir ist-query)"
 "$cc" -std=c11 -Wall -Wextra -pedantic -Werror "$source/examples/c/c.c" \
   $(pkg-config --cflags --libs ist-query) "$rpath" -o "$work/c"
 "$work/c" "$a" "$b"
-"$cxx" -std=c++20 "$source/examples/bake_and_query/bake_and_query.cpp" \
-  $(pkg-config --cflags --libs ist) "$rpath" -o "$work/bake_and_query"
+"$cxx" -std=c++20 -c "$source/examples/bake_and_query/bake_and_query.cpp" \
+  $(pkg-config --cflags ist) -o "$work/bake_and_query.o"
+"$cxx" "$work/bake_and_query.o" $(pkg-config --libs ist) "$rpath" -o "$work/bake_and_query"
 "$work/bake_and_query" "$@"
 readelf -d "$work/bake_and_query" | grep -q 'libist\.so'
 
 # The static libraries of the same tree, by name.
-"$cxx" -std=c++20 "$source/examples/bake_and_query/bake_and_query.cpp" \
-  $(pkg-config --static --cflags --libs ist | sed 's/-list_query/-l:libist_query.a/; s/-list /-l:libist.a /') \
-  -o "$work/bake_and_query"
+"$cxx" "$work/bake_and_query.o" -o "$work/bake_and_query" \
+  $(pkg-config --static --libs ist | sed 's/-list_query/-l:libist_query.a/; s/-list /-l:libist.a /')
 "$work/bake_and_query" "$@"
 if readelf -d "$work/bake_and_query" | grep 'libist'; then exit 1; fi
 

@@ -52,7 +52,7 @@ class CoincidentInstances : public ::testing::Test {
     return {asset_.view(), pose, scale};
   }
   CoincidenceWeight weight(const PlacedTree& b) const {
-    return coincidence_weight(tree_, relative_pose(still(), b)->a_from_b);
+    return coincidence_weight(tree_.root, tree_.mean_radius, relative_pose(still(), b)->a_from_b);
   }
   /// What is answered, over all pairs of spheres in double.
   double reference(const PlacedTree& b) const {

@@ -10,6 +10,7 @@
 
 #include <ist/gpu_query.h>
 
+#include "cuda/query/batch_arrays.h"
 #include "cuda/query/make_solid_ref.h"
 
 namespace ist::testing {

@@ -13,6 +13,7 @@
 #include "bake/field/field_mesh.h"
 #include "mesh/exact_sign.h"
 #include "query/asset/surface_tree.h"
+#include "query/probe/sides.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 
@@ -266,7 +267,8 @@ TEST(Field, GridTellsInsideFromOutside) {
         inside = (brick.inside >> bit & 1) != 0;
         if ((brick.surface >> bit & 1) != 0) {
           ++in_surface_cells;
-          const auto [begin, end] = tree.cell_list(brick, static_cast<std::uint32_t>(bit));
+          const auto [begin, end] = cell_list(brick, static_cast<std::uint32_t>(bit),
+                                              [&](std::uint32_t i) { return tree.cell_ends[i]; });
           std::optional<int> steps = 0;
           for (std::uint32_t e = begin; e < end && steps; ++e) {
             const std::uint32_t triangle = tree.cell_triangles[e];

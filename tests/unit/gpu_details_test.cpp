@@ -6,6 +6,8 @@
 #include <random>
 #include <string>
 
+#include "cuda/query/detail_sums.h"
+#include "numerics/team.h"
 #include "query/base/relative_pose.h"
 #include "query/kernel/look_kernel.h"
 #include "support/detailed_pairs.h"
@@ -77,7 +79,7 @@ TEST(GpuDetails, QuickLooksAreTheCpus) {
   std::size_t met = 0;
   for (const BatchPair& pair : detailed_pairs(200, 84)) {
     const gpu::SolidRef &a = solids.refs()[pair.a], &b = solids.refs()[pair.b];
-    gpu::PairPlace place;
+    PairPlace place;
     ASSERT_TRUE(
         place.place(a.frame, pair.pose_a, pair.scale_a, b.frame, pair.pose_b, pair.scale_b));
     const SerialTeam team;
@@ -93,8 +95,8 @@ TEST(GpuDetails, QuickLooksAreTheCpus) {
         SphereTree(header_b, matched_tree(header_b, header_b.detail_count)), pose->a_from_b, true);
     met += cpu.volume > 0 ? 1 : 0;
     // The CPU's balls stand where floats say.
-    EXPECT_NEAR(gpu.volume, cpu.volume, 1e-5 * cpu.volume + 1e-6 * cpu.slope.by_translation.norm());
-    const double slope = 1e-4 * (cpu.slope.by_translation.norm() + std::cbrt(cpu.volume) * 0.1);
+    EXPECT_NEAR(gpu.volume, cpu.volume, 1e-5 * cpu.volume + 1e-6 * norm(cpu.slope.by_translation));
+    const double slope = 1e-4 * (norm(cpu.slope.by_translation) + std::cbrt(cpu.volume) * 0.1);
     for (int k = 0; k < 3; ++k) {
       EXPECT_NEAR(gpu.slope.by_translation[k], cpu.slope.by_translation[k], slope);
       EXPECT_NEAR(gpu.slope.by_rotation[k], cpu.slope.by_rotation[k], slope);

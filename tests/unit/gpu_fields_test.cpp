@@ -8,6 +8,7 @@
 
 #include <ist/error.h>
 
+#include "cuda/query/disc_part.h"
 #include "query/base/turned_over.h"
 
 #include "support/host_patches.h"
@@ -264,7 +265,7 @@ TEST(GpuFields, NodesOnATrianglesPlane) {
   std::vector<BatchPair> pairs;
   for (int i = 0; i < 1000; ++i) {
     const auto node = static_cast<std::uint32_t>(random.uniform(0, 1) * tree.leaf_blocks);
-    const gpu::NodeBall ball = tree.ball(0, node);
+    const NodeBall ball = tree.ball(0, node);
     double c[3][3], on[3], moved[3] = {0, 0, 0};
     do {
       field.field.mesh.corners(static_cast<std::uint32_t>(random.uniform(0, 1600)), c);

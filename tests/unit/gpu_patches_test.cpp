@@ -130,17 +130,18 @@ class RegionSums {
       return solids.refs()[asset].tree[static_cast<int>(measure)];
     };
     const gpu::TreeRef &a = tree_of(pair.a), &b = tree_of(pair.b);
-    gpu::PairPlace place;
+    PairPlace place;
     EXPECT_TRUE(place.place(solids.refs()[pair.a].frame, pair.pose_a, pair.scale_a,
                             solids.refs()[pair.b].frame, pair.pose_b, pair.scale_b));
-    const bool of_b = gpu::divides_b(a, b, place.a_from_b.scale);
+    const bool of_b =
+        divides_b(a.leaf_blocks, a.root[3], b.leaf_blocks, b.root[3] * place.a_from_b.scale);
     cuts_ = solids.refs()[of_b ? pair.b : pair.a].cuts[static_cast<int>(measure)];
     sums_.resize(cuts_.bins);
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> to_world(place.rotation_a);
     for (std::uint32_t i = 0; i < kWidth * a.leaf_blocks; ++i) {
-      const gpu::NodeBall x = a.ball(kSphereLevel, i);
+      const NodeBall x = a.ball(kSphereLevel, i);
       for (std::uint32_t j = 0; x.r > 0 && j < kWidth * b.leaf_blocks; ++j) {
-        const gpu::NodeBall y = b.ball(kSphereLevel, j);
+        const NodeBall y = b.ball(kSphereLevel, j);
         if (!(y.r > 0)) continue;
         double moved[3];
         place.a_from_b.apply(y.centre, moved);
@@ -156,7 +157,7 @@ class RegionSums {
         sum.pushed += force.norm();
         sum.force += force;
         sum.moment += volume * (unit * (to_world * (from + l.cap_b / (l.cap_a + l.cap_b) * way)) +
-                                Eigen::Map<const Vector3d>(place.origin_a));
+                                vector(place.origin_a));
       }
     }
   }

@@ -20,32 +20,39 @@ namespace {
 
 using Eigen::Vector3d;
 
-TEST(GpuQuery, SeesPairsAsTheCpuDoes) {
+TEST(GpuQuery, APlaceIsThatOfTheMatricesByEigen) {
+  const HostSolids solids(batch_solids());
   RandomPairs poses(1);
   for (const BatchPair& pair : poses.pairs(200)) {
     const auto [a, b] = placed(pair);
-    const std::optional<RelativePose> cpu = relative_pose(a, b);
-    ASSERT_TRUE(cpu);
-    const auto frame = [](const PlacedTree& tree) {
+    PairPlace place;
+    ASSERT_TRUE(place.place(solids.refs()[pair.a].frame, a.pose, a.scale,
+                            solids.refs()[pair.b].frame, b.pose, b.scale));
+    const auto world_from = [](const PlacedTree& tree) {
       const AssetHeader& h = tree.tree.header();
-      return gpu::AssetFrame{{h.centre[0], h.centre[1], h.centre[2]}, std::ldexp(1.0, h.exponent)};
+      return Eigen::Affine3d(
+          Eigen::Translation3d(Vector3d(tree.pose.t)) *
+          Eigen::Quaterniond(tree.pose.q[0], tree.pose.q[1], tree.pose.q[2], tree.pose.q[3])
+              .normalized() *
+          Eigen::Scaling(tree.scale) * Eigen::Translation3d(vector(h.centre)) *
+          Eigen::Scaling(std::ldexp(1.0, h.exponent)));
     };
-    gpu::PairPlace place;
-    ASSERT_TRUE(place.place(frame(a), a.pose, a.scale, frame(b), b.pose, b.scale));
-    const auto near = [](double x, double y) { EXPECT_NEAR(x, y, 1e-13 * (1 + std::abs(y))); };
-    for (int k = 0; k < 9; ++k) {
-      near(place.a_from_b.m[k], cpu->a_from_b.m[k]);
-      near(place.b_from_a.m[k], cpu->b_from_a.m[k]);
-      near(place.rotation_a[k], cpu->rotation_a(k / 3, k % 3));
+    const auto near = [](const Vector3d& x, const Vector3d& y) {
+      EXPECT_LE((x - y).norm(), 1e-12 * (1 + y.norm()));
+    };
+    const Eigen::Affine3d world_a = world_from(a), world_b = world_from(b);
+    for (const Vec3& x : {Vec3{0, 0, 0}, Vec3{0.3, -0.7, 0.2}, Vec3{-1, 1, 0.5}}) {
+      const double from[3] = {x.x, x.y, x.z};
+      double to[3];
+      near(vector(place.to_world(x)), world_a * vector(x));
+      place.a_from_b.apply(from, to);
+      near(Vector3d(to), world_a.inverse() * (world_b * vector(x)));
+      place.b_from_a.apply(from, to);
+      near(Vector3d(to), world_b.inverse() * (world_a * vector(x)));
     }
-    for (int k = 0; k < 3; ++k) {
-      near(place.a_from_b.t[k], cpu->a_from_b.t[k]);
-      near(place.b_from_a.t[k], cpu->b_from_a.t[k]);
-      near(place.origin_a[k], cpu->unit_origin_a[k]);
-      near(place.offset_b[k], cpu->unit_offset_b[k]);
-    }
-    near(place.a_from_b.scale, cpu->a_from_b.scale);
-    near(place.unit_a, cpu->unit_a);
+    near(vector(place.offset_b), world_b.translation() - Vector3d(b.pose.t));
+    EXPECT_NEAR(place.a_from_b.scale * place.unit_a, std::cbrt(world_b.linear().determinant()),
+                1e-13);
   }
 }
 
@@ -174,7 +181,7 @@ TEST(GpuQuery, CountsChildrenThatMeet) {
   for (const BatchPair& pair : RandomPairs(9).pairs(300)) {
     const gpu::SolidRef& a = solids.refs()[pair.a];
     const gpu::SolidRef& b = solids.refs()[pair.b];
-    gpu::PairPlace place;
+    PairPlace place;
     ASSERT_TRUE(
         place.place(a.frame, pair.pose_a, pair.scale_a, b.frame, pair.pose_b, pair.scale_b));
     const auto count = [&](std::uint32_t most) {
@@ -211,8 +218,7 @@ TEST(GpuQuery, ForceAndTorqueAreTheGradientsTurned) {
   to.rotation_gradient = turn;
   to.force = force;
   to.torque = torque;
-  gpu::write_answer(to, 0, {.volume = 1, .centre = {}, .push = {2, -3, 5}, .turn = {-7, 11, 13}},
-                    {});
+  gpu::write_answer(to, 0, {1, {0, 0, 0}, {2, -3, 5}, {-7, 11, 13}}, {});
   for (int k = 0; k < 3; ++k) {
     EXPECT_EQ(force[k], -push[k]);
     EXPECT_EQ(torque[k], -turn[k]);

@@ -51,7 +51,7 @@ LeastGaps least_gaps(const PlacedTree& a, const PlacedTree& b) {
       const double d = (y.centre - x.centre).norm();
       if (d - x.r - y.r < least.spheres) {
         least.spheres = d - x.r - y.r;
-        least.normal = pose.rotation_a * (y.centre - x.centre) / d;
+        least.normal = pose.rotation() * (y.centre - x.centre) / d;
       }
       least.covers = std::min(least.covers, d - x.cover - y.cover);
     }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "numerics/host_device.h"
+
 // Constants of the queries, on the CPU and on the GPU.
 
 namespace ist {
@@ -14,6 +16,9 @@ inline constexpr double kFarthestPose = 1e60;
 /// Quaternions and normals of these lengths are normalised: their squares are neither 0 nor Inf.
 inline constexpr double kShortestDirection = 1e-150, kLongestDirection = 1e150;
 
+/// Of a field's lengths and distances; their squares stay finite.
+inline constexpr double kLongestLength = 1e150;
+
 /// From this ratio of sizes on all is in double. Float keeps a sum of lenses to 1e-5 while both
 /// trees' spheres are of like size: what is rounded are differences to the nearest block's origin,
 /// a few radii long.
@@ -24,6 +29,11 @@ inline constexpr double kLeastAngle = 1e-6;
 /// Part of a ball's radius, squared, within which an edge is too near its centre: the angle under
 /// which the edge is seen is as wrong as the rounding of positions over the way to it.
 inline constexpr double kOnEdge2 = 0x1p-28;
+/// By this part of its radius such a ball is moved along an axis: in a direction in which no edge
+/// of a made thing lies.
+IST_HD constexpr double moved_along(int axis) {
+  return 0x1p-12 * (axis == 0 ? 0.43877 : axis == 1 ? 0.61803 : 0.65236);
+}
 
 // Overlapping sphere pairs number kPairShare · n_a n_b · ball(r_a + r_b) · (V + kPairRim (r_a +
 // r_b) √(V L)). Here n is spheres per volume, r a mean radius, V the overlap, and L the size of the
@@ -54,5 +64,7 @@ inline constexpr double kCopyAlone = 0.4, kCopyApart = 1.6;
 // kSpeck of the other overlaps by nothing.
 inline constexpr double kPokeOut = 3;
 inline constexpr double kSpeck = 1e-9;
+/// Least distance of two centres: equal balls in one place then overlap by all of their volume.
+inline constexpr double kLeastDistance = 1e-18;
 
 }  // namespace ist

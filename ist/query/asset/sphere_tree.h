@@ -8,14 +8,9 @@
 
 #include <ist/asset_layout.h>
 
-#include "query/asset/shared_constants.h"
+#include "query/asset/node_ball.h"
 
 namespace ist {
-
-struct NodeBall {
-  double centre[3] = {};
-  double r = 0;
-};
 
 /// What is known of all spheres below a block.
 struct NodeSums {
@@ -52,20 +47,13 @@ struct SphereTree {
     if (at_level == top)
       return {{header->root[0], header->root[1], header->root[2]}, header->root[3]};
     const Level& above = level[at_level + 1];
-    const BallBlock& b = above.blocks[block / kWidth];
-    const Origin& o = above.origins[block / kWidth];
-    const std::uint32_t lane = block % kWidth;
-    return {{o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
-             o.z + static_cast<double>(b.z[lane])},
-            static_cast<double>(b.r[lane])};
+    return lane_ball(above.blocks[block / kWidth], above.origins[block / kWidth], block % kWidth);
   }
 
+  RootBall root() const noexcept { return RootBall::of(header->root, header->root_cover); }
+
   NodeBall sphere(std::uint32_t block, std::uint32_t lane) const noexcept {
-    const BallBlock& b = level[0].blocks[block];
-    const Origin& o = level[0].origins[block];
-    return {{o.x + static_cast<double>(b.x[lane]), o.y + static_cast<double>(b.y[lane]),
-             o.z + static_cast<double>(b.z[lane])},
-            static_cast<double>(b.r[lane])};
+    return lane_ball(level[0].blocks[block], level[0].origins[block], lane);
   }
 
   NodeSums sums(int at_level, std::uint32_t block) const noexcept {
@@ -85,10 +73,8 @@ struct SphereTree {
     return static_cast<double>(level[at_level + 1].nodes[block / kWidth].cover[block % kWidth]);
   }
 
-  /// Cube of the typical radius of a level's nodes, up to a factor that all trees share: blocks
-  /// tile the root ball.
   double typical_cube(int at_level) const noexcept {
-    return header->root[3] * header->root[3] * header->root[3] / count(at_level);
+    return ist::typical_cube(header->root[3], count(at_level));
   }
 
   /// The leaf blocks [begin, end) below a node.

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -64,18 +63,6 @@ struct SurfaceTree {
     out[0] = b.x[vertex];
     out[1] = b.y[vertex];
     out[2] = b.z[vertex];
-  }
-
-  /// A cell's triangles are cell_triangles[begin … end).
-  struct CellList {
-    std::uint32_t begin, end;
-  };
-
-  /// Of a cell whose bit is among the brick's `surface`.
-  CellList cell_list(const CellBrick& brick, std::uint32_t bit) const noexcept {
-    const std::uint64_t before = brick.surface & ((std::uint64_t{1} << bit) - 1);
-    const std::uint32_t cell = brick.first + static_cast<std::uint32_t>(std::popcount(before));
-    return {brick.list + (before == 0 ? 0 : cell_ends[cell - 1]), brick.list + cell_ends[cell]};
   }
 
   const FieldHeader* header;

@@ -1,14 +1,17 @@
 #pragma once
 
-// The members of answers, listed once: C structs, Python's columns and comparisons go through this
-// list. tests/unit/members_test.cpp fails if an answer has a member that is not here.
+#include "numerics/host_device.h"
+
+// The members of answers, listed once: C structs, Python's columns, the GPU's arrays and
+// comparisons go through this list. tests/unit/members_test.cpp fails if an answer has a member
+// that is not here.
 
 namespace ist {
 
 /// visit(member of each) for every member that all of `answers` have: answers of queries, their C
 /// structs, and columns that name members alike.
 template <class Visit, class... Answers>
-constexpr void for_each_member(const Visit& visit, Answers&... answers) {
+IST_HD constexpr void for_each_member(const Visit& visit, Answers&... answers) {
 #define IST_MEMBER(name) \
   if constexpr ((requires { answers.name; } && ...)) visit(answers.name...)
   IST_MEMBER(id);

@@ -1,11 +1,6 @@
 #pragma once
 
-// As numerics/host_device.h: the device's code includes this header too.
-#ifdef __CUDACC__
-#define IST_HD __host__ __device__
-#else
-#define IST_HD
-#endif
+#include "numerics/host_device.h"
 
 namespace ist {
 

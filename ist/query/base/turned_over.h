@@ -1,9 +1,11 @@
 #pragma once
 
-#include <Eigen/Geometry>
 #include <span>
 
 #include <ist/query.h>
+
+#include "query/base/relative_pose.h"
+#include "query/base/world_sums.h"
 
 // Answers about a motion of one solid, which is at `moved`, about its origin, as answers about a
 // motion of the other, at `other`, about its own.
@@ -11,22 +13,22 @@
 namespace ist {
 
 /// [u] From the other's origin to the first one's, world.
-inline Eigen::Vector3d arm_between(const Pose& moved, const Pose& other) noexcept {
-  return {moved.t[0] - other.t[0], moved.t[1] - other.t[1], moved.t[2] - other.t[2]};
+inline Vec3 arm_between(const Pose& moved, const Pose& other) noexcept {
+  return vec3(moved.t) - vec3(other.t);
 }
 
 inline void turn_over(const Pose& moved, const Pose& other, Penetration& answer) noexcept {
-  const Eigen::Vector3d arm = arm_between(moved, other);
-  answer.rotation_gradient = -(answer.rotation_gradient + arm.cross(answer.translation_gradient));
-  answer.translation_gradient = -answer.translation_gradient;
+  Eigen::Vector3d &push = answer.translation_gradient, &turn = answer.rotation_gradient;
+  turn = vector(turned_over(arm_between(moved, other), plain(push), plain(turn)));
+  push = -push;
 }
 
 inline void turn_over(const Pose& moved, const Pose& other,
                       std::span<ContactPatch> patches) noexcept {
-  const Eigen::Vector3d arm = arm_between(moved, other);
+  const Vec3 arm = arm_between(moved, other);
   for (ContactPatch& patch : patches) {
     patch.normal = -patch.normal;
-    patch.torque = -(patch.torque + arm.cross(patch.force));
+    patch.torque = vector(turned_over(arm, plain(patch.force), plain(patch.torque)));
     patch.force = -patch.force;
   }
 }

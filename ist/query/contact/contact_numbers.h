@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
+
+#include "numerics/vec3.h"
 
 // Numbers of a contact's division that the CPU and the GPU share.
 
@@ -22,5 +25,36 @@ inline constexpr std::uint32_t kFewContactBlocks = 16;
 /// What lies wholly inside is pushed nowhere but by rounding: an area of no more than this share of
 /// volume^(2/3).
 inline constexpr double kPushRounding = 1e-9;
+
+/// Whether contacts are divided along B's tree: the smaller solid's, whose contacts stay with its
+/// own corners while it slides, or the only one fine enough. The pose has no say. `blocks_…`: leaf
+/// blocks.
+IST_HD inline bool divides_b(std::uint32_t blocks_a, double radius_a, std::uint32_t blocks_b,
+                             double radius_b) noexcept {
+  const std::uint32_t fewer = blocks_a < blocks_b ? blocks_a : blocks_b;
+  if (fewer < kFewContactBlocks && blocks_a != blocks_b) return blocks_b > blocks_a;
+  return radius_b <= radius_a;
+}
+
+/// The central axis of a patch's wrench on B, world.
+struct PatchAxis {
+  Vec3 point, normal;
+  double area, depth, twist;
+
+  /// `origin`: [u] that the torque is about; `deepest`: [u] what the depth is held under.
+  IST_HD static PatchAxis of(double volume, const Vec3& centroid, const Vec3& force,
+                             const Vec3& torque, const Vec3& origin, double deepest) noexcept {
+    PatchAxis axis = {centroid, {0, 0, 0}, 0, 0, 0};
+    const double area = norm(force);
+    if (!(area > kPushRounding * std::cbrt(volume * volume))) return axis;
+    axis.area = area;
+    axis.normal = force / area;
+    axis.depth = volume / area < deepest ? volume / area : deepest;
+    const Vec3 moment = torque - cross(centroid - origin, force);
+    axis.point = centroid + cross(axis.normal, moment) / area;
+    axis.twist = dot(axis.normal, moment);
+    return axis;
+  }
+};
 
 }  // namespace ist

@@ -30,23 +30,21 @@ std::size_t write_patches(const Binned& binned, const Penetration& whole,
   if (division.size() == 0) return 0;
   const std::span<ContactPatch> out = patches.first(division.size());
 
-  const RelativePose& pose = binned.pose;
-  const double unit = pose.unit_a;
-  const Eigen::Vector3d origin_b(pose.a_from_b.t[0], pose.a_from_b.t[1], pose.a_from_b.t[2]);
   double volume = 0;
   std::size_t largest = 0;
   for (std::size_t i = 0; i < out.size(); ++i) {
     const ContactPart& part = binned.bins.parts()[i];
-    const Overlap sum = division.sum(part);
+    Overlap pushed = division.sum(part);
+    pushed.force = -pushed.force;  // on B
+    pushed.torque = -pushed.torque;
+    const WorldSums sum = pushed.in_world(binned.pose);
     ContactPatch& patch = out[i];
     patch = ContactPatch();
     patch.id = part.id;
-    patch.volume = unit * unit * unit * sum.volume;
-    patch.centroid = sum.volume > 0 ? pose.to_world(sum.moment / sum.volume + origin_b)
-                                    : Eigen::Vector3d(whole.centroid);
-    patch.force = -(unit * unit) * (pose.rotation_a * sum.force);
-    patch.torque = -(unit * unit * unit) * (pose.rotation_a * sum.torque) +
-                   pose.unit_offset_b.cross(patch.force);
+    patch.volume = sum.volume;
+    patch.centroid = sum.volume > 0 ? vector(sum.centroid) : whole.centroid;
+    patch.force = vector(sum.translation_gradient);
+    patch.torque = vector(sum.rotation_gradient);
     volume += patch.volume;
     if (patch.volume > out[largest].volume) largest = i;
   }
@@ -89,19 +87,14 @@ std::size_t spread(const Penetration& part, const Penetration& whole, std::size_
 }
 
 void finish_patches(std::span<ContactPatch> patches, const Pose& b, double deepest) noexcept {
-  const Eigen::Vector3d origin(b.t);
   for (ContactPatch& patch : patches) {
-    patch.point = patch.centroid;
-    patch.normal.setZero();
-    patch.area = patch.depth = patch.twist = 0;
-    const double area = patch.force.norm();
-    if (!(area > kPushRounding * std::cbrt(patch.volume * patch.volume))) continue;
-    patch.area = area;
-    patch.normal = patch.force / patch.area;
-    patch.depth = std::min(patch.volume / patch.area, deepest);
-    const Eigen::Vector3d moment = patch.torque - (patch.centroid - origin).cross(patch.force);
-    patch.point += patch.normal.cross(moment) / patch.area;
-    patch.twist = patch.normal.dot(moment);
+    const PatchAxis axis = PatchAxis::of(patch.volume, plain(patch.centroid), plain(patch.force),
+                                         plain(patch.torque), vec3(b.t), deepest);
+    patch.point = vector(axis.point);
+    patch.normal = vector(axis.normal);
+    patch.area = axis.area;
+    patch.depth = axis.depth;
+    patch.twist = axis.twist;
   }
 }
 

@@ -26,9 +26,7 @@ bool before(const RankedPair& l, const RankedPair& r) {
 
 bool opens_a(const SphereTree& a, int level_a, const SphereTree& b, int level_b,
              double scale) noexcept {
-  return level_b == kSphereLevel ||
-         (level_a != kSphereLevel &&
-          a.typical_cube(level_a) >= scale * scale * scale * b.typical_cube(level_b));
+  return opens_a(level_a, a.typical_cube(level_a), level_b, b.typical_cube(level_b), scale);
 }
 
 Descent::Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
@@ -37,7 +35,7 @@ Descent::Descent(const SphereTree& a, const SphereTree& b, const RelativePose& p
       b_(b),
       pose_(pose),
       map_(pose.a_from_b),
-      precision_(precision_for(a, b, pose)),
+      precision_(precision_for(a.root(), b.root(), pose.a_from_b.scale)),
       limits_(limits),
       scratch_(scratch),
       bins_(bins),

@@ -76,9 +76,9 @@ class DetailQueries {
   }
 
   CoincidenceWeight coincidence_weight_of(const DetailPair& pair) const noexcept {
-    return same_asset_ && pair.a == pair.b
-               ? coincidence_weight(matched_tree(a_, pair.a), pose_.a_from_b)
-               : CoincidenceWeight{};
+    if (!same_asset_ || pair.a != pair.b) return {};
+    const TreeHeader& tree = matched_tree(a_, pair.a);
+    return coincidence_weight(tree.root, tree.mean_radius, pose_.a_from_b);
   }
 
   std::uint32_t visits() const noexcept { return visits_; }

@@ -4,12 +4,25 @@
 #include <cstdint>
 #include <numbers>
 
+#include <ist/asset_layout.h>
+
 #include "query/asset/shared_constants.h"
 #include "query/base/smooth_step.h"
 
 // What levels of detail cost and which part of an answer each gives, on the CPU and on the GPU.
 
 namespace ist {
+
+/// A matched tree at a level of detail; lengths in its unit frame.
+struct LevelCost {
+  double reach;  ///< radius of the root ball
+  double mean_radius, volume_sum, sphere_count;
+
+  static LevelCost of(const TreeHeader& tree) noexcept {
+    return {tree.root[3], tree.mean_radius, tree.volume_sum,
+            static_cast<double>(tree.sphere_count)};
+  }
+};
 
 /// Levels of detail of two assets that are asked together.
 struct DetailPair {
@@ -36,14 +49,12 @@ IST_HD inline DetailWeight complement(const DetailWeight& x) noexcept {
   return {1 - x.weight, -x.slope};
 }
 
-/// The levels a and b of two assets; `reach_…`: their root balls' radii, `scale`: of B in A's unit
-/// frame.
-template <class Level>
-IST_HD DetailPair detail_pair(std::uint32_t a, const Level& of_a, double reach_a, std::uint32_t b,
-                              const Level& of_b, double reach_b, double scale) noexcept {
+/// The levels a and b of two assets. `scale`: of B in A's unit frame.
+IST_HD inline DetailPair detail_pair(std::uint32_t a, const LevelCost& of_a, std::uint32_t b,
+                                     const LevelCost& of_b, double scale) noexcept {
   const double volume_b = of_b.volume_sum * (scale * scale * scale);
   const double reach = of_a.mean_radius + of_b.mean_radius * scale;
-  const double size = reach_b * scale < reach_a ? reach_b * scale : reach_a;
+  const double size = of_b.reach * scale < of_a.reach ? of_b.reach * scale : of_a.reach;
   return {a, b,
           kPairShare * (of_a.sphere_count / of_a.volume_sum) * (of_b.sphere_count / volume_b) *
               (4 * std::numbers::pi / 3 * (reach * reach * reach)),

@@ -7,7 +7,7 @@
 namespace ist::exact {
 
 /// +1: the edge p → q goes down through the plane, into the other solid; −1: up.
-IST_ANYWHERE int direction(int sign_p) { return sign_p > 0 ? 1 : -1; }
+IST_HD inline int direction(int sign_p) { return sign_p > 0 ? 1 : -1; }
 
 /// What exact signs say of two triangles.
 struct TriangleSigns {
@@ -17,7 +17,7 @@ struct TriangleSigns {
   std::uint32_t pierced = 0;
 };
 
-IST_ANYWHERE TriangleSigns cross_exactly(const Point (&a)[3], const Point (&b)[3]) {
+IST_HD inline TriangleSigns cross_exactly(const Point (&a)[3], const Point (&b)[3]) {
   TriangleSigns out;
   const auto alike = [](const Determinant(&h)[3]) {
     return h[0].sign == h[1].sign && h[1].sign == h[2].sign;
@@ -43,7 +43,7 @@ IST_ANYWHERE TriangleSigns cross_exactly(const Point (&a)[3], const Point (&b)[3
 
 /// How often the way from p to q, both B's points or both A's, enters the other solid through one
 /// of its triangles: 1, 0 or −1.
-IST_ANYWHERE int enters(const Point& p, const Point& q, const Point (&t)[3], bool of_b) {
+IST_HD inline int enters(const Point& p, const Point& q, const Point (&t)[3], bool of_b) {
   int sign[2], way[3];
   for (int k = 0; k < 2; ++k)
     sign[k] = (of_b ? height_over_a(t, k == 0 ? p : q) : height_over_b(t, k == 0 ? p : q)).sign;

@@ -2,15 +2,11 @@
 
 #include <cmath>
 
+#include "numerics/host_device.h"
+
 // Exact arithmetic with doubles: a number as a sum of doubles that do not overlap, the smallest
 // first (Shewchuk, "Adaptive Precision Floating-Point Arithmetic", 1997). Plain numbers, no
 // library: host, device and WebAssembly compile it. Nothing may be fused or re-associated here.
-
-#if defined(__CUDACC__)
-#define IST_ANYWHERE __host__ __device__ __forceinline__
-#else
-#define IST_ANYWHERE inline
-#endif
 
 namespace ist::exact {
 
@@ -18,27 +14,27 @@ namespace ist::exact {
 inline constexpr double kHalfUnit = 0x1p-53;
 
 /// high + low = a + b exactly.
-IST_ANYWHERE void two_sum(double a, double b, double& high, double& low) {
+IST_HD inline void two_sum(double a, double b, double& high, double& low) {
   high = a + b;
   const double part = high - a;
   low = (a - (high - part)) + (b - part);
 }
 
 /// high + low = a − b exactly.
-IST_ANYWHERE void two_difference(double a, double b, double& high, double& low) {
+IST_HD inline void two_difference(double a, double b, double& high, double& low) {
   high = a - b;
   const double part = a - high;
   low = (a - (high + part)) + (part - b);
 }
 
-IST_ANYWHERE void split(double a, double& high, double& low) {
+IST_HD inline void split(double a, double& high, double& low) {
   const double c = 134217729.0 * a;  // 2^27 + 1
   high = c - (c - a);
   low = a - high;
 }
 
 /// high + low = a · b exactly, short of overflow and underflow.
-IST_ANYWHERE void two_product(double a, double b, double& high, double& low) {
+IST_HD inline void two_product(double a, double b, double& high, double& low) {
   high = a * b;
   double ah, al, bh, bl;
   split(a, ah, al);
@@ -49,12 +45,12 @@ IST_ANYWHERE void two_product(double a, double b, double& high, double& low) {
 /// A sum of many numbers, nearly as exact as in twice the digits.
 class CarefulSum {
  public:
-  IST_ANYWHERE void add(double x) {
+  IST_HD inline void add(double x) {
     double rest;
     two_sum(high_, x, high_, rest);
     low_ += rest;
   }
-  IST_ANYWHERE double value() const { return high_ + low_; }
+  IST_HD inline double value() const { return high_ + low_; }
 
  private:
   double high_ = 0, low_ = 0;
@@ -66,9 +62,9 @@ struct Expansion {
   int count = 0;
   double part[kRoom];
 
-  IST_ANYWHERE int sign() const { return count == 0 ? 0 : part[count - 1] > 0 ? 1 : -1; }
+  IST_HD inline int sign() const { return count == 0 ? 0 : part[count - 1] > 0 ? 1 : -1; }
   /// The nearest double, or nearly.
-  IST_ANYWHERE double value() const {
+  IST_HD inline double value() const {
     double sum = 0;
     for (int i = 0; i < count; ++i) sum += part[i];
     return sum;
@@ -77,8 +73,8 @@ struct Expansion {
 
 /// a + b, or a − b where `factor` is −1.
 template <int kA, int kB>
-IST_ANYWHERE Expansion<kA + kB> sum(const Expansion<kA>& a, const Expansion<kB>& b,
-                                    double factor = 1) {
+IST_HD inline Expansion<kA + kB> sum(const Expansion<kA>& a, const Expansion<kB>& b,
+                                     double factor = 1) {
   Expansion<kA + kB> out;
   int i = 0, j = 0;
   double carried = 0;
@@ -96,7 +92,7 @@ IST_ANYWHERE Expansion<kA + kB> sum(const Expansion<kA>& a, const Expansion<kB>&
 
 /// a · b.
 template <int kA>
-IST_ANYWHERE Expansion<2 * kA> scaled(const Expansion<kA>& a, double b) {
+IST_HD inline Expansion<2 * kA> scaled(const Expansion<kA>& a, double b) {
   Expansion<2 * kA> out;
   if (a.count == 0 || b == 0) return out;
   double carried, rest;
@@ -115,7 +111,7 @@ IST_ANYWHERE Expansion<2 * kA> scaled(const Expansion<kA>& a, double b) {
 }
 
 /// a − b of two doubles.
-IST_ANYWHERE Expansion<2> difference(double a, double b) {
+IST_HD inline Expansion<2> difference(double a, double b) {
   Expansion<2> out;
   double high, low;
   two_difference(a, b, high, low);
@@ -125,7 +121,7 @@ IST_ANYWHERE Expansion<2> difference(double a, double b) {
 }
 
 template <int kA>
-IST_ANYWHERE Expansion<4 * kA> product(const Expansion<kA>& a, const Expansion<2>& b) {
+IST_HD inline Expansion<4 * kA> product(const Expansion<kA>& a, const Expansion<2>& b) {
   // One of b's parts is there at least in all but the rarest cases.
   if (b.count < 2) {
     Expansion<4 * kA> out;
@@ -138,8 +134,8 @@ IST_ANYWHERE Expansion<4 * kA> product(const Expansion<kA>& a, const Expansion<2
 }
 
 /// a b − c d.
-IST_ANYWHERE Expansion<16> minor(const Expansion<2>& a, const Expansion<2>& b,
-                                 const Expansion<2>& c, const Expansion<2>& d) {
+IST_HD inline Expansion<16> minor(const Expansion<2>& a, const Expansion<2>& b,
+                                  const Expansion<2>& c, const Expansion<2>& d) {
   return sum(product(a, b), product(c, d), -1);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "numerics/vec3.h"
 #include "query/exact/expansion.h"
 
 // Exact signs of determinants of four points, of which some belong to B. A tie is broken as if B
@@ -8,23 +9,7 @@
 
 namespace ist::exact {
 
-struct Point {
-  double x, y, z;
-};
-
-IST_ANYWHERE Point operator+(const Point& a, const Point& b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-IST_ANYWHERE Point operator-(const Point& a, const Point& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-IST_ANYWHERE Point operator*(double s, const Point& a) { return {s * a.x, s * a.y, s * a.z}; }
-IST_ANYWHERE double dot(const Point& a, const Point& b) {
-  return (a.x * b.x + a.y * b.y) + a.z * b.z;
-}
-IST_ANYWHERE Point cross(const Point& a, const Point& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+using Point = Vec3;
 
 /// A rounded determinant and how far it may be off; its sign once it is certain.
 struct Determinant {
@@ -38,8 +23,8 @@ struct Determinant {
 inline constexpr double kFilter = 1e-15;
 
 /// The sign of a d − b c of differences, 0 for none: in doubles where these are certain.
-IST_ANYWHERE int sign_of_minor(double a1, double a0, double b1, double b0, double c1, double c0,
-                               double d1, double d0) {
+IST_HD inline int sign_of_minor(double a1, double a0, double b1, double b0, double c1, double c0,
+                                double d1, double d0) {
   const double ad = (a1 - a0) * (d1 - d0), bc = (b1 - b0) * (c1 - c0);
   const double value = ad - bc;
   if (std::abs(value) > kFilter * (std::abs(ad) + std::abs(bc))) return value > 0 ? 1 : -1;
@@ -50,8 +35,8 @@ IST_ANYWHERE int sign_of_minor(double a1, double a0, double b1, double b0, doubl
 }
 
 /// The sign of a tie, from the normal u × v along which the infinitesimal goes.
-IST_ANYWHERE int sign_of_tie(const Point& u1, const Point& u0, const Point& v1, const Point& v0,
-                             int moved) {
+IST_HD inline int sign_of_tie(const Point& u1, const Point& u0, const Point& v1, const Point& v0,
+                              int moved) {
   int sign = sign_of_minor(u1.y, u0.y, u1.z, u0.z, v1.y, v0.y, v1.z, v0.z);
   if (sign == 0) sign = sign_of_minor(u1.z, u0.z, u1.x, u0.x, v1.z, v0.z, v1.x, v0.x);
   if (sign == 0) sign = sign_of_minor(u1.x, u0.x, u1.y, u0.y, v1.x, v0.x, v1.y, v0.y);
@@ -61,9 +46,9 @@ IST_ANYWHERE int sign_of_tie(const Point& u1, const Point& u0, const Point& v1, 
 
 /// (r1 − r0) · ((u1 − u0) × (v1 − v0)), where r1 moves along with the infinitesimal (`moved` = 1),
 /// or r0 does (−1); the others' differences stay.
-IST_ANYWHERE Determinant exact_determinant(const Point& r1, const Point& r0, const Point& u1,
-                                           const Point& u0, const Point& v1, const Point& v0,
-                                           int moved) {
+IST_HD inline Determinant exact_determinant(const Point& r1, const Point& r0, const Point& u1,
+                                            const Point& u0, const Point& v1, const Point& v0,
+                                            int moved) {
   // All in a plane across an axis: how aligned parts lie.
   if ((r1.x == r0.x && u1.x == u0.x && v1.x == v0.x) ||
       (r1.y == r0.y && u1.y == u0.y && v1.y == v0.y) ||
@@ -83,8 +68,9 @@ IST_ANYWHERE Determinant exact_determinant(const Point& r1, const Point& r0, con
 }
 
 /// The same, in doubles where these are certain.
-IST_ANYWHERE Determinant determinant(const Point& r1, const Point& r0, const Point& u1,
-                                     const Point& u0, const Point& v1, const Point& v0, int moved) {
+IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Point& u1,
+                                      const Point& u0, const Point& v1, const Point& v0,
+                                      int moved) {
   const Point r = r1 - r0, u = u1 - u0, v = v1 - v0;
   const double ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
                bz = u.y * v.x;
@@ -97,17 +83,18 @@ IST_ANYWHERE Determinant determinant(const Point& r1, const Point& r0, const Poi
 }
 
 /// How far B's point lies above triangle A's plane: > 0 outside.
-IST_ANYWHERE Determinant height_over_a(const Point (&a)[3], const Point& b) {
+IST_HD inline Determinant height_over_a(const Point (&a)[3], const Point& b) {
   return determinant(b, a[0], a[1], a[0], a[2], a[0], 1);
 }
 
 /// How far A's point lies above triangle B's plane.
-IST_ANYWHERE Determinant height_over_b(const Point (&b)[3], const Point& a) {
+IST_HD inline Determinant height_over_b(const Point (&b)[3], const Point& a) {
   return determinant(a, b[0], b[1], b[0], b[2], b[0], -1);
 }
 
 /// Which way round A's edge p → q goes about B's edge r → s.
-IST_ANYWHERE Determinant way_round(const Point& p, const Point& q, const Point& r, const Point& s) {
+IST_HD inline Determinant way_round(const Point& p, const Point& q, const Point& r,
+                                    const Point& s) {
   return determinant(r, p, q, p, s, r, 1);
 }
 

@@ -69,7 +69,7 @@ class FieldDescent {
         const Eigen::Vector3d x(balls.origin[0] + balls.x[lane], balls.origin[1] + balls.y[lane],
                                 balls.origin[2] + balls.z[lane]);
         const double d = shape_.look(x).distance;
-        const double reach = balls.r[lane] * (1 + 1e-6) + shape_.error();
+        const double reach = sure_reach(balls.r[lane], shape_.error());
         const std::uint32_t child = kWidth * block + lane;
         if (d <= -reach) continue;
         if (d >= reach) {
@@ -98,8 +98,8 @@ class FieldDescent {
         const BallPart ball = shape_.part(at, balls.r[i]);
         if (!(ball.volume > 0)) continue;
         ++pairs;
-        add_part(at - Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]), ball.volume, ball.gradient,
-                 ball.moment, part.overlap);
+        add_part(at - Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]), ball.volume,
+                 Eigen::Vector3d(ball.gradient), Eigen::Vector3d(ball.moment), part.overlap);
         part.area += ball.area;
         if (ball.area > 0)
           part.crossed += 4 * std::numbers::pi / 3 * (balls.r[i] * balls.r[i] * balls.r[i]);

@@ -96,8 +96,8 @@ class GapSearch {
     const double unit = pose_.unit_a;
     const double reach = map_.scale * std::max(tree_.header->root[3], tree_.header->root_cover) +
                          Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]).norm();
-    const double off = shape_.error() + distance_error(Precision::float64, reach) +
-                       1e-15 * pose_.unit_origin_a.norm() / unit;
+    const double off =
+        shape_.error() + distance_error(Precision::float64, reach) + pose_.rounding_of_world();
     result.distance_min = unit * std::max(0.0, cover_ - off);
     if (!(gap_ < std::numeric_limits<double>::infinity())) {  // stopped before any sphere
       result.distance = result.distance_max = std::numeric_limits<double>::infinity();
@@ -110,7 +110,7 @@ class GapSearch {
         length > 0 ? Eigen::Vector3d(-inward_ / length) : Eigen::Vector3d::Zero().eval();
     result.point_b = pose_.to_world(centre_ - radius_ * out);
     result.point_a = pose_.to_world(centre_ - (radius_ + gap_) * out);
-    result.normal = pose_.rotation_a * out;
+    result.normal = pose_.rotation() * out;
     return result;
   }
 

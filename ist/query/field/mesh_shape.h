@@ -2,6 +2,7 @@
 
 #include <ist/field.h>
 
+#include "query/asset/shared_constants.h"
 #include "query/asset/surface_tree.h"
 #include "query/probe/membership.h"
 #include "query/probe/surface_distance.h"
@@ -13,7 +14,7 @@ struct MeshShape {
   explicit MeshShape(const MeshField& f) noexcept : surface(surface_tree(f.tree)) {}
   FieldSample nearest(const Eigen::Vector3d& x) const noexcept {
     const double at[3] = {x.x(), x.y(), x.z()};
-    const NearestSurface found = nearest_surface(surface, at, 1e150);
+    const NearestSurface found = nearest_surface(surface, at, kLongestLength);
     const Eigen::Vector3d point(found.point[0], found.point[1], found.point[2]);
     const Eigen::Vector3d way = found.distance > 0 ? Eigen::Vector3d((point - x) / found.distance)
                                                    : Eigen::Vector3d::Zero().eval();

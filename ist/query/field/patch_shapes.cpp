@@ -46,37 +46,11 @@ class PatchFiller {
 
 }  // namespace
 
-BoxShape::BoxShape(const BoxField& f) noexcept : half(f.half_extents), sound(is_sound(f)) {}
-
-FieldSample BoxShape::look(const Eigen::Vector3d& x) const noexcept {
-  const Eigen::Vector3d beyond = x.cwiseAbs() - half;
-  Eigen::Index face;
-  const double deepest = beyond.maxCoeff(&face);
-  Eigen::Vector3d out = Eigen::Vector3d::Zero();
-  double distance = -deepest;
-  if (deepest <= 0) {
-    out[face] = 1;
-  } else {
-    out = beyond.cwiseMax(0.0);
-    distance = -out.norm();
-    out /= -distance;
-  }
-  for (int k = 0; k < 3; ++k) out[k] = x[k] < 0 ? -out[k] : out[k];
-  return {distance, -out};
-}
-
 ProbeTotal BoxShape::block(const ProbeBalls& balls, std::uint32_t used, const double (&origin)[3],
                            std::uint32_t& pairs) noexcept {
-  // Faces within reach: six half-spaces, each x[axis] · side ≤ half[axis].
-  int faces = 0, axis = 0;
-  double side = 1;
-  for (int k = 0; k < 3; ++k) {
-    for (const double s : {1.0, -1.0}) {
-      if (half[k] - s * balls.origin[k] >= balls.reach) continue;
-      ++faces;
-      axis = k, side = s;
-    }
-  }
+  int axis;
+  double side;
+  const int faces = faces_near(balls.origin, balls.reach, axis, side);
   if (faces == 1) {
     ProbeTotal total;
     Eigen::Vector3d inward = Eigen::Vector3d::Zero();
@@ -85,36 +59,28 @@ ProbeTotal BoxShape::block(const ProbeBalls& balls, std::uint32_t used, const do
     for (std::size_t i = 0; i < kWidth; ++i) {
       if ((used >> i & 1) == 0) continue;
       const double r = balls.r[i];
-      const FieldSample sample{half[axis] - side * (balls.origin[axis] + at[axis][i]), inward};
-      if (!(sample.distance > -r)) continue;
+      const double distance = below_face(axis, side, balls.origin[axis] + at[axis][i]);
+      if (!(distance > -r)) continue;
+      const Cap part = cap(r, distance);
       const Eigen::Vector3d x(balls.origin[0] + balls.x[i] - origin[0],
                               balls.origin[1] + balls.y[i] - origin[1],
                               balls.origin[2] + balls.z[i] - origin[2]);
-      const BallPart part = flat_part(sample, r);
       ++pairs;
-      add_part(x, part.volume, part.gradient, part.moment, total.overlap);
-      total.area += part.area;
-      total.crossed += part.area > 0 ? 4 * std::numbers::pi / 3 * (r * r * r) : 0;
+      add_part(x, part.volume, part.derivative * inward, part.moment * inward, total.overlap);
+      total.area += part.derivative;
+      total.crossed += part.derivative > 0 ? 4 * std::numbers::pi / 3 * (r * r * r) : 0;
     }
     return total;
   }
   if (!has_patch_) {
-    double v[8][3];
-    for (int i = 0; i < 8; ++i)
-      for (int k = 0; k < 3; ++k) v[i][k] = (i >> k & 1) != 0 ? half[k] : -half[k];
-    constexpr int kFaces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
-                                  {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
     TriangleCorners corners{};
-    std::size_t n = 0;
-    for (const auto& f : kFaces) {
-      for (const int first : {1, 2}) {
-        const int corner[3] = {f[0], f[first], f[first + 1]};
-        for (std::size_t k = 0; k < 3; ++k) {
-          corners.x[k][n] = v[corner[k]][0];
-          corners.y[k][n] = v[corner[k]][1];
-          corners.z[k][n] = v[corner[k]][2];
-        }
-        ++n;
+    for (std::uint32_t n = 0; n < 12; ++n) {
+      double c[3][3];
+      PlainBox::corners(n, c);
+      for (std::size_t k = 0; k < 3; ++k) {
+        corners.x[k][n] = c[k][0];
+        corners.y[k][n] = c[k][1];
+        corners.z[k][n] = c[k][2];
       }
     }
     make_patch(corners, patch_);
@@ -129,60 +95,39 @@ ProbeTotal BoxShape::block(const ProbeBalls& balls, std::uint32_t used, const do
   });
   std::uint32_t inside = 0;
   for (std::uint32_t i = 0; i < kWidth; ++i) {
-    const bool in = std::abs(seen.origin[0] + seen.x[i]) < half.x() &&
-                    std::abs(seen.origin[1] + seen.y[i]) < half.y() &&
-                    std::abs(seen.origin[2] + seen.z[i]) < half.z();
-    inside |= in ? 1u << i : 0u;
+    const double x[3] = {seen.origin[0] + seen.x[i], seen.origin[1] + seen.y[i],
+                         seen.origin[2] + seen.z[i]};
+    inside |= holds(x) ? 1u << i : 0u;
   }
   return total_of(balls, sums, settled_sides(sums, inside) & used, origin);
 }
 
-HeightShape::HeightShape(const HeightField& f) noexcept : sound(is_sound(f)), field_(f) {}
-
-double HeightShape::height(std::int64_t i, std::int64_t j) const noexcept {
-  i = std::clamp<std::int64_t>(i, 0, std::int64_t{field_.columns} - 1);
-  j = std::clamp<std::int64_t>(j, 0, std::int64_t{field_.rows} - 1);
-  const double height =
-      field_.heights[static_cast<std::size_t>(j) * field_.columns + static_cast<std::size_t>(i)];
+double HeightShape::height(std::int64_t i, std::int64_t j) noexcept {
+  const double height = PlainTerrain::height(i, j);
   if (std::isfinite(height)) return height;
   sound = false;
   return 0;
 }
 
-FieldSample HeightShape::look(const Eigen::Vector3d& x) const noexcept {
-  // Only what is beyond all heights is told at once; the rest is looked at ball by ball.
-  FieldSample at;
-  if (x.z() > field_.highest) at.distance = field_.highest - x.z();
-  if (x.z() < field_.lowest) at.distance = field_.lowest - x.z();
-  return at;
+double HeightShape::surface(double x, double y) noexcept {
+  return PlainTerrain::surface(x, y, [&](std::int64_t i, std::int64_t j) { return height(i, j); });
 }
 
-double HeightShape::surface(double x, double y) const noexcept {
-  const double u = std::clamp(x / field_.spacing[0], -1.0, static_cast<double>(field_.columns));
-  const double v = std::clamp(y / field_.spacing[1], -1.0, static_cast<double>(field_.rows));
-  const double i = std::floor(u), j = std::floor(v);
-  const double s = u - i, t = v - j;
-  const auto a = static_cast<std::int64_t>(i), b = static_cast<std::int64_t>(j);
-  const double h00 = height(a, b), h11 = height(a + 1, b + 1);
-  return s >= t ? h00 + s * (height(a + 1, b) - h00) + t * (h11 - height(a + 1, b))
-                : h00 + t * (height(a, b + 1) - h00) + s * (h11 - height(a, b + 1));
-}
-
-FieldSample HeightShape::nearest(const Eigen::Vector3d& x) const noexcept {
+FieldSample HeightShape::nearest(const Eigen::Vector3d& x) noexcept {
   const double gap = x.z() - surface(x.x(), x.y());
   const double at[3] = {x.x(), x.y(), x.z()};
   Eigen::Vector3d point(x.x(), x.y(), x.z() - gap);
   double best2 = gap * gap;
-  const std::int64_t last[2] = {std::int64_t{field_.columns} - 2, std::int64_t{field_.rows} - 2};
+  const std::int64_t last[2] = {std::int64_t{columns} - 2, std::int64_t{rows} - 2};
   std::int64_t middle[2];
   for (int k = 0; k < 2; ++k)
     middle[k] = static_cast<std::int64_t>(
-        std::clamp(std::floor(x[k] / field_.spacing[k]), 0.0, static_cast<double>(last[k])));
+        std::clamp(std::floor(x[k] / spacing[k]), 0.0, static_cast<double>(last[k])));
   const auto try_cell = [&](std::int64_t i, std::int64_t j) {
     if (i < 0 || j < 0 || i > last[0] || j > last[1]) return;
     const auto corner = [&](std::int64_t a, std::int64_t b, double(&p)[3]) {
-      p[0] = static_cast<double>(a) * field_.spacing[0];
-      p[1] = static_cast<double>(b) * field_.spacing[1];
+      p[0] = static_cast<double>(a) * spacing[0];
+      p[1] = static_cast<double>(b) * spacing[1];
       p[2] = height(a, b);
     };
     double c[4][3], found[3];
@@ -195,8 +140,8 @@ FieldSample HeightShape::nearest(const Eigen::Vector3d& x) const noexcept {
     }
   };
   // Ring by ring, as long as one may come nearer, all heights being within their bounds.
-  const double apart = std::max({0.0, x.z() - field_.highest, field_.lowest - x.z()});
-  const double step = std::min(field_.spacing[0], field_.spacing[1]);
+  const double apart = std::max({0.0, x.z() - highest, lowest - x.z()});
+  const double step = std::min(spacing[0], spacing[1]);
   const std::int64_t most = std::max(last[0], last[1]) + 1;
   for (std::int64_t ring = 0; ring <= most; ++ring) {
     const double least = static_cast<double>(ring - 1) * step;
@@ -213,29 +158,13 @@ FieldSample HeightShape::nearest(const Eigen::Vector3d& x) const noexcept {
   return gap > 0 ? FieldSample{-distance, -up} : FieldSample{distance, up};
 }
 
-void HeightShape::add_cells(const ProbeBalls& balls, std::uint32_t used,
-                            ProbeSums& sums) const noexcept {
+void HeightShape::add_cells(const ProbeBalls& balls, std::uint32_t used, ProbeSums& sums) noexcept {
   PatchFiller filler(balls, used, sums);
   std::int64_t from[2], to[2];
-  for (int k = 0; k < 2; ++k) {
-    const double low = (balls.origin[k] - balls.reach) / field_.spacing[k];
-    const double high = (balls.origin[k] + balls.reach) / field_.spacing[k];
-    const double last = (k == 0 ? field_.columns : field_.rows) - 1;
-    // Beyond the border one cell is as good as any number: it is level across it.
-    from[k] = static_cast<std::int64_t>(std::floor(std::clamp(low, -1.0, last)));
-    to[k] = static_cast<std::int64_t>(std::floor(std::clamp(high, -1.0, last)));
-  }
+  for (int k = 0; k < 2; ++k) cells_near(k, balls.origin[k], balls.reach, from[k], to[k]);
   const auto corner = [&](std::int64_t i, std::int64_t j, double(&p)[3]) {
-    // The cells at the border reach as far as the balls do.
-    const auto place = [&](std::int64_t n, int k) {
-      const std::int64_t last = (k == 0 ? field_.columns : field_.rows) - 1;
-      const double at = static_cast<double>(n) * field_.spacing[k];
-      if (n < 0) return std::min(at, balls.origin[k] - 2 * balls.reach);
-      if (n > last) return std::max(at, balls.origin[k] + 2 * balls.reach);
-      return at;
-    };
-    p[0] = place(i, 0);
-    p[1] = place(j, 1);
+    p[0] = point(0, i, balls.origin[0], balls.reach);
+    p[1] = point(1, j, balls.origin[1], balls.reach);
     p[2] = height(i, j);
   };
   for (std::int64_t j = from[1]; j <= to[1]; ++j) {

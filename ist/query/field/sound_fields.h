@@ -11,14 +11,14 @@
 
 namespace ist {
 
-inline bool is_length(double x) noexcept { return x > 0 && x <= 1e150; }
-inline bool is_extent(double x) noexcept { return x >= 0 && x <= 1e150; }
+inline bool is_length(double x) noexcept { return x > 0 && x <= kLongestLength; }
+inline bool is_extent(double x) noexcept { return x >= 0 && x <= kLongestLength; }
 inline bool is_side(std::uint32_t points) noexcept { return points >= 2 && points <= 1u << 20; }
 
 inline bool is_sound(const HalfSpaceField& f) noexcept {
   const double length = f.normal.norm();
   return length >= kShortestDirection && length <= kLongestDirection &&
-         std::abs(f.offset / length) <= 1e150;
+         std::abs(f.offset / length) <= kLongestLength;
 }
 inline bool is_sound(const BoxField& f) noexcept {
   return is_length(f.half_extents[0]) && is_length(f.half_extents[1]) &&

@@ -61,7 +61,7 @@ SurfaceDescent::SurfaceDescent(const SurfaceTree& surface, const SphereTree& pro
       map_(pose.a_from_b),
       ball_header_(ball_header(surface)),
       balls_(ball_tree(surface, ball_header_)),
-      precision_(precision_for(balls_, probes, pose)),
+      precision_(precision_for(balls_.root(), probes.root(), pose.a_from_b.scale)),
       scratch_(scratch),
       budget_(limits.max_visits),
       surface_level_(balls_.top),
@@ -379,7 +379,8 @@ void SurfaceDescent::leave_both(std::size_t from) noexcept {
 Penetration SurfaceDescent::penetration() const noexcept {
   // Both surfaces lie within the field's error of each other; centres are rounded too.
   const double off =
-      surface_.header->error + distance_error(Precision::float64, span(balls_, probes_, pose_));
+      surface_.header->error +
+      distance_error(Precision::float64, span(balls_.root(), probes_.root(), pose_.a_from_b));
   return tally_.answer(off, budget_.visits());
 }
 

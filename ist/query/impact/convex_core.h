@@ -35,8 +35,8 @@ inline double core_radius(const CapsuleShape& s) noexcept { return s.radius; }
 inline double core_radius(const CylinderShape&) noexcept { return 0; }
 
 inline Eigen::Vector3d furthest(const BoxShape& s, const Eigen::Vector3d& n) noexcept {
-  return {std::copysign(s.half.x(), n.x()), std::copysign(s.half.y(), n.y()),
-          std::copysign(s.half.z(), n.z())};
+  return {std::copysign(s.half[0], n.x()), std::copysign(s.half[1], n.y()),
+          std::copysign(s.half[2], n.z())};
 }
 inline Eigen::Vector3d furthest(const BallShape&, const Eigen::Vector3d&) noexcept {
   return Eigen::Vector3d::Zero();
@@ -96,10 +96,10 @@ PlaneBetween plane_between(const Shape& shape, const ConvexPiece& triangle) noex
 inline PlaneBetween plane_between(const HalfSpaceShape& shape,
                                   const ConvexPiece& triangle) noexcept {
   PlaneBetween between;
-  between.normal = shape.normal;
+  between.normal = Eigen::Vector3d(shape.normal);
   between.apart = std::numeric_limits<double>::infinity();
   for (const Eigen::Vector3d& corner : triangle.corner) {
-    const double height = shape.normal.dot(corner) - shape.offset;
+    const double height = between.normal.dot(corner) - shape.offset;
     if (height >= between.apart) continue;
     between.apart = between.distance = height;
     between.point = corner;

@@ -105,12 +105,10 @@ NodeBall ImpactSide::ball(int level, std::uint32_t number) const noexcept {
     return {{middle.x(), middle.y(), middle.z()}, kMore * std::sqrt(r2) + error_};
   }
   const SurfaceTree::Level& above = surface_->level[level + 1];
-  const BallBlock& balls = above.balls[number / kWidth];
-  const Origin& o = above.origins[number / kWidth];
-  const std::uint32_t lane = number % kWidth;
-  return {{o.x + static_cast<double>(balls.x[lane]), o.y + static_cast<double>(balls.y[lane]),
-           o.z + static_cast<double>(balls.z[lane])},
-          static_cast<double>(balls.r[lane]) + error_};
+  NodeBall ball =
+      lane_ball(above.balls[number / kWidth], above.origins[number / kWidth], number % kWidth);
+  ball.r += error_;
+  return ball;
 }
 
 PointHull ImpactSide::hull(int level, std::uint32_t number) const noexcept {

@@ -6,8 +6,6 @@
 
 #include <ist/asset_layout.h>
 
-#include "query/asset/shared_constants.h"
-
 namespace ist {
 namespace {
 
@@ -18,12 +16,6 @@ using Eigen::Vector3d;
 constexpr double kWayRounding = 6 * 0x1p-53;
 // Of what is turned: a polynomial's sine and the angle that it is of, three-term products and sums.
 constexpr double kTurnRounding = 32 * 0x1p-53;
-
-Quaterniond unit_rotation(const Pose& pose) noexcept {
-  const double* const q = pose.q;
-  const double norm = std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
-  return {q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm};
-}
 
 Vector3d translation(const Pose& pose) noexcept { return {pose.t[0], pose.t[1], pose.t[2]}; }
 
@@ -81,7 +73,7 @@ std::optional<MovingFrame> frame_of(const Pose& pose_a, double scale_a, const As
   const double farthest =
       frame.between.norm() + frame.speed * duration + frame.a.reach + frame.b.reach;
   const double angles = (frame.a.spin_speed + frame.b.spin_speed) * duration;
-  if (!(farthest <= kFarthestPose) || !(angles <= kFarthestPose)) return std::nullopt;
+  if (!in_pose_range({farthest, angles, 0})) return std::nullopt;
   return frame;
 }
 

@@ -1,8 +1,9 @@
 #pragma once
 
-#include <algorithm>
 #include <limits>
 #include <numbers>
+
+#include "numerics/host_device.h"
 
 namespace ist {
 
@@ -14,9 +15,13 @@ struct Lens {
   T cap_b = 0;   ///< likewise of ball B's; the lens is both caps
   T circle = 0;  ///< squared radius
 
-  T volume() const { return T(std::numbers::pi / 3) * (cap_a + cap_b); }
-  T derivative() const { return -T(std::numbers::pi) * circle; }  ///< dV/d(centre distance)
+  IST_HD T volume() const { return T(std::numbers::pi / 3) * (cap_a + cap_b); }
+  /// dV/d(centre distance)
+  IST_HD T derivative() const { return -T(std::numbers::pi) * circle; }
 };
+
+template <class T>
+inline constexpr T kSmallestNormal = std::numeric_limits<T>::min();
 
 /// Lens of balls of radii `ra`, `rb` ≥ 0 at centre distance `d` ≥ 0. The sums g, f, e must never be
 /// re-associated: in this order each loses no digit at any ratio of radii, near tangency or near
@@ -25,7 +30,7 @@ struct Lens {
 /// along the axis, the same for both caps and opposite, so the lens's centroid is (cap_a · centre_a
 /// + cap_b · centre_b) / (cap_a + cap_b).
 template <class T>
-Lens<T> lens(T ra, T rb, T d) {
+IST_HD Lens<T> lens(T ra, T rb, T d) {
   const T a = ra > rb ? ra : rb;
   const T b = ra > rb ? rb : ra;
   const T g = (a - d) + b;
@@ -33,10 +38,11 @@ Lens<T> lens(T ra, T rb, T d) {
   const T e = (a - b) + d;
   if (!(g > 0)) return {};
   // Below the smallest normal number 1/(2d) overflows, and equal balls coincide to rounding.
-  const bool holds = f <= 0 || d < std::numeric_limits<T>::min();
+  const bool holds = f <= 0 || d < kSmallestNormal<T>;
   const T inverse = T(0.5) / (holds ? T(1) : d);
   const T ha = holds ? T(0) : (f * inverse) * g;
-  const T hb = holds ? T(2) * b : std::min((e * inverse) * g, T(2) * b);
+  const T full = (e * inverse) * g;
+  const T hb = holds || T(2) * b < full ? T(2) * b : full;
   const T cap_large = (ha * ha) * (T(3) * a - ha);
   const T cap_small = (hb * hb) * (T(3) * b - hb);
   const T circle = ha * (T(2) * a - ha);

@@ -132,7 +132,7 @@ HWY_INLINE void add_lenses(const FilledBalls& a, const FilledBalls& b, const dou
   const LaneTag<float> d;
   using V = hn::Vec<decltype(d)>;
   const V zero = hn::Zero(d), two = hn::Set(d, 2.0f), three = hn::Set(d, 3.0f);
-  const V one = hn::Set(d, 1.0f), tiny = hn::Set(d, 1e-18f);
+  const V one = hn::Set(d, 1.0f), tiny = hn::Set(d, static_cast<float>(kLeastDistance));
   // Sixteen lanes, each of which adds up in the same order whatever the vectors' width.
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
     V volume = zero;

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "query/base/relative_pose.h"
+#include "query/base/world_sums.h"
 #include "query/kernel/leaf_kernel.h"
 #include "query/kernel/subtree_kernel.h"
 
@@ -23,6 +24,10 @@ struct Overlap {
     force += other.force;
     torque += other.torque;
     moment += other.moment;
+  }
+
+  WorldSums in_world(const PairPlace& place) const noexcept {
+    return WorldSums::of(place, volume, plain(force), plain(torque), plain(moment));
   }
 };
 

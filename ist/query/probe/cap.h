@@ -2,6 +2,8 @@
 
 #include <numbers>
 
+#include "numerics/host_device.h"
+
 namespace ist {
 
 /// A ball of radius r cut by a plane.
@@ -13,7 +15,7 @@ struct Cap {
 
 /// `d`: distance of the centre from the plane, positive inside. Each form has no difference of like
 /// numbers where it is small: relative error 1e-15 up to tangency.
-inline Cap cap(double r, double d) noexcept {
+IST_HD inline Cap cap(double r, double d) {
   const double pi = std::numbers::pi;
   if (!(d > -r)) return {};
   if (d >= r) return {4 * pi / 3 * (r * r * r), 0, 0};

@@ -308,12 +308,6 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace ist {
-namespace {
-
-// 2^-12 in a direction in which no edge of a made thing lies.
-constexpr double kAway[3] = {0x1p-12 * 0.43877, 0x1p-12 * 0.61803, 0x1p-12 * 0.65236};
-
-}  // namespace
 
 HWY_EXPORT(add_patch_to);
 
@@ -325,9 +319,9 @@ ProbeBalls away_from_edges(const ProbeBalls& balls, std::uint32_t chosen) noexce
       moved.r[i] = 0;
       continue;
     }
-    moved.x[i] += kAway[0] * balls.r[i];
-    moved.y[i] += kAway[1] * balls.r[i];
-    moved.z[i] += kAway[2] * balls.r[i];
+    moved.x[i] += moved_along(0) * balls.r[i];
+    moved.y[i] += moved_along(1) * balls.r[i];
+    moved.z[i] += moved_along(2) * balls.r[i];
     most = std::max(most, balls.r[i]);
   }
   moved.reach += 0x1p-11 * most;
@@ -338,8 +332,8 @@ void put_right(const ProbeSums& moved, const ProbeBalls& balls, ProbeSums& sums)
   for (std::size_t i = 0; i < kWidth; ++i) {
     if ((sums.on_edge >> i & 1) == 0) continue;
     double change = 0;  // of the volume, on the way back
-    for (std::size_t k = 0; k < 3; ++k)
-      change += 0.5 * (sums.pull[k][i] + moved.pull[k][i]) * (kAway[k] * balls.r[i]);
+    for (int k = 0; k < 3; ++k)
+      change += 0.5 * (sums.pull[k][i] + moved.pull[k][i]) * (moved_along(k) * balls.r[i]);
     sums.cones[i] = moved.cones[i] + change;
     sums.angle[i] = moved.angle[i];
   }

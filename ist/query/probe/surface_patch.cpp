@@ -5,7 +5,7 @@
 #include <hwy/foreach_target.h>
 
 #include "query/probe/feet-inl.h"
-#include "query/probe/passes_left.h"
+#include "query/probe/sides.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
@@ -44,11 +44,10 @@ std::uint32_t odd_ways_of(const SurfacePatch& patch, std::uint32_t triangles,
     // less along y, least along z; that is one way for all triangles, even around a corner.
     std::uint32_t all = 0xffff, none = 0xffff;
     for (int c = 0; c < 3; ++c) {
-      const double* const a = p[c];
-      const double* const b = p[(c + 1) % 3];
+      const double(&a)[3] = p[c];
+      const double(&b)[3] = p[(c + 1) % 3];
       double normal[3];
-      for (int k = 0; k < 3; ++k)
-        normal[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+      cross(a, b, normal);
       std::uint32_t left = 0;
       if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) {
         // The start is in line with the edge: it is moved likewise, by still less.
@@ -61,9 +60,7 @@ std::uint32_t odd_ways_of(const SurfacePatch& patch, std::uint32_t triangles,
         if (((all | none) & across) == 0) break;
         continue;
       }
-      const bool tie = normal[0] != 0   ? normal[0] > 0
-                       : normal[1] != 0 ? normal[1] > 0
-                                        : normal[2] > 0;
+      const bool tie = first_is_positive(normal);
       const V plane[3] = {hn::Set(d, normal[0]), hn::Set(d, normal[1]), hn::Set(d, normal[2])};
       for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
         const V x = hn::Load(d, balls.x + lane) + hn::Set(d, way[0]);

@@ -33,7 +33,7 @@ IST_HD inline float distance_to_triangle(const GridTriangle& triangle, Float3 p)
 }
 
 IST_HD inline float distance_to_sphere(const Sphere& s, Float3 p) {
-  return norm({p.x - s.x, p.y - s.y, p.z - s.z}) - s.r;
+  return norm(Float3{p.x - s.x, p.y - s.y, p.z - s.z}) - s.r;
 }
 
 IST_HD inline float distance_to(const GridScene& scene, std::uint32_t tag, Float3 p) {

@@ -5,7 +5,7 @@
 
 #include "numerics/host_device.h"
 
-namespace ist::gpu {
+namespace ist {
 
 IST_HD inline int count_bits(std::uint32_t bits) {
 #ifdef __CUDA_ARCH__
@@ -23,7 +23,7 @@ IST_HD inline int count_bits(std::uint64_t bits) {
 #endif
 }
 
-/// The number of the lowest bit that is set; of none nothing is said.
+/// The number of the lowest bit that is set. `bits` must not be 0.
 IST_HD inline int lowest_bit(std::uint32_t bits) {
 #ifdef __CUDA_ARCH__
   return __ffs(static_cast<int>(bits)) - 1;
@@ -32,4 +32,4 @@ IST_HD inline int lowest_bit(std::uint32_t bits) {
 #endif
 }
 
-}  // namespace ist::gpu
+}  // namespace ist

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+
+#include "cuda/query/patch_arrays.h"
+#include "cuda/query/separation_arrays.h"
+#include "cuda/query/triangle_steps.h"
+
+// What launches all that answers a batch, and waits for nothing.
+
+namespace ist::gpu {
+
+struct TriangleGrids {
+  int walk, sum, rest;
+};
+
+/// Blocks of each kernel that the current device runs at a time.
+struct Grids {
+  int sum, details;                ///< of a batch of trees
+  int search[2];                   ///< of separations, in float and in double
+  int divide;                      ///< of contact patches
+  int smooth;                      ///< of trees in fields …
+  TriangleGrids of[kFieldGroups];  ///< … by their group
+};
+
+/// Each sets the members of its kernels.
+void find_batch_grids(Grids& grids);
+void find_separation_grids(Grids& grids);
+void find_patch_grids(Grids& grids);
+void find_field_grids(Grids& grids);
+template <class Kind>
+TriangleGrids triangle_grids();
+
+void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t stream);
+void launch_separations(const SeparationArrays& batch, const Grids& grids, cudaStream_t stream);
+/// As many divide contacts as `room_bytes` hold the rooms of.
+void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t room_bytes,
+                    cudaStream_t stream);
+/// `has`: groups of which there are fields.
+void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups],
+                        const Grids& grids, cudaStream_t stream);
+/// The pairs of a kind that a batch of fields has listed.
+template <class Kind>
+void launch_triangle_pairs(const FieldBatch& batch, const Grids& grids, cudaStream_t stream);
+
+}  // namespace ist::gpu

@@ -1,0 +1,268 @@
+#include <algorithm>
+#include <cstddef>
+#include <memory>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+
+#include "cuda/query/batch_steps.h"
+#include "cuda/query/detail_sums.h"
+#include "cuda/query/field_steps.h"
+#include "cuda/query/patch_steps.h"
+#include "cuda/query/separation_steps.h"
+#include "cuda/query/triangle_steps.h"
+#include "support/host_batch.h"
+#include "support/host_patches.h"
+#include "support/host_separations.h"
+#include "support/host_team.h"
+#include "support/patch_columns.h"
+#include "support/separation_columns.h"
+
+namespace ist::testing {
+
+std::vector<Penetration> HostBatch::run(const std::vector<BatchPair>& pairs, Measure measure,
+                                        unsigned seed, std::uint32_t pair_budget) {
+  const std::size_t n = pairs.size();
+  const PairColumns columns(pairs);
+  BatchColumns to = BatchColumns::unwritten(n);
+  std::vector<std::uint32_t> list(gpu::kSizes * n), detailed(n);
+  std::vector<gpu::SplitPair> splits(room_);
+  std::vector<gpu::PairTask> tasks(room_);
+  std::vector<std::uint32_t> posted(room_);
+  std::vector<PairPlace> places(room_);
+  std::vector<gpu::LensTotals> totals(2 * std::size_t{room_});
+  std::vector<std::uint32_t> entries_a(room_), entries_b(room_);
+  counters = {};
+  const gpu::SolidPairs asked = solids_.asked(columns.pairs(), measure, to.answers());
+  const gpu::BatchArrays batch = {asked,
+                                  pair_budget,
+                                  true,
+                                  &counters,
+                                  list.data(),
+                                  detailed.data(),
+                                  splits.data(),
+                                  tasks.data(),
+                                  posted.data(),
+                                  places.data(),
+                                  totals.data(),
+                                  entries_a.data(),
+                                  entries_b.data(),
+                                  room_,
+                                  room_,
+                                  room_,
+                                  most_alone,
+                                  task_weight,
+                                  by_size ? static_cast<std::uint32_t>(n) : 0};
+  for (std::uint32_t i = 0; i < n; ++i) {
+    std::uint32_t meet = 0;
+    const gpu::PairUse use = gpu::sift_pair(batch, i, meet);
+    if (use == gpu::PairUse::summed) gpu::list_pair(batch, i, meet, counters.listed++);
+    if (use == gpu::PairUse::detailed) detailed[counters.detailed++] = i;
+  }
+  const auto details = std::make_unique<gpu::DetailMemory>();
+  for (std::uint32_t k = 0; k < counters.detailed; ++k)
+    by_team(seed, [&](const auto& team) { gpu::sum_details(team, batch, detailed[k], *details); });
+  sum(batch, seed);
+  for (const std::uint32_t flag : posted)
+    if (flag != 0) throw std::logic_error("a task was not taken");
+  run_fields(asked, seed);
+  return to.rows();
+}
+
+void HostBatch::cut_for(std::size_t most_pairs) {
+  gpu::BatchArrays arrays;
+  arrays.cut_for(most_pairs);
+  most_alone = arrays.most_alone;
+  task_weight = arrays.task_weight;
+  by_size = arrays.size_room > 0;
+}
+
+void HostBatch::sum(const gpu::BatchArrays& batch, unsigned seed) {
+  const auto memory = std::make_unique<gpu::WorkMemory>();
+  memory->is_task = false;
+  constexpr std::uint32_t kMost = 1 + gpu::kPlacedAhead;
+  for (std::uint32_t k = 0; k < counters.listed; k += kMost)
+    by_team(seed, [&](const auto& team) {
+      gpu::place_pairs(team, batch, k, std::min(kMost, counters.listed - k), *memory);
+      for (;;) {
+        if (team.lane() == 0) memory->hand_out = memory->at % 4 != 0;
+        gpu::do_work(team, batch, *memory);
+        if (memory->waiting == 0) return;
+        team.sync();
+        gpu::take_placed(team, *memory);
+      }
+    });
+  memory->is_task = true;
+  for (std::uint32_t k = 0; gpu::look_for_task(batch, k, 0) != 0; ++k) {
+    memory->at = k;
+    by_team(seed, [&](const auto& team) {
+      if (gpu::take_task(team, batch, *memory)) gpu::do_work(team, batch, *memory);
+    });
+  }
+}
+
+void HostBatch::run_fields(const gpu::SolidPairs& asked, unsigned seed) {
+  const std::size_t n = asked.pairs.count;
+  std::vector<std::uint32_t> lists[2] = {std::vector<std::uint32_t>(n),
+                                         std::vector<std::uint32_t>(n)};
+  field_counters = {};
+  rounds = 0;
+  const gpu::FieldBatch batch = {
+      asked, &field_counters, {lists[0].data(), lists[1].data()}, triangle_room()};
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const int group = gpu::sift_field_pair(batch, i);
+    if (group >= 0) gpu::listed_pair(batch, group, field_counters.listed[group]++) = i;
+  }
+  const auto memory = std::make_unique<gpu::WalkMemory>();
+  for (std::uint32_t k = 0; k < field_counters.listed[gpu::kSmooth]; ++k)
+    by_team(seed, [&](const auto& team) {
+      gpu::sum_field_pair(team, batch, gpu::listed_pair(batch, gpu::kSmooth, k), *memory);
+    });
+  sum_rounds<gpu::FacetKind>(batch, seed);
+  sum_rounds<gpu::MeshKind>(batch, seed);
+}
+
+gpu::TriangleRoom HostBatch::triangle_room() {
+  queries_.resize(query_room);
+  parts_.resize(part_room);
+  words_.resize(word_room);
+  return {queries_.data(), parts_.data(), words_.data(), query_room, part_room, word_room};
+}
+
+template <class Kind>
+void HostBatch::sum_rounds(const gpu::FieldBatch& batch, unsigned seed) {
+  const auto walks = std::make_unique<typename Kind::WalkMemory>();
+  const auto sums = std::make_unique<gpu::SumMemory<Kind>>();
+  const auto whole = std::make_unique<gpu::WholeMemory<Kind>>();
+  const std::uint32_t listed = field_counters.listed[Kind::kGroup];
+  std::uint32_t first = 0;
+  for (std::uint32_t n = 0; n < most_rounds && first < listed; ++n, ++rounds) {
+    gpu::TriangleRound& round = gpu::round_of<Kind>(batch, n);
+    round = {first, 0, 0, 0, 0};
+    const std::uint32_t count = gpu::pairs_from<Kind>(batch, first);
+    for (std::uint32_t k = 0; k < count; ++k) gpu::place_query<Kind>(batch, k, first + k);
+    for (; round.walked < count && gpu::goes_on(batch, round, 1); ++round.walked)
+      by_team(seed, [&](const auto& team) {
+        gpu::walk_query<Kind>(team, batch, round, round.walked, *walks);
+      });
+    for (std::uint32_t k = 0; k < std::min(round.parts, part_room); ++k)
+      by_team(seed, [&](const auto& team) { gpu::sum_part<Kind>(team, batch, k, *sums); });
+    for (std::uint32_t k = 0; k < round.walked; ++k) gpu::answer_query(batch, k);
+    if (round.walked == 0) throw std::logic_error("a round has no room for a pair");
+    first = gpu::end_of<Kind>(batch, round);
+  }
+  const std::uint32_t large = field_counters.large[Kind::kGroup];
+  for (std::uint32_t k = 0; k < large + (listed - first); ++k) {
+    const std::uint32_t at = k < large ? k : first + (k - large);
+    by_team(seed, [&](const auto& team) {
+      gpu::sum_whole_query<Kind>(team, batch, gpu::listed_pair(batch, Kind::kGroup, at), *whole);
+    });
+  }
+}
+
+std::vector<PatchedPair> HostPatches::run(const std::vector<BatchPair>& pairs, Measure measure,
+                                          std::uint32_t most, unsigned seed) {
+  const std::size_t n = pairs.size();
+  const PairColumns columns(pairs);
+  BatchColumns wholes = BatchColumns::unwritten(n);
+  constexpr double kUnwritten = -7;
+  const std::vector<double> numbers(n * most, kUnwritten), vectors(3 * n * most, kUnwritten);
+  PatchColumns to{most,
+                  std::vector<std::uint32_t>(n, 99),
+                  std::vector<std::uint64_t>(n * most),
+                  vectors,
+                  vectors,
+                  numbers,
+                  numbers,
+                  numbers,
+                  vectors,
+                  vectors,
+                  vectors,
+                  numbers};
+  // What teams that come before left in their room must not matter.
+  std::vector<std::byte> room(gpu::PatchRoom::bytes(solids_.most_bins()), std::byte{0xA5});
+  gpu::PatchArrays batch = {};
+  static_cast<gpu::SolidPairs&>(batch.pairs) =
+      solids_.asked(columns.pairs(), measure, wholes.answers());
+  batch.patches = {most,
+                   to.count.data(),
+                   to.id.data(),
+                   to.centroid.data(),
+                   to.normal.data(),
+                   to.area.data(),
+                   to.depth.data(),
+                   to.volume.data(),
+                   to.force.data(),
+                   to.torque.data(),
+                   to.point.data(),
+                   to.twist.data()};
+  batch.rooms = room.data();
+  batch.most_bins = solids_.most_bins();
+  const auto memory = std::make_unique<gpu::PatchMemory>();
+  for (std::uint32_t i = 0; i < n; ++i)
+    if (gpu::sift_patches(batch, i))
+      by_team(seed,
+              [&](const auto& team) { gpu::patch_pair(team, batch, i, batch.room(0), *memory); });
+  return to.rows(wholes.rows());
+}
+
+std::vector<Separation> HostSeparations::run(const std::vector<BatchPair>& pairs, unsigned seed,
+                                             std::uint32_t max_visits) {
+  const std::size_t n = pairs.size();
+  const PairColumns columns(pairs);
+  constexpr double kUnwritten = -7;
+  const std::vector<double> numbers(n, kUnwritten), vectors(3 * n, kUnwritten);
+  SeparationColumns to{numbers,
+                       numbers,
+                       numbers,
+                       vectors,
+                       vectors,
+                       vectors,
+                       std::vector<QueryStatus>(n),
+                       std::vector<std::uint32_t>(n),
+                       std::vector<std::uint32_t>(n)};
+  std::vector<std::uint32_t> lists[2] = {std::vector<std::uint32_t>(n),
+                                         std::vector<std::uint32_t>(n)};
+  std::vector<gpu::SplitPair> splits(room_);
+  std::vector<gpu::PairTask> tasks(room_);
+  std::vector<gpu::GapTotals> totals(2 * std::size_t{room_});
+  std::vector<std::uint32_t> entries_a(room_), entries_b(room_);
+  std::vector<double> entries_gap(room_), entries_cover(room_);
+  counters[0] = counters[1] = {};
+  gpu::SeparationArrays batch = {};
+  static_cast<gpu::SolidPairs&>(batch.pairs) = solids_.asked(columns.pairs(), Measure::inner, {});
+  batch.counters = counters;
+  for (int kind = 0; kind < 2; ++kind) batch.list[kind] = lists[kind].data();
+  batch.pairs.splits = splits.data();
+  batch.pairs.tasks = tasks.data();
+  batch.pairs.split_room = batch.pairs.task_room = batch.pairs.entry_room = room_;
+  batch.answers = {to.distance.data(), to.distance_min.data(), to.distance_max.data(),
+                   to.point_a.data(),  to.point_b.data(),      to.normal.data(),
+                   to.status.data(),   to.visits.data(),       to.spheres.data()};
+  batch.max_visits = max_visits == 0 ? ~0u : max_visits;
+  batch.totals = totals.data();
+  batch.entries = {entries_a.data(), entries_b.data(), entries_gap.data(), entries_cover.data()};
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const int list = gpu::sift_separation(batch, i);
+    if (list >= 0) lists[list][counters[list].listed++] = i;
+  }
+  separate<float>(batch, 0, seed);
+  separate<double>(batch, 1, seed);
+  return to.rows();
+}
+
+template <class Real>
+void HostSeparations::separate(const gpu::SeparationArrays& batch, int kind, unsigned seed) {
+  const auto memory = std::make_unique<gpu::GapMemory<Real>>();
+  for (std::uint32_t k = 0; k < counters[kind].listed; ++k)
+    by_team(seed, [&](const auto& team) {
+      gpu::separate_pair<std::decay_t<decltype(team)>, Real>(team, batch, batch.list[kind][k],
+                                                             *memory);
+    });
+  for (std::uint32_t k = 0; k < std::min(counters[kind].tasks, room_); ++k)
+    by_team(seed, [&](const auto& team) {
+      gpu::separate_task<std::decay_t<decltype(team)>, Real>(team, batch, k, *memory);
+    });
+}
+
+}  // namespace ist::testing
